@@ -1,0 +1,246 @@
+//! The main road: recording in, noise model out. Reads like the paper's section II.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use serde_json::{Map, Value, json};
+use sha2::{Digest, Sha256};
+
+use crate::error::{Error, Result};
+use crate::io::sha256_hex;
+use crate::measure::{
+    MeasureOptions, Planes, SigmaKind, SigmaTable, ViewMeasurement, Workbench, measure_view,
+};
+use crate::model::{
+    FitSummary, Form, HeldOut, NoiseModel, Provenance, SigmaFit, compare_forms, fit,
+};
+use crate::view::{Recording, RecordingFile};
+
+/// Settings of a calibration.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct CalibrateOptions {
+    pub measure: MeasureOptions,
+    pub kind: SigmaKind,
+    /// The form to fit; `None` takes the one that predicts left-out distances best.
+    pub form: Option<Form>,
+}
+
+/// A view that was not used, and why.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Excluded {
+    pub view: String,
+    pub reason: String,
+}
+
+/// All views of a recording, measured.
+#[derive(Debug, Clone)]
+pub struct Measurements {
+    pub views: Vec<ViewMeasurement>,
+    pub excluded: Vec<Excluded>,
+}
+
+/// A calibrated sensor.
+#[derive(Debug, Clone)]
+pub struct Calibration {
+    pub table: SigmaTable,
+    pub fit: SigmaFit,
+    /// How well each form predicts distances left out, best first; empty with too few distances.
+    pub comparison: Vec<HeldOut>,
+    pub model: NoiseModel,
+    pub warnings: Vec<String>,
+}
+
+/// Told about progress: views done, views in all.
+pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
+
+/// Measure every view. Views without a plane are excluded and told; the others do not suffer.
+///
+/// # Errors
+/// When no view can be measured at all; the message gives the first reason.
+pub fn measure(
+    recording: &Recording,
+    options: &MeasureOptions,
+    progress: Progress<'_>,
+) -> Result<Measurements> {
+    let bench = Workbench::new(&recording.sensor, *options);
+    let done = AtomicUsize::new(0);
+    let total = recording.views.len();
+    let results: Vec<_> = recording
+        .views
+        .par_iter()
+        .map(|view| {
+            let result = measure_view(view, &bench);
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+            result
+        })
+        .collect();
+    let mut measurements = Measurements { views: Vec::new(), excluded: Vec::new() };
+    for (view, result) in recording.views.iter().zip(results) {
+        match result {
+            Ok(m) => measurements.views.push(m),
+            Err(e) => measurements
+                .excluded
+                .push(Excluded { view: view.name.clone(), reason: e.to_string() }),
+        }
+    }
+    if measurements.views.is_empty() {
+        let first = measurements.excluded.first().map_or("there is no view", |e| &e.reason);
+        return Err(Error::recording(
+            &recording.root,
+            format!("no view of {total} can be used; the first: {first}"),
+            "see the reasons, or give each target's region in view.json",
+        ));
+    }
+    Ok(measurements)
+}
+
+/// Fit the noise model to the measured views.
+///
+/// # Errors
+/// When the views are too few or too alike for the form.
+pub fn model_of(
+    recording: &Recording,
+    measurements: &Measurements,
+    options: &CalibrateOptions,
+) -> Result<Calibration> {
+    let table = SigmaTable::of(&measurements.views, options.kind);
+    if table.rows.is_empty() {
+        return Err(Error::NotEnough {
+            what: format!("no view gives a {}", options.kind.words()),
+            remedy: "a temporal sigma needs views of at least two frames".into(),
+        });
+    }
+    let (fit, comparison) = fit_chosen(&table, options.form)?;
+    let warnings = warnings(recording, measurements, &fit);
+    let mut provenance = Provenance::now(Some(options.measure.seed.0));
+    provenance.options = describe(options, fit.form);
+    provenance.sha256 = hashes(recording, measurements);
+    let model = noise_model(
+        Some(RecordingFile::of(&recording.sensor)),
+        &fit,
+        &comparison,
+        options.kind,
+        provenance,
+    );
+    Ok(Calibration { table, fit, comparison, model, warnings })
+}
+
+/// Fit a bare table.
+///
+/// # Errors
+/// As [`model_of`].
+pub fn model_of_table(
+    table: &SigmaTable,
+    form: Option<Form>,
+    source: &Path,
+) -> Result<Calibration> {
+    let (fit, comparison) = fit_chosen(table, form)?;
+    let mut provenance = Provenance::now(None);
+    provenance.options.insert("form".into(), json!(fit.form.id()));
+    let bytes = std::fs::read(source).map_err(|e| Error::read(source, e))?;
+    let name = source.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    provenance.sha256.insert(name, json!(sha256_hex(&bytes)));
+    let warnings = fit.remarks.clone();
+    let model = noise_model(None, &fit, &comparison, SigmaKind::Spatial, provenance);
+    Ok(Calibration { table: table.clone(), fit, comparison, model, warnings })
+}
+
+fn fit_chosen(table: &SigmaTable, form: Option<Form>) -> Result<(SigmaFit, Vec<HeldOut>)> {
+    let comparison = compare_forms(table);
+    let form = form.or(comparison.first().map(|h| h.form)).unwrap_or(Form::Paper);
+    Ok((fit(table, form)?, comparison))
+}
+
+fn noise_model(
+    sensor: Option<RecordingFile>,
+    fit: &SigmaFit,
+    comparison: &[HeldOut],
+    kind: SigmaKind,
+    provenance: Provenance,
+) -> NoiseModel {
+    let residual = if kind == SigmaKind::Paper { "perpendicular" } else { "axial" };
+    NoiseModel {
+        sensor,
+        sigma: fit.model(),
+        effects: Vec::new(),
+        fit: FitSummary {
+            views: fit.views,
+            samples: fit.rows,
+            rmse_m: fit.rmse_m,
+            r2: fit.r2,
+            heldout: comparison.iter().find(|h| h.form == fit.form).map(|h| h.rmse_relative),
+            degrees_of_freedom: fit.degrees_of_freedom,
+            residual: residual.into(),
+            remarks: fit.remarks.clone(),
+        },
+        provenance,
+    }
+}
+
+fn describe(options: &CalibrateOptions, form: Form) -> Map<String, Value> {
+    let planes = match options.measure.planes {
+        Planes::PerView => "view",
+        Planes::PerFrame => "frame",
+    };
+    let value = json!({
+        "form": form.id(),
+        "form_chosen_by": if options.form.is_some() { "user" } else { "held-out distances" },
+        "sigma": options.kind.words(),
+        "planes": planes,
+        "ransac_threshold_m": options.measure.ransac_threshold_m,
+        "ransac_iterations": options.measure.ransac_iterations,
+    });
+    match value {
+        Value::Object(map) => map,
+        _ => Map::new(),
+    }
+}
+
+/// Hash of the description files, and of every view's frames.
+fn hashes(recording: &Recording, measurements: &Measurements) -> Map<String, Value> {
+    let mut map = Map::new();
+    let mut described = Sha256::new();
+    let mut files: Vec<&PathBuf> = recording.described_by.iter().collect();
+    files.sort();
+    for path in files {
+        described.update(std::fs::read(path).unwrap_or_default());
+    }
+    let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02x}")).collect::<String>();
+    map.insert("description".into(), json!(hex(&described.finalize())));
+    let mut frames = Sha256::new();
+    for view in &measurements.views {
+        frames.update(view.name.as_bytes());
+        frames.update(view.digest);
+    }
+    map.insert("frames".into(), json!(hex(&frames.finalize())));
+    map
+}
+
+/// What a person should know before trusting the model; the most important first.
+fn warnings(recording: &Recording, measurements: &Measurements, fit: &SigmaFit) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for e in &measurements.excluded {
+        warnings.push(format!("view {} was left out: {}", e.view, e.reason));
+    }
+    let total = measurements.views.len();
+    let smooth = measurements.views.iter().filter(|v| v.correlation.persists).count();
+    if smooth > 0 {
+        warnings.push(format!(
+            "in {smooth} of {total} views the residual is smooth over more than 40 px: sigma there holds a \
+             systematic error (lens, bands; see the pictures), and frames do not average it out"
+        ));
+    }
+    let single = measurements.views.iter().filter(|v| v.frames < 2).count();
+    if single > 0 {
+        warnings.push(format!(
+            "{single} of {total} views have a single frame: no temporal sigma from them"
+        ));
+    }
+    warnings.extend(fit.remarks.iter().cloned());
+    for view in &measurements.views {
+        warnings.extend(view.notes.iter().map(|note| format!("view {}: {note}", view.name)));
+    }
+    warnings.extend(recording.remarks.iter().cloned());
+    warnings
+}

@@ -1,0 +1,80 @@
+//! One error type for the library: what went wrong, where, and what to do about it.
+
+use std::path::{Path, PathBuf};
+
+/// Every failure the library reports. `Display` is one line that a person can act on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The operating system refused to read or write.
+    #[error("{}: {source}; {remedy}", path.display())]
+    Io { path: PathBuf, source: std::io::Error, remedy: &'static str },
+    /// A file that is not the JSON it should be.
+    #[error("{}{}: {what}; {remedy}", path.display(), at_line(*line))]
+    Json {
+        path: PathBuf,
+        /// 1-based; 0 when the whole document is meant.
+        line: usize,
+        what: String,
+        remedy: &'static str,
+    },
+    /// A line of a text file (`depth.txt`, `INDEX.txt`, a table) that cannot be understood.
+    #[error("{}{}: {what}; {remedy}", path.display(), at_line(*line))]
+    Text { path: PathBuf, line: usize, what: String, remedy: &'static str },
+    /// An image that is damaged or not of the promised kind.
+    #[error("{}: {what}; {remedy}", path.display())]
+    Image { path: PathBuf, what: String, remedy: &'static str },
+    /// A folder that holds no recording, or one that contradicts itself.
+    #[error("{}: {what}; {remedy}", path.display())]
+    Recording { path: PathBuf, what: String, remedy: &'static str },
+    /// A view in which no target plane can be found.
+    #[error("view {view}: {what}; {remedy}")]
+    View { view: String, what: String, remedy: &'static str },
+    /// Too little, or too uniform, to fit what was asked for.
+    #[error("{what}; {remedy}")]
+    NotEnough { what: String, remedy: String },
+    /// A model file that is foreign, damaged or newer than this program.
+    #[error("{}: {what}; {remedy}", path.display())]
+    ModelFile { path: PathBuf, what: String, remedy: &'static str },
+    /// An option or argument outside its range.
+    #[error("{what}; {remedy}")]
+    Argument { what: String, remedy: &'static str },
+    /// A picture or page could not be drawn.
+    #[error("{what}: drawing failed: {why}")]
+    Drawing { what: &'static str, why: String },
+    /// The numerical solver gave up; the data are usually the reason.
+    #[error("fit: {what}; {remedy}")]
+    Solver { what: String, remedy: &'static str },
+}
+
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+fn at_line(line: usize) -> String {
+    if line == 0 { String::new() } else { format!(", line {line}") }
+}
+
+impl Error {
+    pub(crate) fn read(path: &Path, source: std::io::Error) -> Self {
+        Error::Io {
+            path: path.to_path_buf(),
+            source,
+            remedy: "check that the path is right and readable",
+        }
+    }
+
+    pub(crate) fn write(path: &Path, source: std::io::Error) -> Self {
+        Error::Io {
+            path: path.to_path_buf(),
+            source,
+            remedy: "choose a folder that can be written with -o",
+        }
+    }
+
+    pub(crate) fn recording(path: &Path, what: impl Into<String>, remedy: &'static str) -> Self {
+        Error::Recording { path: path.to_path_buf(), what: what.into(), remedy }
+    }
+
+    pub(crate) fn image(path: &Path, what: impl Into<String>, remedy: &'static str) -> Self {
+        Error::Image { path: path.to_path_buf(), what: what.into(), remedy }
+    }
+}

@@ -1,0 +1,153 @@
+//! A depth frame as stored, and how its words become metres.
+
+use serde::{Deserialize, Serialize};
+
+/// One depth image: 16-bit words, row-major, still in the sensor's own code.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    pub width: usize,
+    pub height: usize,
+    pub words: Vec<u16>,
+}
+
+/// How a stored word becomes a depth along the optical axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DepthCode {
+    /// z = word / units_per_metre (5000 in the TUM layout, 1000 for OpenNI and ROS).
+    Metric { units_per_metre: f64, invalid: u16 },
+    /// z = 1 / (offset + slope * word): the 11-bit words of a Kinect v1.
+    Disparity { offset: f64, slope: f64, invalid: u16 },
+}
+
+/// The JSON face of [`DepthCode::Disparity`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RawDisparity {
+    pub offset: f64,
+    pub slope: f64,
+    #[serde(default = "default_invalid_disparity")]
+    pub invalid: u16,
+}
+
+fn default_invalid_disparity() -> u16 {
+    KINECT_NO_MEASUREMENT
+}
+
+/// The word a Kinect v1 writes where it saw no pattern (11 bits, all ones).
+pub const KINECT_NO_MEASUREMENT: u16 = 2047;
+
+impl DepthCode {
+    /// Depth in metres, or `None` for the word that means "no measurement" and for words whose
+    /// depth is not a positive finite number.
+    pub fn metres(&self, word: u16) -> Option<f64> {
+        let z = match *self {
+            DepthCode::Metric { units_per_metre, invalid } => {
+                if word == invalid || word == 0 {
+                    return None;
+                }
+                f64::from(word) / units_per_metre
+            }
+            DepthCode::Disparity { offset, slope, invalid } => {
+                if word == invalid {
+                    return None;
+                }
+                1.0 / (offset + slope * f64::from(word))
+            }
+        };
+        (z.is_finite() && z > 0.0 && z < FARTHEST_M).then_some(z)
+    }
+
+    /// The word nearest to depth `z` (m), or the word for "no measurement" when none fits.
+    pub fn word(&self, z: f64) -> u16 {
+        let (exact, invalid, top) = match *self {
+            DepthCode::Metric { units_per_metre, invalid } => {
+                (z * units_per_metre, invalid, 65535.0)
+            }
+            DepthCode::Disparity { offset, slope, invalid } => {
+                ((1.0 / z - offset) / slope, invalid, f64::from(KINECT_NO_MEASUREMENT))
+            }
+        };
+        let rounded = exact.round();
+        if z > 0.0 && rounded > 0.0 && rounded < top { rounded as u16 } else { invalid }
+    }
+
+    /// One step of the code at depth `z`, in inverse depth (1/m).
+    pub fn step_inverse(&self, z: f64) -> f64 {
+        match *self {
+            DepthCode::Metric { units_per_metre, .. } => 1.0 / (units_per_metre * z * z),
+            DepthCode::Disparity { slope, .. } => slope.abs(),
+        }
+    }
+
+    /// Depth in metres of each of the 65,536 words; NaN where there is no measurement.
+    pub fn table(&self) -> DepthTable {
+        let metres =
+            (0..=u16::MAX).map(|word| self.metres(word).map_or(f32::NAN, |z| z as f32)).collect();
+        DepthTable { metres }
+    }
+
+    pub fn fault(&self) -> Option<String> {
+        match *self {
+            DepthCode::Metric { units_per_metre, .. } => (!(units_per_metre.is_finite()
+                && units_per_metre > 0.0))
+                .then(|| format!("units_per_metre = {units_per_metre} must be positive")),
+            DepthCode::Disparity { offset, slope, .. } => (!offset.is_finite()
+                || !slope.is_finite()
+                || slope == 0.0)
+                .then(|| format!("raw_disparity offset = {offset}, slope = {slope} give no depth")),
+        }
+    }
+}
+
+/// Farther than any sensor of this kind can see: 1/(c0 + c1 raw) has a pole, and words just
+/// before it would otherwise count as walls a kilometre away.
+const FARTHEST_M: f64 = 100.0;
+
+/// Look-up from word to depth.
+#[derive(Debug, Clone)]
+pub struct DepthTable {
+    metres: Vec<f32>,
+}
+
+impl DepthTable {
+    /// Depth along the optical axis, m; NaN where there is no measurement.
+    #[inline]
+    pub fn metres(&self, word: u16) -> f32 {
+        self.metres[usize::from(word)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KINECT: DepthCode =
+        DepthCode::Disparity { offset: 3.3309495161, slope: -0.0030711016, invalid: 2047 };
+
+    #[test]
+    fn words_survive_a_round_trip_in_both_codes() {
+        let tum = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
+        for code in [KINECT, tum] {
+            for word in 1..1080u16 {
+                if let Some(z) = code.metres(word) {
+                    assert_eq!(code.word(z), word, "{code:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn beyond_the_pole_of_the_disparity_code_there_is_no_depth() {
+        assert_eq!(KINECT.metres(2047), None);
+        assert_eq!(KINECT.metres(1100), None, "negative depth");
+        assert!(KINECT.metres(1084).is_none(), "beyond 100 m");
+        assert!((KINECT.metres(600).unwrap() - 0.6721).abs() < 1e-3);
+    }
+
+    #[test]
+    fn no_depth_becomes_no_measurement() {
+        assert_eq!(KINECT.word(f64::NAN), 2047);
+        assert_eq!(KINECT.word(-1.0), 2047);
+        let tum = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
+        assert_eq!(tum.word(20.0), 0, "does not fit 16 bits");
+    }
+}

@@ -1,0 +1,88 @@
+//! A fakenect dump: INDEX.txt and d-<time>-<stamp>.pgm, raw 11-bit words of a Kinect v1.
+
+use std::path::Path;
+
+use super::stills::{Film, split};
+use super::{Assumed, assumed_sensor, images};
+use crate::error::{Error, Result};
+use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
+use crate::view::{FrameRef, Recording};
+
+pub(super) const INDEX: &str = "INDEX.txt";
+/// z = 1/(3.33095 - 0.0030711 raw): the fit OpenKinect users have shared since 2010.
+const OPENKINECT: DepthCode = DepthCode::Disparity {
+    offset: 3.330_949_516_1,
+    slope: -0.003_071_101_6,
+    invalid: KINECT_NO_MEASUREMENT,
+};
+/// Focal length of a Kinect v1 infrared camera to a percent, and the image centre.
+const KINECT_INTRINSICS: [f64; 4] = [585.0, 585.0, 319.5, 239.5];
+
+pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Recording> {
+    let index = root.join(INDEX);
+    let text = std::fs::read_to_string(&index).map_err(|e| Error::read(&index, e))?;
+    let mut remarks = Vec::new();
+    let mut frames = Vec::new();
+    for (i, line) in text.lines().enumerate() {
+        let name = line.trim();
+        if !name.starts_with("d-") {
+            continue;
+        }
+        let timestamp = stamp(name).ok_or_else(|| Error::Text {
+            path: index.clone(),
+            line: i + 1,
+            what: format!("\"{}\" is not d-<time>-<stamp>.pgm", super::list::shorten(name)),
+            remedy: "record the dump with fakenect-record",
+        })?;
+        let path = root.join(name);
+        if path.is_file() {
+            frames.push(FrameRef { timestamp, path });
+        } else {
+            remarks
+                .push(format!("INDEX.txt line {} names {name}, which is missing; left out", i + 1));
+        }
+    }
+    let first = frames.first().ok_or_else(|| {
+        Error::recording(
+            &index,
+            "no depth frame (d-*.pgm) in it",
+            "record the dump with fakenect-record",
+        )
+    })?;
+    let size = images::size_of(&first.path)?;
+    if assumed.intrinsics.is_none() || assumed.code.is_none() {
+        remarks.push(
+            "a fakenect dump carries no calibration: OpenKinect's depth formula and f = 585 px assumed; \
+             give --intrinsics and --raw-disparity"
+                .into(),
+        );
+    }
+    let sensor = assumed_sensor(
+        "Kinect for Xbox 360 (fakenect dump)",
+        size,
+        assumed.intrinsics.unwrap_or(KINECT_INTRINSICS),
+        assumed.code.unwrap_or(OPENKINECT),
+        &Assumed { baseline_m: assumed.baseline_m.or(Some(KINECT_BASELINE_M)), ..assumed.clone() },
+    )?;
+    let views = split(frames, &sensor, Film::Video, &mut remarks)?;
+    Ok(Recording { root: root.to_path_buf(), sensor, views, remarks, described_by: vec![index] })
+}
+
+/// Projector to camera in every Kinect v1 (LDDIS of the OpenNI device properties: 7.5 cm).
+const KINECT_BASELINE_M: f64 = 0.075;
+
+/// Host time in seconds: the first number of d-<time>-<stamp>.pgm.
+fn stamp(name: &str) -> Option<f64> {
+    let rest = name.strip_prefix("d-")?.strip_suffix(".pgm")?;
+    let (time, _) = rest.split_once('-')?;
+    time.parse().ok().filter(|t: &f64| t.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_stamp_is_the_first_number() {
+        assert_eq!(super::stamp("d-1316653530.207391-4127230476.pgm"), Some(1316653530.207391));
+        assert_eq!(super::stamp("d-x-1.pgm"), None);
+    }
+}

@@ -1,0 +1,59 @@
+//! A plain folder of 16-bit PNGs, in name order; everything else must be told by options.
+
+use std::path::{Path, PathBuf};
+
+use super::stills::{Film, split};
+use super::{Assumed, assumed_sensor, images};
+use crate::error::{Error, Result};
+use crate::frame::DepthCode;
+use crate::view::{FrameRef, Recording};
+
+/// OpenNI and ROS write millimetres.
+const MILLIMETRES: DepthCode = DepthCode::Metric { units_per_metre: 1000.0, invalid: 0 };
+
+pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Recording> {
+    let files = png_files(root)?;
+    let Some(first) = files.first() else {
+        return Err(Error::recording(
+            root,
+            "neither recording.json, depth.txt, INDEX.txt nor a PNG is in this folder",
+            "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs",
+        ));
+    };
+    let Some(intrinsics) = assumed.intrinsics else {
+        return Err(Error::recording(
+            root,
+            "a plain folder of PNGs carries no intrinsics",
+            "give --intrinsics fx,fy,cx,cy (and --units-per-metre or --raw-disparity)",
+        ));
+    };
+    let size = images::size_of(first)?;
+    let mut remarks = Vec::new();
+    let code = assumed.code.unwrap_or_else(|| {
+        remarks.push(
+            "depth taken as millimetres; give --units-per-metre or --raw-disparity if not".into(),
+        );
+        MILLIMETRES
+    });
+    let sensor = assumed_sensor("depth images", size, intrinsics, code, assumed)?;
+    let frames = files
+        .into_iter()
+        .enumerate()
+        .map(|(i, path)| FrameRef { timestamp: i as f64 * NOMINAL_INTERVAL_S, path })
+        .collect();
+    let views = split(frames, &sensor, Film::Captures, &mut remarks)?;
+    Ok(Recording { root: root.to_path_buf(), sensor, views, remarks, described_by: Vec::new() })
+}
+
+/// 30 Hz: a plain folder has no clock, and every sensor of this kind runs at it.
+const NOMINAL_INTERVAL_S: f64 = 1.0 / 30.0;
+
+fn png_files(root: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(root).map_err(|e| Error::read(root, e))?;
+    let mut files: Vec<PathBuf> = entries
+        .filter_map(|entry| entry.ok().map(|e| e.path()))
+        .filter(|p| p.is_file() && p.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")))
+        .collect();
+    files.sort();
+    Ok(files)
+}

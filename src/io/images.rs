@@ -1,0 +1,225 @@
+//! Depth and infrared images: PNG in both, PGM as fakenect writes it.
+
+use std::fs;
+use std::io::Cursor;
+use std::path::Path;
+
+use png::{BitDepth, ColorType};
+use sha2::{Digest, Sha256};
+
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+
+/// Reads frames of one fixed size and keeps the hash of all bytes it has read.
+#[derive(Debug, Clone)]
+pub struct FrameSource {
+    width: usize,
+    height: usize,
+    hash: Sha256,
+}
+
+/// What to do about an image that is not what it should be.
+const REMEDY_DEPTH: &str = "depth must be a 16-bit single-channel PNG of the recording's size";
+
+impl FrameSource {
+    pub fn new(width: usize, height: usize) -> Self {
+        FrameSource { width, height, hash: Sha256::new() }
+    }
+
+    /// Read one depth frame.
+    ///
+    /// # Errors
+    /// When the file is missing, truncated, of another kind (8 bit, colour) or of another size.
+    pub fn read(&mut self, path: &Path) -> Result<Frame> {
+        let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
+        self.hash.update(&bytes);
+        let frame = decode(path, &bytes)?;
+        if (frame.width, frame.height) != (self.width, self.height) {
+            return Err(Error::image(
+                path,
+                format!(
+                    "the image is {} x {} px, the recording says {} x {}",
+                    frame.width, frame.height, self.width, self.height
+                ),
+                "correct width and height in recording.json, or take the image out",
+            ));
+        }
+        Ok(frame)
+    }
+
+    /// SHA-256 over every byte read so far, in the order it was read.
+    pub fn digest(self) -> [u8; 32] {
+        self.hash.finalize().into()
+    }
+}
+
+/// Width and height of an image without decoding it all.
+pub(super) fn size_of(path: &Path) -> Result<(usize, usize)> {
+    let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
+    let frame = decode(path, &bytes)?;
+    Ok((frame.width, frame.height))
+}
+
+fn decode(path: &Path, bytes: &[u8]) -> Result<Frame> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("pgm")) {
+        decode_fakenect_pgm(path, bytes)
+    } else {
+        decode_png16(path, bytes)
+    }
+}
+
+fn decode_png16(path: &Path, bytes: &[u8]) -> Result<Frame> {
+    let damaged = |e: png::DecodingError| {
+        Error::image(path, format!("not a whole PNG ({e})"), "the file is damaged; record it again")
+    };
+    let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().map_err(damaged)?;
+    let info = reader.info();
+    let (width, height) = (info.width as usize, info.height as usize);
+    if info.bit_depth != BitDepth::Sixteen || info.color_type != ColorType::Grayscale {
+        return Err(Error::image(
+            path,
+            format!("{} bit {:?} PNG", info.bit_depth as u8, info.color_type),
+            REMEDY_DEPTH,
+        ));
+    }
+    let size = reader.output_buffer_size().unwrap_or(0);
+    let mut buffer = vec![0; size];
+    reader.next_frame(&mut buffer).map_err(damaged)?;
+    let words = buffer.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect();
+    Ok(Frame { width, height, words })
+}
+
+/// `P5 w h 65535` and little-endian words, against the PGM standard: fakenect writes memory as is.
+fn decode_fakenect_pgm(path: &Path, bytes: &[u8]) -> Result<Frame> {
+    let bad = |what: &str| Error::image(path, what, "expected a fakenect d-*.pgm: P5, size, 65535");
+    let (header, data) = pgm_header(bytes).ok_or_else(|| bad("no P5 header"))?;
+    let [width, height, top] = header;
+    if top != 65535 {
+        return Err(bad("the greatest value is not 65535"));
+    }
+    if data.len() < 2 * width * height {
+        return Err(bad("the image is cut short"));
+    }
+    let words = data[..2 * width * height]
+        .chunks_exact(2)
+        .map(|b| u16::from_le_bytes([b[0], b[1]]))
+        .collect();
+    Ok(Frame { width, height, words })
+}
+
+/// Width, height and greatest value, and the bytes after the single white space that ends them.
+fn pgm_header(bytes: &[u8]) -> Option<([usize; 3], &[u8])> {
+    let mut rest = bytes.strip_prefix(b"P5")?;
+    let mut numbers = [0usize; 3];
+    for number in &mut numbers {
+        let start = rest.iter().position(|b| !b.is_ascii_whitespace())?;
+        rest = &rest[start..];
+        let end = rest.iter().position(|b| !b.is_ascii_digit())?;
+        *number = std::str::from_utf8(&rest[..end]).ok()?.parse().ok()?;
+        rest = &rest[end..];
+    }
+    let [width, height, _] = numbers;
+    let plausible = (1..=16384).contains(&width) && (1..=16384).contains(&height);
+    plausible.then_some((numbers, rest.get(1..)?))
+}
+
+/// Infrared amplitude, 8 or 16 bit, as numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InfraredImage {
+    pub width: usize,
+    pub height: usize,
+    pub amplitude: Vec<u16>,
+}
+
+impl InfraredImage {
+    /// # Errors
+    /// When the file is not a whole grey PNG of 8 or 16 bits.
+    pub fn read(path: &Path) -> Result<Self> {
+        let image = image::ImageReader::open(path)
+            .map_err(|e| Error::read(path, e))?
+            .decode()
+            .map_err(|e| Error::image(path, e.to_string(), "infrared must be a grey PNG"))?;
+        let amplitude = match image {
+            image::DynamicImage::ImageLuma8(grey) => {
+                return Ok(InfraredImage {
+                    width: grey.width() as usize,
+                    height: grey.height() as usize,
+                    amplitude: grey.into_raw().into_iter().map(u16::from).collect(),
+                });
+            }
+            image::DynamicImage::ImageLuma16(grey) => grey,
+            other => {
+                return Err(Error::image(
+                    path,
+                    format!("{:?} image", other.color()),
+                    "infrared must be a grey PNG of 8 or 16 bits",
+                ));
+            }
+        };
+        Ok(InfraredImage {
+            width: amplitude.width() as usize,
+            height: amplitude.height() as usize,
+            amplitude: amplitude.into_raw(),
+        })
+    }
+}
+
+/// A depth frame as the bytes of a 16-bit grey PNG.
+///
+/// # Errors
+/// When the frame's size does not match its words.
+pub fn encode_png16(frame: &Frame) -> Result<Vec<u8>> {
+    let failed = |e: png::EncodingError| Error::Drawing { what: "depth PNG", why: e.to_string() };
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, frame.width as u32, frame.height as u32);
+    encoder.set_color(ColorType::Grayscale);
+    encoder.set_depth(BitDepth::Sixteen);
+    encoder.set_compression(png::Compression::Balanced);
+    let mut writer = encoder.write_header().map_err(failed)?;
+    let data: Vec<u8> = frame.words.iter().flat_map(|w| w.to_be_bytes()).collect();
+    writer.write_image_data(&data).map_err(failed)?;
+    writer.finish().map_err(failed)?;
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame() -> Frame {
+        Frame { width: 5, height: 3, words: (0..15).map(|i| i * 4000 + 7).collect() }
+    }
+
+    #[test]
+    fn png_round_trip_is_exact() {
+        let bytes = encode_png16(&frame()).unwrap();
+        assert_eq!(decode_png16(Path::new("x.png"), &bytes).unwrap(), frame());
+    }
+
+    #[test]
+    fn every_truncation_of_a_png_is_an_error_not_a_panic() {
+        let bytes = encode_png16(&frame()).unwrap();
+        let data_end = bytes.len() - 12; // IEND carries no pixels
+        for cut in 0..data_end - 4 {
+            assert!(decode_png16(Path::new("x.png"), &bytes[..cut]).is_err(), "cut at {cut}");
+        }
+    }
+
+    #[test]
+    fn fakenect_words_are_little_endian() {
+        let mut bytes = b"P5 2 1 65535\n".to_vec();
+        bytes.extend([0x01, 0x02, 0xff, 0x07]);
+        let frame = decode_fakenect_pgm(Path::new("d.pgm"), &bytes).unwrap();
+        assert_eq!(frame.words, [0x0201, 2047]);
+        for cut in 0..bytes.len() {
+            assert!(decode_fakenect_pgm(Path::new("d.pgm"), &bytes[..cut]).is_err());
+        }
+    }
+
+    #[test]
+    fn a_header_that_claims_a_huge_image_is_refused() {
+        assert!(
+            decode_fakenect_pgm(Path::new("d.pgm"), b"P5 99999999 99999999 65535\n..").is_err()
+        );
+    }
+}

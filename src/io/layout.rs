@@ -1,0 +1,173 @@
+//! The recording layout: recording.json and one folder a view (contract, section 1).
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::list::{FrameList, read_list};
+use super::output::write_atomic;
+use crate::error::{Error, Result};
+use crate::view::{
+    RECORDING_FORMAT, Recording, RecordingFile, Region, Sensor, TargetSize, View, ViewNotes,
+};
+
+pub(super) const DESCRIPTION: &str = "recording.json";
+const VIEW_FILE: &str = "view.json";
+const DEPTH_LIST: &str = "depth.txt";
+const INFRARED_LIST: &str = "ir.txt";
+const REMEDY_JSON: &str = "compare it with the recording layout in the README";
+
+/// `view.json`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ViewFile {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target: Option<TargetSize>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_distance_m: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub roi: Option<[f64; 4]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub polygon: Option<Vec<[f64; 2]>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ambient_lux: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub notes: Option<String>,
+}
+
+impl ViewFile {
+    fn notes(self) -> Result<ViewNotes, String> {
+        let region = match (self.roi, self.polygon) {
+            (Some(_), Some(_)) => return Err("both roi and polygon are given; keep one".into()),
+            (Some(r), None) => {
+                if !(r[2] > r[0] && r[3] > r[1]) {
+                    return Err(format!("roi {r:?} is empty; it is [u0, v0, u1, v1]"));
+                }
+                Some(Region::Rectangle(r))
+            }
+            (None, Some(p)) if p.len() < 3 => {
+                return Err(format!("a polygon needs three corners, this one has {}", p.len()));
+            }
+            (None, polygon) => polygon.map(Region::Polygon),
+        };
+        if self.reference_distance_m.is_some_and(|d| !(d.is_finite() && d > 0.0)) {
+            return Err("reference_distance_m must be positive".into());
+        }
+        Ok(ViewNotes {
+            target: self.target,
+            reference_distance_m: self.reference_distance_m,
+            region,
+            temperature_c: self.temperature_c,
+            ambient_lux: self.ambient_lux,
+            notes: self.notes,
+        })
+    }
+}
+
+pub(super) fn open(root: &Path) -> Result<Recording> {
+    let path = root.join(DESCRIPTION);
+    let sensor = read_sensor(&path)?;
+    let mut recording = Recording {
+        root: root.to_path_buf(),
+        sensor,
+        views: Vec::new(),
+        remarks: Vec::new(),
+        described_by: vec![path],
+    };
+    for folder in view_folders(root)? {
+        let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        match open_view(&folder, &name, &mut recording) {
+            Ok(view) => recording.views.push(view),
+            Err(e) => recording.remarks.push(format!("view {name} left out: {e}")),
+        }
+    }
+    Ok(recording)
+}
+
+fn read_sensor(path: &Path) -> Result<Sensor> {
+    let file: RecordingFile = read_json(path)?;
+    let wrong =
+        |what: String| Error::Json { path: path.to_path_buf(), line: 0, what, remedy: REMEDY_JSON };
+    if file.format != RECORDING_FORMAT {
+        return Err(wrong(format!(
+            "format is \"{}\", expected \"{RECORDING_FORMAT}\"",
+            file.format
+        )));
+    }
+    file.sensor().map_err(wrong)
+}
+
+fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+    serde_json::from_str(&text).map_err(|e| Error::Json {
+        path: path.to_path_buf(),
+        line: e.line(),
+        what: e.to_string(),
+        remedy: REMEDY_JSON,
+    })
+}
+
+/// Sub-folders that hold a depth list, in name order.
+fn view_folders(root: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(root).map_err(|e| Error::read(root, e))?;
+    let mut folders: Vec<PathBuf> = entries
+        .filter_map(|entry| entry.ok().map(|e| e.path()))
+        .filter(|p| p.is_dir() && (p.join(DEPTH_LIST).exists() || p.join(VIEW_FILE).exists()))
+        .collect();
+    folders.sort();
+    Ok(folders)
+}
+
+fn open_view(folder: &Path, name: &str, recording: &mut Recording) -> Result<View> {
+    let depth_list = folder.join(DEPTH_LIST);
+    let depth = read_list(&depth_list)?;
+    remark_on(&depth, name, &mut recording.remarks);
+    if depth.frames.is_empty() {
+        return Err(Error::recording(
+            &depth_list,
+            "no frame can be read",
+            "list at least one existing depth image",
+        ));
+    }
+    let infrared_list = folder.join(INFRARED_LIST);
+    let infrared =
+        if infrared_list.is_file() { read_list(&infrared_list)? } else { FrameList::default() };
+    remark_on(&infrared, name, &mut recording.remarks);
+    let view_file = folder.join(VIEW_FILE);
+    let notes = if view_file.is_file() {
+        let notes = read_json::<ViewFile>(&view_file)?.notes().map_err(|what| Error::Json {
+            path: view_file.clone(),
+            line: 0,
+            what,
+            remedy: REMEDY_JSON,
+        })?;
+        recording.described_by.push(view_file);
+        notes
+    } else {
+        ViewNotes::default()
+    };
+    recording.described_by.push(depth_list);
+    Ok(View { name: name.into(), depth: depth.frames, infrared: infrared.frames, notes })
+}
+
+fn remark_on(list: &FrameList, view: &str, remarks: &mut Vec<String>) {
+    remarks.extend(list.remarks.iter().map(|r| format!("view {view}: {r}")));
+}
+
+/// Write `recording.json` for `sensor` into `root`.
+///
+/// # Errors
+/// When the folder cannot be written.
+pub fn write_recording_file(root: &Path, sensor: &Sensor) -> Result<()> {
+    let path = root.join(DESCRIPTION);
+    let mut text =
+        serde_json::to_string_pretty(&RecordingFile::of(sensor)).map_err(|e| Error::Json {
+            path: path.clone(),
+            line: 0,
+            what: e.to_string(),
+            remedy: "the sensor's numbers must be finite",
+        })?;
+    text.push('\n');
+    write_atomic(&path, text.as_bytes())
+}

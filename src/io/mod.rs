@@ -1,0 +1,90 @@
+//! Files in, files out. One reader a file; every layout ends as the same [`Recording`].
+
+mod dump;
+mod folder;
+mod images;
+mod layout;
+mod list;
+mod output;
+mod stills;
+mod tum;
+
+pub use images::{FrameSource, InfraredImage, encode_png16};
+pub use layout::{ViewFile, write_recording_file};
+pub use list::{FrameList, read_list};
+pub use output::{OutputDir, sha256_hex, write_atomic};
+
+use std::path::Path;
+
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::frame::DepthCode;
+use crate::view::{Recording, Sensor};
+
+/// What the user knows about a folder that does not describe itself.
+#[derive(Debug, Clone, Default)]
+pub struct Assumed {
+    /// fx, fy, cx, cy in px.
+    pub intrinsics: Option<[f64; 4]>,
+    pub code: Option<DepthCode>,
+    pub baseline_m: Option<f64>,
+}
+
+/// Open whatever stands at `path`: a recording, a TUM folder, a fakenect dump or a plain folder
+/// of 16-bit PNGs. Frames are not read, except to find still stretches in a film.
+///
+/// # Errors
+/// When the folder is none of these, is empty, or describes itself wrongly.
+pub fn open(path: &Path, assumed: &Assumed) -> Result<Recording> {
+    if !path.is_dir() {
+        return Err(Error::recording(
+            path,
+            "there is no such folder",
+            "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs",
+        ));
+    }
+    let recording = if path.join(layout::DESCRIPTION).is_file() {
+        layout::open(path)?
+    } else if path.join(dump::INDEX).is_file() {
+        dump::open(path, assumed)?
+    } else if path.join(tum::DEPTH_LIST).is_file() {
+        tum::open(path, assumed)?
+    } else {
+        folder::open(path, assumed)?
+    };
+    if recording.views.is_empty() {
+        let reason = recording.remarks.first().cloned();
+        return Err(Error::recording(
+            path,
+            reason.unwrap_or_else(|| "no view in it".into()),
+            "a view is a folder with depth.txt and depth/*.png beside recording.json",
+        ));
+    }
+    Ok(recording)
+}
+
+/// A sensor for folders that carry no description of their own.
+fn assumed_sensor(
+    name: &str,
+    size: (usize, usize),
+    intrinsics: [f64; 4],
+    code: DepthCode,
+    assumed: &Assumed,
+) -> Result<Sensor> {
+    let [fx, fy, cx, cy] = intrinsics;
+    let sensor = Sensor {
+        name: name.into(),
+        serial: None,
+        mode: None,
+        camera: Camera { width: size.0, height: size.1, fx, fy, cx, cy, distortion: None },
+        baseline_m: assumed.baseline_m,
+        code,
+    };
+    match sensor.fault() {
+        Some(what) => Err(Error::Argument {
+            what: format!("--intrinsics {fx},{fy},{cx},{cy}: {what}"),
+            remedy: "give fx,fy,cx,cy in pixels",
+        }),
+        None => Ok(sensor),
+    }
+}

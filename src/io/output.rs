@@ -1,0 +1,89 @@
+//! Outputs appear whole or not at all: written beside their place, then renamed into it.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use crate::error::{Error, Result};
+
+/// A folder that was found writable before the work began.
+#[derive(Debug, Clone)]
+pub struct OutputDir(PathBuf);
+
+impl OutputDir {
+    /// Make the folder and try it, so that a run of an hour does not end in "permission denied".
+    ///
+    /// # Errors
+    /// When it cannot be made or written.
+    pub fn create(path: &Path) -> Result<Self> {
+        fs::create_dir_all(path).map_err(|e| Error::write(path, e))?;
+        let probe = path.join(format!(".kinoise-{}.tmp", std::process::id()));
+        fs::write(&probe, b"").map_err(|e| Error::write(path, e))?;
+        fs::remove_file(&probe).map_err(|e| Error::write(path, e))?;
+        Ok(OutputDir(path.to_path_buf()))
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// Write one file of the output.
+    ///
+    /// # Errors
+    /// When the folder has become unwritable or the disk is full.
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<PathBuf> {
+        let path = self.0.join(name);
+        write_atomic(&path, bytes)?;
+        Ok(path)
+    }
+}
+
+/// Write beside `path`, then rename: a kill or a full disk leaves the old file, or none.
+///
+/// # Errors
+/// When the folder cannot be written; the temporary file is then removed.
+pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<()> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let temporary = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
+    let written = fs::File::create(&temporary)
+        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_data()))
+        .and_then(|()| fs::rename(&temporary, path));
+    written.map_err(|e| {
+        let _ = fs::remove_file(&temporary);
+        Error::write(path, e)
+    })
+}
+
+/// SHA-256 as lower-case hexadecimal.
+pub fn sha256_hex(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_no_temporary_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let blocked = dir.path().join("taken");
+        fs::create_dir(&blocked).unwrap();
+        fs::write(blocked.join("x"), b"").unwrap();
+        assert!(write_atomic(&blocked, b"1").is_err(), "a folder stands there");
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn the_hash_is_the_standard_one() {
+        assert_eq!(
+            sha256_hex(b"abc"),
+            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+        );
+    }
+}

@@ -1,0 +1,128 @@
+//! Cutting a film into views: stretches in which neither target nor sensor moves.
+
+use super::images::FrameSource;
+use crate::error::Result;
+use crate::frame::{DepthTable, Frame};
+use crate::view::{FrameRef, Sensor, View, ViewNotes};
+
+/// How the frames were taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Film {
+    /// 30 Hz throughout, also while the target is carried: short stretches are motion.
+    Video,
+    /// Taken on purpose: a single frame is a view.
+    Captures,
+}
+
+impl Film {
+    /// A third of a second of stillness is what a hand-held board cannot give by accident.
+    fn shortest(self) -> usize {
+        match self {
+            Film::Video => 10,
+            Film::Captures => 1,
+        }
+    }
+}
+
+/// Pixels compared from frame to frame lie on a grid of this pitch, px.
+const GRID_PX: usize = 12;
+/// A sample has moved when its depth changed by more than this share plus this much of z^2 (1/m):
+/// six standard deviations of a Kinect's own noise (Khoshelham: 1.4e-3 z^2) and no less.
+const MOVED_SHARE: f64 = 0.005;
+const MOVED_QUADRATIC: f64 = 0.009;
+/// The scene has moved when this share of the samples has.
+const MOVED_SAMPLES: f64 = 0.10;
+
+/// Split into views; unreadable frames and frames in motion are told and left out.
+pub(super) fn split(
+    frames: Vec<FrameRef>,
+    sensor: &Sensor,
+    film: Film,
+    remarks: &mut Vec<String>,
+) -> Result<Vec<View>> {
+    let table = sensor.code.table();
+    let mut source = FrameSource::new(sensor.camera.width, sensor.camera.height);
+    let mut stretches: Vec<(Vec<f32>, Vec<FrameRef>)> = Vec::new();
+    for frame_ref in frames {
+        let frame = match source.read(&frame_ref.path) {
+            Ok(frame) => frame,
+            Err(e) => {
+                remarks.push(format!("frame left out: {e}"));
+                continue;
+            }
+        };
+        let samples = sample(&frame, &table);
+        match stretches.last_mut() {
+            Some((reference, stretch)) if still(reference, &samples) => stretch.push(frame_ref),
+            _ => stretches.push((samples, vec![frame_ref])),
+        }
+    }
+    let total: usize = stretches.iter().map(|(_, s)| s.len()).sum();
+    let longest = stretches.iter().map(|(_, s)| s.len()).max().unwrap_or(0);
+    let shortest = film.shortest().min(longest);
+    let kept: Vec<View> = stretches
+        .into_iter()
+        .filter(|(_, stretch)| stretch.len() >= shortest)
+        .enumerate()
+        .map(|(i, (_, depth))| View {
+            name: name(i, &depth, film),
+            depth,
+            infrared: Vec::new(),
+            notes: ViewNotes::default(),
+        })
+        .collect();
+    let used: usize = kept.iter().map(|v| v.depth.len()).sum();
+    if used < total {
+        remarks.push(format!(
+            "{} of {total} frames lie between still stretches (target or sensor moving) and are left out",
+            total - used
+        ));
+    }
+    Ok(kept)
+}
+
+/// A single capture keeps its file's name; a stretch of a film gets a number.
+fn name(index: usize, frames: &[FrameRef], film: Film) -> String {
+    match (film, frames) {
+        (Film::Captures, [only]) => {
+            only.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+        }
+        _ => format!("still-{index:03}"),
+    }
+}
+
+fn sample(frame: &Frame, table: &DepthTable) -> Vec<f32> {
+    (GRID_PX / 2..frame.height)
+        .step_by(GRID_PX)
+        .flat_map(|v| (GRID_PX / 2..frame.width).step_by(GRID_PX).map(move |u| v * frame.width + u))
+        .map(|i| table.metres(frame.words[i]))
+        .collect()
+}
+
+fn still(reference: &[f32], samples: &[f32]) -> bool {
+    let (mut seen, mut moved) = (0usize, 0usize);
+    for (&a, &b) in reference.iter().zip(samples) {
+        let (a, b) = (f64::from(a), f64::from(b));
+        if a.is_finite() && b.is_finite() {
+            seen += 1;
+            moved += usize::from((a - b).abs() > MOVED_SHARE * a + MOVED_QUADRATIC * a * a);
+        }
+    }
+    seen == 0 || (moved as f64) < MOVED_SAMPLES * seen as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_still_and_a_shifted_board_is_not() {
+        let reference: Vec<f32> = (0..1000).map(|i| 2.0 + (i % 7) as f32 * 1e-3).collect();
+        let noisy: Vec<f32> =
+            reference.iter().enumerate().map(|(i, z)| z + 0.006 * ((i % 3) as f32 - 1.0)).collect();
+        assert!(still(&reference, &noisy));
+        let moved: Vec<f32> =
+            reference.iter().enumerate().map(|(i, z)| if i < 200 { z + 0.2 } else { *z }).collect();
+        assert!(!still(&reference, &moved));
+    }
+}

@@ -1,0 +1,324 @@
+//! Tables of sigma: what the fit reads, and measurements.csv.
+
+use std::path::Path;
+
+use super::{Cell, ViewMeasurement};
+use crate::error::{Error, Result};
+
+/// Which standard deviation a model is fitted to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SigmaKind {
+    /// Over the pixels of one frame, along the optical axis: the default.
+    #[default]
+    Spatial,
+    /// Of one pixel over time.
+    Temporal,
+    /// Over pixels and frames.
+    Total,
+    /// The paper's method: RANSAC inliers of one frame, across the plane.
+    Paper,
+}
+
+impl SigmaKind {
+    pub fn words(self) -> &'static str {
+        match self {
+            SigmaKind::Spatial => "spatial sigma of one frame, along the optical axis",
+            SigmaKind::Temporal => "temporal sigma of a pixel, along the optical axis",
+            SigmaKind::Total => "total sigma over pixels and frames, along the optical axis",
+            SigmaKind::Paper => "the paper's sigma: point-to-plane distances of RANSAC inliers",
+        }
+    }
+}
+
+/// One measured sigma.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SigmaRow {
+    pub z_m: f64,
+    pub theta_rad: f64,
+    pub sigma_m: f64,
+    /// Independent samples behind it; `None` when the table does not say.
+    pub n_effective: Option<f64>,
+    /// Rows of one view share the view's errors.
+    pub view: usize,
+}
+
+impl SigmaRow {
+    /// Standard error from the sample size alone, m.
+    pub fn std_error_m(&self) -> Option<f64> {
+        self.n_effective.map(|n| self.sigma_m / (2.0 * n).sqrt())
+    }
+}
+
+/// What a model is fitted to.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SigmaTable {
+    pub rows: Vec<SigmaRow>,
+}
+
+impl SigmaTable {
+    /// The chosen sigma of every cell of every view.
+    pub fn of(views: &[ViewMeasurement], kind: SigmaKind) -> Self {
+        let rows = views.iter().enumerate().flat_map(|(view, m)| rows_of(view, m, kind)).collect();
+        SigmaTable { rows }
+    }
+
+    pub fn views(&self) -> usize {
+        let mut seen: Vec<usize> = self.rows.iter().map(|r| r.view).collect();
+        seen.sort_unstable();
+        seen.dedup();
+        seen.len()
+    }
+
+    /// Least and greatest of a column.
+    pub fn range(&self, column: impl Fn(&SigmaRow) -> f64) -> [f64; 2] {
+        self.rows
+            .iter()
+            .map(column)
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+    }
+}
+
+fn rows_of(view: usize, m: &ViewMeasurement, kind: SigmaKind) -> Vec<SigmaRow> {
+    if kind == SigmaKind::Paper {
+        return m
+            .paper
+            .iter()
+            .map(|p| SigmaRow {
+                z_m: p.z_m,
+                theta_rad: p.theta_rad,
+                sigma_m: p.sigma_m,
+                n_effective: Some((p.inliers as f64 / m.correlation.sum_of_squares).max(1.0)),
+                view,
+            })
+            .collect();
+    }
+    let sigma = |cell: &Cell| match kind {
+        SigmaKind::Temporal => cell.spread.temporal_m,
+        SigmaKind::Total => Some(cell.spread.total_m),
+        SigmaKind::Spatial | SigmaKind::Paper => Some(cell.spread.spatial_m),
+    };
+    m.cells
+        .iter()
+        .filter_map(|cell| {
+            let sigma_m = sigma(cell).filter(|s| *s > 0.0)?;
+            Some(SigmaRow {
+                z_m: cell.z_m,
+                theta_rad: m.theta_rad,
+                sigma_m,
+                n_effective: Some(cell.n_effective),
+                view,
+            })
+        })
+        .collect()
+}
+
+/// Columns of measurements.csv; the contract's come first.
+pub const MEASUREMENT_COLUMNS: [&str; 24] = [
+    "view",
+    "z_m",
+    "theta_rad",
+    "azimuth_rad",
+    "sigma_m",
+    "sigma_std_error_m",
+    "sigma_temporal_m",
+    "n",
+    "n_effective",
+    "sigma_total_m",
+    "sigma_perpendicular_m",
+    "missing",
+    "cut",
+    "view_z_m",
+    "view_sigma_m",
+    "axis_distance_m",
+    "reference_distance_m",
+    "paper_z_m",
+    "paper_theta_rad",
+    "paper_sigma_m",
+    "correlation_px",
+    "temporal_correlation",
+    "infrared",
+    "time_s",
+];
+
+/// measurements.csv: a row a cell, SI units, empty where a statistic cannot be had.
+pub fn write_measurements(views: &[ViewMeasurement]) -> String {
+    let mut text = MEASUREMENT_COLUMNS.join(",");
+    text.push('\n');
+    for m in views {
+        for cell in &m.cells {
+            let fields = row(m, cell);
+            debug_assert_eq!(fields.len(), MEASUREMENT_COLUMNS.len());
+            text.push_str(&fields.join(","));
+            text.push('\n');
+        }
+    }
+    text
+}
+
+fn row(m: &ViewMeasurement, cell: &Cell) -> Vec<String> {
+    let paper = m.paper.as_ref();
+    vec![
+        quoted(&m.name),
+        number(cell.z_m),
+        number(m.theta_rad),
+        number(m.azimuth_rad),
+        number(cell.spread.spatial_m),
+        number(cell.std_error_m),
+        optional(cell.spread.temporal_m),
+        cell.n.to_string(),
+        number(cell.n_effective),
+        number(cell.spread.total_m),
+        number(cell.spread.perpendicular_m),
+        cell.missing.to_string(),
+        cell.cut.to_string(),
+        number(m.z_m),
+        number(m.whole.spread.spatial_m),
+        number(m.axis_distance_m),
+        optional(m.reference_distance_m),
+        optional(paper.map(|p| p.z_m)),
+        optional(paper.map(|p| p.theta_rad)),
+        optional(paper.map(|p| p.sigma_m)),
+        number(m.correlation.sum_of_squares.sqrt()),
+        optional(m.temporal_correlation),
+        optional(m.infrared),
+        number(m.time_s),
+    ]
+}
+
+/// Shortest text that reads back to the same number; empty for what is not one.
+fn number(v: f64) -> String {
+    if v.is_finite() { format!("{v}") } else { String::new() }
+}
+
+fn optional(v: Option<f64>) -> String {
+    v.map_or_else(String::new, number)
+}
+
+/// View names are folder names and may hold commas or quotes.
+fn quoted(name: &str) -> String {
+    if name.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", name.replace('"', "\"\""))
+    } else {
+        name.to_string()
+    }
+}
+
+const REMEDY_TABLE: &str = "the header is z_m,theta_rad,sigma_m and optionally n, SI units";
+
+/// Read `z_m,theta_rad,sigma_m[,n]` (any order, other columns ignored). With a column `view`
+/// rows of the same name count as one view; a column `n_effective` is preferred to `n`.
+///
+/// # Errors
+/// When a column is missing or a value is not a usable number; the message names the line.
+pub fn read_table(path: &Path) -> Result<SigmaTable> {
+    let file = std::fs::File::open(path).map_err(|e| Error::read(path, e))?;
+    let wrong = |line: usize, what: String| Error::Text {
+        path: path.to_path_buf(),
+        line,
+        what,
+        remedy: REMEDY_TABLE,
+    };
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_reader(std::io::BufReader::new(file));
+    let headers = reader.headers().map_err(|e| wrong(1, e.to_string()))?.clone();
+    let find = |name: &str| headers.iter().position(|h| h.trim_start_matches('\u{feff}') == name);
+    let need =
+        |name: &str| find(name).ok_or_else(|| wrong(1, format!("there is no column {name}")));
+    let columns = [need("z_m")?, need("theta_rad")?, need("sigma_m")?];
+    let count = find("n_effective").or_else(|| find("n"));
+    let view = find("view");
+    let mut names: Vec<String> = Vec::new();
+    let mut table = SigmaTable::default();
+    for record in reader.records() {
+        let record = record.map_err(|e| {
+            let line = e.position().map_or(0, |p| p.line() as usize);
+            wrong(line, e.to_string())
+        })?;
+        let line = record.position().map_or(0, |p| p.line() as usize);
+        let text = |column: usize| record.get(column).unwrap_or("").to_string();
+        let value = |column: usize| -> Result<f64> {
+            let text = text(column);
+            text.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
+                wrong(line, format!("{} = \"{text}\" is not a number", &headers[column]))
+            })
+        };
+        let [z_m, theta_rad, sigma_m] =
+            [value(columns[0])?, value(columns[1])?, value(columns[2])?];
+        check(z_m, theta_rad, sigma_m).map_err(|what| wrong(line, what))?;
+        let n_effective = match count {
+            Some(column) if !text(column).is_empty() => Some(value(column)?)
+                .filter(|n| *n >= 1.0)
+                .ok_or_else(|| wrong(line, "n is below 1".into()))?
+                .into(),
+            _ => None,
+        };
+        let view = match view {
+            Some(column) => index_of(&mut names, text(column)),
+            None => table.rows.len(),
+        };
+        table.rows.push(SigmaRow { z_m, theta_rad, sigma_m, n_effective, view });
+    }
+    let counted = table.rows.iter().filter(|r| r.n_effective.is_some()).count();
+    if counted != 0 && counted != table.rows.len() {
+        return Err(wrong(0, "n is given in some rows and missing in others".into()));
+    }
+    Ok(table)
+}
+
+fn check(z_m: f64, theta_rad: f64, sigma_m: f64) -> Result<(), String> {
+    if z_m <= 0.0 {
+        return Err(format!("z_m = {z_m} must be positive"));
+    }
+    if !(0.0..std::f64::consts::FRAC_PI_2).contains(&theta_rad) {
+        return Err(format!("theta_rad = {theta_rad} must lie in [0, pi/2); is it in degrees?"));
+    }
+    if sigma_m <= 0.0 {
+        return Err(format!("sigma_m = {sigma_m} must be positive"));
+    }
+    Ok(())
+}
+
+fn index_of(names: &mut Vec<String>, name: String) -> usize {
+    names.iter().position(|n| *n == name).unwrap_or_else(|| {
+        names.push(name);
+        names.len() - 1
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<SigmaTable> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("table.csv");
+        std::fs::write(&path, text).unwrap();
+        read_table(&path)
+    }
+
+    #[test]
+    fn columns_in_any_order_with_views() {
+        let table = read("n,view,theta_rad,z_m,sigma_m\n100,a,0.1,1.0,0.002\n50,a,0.1,1.1,0.0021\n9,b,0,2,0.006\n").unwrap();
+        assert_eq!(table.rows.len(), 3);
+        assert_eq!(table.views(), 2);
+        assert_eq!(table.rows[1].n_effective, Some(50.0));
+    }
+
+    #[test]
+    fn every_bad_cell_names_its_line() {
+        for (bad, says) in [
+            ("z_m,theta_rad,sigma_m\n1,0,0.002\n1,0,NaN\n", "line 3"),
+            ("z_m,theta_rad,sigma_m\n1,0,0.002\n-1,0,0.002\n", "line 3"),
+            ("z_m,theta_rad,sigma_m\n1,45,0.002\n", "degrees"),
+            ("z_m,sigma_m\n1,0.002\n", "theta_rad"),
+            ("z_m,theta_rad,sigma_m\n1,0\n", "line 2"),
+            ("z_m,theta_rad,sigma_m,n\n1,0,0.002,5\n1,0,0.002,\n", "missing in others"),
+            ("z_m,theta_rad,sigma_m\n1,0,0\n", "positive"),
+        ] {
+            let message = read(bad).unwrap_err().to_string();
+            assert!(message.contains(says), "{message}");
+        }
+    }
+}

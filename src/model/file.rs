@@ -1,0 +1,315 @@
+//! `model.json` (contract, section 4): written and read back bit for bit, refused when foreign.
+
+use std::path::Path;
+use std::time::{Duration, SystemTime};
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use super::forms::Form;
+use super::{Domain, SigmaModel};
+use crate::error::{Error, Result};
+use crate::io::write_atomic;
+use crate::view::RecordingFile;
+
+/// The format this version writes and reads.
+pub const MODEL_FORMAT: &str = "kinoise-model/1";
+const FORMAT_FAMILY: &str = "kinoise-model/";
+
+/// A sensor's noise, as exchanged between `calibrate`, `simulate`, `diagnose` and `map`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoiseModel {
+    /// `None` when the model came from a bare table.
+    pub sensor: Option<RecordingFile>,
+    pub sigma: SigmaModel,
+    /// Physical effects beyond sigma: id and parameters (effects.md).
+    pub effects: Vec<Effect>,
+    pub fit: FitSummary,
+    pub provenance: Provenance,
+}
+
+/// One physical effect of the model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Effect {
+    pub id: String,
+    pub parameters: Map<String, Value>,
+}
+
+/// How the surface was fitted.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct FitSummary {
+    pub views: usize,
+    pub samples: usize,
+    /// Root mean square of measured minus fitted sigma, m.
+    pub rmse_m: f64,
+    pub r2: f64,
+    /// Root mean square relative error at distances left out of the fit.
+    pub heldout: Option<f64>,
+    /// Student's degrees of freedom of the intervals.
+    pub degrees_of_freedom: f64,
+    /// What sigma is: along the optical axis ("axial") or across the plane ("perpendicular").
+    pub residual: String,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
+}
+
+/// Where a model comes from.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    pub tool: String,
+    pub version: String,
+    pub seed: Option<u64>,
+    pub options: Map<String, Value>,
+    /// SHA-256 of the inputs, by name.
+    pub sha256: Map<String, Value>,
+    /// RFC 3339, UTC; SOURCE_DATE_EPOCH where that is set.
+    pub created: String,
+}
+
+impl Provenance {
+    /// This program, now.
+    pub fn now(seed: Option<u64>) -> Self {
+        let epoch = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|s| s.parse().ok());
+        let time =
+            epoch.map_or_else(SystemTime::now, |s| SystemTime::UNIX_EPOCH + Duration::from_secs(s));
+        Provenance {
+            tool: "kinoise".into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            seed,
+            created: humantime::format_rfc3339_seconds(time).to_string(),
+            ..Provenance::default()
+        }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct ModelFile {
+    format: String,
+    sensor: Option<RecordingFile>,
+    sigma: SigmaFile,
+    effects: Vec<Effect>,
+    fit: FitSummary,
+    provenance: Provenance,
+}
+
+#[derive(Serialize, Deserialize)]
+struct SigmaFile {
+    form: String,
+    formula: String,
+    parameters: Map<String, Value>,
+    covariance: Vec<Vec<f64>>,
+    valid: Valid,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Valid {
+    z_m: [f64; 2],
+    theta_rad: [f64; 2],
+}
+
+#[derive(Serialize, Deserialize)]
+struct ParameterFile {
+    value: f64,
+    std_error: Option<f64>,
+}
+
+const REMEDY: &str = "make the model again with `kinoise calibrate` or `kinoise fit`";
+
+impl NoiseModel {
+    /// The text of `model.json`.
+    ///
+    /// # Errors
+    /// When a number of the model is not finite.
+    pub fn to_json(&self) -> Result<String> {
+        if let Some(what) = self.sigma.fault() {
+            return Err(Error::Solver {
+                what,
+                remedy: "the model cannot be written; look at the views' warnings",
+            });
+        }
+        let spec = self.sigma.form.spec();
+        let parameters = spec
+            .parameters()
+            .iter()
+            .zip(self.sigma.parameters.iter().zip(&self.sigma.std_errors))
+            .map(|((name, _), (&value, &std_error))| {
+                (name.to_string(), serde_json::json!(ParameterFile { value, std_error }))
+            })
+            .collect();
+        let file = ModelFile {
+            format: MODEL_FORMAT.into(),
+            sensor: self.sensor.clone(),
+            sigma: SigmaFile {
+                form: spec.id().into(),
+                formula: spec.formula().into(),
+                parameters,
+                covariance: self
+                    .sigma
+                    .covariance
+                    .row_iter()
+                    .map(|r| r.iter().copied().collect())
+                    .collect(),
+                valid: Valid { z_m: self.sigma.domain.z_m, theta_rad: self.sigma.domain.theta_rad },
+            },
+            effects: self.effects.clone(),
+            fit: self.fit.clone(),
+            provenance: self.provenance.clone(),
+        };
+        let mut text = serde_json::to_string_pretty(&file).map_err(|e| Error::Solver {
+            what: format!("the model cannot be written as JSON: {e}"),
+            remedy: "report this as a bug",
+        })?;
+        text.push('\n');
+        Ok(text)
+    }
+
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        write_atomic(path, self.to_json()?.as_bytes())
+    }
+
+    /// # Errors
+    /// When the file is missing, not a model, damaged, or of a newer format.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+        Self::from_json(&text).map_err(|(what, remedy)| Error::ModelFile {
+            path: path.to_path_buf(),
+            what,
+            remedy,
+        })
+    }
+
+    fn from_json(text: &str) -> Result<Self, (String, &'static str)> {
+        let value: Value = serde_json::from_str(text).map_err(|e| {
+            (format!("not whole JSON ({e})"), "the file is damaged; restore it or make it again")
+        })?;
+        check_format(&value)?;
+        let file: ModelFile = serde_json::from_value(value)
+            .map_err(|e| (format!("a part of the model is missing or wrong ({e})"), REMEDY))?;
+        let sigma = read_sigma(file.sigma, file.fit.degrees_of_freedom)?;
+        if let Some(fault) = sigma.fault() {
+            return Err((fault, REMEDY));
+        }
+        Ok(NoiseModel {
+            sensor: file.sensor,
+            sigma,
+            effects: file.effects,
+            fit: file.fit,
+            provenance: file.provenance,
+        })
+    }
+}
+
+fn check_format(value: &Value) -> Result<(), (String, &'static str)> {
+    let Some(format) = value.get("format").and_then(Value::as_str) else {
+        return Err(("it has no \"format\": not a kinoise model".into(), REMEDY));
+    };
+    if format == MODEL_FORMAT {
+        return Ok(());
+    }
+    match format.strip_prefix(FORMAT_FAMILY).and_then(|v| v.parse::<u32>().ok()) {
+        Some(version) if version > 1 => Err((
+            format!("its format is \"{format}\", newer than this program's \"{MODEL_FORMAT}\""),
+            "update kinoise",
+        )),
+        _ => Err((format!("its format is \"{format}\", not \"{MODEL_FORMAT}\""), REMEDY)),
+    }
+}
+
+fn read_sigma(
+    file: SigmaFile,
+    degrees_of_freedom: f64,
+) -> Result<SigmaModel, (String, &'static str)> {
+    let form: Form =
+        file.form.parse().map_err(|what| (what, "update kinoise, or make the model again"))?;
+    let mut parameters = Vec::new();
+    let mut std_errors = Vec::new();
+    for (name, _) in form.spec().parameters() {
+        let value = file
+            .parameters
+            .get(*name)
+            .ok_or_else(|| (format!("the parameter {name} is missing"), REMEDY))?;
+        let parameter: ParameterFile = serde_json::from_value(value.clone())
+            .map_err(|e| (format!("the parameter {name}: {e}"), REMEDY))?;
+        parameters.push(parameter.value);
+        std_errors.push(parameter.std_error);
+    }
+    let p = parameters.len();
+    if file.covariance.len() != p || file.covariance.iter().any(|row| row.len() != p) {
+        return Err((format!("the covariance is not {p} x {p}"), REMEDY));
+    }
+    Ok(SigmaModel {
+        form,
+        parameters,
+        std_errors,
+        covariance: DMatrix::from_fn(p, p, |i, j| file.covariance[i][j]),
+        domain: Domain { z_m: file.valid.z_m, theta_rad: file.valid.theta_rad },
+        degrees_of_freedom,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn model() -> NoiseModel {
+        NoiseModel {
+            sensor: None,
+            sigma: SigmaModel::paper(),
+            effects: Vec::new(),
+            fit: FitSummary {
+                degrees_of_freedom: 1e9,
+                residual: "axial".into(),
+                ..FitSummary::default()
+            },
+            provenance: Provenance::default(),
+        }
+    }
+
+    proptest! {
+        /// Any finite doubles survive the file exactly.
+        #[test]
+        fn numbers_read_back_bit_for_bit(a in 1e-12f64..1.0, b in 1e-300f64..1.0, c in -1.0f64..1.0, s in proptest::num::f64::NORMAL) {
+            let mut model = model();
+            model.sigma.parameters[0] = a;
+            model.sigma.parameters[1] = b;
+            model.sigma.parameters[2] = c;
+            model.sigma.covariance[(0, 1)] = s;
+            model.sigma.std_errors[1] = Some(a);
+            let back = NoiseModel::from_json(&model.to_json().unwrap()).unwrap();
+            prop_assert_eq!(back, model);
+        }
+    }
+
+    #[test]
+    fn foreign_newer_and_damaged_files_are_told_apart() {
+        let good = model().to_json().unwrap();
+        let says = |text: &str| NoiseModel::from_json(text).unwrap_err().0;
+        assert!(says(&good.replace("kinoise-model/1", "kinoise-model/2")).contains("newer"));
+        assert!(
+            says(&good.replace("kinoise-model/1", "other/1")).contains("not \"kinoise-model/1\"")
+        );
+        assert!(says("{}").contains("no \"format\""));
+        assert!(says(&good[..good.len() / 2]).contains("not whole JSON"));
+        assert!(says(&good.replace("\"b\"", "\"bb\"")).contains("parameter b"));
+        assert!(
+            says(&good.replace("\"form\": \"paper\"", "\"form\": \"cubic\"")).contains("cubic")
+        );
+        assert!(
+            says(&good.replace("1.39,", "1.0,").replace("\"value\": 1.39", "\"value\": 1.0"))
+                .contains("pole")
+        );
+    }
+
+    /// Every truncation is an error, none a panic.
+    #[test]
+    fn every_truncation_is_refused() {
+        let good = model().to_json().unwrap();
+        for cut in (0..good.len() - 2).step_by(7) {
+            assert!(NoiseModel::from_json(&good[..cut]).is_err(), "cut at {cut}");
+        }
+    }
+}

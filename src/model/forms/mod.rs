@@ -1,0 +1,150 @@
+//! Forms of sigma(z, theta), one a file. Adding one: its file, and a line in [`Form`].
+
+mod disparity;
+mod khoshelham;
+mod nguyen;
+mod paper;
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::rows::Rows;
+
+pub use paper::{PAPER_EQ1, tilt};
+
+/// Most parameters a form has.
+pub const MOST_PARAMETERS: usize = 6;
+
+/// How a parameter is walked while fitting.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Walk {
+    Linear,
+    /// Positive: its logarithm is walked.
+    Log,
+    /// Greater than the steepest theta of the data, where the form has its pole.
+    LogAboveTheta,
+}
+
+/// Where the fit starts: near enough for a local solver, found without a user's guess.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Start {
+    pub parameters: Vec<f64>,
+    /// Parameters the data say nothing about, held at a stated value.
+    pub held: Vec<bool>,
+    pub remarks: Vec<String>,
+}
+
+/// A formula for sigma.
+pub trait SigmaForm: Sync {
+    fn id(&self) -> &'static str;
+    /// In words, with units.
+    fn formula(&self) -> &'static str;
+    /// Where it comes from.
+    fn reference(&self) -> &'static str;
+    fn parameters(&self) -> &'static [(&'static str, Walk)];
+    /// sigma in m at depth z (m) and tilt theta (rad).
+    fn sigma(&self, p: &[f64], z: f64, theta: f64) -> f64;
+    /// Derivatives of sigma by the parameters, into the first slots of `out`.
+    fn gradient(&self, p: &[f64], z: f64, theta: f64, out: &mut [f64; MOST_PARAMETERS]);
+    /// Where sigma runs to infinity, rad.
+    fn pole(&self, _p: &[f64]) -> Option<f64> {
+        None
+    }
+    /// A start from the data alone. `None` when the data cannot carry the form.
+    fn start(&self, rows: &Rows) -> Option<Start>;
+    /// Fewest different distances the form needs.
+    fn distances_needed(&self) -> usize;
+    /// What to say of parameter `i` when its standard error is of the size of its value.
+    fn why_weak(&self, _i: usize, _rows: &Rows) -> Option<String> {
+        None
+    }
+}
+
+/// The forms there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Form {
+    Paper,
+    Nguyen,
+    Khoshelham,
+    Disparity,
+}
+
+impl Form {
+    pub const ALL: [Form; 4] = [Form::Paper, Form::Nguyen, Form::Khoshelham, Form::Disparity];
+
+    pub fn spec(self) -> &'static dyn SigmaForm {
+        match self {
+            Form::Paper => &paper::Paper,
+            Form::Nguyen => &nguyen::Nguyen,
+            Form::Khoshelham => &khoshelham::Khoshelham,
+            Form::Disparity => &disparity::Disparity,
+        }
+    }
+
+    pub fn id(self) -> &'static str {
+        self.spec().id()
+    }
+}
+
+impl fmt::Display for Form {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.id())
+    }
+}
+
+impl FromStr for Form {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Form::ALL.into_iter().find(|f| f.id() == text).ok_or_else(|| {
+            let known: Vec<&str> = Form::ALL.iter().map(|f| f.id()).collect();
+            format!("there is no form \"{text}\"; the forms are {}", known.join(", "))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every form's gradient against central differences.
+    #[test]
+    fn gradients_match_differences() {
+        for form in Form::ALL {
+            let spec = form.spec();
+            let p: Vec<f64> = match form {
+                Form::Paper => PAPER_EQ1.to_vec(),
+                Form::Nguyen => vec![0.0012, 0.0019, 0.4, 0.0001],
+                Form::Khoshelham => vec![1.425e-3],
+                Form::Disparity => vec![1.4e-3, 0.8e-3],
+            };
+            assert_eq!(p.len(), spec.parameters().len());
+            for (z, theta) in [(0.8, 0.0), (1.0, 0.6), (3.7, 1.25)] {
+                let mut gradient = [0.0; MOST_PARAMETERS];
+                spec.gradient(&p, z, theta, &mut gradient);
+                for i in 0..p.len() {
+                    let h = 1e-6 * p[i].abs().max(1e-6);
+                    let (mut low, mut high) = (p.clone(), p.clone());
+                    low[i] -= h;
+                    high[i] += h;
+                    let numeric =
+                        (spec.sigma(&high, z, theta) - spec.sigma(&low, z, theta)) / (2.0 * h);
+                    let scale = gradient[i].abs().max(1e-9);
+                    assert!(
+                        (gradient[i] - numeric).abs() < 1e-5 * scale,
+                        "{form} {i}: {} {numeric}",
+                        gradient[i]
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn names_read_back() {
+        for form in Form::ALL {
+            assert_eq!(form.id().parse::<Form>().unwrap(), form);
+        }
+        assert!("best".parse::<Form>().unwrap_err().contains("paper"));
+    }
+}

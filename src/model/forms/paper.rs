@@ -1,0 +1,210 @@
+//! Yamaguchi et al. 2016, Eq. 1: six parameters.
+
+use super::{MOST_PARAMETERS, SigmaForm, Start, Walk};
+use crate::measure::SigmaRow;
+use crate::model::rows::{BestTilt, Rows, TiltSearch};
+
+/// a, b, c, d, e, f as printed (m and rad).
+pub const PAPER_EQ1: [f64; 6] = [0.00151, 0.00215, 0.483, 1.88e-6, 2.01, 1.39];
+
+#[derive(Debug)]
+pub(super) struct Paper;
+
+/// theta^2 / (f - theta)^2.
+#[inline]
+pub fn tilt(theta: f64, f: f64) -> f64 {
+    let ratio = theta / (f - theta);
+    ratio * ratio
+}
+
+/// Derivatives of a + b (z - c)^2 by a, b, c.
+pub(super) fn vertex_gradient(p: &[f64], z: f64, out: &mut [f64; MOST_PARAMETERS]) {
+    let off = z - p[2];
+    out[0] = 1.0;
+    out[1] = off * off;
+    out[2] = -2.0 * p[1] * off;
+}
+
+/// (a, b, c) of alpha + beta z + gamma z^2; `None` when it opens downwards.
+pub(super) fn vertex(alpha: f64, beta: f64, gamma: f64) -> Option<[f64; 3]> {
+    if !(gamma > 0.0) {
+        return None;
+    }
+    let c = -beta / (2.0 * gamma);
+    Some([alpha - gamma * c * c, gamma, c])
+}
+
+/// A vertex farther than this from the data is an extrapolation, not a measurement, m.
+const VERTEX_REACH_M: f64 = 5.0;
+
+/// Start of a + b (z - c)^2 + d h with h known: all linear. Falls back on holding c where the
+/// parabola has no upward vertex near the data, and d at zero where tilt adds no noise.
+pub(super) fn parabola_start(rows: &Rows, h: impl Fn(&SigmaRow) -> f64) -> Option<Start> {
+    let tilted = rows.iter().any(|r| h(r) > 0.0);
+    let mut remarks = Vec::new();
+    let mut with_tilt = tilted;
+    let columns = |tilt: bool| {
+        rows.solve_linear(3 + usize::from(tilt), |r, out| {
+            out[0] = 1.0;
+            out[1] = r.z_m;
+            out[2] = r.z_m * r.z_m;
+            if tilt {
+                out[3] = h(r);
+            }
+        })
+    };
+    let mut q = columns(with_tilt);
+    if with_tilt && q.as_ref().is_none_or(|q| q[3] <= 0.0) {
+        with_tilt = false;
+        q = columns(false);
+    }
+    let near = |c: f64| (-VERTEX_REACH_M..=VERTEX_REACH_M).contains(&c);
+    let abc = q.as_ref().and_then(|q| vertex(q[0], q[1], q[2])).filter(|abc| near(abc[2]));
+    let (abc, held_c) = match abc {
+        Some(abc) => (abc, false),
+        None => (vertex_held(rows, &mut remarks)?, true),
+    };
+    let d = match (with_tilt, &q) {
+        (true, Some(q)) => q[3],
+        _ => LEAST_TILT,
+    };
+    if !with_tilt {
+        remarks.push(if tilted {
+            "tilt adds no noise that these views show: d is held at practically zero".into()
+        } else {
+            "no view is tilted: d is held at practically zero".into()
+        });
+    }
+    Some(Start {
+        parameters: vec![abc[0], abc[1], abc[2], d],
+        held: vec![false, false, held_c, !with_tilt],
+        remarks,
+    })
+}
+
+/// A tilt coefficient that changes sigma by nothing at any angle short of the pole.
+const LEAST_TILT: f64 = 1e-12;
+
+/// a and b with c held at the paper's.
+fn vertex_held(rows: &Rows, remarks: &mut Vec<String>) -> Option<[f64; 3]> {
+    let c = PAPER_EQ1[2];
+    let q = rows.solve_linear(2, |r, out| {
+        out[0] = 1.0;
+        out[1] = (r.z_m - c).powi(2);
+    })?;
+    remarks.push(format!(
+        "b and c cannot be told apart from these distances: c is held at the paper's {c} m"
+    ));
+    (q[1] > 0.0).then_some([q[0], q[1], c])
+}
+
+/// The drop of chi-square that three more parameters gain by chance once in a hundred times
+/// (chi-square with 3 degrees of freedom, 1 %: 11.3).
+const TILT_WORTH: f64 = 11.3;
+
+impl SigmaForm for Paper {
+    fn id(&self) -> &'static str {
+        "paper"
+    }
+
+    fn formula(&self) -> &'static str {
+        "sigma = a + b (z - c)^2 + d z^e theta^2 / (f - theta)^2 (m; z in m, theta in rad)"
+    }
+
+    fn reference(&self) -> &'static str {
+        "Yamaguchi, Emaru, Kobayashi and Ravankar, SII 2016, Eq. 1"
+    }
+
+    fn parameters(&self) -> &'static [(&'static str, Walk)] {
+        &[
+            ("a", Walk::Linear),
+            ("b", Walk::Log),
+            ("c", Walk::Linear),
+            ("d", Walk::Log),
+            ("e", Walk::Linear),
+            ("f", Walk::LogAboveTheta),
+        ]
+    }
+
+    fn sigma(&self, p: &[f64], z: f64, theta: f64) -> f64 {
+        let axial = p[0] + p[1] * (z - p[2]).powi(2);
+        if theta == 0.0 { axial } else { axial + p[3] * z.powf(p[4]) * tilt(theta, p[5]) }
+    }
+
+    fn gradient(&self, p: &[f64], z: f64, theta: f64, out: &mut [f64; MOST_PARAMETERS]) {
+        vertex_gradient(p, z, out);
+        let unit = z.powf(p[4]) * tilt(theta, p[5]);
+        out[3] = unit;
+        out[4] = p[3] * unit * z.ln();
+        out[5] = -2.0 * p[3] * unit / (p[5] - theta);
+    }
+
+    fn pole(&self, p: &[f64]) -> Option<f64> {
+        Some(p[5])
+    }
+
+    /// Variable projection: for given (e, f) the rest is linear, so only these two are searched.
+    fn start(&self, rows: &Rows) -> Option<Start> {
+        let best =
+            if rows.steepest() > 0.0 { TiltSearch::new(rows).map(|s| s.best()) } else { None };
+        match best.filter(|b| b.gain > TILT_WORTH * rows.noise_scale(b.chi2)) {
+            Some(best) => with_tilt(rows, &best),
+            None => without_tilt(rows),
+        }
+    }
+
+    fn distances_needed(&self) -> usize {
+        3
+    }
+
+    fn why_weak(&self, i: usize, rows: &Rows) -> Option<String> {
+        match i {
+            0..=2 => Some(format!(
+                "a, b and c cannot be told apart well: the nearest view is at {:.2} m, c needs views on both sides of it",
+                rows.range(|r| r.z_m)[0]
+            )),
+            _ => Some(why_no_tilt(rows)),
+        }
+    }
+}
+
+fn with_tilt(rows: &Rows, best: &BestTilt) -> Option<Start> {
+    let mut start = parabola_start(rows, |r| r.z_m.powf(best.e) * tilt(r.theta_rad, best.f))?;
+    let held = start.held[3];
+    start.parameters.extend([best.e, best.f]);
+    start.held.extend([held, held || best.at_rim]);
+    if best.at_rim {
+        start.remarks.push(format!(
+            "f is held at {:.3} rad, the rim of its search: {}",
+            best.f,
+            why_no_tilt(rows)
+        ));
+    }
+    Some(start)
+}
+
+/// e and f as printed in the paper; d as far as the data know it.
+fn without_tilt(rows: &Rows) -> Option<Start> {
+    let (e, f) = (PAPER_EQ1[4], PAPER_EQ1[5].max(rows.steepest() + 0.02));
+    let mut start = parabola_start(rows, |r| r.z_m.powf(e) * tilt(r.theta_rad, f))?;
+    start.parameters.extend([e, f]);
+    start.held.extend([true, true]);
+    start.remarks.push(format!("e and f are held at {e} and {f:.3} rad: {}", why_no_tilt(rows)));
+    Some(start)
+}
+
+/// Below this the tilt term of Eq. 1 is under a tenth of the axial one (physics: 71.9-73.5 deg).
+const TILT_SHOWS_DEG: f64 = 74.0;
+
+fn why_no_tilt(rows: &Rows) -> String {
+    let steepest = rows.steepest().to_degrees();
+    if steepest < TILT_SHOWS_DEG {
+        format!(
+            "d, e and f cannot be told apart: no view is tilted past {TILT_SHOWS_DEG} degrees (steepest {steepest:.1})"
+        )
+    } else {
+        format!(
+            "d, e and f cannot be told apart: too few or too noisy views between {TILT_SHOWS_DEG} and {steepest:.1} degrees"
+        )
+    }
+}

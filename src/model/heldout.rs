@@ -1,0 +1,116 @@
+//! Judging forms on distances they have not seen.
+
+use super::fit::{DISTANCE_RATIO, fit};
+use super::forms::Form;
+use super::rows::Rows;
+use crate::measure::SigmaTable;
+
+/// How a form predicts the sigmas of a distance left out of its fit, over all distances.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldOut {
+    pub form: Form,
+    /// Mean log density of the relative residual, nats a view; greater is better.
+    pub log_score: f64,
+    /// Root mean square relative error, views weighing the same.
+    pub rmse_relative: f64,
+    /// Groups of distances that were left out in turn.
+    pub folds: usize,
+}
+
+/// More distances than this are put together into as many groups.
+const MOST_FOLDS: usize = 8;
+
+/// Leave out one distance (or group of neighbouring distances) at a time; views stay whole.
+///
+/// `None` when there are fewer than three distances or a fold cannot be fitted.
+pub fn held_out(table: &SigmaTable, form: Form) -> Option<HeldOut> {
+    let folds = folds(table);
+    let count = folds.iter().map(|(_, fold)| fold + 1).max()?;
+    if count < 3 {
+        return None;
+    }
+    let fold_of = |view: usize| folds.iter().find(|(v, _)| *v == view).map_or(0, |(_, f)| *f);
+    let (mut score, mut square, mut views) = (0.0, 0.0, 0.0);
+    for left_out in 0..count {
+        let pick = |keep: bool| SigmaTable {
+            rows: table
+                .rows
+                .iter()
+                .filter(|r| (fold_of(r.view) != left_out) == keep)
+                .copied()
+                .collect(),
+        };
+        let (train, test) = (pick(true), pick(false));
+        let fitted = fit(&train, form).ok()?;
+        let p = fitted.values();
+        let extra = fitted.extra_within.powi(2) + fitted.extra_between.powi(2);
+        let rows = Rows::new(&test);
+        for view in views_of(&test) {
+            let (mut s, mut q, mut n) = (0.0, 0.0, 0.0);
+            for (i, r) in rows.iter().enumerate().filter(|(_, r)| r.view == view) {
+                let predicted = form.spec().sigma(&p, r.z_m, r.theta_rad);
+                let error = r.sigma_m / predicted - 1.0;
+                let variance = if rows.counted() {
+                    rows.relative_variance(i) + extra
+                } else {
+                    fitted.rmse_relative.powi(2)
+                }
+                .max(f64::MIN_POSITIVE);
+                s += -0.5
+                    * (error * error / variance + (2.0 * std::f64::consts::PI * variance).ln());
+                q += error * error;
+                n += 1.0;
+            }
+            score += s / n;
+            square += q / n;
+            views += 1.0;
+        }
+    }
+    let result = HeldOut {
+        form,
+        log_score: score / views,
+        rmse_relative: (square / views).sqrt(),
+        folds: count,
+    };
+    (result.log_score.is_finite() && result.rmse_relative.is_finite()).then_some(result)
+}
+
+/// All forms that can be judged, best first.
+pub fn compare_forms(table: &SigmaTable) -> Vec<HeldOut> {
+    let mut scores: Vec<HeldOut> =
+        Form::ALL.into_iter().filter_map(|f| held_out(table, f)).collect();
+    scores.sort_by(|a, b| b.log_score.total_cmp(&a.log_score));
+    scores
+}
+
+fn views_of(table: &SigmaTable) -> Vec<usize> {
+    let mut views: Vec<usize> = table.rows.iter().map(|r| r.view).collect();
+    views.sort_unstable();
+    views.dedup();
+    views
+}
+
+/// Each view with the number of its fold, by its mean distance.
+fn folds(table: &SigmaTable) -> Vec<(usize, usize)> {
+    let mut views: Vec<(usize, f64)> = views_of(table)
+        .into_iter()
+        .map(|view| {
+            let z: Vec<f64> = table.rows.iter().filter(|r| r.view == view).map(|r| r.z_m).collect();
+            (view, z.iter().sum::<f64>() / z.len() as f64)
+        })
+        .collect();
+    views.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mut group = 0;
+    let mut groups: Vec<usize> = Vec::new();
+    for (i, view) in views.iter().enumerate() {
+        if i > 0 && view.1 > views[i - 1].1 * DISTANCE_RATIO {
+            group += 1;
+        }
+        groups.push(group);
+    }
+    if group + 1 > MOST_FOLDS || group < 2 {
+        let n = views.len();
+        groups = (0..n).map(|i| i * MOST_FOLDS.min(n) / n).collect();
+    }
+    views.into_iter().zip(groups).map(|((view, _), fold)| (view, fold)).collect()
+}

@@ -1,0 +1,403 @@
+//! Measured sigmas with their weights, ready for least squares.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::measure::{SigmaRow, SigmaTable};
+use crate::solve::nelder_mead;
+
+/// Rows grouped by view. The relative error of a row is taken as the sum of three independent
+/// ones: its sampling error (variance 1/(2 n_effective)), an error of its own (tau_cell) and one
+/// shared by the rows of its view (tau_view). Residuals are relative to the *model's* sigma, not
+/// the measured one: weights from the measurement favour what came out too small.
+#[derive(Debug, Clone)]
+pub struct Rows {
+    rows: Vec<SigmaRow>,
+    /// Ranges of rows of one view.
+    blocks: Vec<std::ops::Range<usize>>,
+    /// Sampling variance of the relative error; one everywhere when no n is known.
+    sampling: Vec<f64>,
+    counted: bool,
+    /// Sigma that residuals are relative to, m.
+    reference: Vec<f64>,
+    pub tau_cell2: f64,
+    pub tau_view2: f64,
+}
+
+impl Rows {
+    pub fn new(table: &SigmaTable) -> Self {
+        let mut rows = table.rows.clone();
+        rows.sort_by_key(|r| r.view);
+        let mut blocks: Vec<std::ops::Range<usize>> = Vec::new();
+        for (i, row) in rows.iter().enumerate() {
+            match blocks.last_mut() {
+                Some(block) if rows[block.start].view == row.view => block.end = i + 1,
+                _ => blocks.push(i..i + 1),
+            }
+        }
+        let counted = rows.iter().all(|r| r.n_effective.is_some());
+        let sampling = rows
+            .iter()
+            .map(|r| r.n_effective.filter(|_| counted).map_or(1.0, |n| 0.5 / n))
+            .collect();
+        let reference = rows.iter().map(|r| r.sigma_m).collect();
+        Rows { rows, blocks, sampling, counted, reference, tau_cell2: 0.0, tau_view2: 0.0 }
+    }
+
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    pub fn views(&self) -> usize {
+        self.blocks.len()
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = &SigmaRow> {
+        self.rows.iter()
+    }
+
+    pub fn steepest(&self) -> f64 {
+        self.range(|r| r.theta_rad)[1]
+    }
+
+    pub fn range(&self, column: impl Fn(&SigmaRow) -> f64) -> [f64; 2] {
+        self.rows
+            .iter()
+            .map(column)
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+    }
+
+    /// Is the sampling error known (a table with n)?
+    pub fn counted(&self) -> bool {
+        self.counted
+    }
+
+    /// Distances that differ by more than `ratio`.
+    pub fn distances(&self, ratio: f64) -> usize {
+        let mut z: Vec<f64> = self.rows.iter().map(|r| r.z_m).collect();
+        z.sort_by(f64::total_cmp);
+        let mut last = 0.0;
+        z.into_iter()
+            .filter(|&z| {
+                let new = z > last * ratio;
+                if new {
+                    last = z
+                }
+                new
+            })
+            .count()
+    }
+
+    /// Make residuals relative to these sigmas, m.
+    pub fn refer_to(&mut self, sigma: impl Fn(&SigmaRow) -> f64) {
+        self.reference = self.rows.iter().map(sigma).collect();
+    }
+
+    pub fn reference(&self) -> &[f64] {
+        &self.reference
+    }
+
+    /// What one unit of weighted chi-square is expected to be per degree of freedom.
+    pub fn noise_scale(&self, chi2: f64) -> f64 {
+        if self.counted {
+            1.0
+        } else {
+            (chi2 / (self.len() as f64 - 6.0).max(1.0)).max(f64::MIN_POSITIVE)
+        }
+    }
+
+    /// Divide by the reference sigma and rotate so that errors become independent and of unit
+    /// variance: for a view with variances D and shared tau^2, (D + tau^2 11')^(-1/2) in closed
+    /// form.
+    pub fn whiten(&self, column: &mut [f64]) {
+        for block in &self.blocks {
+            let (mut s, mut dot) = (0.0, 0.0);
+            for i in block.clone() {
+                let per = 1.0 / (self.sampling[i] + self.tau_cell2);
+                column[i] *= per.sqrt() / self.reference[i];
+                s += per;
+                dot += column[i] * per.sqrt();
+            }
+            if self.tau_view2 > 0.0 && s > 0.0 {
+                let shrink = (1.0 - 1.0 / (1.0 + self.tau_view2 * s).sqrt()) / s * dot;
+                for i in block.clone() {
+                    column[i] -= shrink / (self.sampling[i] + self.tau_cell2).sqrt();
+                }
+            }
+        }
+    }
+
+    pub fn whitened_sigmas(&self) -> DVector<f64> {
+        let mut y: Vec<f64> = self.rows.iter().map(|r| r.sigma_m).collect();
+        self.whiten(&mut y);
+        DVector::from_vec(y)
+    }
+
+    /// Weighted least squares of sigma on `k` columns; `None` when they are not independent.
+    pub fn solve_linear(&self, k: usize, fill: impl Fn(&SigmaRow, &mut [f64])) -> Option<Vec<f64>> {
+        let n = self.len();
+        if n < k {
+            return None;
+        }
+        let mut a = DMatrix::zeros(n, k);
+        let mut values = vec![0.0; k];
+        for (i, row) in self.rows.iter().enumerate() {
+            fill(row, &mut values);
+            for (j, &v) in values.iter().enumerate() {
+                a[(i, j)] = v;
+            }
+        }
+        let mut scales = Vec::with_capacity(k);
+        for j in 0..k {
+            let column = &mut a.as_mut_slice()[j * n..(j + 1) * n];
+            self.whiten(column);
+            let norm = column.iter().map(|v| v * v).sum::<f64>().sqrt();
+            if !(norm > 0.0 && norm.is_finite()) {
+                return None;
+            }
+            column.iter_mut().for_each(|v| *v /= norm);
+            scales.push(norm);
+        }
+        let qr = a.qr();
+        let r = qr.r();
+        if (0..k).any(|j| r[(j, j)].abs() < DEPENDENT) {
+            return None;
+        }
+        let right = qr.q().tr_mul(&self.whitened_sigmas());
+        let x = r.solve_upper_triangular(&right)?;
+        Some(x.iter().zip(&scales).map(|(x, s)| x / s).collect())
+    }
+
+    /// Set the two extra variances so that the relative residuals are as large as expected
+    /// (Paule and Mandel 1982, within views and between them); zero where sampling explains all.
+    pub fn estimate_extra(&mut self, parameters: usize) {
+        if !self.counted {
+            return;
+        }
+        let residual: Vec<f64> =
+            self.rows.iter().zip(&self.reference).map(|(r, s)| r.sigma_m / s - 1.0).collect();
+        let within_dof = self.len() as f64 - self.views() as f64;
+        self.tau_cell2 = smallest_root(|tau| self.within(&residual, tau) - within_dof);
+        let between_dof = (self.views() as f64 - parameters as f64).max(1.0);
+        let cell = self.tau_cell2;
+        self.tau_view2 = smallest_root(|tau| self.between(&residual, cell, tau) - between_dof);
+    }
+
+    /// Chi-square of the rows about their view's mean.
+    fn within(&self, residual: &[f64], tau_cell2: f64) -> f64 {
+        self.blocks.iter().map(|b| self.block(b, residual, tau_cell2).2).sum()
+    }
+
+    /// Chi-square of the views' means.
+    fn between(&self, residual: &[f64], tau_cell2: f64, tau_view2: f64) -> f64 {
+        self.blocks
+            .iter()
+            .map(|b| {
+                let (mean, variance, _) = self.block(b, residual, tau_cell2);
+                mean * mean / (variance + tau_view2)
+            })
+            .sum()
+    }
+
+    /// Weighted mean of a view's residuals, its variance, and the chi-square about it.
+    fn block(
+        &self,
+        block: &std::ops::Range<usize>,
+        residual: &[f64],
+        tau_cell2: f64,
+    ) -> (f64, f64, f64) {
+        let weight = |i: usize| 1.0 / (self.sampling[i] + tau_cell2);
+        let total: f64 = block.clone().map(weight).sum();
+        let mean = block.clone().map(|i| weight(i) * residual[i]).sum::<f64>() / total;
+        let chi2 = block.clone().map(|i| weight(i) * (residual[i] - mean).powi(2)).sum();
+        (mean, 1.0 / total, chi2)
+    }
+
+    /// Total relative variance of row `i`.
+    pub fn relative_variance(&self, i: usize) -> f64 {
+        self.sampling[i] + self.tau_cell2 + self.tau_view2
+    }
+}
+
+/// Diagonal of R after columns were scaled to unit length: below this a column adds nothing new.
+const DEPENDENT: f64 = 1e-9;
+
+/// The least tau^2 >= 0 at which a decreasing excess is not positive, by bisection.
+fn smallest_root(excess: impl Fn(f64) -> f64) -> f64 {
+    if !(excess(0.0) > 0.0) {
+        return 0.0;
+    }
+    let mut high = 1e-6;
+    while excess(high) > 0.0 && high < 1e6 {
+        high *= 4.0;
+    }
+    let mut low = 0.0;
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if excess(middle) > 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
+/// Variable projection for the paper's tilt term: how much a column z^e theta^2/(f - theta)^2
+/// improves on a parabola in z, as a function of (e, f) alone.
+pub struct TiltSearch<'a> {
+    rows: &'a Rows,
+    log_z: Vec<f64>,
+    /// Orthonormal basis of the whitened 1, z, z^2.
+    basis: DMatrix<f64>,
+    /// What the parabola leaves of the whitened sigmas.
+    left: DVector<f64>,
+}
+
+/// Where the search ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BestTilt {
+    pub e: f64,
+    pub f: f64,
+    /// Drop of the weighted chi-square against no tilt term.
+    pub gain: f64,
+    pub chi2: f64,
+    /// (e, f) stand at the rim of the search: the data do not bound them.
+    pub at_rim: bool,
+}
+
+/// The searched box: exponents from Nguyen's -0.5 to Eq. 1's 2.01 and well beyond, the pole from
+/// 0.3 degrees to 3 rad past the steepest view.
+const EXPONENTS: [f64; 2] = [-4.0, 6.0];
+const LOG_POLE: [f64; 2] = [-5.3, 1.1];
+const GRID: [usize; 2] = [9, 13];
+
+impl<'a> TiltSearch<'a> {
+    pub fn new(rows: &'a Rows) -> Option<Self> {
+        let n = rows.len();
+        let mut a = DMatrix::zeros(n, 3);
+        for (i, row) in rows.iter().enumerate() {
+            a[(i, 0)] = 1.0;
+            a[(i, 1)] = row.z_m;
+            a[(i, 2)] = row.z_m * row.z_m;
+        }
+        for j in 0..3 {
+            rows.whiten(&mut a.as_mut_slice()[j * n..(j + 1) * n]);
+        }
+        let basis = a.qr().q();
+        let y = rows.whitened_sigmas();
+        let left = &y - &basis * basis.tr_mul(&y);
+        let log_z = rows.iter().map(|r| r.z_m.ln()).collect();
+        left.iter().all(|v| v.is_finite()).then_some(TiltSearch { rows, log_z, basis, left })
+    }
+
+    /// Drop of chi-square at (e, ln(f - steepest)); zero where the coefficient would be negative.
+    fn gain(&self, e: f64, log_pole: f64) -> f64 {
+        let inside = |v: f64, [low, high]: [f64; 2]| (low..=high).contains(&v);
+        if !inside(e, EXPONENTS) || !inside(log_pole, LOG_POLE) {
+            return 0.0;
+        }
+        let f = self.rows.steepest() + log_pole.exp();
+        let mut h: Vec<f64> = self
+            .rows
+            .iter()
+            .zip(&self.log_z)
+            .map(|(r, lz)| (e * lz).exp() * super::forms::tilt(r.theta_rad, f))
+            .collect();
+        self.rows.whiten(&mut h);
+        let h = DVector::from_vec(h);
+        let shadow = self.basis.tr_mul(&h);
+        let square = h.norm_squared() - shadow.norm_squared();
+        // `left` is orthogonal to the basis already.
+        let dot = h.dot(&self.left);
+        if dot > 0.0 && square > 1e-12 * h.norm_squared() { dot * dot / square } else { 0.0 }
+    }
+
+    /// The best (e, f): a grid over the box, then Nelder-Mead.
+    pub fn best(&self) -> BestTilt {
+        let at = |[low, high]: [f64; 2], i: usize, n: usize| {
+            low + (high - low) * i as f64 / (n - 1) as f64
+        };
+        let (mut e, mut g, mut gain) = (EXPONENTS[0], LOG_POLE[1], -1.0);
+        for i in 0..GRID[0] {
+            for j in 0..GRID[1] {
+                let (ei, gj) = (at(EXPONENTS, i, GRID[0]), at(LOG_POLE, j, GRID[1]));
+                let value = self.gain(ei, gj);
+                if value > gain {
+                    (e, g, gain) = (ei, gj, value);
+                }
+            }
+        }
+        let refined = nelder_mead(|x| -self.gain(x[0], x[1]), &[e, g], &[0.4, -0.2], 120);
+        let value = self.gain(refined[0], refined[1]);
+        if value > gain {
+            (e, g, gain) = (refined[0], refined[1], value);
+        }
+        let near = |v: f64, [low, high]: [f64; 2]| (v - low).min(high - v) < 0.02 * (high - low);
+        BestTilt {
+            e,
+            f: self.rows.steepest() + g.exp(),
+            gain,
+            chi2: self.left.norm_squared() - gain,
+            at_rim: near(e, EXPONENTS) || near(g, LOG_POLE),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows() -> Rows {
+        let table = SigmaTable {
+            rows: (0..12)
+                .map(|i| SigmaRow {
+                    z_m: 1.0 + 0.2 * f64::from(i),
+                    theta_rad: 0.1,
+                    sigma_m: 0.002 + 0.001 * f64::from(i),
+                    n_effective: Some(50.0 + 10.0 * f64::from(i)),
+                    view: (i / 3) as usize,
+                })
+                .collect(),
+        };
+        let mut rows = Rows::new(&table);
+        rows.tau_cell2 = 0.003;
+        rows.tau_view2 = 0.02;
+        rows
+    }
+
+    /// Whitened products against the explicit inverse of the covariance.
+    #[test]
+    fn whitening_is_the_inverse_covariance() {
+        let rows = rows();
+        let n = rows.len();
+        let covariance = DMatrix::from_fn(n, n, |i, j| {
+            let same_view = rows.rows[i].view == rows.rows[j].view;
+            let mut c = if same_view { rows.tau_view2 } else { 0.0 };
+            if i == j {
+                c += rows.sampling[i] + rows.tau_cell2;
+            }
+            c * rows.reference[i] * rows.reference[j]
+        });
+        let x = DVector::from_fn(n, |i, _| (i as f64).sin());
+        let y = DVector::from_fn(n, |i, _| (i as f64 * 0.7).cos());
+        let explicit = x.dot(&covariance.try_inverse().unwrap().clone_owned().mul_to_vector(&y));
+        let (mut xw, mut yw) = (x.as_slice().to_vec(), y.as_slice().to_vec());
+        rows.whiten(&mut xw);
+        rows.whiten(&mut yw);
+        let whitened: f64 = xw.iter().zip(&yw).map(|(a, b)| a * b).sum();
+        assert!((whitened / explicit - 1.0).abs() < 1e-9, "{whitened} {explicit}");
+    }
+
+    trait MulToVector {
+        fn mul_to_vector(self, y: &DVector<f64>) -> DVector<f64>;
+    }
+    impl MulToVector for DMatrix<f64> {
+        fn mul_to_vector(self, y: &DVector<f64>) -> DVector<f64> {
+            self * y
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Drawing and pages. Computes nothing: a number in a report exists as data elsewhere.

@@ -1,0 +1,169 @@
+//! The two argmin solvers the fits use, with every way of running for ever closed.
+
+use argmin::core::{
+    CostFunction, Error as ArgminError, Executor, Gradient, Hessian, State, TerminationReason,
+};
+use argmin::solver::neldermead::NelderMead;
+use argmin::solver::trustregion::{Steihaug, TrustRegion};
+use nalgebra::{DMatrix, DVector};
+
+/// A sum of squares: residuals and their Jacobian at a point.
+pub trait LeastSquares {
+    /// Residuals (n) and Jacobian (n x p); `None` outside the domain.
+    fn linearise(&self, x: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)>;
+    /// Half the sum of squares; infinite outside the domain.
+    fn cost(&self, x: &DVector<f64>) -> f64;
+}
+
+/// Where a solver stopped and why.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ending {
+    pub x: DVector<f64>,
+    pub cost: f64,
+    pub iterations: u64,
+    pub reason: String,
+}
+
+struct AsArgmin<'a, P>(&'a P);
+
+impl<P: LeastSquares> CostFunction for AsArgmin<'_, P> {
+    type Param = DVector<f64>;
+    type Output = f64;
+    fn cost(&self, x: &Self::Param) -> Result<f64, ArgminError> {
+        Ok(finite_or_huge(self.0.cost(x)))
+    }
+}
+
+impl<P: LeastSquares> Gradient for AsArgmin<'_, P> {
+    type Param = DVector<f64>;
+    type Gradient = DVector<f64>;
+    fn gradient(&self, x: &Self::Param) -> Result<DVector<f64>, ArgminError> {
+        Ok(self.0.linearise(x).map_or_else(|| DVector::zeros(x.len()), |(r, j)| j.tr_mul(&r)))
+    }
+}
+
+impl<P: LeastSquares> Hessian for AsArgmin<'_, P> {
+    type Param = DVector<f64>;
+    type Hessian = DMatrix<f64>;
+    /// Gauss-Newton: J'J.
+    fn hessian(&self, x: &Self::Param) -> Result<DMatrix<f64>, ArgminError> {
+        let p = x.len();
+        Ok(self.0.linearise(x).map_or_else(|| DMatrix::identity(p, p), |(_, j)| j.tr_mul(&j)))
+    }
+}
+
+/// argmin's line of solvers compares costs; NaN would pass every comparison.
+fn finite_or_huge(cost: f64) -> f64 {
+    if cost.is_finite() { cost } else { f64::MAX / 4.0 }
+}
+
+/// Trust region with Steihaug's truncated conjugate gradients on the Gauss-Newton Hessian, from
+/// a start that is already near: the only one of argmin's solvers that almost always converges
+/// on this problem. `None` when the start is outside the domain.
+pub fn trust_region<P: LeastSquares>(
+    problem: &P,
+    start: DVector<f64>,
+    most: u64,
+) -> Option<Ending> {
+    let initial = problem.cost(&start);
+    if !initial.is_finite() {
+        return None;
+    }
+    let radius = (1e-2 * start.norm()).max(1e-3);
+    let subproblem = Steihaug::new().with_max_iters(2 * start.len() as u64 + 4);
+    let solver =
+        TrustRegion::new(subproblem).with_radius(radius).ok()?.with_max_radius(1e6).ok()?;
+    let run = Executor::new(AsArgmin(problem), solver)
+        .configure(|state| state.param(start.clone()).max_iters(most).target_cost(0.0))
+        .timer(false)
+        .run();
+    let Ok(result) = run else {
+        return Some(Ending {
+            x: start,
+            cost: initial,
+            iterations: 0,
+            reason: "solver error".into(),
+        });
+    };
+    let state = result.state();
+    let (x, cost) = match state.get_best_param() {
+        Some(best) if state.get_best_cost() <= initial => (best.clone(), state.get_best_cost()),
+        _ => (start, initial),
+    };
+    Some(Ending {
+        x,
+        cost,
+        iterations: state.get_iter(),
+        reason: reason(state.get_termination_reason()),
+    })
+}
+
+fn reason(reason: Option<&TerminationReason>) -> String {
+    reason.map_or_else(|| "unknown".into(), ToString::to_string)
+}
+
+struct Plain<F>(F);
+
+impl<F: Fn(&[f64]) -> f64> CostFunction for Plain<F> {
+    type Param = Vec<f64>;
+    type Output = f64;
+    fn cost(&self, x: &Self::Param) -> Result<f64, ArgminError> {
+        Ok(finite_or_huge((self.0)(x)))
+    }
+}
+
+/// Nelder-Mead from a simplex of the given edge lengths around `start`.
+pub fn nelder_mead(
+    cost: impl Fn(&[f64]) -> f64,
+    start: &[f64],
+    edges: &[f64],
+    most: u64,
+) -> Vec<f64> {
+    let mut simplex = vec![start.to_vec()];
+    for (i, edge) in edges.iter().enumerate() {
+        let mut corner = start.to_vec();
+        corner[i] += edge;
+        simplex.push(corner);
+    }
+    let Ok(solver) = NelderMead::new(simplex).with_sd_tolerance(1e-9) else {
+        return start.to_vec();
+    };
+    let run = Executor::new(Plain(cost), solver)
+        .configure(|state| state.max_iters(most))
+        .timer(false)
+        .run();
+    run.ok().and_then(|r| r.state().get_best_param().cloned()).unwrap_or_else(|| start.to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rosenbrock's valley as least squares: minimum 0 at (1, 1).
+    struct Valley;
+
+    impl LeastSquares for Valley {
+        fn linearise(&self, x: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
+            let r = DVector::from_vec(vec![10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]]);
+            let j = DMatrix::from_row_slice(2, 2, &[-20.0 * x[0], 10.0, -1.0, 0.0]);
+            Some((r, j))
+        }
+        fn cost(&self, x: &DVector<f64>) -> f64 {
+            self.linearise(x).map_or(f64::INFINITY, |(r, _)| 0.5 * r.norm_squared())
+        }
+    }
+
+    #[test]
+    fn trust_region_walks_the_valley() {
+        let end = trust_region(&Valley, DVector::from_vec(vec![-1.2, 1.0]), 200).unwrap();
+        assert!((end.x[0] - 1.0).abs() < 1e-6 && (end.x[1] - 1.0).abs() < 1e-6, "{end:?}");
+    }
+
+    #[test]
+    fn nelder_mead_survives_nan() {
+        let cost =
+            |x: &[f64]| if x[0] < 0.0 { f64::NAN } else { (x[0] - 2.0).powi(2) + x[1].powi(2) };
+        let x = nelder_mead(cost, &[0.5, 1.0], &[0.5, 0.5], 400);
+        assert!((x[0] - 2.0).abs() < 1e-3 && x[1].abs() < 1e-3, "{x:?}");
+    }
+}

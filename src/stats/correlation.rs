@@ -1,0 +1,141 @@
+//! How many independent samples a patch of correlated pixels is worth.
+
+/// Spatial correlation of a residual image, summed along columns and rows.
+///
+/// The sums treat the correlation as the product of its course along u and along v, which is
+/// exact for a rectangular matching window.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Correlation {
+    /// rho(lag, 0), lag = 0, 1, 2 ... px along the columns.
+    pub along_u: Vec<f64>,
+    pub along_v: Vec<f64>,
+    /// Sum of rho over all lags: pixels per independent sample of a *mean*.
+    pub sum: f64,
+    /// Sum of rho^2 over all lags: pixels per independent sample of a *variance*.
+    pub sum_of_squares: f64,
+    /// The correlation had not died out at the longest lag: what is left is not noise but a
+    /// smooth error (a bowl, bands), and the sums are lower bounds.
+    pub persists: bool,
+}
+
+/// Longest lag looked at, px: four times a Kinect's matching window.
+const LONGEST_LAG: usize = 40;
+/// Correlations below this count as dead.
+const DEAD: f64 = 0.05;
+/// Pairs looked at per lag; the standard error of a correlation is then 0.01.
+const PAIRS: usize = 10_000;
+
+/// Measure on the residual `field` (row-major, `width` wide, NaN where there is none).
+pub fn measure_correlation(field: &[f32], width: usize) -> Correlation {
+    let height = field.len() / width.max(1);
+    let valid = field.iter().filter(|e| e.is_finite()).count();
+    let stride = (valid / PAIRS).max(1);
+    let along_u =
+        course(field, width, valid, stride, |i, lag| (i % width + lag < width).then_some(i + lag));
+    let along_v = course(field, width, valid, stride, |i, lag| {
+        (i / width + lag < height).then_some(i + lag * width)
+    });
+    let two_sided =
+        |c: &[f64], power: i32| 1.0 + 2.0 * c[1..].iter().map(|r| r.powi(power)).sum::<f64>();
+    let persists = |c: &[f64]| c.len() > LONGEST_LAG;
+    Correlation {
+        sum: (two_sided(&along_u, 1) * two_sided(&along_v, 1)).max(1.0),
+        sum_of_squares: two_sided(&along_u, 2) * two_sided(&along_v, 2),
+        persists: persists(&along_u) || persists(&along_v),
+        along_u,
+        along_v,
+    }
+}
+
+/// Correlation at lag 0, 1, 2 ... until it is dead.
+fn course(
+    field: &[f32],
+    width: usize,
+    valid: usize,
+    stride: usize,
+    partner: impl Fn(usize, usize) -> Option<usize>,
+) -> Vec<f64> {
+    let mut course = vec![1.0];
+    if valid < 100 || width == 0 {
+        return course;
+    }
+    // A stride that shares no factor with the width visits all columns.
+    let stride = if stride > 1 { stride | 1 } else { 1 };
+    for lag in 1..=LONGEST_LAG {
+        let (mut ab, mut aa, mut bb, mut n) = (0.0f64, 0.0f64, 0.0f64, 0usize);
+        for i in (0..field.len()).step_by(stride) {
+            let a = field[i];
+            if !a.is_finite() {
+                continue;
+            }
+            if let Some(b) = partner(i, lag).map(|j| field[j]).filter(|b| b.is_finite()) {
+                let (a, b) = (f64::from(a), f64::from(b));
+                ab += a * b;
+                aa += a * a;
+                bb += b * b;
+                n += 1;
+            }
+        }
+        let rho = if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 };
+        let noise = 2.0 / (n.max(1) as f64).sqrt();
+        if n < 50 || rho < DEAD.max(noise) {
+            break;
+        }
+        course.push(rho);
+    }
+    course
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::Seed;
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn white(width: usize, height: usize) -> Vec<f32> {
+        let mut rng = Seed(4).stream("white");
+        (0..width * height).map(|_| StandardNormal.sample(&mut rng)).collect()
+    }
+
+    /// Moving average over a `side` x `side` window.
+    fn blurred(field: &[f32], width: usize, side: usize) -> Vec<f32> {
+        let height = field.len() / width;
+        (0..field.len())
+            .map(|i| {
+                let (u, v) = (i % width, i / width);
+                let mut sum = 0.0;
+                for dv in 0..side {
+                    for du in 0..side {
+                        sum += field[((v + dv) % height) * width + (u + du) % width];
+                    }
+                }
+                sum
+            })
+            .collect()
+    }
+
+    #[test]
+    fn white_noise_is_worth_its_count() {
+        let c = measure_correlation(&white(300, 200), 300);
+        assert!((c.sum_of_squares - 1.0).abs() < 0.02, "{c:?}");
+        assert!(!c.persists);
+    }
+
+    /// For a moving average over n pixels rho(k) = 1 - k/n, so sum rho = n and
+    /// sum rho^2 = n (2/3 + 1/(3 n^2)) along each axis.
+    #[test]
+    fn a_nine_pixel_window_is_recognised() {
+        let c = measure_correlation(&blurred(&white(400, 300), 400, 9), 400);
+        let squares = (9.0 * (2.0 / 3.0 + 1.0 / 243.0f64)).powi(2);
+        assert!((c.sum / 81.0 - 1.0).abs() < 0.15, "sum {}", c.sum);
+        assert!((c.sum_of_squares / squares - 1.0).abs() < 0.12, "squares {}", c.sum_of_squares);
+        assert!(!c.persists);
+    }
+
+    #[test]
+    fn a_bowl_persists() {
+        let field: Vec<f32> =
+            (0..300 * 200).map(|i| ((i % 300) as f32 - 150.0).powi(2) * 1e-4 - 0.75).collect();
+        assert!(measure_correlation(&field, 300).persists);
+    }
+}

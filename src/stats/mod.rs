@@ -1,0 +1,41 @@
+//! Small statistics the pipeline shares.
+
+mod correlation;
+mod truncated;
+
+pub use correlation::{Correlation, measure_correlation};
+pub use truncated::{normal_cut_factor, std_unbias};
+
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// Median by selection; NaN when empty. The slice is reordered.
+pub fn median_in_place(values: &mut [f32]) -> f32 {
+    let n = values.len();
+    if n == 0 {
+        return f32::NAN;
+    }
+    *values.select_nth_unstable_by(n / 2, f32::total_cmp).1
+}
+
+/// Two-sided quantile of Student's t: P(|T| < q) = `level`.
+pub fn student_quantile(level: f64, degrees_of_freedom: f64) -> f64 {
+    let p = 0.5 + 0.5 * level;
+    StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1.0)).map_or(f64::NAN, |t| t.inverse_cdf(p))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn student_quantiles_match_the_tables() {
+        assert!((student_quantile(0.95, 10.0) - 2.228).abs() < 1e-3);
+        assert!((student_quantile(0.95, 1e6) - 1.960).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_median_of_nothing_is_nan() {
+        assert!(median_in_place(&mut []).is_nan());
+        assert_eq!(median_in_place(&mut [3.0, 1.0, 2.0]), 2.0);
+    }
+}

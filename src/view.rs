@@ -1,0 +1,209 @@
+//! A recording: a sensor and the views it took of a planar target.
+
+use std::path::PathBuf;
+
+use crate::camera::Camera;
+use crate::frame::{DepthCode, RawDisparity};
+use serde::{Deserialize, Serialize};
+
+/// The unit that was recorded: everything `recording.json` says about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensor {
+    pub name: String,
+    pub serial: Option<String>,
+    pub mode: Option<String>,
+    pub camera: Camera,
+    /// Distance between projector and camera, m.
+    pub baseline_m: Option<f64>,
+    pub code: DepthCode,
+}
+
+impl Sensor {
+    /// fx * baseline: disparity in px is this over the depth in m.
+    pub fn disparity_px_m(&self) -> Option<f64> {
+        self.baseline_m.map(|b| self.camera.fx * b)
+    }
+
+    pub fn fault(&self) -> Option<String> {
+        let baseline = self
+            .baseline_m
+            .filter(|b| !(b.is_finite() && *b > 0.0))
+            .map(|b| format!("baseline_m = {b} must be positive"));
+        self.camera.fault().or_else(|| self.code.fault()).or(baseline)
+    }
+}
+
+/// Where the target is, when the recording says so; pixel coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Region {
+    /// Corners u0, v0, u1, v1; both edges belong to the region.
+    Rectangle([f64; 4]),
+    /// May reach outside the image.
+    Polygon(Vec<[f64; 2]>),
+}
+
+impl Region {
+    /// Does the centre of pixel (u, v) lie inside? Even-odd rule for polygons.
+    pub fn contains(&self, u: f64, v: f64) -> bool {
+        match self {
+            Region::Rectangle([u0, v0, u1, v1]) => u >= *u0 && u <= *u1 && v >= *v0 && v <= *v1,
+            Region::Polygon(corners) => {
+                let mut inside = false;
+                let mut previous = corners[corners.len() - 1];
+                for &corner in corners {
+                    let [(ua, va), (ub, vb)] = [corner, previous].map(|[a, b]| (a, b));
+                    if (va > v) != (vb > v) && u < (ub - ua) * (v - va) / (vb - va) + ua {
+                        inside = !inside;
+                    }
+                    previous = corner;
+                }
+                inside
+            }
+        }
+    }
+}
+
+/// Width and height of the target.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TargetSize {
+    pub width_m: f64,
+    pub height_m: f64,
+}
+
+/// What `view.json` may say.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ViewNotes {
+    pub target: Option<TargetSize>,
+    pub reference_distance_m: Option<f64>,
+    pub region: Option<Region>,
+    pub temperature_c: Option<f64>,
+    pub ambient_lux: Option<f64>,
+    pub notes: Option<String>,
+}
+
+/// A frame that can be read when it is needed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameRef {
+    /// Seconds, one clock for the whole recording.
+    pub timestamp: f64,
+    pub path: PathBuf,
+}
+
+/// One still pose of target and sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    pub name: String,
+    pub depth: Vec<FrameRef>,
+    pub infrared: Vec<FrameRef>,
+    pub notes: ViewNotes,
+}
+
+/// Views in name order, their frames not yet read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    pub root: PathBuf,
+    pub sensor: Sensor,
+    pub views: Vec<View>,
+    /// What was found odd while opening, in words.
+    pub remarks: Vec<String>,
+    /// Files that describe the recording (not the frames), for provenance.
+    pub described_by: Vec<PathBuf>,
+}
+
+/// `recording.json`, as the contract lays it down.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RecordingFile {
+    pub format: String,
+    pub sensor: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub serial: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mode: Option<String>,
+    #[serde(flatten)]
+    pub camera: Camera,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub baseline_m: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units_per_metre: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub invalid: Option<u16>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub raw_disparity: Option<RawDisparity>,
+}
+
+/// The only recording format there is.
+pub const RECORDING_FORMAT: &str = "recording/1";
+
+impl RecordingFile {
+    pub fn of(sensor: &Sensor) -> Self {
+        let (units_per_metre, invalid, raw_disparity) = match sensor.code {
+            DepthCode::Metric { units_per_metre, invalid } => {
+                (Some(units_per_metre), Some(invalid), None)
+            }
+            DepthCode::Disparity { offset, slope, invalid } => {
+                (None, None, Some(RawDisparity { offset, slope, invalid }))
+            }
+        };
+        RecordingFile {
+            format: RECORDING_FORMAT.into(),
+            sensor: sensor.name.clone(),
+            serial: sensor.serial.clone(),
+            mode: sensor.mode.clone(),
+            camera: sensor.camera.clone(),
+            baseline_m: sensor.baseline_m,
+            units_per_metre,
+            invalid,
+            raw_disparity,
+        }
+    }
+
+    /// The sensor described, or what is wrong with the description.
+    pub fn sensor(self) -> Result<Sensor, String> {
+        let code = match (self.units_per_metre, self.raw_disparity) {
+            (Some(units_per_metre), None) => {
+                DepthCode::Metric { units_per_metre, invalid: self.invalid.unwrap_or(0) }
+            }
+            (None, Some(RawDisparity { offset, slope, invalid })) => {
+                DepthCode::Disparity { offset, slope, invalid }
+            }
+            (None, None) => return Err("neither units_per_metre nor raw_disparity is given".into()),
+            (Some(_), Some(_)) => {
+                return Err("units_per_metre and raw_disparity contradict each other".into());
+            }
+        };
+        let sensor = Sensor {
+            name: self.sensor,
+            serial: self.serial,
+            mode: self.mode,
+            camera: self.camera,
+            baseline_m: self.baseline_m,
+            code,
+        };
+        match sensor.fault() {
+            Some(fault) => Err(fault),
+            None => Ok(sensor),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_polygon_may_be_concave_and_reach_outside() {
+        let arrow = Region::Polygon(vec![[-5.0, -5.0], [10.0, 5.0], [-5.0, 15.0], [2.0, 5.0]]);
+        assert!(arrow.contains(6.0, 5.0));
+        assert!(!arrow.contains(0.0, 5.0), "in the notch");
+        assert!(arrow.contains(-3.0, -3.0));
+        assert!(!arrow.contains(11.0, 5.0));
+    }
+
+    #[test]
+    fn a_description_must_say_how_words_become_metres() {
+        let text = r#"{"format":"recording/1","sensor":"s","width":4,"height":3,
+            "fx":5,"fy":5,"cx":2,"cy":1}"#;
+        let file: RecordingFile = serde_json::from_str(text).unwrap();
+        assert!(file.sensor().unwrap_err().contains("units_per_metre"));
+    }
+}
