@@ -30,6 +30,7 @@ pub mod plane;
 pub mod report;
 pub mod residual;
 pub mod rng;
+pub mod simulate;
 pub mod solve;
 pub mod stats;
 pub mod view;

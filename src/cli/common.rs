@@ -1,0 +1,130 @@
+//! Options and habits all commands share.
+
+use std::io::{IsTerminal, Write};
+
+use anyhow::{Context, bail};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use kinoise::frame::KINECT_NO_MEASUREMENT;
+use kinoise::io::Assumed;
+use kinoise::{DepthCode, Seed};
+
+#[derive(Debug, Args)]
+pub struct Global {
+    /// Print the result as JSON on stdout
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Seed of all random choices: the same seed gives the same bytes
+    #[arg(long, global = true, default_value_t = 1)]
+    pub seed: u64,
+    /// Threads; results do not depend on it [default: all cores]
+    #[arg(long, global = true)]
+    pub threads: Option<usize>,
+}
+
+impl Global {
+    pub fn seed(&self) -> Seed {
+        Seed(self.seed)
+    }
+
+    pub fn set_threads(&self) -> anyhow::Result<()> {
+        let Some(n) = self.threads else { return Ok(()) };
+        if n == 0 {
+            bail!("--threads 0: give at least one thread");
+        }
+        rayon::ThreadPoolBuilder::new().num_threads(n).build_global().context("--threads")
+    }
+
+    /// The result for programs; people read stderr.
+    pub fn print_json(&self, value: &serde_json::Value) -> anyhow::Result<()> {
+        if self.json {
+            let mut out = std::io::stdout().lock();
+            serde_json::to_writer_pretty(&mut out, value)?;
+            writeln!(out)?;
+        }
+        Ok(())
+    }
+}
+
+/// What a folder that does not describe itself needs to be told.
+#[derive(Debug, Args)]
+pub struct Input {
+    /// fx,fy,cx,cy in px, for folders without recording.json
+    #[arg(
+        long,
+        value_delimiter = ',',
+        num_args = 4,
+        value_name = "FX,FY,CX,CY",
+        allow_hyphen_values = true
+    )]
+    intrinsics: Option<Vec<f64>>,
+    /// Depth words per metre (1000 = mm, 5000 = TUM), for folders without recording.json
+    #[arg(long, value_name = "N", conflicts_with = "raw_disparity")]
+    units_per_metre: Option<f64>,
+    /// Raw Kinect words: z = 1/(C0 + C1 word), for folders without recording.json
+    #[arg(
+        long,
+        value_delimiter = ',',
+        num_args = 2,
+        value_name = "C0,C1",
+        allow_hyphen_values = true
+    )]
+    raw_disparity: Option<Vec<f64>>,
+    /// Projector-camera distance in m, for folders without recording.json
+    #[arg(long, value_name = "M")]
+    baseline: Option<f64>,
+}
+
+impl Input {
+    pub fn assumed(&self) -> anyhow::Result<Assumed> {
+        let code = match (self.units_per_metre, self.raw_disparity.as_deref()) {
+            (Some(units_per_metre), _) => Some(DepthCode::Metric { units_per_metre, invalid: 0 }),
+            (None, Some(&[offset, slope])) => {
+                Some(DepthCode::Disparity { offset, slope, invalid: KINECT_NO_MEASUREMENT })
+            }
+            _ => None,
+        };
+        if let Some(fault) = code.as_ref().and_then(DepthCode::fault) {
+            bail!("{fault}");
+        }
+        let intrinsics = self.intrinsics.as_deref().and_then(|v| v.try_into().ok());
+        Ok(Assumed { intrinsics, code, baseline_m: self.baseline })
+    }
+}
+
+/// A bar on a terminal, nothing elsewhere.
+pub struct Bar(ProgressBar);
+
+impl Bar {
+    pub fn new(what: &'static str) -> Self {
+        if !std::io::stderr().is_terminal() {
+            return Bar(ProgressBar::hidden());
+        }
+        let bar = ProgressBar::new(0);
+        if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {eta}") {
+            bar.set_style(style);
+        }
+        bar.set_message(what);
+        Bar(bar)
+    }
+
+    pub fn step(&self, done: usize, total: usize) {
+        self.0.set_length(total as u64);
+        // Threads report out of order; a bar never goes back.
+        if done as u64 > self.0.position() {
+            self.0.set_position(done as u64);
+        }
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// A line for people.
+pub fn say(text: impl AsRef<str>) {
+    let mut err = std::io::stderr().lock();
+    let _ = writeln!(err, "{}", text.as_ref());
+}

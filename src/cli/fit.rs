@@ -1,0 +1,39 @@
+use std::path::PathBuf;
+
+use clap::Args;
+use kinoise::io::OutputDir;
+use kinoise::measure::read_table;
+use kinoise::model_of_table;
+use kinoise::report::CalibrationPage;
+
+use super::calibrate::{Fitting, write_outputs};
+use super::common::{Global, say};
+use super::words;
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// CSV with the columns z_m,theta_rad,sigma_m and optionally n (SI units)
+    table: PathBuf,
+    /// Folder for model.json, sigma.svg and report.html
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    #[command(flatten)]
+    fitting: Fitting,
+}
+
+pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
+    let table = read_table(&arguments.table)?;
+    let calibration = model_of_table(&table, arguments.fitting.form()?, &arguments.table)?;
+    let out = OutputDir::create(&arguments.output)?;
+    let page = CalibrationPage {
+        title: &format!("Noise model of {}", arguments.table.display()),
+        sensor: None,
+        measurements: None,
+        calibration: &calibration,
+        overlays: arguments.fitting.overlays(),
+    };
+    write_outputs(&out, &page)?;
+    say(words::summary(&calibration));
+    say(words::warnings(&calibration));
+    global.print_json(&words::as_json(&calibration, None))
+}

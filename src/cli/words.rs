@@ -1,0 +1,161 @@
+//! What a calibration says to people, and to programs.
+
+use kinoise::calibrate::Measurements;
+use kinoise::{Calibration, SigmaModel};
+use serde_json::{Value, json};
+
+/// A few lines and a table: the surface beside the published ones.
+pub fn summary(calibration: &Calibration) -> String {
+    let fit = &calibration.fit;
+    let mut text = format!("{}\n", fit.form.spec().formula());
+    for p in &fit.parameters {
+        let error = p.std_error.map_or("held".into(), |e| format!("± {}", three_digits(e)));
+        text.push_str(&format!(
+            "  {:<3}= {:>12}  {error}\n",
+            p.name,
+            three_digits_like(p.value, p.std_error)
+        ));
+    }
+    text.push_str(&format!(
+        "fitted to {} sigmas of {} views: rmse {:.2} mm ({:.1} % of sigma), r2 {:.4}",
+        fit.rows,
+        fit.views,
+        1e3 * fit.rmse_m,
+        1e2 * fit.rmse_relative,
+        fit.r2
+    ));
+    if let Some(h) = calibration.comparison.iter().find(|h| h.form == fit.form) {
+        text.push_str(&format!("; {:.1} % at distances left out", 1e2 * h.rmse_relative));
+    }
+    text.push_str("\n\n");
+    text.push_str(&surface(&calibration.model.sigma));
+    if calibration.comparison.len() > 1 {
+        text.push_str("\nforms by distances left out (error of sigma, log score a view):\n");
+        for h in &calibration.comparison {
+            text.push_str(&format!(
+                "  {:<11}{:>7.1} %{:>9.2}\n",
+                h.form.id(),
+                1e2 * h.rmse_relative,
+                h.log_score
+            ));
+        }
+    }
+    text
+}
+
+/// Sigma in mm on a small grid inside the valid domain, with the paper's and the others'.
+pub fn surface(model: &SigmaModel) -> String {
+    let mut text = String::from(
+        " z (m)  tilt   this sensor (95 %)       paper Eq. 1  Nguyen 2012  Khoshelham 2012   sigma in mm\n",
+    );
+    for z in shown_distances(model) {
+        for theta_deg in [0.0f64, 30.0, 60.0, 75.0] {
+            let theta = theta_deg.to_radians();
+            let [low, high] = model.domain.theta_rad;
+            // A frontal view is never exactly frontal.
+            if theta > high || (theta < low - 0.1) {
+                continue;
+            }
+            let [a, b] = model.interval(z, theta, 0.95);
+            let own = format!("{:.2} ({:.2}-{:.2})", 1e3 * model.sigma(z, theta), 1e3 * a, 1e3 * b);
+            let other = |m: SigmaModel| 1e3 * m.sigma(z, theta);
+            text.push_str(&format!(
+                "{z:>6.2}{theta_deg:>5.0}°   {own:<24}{:>10.2}{:>13.2}{:>13.2}\n",
+                other(SigmaModel::paper()),
+                other(SigmaModel::nguyen()),
+                other(SigmaModel::khoshelham())
+            ));
+        }
+    }
+    text
+}
+
+/// Round distances inside the domain, or its ends when none lies there.
+fn shown_distances(model: &SigmaModel) -> Vec<f64> {
+    let [low, high] = model.domain.z_m;
+    let round: Vec<f64> =
+        [0.5, 1.0, 2.0, 3.0, 4.0, 6.0].into_iter().filter(|z| (low..=high).contains(z)).collect();
+    if round.is_empty() { vec![0.5 * (low + high)] } else { round }
+}
+
+fn three_digits(v: f64) -> String {
+    if v == 0.0 || !v.is_finite() {
+        return format!("{v}");
+    }
+    let magnitude = v.abs().log10().floor();
+    if (-4.0..4.0).contains(&magnitude) {
+        format!("{v:.*}", (2.0 - magnitude).max(0.0) as usize)
+    } else {
+        format!("{v:.2e}")
+    }
+}
+
+/// As many digits as the error warrants.
+fn three_digits_like(v: f64, error: Option<f64>) -> String {
+    match error {
+        Some(e) if e > 0.0 && e.is_finite() && v.abs() >= 1e-4 => {
+            let digits = (1.0 - e.log10().floor()).clamp(0.0, 9.0) as usize;
+            format!("{v:.digits$}")
+        }
+        _ => three_digits(v),
+    }
+}
+
+/// The warnings, each on its line; long lists are cut, the report has them all.
+pub fn warnings(calibration: &Calibration) -> String {
+    const SHOWN: usize = 8;
+    let all = &calibration.warnings;
+    let mut text = String::new();
+    for warning in all.iter().take(SHOWN) {
+        text.push_str(&format!("note: {warning}\n"));
+    }
+    if all.len() > SHOWN {
+        text.push_str(&format!("note: {} more in report.html\n", all.len() - SHOWN));
+    }
+    text
+}
+
+/// The result for programs.
+pub fn as_json(calibration: &Calibration, measurements: Option<&Measurements>) -> Value {
+    let fit = &calibration.fit;
+    let parameters: serde_json::Map<String, Value> = fit
+        .parameters
+        .iter()
+        .map(|p| {
+            (p.name.into(), json!({"value": p.value, "std_error": p.std_error, "remark": p.remark}))
+        })
+        .collect();
+    let mut value = json!({
+        "form": fit.form.id(),
+        "parameters": parameters,
+        "valid": {"z_m": fit.domain.z_m, "theta_rad": fit.domain.theta_rad},
+        "rows": fit.rows,
+        "rmse_m": fit.rmse_m,
+        "rmse_relative": fit.rmse_relative,
+        "r2": fit.r2,
+        "comparison": calibration.comparison.iter().map(|h| json!({
+            "form": h.form.id(), "log_score": h.log_score, "rmse_relative": h.rmse_relative,
+        })).collect::<Vec<_>>(),
+        "warnings": calibration.warnings,
+    });
+    if let Some(m) = measurements {
+        value["views"] = m.views.iter().map(|v| json!({
+            "view": v.name,
+            "z_m": v.z_m,
+            "theta_rad": v.theta_rad,
+            "azimuth_rad": v.azimuth_rad,
+            "sigma_m": v.whole.spread.spatial_m,
+            "sigma_std_error_m": v.whole.std_error_m,
+            "sigma_temporal_m": v.whole.spread.temporal_m,
+            "sigma_total_m": v.whole.spread.total_m,
+            "frames": v.frames,
+            "n": v.whole.n,
+            "n_effective": v.whole.n_effective,
+            "paper": v.paper.map(|p| json!({"z_m": p.z_m, "theta_rad": p.theta_rad, "sigma_m": p.sigma_m})),
+            "notes": v.notes,
+        })).collect();
+        value["excluded"] =
+            m.excluded.iter().map(|e| json!({"view": e.view, "reason": e.reason})).collect();
+    }
+    value
+}
