@@ -32,7 +32,8 @@ fn calibrated(seed: u64) -> (Measurements, Calibration) {
         kind: SigmaKind::Spatial,
         form: Some(Form::Paper),
     };
-    let views = kinoise::measure_recording(&recording, &options.measure, &|_, _| ()).expect("measured");
+    let views =
+        kinoise::measure_recording(&recording, &options.measure, &|_, _| ()).expect("measured");
     assert!(views.excluded.is_empty(), "seed {seed}: {:?}", views.excluded);
     let calibration = kinoise::model_of(&recording, &views, &options).expect("fitted");
     (views, calibration)
@@ -60,7 +61,11 @@ fn the_surface_covers_the_truth() {
             if (z - view.z_m).abs() > 0.03 * view.z_m || (theta - view.theta_rad).abs() > 0.02 {
                 extrapolated += 1;
             }
-            let truth_there = if (z, theta) == (view.z_m, view.theta_rad) { sigma } else { truth().sigma(z, theta) };
+            let truth_there = if (z, theta) == (view.z_m, view.theta_rad) {
+                sigma
+            } else {
+                truth().sigma(z, theta)
+            };
             let [low, high] = model.interval(view.z_m, view.theta_rad, 0.95);
             *hits += u32::from((low..=high).contains(&truth_there));
         }

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::cells::{Bins, Cell, Context, Sums};
 use super::{Planes, ResidualPicture, ViewMeasurement, Workbench};
 use crate::frame::Frame;
-use crate::plane::{Plane, Target, fit_affine_robust};
+use crate::plane::{Effort, Plane, Target, fit_affine_robust};
 use crate::residual::perpendicular_per_axial;
 use crate::stats::{Correlation, measure_correlation, median_in_place, normal_cut_factor};
 
@@ -302,8 +302,15 @@ impl<'a> Scan<'a> {
             }
         }
         let floor = 0.1 * self.bench.step(self.plane.q.z.abs());
-        fit_affine_robust(&w, &self.bench.rays, &target.pixels, &self.plane, floor)
-            .map_or(self.plane, |fit| fit.plane)
+        fit_affine_robust(
+            &w,
+            &self.bench.rays,
+            &target.pixels,
+            &self.plane,
+            floor,
+            Effort::AllPixels,
+        )
+        .map_or(self.plane, |fit| fit.plane)
     }
 
     /// By how much the expected depth of each pixel rose with the refit, m.

@@ -51,25 +51,29 @@ impl Lattice {
         reach: impl Fn(f64) -> f64,
         seeds: &[usize],
     ) -> Vec<bool> {
-        let on_plane = |node: usize| {
-            self.sample[node].is_some_and(|i| {
-                let i = i as usize;
-                let (x, y) = rays.at(i);
-                let expected = plane.inverse_depth(x, y);
-                expected > 0.0 && (f64::from(w[i]) - expected).abs() < reach(expected)
+        let on_plane: Vec<bool> = self
+            .sample
+            .iter()
+            .map(|sample| {
+                sample.is_some_and(|i| {
+                    let i = i as usize;
+                    let (x, y) = rays.at(i);
+                    let expected = plane.inverse_depth(x, y);
+                    expected > 0.0 && (f64::from(w[i]) - expected).abs() < reach(expected)
+                })
             })
-        };
+            .collect();
         let mut mask = vec![false; self.sample.len()];
         let mut queue: Vec<usize> = Vec::new();
         for &seed in seeds {
-            if !mask[seed] && on_plane(seed) {
+            if !mask[seed] && on_plane[seed] {
                 mask[seed] = true;
                 queue.push(seed);
             }
         }
         while let Some(node) = queue.pop() {
             for neighbour in self.around(node, BRIDGE) {
-                if !mask[neighbour] && on_plane(neighbour) {
+                if !mask[neighbour] && on_plane[neighbour] {
                     mask[neighbour] = true;
                     queue.push(neighbour);
                 }

@@ -11,7 +11,7 @@ mod grow;
 mod ransac;
 mod target;
 
-pub use affine::{AffineFit, fit_affine_robust};
+pub use affine::{AffineFit, Effort, fit_affine_robust};
 pub use ransac::{
     Consensus, Estimator, InlierCount, Points, RansacOptions, RansacPlane, UniformSampler,
     ransac_plane,

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::Plane;
-use super::affine::{AffineFit, MAD_TO_SIGMA, fit_affine_robust};
+use super::affine::{AffineFit, Effort, MAD_TO_SIGMA, fit_affine_robust};
 use super::grow::Lattice;
 use super::ransac::{Estimator, InlierCount, UniformSampler, ransac};
 use crate::camera::{Camera, Rays};
@@ -222,7 +222,7 @@ fn seed_plane(
         SEED_HYPOTHESES,
         SEED_CONFIDENCE,
     )?;
-    fit_affine_robust(image.w, image.rays, pixels, &Plane::new(q), floor)
+    fit_affine_robust(image.w, image.rays, pixels, &Plane::new(q), floor, Effort::Sample)
 }
 
 const SEED_CONFIDENCE: f64 = 0.9999;
@@ -314,7 +314,7 @@ fn candidate(
         mask = grown;
         let samples = lattice.samples(&mask);
         let floor = image.floor(fit.plane.q.z.abs());
-        fit = fit_affine_robust(image.w, image.rays, &samples, &fit.plane, floor)?;
+        fit = fit_affine_robust(image.w, image.rays, &samples, &fit.plane, floor, Effort::Sample)?;
     }
     let nodes = mask.iter().filter(|m| **m).count();
     if nodes * lattice.pitch * lattice.pitch < FEWEST_PIXELS {
