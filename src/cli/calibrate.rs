@@ -160,7 +160,7 @@ pub fn write_outputs(
     let model = out.path().join("model.json");
     calibration.model.write(&model)?;
     say(format!(
-        "wrote {} (and measurements.csv, sigma.svg, sigma_map.svg, report.html beside it)\n",
+        "wrote {}, with sigma.svg, sigma_map.svg and report.html beside it\n",
         model.display()
     ));
     Ok(())

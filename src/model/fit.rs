@@ -62,6 +62,13 @@ impl SigmaFit {
         self.parameters.iter().map(|p| p.value).collect()
     }
 
+    /// Variance of the relative residual, with the free parameters paid for.
+    pub fn relative_variance(&self) -> f64 {
+        let free = self.parameters.iter().filter(|p| p.std_error.is_some()).count();
+        let n = self.rows as f64;
+        self.rmse_relative.powi(2) * n / (n - free as f64).max(1.0)
+    }
+
     /// The surface without the story of its fit.
     pub fn model(&self) -> SigmaModel {
         SigmaModel {
@@ -292,7 +299,7 @@ fn report(
     if !converged {
         remarks.push(format!("the weights had not settled after {iterations} rounds"));
     }
-    let weak: Vec<&Parameter> = parameters.iter().filter(|q| q.remark.is_some()).collect();
+    let weak = parameters.iter().filter(|q| q.std_error.is_some() && q.remark.is_some());
     for q in weak {
         let text = q.remark.clone().unwrap_or_default();
         if !remarks.contains(&text) {
@@ -312,8 +319,8 @@ fn report(
         rows: rows.len(),
         views: rows.views(),
         degrees_of_freedom: degrees,
-        extra_within: rows.tau_cell2.sqrt(),
-        extra_between: rows.tau_view2.sqrt(),
+        extra_within: rows.extra()[0],
+        extra_between: rows.extra()[1],
         rmse_m: (left / n).sqrt(),
         rmse_relative: (relative.iter().map(|r| r * r).sum::<f64>() / n).sqrt(),
         r2: if scatter > 0.0 { 1.0 - left / scatter } else { 0.0 },

@@ -53,7 +53,7 @@ pub fn held_out(table: &SigmaTable, form: Form) -> Option<HeldOut> {
                 let variance = if rows.counted() {
                     rows.relative_variance(i) + extra
                 } else {
-                    fitted.rmse_relative.powi(2)
+                    fitted.relative_variance()
                 }
                 .max(f64::MIN_POSITIVE);
                 s += -0.5

@@ -19,8 +19,22 @@ pub struct Rows {
     counted: bool,
     /// Sigma that residuals are relative to, m.
     reference: Vec<f64>,
-    pub tau_cell2: f64,
-    pub tau_view2: f64,
+    steepest: f64,
+    /// Relative variance of each row's own error beyond sampling, and of what a view shares.
+    tau_cell2: f64,
+    tau_view2: f64,
+    whitener: Whitener,
+}
+
+/// What [`Rows::whiten`] multiplies with.
+#[derive(Debug, Clone, Default)]
+struct Whitener {
+    /// One over the standard deviation of a row's own relative error.
+    root: Vec<f64>,
+    /// The same over the reference sigma.
+    scale: Vec<f64>,
+    /// Per view, by how much its common error is shrunk.
+    shrink: Vec<f64>,
 }
 
 impl Rows {
@@ -40,7 +54,20 @@ impl Rows {
             .map(|r| r.n_effective.filter(|_| counted).map_or(1.0, |n| 0.5 / n))
             .collect();
         let reference = rows.iter().map(|r| r.sigma_m).collect();
-        Rows { rows, blocks, sampling, counted, reference, tau_cell2: 0.0, tau_view2: 0.0 }
+        let steepest = rows.iter().map(|r| r.theta_rad).fold(f64::NEG_INFINITY, f64::max);
+        let mut rows = Rows {
+            rows,
+            blocks,
+            sampling,
+            counted,
+            reference,
+            steepest,
+            tau_cell2: 0.0,
+            tau_view2: 0.0,
+            whitener: Whitener::default(),
+        };
+        rows.weigh();
+        rows
     }
 
     pub fn len(&self) -> usize {
@@ -60,7 +87,7 @@ impl Rows {
     }
 
     pub fn steepest(&self) -> f64 {
-        self.range(|r| r.theta_rad)[1]
+        self.steepest
     }
 
     pub fn range(&self, column: impl Fn(&SigmaRow) -> f64) -> [f64; 2] {
@@ -94,6 +121,7 @@ impl Rows {
     /// Make residuals relative to these sigmas, m.
     pub fn refer_to(&mut self, sigma: impl Fn(&SigmaRow) -> f64) {
         self.reference = self.rows.iter().map(sigma).collect();
+        self.weigh();
     }
 
     pub fn reference(&self) -> &[f64] {
@@ -113,21 +141,34 @@ impl Rows {
     /// variance: for a view with variances D and shared tau^2, (D + tau^2 11')^(-1/2) in closed
     /// form.
     pub fn whiten(&self, column: &mut [f64]) {
-        for block in &self.blocks {
-            let (mut s, mut dot) = (0.0, 0.0);
-            for i in block.clone() {
-                let per = 1.0 / (self.sampling[i] + self.tau_cell2);
-                column[i] *= per.sqrt() / self.reference[i];
-                s += per;
-                dot += column[i] * per.sqrt();
-            }
-            if self.tau_view2 > 0.0 && s > 0.0 {
-                let shrink = (1.0 - 1.0 / (1.0 + self.tau_view2 * s).sqrt()) / s * dot;
-                for i in block.clone() {
-                    column[i] -= shrink / (self.sampling[i] + self.tau_cell2).sqrt();
+        for (value, scale) in column.iter_mut().zip(&self.whitener.scale) {
+            *value *= scale;
+        }
+        for (block, shrink) in self.blocks.iter().zip(&self.whitener.shrink) {
+            if *shrink > 0.0 {
+                let root = &self.whitener.root[block.clone()];
+                let column = &mut column[block.clone()];
+                let dot: f64 = column.iter().zip(root).map(|(v, r)| v * r).sum();
+                for (v, r) in column.iter_mut().zip(root) {
+                    *v -= shrink * dot * r;
                 }
             }
         }
+    }
+
+    /// Prepare the whitening; called whenever weights or reference change.
+    fn weigh(&mut self) {
+        let w = &mut self.whitener;
+        w.root = self.sampling.iter().map(|s| 1.0 / (s + self.tau_cell2).sqrt()).collect();
+        w.scale = w.root.iter().zip(&self.reference).map(|(r, s)| r / s).collect();
+        w.shrink = self
+            .blocks
+            .iter()
+            .map(|block| {
+                let s: f64 = w.root[block.clone()].iter().map(|r| r * r).sum();
+                (1.0 - 1.0 / (1.0 + self.tau_view2 * s).sqrt()) / s
+            })
+            .collect();
     }
 
     pub fn whitened_sigmas(&self) -> DVector<f64> {
@@ -180,10 +221,16 @@ impl Rows {
         let residual: Vec<f64> =
             self.rows.iter().zip(&self.reference).map(|(r, s)| r.sigma_m / s - 1.0).collect();
         let within_dof = self.len() as f64 - self.views() as f64;
-        self.tau_cell2 = smallest_root(|tau| self.within(&residual, tau) - within_dof);
+        // With a row a view there is nothing within views but rounding.
+        self.tau_cell2 = if within_dof < 1.0 {
+            0.0
+        } else {
+            smallest_root(|tau| self.within(&residual, tau) - within_dof)
+        };
         let between_dof = (self.views() as f64 - parameters as f64).max(1.0);
         let cell = self.tau_cell2;
         self.tau_view2 = smallest_root(|tau| self.between(&residual, cell, tau) - between_dof);
+        self.weigh();
     }
 
     /// Chi-square of the rows about their view's mean.
@@ -216,6 +263,11 @@ impl Rows {
         (mean, 1.0 / total, chi2)
     }
 
+    /// Relative scatter beyond sampling, as standard deviations: within views and between them.
+    pub fn extra(&self) -> [f64; 2] {
+        [self.tau_cell2.sqrt(), self.tau_view2.sqrt()]
+    }
+
     /// Total relative variance of row `i`.
     pub fn relative_variance(&self, i: usize) -> f64 {
         self.sampling[i] + self.tau_cell2 + self.tau_view2
@@ -224,6 +276,9 @@ impl Rows {
 
 /// Diagonal of R after columns were scaled to unit length: below this a column adds nothing new.
 const DEPENDENT: f64 = 1e-9;
+
+/// Relative width at which the bisection for tau^2 ends: far below any use, far above rounding.
+const ROOT_DIGITS: f64 = 1e-12;
 
 /// The least tau^2 >= 0 at which a decreasing excess is not positive, by bisection.
 fn smallest_root(excess: impl Fn(f64) -> f64) -> f64 {
@@ -235,7 +290,7 @@ fn smallest_root(excess: impl Fn(f64) -> f64) -> f64 {
         high *= 4.0;
     }
     let mut low = 0.0;
-    for _ in 0..60 {
+    while high - low > ROOT_DIGITS * high {
         let middle = 0.5 * (low + high);
         if excess(middle) > 0.0 {
             low = middle;
@@ -273,7 +328,7 @@ pub struct BestTilt {
 /// 0.3 degrees to 3 rad past the steepest view.
 const EXPONENTS: [f64; 2] = [-4.0, 6.0];
 const LOG_POLE: [f64; 2] = [-5.3, 1.1];
-const GRID: [usize; 2] = [9, 13];
+const GRID: [usize; 2] = [9, 11];
 
 impl<'a> TiltSearch<'a> {
     pub fn new(rows: &'a Rows) -> Option<Self> {
@@ -294,45 +349,59 @@ impl<'a> TiltSearch<'a> {
         left.iter().all(|v| v.is_finite()).then_some(TiltSearch { rows, log_z, basis, left })
     }
 
-    /// Drop of chi-square at (e, ln(f - steepest)); zero where the coefficient would be negative.
-    fn gain(&self, e: f64, log_pole: f64) -> f64 {
+    /// z^e of every row.
+    fn powers(&self, e: f64) -> Vec<f64> {
+        self.log_z.iter().map(|lz| (e * lz).exp()).collect()
+    }
+
+    /// theta^2 / (f - theta)^2 of every row, f given as ln(f - steepest).
+    fn tilts(&self, log_pole: f64) -> Vec<f64> {
+        let f = self.rows.steepest() + log_pole.exp();
+        self.rows.iter().map(|r| super::forms::tilt(r.theta_rad, f)).collect()
+    }
+
+    /// Drop of chi-square when the product of the two columns joins the parabola; zero where its
+    /// coefficient would be negative.
+    fn gain(&self, powers: &[f64], tilts: &[f64]) -> f64 {
+        let mut h: Vec<f64> = powers.iter().zip(tilts).map(|(p, t)| p * t).collect();
+        self.rows.whiten(&mut h);
+        let h = DVector::from_vec(h);
+        let shadow = self.basis.tr_mul(&h);
+        let norm = h.norm_squared();
+        let square = norm - shadow.norm_squared();
+        // `left` is orthogonal to the basis already.
+        let dot = h.dot(&self.left);
+        if dot > 0.0 && square > 1e-12 * norm { dot * dot / square } else { 0.0 }
+    }
+
+    fn gain_at(&self, e: f64, log_pole: f64) -> f64 {
         let inside = |v: f64, [low, high]: [f64; 2]| (low..=high).contains(&v);
         if !inside(e, EXPONENTS) || !inside(log_pole, LOG_POLE) {
             return 0.0;
         }
-        let f = self.rows.steepest() + log_pole.exp();
-        let mut h: Vec<f64> = self
-            .rows
-            .iter()
-            .zip(&self.log_z)
-            .map(|(r, lz)| (e * lz).exp() * super::forms::tilt(r.theta_rad, f))
-            .collect();
-        self.rows.whiten(&mut h);
-        let h = DVector::from_vec(h);
-        let shadow = self.basis.tr_mul(&h);
-        let square = h.norm_squared() - shadow.norm_squared();
-        // `left` is orthogonal to the basis already.
-        let dot = h.dot(&self.left);
-        if dot > 0.0 && square > 1e-12 * h.norm_squared() { dot * dot / square } else { 0.0 }
+        self.gain(&self.powers(e), &self.tilts(log_pole))
     }
 
     /// The best (e, f): a grid over the box, then Nelder-Mead.
     pub fn best(&self) -> BestTilt {
-        let at = |[low, high]: [f64; 2], i: usize, n: usize| {
-            low + (high - low) * i as f64 / (n - 1) as f64
+        let axis = |[low, high]: [f64; 2], n: usize| {
+            (0..n).map(move |i| low + (high - low) * i as f64 / (n - 1) as f64)
         };
+        let tilts: Vec<(f64, Vec<f64>)> =
+            axis(LOG_POLE, GRID[1]).map(|g| (g, self.tilts(g))).collect();
         let (mut e, mut g, mut gain) = (EXPONENTS[0], LOG_POLE[1], -1.0);
-        for i in 0..GRID[0] {
-            for j in 0..GRID[1] {
-                let (ei, gj) = (at(EXPONENTS, i, GRID[0]), at(LOG_POLE, j, GRID[1]));
-                let value = self.gain(ei, gj);
+        for exponent in axis(EXPONENTS, GRID[0]) {
+            let powers = self.powers(exponent);
+            for (log_pole, tilts) in &tilts {
+                let value = self.gain(&powers, tilts);
                 if value > gain {
-                    (e, g, gain) = (ei, gj, value);
+                    (e, g, gain) = (exponent, *log_pole, value);
                 }
             }
         }
-        let refined = nelder_mead(|x| -self.gain(x[0], x[1]), &[e, g], &[0.4, -0.2], 120);
-        let value = self.gain(refined[0], refined[1]);
+        let refined =
+            nelder_mead(|x| -self.gain_at(x[0], x[1]), &[e, g], &[0.4, -0.2], NELDER_MEAD_STEPS);
+        let value = self.gain_at(refined[0], refined[1]);
         if value > gain {
             (e, g, gain) = (refined[0], refined[1], value);
         }
@@ -346,6 +415,9 @@ impl<'a> TiltSearch<'a> {
         }
     }
 }
+
+/// The local solver takes over from here, so a few digits are enough.
+const NELDER_MEAD_STEPS: u64 = 40;
 
 #[cfg(test)]
 mod tests {
@@ -366,6 +438,7 @@ mod tests {
         let mut rows = Rows::new(&table);
         rows.tau_cell2 = 0.003;
         rows.tau_view2 = 0.02;
+        rows.weigh();
         rows
     }
 
