@@ -237,6 +237,8 @@ struct Candidate {
     away_px: f64,
     /// Its residual is noise, not relief.
     flat: bool,
+    /// Larger than the palm of a hand.
+    roomy: bool,
 }
 
 /// Half sizes of the windows a seed is looked for in, as shares of the image width: from a board
@@ -260,7 +262,7 @@ fn at_principal_point(image: &InverseDepthImage<'_>, rng: &mut Stream) -> Result
             None => true,
             Some(b) => rank(&candidate) > rank(b),
         };
-        let good = candidate.flat && candidate.at_centre >= AT_CENTRE;
+        let good = candidate.flat && candidate.roomy && candidate.at_centre >= AT_CENTRE;
         if better {
             best = Some(candidate);
         }
@@ -278,9 +280,9 @@ fn at_principal_point(image: &InverseDepthImage<'_>, rng: &mut Stream) -> Result
 /// The principal point looks at the plane when this share of what is measured there lies on it.
 const AT_CENTRE: f64 = 0.5;
 
-/// Flat before not flat, looked at before looked past, then near before far.
-fn rank(c: &Candidate) -> (bool, bool, i64) {
-    (c.flat, c.at_centre >= AT_CENTRE, -(c.away_px as i64))
+/// Flat before not flat, a board before a palm, looked at before looked past, near before far.
+fn rank(c: &Candidate) -> (bool, bool, bool, i64) {
+    (c.flat, c.roomy, c.at_centre >= AT_CENTRE, -(c.away_px as i64))
 }
 
 const GROWING_ROUNDS: usize = 12;
@@ -330,6 +332,11 @@ const CENTRE_DISC: f64 = 0.0125;
 const RELIEF: f64 = 4.0;
 const RELIEF_LARGE: f64 = 8.0;
 const LARGE: f64 = 0.04;
+/// No surface scatters by more than this share of its distance: a Kinect at 8 m reaches 2 %.
+const ROUGHEST: f64 = 0.05;
+/// What lies within a centimetre of one plane on a hand is below this, a sheet of paper three
+/// times above, m^2.
+const LEAST_AREA_M2: f64 = 0.02;
 
 fn judge(
     image: &InverseDepthImage<'_>,
@@ -349,6 +356,7 @@ fn judge(
     let samples = lattice.samples(&mask);
     let noise = image.local_noise(&samples).max(image.floor(fit.plane.q.z.abs()));
     let relief = fit.scale / noise;
+    let rough = fit.scale > ROUGHEST * median_inverse_depth(image, &samples);
     let large = nodes as f64 > LARGE * mask.len() as f64;
     let away_px = samples
         .iter()
@@ -359,11 +367,30 @@ fn judge(
         .fold(f64::INFINITY, f64::min);
     Candidate {
         at_centre: on as f64 / measured.len().max(1) as f64,
-        flat: relief < if large { RELIEF_LARGE } else { RELIEF },
+        flat: !rough && relief < if large { RELIEF_LARGE } else { RELIEF },
+        roomy: area(image, lattice, &fit.plane, &samples) > LEAST_AREA_M2,
         fit,
         mask,
         away_px,
     }
+}
+
+fn median_inverse_depth(image: &InverseDepthImage<'_>, pixels: &[u32]) -> f64 {
+    let mut w: Vec<f32> = pixels.iter().map(|&i| image.w[i as usize]).collect();
+    f64::from(median_in_place(&mut w))
+}
+
+/// Area on the plane that the nodes cover, m^2: a pixel covers z^3 |q| / (fx fy).
+fn area(image: &InverseDepthImage<'_>, lattice: &Lattice, plane: &Plane, samples: &[u32]) -> f64 {
+    let node = (lattice.pitch * lattice.pitch) as f64 / (image.camera.fx * image.camera.fy);
+    let cubes: f64 = samples
+        .iter()
+        .map(|&i| {
+            let (x, y) = image.rays.at(i as usize);
+            plane.depth(x, y).powi(3)
+        })
+        .sum();
+    cubes * plane.q.norm() * node
 }
 
 /// Pixels of the square of half size `half` (px) around the principal point.

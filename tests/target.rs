@@ -1,0 +1,235 @@
+//! Finding the target without a region: scenes drawn here, ray by ray, with a known answer.
+
+use kinoise::plane::{InverseDepthImage, Target, find_target};
+use kinoise::simulate::kinect_v1;
+use kinoise::{Camera, Seed, SigmaModel};
+use nalgebra::Vector3;
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// A thing a ray may hit.
+enum Thing {
+    /// A rectangle: centre, half extents along two unit axes.
+    Rectangle {
+        centre: Vector3<f64>,
+        right: Vector3<f64>,
+        down: Vector3<f64>,
+        half: [f64; 2],
+    },
+    Sphere {
+        centre: Vector3<f64>,
+        radius: f64,
+    },
+}
+
+impl Thing {
+    fn wall(z: f64) -> Self {
+        Thing::Rectangle {
+            centre: Vector3::new(0.0, 0.0, z),
+            right: Vector3::x(),
+            down: Vector3::y(),
+            half: [10.0, 10.0],
+        }
+    }
+
+    fn floor(y: f64) -> Self {
+        Thing::Rectangle {
+            centre: Vector3::new(0.0, y, 0.0),
+            right: Vector3::x(),
+            down: Vector3::z(),
+            half: [10.0, 20.0],
+        }
+    }
+
+    /// A board at depth z on the axis, turned by theta about the image's vertical axis.
+    fn board(z: f64, theta: f64, half: [f64; 2]) -> Self {
+        let right = Vector3::new(theta.cos(), 0.0, theta.sin());
+        Thing::Rectangle { centre: Vector3::new(0.0, 0.0, z), right, down: Vector3::y(), half }
+    }
+
+    fn sphere(x: f64, y: f64, z: f64, radius: f64) -> Self {
+        Thing::Sphere { centre: Vector3::new(x, y, z), radius }
+    }
+
+    /// Depth along the axis at which the ray hits.
+    fn hit(&self, ray: &Vector3<f64>) -> Option<f64> {
+        match self {
+            Thing::Rectangle { centre, right, down, half } => {
+                let normal = right.cross(down);
+                let depth = normal.dot(centre) / normal.dot(ray);
+                let offset = ray * depth - centre;
+                let inside =
+                    offset.dot(right).abs() <= half[0] && offset.dot(down).abs() <= half[1];
+                (depth > 0.0 && inside).then_some(depth)
+            }
+            Thing::Sphere { centre, radius } => {
+                let (a, b) = (ray.norm_squared(), ray.dot(centre));
+                let discriminant = b * b - a * (centre.norm_squared() - radius * radius);
+                (discriminant > 0.0).then(|| (b - discriminant.sqrt()) / a).filter(|d| *d > 0.0)
+            }
+        }
+    }
+}
+
+struct Scene {
+    camera: Camera,
+    w: Vec<f32>,
+    /// Index of the thing each pixel sees.
+    seen: Vec<Option<usize>>,
+}
+
+/// Noise of Eq. 1 along the axis, one pixel in fifty without measurement.
+fn draw(things: &[Thing], seed: u64) -> Scene {
+    let camera = kinect_v1(1).camera;
+    let rays = camera.rays();
+    let sigma = SigmaModel::paper();
+    let mut rng = Seed(seed).stream("scene");
+    let (mut w, mut seen) = (Vec::new(), Vec::new());
+    for i in 0..camera.pixels() {
+        let (x, y) = rays.at(i);
+        let ray = Vector3::new(x, y, 1.0);
+        let nearest = things
+            .iter()
+            .enumerate()
+            .filter_map(|(k, thing)| thing.hit(&ray).map(|z| (k, z)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .filter(|(_, z)| *z < 8.0);
+        let noise: f64 = StandardNormal.sample(&mut rng);
+        let hole = rng.random::<f64>() < 0.02;
+        w.push(match nearest {
+            Some((_, z)) if !hole => (1.0 / (z + sigma.sigma(z, 0.0) * noise)) as f32,
+            _ => f32::NAN,
+        });
+        seen.push(nearest.map(|(k, _)| k));
+    }
+    Scene { camera, w, seen }
+}
+
+fn find(scene: &Scene) -> Result<Target, String> {
+    let rays = scene.camera.rays();
+    let image = InverseDepthImage {
+        w: &scene.w,
+        rays: &rays,
+        camera: &scene.camera,
+        step: &|w| 2e-4 * w * w,
+    };
+    find_target(&image, None, &mut Seed(1).stream("target"))
+}
+
+/// The target is thing 0: nearly all of what was taken is it, and most of it was taken.
+fn expect_first(name: &str, things: &[Thing], theta: f64) {
+    for seed in 0..5 {
+        let scene = draw(things, seed);
+        let target = find(&scene).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let right = target.pixels.iter().filter(|&&i| scene.seen[i as usize] == Some(0)).count();
+        let there = (0..scene.w.len())
+            .filter(|&i| scene.seen[i] == Some(0) && scene.w[i].is_finite())
+            .count();
+        let precision = right as f64 / target.pixels.len() as f64;
+        let recall = right as f64 / there as f64;
+        let angle = (target.plane.theta() - theta).to_degrees().abs();
+        assert!(precision > 0.99, "{name}: precision {precision:.4}");
+        assert!(recall > 0.75, "{name}: recall {recall:.3}");
+        assert!(angle < 0.6, "{name}: tilt off by {angle:.2} degrees");
+        let told = target.exclusions;
+        assert_eq!(
+            told.considered,
+            told.invalid + told.off_plane + told.edge + target.pixels.len()
+        );
+    }
+}
+
+#[test]
+fn a_small_board_before_a_wall_that_covers_far_more() {
+    for (z, theta, half) in [
+        (1.0, 0.0, [0.15, 0.12]),
+        (1.0, 1.0, [0.25, 0.2]),
+        (2.0, 0.5, [0.2, 0.15]),
+        (3.0, 0.0, [0.25, 0.2]),
+        (3.0, 1.1, [0.4, 0.3]),
+        (1.5, 1.3, [0.3, 0.2]),
+    ] {
+        let things = [Thing::board(z, theta, half), Thing::wall(z + 0.8)];
+        expect_first(&format!("z {z}, tilt {theta}"), &things, theta);
+    }
+}
+
+#[test]
+fn a_board_on_a_floor_between_boxes() {
+    let things = [
+        Thing::board(1.5, 0.4, [0.4, 0.5]),
+        Thing::wall(3.5),
+        Thing::floor(0.5),
+        Thing::board(1.2, -0.3, [0.0, 0.0]),
+        Thing::sphere(0.7, 0.2, 1.6, 0.15),
+        Thing::sphere(-0.6, -0.3, 1.4, 0.1),
+    ];
+    expect_first("floor and boxes", &things, 0.4);
+}
+
+/// Fists at the board's sides and fingers before it.
+#[test]
+fn hands_that_hold_the_board() {
+    let mut things = vec![Thing::board(1.2, 0.3, [0.4, 0.3]), Thing::wall(2.5)];
+    for side in [-1.0, 1.0] {
+        things.push(Thing::sphere(0.38 * side, 0.05, 1.2 + 0.12 * side, 0.06));
+        for finger in 0..4 {
+            things.push(Thing::sphere(
+                0.33 * side,
+                0.03 * f64::from(finger),
+                1.18 + 0.1 * side,
+                0.02,
+            ));
+        }
+    }
+    expect_first("hands", &things, 0.3);
+}
+
+/// A hand right where the principal point looks: the board around it is taken, and it is told.
+#[test]
+fn a_hand_over_the_principal_point() {
+    let mut things = vec![Thing::board(1.2, 0.3, [0.4, 0.3]), Thing::wall(2.5)];
+    for k in 0..5 {
+        let x = -0.04 + 0.02 * f64::from(k);
+        things.push(Thing::sphere(x, -0.02, 1.12, 0.022));
+        things.push(Thing::sphere(x, 0.03, 1.13, 0.03));
+    }
+    expect_first("hand in the middle", &things, 0.3);
+    let target = find(&draw(&things, 0)).unwrap();
+    assert!(target.notes.iter().any(|n| n.contains("principal point")), "{:?}", target.notes);
+}
+
+#[test]
+fn a_person_behind_and_an_edge_of_a_table() {
+    let things = [
+        Thing::board(1.8, 0.7, [0.45, 0.35]),
+        Thing::wall(4.0),
+        Thing::sphere(0.1, -0.5, 2.4, 0.35),
+        Thing::sphere(0.1, -0.1, 2.5, 0.4),
+        Thing::floor(0.36),
+    ];
+    expect_first("person behind", &things, 0.7);
+}
+
+#[test]
+fn a_wall_that_fills_the_picture_is_the_target() {
+    expect_first("wall", &[Thing::wall(2.0)], 0.0);
+}
+
+#[test]
+fn no_plane_no_target() {
+    let ball = [Thing::sphere(0.0, 0.0, 1.0, 0.3)];
+    let balls: Vec<Thing> = (0..60)
+        .map(|k| {
+            let (c, r) = (f64::from(k % 10), f64::from(k / 10));
+            Thing::sphere(0.12 * (c - 4.5), 0.12 * (r - 2.5), 1.0 + 0.05 * f64::from(k % 3), 0.08)
+        })
+        .collect();
+    assert!(find(&draw(&ball, 1)).is_err(), "a ball");
+    assert!(find(&draw(&balls, 1)).is_err(), "a heap of balls");
+    let mut nothing = draw(&[], 1);
+    assert!(find(&nothing).is_err());
+    let mut rng = Seed(4).stream("random");
+    nothing.w.iter_mut().for_each(|w| *w = rng.random_range(0.25..2.0));
+    assert!(find(&nothing).is_err(), "random depths");
+}
