@@ -137,8 +137,8 @@ impl Context {
         let moving_frames = 1.0 + (frames - 1.0) * self.temporal_dilution;
         let absorbed = self.absorbed(frozen, moving_frames);
         let unbias = 1.0 / (1.0 - absorbed);
+        let spatial = ((s.e2 - s.between).max(0.0) / s.n / self.cut_factor) * unbias;
         let total = total * unbias;
-        let spatial = (total - s.between / s.n).max(0.0);
         // Squares of the covariance between two frames: frozen^2 off the diagonal.
         let moving = 1.0 - frozen;
         let worth = frozen * frozen + moving * (moving + 2.0 * frozen) / moving_frames;

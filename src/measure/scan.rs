@@ -392,6 +392,7 @@ impl<'a> Scan<'a> {
                 }
             }
         }
+        centre(&mut field);
         measure_correlation(&field, camera.width)
     }
 
@@ -419,6 +420,17 @@ impl<'a> Scan<'a> {
 
 /// Enough to see a lens's bowl and a firmware's bands; 77 kB a view.
 const PICTURE_WIDTH: usize = 160;
+
+/// Take the mean out: what a frame shares as a whole is not correlation between pixels.
+fn centre(field: &mut [f32]) {
+    let (mut sum, mut n) = (0f64, 0f64);
+    for e in field.iter().filter(|e| e.is_finite()) {
+        sum += f64::from(*e);
+        n += 1.0;
+    }
+    let mean = (sum / n.max(1.0)) as f32;
+    field.iter_mut().for_each(|e| *e -= mean);
+}
 
 /// The target's pixels sorted into bins of depth; small bins join their neighbour.
 fn by_cell(pixels: &[u32], plane: &Plane, bench: &Workbench<'_>) -> (Vec<u32>, Vec<usize>) {

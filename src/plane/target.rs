@@ -14,7 +14,8 @@ use crate::view::Region;
 /// The pixels of the target and a first plane through them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Target {
-    /// Indices into the image, ascending.
+    /// Indices into the image, ascending. All pixels of the target's region, also those without a
+    /// measurement and those off the plane: holes and gross errors belong to the sensor's noise.
     pub pixels: Vec<u32>,
     pub plane: Plane,
     /// Robust standard deviation about the plane, inverse depth, 1/m.
@@ -159,15 +160,14 @@ fn in_region(
         ));
     }
     let fit = seed_plane(image, &valid, rng).ok_or("its region holds no plane")?;
-    let pixels: Vec<u32> =
-        valid.iter().copied().filter(|&i| on_plane(image, &fit, i as usize)).collect();
-    if pixels.len() < FEWEST_PIXELS {
-        return Err(format!("only {} pixels of its region lie on one plane", pixels.len()));
+    let on = valid.iter().filter(|&&i| on_plane(image, &fit, i as usize)).count();
+    if on < FEWEST_PIXELS {
+        return Err(format!("only {on} pixels of its region lie on one plane"));
     }
     let exclusions = Exclusions {
         considered: inside.len(),
         invalid: inside.len() - valid.len(),
-        off_plane: valid.len() - pixels.len(),
+        off_plane: valid.len() - on,
         edge: 0,
     };
     let mut notes = Vec::new();
@@ -178,7 +178,14 @@ fn in_region(
             100.0 * share
         ));
     }
+    let pixels = inside.into_iter().filter(|&i| in_front(image, &fit.plane, i as usize)).collect();
     Ok(Target { pixels, plane: fit.plane, scale: fit.scale, exclusions, notes })
+}
+
+/// Does the pixel's ray meet the plane before the camera?
+fn in_front(image: &InverseDepthImage<'_>, plane: &Plane, i: usize) -> bool {
+    let (x, y) = image.rays.at(i);
+    plane.inverse_depth(x, y) > 0.0
 }
 
 /// Clutter below this share of a region is not worth a line.
@@ -430,25 +437,31 @@ fn finish(
             best.away_px
         ));
     }
-    let (mut pixels, mut edge) = (Vec::new(), 0);
+    let (mut pixels, mut on, mut edge) = (Vec::new(), 0, 0);
     for i in 0..image.w.len() {
         let node = lattice.node_of(i, width);
-        if !filled[node] || !image.valid(i) || !on_plane(image, &best.fit, i) {
+        if !filled[node] || !in_front(image, &best.fit.plane, i) {
+            continue;
+        }
+        let fits = image.valid(i) && on_plane(image, &best.fit, i);
+        // Beyond what was reached by growing, only what fits: a gap may show something else.
+        if !best.mask[node] && !fits {
             continue;
         }
         if trimmed[node] || keep_rim {
             pixels.push(i as u32);
+            on += usize::from(fits);
         } else {
-            edge += 1;
+            edge += usize::from(fits);
         }
     }
-    if pixels.len() < FEWEST_PIXELS {
-        return Err(format!("the plane at the principal point has only {} pixels", pixels.len()));
+    if on < FEWEST_PIXELS {
+        return Err(format!("the plane at the principal point has only {on} pixels"));
     }
     let exclusions = Exclusions {
         considered: image.w.len(),
         invalid: image.w.len() - measured,
-        off_plane: measured - pixels.len() - edge,
+        off_plane: measured - on - edge,
         edge,
     };
     Ok(Target { pixels, plane: best.fit.plane, scale: best.fit.scale, exclusions, notes })
