@@ -31,10 +31,8 @@ pub fn scale_mm(picture: &ResidualPicture) -> f64 {
 /// # Errors
 /// When the picture's size and its pixels disagree.
 pub fn residual_png(picture: &ResidualPicture, scale_mm: f64) -> Result<Vec<u8>> {
-    let failed = |e: png::EncodingError| Error::Drawing {
-        what: "the residual picture",
-        why: e.to_string(),
-    };
+    let failed =
+        |e: png::EncodingError| Error::Drawing { what: "the residual picture", why: e.to_string() };
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, picture.width as u32, picture.height as u32);
     encoder.set_color(png::ColorType::Indexed);

@@ -10,8 +10,8 @@ use image::imageops::{FilterType, resize};
 use image::{ImageFormat, RgbImage};
 use plotters::coord::Shift;
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::register_font;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::colours::INK;
 use crate::error::{Error, Result};
@@ -54,8 +54,7 @@ pub(super) fn png(drawing: &impl Drawing) -> Result<Vec<u8>> {
     let (width, height) = size_of(drawing, scale);
     let mut image = RgbImage::new(width, height);
     on_sheet(drawing, BitMapBackend::with_buffer(&mut image, (width, height)), scale as i32)?;
-    let small =
-        resize(&image, width / OVERSAMPLING, height / OVERSAMPLING, FilterType::Triangle);
+    let small = resize(&image, width / OVERSAMPLING, height / OVERSAMPLING, FilterType::Triangle);
     let mut bytes = Vec::new();
     small.write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png).map_err(failed(drawing))?;
     Ok(bytes)

@@ -27,12 +27,8 @@ impl Drawing for Figure2 {
 
     fn draw<B: DrawingBackend>(&self, sheet: &Sheet<'_, B>) -> Drawn<B> {
         sheet.title(&self.title, WIDTH as i32)?;
-        let area = sheet.root.margin(
-            sheet.px(TITLE_ROOM),
-            sheet.px(10),
-            sheet.px(12),
-            sheet.px(LEGEND),
-        );
+        let area =
+            sheet.root.margin(sheet.px(TITLE_ROOM), sheet.px(10), sheet.px(12), sheet.px(LEGEND));
         let mut chart = ChartBuilder::on(&area)
             .x_label_area_size(sheet.px(48))
             .y_label_area_size(sheet.px(66))
@@ -64,10 +60,7 @@ impl Drawing for Figure2 {
     }
 }
 
-fn axes<B: DrawingBackend>(
-    sheet: &Sheet<'_, B>,
-    chart: &mut Chart<'_, B, Axis, Axis>,
-) -> Drawn<B> {
+fn axes<B: DrawingBackend>(sheet: &Sheet<'_, B>, chart: &mut Chart<'_, B, Axis, Axis>) -> Drawn<B> {
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
@@ -229,7 +222,13 @@ impl Figure2 {
             sheet.text(overlay.label(), (text_x, y), SMALL, HPos::Left)?;
             if !self.lines.iter().any(|l| l.overlay == overlay) {
                 let y = next(8);
-                sheet.coloured_text("(not these distances)", (text_x, y), SMALL, HPos::Left, &FAINT)?;
+                sheet.coloured_text(
+                    "(not these distances)",
+                    (text_x, y),
+                    SMALL,
+                    HPos::Left,
+                    &FAINT,
+                )?;
             }
         }
         self.key_to_points(sheet, (x, next(10)))
@@ -255,11 +254,31 @@ const SHAPES: [&[(f64, f64)]; 6] = [
     &[(0.0, -1.3), (1.1, 0.0), (0.0, 1.3), (-1.1, 0.0)],
     &[(0.0, 1.2), (1.1, -0.8), (-1.1, -0.8)],
     &[
-        (-0.4, -1.2), (0.4, -1.2), (0.4, -0.4), (1.2, -0.4), (1.2, 0.4), (0.4, 0.4),
-        (0.4, 1.2), (-0.4, 1.2), (-0.4, 0.4), (-1.2, 0.4), (-1.2, -0.4), (-0.4, -0.4),
+        (-0.4, -1.2),
+        (0.4, -1.2),
+        (0.4, -0.4),
+        (1.2, -0.4),
+        (1.2, 0.4),
+        (0.4, 0.4),
+        (0.4, 1.2),
+        (-0.4, 1.2),
+        (-0.4, 0.4),
+        (-1.2, 0.4),
+        (-1.2, -0.4),
+        (-0.4, -0.4),
     ],
     &[
-        (-1.2, -0.6), (-0.6, -1.2), (0.0, -0.6), (0.6, -1.2), (1.2, -0.6), (0.6, 0.0),
-        (1.2, 0.6), (0.6, 1.2), (0.0, 0.6), (-0.6, 1.2), (-1.2, 0.6), (-0.6, 0.0),
+        (-1.2, -0.6),
+        (-0.6, -1.2),
+        (0.0, -0.6),
+        (0.6, -1.2),
+        (1.2, -0.6),
+        (0.6, 0.0),
+        (1.2, 0.6),
+        (0.6, 1.2),
+        (0.0, 0.6),
+        (-0.6, 1.2),
+        (-1.2, 0.6),
+        (-0.6, 0.0),
     ],
 ];

@@ -15,10 +15,8 @@ const WIDEST_RATIO: f64 = 1.25;
 pub(super) fn by_distance(rows: &[SigmaRow]) -> Vec<Vec<SigmaRow>> {
     let mut sorted = rows.to_vec();
     sorted.sort_by(|a, b| a.z_m.total_cmp(&b.z_m));
-    let natural: Vec<Vec<SigmaRow>> = sorted
-        .chunk_by(|a, b| b.z_m <= a.z_m * DISTANCE_RATIO)
-        .map(<[SigmaRow]>::to_vec)
-        .collect();
+    let natural: Vec<Vec<SigmaRow>> =
+        sorted.chunk_by(|a, b| b.z_m <= a.z_m * DISTANCE_RATIO).map(<[SigmaRow]>::to_vec).collect();
     let compact = |g: &Vec<SigmaRow>| g[g.len() - 1].z_m < WIDEST_RATIO * g[0].z_m;
     if natural.len() <= MOST_GROUPS && natural.iter().all(compact) {
         natural
@@ -40,13 +38,8 @@ mod tests {
     use super::*;
 
     fn rows(distances: impl IntoIterator<Item = f64>) -> Vec<SigmaRow> {
-        let row = |z_m| SigmaRow {
-            z_m,
-            theta_rad: 0.0,
-            sigma_m: 0.001,
-            n_effective: None,
-            view: 0,
-        };
+        let row =
+            |z_m| SigmaRow { z_m, theta_rad: 0.0, sigma_m: 0.001, n_effective: None, view: 0 };
         distances.into_iter().map(row).collect()
     }
 

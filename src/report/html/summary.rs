@@ -52,11 +52,16 @@ fn facts(input: &CalibrationPage<'_>) -> Markup {
         ("distance z", format!("{} m", range(domain.z_m, 2))),
         ("tilt θ", format!("{}°", range(domain.theta_rad.map(f64::to_degrees), 1))),
         ("sigma is", format!("{}, {} cells", axis_words(&summary.residual), summary.samples)),
-        ("fit error", format!("{} mm rms, r² = {}", fixed(MM * summary.rmse_m, 2), fixed(summary.r2, 3))),
-        ("error at distances left out", summary.heldout.map_or(
-            "not known: too few distances".into(),
-            |e| format!("{} % rms", fixed(100.0 * e, 1)),
-        )),
+        (
+            "fit error",
+            format!("{} mm rms, r² = {}", fixed(MM * summary.rmse_m, 2), fixed(summary.r2, 3)),
+        ),
+        (
+            "error at distances left out",
+            summary.heldout.map_or("not known: too few distances".into(), |e| {
+                format!("{} % rms", fixed(100.0 * e, 1))
+            }),
+        ),
     ];
     html! {
         dl { @for (name, value) in rows { div { dt { (name) } dd { (value) } } } }

@@ -6,9 +6,21 @@ use crate::measure::ViewMeasurement;
 use crate::report::numbers::{ABSENT, degrees, fixed, millimetres};
 
 const COLUMNS: [&str; 15] = [
-    "z m", "θ °", "azimuth °", "σ mm", "± s.e.", "temporal σ mm", "perpendicular σ mm",
-    "paper's z m", "paper's θ °", "paper's σ mm", "samples", "independent samples",
-    "correlation px", "frames", "pixels left out",
+    "z m",
+    "θ °",
+    "azimuth °",
+    "σ mm",
+    "± s.e.",
+    "temporal σ mm",
+    "perpendicular σ mm",
+    "paper's z m",
+    "paper's θ °",
+    "paper's σ mm",
+    "samples",
+    "independent samples",
+    "correlation px",
+    "frames",
+    "pixels left out",
 ];
 
 pub(super) fn section(views: &[ViewMeasurement]) -> Markup {

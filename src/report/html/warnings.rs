@@ -77,14 +77,11 @@ mod tests {
 
     #[test]
     fn remarks_that_differ_in_numbers_are_one_group() {
-        let groups = grouped(&[
-            "view a: 3.5 mm off",
-            "view b: no infrared",
-            "view c: 14.25 mm off",
-        ]);
-        assert_eq!(groups, [
-            vec!["view a: 3.5 mm off", "view c: 14.25 mm off"],
-            vec!["view b: no infrared"],
-        ]);
+        let groups =
+            grouped(&["view a: 3.5 mm off", "view b: no infrared", "view c: 14.25 mm off"]);
+        assert_eq!(
+            groups,
+            [vec!["view a: 3.5 mm off", "view c: 14.25 mm off"], vec!["view b: no infrared"],]
+        );
     }
 }

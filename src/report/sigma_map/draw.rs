@@ -61,15 +61,18 @@ impl SigmaMap {
         let style = sheet.stroke(&HATCH_INK, 1);
         for start in (left - height..right).step_by(HATCH * sheet.unit.unsigned_abs() as usize) {
             let [from, to] = [start.max(left), (start + height).min(right)];
-            sheet.line(&[(from, bottom - (from - start)), (to, bottom - (to - start))], style, &[])?;
+            sheet.line(
+                &[(from, bottom - (from - start)), (to, bottom - (to - start))],
+                style,
+                &[],
+            )?;
         }
         Ok(())
     }
 
     fn surface<B: DrawingBackend>(&self, sheet: &Sheet<'_, B>, at: At<'_>) -> Drawn<B> {
         for run in &self.runs {
-            let corners =
-                [at(run.z_m[0], run.theta_deg[1]), at(run.z_m[1], run.theta_deg[0])];
+            let corners = [at(run.z_m[0], run.theta_deg[1]), at(run.z_m[1], run.theta_deg[0])];
             sheet.fill(corners, &colour(run.shade))?;
         }
         let [z, theta] = [self.valid_z_m, self.valid_theta_deg];
@@ -118,8 +121,7 @@ impl SigmaMap {
         let height = |share: f64| bottom - (share * f64::from(bottom - top)).round() as i32;
         sheet.text("σ (mm)", (left, sheet.px(TITLE_ROOM + 10)), TEXT, HPos::Left)?;
         for shade in 0..Self::SHADES {
-            let [low, high] =
-                [shade, shade + 1].map(|s| height(s as f64 / Self::SHADES as f64));
+            let [low, high] = [shade, shade + 1].map(|s| height(s as f64 / Self::SHADES as f64));
             sheet.fill([(left, high), (right, low)], &colour(shade))?;
         }
         sheet.root.draw(&Rectangle::new([(left, top), (right, bottom)], sheet.stroke(&INK, 1)))?;

@@ -90,9 +90,10 @@ fn place(grid: &Grid, pieces: &[[[f64; 2]; 2]], taken: &[[f64; 2]]) -> Option<[f
         let here = share(p);
         let inside = here.iter().all(|s| (LABEL_INSET..=1.0 - LABEL_INSET).contains(s));
         inside
-            && taken.iter().map(|t| share(*t)).all(|t| {
-                (0..2).any(|k| (here[k] - t[k]).abs() > LABELS_APART[k])
-            })
+            && taken
+                .iter()
+                .map(|t| share(*t))
+                .all(|t| (0..2).any(|k| (here[k] - t[k]).abs() > LABELS_APART[k]))
     };
     let height = |p: &[f64; 2]| (share(*p)[1] - LABEL_HEIGHT).abs();
     pieces
