@@ -161,10 +161,13 @@ fn group_of(rows: &[SigmaRow], model: &SigmaModel) -> Group {
             std_error_mm: r.std_error_m().map(|e| MM * e),
         })
         .collect();
+    // A published surface has no band.
+    let exact = model.covariance.iter().all(|c| *c == 0.0);
     let curve = tilts(model.domain.theta_rad)
         .map(|theta| {
-            let [low, high] = model.interval(z_m, theta, LEVEL);
-            [theta.to_degrees(), MM * model.sigma(z_m, theta), MM * low, MM * high]
+            let sigma = model.sigma(z_m, theta);
+            let [low, high] = if exact { [sigma; 2] } else { model.interval(z_m, theta, LEVEL) };
+            [theta.to_degrees(), MM * sigma, MM * low, MM * high]
         })
         .collect();
     Group { z_m, range_m: [rows[0].z_m, rows[rows.len() - 1].z_m], points, curve }

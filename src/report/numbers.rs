@@ -78,6 +78,7 @@ fn word(token: &str, value: &dyn Fn(&str) -> Option<f64>) -> Markup {
         (None, "sigma") => html! { i { "σ" } },
         (None, "theta") => html! { i { "θ" } },
         (None, "pi") => html! { "π" },
+        (None, "sqrt") => html! { "√" },
         (None, "*") => html! { "·" },
         (None, "-") => html! { "−" },
         (None, t) if t.chars().all(char::is_alphabetic) && t.len() <= 2 => html! { i { (t) } },

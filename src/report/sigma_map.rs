@@ -156,7 +156,9 @@ mod tests {
 
     #[test]
     fn the_papers_surface_has_labelled_lines() {
-        let map = SigmaMap::of(&SigmaTable::default(), &SigmaModel::paper());
+        let mut model = SigmaModel::paper();
+        model.domain.theta_rad[1] = 1.33;
+        let map = SigmaMap::of(&SigmaTable::default(), &model);
         assert!(map.lines.iter().filter(|l| l.label_at.is_some()).count() >= 4);
         assert!(map.runs.iter().any(|r| r.shade == SigmaMap::SHADES - 1));
         assert!(map.svg().unwrap().contains("σ (mm)"));

@@ -122,6 +122,9 @@ fn ours(model: &SigmaModel, z: f64, theta: f64) -> Markup {
     if !measured(model, z) {
         return html! { (ABSENT) };
     }
+    if model.covariance.iter().all(|c| *c == 0.0) {
+        return html! { b { (millimetres(model.sigma(z, theta))) } };
+    }
     let [low, high] = model.interval(z, theta, LEVEL).map(millimetres);
     html! { b { (millimetres(model.sigma(z, theta))) } " " span.units { "(" (low) " – " (high) ")" } }
 }

@@ -5,20 +5,19 @@ use maud::{Markup, html};
 use crate::measure::ViewMeasurement;
 use crate::report::numbers::{ABSENT, degrees, fixed, millimetres};
 
-const COLUMNS: [&str; 15] = [
+const COLUMNS: [&str; 14] = [
     "z m",
     "θ °",
     "azimuth °",
-    "σ mm",
-    "± s.e.",
+    "σ ± s.e. mm",
     "temporal σ mm",
-    "perpendicular σ mm",
-    "paper's z m",
-    "paper's θ °",
-    "paper's σ mm",
-    "samples",
-    "independent samples",
-    "correlation px",
+    "perp. σ mm",
+    "paper z m",
+    "paper θ °",
+    "paper σ mm",
+    "n",
+    "n effective",
+    "corr. px",
     "frames",
     "pixels left out",
 ];
@@ -33,9 +32,10 @@ pub(super) fn section(views: &[ViewMeasurement]) -> Markup {
             } }
             p.note {
                 "σ: of one frame over the whole target, along the optical axis. Temporal: of one pixel over the frames. \
-                 Perpendicular: across the plane. The paper's: mean depth, tilt and spread of the RANSAC inliers of \
-                 the first frame. Correlation: length within which neighbouring pixels err together; “+” where it \
-                 had not died out. Pixels left out: without depth / off the plane / at the target's edge."
+                 Perp.: across the plane. Paper: mean depth, tilt and spread of the RANSAC inliers of the first \
+                 frame. n: samples (pixels times frames); n effective: independent samples they are worth. Corr.: \
+                 length within which neighbouring pixels err together; “+” where it had not died out. Pixels left \
+                 out: without depth / off the plane / at the target's edge."
             }
         }
     }
@@ -49,8 +49,7 @@ fn row(view: &ViewMeasurement) -> Markup {
         fixed(view.z_m, 3),
         degrees(view.theta_rad),
         degrees(view.azimuth_rad),
-        millimetres(spread.spatial_m),
-        millimetres(view.whole.std_error_m),
+        format!("{} ± {}", millimetres(spread.spatial_m), millimetres(view.whole.std_error_m)),
         spread.temporal_m.map_or_else(absent, millimetres),
         millimetres(spread.perpendicular_m),
         paper.map_or_else(absent, |p| fixed(p.z_m, 3)),

@@ -11,16 +11,17 @@ pub(super) struct Grid {
 }
 
 impl Grid {
+    /// Denser towards the upper end of `y`, where the forms bend to their poles.
     pub fn sample(
         x: [f64; 2],
         y: [f64; 2],
         cells: [usize; 2],
         f: &dyn Fn(f64, f64) -> f64,
     ) -> Self {
-        let along = |[low, high]: [f64; 2], n: usize| -> Vec<f64> {
-            (0..=n).map(|i| low + (high - low) * i as f64 / n as f64).collect()
+        let along = |[low, high]: [f64; 2], n: usize, share: fn(f64) -> f64| -> Vec<f64> {
+            (0..=n).map(|i| low + (high - low) * share(i as f64 / n as f64)).collect()
         };
-        let (x, y) = (along(x, cells[0]), along(y, cells[1]));
+        let (x, y) = (along(x, cells[0], |s| s), along(y, cells[1], |s| s * (2.0 - s)));
         let value = y.iter().flat_map(|&v| x.iter().map(move |&u| f(u, v))).collect();
         Grid { x, y, value }
     }
@@ -66,7 +67,7 @@ fn crossings(corners: &[([f64; 2], f64); 4], level: f64) -> Vec<[f64; 2]> {
 const LABEL_HEIGHT: f64 = 0.3;
 const LABELS_APART: [f64; 2] = [0.08, 0.06];
 /// ... and this far from its sides.
-const LABEL_INSET: f64 = 0.01;
+const LABEL_INSET: f64 = 0.02;
 
 pub(super) fn lines(grid: &Grid, levels: &[f64]) -> Vec<IsoLine> {
     let mut taken: Vec<[f64; 2]> = Vec::new();
