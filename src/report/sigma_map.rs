@@ -160,7 +160,12 @@ mod tests {
         model.domain.theta_rad[1] = 1.33;
         let map = SigmaMap::of(&SigmaTable::default(), &model);
         assert!(map.lines.iter().filter(|l| l.label_at.is_some()).count() >= 4);
-        assert!(map.runs.iter().any(|r| r.shade == SigmaMap::SHADES - 1));
+        let shades = map.runs.iter().map(|r| r.shade);
+        assert!(shades.clone().min() == Some(0) && shades.max() > Some(SigmaMap::SHADES / 2));
+        let size = |[low, high]: [f64; 2]| high - low;
+        let covered: f64 = map.runs.iter().map(|r| size(r.z_m) * size(r.theta_deg)).sum();
+        let all = size(map.valid_z_m) * size(map.valid_theta_deg);
+        approx::assert_relative_eq!(covered, all, max_relative = 1e-9);
         assert!(map.svg().unwrap().contains("σ (mm)"));
     }
 

@@ -29,13 +29,14 @@ fn with_numbers(calibration: &Calibration) -> Markup {
     let model = &calibration.model.sigma;
     let spec = model.form.spec();
     let (equation, units) = spec.formula().split_once(" (m").unwrap_or((spec.formula(), ""));
+    let units = units.trim_start_matches(';').trim_end_matches(')').replace("theta", "θ");
     let value = |name: &str| {
         let at = spec.parameters().iter().position(|(n, _)| *n == name)?;
         model.parameters.get(at).copied()
     };
     html! {
         (formula(equation, &value))
-        " " span.units { "in m; " (units.trim_start_matches(';').trim_end_matches(')').trim()) }
+        " " span.units { "in m; " (units) }
     }
 }
 
