@@ -1,46 +1,20 @@
 //! Drawing and pages. Computes nothing: a number in a report exists as data elsewhere.
-use crate::{Calibration, Measurements, Result, Sensor, SigmaModel, SigmaTable};
-#[derive(Debug, Clone, Copy)]
-pub enum Overlay {
-    PaperEq1,
-}
-impl std::str::FromStr for Overlay {
-    type Err = String;
-    fn from_str(_: &str) -> std::result::Result<Self, String> {
-        Ok(Overlay::PaperEq1)
-    }
-}
-pub struct Figure2;
-impl Figure2 {
-    pub fn of(_: &SigmaTable, _: &SigmaModel, _: &[Overlay]) -> Self {
-        Figure2
-    }
-    pub fn svg(&self) -> Result<String> {
-        Ok(String::new())
-    }
-    pub fn png(&self) -> Result<Vec<u8>> {
-        Ok(vec![])
-    }
-}
-pub struct SigmaMap;
-impl SigmaMap {
-    pub fn of(_: &SigmaTable, _: &SigmaModel) -> Self {
-        SigmaMap
-    }
-    pub fn svg(&self) -> Result<String> {
-        Ok(String::new())
-    }
-    pub fn png(&self) -> Result<Vec<u8>> {
-        Ok(vec![])
-    }
-}
-pub struct CalibrationPage<'a> {
-    pub title: &'a str,
-    pub sensor: Option<&'a Sensor>,
-    pub measurements: Option<&'a Measurements>,
-    pub calibration: &'a Calibration,
-    pub overlays: &'a [Overlay],
-}
-pub fn calibration_page(_: &CalibrationPage<'_>) -> Result<String> {
-    Ok(String::new())
-}
+//!
+//! A figure is plain data first ([`Figure2`], [`SigmaMap`]: what stands where, with which label),
+//! drawn second, by one function for SVG and PNG alike. The page puts figures and tables together.
+
+mod axis;
+mod base64;
+mod colours;
+mod figure2;
+mod html;
+mod numbers;
+mod residual_picture;
+mod sheet;
+mod sigma_map;
+
+pub use axis::Axis;
+pub use figure2::{Figure2, Group, Overlay, OverlayLine, Point};
+pub use html::{CalibrationPage, calibration_page};
+pub use residual_picture::{residual_png, scale_mm};
+pub use sigma_map::{IsoLine, Run, SigmaMap};

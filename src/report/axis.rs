@@ -1,0 +1,172 @@
+//! An axis with round ticks, linear or logarithmic, as plotters wants it.
+
+use std::ops::Range;
+
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+
+/// From `low` to `high`, with the values that get a tick and a label.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    pub low: f64,
+    pub high: f64,
+    pub log: bool,
+    pub ticks: Vec<f64>,
+}
+
+/// More labels than this crowd a figure.
+const MOST_TICKS: usize = 10;
+/// A logarithmic axis wants at least this many labels to be read.
+const FEWEST_LOG_TICKS: usize = 4;
+/// Share of the value by which an empty range is widened on either side.
+const WIDEN: f64 = 0.05;
+/// Mantissas of round numbers.
+const ROUND: [f64; 3] = [1.0, 2.0, 5.0];
+/// ... and more of them, evenly spread on a short logarithmic axis.
+const FINER: [f64; 6] = [1.0, 1.5, 2.0, 3.0, 5.0, 7.0];
+
+impl Axis {
+    /// Ticks at multiples of 1, 2 or 5 times a power of ten.
+    pub fn linear(low: f64, high: f64) -> Self {
+        let [low, high] = widened(low, high);
+        Axis { low, high, log: false, ticks: multiples(low, high) }
+    }
+
+    /// Ticks at 1, 2 and 5 times powers of ten; both ends must be positive.
+    pub fn log(low: f64, high: f64) -> Self {
+        let [low, high] = widened(low.max(f64::MIN_POSITIVE), high);
+        let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
+        let inside = |mantissas: &[f64]| -> Vec<f64> {
+            decades
+                .clone()
+                .flat_map(|k| mantissas.iter().map(move |m| m * 10f64.powi(k)))
+                .filter(|v| (low..=high).contains(v))
+                .collect()
+        };
+        let mut ticks = inside(&ROUND);
+        if ticks.len() > MOST_TICKS {
+            ticks = inside(&ROUND[..1]);
+        } else if ticks.len() < FEWEST_LOG_TICKS {
+            ticks = inside(&FINER);
+        }
+        if ticks.len() < FEWEST_LOG_TICKS {
+            ticks = multiples(low, high);
+        }
+        Axis { low, high, log: true, ticks }
+    }
+
+    /// Without the ticks below `value`.
+    pub fn ticks_from(mut self, value: f64) -> Self {
+        self.ticks.retain(|t| *t >= value);
+        self
+    }
+
+    /// Where `value` lies, 0 at the low end and 1 at the high one.
+    pub fn share(&self, value: f64) -> f64 {
+        if self.log {
+            (value / self.low).ln() / (self.high / self.low).ln()
+        } else {
+            (value - self.low) / (self.high - self.low)
+        }
+    }
+
+    pub fn contains(&self, value: f64) -> bool {
+        (self.low..=self.high).contains(&value)
+    }
+
+    /// Ticks are round numbers: no more digits than they need.
+    pub fn label(value: f64) -> String {
+        const DIGITS: f64 = 1e9;
+        format!("{}", (value * DIGITS).round() / DIGITS + 0.0).replace('-', "−")
+    }
+}
+
+/// The least of 1, 2, 5 times a power of ten that is not below `value`.
+pub(super) fn round_up(value: f64) -> f64 {
+    const ROUNDING: f64 = 1e-9;
+    let decade = 10f64.powf(value.log10().floor());
+    let mantissa = value / decade * (1.0 - ROUNDING);
+    ROUND.into_iter().find(|m| *m >= mantissa).unwrap_or(10.0) * decade
+}
+
+fn widened(low: f64, high: f64) -> [f64; 2] {
+    if high > low * (1.0 + f64::EPSILON) || high > low && low <= 0.0 {
+        return [low, high];
+    }
+    let by = if low == 0.0 { 1.0 } else { WIDEN * low.abs() };
+    [low - by, low + by]
+}
+
+fn multiples(low: f64, high: f64) -> Vec<f64> {
+    let step = round_up((high - low) / MOST_TICKS as f64);
+    let first = (low / step - f64::EPSILON).ceil() as i64;
+    (first..)
+        .map(|k| k as f64 * step)
+        .take_while(|v| *v <= high * (1.0 + f64::EPSILON) + f64::EPSILON)
+        .take(2 * MOST_TICKS)
+        .collect()
+}
+
+impl Ranged for Axis {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        let length = f64::from(limit.1 - limit.0);
+        limit.0 + (self.share(*value) * length).round() as i32
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, _hint: Hint) -> Vec<f64> {
+        self.ticks.clone()
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.low..self.high
+    }
+}
+
+impl ValueFormatter<f64> for Axis {
+    fn format(value: &f64) -> String {
+        Axis::label(*value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn round_numbers_are_one_two_or_five() {
+        for (value, up) in [
+            (0.7, 1.0),
+            (1.0, 1.0),
+            (1.01, 2.0),
+            (2.0, 2.0),
+            (3.0, 5.0),
+            (5.1, 10.0),
+            (0.013, 0.02),
+            (470.0, 500.0),
+        ] {
+            approx::assert_relative_eq!(round_up(value), up, max_relative = 1e-12);
+        }
+    }
+
+    #[test]
+    fn ticks_are_inside_finite_and_few() {
+        for (low, high) in [(0.0, 0.0), (1.0, 1.0), (0.0, 76.0), (1.3, 1.31), (0.5, 900.0)] {
+            for axis in [Axis::linear(low, high), Axis::log(low.max(1e-3), high.max(1e-3))] {
+                assert!(axis.low.is_finite() && axis.high > axis.low, "{axis:?}");
+                assert!((2..=11).contains(&axis.ticks.len()), "{axis:?}");
+                for t in &axis.ticks {
+                    assert!((-1e-9..=1.0 + 1e-9).contains(&axis.share(*t)), "{axis:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn labels_have_no_needless_digits() {
+        let labels: Vec<String> =
+            [0.1 + 0.2, 5.0, 20.0, 0.005].into_iter().map(Axis::label).collect();
+        assert_eq!(labels, ["0.3", "5", "20", "0.005"]);
+    }
+}

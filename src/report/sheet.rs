@@ -1,0 +1,216 @@
+//! A sheet to draw on: one generic drawing, two backends.
+//!
+//! Sizes are in units of the SVG's pixel; the PNG is drawn at a multiple of them and shrunk,
+//! which smooths edges that plotters' bitmap leaves jagged.
+
+use std::io::Cursor;
+use std::sync::OnceLock;
+
+use image::imageops::{FilterType, resize};
+use image::{ImageFormat, RgbImage};
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::register_font;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::colours::INK;
+use crate::error::{Error, Result};
+
+pub(super) type Drawn<B, T = ()> =
+    Result<T, DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
+/// A place on the backend.
+pub(super) type Pixel = (i32, i32);
+
+/// Something that can be drawn.
+pub(super) trait Drawing {
+    /// For the error message.
+    const WHAT: &'static str;
+    /// Width and height, units.
+    const SIZE: (u32, u32);
+    fn draw<B: DrawingBackend>(&self, sheet: &Sheet<'_, B>) -> Drawn<B>;
+}
+
+/// Pixels of the PNG a unit, after shrinking ...
+const PNG_SCALE: u32 = 2;
+/// ... by this factor.
+const OVERSAMPLING: u32 = 2;
+/// plotters' bitmap centres the box of a line, not the letters, units.
+const PNG_TEXT_DROP: i32 = 2;
+/// plotters writes SVG fonts at 1/1.24 of their size (its ratio of line to em); sizes here are
+/// such that both backends agree to the eye.
+pub(super) const TEXT: i32 = 17;
+pub(super) const SMALL: i32 = 15;
+const TITLE: i32 = 21;
+pub(super) const FONT: &str = "sans-serif";
+
+pub(super) fn svg(drawing: &impl Drawing) -> Result<String> {
+    let mut text = String::new();
+    on_sheet(drawing, SVGBackend::with_string(&mut text, size_of(drawing, 1)), 1)?;
+    Ok(text)
+}
+
+pub(super) fn png(drawing: &impl Drawing) -> Result<Vec<u8>> {
+    let scale = PNG_SCALE * OVERSAMPLING;
+    let (width, height) = size_of(drawing, scale);
+    let mut image = RgbImage::new(width, height);
+    on_sheet(drawing, BitMapBackend::with_buffer(&mut image, (width, height)), scale as i32)?;
+    let small = resize(&image, width / OVERSAMPLING, height / OVERSAMPLING, FilterType::Triangle);
+    let mut bytes = Vec::new();
+    small.write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png).map_err(failed(drawing))?;
+    Ok(bytes)
+}
+
+fn size_of<D: Drawing>(_: &D, scale: u32) -> (u32, u32) {
+    (D::SIZE.0 * scale, D::SIZE.1 * scale)
+}
+
+fn failed<D: Drawing, E: std::fmt::Display>(_: &D) -> impl Fn(E) -> Error {
+    |e| Error::Drawing { what: D::WHAT, why: e.to_string() }
+}
+
+fn on_sheet<B: DrawingBackend, D: Drawing>(drawing: &D, backend: B, unit: i32) -> Result<()> {
+    if !font_registered() {
+        return Err(Error::Drawing { what: D::WHAT, why: "the built-in font is damaged".into() });
+    }
+    let root = backend.into_drawing_area();
+    let draw = || -> Drawn<B> {
+        root.fill(&WHITE)?;
+        let text_drop = if unit > 1 { unit * PNG_TEXT_DROP } else { 0 };
+        drawing.draw(&Sheet { root: &root, unit, text_drop })?;
+        root.present()
+    };
+    draw().map_err(failed(drawing))
+}
+
+/// plotters measures (and, in PNGs, draws) text with this font; SVGs only name the family.
+fn font_registered() -> bool {
+    static DONE: OnceLock<bool> = OnceLock::new();
+    *DONE.get_or_init(|| {
+        let bytes = include_bytes!("fonts/kinoise-sans.ttf");
+        register_font(FONT, FontStyle::Normal, bytes).is_ok()
+    })
+}
+
+/// The whole drawing area and the size of a unit, px.
+pub(super) struct Sheet<'a, B: DrawingBackend> {
+    pub root: &'a DrawingArea<B, Shift>,
+    pub unit: i32,
+    /// What the backend sets text too high, px.
+    text_drop: i32,
+}
+
+/// What the plotters chart inside a sheet is like.
+pub(super) type Chart<'a, B, X, Y> = ChartContext<'a, B, Cartesian2d<X, Y>>;
+
+/// Strokes and gaps of a broken line, units; empty for a whole one.
+pub(super) type Dashes = &'static [i32];
+
+impl<B: DrawingBackend> Sheet<'_, B> {
+    /// Units to px.
+    pub fn px(&self, units: i32) -> i32 {
+        units * self.unit
+    }
+
+    pub fn stroke<C: Color>(&self, colour: &C, width: u32) -> ShapeStyle {
+        colour.stroke_width(width * self.unit.unsigned_abs())
+    }
+
+    pub fn line(&self, points: &[Pixel], style: ShapeStyle, dashes: Dashes) -> Drawn<B> {
+        if dashes.is_empty() {
+            return self.root.draw(&PathElement::new(points.to_vec(), style));
+        }
+        let pattern: Vec<f64> = dashes.iter().map(|d| f64::from(self.px(*d))).collect();
+        for piece in broken(points, &pattern) {
+            self.root.draw(&PathElement::new(piece, style))?;
+        }
+        Ok(())
+    }
+
+    pub fn fill<C: Color>(&self, corners: [Pixel; 2], colour: &C) -> Drawn<B> {
+        self.root.draw(&Rectangle::new(corners, colour.filled()))
+    }
+
+    /// Text whose left (or as `anchor` says) middle is at `at`.
+    pub fn text(&self, text: &str, at: Pixel, size: i32, anchor: HPos) -> Drawn<B> {
+        self.coloured_text(text, at, size, anchor, &INK)
+    }
+
+    pub fn coloured_text<C: Color>(
+        &self,
+        text: &str,
+        at: Pixel,
+        size: i32,
+        anchor: HPos,
+        colour: &C,
+    ) -> Drawn<B> {
+        let style = self.font(size).color(colour).pos(Pos::new(anchor, VPos::Center));
+        self.root.draw_text(text, &style, (at.0, at.1 + self.text_drop))
+    }
+
+    pub fn font(&self, size: i32) -> TextStyle<'static> {
+        (FONT, self.px(size)).into_text_style(self.root)
+    }
+
+    /// Width of a text, px.
+    pub fn width(&self, text: &str, size: i32) -> Drawn<B, i32> {
+        Ok(self.root.estimate_text_size(text, &self.font(size))?.0 as i32)
+    }
+
+    /// The figure's title, as large as fits.
+    pub fn title(&self, text: &str, width: i32) -> Drawn<B> {
+        const LEFT: i32 = 16;
+        const MIDDLE: i32 = 22;
+        let needed = self.width(text, TITLE)?.max(1);
+        let room = self.px(width - 2 * LEFT);
+        let size = if needed > room { (TITLE * room / needed).max(SMALL / 2) } else { TITLE };
+        self.text(text, (self.px(LEFT), self.px(MIDDLE)), size, HPos::Left)
+    }
+}
+
+/// Cut a line into the strokes of a pattern of lengths (stroke, gap, stroke, ...).
+fn broken(points: &[Pixel], pattern: &[f64]) -> Vec<Vec<Pixel>> {
+    let mut pieces = Vec::new();
+    let (mut slot, mut left) = (0, pattern[0]);
+    let mut piece: Vec<Pixel> = points.first().copied().into_iter().collect();
+    for pair in points.windows(2) {
+        let [from, to] = [pair[0], pair[1]].map(|(x, y)| (f64::from(x), f64::from(y)));
+        let length = (to.0 - from.0).hypot(to.1 - from.1);
+        let mut done = 0.0;
+        while length - done > left {
+            done += left;
+            let share = done / length;
+            let at = [from.0 + share * (to.0 - from.0), from.1 + share * (to.1 - from.1)];
+            let at = (at[0].round() as i32, at[1].round() as i32);
+            if slot % 2 == 0 {
+                piece.push(at);
+                pieces.push(std::mem::take(&mut piece));
+            } else {
+                piece = vec![at];
+            }
+            slot += 1;
+            left = pattern[slot % pattern.len()];
+        }
+        left -= length - done;
+        if slot % 2 == 0 {
+            piece.push(pair[1]);
+        }
+    }
+    if piece.len() > 1 {
+        pieces.push(piece);
+    }
+    pieces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dashes_alternate_over_corners() {
+        let pieces = broken(&[(0, 0), (10, 0), (10, 10)], &[6.0, 2.0]);
+        assert_eq!(
+            pieces,
+            [vec![(0, 0), (6, 0)], vec![(8, 0), (10, 0), (10, 4)], vec![(10, 6), (10, 10)]]
+        );
+    }
+}
