@@ -422,6 +422,7 @@ fn finish(
     let width = image.camera.width;
     let filled = lattice.eroded(&lattice.dilated(&best.mask));
     let trimmed = lattice.eroded(&filled);
+    let core = lattice.eroded(&trimmed);
     let count = |mask: &[bool]| mask.iter().filter(|m| **m).count();
     let keep_rim = 2 * count(&trimmed) < count(&filled);
     let mut notes = Vec::new();
@@ -444,8 +445,8 @@ fn finish(
             continue;
         }
         let fits = image.valid(i) && on_plane(image, &best.fit, i);
-        // Beyond what was reached by growing, only what fits: a gap may show something else.
-        if !best.mask[node] && !fits {
+        // Near the rim only what fits: something else may be seen there.
+        if !core[node] && !fits {
             continue;
         }
         if trimmed[node] || keep_rim {

@@ -66,13 +66,13 @@ pub(super) fn parabola_start(rows: &Rows, h: impl Fn(&SigmaRow) -> f64) -> Optio
     };
     let d = match (with_tilt, &q) {
         (true, Some(q)) => q[3],
-        _ => LEAST_TILT,
+        _ => 0.0,
     };
     if !with_tilt {
         remarks.push(if tilted {
-            "tilt adds no noise that these views show: d is held at practically zero".into()
+            "tilt adds no noise that these views show: d is held at zero".into()
         } else {
-            "no view is tilted: d is held at practically zero".into()
+            "no view is tilted: d is held at zero".into()
         });
     }
     Some(Start {
@@ -81,9 +81,6 @@ pub(super) fn parabola_start(rows: &Rows, h: impl Fn(&SigmaRow) -> f64) -> Optio
         remarks,
     })
 }
-
-/// A tilt coefficient that changes sigma by nothing at any angle short of the pole.
-const LEAST_TILT: f64 = 1e-12;
 
 /// a and b with c held at the paper's.
 fn vertex_held(rows: &Rows, remarks: &mut Vec<String>) -> Option<[f64; 3]> {
