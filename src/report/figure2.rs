@@ -59,7 +59,8 @@ impl FromStr for Overlay {
     }
 }
 
-/// A measured sigma.
+/// A measured sigma, carried along the fitted surface from its own distance to its group's: its
+/// height over the curve is its relative residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
     pub theta_deg: f64,
@@ -155,10 +156,13 @@ fn group_of(rows: &[SigmaRow], model: &SigmaModel) -> Group {
     let z_m = rows[rows.len() / 2].z_m;
     let points = rows
         .iter()
-        .map(|r| Point {
-            theta_deg: r.theta_rad.to_degrees(),
-            sigma_mm: MM * r.sigma_m,
-            std_error_mm: r.std_error_m().map(|e| MM * e),
+        .map(|r| {
+            let carried = MM * model.sigma(z_m, r.theta_rad) / model.sigma(r.z_m, r.theta_rad);
+            Point {
+                theta_deg: r.theta_rad.to_degrees(),
+                sigma_mm: carried * r.sigma_m,
+                std_error_mm: r.std_error_m().map(|e| carried * e),
+            }
         })
         .collect();
     // A published surface has no band.

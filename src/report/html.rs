@@ -39,7 +39,9 @@ pub fn calibration_page(input: &CalibrationPage<'_>) -> Result<String> {
         (summary::section(input))
         (figure(&figure2.svg()?, "Noise against tilt. Each point is a measured σ, its bar one standard error; \
             colour and shape tell the distance. Curves are the fit at the median distance of each colour, \
-            drawn only over the tilts that were measured."))
+            drawn only over the tilts that were measured. A point is carried along the fitted surface from its \
+            own distance to its curve's, so that its height over the curve is its relative residual; \
+            measurements.csv has it as measured."))
         (figure(&map.svg()?, "The fitted σ where it is valid. Dots are the measured cells: far from them \
             the colour is interpolation."))
         (model::section(calibration))

@@ -236,15 +236,28 @@ impl Figure2 {
 
     fn key_to_points<B: DrawingBackend>(&self, sheet: &Sheet<'_, B>, (x, y): Pixel) -> Drawn<B> {
         let bars = self.groups.iter().flat_map(|g| &g.points).any(|p| p.std_error_mm.is_some());
-        let words = if bars { "points: measured ± 1 s.e." } else { "points: measured" };
-        sheet.coloured_text(words, (x, y), SMALL, HPos::Left, &FAINT)
+        let words = if bars { "points: measured ± 1 s.e.," } else { "points: measured," };
+        sheet.coloured_text(words, (x, y), SMALL, HPos::Left, &FAINT)?;
+        let below = y + sheet.px(LINE) * 8 / 10;
+        sheet.coloured_text(
+            "carried to the curve's distance",
+            (x, below),
+            SMALL,
+            HPos::Left,
+            &FAINT,
+        )
     }
 }
 
 /// Distances that print alike are one.
 fn label(group: &Group) -> String {
     let [low, high] = group.range_m.map(|z| format!("{z:.2}"));
-    if low == high { format!("{low} m") } else { format!("{low} – {high} m") }
+    if low == high {
+        format!("{low} m")
+    } else {
+        let [low, high] = group.range_m.map(|z| format!("{z:.1}"));
+        format!("{:.2} m ({low} – {high})", group.z_m)
+    }
 }
 
 /// Corners of the markers after the first (a disc), in units of the radius.
