@@ -50,7 +50,8 @@ impl Bins {
     /// For depths between `low` and `high`, m.
     pub fn between(low: f64, high: f64) -> Self {
         let range = (high / low).ln();
-        if !(range > BIN_WHEN_RATIO.ln()) {
+        let tilted = range > BIN_WHEN_RATIO.ln();
+        if !tilted {
             return Bins { low, log_ratio: f64::INFINITY, count: 1 };
         }
         let count = ((range / BIN_RATIO.ln()).ceil() as usize).min(MOST_BINS);

@@ -114,7 +114,7 @@ pub fn fit(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
             .fold(0.0, f64::max);
         converged = change < SETTLED;
     }
-    if rows.iter().any(|r| !(spec.sigma(&p, r.z_m, r.theta_rad) > 0.0)) {
+    if !rows.iter().all(|r| spec.sigma(&p, r.z_m, r.theta_rad) > 0.0) {
         return Err(Error::Solver {
             what: format!("the form \"{form}\" is not positive where the data are"),
             remedy: "look for outlying views in measurements.csv, or choose another --form",
@@ -381,7 +381,7 @@ fn name_parameters(
         .enumerate()
         .map(|(i, &(name, _))| {
             let std_error = free.contains(&i).then(|| covariance[(i, i)].max(0.0).sqrt());
-            let weak = std_error.is_some_and(|e| !(e <= WEAK * p[i].abs()));
+            let weak = std_error.is_some_and(|e| e.is_nan() || e > WEAK * p[i].abs());
             let remark = match std_error {
                 None => Some(format!("{name} was held, not fitted")),
                 Some(_) if weak => spec

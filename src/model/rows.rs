@@ -282,7 +282,7 @@ const ROOT_DIGITS: f64 = 1e-12;
 
 /// The least tau^2 >= 0 at which a decreasing excess is not positive, by bisection.
 fn smallest_root(excess: impl Fn(f64) -> f64) -> f64 {
-    if !(excess(0.0) > 0.0) {
+    if excess(0.0).is_nan() || excess(0.0) <= 0.0 {
         return 0.0;
     }
     let mut high = 1e-6;

@@ -27,11 +27,8 @@ pub(super) fn vertex_gradient(p: &[f64], z: f64, out: &mut [f64; MOST_PARAMETERS
 
 /// (a, b, c) of alpha + beta z + gamma z^2; `None` when it opens downwards.
 pub(super) fn vertex(alpha: f64, beta: f64, gamma: f64) -> Option<[f64; 3]> {
-    if !(gamma > 0.0) {
-        return None;
-    }
     let c = -beta / (2.0 * gamma);
-    Some([alpha - gamma * c * c, gamma, c])
+    (gamma > 0.0).then_some([alpha - gamma * c * c, gamma, c])
 }
 
 /// A vertex farther than this from the data is an extrapolation, not a measurement, m.
