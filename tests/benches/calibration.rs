@@ -8,8 +8,11 @@ use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use kinoise::io::{Assumed, FrameSource, open};
 use kinoise::measure::{MeasureOptions, SigmaRow, SigmaTable, Workbench, measure_view};
 use kinoise::model::fit;
-use kinoise::plane::{Points, RansacOptions, ransac_plane};
+use kinoise::plane::{
+    Effort, InverseDepthImage, Points, RansacOptions, find_target, fit_affine_robust, ransac_plane,
+};
 use kinoise::simulate::{Board, Grid, Shoot, kinect_v1};
+use kinoise::view::Region;
 use kinoise::{Form, Plane, Seed, SigmaModel};
 use rand_distr::{Distribution, StandardNormal};
 
@@ -64,6 +67,31 @@ fn planes(c: &mut Criterion) {
     c.bench_function("plane: RANSAC + refit, 307,200 points", |b| {
         b.iter(|| ransac_plane(black_box(&points), &options, &mut Seed(1).stream("r")));
     });
+    default_plane(&points, &truth, c);
+}
+
+/// The default plane on the same points: RANSAC seed, then the robust fit of 1/z on all pixels.
+fn default_plane(points: &Points, truth: &Plane, c: &mut Criterion) {
+    let camera = kinect_v1(1).camera;
+    let mut rays = camera.rays();
+    let w: Vec<f32> = points.z.iter().map(|z| 1.0 / z).collect();
+    rays.x = points.x.iter().zip(&w).map(|(x, w)| x * w).collect();
+    rays.y = points.y.iter().zip(&w).map(|(y, w)| y * w).collect();
+    let pixels: Vec<u32> = (0..w.len() as u32).collect();
+    let region = Region::Rectangle([0.0, 0.0, 640.0, 480.0]);
+    let run = || {
+        let image = InverseDepthImage { w: &w, rays: &rays, camera: &camera, step: &|_| 2.9e-3 };
+        let target = find_target(&image, Some(&region), &mut Seed(1).stream("r")).expect("a plane");
+        fit_affine_robust(&w, &rays, &pixels, &target.plane, 3e-4, Effort::AllPixels)
+            .expect("a fit")
+    };
+    let found = run().plane;
+    println!(
+        "the same by the default fit: angle error {:.4} deg, distance error {:.3} mm",
+        found.normal().angle(&truth.normal()).to_degrees(),
+        1e3 * (found.distance() - truth.distance())
+    );
+    c.bench_function("plane: seed + robust fit in 1/z, 307,200 points", |b| b.iter(run));
 }
 
 /// 100 cells of Eq. 1, each from `samples` samples.
