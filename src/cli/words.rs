@@ -58,16 +58,24 @@ pub fn surface(model: &SigmaModel) -> String {
             }
             let [a, b] = model.interval(z, theta, 0.95);
             let own = format!("{:.2} ({:.2}-{:.2})", 1e3 * model.sigma(z, theta), 1e3 * a, 1e3 * b);
-            let other = |m: SigmaModel| 1e3 * m.sigma(z, theta);
             text.push_str(&format!(
-                "{z:>6.2}{theta_deg:>5.0}°   {own:<24}{:>10.2}{:>13.2}{:>13.2}\n",
-                other(SigmaModel::paper()),
-                other(SigmaModel::nguyen()),
-                other(SigmaModel::khoshelham())
+                "{z:>6.2}{theta_deg:>5.0}°   {own:<24}{:>10}{:>13}{:>13}\n",
+                published(&SigmaModel::paper(), z, theta),
+                published(&SigmaModel::nguyen(), z, theta),
+                published(&SigmaModel::khoshelham(), z, theta)
             ));
         }
     }
     text
+}
+
+/// In mm, or a dash where its authors have not measured.
+fn published(model: &SigmaModel, z: f64, theta: f64) -> String {
+    if model.domain.contains(z, theta) {
+        format!("{:.2}", 1e3 * model.sigma(z, theta))
+    } else {
+        "-".into()
+    }
 }
 
 /// Round distances inside the domain, or its ends when none lies there.
