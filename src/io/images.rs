@@ -75,6 +75,10 @@ fn decode_png16(path: &Path, bytes: &[u8]) -> Result<Frame> {
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().map_err(damaged)?;
     let info = reader.info();
     let (width, height) = (info.width as usize, info.height as usize);
+    if !plausible(width, height) {
+        // The header is not to be believed with memory before the pixels are there.
+        return Err(Error::image(path, format!("{width} x {height} px PNG"), REMEDY_DEPTH));
+    }
     if info.bit_depth != BitDepth::Sixteen || info.color_type != ColorType::Grayscale {
         return Err(Error::image(
             path,
@@ -119,8 +123,12 @@ fn pgm_header(bytes: &[u8]) -> Option<([usize; 3], &[u8])> {
         rest = &rest[end..];
     }
     let [width, height, _] = numbers;
-    let plausible = (1..=16384).contains(&width) && (1..=16384).contains(&height);
-    plausible.then_some((numbers, rest.get(1..)?))
+    plausible(width, height).then_some((numbers, rest.get(1..)?))
+}
+
+/// The sizes a camera may have (as [`crate::Camera::fault`] sees it).
+fn plausible(width: usize, height: usize) -> bool {
+    (1..=16384).contains(&width) && (1..=16384).contains(&height)
 }
 
 /// Infrared amplitude, 8 or 16 bit, as numbers.
