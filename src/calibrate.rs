@@ -33,6 +33,12 @@ pub struct Excluded {
     pub reason: String,
 }
 
+impl std::fmt::Display for Excluded {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "view {} was left out: {}", self.view, self.reason)
+    }
+}
+
 /// All views of a recording, measured.
 #[derive(Debug, Clone)]
 pub struct Measurements {
@@ -221,8 +227,10 @@ fn hashes(recording: &Recording, measurements: &Measurements) -> Map<String, Val
 fn warnings(recording: &Recording, measurements: &Measurements, fit: &SigmaFit) -> Vec<String> {
     let mut warnings = Vec::new();
     for e in &measurements.excluded {
-        warnings.push(format!("view {} was left out: {}", e.view, e.reason));
+        warnings.push(e.to_string());
     }
+    // Views left out while opening stand here too.
+    warnings.extend(recording.remarks.iter().cloned());
     let total = measurements.views.len();
     let smooth = measurements.views.iter().filter(|v| v.correlation.persists).count();
     if smooth > 0 {
@@ -241,6 +249,5 @@ fn warnings(recording: &Recording, measurements: &Measurements, fit: &SigmaFit) 
     for view in &measurements.views {
         warnings.extend(view.notes.iter().map(|note| format!("view {}: {note}", view.name)));
     }
-    warnings.extend(recording.remarks.iter().cloned());
     warnings
 }
