@@ -78,7 +78,9 @@ impl Input {
             (None, None) => None,
         };
         if let Some(fault) = code.as_ref().and_then(DepthCode::fault) {
-            bail!("{fault}");
+            bail!(
+                "{fault}; give --units-per-metre or --raw-disparity numbers that turn words into metres"
+            );
         }
         Ok(Assumed { intrinsics: self.intrinsics, code, baseline_m: self.baseline })
     }
