@@ -437,6 +437,9 @@ fn a_view_without_a_plane() {
     let result =
         bench.calibrate().tells(&["view 0004 was left out", "view 0007 was left out", "view.json"]);
     assert_eq!(used(&result), common::GOOD_VIEWS - 2);
+    // Saying where the target is does not make it one.
+    bench.put("0004/view.json", "{\"roi\": [40, 30, 120, 90]}");
+    bench.calibrate().tells(&["view 0004 was left out", "view 0007 was left out"]);
 }
 
 /// A ball of 0.3 m radius whose middle is 1.2 m away.
