@@ -19,7 +19,7 @@ struct Bench {
 
 impl Bench {
     fn empty() -> Self {
-        let folder = tempfile::tempdir().expect("a temporary folder");
+        let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a temporary folder");
         let recording = folder.path().join("recording");
         Bench { folder, recording }
     }
@@ -371,11 +371,19 @@ fn crc32(bytes: &[u8]) -> u32 {
 
 #[test]
 fn one_spoiled_frame_is_told_and_its_view_stays() {
-    for (bytes, says) in spoiled_images() {
+    // Eleven kinds of damage, four views at a time: the list of notes is cut after eight.
+    for few in spoiled_images().chunks(4) {
         let bench = Bench::good();
-        bench.put("0003/depth/0001.png", &bytes);
-        let result = bench.calibrate().tells(&["view 0003", "frame left out", "0001.png", says]);
-        assert_eq!(used(&result), common::GOOD_VIEWS, "{says}");
+        for (view, (bytes, _)) in few.iter().enumerate() {
+            bench.put(&format!("{view:04}/depth/0001.png"), bytes);
+        }
+        let run = bench.calibrate();
+        for (view, (_, says)) in few.iter().enumerate() {
+            let told = format!("view {view:04}: frame left out");
+            let line = run.stderr.lines().find(|l| l.contains(&told)).expect(&run.stderr);
+            assert!(line.contains("0001.png") && line.contains(says), "{says}: {line}");
+        }
+        assert_eq!(used(&run.tells(&[])), common::GOOD_VIEWS);
     }
 }
 
@@ -469,12 +477,16 @@ fn a_list_that_names_a_missing_file() {
 
 #[test]
 fn lines_that_are_no_frames() {
+    let bench = Bench::good();
+    let mut spoilt: Vec<String> = Vec::new();
     for line in ["no-time depth/0001.png", "NAN depth/0001.png", "INF depth/0001.png", "3.5"] {
-        let bench = Bench::good();
-        bench.edit("0006/depth.txt", |t| format!("{t}{line}\n"));
-        let result = bench.calibrate().tells(&["view 0006 left out", "depth.txt, line 4", line]);
-        assert_eq!(used(&result), common::GOOD_VIEWS - 1);
+        let view = spoilt.len();
+        bench.edit(&format!("{view:04}/depth.txt"), |t| format!("{t}{line}\n"));
+        spoilt.push(format!("{view:04}/depth.txt, line 4: \"{line}\""));
     }
+    let needles: Vec<&str> = spoilt.iter().map(String::as_str).collect();
+    let result = bench.calibrate().tells(&needles);
+    assert_eq!(used(&result), common::GOOD_VIEWS - needles.len());
 }
 
 #[test]
@@ -524,7 +536,7 @@ fn a_timestamp_given_twice() {
 
 #[test]
 fn a_broken_view_file_costs_its_view_alone() {
-    for (text, says) in [
+    let broken = [
         ("{\n\"roi\": [1, 2\n", "line"),
         ("{\"roi\": [1, 2, 3]}", "line 1"),
         ("{\"polygon\": [[10, 10], [20, 20]]}", "three corners"),
@@ -534,25 +546,38 @@ fn a_broken_view_file_costs_its_view_alone() {
         ("{\"roi\": [60, 50, 80, 70], \"polygon\": [[1, 1], [9, 1], [9, 9]]}", "both"),
         ("{\"reference_distance_m\": -1}", "reference_distance_m"),
         ("{\"reference_distance_m\": 1e999}", "line 1"),
-    ] {
+    ];
+    for few in broken.chunks(3) {
         let bench = Bench::good();
-        bench.put("0008/view.json", text);
-        let result = bench.calibrate().tells(&["view 0008 left out", "0008/view.json", says]);
-        assert_eq!(used(&result), common::GOOD_VIEWS - 1, "{text}");
+        for (view, (text, _)) in few.iter().enumerate() {
+            bench.put(&format!("{view:04}/view.json"), text);
+        }
+        let run = bench.calibrate();
+        for (view, (_, says)) in few.iter().enumerate() {
+            let told = format!("view {view:04} left out");
+            let line = run.stderr.lines().find(|l| l.contains(&told)).expect(&run.stderr);
+            assert!(line.contains("view.json") && line.contains(says), "{says}: {line}");
+        }
+        assert_eq!(used(&run.tells(&[])), common::GOOD_VIEWS - few.len());
     }
 }
 
 #[test]
 fn a_region_that_holds_nothing() {
-    for (text, says) in [
+    let bench = Bench::good();
+    let empty = [
         ("{\"polygon\": [[900, 900], [990, 900], [990, 990]]}", "outside the image"),
         ("{\"polygon\": [[50, 50], [50, 50], [50, 50]]}", "region"),
         ("{\"roi\": [0, 0, 3, 3]}", "region"),
         ("{\"roi\": [-1e9, -1e9, -1e8, -1e8]}", "outside the image"),
-    ] {
-        let bench = Bench::good();
-        bench.put("0008/view.json", text);
-        bench.calibrate().tells(&["view 0008", says]);
+    ];
+    for (view, (text, _)) in empty.iter().enumerate() {
+        bench.put(&format!("{view:04}/view.json"), text);
+    }
+    let result = bench.calibrate().tells(&[]);
+    assert_eq!(used(&result), common::GOOD_VIEWS - empty.len());
+    for (excluded, (_, says)) in result["excluded"].as_array().expect("a list").iter().zip(empty) {
+        assert!(excluded["reason"].as_str().expect("words").contains(says), "{excluded}");
     }
     let bench = Bench::good();
     bench
@@ -803,10 +828,17 @@ impl Damage {
     }
 }
 
-/// Four frontal views, so that a fit takes no time.
-fn small() -> &'static Path {
+/// Four frontal views, so that a fit takes no time; spoiled and mended again by every case.
+fn small() -> &'static Bench {
     static SMALL: std::sync::OnceLock<Bench> = std::sync::OnceLock::new();
-    &SMALL.get_or_init(|| Bench::of(&[1.0, 1.5, 2.0, 3.0], &[0.0])).recording
+    SMALL.get_or_init(|| {
+        let bench = Bench::of(&[1.0, 1.5, 2.0, 3.0], &[0.0]);
+        bench.put(
+            "0001/view.json",
+            "{\"polygon\": [[60.0, 40.0], [99.5, 40.0], [99.5, 80.0], [60.0, 80.0]],\n \"reference_distance_m\": 1.0}\n",
+        );
+        bench
+    })
 }
 
 proptest! {
@@ -824,10 +856,9 @@ proptest! {
         ]),
         damage in damage(),
     ) {
-        let bench = Bench::empty();
-        copy_tree(small(), &bench.recording());
-        bench.put("0001/view.json", "{\"polygon\": [[60.0, 40.0], [99.5, 40.0], [99.5, 80.0], [60.0, 80.0]],\n \"reference_distance_m\": 1.0}\n");
-        let mut bytes = fs::read(bench.file(file)).expect("read");
+        let bench = small();
+        let whole = fs::read(bench.file(file)).expect("read");
+        let mut bytes = whole.clone();
         damage.done_to(&mut bytes);
         bench.put(file, &bytes);
         let options = kinoise::CalibrateOptions {
@@ -840,6 +871,7 @@ proptest! {
                 has_only_numbers("measurements", &kinoise::measure::write_measurements(&views.views));
                 kinoise::model_of(&recording, &views, &options)?.model.to_json()
             });
+        bench.put(file, whole);
         match result {
             Ok(model) => has_only_numbers("model", &model),
             Err(e) => prop_assert!(!e.to_string().contains('\n'), "{e}"),

@@ -36,7 +36,8 @@ pub const GOOD_VIEWS: usize = 12;
 pub fn good() -> &'static Path {
     static GOOD: OnceLock<tempfile::TempDir> = OnceLock::new();
     GOOD.get_or_init(|| {
-        let folder = tempfile::tempdir().expect("a temporary folder");
+        // Statics are never dropped: below target/ nobody minds.
+        let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a temporary folder");
         shots(grid(&[1.0, 1.5, 2.0, 3.0], &[0.0, 30.0, 60.0]), 2, 1)
             .write(folder.path(), &|_, _| ())
             .expect("the recording is written");
