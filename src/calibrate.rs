@@ -33,6 +33,21 @@ pub struct Excluded {
     pub reason: String,
 }
 
+impl Excluded {
+    fn of(view: &str, error: &Error) -> Self {
+        let text = error.to_string();
+        // The view's name has its own field.
+        let reason = text.strip_prefix(&format!("view {view}: ")).unwrap_or(&text);
+        Excluded { view: view.into(), reason: reason.into() }
+    }
+}
+
+impl std::fmt::Display for Excluded {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "view {} was left out: {}", self.view, self.reason)
+    }
+}
+
 /// All views of a recording, measured.
 #[derive(Debug, Clone)]
 pub struct Measurements {
@@ -79,13 +94,14 @@ pub fn measure(
     for (view, result) in recording.views.iter().zip(results) {
         match result {
             Ok(m) => measurements.views.push(m),
-            Err(e) => measurements
-                .excluded
-                .push(Excluded { view: view.name.clone(), reason: e.to_string() }),
+            Err(e) => measurements.excluded.push(Excluded::of(&view.name, &e)),
         }
     }
     if measurements.views.is_empty() {
-        let first = measurements.excluded.first().map_or("there is no view", |e| &e.reason);
+        let first = measurements.excluded.first().map_or_else(
+            || "there is no view".to_string(),
+            |e| format!("view {}: {}", e.view, e.reason),
+        );
         return Err(Error::recording(
             &recording.root,
             format!("no view of {total} can be used; the first: {first}"),
@@ -221,8 +237,10 @@ fn hashes(recording: &Recording, measurements: &Measurements) -> Map<String, Val
 fn warnings(recording: &Recording, measurements: &Measurements, fit: &SigmaFit) -> Vec<String> {
     let mut warnings = Vec::new();
     for e in &measurements.excluded {
-        warnings.push(format!("view {} was left out: {}", e.view, e.reason));
+        warnings.push(e.to_string());
     }
+    // Views left out while opening stand here too.
+    warnings.extend(recording.remarks.iter().cloned());
     let total = measurements.views.len();
     let smooth = measurements.views.iter().filter(|v| v.correlation.persists).count();
     if smooth > 0 {
@@ -241,6 +259,5 @@ fn warnings(recording: &Recording, measurements: &Measurements, fit: &SigmaFit) 
     for view in &measurements.views {
         warnings.extend(view.notes.iter().map(|note| format!("view {}: {note}", view.name)));
     }
-    warnings.extend(recording.remarks.iter().cloned());
     warnings
 }

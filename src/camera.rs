@@ -25,7 +25,7 @@ impl Camera {
     /// What is wrong with these numbers, if anything.
     pub fn fault(&self) -> Option<String> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
-        if self.width == 0 || self.height == 0 || self.width > 16384 || self.height > 16384 {
+        if !usable_size(self.width, self.height) {
             return Some(format!("image size {} x {} px is not usable", self.width, self.height));
         }
         if !positive(self.fx) || !positive(self.fy) {
@@ -89,6 +89,15 @@ impl Camera {
         }
         Rays { x, y }
     }
+}
+
+/// 16 megapixels are ten times what any depth sensor has; more is a slip or damage, and the rays
+/// of all pixels would take gigabytes before the first image shows the contradiction.
+const MOST_PIXELS: usize = 1 << 24;
+
+pub(crate) fn usable_size(width: usize, height: usize) -> bool {
+    let pixels = width.saturating_mul(height);
+    (1..=MOST_PIXELS).contains(&pixels)
 }
 
 /// The map contracts by the size of the distortion; ten rounds are below 1e-9 px for a Kinect.

@@ -125,6 +125,9 @@ pub fn calibrate(
     say(opening(recording, &measurements));
     out.write("measurements.csv", write_measurements(&measurements.views).as_bytes())?;
     let calibration = model_of(recording, &measurements, options).with_context(|| {
+        // Without a model there is no list of warnings: this is the only place to say why.
+        measurements.excluded.iter().for_each(|e| say(format!("note: {e}")));
+        recording.remarks.iter().for_each(|r| say(format!("note: {r}")));
         format!(
             "the views were measured ({}) but no model was fitted",
             out.path().join("measurements.csv").display()

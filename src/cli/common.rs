@@ -52,24 +52,17 @@ pub struct Input {
     /// fx,fy,cx,cy in px, for folders without recording.json
     #[arg(
         long,
-        value_delimiter = ',',
-        num_args = 4,
         value_name = "FX,FY,CX,CY",
+        value_parser = numbers::<4>,
         allow_hyphen_values = true
     )]
-    intrinsics: Option<Vec<f64>>,
+    intrinsics: Option<[f64; 4]>,
     /// Depth words per metre (1000 = mm, 5000 = TUM), for folders without recording.json
     #[arg(long, value_name = "N", conflicts_with = "raw_disparity")]
     units_per_metre: Option<f64>,
     /// Raw Kinect words: z = 1/(C0 + C1 word), for folders without recording.json
-    #[arg(
-        long,
-        value_delimiter = ',',
-        num_args = 2,
-        value_name = "C0,C1",
-        allow_hyphen_values = true
-    )]
-    raw_disparity: Option<Vec<f64>>,
+    #[arg(long, value_name = "C0,C1", value_parser = numbers::<2>, allow_hyphen_values = true)]
+    raw_disparity: Option<[f64; 2]>,
     /// Projector-camera distance in m, for folders without recording.json
     #[arg(long, value_name = "M")]
     baseline: Option<f64>,
@@ -77,19 +70,32 @@ pub struct Input {
 
 impl Input {
     pub fn assumed(&self) -> anyhow::Result<Assumed> {
-        let code = match (self.units_per_metre, self.raw_disparity.as_deref()) {
+        let code = match (self.units_per_metre, self.raw_disparity) {
             (Some(units_per_metre), _) => Some(DepthCode::Metric { units_per_metre, invalid: 0 }),
-            (None, Some(&[offset, slope])) => {
+            (None, Some([offset, slope])) => {
                 Some(DepthCode::Disparity { offset, slope, invalid: KINECT_NO_MEASUREMENT })
             }
-            _ => None,
+            (None, None) => None,
         };
         if let Some(fault) = code.as_ref().and_then(DepthCode::fault) {
-            bail!("{fault}");
+            bail!(
+                "{fault}; give --units-per-metre or --raw-disparity numbers that turn words into metres"
+            );
         }
-        let intrinsics = self.intrinsics.as_deref().and_then(|v| v.try_into().ok());
-        Ok(Assumed { intrinsics, code, baseline_m: self.baseline })
+        Ok(Assumed { intrinsics: self.intrinsics, code, baseline_m: self.baseline })
     }
+}
+
+/// "a,b,..." as exactly `N` numbers, for clap.
+///
+/// (clap's `num_args` counts arguments before it splits them at commas, so it cannot say this.)
+pub fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let parsed: Vec<f64> = text
+        .split(',')
+        .map(|part| part.trim().parse().map_err(|_| format!("\"{part}\" is not a number")))
+        .collect::<Result<_, String>>()?;
+    let given = parsed.len();
+    parsed.try_into().map_err(|_| format!("{given} numbers where {N} are needed, with commas"))
 }
 
 /// A bar on a terminal, nothing elsewhere.

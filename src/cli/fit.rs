@@ -1,5 +1,6 @@
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::Args;
 use kinoise::io::OutputDir;
 use kinoise::measure::read_table;
@@ -23,7 +24,8 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let table = read_table(&arguments.table)?;
-    let calibration = model_of_table(&table, arguments.fitting.form()?, &arguments.table)?;
+    let calibration = model_of_table(&table, arguments.fitting.form()?, &arguments.table)
+        .with_context(|| arguments.table.display().to_string())?;
     let out = OutputDir::create(&arguments.output)?;
     let page = CalibrationPage {
         title: &format!("Noise model of {}", arguments.table.display()),

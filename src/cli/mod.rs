@@ -9,6 +9,7 @@ mod words;
 
 use std::process::ExitCode;
 
+use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
 /// How noisy is this depth sensor, and why?
@@ -39,9 +40,13 @@ const FAILURE: u8 = 2;
 pub fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(e) => {
+        Err(e) if is_help(&e) => {
             let _ = e.print();
             return if e.use_stderr() { ExitCode::from(FAILURE) } else { ExitCode::SUCCESS };
+        }
+        Err(e) => {
+            eprintln!("kinoise: {}; see kinoise --help", one_line(&e));
+            return ExitCode::from(FAILURE);
         }
     };
     match run(&arguments) {
@@ -51,6 +56,19 @@ pub fn main() -> ExitCode {
             ExitCode::from(FAILURE)
         }
     }
+}
+
+/// Asked for, or nothing was said at all: the page is the answer.
+fn is_help(e: &clap::Error) -> bool {
+    !e.use_stderr() || e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
+}
+
+/// What clap says before its usage and its tips, without its "error: ".
+fn one_line(e: &clap::Error) -> String {
+    let text = e.to_string();
+    let said = text.split("\n\n").next().unwrap_or_default();
+    let words: Vec<&str> = said.split_whitespace().collect();
+    words.join(" ").trim_start_matches("error: ").to_string()
 }
 
 fn run(arguments: &Arguments) -> anyhow::Result<()> {

@@ -5,7 +5,7 @@ use kinoise::model::{Domain, PAPER_EQ1};
 use kinoise::simulate::{Board, Grid, Shoot, kinect_v1};
 use kinoise::{Form, NoiseModel, SigmaModel};
 
-use super::common::{Bar, Global, say};
+use super::common::{Bar, Global, numbers, say};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -24,8 +24,8 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1, value_name = "N")]
     shrink: usize,
     /// Board width and height in m
-    #[arg(long, value_delimiter = ',', num_args = 2, default_values_t = [1.0, 0.8], value_name = "W,H")]
-    board: Vec<f64>,
+    #[arg(long, value_parser = numbers::<2>, default_value = "1,0.8", value_name = "W,H")]
+    board: [f64; 2],
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -44,7 +44,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     if arguments.frames == 0 || !(1..=8).contains(&arguments.shrink) {
         anyhow::bail!("--frames must be at least 1 and --shrink between 1 and 8");
     }
-    let [width_m, height_m] = [arguments.board[0], arguments.board[1]];
+    let [width_m, height_m] = arguments.board;
     if !(width_m > 0.0 && height_m > 0.0) {
         anyhow::bail!("--board {width_m},{height_m}: give a width and a height in m");
     }

@@ -7,6 +7,7 @@ use std::path::Path;
 use png::{BitDepth, ColorType};
 use sha2::{Digest, Sha256};
 
+use crate::camera::usable_size;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 
@@ -75,6 +76,10 @@ fn decode_png16(path: &Path, bytes: &[u8]) -> Result<Frame> {
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().map_err(damaged)?;
     let info = reader.info();
     let (width, height) = (info.width as usize, info.height as usize);
+    if !usable_size(width, height) {
+        // The header is not to be believed with memory before the pixels are there.
+        return Err(Error::image(path, format!("{width} x {height} px PNG"), REMEDY_DEPTH));
+    }
     if info.bit_depth != BitDepth::Sixteen || info.color_type != ColorType::Grayscale {
         return Err(Error::image(
             path,
@@ -119,8 +124,7 @@ fn pgm_header(bytes: &[u8]) -> Option<([usize; 3], &[u8])> {
         rest = &rest[end..];
     }
     let [width, height, _] = numbers;
-    let plausible = (1..=16384).contains(&width) && (1..=16384).contains(&height);
-    plausible.then_some((numbers, rest.get(1..)?))
+    usable_size(width, height).then_some((numbers, rest.get(1..)?))
 }
 
 /// Infrared amplitude, 8 or 16 bit, as numbers.

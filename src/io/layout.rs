@@ -86,16 +86,19 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
 }
 
 fn read_sensor(path: &Path) -> Result<Sensor> {
-    let file: RecordingFile = read_json(path)?;
     let wrong =
         |what: String| Error::Json { path: path.to_path_buf(), line: 0, what, remedy: REMEDY_JSON };
-    if file.format != RECORDING_FORMAT {
-        return Err(wrong(format!(
-            "format is \"{}\", expected \"{RECORDING_FORMAT}\"",
-            file.format
-        )));
+    // Another format has other keys: its name says more than the first key that is missing.
+    let Format { format } = read_json(path)?;
+    if format != RECORDING_FORMAT {
+        return Err(wrong(format!("format is \"{format}\", expected \"{RECORDING_FORMAT}\"")));
     }
-    file.sensor().map_err(wrong)
+    read_json::<RecordingFile>(path)?.sensor().map_err(wrong)
+}
+
+#[derive(Deserialize)]
+struct Format {
+    format: String,
 }
 
 fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {

@@ -69,6 +69,12 @@ fn put_in_order(list: &mut FrameList, file: &str) {
             before - frames.len()
         ));
     }
+    let shared = frames.windows(2).filter(|w| w[0].timestamp == w[1].timestamp).count();
+    if shared > 0 {
+        list.remarks.push(format!(
+            "{file}: {shared} frames have the same timestamp as another; all are used"
+        ));
+    }
 }
 
 /// A line as it can be quoted in a message.

@@ -39,7 +39,7 @@ pub fn open(path: &Path, assumed: &Assumed) -> Result<Recording> {
     if !path.is_dir() {
         return Err(Error::recording(
             path,
-            "there is no such folder",
+            if path.exists() { "this is not a folder" } else { "there is no such folder" },
             "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs",
         ));
     }

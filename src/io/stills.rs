@@ -32,6 +32,9 @@ const MOVED_SHARE: f64 = 0.005;
 const MOVED_QUADRATIC: f64 = 0.009;
 /// The scene has moved when this share of the samples has.
 const MOVED_SAMPLES: f64 = 0.10;
+/// ... or when samples measured in one of two frames only are this share of those in both: holes
+/// flicker at edges and in shadows, but a board that is carried away leaves one where it was.
+const MOVED_HOLES: f64 = 0.5;
 
 /// Split into views; unreadable frames and frames in motion are told and left out.
 pub(super) fn split(
@@ -52,6 +55,13 @@ pub(super) fn split(
             }
         };
         let samples = sample(&frame, &table);
+        if samples.iter().all(|z| z.is_nan()) {
+            remarks.push(format!(
+                "frame left out: {}: no pixel carries a depth",
+                frame_ref.path.display()
+            ));
+            continue;
+        }
         match stretches.last_mut() {
             Some((reference, stretch)) if still(reference, &samples) => stretch.push(frame_ref),
             _ => stretches.push((samples, vec![frame_ref])),
@@ -100,15 +110,17 @@ fn sample(frame: &Frame, table: &DepthTable) -> Vec<f32> {
 }
 
 fn still(reference: &[f32], samples: &[f32]) -> bool {
-    let (mut seen, mut moved) = (0usize, 0usize);
+    let (mut seen, mut once, mut moved) = (0usize, 0usize, 0usize);
     for (&a, &b) in reference.iter().zip(samples) {
         let (a, b) = (f64::from(a), f64::from(b));
         if a.is_finite() && b.is_finite() {
             seen += 1;
             moved += usize::from((a - b).abs() > MOVED_SHARE * a + MOVED_QUADRATIC * a * a);
+        } else {
+            once += usize::from(a.is_finite() || b.is_finite());
         }
     }
-    seen == 0 || (moved as f64) < MOVED_SAMPLES * seen as f64
+    (moved as f64) < MOVED_SAMPLES * seen as f64 && (once as f64) < MOVED_HOLES * seen as f64
 }
 
 #[cfg(test)]

@@ -348,6 +348,10 @@ fn covariance(
     for (mut column, norm) in j.column_iter_mut().zip(&norms) {
         column /= *norm;
     }
+    if j.nrows() < free.len() {
+        // Rows of zeros see nothing; without them the decomposition is short of directions.
+        j = j.resize_vertically(free.len(), 0.0);
+    }
     let svd = j.svd(false, true);
     let Some(v_t) = svd.v_t else { return full };
     let largest = svd.singular_values.max();

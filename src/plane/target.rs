@@ -159,7 +159,9 @@ fn in_region(
             inside.len()
         ));
     }
-    let fit = seed_plane(image, &valid, rng).ok_or("its region holds no plane")?;
+    let fit = seed_plane(image, &valid, rng)
+        .filter(|fit| fit.scale <= ROUGHEST * median_inverse_depth(image, &valid))
+        .ok_or("its region holds no plane")?;
     let on = valid.iter().filter(|&&i| on_plane(image, &fit, i as usize)).count();
     if on < FEWEST_PIXELS {
         return Err(format!("only {on} pixels of its region lie on one plane"));
