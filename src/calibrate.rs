@@ -15,7 +15,7 @@ use crate::measure::{
 use crate::model::{
     FitSummary, Form, HeldOut, NoiseModel, Provenance, SigmaFit, compare_forms, fit,
 };
-use crate::view::{Recording, RecordingFile};
+use crate::view::{Excluded, Recording, RecordingFile};
 
 /// Settings of a calibration.
 #[derive(Debug, Clone, Copy, Default)]
@@ -24,28 +24,6 @@ pub struct CalibrateOptions {
     pub kind: SigmaKind,
     /// The form to fit; `None` takes the one that predicts left-out distances best.
     pub form: Option<Form>,
-}
-
-/// A view that was not used, and why.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Excluded {
-    pub view: String,
-    pub reason: String,
-}
-
-impl Excluded {
-    fn of(view: &str, error: &Error) -> Self {
-        let text = error.to_string();
-        // The view's name has its own field.
-        let reason = text.strip_prefix(&format!("view {view}: ")).unwrap_or(&text);
-        Excluded { view: view.into(), reason: reason.into() }
-    }
-}
-
-impl std::fmt::Display for Excluded {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "view {} was left out: {}", self.view, self.reason)
-    }
 }
 
 /// All views of a recording, measured.
@@ -90,7 +68,7 @@ pub fn measure(
             result
         })
         .collect();
-    let mut measurements = Measurements { views: Vec::new(), excluded: Vec::new() };
+    let mut measurements = Measurements { views: Vec::new(), excluded: recording.excluded.clone() };
     for (view, result) in recording.views.iter().zip(results) {
         match result {
             Ok(m) => measurements.views.push(m),

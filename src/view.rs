@@ -104,10 +104,34 @@ pub struct Recording {
     pub root: PathBuf,
     pub sensor: Sensor,
     pub views: Vec<View>,
+    /// Views that could not be opened.
+    pub excluded: Vec<Excluded>,
     /// What was found odd while opening, in words.
     pub remarks: Vec<String>,
     /// Files that describe the recording (not the frames), for provenance.
     pub described_by: Vec<PathBuf>,
+}
+
+/// A view that was not used, and why.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Excluded {
+    pub view: String,
+    pub reason: String,
+}
+
+impl Excluded {
+    pub(crate) fn of(view: &str, error: &crate::error::Error) -> Self {
+        let text = error.to_string();
+        // The view's name has its own field.
+        let reason = text.strip_prefix(&format!("view {view}: ")).unwrap_or(&text);
+        Excluded { view: view.into(), reason: reason.into() }
+    }
+}
+
+impl std::fmt::Display for Excluded {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "view {} was left out: {}", self.view, self.reason)
+    }
 }
 
 /// `recording.json`, as the contract lays it down.

@@ -472,7 +472,7 @@ fn a_list_that_names_a_missing_file() {
     let result = bench.calibrate().tells(&["view 0006", "depth.txt line 2", "0000.png", "missing"]);
     assert_eq!(used(&result), common::GOOD_VIEWS);
     fs::remove_file(bench.file("0006/depth/0001.png")).expect("removed");
-    bench.calibrate().tells(&["view 0006 left out", "0006/depth.txt"]);
+    bench.calibrate().tells(&["view 0006 was left out", "0006/depth.txt"]);
 }
 
 #[test]
@@ -493,7 +493,7 @@ fn lines_that_are_no_frames() {
 fn a_list_that_is_empty_or_binary() {
     let bench = Bench::good();
     bench.put("0001/depth.txt", "# nothing\n").put("0002/depth.txt", [0xff, 0x00, 0xfe]);
-    let result = bench.calibrate().tells(&["view 0001 left out", "view 0002 left out"]);
+    let result = bench.calibrate().tells(&["view 0001 was left out", "view 0002 was left out"]);
     assert_eq!(used(&result), common::GOOD_VIEWS - 2);
 }
 
@@ -501,7 +501,7 @@ fn a_list_that_is_empty_or_binary() {
 fn a_folder_with_a_view_file_and_no_list() {
     let bench = Bench::good();
     bench.put("notes/view.json", "{}");
-    bench.calibrate().tells(&["view notes left out", "depth.txt"]);
+    bench.calibrate().tells(&["view notes was left out", "depth.txt"]);
 }
 
 #[test]
@@ -554,7 +554,7 @@ fn a_broken_view_file_costs_its_view_alone() {
         }
         let run = bench.calibrate();
         for (view, (_, says)) in few.iter().enumerate() {
-            let told = format!("view {view:04} left out");
+            let told = format!("view {view:04} was left out");
             let line = run.stderr.lines().find(|l| l.contains(&told)).expect(&run.stderr);
             assert!(line.contains("view.json") && line.contains(says), "{says}: {line}");
         }
@@ -593,7 +593,7 @@ fn a_view_left_out_is_told_before_smaller_oddities() {
         bench.put(&format!("{view:04}/depth/0001.png"), b"spoiled");
     }
     bench.put("0011/view.json", "{");
-    bench.calibrate().tells(&["view 0011 left out"]);
+    bench.calibrate().tells(&["view 0011 was left out"]);
 }
 
 // ---- too few, too alike ---------------------------------------------------------------------

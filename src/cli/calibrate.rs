@@ -28,7 +28,7 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value_t = PlanesArgument::View)]
     planes: PlanesArgument,
     /// The paper's RANSAC threshold in m [default: 3 robust standard deviations of the view]
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
     ransac_threshold: Option<f64>,
 }
 
@@ -128,8 +128,13 @@ pub fn calibrate(
         // Without a model there is no list of warnings: this is the only place to say why.
         measurements.excluded.iter().for_each(|e| say(format!("note: {e}")));
         recording.remarks.iter().for_each(|r| say(format!("note: {r}")));
+        let older = if out.path().join("model.json").exists() {
+            " (the model.json there is from an earlier run)"
+        } else {
+            ""
+        };
         format!(
-            "the views were measured ({}) but no model was fitted",
+            "the views were measured ({}) but no model was fitted{older}",
             out.path().join("measurements.csv").display()
         )
     })?;

@@ -15,7 +15,7 @@ pub struct Global {
     #[arg(long, global = true)]
     pub json: bool,
     /// Seed of all random choices: the same seed gives the same bytes
-    #[arg(long, global = true, default_value_t = 1)]
+    #[arg(long, global = true, default_value_t = 1, allow_hyphen_values = true)]
     pub seed: u64,
     /// Threads; results do not depend on it [default: all cores]
     #[arg(long, global = true)]
@@ -64,7 +64,7 @@ pub struct Input {
     #[arg(long, value_name = "C0,C1", value_parser = numbers::<2>, allow_hyphen_values = true)]
     raw_disparity: Option<[f64; 2]>,
     /// Projector-camera distance in m, for folders without recording.json
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
     baseline: Option<f64>,
 }
 

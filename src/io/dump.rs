@@ -65,7 +65,14 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Recording> {
         &Assumed { baseline_m: assumed.baseline_m.or(Some(KINECT_BASELINE_M)), ..assumed.clone() },
     )?;
     let views = split(frames, &sensor, Film::Video, &mut remarks)?;
-    Ok(Recording { root: root.to_path_buf(), sensor, views, remarks, described_by: vec![index] })
+    Ok(Recording {
+        root: root.to_path_buf(),
+        sensor,
+        views,
+        excluded: Vec::new(),
+        remarks,
+        described_by: vec![index],
+    })
 }
 
 /// Projector to camera in every Kinect v1 (LDDIS of the OpenNI device properties: 7.5 cm).

@@ -42,7 +42,14 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Recording> {
         .map(|(i, path)| FrameRef { timestamp: i as f64 * NOMINAL_INTERVAL_S, path })
         .collect();
     let views = split(frames, &sensor, Film::Captures, &mut remarks)?;
-    Ok(Recording { root: root.to_path_buf(), sensor, views, remarks, described_by: Vec::new() })
+    Ok(Recording {
+        root: root.to_path_buf(),
+        sensor,
+        views,
+        excluded: Vec::new(),
+        remarks,
+        described_by: Vec::new(),
+    })
 }
 
 /// 30 Hz: a plain folder has no clock, and every sensor of this kind runs at it.

@@ -8,7 +8,8 @@ use super::list::{FrameList, read_list};
 use super::output::write_atomic;
 use crate::error::{Error, Result};
 use crate::view::{
-    RECORDING_FORMAT, Recording, RecordingFile, Region, Sensor, TargetSize, View, ViewNotes,
+    Excluded, RECORDING_FORMAT, Recording, RecordingFile, Region, Sensor, TargetSize, View,
+    ViewNotes,
 };
 
 pub(super) const DESCRIPTION: &str = "recording.json";
@@ -72,6 +73,7 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
         root: root.to_path_buf(),
         sensor,
         views: Vec::new(),
+        excluded: Vec::new(),
         remarks: Vec::new(),
         described_by: vec![path],
     };
@@ -79,7 +81,7 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         match open_view(&folder, &name, &mut recording) {
             Ok(view) => recording.views.push(view),
-            Err(e) => recording.remarks.push(format!("view {name} left out: {e}")),
+            Err(e) => recording.excluded.push(Excluded::of(&name, &e)),
         }
     }
     Ok(recording)

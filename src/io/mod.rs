@@ -53,7 +53,11 @@ pub fn open(path: &Path, assumed: &Assumed) -> Result<Recording> {
         folder::open(path, assumed)?
     };
     if recording.views.is_empty() {
-        let reason = recording.remarks.first().cloned();
+        let reason = recording
+            .excluded
+            .first()
+            .map(ToString::to_string)
+            .or_else(|| recording.remarks.first().cloned());
         return Err(Error::recording(
             path,
             reason.unwrap_or_else(|| "no view in it".into()),

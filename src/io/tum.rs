@@ -37,5 +37,12 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Recording> {
         assumed,
     )?;
     let views = split(list.frames, &sensor, Film::Video, &mut remarks)?;
-    Ok(Recording { root: root.to_path_buf(), sensor, views, remarks, described_by: vec![path] })
+    Ok(Recording {
+        root: root.to_path_buf(),
+        sensor,
+        views,
+        excluded: Vec::new(),
+        remarks,
+        described_by: vec![path],
+    })
 }

@@ -1,9 +1,10 @@
 use super::*;
-use crate::calibrate::{Excluded, model_of_table};
+use crate::calibrate::model_of_table;
 use crate::measure::{Cell, ResidualPicture, SigmaRow, SigmaTable, Spread, ViewMeasurement};
 use crate::model::Form;
 use crate::plane::{Exclusions, Plane};
 use crate::stats::Correlation;
+use crate::view::Excluded;
 
 fn calibration() -> Calibration {
     let model = Overlay::Khoshelham.model();

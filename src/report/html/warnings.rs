@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::CalibrationPage;
-use crate::calibrate::Excluded;
+use crate::view::Excluded;
 
 /// Longer lists fold away.
 const LONGEST_OPEN: usize = 3;
