@@ -78,7 +78,8 @@ pub fn measure(
     if measurements.views.is_empty() {
         let first = measurements.excluded.first().map_or_else(
             || "there is no view".to_string(),
-            |e| format!("view {}: {}", e.view, e.reason),
+            // Its remedy is the same as this message's.
+            |e| format!("view {}: {}", e.view, e.reason.split("; ").next().unwrap_or_default()),
         );
         return Err(Error::recording(
             &recording.root,

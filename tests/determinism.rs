@@ -111,3 +111,18 @@ fn a_model_made_from_a_simulation_of_itself_repeats() {
     };
     assert_eq!(calibrated(), calibrated());
 }
+
+/// calib_data/README.md says how the bundled recording was made; this is that command.
+#[test]
+fn the_bundled_recording_is_what_its_command_makes() {
+    let bundled = Path::new(env!("CARGO_MANIFEST_DIR")).join("calib_data/eq1-paper-grid");
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let made = folder.path().join("made");
+    kinoise()
+        .arg("simulate")
+        .arg(&made)
+        .args(["--seed", "2016", "--shrink", "2", "--frames", "2"])
+        .assert()
+        .success();
+    same(&tree(&bundled), &tree(&made));
+}

@@ -191,3 +191,31 @@ fn sigma_never_reaches_the_pole() {
     }
     assert!(!SigmaModel::paper().domain.contains(2.0, 1.389));
 }
+
+/// A bin that caught a neighbouring object, a view of something else: told, and without pull.
+#[test]
+fn sigmas_far_off_the_surface_are_left_out_and_told() {
+    let mut rng = Seed(21).stream("noise");
+    let mut table = exact([0, 10, 20, 30, 40, 50, 60, 70, 73, 76].into_iter());
+    for row in &mut table.rows {
+        let draw: f64 = StandardNormal.sample(&mut rng);
+        row.sigma_m *= 1.0 + 0.02 * draw;
+        row.n_effective = Some(1250.0);
+    }
+    let clean = fit(&table, Form::Paper).unwrap();
+    assert!(clean.left_out.is_empty(), "{:?}", clean.remarks);
+    let spoiled = [3, 17, 29, 44, 60];
+    let mut kept = table.clone();
+    for (k, &i) in spoiled.iter().enumerate() {
+        table.rows[i].sigma_m *= 2.0 + k as f64;
+    }
+    kept.rows =
+        (0..kept.rows.len()).filter(|i| !spoiled.contains(i)).map(|i| kept.rows[i]).collect();
+    let fitted = fit(&table, Form::Paper).unwrap();
+    let without = fit(&kept, Form::Paper).unwrap();
+    assert_eq!(fitted.left_out.len(), spoiled.len());
+    assert!(fitted.remarks[0].starts_with("5 of 70 sigmas"), "{}", fitted.remarks[0]);
+    for (a, b) in fitted.parameters.iter().zip(&without.parameters) {
+        assert!((a.value / b.value - 1.0).abs() < 1e-9, "{}: {} {}", a.name, a.value, b.value);
+    }
+}

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::cells::{Bins, Cell, Context, Sums};
 use super::{Planes, ResidualPicture, ViewMeasurement, Workbench};
 use crate::frame::Frame;
-use crate::plane::{Effort, Plane, Target, fit_affine_robust};
+use crate::plane::{Effort, MAD_TO_SIGMA, Plane, Target, fit_affine_robust};
 use crate::residual::perpendicular_per_axial;
 use crate::stats::{Correlation, measure_correlation, median_in_place, normal_cut_factor};
 
@@ -483,7 +483,7 @@ fn expected(pixels: &[u32], plane: &Plane, bench: &Workbench<'_>) -> Vec<f32> {
 fn settled_scale(residuals: Vec<f32>, least: f64) -> f64 {
     let mut off: Vec<f32> = residuals.iter().map(|e| e.abs()).collect();
     let mad = f64::from(median_in_place(&mut off));
-    let mut scale = if mad.is_finite() { (1.4826 * mad).max(least) } else { least };
+    let mut scale = if mad.is_finite() { (MAD_TO_SIGMA * mad).max(least) } else { least };
     let factor = normal_cut_factor(CUT_SIGMAS);
     for _ in 0..CUT_ROUNDS {
         let cut = CUT_SIGMAS * scale;

@@ -11,7 +11,7 @@ use super::forms::{Form, MOST_PARAMETERS, SigmaForm, Walk};
 use super::rows::Rows;
 use super::{Domain, SigmaModel};
 use crate::error::{Error, Result};
-use crate::measure::SigmaTable;
+use crate::measure::{SigmaRow, SigmaTable};
 use crate::solve::{LeastSquares, trust_region};
 
 /// A parameter as reported.
@@ -35,6 +35,8 @@ pub struct SigmaFit {
     pub domain: Domain,
     pub rows: usize,
     pub views: usize,
+    /// Sigmas that stand far off the surface and were not fitted.
+    pub left_out: Vec<SigmaRow>,
     /// Views less free parameters (at least 1): what intervals' quantiles use.
     pub degrees_of_freedom: f64,
     /// Relative scatter that sampling does not explain, within views and between them.
@@ -82,12 +84,12 @@ impl SigmaFit {
     }
 }
 
-/// Fit `form` to `table`.
+/// Fit `form` to every row of `table`.
 ///
 /// # Errors
 /// When the table has too few rows or distances for the form, or the solver finds no surface
 /// that is positive where the data are.
-pub fn fit(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
+pub fn fit_all(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
     let spec = form.spec();
     let mut rows = Rows::new(table);
     enough(&rows, spec)?;
@@ -97,8 +99,10 @@ pub fn fit(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
     };
     let first = spec.start(&rows).ok_or_else(no_start)?;
     rows.refer_to(|r| positive(spec.sigma(&first.parameters, r.z_m, r.theta_rad), r.sigma_m));
+    rows.estimate_extra(first.held.iter().filter(|held| !**held).count());
     let start = spec.start(&rows).ok_or_else(no_start)?;
-    let free: Vec<usize> = (0..start.held.len()).filter(|&i| !start.held[i]).collect();
+    let mut remarks = start.remarks;
+    let mut free: Vec<usize> = (0..start.held.len()).filter(|&i| !start.held[i]).collect();
     let mut p = start.parameters.clone();
     let (mut rounds, mut converged) = (0, false);
     while rounds < MOST_ROUNDS && !converged {
@@ -107,6 +111,7 @@ pub fn fit(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
         rows.estimate_extra(free.len());
         let before: Vec<f64> = rows.reference().to_vec();
         p = polish(&rows, spec, &p, &free);
+        hold_strays(&rows, spec, &mut p, &mut free, &mut remarks);
         let change = rows
             .iter()
             .zip(&before)
@@ -121,7 +126,29 @@ pub fn fit(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
         });
     }
     rows.refer_to(|r| spec.sigma(&p, r.z_m, r.theta_rad));
-    Ok(report(form, &rows, p, &free, start.remarks, rounds, converged))
+    Ok(report(form, &rows, p, &free, remarks, rounds, converged))
+}
+
+/// Hold free parameters that left where they can be believed at the edge.
+fn hold_strays(
+    rows: &Rows,
+    spec: &dyn SigmaForm,
+    p: &mut [f64],
+    free: &mut Vec<usize>,
+    remarks: &mut Vec<String>,
+) {
+    free.retain(|&i| match spec.limits(i, rows) {
+        Some([low, high]) if !(low..=high).contains(&p[i]) => {
+            p[i] = if p[i] > high { high } else { low };
+            remarks.push(format!(
+                "{} runs out of what is believed and is held at {:.3}",
+                spec.parameters()[i].0,
+                p[i]
+            ));
+            false
+        }
+        _ => true,
+    });
 }
 
 fn positive(sigma: f64, otherwise: f64) -> f64 {
@@ -318,6 +345,7 @@ fn report(
         covariance,
         rows: rows.len(),
         views: rows.views(),
+        left_out: Vec::new(),
         degrees_of_freedom: degrees,
         extra_within: rows.extra()[0],
         extra_between: rows.extra()[1],

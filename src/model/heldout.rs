@@ -1,7 +1,8 @@
 //! Judging forms on distances they have not seen.
 
-use super::fit::{DISTANCE_RATIO, fit};
+use super::fit::DISTANCE_RATIO;
 use super::forms::Form;
+use super::outliers::fit;
 use super::rows::Rows;
 use crate::measure::SigmaTable;
 

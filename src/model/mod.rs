@@ -4,12 +4,14 @@ mod file;
 mod fit;
 mod forms;
 mod heldout;
+mod outliers;
 mod rows;
 
 pub use file::{FitSummary, MODEL_FORMAT, NoiseModel, Provenance};
-pub use fit::{DISTANCE_RATIO, Parameter, SigmaFit, fit};
+pub use fit::{DISTANCE_RATIO, Parameter, SigmaFit};
 pub use forms::{Form, PAPER_EQ1, SigmaForm};
 pub use heldout::{HeldOut, compare_forms, held_out};
+pub use outliers::fit;
 
 use nalgebra::{DMatrix, DVector};
 

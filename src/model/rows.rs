@@ -130,11 +130,8 @@ impl Rows {
 
     /// What one unit of weighted chi-square is expected to be per degree of freedom.
     pub fn noise_scale(&self, chi2: f64) -> f64 {
-        if self.counted {
-            1.0
-        } else {
-            (chi2 / (self.len() as f64 - 6.0).max(1.0)).max(f64::MIN_POSITIVE)
-        }
+        let found = chi2 / (self.len() as f64 - 6.0).max(1.0);
+        found.max(if self.counted { 1.0 } else { f64::MIN_POSITIVE })
     }
 
     /// Divide by the reference sigma and rotate so that errors become independent and of unit
@@ -320,14 +317,14 @@ pub struct BestTilt {
     /// Drop of the weighted chi-square against no tilt term.
     pub gain: f64,
     pub chi2: f64,
-    /// (e, f) stand at the rim of the search: the data do not bound them.
-    pub at_rim: bool,
+    /// e, f stand at the rim of the search: the data do not bound them.
+    pub at_rim: [bool; 2],
 }
 
 /// The searched box: exponents from Nguyen's -0.5 to Eq. 1's 2.01 and well beyond, the pole from
 /// 0.3 degrees to 3 rad past the steepest view.
-const EXPONENTS: [f64; 2] = [-4.0, 6.0];
-const LOG_POLE: [f64; 2] = [-5.3, 1.1];
+pub const EXPONENTS: [f64; 2] = [-4.0, 6.0];
+pub const LOG_POLE: [f64; 2] = [-5.3, 1.1];
 const GRID: [usize; 2] = [9, 11];
 
 impl<'a> TiltSearch<'a> {
@@ -411,7 +408,7 @@ impl<'a> TiltSearch<'a> {
             f: self.rows.steepest() + g.exp(),
             gain,
             chi2: self.left.norm_squared() - gain,
-            at_rim: near(e, EXPONENTS) || near(g, LOG_POLE),
+            at_rim: [near(e, EXPONENTS), near(g, LOG_POLE)],
         }
     }
 }

@@ -11,6 +11,7 @@ mod grow;
 mod ransac;
 mod target;
 
+pub(crate) use affine::MAD_TO_SIGMA;
 pub use affine::{AffineFit, Effort, fit_affine_robust};
 pub use ransac::{
     Consensus, Estimator, InlierCount, Points, RansacOptions, RansacPlane, UniformSampler,

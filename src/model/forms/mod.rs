@@ -52,6 +52,10 @@ pub trait SigmaForm: Sync {
     }
     /// A start from the data alone. `None` when the data cannot carry the form.
     fn start(&self, rows: &Rows) -> Option<Start>;
+    /// Where parameter `i` can be believed; beyond, it is held at the edge.
+    fn limits(&self, _i: usize, _rows: &Rows) -> Option<[f64; 2]> {
+        None
+    }
     /// Fewest different distances the form needs.
     fn distances_needed(&self) -> usize;
     /// What to say of parameter `i` when its standard error is of the size of its value.

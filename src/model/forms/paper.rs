@@ -2,7 +2,7 @@
 
 use super::{MOST_PARAMETERS, SigmaForm, Start, Walk};
 use crate::measure::SigmaRow;
-use crate::model::rows::{BestTilt, Rows, TiltSearch};
+use crate::model::rows::{BestTilt, EXPONENTS, LOG_POLE, Rows, TiltSearch};
 
 /// a, b, c, d, e, f as printed (m and rad).
 pub const PAPER_EQ1: [f64; 6] = [0.00151, 0.00215, 0.483, 1.88e-6, 2.01, 1.39];
@@ -139,8 +139,8 @@ impl SigmaForm for Paper {
 
     /// Variable projection: for given (e, f) the rest is linear, so only these two are searched.
     fn start(&self, rows: &Rows) -> Option<Start> {
-        let best =
-            if rows.steepest() > 0.0 { TiltSearch::new(rows).map(|s| s.best()) } else { None };
+        let steep = rows.steepest() >= TILT_MAY_SHOW_DEG.to_radians();
+        let best = if steep { TiltSearch::new(rows).map(|s| s.best()) } else { None };
         match best.filter(|b| b.gain > TILT_WORTH * rows.noise_scale(b.chi2)) {
             Some(best) => with_tilt(rows, &best),
             None => without_tilt(rows),
@@ -149,6 +149,14 @@ impl SigmaForm for Paper {
 
     fn distances_needed(&self) -> usize {
         3
+    }
+
+    fn limits(&self, i: usize, rows: &Rows) -> Option<[f64; 2]> {
+        match i {
+            4 => Some(EXPONENTS),
+            5 => Some(LOG_POLE.map(|g| rows.steepest() + g.exp())),
+            _ => None,
+        }
     }
 
     fn why_weak(&self, i: usize, rows: &Rows) -> Option<String> {
@@ -166,11 +174,10 @@ fn with_tilt(rows: &Rows, best: &BestTilt) -> Option<Start> {
     let mut start = parabola_start(rows, |r| r.z_m.powf(best.e) * tilt(r.theta_rad, best.f))?;
     let held = start.held[3];
     start.parameters.extend([best.e, best.f]);
-    start.held.extend([held, held || best.at_rim]);
-    if best.at_rim {
+    start.held.extend([held || best.at_rim[0], held || best.at_rim[1]]);
+    if best.at_rim.contains(&true) {
         start.remarks.push(format!(
-            "f is held at {:.3} rad, the rim of its search: {}",
-            best.f,
+            "the tilt term runs to the edge of what is believed: {}",
             why_no_tilt(rows)
         ));
     }
@@ -186,6 +193,10 @@ fn without_tilt(rows: &Rows) -> Option<Start> {
     start.remarks.push(format!("e and f are held at {e} and {f:.3} rad: {}", why_no_tilt(rows)));
     Some(start)
 }
+
+/// Without a view this steep e and f are not even looked for: whatever else grows with tilt would
+/// be dressed up as a pole.
+const TILT_MAY_SHOW_DEG: f64 = 70.0;
 
 /// Below this the tilt term of Eq. 1 is under a tenth of the axial one (physics: 71.9-73.5 deg).
 const TILT_SHOWS_DEG: f64 = 74.0;
