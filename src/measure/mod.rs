@@ -4,6 +4,8 @@
 //! and the scale, the rest stream through accumulators.
 
 mod cells;
+mod grouping;
+mod lagged;
 mod paper;
 mod scan;
 mod table;

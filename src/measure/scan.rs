@@ -2,19 +2,14 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::cells::{Bins, Cell, Context, Sums};
+use super::cells::{Cell, Context, Sums};
+use super::grouping::{CUT_SIGMAS, by_cell, expected, settled_scale};
+use super::lagged::Lagged;
 use super::{Planes, ResidualPicture, ViewMeasurement, Workbench};
 use crate::frame::Frame;
-use crate::plane::{Effort, MAD_TO_SIGMA, Plane, Target, fit_affine_robust};
+use crate::plane::{Effort, Plane, Target, fit_affine_robust};
 use crate::residual::perpendicular_per_axial;
-use crate::stats::{Correlation, measure_correlation, median_in_place, normal_cut_factor};
-
-/// Residuals beyond this many standard deviations of their cell are gross errors; the variance
-/// of what is kept is divided by [`normal_cut_factor`], 0.994.
-const CUT_SIGMAS: f64 = 3.5;
-/// Cells with fewer pixels than this join their neighbour.
-const FEWEST_CELL_PIXELS: usize = 150;
-const CUT_ROUNDS: usize = 6;
+use crate::stats::{Correlation, measure_correlation, normal_cut_factor};
 
 pub(super) struct Scan<'a> {
     bench: &'a Workbench<'a>,
@@ -45,57 +40,6 @@ struct FrameSums {
     n: f64,
     sum: f64,
     mean_square: f64,
-}
-
-/// Half squared differences of a pixel's residual over one and two frames, over the first frames.
-///
-/// They estimate variance times 1 - rho(lag) without knowing the pixel's own mean, and for a
-/// first-order filter rho(2) = rho(1)^2, so that their ratio is 1 + rho(1).
-#[derive(Debug, Default)]
-struct Lagged {
-    frames: usize,
-    previous: Vec<f32>,
-    before: Vec<f32>,
-    one: Mean,
-    two: Mean,
-}
-
-#[derive(Debug, Clone, Copy, Default)]
-struct Mean {
-    sum: f64,
-    n: f64,
-}
-
-impl Mean {
-    fn half_squared_differences(&mut self, a: &[f32], b: &[f32]) {
-        for (&a, &b) in a.iter().zip(b) {
-            let d = f64::from(b - a);
-            if d.is_finite() {
-                self.sum += 0.5 * d * d;
-                self.n += 1.0;
-            }
-        }
-    }
-
-    fn value(&self) -> Option<f64> {
-        (self.n > 0.0 && self.sum > 0.0).then(|| self.sum / self.n)
-    }
-}
-
-impl Lagged {
-    fn follow(&mut self, residuals: Vec<f32>) {
-        self.one.half_squared_differences(&self.previous, &residuals);
-        self.two.half_squared_differences(&self.before, &residuals);
-        self.before = std::mem::replace(&mut self.previous, residuals);
-    }
-
-    /// Correlation of the moving part one frame apart; `None` with fewer than four frames.
-    fn correlation(&self) -> Option<f64> {
-        if self.frames < 4 {
-            return None;
-        }
-        Some((self.two.value()? / self.one.value()? - 1.0).clamp(-1.0, 1.0))
-    }
 }
 
 impl<'a> Scan<'a> {
@@ -430,77 +374,4 @@ fn centre(field: &mut [f32]) {
     }
     let mean = (sum / n.max(1.0)) as f32;
     field.iter_mut().for_each(|e| *e -= mean);
-}
-
-/// The target's pixels sorted into bins of depth; small bins join their neighbour.
-fn by_cell(pixels: &[u32], plane: &Plane, bench: &Workbench<'_>) -> (Vec<u32>, Vec<usize>) {
-    let depth = |i: u32| {
-        let (x, y) = bench.rays.at(i as usize);
-        plane.depth(x, y)
-    };
-    let (mut low, mut high) = (f64::INFINITY, 0f64);
-    for &i in pixels {
-        let z = depth(i);
-        low = low.min(z);
-        high = high.max(z);
-    }
-    let bins = Bins::between(low, high);
-    let mut groups: Vec<Vec<u32>> = vec![Vec::new(); bins.count];
-    for &i in pixels {
-        groups[bins.index(depth(i))].push(i);
-    }
-    let mut sorted = Vec::with_capacity(pixels.len());
-    let mut starts = vec![0];
-    let mut open = 0;
-    for group in groups {
-        open += group.len();
-        sorted.extend(group);
-        if open >= FEWEST_CELL_PIXELS {
-            starts.push(sorted.len());
-            open = 0;
-        }
-    }
-    if open > 0 {
-        if starts.len() > 1 {
-            starts.pop();
-        }
-        starts.push(sorted.len());
-    }
-    (sorted, starts)
-}
-
-fn expected(pixels: &[u32], plane: &Plane, bench: &Workbench<'_>) -> Vec<f32> {
-    pixels
-        .iter()
-        .map(|&i| {
-            let (x, y) = bench.rays.at(i as usize);
-            plane.depth(x, y) as f32
-        })
-        .collect()
-}
-
-/// Standard deviation inside +-[`CUT_SIGMAS`] of itself, corrected for the cut.
-fn settled_scale(residuals: Vec<f32>, least: f64) -> f64 {
-    let mut off: Vec<f32> = residuals.iter().map(|e| e.abs()).collect();
-    let mad = f64::from(median_in_place(&mut off));
-    let mut scale = if mad.is_finite() { (MAD_TO_SIGMA * mad).max(least) } else { least };
-    let factor = normal_cut_factor(CUT_SIGMAS);
-    for _ in 0..CUT_ROUNDS {
-        let cut = CUT_SIGMAS * scale;
-        let (mut n, mut sum) = (0.0, 0.0);
-        for &e in &residuals {
-            let e = f64::from(e);
-            if e.abs() < cut {
-                n += 1.0;
-                sum += e * e;
-            }
-        }
-        let next = if n > 0.0 { (sum / n / factor).sqrt().max(least) } else { least };
-        let settled = (next / scale - 1.0).abs() < 1e-4;
-        scale = next;
-        if settled {
-            break;
-        }
-    }
-    scale
 }

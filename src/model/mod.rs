@@ -4,8 +4,10 @@ mod file;
 mod fit;
 mod forms;
 mod heldout;
+mod local;
 mod outliers;
 mod rows;
+mod tilt_search;
 
 pub use file::{FitSummary, MODEL_FORMAT, NoiseModel, Provenance};
 pub use fit::{DISTANCE_RATIO, Parameter, SigmaFit};

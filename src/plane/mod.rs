@@ -8,6 +8,7 @@
 
 mod affine;
 mod grow;
+mod principal_point;
 mod ransac;
 mod target;
 

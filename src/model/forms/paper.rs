@@ -2,7 +2,8 @@
 
 use super::{MOST_PARAMETERS, SigmaForm, Start, Walk};
 use crate::measure::SigmaRow;
-use crate::model::rows::{BestTilt, EXPONENTS, LOG_POLE, Rows, TiltSearch};
+use crate::model::rows::Rows;
+use crate::model::tilt_search::{BestTilt, EXPONENTS, LOG_POLE, TiltSearch};
 
 /// a, b, c, d, e, f as printed (m and rad).
 pub const PAPER_EQ1: [f64; 6] = [0.00151, 0.00215, 0.483, 1.88e-6, 2.01, 1.39];

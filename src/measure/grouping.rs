@@ -1,0 +1,91 @@
+//! The target's pixels grouped by depth, what depth each should show, and how far off is too far.
+
+use super::Workbench;
+use super::cells::Bins;
+use crate::plane::{MAD_TO_SIGMA, Plane};
+use crate::stats::{median_in_place, normal_cut_factor};
+
+/// Residuals beyond this many standard deviations of their cell are gross errors; the variance
+/// of what is kept is divided by [`normal_cut_factor`], 0.994.
+pub(super) const CUT_SIGMAS: f64 = 3.5;
+/// Cells with fewer pixels than this join their neighbour.
+const FEWEST_CELL_PIXELS: usize = 150;
+const CUT_ROUNDS: usize = 6;
+
+/// The target's pixels sorted into bins of depth; small bins join their neighbour.
+pub(super) fn by_cell(
+    pixels: &[u32],
+    plane: &Plane,
+    bench: &Workbench<'_>,
+) -> (Vec<u32>, Vec<usize>) {
+    let depth = |i: u32| {
+        let (x, y) = bench.rays.at(i as usize);
+        plane.depth(x, y)
+    };
+    let (mut low, mut high) = (f64::INFINITY, 0f64);
+    for &i in pixels {
+        let z = depth(i);
+        low = low.min(z);
+        high = high.max(z);
+    }
+    let bins = Bins::between(low, high);
+    let mut groups: Vec<Vec<u32>> = vec![Vec::new(); bins.count];
+    for &i in pixels {
+        groups[bins.index(depth(i))].push(i);
+    }
+    let mut sorted = Vec::with_capacity(pixels.len());
+    let mut starts = vec![0];
+    let mut open = 0;
+    for group in groups {
+        open += group.len();
+        sorted.extend(group);
+        if open >= FEWEST_CELL_PIXELS {
+            starts.push(sorted.len());
+            open = 0;
+        }
+    }
+    if open > 0 {
+        if starts.len() > 1 {
+            starts.pop();
+        }
+        starts.push(sorted.len());
+    }
+    (sorted, starts)
+}
+
+/// Depth at which each pixel's ray meets the plane, m.
+pub(super) fn expected(pixels: &[u32], plane: &Plane, bench: &Workbench<'_>) -> Vec<f32> {
+    pixels
+        .iter()
+        .map(|&i| {
+            let (x, y) = bench.rays.at(i as usize);
+            plane.depth(x, y) as f32
+        })
+        .collect()
+}
+
+/// Standard deviation inside +-[`CUT_SIGMAS`] of itself, corrected for the cut.
+pub(super) fn settled_scale(residuals: Vec<f32>, least: f64) -> f64 {
+    let mut off: Vec<f32> = residuals.iter().map(|e| e.abs()).collect();
+    let mad = f64::from(median_in_place(&mut off));
+    let mut scale = if mad.is_finite() { (MAD_TO_SIGMA * mad).max(least) } else { least };
+    let factor = normal_cut_factor(CUT_SIGMAS);
+    for _ in 0..CUT_ROUNDS {
+        let cut = CUT_SIGMAS * scale;
+        let (mut n, mut sum) = (0.0, 0.0);
+        for &e in &residuals {
+            let e = f64::from(e);
+            if e.abs() < cut {
+                n += 1.0;
+                sum += e * e;
+            }
+        }
+        let next = if n > 0.0 { (sum / n / factor).sqrt().max(least) } else { least };
+        let settled = (next / scale - 1.0).abs() < 1e-4;
+        scale = next;
+        if settled {
+            break;
+        }
+    }
+    scale
+}
