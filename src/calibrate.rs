@@ -78,13 +78,12 @@ pub fn measure(
     if measurements.views.is_empty() {
         let first = measurements.excluded.first().map_or_else(
             || "there is no view".to_string(),
-            // Its remedy is the same as this message's.
-            |e| format!("view {}: {}", e.view, e.reason.split("; ").next().unwrap_or_default()),
+            |e| format!("view {}: {}", e.view, e.reason),
         );
         return Err(Error::recording(
             &recording.root,
             format!("no view of {total} can be used; the first: {first}"),
-            "see the reasons, or give each target's region in view.json",
+            "put this right, then run again",
         ));
     }
     Ok(measurements)

@@ -107,7 +107,7 @@ pub(super) fn natural_jacobian(
     j
 }
 
-const TRUST_REGION_STEPS: u64 = 25;
+const TRUST_REGION_STEPS: u64 = 4;
 
 pub(super) fn polish(rows: &Rows, spec: &dyn SigmaForm, p: &[f64], free: &[usize]) -> Vec<f64> {
     if free.is_empty() {
