@@ -25,6 +25,8 @@ pub struct Cell {
     pub n: usize,
     /// Independent samples they are worth for a variance.
     pub n_effective: f64,
+    /// Independent samples the temporal sigma is worth: a pixel gives one frame less than it has.
+    pub n_effective_temporal: f64,
     /// Samples of target pixels without a depth.
     pub missing: usize,
     /// Samples farther than the cut from the plane.
@@ -111,8 +113,8 @@ pub(super) struct Context {
     /// Pixels per independent sample of a mean and of a variance.
     pub correlation_sum: f64,
     pub correlation_squares: f64,
-    /// Independent frames per frame, for the part that changes with time.
-    pub temporal_dilution: f64,
+    /// Correlation of the moving part one frame apart; a first-order filter from there.
+    pub temporal_rho: f64,
     /// Pixels of the whole view: the plane's three parameters are shared by all cells.
     pub view_pixels: f64,
     pub per_frame_planes: bool,
@@ -130,15 +132,16 @@ impl Context {
             return None;
         }
         let total = s.e2 / s.n / self.cut_factor;
-        let temporal = (self.frames >= 2.0 && s.within_dof > 0.0)
-            .then(|| s.within / s.within_dof / self.cut_factor);
+        let frames = (s.n / s.pixels.max(1.0)).max(1.0);
+        let within = (self.frames >= 2.0 && s.within_dof > 0.0).then(|| s.within / s.within_dof);
+        let temporal = within.map(|w| self.temporal(w, total, frames));
         // Share of the variance that stands still from frame to frame.
         let frozen = temporal.map_or(1.0, |t| (1.0 - t / total).clamp(0.0, 1.0));
-        let frames = (s.n / s.pixels.max(1.0)).max(1.0);
-        let moving_frames = 1.0 + (frames - 1.0) * self.temporal_dilution;
+        let moving_frames = 1.0 + (frames - 1.0) * self.temporal_dilution();
         let absorbed = self.absorbed(frozen, moving_frames);
         let unbias = 1.0 / (1.0 - absorbed);
-        let spatial = ((s.e2 - s.between).max(0.0) / s.n / self.cut_factor) * unbias;
+        let shared = self.shared_by_a_frame(s, within.unwrap_or(0.0));
+        let spatial = ((s.e2 - shared).max(0.0) / s.n / self.cut_factor) * unbias;
         let total = total * unbias;
         // Squares of the covariance between two frames: frozen^2 off the diagonal.
         let moving = 1.0 - frozen;
@@ -157,9 +160,34 @@ impl Context {
             std_error_m: spatial_m / (2.0 * n_effective).sqrt(),
             n: s.n as usize,
             n_effective,
+            n_effective_temporal: (s.pixels / self.correlation_squares * (moving_frames - 1.0))
+                .max(1.0),
             missing: s.missing,
             cut: s.cut,
         })
+    }
+
+    /// Independent frames per frame, for the part that changes with time: the squares of a
+    /// first-order correlation sum to (1 + rho^2) / (1 - rho^2).
+    fn temporal_dilution(&self) -> f64 {
+        let square = self.temporal_rho * self.temporal_rho;
+        (1.0 - square) / (1.0 + square)
+    }
+
+    /// Variance of a pixel over time, from its variance `within` a few correlated frames about
+    /// their own mean, which is short by the frames' mean correlation, and by the cut: of two
+    /// Gaussian parts of a sum, cutting the sum narrows each in proportion to its share.
+    fn temporal(&self, within: f64, total: f64, frames: f64) -> f64 {
+        let moving = (within / total).clamp(0.0, 1.0);
+        let cut = 1.0 - (1.0 - self.cut_factor) * moving;
+        within / cut / (1.0 - mean_correlation(self.temporal_rho, frames))
+    }
+
+    /// Of the squares between frames, those beyond what noise correlated between neighbours makes
+    /// by itself: a shift of the whole frame, which is no spread over the pixels.
+    fn shared_by_a_frame(&self, s: &Sums, within: f64) -> f64 {
+        let by_noise = (self.frames - 1.0) * within * self.correlation_sum.min(s.pixels);
+        (s.between - by_noise).max(0.0)
     }
 
     /// Share of one frame's variance that the plane fit took away.
@@ -170,6 +198,17 @@ impl Context {
         (per_plane * share).min(MOST_ABSORBED)
     }
 }
+
+/// Mean correlation between two different ones of `frames` frames of a first-order filter.
+fn mean_correlation(rho: f64, frames: f64) -> f64 {
+    let n = frames.round().max(2.0);
+    // The sum of (n - k) rho^k over k = 1 .. n - 1, closed.
+    let sum = rho * (n * (1.0 - rho) - (1.0 - rho.powf(n))) / (1.0 - rho).powi(2);
+    (2.0 * sum / (n * (n - 1.0))).clamp(0.0, MOST_SHARED)
+}
+
+/// A filter slower than the view leaves too little of its noise to be scaled up honestly.
+const MOST_SHARED: f64 = 0.8;
 
 #[cfg(test)]
 mod tests {
@@ -192,7 +231,7 @@ mod tests {
             cut_factor: 1.0,
             correlation_sum: 1.0,
             correlation_squares: 1.0,
-            temporal_dilution: 1.0,
+            temporal_rho: 0.0,
             view_pixels: 1000.0,
             per_frame_planes: false,
         };
@@ -209,5 +248,20 @@ mod tests {
         assert!((white.n_effective - 10_000.0).abs() < 1.0, "{white:?}");
         let frozen = context.cell(&Sums { within: 0.0, ..base }).unwrap();
         assert!((frozen.n_effective - 1000.0).abs() < 1.0, "{frozen:?}");
+    }
+
+    /// Against the plain double sum.
+    #[test]
+    fn the_mean_correlation_is_the_mean_over_pairs() {
+        for (rho, n) in [(0.0, 5), (0.3, 2), (0.6, 7), (0.8, 4)] {
+            let mut sum = 0.0;
+            for i in 0..n {
+                for j in 0..i {
+                    sum += f64::powi(rho, i - j);
+                }
+            }
+            let mean = 2.0 * sum / f64::from(n * (n - 1));
+            assert!((mean_correlation(rho, f64::from(n)) - mean).abs() < 1e-12, "{rho} {n}");
+        }
     }
 }

@@ -313,8 +313,7 @@ impl<'a> Scan<'a> {
             cut_factor: normal_cut_factor(CUT_SIGMAS),
             correlation_sum: correlation.sum,
             correlation_squares: correlation.sum_of_squares,
-            // Squares of an AR(1) correlation sum to (1 + rho^2) / (1 - rho^2).
-            temporal_dilution: (1.0 - rho * rho) / (1.0 + rho * rho),
+            temporal_rho: rho,
             view_pixels: self.pixels.len() as f64,
             per_frame_planes: self.bench.options.planes == Planes::PerFrame,
         }

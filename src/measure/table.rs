@@ -101,11 +101,15 @@ fn rows_of(view: usize, m: &ViewMeasurement, kind: SigmaKind) -> Vec<SigmaRow> {
         .iter()
         .filter_map(|cell| {
             let sigma_m = sigma(cell).filter(|s| *s > 0.0)?;
+            let n_effective = match kind {
+                SigmaKind::Temporal => cell.n_effective_temporal,
+                _ => cell.n_effective,
+            };
             Some(SigmaRow {
                 z_m: cell.z_m,
                 theta_rad: m.theta_rad,
                 sigma_m,
-                n_effective: Some(cell.n_effective),
+                n_effective: Some(n_effective),
                 view,
             })
         })

@@ -31,6 +31,7 @@ fn view(name: &str) -> ViewMeasurement {
         std_error_m: 1e-4,
         n: 5000,
         n_effective: 1234.0,
+        n_effective_temporal: 1.0,
         missing: 0,
         cut: 0,
     };
