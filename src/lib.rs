@@ -21,6 +21,7 @@
 
 pub mod calibrate;
 pub mod camera;
+pub mod effects;
 pub mod error;
 pub mod frame;
 pub mod io;
@@ -30,6 +31,7 @@ pub mod plane;
 pub mod report;
 pub mod residual;
 pub mod rng;
+pub mod scene;
 pub mod simulate;
 pub mod solve;
 pub mod stats;

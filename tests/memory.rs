@@ -12,6 +12,7 @@ use common::{BOARD, truth, write_depth};
 use kinoise::Seed;
 use kinoise::io::write_recording_file;
 use kinoise::plane::Plane;
+use kinoise::scene::Bench;
 use kinoise::simulate::{kinect_v1, shoot};
 
 const VIEWS: usize = 4;
@@ -34,8 +35,8 @@ fn two_thousand_frames_fit_into_300_megabytes() {
         let plane = Plane::tilted(0.9 + 0.5 * view as f64, 0.3, view as f64);
         let mut list = String::new();
         for k in 0..IMAGES {
-            let mut rng = Seed(1).stream(&format!("memory/{view}/{k}"));
-            let frame = shoot(&sensor, &rays, &plane, &BOARD, &truth(), &mut rng);
+            let seed = Seed((view * IMAGES + k) as u64);
+            let frame = shoot(&sensor, &rays, &Bench::bare(plane, BOARD), &truth(), seed);
             write_depth(&root.join(format!("{view}/depth/{k}.png")), &frame);
         }
         for k in 0..FRAMES {

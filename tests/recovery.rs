@@ -4,7 +4,8 @@
 use kinoise::io::{Assumed, open};
 use kinoise::measure::MeasureOptions;
 use kinoise::model::{Domain, PAPER_EQ1};
-use kinoise::simulate::{Board, Grid, Shoot, kinect_v1};
+use kinoise::scene::{Board, Target};
+use kinoise::simulate::{Grid, Shoot, kinect_v1};
 use kinoise::{CalibrateOptions, Calibration, Form, Measurements, Seed, SigmaKind, SigmaModel};
 
 const SEEDS: u64 = 200;
@@ -17,14 +18,9 @@ fn truth() -> SigmaModel {
 fn calibrated(seed: u64) -> (Measurements, Calibration) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let root = folder.path().join("recording");
-    let shoot = Shoot {
-        sensor: kinect_v1(2),
-        board: Board { width_m: 1.0, height_m: 0.8 },
-        grid: Grid::paper(),
-        frames: 1,
-        sigma: truth(),
-        seed: Seed(seed),
-    };
+    let board = Target::Board(Board { width_m: 1.0, height_m: 0.8 });
+    let poses = Grid::paper().views();
+    let shoot = Shoot::plain(kinect_v1(2), board, &poses, 1, truth(), Seed(seed));
     shoot.write(&root, &|_, _| ()).expect("the recording is written");
     let recording = open(&root, &Assumed::default()).expect("the recording opens");
     let options = CalibrateOptions {

@@ -1,9 +1,15 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
+use kinoise::effects::Active;
+use kinoise::io::{Assumed, open, write_atomic};
 use kinoise::model::{Domain, PAPER_EQ1};
-use kinoise::simulate::{Board, Grid, Shoot, kinect_v1};
-use kinoise::{Form, NoiseModel, SigmaModel};
+use kinoise::scene::{Board, PATCH_SIDE_M, Print, Target, WHITE};
+use kinoise::simulate::{
+    Grid, GridView, Physics, Scenery, Shoot, ViewPlan, kinect_v1, plan_grid, plan_like,
+};
+use kinoise::{Form, NoiseModel, Sensor, SigmaModel};
 
 use super::common::{Bar, Global, numbers, say};
 
@@ -14,18 +20,72 @@ pub struct Arguments {
     /// model.json to shoot with [default: the paper's Eq. 1, taken at its word outside 1 to 4 m too]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// The poses
-    #[arg(long, value_enum, default_value_t = GridArgument::Paper)]
-    grid: GridArgument,
+    /// Add a physical effect (see kinoise effects); repeatable
+    #[arg(long = "effect", value_name = "ID:KEY=VALUE", value_parser = effect)]
+    effects: Vec<Active>,
+    /// Shoot the very views of this recording: planes, regions, pixels, frames, timestamps
+    #[arg(long, value_name = "REC", conflicts_with_all = ["grid", "distances", "tilts", "azimuths", "frames", "shrink", "board", "wall_target", "patches", "wall", "clutter", "ordered"])]
+    like: Option<PathBuf>,
+    #[command(flatten)]
+    poses: Poses,
     /// Frames a view
     #[arg(long, default_value_t = 1)]
     frames: usize,
-    /// Make the image this many times smaller each way (1 = 640 x 480)
-    #[arg(long, default_value_t = 1, value_name = "N")]
-    shrink: usize,
+    /// Make the image this many times smaller each way, 1 (640 x 480) to 8; without --model
+    #[arg(long, value_name = "N")]
+    shrink: Option<usize>,
+    #[command(flatten)]
+    scenery: SceneryArguments,
+    /// Write infrared amplitude images too
+    #[arg(long)]
+    infrared: bool,
+    /// Write what was switched on to this file; the recording itself never tells
+    #[arg(long, value_name = "FILE")]
+    recipe: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+struct Poses {
+    /// The poses
+    #[arg(long, value_enum, default_value_t = GridArgument::Paper)]
+    grid: GridArgument,
+    /// Own distances in m, in place of the grid's
+    #[arg(long, value_delimiter = ',', value_name = "M,M,..")]
+    distances: Vec<f64>,
+    /// Own tilts in degrees, in place of the grid's
+    #[arg(long, value_delimiter = ',', value_name = "DEG,..")]
+    tilts: Vec<f64>,
+    /// Own directions of tilt in degrees, 0 along the columns; every pose in each of them
+    #[arg(long, value_delimiter = ',', value_name = "DEG,..", allow_hyphen_values = true)]
+    azimuths: Vec<f64>,
+    /// Take the views in the grid's order, not in random order
+    #[arg(long)]
+    ordered: bool,
+}
+
+#[derive(Debug, Args)]
+struct SceneryArguments {
     /// Board width and height in m
     #[arg(long, value_parser = numbers::<2>, default_value = "1,0.8", value_name = "W,H")]
     board: [f64; 2],
+    /// The target is a wall that fills the picture
+    #[arg(long, conflicts_with = "board")]
+    wall_target: bool,
+    /// Print grey squares on the target
+    #[arg(long)]
+    patches: bool,
+    /// A wall this far behind the target, m
+    #[arg(long, value_name = "M")]
+    wall: Option<f64>,
+    /// Boxes in the way, beside the target's middle
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    clutter: usize,
+    /// Write reference distances with this standard deviation, m
+    #[arg(long, value_name = "M")]
+    reference_error: Option<f64>,
+    /// Write the temperature of the room into every view
+    #[arg(long)]
+    conditions: bool,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -34,58 +94,166 @@ enum GridArgument {
     Paper,
 }
 
+fn effect(text: &str) -> Result<Active, String> {
+    Active::parse(text).map_err(|e| e.to_string())
+}
+
 /// Eq. 1 everywhere a board of this size reaches, short of its pole.
 fn eq1_at_its_word() -> SigmaModel {
     let domain = Domain { z_m: [0.2, 10.0], theta_rad: [0.0, PAPER_EQ1[5] - 0.02] };
     SigmaModel::published(Form::Paper, &PAPER_EQ1, domain)
 }
 
-pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
-    if arguments.frames == 0 || !(1..=8).contains(&arguments.shrink) {
-        anyhow::bail!("--frames must be at least 1 and --shrink between 1 and 8");
-    }
-    let [width_m, height_m] = arguments.board;
-    if !(width_m > 0.0 && height_m > 0.0) {
-        anyhow::bail!("--board {width_m},{height_m}: give a width and a height in m");
-    }
-    let (sigma, sensor) = match &arguments.model {
-        Some(path) => {
-            let model = NoiseModel::read(path)?;
-            let sensor = match model.sensor {
-                Some(file) => {
-                    file.sensor().map_err(|e| anyhow::anyhow!("{}: sensor: {e}", path.display()))?
-                }
-                None => kinect_v1(arguments.shrink),
-            };
-            (model.sigma, sensor)
+impl Poses {
+    fn views(&self) -> anyhow::Result<Vec<GridView>> {
+        let GridArgument::Paper = self.grid;
+        let mut grid = Grid::paper();
+        if !self.distances.is_empty() {
+            grid.distances_m = self.distances.clone();
         }
-        None => (eq1_at_its_word(), kinect_v1(arguments.shrink)),
+        if !self.tilts.is_empty() {
+            grid.tilts_rad = self.tilts.iter().map(|t| t.to_radians()).collect();
+        }
+        if grid.distances_m.iter().any(|z| !(0.1..=20.0).contains(z)) {
+            bail!("--distances: a distance lies between 0.1 and 20 m");
+        }
+        if grid.tilts_rad.iter().any(|t| !(0.0..1.55).contains(t)) {
+            bail!("--tilts: a tilt lies between 0 and 88 degrees");
+        }
+        let azimuths: Vec<f64> = self.azimuths.iter().map(|a| a.to_radians()).collect();
+        Ok(if azimuths.is_empty() { grid.views() } else { grid.views_towards(&azimuths) })
+    }
+}
+
+impl SceneryArguments {
+    fn scenery(&self) -> anyhow::Result<Scenery> {
+        let [width_m, height_m] = self.board;
+        if !(width_m > 0.0 && height_m > 0.0) {
+            bail!("--board {width_m},{height_m}: give a width and a height in m");
+        }
+        let positive = |name: &str, value: Option<f64>| match value {
+            Some(v) if !(v.is_finite() && v >= 0.0) => bail!("{name} {v}: give a length in m"),
+            _ => Ok(()),
+        };
+        positive("--wall", self.wall)?;
+        positive("--reference-error", self.reference_error)?;
+        Ok(Scenery {
+            target: if self.wall_target {
+                Target::Wall
+            } else {
+                Target::Board(Board { width_m, height_m })
+            },
+            print: if self.patches { Print::Patches(PATCH_SIDE_M) } else { Print::Plain(WHITE) },
+            wall_gap_m: self.wall,
+            clutter: self.clutter,
+            reference_error_m: self.reference_error,
+            conditions: self.conditions,
+        })
+    }
+}
+
+/// What shoots: the model's own sensor and effects, or a Kinect and Eq. 1.
+fn camera(arguments: &Arguments) -> anyhow::Result<(Sensor, SigmaModel, Vec<Active>)> {
+    let shrink = arguments.shrink.unwrap_or(1);
+    if !(1..=8).contains(&shrink) {
+        bail!("--shrink {shrink}: give a whole number from 1 to 8");
+    }
+    let Some(path) = &arguments.model else {
+        return Ok((kinect_v1(shrink), eq1_at_its_word(), Vec::new()));
     };
-    let GridArgument::Paper = arguments.grid;
+    let model = NoiseModel::read(path)?;
+    let sensor = match model.sensor {
+        Some(_) if arguments.shrink.is_some() => {
+            bail!("--shrink: {} brings its own sensor; leave --shrink out", path.display())
+        }
+        Some(file) => {
+            file.sensor().map_err(|e| anyhow::anyhow!("{}: sensor: {e}", path.display()))?
+        }
+        None => kinect_v1(shrink),
+    };
+    let effects = model
+        .effects
+        .iter()
+        .map(|e| Active::from_model(&e.id, &e.parameters))
+        .collect::<Result<_, _>>()
+        .with_context(|| path.display().to_string())?;
+    Ok((sensor, model.sigma, effects))
+}
+
+/// The views, and the sensor of the recording that is shot again.
+fn plans(
+    arguments: &Arguments,
+    global: &Global,
+) -> anyhow::Result<(Vec<ViewPlan>, Option<Sensor>)> {
+    let seed = global.seed();
+    let scenery = arguments.scenery.scenery()?;
+    let Some(like) = &arguments.like else {
+        let poses = arguments.poses.views()?;
+        let shuffled = !arguments.poses.ordered;
+        return Ok((plan_grid(&poses, &scenery, arguments.frames, shuffled, seed), None));
+    };
+    let recording = open(like, &Assumed::default())?;
+    let (plans, excluded) = plan_like(&recording, scenery.reference_error_m.unwrap_or(0.0), seed);
+    for view in &excluded {
+        say(format!("note: {view}"));
+    }
+    if plans.is_empty() {
+        bail!("{}: no view shows a plane; see the notes", like.display());
+    }
+    Ok((plans, Some(recording.sensor)))
+}
+
+pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
+    if arguments.frames == 0 {
+        bail!("--frames 0: a view has at least one");
+    }
+    let (sensor, sigma, mut effects) = camera(arguments)?;
+    effects.extend(arguments.effects.iter().cloned());
+    let (views, recorded_by) = plans(arguments, global)?;
+    let sensor = recorded_by.unwrap_or(sensor);
+    tell_of_clamped(&views, &sigma);
     let shoot = Shoot {
         sensor,
-        board: Board { width_m, height_m },
-        grid: Grid::paper(),
-        frames: arguments.frames,
-        sigma,
+        views,
+        physics: Physics::Formula { sigma, effects },
+        infrared: arguments.infrared,
         seed: global.seed(),
     };
-    if shoot.grid.views().iter().any(|v| !shoot.sigma.domain.contains(v.z_m, v.theta_rad)) {
-        let d = shoot.sigma.domain;
+    let bar = Bar::new("views");
+    shoot.write(&arguments.output, &|done, all| bar.step(done, all))?;
+    drop(bar);
+    if let Some(path) = &arguments.recipe {
+        write_recipe(path, &shoot)?;
+    }
+    let frames: usize = shoot.views.iter().map(|v| v.stamps.len()).sum();
+    say(format!(
+        "wrote {} views, {frames} frames, to {}",
+        shoot.views.len(),
+        arguments.output.display()
+    ));
+    global.print_json(&serde_json::json!({"views": shoot.views.len(), "frames": frames, "output": arguments.output}))
+}
+
+fn tell_of_clamped(views: &[ViewPlan], sigma: &SigmaModel) {
+    let outside = |v: &&ViewPlan| {
+        let plane = &v.bench.plane;
+        !sigma.domain.contains(plane.depth(0.0, 0.0), plane.theta())
+    };
+    let count = views.iter().filter(outside).count();
+    if count > 0 {
+        let d = sigma.domain;
         say(format!(
-            "note: some views lie outside the model's range (z {:.2} to {:.2} m, tilt up to {:.1} degrees); sigma is clamped to its edge there",
+            "note: {count} of {} views lie outside the model's range (z {:.2} to {:.2} m, tilt up to {:.1} degrees); sigma is clamped to its edge there",
+            views.len(),
             d.z_m[0],
             d.z_m[1],
             d.theta_rad[1].to_degrees()
         ));
     }
-    let bar = Bar::new("views");
-    let views = shoot.write(&arguments.output, &|done, all| bar.step(done, all))?;
-    drop(bar);
-    say(format!(
-        "wrote {views} views of {} frame(s) to {}",
-        arguments.frames,
-        arguments.output.display()
-    ));
-    global.print_json(&serde_json::json!({"views": views, "frames": arguments.frames, "output": arguments.output}))
+}
+
+fn write_recipe(path: &Path, shoot: &Shoot) -> anyhow::Result<()> {
+    let mut text = serde_json::to_string_pretty(&shoot.recipe())?;
+    text.push('\n');
+    Ok(write_atomic(path, text.as_bytes())?)
 }

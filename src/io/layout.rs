@@ -38,6 +38,23 @@ pub struct ViewFile {
 }
 
 impl ViewFile {
+    fn of(notes: &ViewNotes) -> Self {
+        let (roi, polygon) = match &notes.region {
+            Some(Region::Rectangle(r)) => (Some(*r), None),
+            Some(Region::Polygon(p)) => (None, Some(p.clone())),
+            None => (None, None),
+        };
+        ViewFile {
+            target: notes.target,
+            reference_distance_m: notes.reference_distance_m,
+            roi,
+            polygon,
+            temperature_c: notes.temperature_c,
+            ambient_lux: notes.ambient_lux,
+            notes: notes.notes.clone(),
+        }
+    }
+
     fn notes(self) -> Result<ViewNotes, String> {
         let region = match (self.roi, self.polygon) {
             (Some(_), Some(_)) => return Err("both roi and polygon are given; keep one".into()),
@@ -160,19 +177,36 @@ fn remark_on(list: &FrameList, view: &str, remarks: &mut Vec<String>) {
     remarks.extend(list.remarks.iter().map(|r| format!("view {view}: {r}")));
 }
 
+/// Write `view.json` into the view's folder; nothing where nothing is known.
+///
+/// # Errors
+/// When the folder cannot be written.
+pub fn write_view_notes(folder: &Path, notes: &ViewNotes) -> Result<()> {
+    if *notes == ViewNotes::default() {
+        return Ok(());
+    }
+    write_json(&folder.join(VIEW_FILE), &ViewFile::of(notes), "the view's numbers must be finite")
+}
+
+fn write_json(path: &Path, value: &impl Serialize, remedy: &'static str) -> Result<()> {
+    let mut text = serde_json::to_string_pretty(value).map_err(|e| Error::Json {
+        path: path.to_path_buf(),
+        line: 0,
+        what: e.to_string(),
+        remedy,
+    })?;
+    text.push('\n');
+    write_atomic(path, text.as_bytes())
+}
+
 /// Write `recording.json` for `sensor` into `root`.
 ///
 /// # Errors
 /// When the folder cannot be written.
 pub fn write_recording_file(root: &Path, sensor: &Sensor) -> Result<()> {
-    let path = root.join(DESCRIPTION);
-    let mut text =
-        serde_json::to_string_pretty(&RecordingFile::of(sensor)).map_err(|e| Error::Json {
-            path: path.clone(),
-            line: 0,
-            what: e.to_string(),
-            remedy: "the sensor's numbers must be finite",
-        })?;
-    text.push('\n');
-    write_atomic(&path, text.as_bytes())
+    write_json(
+        &root.join(DESCRIPTION),
+        &RecordingFile::of(sensor),
+        "the sensor's numbers must be finite",
+    )
 }

@@ -10,7 +10,7 @@ mod stills;
 mod tum;
 
 pub use images::{FrameSource, InfraredImage, encode_png16};
-pub use layout::{ViewFile, write_recording_file};
+pub use layout::{ViewFile, write_recording_file, write_view_notes};
 pub use list::{FrameList, read_list};
 pub use output::{OutputDir, sha256_hex, write_atomic};
 

@@ -131,28 +131,9 @@ const HELD_FRAMES: usize = 8;
 pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasurement> {
     let camera = &bench.sensor.camera;
     let mut source = FrameSource::new(camera.width, camera.height);
-    let mut reader = FrameReader {
-        frames: view.depth.iter(),
-        source: &mut source,
-        notes: Vec::new(),
-        table: &bench.table,
-    };
-    let mut held = Vec::new();
-    while held.len() < HELD_FRAMES {
-        let Some(frame) = reader.next_readable() else { break };
-        held.push(frame);
-    }
-    let failed = |what: String, remedy| Error::View { view: view.name.clone(), what, remedy };
-    if held.is_empty() {
-        let why = reader.notes.first().cloned().unwrap_or_else(|| "it has no frame".into());
-        return Err(failed(why, "record the view again"));
-    }
-    let target = target_of(view, bench, &held).map_err(|what| {
-        failed(
-            what,
-            "give the target's region in view.json (roi or polygon), or record the view again",
-        )
-    })?;
+    let mut reader = FrameReader::of(view, &mut source, &bench.table);
+    let held = reader.hold(view)?;
+    let target = target_of(view, bench, &held)?;
     let mut scan = Scan::begin(bench, &target, &held);
     for frame in &held {
         scan.add(frame);
@@ -165,7 +146,11 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
     let infrared = infrared_of(view, &target, bench, &mut notes);
     notes.extend(target.notes.iter().cloned());
     let mut result = scan.finish(&target, &held[0]).ok_or_else(|| {
-        failed("the residuals of its plane cannot be measured".into(), "record the view again")
+        failed(
+            view,
+            "the residuals of its plane cannot be measured".into(),
+            "record the view again",
+        )
     })?;
     result.name = view.name.clone();
     result.time_s = view.depth[0].timestamp;
@@ -177,6 +162,18 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
     Ok(result)
 }
 
+/// The target of one view, from its first frames.
+///
+/// # Errors
+/// As [`measure_view`].
+pub fn view_target(view: &View, bench: &Workbench<'_>) -> Result<Target> {
+    let camera = &bench.sensor.camera;
+    let mut source = FrameSource::new(camera.width, camera.height);
+    let mut reader = FrameReader::of(view, &mut source, &bench.table);
+    let held = reader.hold(view)?;
+    target_of(view, bench, &held)
+}
+
 /// Hands out the frames that can be read; tells of the others.
 struct FrameReader<'r> {
     frames: std::slice::Iter<'r, FrameRef>,
@@ -185,7 +182,29 @@ struct FrameReader<'r> {
     table: &'r DepthTable,
 }
 
-impl FrameReader<'_> {
+fn failed(view: &View, what: String, remedy: &'static str) -> Error {
+    Error::View { view: view.name.clone(), what, remedy }
+}
+
+impl<'r> FrameReader<'r> {
+    fn of(view: &'r View, source: &'r mut FrameSource, table: &'r DepthTable) -> Self {
+        FrameReader { frames: view.depth.iter(), source, notes: Vec::new(), table }
+    }
+
+    /// The first readable frames.
+    fn hold(&mut self, view: &View) -> Result<Vec<Frame>> {
+        let mut held = Vec::new();
+        while held.len() < HELD_FRAMES {
+            let Some(frame) = self.next_readable() else { break };
+            held.push(frame);
+        }
+        if held.is_empty() {
+            let why = self.notes.first().cloned().unwrap_or_else(|| "it has no frame".into());
+            return Err(failed(view, why, "record the view again"));
+        }
+        Ok(held)
+    }
+
     fn next_readable(&mut self) -> Option<Frame> {
         while let Some(frame_ref) = self.frames.next() {
             match self.source.read(&frame_ref.path) {
@@ -205,7 +224,7 @@ impl FrameReader<'_> {
     }
 }
 
-fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Target, String> {
+fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Target> {
     let w = mean_inverse_depth(held, &bench.table);
     let image = InverseDepthImage {
         w: &w,
@@ -214,7 +233,13 @@ fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Targe
         step: &|w| bench.step(w),
     };
     let mut rng = bench.options.seed.stream(&format!("target/{}", view.name));
-    find_target(&image, view.notes.region.as_ref(), &mut rng)
+    find_target(&image, view.notes.region.as_ref(), &mut rng).map_err(|what| {
+        failed(
+            view,
+            what,
+            "give the target's region in view.json (roi or polygon), or record the view again",
+        )
+    })
 }
 
 /// Mean over the frames, where at least half of them measured; 1/m, NaN elsewhere.

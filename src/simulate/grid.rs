@@ -39,6 +39,19 @@ impl Grid {
         }
     }
 
+    /// Every distance and tilt in each of these directions, rad; a tilt of zero has none.
+    pub fn views_towards(&self, azimuths_rad: &[f64]) -> Vec<GridView> {
+        let mut views = Vec::new();
+        for &z_m in &self.distances_m {
+            for &theta_rad in &self.tilts_rad {
+                let directions = if theta_rad == 0.0 { &azimuths_rad[..1] } else { azimuths_rad };
+                let pose = |&azimuth_rad| GridView { z_m, theta_rad, azimuth_rad };
+                views.extend(directions.iter().map(pose));
+            }
+        }
+        views
+    }
+
     pub fn views(&self) -> Vec<GridView> {
         let mut views = Vec::new();
         for (i, &z_m) in self.distances_m.iter().enumerate() {

@@ -11,7 +11,8 @@ use kinoise::model::fit;
 use kinoise::plane::{
     Effort, InverseDepthImage, Points, RansacOptions, find_target, fit_affine_robust, ransac_plane,
 };
-use kinoise::simulate::{Board, Grid, Shoot, kinect_v1};
+use kinoise::scene::{Board, Target};
+use kinoise::simulate::{Grid, Shoot, kinect_v1};
 use kinoise::view::Region;
 use kinoise::{Form, Plane, Seed, SigmaModel};
 use rand_distr::{Distribution, StandardNormal};
@@ -130,14 +131,9 @@ fn fits(c: &mut Criterion) {
 fn frames(c: &mut Criterion) {
     const FRAMES: usize = 120;
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let shoot = Shoot {
-        sensor: kinect_v1(1),
-        board: Board { width_m: 3.0, height_m: 2.0 },
-        grid: Grid { distances_m: vec![1.5], tilts_rad: vec![0.1] },
-        frames: FRAMES,
-        sigma: SigmaModel::paper(),
-        seed: Seed(1),
-    };
+    let board = Target::Board(Board { width_m: 3.0, height_m: 2.0 });
+    let poses = Grid { distances_m: vec![1.5], tilts_rad: vec![0.1] }.views();
+    let shoot = Shoot::plain(kinect_v1(1), board, &poses, FRAMES, SigmaModel::paper(), Seed(1));
     let root = folder.path().join("recording");
     shoot.write(&root, &|_, _| ()).expect("written");
     frames_of(c, "simulated wall, 120 frames", &root);

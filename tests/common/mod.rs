@@ -6,10 +6,11 @@ use std::sync::OnceLock;
 
 use assert_cmd::Command;
 use kinoise::model::{Domain, PAPER_EQ1};
-use kinoise::simulate::{Board, Grid, Shoot, kinect_v1};
+use kinoise::scene::{Board, Target};
+use kinoise::simulate::{Grid, Shoot, kinect_v1};
 use kinoise::{Form, Frame, Seed, SigmaModel};
 
-pub const BOARD: Board = Board { width_m: 1.0, height_m: 0.8 };
+pub const BOARD: Target = Target::Board(Board { width_m: 1.0, height_m: 0.8 });
 
 /// Eq. 1 taken at its word wherever a board of this size reaches.
 pub fn truth() -> SigmaModel {
@@ -26,7 +27,7 @@ pub fn grid(distances_m: &[f64], tilts_deg: &[f64]) -> Grid {
 
 /// Shots of 160 x 120 px: a view of the good recording weighs 20 kB.
 pub fn shots(grid: Grid, frames: usize, seed: u64) -> Shoot {
-    Shoot { sensor: kinect_v1(4), board: BOARD, grid, frames, sigma: truth(), seed: Seed(seed) }
+    Shoot::plain(kinect_v1(4), BOARD, &grid.views(), frames, truth(), Seed(seed))
 }
 
 /// Views of the good recording: four distances, three tilts, two frames each.

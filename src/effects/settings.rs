@@ -1,0 +1,122 @@
+//! An effect with its knobs set, from the command line or from a model file.
+
+use serde_json::{Map, Value};
+
+use super::{CATALOGUE, Effect, find};
+use crate::error::{Error, Result};
+
+/// Values of an effect's parameters, in the card's order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings(Vec<f64>);
+
+/// An effect that is switched on.
+#[derive(Clone)]
+pub struct Active {
+    pub effect: &'static dyn Effect,
+    pub settings: Settings,
+}
+
+impl Settings {
+    /// The value of the card's parameter number `index`.
+    pub fn at(&self, index: usize) -> f64 {
+        self.0[index]
+    }
+
+    pub fn typical(effect: &dyn Effect) -> Self {
+        Settings(effect.card().parameters.iter().map(|p| p.typical).collect())
+    }
+}
+
+const KNOWN: &str = "see `kinoise effects` for the ids and their parameters";
+
+fn fault(what: String) -> Error {
+    Error::Argument { what, remedy: KNOWN }
+}
+
+impl Active {
+    /// By id, all knobs at their typical values.
+    ///
+    /// # Errors
+    /// When no effect has this id.
+    pub fn typical(id: &str) -> Result<Self> {
+        let effect = find(id).ok_or_else(|| {
+            let near = CATALOGUE
+                .iter()
+                .map(|e| e.card().id)
+                .find(|known| known.contains(id) || id.contains(known));
+            let hint = near.map_or(String::new(), |n| format!("; did you mean {n}?"));
+            fault(format!("effect \"{id}\" is not in the catalogue{hint}"))
+        })?;
+        Ok(Active { effect, settings: Settings::typical(effect) })
+    }
+
+    /// `self` with one knob set.
+    ///
+    /// # Errors
+    /// When the effect has no such knob, or the value is outside its range.
+    pub fn with(mut self, key: &str, value: f64) -> Result<Self> {
+        let card = self.effect.card();
+        let index = card.parameters.iter().position(|p| p.name == key).ok_or_else(|| {
+            let names: Vec<&str> = card.parameters.iter().map(|p| p.name).collect();
+            fault(format!("effect {} has no \"{key}\", but {}", card.id, names.join(", ")))
+        })?;
+        let p = &card.parameters[index];
+        let [low, high] = p.range;
+        if !(low..=high).contains(&value) {
+            return Err(fault(format!(
+                "effect {}: {key} = {value} is outside {low} to {high} {}",
+                card.id, p.unit
+            )));
+        }
+        self.settings.0[index] = value;
+        Ok(self)
+    }
+
+    /// `ID`, or `ID:key=value,key=value`.
+    ///
+    /// # Errors
+    /// When the text is no such thing, or names what the catalogue has not.
+    pub fn parse(text: &str) -> Result<Self> {
+        let (id, knobs) = text.split_once(':').unwrap_or((text, ""));
+        let mut active = Active::typical(id.trim())?;
+        for knob in knobs.split(',').filter(|k| !k.trim().is_empty()) {
+            let (key, value) = knob
+                .split_once('=')
+                .ok_or_else(|| fault(format!("effect {id}: \"{knob}\" is not key=value")))?;
+            let number = value
+                .trim()
+                .parse()
+                .map_err(|_| fault(format!("effect {id}: {key} = \"{value}\" is not a number")))?;
+            active = active.with(key.trim(), number)?;
+        }
+        Ok(active)
+    }
+
+    /// As `model.json` has it: parameters as numbers or as {"value": number, ..}.
+    ///
+    /// # Errors
+    /// As [`Active::with`]; and when a parameter is no number.
+    pub fn from_model(id: &str, parameters: &Map<String, Value>) -> Result<Self> {
+        let mut active = Active::typical(id)?;
+        for (key, value) in parameters {
+            let number =
+                value.get("value").unwrap_or(value).as_f64().ok_or_else(|| {
+                    fault(format!("effect {id}: {key} = {value} is not a number"))
+                })?;
+            active = active.with(key, number)?;
+        }
+        Ok(active)
+    }
+
+    /// The parameters by name.
+    pub fn parameters(&self) -> Map<String, Value> {
+        let names = self.effect.card().parameters.iter().map(|p| p.name.to_string());
+        names.zip(self.settings.0.iter().map(|&v| Value::from(v))).collect()
+    }
+}
+
+impl std::fmt::Debug for Active {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}:{:?}", self.effect.card().id, self.settings.0)
+    }
+}

@@ -1,0 +1,96 @@
+//! What every pixel of a camera sees of a world: computed once a view.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::{TargetFrame, World};
+use crate::camera::{Camera, Rays};
+
+/// One connected piece of the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    /// The calibration target (or a part of it).
+    pub is_target: bool,
+    /// Tilt against the optical axis, rad, where it is the same all over; `None` when curved.
+    pub theta_rad: Option<f64>,
+}
+
+/// [`Seen::surface`] of a pixel that looks past everything.
+#[derive(Debug, Clone, Copy)]
+pub struct Nothing;
+
+impl Nothing {
+    pub const SURFACE: u16 = u16::MAX;
+}
+
+/// Per pixel, row-major.
+#[derive(Debug, Clone)]
+pub struct Seen {
+    pub width: usize,
+    pub height: usize,
+    /// Depth along the optical axis, m; NaN where there is nothing.
+    pub depth: Vec<f32>,
+    /// Unit normal towards the camera.
+    pub normal: Vec<[f32; 3]>,
+    pub surface: Vec<u16>,
+    /// Share of infrared light given back.
+    pub albedo: Vec<f32>,
+    pub surfaces: Vec<Surface>,
+    pub target: Option<TargetFrame>,
+}
+
+impl Seen {
+    /// Cast the rays of all pixels from the camera's centre.
+    pub fn of(world: &dyn World, camera: &Camera, rays: &Rays) -> Self {
+        let hits: Vec<_> = (0..camera.pixels())
+            .into_par_iter()
+            .map(|i| {
+                let (x, y) = rays.at(i);
+                world.cast(&Vector3::zeros(), &Vector3::new(x, y, 1.0))
+            })
+            .collect();
+        let mut seen = Seen {
+            width: camera.width,
+            height: camera.height,
+            depth: Vec::with_capacity(hits.len()),
+            normal: Vec::with_capacity(hits.len()),
+            surface: Vec::with_capacity(hits.len()),
+            albedo: Vec::with_capacity(hits.len()),
+            surfaces: world.surfaces(),
+            target: world.target(),
+        };
+        for hit in hits {
+            // The ray's third component is one: its parameter is the depth.
+            seen.depth.push(hit.map_or(f32::NAN, |h| h.t as f32));
+            seen.normal.push(hit.map_or([0.0; 3], |h| h.normal.cast::<f32>().into()));
+            seen.surface.push(hit.map_or(Nothing::SURFACE, |h| h.surface));
+            seen.albedo.push(hit.map_or(0.0, |h| h.albedo as f32));
+        }
+        seen
+    }
+
+    pub fn is_target(&self, i: usize) -> bool {
+        self.surfaces.get(usize::from(self.surface[i])).is_some_and(|s| s.is_target)
+    }
+
+    /// Tilt of the surface at pixel `i` against the optical axis, rad.
+    pub fn theta(&self, i: usize) -> f64 {
+        let flat = self.surfaces.get(usize::from(self.surface[i])).and_then(|s| s.theta_rad);
+        flat.unwrap_or_else(|| f64::from(self.normal[i][2].abs().min(1.0)).acos())
+    }
+
+    /// Image direction in which the surface at pixel `i` recedes, rad, 0 along the columns.
+    ///
+    /// The normal towards the camera leans to the side on which the depth grows.
+    pub fn azimuth(&self, i: usize) -> f64 {
+        let [x, y, _] = self.normal[i];
+        f64::from(y).atan2(f64::from(x))
+    }
+
+    /// Cosine between the pixel's line of sight and the normal.
+    pub fn cos_incidence(&self, i: usize, rays: &Rays) -> f64 {
+        let (x, y) = rays.at(i);
+        let [a, b, c] = self.normal[i].map(f64::from);
+        ((a * x + b * y + c) / (x * x + y * y + 1.0).sqrt()).abs()
+    }
+}

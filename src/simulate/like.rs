@@ -1,0 +1,70 @@
+//! Shooting the very views of a recording again: a simulated twin.
+
+use nalgebra::Vector3;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use super::plan::ViewPlan;
+use crate::error::Result;
+use crate::measure::{MeasureOptions, Workbench, view_target};
+use crate::plane::Target as Found;
+use crate::rng::Seed;
+use crate::scene::{Bench, Target, TargetFrame};
+use crate::view::{Excluded, Recording, View, ViewNotes};
+
+/// The views of `recording`: same planes, regions, pixels, frames and timestamps. A reference
+/// distance becomes the simulated plane's own, with `reference_error_m` of noise.
+///
+/// Views without a plane are returned beside, with the reason.
+pub fn plan_like(
+    recording: &Recording,
+    reference_error_m: f64,
+    seed: Seed,
+) -> (Vec<ViewPlan>, Vec<Excluded>) {
+    let options = MeasureOptions { seed, ..MeasureOptions::default() };
+    let bench = Workbench::new(&recording.sensor, options);
+    let found: Vec<Result<Found>> =
+        recording.views.par_iter().map(|view| view_target(view, &bench)).collect();
+    let mut plans = Vec::new();
+    let mut excluded = recording.excluded.clone();
+    for (view, target) in recording.views.iter().zip(found) {
+        match target {
+            Ok(target) => plans.push(plan(view, &target, &bench, reference_error_m, seed)),
+            Err(e) => excluded.push(Excluded::of(&view.name, &e)),
+        }
+    }
+    (plans, excluded)
+}
+
+fn plan(
+    view: &View,
+    target: &Found,
+    bench: &Workbench<'_>,
+    reference_error_m: f64,
+    seed: Seed,
+) -> ViewPlan {
+    let plane = target.plane;
+    let mut mask = vec![false; bench.sensor.camera.pixels()];
+    let mut middle = Vector3::zeros();
+    for &i in &target.pixels {
+        mask[i as usize] = true;
+        let (x, y) = bench.rays.at(i as usize);
+        middle += Vector3::new(x, y, 1.0) * plane.depth(x, y);
+    }
+    let reference_distance_m = view.notes.reference_distance_m.map(|_| {
+        let name = format!("simulate/reference/{}", view.name);
+        let off: f64 = StandardNormal.sample(&mut seed.stream(&name));
+        plane.depth(0.0, 0.0) + reference_error_m * off
+    });
+    ViewPlan {
+        name: view.name.clone(),
+        bench: Bench {
+            frame: TargetFrame::on(&plane, middle / target.pixels.len() as f64),
+            // The pixels of the real target are its outline.
+            ..Bench::bare(plane, Target::Wall)
+        },
+        mask: Some(mask),
+        stamps: view.depth.iter().map(|f| f.timestamp).collect(),
+        notes: ViewNotes { reference_distance_m, ..view.notes.clone() },
+    }
+}

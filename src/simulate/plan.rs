@@ -1,0 +1,136 @@
+//! What to take: the views of a recording before the shutter opens.
+
+use rand::Rng;
+use rand::seq::SliceRandom;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::grid::GridView;
+use crate::camera::{Camera, Rays};
+use crate::rng::Seed;
+use crate::scene::{Bench, Patch, Print, Seen, Target, WHITE};
+use crate::view::{TargetSize, ViewNotes};
+use nalgebra::Vector3;
+
+/// One view to be taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewPlan {
+    pub name: String,
+    pub bench: Bench,
+    /// Pixels that may answer; `None` for all. Row-major.
+    pub mask: Option<Vec<bool>>,
+    /// One a frame, s.
+    pub stamps: Vec<f64>,
+    pub notes: ViewNotes,
+}
+
+impl ViewPlan {
+    /// What the camera's pixels see of the view.
+    pub fn seen(&self, camera: &Camera, rays: &Rays) -> Seen {
+        let mut seen = Seen::of(&self.bench, camera, rays);
+        if let Some(mask) = &self.mask {
+            let hidden = mask.iter().enumerate().filter(|(_, shown)| !**shown);
+            hidden.for_each(|(i, _)| seen.depth[i] = f32::NAN);
+        }
+        seen
+    }
+}
+
+/// What stands on the bench beside the target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scenery {
+    pub target: Target,
+    pub print: Print,
+    /// How far behind the target's centre a wall stands, m.
+    pub wall_gap_m: Option<f64>,
+    /// Boxes and hands between sensor and target, away from the optical axis.
+    pub clutter: usize,
+    /// Standard deviation of the reference distances, m; `None` writes none.
+    pub reference_error_m: Option<f64>,
+    /// Write the room's temperature and light into every view.
+    pub conditions: bool,
+}
+
+impl Scenery {
+    /// The target alone, white, nothing known about it.
+    pub fn bare(target: Target) -> Self {
+        Scenery {
+            target,
+            print: Print::Plain(WHITE),
+            wall_gap_m: None,
+            clutter: 0,
+            reference_error_m: None,
+            conditions: false,
+        }
+    }
+}
+
+/// Frame rate of every sensor of this kind, Hz.
+pub const RATE_HZ: f64 = 30.0;
+/// From the start of one view to the start of the next, s: time to move a board.
+const VIEW_INTERVAL_S: f64 = 30.0;
+/// What a room has.
+const ROOM_TEMPERATURE_C: f64 = 22.0;
+
+/// The poses in random order, so that time and distance are not the same axis (`shuffled`), or in
+/// the order given.
+pub fn plan_grid(
+    poses: &[GridView],
+    scenery: &Scenery,
+    frames: usize,
+    shuffled: bool,
+    seed: Seed,
+) -> Vec<ViewPlan> {
+    let mut poses = poses.to_vec();
+    if shuffled {
+        poses.shuffle(&mut seed.stream("simulate/order"));
+    }
+    poses.iter().enumerate().map(|(index, pose)| view(index, pose, scenery, frames, seed)).collect()
+}
+
+fn view(index: usize, pose: &GridView, scenery: &Scenery, frames: usize, seed: Seed) -> ViewPlan {
+    let mut bench = Bench::bare(pose.plane(), scenery.target);
+    bench.print = scenery.print;
+    bench.wall_m = scenery.wall_gap_m.map(|gap| pose.z_m + gap);
+    bench.clutter = clutter(pose.z_m, scenery.clutter, seed, index);
+    let start = index as f64 * VIEW_INTERVAL_S;
+    let reference = scenery.reference_error_m.map(|error| {
+        let off: f64 =
+            StandardNormal.sample(&mut seed.stream(&format!("simulate/reference/{index}")));
+        pose.z_m + error * off
+    });
+    let target = match scenery.target {
+        Target::Board(b) => Some(TargetSize { width_m: b.width_m, height_m: b.height_m }),
+        Target::Wall => None,
+    };
+    ViewPlan {
+        name: format!("{index:04}"),
+        bench,
+        mask: None,
+        stamps: (0..frames).map(|k| start + k as f64 / RATE_HZ).collect(),
+        notes: ViewNotes {
+            // Only a view that says something else has a view.json too.
+            target: target.filter(|_| reference.is_some() || scenery.conditions),
+            reference_distance_m: reference,
+            temperature_c: scenery.conditions.then_some(ROOM_TEMPERATURE_C),
+            ..ViewNotes::default()
+        },
+    }
+}
+
+/// Boxes nearer than the target, beside the axis by 0.15 to 0.35 of the depth.
+fn clutter(z: f64, count: usize, seed: Seed, view: usize) -> Vec<Patch> {
+    let mut rng = seed.stream(&format!("simulate/clutter/{view}"));
+    (0..count)
+        .map(|_| {
+            let depth = z * rng.random_range(0.5..0.9);
+            let angle = rng.random_range(0.0..std::f64::consts::TAU);
+            let aside = depth * rng.random_range(0.2..0.4);
+            Patch {
+                centre: Vector3::new(aside * f64::cos(angle), aside * f64::sin(angle), depth),
+                width_m: depth * rng.random_range(0.05..0.15),
+                height_m: depth * rng.random_range(0.05..0.15),
+                albedo: rng.random_range(0.2..0.8),
+            }
+        })
+        .collect()
+}

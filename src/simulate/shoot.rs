@@ -1,0 +1,207 @@
+//! Taking the views of a plan and writing them as a recording.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+
+use super::formula::{FormulaSensor, Shot};
+use super::grid::GridView;
+use super::plan::{Scenery, ViewPlan, plan_grid};
+use crate::calibrate::Progress;
+use crate::camera::Rays;
+use crate::effects::{Active, Instant};
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::io::{encode_png16, write_atomic, write_recording_file, write_view_notes};
+use crate::model::SigmaModel;
+use crate::rng::Seed;
+use crate::scene::Target;
+use crate::view::Sensor;
+
+/// By which world the frames are made.
+#[derive(Debug, Clone)]
+pub enum Physics {
+    /// sigma(z, theta) and the effects, in light-path order.
+    Formula { sigma: SigmaModel, effects: Vec<Active> },
+}
+
+/// Views to be taken by one sensor.
+#[derive(Debug, Clone)]
+pub struct Shoot {
+    pub sensor: Sensor,
+    pub views: Vec<ViewPlan>,
+    pub physics: Physics,
+    /// Write infrared amplitude images too.
+    pub infrared: bool,
+    pub seed: Seed,
+}
+
+impl Shoot {
+    /// A bare target at these poses in random order, Gaussian noise of sigma(z, theta).
+    pub fn plain(
+        sensor: Sensor,
+        target: Target,
+        poses: &[GridView],
+        frames: usize,
+        sigma: SigmaModel,
+        seed: Seed,
+    ) -> Self {
+        Shoot {
+            sensor,
+            views: plan_grid(poses, &Scenery::bare(target), frames, true, seed),
+            physics: Physics::Formula { sigma, effects: Vec::new() },
+            infrared: false,
+            seed,
+        }
+    }
+
+    /// Write the whole recording into `root`, a view a folder.
+    ///
+    /// # Errors
+    /// When the folder exists with something in it, or cannot be written.
+    pub fn write(&self, root: &Path, progress: Progress<'_>) -> Result<()> {
+        refuse_full(root)?;
+        std::fs::create_dir_all(root).map_err(|e| Error::write(root, e))?;
+        write_recording_file(root, &self.sensor)?;
+        let rays = self.sensor.camera.rays();
+        let first = self.views.iter().filter_map(|v| v.stamps.first()).copied();
+        let session = first.fold(f64::INFINITY, f64::min);
+        let done = AtomicUsize::new(0);
+        self.views.par_iter().enumerate().try_for_each(|(index, view)| {
+            self.write_view(root, index, view, session, &rays)?;
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1, self.views.len());
+            Ok(())
+        })
+    }
+
+    /// What was switched on, for a file of its own.
+    pub fn recipe(&self) -> serde_json::Value {
+        let physics = match &self.physics {
+            Physics::Formula { sigma, effects } => {
+                let effect = |a: &Active| serde_json::json!({"id": a.effect.card().id, "parameters": a.parameters()});
+                serde_json::json!({
+                    "world": "formula",
+                    "sigma": {"form": sigma.form.spec().id(), "parameters": sigma.parameters},
+                    "effects": effects.iter().map(effect).collect::<Vec<_>>(),
+                })
+            }
+        };
+        let view = |v: &ViewPlan| {
+            let q = v.bench.plane.q;
+            serde_json::json!({"name": v.name, "plane": [q.x, q.y, q.z]})
+        };
+        serde_json::json!({
+            "format": "kinoise-recipe/1",
+            "seed": self.seed.0,
+            "physics": physics,
+            "views": self.views.iter().map(view).collect::<Vec<_>>(),
+        })
+    }
+
+    fn write_view(
+        &self,
+        root: &Path,
+        index: usize,
+        view: &ViewPlan,
+        session: f64,
+        rays: &Rays,
+    ) -> Result<()> {
+        let path = root.join(&view.name);
+        let mut folder = ViewFolder::new(&path, self.infrared)?;
+        let instants = view.stamps.iter().enumerate().map(|(frame, &stamp)| Instant {
+            view: index,
+            frame,
+            session_s: stamp - session,
+            view_s: stamp - view.stamps[0],
+        });
+        match &self.physics {
+            Physics::Formula { sigma, effects } => {
+                let seen = view.seen(&self.sensor.camera, rays);
+                let camera =
+                    FormulaSensor { sensor: &self.sensor, rays, sigma, effects, seed: self.seed };
+                let mut shooting = camera.begin(&seen);
+                for (instant, &stamp) in instants.zip(&view.stamps) {
+                    let shot = shooting.shoot(instant);
+                    let infrared = self.infrared.then(|| self.amplitude(&shot, instant));
+                    folder.add(stamp, &shot.depth, infrared.as_ref())?;
+                }
+            }
+        }
+        folder.finish(view)
+    }
+
+    /// The infrared picture of a formula's light: 10 bits, shot and read noise.
+    fn amplitude(&self, shot: &Shot, instant: Instant) -> Frame {
+        let name = format!("simulate/infrared/{}/{}", instant.view, instant.frame);
+        let mut noise = vec![0f32; shot.light.len()];
+        crate::effects::fill_normal(&mut noise, &mut self.seed.stream(&name));
+        let words = shot.light.iter().zip(&noise).map(|(light, n)| {
+            let mean = DN_AT_1_M * light;
+            let sd = (mean / ELECTRONS_PER_DN + READ_NOISE_DN * READ_NOISE_DN).sqrt();
+            (mean + sd * n).round().clamp(0.0, 1023.0) as u16
+        });
+        Frame { width: shot.depth.width, height: shot.depth.height, words: words.collect() }
+    }
+}
+
+/// Landau, Choo and Beling 2015: 5.90e8 cos / r^2 (r in mm), 10-bit numbers.
+const DN_AT_1_M: f32 = 590.0;
+/// Same source.
+const READ_NOISE_DN: f32 = 10.4;
+/// A 10-bit sensor of this class fills up at some 10,000 electrons.
+const ELECTRONS_PER_DN: f32 = 10.0;
+
+/// A view's folder as it fills.
+struct ViewFolder<'a> {
+    root: &'a Path,
+    depth_list: String,
+    infrared_list: String,
+    frames: usize,
+}
+
+impl<'a> ViewFolder<'a> {
+    fn new(root: &'a Path, infrared: bool) -> Result<Self> {
+        for kind in ["depth", "ir"].into_iter().take(1 + usize::from(infrared)) {
+            let images = root.join(kind);
+            std::fs::create_dir_all(&images).map_err(|e| Error::write(&images, e))?;
+        }
+        let header = String::from("# timestamp path\n");
+        Ok(ViewFolder { root, depth_list: header.clone(), infrared_list: header, frames: 0 })
+    }
+
+    fn add(&mut self, stamp: f64, depth: &Frame, infrared: Option<&Frame>) -> Result<()> {
+        let name = format!("{:04}.png", self.frames);
+        write_atomic(&self.root.join("depth").join(&name), &encode_png16(depth)?)?;
+        let _ = writeln!(self.depth_list, "{stamp:.6} depth/{name}");
+        if let Some(image) = infrared {
+            write_atomic(&self.root.join("ir").join(&name), &encode_png16(image)?)?;
+            let _ = writeln!(self.infrared_list, "{stamp:.6} ir/{name}");
+        }
+        self.frames += 1;
+        Ok(())
+    }
+
+    fn finish(self, view: &ViewPlan) -> Result<()> {
+        write_view_notes(self.root, &view.notes)?;
+        if self.root.join("ir").is_dir() {
+            write_atomic(&self.root.join("ir.txt"), self.infrared_list.as_bytes())?;
+        }
+        // Last: a view without its list is no view, so a kill leaves none half done.
+        write_atomic(&self.root.join("depth.txt"), self.depth_list.as_bytes())
+    }
+}
+
+/// Never mix a simulation into somebody's recording.
+fn refuse_full(root: &Path) -> Result<()> {
+    let full = std::fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_some());
+    if full {
+        return Err(Error::recording(
+            root,
+            "the folder is not empty",
+            "choose a new folder for the recording",
+        ));
+    }
+    Ok(())
+}
