@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use common::{BOARD, data, truth, write_depth};
+use common::{BOARD, BOARD_HEIGHT_M, data, truth, write_depth};
 use kinoise::frame::KINECT_NO_MEASUREMENT;
 use kinoise::io::{Assumed, open, write_recording_file};
 use kinoise::measure::MeasureOptions;
@@ -167,7 +167,7 @@ fn one_agrees(view: &ViewMeasurement, pose: &GridView, code: DepthCode) {
     let mean = (z - mean_depth(pose)).abs();
     assert!(mean < 0.004 * z, "{}: z {z}, {}", view.name, mean_depth(pose));
     // A slope over a target of width W seen at f px/m: error of the mean over its spread.
-    let spread = BOARD.height_m / 12f64.sqrt() * pose.theta_rad.cos();
+    let spread = BOARD_HEIGHT_M / 12f64.sqrt() * pose.theta_rad.cos();
     let theta = (view.theta_rad - pose.theta_rad).abs();
     let slope = sigma / n.sqrt() / spread;
     assert!(

@@ -10,7 +10,8 @@ use kinoise::scene::{Board, Target};
 use kinoise::simulate::{Grid, Shoot, kinect_v1};
 use kinoise::{Form, Frame, Seed, SigmaModel};
 
-pub const BOARD: Target = Target::Board(Board { width_m: 1.0, height_m: 0.8 });
+pub const BOARD_HEIGHT_M: f64 = 0.8;
+pub const BOARD: Target = Target::Board(Board { width_m: 1.0, height_m: BOARD_HEIGHT_M });
 
 /// Eq. 1 taken at its word wherever a board of this size reaches.
 pub fn truth() -> SigmaModel {
