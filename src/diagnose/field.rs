@@ -1,0 +1,155 @@
+//! Residuals that can be trusted: every pixel of the target, all frames, about one plane a view.
+//!
+//! In disparity a plane is exactly affine in the image, so the residual is taken there, in px of
+//! fx * baseline / z. Nothing is cut by a RANSAC threshold: what strays is clipped, and counted.
+
+use crate::camera::Rays;
+use crate::effects::KINECT_BASELINE_M;
+use crate::error::Result;
+use crate::frame::{DepthTable, Frame};
+use crate::io::FrameSource;
+use crate::measure::{Workbench, view_target};
+use crate::model::SigmaModel;
+use crate::plane::Plane;
+use crate::view::{Sensor, View};
+
+/// One view's residuals.
+#[derive(Debug, Clone)]
+pub struct Field {
+    pub name: String,
+    /// On the recording's clock, s.
+    pub time_s: f64,
+    pub plane: Plane,
+    /// fx * baseline, px m.
+    pub scale_px_m: f64,
+    pub width: usize,
+    /// Pixels of the target, ascending.
+    pub pixels: Vec<u32>,
+    /// Model's standard deviation of the disparity of each pixel, px.
+    pub sigma: Vec<f32>,
+    /// Robust standard deviation of the view's residuals, px.
+    pub spread_px: f32,
+    /// Mean over the frames, px; NaN where never measured.
+    pub mean: Vec<f32>,
+    /// Mean square over the frames, px^2.
+    pub square: Vec<f32>,
+    /// Frames with a measurement inside the clip.
+    pub count: Vec<u16>,
+    /// Frames with a measurement.
+    pub measured: Vec<u16>,
+    /// Residuals of the first frames, px, in order.
+    pub first: Vec<Vec<f32>>,
+    /// Time and mean residual of each frame, s since the first and px.
+    pub frames: Vec<(f64, f64)>,
+    pub reference_distance_m: Option<f64>,
+    pub temperature_c: Option<f64>,
+    pub ambient_lux: Option<f64>,
+}
+
+/// Beyond this many sigmas of the model, or of the view's own residuals where errors the model
+/// lacks are larger, a residual is no noise: it is kept out of the means and left to the tests of
+/// the tails.
+const CLIP_SIGMAS: f32 = 6.0;
+/// Single frames kept whole: enough for correlations in time.
+pub const FRAMES_KEPT: usize = 4;
+
+impl Field {
+    /// Read the view and collect its residuals.
+    ///
+    /// # Errors
+    /// When no frame can be read or none shows a plane.
+    pub fn read(view: &View, bench: &Workbench<'_>, sigma: &SigmaModel) -> Result<Self> {
+        let target = view_target(view, bench)?;
+        let camera = &bench.sensor.camera;
+        let mut field = Field::empty(view, bench.sensor, target.plane, target.pixels);
+        field.sigma = field.expected_sigma(&bench.rays, sigma);
+        field.spread_px = (target.scale * field.scale_px_m) as f32;
+        let mut source = FrameSource::new(camera.width, camera.height);
+        let start = view.depth.first().map_or(0.0, |f| f.timestamp);
+        for frame in &view.depth {
+            if let Ok(image) = source.read(&frame.path) {
+                field.add(&image, frame.timestamp - start, &bench.rays, &bench.table);
+            }
+        }
+        field.close();
+        Ok(field)
+    }
+
+    fn empty(view: &View, sensor: &Sensor, plane: Plane, pixels: Vec<u32>) -> Self {
+        let n = pixels.len();
+        Field {
+            name: view.name.clone(),
+            time_s: view.depth.first().map_or(0.0, |f| f.timestamp),
+            plane,
+            scale_px_m: sensor
+                .disparity_px_m()
+                .unwrap_or(sensor.camera.fx * KINECT_BASELINE_M),
+            width: sensor.camera.width,
+            pixels,
+            sigma: Vec::new(),
+            spread_px: 0.0,
+            mean: vec![0.0; n],
+            square: vec![0.0; n],
+            count: vec![0; n],
+            measured: vec![0; n],
+            first: Vec::new(),
+            frames: Vec::new(),
+            reference_distance_m: view.notes.reference_distance_m,
+            temperature_c: view.notes.temperature_c,
+            ambient_lux: view.notes.ambient_lux,
+        }
+    }
+
+    /// Sigma of the disparity at each pixel, px.
+    fn expected_sigma(&self, rays: &Rays, sigma: &SigmaModel) -> Vec<f32> {
+        let theta = self.plane.theta();
+        let of = |&i: &u32| {
+            let (x, y) = rays.at(i as usize);
+            let z = self.plane.depth(x, y);
+            (sigma.sigma(z, theta) * self.scale_px_m / (z * z)) as f32
+        };
+        self.pixels.iter().map(of).collect()
+    }
+
+    /// Disparity of the plane at pixel number `k` of the target, px.
+    pub fn disparity(&self, k: usize, rays: &Rays) -> f64 {
+        let (x, y) = rays.at(self.pixels[k] as usize);
+        self.scale_px_m * self.plane.inverse_depth(x, y)
+    }
+
+    fn add(&mut self, frame: &Frame, time: f64, rays: &Rays, table: &DepthTable) {
+        let keep = self.first.len() < FRAMES_KEPT;
+        let mut residuals = if keep { vec![f32::NAN; self.pixels.len()] } else { Vec::new() };
+        let (mut sum, mut n) = (0.0f64, 0.0f64);
+        for k in 0..self.pixels.len() {
+            let z = table.metres(frame.words[self.pixels[k] as usize]);
+            if !z.is_finite() {
+                continue;
+            }
+            self.measured[k] += 1;
+            let e = (self.scale_px_m / f64::from(z) - self.disparity(k, rays)) as f32;
+            if keep {
+                residuals[k] = e;
+            }
+            if e.abs() <= CLIP_SIGMAS * self.sigma[k].max(self.spread_px) {
+                self.count[k] += 1;
+                self.mean[k] += e;
+                self.square[k] += e * e;
+                sum += f64::from(e);
+                n += 1.0;
+            }
+        }
+        if keep {
+            self.first.push(residuals);
+        }
+        self.frames.push((time, if n > 0.0 { sum / n } else { f64::NAN }));
+    }
+
+    fn close(&mut self) {
+        for k in 0..self.pixels.len() {
+            let n = f32::from(self.count[k]);
+            self.mean[k] /= n;
+            self.square[k] /= n;
+        }
+    }
+}
