@@ -44,11 +44,14 @@ fn radial(all: &mut Vec<Candidate>) {
         let columns = move |p: &Place, g: &mut [f64]| {
             let scale = (p.disparity / DISPARITY_UNIT_PX).powf(power);
             let r2 = p.radius * p.radius;
-            g[0] = scale * r2;
-            g[1] = scale * r2 * r2;
+            let mut term = scale;
+            for g in g {
+                term *= r2;
+                *g = term;
+            }
         };
         all.push(
-            Candidate::named("radial-disparity-bias", "radius", 2, columns)
+            Candidate::named("radial-disparity-bias", "radius", 4, columns)
                 .with("disparity_power", power),
         );
     }
@@ -91,7 +94,7 @@ fn locking(all: &mut Vec<Candidate>, reach: &Reach) {
 /// Stripes down the picture: three harmonics of a free period.
 fn banding(all: &mut Vec<Candidate>, camera: &Camera) {
     let width = camera.width as f64;
-    for half_cycles in 3..=64 {
+    for half_cycles in 4..=64 {
         let period = 2.0 * width / f64::from(half_cycles);
         let columns = move |p: &Place, g: &mut [f64]| {
             let (s, c) = (TAU * p.u / period).sin_cos();

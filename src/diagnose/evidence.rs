@@ -29,55 +29,67 @@ pub struct Gain {
     pub covariance: DMatrix<f64>,
 }
 
-/// Weighted rows of one view, to be reduced to an [`Evidence`].
-pub struct Rows<'a> {
-    /// Nuisance columns, row by row.
-    pub nuisance: &'a [Vec<f64>],
-    /// Response and weight (inverse variance, in independent samples).
-    pub response: &'a [f64],
-    pub weight: &'a [f64],
+/// One view's data with its nuisances: what candidates are reduced against.
+pub struct Rows {
+    response: Vec<f64>,
+    /// Inverse variance, in independent samples.
+    weight: Vec<f64>,
+    nuisance: DMatrix<f64>,
+    /// Inverse of the nuisances' own normal equations, and their right-hand side.
+    inverse: DMatrix<f64>,
+    seen: DVector<f64>,
 }
 
-impl Rows<'_> {
-    /// Profile the nuisances out and reduce. `columns` fills one row of the candidate's columns.
+impl Rows {
+    /// `nuisance` has a row a sample. `None` when the nuisances cannot be told apart.
+    pub fn new(response: Vec<f64>, weight: Vec<f64>, nuisance: DMatrix<f64>) -> Option<Self> {
+        let p = nuisance.ncols();
+        let mut own = DMatrix::<f64>::zeros(p, p);
+        let mut seen = DVector::<f64>::zeros(p);
+        for (i, (&y, &w)) in response.iter().zip(&weight).enumerate() {
+            for q in 0..p {
+                let wx = w * nuisance[(i, q)];
+                seen[q] += wx * y;
+                for r in 0..=q {
+                    own[(q, r)] += wx * nuisance[(i, r)];
+                }
+            }
+        }
+        own.fill_upper_triangle_with_lower_triangle();
+        Some(Rows { response, weight, nuisance, inverse: own.try_inverse()?, seen })
+    }
+
+    /// Profile the nuisances out. `columns` fills one row of the candidate's columns.
     pub fn reduce(&self, count: usize, mut columns: impl FnMut(usize, &mut [f64])) -> Evidence {
-        let p = self.nuisance.first().map_or(0, Vec::len);
+        let p = self.seen.len();
         let mut g = vec![0.0; count];
         let mut a = DMatrix::<f64>::zeros(count, count);
         let mut b = DVector::<f64>::zeros(count);
         let mut cross = DMatrix::<f64>::zeros(p, count);
-        let mut own = DMatrix::<f64>::zeros(p, p);
-        let mut seen = DVector::<f64>::zeros(p);
-        for (i, (&y, &w)) in self.response.iter().zip(self.weight).enumerate() {
+        for (i, (&y, &w)) in self.response.iter().zip(&self.weight).enumerate() {
             if w <= 0.0 {
                 continue;
             }
             columns(i, &mut g);
-            let x = &self.nuisance[i];
             for j in 0..count {
+                // Curves touch two of their many columns.
+                if g[j] == 0.0 {
+                    continue;
+                }
                 let wg = w * g[j];
                 b[j] += wg * y;
                 for k in 0..=j {
                     a[(j, k)] += wg * g[k];
                 }
-                for (q, &xq) in x.iter().enumerate() {
-                    cross[(q, j)] += wg * xq;
-                }
-            }
-            for q in 0..p {
-                seen[q] += w * x[q] * y;
-                for r in 0..=q {
-                    own[(q, r)] += w * x[q] * x[r];
+                for q in 0..p {
+                    cross[(q, j)] += wg * self.nuisance[(i, q)];
                 }
             }
         }
-        own.fill_upper_triangle_with_lower_triangle();
         a.fill_upper_triangle_with_lower_triangle();
-        if let Some(inverse) = own.try_inverse() {
-            let project = cross.transpose() * inverse;
-            a -= &project * &cross;
-            b -= &project * &seen;
-        }
+        let project = cross.transpose() * &self.inverse;
+        a -= &project * &cross;
+        b -= &project * &self.seen;
         Evidence { a, b }
     }
 }
@@ -109,17 +121,49 @@ pub fn gain(views: &[Evidence], prior: f64) -> Option<Gain> {
     })
 }
 
-/// The same views with nothing in them but noise: b ~ N(0, A).
-pub fn null(views: &[Evidence], rng: &mut Stream) -> Vec<Evidence> {
-    views
-        .iter()
-        .map(|v| {
-            let k = v.b.len();
-            let draw = DVector::from_fn(k, |_, _| StandardNormal.sample(rng));
-            let eigen = v.a.clone().symmetric_eigen();
-            let root = eigen.eigenvalues.map(|e| e.max(0.0).sqrt());
-            let b = &eigen.eigenvectors * draw.component_mul(&root);
-            Evidence { a: v.a.clone(), b }
-        })
-        .collect()
+/// What noise alone may bring for a candidate: b ~ N(0, A) in every view.
+///
+/// Worked in the eigenvectors of the summed A, in which the views' own A are taken as diagonal:
+/// exact when the views' A are multiples of one another, and a thousand times quicker.
+pub struct Null {
+    /// Information of each view on each eigenvector.
+    by_view: Vec<Vec<f64>>,
+    total: Vec<f64>,
+    prior: f64,
+}
+
+impl Null {
+    pub fn of(views: &[Evidence], prior: f64) -> Option<Self> {
+        let k = views.first()?.b.len();
+        let sum = views.iter().fold(DMatrix::zeros(k, k), |sum, v| sum + &v.a);
+        let u = sum.symmetric_eigen().eigenvectors;
+        let by_view: Vec<Vec<f64>> = views
+            .iter()
+            .map(|v| {
+                let au = &v.a * &u;
+                (0..k).map(|j| u.column(j).dot(&au.column(j)).max(0.0)).collect()
+            })
+            .collect();
+        let total = (0..k).map(|j| by_view.iter().map(|a| a[j]).sum()).collect();
+        Some(Null { by_view, total, prior })
+    }
+
+    /// The gain of one recording of nothing but noise, nats.
+    pub fn draw(&self, rng: &mut Stream) -> f64 {
+        let mut gain = 0.0;
+        let mut b = vec![0.0; self.by_view.len()];
+        for (j, &total) in self.total.iter().enumerate() {
+            let mut sum = 0.0;
+            for (b, a) in b.iter_mut().zip(&self.by_view) {
+                let draw: f64 = StandardNormal.sample(rng);
+                *b = a[j].sqrt() * draw;
+                sum += *b;
+            }
+            for (b, a) in b.iter().zip(&self.by_view) {
+                let beta = (sum - b) / (total - a[j] + self.prior);
+                gain += beta * (b - 0.5 * beta * a[j]);
+            }
+        }
+        gain
+    }
 }

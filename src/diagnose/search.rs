@@ -1,11 +1,12 @@
 //! The search for missing terms: best first, each step judged on held-out views against what
 //! noise alone would have brought.
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::bias::{self, Reach};
 use super::candidate::Candidate;
-use super::evidence::{Evidence, Gain, Rows, gain, null};
+use super::evidence::{Evidence, Gain, Null, Rows, gain};
 use super::field::Field;
 use super::tiles::{Place, Tile, tiles};
 use crate::camera::{Camera, Rays};
@@ -118,26 +119,30 @@ pub fn high_pass(image: &[f32], width: usize, height: usize) -> Vec<f32> {
         .collect()
 }
 
-/// Every view's evidence for a candidate, about the residuals minus `fitted`.
-fn evidence(layer: &Layer, fitted: &[Vec<f64>], candidate: &Candidate) -> Vec<Evidence> {
+/// The views' residuals minus what is `fitted`, about a plane of their own each.
+fn rows(layer: &Layer, fitted: &[Vec<f64>]) -> Vec<Rows> {
     layer
         .views
-        .iter()
+        .par_iter()
         .zip(fitted)
-        .map(|(view, fitted)| {
-            let response: Vec<f64> =
-                view.tiles.iter().zip(fitted).map(|(t, f)| finite(t.mean - f)).collect();
-            let weight: Vec<f64> = view
-                .tiles
-                .iter()
-                .map(|t| if t.mean.is_finite() { t.pixels / t.variance / view.inflation } else { 0.0 })
-                .collect();
-            let nuisance: Vec<Vec<f64>> =
-                view.tiles.iter().map(|t| vec![1.0, t.place.x, t.place.y]).collect();
-            Rows { nuisance: &nuisance, response: &response, weight: &weight }
-                .reduce(candidate.count, |i, g| (candidate.columns)(&view.tiles[i].place, g))
+        .filter_map(|(view, fitted)| {
+            let n = view.tiles.len();
+            let response = view.tiles.iter().zip(fitted).map(|(t, f)| finite(t.mean - f)).collect();
+            let weight = view.tiles.iter().map(|t| finite(t.pixels / t.variance / view.inflation));
+            let nuisance = DMatrix::from_fn(n, 3, |i, q| {
+                let p = &view.tiles[i].place;
+                [1.0, p.x, p.y][q]
+            });
+            Rows::new(response, weight.collect(), nuisance)
         })
         .collect()
+}
+
+fn evidence(layer: &Layer, rows: &[Rows], candidate: &Candidate) -> Vec<Evidence> {
+    let reduce = |(view, rows): (&ViewTiles, &Rows)| {
+        rows.reduce(candidate.count, |i, g| (candidate.columns)(&view.tiles[i].place, g))
+    };
+    layer.views.iter().zip(rows).map(reduce).collect()
 }
 
 fn finite(v: f64) -> f64 {
@@ -147,7 +152,7 @@ fn finite(v: f64) -> f64 {
 /// A coefficient nothing is known about is a few px at most.
 const PRIOR_PER_PX2: f64 = 0.1;
 /// Simulations of the null at each step.
-const REPLICATES: u64 = 200;
+const REPLICATES: u64 = 1000;
 /// No more terms than this are looked for in a layer.
 const MOST_TERMS: usize = 6;
 
@@ -161,15 +166,16 @@ pub fn search_bias(layer: &Layer, camera: &Camera, seed: Seed) -> Vec<Found> {
             .into_iter()
             .chain(bias::curves(camera, &layer.reach))
             .collect();
-        let judged: Vec<(Vec<Evidence>, Option<Gain>)> = candidates
+        let rows = rows(layer, &fitted);
+        let judged: Vec<(Option<Null>, Option<Gain>)> = candidates
             .par_iter()
             .map(|c| {
-                let e = evidence(layer, &fitted, c);
-                let g = gain(&e, PRIOR_PER_PX2);
-                (e, g)
+                let e = evidence(layer, &rows, c);
+                (Null::of(&e, PRIOR_PER_PX2), gain(&e, PRIOR_PER_PX2))
             })
             .collect();
-        let threshold = threshold(&judged, seed);
+        let nulls: Vec<&Null> = judged.iter().filter_map(|j| j.0.as_ref()).collect();
+        let threshold = threshold(&nulls, seed);
         let total = |i: usize| judged[i].1.as_ref().map_or(f64::NEG_INFINITY, |g| g.total);
         let best = |named: bool| {
             (0..candidates.len())
@@ -215,16 +221,12 @@ fn trace(candidates: &[Candidate], total: &dyn Fn(usize) -> f64, threshold: f64)
 }
 
 /// The greatest gain over all candidates that noise alone brings in 99 of 100 recordings.
-fn threshold(judged: &[(Vec<Evidence>, Option<Gain>)], seed: Seed) -> f64 {
+fn threshold(nulls: &[&Null], seed: Seed) -> f64 {
     let mut greatest: Vec<f64> = (0..REPLICATES)
         .into_par_iter()
         .map(|replicate| {
             let mut rng = seed.stream(&format!("diagnose/null/{replicate}"));
-            judged
-                .iter()
-                .filter_map(|(views, _)| gain(&null(views, &mut rng), PRIOR_PER_PX2))
-                .map(|g| g.total)
-                .fold(0.0, f64::max)
+            nulls.iter().map(|null| null.draw(&mut rng)).fold(0.0, f64::max)
         })
         .collect();
     greatest.sort_by(f64::total_cmp);
