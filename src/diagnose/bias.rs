@@ -16,6 +16,10 @@ pub struct Reach {
     pub right: [f64; 2],
     pub down: [f64; 2],
     pub edge: f64,
+    pub z: [f64; 2],
+    pub theta: [f64; 2],
+    pub session: [f64; 2],
+    pub light: [f64; 2],
 }
 
 /// All named bias families for a camera.

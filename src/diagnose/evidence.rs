@@ -41,10 +41,16 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// `nuisance` has a row a sample. `None` when the nuisances cannot be told apart.
-    pub fn new(response: Vec<f64>, weight: Vec<f64>, nuisance: DMatrix<f64>) -> Option<Self> {
+    /// `nuisance` has a row a sample, and a precision that holds each of its coefficients to
+    /// zero (0: free). `None` when the nuisances cannot be told apart.
+    pub fn new(
+        response: Vec<f64>,
+        weight: Vec<f64>,
+        nuisance: DMatrix<f64>,
+        precision: &[f64],
+    ) -> Option<Self> {
         let p = nuisance.ncols();
-        let mut own = DMatrix::<f64>::zeros(p, p);
+        let mut own = DMatrix::<f64>::from_diagonal(&DVector::from_column_slice(precision));
         let mut seen = DVector::<f64>::zeros(p);
         for (i, (&y, &w)) in response.iter().zip(&weight).enumerate() {
             for q in 0..p {

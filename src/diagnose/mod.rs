@@ -4,8 +4,12 @@ mod bias;
 mod candidate;
 mod evidence;
 mod field;
+mod layers;
 mod search;
+mod smooth;
 mod tiles;
+mod variance;
 
 pub use field::Field;
-pub use search::{Found, Layer, search_bias};
+pub use layers::Layers;
+pub use search::Found;

@@ -36,6 +36,10 @@ pub struct Place {
     pub session_s: f64,
     /// Infrared amplitude over the recording's median; 1 where there is none.
     pub light: f64,
+    /// Ambient light over the recording's mean; 0 where it is not known.
+    pub ambient: f64,
+    /// Model's variance of a pixel's disparity, px^2.
+    pub variance: f64,
 }
 
 /// Mean residual of a patch of pixels.
@@ -142,6 +146,8 @@ impl Sums {
                 azimuth: plane.azimuth(),
                 session_s: field.time_s - session_start,
                 light: 1.0,
+                ambient: field.ambient_lux.unwrap_or(0.0),
+                variance: self.variance / self.n,
             },
             mean: self.mean / self.n,
             square: self.square / self.n,
