@@ -3,6 +3,7 @@
 mod calibrate;
 mod common;
 mod demo;
+mod effects;
 mod fit;
 mod simulate;
 mod words;
@@ -30,6 +31,8 @@ enum Command {
     Fit(fit::Arguments),
     /// Make a recording by formula
     Simulate(simulate::Arguments),
+    /// The catalogue of physical effects: what each does, how it shows, what it is taken for
+    Effects(effects::Arguments),
     /// The whole road on bundled data
     Demo(demo::Arguments),
 }
@@ -78,6 +81,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Calibrate(a) => calibrate::run(a, global),
         Command::Fit(a) => fit::run(a, global),
         Command::Simulate(a) => simulate::run(a, global),
+        Command::Effects(a) => effects::run(a, global),
         Command::Demo(a) => demo::run(a, global),
     }
 }

@@ -121,7 +121,7 @@ impl Shoot {
                 let seen = view.seen(&self.sensor.camera, rays);
                 let camera =
                     FormulaSensor { sensor: &self.sensor, rays, sigma, effects, seed: self.seed };
-                let mut shooting = camera.begin(&seen);
+                let mut shooting = camera.begin(&seen).under(view.ambient_lux);
                 for (instant, &stamp) in instants.zip(&view.stamps) {
                     let shot = shooting.shoot(instant);
                     let infrared = self.infrared.then(|| self.amplitude(&shot, instant));
