@@ -180,19 +180,6 @@ fn camera(arguments: &Arguments) -> anyhow::Result<(Sensor, SigmaModel, Vec<Acti
     Ok((sensor, model.sigma, effects))
 }
 
-/// Two of a kind would share their random numbers, and nobody could say what they do together.
-fn refuse_twice(effects: &[Active]) -> anyhow::Result<()> {
-    for (n, active) in effects.iter().enumerate() {
-        let id = active.effect.card().id;
-        if effects[..n].iter().any(|earlier| earlier.effect.card().id == id) {
-            bail!(
-                "--effect {id}: it is there twice (the model's own effects count); give it once, all its knobs in one: ID:KEY=VALUE,KEY=VALUE"
-            );
-        }
-    }
-    Ok(())
-}
-
 /// The views, and the sensor of the recording that is shot again.
 fn plans(
     arguments: &Arguments,
@@ -222,7 +209,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     }
     let (sensor, sigma, mut effects) = camera(arguments)?;
     effects.extend(arguments.effects.iter().cloned());
-    refuse_twice(&effects)?;
+    Active::refuse_twice(&effects)?;
     let (views, recorded_by) = plans(arguments, global)?;
     let sensor = recorded_by.unwrap_or(sensor);
     tell_of_clamped(&views, &sigma);

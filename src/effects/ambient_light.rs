@@ -19,7 +19,7 @@ static CARD: Card = Card {
     statistic: "variance",
     axis: "intensity",
     confused_with: "range-exponent, which does not go with the light of the room; intensity-dependent-noise: ambient light falls on the print as the pattern does, so that their ratio stays",
-    reference: "physics.md 1D 39; Fankhauser et al. 2015",
+    reference: "Fankhauser et al. 2015",
 };
 
 impl Effect for AmbientLight {

@@ -28,7 +28,7 @@ static CARD: Card = Card {
     statistic: "bias",
     axis: "column",
     confused_with: "target-bow, which moves and turns with the board; disparity-quantisation on a tilted plane, whose contours move with the distance",
-    reference: "OpenNI property GmcMode; physics.md 1A 14: 1/8 px steps, 2 to 8 bands",
+    reference: "OpenNI property GmcMode: a correction in the read-out's steps of 1/8 px; 2 to 8 bands",
 };
 
 impl Effect for ColumnBanding {

@@ -19,7 +19,7 @@ static CARD: Card = Card {
     statistic: "bias",
     axis: "edge-distance",
     confused_with: "target-bow, which has no edge; occlusion-shadow, which loses pixels on one side",
-    reference: "physics.md 1D 37: flying pixels; BlenSor",
+    reference: "Gschwandtner et al. 2011 (BlenSor): mixed pixels; half a matching window",
 };
 
 impl Effect for EdgeMixing {

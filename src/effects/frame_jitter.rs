@@ -19,7 +19,7 @@ static CARD: Card = Card {
     statistic: "correlation",
     axis: "frame",
     confused_with: "target-motion, which has a direction; temporal-correlation, which is each pixel's own",
-    reference: "physics.md 1C 29, vibration",
+    reference: "vibration of the mount or of the reference",
 };
 
 impl Effect for FrameJitter {

@@ -19,7 +19,7 @@ static CARD: Card = Card {
     statistic: "correlation",
     axis: "frame",
     confused_with: "fixed-pattern-noise, which is the same in every view; temporal-correlation, which dies out over frames",
-    reference: "Landau, Choo and Beling 2015: dot energy Gamma(4.54, 0.196); physics.md 1A 5",
+    reference: "Landau, Choo and Beling 2015: dot energy Gamma(4.54, 0.196)",
 };
 
 impl Effect for FrozenNoise {

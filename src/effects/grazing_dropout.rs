@@ -35,7 +35,7 @@ static CARD: Card = Card {
     statistic: "missing",
     axis: "theta",
     confused_with: "range-dropout, which does not go with the tilt; intensity-dependent-noise, since grazing surfaces are darker",
-    reference: "Nguyen, Izadi and Lovell 2012: nothing beyond 80 degrees; physics.md 1D 41",
+    reference: "Nguyen, Izadi and Lovell 2012: nothing beyond 80 degrees",
 };
 
 impl Effect for GrazingDropout {

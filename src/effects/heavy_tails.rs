@@ -28,7 +28,7 @@ static CARD: Card = Card {
     statistic: "distribution",
     axis: "residual",
     confused_with: "vignetting, slope-noise and other uneven noise, which looks heavy-tailed when pooled: divide by the local sigma first",
-    reference: "physics.md 1A 11: 0.1 to 5 %",
+    reference: "Mallick, Das and Majumdar 2014, review; 0.1 to 5 % of the pixels",
 };
 
 impl Effect for HeavyTails {

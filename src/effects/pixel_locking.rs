@@ -21,7 +21,7 @@ static CARD: Card = Card {
     statistic: "bias",
     axis: "disparity-phase",
     confused_with: "disparity-quantisation, whose comb is finer (a fraction of a pixel) and keeps the mean; target-bow, which moves with the board",
-    reference: "Shimizu and Okutomi 2001, sub-pixel estimation error cancellation; physics.md 1A 3: 0.04 to 0.06 px for a 9 x 9 window",
+    reference: "Shimizu and Okutomi 2001, sub-pixel estimation error cancellation: 0.04 to 0.06 px for a 9 x 9 window on random dots",
 };
 
 impl Effect for PixelLocking {

@@ -122,6 +122,21 @@ impl Active {
         }
     }
 
+    /// Two of a kind would share their random numbers, and nobody could say what they do together.
+    ///
+    /// # Errors
+    /// When an effect is there twice.
+    pub fn refuse_twice(effects: &[Active]) -> Result<()> {
+        let ids: Vec<&str> = effects.iter().map(|a| a.effect.card().id).collect();
+        match ids.iter().enumerate().find(|(n, id)| ids[..*n].contains(id)) {
+            None => Ok(()),
+            Some((_, id)) => Err(Error::Argument {
+                what: format!("effect {id} is there twice (a model brings its own)"),
+                remedy: "give it once, all its knobs in one: ID:KEY=VALUE,KEY=VALUE",
+            }),
+        }
+    }
+
     /// In the order in which light meets them, whatever the order they were named in: by stage,
     /// within a stage as in the catalogue.
     pub fn in_light_path(effects: &[Active]) -> Vec<&Active> {

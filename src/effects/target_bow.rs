@@ -28,7 +28,7 @@ static CARD: Card = Card {
     statistic: "bias",
     axis: "target-position",
     confused_with: "radial-disparity-bias and lens-distortion, which stay in the picture when the board moves; turn the board by 180 degrees, or move it aside",
-    reference: "physics.md 1D 32: millimetres, independent of z",
+    reference: "geometry of a bent plate: millimetres, whatever the distance",
 };
 
 impl Effect for TargetBow {

@@ -19,7 +19,7 @@ static CARD: Card = Card {
     statistic: "bias",
     axis: "frame",
     confused_with: "thermal-drift, which goes on from view to view; frame-jitter, which has no direction",
-    reference: "physics.md 1C 29",
+    reference: "kinematics: velocity times time",
 };
 
 impl Effect for TargetMotion {

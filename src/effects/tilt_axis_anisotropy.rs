@@ -19,7 +19,7 @@ static CARD: Card = Card {
     statistic: "variance",
     axis: "azimuth",
     confused_with: "slope-noise, which is the same in all directions",
-    reference: "physics.md 1A 8 to 10: stretch against shear",
+    reference: "geometry: a disparity gradient of b tan(theta) / z, along the window or across it",
 };
 
 impl Effect for TiltAxisAnisotropy {

@@ -77,7 +77,7 @@ const ROOM_TEMPERATURE_C: f64 = 22.0;
 const AMBIENT_LUX: [f64; 2] = [100.0, 2000.0];
 
 /// The light of a view, drawn whether or not any effect looks at it. Whole lx, as a meter shows.
-pub(super) fn ambient_lux(seed: Seed, view: &str) -> f64 {
+fn ambient_lux(seed: Seed, view: usize) -> f64 {
     let [dim, bright] = AMBIENT_LUX.map(f64::ln);
     let mut rng = seed.stream(&format!("simulate/ambient/{view}"));
     rng.random_range(dim..bright).exp().round()
@@ -105,7 +105,7 @@ fn view(index: usize, pose: &GridView, scenery: &Scenery, frames: usize, seed: S
     bench.wall_m = scenery.wall_gap_m.map(|gap| pose.z_m + gap);
     bench.clutter = clutter(pose.z_m, scenery.clutter, seed, index);
     let start = index as f64 * VIEW_INTERVAL_S;
-    let ambient_lux = ambient_lux(seed, &index.to_string());
+    let ambient_lux = ambient_lux(seed, index);
     let reference = scenery.reference_error_m.map(|error| {
         let off: f64 =
             StandardNormal.sample(&mut seed.stream(&format!("simulate/reference/{index}")));
