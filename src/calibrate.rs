@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
-use crate::io::sha256_hex;
+use crate::io::{hex, sha256_hex};
 use crate::measure::{
     MeasureOptions, Planes, SigmaKind, SigmaTable, ViewMeasurement, Workbench, measure_view,
 };
@@ -92,7 +92,7 @@ pub fn measure(
 /// Fit the noise model to the measured views.
 ///
 /// # Errors
-/// When the views are too few or too alike for the form.
+/// When the views are too few or too alike for the form, or a file that describes them is gone.
 pub fn model_of(
     recording: &Recording,
     measurements: &Measurements,
@@ -109,7 +109,7 @@ pub fn model_of(
     let warnings = warnings(recording, measurements, &fit);
     let mut provenance = Provenance::now(Some(options.measure.seed.0));
     provenance.options = describe(options, fit.form);
-    provenance.sha256 = hashes(recording, measurements);
+    provenance.sha256 = hashes(recording, measurements)?;
     let model = noise_model(
         Some(RecordingFile::of(&recording.sensor)),
         &fit,
@@ -192,15 +192,17 @@ fn describe(options: &CalibrateOptions, form: Form) -> Map<String, Value> {
 }
 
 /// Hash of the description files, and of every view's frames.
-fn hashes(recording: &Recording, measurements: &Measurements) -> Map<String, Value> {
+///
+/// # Errors
+/// When a description file can no longer be read: a hash of nothing would vouch for the wrong input.
+fn hashes(recording: &Recording, measurements: &Measurements) -> Result<Map<String, Value>> {
     let mut map = Map::new();
     let mut described = Sha256::new();
     let mut files: Vec<&PathBuf> = recording.described_by.iter().collect();
     files.sort();
     for path in files {
-        described.update(std::fs::read(path).unwrap_or_default());
+        described.update(std::fs::read(path).map_err(|e| Error::read(path, e))?);
     }
-    let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02x}")).collect::<String>();
     map.insert("description".into(), json!(hex(&described.finalize())));
     let mut frames = Sha256::new();
     for view in &measurements.views {
@@ -208,7 +210,7 @@ fn hashes(recording: &Recording, measurements: &Measurements) -> Map<String, Val
         frames.update(view.digest);
     }
     map.insert("frames".into(), json!(hex(&frames.finalize())));
-    map
+    Ok(map)
 }
 
 /// What a person should know before trusting the model; the most important first.

@@ -7,8 +7,11 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum Error {
     /// The operating system refused to read or write.
-    #[error("{}: {source}; {remedy}", path.display())]
-    Io { path: PathBuf, source: std::io::Error, remedy: &'static str },
+    ///
+    /// The cause stands in the message and is therefore not [`std::error::Error::source`] too: a
+    /// chain of causes would say it twice.
+    #[error("{}: {cause}; {remedy}", path.display())]
+    Io { path: PathBuf, cause: std::io::Error, remedy: &'static str },
     /// A file that is not the JSON it should be.
     #[error("{}{}: {what}; {remedy}", path.display(), at_line(*line))]
     Json {
@@ -54,18 +57,18 @@ fn at_line(line: usize) -> String {
 }
 
 impl Error {
-    pub(crate) fn read(path: &Path, source: std::io::Error) -> Self {
+    pub(crate) fn read(path: &Path, cause: std::io::Error) -> Self {
         Error::Io {
             path: path.to_path_buf(),
-            source,
+            cause,
             remedy: "check that the path is right and readable",
         }
     }
 
-    pub(crate) fn write(path: &Path, source: std::io::Error) -> Self {
+    pub(crate) fn write(path: &Path, cause: std::io::Error) -> Self {
         Error::Io {
             path: path.to_path_buf(),
-            source,
+            cause,
             remedy: "choose a folder that can be written with -o",
         }
     }

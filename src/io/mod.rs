@@ -12,6 +12,7 @@ mod tum;
 pub use images::{FrameSource, InfraredImage, encode_png16};
 pub use layout::{ViewFile, write_recording_file};
 pub use list::{FrameList, read_list};
+pub(crate) use output::hex;
 pub use output::{OutputDir, sha256_hex, write_atomic};
 
 use std::path::Path;
