@@ -353,7 +353,7 @@ fn total_least_squares(points: &[Vector3<f64>]) -> (f64, f64, Vec<bool>) {
         let mut sizes: Vec<f64> =
             off.iter().zip(&kept).filter(|(_, k)| **k).map(|(o, _)| o.abs()).collect();
         sizes.sort_by(f64::total_cmp);
-        let reach = 3.5 * 1.4826 * sizes[sizes.len() / 2];
+        let reach = 3.5 * kinoise::stats::MAD_TO_SIGMA * sizes[sizes.len() / 2];
         kept = off.iter().map(|o| o.abs() <= reach).collect();
     }
     (result.0, result.1, kept)
