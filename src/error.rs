@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-/// Every failure the library reports. `Display` is one line that a person can act on.
+/// Every failure the library reports. `Display` is one line that a person can act on: where
+/// (`path`, `line`, `view`), what is wrong there (`what`, `cause`, `why`), what to do (`remedy`).
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -50,6 +51,7 @@ pub enum Error {
     Solver { what: String, remedy: &'static str },
 }
 
+/// With this library's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 fn at_line(line: usize) -> String {

@@ -25,6 +25,7 @@ impl OutputDir {
         Ok(OutputDir(path.to_path_buf()))
     }
 
+    /// Where it is.
     pub fn path(&self) -> &Path {
         &self.0
     }
