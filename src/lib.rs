@@ -33,6 +33,7 @@ pub mod rng;
 pub mod simulate;
 pub mod solve;
 pub mod stats;
+pub mod units;
 pub mod view;
 
 pub use calibrate::{

@@ -3,6 +3,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use kinoise::model::{Domain, PAPER_EQ1};
 use kinoise::simulate::{Board, Grid, Shoot, kinect_v1};
+use kinoise::units::shortest;
 use kinoise::{Form, NoiseModel, SigmaModel};
 
 use super::common::{Bar, Global, numbers, say};
@@ -20,9 +21,10 @@ pub struct Arguments {
     /// Frames a view
     #[arg(long, default_value_t = 1)]
     frames: usize,
-    /// Make the image this many times smaller each way (1 = 640 x 480)
-    #[arg(long, default_value_t = 1, value_name = "N")]
-    shrink: usize,
+    /// Make the image 1 to 8 times smaller each way [default: 1, which is 640 x 480]; not with a
+    /// model that carries its own sensor
+    #[arg(long, value_name = "N")]
+    shrink: Option<usize>,
     /// Board width and height in m
     #[arg(long, value_parser = numbers::<2>, default_value = "1,0.8", value_name = "W,H")]
     board: [f64; 2],
@@ -41,25 +43,38 @@ fn eq1_at_its_word() -> SigmaModel {
 }
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
-    if arguments.frames == 0 || !(1..=8).contains(&arguments.shrink) {
-        anyhow::bail!("--frames must be at least 1 and --shrink between 1 and 8");
+    let shrink = arguments.shrink.unwrap_or(1);
+    if arguments.frames == 0 {
+        anyhow::bail!("--frames 0: give at least 1");
+    }
+    // At 8 a board of 1 m, seen from 4 m, is still 18 px wide; smaller ones are all rim.
+    if !(1..=8).contains(&shrink) {
+        anyhow::bail!("--shrink {shrink}: give a whole number from 1 to 8");
     }
     let [width_m, height_m] = arguments.board;
     if !(width_m > 0.0 && height_m > 0.0) {
-        anyhow::bail!("--board {width_m},{height_m}: give a width and a height in m");
+        anyhow::bail!(
+            "--board {},{}: give a width and a height in m",
+            shortest(width_m),
+            shortest(height_m)
+        );
     }
     let (sigma, sensor) = match &arguments.model {
         Some(path) => {
             let model = NoiseModel::read(path)?;
             let sensor = match model.sensor {
+                Some(_) if arguments.shrink.is_some() => anyhow::bail!(
+                    "--shrink: {} carries its own sensor, whose size it has; leave --shrink out",
+                    path.display()
+                ),
                 Some(file) => {
                     file.sensor().map_err(|e| anyhow::anyhow!("{}: sensor: {e}", path.display()))?
                 }
-                None => kinect_v1(arguments.shrink),
+                None => kinect_v1(shrink),
             };
             (model.sigma, sensor)
         }
-        None => (eq1_at_its_word(), kinect_v1(arguments.shrink)),
+        None => (eq1_at_its_word(), kinect_v1(shrink)),
     };
     let GridArgument::Paper = arguments.grid;
     let shoot = Shoot {

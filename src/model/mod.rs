@@ -84,13 +84,15 @@ impl SigmaModel {
 
     /// Nguyen, Izadi and Lovell 2012, over the range they measured.
     pub fn nguyen() -> Self {
-        let domain = Domain { z_m: [0.4, 4.0], theta_rad: [0.0, 1.47] };
+        // Their model is used below 80 degrees.
+        let domain = Domain { z_m: [0.4, 4.0], theta_rad: [0.0, 80f64.to_radians()] };
         Self::published(Form::Nguyen, &[0.0012, 0.0019, 0.4, 0.0001], domain)
     }
 
-    /// Khoshelham and Elberink 2012: half a step of disparity.
+    /// Khoshelham and Elberink 2012: half a step of disparity, measured on a plane faced squarely.
     pub fn khoshelham() -> Self {
-        let domain = Domain { z_m: [0.5, 5.0], theta_rad: [0.0, 1.47] };
+        // A target that is faced by hand stands within ten degrees.
+        let domain = Domain { z_m: [0.5, 5.0], theta_rad: [0.0, 10f64.to_radians()] };
         Self::published(Form::Khoshelham, &[1.425e-3], domain)
     }
 

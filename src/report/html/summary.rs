@@ -101,7 +101,7 @@ fn comparison(model: &SigmaModel) -> Markup {
         } }
         p.note {
             "At θ = " (fixed(theta.to_degrees(), 1)) "°, the least tilt measured; in brackets the 95 % interval. "
-            (ABSENT) " where the source has not measured."
+            (ABSENT) " where the source has measured no such distance or tilt."
         }
     }
 }
@@ -131,5 +131,7 @@ fn ours(model: &SigmaModel, z: f64, theta: f64) -> Markup {
 }
 
 fn theirs(model: &SigmaModel, z: f64, theta: f64) -> String {
-    if measured(model, z) { millimetres(model.sigma(z, theta)) } else { ABSENT.into() }
+    let [squarest, steepest] = model.domain.theta_rad;
+    let tilted = (squarest..=steepest).contains(&theta);
+    if tilted && measured(model, z) { millimetres(model.sigma(z, theta)) } else { ABSENT.into() }
 }
