@@ -15,7 +15,8 @@ use crate::measure::{
     MeasureOptions, Planes, SigmaKind, SigmaTable, ViewMeasurement, Workbench, measure_view,
 };
 use crate::model::{
-    FitSummary, Form, HeldOut, NoiseModel, Provenance, SigmaFit, compare_forms, fit,
+    Direction, FitSummary, Form, HeldOut, NoiseModel, Provenance, SigmaFit, SigmaModel,
+    compare_forms, sort_out,
 };
 use crate::view::{Excluded, Recording, RecordingFile};
 
@@ -151,9 +152,10 @@ pub fn model_of_table(
 }
 
 fn fit_chosen(table: &SigmaTable, form: Option<Form>) -> Result<(SigmaFit, Vec<HeldOut>)> {
-    let comparison = compare_forms(table);
+    let sorted = sort_out(table);
+    let comparison = compare_forms(&sorted.kept);
     let form = form.or(comparison.first().map(|h| h.form)).unwrap_or(Form::Paper);
-    Ok((fit(table, form)?, comparison))
+    Ok((sorted.fit(form)?, comparison))
 }
 
 fn noise_model(
@@ -163,10 +165,13 @@ fn noise_model(
     kind: SigmaKind,
     provenance: Provenance,
 ) -> NoiseModel {
-    let residual = if kind == SigmaKind::Paper { "perpendicular" } else { "axial" };
+    let direction = match kind {
+        SigmaKind::Paper => Direction::Perpendicular,
+        SigmaKind::Spatial | SigmaKind::Temporal | SigmaKind::Total => Direction::Axial,
+    };
     NoiseModel {
         sensor,
-        sigma: fit.model(),
+        sigma: SigmaModel { direction, ..fit.model() },
         effects: Vec::new(),
         fit: FitSummary {
             views: fit.views,
@@ -174,8 +179,6 @@ fn noise_model(
             rmse_m: fit.rmse_m,
             r2: fit.r2,
             heldout: comparison.iter().find(|h| h.form == fit.form).map(|h| h.rmse_relative),
-            degrees_of_freedom: fit.degrees_of_freedom,
-            residual: residual.into(),
             remarks: fit.remarks.clone(),
         },
         provenance,

@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use kinoise::model::{Domain, PAPER_EQ1};
+use kinoise::model::{Direction, Domain, PAPER_EQ1};
 use kinoise::simulate::{Board, Grid, Shoot, kinect_v1};
 use kinoise::units::shortest;
 use kinoise::{Form, NoiseModel, SigmaModel};
@@ -72,6 +72,12 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
                 }
                 None => kinect_v1(shrink),
             };
+            if model.sigma.direction == Direction::Perpendicular {
+                say(format!(
+                    "note: {} describes distances across the plane; depth noise is 1/cos(tilt) times them",
+                    path.display()
+                ));
+            }
             (model.sigma, sensor)
         }
         None => (eq1_at_its_word(), kinect_v1(shrink)),

@@ -35,7 +35,7 @@ impl Axes {
 }
 
 /// Shoot the board at `plane`: depth along the axis plus Gaussian noise of standard deviation
-/// sigma(z, theta), then the depth code. No background: pixels beside the board measure nothing.
+/// sigma(z, theta) along that axis, then the depth code. No background: pixels beside the board measure nothing.
 pub fn shoot(
     sensor: &Sensor,
     rays: &Rays,
@@ -62,7 +62,7 @@ pub fn shoot(
                 return nothing;
             }
             let noise: f64 = StandardNormal.sample(rng);
-            sensor.code.word(z + sigma.sigma(z, theta) * noise)
+            sensor.code.word(z + sigma.axial_sigma(z, theta) * noise)
         })
         .collect();
     Frame { width: sensor.camera.width, height: sensor.camera.height, words }
