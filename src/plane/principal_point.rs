@@ -1,8 +1,8 @@
 //! Without a region the target is the plane that the principal point looks at.
 
 use super::affine::{AffineFit, Effort, fit_affine_robust};
-use super::grow::Lattice;
-use super::target::{FEWEST_PIXELS, in_front, on_plane, seed_plane};
+use super::grow::{Gauge, Lattice};
+use super::target::{FEWEST_PIXELS, REACH_FLOOR_M, in_front, on_plane, seed_plane};
 use super::{Exclusions, InverseDepthImage, Plane, Target};
 use crate::camera::Camera;
 use crate::rng::Stream;
@@ -30,7 +30,7 @@ pub(super) fn at_principal_point(
     rng: &mut Stream,
 ) -> Result<Target, String> {
     let camera = image.camera;
-    let lattice = Lattice::over(image.w, camera.width, camera.height);
+    let lattice = Lattice::over(image.w, image.rays, camera.width, camera.height);
     let measured = image.w.iter().filter(|w| w.is_finite()).count();
     if measured < FEWEST_PIXELS {
         return Err(format!("only {measured} of {} pixels carry a depth", image.w.len()));
@@ -69,6 +69,9 @@ fn rank(c: &Candidate) -> (bool, bool, bool, i64) {
 }
 
 const GROWING_ROUNDS: usize = 12;
+/// The scale may grow to this many times the seed's before it means another surface: smooth
+/// errors of lens and board show over the whole target that a small seed does not see.
+const SCALE_GROWTH: f64 = 2.0;
 
 fn candidate(
     image: &InverseDepthImage<'_>,
@@ -82,17 +85,17 @@ fn candidate(
         return None;
     }
     let mut fit = seed_plane(image, &seeds, rng)?;
+    let most = SCALE_GROWTH * fit.scale;
     let seed_nodes: Vec<usize> =
         seeds.iter().map(|&i| lattice.node_of(i as usize, image.camera.width)).collect();
+    let mut known = vec![false; lattice.columns * lattice.rows];
+    seed_nodes.iter().for_each(|&node| known[node] = true);
     let mut mask: Vec<bool> = Vec::new();
     for _ in 0..GROWING_ROUNDS {
-        let grown = lattice.grow(
-            image.w,
-            image.rays,
-            &fit.plane,
-            |w| image.reach(w, fit.scale),
-            &seed_nodes,
-        );
+        let gauge = Gauge { fit: &fit, slack_m: REACH_FLOOR_M };
+        let mut open = lattice.quiet(&lattice.residuals(&gauge));
+        open.iter_mut().zip(&known).for_each(|(open, known)| *open &= known);
+        let grown = lattice.reached(&open, &seed_nodes);
         if grown == mask {
             break;
         }
@@ -100,7 +103,10 @@ fn candidate(
         let samples = lattice.samples(&mask);
         let floor = image.floor(fit.plane.q.z.abs());
         fit = fit_affine_robust(image.w, image.rays, &samples, &fit.plane, floor, Effort::Sample)?;
+        fit.scale = fit.scale.min(most);
+        known = lattice.known(&mask)?;
     }
+    let mask = lattice.with_rim(&mask, &lattice.residuals(&Gauge { fit: &fit, slack_m: REACH_FLOOR_M }));
     let nodes = mask.iter().filter(|m| **m).count();
     if nodes * lattice.pitch * lattice.pitch < FEWEST_PIXELS {
         return None;
