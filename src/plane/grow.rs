@@ -28,7 +28,7 @@ pub(super) struct Lattice {
 const NODES_ACROSS: f64 = 213.0;
 /// A node is judged by the nodes this far around it: 15 px on a 640 px image, wider than the 9 px
 /// over which a Kinect's matching window correlates the noise (Konolige and Mihelich 2011).
-const AROUND: usize = 2;
+
 /// The mean of a neighbourhood is off by less than this many sigma: noise alone moves it by
 /// 0.6 sigma where it is correlated over 9 px; the rest is for smooth errors of lens and board,
 /// which on real Kinects reach about twice the noise.
@@ -52,7 +52,7 @@ pub(super) struct Gauge<'f> {
 impl Gauge<'_> {
     /// Sigma in inverse depth that the slack is worth where the plane has inverse depth `w`.
     fn sigma(&self, w: f64) -> f64 {
-        self.fit.scale.max(self.slack_m * w * w / MEAN_SIGMAS)
+        self.fit.scale.max(self.slack_m * w * w / ev("SLACK"))
     }
 }
 
@@ -115,8 +115,8 @@ impl Lattice {
             .zip(residuals)
             .map(|(&[n, sum, squares], r)| {
                 r.is_finite()
-                    && f64::from(sum.abs()) < MEAN_SIGMAS * f64::from(n)
-                    && f64::from(squares) < SPREAD_SIGMAS * SPREAD_SIGMAS * f64::from(n)
+                    && f64::from(sum.abs()) < ev("MEAN") * f64::from(n)
+                    && f64::from(squares - sum * sum / n) < ev("SPREAD").powi(2) * f64::from(n)
             })
             .collect()
     }
@@ -129,14 +129,14 @@ impl Lattice {
         let mut both = vec![[0f32; 3]; residuals.len()];
         for node in 0..residuals.len() {
             let (first, c) = (node - node % self.columns, node % self.columns);
-            let (low, high) = (c.saturating_sub(AROUND), (c + AROUND).min(self.columns - 1));
+            let (low, high) = (c.saturating_sub((ev("AROUND") as usize)), (c + (ev("AROUND") as usize)).min(self.columns - 1));
             residuals[first + low..=first + high]
                 .iter()
                 .for_each(|&r| add(&mut across[node], moments(r)));
         }
         for node in 0..residuals.len() {
             let (row, c) = (node / self.columns, node % self.columns);
-            for r in row.saturating_sub(AROUND)..=(row + AROUND).min(self.rows - 1) {
+            for r in row.saturating_sub((ev("AROUND") as usize))..=(row + (ev("AROUND") as usize)).min(self.rows - 1) {
                 add(&mut both[node], across[r * self.columns + c]);
             }
         }
@@ -178,12 +178,13 @@ impl Lattice {
 
     /// The rim that judging by neighbourhoods cost: nodes within a neighbourhood of the set ones
     /// that lie on the plane themselves.
-    pub fn with_rim(&self, mask: &[bool], residuals: &[f32]) -> Vec<bool> {
+    pub fn with_rim(&self, mask: &[bool], residuals: &[f32], barred: &[bool]) -> Vec<bool> {
         let mut wide = mask.to_vec();
-        for _ in 0..AROUND {
+        for _ in 0..(ev("AROUND") as usize) {
             let near = self.dilated(&wide);
             for node in 0..wide.len() {
-                wide[node] |= near[node] && f64::from(residuals[node].abs()) < MEAN_SIGMAS;
+                wide[node] |= near[node] && !barred[node]
+ && f64::from(residuals[node].abs()) < ev("RIM");
             }
         }
         wide
@@ -194,6 +195,31 @@ impl Lattice {
         let columns = c.saturating_sub(radius)..=(c + radius).min(self.columns - 1);
         let rows = r.saturating_sub(radius)..=(r + radius).min(self.rows - 1);
         rows.flat_map(move |row| columns.clone().map(move |column| row * self.columns + column))
+    }
+
+    pub fn measured(&self) -> impl Iterator<Item = bool> + '_ {
+        self.sample.iter().map(Option::is_some)
+    }
+
+    /// Nodes at most `steps` columns and `steps` rows from a set one.
+    pub fn within(&self, mask: &[bool], steps: usize) -> Vec<bool> {
+        let spread = |mask: &[bool], length: usize, at: &dyn Fn(usize, usize) -> usize| {
+            let mut wide = vec![false; mask.len()];
+            for line in 0..mask.len() / length {
+                let (mut forth, mut back) = (usize::MAX, usize::MAX);
+                for k in 0..length {
+                    let (a, b) = (at(line, k), at(line, length - 1 - k));
+                    forth = if mask[a] { 0 } else { forth.saturating_add(1) };
+                    back = if mask[b] { 0 } else { back.saturating_add(1) };
+                    wide[a] |= forth <= steps;
+                    wide[b] |= back <= steps;
+                }
+            }
+            wide
+        };
+        let columns = self.columns;
+        let along_rows = spread(mask, columns, &|row, k| row * columns + k);
+        spread(&along_rows, self.rows, &|column, k| k * columns + column)
     }
 
     /// Every node with a set node within one step.
@@ -209,3 +235,8 @@ impl Lattice {
 
 /// Gaps up to this many nodes are crossed: speckle holes, not the gap between two objects.
 const BRIDGE: usize = 2;
+
+pub(super) fn ev(name: &str) -> f64 {
+    static M: std::sync::OnceLock<std::collections::HashMap<String, f64>> = std::sync::OnceLock::new();
+    M.get_or_init(|| std::env::vars().filter_map(|(k, v)| Some((k, v.parse().ok()?))).collect())[name]
+}

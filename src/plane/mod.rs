@@ -10,6 +10,7 @@ mod affine;
 mod grow;
 mod principal_point;
 mod ransac;
+mod rival;
 mod target;
 
 pub(crate) use affine::MAD_TO_SIGMA;

@@ -2,6 +2,7 @@
 
 use super::affine::{AffineFit, Effort, fit_affine_robust};
 use super::grow::{Gauge, Lattice};
+use super::rival::rivals;
 use super::target::{FEWEST_PIXELS, REACH_FLOOR_M, in_front, on_plane, seed_plane};
 use super::{Exclusions, InverseDepthImage, Plane, Target};
 use crate::camera::Camera;
@@ -68,6 +69,8 @@ fn rank(c: &Candidate) -> (bool, bool, bool, i64) {
     (c.flat, c.roomy, c.at_centre >= AT_CENTRE, -(c.away_px as i64))
 }
 
+/// Times that what belongs to other planes is taken out and the target grown again.
+const RIVAL_ROUNDS: usize = 3;
 const GROWING_ROUNDS: usize = 12;
 /// The scale may grow to this many times the seed's before it means another surface: smooth
 /// errors of lens and board show over the whole target that a small seed does not see.
@@ -84,34 +87,60 @@ fn candidate(
     if seeds.len() < 40 {
         return None;
     }
-    let mut fit = seed_plane(image, &seeds, rng)?;
-    let most = SCALE_GROWTH * fit.scale;
+    let seed = seed_plane(image, &seeds, rng)?;
+    let mut fit = seed;
+    let most = super::grow::ev("GROWTH") * seed.scale;
     let seed_nodes: Vec<usize> =
         seeds.iter().map(|&i| lattice.node_of(i as usize, image.camera.width)).collect();
-    let mut known = vec![false; lattice.columns * lattice.rows];
-    seed_nodes.iter().for_each(|&node| known[node] = true);
+    let mut barred = vec![false; lattice.columns * lattice.rows];
+    let mut mask = barred.clone();
+    for _ in 0..RIVAL_ROUNDS {
+        (fit, mask) = grown(image, lattice, &seed, most, &seed_nodes, &barred)?;
+        barred = rivals(image, lattice, &fit, &mask, rng);
+        if !mask.iter().zip(&barred).any(|(m, b)| *m && *b) {
+            break;
+        }
+    }
+    let gauge = Gauge { fit: &fit, slack_m: REACH_FLOOR_M };
+    let mask = lattice.with_rim(&mask, &lattice.residuals(&gauge), &barred);
+    let nodes = mask.iter().filter(|m| **m).count();
+    if nodes * lattice.pitch * lattice.pitch < FEWEST_PIXELS {
+        return None;
+    }
+    Some(judge(image, lattice, fit, mask, nodes))
+}
+
+/// Grow from the seeds until nothing changes, refitting as the plane becomes better known.
+fn grown(
+    image: &InverseDepthImage<'_>,
+    lattice: &Lattice,
+    start: &AffineFit,
+    most: f64,
+    seeds: &[usize],
+    barred: &[bool],
+) -> Option<(AffineFit, Vec<bool>)> {
+    let mut fit = *start;
+    let mut known = vec![false; barred.len()];
+    seeds.iter().for_each(|&node| known[node] = true);
     let mut mask: Vec<bool> = Vec::new();
     for _ in 0..GROWING_ROUNDS {
         let gauge = Gauge { fit: &fit, slack_m: REACH_FLOOR_M };
         let mut open = lattice.quiet(&lattice.residuals(&gauge));
-        open.iter_mut().zip(&known).for_each(|(open, known)| *open &= known);
-        let grown = lattice.reached(&open, &seed_nodes);
-        if grown == mask {
+        for ((open, known), barred) in open.iter_mut().zip(&known).zip(barred) {
+            *open &= *known && !barred;
+        }
+        let next = lattice.reached(&open, seeds);
+        if next == mask {
             break;
         }
-        mask = grown;
+        mask = next;
         let samples = lattice.samples(&mask);
         let floor = image.floor(fit.plane.q.z.abs());
         fit = fit_affine_robust(image.w, image.rays, &samples, &fit.plane, floor, Effort::Sample)?;
         fit.scale = fit.scale.min(most);
         known = lattice.known(&mask)?;
     }
-    let mask = lattice.with_rim(&mask, &lattice.residuals(&Gauge { fit: &fit, slack_m: REACH_FLOOR_M }));
-    let nodes = mask.iter().filter(|m| **m).count();
-    if nodes * lattice.pitch * lattice.pitch < FEWEST_PIXELS {
-        return None;
-    }
-    Some(judge(image, lattice, fit, mask, nodes))
+    Some((fit, mask))
 }
 
 /// Around the principal point, a disc of this share of the width is "what it looks at".
