@@ -26,33 +26,37 @@ pub(super) struct Lattice {
 
 /// Nodes across the image; 3 px pitch on a 640 px image.
 const NODES_ACROSS: f64 = 213.0;
-/// A node is judged by the nodes this far around it: 15 px on a 640 px image, wider than the 9 px
-/// over which a Kinect's matching window correlates the noise (Konolige and Mihelich 2011).
-
-/// The mean of a neighbourhood is off by less than this many sigma: noise alone moves it by
-/// 0.6 sigma where it is correlated over 9 px; the rest is for smooth errors of lens and board,
-/// which on real Kinects reach about twice the noise.
-const MEAN_SIGMAS: f64 = 2.5;
-/// ... and its root mean square is below this many: 3 independent samples exceed it once in 140,
-/// a surface that crosses the plane at an angle exceeds it beyond the crossing.
-const SPREAD_SIGMAS: f64 = 2.0;
+/// A node is judged by the nodes this far around it: 15 px on a 640 px image, wider than the
+/// matching window of a Kinect v1, 9 px (Konolige and Mihelich 2011), which correlates its noise.
+const AROUND: usize = 2;
+/// The mean of a neighbourhood is off by less than this many sigma: smooth errors of lens and
+/// board pass (real views reach 4), noise alone moves the mean by 0.6 where 9 px are correlated.
+const MEAN_SIGMAS: f64 = 5.0;
+/// ... and it scatters about its own mean by less than this. Noise correlated over 9 px leaves
+/// below 1 with a spread of 0.4; a wall that crosses the plane at an angle grows without bound.
+const SPREAD_SIGMAS: f64 = 1.5;
+/// Single nodes at the rim are on the plane within this: they have no neighbourhood to help.
+const RIM_SIGMAS: f64 = 2.5;
 /// Residuals count at most this many sigma, so that one gross error decides nothing.
 const CLIP_SIGMAS: f64 = 6.0;
-/// Side of the matching window of a Kinect v1, px at 640 px across: one independent sample each.
+/// Nodes to an independent sample: that window, 9 x 9 px, at 3 px to a node.
 const CORRELATED_NODES: f64 = 9.0;
+/// Sigma is taken for at least this much, m: lens errors of a Kinect bend a near wall (0.56 m)
+/// by 8 mm where its noise is below a millimetre.
+pub(super) const BEND_M: f64 = 0.004;
 
-/// What a plane lets through.
+/// A plane and the yardstick along it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gauge<'f> {
     pub fit: &'f AffineFit,
-    /// Distance from the plane that is never too far, m.
-    pub slack_m: f64,
+    /// Least sigma, m.
+    pub bend_m: f64,
 }
 
 impl Gauge<'_> {
-    /// Sigma in inverse depth that the slack is worth where the plane has inverse depth `w`.
+    /// Sigma where the plane has inverse depth `w`, 1/m.
     fn sigma(&self, w: f64) -> f64 {
-        self.fit.scale.max(self.slack_m * w * w / ev("SLACK"))
+        self.fit.scale.max(self.bend_m * w * w)
     }
 }
 
@@ -91,6 +95,10 @@ impl Lattice {
         self.sample.iter().zip(mask).filter(|(_, m)| **m).filter_map(|(s, _)| *s).collect()
     }
 
+    pub fn measured(&self) -> impl Iterator<Item = bool> + '_ {
+        self.sample.iter().map(Option::is_some)
+    }
+
     /// Residual of each node's mean in sigma of the gauge; NaN without a measurement.
     pub fn residuals(&self, gauge: &Gauge<'_>) -> Vec<f32> {
         let q = gauge.fit.plane.q;
@@ -115,8 +123,8 @@ impl Lattice {
             .zip(residuals)
             .map(|(&[n, sum, squares], r)| {
                 r.is_finite()
-                    && f64::from(sum.abs()) < ev("MEAN") * f64::from(n)
-                    && f64::from(squares - sum * sum / n) < ev("SPREAD").powi(2) * f64::from(n)
+                    && f64::from(sum.abs()) < MEAN_SIGMAS * f64::from(n)
+                    && f64::from(squares - sum * sum / n) < SPREAD_SIGMAS.powi(2) * f64::from(n)
             })
             .collect()
     }
@@ -129,22 +137,22 @@ impl Lattice {
         let mut both = vec![[0f32; 3]; residuals.len()];
         for node in 0..residuals.len() {
             let (first, c) = (node - node % self.columns, node % self.columns);
-            let (low, high) = (c.saturating_sub((ev("AROUND") as usize)), (c + (ev("AROUND") as usize)).min(self.columns - 1));
+            let (low, high) = (c.saturating_sub(AROUND), (c + AROUND).min(self.columns - 1));
             residuals[first + low..=first + high]
                 .iter()
                 .for_each(|&r| add(&mut across[node], moments(r)));
         }
         for node in 0..residuals.len() {
             let (row, c) = (node / self.columns, node % self.columns);
-            for r in row.saturating_sub((ev("AROUND") as usize))..=(row + (ev("AROUND") as usize)).min(self.rows - 1) {
+            for r in row.saturating_sub(AROUND)..=(row + AROUND).min(self.rows - 1) {
                 add(&mut both[node], across[r * self.columns + c]);
             }
         }
         both
     }
 
-    /// Nodes at which the plane through the set nodes is known to better than one sigma;
-    /// everywhere the slack is wider than the noise counts as known.
+    /// Nodes at which the plane through the set nodes is known to better than one sigma: the
+    /// leverage r' (sum r r')^-1 r of their rays, in independent samples.
     pub fn known(&self, mask: &[bool]) -> Option<Vec<bool>> {
         let mut information = Matrix3::zeros();
         for (ray, _) in self.mean.iter().zip(mask).filter(|(_, m)| **m).filter_map(|(s, _)| *s) {
@@ -155,88 +163,17 @@ impl Lattice {
         Some(self.mean.iter().map(|mean| mean.is_some_and(|(ray, _)| known(&ray))).collect())
     }
 
-    /// Nodes reached from `seeds` over `open` nodes.
-    pub fn reached(&self, open: &[bool], seeds: &[usize]) -> Vec<bool> {
-        let mut mask = vec![false; open.len()];
-        let mut queue: Vec<usize> = Vec::new();
-        for &seed in seeds {
-            if !mask[seed] && open[seed] {
-                mask[seed] = true;
-                queue.push(seed);
-            }
-        }
-        while let Some(node) = queue.pop() {
-            for neighbour in self.around(node, BRIDGE) {
-                if !mask[neighbour] && open[neighbour] {
-                    mask[neighbour] = true;
-                    queue.push(neighbour);
-                }
-            }
-        }
-        mask
-    }
-
     /// The rim that judging by neighbourhoods cost: nodes within a neighbourhood of the set ones
     /// that lie on the plane themselves.
     pub fn with_rim(&self, mask: &[bool], residuals: &[f32], barred: &[bool]) -> Vec<bool> {
         let mut wide = mask.to_vec();
-        for _ in 0..(ev("AROUND") as usize) {
+        for _ in 0..AROUND {
             let near = self.dilated(&wide);
             for node in 0..wide.len() {
-                wide[node] |= near[node] && !barred[node]
- && f64::from(residuals[node].abs()) < ev("RIM");
+                wide[node] |=
+                    near[node] && !barred[node] && f64::from(residuals[node].abs()) < RIM_SIGMAS;
             }
         }
         wide
     }
-
-    fn around(&self, node: usize, radius: usize) -> impl Iterator<Item = usize> + '_ {
-        let (c, r) = (node % self.columns, node / self.columns);
-        let columns = c.saturating_sub(radius)..=(c + radius).min(self.columns - 1);
-        let rows = r.saturating_sub(radius)..=(r + radius).min(self.rows - 1);
-        rows.flat_map(move |row| columns.clone().map(move |column| row * self.columns + column))
-    }
-
-    pub fn measured(&self) -> impl Iterator<Item = bool> + '_ {
-        self.sample.iter().map(Option::is_some)
-    }
-
-    /// Nodes at most `steps` columns and `steps` rows from a set one.
-    pub fn within(&self, mask: &[bool], steps: usize) -> Vec<bool> {
-        let spread = |mask: &[bool], length: usize, at: &dyn Fn(usize, usize) -> usize| {
-            let mut wide = vec![false; mask.len()];
-            for line in 0..mask.len() / length {
-                let (mut forth, mut back) = (usize::MAX, usize::MAX);
-                for k in 0..length {
-                    let (a, b) = (at(line, k), at(line, length - 1 - k));
-                    forth = if mask[a] { 0 } else { forth.saturating_add(1) };
-                    back = if mask[b] { 0 } else { back.saturating_add(1) };
-                    wide[a] |= forth <= steps;
-                    wide[b] |= back <= steps;
-                }
-            }
-            wide
-        };
-        let columns = self.columns;
-        let along_rows = spread(mask, columns, &|row, k| row * columns + k);
-        spread(&along_rows, self.rows, &|column, k| k * columns + column)
-    }
-
-    /// Every node with a set node within one step.
-    pub fn dilated(&self, mask: &[bool]) -> Vec<bool> {
-        (0..mask.len()).map(|n| self.around(n, 1).any(|m| mask[m])).collect()
-    }
-
-    /// Every node whose neighbours inside the image are all set.
-    pub fn eroded(&self, mask: &[bool]) -> Vec<bool> {
-        (0..mask.len()).map(|n| self.around(n, 1).all(|m| mask[m])).collect()
-    }
-}
-
-/// Gaps up to this many nodes are crossed: speckle holes, not the gap between two objects.
-const BRIDGE: usize = 2;
-
-pub(super) fn ev(name: &str) -> f64 {
-    static M: std::sync::OnceLock<std::collections::HashMap<String, f64>> = std::sync::OnceLock::new();
-    M.get_or_init(|| std::env::vars().filter_map(|(k, v)| Some((k, v.parse().ok()?))).collect())[name]
 }

@@ -5,7 +5,7 @@
 
 use super::affine::AffineFit;
 use super::grow::{Gauge, Lattice};
-use super::target::{InverseDepthImage, REACH_FLOOR_M, seed_plane};
+use super::target::{InverseDepthImage, seed_plane};
 use crate::rng::Stream;
 
 /// Rivals are looked for this many nodes around the target: a tenth of the image's width.
@@ -37,7 +37,7 @@ pub(super) fn rivals(
             break;
         }
         let Some(rival) = seed_plane(image, &samples, rng) else { break };
-        let residuals = lattice.residuals(&Gauge { fit: &rival, slack_m: 0.0 });
+        let residuals = lattice.residuals(&Gauge { fit: &rival, bend_m: 0.0 });
         let before = count(&ring);
         for (node, r) in ring.iter_mut().zip(&residuals) {
             // NaN is no measurement and not in the ring.
@@ -52,13 +52,12 @@ pub(super) fn rivals(
             *bar |= theirs < own;
         }
     }
-    // A neighbourhood half on the target's edge still looks like the target.
-    lattice.dilated(&barred)
+    barred
 }
 
 /// Sum of squares about the plane around each node.
 fn neighbourhoods(lattice: &Lattice, fit: &AffineFit) -> Vec<f32> {
-    let residuals = lattice.residuals(&Gauge { fit, slack_m: 0.0 });
+    let residuals = lattice.residuals(&Gauge { fit, bend_m: 0.0 });
     lattice.boxed(&residuals).iter().map(|sums| sums[2]).collect()
 }
 

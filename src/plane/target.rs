@@ -53,7 +53,7 @@ pub(super) const FEWEST_PIXELS: usize = 300;
 const REACH_SIGMAS: f64 = 5.0;
 /// ... and pixels within this distance always do: lens errors of a Kinect bend a near wall by
 /// 8 mm, while a hand holding a board stands off by more.
-pub(super) const REACH_FLOOR_M: f64 = 0.010;
+const REACH_FLOOR_M: f64 = 0.010;
 /// Standard deviation below which no structured-light sensor was ever measured, as a + b z^2
 /// (m): half of Khoshelham and Elberink's 1.425e-3 z^2 and a millimetre of rounding.
 const SIGMA_FLOOR_M: f64 = 0.0005;
