@@ -4,11 +4,12 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use kinoise::effects::Active;
 use kinoise::io::{Assumed, open, write_atomic};
-use kinoise::model::{Domain, PAPER_EQ1};
+use kinoise::model::{Direction, Domain, PAPER_EQ1};
 use kinoise::scene::{Board, PATCH_SIDE_M, Print, Target, WHITE};
 use kinoise::simulate::{
     Grid, GridView, Physics, Scenery, Shoot, ViewPlan, kinect_v1, plan_grid, plan_like,
 };
+use kinoise::units::shortest;
 use kinoise::{Form, NoiseModel, Sensor, SigmaModel};
 
 use super::common::{Bar, Global, numbers, say};
@@ -31,7 +32,8 @@ pub struct Arguments {
     /// Frames a view
     #[arg(long, default_value_t = 1)]
     frames: usize,
-    /// Make the image this many times smaller each way, 1 (640 x 480) to 8; without --model
+    /// Make the image 1 to 8 times smaller each way [default: 1, which is 640 x 480]; not with a
+    /// model that carries its own sensor
     #[arg(long, value_name = "N")]
     shrink: Option<usize>,
     #[command(flatten)]
@@ -129,7 +131,11 @@ impl SceneryArguments {
     fn scenery(&self) -> anyhow::Result<Scenery> {
         let [width_m, height_m] = self.board;
         if !(width_m > 0.0 && height_m > 0.0) {
-            bail!("--board {width_m},{height_m}: give a width and a height in m");
+            bail!(
+                "--board {},{}: give a width and a height in m",
+                shortest(width_m),
+                shortest(height_m)
+            );
         }
         let positive = |name: &str, value: Option<f64>| match value {
             Some(v) if !(v.is_finite() && v >= 0.0) => bail!("{name} {v}: give a length in m"),
@@ -171,6 +177,12 @@ fn camera(arguments: &Arguments) -> anyhow::Result<(Sensor, SigmaModel, Vec<Acti
         }
         None => kinect_v1(shrink),
     };
+    if model.sigma.direction == Direction::Perpendicular {
+        say(format!(
+            "note: {} describes distances across the plane; depth noise is 1/cos(tilt) times them",
+            path.display()
+        ));
+    }
     let effects = model
         .effects
         .iter()

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::list::read_list;
-use super::stills::{Film, split};
+use super::stills::{Film, Footage};
 use super::{Assumed, assumed_sensor, images};
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
@@ -36,13 +36,7 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Recording> {
         assumed.code.unwrap_or(TUM_CODE),
         assumed,
     )?;
-    let views = split(list.frames, &sensor, Film::Video, &mut remarks)?;
-    Ok(Recording {
-        root: root.to_path_buf(),
-        sensor,
-        views,
-        excluded: Vec::new(),
-        remarks,
-        described_by: vec![path],
-    })
+    let footage =
+        Footage { frames: list.frames, film: Film::Video, remarks, described_by: vec![path] };
+    Ok(footage.recording(root, sensor))
 }

@@ -90,10 +90,7 @@ impl Rows {
     }
 
     pub fn range(&self, column: impl Fn(&SigmaRow) -> f64) -> [f64; 2] {
-        self.rows
-            .iter()
-            .map(column)
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+        crate::stats::range(self.rows.iter().map(column))
     }
 
     /// Is the sampling error known (a table with n)?

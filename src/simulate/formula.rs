@@ -156,7 +156,7 @@ fn sigma_of(seen: &Seen, model: &SigmaModel) -> Vec<f32> {
             }
             match tables.get(usize::from(seen.surface[i])).and_then(Option::as_ref) {
                 Some(table) => table.at(z) as f32,
-                None => model.sigma(z, seen.theta(i)) as f32,
+                None => model.axial_sigma(z, seen.theta(i)) as f32,
             }
         })
         .collect()
@@ -187,7 +187,7 @@ impl SigmaByDepth {
     fn of(model: &SigmaModel, theta: f64) -> Self {
         let [low, high] = model.domain.z_m;
         let step = (high - low).max(1e-9) / (NODES - 1) as f64;
-        let nodes = (0..NODES).map(|k| model.sigma(low + k as f64 * step, theta)).collect();
+        let nodes = (0..NODES).map(|k| model.axial_sigma(low + k as f64 * step, theta)).collect();
         SigmaByDepth { low, step, nodes }
     }
 

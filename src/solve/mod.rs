@@ -18,9 +18,13 @@ pub trait LeastSquares {
 /// Where a solver stopped and why.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ending {
+    /// The place.
     pub x: DVector<f64>,
+    /// Half the sum of squares there.
     pub cost: f64,
+    /// Steps taken.
     pub iterations: u64,
+    /// In words.
     pub reason: String,
 }
 
