@@ -6,6 +6,7 @@ use std::path::Path;
 
 use kinoise::measure::{Cell, SigmaRow, SigmaTable};
 use kinoise::model::{Direction, PAPER_EQ1, compare_forms, fit};
+use kinoise::simulate::Physics;
 use kinoise::{Form, NoiseModel, Seed, SigmaModel};
 use rand_distr::{Distribution, StandardNormal};
 use serde_json::{Value, json};
@@ -111,7 +112,8 @@ fn a_simulation_from_a_perpendicular_model_measures_as_one() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let root = folder.path().join("recording");
     let mut shots = common::shots(common::grid(&[1.5], &[60.0]), 4, 7);
-    shots.sigma.direction = Direction::Perpendicular;
+    let Physics::Formula { sigma, .. } = &mut shots.physics;
+    sigma.direction = Direction::Perpendicular;
     shots.write(&root, &|_, _| ()).expect("written");
     let recording = kinoise::io::open(&root, &Default::default()).expect("opens");
     let measured =
