@@ -42,8 +42,8 @@ const CLIP_SIGMAS: f64 = 6.0;
 /// Nodes to an independent sample: that window, 9 x 9 px, at 3 px to a node.
 const CORRELATED_NODES: f64 = 9.0;
 /// Sigma is taken for at least this much, m: lens errors of a Kinect bend a near wall (0.56 m)
-/// by 8 mm where its noise is below a millimetre.
-pub(super) const BEND_M: f64 = 0.004;
+/// by 8 mm where its noise is a millimetre, and 5 sigma shall hold that.
+pub(super) const BEND_M: f64 = 0.002;
 
 /// A plane and the yardstick along it.
 #[derive(Debug, Clone, Copy)]
@@ -161,6 +161,23 @@ impl Lattice {
         let covariance = (information / CORRELATED_NODES).try_inverse()?;
         let known = |ray: &Vector3<f64>| ray.dot(&(covariance * ray)) < 1.0;
         Some(self.mean.iter().map(|mean| mean.is_some_and(|(ray, _)| known(&ray))).collect())
+    }
+
+    /// Share of the outline that misses the plane by little: where a board ends depth steps, where
+    /// a curved surface leaves its plane it does not. The image's border is outline, too.
+    pub fn curving_away(&self, mask: &[bool], residuals: &[f32]) -> f64 {
+        let (mut outline, mut near) = (0u32, 0u32);
+        for (node, next) in self.dilated(mask).iter().enumerate() {
+            let (c, r) = (node % self.columns, node / self.columns);
+            let border = c == 0 || r == 0 || c + 1 == self.columns || r + 1 == self.rows;
+            if mask[node] {
+                outline += u32::from(border);
+            } else if *next {
+                outline += 1;
+                near += u32::from(f64::from(residuals[node].abs()) < CLIP_SIGMAS);
+            }
+        }
+        f64::from(near) / f64::from(outline.max(1))
     }
 
     /// The rim that judging by neighbourhoods cost: nodes within a neighbourhood of the set ones
