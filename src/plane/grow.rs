@@ -30,7 +30,7 @@ const NODES_ACROSS: f64 = 213.0;
 /// matching window of a Kinect v1, 9 px (Konolige and Mihelich 2011), which correlates its noise.
 const AROUND: usize = 2;
 /// The mean of a neighbourhood is off by less than this many sigma: smooth errors of lens and
-/// board pass (real views reach 4), noise alone moves the mean by 0.6 where 9 px are correlated.
+/// board pass (at 2.5 the rims of real boards were lost), noise alone moves the mean by 0.6 where 9 px are correlated.
 const MEAN_SIGMAS: f64 = 5.0;
 /// ... and it scatters about its own mean by less than this. Noise correlated over 9 px leaves
 /// below 1 with a spread of 0.4; a wall that crosses the plane at an angle grows without bound.
@@ -125,6 +125,17 @@ impl Lattice {
                 r.is_finite()
                     && f64::from(sum.abs()) < MEAN_SIGMAS * f64::from(n)
                     && f64::from(squares - sum * sum / n) < SPREAD_SIGMAS.powi(2) * f64::from(n)
+            })
+            .collect()
+    }
+
+    /// Nodes whose neighbourhood as a whole is off the plane.
+    pub fn off(&self, residuals: &[f32]) -> Vec<bool> {
+        let sums = self.boxed(residuals);
+        sums.iter()
+            .zip(residuals)
+            .map(|(&[n, sum, _], r)| {
+                r.is_finite() && f64::from(sum.abs()) > MEAN_SIGMAS * f64::from(n)
             })
             .collect()
     }
