@@ -76,7 +76,16 @@ mod tests {
         let spread =
             Spread { spatial_m: sigma, temporal_m: None, total_m: sigma, perpendicular_m: sigma };
         let std_error_m = 0.05 * sigma;
-        let cell = Cell { z_m, spread, std_error_m, n, n_effective: 200.0, missing: 0, cut: 0 };
+        let cell = Cell {
+            z_m,
+            spread,
+            std_error_m,
+            n,
+            n_effective: 200.0,
+            n_effective_temporal: 1.0,
+            missing: 0,
+            cut: 0,
+        };
         Bin { cell, mean_m }
     }
 

@@ -71,14 +71,14 @@ impl Lattice {
             let (mut sum, mut n) = (Vector3::zeros(), 0.0);
             let mut sum_w = 0.0;
             for v in v0..(v0 + pitch).min(height) {
-                for i in v * width + u0..v * width + (u0 + pitch).min(width) {
-                    if w[i].is_finite() {
-                        let (x, y) = rays.at(i);
-                        sum += Vector3::new(x, y, 1.0);
-                        sum_w += f64::from(w[i]);
-                        n += 1.0;
-                        sample[node].get_or_insert(i as u32);
-                    }
+                let start = v * width + u0;
+                let row = &w[start..v * width + (u0 + pitch).min(width)];
+                for (i, w) in (start..).zip(row).filter(|(_, w)| w.is_finite()) {
+                    let (x, y) = rays.at(i);
+                    sum += Vector3::new(x, y, 1.0);
+                    sum_w += f64::from(*w);
+                    n += 1.0;
+                    sample[node].get_or_insert(i as u32);
                 }
             }
             mean[node] = (n > 0.0).then(|| (sum / n, sum_w / n));
@@ -146,17 +146,15 @@ impl Lattice {
         let moments = |r: f32| if r.is_finite() { [1.0, r, r * r] } else { [0.0; 3] };
         let mut across = vec![[0f32; 3]; residuals.len()];
         let mut both = vec![[0f32; 3]; residuals.len()];
-        for node in 0..residuals.len() {
+        for (node, sums) in across.iter_mut().enumerate() {
             let (first, c) = (node - node % self.columns, node % self.columns);
             let (low, high) = (c.saturating_sub(AROUND), (c + AROUND).min(self.columns - 1));
-            residuals[first + low..=first + high]
-                .iter()
-                .for_each(|&r| add(&mut across[node], moments(r)));
+            residuals[first + low..=first + high].iter().for_each(|&r| add(sums, moments(r)));
         }
-        for node in 0..residuals.len() {
+        for (node, sums) in both.iter_mut().enumerate() {
             let (row, c) = (node / self.columns, node % self.columns);
             for r in row.saturating_sub(AROUND)..=(row + AROUND).min(self.rows - 1) {
-                add(&mut both[node], across[r * self.columns + c]);
+                add(sums, across[r * self.columns + c]);
             }
         }
         both
