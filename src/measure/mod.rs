@@ -4,6 +4,7 @@
 //! and the scale, the rest stream through accumulators.
 
 mod cells;
+mod doubtful;
 mod grouping;
 mod lagged;
 mod paper;
@@ -187,6 +188,7 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
     result.paper = paper;
     result.infrared = infrared;
     result.reference_distance_m = view.notes.reference_distance_m;
+    notes.append(&mut result.notes);
     result.notes = notes;
     result.digest = source.digest();
     Ok(result)

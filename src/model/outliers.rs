@@ -13,14 +13,14 @@ use crate::measure::{SigmaRow, SigmaTable};
 /// tests/outliers.rs: of clean tables of 30 rows under 1 % lose one (the scale is a median of few
 /// and sometimes small), where n is known none of 4,000 (the scale is at least sampling's).
 const OFF: f64 = 5.0;
-/// Within so many standard deviations of *sampling alone* nothing needs to be looked for: the
-/// robust scale is never less. A Gaussian row leaves it once in two thousand.
-const PLAINLY_IN: f64 = 3.5;
+/// Chi-square of sampling alone exceeds its mean by so many of its standard deviations once in a
+/// thousand tables (normal quantile of 0.999): below, nothing needs to be looked for.
+const PLAINLY_NOISE: f64 = 3.09;
 /// More than this share is no longer a few outliers but a wrong form, and nothing is left out.
 const MOST_SHARE: f64 = 0.2;
 const MOST_ROUNDS: usize = 6;
 /// With fewer rows than this beyond the parameters a median of residuals is no scale.
-const LEAST_SPARE_ROWS: usize = 6;
+const LEAST_SPARE_ROWS: f64 = 6.0;
 
 /// The forms against which outliers are judged, the most flexible first: what no form can follow
 /// is no fault of the form that is asked for.
@@ -76,11 +76,16 @@ fn judged(table: &SigmaTable, form: Form) -> Option<Sorted> {
     if whole.as_ref().is_some_and(|w| nothing_to_look_for(table, w)) {
         return Some(all(table, whole));
     }
-    let ends: Vec<End> = JUDGES
-        .into_iter()
-        .skip_while(|judge| *judge != form)
-        .filter_map(|start| rejected(table, form, robust::surface(table, start)?))
-        .collect();
+    let mut ends = Vec::new();
+    for start in JUDGES.into_iter().skip_while(|judge| *judge != form) {
+        let end = robust::surface(table, start).and_then(|s| rejected(table, form, s));
+        let Some(end) = end else { continue };
+        let done = nothing_to_look_for(&without(table, &end.off), &end.fitted);
+        ends.push(end);
+        if done {
+            break;
+        }
+    }
     let Some(best) = least_cost(table, ends) else {
         return whole.map(|w| all(table, Some(w)));
     };
@@ -133,15 +138,21 @@ fn least_cost(table: &SigmaTable, ends: Vec<End>) -> Option<End> {
     ends.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
-/// Too few rows to tell, or all of them as near as sampling puts them.
-fn nothing_to_look_for(table: &SigmaTable, whole: &SigmaFit) -> bool {
-    let surface = Surface::of(table, whole.form, &whole.values(), whole.free());
-    let near = |(r, sigma): (&SigmaRow, &f64)| {
-        r.n_effective
-            .is_some_and(|n| (r.sigma_m / sigma).ln().abs() <= PLAINLY_IN * (0.5 / n).sqrt())
+/// Too few rows to tell, or the fit leaves what sampling explains: no row off by itself (the robust
+/// scale is never below sampling), and together no more than sampling allows, as there would be if
+/// an outlier had bent the surface.
+fn nothing_to_look_for(table: &SigmaTable, fitted: &SigmaFit) -> bool {
+    let surface = Surface::of(table, fitted.form, &fitted.values(), fitted.free());
+    let spare = table.rows.len() as f64 - surface.free as f64;
+    if spare < LEAST_SPARE_ROWS {
+        return true;
+    }
+    let square = |(r, sigma): (&SigmaRow, &f64)| {
+        r.n_effective.map_or(f64::INFINITY, |n| 2.0 * n * (r.sigma_m / sigma).ln().powi(2))
     };
-    table.rows.len() < surface.free + LEAST_SPARE_ROWS
-        || table.rows.iter().zip(&surface.sigma).all(near)
+    let squares = || table.rows.iter().zip(&surface.sigma).map(square);
+    squares().all(|t2| t2 <= OFF * OFF)
+        && squares().sum::<f64>() <= spare + PLAINLY_NOISE * (2.0 * spare).sqrt()
 }
 
 fn without(table: &SigmaTable, off: &[usize]) -> SigmaTable {

@@ -14,7 +14,8 @@ use crate::stats::median_in_place;
 
 /// Huber's constant: 95 % efficiency where the errors are Gaussian after all.
 const HUBER: f64 = 1.345;
-const MOST_ROUNDS: usize = 30;
+/// What has not come to rest by then is judged as it is: leaving out and looking again follows.
+const MOST_ROUNDS: usize = 10;
 /// The surface rests when no sigma of it moves by more than this share of a standard deviation:
 /// what follows asks about several of them.
 const RESTS: f64 = 0.1;

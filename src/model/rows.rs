@@ -218,42 +218,45 @@ impl Rows {
         self.tau_cell2 = if within_dof < 1.0 {
             0.0
         } else {
-            smallest_root(|tau| self.within(&residual, tau) - within_dof)
+            paule_mandel(within_dof, |tau| self.within(&residual, tau))
         };
         let between_dof = (self.views() as f64 - parameters as f64).max(1.0);
-        let cell = self.tau_cell2;
-        self.tau_view2 = smallest_root(|tau| self.between(&residual, cell, tau) - between_dof);
+        let means: Vec<(f64, f64)> = self
+            .blocks
+            .iter()
+            .map(|b| {
+                let (mean, variance, ..) = self.block(b, &residual, self.tau_cell2);
+                (mean * mean, variance)
+            })
+            .collect();
+        self.tau_view2 = paule_mandel(between_dof, |tau| between(&means, tau));
         self.weigh();
     }
 
-    /// Chi-square of the rows about their view's mean.
-    fn within(&self, residual: &[f64], tau_cell2: f64) -> f64 {
-        self.blocks.iter().map(|b| self.block(b, residual, tau_cell2).2).sum()
+    /// Chi-square of the rows about their view's mean, and its derivative by tau_cell^2.
+    fn within(&self, residual: &[f64], tau_cell2: f64) -> (f64, f64) {
+        self.blocks.iter().fold((0.0, 0.0), |(chi2, slope), b| {
+            let (_, _, c, s) = self.block(b, residual, tau_cell2);
+            (chi2 + c, slope + s)
+        })
     }
 
-    /// Chi-square of the views' means.
-    fn between(&self, residual: &[f64], tau_cell2: f64, tau_view2: f64) -> f64 {
-        self.blocks
-            .iter()
-            .map(|b| {
-                let (mean, variance, _) = self.block(b, residual, tau_cell2);
-                mean * mean / (variance + tau_view2)
-            })
-            .sum()
-    }
-
-    /// Weighted mean of a view's residuals, its variance, and the chi-square about it.
+    /// Weighted mean of a view's residuals, its variance, the chi-square about it, and that one's
+    /// derivative by tau_cell^2 (the mean is where chi-square is least, so moving it adds nothing).
     fn block(
         &self,
         block: &std::ops::Range<usize>,
         residual: &[f64],
         tau_cell2: f64,
-    ) -> (f64, f64, f64) {
+    ) -> (f64, f64, f64, f64) {
         let weight = |i: usize| 1.0 / (self.sampling[i] + tau_cell2);
         let total: f64 = block.clone().map(weight).sum();
         let mean = block.clone().map(|i| weight(i) * residual[i]).sum::<f64>() / total;
-        let chi2 = block.clone().map(|i| weight(i) * (residual[i] - mean).powi(2)).sum();
-        (mean, 1.0 / total, chi2)
+        let (chi2, slope) = block.clone().fold((0.0, 0.0), |(chi2, slope), i| {
+            let part = weight(i) * (residual[i] - mean).powi(2);
+            (chi2 + part, slope - part * weight(i))
+        });
+        (mean, 1.0 / total, chi2, slope)
     }
 
     /// Relative scatter beyond sampling, as standard deviations: within views and between them.
@@ -270,28 +273,35 @@ impl Rows {
 /// Diagonal of R after columns were scaled to unit length: below this a column adds nothing new.
 const DEPENDENT: f64 = 1e-9;
 
-/// Relative width at which the bisection for tau^2 ends: far below any use, far above rounding.
-const ROOT_DIGITS: f64 = 1e-12;
+/// Chi-square of the views' means (their squares and variances), and its derivative by tau_view^2.
+fn between(means: &[(f64, f64)], tau_view2: f64) -> (f64, f64) {
+    means.iter().fold((0.0, 0.0), |(chi2, slope), (square, variance)| {
+        let weight = 1.0 / (variance + tau_view2);
+        (chi2 + square * weight, slope - square * weight * weight)
+    })
+}
 
-/// The least tau^2 >= 0 at which a decreasing excess is not positive, by bisection.
-fn smallest_root(excess: impl Fn(f64) -> f64) -> f64 {
-    if excess(0.0).is_nan() || excess(0.0) <= 0.0 {
-        return 0.0;
-    }
-    let mut high = 1e-6;
-    while excess(high) > 0.0 && high < 1e6 {
-        high *= 4.0;
-    }
-    let mut low = 0.0;
-    while high - low > ROOT_DIGITS * high {
-        let middle = 0.5 * (low + high);
-        if excess(middle) > 0.0 {
-            low = middle;
-        } else {
-            high = middle;
+/// Relative step at which tau^2 is found: far below any use, far above rounding.
+const ROOT_DIGITS: f64 = 1e-12;
+/// Newton's step takes some ten rounds; from far off it starts by doubling, and a double has a
+/// thousand doublings.
+const MOST_NEWTON_STEPS: usize = 1000;
+
+/// The tau^2 >= 0 at which chi-square (and its slope) is `expected`, or zero where it is less
+/// already. Newton's step: chi-square falls and is convex in tau^2, so from zero the steps never
+/// pass the root (DerSimonian and Kacker 2007).
+fn paule_mandel(expected: f64, chi2: impl Fn(f64) -> (f64, f64)) -> f64 {
+    let mut tau = 0.0;
+    for _ in 0..MOST_NEWTON_STEPS {
+        let (found, slope) = chi2(tau);
+        let step = (expected - found) / slope;
+        // Also where nothing is a number any more: then the last tau stands.
+        if !(step > ROOT_DIGITS * tau && step.is_finite()) {
+            break;
         }
+        tau += step;
     }
-    high
+    tau
 }
 
 #[cfg(test)]
@@ -315,6 +325,18 @@ mod tests {
         rows.tau_view2 = 0.02;
         rows.weigh();
         rows
+    }
+
+    /// The root against its definition, from hardly any excess to a million times too much.
+    #[test]
+    fn extra_variance_makes_chi_square_what_is_expected() {
+        let rows = rows();
+        for size in [0.11, 0.3, 10.0, 1e3] {
+            let residual: Vec<f64> = (0..12).map(|i| size * f64::from(i * i).sin()).collect();
+            let tau = paule_mandel(8.0, |tau| rows.within(&residual, tau));
+            assert!((rows.within(&residual, tau).0 / 8.0 - 1.0).abs() < 1e-9, "{size}: {tau}");
+        }
+        assert_eq!(paule_mandel(8.0, |tau| rows.within(&[1e-3; 12], tau)), 0.0);
     }
 
     /// Whitened products against the explicit inverse of the covariance.

@@ -7,6 +7,7 @@ use super::target::{FEWEST_PIXELS, on_plane, seed_plane};
 use super::{InverseDepthImage, Plane};
 use crate::camera::Camera;
 use crate::rng::Stream;
+use crate::stats::normal_cut_factor;
 
 /// A plane grown from a window around the principal point.
 pub(super) struct Candidate {
@@ -40,7 +41,8 @@ pub(super) fn candidate(
     if seeds.len() < 40 {
         return None;
     }
-    let seed = seed_plane(image, &seeds, rng)?;
+    let mut seed = seed_plane(image, &seeds, rng)?;
+    seed.scale = settled_scale(image, &seed, &seeds);
     let mut fit = seed;
     let most = SCALE_GROWTH * seed.scale;
     let seed_nodes: Vec<usize> =
@@ -55,12 +57,61 @@ pub(super) fn candidate(
         }
     }
     let gauge = Gauge { fit: &fit, bend_m: BEND_M };
-    let mask = lattice.with_rim(&mask, &lattice.residuals(&gauge), &barred);
+    mask.iter_mut().zip(&barred).for_each(|(m, b)| *m &= !b);
+    let residuals = lattice.residuals(&gauge);
+    let mask = lattice.with_rim(&mask, &residuals, &barred);
+    let curved = lattice.curving_away(&mask, &residuals) > CURVED;
+    let pixels = pixels_of(image, lattice, &mask);
+    let floor = image.floor(fit.plane.q.z.abs());
+    let fit = fit_affine_robust(image.w, image.rays, &pixels, &fit.plane, floor, Effort::Sample)?;
+    let fit = AffineFit { scale: settled_scale(image, &fit, &pixels), ..fit };
     let nodes = mask.iter().filter(|m| **m).count();
     if nodes * lattice.pitch * lattice.pitch < FEWEST_PIXELS {
         return None;
     }
-    Some(judge(image, lattice, fit, mask, nodes))
+    let mut found = judge(image, lattice, fit, mask, nodes);
+    found.flat &= !curved;
+    Some(found)
+}
+
+/// A target that goes on smoothly beyond its plane over more than this share of its outline is
+/// cut out of a curved surface. A board that a wall crosses goes on along one of its four sides.
+const CURVED: f64 = 0.6;
+
+/// Where half of the pixels share one code the median absolute deviation is blind; then the
+/// standard deviation inside a cut of itself. 1/m.
+fn settled_scale(image: &InverseDepthImage<'_>, fit: &AffineFit, pixels: &[u32]) -> f64 {
+    let step = (image.step)(fit.plane.q.z.abs());
+    let mut scale = fit.scale;
+    if scale > step {
+        return scale;
+    }
+    for _ in 0..SETTLING_ROUNDS {
+        let (mut n, mut squares) = (0.0, 0.0);
+        for &i in pixels {
+            let (x, y) = image.rays.at(i as usize);
+            let off = f64::from(image.w[i as usize]) - fit.plane.inverse_depth(x, y);
+            if off.abs() < SETTLING_SIGMAS * scale {
+                n += 1.0;
+                squares += off * off;
+            }
+        }
+        let factor = normal_cut_factor(SETTLING_SIGMAS);
+        scale = scale.max((squares / f64::max(n, 1.0) / factor).sqrt());
+    }
+    scale.min(step)
+}
+
+/// The cut, as everywhere for sigma: 0.05 % of a Gaussian lies beyond.
+const SETTLING_SIGMAS: f64 = 3.5;
+const SETTLING_ROUNDS: usize = 4;
+
+/// Measured pixels of the nodes that are set.
+fn pixels_of(image: &InverseDepthImage<'_>, lattice: &Lattice, mask: &[bool]) -> Vec<u32> {
+    (0..image.w.len())
+        .filter(|&i| image.valid(i) && mask[lattice.node_of(i, image.camera.width)])
+        .map(|i| i as u32)
+        .collect()
 }
 
 /// Grow from the seeds until nothing changes, refitting as the plane becomes better known.
@@ -90,7 +141,7 @@ fn grown(
         let samples = lattice.samples(&mask);
         let floor = image.floor(fit.plane.q.z.abs());
         fit = fit_affine_robust(image.w, image.rays, &samples, &fit.plane, floor, Effort::Sample)?;
-        fit.scale = fit.scale.min(most);
+        fit.scale = settled_scale(image, &fit, &samples).min(most);
         known = lattice.known(&mask)?;
     }
     Some((fit, mask))

@@ -30,7 +30,7 @@ const NODES_ACROSS: f64 = 213.0;
 /// matching window of a Kinect v1, 9 px (Konolige and Mihelich 2011), which correlates its noise.
 const AROUND: usize = 2;
 /// The mean of a neighbourhood is off by less than this many sigma: smooth errors of lens and
-/// board pass (real views reach 4), noise alone moves the mean by 0.6 where 9 px are correlated.
+/// board pass (at 2.5 the rims of real boards were lost), noise alone moves the mean by 0.6 where 9 px are correlated.
 const MEAN_SIGMAS: f64 = 5.0;
 /// ... and it scatters about its own mean by less than this. Noise correlated over 9 px leaves
 /// below 1 with a spread of 0.4; a wall that crosses the plane at an angle grows without bound.
@@ -42,8 +42,8 @@ const CLIP_SIGMAS: f64 = 6.0;
 /// Nodes to an independent sample: that window, 9 x 9 px, at 3 px to a node.
 const CORRELATED_NODES: f64 = 9.0;
 /// Sigma is taken for at least this much, m: lens errors of a Kinect bend a near wall (0.56 m)
-/// by 8 mm where its noise is below a millimetre.
-pub(super) const BEND_M: f64 = 0.004;
+/// by 8 mm where its noise is a millimetre, and 5 sigma shall hold that.
+pub(super) const BEND_M: f64 = 0.002;
 
 /// A plane and the yardstick along it.
 #[derive(Debug, Clone, Copy)]
@@ -71,14 +71,14 @@ impl Lattice {
             let (mut sum, mut n) = (Vector3::zeros(), 0.0);
             let mut sum_w = 0.0;
             for v in v0..(v0 + pitch).min(height) {
-                for i in v * width + u0..v * width + (u0 + pitch).min(width) {
-                    if w[i].is_finite() {
-                        let (x, y) = rays.at(i);
-                        sum += Vector3::new(x, y, 1.0);
-                        sum_w += f64::from(w[i]);
-                        n += 1.0;
-                        sample[node].get_or_insert(i as u32);
-                    }
+                let start = v * width + u0;
+                let row = &w[start..v * width + (u0 + pitch).min(width)];
+                for (i, w) in (start..).zip(row).filter(|(_, w)| w.is_finite()) {
+                    let (x, y) = rays.at(i);
+                    sum += Vector3::new(x, y, 1.0);
+                    sum_w += f64::from(*w);
+                    n += 1.0;
+                    sample[node].get_or_insert(i as u32);
                 }
             }
             mean[node] = (n > 0.0).then(|| (sum / n, sum_w / n));
@@ -129,23 +129,32 @@ impl Lattice {
             .collect()
     }
 
+    /// Nodes whose neighbourhood as a whole is off the plane.
+    pub fn off(&self, residuals: &[f32]) -> Vec<bool> {
+        let sums = self.boxed(residuals);
+        sums.iter()
+            .zip(residuals)
+            .map(|(&[n, sum, _], r)| {
+                r.is_finite() && f64::from(sum.abs()) > MEAN_SIGMAS * f64::from(n)
+            })
+            .collect()
+    }
+
     /// Number, sum and sum of squares of the measured residuals around each node.
     pub fn boxed(&self, residuals: &[f32]) -> Vec<[f32; 3]> {
         let add = |a: &mut [f32; 3], b: [f32; 3]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
         let moments = |r: f32| if r.is_finite() { [1.0, r, r * r] } else { [0.0; 3] };
         let mut across = vec![[0f32; 3]; residuals.len()];
         let mut both = vec![[0f32; 3]; residuals.len()];
-        for node in 0..residuals.len() {
+        for (node, sums) in across.iter_mut().enumerate() {
             let (first, c) = (node - node % self.columns, node % self.columns);
             let (low, high) = (c.saturating_sub(AROUND), (c + AROUND).min(self.columns - 1));
-            residuals[first + low..=first + high]
-                .iter()
-                .for_each(|&r| add(&mut across[node], moments(r)));
+            residuals[first + low..=first + high].iter().for_each(|&r| add(sums, moments(r)));
         }
-        for node in 0..residuals.len() {
+        for (node, sums) in both.iter_mut().enumerate() {
             let (row, c) = (node / self.columns, node % self.columns);
             for r in row.saturating_sub(AROUND)..=(row + AROUND).min(self.rows - 1) {
-                add(&mut both[node], across[r * self.columns + c]);
+                add(sums, across[r * self.columns + c]);
             }
         }
         both
@@ -161,6 +170,23 @@ impl Lattice {
         let covariance = (information / CORRELATED_NODES).try_inverse()?;
         let known = |ray: &Vector3<f64>| ray.dot(&(covariance * ray)) < 1.0;
         Some(self.mean.iter().map(|mean| mean.is_some_and(|(ray, _)| known(&ray))).collect())
+    }
+
+    /// Share of the outline that misses the plane by little: where a board ends depth steps, where
+    /// a curved surface leaves its plane it does not. The image's border is outline, too.
+    pub fn curving_away(&self, mask: &[bool], residuals: &[f32]) -> f64 {
+        let (mut outline, mut near) = (0u32, 0u32);
+        for (node, next) in self.dilated(mask).iter().enumerate() {
+            let (c, r) = (node % self.columns, node / self.columns);
+            let border = c == 0 || r == 0 || c + 1 == self.columns || r + 1 == self.rows;
+            if mask[node] {
+                outline += u32::from(border);
+            } else if *next {
+                outline += 1;
+                near += u32::from(f64::from(residuals[node].abs()) < CLIP_SIGMAS);
+            }
+        }
+        f64::from(near) / f64::from(outline.max(1))
     }
 
     /// The rim that judging by neighbourhoods cost: nodes within a neighbourhood of the set ones

@@ -11,6 +11,7 @@ mod candidate;
 mod grow;
 mod principal_point;
 mod ransac;
+mod relief;
 mod rival;
 mod shapes;
 mod target;
