@@ -5,6 +5,7 @@ mod common;
 mod demo;
 mod fit;
 mod simulate;
+mod simulate_room;
 mod words;
 
 use std::process::ExitCode;
@@ -28,7 +29,7 @@ enum Command {
     Calibrate(calibrate::Arguments),
     /// Fit sigma(z, theta) to a table z_m,theta_rad,sigma_m[,n]
     Fit(fit::Arguments),
-    /// Make a recording by formula
+    /// Make a recording, or a film of a room, by formula
     Simulate(simulate::Arguments),
     /// The whole road on bundled data
     Demo(demo::Arguments),

@@ -104,7 +104,7 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
     Ok(recording)
 }
 
-fn read_sensor(path: &Path) -> Result<Sensor> {
+pub(super) fn read_sensor(path: &Path) -> Result<Sensor> {
     let wrong =
         |what: String| Error::Json { path: path.to_path_buf(), line: 0, what, remedy: REMEDY_JSON };
     // Another format has other keys: its name says more than the first key that is missing.

@@ -1,5 +1,6 @@
 //! Files in, files out. One reader a file; every layout ends as the same [`Recording`].
 
+mod colour;
 mod dump;
 mod folder;
 mod images;
@@ -9,6 +10,7 @@ mod output;
 mod stills;
 mod tum;
 
+pub use colour::encode_rgb;
 pub use images::{FrameSource, InfraredImage, encode_png16};
 pub use layout::{ViewFile, write_recording_file, write_view_notes};
 pub use list::{FrameList, read_list};
@@ -43,11 +45,13 @@ pub fn open(path: &Path, assumed: &Assumed) -> Result<Recording> {
             "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs",
         ));
     }
-    let recording = if path.join(layout::DESCRIPTION).is_file() {
+    // A described TUM sequence has its frames at the root, a recording in one folder a view.
+    let sequence = path.join(tum::DEPTH_LIST).is_file();
+    let recording = if path.join(layout::DESCRIPTION).is_file() && !sequence {
         layout::open(path)?
     } else if path.join(dump::INDEX).is_file() {
         dump::open(path, assumed)?
-    } else if path.join(tum::DEPTH_LIST).is_file() {
+    } else if sequence {
         tum::open(path, assumed)?
     } else {
         folder::open(path, assumed)?

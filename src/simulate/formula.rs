@@ -31,12 +31,23 @@ pub struct Shooting<'a> {
 
 impl FormulaSensor<'_> {
     pub fn begin<'a>(&'a self, seen: &'a Seen) -> Shooting<'a> {
+        self.begin_at(seen, sigma_of(seen, self.sigma), HashMap::new())
+    }
+
+    /// With sigma (m) already known, and what the effects remember of the frames before: for a
+    /// camera that moves, whose every frame sees something else.
+    pub(super) fn begin_at<'a>(
+        &'a self,
+        seen: &'a Seen,
+        sigma: Vec<f32>,
+        memory: HashMap<&'static str, Vec<f32>>,
+    ) -> Shooting<'a> {
         Shooting {
             camera: self,
             seen,
-            sigma: without_rounding(sigma_of(seen, self.sigma), seen, self.sensor),
+            sigma: without_rounding(sigma, seen, self.sensor),
             light: light_of(seen, self.rays),
-            memory: HashMap::new(),
+            memory,
         }
     }
 }
@@ -49,6 +60,10 @@ pub struct Shot {
 }
 
 impl Shooting<'_> {
+    pub(super) fn into_memory(self) -> HashMap<&'static str, Vec<f32>> {
+        self.memory
+    }
+
     pub fn shoot(&mut self, instant: Instant) -> Shot {
         let FormulaSensor { sensor, rays, effects, seed, .. } = *self.camera;
         let mut exposure = Exposure {

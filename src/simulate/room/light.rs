@@ -1,0 +1,32 @@
+//! Lambert's law under two ceiling lamps, and what the white walls give back from everywhere.
+
+use nalgebra::Vector3;
+
+/// A small lamp.
+struct Lamp {
+    at: Vector3<f64>,
+    /// Brightness it gives a white surface 1 m below it, as a share of display white.
+    power: f64,
+}
+
+/// Above either long side of the desks, 2.7 m high; together they light a desk top to about 0.55.
+const LAMPS: [Lamp; 2] = [
+    Lamp { at: Vector3::new(-0.4, 1.5, 2.7), power: 1.3 },
+    Lamp { at: Vector3::new(0.4, -1.5, 2.7), power: 1.3 },
+];
+/// What comes back from walls and ceiling, on faces turned up, and the loss on those turned down.
+const AMBIENT: f64 = 0.44;
+const AMBIENT_SLOPE: f64 = 0.1;
+/// A lamp is a tube, not a point: its light falls off more slowly near by, m.
+const LAMP_SIZE_M: f64 = 1.2;
+
+/// Share of display white that a white surface shows; may exceed one near a lamp.
+pub fn brightness(point: &Vector3<f64>, normal: &Vector3<f64>) -> f32 {
+    let direct = LAMPS.iter().map(|lamp| {
+        let way = lamp.at - point;
+        let square = way.norm_squared();
+        let cosine = normal.dot(&way).max(0.0) / square.sqrt();
+        lamp.power * cosine / (square + LAMP_SIZE_M * LAMP_SIZE_M)
+    });
+    (AMBIENT + AMBIENT_SLOPE * normal.z + direct.sum::<f64>()) as f32
+}

@@ -1,0 +1,100 @@
+//! Pictures on surfaces, with their smaller copies, so that far texture blurs and does not flicker.
+
+/// A square picture that repeats, and its halvings down to one texel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Texture {
+    levels: Vec<Level>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Level {
+    /// Texels a side, a power of two.
+    size: usize,
+    texels: Vec<[u8; 3]>,
+}
+
+impl Texture {
+    /// Of `size` by `size` texels, row by row.
+    ///
+    /// # Panics
+    /// When `size` is no power of two or does not fit the texels.
+    pub fn new(size: usize, texels: Vec<[u8; 3]>) -> Self {
+        assert!(size.is_power_of_two() && texels.len() == size * size, "a square picture");
+        let mut levels = vec![Level { size, texels }];
+        while levels[levels.len() - 1].size > 1 {
+            levels.push(levels[levels.len() - 1].halved());
+        }
+        Texture { levels }
+    }
+
+    /// Texels a side of the full picture.
+    pub fn size(&self) -> usize {
+        self.levels[0].size
+    }
+
+    /// Colour, 0 to 255, at `uv` (in pictures; repeats), where a pixel covers 2^`lod` texels.
+    #[inline]
+    pub fn at(&self, uv: [f32; 2], lod: f32) -> [f32; 3] {
+        let top = (self.levels.len() - 1) as f32;
+        let lod = lod.clamp(0.0, top);
+        let fine = lod as usize;
+        let share = lod - fine as f32;
+        let near = self.levels[fine].at(uv);
+        if share == 0.0 {
+            return near;
+        }
+        let far = self.levels[fine + 1].at(uv);
+        std::array::from_fn(|c| near[c] + share * (far[c] - near[c]))
+    }
+}
+
+impl Level {
+    fn halved(&self) -> Level {
+        let size = self.size / 2;
+        let mut texels = Vec::with_capacity(size * size);
+        for y in 0..size {
+            for x in 0..size {
+                let four = [(0, 0), (1, 0), (0, 1), (1, 1)]
+                    .map(|(i, j)| self.texels[(2 * y + j) * self.size + 2 * x + i]);
+                let mean = |c: usize| four.iter().map(|t| u16::from(t[c])).sum::<u16>() + 2;
+                texels.push([0, 1, 2].map(|c| (mean(c) / 4) as u8));
+            }
+        }
+        Level { size, texels }
+    }
+
+    /// Between the four nearest texel centres.
+    #[inline]
+    fn at(&self, uv: [f32; 2]) -> [f32; 3] {
+        let [x, y] = uv.map(|v| (v - v.floor()) * self.size as f32 - 0.5);
+        let (left, up) = (x.floor(), y.floor());
+        let (s, t) = (x - left, y - up);
+        let wrap = |k: f32, step: i32| (k as i32 + step) as usize & (self.size - 1);
+        let (x0, x1) = (wrap(left, 0), wrap(left, 1));
+        let (y0, y1) = (wrap(up, 0) * self.size, wrap(up, 1) * self.size);
+        let (a, b) = (self.texels[y0 + x0], self.texels[y0 + x1]);
+        let (c, d) = (self.texels[y1 + x0], self.texels[y1 + x1]);
+        let weights = [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t];
+        std::array::from_fn(|k| {
+            weights[0] * f32::from(a[k])
+                + weights[1] * f32::from(b[k])
+                + weights[2] * f32::from(c[k])
+                + weights[3] * f32::from(d[k])
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_level_is_the_mean_and_texel_centres_are_exact() {
+        let texels: Vec<[u8; 3]> = (0..16).map(|i| [10 * i as u8, 3, 250]).collect();
+        let texture = Texture::new(4, texels.clone());
+        assert!((texture.at([0.3, 0.9], 9.0)[0] - 75.0).abs() <= 1.0);
+        let at = |x: usize, y: usize| [(x as f32 + 0.5) / 4.0, (y as f32 + 0.5) / 4.0];
+        assert_eq!(texture.at(at(2, 1), 0.0)[0], f32::from(texels[6][0]));
+        assert_eq!(texture.at([at(2, 1)[0] + 5.0, at(2, 1)[1] - 3.0], 0.0)[0], 60.0, "repeats");
+    }
+}
