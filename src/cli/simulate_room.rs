@@ -71,8 +71,16 @@ fn fitted(
     frames: Option<usize>,
     stride: usize,
 ) -> anyhow::Result<Vec<Pose>> {
-    let samples = read_trajectory(file)?;
-    let Resampled { poses, gaps } = resample(&samples, frames.map(|n| n.saturating_mul(stride)))?;
+    let read = read_trajectory(file)?;
+    if read.repeated > 0 {
+        say(format!(
+            "note: {}: {} lines repeat the time of the line before; they are left out",
+            file.display(),
+            read.repeated
+        ));
+    }
+    let Resampled { poses, gaps } =
+        resample(&read.poses, frames.map(|n| n.saturating_mul(stride)))?;
     let placed = place(room, &poses)?;
     if !gaps.is_empty() {
         let seconds: f64 = gaps.iter().map(|g| g.seconds()).sum();

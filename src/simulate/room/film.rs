@@ -127,7 +127,8 @@ impl Film {
 const TUM_FOCAL_PX: f64 = 525.0;
 
 fn file_name(pose: &Pose) -> String {
-    format!("{:.6}.png", pose.stamp)
+    // As wide as a stamp of this century: names sort as the times do.
+    format!("{:017.6}.png", pose.stamp)
 }
 
 fn write_pair(root: &Path, pose: &Pose, picture: &Picture, depth: &Frame) -> Result<()> {
@@ -137,8 +138,8 @@ fn write_pair(root: &Path, pose: &Pose, picture: &Picture, depth: &Frame) -> Res
     write_atomic(&root.join("depth").join(&name), &encode_png16(depth)?)
 }
 
-/// The two halves of the camera, ready.
-struct Shutter<'a> {
+/// The film's camera, ready to take any frame.
+pub struct Shutter<'a> {
     film: &'a Film,
     camera: RoomCamera<'a>,
     depth: FormulaSensor<'a>,
@@ -146,7 +147,8 @@ struct Shutter<'a> {
 }
 
 impl<'a> Shutter<'a> {
-    fn new(film: &'a Film, sensor: &'a Sensor, rays: &'a Rays) -> Self {
+    /// `sensor` and `rays` are those of one camera; its code is that of the words.
+    pub fn new(film: &'a Film, sensor: &'a Sensor, rays: &'a Rays) -> Self {
         let Film { sigma, effects, seed, .. } = film;
         Shutter {
             film,
@@ -154,6 +156,13 @@ impl<'a> Shutter<'a> {
             depth: FormulaSensor { sensor, rays, sigma, effects, seed: *seed },
             table: SigmaTable::of(sigma),
         }
+    }
+
+    /// One frame on its own, on one thread: effects remember nothing before it.
+    pub fn shoot(&self, frame: usize) -> (Picture, Frame) {
+        let picture = self.camera.take(&self.film.poses[frame].world_from_camera);
+        let depth = self.expose_one(&picture, frame, &mut Memory::new());
+        (picture, depth)
     }
 
     /// Depth words of consecutive frames. Effects may remember: with any, frames go in order.

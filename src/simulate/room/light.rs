@@ -9,13 +9,13 @@ struct Lamp {
     power: f64,
 }
 
-/// Above either long side of the desks, 2.7 m high; together they light a desk top to about 0.55.
+/// Above either long side of the desks, 2.7 m high; together they light a desk top to about 0.7.
 const LAMPS: [Lamp; 2] = [
-    Lamp { at: Vector3::new(-0.4, 1.5, 2.7), power: 1.3 },
-    Lamp { at: Vector3::new(0.4, -1.5, 2.7), power: 1.3 },
+    Lamp { at: Vector3::new(-0.4, 1.5, 2.7), power: 1.7 },
+    Lamp { at: Vector3::new(0.4, -1.5, 2.7), power: 1.7 },
 ];
 /// What comes back from walls and ceiling, on faces turned up, and the loss on those turned down.
-const AMBIENT: f64 = 0.44;
+const AMBIENT: f64 = 0.5;
 const AMBIENT_SLOPE: f64 = 0.1;
 /// A lamp is a tube, not a point: its light falls off more slowly near by, m.
 const LAMP_SIZE_M: f64 = 1.2;

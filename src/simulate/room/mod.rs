@@ -27,16 +27,16 @@ mod texture;
 mod trajectory;
 
 pub use body::Body;
-pub use film::Film;
+pub use film::{Film, Shutter};
 pub use furnish::{CEILING_M, FLOOR_M};
 pub use paint::{Lay, Paint, Skin};
-pub use path::around_the_desks;
+pub use path::{around_the_desks, looking};
 pub use place::{CLEARANCE_M, Placement, place};
 pub use render::{Picture, RoomCamera};
 pub use resample::{Gap, Resampled, resample};
 pub use shape::{Shape, Touch};
 pub use texture::Texture;
-pub use trajectory::read_trajectory;
+pub use trajectory::{Trajectory, read_trajectory};
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 

@@ -7,26 +7,39 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use super::Pose;
 use crate::error::{Error, Result};
 
+/// The poses of a file, in time order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    pub poses: Vec<Pose>,
+    /// Lines left out because their time is the line's before (freiburg2_desk has some).
+    pub repeated: usize,
+}
+
 /// Read a trajectory file; lines that begin with `#` are comments.
 ///
 /// # Errors
 /// With the line, when it is not eight finite numbers, its quaternion has no length, or its time
-/// is not after the line's before; and when the file holds no pose.
-pub fn read_trajectory(path: &Path) -> Result<Vec<Pose>> {
+/// is before that of the line above; and when the file holds no pose.
+pub fn read_trajectory(path: &Path) -> Result<Trajectory> {
     let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
-    let mut poses: Vec<Pose> = Vec::new();
+    let mut read = Trajectory { poses: Vec::new(), repeated: 0 };
     for (i, line) in text.lines().enumerate() {
         let content = line.trim_start_matches('\u{feff}').trim();
         if content.is_empty() || content.starts_with('#') {
             continue;
         }
-        let after = poses.last().map_or(f64::NEG_INFINITY, |p| p.stamp);
-        poses.push(parse(content, after).map_err(|fault| fault.at(path, i + 1))?);
+        let before = read.poses.last().map_or(f64::NEG_INFINITY, |p| p.stamp);
+        let pose = parse(content, before).map_err(|fault| fault.at(path, i + 1))?;
+        if pose.stamp > before {
+            read.poses.push(pose);
+        } else {
+            read.repeated += 1;
+        }
     }
-    if poses.is_empty() {
+    if read.poses.is_empty() {
         return Err(Fault::new("no pose in it", REMEDY_FORMAT).at(path, 0));
     }
-    Ok(poses)
+    Ok(read)
 }
 
 const REMEDY_FORMAT: &str = "write \"timestamp tx ty tz qx qy qz qw\", one pose a line";
@@ -49,7 +62,7 @@ impl Fault {
     }
 }
 
-fn parse(line: &str, after: f64) -> Result<Pose, Fault> {
+fn parse(line: &str, before: f64) -> Result<Pose, Fault> {
     let numbers = line
         .split(|c: char| c.is_whitespace() || c == ',')
         .filter(|word| !word.is_empty())
@@ -69,9 +82,9 @@ fn parse(line: &str, after: f64) -> Result<Pose, Fault> {
         let what = format!("the quaternion {qx} {qy} {qz} {qw} is no rotation");
         return Err(Fault::new(what, "take the line out, or give qx qy qz qw of length 1"));
     }
-    if stamp <= after {
-        let what = format!("time {stamp} is not after the pose before, {after}");
-        return Err(Fault::new(what, "sort the lines by time, each time once"));
+    if stamp < before {
+        let what = format!("time {stamp} comes after {before}, which is later");
+        return Err(Fault::new(what, "sort the lines by time"));
     }
     let rotation = UnitQuaternion::from_quaternion(quaternion);
     let world_from_camera = Isometry3::from_parts(Translation3::new(tx, ty, tz), rotation);
