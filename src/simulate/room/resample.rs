@@ -1,8 +1,8 @@
 //! Poses at the sensor's frame rate from poses at any times.
 //!
 //! Translation: cubic Hermite between the neighbouring samples; rotation: slerp. Across a gap the
-//! speed at its ends is kept no larger than what cannot overshoot (Fritsch and Carlson 1980: three
-//! times the gap's own), so that the camera glides through.
+//! speed at its ends is kept no larger than the gap's own, so that the camera glides through: a
+//! cubic with end speeds v leaves the chord by at most 4/27 of v times the time it has.
 
 use nalgebra::{Isometry3, Translation3, Vector3};
 
@@ -36,7 +36,6 @@ pub const GAP_S: f64 = 0.2;
 const SPEED_SPAN_S: f64 = 0.03;
 /// An hour's frames; more is stamps that are not in seconds.
 const MOST_FRAMES: f64 = 3600.0 * RATE_HZ;
-const NO_OVERSHOOT: f64 = 3.0;
 
 /// Every 1/30 s from the first sample to the last; at most `limit` frames.
 ///
@@ -76,9 +75,9 @@ fn at(samples: &[Pose], stamp: f64) -> Pose {
     let span = b.stamp - a.stamp;
     let u = (stamp - a.stamp) / span;
     let chord = (position(b) - position(a)) / span;
-    let limited = |speed: Vector3<f64>| match NO_OVERSHOOT * chord.norm() {
-        most if speed.norm() > most => speed * (most / speed.norm()),
-        _ => speed,
+    let limited = |speed: Vector3<f64>| {
+        let fast = span > GAP_S && speed.norm() > chord.norm();
+        if fast { speed * (chord.norm() / speed.norm()) } else { speed }
     };
     let (leave, arrive) = (limited(speed(samples, next - 1)), limited(speed(samples, next)));
     let place = hermite(u, [position(a), position(b)], [leave * span, arrive * span]);
