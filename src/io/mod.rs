@@ -1,20 +1,20 @@
 //! Files in, files out. One reader a file; every layout ends as the same [`Recording`].
 
-mod colour;
 mod dump;
 mod folder;
 mod images;
 mod layout;
 mod list;
 mod output;
+mod quick;
 mod stills;
 mod tum;
 
-pub use colour::encode_rgb;
 pub use images::{FrameSource, InfraredImage, encode_png16};
 pub use layout::{ViewFile, write_recording_file, write_view_notes};
 pub use list::{FrameList, read_list};
 pub use output::{OutputDir, sha256_hex, write_atomic};
+pub use quick::{encode_png16_quickly, encode_rgb};
 
 use std::path::Path;
 

@@ -13,7 +13,7 @@ use crate::camera::Rays;
 use crate::effects::{Active, Instant};
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, Frame};
-use crate::io::{encode_png16, encode_rgb, write_atomic, write_recording_file};
+use crate::io::{encode_png16_quickly, encode_rgb, write_atomic, write_recording_file};
 use crate::model::SigmaModel;
 use crate::rng::Seed;
 use crate::simulate::formula::FormulaSensor;
@@ -135,7 +135,7 @@ fn write_pair(root: &Path, pose: &Pose, picture: &Picture, depth: &Frame) -> Res
     let (width, height) = (picture.seen.width, picture.seen.height);
     let name = file_name(pose);
     write_atomic(&root.join("rgb").join(&name), &encode_rgb(width, height, &picture.rgb)?)?;
-    write_atomic(&root.join("depth").join(&name), &encode_png16(depth)?)
+    write_atomic(&root.join("depth").join(&name), &encode_png16_quickly(depth)?)
 }
 
 /// The film's camera, ready to take any frame.

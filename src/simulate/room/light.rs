@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 
 /// A small lamp.
 struct Lamp {
-    at: Vector3<f64>,
+    at: Vector3<f32>,
     /// Brightness it gives a white surface 1 m below it, as a share of display white.
-    power: f64,
+    power: f32,
 }
 
 /// Above either long side of the desks, 2.7 m high; together they light a desk top to about 0.7.
@@ -15,18 +15,18 @@ const LAMPS: [Lamp; 2] = [
     Lamp { at: Vector3::new(0.4, -1.5, 2.7), power: 1.7 },
 ];
 /// What comes back from walls and ceiling, on faces turned up, and the loss on those turned down.
-const AMBIENT: f64 = 0.5;
-const AMBIENT_SLOPE: f64 = 0.1;
+const AMBIENT: f32 = 0.5;
+const AMBIENT_SLOPE: f32 = 0.1;
 /// A lamp is a tube, not a point: its light falls off more slowly near by, m.
-const LAMP_SIZE_M: f64 = 1.2;
+const LAMP_SIZE_M: f32 = 1.2;
 
 /// Share of display white that a white surface shows; may exceed one near a lamp.
-pub fn brightness(point: &Vector3<f64>, normal: &Vector3<f64>) -> f32 {
+pub fn brightness(point: &Vector3<f32>, normal: &Vector3<f32>) -> f32 {
     let direct = LAMPS.iter().map(|lamp| {
         let way = lamp.at - point;
         let square = way.norm_squared();
-        let cosine = normal.dot(&way).max(0.0) / square.sqrt();
-        lamp.power * cosine / (square + LAMP_SIZE_M * LAMP_SIZE_M)
+        let cosine = normal.dot(&way).max(0.0);
+        lamp.power * cosine / (square.sqrt() * (square + LAMP_SIZE_M * LAMP_SIZE_M))
     });
-    (AMBIENT + AMBIENT_SLOPE * normal.z + direct.sum::<f64>()) as f32
+    AMBIENT + AMBIENT_SLOPE * normal.z + direct.sum::<f32>()
 }

@@ -1,6 +1,7 @@
 //! What a surface looks like: a texture, how it lies there, and its answer to infrared.
 
 use super::shape::Shape;
+use super::texture::fraction;
 
 /// How a texture lies on a face.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,32 +53,38 @@ impl Paint {
     }
 
     /// Texture coordinates (in pictures) of a place on a face that is `extent` large, m, and the
-    /// pictures per metre there.
+    /// pictures per square metre there.
     #[inline]
     pub fn coordinates(&self, place: [f32; 2], extent: [f32; 2]) -> ([f32; 2], f32) {
         match self.lay {
             Lay::Fit => {
-                let scale = [1.0 / extent[0], 1.0 / extent[1]];
-                let uv = [0, 1].map(|k| place[k] * scale[k] + 0.5);
-                (uv, (scale[0] * scale[1]).sqrt())
+                let scale = extent.map(|e| 1.0 / e);
+                (std::array::from_fn(|k| place[k] * scale[k] + 0.5), scale[0] * scale[1])
             }
-            Lay::Repeat(metres) => (place.map(|p| p / metres), 1.0 / metres),
+            Lay::Repeat(metres) => {
+                let scale = 1.0 / metres;
+                (place.map(|p| p * scale), scale * scale)
+            }
             Lay::Tiles { side_m, of_m } => {
-                let cell = place.map(|p| (p / side_m).floor());
-                let cut = scatter(cell);
-                let uv = [0, 1].map(|k| (place[k] - cell[k] * side_m) / of_m + cut[k]);
-                (uv, 1.0 / of_m)
+                let tiles = place.map(|p| p / side_m);
+                let within = tiles.map(fraction);
+                let cut = scatter([tiles[0] - within[0], tiles[1] - within[1]]);
+                let scale = 1.0 / of_m;
+                let uv = std::array::from_fn(|k| within[k] * side_m * scale + cut[k]);
+                (uv, scale * scale)
             }
         }
     }
 }
 
 /// Two numbers in [0, 1) that nobody sees a pattern in: the fractions of multiples of the plastic
-/// number's powers (Roberts' R2 sequence), turned by the cell.
+/// number's powers (Roberts' R2 sequence), turned by the cell, whose numbers are whole.
 fn scatter(cell: [f32; 2]) -> [f32; 2] {
     const R2: [f32; 2] = [0.754_877_7, 0.569_840_3];
-    let index = cell[0] * 57.0 + cell[1] * 131.0;
-    R2.map(|r| (index * r).rem_euclid(1.0))
+    // A difference of floats: whole only to rounding, so made whole (a room has +-100 tiles).
+    let [i, j] = cell.map(|c| (c + 1000.5) as i32);
+    let index = (57 * i + 131 * j) as f32;
+    R2.map(|r| fraction(index * r))
 }
 
 /// The paint of every face of a shape, by [`Shape::FACES`].

@@ -8,6 +8,7 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 use super::body::Staged;
 use super::light::brightness;
 use super::shape::Touch;
+use super::texture::rough_log2;
 use super::{Room, surface};
 use crate::camera::{Camera, Rays};
 use crate::scene::{Nothing, Seen, World};
@@ -129,7 +130,7 @@ type Candidate = (f64, usize);
 struct View<'a> {
     camera: &'a RoomCamera<'a>,
     world_from_camera: Matrix3<f64>,
-    position: Vector3<f64>,
+    position: Vector3<f32>,
     staged: Vec<Staged>,
 }
 
@@ -148,7 +149,7 @@ impl<'a> View<'a> {
         View {
             camera,
             world_from_camera: world_from_camera.rotation.to_rotation_matrix().into_inner(),
-            position: world_from_camera.translation.vector,
+            position: world_from_camera.translation.vector.cast(),
             staged: camera.room.bodies.iter().map(|b| Staged::new(b, world_from_camera)).collect(),
         }
     }
@@ -213,15 +214,18 @@ impl<'a> View<'a> {
         let paint = body.paint(met.touch.face);
         let place = body.shape.place(&met.point, met.touch.face);
         let extent = body.shape.extent(met.touch.face);
-        let (uv, per_metre) =
+        let (uv, density) =
             paint.coordinates(place.cast::<f32>().into(), extent.cast::<f32>().into());
         let texture = &self.camera.room.textures[paint.texture];
-        // A pixel covers t / f, stretched by the tilt in one direction: the geometric mean.
+        // A pixel covers (t / f)^2 / cos: half the logarithm of its area in texels.
         let tilt = (met.normal.dot(direction).abs() / direction.norm()).max(FLATTEST);
-        let pixel_m = met.touch.t / self.camera.camera.fx / tilt.sqrt();
-        let lod = (pixel_m as f32 * per_metre * texture.size() as f32).log2() + SHARPEN;
-        let point = self.position + self.world_from_camera * direction * met.touch.t;
-        let light = brightness(&point, &(self.world_from_camera * met.normal));
+        let side_m = met.touch.t / self.camera.camera.fx;
+        let size = texture.size() as f32;
+        let texels = (side_m * side_m / tilt) as f32 * density * size * size;
+        let lod = 0.5 * rough_log2(texels) + SHARPEN;
+        let way = (self.world_from_camera * direction * met.touch.t).cast::<f32>();
+        let normal = (self.world_from_camera * met.normal).cast::<f32>();
+        let light = brightness(&(self.position + way), &normal);
         let light = light + paint.glow * (1.0 - light);
         let printed = texture.at(uv, lod);
         std::array::from_fn(|c| printed[c] * paint.tint[c] * light)

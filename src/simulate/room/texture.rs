@@ -35,6 +35,7 @@ impl Texture {
     /// Colour, 0 to 255, at `uv` (in pictures; repeats), where a pixel covers 2^`lod` texels.
     #[inline]
     pub fn at(&self, uv: [f32; 2], lod: f32) -> [f32; 3] {
+        let uv = uv.map(fraction);
         let top = (self.levels.len() - 1) as f32;
         let lod = lod.clamp(0.0, top);
         let fine = lod as usize;
@@ -63,15 +64,16 @@ impl Level {
         Level { size, texels }
     }
 
-    /// Between the four nearest texel centres.
+    /// Between the four nearest texel centres; `uv` in [0, 1].
     #[inline]
     fn at(&self, uv: [f32; 2]) -> [f32; 3] {
-        let [x, y] = uv.map(|v| (v - v.floor()) * self.size as f32 - 0.5);
-        let (left, up) = (x.floor(), y.floor());
-        let (s, t) = (x - left, y - up);
-        let wrap = |k: f32, step: i32| (k as i32 + step) as usize & (self.size - 1);
-        let (x0, x1) = (wrap(left, 0), wrap(left, 1));
-        let (y0, y1) = (wrap(up, 0) * self.size, wrap(up, 1) * self.size);
+        // A whole picture more keeps the numbers positive, and the mask takes it off again.
+        let [x, y] = uv.map(|v| (v + 1.0) * self.size as f32 - 0.5);
+        let (left, up) = (x as usize, y as usize);
+        let (s, t) = (x - left as f32, y - up as f32);
+        let mask = self.size - 1;
+        let (x0, x1) = (left & mask, (left + 1) & mask);
+        let (y0, y1) = ((up & mask) * self.size, ((up + 1) & mask) * self.size);
         let (a, b) = (self.texels[y0 + x0], self.texels[y0 + x1]);
         let (c, d) = (self.texels[y1 + x0], self.texels[y1 + x1]);
         let weights = [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t];
@@ -82,6 +84,20 @@ impl Level {
                 + weights[3] * f32::from(d[k])
         })
     }
+}
+
+/// The part of a number after the point, 0 to 1. (`floor` is a call on a plain x86-64.)
+#[inline]
+pub fn fraction(v: f32) -> f32 {
+    let rest = v - v as i32 as f32;
+    if rest < 0.0 { rest + 1.0 } else { rest }
+}
+
+/// log2, straight between the powers of two: at most 0.09 too low, a tenth of a level.
+#[inline]
+pub fn rough_log2(v: f32) -> f32 {
+    const ONE: f32 = 127.0;
+    v.to_bits() as f32 / (1u32 << 23) as f32 - ONE
 }
 
 #[cfg(test)]
