@@ -63,6 +63,13 @@ impl Staged {
         }
     }
 
+    /// May a ray within the cone about the unit vector `axis` meet it? The cone widens by `slope`
+    /// metres a metre. Never wrong with a no.
+    pub fn is_near(&self, axis: &Vector3<f64>, slope: f64) -> bool {
+        let stray = slope * (self.middle.norm() + self.reach);
+        self.shape.is_near(&self.origin, &(self.body_from_bundle * axis), stray)
+    }
+
     #[inline]
     pub fn touch(&self, direction: &Vector3<f64>) -> Option<Touch> {
         self.shape.touch(&self.origin, &(self.body_from_bundle * direction))

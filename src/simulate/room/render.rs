@@ -1,7 +1,8 @@
 //! What a camera sees of a room: depth, normals and colour of every pixel.
 //!
-//! Rays of a small tile of the picture go nearly the same way: bodies are sorted out a tile at a
-//! time (sphere against cone), and a ray meets only the few that are left.
+//! Rays of a small tile of the picture go nearly the same way: bodies are sorted out first for
+//! large tiles, then for the small ones in each (cone against sphere, and against the body grown by
+//! the cone's width), and a ray meets only the few that are left.
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
@@ -13,8 +14,9 @@ use super::{Room, surface};
 use crate::camera::{Camera, Rays};
 use crate::scene::{Nothing, Seen, World};
 
-/// Pixels a side: a quarter of a desk's width at arm's length, and the fastest of 8, 16 and 32.
-const TILE: usize = 16;
+/// Pixels a side of the large tiles and of the small ones in them.
+const REGION: usize = 64;
+const TILE: usize = 8;
 
 /// A frame of colour and of true depth.
 #[derive(Debug, Clone)]
@@ -29,38 +31,51 @@ pub struct RoomCamera<'a> {
     room: &'a Room,
     camera: &'a Camera,
     rays: &'a Rays,
-    tiles: Vec<Tile>,
+    regions: Vec<Region>,
 }
 
 impl<'a> RoomCamera<'a> {
     pub fn new(room: &'a Room, camera: &'a Camera, rays: &'a Rays) -> Self {
-        let rows = (0..camera.height).step_by(TILE);
-        let corners = rows.flat_map(|v| (0..camera.width).step_by(TILE).map(move |u| (u, v)));
-        let tiles = corners.map(|(u, v)| Tile::new(camera, rays, u, v)).collect();
-        RoomCamera { room, camera, rays, tiles }
+        let whole = Patch { first: (0, 0), size: (camera.width, camera.height) };
+        let region = |patch: Patch| Region {
+            tile: Tile::new(camera, rays, patch),
+            parts: patch.split(TILE).map(|part| Tile::new(camera, rays, part)).collect(),
+        };
+        RoomCamera { room, camera, rays, regions: whole.split(REGION).map(region).collect() }
     }
 
     /// From this pose; on one thread.
     pub fn take(&self, world_from_camera: &Isometry3<f64>) -> Picture {
         let view = View::new(self, world_from_camera);
         let mut picture = self.blank();
-        let mut candidates = Vec::with_capacity(self.room.bodies.len());
-        for tile in &self.tiles {
-            view.sort_out(tile, &mut candidates);
-            for i in tile.pixels(self.camera.width) {
-                view.expose(i, &candidates, &mut picture);
-            }
-        }
-        for tile in &self.tiles {
-            view.sort_out(tile, &mut candidates);
-            for i in tile.pixels(self.camera.width) {
-                if is_edge(&picture.seen, i) {
-                    let colour = view.softened(i, &candidates);
-                    put(&mut picture.rgb, i, colour);
-                }
-            }
-        }
+        self.each_tile(&view, |pixels, candidates| {
+            pixels.for_each(|i| view.expose(i, candidates, &mut picture));
+        });
+        let Picture { seen, rgb } = &mut picture;
+        self.each_tile(&view, |pixels, candidates| {
+            let edges = pixels.filter(|&i| is_edge(seen, i));
+            edges.for_each(|i| {
+                let middle = [0, 1, 2].map(|c| f32::from(rgb[3 * i + c]));
+                put(rgb, i, view.softened(i, middle, candidates));
+            });
+        });
         picture
+    }
+
+    /// The pixels of every small tile, with the bodies they may see, nearest first.
+    fn each_tile(
+        &self,
+        view: &View<'_>,
+        mut visit: impl FnMut(&mut dyn Iterator<Item = usize>, &[Candidate]),
+    ) {
+        let all: Vec<usize> = (0..self.room.bodies.len()).collect();
+        for region in &self.regions {
+            let near = view.met(&region.tile, &all);
+            for tile in &region.parts {
+                let candidates = view.sorted(&view.met(tile, &near));
+                visit(&mut tile.patch.pixels(self.camera.width), &candidates);
+            }
+        }
     }
 
     fn blank(&self) -> Picture {
@@ -81,40 +96,64 @@ impl<'a> RoomCamera<'a> {
     }
 }
 
-/// A patch of the picture and the cone about its rays.
-struct Tile {
+/// A rectangle of pixels.
+#[derive(Clone, Copy)]
+struct Patch {
     first: (usize, usize),
     size: (usize, usize),
-    axis: Vector3<f64>,
-    cosine: f64,
-    sine: f64,
 }
 
-impl Tile {
-    fn new(camera: &Camera, rays: &Rays, u: usize, v: usize) -> Self {
-        let size = (TILE.min(camera.width - u), TILE.min(camera.height - v));
-        let mut tile = Tile { first: (u, v), size, axis: Vector3::zeros(), cosine: 1.0, sine: 0.0 };
-        let unit = |i: usize| direction(rays, i).normalize();
-        tile.axis = tile.pixels(camera.width).map(unit).sum::<Vector3<f64>>().normalize();
-        let widest = tile.pixels(camera.width).map(|i| unit(i).dot(&tile.axis));
-        let half = widest.fold(1.0, f64::min).min(1.0).acos();
-        // The softened edges look half a pixel beyond the outermost rays.
-        let half = half + 1.0 / camera.fx.min(camera.fy);
-        (tile.sine, tile.cosine) = half.sin_cos();
-        tile
+impl Patch {
+    /// Into squares of this side, smaller at the right and below.
+    fn split(self, side: usize) -> impl Iterator<Item = Patch> {
+        let ((left, top), (columns, rows)) = (self.first, self.size);
+        let corners = (0..rows)
+            .step_by(side)
+            .flat_map(move |v| (0..columns).step_by(side).map(move |u| (u, v)));
+        corners.map(move |(u, v)| Patch {
+            first: (left + u, top + v),
+            size: (side.min(columns - u), side.min(rows - v)),
+        })
     }
 
     fn pixels(&self, width: usize) -> impl Iterator<Item = usize> + use<> {
         let ((u, v), (columns, rows)) = (self.first, self.size);
         (v..v + rows).flat_map(move |row| (u..u + columns).map(move |column| row * width + column))
     }
+}
 
-    /// May a ray of the cone meet the sphere? Never wrong with a no.
+/// A large tile and its parts.
+struct Region {
+    tile: Tile,
+    parts: Vec<Tile>,
+}
+
+/// A patch of the picture and the cone about its rays.
+struct Tile {
+    patch: Patch,
+    axis: Vector3<f64>,
+    cosine: f64,
+    sine: f64,
+}
+
+impl Tile {
+    fn new(camera: &Camera, rays: &Rays, patch: Patch) -> Self {
+        let unit = |i: usize| direction(rays, i).normalize();
+        let axis = patch.pixels(camera.width).map(unit).sum::<Vector3<f64>>().normalize();
+        let widest = patch.pixels(camera.width).map(|i| unit(i).dot(&axis));
+        let half = widest.fold(1.0, f64::min).acos();
+        // The softened edges look half a pixel beyond the outermost rays.
+        let (sine, cosine) = (half + 1.0 / camera.fx.min(camera.fy)).sin_cos();
+        Tile { patch, axis, cosine, sine }
+    }
+
+    /// May a ray of the cone meet the body? Never wrong with a no.
     fn meets(&self, body: &Staged) -> bool {
         let along = self.axis.dot(&body.middle);
         let aside = (body.middle.norm_squared() - along * along).max(0.0).sqrt();
         // Distance of the middle from the cone's side (less than the true one behind the apex).
         aside * self.cosine - along * self.sine <= body.reach
+            && body.is_near(&self.axis, self.sine / self.cosine)
     }
 }
 
@@ -154,12 +193,17 @@ impl<'a> View<'a> {
         }
     }
 
-    /// The bodies the tile may see, nearest first.
-    fn sort_out(&self, tile: &Tile, candidates: &mut Vec<Candidate>) {
-        candidates.clear();
-        let met = self.staged.iter().enumerate().filter(|(_, body)| tile.meets(body));
-        candidates.extend(met.map(|(index, body)| (body.nearest(), index)));
+    /// Those of the bodies that a tile may see.
+    fn met(&self, tile: &Tile, bodies: &[usize]) -> Vec<usize> {
+        bodies.iter().copied().filter(|&index| tile.meets(&self.staged[index])).collect()
+    }
+
+    /// Nearest first.
+    fn sorted(&self, bodies: &[usize]) -> Vec<Candidate> {
+        let near = |&index: &usize| (self.staged[index].nearest(), index);
+        let mut candidates: Vec<Candidate> = bodies.iter().map(near).collect();
         candidates.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        candidates
     }
 
     #[inline]
@@ -194,10 +238,10 @@ impl<'a> View<'a> {
         put(&mut picture.rgb, i, self.colour(&met, &direction));
     }
 
-    /// Mean of four rays within the pixel, where several bodies share it.
-    fn softened(&self, i: usize, candidates: &[Candidate]) -> [f32; 3] {
+    /// Mean of the pixel's middle and of rays beside it, where several bodies share the pixel.
+    fn softened(&self, i: usize, middle: [f32; 3], candidates: &[Candidate]) -> [f32; 3] {
         let Camera { fx, fy, .. } = self.camera.camera;
-        let mut sum = [0.0; 3];
+        let mut sum = middle;
         for [du, dv] in WITHIN_PIXEL {
             let aside = direction(self.camera.rays, i) + Vector3::new(du / fx, dv / fy, 0.0);
             if let Some(met) = self.meet(&aside, candidates) {
@@ -205,7 +249,7 @@ impl<'a> View<'a> {
                 (0..3).for_each(|c| sum[c] += colour[c]);
             }
         }
-        sum.map(|c| c / WITHIN_PIXEL.len() as f32)
+        sum.map(|c| c / (1 + WITHIN_PIXEL.len()) as f32)
     }
 
     /// Red, green, blue, 0 to 255.
@@ -232,9 +276,8 @@ impl<'a> View<'a> {
     }
 }
 
-/// A rotated grid: every row and column of a pixel is tried, px.
-const WITHIN_PIXEL: [[f64; 2]; 4] =
-    [[-0.125, -0.375], [0.375, -0.125], [0.125, 0.375], [-0.375, 0.125]];
+/// Beside the middle, px: with it, three rays in three thirds of the pixel, across and down.
+const WITHIN_PIXEL: [[f64; 2]; 2] = [[-0.33, 0.33], [0.33, -0.33]];
 /// Cosine below which a grazing surface blurs no further.
 const FLATTEST: f64 = 0.05;
 /// Levels: a camera's own sharpening, and corners stay corners. Half a level does not flicker.

@@ -61,6 +61,19 @@ impl Shape {
         }
     }
 
+    /// May a ray that strays from this one by up to `stray` (m) meet it? Never wrong with a no.
+    #[inline]
+    pub fn is_near(&self, o: &Vector3<f64>, d: &Vector3<f64>, stray: f64) -> bool {
+        let half = match *self {
+            Shape::Cuboid(half) => half,
+            Shape::Ball(r) => Vector3::repeat(r),
+            Shape::Drum { radius, half_height } => Vector3::new(radius, radius, half_height),
+            Shape::Shell(_) => return true,
+        };
+        let (near, far, _) = slabs(&half.add_scalar(stray), o, d);
+        near <= far && far > 0.0
+    }
+
     /// Unit normal at a point of the surface, on the side it is seen from.
     #[inline]
     pub fn normal(&self, point: &Vector3<f64>, face: usize) -> Vector3<f64> {
@@ -154,8 +167,9 @@ fn outside(over: &Vector3<f64>) -> f64 {
     over.map(|v| v.max(0.0)).norm() + over.max().min(0.0)
 }
 
-/// A cuboid is what three slabs share.
-fn touch_cuboid(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Touch> {
+/// Where a ray enters and leaves what three slabs share, and through which face it enters.
+#[inline]
+fn slabs(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> (f64, f64, usize) {
     let (mut near, mut far, mut face) = (f64::NEG_INFINITY, f64::INFINITY, 0);
     for k in 0..3 {
         let inverse = 1.0 / d[k];
@@ -167,6 +181,11 @@ fn touch_cuboid(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> Opti
         }
         far = far.min(low.max(high));
     }
+    (near, far, face)
+}
+
+fn touch_cuboid(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Touch> {
+    let (near, far, face) = slabs(half, o, d);
     (near <= far && near > 0.0).then_some(Touch { t: near, face })
 }
 

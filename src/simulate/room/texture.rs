@@ -10,7 +10,8 @@ pub struct Texture {
 struct Level {
     /// Texels a side, a power of two.
     size: usize,
-    texels: Vec<[u8; 3]>,
+    /// Red, green, blue and nothing: four bytes are one load.
+    texels: Vec<[u8; 4]>,
 }
 
 impl Texture {
@@ -20,7 +21,8 @@ impl Texture {
     /// When `size` is no power of two or does not fit the texels.
     pub fn new(size: usize, texels: Vec<[u8; 3]>) -> Self {
         assert!(size.is_power_of_two() && texels.len() == size * size, "a square picture");
-        let mut levels = vec![Level { size, texels }];
+        let padded = texels.iter().map(|&[r, g, b]| [r, g, b, 0]).collect();
+        let mut levels = vec![Level { size, texels: padded }];
         while levels[levels.len() - 1].size > 1 {
             levels.push(levels[levels.len() - 1].halved());
         }
@@ -39,12 +41,16 @@ impl Texture {
         let top = (self.levels.len() - 1) as f32;
         let lod = lod.clamp(0.0, top);
         let fine = lod as usize;
-        let share = lod - fine as f32;
-        let near = self.levels[fine].at(uv);
-        if share == 0.0 {
-            return near;
+        // Half of all places see one level only; the blend between two stays continuous.
+        let share = (2.0 * (lod - fine as f32) - 0.5).clamp(0.0, 1.0);
+        let one = |level: usize| {
+            let [r, g, b, _] = self.levels[level].at(uv);
+            [r, g, b]
+        };
+        if share == 0.0 || share == 1.0 {
+            return one(fine + share as usize);
         }
-        let far = self.levels[fine + 1].at(uv);
+        let (near, far) = (self.levels[fine].at(uv), self.levels[fine + 1].at(uv));
         std::array::from_fn(|c| near[c] + share * (far[c] - near[c]))
     }
 }
@@ -58,7 +64,7 @@ impl Level {
                 let four = [(0, 0), (1, 0), (0, 1), (1, 1)]
                     .map(|(i, j)| self.texels[(2 * y + j) * self.size + 2 * x + i]);
                 let mean = |c: usize| four.iter().map(|t| u16::from(t[c])).sum::<u16>() + 2;
-                texels.push([0, 1, 2].map(|c| (mean(c) / 4) as u8));
+                texels.push([0, 1, 2, 3].map(|c| (mean(c) / 4) as u8));
             }
         }
         Level { size, texels }
@@ -66,7 +72,7 @@ impl Level {
 
     /// Between the four nearest texel centres; `uv` in [0, 1].
     #[inline]
-    fn at(&self, uv: [f32; 2]) -> [f32; 3] {
+    fn at(&self, uv: [f32; 2]) -> [f32; 4] {
         // A whole picture more keeps the numbers positive, and the mask takes it off again.
         let [x, y] = uv.map(|v| (v + 1.0) * self.size as f32 - 0.5);
         let (left, up) = (x as usize, y as usize);
@@ -74,14 +80,12 @@ impl Level {
         let mask = self.size - 1;
         let (x0, x1) = (left & mask, (left + 1) & mask);
         let (y0, y1) = ((up & mask) * self.size, ((up + 1) & mask) * self.size);
-        let (a, b) = (self.texels[y0 + x0], self.texels[y0 + x1]);
-        let (c, d) = (self.texels[y1 + x0], self.texels[y1 + x1]);
-        let weights = [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t];
+        let corner = |x: usize, y: usize| self.texels[y + x].map(f32::from);
+        let (a, b, c, d) = (corner(x0, y0), corner(x1, y0), corner(x0, y1), corner(x1, y1));
         std::array::from_fn(|k| {
-            weights[0] * f32::from(a[k])
-                + weights[1] * f32::from(b[k])
-                + weights[2] * f32::from(c[k])
-                + weights[3] * f32::from(d[k])
+            let above = a[k] + s * (b[k] - a[k]);
+            let below = c[k] + s * (d[k] - c[k]);
+            above + t * (below - above)
         })
     }
 }
