@@ -16,11 +16,8 @@ pub struct Body {
 impl Body {
     /// How far a point of the room is from the body's surface, m; negative where it must not be.
     pub fn clearance(&self, point: &Vector3<f64>) -> f64 {
-        self.shape.clearance(&self.into_body(point))
-    }
-
-    fn into_body(&self, point: &Vector3<f64>) -> Vector3<f64> {
-        self.room_from_body.inverse_transform_point(&(*point).into()).coords
+        let in_body = self.room_from_body.inverse_transform_point(&(*point).into());
+        self.shape.clearance(&in_body.coords)
     }
 
     pub fn paint(&self, face: usize) -> &Paint {

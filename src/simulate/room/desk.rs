@@ -64,7 +64,7 @@ fn drawers(b: &mut Builder) {
         let front = Skin::all(b.plain([0.62, 0.64, 0.68]));
         b.cuboid([0.52, -0.305, z], [0.39, 0.01, 0.16], 0.0, front);
         let grip = Skin::all(b.dark());
-        b.cuboid([0.52, -0.318, z + 0.1], [0.12, 0.016, 0.02], 0.0, grip);
+        b.cuboid([0.52, -0.32, z + 0.1], [0.12, 0.016, 0.02], 0.0, grip);
     }
 }
 

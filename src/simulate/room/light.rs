@@ -1,6 +1,6 @@
 //! Lambert's law under two ceiling lamps, and what the white walls give back from everywhere.
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 
 /// A small lamp.
 struct Lamp {
@@ -20,13 +20,32 @@ const AMBIENT_SLOPE: f32 = 0.1;
 /// A lamp is a tube, not a point: its light falls off more slowly near by, m.
 const LAMP_SIZE_M: f32 = 1.2;
 
-/// Share of display white that a white surface shows; may exceed one near a lamp.
-pub fn brightness(point: &Vector3<f32>, normal: &Vector3<f32>) -> f32 {
-    let direct = LAMPS.iter().map(|lamp| {
-        let way = lamp.at - point;
-        let square = way.norm_squared();
-        let cosine = normal.dot(&way).max(0.0);
-        lamp.power * cosine / (square.sqrt() * (square + LAMP_SIZE_M * LAMP_SIZE_M))
-    });
-    AMBIENT + AMBIENT_SLOPE * normal.z + direct.sum::<f32>()
+/// The lamps as one camera has them about itself: what is seen needs no turning into the room.
+pub struct Light {
+    lamps: [Lamp; 2],
+    up: Vector3<f32>,
+}
+
+impl Light {
+    pub fn about(world_from_camera: &Isometry3<f64>) -> Self {
+        let camera_from_world = world_from_camera.inverse().cast::<f32>();
+        let lamps = LAMPS.map(|lamp| Lamp {
+            at: camera_from_world.transform_point(&lamp.at.into()).coords,
+            power: lamp.power,
+        });
+        Light { lamps, up: camera_from_world * Vector3::z() }
+    }
+
+    /// Share of display white that a white surface shows at a point (m), with this unit normal,
+    /// both in the camera's frame; may exceed one near a lamp.
+    #[inline]
+    pub fn on(&self, point: &Vector3<f32>, normal: &Vector3<f32>) -> f32 {
+        let direct = self.lamps.iter().map(|lamp| {
+            let way = lamp.at - point;
+            let square = way.norm_squared();
+            let cosine = normal.dot(&way).max(0.0);
+            lamp.power * cosine / (square.sqrt() * (square + LAMP_SIZE_M * LAMP_SIZE_M))
+        });
+        AMBIENT + AMBIENT_SLOPE * normal.dot(&self.up) + direct.sum::<f32>()
+    }
 }

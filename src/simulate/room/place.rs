@@ -100,7 +100,7 @@ fn anchors(poses: &[Pose]) -> Vec<Vector2<f64>> {
     let (low, high) = bounds(poses);
     let middle = 0.5 * (low + high).xy();
     let gaze = looked_at(poses).filter(|p| (p - middle).norm() < GAZE_REACH_M);
-    let ahead: Vector2<f64> = poses.iter().map(|p| level_gaze(p)).sum();
+    let ahead: Vector2<f64> = poses.iter().map(level_gaze).sum();
     let ahead = ahead.try_normalize(1e-9).map(|d| middle + AHEAD_M * d);
     gaze.into_iter().chain(ahead).chain([middle]).collect()
 }

@@ -4,10 +4,10 @@
 //! large tiles, then for the small ones in each (cone against sphere, and against the body grown by
 //! the cone's width), and a ray meets only the few that are left.
 
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 use super::body::Staged;
-use super::light::brightness;
+use super::light::Light;
 use super::shape::Touch;
 use super::texture::rough_log2;
 use super::{Room, surface};
@@ -168,8 +168,7 @@ type Candidate = (f64, usize);
 /// A room as seen from one pose.
 struct View<'a> {
     camera: &'a RoomCamera<'a>,
-    world_from_camera: Matrix3<f64>,
-    position: Vector3<f32>,
+    light: Light,
     staged: Vec<Staged>,
 }
 
@@ -187,8 +186,7 @@ impl<'a> View<'a> {
     fn new(camera: &'a RoomCamera<'a>, world_from_camera: &Isometry3<f64>) -> Self {
         View {
             camera,
-            world_from_camera: world_from_camera.rotation.to_rotation_matrix().into_inner(),
-            position: world_from_camera.translation.vector.cast(),
+            light: Light::about(world_from_camera),
             staged: camera.room.bodies.iter().map(|b| Staged::new(b, world_from_camera)).collect(),
         }
     }
@@ -267,9 +265,8 @@ impl<'a> View<'a> {
         let size = texture.size() as f32;
         let texels = (side_m * side_m / tilt) as f32 * density * size * size;
         let lod = 0.5 * rough_log2(texels) + SHARPEN;
-        let way = (self.world_from_camera * direction * met.touch.t).cast::<f32>();
-        let normal = (self.world_from_camera * met.normal).cast::<f32>();
-        let light = brightness(&(self.position + way), &normal);
+        let point = (direction * met.touch.t).cast::<f32>();
+        let light = self.light.on(&point, &met.normal.cast());
         let light = light + paint.glow * (1.0 - light);
         let printed = texture.at(uv, lod);
         std::array::from_fn(|c| printed[c] * paint.tint[c] * light)

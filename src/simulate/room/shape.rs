@@ -147,7 +147,7 @@ impl Shape {
 /// Outward normal of a cuboid's face.
 fn axis(face: usize) -> Vector3<f64> {
     let mut normal = Vector3::zeros();
-    normal[face / 2] = if face % 2 == 0 { -1.0 } else { 1.0 };
+    normal[face / 2] = if face.is_multiple_of(2) { -1.0 } else { 1.0 };
     normal
 }
 

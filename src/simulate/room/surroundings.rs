@@ -92,9 +92,10 @@ fn bookcase(b: &mut Builder, which: usize) {
         let row = which + k as usize;
         let spines = b.prints.spines[row % b.prints.spines.len()];
         let skin = Skin::all(b.plain([0.3, 0.28, 0.26])).with(Shape::FRONT, picture(spines));
-        let (width, aside) = if row % 3 == 0 { (0.62, -0.16) } else { (0.92, 0.0) };
+        let has_tin = row.is_multiple_of(3);
+        let (width, aside) = if has_tin { (0.62, -0.16) } else { (0.92, 0.0) };
         b.cuboid([aside, 0.03, z + 0.022], [width, 0.2, 0.27], 0.0, skin);
-        if row % 3 == 0 {
+        if has_tin {
             let tin = Skin::all(picture(b.prints.labels[row % b.prints.labels.len()]));
             b.drum([0.3, 0.0, z + 0.022], 0.07, 0.2, tin);
         }
