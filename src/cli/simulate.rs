@@ -6,6 +6,7 @@ use kinoise::effects::Active;
 use kinoise::io::{Assumed, open, write_atomic};
 use kinoise::model::{Direction, Domain, PAPER_EQ1};
 use kinoise::scene::{Board, PATCH_SIDE_M, Print, Target, WHITE};
+use kinoise::simulate::room::Film;
 use kinoise::simulate::{
     Grid, GridView, Physics, Scenery, Shoot, ViewPlan, kinect_v1, plan_grid, plan_like,
 };
@@ -13,6 +14,7 @@ use kinoise::units::shortest;
 use kinoise::{Form, NoiseModel, Sensor, SigmaModel};
 
 use super::common::{Bar, Global, numbers, say};
+use super::simulate_room::{self, FilmArguments, RoomArguments};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -29,9 +31,11 @@ pub struct Arguments {
     like: Option<PathBuf>,
     #[command(flatten)]
     poses: Poses,
-    /// Frames a view
-    #[arg(long, default_value_t = 1)]
-    frames: usize,
+    /// Frames a view [default: 1]; with --room, of the film [default: the whole path]
+    #[arg(long)]
+    frames: Option<usize>,
+    #[command(flatten)]
+    room: RoomArguments,
     /// Make the image 1 to 8 times smaller each way [default: 1, which is 640 x 480]; not with a
     /// model that carries its own sensor
     #[arg(long, value_name = "N")]
@@ -202,7 +206,10 @@ fn plans(
     let Some(like) = &arguments.like else {
         let poses = arguments.poses.views()?;
         let shuffled = !arguments.poses.ordered;
-        return Ok((plan_grid(&poses, &scenery, arguments.frames, shuffled, seed), None));
+        return Ok((
+            plan_grid(&poses, &scenery, arguments.frames.unwrap_or(1), shuffled, seed),
+            None,
+        ));
     };
     let recording = open(like, &Assumed::default())?;
     let (plans, excluded) = plan_like(&recording, scenery.reference_error_m.unwrap_or(0.0), seed);
@@ -216,12 +223,28 @@ fn plans(
 }
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
-    if arguments.frames == 0 {
+    if arguments.frames == Some(0) {
         bail!("--frames 0: a view has at least one");
     }
     let (sensor, sigma, mut effects) = camera(arguments)?;
     effects.extend(arguments.effects.iter().cloned());
     Active::refuse_twice(&effects)?;
+    if arguments.room.room {
+        let shot = FilmArguments {
+            output: &arguments.output,
+            frames: arguments.frames,
+            recipe: arguments.recipe.as_deref(),
+            // A model brings its own sensor; without one it is what TUM readers assume.
+            sensor: if arguments.model.is_some() {
+                sensor
+            } else {
+                Film::kinect(arguments.shrink.unwrap_or(1))
+            },
+            sigma,
+            effects,
+        };
+        return simulate_room::run(&arguments.room, shot, global);
+    }
     let (views, recorded_by) = plans(arguments, global)?;
     let sensor = recorded_by.unwrap_or(sensor);
     tell_of_clamped(&views, &sigma);
@@ -236,7 +259,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     shoot.write(&arguments.output, &|done, all| bar.step(done, all))?;
     drop(bar);
     if let Some(path) = &arguments.recipe {
-        write_recipe(path, &shoot)?;
+        write_recipe(path, &shoot.recipe())?;
     }
     let frames: usize = shoot.views.iter().map(|v| v.stamps.len()).sum();
     say(format!(
@@ -265,8 +288,8 @@ fn tell_of_clamped(views: &[ViewPlan], sigma: &SigmaModel) {
     }
 }
 
-fn write_recipe(path: &Path, shoot: &Shoot) -> anyhow::Result<()> {
-    let mut text = serde_json::to_string_pretty(&shoot.recipe())?;
+pub(super) fn write_recipe(path: &Path, recipe: &serde_json::Value) -> anyhow::Result<()> {
+    let mut text = serde_json::to_string_pretty(recipe)?;
     text.push('\n');
     Ok(write_atomic(path, text.as_bytes())?)
 }

@@ -116,7 +116,7 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
     Ok(recording)
 }
 
-fn read_sensor(path: &Path, unknown: &mut UnknownKeys) -> Result<Sensor> {
+pub(super) fn read_sensor(path: &Path, unknown: &mut UnknownKeys) -> Result<Sensor> {
     let wrong =
         |what: String| Error::Json { path: path.to_path_buf(), line: 0, what, remedy: REMEDY_JSON };
     let text = read_text(path)?;

@@ -6,6 +6,7 @@ mod images;
 mod layout;
 mod list;
 mod output;
+mod quick;
 mod stills;
 mod tum;
 mod unknown;
@@ -15,6 +16,7 @@ pub use layout::{ViewFile, write_recording_file, write_view_notes};
 pub use list::{FrameList, read_list};
 pub(crate) use output::hex;
 pub use output::{OutputDir, sha256_hex, write_atomic};
+pub use quick::{encode_png16_quickly, encode_rgb};
 
 use std::path::{Path, PathBuf};
 
@@ -62,12 +64,14 @@ pub fn open(path: &Path, assumed: &Assumed) -> Result<Recording> {
             "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs",
         ));
     }
-    let recording = if path.join(layout::DESCRIPTION).is_file() {
+    // A described TUM sequence has its frames at the root, a recording in one folder a view.
+    let sequence = path.join(tum::DEPTH_LIST).is_file();
+    let recording = if path.join(layout::DESCRIPTION).is_file() && !sequence {
         refuse(assumed, path)?;
         layout::open(path)?
     } else if path.join(dump::INDEX).is_file() {
         dump::open(path, assumed)?
-    } else if path.join(tum::DEPTH_LIST).is_file() {
+    } else if sequence {
         tum::open(path, assumed)?
     } else {
         folder::open(path, assumed)?

@@ -34,14 +34,25 @@ pub struct Shooting<'a> {
 
 impl FormulaSensor<'_> {
     pub fn begin<'a>(&'a self, seen: &'a Seen) -> Shooting<'a> {
+        self.begin_at(seen, sigma_of(seen, self.sigma), HashMap::new())
+    }
+
+    /// With sigma (m) already known, and what the effects remember of the frames before: for a
+    /// camera that moves, whose every frame sees something else.
+    pub(super) fn begin_at<'a>(
+        &'a self,
+        seen: &'a Seen,
+        sigma: Vec<f32>,
+        memory: HashMap<&'static str, Vec<f32>>,
+    ) -> Shooting<'a> {
         Shooting {
             camera: self,
             effects: Active::in_light_path(self.effects),
             seen,
             ambient_lux: ROOM_LUX,
-            sigma: without_rounding(sigma_of(seen, self.sigma), seen, self.sensor),
+            sigma: without_rounding(sigma, seen, self.sensor),
             light: light_of(seen, self.rays),
-            memory: HashMap::new(),
+            memory,
         }
     }
 }
@@ -57,6 +68,10 @@ impl Shooting<'_> {
     /// In a room of this much light, lx, instead of an office's.
     pub fn under(self, ambient_lux: f64) -> Self {
         Shooting { ambient_lux, ..self }
+    }
+
+    pub(super) fn into_memory(self) -> HashMap<&'static str, Vec<f32>> {
+        self.memory
     }
 
     pub fn shoot(&mut self, instant: Instant) -> Shot {

@@ -194,7 +194,7 @@ impl<'a> ViewFolder<'a> {
 }
 
 /// Never mix a simulation into somebody's recording.
-fn refuse_full(root: &Path) -> Result<()> {
+pub(super) fn refuse_full(root: &Path) -> Result<()> {
     let full = std::fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_some());
     if full {
         return Err(Error::recording(
