@@ -9,6 +9,7 @@ mod kinect;
 mod like;
 mod plan;
 mod shoot;
+pub mod speckle;
 
 pub use formula::{FormulaSensor, Shooting, Shot, shoot};
 pub use grid::{Grid, GridView};
