@@ -28,7 +28,7 @@ enum Command {
     Calibrate(calibrate::Arguments),
     /// Fit sigma(z, theta) to a table z_m,theta_rad,sigma_m[,n]
     Fit(fit::Arguments),
-    /// Make a recording by formula
+    /// Make a recording by formula or by light
     Simulate(simulate::Arguments),
     /// The whole road on bundled data
     Demo(demo::Arguments),

@@ -23,9 +23,9 @@ pub struct Pattern {
 
 /// The pattern is the unit's own, whatever the seed of a simulation.
 const UNIT: Seed = Seed(0x4b69_6e65_6374);
-/// Places a row that span the image: three tiles of 211 (Reichinger, "Kinect Pattern Uncovered",
-/// from memory; physics.md, 13).
-const PLACES_ACROSS: f64 = 633.0;
+/// Three tiles of 211 places span the 640 columns (Reichinger, "Kinect Pattern Uncovered", from
+/// memory; physics.md, 13).
+const PITCH_PX: f64 = 640.0 / 633.0;
 /// Places that hold a dot: about one in nine, a 9 x 9 window sees nine (same source).
 const FILLED: f64 = 0.11;
 /// Gamma shape of the light of a dot (Landau, Choo and Beling 2015).
@@ -39,10 +39,9 @@ pub struct Field {
 }
 
 impl Pattern {
-    /// Dots over `field`, on a grid of which [`PLACES_ACROSS`] places span `image_width` (a
-    /// difference of normalised coordinates).
-    pub fn over(field: &Field, image_width: f64) -> Self {
-        let pitch = image_width / PLACES_ACROSS;
+    /// Dots over `field`, made for a camera of this focal length, px.
+    pub fn over(field: &Field, focal_px: f64) -> Self {
+        let pitch = PITCH_PX / focal_px;
         let places = |[low, high]: [f64; 2]| ((high - low) / pitch).ceil() as usize + 1;
         let (columns, rows) = (places(field.x), places(field.y));
         let energy = Gamma::new(ENERGY_SHAPE, 1.0 / ENERGY_SHAPE).expect("positive parameters");
@@ -91,10 +90,10 @@ mod tests {
     #[test]
     fn the_pattern_is_as_dense_as_a_kinects_and_its_dots_stand_apart() {
         let field = Field { x: [-0.55, 0.55], y: [-0.41, 0.41] };
-        let Pattern { dots } = Pattern::over(&field, 1.1);
-        let expected = 0.11 * 633.0 * (633.0 * 0.82 / 1.1);
+        let Pattern { dots } = Pattern::over(&field, 580.0);
+        let pitch = 640.0 / 633.0 / 580.0;
+        let expected = 0.11 * 1.1 * 0.82 / (pitch * pitch);
         assert!((dots.len() as f64 / expected - 1.0).abs() < 0.01, "{}", dots.len());
-        let pitch = 1.1 / 633.0;
         for (i, a) in dots.iter().enumerate().step_by(37) {
             let near =
                 |b: &&Dot| (a.x - b.x).abs() < 1.5 * pitch && (a.y - b.y).abs() < 1.5 * pitch;

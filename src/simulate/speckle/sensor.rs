@@ -184,7 +184,7 @@ fn pattern_for(camera: &Camera, baseline_m: f64, candidates: Candidates) -> Patt
     let nearest = candidates.last() as f64 / camera.fx + baseline_m / REFERENCE_M;
     field.x = [field.x[0] - nearest - mx, field.x[1] + mx];
     field.y = [field.y[0] - my, field.y[1] + my];
-    Pattern::over(&field, camera.width as f64 / camera.fx)
+    Pattern::over(&field, camera.fx)
 }
 
 /// The factory: a white plane across the axis, cold, no speckle, no noise.
