@@ -1,8 +1,9 @@
 //! From the projector to the surface and into the lens: where every dot lands in the picture.
 
-use nalgebra::{Matrix2, Vector3};
+use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::causes::Causes;
+use super::grain::Grain;
 use super::moment::Moment;
 use super::pattern::{Dot, Pattern};
 use crate::camera::Camera;
@@ -58,13 +59,13 @@ impl<'a> Optics<'a> {
         }
     }
 
-    /// The pattern on the world; `speckle` multiplies the light of each dot.
-    pub fn spots(&self, world: &dyn World, pattern: &Pattern, speckle: &[f32]) -> Vec<Spot> {
-        let lit = pattern.dots.iter().zip(speckle);
-        lit.filter_map(|(dot, &factor)| self.spot(world, dot, f64::from(factor))).collect()
+    /// The pattern on the world, with the speckle of each dot.
+    pub fn spots(&self, world: &dyn World, pattern: &Pattern, grains: &[Grain]) -> Vec<Spot> {
+        let lit = pattern.dots.iter().zip(grains);
+        lit.filter_map(|(dot, grain)| self.spot(world, dot, grain)).collect()
     }
 
-    fn spot(&self, world: &dyn World, dot: &Dot, speckle: f64) -> Option<Spot> {
+    fn spot(&self, world: &dyn World, dot: &Dot, grain: &Grain) -> Option<Spot> {
         let beam = self.beam(dot)?;
         let hit = world.cast(&self.projector, &beam)?;
         let point = self.projector + beam * hit.t;
@@ -72,19 +73,20 @@ impl<'a> Optics<'a> {
             return None;
         }
         let (x, y) = (point.x / point.z, point.y / point.z);
-        let (u, v) = self.camera.project(x, y);
         let shape = self.picture_from_pattern(&beam, &hit, (x, y));
         let beam_sd = BEAM_PX / self.camera.fx;
+        let (u, v) = self.camera.project(x, y);
+        let aside = shape * Vector2::from(grain.aside) * beam_sd;
         let image = shape * shape.transpose() * (beam_sd * beam_sd);
         let covariance = image + Matrix2::identity() * smear(self.blur_px);
         let irradiance =
             -hit.normal.dot(&beam) / beam.norm() / (hit.t * hit.t * beam.norm_squared());
         // cos^4 of the angle to the axis: less aperture, longer way, slanted pixel.
         let vignetting = (1.0 + x * x + y * y).powi(-2);
-        let brightness = irradiance * vignetting * hit.albedo / WHITE * dot.energy * speckle;
+        let brightness = irradiance * vignetting * hit.albedo / WHITE * dot.energy * grain.light;
         let spread = (image.determinant() / covariance.determinant()).sqrt();
         let peak = full_light() * self.light * brightness * spread;
-        Some(Spot { u, v, peak, covariance })
+        Some(Spot { u: u + aside.x, v: v + aside.y, peak, covariance })
     }
 
     /// Diffraction fixes sines, not tangents: they grow with the wavelength.

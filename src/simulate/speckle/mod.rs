@@ -13,6 +13,7 @@
 
 mod causes;
 mod detector;
+mod grain;
 mod light;
 mod matcher;
 mod moment;

@@ -1,5 +1,6 @@
 //! The dots a projector sends out: fixed for the life of the unit.
 
+use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_distr::{Distribution, Gamma};
 
@@ -46,9 +47,13 @@ impl Pattern {
         let (columns, rows) = (places(field.x), places(field.y));
         let energy = Gamma::new(ENERGY_SHAPE, 1.0 / ENERGY_SHAPE).expect("positive parameters");
         let mut rng = UNIT.stream("simulate/speckle/energy");
+        let mut aside = UNIT.stream("simulate/speckle/aside");
+        // Anywhere in its place: on a strict grid of nearly a pixel's pitch all dots of a column
+        // would meet the pixels alike, and the beat would paint stripes of 90 px.
+        let mut within = |place: usize| pitch * (place as f64 + aside.random_range(-0.5..0.5));
         let dot = |place: usize| Dot {
-            x: field.x[0] + pitch * (place % columns) as f64,
-            y: field.y[0] + pitch * (place / columns) as f64,
+            x: field.x[0] + within(place % columns),
+            y: field.y[0] + within(place / columns),
             energy: energy.sample(&mut rng),
         };
         Pattern { dots: free_places(columns, rows).into_iter().map(dot).collect() }
@@ -96,7 +101,7 @@ mod tests {
         assert!((dots.len() as f64 / expected - 1.0).abs() < 0.01, "{}", dots.len());
         for (i, a) in dots.iter().enumerate().step_by(37) {
             let near =
-                |b: &&Dot| (a.x - b.x).abs() < 1.5 * pitch && (a.y - b.y).abs() < 1.5 * pitch;
+                |b: &&Dot| (a.x - b.x).abs() < pitch && (a.y - b.y).abs() < pitch;
             assert_eq!(dots.iter().filter(near).count(), 1, "dot {i}");
         }
         let mean = dots.iter().map(|d| d.energy).sum::<f64>() / dots.len() as f64;

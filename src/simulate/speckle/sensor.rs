@@ -1,9 +1,8 @@
 //! The Kinect by light as a whole: made once, then pointed at benches.
 
-use rand_distr::{Distribution, Gamma};
-
 use super::causes::Causes;
 use super::detector::{Ambient, expose};
+use super::grain::Grain;
 use super::light::Optics;
 use super::matcher;
 use super::moment::Moment;
@@ -64,16 +63,10 @@ impl SpeckleSensor {
         Filming { sensor: self, bench, seed, taken: None }
     }
 
-    /// Light of each dot relative to its mean: the same as long as the target stands still.
-    fn speckle(&self, seed: Seed, view: usize, epoch: i64) -> Vec<f32> {
-        let contrast = self.causes.speckle;
-        if contrast == 0.0 {
-            return vec![1.0; self.pattern.dots.len()];
-        }
-        let (shape, scale) = (contrast.powi(-2), contrast * contrast);
-        let gamma = Gamma::new(shape, scale).expect("positive parameters");
+    /// The same as long as the target stands still.
+    fn grains(&self, seed: Seed, view: usize, epoch: i64) -> Vec<Grain> {
         let mut rng = seed.stream(&format!("simulate/speckle/{view}/{epoch}"));
-        self.pattern.dots.iter().map(|_| gamma.sample(&mut rng) as f32).collect()
+        Grain::draw(self.pattern.dots.len(), self.causes.speckle, &mut rng)
     }
 
     fn ambient(&self, bench: &Bench) -> Ambient {
@@ -90,7 +83,7 @@ impl SpeckleSensor {
         Ambient::Light(light.collect())
     }
 
-    fn picture(&self, world: &dyn World, moment: &Moment, speckle: &[f32]) -> Picture {
+    fn picture(&self, world: &dyn World, moment: &Moment, grains: &[Grain]) -> Picture {
         let optics = Optics::at(moment, &self.causes, &self.camera, self.baseline_m);
         Picture::dark(self.camera.width, self.camera.height, 0).with(&optics.spots(
             world,
@@ -130,8 +123,8 @@ impl Filming<'_> {
 
     fn take(&self, view: usize, moment: Moment) -> Taken {
         let bench = moment.bench(&self.sensor.causes, self.bench);
-        let speckle = self.sensor.speckle(self.seed, view, moment.speckle_epoch());
-        let dots = self.sensor.picture(&bench, &moment, &speckle);
+        let grains = self.sensor.grains(self.seed, view, moment.speckle_epoch());
+        let dots = self.sensor.picture(&bench, &moment, &grains);
         Taken { moment, dots, ambient: self.sensor.ambient(&bench) }
     }
 }
@@ -197,7 +190,7 @@ fn record_reference(
 ) -> Picture {
     let plane = Bench::bare(Plane::tilted(REFERENCE_M, 0.0, 0.0), Target::Wall);
     let optics = Optics::at(&Moment::FACTORY, causes, camera, baseline_m);
-    let even = vec![1.0; pattern.dots.len()];
+    let even = vec![Grain::NONE; pattern.dots.len()];
     let (first, columns) = candidates.reference_columns(camera.width);
     Picture::dark(columns, camera.height, first).with(&optics.spots(&plane, pattern, &even))
 }
