@@ -8,11 +8,11 @@
 mod common;
 
 use common::speckle::{FB, Watch, frontal, kinect, wall, watch};
-use kinoise::simulate::{Physics, Scenery, Shoot, kinect_v1, plan_grid};
-use kinoise::{CalibrateOptions, Form, Seed};
 use kinoise::effects::Instant;
 use kinoise::scene::{Bench, Board, Target};
 use kinoise::simulate::speckle::{Causes, SpeckleSensor};
+use kinoise::simulate::{Physics, Scenery, Shoot, kinect_v1, plan_grid};
+use kinoise::{CalibrateOptions, Form, Seed};
 
 fn causes(text: &[&str]) -> Causes {
     text.iter().fold(Causes::default(), |c, t| c.parse(t).expect("a cause"))
@@ -237,7 +237,9 @@ fn the_same_seed_gives_the_same_bytes_on_one_thread_and_two() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         let moving = causes(&["motion_mps=0.1", "warm_up_k=3", "ambient_dn=20", "lens_k1=-0.1"]);
-        pool.install(|| small_shoot(2, 4, moving).write(folder.path(), &|_, _| ()).expect("written"));
+        pool.install(|| {
+            small_shoot(2, 4, moving).write(folder.path(), &|_, _| ()).expect("written")
+        });
         let mut files: Vec<(String, Vec<u8>)> = Vec::new();
         for view in ["0000", "0003", "0005"] {
             for file in ["depth/0000.png", "depth/0001.png", "ir/0001.png"] {
@@ -245,7 +247,10 @@ fn the_same_seed_gives_the_same_bytes_on_one_thread_and_two() {
                 files.push((name.clone(), std::fs::read(folder.path().join(name)).expect("there")));
             }
         }
-        files.push(("recording.json".into(), std::fs::read(folder.path().join("recording.json")).expect("there")));
+        files.push((
+            "recording.json".into(),
+            std::fs::read(folder.path().join("recording.json")).expect("there"),
+        ));
         files
     };
     let (one, two) = (bytes(1), bytes(2));
@@ -262,9 +267,11 @@ fn a_calibration_finds_a_kinects_disparity_noise() {
     let recording = kinoise::io::open(&root, &kinoise::io::Assumed::default()).expect("opens");
     assert!(recording.sensor.camera.distortion.is_none());
     let options = CalibrateOptions { form: Some(Form::Disparity), ..Default::default() };
-    let views = kinoise::measure_recording(&recording, &options.measure, &|_, _| ()).expect("measured");
+    let views =
+        kinoise::measure_recording(&recording, &options.measure, &|_, _| ()).expect("measured");
     let calibration = kinoise::model_of(&recording, &views, &options).expect("fitted");
-    let sigma_d = calibration.model.sigma.parameters[0] * recording.sensor.disparity_px_m().expect("known");
+    let sigma_d =
+        calibration.model.sigma.parameters[0] * recording.sensor.disparity_px_m().expect("known");
     println!("sigma_d {sigma_d:.3} px");
     assert!((0.05..0.15).contains(&sigma_d), "{sigma_d}");
 }

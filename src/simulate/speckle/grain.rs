@@ -28,7 +28,7 @@ impl Grain {
             return vec![Grain::NONE; count];
         }
         let gamma = Gamma::new(contrast.powi(-2), contrast * contrast).expect("positive");
-        let mut normal = |rng: &mut Stream| -> f64 {
+        let normal = |rng: &mut Stream| -> f64 {
             let n: f64 = StandardNormal.sample(rng);
             contrast * n
         };

@@ -100,8 +100,7 @@ mod tests {
         let expected = 0.11 * 1.1 * 0.82 / (pitch * pitch);
         assert!((dots.len() as f64 / expected - 1.0).abs() < 0.01, "{}", dots.len());
         for (i, a) in dots.iter().enumerate().step_by(37) {
-            let near =
-                |b: &&Dot| (a.x - b.x).abs() < pitch && (a.y - b.y).abs() < pitch;
+            let near = |b: &&Dot| (a.x - b.x).abs() < pitch && (a.y - b.y).abs() < pitch;
             assert_eq!(dots.iter().filter(near).count(), 1, "dot {i}");
         }
         let mean = dots.iter().map(|d| d.energy).sum::<f64>() / dots.len() as f64;

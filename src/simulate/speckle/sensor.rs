@@ -88,7 +88,7 @@ impl SpeckleSensor {
         Picture::dark(self.camera.width, self.camera.height, 0).with(&optics.spots(
             world,
             &self.pattern,
-            speckle,
+            grains,
         ))
     }
 }
