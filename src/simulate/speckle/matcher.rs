@@ -73,7 +73,8 @@ fn match_band(
     let pair = |v: usize| RowPair { picture: seen.row(v), reference: reference.row(v).grey };
     let first = top.max(half);
     let end = (top + shift.len() / seen.width).min(seen.height.saturating_sub(half));
-    if first >= end {
+    // A picture smaller than the window has no answer.
+    if first >= end || seen.width <= 2 * half {
         return;
     }
     let mut products = ColumnProducts::new(seen.width, reference.candidates.count);

@@ -84,8 +84,11 @@ impl Reference {
     }
 
     pub fn row(&self, v: usize) -> ReferenceRow<'_> {
-        let at =
-            |values| -> &[f32] { &<[f32]>::split_at(values, v * self.columns).1[..self.columns] };
-        ReferenceRow { grey: at(&self.grey), mean: at(&self.mean), weight: at(&self.weight) }
+        let span = v * self.columns..(v + 1) * self.columns;
+        ReferenceRow {
+            grey: &self.grey[span.clone()],
+            mean: &self.mean[span.clone()],
+            weight: &self.weight[span],
+        }
     }
 }

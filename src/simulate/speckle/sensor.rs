@@ -85,11 +85,8 @@ impl SpeckleSensor {
 
     fn picture(&self, world: &dyn World, moment: &Moment, grains: &[Grain]) -> Picture {
         let optics = Optics::at(moment, &self.causes, &self.camera, self.baseline_m);
-        Picture::dark(self.camera.width, self.camera.height, 0).with(&optics.spots(
-            world,
-            &self.pattern,
-            grains,
-        ))
+        let spots = optics.spots(world, &self.pattern, grains);
+        Picture::dark(self.camera.width, self.camera.height, 0).with(&spots)
     }
 }
 
@@ -189,7 +186,7 @@ fn record_reference(
     candidates: Candidates,
 ) -> Picture {
     let plane = Bench::bare(Plane::tilted(REFERENCE_M, 0.0, 0.0), Target::Wall);
-    let optics = Optics::at(&Moment::FACTORY, causes, camera, baseline_m);
+    let optics = Optics { light: 1.0, ..Optics::at(&Moment::FACTORY, causes, camera, baseline_m) };
     let even = vec![Grain::NONE; pattern.dots.len()];
     let (first, columns) = candidates.reference_columns(camera.width);
     Picture::dark(columns, camera.height, first).with(&optics.spots(&plane, pattern, &even))
