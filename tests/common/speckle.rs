@@ -176,6 +176,19 @@ impl Watch {
         (squares / blocks.len() as f64).sqrt()
     }
 
+    /// Columns from .. to without light: a tenth of what the first six have.
+    pub fn dark_columns(&self, columns: (f64, f64)) -> f64 {
+        let black = f64::from(self.infrared.iter().copied().min().unwrap_or(0));
+        let light: Vec<f64> = (columns.0.ceil() as usize..columns.1 as usize)
+            .map(|u| {
+                let column = self.infrared[u..].iter().step_by(WIDTH);
+                column.map(|dn| f64::from(*dn) - black).sum::<f64>() / HEIGHT as f64
+            })
+            .collect();
+        let wall = light[..6].iter().sum::<f64>() / 6.0;
+        light.iter().filter(|l| **l < 0.1 * wall).count() as f64
+    }
+
     /// Mean infrared light in the middle of the picture over the darkest pixel there, DN.
     pub fn middle_light_dn(&self) -> f64 {
         let middle: Vec<f64> = (0..WIDTH * HEIGHT)

@@ -71,9 +71,9 @@ causes! {
          what is published: a disparity sd of 0.08 px at 4 m; with 1 it is 0.12 px)";
     ambient_dn ["DN"] 0.0..=1000.0, 0.0:
         "sunlight or lamps on a white surface, in numbers of the 10-bit camera";
-    speckle ["1"] 0.0..=2.0, 0.469:
-        "laser speckle: sd over mean of a dot's light (Landau: Gamma of shape 4.54), and its \
-         shift over its radius";
+    speckle ["1"] 0.0..=2.0, 0.324:
+        "laser speckle: sd over mean of a dot's light, and its shift over its radius (half of \
+         Landau's Gamma of shape 4.54; the other half is the projector's)";
     lens_k1 ["1"] -0.3..=0.3, 0.0:
         "radial distortion r^2 of the infrared lens that recording.json does not know";
     lens_k2 ["1"] -0.3..=0.3, 0.0:
