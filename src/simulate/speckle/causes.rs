@@ -67,13 +67,13 @@ causes! {
         "least correlation that counts as an answer (in the dark 81 pixels correlate by chance \
          with sd 1/9; the best of 100 candidates exceeds 0.4 once in a hundred)";
     light ["1"] 0.0..=100.0, 2.0:
-        "projector power over that of Landau's law of dot peaks (with 2 the noise far away is \
-         what is published: a disparity sd of 0.08 px at 4 m; with 1 it is 0.12 px)";
+        "projector power over that of Landau's law of dot peaks; chosen, not derived: with 2 the \
+         disparity sd at 4 m is 0.10 px, with 1 it is 0.13 px, published is 0.08 px";
     ambient_dn ["DN"] 0.0..=1000.0, 0.0:
         "sunlight or lamps on a white surface, in numbers of the 10-bit camera";
     speckle ["1"] 0.0..=2.0, 0.324:
         "laser speckle: sd over mean of a dot's light, and its shift over its radius (half of \
-         Landau's Gamma of shape 4.54; the other half is the projector's)";
+         Landau's Gamma of shape 4.54, the other half is the projector's: an assumed split)";
     lens_k1 ["1"] -0.3..=0.3, 0.0:
         "radial distortion r^2 of the infrared lens that recording.json does not know";
     lens_k2 ["1"] -0.3..=0.3, 0.0:
