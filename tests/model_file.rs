@@ -112,7 +112,7 @@ fn a_simulation_from_a_perpendicular_model_measures_as_one() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let root = folder.path().join("recording");
     let mut shots = common::shots(common::grid(&[1.5], &[60.0]), 4, 7);
-    let Physics::Formula { sigma, .. } = &mut shots.physics;
+    let Physics::Formula { sigma, .. } = &mut shots.physics else { panic!("by formula") };
     sigma.direction = Direction::Perpendicular;
     shots.write(&root, &|_, _| ()).expect("written");
     let recording = kinoise::io::open(&root, &Default::default()).expect("opens");

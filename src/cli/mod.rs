@@ -30,7 +30,7 @@ enum Command {
     Calibrate(calibrate::Arguments),
     /// Fit sigma(z, theta) to a table z_m,theta_rad,sigma_m[,n]
     Fit(fit::Arguments),
-    /// Make a recording, or a film of a room, by formula
+    /// Make a recording, or a film of a room, by formula or by light
     Simulate(simulate::Arguments),
     /// The catalogue of physical effects: what each does, how it shows, what it is taken for
     Effects(effects::Arguments),

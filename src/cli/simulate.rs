@@ -7,6 +7,7 @@ use kinoise::io::{Assumed, open, write_atomic};
 use kinoise::model::{Direction, Domain, PAPER_EQ1};
 use kinoise::scene::{Board, PATCH_SIDE_M, Print, Target, WHITE};
 use kinoise::simulate::room::Film;
+use kinoise::simulate::speckle::Causes;
 use kinoise::simulate::{
     Grid, GridView, Physics, Scenery, Shoot, ViewPlan, kinect_v1, plan_grid, plan_like,
 };
@@ -23,6 +24,12 @@ pub struct Arguments {
     /// model.json to shoot with [default: the paper's Eq. 1, taken at its word outside 1 to 4 m too]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
+    /// The world: errors by formula, or dots seen and matched in which errors arise by themselves
+    #[arg(long, value_enum, default_value_t = PhysicsArgument::Formula)]
+    physics: PhysicsArgument,
+    /// With --physics speckle: set a cause, such as ambient_dn=200; repeatable. An unknown name is answered with the list
+    #[arg(long = "cause", value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    causes: Vec<String>,
     /// Add a physical effect (see kinoise effects); repeatable
     #[arg(long = "effect", value_name = "ID:KEY=VALUE", value_parser = effect)]
     effects: Vec<Active>,
@@ -92,6 +99,14 @@ struct SceneryArguments {
     /// Write the temperature of the room into every view
     #[arg(long)]
     conditions: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+enum PhysicsArgument {
+    /// sigma(z, theta) of the model, and effects
+    Formula,
+    /// A Kinect v1 by light: pattern, lens, chip, block matching
+    Speckle,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -247,14 +262,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     }
     let (views, recorded_by) = plans(arguments, global)?;
     let sensor = recorded_by.unwrap_or(sensor);
-    tell_of_clamped(&views, &sigma);
-    let shoot = Shoot {
-        sensor,
-        views,
-        physics: Physics::Formula { sigma, effects },
-        infrared: arguments.infrared,
-        seed: global.seed(),
-    };
+    let physics = physics(arguments, sigma, effects)?;
+    if let Physics::Formula { sigma, .. } = &physics {
+        tell_of_clamped(&views, sigma);
+    }
+    let shoot = Shoot { sensor, views, physics, infrared: arguments.infrared, seed: global.seed() };
     let bar = Bar::new("views");
     shoot.write(&arguments.output, &|done, all| bar.step(done, all))?;
     drop(bar);
@@ -268,6 +280,25 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         arguments.output.display()
     ));
     global.print_json(&serde_json::json!({"views": shoot.views.len(), "frames": frames, "output": arguments.output}))
+}
+
+/// Which world; each refuses what only the other knows.
+fn physics(
+    arguments: &Arguments,
+    sigma: SigmaModel,
+    effects: Vec<Active>,
+) -> anyhow::Result<Physics> {
+    if arguments.physics == PhysicsArgument::Formula {
+        if !arguments.causes.is_empty() {
+            bail!("--cause belongs to --physics speckle; by formula there is --effect");
+        }
+        return Ok(Physics::Formula { sigma, effects });
+    }
+    if !arguments.effects.is_empty() {
+        bail!("--effect belongs to --physics formula; by light there is --cause");
+    }
+    let causes = arguments.causes.iter().try_fold(Causes::default(), |c, text| c.parse(text))?;
+    Ok(Physics::Speckle { causes })
 }
 
 fn tell_of_clamped(views: &[ViewPlan], sigma: &SigmaModel) {

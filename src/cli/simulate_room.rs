@@ -16,7 +16,7 @@ use super::simulate::write_recipe;
 #[derive(Debug, Args)]
 pub struct RoomArguments {
     /// Film an office with two desks: a TUM-layout sequence with colour, depth and ground truth
-    #[arg(long, conflicts_with_all = ["like", "grid", "distances", "tilts", "azimuths", "ordered", "board", "wall_target", "patches", "wall", "clutter", "reference_error", "conditions", "infrared"])]
+    #[arg(long, conflicts_with_all = ["like", "grid", "distances", "tilts", "azimuths", "ordered", "board", "wall_target", "patches", "wall", "clutter", "reference_error", "conditions", "infrared", "physics", "causes"])]
     pub room: bool,
     /// Poses to film along: timestamp tx ty tz qx qy qz qw, z up [default: once around the desks]
     #[arg(long, value_name = "POSES", requires = "room")]

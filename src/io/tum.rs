@@ -5,8 +5,8 @@ use std::path::Path;
 
 use super::layout::{DESCRIPTION, read_sensor};
 use super::list::read_list;
-use super::unknown::UnknownKeys;
 use super::stills::{Film, Footage};
+use super::unknown::UnknownKeys;
 use super::{Assumed, assumed_sensor, images};
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;

@@ -11,6 +11,7 @@ mod plan;
 pub mod room;
 mod shoot;
 mod sigma_table;
+pub mod speckle;
 
 pub use formula::{FormulaSensor, Shooting, Shot, shoot};
 pub use grid::{Grid, GridView};

@@ -6,6 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::grid::GridView;
 use crate::camera::{Camera, Rays};
+use crate::effects::Instant;
 use crate::rng::Seed;
 use crate::scene::{Bench, Patch, Print, Seen, Target, WHITE};
 use crate::view::{TargetSize, ViewNotes};
@@ -34,6 +35,19 @@ impl ViewPlan {
             hidden.for_each(|(i, _)| seen.depth[i] = f32::NAN);
         }
         seen
+    }
+
+    /// Time stamps and instants of the frames of view number `index`; `session_s` is the time
+    /// stamp at which the session began.
+    pub fn instants(
+        &self,
+        index: usize,
+        session_s: f64,
+    ) -> impl Iterator<Item = (f64, Instant)> + '_ {
+        self.stamps.iter().enumerate().map(move |(frame, &stamp)| {
+            let view_s = stamp - self.stamps[0];
+            (stamp, Instant { view: index, frame, session_s: stamp - session_s, view_s })
+        })
     }
 }
 
