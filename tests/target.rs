@@ -133,7 +133,7 @@ fn draw_with(things: &[Thing], seed: u64, kind: Noise) -> Scene {
         Noise::White => w,
         Noise::Kinect => RAW[0] + RAW[1] * ((w - RAW[0]) / RAW[1]).round(),
     };
-    for i in 0..camera.pixels() {
+    for (i, noise) in noise.iter().enumerate() {
         let (x, y) = rays.at(i);
         let ray = Vector3::new(x, y, 1.0);
         let nearest = things
@@ -144,7 +144,7 @@ fn draw_with(things: &[Thing], seed: u64, kind: Noise) -> Scene {
             .filter(|(_, z)| *z < 8.0);
         let hole = rng.random::<f64>() < 0.02;
         w.push(match nearest {
-            Some((_, z)) if !hole => code(1.0 / (z + sigma.sigma(z, 0.0) * noise[i])) as f32,
+            Some((_, z)) if !hole => code(1.0 / (z + sigma.sigma(z, 0.0) * noise)) as f32,
             _ => f32::NAN,
         });
         seen.push(nearest.map(|(k, _)| k));
