@@ -35,10 +35,16 @@ const MEAN_SIGMAS: f64 = 5.0;
 /// ... and it scatters about its own mean by less than this. Noise correlated over 9 px leaves
 /// below 1 with a spread of 0.4; a wall that crosses the plane at an angle grows without bound.
 const SPREAD_SIGMAS: f64 = 1.5;
+/// ... or than this many times what adjacent nodes differ: white noise has a ratio of 1, and of
+/// 1.5 where 9 px are correlated; a wall over a fifth of the neighbourhood one of 2.6, and more
+/// where it covers more.
+const SPREAD_PER_ROUGHNESS: f64 = 2.0;
 /// Single nodes at the rim are on the plane within this: they have no neighbourhood to help.
 const RIM_SIGMAS: f64 = 2.5;
-/// Residuals count at most this many sigma, so that one gross error decides nothing.
-const CLIP_SIGMAS: f64 = 6.0;
+/// In sums residuals count at most this many sigma, so that one gross error decides nothing.
+const CLIP_SIGMAS: f32 = 6.0;
+/// What is off by less just misses the plane: a surface that curves away passes through here.
+const MISS_SIGMAS: f64 = 8.0;
 /// Nodes to an independent sample: that window, 9 x 9 px, at 3 px to a node.
 const CORRELATED_NODES: f64 = 9.0;
 /// Sigma is taken for at least this much, m: lens errors of a Kinect bend a near wall (0.56 m)
@@ -66,22 +72,19 @@ impl Lattice {
         let (columns, rows) = (width.div_ceil(pitch), height.div_ceil(pitch));
         let mut sample = vec![None; columns * rows];
         let mut mean = vec![None; columns * rows];
-        for node in 0..columns * rows {
+        for (node, (sample, mean)) in sample.iter_mut().zip(&mut mean).enumerate() {
             let (u0, v0) = ((node % columns) * pitch, (node / columns) * pitch);
-            let (mut sum, mut n) = (Vector3::zeros(), 0.0);
-            let mut sum_w = 0.0;
-            for v in v0..(v0 + pitch).min(height) {
-                let start = v * width + u0;
-                let row = &w[start..v * width + (u0 + pitch).min(width)];
-                for (i, w) in (start..).zip(row).filter(|(_, w)| w.is_finite()) {
-                    let (x, y) = rays.at(i);
-                    sum += Vector3::new(x, y, 1.0);
-                    sum_w += f64::from(*w);
-                    n += 1.0;
-                    sample[node].get_or_insert(i as u32);
-                }
+            let (mut sum, mut sum_w, mut n) = (Vector3::zeros(), 0.0, 0.0);
+            let pixels = (v0..(v0 + pitch).min(height))
+                .flat_map(|v| v * width + u0..v * width + (u0 + pitch).min(width));
+            for i in pixels.filter(|&i| w[i].is_finite()) {
+                let (x, y) = rays.at(i);
+                sum += Vector3::new(x, y, 1.0);
+                sum_w += f64::from(w[i]);
+                n += 1.0;
+                sample.get_or_insert(i as u32);
             }
-            mean[node] = (n > 0.0).then(|| (sum / n, sum_w / n));
+            *mean = (n > 0.0).then(|| (sum / n, sum_w / n));
         }
         Lattice { pitch, columns, rows, sample, mean }
     }
@@ -99,7 +102,8 @@ impl Lattice {
         self.sample.iter().map(Option::is_some)
     }
 
-    /// Residual of each node's mean in sigma of the gauge; NaN without a measurement.
+    /// Residual of each node's mean in sigma of the gauge, at most [`MISS_SIGMAS`]; NaN without a
+    /// measurement.
     pub fn residuals(&self, gauge: &Gauge<'_>) -> Vec<f32> {
         let q = gauge.fit.plane.q;
         self.mean
@@ -108,25 +112,54 @@ impl Lattice {
                 Some((ray, w)) if q.dot(ray) > 0.0 => {
                     let expected = q.dot(ray);
                     let t = (w - expected) / gauge.sigma(expected);
-                    t.clamp(-CLIP_SIGMAS, CLIP_SIGMAS) as f32
+                    t.clamp(-MISS_SIGMAS, MISS_SIGMAS) as f32
                 }
-                Some(_) => CLIP_SIGMAS as f32,
+                Some(_) => MISS_SIGMAS as f32,
                 None => f32::NAN,
             })
             .collect()
     }
 
     /// Nodes whose neighbourhood, by mean and by spread, is noise about the plane.
+    ///
+    /// Noise may be larger there than at the seed (a depth error that does not grow with depth
+    /// is, on the near side of a tilted target), or hold gross errors: then neighbours differ as
+    /// much as the neighbourhood spreads, about the plane. Where another surface begins they do
+    /// not.
     pub fn quiet(&self, residuals: &[f32]) -> Vec<bool> {
         let sums = self.boxed(residuals);
+        let rough = self.roughness(residuals);
         sums.iter()
+            .zip(&rough)
             .zip(residuals)
-            .map(|(&[n, sum, squares], r)| {
+            .map(|((&[n, sum, squares], rough), r)| {
+                let mean = f64::from(sum / n);
+                let spread = f64::from(squares / n) - mean * mean;
+                let noise = mean * mean < spread && spread < SPREAD_PER_ROUGHNESS * rough;
                 r.is_finite()
-                    && f64::from(sum.abs()) < MEAN_SIGMAS * f64::from(n)
-                    && f64::from(squares - sum * sum / n) < SPREAD_SIGMAS.powi(2) * f64::from(n)
+                    && mean.abs() < MEAN_SIGMAS
+                    && (noise || spread < SPREAD_SIGMAS.powi(2))
             })
             .collect()
+    }
+
+    /// Half the mean squared difference of adjacent nodes around each node: the variance, were
+    /// the noise white.
+    fn roughness(&self, residuals: &[f32]) -> Vec<f64> {
+        let pairs: Vec<[f32; 2]> = (0..residuals.len())
+            .map(|node| {
+                let right = (node % self.columns + 1 < self.columns).then_some(node + 1);
+                let below = Some(node + self.columns).filter(|&below| below < residuals.len());
+                right
+                    .into_iter()
+                    .chain(below)
+                    .map(|other| 0.5 * (residuals[other] - residuals[node]).powi(2))
+                    .filter(|half| half.is_finite())
+                    .fold([0.0, 0.0], |[n, sum], half| [n + 1.0, sum + half])
+            })
+            .collect();
+        let sums = self.summed_around(&pairs);
+        sums.iter().map(|[n, sum]| f64::from(sum / n.max(1.0))).collect()
     }
 
     /// Nodes whose neighbourhood as a whole is off the plane.
@@ -142,19 +175,27 @@ impl Lattice {
 
     /// Number, sum and sum of squares of the measured residuals around each node.
     pub fn boxed(&self, residuals: &[f32]) -> Vec<[f32; 3]> {
-        let add = |a: &mut [f32; 3], b: [f32; 3]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
-        let moments = |r: f32| if r.is_finite() { [1.0, r, r * r] } else { [0.0; 3] };
-        let mut across = vec![[0f32; 3]; residuals.len()];
-        let mut both = vec![[0f32; 3]; residuals.len()];
-        for (node, sums) in across.iter_mut().enumerate() {
+        let moments = |r: &f32| {
+            let r = r.clamp(-CLIP_SIGMAS, CLIP_SIGMAS);
+            if r.is_finite() { [1.0, r, r * r] } else { [0.0; 3] }
+        };
+        self.summed_around(&residuals.iter().map(moments).collect::<Vec<_>>())
+    }
+
+    /// Sums over the nodes around each node.
+    fn summed_around<const N: usize>(&self, values: &[[f32; N]]) -> Vec<[f32; N]> {
+        let add = |a: &mut [f32; N], b: &[f32; N]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+        let mut across = vec![[0f32; N]; values.len()];
+        let mut both = vec![[0f32; N]; values.len()];
+        for (node, sum) in across.iter_mut().enumerate() {
             let (first, c) = (node - node % self.columns, node % self.columns);
             let (low, high) = (c.saturating_sub(AROUND), (c + AROUND).min(self.columns - 1));
-            residuals[first + low..=first + high].iter().for_each(|&r| add(sums, moments(r)));
+            values[first + low..=first + high].iter().for_each(|v| add(sum, v));
         }
-        for (node, sums) in both.iter_mut().enumerate() {
+        for (node, sum) in both.iter_mut().enumerate() {
             let (row, c) = (node / self.columns, node % self.columns);
             for r in row.saturating_sub(AROUND)..=(row + AROUND).min(self.rows - 1) {
-                add(sums, across[r * self.columns + c]);
+                add(sum, &across[r * self.columns + c]);
             }
         }
         both
@@ -173,17 +214,18 @@ impl Lattice {
     }
 
     /// Share of the outline that misses the plane by little: where a board ends depth steps, where
-    /// a curved surface leaves its plane it does not. The image's border is outline, too.
+    /// a curved surface leaves its plane it does not. The outline is taken two nodes out, as those
+    /// next to the rim mix both sides of a step; the image's border is outline, too.
     pub fn curving_away(&self, mask: &[bool], residuals: &[f32]) -> f64 {
+        let next = self.dilated(mask);
         let (mut outline, mut near) = (0u32, 0u32);
-        for (node, next) in self.dilated(mask).iter().enumerate() {
+        for (node, around) in self.dilated(&next).iter().enumerate() {
             let (c, r) = (node % self.columns, node / self.columns);
             let border = c == 0 || r == 0 || c + 1 == self.columns || r + 1 == self.rows;
-            if mask[node] {
-                outline += u32::from(border);
-            } else if *next {
+            if *around && (!next[node] || border) {
                 outline += 1;
-                near += u32::from(f64::from(residuals[node].abs()) < CLIP_SIGMAS);
+                let misses = !mask[node] && f64::from(residuals[node].abs()) < MISS_SIGMAS;
+                near += u32::from(misses);
             }
         }
         f64::from(near) / f64::from(outline.max(1))
