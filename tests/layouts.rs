@@ -151,11 +151,8 @@ const ERRORS: f64 = 5.0;
 #[track_caller]
 fn one_agrees(view: &ViewMeasurement, pose: &GridView, code: DepthCode) {
     let z = view.z_m;
-    let expected = |z: f64| {
-        // Rounding to the code adds its own variance, step^2/12 (Sheppard).
-        let step = code.step_inverse(z) * z * z;
-        truth().sigma(z, pose.theta_rad).hypot(step / 12f64.sqrt())
-    };
+    // Sigma is of stored words: the simulator leaves room for what rounding to the code adds.
+    let expected = |z: f64| truth().sigma(z, pose.theta_rad);
     let sigma = expected(z);
     let n = view.whole.n as f64;
     // The plane's depth on the axis: a mean over n residuals; half a word step for the rounding of
