@@ -7,6 +7,7 @@ mod forms;
 mod heldout;
 mod local;
 mod outliers;
+mod paule_mandel;
 mod quality;
 mod robust;
 mod rows;
