@@ -1,5 +1,7 @@
 //! The main road: recording in, noise model out. Reads like the paper's section II.
 
+mod warnings;
+
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -8,19 +10,22 @@ use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
-use crate::io::sha256_hex;
+use crate::io::{hex, sha256_hex};
 use crate::measure::{
     MeasureOptions, Planes, SigmaKind, SigmaTable, ViewMeasurement, Workbench, measure_view,
 };
 use crate::model::{
-    FitSummary, Form, HeldOut, NoiseModel, Provenance, SigmaFit, compare_forms, fit,
+    Direction, FitSummary, Form, HeldOut, NoiseModel, Provenance, SigmaFit, SigmaModel,
+    compare_forms, sort_out,
 };
 use crate::view::{Excluded, Recording, RecordingFile};
 
 /// Settings of a calibration.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CalibrateOptions {
+    /// How views are measured.
     pub measure: MeasureOptions,
+    /// Which standard deviation the model describes.
     pub kind: SigmaKind,
     /// The form to fit; `None` takes the one that predicts left-out distances best.
     pub form: Option<Form>,
@@ -29,18 +34,24 @@ pub struct CalibrateOptions {
 /// All views of a recording, measured.
 #[derive(Debug, Clone)]
 pub struct Measurements {
+    /// In the recording's order.
     pub views: Vec<ViewMeasurement>,
+    /// Views that could not be opened or measured, and why.
     pub excluded: Vec<Excluded>,
 }
 
 /// A calibrated sensor.
 #[derive(Debug, Clone)]
 pub struct Calibration {
+    /// What was fitted to.
     pub table: SigmaTable,
+    /// The fit with its diagnostics.
     pub fit: SigmaFit,
     /// How well each form predicts distances left out, best first; empty with too few distances.
     pub comparison: Vec<HeldOut>,
+    /// What is exchanged with other programs.
     pub model: NoiseModel,
+    /// What to know before trusting it, the most important first.
     pub warnings: Vec<String>,
 }
 
@@ -92,7 +103,7 @@ pub fn measure(
 /// Fit the noise model to the measured views.
 ///
 /// # Errors
-/// When the views are too few or too alike for the form.
+/// When the views are too few or too alike for the form, or a file that describes them is gone.
 pub fn model_of(
     recording: &Recording,
     measurements: &Measurements,
@@ -106,10 +117,10 @@ pub fn model_of(
         });
     }
     let (fit, comparison) = fit_chosen(&table, options.form)?;
-    let warnings = warnings(recording, measurements, &fit);
+    let warnings = warnings::of(recording, measurements, &fit);
     let mut provenance = Provenance::now(Some(options.measure.seed.0));
     provenance.options = describe(options, fit.form);
-    provenance.sha256 = hashes(recording, measurements);
+    provenance.sha256 = hashes(recording, measurements)?;
     let model = noise_model(
         Some(RecordingFile::of(&recording.sensor)),
         &fit,
@@ -141,9 +152,10 @@ pub fn model_of_table(
 }
 
 fn fit_chosen(table: &SigmaTable, form: Option<Form>) -> Result<(SigmaFit, Vec<HeldOut>)> {
-    let comparison = compare_forms(table);
+    let sorted = sort_out(table);
+    let comparison = compare_forms(&sorted.kept);
     let form = form.or(comparison.first().map(|h| h.form)).unwrap_or(Form::Paper);
-    Ok((fit(table, form)?, comparison))
+    Ok((sorted.fit(form)?, comparison))
 }
 
 fn noise_model(
@@ -153,10 +165,13 @@ fn noise_model(
     kind: SigmaKind,
     provenance: Provenance,
 ) -> NoiseModel {
-    let residual = if kind == SigmaKind::Paper { "perpendicular" } else { "axial" };
+    let direction = match kind {
+        SigmaKind::Paper => Direction::Perpendicular,
+        SigmaKind::Spatial | SigmaKind::Temporal | SigmaKind::Total => Direction::Axial,
+    };
     NoiseModel {
         sensor,
-        sigma: fit.model(),
+        sigma: SigmaModel { direction, ..fit.model() },
         effects: Vec::new(),
         fit: FitSummary {
             views: fit.views,
@@ -164,8 +179,6 @@ fn noise_model(
             rmse_m: fit.rmse_m,
             r2: fit.r2,
             heldout: comparison.iter().find(|h| h.form == fit.form).map(|h| h.rmse_relative),
-            degrees_of_freedom: fit.degrees_of_freedom,
-            residual: residual.into(),
             remarks: fit.remarks.clone(),
         },
         provenance,
@@ -192,15 +205,17 @@ fn describe(options: &CalibrateOptions, form: Form) -> Map<String, Value> {
 }
 
 /// Hash of the description files, and of every view's frames.
-fn hashes(recording: &Recording, measurements: &Measurements) -> Map<String, Value> {
+///
+/// # Errors
+/// When a description file can no longer be read: a hash of nothing would vouch for the wrong input.
+fn hashes(recording: &Recording, measurements: &Measurements) -> Result<Map<String, Value>> {
     let mut map = Map::new();
     let mut described = Sha256::new();
     let mut files: Vec<&PathBuf> = recording.described_by.iter().collect();
     files.sort();
     for path in files {
-        described.update(std::fs::read(path).unwrap_or_default());
+        described.update(std::fs::read(path).map_err(|e| Error::read(path, e))?);
     }
-    let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02x}")).collect::<String>();
     map.insert("description".into(), json!(hex(&described.finalize())));
     let mut frames = Sha256::new();
     for view in &measurements.views {
@@ -208,34 +223,5 @@ fn hashes(recording: &Recording, measurements: &Measurements) -> Map<String, Val
         frames.update(view.digest);
     }
     map.insert("frames".into(), json!(hex(&frames.finalize())));
-    map
-}
-
-/// What a person should know before trusting the model; the most important first.
-fn warnings(recording: &Recording, measurements: &Measurements, fit: &SigmaFit) -> Vec<String> {
-    let mut warnings = Vec::new();
-    for e in &measurements.excluded {
-        warnings.push(e.to_string());
-    }
-    // Views left out while opening stand here too.
-    warnings.extend(recording.remarks.iter().cloned());
-    let total = measurements.views.len();
-    let smooth = measurements.views.iter().filter(|v| v.correlation.persists).count();
-    if smooth > 0 {
-        warnings.push(format!(
-            "in {smooth} of {total} views the residual is smooth over more than 40 px: sigma there holds a \
-             systematic error (lens, bands; see the pictures), and frames do not average it out"
-        ));
-    }
-    let single = measurements.views.iter().filter(|v| v.frames < 2).count();
-    if single > 0 {
-        warnings.push(format!(
-            "{single} of {total} views have a single frame: no temporal sigma from them"
-        ));
-    }
-    warnings.extend(fit.remarks.iter().cloned());
-    for view in &measurements.views {
-        warnings.extend(view.notes.iter().map(|note| format!("view {}: {note}", view.name)));
-    }
-    warnings
+    Ok(map)
 }

@@ -2,13 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
-/// Every failure the library reports. `Display` is one line that a person can act on.
+/// Every failure the library reports. `Display` is one line that a person can act on: where
+/// (`path`, `line`, `view`), what is wrong there (`what`, `cause`, `why`), what to do (`remedy`).
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The operating system refused to read or write.
-    #[error("{}: {source}; {remedy}", path.display())]
-    Io { path: PathBuf, source: std::io::Error, remedy: &'static str },
+    ///
+    /// The cause stands in the message and is therefore not [`std::error::Error::source`] too: a
+    /// chain of causes would say it twice.
+    #[error("{}: {cause}; {remedy}", path.display())]
+    Io { path: PathBuf, cause: std::io::Error, remedy: &'static str },
     /// A file that is not the JSON it should be.
     #[error("{}{}: {what}; {remedy}", path.display(), at_line(*line))]
     Json {
@@ -47,6 +51,7 @@ pub enum Error {
     Solver { what: String, remedy: &'static str },
 }
 
+/// With this library's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 fn at_line(line: usize) -> String {
@@ -54,18 +59,18 @@ fn at_line(line: usize) -> String {
 }
 
 impl Error {
-    pub(crate) fn read(path: &Path, source: std::io::Error) -> Self {
+    pub(crate) fn read(path: &Path, cause: std::io::Error) -> Self {
         Error::Io {
             path: path.to_path_buf(),
-            source,
+            cause,
             remedy: "check that the path is right and readable",
         }
     }
 
-    pub(crate) fn write(path: &Path, source: std::io::Error) -> Self {
+    pub(crate) fn write(path: &Path, cause: std::io::Error) -> Self {
         Error::Io {
             path: path.to_path_buf(),
-            source,
+            cause,
             remedy: "choose a folder that can be written with -o",
         }
     }

@@ -2,11 +2,16 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::units::shortest;
+
 /// One depth image: 16-bit words, row-major, still in the sensor's own code.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
+    /// Columns, px.
     pub width: usize,
+    /// Rows, px.
     pub height: usize,
+    /// The words, `width * height` of them; [`DepthCode`] turns them into metres.
     pub words: Vec<u16>,
 }
 
@@ -14,16 +19,31 @@ pub struct Frame {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DepthCode {
     /// z = word / units_per_metre (5000 in the TUM layout, 1000 for OpenNI and ROS).
-    Metric { units_per_metre: f64, invalid: u16 },
+    Metric {
+        /// Words a metre, 1/m.
+        units_per_metre: f64,
+        /// The word for "no measurement"; 0 is one too.
+        invalid: u16,
+    },
     /// z = 1 / (offset + slope * word): the 11-bit words of a Kinect v1.
-    Disparity { offset: f64, slope: f64, invalid: u16 },
+    Disparity {
+        /// Inverse depth of the word 0, 1/m.
+        offset: f64,
+        /// Inverse depth a word, 1/m; negative for a Kinect v1.
+        slope: f64,
+        /// The word for "no measurement".
+        invalid: u16,
+    },
 }
 
 /// The JSON face of [`DepthCode::Disparity`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RawDisparity {
+    /// Inverse depth of the word 0, 1/m.
     pub offset: f64,
+    /// Inverse depth a word, 1/m.
     pub slope: f64,
+    /// The word for "no measurement".
     #[serde(default = "default_invalid_disparity")]
     pub invalid: u16,
 }
@@ -85,22 +105,30 @@ impl DepthCode {
         DepthTable { metres }
     }
 
+    /// What is wrong with these numbers, if anything.
     pub fn fault(&self) -> Option<String> {
         match *self {
-            DepthCode::Metric { units_per_metre, .. } => (!(units_per_metre.is_finite()
-                && units_per_metre > 0.0))
-                .then(|| format!("units_per_metre = {units_per_metre} must be positive")),
-            DepthCode::Disparity { offset, slope, .. } => (!offset.is_finite()
-                || !slope.is_finite()
-                || slope == 0.0)
-                .then(|| format!("raw_disparity offset = {offset}, slope = {slope} give no depth")),
+            DepthCode::Metric { units_per_metre, .. } => {
+                (!(units_per_metre.is_finite() && units_per_metre > 0.0)).then(|| {
+                    format!("units_per_metre = {} must be positive", shortest(units_per_metre))
+                })
+            }
+            DepthCode::Disparity { offset, slope, .. } => {
+                (!offset.is_finite() || !slope.is_finite() || slope == 0.0).then(|| {
+                    format!(
+                        "raw_disparity offset = {}, slope = {} give no depth",
+                        shortest(offset),
+                        shortest(slope)
+                    )
+                })
+            }
         }
     }
 }
 
 /// Farther than any sensor of this kind can see: 1/(c0 + c1 raw) has a pole, and words just
 /// before it would otherwise count as walls a kilometre away.
-const FARTHEST_M: f64 = 100.0;
+pub(crate) const FARTHEST_M: f64 = 100.0;
 
 /// Look-up from word to depth.
 #[derive(Debug, Clone)]

@@ -4,17 +4,23 @@ use std::path::PathBuf;
 
 use crate::camera::Camera;
 use crate::frame::{DepthCode, RawDisparity};
+use crate::units::shortest;
 use serde::{Deserialize, Serialize};
 
 /// The unit that was recorded: everything `recording.json` says about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensor {
+    /// Make and model, in words.
     pub name: String,
+    /// Which unit it is.
     pub serial: Option<String>,
+    /// "normal" or "near".
     pub mode: Option<String>,
+    /// The depth image's camera.
     pub camera: Camera,
     /// Distance between projector and camera, m.
     pub baseline_m: Option<f64>,
+    /// How a stored word becomes a depth.
     pub code: DepthCode,
 }
 
@@ -24,12 +30,14 @@ impl Sensor {
         self.baseline_m.map(|b| self.camera.fx * b)
     }
 
+    /// What is wrong with these numbers, if anything.
     pub fn fault(&self) -> Option<String> {
         let baseline = self
             .baseline_m
             .filter(|b| !(b.is_finite() && *b > 0.0))
-            .map(|b| format!("baseline_m = {b} must be positive"));
-        self.camera.fault().or_else(|| self.code.fault()).or(baseline)
+            .map(|b| format!("baseline_m = {} must be positive", shortest(b)));
+        let camera = self.camera.fault().map(|fault| fault.to_string());
+        camera.or_else(|| self.code.fault()).or(baseline)
     }
 }
 
@@ -66,18 +74,26 @@ impl Region {
 /// Width and height of the target.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TargetSize {
+    /// Width, m.
     pub width_m: f64,
+    /// Height, m.
     pub height_m: f64,
 }
 
 /// What `view.json` may say.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ViewNotes {
+    /// How large the target is.
     pub target: Option<TargetSize>,
+    /// Depth of the target's plane on the optical axis, measured by other means, m.
     pub reference_distance_m: Option<f64>,
+    /// Where the target is in the image; by default what the principal point looks at.
     pub region: Option<Region>,
+    /// Temperature of the sensor or the room, degrees Celsius.
     pub temperature_c: Option<f64>,
+    /// Light on the target, lx.
     pub ambient_lux: Option<f64>,
+    /// For people.
     pub notes: Option<String>,
 }
 
@@ -86,23 +102,31 @@ pub struct ViewNotes {
 pub struct FrameRef {
     /// Seconds, one clock for the whole recording.
     pub timestamp: f64,
+    /// The image file.
     pub path: PathBuf,
 }
 
 /// One still pose of target and sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
+    /// The folder's name, or the file's or the stretch's where a view has no folder.
     pub name: String,
+    /// Depth frames in time order.
     pub depth: Vec<FrameRef>,
+    /// Infrared images in time order; may be none.
     pub infrared: Vec<FrameRef>,
+    /// What its `view.json` says.
     pub notes: ViewNotes,
 }
 
 /// Views in name order, their frames not yet read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
+    /// The folder it was opened from.
     pub root: PathBuf,
+    /// The unit that recorded it.
     pub sensor: Sensor,
+    /// The views that could be opened.
     pub views: Vec<View>,
     /// Views that could not be opened.
     pub excluded: Vec<Excluded>,
@@ -115,7 +139,9 @@ pub struct Recording {
 /// A view that was not used, and why.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excluded {
+    /// Its name.
     pub view: String,
+    /// What went wrong, where, and what to do.
     pub reason: String,
 }
 
@@ -137,20 +163,29 @@ impl std::fmt::Display for Excluded {
 /// `recording.json`, as the contract lays it down.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordingFile {
+    /// [`RECORDING_FORMAT`].
     pub format: String,
+    /// Make and model, in words.
     pub sensor: String,
+    /// Which unit it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub serial: Option<String>,
+    /// "normal" or "near".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mode: Option<String>,
+    /// width, height, fx, fy, cx, cy, distortion; px.
     #[serde(flatten)]
     pub camera: Camera,
+    /// Distance between projector and camera, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub baseline_m: Option<f64>,
+    /// Words a metre, 1/m; this or `raw_disparity`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units_per_metre: Option<f64>,
+    /// The word for "no measurement" beside `units_per_metre`; 0 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub invalid: Option<u16>,
+    /// z = 1/(offset + slope word).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub raw_disparity: Option<RawDisparity>,
 }
@@ -159,6 +194,7 @@ pub struct RecordingFile {
 pub const RECORDING_FORMAT: &str = "recording/1";
 
 impl RecordingFile {
+    /// The description of `sensor`.
     pub fn of(sensor: &Sensor) -> Self {
         let (units_per_metre, invalid, raw_disparity) = match sensor.code {
             DepthCode::Metric { units_per_metre, invalid } => {

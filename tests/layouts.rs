@@ -151,11 +151,8 @@ const ERRORS: f64 = 5.0;
 #[track_caller]
 fn one_agrees(view: &ViewMeasurement, pose: &GridView, code: DepthCode) {
     let z = view.z_m;
-    let expected = |z: f64| {
-        // Rounding to the code adds its own variance, step^2/12 (Sheppard).
-        let step = code.step_inverse(z) * z * z;
-        truth().sigma(z, pose.theta_rad).hypot(step / 12f64.sqrt())
-    };
+    // Sigma is of stored words: the simulator leaves room for what rounding to the code adds.
+    let expected = |z: f64| truth().sigma(z, pose.theta_rad);
     let sigma = expected(z);
     let n = view.whole.n as f64;
     // The plane's depth on the axis: a mean over n residuals; half a word step for the rounding of
@@ -250,6 +247,34 @@ fn empty_frames_neither_join_nor_part_a_still_stretch() {
     frames.insert(0, empty);
     let (recording, m) = read_back(|root| write_tum(root, &frames), &assumed(None));
     assert!(told(&recording, "no pixel carries a depth"), "{:?}", recording.remarks);
+    agrees_with_the_truth(&m, TUM);
+}
+
+/// Damaged frames are frames too: they are counted in the whole, and told.
+#[test]
+fn damaged_frames_of_a_film_are_counted() {
+    let frames = film(TUM);
+    let moving = MOVING * (poses().len() - 1);
+    let write = |root: &Path| {
+        write_tum(root, &frames);
+        for (k, name) in ["damaged.png", "cut.png"].iter().enumerate() {
+            fs::write(root.join("depth").join(name), b"no picture").expect("written");
+            let path = root.join("depth.txt");
+            let list = fs::read_to_string(&path).expect("text");
+            let line = format!("{}.01 depth/{name}\n", 1305 + k);
+            fs::write(path, list + &line).expect("written");
+        }
+    };
+    let (recording, m) = read_back(write, &assumed(None));
+    let all = frames.len() + 2;
+    for words in [
+        format!("2 of {all} frames cannot be read or carry no depth; the first: "),
+        format!("{moving} of {all} frames lie between"),
+        "damaged.png".into(),
+        "cut.png".into(),
+    ] {
+        assert!(told(&recording, &words), "{words}: {:?}", recording.remarks);
+    }
     agrees_with_the_truth(&m, TUM);
 }
 
@@ -354,7 +379,7 @@ fn total_least_squares(points: &[Vector3<f64>]) -> (f64, f64, Vec<bool>) {
         let mut sizes: Vec<f64> =
             off.iter().zip(&kept).filter(|(_, k)| **k).map(|(o, _)| o.abs()).collect();
         sizes.sort_by(f64::total_cmp);
-        let reach = 3.5 * 1.4826 * sizes[sizes.len() / 2];
+        let reach = 3.5 * kinoise::stats::MAD_TO_SIGMA * sizes[sizes.len() / 2];
         kept = off.iter().map(|o| o.abs() <= reach).collect();
     }
     (result.0, result.1, kept)

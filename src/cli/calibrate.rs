@@ -5,6 +5,8 @@ use clap::{Args, ValueEnum};
 use kinoise::calibrate::{Measurements, measure, model_of};
 use kinoise::io::{OutputDir, open};
 use kinoise::measure::{MeasureOptions, Planes, write_measurements};
+use kinoise::stats;
+use kinoise::units::shortest;
 use kinoise::{CalibrateOptions, Calibration, Form, Recording, SigmaKind};
 
 use super::common::{Bar, Global, Input, say};
@@ -75,7 +77,7 @@ impl Arguments {
         if let Some(t) = self.ransac_threshold
             && !(t > 0.0 && t.is_finite())
         {
-            anyhow::bail!("--ransac-threshold {t}: give a positive distance in m");
+            anyhow::bail!("--ransac-threshold {}: give a positive distance in m", shortest(t));
         }
         Ok(CalibrateOptions {
             measure: MeasureOptions {
@@ -175,12 +177,7 @@ pub fn write_outputs(
 }
 
 fn opening(recording: &Recording, m: &Measurements) -> String {
-    let range = |f: &dyn Fn(&kinoise::ViewMeasurement) -> f64| {
-        m.views
-            .iter()
-            .map(f)
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)])
-    };
+    let range = |f: &dyn Fn(&kinoise::ViewMeasurement) -> f64| stats::range(m.views.iter().map(f));
     let [z0, z1] = range(&|v| v.z_m);
     let [t0, t1] = range(&|v| v.theta_rad.to_degrees());
     let frames: usize = m.views.iter().map(|v| v.frames).sum();

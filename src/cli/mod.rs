@@ -3,8 +3,10 @@
 mod calibrate;
 mod common;
 mod demo;
+mod effects;
 mod fit;
 mod simulate;
+mod simulate_room;
 mod words;
 
 use std::process::ExitCode;
@@ -28,8 +30,10 @@ enum Command {
     Calibrate(calibrate::Arguments),
     /// Fit sigma(z, theta) to a table z_m,theta_rad,sigma_m[,n]
     Fit(fit::Arguments),
-    /// Make a recording by formula
+    /// Make a recording, or a film of a room, by formula or by light
     Simulate(simulate::Arguments),
+    /// The catalogue of physical effects: what each does, how it shows, what it is taken for
+    Effects(effects::Arguments),
     /// The whole road on bundled data
     Demo(demo::Arguments),
 }
@@ -78,6 +82,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Calibrate(a) => calibrate::run(a, global),
         Command::Fit(a) => fit::run(a, global),
         Command::Simulate(a) => simulate::run(a, global),
+        Command::Effects(a) => effects::run(a, global),
         Command::Demo(a) => demo::run(a, global),
     }
 }

@@ -4,14 +4,18 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use kinoise::effects::Active;
 use kinoise::io::{Assumed, open, write_atomic};
-use kinoise::model::{Domain, PAPER_EQ1};
+use kinoise::model::{Direction, Domain, PAPER_EQ1};
 use kinoise::scene::{Board, PATCH_SIDE_M, Print, Target, WHITE};
+use kinoise::simulate::room::Film;
+use kinoise::simulate::speckle::Causes;
 use kinoise::simulate::{
     Grid, GridView, Physics, Scenery, Shoot, ViewPlan, kinect_v1, plan_grid, plan_like,
 };
+use kinoise::units::shortest;
 use kinoise::{Form, NoiseModel, Sensor, SigmaModel};
 
 use super::common::{Bar, Global, numbers, say};
+use super::simulate_room::{self, FilmArguments, RoomArguments};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -20,6 +24,12 @@ pub struct Arguments {
     /// model.json to shoot with [default: the paper's Eq. 1, taken at its word outside 1 to 4 m too]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
+    /// The world: errors by formula, or dots seen and matched in which errors arise by themselves
+    #[arg(long, value_enum, default_value_t = PhysicsArgument::Formula)]
+    physics: PhysicsArgument,
+    /// With --physics speckle: set a cause, such as ambient_dn=200; repeatable. An unknown name is answered with the list
+    #[arg(long = "cause", value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    causes: Vec<String>,
     /// Add a physical effect (see kinoise effects); repeatable
     #[arg(long = "effect", value_name = "ID:KEY=VALUE", value_parser = effect)]
     effects: Vec<Active>,
@@ -28,10 +38,13 @@ pub struct Arguments {
     like: Option<PathBuf>,
     #[command(flatten)]
     poses: Poses,
-    /// Frames a view
-    #[arg(long, default_value_t = 1)]
-    frames: usize,
-    /// Make the image this many times smaller each way, 1 (640 x 480) to 8; without --model
+    /// Frames a view [default: 1]; with --room, of the film [default: the whole path]
+    #[arg(long)]
+    frames: Option<usize>,
+    #[command(flatten)]
+    room: RoomArguments,
+    /// Make the image 1 to 8 times smaller each way [default: 1, which is 640 x 480]; not with a
+    /// model that carries its own sensor
     #[arg(long, value_name = "N")]
     shrink: Option<usize>,
     #[command(flatten)]
@@ -88,6 +101,14 @@ struct SceneryArguments {
     conditions: bool,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+enum PhysicsArgument {
+    /// sigma(z, theta) of the model, and effects
+    Formula,
+    /// A Kinect v1 by light: pattern, lens, chip, block matching
+    Speckle,
+}
+
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum GridArgument {
     /// 1 to 4 m by 0.5 m, 0 to 70 degrees by 10, and 76
@@ -129,7 +150,11 @@ impl SceneryArguments {
     fn scenery(&self) -> anyhow::Result<Scenery> {
         let [width_m, height_m] = self.board;
         if !(width_m > 0.0 && height_m > 0.0) {
-            bail!("--board {width_m},{height_m}: give a width and a height in m");
+            bail!(
+                "--board {},{}: give a width and a height in m",
+                shortest(width_m),
+                shortest(height_m)
+            );
         }
         let positive = |name: &str, value: Option<f64>| match value {
             Some(v) if !(v.is_finite() && v >= 0.0) => bail!("{name} {v}: give a length in m"),
@@ -171,6 +196,12 @@ fn camera(arguments: &Arguments) -> anyhow::Result<(Sensor, SigmaModel, Vec<Acti
         }
         None => kinect_v1(shrink),
     };
+    if model.sigma.direction == Direction::Perpendicular {
+        say(format!(
+            "note: {} describes distances across the plane; depth noise is 1/cos(tilt) times them",
+            path.display()
+        ));
+    }
     let effects = model
         .effects
         .iter()
@@ -190,7 +221,10 @@ fn plans(
     let Some(like) = &arguments.like else {
         let poses = arguments.poses.views()?;
         let shuffled = !arguments.poses.ordered;
-        return Ok((plan_grid(&poses, &scenery, arguments.frames, shuffled, seed), None));
+        return Ok((
+            plan_grid(&poses, &scenery, arguments.frames.unwrap_or(1), shuffled, seed),
+            None,
+        ));
     };
     let recording = open(like, &Assumed::default())?;
     let (plans, excluded) = plan_like(&recording, scenery.reference_error_m.unwrap_or(0.0), seed);
@@ -204,26 +238,40 @@ fn plans(
 }
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
-    if arguments.frames == 0 {
+    if arguments.frames == Some(0) {
         bail!("--frames 0: a view has at least one");
     }
     let (sensor, sigma, mut effects) = camera(arguments)?;
     effects.extend(arguments.effects.iter().cloned());
+    Active::refuse_twice(&effects)?;
+    if arguments.room.room {
+        let shot = FilmArguments {
+            output: &arguments.output,
+            frames: arguments.frames,
+            recipe: arguments.recipe.as_deref(),
+            // A model brings its own sensor; without one it is what TUM readers assume.
+            sensor: if arguments.model.is_some() {
+                sensor
+            } else {
+                Film::kinect(arguments.shrink.unwrap_or(1))
+            },
+            sigma,
+            effects,
+        };
+        return simulate_room::run(&arguments.room, shot, global);
+    }
     let (views, recorded_by) = plans(arguments, global)?;
     let sensor = recorded_by.unwrap_or(sensor);
-    tell_of_clamped(&views, &sigma);
-    let shoot = Shoot {
-        sensor,
-        views,
-        physics: Physics::Formula { sigma, effects },
-        infrared: arguments.infrared,
-        seed: global.seed(),
-    };
+    let physics = physics(arguments, sigma, effects)?;
+    if let Physics::Formula { sigma, .. } = &physics {
+        tell_of_clamped(&views, sigma);
+    }
+    let shoot = Shoot { sensor, views, physics, infrared: arguments.infrared, seed: global.seed() };
     let bar = Bar::new("views");
     shoot.write(&arguments.output, &|done, all| bar.step(done, all))?;
     drop(bar);
     if let Some(path) = &arguments.recipe {
-        write_recipe(path, &shoot)?;
+        write_recipe(path, &shoot.recipe())?;
     }
     let frames: usize = shoot.views.iter().map(|v| v.stamps.len()).sum();
     say(format!(
@@ -232,6 +280,25 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         arguments.output.display()
     ));
     global.print_json(&serde_json::json!({"views": shoot.views.len(), "frames": frames, "output": arguments.output}))
+}
+
+/// Which world; each refuses what only the other knows.
+fn physics(
+    arguments: &Arguments,
+    sigma: SigmaModel,
+    effects: Vec<Active>,
+) -> anyhow::Result<Physics> {
+    if arguments.physics == PhysicsArgument::Formula {
+        if !arguments.causes.is_empty() {
+            bail!("--cause belongs to --physics speckle; by formula there is --effect");
+        }
+        return Ok(Physics::Formula { sigma, effects });
+    }
+    if !arguments.effects.is_empty() {
+        bail!("--effect belongs to --physics formula; by light there is --cause");
+    }
+    let causes = arguments.causes.iter().try_fold(Causes::default(), |c, text| c.parse(text))?;
+    Ok(Physics::Speckle { causes })
 }
 
 fn tell_of_clamped(views: &[ViewPlan], sigma: &SigmaModel) {
@@ -252,8 +319,8 @@ fn tell_of_clamped(views: &[ViewPlan], sigma: &SigmaModel) {
     }
 }
 
-fn write_recipe(path: &Path, shoot: &Shoot) -> anyhow::Result<()> {
-    let mut text = serde_json::to_string_pretty(&shoot.recipe())?;
+pub(super) fn write_recipe(path: &Path, recipe: &serde_json::Value) -> anyhow::Result<()> {
+    let mut text = serde_json::to_string_pretty(recipe)?;
     text.push('\n');
     Ok(write_atomic(path, text.as_bytes())?)
 }

@@ -1,6 +1,7 @@
 //! What a calibration says to people, and to programs.
 
 use kinoise::calibrate::Measurements;
+use kinoise::units::decimals;
 use kinoise::{Calibration, SigmaModel};
 use serde_json::{Value, json};
 
@@ -57,7 +58,8 @@ pub fn surface(model: &SigmaModel) -> String {
                 continue;
             }
             let [a, b] = model.interval(z, theta, 0.95);
-            let own = format!("{:.2} ({:.2}-{:.2})", 1e3 * model.sigma(z, theta), 1e3 * a, 1e3 * b);
+            let [sigma, a, b] = [model.sigma(z, theta), a, b].map(millimetres);
+            let own = format!("{sigma} ({a}-{b})");
             text.push_str(&format!(
                 "{z:>6.2}{theta_deg:>5.0}°   {own:<24}{:>10}{:>13}{:>13}\n",
                 published(&SigmaModel::paper(), z, theta),
@@ -66,16 +68,17 @@ pub fn surface(model: &SigmaModel) -> String {
             ));
         }
     }
+    text.push_str("    -: a distance or tilt its authors have not measured\n");
     text
+}
+
+fn millimetres(metres: f64) -> String {
+    decimals(1e3 * metres, 2)
 }
 
 /// In mm, or a dash where its authors have not measured.
 fn published(model: &SigmaModel, z: f64, theta: f64) -> String {
-    if model.domain.contains(z, theta) {
-        format!("{:.2}", 1e3 * model.sigma(z, theta))
-    } else {
-        "-".into()
-    }
+    if model.domain.contains(z, theta) { millimetres(model.sigma(z, theta)) } else { "-".into() }
 }
 
 /// Round distances inside the domain, or its ends when none lies there.
@@ -150,6 +153,9 @@ pub fn as_json(calibration: &Calibration, measurements: Option<&Measurements>) -
         value["views"] = m.views.iter().map(|v| json!({
             "view": v.name,
             "z_m": v.z_m,
+            "axis_distance_m": v.axis_distance_m,
+            "reference_distance_m": v.reference_distance_m,
+            "off_reference_m": v.reference().map(|r| r.off_m()),
             "theta_rad": v.theta_rad,
             "azimuth_rad": v.azimuth_rad,
             "sigma_m": v.whole.spread.spatial_m,

@@ -5,9 +5,9 @@
 pub enum Stage {
     /// The target's shape and motion: changes `depth`.
     Surface,
-    /// Lens and light: changes `depth` (which ray a pixel has) and `light`.
+    /// What a pixel looks at: changes `depth`.
     Optics,
-    /// How noisy a pixel is: changes `sigma`.
+    /// How noisy a pixel is, and the light that makes it so: changes `sigma` and `light`.
     Variance,
     /// How the noise hangs together over frames: changes `noise`, of unit variance.
     NoiseInTime,
@@ -21,14 +21,16 @@ pub enum Stage {
     Disparity,
     /// Pixels without an answer: `disparity` becomes NaN.
     Missing,
-    /// The read-out of the match: rounds `disparity`.
+    /// The read-out of the match: rounds and shifts `disparity`.
     Quantiser,
     /// What the driver makes of it: changes `depth`.
     Driver,
+    /// The stored number: rounds `depth`.
+    Word,
 }
 
 impl Stage {
-    pub const ALL: [Stage; 11] = [
+    pub const ALL: [Stage; 12] = [
         Stage::Surface,
         Stage::Optics,
         Stage::Variance,
@@ -40,6 +42,7 @@ impl Stage {
         Stage::Missing,
         Stage::Quantiser,
         Stage::Driver,
+        Stage::Word,
     ];
 }
 
@@ -63,11 +66,13 @@ pub struct Card {
     pub stage: Stage,
     /// What was left out when it is missing, one sentence.
     pub words: &'static str,
-    /// The first is the strength: at zero the effect does nothing.
+    /// The first is the strength.
     pub parameters: &'static [Parameter],
+    /// The strength at which nature is as if the effect were not there.
+    pub identity: f64,
     pub statistic: &'static str,
     pub axis: &'static str,
-    /// Ids of the effects it is taken for most easily, and what tells them apart.
+    /// The effects it is taken for most easily, by id, and what tells them apart.
     pub confused_with: &'static str,
     pub reference: &'static str,
 }

@@ -15,6 +15,7 @@ static CARD: Card = Card {
         typical: 0.125,
         words: "one step of the disparity",
     }],
+    identity: 0.0,
     statistic: "distribution",
     axis: "disparity-phase",
     confused_with: "depth-rounding, whose gaps do not grow with z; pixel-locking, which shifts the mean and leaves no comb",
@@ -28,8 +29,6 @@ impl Effect for DisparityQuantisation {
 
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let step = settings.at(0) as f32;
-        if step > 0.0 {
-            exposure.disparity.iter_mut().for_each(|d| *d = (*d / step).round() * step);
-        }
+        exposure.disparity.iter_mut().for_each(|d| *d = (*d / step).round() * step);
     }
 }

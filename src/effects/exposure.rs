@@ -2,10 +2,9 @@
 
 use std::collections::HashMap;
 
-use rand_distr::{Distribution, StandardNormal};
+use nalgebra::Vector3;
 
 use crate::camera::Rays;
-use crate::rng::{Seed, Stream};
 use crate::scene::Seen;
 use crate::view::Sensor;
 
@@ -28,6 +27,8 @@ pub struct Exposure<'a> {
     /// What the pixels look at, undisturbed.
     pub seen: &'a Seen,
     pub instant: Instant,
+    /// Light of the room on the target, lx.
+    pub ambient_lux: f64,
     /// Depth along the optical axis, m: true until the noise is added, then measured.
     pub depth: Vec<f32>,
     /// Infrared light that comes back, relative to a white surface at 1 m facing the sensor.
@@ -57,15 +58,18 @@ impl Exposure<'_> {
         (i % self.seen.width, i / self.seen.width)
     }
 
-    /// Distance from the principal point over that of the farthest corner, 0 to 1.
-    pub fn radius(&self, i: usize) -> f64 {
-        let (u, v) = self.at(i);
-        self.off_centre_px(u as f64, v as f64) / self.corner_radius_px()
+    /// What pixel `i` looks at, m.
+    pub fn point(&self, i: usize) -> Vector3<f64> {
+        let (x, y) = self.rays.at(i);
+        Vector3::new(x, y, 1.0) * f64::from(self.depth[i])
     }
 
-    fn off_centre_px(&self, u: f64, v: f64) -> f64 {
-        let c = &self.sensor.camera;
-        f64::hypot(u - c.cx, v - c.cy)
+    /// Distance of pixels from the principal point over that of the farthest corner, 0 to 1.
+    pub fn radius(&self) -> impl Fn(usize) -> f64 + use<> {
+        let camera = &self.sensor.camera;
+        let (width, cx, cy) = (self.seen.width, camera.cx, camera.cy);
+        let corner = self.corner_radius_px();
+        move |i| f64::hypot((i % width) as f64 - cx, (i / width) as f64 - cy) / corner
     }
 
     /// Of the farthest corner from the principal point, px.
@@ -74,47 +78,39 @@ impl Exposure<'_> {
         let (right, bottom) = (c.width as f64 - 1.0, c.height as f64 - 1.0);
         [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)]
             .into_iter()
-            .map(|(u, v)| self.off_centre_px(u, v))
+            .map(|(u, v)| f64::hypot(u - c.cx, v - c.cy))
             .fold(0.0, f64::max)
+    }
+
+    /// Depth, m, at which `ray` meets the surface at pixel `i`, taken as flat there and lifted by
+    /// `lift_m` along its normal, towards the sensor.
+    pub fn meet(&self, i: usize, ray: (f64, f64), lift_m: f64) -> f64 {
+        let [a, b, c] = self.seen.normal[i].map(f64::from);
+        let along = |(x, y): (f64, f64)| a * x + b * y + c;
+        // n . X of the surface is negative: the normal looks back.
+        let level = f64::from(self.depth[i]) * along(self.rays.at(i));
+        (level + lift_m) / along(ray)
+    }
+
+    /// Change every pixel's disparity, px, by what `shift` says.
+    pub fn shift_disparity(&mut self, shift: impl Fn(usize) -> f64) {
+        for (i, d) in self.disparity.iter_mut().enumerate() {
+            *d += shift(i) as f32;
+        }
+    }
+
+    /// `act` with what `make` made in the view's first frame.
+    pub fn with_kept(
+        &mut self,
+        id: &'static str,
+        make: impl FnOnce(&Self) -> Vec<f32>,
+        act: impl FnOnce(&mut Self, &[f32]),
+    ) {
+        let kept = self.memory.remove(id).unwrap_or_else(|| make(self));
+        act(self, &kept);
+        self.memory.insert(id, kept);
     }
 }
 
 /// Of a Kinect v1; where a sensor without a given baseline is to have a disparity.
 pub const KINECT_BASELINE_M: f64 = 0.075;
-
-/// For how long a random number stays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scope {
-    /// The unit's own: the same in every view.
-    Sensor,
-    /// Stands still while the scene does.
-    View,
-    /// Fresh in every frame.
-    Frame,
-}
-
-/// Where an effect's random numbers come from: streams named after the effect alone.
-#[derive(Debug, Clone, Copy)]
-pub struct Draw<'a> {
-    pub seed: Seed,
-    pub id: &'a str,
-    pub instant: Instant,
-}
-
-impl Draw<'_> {
-    /// The stream for this scope and part of the effect.
-    pub fn stream(&self, scope: Scope, part: &str) -> Stream {
-        let Instant { view, frame, .. } = self.instant;
-        let name = match scope {
-            Scope::Sensor => format!("effect/{}/{part}", self.id),
-            Scope::View => format!("effect/{}/{part}/{view}", self.id),
-            Scope::Frame => format!("effect/{}/{part}/{view}/{frame}", self.id),
-        };
-        self.seed.stream(&name)
-    }
-}
-
-/// Independent standard normal numbers.
-pub fn fill_normal(out: &mut [f32], rng: &mut Stream) {
-    out.fill_with(|| StandardNormal.sample(rng));
-}

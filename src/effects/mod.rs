@@ -2,24 +2,29 @@
 //!
 //! Light meets the surface, passes the lens, is matched into a disparity and becomes a depth word.
 //! Each effect belongs to one [`Stage`] of that path; the driver in `simulate` walks the stages in
-//! order and hands every active effect the [`Exposure`] under way. An effect of strength zero
-//! changes nothing, and draws only from streams of its own name, so that adding one changes no
-//! other.
+//! order and hands every active effect the [`Exposure`] under way. An effect at its card's identity
+//! is not there, and every effect draws only from streams of its own name, so that adding one
+//! changes no other.
 
 mod card;
+mod draw;
 mod exposure;
 mod settings;
 
+pub use ambient_light::ROOM_LUX;
 pub use card::{Card, Parameter, Stage};
-pub use exposure::{Draw, Exposure, Instant, KINECT_BASELINE_M, Scope, fill_normal};
+pub use draw::{Draw, Scope, fill_normal};
+pub use exposure::{Exposure, Instant, KINECT_BASELINE_M};
 pub use settings::{Active, Settings};
+
+use draw::{chance, logistic, normals};
 
 /// The forward face of a physical effect: what nature does to the exposure.
 pub trait Effect: Send + Sync {
     fn card(&self) -> &'static Card;
 
     /// Change `exposure` as the effect does with these settings. Called once a frame, at the
-    /// card's stage.
+    /// card's stage, and only when the strength is not the card's identity.
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw);
 }
 
@@ -35,8 +40,34 @@ macro_rules! catalogue {
 
 catalogue! {
     disparity_quantisation::DisparityQuantisation,
-    spatial_correlation::SpatialCorrelation,
+    depth_rounding::DepthRounding,
+    pixel_locking::PixelLocking,
+    column_banding::ColumnBanding,
+    radial_disparity_bias::RadialDisparityBias,
+    lens_distortion::LensDistortion,
+    range_not_depth::RangeNotDepth,
+    depth_scale::DepthScale,
+    disparity_offset::DisparityOffset,
+    thermal_drift::ThermalDrift,
+    target_bow::TargetBow,
+    target_motion::TargetMotion,
+    fixed_pattern_noise::FixedPatternNoise,
+    edge_mixing::EdgeMixing,
+    range_exponent::RangeExponent,
+    slope_noise::SlopeNoise,
+    tilt_axis_anisotropy::TiltAxisAnisotropy,
     vignetting::Vignetting,
+    intensity_dependent_noise::IntensityDependentNoise,
+    ambient_light::AmbientLight,
+    heavy_tails::HeavyTails,
+    spatial_correlation::SpatialCorrelation,
+    temporal_correlation::TemporalCorrelation,
+    frozen_noise::FrozenNoise,
+    row_noise::RowNoise,
+    frame_jitter::FrameJitter,
+    grazing_dropout::GrazingDropout,
+    range_dropout::RangeDropout,
+    occlusion_shadow::OcclusionShadow,
 }
 
 /// The effect of this id.

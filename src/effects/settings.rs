@@ -2,8 +2,9 @@
 
 use serde_json::{Map, Value};
 
-use super::{CATALOGUE, Effect, find};
+use super::{CATALOGUE, Draw, Effect, Exposure, find};
 use crate::error::{Error, Result};
+use crate::rng::Seed;
 
 /// Values of an effect's parameters, in the card's order.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,6 +107,46 @@ impl Active {
             active = active.with(key, number)?;
         }
         Ok(active)
+    }
+
+    /// Is the strength such that nature is as without the effect?
+    pub fn is_identity(&self) -> bool {
+        self.settings.at(0) == self.effect.card().identity
+    }
+
+    /// Let it act on a frame under way.
+    pub fn act(&self, exposure: &mut Exposure, seed: Seed) {
+        if !self.is_identity() {
+            let draw = Draw { seed, id: self.effect.card().id, instant: exposure.instant };
+            self.effect.forward(&self.settings, exposure, &draw);
+        }
+    }
+
+    /// Two of a kind would share their random numbers, and nobody could say what they do together.
+    ///
+    /// # Errors
+    /// When an effect is there twice.
+    pub fn refuse_twice(effects: &[Active]) -> Result<()> {
+        let ids: Vec<&str> = effects.iter().map(|a| a.effect.card().id).collect();
+        match ids.iter().enumerate().find(|(n, id)| ids[..*n].contains(id)) {
+            None => Ok(()),
+            Some((_, id)) => Err(Error::Argument {
+                what: format!("effect {id} is there twice (a model brings its own)"),
+                remedy: "give it once, all its knobs in one: ID:KEY=VALUE,KEY=VALUE",
+            }),
+        }
+    }
+
+    /// In the order in which light meets them, whatever the order they were named in: by stage,
+    /// within a stage as in the catalogue.
+    pub fn in_light_path(effects: &[Active]) -> Vec<&Active> {
+        let place = |a: &&Active| {
+            let card = a.effect.card();
+            (card.stage, CATALOGUE.iter().position(|e| e.card().id == card.id))
+        };
+        let mut ordered: Vec<&Active> = effects.iter().collect();
+        ordered.sort_by_key(place);
+        ordered
     }
 
     /// The parameters by name.

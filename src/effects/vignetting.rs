@@ -15,6 +15,7 @@ static CARD: Card = Card {
         typical: 0.5,
         words: "by how much sigma is larger at the corner radius, as a share",
     }],
+    identity: 0.0,
     statistic: "variance",
     axis: "radius",
     confused_with: "slope-noise: even a frontal target is met at an angle off the axis, but that grows with the tilt",
@@ -28,12 +29,9 @@ impl Effect for Vignetting {
 
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let growth = settings.at(0);
-        if growth == 0.0 {
-            return;
-        }
+        let radius = exposure.radius();
         for i in 0..exposure.pixels() {
-            let r = exposure.radius(i);
-            let factor = 1.0 + growth * r * r;
+            let factor = 1.0 + growth * radius(i).powi(2);
             exposure.sigma[i] *= factor as f32;
             // Shot noise: the standard deviation goes with one over the root of the light.
             exposure.light[i] /= (factor * factor) as f32;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::stills::{Film, split};
+use super::stills::{Film, Footage};
 use super::{Assumed, assumed_sensor, images};
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
@@ -64,15 +64,8 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Recording> {
         assumed.code.unwrap_or(OPENKINECT),
         &Assumed { baseline_m: assumed.baseline_m.or(Some(KINECT_BASELINE_M)), ..assumed.clone() },
     )?;
-    let views = split(frames, &sensor, Film::Video, &mut remarks)?;
-    Ok(Recording {
-        root: root.to_path_buf(),
-        sensor,
-        views,
-        excluded: Vec::new(),
-        remarks,
-        described_by: vec![index],
-    })
+    let footage = Footage { frames, film: Film::Video, remarks, described_by: vec![index] };
+    Ok(footage.recording(root, sensor))
 }
 
 /// Projector to camera in every Kinect v1 (LDDIS of the OpenNI device properties: 7.5 cm).

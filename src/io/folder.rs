@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::stills::{Film, split};
-use super::{Assumed, assumed_sensor, images};
+use super::stills::{Film, Footage};
+use super::{Assumed, assumed_sensor, entries, images};
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
 use crate::view::{FrameRef, Recording};
@@ -41,26 +41,15 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Recording> {
         .enumerate()
         .map(|(i, path)| FrameRef { timestamp: i as f64 * NOMINAL_INTERVAL_S, path })
         .collect();
-    let views = split(frames, &sensor, Film::Captures, &mut remarks)?;
-    Ok(Recording {
-        root: root.to_path_buf(),
-        sensor,
-        views,
-        excluded: Vec::new(),
-        remarks,
-        described_by: Vec::new(),
-    })
+    let footage = Footage { frames, film: Film::Captures, remarks, described_by: Vec::new() };
+    Ok(footage.recording(root, sensor))
 }
 
 /// 30 Hz: a plain folder has no clock, and every sensor of this kind runs at it.
 const NOMINAL_INTERVAL_S: f64 = 1.0 / 30.0;
 
 fn png_files(root: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(root).map_err(|e| Error::read(root, e))?;
-    let mut files: Vec<PathBuf> = entries
-        .filter_map(|entry| entry.ok().map(|e| e.path()))
-        .filter(|p| p.is_file() && p.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")))
-        .collect();
-    files.sort();
+    let mut files = entries(root)?;
+    files.retain(|p| p.is_file() && p.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")));
     Ok(files)
 }

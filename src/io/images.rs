@@ -23,6 +23,7 @@ pub struct FrameSource {
 const REMEDY_DEPTH: &str = "depth must be a 16-bit single-channel PNG of the recording's size";
 
 impl FrameSource {
+    /// For frames of this size, px.
     pub fn new(width: usize, height: usize) -> Self {
         FrameSource { width, height, hash: Sha256::new() }
     }
@@ -130,12 +131,17 @@ fn pgm_header(bytes: &[u8]) -> Option<([usize; 3], &[u8])> {
 /// Infrared amplitude, 8 or 16 bit, as numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InfraredImage {
+    /// Columns, px.
     pub width: usize,
+    /// Rows, px.
     pub height: usize,
+    /// Row-major, in the image's own units.
     pub amplitude: Vec<u16>,
 }
 
 impl InfraredImage {
+    /// Read one image.
+    ///
     /// # Errors
     /// When the file is not a whole grey PNG of 8 or 16 bits.
     pub fn read(path: &Path) -> Result<Self> {

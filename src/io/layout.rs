@@ -3,9 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
+use super::entries;
 use super::list::{FrameList, read_list};
 use super::output::write_atomic;
+use super::unknown::UnknownKeys;
 use crate::error::{Error, Result};
 use crate::view::{
     Excluded, RECORDING_FORMAT, Recording, RecordingFile, Region, Sensor, TargetSize, View,
@@ -21,18 +24,25 @@ const REMEDY_JSON: &str = "compare it with the recording layout in the README";
 /// `view.json`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ViewFile {
+    /// How large the target is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<TargetSize>,
+    /// Depth of the target's plane on the optical axis, measured by other means, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference_distance_m: Option<f64>,
+    /// The target's region u0, v0, u1, v1, px; both edges belong to it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub roi: Option<[f64; 4]>,
+    /// The target's corners u, v, px; may reach outside the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub polygon: Option<Vec<[f64; 2]>>,
+    /// Degrees Celsius.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<f64>,
+    /// Light on the target, lx.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ambient_lux: Option<f64>,
+    /// For people.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub notes: Option<String>,
 }
@@ -85,7 +95,8 @@ impl ViewFile {
 
 pub(super) fn open(root: &Path) -> Result<Recording> {
     let path = root.join(DESCRIPTION);
-    let sensor = read_sensor(&path)?;
+    let mut unknown = UnknownKeys::default();
+    let sensor = read_sensor(&path, &mut unknown)?;
     let mut recording = Recording {
         root: root.to_path_buf(),
         sensor,
@@ -96,23 +107,27 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
     };
     for folder in view_folders(root)? {
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        match open_view(&folder, &name, &mut recording) {
+        match open_view(&folder, &name, &mut recording, &mut unknown) {
             Ok(view) => recording.views.push(view),
             Err(e) => recording.excluded.push(Excluded::of(&name, &e)),
         }
     }
+    recording.remarks.extend(unknown.remarks());
     Ok(recording)
 }
 
-fn read_sensor(path: &Path) -> Result<Sensor> {
+pub(super) fn read_sensor(path: &Path, unknown: &mut UnknownKeys) -> Result<Sensor> {
     let wrong =
         |what: String| Error::Json { path: path.to_path_buf(), line: 0, what, remedy: REMEDY_JSON };
+    let text = read_text(path)?;
     // Another format has other keys: its name says more than the first key that is missing.
-    let Format { format } = read_json(path)?;
+    let Format { format } = parse(path, &text)?;
     if format != RECORDING_FORMAT {
         return Err(wrong(format!("format is \"{format}\", expected \"{RECORDING_FORMAT}\"")));
     }
-    read_json::<RecordingFile>(path)?.sensor().map_err(wrong)
+    let file: RecordingFile = parse(path, &text)?;
+    unknown.note(path, &parse(path, &text)?, &json!(file));
+    file.sensor().map_err(wrong)
 }
 
 #[derive(Deserialize)]
@@ -120,28 +135,37 @@ struct Format {
     format: String,
 }
 
-fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
-    serde_json::from_str(&text).map_err(|e| Error::Json {
+fn read_text(path: &Path) -> Result<String> {
+    std::fs::read_to_string(path).map_err(|e| Error::read(path, e))
+}
+
+fn parse<T: serde::de::DeserializeOwned>(path: &Path, text: &str) -> Result<T> {
+    serde_json::from_str(text).map_err(|e| Error::Json {
         path: path.to_path_buf(),
         line: e.line(),
-        what: e.to_string(),
+        what: without_place(&e.to_string()),
         remedy: REMEDY_JSON,
     })
 }
 
+/// serde's "... at line 3 column 7" without the line, which the error tells in its own words.
+fn without_place(what: &str) -> String {
+    what.rsplit_once(" at line ").map_or(what, |(before, _)| before).into()
+}
+
 /// Sub-folders that hold a depth list, in name order.
 fn view_folders(root: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(root).map_err(|e| Error::read(root, e))?;
-    let mut folders: Vec<PathBuf> = entries
-        .filter_map(|entry| entry.ok().map(|e| e.path()))
-        .filter(|p| p.is_dir() && (p.join(DEPTH_LIST).exists() || p.join(VIEW_FILE).exists()))
-        .collect();
-    folders.sort();
+    let mut folders = entries(root)?;
+    folders.retain(|p| p.is_dir() && (p.join(DEPTH_LIST).exists() || p.join(VIEW_FILE).exists()));
     Ok(folders)
 }
 
-fn open_view(folder: &Path, name: &str, recording: &mut Recording) -> Result<View> {
+fn open_view(
+    folder: &Path,
+    name: &str,
+    recording: &mut Recording,
+    unknown: &mut UnknownKeys,
+) -> Result<View> {
     let depth_list = folder.join(DEPTH_LIST);
     let depth = read_list(&depth_list)?;
     remark_on(&depth, name, &mut recording.remarks);
@@ -158,12 +182,7 @@ fn open_view(folder: &Path, name: &str, recording: &mut Recording) -> Result<Vie
     remark_on(&infrared, name, &mut recording.remarks);
     let view_file = folder.join(VIEW_FILE);
     let notes = if view_file.is_file() {
-        let notes = read_json::<ViewFile>(&view_file)?.notes().map_err(|what| Error::Json {
-            path: view_file.clone(),
-            line: 0,
-            what,
-            remedy: REMEDY_JSON,
-        })?;
+        let notes = read_notes(&view_file, unknown)?;
         recording.described_by.push(view_file);
         notes
     } else {
@@ -171,6 +190,18 @@ fn open_view(folder: &Path, name: &str, recording: &mut Recording) -> Result<Vie
     };
     recording.described_by.push(depth_list);
     Ok(View { name: name.into(), depth: depth.frames, infrared: infrared.frames, notes })
+}
+
+fn read_notes(path: &Path, unknown: &mut UnknownKeys) -> Result<ViewNotes> {
+    let text = read_text(path)?;
+    let file: ViewFile = parse(path, &text)?;
+    unknown.note(path, &parse(path, &text)?, &json!(file));
+    file.notes().map_err(|what| Error::Json {
+        path: path.to_path_buf(),
+        line: 0,
+        what,
+        remedy: REMEDY_JSON,
+    })
 }
 
 fn remark_on(list: &FrameList, view: &str, remarks: &mut Vec<String>) {

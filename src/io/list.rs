@@ -8,7 +8,9 @@ use crate::view::FrameRef;
 /// The frames a list names, in time order, and what was odd about it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FrameList {
+    /// In time order.
     pub frames: Vec<FrameRef>,
+    /// In words.
     pub remarks: Vec<String>,
 }
 

@@ -6,19 +6,24 @@ mod images;
 mod layout;
 mod list;
 mod output;
+mod quick;
 mod stills;
 mod tum;
+mod unknown;
 
 pub use images::{FrameSource, InfraredImage, encode_png16};
 pub use layout::{ViewFile, write_recording_file, write_view_notes};
 pub use list::{FrameList, read_list};
+pub(crate) use output::hex;
 pub use output::{OutputDir, sha256_hex, write_atomic};
+pub use quick::{encode_png16_quickly, encode_rgb};
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
+use crate::units::shortest;
 use crate::view::{Recording, Sensor};
 
 /// What the user knows about a folder that does not describe itself.
@@ -26,15 +31,31 @@ use crate::view::{Recording, Sensor};
 pub struct Assumed {
     /// fx, fy, cx, cy in px.
     pub intrinsics: Option<[f64; 4]>,
+    /// How words become metres.
     pub code: Option<DepthCode>,
+    /// Distance between projector and camera, m.
     pub baseline_m: Option<f64>,
+}
+
+impl Assumed {
+    /// What was given, under the names of the options.
+    fn given(&self) -> Vec<&'static str> {
+        let code = self.code.map(|code| match code {
+            DepthCode::Metric { .. } => "--units-per-metre",
+            DepthCode::Disparity { .. } => "--raw-disparity",
+        });
+        let intrinsics = self.intrinsics.map(|_| "--intrinsics");
+        let baseline = self.baseline_m.map(|_| "--baseline");
+        [intrinsics, code, baseline].into_iter().flatten().collect()
+    }
 }
 
 /// Open whatever stands at `path`: a recording, a TUM folder, a fakenect dump or a plain folder
 /// of 16-bit PNGs. Frames are not read, except to find still stretches in a film.
 ///
 /// # Errors
-/// When the folder is none of these, is empty, or describes itself wrongly.
+/// When the folder is none of these, is empty, or describes itself wrongly; or when something is
+/// assumed of a recording that describes itself.
 pub fn open(path: &Path, assumed: &Assumed) -> Result<Recording> {
     if !path.is_dir() {
         return Err(Error::recording(
@@ -43,11 +64,14 @@ pub fn open(path: &Path, assumed: &Assumed) -> Result<Recording> {
             "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs",
         ));
     }
-    let recording = if path.join(layout::DESCRIPTION).is_file() {
+    // A described TUM sequence has its frames at the root, a recording in one folder a view.
+    let sequence = path.join(tum::DEPTH_LIST).is_file();
+    let recording = if path.join(layout::DESCRIPTION).is_file() && !sequence {
+        refuse(assumed, path)?;
         layout::open(path)?
     } else if path.join(dump::INDEX).is_file() {
         dump::open(path, assumed)?
-    } else if path.join(tum::DEPTH_LIST).is_file() {
+    } else if sequence {
         tum::open(path, assumed)?
     } else {
         folder::open(path, assumed)?
@@ -65,6 +89,34 @@ pub fn open(path: &Path, assumed: &Assumed) -> Result<Recording> {
         ));
     }
     Ok(recording)
+}
+
+/// An option that would have no effect must not look as if it had one.
+fn refuse(assumed: &Assumed, path: &Path) -> Result<()> {
+    let given = assumed.given();
+    if given.is_empty() {
+        return Ok(());
+    }
+    Err(Error::Argument {
+        what: format!(
+            "{}: {} describes its sensor itself",
+            given.join(" and "),
+            path.join(layout::DESCRIPTION).display()
+        ),
+        remedy: "leave the option out, or correct that file",
+    })
+}
+
+/// What stands in a folder, in name order.
+fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+    let failed = |e| Error::read(folder, e);
+    let mut paths = std::fs::read_dir(folder)
+        .map_err(failed)?
+        .map(|entry| entry.map(|e| e.path()))
+        .collect::<std::io::Result<Vec<PathBuf>>>()
+        .map_err(failed)?;
+    paths.sort();
+    Ok(paths)
 }
 
 /// A sensor for folders that carry no description of their own.
@@ -86,7 +138,7 @@ fn assumed_sensor(
     };
     match sensor.fault() {
         Some(what) => Err(Error::Argument {
-            what: format!("--intrinsics {fx},{fy},{cx},{cy}: {what}"),
+            what: format!("--intrinsics {}: {what}", intrinsics.map(shortest).join(",")),
             remedy: "give fx,fy,cx,cy in pixels",
         }),
         None => Ok(sensor),

@@ -1,9 +1,10 @@
 //! Cutting a film into views: stretches in which neither target nor sensor moves.
 
+use std::path::{Path, PathBuf};
+
 use super::images::FrameSource;
-use crate::error::Result;
 use crate::frame::{DepthTable, Frame};
-use crate::view::{FrameRef, Sensor, View, ViewNotes};
+use crate::view::{FrameRef, Recording, Sensor, View, ViewNotes};
 
 /// How the frames were taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,59 +37,95 @@ const MOVED_SAMPLES: f64 = 0.10;
 /// flicker at edges and in shadows, but a board that is carried away leaves one where it was.
 const MOVED_HOLES: f64 = 0.5;
 
-/// Split into views; unreadable frames and frames in motion are told and left out.
-pub(super) fn split(
-    frames: Vec<FrameRef>,
-    sensor: &Sensor,
-    film: Film,
-    remarks: &mut Vec<String>,
-) -> Result<Vec<View>> {
-    let table = sensor.code.table();
-    let mut source = FrameSource::new(sensor.camera.width, sensor.camera.height);
-    let mut stretches: Vec<(Vec<f32>, Vec<FrameRef>)> = Vec::new();
-    for frame_ref in frames {
-        let frame = match source.read(&frame_ref.path) {
-            Ok(frame) => frame,
-            Err(e) => {
-                remarks.push(format!("frame left out: {e}"));
-                continue;
-            }
-        };
-        let samples = sample(&frame, &table);
-        if samples.iter().all(|z| z.is_nan()) {
+/// Frames that no view file parts, and what is known about them.
+pub(super) struct Footage {
+    pub frames: Vec<FrameRef>,
+    pub film: Film,
+    /// What was found odd while listing them.
+    pub remarks: Vec<String>,
+    /// The files that list them.
+    pub described_by: Vec<PathBuf>,
+}
+
+impl Footage {
+    /// Cut into views; frames in motion and frames that show nothing are told and left out.
+    pub fn recording(self, root: &Path, sensor: Sensor) -> Recording {
+        let listed = self.frames.len();
+        let (stretches, blank) = stretches(self.frames, &sensor);
+        let readable: usize = stretches.iter().map(Vec::len).sum();
+        let views = views(stretches, self.film);
+        let used: usize = views.iter().map(|v| v.depth.len()).sum();
+        let mut remarks = Vec::new();
+        if let Some((first, others)) = blank.split_first() {
             remarks.push(format!(
-                "frame left out: {}: no pixel carries a depth",
-                frame_ref.path.display()
+                "{} of {listed} frames cannot be read or carry no depth; the first: {first}",
+                blank.len()
             ));
-            continue;
+            remarks.extend(others.iter().map(|why| format!("frame left out: {why}")));
         }
-        match stretches.last_mut() {
-            Some((reference, stretch)) if still(reference, &samples) => stretch.push(frame_ref),
-            _ => stretches.push((samples, vec![frame_ref])),
+        if used < readable {
+            remarks.push(format!(
+                "{} of {listed} frames lie between still stretches (target or sensor moving) and are left out",
+                readable - used
+            ));
+        }
+        // Why frames are missing says more than what was assumed about the others.
+        remarks.extend(self.remarks);
+        Recording {
+            root: root.to_path_buf(),
+            sensor,
+            views,
+            excluded: Vec::new(),
+            remarks,
+            described_by: self.described_by,
         }
     }
-    let total: usize = stretches.iter().map(|(_, s)| s.len()).sum();
-    let longest = stretches.iter().map(|(_, s)| s.len()).max().unwrap_or(0);
+}
+
+/// Runs of frames that agree with their first; and why each of the frames in none is in none.
+fn stretches(frames: Vec<FrameRef>, sensor: &Sensor) -> (Vec<Vec<FrameRef>>, Vec<String>) {
+    let table = sensor.code.table();
+    let mut source = FrameSource::new(sensor.camera.width, sensor.camera.height);
+    let mut stretches: Vec<Vec<FrameRef>> = Vec::new();
+    let mut reference = Vec::new();
+    let mut blank = Vec::new();
+    for frame in frames {
+        match samples(&mut source, &frame.path, &table) {
+            Ok(samples) => match stretches.last_mut() {
+                Some(stretch) if still(&reference, &samples) => stretch.push(frame),
+                _ => {
+                    reference = samples;
+                    stretches.push(vec![frame]);
+                }
+            },
+            Err(why) => blank.push(why),
+        }
+    }
+    (stretches, blank)
+}
+
+/// Depths on the grid, or why the frame has none.
+fn samples(source: &mut FrameSource, path: &Path, table: &DepthTable) -> Result<Vec<f32>, String> {
+    let frame = source.read(path).map_err(|e| e.to_string())?;
+    let samples = sample(&frame, table);
+    if samples.iter().all(|z| z.is_nan()) {
+        return Err(format!("{}: no pixel carries a depth", path.display()));
+    }
+    Ok(samples)
+}
+
+fn views(stretches: Vec<Vec<FrameRef>>, film: Film) -> Vec<View> {
+    let longest = stretches.iter().map(Vec::len).max().unwrap_or(0);
     let shortest = film.shortest().min(longest);
-    let kept: Vec<View> = stretches
-        .into_iter()
-        .filter(|(_, stretch)| stretch.len() >= shortest)
-        .enumerate()
-        .map(|(i, (_, depth))| View {
+    let long = stretches.into_iter().filter(|stretch| stretch.len() >= shortest);
+    long.enumerate()
+        .map(|(i, depth)| View {
             name: name(i, &depth, film),
             depth,
             infrared: Vec::new(),
             notes: ViewNotes::default(),
         })
-        .collect();
-    let used: usize = kept.iter().map(|v| v.depth.len()).sum();
-    if used < total {
-        remarks.push(format!(
-            "{} of {total} frames lie between still stretches (target or sensor moving) and are left out",
-            total - used
-        ));
-    }
-    Ok(kept)
+        .collect()
 }
 
 /// A single capture keeps its file's name; a stretch of a film gets a number.

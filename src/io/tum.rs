@@ -1,13 +1,16 @@
 //! One TUM RGB-D folder: depth.txt and depth/, 5000 units a metre, read as a film of a target.
+//! A recording.json beside depth.txt describes its sensor, as simulated rooms have it.
 
 use std::path::Path;
 
+use super::layout::{DESCRIPTION, read_sensor};
 use super::list::read_list;
-use super::stills::{Film, split};
+use super::stills::{Film, Footage};
+use super::unknown::UnknownKeys;
 use super::{Assumed, assumed_sensor, images};
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
-use crate::view::Recording;
+use crate::view::{Recording, Sensor};
 
 pub(super) const DEPTH_LIST: &str = "depth.txt";
 /// What ROS publishes for an uncalibrated PrimeSense camera; the TUM tools assume it too.
@@ -21,28 +24,39 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Recording> {
     let first = list.frames.first().ok_or_else(|| {
         Error::recording(&path, "no depth frame in it", "list at least one existing depth image")
     })?;
-    let size = images::size_of(&first.path)?;
     let mut remarks = list.remarks.clone();
+    let description = root.join(DESCRIPTION);
+    let mut described_by = vec![path];
+    let sensor = if description.is_file() {
+        let mut unknown = UnknownKeys::default();
+        let sensor = read_sensor(&description, &mut unknown)?;
+        remarks.extend(unknown.remarks());
+        described_by.push(description);
+        sensor
+    } else {
+        undescribed(images::size_of(&first.path)?, assumed, &mut remarks)?
+    };
+    let footage = Footage { frames: list.frames, film: Film::Video, remarks, described_by };
+    Ok(footage.recording(root, sensor))
+}
+
+/// The sensor of a folder that says nothing about it.
+fn undescribed(
+    size: (usize, usize),
+    assumed: &Assumed,
+    remarks: &mut Vec<String>,
+) -> Result<Sensor> {
     if assumed.intrinsics.is_none() {
         remarks.push(
             "a TUM folder carries no intrinsics: 525,525,319.5,239.5 assumed; give --intrinsics"
                 .into(),
         );
     }
-    let sensor = assumed_sensor(
+    assumed_sensor(
         "TUM RGB-D sequence",
         size,
         assumed.intrinsics.unwrap_or(ROS_DEFAULT),
         assumed.code.unwrap_or(TUM_CODE),
         assumed,
-    )?;
-    let views = split(list.frames, &sensor, Film::Video, &mut remarks)?;
-    Ok(Recording {
-        root: root.to_path_buf(),
-        sensor,
-        views,
-        excluded: Vec::new(),
-        remarks,
-        described_by: vec![path],
-    })
+    )
 }

@@ -4,14 +4,17 @@
 //! and the scale, the rest stream through accumulators.
 
 mod cells;
+mod doubtful;
 mod grouping;
 mod lagged;
 mod paper;
+mod reference;
 mod scan;
 mod table;
 
 pub use cells::{Cell, Spread};
 pub use paper::PaperResult;
+pub use reference::ReferenceDistance;
 pub use table::{
     MEASUREMENT_COLUMNS, SigmaKind, SigmaRow, SigmaTable, read_table, write_measurements,
 };
@@ -40,10 +43,13 @@ pub enum Planes {
 /// Settings of the measurement.
 #[derive(Debug, Clone, Copy)]
 pub struct MeasureOptions {
+    /// One plane a view, or one a frame.
     pub planes: Planes,
     /// The paper's RANSAC threshold, m; by default three robust standard deviations of the view.
     pub ransac_threshold_m: Option<f64>,
+    /// Most hypotheses the paper's RANSAC tries.
     pub ransac_iterations: usize,
+    /// Of all random choices.
     pub seed: Seed,
 }
 
@@ -61,13 +67,18 @@ impl Default for MeasureOptions {
 /// What every view of a recording shares: computed once.
 #[derive(Debug)]
 pub struct Workbench<'a> {
+    /// The unit that recorded.
     pub sensor: &'a Sensor,
+    /// Of all its pixels.
     pub rays: Rays,
+    /// From word to m.
     pub table: DepthTable,
+    /// The settings.
     pub options: MeasureOptions,
 }
 
 impl<'a> Workbench<'a> {
+    /// Works out the rays of all pixels and the depth of all words.
     pub fn new(sensor: &'a Sensor, options: MeasureOptions) -> Self {
         Workbench { sensor, rays: sensor.camera.rays(), table: sensor.code.table(), options }
     }
@@ -81,13 +92,17 @@ impl<'a> Workbench<'a> {
 /// All that one view tells.
 #[derive(Debug, Clone)]
 pub struct ViewMeasurement {
+    /// The view's name.
     pub name: String,
     /// Seconds on the recording's clock, first frame.
     pub time_s: f64,
+    /// The default plane fit.
     pub plane: Plane,
     /// Mean depth of the target's pixels, m.
     pub z_m: f64,
+    /// Between the optical axis and the plane's normal, rad.
     pub theta_rad: f64,
+    /// Image direction in which depth grows, rad; 0 along the columns.
     pub azimuth_rad: f64,
     /// The whole target as one.
     pub whole: Cell,
@@ -95,26 +110,42 @@ pub struct ViewMeasurement {
     pub cells: Vec<Cell>,
     /// The paper's method on the first frame.
     pub paper: Option<PaperResult>,
+    /// Between neighbouring pixels' residuals.
     pub correlation: Correlation,
     /// Correlation of a pixel with itself one frame later; `None` with fewer than 4 frames.
     pub temporal_correlation: Option<f64>,
+    /// Frames used.
     pub frames: usize,
+    /// Pixels left out, by reason.
     pub exclusions: Exclusions,
+    /// From `view.json`, m.
     pub reference_distance_m: Option<f64>,
     /// Depth of the plane on the optical axis, m: what a reference distance is compared with.
     pub axis_distance_m: f64,
     /// Mean infrared amplitude of the target, in the image's own units.
     pub infrared: Option<f64>,
+    /// Of the mean residual.
     pub picture: ResidualPicture,
+    /// What was odd about it, in words.
     pub notes: Vec<String>,
     /// SHA-256 of the frames' bytes in order.
     pub digest: [u8; 32],
 }
 
+impl ViewMeasurement {
+    /// The distance on the optical axis beside the one that `view.json` gives, if it gives one.
+    pub fn reference(&self) -> Option<ReferenceDistance> {
+        self.reference_distance_m
+            .map(|reference_m| ReferenceDistance { reference_m, measured_m: self.axis_distance_m })
+    }
+}
+
 /// The view's mean residual, shrunk for looking at; NaN outside the target.
 #[derive(Debug, Clone)]
 pub struct ResidualPicture {
+    /// Columns, px of the picture.
     pub width: usize,
+    /// Rows, px of the picture.
     pub height: usize,
     /// Axial residual, mm, row-major.
     pub millimetres: Vec<f32>,
@@ -157,6 +188,7 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
     result.paper = paper;
     result.infrared = infrared;
     result.reference_distance_m = view.notes.reference_distance_m;
+    notes.append(&mut result.notes);
     result.notes = notes;
     result.digest = source.digest();
     Ok(result)

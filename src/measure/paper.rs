@@ -13,13 +13,17 @@ use crate::view::View;
 /// What the paper's method gives for a view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PaperResult {
+    /// Total least squares over the inliers.
     pub plane: Plane,
     /// Mean depth of the inliers, m.
     pub z_m: f64,
+    /// Between the optical axis and the plane's normal, rad.
     pub theta_rad: f64,
     /// Standard deviation of the inliers' distances to the plane, m.
     pub sigma_m: f64,
+    /// Points within the threshold.
     pub inliers: usize,
+    /// Greatest distance of an inlier from its plane, m.
     pub threshold_m: f64,
 }
 

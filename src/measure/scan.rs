@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::cells::{Cell, Context, Sums};
+use super::doubtful::{Bin, doubts};
 use super::grouping::{CUT_SIGMAS, by_cell, expected, settled_scale};
 use super::lagged::Lagged;
 use super::{Planes, ResidualPicture, ViewMeasurement, Workbench};
@@ -205,13 +206,11 @@ impl<'a> Scan<'a> {
         };
         let shift = self.shift_to(&plane);
         let sums = self.sums(&plane, &shift);
-        let mut whole = Sums::default();
-        sums.iter().for_each(|s| whole.merge(s));
         let correlation = self.correlation(first, &plane, &sums);
         let temporal_correlation = self.lagged.correlation();
         let context = self.context(&correlation, temporal_correlation);
-        let cells: Vec<Cell> = sums.iter().filter_map(|s| context.cell(s)).collect();
-        let whole = context.cell(&whole)?;
+        let (cells, trusted, notes) = trusted_cells(&sums, &context);
+        let whole = context.cell(&trusted)?;
         Some(ViewMeasurement {
             name: String::new(),
             time_s: 0.0,
@@ -230,7 +229,7 @@ impl<'a> Scan<'a> {
             axis_distance_m: plane.depth(0.0, 0.0),
             infrared: None,
             picture: self.picture(&shift),
-            notes: Vec::new(),
+            notes,
             digest: [0; 32],
         })
     }
@@ -359,6 +358,25 @@ impl<'a> Scan<'a> {
             .collect();
         ResidualPicture { width, height, millimetres }
     }
+}
+
+/// The cells that show the target's noise, their sums as one, and why the others do not.
+fn trusted_cells(sums: &[Sums], context: &Context) -> (Vec<Cell>, Sums, Vec<String>) {
+    let (bins, sums): (Vec<Bin>, Vec<&Sums>) = sums
+        .iter()
+        .filter_map(|s| Some((Bin { cell: context.cell(s)?, mean_m: s.e / s.n }, s)))
+        .unzip();
+    let (mut cells, mut whole, mut notes) = (Vec::new(), Sums::default(), Vec::new());
+    for ((bin, sums), doubt) in bins.iter().zip(sums).zip(doubts(&bins)) {
+        match doubt {
+            Some(why) => notes.push(why),
+            None => {
+                cells.push(bin.cell);
+                whole.merge(sums);
+            }
+        }
+    }
+    (cells, whole, notes)
 }
 
 /// Enough to see a lens's bowl and a firmware's bands; 77 kB a view.

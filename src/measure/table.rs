@@ -4,6 +4,8 @@ use std::path::Path;
 
 use super::{Cell, ViewMeasurement};
 use crate::error::{Error, Result};
+use crate::frame::FARTHEST_M;
+use crate::units::shortest;
 
 /// Which standard deviation a model is fitted to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -20,6 +22,7 @@ pub enum SigmaKind {
 }
 
 impl SigmaKind {
+    /// For messages and provenance.
     pub fn words(self) -> &'static str {
         match self {
             SigmaKind::Spatial => "spatial sigma of one frame, along the optical axis",
@@ -33,8 +36,11 @@ impl SigmaKind {
 /// One measured sigma.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SigmaRow {
+    /// Mean depth of the samples, m.
     pub z_m: f64,
+    /// Tilt of the plane, rad.
     pub theta_rad: f64,
+    /// The standard deviation, m.
     pub sigma_m: f64,
     /// Independent samples behind it; `None` when the table does not say.
     pub n_effective: Option<f64>,
@@ -52,6 +58,7 @@ impl SigmaRow {
 /// What a model is fitted to.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SigmaTable {
+    /// In any order.
     pub rows: Vec<SigmaRow>,
 }
 
@@ -62,6 +69,7 @@ impl SigmaTable {
         SigmaTable { rows }
     }
 
+    /// Number of different views.
     pub fn views(&self) -> usize {
         let mut seen: Vec<usize> = self.rows.iter().map(|r| r.view).collect();
         seen.sort_unstable();
@@ -71,10 +79,7 @@ impl SigmaTable {
 
     /// Least and greatest of a column.
     pub fn range(&self, column: impl Fn(&SigmaRow) -> f64) -> [f64; 2] {
-        self.rows
-            .iter()
-            .map(column)
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+        crate::stats::range(self.rows.iter().map(column))
     }
 }
 
@@ -191,7 +196,7 @@ fn row(m: &ViewMeasurement, cell: &Cell) -> Vec<String> {
 
 /// Shortest text that reads back to the same number; empty for what is not one.
 fn number(v: f64) -> String {
-    if v.is_finite() { format!("{v}") } else { String::new() }
+    if v.is_finite() { shortest(v) } else { String::new() }
 }
 
 fn optional(v: Option<f64>) -> String {
@@ -222,11 +227,22 @@ pub fn read_table(path: &Path) -> Result<SigmaTable> {
         what,
         remedy: REMEDY_TABLE,
     };
+    let damaged = |e: csv::Error| {
+        let line = e.position().map_or(1, |p| p.line() as usize);
+        match e.into_kind() {
+            csv::ErrorKind::Io(cause) => Error::read(path, cause),
+            csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+                wrong(line, format!("{len} cells, the header has {expected_len}"))
+            }
+            csv::ErrorKind::Utf8 { .. } => wrong(line, "this is not text".into()),
+            _ => wrong(line, "this is not a line of a table".into()),
+        }
+    };
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .comment(Some(b'#'))
         .from_reader(std::io::BufReader::new(file));
-    let headers = reader.headers().map_err(|e| wrong(1, e.to_string()))?.clone();
+    let headers = reader.headers().map_err(damaged)?.clone();
     let find = |name: &str| headers.iter().position(|h| h.trim_start_matches('\u{feff}') == name);
     let need =
         |name: &str| find(name).ok_or_else(|| wrong(1, format!("there is no column {name}")));
@@ -236,10 +252,7 @@ pub fn read_table(path: &Path) -> Result<SigmaTable> {
     let mut names: Vec<String> = Vec::new();
     let mut table = SigmaTable::default();
     for record in reader.records() {
-        let record = record.map_err(|e| {
-            let line = e.position().map_or(0, |p| p.line() as usize);
-            wrong(line, e.to_string())
-        })?;
+        let record = record.map_err(damaged)?;
         let line = record.position().map_or(0, |p| p.line() as usize);
         let text = |column: usize| record.get(column).unwrap_or("").to_string();
         let value = |column: usize| -> Result<f64> {
@@ -272,14 +285,21 @@ pub fn read_table(path: &Path) -> Result<SigmaTable> {
 }
 
 fn check(z_m: f64, theta_rad: f64, sigma_m: f64) -> Result<(), String> {
+    let wrong = |name: &str, v: f64, why: &str| Err(format!("{name} = {} {why}", shortest(v)));
     if z_m <= 0.0 {
-        return Err(format!("z_m = {z_m} must be positive"));
+        return wrong("z_m", z_m, "must be positive");
+    }
+    if z_m >= FARTHEST_M {
+        return wrong("z_m", z_m, "is farther than any such sensor sees; is it in millimetres?");
     }
     if !(0.0..std::f64::consts::FRAC_PI_2).contains(&theta_rad) {
-        return Err(format!("theta_rad = {theta_rad} must lie in [0, pi/2); is it in degrees?"));
+        return wrong("theta_rad", theta_rad, "must lie in [0, pi/2); is it in degrees?");
     }
     if sigma_m <= 0.0 {
-        return Err(format!("sigma_m = {sigma_m} must be positive"));
+        return wrong("sigma_m", sigma_m, "must be positive");
+    }
+    if sigma_m >= FARTHEST_M {
+        return wrong("sigma_m", sigma_m, "is no depth noise; is it in millimetres?");
     }
     Ok(())
 }
@@ -320,6 +340,10 @@ mod tests {
             ("z_m,theta_rad,sigma_m\n1,0\n", "line 2"),
             ("z_m,theta_rad,sigma_m,n\n1,0,0.002,5\n1,0,0.002,\n", "missing in others"),
             ("z_m,theta_rad,sigma_m\n1,0,0\n", "positive"),
+            ("z_m,theta_rad,sigma_m\n1500,0,0.003\n", "z_m = 1500 is farther than any"),
+            ("z_m,theta_rad,sigma_m\n-1e300,0,0.003\n", "z_m = -1e300 must be positive"),
+            ("z_m,theta_rad,sigma_m\n1,0,1e300\n", "sigma_m = 1e300 is no depth noise"),
+            ("z_m,theta_rad,sigma_m\n1,0\n", "2 cells, the header has 3"),
         ] {
             let message = read(bad).unwrap_err().to_string();
             assert!(message.contains(says), "{message}");

@@ -8,9 +8,10 @@
 use nalgebra::DMatrix;
 
 use super::forms::{Form, SigmaForm};
-use super::local::{natural_jacobian, polish};
+use super::local::polish;
 use super::rows::Rows;
-use super::{Domain, SigmaModel};
+use super::statistics::report;
+use super::surface::{Direction, Domain, SigmaModel};
 use crate::error::{Error, Result};
 use crate::measure::{SigmaRow, SigmaTable};
 
@@ -45,7 +46,11 @@ pub struct SigmaFit {
     /// Root mean square of s - sigma, m, and as a share of sigma.
     pub rmse_m: f64,
     pub rmse_relative: f64,
+    /// What `rmse_relative` would be from sampling alone; `None` when no n is known.
+    pub sampling_relative: Option<f64>,
     pub r2: f64,
+    /// The surface explains so little that the remarks warn of it first.
+    pub poor: bool,
     pub iterations: usize,
     pub converged: bool,
     pub remarks: Vec<String>,
@@ -56,22 +61,24 @@ pub const DISTANCE_RATIO: f64 = 1.05;
 const MOST_ROUNDS: usize = 60;
 /// Largest change of ln sigma over the table at which the weights have settled.
 const SETTLED: f64 = 1e-10;
-/// A parameter whose standard error exceeds this share of its value is called not determined.
-const WEAK: f64 = 0.5;
 
 impl SigmaFit {
     pub fn values(&self) -> Vec<f64> {
         self.parameters.iter().map(|p| p.value).collect()
     }
 
-    /// Variance of the relative residual, with the free parameters paid for.
-    pub fn relative_variance(&self) -> f64 {
-        let free = self.parameters.iter().filter(|p| p.std_error.is_some()).count();
-        let n = self.rows as f64;
-        self.rmse_relative.powi(2) * n / (n - free as f64).max(1.0)
+    /// Number of parameters that were fitted.
+    pub fn free(&self) -> usize {
+        self.parameters.iter().filter(|p| p.std_error.is_some()).count()
     }
 
-    /// The surface without the story of its fit.
+    /// Variance of the relative residual, with the free parameters paid for.
+    pub fn relative_variance(&self) -> f64 {
+        let n = self.rows as f64;
+        self.rmse_relative.powi(2) * n / (n - self.free() as f64).max(1.0)
+    }
+
+    /// The surface without the story of its fit, as one along the optical axis.
     pub fn model(&self) -> SigmaModel {
         SigmaModel {
             form: self.form,
@@ -80,6 +87,7 @@ impl SigmaFit {
             covariance: self.covariance.clone(),
             domain: self.domain,
             degrees_of_freedom: self.degrees_of_freedom,
+            direction: Direction::Axial,
         }
     }
 }
@@ -88,7 +96,7 @@ impl SigmaFit {
 ///
 /// # Errors
 /// When the table has too few rows or distances for the form, or the solver finds no surface
-/// that is positive where the data are.
+/// that is positive over their range.
 pub fn fit_all(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
     let spec = form.spec();
     let mut rows = Rows::new(table);
@@ -117,11 +125,12 @@ pub fn fit_all(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
             .zip(&before)
             .map(|(r, s)| (spec.sigma(&p, r.z_m, r.theta_rad) / s).ln().abs())
             .fold(0.0, f64::max);
-        converged = change < SETTLED;
+        converged =
+            change < SETTLED && !hold_positive(&rows, spec, &mut p, &mut free, &mut remarks);
     }
-    if !rows.iter().all(|r| spec.sigma(&p, r.z_m, r.theta_rad) > 0.0) {
+    if !positive_in_range(&rows, spec, &p) {
         return Err(Error::Solver {
-            what: format!("the form \"{form}\" is not positive where the data are"),
+            what: format!("the form \"{form}\" is not positive over the range of the data"),
             remedy: "look for outlying views in measurements.csv, or choose another --form",
         });
     }
@@ -149,6 +158,53 @@ fn hold_strays(
         }
         _ => true,
     });
+}
+
+/// A surface may not come nearer to zero inside its range than this share of the least sigma
+/// measured: between two distances a parabola can dip to where no sensor is.
+const LEAST_SHARE: f64 = 0.1;
+
+/// Where the surface is least inside its range: at the vertex or the end of z next to it, and at
+/// the least tilt, for no form's tilt term is negative.
+fn least_point(rows: &Rows, spec: &dyn SigmaForm, p: &[f64]) -> Option<(f64, f64)> {
+    let domain = Domain::of(rows, spec.pole(p));
+    spec.vertex(p).map(|c| domain.clamp(c, 0.0))
+}
+
+/// Lift a surface that dips too low to [`LEAST_SHARE`] and hold its floor there. True when that
+/// was needed: the rest must be fitted again.
+fn hold_positive(
+    rows: &Rows,
+    spec: &dyn SigmaForm,
+    p: &mut [f64],
+    free: &mut Vec<usize>,
+    remarks: &mut Vec<String>,
+) -> bool {
+    let Some((z, theta)) = least_point(rows, spec, p) else { return false };
+    let floor = LEAST_SHARE * rows.range(|r| r.sigma_m)[0];
+    let sigma = spec.sigma(p, z, theta);
+    // Once lifted, half the way down again is let be: the surface is positive.
+    if sigma >= if free.contains(&0) { floor } else { 0.5 * floor } {
+        return false;
+    }
+    p[0] += floor - sigma;
+    if free.contains(&0) {
+        free.retain(|&i| i != 0);
+        remarks.push(format!(
+            "a is held: fitted freely the surface falls to {:.2} mm at {z:.2} m; record views near that distance",
+            1e3 * sigma
+        ));
+    }
+    true
+}
+
+fn positive_in_range(rows: &Rows, spec: &dyn SigmaForm, p: &[f64]) -> bool {
+    let good = |z, theta| {
+        let sigma: f64 = spec.sigma(p, z, theta);
+        sigma.is_finite() && sigma > 0.0
+    };
+    rows.iter().all(|r| good(r.z_m, r.theta_rad))
+        && least_point(rows, spec, p).is_none_or(|(z, theta)| good(z, theta))
 }
 
 fn positive(sigma: f64, otherwise: f64) -> f64 {
@@ -187,128 +243,4 @@ fn enough(rows: &Rows, spec: &dyn SigmaForm) -> Result<()> {
         });
     }
     Ok(())
-}
-
-fn report(
-    form: Form,
-    rows: &Rows,
-    p: Vec<f64>,
-    free: &[usize],
-    mut remarks: Vec<String>,
-    iterations: usize,
-    converged: bool,
-) -> SigmaFit {
-    let spec = form.spec();
-    let relative: Vec<f64> =
-        rows.iter().map(|r| r.sigma_m / spec.sigma(&p, r.z_m, r.theta_rad) - 1.0).collect();
-    let degrees = (rows.views() as f64 - free.len() as f64).max(1.0);
-    let scale = if rows.counted() {
-        1.0
-    } else {
-        relative.iter().map(|r| r * r).sum::<f64>()
-            / (rows.len() as f64 - free.len() as f64).max(1.0)
-    };
-    let covariance = covariance(rows, spec, &p, free, scale);
-    let parameters = name_parameters(spec, rows, &p, free, &covariance);
-    if !converged {
-        remarks.push(format!("the weights had not settled after {iterations} rounds"));
-    }
-    let weak = parameters.iter().filter(|q| q.std_error.is_some() && q.remark.is_some());
-    for q in weak {
-        let text = q.remark.clone().unwrap_or_default();
-        if !remarks.contains(&text) {
-            remarks.push(text);
-        }
-    }
-    let n = rows.len() as f64;
-    let mean = rows.iter().map(|r| r.sigma_m).sum::<f64>() / n;
-    let scatter: f64 = rows.iter().map(|r| (r.sigma_m - mean).powi(2)).sum();
-    let left: f64 =
-        rows.iter().map(|r| (r.sigma_m - spec.sigma(&p, r.z_m, r.theta_rad)).powi(2)).sum();
-    SigmaFit {
-        form,
-        domain: Domain::of(rows, spec.pole(&p)),
-        parameters,
-        covariance,
-        rows: rows.len(),
-        views: rows.views(),
-        left_out: Vec::new(),
-        degrees_of_freedom: degrees,
-        extra_within: rows.extra()[0],
-        extra_between: rows.extra()[1],
-        rmse_m: (left / n).sqrt(),
-        rmse_relative: (relative.iter().map(|r| r * r).sum::<f64>() / n).sqrt(),
-        r2: if scatter > 0.0 { 1.0 - left / scatter } else { 0.0 },
-        iterations,
-        converged,
-        remarks,
-    }
-}
-
-/// (J' C^-1 J)^-1 by singular values; directions the data do not see get no variance here and
-/// are named by [`name_parameters`].
-fn covariance(
-    rows: &Rows,
-    spec: &dyn SigmaForm,
-    p: &[f64],
-    free: &[usize],
-    scale: f64,
-) -> DMatrix<f64> {
-    let mut full = DMatrix::zeros(p.len(), p.len());
-    if free.is_empty() {
-        return full;
-    }
-    let mut j = natural_jacobian(rows, spec, p, free);
-    let norms: Vec<f64> = j.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE)).collect();
-    for (mut column, norm) in j.column_iter_mut().zip(&norms) {
-        column /= *norm;
-    }
-    if j.nrows() < free.len() {
-        // Rows of zeros see nothing; without them the decomposition is short of directions.
-        j = j.resize_vertically(free.len(), 0.0);
-    }
-    let svd = j.svd(false, true);
-    let Some(v_t) = svd.v_t else { return full };
-    let largest = svd.singular_values.max();
-    for (a, &ia) in free.iter().enumerate() {
-        for (b, &ib) in free.iter().enumerate() {
-            let sum: f64 = (0..free.len())
-                .map(|k| {
-                    let s = svd.singular_values[k].max(UNSEEN * largest);
-                    v_t[(k, a)] * v_t[(k, b)] / (s * s)
-                })
-                .sum();
-            full[(ia, ib)] = scale * sum / (norms[a] * norms[b]);
-        }
-    }
-    full
-}
-
-/// Singular values below this share of the largest are rounding; the variance along them is
-/// then huge but finite.
-const UNSEEN: f64 = 1e-10;
-
-fn name_parameters(
-    spec: &dyn SigmaForm,
-    rows: &Rows,
-    p: &[f64],
-    free: &[usize],
-    covariance: &DMatrix<f64>,
-) -> Vec<Parameter> {
-    spec.parameters()
-        .iter()
-        .enumerate()
-        .map(|(i, &(name, _))| {
-            let std_error = free.contains(&i).then(|| covariance[(i, i)].max(0.0).sqrt());
-            let weak = std_error.is_some_and(|e| e.is_nan() || e > WEAK * p[i].abs());
-            let remark = match std_error {
-                None => Some(format!("{name} was held, not fitted")),
-                Some(_) if weak => spec
-                    .why_weak(i, rows)
-                    .or_else(|| Some(format!("{name} is not determined by these data"))),
-                Some(_) => None,
-            };
-            Parameter { name, value: p[i], std_error, remark }
-        })
-        .collect()
 }

@@ -1,8 +1,7 @@
 //! Judging forms on distances they have not seen.
 
-use super::fit::DISTANCE_RATIO;
+use super::fit::{DISTANCE_RATIO, fit_all};
 use super::forms::Form;
-use super::outliers::fit;
 use super::rows::Rows;
 use crate::measure::SigmaTable;
 
@@ -14,6 +13,8 @@ pub struct HeldOut {
     pub log_score: f64,
     /// Root mean square relative error, views weighing the same.
     pub rmse_relative: f64,
+    /// Mean squared error in its own predicted variance; one where the form knows how sure it is.
+    pub chi2: f64,
     /// Groups of distances that were left out in turn.
     pub folds: usize,
 }
@@ -21,7 +22,8 @@ pub struct HeldOut {
 /// More distances than this are put together into as many groups.
 const MOST_FOLDS: usize = 8;
 
-/// Leave out one distance (or group of neighbouring distances) at a time; views stay whole.
+/// Leave out one distance (or group of neighbouring distances) at a time; views stay whole. Every
+/// row counts: take outliers out first ([`super::sort_out`]), so that all forms are asked the same.
 ///
 /// `None` when there are fewer than three distances or a fold cannot be fitted.
 pub fn held_out(table: &SigmaTable, form: Form) -> Option<HeldOut> {
@@ -31,7 +33,7 @@ pub fn held_out(table: &SigmaTable, form: Form) -> Option<HeldOut> {
         return None;
     }
     let fold_of = |view: usize| folds.iter().find(|(v, _)| *v == view).map_or(0, |(_, f)| *f);
-    let (mut score, mut square, mut views) = (0.0, 0.0, 0.0);
+    let (mut score, mut square, mut chi2, mut views) = (0.0, 0.0, 0.0, 0.0);
     for left_out in 0..count {
         let pick = |keep: bool| SigmaTable {
             rows: table
@@ -42,12 +44,13 @@ pub fn held_out(table: &SigmaTable, form: Form) -> Option<HeldOut> {
                 .collect(),
         };
         let (train, test) = (pick(true), pick(false));
-        let fitted = fit(&train, form).ok()?;
+        let fitted = fit_all(&train, form).ok()?;
+        let surface = fitted.model();
         let p = fitted.values();
         let extra = fitted.extra_within.powi(2) + fitted.extra_between.powi(2);
         let rows = Rows::new(&test);
         for view in views_of(&test) {
-            let (mut s, mut q, mut n) = (0.0, 0.0, 0.0);
+            let (mut s, mut q, mut c, mut n) = (0.0, 0.0, 0.0, 0.0);
             for (i, r) in rows.iter().enumerate().filter(|(_, r)| r.view == view) {
                 let predicted = form.spec().sigma(&p, r.z_m, r.theta_rad);
                 let error = r.sigma_m / predicted - 1.0;
@@ -56,14 +59,19 @@ pub fn held_out(table: &SigmaTable, form: Form) -> Option<HeldOut> {
                 } else {
                     fitted.relative_variance()
                 }
-                .max(f64::MIN_POSITIVE);
+                .max(f64::MIN_POSITIVE)
+                    // A surface that is unsure of a distance it has not seen may not be scored
+                    // as if it were sure.
+                    + (surface.std_error(r.z_m, r.theta_rad) / predicted).powi(2);
                 s += -0.5
                     * (error * error / variance + (2.0 * std::f64::consts::PI * variance).ln());
                 q += error * error;
+                c += error * error / variance;
                 n += 1.0;
             }
             score += s / n;
             square += q / n;
+            chi2 += c / n;
             views += 1.0;
         }
     }
@@ -71,12 +79,13 @@ pub fn held_out(table: &SigmaTable, form: Form) -> Option<HeldOut> {
         form,
         log_score: score / views,
         rmse_relative: (square / views).sqrt(),
+        chi2: chi2 / views,
         folds: count,
     };
     (result.log_score.is_finite() && result.rmse_relative.is_finite()).then_some(result)
 }
 
-/// All forms that can be judged, best first.
+/// All forms that can be judged, best first, on the same rows for all.
 pub fn compare_forms(table: &SigmaTable) -> Vec<HeldOut> {
     let mut scores: Vec<HeldOut> =
         Form::ALL.into_iter().filter_map(|f| held_out(table, f)).collect();

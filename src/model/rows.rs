@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::paule_mandel::{between, paule_mandel};
 use crate::measure::{SigmaRow, SigmaTable};
 
 /// Rows grouped by view. The relative error of a row is taken as the sum of three independent
@@ -30,10 +31,11 @@ pub struct Rows {
 struct Whitener {
     /// One over the standard deviation of a row's own relative error.
     root: Vec<f64>,
-    /// The same over the reference sigma.
+    /// What a value is multiplied with: the same over the reference sigma, and where a view is one
+    /// row, its share of the view's common error too.
     scale: Vec<f64>,
-    /// Per view, by how much its common error is shrunk.
-    shrink: Vec<f64>,
+    /// Views of several rows: by how much their common error is shrunk.
+    shared: Vec<(std::ops::Range<usize>, f64)>,
 }
 
 impl Rows {
@@ -90,10 +92,7 @@ impl Rows {
     }
 
     pub fn range(&self, column: impl Fn(&SigmaRow) -> f64) -> [f64; 2] {
-        self.rows
-            .iter()
-            .map(column)
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+        crate::stats::range(self.rows.iter().map(column))
     }
 
     /// Is the sampling error known (a table with n)?
@@ -140,14 +139,12 @@ impl Rows {
         for (value, scale) in column.iter_mut().zip(&self.whitener.scale) {
             *value *= scale;
         }
-        for (block, shrink) in self.blocks.iter().zip(&self.whitener.shrink) {
-            if *shrink > 0.0 {
-                let root = &self.whitener.root[block.clone()];
-                let column = &mut column[block.clone()];
-                let dot: f64 = column.iter().zip(root).map(|(v, r)| v * r).sum();
-                for (v, r) in column.iter_mut().zip(root) {
-                    *v -= shrink * dot * r;
-                }
+        for (block, shrink) in &self.whitener.shared {
+            let root = &self.whitener.root[block.clone()];
+            let column = &mut column[block.clone()];
+            let dot: f64 = column.iter().zip(root).map(|(v, r)| v * r).sum();
+            for (v, r) in column.iter_mut().zip(root) {
+                *v -= shrink * dot * r;
             }
         }
     }
@@ -157,14 +154,19 @@ impl Rows {
         let w = &mut self.whitener;
         w.root = self.sampling.iter().map(|s| 1.0 / (s + self.tau_cell2).sqrt()).collect();
         w.scale = w.root.iter().zip(&self.reference).map(|(r, s)| r / s).collect();
-        w.shrink = self
-            .blocks
-            .iter()
-            .map(|block| {
-                let s: f64 = w.root[block.clone()].iter().map(|r| r * r).sum();
-                (1.0 - 1.0 / (1.0 + self.tau_view2 * s).sqrt()) / s
-            })
-            .collect();
+        w.shared.clear();
+        if self.tau_view2 == 0.0 {
+            return;
+        }
+        for block in &self.blocks {
+            let s: f64 = w.root[block.clone()].iter().map(|r| r * r).sum();
+            let kept = 1.0 / (1.0 + self.tau_view2 * s).sqrt();
+            if block.len() == 1 {
+                w.scale[block.start] *= kept;
+            } else {
+                w.shared.push((block.clone(), (1.0 - kept) / s));
+            }
+        }
     }
 
     pub fn whitened_sigmas(&self) -> DVector<f64> {
@@ -221,42 +223,45 @@ impl Rows {
         self.tau_cell2 = if within_dof < 1.0 {
             0.0
         } else {
-            smallest_root(|tau| self.within(&residual, tau) - within_dof)
+            paule_mandel(within_dof, |tau| self.within(&residual, tau))
         };
         let between_dof = (self.views() as f64 - parameters as f64).max(1.0);
-        let cell = self.tau_cell2;
-        self.tau_view2 = smallest_root(|tau| self.between(&residual, cell, tau) - between_dof);
+        let means: Vec<(f64, f64)> = self
+            .blocks
+            .iter()
+            .map(|b| {
+                let (mean, variance, ..) = self.block(b, &residual, self.tau_cell2);
+                (mean * mean, variance)
+            })
+            .collect();
+        self.tau_view2 = paule_mandel(between_dof, |tau| between(&means, tau));
         self.weigh();
     }
 
-    /// Chi-square of the rows about their view's mean.
-    fn within(&self, residual: &[f64], tau_cell2: f64) -> f64 {
-        self.blocks.iter().map(|b| self.block(b, residual, tau_cell2).2).sum()
+    /// Chi-square of the rows about their view's mean, and its derivative by tau_cell^2.
+    fn within(&self, residual: &[f64], tau_cell2: f64) -> (f64, f64) {
+        self.blocks.iter().fold((0.0, 0.0), |(chi2, slope), b| {
+            let (_, _, c, s) = self.block(b, residual, tau_cell2);
+            (chi2 + c, slope + s)
+        })
     }
 
-    /// Chi-square of the views' means.
-    fn between(&self, residual: &[f64], tau_cell2: f64, tau_view2: f64) -> f64 {
-        self.blocks
-            .iter()
-            .map(|b| {
-                let (mean, variance, _) = self.block(b, residual, tau_cell2);
-                mean * mean / (variance + tau_view2)
-            })
-            .sum()
-    }
-
-    /// Weighted mean of a view's residuals, its variance, and the chi-square about it.
+    /// Weighted mean of a view's residuals, its variance, the chi-square about it, and that one's
+    /// derivative by tau_cell^2 (the mean is where chi-square is least, so moving it adds nothing).
     fn block(
         &self,
         block: &std::ops::Range<usize>,
         residual: &[f64],
         tau_cell2: f64,
-    ) -> (f64, f64, f64) {
+    ) -> (f64, f64, f64, f64) {
         let weight = |i: usize| 1.0 / (self.sampling[i] + tau_cell2);
         let total: f64 = block.clone().map(weight).sum();
         let mean = block.clone().map(|i| weight(i) * residual[i]).sum::<f64>() / total;
-        let chi2 = block.clone().map(|i| weight(i) * (residual[i] - mean).powi(2)).sum();
-        (mean, 1.0 / total, chi2)
+        let (chi2, slope) = block.clone().fold((0.0, 0.0), |(chi2, slope), i| {
+            let part = weight(i) * (residual[i] - mean).powi(2);
+            (chi2 + part, slope - part * weight(i))
+        });
+        (mean, 1.0 / total, chi2, slope)
     }
 
     /// Relative scatter beyond sampling, as standard deviations: within views and between them.
@@ -273,30 +278,6 @@ impl Rows {
 /// Diagonal of R after columns were scaled to unit length: below this a column adds nothing new.
 const DEPENDENT: f64 = 1e-9;
 
-/// Relative width at which the bisection for tau^2 ends: far below any use, far above rounding.
-const ROOT_DIGITS: f64 = 1e-12;
-
-/// The least tau^2 >= 0 at which a decreasing excess is not positive, by bisection.
-fn smallest_root(excess: impl Fn(f64) -> f64) -> f64 {
-    if excess(0.0).is_nan() || excess(0.0) <= 0.0 {
-        return 0.0;
-    }
-    let mut high = 1e-6;
-    while excess(high) > 0.0 && high < 1e6 {
-        high *= 4.0;
-    }
-    let mut low = 0.0;
-    while high - low > ROOT_DIGITS * high {
-        let middle = 0.5 * (low + high);
-        if excess(middle) > 0.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    high
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -309,7 +290,8 @@ mod tests {
                     theta_rad: 0.1,
                     sigma_m: 0.002 + 0.001 * f64::from(i),
                     n_effective: Some(50.0 + 10.0 * f64::from(i)),
-                    view: (i / 3) as usize,
+                    // Three views of three rows, and three of one.
+                    view: (i / 3).max(i - 6) as usize,
                 })
                 .collect(),
         };

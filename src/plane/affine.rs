@@ -8,8 +8,7 @@ use crate::stats::median_in_place;
 
 /// Tukey's biweight reaches zero here, in standard deviations: 95 % efficient on Gaussian noise.
 const TUKEY: f64 = 4.685;
-/// The median absolute deviation of a Gaussian times this is its standard deviation.
-pub(crate) const MAD_TO_SIGMA: f64 = 1.4826;
+pub(crate) use crate::stats::MAD_TO_SIGMA;
 
 /// A robust plane and the scale of what it left.
 #[derive(Debug, Clone, Copy, PartialEq)]

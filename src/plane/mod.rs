@@ -7,9 +7,13 @@
 //! steepens small, far, tilted targets (0.3 to 1 degree on the real views beyond 2.4 m).
 
 mod affine;
+mod candidate;
 mod grow;
 mod principal_point;
 mod ransac;
+mod relief;
+mod rival;
+mod shapes;
 mod target;
 
 pub(crate) use affine::MAD_TO_SIGMA;

@@ -1,25 +1,11 @@
 //! Without a region the target is the plane that the principal point looks at.
 
-use super::affine::{AffineFit, Effort, fit_affine_robust};
+use super::candidate::{Candidate, around_principal_point, candidate, centre_disc};
 use super::grow::Lattice;
 use super::target::{FEWEST_PIXELS, in_front, on_plane, seed_plane};
-use super::{Exclusions, InverseDepthImage, Plane, Target};
-use crate::camera::Camera;
+use super::{Exclusions, InverseDepthImage, Target};
 use crate::rng::Stream;
-
-/// A plane grown from a window around the principal point.
-struct Candidate {
-    fit: AffineFit,
-    mask: Vec<bool>,
-    /// Share of the measured pixels around the principal point that lie on it.
-    at_centre: f64,
-    /// Distance of the nearest node from the principal point, px.
-    away_px: f64,
-    /// Its residual is noise, not relief.
-    flat: bool,
-    /// Larger than the palm of a hand.
-    roomy: bool,
-}
+use crate::stats::median_in_place;
 
 /// Half sizes of the windows a seed is looked for in, as shares of the image width: from a board
 /// seen edge-on to one whose middle is hidden by a hand.
@@ -30,7 +16,7 @@ pub(super) fn at_principal_point(
     rng: &mut Stream,
 ) -> Result<Target, String> {
     let camera = image.camera;
-    let lattice = Lattice::over(image.w, camera.width, camera.height);
+    let lattice = Lattice::over(image.w, image.rays, camera.width, camera.height);
     let measured = image.w.iter().filter(|w| w.is_finite()).count();
     if measured < FEWEST_PIXELS {
         return Err(format!("only {measured} of {} pixels carry a depth", image.w.len()));
@@ -57,8 +43,79 @@ pub(super) fn at_principal_point(
     if !best.flat {
         return Err("what the principal point looks at is not flat".into());
     }
+    if best.at_centre < AT_CENTRE {
+        only_a_hand_between(image, &best, rng)?;
+    }
     finish(image, &lattice, &best, measured)
 }
+
+/// A plane that the principal point does not look at is the target only behind something small
+/// and not flat, such as a hand. A flat thing there is the board itself, and what was found is a
+/// wall.
+fn only_a_hand_between(
+    image: &InverseDepthImage<'_>,
+    best: &Candidate,
+    rng: &mut Stream,
+) -> Result<(), String> {
+    let camera = image.camera;
+    let Some(ahead) = ahead(image, best, &centre_disc(camera)) else {
+        return Ok(());
+    };
+    let fault = |what: &str| {
+        Err(format!(
+            "{what} at the principal point, and the nearest plane found, {:.0} px away at {:.2} m, \
+             is another; aim the camera at the target's middle",
+            best.away_px,
+            best.fit.plane.depth(0.0, 0.0)
+        ))
+    };
+    if ahead <= 0.0 {
+        return fault("nothing flat");
+    }
+    let metre_px = camera.fx * best.fit.plane.inverse_depth(0.0, 0.0);
+    if best.away_px > HAND_M * metre_px {
+        return fault("something large");
+    }
+    if flat_there(image, best, rng) {
+        return fault("something flat but too noisy or too narrow to be measured");
+    }
+    Ok(())
+}
+
+/// Median inverse depth of the pixels above the candidate's plane, 1/m; `None` without any.
+fn ahead(image: &InverseDepthImage<'_>, best: &Candidate, pixels: &[u32]) -> Option<f32> {
+    let mut ahead: Vec<f32> = pixels
+        .iter()
+        .map(|&i| {
+            let (x, y) = image.rays.at(i as usize);
+            image.w[i as usize] - best.fit.plane.inverse_depth(x, y) as f32
+        })
+        .filter(|d| d.is_finite())
+        .collect();
+    (!ahead.is_empty()).then(|| median_in_place(&mut ahead))
+}
+
+/// Does most of what is around the principal point lie on one plane, by the candidate's noise?
+fn flat_there(image: &InverseDepthImage<'_>, best: &Candidate, rng: &mut Stream) -> bool {
+    let half = WINDOWS[1] * image.camera.width as f64;
+    let around: Vec<u32> = around_principal_point(image.camera, half)
+        .into_iter()
+        .filter(|&i| image.valid(i as usize))
+        .collect();
+    let Some(fit) = seed_plane(image, &around, rng) else { return false };
+    let near = |i: &&u32| {
+        let (x, y) = image.rays.at(**i as usize);
+        let off = f64::from(image.w[**i as usize]) - fit.plane.inverse_depth(x, y);
+        off.abs() < FLAT_SIGMAS * best.fit.scale
+    };
+    around.iter().filter(near).count() as f64 > FLAT_SHARE * around.len() as f64
+}
+
+/// A hand and a wrist reach no farther over the board than this, m.
+const HAND_M: f64 = 0.15;
+/// Flat is what holds this share within so many sigma of a plane: 99 % of noise is.
+const FLAT_SIGMAS: f64 = 2.5;
+const FLAT_SHARE: f64 = 0.8;
 
 /// The principal point looks at the plane when this share of what is measured there lies on it.
 const AT_CENTRE: f64 = 0.5;
@@ -66,119 +123,6 @@ const AT_CENTRE: f64 = 0.5;
 /// Flat before not flat, a board before a palm, looked at before looked past, near before far.
 fn rank(c: &Candidate) -> (bool, bool, bool, i64) {
     (c.flat, c.roomy, c.at_centre >= AT_CENTRE, -(c.away_px as i64))
-}
-
-const GROWING_ROUNDS: usize = 12;
-
-fn candidate(
-    image: &InverseDepthImage<'_>,
-    lattice: &Lattice,
-    half: f64,
-    rng: &mut Stream,
-) -> Option<Candidate> {
-    let window = around_principal_point(image.camera, half);
-    let seeds: Vec<u32> = window.into_iter().filter(|&i| image.valid(i as usize)).collect();
-    if seeds.len() < 40 {
-        return None;
-    }
-    let mut fit = seed_plane(image, &seeds, rng)?;
-    let seed_nodes: Vec<usize> =
-        seeds.iter().map(|&i| lattice.node_of(i as usize, image.camera.width)).collect();
-    let mut mask: Vec<bool> = Vec::new();
-    for _ in 0..GROWING_ROUNDS {
-        let grown = lattice.grow(
-            image.w,
-            image.rays,
-            &fit.plane,
-            |w| image.reach(w, fit.scale),
-            &seed_nodes,
-        );
-        if grown == mask {
-            break;
-        }
-        mask = grown;
-        let samples = lattice.samples(&mask);
-        let floor = image.floor(fit.plane.q.z.abs());
-        fit = fit_affine_robust(image.w, image.rays, &samples, &fit.plane, floor, Effort::Sample)?;
-    }
-    let nodes = mask.iter().filter(|m| **m).count();
-    if nodes * lattice.pitch * lattice.pitch < FEWEST_PIXELS {
-        return None;
-    }
-    Some(judge(image, lattice, fit, mask, nodes))
-}
-
-/// Around the principal point, a disc of this share of the width is "what it looks at".
-const CENTRE_DISC: f64 = 0.0125;
-/// Relief: residual over local noise above which a surface is not flat, and the more lenient one
-/// for surfaces over four percent of the image (a lens may bend a near wall that much).
-const RELIEF: f64 = 4.0;
-const RELIEF_LARGE: f64 = 8.0;
-const LARGE: f64 = 0.04;
-/// What lies within a centimetre of one plane on a hand is below this, a sheet of paper three
-/// times above, m^2.
-const LEAST_AREA_M2: f64 = 0.02;
-
-fn judge(
-    image: &InverseDepthImage<'_>,
-    lattice: &Lattice,
-    fit: AffineFit,
-    mask: Vec<bool>,
-    nodes: usize,
-) -> Candidate {
-    let camera = image.camera;
-    let disc = around_principal_point(camera, (CENTRE_DISC * camera.width as f64).max(3.0));
-    let measured: Vec<usize> =
-        disc.iter().map(|&i| i as usize).filter(|&i| image.valid(i)).collect();
-    let on = measured
-        .iter()
-        .filter(|&&i| mask[lattice.node_of(i, camera.width)] && on_plane(image, &fit, i))
-        .count();
-    let samples = lattice.samples(&mask);
-    let noise = image.local_noise(&samples).max(image.floor(fit.plane.q.z.abs()));
-    let relief = fit.scale / noise;
-    let rough = image.too_rough(&fit, &samples);
-    let large = nodes as f64 > LARGE * mask.len() as f64;
-    let away_px = samples
-        .iter()
-        .map(|&i| {
-            let (u, v) = (f64::from(i) % camera.width as f64, f64::from(i) / camera.width as f64);
-            (u - camera.cx).hypot(v.floor() - camera.cy)
-        })
-        .fold(f64::INFINITY, f64::min);
-    Candidate {
-        at_centre: on as f64 / measured.len().max(1) as f64,
-        flat: !rough && relief < if large { RELIEF_LARGE } else { RELIEF },
-        roomy: area(image, lattice, &fit.plane, &samples) > LEAST_AREA_M2,
-        fit,
-        mask,
-        away_px,
-    }
-}
-
-/// Area on the plane that the nodes cover, m^2: a pixel covers z^3 |q| / (fx fy).
-fn area(image: &InverseDepthImage<'_>, lattice: &Lattice, plane: &Plane, samples: &[u32]) -> f64 {
-    let node = (lattice.pitch * lattice.pitch) as f64 / (image.camera.fx * image.camera.fy);
-    let cubes: f64 = samples
-        .iter()
-        .map(|&i| {
-            let (x, y) = image.rays.at(i as usize);
-            plane.depth(x, y).powi(3)
-        })
-        .sum();
-    cubes * plane.q.norm() * node
-}
-
-/// Pixels of the square of half size `half` (px) around the principal point.
-fn around_principal_point(camera: &Camera, half: f64) -> Vec<u32> {
-    let range = |c: f64, n: usize| {
-        let low = (c - half).max(0.0).ceil() as usize;
-        let high = (c + half).min(n as f64 - 1.0).max(0.0) as usize;
-        low..=high
-    };
-    range(camera.cy, camera.height)
-        .flat_map(|v| range(camera.cx, camera.width).map(move |u| (v * camera.width + u) as u32))
-        .collect()
 }
 
 /// Pixels of the grown region, less its rim, and what was left out.

@@ -6,6 +6,7 @@ use super::Plane;
 use super::affine::{AffineFit, Effort, MAD_TO_SIGMA, fit_affine_robust};
 use super::principal_point::at_principal_point;
 use super::ransac::{Estimator, InlierCount, UniformSampler, ransac};
+use super::relief::{Relief, relief};
 use crate::camera::{Camera, Rays};
 use crate::rng::Stream;
 use crate::stats::median_in_place;
@@ -171,7 +172,9 @@ fn in_region(
     let fit = seed_plane(image, &valid, rng)
         .filter(|fit| !image.too_rough(fit, &valid))
         .ok_or("its region holds no plane")?;
-    let on = valid.iter().filter(|&&i| on_plane(image, &fit, i as usize)).count();
+    let relief = flat_enough(image, &inside, &valid, &fit)?;
+    let flat = |i: u32| !relief.mask[relief.lattice.node_of(i as usize, width)];
+    let on = valid.iter().filter(|&&i| flat(i) && on_plane(image, &fit, i as usize)).count();
     if on < FEWEST_PIXELS {
         return Err(format!("only {on} pixels of its region lie on one plane"));
     }
@@ -181,7 +184,7 @@ fn in_region(
         off_plane: valid.len() - on,
         edge: 0,
     };
-    let mut notes = Vec::new();
+    let mut notes = relief.notes;
     let share = exclusions.off_plane as f64 / valid.len() as f64;
     if share > TELL_OFF_PLANE {
         notes.push(format!(
@@ -189,8 +192,39 @@ fn in_region(
             100.0 * share
         ));
     }
-    let pixels = inside.into_iter().filter(|&i| in_front(image, &fit.plane, i as usize)).collect();
+    let pixels = inside
+        .into_iter()
+        .filter(|&i| flat(i) && in_front(image, &fit.plane, i as usize))
+        .collect();
     Ok(Target { pixels, plane: fit.plane, scale: fit.scale, exclusions, notes })
+}
+
+/// A region of which more than this share is off the plane was not drawn around a target.
+const MOST_RELIEF: f64 = 0.5;
+/// Residual over local noise above which a region is no plane: Herrera's 39 views reach 3.7.
+const MOST_BENT: f64 = 5.0;
+
+/// What stands off the plane in a region that is a plane otherwise.
+fn flat_enough(
+    image: &InverseDepthImage<'_>,
+    inside: &[u32],
+    valid: &[u32],
+    fit: &AffineFit,
+) -> Result<Relief, String> {
+    let relief = relief(image, inside, fit);
+    if relief.share > MOST_RELIEF {
+        return Err(format!(
+            "{:.0} % of its region are off the plane that fits it best",
+            100.0 * relief.share
+        ));
+    }
+    let bent = fit.scale / image.local_noise(valid).max(image.floor(fit.plane.q.z.abs()));
+    if bent > MOST_BENT {
+        return Err(format!(
+            "its region is not flat: it is off the best plane by {bent:.1} times its own noise"
+        ));
+    }
+    Ok(relief)
 }
 
 /// Does the pixel's ray meet the plane before the camera?

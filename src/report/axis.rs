@@ -7,9 +7,13 @@ use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, Value
 /// From `low` to `high`, with the values that get a tick and a label.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
+    /// The left or lower end.
     pub low: f64,
+    /// The right or upper end.
     pub high: f64,
+    /// Logarithmic, not linear.
     pub log: bool,
+    /// Values with a tick and a label, rising.
     pub ticks: Vec<f64>,
 }
 
@@ -69,6 +73,7 @@ impl Axis {
         }
     }
 
+    /// Does `value` lie on the axis?
     pub fn contains(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }

@@ -7,33 +7,13 @@ pub(super) const FAINT: RGBColor = RGBColor(110, 110, 110);
 pub(super) const GRID: RGBColor = RGBColor(225, 225, 225);
 
 /// Viridis (van der Walt and Smith 2015) up to the green that still shows on white.
-const DISTANCES: [RGBColor; 6] = [
-    RGBColor(68, 1, 84),
-    RGBColor(65, 68, 135),
-    RGBColor(42, 120, 142),
-    RGBColor(34, 168, 132),
-    RGBColor(122, 209, 81),
-    RGBColor(190, 214, 40),
-];
+const DISTANCES: [u32; 6] = [0x440154, 0x414487, 0x2a788e, 0x22a884, 0x7ad151, 0xbed628];
 
 /// ColorBrewer's YlGnBu up to the blue on which black still shows.
-const SURFACE: [RGBColor; 6] = [
-    RGBColor(255, 255, 217),
-    RGBColor(237, 248, 177),
-    RGBColor(199, 233, 180),
-    RGBColor(127, 205, 187),
-    RGBColor(65, 182, 196),
-    RGBColor(29, 145, 192),
-];
+const SURFACE: [u32; 6] = [0xffffd9, 0xedf8b1, 0xc7e9b4, 0x7fcdbb, 0x41b6c4, 0x1d91c0];
 
 /// ColorBrewer's RdBu, reversed: blue nearer than the plane, red farther.
-const RESIDUALS: [RGBColor; 5] = [
-    RGBColor(5, 74, 150),
-    RGBColor(103, 169, 214),
-    RGBColor(255, 255, 255),
-    RGBColor(239, 138, 98),
-    RGBColor(165, 15, 33),
-];
+const RESIDUALS: [u32; 5] = [0x054a96, 0x67a9d6, 0xffffff, 0xef8a62, 0xa50f21];
 
 /// Of a distance: dark is near. `share` runs from 0 to 1, as in the others.
 pub(super) fn distance(share: f64) -> RGBColor {
@@ -50,11 +30,28 @@ pub(super) fn residual(share: f64) -> RGBColor {
     between(&RESIDUALS, share)
 }
 
-fn between(anchors: &[RGBColor], share: f64) -> RGBColor {
+/// The same hue for a thin line: at full lightness the last of the distances' colours is lost on
+/// white.
+pub(super) fn darker(RGBColor(r, g, b): RGBColor) -> RGBColor {
+    let dim = |c: u8| (f64::from(c) * DARKER).round() as u8;
+    RGBColor(dim(r), dim(g), dim(b))
+}
+
+/// At which even the lightest keeps a contrast of 4.5 to white (WCAG 2.1, 1.4.3).
+const DARKER: f64 = 0.58;
+
+/// Red, green and blue, a byte each.
+fn rgb(colour: u32) -> RGBColor {
+    let [_, r, g, b] = colour.to_be_bytes();
+    RGBColor(r, g, b)
+}
+
+/// Linear between the anchors, which are evenly spread.
+fn between(anchors: &[u32], share: f64) -> RGBColor {
     let last = anchors.len() - 1;
     let at = share.clamp(0.0, 1.0) * last as f64;
     let i = (at as usize).min(last - 1);
-    let [RGBColor(r0, g0, b0), RGBColor(r1, g1, b1)] = [anchors[i], anchors[i + 1]];
+    let [RGBColor(r0, g0, b0), RGBColor(r1, g1, b1)] = [anchors[i], anchors[i + 1]].map(rgb);
     let mix =
         |a: u8, b: u8| (f64::from(a) + (at - i as f64) * (f64::from(b) - f64::from(a))).round();
     RGBColor(mix(r0, r1) as u8, mix(g0, g1) as u8, mix(b0, b1) as u8)
@@ -66,6 +63,23 @@ mod tests {
 
     fn luma(RGBColor(r, g, b): RGBColor) -> f64 {
         0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)
+    }
+
+    /// Relative luminance of sRGB, as WCAG 2.1 defines it.
+    fn luminance(RGBColor(r, g, b): RGBColor) -> f64 {
+        let linear = |c: u8| {
+            let c = f64::from(c) / 255.0;
+            if c <= 0.03928 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+        };
+        0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b)
+    }
+
+    #[test]
+    fn thin_lines_stand_out_from_white() {
+        for i in 0..=20 {
+            let line = darker(distance(f64::from(i) / 20.0));
+            assert!(1.05 / (luminance(line) + 0.05) >= 4.5, "{line:?}");
+        }
     }
 
     #[test]

@@ -2,69 +2,27 @@
 
 mod draw;
 mod groups;
+mod marks;
+mod overlay;
 
-use std::str::FromStr;
+pub use overlay::Overlay;
 
 use super::axis::Axis;
 use super::sheet;
 use crate::error::Result;
 use crate::measure::{SigmaRow, SigmaTable};
 use crate::model::{DISTANCE_RATIO, Domain, SigmaModel};
-
-/// A published surface to draw beside the fit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Overlay {
-    PaperEq1,
-    Nguyen,
-    Khoshelham,
-}
-
-impl Overlay {
-    pub const ALL: [Overlay; 3] = [Overlay::PaperEq1, Overlay::Nguyen, Overlay::Khoshelham];
-
-    pub fn id(self) -> &'static str {
-        match self {
-            Overlay::PaperEq1 => "eq1",
-            Overlay::Nguyen => "nguyen",
-            Overlay::Khoshelham => "khoshelham",
-        }
-    }
-
-    /// As a legend says it.
-    pub fn label(self) -> &'static str {
-        match self {
-            Overlay::PaperEq1 => "paper, Eq. 1",
-            Overlay::Nguyen => "Nguyen et al. 2012",
-            Overlay::Khoshelham => "Khoshelham 2012",
-        }
-    }
-
-    pub fn model(self) -> SigmaModel {
-        match self {
-            Overlay::PaperEq1 => SigmaModel::paper(),
-            Overlay::Nguyen => SigmaModel::nguyen(),
-            Overlay::Khoshelham => SigmaModel::khoshelham(),
-        }
-    }
-}
-
-impl FromStr for Overlay {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        Overlay::ALL.into_iter().find(|o| o.id() == text).ok_or_else(|| {
-            let known = Overlay::ALL.map(Overlay::id).join(", ");
-            format!("there is no overlay \"{text}\"; the overlays are {known}")
-        })
-    }
-}
+use crate::stats::range;
 
 /// A measured sigma, carried along the fitted surface from its own distance to its group's: its
 /// height over the curve is its relative residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
+    /// Tilt, degrees.
     pub theta_deg: f64,
+    /// Sigma, carried to the group's distance, mm.
     pub sigma_mm: f64,
+    /// Its standard error, carried likewise, mm; none when the table has no n.
     pub std_error_mm: Option<f64>,
 }
 
@@ -75,21 +33,27 @@ pub struct Group {
     pub z_m: f64,
     /// Least and greatest distance of the points, m.
     pub range_m: [f64; 2],
+    /// The measured sigmas.
     pub points: Vec<Point>,
     /// theta (degrees), sigma (mm), lower and upper end of its 95 % interval.
     pub curve: Vec<[f64; 4]>,
 }
 
-/// A published surface at the distance of a group: theta (degrees), sigma (mm).
+/// A published surface at the distance of a group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OverlayLine {
+    /// Which surface.
     pub overlay: Overlay,
+    /// Index of the group whose distance it is drawn at: it has that group's colour and mark.
+    pub group: usize,
+    /// theta (degrees), sigma (mm).
     pub line: Vec<[f64; 2]>,
 }
 
 /// Everything Fig. 2 shows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure2 {
+    /// Above the figure.
     pub title: String,
     /// Tilt, degrees.
     pub x: Axis,
@@ -97,6 +61,7 @@ pub struct Figure2 {
     pub y: Axis,
     /// By distance, nearest first; at most seven.
     pub groups: Vec<Group>,
+    /// The published surfaces asked for.
     pub overlays: Vec<Overlay>,
     /// None for overlays that never measured these distances.
     pub lines: Vec<OverlayLine>,
@@ -116,6 +81,7 @@ const BEYOND: f64 = 1.3;
 const MM: f64 = 1e3;
 
 impl Figure2 {
+    /// Works out all that is drawn.
     pub fn of(table: &SigmaTable, model: &SigmaModel, overlays: &[Overlay]) -> Self {
         let groups: Vec<Group> = groups::by_distance(&table.rows)
             .into_iter()
@@ -126,7 +92,10 @@ impl Figure2 {
             .flat_map(|&overlay| {
                 let published = overlay.model();
                 let domain = model.domain;
-                groups.iter().filter_map(move |g| overlay_line(overlay, &published, g.z_m, &domain))
+                groups.iter().enumerate().filter_map(move |(group, g)| {
+                    let line = overlay_line(&published, g.z_m, &domain)?;
+                    Some(OverlayLine { overlay, group, line })
+                })
             })
             .collect();
         Figure2 {
@@ -139,12 +108,16 @@ impl Figure2 {
         }
     }
 
+    /// As SVG text.
+    ///
     /// # Errors
     /// When plotters fails.
     pub fn svg(&self) -> Result<String> {
         sheet::svg(self)
     }
 
+    /// As the bytes of a PNG.
+    ///
     /// # Errors
     /// When plotters or the PNG encoder fails.
     pub fn png(&self) -> Result<Vec<u8>> {
@@ -183,12 +156,7 @@ fn tilts([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
 }
 
 /// Only where the published surface was measured.
-fn overlay_line(
-    overlay: Overlay,
-    published: &SigmaModel,
-    z_m: f64,
-    shown: &Domain,
-) -> Option<OverlayLine> {
+fn overlay_line(published: &SigmaModel, z_m: f64, shown: &Domain) -> Option<Vec<[f64; 2]>> {
     let [near, far] = published.domain.z_m;
     if z_m * DISTANCE_RATIO < near || z_m > far * DISTANCE_RATIO {
         return None;
@@ -196,7 +164,7 @@ fn overlay_line(
     let [low, high] = published.domain.theta_rad;
     let both = [shown.theta_rad[0].max(low), shown.theta_rad[1].min(high)];
     let line = tilts(both).map(|t| [t.to_degrees(), MM * published.sigma(z_m, t)]).collect();
-    (both[1] >= both[0]).then_some(OverlayLine { overlay, line })
+    (both[1] >= both[0]).then_some(line)
 }
 
 fn tilt_axis(table: &SigmaTable, model: &SigmaModel) -> Axis {
@@ -208,15 +176,13 @@ fn tilt_axis(table: &SigmaTable, model: &SigmaModel) -> Axis {
 }
 
 fn sigma_axis(groups: &[Group]) -> Axis {
-    let fold = |[low, high]: [f64; 2], v: f64| [low.min(v), high.max(v)];
-    let empty = [f64::INFINITY, f64::NEG_INFINITY];
     let points = groups.iter().flat_map(|g| &g.points);
-    let measured = points.clone().map(|p| p.sigma_mm).fold(empty, fold);
-    let [low, high] = points
+    let measured = range(points.clone().map(|p| p.sigma_mm));
+    let reaching = points
         .flat_map(|p| [-1.0, 1.0].map(|s| p.sigma_mm + s * p.std_error_mm.unwrap_or(0.0)))
         .chain(groups.iter().flat_map(|g| &g.curve).flat_map(|c| [c[2], c[3]]))
-        .map(|v| v.clamp(measured[0] / BEYOND, measured[1] * BEYOND))
-        .fold(measured, fold);
+        .map(|v| v.clamp(measured[0] / BEYOND, measured[1] * BEYOND));
+    let [low, high] = range(reaching.chain(measured));
     if high > LOG_WHEN_RATIO * low {
         let spare = (high / low).powf(MARGIN);
         Axis::log(low / spare, high * spare)
@@ -273,12 +239,18 @@ mod tests {
         }
     }
 
+    /// A line is told apart by its pattern (which surface) and its mark and colour (which distance).
     #[test]
-    fn overlays_are_named_as_on_the_command_line() {
-        for overlay in Overlay::ALL {
-            assert_eq!(overlay.id().parse(), Ok(overlay));
+    fn an_overlay_line_knows_its_group() {
+        let figure =
+            Figure2::of(&table(&[0.0, 9.0], &[1.0, 2.0]), &SigmaModel::paper(), &Overlay::ALL);
+        let pairs: Vec<_> = figure.lines.iter().map(|l| (l.overlay, l.group)).collect();
+        let expected: Vec<_> = Overlay::ALL.into_iter().flat_map(|o| [(o, 0), (o, 1)]).collect();
+        assert_eq!(pairs, expected);
+        for line in &figure.lines {
+            let z = figure.groups[line.group].z_m;
+            approx::assert_relative_eq!(line.line[0][1], MM * line.overlay.model().sigma(z, 0.0));
         }
-        assert!("eq2".parse::<Overlay>().unwrap_err().contains("eq1, nguyen, khoshelham"));
     }
 
     #[test]

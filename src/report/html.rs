@@ -18,9 +18,13 @@ use crate::view::Sensor;
 /// What the page is about; a bare table has neither sensor nor measurements.
 #[derive(Debug, Clone, Copy)]
 pub struct CalibrationPage<'a> {
+    /// Of the page.
     pub title: &'a str,
+    /// The unit, when a recording was measured.
     pub sensor: Option<&'a Sensor>,
+    /// Its views.
     pub measurements: Option<&'a Measurements>,
+    /// The model with all that belongs to it.
     pub calibration: &'a Calibration,
     /// Drawn into Fig. 2.
     pub overlays: &'a [Overlay],

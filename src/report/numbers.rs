@@ -10,7 +10,7 @@ const PLAIN: std::ops::Range<f64> = 1e-3..1e5;
 /// A fixed number of decimals.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if value.is_finite() {
-        format!("{value:.decimals$}").replace('-', "−")
+        crate::units::decimals(value, decimals).replace('-', "−")
     } else {
         ABSENT.into()
     }

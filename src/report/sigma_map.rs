@@ -12,7 +12,9 @@ use crate::model::SigmaModel;
 /// A stretch of the map of one shade.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Run {
+    /// From and to, m.
     pub z_m: [f64; 2],
+    /// From and to, degrees.
     pub theta_deg: [f64; 2],
     /// 0 is the least sigma, [`SigmaMap::SHADES`] - 1 the greatest.
     pub shade: usize,
@@ -21,6 +23,7 @@ pub struct Run {
 /// Where sigma has one value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IsoLine {
+    /// That value, mm.
     pub sigma_mm: f64,
     /// Ends of straight pieces: z (m), theta (degrees).
     pub pieces: Vec<[[f64; 2]; 2]>,
@@ -31,6 +34,7 @@ pub struct IsoLine {
 /// Everything the map shows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SigmaMap {
+    /// Above the map.
     pub title: String,
     /// Distance, m.
     pub x: Axis,
@@ -38,9 +42,13 @@ pub struct SigmaMap {
     pub y: Axis,
     /// Colour, mm, logarithmic.
     pub sigma_mm: Axis,
+    /// Distances where the model is valid, m.
     pub valid_z_m: [f64; 2],
+    /// Tilts where it is, degrees.
     pub valid_theta_deg: [f64; 2],
+    /// The coloured surface.
     pub runs: Vec<Run>,
+    /// At the colour scale's ticks.
     pub lines: Vec<IsoLine>,
     /// The measured cells: z (m), theta (degrees).
     pub cells: Vec<[f64; 2]>,
@@ -62,6 +70,7 @@ impl SigmaMap {
     /// Steps of colour: fine enough to look continuous.
     pub const SHADES: usize = 36;
 
+    /// Works out all that is drawn.
     pub fn of(table: &SigmaTable, model: &SigmaModel) -> Self {
         let z = at_least(model.domain.z_m, NARROWEST_SHARE * model.domain.z_m[1]);
         let theta = at_least(model.domain.theta_rad.map(f64::to_degrees), NARROWEST_DEG);
@@ -84,12 +93,16 @@ impl SigmaMap {
         }
     }
 
+    /// As SVG text.
+    ///
     /// # Errors
     /// When plotters fails.
     pub fn svg(&self) -> Result<String> {
         sheet::svg(self)
     }
 
+    /// As the bytes of a PNG.
+    ///
     /// # Errors
     /// When plotters or the PNG encoder fails.
     pub fn png(&self) -> Result<Vec<u8>> {

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::camera::Rays;
-use crate::effects::{Active, Draw, Exposure, Instant, Stage, fill_normal};
+use crate::effects::{Active, Exposure, Instant, ROOM_LUX, Stage, fill_normal};
 use crate::frame::Frame;
 use crate::model::SigmaModel;
 use crate::rng::Seed;
@@ -22,7 +22,10 @@ pub struct FormulaSensor<'a> {
 /// The frames of one view, to be taken in order.
 pub struct Shooting<'a> {
     camera: &'a FormulaSensor<'a>,
+    /// In light-path order.
+    effects: Vec<&'a Active>,
     seen: &'a Seen,
+    ambient_lux: f64,
     /// Of the undisturbed depth, m.
     sigma: Vec<f32>,
     light: Vec<f32>,
@@ -31,12 +34,25 @@ pub struct Shooting<'a> {
 
 impl FormulaSensor<'_> {
     pub fn begin<'a>(&'a self, seen: &'a Seen) -> Shooting<'a> {
+        self.begin_at(seen, sigma_of(seen, self.sigma), HashMap::new())
+    }
+
+    /// With sigma (m) already known, and what the effects remember of the frames before: for a
+    /// camera that moves, whose every frame sees something else.
+    pub(super) fn begin_at<'a>(
+        &'a self,
+        seen: &'a Seen,
+        sigma: Vec<f32>,
+        memory: HashMap<&'static str, Vec<f32>>,
+    ) -> Shooting<'a> {
         Shooting {
             camera: self,
+            effects: Active::in_light_path(self.effects),
             seen,
-            sigma: without_rounding(sigma_of(seen, self.sigma), seen, self.sensor),
+            ambient_lux: ROOM_LUX,
+            sigma: without_rounding(sigma, seen, self.sensor),
             light: light_of(seen, self.rays),
-            memory: HashMap::new(),
+            memory,
         }
     }
 }
@@ -49,13 +65,23 @@ pub struct Shot {
 }
 
 impl Shooting<'_> {
+    /// In a room of this much light, lx, instead of an office's.
+    pub fn under(self, ambient_lux: f64) -> Self {
+        Shooting { ambient_lux, ..self }
+    }
+
+    pub(super) fn into_memory(self) -> HashMap<&'static str, Vec<f32>> {
+        self.memory
+    }
+
     pub fn shoot(&mut self, instant: Instant) -> Shot {
-        let FormulaSensor { sensor, rays, effects, seed, .. } = *self.camera;
+        let FormulaSensor { sensor, rays, seed, .. } = *self.camera;
         let mut exposure = Exposure {
             sensor,
             rays,
             seen: self.seen,
             instant,
+            ambient_lux: self.ambient_lux,
             depth: self.seen.depth.clone(),
             light: self.light.clone(),
             sigma: self.sigma.clone(),
@@ -71,10 +97,8 @@ impl Shooting<'_> {
                 Stage::Driver => read_out(&mut exposure),
                 _ => {}
             }
-            for active in effects.iter().filter(|a| a.effect.card().stage == stage) {
-                let draw = Draw { seed, id: active.effect.card().id, instant };
-                active.effect.forward(&active.settings, &mut exposure, &draw);
-            }
+            let due = self.effects.iter().filter(|a| a.effect.card().stage == stage);
+            due.for_each(|active| active.act(&mut exposure, seed));
         }
         self.memory = std::mem::take(&mut exposure.memory);
         let words = exposure.depth.iter().map(|&z| sensor.code.word(f64::from(z))).collect();
@@ -147,7 +171,7 @@ fn sigma_of(seen: &Seen, model: &SigmaModel) -> Vec<f32> {
             }
             match tables.get(usize::from(seen.surface[i])).and_then(Option::as_ref) {
                 Some(table) => table.at(z) as f32,
-                None => model.sigma(z, seen.theta(i)) as f32,
+                None => model.axial_sigma(z, seen.theta(i)) as f32,
             }
         })
         .collect()
@@ -178,7 +202,7 @@ impl SigmaByDepth {
     fn of(model: &SigmaModel, theta: f64) -> Self {
         let [low, high] = model.domain.z_m;
         let step = (high - low).max(1e-9) / (NODES - 1) as f64;
-        let nodes = (0..NODES).map(|k| model.sigma(low + k as f64 * step, theta)).collect();
+        let nodes = (0..NODES).map(|k| model.axial_sigma(low + k as f64 * step, theta)).collect();
         SigmaByDepth { low, step, nodes }
     }
 

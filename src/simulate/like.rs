@@ -5,6 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::plan::ViewPlan;
+use crate::effects::ROOM_LUX;
 use crate::error::Result;
 use crate::measure::{MeasureOptions, Workbench, view_target};
 use crate::plane::Target as Found;
@@ -64,6 +65,8 @@ fn plan(
             ..Bench::bare(plane, Target::Wall)
         },
         mask: Some(mask),
+        // As measured; where nobody looked, the same in all views.
+        ambient_lux: view.notes.ambient_lux.unwrap_or(ROOM_LUX),
         stamps: view.depth.iter().map(|f| f.timestamp).collect(),
         notes: ViewNotes { reference_distance_m, ..view.notes.clone() },
     }

@@ -8,7 +8,10 @@ mod grid;
 mod kinect;
 mod like;
 mod plan;
+pub mod room;
 mod shoot;
+mod sigma_table;
+pub mod speckle;
 
 pub use formula::{FormulaSensor, Shooting, Shot, shoot};
 pub use grid::{Grid, GridView};

@@ -6,6 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::grid::GridView;
 use crate::camera::{Camera, Rays};
+use crate::effects::Instant;
 use crate::rng::Seed;
 use crate::scene::{Bench, Patch, Print, Seen, Target, WHITE};
 use crate::view::{TargetSize, ViewNotes};
@@ -20,6 +21,8 @@ pub struct ViewPlan {
     pub mask: Option<Vec<bool>>,
     /// One a frame, s.
     pub stamps: Vec<f64>,
+    /// Light of the room on the target, lx.
+    pub ambient_lux: f64,
     pub notes: ViewNotes,
 }
 
@@ -32,6 +35,19 @@ impl ViewPlan {
             hidden.for_each(|(i, _)| seen.depth[i] = f32::NAN);
         }
         seen
+    }
+
+    /// Time stamps and instants of the frames of view number `index`; `session_s` is the time
+    /// stamp at which the session began.
+    pub fn instants(
+        &self,
+        index: usize,
+        session_s: f64,
+    ) -> impl Iterator<Item = (f64, Instant)> + '_ {
+        self.stamps.iter().enumerate().map(move |(frame, &stamp)| {
+            let view_s = stamp - self.stamps[0];
+            (stamp, Instant { view: index, frame, session_s: stamp - session_s, view_s })
+        })
     }
 }
 
@@ -46,7 +62,7 @@ pub struct Scenery {
     pub clutter: usize,
     /// Standard deviation of the reference distances, m; `None` writes none.
     pub reference_error_m: Option<f64>,
-    /// Write the room's temperature and light into every view.
+    /// Write the room's temperature and light into every view; the light varies either way.
     pub conditions: bool,
 }
 
@@ -71,6 +87,16 @@ const VIEW_INTERVAL_S: f64 = 30.0;
 /// What a room has.
 const ROOM_TEMPERATURE_C: f64 = 22.0;
 
+/// From a room with drawn curtains to a place at the window, lx.
+const AMBIENT_LUX: [f64; 2] = [100.0, 2000.0];
+
+/// The light of a view, drawn whether or not any effect looks at it. Whole lx, as a meter shows.
+fn ambient_lux(seed: Seed, view: usize) -> f64 {
+    let [dim, bright] = AMBIENT_LUX.map(f64::ln);
+    let mut rng = seed.stream(&format!("simulate/ambient/{view}"));
+    rng.random_range(dim..bright).exp().round()
+}
+
 /// The poses in random order, so that time and distance are not the same axis (`shuffled`), or in
 /// the order given.
 pub fn plan_grid(
@@ -93,6 +119,7 @@ fn view(index: usize, pose: &GridView, scenery: &Scenery, frames: usize, seed: S
     bench.wall_m = scenery.wall_gap_m.map(|gap| pose.z_m + gap);
     bench.clutter = clutter(pose.z_m, scenery.clutter, seed, index);
     let start = index as f64 * VIEW_INTERVAL_S;
+    let ambient_lux = ambient_lux(seed, index);
     let reference = scenery.reference_error_m.map(|error| {
         let off: f64 =
             StandardNormal.sample(&mut seed.stream(&format!("simulate/reference/{index}")));
@@ -106,12 +133,14 @@ fn view(index: usize, pose: &GridView, scenery: &Scenery, frames: usize, seed: S
         name: format!("{index:04}"),
         bench,
         mask: None,
+        ambient_lux,
         stamps: (0..frames).map(|k| start + k as f64 / RATE_HZ).collect(),
         notes: ViewNotes {
             // Only a view that says something else has a view.json too.
             target: target.filter(|_| reference.is_some() || scenery.conditions),
             reference_distance_m: reference,
             temperature_c: scenery.conditions.then_some(ROOM_TEMPERATURE_C),
+            ambient_lux: scenery.conditions.then_some(ambient_lux),
             ..ViewNotes::default()
         },
     }

@@ -1,7 +1,7 @@
 //! Taking the views of a plan and writing them as a recording.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
@@ -9,11 +9,12 @@ use rayon::prelude::*;
 use super::formula::{FormulaSensor, Shot};
 use super::grid::GridView;
 use super::plan::{Scenery, ViewPlan, plan_grid};
+use super::speckle::{Causes, SpeckleSensor};
 use crate::calibrate::Progress;
 use crate::camera::Rays;
 use crate::effects::{Active, Instant};
 use crate::error::{Error, Result};
-use crate::frame::Frame;
+use crate::frame::{Frame, KINECT_NO_MEASUREMENT};
 use crate::io::{encode_png16, write_atomic, write_recording_file, write_view_notes};
 use crate::model::SigmaModel;
 use crate::rng::Seed;
@@ -25,6 +26,8 @@ use crate::view::Sensor;
 pub enum Physics {
     /// sigma(z, theta) and the effects, in light-path order.
     Formula { sigma: SigmaModel, effects: Vec<Active> },
+    /// Dots, a lens, a chip and a matcher.
+    Speckle { causes: Causes },
 }
 
 /// Views to be taken by one sensor.
@@ -64,13 +67,24 @@ impl Shoot {
     pub fn write(&self, root: &Path, progress: Progress<'_>) -> Result<()> {
         refuse_full(root)?;
         std::fs::create_dir_all(root).map_err(|e| Error::write(root, e))?;
-        write_recording_file(root, &self.sensor)?;
+        let by_light = match &self.physics {
+            Physics::Speckle { causes } => Some(SpeckleSensor::new(&self.sensor, causes.clone())),
+            Physics::Formula { .. } => None,
+        };
+        let described = by_light.as_ref().map_or(&self.sensor, SpeckleSensor::described);
+        write_recording_file(root, described)?;
         let rays = self.sensor.camera.rays();
         let first = self.views.iter().filter_map(|v| v.stamps.first()).copied();
         let session = first.fold(f64::INFINITY, f64::min);
         let done = AtomicUsize::new(0);
         self.views.par_iter().enumerate().try_for_each(|(index, view)| {
-            self.write_view(root, index, view, session, &rays)?;
+            let mut folder = ViewFolder::new(&root.join(&view.name), self.infrared)?;
+            let instants = view.instants(index, session);
+            match &by_light {
+                Some(sensor) => self.film(sensor, view, instants, &mut folder)?,
+                None => self.shoot(view, instants, &rays, &mut folder)?,
+            }
+            folder.finish(view)?;
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, self.views.len());
             Ok(())
         })
@@ -87,6 +101,9 @@ impl Shoot {
                     "effects": effects.iter().map(effect).collect::<Vec<_>>(),
                 })
             }
+            Physics::Speckle { causes } => {
+                serde_json::json!({"world": "speckle", "causes": causes.values()})
+            }
         };
         let view = |v: &ViewPlan| {
             let q = v.bench.plane.q;
@@ -100,36 +117,44 @@ impl Shoot {
         })
     }
 
-    fn write_view(
+    /// By formula.
+    fn shoot(
         &self,
-        root: &Path,
-        index: usize,
         view: &ViewPlan,
-        session: f64,
+        instants: impl Iterator<Item = (f64, Instant)>,
         rays: &Rays,
+        folder: &mut ViewFolder,
     ) -> Result<()> {
-        let path = root.join(&view.name);
-        let mut folder = ViewFolder::new(&path, self.infrared)?;
-        let instants = view.stamps.iter().enumerate().map(|(frame, &stamp)| Instant {
-            view: index,
-            frame,
-            session_s: stamp - session,
-            view_s: stamp - view.stamps[0],
-        });
-        match &self.physics {
-            Physics::Formula { sigma, effects } => {
-                let seen = view.seen(&self.sensor.camera, rays);
-                let camera =
-                    FormulaSensor { sensor: &self.sensor, rays, sigma, effects, seed: self.seed };
-                let mut shooting = camera.begin(&seen);
-                for (instant, &stamp) in instants.zip(&view.stamps) {
-                    let shot = shooting.shoot(instant);
-                    let infrared = self.infrared.then(|| self.amplitude(&shot, instant));
-                    folder.add(stamp, &shot.depth, infrared.as_ref())?;
-                }
-            }
+        let Physics::Formula { sigma, effects } = &self.physics else { return Ok(()) };
+        let seen = view.seen(&self.sensor.camera, rays);
+        let camera = FormulaSensor { sensor: &self.sensor, rays, sigma, effects, seed: self.seed };
+        let mut shooting = camera.begin(&seen).under(view.ambient_lux);
+        for (stamp, instant) in instants {
+            let shot = shooting.shoot(instant);
+            let infrared = self.infrared.then(|| self.amplitude(&shot, instant));
+            folder.add(stamp, &shot.depth, infrared.as_ref())?;
         }
-        folder.finish(view)
+        Ok(())
+    }
+
+    /// By light.
+    fn film(
+        &self,
+        sensor: &SpeckleSensor,
+        view: &ViewPlan,
+        instants: impl Iterator<Item = (f64, Instant)>,
+        folder: &mut ViewFolder,
+    ) -> Result<()> {
+        let mut filming = sensor.begin(&view.bench, self.seed);
+        for (stamp, instant) in instants {
+            let mut shot = filming.shoot(instant);
+            if let Some(mask) = &view.mask {
+                let hidden = shot.depth.words.iter_mut().zip(mask).filter(|(_, shown)| !**shown);
+                hidden.for_each(|(word, _)| *word = KINECT_NO_MEASUREMENT);
+            }
+            folder.add(stamp, &shot.depth, self.infrared.then_some(&shot.infrared))?;
+        }
+        Ok(())
     }
 
     /// The infrared picture of a formula's light: 10 bits, shot and read noise.
@@ -154,21 +179,26 @@ const READ_NOISE_DN: f32 = 10.4;
 const ELECTRONS_PER_DN: f32 = 10.0;
 
 /// A view's folder as it fills.
-struct ViewFolder<'a> {
-    root: &'a Path,
+struct ViewFolder {
+    root: PathBuf,
     depth_list: String,
     infrared_list: String,
     frames: usize,
 }
 
-impl<'a> ViewFolder<'a> {
-    fn new(root: &'a Path, infrared: bool) -> Result<Self> {
+impl ViewFolder {
+    fn new(root: &Path, infrared: bool) -> Result<Self> {
         for kind in ["depth", "ir"].into_iter().take(1 + usize::from(infrared)) {
             let images = root.join(kind);
             std::fs::create_dir_all(&images).map_err(|e| Error::write(&images, e))?;
         }
         let header = String::from("# timestamp path\n");
-        Ok(ViewFolder { root, depth_list: header.clone(), infrared_list: header, frames: 0 })
+        Ok(ViewFolder {
+            root: root.into(),
+            depth_list: header.clone(),
+            infrared_list: header,
+            frames: 0,
+        })
     }
 
     fn add(&mut self, stamp: f64, depth: &Frame, infrared: Option<&Frame>) -> Result<()> {
@@ -184,7 +214,7 @@ impl<'a> ViewFolder<'a> {
     }
 
     fn finish(self, view: &ViewPlan) -> Result<()> {
-        write_view_notes(self.root, &view.notes)?;
+        write_view_notes(&self.root, &view.notes)?;
         if self.root.join("ir").is_dir() {
             write_atomic(&self.root.join("ir.txt"), self.infrared_list.as_bytes())?;
         }
@@ -194,7 +224,7 @@ impl<'a> ViewFolder<'a> {
 }
 
 /// Never mix a simulation into somebody's recording.
-fn refuse_full(root: &Path) -> Result<()> {
+pub(super) fn refuse_full(root: &Path) -> Result<()> {
     let full = std::fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_some());
     if full {
         return Err(Error::recording(

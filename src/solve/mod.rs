@@ -1,5 +1,7 @@
 //! The two argmin solvers the fits use, with every way of running for ever closed.
 
+use std::cell::RefCell;
+
 use argmin::core::{
     CostFunction, Error as ArgminError, Executor, Gradient, Hessian, State, TerminationReason,
 };
@@ -18,19 +20,54 @@ pub trait LeastSquares {
 /// Where a solver stopped and why.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ending {
+    /// The place.
     pub x: DVector<f64>,
+    /// Half the sum of squares there.
     pub cost: f64,
+    /// Steps taken.
     pub iterations: u64,
+    /// In words.
     pub reason: String,
 }
 
-struct AsArgmin<'a, P>(&'a P);
+/// A problem in argmin's terms. Gradient and Hessian are asked for at the same point one after the
+/// other, and both come from one linearisation: the last is kept.
+struct AsArgmin<'a, P> {
+    problem: &'a P,
+    last: RefCell<Option<Linear>>,
+}
+
+struct Linear {
+    at: DVector<f64>,
+    gradient: DVector<f64>,
+    hessian: DMatrix<f64>,
+}
+
+impl<'a, P: LeastSquares> AsArgmin<'a, P> {
+    fn new(problem: &'a P) -> Self {
+        AsArgmin { problem, last: RefCell::new(None) }
+    }
+
+    /// J'r and, by Gauss and Newton, J'J.
+    fn linear<T>(&self, at: &DVector<f64>, take: impl Fn(&Linear) -> T) -> T {
+        let mut last = self.last.borrow_mut();
+        if let Some(linear) = last.as_ref().filter(|l| l.at == *at) {
+            return take(linear);
+        }
+        let n = at.len();
+        let (gradient, hessian) = self.problem.linearise(at).map_or_else(
+            || (DVector::zeros(n), DMatrix::identity(n, n)),
+            |(r, j)| (j.tr_mul(&r), j.tr_mul(&j)),
+        );
+        take(last.insert(Linear { at: at.clone(), gradient, hessian }))
+    }
+}
 
 impl<P: LeastSquares> CostFunction for AsArgmin<'_, P> {
     type Param = DVector<f64>;
     type Output = f64;
     fn cost(&self, x: &Self::Param) -> Result<f64, ArgminError> {
-        Ok(finite_or_huge(self.0.cost(x)))
+        Ok(finite_or_huge(self.problem.cost(x)))
     }
 }
 
@@ -38,17 +75,15 @@ impl<P: LeastSquares> Gradient for AsArgmin<'_, P> {
     type Param = DVector<f64>;
     type Gradient = DVector<f64>;
     fn gradient(&self, x: &Self::Param) -> Result<DVector<f64>, ArgminError> {
-        Ok(self.0.linearise(x).map_or_else(|| DVector::zeros(x.len()), |(r, j)| j.tr_mul(&r)))
+        Ok(self.linear(x, |l| l.gradient.clone()))
     }
 }
 
 impl<P: LeastSquares> Hessian for AsArgmin<'_, P> {
     type Param = DVector<f64>;
     type Hessian = DMatrix<f64>;
-    /// Gauss-Newton: J'J.
     fn hessian(&self, x: &Self::Param) -> Result<DMatrix<f64>, ArgminError> {
-        let p = x.len();
-        Ok(self.0.linearise(x).map_or_else(|| DMatrix::identity(p, p), |(_, j)| j.tr_mul(&j)))
+        Ok(self.linear(x, |l| l.hessian.clone()))
     }
 }
 
@@ -73,7 +108,7 @@ pub fn trust_region<P: LeastSquares>(
     let subproblem = Steihaug::new().with_max_iters(2 * start.len() as u64 + 4);
     let solver =
         TrustRegion::new(subproblem).with_radius(radius).ok()?.with_max_radius(1e6).ok()?;
-    let run = Executor::new(AsArgmin(problem), solver)
+    let run = Executor::new(AsArgmin::new(problem), solver)
         .configure(|state| state.param(start.clone()).max_iters(most).target_cost(0.0))
         .timer(false)
         .run();

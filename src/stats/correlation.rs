@@ -8,6 +8,7 @@
 pub struct Correlation {
     /// rho(lag, 0), lag = 0, 1, 2 ... px along the columns.
     pub along_u: Vec<f64>,
+    /// The same along the rows: rho(0, lag).
     pub along_v: Vec<f64>,
     /// Sum of rho over all lags: pixels per independent sample of a *mean*.
     pub sum: f64,

@@ -8,6 +8,17 @@ pub use truncated::{normal_cut_factor, std_unbias};
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
+/// The median absolute deviation of a Gaussian times this is its standard deviation:
+/// 1/Phi^-1(3/4), Phi the standard normal distribution.
+pub const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
+
+/// Least and greatest; infinite and the wrong way round when there are none.
+pub fn range(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    values
+        .into_iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+}
+
 /// Median by selection; NaN when empty. The slice is reordered.
 pub fn median_in_place(values: &mut [f32]) -> f32 {
     let n = values.len();
@@ -35,6 +46,15 @@ mod tests {
     fn student_quantiles_match_the_tables() {
         assert!((student_quantile(0.95, 10.0) - 2.228).abs() < 1e-3);
         assert!((student_quantile(0.95, 1e9) - 1.960).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_robust_scale_is_the_inverse_of_the_upper_quartile() {
+        approx::assert_relative_eq!(
+            MAD_TO_SIGMA * Normal::standard().inverse_cdf(0.75),
+            1.0,
+            max_relative = 1e-12
+        );
     }
 
     #[test]

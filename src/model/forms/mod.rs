@@ -50,6 +50,10 @@ pub trait SigmaForm: Sync {
     fn pole(&self, _p: &[f64]) -> Option<f64> {
         None
     }
+    /// Where along z sigma is least, m, for a form whose first parameter lifts all of it.
+    fn vertex(&self, _p: &[f64]) -> Option<f64> {
+        None
+    }
     /// A start from the data alone. `None` when the data cannot carry the form.
     fn start(&self, rows: &Rows) -> Option<Start>;
     /// Where parameter `i` can be believed; beyond, it is held at the edge.

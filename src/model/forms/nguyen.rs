@@ -38,6 +38,10 @@ impl SigmaForm for Nguyen {
         out[3] = tilt(z, theta);
     }
 
+    fn vertex(&self, p: &[f64]) -> Option<f64> {
+        Some(p[2])
+    }
+
     fn pole(&self, _p: &[f64]) -> Option<f64> {
         Some(std::f64::consts::FRAC_PI_2)
     }

@@ -38,7 +38,7 @@ const VERTEX_REACH_M: f64 = 5.0;
 /// Start of a + b (z - c)^2 + d h with h known: all linear. Falls back on holding c where the
 /// parabola has no upward vertex near the data, and d at zero where tilt adds no noise.
 pub(super) fn parabola_start(rows: &Rows, h: impl Fn(&SigmaRow) -> f64) -> Option<Start> {
-    let tilted = rows.iter().any(|r| h(r) > 0.0);
+    let tilted = tilts_differ(rows) && rows.iter().any(|r| h(r) > 0.0);
     let mut remarks = Vec::new();
     let mut with_tilt = tilted;
     let columns = |tilt: bool| {
@@ -70,7 +70,7 @@ pub(super) fn parabola_start(rows: &Rows, h: impl Fn(&SigmaRow) -> f64) -> Optio
         remarks.push(if tilted {
             "tilt adds no noise that these views show: d is held at zero".into()
         } else {
-            "no view is tilted: d is held at zero".into()
+            "all views have the same tilt: d is held at zero".into()
         });
     }
     Some(Start {
@@ -79,6 +79,16 @@ pub(super) fn parabola_start(rows: &Rows, h: impl Fn(&SigmaRow) -> f64) -> Optio
         remarks,
     })
 }
+
+/// Do the views differ in tilt at all? Where they do not, the tilt term is one more parabola and
+/// its coefficient anything.
+fn tilts_differ(rows: &Rows) -> bool {
+    let [least, most] = rows.range(|r| r.theta_rad);
+    most - least > ONE_TILT_DEG.to_radians()
+}
+
+/// Views this near in tilt have one: so far is a board off that is set up by hand and eye.
+const ONE_TILT_DEG: f64 = 5.0;
 
 /// a and b with c held at the paper's.
 fn vertex_held(rows: &Rows, remarks: &mut Vec<String>) -> Option<[f64; 3]> {
@@ -132,6 +142,10 @@ impl SigmaForm for Paper {
         out[3] = unit;
         out[4] = p[3] * unit * z.ln();
         out[5] = -2.0 * p[3] * unit / (p[5] - theta);
+    }
+
+    fn vertex(&self, p: &[f64]) -> Option<f64> {
+        Some(p[2])
     }
 
     fn pole(&self, p: &[f64]) -> Option<f64> {

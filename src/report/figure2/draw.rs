@@ -3,10 +3,12 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-use super::{Figure2, Group, Overlay, Point};
+use super::marks::draw_mark;
+use super::{Figure2, Group, Overlay, OverlayLine, Point};
 use crate::report::axis::Axis;
 use crate::report::colours::{self, FAINT, GRID, INK};
 use crate::report::sheet::{Chart, Dashes, Drawing, Drawn, Pixel, SMALL, Sheet, TEXT};
+use crate::units::decimals;
 
 const WIDTH: u32 = 960;
 const HEIGHT: u32 = 560;
@@ -20,6 +22,8 @@ const BAND_OPACITY: f64 = 0.16;
 const CAP: i32 = 3;
 /// With more points than this markers shrink.
 const MANY_POINTS: usize = 120;
+/// Radius of the mark that tells an overlay's distance, units.
+const OPEN_MARK: i32 = 4;
 
 impl Drawing for Figure2 {
     const WHAT: &'static str = "figure 2";
@@ -34,24 +38,25 @@ impl Drawing for Figure2 {
             .y_label_area_size(sheet.px(66))
             .build_cartesian_2d(self.x.clone(), self.y.clone())?;
         axes(sheet, &mut chart)?;
-        let place = Place { x: &self.x, y: &self.y, at: &|x, y| chart.backend_coord(&(x, y)) };
+        let at = |x, y| chart.backend_coord(&(x, y));
+        let plot = Plot { sheet, x: &self.x, y: &self.y, at: &at };
         for (i, group) in self.groups.iter().enumerate() {
-            band(sheet, &place, group, self.colour(i))?;
+            plot.band(group, self.colour(i))?;
         }
         for line in &self.lines {
-            place.follow(sheet, &line.line, sheet.stroke(&INK, 1), dashes(line.overlay))?;
+            self.overlay(&plot, line)?;
         }
         for (i, group) in self.groups.iter().enumerate() {
-            curve(sheet, &place, group, self.colour(i))?;
+            plot.curve(group, self.colour(i))?;
         }
         for (i, group) in self.groups.iter().enumerate() {
             for point in &group.points {
-                self.error_bar(sheet, &place, point, i)?;
+                self.error_bar(&plot, point, i)?;
             }
         }
         for (i, group) in self.groups.iter().enumerate() {
             for point in &group.points {
-                if let Some(at) = place.inside(point.theta_deg, point.sigma_mm) {
+                if let Some(at) = plot.inside(point.theta_deg, point.sigma_mm) {
                     self.marker(sheet, at, i)?;
                 }
             }
@@ -74,14 +79,15 @@ fn axes<B: DrawingBackend>(sheet: &Sheet<'_, B>, chart: &mut Chart<'_, B, Axis, 
         .draw()
 }
 
-/// From values to places on the sheet; what falls outside the axes is not drawn.
-struct Place<'a> {
+/// A sheet with axes: from values to places; what falls outside the axes is not drawn.
+struct Plot<'a, B: DrawingBackend> {
+    sheet: &'a Sheet<'a, B>,
     x: &'a Axis,
     y: &'a Axis,
     at: &'a dyn Fn(f64, f64) -> Pixel,
 }
 
-impl Place<'_> {
+impl<B: DrawingBackend> Plot<'_, B> {
     fn inside(&self, x: f64, y: f64) -> Option<Pixel> {
         (self.x.contains(x) && self.y.contains(y)).then(|| (self.at)(x, y))
     }
@@ -91,52 +97,36 @@ impl Place<'_> {
     }
 
     /// Draw the parts of a line that lie inside; a lone point becomes a short stroke.
-    fn follow<B: DrawingBackend>(
-        &self,
-        sheet: &Sheet<'_, B>,
-        line: &[[f64; 2]],
-        style: ShapeStyle,
-        dashes: Dashes,
-    ) -> Drawn<B> {
+    fn follow(&self, line: &[[f64; 2]], style: ShapeStyle, dashes: Dashes) -> Drawn<B> {
         let places: Vec<Option<Pixel>> = line.iter().map(|[x, y]| self.inside(*x, *y)).collect();
         for part in places.split(Option::is_none) {
             let part: Vec<Pixel> = part.iter().flatten().copied().collect();
             match part[..] {
                 [] => {}
                 [(x, y)] => {
-                    let reach = sheet.px(SAMPLE / 2);
-                    sheet.line(&[(x - reach, y), (x + reach, y)], style, dashes)?;
+                    let reach = self.sheet.px(SAMPLE / 2);
+                    self.sheet.line(&[(x - reach, y), (x + reach, y)], style, dashes)?;
                 }
-                _ => sheet.line(&part, style, dashes)?,
+                _ => self.sheet.line(&part, style, dashes)?,
             }
         }
         Ok(())
     }
-}
 
-fn band<B: DrawingBackend>(
-    sheet: &Sheet<'_, B>,
-    place: &Place<'_>,
-    group: &Group,
-    colour: RGBColor,
-) -> Drawn<B> {
-    let there = group.curve.iter().map(|[x, _, low, _]| place.clamped(*x, *low));
-    let back = group.curve.iter().rev().map(|[x, _, _, high]| place.clamped(*x, *high));
-    let outline: Vec<Pixel> = there.chain(back).collect();
-    if group.curve.len() < 2 {
-        return Ok(());
+    fn band(&self, group: &Group, colour: RGBColor) -> Drawn<B> {
+        let there = group.curve.iter().map(|[x, _, low, _]| self.clamped(*x, *low));
+        let back = group.curve.iter().rev().map(|[x, _, _, high]| self.clamped(*x, *high));
+        let outline: Vec<Pixel> = there.chain(back).collect();
+        if group.curve.len() < 2 {
+            return Ok(());
+        }
+        self.sheet.root.draw(&Polygon::new(outline, colour.mix(BAND_OPACITY)))
     }
-    sheet.root.draw(&Polygon::new(outline, colour.mix(BAND_OPACITY)))
-}
 
-fn curve<B: DrawingBackend>(
-    sheet: &Sheet<'_, B>,
-    place: &Place<'_>,
-    group: &Group,
-    colour: RGBColor,
-) -> Drawn<B> {
-    let line: Vec<[f64; 2]> = group.curve.iter().map(|[x, y, _, _]| [*x, *y]).collect();
-    place.follow(sheet, &line, sheet.stroke(&colour, 2), &[])
+    fn curve(&self, group: &Group, colour: RGBColor) -> Drawn<B> {
+        let line: Vec<[f64; 2]> = group.curve.iter().map(|[x, y, _, _]| [*x, *y]).collect();
+        self.follow(&line, self.sheet.stroke(&colour, 2), &[])
+    }
 }
 
 fn dashes(overlay: Overlay) -> Dashes {
@@ -152,19 +142,30 @@ impl Figure2 {
         colours::distance(group as f64 / (self.groups.len().max(2) - 1) as f64)
     }
 
+    /// In its distance's colour, which a mark at its squarest end tells where colours are lost.
+    fn overlay<B: DrawingBackend>(&self, plot: &Plot<'_, B>, line: &OverlayLine) -> Drawn<B> {
+        let colour = colours::darker(self.colour(line.group));
+        plot.follow(&line.line, plot.sheet.stroke(&colour, 1), dashes(line.overlay))?;
+        let first = line.line.iter().find_map(|[x, y]| plot.inside(*x, *y));
+        let Some((x, y)) = first else { return Ok(()) };
+        let beside = (x - plot.sheet.px(OPEN_MARK + 3), y);
+        let (edge, fill) = (plot.sheet.stroke(&colour, 1), WHITE.filled());
+        draw_mark(plot.sheet, beside, line.group, plot.sheet.px(OPEN_MARK), [fill, edge])
+    }
+
     fn error_bar<B: DrawingBackend>(
         &self,
-        sheet: &Sheet<'_, B>,
-        place: &Place<'_>,
+        plot: &Plot<'_, B>,
         point: &Point,
         group: usize,
     ) -> Drawn<B> {
+        let sheet = plot.sheet;
         let (x, y) = (point.theta_deg, point.sigma_mm);
-        let (Some(error), Some(_)) = (point.std_error_mm, place.inside(x, y)) else {
+        let (Some(error), Some(_)) = (point.std_error_mm, plot.inside(x, y)) else {
             return Ok(());
         };
         let style = sheet.stroke(&self.colour(group), 1);
-        let ends = [y - error, y + error].map(|v| place.clamped(x, v));
+        let ends = [y - error, y + error].map(|v| plot.clamped(x, v));
         sheet.line(&ends, style, &[])?;
         let cap = sheet.px(CAP);
         for (u, v) in ends {
@@ -179,17 +180,7 @@ impl Figure2 {
         let (radius, opacity) = if crowded { (4, 0.6) } else { (5, 1.0) };
         let edge = sheet.stroke(&INK.mix(opacity), 1);
         let fill = self.colour(group).filled();
-        let radius = sheet.px(radius);
-        let Some(shape) = group.checked_sub(1).map(|i| SHAPES[i % SHAPES.len()]) else {
-            sheet.root.draw(&Circle::new(at, radius, fill))?;
-            return sheet.root.draw(&Circle::new(at, radius, edge));
-        };
-        let along = |share: f64| (share * f64::from(radius)).round() as i32;
-        let mut corners: Vec<Pixel> =
-            shape.iter().map(|(u, v)| (at.0 + along(*u), at.1 + along(*v))).collect();
-        sheet.root.draw(&Polygon::new(corners.clone(), fill))?;
-        corners.push(corners[0]);
-        sheet.line(&corners, edge, &[])
+        draw_mark(sheet, at, group, sheet.px(radius), [fill, edge])
     }
 
     fn legend<B: DrawingBackend>(&self, sheet: &Sheet<'_, B>) -> Drawn<B> {
@@ -221,15 +212,11 @@ impl Figure2 {
             sheet.line(&sample, sheet.stroke(&INK, 1), dashes(overlay))?;
             sheet.text(overlay.label(), (text_x, y), SMALL, HPos::Left)?;
             if !self.lines.iter().any(|l| l.overlay == overlay) {
-                let y = next(8);
-                sheet.coloured_text(
-                    "(not these distances)",
-                    (text_x, y),
-                    SMALL,
-                    HPos::Left,
-                    &FAINT,
-                )?;
+                self.aside(sheet, "(nothing measured here)", (text_x, next(8)))?;
             }
+        }
+        if !self.lines.is_empty() {
+            self.aside(sheet, "open marks: their distance", (x, next(10)))?;
         }
         self.key_to_points(sheet, (x, next(10)))
     }
@@ -237,61 +224,22 @@ impl Figure2 {
     fn key_to_points<B: DrawingBackend>(&self, sheet: &Sheet<'_, B>, (x, y): Pixel) -> Drawn<B> {
         let bars = self.groups.iter().flat_map(|g| &g.points).any(|p| p.std_error_mm.is_some());
         let words = if bars { "points: measured ± 1 s.e.," } else { "points: measured," };
-        sheet.coloured_text(words, (x, y), SMALL, HPos::Left, &FAINT)?;
-        let below = y + sheet.px(LINE) * 8 / 10;
-        sheet.coloured_text(
-            "carried to the curve's distance",
-            (x, below),
-            SMALL,
-            HPos::Left,
-            &FAINT,
-        )
+        self.aside(sheet, words, (x, y))?;
+        self.aside(sheet, "carried to the curve's distance", (x, y + sheet.px(LINE) * 8 / 10))
+    }
+
+    fn aside<B: DrawingBackend>(&self, sheet: &Sheet<'_, B>, words: &str, at: Pixel) -> Drawn<B> {
+        sheet.coloured_text(words, at, SMALL, HPos::Left, &FAINT)
     }
 }
 
 /// Distances that print alike are one.
 fn label(group: &Group) -> String {
-    let [low, high] = group.range_m.map(|z| format!("{z:.2}"));
+    let [low, high] = group.range_m.map(|z| decimals(z, 2));
     if low == high {
         format!("{low} m")
     } else {
-        let [low, high] = group.range_m.map(|z| format!("{z:.1}"));
-        format!("{:.2} m ({low} – {high})", group.z_m)
+        let [low, high] = group.range_m.map(|z| decimals(z, 1));
+        format!("{} m ({low} – {high})", decimals(group.z_m, 2))
     }
 }
-
-/// Corners of the markers after the first (a disc), in units of the radius.
-const SHAPES: [&[(f64, f64)]; 6] = [
-    &[(-0.85, -0.85), (0.85, -0.85), (0.85, 0.85), (-0.85, 0.85)],
-    &[(0.0, -1.2), (1.1, 0.8), (-1.1, 0.8)],
-    &[(0.0, -1.3), (1.1, 0.0), (0.0, 1.3), (-1.1, 0.0)],
-    &[(0.0, 1.2), (1.1, -0.8), (-1.1, -0.8)],
-    &[
-        (-0.4, -1.2),
-        (0.4, -1.2),
-        (0.4, -0.4),
-        (1.2, -0.4),
-        (1.2, 0.4),
-        (0.4, 0.4),
-        (0.4, 1.2),
-        (-0.4, 1.2),
-        (-0.4, 0.4),
-        (-1.2, 0.4),
-        (-1.2, -0.4),
-        (-0.4, -0.4),
-    ],
-    &[
-        (-1.2, -0.6),
-        (-0.6, -1.2),
-        (0.0, -0.6),
-        (0.6, -1.2),
-        (1.2, -0.6),
-        (0.6, 0.0),
-        (1.2, 0.6),
-        (0.6, 1.2),
-        (0.0, 0.6),
-        (-0.6, 1.2),
-        (-1.2, 0.6),
-        (-0.6, 0.0),
-    ],
-];

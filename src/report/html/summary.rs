@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::CalibrationPage;
 use crate::calibrate::Calibration;
-use crate::model::{DISTANCE_RATIO, SigmaModel};
+use crate::model::{DISTANCE_RATIO, Direction, SigmaModel};
 use crate::report::figure2::Overlay;
 use crate::report::numbers::{ABSENT, MM, fixed, formula, millimetres, range};
 
@@ -52,10 +52,18 @@ fn facts(input: &CalibrationPage<'_>) -> Markup {
         ("views", used),
         ("distance z", format!("{} m", range(domain.z_m, 2))),
         ("tilt θ", format!("{}°", range(domain.theta_rad.map(f64::to_degrees), 1))),
-        ("sigma is", format!("{}, {} cells", axis_words(&summary.residual), summary.samples)),
+        (
+            "sigma is",
+            format!("{}, {} cells", axis_words(calibration.model.sigma.direction), summary.samples),
+        ),
         (
             "fit error",
-            format!("{} mm rms, r² = {}", fixed(MM * summary.rmse_m, 2), fixed(summary.r2, 3)),
+            format!(
+                "{} mm rms, r² = {}{}",
+                fixed(MM * summary.rmse_m, 2),
+                fixed(summary.r2, 3),
+                if calibration.fit.poor { ": a poor fit, see the warnings" } else { "" }
+            ),
         ),
         (
             "error at distances left out",
@@ -69,11 +77,10 @@ fn facts(input: &CalibrationPage<'_>) -> Markup {
     }
 }
 
-fn axis_words(residual: &str) -> &str {
-    match residual {
-        "axial" => "measured along the optical axis",
-        "perpendicular" => "measured across the plane",
-        other => other,
+fn axis_words(direction: Direction) -> &'static str {
+    match direction {
+        Direction::Axial => "measured along the optical axis",
+        Direction::Perpendicular => "measured across the plane",
     }
 }
 
@@ -101,7 +108,7 @@ fn comparison(model: &SigmaModel) -> Markup {
         } }
         p.note {
             "At θ = " (fixed(theta.to_degrees(), 1)) "°, the least tilt measured; in brackets the 95 % interval. "
-            (ABSENT) " where the source has not measured."
+            (ABSENT) " where the source has measured no such distance or tilt."
         }
     }
 }
@@ -131,5 +138,7 @@ fn ours(model: &SigmaModel, z: f64, theta: f64) -> Markup {
 }
 
 fn theirs(model: &SigmaModel, z: f64, theta: f64) -> String {
-    if measured(model, z) { millimetres(model.sigma(z, theta)) } else { ABSENT.into() }
+    let [squarest, steepest] = model.domain.theta_rad;
+    let tilted = (squarest..=steepest).contains(&theta);
+    if tilted && measured(model, z) { millimetres(model.sigma(z, theta)) } else { ABSENT.into() }
 }

@@ -2,11 +2,13 @@
 
 use maud::{Markup, html};
 
-use crate::measure::ViewMeasurement;
-use crate::report::numbers::{ABSENT, degrees, fixed, millimetres};
+use crate::measure::{ReferenceDistance, ViewMeasurement};
+use crate::report::numbers::{ABSENT, MM, degrees, fixed, millimetres};
 
-const COLUMNS: [&str; 14] = [
+const COLUMNS: [&str; 16] = [
     "z m",
+    "axis m",
+    "off reference mm",
     "θ °",
     "azimuth °",
     "σ ± s.e. mm",
@@ -31,7 +33,9 @@ pub(super) fn section(views: &[ViewMeasurement]) -> Markup {
                 tbody { @for view in views { (row(view)) } }
             } }
             p.note {
-                "σ: of one frame over the whole target, along the optical axis. Temporal: of one pixel over the frames. \
+                "z: mean depth of the target. Axis: depth of its plane on the optical axis; off reference: that less \
+                 the distance measured by other means, “(!)” where they differ by more than "
+                (ReferenceDistance::tolerance_words()) ". σ: of one frame over the whole target, along the optical axis. Temporal: of one pixel over the frames. \
                  Perp.: across the plane. Paper: mean depth, tilt and spread of the RANSAC inliers of the first \
                  frame. n: samples (pixels times frames); n effective: independent samples they are worth. Corr.: \
                  length within which neighbouring pixels err together; “+” where it had not died out. Pixels left \
@@ -47,6 +51,8 @@ fn row(view: &ViewMeasurement) -> Markup {
     let absent = || ABSENT.to_string();
     let cells = [
         fixed(view.z_m, 3),
+        fixed(view.axis_distance_m, 3),
+        view.reference().map_or_else(absent, off_reference),
         degrees(view.theta_rad),
         degrees(view.azimuth_rad),
         format!("{} ± {}", millimetres(spread.spatial_m), millimetres(view.whole.std_error_m)),
@@ -64,6 +70,14 @@ fn row(view: &ViewMeasurement) -> Markup {
     html! {
         tr { th { (view.name) } @for cell in cells { td.n { (cell) } } }
     }
+}
+
+/// Signed, in mm, and marked where it is too much.
+fn off_reference(r: ReferenceDistance) -> String {
+    let off = fixed(MM * r.off_m(), 1);
+    let sign = if r.off_m() > 0.0 { "+" } else { "" };
+    let mark = if r.contradicts() { " (!)" } else { "" };
+    format!("{sign}{off}{mark}")
 }
 
 fn correlation(view: &ViewMeasurement) -> String {

@@ -1,0 +1,101 @@
+use std::io::Write as _;
+
+use anyhow::Context;
+use clap::Args;
+use kinoise::effects::{Active, CATALOGUE, Card, Parameter};
+use serde_json::json;
+
+use super::common::Global;
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Only these [default: all]
+    #[arg(value_name = "ID")]
+    ids: Vec<String>,
+}
+
+/// Columns of a page of text.
+const PAGE_COLUMNS: usize = 100;
+const INDENT: &str = "    ";
+
+pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
+    let cards = cards(&arguments.ids)?;
+    if global.json {
+        return global.print_json(&cards.iter().map(|card| as_json(card)).collect());
+    }
+    let pages: Vec<String> = cards.iter().map(|card| page(card)).collect();
+    // The catalogue is the result, not a remark: stdout. A reader that closes early is no failure.
+    let _ = writeln!(std::io::stdout().lock(), "{}", pages.join("\n"));
+    Ok(())
+}
+
+fn cards(ids: &[String]) -> anyhow::Result<Vec<&'static Card>> {
+    if ids.is_empty() {
+        return Ok(CATALOGUE.iter().map(|e| e.card()).collect());
+    }
+    let card = |id: &String| Active::typical(id).map(|a| a.effect.card());
+    ids.iter().map(card).collect::<Result<_, _>>().context("effects")
+}
+
+fn page(card: &Card) -> String {
+    let mut page = format!("{}\n", card.id);
+    let shows = format!("shows in {}, over {}", in_words(card.statistic), card.axis);
+    let knobs =
+        card.parameters.iter().enumerate().map(|(n, p)| knob(p, (n == 0).then_some(card.identity)));
+    let lines = [card.words.to_string(), shows].into_iter().chain(knobs).chain([
+        format!("taken for: {}", card.confused_with),
+        format!("source: {}", card.reference),
+    ]);
+    lines.for_each(|line| wrap(&line, &mut page));
+    page
+}
+
+fn knob(p: &Parameter, identity: Option<f64>) -> String {
+    let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
+    let off = identity.map_or(String::new(), |value| format!(", off at {value}"));
+    let [low, high] = p.range;
+    format!("{} = {low} to {high}{unit}, typical {}{off}: {}", p.name, p.typical, p.words)
+}
+
+fn in_words(statistic: &str) -> &str {
+    match statistic {
+        "bias" => "the mean error",
+        "variance" => "the size of the noise",
+        "distribution" => "which values occur",
+        "correlation" => "what errs together",
+        "missing" => "pixels without depth",
+        other => other,
+    }
+}
+
+/// Append `text` in lines of at most a page's columns.
+fn wrap(text: &str, page: &mut String) {
+    let mut column = 0;
+    for word in text.split_whitespace() {
+        if column + 1 + word.len() > PAGE_COLUMNS || column == 0 {
+            page.push_str(if column == 0 { INDENT } else { "\n      " });
+            column = INDENT.len() + 2;
+        } else {
+            page.push(' ');
+            column += 1;
+        }
+        page.push_str(word);
+        column += word.len();
+    }
+    page.push('\n');
+}
+
+fn as_json(card: &Card) -> serde_json::Value {
+    let parameter = |p: &Parameter| json!({"name": p.name, "unit": p.unit, "range": p.range, "typical": p.typical, "words": p.words});
+    json!({
+        "id": card.id,
+        "words": card.words,
+        "stage": format!("{:?}", card.stage),
+        "statistic": card.statistic,
+        "axis": card.axis,
+        "parameters": card.parameters.iter().map(parameter).collect::<Vec<_>>(),
+        "identity": {card.parameters[0].name: card.identity},
+        "confused_with": card.confused_with,
+        "reference": card.reference,
+    })
+}

@@ -1,0 +1,34 @@
+//! Depth is off by a factor.
+
+use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+
+pub struct DepthScale;
+
+static CARD: Card = Card {
+    id: "depth-scale",
+    stage: Stage::Driver,
+    words: "focal length or baseline are wrong: every depth is off by the same factor; only reference distances show it",
+    parameters: &[Parameter {
+        name: "scale",
+        unit: "",
+        range: [0.5, 2.0],
+        typical: 1.035,
+        words: "stored depth over true depth",
+    }],
+    identity: 1.0,
+    statistic: "bias",
+    axis: "z",
+    confused_with: "disparity-offset, whose error grows with z^2; thermal-drift, which changes during the session",
+    reference: "TUM RGB-D benchmark: 1.035 for freiburg1",
+};
+
+impl Effect for DepthScale {
+    fn card(&self) -> &'static Card {
+        &CARD
+    }
+
+    fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
+        let scale = settings.at(0) as f32;
+        exposure.depth.iter_mut().for_each(|z| *z *= scale);
+    }
+}

@@ -1,0 +1,34 @@
+//! The reference disparity is wrong.
+
+use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+
+pub struct DisparityOffset;
+
+static CARD: Card = Card {
+    id: "disparity-offset",
+    stage: Stage::Quantiser,
+    words: "the stored reference pattern stands at another distance than the firmware believes: every disparity is shifted by a constant, and depth errs with z^2; only reference distances show it",
+    parameters: &[Parameter {
+        name: "offset_px",
+        unit: "px",
+        range: [-4.0, 4.0],
+        typical: 0.1,
+        words: "added to every disparity: positive brings things nearer",
+    }],
+    identity: 0.0,
+    statistic: "bias",
+    axis: "z",
+    confused_with: "depth-scale, whose error grows with z; take at least five distances",
+    reference: "Khoshelham and Elberink 2012, calibration parameters; Herrera et al. 2012",
+};
+
+impl Effect for DisparityOffset {
+    fn card(&self) -> &'static Card {
+        &CARD
+    }
+
+    fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
+        let offset = settings.at(0);
+        exposure.shift_disparity(|_| offset);
+    }
+}

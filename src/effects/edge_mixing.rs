@@ -1,0 +1,81 @@
+//! Depth mixes with what is behind.
+
+use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+
+pub struct EdgeMixing;
+
+static CARD: Card = Card {
+    id: "edge-mixing",
+    stage: Stage::Optics,
+    words: "at the edge of the target a pixel sees both the target and what is behind, and answers between the two; it needs something behind (--wall)",
+    parameters: &[Parameter {
+        name: "width_px",
+        unit: "px",
+        range: [0.0, 32.0],
+        typical: 2.0,
+        words: "distance from the edge at which a pixel sees one surface only",
+    }],
+    identity: 0.0,
+    statistic: "bias",
+    axis: "edge-distance",
+    confused_with: "target-bow, which has no edge; occlusion-shadow, which loses pixels on one side",
+    reference: "Gschwandtner et al. 2011 (BlenSor): mixed pixels; half a matching window",
+};
+
+impl Effect for EdgeMixing {
+    fn card(&self) -> &'static Card {
+        &CARD
+    }
+
+    fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
+        let width = settings.at(0);
+        let mixing = |e: &Exposure| offsets(e, width);
+        exposure.with_kept(CARD.id, mixing, |e, offsets| {
+            e.depth.iter_mut().zip(offsets).for_each(|(z, offset)| *z += offset);
+        });
+    }
+}
+
+/// By how much each pixel's depth is off, m: of the nearest other surface half at the edge, and
+/// linearly less to nothing at `width` px, as the share of a square footprint.
+fn offsets(exposure: &Exposure, width: f64) -> Vec<f32> {
+    let mut nearest = vec![width; exposure.pixels()];
+    let mut offsets = vec![0f32; exposure.pixels()];
+    for border in (0..exposure.pixels()).filter(|&i| at_border(exposure, i)) {
+        for i in around(exposure, border, width.ceil() as usize) {
+            let distance = from_edge(exposure, border, i);
+            if other(exposure, border, i) && distance < nearest[i] {
+                nearest[i] = distance;
+                let share = 0.5 * (1.0 - distance / width);
+                let step = exposure.depth[border] - exposure.depth[i];
+                offsets[i] = share as f32 * step;
+            }
+        }
+    }
+    offsets
+}
+
+/// Do two pixels answer from different surfaces?
+fn other(exposure: &Exposure, a: usize, b: usize) -> bool {
+    let there = |i: usize| exposure.depth[i].is_finite();
+    exposure.seen.surface[a] != exposure.seen.surface[b] && there(a) && there(b)
+}
+
+fn at_border(exposure: &Exposure, i: usize) -> bool {
+    around(exposure, i, 1).any(|j| other(exposure, i, j))
+}
+
+/// Pixels at most `reach` columns and rows away, itself among them.
+fn around(exposure: &Exposure, i: usize, reach: usize) -> impl Iterator<Item = usize> + use<> {
+    let (width, height) = (exposure.seen.width, exposure.seen.height);
+    let (u, v) = (i % width, i / width);
+    let span = move |at: usize, size: usize| at.saturating_sub(reach)..=(at + reach).min(size - 1);
+    span(v, height).flat_map(move |v| span(u, width).map(move |u| v * width + u))
+}
+
+/// Distance of pixel `i` from the edge this side of pixel `border`, px: the edge runs half-way
+/// between the two surfaces' pixels.
+fn from_edge(exposure: &Exposure, border: usize, i: usize) -> f64 {
+    let ((ub, vb), (u, v)) = (exposure.at(border), exposure.at(i));
+    f64::hypot(u.abs_diff(ub) as f64, v.abs_diff(vb) as f64) - 0.5
+}

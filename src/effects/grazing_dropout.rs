@@ -1,0 +1,56 @@
+//! No depth at grazing angles.
+
+use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, chance, logistic};
+
+pub struct GrazingDropout;
+
+static CARD: Card = Card {
+    id: "grazing-dropout",
+    stage: Stage::Missing,
+    words: "at grazing angles the pattern smears and the match finds nothing",
+    parameters: &[
+        Parameter {
+            name: "share",
+            unit: "",
+            range: [0.0, 1.0],
+            typical: 1.0,
+            words: "of the pixels well beyond the angle that are lost",
+        },
+        Parameter {
+            name: "theta50_deg",
+            unit: "deg",
+            range: [0.0, 90.0],
+            typical: 75.0,
+            words: "tilt at which half of that share is lost",
+        },
+        Parameter {
+            name: "width_deg",
+            unit: "deg",
+            range: [0.0, 45.0],
+            typical: 2.0,
+            words: "how gradual: from a quarter to three quarters over 2.2 times this",
+        },
+    ],
+    identity: 0.0,
+    statistic: "missing",
+    axis: "theta",
+    confused_with: "range-dropout, which does not go with the tilt; intensity-dependent-noise, since grazing surfaces are darker",
+    reference: "Nguyen, Izadi and Lovell 2012: nothing beyond 80 degrees",
+};
+
+impl Effect for GrazingDropout {
+    fn card(&self) -> &'static Card {
+        &CARD
+    }
+
+    fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw) {
+        let (share, half, width) = (settings.at(0), settings.at(1), settings.at(2));
+        let mut rng = draw.stream(Scope::Frame, "lost");
+        for i in 0..exposure.pixels() {
+            let beyond = exposure.seen.theta(i).to_degrees() - half;
+            if chance(share * logistic(beyond, width), &mut rng) {
+                exposure.disparity[i] = f32::NAN;
+            }
+        }
+    }
+}

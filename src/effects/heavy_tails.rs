@@ -1,0 +1,49 @@
+//! Gross mismatches.
+
+use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, chance, normals};
+
+pub struct HeavyTails;
+
+static CARD: Card = Card {
+    id: "heavy-tails",
+    stage: Stage::NoiseTails,
+    words: "now and then the match locks to a wrong place: errors come from a mixture with a wide part, not from one Gaussian",
+    parameters: &[
+        Parameter {
+            name: "fraction",
+            unit: "",
+            range: [0.0, 1.0],
+            typical: 0.02,
+            words: "of the pixels, afresh in every frame",
+        },
+        Parameter {
+            name: "scale",
+            unit: "",
+            range: [1.0, 100.0],
+            typical: 5.0,
+            words: "how many times wider their errors are",
+        },
+    ],
+    identity: 0.0,
+    statistic: "distribution",
+    axis: "residual",
+    confused_with: "vignetting, slope-noise and other uneven noise, which looks heavy-tailed when pooled: divide by the local sigma first",
+    reference: "Mallick, Das and Majumdar 2014, review; 0.1 to 5 % of the pixels",
+};
+
+impl Effect for HeavyTails {
+    fn card(&self) -> &'static Card {
+        &CARD
+    }
+
+    fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw) {
+        let (fraction, scale) = (settings.at(0), settings.at(1) as f32);
+        let mut which = draw.stream(Scope::Frame, "which");
+        let wide = normals(exposure.pixels(), draw.stream(Scope::Frame, "errors"));
+        for (noise, wide) in exposure.noise.iter_mut().zip(wide) {
+            if chance(fraction, &mut which) {
+                *noise = scale * wide;
+            }
+        }
+    }
+}

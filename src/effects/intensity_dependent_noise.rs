@@ -1,0 +1,41 @@
+//! A dark surface is noisier.
+
+use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use crate::scene::WHITE;
+
+pub struct IntensityDependentNoise;
+
+static CARD: Card = Card {
+    id: "intensity-dependent-noise",
+    stage: Stage::Variance,
+    words: "a dark surface sends back less of the pattern, and the match is noisier: an infrared picture of a printed target shows it",
+    parameters: &[Parameter {
+        name: "exponent",
+        unit: "",
+        range: [0.0, 4.0],
+        typical: 0.5,
+        words: "sigma goes with the reflectance to minus this; nothing changes on white paper",
+    }],
+    identity: 0.0,
+    statistic: "variance",
+    axis: "intensity",
+    confused_with: "vignetting, which stays in the picture and not on the print; ambient-light, which goes with the room",
+    reference: "Mallick, Das and Majumdar 2014; shot noise: 0.5",
+};
+
+impl Effect for IntensityDependentNoise {
+    fn card(&self) -> &'static Card {
+        &CARD
+    }
+
+    fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
+        let exponent = settings.at(0);
+        for (sigma, albedo) in exposure.sigma.iter_mut().zip(&exposure.seen.albedo) {
+            let grey = f64::from(*albedo).max(DARKEST) / WHITE;
+            *sigma *= grey.powf(-exponent) as f32;
+        }
+    }
+}
+
+/// Black velvet still gives back this much.
+const DARKEST: f64 = 0.01;

@@ -1,0 +1,35 @@
+//! A row is shifted as one.
+
+use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, normals};
+
+pub struct RowNoise;
+
+static CARD: Card = Card {
+    id: "row-noise",
+    stage: Stage::Disparity,
+    words: "a row of the picture is read as one and shifted as one, afresh in each frame",
+    parameters: &[Parameter {
+        name: "sigma_px",
+        unit: "px",
+        range: [0.0, 4.0],
+        typical: 0.03,
+        words: "standard deviation of the shift",
+    }],
+    identity: 0.0,
+    statistic: "correlation",
+    axis: "row",
+    confused_with: "spatial-correlation, which reaches as far along the columns as along the rows",
+    reference: "row-wise read-out of image sensors (EMVA 1288, row noise)",
+};
+
+impl Effect for RowNoise {
+    fn card(&self) -> &'static Card {
+        &CARD
+    }
+
+    fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw) {
+        let (sigma, width) = (settings.at(0), exposure.seen.width);
+        let rows = normals(exposure.seen.height, draw.stream(Scope::Frame, "rows"));
+        exposure.shift_disparity(|i| sigma * f64::from(rows[i / width]));
+    }
+}

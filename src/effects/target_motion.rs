@@ -1,0 +1,40 @@
+//! Something moved during the view.
+
+use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+
+pub struct TargetMotion;
+
+static CARD: Card = Card {
+    id: "target-motion",
+    stage: Stage::Surface,
+    words: "target or sensor moved along the optical axis while the view was taken: frames disagree, and their mean is off",
+    parameters: &[Parameter {
+        name: "velocity_mps",
+        unit: "m/s",
+        range: [-1.0, 1.0],
+        typical: 0.005,
+        words: "of the target away from the sensor",
+    }],
+    identity: 0.0,
+    statistic: "bias",
+    axis: "frame",
+    confused_with: "thermal-drift, which goes on from view to view; frame-jitter, which has no direction",
+    reference: "kinematics: velocity times time",
+};
+
+impl Effect for TargetMotion {
+    fn card(&self) -> &'static Card {
+        &CARD
+    }
+
+    fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
+        let gone = settings.at(0) * exposure.instant.view_s;
+        for i in 0..exposure.pixels() {
+            if exposure.seen.is_target(i) {
+                // A shift along the axis lifts the plane by its share across it.
+                let lift = f64::from(exposure.seen.normal[i][2]) * gone;
+                exposure.depth[i] = exposure.meet(i, exposure.rays.at(i), lift) as f32;
+            }
+        }
+    }
+}

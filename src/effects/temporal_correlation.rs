@@ -1,0 +1,41 @@
+//! The firmware filters over time.
+
+use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+
+pub struct TemporalCorrelation;
+
+static CARD: Card = Card {
+    id: "temporal-correlation",
+    stage: Stage::NoiseInTime,
+    words: "the firmware carries part of a frame over into the next: noise stays the same size and hangs together over frames",
+    parameters: &[Parameter {
+        name: "rho",
+        unit: "",
+        range: [0.0, 0.999],
+        typical: 0.5,
+        words: "correlation of a pixel's noise from one frame to the next",
+    }],
+    identity: 0.0,
+    statistic: "correlation",
+    axis: "frame",
+    confused_with: "frozen-noise, which never decays while the scene stands still",
+    reference: "librealsense, temporal filter: alpha 0.4, which is rho 0.6",
+};
+
+impl Effect for TemporalCorrelation {
+    fn card(&self) -> &'static Card {
+        &CARD
+    }
+
+    fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
+        let rho = settings.at(0) as f32;
+        let fresh = (1.0 - rho * rho).sqrt();
+        if let Some(last) = exposure.memory.get(CARD.id) {
+            // First-order autoregression; the fresh part keeps the variance at one.
+            for (noise, last) in exposure.noise.iter_mut().zip(last) {
+                *noise = rho * last + fresh * *noise;
+            }
+        }
+        exposure.memory.insert(CARD.id, exposure.noise.clone());
+    }
+}

@@ -1,0 +1,77 @@
+//! What stands off the target's plane inside a region: a ball on the board, a hand, a wall beside it.
+
+use super::InverseDepthImage;
+use super::affine::AffineFit;
+use super::grow::{BEND_M, Gauge, Lattice};
+use super::target::FEWEST_PIXELS;
+
+/// Connected areas off the plane.
+pub(super) struct Relief {
+    pub lattice: Lattice,
+    /// Nodes of the areas and next to them.
+    pub mask: Vec<bool>,
+    /// Each area in words.
+    pub notes: Vec<String>,
+    /// Share of the measured nodes that the areas cover.
+    pub share: f64,
+}
+
+/// Areas of the pixels `inside` whose neighbourhoods are off the plane by more than its noise
+/// and bend. Scattered gross errors and holes are the sensor's and are no relief.
+pub(super) fn relief(image: &InverseDepthImage<'_>, inside: &[u32], fit: &AffineFit) -> Relief {
+    let camera = image.camera;
+    let mut w = vec![f32::NAN; image.w.len()];
+    inside.iter().for_each(|&i| w[i as usize] = image.w[i as usize]);
+    let lattice = Lattice::over(&w, image.rays, camera.width, camera.height);
+    let residuals = lattice.residuals(&Gauge { fit, bend_m: BEND_M });
+    let off = lattice.off(&residuals);
+    let fewest = FEWEST_PIXELS.div_ceil(lattice.pitch * lattice.pitch);
+    let mut left = off.clone();
+    let (mut mask, mut notes) = (vec![false; off.len()], Vec::new());
+    for seed in 0..off.len() {
+        if !left[seed] {
+            continue;
+        }
+        let area = lattice.reached(&left, &[seed]);
+        left.iter_mut().zip(&area).for_each(|(left, area)| *left &= !area);
+        if area.iter().filter(|a| **a).count() >= fewest {
+            notes.push(in_words(image, &lattice, fit, &area));
+            mask.iter_mut().zip(&area).for_each(|(mask, area)| *mask |= area);
+        }
+    }
+    // The slope from the plane up to the relief is below the noise for about a neighbourhood.
+    let mask = lattice.dilated(&lattice.dilated(&mask));
+    let measured = lattice.measured().filter(|m| *m).count();
+    let covered = lattice.measured().zip(&mask).filter(|(measured, m)| *measured && **m).count();
+    let share = covered as f64 / measured.max(1) as f64;
+    Relief { lattice, mask, notes, share }
+}
+
+fn in_words(
+    image: &InverseDepthImage<'_>,
+    lattice: &Lattice,
+    fit: &AffineFit,
+    area: &[bool],
+) -> String {
+    let width = image.camera.width;
+    let samples = lattice.samples(area);
+    let n = samples.len() as f64;
+    let (mut u, mut v, mut off_m, mut square_m) = (0.0, 0.0, 0.0, 0.0);
+    for &i in &samples {
+        let i = i as usize;
+        let (x, y) = image.rays.at(i);
+        let z = 1.0 / f64::from(image.w[i]);
+        u += (i % width) as f64 / n;
+        v += (i / width) as f64 / n;
+        off_m += (z - fit.plane.depth(x, y)) / n;
+        square_m += z * z / (image.camera.fx * image.camera.fy);
+    }
+    let node = (lattice.pitch * lattice.pitch) as f64;
+    format!(
+        "something of {:.0} cm2 around pixel ({u:.0}, {v:.0}) stands {:.0} mm {} the target's \
+         plane; it was left out: take it away, or draw the region around it",
+        1e4 * square_m * node,
+        1000.0 * off_m.abs(),
+        if off_m < 0.0 { "before" } else { "behind" },
+    )
+}

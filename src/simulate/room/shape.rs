@@ -1,0 +1,239 @@
+//! The bodies a room is made of, each in its own coordinates: where a ray meets it, which way it
+//! faces there, and how far a point is from it.
+
+use nalgebra::{Vector2, Vector3};
+
+/// A closed surface about the origin of its own frame, z up, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Shape {
+    /// Half its size along each axis.
+    Cuboid(Vector3<f64>),
+    Ball(f64),
+    /// Upright, closed at both ends.
+    Drum {
+        radius: f64,
+        half_height: f64,
+    },
+    /// A cuboid seen from inside: floor, walls and ceiling.
+    Shell(Vector3<f64>),
+}
+
+/// Where a ray meets a shape.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touch {
+    /// In units of the ray's direction.
+    pub t: f64,
+    /// See [`Shape::FACES`].
+    pub face: usize,
+}
+
+impl Shape {
+    /// Cuboid and shell: -x, +x, -y, +y, -z, +z. Drum: side, bottom, top. Ball: one.
+    pub const FACES: usize = 6;
+    pub const LEFT: usize = 0;
+    pub const RIGHT: usize = 1;
+    pub const FRONT: usize = 2;
+    pub const BACK: usize = 3;
+    pub const BOTTOM: usize = 4;
+    pub const TOP: usize = 5;
+    pub const DRUM_BOTTOM: usize = 1;
+    pub const DRUM_TOP: usize = 2;
+
+    /// Radius of the sphere about the origin that holds it, m.
+    pub fn reach(&self) -> f64 {
+        match *self {
+            Shape::Cuboid(half) | Shape::Shell(half) => half.norm(),
+            Shape::Ball(radius) => radius,
+            Shape::Drum { radius, half_height } => radius.hypot(half_height),
+        }
+    }
+
+    /// The first meeting at t > 0; a ray that starts inside a closed body does not meet it.
+    #[inline]
+    pub fn touch(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Touch> {
+        match self {
+            Shape::Cuboid(half) => touch_cuboid(half, origin, direction),
+            Shape::Ball(radius) => touch_ball(*radius, origin, direction),
+            Shape::Drum { radius, half_height } => {
+                touch_drum(*radius, *half_height, origin, direction)
+            }
+            Shape::Shell(half) => touch_shell(half, origin, direction),
+        }
+    }
+
+    /// May a ray that strays from this one by up to `stray` (m) meet it? Never wrong with a no.
+    #[inline]
+    pub fn is_near(&self, o: &Vector3<f64>, d: &Vector3<f64>, stray: f64) -> bool {
+        let half = match *self {
+            Shape::Cuboid(half) => half,
+            Shape::Ball(r) => Vector3::repeat(r),
+            Shape::Drum { radius, half_height } => Vector3::new(radius, radius, half_height),
+            Shape::Shell(_) => return true,
+        };
+        let (near, far, _) = slabs(&half.add_scalar(stray), o, d);
+        near <= far && far > 0.0
+    }
+
+    /// Unit normal at a point of the surface, on the side it is seen from.
+    #[inline]
+    pub fn normal(&self, point: &Vector3<f64>, face: usize) -> Vector3<f64> {
+        match self {
+            Shape::Cuboid(_) => axis(face),
+            Shape::Shell(_) => -axis(face),
+            Shape::Ball(radius) => point / *radius,
+            Shape::Drum { radius, .. } => match face {
+                Shape::DRUM_BOTTOM => -Vector3::z(),
+                Shape::DRUM_TOP => Vector3::z(),
+                _ => Vector3::new(point.x, point.y, 0.0) / *radius,
+            },
+        }
+    }
+
+    /// Coordinates on the surface, m: to the right and down for somebody who faces it upright
+    /// (on level faces x and -y).
+    #[inline]
+    pub fn place(&self, point: &Vector3<f64>, face: usize) -> Vector2<f64> {
+        let p = point;
+        match self {
+            Shape::Cuboid(_) => unfold(p, face),
+            Shape::Shell(_) if face < Shape::BOTTOM => {
+                let outside = unfold(p, face);
+                Vector2::new(-outside.x, outside.y)
+            }
+            Shape::Shell(_) => Vector2::new(p.x, -p.y),
+            Shape::Ball(radius) => {
+                Vector2::new(p.y.atan2(p.x), -(p.z / radius).clamp(-1.0, 1.0).asin()) * *radius
+            }
+            Shape::Drum { radius, .. } if face == 0 => Vector2::new(p.y.atan2(p.x) * radius, -p.z),
+            Shape::Drum { .. } => Vector2::new(p.x, -p.y),
+        }
+    }
+
+    /// Width and height of a face in the coordinates of [`Shape::place`], m.
+    pub fn extent(&self, face: usize) -> Vector2<f64> {
+        match *self {
+            Shape::Cuboid(h) | Shape::Shell(h) => match face / 2 {
+                0 => Vector2::new(2.0 * h.y, 2.0 * h.z),
+                1 => Vector2::new(2.0 * h.x, 2.0 * h.z),
+                _ => Vector2::new(2.0 * h.x, 2.0 * h.y),
+            },
+            Shape::Ball(r) => Vector2::new(std::f64::consts::TAU * r, std::f64::consts::PI * r),
+            Shape::Drum { radius, half_height } if face == 0 => {
+                Vector2::new(std::f64::consts::TAU * radius, 2.0 * half_height)
+            }
+            Shape::Drum { radius, .. } => Vector2::new(2.0 * radius, 2.0 * radius),
+        }
+    }
+
+    /// How far a point is from where it must not be, m: negative inside a body, and for a shell
+    /// negative outside.
+    pub fn clearance(&self, point: &Vector3<f64>) -> f64 {
+        match self {
+            Shape::Cuboid(half) => outside(&(point.abs() - half)),
+            Shape::Ball(radius) => point.norm() - radius,
+            Shape::Drum { radius, half_height } => {
+                let rim = Vector3::new(
+                    point.x.hypot(point.y) - radius,
+                    point.z.abs() - half_height,
+                    f64::NEG_INFINITY,
+                );
+                outside(&rim)
+            }
+            Shape::Shell(half) => (half - point.abs()).min(),
+        }
+    }
+}
+
+/// Outward normal of a cuboid's face.
+fn axis(face: usize) -> Vector3<f64> {
+    let mut normal = Vector3::zeros();
+    normal[face / 2] = if face.is_multiple_of(2) { -1.0 } else { 1.0 };
+    normal
+}
+
+fn unfold(p: &Vector3<f64>, face: usize) -> Vector2<f64> {
+    match face {
+        Shape::LEFT => Vector2::new(-p.y, -p.z),
+        Shape::RIGHT => Vector2::new(p.y, -p.z),
+        Shape::FRONT => Vector2::new(p.x, -p.z),
+        Shape::BACK => Vector2::new(-p.x, -p.z),
+        Shape::BOTTOM => Vector2::new(-p.x, -p.y),
+        _ => Vector2::new(p.x, -p.y),
+    }
+}
+
+/// Distance of a point from a product of intervals, given by how much it overshoots in each.
+fn outside(over: &Vector3<f64>) -> f64 {
+    over.map(|v| v.max(0.0)).norm() + over.max().min(0.0)
+}
+
+/// Where a ray enters and leaves what three slabs share, and through which face it enters.
+#[inline]
+fn slabs(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> (f64, f64, usize) {
+    let (mut near, mut far, mut face) = (f64::NEG_INFINITY, f64::INFINITY, 0);
+    for k in 0..3 {
+        let inverse = 1.0 / d[k];
+        let (low, high) = ((-half[k] - o[k]) * inverse, (half[k] - o[k]) * inverse);
+        let enters = low.min(high);
+        if enters > near {
+            near = enters;
+            face = 2 * k + usize::from(d[k] < 0.0);
+        }
+        far = far.min(low.max(high));
+    }
+    (near, far, face)
+}
+
+fn touch_cuboid(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Touch> {
+    let (near, far, face) = slabs(half, o, d);
+    (near <= far && near > 0.0).then_some(Touch { t: near, face })
+}
+
+fn touch_shell(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Touch> {
+    let mut hit = Touch { t: f64::INFINITY, face: 0 };
+    for k in 0..3 {
+        let t = (half[k].copysign(d[k]) - o[k]) / d[k];
+        if t < hit.t {
+            hit = Touch { t, face: 2 * k + usize::from(d[k] > 0.0) };
+        }
+    }
+    (hit.t > 0.0 && hit.t.is_finite()).then_some(hit)
+}
+
+fn touch_ball(radius: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Touch> {
+    let (a, b) = (d.norm_squared(), o.dot(d));
+    let discriminant = b * b - a * (o.norm_squared() - radius * radius);
+    if discriminant < 0.0 {
+        return None;
+    }
+    let t = (-b - discriminant.sqrt()) / a;
+    (t > 0.0).then_some(Touch { t, face: 0 })
+}
+
+/// An endless cylinder and a slab, what they share.
+fn touch_drum(radius: f64, half: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Touch> {
+    let (side_in, side_out) = across_cylinder(radius, o, d)?;
+    let inverse = 1.0 / d.z;
+    let (low, high) = ((-half - o.z) * inverse, (half - o.z) * inverse);
+    let (cap_in, cap_out) = (low.min(high), low.max(high));
+    let near = side_in.max(cap_in);
+    let face = match (cap_in > side_in, d.z < 0.0) {
+        (true, true) => Shape::DRUM_TOP,
+        (true, false) => Shape::DRUM_BOTTOM,
+        (false, _) => 0,
+    };
+    (near <= side_out.min(cap_out) && near > 0.0).then_some(Touch { t: near, face })
+}
+
+/// Where a ray enters and leaves the endless cylinder.
+fn across_cylinder(radius: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<(f64, f64)> {
+    let a = d.x * d.x + d.y * d.y;
+    let b = o.x * d.x + o.y * d.y;
+    let c = o.x * o.x + o.y * o.y - radius * radius;
+    if a == 0.0 {
+        return (c <= 0.0).then_some((f64::NEG_INFINITY, f64::INFINITY));
+    }
+    let discriminant = b * b - a * c;
+    let root = discriminant.sqrt();
+    (discriminant >= 0.0).then_some(((-b - root) / a, (-b + root) / a))
+}

@@ -1,0 +1,178 @@
+//! The knobs of the Kinect by light: causes, never errors.
+
+use crate::error::{Error, Result};
+
+/// What can be otherwise about the sensor, the light, the room and the bench.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Causes {
+    pub window_px: f64,
+    pub step_px: f64,
+    pub confidence: f64,
+    pub light: f64,
+    pub ambient_dn: f64,
+    pub speckle: f64,
+    pub lens_k1: f64,
+    pub lens_k2: f64,
+    pub blur_px: f64,
+    pub read_noise_dn: f64,
+    pub warm_up_k: f64,
+    pub warm_up_s: f64,
+    pub wavelength_nm_per_k: f64,
+    pub expansion_per_k: f64,
+    pub bow_m: f64,
+    pub motion_mps: f64,
+}
+
+/// A knob for people and for the command line.
+#[derive(Debug, Clone, Copy)]
+pub struct Cause {
+    pub name: &'static str,
+    pub unit: &'static str,
+    /// What is accepted.
+    pub range: [f64; 2],
+    /// Where it stands when nobody touches it.
+    pub usual: f64,
+    /// What it is, and where the usual value comes from.
+    pub words: &'static str,
+    value: fn(&mut Causes) -> &mut f64,
+}
+
+/// One line a knob: field, unit, range, usual value, words.
+macro_rules! causes {
+    ($($name:ident [$unit:literal] $low:literal ..= $high:literal, $usual:literal: $words:literal;)*) => {
+        /// Every knob there is.
+        pub static KNOWN_CAUSES: &[Cause] = &[$(Cause {
+            name: stringify!($name),
+            unit: $unit,
+            range: [$low, $high],
+            usual: $usual,
+            words: $words,
+            value: |causes| &mut causes.$name,
+        }),*];
+
+        impl Default for Causes {
+            fn default() -> Self {
+                Causes { $($name: $usual),* }
+            }
+        }
+    };
+}
+
+causes! {
+    window_px ["px"] 3.0..=31.0, 9.0:
+        "side of the matching window, odd (Konolige and Mihelich: 9x9 or 9x7)";
+    step_px ["px"] 0.0625..=1.0, 0.125:
+        "read-out step of the disparity (Konolige and Mihelich: 1/8 px)";
+    confidence ["1"] 0.0..=1.0, 0.4:
+        "least correlation that counts as an answer (in the dark 81 pixels correlate by chance \
+         with sd 1/9; the best of 100 candidates exceeds 0.4 once in a hundred)";
+    light ["1"] 0.0..=100.0, 2.0:
+        "projector power over that of Landau's law of dot peaks; chosen, not derived: with 2 the \
+         disparity sd at 4 m is 0.10 px, with 1 it is 0.13 px, published is 0.08 px";
+    ambient_dn ["DN"] 0.0..=1000.0, 0.0:
+        "sunlight or lamps on a white surface, in numbers of the 10-bit camera";
+    speckle ["1"] 0.0..=2.0, 0.324:
+        "laser speckle: sd over mean of a dot's light, and its shift over its radius (half of \
+         Landau's Gamma of shape 4.54, the other half is the projector's: an assumed split)";
+    lens_k1 ["1"] -0.3..=0.3, 0.0:
+        "radial distortion r^2 of the infrared lens that recording.json does not know";
+    lens_k2 ["1"] -0.3..=0.3, 0.0:
+        "radial distortion r^4 of the same";
+    blur_px ["px"] 0.0..=3.0, 0.4:
+        "sd of the lens's point spread";
+    read_noise_dn ["DN"] 0.0..=200.0, 10.4:
+        "sd of the camera's read noise (Landau)";
+    warm_up_k ["K"] -50.0..=50.0, 0.0:
+        "rise of temperature over the session, approached as 1 - exp(-t / warm_up_s)";
+    warm_up_s ["s"] 1.0..=36000.0, 900.0:
+        "time constant of the warm-up (10 to 20 min)";
+    wavelength_nm_per_k ["nm/K"] 0.0..=1.0, 0.06:
+        "drift of the laser: the pattern grows about the projector's axis (stabilised diode)";
+    expansion_per_k ["1/K"] 0.0..=0.001, 2.3e-5:
+        "thermal expansion of the baseline (aluminium)";
+    bow_m ["m"] -0.1..=0.1, 0.0:
+        "rise of the board's middle over its edges";
+    motion_mps ["m/s"] -1.0..=1.0, 0.0:
+        "speed of the target away from the sensor during a view";
+}
+
+const ASK: &str = "give --cause NAME=VALUE with one of these";
+
+fn fault(what: String) -> Error {
+    Error::Argument { what, remedy: ASK }
+}
+
+impl Causes {
+    /// `self` with one knob set.
+    ///
+    /// # Errors
+    /// When there is no such knob, or it does not go so far.
+    pub fn with(mut self, name: &str, value: f64) -> Result<Self> {
+        let cause = KNOWN_CAUSES.iter().find(|c| c.name == name).ok_or_else(|| {
+            let names: Vec<&str> = KNOWN_CAUSES.iter().map(|c| c.name).collect();
+            fault(format!("cause \"{name}\" is not known; known are {}", names.join(", ")))
+        })?;
+        let [low, high] = cause.range;
+        if !(low..=high).contains(&value) {
+            let unit = cause.unit;
+            return Err(fault(format!("{name} = {value} is outside {low} to {high} {unit}")));
+        }
+        if name == "window_px" && value % 2.0 != 1.0 {
+            return Err(fault(format!("window_px = {value} has no middle pixel; it is odd")));
+        }
+        *(cause.value)(&mut self) = value;
+        Ok(self)
+    }
+
+    /// `self` with `key=value` applied.
+    ///
+    /// # Errors
+    /// As [`Causes::with`], and when the text is no such thing.
+    pub fn parse(self, text: &str) -> Result<Self> {
+        let (name, value) = text
+            .split_once('=')
+            .ok_or_else(|| fault(format!("cause \"{text}\" is not key=value")))?;
+        let number = value
+            .trim()
+            .parse()
+            .map_err(|_| fault(format!("cause {name}: \"{value}\" is not a number")))?;
+        self.with(name.trim(), number)
+    }
+
+    /// By name, for the recipe.
+    pub fn values(&self) -> serde_json::Map<String, serde_json::Value> {
+        let mut causes = self.clone();
+        KNOWN_CAUSES
+            .iter()
+            .map(|c| (c.name.to_string(), serde_json::Value::from(*(c.value)(&mut causes))))
+            .collect()
+    }
+
+    /// Half the matching window without its middle, px.
+    pub(super) fn half_window(&self) -> usize {
+        (self.window_px as usize) / 2
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_cause_is_refused_with_the_list_of_the_known() {
+        let said = Causes::default().parse("disparity_sd=0.1").unwrap_err().to_string();
+        for cause in KNOWN_CAUSES {
+            assert!(said.contains(cause.name), "{said}");
+        }
+    }
+
+    #[test]
+    fn every_usual_value_is_inside_its_own_range() {
+        for cause in KNOWN_CAUSES {
+            let causes = Causes::default().with(cause.name, cause.usual).unwrap();
+            assert_eq!(causes, Causes::default(), "{}", cause.name);
+        }
+        assert!(Causes::default().parse("window_px=8").is_err());
+        assert!(Causes::default().parse("light=-1").is_err());
+    }
+}

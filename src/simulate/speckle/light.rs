@@ -1,0 +1,143 @@
+//! From the projector to the surface and into the lens: where every dot lands in the picture.
+
+use nalgebra::{Matrix2, Vector2, Vector3};
+
+use super::causes::Causes;
+use super::grain::Grain;
+use super::moment::Moment;
+use super::pattern::{Dot, Pattern};
+use crate::camera::Camera;
+use crate::scene::{Hit, WHITE, World};
+
+/// A dot in the picture: a Gaussian.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spot {
+    /// Centre, px.
+    pub u: f64,
+    pub v: f64,
+    /// Brightest value, DN.
+    pub peak: f64,
+    /// Covariance, px^2.
+    pub covariance: Matrix2<f64>,
+}
+
+/// Projector and camera as they stand at one moment.
+pub struct Optics<'a> {
+    /// The true lens, distortion included.
+    pub camera: &'a Camera,
+    /// Of the projector in the camera's frame, m.
+    pub projector: Vector3<f64>,
+    pub pattern_scale: f64,
+    pub blur_px: f64,
+    /// Relative projector power.
+    pub light: f64,
+}
+
+/// Landau, Choo and Beling 2015: 5.90e8 cos / r^2 DN (r in mm) is a dot's mean peak in a 10-bit
+/// picture.
+const PEAK_DN_AT_1_M: f64 = 590.0;
+/// Their Gamma factor has the mean 4.54 * 0.196 and not one.
+const LANDAU_MEAN: f64 = 4.54 * 0.196;
+/// Beam of a dot, sd in camera px: with blur and pixel 0.63 px, FWHM 1.5 px, as infrared pictures
+/// of a Kinect show them (1 to 2 px).
+const BEAM_PX: f64 = 0.4;
+/// A square pixel of side one averages: variance of a uniform variable.
+const PIXEL_VARIANCE: f64 = 1.0 / 12.0;
+/// Lens sharpness at which Landau's peak is met, px.
+const LANDAU_BLUR_PX: f64 = 0.4;
+/// A surface that hides a point is nearer by more than this share of the way.
+const HIDING_SHARE: f64 = 1e-3;
+
+impl<'a> Optics<'a> {
+    pub fn at(moment: &Moment, causes: &Causes, camera: &'a Camera, baseline_m: f64) -> Self {
+        Optics {
+            camera,
+            projector: Vector3::x() * (baseline_m * moment.baseline_scale(causes)),
+            pattern_scale: moment.pattern_scale(causes),
+            blur_px: causes.blur_px,
+            light: causes.light,
+        }
+    }
+
+    /// The pattern on the world, with the speckle of each dot.
+    pub fn spots(&self, world: &dyn World, pattern: &Pattern, grains: &[Grain]) -> Vec<Spot> {
+        let lit = pattern.dots.iter().zip(grains);
+        lit.filter_map(|(dot, grain)| self.spot(world, dot, grain)).collect()
+    }
+
+    fn spot(&self, world: &dyn World, dot: &Dot, grain: &Grain) -> Option<Spot> {
+        let beam = self.beam(dot)?;
+        let hit = world.cast(&self.projector, &beam)?;
+        let point = self.projector + beam * hit.t;
+        if !seen_from_camera(world, &point, &hit) {
+            return None;
+        }
+        let (x, y) = (point.x / point.z, point.y / point.z);
+        let shape = self.picture_from_pattern(&beam, &hit, (x, y));
+        let beam_sd = BEAM_PX / self.camera.fx;
+        let (u, v) = self.camera.project(x, y);
+        let aside = shape * Vector2::from(grain.aside) * beam_sd;
+        let image = shape * shape.transpose() * (beam_sd * beam_sd);
+        let covariance = image + Matrix2::identity() * smear(self.blur_px);
+        let irradiance =
+            -hit.normal.dot(&beam) / beam.norm() / (hit.t * hit.t * beam.norm_squared());
+        // cos^4 of the angle to the axis: less aperture, longer way, slanted pixel.
+        let vignetting = (1.0 + x * x + y * y).powi(-2);
+        let brightness = irradiance * vignetting * hit.albedo / WHITE * dot.energy * grain.light;
+        let spread = (image.determinant() / covariance.determinant()).sqrt();
+        let peak = full_light() * self.light * brightness * spread;
+        Some(Spot { u: u + aside.x, v: v + aside.y, peak, covariance })
+    }
+
+    /// Diffraction fixes sines, not tangents: they grow with the wavelength.
+    fn beam(&self, dot: &Dot) -> Option<Vector3<f64>> {
+        let sines = Vector3::new(dot.x, dot.y, 1.0).normalize() * self.pattern_scale;
+        let forward = 1.0 - sines.x * sines.x - sines.y * sines.y;
+        let tangent = |sine: f64| sine / forward.sqrt();
+        (forward > 0.0).then(|| Vector3::new(tangent(sines.x), tangent(sines.y), 1.0))
+    }
+
+    /// Jacobian of picture coordinates (px) by pattern coordinates, on the surface that was hit.
+    ///
+    /// On a plane 1/z is affine in the pattern's coordinates, and x_camera = x + baseline / z:
+    /// a tilt along the baseline stretches the pattern, one across it shears it.
+    fn picture_from_pattern(&self, beam: &Vector3<f64>, hit: &Hit, at: (f64, f64)) -> Matrix2<f64> {
+        let slope = self.projector.x / (hit.t * hit.normal.dot(beam));
+        let camera_from_pattern =
+            Matrix2::new(1.0 + slope * hit.normal.x, slope * hit.normal.y, 0.0, 1.0);
+        lens_jacobian(self.camera, at) * camera_from_pattern
+    }
+}
+
+fn smear(blur_px: f64) -> f64 {
+    blur_px * blur_px + PIXEL_VARIANCE
+}
+
+/// Peak of an unblurred mean dot on a white surface at 1 m, DN: so that the blurred one has
+/// Landau's.
+fn full_light() -> f64 {
+    let beam = BEAM_PX * BEAM_PX;
+    PEAK_DN_AT_1_M * LANDAU_MEAN * (beam + smear(LANDAU_BLUR_PX)) / beam
+}
+
+/// Is the lit side turned to the camera, with nothing in between?
+fn seen_from_camera(world: &dyn World, point: &Vector3<f64>, hit: &Hit) -> bool {
+    hit.normal.dot(point) < 0.0
+        && world.cast(&Vector3::zeros(), point).is_none_or(|first| first.t > 1.0 - HIDING_SHARE)
+}
+
+/// Pixels by normalised coordinates at (x, y).
+fn lens_jacobian(camera: &Camera, (x, y): (f64, f64)) -> Matrix2<f64> {
+    if camera.distortion.is_none() {
+        return Matrix2::new(camera.fx, 0.0, 0.0, camera.fy);
+    }
+    // The lens bends over tenths; a thousandth is short against that and long against rounding.
+    const H: f64 = 1e-3;
+    let column = |dx: f64, dy: f64| {
+        let (u1, v1) = camera.project(x + dx, y + dy);
+        let (u0, v0) = camera.project(x - dx, y - dy);
+        ((u1 - u0) / (2.0 * H), (v1 - v0) / (2.0 * H))
+    };
+    let ((a, c), (b, d)) = (column(H, 0.0), column(0.0, H));
+    Matrix2::new(a, b, c, d)
+}

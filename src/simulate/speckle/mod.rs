@@ -1,0 +1,29 @@
+//! The world by light: a Kinect that sees dots and matches them; no error formula anywhere.
+//!
+//! ```text
+//! pattern -> light -> picture -> detector -> matcher -> read-out -> 11-bit words
+//!            (world)                          (reference)
+//! ```
+//! Frames: the camera's optical frame (x right, y down, z forward, m). The projector stands at
+//! (+baseline, 0, 0), turned as the camera: as on a Kinect v1, on the camera's right when looking
+//! out, so that the shadow of a thing falls on its left. A point at depth z is seen
+//! d = fx * baseline / z px to the right of where the projector sends its dot.
+//!
+//! What can be set are [`Causes`]; noise, steps, bias, holes and shadows follow.
+
+mod causes;
+mod detector;
+mod grain;
+mod light;
+mod matcher;
+mod moment;
+mod pattern;
+mod picture;
+mod readout;
+mod reference;
+mod scores;
+mod sensor;
+
+pub use causes::{Cause, Causes, KNOWN_CAUSES};
+pub use pattern::{Dot, Pattern};
+pub use sensor::{Filming, SpeckleSensor, SpeckleShot};

@@ -1,0 +1,31 @@
+//! Numbers as text, the same everywhere: short, and never a page of digits.
+
+/// From here on (and below its inverse) powers of ten are shorter than zeros; doubles no longer
+/// resolve units beyond 2^53 = 9e15.
+const MANY_DIGITS: f64 = 1e15;
+
+/// The shortest text that reads back to the same number, with a power of ten where it is long.
+///
+/// ```
+/// use kinoise::units::shortest;
+/// assert_eq!(shortest(0.1), "0.1");
+/// assert_eq!(shortest(-1e300), "-1e300");
+/// ```
+pub fn shortest(v: f64) -> String {
+    if is_long(v) { format!("{v:e}") } else { format!("{v}") }
+}
+
+/// With this many decimals, or to three digits with a power of ten where the number is huge.
+///
+/// ```
+/// use kinoise::units::decimals;
+/// assert_eq!(decimals(2.345, 1), "2.3");
+/// assert_eq!(decimals(1e300, 1), "1.00e300");
+/// ```
+pub fn decimals(v: f64, decimals: usize) -> String {
+    if is_long(v) && v.abs() > 1.0 { format!("{v:.2e}") } else { format!("{v:.decimals$}") }
+}
+
+fn is_long(v: f64) -> bool {
+    v.is_finite() && v != 0.0 && !(1.0 / MANY_DIGITS..MANY_DIGITS).contains(&v.abs())
+}

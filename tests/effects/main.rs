@@ -1,0 +1,16 @@
+//! Oracle tests of the physical effects: what each does to depth images, measured by statistics
+//! that know nothing of the effect's own code.
+//!
+//! Every random number is seeded, so a test that passes once passes always; the false-alarm
+//! probabilities say how often a correct effect would fail under another seed.
+
+mod bias_in_the_picture;
+mod bias_of_depth;
+mod catalogue;
+mod correlation;
+mod distribution;
+mod edges;
+mod independence;
+mod laboratory;
+mod missing;
+mod variance;
