@@ -4,12 +4,17 @@ mod bias;
 mod candidate;
 mod evidence;
 mod field;
+mod lattice;
+mod reference;
 mod layers;
 mod search;
 mod smooth;
+mod structure;
 mod tiles;
 mod variance;
 
 pub use field::Field;
 pub use layers::Layers;
+pub use lattice::{Lattice, Words};
 pub use search::Found;
+pub use structure::{Structure, structures};

@@ -1,0 +1,159 @@
+//! Which depths occur at all: the steps of the matcher, and those of the driver.
+
+use std::f64::consts::TAU;
+
+use crate::frame::DepthCode;
+use crate::view::Sensor;
+
+/// How often each stored word occurs on the targets.
+#[derive(Debug, Clone)]
+pub struct Words(pub Vec<u32>);
+
+/// Steps that were found.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Lattice {
+    /// All words are multiples of this many units: depth in metres a step.
+    pub depth_step_m: Option<f64>,
+    /// Occurring disparities are multiples of this, px, give or take a constant.
+    pub disparity_step_px: Option<f64>,
+    /// Length of the mean phase on that lattice, 0 to 1.
+    pub resultant: f64,
+}
+
+/// Fewer distinct words than this make no lattice.
+const FEWEST_WORDS: usize = 12;
+/// Phases gathered more than this belong to a lattice: chance over the scanned frequencies and a
+/// hundred words reaches 0.4.
+const GATHERED: f64 = 0.6;
+/// Neighbouring words that alternate between crowded and empty by this share.
+const CONTRAST: f64 = 0.4;
+/// Coarsest and finest steps looked for, px.
+const STEPS_PX: [f64; 2] = [1.0 / 3.0, 1.0 / 64.0];
+
+impl Words {
+    pub fn none() -> Self {
+        Words(vec![0; 1 << 16])
+    }
+
+    pub fn merge(&mut self, other: &Words) {
+        self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a += b);
+    }
+
+    fn occurring(&self) -> Vec<(usize, f64)> {
+        self.0.iter().enumerate().filter(|(_, n)| **n > 0).map(|(w, n)| (w, f64::from(*n))).collect()
+    }
+
+    /// The lattice the words lie on.
+    pub fn lattice(&self, sensor: &Sensor, scale_px_m: f64) -> Lattice {
+        let words = self.occurring();
+        if words.len() < FEWEST_WORDS {
+            return Lattice::default();
+        }
+        let stride = words.iter().fold(0, |g, (w, _)| gcd(g, *w));
+        match sensor.code {
+            DepthCode::Metric { units_per_metre, .. } => {
+                let (step, resultant) = self.scan(&words, scale_px_m * units_per_metre);
+                Lattice {
+                    depth_step_m: (stride > 1).then(|| stride as f64 / units_per_metre),
+                    disparity_step_px: step.filter(|_| stride == 1),
+                    resultant,
+                }
+            }
+            DepthCode::Disparity { slope, .. } => {
+                // Words are the lattice; what is left to see is whether only every n-th occurs.
+                let offsets = words.iter().fold(0, |g, (w, _)| gcd(g, w - words[0].0));
+                Lattice {
+                    depth_step_m: None,
+                    disparity_step_px: Some(offsets.max(1) as f64 * slope.abs() * scale_px_m),
+                    resultant: 1.0,
+                }
+            }
+        }
+    }
+
+    /// The frequency at which the disparities' phases gather most.
+    fn scan(&self, words: &[(usize, f64)], px_words: f64) -> (Option<f64>, f64) {
+        if self.contrast(words) < CONTRAST {
+            return (None, 0.0);
+        }
+        let disparities: Vec<(f64, f64, f64)> = words
+            .iter()
+            // A count counts less and less: a lattice shows in which words occur.
+            .map(|&(w, n)| (px_words / w as f64, n.sqrt(), px_words / (w * w) as f64))
+            .collect();
+        let range = disparities[0].0 - disparities[disparities.len() - 1].0;
+        let mut best = (0.0, 0.0);
+        let mut frequency = 1.0 / STEPS_PX[0];
+        while frequency < 1.0 / STEPS_PX[1] {
+            let (mut c, mut s, mut n) = (0.0, 0.0, 0.0);
+            for &(d, weight, width) in &disparities {
+                // Words coarser than the lattice cannot show it.
+                if width * frequency < 0.35 {
+                    let (sin, cos) = (TAU * frequency * d).sin_cos();
+                    c += weight * cos;
+                    s += weight * sin;
+                    n += weight;
+                }
+            }
+            let resultant = f64::hypot(c, s) / f64::max(n, 1e-9);
+            if n > 0.0 && resultant > best.1 {
+                best = (frequency, resultant);
+            }
+            frequency += 0.15 / range.max(1.0);
+        }
+        ((best.1 > GATHERED).then(|| 1.0 / best.0), best.1)
+    }
+
+    /// How much neighbouring words differ in number, 0 (smooth) to 1 (every other one empty).
+    fn contrast(&self, words: &[(usize, f64)]) -> f64 {
+        let (mut differ, mut sum) = (0.0, 0.0);
+        for &(w, n) in words {
+            let next = f64::from(*self.0.get(w + 1).unwrap_or(&0));
+            differ += (n - next).abs();
+            sum += n + next;
+        }
+        differ / f64::max(sum, 1.0)
+    }
+}
+
+fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::Seed;
+    use crate::simulate::kinect_v1;
+    use rand::Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn words(step_px: f64, rounding: f64) -> Words {
+        let mut rng = Seed(1).stream("lattice");
+        let mut words = Words::none();
+        let sensor = kinect_v1(1);
+        for _ in 0..200_000 {
+            let z: f64 = rng.random_range(0.8..3.0);
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            let mut d = 43.5 / z + 0.08 * noise;
+            if step_px > 0.0 {
+                d = (d / step_px).round() * step_px;
+            }
+            let z = 43.5 / d;
+            let z = if rounding > 0.0 { (z / rounding).round() * rounding } else { z };
+            words.0[usize::from(sensor.code.word(z))] += 1;
+        }
+        words
+    }
+
+    #[test]
+    fn steps_of_matcher_and_driver_are_found_and_none_where_there_are_none() {
+        let sensor = kinect_v1(1);
+        let found = words(0.125, 0.0).lattice(&sensor, 43.5);
+        assert!((found.disparity_step_px.unwrap() / 0.125 - 1.0).abs() < 2e-3, "{found:?}");
+        let found = words(0.0, 0.001).lattice(&sensor, 43.5);
+        assert_eq!((found.depth_step_m, found.disparity_step_px), (Some(0.001), None));
+        let found = words(0.0, 0.0).lattice(&sensor, 43.5);
+        assert_eq!((found.depth_step_m, found.disparity_step_px), (None, None), "{found:?}");
+    }
+}
