@@ -11,13 +11,33 @@ fn main() {
     };
     let t = std::time::Instant::now();
     let bench = Workbench::new(&rec.sensor, MeasureOptions::default());
-    let fields: Vec<Field> = rec.views.par_iter().filter_map(|v| Field::read(v, &bench, &sigma).ok()).collect();
+    let fields: Vec<Field> =
+        rec.views.par_iter().filter_map(|v| Field::read(v, &bench, &sigma).ok()).collect();
     eprintln!("{} fields {:?}", fields.len(), t.elapsed());
     let mut layer = Layers::of(&fields, &rec.sensor.camera, &bench.rays);
-    eprintln!("layer {:?}; inflation {:?}", t.elapsed(), layer.views.iter().map(|v| (v.inflation*10.0).round()/10.0).collect::<Vec<_>>());
-    for (name, found) in [("bias", layer.search_bias(0.01, Seed(1))), ("variance", layer.search_variance(0.01, Seed(1)))] {
-    for f in found {
-        println!("{name} {:?} {} {:?} gain {:.1} family {:.1} curve {:.1} thr {:.1} ranking {:?} beta {:.4?}", f.candidate.family, f.candidate.axis, f.candidate.settled, f.gain.total, f.best_family, f.best_curve, f.threshold, &f.ranking[..2], &f.gain.beta.as_slice()[..f.gain.beta.len().min(6)]);
-    }}
+    eprintln!(
+        "layer {:?}; inflation {:?}",
+        t.elapsed(),
+        layer.views.iter().map(|v| (v.inflation * 10.0).round() / 10.0).collect::<Vec<_>>()
+    );
+    for (name, found) in [
+        ("bias", layer.search_bias(0.01, Seed(1))),
+        ("variance", layer.search_variance(0.01, Seed(1))),
+    ] {
+        for f in found {
+            println!(
+                "{name} {:?} {} {:?} gain {:.1} family {:.1} curve {:.1} thr {:.1} ranking {:?} beta {:.4?}",
+                f.candidate.family,
+                f.candidate.axis,
+                f.candidate.settled,
+                f.gain.total,
+                f.best_family,
+                f.best_curve,
+                f.threshold,
+                &f.ranking[..2],
+                &f.gain.beta.as_slice()[..f.gain.beta.len().min(6)]
+            );
+        }
+    }
     eprintln!("{:?}", t.elapsed());
 }

@@ -95,7 +95,7 @@ fn locking(all: &mut Vec<Candidate>, reach: &Reach) {
     }
 }
 
-/// Stripes down the picture: three harmonics of a free period.
+/// Stripes down the picture: four harmonics of a free period.
 fn banding(all: &mut Vec<Candidate>, camera: &Camera) {
     let width = camera.width as f64;
     for half_cycles in 4..=64 {
@@ -110,7 +110,7 @@ fn banding(all: &mut Vec<Candidate>, camera: &Camera) {
             }
         };
         all.push(
-            Candidate::named("column-banding", "column", 6, columns).with("period_px", period),
+            Candidate::named("column-banding", "column", 8, columns).with("period_px", period),
         );
     }
 }

@@ -79,7 +79,13 @@ impl Candidate {
             }
         };
         let columns = Box::new(columns);
-        Candidate { family: None, axis: "pixel", settled: Vec::new(), count: across * down, columns }
+        Candidate {
+            family: None,
+            axis: "pixel",
+            settled: Vec::new(),
+            count: across * down,
+            columns,
+        }
     }
 
     /// Value of the term at a place.

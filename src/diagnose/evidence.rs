@@ -65,6 +65,12 @@ impl Rows {
         Some(Rows { response, weight, nuisance, inverse: own.try_inverse()?, seen })
     }
 
+    /// The nuisances' own least squares fit.
+    pub fn nuisances(&self) -> [f64; 3] {
+        let beta = &self.inverse * &self.seen;
+        std::array::from_fn(|q| beta.get(q).copied().unwrap_or(0.0))
+    }
+
     /// Profile the nuisances out. `columns` fills one row of the candidate's columns.
     pub fn reduce(&self, count: usize, mut columns: impl FnMut(usize, &mut [f64])) -> Evidence {
         let p = self.seen.len();

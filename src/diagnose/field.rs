@@ -81,9 +81,7 @@ impl Field {
             name: view.name.clone(),
             time_s: view.depth.first().map_or(0.0, |f| f.timestamp),
             plane,
-            scale_px_m: sensor
-                .disparity_px_m()
-                .unwrap_or(sensor.camera.fx * KINECT_BASELINE_M),
+            scale_px_m: sensor.disparity_px_m().unwrap_or(sensor.camera.fx * KINECT_BASELINE_M),
             width: sensor.camera.width,
             pixels,
             sigma: Vec::new(),

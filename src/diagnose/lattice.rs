@@ -40,7 +40,12 @@ impl Words {
     }
 
     fn occurring(&self) -> Vec<(usize, f64)> {
-        self.0.iter().enumerate().filter(|(_, n)| **n > 0).map(|(w, n)| (w, f64::from(*n))).collect()
+        self.0
+            .iter()
+            .enumerate()
+            .filter(|(_, n)| **n > 0)
+            .map(|(w, n)| (w, f64::from(*n)))
+            .collect()
     }
 
     /// The lattice the words lie on.

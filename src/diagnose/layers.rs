@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::bias::{self, Reach};
+use super::evidence::Rows;
 use super::field::Field;
 use super::search::{Found, Rules, ViewRows, step};
 use super::tiles::{Place, Tile, tiles};
@@ -72,9 +73,21 @@ impl Layers {
             candidates.extend(bias::curves(&self.camera, &self.reach));
             let Some(term) = step(&views, candidates, &rules, seed) else { break };
             add(&term, &self.views, &mut self.bias);
+            self.level();
             found.push(term);
         }
         found
+    }
+
+    /// Take each view's plane out of what is left: the first fit had bent it towards the bias.
+    fn level(&mut self) {
+        let planes: Vec<Option<[f64; 3]>> = self.mean_rows_of(|rows| rows.nuisances());
+        for ((view, fitted), plane) in self.views.iter().zip(&mut self.bias).zip(planes) {
+            let Some([c, a, b]) = plane else { continue };
+            for (p, f) in view.places.iter().zip(fitted) {
+                *f += c + a * p.x + b * p.y;
+            }
+        }
     }
 
     /// The views' mean residuals minus the bias found, about a plane of their own each.
@@ -83,21 +96,15 @@ impl Layers {
             .par_iter()
             .zip(&self.bias)
             .filter_map(|(view, fitted)| {
-                let response = view.tiles.iter().zip(fitted).map(|(t, f)| finite(t.mean - f));
-                let weight = |t: &Tile| finite(t.pixels / t.variance / view.inflation);
-                let nuisance = DMatrix::from_fn(view.tiles.len(), 3, |i, q| {
-                    let p = &view.places[i];
-                    [1.0, p.x, p.y][q]
-                });
-                let rows = super::evidence::Rows::new(
-                    response.collect(),
-                    view.tiles.iter().map(weight).collect(),
-                    nuisance,
-                    &[0.0; 3],
-                )?;
+                let rows = mean_rows(view, fitted)?;
                 Some(ViewRows { places: &view.places, rows })
             })
             .collect()
+    }
+
+    fn mean_rows_of<T>(&self, of: impl Fn(&Rows) -> T) -> Vec<Option<T>> {
+        let views = self.views.iter().zip(&self.bias);
+        views.map(|(view, fitted)| mean_rows(view, fitted).map(|rows| of(&rows))).collect()
     }
 
     /// Terms of the variance, best first.
@@ -110,11 +117,8 @@ impl Layers {
         let mut found = Vec::new();
         while found.len() < MOST_TERMS {
             let level_scatter = view_scatter(&blocks, &fitted);
-            let views: Vec<ViewRows<'_>> = blocks
-                .iter()
-                .zip(&fitted)
-                .filter_map(|(b, f)| b.rows(f, level_scatter))
-                .collect();
+            let views: Vec<ViewRows<'_>> =
+                blocks.iter().zip(&fitted).filter_map(|(b, f)| b.rows(f, level_scatter)).collect();
             let mut candidates = variance::families(&self.sensible);
             candidates.extend(variance::curves(&self.camera, &self.reach));
             let Some(term) = step(&views, candidates, &rules, seed) else { break };
@@ -142,6 +146,17 @@ fn add(term: &Found, views: &[ViewTiles], fitted: &mut [Vec<f64>]) {
             *f += term.candidate.value(&beta, p, &mut row);
         }
     }
+}
+
+fn mean_rows(view: &ViewTiles, fitted: &[f64]) -> Option<Rows> {
+    let response = view.tiles.iter().zip(fitted).map(|(t, f)| finite(t.mean - f));
+    let weight = |t: &Tile| finite(t.pixels / t.variance / view.inflation);
+    let nuisance = DMatrix::from_fn(view.tiles.len(), 3, |i, q| {
+        let p = &view.places[i];
+        [1.0, p.x, p.y][q]
+    });
+    let weights = view.tiles.iter().map(weight).collect();
+    Rows::new(response.collect(), weights, nuisance, &[0.0; 3])
 }
 
 fn finite(v: f64) -> f64 {
@@ -207,8 +222,7 @@ impl Blocks {
         let response = self.response.iter().zip(fitted).map(|(y, f)| y - f).collect();
         let nuisance = DMatrix::from_element(self.places.len(), 1, 1.0);
         let precision = 1.0 / level_scatter.max(1e-9);
-        let rows =
-            super::evidence::Rows::new(response, self.weight.clone(), nuisance, &[precision])?;
+        let rows = Rows::new(response, self.weight.clone(), nuisance, &[precision])?;
         Some(ViewRows { places: &self.places, rows })
     }
 
@@ -278,8 +292,7 @@ fn inflation(field: &Field, camera: &Camera) -> (f64, Correlation) {
         n += 1.0;
     }
     let correlation = measure_correlation(&rough, camera.width);
-    let inflation =
-        if n > 0.0 { (sum / n * correlation.sum).max(1e-6) } else { f64::INFINITY };
+    let inflation = if n > 0.0 { (sum / n * correlation.sum).max(1e-6) } else { f64::INFINITY };
     (inflation, correlation)
 }
 

@@ -5,8 +5,8 @@ mod candidate;
 mod evidence;
 mod field;
 mod lattice;
-mod reference;
 mod layers;
+mod reference;
 mod search;
 mod smooth;
 mod structure;
@@ -14,7 +14,7 @@ mod tiles;
 mod variance;
 
 pub use field::Field;
-pub use layers::Layers;
 pub use lattice::{Lattice, Words};
+pub use layers::Layers;
 pub use search::Found;
 pub use structure::{Structure, structures};

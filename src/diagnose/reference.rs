@@ -66,7 +66,9 @@ pub fn laws(fields: &[Field]) -> Vec<Law> {
     add("disparity-offset", "z", Vec::new(), &|c| -c.z * c.z / c.px_m);
     for tau in WARM_UPS {
         let settled = vec![("time_constant_s", tau)];
-        add("thermal-drift", "session-time", settled, &|c| c.z * (1.0 - (-c.session_s / tau).exp()));
+        add("thermal-drift", "session-time", settled, &|c| {
+            c.z * (1.0 - (-c.session_s / tau).exp())
+        });
     }
     laws
 }

@@ -44,7 +44,12 @@ const REPLICATES: u64 = 1000;
 const AS_GOOD_NATS: f64 = 2.0;
 
 /// The best candidate, if it brings more than noise can.
-pub fn step(views: &[ViewRows<'_>], candidates: Vec<Candidate>, rules: &Rules, seed: Seed) -> Option<Found> {
+pub fn step(
+    views: &[ViewRows<'_>],
+    candidates: Vec<Candidate>,
+    rules: &Rules,
+    seed: Seed,
+) -> Option<Found> {
     let judged: Vec<Option<(Null, Gain)>> = candidates
         .par_iter()
         .map(|c| {

@@ -103,8 +103,7 @@ fn tail(image: &[f32]) -> f64 {
     if sizes.is_empty() {
         return 0.0;
     }
-    let sigma =
-        crate::plane::MAD_TO_SIGMA as f32 * crate::stats::median_in_place(&mut sizes);
+    let sigma = crate::plane::MAD_TO_SIGMA as f32 * crate::stats::median_in_place(&mut sizes);
     let beyond = sizes.iter().filter(|r| **r > TAIL_SIGMAS * sigma).count();
     beyond as f64 / sizes.len() as f64
 }
@@ -137,7 +136,12 @@ fn far_covariance(image: &[f32], camera: &Camera, along_row: bool) -> Option<f64
 }
 
 /// Variance of the frames' means minus what the moving part of the pixels' noise explains.
-fn frame_scatter(field: &Field, correlation_sum: f64, frozen: f64, variance_px2: f64) -> Option<f64> {
+fn frame_scatter(
+    field: &Field,
+    correlation_sum: f64,
+    frozen: f64,
+    variance_px2: f64,
+) -> Option<f64> {
     let means: Vec<f64> = field.frames.iter().map(|f| f.1).filter(|m| m.is_finite()).collect();
     let n = means.len() as f64;
     if n < 3.0 {
@@ -157,8 +161,7 @@ fn approach(field: &Field) -> Option<f64> {
     if n < 3.0 {
         return None;
     }
-    let (t0, m0) =
-        frames.iter().fold((0.0, 0.0), |(t, m), f| (t + f.0 / n, m + f.1 / n));
+    let (t0, m0) = frames.iter().fold((0.0, 0.0), |(t, m), f| (t + f.0 / n, m + f.1 / n));
     let (mut tt, mut tm) = (0.0, 0.0);
     for (t, m) in frames {
         tt += (t - t0).powi(2);
