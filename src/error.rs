@@ -71,7 +71,7 @@ impl Error {
         Error::Io {
             path: path.to_path_buf(),
             cause,
-            remedy: "choose a folder that can be written with -o",
+            remedy: "choose a folder that can be written (-o of most commands)",
         }
     }
 

@@ -22,6 +22,9 @@ pub struct Global {
     pub threads: Option<usize>,
 }
 
+/// More than any machine this runs on has; each costs memory before it helps.
+const MOST_THREADS: usize = 1024;
+
 impl Global {
     pub fn seed(&self) -> Seed {
         Seed(self.seed)
@@ -31,6 +34,9 @@ impl Global {
         let Some(n) = self.threads else { return Ok(()) };
         if n == 0 {
             bail!("--threads 0: give at least one thread");
+        }
+        if n > MOST_THREADS {
+            bail!("--threads {n}: give at most {MOST_THREADS}");
         }
         rayon::ThreadPoolBuilder::new().num_threads(n).build_global().context("--threads")
     }

@@ -34,7 +34,7 @@ pub struct Arguments {
     #[arg(long = "effect", value_name = "ID:KEY=VALUE", value_parser = effect)]
     effects: Vec<Active>,
     /// Shoot the very views of this recording: planes, regions, pixels, frames, timestamps
-    #[arg(long, value_name = "REC", conflicts_with_all = ["grid", "distances", "tilts", "azimuths", "frames", "shrink", "board", "wall_target", "patches", "wall", "clutter", "ordered"])]
+    #[arg(long, value_name = "REC", conflicts_with_all = ["grid", "distances", "tilts", "azimuths", "frames", "shrink", "board", "wall_target", "patches", "wall", "clutter", "ordered", "conditions"])]
     like: Option<PathBuf>,
     #[command(flatten)]
     poses: Poses,
@@ -63,10 +63,10 @@ struct Poses {
     #[arg(long, value_enum, default_value_t = GridArgument::Paper)]
     grid: GridArgument,
     /// Own distances in m, in place of the grid's
-    #[arg(long, value_delimiter = ',', value_name = "M,M,..")]
+    #[arg(long, value_delimiter = ',', value_name = "M,M,..", allow_hyphen_values = true)]
     distances: Vec<f64>,
     /// Own tilts in degrees, in place of the grid's
-    #[arg(long, value_delimiter = ',', value_name = "DEG,..")]
+    #[arg(long, value_delimiter = ',', value_name = "DEG,..", allow_hyphen_values = true)]
     tilts: Vec<f64>,
     /// Own directions of tilt in degrees, 0 along the columns; every pose in each of them
     #[arg(long, value_delimiter = ',', value_name = "DEG,..", allow_hyphen_values = true)]
@@ -79,7 +79,7 @@ struct Poses {
 #[derive(Debug, Args)]
 struct SceneryArguments {
     /// Board width and height in m
-    #[arg(long, value_parser = numbers::<2>, default_value = "1,0.8", value_name = "W,H")]
+    #[arg(long, value_parser = numbers::<2>, default_value = "1,0.8", value_name = "W,H", allow_hyphen_values = true)]
     board: [f64; 2],
     /// The target is a wall that fills the picture
     #[arg(long, conflicts_with = "board")]
@@ -88,13 +88,13 @@ struct SceneryArguments {
     #[arg(long)]
     patches: bool,
     /// A wall this far behind the target, m
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
     wall: Option<f64>,
     /// Boxes in the way, beside the target's middle
     #[arg(long, default_value_t = 0, value_name = "N")]
     clutter: usize,
     /// Write reference distances with this standard deviation, m
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
     reference_error: Option<f64>,
     /// Write the temperature of the room into every view
     #[arg(long)]
@@ -111,7 +111,7 @@ enum PhysicsArgument {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum GridArgument {
-    /// 1 to 4 m by 0.5 m, 0 to 70 degrees by 10, and 76
+    /// 1 to 4 m by 0.5 m, 0 to 70 degrees by 10, and 76 for 80: Eq. 1 has its pole at 79.6
     Paper,
 }
 
@@ -141,6 +141,9 @@ impl Poses {
         if grid.tilts_rad.iter().any(|t| !(0.0..1.55).contains(t)) {
             bail!("--tilts: a tilt lies between 0 and 88 degrees");
         }
+        if self.azimuths.iter().any(|a| !a.is_finite()) {
+            bail!("--azimuths: a direction is a number of degrees");
+        }
         let azimuths: Vec<f64> = self.azimuths.iter().map(|a| a.to_radians()).collect();
         Ok(if azimuths.is_empty() { grid.views() } else { grid.views_towards(&azimuths) })
     }
@@ -162,6 +165,12 @@ impl SceneryArguments {
         };
         positive("--wall", self.wall)?;
         positive("--reference-error", self.reference_error)?;
+        if self.reference_error.is_some_and(|e| e > LARGEST_REFERENCE_ERROR_M) {
+            bail!("--reference-error: more than {LARGEST_REFERENCE_ERROR_M} m is no measurement");
+        }
+        if self.clutter > MOST_CLUTTER {
+            bail!("--clutter {}: give at most {MOST_CLUTTER}", self.clutter);
+        }
         Ok(Scenery {
             target: if self.wall_target {
                 Target::Wall
@@ -237,9 +246,19 @@ fn plans(
     Ok((plans, Some(recording.sensor)))
 }
 
+/// An hour at 30 Hz.
+const MOST_FRAMES: usize = 108_000;
+/// More boxes than this leave no target to see.
+const MOST_CLUTTER: usize = 100;
+/// A reference off by more than this is none, m.
+const LARGEST_REFERENCE_ERROR_M: f64 = 1.0;
+
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
-    if arguments.frames == Some(0) {
-        bail!("--frames 0: a view has at least one");
+    if let Some(n) = arguments.frames.filter(|n| !(1..=MOST_FRAMES).contains(n)) {
+        bail!("--frames {n}: give a number from 1 to {MOST_FRAMES}");
+    }
+    if let Some(path) = &arguments.recipe {
+        check_recipe(path, &arguments.output)?;
     }
     let (sensor, sigma, mut effects) = camera(arguments)?;
     effects.extend(arguments.effects.iter().cloned());
@@ -263,13 +282,25 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let (views, recorded_by) = plans(arguments, global)?;
     let sensor = recorded_by.unwrap_or(sensor);
     let physics = physics(arguments, sigma, effects)?;
-    if let Physics::Formula { sigma, .. } = &physics {
+    if let Physics::Formula { sigma, effects } = &physics {
         tell_of_clamped(&views, sigma);
+        tell_of_idle(effects, arguments);
     }
     let shoot = Shoot { sensor, views, physics, infrared: arguments.infrared, seed: global.seed() };
     let bar = Bar::new("views");
-    shoot.write(&arguments.output, &|done, all| bar.step(done, all))?;
+    let blind = shoot.write(&arguments.output, &|done, all| bar.step(done, all))?;
     drop(bar);
+    if blind.len() == shoot.views.len() {
+        bail!(
+            "{}: no view shows any depth: the target is out of the picture or beyond the depth code; change --distances, --azimuths or --board",
+            arguments.output.display()
+        );
+    }
+    for name in &blind {
+        say(format!(
+            "note: view {name} shows no depth: the target is out of the picture or beyond the depth code"
+        ));
+    }
     if let Some(path) = &arguments.recipe {
         write_recipe(path, &shoot.recipe())?;
     }
@@ -297,14 +328,53 @@ fn physics(
     if !arguments.effects.is_empty() {
         bail!("--effect belongs to --physics formula; by light there is --cause");
     }
+    if !effects.is_empty() {
+        bail!("--model: it brings effects, which are formulas; by light there is --cause");
+    }
+    if arguments.model.is_some() {
+        say("note: of the model only the sensor is used: by light sigma comes by itself");
+    }
     let causes = arguments.causes.iter().try_fold(Causes::default(), |c, text| c.parse(text))?;
     Ok(Physics::Speckle { causes })
+}
+
+/// Effects that have nothing to act on in this scene.
+fn tell_of_idle(effects: &[Active], arguments: &Arguments) {
+    for active in effects {
+        let missing = match active.effect.card().id {
+            "occlusion-shadow" | "edge-mixing" if arguments.scenery.wall.is_none() => {
+                "something behind the target (--wall)"
+            }
+            "intensity-dependent-noise" if !arguments.scenery.patches => {
+                "a target of several greys (--patches)"
+            }
+            _ => continue,
+        };
+        say(format!("note: {} needs {missing} to show much", active.effect.card().id));
+    }
+}
+
+/// A recipe is a file of its own: before hours of shooting, not after.
+fn check_recipe(path: &Path, output: &Path) -> anyhow::Result<()> {
+    if path.exists() {
+        bail!("--recipe {}: the file exists; name a new one", path.display());
+    }
+    if path.starts_with(output) {
+        bail!("--recipe {}: inside the recording it would tell; put it elsewhere", path.display());
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    if folder.is_some_and(|f| !f.is_dir()) {
+        bail!("--recipe {}: its folder does not exist; make it first", path.display());
+    }
+    Ok(())
 }
 
 fn tell_of_clamped(views: &[ViewPlan], sigma: &SigmaModel) {
     let outside = |v: &&ViewPlan| {
         let plane = &v.bench.plane;
-        !sigma.domain.contains(plane.depth(0.0, 0.0), plane.theta())
+        // No recording has a tilt of exactly zero; facing the target is inside all the same.
+        let theta = plane.theta().max(sigma.domain.theta_rad[0]);
+        !sigma.domain.contains(plane.depth(0.0, 0.0), theta)
     };
     let count = views.iter().filter(outside).count();
     if count > 0 {

@@ -19,7 +19,7 @@ pub struct RoomArguments {
     #[arg(long, conflicts_with_all = ["like", "grid", "distances", "tilts", "azimuths", "ordered", "board", "wall_target", "patches", "wall", "clutter", "reference_error", "conditions", "infrared", "physics", "causes"])]
     pub room: bool,
     /// Poses to film along: timestamp tx ty tz qx qy qz qw, z up [default: once around the desks]
-    #[arg(long, value_name = "POSES", requires = "room")]
+    #[arg(long, value_name = "POSES", requires = "room", requires = "room")]
     trajectory: Option<PathBuf>,
     /// Take every Nth frame of the path
     #[arg(long, value_name = "N", default_value_t = 1, requires = "room")]

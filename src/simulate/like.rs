@@ -57,6 +57,7 @@ fn plan(
         let off: f64 = StandardNormal.sample(&mut seed.stream(&name));
         plane.depth(0.0, 0.0) + reference_error_m * off
     });
+    let reference_distance_m = reference_distance_m.filter(|d| *d > 0.0);
     ViewPlan {
         name: view.name.clone(),
         bench: Bench {

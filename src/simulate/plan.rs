@@ -125,6 +125,8 @@ fn view(index: usize, pose: &GridView, scenery: &Scenery, frames: usize, seed: S
             StandardNormal.sample(&mut seed.stream(&format!("simulate/reference/{index}")));
         pose.z_m + error * off
     });
+    // A tape never reads less than nothing.
+    let reference = reference.filter(|d| *d > 0.0);
     let target = match scenery.target {
         Target::Board(b) => Some(TargetSize { width_m: b.width_m, height_m: b.height_m }),
         Target::Wall => None,

@@ -14,7 +14,7 @@ use crate::calibrate::Progress;
 use crate::camera::Rays;
 use crate::effects::{Active, Instant};
 use crate::error::{Error, Result};
-use crate::frame::{Frame, KINECT_NO_MEASUREMENT};
+use crate::frame::{DepthCode, Frame, KINECT_NO_MEASUREMENT};
 use crate::io::{encode_png16, write_atomic, write_recording_file, write_view_notes};
 use crate::model::SigmaModel;
 use crate::rng::Seed;
@@ -60,11 +60,12 @@ impl Shoot {
         }
     }
 
-    /// Write the whole recording into `root`, a view a folder.
+    /// Write the whole recording into `root`, a view a folder. Returns the names of the views that
+    /// show no depth at all: the target is out of the picture, or beyond the depth code.
     ///
     /// # Errors
     /// When the folder exists with something in it, or cannot be written.
-    pub fn write(&self, root: &Path, progress: Progress<'_>) -> Result<()> {
+    pub fn write(&self, root: &Path, progress: Progress<'_>) -> Result<Vec<String>> {
         refuse_full(root)?;
         std::fs::create_dir_all(root).map_err(|e| Error::write(root, e))?;
         let by_light = match &self.physics {
@@ -77,17 +78,22 @@ impl Shoot {
         let first = self.views.iter().filter_map(|v| v.stamps.first()).copied();
         let session = first.fold(f64::INFINITY, f64::min);
         let done = AtomicUsize::new(0);
-        self.views.par_iter().enumerate().try_for_each(|(index, view)| {
-            let mut folder = ViewFolder::new(&root.join(&view.name), self.infrared)?;
+        let empty = |(index, view): (usize, &ViewPlan)| {
+            let mut folder =
+                ViewFolder::new(&root.join(&view.name), self.infrared, &described.code)?;
             let instants = view.instants(index, session);
             match &by_light {
                 Some(sensor) => self.film(sensor, view, instants, &mut folder)?,
                 None => self.shoot(view, instants, &rays, &mut folder)?,
             }
+            let blind = !folder.sees;
             folder.finish(view)?;
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, self.views.len());
-            Ok(())
-        })
+            Ok(blind.then(|| view.name.clone()))
+        };
+        let views: Result<Vec<Option<String>>> =
+            self.views.par_iter().enumerate().map(empty).collect();
+        Ok(views?.into_iter().flatten().collect())
     }
 
     /// What was switched on, for a file of its own.
@@ -184,10 +190,13 @@ struct ViewFolder {
     depth_list: String,
     infrared_list: String,
     frames: usize,
+    /// Some pixel of some frame carries a depth.
+    sees: bool,
+    code: DepthCode,
 }
 
 impl ViewFolder {
-    fn new(root: &Path, infrared: bool) -> Result<Self> {
+    fn new(root: &Path, infrared: bool, code: &DepthCode) -> Result<Self> {
         for kind in ["depth", "ir"].into_iter().take(1 + usize::from(infrared)) {
             let images = root.join(kind);
             std::fs::create_dir_all(&images).map_err(|e| Error::write(&images, e))?;
@@ -198,6 +207,8 @@ impl ViewFolder {
             depth_list: header.clone(),
             infrared_list: header,
             frames: 0,
+            sees: false,
+            code: *code,
         })
     }
 
@@ -210,6 +221,7 @@ impl ViewFolder {
             let _ = writeln!(self.infrared_list, "{stamp:.6} ir/{name}");
         }
         self.frames += 1;
+        self.sees |= depth.words.iter().any(|&word| self.code.metres(word).is_some());
         Ok(())
     }
 

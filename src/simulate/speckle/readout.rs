@@ -6,40 +6,51 @@ use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
 /// The word that stands for infinity on a Kinect v1 (Fisher's 3.331 / 0.003071, OpenKinect).
 const WORD_AT_INFINITY: f64 = 1084.6;
 
+/// What a Kinect v1 reads out, px: one word a step.
+const USUAL_STEP_PX: f64 = 0.125;
+
 /// How a shift becomes a word, and a word a depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReadOut {
-    step_px: f64,
+    /// Where the matcher answers in coarser steps than its words have, px.
+    coarse_px: Option<f64>,
     /// fx * baseline, px m.
     disparity_px_m: f64,
-    /// Of a surface where the reference was.
-    word_at_reference: f64,
+    offset: f64,
+    slope: f64,
 }
 
 impl ReadOut {
-    /// `nearest_px`: the largest shift there is.
-    pub fn new(step_px: f64, disparity_px_m: f64, nearest_px: f64) -> Self {
-        let usual = WORD_AT_INFINITY - disparity_px_m / REFERENCE_M / step_px;
+    /// `nearest_px` is the largest shift there is. A recorder's own disparity code is kept, so
+    /// that its description tells nothing of the step.
+    pub fn new(step_px: f64, disparity_px_m: f64, nearest_px: f64, own: &DepthCode) -> Self {
+        let word_px = step_px.min(USUAL_STEP_PX);
+        let usual = WORD_AT_INFINITY - disparity_px_m / REFERENCE_M / word_px;
         // Finer steps need more words; the nearest surface gets at least word 1.
-        let least = nearest_px / step_px + 1.0;
-        ReadOut { step_px, disparity_px_m, word_at_reference: usual.max(least).round() }
+        let at_reference = usual.max(nearest_px / word_px + 1.0).round();
+        // shift = fx b (1/z - 1/reference) and shift = (at_reference - word) word_px, hence
+        // 1/z = 1/reference + (at_reference - word) word_px / (fx b).
+        let per_word = word_px / disparity_px_m;
+        let (offset, slope) = match *own {
+            DepthCode::Disparity { offset, slope, .. } => (offset, slope),
+            DepthCode::Metric { .. } => (1.0 / REFERENCE_M + at_reference * per_word, -per_word),
+        };
+        let coarse_px = (step_px > USUAL_STEP_PX).then_some(step_px);
+        ReadOut { coarse_px, disparity_px_m, offset, slope }
     }
 
     pub fn word(&self, shift_px: f32) -> u16 {
-        let word = self.word_at_reference - (f64::from(shift_px) / self.step_px).round();
+        let shift = f64::from(shift_px);
+        let shift = self.coarse_px.map_or(shift, |step| (shift / step).round() * step);
+        let inverse = 1.0 / REFERENCE_M + shift / self.disparity_px_m;
+        let word = ((inverse - self.offset) / self.slope).round();
         let fits = word > 0.0 && word < f64::from(KINECT_NO_MEASUREMENT);
         if fits { word as u16 } else { KINECT_NO_MEASUREMENT }
     }
 
-    /// shift = fx b (1/z - 1/reference) and shift = (word_at_reference - word) step, hence
-    /// 1/z = 1/reference + (word_at_reference - word) step / (fx b).
     pub fn code(&self) -> DepthCode {
-        let per_word = self.step_px / self.disparity_px_m;
-        DepthCode::Disparity {
-            offset: 1.0 / REFERENCE_M + self.word_at_reference * per_word,
-            slope: -per_word,
-            invalid: KINECT_NO_MEASUREMENT,
-        }
+        let (offset, slope) = (self.offset, self.slope);
+        DepthCode::Disparity { offset, slope, invalid: KINECT_NO_MEASUREMENT }
     }
 }
 
@@ -50,7 +61,8 @@ mod tests {
     /// Against triangulation, written down again.
     #[test]
     fn words_and_depths_agree_with_triangulation() {
-        let read_out = ReadOut::new(0.125, 43.5, 90.0);
+        let metric = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
+        let read_out = ReadOut::new(0.125, 43.5, 90.0, &metric);
         for z in [0.5, 1.0, 2.0, 3.3] {
             let shift = 580.0 * 0.075 / z - 580.0 * 0.075 / REFERENCE_M;
             let word = read_out.word(shift as f32);
@@ -59,5 +71,20 @@ mod tests {
         }
         let DepthCode::Disparity { offset, slope, .. } = read_out.code() else { unreachable!() };
         assert!((offset / -slope - 1084.6).abs() < 1.0, "infinity is where a Kinect has it");
+    }
+
+    /// The description is the recorder's own, or the usual one, whatever the step.
+    #[test]
+    fn the_code_does_not_tell_the_step() {
+        let metric = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
+        let code = |step| ReadOut::new(step, 43.5, 90.0, &metric).code();
+        assert_eq!(code(0.125), code(0.5));
+        let own =
+            DepthCode::Disparity { offset: 3.12, slope: -0.00286, invalid: KINECT_NO_MEASUREMENT };
+        let read_out = ReadOut::new(0.5, 43.5, 90.0, &own);
+        assert_eq!(read_out.code(), own);
+        let words: std::collections::BTreeSet<u16> =
+            (0..4000).map(|k| read_out.word(k as f32 * 0.01)).collect();
+        assert!((70..=90).contains(&words.len()), "40 px in half pixels: {}", words.len());
     }
 }

@@ -44,7 +44,8 @@ impl SpeckleSensor {
         let camera = with_unknown_lens(&sensor.camera, &causes);
         let disparity_px_m = camera.fx * baseline_m;
         let candidates = Candidates::of(disparity_px_m);
-        let read_out = ReadOut::new(causes.step_px, disparity_px_m, candidates.last() as f64);
+        let nearest_px = candidates.last() as f64;
+        let read_out = ReadOut::new(causes.step_px, disparity_px_m, nearest_px, &sensor.code);
         let pattern = pattern_for(&camera, baseline_m, candidates);
         let picture = record_reference(&camera, baseline_m, &causes, &pattern, candidates);
         let reference = Reference::store(&picture, candidates, causes.half_window());
