@@ -36,6 +36,7 @@ pub mod scene;
 pub mod simulate;
 pub mod solve;
 pub mod stats;
+pub mod terms;
 pub mod units;
 pub mod view;
 

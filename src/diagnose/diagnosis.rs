@@ -1,0 +1,191 @@
+//! What a diagnosis says: `diagnosis.json` (contract, section 5).
+
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use crate::terms::{Axis, Statistic, Term};
+
+pub const DIAGNOSIS_FORMAT: &str = "kinoise-diagnosis/1";
+
+/// All that was found, and all that could not be.
+#[derive(Debug, Clone, Serialize)]
+pub struct Diagnosis {
+    pub format: &'static str,
+    pub recording: String,
+    /// What the recording was held against.
+    pub reference: Reference,
+    pub verdict: Verdict,
+    /// Most important first.
+    pub findings: Vec<Finding>,
+    pub map: Vec<MapRow>,
+    pub heldout: Option<HeldOut>,
+    pub after: After,
+    pub detectable: Vec<Detectable>,
+    /// What this recording cannot tell, and what would.
+    pub cannot_tell: Vec<CannotTell>,
+    pub views: Vec<ViewLine>,
+    /// What was odd, in words.
+    pub remarks: Vec<String>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Reference {
+    #[serde(rename = "model")]
+    Model,
+    #[serde(rename = "simulated recording")]
+    SimulatedRecording,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    Match,
+    Mismatch,
+    Inconclusive,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Status {
+    Named,
+    OneOf,
+    Unexplained,
+    Recalibrate,
+    NotIdentifiable,
+}
+
+/// One mismatch.
+#[derive(Debug, Clone, Serialize)]
+pub struct Finding {
+    pub status: Status,
+    /// Id of effects.md.
+    pub effect: Option<&'static str>,
+    /// Best first; what is left to one is the chance of none of them.
+    pub alternatives: Vec<Alternative>,
+    pub statistic: Statistic,
+    pub axis: Axis,
+    pub interval: [f64; 2],
+    pub unit: &'static str,
+    /// Of all that was explained, 0 to 1.
+    pub share: f64,
+    pub parameters: Map<String, Value>,
+    pub size: Size,
+    pub p_adjusted: f64,
+    pub physics: String,
+    pub next_view: Option<NextView>,
+    /// The curve in words, where it has no name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape: Option<String>,
+    /// What it looks like over its axis.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub curve: Option<Curve>,
+    /// What the model is given.
+    #[serde(skip)]
+    pub terms: Vec<Term>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct Alternative {
+    pub effect: &'static str,
+    pub probability: f64,
+}
+
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Size {
+    /// Root mean square over the recording.
+    pub mm: f64,
+    /// The same over the model's sigma.
+    pub sigma: f64,
+}
+
+/// Points of a curve with their standard errors.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Curve {
+    /// What x is, with its unit.
+    pub x_label: String,
+    pub y_label: String,
+    pub x: Vec<f64>,
+    /// Measured, bin by bin.
+    pub y: Vec<f64>,
+    pub y_std_error: Vec<f64>,
+    /// As the extended model has it.
+    pub model: Vec<f64>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct NextView {
+    pub z_m: f64,
+    pub theta_rad: f64,
+    pub azimuth_rad: f64,
+    pub why: String,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct MapRow {
+    pub statistic: Statistic,
+    pub axis: Axis,
+    pub interval: [f64; 2],
+    pub unit: &'static str,
+    /// In standard deviations of a pixel for the bias, in shares of the model's for the rest.
+    pub effect_size: f64,
+    pub p_adjusted: f64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct HeldOut {
+    pub views: Vec<String>,
+    /// Nats a view.
+    pub log_score_before: f64,
+    pub log_score_after: f64,
+    pub gain: f64,
+    /// 95 %, by resampling views.
+    pub gain_interval: [f64; 2],
+    /// Root mean square of the smooth residual, mm.
+    pub rms_mm_before: f64,
+    pub rms_mm_after: f64,
+    /// Root mean square of the residual to a plane, every pixel of every frame, px of disparity.
+    pub rms_px_before: f64,
+    pub rms_px_after: f64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct After {
+    pub verdict: Verdict,
+    pub remaining: Vec<Remaining>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct Remaining {
+    pub statistic: Statistic,
+    pub axis: Axis,
+    pub p_adjusted: f64,
+    pub words: String,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct Detectable {
+    pub effect: &'static str,
+    /// Least parameter values seen with 80 % power.
+    pub minimum: Map<String, Value>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct CannotTell {
+    pub effect: &'static str,
+    pub why: String,
+}
+
+/// One view, for people.
+#[derive(Debug, Clone, Serialize)]
+pub struct ViewLine {
+    pub name: String,
+    pub z_m: f64,
+    pub theta_rad: f64,
+    pub azimuth_rad: f64,
+    pub frames: usize,
+    pub pixels: usize,
+    /// Root mean square of the view's smooth residual before and after, px of disparity.
+    pub bowl_px_before: f64,
+    pub bowl_px_after: f64,
+    pub held_out: bool,
+}

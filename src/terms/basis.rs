@@ -1,0 +1,348 @@
+//! The shapes a missing term may have: families with a free shape, and nameless curves.
+
+use std::f64::consts::TAU;
+
+use serde::{Deserialize, Serialize};
+
+use super::place::{Axis, Place};
+
+/// Disparity at which a term that grows with a power of it is in px: a Kinect at 1.1 m.
+pub const DISPARITY_UNIT_PX: f64 = 40.0;
+
+/// A term with everything but its linear coefficients settled. Terms of the bias are in px of
+/// disparity, those of the variance in its natural logarithm.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Basis {
+    /// A bowl r^2 .. r^2n in disparity whose depth goes with a power of the disparity.
+    Bowl { disparity_power: f64, orders: usize },
+    /// Rays shifted along the radius, seen through the slope of the target.
+    Lens { fx: f64, fy: f64, orders: usize },
+    /// Ray length in place of depth.
+    RangeNotDepth,
+    /// A board that is not flat: even polynomial of its own coordinates.
+    Bow { degree: usize },
+    /// Periodic in the disparity, two harmonics.
+    Locking { period_px: f64 },
+    /// Stripes down the picture.
+    Banding { period_px: f64, harmonics: usize },
+    /// Fades with the distance from the edge; to both sides alike, or to the left and right apart.
+    EdgeMixing { width_px: f64 },
+    /// Noise with another power of z.
+    RangeExponent { pivot_m: f64 },
+    /// Less light towards the corners.
+    Vignetting { orders: usize },
+    /// Lateral noise through the slope of the target.
+    SlopeNoise { lateral_px: f64 },
+    /// Along the baseline against across it, fading as the tilt does.
+    TiltAxis { tilt_power: i32 },
+    /// Dark surface.
+    Intensity,
+    /// Light of the room against the pattern's.
+    Ambient { ratio: f64 },
+    /// The logarithm of the variance as a whole.
+    Level,
+    /// d log variance / d parameter of the sigma model, on a table over z and theta.
+    Recalibrate { z_m: [f64; 2], theta_rad: [f64; 2], columns: Vec<Vec<f64>> },
+    /// A broken line over an axis between evenly spaced nodes.
+    Curve { over: Over, low: f64, high: f64, nodes: usize, times: Times },
+    /// A broken line on a circle.
+    Ring { over: Over, period: f64, nodes: usize, times: Times },
+    /// A bilinear map over the picture.
+    Map { width: f64, height: f64, across: usize, down: usize, times: Times },
+    /// Two curves at once: a bilinear map over two axes.
+    Pair { over: [Over; 2], low: [f64; 2], high: [f64; 2], nodes: [usize; 2] },
+}
+
+/// What a curve runs over.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Over {
+    Column,
+    Row,
+    Radius,
+    Z,
+    LogZ,
+    Disparity,
+    Right,
+    Down,
+    Edge,
+    Theta,
+    Azimuth,
+    Session,
+    Temperature,
+    Light,
+}
+
+/// What a curve is multiplied by.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Times {
+    One,
+    /// The square of the disparity in units of 40 px: a constant error of depth's own shape.
+    DisparitySquared,
+    /// Disparity over the plane's distance: a lift of the surface along its normal, m.
+    Lift,
+    /// Sine of the tilt: what a frontal plane does not show.
+    Tilt,
+}
+
+impl Over {
+    pub fn value(self, p: &Place) -> f64 {
+        match self {
+            Over::Column => p.u,
+            Over::Row => p.v,
+            Over::Radius => p.radius,
+            Over::Z => p.z,
+            Over::LogZ => p.z.ln(),
+            Over::Disparity => p.disparity,
+            Over::Right => p.right,
+            Over::Down => p.down,
+            Over::Edge => p.edge,
+            Over::Theta => p.theta,
+            Over::Azimuth => p.azimuth,
+            Over::Session => p.session_s,
+            Over::Temperature => p.temperature_c,
+            Over::Light => p.light,
+        }
+    }
+
+    pub fn axis(self) -> Axis {
+        match self {
+            Over::Column => Axis::Column,
+            Over::Row => Axis::Row,
+            Over::Radius => Axis::Radius,
+            Over::Z | Over::LogZ | Over::Disparity => Axis::Z,
+            Over::Right | Over::Down => Axis::TargetPosition,
+            Over::Edge => Axis::EdgeDistance,
+            Over::Theta => Axis::Theta,
+            Over::Azimuth => Axis::Azimuth,
+            Over::Session => Axis::SessionTime,
+            Over::Temperature => Axis::Temperature,
+            Over::Light => Axis::Intensity,
+        }
+    }
+}
+
+impl Times {
+    fn value(self, p: &Place) -> f64 {
+        match self {
+            Times::One => 1.0,
+            Times::DisparitySquared => (p.disparity / DISPARITY_UNIT_PX).powi(2),
+            Times::Lift => p.disparity / p.rho,
+            Times::Tilt => p.theta.sin(),
+        }
+    }
+}
+
+impl Basis {
+    /// How many linear coefficients it has.
+    pub fn count(&self) -> usize {
+        match self {
+            Basis::Bowl { orders, .. } | Basis::Lens { orders, .. } => *orders,
+            Basis::Vignetting { orders } => *orders,
+            Basis::Bow { degree } => BOW_TERMS.iter().filter(|(i, j)| i + j <= *degree as i32).count(),
+            Basis::Locking { .. } => 4,
+            Basis::Banding { harmonics, .. } => 2 * harmonics,
+            Basis::Recalibrate { columns, .. } => columns.len(),
+            Basis::Curve { nodes, .. } | Basis::Ring { nodes, .. } => *nodes,
+            Basis::Map { across, down, .. } => across * down,
+            Basis::Pair { nodes, .. } => nodes[0] * nodes[1],
+            Basis::RangeNotDepth
+            | Basis::EdgeMixing { .. }
+            | Basis::RangeExponent { .. }
+            | Basis::SlopeNoise { .. }
+            | Basis::TiltAxis { .. }
+            | Basis::Intensity
+            | Basis::Ambient { .. }
+            | Basis::Level => 1,
+        }
+    }
+
+    /// The columns at a place; `out` has [`Basis::count`] entries.
+    pub fn fill(&self, p: &Place, out: &mut [f64]) {
+        match *self {
+            Basis::Bowl { disparity_power, .. } => {
+                let scale = if disparity_power == 0.0 {
+                    1.0
+                } else {
+                    (p.disparity / DISPARITY_UNIT_PX).powf(disparity_power)
+                };
+                powers(scale, p.radius * p.radius, out);
+            }
+            Basis::Lens { fx, fy, .. } => {
+                let r2 = p.x * p.x + p.y * p.y;
+                powers(-(p.slope[0] * p.x * fx + p.slope[1] * p.y * fy), r2, out);
+            }
+            Basis::RangeNotDepth => {
+                out[0] = p.disparity * (1.0 / (1.0 + p.x * p.x + p.y * p.y).sqrt() - 1.0);
+            }
+            Basis::Bow { .. } => {
+                let lift = p.disparity / p.rho;
+                for (g, (i, j)) in out.iter_mut().zip(BOW_TERMS) {
+                    *g = lift * p.right.powi(i) * p.down.powi(j);
+                }
+            }
+            Basis::Locking { period_px } => {
+                let (sin, cos) = (TAU * p.disparity / period_px).sin_cos();
+                // A patch sees the mean over the disparities it spans.
+                let (first, second) = (smear(p, 1.0 / period_px), smear(p, 2.0 / period_px));
+                out[0] = first * sin;
+                out[1] = first * cos;
+                out[2] = second * 2.0 * sin * cos;
+                out[3] = second * (cos * cos - sin * sin);
+            }
+            Basis::Banding { period_px, .. } => {
+                let (s, c) = (TAU * p.u / period_px).sin_cos();
+                let (mut sk, mut ck) = (s, c);
+                for (k, pair) in out.chunks_exact_mut(2).enumerate() {
+                    let seen = sinc((k + 1) as f64 * p.side / period_px);
+                    pair[0] = seen * sk;
+                    pair[1] = seen * ck;
+                    (sk, ck) = (sk * c + ck * s, ck * c - sk * s);
+                }
+            }
+            Basis::EdgeMixing { width_px } => out[0] = (-p.edge / width_px).exp(),
+            Basis::RangeExponent { pivot_m } => out[0] = (p.z / pivot_m).ln(),
+            Basis::Vignetting { .. } => powers(1.0, p.radius * p.radius, out),
+            Basis::SlopeNoise { lateral_px } => {
+                let slope2 = p.slope[0].powi(2) + p.slope[1].powi(2);
+                out[0] = (lateral_px * lateral_px * slope2 / p.variance).ln_1p();
+            }
+            Basis::TiltAxis { tilt_power } => {
+                out[0] = (2.0 * p.azimuth).cos() * p.theta.sin().powi(tilt_power);
+            }
+            Basis::Intensity => out[0] = p.light.max(1e-2).ln(),
+            Basis::Ambient { ratio } => {
+                let far = p.z * p.z * (1.0 + p.x * p.x + p.y * p.y) / p.theta.cos().max(0.05);
+                out[0] = (ratio * p.ambient / OFFICE_LUX * far).ln_1p();
+            }
+            Basis::Level => out[0] = 1.0,
+            Basis::Recalibrate { z_m, theta_rad, ref columns } => {
+                let (i, s) = node(p.z, z_m[0], z_m[1], TABLE);
+                let (j, t) = node(p.theta, theta_rad[0], theta_rad[1], TABLE);
+                for (g, column) in out.iter_mut().zip(columns) {
+                    let at = |i: usize, j: usize| column[j * TABLE + i];
+                    *g = (1.0 - t) * ((1.0 - s) * at(i, j) + s * at(i + 1, j))
+                        + t * ((1.0 - s) * at(i, j + 1) + s * at(i + 1, j + 1));
+                }
+            }
+            Basis::Curve { over, low, high, times, .. } => {
+                out.fill(0.0);
+                let (k, t) = node(over.value(p), low, high, out.len());
+                let scale = times.value(p);
+                out[k] = scale * (1.0 - t);
+                out[k + 1] = scale * t;
+            }
+            Basis::Ring { over, period, nodes, times } => {
+                out.fill(0.0);
+                let place = (over.value(p) / period).rem_euclid(1.0) * nodes as f64;
+                let (k, t) = (place as usize % nodes, place.fract());
+                let scale = times.value(p);
+                out[k] += scale * (1.0 - t);
+                out[(k + 1) % nodes] += scale * t;
+            }
+            Basis::Map { width, height, across, down, times } => {
+                let (i, s) = node(p.u, 0.0, width - 1.0, across);
+                let (j, t) = node(p.v, 0.0, height - 1.0, down);
+                bilinear((i, s), (j, t), across, times.value(p), out);
+            }
+            Basis::Pair { over, low, high, nodes } => {
+                let (i, s) = node(over[0].value(p), low[0], high[0], nodes[0]);
+                let (j, t) = node(over[1].value(p), low[1], high[1], nodes[1]);
+                bilinear((i, s), (j, t), nodes[0], 1.0, out);
+            }
+        }
+    }
+
+    /// Value of the term at a place.
+    pub fn value(&self, coefficients: &[f64], p: &Place, row: &mut Vec<f64>) -> f64 {
+        row.clear();
+        row.resize(self.count(), 0.0);
+        self.fill(p, row);
+        row.iter().zip(coefficients).map(|(g, b)| g * b).sum()
+    }
+
+    /// Does it depend on the column of the picture alone?
+    pub fn of_column_alone(&self) -> bool {
+        matches!(
+            self,
+            Basis::Banding { .. } | Basis::Curve { over: Over::Column, times: Times::One, .. }
+        )
+    }
+
+    /// The axis of effects.md that it runs along.
+    pub fn axis(&self) -> Axis {
+        match self {
+            Basis::Bowl { .. } | Basis::Lens { .. } | Basis::RangeNotDepth => Axis::Radius,
+            Basis::Vignetting { .. } => Axis::Radius,
+            Basis::Bow { .. } => Axis::TargetPosition,
+            Basis::Locking { .. } => Axis::DisparityPhase,
+            Basis::Banding { .. } => Axis::Column,
+            Basis::EdgeMixing { .. } => Axis::EdgeDistance,
+            Basis::RangeExponent { .. } | Basis::Level | Basis::Recalibrate { .. } => Axis::Z,
+            Basis::SlopeNoise { .. } => Axis::Theta,
+            Basis::TiltAxis { .. } => Axis::Azimuth,
+            Basis::Intensity | Basis::Ambient { .. } => Axis::Intensity,
+            Basis::Curve { over, .. } => over.axis(),
+            Basis::Ring { over: Over::Disparity, .. } => Axis::DisparityPhase,
+            Basis::Ring { over, .. } => over.axis(),
+            Basis::Map { .. } => Axis::Pixel,
+            Basis::Pair { over, .. } => over[0].axis(),
+        }
+    }
+}
+
+/// Light on the desk of an office, lx: what a room's share of the light is counted at.
+const OFFICE_LUX: f64 = 500.0;
+/// Nodes of a table over z and over theta.
+pub const TABLE: usize = 17;
+/// Powers of right and down on the board, without the plane itself.
+const BOW_TERMS: [(i32, i32); 12] = [
+    (2, 0),
+    (0, 2),
+    (1, 1),
+    (3, 0),
+    (2, 1),
+    (1, 2),
+    (0, 3),
+    (4, 0),
+    (3, 1),
+    (2, 2),
+    (1, 3),
+    (0, 4),
+];
+
+fn powers(scale: f64, base: f64, out: &mut [f64]) {
+    let mut term = scale;
+    for g in out {
+        term *= base;
+        *g = term;
+    }
+}
+
+fn sinc(cycles: f64) -> f64 {
+    let x = std::f64::consts::PI * cycles;
+    if x.abs() < 1e-6 { 1.0 } else { x.sin() / x }
+}
+
+fn smear(p: &Place, frequency: f64) -> f64 {
+    sinc(frequency * p.slope[0] * p.side) * sinc(frequency * p.slope[1] * p.side)
+}
+
+/// Number of the node below a value, and the way to the next.
+fn node(value: f64, low: f64, high: f64, nodes: usize) -> (usize, f64) {
+    let last = (nodes - 1) as f64;
+    let place = ((value - low) / (high - low).max(1e-12) * last).clamp(0.0, last);
+    let k = (place as usize).min(nodes - 2);
+    (k, place - k as f64)
+}
+
+fn bilinear((i, s): (usize, f64), (j, t): (usize, f64), across: usize, scale: f64, out: &mut [f64]) {
+    out.fill(0.0);
+    for (dj, wv) in [(0, 1.0 - t), (1, t)] {
+        for (di, wu) in [(0, 1.0 - s), (1, s)] {
+            out[(j + dj) * across + i + di] = scale * wu * wv;
+        }
+    }
+}

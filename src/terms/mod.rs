@@ -1,0 +1,44 @@
+//! What a model holds beyond sigma(z, theta): terms of the bias and of the variance, as found by
+//! `diagnose` and applied by `simulate`, `correct` and `map`.
+
+mod basis;
+mod place;
+
+pub use basis::{Basis, DISPARITY_UNIT_PX, Over, TABLE, Times};
+pub use place::{Axis, Place, corner_radius};
+
+use serde::{Deserialize, Serialize};
+
+/// What of a measurement a term changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Statistic {
+    Bias,
+    Variance,
+    Distribution,
+    Correlation,
+    Missing,
+}
+
+/// A term with its size: added to the disparity, px, or to the logarithm of its variance.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Term {
+    pub statistic: Statistic,
+    pub basis: Basis,
+    pub coefficients: Vec<f64>,
+}
+
+impl Term {
+    /// At a place, px or nepers of variance. `row` is scratch.
+    pub fn value(&self, p: &Place, row: &mut Vec<f64>) -> f64 {
+        self.basis.value(&self.coefficients, p, row)
+    }
+
+    /// Is it the sensor's, so that it can be taken out of any picture? A board's shape is not.
+    pub fn belongs_to_sensor(&self) -> bool {
+        match self.basis {
+            Basis::Bow { .. } => false,
+            _ => !matches!(self.basis.axis(), Axis::TargetPosition | Axis::EdgeDistance),
+        }
+    }
+}

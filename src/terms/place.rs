@@ -1,0 +1,123 @@
+//! Where a measurement lies, on every axis that a mismatch may follow.
+
+use serde::{Deserialize, Serialize};
+
+use crate::camera::Camera;
+
+/// The axes of effects.md.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Axis {
+    Z,
+    DisparityPhase,
+    Column,
+    Row,
+    Radius,
+    /// Place in the image.
+    Pixel,
+    Theta,
+    Azimuth,
+    TargetPosition,
+    EdgeDistance,
+    Intensity,
+    /// Time within a view.
+    Frame,
+    SessionTime,
+    Temperature,
+    PixelLag,
+    Residual,
+}
+
+impl Axis {
+    /// As effects.md writes it.
+    pub fn id(self) -> &'static str {
+        match self {
+            Axis::Z => "z",
+            Axis::DisparityPhase => "disparity-phase",
+            Axis::Column => "column",
+            Axis::Row => "row",
+            Axis::Radius => "radius",
+            Axis::Pixel => "pixel",
+            Axis::Theta => "theta",
+            Axis::Azimuth => "azimuth",
+            Axis::TargetPosition => "target-position",
+            Axis::EdgeDistance => "edge-distance",
+            Axis::Intensity => "intensity",
+            Axis::Frame => "frame",
+            Axis::SessionTime => "session-time",
+            Axis::Temperature => "temperature",
+            Axis::PixelLag => "pixel-lag",
+            Axis::Residual => "residual",
+        }
+    }
+
+    /// Unit of its values.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Axis::Z | Axis::TargetPosition => "m",
+            Axis::Column | Axis::Row | Axis::Radius | Axis::Pixel | Axis::EdgeDistance => "px",
+            Axis::PixelLag => "px",
+            Axis::Theta | Axis::Azimuth => "rad",
+            Axis::SessionTime | Axis::Frame => "s",
+            Axis::Temperature => "degrees Celsius",
+            Axis::DisparityPhase => "periods",
+            Axis::Intensity => "of the median",
+            Axis::Residual => "sigma",
+        }
+    }
+}
+
+impl std::fmt::Display for Axis {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.id())
+    }
+}
+
+/// Where a patch (or a pixel) of a plane lies.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Place {
+    /// Column and row of the patch's middle, px.
+    pub u: f64,
+    pub v: f64,
+    /// Side of the patch, px.
+    pub side: f64,
+    /// Ray of the middle.
+    pub x: f64,
+    pub y: f64,
+    /// Disparity and depth of the plane, px and m.
+    pub disparity: f64,
+    pub z: f64,
+    /// Disparity gradient of the plane along u and v, px per px.
+    pub slope: [f64; 2],
+    /// From the principal point over the farthest corner's, 0 to 1.
+    pub radius: f64,
+    /// On the target: right and down of its centroid, m.
+    pub right: f64,
+    pub down: f64,
+    /// Distance of the plane from the camera, m.
+    pub rho: f64,
+    /// To the nearest pixel off the target inside the picture, px.
+    pub edge: f64,
+    /// Tilt and its direction, rad.
+    pub theta: f64,
+    pub azimuth: f64,
+    /// Since the first view, s.
+    pub session_s: f64,
+    /// Degrees Celsius; 0 where it is not known.
+    pub temperature_c: f64,
+    /// How light the surface is in infrared over the recording's median; 1 where there is none.
+    pub light: f64,
+    /// Ambient light, lx; 0 where it is not known.
+    pub ambient: f64,
+    /// Model's variance of a pixel's disparity, px^2.
+    pub variance: f64,
+}
+
+/// Of the farthest corner from the principal point, px.
+pub fn corner_radius(camera: &Camera) -> f64 {
+    let (right, bottom) = (camera.width as f64 - 1.0, camera.height as f64 - 1.0);
+    [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)]
+        .into_iter()
+        .map(|(u, v)| f64::hypot(u - camera.cx, v - camera.cy))
+        .fold(0.0, f64::max)
+}
