@@ -2,6 +2,7 @@
 
 mod bias;
 mod candidate;
+mod diagnosis;
 mod evidence;
 mod field;
 mod lattice;
@@ -13,6 +14,7 @@ mod structure;
 mod tiles;
 mod variance;
 
+pub use diagnosis::*;
 pub use field::Field;
 pub use lattice::{Lattice, Words};
 pub use layers::Layers;
