@@ -1,5 +1,6 @@
-use kinoise::diagnose::{Field, Layers};
+use kinoise::diagnose::{Field, Outcome, Survey};
 use kinoise::measure::{MeasureOptions, Workbench};
+use kinoise::terms::{Statistic, Term};
 use kinoise::*;
 use rayon::prelude::*;
 fn main() {
@@ -14,30 +15,34 @@ fn main() {
     let fields: Vec<Field> =
         rec.views.par_iter().filter_map(|v| Field::read(v, &bench, &sigma).ok()).collect();
     eprintln!("{} fields {:?}", fields.len(), t.elapsed());
-    let mut layer = Layers::of(&fields, &rec.sensor.camera, &bench.rays);
-    eprintln!(
-        "layer {:?}; inflation {:?}",
-        t.elapsed(),
-        layer.views.iter().map(|v| (v.inflation * 10.0).round() / 10.0).collect::<Vec<_>>()
-    );
-    for (name, found) in [
-        ("bias", layer.search_bias(0.01, Seed(1))),
-        ("variance", layer.search_variance(0.01, Seed(1))),
-    ] {
-        for f in found {
+    let survey = Survey::of(&fields, &rec.sensor.camera, &bench.rays);
+    eprintln!("survey {:?}", t.elapsed());
+    let camera = &rec.sensor.camera;
+    let show = |name: &str, o: &Outcome| {
+        for (k, c) in o.chosen.iter().enumerate() {
+            let basis = format!("{:?}", c.candidate.basis);
             println!(
-                "{name} {:?} {} {:?} gain {:.1} family {:.1} curve {:.1} thr {:.1} ranking {:?} beta {:.4?}",
-                f.candidate.family,
-                f.candidate.axis,
-                f.candidate.settled,
-                f.gain.total,
-                f.best_family,
-                f.best_curve,
-                f.threshold,
-                &f.ranking[..2],
-                &f.gain.beta.as_slice()[..f.gain.beta.len().min(6)]
+                "{name} {:?} {} gain {:.1} curve {:.1} p {:.1e} rivals {:?} beta {:.4?}",
+                c.candidate.family,
+                &basis[..basis.len().min(80)],
+                c.gain,
+                c.best_curve,
+                c.p,
+                c.rivals.iter().take(3).map(|r| (r.family, r.gain as i64, r.behind as f32)).collect::<Vec<_>>(),
+                &o.coefficients(k)[..c.candidate.basis.count().min(6)]
             );
         }
-    }
+    };
+    let bias = survey.search_bias(camera, 0.01, Seed(1));
+    show("bias", &bias);
+    eprintln!("bias {:?}", t.elapsed());
+    let terms: Vec<Term> = (0..bias.chosen.len())
+        .map(|k| Term {
+            statistic: Statistic::Bias,
+            basis: bias.chosen[k].candidate.basis.clone(),
+            coefficients: bias.coefficients(k),
+        })
+        .collect();
+    show("variance", &survey.search_variance(&terms, &sigma, camera, 0.01, Seed(1)));
     eprintln!("{:?}", t.elapsed());
 }

@@ -9,14 +9,15 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::rng::Stream;
 
-/// A view's normal equations on a candidate's columns, in nats.
+/// A view's normal equations on the columns under test, in nats: first the terms already chosen,
+/// then the candidate.
 #[derive(Debug, Clone)]
 pub struct Evidence {
     pub a: DMatrix<f64>,
     pub b: DVector<f64>,
 }
 
-/// What a candidate brings on views it was not fitted to.
+/// What a set of terms brings on views they were not fitted to.
 #[derive(Debug, Clone)]
 pub struct Gain {
     /// Nats, all views.
@@ -29,89 +30,158 @@ pub struct Gain {
     pub covariance: DMatrix<f64>,
 }
 
-/// One view's data with its nuisances: what candidates are reduced against.
+/// One view's data with what is fitted beside every candidate: its own nuisances, and the terms
+/// already chosen.
 pub struct Rows {
     response: Vec<f64>,
     /// Inverse variance, in independent samples.
     weight: Vec<f64>,
-    nuisance: DMatrix<f64>,
-    /// Inverse of the nuisances' own normal equations, and their right-hand side.
-    inverse: DMatrix<f64>,
+    /// A row a sample: nuisances, then the chosen terms' columns.
+    beside: Vec<f64>,
+    nuisances: usize,
+    width: usize,
+    /// Normal equations of `beside`, before anything is profiled out.
+    own: DMatrix<f64>,
     seen: DVector<f64>,
+    /// Inverse of the nuisances' own block.
+    inverse: DMatrix<f64>,
 }
 
 impl Rows {
-    /// `nuisance` has a row a sample, and a precision that holds each of its coefficients to
-    /// zero (0: free). `None` when the nuisances cannot be told apart.
+    /// `beside` is row-major with `width` columns, of which the first are the nuisances, one for
+    /// each entry of `precision`, which holds them to zero (0: free). `None` when the nuisances
+    /// cannot be told apart.
     pub fn new(
         response: Vec<f64>,
         weight: Vec<f64>,
-        nuisance: DMatrix<f64>,
+        beside: Vec<f64>,
+        width: usize,
         precision: &[f64],
     ) -> Option<Self> {
-        let p = nuisance.ncols();
-        let mut own = DMatrix::<f64>::from_diagonal(&DVector::from_column_slice(precision));
-        let mut seen = DVector::<f64>::zeros(p);
-        for (i, (&y, &w)) in response.iter().zip(&weight).enumerate() {
-            for q in 0..p {
-                let wx = w * nuisance[(i, q)];
+        let mut own = DMatrix::<f64>::zeros(width, width);
+        let mut seen = DVector::<f64>::zeros(width);
+        for ((&y, &w), row) in response.iter().zip(&weight).zip(beside.chunks_exact(width)) {
+            if w <= 0.0 {
+                continue;
+            }
+            for q in 0..width {
+                let wx = w * row[q];
+                if wx == 0.0 {
+                    continue;
+                }
                 seen[q] += wx * y;
                 for r in 0..=q {
-                    own[(q, r)] += wx * nuisance[(i, r)];
+                    own[(q, r)] += wx * row[r];
                 }
             }
         }
         own.fill_upper_triangle_with_lower_triangle();
-        Some(Rows { response, weight, nuisance, inverse: own.try_inverse()?, seen })
+        let p = precision.len();
+        for (q, precision) in precision.iter().enumerate() {
+            own[(q, q)] += precision;
+        }
+        let inverse = own.view((0, 0), (p, p)).into_owned().try_inverse()?;
+        Some(Rows { response, weight, beside, nuisances: p, width, own, seen, inverse })
     }
 
-    /// The nuisances' own least squares fit.
-    pub fn nuisances(&self) -> [f64; 3] {
-        let beta = &self.inverse * &self.seen;
-        std::array::from_fn(|q| beta.get(q).copied().unwrap_or(0.0))
+    /// Samples that share a key made one: exact for columns that depend on the key alone.
+    pub fn grouped(&self, keys: usize, key: impl Fn(usize) -> usize) -> Self {
+        let mut response = vec![0.0; keys];
+        let mut weight = vec![0.0; keys];
+        let mut beside = vec![0.0; keys * self.width];
+        for (i, (&y, &w)) in self.response.iter().zip(&self.weight).enumerate() {
+            let k = key(i);
+            weight[k] += w;
+            response[k] += w * y;
+            let row = &self.beside[i * self.width..][..self.width];
+            for (sum, x) in beside[k * self.width..][..self.width].iter_mut().zip(row) {
+                *sum += w * x;
+            }
+        }
+        for k in 0..keys {
+            let w = weight[k].max(f64::MIN_POSITIVE);
+            response[k] /= w;
+            beside[k * self.width..][..self.width].iter_mut().for_each(|x| *x /= w);
+        }
+        Rows {
+            response,
+            weight,
+            beside,
+            nuisances: self.nuisances,
+            width: self.width,
+            own: self.own.clone(),
+            seen: self.seen.clone(),
+            inverse: self.inverse.clone(),
+        }
     }
 
-    /// Profile the nuisances out. `columns` fills one row of the candidate's columns.
+    /// Coefficients of the nuisances once the chosen terms are what `beta` says.
+    pub fn nuisances(&self, beta: &[f64]) -> DVector<f64> {
+        let p = self.nuisances;
+        let mut right = self.seen.rows(0, p).into_owned();
+        for (j, beta) in beta.iter().enumerate() {
+            right -= self.own.view((0, p + j), (p, 1)) * *beta;
+        }
+        &self.inverse * right
+    }
+
+    /// Evidence on the chosen terms and a candidate, the nuisances profiled out. `columns` fills
+    /// one row of the candidate's columns.
     pub fn reduce(&self, count: usize, mut columns: impl FnMut(usize, &mut [f64])) -> Evidence {
-        let p = self.seen.len();
+        let (p, width) = (self.nuisances, self.width);
+        let m = width - p;
         let mut g = vec![0.0; count];
+        let mut touched = Vec::with_capacity(count);
         let mut a = DMatrix::<f64>::zeros(count, count);
         let mut b = DVector::<f64>::zeros(count);
-        let mut cross = DMatrix::<f64>::zeros(p, count);
+        let mut cross = DMatrix::<f64>::zeros(width, count);
         for (i, (&y, &w)) in self.response.iter().zip(&self.weight).enumerate() {
-            if w <= 0.0 {
+            if w <= 0.0 || count == 0 {
                 continue;
             }
             columns(i, &mut g);
-            for j in 0..count {
-                // Curves touch two of their many columns.
-                if g[j] == 0.0 {
-                    continue;
-                }
+            // Curves touch two of their many columns.
+            touched.clear();
+            touched.extend((0..count).filter(|&j| g[j] != 0.0));
+            let row = &self.beside[i * width..][..width];
+            for (n, &j) in touched.iter().enumerate() {
                 let wg = w * g[j];
                 b[j] += wg * y;
-                for k in 0..=j {
+                for &k in &touched[..=n] {
                     a[(j, k)] += wg * g[k];
                 }
-                for q in 0..p {
-                    cross[(q, j)] += wg * self.nuisance[(i, q)];
+                let mut into = cross.column_mut(j);
+                for (sum, x) in into.iter_mut().zip(row) {
+                    *sum += wg * x;
                 }
             }
         }
         a.fill_upper_triangle_with_lower_triangle();
-        let project = cross.transpose() * &self.inverse;
-        a -= &project * &cross;
-        b -= &project * &self.seen;
-        Evidence { a, b }
+        let n = m + count;
+        let mut all = DMatrix::<f64>::zeros(n, n);
+        let mut right = DVector::<f64>::zeros(n);
+        all.view_mut((0, 0), (m, m)).copy_from(&self.own.view((p, p), (m, m)));
+        all.view_mut((m, m), (count, count)).copy_from(&a);
+        all.view_mut((0, m), (m, count)).copy_from(&cross.view((p, 0), (m, count)));
+        all.view_mut((m, 0), (count, m)).copy_from(&cross.view((p, 0), (m, count)).transpose());
+        right.rows_mut(0, m).copy_from(&self.seen.rows(p, m));
+        right.rows_mut(m, count).copy_from(&b);
+        // The nuisances against all of it.
+        let mut shared = DMatrix::<f64>::zeros(p, n);
+        shared.view_mut((0, 0), (p, m)).copy_from(&self.own.view((0, p), (p, m)));
+        shared.view_mut((0, m), (p, count)).copy_from(&cross.view((0, 0), (p, count)));
+        let project = shared.transpose() * &self.inverse;
+        all -= &project * &shared;
+        right -= &project * self.seen.rows(0, p);
+        Evidence { a: all, b: right }
     }
 }
 
-/// Gain of a candidate over none, each view predicted from a fit to the others. `prior` is the
+/// Gain over no term at all, each view predicted from a fit to the others. `prior` is the
 /// precision that holds a coefficient nothing is known about.
 pub fn gain(views: &[Evidence], prior: f64) -> Option<Gain> {
     let k = views.first()?.b.len();
-    let ridge = DMatrix::identity(k, k) * prior;
-    let mut a = ridge.clone();
+    let mut a = DMatrix::identity(k, k) * prior;
     let mut b = DVector::zeros(k);
     for v in views {
         a += &v.a;
@@ -121,7 +191,7 @@ pub fn gain(views: &[Evidence], prior: f64) -> Option<Gain> {
         .iter()
         .map(|v| {
             let beta = (&a - &v.a).cholesky()?.solve(&(&b - &v.b));
-            Some(beta.dot(&v.b) - 0.5 * beta.dot(&(&v.a * &beta)))
+            Some(score(v, &beta))
         })
         .collect::<Option<_>>()?;
     let whole = a.cholesky()?;
@@ -133,6 +203,25 @@ pub fn gain(views: &[Evidence], prior: f64) -> Option<Gain> {
     })
 }
 
+/// Log likelihood of a view with the coefficients `beta` over that without any, nats.
+pub fn score(view: &Evidence, beta: &DVector<f64>) -> f64 {
+    beta.dot(&view.b) - 0.5 * beta.dot(&(&view.a * beta))
+}
+
+/// Fit to all views but one.
+pub fn fit_without(views: &[Evidence], left_out: usize, prior: f64) -> Option<DVector<f64>> {
+    let k = views.first()?.b.len();
+    let mut a = DMatrix::identity(k, k) * prior;
+    let mut b = DVector::zeros(k);
+    for (i, v) in views.iter().enumerate() {
+        if i != left_out {
+            a += &v.a;
+            b += &v.b;
+        }
+    }
+    Some(a.cholesky()?.solve(&b))
+}
+
 /// What noise alone may bring for a candidate: b ~ N(0, A) in every view.
 ///
 /// Worked in the eigenvectors of the summed A, in which the views' own A are taken as diagonal:
@@ -142,22 +231,25 @@ pub struct Null {
     by_view: Vec<Vec<f64>>,
     total: Vec<f64>,
     prior: f64,
+    /// How much more the views' own fits scatter than their noise explains, at least 1.
+    pub dispersion: f64,
 }
 
 impl Null {
-    pub fn of(views: &[Evidence], prior: f64) -> Option<Self> {
-        let k = views.first()?.b.len();
-        let sum = views.iter().fold(DMatrix::zeros(k, k), |sum, v| sum + &v.a);
+    /// For the columns from number `chosen` on, given the columns before them.
+    pub fn of(views: &[Evidence], chosen: usize, prior: f64) -> Option<Self> {
+        let k = views.first()?.b.len() - chosen;
+        let (alone, left) = beside_chosen(views, chosen, prior)?;
+        let sum = alone.iter().fold(DMatrix::zeros(k, k), |sum, a| sum + a);
         let u = sum.symmetric_eigen().eigenvectors;
-        let by_view: Vec<Vec<f64>> = views
-            .iter()
-            .map(|v| {
-                let au = &v.a * &u;
-                (0..k).map(|j| u.column(j).dot(&au.column(j)).max(0.0)).collect()
-            })
-            .collect();
-        let total = (0..k).map(|j| by_view.iter().map(|a| a[j]).sum()).collect();
-        Some(Null { by_view, total, prior })
+        let information = |a: &DMatrix<f64>| -> Vec<f64> {
+            let au = a * &u;
+            (0..k).map(|j| u.column(j).dot(&au.column(j)).max(0.0)).collect()
+        };
+        let by_view: Vec<Vec<f64>> = alone.iter().map(information).collect();
+        let total: Vec<f64> = (0..k).map(|j| by_view.iter().map(|a| a[j]).sum()).collect();
+        let dispersion = dispersion(&by_view, &total, &u, &left, prior);
+        Some(Null { by_view, total, prior, dispersion })
     }
 
     /// The gain of one recording of nothing but noise, nats.
@@ -178,4 +270,71 @@ impl Null {
         }
         gain
     }
+}
+
+/// The candidate's evidence once the chosen terms are fitted with it: its information in each
+/// view, and its score there.
+fn beside_chosen(
+    views: &[Evidence],
+    chosen: usize,
+    prior: f64,
+) -> Option<(Vec<DMatrix<f64>>, Vec<DVector<f64>>)> {
+    let n = views.first()?.b.len();
+    let k = n - chosen;
+    if chosen == 0 {
+        let split = views.iter().map(|v| (v.a.clone(), v.b.clone()));
+        return Some(split.unzip());
+    }
+    let mut mm = DMatrix::identity(chosen, chosen) * prior;
+    let mut mk = DMatrix::zeros(chosen, k);
+    let mut bm = DVector::zeros(chosen);
+    for v in views {
+        mm += v.a.view((0, 0), (chosen, chosen));
+        mk += v.a.view((0, chosen), (chosen, k));
+        bm += v.b.rows(0, chosen);
+    }
+    let factor = mm.cholesky()?;
+    let (t, beta) = (factor.solve(&mk), factor.solve(&bm));
+    let split = views.iter().map(|v| {
+        let vmm = v.a.view((0, 0), (chosen, chosen));
+        let vmk = v.a.view((0, chosen), (chosen, k));
+        let vkk = v.a.view((chosen, chosen), (k, k));
+        let tm = t.transpose() * vmk;
+        let a = vkk - &tm - tm.transpose() + t.transpose() * vmm * &t;
+        let left_m = v.b.rows(0, chosen) - vmm * &beta;
+        let left_k = v.b.rows(chosen, k) - vmk.transpose() * &beta;
+        (a, left_k - t.transpose() * left_m)
+    });
+    Some(split.unzip())
+}
+
+/// Scatter of the views' scores about the common fit, over what noise gives them.
+fn dispersion(
+    by_view: &[Vec<f64>],
+    total: &[f64],
+    u: &DMatrix<f64>,
+    scores: &[DVector<f64>],
+    prior: f64,
+) -> f64 {
+    let most = total.iter().copied().fold(0.0, f64::max);
+    let (mut sum, mut n) = (0.0, 0.0);
+    for (j, &total) in total.iter().enumerate() {
+        if total < 1e-6 * most {
+            continue;
+        }
+        let score: Vec<f64> = scores.iter().map(|b| u.column(j).dot(b)).collect();
+        let beta = score.iter().sum::<f64>() / (total + prior);
+        for (s, a) in score.iter().zip(by_view) {
+            // A view that says next to nothing would divide by next to nothing.
+            if a[j] > 1e-3 * total {
+                sum += (s - a[j] * beta).powi(2) / a[j];
+                n += 1.0 - a[j] / total;
+            }
+        }
+    }
+    if n < 1.0 {
+        return 1.0;
+    }
+    // Chance alone scatters the estimate by the root of 2 / n.
+    (sum / n - f64::sqrt(2.0 / n)).max(1.0)
 }

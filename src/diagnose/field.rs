@@ -6,8 +6,8 @@
 use crate::camera::Rays;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
-use crate::frame::{DepthTable, Frame};
-use crate::io::FrameSource;
+use crate::frame::{DepthCode, DepthTable, Frame};
+use crate::io::{FrameSource, InfraredImage};
 use crate::measure::{Workbench, view_target};
 use crate::model::SigmaModel;
 use crate::plane::Plane;
@@ -23,6 +23,7 @@ pub struct Field {
     /// fx * baseline, px m.
     pub scale_px_m: f64,
     pub width: usize,
+    pub height: usize,
     /// Pixels of the target, ascending.
     pub pixels: Vec<u32>,
     /// Model's standard deviation of the disparity of each pixel, px.
@@ -44,6 +45,9 @@ pub struct Field {
     pub reference_distance_m: Option<f64>,
     pub temperature_c: Option<f64>,
     pub ambient_lux: Option<f64>,
+    /// Infrared amplitude times the square of the distance over the cosine of the incidence: how
+    /// light the surface is, in the image's own units. Empty without an infrared image.
+    pub light: Vec<f32>,
 }
 
 /// Beyond this many sigmas of the model, or of the view's own residuals where errors the model
@@ -62,7 +66,7 @@ impl Field {
         let target = view_target(view, bench)?;
         let camera = &bench.sensor.camera;
         let mut field = Field::empty(view, bench.sensor, target.plane, target.pixels);
-        field.sigma = field.expected_sigma(&bench.rays, sigma);
+        field.sigma = field.expected_sigma(&bench.rays, sigma, &bench.sensor.code);
         field.spread_px = (target.scale * field.scale_px_m) as f32;
         let mut source = FrameSource::new(camera.width, camera.height);
         let start = view.depth.first().map_or(0.0, |f| f.timestamp);
@@ -72,7 +76,38 @@ impl Field {
             }
         }
         field.close();
+        field.look(view, &bench.rays);
         Ok(field)
+    }
+
+    /// Read the view's first infrared image; one that cannot be read is as none.
+    fn look(&mut self, view: &View, rays: &Rays) {
+        let Some(frame) = view.infrared.first() else { return };
+        let Ok(image) = InfraredImage::read(&frame.path) else { return };
+        if image.width != self.width || image.amplitude.len() < self.width {
+            return;
+        }
+        let n = self.plane.q.normalize();
+        let light = self.pixels.iter().map(|&i| {
+            let (x, y) = rays.at(i as usize);
+            let ray = nalgebra::Vector3::new(x, y, 1.0);
+            let facing = (n.dot(&ray) / ray.norm()).abs().max(0.02);
+            let far = self.plane.depth(x, y).powi(2) * ray.norm_squared();
+            let amplitude = image.amplitude.get(i as usize).copied().unwrap_or(0);
+            (f64::from(amplitude) * far / facing) as f32
+        });
+        self.light = light.collect();
+    }
+
+    /// Values of the target's pixels as an image, NaN elsewhere.
+    pub fn image(&self, values: &[f32]) -> Vec<f32> {
+        let last = self.pixels.last().map_or(0, |&i| i as usize);
+        let rows = self.height.max(last / self.width + 1);
+        let mut image = vec![f32::NAN; self.width * rows];
+        for (&i, &value) in self.pixels.iter().zip(values) {
+            image[i as usize] = value;
+        }
+        image
     }
 
     fn empty(view: &View, sensor: &Sensor, plane: Plane, pixels: Vec<u32>) -> Self {
@@ -83,6 +118,7 @@ impl Field {
             plane,
             scale_px_m: sensor.disparity_px_m().unwrap_or(sensor.camera.fx * KINECT_BASELINE_M),
             width: sensor.camera.width,
+            height: sensor.camera.height,
             pixels,
             sigma: Vec::new(),
             spread_px: 0.0,
@@ -95,16 +131,20 @@ impl Field {
             reference_distance_m: view.notes.reference_distance_m,
             temperature_c: view.notes.temperature_c,
             ambient_lux: view.notes.ambient_lux,
+            light: Vec::new(),
         }
     }
 
     /// Sigma of the disparity at each pixel, px.
-    fn expected_sigma(&self, rays: &Rays, sigma: &SigmaModel) -> Vec<f32> {
+    fn expected_sigma(&self, rays: &Rays, sigma: &SigmaModel, code: &DepthCode) -> Vec<f32> {
         let theta = self.plane.theta();
         let of = |&i: &u32| {
             let (x, y) = rays.at(i as usize);
             let z = self.plane.depth(x, y);
-            (sigma.sigma(z, theta) * self.scale_px_m / (z * z)) as f32
+            // Words are rounded: uniform over a step, in inverse depth.
+            let step = code.step_inverse(z) * self.scale_px_m;
+            let sigma = sigma.axial_sigma(z, theta) * self.scale_px_m / (z * z);
+            (sigma * sigma + step * step / 12.0).sqrt() as f32
         };
         self.pixels.iter().map(of).collect()
     }

@@ -1,30 +1,27 @@
-//! The layers a mismatch may sit in, searched in order: the mean, then the size of the noise.
+//! The layers a mismatch may sit in: the mean, and the size of the noise.
 
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::bias::{self, Reach};
-use super::evidence::Rows;
+use super::bias;
 use super::field::Field;
-use super::search::{Found, Rules, ViewRows, step};
-use super::tiles::{Place, Tile, tiles};
-use super::variance::{self, Sensible};
+use super::reach::Reach;
+use super::search::{Outcome, Rules, ViewData, search};
+use super::smooth::{SMOOTH_PX, high_pass};
+use super::tiles::{SIDE, Tile, tiles};
+use super::variance;
 use crate::camera::{Camera, Rays};
+use crate::model::SigmaModel;
 use crate::rng::Seed;
 use crate::stats::{Correlation, measure_correlation};
+use crate::terms::{Place, Term};
 
 /// The tiles of all views, with how much each view is worth.
-pub struct Layers {
-    pub views: Vec<ViewTiles>,
+pub struct Survey {
+    pub views: Vec<SurveyedView>,
     pub reach: Reach,
-    pub camera: Camera,
-    pub sensible: Sensible,
-    /// What the bias layer explains of each tile, px.
-    pub bias: Vec<Vec<f64>>,
 }
 
-pub struct ViewTiles {
-    pub places: Vec<Place>,
+pub struct SurveyedView {
     pub tiles: Vec<Tile>,
     /// Variance of a pixel's mean in units of the model's, times pixels per independent sample.
     pub inflation: f64,
@@ -35,149 +32,132 @@ pub struct ViewTiles {
 
 /// No more terms than this are looked for in a layer.
 const MOST_TERMS: usize = 8;
-
-impl Layers {
-    pub fn of(fields: &[Field], camera: &Camera, rays: &Rays) -> Self {
-        let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
-        let views: Vec<ViewTiles> = fields
-            .par_iter()
-            .map(|f| {
-                let (inflation, correlation) = inflation(f, camera);
-                let tiles = tiles(f, camera, rays, start);
-                ViewTiles {
-                    places: tiles.iter().map(|t| t.place).collect(),
-                    tiles,
-                    inflation,
-                    correlation,
-                    frames: independent_frames(f, camera),
-                }
-            })
-            .collect();
-        let reach = reach(&views);
-        let bias = views.iter().map(|v| vec![0.0; v.tiles.len()]).collect();
-        let sensible = Sensible {
-            light: false,
-            ambient: fields.iter().any(|f| f.ambient_lux.is_some_and(|a| a > 0.0)),
-        };
-        Layers { views, reach, camera: camera.clone(), sensible, bias }
-    }
-
-    /// Terms of the mean, best first; what they explain is kept in `bias`.
-    pub fn search_bias(&mut self, level: f64, seed: Seed) -> Vec<Found> {
-        // A coefficient nothing is known about is a few px at most.
-        let rules = Rules { level, prior: 0.1, adequacy: ADEQUATE };
-        let mut found = Vec::new();
-        while found.len() < MOST_TERMS {
-            let views = self.mean_rows();
-            let mut candidates = bias::families(&self.camera, &self.reach);
-            candidates.extend(bias::curves(&self.camera, &self.reach));
-            let Some(term) = step(&views, candidates, &rules, seed) else { break };
-            add(&term, &self.views, &mut self.bias);
-            self.level();
-            found.push(term);
-        }
-        found
-    }
-
-    /// Take each view's plane out of what is left: the first fit had bent it towards the bias.
-    fn level(&mut self) {
-        let planes: Vec<Option<[f64; 3]>> = self.mean_rows_of(|rows| rows.nuisances());
-        for ((view, fitted), plane) in self.views.iter().zip(&mut self.bias).zip(planes) {
-            let Some([c, a, b]) = plane else { continue };
-            for (p, f) in view.places.iter().zip(fitted) {
-                *f += c + a * p.x + b * p.y;
-            }
-        }
-    }
-
-    /// The views' mean residuals minus the bias found, about a plane of their own each.
-    fn mean_rows(&self) -> Vec<ViewRows<'_>> {
-        self.views
-            .par_iter()
-            .zip(&self.bias)
-            .filter_map(|(view, fitted)| {
-                let rows = mean_rows(view, fitted)?;
-                Some(ViewRows { places: &view.places, rows })
-            })
-            .collect()
-    }
-
-    fn mean_rows_of<T>(&self, of: impl Fn(&Rows) -> T) -> Vec<Option<T>> {
-        let views = self.views.iter().zip(&self.bias);
-        views.map(|(view, fitted)| mean_rows(view, fitted).map(|rows| of(&rows))).collect()
-    }
-
-    /// Terms of the variance, best first.
-    pub fn search_variance(&self, level: f64, seed: Seed) -> Vec<Found> {
-        // Logarithms of a variance: a factor of e is already much.
-        let rules = Rules { level, prior: 1.0, adequacy: ADEQUATE };
-        let blocks: Vec<Blocks> =
-            self.views.iter().zip(&self.bias).map(|(v, f)| Blocks::of(v, f)).collect();
-        let mut fitted: Vec<Vec<f64>> = blocks.iter().map(|b| vec![0.0; b.places.len()]).collect();
-        let mut found = Vec::new();
-        while found.len() < MOST_TERMS {
-            let level_scatter = view_scatter(&blocks, &fitted);
-            let views: Vec<ViewRows<'_>> =
-                blocks.iter().zip(&fitted).filter_map(|(b, f)| b.rows(f, level_scatter)).collect();
-            let mut candidates = variance::families(&self.sensible);
-            candidates.extend(variance::curves(&self.camera, &self.reach));
-            let Some(term) = step(&views, candidates, &rules, seed) else { break };
-            let mut row = Vec::new();
-            let beta: Vec<f64> = term.gain.beta.iter().copied().collect();
-            for (b, f) in blocks.iter().zip(&mut fitted) {
-                for (p, f) in b.places.iter().zip(f) {
-                    *f += term.candidate.value(&beta, p, &mut row);
-                }
-            }
-            found.push(term);
-        }
-        found
-    }
-}
-
 /// A name that explains less than this share of what a nameless curve explains is not the cause.
 const ADEQUATE: f64 = 0.6;
+/// Precision of a coefficient of the bias: a few px at most.
+pub const BIAS_PRIOR: f64 = 0.1;
+/// Of one of log variance: a factor of e is already much.
+pub const VARIANCE_PRIOR: f64 = 1.0;
 
-fn add(term: &Found, views: &[ViewTiles], fitted: &mut [Vec<f64>]) {
-    let beta: Vec<f64> = term.gain.beta.iter().copied().collect();
-    let mut row = Vec::new();
-    for (view, fitted) in views.iter().zip(fitted) {
-        for (p, f) in view.places.iter().zip(fitted) {
-            *f += term.candidate.value(&beta, p, &mut row);
-        }
+impl Survey {
+    pub fn of(fields: &[Field], camera: &Camera, rays: &Rays) -> Self {
+        let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
+        let mut views: Vec<SurveyedView> = fields
+            .par_iter()
+            .map(|f| {
+                let (inflation, correlation) = inflation(f);
+                let tiles = tiles(f, camera, rays, start);
+                SurveyedView { tiles, inflation, correlation, frames: independent_frames(f) }
+            })
+            .collect();
+        relative_light(&mut views);
+        let reach = Reach::of(views.iter().flat_map(|v| v.tiles.iter()));
+        Survey { views, reach }
+    }
+
+    /// The views' mean residuals, about a plane of their own each.
+    pub fn mean_data(&self) -> Vec<ViewData> {
+        self.views.par_iter().map(mean_data).collect()
+    }
+
+    pub fn search_bias(&self, camera: &Camera, level: f64, seed: Seed) -> Outcome {
+        let rules =
+            Rules { level, prior: BIAS_PRIOR, adequacy: ADEQUATE, most_terms: MOST_TERMS };
+        let mut candidates = bias::families(camera, &self.reach);
+        candidates.extend(bias::curves(camera, &self.reach));
+        let fine = self.mean_data();
+        let coarse: Vec<ViewData> = fine.par_iter().map(coarser).collect();
+        search(&fine, &coarse, &candidates, &rules, seed)
+    }
+
+    /// Log variance over the model's, block by block, once the terms of the bias are taken out.
+    pub fn variance_data(&self, bias: &[Term]) -> Vec<ViewData> {
+        let blocks: Vec<Blocks> = self.views.par_iter().map(|v| Blocks::of(v, bias)).collect();
+        let scatter = view_scatter(&blocks);
+        blocks.into_iter().map(|b| b.data(scatter)).collect()
+    }
+
+    pub fn search_variance(
+        &self,
+        bias: &[Term],
+        sigma: &SigmaModel,
+        camera: &Camera,
+        level: f64,
+        seed: Seed,
+    ) -> Outcome {
+        let rules =
+            Rules { level, prior: VARIANCE_PRIOR, adequacy: ADEQUATE, most_terms: MOST_TERMS };
+        let mut candidates = variance::families(&self.reach, sigma);
+        candidates.extend(variance::curves(camera, &self.reach));
+        let data = self.variance_data(bias);
+        search(&data, &data, &candidates, &rules, seed)
     }
 }
 
-fn mean_rows(view: &ViewTiles, fitted: &[f64]) -> Option<Rows> {
-    let response = view.tiles.iter().zip(fitted).map(|(t, f)| finite(t.mean - f));
-    let weight = |t: &Tile| finite(t.pixels / t.variance / view.inflation);
-    let nuisance = DMatrix::from_fn(view.tiles.len(), 3, |i, q| {
-        let p = &view.places[i];
-        [1.0, p.x, p.y][q]
-    });
-    let weights = view.tiles.iter().map(weight).collect();
-    Rows::new(response.collect(), weights, nuisance, &[0.0; 3])
+/// Light in units of the recording's median.
+fn relative_light(views: &mut [SurveyedView]) {
+    let mut all: Vec<f32> = views
+        .iter()
+        .flat_map(|v| v.tiles.iter().map(|t| t.place.light as f32))
+        .filter(|l| l.is_finite())
+        .collect();
+    let median = f64::from(crate::stats::median_in_place(&mut all));
+    let usable = median > 0.0;
+    for tile in views.iter_mut().flat_map(|v| &mut v.tiles) {
+        let light = tile.place.light / median;
+        tile.place.light = if usable && light.is_finite() { light } else { 1.0 };
+    }
+}
+
+fn mean_data(view: &SurveyedView) -> ViewData {
+    let tiles = &view.tiles;
+    ViewData {
+        places: tiles.iter().map(|t| t.place).collect(),
+        response: tiles.iter().map(|t| finite(t.mean)).collect(),
+        weight: tiles.iter().map(|t| finite(t.pixels / t.variance / view.inflation)).collect(),
+        nuisance: tiles.iter().flat_map(|t| [1.0, t.place.x, t.place.y]).collect(),
+        precision: vec![0.0; 3],
+    }
+}
+
+/// Two tiles by two made one.
+fn coarser(fine: &ViewData) -> ViewData {
+    let side = (2 * SIDE) as f64;
+    let p = fine.precision.len();
+    let mut groups: std::collections::BTreeMap<(u32, u32), Vec<usize>> = Default::default();
+    for (i, place) in fine.places.iter().enumerate() {
+        let key = ((place.v / side) as u32, (place.u / side) as u32);
+        groups.entry(key).or_default().push(i);
+    }
+    let mut coarse = ViewData {
+        places: Vec::with_capacity(groups.len()),
+        response: Vec::with_capacity(groups.len()),
+        weight: Vec::with_capacity(groups.len()),
+        nuisance: Vec::with_capacity(groups.len() * p),
+        precision: fine.precision.clone(),
+    };
+    for members in groups.values() {
+        let weight: f64 = members.iter().map(|&i| fine.weight[i]).sum();
+        let mean = |of: &dyn Fn(usize) -> f64| {
+            if weight > 0.0 {
+                members.iter().map(|&i| fine.weight[i] * of(i)).sum::<f64>() / weight
+            } else {
+                of(members[0])
+            }
+        };
+        let mut place = fine.places[members[0]];
+        place.average(&fine.places, &mean);
+        place.side = side;
+        coarse.places.push(place);
+        coarse.response.push(mean(&|i| fine.response[i]));
+        coarse.weight.push(weight);
+        coarse.nuisance.extend((0..p).map(|q| mean(&|i| fine.nuisance[i * p + q])));
+    }
+    coarse
 }
 
 fn finite(v: f64) -> f64 {
     if v.is_finite() { v } else { 0.0 }
-}
-
-fn reach(views: &[ViewTiles]) -> Reach {
-    let all = || views.iter().flat_map(|v| v.places.iter());
-    let range = |value: fn(&Place) -> f64| {
-        all().map(value).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)])
-    };
-    Reach {
-        disparity: range(|p| p.disparity),
-        right: range(|p| p.right),
-        down: range(|p| p.down),
-        edge: range(|p| p.edge)[1],
-        z: range(|p| p.z),
-        theta: range(|p| p.theta),
-        session: range(|p| p.session_s),
-        light: range(|p| p.light),
-    }
 }
 
 /// Patches large enough for a variance.
@@ -189,19 +169,19 @@ struct Blocks {
 }
 
 /// Side of a block, in tiles: 24 px, seven independent samples under a Kinect's window.
-const BLOCK_TILES: f64 = 6.0;
+const BLOCK_TILES: usize = 6;
 
 impl Blocks {
-    fn of(view: &ViewTiles, bias: &[f64]) -> Self {
+    fn of(view: &SurveyedView, bias: &[Term]) -> Self {
+        let fitted = rough_bias(&view.tiles, bias);
+        let side = (BLOCK_TILES * SIDE) as f64;
         let mut sums: std::collections::BTreeMap<(u32, u32), Sum> = Default::default();
-        let side = BLOCK_TILES * super::tiles::SIDE as f64;
-        for (t, bias) in view.tiles.iter().zip(bias) {
-            if !t.mean.is_finite() {
-                continue;
-            }
+        for (t, bias) in view.tiles.iter().zip(&fitted) {
             let key = ((t.place.v / side) as u32, (t.place.u / side) as u32);
             sums.entry(key).or_default().add(t, *bias);
         }
+        // What the box's mean took with it.
+        let kept = 1.0 - view.correlation.sum / (SMOOTH_PX * SMOOTH_PX) as f64;
         let mut blocks = Blocks { places: Vec::new(), response: Vec::new(), weight: Vec::new() };
         for s in sums.values() {
             // Half a block at least: a few pixels at the rim give no variance.
@@ -211,25 +191,27 @@ impl Blocks {
             let worth = s.n * view.frames / view.correlation.sum_of_squares;
             blocks.places.push(s.place);
             // The mean of log chi^2 / n is about -1 / n.
-            blocks.response.push((s.ratio / s.n).ln() + 1.0 / worth);
+            blocks.response.push((s.ratio / s.n / kept.max(0.5)).ln() + 1.0 / worth);
             blocks.weight.push(0.5 * worth / (1.0 + 1.0 / worth));
         }
         blocks
     }
 
     /// With a level of its own for the view, as uncertain as views scatter.
-    fn rows(&self, fitted: &[f64], level_scatter: f64) -> Option<ViewRows<'_>> {
-        let response = self.response.iter().zip(fitted).map(|(y, f)| y - f).collect();
-        let nuisance = DMatrix::from_element(self.places.len(), 1, 1.0);
-        let precision = 1.0 / level_scatter.max(1e-9);
-        let rows = Rows::new(response, self.weight.clone(), nuisance, &[precision])?;
-        Some(ViewRows { places: &self.places, rows })
+    fn data(self, level_scatter: f64) -> ViewData {
+        ViewData {
+            nuisance: vec![1.0; self.places.len()],
+            places: self.places,
+            response: self.response,
+            weight: self.weight,
+            precision: vec![1.0 / level_scatter],
+        }
     }
 
-    fn level(&self, fitted: &[f64]) -> Option<(f64, f64)> {
+    fn level(&self) -> Option<(f64, f64)> {
         let (mut sum, mut n) = (0.0, 0.0);
-        for ((y, f), w) in self.response.iter().zip(fitted).zip(&self.weight) {
-            sum += w * (y - f);
+        for (y, w) in self.response.iter().zip(&self.weight) {
+            sum += w * y;
             n += w;
         }
         (n > 0.0).then(|| (sum / n, 1.0 / n))
@@ -245,80 +227,108 @@ struct Sum {
 
 impl Sum {
     fn add(&mut self, t: &Tile, bias: f64) {
+        // The rough part of the mean without the rough part of the bias.
+        let rough = t.rough_square - 2.0 * bias * t.rough + bias * bias;
+        let square = t.temporal + rough;
+        if !square.is_finite() {
+            return;
+        }
         if self.n == 0.0 {
             self.place = t.place;
         }
-        let square = t.square - 2.0 * bias * t.mean + bias * bias;
         self.n += t.pixels;
         self.ratio += t.pixels * square / t.variance;
-        // The block lies where its middle tile does; a running mean of the places that matter.
+        // The block lies where its tiles do on average; what is one for the view stays.
         let share = t.pixels / self.n;
-        let mix = |a: f64, b: f64| a + share * (b - a);
+        let mix = |a: &mut f64, b: f64| *a += share * (b - *a);
         let p = &mut self.place;
-        p.u = mix(p.u, t.place.u);
-        p.v = mix(p.v, t.place.v);
-        p.z = mix(p.z, t.place.z);
-        p.disparity = mix(p.disparity, t.place.disparity);
-        p.radius = mix(p.radius, t.place.radius);
-        p.variance = mix(p.variance, t.place.variance);
-        p.edge = mix(p.edge, t.place.edge);
-        p.light = mix(p.light, t.place.light);
+        mix(&mut p.u, t.place.u);
+        mix(&mut p.v, t.place.v);
+        mix(&mut p.x, t.place.x);
+        mix(&mut p.y, t.place.y);
+        mix(&mut p.z, t.place.z);
+        mix(&mut p.disparity, t.place.disparity);
+        mix(&mut p.radius, t.place.radius);
+        mix(&mut p.right, t.place.right);
+        mix(&mut p.down, t.place.down);
+        mix(&mut p.variance, t.place.variance);
+        mix(&mut p.edge, t.place.edge);
+        mix(&mut p.light, t.place.light);
     }
 }
 
-/// Variance of the views' own levels beyond what their samples explain (DerSimonian and Laird's
-/// moment estimate).
-fn view_scatter(blocks: &[Blocks], fitted: &[Vec<f64>]) -> f64 {
-    let levels: Vec<(f64, f64)> =
-        blocks.iter().zip(fitted).filter_map(|(b, f)| b.level(f)).collect();
-    let n = levels.len() as f64;
-    if n < 3.0 {
-        return 0.0;
+/// The bias at the tiles, without what is smooth, px.
+fn rough_bias(tiles: &[Tile], bias: &[Term]) -> Vec<f64> {
+    if bias.is_empty() {
+        return vec![0.0; tiles.len()];
     }
-    let mean = levels.iter().map(|l| l.0).sum::<f64>() / n;
-    let scatter = levels.iter().map(|l| (l.0 - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    let sampling = levels.iter().map(|l| l.1).sum::<f64>() / n;
-    (scatter - sampling).max(0.0)
+    let side = SIDE as f64;
+    let across = tiles.iter().map(|t| (t.place.u / side) as usize + 1).max().unwrap_or(1);
+    let down = tiles.iter().map(|t| (t.place.v / side) as usize + 1).max().unwrap_or(1);
+    let at = |t: &Tile| (t.place.v / side) as usize * across + (t.place.u / side) as usize;
+    let mut image = vec![f32::NAN; across * down];
+    let mut row = Vec::new();
+    for t in tiles {
+        image[at(t)] = bias.iter().map(|b| b.value(&t.place, &mut row)).sum::<f64>() as f32;
+    }
+    let rough = high_pass(&image, across, down, SMOOTH_PX / SIDE);
+    tiles.iter().map(|t| f64::from(rough[at(t)])).collect()
+}
+
+/// A model's sigma is not known better than this from view to view, in log variance.
+const MODEL_TOLERANCE: f64 = 0.05;
+
+/// Variance of the views' own levels beyond what their samples explain (DerSimonian and Laird's
+/// moment estimate), about a line in log z: what a law of the distance explains is no scatter.
+fn view_scatter(blocks: &[Blocks]) -> f64 {
+    let levels: Vec<(f64, f64, f64)> = blocks
+        .iter()
+        .filter_map(|b| b.level().map(|(y, v)| (b.places[0].z.ln(), y, v)))
+        .collect();
+    let floor = MODEL_TOLERANCE * MODEL_TOLERANCE;
+    let n = levels.len() as f64;
+    if n < 4.0 {
+        return floor;
+    }
+    let (x0, y0) = levels.iter().fold((0.0, 0.0), |(x, y), l| (x + l.0 / n, y + l.1 / n));
+    let (mut xx, mut xy) = (1e-9, 0.0);
+    for l in &levels {
+        xx += (l.0 - x0).powi(2);
+        xy += (l.0 - x0) * (l.1 - y0);
+    }
+    let slope = xy / xx;
+    let scatter =
+        levels.iter().map(|l| (l.1 - y0 - slope * (l.0 - x0)).powi(2)).sum::<f64>() / (n - 2.0);
+    let sampling = levels.iter().map(|l| l.2).sum::<f64>() / n;
+    (scatter - sampling).max(floor)
 }
 
 /// How much less a pixel's mean is worth than the model says: its variance relative to the
 /// model's, and how many pixels make one independent sample. Measured on what is left after a
 /// smooth error is taken out.
-fn inflation(field: &Field, camera: &Camera) -> (f64, Correlation) {
-    let rough = rough(&field.mean, field, camera);
+fn inflation(field: &Field) -> (f64, Correlation) {
+    let rough = rough(&field.mean, field);
     let (mut sum, mut n) = (0.0, 0.0);
     for r in rough.iter().filter(|r| r.is_finite()) {
         sum += f64::from(*r).powi(2);
         n += 1.0;
     }
-    let correlation = measure_correlation(&rough, camera.width);
+    let correlation = measure_correlation(&rough, field.width);
     let inflation = if n > 0.0 { (sum / n * correlation.sum).max(1e-6) } else { f64::INFINITY };
     (inflation, correlation)
 }
 
 /// Whitened residuals as an image, without what is smooth.
-fn rough(residuals: &[f32], field: &Field, camera: &Camera) -> Vec<f32> {
-    let mut image = vec![f32::NAN; camera.pixels()];
-    for (k, &i) in field.pixels.iter().enumerate() {
-        image[i as usize] = residuals[k] / field.sigma[k];
-    }
-    super::smooth::high_pass(&image, camera.width, camera.height)
+fn rough(residuals: &[f32], field: &Field) -> Vec<f32> {
+    let whitened: Vec<f32> = residuals.iter().zip(&field.sigma).map(|(r, s)| r / s).collect();
+    high_pass(&field.image(&whitened), field.width, field.height, SMOOTH_PX)
 }
 
 /// F frames whose noise is the same by a share rho are worth 1 / (rho^2 + (1 - rho^2) / F).
-fn independent_frames(field: &Field, camera: &Camera) -> f64 {
+fn independent_frames(field: &Field) -> f64 {
     let [first, second, ..] = field.first.as_slice() else { return 1.0 };
-    let (a, b) = (rough(first, field, camera), rough(second, field, camera));
-    let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
-    for (&a, &b) in a.iter().zip(&b) {
-        let (a, b) = (f64::from(a), f64::from(b));
-        if (a * b).is_finite() {
-            ab += a * b;
-            aa += a * a;
-            bb += b * b;
-        }
-    }
-    let rho = if aa * bb > 0.0 { (ab / (aa * bb).sqrt()).clamp(0.0, 1.0) } else { 0.0 };
+    let rho = super::structure::same_pixel(&rough(first, field), &rough(second, field));
+    let rho = if rho.is_finite() { rho.clamp(0.0, 1.0) } else { 0.0 };
     let frames = field.frames.len() as f64;
     1.0 / (rho * rho + (1.0 - rho * rho) / frames)
 }

@@ -57,7 +57,7 @@ pub fn laws(fields: &[Field]) -> Vec<Law> {
                 }
             })
             .collect();
-        if let (Some(gain), Some(null)) = (gain(&views, PRIOR), Null::of(&views, PRIOR)) {
+        if let (Some(gain), Some(null)) = (gain(&views, PRIOR), Null::of(&views, 0, PRIOR)) {
             laws.push(Law { family, axis, settled, gain, null });
         }
     };

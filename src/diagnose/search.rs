@@ -5,29 +5,22 @@ use rayon::prelude::*;
 
 use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain, Null, Rows, gain};
-use super::tiles::Place;
+use super::tiles::SIDE;
 use crate::rng::Seed;
+use crate::terms::{Basis, Place};
 
-/// One view's places and its data there.
-pub struct ViewRows<'a> {
-    pub places: &'a [Place],
-    pub rows: Rows,
+/// One view's samples.
+pub struct ViewData {
+    pub places: Vec<Place>,
+    pub response: Vec<f64>,
+    pub weight: Vec<f64>,
+    /// Row-major, as many columns as `precision` has entries.
+    pub nuisance: Vec<f64>,
+    /// Holds each nuisance to zero; 0 leaves it free.
+    pub precision: Vec<f64>,
 }
 
-/// A term that was accepted.
-pub struct Found {
-    pub candidate: Candidate,
-    pub gain: Gain,
-    /// Gain of the best family and the best nameless curve at the same step, nats.
-    pub best_family: f64,
-    pub best_curve: f64,
-    /// What noise alone brings at most, nats, at the step's error rate.
-    pub threshold: f64,
-    /// Families by their gain at this step, best first, one entry each.
-    pub ranking: Vec<(&'static str, f64)>,
-}
-
-/// How a step decides.
+/// How a search decides.
 #[derive(Debug, Clone, Copy)]
 pub struct Rules {
     /// Chance that noise alone is taken for a term.
@@ -36,93 +29,386 @@ pub struct Rules {
     pub prior: f64,
     /// A name must explain this share of what the best curve does.
     pub adequacy: f64,
+    pub most_terms: usize,
 }
 
-/// Simulations of the null at each step.
-const REPLICATES: u64 = 1000;
+/// A family beside the one that was chosen.
+#[derive(Debug, Clone)]
+pub struct Rival {
+    pub family: &'static str,
+    pub basis: Basis,
+    /// Nats over the terms before.
+    pub gain: f64,
+    /// How far behind the chosen one, in standard errors over the views.
+    pub behind: f64,
+}
+
+/// A term that was accepted.
+#[derive(Debug, Clone)]
+pub struct Chosen {
+    pub candidate: Candidate,
+    /// Nats over the terms before it.
+    pub gain: f64,
+    /// The best nameless curve's at the same step, nats.
+    pub best_curve: f64,
+    /// All families at this step, best first, the chosen one too where it has a name.
+    pub rivals: Vec<Rival>,
+    /// Chance that noise brings as much anywhere in this layer.
+    pub p: f64,
+}
+
+/// All terms of a layer with their common fit.
+pub struct Outcome {
+    pub chosen: Vec<Chosen>,
+    /// Fit of all terms at once.
+    pub fit: Option<Gain>,
+    pub evidence: Vec<Evidence>,
+    pub noise: NoiseGains,
+}
+
+impl Outcome {
+    /// Coefficients of term number `k` in the common fit: the first and the one after the last.
+    pub fn span(&self, k: usize) -> std::ops::Range<usize> {
+        let first = self.chosen[..k].iter().map(|c| c.candidate.basis.count()).sum();
+        first..first + self.chosen[k].candidate.basis.count()
+    }
+
+    pub fn coefficients(&self, k: usize) -> Vec<f64> {
+        let span = self.span(k);
+        self.fit.as_ref().map_or_else(Vec::new, |f| f.beta.as_slice()[span].to_vec())
+    }
+}
+
 /// Of families that predict as well as the best, the one with the fewest columns is meant.
 const AS_GOOD_NATS: f64 = 2.0;
+/// A later term must bring this share of what the first brought: what is less is the first one's
+/// own shape, badly met.
+const LEAST_SHARE: f64 = 0.004;
 
-/// The best candidate, if it brings more than noise can.
-pub fn step(
-    views: &[ViewRows<'_>],
-    candidates: Vec<Candidate>,
+/// Search a layer. `coarse` has the same views in larger patches, for shapes that do not change
+/// within them.
+pub fn search(
+    fine: &[ViewData],
+    coarse: &[ViewData],
+    candidates: &[Candidate],
     rules: &Rules,
     seed: Seed,
-) -> Option<Found> {
-    let judged: Vec<Option<(Null, Gain)>> = candidates
-        .par_iter()
-        .map(|c| {
-            let e = evidence(views, c);
-            Some((Null::of(&e, rules.prior)?, gain(&e, rules.prior)?))
+) -> Outcome {
+    let mut layer = Layer { fine, coarse, candidates, rules, noise: None, seed };
+    let mut chosen: Vec<Chosen> = Vec::new();
+    while chosen.len() < rules.most_terms {
+        let Some(next) = layer.step(&chosen) else { break };
+        if chosen.first().is_some_and(|first| next.gain < LEAST_SHARE * first.gain) {
+            break;
+        }
+        chosen.push(next);
+    }
+    layer.look_back(&mut chosen);
+    let evidence = layer.evidence_of(&bases(&chosen));
+    let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
+    let noise = layer.noise.unwrap_or_default();
+    Outcome { chosen, fit, evidence, noise }
+}
+
+/// The greatest gains that noise alone brings, ascending, nats.
+#[derive(Debug, Clone, Default)]
+pub struct NoiseGains(Vec<f64>);
+
+/// Simulations of the null.
+const REPLICATES: u64 = 600;
+/// Beyond this quantile the tail of a log likelihood falls as an exponential.
+const TAIL: f64 = 0.1;
+
+impl NoiseGains {
+    fn of(nulls: &[&Null], seed: Seed) -> Self {
+        let mut greatest: Vec<f64> = (0..REPLICATES)
+            .into_par_iter()
+            .map(|replicate| {
+                let mut rng = seed.stream(&format!("diagnose/null/{replicate}"));
+                nulls.iter().map(|null| null.draw(&mut rng)).fold(0.0, f64::max)
+            })
+            .collect();
+        greatest.sort_by(f64::total_cmp);
+        NoiseGains(greatest)
+    }
+
+    fn cut(&self) -> (f64, f64) {
+        let cut = self.0[((self.0.len() - 1) as f64 * (1.0 - TAIL)) as usize];
+        let tail: Vec<f64> = self.0.iter().filter(|g| **g > cut).map(|g| g - cut).collect();
+        (cut, (tail.iter().sum::<f64>() / tail.len().max(1) as f64).max(0.5))
+    }
+
+    /// Exceeded with probability `level`.
+    pub fn threshold(&self, level: f64) -> f64 {
+        if self.0.is_empty() {
+            return f64::INFINITY;
+        }
+        let (cut, mean_excess) = self.cut();
+        cut + mean_excess * (TAIL / level).ln().max(0.0)
+    }
+
+    /// Chance of exceeding `gain`.
+    pub fn p(&self, gain: f64) -> f64 {
+        if self.0.is_empty() {
+            return 1.0;
+        }
+        let (cut, mean_excess) = self.cut();
+        if gain > cut {
+            return TAIL * (-(gain - cut) / mean_excess).exp();
+        }
+        let above = self.0.len() - self.0.partition_point(|g| *g < gain);
+        (above as f64 / self.0.len() as f64).max(TAIL)
+    }
+}
+
+/// A view made ready for the candidates.
+struct Prepared<'a> {
+    fine: (&'a [Place], Rows),
+    coarse: (&'a [Place], Rows),
+    /// By columns of tiles, with a place for each.
+    columns: (Vec<Place>, Rows),
+}
+
+struct Layer<'a> {
+    fine: &'a [ViewData],
+    coarse: &'a [ViewData],
+    candidates: &'a [Candidate],
+    rules: &'a Rules,
+    noise: Option<NoiseGains>,
+    seed: Seed,
+}
+
+struct Judged {
+    gain: Gain,
+    null: Null,
+}
+
+fn bases(chosen: &[Chosen]) -> Vec<&Basis> {
+    bases_where(chosen, |_| true)
+}
+
+fn bases_where(chosen: &[Chosen], which: impl Fn(&Candidate) -> bool) -> Vec<&Basis> {
+    chosen.iter().map(|c| &c.candidate).filter(|c| which(c)).map(|c| &c.basis).collect()
+}
+
+impl<'a> Layer<'a> {
+    /// Evidence of the views on these terms together.
+    fn evidence_of(&self, terms: &[&Basis]) -> Vec<Evidence> {
+        self.coarse
+            .par_iter()
+            .filter_map(|v| Some(rows(v, terms, &[])?.reduce(0, |_, _| ())))
+            .collect()
+    }
+
+    /// Terms with a name are fitted anew beside every candidate; those without have many columns
+    /// and are taken out as they were fitted.
+    fn prepare(&self, chosen: &[Chosen]) -> Vec<Prepared<'a>> {
+        let named: Vec<&Basis> = bases_where(chosen, |c| c.family.is_some());
+        let nameless: Vec<&Basis> = bases_where(chosen, |c| c.family.is_none());
+        let mut settled: Vec<(&Basis, Vec<f64>)> = Vec::new();
+        if !nameless.is_empty() {
+            let all: Vec<&Basis> = nameless.iter().chain(&named).copied().collect();
+            let fit = gain(&self.evidence_of(&all), self.rules.prior);
+            let beta = fit.map_or_else(Vec::new, |f| f.beta.as_slice().to_vec());
+            let mut rest = beta.as_slice();
+            for basis in nameless {
+                if rest.len() >= basis.count() {
+                    let (mine, others) = rest.split_at(basis.count());
+                    settled.push((basis, mine.to_vec()));
+                    rest = others;
+                }
+            }
+        }
+        let pairs: Vec<(&ViewData, &ViewData)> = self.fine.iter().zip(self.coarse).collect();
+        pairs.par_iter().filter_map(|(f, c)| prepare(f, c, &named, &settled)).collect()
+    }
+
+    /// The best candidate beside `chosen`, if it brings more than noise can.
+    fn step(&mut self, chosen: &[Chosen]) -> Option<Chosen> {
+        let views = self.prepare(chosen);
+        let before: Vec<Evidence> =
+            views.iter().map(|v| v.coarse.1.reduce(0, |_, _| ())).collect();
+        let m = before.first()?.b.len();
+        let base = if m > 0 {
+            gain(&before, self.rules.prior)?
+        } else {
+            let none = nalgebra::DVector::zeros(0);
+            Gain {
+                total: 0.0,
+                by_view: vec![0.0; views.len()],
+                beta: none,
+                covariance: nalgebra::DMatrix::zeros(0, 0),
+            }
+        };
+        let judged: Vec<Option<Judged>> = self
+            .candidates
+            .par_iter()
+            .map(|c| {
+                let evidence: Vec<Evidence> = views.iter().map(|v| v.evidence(&c.basis)).collect();
+                let null = Null::of(&evidence, m, self.rules.prior)?;
+                let mut gain = gain(&evidence, self.rules.prior)?;
+                gain.total -= base.total;
+                gain.by_view.iter_mut().zip(&base.by_view).for_each(|(g, b)| *g -= b);
+                Some(Judged { gain, null })
+            })
+            .collect();
+        if self.noise.is_none() {
+            let nulls: Vec<&Null> = judged.iter().flatten().map(|j| &j.null).collect();
+            self.noise = Some(NoiseGains::of(&nulls, self.seed));
+        }
+        let noise = self.noise.as_ref()?;
+        self.choose(&judged, noise)
+    }
+
+    fn choose(&self, judged: &[Option<Judged>], noise: &NoiseGains) -> Option<Chosen> {
+        let total = |i: usize| judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| j.gain.total);
+        // Views that scatter more than their noise says count for less.
+        let safe = |i: usize| judged[i].as_ref().map_or(0.0, |j| j.gain.total / j.null.dispersion);
+        let ranked = |named: bool| {
+            let mut order: Vec<usize> = (0..self.candidates.len())
+                .filter(|&i| self.candidates[i].family.is_some() == named)
+                .collect();
+            order.sort_by(|&a, &b| total(b).total_cmp(&total(a)));
+            order
+        };
+        let (families, curves) = (ranked(true), ranked(false));
+        let threshold = noise.threshold(self.rules.level);
+        self.trace(judged, threshold);
+        let best_curve = curves.first().map_or(f64::NEG_INFINITY, |&i| total(i));
+        let best_family = families.first().map_or(f64::NEG_INFINITY, |&i| total(i));
+        let named = families
+            .iter()
+            .copied()
+            .filter(|&i| total(i) > best_family - AS_GOOD_NATS)
+            .min_by_key(|&i| self.candidates[i].basis.count())
+            .filter(|&i| safe(i) > threshold && total(i) > self.rules.adequacy * best_curve);
+        let winner =
+            named.or_else(|| curves.first().copied().filter(|&i| safe(i) > threshold))?;
+        let won = &judged[winner].as_ref()?.gain;
+        let mut rivals: Vec<Rival> = Vec::new();
+        for &i in &families {
+            let (Some(family), Some(j)) = (self.candidates[i].family, &judged[i]) else { continue };
+            if rivals.iter().all(|r| r.family != family) {
+                rivals.push(Rival {
+                    family,
+                    basis: self.candidates[i].basis.clone(),
+                    gain: total(i),
+                    behind: behind(&won.by_view, &j.gain.by_view),
+                });
+            }
+        }
+        Some(Chosen {
+            candidate: self.candidates[winner].clone(),
+            gain: total(winner),
+            best_curve,
+            rivals,
+            p: noise.p(safe(winner)),
         })
-        .collect();
-    let nulls: Vec<&Null> = judged.iter().flatten().map(|j| &j.0).collect();
-    let threshold = threshold(&nulls, rules.level, seed);
-    let total = |i: usize| judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| j.1.total);
-    let ranked = |named: bool| {
-        let mut order: Vec<usize> =
-            (0..candidates.len()).filter(|&i| candidates[i].family.is_some() == named).collect();
-        order.sort_by(|&a, &b| total(b).total_cmp(&total(a)));
-        order
-    };
-    let (families, curves) = (ranked(true), ranked(false));
-    let best_curve = curves.first().map_or(f64::NEG_INFINITY, |&i| total(i));
-    let best_family = families.first().map_or(f64::NEG_INFINITY, |&i| total(i));
-    trace(&candidates, &total, threshold);
-    let named = families
-        .iter()
-        .copied()
-        .filter(|&i| total(i) > best_family - AS_GOOD_NATS)
-        .min_by_key(|&i| candidates[i].count)
-        .filter(|&i| total(i) > threshold && total(i) > rules.adequacy * best_curve);
-    let winner = named.or_else(|| curves.first().copied().filter(|&i| total(i) > threshold))?;
-    let mut ranking: Vec<(&'static str, f64)> = Vec::new();
-    for &i in &families {
-        let Some(family) = candidates[i].family else { continue };
-        if ranking.iter().all(|r| r.0 != family) {
-            ranking.push((family, total(i)));
+    }
+
+    /// With a new term in, are the ones before it still what fits best, and needed at all?
+    fn look_back(&mut self, chosen: &mut Vec<Chosen>) {
+        let mut k = 0;
+        while k + 1 < chosen.len() {
+            let mut others = chosen.clone();
+            let old = others.remove(k);
+            match self.step(&others) {
+                None => {
+                    chosen.remove(k);
+                }
+                Some(new) => {
+                    if new.candidate.basis != old.candidate.basis {
+                        chosen[k] = new;
+                    } else {
+                        chosen[k].rivals = new.rivals;
+                    }
+                    k += 1;
+                }
+            }
         }
     }
-    let gain = judged.into_iter().nth(winner)??.1;
-    let candidate = candidates.into_iter().nth(winner)?;
-    Some(Found { candidate, gain, best_family, best_curve, threshold, ranking })
-}
 
-fn evidence(views: &[ViewRows<'_>], candidate: &Candidate) -> Vec<Evidence> {
-    let reduce = |view: &ViewRows<'_>| {
-        view.rows.reduce(candidate.count, |i, g| (candidate.columns)(&view.places[i], g))
-    };
-    views.iter().map(reduce).collect()
-}
-
-fn trace(candidates: &[Candidate], total: &dyn Fn(usize) -> f64, threshold: f64) {
-    if std::env::var_os("KINOISE_TRACE").is_none() {
-        return;
-    }
-    let mut order: Vec<usize> = (0..candidates.len()).collect();
-    order.sort_by(|&a, &b| total(b).total_cmp(&total(a)));
-    eprintln!("threshold {threshold:.1}");
-    for &i in order.iter().take(8) {
-        let c = &candidates[i];
-        eprintln!("  {:9.1}  {:?} {} {:?}", total(i), c.family, c.axis, c.settled);
+    fn trace(&self, judged: &[Option<Judged>], threshold: f64) {
+        if std::env::var_os("KINOISE_TRACE").is_none() {
+            return;
+        }
+        let total = |i: usize| judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| j.gain.total);
+        let mut order: Vec<usize> = (0..self.candidates.len()).collect();
+        order.sort_by(|&a, &b| total(b).total_cmp(&total(a)));
+        eprintln!("threshold {threshold:.1}");
+        for &i in order.iter().take(8) {
+            let c = &self.candidates[i];
+            let text = format!("{:?}", c.basis);
+            let dispersion = judged[i].as_ref().map_or(0.0, |j| j.null.dispersion);
+            let text = &text[..text.len().min(90)];
+            eprintln!("  {:9.1} /{dispersion:5.2} {:?} {text}", total(i), c.family);
+        }
     }
 }
 
-/// The greatest gain over all candidates that noise alone exceeds with probability `level`.
-fn threshold(nulls: &[&Null], level: f64, seed: Seed) -> f64 {
-    let mut greatest: Vec<f64> = (0..REPLICATES)
-        .into_par_iter()
-        .map(|replicate| {
-            let mut rng = seed.stream(&format!("diagnose/null/{replicate}"));
-            nulls.iter().map(|null| null.draw(&mut rng)).fold(0.0, f64::max)
-        })
-        .collect();
-    greatest.sort_by(f64::total_cmp);
-    // Beyond the cut the tail of a log likelihood falls as an exponential.
-    const TAIL: f64 = 0.1;
-    let cut = greatest[((REPLICATES - 1) as f64 * (1.0 - TAIL)) as usize];
-    let tail: Vec<f64> = greatest.iter().filter(|g| **g > cut).map(|g| g - cut).collect();
-    let mean_excess = tail.iter().sum::<f64>() / tail.len().max(1) as f64;
-    cut + mean_excess * (TAIL / level).ln().max(0.0)
+/// Mean difference over the views by its standard error.
+fn behind(winner: &[f64], rival: &[f64]) -> f64 {
+    let n = winner.len() as f64;
+    let differences = || winner.iter().zip(rival).map(|(w, r)| w - r);
+    let mean = differences().sum::<f64>() / n;
+    let variance = differences().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    if variance > 0.0 { mean / (variance / n).sqrt() } else { 0.0 }
+}
+
+/// A view's rows with its nuisances and the terms beside, what is settled taken out.
+fn rows(view: &ViewData, beside: &[&Basis], settled: &[(&Basis, Vec<f64>)]) -> Option<Rows> {
+    let p = view.precision.len();
+    let width = p + beside.iter().map(|b| b.count()).sum::<usize>();
+    let mut columns = vec![0.0; view.places.len() * width];
+    for (i, row) in columns.chunks_exact_mut(width).enumerate() {
+        row[..p].copy_from_slice(&view.nuisance[i * p..][..p]);
+        let mut rest = &mut row[p..];
+        for basis in beside {
+            let (mine, others) = rest.split_at_mut(basis.count());
+            basis.fill(&view.places[i], mine);
+            rest = others;
+        }
+    }
+    let mut response = view.response.clone();
+    let mut scratch = Vec::new();
+    for (basis, beta) in settled {
+        for (y, place) in response.iter_mut().zip(&view.places) {
+            *y -= basis.value(beta, place, &mut scratch);
+        }
+    }
+    Rows::new(response, view.weight.clone(), columns, width, &view.precision)
+}
+
+fn prepare<'a>(
+    fine: &'a ViewData,
+    coarse: &'a ViewData,
+    beside: &[&Basis],
+    settled: &[(&Basis, Vec<f64>)],
+) -> Option<Prepared<'a>> {
+    let rows_fine = rows(fine, beside, settled)?;
+    let places = &fine.places;
+    let key = |i: usize| (places[i].u / SIDE as f64) as usize;
+    let count = (0..places.len()).map(|i| key(i) + 1).max().unwrap_or(0);
+    let mut column_places = vec![Place::default(); count];
+    for (i, place) in places.iter().enumerate() {
+        column_places[key(i)] = *place;
+    }
+    Some(Prepared {
+        columns: (column_places, rows_fine.grouped(count, key)),
+        fine: (places, rows_fine),
+        coarse: (&coarse.places, rows(coarse, beside, settled)?),
+    })
+}
+
+impl Prepared<'_> {
+    fn evidence(&self, basis: &Basis) -> Evidence {
+        let (places, rows): (&[Place], &Rows) = if basis.of_column_alone() {
+            (&self.columns.0, &self.columns.1)
+        } else if basis.is_fine() {
+            (self.fine.0, &self.fine.1)
+        } else {
+            (self.coarse.0, &self.coarse.1)
+        };
+        rows.reduce(basis.count(), |i, g| basis.fill(&places[i], g))
+    }
 }

@@ -1,10 +1,10 @@
 //! Taking out what is smooth.
 
 /// Side of the box whose mean is taken out, px: several windows, and less than a lens's bowl.
-const SMOOTH_PX: usize = 49;
+pub const SMOOTH_PX: usize = 49;
 
-/// Minus its mean over a box, where at least a quarter of the box is there; NaN elsewhere.
-pub fn high_pass(image: &[f32], width: usize, height: usize) -> Vec<f32> {
+/// Minus its mean over a box of `side` px, where at least a quarter of the box is there; NaN elsewhere.
+pub fn high_pass(image: &[f32], width: usize, height: usize, side: usize) -> Vec<f32> {
     // Summed-area tables of value and presence.
     let mut sums = vec![(0f64, 0f64); (width + 1) * (height + 1)];
     for v in 0..height {
@@ -19,7 +19,7 @@ pub fn high_pass(image: &[f32], width: usize, height: usize) -> Vec<f32> {
             sums[(v + 1) * (width + 1) + u + 1] = (above.0 + row.0, above.1 + row.1);
         }
     }
-    let half = SMOOTH_PX / 2;
+    let half = side / 2;
     (0..width * height)
         .map(|i| {
             let (u, v) = (i % width, i / width);
@@ -30,7 +30,7 @@ pub fn high_pass(image: &[f32], width: usize, height: usize) -> Vec<f32> {
                 f(at(u1, v1)) - f(at(u0, v1)) - f(at(u1, v0)) + f(at(u0, v0))
             };
             let n = box_of(|s| s.1);
-            if 4.0 * n < (SMOOTH_PX * SMOOTH_PX) as f64 {
+            if 4.0 * n < (side * side) as f64 {
                 return f32::NAN;
             }
             image[i] - (box_of(|s| s.0) / n) as f32

@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::field::Field;
-use super::smooth::high_pass;
+use super::smooth::{SMOOTH_PX, high_pass};
 use crate::camera::Camera;
 use crate::stats::measure_correlation;
 
@@ -72,7 +72,7 @@ fn image(field: &Field, residuals: &[f32], camera: &Camera) -> Vec<f32> {
     for (k, &i) in field.pixels.iter().enumerate() {
         image[i as usize] = residuals[k];
     }
-    high_pass(&image, camera.width, camera.height)
+    high_pass(&image, camera.width, camera.height, SMOOTH_PX)
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {

@@ -3,44 +3,10 @@
 use nalgebra::Vector3;
 
 use super::field::Field;
+use super::smooth::{SMOOTH_PX, high_pass};
 use crate::camera::{Camera, Rays};
 use crate::scene::TargetFrame;
-
-/// Where a tile lies, on every axis that a mismatch may follow.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Place {
-    /// Column and row of the tile's middle, px.
-    pub u: f64,
-    pub v: f64,
-    /// Ray of the middle.
-    pub x: f64,
-    pub y: f64,
-    /// Disparity and depth of the plane, px and m.
-    pub disparity: f64,
-    pub z: f64,
-    /// Disparity gradient of the plane along u and v, px per px.
-    pub slope: [f64; 2],
-    /// From the principal point over the farthest corner's, 0 to 1.
-    pub radius: f64,
-    /// On the target: right and down of its centroid, m.
-    pub right: f64,
-    pub down: f64,
-    /// Distance of the plane from the camera, m.
-    pub rho: f64,
-    /// To the nearest pixel off the target inside the picture, px.
-    pub edge: f64,
-    /// Tilt and its direction, rad.
-    pub theta: f64,
-    pub azimuth: f64,
-    /// Since the first view, s.
-    pub session_s: f64,
-    /// Infrared amplitude over the recording's median; 1 where there is none.
-    pub light: f64,
-    /// Ambient light over the recording's mean; 0 where it is not known.
-    pub ambient: f64,
-    /// Model's variance of a pixel's disparity, px^2.
-    pub variance: f64,
-}
+use crate::terms::{Place, corner_radius};
 
 /// Mean residual of a patch of pixels.
 #[derive(Debug, Clone, Copy)]
@@ -48,8 +14,11 @@ pub struct Tile {
     pub place: Place,
     /// Mean residual, px.
     pub mean: f64,
-    /// Mean square of single frames' residuals, px^2.
-    pub square: f64,
+    /// Mean residual without what is smooth, and its mean square, px and px^2.
+    pub rough: f64,
+    pub rough_square: f64,
+    /// Mean variance of a pixel over the frames, px^2.
+    pub temporal: f64,
     /// Model's variance of a pixel, px^2.
     pub variance: f64,
     /// Pixels with a mean.
@@ -71,6 +40,7 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
     let rows = camera.height.div_ceil(SIDE);
     let mut sums = vec![Sums::default(); across * rows];
     let frames = field.frames.len() as f64;
+    let rough = high_pass(&field.image(&field.mean), camera.width, camera.height, SMOOTH_PX);
     for (k, &i) in field.pixels.iter().enumerate() {
         let (u, v) = (i as usize % camera.width, i as usize / camera.width);
         let s = &mut sums[v / SIDE * across + u / SIDE];
@@ -81,7 +51,14 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
         if mean.is_finite() {
             s.n += 1.0;
             s.mean += mean;
-            s.square += square;
+            s.temporal += square - mean * mean;
+            let rough = f64::from(rough[i as usize]);
+            if rough.is_finite() {
+                s.rough_n += 1.0;
+                s.rough += rough;
+                s.rough_square += rough * rough;
+            }
+            s.light += f64::from(field.light.get(k).copied().unwrap_or(1.0));
             s.variance += f64::from(field.sigma[k]).powi(2);
         }
     }
@@ -100,7 +77,11 @@ struct Sums {
     edge: f64,
     n: f64,
     mean: f64,
-    square: f64,
+    temporal: f64,
+    rough_n: f64,
+    rough: f64,
+    rough_square: f64,
+    light: f64,
     variance: f64,
     asked: f64,
     missing: f64,
@@ -132,6 +113,7 @@ impl Sums {
             place: Place {
                 u,
                 v,
+                side: SIDE as f64,
                 x,
                 y,
                 disparity: field.scale_px_m / z,
@@ -145,27 +127,21 @@ impl Sums {
                 theta: plane.theta(),
                 azimuth: plane.azimuth(),
                 session_s: field.time_s - session_start,
-                light: 1.0,
+                temperature_c: field.temperature_c.unwrap_or(0.0),
+                light: self.light / self.n,
                 ambient: field.ambient_lux.unwrap_or(0.0),
                 variance: self.variance / self.n,
             },
             mean: self.mean / self.n,
-            square: self.square / self.n,
+            rough: self.rough / self.rough_n,
+            rough_square: self.rough_square / self.rough_n,
+            temporal: self.temporal / self.n,
             variance: self.variance / self.n,
             pixels: self.n,
             missing: self.missing / self.asked,
             asked: self.asked,
         }
     }
-}
-
-/// Of the farthest corner from the principal point, px.
-pub fn corner_radius(camera: &Camera) -> f64 {
-    let (right, bottom) = (camera.width as f64 - 1.0, camera.height as f64 - 1.0);
-    [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)]
-        .into_iter()
-        .map(|(u, v)| f64::hypot(u - camera.cx, v - camera.cy))
-        .fold(0.0, f64::max)
 }
 
 /// The target's own coordinates, begun at the centroid of its pixels.

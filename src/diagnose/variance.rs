@@ -1,75 +1,107 @@
 //! What may change the size of the noise: candidates for the logarithm of the variance.
 
-use super::candidate::Candidate;
-use super::tiles::Place;
+use super::candidate::{Candidate, RECALIBRATE};
+use super::reach::Reach;
 use crate::camera::Camera;
+use crate::model::SigmaModel;
+use crate::terms::{Basis, Over, TABLE, Times};
+
+/// Where an excess exponent is counted from, m: the middle (in ratio) of a Kinect's 1 to 4 m.
+const PIVOT_M: f64 = 2.0;
 
 /// All named variance families.
-pub fn families(sensible: &Sensible) -> Vec<Candidate> {
+pub fn families(reach: &Reach, sigma: &SigmaModel) -> Vec<Candidate> {
     let mut all = vec![
-        Candidate::named("range-exponent", "z", 1, |p, g| g[0] = p.z.ln()),
-        Candidate::named("vignetting", "radius", 2, |p, g| {
-            let r2 = p.radius * p.radius;
-            g[0] = r2;
-            g[1] = r2 * r2;
-        }),
+        Candidate::named("range-exponent", Basis::RangeExponent { pivot_m: PIVOT_M }),
+        Candidate::named("vignetting", Basis::Vignetting { orders: 1 }),
+        Candidate::named("vignetting", Basis::Vignetting { orders: 2 }),
+        Candidate::named(RECALIBRATE, Basis::Level),
     ];
     for lateral_px in [0.1, 0.2, 0.4, 0.8, 1.6] {
-        let columns = move |p: &Place, g: &mut [f64]| {
-            let slope2 = p.slope[0].powi(2) + p.slope[1].powi(2);
-            g[0] = (lateral_px * lateral_px * slope2 / p.variance).ln_1p();
+        all.push(Candidate::named("slope-noise", Basis::SlopeNoise { lateral_px }));
+    }
+    for tilt_power in [1, 2] {
+        all.push(Candidate::named("tilt-axis-anisotropy", Basis::TiltAxis { tilt_power }));
+    }
+    if reach.light[1] > 1.05 * reach.light[0] {
+        all.push(Candidate::named("intensity-dependent-noise", Basis::Intensity));
+    }
+    if reach.ambient[1] > 0.0 {
+        for ratio in [0.003, 0.01, 0.03, 0.1, 0.3, 1.0] {
+            all.push(Candidate::named("ambient-light", Basis::Ambient { ratio }));
+        }
+    }
+    all.extend(recalibrations(reach, sigma));
+    all
+}
+
+/// The derivatives of log variance after the sigma model's parameters: all of them, and those that
+/// a frontal target decides.
+fn recalibrations(reach: &Reach, sigma: &SigmaModel) -> Vec<Candidate> {
+    let (z_m, theta_rad) = (reach.z, [reach.theta[0], reach.theta[1].max(reach.theta[0] + 1e-3)]);
+    let table = |model: &SigmaModel| -> Vec<f64> {
+        let at = |[low, high]: [f64; 2], k: usize| {
+            low + (high - low) * k as f64 / (TABLE - 1) as f64
         };
-        all.push(
-            Candidate::named("slope-noise", "theta", 1, columns)
-                .with("sigma_lateral_px", lateral_px),
-        );
-    }
-    // Along the baseline against across it, fading as the tilt does.
-    for power in [1, 2] {
-        let columns = move |p: &Place, g: &mut [f64]| {
-            g[0] = (2.0 * p.azimuth).cos() * p.theta.sin().powi(power);
-        };
-        all.push(
-            Candidate::named("tilt-axis-anisotropy", "azimuth", 1, columns)
-                .with("tilt_power", f64::from(power)),
-        );
-    }
-    if sensible.light {
-        all.push(Candidate::named("intensity-dependent-noise", "intensity", 1, |p, g| {
-            g[0] = p.light.max(1e-3).ln();
-        }));
-    }
-    if sensible.ambient {
-        all.push(Candidate::named("ambient-light", "intensity", 1, |p, g| {
-            g[0] = p.ambient.ln_1p();
-        }));
+        (0..TABLE * TABLE)
+            .map(|n| 2.0 * model.sigma(at(z_m, n % TABLE), at(theta_rad, n / TABLE)).ln())
+            .collect()
+    };
+    let base = table(sigma);
+    let columns: Vec<Vec<f64>> = (0..sigma.parameters.len())
+        .filter_map(|j| {
+            let mut moved = sigma.clone();
+            // A hundredth of the parameter.
+            let step = 0.01 * sigma.parameters[j].abs().max(1e-9);
+            moved.parameters[j] += step;
+            let column: Vec<f64> =
+                table(&moved).iter().zip(&base).map(|(m, b)| (m - b) / 0.01).collect();
+            let told = column.iter().all(|c| c.is_finite())
+                && column.iter().any(|c| c.abs() > 0.05);
+            told.then_some(column)
+        })
+        .collect();
+    let few = columns.len().min(3);
+    let mut all = Vec::new();
+    for n in if few < columns.len() { vec![few, columns.len()] } else { vec![few] } {
+        if n > 0 {
+            let columns = columns[..n].to_vec();
+            all.push(Candidate::named(RECALIBRATE, Basis::Recalibrate { z_m, theta_rad, columns }));
+        }
     }
     all
 }
 
-/// What the recording brings beside depth.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Sensible {
-    pub light: bool,
-    pub ambient: bool,
-}
-
 /// Curves without a name, one axis each.
-pub fn curves(camera: &Camera, reach: &super::bias::Reach) -> Vec<Candidate> {
-    let (w, h) = (camera.width as f64, camera.height as f64);
-    let one = |_: &Place| 1.0;
-    let z = reach.z.map(f64::ln);
-    vec![
-        Candidate::curve("z", z, 8, |p| p.z.ln(), one),
-        Candidate::curve("theta", reach.theta, 6, |p| p.theta, one),
-        Candidate::ring("azimuth", 8, |p| p.azimuth / std::f64::consts::TAU),
-        Candidate::curve("radius", [0.0, 1.0], 8, |p| p.radius, one),
-        Candidate::curve("column", [0.0, w], 12, |p| p.u, one),
-        Candidate::curve("row", [0.0, h], 12, |p| p.v, one),
-        Candidate::ring("disparity-phase", 8, |p| p.disparity),
-        Candidate::curve("session-time", reach.session, 6, |p| p.session_s, one),
-        Candidate::curve("edge-distance", [0.0, 24.0], 6, |p| p.edge, one),
-        Candidate::curve("intensity", reach.light, 6, |p| p.light, one),
-        Candidate::map(w, h, 6, 4),
-    ]
+pub fn curves(camera: &Camera, reach: &Reach) -> Vec<Candidate> {
+    let (width, height) = (camera.width as f64, camera.height as f64);
+    let curve = |over, [low, high]: [f64; 2], nodes| {
+        Candidate::curve(Basis::Curve { over, low, high, nodes, times: Times::One })
+    };
+    let ring = |over, period, nodes| {
+        Candidate::curve(Basis::Ring { over, period, nodes, times: Times::One })
+    };
+    let mut all = vec![
+        curve(Over::LogZ, reach.z.map(f64::ln), 8),
+        curve(Over::Theta, reach.theta, 6),
+        ring(Over::Azimuth, std::f64::consts::TAU, 8),
+        curve(Over::Radius, [0.0, 1.0], 8),
+        curve(Over::Column, [0.0, width], 12),
+        curve(Over::Row, [0.0, height], 12),
+        ring(Over::Disparity, 1.0, 8),
+        curve(Over::Edge, [0.0, 24.0], 6),
+        curve(Over::Right, reach.right, 8),
+        curve(Over::Down, reach.down, 8),
+        Candidate::curve(Basis::Map { width, height, across: 6, down: 4, times: Times::One }),
+    ];
+    for (over, range) in [
+        (Over::Session, reach.session),
+        (Over::Temperature, reach.temperature),
+        (Over::Light, reach.light),
+    ] {
+        if range[1] > range[0] * 1.05 {
+            all.push(curve(over, range, 6));
+        }
+    }
+    all
 }

@@ -271,6 +271,15 @@ impl Basis {
         )
     }
 
+    /// Does it change within a few pixels?
+    pub fn is_fine(&self) -> bool {
+        match self {
+            Basis::Locking { .. } | Basis::Ring { .. } | Basis::EdgeMixing { .. } => true,
+            Basis::Curve { over, .. } => matches!(over, Over::Edge),
+            _ => false,
+        }
+    }
+
     /// The axis of effects.md that it runs along.
     pub fn axis(&self) -> Axis {
         match self {

@@ -113,6 +113,24 @@ pub struct Place {
     pub variance: f64,
 }
 
+impl Place {
+    /// Move to the mean of the members' places; what is one for the view stays.
+    pub fn average(&mut self, all: &[Place], mean: &dyn Fn(&dyn Fn(usize) -> f64) -> f64) {
+        self.u = mean(&|i| all[i].u);
+        self.v = mean(&|i| all[i].v);
+        self.x = mean(&|i| all[i].x);
+        self.y = mean(&|i| all[i].y);
+        self.disparity = mean(&|i| all[i].disparity);
+        self.z = mean(&|i| all[i].z);
+        self.radius = mean(&|i| all[i].radius);
+        self.right = mean(&|i| all[i].right);
+        self.down = mean(&|i| all[i].down);
+        self.edge = mean(&|i| all[i].edge);
+        self.light = mean(&|i| all[i].light);
+        self.variance = mean(&|i| all[i].variance);
+    }
+}
+
 /// Of the farthest corner from the principal point, px.
 pub fn corner_radius(camera: &Camera) -> f64 {
     let (right, bottom) = (camera.width as f64 - 1.0, camera.height as f64 - 1.0);

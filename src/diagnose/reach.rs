@@ -1,0 +1,39 @@
+//! How far the recording reaches on every axis.
+
+use super::tiles::Tile;
+use crate::stats::range;
+use crate::terms::Place;
+
+/// Least and greatest of each axis.
+#[derive(Debug, Clone, Copy)]
+pub struct Reach {
+    pub disparity: [f64; 2],
+    pub z: [f64; 2],
+    pub theta: [f64; 2],
+    pub right: [f64; 2],
+    pub down: [f64; 2],
+    pub session: [f64; 2],
+    pub temperature: [f64; 2],
+    pub light: [f64; 2],
+    pub ambient: [f64; 2],
+    /// Greatest distance from an edge, px.
+    pub edge: f64,
+}
+
+impl Reach {
+    pub fn of<'a>(tiles: impl Iterator<Item = &'a Tile> + Clone) -> Self {
+        let of = |value: fn(&Place) -> f64| range(tiles.clone().map(|t| value(&t.place)));
+        Reach {
+            disparity: of(|p| p.disparity),
+            z: of(|p| p.z),
+            theta: of(|p| p.theta),
+            right: of(|p| p.right),
+            down: of(|p| p.down),
+            session: of(|p| p.session_s),
+            temperature: of(|p| p.temperature_c),
+            light: of(|p| p.light),
+            ambient: of(|p| p.ambient),
+            edge: of(|p| p.edge)[1],
+        }
+    }
+}
