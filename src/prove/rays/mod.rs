@@ -15,6 +15,8 @@ mod outside;
 mod poses;
 mod sets;
 mod shoot;
+#[cfg(test)]
+mod tests;
 mod write;
 
 pub use cameras::Unit;

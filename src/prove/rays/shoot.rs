@@ -18,7 +18,7 @@ const WALL_ALBEDO: f64 = 0.6;
 const DN_AT_1_M: f64 = 590.0;
 const READ_DN: f64 = 10.4;
 /// What an office's light adds to a white surface.
-const DN_A_LUX: f64 = 0.04;
+const DN_A_LUX: f64 = 0.06;
 
 /// Words a metre, 1/m.
 pub fn units(unit: &Unit) -> f64 {
