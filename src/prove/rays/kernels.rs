@@ -89,6 +89,15 @@ impl Window {
 mod tests {
     use super::*;
 
+    /// Chi-square of 40 fields' means, each of standard error 1/sqrt(n): 40 with deviation 9.
+    #[test]
+    fn fresh_noise_has_no_mean() {
+        let n = 20_000;
+        let mean = |view| fresh(Seed(5), view, 0, n).iter().sum::<f32>() / n as f32;
+        let chi2 = (0..40).map(|view| n as f32 * mean(view).powi(2)).sum::<f32>();
+        assert!((15.0..75.0).contains(&chi2), "{chi2}");
+    }
+
     #[test]
     fn windows_of_a_side_reach_equally_far_and_keep_the_variance() {
         let windows = [Window::flat(9.0), Window::flat(5.0), Window::bell(8.0), Window::tent(8.0)];

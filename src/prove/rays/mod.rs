@@ -9,6 +9,8 @@ mod causes_driver;
 mod causes_missing;
 mod causes_noise;
 mod causes_variance;
+mod choices;
+mod eye;
 mod geometry;
 mod kernels;
 mod outside;
@@ -20,9 +22,10 @@ mod tests;
 mod write;
 
 pub use cameras::Unit;
+pub use choices::CATALOGUE;
 pub use geometry::{Board, Site, Stage};
 pub use outside::OUTSIDE;
-pub use sets::{CATALOGUE, Cell, Order, Set};
+pub use sets::{Cell, Order, Set};
 pub use write::write;
 
 use crate::rng::Seed;

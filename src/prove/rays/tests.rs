@@ -132,7 +132,8 @@ fn shaped_noise_keeps_its_size() {
         }
         let fields = (0..6).flat_map(|v| Still::new(&set, v).noise(2));
         let (mean, sd) = moments(fields.map(f64::from));
-        assert!(mean.abs() < 0.02 && (sd - 1.0).abs() < 0.05, "{name}: {mean} {sd}");
+        // 6 x 76,800 pixels, of which a window of 7 px leaves 9,400 independent: 0.010 and 0.005.
+        assert!(mean.abs() < 0.04 && (sd - 1.0).abs() < 0.02, "{name}: {mean} {sd}");
     }
 }
 
