@@ -176,7 +176,7 @@ pub fn edge_mixing(strength: f64, unit: &Unit) -> Cause {
     )
 }
 
-/// Moiré of a sine: used by causes that the catalogue lacks.
+/// One period from 0 to 1.
 pub(super) fn wave(phase: f64) -> f64 {
     (TAU * phase).sin()
 }

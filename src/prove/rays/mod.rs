@@ -72,6 +72,7 @@ pub struct Shake {
 }
 
 type AtSite = Box<dyn Fn(&Site, &Facts<'_>) -> f64 + Send + Sync>;
+type Shaker = Box<dyn Fn(&Clock, &mut Shake) + Send + Sync>;
 type Reshape = Box<dyn Fn(&mut [f32], &Clock) + Send + Sync>;
 
 /// Where in the path a cause acts, and how.
@@ -89,7 +90,7 @@ pub enum Act {
     /// Standard deviation of where a pixel looks, px.
     Wander(f64),
     Grain(Phase, Reshape),
-    Shake(Box<dyn Fn(&Clock, &mut Shake) + Send + Sync>),
+    Shake(Shaker),
     /// Probability of no answer.
     Loss(AtSite),
     /// Disparities that occur: `step` px apart, one of them at `phase` steps.

@@ -99,7 +99,8 @@ fn mean(name: &str, strength: f64, unit: &Unit, rng: &mut Stream) -> Cause {
         }
         "interleave" => {
             let a = 0.04 * size;
-            let act = Act::mismatch(move |s, _| if s.u as usize % 2 == 0 { a } else { -a });
+            let act =
+                Act::mismatch(move |s, _| if (s.u as usize).is_multiple_of(2) { a } else { -a });
             Cause::new(label("interleave", "column", a).also(&["pixel"]), act)
         }
         _ => {

@@ -112,10 +112,10 @@ impl<'a> Still<'a> {
         let mut field = fresh(clock.seed, clock.view, clock.frame, self.disparity.len());
         for phase in Phase::ALL {
             for act in self.acts() {
-                if let Act::Grain(at, shape) = act {
-                    if *at == phase {
-                        shape(&mut field, &clock);
-                    }
+                if let Act::Grain(at, shape) = act
+                    && *at == phase
+                {
+                    shape(&mut field, &clock);
                 }
             }
         }
