@@ -29,6 +29,7 @@ pub mod io;
 pub mod measure;
 pub mod model;
 pub mod plane;
+pub mod prove;
 pub mod report;
 pub mod residual;
 pub mod rng;

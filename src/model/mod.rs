@@ -15,7 +15,7 @@ mod statistics;
 mod surface;
 mod tilt_search;
 
-pub use file::{FitSummary, MODEL_FORMAT, NoiseModel, Provenance};
+pub use file::{Effect as ModelEffect, FitSummary, MODEL_FORMAT, NoiseModel, Provenance};
 pub use fit::{DISTANCE_RATIO, Parameter, SigmaFit};
 pub use forms::{Form, PAPER_EQ1, SigmaForm};
 pub use heldout::{HeldOut, compare_forms, held_out};

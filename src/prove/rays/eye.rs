@@ -1,0 +1,104 @@
+//! A pixel looks, through the lens, at the board or past it.
+
+use nalgebra::Vector3;
+
+use super::geometry::{Site, inside_px, projector_column};
+use super::poses::{Plan, outline};
+use super::sets::Set;
+use super::{Act, Cause};
+
+/// Nothing answers from farther away, m.
+const FARTHEST_M: f64 = 12.0;
+/// Of a wall behind the board.
+const WALL_ALBEDO: f64 = 0.6;
+
+/// A camera in front of a stage.
+pub(super) struct Eye<'a> {
+    set: &'a Set,
+    plan: &'a Plan,
+    corner_px: f64,
+    /// Of the board in the picture, when a cause asks for it.
+    outline: Option<[[f64; 2]; 4]>,
+}
+
+impl<'a> Eye<'a> {
+    pub fn new(set: &'a Set, plan: &'a Plan) -> Self {
+        let c = &set.unit.sensor.camera;
+        let (right, bottom) = (c.width as f64 - 1.0, c.height as f64 - 1.0);
+        let corner_px = c.cx.max(right - c.cx).hypot(c.cy.max(bottom - c.cy));
+        let asked = set.causes.iter().any(|cause| cause.label.axis == "edge-distance");
+        let corners = plan.stage.board.corners(0.0).filter(|_| asked);
+        Eye { set, plan, corner_px, outline: corners.and_then(|c| outline(&set.unit, &c)) }
+    }
+
+    /// What the pixel's ray meets first.
+    pub fn look(&self, u: f64, v: f64) -> Option<Site> {
+        let c = &self.set.unit.sensor.camera;
+        let (x, y) = ((u - c.cx) / c.fx, (v - c.cy) / c.fy);
+        let mut ray = (x, y);
+        for cause in &self.set.causes {
+            if let Act::Ray(bend) = &cause.act {
+                ray = bend(ray.0, ray.1);
+            }
+        }
+        let ray = Vector3::new(ray.0, ray.1, 1.0);
+        let stage = &self.plan.stage;
+        let z_board = self.board_depth(&ray);
+        let place = stage.board.place(&(ray * z_board));
+        let hit = z_board > 0.0 && z_board < FARTHEST_M;
+        let on_board = hit && stage.board.holds(place);
+        let z = if on_board { z_board } else { stage.wall? };
+        let other = if on_board { stage.wall } else { Some(z_board).filter(|_| hit) };
+        let point = ray * z;
+        let fb = self.set.unit.disparity_px_m();
+        let normal = if on_board { stage.board.normal } else { Vector3::z() };
+        // The camera believes in its own rays.
+        let matched = Vector3::new(x, y, 1.0) * z;
+        let column = projector_column(&self.set.unit.sensor, self.set.unit.baseline_m, &matched);
+        Some(Site {
+            u,
+            v,
+            x,
+            y,
+            z,
+            point,
+            on_board,
+            place,
+            radius: (u - c.cx).hypot(v - c.cy) / self.corner_px,
+            disparity: u - column,
+            theta: if on_board { stage.theta } else { 0.0 },
+            facing: normal.dot(&ray) / ray.norm(),
+            edge_px: self.outline.map_or(f64::INFINITY, |o| inside_px(&o, u, v)),
+            other_disparity: other.map(|z| fb / z),
+            albedo: self.albedo(on_board, place),
+        })
+    }
+
+    fn board_depth(&self, ray: &Vector3<f64>) -> f64 {
+        let board = &self.plan.stage.board;
+        let flat = board.reach / board.normal.dot(ray);
+        let lift = |z: f64| {
+            let place = board.place(&(ray * z));
+            let rise = |cause: &Cause| if let Act::Lift(f) = &cause.act { f(place) } else { 0.0 };
+            self.set.causes.iter().map(rise).sum::<f64>()
+        };
+        if !self.set.causes.iter().any(|c| matches!(c.act, Act::Lift(_))) {
+            return flat;
+        }
+        // A few millimetres of rise move the place by less: three rounds settle it.
+        (0..3).fold(flat, |z, _| flat * (1.0 - lift(z) / board.reach))
+    }
+
+    fn albedo(&self, on_board: bool, [p, q]: [f64; 2]) -> f64 {
+        const GREYS: [f64; 5] = [0.8, 0.5, 0.3, 0.2, 0.12];
+        const PATCH_M: f64 = 0.12;
+        if !on_board {
+            return WALL_ALBEDO;
+        }
+        if !self.set.printed {
+            return GREYS[0];
+        }
+        let (i, j) = ((p / PATCH_M).floor() as i64, (q / PATCH_M).floor() as i64);
+        GREYS[(i + 2 * j).rem_euclid(5) as usize]
+    }
+}

@@ -1,0 +1,155 @@
+//! What goes into a set: drawn at random from its order.
+
+use rand::Rng;
+use serde_json::json;
+
+use super::causes_bias::lot;
+use super::choices::{age, cause, names, session, window, words};
+use super::poses::Plan;
+use super::{Cause, Unit};
+use crate::error::Result;
+use crate::io::sha256_hex;
+use crate::model::ModelEffect;
+use crate::rng::Seed;
+
+/// What kind of question a set puts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Cell {
+    Null,
+    Single,
+    Pair,
+    Outside,
+    Blind,
+    Drift,
+}
+
+impl std::str::FromStr for Cell {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let all = [Cell::Null, Cell::Single, Cell::Pair, Cell::Outside, Cell::Blind, Cell::Drift];
+        let named = all.into_iter().find(|cell| json!(cell) == text);
+        named.ok_or_else(|| format!("no cell is called \"{text}\""))
+    }
+}
+
+/// What is asked for.
+#[derive(Debug, Clone)]
+pub struct Order {
+    pub cell: Cell,
+    /// Of the catalogue or from outside it; by lot where none is named. Two, for a pair.
+    pub effects: Vec<String>,
+    /// 1 is the middle of what real units show.
+    pub strength: f64,
+    pub seed: u64,
+    pub views: Option<usize>,
+    pub frames: Option<usize>,
+    pub small: bool,
+}
+
+/// A recording to be taken, and its sealed truth.
+pub struct Set {
+    /// Says nothing.
+    pub name: String,
+    pub order: Order,
+    pub unit: Unit,
+    /// What the model file says, which may be wrong.
+    pub described: Unit,
+    pub known: Vec<ModelEffect>,
+    /// Known and concealed, in no order.
+    pub causes: Vec<Cause>,
+    /// The first so many are known to the model.
+    pub known_causes: usize,
+    pub plans: Vec<Plan>,
+    /// Bits of an infrared image.
+    pub infrared_bits: Option<u8>,
+    /// Patches of grey are printed on the board.
+    pub printed: bool,
+    pub seed: Seed,
+}
+
+impl Set {
+    /// Drawn from the order's seed.
+    ///
+    /// # Errors
+    /// When an effect is asked for that does not exist.
+    pub fn draw(order: Order) -> Result<Self> {
+        let text =
+            format!("{:?}/{:?}/{}/{}", order.cell, order.effects, order.strength, order.seed);
+        let digest = sha256_hex(text.as_bytes());
+        let seed = Seed(u64::from_str_radix(&digest[..16], 16).unwrap_or(order.seed));
+        let mut rng = seed.stream("rays/set");
+        let names = names(&order, &mut rng);
+        let units_per_metre = words(&names, &mut rng);
+        let described = Unit::draw(order.small, units_per_metre, &mut rng);
+        let mut unit = described.clone();
+        if order.cell == Cell::Drift {
+            age(&mut unit, order.strength, &mut rng);
+        }
+        let session = session(&order, &names, &mut rng);
+        let window = window(&order, &names, &mut rng);
+        let known = window.iter().map(known).collect();
+        let known_causes = usize::from(window.is_some());
+        let mut causes: Vec<Cause> = window.into_iter().collect();
+        for name in &names {
+            causes.push(cause(name, &order, &unit, &session, seed, &mut rng)?);
+        }
+        let lit = names
+            .iter()
+            .any(|n| ["intensity-dependent-noise", "ambient-light"].contains(&n.as_str()));
+        let infrared_bits = (lit || rng.random::<f64>() < 0.2).then(|| lot(&[8, 16], &mut rng));
+        let by_print = names.iter().any(|n| n == "intensity-dependent-noise");
+        let printed = by_print || infrared_bits.is_some() && rng.random::<bool>();
+        let plans = session.draw(&unit, &mut rng);
+        Ok(Set {
+            name: sha256_hex(format!("opaque {digest}").as_bytes())[..10].into(),
+            order,
+            unit,
+            described,
+            known,
+            causes,
+            known_causes,
+            plans,
+            infrared_bits,
+            printed,
+            seed,
+        })
+    }
+
+    /// What is sealed: the answer, and how it was made.
+    pub fn truth(&self) -> serde_json::Value {
+        let mut effects: Vec<serde_json::Value> =
+            self.causes[self.known_causes..].iter().map(|c| json!(c.label)).collect();
+        if self.order.cell == Cell::Drift {
+            effects.push(
+                json!({"id": null, "form": "recalibrate", "statistic": "variance", "axis": "z",
+                "also": [], "interval": null, "parameters": {"sigma": self.unit.sigma}}),
+            );
+        }
+        let notes = self.plans.first().map(|p| &p.notes);
+        json!({
+            "name": self.name, "cell": self.order.cell, "strength": self.order.strength,
+            "seed": self.order.seed, "effects": effects,
+            "base": {
+                "known": self.causes[..self.known_causes].iter().map(|c| json!(c.label)).collect::<Vec<_>>(),
+                "sigma": self.described.sigma,
+                "views": self.plans.len(),
+                "frames": self.plans.first().map(|p| p.stamps.len()),
+                "units_per_metre": super::shoot::units(&self.unit),
+                "wall": self.plans.first().is_some_and(|p| p.stage.board.half.is_none()),
+                "reference": notes.is_some_and(|n| n.reference_distance_m.is_some()),
+                "region": notes.is_some_and(|n| n.region.is_some()),
+                "infrared_bits": self.infrared_bits, "printed": self.printed,
+            },
+            "views": self.plans.iter().map(|p| json!({
+                "z_m": p.stage.board.depth(0.0, 0.0), "theta_rad": p.stage.theta, "azimuth_rad": p.stage.azimuth,
+                "session_s": p.session_s, "lux": p.lux, "temperature_c": p.temperature_c,
+            })).collect::<Vec<_>>(),
+        })
+    }
+}
+
+fn known(cause: &Cause) -> ModelEffect {
+    ModelEffect { id: "spatial-correlation".into(), parameters: cause.label.parameters.clone() }
+}
