@@ -105,7 +105,7 @@ fn proof(diagnosis: &Diagnosis) -> Markup {
         @if diagnosis.verdict != Verdict::Inconclusive { (evidence::remarks(&diagnosis.remarks)) }
         p.note {
             "The same as data: diagnosis.json. σ is the standard deviation of a single reading that the simulation \
-             expects. A p-value is the chance of a difference this large if the simulation were right."
+             expects; sizes in mm are root mean squares over the recording. A p-value is the chance of a difference this large if the simulation were right."
         }
     }
 }

@@ -9,8 +9,8 @@ use crate::report::axis::Axis;
 use crate::report::colours::{FAINT, GRID, INK};
 use crate::report::sheet::{self, Drawing, Drawn, SMALL, Sheet, TEXT};
 
-const WIDTH: u32 = 560;
-const HEIGHT: u32 = 330;
+const WIDTH: u32 = 470;
+const HEIGHT: u32 = 290;
 const LEFT: i32 = 10;
 const RIGHT: i32 = 22;
 const TOP: i32 = 40;
@@ -23,6 +23,8 @@ const MANY: usize = 40;
 const MARGIN: f64 = 0.06;
 /// A bar longer than this many times the curve's height does not set the scale.
 const LONGEST_BAR: f64 = 1.5;
+/// Zero belongs into the picture when it is no farther than this many times the curve's height.
+const FARTHEST_ZERO: f64 = 0.6;
 /// The page's accent.
 const LINE: RGBColor = RGBColor(0x1d, 0x91, 0xc0);
 
@@ -77,10 +79,13 @@ fn range(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     (low <= high).then_some([low, high])
 }
 
-/// Points, line, zero, and what of the error bars does not dwarf them.
+/// Points, line, zero where it is near, and what of the error bars does not dwarf them.
 fn heights(points: &[[f64; 3]], line: &[[f64; 2]]) -> Option<[f64; 2]> {
     let values = points.iter().map(|p| p[1]).chain(line.iter().map(|p| p[1]));
-    let [low, high] = range(values.chain([0.0]))?;
+    let [low, high] = range(values)?;
+    let far = FARTHEST_ZERO * (high - low);
+    let zero = (low <= far && high >= -far).then_some(0.0);
+    let [low, high] = range([low, high].into_iter().chain(zero))?;
     let longest = LONGEST_BAR * (high - low);
     let bars = points.iter().filter(|p| p[2] <= longest || longest == 0.0);
     let ends = bars.flat_map(|p| [p[1] - p[2], p[1] + p[2]]).filter(|v| v.is_finite());
@@ -122,8 +127,10 @@ impl Drawing for CurveFigure {
             .x_desc(self.x_label.as_str())
             .draw()?;
         let at = |x: f64, y: f64| chart.backend_coord(&(x, y.clamp(self.y.low, self.y.high)));
-        let zero = [at(self.x.low, 0.0), at(self.x.high, 0.0)];
-        sheet.line(&zero, sheet.stroke(&FAINT, 1), &[5, 4])?;
+        if self.y.contains(0.0) {
+            let zero = [at(self.x.low, 0.0), at(self.x.high, 0.0)];
+            sheet.line(&zero, sheet.stroke(&FAINT, 1), &[5, 4])?;
+        }
         let line: Vec<_> = self.line.iter().map(|p| at(p[0], p[1])).collect();
         sheet.line(&line, sheet.stroke(&LINE, 3), &[])?;
         let ink = sheet.stroke(&INK, 1);

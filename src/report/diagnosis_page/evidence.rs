@@ -92,7 +92,7 @@ pub(super) fn parameters(findings: &[Finding]) -> Markup {
                     @for (k, (key, value)) in f.parameters.iter().enumerate() { tr {
                         th { @if k == 0 { (i + 1) ". " (capital(&called(f))) } }
                         td { code { (key) } }
-                        td.n { (parameters::value(key, value)) }
+                        td.n { (parameters::value(key, value, parameters::DIGITS)) }
                         td.words { (parameters::words(f.effect, key)) }
                     } }
                 } }
@@ -124,6 +124,9 @@ pub(super) fn held_out(held: Option<&HeldOut>) -> Markup {
 /// The same tests once more, against the extended model.
 pub(super) fn after(diagnosis: &Diagnosis) -> Markup {
     let after = &diagnosis.after;
+    if diagnosis.findings.is_empty() && after.remaining.is_empty() {
+        return html! {};
+    }
     html! { section {
         h2 { "The same tests once more, with the findings put in" }
         p {

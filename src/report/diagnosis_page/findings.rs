@@ -113,6 +113,7 @@ fn size(finding: &Finding) -> Markup {
 
 fn surety(finding: &Finding) -> Markup {
     let best = finding.alternatives.first();
+    let named = best.is_some() && matches!(finding.status, Status::Named | Status::OneOf);
     let rest = 1.0 - finding.alternatives.iter().map(|a| a.probability).sum::<f64>();
     html! {
         @match (finding.status, best) {
@@ -127,12 +128,15 @@ fn surety(finding: &Finding) -> Markup {
             },
             _ => {},
         }
-        (chance(finding.p_adjusted))
+        @if named { (chance(finding.p_adjusted)) } @else { (capital(&chance(finding.p_adjusted))) }
         @if finding.p_adjusted.is_finite() { " (" (p_value(finding.p_adjusted)) ")" }
     }
 }
 
 fn share(finding: &Finding) -> Markup {
+    if !finding.share.is_finite() {
+        return html! { "Not known" };
+    }
     let percent = (100.0 * finding.share).clamp(0.0, 100.0);
     html! {
         span.bar { span style={ "width:" (format!("{percent:.0}")) "%" } {} }
@@ -142,10 +146,10 @@ fn share(finding: &Finding) -> Markup {
 
 fn key(finding: &Finding) -> Markup {
     html! {
-        span.dot {} " measured, with one standard error  " span.line {} " "
+        span.dot {} " measured ± standard error " span.line {} " "
         @match finding.status {
-            Status::Unexplained => "the curve given to the simulation",
-            _ => "the simulation with it put in",
+            Status::Unexplained => "curve given to the simulation",
+            _ => "simulation with it put in",
         }
     }
 }

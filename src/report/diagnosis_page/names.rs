@@ -89,7 +89,7 @@ const NAMES: [(&str, &str, &str); 29] = [
     ),
     (
         "range-exponent",
-        "another growth of noise with distance",
+        "noise that grows with distance in another way",
         "the noise grows faster or slower with the distance than the simulation has it",
     ),
     (

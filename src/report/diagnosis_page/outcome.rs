@@ -11,16 +11,18 @@ use crate::report::numbers::fixed;
 
 /// Longer lists fold away.
 const LONGEST_OPEN: usize = 6;
+/// A threshold is not known better.
+const DIGITS: usize = 2;
 
 pub(super) fn gained_and_left(diagnosis: &Diagnosis) -> Markup {
-    let nothing_put_in = diagnosis.verdict == Verdict::Match;
+    let put_in = !diagnosis.findings.is_empty();
     html! {
         section.outcome {
             @if let Some(held) = &diagnosis.heldout { div {
                 h2 { "What was gained" }
                 (gained(held))
             } }
-            @if !nothing_put_in || !diagnosis.after.remaining.is_empty() { div {
+            @if put_in || !diagnosis.after.remaining.is_empty() { div {
                 h2 { "What remains" }
                 (remains(diagnosis))
             } }
@@ -98,14 +100,26 @@ pub(super) fn detectable(all: &[Detectable]) -> Markup {
             h2 { "How small an effect these views could have shown" }
             div.wide { table {
                 thead { tr { th { "cause" } th { "smallest that would be seen" } th { "what the number is" } } }
-                tbody { @for d in all { @for (i, (key, value)) in d.minimum.iter().enumerate() { tr {
-                    th { @if i == 0 { (capital(name(d.effect).short)) } }
-                    td { (parameters::title(key)) " " b { (parameters::value(key, value)) } }
-                    td.words { (parameters::words(Some(d.effect), key)) }
-                } } } }
+                tbody { @for d in all { (smallest(d)) } }
             } }
             p.note { "With a power of 80 %: of five recordings like this one with an effect this large, four would show it." }
         } }
+    }
+}
+
+/// The strength, and what it was counted at.
+fn smallest(d: &Detectable) -> Markup {
+    let mut all = d.minimum.iter();
+    let Some((strength, least)) = all.next() else { return html! {} };
+    html! {
+        tr {
+            th { (capital(name(d.effect).short)) }
+            td {
+                (parameters::title(strength)) " " b { (parameters::value(strength, least, DIGITS)) }
+                @for (key, value) in all { ", at a " (parameters::title(key)) " of " (parameters::value(key, value, DIGITS)) }
+            }
+            td.words { (parameters::words(Some(d.effect), strength)) }
+        }
     }
 }
 

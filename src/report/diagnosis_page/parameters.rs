@@ -20,13 +20,14 @@ const UNITS: [(&str, f64, &str); 7] = [
 ];
 /// Lengths below it are told in mm, m.
 const MILLIMETRES_BELOW_M: f64 = 0.3;
-const DIGITS: usize = 3;
+pub(super) const DIGITS: usize = 3;
 const ERROR_DIGITS: usize = 2;
 /// Values below it are easier with powers of ten.
 const LEAST_PLAIN: f64 = 1e-3;
 
-/// `0.125 ± 0.001 px`; whatever else stands in the file is shown as it is.
-pub(super) fn value(name: &str, value: &Value) -> Markup {
+/// `0.125 ± 0.001 px`, or to so many digits where the error is not known; whatever else stands in
+/// the file is shown as it is.
+pub(super) fn value(name: &str, value: &Value, digits: usize) -> Markup {
     let number = |key: &str| value.get(key).and_then(Value::as_f64);
     let Some(v) = value.as_f64().or_else(|| number("value")) else {
         return match value.as_str() {
@@ -37,7 +38,7 @@ pub(super) fn value(name: &str, value: &Value) -> Markup {
     let (scale, unit) = unit(name, v);
     match number("std_error") {
         Some(e) => html! { (with_error(scale * v, scale * e)) (unit) },
-        None => html! { (significant(scale * v, DIGITS)) (unit) },
+        None => html! { (significant(scale * v, digits)) (unit) },
     }
 }
 
@@ -91,7 +92,7 @@ mod tests {
             ),
             ("form", json!("a < b"), "a &lt; b"),
         ] {
-            assert_eq!(value(name, &json).into_string(), text);
+            assert_eq!(value(name, &json, DIGITS).into_string(), text);
         }
         assert_eq!(title("time_constant_s"), "time constant");
         assert_eq!(

@@ -36,8 +36,11 @@ pub(super) fn section(pictures: &[Picture]) -> Result<Markup> {
                 h2 { "Before and after, as pictures" }
                 p {
                     "What is left of single views when their flat board is taken out. White is no error, blue too near, \
-                     red too far, grey no data. When all is explained, the middle picture shows noise alone, and the \
-                     twin, which is nothing but simulation, looks like the first."
+                     red too far, grey no data. When all is explained, the second picture shows noise alone"
+                    @if pictures.iter().any(|p| p.simulated.is_some()) {
+                        ", and the twin, which is nothing but simulation, looks like the first"
+                    }
+                    "."
                 }
                 @for figure in figures { (figure) }
             }

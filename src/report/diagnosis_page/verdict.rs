@@ -28,7 +28,7 @@ pub(super) fn section(diagnosis: &Diagnosis) -> Markup {
 fn sentence(diagnosis: &Diagnosis) -> String {
     match diagnosis.verdict {
         Verdict::Match => format!(
-            "The simulation explains this recording: no difference from {} was found that chance would not make.",
+            "The simulation explains this recording: nothing in it differs from {} by more than chance.",
             reference(diagnosis.reference)
         ),
         Verdict::Inconclusive => format!(
@@ -125,7 +125,7 @@ fn tiles(diagnosis: &Diagnosis) -> Vec<Tile> {
     let held = diagnosis.views.iter().filter(|v| v.held_out).count();
     let found = diagnosis.findings.iter().filter(|f| is_physics(f)).count();
     let searched = Tile {
-        label: "Searched",
+        label: "Recording",
         big: count(diagnosis.views.len(), "view"),
         note: format!("{held} of them set aside for the final test"),
     };
@@ -139,7 +139,7 @@ fn tiles(diagnosis: &Diagnosis) -> Vec<Tile> {
     };
     let mut tiles = vec![searched, causes];
     tiles.extend(diagnosis.heldout.as_ref().map(gained));
-    if diagnosis.verdict != Verdict::Match {
+    if !diagnosis.findings.is_empty() {
         tiles.push(remains(diagnosis));
     }
     tiles.iter_mut().for_each(|t| t.big = capital(&t.big));

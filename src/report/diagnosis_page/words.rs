@@ -96,7 +96,7 @@ pub(super) fn percent(share: f64) -> String {
 pub(super) fn p_value(p: f64) -> Markup {
     html! {
         @if p < LEAST_P { "p < 10" sup { "−6" } }
-        @else { "p = " (significant(p, if p < 0.095 { 1 } else { 2 })) }
+        @else { "p = " (significant(p, if p < 1e-3 { 1 } else { 2 })) }
     }
 }
 
