@@ -52,7 +52,7 @@ fn unit(name: &str, value: f64) -> (f64, &'static str) {
 }
 
 fn with_error(value: f64, error: f64) -> Markup {
-    if value.abs().max(error) < LEAST_PLAIN || !(error > 0.0) {
+    if error.is_nan() || error <= 0.0 || value.abs().max(error) < LEAST_PLAIN {
         return html! { (significant(value, DIGITS)) " ± " (significant(error, ERROR_DIGITS)) };
     }
     let decimals = decimals_for(error);

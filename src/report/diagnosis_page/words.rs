@@ -159,7 +159,7 @@ mod tests {
         for (at, ends, unit, text) in [
             (Axis::Z, [0.8, 3.204], "m", "0.8 to 3.2 m"),
             (Axis::TargetPosition, [-0.4, 0.4], "m", "−400 to 400 mm"),
-            (Axis::Theta, [0.0, 0.785_398], "rad", "0 to 45°"),
+            (Axis::Theta, [0.0, 0.698_132], "rad", "0 to 40°"),
             (Axis::Radius, [120.0, 398.4], "px", "120 to 398 px"),
             (Axis::SessionTime, [0.0, 1260.0], "s", "0 to 21 min"),
             (Axis::DisparityPhase, [0.0, 0.5], "periods", "0.00 to 0.50 of a step"),

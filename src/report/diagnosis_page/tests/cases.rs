@@ -122,7 +122,7 @@ pub(super) fn diagnosis(verdict: Verdict, findings: Vec<Finding>) -> Diagnosis {
         pixels: 48_211,
         bowl_px_before: 0.121,
         bowl_px_after: 0.018,
-        held_out: i % 4 == 0,
+        held_out: i.is_multiple_of(4),
     };
     Diagnosis {
         format: DIAGNOSIS_FORMAT,
