@@ -6,6 +6,7 @@
 mod axis;
 mod base64;
 mod colours;
+mod diagnosis_page;
 mod figure2;
 mod html;
 mod numbers;
@@ -14,6 +15,7 @@ mod sheet;
 mod sigma_map;
 
 pub use axis::Axis;
+pub use diagnosis_page::{DiagnosisPage, Picture, diagnosis_page};
 pub use figure2::{Figure2, Group, Overlay, OverlayLine, Point};
 pub use html::{CalibrationPage, calibration_page};
 pub use residual_picture::{residual_png, scale_mm};

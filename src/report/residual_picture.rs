@@ -31,14 +31,24 @@ pub fn scale_mm(picture: &ResidualPicture) -> f64 {
 /// # Errors
 /// When the picture's size and its pixels disagree.
 pub fn residual_png(picture: &ResidualPicture, scale_mm: f64) -> Result<Vec<u8>> {
+    let shades = picture.millimetres.iter().map(|&v| shade(v, scale_mm)).collect();
+    png_of(picture.width, picture.height, shades)
+}
+
+/// The same of disparities, px: what is larger than expected is nearer, and blue here too.
+pub(super) fn disparity_png(size: [usize; 2], px: &[f32], scale_px: f64) -> Result<Vec<u8>> {
+    let shades = px.iter().map(|&v| shade(-v, scale_px)).collect();
+    png_of(size[0], size[1], shades)
+}
+
+fn png_of(width: usize, height: usize, shades: Vec<u8>) -> Result<Vec<u8>> {
     let failed =
         |e: png::EncodingError| Error::Drawing { what: "the residual picture", why: e.to_string() };
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, picture.width as u32, picture.height as u32);
+    let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
     encoder.set_color(png::ColorType::Indexed);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_palette(palette());
-    let shades: Vec<u8> = picture.millimetres.iter().map(|&v| shade(v, scale_mm)).collect();
     let mut writer = encoder.write_header().map_err(failed)?;
     writer.write_image_data(&shades).map_err(failed)?;
     writer.finish().map_err(failed)?;
@@ -51,12 +61,12 @@ fn palette() -> Vec<u8> {
     NO_TARGET.into_iter().chain(shades.flat_map(|c| [c.0, c.1, c.2])).collect()
 }
 
-fn shade(millimetres: f32, scale_mm: f64) -> u8 {
-    if !millimetres.is_finite() {
+fn shade(value: f32, scale: f64) -> u8 {
+    if !value.is_finite() {
         return 0;
     }
     let half = f64::from(SHADES / 2);
-    let share = (f64::from(millimetres) / scale_mm).clamp(-1.0, 1.0);
+    let share = (f64::from(value) / scale).clamp(-1.0, 1.0);
     1 + (half + share * half).round() as u8
 }
 
