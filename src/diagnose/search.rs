@@ -101,9 +101,15 @@ pub fn search(
         if chosen.first().is_some_and(|first| next.gain < LEAST_SHARE * first.gain) {
             break;
         }
+        let nameless = next.candidate.family.is_none();
+        if nameless && chosen.iter().all(|c| c.candidate.family.is_some()) {
+            layer.look_back(&mut chosen);
+        }
         chosen.push(next);
     }
-    layer.look_back(&mut chosen);
+    if chosen.iter().all(|c| c.candidate.family.is_some()) {
+        layer.look_back(&mut chosen);
+    }
     let evidence = layer.evidence_of(&bases(&chosen));
     let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
     let noise = layer.noise.unwrap_or_default();
@@ -281,7 +287,8 @@ impl<'a> Layer<'a> {
             .copied()
             .filter(|&i| total(i) > best_family - AS_GOOD_NATS)
             .min_by_key(|&i| self.candidates[i].basis.count())
-            .filter(|&i| safe(i) > threshold && total(i) > self.rules.adequacy * best_curve);
+            .filter(|&i| safe(i) > threshold && total(i) > self.rules.adequacy * best_curve)
+            .filter(|&i| judged[i].as_ref().is_some_and(steady));
         let winner =
             named.or_else(|| curves.first().copied().filter(|&i| safe(i) > threshold))?;
         let won = &judged[winner].as_ref()?.gain;
@@ -306,26 +313,27 @@ impl<'a> Layer<'a> {
         })
     }
 
-    /// With a new term in, are the ones before it still what fits best, and needed at all?
+    /// With all names in, is each still what fits best, and needed at all?
     fn look_back(&mut self, chosen: &mut Vec<Chosen>) {
         let mut k = 0;
-        while k + 1 < chosen.len() {
+        while chosen.len() > 1 && k < chosen.len() {
             let mut others = chosen.clone();
             let old = others.remove(k);
             match self.step(&others) {
                 None => {
                     chosen.remove(k);
+                    continue;
                 }
-                Some(new) => {
-                    if new.candidate.basis != old.candidate.basis {
-                        chosen[k] = new;
-                    } else {
-                        chosen[k].rivals = new.rivals;
-                    }
-                    k += 1;
+                Some(new) if new.candidate.family == old.candidate.family => {
+                    chosen[k] = Chosen { p: old.p.min(new.p), ..new };
                 }
+                // Another name is taken; a curve without one is not.
+                Some(new) if new.candidate.family.is_some() => chosen[k] = new,
+                Some(_) => {}
             }
+            k += 1;
         }
+        chosen.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     }
 
     fn trace(&self, judged: &[Option<Judged>], threshold: f64) {
@@ -344,6 +352,15 @@ impl<'a> Layer<'a> {
             eprintln!("  {:9.1} /{dispersion:5.2} {:?} {text}", total(i), c.family);
         }
     }
+}
+
+/// Views that scatter about a common fit far beyond their noise are explained badly; a name must
+/// then help most of them.
+fn steady(judged: &Judged) -> bool {
+    const WILD: f64 = 3.0;
+    const STEADY: f64 = 2.5;
+    let none = vec![0.0; judged.gain.by_view.len()];
+    judged.null.dispersion < WILD || behind(&judged.gain.by_view, &none) > STEADY
 }
 
 /// Mean difference over the views by its standard error.
