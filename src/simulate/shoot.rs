@@ -100,11 +100,10 @@ impl Shoot {
     pub fn recipe(&self) -> serde_json::Value {
         let physics = match &self.physics {
             Physics::Formula { sigma, effects } => {
-                let effect = |a: &Active| serde_json::json!({"id": a.effect.card().id, "parameters": a.parameters()});
                 serde_json::json!({
                     "world": "formula",
                     "sigma": {"form": sigma.form.spec().id(), "parameters": sigma.parameters},
-                    "effects": effects.iter().map(effect).collect::<Vec<_>>(),
+                    "effects": effects.iter().map(Active::described).collect::<Vec<_>>(),
                 })
             }
             Physics::Speckle { causes } => {
@@ -134,7 +133,7 @@ impl Shoot {
         let Physics::Formula { sigma, effects } = &self.physics else { return Ok(()) };
         let seen = view.seen(&self.sensor.camera, rays);
         let camera = FormulaSensor { sensor: &self.sensor, rays, sigma, effects, seed: self.seed };
-        let mut shooting = camera.begin(&seen).under(view.ambient_lux);
+        let mut shooting = camera.begin(&seen).under(view.ambient_lux).at(view.notes.temperature_c);
         for (stamp, instant) in instants {
             let shot = shooting.shoot(instant);
             let infrared = self.infrared.then(|| self.amplitude(&shot, instant));
