@@ -12,12 +12,12 @@ mod tum;
 mod unknown;
 
 pub(crate) use dump::INDEX;
-pub use images::{FrameSource, InfraredImage, encode_png16};
+pub use images::{FrameSource, InfraredImage, encode_pgm16, encode_png16};
 pub(crate) use layout::DESCRIPTION;
 pub use layout::{ViewFile, write_recording_file, write_view_notes};
 pub use list::{FrameList, read_list};
 pub(crate) use output::hex;
-pub use output::{OutputDir, sha256_hex, write_atomic};
+pub use output::{OutputDir, refuse_full, sha256_hex, write_atomic};
 pub use quick::{encode_png16_quickly, encode_rgb};
 
 use std::path::{Path, PathBuf};

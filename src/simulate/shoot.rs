@@ -15,7 +15,7 @@ use crate::camera::Rays;
 use crate::effects::{Active, Instant};
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, Frame, KINECT_NO_MEASUREMENT};
-use crate::io::{encode_png16, write_atomic, write_recording_file, write_view_notes};
+use crate::io::{encode_png16, refuse_full, write_atomic, write_recording_file, write_view_notes};
 use crate::model::SigmaModel;
 use crate::rng::Seed;
 use crate::scene::Target;
@@ -232,17 +232,4 @@ impl ViewFolder {
         // Last: a view without its list is no view, so a kill leaves none half done.
         write_atomic(&self.root.join("depth.txt"), self.depth_list.as_bytes())
     }
-}
-
-/// Never mix a simulation into somebody's recording.
-pub(super) fn refuse_full(root: &Path) -> Result<()> {
-    let full = std::fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_some());
-    if full {
-        return Err(Error::recording(
-            root,
-            "the folder is not empty",
-            "choose a new folder for the recording",
-        ));
-    }
-    Ok(())
 }

@@ -25,7 +25,7 @@ impl<'a> Pixels<'a> {
         let (u, v) = ((i % self.camera.width) as f64, (i / self.camera.width) as f64);
         let (x, y) = self.rays.at(i);
         let radius = f64::hypot(u - self.camera.cx, v - self.camera.cy) / self.corner;
-        Place { u, v, x, y, radius, light: 1.0, ..Place::default() }
+        Place { u, v, x, y, radius, light: 1.0, rho: 1.0, variance: 1.0, ..Place::default() }
     }
 }
 

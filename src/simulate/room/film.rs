@@ -13,12 +13,13 @@ use crate::camera::Rays;
 use crate::effects::{Acting, Active, Instant};
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, Frame};
-use crate::io::{encode_png16_quickly, encode_rgb, write_atomic, write_recording_file};
+use crate::io::{
+    encode_png16_quickly, encode_rgb, refuse_full, write_atomic, write_recording_file,
+};
 use crate::model::SigmaModel;
 use crate::rng::Seed;
 use crate::simulate::formula::FormulaSensor;
 use crate::simulate::kinect_v1;
-use crate::simulate::shoot::refuse_full;
 use crate::simulate::sigma_table::SigmaTable;
 use crate::view::Sensor;
 
