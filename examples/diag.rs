@@ -13,7 +13,7 @@ fn main() {
     let t = std::time::Instant::now();
     let bench = Workbench::new(&rec.sensor, MeasureOptions::default());
     let fields: Vec<Field> =
-        rec.views.par_iter().filter_map(|v| Field::read(v, &bench, &sigma).ok()).collect();
+        rec.views.par_iter().filter_map(|v| Field::read(v, &bench, &sigma, &Default::default(), 0.0).ok()).collect();
     eprintln!("{} fields {:?}", fields.len(), t.elapsed());
     let survey = Survey::of(&fields, &rec.sensor.camera, &bench.rays);
     eprintln!("survey {:?}", t.elapsed());

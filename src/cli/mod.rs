@@ -2,6 +2,7 @@
 
 mod calibrate;
 mod common;
+mod correct;
 mod demo;
 mod effects;
 mod fit;
@@ -32,6 +33,8 @@ enum Command {
     Fit(fit::Arguments),
     /// Make a recording, or a film of a room, by formula or by light
     Simulate(simulate::Arguments),
+    /// Write a recording again with the model's biases taken out of the depth
+    Correct(correct::Arguments),
     /// The catalogue of physical effects: what each does, how it shows, what it is taken for
     Effects(effects::Arguments),
     /// The whole road on bundled data
@@ -82,6 +85,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Calibrate(a) => calibrate::run(a, global),
         Command::Fit(a) => fit::run(a, global),
         Command::Simulate(a) => simulate::run(a, global),
+        Command::Correct(a) => correct::run(a, global),
         Command::Effects(a) => effects::run(a, global),
         Command::Demo(a) => demo::run(a, global),
     }

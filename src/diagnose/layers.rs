@@ -21,6 +21,7 @@ pub struct Survey {
     pub reach: Reach,
 }
 
+#[derive(Clone)]
 pub struct SurveyedView {
     pub tiles: Vec<Tile>,
     /// Variance of a pixel's mean in units of the model's, times pixels per independent sample.
@@ -68,6 +69,13 @@ impl Survey {
         let fine = self.mean_data();
         let coarse: Vec<ViewData> = fine.par_iter().map(coarser).collect();
         search(&fine, &coarse, &candidates, &rules, seed)
+    }
+
+    /// The views at these places.
+    pub fn subset(&self, which: &[usize]) -> Survey {
+        let views: Vec<SurveyedView> = which.iter().map(|&n| self.views[n].clone()).collect();
+        let reach = Reach::of(views.iter().flat_map(|v| v.tiles.iter()));
+        Survey { views, reach }
     }
 
     /// Log variance over the model's, block by block, once the terms of the bias are taken out.
@@ -121,7 +129,7 @@ fn mean_data(view: &SurveyedView) -> ViewData {
 }
 
 /// Two tiles by two made one.
-fn coarser(fine: &ViewData) -> ViewData {
+pub fn coarser(fine: &ViewData) -> ViewData {
     let side = (2 * SIDE) as f64;
     let p = fine.precision.len();
     let mut groups: std::collections::BTreeMap<(u32, u32), Vec<usize>> = Default::default();

@@ -5,7 +5,10 @@ mod candidate;
 mod diagnosis;
 mod evidence;
 mod field;
+mod known;
 mod lattice;
+mod noise;
+mod parameters;
 mod layers;
 mod reach;
 mod reference;
@@ -17,7 +20,8 @@ mod variance;
 
 pub use diagnosis::*;
 pub use field::Field;
+pub use known::Known;
 pub use lattice::{Lattice, Words};
 pub use layers::Survey;
 pub use search::Outcome;
-pub use structure::{Structure, structures};
+

@@ -57,13 +57,25 @@ pub struct Chosen {
     pub p: f64,
 }
 
+/// What a single nameless curve saw, before anything was explained.
+#[derive(Debug, Clone)]
+pub struct Look {
+    pub basis: Basis,
+    pub coefficients: Vec<f64>,
+    pub p: f64,
+}
+
 /// All terms of a layer with their common fit.
 pub struct Outcome {
     pub chosen: Vec<Chosen>,
+    /// Every nameless curve on its own, on the data as they came.
+    pub looks: Vec<Look>,
     /// Fit of all terms at once.
     pub fit: Option<Gain>,
     pub evidence: Vec<Evidence>,
     pub noise: NoiseGains,
+    /// What still stood out when the search ended.
+    pub remaining: Option<Chosen>,
 }
 
 impl Outcome {
@@ -94,11 +106,13 @@ pub fn search(
     rules: &Rules,
     seed: Seed,
 ) -> Outcome {
-    let mut layer = Layer { fine, coarse, candidates, rules, noise: None, seed };
+    let mut layer = Layer { fine, coarse, candidates, rules, noise: None, looks: Vec::new(), seed };
     let mut chosen: Vec<Chosen> = Vec::new();
-    while chosen.len() < rules.most_terms {
-        let Some(next) = layer.step(&chosen) else { break };
-        if chosen.first().is_some_and(|first| next.gain < LEAST_SHARE * first.gain) {
+    let mut remaining = None;
+    while let Some(next) = layer.step(&chosen) {
+        let little = chosen.first().is_some_and(|first| next.gain < LEAST_SHARE * first.gain);
+        if little || chosen.len() >= rules.most_terms {
+            remaining = Some(next);
             break;
         }
         let nameless = next.candidate.family.is_none();
@@ -113,7 +127,7 @@ pub fn search(
     let evidence = layer.evidence_of(&bases(&chosen));
     let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
     let noise = layer.noise.unwrap_or_default();
-    Outcome { chosen, fit, evidence, noise }
+    Outcome { chosen, looks: layer.looks, fit, evidence, noise, remaining }
 }
 
 /// The greatest gains that noise alone brings, ascending, nats.
@@ -181,6 +195,7 @@ struct Layer<'a> {
     candidates: &'a [Candidate],
     rules: &'a Rules,
     noise: Option<NoiseGains>,
+    looks: Vec<Look>,
     seed: Seed,
 }
 
@@ -260,7 +275,9 @@ impl<'a> Layer<'a> {
             .collect();
         if self.noise.is_none() {
             let nulls: Vec<&Null> = judged.iter().flatten().map(|j| &j.null).collect();
-            self.noise = Some(NoiseGains::of(&nulls, self.seed));
+            let noise = NoiseGains::of(&nulls, self.seed);
+            self.looks = looks(self.candidates, &judged, &noise);
+            self.noise = Some(noise);
         }
         let noise = self.noise.as_ref()?;
         self.choose(&judged, noise)
@@ -352,6 +369,20 @@ impl<'a> Layer<'a> {
             eprintln!("  {:9.1} /{dispersion:5.2} {:?} {text}", total(i), c.family);
         }
     }
+}
+
+fn looks(candidates: &[Candidate], judged: &[Option<Judged>], noise: &NoiseGains) -> Vec<Look> {
+    let nameless = candidates.iter().zip(judged).filter(|(c, _)| c.family.is_none());
+    nameless
+        .filter_map(|(c, j)| {
+            let j = j.as_ref()?;
+            Some(Look {
+                basis: c.basis.clone(),
+                coefficients: j.gain.beta.as_slice().to_vec(),
+                p: noise.p(j.gain.total / j.null.dispersion),
+            })
+        })
+        .collect()
 }
 
 /// Views that scatter about a common fit far beyond their noise are explained badly; a name must

@@ -141,7 +141,9 @@ impl Basis {
         match self {
             Basis::Bowl { orders, .. } | Basis::Lens { orders, .. } => *orders,
             Basis::Vignetting { orders } => *orders,
-            Basis::Bow { degree } => BOW_TERMS.iter().filter(|(i, j)| i + j <= *degree as i32).count(),
+            Basis::Bow { degree } => {
+                BOW_TERMS.iter().filter(|(i, j)| i + j <= *degree as i32).count()
+            }
             Basis::Locking { .. } => 4,
             Basis::Banding { harmonics, .. } => 2 * harmonics,
             Basis::Recalibrate { columns, .. } => columns.len(),
@@ -347,7 +349,13 @@ fn node(value: f64, low: f64, high: f64, nodes: usize) -> (usize, f64) {
     (k, place - k as f64)
 }
 
-fn bilinear((i, s): (usize, f64), (j, t): (usize, f64), across: usize, scale: f64, out: &mut [f64]) {
+fn bilinear(
+    (i, s): (usize, f64),
+    (j, t): (usize, f64),
+    across: usize,
+    scale: f64,
+    out: &mut [f64],
+) {
     out.fill(0.0);
     for (dj, wv) in [(0, 1.0 - t), (1, t)] {
         for (di, wu) in [(0, 1.0 - s), (1, s)] {

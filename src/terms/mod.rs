@@ -2,9 +2,16 @@
 //! `diagnose` and applied by `simulate`, `correct` and `map`.
 
 mod basis;
+mod edges;
+mod fault;
+mod needs;
+mod pixels;
 mod place;
 
 pub use basis::{Basis, DISPARITY_UNIT_PX, Over, TABLE, Times};
+pub use edges::edge_distances;
+pub use needs::Needs;
+pub use pixels::Pixels;
 pub use place::{Axis, Place, corner_radius};
 
 use serde::{Deserialize, Serialize};
