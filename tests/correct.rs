@@ -224,7 +224,7 @@ fn what_a_formula_does_its_correction_undoes() {
 /// Each kind of sensor bias by hand; the surface it needs is found in the noisy picture.
 #[test]
 fn what_a_shape_does_its_correction_undoes() {
-    let (camera, plane) = (sensor().camera, Plane::tilted(1.3, 0.8, -0.7));
+    let (camera, plane) = (sensor().camera, Plane::tilted(1.0, 0.8, -0.7));
     let curve =
         |over, [low, high]: [f64; 2], times| Basis::Curve { over, low, high, nodes: 3, times };
     let map = Basis::Map { width: 320.0, height: 240.0, across: 3, down: 2, times: Times::One };
@@ -241,16 +241,16 @@ fn what_a_shape_does_its_correction_undoes() {
         bias(Basis::RangeNotDepth, &[1.0]),
         bias(curve(Over::Z, [0.5, 4.0], Times::DisparitySquared), &[1.0, 2.0, -1.0]),
         bias(curve(Over::Theta, [0.0, 1.5], Times::One), &[0.0, 0.6, 0.9]),
-        bias(curve(Over::Session, [0.0, 100.0], Times::Lift), &[0.0, 0.02, 0.05]),
+        bias(curve(Over::Session, [0.0, 100.0], Times::Lift), &[0.0, 0.01, 0.02]),
         bias(map, &[0.1, -0.4, 0.6, 0.3, 0.2, -0.5]),
         bias(pair, &[0.5, -0.3, 0.8, 0.4]),
         bias(ring, &[0.4, -0.4, 0.8, 0.2]),
         bias(Basis::Locking { period_px: 3.0 }, &[0.1, 0.05, 0.0, 0.02]),
     ];
-    let quiet = rms(&residuals(&depths(&shots(plane, &[], 0.003, &[0.0])[0]), &plane));
+    let quiet = rms(&residuals(&depths(&shots(plane, &[], 0.001, &[0.0])[0]), &plane));
     for kind in kinds {
         let effects = [shaped(UNEXPLAINED, vec![kind.clone()])];
-        let frame = &shots(plane, &effects, 0.003, &[60.0])[0];
+        let frame = &shots(plane, &effects, 0.001, &[60.0])[0];
         let correction =
             Correction::of(&model(&sensor(), effects.to_vec()), &sensor()).expect("one");
         let mut depth = depths(frame);
@@ -258,8 +258,9 @@ fn what_a_shape_does_its_correction_undoes() {
         let conditions = Conditions { session_s: 60.0, ..Conditions::default() };
         correction.apply(&mut depth, &conditions).expect("applied");
         let after = rms(&residuals(&depth, &plane));
-        assert!(before > 1.2 * quiet, "{kind:?} did nothing: {before}");
-        assert!(after < 1.06 * quiet, "{kind:?}: {before} -> {after}, noise {quiet}");
+        assert!(before > 1.2 * quiet, "{kind:?} did nothing: {before}, noise {quiet}");
+        // A ray length taken for a depth stretches the noise with it, by 9 % here.
+        assert!(after < 1.10 * quiet, "{kind:?}: {before} -> {after}, noise {quiet}");
     }
 }
 
@@ -421,13 +422,13 @@ fn sigma_ratio(recording: &Path) -> f64 {
 #[test]
 fn a_corrected_recording_is_back_at_noise_level() {
     let files = Files::new();
-    let effect = Active::parse("radial-disparity-bias:k_px=0.6").expect("an effect");
+    let effect = Active::parse("radial-disparity-bias:k_px=0.1").expect("an effect");
     let recording = files.recording(METRIC, vec![effect]);
-    files.model(&small(vec![bowl(0.6)]));
+    files.model(&small(vec![bowl(0.1)]));
     let (json, _) = files.correct(&recording, &[]);
     assert_eq!((&json["frames"], &json["clamped"]), (&json!(8), &json!(0)));
     assert!(json["pixels_changed"].as_u64() > Some(100_000), "{json}");
-    assert!((1.0..60.0).contains(&json["rms_shift_mm"].as_f64().expect("a number")), "{json}");
+    assert!((1.0..20.0).contains(&json["rms_shift_mm"].as_f64().expect("a number")), "{json}");
     let (before, after) = (sigma_ratio(&recording), sigma_ratio(&files.at("out")));
     assert!(before > 1.5 && (after - 1.0).abs() < 0.1, "{before} -> {after}");
     // Everything but depth is there, byte for byte.
