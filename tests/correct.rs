@@ -55,9 +55,13 @@ fn bias(basis: Basis, coefficients: &[f64]) -> Term {
 
 /// Frames of a wall through a sensor without noise, or with it.
 fn shots(plane: Plane, effects: &[Effect], sigma_m: f64, sessions: &[f64]) -> Vec<Frame> {
+    shots_of(&Bench::bare(plane, Target::Wall), effects, sigma_m, sessions)
+}
+
+fn shots_of(bench: &Bench, effects: &[Effect], sigma_m: f64, sessions: &[f64]) -> Vec<Frame> {
     let sensor = sensor();
     let rays = sensor.camera.rays();
-    let seen = Seen::of(&Bench::bare(plane, Target::Wall), &sensor.camera, &rays);
+    let seen = Seen::of(bench, &sensor.camera, &rays);
     let domain = Domain { z_m: [0.1, 20.0], theta_rad: [0.0, 1.45] };
     let sigma = SigmaModel::published(Form::Paper, &[sigma_m, 0.0, 0.0, 0.0, 1.0, 1.5], domain);
     let effects = Active::all_of_model(effects).expect("effects");
@@ -140,6 +144,31 @@ fn a_shape_is_its_closed_form_at_chosen_pixels() {
         let off = found[v * 320 + u] - expected;
         assert!(off.abs() < rounding_px(z), "{u} {v}: {off} of {expected}");
     }
+}
+
+/// A bow and a mixed edge belong to the board: the wall behind it has neither.
+#[test]
+fn a_boards_shape_stays_on_the_board() {
+    let plane = Plane::tilted(1.0, 0.0, 0.0);
+    let mut bench = Bench::bare(plane, common::BOARD);
+    bench.wall_m = Some(2.0);
+    let shape = vec![
+        bias(Basis::Bow { degree: 2 }, &[0.05, 0.0, 0.0]),
+        bias(Basis::EdgeMixing { width_px: 3.0 }, &[-0.5]),
+    ];
+    let shot = &shots_of(&bench, &[shaped("target-bow", shape)], SILENT_M, &[0.0])[0];
+    let depth = depths(shot);
+    let found = residuals(&depth, &plane);
+    let camera = sensor().camera;
+    // The board reaches from column 14.5 to 304.5 and from row 3.5 to 235.5.
+    for (u, v) in [(160, 120), (60, 60), (20, 120), (304, 120), (100, 235)] {
+        let right = (u as f64 - camera.cx) / camera.fx;
+        let edge = (u - 14).min(305 - u).min(v - 3).min(236 - v) as f64;
+        let expected = 0.05 * FB * right * right - 0.5 * (-edge / 3.0).exp();
+        let off = found[v * 320 + u] - expected;
+        assert!(off.abs() < rounding_px(1.0), "{u} {v}: {off} of {expected}");
+    }
+    assert!((depth[120 * 320 + 5] - 2.0).abs() < 1e-4, "the wall");
 }
 
 #[test]
