@@ -55,9 +55,13 @@ fn bias(basis: Basis, coefficients: &[f64]) -> Term {
 
 /// Frames of a wall through a sensor without noise, or with it.
 fn shots(plane: Plane, effects: &[Effect], sigma_m: f64, sessions: &[f64]) -> Vec<Frame> {
+    shots_of(&Bench::bare(plane, Target::Wall), effects, sigma_m, sessions)
+}
+
+fn shots_of(bench: &Bench, effects: &[Effect], sigma_m: f64, sessions: &[f64]) -> Vec<Frame> {
     let sensor = sensor();
     let rays = sensor.camera.rays();
-    let seen = Seen::of(&Bench::bare(plane, Target::Wall), &sensor.camera, &rays);
+    let seen = Seen::of(bench, &sensor.camera, &rays);
     let domain = Domain { z_m: [0.1, 20.0], theta_rad: [0.0, 1.45] };
     let sigma = SigmaModel::published(Form::Paper, &[sigma_m, 0.0, 0.0, 0.0, 1.0, 1.5], domain);
     let effects = Active::all_of_model(effects).expect("effects");
@@ -142,6 +146,31 @@ fn a_shape_is_its_closed_form_at_chosen_pixels() {
     }
 }
 
+/// A bow and a mixed edge belong to the board: the wall behind it has neither.
+#[test]
+fn a_boards_shape_stays_on_the_board() {
+    let plane = Plane::tilted(1.0, 0.0, 0.0);
+    let mut bench = Bench::bare(plane, common::BOARD);
+    bench.wall_m = Some(2.0);
+    let shape = vec![
+        bias(Basis::Bow { degree: 2 }, &[0.05, 0.0, 0.0]),
+        bias(Basis::EdgeMixing { width_px: 3.0 }, &[-0.5]),
+    ];
+    let shot = &shots_of(&bench, &[shaped("target-bow", shape)], SILENT_M, &[0.0])[0];
+    let depth = depths(shot);
+    let found = residuals(&depth, &plane);
+    let camera = sensor().camera;
+    // The board reaches from column 14.5 to 304.5 and from row 3.5 to 235.5.
+    for (u, v) in [(160, 120), (60, 60), (20, 120), (304, 120), (100, 235)] {
+        let right = (u as f64 - camera.cx) / camera.fx;
+        let edge = (u - 14).min(305 - u).min(v - 3).min(236 - v) as f64;
+        let expected = 0.05 * FB * right * right - 0.5 * (-edge / 3.0).exp();
+        let off = found[v * 320 + u] - expected;
+        assert!(off.abs() < rounding_px(1.0), "{u} {v}: {off} of {expected}");
+    }
+    assert!((depth[120 * 320 + 5] - 2.0).abs() < 1e-4, "the wall");
+}
+
 #[test]
 fn a_shape_over_the_session_moves_with_it_and_the_rest_stands() {
     let plane = Plane::tilted(1.0, 0.0, 0.0);
@@ -224,7 +253,7 @@ fn what_a_formula_does_its_correction_undoes() {
 /// Each kind of sensor bias by hand; the surface it needs is found in the noisy picture.
 #[test]
 fn what_a_shape_does_its_correction_undoes() {
-    let (camera, plane) = (sensor().camera, Plane::tilted(1.3, 0.8, -0.7));
+    let (camera, plane) = (sensor().camera, Plane::tilted(1.0, 0.8, -0.7));
     let curve =
         |over, [low, high]: [f64; 2], times| Basis::Curve { over, low, high, nodes: 3, times };
     let map = Basis::Map { width: 320.0, height: 240.0, across: 3, down: 2, times: Times::One };
@@ -241,16 +270,16 @@ fn what_a_shape_does_its_correction_undoes() {
         bias(Basis::RangeNotDepth, &[1.0]),
         bias(curve(Over::Z, [0.5, 4.0], Times::DisparitySquared), &[1.0, 2.0, -1.0]),
         bias(curve(Over::Theta, [0.0, 1.5], Times::One), &[0.0, 0.6, 0.9]),
-        bias(curve(Over::Session, [0.0, 100.0], Times::Lift), &[0.0, 0.02, 0.05]),
+        bias(curve(Over::Session, [0.0, 100.0], Times::Lift), &[0.0, 0.01, 0.02]),
         bias(map, &[0.1, -0.4, 0.6, 0.3, 0.2, -0.5]),
         bias(pair, &[0.5, -0.3, 0.8, 0.4]),
         bias(ring, &[0.4, -0.4, 0.8, 0.2]),
         bias(Basis::Locking { period_px: 3.0 }, &[0.1, 0.05, 0.0, 0.02]),
     ];
-    let quiet = rms(&residuals(&depths(&shots(plane, &[], 0.003, &[0.0])[0]), &plane));
+    let quiet = rms(&residuals(&depths(&shots(plane, &[], 0.001, &[0.0])[0]), &plane));
     for kind in kinds {
         let effects = [shaped(UNEXPLAINED, vec![kind.clone()])];
-        let frame = &shots(plane, &effects, 0.003, &[60.0])[0];
+        let frame = &shots(plane, &effects, 0.001, &[60.0])[0];
         let correction =
             Correction::of(&model(&sensor(), effects.to_vec()), &sensor()).expect("one");
         let mut depth = depths(frame);
@@ -258,8 +287,9 @@ fn what_a_shape_does_its_correction_undoes() {
         let conditions = Conditions { session_s: 60.0, ..Conditions::default() };
         correction.apply(&mut depth, &conditions).expect("applied");
         let after = rms(&residuals(&depth, &plane));
-        assert!(before > 1.2 * quiet, "{kind:?} did nothing: {before}");
-        assert!(after < 1.06 * quiet, "{kind:?}: {before} -> {after}, noise {quiet}");
+        assert!(before > 1.2 * quiet, "{kind:?} did nothing: {before}, noise {quiet}");
+        // A ray length taken for a depth stretches the noise with it, by 9 % here.
+        assert!(after < 1.10 * quiet, "{kind:?}: {before} -> {after}, noise {quiet}");
     }
 }
 
@@ -421,13 +451,13 @@ fn sigma_ratio(recording: &Path) -> f64 {
 #[test]
 fn a_corrected_recording_is_back_at_noise_level() {
     let files = Files::new();
-    let effect = Active::parse("radial-disparity-bias:k_px=0.6").expect("an effect");
+    let effect = Active::parse("radial-disparity-bias:k_px=0.1").expect("an effect");
     let recording = files.recording(METRIC, vec![effect]);
-    files.model(&small(vec![bowl(0.6)]));
+    files.model(&small(vec![bowl(0.1)]));
     let (json, _) = files.correct(&recording, &[]);
     assert_eq!((&json["frames"], &json["clamped"]), (&json!(8), &json!(0)));
     assert!(json["pixels_changed"].as_u64() > Some(100_000), "{json}");
-    assert!((1.0..60.0).contains(&json["rms_shift_mm"].as_f64().expect("a number")), "{json}");
+    assert!((1.0..20.0).contains(&json["rms_shift_mm"].as_f64().expect("a number")), "{json}");
     let (before, after) = (sigma_ratio(&recording), sigma_ratio(&files.at("out")));
     assert!(before > 1.5 && (after - 1.0).abs() < 0.1, "{before} -> {after}");
     // Everything but depth is there, byte for byte.

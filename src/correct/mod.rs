@@ -5,6 +5,8 @@
 //! ```
 //! A [`Correction`] does one depth image; [`correct_recording`] does all that lie in a folder.
 
+mod again;
+mod describe;
 mod entries;
 mod files;
 mod locking;
@@ -34,6 +36,13 @@ pub struct Conditions {
     pub temperature_c: Option<f64>,
     /// lx.
     pub ambient_lux: Option<f64>,
+}
+
+impl Conditions {
+    /// A curve over the temperature needs a thermometer.
+    fn tell(&self, term: &Term) -> bool {
+        self.temperature_c.is_some() || !term.needs().temperature
+    }
 }
 
 /// The biases of a sensor, ready to be taken out of its depth images.
@@ -66,9 +75,10 @@ struct Drift {
     time_constant_s: f64,
 }
 
-/// The error of a term is taken at the corrected disparity: substituted until it stays, px. Terms
-/// of a few px that change over tens of px settle in two or three rounds.
-const SETTLED_PX: f64 = 1e-4;
+/// The error of a term is taken at the corrected disparity: substituted until it changes by less, px.
+/// What is left is less again by the term's steepness, a hundredth for terms of a few tenths of a px
+/// over tens of px: two rounds, and a hundred thousandth of a pixel.
+const SETTLED_PX: f64 = 1e-3;
 const MOST_ROUNDS: usize = 8;
 
 impl Correction {
@@ -116,9 +126,11 @@ impl Correction {
             return Ok(());
         }
         let factor = self.scale * self.drifts.iter().map(|d| d.factor(conditions)).product::<f64>();
-        let slopes = self.needs.surface.then(|| self.slopes(depth_m, factor));
+        let slopes = self.needs.slope.then(|| self.slopes(depth_m, factor));
         let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
-        let known = Known { conditions, slopes: slopes.as_ref(), pixels };
+        let terms = self.terms.iter().filter(|t| conditions.tell(t)).collect();
+        let known =
+            Known { conditions, slopes: slopes.as_ref(), pixels, terms, tilt: self.needs.tilt };
         let width = self.camera.width;
         depth_m.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
             let mut scratch = Vec::new();
@@ -148,16 +160,11 @@ impl Correction {
         if self.terms.is_empty() || measured <= 0.0 {
             return measured;
         }
-        let mut place = known.place(i, measured);
+        let mut place = known.place(i);
         let mut d = measured;
         for _ in 0..MOST_ROUNDS {
-            place.at_disparity(d, self.scale_px_m);
-            let bias: f64 = self
-                .terms
-                .iter()
-                .filter(|t| known.knows(t))
-                .map(|t| t.value(&place, scratch))
-                .sum();
+            known.stand(&mut place, i, d);
+            let bias: f64 = known.terms.iter().map(|t| t.value(&place, scratch)).sum();
             let next = measured - bias;
             if !next.is_finite() {
                 return measured;
@@ -191,27 +198,34 @@ struct Known<'a> {
     conditions: &'a Conditions,
     slopes: Option<&'a Slopes>,
     pixels: Pixels<'a>,
+    /// Those that can be evaluated.
+    terms: Vec<&'a Term>,
+    /// Does any of them ask for the tilt?
+    tilt: bool,
 }
 
 impl Known<'_> {
-    /// A curve over the temperature needs a thermometer.
-    fn knows(&self, term: &Term) -> bool {
-        self.conditions.temperature_c.is_some() || !term.needs().temperature
-    }
-
-    fn place(&self, i: usize, disparity: f64) -> Place {
+    fn place(&self, i: usize) -> Place {
         let mut place = self.pixels.place(i);
         place.session_s = self.conditions.session_s;
         place.temperature_c = self.conditions.temperature_c.unwrap_or(0.0);
         place.ambient = self.conditions.ambient_lux.unwrap_or(0.0);
-        if let Some(slopes) = self.slopes {
-            let [along_u, along_v] = slopes.at(i);
-            let Pixels { camera, scale_px_m, .. } = self.pixels;
-            let (qx, qy) = (along_u * camera.fx / scale_px_m, along_v * camera.fy / scale_px_m);
-            let w = disparity / scale_px_m;
-            let q = nalgebra::Vector3::new(qx, qy, w - qx * place.x - qy * place.y);
-            place.lean_on(&Plane::new(q), &self.pixels);
-        }
         place
+    }
+
+    /// Put a surface of this disparity, px, before the pixel, leaning as the picture shows.
+    fn stand(&self, place: &mut Place, i: usize, disparity: f64) {
+        let Pixels { camera, scale_px_m, .. } = self.pixels;
+        place.at_disparity(disparity, scale_px_m);
+        if let Some(slopes) = self.slopes {
+            place.slope = slopes.at(i);
+            if !self.tilt {
+                return;
+            }
+            let [along_u, along_v] = place.slope;
+            let (qx, qy) = (along_u * camera.fx / scale_px_m, along_v * camera.fy / scale_px_m);
+            let qz = disparity / scale_px_m - qx * place.x - qy * place.y;
+            place.lean_on(&Plane::new(nalgebra::Vector3::new(qx, qy, qz)), &self.pixels);
+        }
     }
 }

@@ -9,6 +9,7 @@ use crate::model::SigmaModel;
 
 /// Half a window's side, px: 13 x 13 px bring the slope's noise to a fiftieth of a pixel's a px.
 const REACH: usize = 6;
+const SIDE: usize = 2 * REACH + 1;
 /// A third of the window must be measured.
 const ENOUGH: f64 = 56.0;
 /// A corner window is believed over the middle one when its variance is this much less: an F-ratio
@@ -126,22 +127,22 @@ impl Table {
     }
 
     fn slope(&self, u: usize, v: usize, d: f64, noise: &Noise) -> [f64; 2] {
-        let fit = |du: [usize; 2], dv: [usize; 2]| {
-            let span = |at: usize, [before, after]: [usize; 2], end: usize| {
-                [at.saturating_sub(before), (at + after + 1).min(end)]
-            };
-            LocalPlane::of(&self.window(span(u, du, self.width), span(v, dv, self.height)))
+        // At the picture's border a window is moved in, not cut.
+        let span = |at: usize, before: usize, end: usize| {
+            let first = at.saturating_sub(before).min(end.saturating_sub(SIDE));
+            [first, (first + SIDE).min(end)]
         };
-        const BEFORE: [usize; 2] = [2 * REACH, 0];
-        const AFTER: [usize; 2] = [0, 2 * REACH];
-        let middle = fit([REACH; 2], [REACH; 2]);
+        let fit = |left: usize, above: usize| {
+            LocalPlane::of(&self.window(span(u, left, self.width), span(v, above, self.height)))
+        };
+        let middle = fit(REACH, REACH);
         if let Some(plane) = middle.filter(|p| noise.passes(d, p.variance)) {
             return plane.slope;
         }
-        let corners = [(BEFORE, BEFORE), (BEFORE, AFTER), (AFTER, BEFORE), (AFTER, AFTER)];
+        let corners = [(0, 0), (0, SIDE - 1), (SIDE - 1, 0), (SIDE - 1, SIDE - 1)];
         let best = corners
             .into_iter()
-            .filter_map(|(du, dv)| fit(du, dv))
+            .filter_map(|(left, above)| fit(left, above))
             .min_by(|a, b| a.variance.total_cmp(&b.variance));
         let chosen = match (middle, best) {
             (Some(m), Some(b)) if m.variance > CLEARLY * b.variance => Some(b),

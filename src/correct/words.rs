@@ -28,14 +28,15 @@ impl Words {
 
     /// The word nearest to a positive depth (m), and whether the code ended before it.
     pub fn nearest(&self, z: f32) -> (u16, bool) {
-        let z = f64::from(z);
         let metres = |word| self.code.metres(word).unwrap_or(f64::NAN);
-        if z <= metres(self.near) {
-            return (self.near, z < metres(self.near));
+        for (end, beyond) in
+            [(self.near, z < metres(self.near) as f32), (self.far, z > metres(self.far) as f32)]
+        {
+            if beyond {
+                return (end, true);
+            }
         }
-        if z >= metres(self.far) {
-            return (self.far, z > metres(self.far));
-        }
+        let z = f64::from(z);
         let word = self.code.word(z);
         if self.code.metres(word).is_some() {
             return (word, false);

@@ -170,7 +170,7 @@ impl<'a> Scene<'a> {
         if self.needs.light {
             place.light = f64::from(seen.albedo[i]) / self.grey;
         }
-        if self.needs.surface {
+        if self.needs.slope {
             // n . X is the same all over the surface: the plane is q = n / (n . X).
             let normal = nalgebra::Vector3::from(seen.normal[i].map(f64::from));
             let point = nalgebra::Vector3::new(place.x, place.y, 1.0) * z;

@@ -125,7 +125,7 @@ impl Over {
 }
 
 impl Times {
-    fn value(self, p: &Place) -> f64 {
+    pub(super) fn value(self, p: &Place) -> f64 {
         match self {
             Times::One => 1.0,
             Times::DisparitySquared => (p.disparity / DISPARITY_UNIT_PX).powi(2),
@@ -342,7 +342,7 @@ fn smear(p: &Place, frequency: f64) -> f64 {
 }
 
 /// Number of the node below a value, and the way to the next.
-fn node(value: f64, low: f64, high: f64, nodes: usize) -> (usize, f64) {
+pub(super) fn node(value: f64, low: f64, high: f64, nodes: usize) -> (usize, f64) {
     let last = (nodes - 1) as f64;
     let place = ((value - low) / (high - low).max(1e-12) * last).clamp(0.0, last);
     let k = (place as usize).min(nodes - 2);

@@ -8,8 +8,10 @@ use super::{Statistic, Term};
 pub struct Needs {
     /// Depth or disparity.
     pub depth: bool,
-    /// Slope, tilt or distance of the surface.
-    pub surface: bool,
+    /// Slope of the surface in disparity.
+    pub slope: bool,
+    /// Its tilt, azimuth or distance.
+    pub tilt: bool,
     /// Coordinates on the calibration target, or the way to its edge.
     pub board: bool,
     pub session: bool,
@@ -21,20 +23,22 @@ pub struct Needs {
 impl Needs {
     const PIXEL: Needs = Needs {
         depth: false,
-        surface: false,
+        slope: false,
+        tilt: false,
         board: false,
         session: false,
         temperature: false,
         light: false,
     };
     const DEPTH: Needs = Needs { depth: true, ..Needs::PIXEL };
-    const SURFACE: Needs = Needs { depth: true, surface: true, ..Needs::PIXEL };
+    const SURFACE: Needs = Needs { depth: true, slope: true, tilt: true, ..Needs::PIXEL };
     const BOARD: Needs = Needs { board: true, ..Needs::SURFACE };
 
     pub fn and(self, other: Needs) -> Needs {
         Needs {
             depth: self.depth || other.depth,
-            surface: self.surface || other.surface,
+            slope: self.slope || other.slope,
+            tilt: self.tilt || other.tilt,
             board: self.board || other.board,
             session: self.session || other.session,
             temperature: self.temperature || other.temperature,
@@ -74,9 +78,8 @@ impl Term {
             Basis::Bowl { disparity_power, .. } if *disparity_power == 0.0 => Needs::PIXEL,
             Basis::Bowl { .. } | Basis::RangeNotDepth => Needs::DEPTH,
             Basis::Locking { .. } | Basis::RangeExponent { .. } => Needs::DEPTH,
-            Basis::Lens { .. } | Basis::SlopeNoise { .. } | Basis::TiltAxis { .. } => {
-                Needs::SURFACE
-            }
+            Basis::Lens { .. } => Needs { slope: true, ..Needs::PIXEL },
+            Basis::SlopeNoise { .. } | Basis::TiltAxis { .. } => Needs::SURFACE,
             Basis::Ambient { .. } | Basis::Recalibrate { .. } => Needs::SURFACE,
             Basis::Bow { .. } | Basis::EdgeMixing { .. } => Needs::BOARD,
             Basis::Banding { .. } | Basis::Vignetting { .. } | Basis::Level => Needs::PIXEL,
