@@ -23,6 +23,7 @@ pub struct Survey {
 
 #[derive(Clone)]
 pub struct SurveyedView {
+    pub name: String,
     pub tiles: Vec<Tile>,
     /// Variance of a pixel's mean in units of the model's, times pixels per independent sample.
     pub inflation: f64,
@@ -48,7 +49,13 @@ impl Survey {
             .map(|f| {
                 let (inflation, correlation) = inflation(f);
                 let tiles = tiles(f, camera, rays, start);
-                SurveyedView { tiles, inflation, correlation, frames: independent_frames(f) }
+                SurveyedView {
+                    name: f.name.clone(),
+                    tiles,
+                    inflation,
+                    correlation,
+                    frames: independent_frames(f),
+                }
             })
             .collect();
         relative_light(&mut views);

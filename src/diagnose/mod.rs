@@ -2,9 +2,13 @@
 
 mod bias;
 mod candidate;
+mod detectable;
 mod diagnosis;
+mod engine;
 mod evidence;
 mod field;
+mod findings;
+mod heldout;
 mod known;
 mod lattice;
 mod noise;
@@ -13,12 +17,14 @@ mod layers;
 mod reach;
 mod reference;
 mod search;
+mod shape;
 mod smooth;
 mod structure;
 mod tiles;
 mod variance;
 
 pub use diagnosis::*;
+pub use engine::{DiagnoseOptions, Diagnosed, diagnose};
 pub use field::Field;
 pub use known::Known;
 pub use lattice::{Lattice, Words};

@@ -7,7 +7,7 @@ use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain, Null, Rows, gain};
 use super::tiles::SIDE;
 use crate::rng::Seed;
-use crate::terms::{Basis, Place};
+use crate::terms::{Basis, Place, Term};
 
 /// One view's samples.
 pub struct ViewData {
@@ -130,6 +130,12 @@ pub fn search(
     Outcome { chosen, looks: layer.looks, fit, evidence, noise, remaining }
 }
 
+/// Evidence of views on given terms together.
+pub fn evidence_of(data: &[ViewData], terms: &[Term]) -> Vec<Evidence> {
+    let bases: Vec<&Basis> = terms.iter().map(|t| &t.basis).collect();
+    data.par_iter().filter_map(|v| Some(rows(v, &bases, &[])?.reduce(0, |_, _| ()))).collect()
+}
+
 /// The greatest gains that noise alone brings, ascending, nats.
 #[derive(Debug, Clone, Default)]
 pub struct NoiseGains(Vec<f64>);
@@ -140,7 +146,7 @@ const REPLICATES: u64 = 600;
 const TAIL: f64 = 0.1;
 
 impl NoiseGains {
-    fn of(nulls: &[&Null], seed: Seed) -> Self {
+    pub fn of(nulls: &[&Null], seed: Seed) -> Self {
         let mut greatest: Vec<f64> = (0..REPLICATES)
             .into_par_iter()
             .map(|replicate| {
