@@ -19,7 +19,7 @@ pub fn detectable(
     camera: &Camera,
 ) -> Vec<Detectable> {
     let mean: Vec<ViewData> = survey.mean_data().iter().map(coarser).collect();
-    let blocks = survey.variance_data(&[]);
+    let blocks = survey.variance_data();
     let half = |[low, high]: [f64; 2]| (0.5 * (high - low)).powi(2);
     let (fx, fy) = (camera.fx, camera.fy);
     let bow = half(survey.reach.right);
@@ -50,7 +50,7 @@ pub fn detectable(
         add(&mut all, (effect, name), &mean, bias, Statistic::Bias, basis, unit, |a| a);
     }
     let spreads: Vec<(&'static str, &'static str, Basis, fn(f64) -> f64)> = vec![
-        ("range-exponent", "excess", Basis::RangeExponent { pivot_m: 2.0 }, |a| 0.5 * a),
+        ("range-exponent", "excess", Basis::RangeExponent { pivot_m: 2.0, orders: 1 }, |a| 0.5 * a),
         ("vignetting", "growth", Basis::Vignetting { orders: 1 }, |a| (0.5 * a).exp() - 1.0),
         (
             "slope-noise",

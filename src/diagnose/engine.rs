@@ -16,18 +16,19 @@ use super::heldout;
 use super::known::Known;
 use super::lattice::{Lattice, Words};
 use super::layers::Survey;
-use super::noise::hanging;
+use super::noise::{hanging, tails};
 use super::parameters::estimate;
 use super::reference;
 use super::search::Outcome;
-use super::structure::structures;
+use super::smooth::{SMOOTH_PX, high_pass};
+use super::structure::{Structure, structures, tail};
 use super::tiles::Places;
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
 use crate::measure::{MeasureOptions, Workbench};
 use crate::model::{Effect, NoiseModel, UNEXPLAINED};
 use crate::rng::Seed;
-use crate::terms::{Axis, Basis, Statistic, Term, corner_radius};
+use crate::terms::{Axis, Basis, Place, Statistic, Term, corner_radius};
 use crate::view::{Excluded, Recording};
 
 /// Settings of a diagnosis.
@@ -78,7 +79,12 @@ pub fn diagnose(
         MeasureOptions { seed: options.seed, ..MeasureOptions::default() },
     );
     let known = Known::of(model, camera);
-    let (fields, excluded) = read(recording, &bench, model, &known, progress);
+    let (mut fields, mut excluded) = read(recording, &bench, model, &known, progress);
+    let mut found = Vec::new();
+    if let Some(flat) = as_ranges(recording, &bench, model, &known, fields.len()) {
+        (fields, excluded) = flat;
+        found.push(ranges());
+    }
     if fields.len() < FEWEST_VIEWS {
         let first = excluded
             .first()
@@ -89,30 +95,60 @@ pub fn diagnose(
             "a diagnosis needs at least three views of a plane",
         ));
     }
-    let survey = Survey::of(&fields, camera, &bench.rays);
+    let mut survey = Survey::of(&fields, camera, &bench.rays);
+    survey.fixed_px2 = fixed_px2(&structures(&fields, camera, &[]));
     let scale_px_m = fields[0].scale_px_m;
     let corner = corner_radius(camera);
     // One error rate for everything: half to the mean, a quarter to the variance, the rest shared.
     let level = options.level;
     let bias = survey.search_bias(camera, 0.4 * level, options.seed);
     let bias_terms = terms_of(&bias, Statistic::Bias);
-    let variance =
-        survey.search_variance(&bias_terms, &model.sigma, camera, 0.25 * level, options.seed);
-    let bias_scene = Scene::bias(&survey, scale_px_m, corner);
-    let variance_scene = Scene::variance(&survey, &bias_terms, scale_px_m, corner);
-    let mut found = findings::findings(&bias_scene, &bias);
-    found.extend(findings::findings(&variance_scene, &variance));
-    let sigma_mm = typical_sigma_mm(&fields);
-    let fine = fine_bias(&fields, &bias_terms, &bench);
-    let structure = structures(&fields, camera, &fine);
+    let bias_px = pixel_terms(&fields, &bias_terms, &survey, &bench);
+    let mut structure = structures(&fields, camera, &bias_px);
     let lattice = lattice(&fields, recording);
+    let rows_px2 = mean_of(structure.iter().filter_map(|s| s.row_px2));
+    let fixed_px2 = fixed_px2(&structure);
+    let extra = |p: &Place| {
+        let depth_px = lattice.depth_step_m.unwrap_or(0.0) * scale_px_m / (p.z * p.z);
+        let step_px = lattice.disparity_step_px.unwrap_or(0.0);
+        // Words of a raw sensor are in the model's variance already.
+        let step_px = if is_raw(recording) { 0.0 } else { step_px };
+        (depth_px * depth_px + step_px * step_px) / 12.0 + rows_px2 + fixed_px2
+    };
+    survey.roughen(&fields, &bias_px, extra);
+    let variance = survey.search_variance(&model.sigma, camera, 0.25 * level, options.seed);
+    let variance_terms = terms_of(&variance, Statistic::Variance);
+    let bias_scene = Scene::bias(&survey, scale_px_m, corner);
+    let variance_scene = Scene::variance(&survey, scale_px_m, corner);
+    let sigma_mm = typical_sigma_mm(&fields);
+    measure_tails(&mut structure, &fields, &bias_px, &variance_terms, &survey, &bench);
+    let tails = tails(&structure, &known);
+    let mut terms = findings::findings(&bias_scene, &bias);
+    terms.extend(findings::findings(&variance_scene, &variance));
+    let steps = steps(&lattice, &known, &fields, recording, sigma_mm);
+    // Steps shift the mean within a step, and gross errors add to the variance: neither is news.
+    let coarsest = lattice.disparity_step_px.unwrap_or(0.0).max(
+        lattice.depth_step_m.map_or(0.0, |s| s * scale_px_m / survey.reach.z[0].powi(2)),
+    );
+    terms.retain(|f| {
+        let stepped = !steps.is_empty()
+            && f.effect.is_none()
+            && f.statistic == Statistic::Bias
+            && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)
+            && f.size.sigma * typical_sigma_px(&fields) < 0.5 * coarsest;
+        let tailed = tails.is_some() && f.status == Status::Recalibrate;
+        !stepped && !tailed
+    });
+    found.extend(terms);
     found.extend(
         hanging(&structure, &known, 0.03 * level)
             .into_iter()
+            .chain(tails)
             .map(|h| findings::hanging(h, sigma_mm)),
     );
-    found.extend(steps(&lattice, &known, &fields, recording, sigma_mm));
-    let references = reference::laws(&fields);
+    found.extend(steps);
+    let levels = heldout::levels(&survey, &bias_terms);
+    let references = reference::laws(&fields, &levels);
     found.extend(reference::findings(&references, &known, 0.1 * level, options.seed));
     let mismatch = found.iter().any(|f| f.status != Status::NotIdentifiable);
     let cannot_tell = reference::cannot_tell(&fields);
@@ -143,6 +179,101 @@ pub fn diagnose(
         remarks,
     };
     Ok(Diagnosed { diagnosis, model: extended, fields, bias: bias_terms, excluded })
+}
+
+/// Do the views become flat once their words are taken for lengths of rays? Then with them.
+fn as_ranges(
+    recording: &Recording,
+    bench: &Workbench<'_>,
+    model: &NoiseModel,
+    known: &Known,
+    flat: usize,
+) -> Option<(Vec<Field>, Vec<Excluded>)> {
+    if 2 * flat >= recording.views.len() || known.has("range-not-depth") {
+        return None;
+    }
+    let bench = Workbench { ranges: true, ..Workbench::new(bench.sensor, bench.options) };
+    let mut told = known.clone();
+    told.bias.push(range_term());
+    let (fields, excluded) = read(recording, &bench, model, &told, &|_, _| ());
+    (fields.len() >= FEWEST_VIEWS && fields.len() > 2 * flat).then_some((fields, excluded))
+}
+
+fn range_term() -> Term {
+    Term { statistic: Statistic::Bias, basis: Basis::RangeNotDepth, coefficients: vec![1.0] }
+}
+
+/// The finding that goes with [`as_ranges`].
+fn ranges() -> Finding {
+    let effect = "range-not-depth";
+    let (statistic, axis) = (Statistic::Bias, Axis::Radius);
+    let mut parameters = Map::new();
+    parameters.insert("share".into(), estimate(1.0, 0.01));
+    Finding {
+        status: Status::Named,
+        effect: Some(effect),
+        alternatives: vec![super::diagnosis::Alternative { effect, probability: 0.98 }],
+        statistic,
+        axis,
+        interval: [0.0, 0.0],
+        unit: axis.unit(),
+        share: 1e6,
+        parameters,
+        size: Size::default(),
+        p_adjusted: 1e-9,
+        physics: findings::physics(Status::Named, Some(effect), statistic, axis, None),
+        next_view: None,
+        shape: None,
+        curve: None,
+        terms: vec![range_term()],
+    }
+}
+
+fn is_raw(recording: &Recording) -> bool {
+    matches!(recording.sensor.code, DepthCode::Disparity { .. })
+}
+
+fn mean_of(values: impl Iterator<Item = f64>) -> f64 {
+    let (mut sum, mut n) = (0.0, 0.0);
+    for v in values.filter(|v| v.is_finite()) {
+        sum += v;
+        n += 1.0;
+    }
+    f64::max(sum / f64::max(n, 1.0), 0.0)
+}
+
+/// Variance of the pixels' constant errors, px^2.
+fn fixed_px2(structure: &[Structure]) -> f64 {
+    mean_of(structure.iter().filter_map(|s| s.fixed_px2))
+}
+
+fn typical_sigma_px(fields: &[Field]) -> f64 {
+    let mut all: Vec<f32> =
+        fields.iter().filter_map(|f| f.sigma.get(f.sigma.len() / 2).copied()).collect();
+    f64::from(crate::stats::median_in_place(&mut all))
+}
+
+fn measure_tails(
+    structure: &mut [Structure],
+    fields: &[Field],
+    bias: &[Vec<f32>],
+    variance: &[Term],
+    survey: &Survey,
+    bench: &Workbench<'_>,
+) {
+    let factors = pixel_terms(fields, variance, survey, bench);
+    let camera = &bench.sensor.camera;
+    structure.par_iter_mut().zip(fields).enumerate().for_each(|(n, (s, field))| {
+        let Some(first) = field.first.first() else { return };
+        let whitened: Vec<f32> = (0..first.len())
+            .map(|k| {
+                let factor = factors.get(n).map_or(1.0, |f| (0.5 * f[k]).exp());
+                (first[k] - bias.get(n).map_or(0.0, |b| b[k])) / (field.sigma[k] * factor)
+            })
+            .collect();
+        let image = high_pass(&field.image(&whitened), field.width, field.height, SMOOTH_PX);
+        (s.tail, s.tail_pixels, s.tail_size) = tail(&image, camera);
+    });
 }
 
 fn read(
@@ -197,25 +328,27 @@ fn typical_sigma_mm(fields: &[Field]) -> f64 {
     f64::from(crate::stats::median_in_place(&mut all))
 }
 
-/// What was found of the mean at every pixel, where it changes within a few of them: errors that
-/// stand still are no noise.
-fn fine_bias(fields: &[Field], bias: &[Term], bench: &Workbench<'_>) -> Vec<Vec<f32>> {
-    let shows = |t: &&Term| {
-        t.basis.is_fine() || t.basis.of_column_alone() || matches!(t.basis.axis(), Axis::Row)
-    };
-    let fine: Vec<&Term> = bias.iter().filter(shows).collect();
-    if fine.is_empty() {
+/// The terms at every pixel; empty when there are none.
+fn pixel_terms(
+    fields: &[Field],
+    terms: &[Term],
+    survey: &Survey,
+    bench: &Workbench<'_>,
+) -> Vec<Vec<f32>> {
+    if terms.is_empty() {
         return Vec::new();
     }
+    let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
     fields
         .par_iter()
         .map(|f| {
-            let places = Places::of(f, &bench.sensor.camera, &bench.rays, f.time_s);
+            let places = Places::of(f, &bench.sensor.camera, &bench.rays, start);
             let mut row = Vec::new();
             (0..f.pixels.len())
                 .map(|k| {
-                    let place = places.pixel(k);
-                    fine.iter().map(|t| t.value(&place, &mut row)).sum::<f64>() as f32
+                    let mut place = places.pixel(k);
+                    place.light = survey.light.of(f, k, &place);
+                    terms.iter().map(|t| t.value(&place, &mut row)).sum::<f64>() as f32
                 })
                 .collect()
         })

@@ -6,7 +6,7 @@
 use crate::camera::Rays;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
-use crate::frame::{DepthCode, DepthTable, Frame};
+use crate::frame::{DepthTable, Frame};
 use crate::io::{FrameSource, InfraredImage};
 use crate::measure::{Workbench, view_target};
 use crate::model::SigmaModel;
@@ -79,7 +79,7 @@ impl Field {
         let target = view_target(view, bench)?;
         let camera = &bench.sensor.camera;
         let mut field = Field::empty(view, bench.sensor, target.plane, target.pixels);
-        field.sigma = field.expected_sigma(&bench.rays, sigma, &bench.sensor.code);
+        field.sigma = field.expected_sigma(&bench.rays, sigma);
         let expected = field.known_bias(known, bench, session_start);
         field.spread_px = (target.scale * field.scale_px_m) as f32;
         let mut source = FrameSource::new(camera.width, camera.height);
@@ -111,6 +111,23 @@ impl Field {
             (f64::from(amplitude) * far / facing) as f32
         });
         self.light = light.collect();
+    }
+
+    /// Variance of the frames' means, px^2: what moves as a whole is not the pixels' noise.
+    pub fn moved_px2(&self) -> f64 {
+        let means: Vec<f64> = self.frames.iter().map(|f| f.1).filter(|m| m.is_finite()).collect();
+        let n = means.len() as f64;
+        if n < 2.0 {
+            return 0.0;
+        }
+        let mean = means.iter().sum::<f64>() / n;
+        means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / n
+    }
+
+    /// Pixels measured in a frame, on average.
+    pub fn measured_pixels(&self) -> f64 {
+        let measured: f64 = self.measured.iter().map(|&n| f64::from(n)).sum();
+        measured / self.frames.len().max(1) as f64
     }
 
     /// Values of the target's pixels as an image, NaN elsewhere.
@@ -151,15 +168,12 @@ impl Field {
     }
 
     /// Sigma of the disparity at each pixel, px.
-    fn expected_sigma(&self, rays: &Rays, sigma: &SigmaModel, code: &DepthCode) -> Vec<f32> {
+    fn expected_sigma(&self, rays: &Rays, sigma: &SigmaModel) -> Vec<f32> {
         let theta = self.plane.theta();
         let of = |&i: &u32| {
             let (x, y) = rays.at(i as usize);
             let z = self.plane.depth(x, y);
-            // Words are rounded: uniform over a step, in inverse depth.
-            let step = code.step_inverse(z) * self.scale_px_m;
-            let sigma = sigma.axial_sigma(z, theta) * self.scale_px_m / (z * z);
-            (sigma * sigma + step * step / 12.0).sqrt() as f32
+            (sigma.axial_sigma(z, theta) * self.scale_px_m / (z * z)) as f32
         };
         self.pixels.iter().map(of).collect()
     }

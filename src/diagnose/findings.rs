@@ -29,13 +29,8 @@ impl<'a> Scene<'a> {
         Scene { statistic: Statistic::Bias, survey, data, scale_px_m, corner_px }
     }
 
-    pub fn variance(
-        survey: &'a Survey,
-        bias: &[Term],
-        scale_px_m: f64,
-        corner_px: f64,
-    ) -> Self {
-        let data = survey.variance_data(bias);
+    pub fn variance(survey: &'a Survey, scale_px_m: f64, corner_px: f64) -> Self {
+        let data = survey.variance_data();
         Scene { statistic: Statistic::Variance, survey, data, scale_px_m, corner_px }
     }
 

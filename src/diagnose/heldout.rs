@@ -40,7 +40,6 @@ pub fn score(
     let bias = chosen_on.search_bias(camera, 0.4 * level, options.seed);
     let bias_terms = terms_of(&bias, Statistic::Bias);
     let variance = chosen_on.search_variance(
-        &bias_terms,
         &model.sigma,
         camera,
         0.25 * level,
@@ -48,7 +47,7 @@ pub fn score(
     );
     let variance_terms = terms_of(&variance, Statistic::Variance);
     let means: Vec<ViewData> = judged_on.mean_data().iter().map(coarser).collect();
-    let blocks = judged_on.variance_data(&bias_terms);
+    let blocks = judged_on.variance_data();
     let mut before = Vec::new();
     let mut gains = Vec::new();
     for (mean, block) in means.iter().zip(&blocks) {
@@ -124,31 +123,43 @@ fn rms(views: &[SurveyedView], terms: &[Term], scale_px_m: f64) -> Rms {
     Rms { px: (px / n).sqrt(), mm: (mm / n).sqrt() }
 }
 
-/// The terms' values at the tiles, with the plane fitted anew.
-fn fitted(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
+/// What each view's disparity on the optical axis changes by once the terms are taken out, px.
+pub fn levels(survey: &Survey, terms: &[Term]) -> Vec<f64> {
+    survey.views.iter().map(|v| plane_left(v, &values(v, terms)).map_or(0.0, |p| p[0])).collect()
+}
+
+fn values(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
     let mut row = Vec::new();
-    let mut values: Vec<f64> = view
-        .tiles
+    view.tiles
         .iter()
         .map(|t| terms.iter().map(|term| term.value(&t.place, &mut row)).sum())
-        .collect();
+        .collect()
+}
+
+/// The terms' values at the tiles, with the plane fitted anew.
+fn fitted(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
+    let mut values = values(view, terms);
     // What is left after the terms has a plane of its own: it goes with them.
-    let left = view.tiles.iter().zip(&values).map(|(t, f)| (t.mean - f, t.pixels));
+    if let Some(plane) = plane_left(view, &values) {
+        for (t, f) in view.tiles.iter().zip(&mut values) {
+            *f += plane[0] + plane[1] * t.place.x + plane[2] * t.place.y;
+        }
+    }
+    values
+}
+
+fn plane_left(view: &SurveyedView, values: &[f64]) -> Option<nalgebra::Vector3<f64>> {
     let mut a = nalgebra::Matrix3::zeros();
     let mut b = nalgebra::Vector3::zeros();
-    for (t, (y, w)) in view.tiles.iter().zip(left) {
+    for (t, f) in view.tiles.iter().zip(values) {
+        let (y, w) = (t.mean - f, t.pixels);
         if y.is_finite() {
             let x = nalgebra::Vector3::new(1.0, t.place.x, t.place.y);
             a += w * x * x.transpose();
             b += w * y * x;
         }
     }
-    if let Some(plane) = a.lu().solve(&b) {
-        for (t, f) in view.tiles.iter().zip(&mut values) {
-            *f += plane[0] + plane[1] * t.place.x + plane[2] * t.place.y;
-        }
-    }
-    values
+    a.lu().solve(&b)
 }
 
 /// Root mean square of each view's mean residual with the terms taken out, px.

@@ -73,7 +73,7 @@ fn formula(id: &str, parameters: &Map<String, Value>, camera: &Camera) -> Vec<Te
             .zip(get("period_px"))
             .and_then(|(a, period)| bias(columns(camera), saw_tooth(camera, a, period))),
         "range-exponent" => get("excess")
-            .and_then(|x| variance(Basis::RangeExponent { pivot_m: 2.0 }, vec![2.0 * x])),
+            .and_then(|x| variance(Basis::RangeExponent { pivot_m: 2.0, orders: 1 }, vec![2.0 * x])),
         "vignetting" => get("growth").and_then(|growth| {
             let nodes = 33;
             let values = (0..nodes)
@@ -89,7 +89,7 @@ fn formula(id: &str, parameters: &Map<String, Value>, camera: &Camera) -> Vec<Te
             variance(Basis::TiltAxis { tilt_power: 2 }, vec![ratio.ln() / 0.75])
         }),
         "intensity-dependent-noise" => {
-            get("exponent").and_then(|x| variance(Basis::Intensity, vec![-2.0 * x]))
+            get("exponent").and_then(|x| variance(Basis::Intensity { orders: 1 }, vec![-2.0 * x]))
         }
         "ambient-light" => {
             get("ratio").and_then(|ratio| variance(Basis::Ambient { ratio }, vec![1.0]))

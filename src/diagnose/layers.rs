@@ -13,12 +13,32 @@ use crate::camera::{Camera, Rays};
 use crate::model::SigmaModel;
 use crate::rng::Seed;
 use crate::stats::{Correlation, measure_correlation};
-use crate::terms::{Place, Term};
+use crate::terms::Place;
 
 /// The tiles of all views, with how much each view is worth.
 pub struct Survey {
     pub views: Vec<SurveyedView>,
     pub reach: Reach,
+    /// Variance of what each pixel errs by in every view alike, px^2.
+    pub fixed_px2: f64,
+    pub light: Light,
+}
+
+/// How infrared amplitudes become the light of surfaces.
+#[derive(Debug, Clone, Copy)]
+pub struct Light {
+    /// Of the recording, in the image's own units; 0 where there is no infrared.
+    median: f64,
+    ambient_share: f64,
+}
+
+impl Light {
+    /// Of a single pixel.
+    pub fn of(&self, field: &Field, k: usize, p: &Place) -> f64 {
+        let Some(&light) = field.light.get(k) else { return 1.0 };
+        let own = f64::from(light) / (1.0 + self.ambient_share * p.ambient * far(p));
+        if self.median > 0.0 && own.is_finite() { own / self.median } else { 1.0 }
+    }
 }
 
 #[derive(Clone)]
@@ -58,9 +78,9 @@ impl Survey {
                 }
             })
             .collect();
-        relative_light(&mut views);
+        let light = relative_light(&mut views);
         let reach = Reach::of(views.iter().flat_map(|v| v.tiles.iter()));
-        Survey { views, reach }
+        Survey { views, reach, fixed_px2: 0.0, light }
     }
 
     /// The views' mean residuals, about a plane of their own each.
@@ -69,8 +89,14 @@ impl Survey {
     }
 
     pub fn search_bias(&self, camera: &Camera, level: f64, seed: Seed) -> Outcome {
-        let rules =
-            Rules { level, prior: BIAS_PRIOR, adequacy: ADEQUATE, most_terms: MOST_TERMS };
+        let rules = Rules {
+            level,
+            prior: BIAS_PRIOR,
+            adequacy: ADEQUATE,
+            most_terms: MOST_TERMS,
+            fixed: (self.fixed_px2 > 0.0)
+                .then(|| (self.fixed_px2.sqrt(), camera.pixels() as f64)),
+        };
         let mut candidates = bias::families(camera, &self.reach);
         candidates.extend(bias::curves(camera, &self.reach));
         let fine = self.mean_data();
@@ -82,46 +108,104 @@ impl Survey {
     pub fn subset(&self, which: &[usize]) -> Survey {
         let views: Vec<SurveyedView> = which.iter().map(|&n| self.views[n].clone()).collect();
         let reach = Reach::of(views.iter().flat_map(|v| v.tiles.iter()));
-        Survey { views, reach }
+        Survey { views, reach, fixed_px2: self.fixed_px2, light: self.light }
     }
 
-    /// Log variance over the model's, block by block, once the terms of the bias are taken out.
-    pub fn variance_data(&self, bias: &[Term]) -> Vec<ViewData> {
-        let blocks: Vec<Blocks> = self.views.par_iter().map(|v| Blocks::of(v, bias)).collect();
+    /// With what is known of the mean taken out of what the noise is measured on, view by view
+    /// and pixel by pixel, px; and with variance that has another name already, px^2.
+    pub fn roughen(&mut self, fields: &[Field], bias: &[Vec<f32>], extra: impl Fn(&Place) -> f64 + Sync) {
+        let width = fields.first().map_or(0, |f| f.width);
+        self.views.par_iter_mut().zip(fields).enumerate().for_each(|(n, (view, field))| {
+            if let Some(bias) = bias.get(n) {
+                super::tiles::roughen(&mut view.tiles, field, bias, width);
+            }
+            for t in &mut view.tiles {
+                t.variance += extra(&t.place);
+                t.place.variance = t.variance;
+            }
+        });
+    }
+
+    /// Log variance over the model's, block by block.
+    pub fn variance_data(&self) -> Vec<ViewData> {
+        let blocks: Vec<Blocks> = self.views.par_iter().map(Blocks::of).collect();
         let scatter = view_scatter(&blocks);
         blocks.into_iter().map(|b| b.data(scatter)).collect()
     }
 
     pub fn search_variance(
         &self,
-        bias: &[Term],
         sigma: &SigmaModel,
         camera: &Camera,
         level: f64,
         seed: Seed,
     ) -> Outcome {
-        let rules =
-            Rules { level, prior: VARIANCE_PRIOR, adequacy: ADEQUATE, most_terms: MOST_TERMS };
+        let rules = Rules {
+            level,
+            prior: VARIANCE_PRIOR,
+            adequacy: ADEQUATE,
+            most_terms: MOST_TERMS,
+            fixed: None,
+        };
         let mut candidates = variance::families(&self.reach, sigma);
         candidates.extend(variance::curves(camera, &self.reach));
-        let data = self.variance_data(bias);
+        let data = self.variance_data();
         search(&data, &data, &candidates, &rules, seed)
     }
 }
 
-/// Light in units of the recording's median.
-fn relative_light(views: &mut [SurveyedView]) {
-    let mut all: Vec<f32> = views
-        .iter()
-        .flat_map(|v| v.tiles.iter().map(|t| t.place.light as f32))
-        .filter(|l| l.is_finite())
-        .collect();
+/// Light in units of the recording's median, what the room adds taken out.
+fn relative_light(views: &mut [SurveyedView]) -> Light {
+    let share = ambient_share(views);
+    let mut all: Vec<f32> = Vec::new();
+    for tile in views.iter_mut().flat_map(|v| &mut v.tiles) {
+        let p = &mut tile.place;
+        p.light /= 1.0 + share * p.ambient * far(p);
+        if p.light.is_finite() {
+            all.push(p.light as f32);
+        }
+    }
     let median = f64::from(crate::stats::median_in_place(&mut all));
     let usable = median > 0.0;
     for tile in views.iter_mut().flat_map(|v| &mut v.tiles) {
         let light = tile.place.light / median;
         tile.place.light = if usable && light.is_finite() { light } else { 1.0 };
     }
+    Light { median: if usable { median } else { 0.0 }, ambient_share: share }
+}
+
+/// By this the pattern's light has fallen.
+fn far(p: &Place) -> f64 {
+    p.z * p.z * (1.0 + p.x * p.x + p.y * p.y) / p.theta.cos().max(0.05)
+}
+
+/// Light of the room in the infrared image, a lux over the pattern at 1 m: amplitude times `far`
+/// is a (1 + share lux far), a line through the views' medians.
+fn ambient_share(views: &[SurveyedView]) -> f64 {
+    let points: Vec<(f64, f64)> = views
+        .iter()
+        .filter_map(|v| {
+            let mut light: Vec<f32> = v.tiles.iter().map(|t| t.place.light as f32).collect();
+            light.retain(|l| l.is_finite());
+            let middle = v.tiles.get(v.tiles.len() / 2)?.place;
+            let x = middle.ambient * far(&middle);
+            let y = f64::from(crate::stats::median_in_place(&mut light));
+            (x > 0.0 && y > 0.0).then_some((x, y))
+        })
+        .collect();
+    let n = points.len() as f64;
+    if n < 4.0 {
+        return 0.0;
+    }
+    let (x0, y0) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
+    let (mut xx, mut xy) = (0.0, 0.0);
+    for (x, y) in points {
+        xx += (x - x0).powi(2);
+        xy += (x - x0) * (y - y0);
+    }
+    let slope = if xx > 0.0 { xy / xx } else { 0.0 };
+    let level = y0 - slope * x0;
+    if level > 0.0 { (slope / level).max(0.0) } else { 0.0 }
 }
 
 fn mean_data(view: &SurveyedView) -> ViewData {
@@ -187,13 +271,12 @@ struct Blocks {
 const BLOCK_TILES: usize = 6;
 
 impl Blocks {
-    fn of(view: &SurveyedView, bias: &[Term]) -> Self {
-        let fitted = rough_bias(&view.tiles, bias);
+    fn of(view: &SurveyedView) -> Self {
         let side = (BLOCK_TILES * SIDE) as f64;
         let mut sums: std::collections::BTreeMap<(u32, u32), Sum> = Default::default();
-        for (t, bias) in view.tiles.iter().zip(&fitted) {
+        for t in &view.tiles {
             let key = ((t.place.v / side) as u32, (t.place.u / side) as u32);
-            sums.entry(key).or_default().add(t, *bias);
+            sums.entry(key).or_default().add(t);
         }
         // What the box's mean took with it.
         let kept = 1.0 - view.correlation.sum / (SMOOTH_PX * SMOOTH_PX) as f64;
@@ -241,10 +324,8 @@ struct Sum {
 }
 
 impl Sum {
-    fn add(&mut self, t: &Tile, bias: f64) {
-        // The rough part of the mean without the rough part of the bias.
-        let rough = t.rough_square - 2.0 * bias * t.rough + bias * bias;
-        let square = t.temporal + rough;
+    fn add(&mut self, t: &Tile) {
+        let square = t.temporal + t.rough_square;
         if !square.is_finite() {
             return;
         }
@@ -272,26 +353,8 @@ impl Sum {
     }
 }
 
-/// The bias at the tiles, without what is smooth, px.
-fn rough_bias(tiles: &[Tile], bias: &[Term]) -> Vec<f64> {
-    if bias.is_empty() {
-        return vec![0.0; tiles.len()];
-    }
-    let side = SIDE as f64;
-    let across = tiles.iter().map(|t| (t.place.u / side) as usize + 1).max().unwrap_or(1);
-    let down = tiles.iter().map(|t| (t.place.v / side) as usize + 1).max().unwrap_or(1);
-    let at = |t: &Tile| (t.place.v / side) as usize * across + (t.place.u / side) as usize;
-    let mut image = vec![f32::NAN; across * down];
-    let mut row = Vec::new();
-    for t in tiles {
-        image[at(t)] = bias.iter().map(|b| b.value(&t.place, &mut row)).sum::<f64>() as f32;
-    }
-    let rough = high_pass(&image, across, down, SMOOTH_PX / SIDE);
-    tiles.iter().map(|t| f64::from(rough[at(t)])).collect()
-}
-
 /// A model's sigma is not known better than this from view to view, in log variance.
-const MODEL_TOLERANCE: f64 = 0.05;
+const MODEL_TOLERANCE: f64 = 0.1;
 
 /// Variance of the views' own levels beyond what their samples explain (DerSimonian and Laird's
 /// moment estimate), about a line in log z: what a law of the distance explains is no scatter.

@@ -58,8 +58,12 @@ pub fn hanging(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
     found.extend(window(views, known, level));
     found.extend(in_time(views, known, level));
     found.extend(lines(views, known, level));
-    found.extend(frames(views, known, level));
-    found.extend(tails(views, known));
+    let rho = found
+        .iter()
+        .find(|h| h.families.first() == Some(&"temporal-correlation"))
+        .and_then(|h| h.parameters["rho"]["value"].as_f64())
+        .unwrap_or(0.0);
+    found.extend(frames(views, known, level, rho));
     found
 }
 
@@ -97,7 +101,7 @@ fn window(views: &[Structure], known: &Known, level: f64) -> Option<Hanging> {
 }
 
 /// Correlations smaller than this are not worth a word.
-const LEAST_CORRELATION: f64 = 0.015;
+const LEAST_CORRELATION: f64 = 0.03;
 
 fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
     let mut found = Vec::new();
@@ -245,7 +249,7 @@ fn lines(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
 /// The frames' means scatter by this factor more before it is called jitter.
 const JITTER: f64 = 2.0;
 
-fn frames(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
+fn frames(views: &[Structure], known: &Known, level: f64, rho: f64) -> Vec<Hanging> {
     let all: Vec<_> = views.iter().filter_map(|s| s.jitter).collect();
     let freedom: f64 = all.iter().map(|j| j.freedom).sum();
     if all.len() < 2 || freedom < 2.0 {
@@ -259,7 +263,9 @@ fn frames(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
     let per_trend = trend / n;
     let per_scatter = (scatter / freedom)
         .max(all.iter().map(|j| j.expected_px2).sum::<f64>() / n);
-    let f = per_trend / per_scatter.max(1e-300);
+    // Frames that resemble their neighbours wander.
+    let wander = (1.0 + rho) / (1.0 - rho).max(0.05);
+    let f = per_trend / (per_scatter * wander * wander).max(1e-300);
     let p_motion = FisherSnedecor::new(n, freedom).map_or(1.0, |d| 1.0 - d.cdf(f));
     let moving = p_motion < level && f > 3.0 && !known.has("target-motion");
     if moving {
@@ -308,7 +314,7 @@ fn frames(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
 /// A tail is heavy from this many times a Gaussian's share on, in most views.
 const HEAVY: f64 = 6.0;
 
-fn tails(views: &[Structure], known: &Known) -> Option<Hanging> {
+pub fn tails(views: &[Structure], known: &Known) -> Option<Hanging> {
     if known.has("heavy-tails") {
         return None;
     }

@@ -52,7 +52,13 @@ pub fn parameters(
             });
         }
         Basis::EdgeMixing { .. } => add("amplitude_px", &|b| b[0]),
-        Basis::RangeExponent { .. } => add("excess", &|b| 0.5 * b[0]),
+        Basis::RangeExponent { pivot_m, .. } => add("excess", &|b| {
+            // Between the ends of what was seen.
+            let at = |z: f64| value(basis, b, Place { z, ..Place::default() });
+            let [near, far] = reach.z;
+            let _ = pivot_m;
+            0.5 * (at(far) - at(near)) / (far / near).ln().max(1e-3)
+        }),
         Basis::Vignetting { .. } => {
             add("growth", &|b| (0.5 * b.iter().sum::<f64>()).exp() - 1.0);
         }
@@ -63,7 +69,7 @@ pub fn parameters(
             let at = std::f64::consts::FRAC_PI_3.sin().powi(tilt_power);
             add("ratio", &|b| (b[0] * at).exp());
         }
-        Basis::Intensity => add("exponent", &|b| -0.5 * b[0]),
+        Basis::Intensity { .. } => add("exponent", &|b| -0.5 * b[0]),
         Basis::Ambient { ratio } => add("ratio", &|b| ratio * b[0]),
         Basis::Level => add("sigma_factor", &|b| (0.5 * b[0]).exp()),
         _ => {}

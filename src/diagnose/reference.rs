@@ -44,13 +44,16 @@ const FEWEST: usize = 5;
 /// Time constants of a warm-up, s.
 const WARM_UPS: [f64; 6] = [60.0, 180.0, 480.0, 1200.0, 2400.0, 7200.0];
 
-/// All laws, with what each gains on references left out; empty where there are too few.
-pub fn laws(fields: &[Field]) -> Vec<Law> {
+/// `levels` is what each view's disparity on the optical axis changes by once the found bias is
+/// taken out, px. All laws, with what each gains on references left out; empty where there are too few.
+pub fn laws(fields: &[Field], levels: &[f64]) -> Vec<Law> {
     let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
     let checked: Vec<Checked> = fields
         .iter()
-        .filter_map(|f| {
-            let z = f.plane.depth(0.0, 0.0);
+        .zip(levels)
+        .filter_map(|(f, level)| {
+            // The plane had bent towards what is now known to be a bias.
+            let z = f.scale_px_m / (f.scale_px_m * f.plane.q.z + level);
             let off = z - f.reference_distance_m?;
             let sigma_px = f64::from(f.sigma.get(f.sigma.len() / 2).copied()?);
             let sigma_m = sigma_px * z * z / f.scale_px_m;

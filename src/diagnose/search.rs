@@ -30,6 +30,9 @@ pub struct Rules {
     /// A name must explain this share of what the best curve does.
     pub adequacy: f64,
     pub most_terms: usize,
+    /// Constant error of every pixel, px, and pixels of the picture: a pattern that stands still
+    /// in the picture must be larger than what these errors make by chance.
+    pub fixed: Option<(f64, f64)>,
 }
 
 /// A family beside the one that was chosen.
@@ -95,7 +98,7 @@ impl Outcome {
 const AS_GOOD_NATS: f64 = 2.0;
 /// A later term must bring this share of what the first brought: what is less is the first one's
 /// own shape, badly met.
-const LEAST_SHARE: f64 = 0.004;
+const LEAST_SHARE: f64 = 0.01;
 
 /// Search a layer. `coarse` has the same views in larger patches, for shapes that do not change
 /// within them.
@@ -208,6 +211,9 @@ struct Layer<'a> {
 struct Judged {
     gain: Gain,
     null: Null,
+    /// Can it be meant: of a sensible shape, and larger than what constant errors of the pixels
+    /// make by chance.
+    sensible: bool,
 }
 
 fn bases(chosen: &[Chosen]) -> Vec<&Basis> {
@@ -276,7 +282,8 @@ impl<'a> Layer<'a> {
                 let mut gain = gain(&evidence, self.rules.prior)?;
                 gain.total -= base.total;
                 gain.by_view.iter_mut().zip(&base.by_view).for_each(|(g, b)| *g -= b);
-                Some(Judged { gain, null })
+                let sensible = self.sensible(&c.basis, m, &gain, &evidence);
+                Some(Judged { gain, null, sensible })
             })
             .collect();
         if self.noise.is_none() {
@@ -311,9 +318,12 @@ impl<'a> Layer<'a> {
             .filter(|&i| total(i) > best_family - AS_GOOD_NATS)
             .min_by_key(|&i| self.candidates[i].basis.count())
             .filter(|&i| safe(i) > threshold && total(i) > self.rules.adequacy * best_curve)
+            .filter(|&i| judged[i].as_ref().is_some_and(|j| j.sensible))
             .filter(|&i| judged[i].as_ref().is_some_and(steady));
-        let winner =
-            named.or_else(|| curves.first().copied().filter(|&i| safe(i) > threshold))?;
+        let sensible = |i: usize| judged[i].as_ref().is_some_and(|j| j.sensible);
+        let winner = named.or_else(|| {
+            curves.iter().copied().find(|&i| safe(i) > threshold && sensible(i))
+        })?;
         let won = &judged[winner].as_ref()?.gain;
         let mut rivals: Vec<Rival> = Vec::new();
         for &i in &families {
@@ -334,6 +344,28 @@ impl<'a> Layer<'a> {
             rivals,
             p: noise.p(safe(winner)),
         })
+    }
+
+    fn sensible(&self, basis: &Basis, m: usize, gain: &Gain, evidence: &[Evidence]) -> bool {
+        let beta = gain.beta.rows(m, basis.count());
+        if let Basis::RangeExponent { pivot_m, orders: 2 } = basis {
+            // One way all along: what turns round is no power of z.
+            let ends = self.fine.iter().flat_map(|v| v.places.iter().map(|p| p.z));
+            let slope = |z: f64| beta[0] + 2.0 * beta[1] * (z / pivot_m).ln();
+            let [near, far] = crate::stats::range(ends).map(slope);
+            return near * far > 0.0 || near.abs() < 0.15 * far.abs();
+        }
+        let Some((fixed, pixels)) = self.rules.fixed.filter(|_| basis.is_of_picture()) else {
+            return true;
+        };
+        let k = basis.count();
+        let square: f64 = evidence
+            .iter()
+            .map(|e| beta.dot(&(e.a.view((m, m), (k, k)) * beta)))
+            .sum();
+        let weight: f64 = self.coarse.iter().flat_map(|v| &v.weight).sum();
+        const CLEARLY: f64 = 4.0;
+        square / weight > CLEARLY * fixed * fixed * k as f64 / pixels
     }
 
     /// With all names in, is each still what fits best, and needed at all?

@@ -57,7 +57,10 @@ pub fn structures(fields: &[Field], camera: &Camera, bias: &[Vec<f32>]) -> Vec<S
     let views: Vec<(&Field, &Vec<f32>)> =
         fields.iter().enumerate().map(|(n, f)| (f, bias.get(n).unwrap_or(&none))).collect();
     let means: Vec<Vec<f32>> =
-        views.par_iter().map(|(f, b)| rough(f, &f.mean, b)).collect();
+        views
+            .par_iter()
+            .map(|(f, b)| without_lines(&rough(f, &f.mean, b), camera.width))
+            .collect();
     let fixed = across_views(&means);
     let mut all: Vec<Structure> =
         views.par_iter().map(|(f, b)| structure(f, camera, b)).collect();
@@ -71,14 +74,9 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     let mut s = Structure::default();
     let frames: Vec<Vec<f32>> = field.first.iter().map(|r| rough(field, r, bias)).collect();
     let Some(first) = frames.first() else { return s };
-    let (tail, pixels, size) = tail(first, camera);
-    (s.tail, s.tail_pixels, s.tail_size) = (tail, pixels, size);
     let calm = calm(first);
     s.variance_px2 = mean(calm.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
     let lines = without_lines(&calm, camera.width);
-    // A box of L px has a correlation sum of L along each axis.
-    let correlation = measure_correlation(&lines, camera.width);
-    s.window_px = Some(correlation.sum.sqrt());
     for lag in 1..frames.len().min(4) {
         let pairs = (0..frames.len() - lag).map(|k| same_pixel(&frames[k], &frames[k + lag]));
         s.lagged[lag - 1] = mean(pairs);
@@ -92,7 +90,18 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
         s.row_px2 = shared([1, 0]);
         s.column_px2 = shared([0, 1]);
     }
-    s.jitter = jitter(field, &s, correlation.sum);
+    let correlation = measure_correlation(&lines, camera.width);
+    // What whole rows share is no window's: it stands in the correlation at every lag.
+    let share = |px2: Option<f64>| (px2.unwrap_or(0.0) / s.variance_px2.max(1e-12)).max(0.0);
+    let along = |course: &[f64], share: f64| {
+        let left = |rho: &f64| ((rho - share) / (1.0 - share).max(0.1)).max(0.0);
+        1.0 + 2.0 * course[1..].iter().map(left).filter(|r| *r > 0.05).sum::<f64>()
+    };
+    // A box of L px has a correlation sum of L along each axis.
+    let window = along(&correlation.along_u, share(s.row_px2))
+        * along(&correlation.along_v, share(s.column_px2));
+    s.window_px = Some(window.sqrt());
+    s.jitter = jitter(field, &s, window);
     s
 }
 
@@ -194,7 +203,7 @@ const PATCH: usize = 96;
 
 /// Share of residuals beyond four standard deviations of their patch, their number, and how far
 /// out they lie, in standard deviations.
-fn tail(image: &[f32], camera: &Camera) -> (f64, f64, f64) {
+pub fn tail(image: &[f32], camera: &Camera) -> (f64, f64, f64) {
     let (mut beyond, mut n, mut size) = (0.0, 0.0, 0.0);
     for v0 in (0..camera.height).step_by(PATCH) {
         for u0 in (0..camera.width).step_by(PATCH) {
@@ -278,7 +287,7 @@ fn jitter(field: &Field, s: &Structure, correlation_sum: f64) -> Option<Jitter> 
     let rows = field.pixels.last().zip(field.pixels.first()).map_or(1.0, |(last, first)| {
         f64::from(last - first) / field.width as f64 + 1.0
     });
-    let own = s.variance_px2 * (1.0 - still) * correlation_sum / field.pixels.len() as f64;
+    let own = s.variance_px2 * (1.0 - still) * correlation_sum / field.measured_pixels().max(1.0);
     let trend_px2 = tm * tm / tt;
     let z = field.scale_px_m / disparity;
     Some(Jitter {

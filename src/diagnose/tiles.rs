@@ -16,8 +16,7 @@ pub struct Tile {
     pub mean: f64,
     /// Mean square of single frames' residuals, px^2.
     pub square: f64,
-    /// Mean residual without what is smooth, and its mean square, px and px^2.
-    pub rough: f64,
+    /// Mean square of the mean residual without what is smooth, px^2.
     pub rough_square: f64,
     /// Mean variance of a pixel over the frames, px^2.
     pub temporal: f64,
@@ -61,7 +60,7 @@ impl<'a> Places<'a> {
         }
     }
 
-    /// Of the pixel number `k` of the target; its light and its variance are the field's.
+    /// Of the pixel number `k` of the target; its variance is the field's.
     pub fn pixel(&self, k: usize) -> Place {
         let i = self.field.pixels[k] as usize;
         let (u, v) = ((i % self.camera.width) as f64, (i / self.camera.width) as f64);
@@ -110,6 +109,7 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
     let rows = camera.height.div_ceil(SIDE);
     let mut sums = vec![Sums::default(); across * rows];
     let frames = field.frames.len() as f64;
+    let moved = field.moved_px2();
     let rough = high_pass(&field.image(&field.mean), camera.width, camera.height, SMOOTH_PX);
     for (k, &i) in field.pixels.iter().enumerate() {
         let (u, v) = (i as usize % camera.width, i as usize / camera.width);
@@ -122,11 +122,10 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
             s.n += 1.0;
             s.mean += mean;
             s.square += square;
-            s.temporal += square - mean * mean;
+            s.temporal += square - mean * mean - moved;
             let rough = f64::from(rough[i as usize]);
             if rough.is_finite() {
                 s.rough_n += 1.0;
-                s.rough += rough;
                 s.rough_square += rough * rough;
             }
             s.light += f64::from(field.light.get(k).copied().unwrap_or(1.0));
@@ -147,7 +146,6 @@ struct Sums {
     square: f64,
     temporal: f64,
     rough_n: f64,
-    rough: f64,
     rough_square: f64,
     light: f64,
     variance: f64,
@@ -171,7 +169,6 @@ impl Sums {
             place: Place { light: self.light / self.n, variance, ..place },
             mean: self.mean / self.n,
             square: self.square / self.n,
-            rough: self.rough / self.rough_n,
             rough_square: self.rough_square / self.rough_n,
             temporal: self.temporal / self.n,
             variance,
@@ -192,4 +189,25 @@ fn board_frame(field: &Field, rays: &Rays) -> TargetFrame {
         sum + Vector3::new(x, y, 1.0) * field.plane.depth(x, y)
     });
     TargetFrame::on(&field.plane, sum / few.len() as f64)
+}
+
+/// Measure the rough part of the mean again, with what is known of it taken out.
+pub fn roughen(tiles: &mut [Tile], field: &Field, bias: &[f32], width: usize) {
+    let left: Vec<f32> = field.mean.iter().zip(bias).map(|(m, b)| m - b).collect();
+    let rough = high_pass(&field.image(&left), width, field.height, SMOOTH_PX);
+    let across = width.div_ceil(SIDE);
+    let mut sums = vec![(0.0, 0.0); across * field.height.div_ceil(SIDE)];
+    for &i in &field.pixels {
+        let (u, v) = (i as usize % width, i as usize / width);
+        let r = f64::from(rough[i as usize]);
+        if r.is_finite() {
+            let s = &mut sums[v / SIDE * across + u / SIDE];
+            s.0 += r * r;
+            s.1 += 1.0;
+        }
+    }
+    for t in tiles {
+        let s = sums[t.place.v as usize / SIDE * across + t.place.u as usize / SIDE];
+        t.rough_square = s.0 / s.1;
+    }
 }

@@ -12,7 +12,8 @@ const PIVOT_M: f64 = 2.0;
 /// All named variance families.
 pub fn families(reach: &Reach, sigma: &SigmaModel) -> Vec<Candidate> {
     let mut all = vec![
-        Candidate::named("range-exponent", Basis::RangeExponent { pivot_m: PIVOT_M }),
+        Candidate::named("range-exponent", Basis::RangeExponent { pivot_m: PIVOT_M, orders: 1 }),
+        Candidate::named("range-exponent", Basis::RangeExponent { pivot_m: PIVOT_M, orders: 2 }),
         Candidate::named("vignetting", Basis::Vignetting { orders: 1 }),
         Candidate::named("vignetting", Basis::Vignetting { orders: 2 }),
         Candidate::named(RECALIBRATE, Basis::Level),
@@ -24,7 +25,9 @@ pub fn families(reach: &Reach, sigma: &SigmaModel) -> Vec<Candidate> {
         all.push(Candidate::named("tilt-axis-anisotropy", Basis::TiltAxis { tilt_power }));
     }
     if reach.light[1] > 1.05 * reach.light[0] {
-        all.push(Candidate::named("intensity-dependent-noise", Basis::Intensity));
+        for orders in [1, 2, 3] {
+            all.push(Candidate::named("intensity-dependent-noise", Basis::Intensity { orders }));
+        }
     }
     if reach.ambient[1] > 0.0 {
         for ratio in [0.003, 0.01, 0.03, 0.1, 0.3, 1.0] {

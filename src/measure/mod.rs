@@ -75,12 +75,20 @@ pub struct Workbench<'a> {
     pub table: DepthTable,
     /// The settings.
     pub options: MeasureOptions,
+    /// The words hold the length of the ray, not the depth.
+    pub ranges: bool,
 }
 
 impl<'a> Workbench<'a> {
     /// Works out the rays of all pixels and the depth of all words.
     pub fn new(sensor: &'a Sensor, options: MeasureOptions) -> Self {
-        Workbench { sensor, rays: sensor.camera.rays(), table: sensor.code.table(), options }
+        Workbench {
+            sensor,
+            rays: sensor.camera.rays(),
+            table: sensor.code.table(),
+            options,
+            ranges: false,
+        }
     }
 
     /// Step of the depth code at inverse depth `w`, 1/m.
@@ -257,7 +265,13 @@ impl<'r> FrameReader<'r> {
 }
 
 fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Target> {
-    let w = mean_inverse_depth(held, &bench.table);
+    let mut w = mean_inverse_depth(held, &bench.table);
+    if bench.ranges {
+        for (i, w) in w.iter_mut().enumerate() {
+            let (x, y) = bench.rays.at(i);
+            *w *= (1.0 + x * x + y * y).sqrt() as f32;
+        }
+    }
     let image = InverseDepthImage {
         w: &w,
         rays: &bench.rays,

@@ -91,11 +91,12 @@ mod tests {
             (length(), 1usize..5)
                 .prop_map(|(period_px, harmonics)| Basis::Banding { period_px, harmonics }),
             length().prop_map(|width_px| Basis::EdgeMixing { width_px }),
-            length().prop_map(|pivot_m| Basis::RangeExponent { pivot_m }),
+            (length(), 1usize..3)
+                .prop_map(|(pivot_m, orders)| Basis::RangeExponent { pivot_m, orders }),
             (1usize..4).prop_map(|orders| Basis::Vignetting { orders }),
             length().prop_map(|lateral_px| Basis::SlopeNoise { lateral_px }),
             (0i32..5).prop_map(|tilt_power| Basis::TiltAxis { tilt_power }),
-            Just(Basis::Intensity),
+            (1usize..4).prop_map(|orders| Basis::Intensity { orders }),
             length().prop_map(|ratio| Basis::Ambient { ratio }),
             Just(Basis::Level),
             (axis(), axis(), prop::collection::vec(table, 1..3)).prop_map(

@@ -28,16 +28,16 @@ pub enum Basis {
     Banding { period_px: f64, harmonics: usize },
     /// Fades with the distance from the edge; to both sides alike, or to the left and right apart.
     EdgeMixing { width_px: f64 },
-    /// Noise with another power of z.
-    RangeExponent { pivot_m: f64 },
+    /// Noise with another power of z: powers of ln(z / pivot).
+    RangeExponent { pivot_m: f64, orders: usize },
     /// Less light towards the corners.
     Vignetting { orders: usize },
     /// Lateral noise through the slope of the target.
     SlopeNoise { lateral_px: f64 },
     /// Along the baseline against across it, fading as the tilt does.
     TiltAxis { tilt_power: i32 },
-    /// Dark surface.
-    Intensity,
+    /// Dark surface: ln(light), a level (what counts as light is arbitrary), its square.
+    Intensity { orders: usize },
     /// Light of the room against the pattern's.
     Ambient { ratio: f64 },
     /// The logarithm of the variance as a whole.
@@ -140,7 +140,9 @@ impl Basis {
     pub fn count(&self) -> usize {
         match self {
             Basis::Bowl { orders, .. } | Basis::Lens { orders, .. } => *orders,
-            Basis::Vignetting { orders } => *orders,
+            Basis::Vignetting { orders }
+            | Basis::RangeExponent { orders, .. }
+            | Basis::Intensity { orders } => *orders,
             Basis::Bow { degree } => {
                 BOW_TERMS.iter().filter(|(i, j)| i + j <= *degree as i32).count()
             }
@@ -152,10 +154,8 @@ impl Basis {
             Basis::Pair { nodes, .. } => nodes[0] * nodes[1],
             Basis::RangeNotDepth
             | Basis::EdgeMixing { .. }
-            | Basis::RangeExponent { .. }
             | Basis::SlopeNoise { .. }
             | Basis::TiltAxis { .. }
-            | Basis::Intensity
             | Basis::Ambient { .. }
             | Basis::Level => 1,
         }
@@ -205,7 +205,7 @@ impl Basis {
                 }
             }
             Basis::EdgeMixing { width_px } => out[0] = (-p.edge / width_px).exp(),
-            Basis::RangeExponent { pivot_m } => out[0] = (p.z / pivot_m).ln(),
+            Basis::RangeExponent { pivot_m, .. } => powers(1.0, (p.z / pivot_m).ln(), out),
             Basis::Vignetting { .. } => powers(1.0, p.radius * p.radius, out),
             Basis::SlopeNoise { lateral_px } => {
                 let slope2 = p.slope[0].powi(2) + p.slope[1].powi(2);
@@ -214,7 +214,12 @@ impl Basis {
             Basis::TiltAxis { tilt_power } => {
                 out[0] = (2.0 * p.azimuth).cos() * p.theta.sin().powi(tilt_power);
             }
-            Basis::Intensity => out[0] = p.light.max(1e-2).ln(),
+            Basis::Intensity { .. } => {
+                let light = p.light.max(1e-2).ln();
+                for (g, value) in out.iter_mut().zip([light, 1.0, light * light]) {
+                    *g = value;
+                }
+            }
             Basis::Ambient { ratio } => {
                 let far = p.z * p.z * (1.0 + p.x * p.x + p.y * p.y) / p.theta.cos().max(0.05);
                 out[0] = (ratio * p.ambient / OFFICE_LUX * far).ln_1p();
@@ -273,6 +278,19 @@ impl Basis {
         )
     }
 
+    /// Is it the same in every view?
+    pub fn is_of_picture(&self) -> bool {
+        match self {
+            Basis::Banding { .. } => true,
+            Basis::Bowl { disparity_power, .. } => *disparity_power == 0.0,
+            Basis::Curve { over, times: Times::One, .. } => {
+                matches!(over, Over::Column | Over::Row | Over::Radius)
+            }
+            Basis::Map { times: Times::One, .. } => true,
+            _ => false,
+        }
+    }
+
     /// Does it change within a few pixels?
     pub fn is_fine(&self) -> bool {
         match self {
@@ -294,7 +312,7 @@ impl Basis {
             Basis::RangeExponent { .. } | Basis::Level | Basis::Recalibrate { .. } => Axis::Z,
             Basis::SlopeNoise { .. } => Axis::Theta,
             Basis::TiltAxis { .. } => Axis::Azimuth,
-            Basis::Intensity | Basis::Ambient { .. } => Axis::Intensity,
+            Basis::Intensity { .. } | Basis::Ambient { .. } => Axis::Intensity,
             Basis::Curve { over, .. } => over.axis(),
             Basis::Ring { over: Over::Disparity, .. } => Axis::DisparityPhase,
             Basis::Ring { over, .. } => over.axis(),

@@ -45,7 +45,7 @@ impl Basis {
                 positive("period_px", &[*period_px]).or_else(|| some_orders(*harmonics))
             }
             Basis::EdgeMixing { width_px } => positive("width_px", &[*width_px]),
-            Basis::RangeExponent { pivot_m } => positive("pivot_m", &[*pivot_m]),
+            Basis::RangeExponent { pivot_m, .. } => positive("pivot_m", &[*pivot_m]),
             Basis::SlopeNoise { lateral_px } => positive("lateral_px", &[*lateral_px]),
             Basis::TiltAxis { tilt_power } => (!(0..=MOST_ORDERS as i32).contains(tilt_power))
                 .then(|| format!("tilt_power = {tilt_power} is not from 0 to {MOST_ORDERS}")),
@@ -68,7 +68,7 @@ impl Basis {
             Basis::Pair { low, high, nodes, .. } => rising(low[0], high[0])
                 .or_else(|| rising(low[1], high[1]))
                 .or_else(|| some_nodes(nodes)),
-            Basis::RangeNotDepth | Basis::Intensity | Basis::Level => None,
+            Basis::RangeNotDepth | Basis::Intensity { .. } | Basis::Level => None,
         }
     }
 }

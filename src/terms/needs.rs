@@ -83,7 +83,7 @@ impl Term {
             Basis::Ambient { .. } | Basis::Recalibrate { .. } => Needs::SURFACE,
             Basis::Bow { .. } | Basis::EdgeMixing { .. } => Needs::BOARD,
             Basis::Banding { .. } | Basis::Vignetting { .. } | Basis::Level => Needs::PIXEL,
-            Basis::Intensity => Needs { light: true, ..Needs::PIXEL },
+            Basis::Intensity { .. } => Needs { light: true, ..Needs::PIXEL },
             Basis::Curve { over, times, .. } | Basis::Ring { over, times, .. } => {
                 Needs::over(*over).and(Needs::times(*times))
             }
