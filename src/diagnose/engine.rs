@@ -115,7 +115,20 @@ pub fn diagnose(
         let step_px = if is_raw(recording) { 0.0 } else { step_px };
         (depth_px * depth_px + step_px * step_px) / 12.0 + rows_px2 + fixed_px2
     };
-    survey.roughen(&fields, &bias_px, extra);
+    let range_share: f64 = known
+        .bias
+        .iter()
+        .chain(&bias_terms)
+        .chain(found.iter().flat_map(|f: &Finding| &f.terms))
+        .filter(|t| t.basis == Basis::RangeNotDepth)
+        .map(|t| t.coefficients[0])
+        .sum();
+    // A range in place of a depth makes a disparity, and its noise, smaller.
+    let stretch = |p: &Place| {
+        let ray = 1.0 / (1.0 + p.x * p.x + p.y * p.y).sqrt();
+        (1.0 + range_share.clamp(0.0, 1.0) * (ray - 1.0)).powi(2)
+    };
+    survey.roughen(&fields, &bias_px, extra, stretch);
     let variance = survey.search_variance(&model.sigma, camera, 0.25 * level, options.seed);
     let variance_terms = terms_of(&variance, Statistic::Variance);
     let bias_scene = Scene::bias(&survey, scale_px_m, corner);
@@ -137,7 +150,7 @@ pub fn diagnose(
             && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)
             && f.size.sigma * typical_sigma_px(&fields) < 0.5 * coarsest;
         let tailed = tails.is_some() && f.status == Status::Recalibrate;
-        !stepped && !tailed
+        !stepped && !tailed && f.size.sigma > least_size(f.statistic)
     });
     found.extend(terms);
     found.extend(
@@ -359,6 +372,11 @@ fn lattice(fields: &[Field], recording: &Recording) -> Lattice {
     let mut words = Words::none();
     fields.iter().for_each(|f| words.merge(&f.words));
     words.lattice(&recording.sensor, fields[0].scale_px_m)
+}
+
+/// What is smaller than this, in sigmas, is told of by nobody: models are not better than that.
+fn least_size(statistic: Statistic) -> f64 {
+    if statistic == Statistic::Bias { 0.01 } else { 0.035 }
 }
 
 /// A step is worth telling when the error it makes is this share of the noise.

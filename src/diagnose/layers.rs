@@ -112,15 +112,22 @@ impl Survey {
     }
 
     /// With what is known of the mean taken out of what the noise is measured on, view by view
-    /// and pixel by pixel, px; and with variance that has another name already, px^2.
-    pub fn roughen(&mut self, fields: &[Field], bias: &[Vec<f32>], extra: impl Fn(&Place) -> f64 + Sync) {
+    /// and pixel by pixel, px; and with variance that has another name already, px^2, or is
+    /// stretched by a factor with the measurement itself.
+    pub fn roughen(
+        &mut self,
+        fields: &[Field],
+        bias: &[Vec<f32>],
+        extra: impl Fn(&Place) -> f64 + Sync,
+        stretch: impl Fn(&Place) -> f64 + Sync,
+    ) {
         let width = fields.first().map_or(0, |f| f.width);
         self.views.par_iter_mut().zip(fields).enumerate().for_each(|(n, (view, field))| {
             if let Some(bias) = bias.get(n) {
                 super::tiles::roughen(&mut view.tiles, field, bias, width);
             }
             for t in &mut view.tiles {
-                t.variance += extra(&t.place);
+                t.variance = t.variance * stretch(&t.place) + extra(&t.place);
                 t.place.variance = t.variance;
             }
         });
@@ -193,15 +200,20 @@ fn ambient_share(views: &[SurveyedView]) -> f64 {
             (x > 0.0 && y > 0.0).then_some((x, y))
         })
         .collect();
-    let n = points.len() as f64;
-    if n < 4.0 {
+    if points.len() < 4 {
         return 0.0;
     }
-    let (x0, y0) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
+    // Errors are shares of the light.
+    let n: f64 = points.iter().map(|p| p.1.powi(-2)).sum();
+    let (x0, y0) = points.iter().fold((0.0, 0.0), |(x, y), p| {
+        let w = p.1.powi(-2) / n;
+        (x + w * p.0, y + w * p.1)
+    });
     let (mut xx, mut xy) = (0.0, 0.0);
     for (x, y) in points {
-        xx += (x - x0).powi(2);
-        xy += (x - x0) * (y - y0);
+        let w = y.powi(-2);
+        xx += w * (x - x0).powi(2);
+        xy += w * (x - x0) * (y - y0);
     }
     let slope = if xx > 0.0 { xy / xx } else { 0.0 };
     let level = y0 - slope * x0;

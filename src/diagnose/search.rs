@@ -347,13 +347,10 @@ impl<'a> Layer<'a> {
     }
 
     fn sensible(&self, basis: &Basis, m: usize, gain: &Gain, evidence: &[Evidence]) -> bool {
-        let beta = gain.beta.rows(m, basis.count());
-        if let Basis::RangeExponent { pivot_m, orders: 2 } = basis {
-            // One way all along: what turns round is no power of z.
+        let beta = gain.beta.rows(m, basis.count()).into_owned();
+        if let Basis::RangeExponent { orders: 2.., .. } = basis {
             let ends = self.fine.iter().flat_map(|v| v.places.iter().map(|p| p.z));
-            let slope = |z: f64| beta[0] + 2.0 * beta[1] * (z / pivot_m).ln();
-            let [near, far] = crate::stats::range(ends).map(slope);
-            return near * far > 0.0 || near.abs() < 0.15 * far.abs();
+            return one_way(basis, beta.as_slice(), crate::stats::range(ends));
         }
         let Some((fixed, pixels)) = self.rules.fixed.filter(|_| basis.is_of_picture()) else {
             return true;
@@ -361,7 +358,7 @@ impl<'a> Layer<'a> {
         let k = basis.count();
         let square: f64 = evidence
             .iter()
-            .map(|e| beta.dot(&(e.a.view((m, m), (k, k)) * beta)))
+            .map(|e| beta.dot(&(e.a.view((m, m), (k, k)) * &beta)))
             .sum();
         let weight: f64 = self.coarse.iter().flat_map(|v| &v.weight).sum();
         const CLEARLY: f64 = 4.0;
@@ -407,6 +404,24 @@ impl<'a> Layer<'a> {
             eprintln!("  {:9.1} /{dispersion:5.2} {:?} {text}", total(i), c.family);
         }
     }
+}
+
+/// Up all along, or down: what turns round is no power of z.
+fn one_way(basis: &Basis, beta: &[f64], [near, far]: [f64; 2]) -> bool {
+    const NODES: usize = 24;
+    const BACK: f64 = 0.12;
+    let mut row = Vec::new();
+    let mut at = |k: usize| {
+        let z = near * (far / near).powf(k as f64 / (NODES - 1) as f64);
+        basis.value(beta, &Place { z, ..Place::default() }, &mut row)
+    };
+    let values: Vec<f64> = (0..NODES).map(&mut at).collect();
+    let (mut up, mut down) = (0.0, 0.0);
+    for w in values.windows(2) {
+        let step = w[1] - w[0];
+        if step > 0.0 { up += step } else { down -= step }
+    }
+    f64::min(up, down) < BACK * (up + down)
 }
 
 fn looks(candidates: &[Candidate], judged: &[Option<Judged>], noise: &NoiseGains) -> Vec<Look> {

@@ -59,7 +59,7 @@ pub fn structures(fields: &[Field], camera: &Camera, bias: &[Vec<f32>]) -> Vec<S
     let means: Vec<Vec<f32>> =
         views
             .par_iter()
-            .map(|(f, b)| without_lines(&rough(f, &f.mean, b), camera.width))
+            .map(|(f, b)| without_lines(&calm(&rough(f, &f.mean, b)), camera.width, SHORT_LINE))
             .collect();
     let fixed = across_views(&means);
     let mut all: Vec<Structure> =
@@ -72,13 +72,15 @@ pub fn structures(fields: &[Field], camera: &Camera, bias: &[Vec<f32>]) -> Vec<S
 
 fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     let mut s = Structure::default();
-    let frames: Vec<Vec<f32>> = field.first.iter().map(|r| rough(field, r, bias)).collect();
+    let frames: Vec<Vec<f32>> =
+        field.first.iter().map(|r| calm(&rough(field, r, bias))).collect();
     let Some(first) = frames.first() else { return s };
-    let calm = calm(first);
-    s.variance_px2 = mean(calm.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
-    let lines = without_lines(&calm, camera.width);
+    s.variance_px2 = mean(first.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
+    let lines = without_lines(first, camera.width, LONG_LINE);
+    let level: Vec<Vec<f32>> =
+        frames.iter().map(|f| without_lines(f, camera.width, SHORT_LINE)).collect();
     for lag in 1..frames.len().min(4) {
-        let pairs = (0..frames.len() - lag).map(|k| same_pixel(&frames[k], &frames[k + lag]));
+        let pairs = (0..frames.len() - lag).map(|k| same_pixel(&level[k], &level[k + lag]));
         s.lagged[lag - 1] = mean(pairs);
     }
     if let [a, b, ..] = frames.as_slice() {
@@ -126,14 +128,16 @@ fn calm(image: &[f32]) -> Vec<f32> {
 
 /// Rows and columns shorter than this are left as they are, px: their mean is mostly noise.
 const LONG_LINE: usize = 150;
+/// The same where a pixel is held against itself, and a line's mean only stands in the way.
+const SHORT_LINE: usize = 60;
 
 /// Minus the mean of each long row and column: noise that a row shares is no window's.
-fn without_lines(image: &[f32], width: usize) -> Vec<f32> {
+fn without_lines(image: &[f32], width: usize, least: usize) -> Vec<f32> {
     let mut out = image.to_vec();
     let height = image.len() / width.max(1);
     let mut level = |indices: &mut dyn Iterator<Item = usize>| {
         let line: Vec<usize> = indices.filter(|&i| out[i].is_finite()).collect();
-        if line.len() >= LONG_LINE {
+        if line.len() >= least {
             let mean = line.iter().map(|&i| f64::from(out[i])).sum::<f64>() / line.len() as f64;
             line.iter().for_each(|&i| out[i] -= mean as f32);
         }
@@ -280,7 +284,7 @@ fn jitter(field: &Field, s: &Structure, correlation_sum: f64) -> Option<Jitter> 
         mm += (m - m0).powi(2);
     }
     let disparity = field.scale_px_m * field.plane.q.z;
-    if n < 3.0 || tt <= 0.0 || disparity <= 0.0 {
+    if n < 3.0 || tt <= 0.0 || disparity <= 0.0 || s.variance_px2 <= 0.0 {
         return None;
     }
     let still = s.lagged[0].unwrap_or(0.0).clamp(0.0, 1.0);

@@ -122,7 +122,7 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
             s.n += 1.0;
             s.mean += mean;
             s.square += square;
-            s.temporal += square - mean * mean - moved;
+            s.temporal += square - mean * mean;
             let rough = f64::from(rough[i as usize]);
             if rough.is_finite() {
                 s.rough_n += 1.0;
@@ -132,7 +132,14 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
             s.variance += f64::from(field.sigma[k]).powi(2);
         }
     }
-    sums.iter().filter(|s| s.pixels > 0.0).map(|s| s.tile(&places)).collect()
+    // What moves as a whole moves near disparities more.
+    let middle = field.scale_px_m * field.plane.q.z;
+    let mut tiles: Vec<Tile> =
+        sums.iter().filter(|s| s.pixels > 0.0).map(|s| s.tile(&places)).collect();
+    for t in &mut tiles {
+        t.temporal -= moved * (t.place.disparity / middle).powi(2);
+    }
+    tiles
 }
 
 #[derive(Clone, Copy, Default)]

@@ -14,6 +14,7 @@ pub fn families(reach: &Reach, sigma: &SigmaModel) -> Vec<Candidate> {
     let mut all = vec![
         Candidate::named("range-exponent", Basis::RangeExponent { pivot_m: PIVOT_M, orders: 1 }),
         Candidate::named("range-exponent", Basis::RangeExponent { pivot_m: PIVOT_M, orders: 2 }),
+        Candidate::named("range-exponent", Basis::RangeExponent { pivot_m: PIVOT_M, orders: 4 }),
         Candidate::named("vignetting", Basis::Vignetting { orders: 1 }),
         Candidate::named("vignetting", Basis::Vignetting { orders: 2 }),
         Candidate::named(RECALIBRATE, Basis::Level),
