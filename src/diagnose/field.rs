@@ -3,6 +3,7 @@
 //! In disparity a plane is exactly affine in the image, so the residual is taken there, in px of
 //! fx * baseline / z. Nothing is cut by a RANSAC threshold: what strays is clipped, and counted.
 
+use super::shadow::Shadow;
 use crate::camera::Rays;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
@@ -48,12 +49,14 @@ pub struct Field {
     /// Infrared amplitude times the square of the distance over the cosine of the incidence: how
     /// light the surface is, in the image's own units. Empty without an infrared image.
     pub light: Vec<f32>,
+    /// What lies beside the target in the first frame.
+    pub shadow: Shadow,
 }
 
 /// Beyond this many sigmas of the model, or of the view's own residuals where errors the model
 /// lacks are larger, a residual is no noise: it is kept out of the means and left to the tests of
 /// the tails.
-const CLIP_SIGMAS: f32 = 6.0;
+pub const CLIP_SIGMAS: f32 = 6.0;
 /// Single frames kept whole: enough for correlations in time.
 pub const FRAMES_KEPT: usize = 4;
 
@@ -72,6 +75,9 @@ impl Field {
         let start = view.depth.first().map_or(0.0, |f| f.timestamp);
         for frame in &view.depth {
             if let Ok(image) = source.read(&frame.path) {
+                if field.frames.is_empty() {
+                    field.shadow = Shadow::beside(&field, &image, &bench.rays, &bench.table);
+                }
                 field.add(&image, frame.timestamp - start, &bench.rays, &bench.table);
             }
         }
@@ -132,6 +138,7 @@ impl Field {
             temperature_c: view.notes.temperature_c,
             ambient_lux: view.notes.ambient_lux,
             light: Vec::new(),
+            shadow: Shadow::default(),
         }
     }
 
