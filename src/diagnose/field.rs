@@ -49,6 +49,8 @@ pub struct Field {
     /// Infrared amplitude times the square of the distance over the cosine of the incidence: how
     /// light the surface is, in the image's own units. Empty without an infrared image.
     pub light: Vec<f32>,
+    /// The target's region was given; else it ends where too little is measured.
+    pub told: bool,
     /// What lies beside the target in the first frame.
     pub shadow: Shadow,
 }
@@ -138,6 +140,7 @@ impl Field {
             temperature_c: view.notes.temperature_c,
             ambient_lux: view.notes.ambient_lux,
             light: Vec::new(),
+            told: view.notes.region.is_some(),
             shadow: Shadow::default(),
         }
     }

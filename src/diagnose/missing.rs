@@ -4,19 +4,20 @@
 //! factor of e and more: a finding must hold over the views. Steps on lawful axes have a name
 //! unless a nameless curve does clearly better.
 
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 
 use super::diagnosis::Curve;
 use super::field::Field;
 use super::layers::Survey;
-use super::missing_cells::{Cell, cells};
-use super::missing_fit::{Fitted, Point, fit, points};
-use super::missing_search::{Judged, Losses, Shape, Step, curves, steps};
+use super::missing_cells::{Cell, cells, fine};
+use super::missing_report::{Told, shadow_finding};
+use super::missing_search::{Judged, Losses};
+use super::missing_shapes::{Shape, Step, curves, steps};
 use super::reach::Reach;
-use super::shadow_test::{Band, band};
+use super::shadow_test::band;
 use crate::camera::{Camera, Rays};
 use crate::rng::Seed;
-use crate::terms::{Axis, Basis};
+use crate::terms::Axis;
 
 /// Losses that follow an axis.
 #[derive(Debug, Clone)]
@@ -60,8 +61,6 @@ const ADEQUATE: f64 = 0.6;
 const MOST_FINDINGS: usize = 3;
 /// A later finding must bring this share of what the first brought.
 const LEAST_SHARE: f64 = 0.1;
-/// An effect matters from this lost share on.
-const MATTERS: f64 = 0.05;
 
 /// What the losses of a recording follow.
 pub fn missing(
@@ -71,16 +70,31 @@ pub fn missing(
     _rays: &Rays,
     seed: Seed,
 ) -> MissingOutcome {
-    let mut outcome = of_cells(&cells(survey, camera), &survey.reach, camera, seed);
+    let told: Vec<bool> = fields.iter().map(|f| f.told).collect();
+    let seen = Seen { cells: cells(survey, camera), fine: fine(survey), told };
+    let mut outcome = losses(&seen, &survey.reach, camera, seed);
     let shadows: Vec<_> = fields.iter().map(|f| f.shadow).collect();
     if let Some(band) = band(&shadows, SHADOW_LEVEL) {
-        outcome.findings.push(shadow_finding(band, fields));
+        let shadow = shadow_finding(band, fields);
+        // Where the target's own mask reaches into its shadow, the same losses are seen again.
+        outcome.findings.retain(|f| f.family.is_some() || f.size > shadow.size);
+        outcome.findings.push(shadow);
     }
     outcome
 }
 
-/// Losses on the target.
-fn of_cells(views: &[Vec<Cell>], reach: &Reach, camera: &Camera, seed: Seed) -> MissingOutcome {
+/// The views' losses on the target.
+struct Seen {
+    /// In patches large enough to judge.
+    cells: Vec<Vec<Cell>>,
+    /// In the smallest there are.
+    fine: Vec<Vec<Cell>>,
+    /// Whether a view's region was given.
+    told: Vec<bool>,
+}
+
+fn losses(seen: &Seen, reach: &Reach, camera: &Camera, seed: Seed) -> MissingOutcome {
+    let views = &seen.cells;
     let mut outcome = MissingOutcome::default();
     if views.iter().filter(|v| !v.is_empty()).count() < FEWEST_VIEWS {
         return outcome;
@@ -109,9 +123,8 @@ fn of_cells(views: &[Vec<Cell>], reach: &Reach, camera: &Camera, seed: Seed) -> 
         let more = losses.explained(won);
         explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
         taken.push(won.shape.axis());
-        let rivals = rivals(&judged);
-        let p = chance.of_gain(won.gain);
-        outcome.findings.push(finding(won, rivals, p, &losses, reach, camera));
+        let told = Told { fine: &seen.fine, told: &seen.told, base: losses.base, reach, camera };
+        outcome.findings.push(told.finding(won, rivals(&judged), chance.of_gain(won.gain)));
     }
     outcome
 }
@@ -146,154 +159,6 @@ fn detectable(
         (_, false) => (s.family(), "z50_m, near side", s.middle),
     };
     losses.detectable(steps, threshold).into_iter().map(name).collect()
-}
-
-fn finding(
-    won: &Judged,
-    rivals: Vec<(&'static str, f64)>,
-    p: f64,
-    losses: &Losses<'_>,
-    reach: &Reach,
-    camera: &Camera,
-) -> MissingFinding {
-    let asked: f64 = losses.views.iter().flatten().map(|c| c.asked).sum();
-    let mut finding = MissingFinding {
-        family: won.shape.family(),
-        axis: won.shape.axis(),
-        interval: [0.0; 2],
-        parameters: Map::new(),
-        p,
-        rivals,
-        gain: won.gain,
-        size: 0.0,
-        curve: Curve::default(),
-    };
-    match &won.shape {
-        Shape::Step(step) => {
-            let span = if step.axis == Axis::Theta { reach.theta } else { reach.z };
-            let all = points(losses.views, &|c| step.at(&c.place), span);
-            let own = Fitted { step: *step, base: losses.base, std_error: [None; 3] };
-            let fitted = fit(*step, losses.base, &all).unwrap_or(own);
-            finding.parameters = parameters(&fitted);
-            finding.interval = interval(&fitted, span);
-            let extra = |x: f64| fitted.step.loss(x, losses.base) - losses.base;
-            finding.size = all.iter().map(|p| p.asked * extra(p.x)).sum::<f64>() / asked;
-            finding.curve =
-                binned(&all, won.shape.axis(), span, |x| fitted.step.loss(x, losses.base));
-        }
-        Shape::Curve(axis, basis) => {
-            let (span, at) = along(*axis, basis, reach, camera);
-            let all = points(losses.views, &at, span);
-            let rise = |p: &Point| (p.share - losses.base).max(0.0) * p.asked;
-            finding.size = all.iter().map(rise).sum::<f64>() / asked;
-            finding.curve = binned(&all, *axis, span, |_| f64::NAN);
-            let lost = &finding.curve.y;
-            let most = lost.iter().copied().fold(0.0, f64::max);
-            finding.curve.model = lost.clone();
-            let high = (0..lost.len()).filter(|&k| lost[k] - losses.base > 0.5 * (most - losses.base));
-            finding.interval = crate::stats::range(high.map(|k| finding.curve.x[k]));
-        }
-    }
-    finding
-}
-
-fn along(
-    axis: Axis,
-    basis: &Basis,
-    reach: &Reach,
-    camera: &Camera,
-) -> ([f64; 2], Box<dyn Fn(&Cell) -> f64>) {
-    if let Basis::Curve { over, low, high, .. } = basis {
-        let over = *over;
-        return ([*low, *high], Box::new(move |c| over.value(&c.place)));
-    }
-    let _ = (axis, reach);
-    ([0.0, camera.width as f64], Box::new(|c| c.place.u))
-}
-
-fn estimate(value: f64, std_error: Option<f64>) -> Value {
-    json!({"value": value, "std_error": std_error})
-}
-
-fn parameters(fitted: &Fitted) -> Map<String, Value> {
-    let Fitted { step, std_error: [middle, width, share], .. } = fitted;
-    let (unit, names) = match step.axis {
-        Axis::Theta => (1f64.to_degrees(), ["theta50_deg", "width_deg"]),
-        _ => (1.0, ["z50_m", "width_m"]),
-    };
-    let mut all = Map::new();
-    all.insert(names[0].into(), estimate(unit * step.middle, middle.map(|e| unit * e)));
-    all.insert(names[1].into(), estimate(unit * step.width, width.map(|e| unit * e)));
-    if share.is_some() {
-        all.insert("share".into(), estimate(step.share, *share));
-    }
-    all
-}
-
-/// From where the loss matters to the end of the axis.
-fn interval(fitted: &Fitted, [low, high]: [f64; 2]) -> [f64; 2] {
-    let Step { middle, width, share, axis } = fitted.step;
-    let from = middle + width * (MATTERS / (share - MATTERS).max(MATTERS)).ln();
-    match (width > 0.0, axis) {
-        (true, Axis::Theta) => [from, std::f64::consts::FRAC_PI_2],
-        (true, _) => [from.min(high), high.max(from)],
-        (false, _) => [0.0, from.max(low)],
-    }
-}
-
-/// Lost shares bin by bin; the views are the sample.
-fn binned(points: &[Point], axis: Axis, [low, high]: [f64; 2], model: impl Fn(f64) -> f64) -> Curve {
-    const BINS: usize = 20;
-    let width = ((high - low) / BINS as f64).max(f64::MIN_POSITIVE);
-    let mut curve = Curve {
-        x_label: format!("{axis}, {}", axis.unit()),
-        y_label: "share of the pixel-frames without a measurement".into(),
-        ..Curve::default()
-    };
-    for bin in 0..BINS {
-        let inside = |p: &&Point| (((p.x - low) / width).max(0.0) as usize).min(BINS - 1) == bin;
-        let members: Vec<&Point> = points.iter().filter(inside).collect();
-        let asked: f64 = members.iter().map(|p| p.asked).sum();
-        if asked <= 0.0 {
-            continue;
-        }
-        let mean = |of: &dyn Fn(&Point) -> f64| {
-            members.iter().map(|p| p.asked * of(p)).sum::<f64>() / asked
-        };
-        let (x, y) = (mean(&|p| p.x), mean(&|p| p.share));
-        let scatter: f64 = members.iter().map(|p| (p.asked * (p.share - y)).powi(2)).sum();
-        curve.x.push(x);
-        curve.y.push(y);
-        curve.y_std_error.push((scatter / asked.powi(2)).max(y * (1.0 - y) / asked).sqrt());
-        curve.model.push(model(x));
-    }
-    curve
-}
-
-fn shadow_finding(band: Band, fields: &[Field]) -> MissingFinding {
-    let name = if band.lawful { "occlusion-shadow" } else { Axis::EdgeDistance.id() };
-    let mut parameters = Map::new();
-    if band.lawful {
-        parameters.insert("share".into(), estimate(band.share[0], Some(band.share[1])));
-    }
-    parameters.insert("side".into(), json!(if band.left { "left" } else { "right" }));
-    let (mut lost, mut asked) = (0.0, 0.0);
-    for f in fields {
-        let side = if band.left { f.shadow.left } else { f.shadow.right };
-        lost += side.map_or(0.0, |s| s.width_px * s.rows as f64);
-        asked += f.pixels.len() as f64;
-    }
-    MissingFinding {
-        family: band.lawful.then_some(name),
-        axis: Axis::EdgeDistance,
-        interval: [0.0, band.curve.y.iter().copied().fold(0.0, f64::max)],
-        parameters,
-        p: band.p,
-        rivals: vec![("occlusion-shadow", band.gain[0]), ("edge-distance", band.gain[1])],
-        gain: band.gain[usize::from(!band.lawful)],
-        size: lost / (asked + lost).max(1.0),
-        curve: band.curve,
-    }
 }
 
 #[cfg(test)]

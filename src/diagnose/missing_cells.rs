@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 
 use super::layers::Survey;
-use super::tiles::SIDE;
+use super::tiles::{SIDE, Tile};
 use crate::camera::Camera;
 use crate::terms::Place;
 
@@ -54,6 +54,12 @@ pub fn cells(survey: &Survey, camera: &Camera) -> Vec<Vec<Cell>> {
         .collect()
 }
 
+/// Every tile a cell of its own: for where and how much, not for whether.
+pub fn fine(survey: &Survey) -> Vec<Vec<Cell>> {
+    let cell = |t: &Tile| Cell { place: t.place, lost: t.asked * t.missing, asked: t.asked };
+    survey.views.iter().map(|v| v.tiles.iter().map(cell).collect()).collect()
+}
+
 /// Losses below this share are all the same.
 const HARDLY: f64 = 0.002;
 
@@ -98,7 +104,9 @@ impl Whitener {
         let slopes: Vec<_> =
             cells.iter().map(|c| Vector3::new(1.0, c.place.x, c.place.y)).collect();
         let tight = Vector3::new(1.0 / scatter.level, 1.0 / scatter.slope, 1.0 / scatter.slope);
-        let inner = slopes.iter().fold(Matrix3::from_diagonal(&tight), |m, n| m + n * n.transpose() * weight);
+        let inner = slopes
+            .iter()
+            .fold(Matrix3::from_diagonal(&tight), |m, n| m + n * n.transpose() * weight);
         // Positive definite by its diagonal.
         let inverse = inner.try_inverse().unwrap_or_else(Matrix3::zeros);
         Whitener { weight, slopes, inverse, scatter }
@@ -136,7 +144,8 @@ impl Scatter {
             let own = w.inverse * seen * w.weight;
             sums[0] += (left.iter().sum::<f64>() / left.len().max(1) as f64).powi(2);
             sums[1] += own.y.powi(2) + own.z.powi(2);
-            sums[2] += w.slopes.iter().zip(left).map(|(n, y)| (y - n.dot(&own)).powi(2)).sum::<f64>();
+            sums[2] +=
+                w.slopes.iter().zip(left).map(|(n, y)| (y - n.dot(&own)).powi(2)).sum::<f64>();
             n = [n[0] + 1.0, n[1] + 2.0, n[2] + left.len() as f64];
         }
         let mean = |k: usize| sums[k] / f64::max(n[k], 1.0);

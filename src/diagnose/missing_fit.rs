@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::missing_cells::Cell;
-use super::missing_search::Step;
+use super::missing_shapes::Step;
 use crate::solve::{LeastSquares, trust_region};
 
 /// Share lost where the axis is at `x`, in one view.
@@ -13,10 +13,25 @@ pub struct Point {
     pub x: f64,
     pub share: f64,
     pub asked: f64,
+    /// The true share may be larger.
+    pub at_least: bool,
 }
 
 /// Bins over an axis's reach: a tilted view spans some.
 pub const BINS: usize = 40;
+
+/// Where more is lost the search for the target passes over the holes: the share is a bound.
+const HOLES: f64 = 0.4;
+
+/// In views whose region was not `told`, what lies beyond the first bin with holes is a bound.
+pub fn bounded(mut points: Vec<Point>, step: &Step, told: &[bool]) -> Vec<Point> {
+    let beyond = |p: &Point| p.x * step.width.signum();
+    let from = points.iter().filter(|p| p.share > HOLES).map(beyond).fold(f64::INFINITY, f64::min);
+    for p in &mut points {
+        p.at_least = !told[p.view] && beyond(p) >= from;
+    }
+    points
+}
 
 /// The views' shares, bin by bin of an axis.
 pub fn points(views: &[Vec<Cell>], at: &dyn Fn(&Cell) -> f64, [low, high]: [f64; 2]) -> Vec<Point> {
@@ -35,6 +50,7 @@ pub fn points(views: &[Vec<Cell>], at: &dyn Fn(&Cell) -> f64, [low, high]: [f64;
             x: x / asked,
             share: lost / asked,
             asked,
+            at_least: false,
         }));
     }
     all
@@ -54,6 +70,8 @@ const OFF: f64 = 0.3;
 const TOGETHER: f64 = 16.0;
 /// Shares are known no better.
 const LEAST: f64 = 0.002;
+/// Rises of another form (Gaussian, Gompertz) put the middle up to so many widths elsewhere.
+const FORM: f64 = 0.5;
 /// A share of its own must lower chi squared by this: 1 % of chance.
 const WORTH: f64 = 6.6;
 
@@ -83,9 +101,9 @@ impl Problem<'_> {
             // Between what was expected and what was seen: neither alone may claim certainty.
             let half = 0.5 * (loss + p.share);
             let spread = half * (1.0 - half);
-            let variance =
-                spread * TOGETHER / p.asked + (OFF * spread).powi(2) + LEAST * LEAST;
-            (p.share - loss) / variance.sqrt()
+            let variance = spread * TOGETHER / p.asked + (OFF * spread).powi(2) + LEAST * LEAST;
+            let off = if p.at_least { (p.share - loss).max(0.0) } else { p.share - loss };
+            off / variance.sqrt()
         };
         DVector::from_iterator(self.points.len(), self.points.iter().map(of))
     }
@@ -139,6 +157,7 @@ pub fn fit(start: Step, base: f64, points: &[Point]) -> Option<Fitted> {
     let step = problem.step(&end.x);
     let error = |j: usize| covariance[(j, j)].max(0.0).sqrt();
     let share = problem.free_share.then(|| error(2) * step.share * (1.0 - step.share));
-    let std_error = [Some(error(0)), Some(error(1) * step.width.abs()), share];
+    let std_error =
+        [Some(error(0).hypot(FORM * step.width)), Some(error(1) * step.width.abs()), share];
     Some(Fitted { step, base, std_error })
 }

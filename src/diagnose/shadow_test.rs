@@ -18,8 +18,6 @@ pub struct Band {
     /// over the squares of what a width is known to.
     pub gain: [f64; 2],
     pub p: f64,
-    /// Median width, px, and pixels lost of all target pixels.
-    pub width_px: f64,
     pub curve: Curve,
 }
 
@@ -79,16 +77,14 @@ pub fn band(shadows: &[Shadow], level: f64) -> Option<Band> {
         0.5 * (all - left) / BORDER_PX.powi(2)
     };
     let gain = [explained(&|s| found.share * s.expected_px), explained(&|_| width)];
-    let lawful = one_sided
-        && (LAWFUL[0]..LAWFUL[1]).contains(&found.share)
-        && gain[0] > ADEQUATE * gain[1];
+    let lawful =
+        one_sided && (LAWFUL[0]..LAWFUL[1]).contains(&found.share) && gain[0] > ADEQUATE * gain[1];
     Some(Band {
         left: on_left,
         lawful,
         share: [found.share, found.std_error],
         gain,
         p,
-        width_px: width,
         curve: curve(&sides, found.share),
     })
 }
@@ -107,5 +103,32 @@ fn curve(sides: &[Side], share: f64) -> Curve {
         y: sides.iter().map(|s| s.width_px).collect(),
         y_std_error: vec![BORDER_PX; sides.len()],
         model: sides.iter().map(|s| share * s.expected_px).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shadows(width: impl Fn(f64) -> [f64; 2]) -> Vec<Shadow> {
+        let side = |width_px, expected_px| Some(Side { width_px, expected_px, rows: 100 });
+        (4..14)
+            .map(|k| {
+                let expected = 2.0 * f64::from(k);
+                let [left, right] = width(expected).map(f64::round);
+                Shadow { left: side(left, expected), right: side(right, expected) }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_band_is_a_shadow_when_it_is_on_one_side_and_as_wide_as_it_must_be() {
+        let found = band(&shadows(|e| [0.9 * e, 0.0]), 1e-3).unwrap();
+        assert!(found.lawful && found.left && (found.share[0] - 0.9).abs() < 0.05);
+        assert!(!band(&shadows(|e| [0.0, e]), 1e-3).unwrap().left);
+        assert!(!band(&shadows(|e| [e, 0.9 * e]), 1e-3).unwrap().lawful, "on both sides");
+        assert!(!band(&shadows(|e| [0.0, 3.0 * e]), 1e-3).unwrap().lawful, "too wide");
+        assert!(band(&shadows(|_| [0.0, 0.0]), 1e-3).is_none());
+        assert!(band(&shadows(|e| [f64::from(e > 25.0), 0.0]), 1e-3).is_none(), "a stray pixel");
     }
 }
