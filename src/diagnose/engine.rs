@@ -18,7 +18,9 @@ use super::lattice::{Lattice, Words};
 use super::layers::Survey;
 use super::noise::{hanging, tails};
 use super::parameters::estimate;
+use super::missing::missing;
 use super::reference;
+use super::rim;
 use super::search::Outcome;
 use super::smooth::{SMOOTH_PX, high_pass};
 use super::structure::{Structure, structures, tail};
@@ -157,15 +159,24 @@ pub fn diagnose(
         hanging(&structure, &known, 0.03 * level)
             .into_iter()
             .chain(tails)
+            .chain(rim::mixing(&fields, 0.03 * level).filter(|_| !known.has("edge-mixing")))
             .map(|h| findings::hanging(h, sigma_mm)),
     );
     found.extend(steps);
+    let lost = missing(&fields, &survey, camera, &bench.rays, options.seed);
+    found.extend(
+        lost.findings
+            .into_iter()
+            .filter(|m| m.family.is_none_or(|id| !known.has(id)))
+            .map(findings::missing),
+    );
     let levels = heldout::levels(&survey, &bias_terms);
     let references = reference::laws(&fields, &levels);
     found.extend(reference::findings(&references, &known, 0.1 * level, options.seed));
     let mismatch = found.iter().any(|f| f.status != Status::NotIdentifiable);
     let cannot_tell = reference::cannot_tell(&fields);
     found.extend(cannot_tell.iter().map(not_identifiable));
+    merge(&mut found);
     shares(&mut found);
     let heldout = heldout::score(&survey, model, camera, scale_px_m, options);
     let mut map = findings::map(&bias_scene, &bias, level);
@@ -174,7 +185,12 @@ pub fn diagnose(
     let verdict = if mismatch { Verdict::Mismatch } else { Verdict::Match };
     let extended = extend(model, &found, sensor);
     let views = view_lines(&fields, &survey, &bias_terms, heldout.as_ref());
-    let detectable = super::detectable::detectable(&survey, &bias, &variance, camera);
+    let mut detectable = super::detectable::detectable(&survey, &bias, &variance, camera);
+    detectable.extend(lost.detectable.iter().map(|&(effect, name, least)| {
+        let mut minimum = Map::new();
+        minimum.insert(name.into(), serde_json::json!(least));
+        super::diagnosis::Detectable { effect, minimum }
+    }));
     let mut remarks = recording.remarks.clone();
     remarks.extend(excluded.iter().map(ToString::to_string));
     let diagnosis = Diagnosis {
@@ -472,6 +488,22 @@ fn not_identifiable(what: &CannotTell) -> Finding {
         curve: None,
         terms: Vec::new(),
     }
+}
+
+/// A name is told once, by its strongest finding.
+fn merge(found: &mut Vec<Finding>) {
+    found.sort_by(|a, b| b.share.total_cmp(&a.share));
+    let mut names: Vec<&'static str> = Vec::new();
+    found.retain(|f| match f.effect {
+        Some(id) if f.status != Status::NotIdentifiable => {
+            let new = !names.contains(&id);
+            if new {
+                names.push(id);
+            }
+            new
+        }
+        _ => true,
+    });
 }
 
 /// Nats become shares, and the largest comes first.

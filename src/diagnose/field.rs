@@ -3,6 +3,8 @@
 //! In disparity a plane is exactly affine in the image, so the residual is taken there, in px of
 //! fx * baseline / z. Nothing is cut by a RANSAC threshold: what strays is clipped, and counted.
 
+use super::rim::Rim;
+use super::shadow::Shadow;
 use crate::camera::Rays;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
@@ -55,12 +57,18 @@ pub struct Field {
     pub light: Vec<f32>,
     /// How often each stored word occurs on the target.
     pub words: Words,
+    /// The target's region was given; else it ends where too little is measured.
+    pub told: bool,
+    /// What lies beside the target in the first frame.
+    pub shadow: Shadow,
+    /// How sharp the target's edge is in the first frame.
+    pub rim: Option<Rim>,
 }
 
 /// Beyond this many sigmas of the model, or of the view's own residuals where errors the model
 /// lacks are larger, a residual is no noise: it is kept out of the means and left to the tests of
 /// the tails.
-const CLIP_SIGMAS: f32 = 6.0;
+pub const CLIP_SIGMAS: f32 = 6.0;
 /// Single frames kept whole: enough for correlations in time.
 pub const FRAMES_KEPT: usize = 4;
 
@@ -86,6 +94,10 @@ impl Field {
         let start = view.depth.first().map_or(0.0, |f| f.timestamp);
         for frame in &view.depth {
             if let Ok(image) = source.read(&frame.path) {
+                if field.frames.is_empty() {
+                    field.shadow = Shadow::beside(&field, &image, &bench.rays, &bench.table);
+                    field.rim = Rim::around(&field, &image, &bench.rays, &bench.table);
+                }
                 field.add(&image, frame.timestamp - start, &expected, &bench.table);
             }
         }
@@ -164,6 +176,9 @@ impl Field {
             ambient_lux: view.notes.ambient_lux,
             light: Vec::new(),
             words: Words::none(),
+            told: view.notes.region.is_some(),
+            shadow: Shadow::default(),
+            rim: None,
         }
     }
 

@@ -5,6 +5,7 @@ use serde_json::Map;
 use super::candidate::RECALIBRATE;
 use super::diagnosis::{Alternative, Curve, Finding, MapRow, Size, Status};
 use super::layers::{Survey, coarser};
+use super::missing::MissingFinding;
 use super::noise::Hanging;
 use super::parameters::parameters;
 use super::search::{Chosen, Outcome, ViewData};
@@ -428,6 +429,54 @@ pub fn hanging(found: Hanging, sigma_mm: f64) -> Finding {
         next_view: None,
         shape: found.words,
         curve: None,
+        terms: Vec::new(),
+    }
+}
+
+/// Something lost as a finding.
+pub fn missing(found: MissingFinding) -> Finding {
+    let status = if found.family.is_some() { Status::Named } else { Status::Unexplained };
+    let best = found.rivals.first().map_or(found.gain, |r| r.1);
+    let mut alternatives: Vec<Alternative> = Vec::new();
+    if let Some(effect) = found.family {
+        let known: Vec<(&'static str, f64)> = found
+            .rivals
+            .iter()
+            .filter_map(|&(id, gain)| Some((effects::find(id)?.card().id, gain)))
+            .filter(|r| r.0 != effect)
+            .map(|(id, gain)| (id, (0.25 * (gain - best).clamp(-60.0, 0.0)).exp()))
+            .collect();
+        let total = 1.0 + known.iter().map(|k| k.1).sum::<f64>();
+        alternatives.push(Alternative { effect, probability: 0.97 / total });
+        alternatives.extend(
+            known
+                .iter()
+                .map(|&(effect, odds)| Alternative { effect, probability: 0.97 * odds / total })
+                .filter(|a| a.probability > 0.005),
+        );
+    }
+    let shape = found
+        .family
+        .is_none()
+        .then(|| format!("more is lost from {:.4} to {:.4}", found.interval[0], found.interval[1]));
+    let words =
+        physics(status, found.family, Statistic::Missing, found.axis, shape.as_deref());
+    Finding {
+        status,
+        effect: found.family,
+        alternatives,
+        statistic: Statistic::Missing,
+        axis: found.axis,
+        interval: found.interval,
+        unit: found.axis.unit(),
+        share: found.gain,
+        parameters: found.parameters,
+        size: Size { mm: 0.0, sigma: found.size },
+        p_adjusted: found.p,
+        physics: words,
+        next_view: None,
+        shape,
+        curve: Some(found.curve),
         terms: Vec::new(),
     }
 }

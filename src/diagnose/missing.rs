@@ -1,0 +1,166 @@
+//! The layer of what is not there: which pixels give no answer, and what it follows.
+//!
+//! Losses are judged in log odds, view by view, against views that differ for no reason by a
+//! factor of e and more: a finding must hold over the views. Steps on lawful axes have a name
+//! unless a nameless curve does clearly better.
+
+use serde_json::{Map, Value};
+
+use super::diagnosis::Curve;
+use super::field::Field;
+use super::layers::Survey;
+use super::missing_cells::{Cell, cells, fine};
+use super::missing_report::{Told, shadow_finding};
+use super::missing_search::{Judged, Losses};
+use super::missing_shapes::{Shape, Step, curves, steps};
+use super::reach::Reach;
+use super::shadow_test::band;
+use crate::camera::{Camera, Rays};
+use crate::rng::Seed;
+use crate::terms::Axis;
+
+/// Losses that follow an axis.
+#[derive(Debug, Clone)]
+pub struct MissingFinding {
+    /// Id of effects.md; `None` where no family explains it.
+    pub family: Option<&'static str>,
+    pub axis: Axis,
+    /// Where it matters, in the axis's unit.
+    pub interval: [f64; 2],
+    /// As effects.md names them, each with value and standard error.
+    pub parameters: Map<String, Value>,
+    /// Chance that losses without a cause look as much like it anywhere in this layer.
+    pub p: f64,
+    /// Families and nameless axes beside it, nats, best first.
+    pub rivals: Vec<(&'static str, f64)>,
+    /// Nats on held-out views.
+    pub gain: f64,
+    /// Share of all pixel-frames that it took.
+    pub size: f64,
+    /// Lost share over the axis.
+    pub curve: Curve,
+}
+
+/// All that was found missing.
+#[derive(Debug, Clone, Default)]
+pub struct MissingOutcome {
+    /// Largest gain first.
+    pub findings: Vec<MissingFinding>,
+    /// Families with the middle of the faintest whole step that 80 % of such recordings would
+    /// show, in degrees or m: what begins farther out is not seen.
+    pub detectable: Vec<(&'static str, &'static str, f64)>,
+}
+
+/// Fewer views show no rule.
+const FEWEST_VIEWS: usize = 4;
+/// Chance of a finding on a clean recording: the steps and curves, and the shadow.
+const LEVEL: f64 = 0.001;
+const SHADOW_LEVEL: f64 = 0.0005;
+/// A name must explain this share of what the best nameless curve does.
+const ADEQUATE: f64 = 0.6;
+const MOST_FINDINGS: usize = 3;
+/// A later finding must bring this share of what the first brought.
+const LEAST_SHARE: f64 = 0.1;
+
+/// What the losses of a recording follow.
+pub fn missing(
+    fields: &[Field],
+    survey: &Survey,
+    camera: &Camera,
+    _rays: &Rays,
+    seed: Seed,
+) -> MissingOutcome {
+    let told: Vec<bool> = fields.iter().map(|f| f.told).collect();
+    let seen = Seen { cells: cells(survey, camera), fine: fine(survey), told };
+    let mut outcome = losses(&seen, &survey.reach, camera, seed);
+    let shadows: Vec<_> = fields.iter().map(|f| f.shadow).collect();
+    if let Some(band) = band(&shadows, SHADOW_LEVEL) {
+        let shadow = shadow_finding(band, fields);
+        // Where the target's own mask reaches into its shadow, the same losses are seen again.
+        outcome.findings.retain(|f| f.family.is_some() || f.size > shadow.size);
+        outcome.findings.push(shadow);
+    }
+    outcome
+}
+
+/// The views' losses on the target.
+struct Seen {
+    /// In patches large enough to judge.
+    cells: Vec<Vec<Cell>>,
+    /// In the smallest there are.
+    fine: Vec<Vec<Cell>>,
+    /// Whether a view's region was given.
+    told: Vec<bool>,
+}
+
+fn losses(seen: &Seen, reach: &Reach, camera: &Camera, seed: Seed) -> MissingOutcome {
+    let views = &seen.cells;
+    let mut outcome = MissingOutcome::default();
+    if views.iter().filter(|v| !v.is_empty()).count() < FEWEST_VIEWS {
+        return outcome;
+    }
+    let (steps, curves) = (steps(reach), curves(camera, reach));
+    let mut explained: Vec<Vec<f64>> = views.iter().map(|v| vec![0.0; v.len()]).collect();
+    let mut taken: Vec<Axis> = Vec::new();
+    while outcome.findings.len() < MOST_FINDINGS {
+        let mut losses = Losses::new(views, &explained);
+        let open_steps: Vec<Step> =
+            steps.iter().filter(|s| !taken.contains(&s.axis)).copied().collect();
+        let open_curves: Vec<Shape> =
+            curves.iter().filter(|c| !taken.contains(&c.axis())).cloned().collect();
+        let (first, _) = losses.judge(&open_steps, &open_curves, None);
+        let Some(best) = choose(&first) else { break };
+        losses.scattered_as_left_by(best);
+        let (judged, chance) = losses.judge(&open_steps, &open_curves, Some(seed));
+        let threshold = chance.threshold(LEVEL);
+        if outcome.findings.is_empty() {
+            outcome.detectable = detectable(&losses, &steps, threshold);
+        }
+        let Some(won) = choose(&judged).filter(|j| j.gain > threshold) else { break };
+        if outcome.findings.first().is_some_and(|f| won.gain < LEAST_SHARE * f.gain) {
+            break;
+        }
+        let more = losses.explained(won);
+        explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
+        taken.push(won.shape.axis());
+        let told = Told { fine: &seen.fine, told: &seen.told, base: losses.base, reach, camera };
+        outcome.findings.push(told.finding(won, rivals(&judged), chance.of_gain(won.gain)));
+    }
+    outcome
+}
+
+/// The best step, unless the best curve leaves it behind.
+fn choose(judged: &[Judged]) -> Option<&Judged> {
+    let best = |named: bool| judged.iter().find(|j| j.shape.family().is_some() == named);
+    let (step, curve) = (best(true), best(false));
+    let enough = curve.map_or(0.0, |c| ADEQUATE * c.gain);
+    step.filter(|s| s.gain > enough).or(curve)
+}
+
+fn rivals(judged: &[Judged]) -> Vec<(&'static str, f64)> {
+    let mut all: Vec<(&'static str, f64)> = Vec::new();
+    for j in judged {
+        let name = j.shape.family().unwrap_or(j.shape.axis().id());
+        if all.iter().all(|r| r.0 != name) {
+            all.push((name, j.gain));
+        }
+    }
+    all
+}
+
+fn detectable(
+    losses: &Losses<'_>,
+    steps: &[Step],
+    threshold: f64,
+) -> Vec<(&'static str, &'static str, f64)> {
+    let name = |s: Step| match (s.axis, s.width > 0.0) {
+        (Axis::Theta, _) => (s.family(), "theta50_deg", s.middle.to_degrees()),
+        (_, true) => (s.family(), "z50_m", s.middle),
+        (_, false) => (s.family(), "z50_m, near side", s.middle),
+    };
+    losses.detectable(steps, threshold).into_iter().map(name).collect()
+}
+
+#[cfg(test)]
+#[path = "missing_tests.rs"]
+mod tests;

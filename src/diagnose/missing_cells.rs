@@ -1,0 +1,158 @@
+//! What share of a patch was lost, and how much such shares scatter without any cause.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::layers::Survey;
+use super::tiles::{SIDE, Tile};
+use crate::camera::Camera;
+use crate::terms::Place;
+
+/// Pixel-frames of a patch, and how many of them have no measurement.
+#[derive(Debug, Clone, Copy)]
+pub struct Cell {
+    pub place: Place,
+    pub lost: f64,
+    pub asked: f64,
+}
+
+/// Cells across the picture: some hundred a view, each wider than a clump of dead pixels.
+const ACROSS: usize = 16;
+/// Tiles nearer the target's edge are kept apart, px.
+const RIM_PX: f64 = 8.0;
+/// A smaller patch, in tiles, says little.
+const FEWEST_TILES: usize = 2;
+
+/// The cells of all views.
+pub fn cells(survey: &Survey, camera: &Camera) -> Vec<Vec<Cell>> {
+    let side = (camera.width.div_ceil(ACROSS * SIDE) * SIDE) as f64;
+    survey
+        .views
+        .iter()
+        .map(|view| {
+            let mut groups: BTreeMap<(u32, u32, bool), Vec<usize>> = BTreeMap::new();
+            for (i, t) in view.tiles.iter().enumerate() {
+                let p = &t.place;
+                let key = ((p.v / side) as u32, (p.u / side) as u32, p.edge < RIM_PX);
+                groups.entry(key).or_default().push(i);
+            }
+            let places: Vec<Place> = view.tiles.iter().map(|t| t.place).collect();
+            groups
+                .values()
+                .filter(|g| g.len() >= FEWEST_TILES)
+                .map(|group| {
+                    let sum = |of: &dyn Fn(usize) -> f64| group.iter().map(|&i| of(i)).sum::<f64>();
+                    let asked = sum(&|i| view.tiles[i].asked);
+                    let lost = sum(&|i| view.tiles[i].asked * view.tiles[i].missing);
+                    let mut place = places[group[0]];
+                    place.average(&places, &|of| sum(&|i| view.tiles[i].asked * of(i)) / asked);
+                    Cell { place, lost, asked }
+                })
+                .collect()
+        })
+        .collect()
+}
+
+/// Every tile a cell of its own: for where and how much, not for whether.
+pub fn fine(survey: &Survey) -> Vec<Vec<Cell>> {
+    let cell = |t: &Tile| Cell { place: t.place, lost: t.asked * t.missing, asked: t.asked };
+    survey.views.iter().map(|v| v.tiles.iter().map(cell).collect()).collect()
+}
+
+/// Losses below this share are all the same.
+const HARDLY: f64 = 0.002;
+
+/// Log odds of a share, flattened where hardly anything or nearly all is lost.
+pub fn odds(share: f64) -> f64 {
+    ((share + HARDLY) / (1.0 - share + HARDLY)).ln()
+}
+
+/// Its inverse.
+pub fn share(odds: f64) -> f64 {
+    let e = odds.exp();
+    (((1.0 + HARDLY) * e - HARDLY) / (1.0 + e)).clamp(0.0, 1.0)
+}
+
+/// Variances of the log odds without a cause.
+#[derive(Debug, Clone, Copy)]
+pub struct Scatter {
+    /// Of a view as a whole.
+    pub level: f64,
+    /// Of a view's slope across the picture, for a normalised coordinate of 1.
+    pub slope: f64,
+    /// Of a cell.
+    pub cell: f64,
+}
+
+/// Never believed to be less: views differ by a factor of e, the sides of one picture as well.
+pub const LEAST: Scatter = Scatter { level: 1.0, slope: 4.0, cell: 0.5 };
+/// Neighbouring cells share their clumps: so many make one.
+const CLUMP: f64 = 4.0;
+
+/// Applies the inverse covariance of a view's cells.
+pub struct Whitener {
+    weight: f64,
+    slopes: Vec<Vector3<f64>>,
+    inverse: Matrix3<f64>,
+    scatter: Scatter,
+}
+
+impl Whitener {
+    pub fn of(cells: &[Cell], scatter: Scatter) -> Self {
+        let weight = 1.0 / (CLUMP * scatter.cell);
+        let slopes: Vec<_> =
+            cells.iter().map(|c| Vector3::new(1.0, c.place.x, c.place.y)).collect();
+        let tight = Vector3::new(1.0 / scatter.level, 1.0 / scatter.slope, 1.0 / scatter.slope);
+        let inner = slopes
+            .iter()
+            .fold(Matrix3::from_diagonal(&tight), |m, n| m + n * n.transpose() * weight);
+        // Positive definite by its diagonal.
+        let inverse = inner.try_inverse().unwrap_or_else(Matrix3::zeros);
+        Whitener { weight, slopes, inverse, scatter }
+    }
+
+    /// C^-1 y by Woodbury's identity.
+    pub fn solve(&self, y: &[f64]) -> Vec<f64> {
+        let seen = self.slopes.iter().zip(y).fold(Vector3::zeros(), |s, (n, y)| s + n * *y);
+        let own = self.inverse * seen * self.weight;
+        self.slopes.iter().zip(y).map(|(n, y)| self.weight * (y - n.dot(&own))).collect()
+    }
+
+    /// Log odds of a view in which nothing is wrong.
+    pub fn draw(&self, mut normal: impl FnMut() -> f64) -> Vec<f64> {
+        let s = &self.scatter;
+        let own = Vector3::new(
+            s.level.sqrt() * normal(),
+            s.slope.sqrt() * normal(),
+            s.slope.sqrt() * normal(),
+        );
+        let sd = self.weight.recip().sqrt();
+        self.slopes.iter().map(|n| n.dot(&own) + sd * normal()).collect()
+    }
+}
+
+impl Scatter {
+    /// What is left of the views' log odds: their levels and slopes by least squares, then the
+    /// cells about them.
+    pub fn of(views: &[Vec<Cell>], left: &[Vec<f64>]) -> Self {
+        let (mut sums, mut n) = ([0.0; 3], [0.0; 3]);
+        for (cells, left) in views.iter().zip(left) {
+            let loose = Scatter { level: 1e6, slope: 4.0, cell: 1.0 };
+            let w = Whitener::of(cells, loose);
+            let seen = w.slopes.iter().zip(left).fold(Vector3::zeros(), |s, (n, y)| s + n * *y);
+            let own = w.inverse * seen * w.weight;
+            sums[0] += (left.iter().sum::<f64>() / left.len().max(1) as f64).powi(2);
+            sums[1] += own.y.powi(2) + own.z.powi(2);
+            sums[2] +=
+                w.slopes.iter().zip(left).map(|(n, y)| (y - n.dot(&own)).powi(2)).sum::<f64>();
+            n = [n[0] + 1.0, n[1] + 2.0, n[2] + left.len() as f64];
+        }
+        let mean = |k: usize| sums[k] / f64::max(n[k], 1.0);
+        Scatter {
+            level: mean(0).max(LEAST.level),
+            slope: mean(1).max(LEAST.slope),
+            cell: mean(2).max(LEAST.cell),
+        }
+    }
+}

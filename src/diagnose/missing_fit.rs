@@ -1,0 +1,163 @@
+//! The step itself: where half is lost and how gradually, by weighted least squares on shares.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::missing_cells::Cell;
+use super::missing_shapes::Step;
+use crate::solve::{LeastSquares, trust_region};
+
+/// Share lost where the axis is at `x`, in one view.
+#[derive(Debug, Clone, Copy)]
+pub struct Point {
+    pub view: usize,
+    pub x: f64,
+    pub share: f64,
+    pub asked: f64,
+    /// The true share may be larger.
+    pub at_least: bool,
+}
+
+/// Bins over an axis's reach: a tilted view spans some.
+pub const BINS: usize = 40;
+
+/// Where more is lost the search for the target passes over the holes: the share is a bound.
+const HOLES: f64 = 0.4;
+
+/// In views whose region was not `told`, what lies beyond the first bin with holes is a bound.
+pub fn bounded(mut points: Vec<Point>, step: &Step, told: &[bool]) -> Vec<Point> {
+    let beyond = |p: &Point| p.x * step.width.signum();
+    let from = points.iter().filter(|p| p.share > HOLES).map(beyond).fold(f64::INFINITY, f64::min);
+    for p in &mut points {
+        p.at_least = !told[p.view] && beyond(p) >= from;
+    }
+    points
+}
+
+/// The views' shares, bin by bin of an axis.
+pub fn points(views: &[Vec<Cell>], at: &dyn Fn(&Cell) -> f64, [low, high]: [f64; 2]) -> Vec<Point> {
+    let mut all = Vec::new();
+    let width = ((high - low) / BINS as f64).max(f64::MIN_POSITIVE);
+    for (view, cells) in views.iter().enumerate() {
+        let mut sums = [[0.0; 3]; BINS];
+        for c in cells {
+            let x = at(c);
+            let bin = (((x - low) / width).max(0.0) as usize).min(BINS - 1);
+            let sum = &mut sums[bin];
+            *sum = [sum[0] + c.asked, sum[1] + c.lost, sum[2] + c.asked * x];
+        }
+        all.extend(sums.iter().filter(|s| s[0] > 0.0).map(|&[asked, lost, x]| Point {
+            view,
+            x: x / asked,
+            share: lost / asked,
+            asked,
+            at_least: false,
+        }));
+    }
+    all
+}
+
+/// A step with its standard errors.
+#[derive(Debug, Clone, Copy)]
+pub struct Fitted {
+    pub step: Step,
+    pub base: f64,
+    /// Of middle, width and share; `None` where the share was not fitted.
+    pub std_error: [Option<f64>; 3],
+}
+
+/// Views are off the step by this, in log odds, and neighbours lose their pixels together.
+const OFF: f64 = 0.3;
+const TOGETHER: f64 = 16.0;
+/// Shares are known no better.
+const LEAST: f64 = 0.002;
+/// Rises of another form (Gaussian, Gompertz) put the middle up to so many widths elsewhere.
+const FORM: f64 = 0.5;
+/// A share of its own must lower chi squared by this: 1 % of chance.
+const WORTH: f64 = 6.6;
+
+/// Middle, logarithm of the width, and logit of the share where it is free.
+struct Problem<'a> {
+    points: &'a [Point],
+    start: Step,
+    base: f64,
+    free_share: bool,
+}
+
+impl Problem<'_> {
+    fn step(&self, x: &DVector<f64>) -> Step {
+        let share = if self.free_share { 1.0 / (1.0 + (-x[2]).exp()) } else { 1.0 };
+        Step {
+            middle: x[0],
+            width: self.start.width.signum() * x[1].exp(),
+            share,
+            axis: self.start.axis,
+        }
+    }
+
+    fn residuals(&self, x: &DVector<f64>) -> DVector<f64> {
+        let step = self.step(x);
+        let of = |p: &Point| {
+            let loss = step.loss(p.x, self.base);
+            // Between what was expected and what was seen: neither alone may claim certainty.
+            let half = 0.5 * (loss + p.share);
+            let spread = half * (1.0 - half);
+            let variance = spread * TOGETHER / p.asked + (OFF * spread).powi(2) + LEAST * LEAST;
+            let off = if p.at_least { (p.share - loss).max(0.0) } else { p.share - loss };
+            off / variance.sqrt()
+        };
+        DVector::from_iterator(self.points.len(), self.points.iter().map(of))
+    }
+
+    fn start(&self) -> DVector<f64> {
+        let mut x = vec![self.start.middle, self.start.width.abs().ln()];
+        if self.free_share {
+            x.push(1.0);
+        }
+        DVector::from_vec(x)
+    }
+}
+
+impl LeastSquares for Problem<'_> {
+    fn linearise(&self, x: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let width = self.step(x).width.abs();
+        let within = 1e-4..1e2;
+        if !within.contains(&width) || x.iter().any(|v| !v.is_finite()) {
+            return None;
+        }
+        let r = self.residuals(x);
+        let mut jacobian = DMatrix::zeros(r.len(), x.len());
+        for j in 0..x.len() {
+            let h = if j == 0 { 1e-3 * width } else { 1e-4 };
+            let mut moved = x.clone();
+            moved[j] += h;
+            jacobian.set_column(j, &((self.residuals(&moved) - &r) / h));
+        }
+        Some((r, jacobian))
+    }
+
+    fn cost(&self, x: &DVector<f64>) -> f64 {
+        self.linearise(x).map_or(f64::INFINITY, |(r, _)| 0.5 * r.norm_squared())
+    }
+}
+
+/// Refine a step found on the grid.
+pub fn fit(start: Step, base: f64, points: &[Point]) -> Option<Fitted> {
+    let solve = |free_share: bool| {
+        let problem = Problem { points, start, base, free_share };
+        let end = trust_region(&problem, problem.start(), 100)?;
+        Some((problem, end))
+    };
+    let (whole, end) = solve(false)?;
+    let partial = solve(true).filter(|(_, free)| 2.0 * (end.cost - free.cost) > WORTH);
+    let (problem, end) = partial.unwrap_or((whole, end));
+    let (r, jacobian) = problem.linearise(&end.x)?;
+    let freedom = (r.len() - end.x.len().min(r.len() - 1)) as f64;
+    let scale = (r.norm_squared() / freedom).max(1.0);
+    let covariance = (jacobian.transpose() * &jacobian).try_inverse()? * scale;
+    let step = problem.step(&end.x);
+    let error = |j: usize| covariance[(j, j)].max(0.0).sqrt();
+    let share = problem.free_share.then(|| error(2) * step.share * (1.0 - step.share));
+    let std_error =
+        [Some(error(0).hypot(FORM * step.width)), Some(error(1) * step.width.abs()), share];
+    Some(Fitted { step, base, std_error })
+}

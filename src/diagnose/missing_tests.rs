@@ -1,0 +1,144 @@
+use super::*;
+use crate::plane::Plane;
+use crate::rng::Stream;
+use crate::simulate::kinect_v1;
+use crate::terms::Place;
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+const VIEWS: usize = 14;
+
+/// Cells of views whose pixels are lost by `loss`, and by chance: in some views more than in
+/// others, and in clumps.
+fn session(share: f64, rng: &mut Stream, loss: impl Fn(&Place) -> f64) -> (Vec<Vec<Cell>>, Camera) {
+    let camera = kinect_v1(1).camera;
+    let mut normal = {
+        let mut own = crate::rng::Seed(rng.random()).stream("normal");
+        move || -> f64 { StandardNormal.sample(&mut own) }
+    };
+    let views = (0..VIEWS).map(|view| {
+        let z = 0.8 * (3.5f64 / 0.8).powf(rng.random());
+        let theta = (5.0 * (view as f64 + rng.random::<f64>())).to_radians();
+        let plane = Plane::tilted(z, theta, rng.random_range(-3.1..3.1));
+        let level = normal();
+        let clumps: Vec<f64> = (0..48).map(|_| normal()).collect();
+        let mut cells = Vec::new();
+        for i in 0..192 {
+            let (column, row) = (i % 16, i / 16);
+            let (u, v) = (40.0 * column as f64 + 20.0, 40.0 * row as f64 + 20.0);
+            let (x, y) = camera.ray(u, v);
+            let depth = plane.depth(x, y);
+            if !(0.3..5.0).contains(&depth) {
+                continue;
+            }
+            let place = Place {
+                u,
+                v,
+                x,
+                y,
+                z: depth,
+                theta: plane.theta(),
+                session_s: view as f64,
+                radius: f64::hypot(x, y) / 0.7,
+                edge: 30.0,
+                light: 1.0,
+                ..Place::default()
+            };
+            let by_chance = share * (level + clumps[row / 2 * 8 + column / 2] - 1.0).exp();
+            let p = 1.0 - (1.0 - by_chance.min(1.0)) * (1.0 - loss(&place));
+            let asked: f64 = 6400.0;
+            let drawn = asked * p + (asked * p * (1.0 - p)).sqrt() * normal();
+            cells.push(Cell { place, lost: drawn.round().clamp(0.0, asked), asked });
+        }
+        cells
+    });
+    (views.collect(), camera)
+}
+
+fn find(views: &[Vec<Cell>], camera: &Camera, seed: Seed) -> MissingOutcome {
+    let of = |value: fn(&Place) -> f64| {
+        crate::stats::range(views.iter().flatten().map(|c| value(&c.place)))
+    };
+    let mut reach = Reach::of(std::iter::empty());
+    reach.z = of(|p| p.z);
+    reach.theta = of(|p| p.theta);
+    reach.session = of(|p| p.session_s);
+    reach.light = [1.0, 1.0];
+    let seen = Seen { cells: views.to_vec(), fine: views.to_vec(), told: vec![true; views.len()] };
+    losses(&seen, &reach, camera, seed)
+}
+
+fn parameter(finding: &MissingFinding, name: &str) -> [f64; 2] {
+    ["value", "std_error"].map(|of| finding.parameters[name][of].as_f64().unwrap())
+}
+
+/// Half is lost at 62 degrees; the background by chance.
+#[test]
+fn the_grazing_angle_comes_back() {
+    let mut within = 0;
+    for seed in 0..12 {
+        let mut rng = Seed(seed).stream("grazing");
+        let (views, camera) = session(0.002, &mut rng, |p| {
+            1.0 / (1.0 + (-(p.theta.to_degrees() - 62.0) / 1.5).exp())
+        });
+        let outcome = find(&views, &camera, Seed(seed));
+        let first = outcome.findings.first().expect("found");
+        assert_eq!(first.family, Some("grazing-dropout"), "{seed}: {:?}", first.rivals);
+        assert!(first.p < 1e-3);
+        let [middle, error] = parameter(first, "theta50_deg");
+        assert!((middle - 62.0).abs() < 3.0, "{middle} +- {error}");
+        within += usize::from((middle - 62.0).abs() < 2.0 * error);
+    }
+    // 95 % of 12 are 11; 9 or fewer have a chance of 2 %.
+    assert!(within >= 10, "{within} of 12 within two standard errors");
+}
+
+#[test]
+fn what_is_too_near_is_lost_on_the_near_side() {
+    let mut rng = Seed(3).stream("near");
+    let (views, camera) = session(0.002, &mut rng, |p| 1.0 / (1.0 + ((p.z - 1.0) / 0.04).exp()));
+    let outcome = find(&views, &camera, Seed(3));
+    let first = &outcome.findings[0];
+    assert_eq!((first.family, first.axis), (Some("range-dropout"), Axis::Z));
+    let ([middle, error], [width, _]) = (parameter(first, "z50_m"), parameter(first, "width_m"));
+    assert!((middle - 1.0).abs() < 3.0 * error.max(0.003), "{middle} +- {error}");
+    assert!((width + 0.04).abs() < 0.02, "{width}");
+    assert!(first.interval[0] == 0.0 && (first.interval[1] - 1.12).abs() < 0.08);
+}
+
+/// A band of rows has no name, but a place.
+#[test]
+fn rows_that_fail_are_told_by_their_axis() {
+    let mut rng = Seed(4).stream("rows");
+    let (views, camera) =
+        session(0.001, &mut rng, |p| if (200.0..280.0).contains(&p.v) { 0.1 } else { 0.0 });
+    let first = &find(&views, &camera, Seed(4)).findings[0];
+    assert_eq!((first.family, first.axis), (None, Axis::Row));
+    assert!(first.interval[0] > 150.0 && first.interval[1] < 330.0, "{:?}", first.interval);
+}
+
+/// Two per cent are lost on average, in clumps, by a factor of e more or less from view to view.
+fn alarms(seeds: std::ops::Range<u64>) -> Vec<u64> {
+    seeds
+        .filter(|&seed| {
+            let mut rng = Seed(seed).stream("null");
+            let share = [0.0, 0.01, 0.02][seed as usize % 3];
+            let (views, camera) = session(share, &mut rng, |_| 0.0);
+            !find(&views, &camera, Seed(seed)).findings.is_empty()
+        })
+        .collect()
+}
+
+#[test]
+fn losses_without_a_cause_are_none() {
+    assert_eq!(alarms(0..6), []);
+}
+
+/// False alarms are to be 0.1 % of recordings: two in 200 have a chance of 2 %, three of 0.1 %.
+#[test]
+#[ignore = "takes a minute"]
+fn losses_without_a_cause_are_none_in_two_hundred() {
+    let alarms = alarms(0..200);
+    println!("{} false alarms", alarms.len());
+    assert!(alarms.len() <= 2, "{alarms:?}");
+}
