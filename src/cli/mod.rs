@@ -2,7 +2,9 @@
 
 mod calibrate;
 mod common;
+mod correct;
 mod demo;
+mod diagnose;
 mod effects;
 mod fit;
 mod simulate;
@@ -30,8 +32,12 @@ enum Command {
     Calibrate(calibrate::Arguments),
     /// Fit sigma(z, theta) to a table z_m,theta_rad,sigma_m[,n]
     Fit(fit::Arguments),
+    /// What a model leaves out of a recording: located, named, modelled, and shown to help
+    Diagnose(diagnose::Arguments),
     /// Make a recording, or a film of a room, by formula or by light
     Simulate(simulate::Arguments),
+    /// Write a recording again with the model's biases taken out of the depth
+    Correct(correct::Arguments),
     /// The catalogue of physical effects: what each does, how it shows, what it is taken for
     Effects(effects::Arguments),
     /// The whole road on bundled data
@@ -54,7 +60,7 @@ pub fn main() -> ExitCode {
         }
     };
     match run(&arguments) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => ExitCode::from(code),
         Err(e) => {
             eprintln!("kinoise: {e:#}");
             ExitCode::from(FAILURE)
@@ -75,14 +81,16 @@ fn one_line(e: &clap::Error) -> String {
     words.join(" ").trim_start_matches("error: ").to_string()
 }
 
-fn run(arguments: &Arguments) -> anyhow::Result<()> {
+fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let global = &arguments.global;
     global.set_threads()?;
     match &arguments.command {
-        Command::Calibrate(a) => calibrate::run(a, global),
-        Command::Fit(a) => fit::run(a, global),
-        Command::Simulate(a) => simulate::run(a, global),
-        Command::Effects(a) => effects::run(a, global),
-        Command::Demo(a) => demo::run(a, global),
+        Command::Calibrate(a) => calibrate::run(a, global).map(|()| 0),
+        Command::Fit(a) => fit::run(a, global).map(|()| 0),
+        Command::Diagnose(a) => diagnose::run(a, global),
+        Command::Simulate(a) => simulate::run(a, global).map(|()| 0),
+        Command::Correct(a) => correct::run(a, global).map(|()| 0),
+        Command::Effects(a) => effects::run(a, global).map(|()| 0),
+        Command::Demo(a) => demo::run(a, global).map(|()| 0),
     }
 }

@@ -211,13 +211,27 @@ fn camera(arguments: &Arguments) -> anyhow::Result<(Sensor, SigmaModel, Vec<Acti
             path.display()
         ));
     }
-    let effects = model
-        .effects
-        .iter()
-        .map(|e| Active::from_model(&e.id, &e.parameters))
-        .collect::<Result<_, _>>()
-        .with_context(|| path.display().to_string())?;
+    let effects =
+        Active::all_of_model(&model.effects).with_context(|| path.display().to_string())?;
+    let shaped = model.effects.iter().filter(|e| !e.shape.is_empty());
+    refuse_over_shape(shaped.map(|e| e.id.as_str()), &arguments.effects)?;
     Ok((sensor, model.sigma, effects))
+}
+
+/// An effect on top of the shape that was fitted for it would count twice.
+fn refuse_over_shape<'a>(
+    shaped: impl Iterator<Item = &'a str>,
+    given: &[Active],
+) -> anyhow::Result<()> {
+    let ids: Vec<&str> = shaped.collect();
+    match given.iter().map(|a| a.effect.card().id).find(|id| ids.contains(id)) {
+        None => Ok(()),
+        Some(id) => {
+            bail!(
+                "--effect {id}: the model brings its shape; take it out of the model, or leave --effect out"
+            )
+        }
+    }
 }
 
 /// The views, and the sensor of the recording that is shot again.

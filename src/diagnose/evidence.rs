@@ -115,14 +115,11 @@ impl Rows {
         }
     }
 
-    /// Coefficients of the nuisances once the chosen terms are what `beta` says.
-    pub fn nuisances(&self, beta: &[f64]) -> DVector<f64> {
+    /// Weighted square that the nuisances (and chosen terms) explain.
+    pub fn explained(&self) -> f64 {
         let p = self.nuisances;
-        let mut right = self.seen.rows(0, p).into_owned();
-        for (j, beta) in beta.iter().enumerate() {
-            right -= self.own.view((0, p + j), (p, 1)) * *beta;
-        }
-        &self.inverse * right
+        let seen = self.seen.rows(0, p);
+        (&self.inverse * seen).dot(&seen)
     }
 
     /// Evidence on the chosen terms and a candidate, the nuisances profiled out. `columns` fills

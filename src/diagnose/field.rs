@@ -12,7 +12,12 @@ use crate::io::{FrameSource, InfraredImage};
 use crate::measure::{Workbench, view_target};
 use crate::model::SigmaModel;
 use crate::plane::Plane;
+use crate::terms::{Place, Term};
 use crate::view::{Sensor, View};
+
+use super::known::Known;
+use super::lattice::Words;
+use super::tiles::Places;
 
 /// One view's residuals.
 #[derive(Debug, Clone)]
@@ -53,6 +58,8 @@ pub struct Field {
     pub told: bool,
     /// What lies beside the target in the first frame.
     pub shadow: Shadow,
+    /// How often each stored word occurs on the target.
+    pub words: Words,
 }
 
 /// Beyond this many sigmas of the model, or of the view's own residuals where errors the model
@@ -67,11 +74,18 @@ impl Field {
     ///
     /// # Errors
     /// When no frame can be read or none shows a plane.
-    pub fn read(view: &View, bench: &Workbench<'_>, sigma: &SigmaModel) -> Result<Self> {
+    pub fn read(
+        view: &View,
+        bench: &Workbench<'_>,
+        sigma: &SigmaModel,
+        known: &Known,
+        session_start: f64,
+    ) -> Result<Self> {
         let target = view_target(view, bench)?;
         let camera = &bench.sensor.camera;
         let mut field = Field::empty(view, bench.sensor, target.plane, target.pixels);
         field.sigma = field.expected_sigma(&bench.rays, sigma, &bench.sensor.code);
+        let expected = field.known_bias(known, bench, session_start);
         field.spread_px = (target.scale * field.scale_px_m) as f32;
         let mut source = FrameSource::new(camera.width, camera.height);
         let start = view.depth.first().map_or(0.0, |f| f.timestamp);
@@ -80,7 +94,7 @@ impl Field {
                 if field.frames.is_empty() {
                     field.shadow = Shadow::beside(&field, &image, &bench.rays, &bench.table);
                 }
-                field.add(&image, frame.timestamp - start, &bench.rays, &bench.table);
+                field.add(&image, frame.timestamp - start, &expected, &bench.table);
             }
         }
         field.close();
@@ -142,6 +156,7 @@ impl Field {
             light: Vec::new(),
             told: view.notes.region.is_some(),
             shadow: Shadow::default(),
+            words: Words::none(),
         }
     }
 
@@ -165,17 +180,42 @@ impl Field {
         self.scale_px_m * self.plane.inverse_depth(x, y)
     }
 
-    fn add(&mut self, frame: &Frame, time: f64, rays: &Rays, table: &DepthTable) {
+    /// Disparity that the model expects at each pixel, px; its terms of the variance go to sigma.
+    fn known_bias(&mut self, known: &Known, bench: &Workbench<'_>, start: f64) -> Vec<f32> {
+        let n = self.pixels.len();
+        let mut expected: Vec<f32> =
+            (0..n).map(|k| self.disparity(k, &bench.rays) as f32).collect();
+        if known.bias.is_empty() && known.variance.is_empty() {
+            return expected;
+        }
+        let mut sigma = self.sigma.clone();
+        let places = Places::of(self, &bench.sensor.camera, &bench.rays, start);
+        let mut row = Vec::new();
+        let mut sum = |terms: &[Term], place: &Place| -> f64 {
+            terms.iter().map(|t| t.value(place, &mut row)).sum()
+        };
+        for k in 0..n {
+            let place = places.pixel(k);
+            expected[k] += sum(&known.bias, &place) as f32;
+            sigma[k] *= (0.5 * sum(&known.variance, &place)).exp() as f32;
+        }
+        self.sigma = sigma;
+        expected
+    }
+
+    fn add(&mut self, frame: &Frame, time: f64, expected: &[f32], table: &DepthTable) {
         let keep = self.first.len() < FRAMES_KEPT;
         let mut residuals = if keep { vec![f32::NAN; self.pixels.len()] } else { Vec::new() };
         let (mut sum, mut n) = (0.0f64, 0.0f64);
         for k in 0..self.pixels.len() {
-            let z = table.metres(frame.words[self.pixels[k] as usize]);
+            let word = frame.words[self.pixels[k] as usize];
+            let z = table.metres(word);
             if !z.is_finite() {
                 continue;
             }
             self.measured[k] += 1;
-            let e = (self.scale_px_m / f64::from(z) - self.disparity(k, rays)) as f32;
+            self.words.0[usize::from(word)] += 1;
+            let e = (self.scale_px_m / f64::from(z)) as f32 - expected[k];
             if keep {
                 residuals[k] = e;
             }

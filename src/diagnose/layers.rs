@@ -21,7 +21,9 @@ pub struct Survey {
     pub reach: Reach,
 }
 
+#[derive(Clone)]
 pub struct SurveyedView {
+    pub name: String,
     pub tiles: Vec<Tile>,
     /// Variance of a pixel's mean in units of the model's, times pixels per independent sample.
     pub inflation: f64,
@@ -47,7 +49,13 @@ impl Survey {
             .map(|f| {
                 let (inflation, correlation) = inflation(f);
                 let tiles = tiles(f, camera, rays, start);
-                SurveyedView { tiles, inflation, correlation, frames: independent_frames(f) }
+                SurveyedView {
+                    name: f.name.clone(),
+                    tiles,
+                    inflation,
+                    correlation,
+                    frames: independent_frames(f),
+                }
             })
             .collect();
         relative_light(&mut views);
@@ -68,6 +76,13 @@ impl Survey {
         let fine = self.mean_data();
         let coarse: Vec<ViewData> = fine.par_iter().map(coarser).collect();
         search(&fine, &coarse, &candidates, &rules, seed)
+    }
+
+    /// The views at these places.
+    pub fn subset(&self, which: &[usize]) -> Survey {
+        let views: Vec<SurveyedView> = which.iter().map(|&n| self.views[n].clone()).collect();
+        let reach = Reach::of(views.iter().flat_map(|v| v.tiles.iter()));
+        Survey { views, reach }
     }
 
     /// Log variance over the model's, block by block, once the terms of the bias are taken out.
@@ -121,7 +136,7 @@ fn mean_data(view: &SurveyedView) -> ViewData {
 }
 
 /// Two tiles by two made one.
-fn coarser(fine: &ViewData) -> ViewData {
+pub fn coarser(fine: &ViewData) -> ViewData {
     let side = (2 * SIDE) as f64;
     let p = fine.precision.len();
     let mut groups: std::collections::BTreeMap<(u32, u32), Vec<usize>> = Default::default();

@@ -2,10 +2,17 @@
 
 mod bias;
 mod candidate;
+mod detectable;
 mod diagnosis;
+mod engine;
 mod evidence;
 mod field;
+mod findings;
+mod heldout;
+mod known;
 mod lattice;
+mod noise;
+mod parameters;
 mod layers;
 mod missing;
 mod missing_cells;
@@ -18,15 +25,18 @@ mod reference;
 mod search;
 mod shadow;
 mod shadow_test;
+mod shape;
 mod smooth;
 mod structure;
 mod tiles;
 mod variance;
 
 pub use diagnosis::*;
+pub use engine::{DiagnoseOptions, Diagnosed, diagnose};
 pub use field::Field;
+pub use known::Known;
 pub use lattice::{Lattice, Words};
 pub use layers::Survey;
 pub use missing::{MissingFinding, MissingOutcome, missing};
 pub use search::Outcome;
-pub use structure::{Structure, structures};
+

@@ -2,6 +2,14 @@
 //! means.
 
 use nalgebra::{DMatrix, DVector};
+use serde_json::Map;
+
+use super::diagnosis::{Alternative, CannotTell, Finding, Size, Status};
+use super::known::Known;
+use super::parameters::estimate;
+use super::search::NoiseGains;
+use crate::rng::Seed;
+use crate::terms::{Axis, Statistic};
 
 use super::evidence::{Evidence, Gain, Null, gain};
 use super::field::Field;
@@ -9,7 +17,12 @@ use super::field::Field;
 /// A law that the distances may be off by.
 pub struct Law {
     pub family: &'static str,
-    pub axis: &'static str,
+    pub axis: Axis,
+    /// Of the axis.
+    pub reach: [f64; 2],
+    /// What it makes of the depth, m and in sigmas.
+    pub rms_m: f64,
+    pub rms_sigma: f64,
     pub settled: Vec<(&'static str, f64)>,
     pub gain: Gain,
     pub null: Null,
@@ -23,6 +36,7 @@ struct Checked {
     off: f64,
     session_s: f64,
     px_m: f64,
+    sigma_m: f64,
 }
 
 /// Fewer references than this can be fitted by anything.
@@ -38,7 +52,9 @@ pub fn laws(fields: &[Field]) -> Vec<Law> {
         .filter_map(|f| {
             let z = f.plane.depth(0.0, 0.0);
             let off = z - f.reference_distance_m?;
-            Some(Checked { z, off, session_s: f.time_s - start, px_m: f.scale_px_m })
+            let sigma_px = f64::from(f.sigma.get(f.sigma.len() / 2).copied()?);
+            let sigma_m = sigma_px * z * z / f.scale_px_m;
+            Some(Checked { z, off, session_s: f.time_s - start, px_m: f.scale_px_m, sigma_m })
         })
         .collect();
     if checked.len() < FEWEST {
@@ -58,15 +74,25 @@ pub fn laws(fields: &[Field]) -> Vec<Law> {
             })
             .collect();
         if let (Some(gain), Some(null)) = (gain(&views, PRIOR), Null::of(&views, 0, PRIOR)) {
-            laws.push(Law { family, axis, settled, gain, null });
+            let n = checked.len() as f64;
+            let square = |of: &dyn Fn(&Checked) -> f64| {
+                (checked.iter().map(|c| of(c).powi(2)).sum::<f64>() / n).sqrt()
+            };
+            let shift = |c: &Checked| gain.beta[0] * column(c);
+            let reach = crate::stats::range(checked.iter().map(|c| match axis {
+                Axis::SessionTime => c.session_s,
+                _ => c.z,
+            }));
+            let (rms_m, rms_sigma) = (square(&shift), square(&|c| shift(c) / c.sigma_m));
+            laws.push(Law { family, axis, reach, rms_m, rms_sigma, settled, gain, null });
         }
     };
-    add("depth-scale", "z", Vec::new(), &|c| c.z);
+    add("depth-scale", Axis::Z, Vec::new(), &|c| c.z);
     // An offset of the disparity by delta px moves the depth by -z^2 delta / (f b).
-    add("disparity-offset", "z", Vec::new(), &|c| -c.z * c.z / c.px_m);
+    add("disparity-offset", Axis::Z, Vec::new(), &|c| -c.z * c.z / c.px_m);
     for tau in WARM_UPS {
         let settled = vec![("time_constant_s", tau)];
-        add("thermal-drift", "session-time", settled, &|c| {
+        add("thermal-drift", Axis::SessionTime, settled, &|c| {
             c.z * (1.0 - (-c.session_s / tau).exp())
         });
     }
@@ -89,4 +115,93 @@ fn scatter(checked: &[Checked]) -> f64 {
     let left = fitted.map_or_else(|_| off.norm_squared(), |f| (&off - f).norm_squared());
     // A tape is read to half a millimetre at best.
     (left / (n as f64 - 4.0).max(1.0)).max(0.0005 * 0.0005)
+}
+
+/// Names that predict as well as the best within this many nats cannot be told apart.
+const AS_GOOD_NATS: f64 = 3.0;
+
+/// What the references tell, if anything.
+pub fn findings(laws: &[Law], known: &Known, level: f64, seed: Seed) -> Vec<Finding> {
+    let nulls: Vec<&Null> = laws.iter().map(|l| &l.null).collect();
+    if nulls.is_empty() {
+        return Vec::new();
+    }
+    let noise = NoiseGains::of(&nulls, Seed(seed.0 ^ 0x5eed));
+    let safe = |l: &Law| l.gain.total / l.null.dispersion;
+    let Some(best) = laws.iter().max_by(|a, b| a.gain.total.total_cmp(&b.gain.total)) else {
+        return Vec::new();
+    };
+    if safe(best) < noise.threshold(level) || known.has(best.family) {
+        return Vec::new();
+    }
+    let mut odds: Vec<(&'static str, f64)> = Vec::new();
+    for family in ["depth-scale", "disparity-offset", "thermal-drift"] {
+        let most = laws
+            .iter()
+            .filter(|l| l.family == family)
+            .map(|l| l.gain.total)
+            .fold(f64::NEG_INFINITY, f64::max);
+        odds.push((family, (0.5 * (most - best.gain.total)).exp()));
+    }
+    odds.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let total: f64 = odds.iter().map(|o| o.1).sum();
+    let alternatives: Vec<Alternative> = odds
+        .iter()
+        .map(|&(effect, o)| Alternative { effect, probability: 0.98 * o / total })
+        .filter(|a| a.probability > 0.005)
+        .collect();
+    let close = odds.get(1).is_some_and(|o| o.1 > (-0.5 * AS_GOOD_NATS).exp());
+    let beta = best.gain.beta[0];
+    let error = best.gain.covariance[(0, 0)].sqrt();
+    let mut parameters = Map::new();
+    match best.family {
+        "depth-scale" => parameters.insert("scale".into(), estimate(1.0 + beta, error)),
+        "disparity-offset" => parameters.insert("offset_px".into(), estimate(beta, error)),
+        _ => parameters.insert("relative".into(), estimate(beta, error)),
+    };
+    for (name, value) in &best.settled {
+        parameters.insert((*name).into(), estimate(*value, 0.5 * value));
+    }
+    let status = if close { Status::OneOf } else { Status::Named };
+    vec![Finding {
+        status,
+        effect: Some(best.family),
+        alternatives,
+        statistic: Statistic::Bias,
+        axis: best.axis,
+        interval: best.reach,
+        unit: best.axis.unit(),
+        share: best.gain.total,
+        parameters,
+        size: Size { mm: 1e3 * best.rms_m, sigma: best.rms_sigma },
+        p_adjusted: noise.p(safe(best)),
+        physics: super::findings::physics(
+            status,
+            Some(best.family),
+            Statistic::Bias,
+            best.axis,
+            None,
+        ),
+        next_view: None,
+        shape: None,
+        curve: None,
+        terms: Vec::new(),
+    }]
+}
+
+/// What planes alone never tell.
+pub fn cannot_tell(fields: &[Field]) -> Vec<CannotTell> {
+    if fields.iter().filter(|f| f.reference_distance_m.is_some()).count() >= FEWEST {
+        return Vec::new();
+    }
+    let why = |what: &str| {
+        format!(
+            "{what} is not identifiable from planes without a reference distance: every plane takes it up whole. Measure the distance of the target in at least {FEWEST} views with a tape or a rail and give it as reference_distance_m."
+        )
+    };
+    vec![
+        CannotTell { effect: "depth-scale", why: why("A wrong scale of the depth") },
+        CannotTell { effect: "disparity-offset", why: why("A wrong offset of the disparity") },
+        CannotTell { effect: "thermal-drift", why: why("A drift of the scale over the session") },
+    ]
 }

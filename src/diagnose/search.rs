@@ -7,7 +7,7 @@ use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain, Null, Rows, gain};
 use super::tiles::SIDE;
 use crate::rng::Seed;
-use crate::terms::{Basis, Place};
+use crate::terms::{Basis, Place, Term};
 
 /// One view's samples.
 pub struct ViewData {
@@ -57,13 +57,25 @@ pub struct Chosen {
     pub p: f64,
 }
 
+/// What a single nameless curve saw, before anything was explained.
+#[derive(Debug, Clone)]
+pub struct Look {
+    pub basis: Basis,
+    pub coefficients: Vec<f64>,
+    pub p: f64,
+}
+
 /// All terms of a layer with their common fit.
 pub struct Outcome {
     pub chosen: Vec<Chosen>,
+    /// Every nameless curve on its own, on the data as they came.
+    pub looks: Vec<Look>,
     /// Fit of all terms at once.
     pub fit: Option<Gain>,
     pub evidence: Vec<Evidence>,
     pub noise: NoiseGains,
+    /// What still stood out when the search ended.
+    pub remaining: Option<Chosen>,
 }
 
 impl Outcome {
@@ -94,20 +106,34 @@ pub fn search(
     rules: &Rules,
     seed: Seed,
 ) -> Outcome {
-    let mut layer = Layer { fine, coarse, candidates, rules, noise: None, seed };
+    let mut layer = Layer { fine, coarse, candidates, rules, noise: None, looks: Vec::new(), seed };
     let mut chosen: Vec<Chosen> = Vec::new();
-    while chosen.len() < rules.most_terms {
-        let Some(next) = layer.step(&chosen) else { break };
-        if chosen.first().is_some_and(|first| next.gain < LEAST_SHARE * first.gain) {
+    let mut remaining = None;
+    while let Some(next) = layer.step(&chosen) {
+        let little = chosen.first().is_some_and(|first| next.gain < LEAST_SHARE * first.gain);
+        if little || chosen.len() >= rules.most_terms {
+            remaining = Some(next);
             break;
+        }
+        let nameless = next.candidate.family.is_none();
+        if nameless && chosen.iter().all(|c| c.candidate.family.is_some()) {
+            layer.look_back(&mut chosen);
         }
         chosen.push(next);
     }
-    layer.look_back(&mut chosen);
+    if chosen.iter().all(|c| c.candidate.family.is_some()) {
+        layer.look_back(&mut chosen);
+    }
     let evidence = layer.evidence_of(&bases(&chosen));
     let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
     let noise = layer.noise.unwrap_or_default();
-    Outcome { chosen, fit, evidence, noise }
+    Outcome { chosen, looks: layer.looks, fit, evidence, noise, remaining }
+}
+
+/// Evidence of views on given terms together.
+pub fn evidence_of(data: &[ViewData], terms: &[Term]) -> Vec<Evidence> {
+    let bases: Vec<&Basis> = terms.iter().map(|t| &t.basis).collect();
+    data.par_iter().filter_map(|v| Some(rows(v, &bases, &[])?.reduce(0, |_, _| ()))).collect()
 }
 
 /// The greatest gains that noise alone brings, ascending, nats.
@@ -120,7 +146,7 @@ const REPLICATES: u64 = 600;
 const TAIL: f64 = 0.1;
 
 impl NoiseGains {
-    fn of(nulls: &[&Null], seed: Seed) -> Self {
+    pub fn of(nulls: &[&Null], seed: Seed) -> Self {
         let mut greatest: Vec<f64> = (0..REPLICATES)
             .into_par_iter()
             .map(|replicate| {
@@ -175,6 +201,7 @@ struct Layer<'a> {
     candidates: &'a [Candidate],
     rules: &'a Rules,
     noise: Option<NoiseGains>,
+    looks: Vec<Look>,
     seed: Seed,
 }
 
@@ -254,7 +281,9 @@ impl<'a> Layer<'a> {
             .collect();
         if self.noise.is_none() {
             let nulls: Vec<&Null> = judged.iter().flatten().map(|j| &j.null).collect();
-            self.noise = Some(NoiseGains::of(&nulls, self.seed));
+            let noise = NoiseGains::of(&nulls, self.seed);
+            self.looks = looks(self.candidates, &judged, &noise);
+            self.noise = Some(noise);
         }
         let noise = self.noise.as_ref()?;
         self.choose(&judged, noise)
@@ -281,7 +310,8 @@ impl<'a> Layer<'a> {
             .copied()
             .filter(|&i| total(i) > best_family - AS_GOOD_NATS)
             .min_by_key(|&i| self.candidates[i].basis.count())
-            .filter(|&i| safe(i) > threshold && total(i) > self.rules.adequacy * best_curve);
+            .filter(|&i| safe(i) > threshold && total(i) > self.rules.adequacy * best_curve)
+            .filter(|&i| judged[i].as_ref().is_some_and(steady));
         let winner =
             named.or_else(|| curves.first().copied().filter(|&i| safe(i) > threshold))?;
         let won = &judged[winner].as_ref()?.gain;
@@ -306,26 +336,27 @@ impl<'a> Layer<'a> {
         })
     }
 
-    /// With a new term in, are the ones before it still what fits best, and needed at all?
+    /// With all names in, is each still what fits best, and needed at all?
     fn look_back(&mut self, chosen: &mut Vec<Chosen>) {
         let mut k = 0;
-        while k + 1 < chosen.len() {
+        while chosen.len() > 1 && k < chosen.len() {
             let mut others = chosen.clone();
             let old = others.remove(k);
             match self.step(&others) {
                 None => {
                     chosen.remove(k);
+                    continue;
                 }
-                Some(new) => {
-                    if new.candidate.basis != old.candidate.basis {
-                        chosen[k] = new;
-                    } else {
-                        chosen[k].rivals = new.rivals;
-                    }
-                    k += 1;
+                Some(new) if new.candidate.family == old.candidate.family => {
+                    chosen[k] = Chosen { p: old.p.min(new.p), ..new };
                 }
+                // Another name is taken; a curve without one is not.
+                Some(new) if new.candidate.family.is_some() => chosen[k] = new,
+                Some(_) => {}
             }
+            k += 1;
         }
+        chosen.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     }
 
     fn trace(&self, judged: &[Option<Judged>], threshold: f64) {
@@ -344,6 +375,29 @@ impl<'a> Layer<'a> {
             eprintln!("  {:9.1} /{dispersion:5.2} {:?} {text}", total(i), c.family);
         }
     }
+}
+
+fn looks(candidates: &[Candidate], judged: &[Option<Judged>], noise: &NoiseGains) -> Vec<Look> {
+    let nameless = candidates.iter().zip(judged).filter(|(c, _)| c.family.is_none());
+    nameless
+        .filter_map(|(c, j)| {
+            let j = j.as_ref()?;
+            Some(Look {
+                basis: c.basis.clone(),
+                coefficients: j.gain.beta.as_slice().to_vec(),
+                p: noise.p(j.gain.total / j.null.dispersion),
+            })
+        })
+        .collect()
+}
+
+/// Views that scatter about a common fit far beyond their noise are explained badly; a name must
+/// then help most of them.
+fn steady(judged: &Judged) -> bool {
+    const WILD: f64 = 3.0;
+    const STEADY: f64 = 2.5;
+    let none = vec![0.0; judged.gain.by_view.len()];
+    judged.null.dispersion < WILD || behind(&judged.gain.by_view, &none) > STEADY
 }
 
 /// Mean difference over the views by its standard error.

@@ -1,78 +1,141 @@
 //! How the noise hangs together: between neighbours, frames, rows, and views.
 //!
-//! Every statistic is one number a view, so that views are the sample: its mean over views against
-//! its standard error, by Student's t.
+//! Every statistic is one number a view, so that views are the sample.
 
 use rayon::prelude::*;
 
 use super::field::Field;
 use super::smooth::{SMOOTH_PX, high_pass};
 use crate::camera::Camera;
-use crate::stats::measure_correlation;
+use crate::stats::{MAD_TO_SIGMA, measure_correlation, median_in_place};
 
 /// What one view tells; `None` where it cannot.
 #[derive(Debug, Clone, Default)]
 pub struct Structure {
+    /// Variance of the first frame's rough residual, px^2.
+    pub variance_px2: f64,
     /// Side of the window that would make the correlation, px.
     pub window_px: Option<f64>,
     /// Correlation of a pixel with itself 1, 2 and 3 frames later.
     pub lagged: [Option<f64>; 3],
+    /// Covariance of the mean residual with the other views' at the same pixels, px^2.
+    pub fixed_px2: Option<f64>,
     /// Variance that a row (a column) of one frame shares, px^2.
     pub row_px2: Option<f64>,
     pub column_px2: Option<f64>,
-    /// Variance of a frame's mean beyond what its pixels explain, px^2.
-    pub frame_px2: Option<f64>,
-    /// Change of the plane's disparity, as relative velocity of its depth, 1/s.
-    pub approach_per_s: Option<f64>,
-    /// Share of residuals beyond four standard deviations, and the share a Gaussian has there.
+    /// Of the frames' means about a line in time.
+    pub jitter: Option<Jitter>,
+    /// Share of residuals beyond four local standard deviations, and how many were looked at.
     pub tail: f64,
-    /// Variance of the first frame's rough residual, px^2.
-    pub variance_px2: f64,
+    pub tail_pixels: f64,
+    /// Excess kurtosis inside four local standard deviations would be cut; mean |r| beyond, in
+    /// standard deviations.
+    pub tail_size: f64,
+}
+
+/// Frame by frame, the mean residual of the target.
+#[derive(Debug, Clone, Copy)]
+pub struct Jitter {
+    /// Sum of squares about the line, px^2, and its degrees of freedom.
+    pub scatter_px2: f64,
+    pub freedom: f64,
+    /// What the pixels' own noise lets one expect for scatter / freedom, px^2.
+    pub expected_px2: f64,
+    /// Sum of squares that the line explains, px^2.
+    pub trend_px2: f64,
+    /// Velocity along the optical axis, m/s.
+    pub velocity_mps: f64,
 }
 
 /// A Gaussian's share beyond four standard deviations.
 pub const GAUSSIAN_TAIL: f64 = 6.334e-5;
 const TAIL_SIGMAS: f32 = 4.0;
 
-/// Measure all views.
-pub fn structures(fields: &[Field], camera: &Camera) -> Vec<Structure> {
-    fields.par_iter().map(|f| structure(f, camera)).collect()
+/// Measure all views. `bias` has, view by view, what is known to be no noise, px (or is empty).
+pub fn structures(fields: &[Field], camera: &Camera, bias: &[Vec<f32>]) -> Vec<Structure> {
+    let none = Vec::new();
+    let views: Vec<(&Field, &Vec<f32>)> =
+        fields.iter().enumerate().map(|(n, f)| (f, bias.get(n).unwrap_or(&none))).collect();
+    let means: Vec<Vec<f32>> =
+        views.par_iter().map(|(f, b)| rough(f, &f.mean, b)).collect();
+    let fixed = across_views(&means);
+    let mut all: Vec<Structure> =
+        views.par_iter().map(|(f, b)| structure(f, camera, b)).collect();
+    for (s, fixed) in all.iter_mut().zip(fixed) {
+        s.fixed_px2 = fixed;
+    }
+    all
 }
 
-fn structure(field: &Field, camera: &Camera) -> Structure {
-    let rough: Vec<Vec<f32>> = field.first.iter().map(|r| image(field, r, camera)).collect();
-    let Some(first) = rough.first() else { return Structure::default() };
-    let correlation = measure_correlation(first, camera.width);
-    let mut s = Structure {
-        // A box of L px has a correlation sum of L along each axis.
-        window_px: Some(correlation.sum.sqrt()),
-        tail: tail(first),
-        variance_px2: mean(first.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0),
-        ..Structure::default()
-    };
-    for lag in 1..rough.len().min(4) {
-        let pairs = (0..rough.len() - lag).map(|k| same_pixel(&rough[k], &rough[k + lag]));
+fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
+    let mut s = Structure::default();
+    let frames: Vec<Vec<f32>> = field.first.iter().map(|r| rough(field, r, bias)).collect();
+    let Some(first) = frames.first() else { return s };
+    let (tail, pixels, size) = tail(first, camera);
+    (s.tail, s.tail_pixels, s.tail_size) = (tail, pixels, size);
+    let calm = calm(first);
+    s.variance_px2 = mean(calm.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
+    let lines = without_lines(&calm, camera.width);
+    // A box of L px has a correlation sum of L along each axis.
+    let correlation = measure_correlation(&lines, camera.width);
+    s.window_px = Some(correlation.sum.sqrt());
+    for lag in 1..frames.len().min(4) {
+        let pairs = (0..frames.len() - lag).map(|k| same_pixel(&frames[k], &frames[k + lag]));
         s.lagged[lag - 1] = mean(pairs);
     }
-    if let [a, b, ..] = field.first.as_slice() {
-        let difference: Vec<f32> = a.iter().zip(b).map(|(a, b)| b - a).collect();
-        let change = image(field, &difference, camera);
-        // A difference of two frames has twice the variance of one.
-        s.row_px2 = far_covariance(&change, camera, true).map(|c| 0.5 * c);
-        s.column_px2 = far_covariance(&change, camera, false).map(|c| 0.5 * c);
+    if let [a, b, ..] = frames.as_slice() {
+        let change: Vec<f32> = a.iter().zip(b).map(|(a, b)| b - a).collect();
+        // A difference of two frames has twice the variance of one. Taking out what is smooth
+        // leaves a little of everything everywhere: what a diagonal shows is no row's.
+        let apart = far_covariance(&change, camera, [1, 1]);
+        let shared = |step| Some(0.5 * (far_covariance(&change, camera, step)? - apart?));
+        s.row_px2 = shared([1, 0]);
+        s.column_px2 = shared([0, 1]);
     }
-    s.frame_px2 = frame_scatter(field, correlation.sum, s.lagged[0].unwrap_or(0.0), s.variance_px2);
-    s.approach_per_s = approach(field);
+    s.jitter = jitter(field, &s, correlation.sum);
     s
 }
 
-/// Residuals as an image, px, without what is smooth.
-fn image(field: &Field, residuals: &[f32], camera: &Camera) -> Vec<f32> {
-    let mut image = vec![f32::NAN; camera.pixels()];
-    for (k, &i) in field.pixels.iter().enumerate() {
-        image[i as usize] = residuals[k];
+/// Residuals as an image, px, without what is smooth and what is known.
+fn rough(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
+    let image = if bias.is_empty() {
+        field.image(residuals)
+    } else {
+        let left: Vec<f32> = residuals.iter().zip(bias).map(|(r, b)| r - b).collect();
+        field.image(&left)
+    };
+    high_pass(&image, field.width, field.height, SMOOTH_PX)
+}
+
+/// Without gross errors.
+fn calm(image: &[f32]) -> Vec<f32> {
+    let mut sizes: Vec<f32> = image.iter().filter(|r| r.is_finite()).map(|r| r.abs()).collect();
+    let limit = 6.0 * MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
+    let kept = |r: &f32| if limit > 0.0 && r.abs() > limit { f32::NAN } else { *r };
+    image.iter().map(kept).collect()
+}
+
+/// Rows and columns shorter than this are left as they are, px: their mean is mostly noise.
+const LONG_LINE: usize = 150;
+
+/// Minus the mean of each long row and column: noise that a row shares is no window's.
+fn without_lines(image: &[f32], width: usize) -> Vec<f32> {
+    let mut out = image.to_vec();
+    let height = image.len() / width.max(1);
+    let mut level = |indices: &mut dyn Iterator<Item = usize>| {
+        let line: Vec<usize> = indices.filter(|&i| out[i].is_finite()).collect();
+        if line.len() >= LONG_LINE {
+            let mean = line.iter().map(|&i| f64::from(out[i])).sum::<f64>() / line.len() as f64;
+            line.iter().for_each(|&i| out[i] -= mean as f32);
+        }
+    };
+    for v in 0..height {
+        level(&mut (v * width..(v + 1) * width));
     }
-    high_pass(&image, camera.width, camera.height, SMOOTH_PX)
+    for u in 0..width {
+        level(&mut (0..height).map(|v| v * width + u));
+    }
+    out
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
@@ -98,33 +161,93 @@ pub fn same_pixel(a: &[f32], b: &[f32]) -> f64 {
     if aa * bb > 0.0 { ab / (aa * bb).sqrt() } else { f64::NAN }
 }
 
-fn tail(image: &[f32]) -> f64 {
-    let mut sizes: Vec<f32> = image.iter().filter(|r| r.is_finite()).map(|r| r.abs()).collect();
-    if sizes.is_empty() {
-        return 0.0;
+/// Mean product of each view's mean residual with the mean of the others', px^2.
+fn across_views(means: &[Vec<f32>]) -> Vec<Option<f64>> {
+    let n = means.iter().map(Vec::len).max().unwrap_or(0);
+    let mut sum = vec![0f32; n];
+    let mut count = vec![0u16; n];
+    for image in means {
+        for ((s, c), &r) in sum.iter_mut().zip(&mut count).zip(image) {
+            if r.is_finite() {
+                *s += r;
+                *c += 1;
+            }
+        }
     }
-    let sigma = crate::plane::MAD_TO_SIGMA as f32 * crate::stats::median_in_place(&mut sizes);
-    let beyond = sizes.iter().filter(|r| **r > TAIL_SIGMAS * sigma).count();
-    beyond as f64 / sizes.len() as f64
+    let of = |image: &Vec<f32>| {
+        let (mut products, mut n) = (0.0, 0.0);
+        for ((&s, &c), &r) in sum.iter().zip(&count).zip(image) {
+            if r.is_finite() && c > 1 {
+                // Pixels that many views saw say more.
+                let others = f64::from(c - 1);
+                products += f64::from(r) * f64::from(s - r);
+                n += others;
+            }
+        }
+        (n > 1000.0).then(|| products / n)
+    };
+    means.par_iter().map(of).collect()
+}
+
+/// Side of the patches whose own scale their residuals are held against, px.
+const PATCH: usize = 96;
+
+/// Share of residuals beyond four standard deviations of their patch, their number, and how far
+/// out they lie, in standard deviations.
+fn tail(image: &[f32], camera: &Camera) -> (f64, f64, f64) {
+    let (mut beyond, mut n, mut size) = (0.0, 0.0, 0.0);
+    for v0 in (0..camera.height).step_by(PATCH) {
+        for u0 in (0..camera.width).step_by(PATCH) {
+            let rows = v0..(v0 + PATCH).min(camera.height);
+            let patch: Vec<f32> = rows
+                .flat_map(|v| {
+                    let u1 = (u0 + PATCH).min(camera.width);
+                    image[v * camera.width + u0..v * camera.width + u1].iter().copied()
+                })
+                .filter(|r| r.is_finite())
+                .map(f32::abs)
+                .collect();
+            if patch.len() < PATCH * PATCH / 4 {
+                continue;
+            }
+            let mut sizes = patch.clone();
+            let mad = MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
+            // Coarse words make the median jump; the bulk's own spread bounds it below.
+            let bulk = &mut sizes[..];
+            bulk.sort_unstable_by(f32::total_cmp);
+            let most = &bulk[..bulk.len() * 9 / 10];
+            let square: f64 = most.iter().map(|r| f64::from(*r).powi(2)).sum();
+            // Nine tenths of a Gaussian have 0.72 of its standard deviation... squared 0.6225.
+            let spread = (square / most.len() as f64 / 0.6225).sqrt() as f32;
+            let sigma = mad.max(0.8 * spread);
+            if sigma <= 0.0 {
+                continue;
+            }
+            for r in &patch {
+                n += 1.0;
+                if *r > TAIL_SIGMAS * sigma {
+                    beyond += 1.0;
+                    size += f64::from(r / sigma);
+                }
+            }
+        }
+    }
+    if n > 0.0 { (beyond / n, n, size / f64::max(beyond, 1.0)) } else { (0.0, 0.0, 0.0) }
 }
 
 /// Lags well beyond a Kinect's window, px.
 const FAR: [usize; 4] = [20, 27, 34, 41];
 
-/// Mean product of pixels of one row (column) that are far apart, px^2.
-fn far_covariance(image: &[f32], camera: &Camera, along_row: bool) -> Option<f64> {
+/// Mean product of pixels that are far apart along `step`, px^2.
+fn far_covariance(image: &[f32], camera: &Camera, step: [usize; 2]) -> Option<f64> {
     let (w, h) = (camera.width, camera.height);
     let (mut sum, mut n) = (0.0, 0.0);
     for lag in FAR {
-        let (step, us, vs) = if along_row {
-            (lag, w.saturating_sub(lag), h)
-        } else {
-            (lag * w, w, h.saturating_sub(lag))
-        };
-        for v in 0..vs {
-            for u in 0..us {
+        let (du, dv) = (lag * step[0], lag * step[1]);
+        for v in 0..h.saturating_sub(dv) {
+            for u in 0..w.saturating_sub(du) {
                 let i = v * w + u;
-                let product = image[i] * image[i + step];
+                let product = image[i] * image[i + dv * w + du];
                 if product.is_finite() {
                     sum += f64::from(product);
                     n += 1.0;
@@ -135,38 +258,34 @@ fn far_covariance(image: &[f32], camera: &Camera, along_row: bool) -> Option<f64
     (n > 1000.0).then(|| sum / n)
 }
 
-/// Variance of the frames' means minus what the moving part of the pixels' noise explains.
-fn frame_scatter(
-    field: &Field,
-    correlation_sum: f64,
-    frozen: f64,
-    variance_px2: f64,
-) -> Option<f64> {
-    let means: Vec<f64> = field.frames.iter().map(|f| f.1).filter(|m| m.is_finite()).collect();
-    let n = means.len() as f64;
-    if n < 3.0 {
-        return None;
-    }
-    let mean = means.iter().sum::<f64>() / n;
-    let scatter = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    let moving = variance_px2 * (1.0 - frozen.clamp(0.0, 1.0));
-    Some(scatter - moving * correlation_sum / field.pixels.len() as f64)
-}
-
-/// Least squares of the frames' means on time, over the view's mean disparity: d' / d = -z' / z.
-fn approach(field: &Field) -> Option<f64> {
+/// How the frames' means move.
+fn jitter(field: &Field, s: &Structure, correlation_sum: f64) -> Option<Jitter> {
     let frames: Vec<(f64, f64)> =
         field.frames.iter().copied().filter(|f| f.1.is_finite()).collect();
     let n = frames.len() as f64;
-    if n < 3.0 {
-        return None;
-    }
     let (t0, m0) = frames.iter().fold((0.0, 0.0), |(t, m), f| (t + f.0 / n, m + f.1 / n));
-    let (mut tt, mut tm) = (0.0, 0.0);
+    let (mut tt, mut tm, mut mm) = (0.0, 0.0, 0.0);
     for (t, m) in frames {
         tt += (t - t0).powi(2);
         tm += (t - t0) * (m - m0);
+        mm += (m - m0).powi(2);
     }
     let disparity = field.scale_px_m * field.plane.q.z;
-    (tt > 0.0 && disparity > 0.0).then(|| tm / tt / disparity)
+    if n < 3.0 || tt <= 0.0 || disparity <= 0.0 {
+        return None;
+    }
+    let still = s.lagged[0].unwrap_or(0.0).clamp(0.0, 1.0);
+    let rows = field.pixels.last().zip(field.pixels.first()).map_or(1.0, |(last, first)| {
+        f64::from(last - first) / field.width as f64 + 1.0
+    });
+    let own = s.variance_px2 * (1.0 - still) * correlation_sum / field.pixels.len() as f64;
+    let trend_px2 = tm * tm / tt;
+    let z = field.scale_px_m / disparity;
+    Some(Jitter {
+        scatter_px2: (mm - trend_px2).max(0.0),
+        freedom: n - 2.0,
+        expected_px2: own + s.row_px2.unwrap_or(0.0).max(0.0) / rows,
+        trend_px2,
+        velocity_mps: -tm / tt / disparity * z,
+    })
 }

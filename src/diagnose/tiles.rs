@@ -6,7 +6,7 @@ use super::field::Field;
 use super::smooth::{SMOOTH_PX, high_pass};
 use crate::camera::{Camera, Rays};
 use crate::scene::TargetFrame;
-use crate::terms::{Place, corner_radius};
+use crate::terms::{Place, corner_radius, edge_distances};
 
 /// Mean residual of a patch of pixels.
 #[derive(Debug, Clone, Copy)]
@@ -14,6 +14,8 @@ pub struct Tile {
     pub place: Place,
     /// Mean residual, px.
     pub mean: f64,
+    /// Mean square of single frames' residuals, px^2.
+    pub square: f64,
     /// Mean residual without what is smooth, and its mean square, px and px^2.
     pub rough: f64,
     pub rough_square: f64,
@@ -32,10 +34,78 @@ pub struct Tile {
 /// still seen.
 pub const SIDE: usize = 4;
 
+/// Places of a view's pixels and patches.
+pub struct Places<'a> {
+    field: &'a Field,
+    camera: &'a Camera,
+    rays: &'a Rays,
+    edge: Vec<f32>,
+    board: TargetFrame,
+    corner: f64,
+    session_s: f64,
+}
+
+impl<'a> Places<'a> {
+    /// `session_start` on the recording's clock, s.
+    pub fn of(field: &'a Field, camera: &'a Camera, rays: &'a Rays, session_start: f64) -> Self {
+        let mut on_target = vec![false; camera.pixels()];
+        field.pixels.iter().for_each(|&i| on_target[i as usize] = true);
+        Places {
+            field,
+            camera,
+            rays,
+            edge: edge_distances(&on_target, camera.width),
+            board: board_frame(field, rays),
+            corner: corner_radius(camera),
+            session_s: field.time_s - session_start,
+        }
+    }
+
+    /// Of the pixel number `k` of the target; its light and its variance are the field's.
+    pub fn pixel(&self, k: usize) -> Place {
+        let i = self.field.pixels[k] as usize;
+        let (u, v) = ((i % self.camera.width) as f64, (i / self.camera.width) as f64);
+        let edge = f64::from(self.edge[i]);
+        let (x, y) = self.rays.at(i);
+        let place = self.at(u, v, (x, y), edge);
+        let variance = self.field.sigma.get(k).map_or(1.0, |s| f64::from(*s).powi(2));
+        Place { side: 1.0, variance, ..place }
+    }
+
+    fn at(&self, u: f64, v: f64, (x, y): (f64, f64), edge: f64) -> Place {
+        let (field, camera) = (self.field, self.camera);
+        let plane = &field.plane;
+        let z = plane.depth(x, y);
+        let (right, down) = self.board.place(&(Vector3::new(x, y, 1.0) * z));
+        let slope = |q: f64, f: f64| field.scale_px_m * q / f;
+        Place {
+            u,
+            v,
+            side: SIDE as f64,
+            x,
+            y,
+            disparity: field.scale_px_m / z,
+            z,
+            slope: [slope(plane.q.x, camera.fx), slope(plane.q.y, camera.fy)],
+            radius: f64::hypot(u - camera.cx, v - camera.cy) / self.corner,
+            right,
+            down,
+            rho: plane.distance(),
+            edge,
+            theta: plane.theta(),
+            azimuth: plane.azimuth(),
+            session_s: self.session_s,
+            ambient: field.ambient_lux.unwrap_or(0.0),
+            temperature_c: field.temperature_c.unwrap_or(0.0),
+            light: 1.0,
+            variance: 1.0,
+        }
+    }
+}
+
 /// The tiles of a view.
 pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) -> Vec<Tile> {
-    let edge = edge_distances(field, camera);
-    let frame = board_frame(field, rays);
+    let places = Places::of(field, camera, rays, session_start);
     let across = camera.width.div_ceil(SIDE);
     let rows = camera.height.div_ceil(SIDE);
     let mut sums = vec![Sums::default(); across * rows];
@@ -44,13 +114,14 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
     for (k, &i) in field.pixels.iter().enumerate() {
         let (u, v) = (i as usize % camera.width, i as usize / camera.width);
         let s = &mut sums[v / SIDE * across + u / SIDE];
-        s.add(u, v, f64::from(edge[i as usize]));
+        s.add(u, v, f64::from(places.edge[i as usize]));
         s.asked += frames;
         s.missing += frames - f64::from(field.measured[k]);
         let (mean, square) = (f64::from(field.mean[k]), f64::from(field.square[k]));
         if mean.is_finite() {
             s.n += 1.0;
             s.mean += mean;
+            s.square += square;
             s.temporal += square - mean * mean;
             let rough = f64::from(rough[i as usize]);
             if rough.is_finite() {
@@ -62,11 +133,7 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
             s.variance += f64::from(field.sigma[k]).powi(2);
         }
     }
-    let corner = corner_radius(camera);
-    sums.iter()
-        .filter(|s| s.pixels > 0.0)
-        .map(|s| s.tile(field, camera, &frame, corner, session_start))
-        .collect()
+    sums.iter().filter(|s| s.pixels > 0.0).map(|s| s.tile(&places)).collect()
 }
 
 #[derive(Clone, Copy, Default)]
@@ -77,6 +144,7 @@ struct Sums {
     edge: f64,
     n: f64,
     mean: f64,
+    square: f64,
     temporal: f64,
     rough_n: f64,
     rough: f64,
@@ -95,48 +163,18 @@ impl Sums {
         self.edge += edge;
     }
 
-    fn tile(
-        &self,
-        field: &Field,
-        camera: &Camera,
-        board: &TargetFrame,
-        corner: f64,
-        session_start: f64,
-    ) -> Tile {
+    fn tile(&self, places: &Places<'_>) -> Tile {
         let (u, v) = (self.u / self.pixels, self.v / self.pixels);
-        let (x, y) = camera.ray(u, v);
-        let plane = &field.plane;
-        let z = plane.depth(x, y);
-        let (right, down) = board.place(&(Vector3::new(x, y, 1.0) * z));
-        let slope = |q: f64, f: f64| field.scale_px_m * q / f;
+        let place = places.at(u, v, places.camera.ray(u, v), self.edge / self.pixels);
+        let variance = self.variance / self.n;
         Tile {
-            place: Place {
-                u,
-                v,
-                side: SIDE as f64,
-                x,
-                y,
-                disparity: field.scale_px_m / z,
-                z,
-                slope: [slope(plane.q.x, camera.fx), slope(plane.q.y, camera.fy)],
-                radius: f64::hypot(u - camera.cx, v - camera.cy) / corner,
-                right,
-                down,
-                rho: plane.distance(),
-                edge: self.edge / self.pixels,
-                theta: plane.theta(),
-                azimuth: plane.azimuth(),
-                session_s: field.time_s - session_start,
-                temperature_c: field.temperature_c.unwrap_or(0.0),
-                light: self.light / self.n,
-                ambient: field.ambient_lux.unwrap_or(0.0),
-                variance: self.variance / self.n,
-            },
+            place: Place { light: self.light / self.n, variance, ..place },
             mean: self.mean / self.n,
+            square: self.square / self.n,
             rough: self.rough / self.rough_n,
             rough_square: self.rough_square / self.rough_n,
             temporal: self.temporal / self.n,
-            variance: self.variance / self.n,
+            variance,
             pixels: self.n,
             missing: self.missing / self.asked,
             asked: self.asked,
@@ -154,44 +192,4 @@ fn board_frame(field: &Field, rays: &Rays) -> TargetFrame {
         sum + Vector3::new(x, y, 1.0) * field.plane.depth(x, y)
     });
     TargetFrame::on(&field.plane, sum / few.len() as f64)
-}
-
-/// Chessboard-and-diagonal distance (3-4 chamfer, Borgefors 1986) of each target pixel to the
-/// nearest pixel that is not the target's, px. The picture's border is no edge.
-fn edge_distances(field: &Field, camera: &Camera) -> Vec<f32> {
-    let (w, h) = (camera.width, camera.height);
-    let mut d = vec![0f32; w * h];
-    for &i in &field.pixels {
-        d[i as usize] = f32::INFINITY;
-    }
-    let (one, diagonal) = (1.0f32, 4.0 / 3.0f32);
-    let relax = |d: &mut Vec<f32>, i: usize, u: usize, v: usize, back: bool| {
-        let mut best = d[i];
-        let mut look = |ok: bool, j: usize, step: f32| {
-            if ok {
-                best = best.min(d[j] + step);
-            }
-        };
-        if back {
-            look(u + 1 < w, i + 1, one);
-            look(v + 1 < h, i + w, one);
-            look(v + 1 < h && u + 1 < w, i + w + 1, diagonal);
-            look(v + 1 < h && u > 0, (i + w).wrapping_sub(1), diagonal);
-        } else {
-            look(u > 0, i.wrapping_sub(1), one);
-            look(v > 0, i.wrapping_sub(w), one);
-            look(v > 0 && u > 0, i.wrapping_sub(w + 1), diagonal);
-            look(v > 0 && u + 1 < w, (i + 1).wrapping_sub(w), diagonal);
-        }
-        d[i] = best;
-    };
-    for i in 0..w * h {
-        relax(&mut d, i, i % w, i / w, false);
-    }
-    for i in (0..w * h).rev() {
-        relax(&mut d, i, i % w, i / w, true);
-    }
-    let far = (w + h) as f32;
-    d.iter_mut().for_each(|e| *e = e.min(far));
-    d
 }

@@ -29,6 +29,8 @@ pub struct Exposure<'a> {
     pub instant: Instant,
     /// Light of the room on the target, lx.
     pub ambient_lux: f64,
+    /// Degrees Celsius, where somebody measured it.
+    pub temperature_c: Option<f64>,
     /// Depth along the optical axis, m: true until the noise is added, then measured.
     pub depth: Vec<f32>,
     /// Infrared light that comes back, relative to a white surface at 1 m facing the sensor.
@@ -41,6 +43,9 @@ pub struct Exposure<'a> {
     pub disparity: Vec<f32>,
     /// What an effect keeps from frame to frame of a view, by its id; frames come in order.
     pub memory: HashMap<&'static str, Vec<f32>>,
+    /// What an effect has worked out from `seen` alone, by its id; gone when something else is
+    /// seen.
+    pub still: HashMap<&'static str, Vec<f32>>,
 }
 
 impl Exposure<'_> {

@@ -10,13 +10,15 @@ mod card;
 mod draw;
 mod exposure;
 mod settings;
+mod shape;
 
 pub use ambient_light::ROOM_LUX;
 pub use card::{Card, Parameter, Stage};
 pub use draw::{Draw, Scope, fill_normal};
 pub use exposure::{Exposure, Instant, KINECT_BASELINE_M};
-pub use settings::{Active, Settings};
+pub use settings::{Acting, Active, Settings};
 
+use crate::terms::Term;
 use draw::{chance, logistic, normals};
 
 /// The forward face of a physical effect: what nature does to the exposure.
@@ -26,6 +28,11 @@ pub trait Effect: Send + Sync {
     /// Change `exposure` as the effect does with these settings. Called once a frame, at the
     /// card's stage, and only when the strength is not the card's identity.
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw);
+
+    /// The fitted terms that stand in place of a formula; the catalogue's effects have none.
+    fn terms(&self) -> &[Term] {
+        &[]
+    }
 }
 
 /// One file, one module, one word in the list: what is in the catalogue.

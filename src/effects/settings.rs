@@ -1,9 +1,14 @@
 //! An effect with its knobs set, from the command line or from a model file.
 
-use serde_json::{Map, Value};
+use std::ops::Deref;
+use std::sync::Arc;
 
+use serde_json::{Map, Value, json};
+
+use super::shape::Shape;
 use super::{CATALOGUE, Draw, Effect, Exposure, find};
 use crate::error::{Error, Result};
+use crate::model;
 use crate::rng::Seed;
 
 /// Values of an effect's parameters, in the card's order.
@@ -13,8 +18,26 @@ pub struct Settings(Vec<f64>);
 /// An effect that is switched on.
 #[derive(Clone)]
 pub struct Active {
-    pub effect: &'static dyn Effect,
+    pub effect: Acting,
     pub settings: Settings,
+}
+
+/// What acts: an effect of the catalogue, or the fitted shapes of a model.
+#[derive(Clone)]
+pub enum Acting {
+    Catalogue(&'static dyn Effect),
+    Shape(Arc<Shape>),
+}
+
+impl Deref for Acting {
+    type Target = dyn Effect;
+
+    fn deref(&self) -> &Self::Target {
+        match self {
+            Acting::Catalogue(effect) => *effect,
+            Acting::Shape(shape) => &**shape,
+        }
+    }
 }
 
 impl Settings {
@@ -48,7 +71,7 @@ impl Active {
             let hint = near.map_or(String::new(), |n| format!("; did you mean {n}?"));
             fault(format!("effect \"{id}\" is not in the catalogue{hint}"))
         })?;
-        Ok(Active { effect, settings: Settings::typical(effect) })
+        Ok(Active { effect: Acting::Catalogue(effect), settings: Settings::typical(effect) })
     }
 
     /// `self` with one knob set.
@@ -109,9 +132,35 @@ impl Active {
         Ok(active)
     }
 
+    /// All that a model holds: formulas, and fitted shapes where an effect has one.
+    ///
+    /// # Errors
+    /// As [`Active::from_model`], for effects without a shape.
+    pub fn all_of_model(effects: &[model::Effect]) -> Result<Vec<Self>> {
+        let formulas = effects.iter().filter(|e| e.shape.is_empty());
+        let mut all: Vec<Active> =
+            formulas.map(|e| Active::from_model(&e.id, &e.parameters)).collect::<Result<_>>()?;
+        let shapes = Shape::of(effects.iter().flat_map(|e| e.shape.iter().cloned()));
+        all.extend(shapes.map(|shape| Active {
+            effect: Acting::Shape(Arc::new(shape)),
+            settings: Settings(Vec::new()),
+        }));
+        Ok(all)
+    }
+
+    /// For a recipe: the formula's parameters, or the terms of the shape.
+    pub fn described(&self) -> Value {
+        let id = self.effect.card().id;
+        match self.effect.terms() {
+            [] => json!({"id": id, "parameters": self.parameters()}),
+            terms => json!({"id": id, "shape": terms}),
+        }
+    }
+
     /// Is the strength such that nature is as without the effect?
     pub fn is_identity(&self) -> bool {
-        self.settings.at(0) == self.effect.card().identity
+        // A shape has no knobs.
+        self.settings.0.first().is_some_and(|strength| *strength == self.effect.card().identity)
     }
 
     /// Let it act on a frame under way.

@@ -6,9 +6,9 @@ use super::stills::{Film, Footage};
 use super::{Assumed, assumed_sensor, images};
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
-use crate::view::{FrameRef, Recording};
+use crate::view::{FrameRef, Sensor};
 
-pub(super) const INDEX: &str = "INDEX.txt";
+pub(crate) const INDEX: &str = "INDEX.txt";
 /// z = 1/(3.33095 - 0.0030711 raw): the fit OpenKinect users have shared since 2010.
 const OPENKINECT: DepthCode = DepthCode::Disparity {
     offset: 3.330_949_516_1,
@@ -18,7 +18,7 @@ const OPENKINECT: DepthCode = DepthCode::Disparity {
 /// Focal length of a Kinect v1 infrared camera to a percent, and the image centre.
 const KINECT_INTRINSICS: [f64; 4] = [585.0, 585.0, 319.5, 239.5];
 
-pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Recording> {
+pub(super) fn footage(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     let index = root.join(INDEX);
     let text = std::fs::read_to_string(&index).map_err(|e| Error::read(&index, e))?;
     let mut remarks = Vec::new();
@@ -65,7 +65,7 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Recording> {
         &Assumed { baseline_m: assumed.baseline_m.or(Some(KINECT_BASELINE_M)), ..assumed.clone() },
     )?;
     let footage = Footage { frames, film: Film::Video, remarks, described_by: vec![index] };
-    Ok(footage.recording(root, sensor))
+    Ok((footage, sensor))
 }
 
 /// Projector to camera in every Kinect v1 (LDDIS of the OpenNI device properties: 7.5 cm).

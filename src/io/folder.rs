@@ -6,12 +6,12 @@ use super::stills::{Film, Footage};
 use super::{Assumed, assumed_sensor, entries, images};
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
-use crate::view::{FrameRef, Recording};
+use crate::view::{FrameRef, Sensor};
 
 /// OpenNI and ROS write millimetres.
 const MILLIMETRES: DepthCode = DepthCode::Metric { units_per_metre: 1000.0, invalid: 0 };
 
-pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Recording> {
+pub(super) fn footage(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     let files = png_files(root)?;
     let Some(first) = files.first() else {
         return Err(Error::recording(
@@ -42,7 +42,7 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Recording> {
         .map(|(i, path)| FrameRef { timestamp: i as f64 * NOMINAL_INTERVAL_S, path })
         .collect();
     let footage = Footage { frames, film: Film::Captures, remarks, described_by: Vec::new() };
-    Ok(footage.recording(root, sensor))
+    Ok((footage, sensor))
 }
 
 /// 30 Hz: a plain folder has no clock, and every sensor of this kind runs at it.

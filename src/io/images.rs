@@ -192,6 +192,13 @@ pub fn encode_png16(frame: &Frame) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// A depth frame as fakenect writes it: a PGM whose words are little-endian.
+pub fn encode_pgm16(frame: &Frame) -> Vec<u8> {
+    let mut bytes = format!("P5 {} {} 65535\n", frame.width, frame.height).into_bytes();
+    bytes.extend(frame.words.iter().flat_map(|w| w.to_le_bytes()));
+    bytes
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -213,6 +220,12 @@ mod tests {
         for cut in 0..data_end - 4 {
             assert!(decode_png16(Path::new("x.png"), &bytes[..cut]).is_err(), "cut at {cut}");
         }
+    }
+
+    #[test]
+    fn pgm_round_trip_is_exact() {
+        let bytes = encode_pgm16(&frame());
+        assert_eq!(decode_fakenect_pgm(Path::new("d.pgm"), &bytes).unwrap(), frame());
     }
 
     #[test]

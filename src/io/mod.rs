@@ -11,11 +11,13 @@ mod stills;
 mod tum;
 mod unknown;
 
-pub use images::{FrameSource, InfraredImage, encode_png16};
+pub(crate) use dump::INDEX;
+pub use images::{FrameSource, InfraredImage, encode_pgm16, encode_png16};
+pub(crate) use layout::DESCRIPTION;
 pub use layout::{ViewFile, write_recording_file, write_view_notes};
 pub use list::{FrameList, read_list};
 pub(crate) use output::hex;
-pub use output::{OutputDir, sha256_hex, write_atomic};
+pub use output::{OutputDir, refuse_full, sha256_hex, write_atomic};
 pub use quick::{encode_png16_quickly, encode_rgb};
 
 use std::path::{Path, PathBuf};
@@ -25,6 +27,7 @@ use crate::error::{Error, Result};
 use crate::frame::DepthCode;
 use crate::units::shortest;
 use crate::view::{Recording, Sensor};
+use stills::Footage;
 
 /// What the user knows about a folder that does not describe itself.
 #[derive(Debug, Clone, Default)]
@@ -50,6 +53,46 @@ impl Assumed {
     }
 }
 
+/// How the files of a recording lie in its folder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layout {
+    /// recording.json, and a folder a view.
+    Recording,
+    /// depth.txt, as in the TUM benchmark; recording.json beside it is read too.
+    Sequence,
+    /// What fakenect-record writes.
+    Dump,
+    /// PNGs and nothing else.
+    Images,
+}
+
+impl Layout {
+    /// Of a folder.
+    ///
+    /// # Errors
+    /// When there is no such folder.
+    pub fn of(path: &Path) -> Result<Self> {
+        if !path.is_dir() {
+            return Err(Error::recording(
+                path,
+                if path.exists() { "this is not a folder" } else { "there is no such folder" },
+                "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs",
+            ));
+        }
+        // A described TUM sequence has its frames at the root, a recording in one folder a view.
+        let sequence = path.join(tum::DEPTH_LIST).is_file();
+        Ok(if path.join(layout::DESCRIPTION).is_file() && !sequence {
+            Layout::Recording
+        } else if path.join(dump::INDEX).is_file() {
+            Layout::Dump
+        } else if sequence {
+            Layout::Sequence
+        } else {
+            Layout::Images
+        })
+    }
+}
+
 /// Open whatever stands at `path`: a recording, a TUM folder, a fakenect dump or a plain folder
 /// of 16-bit PNGs. Frames are not read, except to find still stretches in a film.
 ///
@@ -57,24 +100,34 @@ impl Assumed {
 /// When the folder is none of these, is empty, or describes itself wrongly; or when something is
 /// assumed of a recording that describes itself.
 pub fn open(path: &Path, assumed: &Assumed) -> Result<Recording> {
-    if !path.is_dir() {
-        return Err(Error::recording(
-            path,
-            if path.exists() { "this is not a folder" } else { "there is no such folder" },
-            "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs",
-        ));
-    }
-    // A described TUM sequence has its frames at the root, a recording in one folder a view.
-    let sequence = path.join(tum::DEPTH_LIST).is_file();
-    let recording = if path.join(layout::DESCRIPTION).is_file() && !sequence {
-        refuse(assumed, path)?;
-        layout::open(path)?
-    } else if path.join(dump::INDEX).is_file() {
-        dump::open(path, assumed)?
-    } else if sequence {
-        tum::open(path, assumed)?
-    } else {
-        folder::open(path, assumed)?
+    open_and(path, assumed, Footage::recording)
+}
+
+/// As [`open`], but a film stays whole: one view with all its frames, also those in motion.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_uncut(path: &Path, assumed: &Assumed) -> Result<Recording> {
+    open_and(path, assumed, Footage::uncut)
+}
+
+fn open_and(
+    path: &Path,
+    assumed: &Assumed,
+    cut: impl Fn(Footage, &Path, Sensor) -> Recording,
+) -> Result<Recording> {
+    let footage = match Layout::of(path)? {
+        Layout::Recording => {
+            refuse(assumed, path)?;
+            None
+        }
+        Layout::Dump => Some(dump::footage(path, assumed)?),
+        Layout::Sequence => Some(tum::footage(path, assumed)?),
+        Layout::Images => Some(folder::footage(path, assumed)?),
+    };
+    let recording = match footage {
+        None => layout::open(path)?,
+        Some((footage, sensor)) => cut(footage, path, sensor),
     };
     if recording.views.is_empty() {
         let reason = recording

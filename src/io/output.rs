@@ -41,6 +41,22 @@ impl OutputDir {
     }
 }
 
+/// Never mix a new recording into somebody's folder.
+///
+/// # Errors
+/// When the folder has something in it.
+pub fn refuse_full(root: &Path) -> Result<()> {
+    let full = fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_some());
+    if full {
+        return Err(Error::recording(
+            root,
+            "the folder is not empty",
+            "choose a new folder for the recording",
+        ));
+    }
+    Ok(())
+}
+
 /// Write beside `path`, then rename: a kill or a full disk leaves the old file, or none.
 ///
 /// # Errors

@@ -48,6 +48,24 @@ pub(super) struct Footage {
 }
 
 impl Footage {
+    /// All frames as one view, in motion or not.
+    pub fn uncut(self, root: &Path, sensor: Sensor) -> Recording {
+        let whole = View {
+            name: root.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            depth: self.frames,
+            infrared: Vec::new(),
+            notes: ViewNotes::default(),
+        };
+        Recording {
+            root: root.to_path_buf(),
+            sensor,
+            views: vec![whole],
+            excluded: Vec::new(),
+            remarks: self.remarks,
+            described_by: self.described_by,
+        }
+    }
+
     /// Cut into views; frames in motion and frames that show nothing are told and left out.
     pub fn recording(self, root: &Path, sensor: Sensor) -> Recording {
         let listed = self.frames.len();

@@ -10,7 +10,7 @@ use super::unknown::UnknownKeys;
 use super::{Assumed, assumed_sensor, images};
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
-use crate::view::{Recording, Sensor};
+use crate::view::Sensor;
 
 pub(super) const DEPTH_LIST: &str = "depth.txt";
 /// What ROS publishes for an uncalibrated PrimeSense camera; the TUM tools assume it too.
@@ -18,7 +18,7 @@ const ROS_DEFAULT: [f64; 4] = [525.0, 525.0, 319.5, 239.5];
 /// Scale of the PNGs in the TUM benchmark.
 const TUM_CODE: DepthCode = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
 
-pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Recording> {
+pub(super) fn footage(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     let path = root.join(DEPTH_LIST);
     let list = read_list(&path)?;
     let first = list.frames.first().ok_or_else(|| {
@@ -37,7 +37,7 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Recording> {
         undescribed(images::size_of(&first.path)?, assumed, &mut remarks)?
     };
     let footage = Footage { frames: list.frames, film: Film::Video, remarks, described_by };
-    Ok(footage.recording(root, sensor))
+    Ok((footage, sensor))
 }
 
 /// The sensor of a folder that says nothing about it.

@@ -7,6 +7,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use super::effect::Effect;
 use super::forms::Form;
 use super::{Direction, Domain, SigmaModel};
 use crate::error::{Error, Result};
@@ -23,17 +24,10 @@ pub struct NoiseModel {
     /// `None` when the model came from a bare table.
     pub sensor: Option<RecordingFile>,
     pub sigma: SigmaModel,
-    /// Physical effects beyond sigma: id and parameters (effects.md).
+    /// Physical effects beyond sigma (effects.md).
     pub effects: Vec<Effect>,
     pub fit: FitSummary,
     pub provenance: Provenance,
-}
-
-/// One physical effect of the model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Effect {
-    pub id: String,
-    pub parameters: Map<String, Value>,
 }
 
 /// How the surface was fitted.
@@ -122,13 +116,16 @@ struct ParameterFile {
 
 const REMEDY: &str = "make the model again with `kinoise calibrate` or `kinoise fit`";
 
+const REMEDY_EFFECT: &str = "make the model again with `kinoise diagnose`, or take the effect out";
+
 impl NoiseModel {
     /// The text of `model.json`.
     ///
     /// # Errors
     /// When a number of the model is not finite.
     pub fn to_json(&self) -> Result<String> {
-        if let Some(what) = self.sigma.fault() {
+        let of_effects = || self.effects.iter().find_map(Effect::fault);
+        if let Some(what) = self.sigma.fault().or_else(of_effects) {
             return Err(Error::Solver {
                 what,
                 remedy: "the model cannot be written; look at the views' warnings",
@@ -201,6 +198,9 @@ impl NoiseModel {
         let sigma = read_sigma(file.sigma, &file.fit)?;
         if let Some(fault) = sigma.fault() {
             return Err((fault, REMEDY));
+        }
+        if let Some(fault) = file.effects.iter().find_map(Effect::fault) {
+            return Err((fault, REMEDY_EFFECT));
         }
         Ok(NoiseModel {
             sensor: file.sensor,

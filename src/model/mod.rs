@@ -1,5 +1,6 @@
 //! The noise model: sigma(z, theta) with its domain and certainty, and the file it lives in.
 
+mod effect;
 mod fault;
 mod file;
 mod fit;
@@ -15,7 +16,8 @@ mod statistics;
 mod surface;
 mod tilt_search;
 
-pub use file::{Effect as ModelEffect, FitSummary, MODEL_FORMAT, NoiseModel, Provenance};
+pub use effect::{Effect, UNEXPLAINED};
+pub use file::{FitSummary, MODEL_FORMAT, NoiseModel, Provenance};
 pub use fit::{DISTANCE_RATIO, Parameter, SigmaFit};
 pub use forms::{Form, PAPER_EQ1, SigmaForm};
 pub use heldout::{HeldOut, compare_forms, held_out};

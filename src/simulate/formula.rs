@@ -26,10 +26,12 @@ pub struct Shooting<'a> {
     effects: Vec<&'a Active>,
     seen: &'a Seen,
     ambient_lux: f64,
+    temperature_c: Option<f64>,
     /// Of the undisturbed depth, m.
     sigma: Vec<f32>,
     light: Vec<f32>,
     memory: HashMap<&'static str, Vec<f32>>,
+    still: HashMap<&'static str, Vec<f32>>,
 }
 
 impl FormulaSensor<'_> {
@@ -50,9 +52,11 @@ impl FormulaSensor<'_> {
             effects: Active::in_light_path(self.effects),
             seen,
             ambient_lux: ROOM_LUX,
+            temperature_c: None,
             sigma: without_rounding(sigma, seen, self.sensor),
             light: light_of(seen, self.rays),
             memory,
+            still: HashMap::new(),
         }
     }
 }
@@ -70,6 +74,11 @@ impl Shooting<'_> {
         Shooting { ambient_lux, ..self }
     }
 
+    /// At this temperature, degrees Celsius, where it is known.
+    pub fn at(self, temperature_c: Option<f64>) -> Self {
+        Shooting { temperature_c, ..self }
+    }
+
     pub(super) fn into_memory(self) -> HashMap<&'static str, Vec<f32>> {
         self.memory
     }
@@ -82,12 +91,14 @@ impl Shooting<'_> {
             seen: self.seen,
             instant,
             ambient_lux: self.ambient_lux,
+            temperature_c: self.temperature_c,
             depth: self.seen.depth.clone(),
             light: self.light.clone(),
             sigma: self.sigma.clone(),
             noise: vec![0.0; self.seen.depth.len()],
             disparity: Vec::new(),
             memory: std::mem::take(&mut self.memory),
+            still: std::mem::take(&mut self.still),
         };
         let mut rng = seed.stream(&format!("simulate/{}/{}", instant.view, instant.frame));
         fill_normal(&mut exposure.noise, &mut rng);
@@ -101,6 +112,7 @@ impl Shooting<'_> {
             due.for_each(|active| active.act(&mut exposure, seed));
         }
         self.memory = std::mem::take(&mut exposure.memory);
+        self.still = std::mem::take(&mut exposure.still);
         let words = exposure.depth.iter().map(|&z| sensor.code.word(f64::from(z))).collect();
         let (width, height) = (sensor.camera.width, sensor.camera.height);
         Shot { depth: Frame { width, height, words }, light: exposure.light }

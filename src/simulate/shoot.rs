@@ -15,7 +15,7 @@ use crate::camera::Rays;
 use crate::effects::{Active, Instant};
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, Frame, KINECT_NO_MEASUREMENT};
-use crate::io::{encode_png16, write_atomic, write_recording_file, write_view_notes};
+use crate::io::{encode_png16, refuse_full, write_atomic, write_recording_file, write_view_notes};
 use crate::model::SigmaModel;
 use crate::rng::Seed;
 use crate::scene::Target;
@@ -100,11 +100,10 @@ impl Shoot {
     pub fn recipe(&self) -> serde_json::Value {
         let physics = match &self.physics {
             Physics::Formula { sigma, effects } => {
-                let effect = |a: &Active| serde_json::json!({"id": a.effect.card().id, "parameters": a.parameters()});
                 serde_json::json!({
                     "world": "formula",
                     "sigma": {"form": sigma.form.spec().id(), "parameters": sigma.parameters},
-                    "effects": effects.iter().map(effect).collect::<Vec<_>>(),
+                    "effects": effects.iter().map(Active::described).collect::<Vec<_>>(),
                 })
             }
             Physics::Speckle { causes } => {
@@ -134,7 +133,7 @@ impl Shoot {
         let Physics::Formula { sigma, effects } = &self.physics else { return Ok(()) };
         let seen = view.seen(&self.sensor.camera, rays);
         let camera = FormulaSensor { sensor: &self.sensor, rays, sigma, effects, seed: self.seed };
-        let mut shooting = camera.begin(&seen).under(view.ambient_lux);
+        let mut shooting = camera.begin(&seen).under(view.ambient_lux).at(view.notes.temperature_c);
         for (stamp, instant) in instants {
             let shot = shooting.shoot(instant);
             let infrared = self.infrared.then(|| self.amplitude(&shot, instant));
@@ -233,17 +232,4 @@ impl ViewFolder {
         // Last: a view without its list is no view, so a kill leaves none half done.
         write_atomic(&self.root.join("depth.txt"), self.depth_list.as_bytes())
     }
-}
-
-/// Never mix a simulation into somebody's recording.
-pub(super) fn refuse_full(root: &Path) -> Result<()> {
-    let full = std::fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_some());
-    if full {
-        return Err(Error::recording(
-            root,
-            "the folder is not empty",
-            "choose a new folder for the recording",
-        ));
-    }
-    Ok(())
 }

@@ -125,7 +125,7 @@ impl Over {
 }
 
 impl Times {
-    fn value(self, p: &Place) -> f64 {
+    pub(super) fn value(self, p: &Place) -> f64 {
         match self {
             Times::One => 1.0,
             Times::DisparitySquared => (p.disparity / DISPARITY_UNIT_PX).powi(2),
@@ -141,7 +141,9 @@ impl Basis {
         match self {
             Basis::Bowl { orders, .. } | Basis::Lens { orders, .. } => *orders,
             Basis::Vignetting { orders } => *orders,
-            Basis::Bow { degree } => BOW_TERMS.iter().filter(|(i, j)| i + j <= *degree as i32).count(),
+            Basis::Bow { degree } => {
+                BOW_TERMS.iter().filter(|(i, j)| i + j <= *degree as i32).count()
+            }
             Basis::Locking { .. } => 4,
             Basis::Banding { harmonics, .. } => 2 * harmonics,
             Basis::Recalibrate { columns, .. } => columns.len(),
@@ -340,14 +342,20 @@ fn smear(p: &Place, frequency: f64) -> f64 {
 }
 
 /// Number of the node below a value, and the way to the next.
-fn node(value: f64, low: f64, high: f64, nodes: usize) -> (usize, f64) {
+pub(super) fn node(value: f64, low: f64, high: f64, nodes: usize) -> (usize, f64) {
     let last = (nodes - 1) as f64;
     let place = ((value - low) / (high - low).max(1e-12) * last).clamp(0.0, last);
     let k = (place as usize).min(nodes - 2);
     (k, place - k as f64)
 }
 
-fn bilinear((i, s): (usize, f64), (j, t): (usize, f64), across: usize, scale: f64, out: &mut [f64]) {
+fn bilinear(
+    (i, s): (usize, f64),
+    (j, t): (usize, f64),
+    across: usize,
+    scale: f64,
+    out: &mut [f64],
+) {
     out.fill(0.0);
     for (dj, wv) in [(0, 1.0 - t), (1, t)] {
         for (di, wu) in [(0, 1.0 - s), (1, s)] {

@@ -2,9 +2,17 @@
 //! `diagnose` and applied by `simulate`, `correct` and `map`.
 
 mod basis;
+mod edges;
+mod fault;
+mod needs;
+mod pixels;
 mod place;
+mod value;
 
 pub use basis::{Basis, DISPARITY_UNIT_PX, Over, TABLE, Times};
+pub use edges::edge_distances;
+pub use needs::Needs;
+pub use pixels::Pixels;
 pub use place::{Axis, Place, corner_radius};
 
 use serde::{Deserialize, Serialize};
@@ -29,11 +37,6 @@ pub struct Term {
 }
 
 impl Term {
-    /// At a place, px or nepers of variance. `row` is scratch.
-    pub fn value(&self, p: &Place, row: &mut Vec<f64>) -> f64 {
-        self.basis.value(&self.coefficients, p, row)
-    }
-
     /// Is it the sensor's, so that it can be taken out of any picture? A board's shape is not.
     pub fn belongs_to_sensor(&self) -> bool {
         match self.basis {

@@ -76,7 +76,9 @@ fn every_file_with_an_effect_is_in_the_list() {
     let mut files = 0;
     for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
         let text = std::fs::read_to_string(entry.path()).unwrap();
-        if text.contains("impl Effect for ") {
+        // A fitted shape has no formula of its own, and so no entry.
+        let shape = entry.file_name() == "shape.rs";
+        if text.contains("impl Effect for ") && !shape {
             files += 1;
             let id = entry.path().file_stem().unwrap().to_str().unwrap().replace('_', "-");
             assert!(ids().contains(&id.as_str()), "{id} is missing from catalogue! in mod.rs");

@@ -5,7 +5,7 @@ use rand::Rng;
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::frame::DepthCode;
-use crate::model::{Domain, FitSummary, Form, ModelEffect, NoiseModel, Provenance, SigmaModel};
+use crate::model::{Domain, FitSummary, Form, Effect, NoiseModel, Provenance, SigmaModel};
 use crate::rng::Stream;
 use crate::view::{RecordingFile, Sensor};
 
@@ -75,7 +75,7 @@ impl Unit {
     ///
     /// # Errors
     /// Never, unless a number is not finite.
-    pub fn model(&self, effects: Vec<ModelEffect>) -> Result<NoiseModel> {
+    pub fn model(&self, effects: Vec<Effect>) -> Result<NoiseModel> {
         let domain = Domain { z_m: VALID_M, theta_rad: VALID_RAD };
         Ok(NoiseModel {
             sensor: Some(RecordingFile::of(&self.sensor)),

@@ -9,7 +9,7 @@ use super::poses::Plan;
 use super::{Cause, Unit};
 use crate::error::Result;
 use crate::io::sha256_hex;
-use crate::model::ModelEffect;
+use crate::model::Effect;
 use crate::rng::Seed;
 
 /// What kind of question a set puts.
@@ -56,7 +56,7 @@ pub struct Set {
     pub unit: Unit,
     /// What the model file says, which may be wrong.
     pub described: Unit,
-    pub known: Vec<ModelEffect>,
+    pub known: Vec<Effect>,
     /// Known and concealed, in no order.
     pub causes: Vec<Cause>,
     /// The first so many are known to the model.
@@ -150,6 +150,6 @@ impl Set {
     }
 }
 
-fn known(cause: &Cause) -> ModelEffect {
-    ModelEffect { id: "spatial-correlation".into(), parameters: cause.label.parameters.clone() }
+fn known(cause: &Cause) -> Effect {
+    Effect { id: "spatial-correlation".into(), parameters: cause.label.parameters.clone(), ..Effect::default() }
 }

@@ -10,15 +10,16 @@ use super::render::{Picture, RoomCamera};
 use super::{Pose, Room};
 use crate::calibrate::Progress;
 use crate::camera::Rays;
-use crate::effects::{Active, Instant};
+use crate::effects::{Acting, Active, Instant};
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, Frame};
-use crate::io::{encode_png16_quickly, encode_rgb, write_atomic, write_recording_file};
+use crate::io::{
+    encode_png16_quickly, encode_rgb, refuse_full, write_atomic, write_recording_file,
+};
 use crate::model::SigmaModel;
 use crate::rng::Seed;
 use crate::simulate::formula::FormulaSensor;
 use crate::simulate::kinect_v1;
-use crate::simulate::shoot::refuse_full;
 use crate::simulate::sigma_table::SigmaTable;
 use crate::view::Sensor;
 
@@ -85,14 +86,13 @@ impl Film {
 
     /// What was switched on and where the camera went, for a file of its own.
     pub fn recipe(&self) -> serde_json::Value {
-        let effect = |a: &Active| serde_json::json!({"id": a.effect.card().id, "parameters": a.parameters()});
         serde_json::json!({
             "format": "kinoise-recipe/1",
             "seed": self.seed.0,
             "physics": {
                 "world": "formula",
                 "sigma": {"form": self.sigma.form.spec().id(), "parameters": self.sigma.parameters},
-                "effects": self.effects.iter().map(effect).collect::<Vec<_>>(),
+                "effects": self.effects.iter().map(Active::described).collect::<Vec<_>>(),
             },
             "room": {"scene": "office", "frames": self.poses.len()},
         })
@@ -165,9 +165,10 @@ impl<'a> Shutter<'a> {
         (picture, depth)
     }
 
-    /// Depth words of consecutive frames. Effects may remember: with any, frames go in order.
+    /// Depth words of consecutive frames. The catalogue's effects may remember: with any, frames go
+    /// in order.
     fn expose(&self, pictures: &[Picture], first: usize, memory: &mut Memory) -> Vec<Frame> {
-        if self.film.effects.is_empty() {
+        if self.film.effects.iter().all(|a| matches!(a.effect, Acting::Shape(_))) {
             let each = |(k, p)| self.expose_one(p, first + k, &mut Memory::new());
             return pictures.par_iter().enumerate().map(each).collect();
         }

@@ -1,0 +1,92 @@
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::Args;
+use kinoise::correct::{Corrected, correct_recording};
+use kinoise::effects::Active;
+use kinoise::{DepthCode, NoiseModel};
+
+use super::common::{Bar, Global, Input, say};
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A recording, a TUM folder, a fakenect dump, or a folder of 16-bit PNGs
+    recording: PathBuf,
+    /// model.json of this sensor, as kinoise diagnose writes it
+    #[arg(long, value_name = "FILE")]
+    model: PathBuf,
+    /// New folder for the corrected recording
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// Leave raw disparities in their code: what is taken out is rounded to its steps again
+    #[arg(long)]
+    keep_code: bool,
+    #[command(flatten)]
+    input: Input,
+}
+
+/// Remarks shown; a recording of an hour may have thousands.
+const SHOWN: usize = 8;
+
+pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
+    let model = NoiseModel::read(&arguments.model)?;
+    // Said of the file while its name is at hand.
+    Active::all_of_model(&model.effects).with_context(|| arguments.model.display().to_string())?;
+    let bar = Bar::new("frames");
+    let corrected = correct_recording(
+        &arguments.recording,
+        &arguments.input.assumed()?,
+        &model,
+        &arguments.output,
+        arguments.keep_code,
+        &|done, all| bar.step(done, all),
+    )?;
+    drop(bar);
+    tell(&corrected, arguments);
+    global.print_json(&serde_json::json!({
+        "frames": corrected.frames,
+        "pixels": corrected.measured,
+        "pixels_changed": corrected.changed,
+        "rms_shift_mm": 1e3 * corrected.rms_shift_m,
+        "clamped": corrected.clamped,
+        "units_per_metre": units_per_metre(&corrected),
+        "not_corrected": corrected.ignored,
+        "output": arguments.output,
+    }))
+}
+
+fn units_per_metre(corrected: &Corrected) -> Option<f64> {
+    match corrected.code {
+        DepthCode::Metric { units_per_metre, .. } => Some(units_per_metre),
+        DepthCode::Disparity { .. } => None,
+    }
+}
+
+fn tell(corrected: &Corrected, arguments: &Arguments) {
+    for remark in corrected.remarks.iter().take(SHOWN) {
+        say(format!("note: {remark}"));
+    }
+    if corrected.remarks.len() > SHOWN {
+        say(format!("note: and {} more of the kind", corrected.remarks.len() - SHOWN));
+    }
+    if !corrected.ignored.is_empty() {
+        say(format!("note: no bias of the sensor, and left in: {}", corrected.ignored.join(", ")));
+    }
+    if corrected.changed == 0 {
+        say(format!("note: {} holds no bias that changes a depth here", arguments.model.display()));
+    }
+    if corrected.clamped > 0 {
+        say(format!(
+            "note: {} corrected depths lie beyond the ends of the depth code and stand at its end",
+            corrected.clamped
+        ));
+    }
+    say(format!(
+        "corrected {} of {} depths in {} frames by {:.2} mm (root mean square); wrote {}",
+        corrected.changed,
+        corrected.measured,
+        corrected.frames,
+        1e3 * corrected.rms_shift_m,
+        arguments.output.display()
+    ));
+}

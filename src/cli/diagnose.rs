@@ -1,0 +1,105 @@
+use std::path::PathBuf;
+
+use clap::Args;
+use kinoise::diagnose::{DiagnoseOptions, Diagnosis, Status, Verdict, diagnose};
+use kinoise::io::{OutputDir, open};
+use kinoise::report::{DiagnosisPage, diagnosis_page};
+use kinoise::{CalibrateOptions, NoiseModel, Recording};
+
+use super::common::{Bar, Global, Input, say};
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A recording, a TUM folder, a fakenect dump, or a folder of 16-bit PNGs
+    recording: PathBuf,
+    /// The model to hold it against [default: one calibrated on the recording itself]
+    #[arg(short, long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Folder for diagnosis.json, model.json and report.html
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    #[command(flatten)]
+    input: Input,
+}
+
+/// A mismatch was found (contract, section 3).
+const FOUND: u8 = 1;
+
+pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
+    let recording = open(&arguments.recording, &arguments.input.assumed()?)?;
+    let model = match &arguments.model {
+        Some(path) => NoiseModel::read(path)?,
+        None => calibrated(&recording, global)?,
+    };
+    let out = OutputDir::create(&arguments.output)?;
+    let options = DiagnoseOptions { seed: global.seed(), ..DiagnoseOptions::default() };
+    let bar = Bar::new("views");
+    let done = diagnose(&recording, &model, &options, &|done, all| bar.step(done, all))?;
+    drop(bar);
+    let diagnosis = &done.diagnosis;
+    let json = serde_json::to_value(diagnosis)?;
+    out.write("diagnosis.json", format!("{json:#}\n").as_bytes())?;
+    done.model.write(&out.path().join("model.json"))?;
+    let title = format!("What the model of {} leaves out", recording.sensor.name);
+    let page = DiagnosisPage { title: &title, diagnosis, pictures: &[] };
+    out.write("report.html", diagnosis_page(&page)?.as_bytes())?;
+    say(words(diagnosis));
+    global.print_json(&json)?;
+    Ok(if diagnosis.verdict == Verdict::Mismatch { FOUND } else { 0 })
+}
+
+fn calibrated(recording: &Recording, global: &Global) -> anyhow::Result<NoiseModel> {
+    let mut options = CalibrateOptions { form: Some(kinoise::Form::Paper), ..Default::default() };
+    options.measure.seed = global.seed();
+    let bar = Bar::new("views");
+    let views =
+        kinoise::measure_recording(recording, &options.measure, &|done, all| bar.step(done, all))?;
+    drop(bar);
+    say("no --model given: calibrated on this recording first");
+    Ok(kinoise::model_of(recording, &views, &options)?.model)
+}
+
+fn words(diagnosis: &Diagnosis) -> String {
+    let mut text = match diagnosis.verdict {
+        Verdict::Match => "match: nothing was found that the model leaves out\n".to_string(),
+        Verdict::Inconclusive => "inconclusive: these views could not have shown it\n".to_string(),
+        Verdict::Mismatch => "mismatch: the model leaves out\n".to_string(),
+    };
+    for f in diagnosis.findings.iter().filter(|f| f.status != Status::NotIdentifiable) {
+        let name = match (f.status, f.effect) {
+            (Status::Recalibrate, _) => "sigma itself is off: calibrate again".to_string(),
+            (Status::OneOf, _) => {
+                let names: Vec<&str> = f.alternatives.iter().take(3).map(|a| a.effect).collect();
+                names.join(" or ")
+            }
+            (_, Some(effect)) => effect.to_string(),
+            (_, None) => format!("something without a name ({})", f.shape.as_deref().unwrap_or("")),
+        };
+        let parameters: Vec<String> = f
+            .parameters
+            .iter()
+            .filter_map(|(k, v)| Some(format!("{k} {:.4}", v.get("value")?.as_f64()?)))
+            .collect();
+        text += &format!(
+            "  {name}: {:.2} mm, {:.2} sigma, {:.0} % of it; along {}{}{}\n",
+            f.size.mm,
+            f.size.sigma,
+            100.0 * f.share,
+            f.axis,
+            if parameters.is_empty() { "" } else { "; " },
+            parameters.join(", ")
+        );
+    }
+    if let Some(h) = &diagnosis.heldout {
+        text += &format!(
+            "on {} views kept aside: {:.1} nats a view gained [{:.1}, {:.1}], rms {:.3} -> {:.3} mm\n",
+            h.views.len(),
+            h.gain,
+            h.gain_interval[0],
+            h.gain_interval[1],
+            h.rms_mm_before,
+            h.rms_mm_after
+        );
+    }
+    text
+}

@@ -1,0 +1,120 @@
+//! The files of a recording beside its depth images.
+
+use std::collections::HashSet;
+use std::path::{Component, Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::io::{DESCRIPTION, INDEX, write_atomic};
+
+/// Folders in folders: more is a link that leads back to where it stands.
+const DEEPEST: usize = 12;
+
+/// Every file below `root`, as paths relative to it, in name order.
+pub(super) fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    let mut folders = vec![(PathBuf::new(), 0)];
+    while let Some((folder, depth)) = folders.pop() {
+        let here = root.join(&folder);
+        for entry in std::fs::read_dir(&here).map_err(|e| Error::read(&here, e))? {
+            let name = entry.map_err(|e| Error::read(&here, e))?.file_name();
+            let path = folder.join(name);
+            if !root.join(&path).is_dir() {
+                files.push(path);
+            } else if depth < DEEPEST {
+                folders.push((path, depth + 1));
+            } else {
+                return Err(Error::recording(
+                    &root.join(&path),
+                    format!("more than {DEEPEST} folders deep"),
+                    "take out the link that leads back into the recording",
+                ));
+            }
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// Is it a file without which a folder is no recording, and which therefore comes last?
+pub(super) fn makes_a_recording(file: &Path) -> bool {
+    let name = file.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+    name == DESCRIPTION || name == INDEX || name == "depth.txt"
+}
+
+/// Copy files, those that make a recording of the folder after all others.
+pub(super) fn copy(from: &Path, to: &Path, files: &[&PathBuf]) -> Result<()> {
+    for file in files {
+        let (source, target) = (from.join(file), to.join(file));
+        make_folder_of(&target)?;
+        let bytes = std::fs::read(&source).map_err(|e| Error::read(&source, e))?;
+        write_atomic(&target, &bytes)?;
+    }
+    Ok(())
+}
+
+pub(super) fn make_folder_of(file: &Path) -> Result<()> {
+    let folder = file.parent().unwrap_or(Path::new("."));
+    std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))
+}
+
+/// Where a listed image stands, relative to `root`.
+///
+/// # Errors
+/// When it stands outside: written again it would be lost.
+pub(super) fn inside(root: &Path, file: &Path) -> Result<PathBuf> {
+    let mut parts: Vec<Component<'_>> = Vec::new();
+    let relative = file.strip_prefix(root).ok();
+    let mut outside = relative.is_none();
+    for part in relative.into_iter().flat_map(Path::components) {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir => outside |= parts.pop().is_none(),
+            part => parts.push(part),
+        }
+    }
+    if outside {
+        return Err(Error::recording(
+            file,
+            "a list names this image, which stands outside the recording",
+            "copy it into the recording",
+        ));
+    }
+    Ok(parts.iter().collect())
+}
+
+/// # Errors
+/// When `output` lies in `input`: it would become part of what is read.
+pub(super) fn refuse_inside(output: &Path, input: &Path) -> Result<()> {
+    let input = input.canonicalize().map_err(|e| Error::read(input, e))?;
+    let absolute = std::path::absolute(output).map_err(|e| Error::write(output, e))?;
+    // What does not exist yet has no canonical name; the folder it will stand in has.
+    let standing = absolute.ancestors().find_map(|folder| folder.canonicalize().ok());
+    if standing.is_some_and(|folder| folder.starts_with(&input)) {
+        return Err(Error::recording(
+            output,
+            "the output would lie inside the recording that is read",
+            "choose a folder elsewhere",
+        ));
+    }
+    Ok(())
+}
+
+/// Each image once, though several lists or lines may name it.
+pub(super) fn once<T>(items: Vec<(PathBuf, T)>) -> Vec<(PathBuf, T)> {
+    let mut known = HashSet::new();
+    items.into_iter().filter(|(path, _)| known.insert(path.clone())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_outside_are_refused_however_they_are_named() {
+        let root = Path::new("/rec");
+        let of = |file: &str| inside(root, Path::new(file)).ok();
+        assert_eq!(of("/rec/a/./b/../c.png"), Some("a/c.png".into()));
+        assert_eq!(of("/rec/a/../../x.png"), None);
+        assert_eq!(of("/elsewhere/x.png"), None);
+    }
+}

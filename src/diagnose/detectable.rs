@@ -1,0 +1,91 @@
+//! How small an effect this recording could have shown.
+
+use serde_json::{Map, json};
+
+use super::diagnosis::Detectable;
+use super::layers::{Survey, coarser};
+use super::search::{Outcome, ViewData, evidence_of};
+use crate::camera::Camera;
+use crate::terms::{Basis, Statistic, Term};
+
+/// Nats beyond the threshold that eight recordings in ten would bring.
+const MARGIN: f64 = 4.0;
+
+/// The least parameter of each family that would be found with 80 % power.
+pub fn detectable(
+    survey: &Survey,
+    bias: &Outcome,
+    variance: &Outcome,
+    camera: &Camera,
+) -> Vec<Detectable> {
+    let mean: Vec<ViewData> = survey.mean_data().iter().map(coarser).collect();
+    let blocks = survey.variance_data(&[]);
+    let half = |[low, high]: [f64; 2]| (0.5 * (high - low)).powi(2);
+    let (fx, fy) = (camera.fx, camera.fy);
+    let bow = half(survey.reach.right);
+    let families: Vec<(&'static str, &'static str, Basis, Vec<f64>)> = vec![
+        (
+            "radial-disparity-bias",
+            "k_px",
+            Basis::Bowl { disparity_power: 0.0, orders: 1 },
+            vec![1.0],
+        ),
+        ("lens-distortion", "k1", Basis::Lens { fx, fy, orders: 1 }, vec![1.0]),
+        ("target-bow", "sagitta_m", Basis::Bow { degree: 2 }, vec![1.0 / bow, 0.0, 0.0]),
+        (
+            "pixel-locking",
+            "amplitude_px",
+            Basis::Locking { period_px: 1.0 },
+            vec![1.0, 0.0, 0.0, 0.0],
+        ),
+        (
+            "column-banding",
+            "amplitude_px",
+            Basis::Banding { period_px: camera.width as f64 / 8.0, harmonics: 1 },
+            vec![1.0, 0.0],
+        ),
+    ];
+    let mut all = Vec::new();
+    for (effect, name, basis, unit) in families {
+        add(&mut all, (effect, name), &mean, bias, Statistic::Bias, basis, unit, |a| a);
+    }
+    let spreads: Vec<(&'static str, &'static str, Basis, fn(f64) -> f64)> = vec![
+        ("range-exponent", "excess", Basis::RangeExponent { pivot_m: 2.0 }, |a| 0.5 * a),
+        ("vignetting", "growth", Basis::Vignetting { orders: 1 }, |a| (0.5 * a).exp() - 1.0),
+        (
+            "slope-noise",
+            "sigma_lateral_px",
+            Basis::SlopeNoise { lateral_px: 0.2 },
+            |a| 0.2 * a.sqrt(),
+        ),
+        ("tilt-axis-anisotropy", "ratio", Basis::TiltAxis { tilt_power: 2 }, |a| (0.75 * a).exp()),
+    ];
+    for (effect, name, basis, to) in spreads {
+        add(&mut all, (effect, name), &blocks, variance, Statistic::Variance, basis, vec![1.0], to);
+    }
+    all
+}
+
+#[allow(clippy::too_many_arguments)]
+fn add(
+    all: &mut Vec<Detectable>,
+    (effect, name): (&'static str, &'static str),
+    data: &[ViewData],
+    outcome: &Outcome,
+    statistic: Statistic,
+    basis: Basis,
+    unit: Vec<f64>,
+    to: impl Fn(f64) -> f64,
+) {
+    let term = Term { statistic, basis, coefficients: unit.clone() };
+    let unit = nalgebra::DVector::from_vec(unit);
+    let information: f64 =
+        evidence_of(data, &[term]).iter().map(|e| unit.dot(&(&e.a * &unit))).sum();
+    let need = outcome.noise.threshold(0.01) + MARGIN;
+    let least = to((2.0 * need / information).sqrt());
+    if least.is_finite() && information > 0.0 {
+        let mut minimum = Map::new();
+        minimum.insert(name.into(), json!(least));
+        all.push(Detectable { effect, minimum });
+    }
+}

@@ -1,0 +1,200 @@
+//! What the found terms are worth on views that had no part in any choice.
+
+use rand::Rng;
+use rand::seq::SliceRandom;
+
+use super::diagnosis::HeldOut;
+use super::engine::{DiagnoseOptions, terms_of};
+use super::evidence::{Rows, gain};
+use super::layers::{Survey, SurveyedView, coarser};
+use super::search::ViewData;
+use crate::camera::Camera;
+use crate::model::NoiseModel;
+use crate::terms::{Statistic, Term};
+
+/// A share of the views is kept aside.
+const KEPT_ASIDE: usize = 4;
+/// With fewer views than this none can be spared.
+const FEWEST: usize = 6;
+
+/// Choose again without some views, and score those.
+pub fn score(
+    survey: &Survey,
+    model: &NoiseModel,
+    camera: &Camera,
+    scale_px_m: f64,
+    options: &DiagnoseOptions,
+) -> Option<HeldOut> {
+    let n = survey.views.len();
+    if n < FEWEST {
+        return None;
+    }
+    let mut rng = options.seed.stream("diagnose/heldout");
+    let mut order: Vec<usize> = (0..n).collect();
+    order.shuffle(&mut rng);
+    let mut aside = order[..(n / KEPT_ASIDE).max(1)].to_vec();
+    aside.sort_unstable();
+    let rest: Vec<usize> = (0..n).filter(|v| !aside.contains(v)).collect();
+    let (chosen_on, judged_on) = (survey.subset(&rest), survey.subset(&aside));
+    let level = options.level;
+    let bias = chosen_on.search_bias(camera, 0.4 * level, options.seed);
+    let bias_terms = terms_of(&bias, Statistic::Bias);
+    let variance = chosen_on.search_variance(
+        &bias_terms,
+        &model.sigma,
+        camera,
+        0.25 * level,
+        options.seed,
+    );
+    let variance_terms = terms_of(&variance, Statistic::Variance);
+    let means: Vec<ViewData> = judged_on.mean_data().iter().map(coarser).collect();
+    let blocks = judged_on.variance_data(&bias_terms);
+    let mut before = Vec::new();
+    let mut gains = Vec::new();
+    for (mean, block) in means.iter().zip(&blocks) {
+        let (b0, b1) = (log_score(mean, &[])?, log_score(mean, &bias_terms)?);
+        let (v0, v1) = (log_score(block, &[])?, log_score(block, &variance_terms)?);
+        before.push(b0 + v0);
+        gains.push(b1 - b0 + v1 - v0);
+    }
+    let views = before.len() as f64;
+    let mean_before = before.iter().sum::<f64>() / views;
+    let gain = gains.iter().sum::<f64>() / views;
+    let rms = |terms: &[Term]| rms(&judged_on.views, terms, scale_px_m);
+    let (old, new) = (rms(&[]), rms(&bias_terms));
+    Some(HeldOut {
+        views: aside.iter().map(|&v| survey.views[v].name.clone()).collect(),
+        log_score_before: mean_before,
+        log_score_after: mean_before + gain,
+        gain,
+        gain_interval: bootstrap(&gains, &mut rng),
+        rms_mm_before: old.mm,
+        rms_mm_after: new.mm,
+        rms_px_before: old.px,
+        rms_px_after: new.px,
+    })
+}
+
+/// -r'Wr / 2 with the nuisances fitted, nats.
+fn log_score(view: &ViewData, terms: &[Term]) -> Option<f64> {
+    let mut row = Vec::new();
+    let response: Vec<f64> = view
+        .response
+        .iter()
+        .zip(&view.places)
+        .map(|(y, p)| y - terms.iter().map(|t| t.value(p, &mut row)).sum::<f64>())
+        .collect();
+    let p = view.precision.len();
+    let own: f64 = response.iter().zip(&view.weight).map(|(y, w)| w * y * y).sum();
+    let rows = Rows::new(response, view.weight.clone(), view.nuisance.clone(), p, &view.precision)?;
+    Some(-0.5 * (own - rows.explained()))
+}
+
+/// 95 % of the mean, by resampling.
+fn bootstrap(values: &[f64], rng: &mut crate::rng::Stream) -> [f64; 2] {
+    const RESAMPLES: usize = 2000;
+    let n = values.len();
+    let mut means: Vec<f64> = (0..RESAMPLES)
+        .map(|_| (0..n).map(|_| values[rng.random_range(0..n)]).sum::<f64>() / n as f64)
+        .collect();
+    means.sort_by(f64::total_cmp);
+    [means[RESAMPLES / 40], means[RESAMPLES - 1 - RESAMPLES / 40]]
+}
+
+struct Rms {
+    px: f64,
+    mm: f64,
+}
+
+/// Root mean square of the smooth residual in mm, and of every pixel of every frame in px.
+fn rms(views: &[SurveyedView], terms: &[Term], scale_px_m: f64) -> Rms {
+    let (mut px, mut mm, mut n) = (0.0, 0.0, 0.0);
+    for view in views {
+        let fitted = fitted(view, terms);
+        for (t, f) in view.tiles.iter().zip(&fitted) {
+            if !t.mean.is_finite() {
+                continue;
+            }
+            let to_mm = 1e3 * t.place.z * t.place.z / scale_px_m;
+            px += t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0);
+            mm += t.pixels * ((t.mean - f) * to_mm).powi(2);
+            n += t.pixels;
+        }
+    }
+    Rms { px: (px / n).sqrt(), mm: (mm / n).sqrt() }
+}
+
+/// The terms' values at the tiles, with the plane fitted anew.
+fn fitted(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
+    let mut row = Vec::new();
+    let mut values: Vec<f64> = view
+        .tiles
+        .iter()
+        .map(|t| terms.iter().map(|term| term.value(&t.place, &mut row)).sum())
+        .collect();
+    // What is left after the terms has a plane of its own: it goes with them.
+    let left = view.tiles.iter().zip(&values).map(|(t, f)| (t.mean - f, t.pixels));
+    let mut a = nalgebra::Matrix3::zeros();
+    let mut b = nalgebra::Vector3::zeros();
+    for (t, (y, w)) in view.tiles.iter().zip(left) {
+        if y.is_finite() {
+            let x = nalgebra::Vector3::new(1.0, t.place.x, t.place.y);
+            a += w * x * x.transpose();
+            b += w * y * x;
+        }
+    }
+    if let Some(plane) = a.lu().solve(&b) {
+        for (t, f) in view.tiles.iter().zip(&mut values) {
+            *f += plane[0] + plane[1] * t.place.x + plane[2] * t.place.y;
+        }
+    }
+    values
+}
+
+/// Root mean square of each view's mean residual with the terms taken out, px.
+pub fn rms_by_view(survey: &Survey, terms: &[Term]) -> Vec<f64> {
+    survey
+        .views
+        .iter()
+        .map(|view| {
+            let (mut sum, mut n) = (0.0, 0.0);
+            for (t, f) in view.tiles.iter().zip(&fitted(view, terms)) {
+                if t.mean.is_finite() {
+                    sum += t.pixels * (t.mean - f).powi(2);
+                    n += t.pixels;
+                }
+            }
+            (sum / f64::max(n, 1.0)).sqrt()
+        })
+        .collect()
+}
+
+/// Every view with coefficients fitted to the others, the shapes as chosen on all: root mean
+/// square of every pixel of every frame to a plane, px, before and after.
+pub fn left_out(survey: &Survey, terms: &[Term], prior: f64) -> Option<[f64; 2]> {
+    let data: Vec<ViewData> = survey.mean_data().iter().map(coarser).collect();
+    let evidence = super::search::evidence_of(&data, terms);
+    gain(&evidence, prior)?;
+    let (mut sums, mut n) = ([0.0; 2], 0.0);
+    for (v, view) in survey.views.iter().enumerate() {
+        let beta = super::evidence::fit_without(&evidence, v, prior)?;
+        let mut rest = beta.as_slice();
+        let refitted: Vec<Term> = terms
+            .iter()
+            .map(|t| {
+                let (mine, others) = rest.split_at(t.basis.count());
+                rest = others;
+                Term { coefficients: mine.to_vec(), ..t.clone() }
+            })
+            .collect();
+        for (sum, terms) in sums.iter_mut().zip([&[][..], &refitted]) {
+            for (t, f) in view.tiles.iter().zip(&fitted(view, terms)) {
+                if t.mean.is_finite() {
+                    *sum += t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0);
+                }
+            }
+        }
+        n += view.tiles.iter().filter(|t| t.mean.is_finite()).map(|t| t.pixels).sum::<f64>();
+    }
+    Some(sums.map(|s| (s / n).sqrt()))
+}

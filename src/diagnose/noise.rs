@@ -1,0 +1,343 @@
+//! What the structure of the noise amounts to: each view is one sample of every statistic.
+
+use serde_json::{Map, json};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
+
+use super::known::Known;
+use super::parameters::estimate;
+use super::structure::{GAUSSIAN_TAIL, Structure};
+use crate::terms::{Axis, Statistic};
+
+/// A mismatch of the noise's structure.
+#[derive(Debug, Clone)]
+pub struct Hanging {
+    /// Best first; more than one when they cannot be told apart. Empty: no name.
+    pub families: Vec<&'static str>,
+    pub statistic: Statistic,
+    pub axis: Axis,
+    pub interval: [f64; 2],
+    pub parameters: Map<String, serde_json::Value>,
+    /// In units of the noise's standard deviation.
+    pub size_sigma: f64,
+    pub p: f64,
+    /// Roughly, nats a recording.
+    pub nats: f64,
+    pub words: Option<String>,
+}
+
+/// Mean of a statistic over the views, and its standard error.
+#[derive(Debug, Clone, Copy)]
+struct Mean {
+    value: f64,
+    std_error: f64,
+    views: f64,
+}
+
+impl Mean {
+    fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
+        let values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+        let n = values.len() as f64;
+        if n < 2.0 {
+            return None;
+        }
+        let value = values.iter().sum::<f64>() / n;
+        let variance = values.iter().map(|v| (v - value).powi(2)).sum::<f64>() / (n - 1.0);
+        Some(Mean { value, std_error: (variance / n).sqrt(), views: n })
+    }
+
+    /// Chance of a mean this far above `expected`, one-sided, by Student's t.
+    fn p_above(&self, expected: f64) -> f64 {
+        let t = (self.value - expected) / self.std_error.max(1e-12 * self.value.abs()).max(1e-300);
+        StudentsT::new(0.0, 1.0, self.views - 1.0).map_or(1.0, |d| 1.0 - d.cdf(t)).max(1e-300)
+    }
+}
+
+/// All mismatches of structure at this error rate each.
+pub fn hanging(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
+    let mut found = Vec::new();
+    found.extend(window(views, known, level));
+    found.extend(in_time(views, known, level));
+    found.extend(lines(views, known, level));
+    found.extend(frames(views, known, level));
+    found.extend(tails(views, known));
+    found
+}
+
+fn one(name: &str, value: f64, std_error: f64) -> Map<String, serde_json::Value> {
+    let mut map = Map::new();
+    map.insert(name.into(), estimate(value, std_error));
+    map
+}
+
+fn nats(m: &Mean, expected: f64) -> f64 {
+    let t = (m.value - expected) / m.std_error.max(1e-9);
+    0.5 * m.views * (t * t / m.views).ln_1p()
+}
+
+/// Windows that differ by less than this factor are the same.
+const SAME_WINDOW: f64 = 1.12;
+
+fn window(views: &[Structure], known: &Known, level: f64) -> Option<Hanging> {
+    let logs = || views.iter().filter_map(|s| s.window_px).map(f64::ln);
+    let m = Mean::of(logs())?;
+    let expected = known.parameter("spatial-correlation", "length_px").unwrap_or(1.0).max(1.0);
+    let length = m.value.exp();
+    let p = m.p_above(expected.ln());
+    (p < level && length > SAME_WINDOW * expected).then(|| Hanging {
+        families: vec!["spatial-correlation"],
+        statistic: Statistic::Correlation,
+        axis: Axis::PixelLag,
+        interval: [0.0, length],
+        parameters: one("length_px", length, length * m.std_error),
+        size_sigma: 1.0,
+        p,
+        nats: nats(&m, expected.ln()),
+        words: None,
+    })
+}
+
+/// Correlations smaller than this are not worth a word.
+const LEAST_CORRELATION: f64 = 0.015;
+
+fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
+    let mut found = Vec::new();
+    let fixed = Mean::of(views.iter().filter_map(|s| s.fixed_px2));
+    let variance = Mean::of(views.iter().map(|s| s.variance_px2)).map_or(0.0, |m| m.value);
+    let mut fixed_px2 = 0.0;
+    if let Some(m) = fixed {
+        let sigma = m.value.max(0.0).sqrt();
+        let known_px = known.parameter("fixed-pattern-noise", "sigma_px").unwrap_or(0.0);
+        let expected = known_px * known_px;
+        let p = m.p_above(expected);
+        let share = (m.value - expected) / variance.max(1e-12);
+        fixed_px2 = m.value.max(0.0);
+        if p < level && share > 0.003 {
+            found.push(Hanging {
+                families: vec!["fixed-pattern-noise"],
+                statistic: Statistic::Bias,
+                axis: Axis::Pixel,
+                interval: [0.0, 0.0],
+                parameters: one("sigma_px", sigma, 0.5 * m.std_error / sigma.max(1e-9)),
+                size_sigma: share.sqrt(),
+                p,
+                nats: nats(&m, expected),
+                words: None,
+            });
+        }
+    }
+    let at = |lag: usize| move |s: &Structure| s.lagged[lag];
+    let Some(first) = Mean::of(views.iter().filter_map(at(0))) else { return found };
+    let fixed_share = fixed_px2 / variance.max(1e-12);
+    let frozen_known = known.parameter("frozen-noise", "fraction").unwrap_or(0.0);
+    let rho_known = known.parameter("temporal-correlation", "rho").unwrap_or(0.0);
+    // What stands still in a view: the part that all lags share, without what all views share.
+    let last = if views.iter().any(|s| s.lagged[2].is_some()) { 2 } else { 1 };
+    let static_part = |s: &Structure| -> Option<f64> {
+        let (c1, c2) = (s.lagged[0]?, s.lagged[1]?);
+        let c3 = s.lagged[2].unwrap_or(c2 * c2 / c1.max(1e-6));
+        Some(still_share([c1, c2, c3], s.lagged[2].is_some())
+            - fixed_px2 / s.variance_px2.max(1e-12))
+    };
+    let falling = Mean::of(views.iter().filter_map(|s| Some(s.lagged[0]? - s.lagged[last]?)));
+    let still = Mean::of(views.iter().filter_map(static_part));
+    let Some((falling, still)) = falling.zip(still) else {
+        // Two frames a view: still or slowly changing, nobody can say.
+        let p = first.p_above(fixed_share + frozen_known + rho_known);
+        let more = first.value - fixed_share - frozen_known - rho_known;
+        if p < level && more > LEAST_CORRELATION {
+            found.push(Hanging {
+                families: vec!["frozen-noise", "temporal-correlation"],
+                statistic: Statistic::Correlation,
+                axis: Axis::Frame,
+                interval: [0.0, 1.0],
+                parameters: one("fraction", first.value, first.std_error),
+                size_sigma: more.max(0.0).sqrt(),
+                p,
+                nats: nats(&first, 0.0),
+                words: None,
+            });
+        }
+        return found;
+    };
+    let (p_falling, p_still) = (falling.p_above(0.0), still.p_above(frozen_known));
+    if p_falling < level && falling.value > LEAST_CORRELATION && rho_known == 0.0 {
+        let s = still.value.max(0.0) + fixed_share;
+        let rho = ((first.value - s) / (1.0 - s).max(1e-6)).clamp(0.0, 1.0);
+        found.push(Hanging {
+            families: vec!["temporal-correlation"],
+            statistic: Statistic::Correlation,
+            axis: Axis::Frame,
+            interval: [1.0, 3.0],
+            parameters: one("rho", rho, first.std_error),
+            size_sigma: rho.sqrt(),
+            p: p_falling,
+            nats: nats(&falling, 0.0),
+            words: None,
+        });
+    }
+    if p_still < level && still.value - frozen_known > LEAST_CORRELATION {
+        found.push(Hanging {
+            families: vec!["frozen-noise"],
+            statistic: Statistic::Correlation,
+            axis: Axis::Frame,
+            interval: [1.0, 3.0],
+            parameters: one("fraction", still.value, still.std_error),
+            size_sigma: still.value.max(0.0).sqrt(),
+            p: p_still,
+            nats: nats(&still, frozen_known),
+            words: None,
+        });
+    }
+    found
+}
+
+/// The s of c_k = s + (1 - s) rho^k, from the correlations at lags one to three.
+fn still_share([c1, c2, c3]: [f64; 3], three: bool) -> f64 {
+    let (near, far) = (c1 - c2, c2 - c3);
+    if !three {
+        // rho^2 = rho * rho alone cannot be told from a share: what falls is taken as a filter's.
+        return if near > 0.05 * c1 { 0.0 } else { c2 };
+    }
+    if near <= 0.02 {
+        return (c1 + c2 + c3) / 3.0;
+    }
+    let rho = (far / near).clamp(0.0, 0.95);
+    // c1 - c2 = (1 - s) rho (1 - rho); a moving average dies at once and leaves the last.
+    let s = if rho < 0.05 { c3 } else { 1.0 - near / (rho * (1.0 - rho)) };
+    s.clamp(0.0, c3.max(0.0))
+}
+
+fn lines(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
+    let variance = Mean::of(views.iter().map(|s| s.variance_px2)).map_or(0.0, |m| m.value);
+    let mut found = Vec::new();
+    let rows = Mean::of(views.iter().filter_map(|s| s.row_px2));
+    let columns = Mean::of(views.iter().filter_map(|s| s.column_px2));
+    let known_px = known.parameter("row-noise", "sigma_px").unwrap_or(0.0);
+    let both = [
+        (rows, vec!["row-noise"], Axis::Row, known_px * known_px),
+        (columns, vec![], Axis::Column, 0.0),
+    ];
+    for (m, families, axis, expected) in both {
+        let Some(m) = m else { continue };
+        let p = m.p_above(expected);
+        let share = (m.value - expected) / variance.max(1e-12);
+        if p < level && share > 0.004 {
+            let sigma = m.value.max(0.0).sqrt();
+            let words = families.is_empty().then(|| {
+                "each column is shifted as one, afresh in every frame".to_string()
+            });
+            found.push(Hanging {
+                families,
+                statistic: Statistic::Correlation,
+                axis,
+                interval: [0.0, 0.0],
+                parameters: one("sigma_px", sigma, 0.5 * m.std_error / sigma.max(1e-9)),
+                size_sigma: share.sqrt(),
+                p,
+                nats: nats(&m, expected),
+                words,
+            });
+        }
+    }
+    found
+}
+
+/// The frames' means scatter by this factor more before it is called jitter.
+const JITTER: f64 = 2.0;
+
+fn frames(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
+    let all: Vec<_> = views.iter().filter_map(|s| s.jitter).collect();
+    let freedom: f64 = all.iter().map(|j| j.freedom).sum();
+    if all.len() < 2 || freedom < 2.0 {
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    let scatter: f64 = all.iter().map(|j| j.scatter_px2).sum();
+    let trend: f64 = all.iter().map(|j| j.trend_px2).sum();
+    let n = all.len() as f64;
+    // Motion: the line explains more than the scatter about it does.
+    let per_trend = trend / n;
+    let per_scatter = (scatter / freedom)
+        .max(all.iter().map(|j| j.expected_px2).sum::<f64>() / n);
+    let f = per_trend / per_scatter.max(1e-300);
+    let p_motion = FisherSnedecor::new(n, freedom).map_or(1.0, |d| 1.0 - d.cdf(f));
+    let moving = p_motion < level && f > 3.0 && !known.has("target-motion");
+    if moving {
+        let speed = (all.iter().map(|j| j.velocity_mps.powi(2)).sum::<f64>() / n).sqrt();
+        let signed = all.iter().map(|j| j.velocity_mps).sum::<f64>() / n;
+        let velocity = if signed < 0.0 { -speed } else { speed };
+        found.push(Hanging {
+            families: vec!["target-motion"],
+            statistic: Statistic::Bias,
+            axis: Axis::Frame,
+            interval: [0.0, 0.0],
+            parameters: one("velocity_mps", velocity, speed / (2.0 * n).sqrt()),
+            size_sigma: 0.0,
+            p: p_motion.max(1e-300),
+            nats: 0.5 * n * f.ln().max(0.0),
+            words: None,
+        });
+    }
+    let known_px = known.parameter("frame-jitter", "sigma_px").unwrap_or(0.0);
+    let ratio: f64 = all
+        .iter()
+        .map(|j| j.scatter_px2 / (j.expected_px2 + known_px * known_px).max(1e-300))
+        .sum();
+    let p_jitter = ChiSquared::new(freedom).map_or(1.0, |d| 1.0 - d.cdf(ratio / JITTER));
+    let jitter_px2 = all.iter().map(|j| j.scatter_px2 - j.freedom * j.expected_px2).sum::<f64>()
+        / freedom;
+    let aside = moving && jitter_px2 < 0.15 * per_trend;
+    if p_jitter < level && jitter_px2 > 0.0 && !aside {
+        let sigma = jitter_px2.sqrt();
+        let variance = Mean::of(views.iter().map(|s| s.variance_px2)).map_or(1.0, |m| m.value);
+        found.push(Hanging {
+            families: vec!["frame-jitter"],
+            statistic: Statistic::Correlation,
+            axis: Axis::Frame,
+            interval: [0.0, 0.0],
+            parameters: one("sigma_px", sigma, sigma / (2.0 * freedom).sqrt()),
+            size_sigma: (jitter_px2 / variance.max(1e-12)).sqrt(),
+            p: p_jitter.max(1e-300),
+            nats: 0.5 * freedom * (ratio / freedom).ln().max(0.0),
+            words: None,
+        });
+    }
+    found
+}
+
+/// A tail is heavy from this many times a Gaussian's share on, in most views.
+const HEAVY: f64 = 6.0;
+
+fn tails(views: &[Structure], known: &Known) -> Option<Hanging> {
+    if known.has("heavy-tails") {
+        return None;
+    }
+    let looked: Vec<&Structure> = views.iter().filter(|s| s.tail_pixels > 5000.0).collect();
+    let n = looked.len() as f64;
+    let heavy = looked.iter().filter(|s| s.tail > HEAVY * GAUSSIAN_TAIL).count() as f64;
+    if n < 2.0 || heavy < 0.7 * n {
+        return None;
+    }
+    let m = Mean::of(looked.iter().map(|s| s.tail))?;
+    let size = Mean::of(looked.iter().filter(|s| s.tail > 0.0).map(|s| s.tail_size))?;
+    // A second Gaussian of this scale: the mean excess beyond four deviations is roughly
+    // scale^2 / 4 for scales well above one.
+    let scale = (4.0 * (size.value - 4.0)).max(1.0).sqrt().max(1.5);
+    let beyond = 2.0 * (1.0 - statrs::distribution::Normal::standard().cdf(4.0 / scale));
+    let fraction = ((m.value - GAUSSIAN_TAIL) / beyond.max(1e-6)).clamp(0.0, 1.0);
+    let mut parameters = one("fraction", fraction, fraction * m.std_error / m.value.max(1e-12));
+    parameters.insert("scale".into(), estimate(scale, 0.5 * scale * size.std_error / size.value));
+    parameters.insert("share_beyond_4_sigma".into(), json!(m.value));
+    Some(Hanging {
+        families: vec!["heavy-tails"],
+        statistic: Statistic::Distribution,
+        axis: Axis::Residual,
+        interval: [4.0, 4.0 + 2.0 * (size.value - 4.0).max(0.5)],
+        parameters,
+        size_sigma: size.value,
+        p: m.p_above(GAUSSIAN_TAIL),
+        nats: m.value * looked.iter().map(|s| s.tail_pixels).sum::<f64>()
+            * (m.value / GAUSSIAN_TAIL).ln(),
+        words: None,
+    })
+}

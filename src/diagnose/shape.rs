@@ -1,0 +1,96 @@
+//! A curve in words.
+
+use crate::terms::{Axis, Basis};
+
+/// What a nameless curve looks like.
+pub fn words(basis: &Basis, beta: &[f64]) -> String {
+    match basis {
+        Basis::Ring { period, over, .. } => {
+            let unit = over.axis();
+            if matches!(basis.axis(), Axis::DisparityPhase) {
+                format!("periodic in the disparity, period {period:.3} px")
+            } else {
+                format!("periodic in {unit}, period {period:.3}")
+            }
+        }
+        Basis::Map { .. } => "a smooth pattern that stands still in the picture".into(),
+        Basis::Pair { over, .. } => {
+            format!("depends on {} and {} together", over[0].axis(), over[1].axis())
+        }
+        Basis::Curve { low, high, nodes, .. } => {
+            let at = |k: usize| low + (high - low) * k as f64 / (nodes - 1) as f64;
+            curve(beta, &at)
+        }
+        _ => "of its family's shape, but not where the family puts it".into(),
+    }
+}
+
+fn curve(beta: &[f64], at: &dyn Fn(usize) -> f64) -> String {
+    let n = beta.len();
+    let [low, high] = crate::stats::range(beta.iter().copied());
+    let height = high - low;
+    if n < 4 || height <= 0.0 {
+        return "flat".into();
+    }
+    let steps: Vec<f64> = beta.windows(2).map(|w| w[1] - w[0]).collect();
+    let walked: f64 = steps.iter().map(|s| s.abs()).sum();
+    let (jump, size) = steps
+        .iter()
+        .enumerate()
+        .map(|(k, s)| (k, s.abs()))
+        .fold((0, 0.0), |best, s| if s.1 > best.1 { s } else { best });
+    let net = (beta[n - 1] - beta[0]).abs();
+    let turns = {
+        // Turns that matter: by a quarter of the height.
+        let (mut turns, mut extreme, mut direction) = (0, beta[0], 0.0f64);
+        for &b in beta {
+            let moved = b - extreme;
+            if direction == 0.0 && moved.abs() > 0.25 * height {
+                (direction, extreme) = (moved.signum(), b);
+            } else if direction != 0.0 && moved * direction > 0.0 {
+                extreme = b;
+            } else if direction != 0.0 && moved.abs() > 0.25 * height {
+                (turns, direction, extreme) = (turns + 1, -direction, b);
+            }
+        }
+        turns
+    };
+    if net > 0.7 * height && walked < 1.6 * height {
+        if size > 0.6 * height {
+            return format!("a step at {:.4}", 0.5 * (at(jump) + at(jump + 1)));
+        }
+        let rising = beta[n - 1] > beta[0];
+        return format!("monotone, {}", if rising { "rising" } else { "falling" });
+    }
+    if turns >= 4 {
+        return format!("wavy, {} turns", turns);
+    }
+    let top = (0..n).fold(0, |best, k| {
+        let far = |k: usize| (beta[k] - 0.5 * (beta[0] + beta[n - 1])).abs();
+        if far(k) > far(best) { k } else { best }
+    });
+    let kind = if beta[top] > 0.5 * (beta[0] + beta[n - 1]) { "bump" } else { "dip" };
+    format!("a {kind} at {:.4}", at(top))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::terms::{Over, Times};
+
+    fn of(values: impl Fn(f64) -> f64) -> String {
+        let nodes = 16;
+        let beta: Vec<f64> = (0..nodes).map(|k| values(k as f64 / 15.0)).collect();
+        let over = Over::Row;
+        words(&Basis::Curve { over, low: 0.0, high: 1.0, nodes, times: Times::One }, &beta)
+    }
+
+    #[test]
+    fn curves_are_told_by_their_shape() {
+        assert!(of(|x| f64::from(x > 0.5)).starts_with("a step at 0.5"));
+        assert_eq!(of(|x| x * x), "monotone, rising");
+        assert_eq!(of(|x| -x), "monotone, falling");
+        assert!(of(|x| (-(x - 0.4f64).powi(2) / 0.01).exp()).starts_with("a bump at 0.4"));
+        assert!(of(|x| (20.0 * x).sin()).starts_with("wavy"));
+    }
+}

@@ -1,0 +1,47 @@
+//! Places of single pixels, of whatever they look at.
+
+use super::place::{Place, corner_radius};
+use crate::camera::{Camera, Rays};
+use crate::plane::Plane;
+
+/// A camera's pixels as places.
+#[derive(Debug, Clone, Copy)]
+pub struct Pixels<'a> {
+    pub camera: &'a Camera,
+    pub rays: &'a Rays,
+    /// Disparity in px times depth in m.
+    pub scale_px_m: f64,
+    corner: f64,
+}
+
+impl<'a> Pixels<'a> {
+    pub fn new(camera: &'a Camera, rays: &'a Rays, scale_px_m: f64) -> Self {
+        Pixels { camera, rays, scale_px_m, corner: corner_radius(camera) }
+    }
+
+    /// Where pixel `i` lies in the picture; nothing is known of what it looks at. A single pixel
+    /// has no width over which a ripple would fade.
+    pub fn place(&self, i: usize) -> Place {
+        let (u, v) = ((i % self.camera.width) as f64, (i / self.camera.width) as f64);
+        let (x, y) = self.rays.at(i);
+        let radius = f64::hypot(u - self.camera.cx, v - self.camera.cy) / self.corner;
+        Place { u, v, x, y, radius, light: 1.0, rho: 1.0, variance: 1.0, ..Place::default() }
+    }
+}
+
+impl Place {
+    /// `self` with a surface of this disparity, px.
+    pub fn at_disparity(&mut self, disparity: f64, scale_px_m: f64) {
+        self.disparity = disparity;
+        self.z = scale_px_m / disparity;
+    }
+
+    /// `self` on a plane (disparity and depth apart), with all that follows from its slope.
+    pub fn lean_on(&mut self, plane: &Plane, pixels: &Pixels<'_>) {
+        let slope = |q: f64, f: f64| pixels.scale_px_m * q / f;
+        self.slope = [slope(plane.q.x, pixels.camera.fx), slope(plane.q.y, pixels.camera.fy)];
+        self.rho = plane.distance();
+        self.theta = plane.theta();
+        self.azimuth = plane.azimuth();
+    }
+}

@@ -1,0 +1,76 @@
+//! A term's value without its whole row: curves and maps have a few columns that are not zero.
+
+use super::Term;
+use super::basis::{Basis, node};
+use super::place::Place;
+
+impl Term {
+    /// At a place, px or nepers of variance. `row` is scratch.
+    pub fn value(&self, p: &Place, row: &mut Vec<f64>) -> f64 {
+        let b = &self.coefficients[..];
+        match self.basis {
+            Basis::Curve { over, low, high, nodes, times } => {
+                let (k, t) = node(over.value(p), low, high, nodes);
+                times.value(p) * (b[k] * (1.0 - t) + b[k + 1] * t)
+            }
+            Basis::Ring { over, period, nodes, times } => {
+                let place = (over.value(p) / period).rem_euclid(1.0) * nodes as f64;
+                let (k, t) = (place as usize % nodes, place.fract());
+                times.value(p) * (b[k] * (1.0 - t) + b[(k + 1) % nodes] * t)
+            }
+            Basis::Map { width, height, across, down, times } => {
+                let column = node(p.u, 0.0, width - 1.0, across);
+                let row = node(p.v, 0.0, height - 1.0, down);
+                times.value(p) * bilinear(b, across, column, row)
+            }
+            Basis::Pair { over, low, high, nodes } => {
+                let first = node(over[0].value(p), low[0], high[0], nodes[0]);
+                let second = node(over[1].value(p), low[1], high[1], nodes[1]);
+                bilinear(b, nodes[0], first, second)
+            }
+            _ => self.basis.value(b, p, row),
+        }
+    }
+}
+
+fn bilinear(b: &[f64], across: usize, (i, s): (usize, f64), (j, t): (usize, f64)) -> f64 {
+    let along = |j: usize| b[j * across + i] * (1.0 - s) + b[j * across + i + 1] * s;
+    along(j) * (1.0 - t) + along(j + 1) * t
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::terms::{Over, Statistic, Times};
+
+    /// The short way against the whole row.
+    #[test]
+    fn the_value_is_the_row_times_the_coefficients() {
+        let (over, times) = (Over::Disparity, Times::DisparitySquared);
+        let bases = [
+            Basis::Curve { over, low: 5.0, high: 60.0, nodes: 7, times },
+            Basis::Ring { over, period: 3.0, nodes: 5, times: Times::Lift },
+            Basis::Map { width: 640.0, height: 480.0, across: 5, down: 4, times: Times::Tilt },
+            Basis::Pair {
+                over: [over, Over::Row],
+                low: [5.0, 0.0],
+                high: [60.0, 479.0],
+                nodes: [3, 6],
+            },
+            Basis::Banding { period_px: 30.0, harmonics: 2 },
+        ];
+        for basis in bases {
+            let coefficients: Vec<f64> =
+                (0..basis.count()).map(|k| (1.7 * k as f64).sin()).collect();
+            let term = Term { statistic: Statistic::Bias, basis, coefficients };
+            for k in 0..200 {
+                let (u, v) = (f64::from(k * 3), f64::from(k * 37 % 480));
+                let disparity = 0.4 * f64::from(k);
+                let place = Place { u, v, disparity, rho: 1.3, theta: 0.4, ..Place::default() };
+                let whole = term.basis.value(&term.coefficients, &place, &mut Vec::new());
+                let short = term.value(&place, &mut Vec::new());
+                assert!((short - whole).abs() < 1e-12, "{:?} {k}: {short} {whole}", term.basis);
+            }
+        }
+    }
+}

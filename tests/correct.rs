@@ -1,0 +1,686 @@
+//! Shapes in and biases out: the simulator against closed forms, the correction against noise.
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use common::{copy_tree, good, kinoise, truth};
+use kinoise::correct::{Conditions, Correction, correct_recording};
+use kinoise::effects::Active;
+use kinoise::io::{Assumed, FrameSource, open_uncut};
+use kinoise::model::{Domain, Effect, FitSummary, Provenance, UNEXPLAINED};
+use kinoise::scene::{Bench, Seen, Target};
+use kinoise::simulate::{FormulaSensor, Physics, Scenery, Shoot, kinect_v1, plan_grid};
+use kinoise::terms::{Basis, Over, Statistic, Term, Times};
+use kinoise::view::RecordingFile;
+use kinoise::{DepthCode, Form, Frame, NoiseModel, Plane, Seed, Sensor, SigmaModel};
+use serde_json::{Value, json};
+
+/// Pixels of half the size each way, words of 0.07 mm.
+fn sensor() -> Sensor {
+    let code = DepthCode::Metric { units_per_metre: 15_000.0, invalid: 0 };
+    Sensor { code, ..kinect_v1(2) }
+}
+
+/// fx * baseline of it, px m.
+const FB: f64 = 290.0 * 0.075;
+
+fn model(sensor: &Sensor, effects: Vec<Effect>) -> NoiseModel {
+    NoiseModel {
+        sensor: Some(RecordingFile::of(sensor)),
+        sigma: truth(),
+        effects,
+        fit: FitSummary::default(),
+        provenance: Provenance::default(),
+    }
+}
+
+fn named(id: &str, parameters: Value) -> Effect {
+    let parameters = parameters.as_object().expect("an object").clone();
+    Effect { id: id.into(), parameters, shape: Vec::new() }
+}
+
+fn shaped(id: &str, shape: Vec<Term>) -> Effect {
+    Effect { id: id.into(), shape, ..Effect::default() }
+}
+
+fn term(statistic: Statistic, basis: Basis, coefficients: &[f64]) -> Term {
+    Term { statistic, basis, coefficients: coefficients.to_vec() }
+}
+
+fn bias(basis: Basis, coefficients: &[f64]) -> Term {
+    term(Statistic::Bias, basis, coefficients)
+}
+
+/// Frames of a wall through a sensor without noise, or with it.
+fn shots(plane: Plane, effects: &[Effect], sigma_m: f64, sessions: &[f64]) -> Vec<Frame> {
+    shots_of(&Bench::bare(plane, Target::Wall), effects, sigma_m, sessions)
+}
+
+fn shots_of(bench: &Bench, effects: &[Effect], sigma_m: f64, sessions: &[f64]) -> Vec<Frame> {
+    let sensor = sensor();
+    let rays = sensor.camera.rays();
+    let seen = Seen::of(bench, &sensor.camera, &rays);
+    let domain = Domain { z_m: [0.1, 20.0], theta_rad: [0.0, 1.45] };
+    let sigma = SigmaModel::published(Form::Paper, &[sigma_m, 0.0, 0.0, 0.0, 1.0, 1.5], domain);
+    let effects = Active::all_of_model(effects).expect("effects");
+    let camera = FormulaSensor {
+        sensor: &sensor,
+        rays: &rays,
+        sigma: &sigma,
+        effects: &effects,
+        seed: Seed(3),
+    };
+    let mut shooting = camera.begin(&seen);
+    let instant = |(frame, &session_s): (usize, &f64)| kinoise::effects::Instant {
+        view: 0,
+        frame,
+        session_s,
+        view_s: frame as f64 / 30.0,
+    };
+    sessions.iter().enumerate().map(|f| shooting.shoot(instant(f)).depth).collect()
+}
+
+const SILENT_M: f64 = 1e-9;
+
+fn depths(frame: &Frame) -> Vec<f32> {
+    let table = sensor().code.table();
+    frame.words.iter().map(|&w| table.metres(w)).collect()
+}
+
+/// Disparity minus the plane's, px, of every pixel.
+fn residuals(depth: &[f32], plane: &Plane) -> Vec<f64> {
+    let rays = sensor().camera.rays();
+    let of = |(i, &z): (usize, &f32)| {
+        let (x, y) = rays.at(i);
+        FB * (1.0 / f64::from(z) - plane.inverse_depth(x, y))
+    };
+    depth.iter().enumerate().map(of).collect()
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// Half a word's step at a depth, px, and single precision.
+fn rounding_px(z: f64) -> f64 {
+    0.6 / 15_000.0 * FB / (z * z) + 1e-4
+}
+
+/// (u, v) of chosen pixels.
+const CHOSEN: [(usize, usize); 5] = [(0, 0), (160, 120), (319, 239), (40, 200), (250, 17)];
+
+#[test]
+fn a_shape_is_its_closed_form_at_chosen_pixels() {
+    let plane = Plane::tilted(1.2, 0.6, 0.4);
+    let camera = sensor().camera;
+    let shape = vec![
+        bias(Basis::Bowl { disparity_power: 2.0, orders: 2 }, &[0.8, -0.3]),
+        bias(Basis::Banding { period_px: 40.0, harmonics: 1 }, &[0.2, -0.1]),
+        bias(Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 1 }, &[-0.05]),
+        bias(
+            Basis::Curve { over: Over::LogZ, low: 0.0, high: 1.0, nodes: 3, times: Times::Tilt },
+            &[0.1, 0.5, 0.3],
+        ),
+    ];
+    let shot = &shots(plane, &[shaped(UNEXPLAINED, shape)], SILENT_M, &[0.0])[0];
+    let found = residuals(&depths(shot), &plane);
+    for (u, v) in CHOSEN {
+        let (x, y) = ((u as f64 - camera.cx) / camera.fx, (v as f64 - camera.cy) / camera.fy);
+        let z = plane.depth(x, y);
+        let d = FB / z;
+        let r2 = ((u as f64 - 159.5).powi(2) + (v as f64 - 119.5).powi(2))
+            / (159.5f64.powi(2) + 119.5f64.powi(2));
+        let bowl = (d / 40.0).powi(2) * (0.8 * r2 - 0.3 * r2 * r2);
+        let phase = std::f64::consts::TAU * u as f64 / 40.0;
+        let banding = 0.2 * phase.sin() - 0.1 * phase.cos();
+        // k1 of a lens moves a ray by k1 r^2 along the radius: disparity by the plane's gradient.
+        let gradient = FB * (plane.q.x * x + plane.q.y * y);
+        let lens = -gradient * (x * x + y * y) * -0.05;
+        let knot = z.ln().clamp(0.0, 1.0) * 2.0;
+        let line = if knot < 1.0 { 0.1 + 0.4 * knot } else { 0.5 - 0.2 * (knot - 1.0) };
+        let expected = bowl + banding + lens + line * 0.6f64.sin();
+        let off = found[v * 320 + u] - expected;
+        assert!(off.abs() < rounding_px(z), "{u} {v}: {off} of {expected}");
+    }
+}
+
+/// A bow and a mixed edge belong to the board: the wall behind it has neither.
+#[test]
+fn a_boards_shape_stays_on_the_board() {
+    let plane = Plane::tilted(1.0, 0.0, 0.0);
+    let mut bench = Bench::bare(plane, common::BOARD);
+    bench.wall_m = Some(2.0);
+    let shape = vec![
+        bias(Basis::Bow { degree: 2 }, &[0.05, 0.0, 0.0]),
+        bias(Basis::EdgeMixing { width_px: 3.0 }, &[-0.5]),
+    ];
+    let shot = &shots_of(&bench, &[shaped("target-bow", shape)], SILENT_M, &[0.0])[0];
+    let depth = depths(shot);
+    let found = residuals(&depth, &plane);
+    let camera = sensor().camera;
+    // The board reaches from column 14.5 to 304.5 and from row 3.5 to 235.5.
+    for (u, v) in [(160, 120), (60, 60), (20, 120), (304, 120), (100, 235)] {
+        let right = (u as f64 - camera.cx) / camera.fx;
+        let edge = (u - 14).min(305 - u).min(v - 3).min(236 - v) as f64;
+        let expected = 0.05 * FB * right * right - 0.5 * (-edge / 3.0).exp();
+        let off = found[v * 320 + u] - expected;
+        assert!(off.abs() < rounding_px(1.0), "{u} {v}: {off} of {expected}");
+    }
+    assert!((depth[120 * 320 + 5] - 2.0).abs() < 1e-4, "the wall");
+}
+
+#[test]
+fn a_shape_over_the_session_moves_with_it_and_the_rest_stands() {
+    let plane = Plane::tilted(1.0, 0.0, 0.0);
+    let curve = |over, high| Basis::Curve { over, low: 0.0, high, nodes: 2, times: Times::One };
+    let shape = vec![
+        bias(curve(Over::Session, 100.0), &[0.0, 1.0]),
+        bias(curve(Over::Column, 319.0), &[0.0, 0.5]),
+    ];
+    let sessions = [0.0, 25.0, 100.0, 400.0];
+    let frames = shots(plane, &[shaped("thermal-drift", shape)], SILENT_M, &sessions);
+    for (frame, expected) in frames.iter().zip([0.0, 0.25, 1.0, 1.0]) {
+        let found = residuals(&depths(frame), &plane);
+        for u in [0, 100, 319] {
+            let off = found[120 * 320 + u] - expected - 0.5 * u as f64 / 319.0;
+            assert!(off.abs() < rounding_px(1.0), "{expected}: {off}");
+        }
+    }
+}
+
+/// Standard deviation times exp(value / 2), by depth read-out over many pixels.
+#[test]
+fn a_variance_shape_scales_the_noise() {
+    let plane = Plane::tilted(1.0, 0.0, 0.0);
+    let level = term(Statistic::Variance, Basis::Level, &[1.2]);
+    let spread = |effects: &[Effect]| {
+        rms(&residuals(&depths(&shots(plane, effects, 0.003, &[0.0])[0]), &plane))
+    };
+    let ratio = spread(&[shaped("vignetting", vec![level])]) / spread(&[]);
+    assert!((ratio / 0.6f64.exp() - 1.0).abs() < 0.01, "{ratio}");
+}
+
+/// The same effect by formula and by hand-written shape: the same picture.
+#[test]
+fn a_bowl_by_shape_is_the_bowl_by_formula() {
+    let plane = Plane::tilted(1.5, 0.5, 1.0);
+    let bowl = bias(Basis::Bowl { disparity_power: 0.0, orders: 1 }, &[0.7]);
+    let by_shape = shots(plane, &[shaped("radial-disparity-bias", vec![bowl])], 0.002, &[0.0]);
+    let by_formula =
+        shots(plane, &[named("radial-disparity-bias", json!({"k_px": 0.7}))], 0.002, &[0.0]);
+    let apart = by_shape[0].words.iter().zip(&by_formula[0].words).map(|(a, b)| a.abs_diff(*b));
+    assert!(apart.max().unwrap_or(0) <= 1);
+}
+
+/// Every formula that can be inverted, alone and then all together, with noise.
+#[test]
+fn what_a_formula_does_its_correction_undoes() {
+    let entries = [
+        named("depth-scale", json!({"scale": 1.04})),
+        named("disparity-offset", json!({"offset_px": 0.4})),
+        named("thermal-drift", json!({"relative": 0.02, "time_constant_s": 50.0})),
+        named("range-not-depth", json!({"share": 1.0})),
+        named("radial-disparity-bias", json!({"k_px": {"value": -0.8, "std_error": 0.1}})),
+        named("lens-distortion", json!({"k1": -0.08})),
+        named("pixel-locking", json!({"amplitude_px": 0.1})),
+        named("column-banding", json!({"amplitude_px": 0.2, "period_px": 50.0})),
+    ];
+    let plane = Plane::tilted(1.1, 0.7, 0.3);
+    let check = |effects: &[Effect], sigma_m: f64, limit_px: f64| {
+        let frame = &shots(plane, effects, sigma_m, &[0.0, 70.0])[1];
+        let correction =
+            Correction::of(&model(&sensor(), effects.to_vec()), &sensor()).expect("one");
+        let mut depth = depths(frame);
+        let before = rms(&residuals(&depth, &plane));
+        let conditions = Conditions { session_s: 70.0, ..Conditions::default() };
+        correction.apply(&mut depth, &conditions).expect("applied");
+        let after = rms(&residuals(&depth, &plane));
+        let ids: Vec<&str> = effects.iter().map(|e| e.id.as_str()).collect();
+        assert!(before > 0.03, "{ids:?} did nothing: {before}");
+        assert!(after < limit_px, "{ids:?}: {before} -> {after} px, not below {limit_px}");
+    };
+    for entry in &entries {
+        check(std::slice::from_ref(entry), SILENT_M, 0.008);
+    }
+    check(&entries, SILENT_M, 0.012);
+    let noise = rms(&residuals(&depths(&shots(plane, &[], 0.004, &[0.0])[0]), &plane));
+    // What scales the depth and what locks it change the noise a little with it.
+    check(&entries, 0.004, 1.15 * noise);
+}
+
+/// Each kind of sensor bias by hand; the surface it needs is found in the noisy picture.
+#[test]
+fn what_a_shape_does_its_correction_undoes() {
+    let (camera, plane) = (sensor().camera, Plane::tilted(1.0, 0.8, -0.7));
+    let curve =
+        |over, [low, high]: [f64; 2], times| Basis::Curve { over, low, high, nodes: 3, times };
+    let map = Basis::Map { width: 320.0, height: 240.0, across: 3, down: 2, times: Times::One };
+    let pair = Basis::Pair {
+        over: [Over::Radius, Over::Disparity],
+        low: [0.0, 10.0],
+        high: [1.0, 30.0],
+        nodes: [2, 2],
+    };
+    let ring = Basis::Ring { over: Over::Azimuth, period: 6.3, nodes: 4, times: Times::Tilt };
+    let kinds = [
+        bias(Basis::Bowl { disparity_power: 1.0, orders: 2 }, &[2.0, -0.6]),
+        bias(Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 2 }, &[-0.1, 0.05]),
+        bias(Basis::RangeNotDepth, &[1.0]),
+        bias(curve(Over::Z, [0.5, 4.0], Times::DisparitySquared), &[1.0, 2.0, -1.0]),
+        bias(curve(Over::Theta, [0.0, 1.5], Times::One), &[0.0, 0.6, 0.9]),
+        bias(curve(Over::Session, [0.0, 100.0], Times::Lift), &[0.0, 0.01, 0.02]),
+        bias(map, &[0.1, -0.4, 0.6, 0.3, 0.2, -0.5]),
+        bias(pair, &[0.5, -0.3, 0.8, 0.4]),
+        bias(ring, &[0.4, -0.4, 0.8, 0.2]),
+        bias(Basis::Locking { period_px: 3.0 }, &[0.1, 0.05, 0.0, 0.02]),
+    ];
+    let quiet = rms(&residuals(&depths(&shots(plane, &[], 0.001, &[0.0])[0]), &plane));
+    for kind in kinds {
+        let effects = [shaped(UNEXPLAINED, vec![kind.clone()])];
+        let frame = &shots(plane, &effects, 0.001, &[60.0])[0];
+        let correction =
+            Correction::of(&model(&sensor(), effects.to_vec()), &sensor()).expect("one");
+        let mut depth = depths(frame);
+        let before = rms(&residuals(&depth, &plane));
+        let conditions = Conditions { session_s: 60.0, ..Conditions::default() };
+        correction.apply(&mut depth, &conditions).expect("applied");
+        let after = rms(&residuals(&depth, &plane));
+        assert!(before > 1.2 * quiet, "{kind:?} did nothing: {before}, noise {quiet}");
+        // A ray length taken for a depth stretches the noise with it, by 9 % here.
+        assert!(after < 1.10 * quiet, "{kind:?}: {before} -> {after}, noise {quiet}");
+    }
+}
+
+/// A board's shape, an edge's mixing and any variance are not the sensor's bias.
+#[test]
+fn what_is_not_the_sensors_bias_stays_in_and_is_told() {
+    let across = Basis::Pair {
+        over: [Over::Column, Over::Right],
+        low: [0.0, -1.0],
+        high: [319.0, 1.0],
+        nodes: [2, 2],
+    };
+    let effects = vec![
+        shaped("target-bow", vec![bias(Basis::Bow { degree: 2 }, &[0.01, 0.0, 0.0])]),
+        shaped("edge-mixing", vec![bias(Basis::EdgeMixing { width_px: 2.0 }, &[1.0])]),
+        shaped("vignetting", vec![term(Statistic::Variance, Basis::Level, &[1.0])]),
+        shaped(UNEXPLAINED, vec![bias(across, &[1.0; 4])]),
+        named("target-motion", json!({"velocity_mps": 0.01})),
+        named("heavy-tails", json!({})),
+    ];
+    let correction = Correction::of(&model(&sensor(), effects), &sensor()).expect("a correction");
+    assert!(correction.is_identity());
+    let ids =
+        ["target-bow", "edge-mixing", "vignetting", UNEXPLAINED, "target-motion", "heavy-tails"];
+    assert_eq!(correction.ignored(), ids);
+}
+
+/// A curve over a temperature that nobody measured is not applied at its cold end.
+#[test]
+fn an_unknown_temperature_changes_nothing() {
+    let curve = Basis::Curve {
+        over: Over::Temperature,
+        low: 20.0,
+        high: 40.0,
+        nodes: 2,
+        times: Times::One,
+    };
+    let effects = vec![shaped(UNEXPLAINED, vec![bias(curve, &[0.5, 1.0])])];
+    let correction = Correction::of(&model(&sensor(), effects), &sensor()).expect("a correction");
+    let at = |temperature_c| {
+        let mut depth = vec![1.0f32; 320 * 240];
+        let conditions = Conditions { temperature_c, ..Conditions::default() };
+        correction.apply(&mut depth, &conditions).expect("applied");
+        f64::from(depth[0])
+    };
+    assert_eq!(at(None), 1.0);
+    assert!((at(Some(30.0)) - FB / (FB - 0.75)).abs() < 1e-6);
+}
+
+// ---- whole recordings ----------------------------------------------------------------------
+
+struct Files {
+    folder: tempfile::TempDir,
+}
+
+impl Files {
+    fn new() -> Self {
+        let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a temporary folder");
+        Files { folder }
+    }
+
+    fn at(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn model(&self, model: &NoiseModel) -> PathBuf {
+        let path = self.at("model.json");
+        model.write(&path).expect("written");
+        path
+    }
+
+    /// A recording of 160 x 120 px with `code`.
+    fn recording(&self, code: DepthCode, effects: Vec<Active>) -> PathBuf {
+        let sensor = Sensor { code, ..kinect_v1(4) };
+        let grid = common::grid(&[1.0, 1.6], &[0.0, 40.0]);
+        let shoot = Shoot {
+            views: plan_grid(&grid.views(), &Scenery::bare(Target::Wall), 2, true, Seed(2)),
+            sensor,
+            physics: Physics::Formula { sigma: truth(), effects },
+            infrared: true,
+            seed: Seed(2),
+        };
+        let path = self.at("rec");
+        shoot.write(&path, &|_, _| ()).expect("written");
+        path
+    }
+
+    fn correct(&self, recording: &Path, options: &[&str]) -> (Value, String) {
+        let output = self.run(recording, &self.at("out"), options);
+        let said = String::from_utf8(output.stderr).expect("text");
+        assert!(output.status.success(), "{said}");
+        (serde_json::from_slice(&output.stdout).expect("JSON"), said)
+    }
+
+    fn run(&self, recording: &Path, out: &Path, options: &[&str]) -> std::process::Output {
+        let mut command = kinoise();
+        command.arg("correct").arg(recording).arg("--model").arg(self.at("model.json"));
+        command.arg("-o").arg(out).arg("--json").args(options).output().expect("runs")
+    }
+
+    #[track_caller]
+    fn refused(&self, recording: &Path, out: &Path, needles: &[&str]) {
+        let output = self.run(recording, out, &[]);
+        let said = String::from_utf8(output.stderr).expect("text");
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert_eq!(said.lines().filter(|l| l.starts_with("kinoise: ")).count(), 1, "{said}");
+        assert!(needles.iter().all(|n| said.contains(n)), "{needles:?} in {said}");
+        assert!(said.contains("; ") && output.stdout.is_empty(), "{said}");
+    }
+}
+
+const METRIC: DepthCode = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
+const RAW: DepthCode =
+    DepthCode::Disparity { offset: 3.3309495161, slope: -0.0030711016, invalid: 2047 };
+
+fn small(effects: Vec<Effect>) -> NoiseModel {
+    model(&kinect_v1(4), effects)
+}
+
+fn bowl(k_px: f64) -> Effect {
+    let bowl = bias(Basis::Bowl { disparity_power: 0.0, orders: 1 }, &[k_px]);
+    shaped("radial-disparity-bias", vec![bowl])
+}
+
+/// Every file with its bytes, in name order.
+fn tree(root: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut files = Vec::new();
+    let mut folders = vec![root.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(root).expect("below").to_path_buf();
+                files.push((name, fs::read(&path).expect("read")));
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
+/// Root mean square about the best plane of each view's first frame in units of sigma, by
+/// calibrating.
+fn sigma_ratio(recording: &Path) -> f64 {
+    let opened = kinoise::io::open(recording, &Assumed::default()).expect("opened");
+    let measured =
+        kinoise::measure_recording(&opened, &Default::default(), &|_, _| ()).expect("measured");
+    let ratios: Vec<f64> = measured
+        .views
+        .iter()
+        .map(|v| v.whole.spread.spatial_m / truth().sigma(v.z_m, v.theta_rad))
+        .collect();
+    assert_eq!(ratios.len(), 4);
+    ratios.iter().sum::<f64>() / 4.0
+}
+
+#[test]
+fn a_corrected_recording_is_back_at_noise_level() {
+    let files = Files::new();
+    let effect = Active::parse("radial-disparity-bias:k_px=0.1").expect("an effect");
+    let recording = files.recording(METRIC, vec![effect]);
+    files.model(&small(vec![bowl(0.1)]));
+    let (json, _) = files.correct(&recording, &[]);
+    assert_eq!((&json["frames"], &json["clamped"]), (&json!(8), &json!(0)));
+    assert!(json["pixels_changed"].as_u64() > Some(100_000), "{json}");
+    assert!((1.0..20.0).contains(&json["rms_shift_mm"].as_f64().expect("a number")), "{json}");
+    let (before, after) = (sigma_ratio(&recording), sigma_ratio(&files.at("out")));
+    assert!(before > 1.5 && (after - 1.0).abs() < 0.1, "{before} -> {after}");
+    // Everything but depth is there, byte for byte.
+    let (old, new) = (tree(&recording), tree(&files.at("out")));
+    assert_eq!(old.len(), new.len());
+    for ((name, a), (other, b)) in old.iter().zip(&new) {
+        assert_eq!(name, other);
+        assert!(a == b || name.to_string_lossy().contains("depth/"), "{}", name.display());
+    }
+}
+
+#[test]
+fn a_model_without_bias_changes_no_byte() {
+    let files = Files::new();
+    files.model(&small(vec![named("vignetting", json!({"growth": 0.4}))]));
+    for code in [METRIC, RAW] {
+        let recording = files.recording(code, Vec::new());
+        let (json, said) = files.correct(&recording, &[]);
+        assert_eq!((&json["pixels_changed"], &json["rms_shift_mm"]), (&json!(0), &json!(0.0)));
+        assert!(said.contains("left in: vignetting"), "{said}");
+        assert!(tree(&recording) == tree(&files.at("out")));
+        fs::remove_dir_all(&recording).expect("removed");
+        fs::remove_dir_all(files.at("out")).expect("removed");
+    }
+}
+
+#[test]
+fn raw_disparities_become_fine_metric_words_unless_kept() {
+    let files = Files::new();
+    let offset = Active::parse("disparity-offset:offset_px=0.2").expect("an effect");
+    let recording = files.recording(RAW, vec![offset]);
+    let described = recording.join("recording.json");
+    let text = fs::read_to_string(&described).expect("read");
+    fs::write(&described, text.replacen('{', "{ \"owner\": \"lab 3\",", 1)).expect("written");
+    files.model(&small(vec![named("disparity-offset", json!({"offset_px": 0.2}))]));
+    let (json, _) = files.correct(&recording, &[]);
+    assert_eq!(json["units_per_metre"], json!(10_000.0));
+    let text = fs::read_to_string(files.at("out/recording.json")).expect("read");
+    let value: Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!((&value["owner"], &value["raw_disparity"]), (&json!("lab 3"), &Value::Null));
+    // d = fb / z and 0.2 px less of it.
+    let fb = 145.0 * 0.075;
+    let views = |path: &Path| open_uncut(path, &Assumed::default()).expect("opened");
+    let (old, new) = (views(&recording), views(&files.at("out")));
+    let (old_table, new_table) = (old.sensor.code.table(), new.sensor.code.table());
+    let mut source = FrameSource::new(160, 120);
+    for (a, b) in old.views.iter().zip(&new.views) {
+        let a = source.read(&a.depth[0].path).expect("read");
+        let b = source.read(&b.depth[0].path).expect("read");
+        for (&raw, &word) in a.words.iter().zip(&b.words) {
+            let (z, better) = (old_table.metres(raw), new_table.metres(word));
+            assert_eq!(z.is_nan(), better.is_nan(), "valid stays valid, and invalid invalid");
+            let expected = fb / (fb / f64::from(z) - 0.2);
+            assert!(z.is_nan() || (f64::from(better) - expected).abs() < 5.1e-5, "{z} {better}");
+        }
+    }
+    fs::remove_dir_all(files.at("out")).expect("removed");
+    let (json, _) = files.correct(&recording, &["--keep-code"]);
+    assert_eq!(json["units_per_metre"], Value::Null);
+    assert!(fs::read_to_string(files.at("out/recording.json")).expect("read").contains("raw_disp"));
+}
+
+#[test]
+fn the_bytes_do_not_depend_on_the_number_of_threads() {
+    let files = Files::new();
+    let recording = files.recording(METRIC, Vec::new());
+    let camera = kinect_v1(4).camera;
+    let lens = bias(Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 1 }, &[-0.1]);
+    files.model(&small(vec![bowl(0.5), shaped("lens-distortion", vec![lens])]));
+    let (one, _) = files.correct(&recording, &["--threads", "1"]);
+    fs::rename(files.at("out"), files.at("one")).expect("moved");
+    let (two, _) = files.correct(&recording, &["--threads", "2"]);
+    assert_eq!(one, two);
+    assert!(tree(&files.at("one")) == tree(&files.at("out")));
+}
+
+#[test]
+fn a_film_keeps_its_colour_and_every_frame() {
+    let files = Files::new();
+    let model_path = files.model(&small(vec![bowl(0.5)]));
+    let film = files.at("film");
+    let shot = kinoise()
+        .args(["simulate", "--room", "--frames", "4", "--model"])
+        .arg(&model_path)
+        .arg(&film)
+        .output()
+        .expect("runs");
+    assert!(shot.status.success(), "{}", String::from_utf8_lossy(&shot.stderr));
+    let (json, said) = files.correct(&film, &[]);
+    assert_eq!(json["frames"], json!(4), "{said}");
+    let (old, new) = (tree(&film), tree(&files.at("out")));
+    let changed: Vec<_> = old.iter().zip(&new).filter(|(a, b)| a != b).map(|(a, _)| &a.0).collect();
+    assert_eq!(old.len(), new.len());
+    assert_eq!(changed.len(), 4, "the depth images and nothing else: {changed:?}");
+    // The shape that the film was shot with is out again: a film without it is the same but for rounding.
+    files.model(&small(Vec::new()));
+    let plain = files.at("plain");
+    let shot = kinoise()
+        .args(["simulate", "--room", "--frames", "4", "--model"])
+        .arg(&model_path)
+        .arg(&plain)
+        .output()
+        .expect("runs");
+    assert!(shot.status.success());
+    let mut source = FrameSource::new(160, 120);
+    let mut off = 0;
+    for name in &changed {
+        let a = source.read(&plain.join(name)).expect("read");
+        let b = source.read(&files.at("out").join(name)).expect("read");
+        // A word of 0.2 mm each way, and as much again from the rounding of the shifted depth.
+        off += a.words.iter().zip(&b.words).filter(|(a, b)| a.abs_diff(**b) > 3).count();
+    }
+    assert!(off < 200, "{off} pixels are elsewhere");
+}
+
+#[test]
+fn a_dump_of_raw_words_goes_on_as_a_described_sequence() {
+    let files = Files::new();
+    let raw = files.recording(RAW, Vec::new());
+    let dump = files.at("dump");
+    fs::create_dir(&dump).expect("made");
+    let recording = open_uncut(&raw, &Assumed::default()).expect("opened");
+    let mut source = FrameSource::new(160, 120);
+    let mut index = String::new();
+    for (k, frame) in recording.views.iter().flat_map(|v| &v.depth).enumerate() {
+        let name = format!("d-{}.{k}-{k}.pgm", 1000 + k);
+        let image = source.read(&frame.path).expect("read");
+        fs::write(dump.join(&name), kinoise::io::encode_pgm16(&image)).expect("written");
+        index += &format!("{name}\nr-{}.{k}-{k}.ppm\n", 1000 + k);
+        fs::write(dump.join(format!("r-{}.{k}-{k}.ppm", 1000 + k)), b"P6").expect("written");
+    }
+    fs::write(dump.join("INDEX.txt"), index).expect("written");
+    files.model(&small(vec![bowl(0.5)]));
+    let options = ["--intrinsics", "145,145,79.5,59.5"];
+    let (json, _) = files.correct(&dump, &options);
+    assert_eq!(json["frames"], json!(8));
+    let again = open_uncut(&files.at("out"), &Assumed::default()).expect("described");
+    assert_eq!((again.views[0].depth.len(), again.sensor.camera.fx), (8, 145.0));
+    assert!(files.at("out/r-1000.0-0.ppm").is_file(), "colour goes along");
+    fs::remove_dir_all(files.at("out")).expect("removed");
+    files.correct(&dump, &[&options[..], &["--keep-code"]].concat());
+    assert!(files.at("out/INDEX.txt").is_file());
+}
+
+/// 1/z - 4 px of disparity leave nothing behind 2.7 m: the code's end, and told.
+#[test]
+fn depths_beyond_the_code_stand_at_its_end() {
+    let files = Files::new();
+    let recording = files.recording(METRIC, Vec::new());
+    files.model(&small(vec![shaped(UNEXPLAINED, vec![bias(Basis::Level, &[6.9])])]));
+    let (json, said) = files.correct(&recording, &[]);
+    assert!(json["clamped"].as_u64() > Some(0), "{json}");
+    assert!(said.contains("beyond the ends"), "{said}");
+}
+
+#[test]
+fn a_damaged_image_is_copied_and_told() {
+    let files = Files::new();
+    let recording = files.recording(METRIC, Vec::new());
+    files.model(&small(vec![bowl(0.5)]));
+    fs::write(recording.join("0001/depth/0000.png"), b"no picture").expect("written");
+    let (json, said) = files.correct(&recording, &[]);
+    assert_eq!(json["frames"], json!(7));
+    assert!(said.contains("copied as it is") && said.contains("0000.png"), "{said}");
+}
+
+#[test]
+fn bad_input_is_refused_with_one_message() {
+    let files = Files::new();
+    let recording = files.at("rec");
+    copy_tree(good(), &recording);
+    let out = files.at("out");
+    files.refused(&recording, &out, &["model.json"]);
+    files.model(&model(&kinect_v1(2), vec![bowl(0.5)]));
+    files.refused(&recording, &out, &["320 x 240", "160 x 120"]);
+    fs::write(files.at("model.json"), "{\"format\": \"kinoise-model/9\"}").expect("written");
+    files.refused(&recording, &out, &["newer"]);
+    files.model(&small(vec![named("no-such-thing", json!({}))]));
+    files.refused(&recording, &out, &["model.json", "no-such-thing"]);
+    let path = files.model(&small(vec![bowl(0.5)]));
+    files.refused(&files.at("nowhere"), &out, &["no such folder"]);
+    files.refused(&recording, &recording.join("new/folder"), &["inside"]);
+    files.refused(&recording, &recording, &["inside"]);
+    files.refused(&recording, files.folder.path(), &["not empty"]);
+    let text = fs::read_to_string(&path).expect("read");
+    for (from, to, says) in [
+        ("\"orders\": 1", "\"orders\": 2", "1 coefficients where its basis has 2"),
+        ("\"orders\": 1", "\"orders\": 0", "orders"),
+        ("\"kind\": \"bowl\"", "\"kind\": \"cup\"", "cup"),
+        ("\"statistic\": \"bias\"", "\"statistic\": \"missing\"", "a bias or a variance"),
+    ] {
+        let lie = text.replacen(from, to, 1);
+        assert_ne!(lie, text, "{from}");
+        fs::write(&path, lie).expect("written");
+        files.refused(&recording, &out, &["model.json", says]);
+    }
+    assert!(!out.exists(), "nothing was begun");
+}
+
+#[test]
+fn an_effect_on_top_of_its_shape_is_refused() {
+    let files = Files::new();
+    let path = files.model(&small(vec![bowl(0.5)]));
+    let output = kinoise()
+        .args(["simulate", "--effect", "radial-disparity-bias:k_px=1", "--model"])
+        .arg(path)
+        .arg(files.at("out"))
+        .output()
+        .expect("runs");
+    let said = String::from_utf8(output.stderr).expect("text");
+    assert!(output.status.code() == Some(2) && said.contains("brings its shape"), "{said}");
+}
+
+#[test]
+fn the_library_does_what_the_program_does() {
+    let files = Files::new();
+    let recording = files.recording(METRIC, Vec::new());
+    let model = small(vec![bowl(0.5)]);
+    files.model(&model);
+    let (json, _) = files.correct(&recording, &[]);
+    let out = files.at("library");
+    let done = correct_recording(&recording, &Assumed::default(), &model, &out, false, &|_, _| ())
+        .expect("done");
+    assert_eq!(json["pixels_changed"], json!(done.changed));
+    assert!(tree(&out) == tree(&files.at("out")));
+}
