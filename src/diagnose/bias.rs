@@ -51,9 +51,7 @@ fn locking(all: &mut Vec<Candidate>, reach: &Reach) {
     let half = ((OFF / step).ceil() as i64).clamp(1, 12);
     for k in -half..=half {
         let period_px = 1.0 / (1.0 + OFF * k as f64 / half as f64);
-        for harmonics in [2, 4] {
-            all.push(Candidate::named("pixel-locking", Basis::Locking { period_px, harmonics }));
-        }
+        all.push(Candidate::named("pixel-locking", Basis::Locking { period_px, harmonics: 3 }));
     }
 }
 

@@ -110,12 +110,15 @@ pub fn diagnose(
     let lattice = lattice(&fields, recording);
     let rows_px2 = mean_of(structure.iter().filter_map(|s| s.row_px2));
     let fixed_px2 = fixed_px2(&structure);
+    let single = fields.iter().all(|f| f.frames.len() < 2);
     let extra = |p: &Place| {
         let depth_px = lattice.depth_step_m.unwrap_or(0.0) * scale_px_m / (p.z * p.z);
         let step_px = lattice.disparity_step_px.unwrap_or(0.0);
         // Words of a raw sensor are in the model's variance already.
         let step_px = if is_raw(recording) { 0.0 } else { step_px };
-        (depth_px * depth_px + step_px * step_px) / 12.0 + rows_px2 + fixed_px2
+        // With frames to compare, what stands still is not in the variance.
+        let still = if single { fixed_px2 } else { 0.0 };
+        (depth_px * depth_px + step_px * step_px) / 12.0 + rows_px2 + still
     };
     let range_share: f64 = known
         .bias
