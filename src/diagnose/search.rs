@@ -7,7 +7,7 @@ use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain, Null, Rows, gain};
 use super::tiles::SIDE;
 use crate::rng::Seed;
-use crate::terms::{Basis, Place, Term};
+use crate::terms::{Basis, Over, Place, Term};
 
 /// One view's samples.
 pub struct ViewData {
@@ -194,8 +194,8 @@ impl NoiseGains {
 struct Prepared<'a> {
     fine: (&'a [Place], Rows),
     coarse: (&'a [Place], Rows),
-    /// By columns of tiles, with a place for each.
-    columns: (Vec<Place>, Rows),
+    /// The fine samples gathered by one coordinate, with a place for each group.
+    groups: Vec<(Over, Vec<Place>, Rows)>,
 }
 
 struct Layer<'a> {
@@ -279,6 +279,12 @@ impl<'a> Layer<'a> {
             .candidates
             .par_iter()
             .map(|c| {
+                // A name is taken once; what its shape misses is left to the curves.
+                let taken = c.family.is_some()
+                    && chosen.iter().any(|old| old.candidate.family == c.family);
+                if taken {
+                    return None;
+                }
                 let evidence: Vec<Evidence> = views.iter().map(|v| v.evidence(&c.basis)).collect();
                 let null = Null::of(&evidence, m, self.rules.prior)?;
                 let mut gain = gain(&evidence, self.rules.prior)?;
@@ -515,23 +521,49 @@ fn prepare<'a>(
 ) -> Option<Prepared<'a>> {
     let rows_fine = rows(fine, beside, settled)?;
     let places = &fine.places;
-    let key = |i: usize| (places[i].u / SIDE as f64) as usize;
-    let count = (0..places.len()).map(|i| key(i) + 1).max().unwrap_or(0);
-    let mut column_places = vec![Place::default(); count];
-    for (i, place) in places.iter().enumerate() {
-        column_places[key(i)] = *place;
-    }
+    let side = SIDE as f64;
+    let groups = vec![
+        gather(&rows_fine, places, Over::Column, side),
+        gather(&rows_fine, places, Over::Row, side),
+        gather(&rows_fine, places, Over::Disparity, DISPARITY_GROUP_PX),
+        gather(&rows_fine, places, Over::Edge, EDGE_GROUP_PX),
+    ];
     Some(Prepared {
-        columns: (column_places, rows_fine.grouped(count, key)),
+        groups,
         fine: (places, rows_fine),
         coarse: (&coarse.places, rows(coarse, beside, settled)?),
     })
 }
 
+/// Disparities this near are one, px: a thirtieth of a locking's period.
+const DISPARITY_GROUP_PX: f64 = 1.0 / 30.0;
+const EDGE_GROUP_PX: f64 = 0.5;
+
+/// Samples in steps of one coordinate; each group lies where its samples do on average.
+fn gather(rows: &Rows, places: &[Place], over: Over, step: f64) -> (Over, Vec<Place>, Rows) {
+    let low = places.iter().map(|p| over.value(p)).fold(f64::INFINITY, f64::min);
+    let key = |i: usize| ((over.value(&places[i]) - low) / step) as usize;
+    let count = (0..places.len()).map(|i| key(i) + 1).max().unwrap_or(0);
+    let mut sums = vec![(Place::default(), [0.0; 6], 0.0); count];
+    for (i, p) in places.iter().enumerate() {
+        let (first, sum, n) = &mut sums[key(i)];
+        *first = *p;
+        *n += 1.0;
+        let values = [p.u, p.v, p.disparity, p.z, p.edge, p.radius];
+        sum.iter_mut().zip(values).for_each(|(s, v)| *s += v);
+    }
+    let mean = |(place, sum, n): &(Place, [f64; 6], f64)| {
+        let [u, v, disparity, z, edge, radius] = sum.map(|s| s / f64::max(*n, 1.0));
+        Place { u, v, disparity, z, edge, radius, ..*place }
+    };
+    (over, sums.iter().map(mean).collect(), rows.grouped(count, key))
+}
+
 impl Prepared<'_> {
     fn evidence(&self, basis: &Basis) -> Evidence {
-        let (places, rows): (&[Place], &Rows) = if basis.of_column_alone() {
-            (&self.columns.0, &self.columns.1)
+        let alone = basis.alone().and_then(|over| self.groups.iter().find(|g| g.0 == over));
+        let (places, rows): (&[Place], &Rows) = if let Some((_, places, rows)) = alone {
+            (places, rows)
         } else if basis.is_fine() {
             (self.fine.0, &self.fine.1)
         } else {
