@@ -7,6 +7,7 @@ use kinoise::report::{DiagnosisPage, diagnosis_page};
 use kinoise::{CalibrateOptions, NoiseModel, Recording};
 
 use super::common::{Bar, Global, Input, say};
+use super::diagnose_pictures;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -41,7 +42,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     out.write("diagnosis.json", format!("{json:#}\n").as_bytes())?;
     done.model.write(&out.path().join("model.json"))?;
     let title = format!("What the model of {} leaves out", recording.sensor.name);
-    let page = DiagnosisPage { title: &title, diagnosis, pictures: &[] };
+    let pictures = diagnose_pictures::of(&done, &recording.sensor, &model, global.seed());
+    let page = DiagnosisPage { title: &title, diagnosis, pictures: &pictures };
     out.write("report.html", diagnosis_page(&page)?.as_bytes())?;
     say(words(diagnosis));
     global.print_json(&json)?;

@@ -55,7 +55,16 @@ pub struct Diagnosed {
     pub fields: Vec<Field>,
     /// Terms of the bias that were found, for pictures.
     pub bias: Vec<Term>,
+    /// The same at every pixel of every field, px; empty when there are none.
+    pub bias_px: Vec<Vec<f32>>,
     pub excluded: Vec<Excluded>,
+}
+
+impl Diagnosed {
+    /// Mean residual of every pixel of a view, px.
+    pub fn recorded(&self, view: usize) -> Vec<f32> {
+        self.fields[view].mean.clone()
+    }
 }
 
 /// Steps done, steps in all.
@@ -217,7 +226,7 @@ pub fn diagnose(
         views,
         remarks,
     };
-    Ok(Diagnosed { diagnosis, model: extended, fields, bias: bias_terms, excluded })
+    Ok(Diagnosed { diagnosis, model: extended, fields, bias: bias_terms, bias_px, excluded })
 }
 
 /// Do the views become flat once their words are taken for lengths of rays? Then with them.

@@ -13,6 +13,7 @@ mod known;
 mod lattice;
 mod noise;
 mod parameters;
+mod pictures;
 mod layers;
 mod missing;
 mod missing_cells;
@@ -39,5 +40,6 @@ pub use known::Known;
 pub use lattice::{Lattice, Words};
 pub use layers::Survey;
 pub use missing::{MissingFinding, MissingOutcome, missing};
+pub use pictures::{ViewPictures, pictures};
 pub use search::Outcome;
 

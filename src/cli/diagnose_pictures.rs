@@ -1,0 +1,82 @@
+//! Where diagnosis and simulator meet: the views worth seeing, each with its simulated twin.
+
+use std::f64::consts::PI;
+
+use kinoise::camera::Rays;
+use kinoise::diagnose::{Diagnosed, Field, ViewPictures, pictures};
+use kinoise::effects::{Active, Instant};
+use kinoise::report::Picture;
+use kinoise::simulate::{FormulaSensor, plan_on};
+use kinoise::view::ViewNotes;
+use kinoise::{Frame, NoiseModel, Seed, Sensor};
+
+/// More frames of a twin than this add nothing that an eye sees.
+const MOST_FRAMES: usize = 16;
+
+/// `given` is the model that the recording was held against.
+pub fn of(done: &Diagnosed, sensor: &Sensor, given: &NoiseModel, seed: Seed) -> Vec<Picture> {
+    let rays = sensor.camera.rays();
+    // What the simulator does not know how to make has no twin.
+    let effects = Active::all_of_model(&done.model.effects).ok();
+    let twin = Twin { sensor, rays: &rays, model: &done.model, effects: effects.as_deref(), seed };
+    let session_s = done.fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
+    pictures(done, sensor, given, &|index, field| twin.frames(index, field, session_s))
+        .into_iter()
+        .map(|p| picture(p, done))
+        .collect()
+}
+
+struct Twin<'a> {
+    sensor: &'a Sensor,
+    rays: &'a Rays,
+    model: &'a NoiseModel,
+    effects: Option<&'a [Active]>,
+    seed: Seed,
+}
+
+impl Twin<'_> {
+    fn frames(&self, index: usize, field: &Field, session_s: f64) -> Option<Vec<(f64, Frame)>> {
+        let times = field.frames.iter().take(MOST_FRAMES).map(|f| f.0);
+        let stamps = times.map(|t| field.time_s + t).collect();
+        let notes = ViewNotes {
+            temperature_c: field.temperature_c,
+            ambient_lux: field.ambient_lux,
+            ..ViewNotes::default()
+        };
+        let plan = plan_on(&field.name, &field.plane, &field.pixels, self.rays, stamps, notes);
+        let seen = plan.seen(&self.sensor.camera, self.rays);
+        let camera = FormulaSensor {
+            sensor: self.sensor,
+            rays: self.rays,
+            sigma: &self.model.sigma,
+            effects: self.effects?,
+            seed: self.seed,
+        };
+        let mut shooting =
+            camera.begin(&seen).under(plan.ambient_lux).at(plan.notes.temperature_c);
+        let shot = |(_, instant): (f64, Instant)| (instant.view_s, shooting.shoot(instant).depth);
+        Some(plan.instants(index, session_s).map(shot).collect())
+    }
+}
+
+fn picture(p: ViewPictures, done: &Diagnosed) -> Picture {
+    let line = &done.diagnosis.views[p.view];
+    let tilt = 180.0 / PI * line.theta_rad;
+    let range = p.range_px();
+    Picture {
+        caption: format!(
+            "View {}: board at {:.2} m, tilted {tilt:.0}°; mean of {} frame{}",
+            line.name,
+            line.z_m,
+            line.frames,
+            if line.frames == 1 { "" } else { "s" }
+        ),
+        width: p.width,
+        height: p.height,
+        before: p.before,
+        after: p.after,
+        simulated: p.twin,
+        unit: "px",
+        range,
+    }
+}
