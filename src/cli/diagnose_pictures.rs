@@ -1,7 +1,5 @@
 //! Where diagnosis and simulator meet: the views worth seeing, each with its simulated twin.
 
-use std::f64::consts::PI;
-
 use kinoise::camera::Rays;
 use kinoise::diagnose::{Diagnosed, Field, ViewPictures, pictures};
 use kinoise::effects::{Active, Instant};
@@ -16,9 +14,8 @@ const MOST_FRAMES: usize = 16;
 /// `given` is the model that the recording was held against.
 pub fn of(done: &Diagnosed, sensor: &Sensor, given: &NoiseModel, seed: Seed) -> Vec<Picture> {
     let rays = sensor.camera.rays();
-    // What the simulator does not know how to make has no twin.
-    let effects = Active::all_of_model(&done.model.effects).ok();
-    let twin = Twin { sensor, rays: &rays, model: &done.model, effects: effects.as_deref(), seed };
+    let effects = effects(&done.model);
+    let twin = Twin { sensor, rays: &rays, model: &done.model, effects: &effects, seed };
     let session_s = done.fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
     pictures(done, sensor, given, &|index, field| twin.frames(index, field, session_s))
         .into_iter()
@@ -26,11 +23,24 @@ pub fn of(done: &Diagnosed, sensor: &Sensor, given: &NoiseModel, seed: Seed) -> 
         .collect()
 }
 
+/// What moves the plane as a whole: a picture about the plane does not show it.
+const OF_THE_PLANE: [&str; 3] = ["depth-scale", "disparity-offset", "thermal-drift"];
+
+/// All that the simulator knows how to make.
+fn effects(model: &NoiseModel) -> Vec<Active> {
+    let mut known = model.effects.clone();
+    known.retain(|e| {
+        let id = e.id.as_str();
+        !OF_THE_PLANE.contains(&id) && Active::all_of_model(std::slice::from_ref(e)).is_ok()
+    });
+    Active::all_of_model(&known).unwrap_or_default()
+}
+
 struct Twin<'a> {
     sensor: &'a Sensor,
     rays: &'a Rays,
     model: &'a NoiseModel,
-    effects: Option<&'a [Active]>,
+    effects: &'a [Active],
     seed: Seed,
 }
 
@@ -49,7 +59,7 @@ impl Twin<'_> {
             sensor: self.sensor,
             rays: self.rays,
             sigma: &self.model.sigma,
-            effects: self.effects?,
+            effects: self.effects,
             seed: self.seed,
         };
         let mut shooting =
@@ -61,7 +71,7 @@ impl Twin<'_> {
 
 fn picture(p: ViewPictures, done: &Diagnosed) -> Picture {
     let line = &done.diagnosis.views[p.view];
-    let tilt = 180.0 / PI * line.theta_rad;
+    let tilt = line.theta_rad.to_degrees();
     let range = p.range_px();
     Picture {
         caption: format!(

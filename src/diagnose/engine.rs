@@ -19,6 +19,7 @@ use super::layers::Survey;
 use super::noise::{Hanging, hanging, tails};
 use super::parameters::estimate;
 use super::missing::missing;
+use super::next_view;
 use super::reference;
 use super::rim;
 use super::search::Outcome;
@@ -154,6 +155,11 @@ pub fn diagnose(
     let tails = tails(&structure, &known);
     let mut terms = findings::findings(&bias_scene, &bias);
     terms.extend(findings::findings(&variance_scene, &variance));
+    for (scene, outcome) in [(&bias_scene, &bias), (&variance_scene, &variance)] {
+        if let Some(outlook) = next_view::outlook(scene, &model.sigma, camera, &bench.rays) {
+            next_view::advise(&mut terms, scene, outcome, &outlook);
+        }
+    }
     let steps = steps(&lattice, &known, &fields, recording, sigma_mm);
     // Steps shift the mean within a step, and gross errors add to the variance: neither is news.
     let coarsest = lattice.disparity_step_px.unwrap_or(0.0).max(

@@ -11,6 +11,7 @@ mod findings;
 mod heldout;
 mod known;
 mod lattice;
+mod next_view;
 mod noise;
 mod parameters;
 mod pictures;
