@@ -17,7 +17,11 @@ pub fn of(done: &Diagnosed, sensor: &Sensor, given: &NoiseModel, seed: Seed) -> 
     let effects = effects(&done.model);
     let twin = Twin { sensor, rays: &rays, model: &done.model, effects: &effects, seed };
     let session_s = done.fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
-    pictures(done, sensor, given, &|index, field| twin.frames(index, field, session_s))
+    // Beside a simulated recording, what is shown is a difference already.
+    let retake = |index, field: &Field| {
+        if done.against.is_empty() { twin.frames(index, field, session_s) } else { None }
+    };
+    pictures(done, sensor, given, &retake)
         .into_iter()
         .map(|p| picture(p, done))
         .collect()
@@ -73,9 +77,10 @@ fn picture(p: ViewPictures, done: &Diagnosed) -> Picture {
     let line = &done.diagnosis.views[p.view];
     let tilt = line.theta_rad.to_degrees();
     let range = p.range_px();
+    let beyond = if done.against.is_empty() { "" } else { ", recorded minus simulated" };
     Picture {
         caption: format!(
-            "View {}: board at {:.2} m, tilted {tilt:.0}°; mean of {} frame{}",
+            "View {}{beyond}: board at {:.2} m, tilted {tilt:.0}°; mean of {} frame{}",
             line.name,
             line.z_m,
             line.frames,

@@ -1,5 +1,6 @@
 //! When simulation and recording differ: where, why, and what is gained by knowing.
 
+mod against;
 mod bias;
 mod candidate;
 mod detectable;
@@ -14,6 +15,7 @@ mod lattice;
 mod next_view;
 mod noise;
 mod parameters;
+mod partners;
 mod pictures;
 mod layers;
 mod missing;
@@ -35,7 +37,7 @@ mod tiles;
 mod variance;
 
 pub use diagnosis::*;
-pub use engine::{DiagnoseOptions, Diagnosed, diagnose};
+pub use engine::{DiagnoseOptions, Diagnosed, diagnose, diagnose_against};
 pub use field::Field;
 pub use known::Known;
 pub use lattice::{Lattice, Words};
