@@ -21,10 +21,7 @@ pub fn of(done: &Diagnosed, sensor: &Sensor, given: &NoiseModel, seed: Seed) -> 
     let retake = |index, field: &Field| {
         if done.against.is_empty() { twin.frames(index, field, session_s) } else { None }
     };
-    pictures(done, sensor, given, &retake)
-        .into_iter()
-        .map(|p| picture(p, done))
-        .collect()
+    pictures(done, sensor, given, &retake).into_iter().map(|p| picture(p, done)).collect()
 }
 
 /// What moves the plane as a whole: a picture about the plane does not show it.
@@ -66,8 +63,7 @@ impl Twin<'_> {
             effects: self.effects,
             seed: self.seed,
         };
-        let mut shooting =
-            camera.begin(&seen).under(plan.ambient_lux).at(plan.notes.temperature_c);
+        let mut shooting = camera.begin(&seen).under(plan.ambient_lux).at(plan.notes.temperature_c);
         let shot = |(_, instant): (f64, Instant)| (instant.view_s, shooting.shoot(instant).depth);
         Some(plan.instants(index, session_s).map(shot).collect())
     }

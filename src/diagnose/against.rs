@@ -22,6 +22,7 @@ use super::tiles::SIDE;
 use crate::error::{Error, Result};
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
+use crate::terms::Axis;
 use crate::view::{Recording, Sensor};
 
 /// The simulated views, in the order of the real ones they belong to.
@@ -190,9 +191,7 @@ impl Baseline {
     /// The simulated variances are as uncertain as the real ones.
     pub fn doubt(&self, survey: &mut Survey) {
         let (ours, theirs) = (survey.variance_data(), self.survey.variance_data());
-        let mean = |v: &ViewData| {
-            v.weight.iter().sum::<f64>() / v.weight.len().max(1) as f64
-        };
+        let mean = |v: &ViewData| v.weight.iter().sum::<f64>() / v.weight.len().max(1) as f64;
         for (view, (ours, theirs)) in survey.views.iter_mut().zip(ours.iter().zip(&theirs)) {
             let (w, t) = (mean(ours), mean(theirs));
             if w + t > 0.0 {
@@ -206,7 +205,8 @@ impl Baseline {
     pub fn compare(&self, structure: &mut [Structure], real: &Lattice, known: &mut Known) {
         let ours = structure;
         let level = |of: &dyn Fn(&Structure) -> Option<f64>| {
-            let all: Vec<f64> = self.structure.iter().filter_map(of).filter(|v| v.is_finite()).collect();
+            let all: Vec<f64> =
+                self.structure.iter().filter_map(of).filter(|v| v.is_finite()).collect();
             all.iter().sum::<f64>() / all.len().max(1) as f64
         };
         let windows = level(&|s| s.window_px.map(f64::ln));
@@ -257,13 +257,16 @@ impl Baseline {
         }
     }
 
-    /// Is as much lost in the simulated views, and for the same reason?
-    pub fn loses_alike(&self, lost: &MissingFinding) -> bool {
-        self.lost.iter().any(|own| {
+    /// Is as much lost in the simulated views, for the same reason or on the whole?
+    pub fn loses_alike(&self, lost: &MissingFinding, real: &Survey) -> bool {
+        let same = self.lost.iter().any(|own| {
             own.family == lost.family
                 && own.axis == lost.axis
                 && (own.size.max(1e-6) / lost.size.max(1e-6)).ln().abs() < LOSSES_ALIKE
-        })
+        });
+        // What lies beside the target is no tile's.
+        let on_target = lost.axis != Axis::EdgeDistance;
+        same || on_target && lost_share(real) < 1.2 * lost_share(&self.survey) + LOST_BY_LOT
     }
 
     /// What the simulation shows and the recording does not, in words.
@@ -283,8 +286,17 @@ impl Baseline {
 
 /// Steps that differ by less are the same, as a logarithm.
 const STEPS_ALIKE: f64 = 0.05;
+/// A share of the pixels that nobody misses.
+const LOST_BY_LOT: f64 = 0.0005;
 /// Losses whose sizes differ by less are the same: views lose by lot.
 const LOSSES_ALIKE: f64 = 0.4;
+
+/// Of all that was asked of the target's pixels.
+fn lost_share(survey: &Survey) -> f64 {
+    let tiles = || survey.views.iter().flat_map(|v| &v.tiles);
+    let asked: f64 = tiles().map(|t| t.asked).sum();
+    tiles().map(|t| t.asked * t.missing).sum::<f64>() / asked.max(1.0)
+}
 
 fn patch(u: f64, v: f64, side: usize) -> (u32, u32) {
     ((v / side as f64) as u32, (u / side as f64) as u32)

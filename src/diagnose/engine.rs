@@ -230,7 +230,7 @@ fn run(
         lost.findings
             .into_iter()
             .filter(|m| m.family.is_none_or(|id| !known.has(id)))
-            .filter(|m| baseline.as_ref().is_none_or(|b| !b.loses_alike(m)))
+            .filter(|m| baseline.as_ref().is_none_or(|b| !b.loses_alike(m, &survey)))
             .map(findings::missing),
     );
     let levels = heldout::levels(&survey, &bias_terms);

@@ -94,9 +94,10 @@ impl Field {
         field.spread_px = (target.scale * field.scale_px_m) as f32;
         let mut source = FrameSource::new(camera.width, camera.height);
         let start = view.depth.first().map_or(0.0, |f| f.timestamp);
-        let frames = view.depth.iter().filter_map(|frame| {
-            Some((frame.timestamp - start, source.read(&frame.path).ok()?))
-        });
+        let frames = view
+            .depth
+            .iter()
+            .filter_map(|frame| Some((frame.timestamp - start, source.read(&frame.path).ok()?)));
         field.expose(frames, bench, sigma, known, session_start);
         field.look(view, &bench.rays);
         Ok(field)

@@ -68,14 +68,18 @@ impl Prospects {
 }
 
 /// `best` with its coefficients against `rival`, whose coefficients are free.
-pub fn prospects(taken: &[ViewData], best: &Term, rival: &Term, outlook: &Outlook<'_>) -> Prospects {
+pub fn prospects(
+    taken: &[ViewData],
+    best: &Term,
+    rival: &Term,
+    outlook: &Outlook<'_>,
+) -> Prospects {
     let pair = [best.clone(), rival.clone()];
     let k = best.basis.count();
     let beta = DVector::from_column_slice(&best.coefficients);
     let n = k + rival.basis.count();
-    let sum = evidence_of(taken, &pair)
-        .iter()
-        .fold(DMatrix::zeros(n, n), |sum, e: &Evidence| sum + &e.a);
+    let sum =
+        evidence_of(taken, &pair).iter().fold(DMatrix::zeros(n, n), |sum, e: &Evidence| sum + &e.a);
     let of_board = !best.belongs_to_sensor() || !rival.belongs_to_sensor();
     let views = poses()
         .into_par_iter()
@@ -145,7 +149,8 @@ impl Outlook<'_> {
                 place.lean_on(plane, &pixels);
                 let point = Vector3::new(place.x, place.y, 1.0) * z;
                 (place.right, place.down) = board.place(&point);
-                let on = within(place.right, self.reach.right) && within(place.down, self.reach.down);
+                let on =
+                    within(place.right, self.reach.right) && within(place.down, self.reach.down);
                 if of_board && !on {
                     continue;
                 }
@@ -212,7 +217,8 @@ pub fn outlook<'a>(
 pub fn advise(found: &mut [Finding], scene: &Scene<'_>, outcome: &Outcome, outlook: &Outlook<'_>) {
     for finding in found.iter_mut().filter(|f| f.statistic == scene.statistic) {
         let sure = finding.alternatives.first().map_or(0.0, |a| a.probability);
-        let runner_up = finding.alternatives.iter().map(|a| a.effect).find(|e| Some(*e) != finding.effect);
+        let runner_up =
+            finding.alternatives.iter().map(|a| a.effect).find(|e| Some(*e) != finding.effect);
         let (Some(name), Some(runner_up), true) = (finding.effect, runner_up, sure < SURE) else {
             continue;
         };
@@ -290,8 +296,7 @@ mod tests {
     /// Frontal views, and what is asked of another.
     fn confused(best: &Term, rival: &Term) -> (Prospects, Prospects) {
         let sensor = kinect_v1(4);
-        let (camera, rays, sigma, reach) =
-            (&sensor.camera, sensor.camera.rays(), sigma(), reach());
+        let (camera, rays, sigma, reach) = (&sensor.camera, sensor.camera.rays(), sigma(), reach());
         let outlook = Outlook {
             statistic: Statistic::Bias,
             camera,

@@ -61,7 +61,9 @@ pub fn pictures(
                 Some(bias) => recorded.iter().zip(bias).map(|(r, b)| r - b).collect(),
                 None => recorded.clone(),
             };
-            let show = |values: &[f32]| shrunk(&field.image(&about_plane(field, values, &bench.rays)), field);
+            let show = |values: &[f32]| {
+                shrunk(&field.image(&about_plane(field, values, &bench.rays)), field)
+            };
             let (width, height, before) = show(&recorded);
             let (_, _, after) = show(&left);
             let twin = twin.map(|t| show(&t).2);
