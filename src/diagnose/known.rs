@@ -39,6 +39,19 @@ impl Known {
         known
     }
 
+    /// Take a parameter of an effect for known; nothing is taken out for it.
+    pub fn learn(&mut self, id: &str, name: &str, value: f64) {
+        let entry = match self.entries.iter().position(|e| e.0 == id) {
+            Some(k) => &mut self.entries[k],
+            None => {
+                self.entries.push((id.into(), Map::new()));
+                let last = self.entries.len() - 1;
+                &mut self.entries[last]
+            }
+        };
+        entry.1.insert(name.into(), value.into());
+    }
+
     pub fn has(&self, id: &str) -> bool {
         self.entries.iter().any(|(known, _)| known == id)
     }

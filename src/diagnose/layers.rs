@@ -304,7 +304,7 @@ struct Blocks {
 }
 
 /// Side of a block, in tiles: 24 px, seven independent samples under a Kinect's window.
-const BLOCK_TILES: usize = 6;
+pub const BLOCK_TILES: usize = 6;
 
 impl Blocks {
     fn of(view: &SurveyedView) -> Self {

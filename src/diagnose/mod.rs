@@ -1,5 +1,6 @@
 //! When simulation and recording differ: where, why, and what is gained by knowing.
 
+mod against;
 mod bias;
 mod candidate;
 mod detectable;
@@ -11,8 +12,11 @@ mod findings;
 mod heldout;
 mod known;
 mod lattice;
+mod next_view;
 mod noise;
 mod parameters;
+mod partners;
+mod pictures;
 mod layers;
 mod missing;
 mod missing_cells;
@@ -33,11 +37,12 @@ mod tiles;
 mod variance;
 
 pub use diagnosis::*;
-pub use engine::{DiagnoseOptions, Diagnosed, diagnose};
+pub use engine::{DiagnoseOptions, Diagnosed, diagnose, diagnose_against};
 pub use field::Field;
 pub use known::Known;
 pub use lattice::{Lattice, Words};
 pub use layers::Survey;
 pub use missing::{MissingFinding, MissingOutcome, missing};
+pub use pictures::{ViewPictures, pictures};
 pub use search::Outcome;
 
