@@ -17,10 +17,10 @@ use super::heldout;
 use super::known::Known;
 use super::lattice::{Lattice, Words};
 use super::layers::Survey;
-use super::noise::{Hanging, hanging, tails};
-use super::parameters::estimate;
 use super::missing::missing;
 use super::next_view;
+use super::noise::{Hanging, hanging, tails};
+use super::parameters::estimate;
 use super::reference;
 use super::rim;
 use super::search::Outcome;
@@ -204,9 +204,10 @@ fn run(
     }
     let steps = steps(&lattice, &known, &fields, recording, sigma_mm);
     // Steps shift the mean within a step, and gross errors add to the variance: neither is news.
-    let coarsest = lattice.disparity_step_px.unwrap_or(0.0).max(
-        lattice.depth_step_m.map_or(0.0, |s| s * scale_px_m / survey.reach.z[0].powi(2)),
-    );
+    let coarsest = lattice
+        .disparity_step_px
+        .unwrap_or(0.0)
+        .max(lattice.depth_step_m.map_or(0.0, |s| s * scale_px_m / survey.reach.z[0].powi(2)));
     terms.retain(|f| {
         let stepped = (!steps.is_empty() || baseline.is_some())
             && f.effect.is_none()
@@ -265,7 +266,11 @@ fn run(
     let diagnosis = Diagnosis {
         format: DIAGNOSIS_FORMAT,
         recording: recording.root.display().to_string(),
-        reference: if simulated.is_some() { Reference::SimulatedRecording } else { Reference::Model },
+        reference: if simulated.is_some() {
+            Reference::SimulatedRecording
+        } else {
+            Reference::Model
+        },
         verdict,
         findings: found,
         map,
@@ -277,7 +282,15 @@ fn run(
         remarks,
     };
     let against = baseline.map_or_else(Vec::new, |b| b.fields);
-    Ok(Diagnosed { diagnosis, model: extended, fields, bias: bias_terms, bias_px, excluded, against })
+    Ok(Diagnosed {
+        diagnosis,
+        model: extended,
+        fields,
+        bias: bias_terms,
+        bias_px,
+        excluded,
+        against,
+    })
 }
 
 /// Do the views become flat once their words are taken for lengths of rays? Then with them.
@@ -667,8 +680,7 @@ fn extend(model: &NoiseModel, found: &[Finding], sensor: &crate::view::Sensor) -
         extended.sensor = Some(crate::view::RecordingFile::of(sensor));
     }
     for f in found {
-        let keeps = matches!(f.status, Status::Named | Status::OneOf)
-            || !f.terms.is_empty();
+        let keeps = matches!(f.status, Status::Named | Status::OneOf) || !f.terms.is_empty();
         if !keeps {
             continue;
         }

@@ -39,12 +39,7 @@ pub fn score(
     let level = options.level;
     let bias = chosen_on.search_bias(camera, 0.4 * level, options.seed);
     let bias_terms = terms_of(&bias, Statistic::Bias);
-    let variance = chosen_on.search_variance(
-        &model.sigma,
-        camera,
-        0.25 * level,
-        options.seed,
-    );
+    let variance = chosen_on.search_variance(&model.sigma, camera, 0.25 * level, options.seed);
     let variance_terms = terms_of(&variance, Statistic::Variance);
     let means: Vec<ViewData> = judged_on.mean_data().iter().map(coarser).collect();
     let blocks = judged_on.variance_data();

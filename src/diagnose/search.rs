@@ -229,10 +229,7 @@ impl<'a> Layer<'a> {
     fn evidence_of(&self, terms: &[&Basis]) -> Vec<Evidence> {
         let fine = terms.iter().any(|b| b.is_fine() || b.of_column_alone());
         let views = if fine { self.fine } else { self.coarse };
-        views
-            .par_iter()
-            .filter_map(|v| Some(rows(v, terms, &[])?.reduce(0, |_, _| ())))
-            .collect()
+        views.par_iter().filter_map(|v| Some(rows(v, terms, &[])?.reduce(0, |_, _| ()))).collect()
     }
 
     /// Terms with a name are fitted anew beside every candidate; those without have many columns
@@ -261,8 +258,7 @@ impl<'a> Layer<'a> {
     /// The best candidate beside `chosen`, if it brings more than noise can.
     fn step(&mut self, chosen: &[Chosen]) -> Option<Chosen> {
         let views = self.prepare(chosen);
-        let before: Vec<Evidence> =
-            views.iter().map(|v| v.coarse.1.reduce(0, |_, _| ())).collect();
+        let before: Vec<Evidence> = views.iter().map(|v| v.coarse.1.reduce(0, |_, _| ())).collect();
         let m = before.first()?.b.len();
         let base = if m > 0 {
             gain(&before, self.rules.prior)?
@@ -280,8 +276,8 @@ impl<'a> Layer<'a> {
             .par_iter()
             .map(|c| {
                 // A name is taken once; what its shape misses is left to the curves.
-                let taken = c.family.is_some()
-                    && chosen.iter().any(|old| old.candidate.family == c.family);
+                let taken =
+                    c.family.is_some() && chosen.iter().any(|old| old.candidate.family == c.family);
                 if taken {
                     return None;
                 }
@@ -340,9 +336,8 @@ impl<'a> Layer<'a> {
             let again = chosen.iter().any(|c| same_curve(&c.candidate, &self.candidates[i]));
             !again && judged[i].as_ref().is_some_and(|j| j.sensible)
         };
-        let winner = named.or_else(|| {
-            curves.iter().copied().find(|&i| safe(i) > threshold && sensible(i))
-        })?;
+        let winner = named
+            .or_else(|| curves.iter().copied().find(|&i| safe(i) > threshold && sensible(i)))?;
         let won = &judged[winner].as_ref()?.gain;
         let mut rivals: Vec<Rival> = Vec::new();
         for &i in &families {
@@ -375,10 +370,8 @@ impl<'a> Layer<'a> {
             return true;
         };
         let k = basis.count();
-        let square: f64 = evidence
-            .iter()
-            .map(|e| beta.dot(&(e.a.view((m, m), (k, k)) * &beta)))
-            .sum();
+        let square: f64 =
+            evidence.iter().map(|e| beta.dot(&(e.a.view((m, m), (k, k)) * &beta))).sum();
         let weight: f64 = self.coarse.iter().flat_map(|v| &v.weight).sum();
         const CLEARLY: f64 = 4.0;
         square / weight > CLEARLY * fixed * fixed * k as f64 / pixels
