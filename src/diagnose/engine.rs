@@ -16,7 +16,7 @@ use super::findings::{self, Scene};
 use super::heldout;
 use super::known::Known;
 use super::lattice::{Lattice, Words};
-use super::layers::Survey;
+use super::layers::{BIAS_PRIOR, Survey};
 use super::missing::missing;
 use super::next_view;
 use super::noise::{Hanging, hanging, tails};
@@ -234,7 +234,13 @@ fn run(
             .filter(|m| baseline.as_ref().is_none_or(|b| !b.loses_alike(m, &survey)))
             .map(findings::missing),
     );
-    let levels = heldout::levels(&survey, &bias_terms);
+    // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
+    let anchored: Vec<Term> = bias_terms
+        .iter()
+        .filter(|t| matches!(t.basis, Basis::RangeNotDepth | Basis::Lens { .. }))
+        .cloned()
+        .collect();
+    let levels = heldout::levels(&survey, &anchored);
     let references = reference::laws(&fields, &levels);
     found.extend(reference::findings(&references, &known, 0.1 * level, options.seed));
     let mismatch = found.iter().any(|f| f.status != Status::NotIdentifiable);
@@ -248,6 +254,7 @@ fn run(
     merge(&mut found);
     shares(&mut found);
     let heldout = heldout::score(&survey, model, camera, scale_px_m, options);
+    let left_out = heldout::left_out(&survey, &bias_terms, BIAS_PRIOR);
     let mut map = findings::map(&bias_scene, &bias, level);
     map.extend(findings::map(&variance_scene, &variance, level));
     let after = after(&bias, &variance);
@@ -275,6 +282,7 @@ fn run(
         findings: found,
         map,
         heldout,
+        left_out,
         after,
         detectable,
         cannot_tell,

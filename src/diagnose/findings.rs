@@ -202,8 +202,11 @@ pub fn naming(chosen: &Chosen) -> (Status, Option<&'static str>, Vec<Alternative
         return (Status::Unexplained, None, Vec::new());
     };
     let adequacy = chosen.gain / chosen.best_curve.max(1e-9);
-    let none =
-        if chosen.best_curve > 0.0 { 1.0 / (1.0 + ((adequacy - 0.66) / 0.05).exp()) } else { 0.0 };
+    let none = if chosen.best_curve > 0.0 {
+        1.0 / (1.0 + ((adequacy - chosen.adequacy - 0.06) / 0.05).exp())
+    } else {
+        0.0
+    };
     let best = chosen.rivals.iter().find(|r| r.family == family).map_or(chosen.gain, |r| r.gain);
     let mut odds: Vec<(&'static str, f64)> = vec![(family, 1.0)];
     for rival in chosen.rivals.iter().filter(|r| r.family != family) {

@@ -50,6 +50,8 @@ pub struct Rival {
 #[derive(Debug, Clone)]
 pub struct Chosen {
     pub candidate: Candidate,
+    /// The share of the best curve that its name had to explain.
+    pub adequacy: f64,
     /// Nats over the terms before it.
     pub gain: f64,
     /// The best nameless curve's at the same step, nats.
@@ -98,7 +100,7 @@ impl Outcome {
 const AS_GOOD_NATS: f64 = 2.0;
 /// A later term must bring this share of what the first brought: what is less is the first one's
 /// own shape, badly met.
-const LEAST_SHARE: f64 = 0.01;
+const LEAST_SHARE: f64 = 0.005;
 
 /// Search a layer. `coarse` has the same views in larger patches, for shapes that do not change
 /// within them.
@@ -326,7 +328,7 @@ impl<'a> Layer<'a> {
             .copied()
             .filter(|&i| total(i) > best_family - AS_GOOD_NATS)
             .min_by_key(|&i| self.candidates[i].basis.count())
-            .filter(|&i| safe(i) > threshold && total(i) > self.rules.adequacy * best_curve)
+            .filter(|&i| safe(i) > threshold && total(i) > self.adequacy(i) * best_curve)
             .filter(|&i| judged[i].as_ref().is_some_and(|j| j.sensible))
             .filter(|&i| {
                 let clear = total(i) > CLEAR * best_curve;
@@ -353,11 +355,21 @@ impl<'a> Layer<'a> {
         }
         Some(Chosen {
             candidate: self.candidates[winner].clone(),
+            adequacy: self.adequacy(winner),
             gain: total(winner),
             best_curve,
             rivals,
             p: noise.p(safe(winner)),
         })
+    }
+
+    /// The share of the best curve that a name must explain. Bands on a real sensor ride on a
+    /// smooth error of the column that is no band's.
+    fn adequacy(&self, i: usize) -> f64 {
+        match self.candidates[i].basis {
+            Basis::Banding { .. } => BANDS_ADEQUATE.min(self.rules.adequacy),
+            _ => self.rules.adequacy,
+        }
     }
 
     fn sensible(&self, basis: &Basis, m: usize, gain: &Gain, evidence: &[Evidence]) -> bool {
@@ -461,6 +473,8 @@ fn looks(candidates: &[Candidate], judged: &[Option<Judged>], noise: &NoiseGains
         .collect()
 }
 
+/// See [`Layer::adequacy`].
+const BANDS_ADEQUATE: f64 = 0.45;
 /// A name that explains this share of what the best nameless curve does is met by its own shape.
 const CLEAR: f64 = 0.85;
 
