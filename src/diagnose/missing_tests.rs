@@ -131,7 +131,7 @@ fn alarms(seeds: std::ops::Range<u64>) -> Vec<u64> {
 
 #[test]
 fn losses_without_a_cause_are_none() {
-    assert_eq!(alarms(0..6), []);
+    assert_eq!(alarms(0..6), Vec::<u64>::new());
 }
 
 /// False alarms are to be 0.1 % of recordings: two in 200 have a chance of 2 %, three of 0.1 %.
