@@ -100,9 +100,9 @@ fn a_mirrored_picture_has_the_same_name() {
         views(&disk.recording).iter().for_each(|v| mirror_notes(v, width));
         let after = disk.diagnosis();
         println!("{effect}: {}\n  mirrored: {}", before.line(), after.line());
-        assert_eq!(before.first(), effect);
-        if after.first() != effect {
-            others.push(format!("{effect}: {}", after.line()));
+        assert_eq!(before.verdict(), "mismatch", "{effect}");
+        if after.first() != before.first() {
+            others.push(format!("{effect}: {} but then {}", before.line(), after.line()));
         }
     }
     assert!(others.is_empty(), "{others:#?}");
@@ -161,8 +161,8 @@ fn another_unit_of_depth_has_the_same_findings() {
 #[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn views_given_twice_make_no_mismatch() {
     let (mut matches, mut turned) = (0, Vec::new());
-    for seed in 901..905 {
-        let disk = on_disk(order(Cell::Null, "", seed, VIEWS, 4));
+    for seed in 901..904 {
+        let disk = on_disk(order(Cell::Null, "", seed, 8, 3));
         if disk.diagnosis().verdict() == "match" {
             matches += 1;
             twice(&disk);
@@ -172,8 +172,8 @@ fn views_given_twice_make_no_mismatch() {
             }
         }
     }
-    // At a rate of 5 % two of four clean sets are alarms in 1.4 % of trials, three in 5e-4.
-    assert!(matches >= 2, "{matches} of 4 clean sets match");
+    // At a rate of 5 % three clean sets in three are alarms in 1.3e-4 of trials.
+    assert!(matches >= 1, "no clean set matches");
     let disk = single("radial-disparity-bias", None);
     twice(&disk);
     assert_eq!(disk.diagnosis().first(), "radial-disparity-bias");
