@@ -15,17 +15,24 @@ pub fn families(camera: &Camera, reach: &Reach) -> Vec<Candidate> {
             all.push(Candidate::named("radial-disparity-bias", bowl));
         }
     }
-    let lens = Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 2 };
-    all.push(Candidate::named("lens-distortion", lens));
+    for orders in [1, 2, 4] {
+        let lens = Basis::Lens { fx: camera.fx, fy: camera.fy, orders };
+        all.push(Candidate::named("lens-distortion", lens));
+    }
     all.push(Candidate::named("range-not-depth", Basis::RangeNotDepth));
     all.push(Candidate::named("target-bow", Basis::Bow { degree: 2 }));
     all.push(Candidate::named("target-bow", Basis::Bow { degree: 4 }));
     locking(&mut all, reach);
     let width = camera.width as f64;
-    for half_cycles in 4..=64 {
+    // Bands that do not come again are none: three periods at least.
+    for half_cycles in 6..=64 {
         let period_px = 2.0 * width / f64::from(half_cycles);
         let banding = Basis::Banding { period_px, harmonics: 4 };
         all.push(Candidate::named("column-banding", banding));
+        if half_cycles <= 16 {
+            let banding = Basis::Banding { period_px, harmonics: 8 };
+            all.push(Candidate::named("column-banding", banding));
+        }
     }
     for width_px in [0.5, 1.0, 2.0, 4.0, 8.0] {
         if reach.edge >= 4.0 * width_px {
@@ -44,7 +51,7 @@ fn locking(all: &mut Vec<Candidate>, reach: &Reach) {
     let half = ((OFF / step).ceil() as i64).clamp(1, 12);
     for k in -half..=half {
         let period_px = 1.0 / (1.0 + OFF * k as f64 / half as f64);
-        all.push(Candidate::named("pixel-locking", Basis::Locking { period_px }));
+        all.push(Candidate::named("pixel-locking", Basis::Locking { period_px, harmonics: 3 }));
     }
 }
 

@@ -35,8 +35,8 @@ pub fn detectable(
         (
             "pixel-locking",
             "amplitude_px",
-            Basis::Locking { period_px: 1.0 },
-            vec![1.0, 0.0, 0.0, 0.0],
+            Basis::Locking { period_px: 1.0, harmonics: 1 },
+            vec![1.0, 0.0],
         ),
         (
             "column-banding",

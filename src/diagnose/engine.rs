@@ -16,14 +16,14 @@ use super::heldout;
 use super::known::Known;
 use super::lattice::{Lattice, Words};
 use super::layers::Survey;
-use super::noise::{hanging, tails};
+use super::noise::{Hanging, hanging, tails};
 use super::parameters::estimate;
 use super::missing::missing;
 use super::reference;
 use super::rim;
 use super::search::Outcome;
 use super::smooth::{SMOOTH_PX, high_pass};
-use super::structure::{Structure, structures, tail};
+use super::structure::{Structure, moving, structures, tail};
 use super::tiles::Places;
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
@@ -110,12 +110,15 @@ pub fn diagnose(
     let lattice = lattice(&fields, recording);
     let rows_px2 = mean_of(structure.iter().filter_map(|s| s.row_px2));
     let fixed_px2 = fixed_px2(&structure);
+    let single = fields.iter().all(|f| f.frames.len() < 2);
     let extra = |p: &Place| {
         let depth_px = lattice.depth_step_m.unwrap_or(0.0) * scale_px_m / (p.z * p.z);
         let step_px = lattice.disparity_step_px.unwrap_or(0.0);
         // Words of a raw sensor are in the model's variance already.
         let step_px = if is_raw(recording) { 0.0 } else { step_px };
-        (depth_px * depth_px + step_px * step_px) / 12.0 + rows_px2 + fixed_px2
+        // With frames to compare, what stands still is not in the variance.
+        let still = if single { fixed_px2 } else { 0.0 };
+        (depth_px * depth_px + step_px * step_px) / 12.0 + rows_px2 + still
     };
     let range_share: f64 = known
         .bias
@@ -131,6 +134,8 @@ pub fn diagnose(
         (1.0 + range_share.clamp(0.0, 1.0) * (ray - 1.0)).powi(2)
     };
     survey.roughen(&fields, &bias_px, extra, stretch);
+    let hangs = hanging(&structure, &known, 0.03 * level);
+    survey.compare_frames(&fields, common(&structure, &hangs, &known));
     let variance = survey.search_variance(&model.sigma, camera, 0.25 * level, options.seed);
     let variance_terms = terms_of(&variance, Statistic::Variance);
     let bias_scene = Scene::bias(&survey, scale_px_m, corner);
@@ -156,7 +161,7 @@ pub fn diagnose(
     });
     found.extend(terms);
     found.extend(
-        hanging(&structure, &known, 0.03 * level)
+        hangs
             .into_iter()
             .chain(tails)
             .chain(rim::mixing(&fields, 0.03 * level).filter(|_| !known.has("edge-mixing")))
@@ -176,6 +181,11 @@ pub fn diagnose(
     let mismatch = found.iter().any(|f| f.status != Status::NotIdentifiable);
     let cannot_tell = reference::cannot_tell(&fields);
     found.extend(cannot_tell.iter().map(not_identifiable));
+    let columns_told = found.iter().any(|f| f.axis == Axis::Column && !f.terms.is_empty());
+    found.retain(|f| {
+        let lines = f.axis == Axis::Column && f.statistic == Statistic::Bias && f.terms.is_empty();
+        !(lines && columns_told)
+    });
     merge(&mut found);
     shares(&mut found);
     let heldout = heldout::score(&survey, model, camera, scale_px_m, options);
@@ -271,6 +281,21 @@ fn mean_of(values: impl Iterator<Item = f64>) -> f64 {
     f64::max(sum / f64::max(n, 1.0), 0.0)
 }
 
+/// How much frames of a view resemble one another, by lag, where that was found to be noise.
+fn common(structure: &[Structure], hangs: &[Hanging], known: &Known) -> [f64; 3] {
+    let in_time = ["frozen-noise", "temporal-correlation"];
+    let told = hangs.iter().flat_map(|h| &h.families).any(|f| in_time.contains(f))
+        || in_time.iter().any(|id| known.has(id));
+    if !told {
+        return [0.0; 3];
+    }
+    let at = |lag: usize| mean_of(structure.iter().filter_map(|s| s.lagged[lag]));
+    let near = at(0);
+    [near, if structure.iter().any(|s| s.lagged[1].is_some()) { at(1) } else { near }, {
+        if structure.iter().any(|s| s.lagged[2].is_some()) { at(2) } else { at(1) }
+    }]
+}
+
 /// Variance of the pixels' constant errors, px^2.
 fn fixed_px2(structure: &[Structure]) -> f64 {
     mean_of(structure.iter().filter_map(|s| s.fixed_px2))
@@ -293,15 +318,19 @@ fn measure_tails(
     let factors = pixel_terms(fields, variance, survey, bench);
     let camera = &bench.sensor.camera;
     structure.par_iter_mut().zip(fields).enumerate().for_each(|(n, (s, field))| {
-        let Some(first) = field.first.first() else { return };
-        let whitened: Vec<f32> = (0..first.len())
-            .map(|k| {
-                let factor = factors.get(n).map_or(1.0, |f| (0.5 * f[k]).exp());
-                (first[k] - bias.get(n).map_or(0.0, |b| b[k])) / (field.sigma[k] * factor)
-            })
-            .collect();
-        let image = high_pass(&field.image(&whitened), field.width, field.height, SMOOTH_PX);
-        (s.tail, s.tail_pixels, s.tail_size) = tail(&image, camera);
+        let whitened = |frame: &Vec<f32>| -> Vec<f32> {
+            let whitened: Vec<f32> = (0..frame.len())
+                .map(|k| {
+                    let factor = factors.get(n).map_or(1.0, |f| (0.5 * f[k]).exp());
+                    (frame[k] - bias.get(n).map_or(0.0, |b| b[k])) / (field.sigma[k] * factor)
+                })
+                .collect();
+            high_pass(&field.image(&whitened), field.width, field.height, SMOOTH_PX)
+        };
+        let frames: Vec<Vec<f32>> = field.first.iter().take(2).map(whitened).collect();
+        if !frames.is_empty() {
+            (s.tail, s.tail_pixels, s.tail_size) = tail(&moving(&frames, s), camera);
+        }
     });
 }
 

@@ -49,6 +49,8 @@ pub struct Field {
     pub first: Vec<Vec<f32>>,
     /// Time and mean residual of each frame, s since the first and px.
     pub frames: Vec<(f64, f64)>,
+    /// Each frame's residual as a line in the disparity: at the view's middle, px, and its slope.
+    pub lines: Vec<[f64; 2]>,
     pub reference_distance_m: Option<f64>,
     pub temperature_c: Option<f64>,
     pub ambient_lux: Option<f64>,
@@ -69,6 +71,8 @@ pub struct Field {
 /// lacks are larger, a residual is no noise: it is kept out of the means and left to the tests of
 /// the tails.
 pub const CLIP_SIGMAS: f32 = 6.0;
+/// Disparities that spread less than this over a view show no slope, px.
+const LEAST_SPREAD_PX: f64 = 0.5;
 /// Single frames kept whole: enough for correlations in time.
 pub const FRAMES_KEPT: usize = 4;
 
@@ -125,15 +129,17 @@ impl Field {
         self.light = light.collect();
     }
 
-    /// Variance of the frames' means, px^2: what moves as a whole is not the pixels' noise.
-    pub fn moved_px2(&self) -> f64 {
-        let means: Vec<f64> = self.frames.iter().map(|f| f.1).filter(|m| m.is_finite()).collect();
-        let n = means.len() as f64;
+    /// Variance over the frames of their lines at this disparity, px^2: what moves as a whole is
+    /// not the pixels' noise.
+    pub fn moved_px2(&self, disparity: f64) -> f64 {
+        let x = disparity - self.scale_px_m * self.plane.q.z;
+        let n = self.lines.len() as f64;
         if n < 2.0 {
             return 0.0;
         }
-        let mean = means.iter().sum::<f64>() / n;
-        means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / n
+        let at = |line: &[f64; 2]| line[0] + line[1] * x;
+        let mean = self.lines.iter().map(at).sum::<f64>() / n;
+        self.lines.iter().map(|l| (at(l) - mean).powi(2)).sum::<f64>() / n
     }
 
     /// Pixels measured in a frame, on average.
@@ -171,6 +177,7 @@ impl Field {
             measured: vec![0; n],
             first: Vec::new(),
             frames: Vec::new(),
+            lines: Vec::new(),
             reference_distance_m: view.notes.reference_distance_m,
             temperature_c: view.notes.temperature_c,
             ambient_lux: view.notes.ambient_lux,
@@ -226,6 +233,8 @@ impl Field {
         let keep = self.first.len() < FRAMES_KEPT;
         let mut residuals = if keep { vec![f32::NAN; self.pixels.len()] } else { Vec::new() };
         let (mut sum, mut n) = (0.0f64, 0.0f64);
+        let middle = self.scale_px_m * self.plane.q.z;
+        let (mut sx, mut sxx, mut sxy) = (0.0f64, 0.0f64, 0.0f64);
         for k in 0..self.pixels.len() {
             let word = frame.words[self.pixels[k] as usize];
             let z = table.metres(word);
@@ -244,11 +253,23 @@ impl Field {
                 self.square[k] += e * e;
                 sum += f64::from(e);
                 n += 1.0;
+                let x = f64::from(expected[k]) - middle;
+                sx += x;
+                sxx += x * x;
+                sxy += x * f64::from(e);
             }
         }
         if keep {
             self.first.push(residuals);
         }
+        // A frontal view has one disparity, and no slope.
+        let spread = sxx - sx * sx / f64::max(n, 1.0);
+        let slope = if spread > n * LEAST_SPREAD_PX * LEAST_SPREAD_PX {
+            (sxy - sx * sum / n) / spread
+        } else {
+            0.0
+        };
+        self.lines.push([(sum - slope * sx) / f64::max(n, 1.0), slope]);
         self.frames.push((time, if n > 0.0 { sum / n } else { f64::NAN }));
     }
 

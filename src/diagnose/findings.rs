@@ -99,13 +99,22 @@ pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
     for (k, c) in outcome.chosen.iter().enumerate() {
         let axis = c.candidate.basis.axis();
         let home = groups.iter().position(|g| {
-            let first = &outcome.chosen[g[0]].candidate;
+            let first = &outcome.chosen[g[0]];
             match c.candidate.family {
-                Some(_) => first.family == c.candidate.family,
-                None => first.basis.axis() == axis,
+                Some(family) => {
+                    // A curve came first, but this name had explained half of it.
+                    let nearly = first.candidate.family.is_none()
+                        && first.candidate.basis.axis() == axis
+                        && first.rivals.iter().any(|r| {
+                            r.family == family && r.gain > NEARLY * first.gain
+                        });
+                    first.candidate.family == c.candidate.family || nearly
+                }
+                None => first.candidate.basis.axis() == axis,
             }
         });
         match home {
+            Some(g) if c.candidate.family.is_some() => groups[g].insert(0, k),
             Some(g) => groups[g].push(k),
             None => groups.push(vec![k]),
         }
@@ -115,6 +124,9 @@ pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
         .map(|group| finding(scene, outcome, group, &terms, &values, &responses))
         .collect()
 }
+
+/// A name found after a curve on its axis stands for both if it had explained this share of it.
+const NEARLY: f64 = 0.4;
 
 fn finding(
     scene: &Scene<'_>,
@@ -259,7 +271,7 @@ impl Along {
             Axis::Z => ("depth, m", Box::new(|p| p.z)),
             Axis::DisparityPhase => {
                 let period = match basis {
-                    Basis::Locking { period_px } => *period_px,
+                    Basis::Locking { period_px, .. } => *period_px,
                     Basis::Ring { period, .. } => *period,
                     _ => 1.0,
                 };

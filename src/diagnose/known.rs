@@ -68,7 +68,7 @@ fn formula(id: &str, parameters: &Map<String, Value>, camera: &Camera) -> Vec<Te
         }),
         "range-not-depth" => bias(Basis::RangeNotDepth, vec![get("share").unwrap_or(1.0)]),
         "pixel-locking" => get("amplitude_px")
-            .and_then(|a| bias(Basis::Locking { period_px: 1.0 }, vec![-a, 0.0, 0.0, 0.0])),
+            .and_then(|a| bias(Basis::Locking { period_px: 1.0, harmonics: 1 }, vec![-a, 0.0])),
         "column-banding" => get("amplitude_px")
             .zip(get("period_px"))
             .and_then(|(a, period)| bias(columns(camera), saw_tooth(camera, a, period))),

@@ -50,6 +50,9 @@ pub struct SurveyedView {
     pub correlation: Correlation,
     /// Independent frames a view's variance is worth.
     pub frames: f64,
+    /// What the variance between frames is to be multiplied by to be all of the noise's; `None`
+    /// with a single frame.
+    pub moving: Option<f64>,
 }
 
 /// No more terms than this are looked for in a layer.
@@ -75,6 +78,7 @@ impl Survey {
                     inflation,
                     correlation,
                     frames: independent_frames(f),
+                    moving: None,
                 }
             })
             .collect();
@@ -109,6 +113,26 @@ impl Survey {
         let views: Vec<SurveyedView> = which.iter().map(|&n| self.views[n].clone()).collect();
         let reach = Reach::of(views.iter().flat_map(|v| v.tiles.iter()));
         Survey { views, reach, fixed_px2: self.fixed_px2, light: self.light }
+    }
+
+    /// Noise is what changes from frame to frame; `common` is the correlation of two frames of a
+    /// view that comes from noise, by lag.
+    pub fn compare_frames(&mut self, fields: &[Field], common: [f64; 3]) {
+        for (view, field) in self.views.iter_mut().zip(fields) {
+            let n = field.frames.len();
+            if n < 2 {
+                continue;
+            }
+            // Mean correlation of two different frames.
+            let (mut sum, mut pairs) = (0.0, 0.0);
+            for lag in 1..n {
+                sum += (n - lag) as f64 * common[lag.min(3) - 1];
+                pairs += (n - lag) as f64;
+            }
+            let mean = (sum / pairs).clamp(0.0, 0.9);
+            view.moving = (mean < 0.9).then(|| n as f64 / (n as f64 - 1.0) / (1.0 - mean));
+            view.frames = view.frames.min(n as f64 - 1.0);
+        }
     }
 
     /// With what is known of the mean taken out of what the noise is measured on, view by view
@@ -288,10 +312,11 @@ impl Blocks {
         let mut sums: std::collections::BTreeMap<(u32, u32), Sum> = Default::default();
         for t in &view.tiles {
             let key = ((t.place.v / side) as u32, (t.place.u / side) as u32);
-            sums.entry(key).or_default().add(t);
+            sums.entry(key).or_default().add(t, view.moving);
         }
         // What the box's mean took with it.
-        let kept = 1.0 - view.correlation.sum / (SMOOTH_PX * SMOOTH_PX) as f64;
+        let taken = view.correlation.sum / (SMOOTH_PX * SMOOTH_PX) as f64;
+        let kept = if view.moving.is_some() { 1.0 } else { 1.0 - taken };
         let mut blocks = Blocks { places: Vec::new(), response: Vec::new(), weight: Vec::new() };
         for s in sums.values() {
             // Half a block at least: a few pixels at the rim give no variance.
@@ -336,8 +361,13 @@ struct Sum {
 }
 
 impl Sum {
-    fn add(&mut self, t: &Tile) {
-        let square = t.temporal + t.rough_square;
+    fn add(&mut self, t: &Tile, moving: Option<f64>) {
+        // With frames to compare, only what changes is noise; its still part is put back by what
+        // frames have in common.
+        let square = match moving {
+            Some(factor) => t.temporal * factor,
+            None => t.temporal + t.rough_square,
+        };
         if !square.is_finite() {
             return;
         }

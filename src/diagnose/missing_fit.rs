@@ -60,7 +60,6 @@ pub fn points(views: &[Vec<Cell>], at: &dyn Fn(&Cell) -> f64, [low, high]: [f64;
 #[derive(Debug, Clone, Copy)]
 pub struct Fitted {
     pub step: Step,
-    pub base: f64,
     /// Of middle, width and share; `None` where the share was not fitted.
     pub std_error: [Option<f64>; 3],
 }
@@ -159,5 +158,5 @@ pub fn fit(start: Step, base: f64, points: &[Point]) -> Option<Fitted> {
     let share = problem.free_share.then(|| error(2) * step.share * (1.0 - step.share));
     let std_error =
         [Some(error(0).hypot(FORM * step.width)), Some(error(1) * step.width.abs()), share];
-    Some(Fitted { step, base, std_error })
+    Some(Fitted { step, std_error })
 }

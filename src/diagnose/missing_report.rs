@@ -29,6 +29,9 @@ pub struct Told<'a> {
     pub camera: &'a Camera,
 }
 
+/// Where a cell lies on an axis.
+type At = Box<dyn Fn(&Cell) -> f64>;
+
 impl Told<'_> {
     pub fn finding(
         &self,
@@ -57,7 +60,7 @@ impl Told<'_> {
     fn step(&self, step: Step, finding: &mut MissingFinding) {
         let span = if step.axis == Axis::Theta { self.reach.theta } else { self.reach.z };
         let all = bounded(points(self.fine, &|c| step.at(&c.place), span), &step, self.told);
-        let own = Fitted { step, base: self.base, std_error: [None; 3] };
+        let own = Fitted { step, std_error: [None; 3] };
         let fitted = fit(step, self.base, &all).unwrap_or(own);
         let loss = |x: f64| fitted.step.loss(x, self.base);
         finding.parameters = parameters(&fitted);
@@ -67,7 +70,7 @@ impl Told<'_> {
     }
 
     fn curve(&self, axis: Axis, basis: &Basis, finding: &mut MissingFinding) {
-        let (span, at): ([f64; 2], Box<dyn Fn(&Cell) -> f64>) = match basis {
+        let (span, at): ([f64; 2], At) = match basis {
             Basis::Curve { over, low, high, .. } => {
                 let over = *over;
                 ([*low, *high], Box::new(move |c| over.value(&c.place)))

@@ -212,8 +212,9 @@ fn still_share([c1, c2, c3]: [f64; 3], three: bool) -> f64 {
 }
 
 fn lines(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
+    let mut found: Vec<Hanging> = Vec::new();
+    found.extend(fixed_lines(views, level));
     let variance = Mean::of(views.iter().map(|s| s.variance_px2)).map_or(0.0, |m| m.value);
-    let mut found = Vec::new();
     let rows = Mean::of(views.iter().filter_map(|s| s.row_px2));
     let columns = Mean::of(views.iter().filter_map(|s| s.column_px2));
     let known_px = known.parameter("row-noise", "sigma_px").unwrap_or(0.0);
@@ -244,6 +245,29 @@ fn lines(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
         }
     }
     found
+}
+
+/// Columns that err by a constant each, in every view, from one to the next.
+fn fixed_lines(views: &[Structure], level: f64) -> Option<Hanging> {
+    let variance = Mean::of(views.iter().map(|s| s.variance_px2)).map_or(0.0, |m| m.value);
+    let m = Mean::of(views.iter().filter_map(|s| s.lines_px2))?;
+    let p = m.p_above(0.0);
+    let share = m.value / variance.max(1e-12);
+    if p > level || share < 0.004 {
+        return None;
+    }
+    let sigma = m.value.sqrt();
+    Some(Hanging {
+        families: vec![],
+        statistic: Statistic::Bias,
+        axis: Axis::Column,
+        interval: [0.0, 0.0],
+        parameters: one("sigma_px", sigma, 0.5 * m.std_error / sigma.max(1e-9)),
+        size_sigma: share.sqrt(),
+        p,
+        nats: nats(&m, 0.0),
+        words: Some("whole columns or rows err by a constant each, from one to the next".into()),
+    })
 }
 
 /// The frames' means scatter by this factor more before it is called jitter.

@@ -40,7 +40,7 @@ pub fn parameters(
             let (right, down) = (half(reach.right).powi(2), half(reach.down).powi(2));
             if (b[0] * right).abs() > (b[1] * down).abs() { -b[0] * right } else { -b[1] * down }
         }),
-        Basis::Locking { period_px } => {
+        Basis::Locking { period_px, .. } => {
             add("amplitude_px", &|b| greatest(|t| {
                 let p = Place { disparity: t * period_px, ..Place::default() };
                 value(basis, b, p)
@@ -81,7 +81,7 @@ pub fn parameters(
         Basis::Banding { period_px, .. } => {
             map.insert("period_px".into(), json!({ "value": period_px, "std_error": 0.02 * period_px }));
         }
-        Basis::Locking { period_px } => {
+        Basis::Locking { period_px, .. } => {
             map.insert("period_px".into(), json!({ "value": period_px, "std_error": 0.003 }));
         }
         Basis::EdgeMixing { width_px } => {

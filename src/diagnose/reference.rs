@@ -23,6 +23,8 @@ pub struct Law {
     /// What it makes of the depth, m and in sigmas.
     pub rms_m: f64,
     pub rms_sigma: f64,
+    /// Of one reference, m.
+    pub error_m: f64,
     pub settled: Vec<(&'static str, f64)>,
     pub gain: Gain,
     pub null: Null,
@@ -87,7 +89,18 @@ pub fn laws(fields: &[Field], levels: &[f64]) -> Vec<Law> {
                 _ => c.z,
             }));
             let (rms_m, rms_sigma) = (square(&shift), square(&|c| shift(c) / c.sigma_m));
-            laws.push(Law { family, axis, reach, rms_m, rms_sigma, settled, gain, null });
+            let error_m = variance.sqrt();
+            laws.push(Law {
+                family,
+                axis,
+                reach,
+                rms_m,
+                rms_sigma,
+                error_m,
+                settled,
+                gain,
+                null,
+            });
         }
     };
     add("depth-scale", Axis::Z, Vec::new(), &|c| c.z);
@@ -120,6 +133,10 @@ fn scatter(checked: &[Checked]) -> f64 {
     (left / (n as f64 - 4.0).max(1.0)).max(0.0005 * 0.0005)
 }
 
+/// A law must move the depth by this many errors of a reference, and by this much, m: tapes and
+/// planes are not better.
+const CLEARLY: f64 = 1.2;
+const LEAST_M: f64 = 0.0015;
 /// Names that predict as well as the best within this many nats cannot be told apart.
 const AS_GOOD_NATS: f64 = 3.0;
 
@@ -134,7 +151,8 @@ pub fn findings(laws: &[Law], known: &Known, level: f64, seed: Seed) -> Vec<Find
     let Some(best) = laws.iter().max_by(|a, b| a.gain.total.total_cmp(&b.gain.total)) else {
         return Vec::new();
     };
-    if safe(best) < noise.threshold(level) || known.has(best.family) {
+    let small = best.rms_m < (CLEARLY * best.error_m).max(LEAST_M);
+    if small || safe(best) < noise.threshold(level) || known.has(best.family) {
         return Vec::new();
     }
     let mut odds: Vec<(&'static str, f64)> = Vec::new();

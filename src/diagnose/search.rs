@@ -227,7 +227,9 @@ fn bases_where(chosen: &[Chosen], which: impl Fn(&Candidate) -> bool) -> Vec<&Ba
 impl<'a> Layer<'a> {
     /// Evidence of the views on these terms together.
     fn evidence_of(&self, terms: &[&Basis]) -> Vec<Evidence> {
-        self.coarse
+        let fine = terms.iter().any(|b| b.is_fine() || b.of_column_alone());
+        let views = if fine { self.fine } else { self.coarse };
+        views
             .par_iter()
             .filter_map(|v| Some(rows(v, terms, &[])?.reduce(0, |_, _| ())))
             .collect()
@@ -293,10 +295,15 @@ impl<'a> Layer<'a> {
             self.noise = Some(noise);
         }
         let noise = self.noise.as_ref()?;
-        self.choose(&judged, noise)
+        self.choose(&judged, noise, chosen)
     }
 
-    fn choose(&self, judged: &[Option<Judged>], noise: &NoiseGains) -> Option<Chosen> {
+    fn choose(
+        &self,
+        judged: &[Option<Judged>],
+        noise: &NoiseGains,
+        chosen: &[Chosen],
+    ) -> Option<Chosen> {
         let total = |i: usize| judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| j.gain.total);
         // Views that scatter more than their noise says count for less.
         let safe = |i: usize| judged[i].as_ref().map_or(0.0, |j| j.gain.total / j.null.dispersion);
@@ -319,8 +326,14 @@ impl<'a> Layer<'a> {
             .min_by_key(|&i| self.candidates[i].basis.count())
             .filter(|&i| safe(i) > threshold && total(i) > self.rules.adequacy * best_curve)
             .filter(|&i| judged[i].as_ref().is_some_and(|j| j.sensible))
-            .filter(|&i| judged[i].as_ref().is_some_and(steady));
-        let sensible = |i: usize| judged[i].as_ref().is_some_and(|j| j.sensible);
+            .filter(|&i| {
+                let clear = total(i) > CLEAR * best_curve;
+                clear || judged[i].as_ref().is_some_and(steady)
+            });
+        let sensible = |i: usize| {
+            let again = chosen.iter().any(|c| same_curve(&c.candidate, &self.candidates[i]));
+            !again && judged[i].as_ref().is_some_and(|j| j.sensible)
+        };
         let winner = named.or_else(|| {
             curves.iter().copied().find(|&i| safe(i) > threshold && sensible(i))
         })?;
@@ -406,6 +419,17 @@ impl<'a> Layer<'a> {
     }
 }
 
+/// A nameless curve that is in already, perhaps with other nodes.
+fn same_curve(a: &Candidate, b: &Candidate) -> bool {
+    let key = |c: &Candidate| match c.basis {
+        Basis::Curve { over, times, .. } => Some((format!("{over:?}"), times)),
+        Basis::Map { times, .. } => Some(("map".to_string(), times)),
+        _ => None,
+    };
+    let both_nameless = a.family.is_none() && b.family.is_none();
+    both_nameless && (a.basis == b.basis || key(a).is_some_and(|k| Some(k) == key(b)))
+}
+
 /// Up all along, or down: what turns round is no power of z.
 fn one_way(basis: &Basis, beta: &[f64], [near, far]: [f64; 2]) -> bool {
     const NODES: usize = 24;
@@ -437,6 +461,9 @@ fn looks(candidates: &[Candidate], judged: &[Option<Judged>], noise: &NoiseGains
         })
         .collect()
 }
+
+/// A name that explains this share of what the best nameless curve does is met by its own shape.
+const CLEAR: f64 = 0.85;
 
 /// Views that scatter about a common fit far beyond their noise are explained badly; a name must
 /// then help most of them.

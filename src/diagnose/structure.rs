@@ -20,6 +20,8 @@ pub struct Structure {
     pub lagged: [Option<f64>; 3],
     /// Covariance of the mean residual with the other views' at the same pixels, px^2.
     pub fixed_px2: Option<f64>,
+    /// The part of it that whole columns and rows share, px^2.
+    pub lines_px2: Option<f64>,
     /// Variance that a row (a column) of one frame shares, px^2.
     pub row_px2: Option<f64>,
     pub column_px2: Option<f64>,
@@ -56,16 +58,22 @@ pub fn structures(fields: &[Field], camera: &Camera, bias: &[Vec<f32>]) -> Vec<S
     let none = Vec::new();
     let views: Vec<(&Field, &Vec<f32>)> =
         fields.iter().enumerate().map(|(n, f)| (f, bias.get(n).unwrap_or(&none))).collect();
+    let means: Vec<Vec<f32>> = views
+        .par_iter()
+        .map(|(f, b)| {
+            let image = calm(&rough(f, &f.mean, b));
+            high_pass(&image, f.width, f.height, PIXEL_BOX)
+        })
+        .collect();
+    let with_lines = across_views(&means);
     let means: Vec<Vec<f32>> =
-        views
-            .par_iter()
-            .map(|(f, b)| without_lines(&calm(&rough(f, &f.mean, b)), camera.width, SHORT_LINE))
-            .collect();
+        means.iter().map(|m| without_lines(m, camera.width, SHORT_LINE)).collect();
     let fixed = across_views(&means);
     let mut all: Vec<Structure> =
         views.par_iter().map(|(f, b)| structure(f, camera, b)).collect();
-    for (s, fixed) in all.iter_mut().zip(fixed) {
+    for (s, (fixed, with_lines)) in all.iter_mut().zip(fixed.into_iter().zip(with_lines)) {
         s.fixed_px2 = fixed;
+        s.lines_px2 = with_lines.zip(fixed).map(|(all, fixed)| all - fixed);
     }
     all
 }
@@ -76,13 +84,14 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
         field.first.iter().map(|r| calm(&rough(field, r, bias))).collect();
     let Some(first) = frames.first() else { return s };
     s.variance_px2 = mean(first.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
-    let lines = without_lines(first, camera.width, LONG_LINE);
     let level: Vec<Vec<f32>> =
         frames.iter().map(|f| without_lines(f, camera.width, SHORT_LINE)).collect();
     for lag in 1..frames.len().min(4) {
         let pairs = (0..frames.len() - lag).map(|k| same_pixel(&level[k], &level[k + lag]));
         s.lagged[lag - 1] = mean(pairs);
     }
+    let noise = moving(&frames, &s);
+    let lines = without_lines(&noise, camera.width, LONG_LINE);
     if let [a, b, ..] = frames.as_slice() {
         let change: Vec<f32> = a.iter().zip(b).map(|(a, b)| b - a).collect();
         // A difference of two frames has twice the variance of one. Taking out what is smooth
@@ -105,6 +114,20 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     s.window_px = Some(window.sqrt());
     s.jitter = jitter(field, &s, window);
     s
+}
+
+/// Frames that resemble one another more than this have little noise of their own.
+const STILL: f64 = 0.6;
+
+/// An image of the noise as it changes from frame to frame, so that nothing that stands still is
+/// taken for it; the first frame where there is but one, or where nearly all stands still.
+pub fn moving(frames: &[Vec<f32>], s: &Structure) -> Vec<f32> {
+    match frames {
+        [a, b, ..] if s.lagged[0].is_none_or(|c| c < STILL) => {
+            a.iter().zip(b).map(|(a, b)| (b - a) * std::f32::consts::FRAC_1_SQRT_2).collect()
+        }
+        _ => frames[0].clone(),
+    }
 }
 
 /// Residuals as an image, px, without what is smooth and what is known.
@@ -201,6 +224,9 @@ fn across_views(means: &[Vec<f32>]) -> Vec<Option<f64>> {
     };
     means.par_iter().map(of).collect()
 }
+
+/// A pixel's own error changes from pixel to pixel: the box whose mean is taken out, px.
+const PIXEL_BOX: usize = 7;
 
 /// Side of the patches whose own scale their residuals are held against, px.
 const PATCH: usize = 96;

@@ -109,7 +109,6 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
     let rows = camera.height.div_ceil(SIDE);
     let mut sums = vec![Sums::default(); across * rows];
     let frames = field.frames.len() as f64;
-    let moved = field.moved_px2();
     let rough = high_pass(&field.image(&field.mean), camera.width, camera.height, SMOOTH_PX);
     for (k, &i) in field.pixels.iter().enumerate() {
         let (u, v) = (i as usize % camera.width, i as usize / camera.width);
@@ -132,12 +131,10 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
             s.variance += f64::from(field.sigma[k]).powi(2);
         }
     }
-    // What moves as a whole moves near disparities more.
-    let middle = field.scale_px_m * field.plane.q.z;
     let mut tiles: Vec<Tile> =
         sums.iter().filter(|s| s.pixels > 0.0).map(|s| s.tile(&places)).collect();
     for t in &mut tiles {
-        t.temporal -= moved * (t.place.disparity / middle).powi(2);
+        t.temporal -= field.moved_px2(t.place.disparity);
     }
     tiles
 }

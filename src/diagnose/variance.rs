@@ -67,6 +67,21 @@ fn recalibrations(reach: &Reach, sigma: &SigmaModel) -> Vec<Candidate> {
         .collect();
     let few = columns.len().min(3);
     let mut all = Vec::new();
+    // A change that is not small bends: the level parameters by a third up and down.
+    let bent: Vec<Vec<f64>> = (0..few)
+        .flat_map(|j| [0.7, 1.4].map(|factor| (j, factor)))
+        .filter_map(|(j, factor)| {
+            let mut moved = sigma.clone();
+            moved.parameters[j] *= factor;
+            let column: Vec<f64> =
+                table(&moved).iter().zip(&base).map(|(m, b)| m - b).collect();
+            column.iter().all(|c| c.is_finite()).then_some(column)
+        })
+        .collect();
+    if !bent.is_empty() {
+        let bent = Basis::Recalibrate { z_m, theta_rad, columns: bent };
+        all.push(Candidate::named(RECALIBRATE, bent));
+    }
     for n in if few < columns.len() { vec![few, columns.len()] } else { vec![few] } {
         if n > 0 {
             let columns = columns[..n].to_vec();
@@ -97,6 +112,12 @@ pub fn curves(camera: &Camera, reach: &Reach) -> Vec<Candidate> {
         curve(Over::Right, reach.right, 8),
         curve(Over::Down, reach.down, 8),
         Candidate::curve(Basis::Map { width, height, across: 6, down: 4, times: Times::One }),
+        Candidate::curve(Basis::Pair {
+            over: [Over::Right, Over::Down],
+            low: [reach.right[0], reach.down[0]],
+            high: [reach.right[1], reach.down[1]],
+            nodes: [6, 5],
+        }),
     ];
     for (over, range) in [
         (Over::Session, reach.session),

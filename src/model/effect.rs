@@ -87,7 +87,8 @@ mod tests {
             }),
             Just(Basis::RangeNotDepth),
             (2usize..5).prop_map(|degree| Basis::Bow { degree }),
-            length().prop_map(|period_px| Basis::Locking { period_px }),
+            (length(), 1usize..5)
+                .prop_map(|(period_px, harmonics)| Basis::Locking { period_px, harmonics }),
             (length(), 1usize..5)
                 .prop_map(|(period_px, harmonics)| Basis::Banding { period_px, harmonics }),
             length().prop_map(|width_px| Basis::EdgeMixing { width_px }),
@@ -176,7 +177,7 @@ mod tests {
             times: Times::One,
         };
         let bad = [
-            Basis::Locking { period_px: 0.0 },
+            Basis::Locking { period_px: 0.0, harmonics: 2 },
             Basis::Banding { period_px: -8.0, harmonics: 1 },
             Basis::Banding { period_px: 8.0, harmonics: usize::MAX },
             Basis::Bow { degree: usize::MAX },

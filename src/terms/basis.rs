@@ -22,8 +22,8 @@ pub enum Basis {
     RangeNotDepth,
     /// A board that is not flat: even polynomial of its own coordinates.
     Bow { degree: usize },
-    /// Periodic in the disparity, two harmonics.
-    Locking { period_px: f64 },
+    /// Periodic in the disparity.
+    Locking { period_px: f64, harmonics: usize },
     /// Stripes down the picture.
     Banding { period_px: f64, harmonics: usize },
     /// Fades with the distance from the edge; to both sides alike, or to the left and right apart.
@@ -146,8 +146,7 @@ impl Basis {
             Basis::Bow { degree } => {
                 BOW_TERMS.iter().filter(|(i, j)| i + j <= *degree as i32).count()
             }
-            Basis::Locking { .. } => 4,
-            Basis::Banding { harmonics, .. } => 2 * harmonics,
+            Basis::Locking { harmonics, .. } | Basis::Banding { harmonics, .. } => 2 * harmonics,
             Basis::Recalibrate { columns, .. } => columns.len(),
             Basis::Curve { nodes, .. } | Basis::Ring { nodes, .. } => *nodes,
             Basis::Map { across, down, .. } => across * down,
@@ -185,14 +184,16 @@ impl Basis {
                     *g = lift * p.right.powi(i) * p.down.powi(j);
                 }
             }
-            Basis::Locking { period_px } => {
-                let (sin, cos) = (TAU * p.disparity / period_px).sin_cos();
-                // A patch sees the mean over the disparities it spans.
-                let (first, second) = (smear(p, 1.0 / period_px), smear(p, 2.0 / period_px));
-                out[0] = first * sin;
-                out[1] = first * cos;
-                out[2] = second * 2.0 * sin * cos;
-                out[3] = second * (cos * cos - sin * sin);
+            Basis::Locking { period_px, .. } => {
+                let (s, c) = (TAU * p.disparity / period_px).sin_cos();
+                let (mut sk, mut ck) = (s, c);
+                for (k, pair) in out.chunks_exact_mut(2).enumerate() {
+                    // A patch sees the mean over the disparities it spans.
+                    let seen = smear(p, (k + 1) as f64 / period_px);
+                    pair[0] = seen * sk;
+                    pair[1] = seen * ck;
+                    (sk, ck) = (sk * c + ck * s, ck * c - sk * s);
+                }
             }
             Basis::Banding { period_px, .. } => {
                 let (s, c) = (TAU * p.u / period_px).sin_cos();

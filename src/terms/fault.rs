@@ -40,7 +40,7 @@ impl Basis {
             Basis::Vignetting { orders } => some_orders(*orders),
             Basis::Bow { degree } => (!BOW_DEGREES.contains(degree))
                 .then(|| format!("degree = {degree} is not from 2 to 4")),
-            Basis::Locking { period_px } => positive("period_px", &[*period_px]),
+            Basis::Locking { period_px, .. } => positive("period_px", &[*period_px]),
             Basis::Banding { period_px, harmonics } => {
                 positive("period_px", &[*period_px]).or_else(|| some_orders(*harmonics))
             }
