@@ -13,7 +13,7 @@ use kinoise::{DepthCode, Plane, Seed};
 use rand::seq::SliceRandom;
 use serde_json::Value;
 
-const VIEWS: usize = 12;
+const VIEWS: usize = 10;
 
 /// One effect in a set with so many words to a metre, where that matters.
 fn single(effect: &str, words: Option<f64>) -> OnDisk {

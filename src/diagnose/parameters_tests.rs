@@ -47,7 +47,7 @@ fn exact() -> Vec<(Basis, Vec<f64>, &'static str, f64, f64)> {
         (Basis::Bow { degree: 2 }, vec![-0.02 / 0.36, 0.0, 0.0], "sagitta_m", 0.02, 1e-12),
         (Basis::Bow { degree: 2 }, vec![0.0, 0.02 / 0.16, 0.0], "sagitta_m", -0.02, 1e-12),
         (
-            Basis::Locking { period_px: 1.0 },
+            Basis::Locking { period_px: 1.0, harmonics: 2 },
             vec![0.1 * phase.cos(), 0.1 * phase.sin(), 0.0, 0.0],
             "amplitude_px",
             0.1,

@@ -55,6 +55,7 @@ fn picture(camera: &Camera, beside: impl Fn(usize) -> Option<f64>) -> (Field, Fr
         measured: vec![1; n],
         first: Vec::new(),
         frames: Vec::new(),
+        lines: Vec::new(),
         reference_distance_m: None,
         temperature_c: None,
         ambient_lux: None,

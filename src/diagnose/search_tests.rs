@@ -57,7 +57,7 @@ fn candidates() -> Vec<Candidate> {
     vec![
         Candidate::named("radial-disparity-bias", Basis::Bowl { disparity_power: 0.0, orders: 1 }),
         Candidate::named("column-banding", Basis::Banding { period_px: 160.0, harmonics: 2 }),
-        Candidate::named("pixel-locking", Basis::Locking { period_px: 1.0 }),
+        Candidate::named("pixel-locking", Basis::Locking { period_px: 1.0, harmonics: 2 }),
         curve(Over::Column, 639.0),
         curve(Over::Row, 479.0),
         curve(Over::Radius, 1.0),
