@@ -335,3 +335,7 @@ fn dispersion(
     // Chance alone scatters the estimate by the root of 2 / n.
     (sum / n - f64::sqrt(2.0 / n)).max(1.0)
 }
+
+#[cfg(test)]
+#[path = "evidence_tests.rs"]
+mod tests;

@@ -131,3 +131,7 @@ fn saw_tooth(camera: &Camera, amplitude_px: f64, period_px: f64) -> Vec<f64> {
     };
     (0..camera.width.max(2)).map(tooth).collect()
 }
+
+#[cfg(test)]
+#[path = "known_tests.rs"]
+mod tests;

@@ -373,3 +373,7 @@ pub fn tails(views: &[Structure], known: &Known) -> Option<Hanging> {
         words: None,
     })
 }
+
+#[cfg(test)]
+#[path = "noise_tests.rs"]
+mod tests;

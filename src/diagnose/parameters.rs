@@ -148,3 +148,7 @@ fn delta(of: &dyn Fn(&[f64]) -> f64, beta: &[f64], covariance: &DMatrix<f64>) ->
     let g = nalgebra::DVector::from_vec(gradient);
     g.dot(&(covariance * &g)).max(0.0).sqrt()
 }
+
+#[cfg(test)]
+#[path = "parameters_tests.rs"]
+mod tests;

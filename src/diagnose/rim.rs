@@ -137,3 +137,7 @@ mod tests {
         assert_eq!(between(&[(40.0, 40.0); 9], 0.5), None);
     }
 }
+
+#[cfg(test)]
+#[path = "rim_tests.rs"]
+mod pictures;

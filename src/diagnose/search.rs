@@ -579,3 +579,7 @@ impl Prepared<'_> {
         rows.reduce(basis.count(), |i, g| basis.fill(&places[i], g))
     }
 }
+
+#[cfg(test)]
+#[path = "search_tests.rs"]
+mod tests;

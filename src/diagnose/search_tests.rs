@@ -1,0 +1,166 @@
+//! Searches over made-up views: what is put in is found, and noise is let be.
+
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+use crate::rng::{Seed, Stream};
+use crate::terms::{Over, Times};
+
+const VIEWS: usize = 12;
+const SAMPLES: usize = 120;
+const RULES: Rules = Rules { level: 0.01, prior: 1e-6, adequacy: 0.7, most_terms: 4, fixed: None };
+
+/// Places all over the picture with a free level a view; noise of unit variance, and a bias.
+fn session(rng: &mut Stream, bias: impl Fn(&Place) -> f64) -> Vec<ViewData> {
+    (0..VIEWS)
+        .map(|_| {
+            let level: f64 = StandardNormal.sample(rng);
+            let disparity = rng.random_range(10.0..45.0);
+            let places: Vec<Place> = (0..SAMPLES)
+                .map(|_| {
+                    let (u, v) = (rng.random_range(0.0..640.0), rng.random_range(0.0..480.0));
+                    let radius = f64::hypot(u - 319.5, v - 239.5) / 399.5;
+                    Place {
+                        u,
+                        v,
+                        radius,
+                        disparity,
+                        side: 8.0,
+                        z: 43.5 / disparity,
+                        ..Place::default()
+                    }
+                })
+                .collect();
+            let response = places
+                .iter()
+                .map(|p| {
+                    let noise: f64 = StandardNormal.sample(rng);
+                    3.0 * level + bias(p) + noise
+                })
+                .collect();
+            ViewData {
+                places,
+                response,
+                weight: vec![1.0; SAMPLES],
+                nuisance: vec![1.0; SAMPLES],
+                precision: vec![0.0],
+            }
+        })
+        .collect()
+}
+
+fn candidates() -> Vec<Candidate> {
+    let curve = |over, high| {
+        Candidate::curve(Basis::Curve { over, low: 0.0, high, nodes: 9, times: Times::One })
+    };
+    vec![
+        Candidate::named("radial-disparity-bias", Basis::Bowl { disparity_power: 0.0, orders: 1 }),
+        Candidate::named("column-banding", Basis::Banding { period_px: 160.0, harmonics: 2 }),
+        Candidate::named("pixel-locking", Basis::Locking { period_px: 1.0, harmonics: 2 }),
+        curve(Over::Column, 639.0),
+        curve(Over::Row, 479.0),
+        curve(Over::Radius, 1.0),
+    ]
+}
+
+fn found(views: &[ViewData], seed: u64) -> Outcome {
+    search(views, views, &candidates(), &RULES, Seed(seed))
+}
+
+fn families(outcome: &Outcome) -> Vec<Option<&'static str>> {
+    outcome.chosen.iter().map(|c| c.candidate.family).collect()
+}
+
+/// 200 searches at 1 %: two are expected to find something; more than 9 have a chance of 4e-5.
+#[test]
+fn noise_is_let_be() {
+    let alarms = (0..200)
+        .filter(|&seed| {
+            let mut rng = Seed(seed).stream("search/null");
+            !found(&session(&mut rng, |_| 0.0), seed).chosen.is_empty()
+        })
+        .count();
+    println!("{alarms} of 200 false alarms at 1 %");
+    assert!(alarms <= 9, "{alarms} of 200");
+}
+
+#[test]
+fn what_was_put_in_is_found_with_its_size() {
+    for seed in 0..8 {
+        let mut rng = Seed(seed).stream("search/bowl");
+        let outcome = found(&session(&mut rng, |p| 1.5 * p.radius * p.radius), seed);
+        assert_eq!(families(&outcome), [Some("radial-disparity-bias")], "seed {seed}");
+        let fit = outcome.fit.as_ref().unwrap();
+        let (k, error) = (outcome.coefficients(0)[0], fit.covariance[(0, 0)].sqrt());
+        // Five standard errors in 8 searches: 5e-6.
+        assert!((k - 1.5).abs() < 5.0 * error && error < 0.15, "{k} +- {error}");
+        assert!(outcome.chosen[0].p < 1e-4 && outcome.chosen[0].rivals[0].behind == 0.0);
+    }
+}
+
+#[test]
+fn two_causes_are_two_terms_whichever_is_larger() {
+    for (bowl, stripes) in [(3.0, 0.6), (1.2, 1.5)] {
+        let mut rng = Seed(5).stream("search/two");
+        let bias = |p: &Place| {
+            bowl * p.radius * p.radius + stripes * (std::f64::consts::TAU * p.u / 160.0).sin()
+        };
+        let outcome = found(&session(&mut rng, bias), 5);
+        let mut names = families(&outcome);
+        names.sort_unstable();
+        assert_eq!(names, [Some("column-banding"), Some("radial-disparity-bias")]);
+        let gains: Vec<f64> = outcome.chosen.iter().map(|c| c.gain).collect();
+        assert!(gains[0] >= gains[1], "best first: {gains:?}");
+        assert_eq!(outcome.span(1).start, outcome.span(0).end);
+    }
+}
+
+/// A step over the rows is no family's: it stays a curve on its own axis.
+#[test]
+fn what_has_no_family_stays_a_curve() {
+    let mut rng = Seed(6).stream("search/step");
+    let outcome = found(&session(&mut rng, |p| f64::from(p.v > 300.0)), 6);
+    let first = &outcome.chosen[0].candidate;
+    assert_eq!(first.family, None);
+    assert_eq!(first.basis.axis(), crate::terms::Axis::Row);
+}
+
+/// A curve along the columns that the stripes do not explain is not called stripes.
+#[test]
+fn a_family_that_explains_a_part_is_not_named() {
+    let mut rng = Seed(7).stream("search/part");
+    let outcome = found(&session(&mut rng, |p| (-((p.u - 200.0) / 60.0).powi(2)).exp() * 2.0), 7);
+    assert_eq!(outcome.chosen[0].candidate.family, None);
+    assert_eq!(outcome.chosen[0].candidate.basis.axis(), crate::terms::Axis::Column);
+}
+
+#[test]
+fn thresholds_and_chances_are_each_others_inverse() {
+    let gains = NoiseGains((1..=600).map(|k| -(1.0 - f64::from(k) / 601.0).ln()).collect());
+    // Exponential: passed with probability exp(-g).
+    for level in [0.05, 0.01, 1e-3, 1e-5] {
+        let threshold = gains.threshold(level);
+        assert!((gains.p(threshold) / level - 1.0).abs() < 1e-9, "{level}");
+        assert!((threshold / -level.ln() - 1.0).abs() < 0.08, "{level}: {threshold}");
+    }
+    assert!(gains.p(0.0) > 0.9 && gains.p(0.0) <= 1.0);
+    assert!(NoiseGains::default().threshold(0.05) == f64::INFINITY);
+    assert!(NoiseGains::default().p(1e9) == 1.0);
+}
+
+/// Same seed, same search, on one thread and two.
+#[test]
+fn a_search_repeats() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut rng = Seed(8).stream("search/repeat");
+            let outcome = found(&session(&mut rng, |p| p.radius * p.radius), 8);
+            (families(&outcome), outcome.coefficients(0), outcome.chosen[0].p)
+        })
+    };
+    let one = run(1);
+    assert_eq!(one, run(2));
+    assert_eq!(one, run(2));
+}
