@@ -87,6 +87,16 @@ impl Survey {
         Survey { views, reach, fixed_px2: 0.0, light }
     }
 
+    /// Pixels of the picture that any view's target covered.
+    fn covered_px(&self, camera: &Camera) -> f64 {
+        let across = camera.width.div_ceil(SIDE);
+        let mut seen = vec![false; across * camera.height.div_ceil(SIDE)];
+        for t in self.views.iter().flat_map(|v| &v.tiles) {
+            seen[t.place.v as usize / SIDE * across + t.place.u as usize / SIDE] = true;
+        }
+        (seen.iter().filter(|s| **s).count() * SIDE * SIDE) as f64
+    }
+
     /// The views' mean residuals, about a plane of their own each.
     pub fn mean_data(&self) -> Vec<ViewData> {
         self.views.par_iter().map(mean_data).collect()
@@ -98,7 +108,7 @@ impl Survey {
             prior: BIAS_PRIOR,
             adequacy: ADEQUATE,
             most_terms: MOST_TERMS,
-            fixed: (self.fixed_px2 > 0.0).then(|| (self.fixed_px2.sqrt(), camera.pixels() as f64)),
+            fixed: (self.fixed_px2 > 0.0).then(|| (self.fixed_px2.sqrt(), self.covered_px(camera))),
         };
         let mut candidates = bias::families(camera, &self.reach);
         candidates.extend(bias::curves(camera, &self.reach));
@@ -251,6 +261,7 @@ fn mean_data(view: &SurveyedView) -> ViewData {
         weight: tiles.iter().map(|t| finite(t.pixels / t.variance / view.inflation)).collect(),
         nuisance: tiles.iter().flat_map(|t| [1.0, t.place.x, t.place.y]).collect(),
         precision: vec![0.0; 3],
+        gathered: Vec::new(),
     }
 }
 
@@ -269,8 +280,10 @@ pub fn coarser(fine: &ViewData) -> ViewData {
         weight: Vec::with_capacity(groups.len()),
         nuisance: Vec::with_capacity(groups.len() * p),
         precision: fine.precision.clone(),
+        gathered: vec![0; fine.places.len()],
     };
-    for members in groups.values() {
+    for (k, members) in groups.values().enumerate() {
+        members.iter().for_each(|&i| coarse.gathered[i] = k as u32);
         let weight: f64 = members.iter().map(|&i| fine.weight[i]).sum();
         let mean = |of: &dyn Fn(usize) -> f64| {
             if weight > 0.0 {
@@ -339,6 +352,7 @@ impl Blocks {
             response: self.response,
             weight: self.weight,
             precision: vec![1.0 / level_scatter],
+            gathered: Vec::new(),
         }
     }
 

@@ -18,6 +18,8 @@ pub struct ViewData {
     pub nuisance: Vec<f64>,
     /// Holds each nuisance to zero; 0 leaves it free.
     pub precision: Vec<f64>,
+    /// For larger patches: which of them each sample of the finer data went to.
+    pub gathered: Vec<u32>,
 }
 
 /// How a search decides.
@@ -138,7 +140,9 @@ pub fn search(
 /// Evidence of views on given terms together.
 pub fn evidence_of(data: &[ViewData], terms: &[Term]) -> Vec<Evidence> {
     let bases: Vec<&Basis> = terms.iter().map(|t| &t.basis).collect();
-    data.par_iter().filter_map(|v| Some(rows(v, &bases, &[])?.reduce(0, |_, _| ()))).collect()
+    data.par_iter()
+        .filter_map(|v| Some(rows(v, v.response.clone(), &bases)?.reduce(0, |_, _| ())))
+        .collect()
 }
 
 /// The greatest gains that noise alone brings, ascending, nats.
@@ -231,7 +235,10 @@ impl<'a> Layer<'a> {
     fn evidence_of(&self, terms: &[&Basis]) -> Vec<Evidence> {
         let fine = terms.iter().any(|b| b.is_fine() || b.of_column_alone());
         let views = if fine { self.fine } else { self.coarse };
-        views.par_iter().filter_map(|v| Some(rows(v, terms, &[])?.reduce(0, |_, _| ()))).collect()
+        views
+            .par_iter()
+            .filter_map(|v| Some(rows(v, v.response.clone(), terms)?.reduce(0, |_, _| ())))
+            .collect()
     }
 
     /// Terms with a name are fitted anew beside every candidate; those without have many columns
@@ -496,8 +503,20 @@ fn behind(winner: &[f64], rival: &[f64]) -> f64 {
     if variance > 0.0 { mean / (variance / n).sqrt() } else { 0.0 }
 }
 
-/// A view's rows with its nuisances and the terms beside, what is settled taken out.
-fn rows(view: &ViewData, beside: &[&Basis], settled: &[(&Basis, Vec<f64>)]) -> Option<Rows> {
+/// A view's response, what is settled taken out.
+fn without(view: &ViewData, settled: &[(&Basis, Vec<f64>)]) -> Vec<f64> {
+    let mut response = view.response.clone();
+    let mut scratch = Vec::new();
+    for (basis, beta) in settled {
+        for (y, place) in response.iter_mut().zip(&view.places) {
+            *y -= basis.value(beta, place, &mut scratch);
+        }
+    }
+    response
+}
+
+/// A view's rows with its nuisances and the terms beside.
+fn rows(view: &ViewData, response: Vec<f64>, beside: &[&Basis]) -> Option<Rows> {
     let p = view.precision.len();
     let width = p + beside.iter().map(|b| b.count()).sum::<usize>();
     let mut columns = vec![0.0; view.places.len() * width];
@@ -510,13 +529,6 @@ fn rows(view: &ViewData, beside: &[&Basis], settled: &[(&Basis, Vec<f64>)]) -> O
             rest = others;
         }
     }
-    let mut response = view.response.clone();
-    let mut scratch = Vec::new();
-    for (basis, beta) in settled {
-        for (y, place) in response.iter_mut().zip(&view.places) {
-            *y -= basis.value(beta, place, &mut scratch);
-        }
-    }
     Rows::new(response, view.weight.clone(), columns, width, &view.precision)
 }
 
@@ -526,7 +538,18 @@ fn prepare<'a>(
     beside: &[&Basis],
     settled: &[(&Basis, Vec<f64>)],
 ) -> Option<Prepared<'a>> {
-    let rows_fine = rows(fine, beside, settled)?;
+    let left = without(fine, settled);
+    let left_coarse = if coarse.gathered.is_empty() {
+        left.clone()
+    } else {
+        // What changes within a patch is taken out before the patch is made.
+        let mut sums = vec![0.0; coarse.places.len()];
+        for ((y, w), &k) in left.iter().zip(&fine.weight).zip(&coarse.gathered) {
+            sums[k as usize] += w * y;
+        }
+        sums.iter().zip(&coarse.weight).map(|(s, w)| if *w > 0.0 { s / w } else { 0.0 }).collect()
+    };
+    let rows_fine = rows(fine, left, beside)?;
     let places = &fine.places;
     let side = SIDE as f64;
     let groups = vec![
@@ -538,7 +561,7 @@ fn prepare<'a>(
     Some(Prepared {
         groups,
         fine: (places, rows_fine),
-        coarse: (&coarse.places, rows(coarse, beside, settled)?),
+        coarse: (&coarse.places, rows(coarse, left_coarse, beside)?),
     })
 }
 

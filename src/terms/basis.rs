@@ -292,15 +292,12 @@ impl Basis {
         self.alone() == Some(Over::Column)
     }
 
-    /// Is it the same in every view?
+    /// Does it stand still in the picture, but for its size?
     pub fn is_of_picture(&self) -> bool {
         match self {
             Basis::Banding { .. } => true,
-            Basis::Bowl { disparity_power, .. } => *disparity_power == 0.0,
-            Basis::Curve { over, times: Times::One, .. } => {
-                matches!(over, Over::Column | Over::Row | Over::Radius)
-            }
-            Basis::Map { times: Times::One, .. } => true,
+            Basis::Bowl { .. } | Basis::Map { .. } => true,
+            Basis::Curve { over, .. } => matches!(over, Over::Column | Over::Row | Over::Radius),
             _ => false,
         }
     }
