@@ -274,7 +274,7 @@ fn what_a_shape_does_its_correction_undoes() {
         bias(map, &[0.1, -0.4, 0.6, 0.3, 0.2, -0.5]),
         bias(pair, &[0.5, -0.3, 0.8, 0.4]),
         bias(ring, &[0.4, -0.4, 0.8, 0.2]),
-        bias(Basis::Locking { period_px: 3.0 }, &[0.1, 0.05, 0.0, 0.02]),
+        bias(Basis::Locking { period_px: 3.0, harmonics: 2 }, &[0.1, 0.05, 0.0, 0.02]),
     ];
     let quiet = rms(&residuals(&depths(&shots(plane, &[], 0.001, &[0.0])[0]), &plane));
     for kind in kinds {

@@ -1,12 +1,15 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use kinoise::diagnose::{DiagnoseOptions, Diagnosis, Status, Verdict, diagnose};
+use kinoise::diagnose::{
+    DiagnoseOptions, Diagnosis, Reference, Status, Verdict, diagnose, diagnose_against,
+};
 use kinoise::io::{OutputDir, open};
 use kinoise::report::{DiagnosisPage, diagnosis_page};
 use kinoise::{CalibrateOptions, NoiseModel, Recording};
 
 use super::common::{Bar, Global, Input, say};
+use super::diagnose_pictures;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -15,6 +18,9 @@ pub struct Arguments {
     /// The model to hold it against [default: one calibrated on the recording itself]
     #[arg(short, long, value_name = "FILE")]
     model: Option<PathBuf>,
+    /// A simulated recording of the same views to hold it against: what does that simulation leave out?
+    #[arg(long, value_name = "SIMULATED_REC", conflicts_with = "model")]
+    against: Option<PathBuf>,
     /// Folder for diagnosis.json, model.json and report.html
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
@@ -27,21 +33,35 @@ const FOUND: u8 = 1;
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     let recording = open(&arguments.recording, &arguments.input.assumed()?)?;
-    let model = match &arguments.model {
-        Some(path) => NoiseModel::read(path)?,
-        None => calibrated(&recording, global)?,
+    let simulated = match &arguments.against {
+        Some(path) => Some(open(path, &arguments.input.assumed()?)?),
+        None => None,
+    };
+    let model = match (&arguments.model, &simulated) {
+        (Some(path), _) => NoiseModel::read(path)?,
+        (None, Some(simulated)) => weights(&recording, simulated, global)?,
+        (None, None) => {
+            say("no --model given: calibrated on this recording first");
+            calibrated(&recording, global)?
+        }
     };
     let out = OutputDir::create(&arguments.output)?;
     let options = DiagnoseOptions { seed: global.seed(), ..DiagnoseOptions::default() };
     let bar = Bar::new("views");
-    let done = diagnose(&recording, &model, &options, &|done, all| bar.step(done, all))?;
+    let step = |done, all| bar.step(done, all);
+    let done = match &simulated {
+        Some(simulated) => diagnose_against(&recording, simulated, &model, &options, &step)?,
+        None => diagnose(&recording, &model, &options, &step)?,
+    };
     drop(bar);
     let diagnosis = &done.diagnosis;
     let json = serde_json::to_value(diagnosis)?;
     out.write("diagnosis.json", format!("{json:#}\n").as_bytes())?;
     done.model.write(&out.path().join("model.json"))?;
-    let title = format!("What the model of {} leaves out", recording.sensor.name);
-    let page = DiagnosisPage { title: &title, diagnosis, pictures: &[] };
+    let held_against = if simulated.is_some() { "simulation" } else { "model" };
+    let title = format!("What the {held_against} of {} leaves out", recording.sensor.name);
+    let pictures = diagnose_pictures::of(&done, &recording.sensor, &model, global.seed());
+    let page = DiagnosisPage { title: &title, diagnosis, pictures: &pictures };
     out.write("report.html", diagnosis_page(&page)?.as_bytes())?;
     say(words(diagnosis));
     global.print_json(&json)?;
@@ -55,15 +75,30 @@ fn calibrated(recording: &Recording, global: &Global) -> anyhow::Result<NoiseMod
     let views =
         kinoise::measure_recording(recording, &options.measure, &|done, all| bar.step(done, all))?;
     drop(bar);
-    say("no --model given: calibrated on this recording first");
     Ok(kinoise::model_of(recording, &views, &options)?.model)
 }
 
+/// The sigma to weigh by: the simulation's own, or the recording's where that has none.
+fn weights(
+    recording: &Recording,
+    simulated: &Recording,
+    global: &Global,
+) -> anyhow::Result<NoiseModel> {
+    calibrated(simulated, global).or_else(|why| {
+        say(format!("note: sigma was calibrated on the recording; on the simulated one: {why:#}"));
+        calibrated(recording, global)
+    })
+}
+
 fn words(diagnosis: &Diagnosis) -> String {
+    let held_against = match diagnosis.reference {
+        Reference::Model => "the model",
+        Reference::SimulatedRecording => "the simulation",
+    };
     let mut text = match diagnosis.verdict {
-        Verdict::Match => "match: nothing was found that the model leaves out\n".to_string(),
+        Verdict::Match => format!("match: nothing was found that {held_against} leaves out\n"),
         Verdict::Inconclusive => "inconclusive: these views could not have shown it\n".to_string(),
-        Verdict::Mismatch => "mismatch: the model leaves out\n".to_string(),
+        Verdict::Mismatch => format!("mismatch: {held_against} leaves out\n"),
     };
     for f in diagnosis.findings.iter().filter(|f| f.status != Status::NotIdentifiable) {
         let name = match (f.status, f.effect) {

@@ -5,6 +5,7 @@ mod common;
 mod correct;
 mod demo;
 mod diagnose;
+mod diagnose_pictures;
 mod effects;
 mod fit;
 mod simulate;

@@ -61,7 +61,8 @@ pub fn curves(camera: &Camera, reach: &Reach) -> Vec<Candidate> {
     let curve = |over, [low, high]: [f64; 2], nodes, times| {
         Candidate::curve(Basis::Curve { over, low, high, nodes, times })
     };
-    let map = |times| Candidate::curve(Basis::Map { width, height, across: 8, down: 6, times });
+    let map =
+        |across, down, times| Candidate::curve(Basis::Map { width, height, across, down, times });
     let mut all = vec![
         curve(Over::Column, [0.0, width], 24, Times::One),
         curve(Over::Column, [0.0, width], 72, Times::One),
@@ -80,8 +81,10 @@ pub fn curves(camera: &Camera, reach: &Reach) -> Vec<Candidate> {
             nodes: 12,
             times: Times::One,
         }),
-        map(Times::One),
-        map(Times::DisparitySquared),
+        map(8, 6, Times::One),
+        map(8, 6, Times::DisparitySquared),
+        map(16, 12, Times::One),
+        map(16, 12, Times::DisparitySquared),
     ];
     all.extend(waves(reach));
     if reach.light[1] > 1.05 * reach.light[0] {

@@ -52,12 +52,9 @@ pub fn detectable(
     let spreads: Vec<(&'static str, &'static str, Basis, fn(f64) -> f64)> = vec![
         ("range-exponent", "excess", Basis::RangeExponent { pivot_m: 2.0, orders: 1 }, |a| 0.5 * a),
         ("vignetting", "growth", Basis::Vignetting { orders: 1 }, |a| (0.5 * a).exp() - 1.0),
-        (
-            "slope-noise",
-            "sigma_lateral_px",
-            Basis::SlopeNoise { lateral_px: 0.2 },
-            |a| 0.2 * a.sqrt(),
-        ),
+        ("slope-noise", "sigma_lateral_px", Basis::SlopeNoise { lateral_px: 0.2 }, |a| {
+            0.2 * a.sqrt()
+        }),
         ("tilt-axis-anisotropy", "ratio", Basis::TiltAxis { tilt_power: 2 }, |a| (0.75 * a).exp()),
     ];
     for (effect, name, basis, to) in spreads {

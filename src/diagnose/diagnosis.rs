@@ -19,6 +19,8 @@ pub struct Diagnosis {
     pub findings: Vec<Finding>,
     pub map: Vec<MapRow>,
     pub heldout: Option<HeldOut>,
+    /// Every view with the terms' coefficients fitted to the others, the shapes as chosen on all.
+    pub left_out: Option<LeftOut>,
     pub after: After,
     pub detectable: Vec<Detectable>,
     /// What this recording cannot tell, and what would.
@@ -146,6 +148,16 @@ pub struct HeldOut {
     /// Root mean square of the residual to a plane, every pixel of every frame, px of disparity.
     pub rms_px_before: f64,
     pub rms_px_after: f64,
+}
+
+/// Root mean square of the residual to a plane, every pixel of every frame of every view, px.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct LeftOut {
+    pub rms_px_before: f64,
+    pub rms_px_after: f64,
+    /// The mean over the views of each view's own.
+    pub mean_of_views_px_before: f64,
+    pub mean_of_views_px_after: f64,
 }
 
 #[derive(Debug, Clone, Serialize)]

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use serde_json::Map;
 
+use super::against::Baseline;
 use super::diagnosis::{
     After, CannotTell, DIAGNOSIS_FORMAT, Diagnosis, Finding, Reference, Remaining, Size, Status,
     Verdict, ViewLine,
@@ -15,16 +16,18 @@ use super::findings::{self, Scene};
 use super::heldout;
 use super::known::Known;
 use super::lattice::{Lattice, Words};
-use super::layers::Survey;
+use super::layers::{BIAS_PRIOR, Survey};
+use super::missing::missing;
+use super::next_view;
 use super::noise::{Hanging, hanging, tails};
 use super::parameters::estimate;
-use super::missing::missing;
 use super::reference;
 use super::rim;
 use super::search::Outcome;
 use super::smooth::{SMOOTH_PX, high_pass};
 use super::structure::{Structure, moving, structures, tail};
 use super::tiles::Places;
+use crate::effects;
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
 use crate::measure::{MeasureOptions, Workbench};
@@ -55,7 +58,22 @@ pub struct Diagnosed {
     pub fields: Vec<Field>,
     /// Terms of the bias that were found, for pictures.
     pub bias: Vec<Term>,
+    /// The same at every pixel of every field, px; empty when there are none.
+    pub bias_px: Vec<Vec<f32>>,
     pub excluded: Vec<Excluded>,
+    /// The simulated views, where there are any, in the same order.
+    pub against: Vec<Field>,
+}
+
+impl Diagnosed {
+    /// Mean residual of every pixel of a view, beyond the simulated one's where there is one, px.
+    pub fn recorded(&self, view: usize) -> Vec<f32> {
+        let mean = &self.fields[view].mean;
+        let Some(twin) = self.against.get(view) else { return mean.clone() };
+        let theirs = twin.image(&twin.mean);
+        let at = |i: u32| theirs.get(i as usize).copied().unwrap_or(f32::NAN);
+        self.fields[view].pixels.iter().zip(mean).map(|(&i, m)| m - at(i)).collect()
+    }
 }
 
 /// Steps done, steps in all.
@@ -74,13 +92,39 @@ pub fn diagnose(
     options: &DiagnoseOptions,
     progress: Progress<'_>,
 ) -> Result<Diagnosed> {
+    run(recording, None, model, options, progress)
+}
+
+/// Find out what a simulation leaves out: `simulated` is its recording of the same views, `model`
+/// the sigma to weigh by.
+///
+/// # Errors
+/// When another sensor was simulated, or fewer than three views have a partner.
+pub fn diagnose_against(
+    recording: &Recording,
+    simulated: &Recording,
+    model: &NoiseModel,
+    options: &DiagnoseOptions,
+    progress: Progress<'_>,
+) -> Result<Diagnosed> {
+    run(recording, Some(simulated), model, options, progress)
+}
+
+pub(super) fn measure_options(options: &DiagnoseOptions) -> MeasureOptions {
+    MeasureOptions { seed: options.seed, ..MeasureOptions::default() }
+}
+
+fn run(
+    recording: &Recording,
+    simulated: Option<&Recording>,
+    model: &NoiseModel,
+    options: &DiagnoseOptions,
+    progress: Progress<'_>,
+) -> Result<Diagnosed> {
     let sensor = &recording.sensor;
     let camera = &sensor.camera;
-    let bench = Workbench::new(
-        sensor,
-        MeasureOptions { seed: options.seed, ..MeasureOptions::default() },
-    );
-    let known = Known::of(model, camera);
+    let bench = Workbench::new(sensor, measure_options(options));
+    let mut known = Known::of(model, camera);
     let (mut fields, mut excluded) = read(recording, &bench, model, &known, progress);
     let mut found = Vec::new();
     if let Some(flat) = as_ranges(recording, &bench, model, &known, fields.len()) {
@@ -97,8 +141,15 @@ pub fn diagnose(
             "a diagnosis needs at least three views of a plane",
         ));
     }
+    let mut baseline = simulated
+        .map(|s| Baseline::of(s, sensor, &mut fields, model, options, progress))
+        .transpose()?;
     let mut survey = Survey::of(&fields, camera, &bench.rays);
     survey.fixed_px2 = fixed_px2(&structures(&fields, camera, &[]));
+    if let Some(baseline) = &baseline {
+        baseline.references(&mut fields);
+        baseline.means(&mut survey);
+    }
     let scale_px_m = fields[0].scale_px_m;
     let corner = corner_radius(camera);
     // One error rate for everything: half to the mean, a quarter to the variance, the rest shared.
@@ -108,18 +159,16 @@ pub fn diagnose(
     let bias_px = pixel_terms(&fields, &bias_terms, &survey, &bench);
     let mut structure = structures(&fields, camera, &bias_px);
     let lattice = lattice(&fields, recording);
-    let rows_px2 = mean_of(structure.iter().filter_map(|s| s.row_px2));
-    let fixed_px2 = fixed_px2(&structure);
-    let single = fields.iter().all(|f| f.frames.len() < 2);
-    let extra = |p: &Place| {
-        let depth_px = lattice.depth_step_m.unwrap_or(0.0) * scale_px_m / (p.z * p.z);
-        let step_px = lattice.disparity_step_px.unwrap_or(0.0);
-        // Words of a raw sensor are in the model's variance already.
-        let step_px = if is_raw(recording) { 0.0 } else { step_px };
-        // With frames to compare, what stands still is not in the variance.
-        let still = if single { fixed_px2 } else { 0.0 };
-        (depth_px * depth_px + step_px * step_px) / 12.0 + rows_px2 + still
-    };
+    let own = Steps::of(&lattice, &structure, &fields, recording);
+    let theirs = baseline.as_ref().map(|b| b.steps);
+    let extra = |p: &Place| (own.at(p) - theirs.map_or(0.0, |s| s.at(p))).max(0.0);
+    let mut compared = false;
+    if let Some(baseline) = &mut baseline {
+        let more = baseline.too_much(&structure, 0.03 * level);
+        baseline.remarks.extend(more);
+        baseline.compare(&mut structure, &lattice, &mut known);
+        compared = baseline.variances(&mut survey);
+    }
     let range_share: f64 = known
         .bias
         .iter()
@@ -136,6 +185,9 @@ pub fn diagnose(
     survey.roughen(&fields, &bias_px, extra, stretch);
     let hangs = hanging(&structure, &known, 0.03 * level);
     survey.compare_frames(&fields, common(&structure, &hangs, &known));
+    if let Some(baseline) = baseline.as_ref().filter(|_| compared) {
+        baseline.doubt(&mut survey);
+    }
     let variance = survey.search_variance(&model.sigma, camera, 0.25 * level, options.seed);
     let variance_terms = terms_of(&variance, Statistic::Variance);
     let bias_scene = Scene::bias(&survey, scale_px_m, corner);
@@ -145,13 +197,19 @@ pub fn diagnose(
     let tails = tails(&structure, &known);
     let mut terms = findings::findings(&bias_scene, &bias);
     terms.extend(findings::findings(&variance_scene, &variance));
+    for (scene, outcome) in [(&bias_scene, &bias), (&variance_scene, &variance)] {
+        if let Some(outlook) = next_view::outlook(scene, &model.sigma, camera, &bench.rays) {
+            next_view::advise(&mut terms, scene, outcome, &outlook);
+        }
+    }
     let steps = steps(&lattice, &known, &fields, recording, sigma_mm);
     // Steps shift the mean within a step, and gross errors add to the variance: neither is news.
-    let coarsest = lattice.disparity_step_px.unwrap_or(0.0).max(
-        lattice.depth_step_m.map_or(0.0, |s| s * scale_px_m / survey.reach.z[0].powi(2)),
-    );
+    let coarsest = lattice
+        .disparity_step_px
+        .unwrap_or(0.0)
+        .max(lattice.depth_step_m.map_or(0.0, |s| s * scale_px_m / survey.reach.z[0].powi(2)));
     terms.retain(|f| {
-        let stepped = !steps.is_empty()
+        let stepped = (!steps.is_empty() || baseline.is_some())
             && f.effect.is_none()
             && f.statistic == Statistic::Bias
             && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)
@@ -173,9 +231,16 @@ pub fn diagnose(
         lost.findings
             .into_iter()
             .filter(|m| m.family.is_none_or(|id| !known.has(id)))
+            .filter(|m| baseline.as_ref().is_none_or(|b| !b.loses_alike(m, &survey)))
             .map(findings::missing),
     );
-    let levels = heldout::levels(&survey, &bias_terms);
+    // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
+    let anchored: Vec<Term> = bias_terms
+        .iter()
+        .filter(|t| matches!(t.basis, Basis::RangeNotDepth | Basis::Lens { .. }))
+        .cloned()
+        .collect();
+    let levels = heldout::levels(&survey, &anchored);
     let references = reference::laws(&fields, &levels);
     found.extend(reference::findings(&references, &known, 0.1 * level, options.seed));
     let mismatch = found.iter().any(|f| f.status != Status::NotIdentifiable);
@@ -189,6 +254,7 @@ pub fn diagnose(
     merge(&mut found);
     shares(&mut found);
     let heldout = heldout::score(&survey, model, camera, scale_px_m, options);
+    let left_out = heldout::left_out(&survey, &bias_terms, BIAS_PRIOR);
     let mut map = findings::map(&bias_scene, &bias, level);
     map.extend(findings::map(&variance_scene, &variance, level));
     let after = after(&bias, &variance);
@@ -203,21 +269,36 @@ pub fn diagnose(
     }));
     let mut remarks = recording.remarks.clone();
     remarks.extend(excluded.iter().map(ToString::to_string));
+    remarks.extend(baseline.iter_mut().flat_map(|b| std::mem::take(&mut b.remarks)));
     let diagnosis = Diagnosis {
         format: DIAGNOSIS_FORMAT,
         recording: recording.root.display().to_string(),
-        reference: Reference::Model,
+        reference: if simulated.is_some() {
+            Reference::SimulatedRecording
+        } else {
+            Reference::Model
+        },
         verdict,
         findings: found,
         map,
         heldout,
+        left_out,
         after,
         detectable,
         cannot_tell,
         views,
         remarks,
     };
-    Ok(Diagnosed { diagnosis, model: extended, fields, bias: bias_terms, excluded })
+    let against = baseline.map_or_else(Vec::new, |b| b.fields);
+    Ok(Diagnosed {
+        diagnosis,
+        model: extended,
+        fields,
+        bias: bias_terms,
+        bias_px,
+        excluded,
+        against,
+    })
 }
 
 /// Do the views become flat once their words are taken for lengths of rays? Then with them.
@@ -268,6 +349,40 @@ fn ranges() -> Finding {
     }
 }
 
+/// Variance that comes by other names than sigma: of steps, rows, and pixels.
+#[derive(Debug, Clone, Copy)]
+pub struct Steps {
+    depth_px_m2: f64,
+    disparity_px: f64,
+    noise_px2: f64,
+}
+
+impl Steps {
+    pub fn of(
+        lattice: &Lattice,
+        structure: &[Structure],
+        fields: &[Field],
+        recording: &Recording,
+    ) -> Self {
+        let step_px = lattice.disparity_step_px.unwrap_or(0.0);
+        // With frames to compare, what stands still is not in the variance.
+        let single = fields.iter().all(|f| f.frames.len() < 2);
+        let still = if single { fixed_px2(structure) } else { 0.0 };
+        Steps {
+            depth_px_m2: lattice.depth_step_m.unwrap_or(0.0) * fields[0].scale_px_m,
+            // Words of a raw sensor are in the model's variance already.
+            disparity_px: if is_raw(recording) { 0.0 } else { step_px },
+            noise_px2: mean_of(structure.iter().filter_map(|s| s.row_px2)) + still,
+        }
+    }
+
+    /// At a place, px^2.
+    pub fn at(&self, p: &Place) -> f64 {
+        let depth_px = self.depth_px_m2 / (p.z * p.z);
+        (depth_px * depth_px + self.disparity_px.powi(2)) / 12.0 + self.noise_px2
+    }
+}
+
 fn is_raw(recording: &Recording) -> bool {
     matches!(recording.sensor.code, DepthCode::Disparity { .. })
 }
@@ -282,7 +397,7 @@ fn mean_of(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// How much frames of a view resemble one another, by lag, where that was found to be noise.
-fn common(structure: &[Structure], hangs: &[Hanging], known: &Known) -> [f64; 3] {
+pub(super) fn common(structure: &[Structure], hangs: &[Hanging], known: &Known) -> [f64; 3] {
     let in_time = ["frozen-noise", "temporal-correlation"];
     let told = hangs.iter().flat_map(|h| &h.families).any(|f| in_time.contains(f))
         || in_time.iter().any(|id| known.has(id));
@@ -297,7 +412,7 @@ fn common(structure: &[Structure], hangs: &[Hanging], known: &Known) -> [f64; 3]
 }
 
 /// Variance of the pixels' constant errors, px^2.
-fn fixed_px2(structure: &[Structure]) -> f64 {
+pub(super) fn fixed_px2(structure: &[Structure]) -> f64 {
     mean_of(structure.iter().filter_map(|s| s.fixed_px2))
 }
 
@@ -307,7 +422,7 @@ fn typical_sigma_px(fields: &[Field]) -> f64 {
     f64::from(crate::stats::median_in_place(&mut all))
 }
 
-fn measure_tails(
+pub(super) fn measure_tails(
     structure: &mut [Structure],
     fields: &[Field],
     bias: &[Vec<f32>],
@@ -334,7 +449,7 @@ fn measure_tails(
     });
 }
 
-fn read(
+pub(super) fn read(
     recording: &Recording,
     bench: &Workbench<'_>,
     model: &NoiseModel,
@@ -413,7 +528,7 @@ fn pixel_terms(
         .collect()
 }
 
-fn lattice(fields: &[Field], recording: &Recording) -> Lattice {
+pub(super) fn lattice(fields: &[Field], recording: &Recording) -> Lattice {
     let mut words = Words::none();
     fields.iter().for_each(|f| words.merge(&f.words));
     words.lattice(&recording.sensor, fields[0].scale_px_m)
@@ -573,8 +688,7 @@ fn extend(model: &NoiseModel, found: &[Finding], sensor: &crate::view::Sensor) -
         extended.sensor = Some(crate::view::RecordingFile::of(sensor));
     }
     for f in found {
-        let keeps = matches!(f.status, Status::Named | Status::OneOf)
-            || !f.terms.is_empty();
+        let keeps = matches!(f.status, Status::Named | Status::OneOf) || !f.terms.is_empty();
         if !keeps {
             continue;
         }
@@ -582,11 +696,12 @@ fn extend(model: &NoiseModel, found: &[Finding], sensor: &crate::view::Sensor) -
             (Status::Recalibrate, _) | (_, None) => UNEXPLAINED,
             (_, Some(id)) => id,
         };
-        extended.effects.push(Effect {
-            id: id.into(),
-            parameters: f.parameters.clone(),
-            shape: f.terms.clone(),
-        });
+        let mut parameters = f.parameters.clone();
+        if let Some(card) = effects::find(id).filter(|_| f.terms.is_empty()).map(|e| e.card()) {
+            // The simulator takes the catalogue's parameters alone.
+            parameters.retain(|name, _| card.parameters.iter().any(|p| p.name == name));
+        }
+        extended.effects.push(Effect { id: id.into(), parameters, shape: f.terms.clone() });
     }
     extended
 }

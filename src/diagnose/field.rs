@@ -91,23 +91,60 @@ impl Field {
         let target = view_target(view, bench)?;
         let camera = &bench.sensor.camera;
         let mut field = Field::empty(view, bench.sensor, target.plane, target.pixels);
-        field.sigma = field.expected_sigma(&bench.rays, sigma);
-        let expected = field.known_bias(known, bench, session_start);
         field.spread_px = (target.scale * field.scale_px_m) as f32;
         let mut source = FrameSource::new(camera.width, camera.height);
         let start = view.depth.first().map_or(0.0, |f| f.timestamp);
-        for frame in &view.depth {
-            if let Ok(image) = source.read(&frame.path) {
-                if field.frames.is_empty() {
-                    field.shadow = Shadow::beside(&field, &image, &bench.rays, &bench.table);
-                    field.rim = Rim::around(&field, &image, &bench.rays, &bench.table);
-                }
-                field.add(&image, frame.timestamp - start, &expected, &bench.table);
-            }
-        }
-        field.close();
+        let frames = view
+            .depth
+            .iter()
+            .filter_map(|frame| Some((frame.timestamp - start, source.read(&frame.path).ok()?)));
+        field.expose(frames, bench, sigma, known, session_start);
         field.look(view, &bench.rays);
         Ok(field)
+    }
+
+    /// The same pixels about the same plane, seen in other frames (time since the first, s).
+    pub fn with_frames(
+        &self,
+        frames: impl Iterator<Item = (f64, Frame)>,
+        bench: &Workbench<'_>,
+        sigma: &SigmaModel,
+        known: &Known,
+        session_start: f64,
+    ) -> Self {
+        let n = self.pixels.len();
+        let mut field = Field {
+            mean: vec![0.0; n],
+            square: vec![0.0; n],
+            count: vec![0; n],
+            measured: vec![0; n],
+            first: Vec::new(),
+            frames: Vec::new(),
+            words: Words::none(),
+            ..self.clone()
+        };
+        field.expose(frames, bench, sigma, known, session_start);
+        field
+    }
+
+    fn expose(
+        &mut self,
+        frames: impl Iterator<Item = (f64, Frame)>,
+        bench: &Workbench<'_>,
+        sigma: &SigmaModel,
+        known: &Known,
+        session_start: f64,
+    ) {
+        self.sigma = self.expected_sigma(&bench.rays, sigma);
+        let expected = self.known_bias(known, bench, session_start);
+        for (time, image) in frames {
+            if self.frames.is_empty() {
+                self.shadow = Shadow::beside(self, &image, &bench.rays, &bench.table);
+                self.rim = Rim::around(self, &image, &bench.rays, &bench.table);
+            }
+            self.add(&image, time, &expected, &bench.table);
+        }
+        self.close();
     }
 
     /// Read the view's first infrared image; one that cannot be read is as none.

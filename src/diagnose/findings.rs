@@ -105,9 +105,10 @@ pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
                     // A curve came first, but this name had explained half of it.
                     let nearly = first.candidate.family.is_none()
                         && first.candidate.basis.axis() == axis
-                        && first.rivals.iter().any(|r| {
-                            r.family == family && r.gain > NEARLY * first.gain
-                        });
+                        && first
+                            .rivals
+                            .iter()
+                            .any(|r| r.family == family && r.gain > NEARLY * first.gain);
                     first.candidate.family == c.candidate.family || nearly
                 }
                 None => first.candidate.basis.axis() == axis,
@@ -119,10 +120,7 @@ pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
             None => groups.push(vec![k]),
         }
     }
-    groups
-        .iter()
-        .map(|group| finding(scene, outcome, group, &terms, &values, &responses))
-        .collect()
+    groups.iter().map(|group| finding(scene, outcome, group, &terms, &values, &responses)).collect()
 }
 
 /// A name found after a curve on its axis stands for both if it had explained this share of it.
@@ -146,10 +144,7 @@ fn finding(
         .iter()
         .enumerate()
         .map(|(v, y)| {
-            y.iter()
-                .enumerate()
-                .map(|(i, y)| y - rest.get(v).map_or(0.0, |r| r[i]))
-                .collect()
+            y.iter().enumerate().map(|(i, y)| y - rest.get(v).map_or(0.0, |r| r[i])).collect()
         })
         .collect();
     let along = Along::of(scene, &chosen.candidate.basis);
@@ -161,9 +156,8 @@ fn finding(
     let parameters = covariance.map_or_else(Map::new, |c| {
         parameters(&terms[main].basis, &terms[main].coefficients, &c, &scene.survey.reach)
     });
-    let shape = effect
-        .is_none()
-        .then(|| shape::words(&terms[main].basis, &terms[main].coefficients));
+    let shape =
+        effect.is_none().then(|| shape::words(&terms[main].basis, &terms[main].coefficients));
     let physics = physics(status, effect, scene.statistic, axis, shape.as_deref());
     let mut finding = Finding {
         status,
@@ -208,7 +202,11 @@ pub fn naming(chosen: &Chosen) -> (Status, Option<&'static str>, Vec<Alternative
         return (Status::Unexplained, None, Vec::new());
     };
     let adequacy = chosen.gain / chosen.best_curve.max(1e-9);
-    let none = if chosen.best_curve > 0.0 { 1.0 / (1.0 + ((adequacy - 0.66) / 0.05).exp()) } else { 0.0 };
+    let none = if chosen.best_curve > 0.0 {
+        1.0 / (1.0 + ((adequacy - chosen.adequacy - 0.06) / 0.05).exp())
+    } else {
+        0.0
+    };
     let best = chosen.rivals.iter().find(|r| r.family == family).map_or(chosen.gain, |r| r.gain);
     let mut odds: Vec<(&'static str, f64)> = vec![(family, 1.0)];
     for rival in chosen.rivals.iter().filter(|r| r.family != family) {
@@ -275,7 +273,10 @@ impl Along {
                     Basis::Ring { period, .. } => *period,
                     _ => 1.0,
                 };
-                ("fraction of a pixel of disparity", Box::new(move |p| (p.disparity / period).rem_euclid(1.0)))
+                (
+                    "fraction of a pixel of disparity",
+                    Box::new(move |p| (p.disparity / period).rem_euclid(1.0)),
+                )
             }
             Axis::Column => ("column, px", Box::new(|p| p.u)),
             Axis::Row => ("row, px", Box::new(|p| p.v)),
@@ -291,7 +292,9 @@ impl Along {
                 _ => ("right on the board, m", Box::new(|p| p.right)),
             },
             Axis::EdgeDistance => ("distance from the target's edge, px", Box::new(|p| p.edge)),
-            Axis::Intensity => ("infrared light of the surface, of the median", Box::new(|p| p.light)),
+            Axis::Intensity => {
+                ("infrared light of the surface, of the median", Box::new(|p| p.light))
+            }
             Axis::SessionTime => ("time since the first view, s", Box::new(|p| p.session_s)),
             Axis::Temperature => ("temperature, degrees Celsius", Box::new(|p| p.temperature_c)),
             _ => ("", Box::new(|p| p.z)),
@@ -364,8 +367,7 @@ impl Along {
             }
             let mean = by_view.iter().map(|s| s[b][1]).sum::<f64>() / total;
             let model = by_view.iter().map(|s| s[b][2]).sum::<f64>() / total;
-            let scatter: f64 =
-                by_view.iter().map(|s| (s[b][1] - s[b][0] * mean).powi(2)).sum();
+            let scatter: f64 = by_view.iter().map(|s| (s[b][1] - s[b][0] * mean).powi(2)).sum();
             let error = scatter.sqrt() / total;
             curve.x.push(by_view.iter().map(|s| s[b][3]).sum::<f64>() / total);
             curve.y.push(show(mean));
@@ -471,8 +473,7 @@ pub fn missing(found: MissingFinding) -> Finding {
         .family
         .is_none()
         .then(|| format!("more is lost from {:.4} to {:.4}", found.interval[0], found.interval[1]));
-    let words =
-        physics(status, found.family, Statistic::Missing, found.axis, shape.as_deref());
+    let words = physics(status, found.family, Statistic::Missing, found.axis, shape.as_deref());
     Finding {
         status,
         effect: found.family,

@@ -3,7 +3,7 @@
 use rand::Rng;
 use rand::seq::SliceRandom;
 
-use super::diagnosis::HeldOut;
+use super::diagnosis::{HeldOut, LeftOut};
 use super::engine::{DiagnoseOptions, terms_of};
 use super::evidence::{Rows, gain};
 use super::layers::{Survey, SurveyedView, coarser};
@@ -39,12 +39,7 @@ pub fn score(
     let level = options.level;
     let bias = chosen_on.search_bias(camera, 0.4 * level, options.seed);
     let bias_terms = terms_of(&bias, Statistic::Bias);
-    let variance = chosen_on.search_variance(
-        &model.sigma,
-        camera,
-        0.25 * level,
-        options.seed,
-    );
+    let variance = chosen_on.search_variance(&model.sigma, camera, 0.25 * level, options.seed);
     let variance_terms = terms_of(&variance, Statistic::Variance);
     let means: Vec<ViewData> = judged_on.mean_data().iter().map(coarser).collect();
     let blocks = judged_on.variance_data();
@@ -182,11 +177,12 @@ pub fn rms_by_view(survey: &Survey, terms: &[Term]) -> Vec<f64> {
 
 /// Every view with coefficients fitted to the others, the shapes as chosen on all: root mean
 /// square of every pixel of every frame to a plane, px, before and after.
-pub fn left_out(survey: &Survey, terms: &[Term], prior: f64) -> Option<[f64; 2]> {
+pub fn left_out(survey: &Survey, terms: &[Term], prior: f64) -> Option<LeftOut> {
     let data: Vec<ViewData> = survey.mean_data().iter().map(coarser).collect();
     let evidence = super::search::evidence_of(&data, terms);
     gain(&evidence, prior)?;
     let (mut sums, mut n) = ([0.0; 2], 0.0);
+    let mut by_view = [0.0; 2];
     for (v, view) in survey.views.iter().enumerate() {
         let beta = super::evidence::fit_without(&evidence, v, prior)?;
         let mut rest = beta.as_slice();
@@ -198,14 +194,25 @@ pub fn left_out(survey: &Survey, terms: &[Term], prior: f64) -> Option<[f64; 2]>
                 Term { coefficients: mine.to_vec(), ..t.clone() }
             })
             .collect();
-        for (sum, terms) in sums.iter_mut().zip([&[][..], &refitted]) {
+        let pixels: f64 = view.tiles.iter().filter(|t| t.mean.is_finite()).map(|t| t.pixels).sum();
+        let both = sums.iter_mut().zip(&mut by_view).zip([&[][..], &refitted]);
+        for ((sum, by_view), terms) in both {
+            let before = *sum;
             for (t, f) in view.tiles.iter().zip(&fitted(view, terms)) {
                 if t.mean.is_finite() {
                     *sum += t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0);
                 }
             }
+            *by_view += ((*sum - before) / pixels.max(1.0)).sqrt();
         }
-        n += view.tiles.iter().filter(|t| t.mean.is_finite()).map(|t| t.pixels).sum::<f64>();
+        n += pixels;
     }
-    Some(sums.map(|s| (s / n).sqrt()))
+    let [before, after] = sums.map(|s| (s / n).sqrt());
+    let [mean_before, mean_after] = by_view.map(|s| s / survey.views.len() as f64);
+    Some(LeftOut {
+        rms_px_before: before,
+        rms_px_after: after,
+        mean_of_views_px_before: mean_before,
+        mean_of_views_px_after: mean_after,
+    })
 }

@@ -39,6 +39,19 @@ impl Known {
         known
     }
 
+    /// Take a parameter of an effect for known; nothing is taken out for it.
+    pub fn learn(&mut self, id: &str, name: &str, value: f64) {
+        let entry = match self.entries.iter().position(|e| e.0 == id) {
+            Some(k) => &mut self.entries[k],
+            None => {
+                self.entries.push((id.into(), Map::new()));
+                let last = self.entries.len() - 1;
+                &mut self.entries[last]
+            }
+        };
+        entry.1.insert(name.into(), value.into());
+    }
+
     pub fn has(&self, id: &str) -> bool {
         self.entries.iter().any(|(known, _)| known == id)
     }
@@ -61,19 +74,20 @@ fn formula(id: &str, parameters: &Map<String, Value>, camera: &Camera) -> Vec<Te
     let bias = |basis, coefficients| term(Statistic::Bias, basis, coefficients);
     let variance = |basis, coefficients| term(Statistic::Variance, basis, coefficients);
     let found = match id {
-        "radial-disparity-bias" => get("k_px")
-            .and_then(|k| bias(Basis::Bowl { disparity_power: 0.0, orders: 1 }, vec![k])),
-        "lens-distortion" => get("k1").and_then(|k| {
-            bias(Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 1 }, vec![k])
-        }),
+        "radial-disparity-bias" => {
+            get("k_px").and_then(|k| bias(Basis::Bowl { disparity_power: 0.0, orders: 1 }, vec![k]))
+        }
+        "lens-distortion" => get("k1")
+            .and_then(|k| bias(Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 1 }, vec![k])),
         "range-not-depth" => bias(Basis::RangeNotDepth, vec![get("share").unwrap_or(1.0)]),
         "pixel-locking" => get("amplitude_px")
             .and_then(|a| bias(Basis::Locking { period_px: 1.0, harmonics: 1 }, vec![-a, 0.0])),
         "column-banding" => get("amplitude_px")
             .zip(get("period_px"))
             .and_then(|(a, period)| bias(columns(camera), saw_tooth(camera, a, period))),
-        "range-exponent" => get("excess")
-            .and_then(|x| variance(Basis::RangeExponent { pivot_m: 2.0, orders: 1 }, vec![2.0 * x])),
+        "range-exponent" => get("excess").and_then(|x| {
+            variance(Basis::RangeExponent { pivot_m: 2.0, orders: 1 }, vec![2.0 * x])
+        }),
         "vignetting" => get("growth").and_then(|growth| {
             let nodes = 33;
             let values = (0..nodes)

@@ -98,8 +98,7 @@ impl Survey {
             prior: BIAS_PRIOR,
             adequacy: ADEQUATE,
             most_terms: MOST_TERMS,
-            fixed: (self.fixed_px2 > 0.0)
-                .then(|| (self.fixed_px2.sqrt(), camera.pixels() as f64)),
+            fixed: (self.fixed_px2 > 0.0).then(|| (self.fixed_px2.sqrt(), camera.pixels() as f64)),
         };
         let mut candidates = bias::families(camera, &self.reach);
         candidates.extend(bias::curves(camera, &self.reach));
@@ -304,7 +303,7 @@ struct Blocks {
 }
 
 /// Side of a block, in tiles: 24 px, seven independent samples under a Kinect's window.
-const BLOCK_TILES: usize = 6;
+pub const BLOCK_TILES: usize = 6;
 
 impl Blocks {
     fn of(view: &SurveyedView) -> Self {
@@ -401,10 +400,8 @@ const MODEL_TOLERANCE: f64 = 0.1;
 /// Variance of the views' own levels beyond what their samples explain (DerSimonian and Laird's
 /// moment estimate), about a line in log z: what a law of the distance explains is no scatter.
 fn view_scatter(blocks: &[Blocks]) -> f64 {
-    let levels: Vec<(f64, f64, f64)> = blocks
-        .iter()
-        .filter_map(|b| b.level().map(|(y, v)| (b.places[0].z.ln(), y, v)))
-        .collect();
+    let levels: Vec<(f64, f64, f64)> =
+        blocks.iter().filter_map(|b| b.level().map(|(y, v)| (b.places[0].z.ln(), y, v))).collect();
     let floor = MODEL_TOLERANCE * MODEL_TOLERANCE;
     let n = levels.len() as f64;
     if n < 4.0 {

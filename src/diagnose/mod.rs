@@ -1,5 +1,6 @@
 //! When simulation and recording differ: where, why, and what is gained by knowing.
 
+mod against;
 mod bias;
 mod candidate;
 mod detectable;
@@ -11,8 +12,6 @@ mod findings;
 mod heldout;
 mod known;
 mod lattice;
-mod noise;
-mod parameters;
 mod layers;
 mod missing;
 mod missing_cells;
@@ -20,24 +19,29 @@ mod missing_fit;
 mod missing_report;
 mod missing_search;
 mod missing_shapes;
+mod next_view;
+mod noise;
+mod parameters;
+mod partners;
+mod pictures;
 mod reach;
 mod reference;
 mod rim;
 mod search;
-mod shape;
 mod shadow;
 mod shadow_test;
+mod shape;
 mod smooth;
 mod structure;
 mod tiles;
 mod variance;
 
 pub use diagnosis::*;
-pub use engine::{DiagnoseOptions, Diagnosed, diagnose};
+pub use engine::{DiagnoseOptions, Diagnosed, diagnose, diagnose_against};
 pub use field::Field;
 pub use known::Known;
 pub use lattice::{Lattice, Words};
 pub use layers::Survey;
 pub use missing::{MissingFinding, MissingOutcome, missing};
+pub use pictures::{ViewPictures, pictures};
 pub use search::Outcome;
-

@@ -139,8 +139,10 @@ fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
     let static_part = |s: &Structure| -> Option<f64> {
         let (c1, c2) = (s.lagged[0]?, s.lagged[1]?);
         let c3 = s.lagged[2].unwrap_or(c2 * c2 / c1.max(1e-6));
-        Some(still_share([c1, c2, c3], s.lagged[2].is_some())
-            - fixed_px2 / s.variance_px2.max(1e-12))
+        Some(
+            still_share([c1, c2, c3], s.lagged[2].is_some())
+                - fixed_px2 / s.variance_px2.max(1e-12),
+        )
     };
     let falling = Mean::of(views.iter().filter_map(|s| Some(s.lagged[0]? - s.lagged[last]?)));
     let still = Mean::of(views.iter().filter_map(static_part));
@@ -228,9 +230,9 @@ fn lines(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
         let share = (m.value - expected) / variance.max(1e-12);
         if p < level && share > 0.004 {
             let sigma = m.value.max(0.0).sqrt();
-            let words = families.is_empty().then(|| {
-                "each column is shifted as one, afresh in every frame".to_string()
-            });
+            let words = families
+                .is_empty()
+                .then(|| "each column is shifted as one, afresh in every frame".to_string());
             found.push(Hanging {
                 families,
                 statistic: Statistic::Correlation,
@@ -285,8 +287,7 @@ fn frames(views: &[Structure], known: &Known, level: f64, rho: f64) -> Vec<Hangi
     let n = all.len() as f64;
     // Motion: the line explains more than the scatter about it does.
     let per_trend = trend / n;
-    let per_scatter = (scatter / freedom)
-        .max(all.iter().map(|j| j.expected_px2).sum::<f64>() / n);
+    let per_scatter = (scatter / freedom).max(all.iter().map(|j| j.expected_px2).sum::<f64>() / n);
     // Frames that resemble their neighbours wander.
     let wander = (1.0 + rho) / (1.0 - rho).max(0.05);
     let f = per_trend / (per_scatter * wander * wander).max(1e-300);
@@ -314,8 +315,8 @@ fn frames(views: &[Structure], known: &Known, level: f64, rho: f64) -> Vec<Hangi
         .map(|j| j.scatter_px2 / (j.expected_px2 + known_px * known_px).max(1e-300))
         .sum();
     let p_jitter = ChiSquared::new(freedom).map_or(1.0, |d| 1.0 - d.cdf(ratio / JITTER));
-    let jitter_px2 = all.iter().map(|j| j.scatter_px2 - j.freedom * j.expected_px2).sum::<f64>()
-        / freedom;
+    let jitter_px2 =
+        all.iter().map(|j| j.scatter_px2 - j.freedom * j.expected_px2).sum::<f64>() / freedom;
     let aside = moving && jitter_px2 < 0.15 * per_trend;
     if p_jitter < level && jitter_px2 > 0.0 && !aside {
         let sigma = jitter_px2.sqrt();
@@ -366,7 +367,8 @@ pub fn tails(views: &[Structure], known: &Known) -> Option<Hanging> {
         parameters,
         size_sigma: size.value,
         p: m.p_above(GAUSSIAN_TAIL),
-        nats: m.value * looked.iter().map(|s| s.tail_pixels).sum::<f64>()
+        nats: m.value
+            * looked.iter().map(|s| s.tail_pixels).sum::<f64>()
             * (m.value / GAUSSIAN_TAIL).ln(),
         words: None,
     })

@@ -41,10 +41,12 @@ pub fn parameters(
             if (b[0] * right).abs() > (b[1] * down).abs() { -b[0] * right } else { -b[1] * down }
         }),
         Basis::Locking { period_px, .. } => {
-            add("amplitude_px", &|b| greatest(|t| {
-                let p = Place { disparity: t * period_px, ..Place::default() };
-                value(basis, b, p)
-            }));
+            add("amplitude_px", &|b| {
+                greatest(|t| {
+                    let p = Place { disparity: t * period_px, ..Place::default() };
+                    value(basis, b, p)
+                })
+            });
         }
         Basis::Banding { period_px, .. } => {
             add("amplitude_px", &|b| {
@@ -76,16 +78,25 @@ pub fn parameters(
     }
     match *basis {
         Basis::Bowl { disparity_power, .. } => {
-            map.insert("disparity_power".into(), json!({ "value": disparity_power, "std_error": 0.25 }));
+            map.insert(
+                "disparity_power".into(),
+                json!({ "value": disparity_power, "std_error": 0.25 }),
+            );
         }
         Basis::Banding { period_px, .. } => {
-            map.insert("period_px".into(), json!({ "value": period_px, "std_error": 0.02 * period_px }));
+            map.insert(
+                "period_px".into(),
+                json!({ "value": period_px, "std_error": 0.02 * period_px }),
+            );
         }
         Basis::Locking { period_px, .. } => {
             map.insert("period_px".into(), json!({ "value": period_px, "std_error": 0.003 }));
         }
         Basis::EdgeMixing { width_px } => {
-            map.insert("width_px".into(), json!({ "value": width_px, "std_error": 0.4 * width_px }));
+            map.insert(
+                "width_px".into(),
+                json!({ "value": width_px, "std_error": 0.4 * width_px }),
+            );
         }
         _ => {}
     }

@@ -90,17 +90,7 @@ pub fn laws(fields: &[Field], levels: &[f64]) -> Vec<Law> {
             }));
             let (rms_m, rms_sigma) = (square(&shift), square(&|c| shift(c) / c.sigma_m));
             let error_m = variance.sqrt();
-            laws.push(Law {
-                family,
-                axis,
-                reach,
-                rms_m,
-                rms_sigma,
-                error_m,
-                settled,
-                gain,
-                null,
-            });
+            laws.push(Law { family, axis, reach, rms_m, rms_sigma, error_m, settled, gain, null });
         }
     };
     add("depth-scale", Axis::Z, Vec::new(), &|c| c.z);

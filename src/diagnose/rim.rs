@@ -83,10 +83,8 @@ fn between(walk: &[(f64, f64)], clip: f64) -> Option<f64> {
         stretch.iter().all(|d| d.0.is_finite() && d.0 < d.1 - STEP * clip) && high - low < clip
     })?;
     let behind = walk[start..start + BEHIND].iter().map(|d| d.0).sum::<f64>() / BEHIND as f64;
-    let mixed = walk[..start]
-        .iter()
-        .filter(|(d, plane)| *d < plane - clip && *d > behind + clip)
-        .count();
+    let mixed =
+        walk[..start].iter().filter(|(d, plane)| *d < plane - clip && *d > behind + clip).count();
     Some(mixed as f64)
 }
 

@@ -7,7 +7,7 @@ use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain, Null, Rows, gain};
 use super::tiles::SIDE;
 use crate::rng::Seed;
-use crate::terms::{Basis, Place, Term};
+use crate::terms::{Basis, Over, Place, Term};
 
 /// One view's samples.
 pub struct ViewData {
@@ -50,6 +50,8 @@ pub struct Rival {
 #[derive(Debug, Clone)]
 pub struct Chosen {
     pub candidate: Candidate,
+    /// The share of the best curve that its name had to explain.
+    pub adequacy: f64,
     /// Nats over the terms before it.
     pub gain: f64,
     /// The best nameless curve's at the same step, nats.
@@ -98,7 +100,7 @@ impl Outcome {
 const AS_GOOD_NATS: f64 = 2.0;
 /// A later term must bring this share of what the first brought: what is less is the first one's
 /// own shape, badly met.
-const LEAST_SHARE: f64 = 0.01;
+const LEAST_SHARE: f64 = 0.005;
 
 /// Search a layer. `coarse` has the same views in larger patches, for shapes that do not change
 /// within them.
@@ -194,8 +196,8 @@ impl NoiseGains {
 struct Prepared<'a> {
     fine: (&'a [Place], Rows),
     coarse: (&'a [Place], Rows),
-    /// By columns of tiles, with a place for each.
-    columns: (Vec<Place>, Rows),
+    /// The fine samples gathered by one coordinate, with a place for each group.
+    groups: Vec<(Over, Vec<Place>, Rows)>,
 }
 
 struct Layer<'a> {
@@ -229,10 +231,7 @@ impl<'a> Layer<'a> {
     fn evidence_of(&self, terms: &[&Basis]) -> Vec<Evidence> {
         let fine = terms.iter().any(|b| b.is_fine() || b.of_column_alone());
         let views = if fine { self.fine } else { self.coarse };
-        views
-            .par_iter()
-            .filter_map(|v| Some(rows(v, terms, &[])?.reduce(0, |_, _| ())))
-            .collect()
+        views.par_iter().filter_map(|v| Some(rows(v, terms, &[])?.reduce(0, |_, _| ()))).collect()
     }
 
     /// Terms with a name are fitted anew beside every candidate; those without have many columns
@@ -261,8 +260,7 @@ impl<'a> Layer<'a> {
     /// The best candidate beside `chosen`, if it brings more than noise can.
     fn step(&mut self, chosen: &[Chosen]) -> Option<Chosen> {
         let views = self.prepare(chosen);
-        let before: Vec<Evidence> =
-            views.iter().map(|v| v.coarse.1.reduce(0, |_, _| ())).collect();
+        let before: Vec<Evidence> = views.iter().map(|v| v.coarse.1.reduce(0, |_, _| ())).collect();
         let m = before.first()?.b.len();
         let base = if m > 0 {
             gain(&before, self.rules.prior)?
@@ -279,6 +277,12 @@ impl<'a> Layer<'a> {
             .candidates
             .par_iter()
             .map(|c| {
+                // A name is taken once; what its shape misses is left to the curves.
+                let taken =
+                    c.family.is_some() && chosen.iter().any(|old| old.candidate.family == c.family);
+                if taken {
+                    return None;
+                }
                 let evidence: Vec<Evidence> = views.iter().map(|v| v.evidence(&c.basis)).collect();
                 let null = Null::of(&evidence, m, self.rules.prior)?;
                 let mut gain = gain(&evidence, self.rules.prior)?;
@@ -324,7 +328,7 @@ impl<'a> Layer<'a> {
             .copied()
             .filter(|&i| total(i) > best_family - AS_GOOD_NATS)
             .min_by_key(|&i| self.candidates[i].basis.count())
-            .filter(|&i| safe(i) > threshold && total(i) > self.rules.adequacy * best_curve)
+            .filter(|&i| safe(i) > threshold && total(i) > self.adequacy(i) * best_curve)
             .filter(|&i| judged[i].as_ref().is_some_and(|j| j.sensible))
             .filter(|&i| {
                 let clear = total(i) > CLEAR * best_curve;
@@ -334,9 +338,8 @@ impl<'a> Layer<'a> {
             let again = chosen.iter().any(|c| same_curve(&c.candidate, &self.candidates[i]));
             !again && judged[i].as_ref().is_some_and(|j| j.sensible)
         };
-        let winner = named.or_else(|| {
-            curves.iter().copied().find(|&i| safe(i) > threshold && sensible(i))
-        })?;
+        let winner = named
+            .or_else(|| curves.iter().copied().find(|&i| safe(i) > threshold && sensible(i)))?;
         let won = &judged[winner].as_ref()?.gain;
         let mut rivals: Vec<Rival> = Vec::new();
         for &i in &families {
@@ -352,11 +355,21 @@ impl<'a> Layer<'a> {
         }
         Some(Chosen {
             candidate: self.candidates[winner].clone(),
+            adequacy: self.adequacy(winner),
             gain: total(winner),
             best_curve,
             rivals,
             p: noise.p(safe(winner)),
         })
+    }
+
+    /// The share of the best curve that a name must explain. Bands on a real sensor ride on a
+    /// smooth error of the column that is no band's.
+    fn adequacy(&self, i: usize) -> f64 {
+        match self.candidates[i].basis {
+            Basis::Banding { .. } => BANDS_ADEQUATE.min(self.rules.adequacy),
+            _ => self.rules.adequacy,
+        }
     }
 
     fn sensible(&self, basis: &Basis, m: usize, gain: &Gain, evidence: &[Evidence]) -> bool {
@@ -369,10 +382,8 @@ impl<'a> Layer<'a> {
             return true;
         };
         let k = basis.count();
-        let square: f64 = evidence
-            .iter()
-            .map(|e| beta.dot(&(e.a.view((m, m), (k, k)) * &beta)))
-            .sum();
+        let square: f64 =
+            evidence.iter().map(|e| beta.dot(&(e.a.view((m, m), (k, k)) * &beta))).sum();
         let weight: f64 = self.coarse.iter().flat_map(|v| &v.weight).sum();
         const CLEARLY: f64 = 4.0;
         square / weight > CLEARLY * fixed * fixed * k as f64 / pixels
@@ -462,6 +473,8 @@ fn looks(candidates: &[Candidate], judged: &[Option<Judged>], noise: &NoiseGains
         .collect()
 }
 
+/// See [`Layer::adequacy`].
+const BANDS_ADEQUATE: f64 = 0.45;
 /// A name that explains this share of what the best nameless curve does is met by its own shape.
 const CLEAR: f64 = 0.85;
 
@@ -515,23 +528,49 @@ fn prepare<'a>(
 ) -> Option<Prepared<'a>> {
     let rows_fine = rows(fine, beside, settled)?;
     let places = &fine.places;
-    let key = |i: usize| (places[i].u / SIDE as f64) as usize;
-    let count = (0..places.len()).map(|i| key(i) + 1).max().unwrap_or(0);
-    let mut column_places = vec![Place::default(); count];
-    for (i, place) in places.iter().enumerate() {
-        column_places[key(i)] = *place;
-    }
+    let side = SIDE as f64;
+    let groups = vec![
+        gather(&rows_fine, places, Over::Column, side),
+        gather(&rows_fine, places, Over::Row, side),
+        gather(&rows_fine, places, Over::Disparity, DISPARITY_GROUP_PX),
+        gather(&rows_fine, places, Over::Edge, EDGE_GROUP_PX),
+    ];
     Some(Prepared {
-        columns: (column_places, rows_fine.grouped(count, key)),
+        groups,
         fine: (places, rows_fine),
         coarse: (&coarse.places, rows(coarse, beside, settled)?),
     })
 }
 
+/// Disparities this near are one, px: a thirtieth of a locking's period.
+const DISPARITY_GROUP_PX: f64 = 1.0 / 30.0;
+const EDGE_GROUP_PX: f64 = 0.5;
+
+/// Samples in steps of one coordinate; each group lies where its samples do on average.
+fn gather(rows: &Rows, places: &[Place], over: Over, step: f64) -> (Over, Vec<Place>, Rows) {
+    let low = places.iter().map(|p| over.value(p)).fold(f64::INFINITY, f64::min);
+    let key = |i: usize| ((over.value(&places[i]) - low) / step) as usize;
+    let count = (0..places.len()).map(|i| key(i) + 1).max().unwrap_or(0);
+    let mut sums = vec![(Place::default(), [0.0; 6], 0.0); count];
+    for (i, p) in places.iter().enumerate() {
+        let (first, sum, n) = &mut sums[key(i)];
+        *first = *p;
+        *n += 1.0;
+        let values = [p.u, p.v, p.disparity, p.z, p.edge, p.radius];
+        sum.iter_mut().zip(values).for_each(|(s, v)| *s += v);
+    }
+    let mean = |(place, sum, n): &(Place, [f64; 6], f64)| {
+        let [u, v, disparity, z, edge, radius] = sum.map(|s| s / f64::max(*n, 1.0));
+        Place { u, v, disparity, z, edge, radius, ..*place }
+    };
+    (over, sums.iter().map(mean).collect(), rows.grouped(count, key))
+}
+
 impl Prepared<'_> {
     fn evidence(&self, basis: &Basis) -> Evidence {
-        let (places, rows): (&[Place], &Rows) = if basis.of_column_alone() {
-            (&self.columns.0, &self.columns.1)
+        let alone = basis.alone().and_then(|over| self.groups.iter().find(|g| g.0 == over));
+        let (places, rows): (&[Place], &Rows) = if let Some((_, places, rows)) = alone {
+            (places, rows)
         } else if basis.is_fine() {
             (self.fine.0, &self.fine.1)
         } else {

@@ -69,8 +69,7 @@ pub fn structures(fields: &[Field], camera: &Camera, bias: &[Vec<f32>]) -> Vec<S
     let means: Vec<Vec<f32>> =
         means.iter().map(|m| without_lines(m, camera.width, SHORT_LINE)).collect();
     let fixed = across_views(&means);
-    let mut all: Vec<Structure> =
-        views.par_iter().map(|(f, b)| structure(f, camera, b)).collect();
+    let mut all: Vec<Structure> = views.par_iter().map(|(f, b)| structure(f, camera, b)).collect();
     for (s, (fixed, with_lines)) in all.iter_mut().zip(fixed.into_iter().zip(with_lines)) {
         s.fixed_px2 = fixed;
         s.lines_px2 = with_lines.zip(fixed).map(|(all, fixed)| all - fixed);
@@ -80,8 +79,7 @@ pub fn structures(fields: &[Field], camera: &Camera, bias: &[Vec<f32>]) -> Vec<S
 
 fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     let mut s = Structure::default();
-    let frames: Vec<Vec<f32>> =
-        field.first.iter().map(|r| calm(&rough(field, r, bias))).collect();
+    let frames: Vec<Vec<f32>> = field.first.iter().map(|r| calm(&rough(field, r, bias))).collect();
     let Some(first) = frames.first() else { return s };
     s.variance_px2 = mean(first.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
     let level: Vec<Vec<f32>> =
@@ -314,9 +312,11 @@ fn jitter(field: &Field, s: &Structure, correlation_sum: f64) -> Option<Jitter> 
         return None;
     }
     let still = s.lagged[0].unwrap_or(0.0).clamp(0.0, 1.0);
-    let rows = field.pixels.last().zip(field.pixels.first()).map_or(1.0, |(last, first)| {
-        f64::from(last - first) / field.width as f64 + 1.0
-    });
+    let rows = field
+        .pixels
+        .last()
+        .zip(field.pixels.first())
+        .map_or(1.0, |(last, first)| f64::from(last - first) / field.width as f64 + 1.0);
     let own = s.variance_px2 * (1.0 - still) * correlation_sum / field.measured_pixels().max(1.0);
     let trend_px2 = tm * tm / tt;
     let z = field.scale_px_m / disparity;

@@ -116,6 +116,7 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
         s.add(u, v, f64::from(places.edge[i as usize]));
         s.asked += frames;
         s.missing += frames - f64::from(field.measured[k]);
+        s.variance += f64::from(field.sigma[k]).powi(2);
         let (mean, square) = (f64::from(field.mean[k]), f64::from(field.square[k]));
         if mean.is_finite() {
             s.n += 1.0;
@@ -128,7 +129,6 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
                 s.rough_square += rough * rough;
             }
             s.light += f64::from(field.light.get(k).copied().unwrap_or(1.0));
-            s.variance += f64::from(field.sigma[k]).powi(2);
         }
     }
     let mut tiles: Vec<Tile> =
@@ -168,7 +168,7 @@ impl Sums {
     fn tile(&self, places: &Places<'_>) -> Tile {
         let (u, v) = (self.u / self.pixels, self.v / self.pixels);
         let place = places.at(u, v, places.camera.ray(u, v), self.edge / self.pixels);
-        let variance = self.variance / self.n;
+        let variance = self.variance / self.pixels;
         Tile {
             place: Place { light: self.light / self.n, variance, ..place },
             mean: self.mean / self.n,

@@ -44,9 +44,8 @@ pub fn families(reach: &Reach, sigma: &SigmaModel) -> Vec<Candidate> {
 fn recalibrations(reach: &Reach, sigma: &SigmaModel) -> Vec<Candidate> {
     let (z_m, theta_rad) = (reach.z, [reach.theta[0], reach.theta[1].max(reach.theta[0] + 1e-3)]);
     let table = |model: &SigmaModel| -> Vec<f64> {
-        let at = |[low, high]: [f64; 2], k: usize| {
-            low + (high - low) * k as f64 / (TABLE - 1) as f64
-        };
+        let at =
+            |[low, high]: [f64; 2], k: usize| low + (high - low) * k as f64 / (TABLE - 1) as f64;
         (0..TABLE * TABLE)
             .map(|n| 2.0 * model.sigma(at(z_m, n % TABLE), at(theta_rad, n / TABLE)).ln())
             .collect()
@@ -60,8 +59,8 @@ fn recalibrations(reach: &Reach, sigma: &SigmaModel) -> Vec<Candidate> {
             moved.parameters[j] += step;
             let column: Vec<f64> =
                 table(&moved).iter().zip(&base).map(|(m, b)| (m - b) / 0.01).collect();
-            let told = column.iter().all(|c| c.is_finite())
-                && column.iter().any(|c| c.abs() > 0.05);
+            let told =
+                column.iter().all(|c| c.is_finite()) && column.iter().any(|c| c.abs() > 0.05);
             told.then_some(column)
         })
         .collect();
@@ -73,8 +72,7 @@ fn recalibrations(reach: &Reach, sigma: &SigmaModel) -> Vec<Candidate> {
         .filter_map(|(j, factor)| {
             let mut moved = sigma.clone();
             moved.parameters[j] *= factor;
-            let column: Vec<f64> =
-                table(&moved).iter().zip(&base).map(|(m, b)| m - b).collect();
+            let column: Vec<f64> = table(&moved).iter().zip(&base).map(|(m, b)| m - b).collect();
             column.iter().all(|c| c.is_finite()).then_some(column)
         })
         .collect();

@@ -5,10 +5,11 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::plan::ViewPlan;
+use crate::camera::Rays;
 use crate::effects::ROOM_LUX;
 use crate::error::Result;
 use crate::measure::{MeasureOptions, Workbench, view_target};
-use crate::plane::Target as Found;
+use crate::plane::{Plane, Target as Found};
 use crate::rng::Seed;
 use crate::scene::{Bench, Target, TargetFrame};
 use crate::view::{Excluded, Recording, View, ViewNotes};
@@ -45,30 +46,44 @@ fn plan(
     seed: Seed,
 ) -> ViewPlan {
     let plane = target.plane;
-    let mut mask = vec![false; bench.sensor.camera.pixels()];
-    let mut middle = Vector3::zeros();
-    for &i in &target.pixels {
-        mask[i as usize] = true;
-        let (x, y) = bench.rays.at(i as usize);
-        middle += Vector3::new(x, y, 1.0) * plane.depth(x, y);
-    }
     let reference_distance_m = view.notes.reference_distance_m.map(|_| {
         let name = format!("simulate/reference/{}", view.name);
         let off: f64 = StandardNormal.sample(&mut seed.stream(&name));
         plane.depth(0.0, 0.0) + reference_error_m * off
     });
     let reference_distance_m = reference_distance_m.filter(|d| *d > 0.0);
+    let notes = ViewNotes { reference_distance_m, ..view.notes.clone() };
+    let stamps = view.depth.iter().map(|f| f.timestamp).collect();
+    plan_on(&view.name, &plane, &target.pixels, &bench.rays, stamps, notes)
+}
+
+/// A view of these pixels of a plane.
+pub fn plan_on(
+    name: &str,
+    plane: &Plane,
+    pixels: &[u32],
+    rays: &Rays,
+    stamps: Vec<f64>,
+    notes: ViewNotes,
+) -> ViewPlan {
+    let mut mask = vec![false; rays.x.len()];
+    let mut middle = Vector3::zeros();
+    for &i in pixels {
+        mask[i as usize] = true;
+        let (x, y) = rays.at(i as usize);
+        middle += Vector3::new(x, y, 1.0) * plane.depth(x, y);
+    }
     ViewPlan {
-        name: view.name.clone(),
+        name: name.into(),
         bench: Bench {
-            frame: TargetFrame::on(&plane, middle / target.pixels.len() as f64),
+            frame: TargetFrame::on(plane, middle / pixels.len() as f64),
             // The pixels of the real target are its outline.
-            ..Bench::bare(plane, Target::Wall)
+            ..Bench::bare(*plane, Target::Wall)
         },
         mask: Some(mask),
         // As measured; where nobody looked, the same in all views.
-        ambient_lux: view.notes.ambient_lux.unwrap_or(ROOM_LUX),
-        stamps: view.depth.iter().map(|f| f.timestamp).collect(),
-        notes: ViewNotes { reference_distance_m, ..view.notes.clone() },
+        ambient_lux: notes.ambient_lux.unwrap_or(ROOM_LUX),
+        stamps,
+        notes,
     }
 }

@@ -16,6 +16,6 @@ pub mod speckle;
 pub use formula::{FormulaSensor, Shooting, Shot, shoot};
 pub use grid::{Grid, GridView};
 pub use kinect::kinect_v1;
-pub use like::plan_like;
+pub use like::{plan_like, plan_on};
 pub use plan::{RATE_HZ, Scenery, ViewPlan, plan_grid};
 pub use shoot::{Physics, Shoot};

@@ -271,12 +271,25 @@ impl Basis {
         row.iter().zip(coefficients).map(|(g, b)| g * b).sum()
     }
 
+    /// Does it depend on one coordinate of a view alone?
+    pub fn alone(&self) -> Option<Over> {
+        match self {
+            Basis::Banding { .. } => Some(Over::Column),
+            Basis::Locking { .. } => Some(Over::Disparity),
+            Basis::EdgeMixing { .. } => Some(Over::Edge),
+            Basis::Curve { over, times: Times::One, .. }
+            | Basis::Ring { over, times: Times::One, .. } => match over {
+                Over::Column | Over::Row | Over::Edge => Some(*over),
+                Over::Disparity | Over::Z | Over::LogZ => Some(Over::Disparity),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
     /// Does it depend on the column of the picture alone?
     pub fn of_column_alone(&self) -> bool {
-        matches!(
-            self,
-            Basis::Banding { .. } | Basis::Curve { over: Over::Column, times: Times::One, .. }
-        )
+        self.alone() == Some(Over::Column)
     }
 
     /// Is it the same in every view?

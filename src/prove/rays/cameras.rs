@@ -5,7 +5,7 @@ use rand::Rng;
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::frame::DepthCode;
-use crate::model::{Domain, FitSummary, Form, Effect, NoiseModel, Provenance, SigmaModel};
+use crate::model::{Domain, Effect, FitSummary, Form, NoiseModel, Provenance, SigmaModel};
 use crate::rng::Stream;
 use crate::view::{RecordingFile, Sensor};
 

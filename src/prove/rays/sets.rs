@@ -151,5 +151,9 @@ impl Set {
 }
 
 fn known(cause: &Cause) -> Effect {
-    Effect { id: "spatial-correlation".into(), parameters: cause.label.parameters.clone(), ..Effect::default() }
+    Effect {
+        id: "spatial-correlation".into(),
+        parameters: cause.label.parameters.clone(),
+        ..Effect::default()
+    }
 }

@@ -59,7 +59,8 @@ fn figure(picture: &Picture) -> Result<Markup> {
         .filter_map(|(title, values)| Some((title, values?)))
         .map(|(title, values)| panel(title, values, picture))
         .collect::<Result<Vec<Markup>>>()?;
-    let end = Axis::label(f64::from(picture.range));
+    // An f32's decimals end after the seventh digit.
+    let end = Axis::label((f64::from(picture.range) * 1e6).round() / 1e6);
     Ok(html! {
         figure.before-after {
             div.panels { @for panel in panels { (panel) } }

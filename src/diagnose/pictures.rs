@@ -1,0 +1,136 @@
+//! Residuals of a few views as pictures: as recorded, with what was found taken out, and of the
+//! view's twin. Computed here, drawn elsewhere.
+
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+
+use super::engine::Diagnosed;
+use super::field::Field;
+use super::known::Known;
+use crate::camera::Rays;
+use crate::frame::Frame;
+use crate::measure::{MeasureOptions, Workbench};
+use crate::model::NoiseModel;
+use crate::view::Sensor;
+
+/// One view, row by row, px of disparity; NaN off the target.
+#[derive(Debug, Clone)]
+pub struct ViewPictures {
+    /// Number among the diagnosed views.
+    pub view: usize,
+    pub width: usize,
+    pub height: usize,
+    /// Mean over the frames about the view's plane.
+    pub before: Vec<f32>,
+    /// Without the bias that was found, about a plane fitted anew.
+    pub after: Vec<f32>,
+    /// The twin, measured as the recording was.
+    pub twin: Option<Vec<f32>>,
+}
+
+/// Takes a view again: its number and its field to frames and their times since the first, s.
+pub type Retake<'a> = &'a (dyn Fn(usize, &Field) -> Option<Vec<(f64, Frame)>> + Sync);
+
+/// More views tire the reader.
+const VIEWS: usize = 3;
+/// Wider pictures only show grain, px.
+const WIDEST: usize = 400;
+/// A picture covers this share of its pixels; the few beyond saturate.
+const COVERED: f64 = 0.98;
+
+/// Of the views that changed most, spread over the distances. `model` is the one that was given.
+pub fn pictures(
+    done: &Diagnosed,
+    sensor: &Sensor,
+    model: &NoiseModel,
+    retake: Retake<'_>,
+) -> Vec<ViewPictures> {
+    let bench = Workbench::new(sensor, MeasureOptions::default());
+    let known = Known::of(model, &sensor.camera);
+    let start = done.fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
+    worth_seeing(done)
+        .into_par_iter()
+        .map(|view| {
+            let field = &done.fields[view];
+            let recorded = done.recorded(view);
+            let twin = retake(view, field).map(|frames| {
+                let frames = frames.into_iter();
+                field.with_frames(frames, &bench, &model.sigma, &known, start).mean
+            });
+            let left: Vec<f32> = match done.bias_px.get(view) {
+                Some(bias) => recorded.iter().zip(bias).map(|(r, b)| r - b).collect(),
+                None => recorded.clone(),
+            };
+            let show = |values: &[f32]| {
+                shrunk(&field.image(&about_plane(field, values, &bench.rays)), field)
+            };
+            let (width, height, before) = show(&recorded);
+            let (_, _, after) = show(&left);
+            let twin = twin.map(|t| show(&t).2);
+            ViewPictures { view, width, height, before, after, twin }
+        })
+        .collect()
+}
+
+impl ViewPictures {
+    /// Where the colours end, px: 1, 2 or 5 times a power of ten.
+    pub fn range_px(&self) -> f32 {
+        let mut sizes: Vec<f32> =
+            self.before.iter().map(|v| v.abs()).filter(|v| v.is_finite()).collect();
+        if sizes.is_empty() {
+            return 1.0;
+        }
+        let rank = ((sizes.len() - 1) as f64 * COVERED) as usize;
+        let (_, size, _) = sizes.select_nth_unstable_by(rank, f32::total_cmp);
+        let decade = 10f32.powf(size.max(1e-4).log10().floor());
+        let mantissa = *size / decade * (1.0 - 1e-6);
+        [1.0, 2.0, 5.0].into_iter().find(|m| *m >= mantissa).unwrap_or(10.0) * decade
+    }
+}
+
+/// The nearest, middle and farthest third of the views, the most changed view of each.
+fn worth_seeing(done: &Diagnosed) -> Vec<usize> {
+    let lines = &done.diagnosis.views;
+    let mut order: Vec<usize> = (0..lines.len().min(done.fields.len())).collect();
+    order.sort_by(|&a, &b| lines[a].z_m.total_cmp(&lines[b].z_m));
+    let changed = |v: usize| lines[v].bowl_px_before.powi(2) - lines[v].bowl_px_after.powi(2);
+    order
+        .chunks(order.len().div_ceil(VIEWS).max(1))
+        .filter_map(|third| {
+            third.iter().copied().max_by(|&a, &b| changed(a).total_cmp(&changed(b)))
+        })
+        .collect()
+}
+
+/// Minus the plane that is left in `values`.
+fn about_plane(field: &Field, values: &[f32], rays: &Rays) -> Vec<f32> {
+    let row = |i: u32| {
+        let (x, y) = rays.at(i as usize);
+        Vector3::new(1.0, x, y)
+    };
+    let (mut a, mut b) = (Matrix3::zeros(), Vector3::zeros());
+    for (&i, &value) in field.pixels.iter().zip(values) {
+        if value.is_finite() {
+            let x = row(i);
+            a += x * x.transpose();
+            b += x * f64::from(value);
+        }
+    }
+    let plane = a.lu().solve(&b).unwrap_or_else(Vector3::zeros);
+    let pairs = field.pixels.iter().zip(values);
+    pairs.map(|(&i, &value)| value - plane.dot(&row(i)) as f32).collect()
+}
+
+/// Pixels by the square made one, until the picture is narrow enough.
+fn shrunk(image: &[f32], field: &Field) -> (usize, usize, Vec<f32>) {
+    let side = field.width.div_ceil(WIDEST).max(1);
+    let (width, height) = (field.width / side, field.height / side);
+    let patch = |k: usize| {
+        let (u0, v0) = (k % width * side, k / width * side);
+        let inside = (v0..v0 + side).flat_map(|v| (u0..u0 + side).map(move |u| (u, v)));
+        let values = inside.map(|(u, v)| image[v * field.width + u]).filter(|e| e.is_finite());
+        let (sum, n) = values.fold((0.0, 0.0), |(sum, n), e| (sum + e, n + 1.0));
+        if n > 0.0 { sum / n } else { f32::NAN }
+    };
+    (width, height, (0..width * height).map(patch).collect())
+}

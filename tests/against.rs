@@ -1,0 +1,157 @@
+//! `diagnose --against`: somebody else's simulation in the model's place.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use kinoise::Seed;
+use kinoise::effects::Active;
+use kinoise::scene::Target;
+use kinoise::simulate::{Physics, Scenery, Shoot, kinect_v1, plan_grid};
+use serde_json::Value;
+
+struct Sets {
+    folder: tempfile::TempDir,
+}
+
+impl Sets {
+    fn new() -> Self {
+        Sets { folder: tempfile::tempdir().expect("a temporary folder") }
+    }
+
+    /// A wall seen from twelve poses, in an order of its own.
+    fn shoot(&self, name: &str, seed: u64, effect: Option<&str>) -> PathBuf {
+        self.shoot_with(name, seed, effect, &[0.9, 1.3, 1.9, 2.7], 2)
+    }
+
+    fn shoot_with(
+        &self,
+        name: &str,
+        seed: u64,
+        effect: Option<&str>,
+        distances: &[f64],
+        shrink: usize,
+    ) -> PathBuf {
+        let grid = common::grid(distances, &[0.0, 25.0, 50.0]);
+        let seed = Seed(seed);
+        let views = plan_grid(&grid.views(), &Scenery::bare(Target::Wall), 3, true, seed);
+        let effects = effect.iter().map(|e| Active::parse(e).expect("an effect")).collect();
+        let physics = Physics::Formula { sigma: common::truth(), effects };
+        let shoot = Shoot { sensor: kinect_v1(shrink), views, physics, infrared: false, seed };
+        let root = self.folder.path().join(name);
+        shoot.write(&root, &|_, _| ()).expect("written");
+        root
+    }
+
+    fn diagnose(&self, real: &Path, simulated: &Path, exit: i32) -> Value {
+        let out = self.folder.path().join("out");
+        let command = common::kinoise()
+            .args(["diagnose", "--against"])
+            .args([simulated, real])
+            .arg("-o")
+            .arg(&out)
+            .assert()
+            .code(exit);
+        let text = String::from_utf8_lossy(&command.get_output().stderr).into_owned();
+        assert!(text.contains("the simulation leaves out"), "{text}");
+        let json = std::fs::read(out.join("diagnosis.json")).expect("diagnosis.json");
+        serde_json::from_slice(&json).expect("JSON")
+    }
+}
+
+fn names(diagnosis: &Value) -> Vec<&str> {
+    let findings = diagnosis["findings"].as_array().expect("findings");
+    let told = findings.iter().filter(|f| f["status"] != "not-identifiable");
+    told.map(|f| f["effect"].as_str().unwrap_or("none")).collect()
+}
+
+#[test]
+fn what_a_simulation_leaves_out_is_named_and_what_both_have_is_not() {
+    let sets = Sets::new();
+    let clean = sets.shoot("clean", 1, None);
+    let bowl = Some("radial-disparity-bias:k_px=0.3");
+    let real = sets.shoot("real", 2, bowl);
+    let found = sets.diagnose(&real, &clean, 1);
+    assert_eq!(names(&found), ["radial-disparity-bias"]);
+    assert_eq!(found["reference"], "simulated recording");
+    let k = &found["findings"][0]["parameters"]["k_px"]["value"];
+    assert!((k.as_f64().expect("a number") - 0.3).abs() < 0.02, "{k}");
+    // The simulation has it too much: the same, with the other sign.
+    let found = sets.diagnose(&clean, &real, 1);
+    assert_eq!(names(&found), ["radial-disparity-bias"]);
+    assert!(
+        found["findings"][0]["parameters"]["k_px"]["value"].as_f64().expect("a number") < -0.25
+    );
+    let both = sets.shoot("both", 3, bowl);
+    assert_eq!(sets.diagnose(&real, &both, 0)["verdict"], "match");
+}
+
+#[test]
+fn noise_is_compared_with_the_simulated_noise() {
+    let sets = Sets::new();
+    let clean = sets.shoot("clean", 4, None);
+    for (n, (id, effect)) in [
+        ("vignetting", "vignetting:growth=0.6"),
+        ("spatial-correlation", "spatial-correlation:length_px=7"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let seed = 10 * (n as u64 + 1);
+        let real = sets.shoot(id, seed, Some(effect));
+        assert_eq!(names(&sets.diagnose(&real, &clean, 1)), [id]);
+        let both = sets.shoot(&format!("{id}-both"), seed + 1, Some(effect));
+        assert_eq!(sets.diagnose(&real, &both, 0)["verdict"], "match", "{id}");
+    }
+}
+
+#[test]
+fn two_recordings_of_nothing_but_noise_match() {
+    let sets = Sets::new();
+    let recordings: Vec<PathBuf> =
+        (0..3).map(|n| sets.shoot(&format!("clean-{n}"), 50 + n, None)).collect();
+    for pair in recordings.windows(2) {
+        let found = sets.diagnose(&pair[0], &pair[1], 0);
+        assert_eq!(found["verdict"], "match", "{:?}", names(&found));
+    }
+}
+
+/// One message: what, and what to do.
+fn refused(real: &Path, simulated: &Path, says: &[&str]) {
+    let out = real.with_file_name("refused");
+    let command = common::kinoise()
+        .args(["diagnose", "--against"])
+        .args([simulated, real])
+        .arg("-o")
+        .arg(out)
+        .assert()
+        .code(2);
+    let text = String::from_utf8_lossy(&command.get_output().stderr).into_owned();
+    assert!(says.iter().all(|s| text.contains(s)), "{text}");
+}
+
+#[test]
+fn other_views_and_other_sensors_are_refused_and_single_strangers_told() {
+    let sets = Sets::new();
+    let real = sets.shoot_with("real", 1, None, &[0.9, 1.3], 4);
+    let elsewhere = sets.shoot_with("elsewhere", 1, None, &[3.0, 3.8], 4);
+    refused(&real, &elsewhere, &["0 of 6 views have a partner", "--like"]);
+    let large = sets.shoot_with("large", 1, None, &[0.9, 1.3], 2);
+    refused(&real, &large, &["320 x 240", "160 x 120", "recording.json"]);
+    let more = sets.shoot_with("more", 2, None, &[0.9, 1.3, 3.0], 4);
+    let found = sets.diagnose(&more, &real, 0);
+    let remarks = found["remarks"].as_array().expect("remarks");
+    assert_eq!(found["views"].as_array().expect("views").len(), 6);
+    let told = |r: &&Value| r.as_str().is_some_and(|r| r.contains("has no view of this pose"));
+    assert_eq!(remarks.iter().filter(told).count(), 3, "{remarks:?}");
+}
+
+#[test]
+fn a_model_and_a_simulation_exclude_one_another() {
+    let command = common::kinoise()
+        .args(["diagnose", "a", "--model", "b", "--against", "c", "-o", "d"])
+        .assert()
+        .code(2);
+    let text = String::from_utf8_lossy(&command.get_output().stderr).into_owned();
+    assert!(text.contains("--against") && text.contains("--model"), "{text}");
+}
