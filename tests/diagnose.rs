@@ -18,7 +18,7 @@ fn clean_sets_match() {
         seed += 1;
         let done = taken[0] + taken[1];
         let views = if done == 0 { 36 } else { [8, 9, 10, 12][done % 4] };
-        let order = order(Cell::Null, "", seed, views, 4);
+        let order = order(Cell::Null, "", seed, views, 3);
         let known = kinoise::prove::rays::Set::draw(order.clone()).expect("drawn").known_causes;
         if taken[known] == 8 {
             continue;

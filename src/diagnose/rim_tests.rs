@@ -88,7 +88,7 @@ fn a_sharp_edge_has_no_pixel_in_between() {
 #[test]
 fn mixed_pixels_are_counted_and_lost_ones_are_not() {
     // From the board to the wall in four steps, three of them in between.
-    let mixed = |away: usize| (away <= 3).then(|| BOARD_M + 0.3 * away as f64);
+    let mixed = |away: usize| (away <= 3).then_some(BOARD_M + 0.3 * away as f64);
     let found = rim(mixed).1.expect("an edge all round");
     assert_eq!(found, Rim { mixed_px: 3.0, crossings: CROSSINGS });
     let lost = rim(|away| (away <= 3).then_some(0.0)).1.expect("an edge all round");
