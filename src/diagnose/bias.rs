@@ -83,8 +83,6 @@ pub fn curves(camera: &Camera, reach: &Reach) -> Vec<Candidate> {
         }),
         map(8, 6, Times::One),
         map(8, 6, Times::DisparitySquared),
-        map(16, 12, Times::One),
-        map(16, 12, Times::DisparitySquared),
     ];
     all.extend(waves(reach));
     if reach.light[1] > 1.05 * reach.light[0] {

@@ -28,6 +28,7 @@ use super::smooth::{SMOOTH_PX, high_pass};
 use super::structure::{Structure, moving, structures, tail};
 use super::tiles::Places;
 use crate::effects;
+use crate::effects::KINECT_BASELINE_M;
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
 use crate::measure::{MeasureOptions, Workbench};
@@ -123,6 +124,7 @@ fn run(
 ) -> Result<Diagnosed> {
     let sensor = &recording.sensor;
     let camera = &sensor.camera;
+    refuse_other_size(model, sensor)?;
     let bench = Workbench::new(sensor, measure_options(options));
     let mut known = Known::of(model, camera);
     let (mut fields, mut excluded) = read(recording, &bench, model, &known, progress);
@@ -131,6 +133,7 @@ fn run(
         (fields, excluded) = flat;
         found.push(ranges());
     }
+    let copies = without_copies(&mut fields);
     if fields.len() < FEWEST_VIEWS {
         let first = excluded
             .first()
@@ -213,7 +216,8 @@ fn run(
             && f.effect.is_none()
             && f.statistic == Statistic::Bias
             && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)
-            && f.size.sigma * typical_sigma_px(&fields) < 0.5 * coarsest;
+            && !is_raw(recording)
+            && f.size.sigma * typical_sigma_px(&fields) < 0.3 * coarsest;
         let tailed = tails.is_some() && f.status == Status::Recalibrate;
         !stepped && !tailed && f.size.sigma > least_size(f.statistic)
     });
@@ -268,6 +272,12 @@ fn run(
         super::diagnosis::Detectable { effect, minimum }
     }));
     let mut remarks = recording.remarks.clone();
+    remarks.extend(copies);
+    if sensor.baseline_m.is_none() {
+        remarks.push(format!(
+            "the recording gives no baseline_m: {KINECT_BASELINE_M} m, a Kinect v1's, is assumed; all disparities scale with it"
+        ));
+    }
     remarks.extend(excluded.iter().map(ToString::to_string));
     remarks.extend(baseline.iter_mut().flat_map(|b| std::mem::take(&mut b.remarks)));
     let diagnosis = Diagnosis {
@@ -299,6 +309,48 @@ fn run(
         excluded,
         against,
     })
+}
+
+fn refuse_other_size(model: &NoiseModel, sensor: &crate::view::Sensor) -> Result<()> {
+    let Some(other) = &model.sensor else { return Ok(()) };
+    let (theirs, ours) = (&other.camera, &sensor.camera);
+    if (theirs.width, theirs.height) == (ours.width, ours.height) {
+        return Ok(());
+    }
+    Err(Error::Argument {
+        what: format!(
+            "the model's sensor has {} x {} px, the recording's {} x {}: its errors lie elsewhere",
+            theirs.width, theirs.height, ours.width, ours.height
+        ),
+        remedy: "give the model that was made of this very sensor",
+    })
+}
+
+/// A view whose frames are another's, bit for bit, is no second witness.
+fn without_copies(fields: &mut Vec<Field>) -> Vec<String> {
+    let mut told = Vec::new();
+    let mut kept: Vec<Field> = Vec::new();
+    for field in fields.drain(..) {
+        let same = |other: &&Field| {
+            other.words.0 == field.words.0
+                && other.frames.len() == field.frames.len()
+                && other.pixels == field.pixels
+                && other.first.first().map(|f| bits(f)) == field.first.first().map(|f| bits(f))
+        };
+        match kept.iter().find(same) {
+            Some(other) => told.push(format!(
+                "view {} has the same frames as view {}: it was left out",
+                field.name, other.name
+            )),
+            None => kept.push(field),
+        }
+    }
+    *fields = kept;
+    told
+}
+
+fn bits(residuals: &[f32]) -> Vec<u32> {
+    residuals.iter().map(|r| r.to_bits()).collect()
 }
 
 /// Do the views become flat once their words are taken for lengths of rays? Then with them.
@@ -607,7 +659,9 @@ fn steps(
     {
         let mm = 1e3 * step / 12f64.sqrt();
         let size = Size { mm, sigma: mm / sigma_mm };
-        add("depth-rounding", Axis::Z, "m", z, "step_m", step, 0.0, size);
+        if size.sigma > STEP_SHARE {
+            add("depth-rounding", Axis::Z, "m", z, "step_m", step, 0.0, size);
+        }
     }
     found
 }

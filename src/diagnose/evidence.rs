@@ -245,7 +245,7 @@ impl Null {
         };
         let by_view: Vec<Vec<f64>> = alone.iter().map(information).collect();
         let total: Vec<f64> = (0..k).map(|j| by_view.iter().map(|a| a[j]).sum()).collect();
-        let dispersion = dispersion(&by_view, &total, &u, &left, prior);
+        let dispersion = dispersion(&alone, &by_view, &total, &u, &left, prior);
         Some(Null { by_view, total, prior, dispersion })
     }
 
@@ -307,6 +307,7 @@ fn beside_chosen(
 
 /// Scatter of the views' scores about the common fit, over what noise gives them.
 fn dispersion(
+    alone: &[DMatrix<f64>],
     by_view: &[Vec<f64>],
     total: &[f64],
     u: &DMatrix<f64>,
@@ -314,17 +315,22 @@ fn dispersion(
     prior: f64,
 ) -> f64 {
     let most = total.iter().copied().fold(0.0, f64::max);
+    let k = u.nrows();
+    let whole = alone.iter().fold(DMatrix::identity(k, k) * prior, |sum, a| sum + a);
+    let seen = scores.iter().fold(DVector::zeros(k), |sum, b| sum + b);
+    let Some(factor) = whole.cholesky() else { return 1.0 };
+    let beta = factor.solve(&seen);
+    // What each view says beyond the common fit.
+    let left: Vec<DVector<f64>> = scores.iter().zip(alone).map(|(b, a)| b - a * &beta).collect();
     let (mut sum, mut n) = (0.0, 0.0);
     for (j, &total) in total.iter().enumerate() {
         if total < 1e-6 * most {
             continue;
         }
-        let score: Vec<f64> = scores.iter().map(|b| u.column(j).dot(b)).collect();
-        let beta = score.iter().sum::<f64>() / (total + prior);
-        for (s, a) in score.iter().zip(by_view) {
+        for (left, a) in left.iter().zip(by_view) {
             // A view that says next to nothing would divide by next to nothing.
             if a[j] > 1e-3 * total {
-                sum += (s - a[j] * beta).powi(2) / a[j];
+                sum += u.column(j).dot(left).powi(2) / a[j];
                 n += 1.0 - a[j] / total;
             }
         }

@@ -56,7 +56,11 @@ pub struct SurveyedView {
 }
 
 /// No more terms than this are looked for in a layer.
-const MOST_TERMS: usize = 8;
+const MOST_TERMS: usize = 10;
+/// A bias smaller than this share of the noise is nobody's concern.
+const LEAST_SIGMAS: f64 = 0.02;
+/// The same for the logarithm of the variance: a sigma that is off by 3 %.
+const LEAST_LOG_VARIANCE: f64 = 0.06;
 /// A name that explains less than this share of what a nameless curve explains is not the cause.
 const ADEQUATE: f64 = 0.6;
 /// Precision of a coefficient of the bias: a few px at most.
@@ -87,6 +91,16 @@ impl Survey {
         Survey { views, reach, fixed_px2: 0.0, light }
     }
 
+    /// Root of the weighted harmonic mean of the model's variance, px.
+    fn typical_sigma_px(&self) -> f64 {
+        let (mut sum, mut n) = (0.0, 0.0);
+        for t in self.views.iter().flat_map(|v| &v.tiles).filter(|t| t.variance > 0.0) {
+            sum += t.pixels / t.variance;
+            n += t.pixels;
+        }
+        (n / sum).sqrt()
+    }
+
     /// Pixels of the picture that any view's target covered.
     fn covered_px(&self, camera: &Camera) -> f64 {
         let across = camera.width.div_ceil(SIDE);
@@ -109,6 +123,7 @@ impl Survey {
             adequacy: ADEQUATE,
             most_terms: MOST_TERMS,
             fixed: (self.fixed_px2 > 0.0).then(|| (self.fixed_px2.sqrt(), self.covered_px(camera))),
+            least: LEAST_SIGMAS * self.typical_sigma_px(),
         };
         let mut candidates = bias::families(camera, &self.reach);
         candidates.extend(bias::curves(camera, &self.reach));
@@ -186,6 +201,7 @@ impl Survey {
             adequacy: ADEQUATE,
             most_terms: MOST_TERMS,
             fixed: None,
+            least: LEAST_LOG_VARIANCE,
         };
         let mut candidates = variance::families(&self.reach, sigma);
         candidates.extend(variance::curves(camera, &self.reach));

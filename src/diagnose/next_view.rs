@@ -132,6 +132,7 @@ impl Outlook<'_> {
         let board = TargetFrame::on(plane, centre);
         let within = |x: f64, [low, high]: [f64; 2]| x >= low && x <= high;
         let mut data = ViewData {
+            gathered: Vec::new(),
             places: Vec::new(),
             response: Vec::new(),
             weight: Vec::new(),

@@ -35,6 +35,8 @@ pub struct Rules {
     /// Constant error of every pixel, px, and pixels of the picture: a pattern that stands still
     /// in the picture must be larger than what these errors make by chance.
     pub fixed: Option<(f64, f64)>,
+    /// Root mean square of the least term that is worth a word, in the response's unit.
+    pub least: f64,
 }
 
 /// A family beside the one that was chosen.
@@ -52,6 +54,8 @@ pub struct Rival {
 #[derive(Debug, Clone)]
 pub struct Chosen {
     pub candidate: Candidate,
+    /// Root mean square, in the response's unit.
+    pub rms: f64,
     /// The share of the best curve that its name had to explain.
     pub adequacy: f64,
     /// Nats over the terms before it.
@@ -63,6 +67,9 @@ pub struct Chosen {
     /// Chance that noise brings as much anywhere in this layer.
     pub p: f64,
 }
+
+/// A later term must be this large beside the largest, root mean square by root mean square.
+const LEAST_OF_LARGEST: f64 = 0.06;
 
 /// What a single nameless curve saw, before anything was explained.
 #[derive(Debug, Clone)]
@@ -113,7 +120,16 @@ pub fn search(
     rules: &Rules,
     seed: Seed,
 ) -> Outcome {
-    let mut layer = Layer { fine, coarse, candidates, rules, noise: None, looks: Vec::new(), seed };
+    let mut layer = Layer {
+        fine,
+        coarse,
+        candidates,
+        rules,
+        noise: None,
+        looks: Vec::new(),
+        largest: 0.0,
+        seed,
+    };
     let mut chosen: Vec<Chosen> = Vec::new();
     let mut remaining = None;
     while let Some(next) = layer.step(&chosen) {
@@ -122,6 +138,7 @@ pub fn search(
             remaining = Some(next);
             break;
         }
+        layer.largest = layer.largest.max(next.rms);
         let nameless = next.candidate.family.is_none();
         if nameless && chosen.iter().all(|c| c.candidate.family.is_some()) {
             layer.look_back(&mut chosen);
@@ -131,6 +148,7 @@ pub fn search(
     if chosen.iter().all(|c| c.candidate.family.is_some()) {
         layer.look_back(&mut chosen);
     }
+    layer.refine_maps(&mut chosen);
     let evidence = layer.evidence_of(&bases(&chosen));
     let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
     let noise = layer.noise.unwrap_or_default();
@@ -211,6 +229,8 @@ struct Layer<'a> {
     rules: &'a Rules,
     noise: Option<NoiseGains>,
     looks: Vec<Look>,
+    /// Root mean square of the largest term so far.
+    largest: f64,
     seed: Seed,
 }
 
@@ -220,6 +240,7 @@ struct Judged {
     /// Can it be meant: of a sensible shape, and larger than what constant errors of the pixels
     /// make by chance.
     sensible: bool,
+    rms: f64,
 }
 
 fn bases(chosen: &[Chosen]) -> Vec<&Basis> {
@@ -295,8 +316,9 @@ impl<'a> Layer<'a> {
                 let mut gain = gain(&evidence, self.rules.prior)?;
                 gain.total -= base.total;
                 gain.by_view.iter_mut().zip(&base.by_view).for_each(|(g, b)| *g -= b);
-                let sensible = self.sensible(&c.basis, m, &gain, &evidence);
-                Some(Judged { gain, null, sensible })
+                let rms = self.rms(&c.basis, m, &gain, &evidence);
+                let sensible = self.sensible(&c.basis, m, &gain, rms);
+                Some(Judged { gain, null, sensible, rms })
             })
             .collect();
         if self.noise.is_none() {
@@ -362,6 +384,7 @@ impl<'a> Layer<'a> {
         }
         Some(Chosen {
             candidate: self.candidates[winner].clone(),
+            rms: judged[winner].as_ref().map_or(0.0, |j| j.rms),
             adequacy: self.adequacy(winner),
             gain: total(winner),
             best_curve,
@@ -379,21 +402,56 @@ impl<'a> Layer<'a> {
         }
     }
 
-    fn sensible(&self, basis: &Basis, m: usize, gain: &Gain, evidence: &[Evidence]) -> bool {
+    /// Root mean square of a candidate's fit over the samples, the nuisances taken out.
+    fn rms(&self, basis: &Basis, m: usize, gain: &Gain, evidence: &[Evidence]) -> f64 {
+        let k = basis.count();
+        let beta = gain.beta.rows(m, k).into_owned();
+        let square: f64 =
+            evidence.iter().map(|e| beta.dot(&(e.a.view((m, m), (k, k)) * &beta))).sum();
+        let weight: f64 = self.coarse.iter().flat_map(|v| &v.weight).sum();
+        (square / weight).max(0.0).sqrt()
+    }
+
+    fn sensible(&self, basis: &Basis, m: usize, gain: &Gain, rms: f64) -> bool {
         let beta = gain.beta.rows(m, basis.count()).into_owned();
         if let Basis::RangeExponent { orders: 2.., .. } = basis {
             let ends = self.fine.iter().flat_map(|v| v.places.iter().map(|p| p.z));
             return one_way(basis, beta.as_slice(), crate::stats::range(ends));
         }
+        let k = basis.count();
+        let least = self.rules.least.max(LEAST_OF_LARGEST * self.largest);
+        if rms < least {
+            return false;
+        }
         let Some((fixed, pixels)) = self.rules.fixed.filter(|_| basis.is_of_picture()) else {
             return true;
         };
-        let k = basis.count();
-        let square: f64 =
-            evidence.iter().map(|e| beta.dot(&(e.a.view((m, m), (k, k)) * &beta))).sum();
-        let weight: f64 = self.coarse.iter().flat_map(|v| &v.weight).sum();
-        const CLEARLY: f64 = 4.0;
-        square / weight > CLEARLY * fixed * fixed * k as f64 / pixels
+        // Seven times what a fit to nothing but the pixels' own errors would make, for the best of
+        // many and for views that cover little of the picture.
+        const CLEARLY: f64 = 50.0;
+        rms * rms > CLEARLY * fixed * fixed * k as f64 / pixels
+    }
+
+    /// Maps with twice as many nodes, where those predict left-out views better.
+    fn refine_maps(&self, chosen: &mut [Chosen]) {
+        for k in 0..chosen.len() {
+            let Basis::Map { width, height, across, down, times } = chosen[k].candidate.basis
+            else {
+                continue;
+            };
+            let finer = Basis::Map { width, height, across: 2 * across, down: 2 * down, times };
+            let total = |terms: &[&Basis]| {
+                gain(&self.evidence_of(terms), self.rules.prior).map_or(0.0, |g| g.total)
+            };
+            let old = bases(chosen);
+            let mut new = old.clone();
+            new[k] = &finer;
+            let better = total(&new) - total(&old);
+            if self.noise.as_ref().is_some_and(|n| better > n.threshold(self.rules.level)) {
+                chosen[k].gain += better;
+                chosen[k].candidate.basis = finer;
+            }
+        }
     }
 
     /// With all names in, is each still what fits best, and needed at all?

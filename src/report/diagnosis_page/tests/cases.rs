@@ -131,6 +131,7 @@ pub(super) fn diagnosis(verdict: Verdict, findings: Vec<Finding>) -> Diagnosis {
         verdict,
         findings,
         map: (0..if nothing { 0 } else { 15 }).map(row).collect(),
+        left_out: None,
         heldout: Some(HeldOut {
             views: vec!["view-00".into(), "view-04".into(), "view-08".into()],
             log_score_before: -4213.2,
