@@ -8,6 +8,7 @@ use kinoise::{CalibrateOptions, Form};
 
 use super::calibrate::calibrate;
 use super::common::{Global, say};
+use super::diagnose::examine;
 use super::words;
 
 #[derive(Debug, Args)]
@@ -32,6 +33,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     say(format!(
         "The recording was made with the paper's Eq. 1, so the first two columns should agree.\nOpen {} to see it all.",
         arguments.output.join("report.html").display()
+    ));
+    say("\nIs there anything that this model leaves out? There should not be:");
+    let told = arguments.output.join("diagnosis");
+    examine(&recording, None, &done.calibration.model, &told, global)?;
+    say(format!(
+        "{} says how small an error would have been seen.",
+        told.join("report.html").display()
     ));
     global.print_json(&words::as_json(&done.calibration, Some(&done.measurements)))
 }

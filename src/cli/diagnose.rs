@@ -1,4 +1,4 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use kinoise::diagnose::{
@@ -45,13 +45,26 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
             calibrated(&recording, global)?
         }
     };
-    let out = OutputDir::create(&arguments.output)?;
+    let diagnosis = examine(&recording, simulated.as_ref(), &model, &arguments.output, global)?;
+    global.print_json(&serde_json::to_value(&diagnosis)?)?;
+    Ok(if diagnosis.verdict == Verdict::Mismatch { FOUND } else { 0 })
+}
+
+/// Diagnose, write every output, tell.
+pub fn examine(
+    recording: &Recording,
+    simulated: Option<&Recording>,
+    model: &NoiseModel,
+    output: &Path,
+    global: &Global,
+) -> anyhow::Result<Diagnosis> {
+    let out = OutputDir::create(output)?;
     let options = DiagnoseOptions { seed: global.seed(), ..DiagnoseOptions::default() };
     let bar = Bar::new("views");
     let step = |done, all| bar.step(done, all);
-    let done = match &simulated {
-        Some(simulated) => diagnose_against(&recording, simulated, &model, &options, &step)?,
-        None => diagnose(&recording, &model, &options, &step)?,
+    let done = match simulated {
+        Some(simulated) => diagnose_against(recording, simulated, model, &options, &step)?,
+        None => diagnose(recording, model, &options, &step)?,
     };
     drop(bar);
     let diagnosis = &done.diagnosis;
@@ -60,12 +73,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     done.model.write(&out.path().join("model.json"))?;
     let held_against = if simulated.is_some() { "simulation" } else { "model" };
     let title = format!("What the {held_against} of {} leaves out", recording.sensor.name);
-    let pictures = diagnose_pictures::of(&done, &recording.sensor, &model, global.seed());
+    let pictures = diagnose_pictures::of(&done, &recording.sensor, model, global.seed());
     let page = DiagnosisPage { title: &title, diagnosis, pictures: &pictures };
     out.write("report.html", diagnosis_page(&page)?.as_bytes())?;
     say(words(diagnosis));
-    global.print_json(&json)?;
-    Ok(if diagnosis.verdict == Verdict::Mismatch { FOUND } else { 0 })
+    Ok(done.diagnosis)
 }
 
 fn calibrated(recording: &Recording, global: &Global) -> anyhow::Result<NoiseModel> {

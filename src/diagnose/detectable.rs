@@ -11,6 +11,9 @@ use crate::terms::{Basis, Statistic, Term};
 /// Nats beyond the threshold that eight recordings in ten would bring.
 const MARGIN: f64 = 4.0;
 
+/// Effect, parameter, shape, and the parameter of a coefficient.
+type Spread = (&'static str, &'static str, Basis, fn(f64) -> f64);
+
 /// The least parameter of each family that would be found with 80 % power.
 pub fn detectable(
     survey: &Survey,
@@ -49,7 +52,7 @@ pub fn detectable(
     for (effect, name, basis, unit) in families {
         add(&mut all, (effect, name), &mean, bias, Statistic::Bias, basis, unit, |a| a);
     }
-    let spreads: Vec<(&'static str, &'static str, Basis, fn(f64) -> f64)> = vec![
+    let spreads: Vec<Spread> = vec![
         ("range-exponent", "excess", Basis::RangeExponent { pivot_m: 2.0, orders: 1 }, |a| 0.5 * a),
         ("vignetting", "growth", Basis::Vignetting { orders: 1 }, |a| (0.5 * a).exp() - 1.0),
         ("slope-noise", "sigma_lateral_px", Basis::SlopeNoise { lateral_px: 0.2 }, |a| {

@@ -269,13 +269,12 @@ impl Null {
     }
 }
 
+/// Information and score of each view.
+type PerView = (Vec<DMatrix<f64>>, Vec<DVector<f64>>);
+
 /// The candidate's evidence once the chosen terms are fitted with it: its information in each
 /// view, and its score there.
-fn beside_chosen(
-    views: &[Evidence],
-    chosen: usize,
-    prior: f64,
-) -> Option<(Vec<DMatrix<f64>>, Vec<DVector<f64>>)> {
+fn beside_chosen(views: &[Evidence], chosen: usize, prior: f64) -> Option<PerView> {
     let n = views.first()?.b.len();
     let k = n - chosen;
     if chosen == 0 {

@@ -254,18 +254,19 @@ fn size(scene: &Scene<'_>, values: &[Vec<f64>]) -> Size {
     Size { mm: (mm / n).sqrt(), sigma: (sigma / n).sqrt() }
 }
 
+type Coordinate = Box<dyn Fn(&Place) -> f64>;
+
 /// The axis along which a term is shown.
 struct Along {
-    axis: Axis,
     label: String,
-    value: Box<dyn Fn(&Place) -> f64>,
+    value: Coordinate,
 }
 
 impl Along {
     fn of(scene: &Scene<'_>, basis: &Basis) -> Self {
         let axis = basis.axis();
         let corner = scene.corner_px;
-        let (label, value): (&str, Box<dyn Fn(&Place) -> f64>) = match axis {
+        let (label, value): (&str, Coordinate) = match axis {
             Axis::Z => ("depth, m", Box::new(|p| p.z)),
             Axis::DisparityPhase => {
                 let period = match basis {
@@ -299,7 +300,7 @@ impl Along {
             Axis::Temperature => ("temperature, degrees Celsius", Box::new(|p| p.temperature_c)),
             _ => ("", Box::new(|p| p.z)),
         };
-        Along { axis, label: label.into(), value }
+        Along { label: label.into(), value }
     }
 
     /// Where nine tenths of the term's energy lie.
@@ -378,7 +379,6 @@ impl Along {
             });
             curve.model.push(show(model));
         }
-        let _ = self.axis;
         curve
     }
 }

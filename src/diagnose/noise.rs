@@ -101,7 +101,7 @@ fn window(views: &[Structure], known: &Known, level: f64) -> Option<Hanging> {
 }
 
 /// Correlations smaller than this are not worth a word.
-const LEAST_CORRELATION: f64 = 0.03;
+const LEAST_CORRELATION: f64 = 0.05;
 
 fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
     let mut found = Vec::new();

@@ -107,6 +107,8 @@ impl Outcome {
 
 /// Of families that predict as well as the best, the one with the fewest columns is meant.
 const AS_GOOD_NATS: f64 = 2.0;
+/// So they do within this share of a large gain: no family's shape is exact.
+const AS_GOOD_SHARE: f64 = 0.01;
 /// A later term must bring this share of what the first brought: what is less is the first one's
 /// own shape, badly met.
 const LEAST_SHARE: f64 = 0.005;
@@ -355,8 +357,8 @@ impl<'a> Layer<'a> {
         let named = families
             .iter()
             .copied()
-            .filter(|&i| total(i) > best_family - AS_GOOD_NATS)
-            .min_by_key(|&i| self.candidates[i].basis.count())
+            .filter(|&i| total(i) > best_family - AS_GOOD_NATS.max(AS_GOOD_SHARE * best_family))
+            .min_by_key(|&i| (self.candidates[i].basis.count(), !self.rests_on_a_measurement(i)))
             .filter(|&i| safe(i) > threshold && total(i) > self.adequacy(i) * best_curve)
             .filter(|&i| judged[i].as_ref().is_some_and(|j| j.sensible))
             .filter(|&i| {
@@ -391,6 +393,12 @@ impl<'a> Layer<'a> {
             rivals,
             p: noise.p(safe(winner)),
         })
+    }
+
+    /// Light of the room was measured for its own sake; the surface's is made out of an image that
+    /// the room lights too.
+    fn rests_on_a_measurement(&self, i: usize) -> bool {
+        matches!(self.candidates[i].basis, Basis::Ambient { .. })
     }
 
     /// The share of the best curve that a name must explain. Bands on a real sensor ride on a

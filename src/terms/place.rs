@@ -113,9 +113,12 @@ pub struct Place {
     pub variance: f64,
 }
 
+/// The mean of what a function gives for the members of a group.
+pub type Mean<'a> = dyn Fn(&dyn Fn(usize) -> f64) -> f64 + 'a;
+
 impl Place {
     /// Move to the mean of the members' places; what is one for the view stays.
-    pub fn average(&mut self, all: &[Place], mean: &dyn Fn(&dyn Fn(usize) -> f64) -> f64) {
+    pub fn average(&mut self, all: &[Place], mean: &Mean<'_>) {
         self.u = mean(&|i| all[i].u);
         self.v = mean(&|i| all[i].v);
         self.x = mean(&|i| all[i].x);
