@@ -1,6 +1,10 @@
-//! The blind trial: makers of recordings whose left-out physics is sealed away.
+//! The blind trial: sets whose left-out physics is sealed away, a solver that sees nothing else,
+//! and a judge who opens the seals afterwards.
 //!
-//! They share no formula with the catalogue and no code with the simulator or the diagnosis; only
-//! the recording and the model file are common ground.
+//! The makers of sets share no formula with the catalogue and no code with the diagnosis; only the
+//! recording and the model file are common ground.
 
+mod question;
 pub mod rays;
+
+pub use question::*;
