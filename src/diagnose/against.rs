@@ -5,9 +5,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::engine::{
-    DiagnoseOptions, FEWEST_VIEWS, Progress, Steps, common, fixed_px2, lattice, measure_tails, read,
-};
+use super::engine::{DiagnoseOptions, FEWEST_VIEWS, Progress};
 use super::field::Field;
 use super::known::Known;
 use super::lattice::Lattice;
@@ -15,8 +13,11 @@ use super::layers::{BLOCK_TILES, Survey};
 use super::missing::{MissingFinding, missing};
 use super::noise::{Hanging, hanging, tails};
 use super::partners::{Pose, partners};
+use super::pixels::{common, fixed_px2, measure_tails};
+use super::reading::read;
 use super::rim;
 use super::search::ViewData;
+use super::steps::{Steps, lattice};
 use super::structure::{Structure, structures};
 use super::tiles::SIDE;
 use crate::error::{Error, Result};

@@ -413,6 +413,28 @@ pub fn physics(
     )
 }
 
+/// A finding with this name and nothing else said yet.
+pub fn named(effect: &'static str, probability: f64, statistic: Statistic, axis: Axis) -> Finding {
+    Finding {
+        status: Status::Named,
+        effect: Some(effect),
+        alternatives: vec![Alternative { effect, probability }],
+        statistic,
+        axis,
+        interval: [0.0, 0.0],
+        unit: axis.unit(),
+        share: 0.0,
+        parameters: Map::new(),
+        size: Size::default(),
+        p_adjusted: 1.0,
+        physics: physics(Status::Named, Some(effect), statistic, axis, None),
+        next_view: None,
+        shape: None,
+        curve: None,
+        terms: Vec::new(),
+    }
+}
+
 /// A mismatch of structure as a finding; `sigma_mm` is the recording's typical sigma.
 pub fn hanging(found: Hanging, sigma_mm: f64) -> Finding {
     let effect = found.families.first().copied();

@@ -4,9 +4,10 @@ use rand::Rng;
 use rand::seq::SliceRandom;
 
 use super::diagnosis::{HeldOut, LeftOut};
-use super::engine::{DiagnoseOptions, terms_of};
+use super::engine::DiagnoseOptions;
 use super::evidence::{Rows, gain};
 use super::layers::{Survey, SurveyedView, coarser};
+use super::pixels::terms_of;
 use super::search::ViewData;
 use crate::camera::Camera;
 use crate::model::NoiseModel;
