@@ -6,6 +6,7 @@ use kinoise::diagnose::{
 };
 use kinoise::io::{OutputDir, open};
 use kinoise::report::{DiagnosisPage, diagnosis_page};
+use kinoise::terms::Statistic;
 use kinoise::{CalibrateOptions, NoiseModel, Recording};
 
 use super::common::{Bar, Global, Input, say};
@@ -127,10 +128,13 @@ fn words(diagnosis: &Diagnosis) -> String {
             .iter()
             .filter_map(|(k, v)| Some(format!("{k} {:.4}", v.get("value")?.as_f64()?)))
             .collect();
+        let size = if f.statistic == Statistic::Missing {
+            format!("{:.1} % of the pixels lost", 100.0 * f.size.sigma)
+        } else {
+            format!("{:.2} mm, {:.2} sigma", f.size.mm, f.size.sigma)
+        };
         text += &format!(
-            "  {name}: {:.2} mm, {:.2} sigma, {:.0} % of it; along {}{}{}\n",
-            f.size.mm,
-            f.size.sigma,
+            "  {name}: {size}, {:.0} % of it; along {}{}{}\n",
             100.0 * f.share,
             f.axis,
             if parameters.is_empty() { "" } else { "; " },

@@ -96,7 +96,7 @@ pub struct Alternative {
 pub struct Size {
     /// Root mean square over the recording.
     pub mm: f64,
-    /// The same over the model's sigma.
+    /// The same over the model's sigma; for what is missing, the share of pixels lost.
     pub sigma: f64,
 }
 

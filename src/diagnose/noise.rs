@@ -365,7 +365,7 @@ pub fn tails(views: &[Structure], known: &Known) -> Option<Hanging> {
         axis: Axis::Residual,
         interval: [4.0, 4.0 + 2.0 * (size.value - 4.0).max(0.5)],
         parameters,
-        size_sigma: size.value,
+        size_sigma: fraction.sqrt() * scale,
         p: m.p_above(GAUSSIAN_TAIL),
         nats: m.value
             * looked.iter().map(|s| s.tail_pixels).sum::<f64>()

@@ -105,6 +105,9 @@ fn size(finding: &Finding) -> Markup {
     if !(size.mm.abs() > 0.0 || size.sigma.abs() > 0.0) {
         return html! { "No size in millimetres can be given" };
     }
+    if finding.statistic == Statistic::Missing {
+        return html! { b { (percent(size.sigma)) } " of the pixels are lost" };
+    }
     html! {
         b { (mm(size.mm)) } " typically, which is " b { (significant(size.sigma, 2)) " times" }
         @if noise { " the noise that was simulated" } @else { " the noise of a single reading" }
