@@ -58,7 +58,7 @@ pub struct SurveyedView {
 /// No more terms than this are looked for in a layer.
 const MOST_TERMS: usize = 10;
 /// A bias smaller than this share of the noise is nobody's concern.
-const LEAST_SIGMAS: f64 = 0.02;
+const LEAST_SIGMAS: f64 = 0.012;
 /// A name that explains less than this share of what a nameless curve explains is not the cause.
 const ADEQUATE: f64 = 0.6;
 /// Precision of a coefficient of the bias: a few px at most.
@@ -425,7 +425,7 @@ impl Sum {
 }
 
 /// A model's sigma is not known better than this from view to view, in log variance.
-const MODEL_TOLERANCE: f64 = 0.1;
+const MODEL_TOLERANCE: f64 = 0.04;
 
 /// Variance of the views' own levels beyond what their samples explain (DerSimonian and Laird's
 /// moment estimate), about a line in log z: what a law of the distance explains is no scatter.

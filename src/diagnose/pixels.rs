@@ -1,0 +1,124 @@
+//! Found terms, pixel by pixel, and what is typical of the pixels.
+
+use rayon::prelude::*;
+
+use super::field::Field;
+use super::known::Known;
+use super::layers::Survey;
+use super::noise::Hanging;
+use super::search::Outcome;
+use super::smooth::{SMOOTH_PX, high_pass};
+use super::structure::{Structure, moving, tail};
+use super::tiles::Places;
+use crate::measure::Workbench;
+use crate::terms::{Statistic, Term};
+
+/// How much frames of a view resemble one another, by lag, where that was found to be noise.
+pub(super) fn common(structure: &[Structure], hangs: &[Hanging], known: &Known) -> [f64; 3] {
+    let in_time = ["frozen-noise", "temporal-correlation"];
+    let told = hangs.iter().flat_map(|h| &h.families).any(|f| in_time.contains(f))
+        || in_time.iter().any(|id| known.has(id));
+    if !told {
+        return [0.0; 3];
+    }
+    let at = |lag: usize| mean_of(structure.iter().filter_map(|s| s.lagged[lag]));
+    let near = at(0);
+    [near, if structure.iter().any(|s| s.lagged[1].is_some()) { at(1) } else { near }, {
+        if structure.iter().any(|s| s.lagged[2].is_some()) { at(2) } else { at(1) }
+    }]
+}
+
+/// Variance of the pixels' constant errors, px^2.
+pub(super) fn fixed_px2(structure: &[Structure]) -> f64 {
+    mean_of(structure.iter().filter_map(|s| s.fixed_px2))
+}
+
+pub(super) fn mean_of(values: impl Iterator<Item = f64>) -> f64 {
+    let (mut sum, mut n) = (0.0, 0.0);
+    for v in values.filter(|v| v.is_finite()) {
+        sum += v;
+        n += 1.0;
+    }
+    f64::max(sum / f64::max(n, 1.0), 0.0)
+}
+
+pub(super) fn typical_sigma_px(fields: &[Field]) -> f64 {
+    let mut all: Vec<f32> =
+        fields.iter().filter_map(|f| f.sigma.get(f.sigma.len() / 2).copied()).collect();
+    f64::from(crate::stats::median_in_place(&mut all))
+}
+
+pub(super) fn measure_tails(
+    structure: &mut [Structure],
+    fields: &[Field],
+    bias: &[Vec<f32>],
+    variance: &[Term],
+    survey: &Survey,
+    bench: &Workbench<'_>,
+) {
+    let factors = pixel_terms(fields, variance, survey, bench);
+    let camera = &bench.sensor.camera;
+    structure.par_iter_mut().zip(fields).enumerate().for_each(|(n, (s, field))| {
+        let whitened = |frame: &Vec<f32>| -> Vec<f32> {
+            let whitened: Vec<f32> = (0..frame.len())
+                .map(|k| {
+                    let factor = factors.get(n).map_or(1.0, |f| (0.5 * f[k]).exp());
+                    (frame[k] - bias.get(n).map_or(0.0, |b| b[k])) / (field.sigma[k] * factor)
+                })
+                .collect();
+            high_pass(&field.image(&whitened), field.width, field.height, SMOOTH_PX)
+        };
+        let frames: Vec<Vec<f32>> = field.first.iter().take(2).map(whitened).collect();
+        if !frames.is_empty() {
+            (s.tail, s.tail_pixels, s.tail_size) = tail(&moving(&frames, s), camera);
+        }
+    });
+}
+
+/// The chosen terms with their common coefficients.
+pub fn terms_of(outcome: &Outcome, statistic: Statistic) -> Vec<Term> {
+    (0..outcome.chosen.len())
+        .map(|k| Term {
+            statistic,
+            basis: outcome.chosen[k].candidate.basis.clone(),
+            coefficients: outcome.coefficients(k),
+        })
+        .collect()
+}
+
+pub(super) fn typical_sigma_mm(fields: &[Field]) -> f64 {
+    let of = |f: &Field| {
+        let z = f.plane.depth(0.0, 0.0);
+        let px = f64::from(*f.sigma.get(f.sigma.len() / 2).unwrap_or(&0.0));
+        1e3 * px * z * z / f.scale_px_m
+    };
+    let mut all: Vec<f32> = fields.iter().map(|f| of(f) as f32).collect();
+    f64::from(crate::stats::median_in_place(&mut all))
+}
+
+/// The terms at every pixel; empty when there are none.
+pub(super) fn pixel_terms(
+    fields: &[Field],
+    terms: &[Term],
+    survey: &Survey,
+    bench: &Workbench<'_>,
+) -> Vec<Vec<f32>> {
+    if terms.is_empty() {
+        return Vec::new();
+    }
+    let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
+    fields
+        .par_iter()
+        .map(|f| {
+            let places = Places::of(f, &bench.sensor.camera, &bench.rays, start);
+            let mut row = Vec::new();
+            (0..f.pixels.len())
+                .map(|k| {
+                    let mut place = places.pixel(k);
+                    place.light = survey.light.of(f, k, &place);
+                    terms.iter().map(|t| t.value(&place, &mut row)).sum::<f64>() as f32
+                })
+                .collect()
+        })
+        .collect()
+}

@@ -1,0 +1,169 @@
+//! The views as fields of residuals: read, checked, and none of them twice.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use serde_json::Map;
+
+use super::diagnosis::Finding;
+use super::engine::{FEWEST_VIEWS, Progress};
+use super::field::Field;
+use super::findings;
+use super::known::Known;
+use super::parameters::estimate;
+use crate::error::{Error, Result};
+use crate::measure::Workbench;
+use crate::model::NoiseModel;
+use crate::terms::{Axis, Basis, Statistic, Term};
+use crate::view::{Excluded, Recording};
+
+/// What could be read of a recording.
+pub(super) struct Taken {
+    pub fields: Vec<Field>,
+    pub excluded: Vec<Excluded>,
+    /// The words turned out to be ranges.
+    pub ranges: Option<Finding>,
+    /// Views that were another's copy, in words.
+    pub copies: Vec<String>,
+}
+
+impl Taken {
+    /// Every view that can be used, one at least of each.
+    ///
+    /// # Errors
+    /// When fewer than three views are left.
+    pub fn of(
+        recording: &Recording,
+        bench: &Workbench<'_>,
+        model: &NoiseModel,
+        known: &Known,
+        progress: Progress<'_>,
+    ) -> Result<Self> {
+        let (mut fields, mut excluded) = read(recording, bench, model, known, progress);
+        let mut found = None;
+        if let Some(flat) = as_ranges(recording, bench, model, known, fields.len()) {
+            (fields, excluded) = flat;
+            found = Some(ranges());
+        }
+        let copies = without_copies(&mut fields);
+        if fields.len() < FEWEST_VIEWS {
+            let first = excluded
+                .first()
+                .map_or_else(String::new, |e| format!("; view {}: {}", e.view, e.reason));
+            return Err(Error::recording(
+                &recording.root,
+                format!("{} of {} views can be used{first}", fields.len(), recording.views.len()),
+                "a diagnosis needs at least three views of a plane",
+            ));
+        }
+        Ok(Taken { fields, excluded, ranges: found, copies })
+    }
+}
+
+pub(super) fn refuse_other_size(model: &NoiseModel, sensor: &crate::view::Sensor) -> Result<()> {
+    let Some(other) = &model.sensor else { return Ok(()) };
+    let (theirs, ours) = (&other.camera, &sensor.camera);
+    if (theirs.width, theirs.height) == (ours.width, ours.height) {
+        return Ok(());
+    }
+    Err(Error::Argument {
+        what: format!(
+            "the model's sensor has {} x {} px, the recording's {} x {}: its errors lie elsewhere",
+            theirs.width, theirs.height, ours.width, ours.height
+        ),
+        remedy: "give the model that was made of this very sensor",
+    })
+}
+
+/// A view whose frames are another's, bit for bit, is no second witness.
+fn without_copies(fields: &mut Vec<Field>) -> Vec<String> {
+    let mut told = Vec::new();
+    let mut kept: Vec<Field> = Vec::new();
+    for field in fields.drain(..) {
+        let same = |other: &&Field| {
+            other.words.0 == field.words.0
+                && other.frames.len() == field.frames.len()
+                && other.pixels == field.pixels
+                && other.first.first().map(|f| bits(f)) == field.first.first().map(|f| bits(f))
+        };
+        match kept.iter().find(same) {
+            Some(other) => told.push(format!(
+                "view {} has the same frames as view {}: it was left out",
+                field.name, other.name
+            )),
+            None => kept.push(field),
+        }
+    }
+    *fields = kept;
+    told
+}
+
+fn bits(residuals: &[f32]) -> Vec<u32> {
+    residuals.iter().map(|r| r.to_bits()).collect()
+}
+
+/// Do the views become flat once their words are taken for lengths of rays? Then with them.
+fn as_ranges(
+    recording: &Recording,
+    bench: &Workbench<'_>,
+    model: &NoiseModel,
+    known: &Known,
+    flat: usize,
+) -> Option<(Vec<Field>, Vec<Excluded>)> {
+    if 2 * flat >= recording.views.len() || known.has("range-not-depth") {
+        return None;
+    }
+    let bench = Workbench { ranges: true, ..Workbench::new(bench.sensor, bench.options) };
+    let mut told = known.clone();
+    told.bias.push(range_term());
+    let (fields, excluded) = read(recording, &bench, model, &told, &|_, _| ());
+    (fields.len() >= FEWEST_VIEWS && fields.len() > 2 * flat).then_some((fields, excluded))
+}
+
+fn range_term() -> Term {
+    Term { statistic: Statistic::Bias, basis: Basis::RangeNotDepth, coefficients: vec![1.0] }
+}
+
+/// The finding that goes with [`as_ranges`].
+fn ranges() -> Finding {
+    let mut parameters = Map::new();
+    parameters.insert("share".into(), estimate(1.0, 0.01));
+    Finding {
+        share: 1e6,
+        parameters,
+        p_adjusted: 1e-9,
+        terms: vec![range_term()],
+        ..findings::named("range-not-depth", 0.98, Statistic::Bias, Axis::Radius)
+    }
+}
+
+pub(super) fn read(
+    recording: &Recording,
+    bench: &Workbench<'_>,
+    model: &NoiseModel,
+    known: &Known,
+    progress: Progress<'_>,
+) -> (Vec<Field>, Vec<Excluded>) {
+    let times = recording.views.iter().filter_map(|v| v.depth.first()).map(|f| f.timestamp);
+    let start = times.fold(f64::INFINITY, f64::min);
+    let done = AtomicUsize::new(0);
+    let total = recording.views.len();
+    let results: Vec<Result<Field>> = recording
+        .views
+        .par_iter()
+        .map(|v| {
+            let field = Field::read(v, bench, &model.sigma, known, start);
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+            field
+        })
+        .collect();
+    let mut excluded = recording.excluded.clone();
+    let mut fields = Vec::new();
+    for (view, result) in recording.views.iter().zip(results) {
+        match result {
+            Ok(field) => fields.push(field),
+            Err(e) => excluded.push(Excluded::of(&view.name, &e)),
+        }
+    }
+    (fields, excluded)
+}

@@ -1,0 +1,109 @@
+//! Steps of the words, and the variance that comes by other names than sigma.
+
+use serde_json::Map;
+
+use super::diagnosis::{Finding, Size};
+use super::field::Field;
+use super::findings;
+use super::known::Known;
+use super::lattice::{Lattice, Words};
+use super::parameters::estimate;
+use super::pixels::{fixed_px2, mean_of};
+use super::structure::Structure;
+use crate::frame::DepthCode;
+use crate::terms::{Axis, Place, Statistic};
+use crate::view::Recording;
+
+/// Variance that comes by other names than sigma: of steps, rows, and pixels.
+#[derive(Debug, Clone, Copy)]
+pub struct Steps {
+    depth_px_m2: f64,
+    disparity_px: f64,
+    noise_px2: f64,
+}
+
+impl Steps {
+    pub fn of(
+        lattice: &Lattice,
+        structure: &[Structure],
+        fields: &[Field],
+        recording: &Recording,
+    ) -> Self {
+        let step_px = lattice.disparity_step_px.unwrap_or(0.0);
+        // With frames to compare, what stands still is not in the variance.
+        let single = fields.iter().all(|f| f.frames.len() < 2);
+        let still = if single { fixed_px2(structure) } else { 0.0 };
+        Steps {
+            depth_px_m2: lattice.depth_step_m.unwrap_or(0.0) * fields[0].scale_px_m,
+            // Words of a raw sensor are in the model's variance already.
+            disparity_px: if is_raw(recording) { 0.0 } else { step_px },
+            noise_px2: mean_of(structure.iter().filter_map(|s| s.row_px2)) + still,
+        }
+    }
+
+    /// At a place, px^2.
+    pub fn at(&self, p: &Place) -> f64 {
+        let depth_px = self.depth_px_m2 / (p.z * p.z);
+        (depth_px * depth_px + self.disparity_px.powi(2)) / 12.0 + self.noise_px2
+    }
+}
+
+pub(super) fn is_raw(recording: &Recording) -> bool {
+    matches!(recording.sensor.code, DepthCode::Disparity { .. })
+}
+
+pub(super) fn lattice(fields: &[Field], recording: &Recording) -> Lattice {
+    let mut words = Words::none();
+    fields.iter().for_each(|f| words.merge(&f.words));
+    words.lattice(&recording.sensor, fields[0].scale_px_m)
+}
+
+/// A step is worth telling when the error it makes is this share of the noise.
+const STEP_SHARE: f64 = 0.1;
+
+pub(super) fn steps(
+    lattice: &Lattice,
+    known: &Known,
+    fields: &[Field],
+    recording: &Recording,
+    sigma_mm: f64,
+) -> Vec<Finding> {
+    let mut found = Vec::new();
+    let mut add = |effect, axis, interval, name: &str, step: f64, error, size: Size| {
+        let mut parameters = Map::new();
+        parameters.insert(name.into(), estimate(step, error));
+        found.push(Finding {
+            interval,
+            share: 10.0 + 100.0 * size.sigma * size.sigma,
+            parameters,
+            size,
+            p_adjusted: 1e-6,
+            ..findings::named(effect, 0.98, Statistic::Distribution, axis)
+        });
+    };
+    let z = crate::stats::range(fields.iter().map(|f| f.plane.depth(0.0, 0.0)));
+    let mut sigma_px: Vec<f32> = fields.iter().filter_map(|f| f.sigma.first().copied()).collect();
+    let sigma_px = f64::from(crate::stats::median_in_place(&mut sigma_px));
+    if let Some(step) = lattice.disparity_step_px
+        && !known.has("disparity-quantisation")
+    {
+        let sigma = step / 12f64.sqrt() / sigma_px;
+        if sigma > STEP_SHARE {
+            let size = Size { mm: sigma * sigma_mm, sigma };
+            let raw = matches!(recording.sensor.code, DepthCode::Disparity { .. });
+            let error = if raw { 0.0 } else { 0.002 * step };
+            let axis = Axis::DisparityPhase;
+            add("disparity-quantisation", axis, [0.0, 1.0], "step_px", step, error, size);
+        }
+    }
+    if let Some(step) = lattice.depth_step_m
+        && !known.has("depth-rounding")
+    {
+        let mm = 1e3 * step / 12f64.sqrt();
+        let size = Size { mm, sigma: mm / sigma_mm };
+        if size.sigma > STEP_SHARE {
+            add("depth-rounding", Axis::Z, z, "step_m", step, 0.0, size);
+        }
+    }
+    found
+}

@@ -1,0 +1,123 @@
+//! What is said in the end: findings in order, the extended model, the views.
+
+use super::diagnosis::{After, CannotTell, Finding, HeldOut, Remaining, Status, Verdict, ViewLine};
+use super::field::Field;
+use super::findings;
+use super::heldout;
+use super::layers::Survey;
+use super::search::Outcome;
+use crate::effects;
+use crate::model::{Effect, NoiseModel, UNEXPLAINED};
+use crate::terms::{Axis, Statistic, Term};
+use crate::view::{RecordingFile, Sensor};
+
+pub(super) fn not_identifiable(what: &CannotTell) -> Finding {
+    Finding {
+        status: Status::NotIdentifiable,
+        alternatives: Vec::new(),
+        physics: what.why.clone(),
+        ..findings::named(what.effect, 0.0, Statistic::Bias, Axis::Z)
+    }
+}
+
+/// A name is told once, by its strongest finding.
+pub(super) fn merge(found: &mut Vec<Finding>) {
+    found.sort_by(|a, b| b.share.total_cmp(&a.share));
+    let mut names: Vec<&'static str> = Vec::new();
+    found.retain(|f| match f.effect {
+        Some(id) if f.status != Status::NotIdentifiable => {
+            let new = !names.contains(&id);
+            if new {
+                names.push(id);
+            }
+            new
+        }
+        _ => true,
+    });
+}
+
+/// Nats become shares, and the largest comes first.
+pub(super) fn shares(found: &mut [Finding]) {
+    let total: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
+    for f in found.iter_mut() {
+        f.share = if total > 0.0 { f.share.max(0.0) / total } else { 0.0 };
+    }
+    found.sort_by(|a, b| {
+        let told = |f: &Finding| f.status == Status::NotIdentifiable;
+        told(a).cmp(&told(b)).then(b.share.total_cmp(&a.share))
+    });
+}
+
+/// Does anything stand out once all terms are in?
+pub(super) fn after(bias: &Outcome, variance: &Outcome) -> After {
+    let mut remaining = Vec::new();
+    for (statistic, outcome) in [(Statistic::Bias, bias), (Statistic::Variance, variance)] {
+        if let Some(left) = &outcome.remaining {
+            let axis = left.candidate.basis.axis();
+            let name = left.candidate.family.unwrap_or("a curve without a name");
+            remaining.push(Remaining {
+                statistic,
+                axis,
+                p_adjusted: left.p,
+                words: format!("{name} would still bring {:.0} nats", left.gain),
+            });
+        }
+    }
+    let verdict = if remaining.is_empty() { Verdict::Match } else { Verdict::Mismatch };
+    After { verdict, remaining }
+}
+
+/// The model with what was found.
+pub(super) fn extend(model: &NoiseModel, found: &[Finding], sensor: &Sensor) -> NoiseModel {
+    let mut extended = model.clone();
+    if extended.sensor.is_none() {
+        extended.sensor = Some(RecordingFile::of(sensor));
+    }
+    for f in found {
+        let keeps = matches!(f.status, Status::Named | Status::OneOf) || !f.terms.is_empty();
+        if !keeps {
+            continue;
+        }
+        let id = match (f.status, f.effect) {
+            (Status::Recalibrate, _) | (_, None) => UNEXPLAINED,
+            (_, Some(id)) => id,
+        };
+        let mut parameters = f.parameters.clone();
+        if let Some(card) = effects::find(id).filter(|_| f.terms.is_empty()).map(|e| e.card()) {
+            // The simulator takes the catalogue's parameters alone.
+            parameters.retain(|name, _| card.parameters.iter().any(|p| p.name == name));
+        }
+        extended.effects.push(Effect { id: id.into(), parameters, shape: f.terms.clone() });
+    }
+    extended
+}
+
+pub(super) fn view_lines(
+    fields: &[Field],
+    survey: &Survey,
+    bias: &[Term],
+    heldout: Option<&HeldOut>,
+) -> Vec<ViewLine> {
+    let before = heldout::rms_by_view(survey, &[]);
+    let after = heldout::rms_by_view(survey, bias);
+    fields
+        .iter()
+        .enumerate()
+        .map(|(n, f)| ViewLine {
+            name: f.name.clone(),
+            z_m: f.plane.depth(0.0, 0.0),
+            theta_rad: f.plane.theta(),
+            azimuth_rad: f.plane.azimuth(),
+            frames: f.frames.len(),
+            pixels: f.pixels.len(),
+            bowl_px_before: before[n],
+            bowl_px_after: after[n],
+            held_out: heldout.is_some_and(|h| h.views.contains(&f.name)),
+        })
+        .collect()
+}
+
+/// What is smaller than this, in sigmas, is told of by nobody: models are not better than that.
+pub(super) fn least_size(statistic: Statistic) -> f64 {
+    if statistic == Statistic::Bias { 0.008 } else { 0.02 }
+}
