@@ -1,5 +1,6 @@
 //! The layers a mismatch may sit in: the mean, and the size of the noise.
 
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::bias;
@@ -427,27 +428,35 @@ impl Sum {
 /// A model's sigma is not known better than this from view to view, in log variance.
 const MODEL_TOLERANCE: f64 = 0.04;
 
-/// Variance of the views' own levels beyond what their samples explain (DerSimonian and Laird's
-/// moment estimate), about a line in log z: what a law of the distance explains is no scatter.
+/// Variance of the views' own levels beyond what their samples explain (a moment estimate after
+/// DerSimonian and Laird), about laws of the distance and of the tilt: what a law explains is no
+/// scatter. Enlarged for the laws that so few views have to settle.
 fn view_scatter(blocks: &[Blocks]) -> f64 {
-    let levels: Vec<(f64, f64, f64)> =
-        blocks.iter().filter_map(|b| b.level().map(|(y, v)| (b.places[0].z.ln(), y, v))).collect();
     let floor = MODEL_TOLERANCE * MODEL_TOLERANCE;
-    let n = levels.len() as f64;
-    if n < 4.0 {
+    let levels: Vec<(&Place, f64, f64)> = blocks
+        .iter()
+        .filter_map(|b| b.level().map(|(level, variance)| (&b.places[0], level, variance)))
+        .collect();
+    let n = levels.len();
+    let laws = |p: &Place| {
+        let steep = p.theta.sin().powi(2);
+        [1.0, p.z.ln(), steep, steep * (2.0 * p.azimuth).cos()]
+    };
+    let orders = if n >= 9 { 4 } else { 2 };
+    if n < orders + 2 {
         return floor;
     }
-    let (x0, y0) = levels.iter().fold((0.0, 0.0), |(x, y), l| (x + l.0 / n, y + l.1 / n));
-    let (mut xx, mut xy) = (1e-9, 0.0);
-    for l in &levels {
-        xx += (l.0 - x0).powi(2);
-        xy += (l.0 - x0) * (l.1 - y0);
-    }
-    let slope = xy / xx;
-    let scatter =
-        levels.iter().map(|l| (l.1 - y0 - slope * (l.0 - x0)).powi(2)).sum::<f64>() / (n - 2.0);
-    let sampling = levels.iter().map(|l| l.2).sum::<f64>() / n;
-    (scatter - sampling).max(floor)
+    let x = DMatrix::from_fn(n, orders, |i, k| laws(levels[i].0)[k]);
+    let y = DVector::from_fn(n, |i, _| levels[i].1);
+    // By SVD: views of one distance or one tilt leave laws without a meaning.
+    let svd = x.clone().svd(true, true);
+    let tiny = 1e-6 * svd.singular_values.max();
+    let Ok(beta) = svd.solve(&y, tiny) else { return floor };
+    let free = (n - svd.rank(tiny)) as f64;
+    let left = (&y - x * beta).norm_squared() / free;
+    let sampling = levels.iter().map(|l| l.2).sum::<f64>() / n as f64;
+    let enlarged = if free > 3.0 { free / (free - 2.0) } else { 3.0 };
+    ((left - sampling) * enlarged).max(floor)
 }
 
 /// How much less a pixel's mean is worth than the model says: its variance relative to the
