@@ -1,15 +1,17 @@
 //! Scratch driver of the proof's ray generator:
 //! `rays OUTDIR --cell CELL --effect ID[,ID] [--strength S | --nats N] --seed N [--count K] [--views N] [--frames N] [--small]`
 //!
-//! With `--nats` a set is as the trial seals it: 320x240, `--small` 160x120.
+//! With `--nats` a set is as the trial seals it: 320x240, `--small` 160x120. With `--light` it is made
+//! of dots, `--effect` names a cause, and `OUT/<name>/` holds `recording/` and `simulated/`.
 
 use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::Context;
 use clap::Parser;
+use kinoise::io::sha256_hex;
 use kinoise::prove::rays::{Cell, Order, Set, write};
-use kinoise::prove::{Asked, World};
+use kinoise::prove::{Asked, World, light, worlds};
 
 #[derive(Parser)]
 struct Arguments {
@@ -38,6 +40,9 @@ struct Arguments {
     frames: Option<usize>,
     #[arg(long)]
     small: bool,
+    /// By light: null or single
+    #[arg(long)]
+    light: bool,
 }
 
 fn cell(text: &str) -> Result<Cell, String> {
@@ -45,11 +50,32 @@ fn cell(text: &str) -> Result<Cell, String> {
 }
 
 impl Arguments {
+    fn asked(&self, world: World, effects: &[String], seed: u64) -> Asked {
+        let Arguments { cell, nats, small, .. } = *self;
+        Asked { world, cell, names: effects.to_vec(), nats, seed, small }
+    }
+
+    /// `OUT/<name>/`, and its truth where the others have theirs.
+    fn shoot(&self, effects: &[String], seed: u64) -> anyhow::Result<()> {
+        let begin = Instant::now();
+        let asked = self.asked(World::Light, effects, seed);
+        let name = &sha256_hex(format!("{asked:?}").as_bytes())[..10];
+        let set = worlds::seal(&asked, None)?;
+        set.write(&self.out.join(name))?;
+        let truth = self.out.join("truth");
+        std::fs::create_dir_all(&truth)?;
+        let told = set.truth();
+        std::fs::write(truth.join(format!("{name}.json")), serde_json::to_vec_pretty(&told)?)?;
+        let causes: Vec<&str> = told.hidden.iter().map(|h| h.form.as_str()).collect();
+        let seconds = begin.elapsed().as_secs_f64();
+        println!("{name} {} {:?} {seconds:.2} s", causes.join("+"), asked.nats);
+        Ok(())
+    }
+
     fn set(&self, effects: &[String], seed: u64) -> kinoise::error::Result<Set> {
         let (cell, small) = (self.cell, self.small);
         if self.nats.is_some() || self.sealed {
-            let (names, nats) = (effects.to_vec(), self.nats);
-            let asked = Asked { world: World::Rays, cell, names, nats, seed, small };
+            let asked = self.asked(World::Rays, effects, seed);
             return Set::sealed(&asked, self.views, self.frames);
         }
         Set::draw(Order {
@@ -68,13 +94,22 @@ fn main() -> anyhow::Result<()> {
     let a = Arguments::parse();
     let every: Vec<Vec<String>> = if a.effect == ["all"] {
         use kinoise::prove::rays::{CATALOGUE, OUTSIDE};
-        let list: &[&str] = if a.cell == Cell::Outside { &OUTSIDE } else { &CATALOGUE };
+        let causes: Vec<&str> = light::known().collect();
+        let list: &[&str] = match a.cell {
+            _ if a.light => &causes,
+            Cell::Outside => &OUTSIDE,
+            _ => &CATALOGUE,
+        };
         list.iter().map(|id| vec![(*id).to_string()]).collect()
     } else {
         vec![a.effect.clone()]
     };
     for effects in every {
         for seed in a.seed..a.seed + a.count {
+            if a.light {
+                a.shoot(&effects, seed)?;
+                continue;
+            }
             let begin = Instant::now();
             let set = a.set(&effects, seed)?;
             let drawn = begin.elapsed().as_secs_f64();

@@ -24,6 +24,10 @@ mod sets;
 mod shoot;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_nats;
+#[cfg(test)]
+pub(super) mod tests_sealed;
 mod trace;
 mod write;
 

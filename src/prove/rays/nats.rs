@@ -225,34 +225,31 @@ pub(super) fn strength_for<E>(
     const WEAKEST: f64 = 1e-6;
     const STRONGEST: f64 = 8.0;
     const NEAR: f64 = 0.02;
-    let (mut low, mut high) = ((WEAKEST.ln(), 0.0), (STRONGEST.ln(), f64::INFINITY));
-    let mut best = (1.0, nats(1.0)?);
+    // ln of the strength, and ln of what it is worth over what is wanted.
+    let (mut low, mut high) = (None, None);
+    let mut s = 1.0;
+    let mut got = nats(s)?;
     for round in 0..40 {
-        let (s, got) = best;
-        if (got / wanted - 1.0).abs() < NEAR || (got < wanted && s >= STRONGEST) {
+        let at_the_end = got < wanted && s >= STRONGEST || got > wanted && s <= WEAKEST;
+        if (got / wanted - 1.0).abs() < NEAR || at_the_end {
             break;
         }
+        let here = (f64::ln(s), (got / wanted).max(1e-12).ln());
         if got < wanted {
-            low = (s.ln(), got)
+            low = Some(here)
         } else {
-            high = (s.ln(), got)
+            high = Some(here)
         }
-        // Twice the strength is worth four times as much, or what the bracket says.
-        let bend = if low.1 > 0.0 && high.1.is_finite() && high.0 > low.0 {
-            ((high.1 / low.1).ln() / (high.0 - low.0)).max(0.1)
-        } else {
-            2.0
+        // Twice the strength is worth four times as much, unless a bracket says otherwise.
+        let alone = |(s, off): (f64, f64)| s - (0.5 * off).clamp(-2.5, 2.5);
+        let next = match (low, high) {
+            (Some(l), Some(h)) if round % 3 == 2 || l.1 < -10.0 => 0.5 * (l.0 + h.0),
+            (Some(l), Some(h)) => l.0 + (h.0 - l.0) * (-l.1 / (h.1 - l.1)).clamp(0.05, 0.95),
+            (Some(end), None) | (None, Some(end)) => alone(end),
+            (None, None) => 0.0,
         };
-        let guess = s.ln() + ((wanted / got.max(1e-12)).ln() / bend).clamp(-5.0, 5.0);
-        let halved = 0.5 * (low.0 + high.0);
-        let bracketed = low.1 > 0.0 && high.1.is_finite();
-        let next = if bracketed && round % 3 == 2 || !(low.0..=high.0).contains(&guess) {
-            if bracketed { halved } else { guess.clamp(low.0, high.0) }
-        } else {
-            guess
-        };
-        let s = next.exp().min(STRONGEST);
-        best = (s, nats(s)?);
+        s = next.exp().clamp(WEAKEST, STRONGEST);
+        got = nats(s)?;
     }
-    Ok(best)
+    Ok((s, got))
 }

@@ -118,6 +118,12 @@ impl<'a> Still<'a> {
         self.light[i] = (site.albedo * (DN_AT_1_M * lit + DN_A_LUX * facts.lux)) as f32;
     }
 
+    /// Probability of no answer.
+    #[cfg(test)]
+    pub fn loss(&self) -> &[f32] {
+        &self.loss
+    }
+
     fn clock(&self, frame: usize) -> Clock {
         let view_s = self.plan.stamps[frame] - self.plan.stamps[0];
         let width = self.set.unit.sensor.camera.width;
