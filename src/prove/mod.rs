@@ -4,7 +4,9 @@
 //! The makers of sets share no formula with the catalogue and no code with the diagnosis; only the
 //! recording and the model file are common ground.
 
+pub mod light;
 mod question;
 pub mod rays;
+pub mod worlds;
 
 pub use question::*;

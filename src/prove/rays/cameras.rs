@@ -27,10 +27,9 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// Drawn at random; `small` has a quarter of the pixels.
-    pub fn draw(small: bool, units_per_metre: f64, rng: &mut Stream) -> Self {
-        let shrink = if small { 0.5 } else { 1.0 };
-        let (width, height) = if small { (320, 240) } else { (640, 480) };
+    /// Drawn at random, its picture `width` px wide and three quarters as high.
+    pub fn draw(width: usize, units_per_metre: f64, rng: &mut Stream) -> Self {
+        let (shrink, height) = (width as f64 / 640.0, width * 3 / 4);
         let fx = shrink * rng.random_range(540.0..600.0);
         let off = |n: usize, rng: &mut Stream| {
             (n as f64 - 1.0) / 2.0 + shrink * rng.random_range(-6.0..6.0)
@@ -82,7 +81,11 @@ impl Unit {
             sigma: SigmaModel::published(Form::Paper, &self.sigma, domain),
             effects,
             fit: FitSummary::default(),
-            provenance: Provenance::now(None),
+            // The same bytes whenever it is written.
+            provenance: Provenance {
+                created: "1970-01-01T00:00:00Z".into(),
+                ..Provenance::now(None)
+            },
         })
     }
 }
@@ -94,7 +97,7 @@ mod tests {
 
     #[test]
     fn the_model_file_says_what_the_unit_does() {
-        let unit = Unit::draw(false, 5000.0, &mut Seed(3).stream("unit"));
+        let unit = Unit::draw(640, 5000.0, &mut Seed(3).stream("unit"));
         let model = unit.model(Vec::new()).unwrap();
         for (z, theta) in [(0.5, 0.0), (1.3, 0.4), (3.3, 1.2), (5.0, 1.3)] {
             assert!((model.sigma.axial_sigma(z, theta) / unit.sigma(z, theta) - 1.0).abs() < 1e-12);

@@ -6,7 +6,7 @@ use rand::Rng;
 use statrs::function::erf::erfc;
 
 use super::kernels::roundish;
-use super::{Act, Cause, Label, Unit};
+use super::{Act, Cause, Label, Trace, Unit};
 use crate::rng::{Seed, Stream};
 
 /// One of `forms`, by lot.
@@ -154,23 +154,24 @@ pub fn fixed_pattern_noise(strength: f64, unit: &Unit, seed: Seed) -> Cause {
     let at = move |s: &super::Site, _: &super::Facts<'_>| {
         sigma * f64::from(own[s.v as usize * width + s.u as usize])
     };
-    Cause::new(label, Act::Mismatch(Box::new(at)))
+    Cause::new(label, Act::Mismatch(Box::new(at))).tracing(Trace::Pixels(sigma))
 }
 
-/// A footprint with soft edges sees two surfaces: their disparities mix by the share of each.
+/// A footprint with soft edges sees two surfaces: their disparities mix by the share of each. Below
+/// strength 1 only a part of the light is spread so.
 pub fn edge_mixing(strength: f64, unit: &Unit) -> Cause {
-    let width = 2.0 * strength * unit.scale().max(0.5);
+    let (width, part) = (2.0 * strength.max(1.0) * unit.scale().max(0.5), strength.min(1.0));
     let label = Label::new(
         Some("edge-mixing"),
         "gaussian footprint, mixed in disparity",
         ["bias", "edge-distance"],
-        &[("width_px", width)],
+        &[("width_px", width), ("part", part)],
     )
     .within(0.0, width);
     Cause::new(
         label,
         Act::mismatch(move |s, _| {
-            let share = 0.5 * erfc(s.edge_px.abs() * FRAC_1_SQRT_2 / (0.5 * width));
+            let share = part * 0.5 * erfc(s.edge_px.abs() * FRAC_1_SQRT_2 / (0.5 * width));
             s.other_disparity.map_or(0.0, |other| share * (other - s.disparity))
         }),
     )

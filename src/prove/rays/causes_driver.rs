@@ -3,7 +3,7 @@
 use rand::Rng;
 
 use super::causes_bias::{lot, sign};
-use super::{Act, Cause, Label, Unit};
+use super::{Act, Cause, Label, Trace, Unit};
 use crate::rng::Stream;
 
 /// Matches come in steps, counted from a reference that is no whole number of them.
@@ -16,7 +16,7 @@ pub fn disparity_quantisation(strength: f64, unit: &Unit, rng: &mut Stream) -> C
         ["distribution", "disparity-phase"],
         &[("step_px", step)],
     );
-    Cause::new(label, Act::Lattice { step, phase })
+    Cause::new(label, Act::Lattice { step, phase }).tracing(Trace::Comb)
 }
 
 /// Cut off, not rounded.
@@ -24,7 +24,7 @@ pub fn depth_rounding(strength: f64) -> Cause {
     let step = 0.002 * strength;
     let label =
         Label::new(Some("depth-rounding"), "floor", ["distribution", "z"], &[("step_m", step)]);
-    Cause::new(label, Act::Floor(step))
+    Cause::new(label, Act::Floor(step)).tracing(Trace::Comb)
 }
 
 /// The ray's length, or what a driver with a wrong focal length makes of it.

@@ -28,7 +28,7 @@ pub fn grazing_dropout(strength: f64, rng: &mut Stream) -> Cause {
         ["missing", "theta"],
         &[("theta50_deg", middle), ("width_deg", width)],
     )
-    .within((middle - width).to_radians(), std::f64::consts::FRAC_PI_2);
+    .within((middle - width).min(89.0).to_radians(), std::f64::consts::FRAC_PI_2);
     Cause::new(label, Act::loss(move |s, _| rise(form, (s.theta.to_degrees() - middle) / width)))
 }
 
@@ -49,19 +49,21 @@ pub fn range_dropout(strength: f64, rng: &mut Stream) -> Cause {
     Cause::new(label, Act::loss(move |s, _| rise(form, (s.z - middle) / width)))
 }
 
-/// The board stands in the projector's light.
-pub fn occlusion_shadow(unit: &Unit) -> Cause {
+/// The board stands in the projector's light; `share` of the pixels there go without an answer.
+pub fn occlusion_shadow(share: f64, unit: &Unit) -> Cause {
     let baseline_m = unit.baseline_m;
     let label = Label::new(
         Some("occlusion-shadow"),
         "shadow rays",
         ["missing", "edge-distance"],
-        &[("share", 1.0)],
+        &[("share", share)],
     );
     Cause::new(
         label,
-        Act::loss(move |s, f| {
-            f64::from(u8::from(!s.on_board && shaded(f.stage, baseline_m, &s.point)))
-        }),
+        Act::loss(
+            move |s, f| {
+                if !s.on_board && shaded(f.stage, baseline_m, &s.point) { share } else { 0.0 }
+            },
+        ),
     )
 }

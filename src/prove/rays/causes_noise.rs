@@ -6,8 +6,8 @@ use rand::Rng;
 use rand_distr::{ChiSquared, Distribution, Exp1};
 
 use super::causes_bias::lot;
-use super::kernels::{Window, fresh, roundish};
-use super::{Act, Cause, Clock, Label, Phase, Unit};
+use super::kernels::{Window, fresh, roundish, white};
+use super::{Act, Cause, Clock, Label, Phase, Trace, Unit};
 use crate::rng::{Seed, Stream};
 
 fn stream(clock: &Clock, what: &str) -> Stream {
@@ -27,7 +27,7 @@ pub fn heavy_tails(strength: f64, rng: &mut Stream) -> Cause {
             field.iter_mut().for_each(|x| *x *= (scale / chi.sample(&mut rng).sqrt()) as f32);
         };
         let label = Label::new(id, "student", tails, &[("nu", nu)]);
-        return Cause::new(label, Act::grain(Phase::Tails, widen));
+        return Cause::new(label, Act::grain(Phase::Tails, widen)).tracing(Trace::Student(nu));
     }
     let (fraction, scale) = (0.015 * strength, rng.random_range(3.0..5.0));
     let stray = move |field: &mut [f32], clock: &Clock| {
@@ -41,15 +41,18 @@ pub fn heavy_tails(strength: f64, rng: &mut Stream) -> Cause {
     };
     let parameters = [("fraction", fraction), ("scale", f64::from(scale) * 2f64.sqrt())];
     let label = Label::new(id, "laplace mixture", tails, &parameters);
-    Cause::new(label, Act::grain(Phase::Tails, stray))
+    let trace = Trace::Stray { fraction, scale: f64::from(scale) };
+    Cause::new(label, Act::grain(Phase::Tails, stray)).tracing(trace)
 }
 
-/// Neighbours share a window that is not a flat one.
+/// Neighbours share a window that is not a flat one; below strength 1 they share it for a part of
+/// the noise only, and the read-out adds the rest.
 pub fn spatial_correlation(strength: f64, rng: &mut Stream) -> Cause {
-    let side = 7.0 * strength;
+    let side = 7.0 * strength.max(1.0);
     let bell = lot(&[true, false], rng);
     let window = if bell { Window::bell(side) } else { Window::tent(side) };
-    windowed(if bell { "gaussian window" } else { "triangular window" }, window)
+    let form = if bell { "gaussian window" } else { "triangular window" };
+    if strength < 1.0 { shared(form, window, strength) } else { windowed(form, window) }
 }
 
 /// The noise seen through `window`.
@@ -60,16 +63,31 @@ pub fn windowed(form: &'static str, window: Window) -> Cause {
         ["correlation", "pixel-lag"],
         &[("length_px", window.side())],
     );
+    let trace = Trace::Window { window: window.clone(), share: 1.0 };
     let blur = move |field: &mut [f32], clock: &Clock| window.blur(field, clock.width);
-    Cause::new(label, Act::grain(Phase::InSpace, blur))
+    Cause::new(label, Act::grain(Phase::InSpace, blur)).tracing(trace)
 }
 
-/// A moving average over two or three frames.
+/// `share` of the variance comes through `window`, the rest is each pixel's own.
+fn shared(form: &'static str, window: Window, share: f64) -> Cause {
+    let Cause { mut label, .. } = windowed(form, window.clone());
+    label.parameters.insert("share".into(), share.into());
+    let trace = Trace::Window { window: window.clone(), share };
+    let (through, own) = (share.sqrt() as f32, (1.0 - share).sqrt() as f32);
+    let mix = move |field: &mut [f32], clock: &Clock| {
+        let mut seen = white(field.len(), stream(clock, "matched"));
+        window.blur(&mut seen, clock.width);
+        field.iter_mut().zip(seen).for_each(|(x, s)| *x = own * *x + through * s);
+    };
+    Cause::new(label, Act::grain(Phase::InSpace, mix)).tracing(trace)
+}
+
+/// A moving average over two frames, the earlier the weaker; beyond strength 1 over three.
 pub fn temporal_correlation(strength: f64) -> Cause {
-    let weights: &[f64] = match strength {
-        s if s < 1.0 => &[1.0, 0.4],
-        s if s < 2.0 => &[1.0, 1.0],
-        _ => &[1.0, 1.0, 1.0],
+    let weights = if strength <= 1.0 {
+        vec![1.0, strength]
+    } else {
+        vec![1.0, 1.0, (strength - 1.0).min(1.0)]
     };
     let norm = weights.iter().map(|w| w * w).sum::<f64>();
     let rho = weights.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / norm;
@@ -79,6 +97,7 @@ pub fn temporal_correlation(strength: f64) -> Cause {
         ["correlation", "frame"],
         &[("rho", rho), ("frames", weights.len() as f64)],
     );
+    let trace = Trace::Average(weights.iter().map(|w| w / norm.sqrt()).collect());
     let weights: Vec<f32> = weights.iter().map(|w| (w / norm.sqrt()) as f32).collect();
     let average = move |field: &mut [f32], clock: &Clock| {
         field.iter_mut().for_each(|x| *x *= weights[0]);
@@ -87,7 +106,7 @@ pub fn temporal_correlation(strength: f64) -> Cause {
             field.iter_mut().zip(earlier).for_each(|(x, e)| *x += weight * e);
         }
     };
-    Cause::new(label, Act::grain(Phase::InTime, average))
+    Cause::new(label, Act::grain(Phase::InTime, average)).tracing(trace)
 }
 
 /// Grain that stands still within a view: a sum of uniforms.
@@ -104,7 +123,7 @@ pub fn frozen_noise(strength: f64) -> Cause {
         let mut rng = stream(&Clock { frame: 0, ..*clock }, "grain");
         field.iter_mut().for_each(|x| *x = alive * *x + still * roundish(&mut rng));
     };
-    Cause::new(label, Act::grain(Phase::AtRest, mix))
+    Cause::new(label, Act::grain(Phase::AtRest, mix)).tracing(Trace::Frozen(fraction))
 }
 
 /// Each row's own shift: uniform.
@@ -117,7 +136,7 @@ pub fn row_noise(strength: f64, unit: &Unit) -> Cause {
         let mut rng = stream(clock, "rows");
         shake.rows.iter_mut().for_each(|row| *row += rng.random_range(-half..half));
     };
-    Cause::new(label, Act::shake(shift))
+    Cause::new(label, Act::shake(shift)).tracing(Trace::Rows(sigma))
 }
 
 /// The mount swings: a sine met at a random phase in every view.
@@ -135,7 +154,7 @@ pub fn frame_jitter(strength: f64, unit: &Unit, rng: &mut Stream) -> Cause {
         let shift = sigma * 2f64.sqrt() * (TAU * (hertz * clock.view_s + phase)).sin();
         shake.rows.iter_mut().for_each(|row| *row += shift as f32);
     };
-    Cause::new(label, Act::shake(swing))
+    Cause::new(label, Act::shake(swing)).tracing(Trace::Frames(sigma))
 }
 
 fn view_phase(seed: Seed, view: usize) -> f64 {

@@ -15,7 +15,7 @@ pub(super) const WHITE: f64 = 0.8;
 pub fn range_exponent(strength: f64, rng: &mut Stream) -> Cause {
     let form = lot(&["softplus", "z^4 in quadrature"], rng);
     let label =
-        Label::new(Some("range-exponent"), form, ["variance", "z"], &[("excess", 0.5 * strength)]);
+        Label::new(Some("range-exponent"), form, ["variance", "z"], &[("growth", 0.5 * strength)]);
     Cause::new(
         label,
         Act::spread(move |s, _| match form {

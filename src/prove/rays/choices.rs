@@ -11,8 +11,8 @@ use super::causes_variance as variance;
 use super::kernels::Window;
 use super::outside::{OUTSIDE, outside};
 use super::poses::{Session, Told};
-use super::sets::{Cell, Order};
-use super::{Cause, Unit};
+use super::sets::Order;
+use super::{Cause, Cell, Unit};
 use crate::error::{Error, Result};
 use crate::rng::{Seed, Stream};
 
@@ -49,6 +49,8 @@ pub const CATALOGUE: [&str; 29] = [
     "occlusion-shadow",
 ];
 
+const EDGED: [&str; 2] = ["edge-mixing", "occlusion-shadow"];
+
 /// What only reference distances show.
 const BLIND: [&str; 3] = ["depth-scale", "disparity-offset", "thermal-drift"];
 
@@ -61,6 +63,45 @@ const PAIRED: [&[&str]; 5] = [
     &["grazing-dropout", "range-dropout"],
 ];
 
+/// Pairs of which one looks like the other until their axes are told apart.
+const MIMICS: [[&str; 2]; 9] = [
+    ["radial-disparity-bias", "lens-distortion"],
+    ["radial-disparity-bias", "target-bow"],
+    ["pixel-locking", "column-banding"],
+    ["vignetting", "tilt-axis-anisotropy"],
+    ["range-exponent", "ambient-light"],
+    ["slope-noise", "range-exponent"],
+    ["frozen-noise", "fixed-pattern-noise"],
+    ["heavy-tails", "vignetting"],
+    ["grazing-dropout", "range-dropout"],
+];
+
+/// What can be confined to some views, a region, far distances or late times and still show there.
+const BY_VIEW: [&str; 5] = [
+    "pixel-locking",
+    "column-banding",
+    "radial-disparity-bias",
+    "vignetting",
+    "tilt-axis-anisotropy",
+];
+const BY_REGION: [&str; 5] =
+    ["pixel-locking", "column-banding", "vignetting", "range-exponent", "range-dropout"];
+const BY_DISTANCE: [&str; 5] = [
+    "pixel-locking",
+    "column-banding",
+    "radial-disparity-bias",
+    "vignetting",
+    "tilt-axis-anisotropy",
+];
+const BY_TIME: [&str; 6] = [
+    "pixel-locking",
+    "column-banding",
+    "radial-disparity-bias",
+    "vignetting",
+    "range-exponent",
+    "range-dropout",
+];
+
 pub(super) fn names(order: &Order, rng: &mut Stream) -> Vec<String> {
     if !order.effects.is_empty() || matches!(order.cell, Cell::Null | Cell::Drift) {
         return order.effects.clone();
@@ -70,8 +111,16 @@ pub(super) fn names(order: &Order, rng: &mut Stream) -> Vec<String> {
     match order.cell {
         Cell::Single => vec![one(&CATALOGUE, rng)],
         Cell::Outside => vec![one(&OUTSIDE, rng)],
-        Cell::Blind => vec![one(&BLIND, rng)],
-        _ => PAIRED.choose_multiple(rng, 2).map(|group| one(group, rng)).collect(),
+        Cell::Blind | Cell::Referenced => vec![one(&BLIND, rng)],
+        Cell::FewViews => vec![one(&BY_VIEW, rng)],
+        Cell::Region => vec![one(&BY_REGION, rng)],
+        Cell::Far => vec![one(&BY_DISTANCE, rng)],
+        Cell::Late => vec![one(&BY_TIME, rng)],
+        Cell::Mimic => bias::lot(&MIMICS, rng).map(String::from).to_vec(),
+        cell => {
+            let many = if cell == Cell::Triple { 3 } else { 2 };
+            PAIRED.choose_multiple(rng, many).map(|group| one(group, rng)).collect()
+        }
     }
 }
 
@@ -86,7 +135,7 @@ pub(super) fn words(names: &[String], rng: &mut Stream) -> f64 {
 }
 
 pub(super) fn session(order: &Order, names: &[String], rng: &mut Stream) -> Session {
-    let edged = any(names, &["edge-mixing", "occlusion-shadow"]);
+    let edged = any(names, &EDGED);
     let boarded = edged || any(names, &["target-bow", "dirty-board"]);
     let steep = any(names, &["grazing-dropout"]);
     let leaning = any(names, &["slope-noise", "tilt-axis-anisotropy", "lens-distortion"]);
@@ -143,15 +192,16 @@ pub(super) fn age(unit: &mut Unit, strength: f64, rng: &mut Stream) {
     unit.sigma[0] *= factor.powf(rng.random_range(-0.5..1.0));
 }
 
+/// The cause of this name at strength `s`; `shadow` is the share of a shadow that goes without an
+/// answer. What is drawn of `rng` does not depend on the strength.
 pub(super) fn cause(
     name: &str,
-    order: &Order,
+    [s, shadow]: [f64; 2],
     unit: &Unit,
     session: &Session,
     seed: Seed,
     rng: &mut Stream,
 ) -> Result<Cause> {
-    let s = order.strength;
     let half = session.half.map_or(0.6, |h| h[0]);
     Ok(match name {
         "disparity-quantisation" => driver::disparity_quantisation(s, unit, rng),
@@ -182,7 +232,7 @@ pub(super) fn cause(
         "frame-jitter" => noise::frame_jitter(s, unit, rng),
         "grazing-dropout" => missing::grazing_dropout(s, rng),
         "range-dropout" => missing::range_dropout(s, rng),
-        "occlusion-shadow" => missing::occlusion_shadow(unit),
+        "occlusion-shadow" => missing::occlusion_shadow(shadow, unit),
         other => outside(other, s, unit, rng).ok_or_else(|| Error::Argument {
             what: format!("no effect is called \"{other}\""),
             remedy: "take one of effects.md, or of those outside it",

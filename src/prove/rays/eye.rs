@@ -4,17 +4,27 @@ use nalgebra::Vector3;
 
 use super::geometry::{Site, inside_px, projector_column};
 use super::poses::{Plan, outline};
-use super::sets::Set;
-use super::{Act, Cause};
+use super::{Act, Cause, Unit};
 
 /// Nothing answers from farther away, m.
 const FARTHEST_M: f64 = 12.0;
 /// Of a wall behind the board.
 const WALL_ALBEDO: f64 = 0.6;
 
+/// A unit, and what acts on it.
+#[derive(Clone, Copy)]
+pub(super) struct World<'a> {
+    pub unit: &'a Unit,
+    pub causes: &'a [Cause],
+    /// Patches of grey are printed on the board.
+    pub printed: bool,
+    /// Some cause asks how far the board's edge is.
+    pub edged: bool,
+}
+
 /// A camera in front of a stage.
 pub(super) struct Eye<'a> {
-    set: &'a Set,
+    world: World<'a>,
     plan: &'a Plan,
     corner_px: f64,
     /// Of the board in the picture, when a cause asks for it.
@@ -22,21 +32,20 @@ pub(super) struct Eye<'a> {
 }
 
 impl<'a> Eye<'a> {
-    pub fn new(set: &'a Set, plan: &'a Plan) -> Self {
-        let c = &set.unit.sensor.camera;
+    pub fn new(world: World<'a>, plan: &'a Plan) -> Self {
+        let c = &world.unit.sensor.camera;
         let (right, bottom) = (c.width as f64 - 1.0, c.height as f64 - 1.0);
         let corner_px = c.cx.max(right - c.cx).hypot(c.cy.max(bottom - c.cy));
-        let asked = set.causes.iter().any(|cause| cause.label.axis == "edge-distance");
-        let corners = plan.stage.board.corners(0.0).filter(|_| asked);
-        Eye { set, plan, corner_px, outline: corners.and_then(|c| outline(&set.unit, &c)) }
+        let corners = plan.stage.board.corners(0.0).filter(|_| world.edged);
+        Eye { world, plan, corner_px, outline: corners.and_then(|c| outline(world.unit, &c)) }
     }
 
     /// What the pixel's ray meets first.
     pub fn look(&self, u: f64, v: f64) -> Option<Site> {
-        let c = &self.set.unit.sensor.camera;
+        let c = &self.world.unit.sensor.camera;
         let (x, y) = ((u - c.cx) / c.fx, (v - c.cy) / c.fy);
         let mut ray = (x, y);
-        for cause in &self.set.causes {
+        for cause in self.world.causes {
             if let Act::Ray(bend) = &cause.act {
                 ray = bend(ray.0, ray.1);
             }
@@ -50,11 +59,12 @@ impl<'a> Eye<'a> {
         let z = if on_board { z_board } else { stage.wall? };
         let other = if on_board { stage.wall } else { Some(z_board).filter(|_| hit) };
         let point = ray * z;
-        let fb = self.set.unit.disparity_px_m();
+        let fb = self.world.unit.disparity_px_m();
         let normal = if on_board { stage.board.normal } else { Vector3::z() };
         // The camera believes in its own rays.
         let matched = Vector3::new(x, y, 1.0) * z;
-        let column = projector_column(&self.set.unit.sensor, self.set.unit.baseline_m, &matched);
+        let column =
+            projector_column(&self.world.unit.sensor, self.world.unit.baseline_m, &matched);
         Some(Site {
             u,
             v,
@@ -80,9 +90,9 @@ impl<'a> Eye<'a> {
         let lift = |z: f64| {
             let place = board.place(&(ray * z));
             let rise = |cause: &Cause| if let Act::Lift(f) = &cause.act { f(place) } else { 0.0 };
-            self.set.causes.iter().map(rise).sum::<f64>()
+            self.world.causes.iter().map(rise).sum::<f64>()
         };
-        if !self.set.causes.iter().any(|c| matches!(c.act, Act::Lift(_))) {
+        if !self.world.causes.iter().any(|c| matches!(c.act, Act::Lift(_))) {
             return flat;
         }
         // A few millimetres of rise move the place by less: three rounds settle it.
@@ -95,7 +105,7 @@ impl<'a> Eye<'a> {
         if !on_board {
             return WALL_ALBEDO;
         }
-        if !self.set.printed {
+        if !self.world.printed {
             return GREYS[0];
         }
         let (i, j) = ((p / PATCH_M).floor() as i64, (q / PATCH_M).floor() as i64);

@@ -61,6 +61,21 @@ impl Window {
         f64::from(self.taps.iter().sum::<f32>()).powi(2)
     }
 
+    /// Sum of the squared correlation over all lags along one axis.
+    pub fn squares(&self) -> f64 {
+        let n = self.taps.len();
+        let lag = |k: usize| (k..n).map(|i| self.taps[i] * self.taps[i - k]).sum::<f32>();
+        1.0 + 2.0 * (1..n).map(|k| f64::from(lag(k)).powi(2)).sum::<f64>()
+    }
+
+    /// Power at an angular frequency, 1/px; 1 on average.
+    pub fn power(&self, frequency: f64) -> f64 {
+        let reach = (self.taps.len() / 2) as f64;
+        let wave =
+            |(k, tap): (usize, &f32)| f64::from(*tap) * (frequency * (k as f64 - reach)).cos();
+        self.taps.iter().enumerate().map(wave).sum::<f64>().powi(2)
+    }
+
     /// Blur, the variance kept; the picture goes on at its other end.
     pub fn blur(&self, field: &mut [f32], width: usize) {
         let height = field.len() / width;

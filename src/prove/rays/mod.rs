@@ -10,28 +10,44 @@ mod causes_missing;
 mod causes_noise;
 mod causes_variance;
 mod choices;
+mod exam;
 mod eye;
+mod gate;
 mod geometry;
+mod ground;
 mod kernels;
+mod nats;
 mod outside;
 mod poses;
+mod sealed;
 mod sets;
 mod shoot;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_nats;
+#[cfg(test)]
+pub(super) mod tests_sealed;
+mod trace;
 mod write;
 
 pub use cameras::Unit;
 pub use choices::CATALOGUE;
 pub use geometry::{Board, Site, Stage};
 pub use outside::OUTSIDE;
-pub use sets::{Cell, Order, Set};
+pub use sealed::seal;
+pub use sets::{Order, Set};
+pub use trace::Trace;
 pub use write::write;
+
+pub use super::question::Cell;
 
 use crate::rng::Seed;
 
 /// What a view's causes may look at beside the pixel.
 pub struct Facts<'a> {
+    /// The view's number.
+    pub view: usize,
     pub stage: &'a Stage,
     /// Since the session began, s.
     pub session_s: f64,
@@ -169,10 +185,16 @@ impl Label {
 pub struct Cause {
     pub label: Label,
     pub act: Act,
+    /// How its information is counted.
+    pub trace: Trace,
 }
 
 impl Cause {
     fn new(label: Label, act: Act) -> Self {
-        Cause { label, act }
+        Cause { label, act, trace: Trace::Field }
+    }
+
+    fn tracing(self, trace: Trace) -> Self {
+        Cause { trace, ..self }
     }
 }

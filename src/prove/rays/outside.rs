@@ -4,7 +4,7 @@ use rand::Rng;
 
 use super::causes_bias::{sign, smooth_step, wave};
 use super::kernels::roundish;
-use super::{Act, Cause, Clock, Label, Phase, Unit};
+use super::{Act, Cause, Clock, Label, Phase, Trace, Unit};
 use crate::rng::Stream;
 
 /// By name.
@@ -164,7 +164,8 @@ fn first_frame(strength: f64) -> Cause {
             field.iter_mut().for_each(|x| *x *= 1.0 + growth as f32);
         }
     };
-    Cause::new(label.within(0.0, 0.01), Act::grain(Phase::Tails, louder))
+    let act = Act::grain(Phase::Tails, louder);
+    Cause::new(label.within(0.0, 0.01), act).tracing(Trace::FirstFrame(growth))
 }
 
 /// A band of rows answers less often.
@@ -175,10 +176,8 @@ fn dead_rows(strength: f64, unit: &Unit, rng: &mut Stream) -> Cause {
     let label = Label::new(None, "dead-rows", ["missing", "row"], &[("share", lost)]);
     let ragged: Vec<f64> =
         (0..height as usize).map(|_| 1.0 + 0.2 * f64::from(roundish(rng))).collect();
-    let act = Act::loss(
-        move |s, _| {
-            if (from..to).contains(&s.v) { lost * ragged[s.v as usize] } else { 0.0 }
-        },
-    );
+    let act = Act::loss(move |s, _| {
+        if (from..to).contains(&s.v) { (lost * ragged[s.v as usize]).min(1.0) } else { 0.0 }
+    });
     Cause::new(label.within(from, to), act)
 }

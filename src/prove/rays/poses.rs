@@ -39,6 +39,8 @@ pub enum Told {
 /// One view.
 #[derive(Debug, Clone)]
 pub struct Plan {
+    /// Its number in the session.
+    pub view: usize,
     pub stage: Stage,
     pub stamps: Vec<f64>,
     pub session_s: f64,
@@ -50,6 +52,7 @@ pub struct Plan {
 impl Plan {
     pub fn facts(&self) -> Facts<'_> {
         Facts {
+            view: self.view,
             stage: &self.stage,
             session_s: self.session_s,
             lux: self.lux,
@@ -81,16 +84,16 @@ impl Session {
             .map(|i| {
                 let z = NEAREST_M * (FARTHEST_M / NEAREST_M).powf(near[i]);
                 let azimuth = azimuth(turn[i], rng);
-                let theta = self.theta(z, tilt[i], azimuth, unit);
+                let theta = self.within(z, self.steepest * tilt[i], azimuth, unit);
                 let plan = self.view(unit, z, [theta, azimuth], [clock, clock - begin], rng);
                 clock += rng.random_range(60.0..240.0);
-                plan
+                Plan { view: i, ..plan }
             })
             .collect()
     }
 
-    fn theta(&self, z: f64, share: f64, azimuth: f64, unit: &Unit) -> f64 {
-        let drawn = self.steepest * share;
+    /// As much of a tilt as a wall can have within the picture; a board can have all of it.
+    pub fn within(&self, z: f64, drawn: f64, azimuth: f64, unit: &Unit) -> f64 {
         if self.half.is_some() {
             return drawn;
         }
@@ -102,7 +105,8 @@ impl Session {
         drawn.min(((1.0 - z / WALL_ENDS_M) / (1.05 * reach)).atan())
     }
 
-    fn view(
+    /// A view by itself, at depth `z` and tilted; its clock is of the recording and of the session.
+    pub fn view(
         &self,
         unit: &Unit,
         z: f64,
@@ -132,7 +136,7 @@ impl Session {
         };
         let stage = Stage { board, wall: behind, theta: tilt[0], azimuth: tilt[1] };
         let stamps = (0..self.frames).map(|k| stamp + k as f64 / RATE_HZ).collect();
-        Plan { stage, stamps, session_s, lux, temperature_c, notes }
+        Plan { view: 0, stage, stamps, session_s, lux, temperature_c, notes }
     }
 
     fn region(&self, unit: &Unit, board: &Board) -> Option<Region> {
@@ -149,8 +153,8 @@ fn tenth(px: f64) -> f64 {
     (10.0 * px).round() / 10.0
 }
 
-/// Along the picture's axes as often as not.
-fn azimuth(turn: f64, rng: &mut Stream) -> f64 {
+/// Along the picture's axes as often as not; `turn` of a full one, to a quarter of it.
+pub fn azimuth(turn: f64, rng: &mut Stream) -> f64 {
     let axis = FRAC_PI_2 * (4.0 * turn).floor();
     let reach = if rng.random::<bool>() { 0.1 } else { std::f64::consts::FRAC_PI_4 };
     axis + rng.random_range(-reach..reach)

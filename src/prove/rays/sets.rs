@@ -1,38 +1,20 @@
 //! What goes into a set: drawn at random from its order.
 
 use rand::Rng;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::causes_bias::lot;
 use super::choices::{age, cause, names, session, window, words};
-use super::poses::Plan;
-use super::{Cause, Unit};
+use super::eye::World;
+use super::gate::Gate;
+use super::ground::{Ground, Repeats};
+use super::nats::strength_for;
+use super::poses::{Plan, Session};
+use super::{Cause, Cell, Trace, Unit};
 use crate::error::Result;
 use crate::io::sha256_hex;
 use crate::model::Effect;
-use crate::rng::Seed;
-
-/// What kind of question a set puts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Cell {
-    Null,
-    Single,
-    Pair,
-    Outside,
-    Blind,
-    Drift,
-}
-
-impl std::str::FromStr for Cell {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let all = [Cell::Null, Cell::Single, Cell::Pair, Cell::Outside, Cell::Blind, Cell::Drift];
-        let named = all.into_iter().find(|cell| json!(cell) == text);
-        named.ok_or_else(|| format!("no cell is called \"{text}\""))
-    }
-}
+use crate::rng::{Seed, Stream};
 
 /// What is asked for.
 #[derive(Debug, Clone)]
@@ -46,6 +28,17 @@ pub struct Order {
     pub views: Option<usize>,
     pub frames: Option<usize>,
     pub small: bool,
+}
+
+/// A cause that the model does not know.
+#[derive(Debug, Clone)]
+pub(super) struct Concealed {
+    pub name: String,
+    /// What it is drawn from, so that it can be drawn again at another strength.
+    start: Stream,
+    pub strength: f64,
+    /// What knowing of it is worth; `None` where that was not asked or cannot be said.
+    pub nats: Option<f64>,
 }
 
 /// A recording to be taken, and its sealed truth.
@@ -67,6 +60,10 @@ pub struct Set {
     /// Patches of grey are printed on the board.
     pub printed: bool,
     pub seed: Seed,
+    pub(super) session: Session,
+    /// One for each cause after the known; the ageing of the unit, where that is all.
+    pub(super) concealed: Vec<Concealed>,
+    gate: Option<Gate>,
 }
 
 impl Set {
@@ -77,14 +74,28 @@ impl Set {
     pub fn draw(order: Order) -> Result<Self> {
         let text =
             format!("{:?}/{:?}/{}/{}", order.cell, order.effects, order.strength, order.seed);
+        let width = if order.small { 320 } else { 640 };
+        Self::of(order, width, &text)
+    }
+
+    /// Drawn from `text`; the picture is `width` px wide.
+    pub(super) fn of(order: Order, width: usize, text: &str) -> Result<Self> {
         let digest = sha256_hex(text.as_bytes());
         let seed = Seed(u64::from_str_radix(&digest[..16], 16).unwrap_or(order.seed));
         let mut rng = seed.stream("rays/set");
         let names = names(&order, &mut rng);
         let units_per_metre = words(&names, &mut rng);
-        let described = Unit::draw(order.small, units_per_metre, &mut rng);
+        let described = Unit::draw(width, units_per_metre, &mut rng);
         let mut unit = described.clone();
+        let conceal = |name: &str, rng: &Stream| Concealed {
+            name: name.into(),
+            start: rng.clone(),
+            strength: order.strength,
+            nats: None,
+        };
+        let mut concealed = Vec::new();
         if order.cell == Cell::Drift {
+            concealed.push(conceal("", &rng));
             age(&mut unit, order.strength, &mut rng);
         }
         let session = session(&order, &names, &mut rng);
@@ -93,7 +104,9 @@ impl Set {
         let known_causes = usize::from(window.is_some());
         let mut causes: Vec<Cause> = window.into_iter().collect();
         for name in &names {
-            causes.push(cause(name, &order, &unit, &session, seed, &mut rng)?);
+            concealed.push(conceal(name, &rng));
+            let strength = [order.strength, 1.0];
+            causes.push(cause(name, strength, &unit, &session, seed, &mut rng)?);
         }
         let lit = names
             .iter()
@@ -102,7 +115,8 @@ impl Set {
         let by_print = names.iter().any(|n| n == "intensity-dependent-noise");
         let printed = by_print || infrared_bits.is_some() && rng.random::<bool>();
         let plans = session.draw(&unit, &mut rng);
-        Ok(Set {
+        let gate = Gate::draw(order.cell, &plans, &unit, &mut rng);
+        let mut set = Set {
             name: sha256_hex(format!("opaque {digest}").as_bytes())[..10].into(),
             order,
             unit,
@@ -114,38 +128,152 @@ impl Set {
             infrared_bits,
             printed,
             seed,
-        })
+            session,
+            concealed,
+            gate,
+        };
+        if let Some(gate) = set.gate.clone() {
+            let free = set.causes.split_off(known_causes);
+            for cause in free {
+                set.causes.push(gate.confine(cause)?);
+            }
+        }
+        Ok(set)
+    }
+
+    /// What looks where only the known causes act.
+    pub(super) fn world(&self) -> World<'_> {
+        World {
+            unit: &self.unit,
+            causes: &self.causes[..self.known_causes],
+            printed: self.printed,
+            edged: self.causes.iter().any(|c| c.label.axis == "edge-distance"),
+        }
+    }
+
+    /// The `k`th concealed cause as it would be at another strength.
+    fn at(&self, k: usize, strength: f64) -> Result<Cause> {
+        let Concealed { name, start, .. } = &self.concealed[k];
+        let strengths = [strength, strength.min(1.0)];
+        let cause =
+            cause(name, strengths, &self.unit, &self.session, self.seed, &mut start.clone())?;
+        match &self.gate {
+            Some(gate) => gate.confine(cause),
+            None => Ok(cause),
+        }
+    }
+
+    /// The described unit, so much older.
+    fn aged(&self, strength: f64) -> Unit {
+        let mut unit = self.described.clone();
+        age(&mut unit, strength, &mut self.concealed[0].start.clone());
+        unit
+    }
+
+    /// Give every concealed cause the strength at which knowing of it is worth `wanted` nats; where
+    /// nothing is wanted, say what it is worth.
+    ///
+    /// # Errors
+    /// Those of [`Set::draw`].
+    pub(super) fn weigh(&mut self, wanted: Option<f64>) -> Result<()> {
+        if self.order.cell == Cell::Drift {
+            return self.weigh_age(wanted);
+        }
+        let mut ground = Ground::of(self);
+        let mut done = Vec::new();
+        // Whether neighbours err together counts for all others.
+        let mut turns: Vec<usize> = (0..self.concealed.len()).collect();
+        let windowed = |k: &usize| matches!(self.concealed_cause(*k).trace, Trace::Window { .. });
+        turns.sort_by_key(|k| !windowed(k));
+        for k in turns {
+            let cause = self.at(k, self.concealed[k].strength)?;
+            let mut told = (self.concealed[k].strength, ground.nats(&cause));
+            if let (Some(wanted), Some(_)) = (wanted, told.1) {
+                let nats = |s| Ok(ground.nats(&self.at(k, s)?).unwrap_or(0.0));
+                let (s, got) = strength_for(wanted, nats)?;
+                told = (s, Some(got));
+            }
+            let cause = self.at(k, told.0)?;
+            if matches!(cause.trace, Trace::Window { .. }) {
+                ground.repeats = Repeats::of([&cause]);
+            }
+            done.push((k, told, cause));
+        }
+        for (k, (strength, nats), cause) in done {
+            let (known, concealed) = (self.known_causes, &mut self.concealed[k]);
+            (concealed.strength, concealed.nats) = (strength, nats);
+            self.causes[known + k] = cause;
+        }
+        Ok(())
+    }
+
+    /// Strength and nats of every concealed cause; NaN where that cannot be said.
+    pub fn told(&self) -> Vec<(f64, f64)> {
+        self.concealed.iter().map(|c| (c.strength, c.nats.unwrap_or(f64::NAN))).collect()
+    }
+
+    fn concealed_cause(&self, k: usize) -> &Cause {
+        &self.causes[self.known_causes + k]
+    }
+
+    fn weigh_age(&mut self, wanted: Option<f64>) -> Result<()> {
+        let ground = Ground::of(self);
+        let nats = |s| {
+            let unit = self.aged(s);
+            Ok(ground.nats_of_age(&|z, theta| unit.sigma(z, theta)))
+        };
+        let (strength, got) = match wanted {
+            Some(wanted) => strength_for(wanted, nats)?,
+            None => (self.order.strength, nats(self.order.strength)?),
+        };
+        self.unit = self.aged(strength);
+        (self.concealed[0].strength, self.concealed[0].nats) = (strength, Some(got));
+        Ok(())
     }
 
     /// What is sealed: the answer, and how it was made.
-    pub fn truth(&self) -> serde_json::Value {
-        let mut effects: Vec<serde_json::Value> =
-            self.causes[self.known_causes..].iter().map(|c| json!(c.label)).collect();
+    pub fn truth(&self) -> Value {
+        let nats = self.concealed.iter().map(|c| json!({"nats": c.nats, "strength": c.strength}));
+        let effect = |(cause, nats): (&Cause, Value)| {
+            let mut all = json!(cause.label);
+            all["nats"] = nats["nats"].clone();
+            all["strength"] = nats["strength"].clone();
+            all
+        };
+        let mut effects: Vec<Value> =
+            self.causes[self.known_causes..].iter().zip(nats).map(effect).collect();
         if self.order.cell == Cell::Drift {
             effects.push(
                 json!({"id": null, "form": "recalibrate", "statistic": "variance", "axis": "z",
-                "also": [], "interval": null, "parameters": {"sigma": self.unit.sigma}}),
+                "also": [], "interval": null, "parameters": {"sigma": self.unit.sigma},
+                "nats": self.concealed[0].nats, "strength": self.concealed[0].strength}),
             );
         }
-        let notes = self.plans.first().map(|p| &p.notes);
         json!({
             "name": self.name, "cell": self.order.cell, "strength": self.order.strength,
-            "seed": self.order.seed, "effects": effects,
-            "base": {
-                "known": self.causes[..self.known_causes].iter().map(|c| json!(c.label)).collect::<Vec<_>>(),
-                "sigma": self.described.sigma,
-                "views": self.plans.len(),
-                "frames": self.plans.first().map(|p| p.stamps.len()),
-                "units_per_metre": super::shoot::units(&self.unit),
-                "wall": self.plans.first().is_some_and(|p| p.stage.board.half.is_none()),
-                "reference": notes.is_some_and(|n| n.reference_distance_m.is_some()),
-                "region": notes.is_some_and(|n| n.region.is_some()),
-                "infrared_bits": self.infrared_bits, "printed": self.printed,
-            },
+            "seed": self.order.seed, "effects": effects, "base": self.base(),
             "views": self.plans.iter().map(|p| json!({
                 "z_m": p.stage.board.depth(0.0, 0.0), "theta_rad": p.stage.theta, "azimuth_rad": p.stage.azimuth,
                 "session_s": p.session_s, "lux": p.lux, "temperature_c": p.temperature_c,
             })).collect::<Vec<_>>(),
+        })
+    }
+
+    /// How the recording was taken.
+    pub(super) fn base(&self) -> Value {
+        let notes = self.plans.first().map(|p| &p.notes);
+        json!({
+            "known": self.causes[..self.known_causes].iter().map(|c| json!(c.label)).collect::<Vec<_>>(),
+            "strengths": self.concealed.iter().map(|c| c.strength).collect::<Vec<_>>(),
+            "confined": self.gate.as_ref().map(|gate| format!("{gate:?}")),
+            "sigma": self.described.sigma,
+            "views": self.plans.len(),
+            "frames": self.plans.first().map(|p| p.stamps.len()),
+            "units_per_metre": super::shoot::units(&self.unit),
+            "wall": self.plans.first().is_some_and(|p| p.stage.board.half.is_none()),
+            "reference": notes.is_some_and(|n| n.reference_distance_m.is_some()),
+            "region": notes.is_some_and(|n| n.region.is_some()),
+            "infrared_bits": self.infrared_bits, "printed": self.printed,
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use rand::Rng;
 
-use super::eye::Eye;
+use super::eye::{Eye, World};
 use super::geometry::Site;
 use super::kernels::{fresh, white};
 use super::poses::Plan;
@@ -41,6 +41,40 @@ pub struct Still<'a> {
     light: Vec<f32>,
 }
 
+/// What the causes of a pixel come to.
+pub(super) struct Sum {
+    /// px.
+    pub error: f64,
+    /// Factor on sigma.
+    pub spread: f64,
+    /// Factor on the stored depth.
+    pub gain: f64,
+    /// Probability of an answer.
+    pub answer: f64,
+}
+
+impl Sum {
+    pub fn of(causes: &[Cause], site: &Site, facts: &Facts<'_>) -> Self {
+        let mut sum = Sum { error: 0.0, spread: 1.0, gain: 1.0, answer: 1.0 };
+        for cause in causes {
+            match &cause.act {
+                Act::Mismatch(f) => sum.error += f(site, facts),
+                Act::Spread(f) => sum.spread *= f(site, facts),
+                Act::Gain(f) => sum.gain *= f(site, facts),
+                Act::Loss(f) => sum.answer *= 1.0 - f(site, facts),
+                _ => {}
+            }
+        }
+        sum
+    }
+}
+
+/// Inverse depth a pixel to the side along the slope, 1/m.
+pub(super) fn slope(unit: &Unit, plan: &Plan) -> f64 {
+    let (c, board) = (&unit.sensor.camera, &plan.stage.board);
+    (board.normal.x / c.fx).hypot(board.normal.y / c.fy) / board.reach
+}
+
 impl<'a> Still<'a> {
     pub fn new(set: &'a Set, view: usize) -> Self {
         let plan = &set.plans[view];
@@ -58,7 +92,7 @@ impl<'a> Still<'a> {
             slope: vec![0.0; n],
             light: vec![0.0; n],
         };
-        let eye = Eye::new(set, plan);
+        let eye = Eye::new(World { causes: &set.causes, ..set.world() }, plan);
         let facts = plan.facts();
         let rounding = 1.0 / (12.0 * units(&set.unit).powi(2));
         for i in 0..n {
@@ -69,31 +103,25 @@ impl<'a> Still<'a> {
     }
 
     fn settle(&mut self, i: usize, site: &Site, facts: &Facts<'_>, rounding: f64) {
-        let (mut error, mut spread, mut gain, mut answer) = (0.0, 1.0, 1.0, 1.0);
-        for cause in &self.set.causes {
-            match &cause.act {
-                Act::Mismatch(f) => error += f(site, facts),
-                Act::Spread(f) => spread *= f(site, facts),
-                Act::Gain(f) => gain *= f(site, facts),
-                Act::Loss(f) => answer *= 1.0 - f(site, facts),
-                _ => {}
-            }
-        }
+        let sum = Sum::of(&self.set.causes, site, facts);
         let base = self.set.unit.sigma(site.z, site.theta);
-        self.disparity[i] = (site.disparity + error) as f32;
+        self.disparity[i] = (site.disparity + sum.error) as f32;
         // The stored number's own rounding is part of what was calibrated.
-        self.sigma[i] = (spread * (base * base - rounding).max(0.0).sqrt()) as f32;
-        self.gain[i] = gain as f32;
-        self.loss[i] = (1.0 - answer) as f32;
+        self.sigma[i] = (sum.spread * (base * base - rounding).max(0.0).sqrt()) as f32;
+        self.gain[i] = sum.gain as f32;
+        self.loss[i] = (1.0 - sum.answer) as f32;
         self.on_board[i] = site.on_board;
-        let c = &self.set.unit.sensor.camera;
-        let board = &facts.stage.board;
         if site.on_board {
-            self.slope[i] =
-                ((board.normal.x / c.fx).hypot(board.normal.y / c.fy) / board.reach) as f32;
+            self.slope[i] = slope(&self.set.unit, self.plan) as f32;
         }
         let lit = site.facing / site.point.norm_squared();
         self.light[i] = (site.albedo * (DN_AT_1_M * lit + DN_A_LUX * facts.lux)) as f32;
+    }
+
+    /// Probability of no answer.
+    #[cfg(test)]
+    pub fn loss(&self) -> &[f32] {
+        &self.loss
     }
 
     fn clock(&self, frame: usize) -> Clock {

@@ -18,15 +18,20 @@ use crate::io::{encode_png16_quickly, write_recording_file, write_view_notes};
 /// # Errors
 /// When the disk refuses.
 pub fn write(set: &Set, root: &Path) -> Result<()> {
-    let folder = root.join(&set.name);
-    for sub in [&folder, &root.join("model"), &root.join("truth")] {
+    for sub in [&root.join("model"), &root.join("truth")] {
         fs::create_dir_all(sub).map_err(|e| Error::write(sub, e))?;
     }
-    write_recording_file(&folder, &set.described.sensor)?;
-    (0..set.plans.len()).into_par_iter().try_for_each(|view| write_view(set, view, &folder))?;
+    recording(set, &root.join(&set.name))?;
     let json = format!("{}.json", set.name);
     set.described.model(set.known.clone())?.write(&root.join("model").join(&json))?;
     save(&root.join("truth").join(&json), format!("{:#}\n", set.truth()).as_bytes())
+}
+
+/// The recording alone.
+pub(super) fn recording(set: &Set, folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
+    write_recording_file(folder, &set.described.sensor)?;
+    (0..set.plans.len()).into_par_iter().try_for_each(|view| write_view(set, view, folder))
 }
 
 fn write_view(set: &Set, view: usize, folder: &Path) -> Result<()> {

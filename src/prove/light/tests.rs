@@ -1,0 +1,61 @@
+//! The sets by light: what they hold, and that they are the same every time.
+
+use super::{SWITCHES, seal};
+use crate::prove::rays::tests_sealed::walkdir;
+use crate::prove::{Asked, Cell, World};
+
+fn asked(cell: Cell, names: &[&str], nats: f64, seed: u64) -> Asked {
+    let names = names.iter().map(ToString::to_string).collect();
+    Asked { world: World::Light, cell, names, nats: Some(nats), seed, small: true }
+}
+
+#[test]
+fn every_switch_goes_as_far_as_it_must() {
+    for switch in &SWITCHES {
+        for nats in [5.0, 15.0, 50.0, 150.0] {
+            let truth = seal(&asked(Cell::Single, &[switch.cause], nats, 3)).unwrap().truth();
+            let one = &truth.hidden[0];
+            assert_eq!(one.form, switch.cause);
+            assert_ne!(truth.base["usual"][switch.cause], truth.base["switched"][switch.cause]);
+            assert!(one.nats.is_none() && one.parameters.contains_key(switch.cause));
+        }
+    }
+    assert!(seal(&asked(Cell::Single, &["no such cause"], 5.0, 1)).is_err());
+    assert!(seal(&asked(Cell::Pair, &[], 5.0, 1)).is_err());
+    assert!(seal(&asked(Cell::Null, &[], 5.0, 1)).unwrap().truth().hidden.is_empty());
+}
+
+/// Two recordings of the same views with other noise; nothing in their text tells the cause.
+#[test]
+fn a_set_by_light_is_two_recordings_of_the_same_poses() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str| {
+        let root = folder.path().join(name);
+        seal(&asked(Cell::Single, &["lens_k1"], 50.0, 2)).unwrap().write(&root).unwrap();
+        let mut files: Vec<(String, Vec<u8>)> = walkdir(&root)
+            .into_iter()
+            .map(|p| {
+                let name = p.strip_prefix(&root).unwrap().display().to_string();
+                (name, std::fs::read(&p).unwrap())
+            })
+            .collect();
+        files.sort();
+        files
+    };
+    let files = write("a");
+    assert_eq!(files, write("b"), "the same bytes");
+    let of = |which: &str| -> Vec<(String, Vec<u8>)> {
+        let prefix = format!("{which}/");
+        let mine = files.iter().filter(|(name, _)| name.starts_with(&prefix));
+        mine.map(|(name, bytes)| (name[prefix.len()..].to_string(), bytes.clone())).collect()
+    };
+    let (recording, simulated) = (of("recording"), of("simulated"));
+    assert_eq!(recording.len() + simulated.len(), files.len(), "nothing else");
+    for ((a, bytes), (b, other)) in recording.iter().zip(&simulated) {
+        assert_eq!(a, b);
+        let image = a.ends_with("png");
+        assert_eq!(bytes == other, !image, "{a}");
+        let text = String::from_utf8_lossy(bytes).to_lowercase();
+        assert!(image || !["lens", "k1", "cause"].iter().any(|w| text.contains(w)), "{a}");
+    }
+}

@@ -1,0 +1,177 @@
+//! How much a cause gives away that shows in no mean and no spread: nats by closed forms.
+
+use std::f64::consts::{PI, TAU};
+
+use statrs::function::gamma::ln_gamma;
+
+use super::kernels::Window;
+
+/// How the information of a cause is counted.
+#[derive(Debug, Clone, Default)]
+pub enum Trace {
+    /// From views without noise, with the cause and without it.
+    #[default]
+    Field,
+    /// A moving average over frames, of unit square sum.
+    Average(Vec<f64>),
+    /// This share of the variance stands still within a view.
+    Frozen(f64),
+    /// `share` of the variance comes through a window.
+    Window { window: Window, share: f64 },
+    /// Student's t of unit variance: degrees of freedom.
+    Student(f64),
+    /// A share of Laplace errors of this scale.
+    Stray { fraction: f64, scale: f64 },
+    /// The first frame's spread grows by this share.
+    FirstFrame(f64),
+    /// Every pixel's own constant, px.
+    Pixels(f64),
+    /// Every row's own shift, px.
+    Rows(f64),
+    /// Every frame's own shift, px.
+    Frames(f64),
+    /// Values that do not occur: seen or not seen, whatever the noise.
+    Comb,
+}
+
+/// Share of white noise that the rounding of the stored words adds at the least; without it the
+/// pixels of a smooth window would tell one another exactly.
+const ROUNDING: f64 = 1e-3;
+
+/// Gain a pixel and frame of knowing that the variance is `ratio` times what is believed.
+pub fn of_variance(ratio: f64) -> f64 {
+    0.5 * (ratio - 1.0 - ratio.ln())
+}
+
+/// Gain of knowing that a number which is believed to be 0 has a variance of its own, `q` times
+/// that of its estimate. The number itself nobody knows.
+pub fn of_effect(q: f64) -> f64 {
+    0.5 * (q - q.ln_1p())
+}
+
+/// Gain a pixel and view of `frames`: minus half the log determinant of their correlation.
+pub fn of_average(weights: &[f64], frames: usize) -> f64 {
+    let lag = |k: usize| weights.iter().skip(k).zip(weights).map(|(a, b)| a * b).sum::<f64>();
+    let lags: Vec<f64> = (0..frames).map(lag).collect();
+    // Durbin and Levinson: what every frame still surprises by, the earlier ones known.
+    let (mut known, mut left, mut gain) = (Vec::<f64>::new(), lags[0], 0.0);
+    for k in 1..frames {
+        let told: f64 = (1..k).map(|j| known[j - 1] * lags[k - j]).sum();
+        let partial = (lags[k] - told) / left;
+        let turned: Vec<f64> = known.iter().rev().map(|a| partial * a).collect();
+        known.iter_mut().zip(turned).for_each(|(a, t)| *a -= t);
+        known.push(partial);
+        left *= 1.0 - partial * partial;
+        gain -= 0.5 * left.ln();
+    }
+    gain
+}
+
+/// Gain a pixel and view of `frames` of which `share` of the variance is the same in all.
+pub fn of_frozen(share: f64, frames: usize) -> f64 {
+    let others = frames as f64 - 1.0;
+    -0.5 * (others * (-share).ln_1p() + (others * share).ln_1p())
+}
+
+/// Gain a pixel and frame of a field whose `share` comes through `window`: minus half the mean log of
+/// its spectrum.
+pub fn of_window(window: &Window, share: f64) -> f64 {
+    const STEPS: usize = 64;
+    let power: Vec<f64> =
+        (0..STEPS).map(|k| window.power(PI * (k as f64 + 0.5) / STEPS as f64)).collect();
+    let log = |a: f64, b: f64| ((1.0 - share) + share * a * b).max(ROUNDING).ln();
+    let sum: f64 = power.iter().map(|a| power.iter().map(|b| log(*a, *b)).sum::<f64>()).sum();
+    -0.5 * sum / (STEPS * STEPS) as f64
+}
+
+/// Errors that any sensor makes now and then, whatever its model says: this share of them, of this
+/// scale in sigma. Tails are told apart from these; without them one wild pixel would be worth a
+/// hundred nats, which nobody would believe.
+const STRAYS: f64 = 1e-3;
+const STRAY_SCALE: f64 = 4.0;
+
+/// Gain a pixel and frame of Student's t of unit variance over a Gaussian, both with strays.
+pub fn of_student(nu: f64) -> f64 {
+    let log_norm = ln_gamma(0.5 * (nu + 1.0)) - ln_gamma(0.5 * nu) - 0.5 * (PI * (nu - 2.0)).ln();
+    divergence(|x| (log_norm - 0.5 * (nu + 1.0) * (x * x / (nu - 2.0)).ln_1p()).exp())
+}
+
+/// Gain a pixel and frame of `fraction` of Laplace errors among Gaussian ones, both with strays.
+pub fn of_strays(fraction: f64, scale: f64) -> f64 {
+    divergence(|x| (1.0 - fraction) * bell(x) + fraction * laplace(x, scale))
+}
+
+fn bell(x: f64) -> f64 {
+    (-0.5 * x * x).exp() / TAU.sqrt()
+}
+
+fn laplace(x: f64, scale: f64) -> f64 {
+    (-x / scale).exp() / (2.0 * scale)
+}
+
+/// Kullback-Leibler divergence of a symmetric density, given at x > 0, from the Gaussian's, strays
+/// mixed into both.
+fn divergence(density: impl Fn(f64) -> f64) -> f64 {
+    // x = sinh(t): fine in the middle, far in the tails; the midpoint rule is exact for such.
+    const STEP: f64 = 0.01;
+    const END: f64 = 8.0;
+    let at = |k: usize| {
+        let t = (k as f64 + 0.5) * STEP;
+        let x = t.sinh();
+        let strays = STRAYS * laplace(x, STRAY_SCALE);
+        let told = (1.0 - STRAYS) * density(x) + strays;
+        let believed = (1.0 - STRAYS) * bell(x) + strays;
+        // Where there are no digits left there is nothing to add.
+        if believed <= 0.0 { 0.0 } else { 2.0 * STEP * t.cosh() * told * (told / believed).ln() }
+    };
+    (0..(END / STEP) as usize).map(at).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// AR(1)-like lags end after one: for two frames the determinant is 1 - rho^2, for three
+    /// 1 - 2 rho^2.
+    #[test]
+    fn a_moving_average_is_worth_its_determinant() {
+        let norm = (1.0f64 + 0.36).sqrt();
+        let weights = [1.0 / norm, 0.6 / norm];
+        let rho2 = (0.6f64 / 1.36).powi(2);
+        assert!((of_average(&weights, 2) + 0.5 * (1.0 - rho2).ln()).abs() < 1e-12);
+        assert!((of_average(&weights, 3) + 0.5 * (1.0 - 2.0 * rho2).ln()).abs() < 1e-12);
+        assert_eq!(of_average(&weights, 1), 0.0);
+    }
+
+    /// Weak correlation is worth a quarter of the sum over all lags of rho^2.
+    #[test]
+    fn a_weak_window_is_worth_its_squares() {
+        let window = Window::flat(3.0);
+        let squares = (1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 9.0f64)).powi(2) - 1.0;
+        let share = 0.002;
+        let weak = 0.25 * share * share * squares;
+        assert!((of_window(&window, share) / weak - 1.0).abs() < 0.02);
+    }
+
+    /// Near the Gaussian: excess kurtosis squared over 48. A few errors so far out that they can only
+    /// be strays: those of a Poisson process whose rate is larger.
+    #[test]
+    fn tails_are_worth_their_divergence() {
+        let nu = 400.0;
+        let kurtosis: f64 = 6.0 / (nu - 4.0);
+        assert!((0.8..1.1).contains(&(of_student(nu) / (kurtosis * kurtosis / 48.0))));
+        let f = 0.01f64;
+        let rate = STRAYS + f;
+        let poisson = rate * (rate / STRAYS).ln() - f;
+        // More than half of them lies among the Gaussian errors, exp(-3 / 4) beyond.
+        assert!((0.3..0.6).contains(&(of_strays(f, STRAY_SCALE) / poisson)));
+        assert!(of_strays(1e-9, 4.0) < 1e-12);
+    }
+
+    #[test]
+    fn what_is_not_there_is_worth_nothing() {
+        assert!(of_frozen(1e-9, 4).abs() < 1e-12 && of_variance(1.0).abs() < 1e-15);
+        assert!(of_effect(0.0) == 0.0 && of_window(&Window::flat(5.0), 0.0).abs() < 1e-15);
+        assert!((of_frozen(0.5, 2) + 0.5 * 0.75f64.ln()).abs() < 1e-12);
+    }
+}
