@@ -59,7 +59,8 @@ fn others(scores: &Scores) -> String {
     let mut text = String::new();
     if let (Some(ece), Some(brier)) = (scores.certainty.ece, scores.certainty.brier) {
         let n = scores.certainty.n;
-        let _ = writeln!(text, "stated probabilities: off by {ece:.3}, Brier {brier:.3} ({n} names)");
+        let _ =
+            writeln!(text, "stated probabilities: off by {ece:.3}, Brier {brier:.3} ({n} names)");
     }
     if let (Some(error), Some(coverage)) = (scores.parameter_error, &scores.coverage) {
         let off = 100.0 * error;

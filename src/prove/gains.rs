@@ -1,36 +1,30 @@
-//! What was learnt, weighed on views that nobody saw.
+//! What an examination gives.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::question::Sealed;
-use crate::error::Result;
-use crate::model::NoiseModel;
-
-/// Under this name the diagnosis itself stands among the methods.
-pub const OUR_METHOD: &str = "kinoise";
-
-/// Log-likelihood gained over the model as it was given, nats a pixel's worth of independent data,
-/// the same scale for every method of one set.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// Expected log score beyond that of the model file alone, nats per 1000 pixels, mean over the
+/// views. Zero where there is no such view.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Gain {
-    /// On views inside the distances and tilts of the recording.
+    /// Views like the recording's.
     pub within: f64,
-    /// On views outside them.
+    /// Views outside its distances or tilts.
     pub beyond: f64,
-    /// How many numbers the method fitted.
+}
+
+/// One way of learning from the recording.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Method {
+    pub gain: Gain,
+    /// Numbers that were fitted.
     pub parameters: usize,
 }
 
-/// Every method's gain on one set, and that of who knows the cause and fits its parameters.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// All methods beside who knows the truth.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Gains {
-    pub methods: BTreeMap<String, Gain>,
     pub oracle: Gain,
+    pub methods: BTreeMap<String, Method>,
 }
-
-/// Who examines, after the seal is open: the set, its folder as the solver had it, and the model
-/// that the diagnosis wrote. `None` where the world has no truth without noise.
-pub type Examine = fn(&dyn Sealed, &Path, &NoiseModel) -> Result<Option<Gains>>;

@@ -6,6 +6,7 @@
 
 mod check;
 mod confine;
+mod examine;
 mod gains;
 mod judge;
 mod plan;
@@ -21,7 +22,8 @@ mod worlds;
 
 pub use check::{CheckOptions, Checked, check};
 pub use confine::confine;
-pub use gains::{Examine, Gain, Gains, OUR_METHOD};
+pub use examine::{Examination, Examine, OUR_METHOD};
+pub use gains::{Gain, Gains, Method};
 pub use judge::*;
 pub use plan::{Planned, plan};
 pub use proof::{Proof, ProvenSet};

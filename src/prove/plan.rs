@@ -141,10 +141,7 @@ fn questions(share: &Share, count: usize, rng: &mut Stream) -> Vec<Asked> {
                 .map(|n| (*n).to_string())
                 .into_iter()
                 .collect(),
-            nats: share
-                .nats
-                .get((first + i + i / together) % share.nats.len().max(1))
-                .copied(),
+            nats: share.nats.get((first + i + i / together) % share.nats.len().max(1)).copied(),
             seed: 0,
             // Not in step with the strengths.
             small: (i + i / 4 + large) % 4 != 0,

@@ -61,13 +61,21 @@ pub struct ProvenSet {
     pub verdict_sha256: Option<String>,
     pub marks: Marks,
     pub gains: Option<Gains>,
+    /// Ids of the catalogue by baseline, best first.
+    #[serde(default)]
+    pub named_by_others: BTreeMap<String, Vec<String>>,
     /// The diagnosis took so long; nothing else here depends on the machine.
     pub seconds: f64,
 }
 
 impl ProvenSet {
     pub fn judged(&self) -> Judged<'_> {
-        Judged { truth: &self.truth, marks: &self.marks, gains: self.gains.as_ref() }
+        Judged {
+            truth: &self.truth,
+            marks: &self.marks,
+            gains: self.gains.as_ref(),
+            named_by_others: &self.named_by_others,
+        }
     }
 }
 

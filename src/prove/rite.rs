@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::gains::{Examine, Gains};
+use super::examine::{Examination, Examine};
 use super::judge::{Judged, mark, scores};
 use super::plan::plan;
 use super::proof::{
@@ -120,7 +120,10 @@ impl Rite<'_> {
                     (&taken.name, &taken.commitment) == (&sealed.name, &sealed.commitment)
                 });
             if !same || again != seal {
-                return Err(refused(&path, "another trial, or one by another build, was sealed here"));
+                return Err(refused(
+                    &path,
+                    "another trial, or one by another build, was sealed here",
+                ));
             }
             return Ok((seal, hash));
         }
@@ -216,6 +219,7 @@ impl Rite<'_> {
     ) -> Result<Vec<(ProvenSet, String)>> {
         let all: Vec<_> = sets.iter().zip(&seal.sets).zip(solved).collect();
         each(&all, self.trial.workers, ("opening", self.progress), |((taken, sealed), solved)| {
+            let Examination { gains, names } = self.examine(taken, sealed)?;
             let set = ProvenSet {
                 name: taken.name.clone(),
                 salt: taken.salt.clone(),
@@ -225,29 +229,30 @@ impl Rite<'_> {
                 failure: solved.failure.clone(),
                 diagnosis_sha256: solved.diagnosis_sha256.clone(),
                 verdict_sha256: solved.verdict_sha256.clone(),
-                gains: self.examine(taken, sealed)?,
+                gains,
+                named_by_others: names,
                 seconds: solved.seconds,
             };
             Ok((set, solved.confinement.clone()))
         })
     }
 
-    fn examine(&self, taken: &Taken, sealed: &SealedSet) -> Result<Option<Gains>> {
+    fn examine(&self, taken: &Taken, sealed: &SealedSet) -> Result<Examination> {
         let (Some(examine), Ok(model)) =
             (self.trial.examine, NoiseModel::read(&self.state("models", &taken.name)))
         else {
-            return Ok(None);
+            return Ok(Examination::default());
         };
         let state = self.state("gains", &taken.name);
-        if let Ok((gains, _)) = read_json(&state) {
-            return Ok(gains);
+        if let Ok((known, _)) = read_json(&state) {
+            return Ok(known);
         }
         let scratch = self.scratch(&taken.name);
         remake(taken, sealed, &scratch)?;
-        let gains = examine(taken.sealed.as_ref(), &scratch.join("set"), &model)?;
-        write_json(&state, &gains)?;
+        let found = examine(taken.sealed.as_ref(), &scratch.join("set"), &model)?;
+        write_json(&state, &found)?;
         remove(&scratch)?;
-        Ok(gains)
+        Ok(found)
     }
 }
 

@@ -80,7 +80,10 @@ impl Taken {
 fn as_read_back(truth: &Truth, asked: &Asked) -> Result<Truth> {
     let text = serde_json::to_string(truth);
     text.and_then(|text| serde_json::from_str(&text)).map_err(|e| Error::Argument {
-        what: format!("the truth of a set of {:?}/{:?} cannot be written: {e}", asked.world, asked.cell),
+        what: format!(
+            "the truth of a set of {:?}/{:?} cannot be written: {e}",
+            asked.world, asked.cell
+        ),
         remedy: "its maker must give finite numbers",
     })
 }
@@ -142,8 +145,7 @@ fn list(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
 
 fn inside(root: &Path, file: &Path) -> String {
     let parts = file.strip_prefix(root).unwrap_or(file).components();
-    let parts: Vec<String> =
-        parts.map(|p| p.as_os_str().to_string_lossy().into_owned()).collect();
+    let parts: Vec<String> = parts.map(|p| p.as_os_str().to_string_lossy().into_owned()).collect();
     parts.join("/")
 }
 

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::learnt::{BEYOND, Side, WITHIN, quantile, ratio};
 use super::scores::{Judged, level};
-use crate::prove::gains::{Gains, OUR_METHOD};
+use crate::prove::examine::OUR_METHOD;
+use crate::prove::gains::Gains;
 use crate::prove::question::{Cell, World};
 use crate::rng::Seed;
 use crate::stats::{at_least, at_most, clopper_pearson};
@@ -161,8 +162,7 @@ fn share(answers: &[bool], marks: [f64; 2], fewer_is_better: bool) -> Figure {
 
 /// Sign test on the median.
 fn median(gains: &[&Gains], side: Side, marks: [f64; 2]) -> Figure {
-    let mut ratios: Vec<f64> =
-        gains.iter().filter_map(|g| ratio(g, OUR_METHOD, side)).collect();
+    let mut ratios: Vec<f64> = gains.iter().filter_map(|g| ratio(g, OUR_METHOD, side)).collect();
     let value = quantile(&mut ratios, 0.5);
     let n = ratios.len();
     let above = |m: f64| ratios.iter().filter(|r| **r >= m).count();
@@ -241,6 +241,7 @@ fn holm(p: &[f64; 5]) -> [f64; 5] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::prove::gains::{Gain, Method};
 
     #[test]
     fn holm_is_as_in_the_textbook() {
@@ -261,19 +262,18 @@ mod tests {
 
     #[test]
     fn the_lead_must_be_over_the_best_of_the_others() {
+        let both = |v: f64| Gain { within: v, beyond: v };
         let of = |ours: f64, other: f64| Gains {
             methods: [(OUR_METHOD, ours), ("process", other), ("none", 0.0)]
                 .into_iter()
-                .map(|(k, v)| {
-                    (k.into(), crate::prove::Gain { within: v, beyond: v, parameters: 1 })
-                })
+                .map(|(k, v)| (k.into(), Method { gain: both(v), parameters: 1 }))
                 .collect(),
-            oracle: crate::prove::Gain { within: 100.0, beyond: 100.0, parameters: 1 },
+            oracle: both(100.0),
         };
         let ahead: Vec<Gains> = (0..40).map(|i| of(90.0 + f64::from(i % 7), 30.0)).collect();
         let behind: Vec<Gains> = (0..40).map(|i| of(90.0 + f64::from(i % 7), 99.0)).collect();
-        let [a, b] = [&ahead, &behind]
-            .map(|all| leading(&all.iter().collect::<Vec<_>>(), [0.6, 0.85]));
+        let [a, b] =
+            [&ahead, &behind].map(|all| leading(&all.iter().collect::<Vec<_>>(), [0.6, 0.85]));
         assert_eq!((a.reached, b.reached), ([true; 2], [false; 2]));
         assert!(a.p[1] < 0.01 && b.p[1] > 0.9);
     }

@@ -125,6 +125,25 @@ pub fn mark(truth: &Truth, verdict: Option<&Value>) -> Result<Marks> {
     })
 }
 
+/// What can be said of names without anything else: whether they are a false alarm, or whether
+/// something was seen, the first name is right, and the set of names is.
+pub fn names_alone(truth: &Truth, names: &[String]) -> Vec<(&'static str, bool)> {
+    let hidden = |id: &String| truth.hidden.iter().any(|h| h.names.contains(id));
+    let catalogued = truth.hidden.iter().all(|h| !h.names.is_empty());
+    match truth.asked.cell {
+        Cell::Drift | Cell::Blind => Vec::new(),
+        _ if truth.hidden.is_empty() => vec![("false_alarm", !names.is_empty())],
+        _ if catalogued => {
+            let all = truth.hidden.iter().all(|h| h.names.iter().any(|n| names.contains(n)));
+            let mut marks = vec![("detected", !names.is_empty())];
+            marks.extend(names.first().map(|id| ("first_name", hidden(id))));
+            marks.push(("exact", all && names.iter().all(hidden)));
+            marks
+        }
+        _ => vec![("detected", !names.is_empty())],
+    }
+}
+
 struct Case<'a> {
     truth: &'a Truth,
     said: Option<&'a Verdict>,
@@ -291,9 +310,8 @@ impl Case<'_> {
         let mut all = Vec::new();
         let findings: Vec<&Said> = self.claims().filter(|f| f.name().is_some()).collect();
         for (i, said) in findings.iter().enumerate() {
-            let elsewhere = |id: &str| {
-                findings.iter().enumerate().any(|(j, f)| i != j && f.name() == Some(id))
-            };
+            let elsewhere =
+                |id: &str| findings.iter().enumerate().any(|(j, f)| i != j && f.name() == Some(id));
             for (rank, a) in said.alternatives.iter().enumerate() {
                 let Some(probability) = a.probability else { continue };
                 let right = self.is_hidden(&a.effect) && (rank == 0 || !elsewhere(&a.effect));

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::certainty::Certainty;
 use super::endpoints::{Endpoint, endpoints};
 use super::learnt::{Learnt, learnt, quantile};
-use super::marks::Marks;
+use super::marks::{Marks, names_alone};
 use crate::prove::gains::Gains;
 use crate::prove::question::{Cell, Truth};
 use crate::stats::clopper_pearson;
@@ -18,6 +18,8 @@ pub struct Judged<'a> {
     pub truth: &'a Truth,
     pub marks: &'a Marks,
     pub gains: Option<&'a Gains>,
+    /// Ids of the catalogue by baseline, best first.
+    pub named_by_others: &'a BTreeMap<String, Vec<String>>,
 }
 
 /// So many of so many.
@@ -73,6 +75,8 @@ pub struct Scores {
     /// Of every name offered.
     pub certainty_of_all: Certainty,
     pub learnt: BTreeMap<String, Learnt>,
+    /// The names that baselines give, by baseline.
+    pub others: BTreeMap<String, Rates>,
     pub endpoints: Vec<Endpoint>,
 }
 
@@ -103,6 +107,7 @@ pub fn scores(sets: &[Judged<'_>]) -> Scores {
         certainty: Certainty::of(stated().filter(|s| s.best)),
         certainty_of_all: Certainty::of(stated()),
         learnt: learnt(&gains),
+        others: others(sets),
         endpoints: endpoints(sets),
     }
 }
@@ -143,10 +148,7 @@ fn rates<'a>(sets: impl Iterator<Item = &'a Judged<'a>>) -> Rates {
     answers.into_iter().filter_map(|(k, v)| Some((k.into(), Rate::of(v.into_iter())?))).collect()
 }
 
-fn grouped(
-    sets: &[Judged<'_>],
-    key: impl Fn(&Truth) -> Option<String>,
-) -> BTreeMap<String, Rates> {
+fn grouped(sets: &[Judged<'_>], key: impl Fn(&Truth) -> Option<String>) -> BTreeMap<String, Rates> {
     let mut groups: BTreeMap<String, Vec<&Judged<'_>>> = BTreeMap::new();
     for set in sets {
         if let Some(key) = key(set.truth) {
@@ -163,6 +165,26 @@ fn confusion(singles: &[Judged<'_>]) -> BTreeMap<String, BTreeMap<String, usize>
         *row.entry(set.marks.first.clone()).or_insert(0) += 1;
     }
     table
+}
+
+/// A baseline's names, judged as ours are.
+fn others(sets: &[Judged<'_>]) -> BTreeMap<String, Rates> {
+    let mut marks: BTreeMap<String, Vec<(&str, bool)>> = BTreeMap::new();
+    for set in sets {
+        for (baseline, names) in set.named_by_others {
+            marks.entry(baseline.clone()).or_default().extend(names_alone(set.truth, names));
+        }
+    }
+    let of = |all: &[(&str, bool)], mark: &str| {
+        Rate::of(all.iter().filter(|m| m.0 == mark).map(|m| m.1)).map(|r| (mark.to_string(), r))
+    };
+    marks
+        .into_iter()
+        .map(|(baseline, all)| {
+            let rates = ["false_alarm", "detected", "first_name", "exact"];
+            (baseline, rates.into_iter().filter_map(|m| of(&all, m)).collect())
+        })
+        .collect()
 }
 
 fn names_f1(sets: &[Judged<'_>]) -> Option<f64> {

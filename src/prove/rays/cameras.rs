@@ -82,7 +82,11 @@ impl Unit {
             sigma: SigmaModel::published(Form::Paper, &self.sigma, domain),
             effects,
             fit: FitSummary::default(),
-            provenance: Provenance::now(None),
+            // The same bytes whenever it is written.
+            provenance: Provenance {
+                created: "1970-01-01T00:00:00Z".into(),
+                ..Provenance::now(None)
+            },
         })
     }
 }
