@@ -30,6 +30,12 @@ impl Global {
         Seed(self.seed)
     }
 
+    /// How many may work at a time.
+    pub fn workers(&self) -> usize {
+        let all = || std::thread::available_parallelism().map_or(1, usize::from);
+        self.threads.unwrap_or_else(all)
+    }
+
     pub fn set_threads(&self) -> anyhow::Result<()> {
         let Some(n) = self.threads else { return Ok(()) };
         if n == 0 {
@@ -53,7 +59,7 @@ impl Global {
 }
 
 /// What a folder that does not describe itself needs to be told.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub struct Input {
     /// fx,fy,cx,cy in px, for folders without recording.json
     #[arg(

@@ -29,6 +29,18 @@ pub struct Arguments {
     input: Input,
 }
 
+impl Arguments {
+    /// Of a folder that describes itself.
+    pub fn plain(
+        recording: PathBuf,
+        model: Option<PathBuf>,
+        against: Option<PathBuf>,
+        output: PathBuf,
+    ) -> Self {
+        Arguments { recording, model, against, output, input: Input::default() }
+    }
+}
+
 /// A mismatch was found (contract, section 3).
 const FOUND: u8 = 1;
 

@@ -8,6 +8,9 @@ mod diagnose;
 mod diagnose_pictures;
 mod effects;
 mod fit;
+mod prove;
+mod prove_solver;
+mod prove_words;
 mod simulate;
 mod simulate_room;
 mod words;
@@ -41,6 +44,11 @@ enum Command {
     Correct(correct::Arguments),
     /// The catalogue of physical effects: what each does, how it shows, what it is taken for
     Effects(effects::Arguments),
+    /// A blind trial of the diagnosis on concealed sets that anyone can check
+    Prove(prove::Arguments),
+    /// One set of a trial, by a process that is shut in
+    #[command(hide = true)]
+    ProveSolver(prove_solver::Arguments),
     /// The whole road on bundled data
     Demo(demo::Arguments),
 }
@@ -84,6 +92,9 @@ fn one_line(e: &clap::Error) -> String {
 
 fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let global = &arguments.global;
+    if let Command::ProveSolver(_) = arguments.command {
+        prove_solver::shut_in();
+    }
     global.set_threads()?;
     match &arguments.command {
         Command::Calibrate(a) => calibrate::run(a, global).map(|()| 0),
@@ -92,6 +103,8 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         Command::Simulate(a) => simulate::run(a, global).map(|()| 0),
         Command::Correct(a) => correct::run(a, global).map(|()| 0),
         Command::Effects(a) => effects::run(a, global).map(|()| 0),
+        Command::Prove(a) => prove::run(a, global),
+        Command::ProveSolver(_) => prove_solver::run(global),
         Command::Demo(a) => demo::run(a, global).map(|()| 0),
     }
 }

@@ -4,9 +4,32 @@
 //! The makers of sets share no formula with the catalogue and no code with the diagnosis; only the
 //! recording and the model file are common ground.
 
+mod check;
+mod confine;
+mod examine;
+mod gains;
+mod judge;
 pub mod light;
+mod plan;
+mod proof;
 mod question;
 pub mod rays;
+mod rite;
+mod seal;
+mod solve;
+mod verdict;
+mod workers;
 pub mod worlds;
 
+pub use check::{CheckOptions, Checked, check};
+pub use confine::confine;
+pub use examine::{Examination, Examine, OUR_METHOD};
+pub use gains::{Gain, Gains, Method};
+pub use judge::*;
+pub use plan::{Planned, plan};
+pub use proof::{Proof, ProvenSet};
 pub use question::*;
+pub use rite::{Trial, prove};
+pub use seal::{Seal, SealedSet, commitment, hash_folder};
+pub use solve::{DATA, Solved};
+pub use worlds::seal;

@@ -1,8 +1,10 @@
 //! Small statistics the pipeline shares.
 
+mod binomial;
 mod correlation;
 mod truncated;
 
+pub use binomial::{at_least, at_most, clopper_pearson};
 pub use correlation::{Correlation, measure_correlation};
 pub use truncated::{normal_cut_factor, std_unbias};
 

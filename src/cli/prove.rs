@@ -1,0 +1,114 @@
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use clap::Args;
+use kinoise::prove::{CheckOptions, Trial, check, prove};
+
+use super::common::{Bar, Global, say};
+use super::prove_words;
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Folder for seal.json, verdicts.json, proof.json; a trial that was interrupted goes on there
+    #[arg(short, long, value_name = "DIR", required_unless_present = "check")]
+    output: Option<PathBuf>,
+    /// How many sets; their kinds keep their shares
+    #[arg(long, value_name = "N", default_value_t = 60)]
+    sets: usize,
+    /// Real recordings, a folder each: a part of the sets is made of them
+    #[arg(long, value_name = "PATH")]
+    data: Option<PathBuf>,
+    /// Keep every set and all that was written about it, in kept/
+    #[arg(long)]
+    keep: bool,
+    /// Longest time for one diagnosis
+    #[arg(long, value_name = "SECONDS", default_value_t = 900)]
+    limit: u64,
+    /// Check the proof in DIR: seals, hashes, marks, scores, and a sample of sets made again
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["output", "sets", "keep", "limit"])]
+    check: Option<PathBuf>,
+    /// With --check: make every set again
+    #[arg(long, requires = "check")]
+    all: bool,
+}
+
+/// A proof that does not hold.
+const DOES_NOT_HOLD: u8 = 1;
+
+pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
+    if let Some(data) = arguments.data.as_ref().filter(|d| !d.is_dir()) {
+        bail!("{}: no folder is here; give --data the folder of the recordings", data.display());
+    }
+    let program = std::env::current_exe().context("where this program lies")?;
+    match (&arguments.check, &arguments.output) {
+        (Some(folder), _) => again(folder, program, arguments, global),
+        (None, Some(output)) => trial(output, program, arguments, global),
+        (None, None) => bail!("no folder was given; say -o DIR, or --check DIR"),
+    }
+}
+
+fn trial(
+    output: &Path,
+    program: PathBuf,
+    arguments: &Arguments,
+    global: &Global,
+) -> anyhow::Result<u8> {
+    if arguments.sets == 0 {
+        bail!("--sets 0: give at least one set");
+    }
+    let trial = Trial {
+        output: std::path::absolute(output).with_context(|| output.display().to_string())?,
+        sets: arguments.sets,
+        seed: global.seed,
+        data: arguments.data.clone(),
+        keep: arguments.keep,
+        workers: global.workers(),
+        program,
+        limit: Duration::from_secs(arguments.limit),
+        examine: None,
+    };
+    let bars = Bars::default();
+    let proof = prove(&trial, &|what, done, all| bars.step(what, done, all))?;
+    drop(bars);
+    global.print_json(&serde_json::to_value(&proof.scores)?)?;
+    say(prove_words::summary(&proof));
+    Ok(0)
+}
+
+fn again(
+    folder: &Path,
+    program: PathBuf,
+    arguments: &Arguments,
+    global: &Global,
+) -> anyhow::Result<u8> {
+    let options = CheckOptions {
+        data: arguments.data.clone(),
+        all: arguments.all,
+        workers: global.workers(),
+        program,
+    };
+    let bars = Bars::default();
+    let checked = check(folder, &options, &|what, done, all| bars.step(what, done, all))?;
+    drop(bars);
+    global.print_json(&serde_json::to_value(&checked)?)?;
+    say(prove_words::checked(&checked));
+    Ok(if checked.faults.is_empty() { 0 } else { DOES_NOT_HOLD })
+}
+
+/// One bar after the other.
+#[derive(Default)]
+struct Bars(Mutex<Option<(&'static str, Bar)>>);
+
+impl Bars {
+    fn step(&self, what: &'static str, done: usize, all: usize) {
+        let Ok(mut bar) = self.0.lock() else { return };
+        if bar.as_ref().is_none_or(|(now, _)| *now != what) {
+            *bar = Some((what, Bar::new(what)));
+        }
+        if let Some((_, bar)) = bar.as_ref() {
+            bar.step(done, all);
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! The place where what was learnt is weighed: after the seals are open.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::gains::Gains;
+use super::question::Sealed;
+use crate::error::Result;
+use crate::model::NoiseModel;
+
+/// Under this name the diagnosis itself stands among the methods.
+pub const OUR_METHOD: &str = "kinoise";
+
+/// What an examination of one set finds.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Examination {
+    /// None where the world has no truth without noise.
+    pub gains: Option<Gains>,
+    /// Ids of the catalogue by baseline, best first, of those baselines that give names.
+    #[serde(default)]
+    pub names: BTreeMap<String, Vec<String>>,
+}
+
+/// Who examines: the opened set, its folder as the solver had it, and the model that the diagnosis
+/// wrote.
+pub type Examine = fn(&dyn Sealed, &Path, &NoiseModel) -> Result<Examination>;
