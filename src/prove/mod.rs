@@ -4,7 +4,11 @@
 //! The makers of sets share no formula with the catalogue and no code with the diagnosis; only the
 //! recording and the model file are common ground.
 
+pub mod baselines;
+pub mod gain;
+mod gains;
 mod question;
 pub mod rays;
 
+pub use gains::{Gain, Gains, Method};
 pub use question::*;
