@@ -5,6 +5,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::learnt::{AtPlaces, Learnt, each};
+use super::linear::{Design, ratios};
 use super::polynomial::Frame;
 use super::tiles::{Tile, Tiles};
 use super::{Baseline, Fitted};
@@ -17,6 +18,8 @@ pub struct GaussianProcess;
 /// Its cost goes with the cube: blocks to settle the hyperparameters with, and blocks to fit.
 const FEW: usize = 260;
 const MOST: usize = 450;
+/// Blocks that the bias is taken out of before the noise is looked at.
+const MANY: usize = 4000;
 /// Factors by which the hyperparameters are tried, a round each.
 const TRIED: [f64; 2] = [2.5, 1.6];
 /// Variance of a plane's coefficients over that of the bias: as good as free.
@@ -161,14 +164,10 @@ fn of_bias(blocks: &Tiles, frame: &Frame) -> Problem {
     }
 }
 
-/// Logarithm of the mean square about the fitted bias; `left` is what the fit leaves of the means.
-fn of_variance(blocks: &Tiles, frame: &Frame, left: &[f64]) -> (Problem, f64) {
+/// Logarithm of the mean square about the fitted bias, and its level.
+fn of_variance(blocks: &Tiles, frame: &Frame) -> (Problem, f64) {
     let tiles = &blocks.tiles;
-    let log = |(t, left): (&Tile, &f64)| {
-        let spread = (t.square - t.mean * t.mean).max(0.0);
-        ((spread + left * left) / t.variance).max(1e-6).ln()
-    };
-    let y: Vec<f64> = tiles.iter().zip(left).map(log).collect();
+    let y: Vec<f64> = tiles.iter().map(|t| (t.square / t.variance).max(1e-6).ln()).collect();
     let count: f64 = tiles.iter().map(|t| t.count).sum();
     let level = tiles.iter().zip(&y).map(|(t, y)| t.count * y).sum::<f64>() / count;
     let problem = Problem {
@@ -180,6 +179,17 @@ fn of_variance(blocks: &Tiles, frame: &Frame, left: &[f64]) -> (Problem, f64) {
     (problem, level)
 }
 
+/// Noise about the bias, in blocks within which the bias hardly changes.
+fn noise_about(bias: Option<&Posterior>, tiles: &Tiles, frame: &Frame) -> Tiles {
+    let blocks = tiles.blocks(MANY);
+    let at = |p: &Posterior| -> Vec<f64> {
+        blocks.tiles.iter().map(|t| p.mean(&frame.of_place(&t.place))).collect()
+    };
+    let fitted =
+        bias.map_or_else(Vec::new, |p| Design::column(&blocks, &at(p)).as_slice().to_vec());
+    blocks.of_ratios(&ratios(&blocks, &fitted))
+}
+
 impl Baseline for GaussianProcess {
     fn name(&self) -> &'static str {
         "gaussian-process"
@@ -188,17 +198,12 @@ impl Baseline for GaussianProcess {
     fn fit(&self, tiles: &Tiles) -> Result<Fitted> {
         let frame = Frame::of(tiles);
         let (few, most) = (tiles.blocks(FEW), tiles.blocks(MOST));
-        let problem = of_bias(&most, &frame);
         let hyper = of_bias(&few, &frame).settle();
-        let bias = problem.posterior(hyper);
-        // What is left of a measurement is its noise's variance times its weight.
-        let left = |i: usize| {
-            bias.as_ref().map_or(most.tiles[i].mean, |b| hyper.noise * problem.noise[i] * b.alpha[i])
-        };
-        let left: Vec<f64> = (0..most.tiles.len()).map(left).collect();
-        let (problem, level) = of_variance(&most, &frame, &left);
-        let none = vec![0.0; few.tiles.len()];
-        let variance = problem.posterior(of_variance(&few, &frame, &none).0.settle());
+        let bias = of_bias(&most, &frame).posterior(hyper);
+        let noise = noise_about(bias.as_ref(), tiles, &frame);
+        let hyper = of_variance(&noise.blocks(FEW), &frame).0.settle();
+        let (problem, level) = of_variance(&noise.blocks(MOST), &frame);
+        let variance = problem.posterior(hyper);
         let freedom = |p: &Option<Posterior>| p.as_ref().map_or(0.0, |p| p.freedom);
         // Five hyperparameters each, and a level.
         let parameters = (freedom(&bias) + freedom(&variance)).round() as usize + 11;

@@ -120,9 +120,8 @@ impl<'a> Lattice<'a> {
             let (from, to) = (self.pixel(k, size), self.pixel(k + 1, size));
             (k, (at - from) as f64 / (to - from).max(1) as f64)
         };
-        let at = |i: usize, j: usize| {
-            nodes[j.min(self.down - 1) * self.across + i.min(self.across - 1)]
-        };
+        let at =
+            |i: usize, j: usize| nodes[j.min(self.down - 1) * self.across + i.min(self.across - 1)];
         let pixel = |p: usize| {
             let (i, s) = way(p % width, width, self.across);
             let (j, t) = way(p / width, height, self.down);

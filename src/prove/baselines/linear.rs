@@ -170,12 +170,7 @@ pub(super) fn working(
 }
 
 /// Of normal measurements, nats.
-fn likelihood(
-    tiles: &Tiles,
-    ratios: &[f64],
-    columns: &DMatrix<f64>,
-    beta: &DVector<f64>,
-) -> f64 {
+fn likelihood(tiles: &Tiles, ratios: &[f64], columns: &DMatrix<f64>, beta: &DVector<f64>) -> f64 {
     let eta = columns * beta;
     let one = |(i, t): (usize, &Tile)| {
         let log = eta[i] / (0.5 * t.count).sqrt();

@@ -5,6 +5,7 @@
 //! to cause that stands in this folder.
 
 mod clams;
+mod formula;
 mod gaussian;
 mod learnt;
 mod linear;

@@ -99,7 +99,8 @@ fn worth(gram: &DMatrix<f64>, right: &DVector<f64>, columns: &[usize], log_n: f6
     if columns.is_empty() {
         return 0.0;
     }
-    let gram = DMatrix::from_fn(columns.len(), columns.len(), |i, j| gram[(columns[i], columns[j])]);
+    let gram =
+        DMatrix::from_fn(columns.len(), columns.len(), |i, j| gram[(columns[i], columns[j])]);
     let right = DVector::from_fn(columns.len(), |i, _| right[columns[i]]);
     let solved = solve(&gram, &right);
     solved.drop - log_n * solved.rank as f64
@@ -195,8 +196,7 @@ fn variance(tiles: &Tiles, fitted: &[f64], log_n: f64) -> Found {
     let families = of_variance();
     let (count, fill) = columns(&families);
     let design = Design::of_variance(tiles, count, &fill).columns;
-    let (gram, ranges, ratios) =
-        (design.tr_mul(&design), ranges(&families), ratios(tiles, fitted));
+    let (gram, ranges, ratios) = (design.tr_mul(&design), ranges(&families), ratios(tiles, fitted));
     let mut chosen: Vec<usize> = Vec::new();
     let mut beta = DVector::zeros(0);
     loop {
@@ -223,9 +223,7 @@ fn variance(tiles: &Tiles, fitted: &[f64], log_n: f64) -> Found {
 
 /// Ratios beyond one, weighed.
 fn weighed(tiles: &Tiles, ratios: &[f64]) -> DVector<f64> {
-    DVector::from_fn(ratios.len(), |i, _| {
-        (0.5 * tiles.tiles[i].count).sqrt() * (ratios[i] - 1.0)
-    })
+    DVector::from_fn(ratios.len(), |i, _| (0.5 * tiles.tiles[i].count).sqrt() * (ratios[i] - 1.0))
 }
 
 impl Baseline for Sparse {

@@ -16,14 +16,13 @@
 //! | variance | a number alone | recalibrate |
 //! | either | anything else | no name |
 
-use std::f64::consts::TAU;
-
 use nalgebra::DVector;
 use ndarray::{Array1, Array2};
-use symbolic_regression::prelude::{BuiltinOpsF64, EvalOptions, PNode, PostfixExpr, eval_tree_array};
+use symbolic_regression::prelude::BuiltinOpsF64;
 use symbolic_regression::{Dataset, Operators, Options, SearchEngine};
 
-use super::learnt::{AtPlaces, Learnt};
+use super::formula::{ARITY, Formula, Kept, NAMES, features, keep, value};
+use super::learnt::Learnt;
 use super::linear::{Design, ratios};
 use super::polynomial::Frame;
 use super::tiles::Tiles;
@@ -41,7 +40,7 @@ pub struct Symbolic {
 
 impl Default for Symbolic {
     fn default() -> Self {
-        Symbolic { tried: 30_000, seed: 1 }
+        Symbolic { tried: 12_000, seed: 1 }
     }
 }
 
@@ -49,36 +48,9 @@ impl Default for Symbolic {
 const BLOCKS: usize = 700;
 /// Nodes of the longest formula.
 const LONGEST: usize = 14;
-/// Two operands at most.
-const ARITY: usize = 2;
 const ISLANDS: usize = 6;
 const GENERATIONS: usize = 1000;
 const CYCLES: usize = 60;
-
-type Formula = PostfixExpr<f64, BuiltinOpsF64, ARITY>;
-
-/// What formulas are made of, in order.
-const FEATURES: usize = 6;
-const COLUMN: u16 = 0;
-const ROW: u16 = 1;
-const DISPARITY: u16 = 2;
-const RADIUS: u16 = 3;
-const TILT: u16 = 4;
-const PHASE: u16 = 5;
-
-fn features(frame: &Frame, places: &[Place]) -> Array2<f64> {
-    let one = |p: &Place| {
-        let [u, v, d] = frame.of_place(p);
-        [u, v, d, p.radius, p.theta, TAU * p.disparity]
-    };
-    let rows: Vec<[f64; FEATURES]> = places.iter().map(one).collect();
-    Array2::from_shape_fn((FEATURES, rows.len()), |(k, i)| rows[i][k])
-}
-
-fn value(formula: &Formula, x: &Array2<f64>) -> Vec<f64> {
-    let options = EvalOptions { check_finite: false, early_exit: false };
-    eval_tree_array::<f64, BuiltinOpsF64, ARITY>(formula, x.view(), &options).0
-}
 
 impl Symbolic {
     /// Formulas that are the best of their length.
@@ -100,7 +72,7 @@ impl Symbolic {
             progress: false,
             ..Options::default()
         };
-        let names = ["u", "v", "d", "r", "theta", "phase"].map(String::from).to_vec();
+        let names = NAMES.map(String::from).to_vec();
         let data = Dataset::with_weights_and_names(
             x.clone(),
             Array1::from_vec(y.to_vec()),
@@ -112,94 +84,43 @@ impl Symbolic {
         while engine.step(1) > 0 {}
         Ok(engine.hall_of_fame().pareto_front().into_iter().map(|m| m.expr).collect())
     }
-}
 
-/// The formula to keep, times a factor; none where none is worth its length.
-struct Kept {
-    formula: Formula,
-    factor: f64,
-}
-
-impl Kept {
-    /// Constants, and the factor.
-    fn parameters(&self) -> usize {
-        self.formula.consts.len() + 1
+    fn bias(&self, tiles: &Tiles, frame: &Frame, log_n: f64) -> Result<Option<Kept>> {
+        let blocks = tiles.blocks(BLOCKS);
+        let x = features(frame, &places(&blocks));
+        let (y, weights) = scaled(blocks.tiles.iter().map(|t| (t.mean, 1.0 / t.error_px2())));
+        let column = |values: &[f64]| Design::column(&blocks, values);
+        let formulas = self.search(&x, &y, &weights)?;
+        Ok(keep(formulas, &x, &Design::residual(&blocks), &column, log_n))
     }
 
-    fn has(&self, feature: u16) -> bool {
-        self.formula.nodes.iter().any(|n| *n == PNode::Var { feature })
-    }
-
-    fn has_sine(&self) -> bool {
-        self.formula.nodes.iter().any(|n| matches!(n, PNode::Op { arity: 1, .. }))
-    }
-
-    fn is_radial(&self) -> bool {
-        self.has(RADIUS) || self.has(COLUMN) && self.has(ROW)
-    }
-
-    fn cause_of_bias(&self) -> Option<&'static str> {
-        if self.has_sine() && (self.has(PHASE) || self.has(DISPARITY)) {
-            Some("pixel-locking")
-        } else if self.has_sine() && self.has(COLUMN) && !self.has(ROW) && !self.has(RADIUS) {
-            Some("column-banding")
-        } else if self.has(TILT) {
-            Some("lens-distortion")
-        } else if self.is_radial() {
-            Some("radial-disparity-bias")
-        } else {
-            None
-        }
-    }
-
-    fn cause_of_variance(&self) -> Option<&'static str> {
-        let any = (0..FEATURES as u16).any(|f| self.has(f));
-        if self.has(TILT) {
-            Some("slope-noise")
-        } else if self.is_radial() {
-            Some("vignetting")
-        } else if self.has(DISPARITY) && !self.has(COLUMN) && !self.has(ROW) {
-            Some("range-exponent")
-        } else if !any {
-            Some("recalibrate")
-        } else {
-            None
-        }
-    }
-
-    fn at_places(self, frame: Frame) -> AtPlaces {
-        Box::new(move |places| {
-            let mut values = value(&self.formula, &features(&frame, places));
-            values.iter_mut().for_each(|v| *v *= self.factor);
-            values
-        })
+    fn variance(
+        &self,
+        tiles: &Tiles,
+        bias: Option<&Kept>,
+        frame: &Frame,
+        log_n: f64,
+    ) -> Result<Option<Kept>> {
+        // Within a block the bias changes, and must not pass for noise.
+        let fitted = bias.map_or_else(Vec::new, |kept| {
+            let values = value(&kept.formula, &features(frame, &places(tiles)));
+            (Design::column(tiles, &values) * kept.factor).as_slice().to_vec()
+        });
+        let blocks = tiles.of_ratios(&ratios(tiles, &fitted)).blocks(BLOCKS);
+        let x = features(frame, &places(&blocks));
+        // The logarithm of a mean of n squares has a variance of 2 / n.
+        let halves: Vec<f64> = blocks.tiles.iter().map(|t| 0.5 * t.count).collect();
+        let logs: Vec<f64> =
+            blocks.tiles.iter().map(|t| (t.square / t.variance).max(1e-6).ln()).collect();
+        let (y, weights) = scaled(logs.iter().copied().zip(halves.iter().copied()));
+        let weigh = |v: &[f64]| DVector::from_fn(v.len(), |i, _| v[i] * halves[i].sqrt());
+        let formulas = self.search(&x, &y, &weights)?;
+        Ok(keep(formulas, &x, &weigh(&logs), &weigh, log_n))
     }
 }
 
-/// The least BIC. `column` makes of a formula's values what is compared with `target`, both over
-/// standard errors.
-fn keep(
-    formulas: Vec<Formula>,
-    x: &Array2<f64>,
-    target: &DVector<f64>,
-    column: &dyn Fn(&[f64]) -> DVector<f64>,
-    log_n: f64,
-) -> Option<(Kept, DVector<f64>)> {
-    let mut best: Option<(f64, Kept, DVector<f64>)> = None;
-    for formula in formulas {
-        let g = column(&value(&formula, x));
-        let size = g.norm_squared();
-        let factor = g.dot(target) / size;
-        if !(size > 0.0 && factor.is_finite()) {
-            continue;
-        }
-        let kept = Kept { formula, factor };
-        let worth = factor * g.dot(target) - log_n * kept.parameters() as f64;
-        if worth > best.as_ref().map_or(0.0, |b| b.0) {
-            best = Some((worth, kept, g * factor));
-        }
-    }
-    best.map(|(_, kept, fitted)| (kept, fitted))
+fn places(tiles: &Tiles) -> Vec<Place> {
+    tiles.tiles.iter().map(|t| t.place).collect()
 }
 
 impl Baseline for Symbolic {
@@ -209,26 +130,9 @@ impl Baseline for Symbolic {
 
     fn fit(&self, tiles: &Tiles) -> Result<Fitted> {
         let frame = Frame::of(tiles);
-        let blocks = tiles.blocks(BLOCKS);
-        let places: Vec<Place> = blocks.tiles.iter().map(|t| t.place).collect();
-        let x = features(&frame, &places);
         let log_n = tiles.tiles.iter().map(|t| t.count).sum::<f64>().ln();
-
-        let (y, weights) = scaled(blocks.tiles.iter().map(|t| (t.mean, 1.0 / t.error_px2())));
-        let target = Design::residual(&blocks);
-        let column = |values: &[f64]| Design::column(&blocks, values);
-        let bias = keep(self.search(&x, &y, &weights)?, &x, &target, &column, log_n);
-
-        let fitted = bias.as_ref().map_or(&[][..], |b| b.1.as_slice());
-        let logs: Vec<f64> = ratios(&blocks, fitted).iter().map(|r| r.max(1e-6).ln()).collect();
-        // The logarithm of a mean of n squares has a variance of 2 / n.
-        let half = |i: usize| 0.5 * blocks.tiles[i].count;
-        let (y, weights) = scaled(logs.iter().enumerate().map(|(i, log)| (*log, half(i))));
-        let weigh = |v: &[f64]| DVector::from_fn(v.len(), |i, _| v[i] * half(i).sqrt());
-        let formulas = self.search(&x, &y, &weights)?;
-        let variance = keep(formulas, &x, &weigh(&logs), &weigh, log_n);
-
-        let (bias, variance) = (bias.map(|b| b.0), variance.map(|v| v.0));
+        let bias = self.bias(tiles, &frame, log_n)?;
+        let variance = self.variance(tiles, bias.as_ref(), &frame, log_n)?;
         let parameters = [&bias, &variance].into_iter().flatten().map(Kept::parameters).sum();
         let causes = [
             bias.as_ref().and_then(Kept::cause_of_bias),

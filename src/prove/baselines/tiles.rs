@@ -47,8 +47,9 @@ pub struct Tiles {
     pub views: Vec<Range<usize>>,
 }
 
-/// Tiles across the picture: 4 px of 160, 16 px of 640.
-const ACROSS: usize = 40;
+/// Tiles across the picture, 2 px of 160 to 8 px of 640: over a steep and near target the disparity
+/// changes by a pixel in ten, and a ripple must not be smeared.
+const ACROSS: usize = 80;
 
 impl Tiles {
     /// Of `recording/` in a folder, weighed by `model`, its effects taken out; what a `simulated/`
@@ -65,11 +66,7 @@ impl Tiles {
 
     /// # Errors
     /// When no view shows a plane.
-    pub fn of(
-        recording: &Recording,
-        twin: Option<&Recording>,
-        model: &NoiseModel,
-    ) -> Result<Self> {
+    pub fn of(recording: &Recording, twin: Option<&Recording>, model: &NoiseModel) -> Result<Self> {
         let sensor = &recording.sensor;
         let bench = Workbench::new(sensor, MeasureOptions::default());
         let known = match twin {
@@ -102,9 +99,8 @@ impl Tiles {
     /// # Errors
     /// When there is nothing.
     pub fn join(sensor: &Sensor, all: Vec<Vec<Tile>>) -> Result<Self> {
-        let scale_px_m = sensor
-            .disparity_px_m()
-            .unwrap_or(sensor.camera.fx * crate::effects::KINECT_BASELINE_M);
+        let scale_px_m =
+            sensor.disparity_px_m().unwrap_or(sensor.camera.fx * crate::effects::KINECT_BASELINE_M);
         let (mut tiles, mut views) = (Vec::new(), Vec::new());
         for view in all.into_iter().filter(|v| v.len() > 3) {
             views.push(tiles.len()..tiles.len() + view.len());
@@ -119,19 +115,41 @@ impl Tiles {
         Ok(Tiles { sensor: sensor.clone(), scale_px_m, tiles, views })
     }
 
-    /// Fewer and larger: those of one view that lie in one of `across` x `across` blocks of the
-    /// picture become one.
-    fn coarser(&self, across: usize) -> Self {
+    /// Fewer and larger, in blocks as small as their number, at most `most`, allows; four a view are
+    /// kept.
+    pub fn blocks(&self, most: usize) -> Self {
+        let fits = |across: &usize| self.occupied(*across) <= most;
+        self.coarser((2..=ACROSS).rev().find(fits).unwrap_or(2))
+    }
+
+    /// Which of `across` x `across` blocks of the picture a tile lies in.
+    fn block(&self, tile: &Tile, across: usize) -> usize {
         let camera = &self.sensor.camera;
-        let block = |x: f64, size: usize| {
-            ((x / size as f64 * across as f64) as usize).min(across - 1)
-        };
+        let part =
+            |x: f64, size: usize| ((x / size as f64 * across as f64) as usize).min(across - 1);
+        part(tile.place.v, camera.height) * across + part(tile.place.u, camera.width)
+    }
+
+    fn occupied(&self, across: usize) -> usize {
+        let mut seen = vec![false; across * across];
+        let mut count = 0;
+        for range in &self.views {
+            seen.fill(false);
+            for t in &self.tiles[range.clone()] {
+                let k = self.block(t, across);
+                count += usize::from(!seen[k]);
+                seen[k] = true;
+            }
+        }
+        count
+    }
+
+    fn coarser(&self, across: usize) -> Self {
         let (mut tiles, mut views) = (Vec::new(), Vec::new());
         for range in &self.views {
             let mut blocks: Vec<Vec<&Tile>> = vec![Vec::new(); across * across];
             for t in &self.tiles[range.clone()] {
-                let (i, j) = (block(t.place.u, camera.width), block(t.place.v, camera.height));
-                blocks[j * across + i].push(t);
+                blocks[self.block(t, across)].push(t);
             }
             let start = tiles.len();
             tiles.extend(blocks.iter().filter(|b| !b.is_empty()).map(|b| merged(b)));
@@ -140,17 +158,14 @@ impl Tiles {
         Tiles { sensor: self.sensor.clone(), scale_px_m: self.scale_px_m, tiles, views }
     }
 
-    /// In blocks as small as their number, at most `most`, allows; four a view are kept.
-    pub fn blocks(&self, most: usize) -> Self {
-        let sizes = (2..=ACROSS / 2).rev().map(|across| self.coarser(across));
-        let mut last = self.coarser(2);
-        for blocks in sizes {
-            if blocks.tiles.len() <= most {
-                last = blocks;
-                break;
-            }
+    /// The same places with noise alone: mean squares over the model's variance, and no mean.
+    pub fn of_ratios(&self, ratios: &[f64]) -> Self {
+        let mut noise = self.clone();
+        for (t, ratio) in noise.tiles.iter_mut().zip(ratios) {
+            t.mean = 0.0;
+            t.square = ratio * t.variance;
         }
-        last
+        noise
     }
 
     /// Ends of what the tiles span on an axis.
@@ -161,9 +176,8 @@ impl Tiles {
 
 fn merged(tiles: &[&Tile]) -> Tile {
     let count: f64 = tiles.iter().map(|t| t.count).sum();
-    let mean = |of: &dyn Fn(&Tile) -> f64| {
-        tiles.iter().map(|t| t.count * of(t)).sum::<f64>() / count
-    };
+    let mean =
+        |of: &dyn Fn(&Tile) -> f64| tiles.iter().map(|t| t.count * of(t)).sum::<f64>() / count;
     let places: Vec<Place> = tiles.iter().map(|t| t.place).collect();
     let mut place = places[0];
     let weigh = |of: &dyn Fn(usize) -> f64| {
@@ -193,7 +207,8 @@ fn take_out(field: &mut Field, twin: &Field) {
 
 /// Light over the recording's median.
 fn even_light(fields: &mut [Field]) {
-    let mut all: Vec<f32> = fields.iter().flat_map(|f| f.light.iter().step_by(7)).copied().collect();
+    let mut all: Vec<f32> =
+        fields.iter().flat_map(|f| f.light.iter().step_by(7)).copied().collect();
     let median = median_in_place(&mut all);
     if median > 0.0 {
         fields.iter_mut().flat_map(|f| &mut f.light).for_each(|l| *l /= median);

@@ -13,7 +13,7 @@ mod model;
 mod score;
 mod stand;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
 pub(crate) use model::MOST_LOG_VARIANCE;
 pub use model::ModelPredictor;
@@ -78,11 +78,7 @@ pub fn examine_and_name(
         let tiles = Tiles::of_folder(folder, given.as_ref().unwrap_or(found))?;
         for baseline in baselines::all() {
             let learnt = baseline.fit(&tiles)?;
-            let gain = if views.is_empty() {
-                Gain::default()
-            } else {
-                gain_of(views, learnt.predictor.as_ref())?
-            };
+            let gain = gain_of(views, learnt.predictor.as_ref())?;
             let name = baseline.name().to_string();
             methods.insert(name.clone(), Method { gain, parameters: learnt.parameters });
             if let Some(names) = learnt.names {

@@ -26,6 +26,8 @@ pub use choices::CATALOGUE;
 pub use geometry::{Board, Site, Stage};
 pub use outside::OUTSIDE;
 pub use sets::{Cell, Order, Set};
+#[cfg(test)]
+pub(super) use shoot::Still;
 pub use write::write;
 
 use crate::rng::Seed;
