@@ -4,9 +4,11 @@
 //! The makers of sets share no formula with the catalogue and no code with the diagnosis; only the
 //! recording and the model file are common ground.
 
+pub mod baselines;
 mod check;
 mod confine;
 mod examine;
+pub mod gain;
 mod gains;
 mod judge;
 pub mod light;

@@ -38,6 +38,8 @@ pub use outside::OUTSIDE;
 pub use sealed::seal;
 pub use sets::{Order, Set};
 pub use trace::Trace;
+#[cfg(test)]
+pub(super) use shoot::Still;
 pub use write::write;
 
 pub use super::question::Cell;
