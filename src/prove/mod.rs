@@ -6,5 +6,6 @@
 
 mod question;
 pub mod rays;
+pub mod real;
 
 pub use question::*;
