@@ -16,6 +16,7 @@ mod plan;
 mod proof;
 mod question;
 pub mod rays;
+pub mod real;
 mod rite;
 mod seal;
 mod solve;

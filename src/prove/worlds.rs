@@ -2,21 +2,24 @@
 
 use std::path::Path;
 
-use super::{Asked, Sealed, World, light, rays};
+use super::{Asked, Sealed, World, light, rays, real};
 use crate::error::{Error, Result};
 
 /// The set that is `asked`; `data` is the folder of the real recordings.
 ///
 /// # Errors
 /// When its world has no such cell or effect.
-pub fn seal(asked: &Asked, _data: Option<&Path>) -> Result<Box<dyn Sealed>> {
+pub fn seal(asked: &Asked, data: Option<&Path>) -> Result<Box<dyn Sealed>> {
     match asked.world {
         World::Rays => rays::seal(asked),
         World::Light => light::seal(asked),
-        World::Real => Err(Error::Argument {
-            what: "real recordings are not sealed here".into(),
-            remedy: "ask for rays or light",
-        }),
+        World::Real => {
+            let data = data.ok_or_else(|| Error::Argument {
+                what: "a set of a real recording was asked for, and no folder of such".into(),
+                remedy: "give --data",
+            })?;
+            real::seal(asked, data)
+        }
     }
 }
 

@@ -1,0 +1,39 @@
+//! One cause on its own, for recordings that a real sensor took.
+
+use super::choices::cause;
+use super::poses::{Session, Told};
+use super::sets::{Cell, Order};
+use super::{Cause, Unit};
+use crate::error::Result;
+use crate::rng::Seed;
+
+pub(in crate::prove) use super::kernels::{Window, fresh, white};
+
+/// The cause of this name at this strength; its form is drawn from `seed` and the name, and is the
+/// same at every strength.
+///
+/// # Errors
+/// When there is no such cause.
+pub(in crate::prove) fn alone(name: &str, strength: f64, unit: &Unit, seed: Seed) -> Result<Cause> {
+    let order = Order {
+        cell: Cell::Single,
+        effects: vec![name.into()],
+        strength,
+        seed: seed.0,
+        views: None,
+        frames: None,
+        small: false,
+    };
+    let session = Session {
+        views: 0,
+        frames: 1,
+        half: None,
+        gap_m: 1.0,
+        steepest: 0.0,
+        region: Told::Nothing,
+        reference_m: None,
+        conditions: false,
+    };
+    let mut rng = seed.stream(&format!("rays/alone/{name}"));
+    cause(name, &order, unit, &session, seed, &mut rng)
+}

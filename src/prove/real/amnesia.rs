@@ -1,0 +1,71 @@
+//! A term that a real recording needs is struck from its model.
+
+use rand::Rng;
+
+use super::full::{Found, Full};
+use crate::error::{Error, Result};
+use crate::model::NoiseModel;
+use crate::prove::{Asked, Hidden};
+use crate::rng::Stream;
+
+/// A term that gains less is not what the recording needs, nats.
+const LEAST_NATS: f64 = 50.0;
+
+/// The model without one of its terms, and what that was. `share` is that of the pixels which the
+/// set keeps.
+///
+/// # Errors
+/// When the model has no such term.
+pub(super) fn strike(
+    full: &Full,
+    asked: &Asked,
+    share: f64,
+    rng: &mut Stream,
+) -> Result<(NoiseModel, Hidden)> {
+    let least = asked.nats.unwrap_or(LEAST_NATS);
+    let wanted = |found: &Found| asked.names.iter().any(|n| *n == found.form);
+    let needed = |found: &Found| found.nats.is_none_or(|nats| nats * share >= least);
+    let choice: Vec<usize> = (0..full.terms.len())
+        .filter(|&k| {
+            if asked.names.is_empty() { needed(&full.terms[k]) } else { wanted(&full.terms[k]) }
+        })
+        .collect();
+    if choice.is_empty() {
+        let has: Vec<&str> = full.terms.iter().map(|t| t.form.as_str()).collect();
+        return Err(Error::Argument {
+            what: format!(
+                "{}: no term to strike; its model holds {}",
+                full.recording.root.display(),
+                has.join(", ")
+            ),
+            remedy: "name one of these, or ask for fewer nats",
+        });
+    }
+    let k = choice[rng.random_range(0..choice.len())];
+    let mut model = full.model.clone();
+    model.effects.remove(k);
+    Ok((model, hidden(&full.terms[k], share)))
+}
+
+fn hidden(found: &Found, share: f64) -> Hidden {
+    Hidden {
+        names: found.names.clone(),
+        form: found.form.clone(),
+        statistic: found.statistic.clone(),
+        axis: found.axis.clone(),
+        also: beside(&found.statistic, &found.axis),
+        interval: Some(found.interval),
+        parameters: found.parameters.clone(),
+        nats: found.nats.map(|n| n * share),
+    }
+}
+
+/// A pattern of the picture shows on all the picture's axes.
+fn beside(statistic: &str, axis: &str) -> Vec<String> {
+    let also: &[&str] = match (statistic, axis) {
+        ("bias", "pixel") => &["radius", "column", "row"],
+        ("bias", "radius") => &["pixel"],
+        _ => &[],
+    };
+    also.iter().map(ToString::to_string).collect()
+}

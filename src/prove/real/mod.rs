@@ -1,0 +1,160 @@
+//! Recordings that a real sensor took, with something struck from their model, with something added
+//! to them, or with nothing done to them at all.
+//!
+//! What is hidden here cannot be known but by the tool itself: the *full model* of a recording is
+//! what calibration and diagnosis find in it, asked again until they find no more. This is the one
+//! world that takes its truth from what is on trial. It asks less than the others therefore: a term
+//! that was struck must be found and named again from other views than all (amnesia); an effect of
+//! the first world, which shares no formula with the tool, must stand out from residuals that no
+//! simulator made (transplant); and one half of a recording must not contradict what was learnt of
+//! the other (halves).
+//!
+//! Nothing real is in this repository: the words come from the user's own folder of data and go to
+//! the user's own output folder.
+
+mod amnesia;
+mod change;
+mod dither;
+mod full;
+mod gain;
+mod scene;
+mod sources;
+#[cfg(test)]
+mod tests;
+mod transplant;
+mod write;
+
+pub use sources::{Source, recordings};
+
+use std::path::Path;
+use std::sync::Arc;
+
+use rand::Rng;
+use rand::seq::SliceRandom;
+use serde_json::{Value, json};
+
+use super::{Asked, Cell, Hidden, Sealed, Truth};
+use crate::error::{Error, Result};
+use crate::model::NoiseModel;
+use crate::rng::{Seed, Stream};
+use change::Graft;
+use full::{Full, full, learnt};
+
+/// Of the views that a recording has, a set takes at least and at most this share.
+const KEPT: [f64; 2] = [0.6, 0.92];
+/// A diagnosis of fewer says too little.
+const FEWEST_VIEWS: usize = 6;
+
+/// A set of real views.
+struct Real {
+    full: Arc<Full>,
+    /// Numbers of the views, ascending.
+    views: Vec<usize>,
+    model: NoiseModel,
+    graft: Option<Graft>,
+    truth: Truth,
+}
+
+/// Make the set that is asked for of a recording in `data`, by lot where there are several.
+///
+/// # Errors
+/// When there is none in `data`, or it cannot show what is asked for.
+pub fn seal(asked: &Asked, data: &Path) -> Result<Box<dyn Sealed>> {
+    let sources = sources::required(data)?;
+    let seed = Seed(asked.seed);
+    let mut rng = seed.stream("real/set");
+    let source = &sources[rng.random_range(0..sources.len())];
+    let full = full(source)?;
+    let all = full.recording.views.len();
+    if all < FEWEST_VIEWS {
+        return Err(Error::Argument {
+            what: format!("{}: {all} views of a plane", source.path.display()),
+            remedy: "real sets need a recording of at least six; better are thirty",
+        });
+    }
+    let set = match asked.cell {
+        Cell::Amnesia => {
+            let views = some(all, &mut rng);
+            let share = full.measured(&views) / full.measured(&(0..all).collect::<Vec<_>>());
+            let (model, hidden) = amnesia::strike(&full, asked, share, &mut rng)?;
+            Real::new(full, views, model, None, asked, vec![hidden])
+        }
+        Cell::Transplant => {
+            let views = some(all, &mut rng);
+            let (graft, hidden) = transplant::graft(&full, asked, &views, seed, &mut rng)?;
+            let model = full.model.clone();
+            Real::new(full, views, model, Some(graft), asked, hidden)
+        }
+        Cell::Halves => {
+            let [mine, theirs] = halves(all, &mut rng);
+            let mut other = full.recording.clone();
+            other.views = theirs.iter().map(|&k| full.recording.views[k].clone()).collect();
+            let model = learnt(&other)?;
+            Real::new(full, mine, model, None, asked, Vec::new())
+        }
+        other => {
+            return Err(Error::Argument {
+                what: format!("{}: real recordings have no such sets", json!(other)),
+                remedy: "ask for amnesia, transplant or halves",
+            });
+        }
+    };
+    Ok(Box::new(set))
+}
+
+/// Views by lot, ascending.
+fn some(all: usize, rng: &mut Stream) -> Vec<usize> {
+    let [least, most] = KEPT.map(|share| (share * all as f64).round() as usize);
+    let least = least.max(FEWEST_VIEWS).min(all);
+    let count = rng.random_range(least..=most.max(least));
+    dealt(all, rng, count)[0].clone()
+}
+
+/// All views, dealt to two.
+fn halves(all: usize, rng: &mut Stream) -> [Vec<usize>; 2] {
+    dealt(all, rng, all / 2)
+}
+
+fn dealt(all: usize, rng: &mut Stream, count: usize) -> [Vec<usize>; 2] {
+    let mut numbers: Vec<usize> = (0..all).collect();
+    numbers.shuffle(rng);
+    let mut rest = numbers.split_off(count);
+    numbers.sort_unstable();
+    rest.sort_unstable();
+    [numbers, rest]
+}
+
+impl Real {
+    fn new(
+        full: Arc<Full>,
+        views: Vec<usize>,
+        model: NoiseModel,
+        graft: Option<Graft>,
+        asked: &Asked,
+        hidden: Vec<Hidden>,
+    ) -> Self {
+        let base = base(&full, &views, &model);
+        Real { full, views, model, graft, truth: Truth { asked: asked.clone(), hidden, base } }
+    }
+}
+
+fn base(full: &Full, views: &[usize], model: &NoiseModel) -> Value {
+    let names: Vec<&str> = views.iter().map(|&k| full.recording.views[k].name.as_str()).collect();
+    let known: Vec<&str> = model.effects.iter().map(|e| e.id.as_str()).collect();
+    json!({
+        "recording": full.recording.root.file_name().unwrap_or_default().to_string_lossy(),
+        "sensor": full.recording.sensor.name,
+        "views": names,
+        "known": known,
+    })
+}
+
+impl Sealed for Real {
+    fn truth(&self) -> Truth {
+        self.truth.clone()
+    }
+
+    fn write(&self, folder: &Path) -> Result<()> {
+        write::write(self, folder)
+    }
+}
