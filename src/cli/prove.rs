@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use kinoise::prove::{CheckOptions, Trial, check, prove};
+use kinoise::prove::{CheckOptions, Trial, check, examine_all, prove};
 
 use super::common::{Bar, Global, say};
 use super::prove_words;
@@ -67,7 +67,7 @@ fn trial(
         workers: global.workers(),
         program,
         limit: Duration::from_secs(arguments.limit),
-        examine: None,
+        examine: Some(examine_all),
     };
     let bars = Bars::default();
     let proof = prove(&trial, &|what, done, all| bars.step(what, done, all))?;

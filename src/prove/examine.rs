@@ -26,3 +26,11 @@ pub struct Examination {
 /// Who examines: the opened set, its folder as the solver had it, and the model that the diagnosis
 /// wrote.
 pub type Examine = fn(&dyn Sealed, &Path, &NoiseModel) -> Result<Examination>;
+
+/// Our model and all baselines on one set, by fresh views where its world can give such.
+///
+/// # Errors
+/// When the recording cannot be read, or a prediction does not fit the views.
+pub fn examine_all(sealed: &dyn Sealed, folder: &Path, found: &NoiseModel) -> Result<Examination> {
+    super::gain::examine_and_name(&sealed.exam(), folder, found, true)
+}

@@ -26,7 +26,7 @@ pub mod worlds;
 
 pub use check::{CheckOptions, Checked, check};
 pub use confine::confine;
-pub use examine::{Examination, Examine, OUR_METHOD};
+pub use examine::{Examination, Examine, OUR_METHOD, examine_all};
 pub use gains::{Gain, Gains, Method};
 pub use judge::*;
 pub use plan::{Planned, plan};

@@ -24,21 +24,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::baselines::{self, Tiles};
+use super::examine::{Examination, OUR_METHOD};
 use super::question::ExamView;
-use super::{Gain, Gains, Method};
+use super::{Gains, Method};
 use crate::error::Result;
 use crate::model::NoiseModel;
-
-/// By what name the diagnosis stands among the methods.
-pub const DIAGNOSIS: &str = "kinoise";
-
-/// What an examination gives, and what those baselines that know names found.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Examined {
-    pub gains: Gains,
-    /// Ids of the catalogue by baseline.
-    pub names: BTreeMap<String, Vec<String>>,
-}
 
 /// Examine the model that was `found` from the recording in `folder` (`recording/` beside
 /// `model.json` or `simulated/`), and the baselines on the same recording when asked for.
@@ -51,7 +41,7 @@ pub fn examine(
     found: &NoiseModel,
     baselines: bool,
 ) -> Result<Gains> {
-    Ok(examine_and_name(views, folder, found, baselines)?.gains)
+    Ok(examine_and_name(views, folder, found, baselines)?.gains.unwrap_or_default())
 }
 
 /// As [`examine`], with the names; without views there are names alone.
@@ -63,16 +53,16 @@ pub fn examine_and_name(
     folder: &Path,
     found: &NoiseModel,
     baselines: bool,
-) -> Result<Examined> {
+) -> Result<Examination> {
     let file = folder.join("model.json");
     let given = file.exists().then(|| NoiseModel::read(&file)).transpose()?;
-    let mut examined = Examined::default();
-    let methods = &mut examined.gains.methods;
+    let (mut gains, mut names_of) = (Gains::default(), BTreeMap::new());
+    let methods = &mut gains.methods;
     methods.insert(NONE.into(), Method::default());
     if let Some(view) = views.first() {
         let predictor = ModelPredictor::beyond(given.as_ref(), found, &view.sensor)?;
         let gain = gain_of(views, &predictor)?;
-        methods.insert(DIAGNOSIS.into(), Method { gain, parameters: predictor.parameters() });
+        methods.insert(OUR_METHOD.into(), Method { gain, parameters: predictor.parameters() });
     }
     if baselines {
         let tiles = Tiles::of_folder(folder, given.as_ref().unwrap_or(found))?;
@@ -82,10 +72,11 @@ pub fn examine_and_name(
             let name = baseline.name().to_string();
             methods.insert(name.clone(), Method { gain, parameters: learnt.parameters });
             if let Some(names) = learnt.names {
-                examined.names.insert(name, names);
+                names_of.insert(name, names);
             }
         }
     }
-    examined.gains.oracle = gain_of(views, &Oracle)?;
-    Ok(examined)
+    gains.oracle = gain_of(views, &Oracle)?;
+    let gains = (!views.is_empty()).then_some(gains);
+    Ok(Examination { gains, names: names_of })
 }

@@ -2,7 +2,6 @@
 
 use super::choices::cause;
 use super::poses::{Session, Told};
-use super::sets::{Cell, Order};
 use super::{Cause, Unit};
 use crate::error::Result;
 use crate::rng::Seed;
@@ -15,15 +14,6 @@ pub(in crate::prove) use super::kernels::{Window, fresh, white};
 /// # Errors
 /// When there is no such cause.
 pub(in crate::prove) fn alone(name: &str, strength: f64, unit: &Unit, seed: Seed) -> Result<Cause> {
-    let order = Order {
-        cell: Cell::Single,
-        effects: vec![name.into()],
-        strength,
-        seed: seed.0,
-        views: None,
-        frames: None,
-        small: false,
-    };
     let session = Session {
         views: 0,
         frames: 1,
@@ -35,5 +25,5 @@ pub(in crate::prove) fn alone(name: &str, strength: f64, unit: &Unit, seed: Seed
         conditions: false,
     };
     let mut rng = seed.stream(&format!("rays/alone/{name}"));
-    cause(name, &order, unit, &session, seed, &mut rng)
+    cause(name, [strength, strength], unit, &session, seed, &mut rng)
 }

@@ -38,9 +38,9 @@ pub use geometry::{Board, Site, Stage};
 pub use outside::OUTSIDE;
 pub use sealed::seal;
 pub use sets::{Order, Set};
-pub use trace::Trace;
 #[cfg(test)]
 pub(super) use shoot::Still;
+pub use trace::Trace;
 pub use write::write;
 
 pub use super::question::Cell;

@@ -68,7 +68,13 @@ impl<'a> Scene<'a> {
     }
 
     pub fn facts(&self) -> Facts<'_> {
-        Facts { stage: &self.stage, session_s: self.session_s, lux: 0.0, temperature_c: 22.0 }
+        Facts {
+            view: 0,
+            stage: &self.stage,
+            session_s: self.session_s,
+            lux: 0.0,
+            temperature_c: 22.0,
+        }
     }
 
     /// Pixel `i`: on the plane, or on something else at depth `beside`, m.
