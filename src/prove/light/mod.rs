@@ -105,8 +105,8 @@ impl Sealed for Light {
     }
 
     fn write(&self, folder: &Path) -> Result<()> {
-        self.recording.write(&folder.join("recording"), &|_, _| ())?;
-        self.simulated.write(&folder.join("simulated"), &|_, _| ()).map(drop)
+        self.recording.write_quickly(&folder.join("recording"), &|_, _| ())?;
+        self.simulated.write_quickly(&folder.join("simulated"), &|_, _| ()).map(drop)
     }
 }
 

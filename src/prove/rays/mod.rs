@@ -30,6 +30,7 @@ mod tests_nats;
 #[cfg(test)]
 pub(super) mod tests_sealed;
 mod trace;
+mod weigh;
 mod write;
 
 pub use cameras::Unit;

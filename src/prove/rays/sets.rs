@@ -7,10 +7,9 @@ use super::causes_bias::lot;
 use super::choices::{age, cause, names, session, window, words};
 use super::eye::World;
 use super::gate::Gate;
-use super::ground::{Ground, Repeats};
-use super::nats::strength_for;
 use super::poses::{Plan, Session};
-use super::{Cause, Cell, Trace, Unit};
+use super::weigh::Concealed;
+use super::{Cause, Cell, Unit};
 use crate::error::Result;
 use crate::io::sha256_hex;
 use crate::model::Effect;
@@ -28,17 +27,6 @@ pub struct Order {
     pub views: Option<usize>,
     pub frames: Option<usize>,
     pub small: bool,
-}
-
-/// A cause that the model does not know.
-#[derive(Debug, Clone)]
-pub(super) struct Concealed {
-    pub name: String,
-    /// What it is drawn from, so that it can be drawn again at another strength.
-    start: Stream,
-    pub strength: f64,
-    /// What knowing of it is worth; `None` where that was not asked or cannot be said.
-    pub nats: Option<f64>,
 }
 
 /// A recording to be taken, and its sealed truth.
@@ -63,7 +51,7 @@ pub struct Set {
     pub(super) session: Session,
     /// One for each cause after the known; the ageing of the unit, where that is all.
     pub(super) concealed: Vec<Concealed>,
-    gate: Option<Gate>,
+    pub(super) gate: Option<Gate>,
 }
 
 impl Set {
@@ -149,86 +137,6 @@ impl Set {
             printed: self.printed,
             edged: self.causes.iter().any(|c| c.label.axis == "edge-distance"),
         }
-    }
-
-    /// The `k`th concealed cause as it would be at another strength.
-    fn at(&self, k: usize, strength: f64) -> Result<Cause> {
-        let Concealed { name, start, .. } = &self.concealed[k];
-        let strengths = [strength, strength.min(1.0)];
-        let cause =
-            cause(name, strengths, &self.unit, &self.session, self.seed, &mut start.clone())?;
-        match &self.gate {
-            Some(gate) => gate.confine(cause),
-            None => Ok(cause),
-        }
-    }
-
-    /// The described unit, so much older.
-    fn aged(&self, strength: f64) -> Unit {
-        let mut unit = self.described.clone();
-        age(&mut unit, strength, &mut self.concealed[0].start.clone());
-        unit
-    }
-
-    /// Give every concealed cause the strength at which knowing of it is worth `wanted` nats; where
-    /// nothing is wanted, say what it is worth.
-    ///
-    /// # Errors
-    /// Those of [`Set::draw`].
-    pub(super) fn weigh(&mut self, wanted: Option<f64>) -> Result<()> {
-        if self.order.cell == Cell::Drift {
-            return self.weigh_age(wanted);
-        }
-        let mut ground = Ground::of(self);
-        let mut done = Vec::new();
-        // Whether neighbours err together counts for all others.
-        let mut turns: Vec<usize> = (0..self.concealed.len()).collect();
-        let windowed = |k: &usize| matches!(self.concealed_cause(*k).trace, Trace::Window { .. });
-        turns.sort_by_key(|k| !windowed(k));
-        for k in turns {
-            let cause = self.at(k, self.concealed[k].strength)?;
-            let mut told = (self.concealed[k].strength, ground.nats(&cause));
-            if let (Some(wanted), Some(_)) = (wanted, told.1) {
-                let nats = |s| Ok(ground.nats(&self.at(k, s)?).unwrap_or(0.0));
-                let (s, got) = strength_for(wanted, nats)?;
-                told = (s, Some(got));
-            }
-            let cause = self.at(k, told.0)?;
-            if matches!(cause.trace, Trace::Window { .. }) {
-                ground.repeats = Repeats::of([&cause]);
-            }
-            done.push((k, told, cause));
-        }
-        for (k, (strength, nats), cause) in done {
-            let (known, concealed) = (self.known_causes, &mut self.concealed[k]);
-            (concealed.strength, concealed.nats) = (strength, nats);
-            self.causes[known + k] = cause;
-        }
-        Ok(())
-    }
-
-    /// Strength and nats of every concealed cause; NaN where that cannot be said.
-    pub fn told(&self) -> Vec<(f64, f64)> {
-        self.concealed.iter().map(|c| (c.strength, c.nats.unwrap_or(f64::NAN))).collect()
-    }
-
-    fn concealed_cause(&self, k: usize) -> &Cause {
-        &self.causes[self.known_causes + k]
-    }
-
-    fn weigh_age(&mut self, wanted: Option<f64>) -> Result<()> {
-        let ground = Ground::of(self);
-        let nats = |s| {
-            let unit = self.aged(s);
-            Ok(ground.nats_of_age(&|z, theta| unit.sigma(z, theta)))
-        };
-        let (strength, got) = match wanted {
-            Some(wanted) => strength_for(wanted, nats)?,
-            None => (self.order.strength, nats(self.order.strength)?),
-        };
-        self.unit = self.aged(strength);
-        (self.concealed[0].strength, self.concealed[0].nats) = (strength, Some(got));
-        Ok(())
     }
 
     /// What is sealed: the answer, and how it was made.

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::ground::Ground;
-use super::sets::Concealed;
 use super::shoot::Still;
+use super::weigh::Concealed;
 use super::{Act, Cause, Cell, Label, Set};
 use crate::prove::{Asked, World};
 use crate::rng::Seed;
@@ -153,7 +153,7 @@ fn what_is_asked_is_reached() {
 
 #[test]
 fn strengths_are_found_where_they_are_hidden() {
-    use super::nats::strength_for;
+    use super::weigh::strength_for;
     let square = |s: f64| Ok::<_, ()>(700.0 * s * s);
     let (s, got) = strength_for(50.0, square).unwrap();
     assert!((got / 50.0 - 1.0).abs() < 0.02 && (s - (50.0f64 / 700.0).sqrt()).abs() < 0.01);
