@@ -114,10 +114,13 @@ fn a_trial_that_was_killed_goes_on_and_ends_the_same() {
     kinoise().args(arguments(&out, "2")).assert().code(2);
 }
 
+/// Its name, what it does, what is said of it.
+type Change<'a> = (&'a str, &'a dyn Fn(&mut Value), &'a str);
+
 #[test]
 fn whatever_is_changed_afterwards_is_found_and_named() {
     let name = Proof::read(finished()).unwrap().sets[1].name.clone();
-    let changes: [(&str, &dyn Fn(&mut Value), &str); 6] = [
+    let changes: [Change<'_>; 6] = [
         ("truth", &|p| p["sets"][1]["truth"]["base"] = json!("another"), "salt and truth"),
         ("salt", &|p| p["sets"][1]["salt"] = json!("00"), "salt and truth"),
         ("verdict", &|p| p["sets"][1]["verdict"]["verdict"] = json!("inconclusive"), "the verdict"),

@@ -1,6 +1,7 @@
 //! The judge: from a truth and a verdict to marks, from all marks to scores. Pure functions; nothing
 //! here looks at a recording, and nothing was changed after a seal was opened (`judge_sha256`).
 
+mod case;
 mod certainty;
 mod endpoints;
 mod learnt;
@@ -17,7 +18,8 @@ pub use marks::{Marks, Names, ParameterMark, Stated, mark};
 pub use scores::{Judged, Rate, Scores, scores};
 
 /// What is hashed into the seal.
-pub const JUDGE_SOURCE: [(&str, &str); 8] = [
+pub const JUDGE_SOURCE: [(&str, &str); 9] = [
+    ("judge/case.rs", include_str!("case.rs")),
     ("judge/certainty.rs", include_str!("certainty.rs")),
     ("judge/endpoints.rs", include_str!("endpoints.rs")),
     ("judge/learnt.rs", include_str!("learnt.rs")),
