@@ -10,6 +10,8 @@ use crate::rng::Stream;
 
 /// A term that gains less is not what the recording needs, nats.
 const LEAST_NATS: f64 = 50.0;
+/// Terms without a name are told of by where they are only: one set in so many may strike one.
+const NAMELESS_EVERY: u32 = 5;
 
 /// The model without one of its terms, and what that was. `share` is that of the pixels which the
 /// set keeps.
@@ -25,11 +27,14 @@ pub(super) fn strike(
     let least = asked.nats.unwrap_or(LEAST_NATS);
     let wanted = |found: &Found| asked.names.iter().any(|n| *n == found.form);
     let needed = |found: &Found| found.nats.is_none_or(|nats| nats * share >= least);
-    let choice: Vec<usize> = (0..full.terms.len())
-        .filter(|&k| {
-            if asked.names.is_empty() { needed(&full.terms[k]) } else { wanted(&full.terms[k]) }
-        })
-        .collect();
+    let those = |fits: &dyn Fn(&Found) -> bool| -> Vec<usize> {
+        (0..full.terms.len()).filter(|&k| fits(&full.terms[k])).collect()
+    };
+    let mut choice = those(&|f| if asked.names.is_empty() { needed(f) } else { wanted(f) });
+    if asked.names.is_empty() && rng.random_range(0..NAMELESS_EVERY) > 0 {
+        let named = those(&|f| needed(f) && !f.names.is_empty());
+        choice = if named.is_empty() { choice } else { named };
+    }
     if choice.is_empty() {
         let has: Vec<&str> = full.terms.iter().map(|t| t.form.as_str()).collect();
         return Err(Error::Argument {

@@ -2,7 +2,7 @@
 
 use rand::Rng;
 
-use super::dither::fractions;
+use super::dither::{Words, places};
 use super::scene::Scene;
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, Frame};
@@ -82,8 +82,9 @@ impl Graft {
         let code = scene.camera.sensor.code;
         let fb = scene.camera.disparity_px_m();
         let valid: Vec<bool> = frame.words.iter().map(|&w| code.metres(w).is_some()).collect();
-        let mut rng = self.stream("step", clock);
-        let places = fractions(frame, &valid, &mut rng);
+        let off = off(scene, target, frame, &valid);
+        let words = Words { frame, valid: &valid, off: &off };
+        let places = places(&words, &mut self.stream("step", clock));
         let noise = self.noise(clock, frame.words.len());
         let trembling = white(frame.words.len(), self.stream("tremble", clock));
         let tails = self.tails(scene, target, frame, &places, clock);
@@ -180,6 +181,31 @@ impl Graft {
         code.word(z)
     }
 }
+
+/// From what the full model expects on the plane, steps of the word; NaN beside it.
+fn off(scene: &Scene<'_>, target: &[bool], frame: &Frame, valid: &[bool]) -> Vec<f32> {
+    let code = scene.camera.sensor.code;
+    let fb = scene.camera.disparity_px_m();
+    let mut row = Vec::new();
+    let mut at = |i: usize| {
+        let site = scene.site(i, None);
+        let d = site.disparity + scene.expected(i, &site, &mut row)[0];
+        let expected = match code {
+            DepthCode::Metric { units_per_metre, .. } => fb / d * units_per_metre,
+            DepthCode::Disparity { offset, slope, .. } => (d / fb - offset) / slope,
+        };
+        (f64::from(frame.words[i]) - expected) as f32
+    };
+    let fits = |i: &usize| valid[*i] && target[*i];
+    let mut off = vec![f32::NAN; valid.len()];
+    (0..valid.len()).filter(fits).for_each(|i| off[i] = at(i));
+    // What strays far says nothing of rounding.
+    off.iter_mut().for_each(|x| *x = if x.abs() < FAR { *x } else { f32::NAN });
+    off
+}
+
+/// Steps.
+const FAR: f32 = 50.0;
 
 fn no_word(code: &DepthCode) -> u16 {
     match code {

@@ -60,6 +60,12 @@ struct Real {
 /// # Errors
 /// When there is none in `data`, or it cannot show what is asked for.
 pub fn seal(asked: &Asked, data: &Path) -> Result<Box<dyn Sealed>> {
+    if !matches!(asked.cell, Cell::Amnesia | Cell::Transplant | Cell::Halves) {
+        return Err(Error::Argument {
+            what: format!("{}: real recordings have no such sets", json!(asked.cell)),
+            remedy: "ask for amnesia, transplant or halves",
+        });
+    }
     let sources = sources::required(data)?;
     let seed = Seed(asked.seed);
     let mut rng = seed.stream("real/set");
@@ -85,18 +91,12 @@ pub fn seal(asked: &Asked, data: &Path) -> Result<Box<dyn Sealed>> {
             let model = full.model.clone();
             Real::new(full, views, model, Some(graft), asked, hidden)
         }
-        Cell::Halves => {
+        _ => {
             let [mine, theirs] = halves(all, &mut rng);
             let mut other = full.recording.clone();
             other.views = theirs.iter().map(|&k| full.recording.views[k].clone()).collect();
             let model = learnt(&other)?;
             Real::new(full, mine, model, None, asked, Vec::new())
-        }
-        other => {
-            return Err(Error::Argument {
-                what: format!("{}: real recordings have no such sets", json!(other)),
-                remedy: "ask for amnesia, transplant or halves",
-            });
         }
     };
     Ok(Box::new(set))
