@@ -144,7 +144,7 @@ fn the_truth_reaches_the_oracle_and_nothing_beats_it() {
     let (oracle, knows) = (gain_of(&views, &Oracle).unwrap(), gain_of(&views, &Knows).unwrap());
     assert!(oracle.within > 100.0);
     assert!((knows.within / oracle.within - 1.0).abs() < 1e-4, "{knows:?} {oracle:?}");
-    assert_eq!(gain_of(&views, &Unaware).unwrap(), Gain::default());
+    assert_eq!(gain_of(&views, &Unaware).unwrap(), crate::prove::Gain::default());
     // Wrong corrections cost: the bias taken out of a view that has none.
     let clean = [view(&plane, &none, &one)];
     assert!(gain_of(&clean, &Knows).unwrap().within < -100.0);
@@ -162,7 +162,7 @@ fn views_are_counted_apart_and_holes_not_at_all() {
     let gain = gain_of(&views, &Oracle).unwrap();
     let must = 1000.0 * (1.5 - 2f64.ln());
     assert!((gain.within - 0.5 * must).abs() < 0.01 && (gain.beyond - must).abs() < 0.01);
-    assert_eq!(gain_of(&[], &Oracle).unwrap(), Gain::default());
+    assert_eq!(gain_of(&[], &Oracle).unwrap(), crate::prove::Gain::default());
 }
 
 /// A number that is missing is an error, not a free pass.

@@ -97,7 +97,7 @@ pub fn scores(sets: &[Judged<'_>]) -> Scores {
         by_world_and_cell: grouped(sets, |t| {
             Some(format!("{}/{}", word(t.asked.world), word(t.asked.cell)))
         }),
-        by_nats: grouped(&singles, |t| level(t).map(|l| format!("{:03}", l as u32))),
+        by_nats: grouped(&singles, |t| level(t).map(|l| format!("{:04}", l as u32))),
         by_effect: grouped(&singles, |t| Some(hidden_name(t))),
         confusion: confusion(&singles),
         names_f1: names_f1(sets),
@@ -113,7 +113,7 @@ pub fn scores(sets: &[Judged<'_>]) -> Scores {
 }
 
 /// Strengths as they are ordered, nats.
-const LEVELS: [f64; 4] = [5.0, 15.0, 50.0, 150.0];
+const LEVELS: [f64; 6] = [5.0, 15.0, 50.0, 150.0, 500.0, 5000.0];
 
 /// What the weakest hidden cause is worth, as the nearest of the strengths that are ordered; what
 /// its world says it reached, else what was ordered.

@@ -19,7 +19,7 @@ use crate::io::{Assumed, FrameSource, open};
 use crate::model::{Effect, Form, NoiseModel, SigmaModel};
 use crate::plane::Plane;
 use crate::prove::rays::borrow::{Window, fresh};
-use crate::prove::rays::{Act, Cause, Clock, Label};
+use crate::prove::rays::{Act, Cause, Clock, Label, Trace};
 use crate::prove::{Asked, Cell, World};
 use crate::rng::Seed;
 use crate::scene::Target;
@@ -193,7 +193,7 @@ fn cause(statistic: &'static str, act: Act) -> Cause {
         interval: None,
         parameters: Map::new(),
     };
-    Cause { label, act }
+    Cause { label, act, trace: Trace::Field }
 }
 
 fn unit() -> (crate::view::Sensor, NoiseModel) {
