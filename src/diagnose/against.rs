@@ -11,7 +11,7 @@ use super::known::Known;
 use super::lattice::Lattice;
 use super::layers::{BLOCK_TILES, Survey};
 use super::missing::{MissingFinding, missing};
-use super::noise::{Hanging, hanging, tails};
+use super::noise::{Hanging, hanging, still_level, tails};
 use super::partners::{Pose, partners};
 use super::pixels::{common, fixed_px2, measure_tails};
 use super::reading::read;
@@ -40,6 +40,33 @@ pub struct Baseline {
     heavy: bool,
     /// What was odd, in words.
     pub remarks: Vec<String>,
+}
+
+/// Gross errors make the noise of one view in two runs differ, in log variance.
+const ANOTHER_RUN: f64 = 0.15;
+
+/// Tails of two recordings are no news within this factor: gross errors come in clumps.
+const TAILS_ALIKE: f64 = 3.0;
+
+/// How much more the blocks of a view scatter about a plane in the picture than Gaussian noise
+/// would make them: the square of a ratio, at least 1.
+fn scatter(view: &ViewData) -> f64 {
+    let n = view.places.len();
+    if n < 6 {
+        return 1.0;
+    }
+    let root: Vec<f64> = view.weight.iter().map(|w| w.sqrt()).collect();
+    let x = nalgebra::DMatrix::from_fn(n, 3, |i, k| {
+        root[i] * [1.0, view.places[i].x, view.places[i].y][k]
+    });
+    let y = nalgebra::DVector::from_fn(n, |i, _| root[i] * view.response[i]);
+    let svd = x.clone().svd(true, true);
+    let tiny = 1e-6 * svd.singular_values.max();
+    let free = (n - svd.rank(tiny)) as f64;
+    let Ok(beta) = svd.solve(&y, tiny) else { return 1.0 };
+    let chi2 = (&y - x * beta).norm_squared();
+    // Four standard deviations beyond what chance makes.
+    if chi2 > free + 4.0 * (2.0 * free).sqrt() { chi2 / free } else { 1.0 }
 }
 
 /// Numbers of two cameras that differ by less are the same, as a share.
@@ -189,14 +216,17 @@ impl Baseline {
         true
     }
 
-    /// The simulated variances are as uncertain as the real ones.
+    /// The simulated variances are as uncertain as the real ones, and both more so than a
+    /// Gaussian's where gross errors come in clumps.
     pub fn doubt(&self, survey: &mut Survey) {
+        survey.tolerance = ANOTHER_RUN;
         let (ours, theirs) = (survey.variance_data(), self.survey.variance_data());
         let mean = |v: &ViewData| v.weight.iter().sum::<f64>() / v.weight.len().max(1) as f64;
         for (view, (ours, theirs)) in survey.views.iter_mut().zip(ours.iter().zip(&theirs)) {
             let (w, t) = (mean(ours), mean(theirs));
             if w + t > 0.0 {
-                view.frames *= t / (w + t);
+                let clumps = scatter(ours).max(scatter(theirs));
+                view.frames *= t / (w + t) / clumps;
             }
         }
     }
@@ -233,7 +263,12 @@ impl Baseline {
         known.learn("spatial-correlation", "length_px", windows.exp());
         known.learn("fixed-pattern-noise", "sigma_px", fixed.max(0.0).sqrt());
         known.learn("row-noise", "sigma_px", rows.max(0.0).sqrt());
+        let still = still_level(&self.structure).filter(|share| *share > 0.0);
+        if let Some(share) = still {
+            known.learn("frozen-noise", "fraction", share);
+        }
         let once = ["frozen-noise", "temporal-correlation", "frame-jitter", "target-motion"];
+        let once = &once[usize::from(still.is_some())..];
         for hang in &self.hangs {
             for id in once.iter().filter(|id| hang.families.contains(id)) {
                 for (name, value) in &hang.parameters {
@@ -256,6 +291,16 @@ impl Baseline {
         if alike(self.lattice.depth_step_m, real.depth_step_m) {
             known.learn("depth-rounding", "step_m", 0.0);
         }
+    }
+
+    /// Are the recording's tails no heavier than those of the simulation, by much?
+    pub fn tails_alike(&self, real: &[Structure]) -> bool {
+        let mean = |all: &[Structure]| {
+            let looked: Vec<f64> =
+                all.iter().filter(|s| s.tail_pixels > 0.0).map(|s| s.tail).collect();
+            looked.iter().sum::<f64>() / looked.len().max(1) as f64
+        };
+        mean(real) < TAILS_ALIKE * mean(&self.structure)
     }
 
     /// Is as much lost in the simulated views, for the same reason or on the whole?

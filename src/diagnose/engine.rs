@@ -253,7 +253,8 @@ impl<'a> Case<'a> {
         let outcome = self.survey.search_variance(sigma, camera, level, self.options.seed);
         let terms = terms_of(&outcome, Statistic::Variance);
         measure_tails(&mut structure, &self.fields, &mean.px, &terms, &self.survey, &self.bench);
-        let tails = tails(&structure, &self.known);
+        let alike = self.baseline.as_ref().is_some_and(|b| b.tails_alike(&structure));
+        let tails = tails(&structure, &self.known).filter(|_| !alike);
         Scatter { lattice, hangs, tails, outcome }
     }
 

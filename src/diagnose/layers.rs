@@ -23,6 +23,8 @@ pub struct Survey {
     /// Variance of what each pixel errs by in every view alike, px^2.
     pub fixed_px2: f64,
     pub light: Light,
+    /// How well the size of the noise is known from view to view beforehand, in log variance.
+    pub tolerance: f64,
 }
 
 /// How infrared amplitudes become the light of surfaces.
@@ -87,7 +89,7 @@ impl Survey {
             .collect();
         let light = relative_light(&mut views);
         let reach = Reach::of(views.iter().flat_map(|v| v.tiles.iter()));
-        Survey { views, reach, fixed_px2: 0.0, light }
+        Survey { views, reach, fixed_px2: 0.0, light, tolerance: MODEL_TOLERANCE }
     }
 
     /// Root of the weighted harmonic mean of the model's variance, px.
@@ -135,7 +137,13 @@ impl Survey {
     pub fn subset(&self, which: &[usize]) -> Survey {
         let views: Vec<SurveyedView> = which.iter().map(|&n| self.views[n].clone()).collect();
         let reach = Reach::of(views.iter().flat_map(|v| v.tiles.iter()));
-        Survey { views, reach, fixed_px2: self.fixed_px2, light: self.light }
+        Survey {
+            views,
+            reach,
+            fixed_px2: self.fixed_px2,
+            light: self.light,
+            tolerance: self.tolerance,
+        }
     }
 
     /// Noise is what changes from frame to frame; `common` is the correlation of two frames of a
@@ -183,7 +191,7 @@ impl Survey {
     /// Log variance over the model's, block by block.
     pub fn variance_data(&self) -> Vec<ViewData> {
         let blocks: Vec<Blocks> = self.views.par_iter().map(Blocks::of).collect();
-        let scatter = view_scatter(&blocks);
+        let scatter = view_scatter(&blocks, self.tolerance);
         blocks.into_iter().map(|b| b.data(scatter)).collect()
     }
 
@@ -431,8 +439,8 @@ const MODEL_TOLERANCE: f64 = 0.04;
 /// Variance of the views' own levels beyond what their samples explain (a moment estimate after
 /// DerSimonian and Laird), about laws of the distance and of the tilt: what a law explains is no
 /// scatter. Enlarged for the laws that so few views have to settle.
-fn view_scatter(blocks: &[Blocks]) -> f64 {
-    let floor = MODEL_TOLERANCE * MODEL_TOLERANCE;
+fn view_scatter(blocks: &[Blocks], tolerance: f64) -> f64 {
+    let floor = tolerance * tolerance;
     let levels: Vec<(&Place, f64, f64)> = blocks
         .iter()
         .filter_map(|b| b.level().map(|(level, variance)| (&b.places[0], level, variance)))

@@ -134,18 +134,9 @@ fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
     let fixed_share = fixed_px2 / variance.max(1e-12);
     let frozen_known = known.parameter("frozen-noise", "fraction").unwrap_or(0.0);
     let rho_known = known.parameter("temporal-correlation", "rho").unwrap_or(0.0);
-    // What stands still in a view: the part that all lags share, without what all views share.
     let last = if views.iter().any(|s| s.lagged[2].is_some()) { 2 } else { 1 };
-    let static_part = |s: &Structure| -> Option<f64> {
-        let (c1, c2) = (s.lagged[0]?, s.lagged[1]?);
-        let c3 = s.lagged[2].unwrap_or(c2 * c2 / c1.max(1e-6));
-        Some(
-            still_share([c1, c2, c3], s.lagged[2].is_some())
-                - fixed_px2 / s.variance_px2.max(1e-12),
-        )
-    };
     let falling = Mean::of(views.iter().filter_map(|s| Some(s.lagged[0]? - s.lagged[last]?)));
-    let still = Mean::of(views.iter().filter_map(static_part));
+    let still = Mean::of(views.iter().filter_map(|s| still_part(s, fixed_px2)));
     let Some((falling, still)) = falling.zip(still) else {
         // Two frames a view: still or slowly changing, nobody can say.
         let p = first.p_above(fixed_share + frozen_known + rho_known);
@@ -195,6 +186,27 @@ fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
         });
     }
     found
+}
+
+/// What stands still in a view: the part that all lags share, without what all views share.
+fn still_part(s: &Structure, fixed_px2: f64) -> Option<f64> {
+    let (c1, c2) = (s.lagged[0]?, s.lagged[1]?);
+    let c3 = s.lagged[2].unwrap_or(c2 * c2 / c1.max(1e-6));
+    let share = still_share([c1, c2, c3], s.lagged[2].is_some());
+    Some(share - fixed_px2 / s.variance_px2.max(1e-12))
+}
+
+/// Share of the noise that stands still within a view, by the views' mean correlations; `None` with
+/// too few frames.
+pub fn still_level(views: &[Structure]) -> Option<f64> {
+    let mean = |of: &dyn Fn(&Structure) -> Option<f64>| {
+        Mean::of(views.iter().filter_map(of)).map(|m| m.value)
+    };
+    let (c1, c2, c3) = (mean(&|s| s.lagged[0])?, mean(&|s| s.lagged[1])?, mean(&|s| s.lagged[2]));
+    let share = still_share([c1, c2, c3.unwrap_or(c2 * c2 / c1.max(1e-6))], c3.is_some());
+    let fixed = mean(&|s| s.fixed_px2).unwrap_or(0.0).max(0.0);
+    let variance = mean(&|s| Some(s.variance_px2)).unwrap_or(0.0);
+    Some(share - fixed / variance.max(1e-12))
 }
 
 /// The s of c_k = s + (1 - s) rho^k, from the correlations at lags one to three.
