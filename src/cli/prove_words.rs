@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use kinoise::prove::{Checked, Endpoint, Level, Proof, Rate, Scores};
 
 /// Columns of the table: the mark, its head.
-const COLUMNS: [(&str, &str); 8] = [
+const COLUMNS: [(&str, &str); 10] = [
     ("false_alarm", "alarm"),
     ("detected", "seen"),
     ("first_name", "name"),
@@ -13,7 +13,9 @@ const COLUMNS: [(&str, &str); 8] = [
     ("exact", "exact"),
     ("axis", "axis"),
     ("abstained", "abstains"),
-    ("confident_wrong", "sure, wrong"),
+    ("recalibrate", "recalib."),
+    ("nothing_claimed", "silent"),
+    ("confident_wrong", "sure+wrong"),
 ];
 
 /// A table by kind of set, and the five endpoints.
@@ -21,13 +23,13 @@ pub fn summary(proof: &Proof) -> String {
     let scores = &proof.scores;
     let mut text = format!("{:<20}", format!("{} sets", scores.sets));
     for (_, head) in COLUMNS {
-        let _ = write!(text, "{head:>12}");
+        let _ = write!(text, "{head:>11}");
     }
     for (kind, rates) in &scores.by_world_and_cell {
         let _ = write!(text, "\n{kind:<20}");
         for (mark, _) in COLUMNS {
             let cell = rates.get(mark).map_or("-".into(), |r| format!("{}/{}", r.k, r.n));
-            let _ = write!(text, "{cell:>12}");
+            let _ = write!(text, "{cell:>11}");
         }
     }
     text += "\n\nsingle causes by what they are worth:\n";
