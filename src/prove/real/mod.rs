@@ -22,6 +22,8 @@ mod sources;
 #[cfg(test)]
 mod tests;
 mod transplant;
+#[cfg(test)]
+mod word_tests;
 mod write;
 
 pub use sources::{Source, recordings};
