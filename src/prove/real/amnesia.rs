@@ -25,7 +25,7 @@ pub(super) fn strike(
     rng: &mut Stream,
 ) -> Result<(NoiseModel, Hidden)> {
     let least = asked.nats.unwrap_or(LEAST_NATS);
-    let wanted = |found: &Found| asked.names.iter().any(|n| *n == found.form);
+    let wanted = |found: &Found| asked.names.contains(&found.form);
     let needed = |found: &Found| found.nats.is_none_or(|nats| nats * share >= least);
     let those = |fits: &dyn Fn(&Found) -> bool| -> Vec<usize> {
         (0..full.terms.len()).filter(|&k| fits(&full.terms[k])).collect()

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use serde_json::{Map, Value, json};
 
+use super::FEWEST_VIEWS;
 use super::sources::Source;
 use crate::calibrate::{CalibrateOptions, measure, model_of};
 use crate::diagnose::{DiagnoseOptions, Diagnosed, Finding, Status, Verdict, diagnose};
@@ -19,7 +20,7 @@ use crate::view::Recording;
 /// What is learnt of a recording does not depend on the set it is learnt for.
 const SEED: Seed = Seed(1);
 /// What was hidden behind the first findings is found in the next round.
-const MOST_ROUNDS: usize = 4;
+const MOST_ROUNDS: usize = 2;
 
 /// A recording with a model that it does not contradict.
 pub(super) struct Full {
@@ -52,24 +53,22 @@ pub(super) struct Found {
     pub nats: Option<f64>,
 }
 
-type Shelf = Mutex<HashMap<PathBuf, Arc<Full>>>;
+/// What cannot be used says why, and is not tried again.
+type Shelf = Mutex<HashMap<PathBuf, Result<Arc<Full>, String>>>;
 
 /// The full model of `source`; worked out once in a process.
 ///
 /// # Errors
-/// When it cannot be read, or is no recording of a plane.
-pub(super) fn full(source: &Source) -> Result<Arc<Full>> {
+/// In words, when it cannot be read, is no recording of a plane, or goes on contradicting its model.
+pub(super) fn full(source: &Source) -> Result<Arc<Full>, String> {
     static SHELF: OnceLock<Shelf> = OnceLock::new();
-    let key = source.path.canonicalize().map_err(|e| Error::read(&source.path, e))?;
+    let path = &source.path;
+    let key = path.canonicalize().map_err(|e| Error::read(path, e).to_string())?;
     let shelf = SHELF.get_or_init(Shelf::default);
     // Held while one is worked out: nobody does it twice.
     let mut shelf = shelf.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(full) = shelf.get(&key) {
-        return Ok(Arc::clone(full));
-    }
-    let full = Arc::new(apart(|| learn(source.open()?))?);
-    shelf.insert(key, Arc::clone(&full));
-    Ok(full)
+    let learnt = || apart(|| learn(source.open()?)).map(Arc::new).map_err(|e| e.to_string());
+    shelf.entry(key).or_insert_with(learnt).clone()
 }
 
 /// On threads of its own: a thread that waits for its share of parallel work takes up other work
@@ -109,6 +108,13 @@ fn learn(mut recording: Recording) -> Result<Full> {
     let mut seen: HashMap<String, Seen> =
         fields.into_iter().map(|f| (f.name, Seen { plane: f.plane, pixels: f.pixels })).collect();
     recording.views.retain(|v| seen.contains_key(&v.name));
+    if recording.views.len() < FEWEST_VIEWS {
+        return Err(Error::recording(
+            &recording.root,
+            format!("{} views of a plane", recording.views.len()),
+            "real sets need six at least; better are thirty",
+        ));
+    }
     let seen: Vec<Seen> = recording.views.iter().filter_map(|v| seen.remove(&v.name)).collect();
     anonymous(&mut model);
     let mut full = Full { recording, model, terms, seen };

@@ -22,6 +22,8 @@ mod sources;
 #[cfg(test)]
 mod tests;
 mod transplant;
+#[cfg(test)]
+mod word_tests;
 mod write;
 
 pub use sources::{Source, recordings};
@@ -69,15 +71,8 @@ pub fn seal(asked: &Asked, data: &Path) -> Result<Box<dyn Sealed>> {
     let sources = sources::required(data)?;
     let seed = Seed(asked.seed);
     let mut rng = seed.stream("real/set");
-    let source = &sources[rng.random_range(0..sources.len())];
-    let full = full(source)?;
+    let full = one_of(sources, &mut rng)?;
     let all = full.recording.views.len();
-    if all < FEWEST_VIEWS {
-        return Err(Error::Argument {
-            what: format!("{}: {all} views of a plane", source.path.display()),
-            remedy: "real sets need a recording of at least six; better are thirty",
-        });
-    }
     let set = match asked.cell {
         Cell::Amnesia => {
             let views = some(all, &mut rng);
@@ -100,6 +95,22 @@ pub fn seal(asked: &Asked, data: &Path) -> Result<Box<dyn Sealed>> {
         }
     };
     Ok(Box::new(set))
+}
+
+/// By lot, of those that can be used.
+fn one_of(mut sources: Vec<Source>, rng: &mut Stream) -> Result<Arc<Full>> {
+    sources.shuffle(rng);
+    let mut whys = Vec::new();
+    for source in &sources {
+        match full(source) {
+            Ok(full) => return Ok(full),
+            Err(why) => whys.push(why),
+        }
+    }
+    Err(Error::Argument {
+        what: whys.join("; "),
+        remedy: "give a folder with another recording, or leave the real sets out",
+    })
 }
 
 /// Views by lot, ascending.
