@@ -450,7 +450,12 @@ fn view_scatter(blocks: &[Blocks], tolerance: f64) -> f64 {
         let steep = p.theta.sin().powi(2);
         [1.0, p.z.ln(), steep, steep * (2.0 * p.azimuth).cos()]
     };
-    let orders = if n >= 9 { 4 } else { 2 };
+    let orders = match n {
+        // By how much two runs differ by chance may follow any law of the distance.
+        _ if tolerance > MODEL_TOLERANCE => 1,
+        9.. => 4,
+        _ => 2,
+    };
     if n < orders + 2 {
         return floor;
     }

@@ -130,11 +130,11 @@ fn counts(sets: usize, real: bool, rng: &mut Stream) -> Vec<(&'static Share, usi
     kinds.into_iter().map(|k| k.0).zip(count).collect()
 }
 
-/// Any stretch of these covers names and strengths evenly; a quarter of the images are large.
+/// Any stretch of these covers names and strengths evenly; one image in eight is large.
 fn questions(share: &Share, count: usize, rng: &mut Stream) -> Vec<Asked> {
     let mut names: Vec<&str> = share.names.to_vec();
     names.shuffle(rng);
-    let (first, large) = (rng.random_range(0..12usize), rng.random_range(0..4usize));
+    let (first, large) = (rng.random_range(0..12usize), rng.random_range(0..8usize));
     let together = least_common_multiple(names.len().max(1), share.nats.len().max(1));
     (0..count)
         .map(|i| Asked {
@@ -148,7 +148,7 @@ fn questions(share: &Share, count: usize, rng: &mut Stream) -> Vec<Asked> {
             nats: share.nats.get((first + i + i / together) % share.nats.len().max(1)).copied(),
             seed: 0,
             // Not in step with the strengths.
-            small: (i + i / 4 + large) % 4 != 0,
+            small: (i + i / 8 + large) % 8 != 0,
         })
         .collect()
 }

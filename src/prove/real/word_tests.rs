@@ -10,7 +10,7 @@ use crate::frame::{DepthCode, Frame};
 use crate::model::{Form, NoiseModel, SigmaModel};
 use crate::plane::Plane;
 use crate::prove::rays::borrow::{Window, fresh};
-use crate::prove::rays::{Act, Cause, Clock, Label};
+use crate::prove::rays::{Act, Cause, Clock, Label, Trace};
 use crate::rng::Seed;
 use crate::simulate::kinect_v1;
 
@@ -26,7 +26,7 @@ fn cause(statistic: &'static str, act: Act) -> Cause {
         interval: None,
         parameters: Map::new(),
     };
-    Cause { label, act }
+    Cause { label, act, trace: Trace::Field }
 }
 
 fn unit() -> (crate::view::Sensor, NoiseModel) {
