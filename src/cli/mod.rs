@@ -7,7 +7,9 @@ mod demo;
 mod diagnose;
 mod diagnose_pictures;
 mod effects;
+mod evaluate;
 mod fit;
+mod map;
 mod simulate;
 mod simulate_room;
 mod words;
@@ -39,6 +41,10 @@ enum Command {
     Simulate(simulate::Arguments),
     /// Write a recording again with the model's biases taken out of the depth
     Correct(correct::Arguments),
+    /// Build a map from a sequence: trajectory, coloured points, statistics
+    Map(map::Arguments),
+    /// ATE and RPE of a trajectory, as the TUM scripts compute them
+    Evaluate(evaluate::Arguments),
     /// The catalogue of physical effects: what each does, how it shows, what it is taken for
     Effects(effects::Arguments),
     /// The whole road on bundled data
@@ -91,6 +97,8 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         Command::Diagnose(a) => diagnose::run(a, global),
         Command::Simulate(a) => simulate::run(a, global).map(|()| 0),
         Command::Correct(a) => correct::run(a, global).map(|()| 0),
+        Command::Map(a) => map::run(a, global),
+        Command::Evaluate(a) => evaluate::run(a, global).map(|()| 0),
         Command::Effects(a) => effects::run(a, global).map(|()| 0),
         Command::Demo(a) => demo::run(a, global).map(|()| 0),
     }
