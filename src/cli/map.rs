@@ -3,7 +3,10 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use kinoise::evaluate::{Delta, Evaluation, evaluate};
 use kinoise::io::OutputDir;
-use kinoise::map::{Init, Kernel, Mapped, Method, Options, Stages, Weights, map, ply};
+use kinoise::map::{
+    Init, Kernel, Mapped, Method, Options, Stages, Weights, frames_csv, map, ply,
+};
+use kinoise::report::map_page;
 use kinoise::sequence::{Sequence, open};
 use kinoise::trajectory::tum_text;
 use kinoise::{NoiseModel, Seed};
@@ -166,6 +169,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     let stats = stats(&mapped, &options, &against, seconds);
     output.write("trajectory.txt", tum_text(&mapped.trajectory()).as_bytes())?;
     output.write("map.ply", &ply(&mapped.map))?;
+    let title = format!("Map of {}", name_of(&arguments.sequence));
+    let page = map_page(&title, &mapped.map, &mapped.frames);
+    output.write("map.html", page.as_bytes())?;
+    output.write("frames.csv", frames_csv(&mapped.frames).as_bytes())?;
     output.write("stats.json", serde_json::to_string_pretty(&stats)?.as_bytes())?;
     for remark in sequence.remarks.iter().chain(&mapped.remarks) {
         say(format!("note: {remark}"));
@@ -234,6 +241,11 @@ fn stats(
         "settings": format!("{options:?}"),
         "truth": against.as_ref().and_then(|t| t.as_ref().ok()).map(super::evaluate::as_json),
     })
+}
+
+fn name_of(path: &std::path::Path) -> String {
+    let whole = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    whole.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// The most memory this process had, MB; of Linux, elsewhere null.

@@ -2,6 +2,7 @@
 
 mod calibrate;
 mod common;
+mod compare;
 mod correct;
 mod demo;
 mod diagnose;
@@ -43,6 +44,8 @@ enum Command {
     Correct(correct::Arguments),
     /// Build a map from a sequence: trajectory, coloured points, statistics
     Map(map::Arguments),
+    /// The paper's four variants of the mapper side by side: tables, figures, report
+    Compare(compare::Arguments),
     /// ATE and RPE of a trajectory, as the TUM scripts compute them
     Evaluate(evaluate::Arguments),
     /// The catalogue of physical effects: what each does, how it shows, what it is taken for
@@ -98,6 +101,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         Command::Simulate(a) => simulate::run(a, global).map(|()| 0),
         Command::Correct(a) => correct::run(a, global).map(|()| 0),
         Command::Map(a) => map::run(a, global),
+        Command::Compare(a) => compare::run(a, global).map(|()| 0),
         Command::Evaluate(a) => evaluate::run(a, global).map(|()| 0),
         Command::Effects(a) => effects::run(a, global).map(|()| 0),
         Command::Demo(a) => demo::run(a, global).map(|()| 0),

@@ -38,7 +38,7 @@ pub use options::{Init, Method, Options};
 pub use ply::ply;
 pub use point::Point;
 pub use stages::Stages;
-pub use tell::remarks;
+pub use tell::{frames_csv, remarks};
 pub use tracker::{Fate, FrameReport};
 
 use prepare::Kitchen;

@@ -69,3 +69,35 @@ fn still(frames: &[FrameReport]) -> Option<String> {
         .fold(0.0, f64::max);
     (frames.len() > 1 && far < STILL_M).then(|| "the camera never moved".to_string())
 }
+
+/// What is known of each frame, a row each: fate, standard deviations of the pose (m and rad),
+/// iterations, share of matched points, what depth does not determine.
+pub fn frames_csv(frames: &[FrameReport]) -> String {
+    let mut text = String::from(
+        "timestamp,fate,sigma_x_m,sigma_y_m,sigma_z_m,sigma_rx_rad,sigma_ry_rad,sigma_rz_rad,iterations,matched,pairs,rms_m,weakest,undetermined\n",
+    );
+    for frame in frames {
+        let fate = match &frame.fate {
+            Fate::First => "first",
+            Fate::Tracked => "tracked",
+            Fate::Lost(_) => "lost",
+        };
+        let sigma = |k: usize| {
+            frame.covariance.map(|c| format!("{:.3e}", c[(k, k)].max(0.0).sqrt())).unwrap_or_default()
+        };
+        let sigmas: Vec<String> = (0..6).map(sigma).collect();
+        let names: Vec<String> = frame.undetermined.iter().map(ToString::to_string).collect();
+        text.push_str(&format!(
+            "{:.6},{fate},{},{},{:.4},{},{:.6},{:.5},{}\n",
+            frame.stamp,
+            sigmas.join(","),
+            frame.iterations,
+            frame.matched,
+            frame.pairs,
+            frame.rms_m,
+            frame.weakest,
+            names.join("; ")
+        ));
+    }
+    text
+}
