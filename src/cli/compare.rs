@@ -53,7 +53,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     } else {
         variants.extend(past_the_paper().into_iter().filter(|v| v.name.contains("default")));
     }
-    let told = |name: &str, done: usize, all: usize| say(format!("run {} of {all}: {name}", done + 1));
+    let told =
+        |name: &str, done: usize, all: usize| say(format!("run {} of {all}: {name}", done + 1));
     let comparison =
         compare(&sequence, &model, &variants, arguments.repeats, global.seed(), &told)?;
     let text = tables(&comparison);

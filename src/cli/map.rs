@@ -3,9 +3,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use kinoise::evaluate::{Delta, Evaluation, evaluate};
 use kinoise::io::OutputDir;
-use kinoise::map::{
-    Init, Kernel, Mapped, Method, Options, Stages, Weights, frames_csv, map, ply,
-};
+use kinoise::map::{Init, Kernel, Mapped, Method, Options, Stages, Weights, frames_csv, map, ply};
 use kinoise::report::map_page;
 use kinoise::sequence::{Sequence, open};
 use kinoise::trajectory::tum_text;
@@ -41,7 +39,7 @@ pub struct Tuning {
     /// Where an alignment starts [default: motion; with --method paper: none]
     #[arg(long, value_enum)]
     init: Option<InitName>,
-    /// How outliers count [default: tukey; with --method paper: square]
+    /// How outliers count [default: huber; with --method paper: square]
     #[arg(long, value_enum)]
     kernel: Option<KernelName>,
     /// Side of a voxel in m

@@ -53,6 +53,7 @@ pub fn past_the_paper() -> Vec<Variant> {
         variant("projective", frames),
         variant("frame to map, plain", Options { weights: Weights::None, ..best }),
         variant("frame to map, square", Options { kernel: Kernel::Square, ..best }),
+        variant("frame to map, Tukey", Options { kernel: Kernel::Tukey, ..best }),
         variant("frame to map (default)", best),
         variant("frame to map, ORB start", Options { init: Init::Orb, ..best }),
     ]
@@ -148,12 +149,7 @@ pub fn compare(
     })
 }
 
-fn run(
-    sequence: &Sequence,
-    model: &NoiseModel,
-    options: &Options,
-    delta: Delta,
-) -> Result<Run> {
+fn run(sequence: &Sequence, model: &NoiseModel, options: &Options, delta: Delta) -> Result<Run> {
     let mapped = map(sequence, model, options, &|_, _| ())?;
     let trajectory = mapped.trajectory();
     let evaluation = evaluate(&sequence.truth, &trajectory, delta)?;

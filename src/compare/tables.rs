@@ -90,7 +90,8 @@ fn line(row: &Row, of: fn(&Run) -> Spread) -> String {
     let mut text = format!("{:<30}{}", row.variant.name, figures(&middle));
     if spreads.len() > 1 {
         let squares = spreads.iter().map(|s| (s.rmse - middle.rmse).powi(2)).sum::<f64>();
-        let _ = write!(text, "   ± {:.3} over {} runs", (squares / (n - 1.0)).sqrt(), spreads.len());
+        let _ =
+            write!(text, "   ± {:.3} over {} runs", (squares / (n - 1.0)).sqrt(), spreads.len());
     }
     text
 }

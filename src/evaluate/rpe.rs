@@ -48,8 +48,8 @@ pub fn relative(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Rpe> 
         }
         let to = &estimate[j];
         if let (Some(a), Some(b)) = (true_pose(from.stamp), true_pose(to.stamp)) {
-            let error = motion(&to.world_from_camera, &from.world_from_camera).inverse()
-                * motion(&b, &a);
+            let error =
+                motion(&to.world_from_camera, &from.world_from_camera).inverse() * motion(&b, &a);
             each.push((from.stamp, error.translation.vector.norm()));
             turns.push(error.rotation.angle());
         }
@@ -66,9 +66,7 @@ pub fn relative(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Rpe> 
 /// The pose at the end of the interval that begins with pose `i`.
 fn partner(estimate: &[Pose], i: usize, delta: Delta) -> usize {
     match delta {
-        Delta::Seconds(s) => {
-            nearest(estimate.len(), |k| estimate[k].stamp, estimate[i].stamp + s)
-        }
+        Delta::Seconds(s) => nearest(estimate.len(), |k| estimate[k].stamp, estimate[i].stamp + s),
         Delta::Frames(n) => nearest(estimate.len(), |k| k as f64, (i + n) as f64),
     }
 }

@@ -7,9 +7,8 @@ use super::*;
 /// The folder of real trajectories, where there is one.
 fn real() -> Option<PathBuf> {
     let data = std::env::var_os("KINOISE_DATA").map(PathBuf::from);
-    let root = data.unwrap_or_else(|| {
-        PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data"))
-    });
+    let root = data
+        .unwrap_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")));
     Some(root.join("tum_trajectories")).filter(|p| p.is_dir())
 }
 
@@ -99,10 +98,8 @@ fn no_common_time_is_told() {
 #[test]
 fn reflections_are_never_taken_for_rotations() {
     let points = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)];
-    let pairs: Vec<_> = points
-        .iter()
-        .map(|&(x, y, z)| (Vector3::new(x, y, z), Vector3::new(x, y, -z)))
-        .collect();
+    let pairs: Vec<_> =
+        points.iter().map(|&(x, y, z)| (Vector3::new(x, y, z), Vector3::new(x, y, -z))).collect();
     let turn = align(&pairs).unwrap().rotation.to_rotation_matrix();
     assert!((turn.matrix().determinant() - 1.0).abs() < 1e-12);
 }

@@ -66,9 +66,8 @@ impl Blocks {
             .flat_map_iter(|v| {
                 let row: Vec<Option<Point>> = (0..width)
                     .map(|u| {
-                        let at = (v * side_px + side_px / 2) * camera.width
-                            + u * side_px
-                            + side_px / 2;
+                        let at =
+                            (v * side_px + side_px / 2) * camera.width + u * side_px + side_px / 2;
                         let plane = plane(&means, [width, height], [u, v])?;
                         point(&means[v * width + u], &plane, at as u32, noise)
                     })
@@ -145,7 +144,8 @@ fn plane(means: &[Mean], [width, height]: [usize; 2], [u, v]: [usize; 2]) -> Opt
             }
             found += 1;
             let [n, x, y, q] = [m.n, m.x - centre.x, m.y - centre.y, m.q - centre.q].map(f64::from);
-            let terms = [n, n * x, n * y, n * x * x, n * x * y, n * y * y, n * q, n * x * q, n * y * q];
+            let terms =
+                [n, n * x, n * y, n * x * x, n * x * y, n * y * y, n * q, n * x * q, n * y * q];
             for (sum, term) in sums.iter_mut().zip(terms) {
                 *sum += term;
             }

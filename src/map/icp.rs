@@ -204,11 +204,8 @@ impl<T: Target> Round<'_, T> {
             }
             sums
         };
-        let parts: Vec<Sums> = source
-            .par_chunks(CHUNK)
-            .zip(memory.par_chunks_mut(CHUNK))
-            .map(part)
-            .collect();
+        let parts: Vec<Sums> =
+            source.par_chunks(CHUNK).zip(memory.par_chunks_mut(CHUNK)).map(part).collect();
         parts.into_iter().fold(Sums::default(), Sums::plus)
     }
 

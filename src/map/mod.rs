@@ -98,9 +98,7 @@ pub fn map(
                 tracker.take(moment.stamp, frame).map(|report| (report, remark))
             }
             Err(e @ Error::Argument { .. }) => Err(e),
-            Err(e) => {
-                Ok((FrameReport::unread(moment.stamp, e.to_string()), None))
-            }
+            Err(e) => Ok((FrameReport::unread(moment.stamp, e.to_string()), None)),
         };
         let following = || sequence.moments.get(k + 1).map(|m| kitchen.prepare(m));
         let (taken, prepared) = rayon::join(take, following);
@@ -133,3 +131,6 @@ fn nothing(sequence: &Sequence, mapped: &Mapped) -> Error {
         "a sequence to map needs two overlapping depth images or more",
     )
 }
+
+#[cfg(test)]
+mod tests;

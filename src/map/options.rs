@@ -81,7 +81,7 @@ impl Options {
     pub fn best() -> Self {
         Options {
             method: Method::Model,
-            kernel: Kernel::Tukey,
+            kernel: Kernel::Huber,
             least_cosine: 0.7,
             least_shift_m: 1e-5,
             least_turn_rad: 1e-5,

@@ -63,11 +63,7 @@ pub struct Kitchen<'a> {
 impl<'a> Kitchen<'a> {
     /// # Errors
     /// When the model is of another sensor.
-    pub fn new(
-        sequence: &'a Sequence,
-        model: &NoiseModel,
-        options: &'a Options,
-    ) -> Result<Self> {
+    pub fn new(sequence: &'a Sequence, model: &NoiseModel, options: &'a Options) -> Result<Self> {
         let correction = Correction::of(model, &sequence.sensor)?;
         Ok(Kitchen {
             sequence,
@@ -134,9 +130,8 @@ impl<'a> Kitchen<'a> {
             Method::Projective | Method::Model => {
                 let camera = &self.sequence.sensor.camera;
                 let side = options.block_px;
-                let blocks = stages.time("blocks", || {
-                    Blocks::of(depth, camera, &self.rays, side, &self.noise)
-                });
+                let blocks = stages
+                    .time("blocks", || Blocks::of(depth, camera, &self.rays, side, &self.noise));
                 let points = blocks.points.iter().flatten().copied().collect();
                 Shape::Blocks(blocks, points)
             }

@@ -29,9 +29,8 @@ impl Stages {
                 None => lists.push((name, vec![ms])),
             }
         }
-        let median = |(name, mut list): (&'static str, Vec<f64>)| {
-            (name, crate::stats::median(&mut list))
-        };
+        let median =
+            |(name, mut list): (&'static str, Vec<f64>)| (name, crate::stats::median(&mut list));
         Stages(lists.into_iter().map(median).collect())
     }
 }

@@ -9,6 +9,8 @@ use super::direction::Direction;
 pub struct Sums {
     /// Upper triangle of J' W J, row by row; J = [n, p x n].
     h: [f64; 21],
+    /// The same, every pair counting one: what the scene determines, whatever its noise.
+    geometry: [f64; 21],
     /// J' W r.
     g: [f64; 6],
     cost: f64,
@@ -52,6 +54,7 @@ impl Sums {
             self.g[a] += wa * residual;
             for &jb in &j[a..] {
                 self.h[k] += wa * jb;
+                self.geometry[k] += j[a] * jb;
                 k += 1;
             }
         }
@@ -67,6 +70,9 @@ impl Sums {
     /// Both together.
     pub fn plus(mut self, other: Sums) -> Sums {
         for (a, b) in self.h.iter_mut().zip(other.h) {
+            *a += b;
+        }
+        for (a, b) in self.geometry.iter_mut().zip(other.geometry) {
             *a += b;
         }
         for (a, b) in self.g.iter_mut().zip(other.g) {
@@ -102,12 +108,14 @@ impl Sums {
         if !(reach > 0.0) {
             return None;
         }
-        let (h, g) = (self.matrix() / self.weight, Vector6::from(self.g) / self.weight);
+        let (h, g) = (full(&self.h) / self.weight, Vector6::from(self.g) / self.weight);
         let mut about = Matrix6::identity();
         let turn = Matrix3::identity() / reach;
         about.fixed_view_mut::<3, 3>(3, 0).copy_from(&(-turn * middle.cross_matrix()));
         about.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
         let eigen = SymmetricEigen::new(about * h * about.transpose());
+        let geometry = about * full(&self.geometry) * about.transpose() / self.pairs as f64;
+        let mut weakest = f64::INFINITY;
         let g = about * g;
         let scatter = self.cost / self.weight * self.pairs as f64
             / (self.pairs as f64 - 6.0).max(1.0)
@@ -116,17 +124,18 @@ impl Sums {
         let mut undetermined = Vec::new();
         for (k, &share) in eigen.eigenvalues.iter().enumerate() {
             let along = eigen.eigenvectors.column(k).into_owned();
-            // What it does not determine stays as it was, and is not known at all.
-            let known = share >= LEAST_SHARE;
-            if known {
+            // Judged by all pairs alike: a far corner among near walls weighs little, but it tells.
+            let told = along.dot(&(geometry * along));
+            weakest = weakest.min(told);
+            // What is not determined stays as it was, and is not known at all.
+            if told >= LEAST_SHARE && share > 0.0 {
                 step -= along * (along.dot(&g) / share);
             } else {
-                undetermined.push(Direction::of(&along, share));
+                undetermined.push(Direction::of(&along, told));
             }
             covariance += along * along.transpose() * (scatter / share.max(1e-9));
         }
         let back = about.transpose();
-        let weakest = eigen.eigenvalues.min().max(0.0);
         let step = back * step;
         step.iter().all(|v| v.is_finite()).then(|| Solution {
             step,
@@ -135,17 +144,18 @@ impl Sums {
             weakest,
         })
     }
+}
 
-    fn matrix(&self) -> Matrix6<f64> {
-        let mut matrix = Matrix6::zeros();
-        let mut k = 0;
-        for a in 0..6 {
-            for b in a..6 {
-                matrix[(a, b)] = self.h[k];
-                matrix[(b, a)] = self.h[k];
-                k += 1;
-            }
+/// The symmetric matrix of an upper triangle.
+fn full(triangle: &[f64; 21]) -> Matrix6<f64> {
+    let mut matrix = Matrix6::zeros();
+    let mut k = 0;
+    for a in 0..6 {
+        for b in a..6 {
+            matrix[(a, b)] = triangle[k];
+            matrix[(b, a)] = triangle[k];
+            k += 1;
         }
-        matrix
     }
+    matrix
 }

@@ -97,7 +97,8 @@ impl Surfels {
             let facing = -point.normal.dot(&point.at) / point.at.norm();
             // On a slanted surface a block is longer.
             let width_m = blocks.side_px as f32 * point.at.z / frame.focal_px / facing;
-            let moved = Point { at: turn * point.at + shift, normal: turn * point.normal, ..*point };
+            let moved =
+                Point { at: turn * point.at + shift, normal: turn * point.normal, ..*point };
             let colour = frame.colour.map(|rgb| colour_of(rgb, point.pixel));
             match sight.same(&self.surfels, &moved, width_m) {
                 Same::Piece(i) => self.surfels[i].observe(&moved, colour, frame.number, fusion),
@@ -135,13 +136,7 @@ pub fn colour_of(rgb: &[u8], pixel: u32) -> Vector3<f32> {
 }
 
 impl Surfel {
-    fn observe(
-        &mut self,
-        p: &Point,
-        colour: Option<Vector3<f32>>,
-        number: u32,
-        fusion: &Fusion,
-    ) {
+    fn observe(&mut self, p: &Point, colour: Option<Vector3<f32>>, number: u32, fusion: &Fusion) {
         let (mine, new) = (self.point.across.powi(-2), p.across.powi(-2));
         let share = new / (mine + new);
         // Only across the surface: along it there is nothing to average.

@@ -58,15 +58,16 @@ fn undetermined(frames: &[FrameReport]) -> Option<String> {
 fn repeated(frames: &[FrameReport]) -> Option<String> {
     let n = frames.iter().filter(|f| f.repeated).count();
     (n > 0).then(|| {
-        format!("{n} of {} depth images are the one before, bit by bit: a frozen driver?", frames.len())
+        format!(
+            "{n} of {} depth images are the one before, bit by bit: a frozen driver?",
+            frames.len()
+        )
     })
 }
 
 fn still(frames: &[FrameReport]) -> Option<String> {
-    let far = frames
-        .iter()
-        .filter_map(|f| Some(f.pose?.translation.vector.norm()))
-        .fold(0.0, f64::max);
+    let far =
+        frames.iter().filter_map(|f| Some(f.pose?.translation.vector.norm())).fold(0.0, f64::max);
     (frames.len() > 1 && far < STILL_M).then(|| "the camera never moved".to_string())
 }
 
@@ -83,7 +84,10 @@ pub fn frames_csv(frames: &[FrameReport]) -> String {
             Fate::Lost(_) => "lost",
         };
         let sigma = |k: usize| {
-            frame.covariance.map(|c| format!("{:.3e}", c[(k, k)].max(0.0).sqrt())).unwrap_or_default()
+            frame
+                .covariance
+                .map(|c| format!("{:.3e}", c[(k, k)].max(0.0).sqrt()))
+                .unwrap_or_default()
         };
         let sigmas: Vec<String> = (0..6).map(sigma).collect();
         let names: Vec<String> = frame.undetermined.iter().map(ToString::to_string).collect();

@@ -13,12 +13,16 @@ use crate::error::Result;
 pub fn comparison_figures(comparison: &Comparison) -> Result<Vec<(&'static str, String)>> {
     let figures = [
         ("fig6_paths.svg", paths(comparison)),
-        ("fig7_ate.svg", over_time(comparison, "Fig. 7. Absolute trajectory error", |r| {
-            &r.evaluation.ate.each
-        })),
-        ("fig8_rpe.svg", over_time(comparison, "Fig. 8. Relative pose error over 1 s", |r| {
-            &r.evaluation.rpe.each
-        })),
+        (
+            "fig7_ate.svg",
+            over_time(comparison, "Fig. 7. Absolute trajectory error", |r| &r.evaluation.ate.each),
+        ),
+        (
+            "fig8_rpe.svg",
+            over_time(comparison, "Fig. 8. Relative pose error over 1 s", |r| {
+                &r.evaluation.rpe.each
+            }),
+        ),
     ];
     figures.into_iter().map(|(name, figure)| Ok((name, figure.svg()?))).collect()
 }
@@ -77,9 +81,8 @@ fn paths(comparison: &Comparison) -> LineFigure {
     }];
     lines.extend(drawn(comparison).map(|(row, run)| {
         let aligned = run.evaluation.ate.truth_from_estimate;
-        let place = |p: &crate::trajectory::Pose| {
-            level((aligned * p.world_from_camera).translation.vector)
-        };
+        let place =
+            |p: &crate::trajectory::Pose| level((aligned * p.world_from_camera).translation.vector);
         Line {
             name: row.variant.name.into(),
             points: run.trajectory.iter().map(place).collect(),

@@ -59,7 +59,8 @@ impl LineFigure {
         };
         let (mut x, mut y) = (range(0), range(1));
         if equal {
-            let inner = [f64::from(WIDTH as i32 - LEGEND - LEFT), f64::from(HEIGHT as i32 - TOP - BOTTOM)];
+            let inner =
+                [f64::from(WIDTH as i32 - LEGEND - LEFT), f64::from(HEIGHT as i32 - TOP - BOTTOM)];
             let scale = ((x[1] - x[0]) / inner[0]).max((y[1] - y[0]) / inner[1]).max(1e-6);
             for (range, pixels) in [(&mut x, inner[0]), (&mut y, inner[1])] {
                 let middle = 0.5 * (range[0] + range[1]);

@@ -14,11 +14,8 @@ const STEPS: f32 = 65_535.0;
 /// The page as text.
 pub fn map_page(title: &str, points: &[MapPoint], frames: &[FrameReport]) -> String {
     let stride = points.len().div_ceil(MOST_POINTS).max(1);
-    let shown: Vec<&MapPoint> = points
-        .iter()
-        .step_by(stride)
-        .filter(|p| p.at.iter().all(|v| v.is_finite()))
-        .collect();
+    let shown: Vec<&MapPoint> =
+        points.iter().step_by(stride).filter(|p| p.at.iter().all(|v| v.is_finite())).collect();
     let mut low = [f32::INFINITY; 3];
     let mut high = [f32::NEG_INFINITY; 3];
     for point in &shown {

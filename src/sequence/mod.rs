@@ -44,11 +44,8 @@ pub struct Sequence {
 /// # Errors
 /// When it is neither, a list in it cannot be read, or it holds no depth image.
 pub fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
-    let mut sequence = if scenes::is_one(root) {
-        scenes::open(root, assumed)?
-    } else {
-        tum::open(root, assumed)?
-    };
+    let mut sequence =
+        if scenes::is_one(root) { scenes::open(root, assumed)? } else { tum::open(root, assumed)? };
     let colourless = sequence.moments.iter().filter(|m| m.colour.is_none()).count();
     if colourless > 0 {
         sequence.remarks.push(format!(

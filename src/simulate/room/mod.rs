@@ -29,6 +29,7 @@ mod surroundings;
 mod texture;
 mod tiles;
 
+pub use crate::trajectory::{Pose, Trajectory, read_trajectory};
 pub use body::Body;
 pub use film::{Film, Shutter};
 pub use furnish::{CEILING_M, FLOOR_M};
@@ -39,7 +40,6 @@ pub use render::{Picture, RoomCamera};
 pub use resample::{Gap, Resampled, resample};
 pub use shape::{Shape, Touch};
 pub use texture::Texture;
-pub use crate::trajectory::{Pose, Trajectory, read_trajectory};
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
