@@ -96,11 +96,20 @@ fn mean(
     if (scratch.len() as f32) < LEAST_FILLED * (side * side) as f32 {
         return Mean::default();
     }
-    let n = scratch.len();
-    let middle = *scratch.select_nth_unstable_by(n / 2, f32::total_cmp).1;
-    let facing = Vector3::z();
-    let sigma_q = noise.axial(1.0 / middle, &facing) * middle * middle;
-    let gate = SIGMAS * sigma_q + SLOPE * middle;
+    let (low, high) =
+        scratch.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &q| (l.min(q), h.max(q)));
+    let gate_of = |q: f32| {
+        let sigma_q = noise.axial(1.0 / q, &Vector3::z()) * q * q;
+        (sigma_q, SIGMAS * sigma_q + SLOPE * q)
+    };
+    // Mostly all is one surface; where it is not, the median stands on the larger part.
+    let mut middle = 0.5 * (low + high);
+    let (mut sigma_q, mut gate) = gate_of(middle);
+    if high - low > gate {
+        let n = scratch.len();
+        middle = *scratch.select_nth_unstable_by(n / 2, f32::total_cmp).1;
+        (sigma_q, gate) = gate_of(middle);
+    }
     let mut sum = Mean { sigma_q, ..Mean::default() };
     for row in v * side..(v + 1) * side {
         for i in row * width + u * side..row * width + (u + 1) * side {
@@ -127,7 +136,7 @@ fn plane(means: &[Mean], [width, height]: [usize; 2], [u, v]: [usize; 2]) -> Opt
         return None;
     }
     let gate = SIGMAS * centre.sigma_q / centre.n.sqrt() + SLOPE_AROUND * centre.q;
-    let mut sums = [0f64; 9];
+    let mut sums = [0f32; 9];
     let mut found = 0;
     for dv in -AROUND..=AROUND {
         for du in -AROUND..=AROUND {
@@ -143,7 +152,7 @@ fn plane(means: &[Mean], [width, height]: [usize; 2], [u, v]: [usize; 2]) -> Opt
                 continue;
             }
             found += 1;
-            let [n, x, y, q] = [m.n, m.x - centre.x, m.y - centre.y, m.q - centre.q].map(f64::from);
+            let [n, x, y, q] = [m.n, m.x - centre.x, m.y - centre.y, m.q - centre.q];
             let terms =
                 [n, n * x, n * y, n * x * x, n * x * y, n * y * y, n * q, n * x * q, n * y * q];
             for (sum, term) in sums.iter_mut().zip(terms) {
@@ -154,7 +163,7 @@ fn plane(means: &[Mean], [width, height]: [usize; 2], [u, v]: [usize; 2]) -> Opt
     if found < FEWEST_AROUND {
         return None;
     }
-    let [n, x, y, xx, xy, yy, q, xq, yq] = sums;
+    let [n, x, y, xx, xy, yy, q, xq, yq] = sums.map(f64::from);
     let matrix = Matrix3::new(xx, xy, x, xy, yy, y, x, y, n);
     let abc = matrix.try_inverse()? * Vector3::new(xq, yq, q);
     let [cx, cy, cq] = [centre.x, centre.y, centre.q].map(f64::from);

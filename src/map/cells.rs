@@ -98,7 +98,12 @@ fn hash([x, y, z]: Place) -> usize {
 /// The cube of side 1 / `per_metre` that holds a point.
 #[inline]
 pub fn place_of(at: &nalgebra::Vector3<f32>, per_metre: f32) -> Place {
-    [at.x, at.y, at.z].map(|v| (v * per_metre).floor() as i32)
+    // floor() is a call into the C library on plain x86-64; a cast and a comparison are not.
+    [at.x, at.y, at.z].map(|v| {
+        let scaled = v * per_metre;
+        let towards_zero = scaled as i32;
+        towards_zero - i32::from((towards_zero as f32) > scaled)
+    })
 }
 
 #[cfg(test)]

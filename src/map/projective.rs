@@ -26,15 +26,16 @@ pub fn block_of(
     if !(p.z > 0.0) {
         return None;
     }
+    let (x, y) = (p.x / p.z, p.y / p.z);
     let (u, v) = if camera.distortion.is_some() {
-        camera.project(f64::from(p.x / p.z), f64::from(p.y / p.z))
+        let (u, v) = camera.project(f64::from(x), f64::from(y));
+        (u as f32, v as f32)
     } else {
-        let (x, y) = (f64::from(p.x / p.z), f64::from(p.y / p.z));
-        (camera.fx * x + camera.cx, camera.fy * y + camera.cy)
+        (camera.fx as f32 * x + camera.cx as f32, camera.fy as f32 * y + camera.cy as f32)
     };
     // Pixel centres are whole numbers.
-    let (u, v) = ((u + 0.5) / side_px as f64, (v + 0.5) / side_px as f64);
-    let inside = u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64;
+    let (u, v) = ((u + 0.5) / side_px as f32, (v + 0.5) / side_px as f32);
+    let inside = u >= 0.0 && v >= 0.0 && u < width as f32 && v < height as f32;
     inside.then(|| v as usize * width + u as usize)
 }
 
