@@ -118,13 +118,19 @@ fn noisy(depth: &[f32], rng: &mut Stream) -> Vec<f32> {
     depth.iter().map(draw).collect()
 }
 
-/// Near and far surfaces with noise that grows as z^2. Were the weights worth nothing, they would
-/// win 17 or more of 20 draws with probability 0.0013.
+/// A near corner on the left, a far one on the right, and noise that grows as z^2. Were the weights
+/// worth nothing, they would win 17 or more of 20 draws with probability 0.0013.
 #[test]
 fn weights_beat_none_where_noise_differs() {
-    // A far corner behind a near desk edge: the far part has most of the pixels.
-    let planes = [([0.6, 0.0, 0.8], 4.6), ([-0.6, 0.0, 0.8], 4.6), ([0.0, 0.95, 0.31], 1.0)];
-    let (still, moved) = (picture(&planes, &Isometry3::identity()), picture(&planes, &motion()));
+    let two_corners = |pose: &Isometry3<f64>| -> Vec<f32> {
+        let [near, far] = [0.55, 2.0].map(|scale| {
+            picture(&CORNER.map(|(normal, distance)| (normal, scale * distance)), pose)
+        });
+        let width = camera().width;
+        let left = |i: usize| i % width < width / 2;
+        (0..near.len()).map(|i| if left(i) { near[i] } else { far[i] }).collect()
+    };
+    let (still, moved) = (two_corners(&Isometry3::identity()), two_corners(&motion()));
     let paper = Options::paper(Weights::None, Init::None).criteria();
     let (mut won, mut squares) = (0, [0.0; 2]);
     for seed in 0..20 {
