@@ -112,8 +112,9 @@ fn mean(
     }
     let mut sum = Mean { sigma_q, ..Mean::default() };
     for row in v * side..(v + 1) * side {
-        for i in row * width + u * side..row * width + (u + 1) * side {
-            let q = 1.0 / depth[i];
+        let first = row * width + u * side;
+        for (k, &z) in depth[first..first + side].iter().enumerate() {
+            let (i, q) = (first + k, 1.0 / z);
             if (q - middle).abs() < gate {
                 sum.n += 1.0;
                 sum.x += rays.x[i];
@@ -176,7 +177,7 @@ fn point(mean: &Mean, plane: &Vector3<f64>, pixel: u32, noise: &Noise) -> Option
     // n / D of the plane; it looks away from the camera.
     let normal = -plane.try_normalize(f64::MIN_POSITIVE)?.cast::<f32>();
     let facing = -normal.dot(&at) / at.norm();
-    if !(facing > LEAST_FACING) {
+    if facing.is_nan() || facing <= LEAST_FACING {
         return None;
     }
     let axial = noise.axial(z, &normal);

@@ -139,7 +139,7 @@ impl Target for Nearest {
 
     #[inline]
     fn find(&self, p: &Vector3<f32>, memory: &mut Memory) -> Option<&Point> {
-        if !((p - memory.at).norm() < memory.leeway) {
+        if (p - memory.at).norm() >= memory.leeway {
             *memory = self.search(p);
         }
         let point = &self.points[memory.found? as usize];

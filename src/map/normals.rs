@@ -75,7 +75,7 @@ fn least_direction(m: [f64; 6]) -> Option<([f64; 3], Vector3<f64>)> {
     let (a, b, c) = (xx - mean, yy - mean, zz - mean);
     let off = xy * xy + xz * xz + yz * yz;
     let p = ((a * a + b * b + c * c + 2.0 * off) / 6.0).sqrt();
-    if !(p > 0.0) {
+    if p.is_nan() || p <= 0.0 {
         return None;
     }
     let det = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz);

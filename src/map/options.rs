@@ -119,7 +119,7 @@ impl Options {
         if self.most_iterations == 0 {
             return wrong("--iterations 0".into(), "give 1 or more");
         }
-        if !(self.most_counted >= 1.0) {
+        if self.most_counted.is_nan() || self.most_counted < 1.0 {
             return wrong(format!("--memory {}", self.most_counted), "give 1 or more");
         }
         Ok(())

@@ -23,7 +23,7 @@ pub fn block_of(
     [width, height]: [usize; 2],
     p: &Vector3<f32>,
 ) -> Option<usize> {
-    if !(p.z > 0.0) {
+    if p.z.is_nan() || p.z <= 0.0 {
         return None;
     }
     let (x, y) = (p.x / p.z, p.y / p.z);

@@ -105,7 +105,7 @@ impl Sums {
         }
         let middle = self.place / self.weight;
         let reach = (self.place_squared / self.weight - middle.norm_squared()).max(0.0).sqrt();
-        if !(reach > 0.0) {
+        if reach.is_nan() || reach <= 0.0 {
             return None;
         }
         let (h, g) = (full(&self.h) / self.weight, Vector6::from(self.g) / self.weight);

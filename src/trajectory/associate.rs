@@ -24,10 +24,10 @@ pub fn associate(first: &[f64], second: &[f64], limit: f64) -> Vec<Pair> {
             begin += 1;
         }
         let within = second[begin..].iter().take_while(|&&b| b <= a + limit).count();
-        for j in begin..begin + within {
-            let apart = (a - second[j]).abs();
+        for (k, &b) in second[begin..begin + within].iter().enumerate() {
+            let apart = (a - b).abs();
             if apart < limit {
-                near.push((apart, Pair { first: i, second: j }));
+                near.push((apart, Pair { first: i, second: begin + k }));
             }
         }
     }
