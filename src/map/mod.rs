@@ -22,7 +22,7 @@ mod ply;
 mod point;
 mod prepare;
 mod projective;
-mod rigid;
+pub mod rigid;
 mod stages;
 mod sums;
 mod surfels;
