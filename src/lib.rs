@@ -21,12 +21,15 @@
 
 pub mod calibrate;
 pub mod camera;
+pub mod compare;
 pub mod correct;
 pub mod diagnose;
 pub mod effects;
 pub mod error;
+pub mod evaluate;
 pub mod frame;
 pub mod io;
+pub mod map;
 pub mod measure;
 pub mod model;
 pub mod plane;
@@ -35,10 +38,12 @@ pub mod report;
 pub mod residual;
 pub mod rng;
 pub mod scene;
+pub mod sequence;
 pub mod simulate;
 pub mod solve;
 pub mod stats;
 pub mod terms;
+pub mod trajectory;
 pub mod units;
 pub mod view;
 

@@ -2,12 +2,15 @@
 
 mod calibrate;
 mod common;
+mod compare;
 mod correct;
 mod demo;
 mod diagnose;
 mod diagnose_pictures;
 mod effects;
+mod evaluate;
 mod fit;
+mod map;
 mod prove;
 mod prove_solver;
 mod prove_words;
@@ -42,6 +45,12 @@ enum Command {
     Simulate(simulate::Arguments),
     /// Write a recording again with the model's biases taken out of the depth
     Correct(correct::Arguments),
+    /// Build a map from a sequence: trajectory, coloured points, statistics
+    Map(map::Arguments),
+    /// The paper's four variants of the mapper side by side: tables, figures, report
+    Compare(compare::Arguments),
+    /// ATE and RPE of a trajectory, as the TUM scripts compute them
+    Evaluate(evaluate::Arguments),
     /// The catalogue of physical effects: what each does, how it shows, what it is taken for
     Effects(effects::Arguments),
     /// A blind trial of the diagnosis on concealed sets that anyone can check
@@ -102,6 +111,9 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         Command::Diagnose(a) => diagnose::run(a, global),
         Command::Simulate(a) => simulate::run(a, global).map(|()| 0),
         Command::Correct(a) => correct::run(a, global).map(|()| 0),
+        Command::Map(a) => map::run(a, global),
+        Command::Compare(a) => compare::run(a, global).map(|()| 0),
+        Command::Evaluate(a) => evaluate::run(a, global).map(|()| 0),
         Command::Effects(a) => effects::run(a, global).map(|()| 0),
         Command::Prove(a) => prove::run(a, global),
         Command::ProveSolver(_) => prove_solver::run(global),

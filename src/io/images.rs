@@ -35,18 +35,7 @@ impl FrameSource {
     pub fn read(&mut self, path: &Path) -> Result<Frame> {
         let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
         self.hash.update(&bytes);
-        let frame = decode(path, &bytes)?;
-        if (frame.width, frame.height) != (self.width, self.height) {
-            return Err(Error::image(
-                path,
-                format!(
-                    "the image is {} x {} px, the recording says {} x {}",
-                    frame.width, frame.height, self.width, self.height
-                ),
-                "correct width and height in recording.json, or take the image out",
-            ));
-        }
-        Ok(frame)
+        decode_sized(path, &bytes, self.width, self.height)
     }
 
     /// SHA-256 over every byte read so far, in the order it was read.
@@ -55,8 +44,60 @@ impl FrameSource {
     }
 }
 
+/// One depth frame of this size, px, without a hash.
+///
+/// # Errors
+/// As [`FrameSource::read`].
+pub(crate) fn read_depth(path: &Path, width: usize, height: usize) -> Result<Frame> {
+    let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
+    decode_sized(path, &bytes, width, height)
+}
+
+fn decode_sized(path: &Path, bytes: &[u8], width: usize, height: usize) -> Result<Frame> {
+    let frame = decode(path, bytes)?;
+    if (frame.width, frame.height) != (width, height) {
+        return Err(Error::image(
+            path,
+            format!(
+                "the image is {} x {} px, the recording says {width} x {height}",
+                frame.width, frame.height
+            ),
+            "correct width and height in recording.json, or take the image out",
+        ));
+    }
+    Ok(frame)
+}
+
+/// A colour image, PNG or JPEG: red, green, blue, row-major.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColourImage {
+    /// Columns, px.
+    pub width: usize,
+    /// Rows, px.
+    pub height: usize,
+    pub rgb: Vec<u8>,
+}
+
+impl ColourImage {
+    /// Read one image.
+    ///
+    /// # Errors
+    /// When the file is not a whole PNG or JPEG.
+    pub fn read(path: &Path) -> Result<Self> {
+        let damaged = |e: image::ImageError| {
+            Error::image(path, e.to_string(), "colour must be a whole PNG or JPEG")
+        };
+        let reader = image::ImageReader::open(path).map_err(|e| Error::read(path, e))?;
+        // By content: names lie.
+        let reader = reader.with_guessed_format().map_err(|e| Error::read(path, e))?;
+        let image = reader.decode().map_err(damaged)?.into_rgb8();
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        Ok(ColourImage { width, height, rgb: image.into_raw() })
+    }
+}
+
 /// Width and height of an image without decoding it all.
-pub(super) fn size_of(path: &Path) -> Result<(usize, usize)> {
+pub(crate) fn size_of(path: &Path) -> Result<(usize, usize)> {
     let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
     let frame = decode(path, &bytes)?;
     Ok((frame.width, frame.height))

@@ -12,7 +12,8 @@ mod tum;
 mod unknown;
 
 pub(crate) use dump::INDEX;
-pub use images::{FrameSource, InfraredImage, encode_pgm16, encode_png16};
+pub use images::{ColourImage, FrameSource, InfraredImage, encode_pgm16, encode_png16};
+pub(crate) use images::{read_depth, size_of};
 pub(crate) use layout::DESCRIPTION;
 pub use layout::{ViewFile, write_recording_file, write_view_notes};
 pub use list::{FrameList, read_list};
@@ -161,7 +162,7 @@ fn refuse(assumed: &Assumed, path: &Path) -> Result<()> {
 }
 
 /// What stands in a folder, in name order.
-fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     let failed = |e| Error::read(folder, e);
     let mut paths = std::fs::read_dir(folder)
         .map_err(failed)?
@@ -173,7 +174,7 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// A sensor for folders that carry no description of their own.
-fn assumed_sensor(
+pub(crate) fn assumed_sensor(
     name: &str,
     size: (usize, usize),
     intrinsics: [f64; 4],

@@ -119,6 +119,17 @@ const REMEDY: &str = "make the model again with `kinoise calibrate` or `kinoise 
 const REMEDY_EFFECT: &str = "make the model again with `kinoise diagnose`, or take the effect out";
 
 impl NoiseModel {
+    /// The paper's Eq. 1, and nothing beyond sigma.
+    pub fn paper() -> Self {
+        NoiseModel {
+            sensor: None,
+            sigma: SigmaModel::paper(),
+            effects: Vec::new(),
+            fit: FitSummary::default(),
+            provenance: Provenance::default(),
+        }
+    }
+
     /// The text of `model.json`.
     ///
     /// # Errors

@@ -6,17 +6,23 @@
 mod axis;
 mod base64;
 mod colours;
+mod comparison;
 mod diagnosis_page;
 mod figure2;
 mod html;
+mod lines;
+mod map_page;
 mod numbers;
 mod residual_picture;
 mod sheet;
 mod sigma_map;
 
 pub use axis::Axis;
+pub use comparison::{comparison_figures, comparison_page};
 pub use diagnosis_page::{DiagnosisPage, Picture, diagnosis_page};
 pub use figure2::{Figure2, Group, Overlay, OverlayLine, Point};
 pub use html::{CalibrationPage, calibration_page};
+pub use lines::{Line, LineFigure};
+pub use map_page::map_page;
 pub use residual_picture::{residual_png, scale_mm};
 pub use sigma_map::{IsoLine, Run, SigmaMap};

@@ -10,7 +10,7 @@ mod like;
 mod plan;
 pub mod room;
 mod shoot;
-mod sigma_table;
+pub(crate) mod sigma_table;
 pub mod speckle;
 
 pub use formula::{FormulaSensor, Shooting, Shot, shoot};

@@ -30,6 +30,19 @@ pub fn median_in_place(values: &mut [f32]) -> f32 {
     *values.select_nth_unstable_by(n / 2, f32::total_cmp).1
 }
 
+/// The middle value, or the mean of the two in the middle; NaN of nothing. Reorders `values`.
+pub fn median(values: &mut [f64]) -> f64 {
+    let n = values.len();
+    if n == 0 {
+        return f64::NAN;
+    }
+    let (below, &mut upper, _) = values.select_nth_unstable_by(n / 2, f64::total_cmp);
+    if n % 2 == 1 {
+        return upper;
+    }
+    0.5 * (upper + below.iter().copied().fold(f64::NEG_INFINITY, f64::max))
+}
+
 /// Two-sided quantile of Student's t: P(|T| < q) = `level`.
 pub fn student_quantile(level: f64, degrees_of_freedom: f64) -> f64 {
     let p = 0.5 + 0.5 * level;

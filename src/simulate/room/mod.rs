@@ -28,8 +28,8 @@ mod shape;
 mod surroundings;
 mod texture;
 mod tiles;
-mod trajectory;
 
+pub use crate::trajectory::{Pose, Trajectory, read_trajectory};
 pub use body::Body;
 pub use film::{Film, Shutter};
 pub use furnish::{CEILING_M, FLOOR_M};
@@ -40,20 +40,11 @@ pub use render::{Picture, RoomCamera};
 pub use resample::{Gap, Resampled, resample};
 pub use shape::{Shape, Touch};
 pub use texture::Texture;
-pub use trajectory::{Trajectory, read_trajectory};
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::scene::{Hit, Surface, World};
 use body::Staged;
-
-/// Where a camera was, and when.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pose {
-    /// s.
-    pub stamp: f64,
-    pub world_from_camera: Isometry3<f64>,
-}
 
 /// Bodies and the textures on them. One body is a [`Shape::Shell`] when there are walls.
 #[derive(Debug, Clone, PartialEq)]

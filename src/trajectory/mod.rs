@@ -1,45 +1,90 @@
 //! Camera poses in the TUM format: `timestamp tx ty tz qx qy qz qw`, `world_from_camera`.
 
+mod associate;
+mod write;
+
+pub use associate::{Pair, associate};
+pub use write::tum_text;
+
 use std::path::Path;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
-use super::Pose;
 use crate::error::{Error, Result};
+
+/// Where a camera was, and when.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// s.
+    pub stamp: f64,
+    pub world_from_camera: Isometry3<f64>,
+}
 
 /// The poses of a file, in time order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     pub poses: Vec<Pose>,
-    /// Lines left out because their time is the line's before (freiburg2_desk has some).
+    /// Lines left out because another line has their time (freiburg2_desk has some).
     pub repeated: usize,
 }
 
-/// Read a trajectory file; lines that begin with `#` are comments.
+/// Read a trajectory file; lines that begin with `#` are comments. Of lines with one time the first
+/// counts.
 ///
 /// # Errors
 /// With the line, when it is not eight finite numbers, its quaternion has no length, or its time
 /// is before that of the line above; and when the file holds no pose.
 pub fn read_trajectory(path: &Path) -> Result<Trajectory> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
     let mut read = Trajectory { poses: Vec::new(), repeated: 0 };
-    for (i, line) in text.lines().enumerate() {
-        let content = line.trim_start_matches('\u{feff}').trim();
-        if content.is_empty() || content.starts_with('#') {
-            continue;
+    each_line(path, |pose| {
+        let before = read.poses.last().map_or(f64::NEG_INFINITY, |p: &Pose| p.stamp);
+        if pose.stamp < before {
+            let what = format!("time {} comes after {before}, which is later", pose.stamp);
+            return Err(Fault::new(what, "sort the lines by time"));
         }
-        let before = read.poses.last().map_or(f64::NEG_INFINITY, |p| p.stamp);
-        let pose = parse(content, before).map_err(|fault| fault.at(path, i + 1))?;
         if pose.stamp > before {
             read.poses.push(pose);
         } else {
             read.repeated += 1;
         }
-    }
-    if read.poses.is_empty() {
-        return Err(Fault::new("no pose in it", REMEDY_FORMAT).at(path, 0));
-    }
+        Ok(())
+    })?;
     Ok(read)
+}
+
+/// Read a trajectory file as the scripts of the TUM benchmark do: lines in any order, and of lines
+/// with one time the last counts.
+///
+/// # Errors
+/// With the line, when it is not eight finite numbers or its quaternion has no length; and when the
+/// file holds no pose.
+pub fn read_benchmark(path: &Path) -> Result<Trajectory> {
+    let mut poses: Vec<Pose> = Vec::new();
+    each_line(path, |pose| {
+        poses.push(pose);
+        Ok(())
+    })?;
+    let lines = poses.len();
+    // A stable sort: of one time the last stays last, and comes first when read backwards.
+    poses.sort_by(|a, b| a.stamp.total_cmp(&b.stamp));
+    poses.reverse();
+    poses.dedup_by(|later, kept| later.stamp == kept.stamp);
+    poses.reverse();
+    Ok(Trajectory { repeated: lines - poses.len(), poses })
+}
+
+fn each_line(path: &Path, mut take: impl FnMut(Pose) -> Result<(), Fault>) -> Result<()> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+    let mut found = false;
+    for (i, line) in text.lines().enumerate() {
+        let content = line.trim_start_matches('\u{feff}').trim();
+        if content.is_empty() || content.starts_with('#') {
+            continue;
+        }
+        parse(content).and_then(&mut take).map_err(|fault| fault.at(path, i + 1))?;
+        found = true;
+    }
+    if found { Ok(()) } else { Err(Fault::new("no pose in it", REMEDY_FORMAT).at(path, 0)) }
 }
 
 const REMEDY_FORMAT: &str = "write \"timestamp tx ty tz qx qy qz qw\", one pose a line";
@@ -62,7 +107,7 @@ impl Fault {
     }
 }
 
-fn parse(line: &str, before: f64) -> Result<Pose, Fault> {
+fn parse(line: &str) -> Result<Pose, Fault> {
     let numbers = line
         .split(|c: char| c.is_whitespace() || c == ',')
         .filter(|word| !word.is_empty())
@@ -81,10 +126,6 @@ fn parse(line: &str, before: f64) -> Result<Pose, Fault> {
     if quaternion.norm() < SHORTEST_QUATERNION {
         let what = format!("the quaternion {qx} {qy} {qz} {qw} is no rotation");
         return Err(Fault::new(what, "take the line out, or give qx qy qz qw of length 1"));
-    }
-    if stamp < before {
-        let what = format!("time {stamp} comes after {before}, which is later");
-        return Err(Fault::new(what, "sort the lines by time"));
     }
     let rotation = UnitQuaternion::from_quaternion(quaternion);
     let world_from_camera = Isometry3::from_parts(Translation3::new(tx, ty, tz), rotation);

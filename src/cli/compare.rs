@@ -1,0 +1,74 @@
+use std::path::PathBuf;
+
+use anyhow::bail;
+use clap::Args;
+use kinoise::NoiseModel;
+use kinoise::compare::{as_json, compare, of_the_paper, past_the_paper, tables};
+use kinoise::io::OutputDir;
+use kinoise::report::{comparison_figures, comparison_page};
+use kinoise::sequence::open;
+
+use super::common::{Global, Input, say};
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A sequence with ground truth, in the layout of the TUM RGB-D benchmark or of 7-Scenes
+    sequence: PathBuf,
+    /// model.json of this sensor [default: the paper's Eq. 1]
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Folder for tables.json, tables.txt, figures and report.html
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Also what goes past the paper, one step at a time
+    #[arg(long)]
+    ablation: bool,
+    /// Runs of each variant that draws by chance
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    repeats: usize,
+    /// Take every Nth depth image
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    stride: usize,
+    /// Take the first N of those
+    #[arg(long, value_name = "N")]
+    frames: Option<usize>,
+    #[command(flatten)]
+    input: Input,
+}
+
+pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
+    if arguments.repeats == 0 {
+        bail!("--repeats 0: give 1 or more");
+    }
+    let mut sequence = open(&arguments.sequence, &arguments.input.assumed()?)?;
+    sequence.thin(arguments.stride, arguments.frames);
+    let output = OutputDir::create(&arguments.output)?;
+    let model = match &arguments.model {
+        Some(path) => NoiseModel::read(path)?,
+        None => NoiseModel::paper(),
+    };
+    let mut variants = of_the_paper();
+    if arguments.ablation {
+        variants.extend(past_the_paper());
+    } else {
+        variants.extend(past_the_paper().into_iter().filter(|v| v.name.contains("default")));
+    }
+    let told =
+        |name: &str, done: usize, all: usize| say(format!("run {} of {all}: {name}", done + 1));
+    let comparison =
+        compare(&sequence, &model, &variants, arguments.repeats, global.seed(), &told)?;
+    let text = tables(&comparison);
+    let json = as_json(&comparison);
+    output.write("tables.json", serde_json::to_string_pretty(&json)?.as_bytes())?;
+    output.write("tables.txt", text.as_bytes())?;
+    for (name, svg) in comparison_figures(&comparison)? {
+        output.write(name, svg.as_bytes())?;
+    }
+    output.write("report.html", comparison_page(&comparison)?.as_bytes())?;
+    for remark in &sequence.remarks {
+        say(format!("note: {remark}"));
+    }
+    say(text);
+    say(format!("wrote {}", arguments.output.join("report.html").display()));
+    global.print_json(&json)
+}

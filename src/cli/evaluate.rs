@@ -1,0 +1,92 @@
+use std::path::PathBuf;
+
+use anyhow::bail;
+use clap::{Args, ValueEnum};
+use kinoise::evaluate::{Delta, Evaluation, Spread, evaluate_files};
+use serde_json::{Value, json};
+
+use super::common::{Global, say};
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// True poses in the TUM format
+    #[arg(long, value_name = "FILE")]
+    truth: PathBuf,
+    /// Estimated poses in the TUM format
+    #[arg(long, value_name = "FILE")]
+    estimate: PathBuf,
+    /// Interval of the relative error
+    #[arg(long, value_name = "N", default_value_t = 1.0, allow_hyphen_values = true)]
+    delta: f64,
+    /// What the interval is counted in
+    #[arg(long, value_enum, default_value = "s")]
+    delta_unit: Unit,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Unit {
+    /// Seconds
+    S,
+    /// Frames
+    F,
+}
+
+impl Arguments {
+    fn delta(&self) -> anyhow::Result<Delta> {
+        let positive = self.delta.is_finite() && self.delta > 0.0;
+        match self.delta_unit {
+            Unit::S if positive => Ok(Delta::Seconds(self.delta)),
+            Unit::F if positive && self.delta.fract() == 0.0 && self.delta < 1e9 => {
+                Ok(Delta::Frames(self.delta as usize))
+            }
+            Unit::S => bail!("--delta {}: give a positive number of seconds", self.delta),
+            Unit::F => bail!("--delta {}: give a whole number of frames, 1 or more", self.delta),
+        }
+    }
+}
+
+pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
+    let told = evaluate_files(&arguments.truth, &arguments.estimate, arguments.delta()?)?;
+    tell(&told, arguments);
+    global.print_json(&as_json(&told))
+}
+
+fn tell(told: &Evaluation, arguments: &Arguments) {
+    let line = |name: &str, s: &Spread, unit: &str| {
+        say(format!(
+            "{name} {unit}: rmse {:.6}  mean {:.6}  median {:.6}  std {:.6}  min {:.6}  max {:.6}  of {} pairs",
+            s.rmse, s.mean, s.median, s.std, s.min, s.max, s.pairs
+        ));
+    };
+    let interval = match arguments.delta_unit {
+        Unit::S => format!("RPE over {} s,", arguments.delta),
+        Unit::F => format!("RPE over {} frames,", arguments.delta),
+    };
+    line("ATE after alignment,", &told.ate.error, "m");
+    line(&interval, &told.rpe.translation, "m");
+    line(&interval, &told.rpe.rotation.scaled(1f64.to_degrees()), "degrees");
+}
+
+/// Contract, section 3.
+pub fn as_json(told: &Evaluation) -> Value {
+    json!({
+        "ate": spread(&told.ate.error, "m"),
+        "rpe_translation": spread(&told.rpe.translation, "m"),
+        "rpe_rotation": spread(&told.rpe.rotation.scaled(1f64.to_degrees()), "deg"),
+    })
+}
+
+fn spread(s: &Spread, unit: &str) -> Value {
+    let figures = [
+        ("rmse", s.rmse),
+        ("mean", s.mean),
+        ("median", s.median),
+        ("std", s.std),
+        ("min", s.min),
+        ("max", s.max),
+    ];
+    let mut object: serde_json::Map<String, Value> =
+        figures.iter().map(|(name, v)| (format!("{name}_{unit}"), json!(v))).collect();
+    object.insert("pairs".into(), json!(s.pairs));
+    Value::Object(object)
+}

@@ -1,0 +1,255 @@
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use kinoise::evaluate::{Delta, Evaluation, evaluate};
+use kinoise::io::OutputDir;
+use kinoise::map::{Init, Kernel, Mapped, Method, Options, Stages, Weights, frames_csv, map, ply};
+use kinoise::report::map_page;
+use kinoise::sequence::{Sequence, open};
+use kinoise::trajectory::tum_text;
+use kinoise::{NoiseModel, Seed};
+use serde_json::{Value, json};
+
+use super::common::{Bar, Global, Input, say};
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A sequence in the layout of the TUM RGB-D benchmark or of 7-Scenes
+    sequence: PathBuf,
+    /// model.json of this sensor [default: the paper's Eq. 1]
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Folder for trajectory.txt, map.ply, stats.json and map.html
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    #[command(flatten)]
+    tuning: Tuning,
+    #[command(flatten)]
+    input: Input,
+}
+
+#[derive(Debug, Args)]
+pub struct Tuning {
+    /// What frames are aligned to, and how
+    #[arg(long, value_enum, default_value = "best")]
+    method: MethodName,
+    /// What a pair of points weighs [default: both; with --method paper: model]
+    #[arg(long, value_enum)]
+    weights: Option<WeightsName>,
+    /// Where an alignment starts [default: motion; with --method paper: none]
+    #[arg(long, value_enum)]
+    init: Option<InitName>,
+    /// How outliers count [default: huber; with --method paper: square]
+    #[arg(long, value_enum)]
+    kernel: Option<KernelName>,
+    /// Side of a voxel in m
+    #[arg(long, value_name = "M")]
+    voxel: Option<f32>,
+    /// Side of an image block in px
+    #[arg(long, value_name = "PX")]
+    block: Option<usize>,
+    /// Neighbours farther than this are none, m
+    #[arg(long, value_name = "M")]
+    gate: Option<f32>,
+    /// Most iterations of an alignment
+    #[arg(long, value_name = "N")]
+    iterations: Option<usize>,
+    /// Observations of a piece of the map that count at most
+    #[arg(long, value_name = "N")]
+    memory: Option<f32>,
+    /// Take every Nth depth image
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub stride: usize,
+    /// Take the first N of those
+    #[arg(long, value_name = "N")]
+    pub frames: Option<usize>,
+    /// Do not read colour for the map
+    #[arg(long)]
+    no_colour: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum MethodName {
+    /// What was measured to be best: model
+    Best,
+    /// The paper's: 3 cm voxels, exact nearest neighbours, frame to frame
+    Paper,
+    /// Image blocks, neighbours by projection, frame to frame: the fastest
+    Projective,
+    /// Image blocks, neighbours by projection, frame to map
+    Model,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum WeightsName {
+    /// All the same
+    None,
+    /// The paper's 1/sigma(d_z, theta) of the standing point
+    Model,
+    /// What both points err by across their surface
+    Both,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum InitName {
+    /// Where the last frame was
+    None,
+    /// As the last two frames moved
+    Motion,
+    /// Where ORB features say
+    Orb,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum KernelName {
+    Square,
+    Huber,
+    Tukey,
+}
+
+impl Tuning {
+    pub fn options(&self, seed: Seed) -> Options {
+        let mut options = match self.method {
+            MethodName::Best | MethodName::Model => Options::best(),
+            MethodName::Paper => Options::paper(Weights::Model, Init::None),
+            MethodName::Projective => Options { method: Method::Projective, ..Options::best() },
+        };
+        if let Some(weights) = self.weights {
+            options.weights = match weights {
+                WeightsName::None => Weights::None,
+                WeightsName::Model => Weights::Model,
+                WeightsName::Both => Weights::Both,
+            };
+        }
+        if let Some(init) = self.init {
+            options.init = match init {
+                InitName::None => Init::None,
+                InitName::Motion => Init::Motion,
+                InitName::Orb => Init::Orb,
+            };
+        }
+        if let Some(kernel) = self.kernel {
+            options.kernel = match kernel {
+                KernelName::Square => Kernel::Square,
+                KernelName::Huber => Kernel::Huber,
+                KernelName::Tukey => Kernel::Tukey,
+            };
+        }
+        Options {
+            voxel_m: self.voxel.unwrap_or(options.voxel_m),
+            block_px: self.block.unwrap_or(options.block_px),
+            gate_m: self.gate.unwrap_or(options.gate_m),
+            most_iterations: self.iterations.unwrap_or(options.most_iterations),
+            most_counted: self.memory.unwrap_or(options.most_counted),
+            colour: !self.no_colour,
+            seed,
+            ..options
+        }
+    }
+}
+
+pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
+    let mut sequence = open(&arguments.sequence, &arguments.input.assumed()?)?;
+    sequence.thin(arguments.tuning.stride, arguments.tuning.frames);
+    let output = OutputDir::create(&arguments.output)?;
+    let model = match &arguments.model {
+        Some(path) => NoiseModel::read(path)?,
+        None => NoiseModel::paper(),
+    };
+    let options = arguments.tuning.options(global.seed());
+    options.check()?;
+    let bar = Bar::new("frames");
+    let begin = std::time::Instant::now();
+    let mapped = map(&sequence, &model, &options, &|done, all| bar.step(done, all))?;
+    drop(bar);
+    let seconds = begin.elapsed().as_secs_f64();
+    let against = truth(&sequence, &mapped);
+    let stats = stats(&mapped, &options, &against, seconds);
+    output.write("trajectory.txt", tum_text(&mapped.trajectory()).as_bytes())?;
+    output.write("map.ply", &ply(&mapped.map))?;
+    let title = format!("Map of {}", name_of(&arguments.sequence));
+    let page = map_page(&title, &mapped.map, &mapped.frames);
+    output.write("map.html", page.as_bytes())?;
+    output.write("frames.csv", frames_csv(&mapped.frames).as_bytes())?;
+    output.write("stats.json", serde_json::to_string_pretty(&stats)?.as_bytes())?;
+    for remark in sequence.remarks.iter().chain(&mapped.remarks) {
+        say(format!("note: {remark}"));
+    }
+    tell(&mapped, &against, &arguments.output);
+    global.print_json(&stats)?;
+    Ok(0)
+}
+
+/// Against the sequence's own true poses, where it has any.
+fn truth(sequence: &Sequence, mapped: &Mapped) -> Option<Result<Evaluation, String>> {
+    if sequence.truth.is_empty() {
+        return None;
+    }
+    let told = evaluate(&sequence.truth, &mapped.trajectory(), Delta::Seconds(1.0));
+    Some(told.map_err(|e| e.to_string()))
+}
+
+fn tell(mapped: &Mapped, against: &Option<Result<Evaluation, String>>, output: &std::path::Path) {
+    match against {
+        Some(Ok(told)) => say(format!(
+            "against the ground truth: ATE {:.4} m, RPE over 1 s {:.4} m and {:.3} degrees (rmse)",
+            told.ate.error.rmse,
+            told.rpe.translation.rmse,
+            told.rpe.rotation.rmse.to_degrees()
+        )),
+        Some(Err(why)) => say(format!("note: not held against the ground truth: {why}")),
+        None => {}
+    }
+    say(format!(
+        "{} of {} frames have a pose; {} points; wrote {}",
+        mapped.frames.len() - mapped.lost(),
+        mapped.frames.len(),
+        mapped.map.len(),
+        output.display()
+    ));
+}
+
+fn stats(
+    mapped: &Mapped,
+    options: &Options,
+    against: &Option<Result<Evaluation, String>>,
+    seconds: f64,
+) -> Value {
+    let followed: Vec<_> = mapped.frames.iter().filter(|f| f.iterations > 0).collect();
+    let n = followed.len().max(1) as f64;
+    let mean = |of: &dyn Fn(&kinoise::map::FrameReport) -> f64| {
+        followed.iter().map(|f| of(f)).sum::<f64>() / n
+    };
+    let all: Vec<Stages> = mapped.frames.iter().map(|f| f.stages.clone()).collect();
+    let mut ms: serde_json::Map<String, Value> =
+        Stages::medians(&all).each().map(|(name, v)| (name.to_string(), json!(v))).collect();
+    let mut totals: Vec<f64> = all.iter().map(Stages::total).collect();
+    ms.insert("total".into(), json!(kinoise::stats::median(&mut totals)));
+    json!({
+        "frames": mapped.frames.len(),
+        "lost": mapped.lost(),
+        "iterations": mean(&|f| f.iterations as f64),
+        "matched": mean(&|f| f.matched),
+        "least_matched": followed.iter().map(|f| f.matched).fold(1.0, f64::min),
+        "weakest": followed.iter().map(|f| f.weakest).fold(1.0, f64::min),
+        "points": mapped.map.len(),
+        "ms": ms,
+        "seconds": seconds,
+        "peak_rss_mb": peak_rss_mb(),
+        "settings": format!("{options:?}"),
+        "truth": against.as_ref().and_then(|t| t.as_ref().ok()).map(super::evaluate::as_json),
+    })
+}
+
+fn name_of(path: &std::path::Path) -> String {
+    let whole = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    whole.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The most memory this process had, MB; of Linux, elsewhere null.
+fn peak_rss_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    let kilobytes: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kilobytes / 1024.0)
+}

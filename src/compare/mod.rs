@@ -1,0 +1,168 @@
+//! The paper's experiment: four variants of one mapper on one sequence, side by side, with what
+//! goes past the paper below them.
+
+mod tables;
+
+pub use tables::{as_json, tables};
+
+use crate::error::{Error, Result};
+use crate::evaluate::{Delta, Evaluation, evaluate};
+use crate::map::{Init, Kernel, Method, Options, Stages, Weights, map};
+use crate::model::NoiseModel;
+use crate::rng::Seed;
+use crate::sequence::Sequence;
+use crate::trajectory::Pose;
+
+/// A way to map, by name.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Variant {
+    pub name: &'static str,
+    /// Is it one of the paper's four?
+    pub of_the_paper: bool,
+    pub options: Options,
+}
+
+/// The paper's four: plain, weighted, and both with the ORB start.
+pub fn of_the_paper() -> Vec<Variant> {
+    let variant = |name, weights, init| Variant {
+        name,
+        of_the_paper: true,
+        options: Options { colour: false, ..Options::paper(weights, init) },
+    };
+    vec![
+        variant("ICP", Weights::None, Init::None),
+        variant("weighted ICP", Weights::Model, Init::None),
+        variant("ORB + ICP", Weights::None, Init::Orb),
+        variant("ORB + weighted ICP", Weights::Model, Init::Orb),
+    ]
+}
+
+/// One step after the other from the paper's mapper to the default.
+pub fn past_the_paper() -> Vec<Variant> {
+    let weighted = Options { colour: false, ..Options::paper(Weights::Model, Init::None) };
+    let best = Options { colour: false, ..Options::best() };
+    let variant = |name, options| Variant { name, of_the_paper: false, options };
+    let frames = Options { method: Method::Projective, ..best };
+    vec![
+        variant("paper + both noises", Options { weights: Weights::Both, ..weighted }),
+        variant(
+            "paper + both noises + Tukey",
+            Options { weights: Weights::Both, kernel: Kernel::Tukey, ..weighted },
+        ),
+        variant("projective, plain", Options { weights: Weights::None, ..frames }),
+        variant("projective", frames),
+        variant("frame to map, plain", Options { weights: Weights::None, ..best }),
+        variant("frame to map, square", Options { kernel: Kernel::Square, ..best }),
+        variant("frame to map, Tukey", Options { kernel: Kernel::Tukey, ..best }),
+        variant("frame to map (default)", best),
+        variant("frame to map, ORB start", Options { init: Init::Orb, ..best }),
+    ]
+}
+
+/// One run of a variant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    pub seed: u64,
+    pub evaluation: Evaluation,
+    pub iterations: f64,
+    pub lost: usize,
+    pub frames: usize,
+    /// Medians over frames, ms.
+    pub stages: Stages,
+    pub trajectory: Vec<Pose>,
+}
+
+/// All runs of a variant; the first is the one that is drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    pub variant: Variant,
+    pub runs: Vec<Run>,
+    /// Why a run has no figures.
+    pub failed: Option<String>,
+}
+
+/// Everything that the tables and figures show.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    pub sequence: String,
+    pub rows: Vec<Row>,
+    /// A camera that never moves: what an estimate must beat.
+    pub still: Evaluation,
+    pub truth: Vec<Pose>,
+    pub remarks: Vec<String>,
+}
+
+/// Told before each run: the variant's name, runs done, runs in all.
+pub type Told<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
+
+/// Run all variants, each `repeats` times with another seed.
+///
+/// # Errors
+/// When the sequence has no ground truth of its time, or the model is of another sensor.
+pub fn compare(
+    sequence: &Sequence,
+    model: &NoiseModel,
+    variants: &[Variant],
+    repeats: usize,
+    seed: Seed,
+    told: Told<'_>,
+) -> Result<Comparison> {
+    let delta = Delta::Seconds(1.0);
+    if sequence.truth.is_empty() {
+        return Err(Error::recording(
+            &sequence.root,
+            "no ground truth in it",
+            "a comparison needs groundtruth.txt, or frame-XXXXXX.pose.txt beside each frame",
+        ));
+    }
+    let nowhere = |m: &crate::sequence::Moment| Pose {
+        stamp: m.stamp,
+        world_from_camera: nalgebra::Isometry3::identity(),
+    };
+    let unmoved: Vec<Pose> = sequence.moments.iter().map(nowhere).collect();
+    let still = evaluate(&sequence.truth, &unmoved, delta)?;
+    let mut rows = Vec::new();
+    let total = variants.len() * repeats;
+    for (k, variant) in variants.iter().enumerate() {
+        let mut row = Row { variant: *variant, runs: Vec::new(), failed: None };
+        for repeat in 0..repeats {
+            told(variant.name, k * repeats + repeat, total);
+            let seed = Seed(seed.0.wrapping_add(repeat as u64));
+            match run(sequence, model, &Options { seed, ..variant.options }, delta) {
+                Ok(run) => row.runs.push(run),
+                Err(e) => row.failed = Some(e.to_string()),
+            }
+            // Without a draw of chance every repeat is the same.
+            if variant.options.init != Init::Orb {
+                break;
+            }
+        }
+        rows.push(row);
+    }
+    let sequence_name = sequence.root.file_name().unwrap_or_default().to_string_lossy();
+    Ok(Comparison {
+        sequence: sequence_name.into_owned(),
+        rows,
+        still,
+        truth: sequence.truth.clone(),
+        remarks: sequence.remarks.clone(),
+    })
+}
+
+fn run(sequence: &Sequence, model: &NoiseModel, options: &Options, delta: Delta) -> Result<Run> {
+    let mapped = map(sequence, model, options, &|_, _| ())?;
+    let trajectory = mapped.trajectory();
+    let evaluation = evaluate(&sequence.truth, &trajectory, delta)?;
+    let steps: Vec<f64> =
+        mapped.frames.iter().filter(|f| f.iterations > 0).map(|f| f.iterations as f64).collect();
+    let stages: Vec<Stages> = mapped.frames.iter().map(|f| f.stages.clone()).collect();
+    Ok(Run {
+        seed: options.seed.0,
+        evaluation,
+        iterations: steps.iter().sum::<f64>() / steps.len().max(1) as f64,
+        lost: mapped.lost(),
+        frames: mapped.frames.len(),
+        stages: Stages::medians(&stages),
+        trajectory,
+    })
+}

@@ -1,0 +1,106 @@
+//! Relative pose error over a fixed interval: evaluate_rpe.py with `--fixed_delta`.
+
+use nalgebra::Isometry3;
+
+use super::{Spread, too_few};
+use crate::error::Result;
+use crate::stats::median;
+use crate::trajectory::Pose;
+
+/// The interval over which motions are compared.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Delta {
+    Seconds(f64),
+    Frames(usize),
+}
+
+/// Motions of the estimate against the true ones.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rpe {
+    /// m.
+    pub translation: Spread,
+    /// rad.
+    pub rotation: Spread,
+    /// Stamp at the motion's beginning, s, and its error, m.
+    pub each: Vec<(f64, f64)>,
+}
+
+/// Of poses in time order.
+///
+/// # Errors
+/// When fewer than two motions have true poses at both ends.
+pub fn relative(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Rpe> {
+    if truth.len() < 2 || estimate.len() < 2 {
+        return Err(too_few(truth, estimate, truth.len().min(estimate.len())));
+    }
+    let limit = most_apart(truth);
+    let true_pose = |stamp: f64| {
+        let nearest = truth[nearest(truth.len(), |i| truth[i].stamp, stamp)];
+        ((nearest.stamp - stamp).abs() <= limit).then_some(nearest.world_from_camera)
+    };
+    let mut each = Vec::new();
+    let mut turns = Vec::new();
+    for (i, from) in estimate.iter().enumerate() {
+        let j = partner(estimate, i, delta);
+        // The script leaves out whatever ends at the last pose, for the interval may reach beyond.
+        if j == estimate.len() - 1 {
+            continue;
+        }
+        let to = &estimate[j];
+        if let (Some(a), Some(b)) = (true_pose(from.stamp), true_pose(to.stamp)) {
+            let error =
+                motion(&to.world_from_camera, &from.world_from_camera).inverse() * motion(&b, &a);
+            each.push((from.stamp, error.translation.vector.norm()));
+            turns.push(error.rotation.angle());
+        }
+    }
+    let shifts: Vec<f64> = each.iter().map(|e| e.1).collect();
+    match (Spread::of(&shifts), Spread::of(&turns)) {
+        (Some(translation), Some(rotation)) if each.len() >= 2 => {
+            Ok(Rpe { translation, rotation, each })
+        }
+        _ => Err(too_few(truth, estimate, each.len())),
+    }
+}
+
+/// The pose at the end of the interval that begins with pose `i`.
+fn partner(estimate: &[Pose], i: usize, delta: Delta) -> usize {
+    match delta {
+        Delta::Seconds(s) => nearest(estimate.len(), |k| estimate[k].stamp, estimate[i].stamp + s),
+        Delta::Frames(n) => nearest(estimate.len(), |k| k as f64, (i + n) as f64),
+    }
+}
+
+/// A true pose farther from a stamp than twice the usual interval is not its pose (a gap), s.
+fn most_apart(truth: &[Pose]) -> f64 {
+    let mut intervals: Vec<f64> = truth.windows(2).map(|w| w[1].stamp - w[0].stamp).collect();
+    2.0 * median(&mut intervals)
+}
+
+fn motion(to: &Isometry3<f64>, from: &Isometry3<f64>) -> Isometry3<f64> {
+    to.inverse() * from
+}
+
+/// Index of the value nearest to `wanted` in an ascending list: the script's own bisection, which
+/// decides ties.
+fn nearest(len: usize, value: impl Fn(usize) -> f64, wanted: f64) -> usize {
+    let mut best = 0;
+    let mut difference = (value(0) - wanted).abs();
+    let (mut begin, mut end) = (0, len);
+    while begin < end {
+        let middle = usize::midpoint(begin, end);
+        let here = value(middle);
+        if (here - wanted).abs() < difference {
+            difference = (here - wanted).abs();
+            best = middle;
+        }
+        if here == wanted {
+            return middle;
+        } else if here > wanted {
+            end = middle;
+        } else {
+            begin = middle + 1;
+        }
+    }
+    best
+}

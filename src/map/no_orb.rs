@@ -1,0 +1,28 @@
+//! What stands in for OpenCV's features in a build without them.
+
+use super::rigid::Agreed;
+use crate::camera::Rays;
+use crate::error::{Error, Result};
+use crate::io::ColourImage;
+use crate::rng::Stream;
+
+/// There are none.
+#[derive(Debug, Clone)]
+pub struct Features;
+
+impl Features {
+    /// # Errors
+    /// Always: this build has no OpenCV.
+    pub fn of(_: &ColourImage, _: &[f32], _: &Rays) -> Result<Self> {
+        Err(Error::Argument {
+            what: "this kinoise was built without OpenCV".into(),
+            remedy: "use --init none or motion, or build with the feature \"opencv\"",
+        })
+    }
+
+    /// # Errors
+    /// Never.
+    pub fn motion_to(&self, _: &Features, _: &mut Stream) -> Result<Option<Agreed>> {
+        Ok(None)
+    }
+}

@@ -1,0 +1,127 @@
+//! What `kinoise map` can be told; the paper's Table II where it has a say.
+
+use super::icp::{Criteria, Kernel, Weights};
+use crate::error::{Error, Result};
+use crate::rng::Seed;
+
+/// What a frame is aligned to, and how neighbours are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// The paper's: voxel grid, normals by principal components, exact nearest neighbours, each
+    /// frame to the one before.
+    Paper,
+    /// Image blocks, neighbours by projection, each frame to the one before.
+    Projective,
+    /// Image blocks, neighbours by projection, each frame to the map so far.
+    Model,
+}
+
+/// Where an alignment starts from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Init {
+    /// Where the last frame was.
+    None,
+    /// As the last two frames moved.
+    Motion,
+    /// Where ORB features say.
+    Orb,
+}
+
+/// All of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    pub method: Method,
+    pub weights: Weights,
+    pub kernel: Kernel,
+    pub init: Init,
+    /// Side of a voxel, m.
+    pub voxel_m: f32,
+    /// Side of an image block, px.
+    pub block_px: usize,
+    /// Neighbours farther than this are none, m.
+    pub gate_m: f32,
+    pub most_iterations: usize,
+    pub least_shift_m: f64,
+    pub least_turn_rad: f64,
+    /// Least cosine between normals of neighbours.
+    pub least_cosine: f64,
+    /// Observations of a piece of the map that count at most.
+    pub most_counted: f32,
+    /// Fewer points than this share with a neighbour: lost.
+    pub least_matched: f64,
+    pub seed: Seed,
+    /// Read colour for the map.
+    pub colour: bool,
+}
+
+impl Options {
+    /// The paper's Table II.
+    pub fn paper(weights: Weights, init: Init) -> Self {
+        Options {
+            method: Method::Paper,
+            weights,
+            kernel: Kernel::Square,
+            init,
+            voxel_m: 0.03,
+            block_px: 4,
+            // Not in the paper: what its peers are run with.
+            gate_m: 0.1,
+            most_iterations: 30,
+            least_shift_m: 1e-8,
+            least_turn_rad: 1e-5 * std::f64::consts::PI / 180.0,
+            least_cosine: -1.0,
+            most_counted: 30.0,
+            least_matched: 0.3,
+            seed: Seed(1),
+            colour: true,
+        }
+    }
+
+    /// What was measured to be best.
+    pub fn best() -> Self {
+        Options {
+            method: Method::Model,
+            kernel: Kernel::Huber,
+            least_cosine: 0.7,
+            least_shift_m: 1e-5,
+            least_turn_rad: 1e-5,
+            ..Options::paper(Weights::Both, Init::Motion)
+        }
+    }
+
+    pub fn criteria(&self) -> Criteria {
+        Criteria {
+            weights: self.weights,
+            kernel: self.kernel,
+            most_iterations: self.most_iterations,
+            least_shift_m: self.least_shift_m,
+            least_turn_rad: self.least_turn_rad,
+            least_cosine: self.least_cosine,
+        }
+    }
+}
+
+impl Options {
+    /// # Errors
+    /// When a number is out of its range.
+    pub fn check(&self) -> Result<()> {
+        let positive = |v: f32| v.is_finite() && v > 0.0;
+        let wrong = |what: String, remedy| Err(Error::Argument { what, remedy });
+        if !(0.002..=1.0).contains(&self.voxel_m) {
+            return wrong(format!("--voxel {}", self.voxel_m), "give 0.002 to 1 m");
+        }
+        if !(1..=32).contains(&self.block_px) {
+            return wrong(format!("--block {}", self.block_px), "give 1 to 32 px");
+        }
+        if !positive(self.gate_m) || self.gate_m > 2.0 {
+            return wrong(format!("--gate {}", self.gate_m), "give a distance up to 2 m");
+        }
+        if self.most_iterations == 0 {
+            return wrong("--iterations 0".into(), "give 1 or more");
+        }
+        if self.most_counted.is_nan() || self.most_counted < 1.0 {
+            return wrong(format!("--memory {}", self.most_counted), "give 1 or more");
+        }
+        Ok(())
+    }
+}

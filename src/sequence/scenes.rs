@@ -1,0 +1,83 @@
+//! The layout of Microsoft's 7-Scenes: frame-XXXXXX.color.png, .depth.png, .pose.txt, no stamps.
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use super::{Moment, Sequence};
+use crate::error::{Error, Result};
+use crate::frame::DepthCode;
+use crate::io::{Assumed, assumed_sensor, entries, size_of};
+use crate::trajectory::Pose;
+
+const DEPTH: &str = ".depth.png";
+/// Nominal; the frames carry no stamps.
+const RATE_HZ: f64 = 30.0;
+/// What 7-Scenes says of its Kinects: fx, fy, cx, cy, px.
+const INTRINSICS: [f64; 4] = [585.0, 585.0, 320.0, 240.0];
+/// Millimetres; 65535 is no measurement.
+const CODE: DepthCode = DepthCode::Metric { units_per_metre: 1000.0, invalid: 65535 };
+
+/// Does the folder hold frame-XXXXXX.depth.png?
+pub(super) fn is_one(root: &Path) -> bool {
+    !root.join("depth.txt").is_file()
+        && entries(root).is_ok_and(|files| files.iter().any(|p| stem(p).is_some()))
+}
+
+/// frame-XXXXXX of a depth image.
+fn stem(path: &Path) -> Option<(String, f64)> {
+    let name = path.file_name()?.to_str()?.strip_suffix(DEPTH)?;
+    let number: f64 = name.strip_prefix("frame-")?.parse().ok()?;
+    Some((name.to_string(), number))
+}
+
+pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
+    let mut remarks = vec!["7-Scenes has no stamps: frame number / 30 Hz is taken".to_string()];
+    let (mut moments, mut truth) = (Vec::new(), Vec::new());
+    for path in entries(root)? {
+        let Some((name, number)) = stem(&path) else { continue };
+        let stamp = number / RATE_HZ;
+        let colour = ["color.png", "color.jpg"].map(|kind| root.join(format!("{name}.{kind}")));
+        let colour = colour.into_iter().find(|p| p.is_file());
+        let pose = root.join(format!("{name}.pose.txt"));
+        if pose.is_file() {
+            match read_pose(&pose)? {
+                Some(world_from_camera) => truth.push(Pose { stamp, world_from_camera }),
+                None => remarks.push(format!("{} is no pose; left out", pose.display())),
+            }
+        }
+        moments.push(Moment { stamp, depth: path, colour });
+    }
+    moments.sort_by(|a, b| a.stamp.total_cmp(&b.stamp));
+    truth.sort_by(|a, b| a.stamp.total_cmp(&b.stamp));
+    let size = size_of(&moments[0].depth)?;
+    let intrinsics = assumed.intrinsics.unwrap_or_else(|| {
+        remarks.push("7-Scenes' own intrinsics 585,585,320,240 assumed; give --intrinsics".into());
+        INTRINSICS
+    });
+    let code = assumed.code.unwrap_or(CODE);
+    let sensor = assumed_sensor("7-Scenes Kinect", size, intrinsics, code, assumed)?;
+    Ok(Sequence { root: root.to_path_buf(), sensor, moments, truth, remarks })
+}
+
+/// A 4 x 4 matrix, `world_from_camera`; `None` where tracking had failed (not finite).
+fn read_pose(path: &Path) -> Result<Option<Isometry3<f64>>> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+    let numbers: Vec<f64> = text.split_whitespace().filter_map(|w| w.parse().ok()).collect();
+    if numbers.len() != 16 {
+        return Err(Error::Text {
+            path: path.to_path_buf(),
+            line: 0,
+            what: format!("{} numbers, a pose has 4 x 4", numbers.len()),
+            remedy: "restore the file, or take it out",
+        });
+    }
+    if numbers.iter().any(|v| !v.is_finite()) {
+        return Ok(None);
+    }
+    let turn = Matrix3::from_fn(|i, j| numbers[4 * i + j]);
+    // Printed digits leave it a little off a rotation.
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&turn));
+    let shift = Vector3::new(numbers[3], numbers[7], numbers[11]);
+    Ok(Some(Isometry3::from_parts(Translation3::from(shift), rotation)))
+}
