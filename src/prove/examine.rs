@@ -36,6 +36,6 @@ const BASELINES_IN: u64 = 3;
 /// # Errors
 /// When the recording cannot be read, or a prediction does not fit the views.
 pub fn examine_all(sealed: &dyn Sealed, folder: &Path, found: &NoiseModel) -> Result<Examination> {
-    let baselines = sealed.truth().asked.seed % BASELINES_IN == 0;
+    let baselines = sealed.truth().asked.seed.is_multiple_of(BASELINES_IN);
     super::gain::examine_and_name(&sealed.exam(), folder, found, baselines)
 }

@@ -54,7 +54,7 @@ impl Kept {
     }
 
     fn has(&self, feature: u16) -> bool {
-        self.formula.nodes.iter().any(|n| *n == PNode::Var { feature })
+        self.formula.nodes.contains(&PNode::Var { feature })
     }
 
     fn has_sine(&self) -> bool {

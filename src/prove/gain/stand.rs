@@ -58,8 +58,8 @@ impl<'a> Stand<'a> {
 /// disparity; `None` where there is none.
 pub fn plane_of(depth: &[f32], camera: &Camera, rays: &Rays) -> Option<Plane> {
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for i in 0..depth.len().min(camera.pixels()) {
-        let z = f64::from(depth[i]);
+    for (i, z) in depth.iter().take(camera.pixels()).enumerate() {
+        let z = f64::from(*z);
         if z > 0.0 && z.is_finite() {
             let (x, y) = rays.at(i);
             let row = Vector3::new(x, y, 1.0);
