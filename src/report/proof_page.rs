@@ -4,6 +4,7 @@
 mod certainty;
 mod failures;
 mod gains;
+mod goal;
 mod goals;
 mod how;
 mod matrix;

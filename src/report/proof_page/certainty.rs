@@ -33,7 +33,7 @@ pub(super) fn section(scores: &Scores) -> Result<Markup> {
                 (table(certainty))
             } } }
             p.note {
-                "On the diagonal, names stated with 70 % are right in 70 of 100 cases; below it the program is surer than it should be. The number at each \
+                "On the diagonal, names stated with 70 % are right in 70 of 100 cases; below it the program is surer than it should be. The number above each \
                  point counts the names in its tenth; bars are 95 % intervals. ECE: mean distance from the diagonal, by count. Brier: mean \
                  square of probability less outcome."
             }
@@ -72,6 +72,8 @@ struct Reliability<'a> {
 }
 
 const SIDE: u32 = 440;
+/// Room for the counts, units.
+const TOP: i32 = 26;
 const DOT: i32 = 5;
 const CAP: i32 = 4;
 const BLUE: RGBColor = RGBColor(0x1d, 0x91, 0xc0);
@@ -81,7 +83,7 @@ impl Drawing for Reliability<'_> {
     const SIZE: (u32, u32) = (SIDE, SIDE);
 
     fn draw<B: DrawingBackend>(&self, sheet: &Sheet<'_, B>) -> Drawn<B> {
-        let [top, bottom, left, right] = [12, 6, 8, 34].map(|u| sheet.px(u));
+        let [top, bottom, left, right] = [TOP, 6, 8, 16].map(|u| sheet.px(u));
         let area = sheet.root.margin(top, bottom, left, right);
         // Room for points on the border.
         let mut axis = Axis::linear(-0.03, 1.03);
@@ -112,8 +114,8 @@ impl Drawing for Reliability<'_> {
             }
             let (x, y) = at(bin.stated, bin.right);
             sheet.root.draw(&Circle::new((x, y), sheet.px(DOT), BLUE.filled()))?;
-            let beside = (x + sheet.px(DOT + 4), y);
-            sheet.text(&bin.n.to_string(), beside, SMALL, HPos::Left)?;
+            let above = (x, sheet.px(TOP / 2));
+            sheet.text(&bin.n.to_string(), above, SMALL - 2, HPos::Center)?;
         }
         Ok(())
     }

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 use serde_json::Value;
 
 use super::sketch::sketch;
-use super::words::{cell, name, percent, strongest, world};
+use super::words::{cell, count, name, percent, strongest, world};
 use crate::prove::{Cell, Hidden, KeptCurve, Proof, ProvenSet};
 use crate::report::numbers::significant;
 
@@ -63,7 +63,7 @@ impl Fault {
             }
             Fault::SureAndWrong => "A name that is not hidden was given with 0.9 or more.",
             Fault::WrongName => {
-                "Something was seen, and its first name is not one of those hidden."
+                "Something was seen, and the first thing said of it is not one of the hidden names."
             }
             Fault::WronglyClaimed => {
                 "Without a reference distance nothing can be known of this, and something was claimed."
@@ -136,8 +136,8 @@ fn weaker(proof: &Proof) -> Markup {
     let open = proof.sets.iter().filter(|s| s.marks.abstained == Some(false));
     let unlisted = open.filter(|s| faults(s).is_empty() && s.marks.detected == Some(true)).count();
     html! {
-        "Not listed: " (misses) " sets with something hidden below 500 nats (or, in the world of light, of any size) in which nothing was found, and "
-        (unlisted) " causes outside the catalogue that were seen and given no confident name, yet not called unexplained in the right place. Both are in the rates above."
+        "Not listed: " (count(misses, "set")) " with something hidden below 500 nats (or, in the world of light, of any size) in which nothing was found, and "
+        (count(unlisted, "cause")) " outside the catalogue, seen and given no confident name, yet not called unexplained in the right place. Both are in the rates above."
     }
 }
 

@@ -51,13 +51,14 @@ fn honesty(proof: &Proof) -> Markup {
     html! {
         h3 { "What the trial’s worlds share with the tool" }
         ul {
-            li { b { "S1, rays and disparity: " } "the geometry of a plane, two cameras and a disparity, as in any textbook. Its makers of \
-                hidden causes import neither the tool’s catalogue nor its diagnosis, and use other formulas than the catalogue does; the causes are nevertheless \
-                thought of by people who know the catalogue." }
-            li { b { "S2, light: " } "no error formula at all. A speckle pattern is rendered and matched by blocks; a hidden cause is a switch in the optics or \
-                in the matcher, and the answer is which switch. Its strengths are sizes in three steps, not nats." }
-            li { b { "S3, real recordings: " } @if proof.order.real { "what a real sensor took; nothing in it was made by us except what was struck out or added." }
-                @else { b { "not part of this trial: " } "it was held without real recordings." } }
+            li { b { "S1, rays and disparity: " } "the geometry of a plane, two cameras and a disparity, as in any textbook. It uses neither the tool’s \
+                catalogue of effects nor its diagnosis, and other formulas for the same causes; but who wrote it knew the catalogue." }
+            li { b { "S2, light: " } "no formula of an error at all. Dots are projected, seen and matched by blocks, with the tool’s own optical simulator; a hidden cause is a \
+                switch in the optics or in the matcher, and the answer is which switch. Its strengths are sizes in three steps, not nats." }
+            li { b { "S3, real recordings: " } @if proof.order.real {
+                "what a real sensor took. It is the one world whose truth comes from what is on trial: the term that is struck out is one that the tool \
+                 itself had found in the whole recording, and what is transplanted is a cause of S1."
+            } @else { b { "not part of this trial" } ", which was held without real recordings." } }
         }
         h3 { "What a sceptic should still doubt" }
         ul {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use maud::{Markup, html};
 
-use super::words::{cell, percents, word, world};
+use super::words::{bare_percents, cell, word, world};
 use crate::prove::{Cell, Rate, Scores, World};
 
 /// The marks with their heads; a rate of the last group is better small.
@@ -91,7 +91,7 @@ fn row(name: &str, rates: &Rates, bold: bool) -> Markup {
 }
 
 fn figures(rate: &Rate) -> Markup {
-    html! { (rate.k) "/" (rate.n) br; span.units { (percents(rate.interval).trim_end_matches(" %").replace(" to ", "–")) } }
+    html! { (rate.k) "/" (rate.n) br; span.units { (bare_percents(rate.interval)) } }
 }
 
 /// Names that other methods give, judged likewise.

@@ -2,8 +2,9 @@
 
 use maud::{Markup, html};
 
-use super::goals::{goals, level_badge, table};
-use super::words::{percent, percents, ratio};
+use super::goal::{Goal, level_badge, table};
+use super::goals::goals;
+use super::words::{count, percent, percents, ratio};
 use crate::prove::{Endpoint, Level, Proof};
 use crate::report::numbers::{ABSENT, significant};
 
@@ -47,8 +48,8 @@ fn done(proof: &Proof) -> Markup {
             "The hash of every recording and of every answer, salted, was written down "
             b { "before the first diagnosis" } ". A separate process diagnosed each recording; what kept it from the rest of the machine: "
             (confinement(proof)) ". Its verdicts were hashed too, and only then were the answers opened and counted, by rules \
-             whose source text was hashed with the rest. Nothing was repeated, nothing left out"
-            @if failed > 0 { "; " b { (failed) " recordings without a diagnosis count as wrong in every respect" } }
+             whose source text was hashed with the rest. Every recording that was sealed counts"
+            @if failed > 0 { "; " b { (count(failed, "recording")) " without a diagnosis count" @if failed == 1 { "s" } " as wrong in every respect" } }
             "."
         }
     }
@@ -59,17 +60,17 @@ pub(super) fn confinement(proof: &Proof) -> Markup {
         @if proof.confinement.is_empty() { "not recorded" }
         @for (i, (how, sets)) in proof.confinement.iter().enumerate() {
             @if i > 0 { "; " }
-            (how) " (" (sets) @if *sets == 1 { " set)" } @else { " sets)" }
+            (how) " (" (count(*sets, "set")) ")"
         }
     }
 }
 
 /// All that was reached, and all that was not.
 fn sentence(endpoints: &[Endpoint]) -> String {
-    let count =
+    let many =
         |level: Level| endpoints.iter().filter(|e| e.value.is_some() && e.reached == level).count();
     let (best, good, missed) =
-        (count(Level::Extraordinary), count(Level::Good), count(Level::Neither));
+        (many(Level::Extraordinary), many(Level::Good), many(Level::Neither));
     let absent = endpoints.iter().filter(|e| e.value.is_none()).count();
     let shown = endpoints.iter().filter(|e| e.shown > Level::Neither).count();
     let mut text =
@@ -77,7 +78,7 @@ fn sentence(endpoints: &[Endpoint]) -> String {
     if absent > 0 {
         text += &format!(", {absent} not measured");
     }
-    text + &format!("; beyond the reach of chance: {shown}.")
+    text + &format!("; shown beyond chance: {shown}.")
 }
 
 fn title(endpoint: &Endpoint) -> &str {
@@ -109,7 +110,7 @@ fn interval(endpoint: &Endpoint) -> String {
 
 fn marks(endpoint: &Endpoint) -> [String; 2] {
     let sign = if endpoint.id == "false-alarms" { "≤" } else { "≥" };
-    endpoint.marks.map(|m| format!("{sign} {}", number(endpoint, m)))
+    endpoint.marks.map(|m| format!("{sign}\u{a0}{}", number(endpoint, m)))
 }
 
 fn reached(endpoint: &Endpoint) -> Option<Level> {
@@ -126,7 +127,7 @@ fn endpoints(all: &[Endpoint]) -> Markup {
             tbody { @for e in all {
                 @let [good, best] = marks(e);
                 tr {
-                    th scope="row" { b { (title(e)) } p.note { (e.words) } }
+                    th scope="row" { b { (title(e)) } }
                     td.n.big { (e.value.map_or(ABSENT.into(), |v| number(e, v))) }
                     td.n { (interval(e)) }
                     td.n { (e.n) }
@@ -137,6 +138,7 @@ fn endpoints(all: &[Endpoint]) -> Markup {
                 }
             } }
         } }
+        details { summary { "The five, word for word as they were sealed" } ol { @for e in all { li { (e.words) } } } }
         p.note {
             "Intervals of shares are Clopper and Pearson’s, of medians by resampling sets. “Beyond chance”: the best mark that a \
              tool which only just misses it would reach with less than 5 %, after Holm’s correction for five figures. A mark can be \
@@ -156,7 +158,7 @@ fn beyond_chance(endpoint: &Endpoint) -> Markup {
     }
 }
 
-fn short(proof: &Proof, goals: &[super::goals::Goal]) -> Markup {
+fn short(proof: &Proof, goals: &[Goal]) -> Markup {
     let endpoints: Vec<&Endpoint> =
         proof.scores.endpoints.iter().filter(|e| reached(e) == Some(Level::Neither)).collect();
     let missed: Vec<_> = goals.iter().filter(|g| g.reached() == Some(Level::Neither)).collect();
@@ -169,10 +171,10 @@ fn short(proof: &Proof, goals: &[super::goals::Goal]) -> Markup {
         ul {
             @for e in &endpoints {
                 li { b { (title(e)) } ": " (e.value.map_or(ABSENT.into(), |v| number(e, v)))
-                    " (95 % interval " (interval(e)) ", " (e.n) " sets); asked for: " (marks(e)[0]) ". " b { "Chosen beforehand." } }
+                    " (95 % interval " (interval(e)) ", " (count(e.n, "set")) "); asked for: " (marks(e)[0]) ". " b { "Chosen beforehand." } }
             }
             @for goal in &missed { li { b { (goal.what) } ": " (goal.in_words()) "." } }
         }
-        @if !absent.is_empty() { p.note { "No set asks for, so not measured: " (absent.join("; ")) "." } }
+        @if !absent.is_empty() { p.note { "Not measured in this trial, for want of sets or of anything to compare with: " (absent.join("; ")) "." } }
     }
 }

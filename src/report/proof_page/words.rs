@@ -9,20 +9,31 @@ use crate::report::numbers::fixed;
 const FINE: f64 = 0.1;
 
 pub(super) fn percent(share: f64) -> String {
-    format!("{} %", bare_percent(share))
+    format!("{}\u{a0}%", bare_percent(share))
 }
 
 /// Without its sign.
 fn bare_percent(share: f64) -> String {
     let near_an_end = share > 0.0 && share < FINE || share > 1.0 - FINE && share < 1.0;
-    let percent = 100.0 * share;
-    let whole = (percent - percent.round()).abs() < 1e-9;
-    fixed(percent, usize::from(near_an_end && !whole))
+    let fine = fixed(100.0 * share, 1);
+    match fine.strip_suffix(".0") {
+        Some("0" | "100") | None if near_an_end => fine,
+        _ => fixed(100.0 * share, 0),
+    }
 }
 
 /// `0.3 to 48 %`.
 pub(super) fn percents([low, high]: [f64; 2]) -> String {
     format!("{} to {}", bare_percent(low), percent(high))
+}
+
+/// `0.3–48`, where the head says that it is percent.
+pub(super) fn bare_percents(ends: [f64; 2]) -> String {
+    ends.map(bare_percent).join("–")
+}
+
+pub(super) fn count(n: usize, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
 pub(super) fn of(rate: &Rate) -> String {
@@ -114,10 +125,12 @@ mod tests {
             (0.5, "50 %"),
             (0.111, "11 %"),
             (0.9953, "99.5 %"),
+            (0.9496, "95 %"),
+            (0.9999, "100.0 %"),
             (1.0, "100 %"),
             (f64::NAN, "– %"),
         ] {
-            assert_eq!(percent(share), text);
+            assert_eq!(percent(share).replace('\u{a0}', " "), text);
         }
         assert_eq!((ratio(-1e-9), ratio(-0.5)), ("0.00".into(), "−0.50".into()));
     }
