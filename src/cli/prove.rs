@@ -4,15 +4,18 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use kinoise::prove::{CheckOptions, Trial, check, examine_all, prove};
+use kinoise::io::write_atomic;
+use kinoise::prove::{CheckOptions, Proof, Trial, check, examine_all, kept_curve, prove};
+use kinoise::report::{ProofPage, proof_page};
 
 use super::common::{Bar, Global, say};
 use super::prove_words;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Folder for seal.json, verdicts.json, proof.json; a trial that was interrupted goes on there
-    #[arg(short, long, value_name = "DIR", required_unless_present = "check")]
+    /// Folder for seal.json, verdicts.json, proof.json and report.html; a trial that was interrupted
+    /// goes on there
+    #[arg(short, long, value_name = "DIR", required_unless_present_any = ["check", "page"])]
     output: Option<PathBuf>,
     /// How many sets; their kinds keep their shares
     #[arg(long, value_name = "N", default_value_t = 60)]
@@ -29,6 +32,9 @@ pub struct Arguments {
     /// Check the proof in DIR: seals, hashes, marks, scores, and a sample of sets made again
     #[arg(long, value_name = "DIR", conflicts_with_all = ["output", "sets", "keep", "limit"])]
     check: Option<PathBuf>,
+    /// Draw report.html of the finished trial in DIR again
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["output", "sets", "data", "keep", "limit", "check"])]
+    page: Option<PathBuf>,
     /// With --check: make every set again
     #[arg(long, requires = "check")]
     all: bool,
@@ -42,11 +48,26 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
         bail!("{}: no folder is here; give --data the folder of the recordings", data.display());
     }
     let program = std::env::current_exe().context("where this program lies")?;
-    match (&arguments.check, &arguments.output) {
-        (Some(folder), _) => again(folder, program, arguments, global),
-        (None, Some(output)) => trial(output, program, arguments, global),
-        (None, None) => bail!("no folder was given; say -o DIR, or --check DIR"),
+    match (&arguments.check, &arguments.page, &arguments.output) {
+        (Some(folder), _, _) => again(folder, program, arguments, global),
+        (None, Some(folder), _) => page(folder),
+        (None, None, Some(output)) => trial(output, program, arguments, global),
+        (None, None, None) => bail!("no folder was given; say -o DIR, --check DIR or --page DIR"),
     }
+}
+
+/// The page of the proof as it lies in the folder, whoever wrote it.
+fn page(folder: &Path) -> anyhow::Result<u8> {
+    let proof = Proof::read(folder)?;
+    let text = proof_page(&ProofPage {
+        title: "A blind trial of kinoise diagnose",
+        proof: &proof,
+        curve: &|set| kept_curve(folder, set),
+    })?;
+    let path = folder.join("report.html");
+    write_atomic(&path, text.as_bytes())?;
+    say(format!("wrote {}", path.display()));
+    Ok(0)
 }
 
 fn trial(
@@ -74,7 +95,7 @@ fn trial(
     drop(bars);
     global.print_json(&serde_json::to_value(&proof.scores)?)?;
     say(prove_words::summary(&proof));
-    Ok(0)
+    page(&trial.output)
 }
 
 fn again(
