@@ -43,8 +43,11 @@ fn row(set: &ProvenSet) -> Option<(u8, String)> {
         (Cell::Drift, _) => Some((1, "the unit’s own noise has changed".into())),
         (Cell::Blind, _) => None,
         (_, []) => Some((0, "nothing hidden".into())),
-        (Cell::Single, [one]) => Some((2, name(one).into())),
-        (Cell::Outside, [one]) => Some((3, format!("outside: {}", name(one)))),
+        // The world of light has switches that the catalogue lacks.
+        (Cell::Single | Cell::Outside, [one]) if one.names.is_empty() => {
+            Some((3, format!("outside: {}", name(one))))
+        }
+        (Cell::Single | Cell::Outside, [one]) => Some((2, name(one).into())),
         _ => None,
     }
 }

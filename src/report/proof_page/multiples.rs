@@ -22,11 +22,9 @@ const TICKS: [f64; 4] = [5.0, 50.0, 500.0, 5000.0];
 pub(super) fn section(sets: &[ProvenSet]) -> Markup {
     let mut causes: BTreeMap<(bool, &str), Vec<&ProvenSet>> = BTreeMap::new();
     for set in sets {
-        let outside = set.truth.asked.cell == Cell::Outside;
-        if let (true, [one]) =
-            (outside || set.truth.asked.cell == Cell::Single, &set.truth.hidden[..])
-        {
-            causes.entry((outside, name(one))).or_default().push(set);
+        let single = matches!(set.truth.asked.cell, Cell::Single | Cell::Outside);
+        if let (true, [one]) = (single, &set.truth.hidden[..]) {
+            causes.entry((one.names.is_empty(), name(one))).or_default().push(set);
         }
     }
     html! {
