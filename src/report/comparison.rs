@@ -1,7 +1,8 @@
 //! Figures 6 to 8 and the page of a comparison.
 
-use maud::{DOCTYPE, PreEscaped, html};
+use maud::{PreEscaped, html};
 
+use super::document::document;
 use super::lines::{Line, LineFigure};
 use crate::compare::{Comparison, Row, Run, tables};
 use crate::error::Result;
@@ -33,29 +34,19 @@ pub fn comparison_figures(comparison: &Comparison) -> Result<Vec<(&'static str, 
 /// When plotters fails.
 pub fn comparison_page(comparison: &Comparison) -> Result<String> {
     let figures = comparison_figures(comparison)?;
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { "Mapping " (comparison.sequence) }
-                style { (PreEscaped(include_str!("page.css"))) }
-            }
-            body { main {
-                h1 { "Mapping " (comparison.sequence) ", variant by variant" }
-                p { "The first four rows are the paper's variants with the parameters of its Table II; those below \
-                    go past it, one step at a time. Errors are computed as the scripts of the TUM benchmark do." }
-                div.wide { pre { (tables(comparison)) } }
-                @for (_, svg) in &figures { figure { div.wide { (PreEscaped(svg)) } } }
-                @if !comparison.remarks.is_empty() {
-                    h2 { "Notes" }
-                    ul { @for remark in &comparison.remarks { li { (remark) } } }
-                }
-            } }
+    let body = html! {
+        h1 { "Mapping " (comparison.sequence) ", variant by variant" }
+        p { "The first four rows are the paper's variants with the parameters of its Table II; those below \
+            go past it, one step at a time. Errors are computed as the scripts of the TUM benchmark do." }
+        div.wide { pre { (tables(comparison)) } }
+        @for (_, svg) in &figures { figure { div.wide { (PreEscaped(svg)) } } }
+        @if !comparison.remarks.is_empty() {
+            h2 { "Notes" }
+            ul { @for remark in &comparison.remarks { li { (remark) } } }
         }
     };
-    Ok(page.into_string())
+    let title = format!("Mapping {}", comparison.sequence);
+    Ok(document(&title, None, &body).into_string())
 }
 
 /// The rows that are drawn: the paper's, and the last way past it.

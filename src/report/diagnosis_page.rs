@@ -11,12 +11,15 @@ mod pictures;
 mod verdict;
 mod words;
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 pub use pictures::Picture;
 
+use super::document::{Kind, document};
 use crate::diagnose::{Diagnosis, Reference, Verdict};
 use crate::error::Result;
+
+const KIND: Kind = Kind { class: "diagnosis", style: include_str!("diagnosis_page.css") };
 
 /// What the page is about.
 #[derive(Debug, Clone, Copy)]
@@ -45,22 +48,7 @@ pub fn diagnosis_page(page: &DiagnosisPage<'_>) -> Result<String> {
         (pictures::section(page.pictures)?)
         (proof(diagnosis))
     };
-    Ok(skeleton(page.title, &body).into_string())
-}
-
-fn skeleton(title: &str, body: &Markup) -> Markup {
-    html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (title) }
-                style { (PreEscaped(include_str!("page.css"))) (PreEscaped(include_str!("diagnosis_page.css"))) }
-            }
-            body.diagnosis { main { (body) } }
-        }
-    }
+    Ok(document(page.title, Some(KIND), &body).into_string())
 }
 
 fn heading(page: &DiagnosisPage<'_>) -> Markup {

@@ -7,8 +7,9 @@ mod summary;
 mod views;
 mod warnings;
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
 
+use super::document::document;
 use super::figure2::{Figure2, Overlay};
 use super::sigma_map::SigmaMap;
 use crate::calibrate::{Calibration, Measurements};
@@ -56,22 +57,7 @@ pub fn calibration_page(input: &CalibrationPage<'_>) -> Result<String> {
         }
         (provenance::section(&calibration.model.provenance))
     };
-    Ok(page(input.title, &body).into_string())
-}
-
-fn page(title: &str, body: &Markup) -> Markup {
-    html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (title) }
-                style { (PreEscaped(include_str!("page.css"))) }
-            }
-            body { main { (body) } }
-        }
-    }
+    Ok(document(input.title, None, &body).into_string())
 }
 
 fn heading(input: &CalibrationPage<'_>) -> Markup {

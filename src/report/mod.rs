@@ -8,6 +8,7 @@ mod base64;
 mod colours;
 mod comparison;
 mod diagnosis_page;
+mod document;
 mod figure2;
 mod html;
 mod lines;

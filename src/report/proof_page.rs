@@ -16,10 +16,13 @@ mod strips;
 mod summary;
 mod words;
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::html;
 
+use super::document::{Kind, document};
 use crate::error::Result;
 use crate::prove::{KeptCurve, Proof, ProvenSet};
+
+const KIND: Kind = Kind { class: "proof", style: include_str!("proof_page.css") };
 
 /// What the page is about.
 pub struct ProofPage<'a> {
@@ -48,22 +51,7 @@ pub fn proof_page(page: &ProofPage<'_>) -> Result<String> {
         (failures::section(proof, page.curve))
         (how::section(proof))
     };
-    Ok(skeleton(page.title, &body).into_string())
-}
-
-fn skeleton(title: &str, body: &Markup) -> Markup {
-    html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (title) }
-                style { (PreEscaped(include_str!("page.css"))) (PreEscaped(include_str!("proof_page.css"))) }
-            }
-            body.proof { main { (body) } }
-        }
-    }
+    Ok(document(page.title, Some(KIND), &body).into_string())
 }
 
 #[cfg(test)]
