@@ -16,6 +16,7 @@ use super::partners::{Pose, partners};
 use super::pixels::{common, fixed_px2, measure_tails};
 use super::reading::read;
 use super::rim;
+use super::scatter::{Left, left_by_fit};
 use super::search::ViewData;
 use super::steps::{Steps, lattice};
 use super::structure::{Structure, structures};
@@ -60,11 +61,7 @@ fn scatter(view: &ViewData) -> f64 {
         root[i] * [1.0, view.places[i].x, view.places[i].y][k]
     });
     let y = nalgebra::DVector::from_fn(n, |i, _| root[i] * view.response[i]);
-    let svd = x.clone().svd(true, true);
-    let tiny = 1e-6 * svd.singular_values.max();
-    let free = (n - svd.rank(tiny)) as f64;
-    let Ok(beta) = svd.solve(&y, tiny) else { return 1.0 };
-    let chi2 = (&y - x * beta).norm_squared();
+    let Some(Left { squares: chi2, free }) = left_by_fit(x, &y) else { return 1.0 };
     // Four standard deviations beyond what chance makes.
     if chi2 > free + 4.0 * (2.0 * free).sqrt() { chi2 / free } else { 1.0 }
 }

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::bias;
 use super::field::Field;
 use super::reach::Reach;
+use super::scatter::{Left, left_by_fit};
 use super::search::{Outcome, Rules, ViewData, search};
 use super::smooth::{SMOOTH_PX, high_pass};
 use super::tiles::{SIDE, Tile, tiles};
@@ -461,12 +462,9 @@ fn view_scatter(blocks: &[Blocks], tolerance: f64) -> f64 {
     }
     let x = DMatrix::from_fn(n, orders, |i, k| laws(levels[i].0)[k]);
     let y = DVector::from_fn(n, |i, _| levels[i].1);
-    // By SVD: views of one distance or one tilt leave laws without a meaning.
-    let svd = x.clone().svd(true, true);
-    let tiny = 1e-6 * svd.singular_values.max();
-    let Ok(beta) = svd.solve(&y, tiny) else { return floor };
-    let free = (n - svd.rank(tiny)) as f64;
-    let left = (&y - x * beta).norm_squared() / free;
+    // Views of one distance or one tilt leave laws without a meaning.
+    let Some(Left { squares, free }) = left_by_fit(x, &y) else { return floor };
+    let left = squares / free;
     let sampling = levels.iter().map(|l| l.2).sum::<f64>() / n as f64;
     let enlarged = if free > 3.0 { free / (free - 2.0) } else { 3.0 };
     ((left - sampling) * enlarged).max(floor)

@@ -29,6 +29,7 @@ mod reach;
 mod reading;
 mod reference;
 mod rim;
+mod scatter;
 mod search;
 mod shadow;
 mod shadow_test;
