@@ -2,10 +2,12 @@
 
 mod binomial;
 mod correlation;
+mod quantile;
 mod truncated;
 
 pub use binomial::{at_least, at_most, clopper_pearson};
 pub use correlation::{Correlation, measure_correlation};
+pub use quantile::quantile;
 pub use truncated::{normal_cut_factor, std_unbias};
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};

@@ -3,13 +3,13 @@
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-use super::learnt::{BEYOND, Side, WITHIN, quantile, ratio};
-use super::scores::{Judged, level};
+use super::learnt::{BEYOND, Side, WITHIN, ratio};
+use super::scores::{Judged, worth};
 use crate::prove::examine::OUR_METHOD;
 use crate::prove::gains::Gains;
 use crate::prove::question::{Cell, World};
 use crate::rng::Seed;
-use crate::stats::{at_least, at_most, clopper_pearson};
+use crate::stats::{at_least, at_most, clopper_pearson, quantile};
 
 /// How far a figure got.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -105,16 +105,16 @@ struct Figure {
 
 pub fn endpoints(sets: &[Judged<'_>]) -> Vec<Endpoint> {
     let alarms: Vec<bool> = sets.iter().filter_map(|s| s.marks.false_alarm).collect();
-    let worth = |s: &Judged<'_>| level(s.truth).is_some_and(|l| l >= 50.0);
     let names: Vec<bool> = sets
         .iter()
         .filter(|s| s.truth.asked.cell == Cell::Single && s.truth.asked.world != World::Real)
-        .filter(|s| worth(s) && s.marks.detected == Some(true))
+        .filter(|s| worth(s.truth) && s.marks.detected == Some(true))
         .filter_map(|s| s.marks.first_name)
         .collect();
     let open: Vec<bool> =
-        sets.iter().filter(|s| worth(s)).filter_map(|s| s.marks.abstained).collect();
-    let gains: Vec<&Gains> = sets.iter().filter(|s| worth(s)).filter_map(|s| s.gains).collect();
+        sets.iter().filter(|s| worth(s.truth)).filter_map(|s| s.marks.abstained).collect();
+    let gains: Vec<&Gains> =
+        sets.iter().filter(|s| worth(s.truth)).filter_map(|s| s.gains).collect();
     let [a, b, c, d, e] = &QUESTIONS;
     let figures = [
         share(&alarms, a.marks, true),

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::prove::gains::{Gain, Gains};
+use crate::stats::quantile;
 
 /// Gains of one method over the oracle's, over sets.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -65,13 +66,4 @@ pub fn learnt(all: &[&Gains]) -> BTreeMap<String, Learnt> {
             (name.clone(), learnt)
         })
         .collect()
-}
-
-/// By interpolation between the sorted values; sorts them.
-pub fn quantile(values: &mut [f64], p: f64) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let at = p * (values.len().checked_sub(1)?) as f64;
-    let (i, rest) = (at.floor() as usize, at.fract());
-    let next = values.get(i + 1).unwrap_or(&values[i]);
-    Some(values[i] + rest * (next - values[i]))
 }

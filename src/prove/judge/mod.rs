@@ -15,10 +15,10 @@ pub use certainty::{Bin, Certainty};
 pub use endpoints::{Endpoint, Level, endpoints_in_words};
 pub use learnt::{Learnt, Ratio};
 pub use marks::{Marks, Names, ParameterMark, Stated, mark};
-pub use scores::{Judged, Rate, Scores, scores};
+pub use scores::{Judged, LEVELS, Rate, Scores, scores, worth};
 
 /// What is hashed into the seal.
-pub const JUDGE_SOURCE: [(&str, &str); 9] = [
+pub const JUDGE_SOURCE: [(&str, &str); 10] = [
     ("judge/case.rs", include_str!("case.rs")),
     ("judge/certainty.rs", include_str!("certainty.rs")),
     ("judge/endpoints.rs", include_str!("endpoints.rs")),
@@ -27,5 +27,6 @@ pub const JUDGE_SOURCE: [(&str, &str); 9] = [
     ("judge/mod.rs", include_str!("mod.rs")),
     ("judge/places.rs", include_str!("places.rs")),
     ("judge/scores.rs", include_str!("scores.rs")),
+    ("stats/quantile.rs", include_str!("../../stats/quantile.rs")),
     ("verdict.rs", include_str!("../verdict.rs")),
 ];

@@ -6,11 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use super::certainty::Certainty;
 use super::endpoints::{Endpoint, endpoints};
-use super::learnt::{Learnt, learnt, quantile};
+use super::learnt::{Learnt, learnt};
 use super::marks::{Marks, names_alone};
 use crate::prove::gains::Gains;
 use crate::prove::question::{Cell, Truth};
-use crate::stats::clopper_pearson;
+use crate::stats::{clopper_pearson, quantile};
 
 /// A set that was judged.
 #[derive(Debug, Clone, Copy)]
@@ -113,7 +113,7 @@ pub fn scores(sets: &[Judged<'_>]) -> Scores {
 }
 
 /// Strengths as they are ordered, nats.
-const LEVELS: [f64; 6] = [5.0, 15.0, 50.0, 150.0, 500.0, 5000.0];
+pub const LEVELS: [f64; 6] = [5.0, 15.0, 50.0, 150.0, 500.0, 5000.0];
 
 /// What the weakest hidden cause is worth, as the nearest of the strengths that are ordered; what
 /// its world says it reached, else what was ordered.
@@ -122,6 +122,15 @@ pub fn level(truth: &Truth) -> Option<f64> {
     let least = nats.reduce(f64::min).filter(|n| *n > 0.0)?;
     let away = |l: &f64| (least / l).ln().abs();
     LEVELS.into_iter().min_by(|a, b| away(a).total_cmp(&away(b)))
+}
+
+/// The least strength at which a cause is worth knowing, nats.
+const WORTH_NATS: f64 = 50.0;
+
+/// Every hidden cause is worth [`WORTH_NATS`] or more, rounded as [`level`] does; `false` where nothing
+/// is hidden.
+pub fn worth(truth: &Truth) -> bool {
+    level(truth).is_some_and(|nats| nats >= WORTH_NATS)
 }
 
 /// As in the files.

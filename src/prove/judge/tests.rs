@@ -211,3 +211,16 @@ fn what_its_world_reached_counts_not_what_was_ordered() {
     truth.hidden[0].nats = Some(19.0);
     assert_eq!(super::scores::level(&truth), Some(15.0));
 }
+
+/// The border between two strengths is their geometric mean, for 15 and 50 the root of 750.
+#[test]
+fn fifty_begins_half_way_from_fifteen() {
+    let limit = 750f64.sqrt();
+    let mut truth = truth(Cell::Pair, &["vignetting", "lens-distortion"], 150.0);
+    for (nats, is_worth) in [(1.0001 * limit, true), (0.9999 * limit, false), (0.0, false)] {
+        truth.hidden[1].nats = Some(nats);
+        assert_eq!(super::worth(&truth), is_worth, "{nats}");
+    }
+    truth.hidden.clear();
+    assert!(!super::worth(&truth), "nothing is hidden");
+}

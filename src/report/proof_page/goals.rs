@@ -1,8 +1,9 @@
 //! The marks beside the five endpoints: what was hoped for, what came.
 
 use super::goal::{Bound, Goal, figure, least, most, share};
-use super::words::worth;
-use crate::prove::{Cell, Judged, Learnt, OUR_METHOD, Proof, ProvenSet, Rate, World, scores};
+use crate::prove::{
+    Cell, Judged, Learnt, OUR_METHOD, Proof, ProvenSet, Rate, World, scores, worth,
+};
 
 /// A yes or no of the judge over some of the sets.
 fn among(

@@ -9,7 +9,7 @@ use plotters::style::text_anchor::HPos;
 use super::multiples;
 use super::words::{judged_alone, level, of, percents, world};
 use crate::error::Result;
-use crate::prove::{Cell, Judged, Proof, ProvenSet, Rate, World, scores};
+use crate::prove::{Cell, Judged, LEVELS, Proof, ProvenSet, Rate, World, scores};
 use crate::report::axis::Axis;
 use crate::report::colours::{FAINT, GRID, INK};
 use crate::report::numbers::ABSENT;
@@ -110,7 +110,6 @@ const BAND_OPACITY: f64 = 0.18;
 const DOT: i32 = 4;
 /// Nats at both ends of the axis.
 const ENDS: [f64; 2] = [4.0, 6300.0];
-const LEVELS: [f64; 6] = [5.0, 15.0, 50.0, 150.0, 500.0, 5000.0];
 /// Half the length of a mark, as a factor in nats.
 const REACH: f64 = 1.18;
 const BLUE: RGBColor = RGBColor(0x1d, 0x91, 0xc0);

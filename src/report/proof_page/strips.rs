@@ -6,12 +6,12 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::gains::rank;
-use super::words::worth;
 use crate::error::Result;
-use crate::prove::{ProvenSet, Ratio, scores};
+use crate::prove::{ProvenSet, Ratio, scores, worth};
 use crate::report::axis::Axis;
 use crate::report::colours::{FAINT, GRID, INK};
 use crate::report::sheet::{self, Drawing, Drawn, Pixel, SMALL, Sheet, TEXT};
+use crate::stats::quantile;
 
 /// Sorted gains over the oracle's, within and beyond.
 type Both = [Vec<f64>; 2];
@@ -60,13 +60,6 @@ const LOW: f64 = -1.1;
 const HIGH: f64 = 1.4;
 const BLUE: RGBColor = RGBColor(0x1d, 0x91, 0xc0);
 const HEADS: [&str; 2] = ["views like the recording’s", "views outside it"];
-
-/// By interpolation in sorted values.
-fn quantile(sorted: &[f64], p: f64) -> Option<f64> {
-    let at = p * sorted.len().checked_sub(1)? as f64;
-    let low = sorted[at.floor() as usize];
-    Some(low + at.fract() * (sorted[at.ceil() as usize] - low))
-}
 
 /// From a value and the middle of a row to a place.
 type Place<'a> = &'a dyn Fn(f64) -> i32;
@@ -124,8 +117,9 @@ fn strip<B: DrawingBackend>(
         let at = (place(*v), y + sheet.px(SPREAD) * off / 4);
         sheet.root.draw(&Circle::new(at, sheet.px(DOT), BLUE.mix(0.45).filled()))?;
     }
+    let mut values = sorted.to_vec();
     let Some(five) = [0.1, 0.25, 0.5, 0.75, 0.9]
-        .map(|p| quantile(sorted, p))
+        .map(|p| quantile(&mut values, p))
         .into_iter()
         .collect::<Option<Vec<f64>>>()
     else {

@@ -85,21 +85,10 @@ pub(super) fn name(hidden: &Hidden) -> &str {
     hidden.names.first().unwrap_or(&hidden.form)
 }
 
-/// Nats of the hidden causes: what their world reached, else what was ordered.
-fn nats(truth: &Truth) -> impl Iterator<Item = f64> {
-    truth.hidden.iter().filter_map(|h| h.nats.or(truth.asked.nats)).filter(|n| *n > 0.0)
-}
-
+/// Nats of the strongest hidden cause: what its world reached, else what was ordered.
 pub(super) fn strongest(truth: &Truth) -> Option<f64> {
-    nats(truth).reduce(f64::max)
-}
-
-/// The judge's 50 nats: nearer, as a ratio, to 50 than to the 15 below it.
-const NEARER_FIFTY: f64 = 27.386_127_875_258_307;
-
-/// Every hidden cause is worth 50 nats or more, as the judge rounds strengths.
-pub(super) fn worth(truth: &Truth) -> bool {
-    nats(truth).reduce(f64::min).is_some_and(|n| n >= NEARER_FIFTY)
+    let nats = truth.hidden.iter().filter_map(|h| h.nats.or(truth.asked.nats));
+    nats.filter(|n| *n > 0.0).reduce(f64::max)
 }
 
 /// For scores of a part of the sets, without what was gained.
@@ -133,10 +122,5 @@ mod tests {
             assert_eq!(percent(share).replace('\u{a0}', " "), text);
         }
         assert_eq!((ratio(-1e-9), ratio(-0.5)), ("0.00".into(), "−0.50".into()));
-    }
-
-    #[test]
-    fn fifty_begins_half_way_from_fifteen() {
-        approx::assert_relative_eq!(NEARER_FIFTY, 750f64.sqrt(), max_relative = 1e-12);
     }
 }
