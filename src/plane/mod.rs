@@ -9,6 +9,7 @@
 mod affine;
 mod candidate;
 mod grow;
+mod normal_equations;
 mod principal_point;
 mod ransac;
 mod relief;
@@ -18,6 +19,7 @@ mod target;
 
 pub(crate) use affine::MAD_TO_SIGMA;
 pub use affine::{AffineFit, Effort, fit_affine_robust};
+pub(crate) use normal_equations::NormalEquations;
 pub use ransac::{
     Consensus, Estimator, InlierCount, Points, RansacOptions, RansacPlane, UniformSampler,
     ransac_plane,

@@ -1,8 +1,9 @@
 //! Least squares with every view's plane taken out, and noise whose logarithm is linear.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::tiles::{Tile, Tiles};
+use crate::plane::NormalEquations;
 
 /// Columns of a design, one row a tile.
 pub(super) struct Design {
@@ -19,14 +20,11 @@ fn weight(tile: &Tile) -> f64 {
 fn without_planes(tiles: &Tiles, column: &mut [f64]) {
     for range in &tiles.views {
         let (tiles, column) = (&tiles.tiles[range.clone()], &mut column[range.clone()]);
-        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        let mut sums = NormalEquations::default();
         for (t, c) in tiles.iter().zip(column.iter()) {
-            let row = Vector3::new(t.place.x, t.place.y, 1.0);
-            let w = weight(t);
-            normal += w * row * row.transpose();
-            right += w * *c * row;
+            sums.add(&Vector3::new(t.place.x, t.place.y, 1.0), *c, weight(t));
         }
-        let plane = normal.cholesky().map_or_else(Vector3::zeros, |c| c.solve(&right));
+        let plane = sums.solve().unwrap_or_else(Vector3::zeros);
         for (t, c) in tiles.iter().zip(column) {
             *c -= plane.dot(&Vector3::new(t.place.x, t.place.y, 1.0));
             *c *= weight(t).sqrt();

@@ -1,8 +1,9 @@
 //! The expected log score of a prediction, and the two ends of its scale.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use crate::error::{Error, Result};
+use crate::plane::NormalEquations;
 use crate::prove::Gain;
 use crate::prove::question::{ExamView, Predictor};
 
@@ -123,15 +124,13 @@ fn pixels(view: &ExamView, predictor: &dyn Predictor) -> Result<Vec<Scored>> {
 /// What the user's plane takes of the error: affine in inverse depth, weighed by the predicted
 /// variance.
 fn plane(pixels: &[Scored]) -> Option<Vector3<f64>> {
-    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    let mut sums = NormalEquations::default();
     for p in pixels {
         // An error of depth by s is one of inverse depth by s / z^2.
         let weight = (p.z * p.z / p.predicted).powi(2);
-        let row = Vector3::new(p.x, p.y, 1.0);
-        normal += weight * row * row.transpose();
-        right += weight * p.error * row;
+        sums.add(&Vector3::new(p.x, p.y, 1.0), p.error, weight);
     }
-    normal.cholesky().map(|c| c.solve(&right)).filter(|q| q.iter().all(|v| v.is_finite()))
+    sums.solve().filter(|q| q.iter().all(|v| v.is_finite()))
 }
 
 fn expected(p: &Scored, q: &Vector3<f64>) -> f64 {

@@ -1,10 +1,10 @@
 //! Where the pixels of a view of a plane lie on every axis.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use crate::camera::{Camera, Rays};
 use crate::correct::Conditions;
-use crate::plane::Plane;
+use crate::plane::{NormalEquations, Plane};
 use crate::scene::TargetFrame;
 use crate::terms::{Pixels, Place, edge_distances};
 
@@ -57,15 +57,13 @@ impl<'a> Stand<'a> {
 /// The plane through a picture's depth (m, NaN where there is none), with weights that are even in
 /// disparity; `None` where there is none.
 pub fn plane_of(depth: &[f32], camera: &Camera, rays: &Rays) -> Option<Plane> {
-    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    let mut sums = NormalEquations::default();
     for (i, z) in depth.iter().take(camera.pixels()).enumerate() {
         let z = f64::from(*z);
         if z > 0.0 && z.is_finite() {
             let (x, y) = rays.at(i);
-            let row = Vector3::new(x, y, 1.0);
-            normal += row * row.transpose();
-            right += row / z;
+            sums.add(&Vector3::new(x, y, 1.0), 1.0 / z, 1.0);
         }
     }
-    normal.cholesky().map(|c| Plane::new(c.solve(&right))).filter(Plane::is_finite)
+    sums.solve().map(Plane::new).filter(Plane::is_finite)
 }

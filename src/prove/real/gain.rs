@@ -1,11 +1,12 @@
 //! What who knows a cause gains by it on a real recording, nats, and the strength for a gain.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::change::Graft;
 use super::full::{Full, area};
 use super::scene::{Camera, Scene};
+use crate::plane::NormalEquations;
 
 /// Pixels are looked at so far apart, px: every cause is wider.
 const APART: usize = 5;
@@ -41,7 +42,8 @@ fn of_view(
     let seen = &full.seen[k];
     let scene = Scene::new(camera, seen.plane, session_s(full, k));
     let width = camera.sensor.camera.width;
-    let mut off = Vec::new();
+    let mut off = NormalEquations::default();
+    let mut looked = 0.0;
     let (mut noisier, mut lost, mut row) = (0.0, 0.0, Vec::new());
     for &i in &seen.pixels {
         let i = i as usize;
@@ -54,11 +56,12 @@ fn of_view(
         let r2 = there.spread.max(1.0).powi(2) + (there.tremble / sigma).powi(2);
         noisier += 0.5 * (r2 - 1.0 - r2.ln());
         lost += there.loss;
-        off.push((Vector3::new(site.x, site.y, 1.0) / sigma, there.shift / sigma));
+        off.add(&(Vector3::new(site.x, site.y, 1.0) / sigma), there.shift / sigma, 1.0);
+        looked += 1.0;
     }
     let each = (APART * APART * full.recording.views[k].depth.len()) as f64;
-    let nats = each * (0.5 * beside_a_plane(&off) / mean_area + noisier / variance_area);
-    (Gain { nats, lost }, off.len() as f64)
+    let nats = each * (0.5 * off.left() / mean_area + noisier / variance_area);
+    (Gain { nats, lost }, looked)
 }
 
 /// Since the recording began, s.
@@ -66,18 +69,6 @@ pub(super) fn session_s(full: &Full, k: usize) -> f64 {
     let stamps = |k: usize| full.recording.views[k].depth.iter().map(|f| f.timestamp);
     let begin = (0..full.recording.views.len()).flat_map(stamps).fold(f64::INFINITY, f64::min);
     stamps(k).next().map_or(0.0, |t| t - begin)
-}
-
-/// Sum of squares that no plane takes up.
-fn beside_a_plane(rows: &[(Vector3<f64>, f64)]) -> f64 {
-    let (mut normal, mut right, mut square) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
-    for (x, y) in rows {
-        normal += x * x.transpose();
-        right += x * *y;
-        square += y * y;
-    }
-    let taken = normal.cholesky().map_or(square, |c| right.dot(&c.solve(&right)));
-    (square - taken).max(0.0)
 }
 
 const WEAKEST: f64 = 0.01;
