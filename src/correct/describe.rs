@@ -8,7 +8,7 @@ use super::again::Again;
 use super::recording::Job;
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
-use crate::io::{DESCRIPTION, Layout, write_atomic, write_recording_file};
+use crate::io::{DESCRIPTION, Layout, pretty_json, write_atomic, write_recording_file};
 use crate::view::Sensor;
 
 impl Again<'_> {
@@ -55,7 +55,5 @@ fn with_code(text: &str, code: &DepthCode) -> Result<String> {
         map.insert("units_per_metre".into(), json!(units_per_metre));
         map.insert("invalid".into(), json!(invalid));
     }
-    let mut text = serde_json::to_string_pretty(&value).map_err(failed)?;
-    text.push('\n');
-    Ok(text)
+    pretty_json(&value).map_err(failed)
 }

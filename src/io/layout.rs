@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::entries;
 use super::list::{FrameList, read_list};
-use super::output::write_atomic;
+use super::output::write_json;
 use super::unknown::UnknownKeys;
 use crate::error::{Error, Result};
 use crate::view::{
@@ -216,18 +216,9 @@ pub fn write_view_notes(folder: &Path, notes: &ViewNotes) -> Result<()> {
     if *notes == ViewNotes::default() {
         return Ok(());
     }
-    write_json(&folder.join(VIEW_FILE), &ViewFile::of(notes), "the view's numbers must be finite")
-}
-
-fn write_json(path: &Path, value: &impl Serialize, remedy: &'static str) -> Result<()> {
-    let mut text = serde_json::to_string_pretty(value).map_err(|e| Error::Json {
-        path: path.to_path_buf(),
-        line: 0,
-        what: e.to_string(),
-        remedy,
-    })?;
-    text.push('\n');
-    write_atomic(path, text.as_bytes())
+    let remedy = "the view's numbers must be finite";
+    write_json(&folder.join(VIEW_FILE), &ViewFile::of(notes), remedy)?;
+    Ok(())
 }
 
 /// Write `recording.json` for `sensor` into `root`.
@@ -235,9 +226,7 @@ fn write_json(path: &Path, value: &impl Serialize, remedy: &'static str) -> Resu
 /// # Errors
 /// When the folder cannot be written.
 pub fn write_recording_file(root: &Path, sensor: &Sensor) -> Result<()> {
-    write_json(
-        &root.join(DESCRIPTION),
-        &RecordingFile::of(sensor),
-        "the sensor's numbers must be finite",
-    )
+    let remedy = "the sensor's numbers must be finite";
+    write_json(&root.join(DESCRIPTION), &RecordingFile::of(sensor), remedy)?;
+    Ok(())
 }

@@ -18,7 +18,7 @@ pub(crate) use layout::DESCRIPTION;
 pub use layout::{ViewFile, write_recording_file, write_view_notes};
 pub use list::{FrameList, read_list};
 pub(crate) use output::hex;
-pub use output::{OutputDir, refuse_full, sha256_hex, write_atomic};
+pub use output::{OutputDir, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
 pub use quick::{encode_png16_quickly, encode_rgb};
 
 use std::path::{Path, PathBuf};

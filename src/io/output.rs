@@ -4,6 +4,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
@@ -73,6 +74,32 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<()> {
     })
 }
 
+/// JSON for people to read, with a line's end at its end.
+///
+/// # Errors
+/// When the value has no form in JSON.
+pub fn pretty_json(value: &impl Serialize) -> serde_json::Result<String> {
+    let mut text = serde_json::to_string_pretty(value)?;
+    text.push('\n');
+    Ok(text)
+}
+
+/// Write [`pretty_json`] whole or not at all; the text that was written. `remedy` is for a value
+/// that has no form in JSON.
+///
+/// # Errors
+/// As [`pretty_json`], and when the folder cannot be written.
+pub fn write_json(path: &Path, value: &impl Serialize, remedy: &'static str) -> Result<String> {
+    let text = pretty_json(value).map_err(|e| Error::Json {
+        path: path.to_path_buf(),
+        line: 0,
+        what: e.to_string(),
+        remedy,
+    })?;
+    write_atomic(path, text.as_bytes())?;
+    Ok(text)
+}
+
 /// SHA-256 as lower-case hexadecimal.
 pub fn sha256_hex(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
@@ -95,6 +122,18 @@ mod tests {
         fs::write(blocked.join("x"), b"").unwrap();
         assert!(write_atomic(&blocked, b"1").is_err(), "a folder stands there");
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn json_ends_with_a_line_and_reads_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.json");
+        let text = write_json(&path, &[1.5, 2.0], "").unwrap();
+        assert_eq!(text, "[\n  1.5,\n  2.0\n]\n");
+        assert_eq!(fs::read_to_string(&path).unwrap(), text);
+        let not_a_key = std::collections::BTreeMap::from([([1, 2], 3)]);
+        assert!(write_json(&path, &not_a_key, "name it").is_err());
+        assert_eq!(fs::read_to_string(&path).unwrap(), text, "the old file stands");
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::effect::Effect;
 use super::forms::Form;
 use super::{Direction, Domain, SigmaModel};
 use crate::error::{Error, Result};
-use crate::io::write_atomic;
+use crate::io::{pretty_json, write_atomic};
 use crate::view::RecordingFile;
 
 /// The format this version writes and reads.
@@ -174,12 +174,10 @@ impl NoiseModel {
             },
             provenance: self.provenance.clone(),
         };
-        let mut text = serde_json::to_string_pretty(&file).map_err(|e| Error::Solver {
+        pretty_json(&file).map_err(|e| Error::Solver {
             what: format!("the model cannot be written as JSON: {e}"),
             remedy: "report this as a bug",
-        })?;
-        text.push('\n');
-        Ok(text)
+        })
     }
 
     /// # Errors

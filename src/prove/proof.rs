@@ -12,7 +12,7 @@ use super::judge::{Judged, Marks, Scores};
 use super::question::Truth;
 use super::seal::Seal;
 use crate::error::{Error, Result};
-use crate::io::{sha256_hex, write_atomic};
+use crate::io::{self, sha256_hex};
 use crate::model::Provenance;
 
 pub const PROOF_FORMAT: &str = "kinoise-proof/1";
@@ -122,13 +122,10 @@ pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<(T, String)> {
     Ok((value, sha256_hex(&bytes)))
 }
 
+const REMEDY: &str = "give the folder of a trial made by this version of kinoise prove";
+
 fn foreign(path: &Path, what: String) -> Error {
-    Error::Json {
-        path: path.to_path_buf(),
-        line: 0,
-        what,
-        remedy: "give the folder of a trial made by this version of kinoise prove",
-    }
+    Error::Json { path: path.to_path_buf(), line: 0, what, remedy: REMEDY }
 }
 
 /// Write whole or not at all; the hash of the bytes.
@@ -136,8 +133,5 @@ fn foreign(path: &Path, what: String) -> Error {
 /// # Errors
 /// When the disk refuses.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<String> {
-    let text = serde_json::to_string_pretty(value).map_err(|e| foreign(path, e.to_string()))?;
-    let text = format!("{text}\n");
-    write_atomic(path, text.as_bytes())?;
-    Ok(sha256_hex(text.as_bytes()))
+    Ok(sha256_hex(io::write_json(path, value, REMEDY)?.as_bytes()))
 }

@@ -31,23 +31,11 @@ use crate::error::Result;
 use crate::model::NoiseModel;
 
 /// Examine the model that was `found` from the recording in `folder` (`recording/` beside
-/// `model.json` or `simulated/`), and the baselines on the same recording when asked for.
+/// `model.json` or `simulated/`), and the baselines on the same recording when asked for, with the
+/// names they give; without views there are names alone.
 ///
 /// # Errors
 /// When the recording cannot be read, or a prediction does not fit the views.
-pub fn examine(
-    views: &[ExamView],
-    folder: &Path,
-    found: &NoiseModel,
-    baselines: bool,
-) -> Result<Gains> {
-    Ok(examine_and_name(views, folder, found, baselines)?.gains.unwrap_or_default())
-}
-
-/// As [`examine`], with the names; without views there are names alone.
-///
-/// # Errors
-/// As [`examine`].
 pub fn examine_and_name(
     views: &[ExamView],
     folder: &Path,
