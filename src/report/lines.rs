@@ -4,7 +4,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::axis::Axis;
-use super::colours::{GRID, INK};
+use super::colours::INK;
 use super::sheet::{self, Drawing, Drawn, SMALL, Sheet, TEXT};
 use crate::error::Result;
 
@@ -102,16 +102,7 @@ impl Drawing for LineFigure {
             .x_label_area_size(sheet.px(BOTTOM))
             .y_label_area_size(sheet.px(LEFT))
             .build_cartesian_2d(self.x.clone(), self.y.clone())?;
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(sheet.stroke(&GRID, 1))
-            .axis_style(sheet.stroke(&INK, 1))
-            .label_style(sheet.font(TEXT).color(&INK))
-            .axis_desc_style(sheet.font(TEXT).color(&INK))
-            .x_desc(&self.x_label)
-            .y_desc(&self.y_label)
-            .draw()?;
+        sheet.mesh(&mut chart, TEXT).x_desc(&self.x_label).y_desc(&self.y_label).draw()?;
         for (i, line) in self.lines.iter().enumerate() {
             let place = |p: &[f64; 2]| chart.backend_coord(&(p[0], p[1]));
             let places: Vec<(i32, i32)> = line.points.iter().map(place).collect();

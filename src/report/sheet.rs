@@ -8,12 +8,14 @@ use std::sync::OnceLock;
 
 use image::imageops::{FilterType, resize};
 use image::{ImageFormat, RgbImage};
+use plotters::chart::MeshStyle;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::register_font;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::colours::INK;
+use super::axis::Axis;
+use super::colours::{GRID, INK};
 use crate::error::{Error, Result};
 
 pub(super) type Drawn<B, T = ()> =
@@ -124,6 +126,22 @@ impl<B: DrawingBackend> Sheet<'_, B> {
             self.root.draw(&PathElement::new(piece, style))?;
         }
         Ok(())
+    }
+
+    /// Axes and a grid in the style of all figures, with text of this size; labels and ticks are
+    /// still to be set, and it is to be drawn.
+    pub fn mesh<'a, 'b>(
+        &self,
+        chart: &'b mut Chart<'a, B, Axis, Axis>,
+        size: i32,
+    ) -> MeshStyle<'a, 'b, Axis, Axis, B> {
+        let mut mesh = chart.configure_mesh();
+        mesh.light_line_style(TRANSPARENT)
+            .bold_line_style(self.stroke(&GRID, 1))
+            .axis_style(self.stroke(&INK, 1))
+            .label_style(self.font(size).color(&INK))
+            .axis_desc_style(self.font(size).color(&INK));
+        mesh
     }
 
     pub fn fill<C: Color>(&self, corners: [Pixel; 2], colour: &C) -> Drawn<B> {

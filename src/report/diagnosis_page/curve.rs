@@ -6,7 +6,7 @@ use plotters::style::text_anchor::HPos;
 use crate::diagnose::Curve;
 use crate::error::Result;
 use crate::report::axis::Axis;
-use crate::report::colours::{FAINT, GRID, INK};
+use crate::report::colours::{FAINT, INK};
 use crate::report::sheet::{self, Drawing, Drawn, SMALL, Sheet, TEXT};
 
 const WIDTH: u32 = 470;
@@ -116,13 +116,9 @@ impl Drawing for CurveFigure {
             .x_label_area_size(sheet.px(46))
             .y_label_area_size(sheet.px(52))
             .build_cartesian_2d(self.x.clone(), self.y.clone())?;
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(sheet.stroke(&GRID, 1))
-            .axis_style(sheet.stroke(&INK, 1))
+        sheet
+            .mesh(&mut chart, SMALL)
             .set_all_tick_mark_size(sheet.px(4))
-            .label_style(sheet.font(SMALL).color(&INK))
             .axis_desc_style(sheet.font(self.fitting(sheet, &self.x_label)?).color(&INK))
             .x_desc(self.x_label.as_str())
             .draw()?;

@@ -6,7 +6,7 @@ use plotters::style::text_anchor::HPos;
 use super::marks::draw_mark;
 use super::{Figure2, Group, Overlay, OverlayLine, Point};
 use crate::report::axis::Axis;
-use crate::report::colours::{self, FAINT, GRID, INK};
+use crate::report::colours::{self, FAINT, INK};
 use crate::report::sheet::{Chart, Dashes, Drawing, Drawn, Pixel, SMALL, Sheet, TEXT};
 use crate::units::decimals;
 
@@ -66,14 +66,9 @@ impl Drawing for Figure2 {
 }
 
 fn axes<B: DrawingBackend>(sheet: &Sheet<'_, B>, chart: &mut Chart<'_, B, Axis, Axis>) -> Drawn<B> {
-    chart
-        .configure_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(sheet.stroke(&GRID, 1))
-        .axis_style(sheet.stroke(&INK, 1))
+    sheet
+        .mesh(chart, TEXT)
         .set_all_tick_mark_size(sheet.px(5))
-        .label_style(sheet.font(TEXT).color(&INK))
-        .axis_desc_style(sheet.font(TEXT).color(&INK))
         .x_desc("tilt θ (degrees)")
         .y_desc("σ (mm)")
         .draw()

@@ -8,7 +8,7 @@ use super::words::{percents, ratio};
 use crate::error::Result;
 use crate::prove::{Bin, Certainty, Scores};
 use crate::report::axis::Axis;
-use crate::report::colours::{FAINT, GRID, INK};
+use crate::report::colours::FAINT;
 use crate::report::numbers::{ABSENT, fixed};
 use crate::report::sheet::{self, Drawing, Drawn, SMALL, Sheet};
 use crate::stats::clopper_pearson;
@@ -92,14 +92,9 @@ impl Drawing for Reliability<'_> {
             .x_label_area_size(sheet.px(46))
             .y_label_area_size(sheet.px(60))
             .build_cartesian_2d(axis.clone(), axis)?;
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(sheet.stroke(&GRID, 1))
-            .axis_style(sheet.stroke(&INK, 1))
+        sheet
+            .mesh(&mut chart, SMALL)
             .set_all_tick_mark_size(sheet.px(4))
-            .label_style(sheet.font(SMALL).color(&INK))
-            .axis_desc_style(sheet.font(SMALL).color(&INK))
             .x_desc("probability stated")
             .y_desc("share that was right")
             .draw()?;

@@ -11,7 +11,7 @@ use super::words::{judged_alone, level, of, percents, world};
 use crate::error::Result;
 use crate::prove::{Cell, Judged, LEVELS, Proof, ProvenSet, Rate, World, scores};
 use crate::report::axis::Axis;
-use crate::report::colours::{FAINT, GRID, INK};
+use crate::report::colours::FAINT;
 use crate::report::numbers::ABSENT;
 use crate::report::sheet::{self, Chart, Dashes, Drawing, Drawn, SMALL, Sheet, TEXT};
 
@@ -149,14 +149,9 @@ impl PowerFigure {
             .x_label_area_size(sheet.px(46))
             .y_label_area_size(sheet.px(44))
             .build_cartesian_2d(x, y)?;
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(sheet.stroke(&GRID, 1))
-            .axis_style(sheet.stroke(&INK, 1))
+        sheet
+            .mesh(&mut chart, SMALL)
             .set_all_tick_mark_size(sheet.px(4))
-            .label_style(sheet.font(SMALL).color(&INK))
-            .axis_desc_style(sheet.font(SMALL).color(&INK))
             .x_desc("nats over the whole recording")
             .draw()?;
         for (nats, percent) in GOALS[i] {

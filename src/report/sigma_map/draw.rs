@@ -31,13 +31,10 @@ impl Drawing for SigmaMap {
             .x_label_area_size(sheet.px(X_LABELS))
             .y_label_area_size(sheet.px(66))
             .build_cartesian_2d(self.x.clone(), self.y.clone())?;
-        chart
-            .configure_mesh()
+        sheet
+            .mesh(&mut chart, TEXT)
             .disable_mesh()
-            .axis_style(sheet.stroke(&INK, 1))
             .set_all_tick_mark_size(sheet.px(5))
-            .label_style(sheet.font(TEXT).color(&INK))
-            .axis_desc_style(sheet.font(TEXT).color(&INK))
             .x_desc("distance z (m)")
             .y_desc("tilt θ (degrees)")
             .draw()?;
