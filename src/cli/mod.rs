@@ -15,7 +15,12 @@ mod prove;
 mod prove_solver;
 mod prove_words;
 mod simulate;
+mod simulate_poses;
+mod simulate_recipe;
 mod simulate_room;
+mod simulate_scenery;
+mod simulate_sensor;
+mod simulate_words;
 mod words;
 
 use std::process::ExitCode;

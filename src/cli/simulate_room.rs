@@ -11,7 +11,7 @@ use kinoise::simulate::room::{
 use kinoise::{Sensor, SigmaModel};
 
 use super::common::{Bar, Global, say};
-use super::simulate::write_recipe;
+use super::simulate_recipe::write_recipe;
 
 #[derive(Debug, Args)]
 pub struct RoomArguments {
