@@ -84,11 +84,32 @@ pub fn curves(camera: &Camera, reach: &Reach) -> Vec<Candidate> {
         map(8, 6, Times::One),
         map(8, 6, Times::DisparitySquared),
     ];
+    all.extend(seams(width, Over::Column));
+    all.extend(seams(height, Over::Row));
+    all.push(along(camera));
     all.extend(waves(reach));
     if reach.light[1] > 1.05 * reach.light[0] {
         all.push(curve(Over::Light, reach.light, 8, Times::One));
     }
     all
+}
+
+/// Two halves of the picture that disagree, at any of these places.
+fn seams(length: f64, over: Over) -> impl Iterator<Item = Candidate> {
+    const PLACES: usize = 32;
+    (2..PLACES - 1).map(move |k| {
+        let at = length * k as f64 / PLACES as f64;
+        let (low, high) = (at - 1.0, at + 1.0);
+        Candidate::curve(Basis::Curve { over, low, high, nodes: 2, times: Times::One })
+    })
+}
+
+/// What turns with the direction of the tilt and is not there without one.
+fn along(camera: &Camera) -> Candidate {
+    let (x, y) = camera.ray(0.0, 0.0);
+    let most = x.hypot(y);
+    let (over, times) = (Over::Along, Times::Tilt);
+    Candidate::curve(Basis::Curve { over, low: -most, high: most, nodes: 9, times })
 }
 
 /// Periodic in depth: what a time-of-flight camera's harmonics do.

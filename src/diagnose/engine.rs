@@ -254,7 +254,8 @@ impl<'a> Case<'a> {
         let terms = terms_of(&outcome, Statistic::Variance);
         measure_tails(&mut structure, &self.fields, &mean.px, &terms, &self.survey, &self.bench);
         let alike = self.baseline.as_ref().is_some_and(|b| b.tails_alike(&structure));
-        let tails = tails(&structure, &self.known).filter(|_| !alike);
+        super::noise::dbg_tails(&structure);
+        let tails = tails(&structure, &self.known, each).filter(|_| !alike);
         Scatter { lattice, hangs, tails, outcome }
     }
 

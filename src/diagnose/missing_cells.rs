@@ -47,6 +47,7 @@ pub fn cells(survey: &Survey, camera: &Camera) -> Vec<Vec<Cell>> {
                     let lost = sum(&|i| view.tiles[i].asked * view.tiles[i].missing);
                     let mut place = places[group[0]];
                     place.average(&places, &|of| sum(&|i| view.tiles[i].asked * of(i)) / asked);
+                    place.side = side;
                     Cell { place, lost, asked }
                 })
                 .collect()
@@ -83,12 +84,18 @@ pub struct Scatter {
     pub slope: f64,
     /// Of a cell.
     pub cell: f64,
+    /// Neighbouring cells share their clumps: so many make one.
+    pub clump: f64,
 }
 
-/// Never believed to be less: views differ by a factor of e, the sides of one picture as well.
-pub const LEAST: Scatter = Scatter { level: 1.0, slope: 4.0, cell: 0.5 };
-/// Neighbouring cells share their clumps: so many make one.
-const CLUMP: f64 = 4.0;
+/// Before anything is measured: views differ by a factor of e, the sides of one picture as well.
+pub const USUAL: Scatter = Scatter { level: 1.0, slope: 4.0, cell: 0.5, clump: 4.0 };
+/// Never believed to be less.
+const LEAST: Scatter = Scatter { level: 0.1, slope: 0.4, cell: 0.1, clump: 1.0 };
+/// What a few views show is taken so much larger.
+const FEW: f64 = 4.0;
+/// Cells nearer than this are neighbours, in their sides: the corners too.
+const APART: f64 = 1.5;
 
 /// Applies the inverse covariance of a view's cells.
 pub struct Whitener {
@@ -100,7 +107,7 @@ pub struct Whitener {
 
 impl Whitener {
     pub fn of(cells: &[Cell], scatter: Scatter) -> Self {
-        let weight = 1.0 / (CLUMP * scatter.cell);
+        let weight = 1.0 / (scatter.clump * scatter.cell);
         let slopes: Vec<_> =
             cells.iter().map(|c| Vector3::new(1.0, c.place.x, c.place.y)).collect();
         let tight = Vector3::new(1.0 / scatter.level, 1.0 / scatter.slope, 1.0 / scatter.slope);
@@ -137,22 +144,59 @@ impl Scatter {
     /// cells about them.
     pub fn of(views: &[Vec<Cell>], left: &[Vec<f64>]) -> Self {
         let (mut sums, mut n) = ([0.0; 3], [0.0; 3]);
+        let mut clump = Clump::default();
         for (cells, left) in views.iter().zip(left) {
-            let loose = Scatter { level: 1e6, slope: 4.0, cell: 1.0 };
+            let loose = Scatter { level: 1e6, slope: 4.0, cell: 1.0, clump: 4.0 };
             let w = Whitener::of(cells, loose);
             let seen = w.slopes.iter().zip(left).fold(Vector3::zeros(), |s, (n, y)| s + n * *y);
             let own = w.inverse * seen * w.weight;
             sums[0] += (left.iter().sum::<f64>() / left.len().max(1) as f64).powi(2);
             sums[1] += own.y.powi(2) + own.z.powi(2);
-            sums[2] +=
-                w.slopes.iter().zip(left).map(|(n, y)| (y - n.dot(&own)).powi(2)).sum::<f64>();
+            let off: Vec<f64> = w.slopes.iter().zip(left).map(|(n, y)| y - n.dot(&own)).collect();
+            sums[2] += off.iter().map(|y| y * y).sum::<f64>();
+            clump.add(cells, &off);
             n = [n[0] + 1.0, n[1] + 2.0, n[2] + left.len() as f64];
         }
         let mean = |k: usize| sums[k] / f64::max(n[k], 1.0);
+        let few = 1.0 + FEW / f64::max(n[0], 1.0);
         Scatter {
-            level: mean(0).max(LEAST.level),
-            slope: mean(1).max(LEAST.slope),
+            level: (few * mean(0)).max(LEAST.level),
+            slope: (few * mean(1)).max(LEAST.slope),
             cell: mean(2).max(LEAST.cell),
+            clump: clump.size().max(LEAST.clump),
         }
     }
 }
+
+/// How much neighbouring cells have in common.
+#[derive(Default)]
+struct Clump {
+    product: f64,
+    square: f64,
+    pairs: f64,
+    cells: f64,
+}
+
+impl Clump {
+    /// Cells one step apart, to the right and below; a rim's cell beside its patch's other part too.
+    fn add(&mut self, cells: &[Cell], off: &[f64]) {
+        let step = cells.iter().map(|c| c.place.side).fold(0.0, f64::max).max(1.0) * APART;
+        for (i, (a, x)) in cells.iter().zip(off).enumerate() {
+            self.square += x * x;
+            self.cells += 1.0;
+            for (b, y) in cells[i + 1..].iter().zip(&off[i + 1..]) {
+                if (a.place.u - b.place.u).hypot(a.place.v - b.place.v) < step {
+                    self.product += x * y;
+                    self.pairs += 1.0;
+                }
+            }
+        }
+    }
+
+    /// Cells that make one: with four neighbours and four at the corners.
+    fn size(&self) -> f64 {
+        let rho = self.product / self.pairs.max(1.0) * self.cells / self.square.max(1e-12);
+        1.0 + 8.0 * rho.clamp(0.0, 1.0)
+    }
+}
+

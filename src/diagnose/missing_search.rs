@@ -5,7 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::evidence::{Evidence, Null, gain};
-use super::missing_cells::{Cell, LEAST, Scatter, Whitener, odds, share};
+use super::missing_cells::{Cell, Scatter, USUAL, Whitener, odds, share};
 use super::missing_shapes::{Shape, Step};
 use crate::rng::Seed;
 use crate::terms::Basis;
@@ -85,7 +85,7 @@ impl<'a> Losses<'a> {
                 cells.iter().zip(e).map(|(c, e)| odds(c.lost / c.asked) - e).collect()
             })
             .collect();
-        let whiteners = views.iter().map(|v| Whitener::of(v, LEAST)).collect();
+        let whiteners = views.iter().map(|v| Whitener::of(v, USUAL)).collect();
         let level = usual(&left).max(odds(0.0));
         let mut losses = Losses { views, left, base: share(level), whiteners };
         losses.left.iter_mut().flatten().for_each(|y| *y -= level);

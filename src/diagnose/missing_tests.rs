@@ -42,6 +42,7 @@ fn session(share: f64, rng: &mut Stream, loss: impl Fn(&Place) -> f64) -> (Vec<V
                 radius: f64::hypot(x, y) / 0.7,
                 edge: 30.0,
                 light: 1.0,
+                side: 40.0,
                 ..Place::default()
             };
             let by_chance = share * (level + clumps[row / 2 * 8 + column / 2] - 1.0).exp();

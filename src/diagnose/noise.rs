@@ -54,6 +54,7 @@ impl Mean {
 
 /// All mismatches of structure at this error rate each.
 pub fn hanging(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
+    if std::env::var_os("KINOISE_TRACE").is_some() { dbg_trace(views); }
     let mut found = Vec::new();
     found.extend(window(views, known, level));
     found.extend(in_time(views, known, level));
@@ -65,6 +66,28 @@ pub fn hanging(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
         .unwrap_or(0.0);
     found.extend(frames(views, known, level, rho));
     found
+}
+
+pub fn dbg_tails(views: &[Structure]) {
+    if std::env::var_os("KINOISE_TRACE").is_none() { return; }
+    let p = |n: &str, m: Option<Mean>, scale: f64| if let Some(m) = m { eprintln!("STAT {n} {:.5} {:.5} {}", m.value / scale, m.std_error / scale, m.views); };
+    p("tail", Mean::of(views.iter().filter(|s| s.tail_pixels > 5000.0).map(|s| s.tail)), GAUSSIAN_TAIL);
+    p("tailpix", Mean::of(views.iter().map(|s| s.tail_pixels)), 1.0);
+}
+
+fn dbg_trace(views: &[Structure]) {
+    let var = Mean::of(views.iter().map(|s| s.variance_px2)).map_or(1.0, |m| m.value);
+    let p = |n: &str, m: Option<Mean>, scale: f64| if let Some(m) = m { eprintln!("STAT {n} {:.5} {:.5} {}", m.value / scale, m.std_error / scale, m.views); };
+    p("lnwindow", Mean::of(views.iter().filter_map(|s| s.window_px).map(f64::ln)), 1.0);
+    p("c1", Mean::of(views.iter().filter_map(|s| s.lagged[0])), 1.0);
+    p("c2", Mean::of(views.iter().filter_map(|s| s.lagged[1])), 1.0);
+    p("c3", Mean::of(views.iter().filter_map(|s| s.lagged[2])), 1.0);
+    p("falling", Mean::of(views.iter().filter_map(|s| Some(s.lagged[0]? - s.lagged[if s.lagged[2].is_some() {2} else {1}]?))), 1.0);
+    p("fixed", Mean::of(views.iter().filter_map(|s| s.fixed_px2)), var);
+    p("lines", Mean::of(views.iter().filter_map(|s| s.lines_px2)), var);
+    p("near", Mean::of(views.iter().filter_map(|s| s.near)), 1.0);
+    p("row", Mean::of(views.iter().filter_map(|s| s.row_px2)), var);
+    p("column", Mean::of(views.iter().filter_map(|s| s.column_px2)), var);
 }
 
 fn one(name: &str, value: f64, std_error: f64) -> Map<String, serde_json::Value> {
@@ -87,21 +110,44 @@ fn window(views: &[Structure], known: &Known, level: f64) -> Option<Hanging> {
     let expected = known.parameter("spatial-correlation", "length_px").unwrap_or(1.0).max(1.0);
     let length = m.value.exp();
     let p = m.p_above(expected.ln());
-    (p < level && length > SAME_WINDOW * expected).then(|| Hanging {
+    let found = |interval, length, std_error, size_sigma, p, nats| Hanging {
         families: vec!["spatial-correlation"],
         statistic: Statistic::Correlation,
         axis: Axis::PixelLag,
-        interval: [0.0, length],
-        parameters: one("length_px", length, length * m.std_error),
-        size_sigma: 1.0,
+        interval,
+        parameters: one("length_px", length, std_error),
+        size_sigma,
         p,
-        nats: nats(&m, expected.ln()),
+        nats,
         words: None,
+    };
+    if p < level && length > SAME_WINDOW * expected {
+        let nats = nats(&m, expected.ln());
+        return Some(found([0.0, length], length, length * m.std_error, 1.0, p, nats));
+    }
+    // A part of the noise alone: seen where neighbours are taken for independent.
+    let near = Mean::of(views.iter().filter_map(|s| s.near))?;
+    let p = near.p_above(0.0);
+    (expected == 1.0 && p < level && near.value > LEAST_NEAR).then(|| {
+        // As many pixels make one as a window of this side would have it.
+        let length = (1.0 + 2.0 * REACH_PX * near.value).max(length);
+        let std_error = 2.0 * REACH_PX * near.std_error + 0.2 * (length - 1.0);
+        let size = near.value.sqrt();
+        found([0.0, REACH_PX], length, std_error, size, p, nats(&near, 0.0))
     })
 }
 
+/// Mean correlation of near pixels that is worth a word.
+const LEAST_NEAR: f64 = 0.002;
+/// As far as neighbours are looked at, px.
+const REACH_PX: f64 = 4.0;
+
 /// Correlations smaller than this are not worth a word.
-const LEAST_CORRELATION: f64 = 0.05;
+const LEAST_CORRELATION: f64 = 0.015;
+/// Share of the variance that pixels repeat in every view, worth a word.
+const LEAST_FIXED: f64 = 0.001;
+/// A share that stands still beside one that changes slowly is known to this.
+const BESIDE_ANOTHER: f64 = 0.05;
 
 fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
     let mut found = Vec::new();
@@ -115,7 +161,7 @@ fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
         let p = m.p_above(expected);
         let share = (m.value - expected) / variance.max(1e-12);
         fixed_px2 = m.value.max(0.0);
-        if p < level && share > 0.003 {
+        if p < level && share > LEAST_FIXED {
             found.push(Hanging {
                 families: vec!["fixed-pattern-noise"],
                 statistic: Statistic::Bias,
@@ -136,8 +182,9 @@ fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
     let rho_known = known.parameter("temporal-correlation", "rho").unwrap_or(0.0);
     let last = if views.iter().any(|s| s.lagged[2].is_some()) { 2 } else { 1 };
     let falling = Mean::of(views.iter().filter_map(|s| Some(s.lagged[0]? - s.lagged[last]?)));
-    let still = Mean::of(views.iter().filter_map(|s| still_part(s, fixed_px2)));
-    let Some((falling, still)) = falling.zip(still) else {
+    let Some((falling, (still, least))) = falling.zip(still_level(views).zip(Mean::of(
+        views.iter().filter_map(|s| s.lagged[last]),
+    ))) else {
         // Two frames a view: still or slowly changing, nobody can say.
         let p = first.p_above(fixed_share + frozen_known + rho_known);
         let more = first.value - fixed_share - frozen_known - rho_known;
@@ -156,9 +203,12 @@ fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
         }
         return found;
     };
-    let (p_falling, p_still) = (falling.p_above(0.0), still.p_above(frozen_known));
-    if p_falling < level && falling.value > LEAST_CORRELATION && rho_known == 0.0 {
-        let s = still.value.max(0.0) + fixed_share;
+    let p_falling = falling.p_above(0.0);
+    // What stands still is in the last of them whole.
+    let p_still = least.p_above(fixed_share + frozen_known);
+    let slowly = p_falling < level && falling.value > LEAST_CORRELATION;
+    if slowly && rho_known == 0.0 {
+        let s = still.max(0.0) + fixed_share;
         let rho = ((first.value - s) / (1.0 - s).max(1e-6)).clamp(0.0, 1.0);
         found.push(Hanging {
             families: vec!["temporal-correlation"],
@@ -172,28 +222,21 @@ fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
             words: None,
         });
     }
-    if p_still < level && still.value - frozen_known > LEAST_CORRELATION {
+    let floor = if slowly { BESIDE_ANOTHER } else { LEAST_CORRELATION };
+    if p_still < level && still - frozen_known > floor {
         found.push(Hanging {
             families: vec!["frozen-noise"],
             statistic: Statistic::Correlation,
             axis: Axis::Frame,
             interval: [1.0, 3.0],
-            parameters: one("fraction", still.value, still.std_error),
-            size_sigma: still.value.max(0.0).sqrt(),
+            parameters: one("fraction", still, least.std_error),
+            size_sigma: still.max(0.0).sqrt(),
             p: p_still,
-            nats: nats(&still, frozen_known),
+            nats: nats(&least, fixed_share + frozen_known),
             words: None,
         });
     }
     found
-}
-
-/// What stands still in a view: the part that all lags share, without what all views share.
-fn still_part(s: &Structure, fixed_px2: f64) -> Option<f64> {
-    let (c1, c2) = (s.lagged[0]?, s.lagged[1]?);
-    let c3 = s.lagged[2].unwrap_or(c2 * c2 / c1.max(1e-6));
-    let share = still_share([c1, c2, c3], s.lagged[2].is_some());
-    Some(share - fixed_px2 / s.variance_px2.max(1e-12))
 }
 
 /// Share of the noise that stands still within a view, by the views' mean correlations; `None` with
@@ -216,7 +259,7 @@ fn still_share([c1, c2, c3]: [f64; 3], three: bool) -> f64 {
         // rho^2 = rho * rho alone cannot be told from a share: what falls is taken as a filter's.
         return if near > 0.05 * c1 { 0.0 } else { c2 };
     }
-    if near <= 0.02 {
+    if near <= 0.01 {
         return (c1 + c2 + c3) / 3.0;
     }
     let rho = (far / near).clamp(0.0, 0.95);
@@ -240,7 +283,7 @@ fn lines(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
         let Some(m) = m else { continue };
         let p = m.p_above(expected);
         let share = (m.value - expected) / variance.max(1e-12);
-        if p < level && share > 0.004 {
+        if p < level && share > LEAST_LINES {
             let sigma = m.value.max(0.0).sqrt();
             let words = families
                 .is_empty()
@@ -261,13 +304,16 @@ fn lines(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
     found
 }
 
+/// Share of the variance that lines have in common, worth a word.
+const LEAST_LINES: f64 = 0.0015;
+
 /// Columns that err by a constant each, in every view, from one to the next.
 fn fixed_lines(views: &[Structure], level: f64) -> Option<Hanging> {
     let variance = Mean::of(views.iter().map(|s| s.variance_px2)).map_or(0.0, |m| m.value);
     let m = Mean::of(views.iter().filter_map(|s| s.lines_px2))?;
     let p = m.p_above(0.0);
     let share = m.value / variance.max(1e-12);
-    if p > level || share < 0.004 {
+    if p > level || share < LEAST_LINES {
         return None;
     }
     let sigma = m.value.sqrt();
@@ -348,20 +394,24 @@ fn frames(views: &[Structure], known: &Known, level: f64, rho: f64) -> Vec<Hangi
     found
 }
 
-/// A tail is heavy from this many times a Gaussian's share on, in most views.
-const HEAVY: f64 = 6.0;
+/// A tail is heavy from this many times a Gaussian's share on.
+const HEAVY: f64 = 2.5;
+/// So heavy it may look without a cause.
+const UNEQUAL: f64 = 1.5;
+/// Views too small to show a tail, in readings.
+const FEWEST_READINGS: f64 = 5000.0;
 
-pub fn tails(views: &[Structure], known: &Known) -> Option<Hanging> {
+pub fn tails(views: &[Structure], known: &Known, level: f64) -> Option<Hanging> {
     if known.has("heavy-tails") {
         return None;
     }
-    let looked: Vec<&Structure> = views.iter().filter(|s| s.tail_pixels > 5000.0).collect();
-    let n = looked.len() as f64;
-    let heavy = looked.iter().filter(|s| s.tail > HEAVY * GAUSSIAN_TAIL).count() as f64;
-    if n < 2.0 || heavy < 0.7 * n {
+    let looked: Vec<&Structure> =
+        views.iter().filter(|s| s.tail_pixels > FEWEST_READINGS).collect();
+    let m = Mean::of(looked.iter().map(|s| s.tail))?;
+    // Patches of unequal noise, and steps of the words, make a tail of a Gaussian too.
+    if m.value < HEAVY * GAUSSIAN_TAIL || m.p_above(UNEQUAL * GAUSSIAN_TAIL) > level {
         return None;
     }
-    let m = Mean::of(looked.iter().map(|s| s.tail))?;
     let size = Mean::of(looked.iter().filter(|s| s.tail > 0.0).map(|s| s.tail_size))?;
     // A second Gaussian of this scale: the mean excess beyond four deviations is roughly
     // scale^2 / 4 for scales well above one.

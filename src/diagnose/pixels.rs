@@ -48,6 +48,9 @@ pub(super) fn typical_sigma_px(fields: &[Field]) -> f64 {
     f64::from(crate::stats::median_in_place(&mut all))
 }
 
+/// Correlation of successive frames below which they are taken to have nothing in common.
+const HARDLY_STILL: f64 = 0.1;
+
 pub(super) fn measure_tails(
     structure: &mut [Structure],
     fields: &[Field],
@@ -68,9 +71,21 @@ pub(super) fn measure_tails(
                 .collect();
             high_pass(&field.image(&whitened), field.width, field.height, SMOOTH_PX)
         };
-        let frames: Vec<Vec<f32>> = field.first.iter().take(2).map(whitened).collect();
-        if !frames.is_empty() {
-            (s.tail, s.tail_pixels, s.tail_size) = tail(&moving(&frames, s), camera);
+        let frames: Vec<Vec<f32>> = field.first.iter().map(whitened).collect();
+        // Single frames, unless what stands still in them could be taken for a tail.
+        let apart = s.lagged[0].is_some_and(|c| c < HARDLY_STILL);
+        let looks = if apart {
+            frames.iter().map(|f| tail(f, camera)).collect()
+        } else if frames.is_empty() {
+            Vec::new()
+        } else {
+            vec![tail(&moving(&frames, s), camera)]
+        };
+        let n: f64 = looks.iter().map(|l| l.1).sum();
+        let beyond: f64 = looks.iter().map(|l| l.0 * l.1).sum();
+        let size: f64 = looks.iter().map(|l| l.0 * l.1 * l.2).sum();
+        if n > 0.0 {
+            (s.tail, s.tail_pixels, s.tail_size) = (beyond / n, n, size / beyond.max(1.0));
         }
     });
 }

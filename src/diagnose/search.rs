@@ -360,6 +360,12 @@ impl<'a> Layer<'a> {
             .filter(|&i| total(i) > best_family - AS_GOOD_NATS.max(AS_GOOD_SHARE * best_family))
             .min_by_key(|&i| (self.candidates[i].basis.count(), !self.rests_on_a_measurement(i)))
             .filter(|&i| safe(i) > threshold && total(i) > self.adequacy(i) * best_curve)
+            // What fewer columns without a name do better is not what the name says.
+            .filter(|&i| {
+                let columns = |k: usize| self.candidates[k].basis.count();
+                let simpler = |&k: &usize| columns(k) < columns(i) && total(k) > total(i);
+                !curves.iter().any(simpler)
+            })
             .filter(|&i| judged[i].as_ref().is_some_and(|j| j.sensible))
             .filter(|&i| {
                 let clear = total(i) > CLEAR * best_curve;
@@ -402,10 +408,12 @@ impl<'a> Layer<'a> {
     }
 
     /// The share of the best curve that a name must explain. Bands on a real sensor ride on a
-    /// smooth error of the column that is no band's.
+    /// smooth error of the column that is no band's; the law of sigma has columns for nearly
+    /// everything that happens to go with the distance.
     fn adequacy(&self, i: usize) -> f64 {
         match self.candidates[i].basis {
             Basis::Banding { .. } => BANDS_ADEQUATE.min(self.rules.adequacy),
+            Basis::Recalibrate { .. } => LAW_ADEQUATE.max(self.rules.adequacy),
             _ => self.rules.adequacy,
         }
     }
@@ -506,7 +514,10 @@ impl<'a> Layer<'a> {
 /// A nameless curve that is in already, perhaps with other nodes.
 fn same_curve(a: &Candidate, b: &Candidate) -> bool {
     let key = |c: &Candidate| match c.basis {
-        Basis::Curve { over, times, .. } => Some((format!("{over:?}"), times)),
+        // A step and a smooth curve are not one.
+        Basis::Curve { over, times, nodes, .. } => {
+            Some((format!("{over:?}{}", nodes == 2), times))
+        }
         Basis::Map { times, .. } => Some(("map".to_string(), times)),
         _ => None,
     };
@@ -546,6 +557,8 @@ fn looks(candidates: &[Candidate], judged: &[Option<Judged>], noise: &NoiseGains
         .collect()
 }
 
+/// See [`Layer::adequacy`].
+const LAW_ADEQUATE: f64 = 0.85;
 /// See [`Layer::adequacy`].
 const BANDS_ADEQUATE: f64 = 0.45;
 /// A name that explains this share of what the best nameless curve does is met by its own shape.

@@ -18,6 +18,9 @@ pub fn words(basis: &Basis, beta: &[f64]) -> String {
             format!("depends on {} and {} together", over[0].axis(), over[1].axis())
         }
         Basis::Curve { low, high, nodes, .. } => {
+            if *nodes == 2 {
+                return format!("a step at {:.4}", 0.5 * (low + high));
+            }
             let at = |k: usize| low + (high - low) * k as f64 / (nodes - 1) as f64;
             curve(beta, &at)
         }

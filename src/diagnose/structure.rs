@@ -16,6 +16,8 @@ pub struct Structure {
     pub variance_px2: f64,
     /// Side of the window that would make the correlation, px.
     pub window_px: Option<f64>,
+    /// Mean correlation of near pixels of what changes between frames, beyond that of far ones.
+    pub near: Option<f64>,
     /// Correlation of a pixel with itself 1, 2 and 3 frames later.
     pub lagged: [Option<f64>; 3],
     /// Covariance of the mean residual with the other views' at the same pixels, px^2.
@@ -90,14 +92,25 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     }
     let noise = moving(&frames, &s);
     let lines = without_lines(&noise, camera.width, LONG_LINE);
-    if let [a, b, ..] = frames.as_slice() {
-        let change: Vec<f32> = a.iter().zip(b).map(|(a, b)| b - a).collect();
-        // A difference of two frames has twice the variance of one. Taking out what is smooth
-        // leaves a little of everything everywhere: what a diagonal shows is no row's.
-        let apart = far_covariance(&change, camera, [1, 1]);
-        let shared = |step| Some(0.5 * (far_covariance(&change, camera, step)? - apart?));
+    let changes = changes(&frames);
+    if !changes.is_empty() {
+        let over = |lags: &[usize], step: [usize; 2]| {
+            let all: Option<Vec<f64>> =
+                changes.iter().map(|c| covariance(c, camera, lags, step)).collect();
+            mean(all?.into_iter())
+        };
+        // Taking out what is smooth leaves a little of everything everywhere: what a diagonal
+        // shows is no row's.
+        let apart = over(&FAR, [1, 1]);
+        let shared = |step| Some(over(&FAR, step)? - apart?);
         s.row_px2 = shared([1, 0]);
         s.column_px2 = shared([0, 1]);
+        let beyond = |step, lines: Option<f64>| Some(over(&NEAR, step)? - apart? - lines?.max(0.0));
+        let power = mean(changes.iter().flatten().map(|&r| f64::from(r).powi(2)));
+        s.near = (|| {
+            let along = beyond([1, 0], s.row_px2)? + beyond([0, 1], s.column_px2)?;
+            Some(0.5 * along / power?.max(1e-12))
+        })();
     }
     let correlation = measure_correlation(&lines, camera.width);
     // What whole rows share is no window's: it stands in the correlation at every lag.
@@ -128,6 +141,24 @@ pub fn moving(frames: &[Vec<f32>], s: &Structure) -> Vec<f32> {
     }
 }
 
+/// What changes between a view's frames, as orthogonal images that have one frame's variance each.
+fn changes(frames: &[Vec<f32>]) -> Vec<Vec<f32>> {
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let less = |a: &[f32], b: &[f32]| -> Vec<f32> {
+        a.iter().zip(b).map(|(a, b)| (b - a) * half).collect()
+    };
+    match frames {
+        [a, b, c, d, ..] => {
+            let sum = |a: &[f32], b: &[f32]| -> Vec<f32> {
+                a.iter().zip(b).map(|(a, b)| (a + b) * half).collect()
+            };
+            vec![less(a, b), less(c, d), less(&sum(a, b), &sum(c, d))]
+        }
+        [a, b, ..] => vec![less(a, b)],
+        _ => Vec::new(),
+    }
+}
+
 /// Residuals as an image, px, without what is smooth and what is known.
 fn rough(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
     let image = if bias.is_empty() {
@@ -150,7 +181,7 @@ fn calm(image: &[f32]) -> Vec<f32> {
 /// Rows and columns shorter than this are left as they are, px: their mean is mostly noise.
 const LONG_LINE: usize = 150;
 /// The same where a pixel is held against itself, and a line's mean only stands in the way.
-const SHORT_LINE: usize = 60;
+const SHORT_LINE: usize = 30;
 
 /// Minus the mean of each long row and column: noise that a row shares is no window's.
 fn without_lines(image: &[f32], width: usize, least: usize) -> Vec<f32> {
@@ -226,25 +257,28 @@ fn across_views(means: &[Vec<f32>]) -> Vec<Option<f64>> {
 /// A pixel's own error changes from pixel to pixel: the box whose mean is taken out, px.
 const PIXEL_BOX: usize = 7;
 
-/// Side of the patches whose own scale their residuals are held against, px.
-const PATCH: usize = 96;
+/// Side of the patches whose own scale their residuals are held against: this share of the
+/// picture's width, px.
+const PATCHES_ACROSS: usize = 7;
+const SMALLEST_PATCH: usize = 40;
 
 /// Share of residuals beyond four standard deviations of their patch, their number, and how far
 /// out they lie, in standard deviations.
 pub fn tail(image: &[f32], camera: &Camera) -> (f64, f64, f64) {
     let (mut beyond, mut n, mut size) = (0.0, 0.0, 0.0);
-    for v0 in (0..camera.height).step_by(PATCH) {
-        for u0 in (0..camera.width).step_by(PATCH) {
-            let rows = v0..(v0 + PATCH).min(camera.height);
+    let side = (camera.width / PATCHES_ACROSS).max(SMALLEST_PATCH);
+    for v0 in (0..camera.height).step_by(side) {
+        for u0 in (0..camera.width).step_by(side) {
+            let rows = v0..(v0 + side).min(camera.height);
             let patch: Vec<f32> = rows
                 .flat_map(|v| {
-                    let u1 = (u0 + PATCH).min(camera.width);
+                    let u1 = (u0 + side).min(camera.width);
                     image[v * camera.width + u0..v * camera.width + u1].iter().copied()
                 })
                 .filter(|r| r.is_finite())
                 .map(f32::abs)
                 .collect();
-            if patch.len() < PATCH * PATCH / 4 {
+            if patch.len() < side * side / 4 {
                 continue;
             }
             let mut sizes = patch.clone();
@@ -273,13 +307,15 @@ pub fn tail(image: &[f32], camera: &Camera) -> (f64, f64, f64) {
 }
 
 /// Lags well beyond a Kinect's window, px.
-const FAR: [usize; 4] = [20, 27, 34, 41];
+const FAR: [usize; 12] = [20, 22, 24, 27, 30, 33, 36, 39, 42, 46, 50, 54];
+/// Lags within a window.
+const NEAR: [usize; 4] = [1, 2, 3, 4];
 
-/// Mean product of pixels that are far apart along `step`, px^2.
-fn far_covariance(image: &[f32], camera: &Camera, step: [usize; 2]) -> Option<f64> {
+/// Mean product of pixels that are so far apart along `step`, px^2.
+fn covariance(image: &[f32], camera: &Camera, lags: &[usize], step: [usize; 2]) -> Option<f64> {
     let (w, h) = (camera.width, camera.height);
     let (mut sum, mut n) = (0.0, 0.0);
-    for lag in FAR {
+    for lag in lags {
         let (du, dv) = (lag * step[0], lag * step[1]);
         for v in 0..h.saturating_sub(dv) {
             for u in 0..w.saturating_sub(du) {

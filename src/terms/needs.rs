@@ -55,7 +55,7 @@ impl Needs {
         match over {
             Over::Column | Over::Row | Over::Radius => Needs::PIXEL,
             Over::Z | Over::LogZ | Over::Disparity => Needs::DEPTH,
-            Over::Theta | Over::Azimuth => Needs::SURFACE,
+            Over::Theta | Over::Azimuth | Over::Along => Needs::SURFACE,
             Over::Right | Over::Down | Over::Edge => Needs::BOARD,
             Over::Session => Needs { session: true, ..Needs::PIXEL },
             Over::Temperature => Needs { temperature: true, ..Needs::PIXEL },
