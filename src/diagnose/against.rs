@@ -139,7 +139,7 @@ impl Baseline {
         let lost = missing(&fields, &survey, camera, &bench.rays, options.seed).findings;
         Baseline {
             mixes: rim::mixing(&fields, 0.03 * options.level).is_some(),
-            heavy: tails(&structure, &none, 0.03 * options.level).is_some(),
+            heavy: tails(&structure, &none, 0.03 * options.level, false).is_some(),
             fields,
             survey,
             structure,

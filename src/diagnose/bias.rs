@@ -2,6 +2,7 @@
 
 use super::candidate::Candidate;
 use super::reach::Reach;
+use super::tiles::SIDE;
 use crate::camera::Camera;
 use crate::terms::{Basis, Over, Times};
 
@@ -27,10 +28,14 @@ pub fn families(camera: &Camera, reach: &Reach) -> Vec<Candidate> {
     // Bands that do not come again are none: three periods at least.
     for half_cycles in 6..=64 {
         let period_px = 2.0 * width / f64::from(half_cycles);
-        let banding = Basis::Banding { period_px, harmonics: 4 };
-        all.push(Candidate::named("column-banding", banding));
-        if half_cycles <= 16 {
-            let banding = Basis::Banding { period_px, harmonics: 8 };
+        // Waves shorter than two tiles look like long ones.
+        let resolved = (period_px / (2.0 * SIDE as f64)) as usize;
+        if resolved > 0 {
+            let banding = Basis::Banding { period_px, harmonics: resolved.min(4) };
+            all.push(Candidate::named("column-banding", banding));
+        }
+        if half_cycles <= 16 && resolved > 4 {
+            let banding = Basis::Banding { period_px, harmonics: resolved.min(8) };
             all.push(Candidate::named("column-banding", banding));
         }
     }

@@ -76,6 +76,9 @@ impl Diagnosed {
 /// Steps done, steps in all.
 pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
 
+/// How noise hangs together changes what a few frames show of its size by so much.
+const LEVEL_BESIDE_TEXTURE: f64 = 0.05;
+
 /// Fewest views that anything is said about.
 pub const FEWEST_VIEWS: usize = 3;
 
@@ -254,8 +257,8 @@ impl<'a> Case<'a> {
         let terms = terms_of(&outcome, Statistic::Variance);
         measure_tails(&mut structure, &self.fields, &mean.px, &terms, &self.survey, &self.bench);
         let alike = self.baseline.as_ref().is_some_and(|b| b.tails_alike(&structure));
-        super::noise::dbg_tails(&structure);
-        let tails = tails(&structure, &self.known, each).filter(|_| !alike);
+        let uneven = outcome.chosen.iter().any(|c| c.candidate.family.is_none());
+        let tails = tails(&structure, &self.known, each, uneven).filter(|_| !alike);
         Scatter { lattice, hangs, tails, outcome }
     }
 
@@ -311,7 +314,9 @@ impl<'a> Case<'a> {
             && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)
             && !is_raw(self.recording)
             && f.size.sigma * typical_sigma_px(&self.fields) < 0.3 * coarsest;
-        let tailed = scatter.tails.is_some() && f.status == Status::Recalibrate;
+        let textured = scatter.tails.is_some()
+            || (!scatter.hangs.is_empty() && f.size.sigma < LEVEL_BESIDE_TEXTURE);
+        let tailed = textured && f.status == Status::Recalibrate;
         !stepped && !tailed && f.size.sigma > least_size(f.statistic)
     }
 

@@ -285,10 +285,14 @@ impl Along {
                 ("distance from the image centre, px", Box::new(move |p| p.radius * corner))
             }
             Axis::Theta => ("tilt, rad", Box::new(|p| p.theta)),
-            Axis::Azimuth if matches!(basis, Basis::Curve { over: crate::terms::Over::Along, .. }) => (
-                "from the optical axis along the tilt, ray",
-                Box::new(|p| crate::terms::Over::Along.value(p)),
-            ),
+            Axis::Azimuth
+                if matches!(basis, Basis::Curve { over: crate::terms::Over::Along, .. }) =>
+            {
+                (
+                    "from the optical axis along the tilt, ray",
+                    Box::new(|p| crate::terms::Over::Along.value(p)),
+                )
+            }
             Axis::Azimuth => ("direction of the tilt, rad", Box::new(|p| p.azimuth)),
             Axis::TargetPosition => match basis {
                 Basis::Curve { over: crate::terms::Over::Down, .. } => {

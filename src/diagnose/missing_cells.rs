@@ -199,4 +199,3 @@ impl Clump {
         1.0 + 8.0 * rho.clamp(0.0, 1.0)
     }
 }
-

@@ -34,15 +34,24 @@ struct Mean {
 }
 
 impl Mean {
-    fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
-        let values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
-        let n = values.len() as f64;
-        if n < 2.0 {
+    fn of(views: &[Structure], value: impl Fn(&Structure) -> Option<f64>) -> Option<Self> {
+        let values: Vec<(f64, f64)> = views
+            .iter()
+            .filter_map(|s| Some((value(s).filter(|v| v.is_finite())?, s.pixels)))
+            .collect();
+        let middle = values.iter().map(|v| v.1).sum::<f64>() / values.len().max(1) as f64;
+        // A small target says little; views differ for reasons of their own, so that a large one
+        // does not say all.
+        let weight = |pixels: f64| if middle > 0.0 { pixels / (pixels + middle) } else { 1.0 };
+        let total: f64 = values.iter().map(|v| weight(v.1)).sum();
+        let squares: f64 = values.iter().map(|v| weight(v.1).powi(2)).sum();
+        let n = total * total / squares.max(f64::MIN_POSITIVE);
+        if values.len() < 2 || n <= 1.0 {
             return None;
         }
-        let value = values.iter().sum::<f64>() / n;
-        let variance = values.iter().map(|v| (v - value).powi(2)).sum::<f64>() / (n - 1.0);
-        Some(Mean { value, std_error: (variance / n).sqrt(), views: n })
+        let value = values.iter().map(|v| weight(v.1) * v.0).sum::<f64>() / total;
+        let scatter: f64 = values.iter().map(|v| (weight(v.1) * (v.0 - value)).powi(2)).sum();
+        Some(Mean { value, std_error: (scatter * n / (n - 1.0)).sqrt() / total, views: n })
     }
 
     /// Chance of a mean this far above `expected`, one-sided, by Student's t.
@@ -54,7 +63,6 @@ impl Mean {
 
 /// All mismatches of structure at this error rate each.
 pub fn hanging(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
-    if std::env::var_os("KINOISE_TRACE").is_some() { dbg_trace(views); }
     let mut found = Vec::new();
     found.extend(window(views, known, level));
     found.extend(in_time(views, known, level));
@@ -66,28 +74,6 @@ pub fn hanging(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
         .unwrap_or(0.0);
     found.extend(frames(views, known, level, rho));
     found
-}
-
-pub fn dbg_tails(views: &[Structure]) {
-    if std::env::var_os("KINOISE_TRACE").is_none() { return; }
-    let p = |n: &str, m: Option<Mean>, scale: f64| if let Some(m) = m { eprintln!("STAT {n} {:.5} {:.5} {}", m.value / scale, m.std_error / scale, m.views); };
-    p("tail", Mean::of(views.iter().filter(|s| s.tail_pixels > 5000.0).map(|s| s.tail)), GAUSSIAN_TAIL);
-    p("tailpix", Mean::of(views.iter().map(|s| s.tail_pixels)), 1.0);
-}
-
-fn dbg_trace(views: &[Structure]) {
-    let var = Mean::of(views.iter().map(|s| s.variance_px2)).map_or(1.0, |m| m.value);
-    let p = |n: &str, m: Option<Mean>, scale: f64| if let Some(m) = m { eprintln!("STAT {n} {:.5} {:.5} {}", m.value / scale, m.std_error / scale, m.views); };
-    p("lnwindow", Mean::of(views.iter().filter_map(|s| s.window_px).map(f64::ln)), 1.0);
-    p("c1", Mean::of(views.iter().filter_map(|s| s.lagged[0])), 1.0);
-    p("c2", Mean::of(views.iter().filter_map(|s| s.lagged[1])), 1.0);
-    p("c3", Mean::of(views.iter().filter_map(|s| s.lagged[2])), 1.0);
-    p("falling", Mean::of(views.iter().filter_map(|s| Some(s.lagged[0]? - s.lagged[if s.lagged[2].is_some() {2} else {1}]?))), 1.0);
-    p("fixed", Mean::of(views.iter().filter_map(|s| s.fixed_px2)), var);
-    p("lines", Mean::of(views.iter().filter_map(|s| s.lines_px2)), var);
-    p("near", Mean::of(views.iter().filter_map(|s| s.near)), 1.0);
-    p("row", Mean::of(views.iter().filter_map(|s| s.row_px2)), var);
-    p("column", Mean::of(views.iter().filter_map(|s| s.column_px2)), var);
 }
 
 fn one(name: &str, value: f64, std_error: f64) -> Map<String, serde_json::Value> {
@@ -105,8 +91,7 @@ fn nats(m: &Mean, expected: f64) -> f64 {
 const SAME_WINDOW: f64 = 1.12;
 
 fn window(views: &[Structure], known: &Known, level: f64) -> Option<Hanging> {
-    let logs = || views.iter().filter_map(|s| s.window_px).map(f64::ln);
-    let m = Mean::of(logs())?;
+    let m = Mean::of(views, |s| s.window_px.map(f64::ln))?;
     let expected = known.parameter("spatial-correlation", "length_px").unwrap_or(1.0).max(1.0);
     let length = m.value.exp();
     let p = m.p_above(expected.ln());
@@ -126,7 +111,7 @@ fn window(views: &[Structure], known: &Known, level: f64) -> Option<Hanging> {
         return Some(found([0.0, length], length, length * m.std_error, 1.0, p, nats));
     }
     // A part of the noise alone: seen where neighbours are taken for independent.
-    let near = Mean::of(views.iter().filter_map(|s| s.near))?;
+    let near = Mean::of(views, |s| s.near)?;
     let p = near.p_above(0.0);
     (expected == 1.0 && p < level && near.value > LEAST_NEAR).then(|| {
         // As many pixels make one as a window of this side would have it.
@@ -151,8 +136,8 @@ const BESIDE_ANOTHER: f64 = 0.05;
 
 fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
     let mut found = Vec::new();
-    let fixed = Mean::of(views.iter().filter_map(|s| s.fixed_px2));
-    let variance = Mean::of(views.iter().map(|s| s.variance_px2)).map_or(0.0, |m| m.value);
+    let fixed = Mean::of(views, |s| s.fixed_px2);
+    let variance = Mean::of(views, |s| Some(s.variance_px2)).map_or(0.0, |m| m.value);
     let mut fixed_px2 = 0.0;
     if let Some(m) = fixed {
         let sigma = m.value.max(0.0).sqrt();
@@ -175,16 +160,15 @@ fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
             });
         }
     }
-    let at = |lag: usize| move |s: &Structure| s.lagged[lag];
-    let Some(first) = Mean::of(views.iter().filter_map(at(0))) else { return found };
+    let Some(first) = Mean::of(views, |s| s.lagged[0]) else { return found };
     let fixed_share = fixed_px2 / variance.max(1e-12);
     let frozen_known = known.parameter("frozen-noise", "fraction").unwrap_or(0.0);
     let rho_known = known.parameter("temporal-correlation", "rho").unwrap_or(0.0);
     let last = if views.iter().any(|s| s.lagged[2].is_some()) { 2 } else { 1 };
-    let falling = Mean::of(views.iter().filter_map(|s| Some(s.lagged[0]? - s.lagged[last]?)));
-    let Some((falling, (still, least))) = falling.zip(still_level(views).zip(Mean::of(
-        views.iter().filter_map(|s| s.lagged[last]),
-    ))) else {
+    let falling = Mean::of(views, |s| Some(s.lagged[0]? - s.lagged[last]?));
+    let Some((falling, (still, least))) =
+        falling.zip(still_level(views).zip(Mean::of(views, |s| s.lagged[last])))
+    else {
         // Two frames a view: still or slowly changing, nobody can say.
         let p = first.p_above(fixed_share + frozen_known + rho_known);
         let more = first.value - fixed_share - frozen_known - rho_known;
@@ -242,9 +226,7 @@ fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
 /// Share of the noise that stands still within a view, by the views' mean correlations; `None` with
 /// too few frames.
 pub fn still_level(views: &[Structure]) -> Option<f64> {
-    let mean = |of: &dyn Fn(&Structure) -> Option<f64>| {
-        Mean::of(views.iter().filter_map(of)).map(|m| m.value)
-    };
+    let mean = |of: &dyn Fn(&Structure) -> Option<f64>| Mean::of(views, of).map(|m| m.value);
     let (c1, c2, c3) = (mean(&|s| s.lagged[0])?, mean(&|s| s.lagged[1])?, mean(&|s| s.lagged[2]));
     let share = still_share([c1, c2, c3.unwrap_or(c2 * c2 / c1.max(1e-6))], c3.is_some());
     let fixed = mean(&|s| s.fixed_px2).unwrap_or(0.0).max(0.0);
@@ -271,9 +253,9 @@ fn still_share([c1, c2, c3]: [f64; 3], three: bool) -> f64 {
 fn lines(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
     let mut found: Vec<Hanging> = Vec::new();
     found.extend(fixed_lines(views, level));
-    let variance = Mean::of(views.iter().map(|s| s.variance_px2)).map_or(0.0, |m| m.value);
-    let rows = Mean::of(views.iter().filter_map(|s| s.row_px2));
-    let columns = Mean::of(views.iter().filter_map(|s| s.column_px2));
+    let variance = Mean::of(views, |s| Some(s.variance_px2)).map_or(0.0, |m| m.value);
+    let rows = Mean::of(views, |s| s.row_px2);
+    let columns = Mean::of(views, |s| s.column_px2);
     let known_px = known.parameter("row-noise", "sigma_px").unwrap_or(0.0);
     let both = [
         (rows, vec!["row-noise"], Axis::Row, known_px * known_px),
@@ -309,8 +291,8 @@ const LEAST_LINES: f64 = 0.0015;
 
 /// Columns that err by a constant each, in every view, from one to the next.
 fn fixed_lines(views: &[Structure], level: f64) -> Option<Hanging> {
-    let variance = Mean::of(views.iter().map(|s| s.variance_px2)).map_or(0.0, |m| m.value);
-    let m = Mean::of(views.iter().filter_map(|s| s.lines_px2))?;
+    let variance = Mean::of(views, |s| Some(s.variance_px2)).map_or(0.0, |m| m.value);
+    let m = Mean::of(views, |s| s.lines_px2)?;
     let p = m.p_above(0.0);
     let share = m.value / variance.max(1e-12);
     if p > level || share < LEAST_LINES {
@@ -378,7 +360,7 @@ fn frames(views: &[Structure], known: &Known, level: f64, rho: f64) -> Vec<Hangi
     let aside = moving && jitter_px2 < 0.15 * per_trend;
     if p_jitter < level && jitter_px2 > 0.0 && !aside {
         let sigma = jitter_px2.sqrt();
-        let variance = Mean::of(views.iter().map(|s| s.variance_px2)).map_or(1.0, |m| m.value);
+        let variance = Mean::of(views, |s| Some(s.variance_px2)).map_or(1.0, |m| m.value);
         found.push(Hanging {
             families: vec!["frame-jitter"],
             statistic: Statistic::Correlation,
@@ -396,23 +378,28 @@ fn frames(views: &[Structure], known: &Known, level: f64, rho: f64) -> Vec<Hangi
 
 /// A tail is heavy from this many times a Gaussian's share on.
 const HEAVY: f64 = 2.5;
+/// So much more where the size of the noise is uneven.
+const MUCH_HEAVIER: f64 = 6.0;
 /// So heavy it may look without a cause.
 const UNEQUAL: f64 = 1.5;
 /// Views too small to show a tail, in readings.
 const FEWEST_READINGS: f64 = 5000.0;
 
-pub fn tails(views: &[Structure], known: &Known, level: f64) -> Option<Hanging> {
+/// Are the residuals' tails heavier than a Gaussian's? `uneven` says that the noise is of unequal
+/// size where no law was found for it, which makes a tail too.
+pub fn tails(views: &[Structure], known: &Known, level: f64, uneven: bool) -> Option<Hanging> {
     if known.has("heavy-tails") {
         return None;
     }
-    let looked: Vec<&Structure> =
-        views.iter().filter(|s| s.tail_pixels > FEWEST_READINGS).collect();
-    let m = Mean::of(looked.iter().map(|s| s.tail))?;
+    let looked = |s: &Structure| s.tail_pixels > FEWEST_READINGS;
+    let m = Mean::of(views, |s| looked(s).then_some(s.tail))?;
     // Patches of unequal noise, and steps of the words, make a tail of a Gaussian too.
-    if m.value < HEAVY * GAUSSIAN_TAIL || m.p_above(UNEQUAL * GAUSSIAN_TAIL) > level {
+    let much = if uneven { MUCH_HEAVIER } else { 1.0 };
+    let expected = much * UNEQUAL * GAUSSIAN_TAIL;
+    if m.value < much * HEAVY * GAUSSIAN_TAIL || m.p_above(expected) > level {
         return None;
     }
-    let size = Mean::of(looked.iter().filter(|s| s.tail > 0.0).map(|s| s.tail_size))?;
+    let size = Mean::of(views, |s| (looked(s) && s.tail > 0.0).then_some(s.tail_size))?;
     // A second Gaussian of this scale: the mean excess beyond four deviations is roughly
     // scale^2 / 4 for scales well above one.
     let scale = (4.0 * (size.value - 4.0)).max(1.0).sqrt().max(1.5);
@@ -430,7 +417,7 @@ pub fn tails(views: &[Structure], known: &Known, level: f64) -> Option<Hanging> 
         size_sigma: fraction.sqrt() * scale,
         p: m.p_above(GAUSSIAN_TAIL),
         nats: m.value
-            * looked.iter().map(|s| s.tail_pixels).sum::<f64>()
+            * views.iter().map(|s| s.tail_pixels).sum::<f64>()
             * (m.value / GAUSSIAN_TAIL).ln(),
         words: None,
     })

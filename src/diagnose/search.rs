@@ -44,7 +44,7 @@ pub struct Rules {
 pub struct Rival {
     pub family: &'static str,
     pub basis: Basis,
-    /// Nats over the terms before.
+    /// Nats over the terms before, over the root of how much more than noise the views disagree.
     pub gain: f64,
     /// How far behind the chosen one, in standard errors over the views.
     pub behind: f64,
@@ -342,22 +342,28 @@ impl<'a> Layer<'a> {
         let total = |i: usize| judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| j.gain.total);
         // Views that scatter more than their noise says count for less.
         let safe = |i: usize| judged[i].as_ref().map_or(0.0, |j| j.gain.total / j.null.dispersion);
-        let ranked = |named: bool| {
+        // A name whose fits to single views disagree is the worse one.
+        let fair = |i: usize| {
+            judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| {
+                if total(i) > 0.0 { total(i) / j.null.dispersion.sqrt() } else { total(i) }
+            })
+        };
+        let ranked = |named: bool, by: &dyn Fn(usize) -> f64| {
             let mut order: Vec<usize> = (0..self.candidates.len())
                 .filter(|&i| self.candidates[i].family.is_some() == named)
                 .collect();
-            order.sort_by(|&a, &b| total(b).total_cmp(&total(a)));
+            order.sort_by(|&a, &b| by(b).total_cmp(&by(a)));
             order
         };
-        let (families, curves) = (ranked(true), ranked(false));
+        let (families, curves) = (ranked(true, &fair), ranked(false, &total));
         let threshold = noise.threshold(self.rules.level);
         self.trace(judged, threshold);
         let best_curve = curves.first().map_or(f64::NEG_INFINITY, |&i| total(i));
-        let best_family = families.first().map_or(f64::NEG_INFINITY, |&i| total(i));
+        let best_family = families.first().map_or(f64::NEG_INFINITY, |&i| fair(i));
         let named = families
             .iter()
             .copied()
-            .filter(|&i| total(i) > best_family - AS_GOOD_NATS.max(AS_GOOD_SHARE * best_family))
+            .filter(|&i| fair(i) > best_family - AS_GOOD_NATS.max(AS_GOOD_SHARE * best_family))
             .min_by_key(|&i| (self.candidates[i].basis.count(), !self.rests_on_a_measurement(i)))
             .filter(|&i| safe(i) > threshold && total(i) > self.adequacy(i) * best_curve)
             // What fewer columns without a name do better is not what the name says.
@@ -385,7 +391,7 @@ impl<'a> Layer<'a> {
                 rivals.push(Rival {
                     family,
                     basis: self.candidates[i].basis.clone(),
-                    gain: total(i),
+                    gain: fair(i),
                     behind: behind(&won.by_view, &j.gain.by_view),
                 });
             }
@@ -413,7 +419,7 @@ impl<'a> Layer<'a> {
     fn adequacy(&self, i: usize) -> f64 {
         match self.candidates[i].basis {
             Basis::Banding { .. } => BANDS_ADEQUATE.min(self.rules.adequacy),
-            Basis::Recalibrate { .. } => LAW_ADEQUATE.max(self.rules.adequacy),
+            Basis::Recalibrate { .. } | Basis::Level => LAW_ADEQUATE.max(self.rules.adequacy),
             _ => self.rules.adequacy,
         }
     }
@@ -515,9 +521,7 @@ impl<'a> Layer<'a> {
 fn same_curve(a: &Candidate, b: &Candidate) -> bool {
     let key = |c: &Candidate| match c.basis {
         // A step and a smooth curve are not one.
-        Basis::Curve { over, times, nodes, .. } => {
-            Some((format!("{over:?}{}", nodes == 2), times))
-        }
+        Basis::Curve { over, times, nodes, .. } => Some((format!("{over:?}{}", nodes == 2), times)),
         Basis::Map { times, .. } => Some(("map".to_string(), times)),
         _ => None,
     };

@@ -12,6 +12,8 @@ use crate::stats::{MAD_TO_SIGMA, measure_correlation, median_in_place};
 /// What one view tells; `None` where it cannot.
 #[derive(Debug, Clone, Default)]
 pub struct Structure {
+    /// Pixels that were looked at.
+    pub pixels: f64,
     /// Variance of the first frame's rough residual, px^2.
     pub variance_px2: f64,
     /// Side of the window that would make the correlation, px.
@@ -83,6 +85,7 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     let mut s = Structure::default();
     let frames: Vec<Vec<f32>> = field.first.iter().map(|r| calm(&rough(field, r, bias))).collect();
     let Some(first) = frames.first() else { return s };
+    s.pixels = first.iter().filter(|r| r.is_finite()).count() as f64;
     s.variance_px2 = mean(first.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
     let level: Vec<Vec<f32>> =
         frames.iter().map(|f| without_lines(f, camera.width, SHORT_LINE)).collect();
