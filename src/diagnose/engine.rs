@@ -24,7 +24,9 @@ use super::rim;
 use super::search::Outcome;
 use super::steps::{Steps, is_raw, lattice, steps};
 use super::structure::structures;
-use super::verdict::{after, extend, least_size, merge, not_identifiable, shares, view_lines};
+use super::verdict::{
+    after, extend, least_size, merge, not_identifiable, shares, symptoms, view_lines,
+};
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
 use crate::measure::{MeasureOptions, Workbench};
@@ -406,6 +408,9 @@ impl<'a> Case<'a> {
                 f.axis == Axis::Column && f.statistic == Statistic::Bias && f.terms.is_empty();
             !(lines && columns_told)
         });
+        if self.baseline.is_some() {
+            symptoms(&mut found);
+        }
         merge(&mut found);
         shares(&mut found);
         let heldout = heldout::score(

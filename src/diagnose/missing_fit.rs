@@ -69,7 +69,8 @@ const OFF: f64 = 0.3;
 const TOGETHER: f64 = 16.0;
 /// Shares are known no better.
 const LEAST: f64 = 0.002;
-/// Rises of another form (Gaussian, Gompertz) put the middle up to so many widths elsewhere.
+/// Rises of another form (Gaussian, Gompertz) put the middle up to so many widths elsewhere, and
+/// are by this share of a width steeper.
 const FORM: f64 = 0.5;
 /// A share of its own must lower chi squared by this: 1 % of chance.
 const WORTH: f64 = 6.6;
@@ -156,7 +157,10 @@ pub fn fit(start: Step, base: f64, points: &[Point]) -> Option<Fitted> {
     let step = problem.step(&end.x);
     let error = |j: usize| covariance[(j, j)].max(0.0).sqrt();
     let share = problem.free_share.then(|| error(2) * step.share * (1.0 - step.share));
-    let std_error =
-        [Some(error(0).hypot(FORM * step.width)), Some(error(1) * step.width.abs()), share];
+    let std_error = [
+        Some(error(0).hypot(FORM * step.width)),
+        Some(error(1).hypot(FORM) * step.width.abs()),
+        share,
+    ];
     Some(Fitted { step, std_error })
 }

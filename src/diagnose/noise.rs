@@ -1,7 +1,7 @@
 //! What the structure of the noise amounts to: each view is one sample of every statistic.
 
 use serde_json::{Map, json};
-use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
+use statrs::distribution::{ChiSquared, Continuous, ContinuousCDF, FisherSnedecor, StudentsT};
 
 use super::known::Known;
 use super::parameters::estimate;
@@ -312,6 +312,9 @@ fn fixed_lines(views: &[Structure], level: f64) -> Option<Hanging> {
     })
 }
 
+/// Motion that is not uniform, and jitter that is no white noise, differ by this share.
+const UNEVEN: f64 = 0.2;
+
 /// The frames' means scatter by this factor more before it is called jitter.
 const JITTER: f64 = 2.0;
 
@@ -342,7 +345,7 @@ fn frames(views: &[Structure], known: &Known, level: f64, rho: f64) -> Vec<Hangi
             statistic: Statistic::Bias,
             axis: Axis::Frame,
             interval: [0.0, 0.0],
-            parameters: one("velocity_mps", velocity, speed / (2.0 * n).sqrt()),
+            parameters: one("velocity_mps", velocity, speed * UNEVEN.hypot(1.0 / (2.0 * n).sqrt())),
             size_sigma: 0.0,
             p: p_motion.max(1e-300),
             nats: 0.5 * n * f.ln().max(0.0),
@@ -366,7 +369,7 @@ fn frames(views: &[Structure], known: &Known, level: f64, rho: f64) -> Vec<Hangi
             statistic: Statistic::Correlation,
             axis: Axis::Frame,
             interval: [0.0, 0.0],
-            parameters: one("sigma_px", sigma, sigma / (2.0 * freedom).sqrt()),
+            parameters: one("sigma_px", sigma, sigma * UNEVEN.hypot(1.0 / (2.0 * freedom).sqrt())),
             size_sigma: (jitter_px2 / variance.max(1e-12)).sqrt(),
             p: p_jitter.max(1e-300),
             nats: 0.5 * freedom * (ratio / freedom).ln().max(0.0),
@@ -382,6 +385,8 @@ const HEAVY: f64 = 2.5;
 const MUCH_HEAVIER: f64 = 6.0;
 /// So heavy it may look without a cause.
 const UNEQUAL: f64 = 1.5;
+/// A tail of another form than two Gaussians moves its parameters by this share.
+const TAIL_FORM: f64 = 0.2;
 /// Views too small to show a tail, in readings.
 const FEWEST_READINGS: f64 = 5000.0;
 
@@ -400,13 +405,15 @@ pub fn tails(views: &[Structure], known: &Known, level: f64, uneven: bool) -> Op
         return None;
     }
     let size = Mean::of(views, |s| (looked(s) && s.tail > 0.0).then_some(s.tail_size))?;
-    // A second Gaussian of this scale: the mean excess beyond four deviations is roughly
-    // scale^2 / 4 for scales well above one.
-    let scale = (4.0 * (size.value - 4.0)).max(1.0).sqrt().max(1.5);
-    let beyond = 2.0 * (1.0 - statrs::distribution::Normal::standard().cdf(4.0 / scale));
-    let fraction = ((m.value - GAUSSIAN_TAIL) / beyond.max(1e-6)).clamp(0.0, 1.0);
-    let mut parameters = one("fraction", fraction, fraction * m.std_error / m.value.max(1e-12));
-    parameters.insert("scale".into(), estimate(scale, 0.5 * scale * size.std_error / size.value));
+    let more = m.value - GAUSSIAN_TAIL;
+    // How far out they lie that are no Gaussian's.
+    let mean = (m.value * size.value - GAUSSIAN_TAIL * beyond_four(1.0).1) / more;
+    let scale = wider(mean);
+    let fraction = (more / beyond_four(scale).0).clamp(0.0, 1.0);
+    let scatter = m.std_error / m.value.max(1e-12);
+    let mut parameters = one("fraction", fraction, fraction * scatter.hypot(TAIL_FORM));
+    let scatter = size.std_error / (size.value - 4.0).max(1e-6);
+    parameters.insert("scale".into(), estimate(scale, scale * scatter.hypot(TAIL_FORM)));
     parameters.insert("share_beyond_4_sigma".into(), json!(m.value));
     Some(Hanging {
         families: vec!["heavy-tails"],
@@ -421,6 +428,24 @@ pub fn tails(views: &[Structure], known: &Known, level: f64, uneven: bool) -> Op
             * (m.value / GAUSSIAN_TAIL).ln(),
         words: None,
     })
+}
+
+/// Share of a Gaussian of this standard deviation beyond four, and its mean distance there.
+fn beyond_four(scale: f64) -> (f64, f64) {
+    let normal = statrs::distribution::Normal::standard();
+    let t = 4.0 / scale;
+    let share = 2.0 * normal.sf(t);
+    (share, 2.0 * scale * Continuous::pdf(&normal, t) / share)
+}
+
+/// Standard deviation of a Gaussian whose mean distance beyond four is `mean`, by bisection.
+fn wider(mean: f64) -> f64 {
+    let (mut low, mut high) = (1.1, 20.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if beyond_four(middle).1 < mean { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
 }
 
 #[cfg(test)]

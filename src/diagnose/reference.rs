@@ -28,6 +28,8 @@ pub struct Law {
     pub settled: Vec<(&'static str, f64)>,
     pub gain: Gain,
     pub null: Null,
+    /// Degrees of freedom that the references' own error was measured with.
+    pub freedom: f64,
 }
 
 /// One view with a reference.
@@ -90,7 +92,19 @@ pub fn laws(fields: &[Field], levels: &[f64]) -> Vec<Law> {
             }));
             let (rms_m, rms_sigma) = (square(&shift), square(&|c| shift(c) / c.sigma_m));
             let error_m = variance.sqrt();
-            laws.push(Law { family, axis, reach, rms_m, rms_sigma, error_m, settled, gain, null });
+            let freedom = (n - LAWS).max(1.0);
+            laws.push(Law {
+                family,
+                axis,
+                reach,
+                rms_m,
+                rms_sigma,
+                error_m,
+                settled,
+                gain,
+                null,
+                freedom,
+            });
         }
     };
     add("depth-scale", Axis::Z, Vec::new(), &|c| c.z);
@@ -105,6 +119,8 @@ pub fn laws(fields: &[Field], levels: &[f64]) -> Vec<Law> {
     laws
 }
 
+/// Columns of [`scatter`].
+const LAWS: f64 = 4.0;
 /// A relative error of a few percent, an offset of a few px.
 const PRIOR: f64 = 1.0;
 
@@ -120,7 +136,7 @@ fn scatter(checked: &[Checked]) -> f64 {
     let fitted = columns.clone().svd(true, true).solve(&off, 1e-9).map(|beta| &columns * beta);
     let left = fitted.map_or_else(|_| off.norm_squared(), |f| (&off - f).norm_squared());
     // A tape is read to half a millimetre at best.
-    (left / (n as f64 - 4.0).max(1.0)).max(0.0005 * 0.0005)
+    (left / (n as f64 - LAWS).max(1.0)).max(0.0005 * 0.0005)
 }
 
 /// A law must move the depth by this many errors of a reference, and by this much, m: tapes and
@@ -137,7 +153,11 @@ pub fn findings(laws: &[Law], known: &Known, level: f64, seed: Seed) -> Vec<Find
         return Vec::new();
     }
     let noise = NoiseGains::of(&nulls, Seed(seed.0 ^ 0x5eed));
-    let safe = |l: &Law| l.gain.total / l.null.dispersion;
+    // An error measured on few references makes a Student's t of a Gaussian.
+    let safe = |l: &Law| {
+        let gain = (l.gain.total / l.null.dispersion).max(0.0);
+        0.5 * l.freedom * (2.0 * gain / l.freedom).ln_1p()
+    };
     let Some(best) = laws.iter().max_by(|a, b| a.gain.total.total_cmp(&b.gain.total)) else {
         return Vec::new();
     };

@@ -36,6 +36,44 @@ pub(super) fn merge(found: &mut Vec<Finding>) {
     });
 }
 
+/// What a matcher does when its light, its blur or its window change.
+const SYMPTOMS: [&str; 8] = [
+    "pixel-locking",
+    "heavy-tails",
+    "range-dropout",
+    "range-exponent",
+    "vignetting",
+    "slope-noise",
+    "column-banding",
+    "intensity-dependent-noise",
+];
+/// Half of them were, in two runs of a world of light that differed in one cause.
+const NO_SYMPTOM: f64 = 0.5;
+/// What changes how noise is made, and so its size.
+const MAKES_NOISE: [&str; 3] = ["spatial-correlation", "frozen-noise", "disparity-quantisation"];
+/// Of the noise's standard deviation, from where on such a change is the first thing to tell.
+const LARGE: f64 = 0.3;
+
+/// A recording held against a simulation of the same physics: the size of the noise follows from
+/// what makes it, and what the catalogue calls a cause is often a symptom.
+pub(super) fn symptoms(found: &mut [Finding]) {
+    let made = found
+        .iter()
+        .any(|f| f.size.sigma > LARGE && f.effect.is_some_and(|id| MAKES_NOISE.contains(&id)));
+    for f in found.iter_mut() {
+        let symptom = f.effect.is_some_and(|id| SYMPTOMS.contains(&id));
+        for a in f.alternatives.iter_mut().filter(|a| SYMPTOMS.contains(&a.effect)) {
+            a.probability *= NO_SYMPTOM;
+        }
+        if symptom {
+            f.physics.push_str(" Held against a simulation it may be a symptom: light, blur and window change it too.");
+        }
+        if made && (symptom || f.status == Status::Recalibrate) {
+            f.share *= 1e-3;
+        }
+    }
+}
+
 /// Nats become shares, and the largest comes first.
 pub(super) fn shares(found: &mut [Finding]) {
     let total: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
