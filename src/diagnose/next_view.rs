@@ -256,6 +256,8 @@ fn told(view: &Prospect, now: f64, best: &str, rival: &str) -> NextView {
         z_m: view.z_m,
         theta_rad: view.theta_rad,
         azimuth_rad: view.azimuth_rad,
+        separation_now: now,
+        separation_then: then,
         why: format!(
             "{best} and {rival} differ most there: {now:.1} standard errors apart as it is, {then:.1} expected with this view; {verdict}"
         ),

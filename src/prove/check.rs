@@ -1,5 +1,7 @@
 //! Whether a proof holds: everything that can be computed again is, and compared.
 
+mod second;
+
 use std::path::{Path, PathBuf};
 
 use rand::seq::SliceRandom;
@@ -54,6 +56,7 @@ pub fn check(folder: &Path, options: &CheckOptions, progress: Progress<'_>) -> R
     checked.judgement(&proof);
     checked.program(&proof, &options.program)?;
     checked.sets(&proof, options, progress)?;
+    checked.second(folder, &proof, options, progress)?;
     Ok(checked)
 }
 
@@ -220,7 +223,7 @@ impl Checked {
         let again = each(&sample, options.workers, ("making sets again", progress), |i| {
             let taken = Taken::of(&planned[*i], data)?;
             let folder = scratch.join(&taken.name);
-            let hash = make(&taken, &folder)?;
+            let hash = make(taken.sealed.as_ref(), &folder)?;
             std::fs::remove_dir_all(&folder).map_err(|e| Error::write(&folder, e))?;
             Ok((taken.commitment, hash))
         });

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::prove::{Cell, Hidden, Judged, ProvenSet, Rate, Truth, World};
+use crate::prove::{Cell, Hidden, Rate, Truth, World};
 use crate::report::numbers::fixed;
 
 /// Shares below a tenth, and those close to all, get a decimal.
@@ -100,16 +100,6 @@ const NEARER_FIFTY: f64 = 27.386_127_875_258_307;
 /// Every hidden cause is worth 50 nats or more, as the judge rounds strengths.
 pub(super) fn worth(truth: &Truth) -> bool {
     nats(truth).reduce(f64::min).is_some_and(|n| n >= NEARER_FIFTY)
-}
-
-/// For scores of a part of the sets, without what was gained.
-pub(super) fn judged_alone(set: &ProvenSet) -> Judged<'_> {
-    Judged { gains: None, ..set.judged() }
-}
-
-/// From the file's "0050" to 50.
-pub(super) fn level(key: &str) -> Option<f64> {
-    key.parse().ok().filter(|n: &f64| n.is_finite() && *n > 0.0)
 }
 
 #[cfg(test)]
