@@ -3,6 +3,7 @@
 mod second;
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rand::seq::SliceRandom;
 
@@ -58,6 +59,13 @@ pub fn check(folder: &Path, options: &CheckOptions, progress: Progress<'_>) -> R
     checked.sets(&proof, options, progress)?;
     checked.second(folder, &proof, options, progress)?;
     Ok(checked)
+}
+
+/// A folder that no other check, in this process or another, works in.
+fn scratch() -> PathBuf {
+    static CHECKS: AtomicUsize = AtomicUsize::new(0);
+    let (process, check) = (std::process::id(), CHECKS.fetch_add(1, Ordering::Relaxed));
+    std::env::temp_dir().join(format!("kinoise-check-{process}-{check}"))
 }
 
 /// At least so many sets are made again.
@@ -218,7 +226,7 @@ impl Checked {
             sample.shuffle(&mut Seed(seed.unwrap_or(0)).stream("prove/check"));
             sample.truncate(FEWEST.max(sample.len().div_ceil(ONE_IN)));
         }
-        let scratch = std::env::temp_dir().join(format!("kinoise-check-{}", std::process::id()));
+        let scratch = scratch();
         let data = options.data.as_deref();
         let again = each(&sample, options.workers, ("making sets again", progress), |i| {
             let taken = Taken::of(&planned[*i], data)?;

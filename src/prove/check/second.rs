@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{CheckOptions, Checked, FEWEST};
+use super::{CheckOptions, Checked, FEWEST, scratch};
 use crate::error::{Error, Result};
 use crate::io::sha256_hex;
 use crate::prove::advice::{
@@ -129,7 +129,7 @@ impl Checked {
     ) -> Result<()> {
         let planned = plan(proof.order.sets, proof.order.seed, proof.order.real);
         let some = if options.all { second.advice.sets.len() } else { FEWEST };
-        let scratch = std::env::temp_dir().join(format!("kinoise-views-{}", std::process::id()));
+        let scratch = scratch();
         let sets: Vec<_> = second.advice.sets.iter().take(some).collect();
         let data = options.data.as_deref();
         let again = each(&sets, options.workers, ("taking views again", progress), |set| {
