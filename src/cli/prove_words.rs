@@ -1,5 +1,6 @@
 //! What a trial says to people.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use kinoise::prove::{Checked, Endpoint, Level, Proof, Rate, Scores};
@@ -32,17 +33,13 @@ pub fn summary(proof: &Proof) -> String {
             let _ = write!(text, "{cell:>11}");
         }
     }
-    text += "\n\nsingle causes by what they are worth:\n";
-    for (nats, rates) in &scores.by_nats {
-        let of = |mark: &str| rates.get(mark).map_or("-".into(), percent);
-        let worth = nats.trim_start_matches('0');
-        let _ = writeln!(
-            text,
-            "{worth:>5} nats: seen {}, right name {}",
-            of("detected"),
-            of("first_name")
-        );
+    text += "\n";
+    for (kind, head, unit) in KINDS {
+        if let Some(levels) = scores.by_strength.get(kind) {
+            let _ = write!(text, "\n{head}:\n{}", strengths(levels, unit));
+        }
     }
+    text += &advised(proof);
     text += &others(scores);
     text += "\nchosen beforehand:\n";
     scores.endpoints.iter().for_each(|e| text += &endpoint(e));
@@ -54,6 +51,59 @@ pub fn summary(proof: &Proof) -> String {
         let _ = writeln!(text, "{failed} sets without a diagnosis: counted as wrong");
     }
     let _ = write!(text, "sha256 of seal.json {}", proof.seal_sha256);
+    text
+}
+
+/// Single causes: what they are, and what their strength is in.
+const KINDS: [(&str, &str, &str); 4] = [
+    ("rays/single", "one cause of the catalogue, by rays", "nats"),
+    ("rays/outside", "one cause outside the catalogue, by rays", "nats"),
+    ("light/single", "one cause with a name in the catalogue, by light", "of size"),
+    ("light/nameless", "one cause without a name in the catalogue, by light", "of size"),
+];
+
+/// A line for each strength.
+fn strengths(levels: &BTreeMap<String, BTreeMap<String, Rate>>, unit: &str) -> String {
+    let mut text = String::new();
+    for (level, rates) in levels {
+        let level = level.trim_start_matches('0');
+        let level =
+            if unit == "nats" { format!("{level} {unit}") } else { format!("{unit} {level}") };
+        let _ = write!(text, "{level:>12}: ");
+        let told = [
+            ("detected", "seen"),
+            ("first_name", "right first name, of those seen,"),
+            ("abstained", "called unexplained in the right place"),
+        ];
+        let parts = told.iter().filter_map(|(mark, words)| {
+            let rate = rates.get(*mark)?;
+            Some(format!("{words} {} of {}, {}", rate.k, rate.n, percent(rate)))
+        });
+        text += &parts.collect::<Vec<_>>().join("; ");
+        text += "\n";
+    }
+    text
+}
+
+/// The second round in a few lines.
+fn advised(proof: &Proof) -> String {
+    let Some(second) = &proof.second else { return String::new() };
+    let scores = &second.scores;
+    let mut text = format!("\nadvised views taken: {}\n", scores.sets);
+    let told = [
+        ("right_in_doubt", "the right name is one of the two in doubt"),
+        ("surer", "of these, its probability rose"),
+        ("led_before", "it led before"),
+        ("leads_after", "it leads with the view"),
+        ("settled", "it leads with 0.9 or more"),
+        ("settled_as_promised", "the same, where the advice expected it"),
+        ("misled", "neither name in doubt is right, and some wrong one became sure"),
+    ];
+    for (mark, words) in told {
+        if let Some(rate) = scores.all.get(mark) {
+            let _ = writeln!(text, "  {words}: {} of {}, {}", rate.k, rate.n, percent(rate));
+        }
+    }
     text
 }
 

@@ -119,6 +119,9 @@ pub struct NextView {
     pub z_m: f64,
     pub theta_rad: f64,
     pub azimuth_rad: f64,
+    /// Standard errors between the two best names, on the views there are and with this one added.
+    pub separation_now: f64,
+    pub separation_then: f64,
     pub why: String,
 }
 

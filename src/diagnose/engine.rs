@@ -2,6 +2,7 @@
 
 use serde_json::Map;
 
+use super::ablation::Ablation;
 use super::against::Baseline;
 use super::diagnosis::{
     DIAGNOSIS_FORMAT, Detectable, Diagnosis, Finding, Reference, Status, Verdict,
@@ -41,11 +42,13 @@ pub struct DiagnoseOptions {
     pub seed: Seed,
     /// Chance that a clean recording is said to have anything wrong.
     pub level: f64,
+    /// Nothing, but in tests of what each part is for.
+    pub ablation: Ablation,
 }
 
 impl Default for DiagnoseOptions {
     fn default() -> Self {
-        DiagnoseOptions { seed: Seed(1), level: 0.03 }
+        DiagnoseOptions { seed: Seed(1), level: 0.03, ablation: Ablation::None }
     }
 }
 
@@ -183,6 +186,7 @@ impl<'a> Case<'a> {
             .map(|s| Baseline::of(s, sensor, &mut fields, model, options, progress))
             .transpose()?;
         let mut survey = Survey::of(&fields, &sensor.camera, &bench.rays);
+        survey.ablate(options.ablation, &fields);
         survey.fixed_px2 = fixed_px2(&structures(&fields, &sensor.camera, &[]));
         if let Some(baseline) = &baseline {
             baseline.references(&mut fields);
@@ -319,7 +323,9 @@ impl<'a> Case<'a> {
         let textured = scatter.tails.is_some()
             || (!scatter.hangs.is_empty() && f.size.sigma < LEVEL_BESIDE_TEXTURE);
         let tailed = textured && f.status == Status::Recalibrate;
-        !stepped && !tailed && f.size.sigma > least_size(f.statistic)
+        !stepped
+            && !tailed
+            && f.size.sigma > self.options.ablation.least_size(least_size(f.statistic))
     }
 
     /// What neither a mean nor a variance shows: how the noise hangs together, tails, steps.

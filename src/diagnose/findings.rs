@@ -196,6 +196,9 @@ fn sum<'a>(layers: impl Iterator<Item = &'a Vec<Vec<f64>>>) -> Vec<Vec<f64>> {
     total
 }
 
+/// Odds of a family that needs more columns to say the same: it can bend to what it is not.
+const RICHER: f64 = 0.35;
+
 /// Which names, and how sure.
 pub fn naming(chosen: &Chosen) -> (Status, Option<&'static str>, Vec<Alternative>) {
     let Some(family) = chosen.candidate.family else {
@@ -212,7 +215,9 @@ pub fn naming(chosen: &Chosen) -> (Status, Option<&'static str>, Vec<Alternative
     for rival in chosen.rivals.iter().filter(|r| r.family != family) {
         let nats = (best - rival.gain).clamp(0.0, 40.0);
         let behind = rival.behind.clamp(-1.0, 6.0);
-        odds.push((rival.family, (-(1.2 * behind + 0.25 * nats)).exp().min(1.0)));
+        let richer = rival.basis.count() > chosen.candidate.basis.count();
+        let bent = if richer { RICHER } else { 1.0 };
+        odds.push((rival.family, bent * (-(1.2 * behind + 0.25 * nats)).exp().min(1.0)));
     }
     let total: f64 = odds.iter().map(|o| o.1).sum();
     odds.sort_by(|a, b| b.1.total_cmp(&a.1));

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::ablation::Ablation;
 use super::bias;
 use super::field::Field;
 use super::reach::Reach;
@@ -26,6 +27,7 @@ pub struct Survey {
     pub light: Light,
     /// How well the size of the noise is known from view to view beforehand, in log variance.
     pub tolerance: f64,
+    pub ablation: Ablation,
 }
 
 /// How infrared amplitudes become the light of surfaces.
@@ -90,7 +92,8 @@ impl Survey {
             .collect();
         let light = relative_light(&mut views);
         let reach = Reach::of(views.iter().flat_map(|v| v.tiles.iter()));
-        Survey { views, reach, fixed_px2: 0.0, light, tolerance: MODEL_TOLERANCE }
+        let (tolerance, ablation) = (MODEL_TOLERANCE, Ablation::None);
+        Survey { views, reach, fixed_px2: 0.0, light, tolerance, ablation }
     }
 
     /// Root of the weighted harmonic mean of the model's variance, px.
@@ -126,12 +129,14 @@ impl Survey {
             most_terms: MOST_TERMS,
             fixed: (self.fixed_px2 > 0.0).then(|| (self.fixed_px2.sqrt(), self.covered_px(camera))),
             least: LEAST_SIGMAS * self.typical_sigma_px(),
+            calibrated: true,
         };
         let mut candidates = bias::families(camera, &self.reach);
         candidates.extend(bias::curves(camera, &self.reach));
         let fine = self.mean_data();
         let coarse: Vec<ViewData> = fine.par_iter().map(coarser).collect();
-        search(&fine, &coarse, &candidates, &rules, seed)
+        let candidates = self.ablation.candidates(candidates);
+        search(&fine, &coarse, &candidates, &self.ablation.rules(rules), seed)
     }
 
     /// The views at these places.
@@ -144,6 +149,7 @@ impl Survey {
             fixed_px2: self.fixed_px2,
             light: self.light,
             tolerance: self.tolerance,
+            ablation: self.ablation,
         }
     }
 
@@ -212,11 +218,13 @@ impl Survey {
             // What views differ by as wholes is mostly taken up by their own levels: small terms are
             // dropped when they are told, by their size on the axis.
             least: 0.0,
+            calibrated: true,
         };
         let mut candidates = variance::families(&self.reach, sigma);
         candidates.extend(variance::curves(camera, &self.reach));
         let data = self.variance_data();
-        search(&data, &data, &candidates, &rules, seed)
+        let candidates = self.ablation.candidates(candidates);
+        search(&data, &data, &candidates, &self.ablation.rules(rules), seed)
     }
 }
 

@@ -1,5 +1,6 @@
 //! When simulation and recording differ: where, why, and what is gained by knowing.
 
+mod ablation;
 mod against;
 mod bias;
 mod candidate;
@@ -41,6 +42,7 @@ mod tiles;
 mod variance;
 mod verdict;
 
+pub use ablation::Ablation;
 pub use diagnosis::*;
 pub use engine::{DiagnoseOptions, Diagnosed, diagnose, diagnose_against};
 pub use field::Field;

@@ -38,7 +38,7 @@ pub struct Outlook<'a> {
     pub rays: &'a Rays,
     pub scale_px_m: f64,
     pub sigma: &'a SigmaModel,
-    /// Extent of the board in use, where a cause belongs to the board.
+    /// Extent of the target in use: the next view has no larger one.
     pub reach: &'a Reach,
     /// Weight of a pixel: over its variance for the mean, as it is for the variance.
     pub worth: f64,
@@ -80,11 +80,10 @@ pub fn prospects(
     let n = k + rival.basis.count();
     let sum =
         evidence_of(taken, &pair).iter().fold(DMatrix::zeros(n, n), |sum, e: &Evidence| sum + &e.a);
-    let of_board = !best.belongs_to_sensor() || !rival.belongs_to_sensor();
     let views = poses()
         .into_par_iter()
         .filter_map(|(z_m, theta_rad, azimuth_rad)| {
-            let view = outlook.view(&Plane::tilted(z_m, theta_rad, azimuth_rad), of_board)?;
+            let view = outlook.view(&Plane::tilted(z_m, theta_rad, azimuth_rad))?;
             let more = evidence_of(std::slice::from_ref(&view), &pair);
             let separation = apart(&(&sum + &more.first()?.a), &beta);
             Some(Prospect { z_m, theta_rad, azimuth_rad, separation })
@@ -124,8 +123,8 @@ fn poses() -> Vec<(f64, f64, f64)> {
 }
 
 impl Outlook<'_> {
-    /// A view of the whole picture, or of the board in its middle; `None` when nothing is seen.
-    fn view(&self, plane: &Plane, of_board: bool) -> Option<ViewData> {
+    /// A view of the target, its middle on the optical axis; `None` when too little is seen.
+    fn view(&self, plane: &Plane) -> Option<ViewData> {
         let side = self.camera.width.div_ceil(ACROSS).max(1);
         let pixels = Pixels::new(self.camera, self.rays, self.scale_px_m);
         let centre = Vector3::new(0.0, 0.0, plane.depth(0.0, 0.0));
@@ -152,7 +151,7 @@ impl Outlook<'_> {
                 (place.right, place.down) = board.place(&point);
                 let on =
                     within(place.right, self.reach.right) && within(place.down, self.reach.down);
-                if of_board && !on {
+                if !on {
                     continue;
                 }
                 place.edge = self.reach.edge;
@@ -256,6 +255,8 @@ fn told(view: &Prospect, now: f64, best: &str, rival: &str) -> NextView {
         z_m: view.z_m,
         theta_rad: view.theta_rad,
         azimuth_rad: view.azimuth_rad,
+        separation_now: now,
+        separation_then: then,
         why: format!(
             "{best} and {rival} differ most there: {now:.1} standard errors apart as it is, {then:.1} expected with this view; {verdict}"
         ),
@@ -274,14 +275,15 @@ mod tests {
         SigmaModel::published(Form::Paper, &PAPER_EQ1, domain)
     }
 
-    fn reach() -> Reach {
+    /// Of a target of this size, m.
+    fn reach([width, height]: [f64; 2]) -> Reach {
         let none = [0.0, 0.0];
         Reach {
             disparity: none,
             z: none,
             theta: none,
-            right: [-0.5, 0.5],
-            down: [-0.4, 0.4],
+            right: [-0.5 * width, 0.5 * width],
+            down: [-0.5 * height, 0.5 * height],
             session: none,
             temperature: none,
             light: none,
@@ -294,10 +296,14 @@ mod tests {
         Term { statistic: Statistic::Bias, basis, coefficients }
     }
 
+    const WALL_M: [f64; 2] = [20.0, 20.0];
+    const BOARD_M: [f64; 2] = [1.0, 0.8];
+
     /// Frontal views, and what is asked of another.
-    fn confused(best: &Term, rival: &Term) -> (Prospects, Prospects) {
+    fn confused(best: &Term, rival: &Term, size: [f64; 2]) -> (Prospects, Prospects) {
         let sensor = kinect_v1(4);
-        let (camera, rays, sigma, reach) = (&sensor.camera, sensor.camera.rays(), sigma(), reach());
+        let (camera, rays, sigma, reach) =
+            (&sensor.camera, sensor.camera.rays(), sigma(), reach(size));
         let outlook = Outlook {
             statistic: Statistic::Bias,
             camera,
@@ -308,10 +314,8 @@ mod tests {
             worth: 0.02,
             precision: vec![0.0; 3],
         };
-        let frontal: Vec<ViewData> = [0.9, 1.3]
-            .iter()
-            .filter_map(|&z| outlook.view(&Plane::tilted(z, 0.0, 0.0), false))
-            .collect();
+        let frontal: Vec<ViewData> =
+            [0.9, 1.3].iter().filter_map(|&z| outlook.view(&Plane::tilted(z, 0.0, 0.0))).collect();
         assert!(frontal[0].places.iter().all(|p: &Place| p.z > 0.0));
         let there = prospects(&frontal, best, rival, &outlook);
         let alone = prospects(&[], best, rival, &outlook);
@@ -325,11 +329,11 @@ mod tests {
         let bowl = term(Basis::Bowl { disparity_power: 0.0, orders: 1 }, vec![0.2]);
         let incidence = term(Basis::Bowl { disparity_power: 1.0, orders: 2 }, vec![0.0; 2]);
         let lens = term(Basis::Lens { fx: 145.0, fy: 145.0, orders: 1 }, vec![0.05]);
-        let (there, _) = confused(&bowl, &incidence);
+        let (there, _) = confused(&bowl, &incidence, WALL_M);
         let best = there.best().unwrap();
         assert!(best.separation > 2.0 * there.now, "{} {best:?}", there.now);
         // A lens shows on tilted planes alone.
-        let (there, _) = confused(&lens, &bowl);
+        let (there, _) = confused(&lens, &bowl, WALL_M);
         let best = there.best().unwrap();
         assert!(there.now < 1e-6 && best.separation > 2.0, "{} {best:?}", there.now);
         assert!(best.theta_rad > 0.4, "{best:?}");
@@ -340,7 +344,7 @@ mod tests {
         let bow = term(Basis::Bow { degree: 2 }, vec![0.02, 0.02, 0.0]);
         let bowl = term(Basis::Bowl { disparity_power: 0.0, orders: 2 }, vec![0.0; 2]);
         for (best, rival) in [(&bow, &bowl), (&bowl_of(0.2), &bow)] {
-            let (there, alone) = confused(best, rival);
+            let (there, alone) = confused(best, rival, BOARD_M);
             let mut all: Vec<f32> = there.views.iter().map(|p| p.separation as f32).collect();
             let median = f64::from(crate::stats::median_in_place(&mut all));
             let most = there.best().unwrap();
@@ -349,6 +353,18 @@ mod tests {
             // Views taken hold the rival down: the same view alone tells less.
             assert!(alone.best().unwrap().separation <= most.separation + 1e-6);
         }
+    }
+
+    /// Of a small board far away little is left in the picture: what a wall would tell there, it
+    /// cannot.
+    #[test]
+    fn a_small_board_is_asked_for_near_by() {
+        let bowl = bowl_of(0.2);
+        let incidence = term(Basis::Bowl { disparity_power: 1.0, orders: 2 }, vec![0.0; 2]);
+        let [wall, board] =
+            [WALL_M, [0.6, 0.5]].map(|size| confused(&bowl, &incidence, size).0.best().copied());
+        let (wall, board) = (wall.unwrap(), board.unwrap());
+        assert!(board.separation < wall.separation && board.z_m <= wall.z_m, "{wall:?} {board:?}");
     }
 
     fn bowl_of(k: f64) -> Term {

@@ -237,14 +237,17 @@ fn tails_are_heavy_when_most_views_have_them() {
         };
         (0..VIEWS).map(view).collect()
     };
-    assert!(tails(&tailed(GAUSSIAN_TAIL, VIEWS), &Known::default()).is_none());
-    assert!(tails(&tailed(2e-3, 4), &Known::default()).is_none(), "in a few views only");
-    let found = tails(&tailed(2e-3, VIEWS), &Known::default()).expect("a tail");
+    assert!(tails(&tailed(GAUSSIAN_TAIL, VIEWS), &Known::default(), 1e-3, false).is_none());
+    assert!(
+        tails(&tailed(2e-3, 4), &Known::default(), 1e-3, false).is_none(),
+        "in a few views only"
+    );
+    let found = tails(&tailed(2e-3, VIEWS), &Known::default(), 1e-3, false).expect("a tail");
     assert_eq!(found.families, ["heavy-tails"]);
     let fraction = parameter(&found, "fraction")[0];
     assert!(fraction > 2e-3 && fraction < 0.2, "{fraction}");
     let known = knowing("heavy-tails", "fraction", fraction);
-    assert!(tails(&tailed(2e-3, VIEWS), &known).is_none());
+    assert!(tails(&tailed(2e-3, VIEWS), &known, 1e-3, false).is_none());
 }
 
 #[test]
@@ -254,5 +257,5 @@ fn one_view_is_no_sample() {
     let one = &with(&mut rng, add)[..1];
     assert!(hanging(one, &Known::default(), LEVEL).is_empty());
     assert!(hanging(&[], &Known::default(), LEVEL).is_empty());
-    assert!(tails(&[], &Known::default()).is_none());
+    assert!(tails(&[], &Known::default(), 1e-3, false).is_none());
 }

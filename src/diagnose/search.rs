@@ -37,6 +37,8 @@ pub struct Rules {
     pub fixed: Option<(f64, f64)>,
     /// Root mean square of the least term that is worth a word, in the response's unit.
     pub least: f64,
+    /// Judge gains by what noise alone would have brought.
+    pub calibrated: bool,
 }
 
 /// A family beside the one that was chosen.
@@ -187,6 +189,11 @@ impl NoiseGains {
         NoiseGains(greatest)
     }
 
+    /// Noise is taken to bring next to nothing.
+    fn unknown() -> Self {
+        NoiseGains(vec![0.0])
+    }
+
     fn cut(&self) -> (f64, f64) {
         let cut = self.0[((self.0.len() - 1) as f64 * (1.0 - TAIL)) as usize];
         let tail: Vec<f64> = self.0.iter().filter(|g| **g > cut).map(|g| g - cut).collect();
@@ -325,7 +332,11 @@ impl<'a> Layer<'a> {
             .collect();
         if self.noise.is_none() {
             let nulls: Vec<&Null> = judged.iter().flatten().map(|j| &j.null).collect();
-            let noise = NoiseGains::of(&nulls, self.seed);
+            let noise = if self.rules.calibrated {
+                NoiseGains::of(&nulls, self.seed)
+            } else {
+                NoiseGains::unknown()
+            };
             self.looks = looks(self.candidates, &judged, &noise);
             self.noise = Some(noise);
         }

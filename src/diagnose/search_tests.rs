@@ -9,8 +9,15 @@ use crate::terms::{Over, Times};
 
 const VIEWS: usize = 12;
 const SAMPLES: usize = 120;
-const RULES: Rules =
-    Rules { level: 0.01, prior: 1e-6, adequacy: 0.7, most_terms: 4, fixed: None, least: 0.0 };
+const RULES: Rules = Rules {
+    level: 0.01,
+    prior: 1e-6,
+    adequacy: 0.7,
+    most_terms: 4,
+    fixed: None,
+    least: 0.0,
+    calibrated: true,
+};
 
 /// Places all over the picture with a free level a view; noise of unit variance, and a bias.
 fn session(rng: &mut Stream, bias: impl Fn(&Place) -> f64) -> Vec<ViewData> {

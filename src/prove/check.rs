@@ -1,6 +1,9 @@
 //! Whether a proof holds: everything that can be computed again is, and compared.
 
+mod second;
+
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rand::seq::SliceRandom;
 
@@ -54,7 +57,15 @@ pub fn check(folder: &Path, options: &CheckOptions, progress: Progress<'_>) -> R
     checked.judgement(&proof);
     checked.program(&proof, &options.program)?;
     checked.sets(&proof, options, progress)?;
+    checked.second(folder, &proof, options, progress)?;
     Ok(checked)
+}
+
+/// A folder that no other check, in this process or another, works in.
+fn scratch() -> PathBuf {
+    static CHECKS: AtomicUsize = AtomicUsize::new(0);
+    let (process, check) = (std::process::id(), CHECKS.fetch_add(1, Ordering::Relaxed));
+    std::env::temp_dir().join(format!("kinoise-check-{process}-{check}"))
 }
 
 /// At least so many sets are made again.
@@ -215,12 +226,12 @@ impl Checked {
             sample.shuffle(&mut Seed(seed.unwrap_or(0)).stream("prove/check"));
             sample.truncate(FEWEST.max(sample.len().div_ceil(ONE_IN)));
         }
-        let scratch = std::env::temp_dir().join(format!("kinoise-check-{}", std::process::id()));
+        let scratch = scratch();
         let data = options.data.as_deref();
         let again = each(&sample, options.workers, ("making sets again", progress), |i| {
             let taken = Taken::of(&planned[*i], data)?;
             let folder = scratch.join(&taken.name);
-            let hash = make(&taken, &folder)?;
+            let hash = make(taken.sealed.as_ref(), &folder)?;
             std::fs::remove_dir_all(&folder).map_err(|e| Error::write(&folder, e))?;
             Ok((taken.commitment, hash))
         });

@@ -4,6 +4,7 @@
 //! The makers of sets share no formula with the catalogue and no code with the diagnosis; only the
 //! recording and the model file are common ground.
 
+mod advice;
 pub mod baselines;
 mod check;
 mod confine;
@@ -25,6 +26,7 @@ mod verdict;
 mod workers;
 pub mod worlds;
 
+pub use advice::{ADVICE_FORMAT, Advice, AdvisedSet, Rediagnosed, SecondRound};
 pub use check::{CheckOptions, Checked, check};
 pub use confine::confine;
 pub use examine::{Examination, Examine, OUR_METHOD, examine_all};

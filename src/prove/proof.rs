@@ -7,6 +7,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::advice::SecondRound;
 use super::gains::Gains;
 use super::judge::{Judged, Marks, Scores};
 use super::question::Truth;
@@ -37,6 +38,9 @@ pub struct Proof {
     pub confinement: BTreeMap<String, usize>,
     /// In the order in which they were put.
     pub sets: Vec<ProvenSet>,
+    /// Advised views taken; older trials have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub second: Option<SecondRound>,
 }
 
 /// What the trial was made from: the same again gives the same sets.

@@ -119,6 +119,15 @@ pub struct ExamView {
     pub sigma_plain: Vec<f32>,
 }
 
+/// How the target stands in a view: where its plane meets the optical axis, m, its tilt, and where
+/// its depth grows to (0 along the columns), rad.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Pose {
+    pub z_m: f64,
+    pub theta_rad: f64,
+    pub azimuth_rad: f64,
+}
+
 /// A set that is ready to be taken.
 pub trait Sealed: Send + Sync {
     fn truth(&self) -> Truth;
@@ -134,6 +143,15 @@ pub trait Sealed: Send + Sync {
     /// noise.
     fn exam(&self) -> Vec<ExamView> {
         Vec::new()
+    }
+
+    /// The same set with one view more, as near to `pose` as its stage permits, and the pose that was
+    /// taken; the other views are the same to the last byte. None where the session is over for good.
+    ///
+    /// # Errors
+    /// Those of making the set.
+    fn with_view(&self, _pose: &Pose) -> Result<Option<(Pose, Box<dyn Sealed>)>> {
+        Ok(None)
     }
 }
 

@@ -1,10 +1,13 @@
 //! The trial from the first seal to the proof.
 
+pub(super) mod second;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use super::advice::ADVISED_DIAGNOSES;
 use super::examine::{Examination, Examine};
 use super::judge::{Judged, mark, scores};
 use super::plan::plan;
@@ -12,6 +15,7 @@ use super::proof::{
     DIAGNOSES, Ordered, PROOF_FILE, PROOF_FORMAT, Proof, ProvenSet, SEAL_FILE, VERDICTS_FILE,
     VERDICTS_FORMAT, VerdictLine, Verdicts, read_json, write_json,
 };
+use super::question::Sealed;
 use super::seal::{Seal, SealedSet, Taken};
 use super::solve::{Solved, Solver, make};
 use super::workers::{Progress, each};
@@ -52,14 +56,16 @@ pub fn prove(trial: &Trial, progress: Progress<'_>) -> Result<Proof> {
         return Err(refused(out.path(), "a finished trial is here"));
     }
     let rite = Rite { trial, root: out.path(), progress };
-    for folder in ["seals", "verdicts", "models", "gains", "scratch"] {
+    for folder in ["seals", "verdicts", "models", "gains", "advised", "scratch"] {
         make_folder(&rite.work(folder))?;
     }
     make_folder(&rite.root.join(DIAGNOSES))?;
+    make_folder(&rite.root.join(ADVISED_DIAGNOSES))?;
     let sets = rite.take()?;
     let (seal, seal_sha256) = rite.seal(&sets)?;
     let solved = rite.solve(&sets, &seal)?;
     let verdicts_sha256 = rite.close(&seal_sha256, &solved)?;
+    let second = rite.second(&sets, &solved, &verdicts_sha256)?;
     let proven = rite.open(&sets, solved, &seal)?;
     let judged: Vec<Judged<'_>> = proven.iter().map(|(set, _)| set.judged()).collect();
     let mut confinement = BTreeMap::new();
@@ -76,6 +82,7 @@ pub fn prove(trial: &Trial, progress: Progress<'_>) -> Result<Proof> {
         seal,
         confinement,
         sets: proven.into_iter().map(|(set, _)| set).collect(),
+        second: Some(second),
     };
     write_json(&rite.root.join(PROOF_FILE), &proof)?;
     remove(&rite.root.join("work"))?;
@@ -146,7 +153,7 @@ impl Rite<'_> {
             return Ok(sealed);
         }
         let scratch = self.scratch(&taken.name);
-        let data_sha256 = make(taken, &scratch)?;
+        let data_sha256 = make(taken.sealed.as_ref(), &scratch)?;
         remove(&scratch)?;
         let commitment = taken.commitment.clone();
         let sealed = SealedSet { name: taken.name.clone(), data_sha256, commitment };
@@ -155,11 +162,7 @@ impl Rite<'_> {
     }
 
     fn solve(&self, sets: &[Taken], seal: &Seal) -> Result<Vec<Solved>> {
-        let solver = Solver {
-            program: &self.trial.program,
-            seed: seal.solver_seed,
-            limit: self.trial.limit,
-        };
+        let solver = self.solver(seal.solver_seed);
         let pairs: Vec<(&Taken, &SealedSet)> = sets.iter().zip(&seal.sets).collect();
         each(&pairs, self.trial.workers, ("diagnosing", self.progress), |(taken, sealed)| {
             let state = self.state("verdicts", &taken.name);
@@ -175,27 +178,43 @@ impl Rite<'_> {
         })
     }
 
+    fn solver(&self, seed: u64) -> Solver<'_> {
+        Solver { program: &self.trial.program, seed, limit: self.trial.limit }
+    }
+
     /// What outlives the scratch folder.
     fn keep(&self, name: &str, scratch: &Path) -> Result<()> {
-        let diagnosis = self.root.join(DIAGNOSES).join(format!("{name}.json"));
-        let model = self.state("models", name);
-        for (from, to) in [("diagnosis.json", diagnosis), ("model.json", model)] {
-            let from = scratch.join("out").join(from);
-            if from.exists() {
-                fs::copy(&from, &to).map_err(|e| Error::write(&to, e))?;
-            }
+        self.keep_file("model.json", &self.state("models", name), scratch)?;
+        self.keep_rest(name, [DIAGNOSES, "kept"], scratch)
+    }
+
+    fn keep_file(&self, file: &str, to: &Path, scratch: &Path) -> Result<()> {
+        let from = scratch.join("out").join(file);
+        if from.exists() {
+            fs::copy(&from, to).map_err(|e| Error::write(to, e))?;
         }
+        Ok(())
+    }
+
+    fn keep_rest(&self, name: &str, [diagnoses, kept]: [&str; 2], scratch: &Path) -> Result<()> {
+        let diagnosis = self.root.join(diagnoses).join(format!("{name}.json"));
+        self.keep_file("diagnosis.json", &diagnosis, scratch)?;
         if !self.trial.keep {
             return remove(scratch);
         }
-        let kept = self.root.join("kept").join(name);
+        let folder = self.root.join(kept);
+        let kept = folder.join(name);
         remove(&kept)?;
-        make_folder(&self.root.join("kept"))?;
+        make_folder(&folder)?;
         fs::rename(scratch, &kept).map_err(|e| Error::write(&kept, e))
     }
 
     /// `verdicts.json`: all is said.
     fn close(&self, seal_sha256: &str, solved: &[Solved]) -> Result<String> {
+        self.publish(VERDICTS_FILE, seal_sha256, solved)
+    }
+
+    fn publish(&self, file: &str, seal_sha256: &str, solved: &[Solved]) -> Result<String> {
         let line = |s: &Solved| VerdictLine {
             name: s.name.clone(),
             diagnosis_sha256: s.diagnosis_sha256.clone(),
@@ -207,7 +226,7 @@ impl Rite<'_> {
             seal_sha256: seal_sha256.into(),
             verdicts: solved.iter().map(line).collect(),
         };
-        write_json(&self.root.join(VERDICTS_FILE), &verdicts)
+        write_json(&self.root.join(file), &verdicts)
     }
 
     /// The seals are opened: judge, and examine what was learnt. With each set what confined it.
@@ -258,12 +277,16 @@ impl Rite<'_> {
 
 /// The set that was sealed, or none.
 fn remake(taken: &Taken, sealed: &SealedSet, scratch: &Path) -> Result<()> {
-    let hash = make(taken, scratch)?;
-    if hash == sealed.data_sha256 {
+    same(taken.sealed.as_ref(), (&taken.name, &sealed.data_sha256), scratch)
+}
+
+/// Make a set whose hash is known.
+fn same(sealed: &dyn Sealed, (name, sha256): (&str, &str), scratch: &Path) -> Result<()> {
+    if make(sealed, scratch)? == *sha256 {
         return Ok(());
     }
     Err(Error::Argument {
-        what: format!("set {} made again is not the one that was sealed", taken.name),
+        what: format!("set {name} made again is not the one that was sealed"),
         remedy: "its maker must give the same bytes every time: report this as a fault",
     })
 }

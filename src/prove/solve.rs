@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::seal::{Taken, canonical, hash_folder};
+use super::question::Sealed;
+use super::seal::{canonical, hash_folder};
 use super::verdict::reduced;
 use crate::error::{Error, Result};
 use crate::io::sha256_hex;
@@ -137,12 +138,12 @@ pub fn verdict_hash(verdict: &Value) -> String {
 ///
 /// # Errors
 /// When the disk refuses.
-pub fn make(taken: &Taken, scratch: &Path) -> Result<String> {
+pub fn make(sealed: &dyn Sealed, scratch: &Path) -> Result<String> {
     if scratch.exists() {
         fs::remove_dir_all(scratch).map_err(|e| Error::write(scratch, e))?;
     }
     let set = scratch.join("set");
     fs::create_dir_all(&set).map_err(|e| Error::write(&set, e))?;
-    taken.sealed.write(&set)?;
+    sealed.write(&set)?;
     hash_folder(&set)
 }

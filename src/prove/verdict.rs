@@ -79,6 +79,22 @@ impl Said {
         self.effect.as_deref().or_else(best).filter(|_| names)
     }
 
+    /// Names with their probabilities, the best first.
+    pub fn offers(&self) -> impl Iterator<Item = (String, f64)> {
+        self.alternatives.iter().map(|a| (a.effect.clone(), a.probability.unwrap_or(0.0)))
+    }
+
+    /// Of a name, 0 where it is not offered.
+    pub fn probability(&self, id: &str) -> f64 {
+        self.offers().find(|o| o.0 == id).map_or(0.0, |o| o.1)
+    }
+
+    /// Standard errors between the two best names, as the views are and with the advised one.
+    pub fn separations(&self) -> Option<[f64; 2]> {
+        let at = |key: &str| self.next_view.as_ref()?.get(key)?.as_f64();
+        Some([at("separation_now")?, at("separation_then")?])
+    }
+
     /// The name, where its probability is stated as 0.9 or more.
     pub fn certain_name(&self) -> Option<&str> {
         let sure = self.alternatives.first().and_then(|a| a.probability)? >= CERTAIN;
@@ -89,6 +105,11 @@ impl Said {
 impl Verdict {
     pub fn claims(&self) -> impl Iterator<Item = &Said> {
         self.findings.iter().filter(|f| f.claims())
+    }
+
+    /// The first finding that asks for another view.
+    pub fn in_doubt(&self) -> Option<&Said> {
+        self.claims().find(|f| f.next_view.as_ref().is_some_and(|v| !v.is_null()))
     }
 
     /// A mismatch is what a user would act upon.

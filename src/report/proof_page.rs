@@ -1,6 +1,7 @@
 //! The page of a trial, for somebody who does not believe it: what was asked, what fell short, the
 //! figures, every failure, and how to check all of it.
 
+mod advice;
 mod certainty;
 mod failures;
 mod gains;
@@ -46,6 +47,7 @@ pub fn proof_page(page: &ProofPage<'_>) -> Result<String> {
         (power::section(proof)?)
         (matrix::section(&proof.sets))
         (certainty::section(&proof.scores)?)
+        (advice::section(proof))
         (rates::section(&proof.scores))
         (gains::section(proof)?)
         (failures::section(proof, page.curve))

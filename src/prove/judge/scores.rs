@@ -9,7 +9,7 @@ use super::endpoints::{Endpoint, endpoints};
 use super::learnt::{Learnt, learnt};
 use super::marks::{Marks, names_alone};
 use crate::prove::gains::Gains;
-use crate::prove::question::{Cell, Truth};
+use crate::prove::question::{Cell, Truth, World};
 use crate::stats::{clopper_pearson, quantile};
 
 /// A set that was judged.
@@ -57,8 +57,12 @@ pub struct Scores {
     pub by_world: BTreeMap<String, Rates>,
     /// World and cell, "rays/single".
     pub by_world_and_cell: BTreeMap<String, Rates>,
-    /// Single causes by what they are worth, nats.
+    /// Single causes made by rays, in the catalogue and outside it, by what they are worth, nats.
     pub by_nats: BTreeMap<String, Rates>,
+    /// Single causes by kind ("rays/single", "rays/outside", "light/single", "light/nameless") and
+    /// strength: nats, but in the world of light the size that was ordered.
+    #[serde(default)]
+    pub by_strength: BTreeMap<String, BTreeMap<String, Rates>>,
     /// Single causes by name; those outside the catalogue by form.
     pub by_effect: BTreeMap<String, Rates>,
     /// Of single causes: what was hidden, what was said first, how often.
@@ -84,6 +88,8 @@ pub struct Scores {
 pub fn scores(sets: &[Judged<'_>]) -> Scores {
     let single = |s: &&Judged<'_>| matches!(s.truth.asked.cell, Cell::Single | Cell::Outside);
     let singles: Vec<Judged<'_>> = sets.iter().filter(single).copied().collect();
+    let by_rays = |s: &&Judged<'_>| s.truth.asked.world == World::Rays;
+    let of_rays: Vec<Judged<'_>> = singles.iter().filter(by_rays).copied().collect();
     let parameters = || sets.iter().flat_map(|s| &s.marks.parameters);
     let stated = || sets.iter().flat_map(|s| &s.marks.stated);
     let mut overlaps: Vec<f64> = sets.iter().filter_map(|s| s.marks.overlap).collect();
@@ -97,7 +103,8 @@ pub fn scores(sets: &[Judged<'_>]) -> Scores {
         by_world_and_cell: grouped(sets, |t| {
             Some(format!("{}/{}", word(t.asked.world), word(t.asked.cell)))
         }),
-        by_nats: grouped(&singles, |t| level(t).map(|l| format!("{:04}", l as u32))),
+        by_nats: grouped(&of_rays, strength),
+        by_strength: by_strength(&singles),
         by_effect: grouped(&singles, |t| Some(hidden_name(t))),
         confusion: confusion(&singles),
         names_f1: names_f1(sets),
@@ -133,8 +140,30 @@ pub fn worth(truth: &Truth) -> bool {
     level(truth).is_some_and(|nats| nats >= WORTH_NATS)
 }
 
+fn strength(truth: &Truth) -> Option<String> {
+    level(truth).map(|l| format!("{:04}", l as u32))
+}
+
+/// A switch of the world of light that has no name in the catalogue stands apart: its name cannot be
+/// right.
+fn kind(truth: &Truth) -> String {
+    let nameless = truth.hidden.iter().all(|h| h.names.is_empty());
+    match truth.asked.world {
+        World::Light if nameless => "light/nameless".into(),
+        world => format!("{}/{}", word(world), word(truth.asked.cell)),
+    }
+}
+
+fn by_strength(singles: &[Judged<'_>]) -> BTreeMap<String, BTreeMap<String, Rates>> {
+    let mut kinds: BTreeMap<String, Vec<Judged<'_>>> = BTreeMap::new();
+    for set in singles {
+        kinds.entry(kind(set.truth)).or_default().push(*set);
+    }
+    kinds.into_iter().map(|(kind, sets)| (kind, grouped(&sets, strength))).collect()
+}
+
 /// As in the files.
-fn word(of: impl Serialize) -> String {
+pub(super) fn word(of: impl Serialize) -> String {
     serde_json::to_value(of).ok().and_then(|v| v.as_str().map(String::from)).unwrap_or_default()
 }
 

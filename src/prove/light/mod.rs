@@ -10,11 +10,11 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::{Asked, Cell, Hidden, Sealed, Truth};
+use super::{Asked, Cell, Hidden, Pose, Sealed, Truth};
 use crate::error::{Error, Result};
 use crate::io::sha256_hex;
 use crate::rng::Seed;
-use crate::simulate::{Physics, Shoot, kinect_v1, plan_grid};
+use crate::simulate::{GridView, Physics, Shoot, kinect_v1, plan_grid};
 use causes::{SWITCHES, Switch};
 
 /// What the picture of a Kinect is shrunk by. The matcher's window does not shrink: at a quarter it
@@ -33,6 +33,11 @@ pub fn known() -> impl Iterator<Item = &'static str> {
 /// # Errors
 /// When this world has no such cell or cause.
 pub fn seal(asked: &Asked) -> Result<Box<dyn Sealed>> {
+    Ok(Box::new(taken(asked, None)?.1))
+}
+
+/// The set, with one view more where one is wanted, and that view's pose.
+fn taken(asked: &Asked, more: Option<&Pose>) -> Result<(Option<Pose>, Light)> {
     let Asked { cell, seed, small, .. } = *asked;
     if ![Cell::Null, Cell::Single].contains(&cell) || asked.names.len() > 1 {
         return Err(Error::Argument {
@@ -55,7 +60,12 @@ pub fn seal(asked: &Asked) -> Result<Box<dyn Sealed>> {
     let sensor = kinect_v1(if small { SHRINK_SMALL } else { SHRINK });
     let cause = switch.map_or("", |s| s.cause);
     let session = poses::draw(cause, &sensor, &mut rng);
-    let views = plan_grid(&session.poses, &session.scenery, poses::FRAMES, true, seed);
+    let mut views = plan_grid(&session.poses, &session.scenery, poses::FRAMES, true, seed);
+    let extra = more.map(|pose| session.nearest(pose, &sensor));
+    if let Some(extra) = extra {
+        let all = [&session.poses[..], &[extra]].concat();
+        views.extend(plan_grid(&all, &session.scenery, poses::FRAMES, false, seed).pop());
+    }
     let mut hidden = Vec::new();
     let mut on = base.clone();
     if let Some(switch) = switch {
@@ -80,11 +90,14 @@ pub fn seal(asked: &Asked) -> Result<Box<dyn Sealed>> {
         infrared: session.infrared,
         seed: Seed(seed_of(&digest, seed)),
     };
-    Ok(Box::new(Light {
+    let light = Light {
         recording: shoot(on, "recording"),
         simulated: shoot(base, "simulated"),
         truth: Truth { asked: asked.clone(), hidden, base: told },
-    }))
+    };
+    let pose =
+        extra.map(|GridView { z_m, theta_rad, azimuth_rad }| Pose { z_m, theta_rad, azimuth_rad });
+    Ok((pose, light))
 }
 
 /// Neither recording has its noise from the other's seed.
@@ -107,6 +120,11 @@ impl Sealed for Light {
     fn write(&self, folder: &Path) -> Result<()> {
         self.recording.write_quickly(&folder.join("recording"), &|_, _| ())?;
         self.simulated.write_quickly(&folder.join("simulated"), &|_, _| ()).map(drop)
+    }
+
+    fn with_view(&self, pose: &Pose) -> Result<Option<(Pose, Box<dyn Sealed>)>> {
+        let (pose, light) = taken(&self.truth.asked, Some(pose))?;
+        Ok(pose.map(|pose| (pose, Box::new(light) as Box<dyn Sealed>)))
     }
 }
 

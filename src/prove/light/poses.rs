@@ -3,6 +3,7 @@
 use rand::Rng;
 use rand::seq::SliceRandom;
 
+use crate::prove::Pose;
 use crate::rng::Stream;
 use crate::scene::{Board, Print, Target, WHITE};
 use crate::simulate::{GridView, Scenery};
@@ -47,16 +48,28 @@ pub(super) fn draw(cause: &str, sensor: &Sensor, rng: &mut Stream) -> Session {
     let pose = |k: usize| {
         let z_m = NEAREST_M * (FARTHEST_M / NEAREST_M).powf(near[k]);
         let azimuth_rad = std::f64::consts::TAU * turn[k];
-        let c = &sensor.camera;
-        let reach = 0.5
-            * (c.width as f64 / c.fx * azimuth_rad.cos().abs()
-                + c.height as f64 / c.fy * azimuth_rad.sin().abs());
-        let most = if boarded {
-            STEEPEST_RAD
-        } else {
-            ((1.0 - z_m / WALL_ENDS_M) / (1.05 * reach)).atan().min(STEEPEST_RAD)
-        };
+        let most = steepest(boarded, z_m, azimuth_rad, sensor);
         GridView { z_m, theta_rad: (STEEPEST_RAD * tilt[k]).min(most), azimuth_rad }
     };
     Session { poses: (0..views).map(pose).collect(), scenery, infrared }
+}
+
+/// What the matcher, and the wall within the picture, let a target lean, rad.
+fn steepest(boarded: bool, z_m: f64, azimuth_rad: f64, sensor: &Sensor) -> f64 {
+    let c = &sensor.camera;
+    let reach = 0.5
+        * (c.width as f64 / c.fx * azimuth_rad.cos().abs()
+            + c.height as f64 / c.fy * azimuth_rad.sin().abs());
+    let wall = ((1.0 - z_m / WALL_ENDS_M) / (1.05 * reach)).atan();
+    if boarded { STEEPEST_RAD } else { STEEPEST_RAD.min(wall) }
+}
+
+impl Session {
+    /// As near to `pose` as the target can stand: out of reach of the matcher nothing is learnt.
+    pub fn nearest(&self, pose: &Pose, sensor: &Sensor) -> GridView {
+        let boarded = matches!(self.scenery.target, Target::Board(_));
+        let z_m = pose.z_m.clamp(NEAREST_M, FARTHEST_M);
+        let most = steepest(boarded, z_m, pose.azimuth_rad, sensor);
+        GridView { z_m, theta_rad: pose.theta_rad.min(most), azimuth_rad: pose.azimuth_rad }
+    }
 }

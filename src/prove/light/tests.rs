@@ -2,7 +2,7 @@
 
 use super::{SWITCHES, seal};
 use crate::prove::rays::tests_sealed::walkdir;
-use crate::prove::{Asked, Cell, World};
+use crate::prove::{Asked, Cell, Pose, World};
 
 fn asked(cell: Cell, names: &[&str], nats: f64, seed: u64) -> Asked {
     let names = names.iter().map(ToString::to_string).collect();
@@ -58,4 +58,29 @@ fn a_set_by_light_is_two_recordings_of_the_same_poses() {
         let text = String::from_utf8_lossy(bytes).to_lowercase();
         assert!(image || !["lens", "k1", "cause"].iter().any(|w| text.contains(w)), "{a}");
     }
+}
+
+/// The views there were stay as they were, to the last byte.
+#[test]
+fn a_view_more_is_all_that_changes() {
+    let folder = tempfile::tempdir().unwrap();
+    let set = seal(&asked(Cell::Single, &["lens_k1"], 50.0, 2)).unwrap();
+    // Out of the matcher's reach: it is taken as near to it as can be.
+    let wanted = Pose { z_m: 4.0, theta_rad: 1.2, azimuth_rad: 0.5 };
+    let (taken, more) = set.with_view(&wanted).unwrap().unwrap();
+    assert!(taken.z_m < 3.0 && taken.theta_rad < 1.0 && taken.azimuth_rad == 0.5);
+    let [before, after] = [("before", &set), ("after", &more)].map(|(name, set)| {
+        let root = folder.path().join(name);
+        set.write(&root).unwrap();
+        let bytes = |p: std::path::PathBuf| {
+            (p.strip_prefix(&root).unwrap().display().to_string(), std::fs::read(&p).unwrap())
+        };
+        walkdir(&root).into_iter().map(bytes).collect::<std::collections::BTreeMap<_, _>>()
+    });
+    assert!(before.iter().all(|(name, bytes)| after.get(name) == Some(bytes)));
+    let new: Vec<&String> = after.keys().filter(|name| !before.contains_key(*name)).collect();
+    assert!(!new.is_empty());
+    let views = new.iter().map(|name| name.split('/').nth(1));
+    let one: std::collections::BTreeSet<_> = views.collect();
+    assert_eq!(one.len(), 1, "in recording and in simulated: {new:?}");
 }

@@ -3,6 +3,7 @@
 //!
 //! One cause acts in one place of that path ([`Act`]) and carries its truth ([`Label`]).
 
+mod advised;
 pub(super) mod borrow;
 mod cameras;
 mod causes_bias;

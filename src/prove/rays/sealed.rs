@@ -7,7 +7,7 @@ use serde_json::{Map, json};
 use super::{Cause, Cell, Order, Set, exam, write};
 use crate::error::{Error, Result};
 use crate::io::sha256_hex;
-use crate::prove::{Asked, ExamView, Hidden, Sealed, Truth};
+use crate::prove::{Asked, ExamView, Hidden, Pose, Sealed, Truth};
 
 /// Every cell that this world has.
 pub const CELLS: [Cell; 13] = [
@@ -108,5 +108,11 @@ impl Sealed for Rays {
 
     fn exam(&self) -> Vec<ExamView> {
         exam::views(&self.set)
+    }
+
+    fn with_view(&self, pose: &Pose) -> Result<Option<(Pose, Box<dyn Sealed>)>> {
+        let mut set = Set::sealed(&self.asked, None, None)?;
+        let taken = set.add_view(pose);
+        Ok(Some((taken, Box::new(Rays { set, asked: self.asked.clone() }))))
     }
 }

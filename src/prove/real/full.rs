@@ -134,13 +134,20 @@ impl Full {
     }
 }
 
-/// What calibration and one diagnosis make of these views.
+/// What calibration makes of these views, and diagnosis as often as with the whole recording.
 ///
 /// # Errors
 /// When too few of them can be used.
 pub(super) fn learnt(recording: &Recording) -> Result<NoiseModel> {
     apart(|| {
-        let mut model = examine(recording, &calibrated(recording)?)?.model;
+        let mut model = calibrated(recording)?;
+        for _ in 0..MOST_ROUNDS {
+            let done = examine(recording, &model)?;
+            if done.diagnosis.verdict != Verdict::Mismatch {
+                break;
+            }
+            model = done.model;
+        }
         anonymous(&mut model);
         Ok(model)
     })

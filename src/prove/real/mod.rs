@@ -71,39 +71,47 @@ pub fn seal(asked: &Asked, data: &Path) -> Result<Box<dyn Sealed>> {
     let sources = sources::required(data)?;
     let seed = Seed(asked.seed);
     let mut rng = seed.stream("real/set");
-    let full = one_of(sources, &mut rng)?;
+    let set = one_of(sources, &mut rng, &|full, rng| taken(full, asked, seed, rng))?;
+    Ok(Box::new(set))
+}
+
+/// The set of this recording.
+fn taken(full: Arc<Full>, asked: &Asked, seed: Seed, rng: &mut Stream) -> Result<Real> {
     let all = full.recording.views.len();
-    let set = match asked.cell {
+    Ok(match asked.cell {
         Cell::Amnesia => {
-            let views = some(all, &mut rng);
+            let views = some(all, rng);
             let share = full.measured(&views) / full.measured(&(0..all).collect::<Vec<_>>());
-            let (model, hidden) = amnesia::strike(&full, asked, share, &mut rng)?;
+            let (model, hidden) = amnesia::strike(&full, asked, share, rng)?;
             Real::new(full, views, model, None, asked, vec![hidden])
         }
         Cell::Transplant => {
-            let views = some(all, &mut rng);
-            let (graft, hidden) = transplant::graft(&full, asked, &views, seed, &mut rng)?;
+            let views = some(all, rng);
+            let (graft, hidden) = transplant::graft(&full, asked, &views, seed, rng)?;
             let model = full.model.clone();
             Real::new(full, views, model, Some(graft), asked, hidden)
         }
         _ => {
-            let [mine, theirs] = halves(all, &mut rng);
+            let [mine, theirs] = halves(all, rng);
             let mut other = full.recording.clone();
             other.views = theirs.iter().map(|&k| full.recording.views[k].clone()).collect();
             let model = learnt(&other)?;
             Real::new(full, mine, model, None, asked, Vec::new())
         }
-    };
-    Ok(Box::new(set))
+    })
 }
 
-/// By lot, of those that can be used.
-fn one_of(mut sources: Vec<Source>, rng: &mut Stream) -> Result<Arc<Full>> {
+type Taking<'a> = &'a dyn Fn(Arc<Full>, &mut Stream) -> Result<Real>;
+
+/// By lot, of those that can be used and can show what is asked for.
+fn one_of(mut sources: Vec<Source>, rng: &mut Stream, take: Taking<'_>) -> Result<Real> {
     sources.shuffle(rng);
     let mut whys = Vec::new();
     for source in &sources {
-        match full(source) {
-            Ok(full) => return Ok(full),
+        let taken =
+            full(source).and_then(|full| take(full, &mut rng.clone()).map_err(|e| e.to_string()));
+        match taken {
+            Ok(set) => return Ok(set),
             Err(why) => whys.push(why),
         }
     }
@@ -152,8 +160,11 @@ impl Real {
 fn base(full: &Full, views: &[usize], model: &NoiseModel) -> Value {
     let names: Vec<&str> = views.iter().map(|&k| full.recording.views[k].name.as_str()).collect();
     let known: Vec<&str> = model.effects.iter().map(|e| e.id.as_str()).collect();
+    let root = &full.recording.root;
+    // data/UNIT/recording is called UNIT.
+    let named = if root.ends_with("recording") { root.parent().unwrap_or(root) } else { root };
     json!({
-        "recording": full.recording.root.file_name().unwrap_or_default().to_string_lossy(),
+        "recording": named.file_name().unwrap_or_default().to_string_lossy(),
         "sensor": full.recording.sensor.name,
         "views": names,
         "known": known,

@@ -2,7 +2,7 @@
 
 use super::goal::{Bound, Goal, figure, least, most, share};
 use crate::prove::{
-    Cell, Judged, Learnt, OUR_METHOD, Proof, ProvenSet, Rate, World, scores, worth,
+    Cell, Judged, Learnt, OUR_METHOD, Proof, ProvenSet, Rate, World, level, scores, worth,
 };
 
 /// A yes or no of the judge over some of the sets.
@@ -27,16 +27,30 @@ fn seen(proof: &Proof) -> Vec<Goal> {
     use Bound::{AtLeast, AtMost};
     let scores = &proof.scores;
     let alarms = |kind: &str| scores.by_world_and_cell.get(kind)?.get("false_alarm").copied();
-    let detected = |key: &str| {
-        let of = scores.by_nats.iter().find(|(k, _)| k.trim_start_matches('0') == key)?.1;
-        of.get("detected").copied()
+    let detected = |nats: f64| {
+        let rays = |s: &ProvenSet| {
+            let asked = &s.truth.asked;
+            let single = matches!(asked.cell, Cell::Single | Cell::Outside);
+            single && asked.world == World::Rays && level(&s.truth) == Some(nats)
+        };
+        among(&proof.sets, rays, |s| s.marks.detected)
     };
     let (five, two) = (most(0.05), AtMost(0.02));
     vec![
         share("False alarms, world of light (S2)", alarms("light/null"), five, two),
         share("False alarms, halves of real recordings (S3)", alarms("real/halves"), five, two),
-        share("Single causes worth 15 nats detected", detected("15"), least(0.5), AtLeast(0.8)),
-        share("Single causes worth 50 nats detected", detected("50"), least(0.95), AtLeast(0.99)),
+        share(
+            "Single causes by rays worth 15 nats detected",
+            detected(15.0),
+            least(0.5),
+            AtLeast(0.8),
+        ),
+        share(
+            "Single causes by rays worth 50 nats detected",
+            detected(50.0),
+            least(0.95),
+            AtLeast(0.99),
+        ),
     ]
 }
 
@@ -92,6 +106,12 @@ fn named(proof: &Proof) -> Vec<Goal> {
             all("masquerade"),
             None,
             AtMost(0.05),
+        ),
+        share(
+            "The advised view, once taken, settles for the right one of the two names in doubt",
+            proof.second.as_ref().and_then(|s| s.scores.all.get("settled").copied()),
+            least(0.7),
+            AtLeast(0.9),
         ),
         share(
             "What planes cannot show is said to be so",

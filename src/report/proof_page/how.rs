@@ -11,7 +11,7 @@ pub(super) fn section(proof: &Proof) -> Markup {
             h2 { "How to check this" }
             ol {
                 li { code { "kinoise prove --check DIR" } ", DIR the folder of this page: compares every hash, opens every seal again with its salt, \
-                    judges every verdict again, scores again, and makes a sample of the recordings again from the seed; with "
+                    judges every verdict again, scores again, applies the rule by which advised views were taken, and makes a sample of the recordings again from the seed; with "
                     code { "--all" } " every one of them" @if proof.order.real { ", for which " code { "--data" } " must name the real recordings" } ". It never reads this page." }
                 li { "Hold the trial again: " code { "kinoise prove -o OTHER --sets " (proof.order.sets) " --seed " (proof.order.seed)
                     @if proof.order.real { " --data RECORDINGS" } } ". The same build gives the same recordings and the same verdicts." }
@@ -26,16 +26,21 @@ pub(super) fn section(proof: &Proof) -> Markup {
 
 fn hashes(proof: &Proof) -> Markup {
     let seal = &proof.seal;
+    let none = String::new();
+    let second = proof.second.as_ref();
+    let (advice, again) = second.map_or((&none, &none), |s| (&s.advice_sha256, &s.verdicts_sha256));
     let rows = [
         ("seal.json, before the first diagnosis", &proof.seal_sha256),
         ("verdicts.json, before the seals were opened", &proof.verdicts_sha256),
+        ("advice.json, before the advised views were diagnosed", advice),
+        ("verdicts-advised.json, before the seals were opened", again),
         ("the program that diagnosed", &seal.binary_sha256),
         ("the judge’s source text", &seal.judge_sha256),
         ("the seed", &seal.seed_sha256),
     ];
     html! {
         h3 { "SHA-256" }
-        dl.hashes { @for (what, hash) in rows { div { dt { (what) } dd { code { (hash) } } } } }
+        dl.hashes { @for (what, hash) in rows.into_iter().filter(|r| !r.1.is_empty()) { div { dt { (what) } dd { code { (hash) } } } } }
         dl.hashes {
             div { dt { "seed of the trial" } dd { (proof.order.seed) } }
             div { dt { "seed of every diagnosis" } dd { (seal.solver_seed) } }

@@ -1,36 +1,37 @@
-//! Detection and naming against strength: all single causes, and each world's.
-
-use std::collections::BTreeMap;
+//! Detection and naming against strength: single causes of each world, in and outside the catalogue.
 
 use maud::{Markup, PreEscaped, html};
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::multiples;
-use super::words::{judged_alone, level, of, percents, world};
+use super::words::{of, percents};
 use crate::error::Result;
-use crate::prove::{Cell, Judged, LEVELS, Proof, ProvenSet, Rate, World, scores};
+use crate::prove::{Cell, LEVELS, Proof, ProvenSet, Rate, Truth, World, level};
 use crate::report::axis::Axis;
 use crate::report::colours::FAINT;
 use crate::report::numbers::ABSENT;
 use crate::report::sheet::{self, Chart, Dashes, Drawing, Drawn, SMALL, Sheet, TEXT};
 
-/// Rates by nats, of one mark.
+/// Rates by strength, of one mark.
 pub(super) type Line = Vec<(f64, Rate)>;
 
-/// Of `by_nats`, one mark in order of strength.
-pub(super) fn line(by_nats: &BTreeMap<String, BTreeMap<String, Rate>>, mark: &str) -> Line {
-    let point =
-        |(key, rates): (&String, &BTreeMap<String, Rate>)| Some((level(key)?, *rates.get(mark)?));
-    let mut line: Line = by_nats.iter().filter_map(point).collect();
+/// Of these sets, one mark in order of strength.
+pub(super) fn line_of<'a>(sets: impl Iterator<Item = &'a ProvenSet>, mark: &str) -> Line {
+    let mut answers: Vec<(f64, Vec<bool>)> = Vec::new();
+    for set in sets {
+        let all = set.marks.yes_no();
+        let answer = all.iter().find(|m| m.0 == mark).and_then(|m| m.1);
+        let (Some(level), Some(answer)) = (level(&set.truth), answer) else { continue };
+        match answers.iter_mut().find(|a| a.0 == level) {
+            Some(of) => of.1.push(answer),
+            None => answers.push((level, vec![answer])),
+        }
+    }
+    let mut line: Line =
+        answers.into_iter().filter_map(|(l, a)| Some((l, Rate::of(a.into_iter())?))).collect();
     line.sort_by(|a, b| a.0.total_cmp(&b.0));
     line
-}
-
-/// The same of a part of the sets.
-pub(super) fn line_of<'a>(sets: impl Iterator<Item = &'a ProvenSet>, mark: &str) -> Line {
-    let judged: Vec<Judged<'_>> = sets.map(judged_alone).collect();
-    line(&scores(&judged).by_nats, mark)
 }
 
 /// The marks that are shown: their name, above the panel.
@@ -38,22 +39,26 @@ const MARKS: [(&str, &str); 2] =
     [("detected", "Detected, %"), ("first_name", "First name right, of those detected, %")];
 
 pub(super) fn section(proof: &Proof) -> Result<Markup> {
-    let all = MARKS.map(|(mark, _)| line(&proof.scores.by_nats, mark));
-    let of_world = |w: World| {
+    let of = |w: World, c: Cell, named: bool| {
         let single = |s: &&ProvenSet| {
-            let asked = &s.truth.asked;
-            asked.world == w && matches!(asked.cell, Cell::Single | Cell::Outside)
+            let Truth { asked, hidden, .. } = &s.truth;
+            (asked.world, asked.cell) == (w, c)
+                && hidden.iter().any(|h| !h.names.is_empty()) == named
         };
         MARKS.map(|(mark, _)| line_of(proof.sets.iter().filter(single), mark))
     };
-    let [rays, light] = [World::Rays, World::Light].map(of_world);
-    let figure = PowerFigure { all: all.clone(), rays: rays.clone(), light: light.clone() };
-    let caption = "Single causes, in and outside the catalogue, by what they are worth. Bands: 95 % intervals of Clopper and Pearson \
-                   over all. Short grey strokes: the plan’s marks “good” and “extraordinary”.";
+    let rays = of(World::Rays, Cell::Single, true);
+    let outside = of(World::Rays, Cell::Outside, false);
+    let light = of(World::Light, Cell::Single, true);
+    let nameless = of(World::Light, Cell::Single, false);
+    let nothing = [&rays, &outside, &light].iter().all(|l| l[0].is_empty());
+    let figure = PowerFigure { rays: rays.clone(), outside: outside.clone(), light: light.clone() };
+    let caption = "Single causes by what they are worth: of the catalogue, and outside it, made by rays; by light. Bands: 95 % intervals of Clopper and \
+                   Pearson over the causes of the catalogue. Short grey strokes: the plan’s marks “good” and “extraordinary”.";
     Ok(html! {
         section {
             h2 { "How strong a cause must be" }
-            @if all[0].is_empty() { p { "No set hides a single cause of a stated strength." } } @else {
+            @if nothing { p { "No set hides a single cause of a stated strength." } } @else {
                 p {
                     "A cause is worth so many " b { "nats" } " as who knows it gains in log-likelihood over the whole recording. That is a strict measure: "
                     b { "in a recording of a million readings, a bias of 1 % of the noise already makes 50 nats" }
@@ -61,9 +66,10 @@ pub(super) fn section(proof: &Proof) -> Result<Markup> {
                 }
                 figure {
                     div.wide role="img" aria-label=(caption) { (PreEscaped(figure.svg()?)) }
-                    figcaption { (caption) " In the world of light the strength is one of three sizes ordered (15, 50, 150), not measured in nats." }
+                    figcaption { (caption) " In the world of light the strength is one of three sizes ordered (15, 50, 150), not measured in nats: its \
+                        line does not stand beside the others at the same worth." }
                 }
-                (table(&[("all", &all), (world(World::Rays), &rays), (world(World::Light), &light)]))
+                (table(&[("rays (S1), catalogue", &rays), ("rays (S1), outside it", &outside), ("light (S2), catalogue", &light), ("light (S2), outside it", &nameless)]))
                 (multiples::section(&proof.sets))
             }
         }
@@ -77,7 +83,7 @@ fn table(lines: &[(&str, &[Line; 2])]) -> Markup {
     let at = |line: &Line, nats: f64| line.iter().find(|p| p.0 == nats).map(|p| p.1);
     html! {
         div.wide { table.small.rates {
-            thead { tr { th { "Nats" } th {} @for nats in &levels { th.n { (Axis::label(*nats)) } } } }
+            thead { tr { th { "Nats, or size" } th {} @for nats in &levels { th.n { (Axis::label(*nats)) } } } }
             tbody { @for (name, both) in lines { @for (line, (_, mark)) in both.iter().zip(MARKS) {
                 @if !line.is_empty() { tr {
                     th scope="row" { (name) }
@@ -94,8 +100,8 @@ fn table(lines: &[(&str, &[Line; 2])]) -> Markup {
 
 /// Lines of both marks.
 struct PowerFigure {
-    all: [Line; 2],
     rays: [Line; 2],
+    outside: [Line; 2],
     light: [Line; 2],
 }
 
@@ -152,15 +158,15 @@ impl PowerFigure {
         sheet
             .mesh(&mut chart, SMALL)
             .set_all_tick_mark_size(sheet.px(4))
-            .x_desc("nats over the whole recording")
+            .x_desc("nats over the whole recording (light: size)")
             .draw()?;
         for (nats, percent) in GOALS[i] {
             let ends = [nats / REACH, nats * REACH].map(|x| chart.backend_coord(&(x, *percent)));
             sheet.line(&ends, sheet.stroke(&FAINT, 2), &[])?;
         }
         draw(sheet, &chart, &self.light[i], &RUST, &[2, 3], false)?;
-        draw(sheet, &chart, &self.rays[i], &DARK, &[7, 4], false)?;
-        draw(sheet, &chart, &self.all[i], &BLUE, &[], true)
+        draw(sheet, &chart, &self.outside[i], &DARK, &[7, 4], false)?;
+        draw(sheet, &chart, &self.rays[i], &BLUE, &[], true)
     }
 }
 
@@ -196,9 +202,9 @@ impl Drawing for PowerFigure {
         self.panel(sheet, 0)?;
         self.panel(sheet, 1)?;
         let legend: [(&str, &[Line; 2], RGBColor, Dashes); 3] = [
-            ("all", &self.all, BLUE, &[]),
-            ("rays (S1)", &self.rays, DARK, &[7, 4]),
-            ("light (S2), by size", &self.light, RUST, &[2, 3]),
+            ("rays (S1), of the catalogue", &self.rays, BLUE, &[]),
+            ("rays (S1), outside it", &self.outside, DARK, &[7, 4]),
+            ("light (S2), of the catalogue, by size", &self.light, RUST, &[2, 3]),
         ];
         let y = sheet.px(HEIGHT as i32 - LEGEND / 2);
         let mut x = sheet.px(60);

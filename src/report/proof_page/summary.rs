@@ -26,8 +26,7 @@ pub(super) fn section(proof: &Proof) -> Markup {
             (table(&goals))
             p.note {
                 "Marks as they stand in the plan of the trial, written before it. A figure without “good” has only \
-                 the higher mark. Not measured at all: whether the proposed next view, once taken, decides between \
-                 two names; only whether one is proposed is counted (see the rates)."
+                 the higher mark."
             }
         }
     }

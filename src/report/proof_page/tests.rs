@@ -82,6 +82,7 @@ fn proof(sets: Vec<ProvenSet>) -> Proof {
         seal: serde_json::from_value::<Seal>(seal).unwrap(),
         confinement: BTreeMap::from([("not <in> force".into(), sets.len())]),
         sets,
+        second: None,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::prove::{Cell, Hidden, Judged, ProvenSet, Rate, Truth, World};
+use crate::prove::{Cell, Hidden, Rate, Truth, World};
 use crate::report::numbers::fixed;
 
 /// Shares below a tenth, and those close to all, get a decimal.
@@ -89,16 +89,6 @@ pub(super) fn name(hidden: &Hidden) -> &str {
 pub(super) fn strongest(truth: &Truth) -> Option<f64> {
     let nats = truth.hidden.iter().filter_map(|h| h.nats.or(truth.asked.nats));
     nats.filter(|n| *n > 0.0).reduce(f64::max)
-}
-
-/// For scores of a part of the sets, without what was gained.
-pub(super) fn judged_alone(set: &ProvenSet) -> Judged<'_> {
-    Judged { gains: None, ..set.judged() }
-}
-
-/// From the file's "0050" to 50.
-pub(super) fn level(key: &str) -> Option<f64> {
-    key.parse().ok().filter(|n: &f64| n.is_finite() && *n > 0.0)
 }
 
 #[cfg(test)]

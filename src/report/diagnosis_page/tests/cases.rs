@@ -90,6 +90,8 @@ fn one_of() -> Finding {
             z_m: 0.8,
             theta_rad: 0.785,
             azimuth_rad: 0.05,
+            separation_now: 0.4,
+            separation_then: 6.0,
             why: "a bent board moves with the board, a bowl of the lens stays in the picture"
                 .into(),
         }),
