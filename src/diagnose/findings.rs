@@ -7,7 +7,7 @@ use super::diagnosis::{Alternative, Curve, Finding, MapRow, Size, Status};
 use super::layers::{Survey, coarser};
 use super::missing::MissingFinding;
 use super::noise::Hanging;
-use super::parameters::parameters;
+use super::parameters::{of_any_formula, parameters};
 use super::search::{Chosen, Outcome, ViewData};
 use super::shape;
 use crate::effects;
@@ -154,7 +154,8 @@ fn finding(
         f.covariance.view((span.start, span.start), (span.len(), span.len())).into_owned()
     });
     let parameters = covariance.map_or_else(Map::new, |c| {
-        parameters(&terms[main].basis, &terms[main].coefficients, &c, &scene.survey.reach)
+        let Term { basis, coefficients, .. } = &terms[main];
+        of_any_formula(basis, parameters(basis, coefficients, &c, &scene.survey.reach))
     });
     let shape =
         effect.is_none().then(|| shape::words(&terms[main].basis, &terms[main].coefficients));
