@@ -12,6 +12,8 @@ mod folder;
 mod font;
 mod freenect;
 mod guide;
+#[cfg(test)]
+mod guide_tests;
 mod play;
 mod queue;
 mod run;
