@@ -407,3 +407,70 @@ fn a_full_disk_ends_it_and_what_was_finished_stays() {
     let kept = open(&output, &Assumed::default()).expect("a recording");
     assert_eq!(kept.views.len(), 1);
 }
+
+/// The library of `tests/data/freenect_mock.c`, made once; `None` without a C compiler.
+fn mock() -> Option<&'static Path> {
+    static MADE: OnceLock<Option<(tempfile::TempDir, PathBuf)>> = OnceLock::new();
+    let made = MADE.get_or_init(|| {
+        let folder = folder();
+        let library = folder.path().join("libmock.so");
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/freenect_mock.c");
+        let compiled =
+            Process::new("cc").args(["-shared", "-fPIC", "-o"]).args([&library, &source]).status();
+        if !compiled.is_ok_and(|status| status.success()) {
+            println!("skipped: no C compiler (cc) to make the mock of libfreenect with");
+            return None;
+        }
+        Some((folder, library))
+    });
+    made.as_ref().map(|(_, library)| library.as_path())
+}
+
+fn from_mock(library: &Path, output: &Path, frames: &str, then: &str) -> assert_cmd::Command {
+    let mut command = kinoise();
+    command
+        .args(["capture", "--source", "freenect", "--plain", "--json", "--views", "any"])
+        .args(["--frames", "4", "--hold", "2", "--patience", "1", "--library"])
+        .args([library, output])
+        .env("MOCK_FRAMES", frames)
+        .env("MOCK_THEN", then);
+    command
+}
+
+/// Serial, factory calibration and infrared, which the stand-in has not.
+#[test]
+fn a_units_own_serial_calibration_and_infrared_are_recorded() {
+    let Some(library) = mock() else { return };
+    let folder = folder();
+    let output = folder.path().join("rec");
+    let ended = from_mock(library, &output, "20", "gone").assert().code(2);
+    assert!(told(&ended).contains("the Kinect is gone"), "{}", told(&ended));
+    let recording = open(&output, &Assumed::default()).expect("a recording");
+    assert_eq!(recording.sensor.serial.as_deref(), Some("A00366802050045A"));
+    assert!((recording.sensor.camera.fx - 575.8).abs() < 0.05);
+    // libfreenect's own table has, for word 700, 10 (m 120/(7.5 - m) + 120) mm, m = -25.375 * .1042.
+    let z = recording.sensor.code.metres(700).expect("a depth");
+    assert!((z - 0.8872).abs() < 0.0001, "{z}");
+    let view = &recording.views[0];
+    assert_eq!((view.depth.len(), view.infrared.len()), (4, 4));
+    assert_eq!(view.depth[0].timestamp, view.infrared[0].timestamp);
+    let infrared = kinoise::io::InfraredImage::read(&view.infrared[0].path).expect("an image");
+    assert_eq!((infrared.width, infrared.height), (640, 480));
+    // The 480 rows in the middle of 488, every row its number.
+    assert_eq!((infrared.amplitude[0], infrared.amplitude[640 * 479]), (4, 483));
+    let now = recording.views[0].depth[0].timestamp;
+    assert!(now > 1.7e9, "seconds since 1970: {now}");
+}
+
+#[test]
+fn a_silent_sensor_a_missing_one_and_another_one_are_told() {
+    let Some(library) = mock() else { return };
+    let folder = folder();
+    let output = folder.path().join("rec");
+    let none = from_mock(library, &output, "0", "none").assert().code(2);
+    assert!(told(&none).contains("no Kinect is connected"), "{}", told(&none));
+    let other = from_mock(library, &output, "9", "gone").args(["--serial", "B0"]).assert().code(2);
+    assert!(told(&other).contains("but A00366802050045A"), "{}", told(&other));
+    let stalled = from_mock(library, &output, "1", "silent").assert().code(2);
+    assert!(told(&stalled).contains("no frame for 1 s"), "{}", told(&stalled));
+}

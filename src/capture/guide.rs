@@ -86,7 +86,7 @@ impl Guide {
         let mut events = Vec::new();
         self.sight = sight;
         let stays = self.settle();
-        if let (false, Some(taking)) = (stays, self.taking.take()) {
+        if !stays && let Some(taking) = self.taking.take() {
             events.push(self.abandon(taking));
         }
         if let Ok(seen) = &self.sight {
