@@ -159,7 +159,7 @@ fn the_screen() {
     let mut around =
         Surroundings { title: "kinect   Kinect for Xbox 360".into(), ..Default::default() };
     story(&mut g, std::iter::repeat_n(Ok(seen(1.02, 11.0)), 4));
-    story(&mut g, [Ok(seen(1.31, 12.0))]);
+    story(&mut g, [Ok(seen(1.25, 12.0))]);
     insta::assert_snapshot!("carry", screen(&g, &around));
     story(&mut g, std::iter::repeat_n(Ok(seen(1.52, 9.0)), 2));
     insta::assert_snapshot!("stay", screen(&g, &around));
