@@ -1,4 +1,4 @@
-//! Letters that can be read from four metres: five rows of blocks.
+//! Big letters, for who stands away from the screen: five rows of blocks.
 
 /// Rows of a letter.
 pub const ROWS: usize = 5;
