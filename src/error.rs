@@ -43,6 +43,9 @@ pub enum Error {
     /// An option or argument outside its range.
     #[error("{what}; {remedy}")]
     Argument { what: String, remedy: &'static str },
+    /// A live sensor that cannot be had.
+    #[error("{what}; {remedy}")]
+    Sensor { what: String, remedy: &'static str },
     /// A picture or page could not be drawn.
     #[error("{what}: drawing failed: {why}")]
     Drawing { what: &'static str, why: String },
@@ -77,6 +80,10 @@ impl Error {
 
     pub(crate) fn recording(path: &Path, what: impl Into<String>, remedy: &'static str) -> Self {
         Error::Recording { path: path.to_path_buf(), what: what.into(), remedy }
+    }
+
+    pub(crate) fn sensor(what: impl Into<String>, remedy: &'static str) -> Self {
+        Error::Sensor { what: what.into(), remedy }
     }
 
     pub(crate) fn image(path: &Path, what: impl Into<String>, remedy: &'static str) -> Self {

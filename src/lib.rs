@@ -21,6 +21,7 @@
 
 pub mod calibrate;
 pub mod camera;
+pub mod capture;
 pub mod compare;
 pub mod correct;
 pub mod diagnose;

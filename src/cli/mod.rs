@@ -1,6 +1,8 @@
 //! One file a subcommand: its arguments and `run`.
 
 mod calibrate;
+mod capture;
+mod capture_audience;
 mod common;
 mod compare;
 mod correct;
@@ -21,6 +23,7 @@ mod simulate_room;
 mod simulate_scenery;
 mod simulate_sensor;
 mod simulate_words;
+mod terminal;
 mod words;
 
 use std::process::ExitCode;
@@ -40,6 +43,8 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Take views from a running Kinect, guided to those that matter
+    Capture(capture::Arguments),
     /// Fit sigma(z, theta) to recorded views of a plane: model.json, plots, report
     Calibrate(calibrate::Arguments),
     /// Fit sigma(z, theta) to a table z_m,theta_rad,sigma_m[,n]
@@ -111,6 +116,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     }
     global.set_threads()?;
     match &arguments.command {
+        Command::Capture(a) => capture::run(a, global),
         Command::Calibrate(a) => calibrate::run(a, global).map(|()| 0),
         Command::Fit(a) => fit::run(a, global).map(|()| 0),
         Command::Diagnose(a) => diagnose::run(a, global),

@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
+use super::images::encode_pgm16;
+use super::output::{refuse_full, write_atomic};
 use super::stills::{Film, Footage};
 use super::{Assumed, assumed_sensor, images};
 use crate::error::{Error, Result};
-use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
+use crate::frame::{DepthCode, Frame, KINECT_NO_MEASUREMENT};
 use crate::view::{FrameRef, Sensor};
 
 pub(crate) const INDEX: &str = "INDEX.txt";
@@ -50,6 +52,15 @@ pub(super) fn footage(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor
         )
     })?;
     let size = images::size_of(&first.path)?;
+    let (sensor, assumptions) = sensor(size, assumed)?;
+    remarks.extend(assumptions);
+    let footage = Footage { frames, film: Film::Video, remarks, described_by: vec![index] };
+    Ok((footage, sensor))
+}
+
+/// The Kinect that recorded frames of `size` px, and what had to be assumed about it.
+pub(super) fn sensor(size: (usize, usize), assumed: &Assumed) -> Result<(Sensor, Vec<String>)> {
+    let mut remarks = Vec::new();
     if assumed.intrinsics.is_none() || assumed.code.is_none() {
         remarks.push(
             "a fakenect dump carries no calibration: OpenKinect's depth formula and f = 585 px assumed; \
@@ -64,9 +75,35 @@ pub(super) fn footage(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor
         assumed.code.unwrap_or(OPENKINECT),
         &Assumed { baseline_m: assumed.baseline_m.or(Some(KINECT_BASELINE_M)), ..assumed.clone() },
     )?;
-    let footage = Footage { frames, film: Film::Video, remarks, described_by: vec![index] };
-    Ok((footage, sensor))
+    Ok((sensor, remarks))
 }
+
+/// Write depth frames as fakenect-record would have: stamps in s, frames of 640 x 480 raw words.
+/// fakenect plays nothing else.
+///
+/// # Errors
+/// When the folder has something in it, or cannot be written.
+pub fn write_dump<'a>(
+    root: &Path,
+    frames: impl IntoIterator<Item = (f64, &'a Frame)>,
+) -> Result<()> {
+    refuse_full(root)?;
+    std::fs::create_dir_all(root).map_err(|e| Error::write(root, e))?;
+    let mut index = String::new();
+    for (stamp, frame) in frames {
+        // The sensor's own clock: 60 MHz in 32 bits.
+        let ticks = (stamp * CLOCK_HZ) as u64 as u32;
+        let name = format!("d-{stamp:.6}-{ticks}.pgm");
+        let file = root.join(&name);
+        std::fs::write(&file, encode_pgm16(frame)).map_err(|e| Error::write(&file, e))?;
+        index += &name;
+        index.push('\n');
+    }
+    write_atomic(&root.join(INDEX), index.as_bytes())
+}
+
+/// Of a Kinect v1's timestamps.
+const CLOCK_HZ: f64 = 60e6;
 
 /// Projector to camera in every Kinect v1 (LDDIS of the OpenNI device properties: 7.5 cm).
 const KINECT_BASELINE_M: f64 = 0.075;

@@ -20,22 +20,7 @@ pub(super) fn footage(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor
             "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs",
         ));
     };
-    let Some(intrinsics) = assumed.intrinsics else {
-        return Err(Error::recording(
-            root,
-            "a plain folder of PNGs carries no intrinsics",
-            "give --intrinsics fx,fy,cx,cy (and --units-per-metre or --raw-disparity)",
-        ));
-    };
-    let size = images::size_of(first)?;
-    let mut remarks = Vec::new();
-    let code = assumed.code.unwrap_or_else(|| {
-        remarks.push(
-            "depth taken as millimetres; give --units-per-metre or --raw-disparity if not".into(),
-        );
-        MILLIMETRES
-    });
-    let sensor = assumed_sensor("depth images", size, intrinsics, code, assumed)?;
+    let (sensor, remarks) = sensor(root, images::size_of(first)?, assumed)?;
     let frames = files
         .into_iter()
         .enumerate()
@@ -43,6 +28,29 @@ pub(super) fn footage(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor
         .collect();
     let footage = Footage { frames, film: Film::Captures, remarks, described_by: Vec::new() };
     Ok((footage, sensor))
+}
+
+/// The sensor that took images of `size` px, as far as options tell, and what was assumed.
+pub(super) fn sensor(
+    root: &Path,
+    size: (usize, usize),
+    assumed: &Assumed,
+) -> Result<(Sensor, Vec<String>)> {
+    let Some(intrinsics) = assumed.intrinsics else {
+        return Err(Error::recording(
+            root,
+            "a plain folder of PNGs carries no intrinsics",
+            "give --intrinsics fx,fy,cx,cy (and --units-per-metre or --raw-disparity)",
+        ));
+    };
+    let mut remarks = Vec::new();
+    let code = assumed.code.unwrap_or_else(|| {
+        remarks.push(
+            "depth taken as millimetres; give --units-per-metre or --raw-disparity if not".into(),
+        );
+        MILLIMETRES
+    });
+    Ok((assumed_sensor("depth images", size, intrinsics, code, assumed)?, remarks))
 }
 
 /// 30 Hz: a plain folder has no clock, and every sensor of this kind runs at it.

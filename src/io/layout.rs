@@ -17,7 +17,7 @@ use crate::view::{
 
 pub(crate) const DESCRIPTION: &str = "recording.json";
 const VIEW_FILE: &str = "view.json";
-const DEPTH_LIST: &str = "depth.txt";
+pub(crate) const DEPTH_LIST: &str = "depth.txt";
 const INFRARED_LIST: &str = "ir.txt";
 const REMEDY_JSON: &str = "compare it with the recording layout in the README";
 
@@ -128,6 +128,11 @@ pub(super) fn read_sensor(path: &Path, unknown: &mut UnknownKeys) -> Result<Sens
     let file: RecordingFile = parse(path, &text)?;
     unknown.note(path, &parse(path, &text)?, &json!(file));
     file.sensor().map_err(wrong)
+}
+
+/// The sensor of a `recording.json`.
+pub(crate) fn read_description(path: &Path) -> Result<Sensor> {
+    read_sensor(path, &mut UnknownKeys::default())
 }
 
 #[derive(Deserialize)]

@@ -12,9 +12,10 @@ mod tum;
 mod unknown;
 
 pub(crate) use dump::INDEX;
+pub use dump::write_dump;
 pub use images::{ColourImage, FrameSource, InfraredImage, encode_pgm16, encode_png16};
 pub(crate) use images::{read_depth, size_of};
-pub(crate) use layout::DESCRIPTION;
+pub(crate) use layout::{DEPTH_LIST, DESCRIPTION, read_description};
 pub use layout::{ViewFile, write_recording_file, write_view_notes};
 pub use list::{FrameList, read_list};
 pub(crate) use output::hex;
@@ -159,6 +160,24 @@ fn refuse(assumed: &Assumed, path: &Path) -> Result<()> {
         ),
         remedy: "leave the option out, or correct that file",
     })
+}
+
+/// The sensor of a folder whose images are `size` px, and what had to be assumed: told by its
+/// recording.json, by what is known of a dump, or by `assumed`.
+pub(crate) fn describe_folder(
+    root: &Path,
+    size: (usize, usize),
+    assumed: &Assumed,
+) -> Result<(Sensor, Vec<String>)> {
+    let description = root.join(DESCRIPTION);
+    if description.is_file() {
+        refuse(assumed, root)?;
+        return Ok((read_description(&description)?, Vec::new()));
+    }
+    if root.join(INDEX).is_file() {
+        return dump::sensor(size, assumed);
+    }
+    folder::sensor(root, size, assumed)
 }
 
 /// What stands in a folder, in name order.

@@ -1,0 +1,267 @@
+//! Decides what becomes of every frame: sights in, events out; it knows neither disk nor screen.
+
+use super::wanted::{Pose, ViewState, Wanted};
+use super::warmth::{Drift, Warmth};
+use super::watch::Seen;
+
+/// A target may wander by this much, root mean square of inverse depth, and still be still, 1/m:
+/// two thirds of a step of a Kinect's words, 2 mm at 1 m and 8 mm at 2 m.
+const STILL_PER_M: f64 = 0.002;
+
+/// How views are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shutter {
+    /// Frames of a view.
+    pub frames: usize,
+    /// Frames for which the target must have been still before.
+    pub hold: usize,
+}
+
+/// What shall be done about a frame, and what there is to tell.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Event {
+    /// A view begins with this frame.
+    Begun(String),
+    /// This frame belongs to the view.
+    Keep,
+    /// The view is whole.
+    Finished(String),
+    /// The view must be thrown away.
+    Abandoned { view: String, why: String },
+    /// The plane was watched long enough.
+    Drift(Drift),
+    /// Nothing is wanted any more.
+    Done,
+}
+
+/// What a person can ask for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Command {
+    /// Take the last view again.
+    Again,
+    /// Go without the view that is suggested.
+    Skip,
+    /// That will do.
+    Quit,
+}
+
+/// The state between two frames.
+pub struct Guide {
+    wanted: Wanted,
+    shutter: Shutter,
+    sight: Result<Seen, String>,
+    /// Where the target began to be still, and for how many frames it has been.
+    still: Option<(Seen, usize)>,
+    taking: Option<Taking>,
+    suggestion: Option<usize>,
+    last: Option<usize>,
+    warmth: Warmth,
+}
+
+#[derive(Clone, Copy)]
+struct Taking {
+    view: usize,
+    kept: usize,
+    /// Did not exist before: nobody wants it when it fails.
+    new: bool,
+}
+
+impl Guide {
+    pub fn new(wanted: Wanted, shutter: Shutter) -> Self {
+        let suggestion = wanted.suggestion(None);
+        Guide {
+            wanted,
+            shutter,
+            sight: Err("no frame yet".into()),
+            still: None,
+            taking: None,
+            suggestion,
+            last: None,
+            warmth: Warmth::default(),
+        }
+    }
+
+    /// One frame, as the watcher saw it.
+    pub fn see(&mut self, stamp: f64, sight: Result<Seen, String>) -> Vec<Event> {
+        let mut events = Vec::new();
+        self.sight = sight;
+        let stays = self.settle();
+        if !stays && let Some(taking) = self.taking.take() {
+            events.push(self.abandon(taking));
+        }
+        if let Ok(seen) = &self.sight {
+            events.extend(self.warmth.add(stamp, seen.plane.q.z).map(Event::Drift));
+        }
+        self.shoot(&mut events);
+        self.suggest();
+        if self.wanted.is_done() && self.taking.is_none() {
+            events.push(Event::Done);
+        }
+        events
+    }
+
+    /// Is the target where it was? If not, stillness begins anew.
+    fn settle(&mut self) -> bool {
+        let Ok(seen) = &self.sight else {
+            self.still = None;
+            self.warmth = Warmth::default();
+            return false;
+        };
+        match &mut self.still {
+            Some((anchor, frames)) if seen.moved_since(anchor) < STILL_PER_M => {
+                *frames += 1;
+                true
+            }
+            _ => {
+                self.still = Some((seen.clone(), 1));
+                self.warmth = Warmth::default();
+                false
+            }
+        }
+    }
+
+    fn shoot(&mut self, events: &mut Vec<Event>) {
+        let taking = match self.taking {
+            Some(taking) => taking,
+            None => {
+                let Some(taking) = self.begin() else { return };
+                events.push(Event::Begun(self.name(taking.view)));
+                taking
+            }
+        };
+        events.push(Event::Keep);
+        let kept = taking.kept + 1;
+        if kept < self.shutter.frames {
+            self.taking = Some(Taking { kept, ..taking });
+            return;
+        }
+        self.taking = None;
+        self.last = Some(taking.view);
+        self.wanted.views[taking.view].state = ViewState::Taken;
+        events.push(Event::Finished(self.name(taking.view)));
+    }
+
+    /// A view begins when the target has been still for long enough where one is wanted.
+    fn begin(&mut self) -> Option<Taking> {
+        let pose = self.pose()?;
+        if self.held() < self.shutter.hold {
+            return None;
+        }
+        let before = self.wanted.views.len();
+        let view = self.wanted.claim(&pose)?;
+        Some(Taking { view, kept: 0, new: self.wanted.views.len() > before })
+    }
+
+    fn abandon(&mut self, taking: Taking) -> Event {
+        let view = self.name(taking.view);
+        if taking.new {
+            self.wanted.views.pop();
+        }
+        let why = match &self.sight {
+            Ok(_) => "the target moved".into(),
+            Err(why) => why.clone(),
+        };
+        Event::Abandoned { view, why }
+    }
+
+    /// Keep a suggestion until it is taken, or another is much nearer: words that flicker help
+    /// nobody.
+    fn suggest(&mut self) {
+        let pose = self.pose();
+        let best = self.wanted.suggestion(pose.as_ref());
+        let (Some(now), Some(new)) = (self.suggestion, best) else {
+            self.suggestion = best;
+            return;
+        };
+        let view = |i: usize| self.wanted.views.get(i).filter(|v| v.state == ViewState::Open);
+        let keep = match (view(now), view(new), pose) {
+            (Some(_), _, None) => true,
+            (Some(old), Some(new), Some(pose)) => old.away(&pose) < 2.0 * new.away(&pose),
+            _ => false,
+        };
+        if !keep {
+            self.suggestion = best;
+        }
+    }
+
+    /// Do what a person asks; what must be undone is told.
+    pub fn obey(&mut self, command: Command) -> Vec<Event> {
+        let mut events = Vec::new();
+        match command {
+            Command::Again => {
+                if let Some(last) = self.last.take() {
+                    self.wanted.views[last].state = ViewState::Open;
+                    self.suggestion = Some(last);
+                    // The target must settle anew before it is taken again.
+                    self.still = None;
+                }
+            }
+            Command::Skip => {
+                if let Some(view) = self.suggestion.and_then(|i| self.wanted.views.get_mut(i)) {
+                    view.state = ViewState::Skipped;
+                }
+                if let Some(taking) = self.taking.take_if(|t| Some(t.view) == self.suggestion) {
+                    let view = self.name(taking.view);
+                    events.push(Event::Abandoned { view, why: "skipped".into() });
+                }
+                self.suggest();
+            }
+            Command::Quit => {
+                if let Some(taking) = self.taking.take() {
+                    let view = self.name(taking.view);
+                    events.push(Event::Abandoned { view, why: "stopped".into() });
+                }
+            }
+        }
+        events
+    }
+
+    fn name(&self, view: usize) -> String {
+        self.wanted.views[view].name.clone()
+    }
+
+    /// What is wanted and what has become of it.
+    pub fn wanted(&self) -> &Wanted {
+        &self.wanted
+    }
+
+    /// The last frame's target, or why there is none.
+    pub fn sight(&self) -> &Result<Seen, String> {
+        &self.sight
+    }
+
+    /// Where the target is.
+    pub fn pose(&self) -> Option<Pose> {
+        self.sight.as_ref().ok().map(Seen::pose)
+    }
+
+    /// Frames for which it has been still.
+    pub fn held(&self) -> usize {
+        self.still.as_ref().map_or(0, |(_, frames)| *frames)
+    }
+
+    /// How far it has moved since it began to be still, m at its distance.
+    pub fn moved_m(&self) -> Option<f64> {
+        let (Ok(seen), Some((anchor, _))) = (&self.sight, &self.still) else { return None };
+        Some(seen.moved_since(anchor) * seen.pose().z_m.powi(2))
+    }
+
+    /// The view that is being taken, and how many frames of it are there.
+    pub fn taking(&self) -> Option<(&str, usize)> {
+        self.taking.map(|t| (self.wanted.views[t.view].name.as_str(), t.kept))
+    }
+
+    /// Which of the wanted views to go to.
+    pub fn suggestion(&self) -> Option<usize> {
+        self.suggestion
+    }
+
+    pub fn shutter(&self) -> Shutter {
+        self.shutter
+    }
+
+    /// Of the present stillness.
+    pub fn drift(&self) -> Option<Drift> {
+        self.warmth.drift()
+    }
+}

@@ -1,0 +1,98 @@
+//! A recording played as if its sensor stood here.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use super::source::{Arrival, End, LiveFrame, Source};
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::io::{Assumed, FrameSource, InfraredImage, open_uncut};
+use crate::view::{FrameRef, Sensor};
+
+/// Longer pauses between frames (a board being moved) are cut to this, s.
+const LONGEST_PAUSE_S: f64 = 0.5;
+
+/// Frames of a recording in time order.
+pub struct Playback {
+    sensor: Sensor,
+    frames: std::vec::IntoIter<(FrameRef, Option<FrameRef>)>,
+    images: FrameSource,
+    /// Play at the recording's own pace, not as fast as frames can be read.
+    paced: bool,
+    previous: Option<(f64, Instant)>,
+    root: PathBuf,
+    remarks: Vec<String>,
+}
+
+impl Playback {
+    /// Open any layout that kinoise reads.
+    ///
+    /// # Errors
+    /// As [`crate::io::open`].
+    pub fn open(root: &Path, assumed: &Assumed, paced: bool) -> Result<Self> {
+        let recording = open_uncut(root, assumed)?;
+        let mut frames: Vec<(FrameRef, Option<FrameRef>)> = Vec::new();
+        for view in recording.views {
+            let mut infrared = view.infrared.into_iter().peekable();
+            for depth in view.depth {
+                while infrared.next_if(|i| i.timestamp < depth.timestamp).is_some() {}
+                let own = infrared.next_if(|i| i.timestamp == depth.timestamp);
+                frames.push((depth, own));
+            }
+        }
+        frames.sort_by(|a, b| a.0.timestamp.total_cmp(&b.0.timestamp));
+        let camera = &recording.sensor.camera;
+        Ok(Playback {
+            images: FrameSource::new(camera.width, camera.height),
+            sensor: recording.sensor,
+            frames: frames.into_iter(),
+            paced,
+            previous: None,
+            root: root.into(),
+            remarks: recording.remarks,
+        })
+    }
+
+    fn keep_pace(&mut self, stamp: f64) {
+        if let (true, Some((before, then))) = (self.paced, self.previous) {
+            let due = Duration::from_secs_f64((stamp - before).clamp(0.0, LONGEST_PAUSE_S));
+            std::thread::sleep(due.saturating_sub(then.elapsed()));
+        }
+        self.previous = Some((stamp, Instant::now()));
+    }
+}
+
+impl Source for Playback {
+    fn sensor(&self) -> &Sensor {
+        &self.sensor
+    }
+
+    fn next(&mut self, _wait: Duration) -> Result<Arrival> {
+        while let Some((depth, infrared)) = self.frames.next() {
+            match self.images.read(&depth.path) {
+                Ok(frame) => {
+                    self.keep_pace(depth.timestamp);
+                    return Ok(Arrival::Frame(LiveFrame {
+                        stamp: depth.timestamp,
+                        infrared: infrared.and_then(|i| amplitude(&i.path, &frame)),
+                        depth: frame,
+                    }));
+                }
+                Err(e) => self.remarks.push(format!("frame left out: {e}")),
+            }
+        }
+        let why = format!("{} was played to its end", self.root.display());
+        Ok(Arrival::End(End { why, lost: false }))
+    }
+
+    fn remarks(&self) -> &[String] {
+        &self.remarks
+    }
+}
+
+/// An infrared image of the depth frame's size, or none.
+fn amplitude(path: &Path, depth: &Frame) -> Option<Frame> {
+    let image = InfraredImage::read(path).ok()?;
+    let same = (image.width, image.height) == (depth.width, depth.height);
+    same.then_some(Frame { width: image.width, height: image.height, words: image.amplitude })
+}

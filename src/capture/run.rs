@@ -1,0 +1,153 @@
+//! The loop: a frame comes, is looked at, and what the guide says about it is done.
+
+use std::time::{Duration, Instant};
+
+use super::guide::{Command, Event, Guide};
+use super::session::Session;
+use super::source::{Arrival, LiveFrame, Source};
+use super::watch::Watcher;
+use crate::error::{Error, Result};
+use crate::view::ViewNotes;
+
+/// Who looks on: a screen, or a log.
+pub trait Audience {
+    /// Something happened.
+    fn event(&mut self, event: &Event);
+
+    /// A frame was dealt with.
+    fn frame(&mut self, guide: &Guide);
+
+    /// What a person asks for, if anything.
+    fn command(&mut self) -> Option<Command>;
+
+    /// Must all end now (Ctrl-C)?
+    fn interrupted(&self) -> bool;
+}
+
+/// How a capture came to its end.
+#[derive(Debug)]
+pub enum Ending {
+    /// Nothing is wanted any more.
+    Complete,
+    /// By a key.
+    Quit,
+    /// By a signal.
+    Interrupted,
+    /// The source ended before all was taken; `lost` when it was needed still.
+    Ended { why: String, lost: bool },
+    /// No frame for so long.
+    Stalled(Duration),
+    /// The disk or the source failed.
+    Failed(Error),
+}
+
+/// What was done.
+#[derive(Debug)]
+pub struct Outcome {
+    pub ending: Ending,
+    /// Views finished in this run, in order.
+    pub finished: Vec<String>,
+    /// Frames looked at.
+    pub frames: usize,
+}
+
+/// How long one wait for a frame lasts: keys are answered between two.
+const WAIT: Duration = Duration::from_millis(50);
+
+/// Take views until nothing is wanted, or something ends it. Finished views are kept whatever
+/// happens; `patience` is how long a stream may stand still.
+pub fn capture(
+    source: &mut dyn Source,
+    session: &mut Session,
+    guide: &mut Guide,
+    audience: &mut dyn Audience,
+    patience: Duration,
+) -> Outcome {
+    let mut watcher = Watcher::new(source.sensor());
+    let mut done = Outcome { ending: Ending::Complete, finished: Vec::new(), frames: 0 };
+    let mut last_frame = Instant::now();
+    let ending = loop {
+        if let Some(ending) = asked(guide, session, audience) {
+            break ending;
+        }
+        let frame = match newest(source, guide.taking().is_some()) {
+            Ok(Arrival::Frame(frame)) => frame,
+            Ok(Arrival::Nothing) if last_frame.elapsed() > patience => {
+                break Ending::Stalled(patience);
+            }
+            Ok(Arrival::Nothing) => continue,
+            Ok(Arrival::End(end)) => break Ending::Ended { why: end.why, lost: end.lost },
+            Err(e) => break Ending::Failed(e),
+        };
+        last_frame = Instant::now();
+        done.frames += 1;
+        let sight = watcher.look(&frame.depth);
+        match follow(guide.see(frame.stamp, sight), &frame, session, audience, &mut done.finished) {
+            Ok(false) => audience.frame(guide),
+            Ok(true) => {
+                audience.frame(guide);
+                break Ending::Complete;
+            }
+            Err(e) => break Ending::Failed(e),
+        }
+    };
+    session.abandon();
+    done.ending = ending;
+    done
+}
+
+/// The next frame; of a live sensor, the newest, unless every one is wanted.
+fn newest(source: &mut dyn Source, every: bool) -> Result<Arrival> {
+    let mut arrival = source.next(WAIT)?;
+    while source.live() && !every && matches!(arrival, Arrival::Frame(_)) {
+        match source.next(Duration::ZERO)? {
+            Arrival::Nothing => break,
+            newer => arrival = newer,
+        }
+    }
+    Ok(arrival)
+}
+
+fn asked(guide: &mut Guide, session: &mut Session, audience: &mut dyn Audience) -> Option<Ending> {
+    if audience.interrupted() {
+        return Some(Ending::Interrupted);
+    }
+    let command = audience.command()?;
+    for event in guide.obey(command) {
+        if matches!(event, Event::Abandoned { .. }) {
+            session.abandon();
+        }
+        audience.event(&event);
+    }
+    match command {
+        Command::Quit => Some(Ending::Quit),
+        _ if guide.wanted().is_done() => Some(Ending::Complete),
+        _ => None,
+    }
+}
+
+/// Do what the events say; true when all is done.
+fn follow(
+    events: Vec<Event>,
+    frame: &LiveFrame,
+    session: &mut Session,
+    audience: &mut dyn Audience,
+    finished: &mut Vec<String>,
+) -> Result<bool> {
+    let mut done = false;
+    for event in &events {
+        match event {
+            Event::Begun(view) => session.begin(view)?,
+            Event::Keep => session.keep(frame)?,
+            Event::Finished(view) => {
+                session.finish(&ViewNotes::default())?;
+                finished.push(view.clone());
+            }
+            Event::Abandoned { .. } => session.abandon(),
+            Event::Drift(_) => {}
+            Event::Done => done = true,
+        }
+        audience.event(event);
+    }
+    Ok(done)
+}

@@ -1,0 +1,130 @@
+//! Is the sensor still warming up? While nothing moves, its plane should not either.
+
+/// Shortest stretch of stillness that says anything, s.
+const FIRST_S: f64 = 20.0;
+/// A drift below this is none, m/min at 1 m (it grows as z^2): in the half hour that a session
+/// lasts it stays below a Kinect's sigma there (Khoshelham and Elberink: 1.4 mm z^2).
+const STEADY_M_PER_MINUTE: f64 = 5e-5;
+/// ... and so is one below this many standard errors.
+const SURE: f64 = 4.0;
+
+/// How the plane wanders.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drift {
+    /// Of the depth on the optical axis, m/min; positive when the plane seems to recede.
+    pub per_minute_m: f64,
+    /// m/min.
+    pub std_error_m: f64,
+    /// Where the plane stands, m.
+    pub z_m: f64,
+    /// Watched for so long, s.
+    pub seconds: f64,
+}
+
+impl Drift {
+    /// Does the sensor still warm up?
+    pub fn is_warming(&self) -> bool {
+        let size = self.per_minute_m.abs();
+        size > SURE * self.std_error_m && size > STEADY_M_PER_MINUTE * self.z_m * self.z_m
+    }
+}
+
+/// A line through inverse depth over time, as sums.
+#[derive(Debug, Clone, Default)]
+pub struct Warmth {
+    first: Option<(f64, f64)>,
+    last_t: f64,
+    n: f64,
+    t: f64,
+    w: f64,
+    tt: f64,
+    tw: f64,
+    ww: f64,
+    told_at_s: f64,
+}
+
+impl Warmth {
+    /// One frame: time, s, and inverse depth on the axis, 1/m. The drift is told after 20 s of
+    /// stillness, and again whenever the time has doubled.
+    pub fn add(&mut self, stamp: f64, inverse_depth: f64) -> Option<Drift> {
+        let (t0, w0) = *self.first.get_or_insert((stamp, inverse_depth));
+        // Sums about the first point keep their digits.
+        let (t, w) = (stamp - t0, inverse_depth - w0);
+        self.n += 1.0;
+        self.t += t;
+        self.w += w;
+        self.tt += t * t;
+        self.tw += t * w;
+        self.ww += w * w;
+        self.last_t = t;
+        if t < FIRST_S.max(2.0 * self.told_at_s) {
+            return None;
+        }
+        self.told_at_s = t;
+        self.drift()
+    }
+
+    /// As far as is known.
+    pub fn drift(&self) -> Option<Drift> {
+        let (_, w0) = self.first?;
+        let n = self.n;
+        let spread = self.tt - self.t * self.t / n;
+        if self.last_t < FIRST_S || n < 10.0 || spread <= 0.0 {
+            return None;
+        }
+        let together = self.tw - self.t * self.w / n;
+        let slope = together / spread;
+        let left = (self.ww - self.w * self.w / n - slope * together).max(0.0);
+        let error = (left / (n - 2.0) / spread).sqrt();
+        let z_m = 1.0 / (w0 + self.w / n);
+        let per_minute = 60.0 * z_m * z_m;
+        Some(Drift {
+            per_minute_m: -slope * per_minute,
+            std_error_m: error * per_minute,
+            z_m,
+            seconds: self.last_t,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::Seed;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// 40 s of a plane at 2 m that recedes by `rate` m/min, jittering by 0.1 mm a frame.
+    fn watched(rate: f64) -> Drift {
+        let mut rng = Seed(5).stream("jitter");
+        let mut warmth = Warmth::default();
+        let mut told = None;
+        for k in 0..=1200 {
+            let t = f64::from(k) / 30.0;
+            let jitter: f64 = StandardNormal.sample(&mut rng);
+            let z = 2.0 + rate * t / 60.0 + 1e-4 * jitter;
+            told = warmth.add(1e9 + t, 1.0 / z).or(told);
+        }
+        told.expect("told after 20 and 40 s")
+    }
+
+    /// The slope's own standard error over 40 s is 1e-4 sqrt(12/1200)/40 * 60 = 1.5e-5 m/min.
+    #[test]
+    fn a_drift_is_measured_with_its_error() {
+        let drift = watched(1e-3);
+        assert!((drift.per_minute_m - 1e-3).abs() < 6e-5, "{drift:?}");
+        assert!((drift.std_error_m / 1.5e-5 - 1.0).abs() < 0.2, "{drift:?}");
+        assert!(drift.is_warming());
+        assert!(watched(-1e-3).per_minute_m < 0.0);
+    }
+
+    #[test]
+    fn a_steady_sensor_is_called_steady() {
+        assert!(!watched(0.0).is_warming());
+    }
+
+    #[test]
+    fn nothing_is_said_before_its_time() {
+        let mut warmth = Warmth::default();
+        assert!((0..500).all(|k| warmth.add(f64::from(k) / 30.0, 0.5).is_none()));
+    }
+}
