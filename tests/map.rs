@@ -242,7 +242,8 @@ fn words_for_nothing_make_no_poses() {
     let metric = open(&folder, &Assumed::default()).unwrap();
     let recording = folder.join("recording.json");
     let text = fs::read_to_string(&recording).unwrap();
-    let disparity = "\"raw_disparity\": {\"offset\": 3.3309, \"slope\": -0.0030711, \"invalid\": 2047}";
+    let disparity =
+        "\"raw_disparity\": {\"offset\": 3.3309, \"slope\": -0.0030711, \"invalid\": 2047}";
     let mut value: serde_json::Value = serde_json::from_str(&text).unwrap();
     let entries = value.as_object_mut().unwrap();
     entries.remove("units_per_metre");

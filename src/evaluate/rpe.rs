@@ -72,7 +72,9 @@ fn too_short(delta: Delta) -> Error {
         Delta::Frames(n) => format!("{n} frames"),
     };
     Error::NotEnough {
-        what: format!("the estimate has no two motions of {interval} with true poses at their ends"),
+        what: format!(
+            "the estimate has no two motions of {interval} with true poses at their ends"
+        ),
         remedy: "compare over a shorter interval (--delta), or give more of the sequence".into(),
     }
 }

@@ -67,14 +67,22 @@ struct Around {
     centre: [[f32; LANES]; 3],
 }
 
+#[inline]
+fn lanes(values: &[f32], begin: usize) -> [f32; LANES] {
+    let mut lanes = [0.0; LANES];
+    lanes.copy_from_slice(&values[begin..begin + LANES]);
+    lanes
+}
+
+/// A number a lane.
+#[inline]
+fn each(of: impl Fn(usize) -> f32) -> [f32; LANES] {
+    std::array::from_fn(of)
+}
+
 impl Around {
     fn of(means: &Means, u: usize, v: usize) -> Self {
         let here = means.place(u, v);
-        let lanes = |values: &[f32], begin: usize| -> [f32; LANES] {
-            let mut lanes = [0.0; LANES];
-            lanes.copy_from_slice(&values[begin..begin + LANES]);
-            lanes
-        };
         let centre = [&means.x, &means.y, &means.q].map(|values| lanes(values, here));
         let (sigma, n) = (lanes(&means.sigma_q, here), lanes(&means.n, here));
         let mut gate = [0.0; LANES];
@@ -89,17 +97,20 @@ impl Around {
                 let there = here + dv * means.stride + du - AROUND * means.stride - AROUND;
                 let (n, x) = (lanes(&means.n, there), lanes(&means.x, there));
                 let (y, q) = (lanes(&means.y, there), lanes(&means.q, there));
-                for lane in 0..LANES {
-                    let q = q[lane] - centre[2][lane];
-                    let n = if q.abs() <= gate[lane] { n[lane] } else { 0.0 };
-                    let (x, y) = (x[lane] - centre[0][lane], y[lane] - centre[1][lane]);
-                    found[lane] += if n > 0.0 { 1.0 } else { 0.0 };
-                    let (nx, ny) = (n * x, n * y);
-                    let terms = [n, nx, ny, nx * x, nx * y, ny * y, n * q, nx * q, ny * q];
-                    for (sum, term) in sums.iter_mut().zip(terms) {
-                        sum[lane] += term;
-                    }
-                }
+                let q = each(|i| q[i] - centre[2][i]);
+                let n = each(|i| if q[i].abs() <= gate[i] { n[i] } else { 0.0 });
+                let (x, y) = (each(|i| x[i] - centre[0][i]), each(|i| y[i] - centre[1][i]));
+                let (nx, ny) = (each(|i| n[i] * x[i]), each(|i| n[i] * y[i]));
+                found = each(|i| found[i] + if n[i] > 0.0 { 1.0 } else { 0.0 });
+                sums[0] = each(|i| sums[0][i] + n[i]);
+                sums[1] = each(|i| sums[1][i] + nx[i]);
+                sums[2] = each(|i| sums[2][i] + ny[i]);
+                sums[3] = each(|i| sums[3][i] + nx[i] * x[i]);
+                sums[4] = each(|i| sums[4][i] + nx[i] * y[i]);
+                sums[5] = each(|i| sums[5][i] + ny[i] * y[i]);
+                sums[6] = each(|i| sums[6][i] + n[i] * q[i]);
+                sums[7] = each(|i| sums[7][i] + nx[i] * q[i]);
+                sums[8] = each(|i| sums[8][i] + ny[i] * q[i]);
             }
         }
         Around { sums, found, centre }

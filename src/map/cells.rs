@@ -165,7 +165,8 @@ pub fn place_of(at: &nalgebra::Vector3<f32>, per_metre: f32) -> Place {
     // instructions a number. The sum with 1.5 * 2^23 has a step of 1: its last bits are the whole
     // number, up to 2^22; a place beyond, or NaN, is some place.
     const WHOLE: f32 = 12_582_912.0;
-    [at.x, at.y, at.z].map(|v| (v * per_metre - 0.5 + WHOLE).to_bits() as i32 - WHOLE.to_bits() as i32)
+    [at.x, at.y, at.z]
+        .map(|v| (v * per_metre - 0.5 + WHOLE).to_bits() as i32 - WHOLE.to_bits() as i32)
 }
 
 #[cfg(test)]

@@ -7,8 +7,8 @@ use crate::camera::Rays;
 
 /// Blocks beyond the image on each side, all empty: who looks around needs no border.
 pub const EDGE: usize = 2;
-/// Blocks worked on at once.
-pub const LANES: usize = 8;
+/// Blocks worked on at once: their sums stay in the registers of any x86-64 or aarch64.
+pub const LANES: usize = 4;
 
 /// One number a block, in rows of `stride` with an empty edge; zero where there is nothing.
 #[derive(Debug, Clone, Default)]
