@@ -211,6 +211,83 @@ fn a_jump_is_told_and_the_path_before_it_kept() {
     }
 }
 
+/// A metre aside without a turn: floor and walls still find neighbours, but far fewer than before.
+#[test]
+fn a_bare_jump_is_told_too() {
+    let dir = tempfile::tempdir().unwrap();
+    for (k, aside) in [[1.0, 0.0], [0.0, 1.0], [-0.7, 0.7]].into_iter().enumerate() {
+        let mut poses = some(14);
+        for pose in &mut poses[8..] {
+            let t = &mut pose.world_from_camera.translation.vector;
+            (t.x, t.y) = (t.x + aside[0], t.y + aside[1]);
+        }
+        let root = dir.path().join(k.to_string());
+        fs::create_dir(&root).unwrap();
+        let folder = film(&root, poses);
+        for method in ["model", "paper", "projective"] {
+            let (code, said, out) = map_folder(&folder, &["--method", method]);
+            assert_eq!(code, 0, "{said}");
+            assert!(said.contains("lost in 6 of 14"), "{method} {aside:?}: {said}");
+            assert_eq!(poses_in(&out), 8);
+        }
+    }
+}
+
+/// The sensor's word for nothing in raw disparity, 2047, is NaN inside: whole images of it, and
+/// images with holes of it, are told or passed over.
+#[test]
+fn words_for_nothing_make_no_poses() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = film(dir.path(), some(6));
+    let metric = open(&folder, &Assumed::default()).unwrap();
+    let recording = folder.join("recording.json");
+    let text = fs::read_to_string(&recording).unwrap();
+    let disparity =
+        "\"raw_disparity\": {\"offset\": 3.3309, \"slope\": -0.0030711, \"invalid\": 2047}";
+    let mut value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let entries = value.as_object_mut().unwrap();
+    entries.remove("units_per_metre");
+    entries.remove("invalid");
+    let raw: serde_json::Value = serde_json::from_str(&format!("{{{disparity}}}")).unwrap();
+    entries.insert("raw_disparity".into(), raw["raw_disparity"].clone());
+    fs::write(&recording, value.to_string()).unwrap();
+    let mut depths: Vec<PathBuf> =
+        fs::read_dir(folder.join("depth")).unwrap().map(|e| e.unwrap().path()).collect();
+    depths.sort();
+    for (k, (path, moment)) in depths.iter().zip(&metric.moments).enumerate() {
+        let metric = metric.words(moment).unwrap();
+        let word = |&w: &u16| match w {
+            0 => 2047,
+            w => ((3.3309 - 5000.0 / f64::from(w)) / 0.003_071_1).round() as u16,
+        };
+        let words = metric.words.iter().map(|w| if k == 3 { 2047 } else { word(w) }).collect();
+        let frame = kinoise::Frame { words, ..metric };
+        fs::write(path, kinoise::io::encode_png16(&frame).unwrap()).unwrap();
+    }
+    let (code, said, out) = map_folder(&folder, &[]);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("lost in 1 of 6") && said.contains("0 points"), "{said}");
+    assert_eq!(poses_in(&out), 5);
+}
+
+/// A bare wall fills every picture: the motion along it is not determined, and that is said.
+#[test]
+fn a_bare_wall_is_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = film(dir.path(), some(6));
+    let wall = kinoise::Frame { width: 160, height: 120, words: vec![10_000; 160 * 120] };
+    let bytes = kinoise::io::encode_png16(&wall).unwrap();
+    for entry in fs::read_dir(folder.join("depth")).unwrap() {
+        fs::write(entry.unwrap().path(), &bytes).unwrap();
+    }
+    for method in ["model", "paper", "projective"] {
+        let (code, said, out) = map_folder(&folder, &["--method", method]);
+        assert_eq!(code, 0, "{said}");
+        assert!(said.contains("depth does not determine the whole motion"), "{method}: {said}");
+        assert_eq!(poses_in(&out), 6);
+    }
+}
+
 #[test]
 fn ground_truth_of_another_time_is_told() {
     let dir = tempfile::tempdir().unwrap();

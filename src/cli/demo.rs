@@ -2,13 +2,17 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use kinoise::io::{Assumed, open};
+use kinoise::map::{Init, Options, Weights};
 use kinoise::measure::MeasureOptions;
 use kinoise::report::Overlay;
-use kinoise::{CalibrateOptions, Form};
+use kinoise::sequence;
+use kinoise::simulate::room::{Film, Room, around_the_desks};
+use kinoise::{CalibrateOptions, Form, NoiseModel, Recording, SigmaModel};
 
 use super::calibrate::calibrate;
 use super::common::{Global, say};
 use super::diagnose::examine;
+use super::map::follow;
 use super::words;
 
 #[derive(Debug, Args)]
@@ -41,7 +45,44 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         "{} says how small an error would have been seen.",
         told.join("report.html").display()
     ));
+    let model = &done.calibration.model;
+    mapped(&recording, model, &arguments.output, global)?;
     global.print_json(&words::as_json(&done.calibration, Some(&done.measurements)))
+}
+
+/// Frames of the film: two seconds.
+const FRAMES: usize = 60;
+
+/// An office filmed through the same sensor, mapped without a model and with it.
+fn mapped(
+    recording: &Recording,
+    model: &NoiseModel,
+    output: &Path,
+    global: &Global,
+) -> anyhow::Result<()> {
+    say("\nWhat is it good for? An office, filmed through the same sensor:");
+    // The same seed makes the same film: one that is there already will do.
+    let folder = output.join(format!("office-{}", global.seed().0));
+    if !folder.join("groundtruth.txt").is_file() {
+        let film = Film {
+            sensor: recording.sensor.clone(),
+            room: Room::office(global.seed()),
+            poses: around_the_desks().into_iter().take(FRAMES).collect(),
+            sigma: SigmaModel::paper(),
+            effects: Vec::new(),
+            seed: global.seed(),
+        };
+        film.write(&folder, &|_, _| ())?;
+    }
+    let sequence = sequence::open(&folder, &Assumed::default())?;
+    let plain = Options { seed: global.seed(), ..Options::paper(Weights::None, Init::None) };
+    let best = Options { seed: global.seed(), ..Options::best() };
+    say("point-to-plane ICP from frame to frame, without the model:");
+    follow(&sequence, model, &plain, "The office, plain ICP", &output.join("map-plain"))?;
+    say("with the model, each frame to the map so far:");
+    follow(&sequence, model, &best, "The office", &output.join("map"))?;
+    say(format!("Open {} and turn it.", output.join("map/map.html").display()));
+    Ok(())
 }
 
 /// calib_data/ beside the caller, or in the source tree this program was built from.

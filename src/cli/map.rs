@@ -1,4 +1,4 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use kinoise::evaluate::{Delta, Evaluation, evaluate};
@@ -151,33 +151,45 @@ impl Tuning {
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     let mut sequence = open(&arguments.sequence, &arguments.input.assumed()?)?;
     sequence.thin(arguments.tuning.stride, arguments.tuning.frames);
-    let output = OutputDir::create(&arguments.output)?;
     let model = match &arguments.model {
         Some(path) => NoiseModel::read(path)?,
         None => NoiseModel::paper(),
     };
     let options = arguments.tuning.options(global.seed());
     options.check()?;
+    let title = format!("Map of {}", name_of(&arguments.sequence));
+    let stats = follow(&sequence, &model, &options, &title, &arguments.output)?;
+    global.print_json(&stats)?;
+    Ok(0)
+}
+
+/// Map, write every output, tell; what stats.json says.
+pub fn follow(
+    sequence: &Sequence,
+    model: &NoiseModel,
+    options: &Options,
+    title: &str,
+    folder: &Path,
+) -> anyhow::Result<Value> {
+    let output = OutputDir::create(folder)?;
     let bar = Bar::new("frames");
     let begin = std::time::Instant::now();
-    let mapped = map(&sequence, &model, &options, &|done, all| bar.step(done, all))?;
+    let mapped = map(sequence, model, options, &|done, all| bar.step(done, all))?;
     drop(bar);
     let seconds = begin.elapsed().as_secs_f64();
-    let against = truth(&sequence, &mapped);
-    let stats = stats(&mapped, &options, &against, seconds);
+    let against = truth(sequence, &mapped);
+    let stats = stats(&mapped, options, &against, seconds);
     output.write("trajectory.txt", tum_text(&mapped.trajectory()).as_bytes())?;
     output.write("map.ply", &ply(&mapped.map))?;
-    let title = format!("Map of {}", name_of(&arguments.sequence));
-    let page = map_page(&title, &mapped.map, &mapped.frames);
+    let page = map_page(title, &mapped.map, &mapped.frames);
     output.write("map.html", page.as_bytes())?;
     output.write("frames.csv", frames_csv(&mapped.frames).as_bytes())?;
     output.write("stats.json", serde_json::to_string_pretty(&stats)?.as_bytes())?;
     for remark in sequence.remarks.iter().chain(&mapped.remarks) {
         say(format!("note: {remark}"));
     }
-    tell(&mapped, &against, &arguments.output);
-    global.print_json(&stats)?;
-    Ok(0)
+    tell(&mapped, &against, folder);
+    Ok(stats)
 }
 
 /// Against the sequence's own true poses, where it has any.
@@ -189,7 +201,7 @@ fn truth(sequence: &Sequence, mapped: &Mapped) -> Option<Result<Evaluation, Stri
     Some(told.map_err(|e| e.to_string()))
 }
 
-fn tell(mapped: &Mapped, against: &Option<Result<Evaluation, String>>, output: &std::path::Path) {
+fn tell(mapped: &Mapped, against: &Option<Result<Evaluation, String>>, output: &Path) {
     match against {
         Some(Ok(told)) => say(format!(
             "against the ground truth: ATE {:.4} m, RPE over 1 s {:.4} m and {:.3} degrees (rmse)",

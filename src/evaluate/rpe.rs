@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 
 use super::{Spread, too_few};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::stats::median;
 use crate::trajectory::Pose;
 
@@ -59,7 +59,23 @@ pub fn relative(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Rpe> 
         (Some(translation), Some(rotation)) if each.len() >= 2 => {
             Ok(Rpe { translation, rotation, each })
         }
-        _ => Err(too_few(truth, estimate, each.len())),
+        _ => {
+            let shared = estimate.iter().filter(|p| true_pose(p.stamp).is_some()).count();
+            Err(if shared < 2 { too_few(truth, estimate, shared) } else { too_short(delta) })
+        }
+    }
+}
+
+fn too_short(delta: Delta) -> Error {
+    let interval = match delta {
+        Delta::Seconds(s) => format!("{s} s"),
+        Delta::Frames(n) => format!("{n} frames"),
+    };
+    Error::NotEnough {
+        what: format!(
+            "the estimate has no two motions of {interval} with true poses at their ends"
+        ),
+        remedy: "compare over a shorter interval (--delta), or give more of the sequence".into(),
     }
 }
 

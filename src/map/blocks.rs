@@ -7,6 +7,7 @@
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
+use super::means::{EDGE, LANES, Means, SIGMAS};
 use super::noise::Noise;
 use super::point::Point;
 use crate::camera::{Camera, Rays};
@@ -21,57 +22,35 @@ pub struct Blocks {
     pub points: Vec<Option<Point>>,
 }
 
-/// The mean of a block's pixels on its front-most surface.
-#[derive(Debug, Clone, Copy, Default)]
-struct Mean {
-    n: f32,
-    x: f32,
-    y: f32,
-    q: f32,
-    /// Of one inverse depth, faced squarely, 1/m.
-    sigma_q: f32,
-}
-
-/// Inverse depths on one surface differ by noise, up to this many sigma ...
-const SIGMAS: f32 = 4.0;
-/// ... and by its slope: a block of 4 px at 525 px is 0.8 % of the distance wide, and 70 degrees
-/// make 2.7 times that, half to either side; blocks two apart, four times as much.
-const SLOPE: f32 = 0.012;
+/// Blocks differ by the slope of their surface too: two apart, by this share of their distance (see
+/// [`super::means`]).
 const SLOPE_AROUND: f32 = 0.05;
-/// A block with fewer pixels than this share is the rim of something.
-const LEAST_FILLED: f32 = 0.4;
 /// Neighbours on each side for the normal.
-const AROUND: isize = 2;
+const AROUND: usize = EDGE;
 /// Of the 25.
-const FEWEST_AROUND: usize = 8;
+const FEWEST_AROUND: f32 = 8.0;
 /// Surfaces seen at more than 80 degrees are rims and mistakes.
 const LEAST_FACING: f32 = 0.17;
 
 impl Blocks {
     /// Of a depth image, m, NaN where nothing was measured.
     pub fn of(depth: &[f32], camera: &Camera, rays: &Rays, side_px: usize, noise: &Noise) -> Self {
-        let (width, height) = (camera.width / side_px, camera.height / side_px);
-        let means: Vec<Mean> = (0..height)
-            .into_par_iter()
-            .flat_map_iter(|v| {
-                let mut scratch = Vec::with_capacity(side_px * side_px);
-                let row: Vec<Mean> = (0..width)
-                    .map(|u| mean(depth, camera.width, rays, [u, v], side_px, noise, &mut scratch))
-                    .collect();
-                row
-            })
-            .collect();
+        let means = Means::of(depth, [camera.width, camera.height], rays, side_px, noise);
+        let Means { width, height, .. } = means;
         let points = (0..height)
             .into_par_iter()
             .flat_map_iter(|v| {
-                let row: Vec<Option<Point>> = (0..width)
-                    .map(|u| {
-                        let at =
-                            (v * side_px + side_px / 2) * camera.width + u * side_px + side_px / 2;
-                        let plane = plane(&means, [width, height], [u, v])?;
-                        point(&means[v * width + u], &plane, at as u32, noise)
-                    })
-                    .collect();
+                let mut row = Vec::with_capacity(width + LANES);
+                for u in (0..width).step_by(LANES) {
+                    let around = Around::of(&means, u, v);
+                    row.extend((0..LANES).map(|lane| {
+                        let plane = around.plane(lane)?;
+                        let centre = (v * side_px + side_px / 2) * camera.width + side_px / 2;
+                        let pixel = centre + (u + lane) * side_px;
+                        point(&means, means.place(u + lane, v), &plane, pixel as u32, noise)
+                    }));
+                }
+                row.truncate(width);
                 row
             })
             .collect();
@@ -79,101 +58,86 @@ impl Blocks {
     }
 }
 
-fn mean(
-    depth: &[f32],
-    width: usize,
-    rays: &Rays,
-    [u, v]: [usize; 2],
-    side: usize,
+/// Moments of the blocks around [`LANES`] blocks side by side, about each one's own mean.
+struct Around {
+    /// n, x, y, xx, xy, yy, q, xq, yq; weighted with the pixels of each.
+    sums: [[f32; LANES]; 9],
+    found: [f32; LANES],
+    /// The mean's own x, y, q.
+    centre: [[f32; LANES]; 3],
+}
+
+#[inline]
+fn lanes(values: &[f32], begin: usize) -> [f32; LANES] {
+    let mut lanes = [0.0; LANES];
+    lanes.copy_from_slice(&values[begin..begin + LANES]);
+    lanes
+}
+
+/// A number a lane.
+#[inline]
+fn each(of: impl Fn(usize) -> f32) -> [f32; LANES] {
+    std::array::from_fn(of)
+}
+
+impl Around {
+    fn of(means: &Means, u: usize, v: usize) -> Self {
+        let here = means.place(u, v);
+        let centre = [&means.x, &means.y, &means.q].map(|values| lanes(values, here));
+        let (sigma, n) = (lanes(&means.sigma_q, here), lanes(&means.n, here));
+        let mut gate = [0.0; LANES];
+        for lane in 0..LANES {
+            let apart = SIGMAS * sigma[lane] / n[lane].sqrt() + SLOPE_AROUND * centre[2][lane];
+            gate[lane] = if n[lane] > 0.0 { apart } else { -1.0 };
+        }
+        let mut sums = [[0f32; LANES]; 9];
+        let mut found = [0f32; LANES];
+        for dv in 0..=2 * AROUND {
+            for du in 0..=2 * AROUND {
+                let there = here + dv * means.stride + du - AROUND * means.stride - AROUND;
+                let (n, x) = (lanes(&means.n, there), lanes(&means.x, there));
+                let (y, q) = (lanes(&means.y, there), lanes(&means.q, there));
+                let q = each(|i| q[i] - centre[2][i]);
+                let n = each(|i| if q[i].abs() <= gate[i] { n[i] } else { 0.0 });
+                let (x, y) = (each(|i| x[i] - centre[0][i]), each(|i| y[i] - centre[1][i]));
+                let (nx, ny) = (each(|i| n[i] * x[i]), each(|i| n[i] * y[i]));
+                found = each(|i| found[i] + if n[i] > 0.0 { 1.0 } else { 0.0 });
+                sums[0] = each(|i| sums[0][i] + n[i]);
+                sums[1] = each(|i| sums[1][i] + nx[i]);
+                sums[2] = each(|i| sums[2][i] + ny[i]);
+                sums[3] = each(|i| sums[3][i] + nx[i] * x[i]);
+                sums[4] = each(|i| sums[4][i] + nx[i] * y[i]);
+                sums[5] = each(|i| sums[5][i] + ny[i] * y[i]);
+                sums[6] = each(|i| sums[6][i] + n[i] * q[i]);
+                sums[7] = each(|i| sums[7][i] + nx[i] * q[i]);
+                sums[8] = each(|i| sums[8][i] + ny[i] * q[i]);
+            }
+        }
+        Around { sums, found, centre }
+    }
+
+    /// (a, b, c) of q = a x + b y + c through the blocks around one.
+    fn plane(&self, lane: usize) -> Option<Vector3<f64>> {
+        if self.found[lane] < FEWEST_AROUND {
+            return None;
+        }
+        let [n, x, y, xx, xy, yy, q, xq, yq] = self.sums.map(|sum| f64::from(sum[lane]));
+        let matrix = Matrix3::new(xx, xy, x, xy, yy, y, x, y, n);
+        let abc = matrix.try_inverse()? * Vector3::new(xq, yq, q);
+        let [cx, cy, cq] = self.centre.map(|c| f64::from(c[lane]));
+        Some(Vector3::new(abc.x, abc.y, abc.z + cq - abc.x * cx - abc.y * cy))
+    }
+}
+
+fn point(
+    means: &Means,
+    i: usize,
+    plane: &Vector3<f64>,
+    pixel: u32,
     noise: &Noise,
-    scratch: &mut Vec<f32>,
-) -> Mean {
-    scratch.clear();
-    for row in v * side..(v + 1) * side {
-        let first = row * width + u * side;
-        scratch.extend(depth[first..first + side].iter().filter(|z| **z > 0.0).map(|z| 1.0 / z));
-    }
-    if (scratch.len() as f32) < LEAST_FILLED * (side * side) as f32 {
-        return Mean::default();
-    }
-    let (low, high) =
-        scratch.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &q| (l.min(q), h.max(q)));
-    let gate_of = |q: f32| {
-        let sigma_q = noise.axial(1.0 / q, &Vector3::z()) * q * q;
-        (sigma_q, SIGMAS * sigma_q + SLOPE * q)
-    };
-    // Mostly all is one surface; where it is not, the median stands on the larger part.
-    let mut middle = 0.5 * (low + high);
-    let (mut sigma_q, mut gate) = gate_of(middle);
-    if high - low > gate {
-        let n = scratch.len();
-        middle = *scratch.select_nth_unstable_by(n / 2, f32::total_cmp).1;
-        (sigma_q, gate) = gate_of(middle);
-    }
-    let mut sum = Mean { sigma_q, ..Mean::default() };
-    for row in v * side..(v + 1) * side {
-        let first = row * width + u * side;
-        for (k, &z) in depth[first..first + side].iter().enumerate() {
-            let (i, q) = (first + k, 1.0 / z);
-            if (q - middle).abs() < gate {
-                sum.n += 1.0;
-                sum.x += rays.x[i];
-                sum.y += rays.y[i];
-                sum.q += q;
-            }
-        }
-    }
-    if sum.n < LEAST_FILLED * (side * side) as f32 {
-        return Mean::default();
-    }
-    let n = sum.n;
-    Mean { n, x: sum.x / n, y: sum.y / n, q: sum.q / n, sigma_q }
-}
-
-/// (a, b, c) of q = a x + b y + c through the blocks around one.
-fn plane(means: &[Mean], [width, height]: [usize; 2], [u, v]: [usize; 2]) -> Option<Vector3<f64>> {
-    let centre = means[v * width + u];
-    if centre.n == 0.0 {
-        return None;
-    }
-    let gate = SIGMAS * centre.sigma_q / centre.n.sqrt() + SLOPE_AROUND * centre.q;
-    let mut sums = [0f32; 9];
-    let mut found = 0;
-    for dv in -AROUND..=AROUND {
-        for du in -AROUND..=AROUND {
-            let (Some(column), Some(row)) = (u.checked_add_signed(du), v.checked_add_signed(dv))
-            else {
-                continue;
-            };
-            if column >= width || row >= height {
-                continue;
-            }
-            let m = means[row * width + column];
-            if m.n == 0.0 || (m.q - centre.q).abs() > gate {
-                continue;
-            }
-            found += 1;
-            let [n, x, y, q] = [m.n, m.x - centre.x, m.y - centre.y, m.q - centre.q];
-            let terms =
-                [n, n * x, n * y, n * x * x, n * x * y, n * y * y, n * q, n * x * q, n * y * q];
-            for (sum, term) in sums.iter_mut().zip(terms) {
-                *sum += term;
-            }
-        }
-    }
-    if found < FEWEST_AROUND {
-        return None;
-    }
-    let [n, x, y, xx, xy, yy, q, xq, yq] = sums.map(f64::from);
-    let matrix = Matrix3::new(xx, xy, x, xy, yy, y, x, y, n);
-    let abc = matrix.try_inverse()? * Vector3::new(xq, yq, q);
-    let [cx, cy, cq] = [centre.x, centre.y, centre.q].map(f64::from);
-    Some(Vector3::new(abc.x, abc.y, abc.z + cq - abc.x * cx - abc.y * cy))
-}
-
-fn point(mean: &Mean, plane: &Vector3<f64>, pixel: u32, noise: &Noise) -> Option<Point> {
-    let z = 1.0 / mean.q;
-    let at = Vector3::new(mean.x * z, mean.y * z, z);
+) -> Option<Point> {
+    let z = 1.0 / means.q[i];
+    let at = Vector3::new(means.x[i] * z, means.y[i] * z, z);
     // n / D of the plane; it looks away from the camera.
     let normal = -plane.try_normalize(f64::MIN_POSITIVE)?.cast::<f32>();
     let facing = -normal.dot(&at) / at.norm();
@@ -181,6 +145,6 @@ fn point(mean: &Mean, plane: &Vector3<f64>, pixel: u32, noise: &Noise) -> Option
         return None;
     }
     let axial = noise.axial(z, &normal);
-    let across = noise.across(axial, &at, &normal, mean.n);
+    let across = noise.across(axial, &at, &normal, means.n[i]);
     Some(Point { at, normal, axial, across, pixel })
 }

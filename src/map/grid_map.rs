@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Vector3};
 
 use super::cells::{Cells, place_of};
+use super::motion::Motion;
 use super::point::Point;
 use super::surfels::colour_of;
 
@@ -43,10 +44,9 @@ struct Sum {
 
 impl GridMap {
     pub fn add(&mut self, points: &[Point], pose: &Isometry3<f64>, rgb: Option<&[u8]>) {
-        let turn = pose.rotation.to_rotation_matrix().matrix().map(|v| v as f32);
-        let shift = pose.translation.vector.map(|v| v as f32);
+        let motion = Motion::of(pose);
         for point in points {
-            let at = turn * point.at + shift;
+            let at = motion.moved(&point.at);
             let index = self.cells.add(place_of(&at, 1.0 / SIDE_M));
             if index == self.sums.len() {
                 self.sums.push(Sum { first: at, ..Sum::default() });
@@ -55,7 +55,7 @@ impl GridMap {
             let information = point.across.powi(-2);
             sum.information += information;
             sum.off += (at - sum.first) * information;
-            sum.normal += turn * point.normal * information;
+            sum.normal += motion.turned(&point.normal) * information;
             if let Some(rgb) = rgb {
                 sum.colour += colour_of(rgb, point.pixel);
                 sum.coloured += 1.0;

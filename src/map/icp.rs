@@ -9,6 +9,7 @@ use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::direction::Direction;
+use super::motion::Motion;
 use super::point::Point;
 use super::sums::{Solution, Sums};
 
@@ -117,7 +118,9 @@ pub fn align<T: Target>(
         };
         // The first round's residuals hold the motion itself: only from the second on is what
         // stands out an outlier.
-        scale = sums.typical();
+        if criteria.kernel != Kernel::Square {
+            scale = sums.typical();
+        }
         let step = solution.step;
         pose = renormalised(&(moved(&step) * pose));
         let (shift, turn) = (step.fixed_rows::<3>(0).norm(), step.fixed_rows::<3>(3).norm());
@@ -186,21 +189,25 @@ struct Round<'a, T> {
 
 impl<T: Target> Round<'_, T> {
     fn sum(&self, source: &[Point], memory: &mut [T::Memory]) -> Sums {
-        let turn = self.pose.rotation.to_rotation_matrix().matrix().map(|v| v as f32);
-        let shift = self.pose.translation.vector.map(|v| v as f32);
+        let motion = Motion::of(self.pose);
+        let any_normal = self.criteria.least_cosine <= -1.0;
+        let keep_sizes = self.criteria.kernel != Kernel::Square;
         let part = |(points, memory): (&[Point], &mut [T::Memory])| {
-            let mut sums = Sums::default();
+            let mut sums = Sums::with_room(if keep_sizes { points.len() } else { 0 });
             for (s, memory) in points.iter().zip(memory) {
-                let at = turn * s.at + shift;
+                let at = motion.moved(&s.at);
                 let Some(d) = self.target.find(&at, memory) else { continue };
-                let normal = turn * s.normal;
-                if f64::from(normal.dot(&d.normal)) < self.criteria.least_cosine {
+                let lean = || f64::from(motion.turned(&s.normal).dot(&d.normal));
+                if !any_normal && lean() < self.criteria.least_cosine {
                     continue;
                 }
                 let residual = f64::from((at - d.at).dot(&d.normal));
                 let weight = self.weight(s, d);
                 let kept = self.kept(residual * weight);
-                sums.add(&at, &d.normal, residual, weight * weight * kept, weight);
+                sums.add(&at, &d.normal, residual, weight * weight * kept);
+                if keep_sizes {
+                    sums.sizes.push((residual * weight).abs() as f32);
+                }
             }
             sums
         };
@@ -214,7 +221,7 @@ impl<T: Target> Round<'_, T> {
         match self.criteria.weights {
             Weights::None => 1.0,
             Weights::Model => 1.0 / f64::from(d.axial),
-            Weights::Both => 1.0 / f64::from(s.across.hypot(d.across)),
+            Weights::Both => 1.0 / f64::from((s.across * s.across + d.across * d.across).sqrt()),
         }
     }
 

@@ -14,6 +14,8 @@ mod direction;
 mod features;
 mod grid_map;
 pub mod icp;
+mod means;
+mod motion;
 mod nearest;
 mod noise;
 mod normals;

@@ -45,6 +45,16 @@ struct Search {
     second: f32,
 }
 
+impl Default for Search {
+    fn default() -> Self {
+        Search { nearest: None, best: f32::INFINITY, second: f32::INFINITY }
+    }
+}
+
+/// A search looks this share of a cube's side farther than it must: more is slower now, less is
+/// sooner repeated.
+const MARGIN: f32 = 0.2;
+
 impl Nearest {
     pub fn new(points: Vec<Point>, side_m: f32, gate_m: f32) -> Self {
         let mut cells = Cells::with_room(points.len());
@@ -70,10 +80,30 @@ impl Nearest {
         &self.points
     }
 
-    /// Shell by shell of cubes, until no cube that is left can hold a nearer point.
-    fn search(&self, p: &Vector3<f32>) -> Memory {
-        let mut search = Search { nearest: None, best: f32::INFINITY, second: f32::INFINITY };
+    /// All cubes as near as a point that is known, and a little farther: for the leeway.
+    fn search(&self, p: &Vector3<f32>, known: Option<u32>) -> Memory {
         let place = place_of(p, 1.0 / self.side_m);
+        let known = known.or_else(|| self.first_in(place));
+        let Some(known) = known else { return self.search_outwards(p, place) };
+        let least = (self.points[known as usize].at - p).norm();
+        if least > self.gate_m {
+            return self.search_outwards(p, place);
+        }
+        let reach = least + MARGIN * self.side_m;
+        let mut search = Search::default();
+        let corner = |sign: f32| place_of(&p.map(|v| v + sign * reach), 1.0 / self.side_m);
+        let (low, high) = (corner(-1.0), corner(1.0));
+        self.cells.each_within(low, high, |cell| self.scan_cell(p, cell, &mut search));
+        self.remember(p, &search, reach)
+    }
+
+    fn first_in(&self, place: Place) -> Option<u32> {
+        let cell = self.cells.get(place)?;
+        self.order.get(self.begins[cell] as usize).copied()
+    }
+
+    /// Box after larger box of cubes, until none that is left can hold a nearer point.
+    fn search_outwards(&self, p: &Vector3<f32>, place: Place) -> Memory {
         // From the point to the border of its own cube; a shell more is a side more.
         let inside = (0..3)
             .map(|k| {
@@ -82,16 +112,21 @@ impl Nearest {
             })
             .fold(f32::INFINITY, f32::min)
             .max(0.0);
-        let mut shell = 0;
-        let reach = loop {
-            self.scan(p, place, shell, &mut search);
-            // Everything nearer than this has been seen.
+        let mut shell = 1;
+        loop {
+            let mut search = Search::default();
+            let corner = |sign: i32| place.map(|v| v + sign * shell);
+            self.cells.each_within(corner(-1), corner(1), |c| self.scan_cell(p, c, &mut search));
             let seen = inside + shell as f32 * self.side_m;
-            if search.best.sqrt() <= seen && shell > 0 || seen > self.gate_m {
-                break seen;
+            if search.best.sqrt() <= seen || seen > self.gate_m {
+                return self.remember(p, &search, seen);
             }
             shell += 1;
-        };
+        }
+    }
+
+    /// What a search that saw everything within `reach`, m, leaves behind.
+    fn remember(&self, p: &Vector3<f32>, search: &Search, reach: f32) -> Memory {
         let nearest = search.best.sqrt();
         let found = search.nearest.filter(|_| nearest <= self.gate_m);
         let others = search.second.sqrt().min(reach);
@@ -100,23 +135,6 @@ impl Nearest {
             None => nearest.min(reach) - self.gate_m,
         };
         Memory { at: *p, leeway, found }
-    }
-
-    fn scan(&self, p: &Vector3<f32>, [x, y, z]: Place, shell: i32, search: &mut Search) {
-        for dz in -shell..=shell {
-            for dy in -shell..=shell {
-                let rim = dz.abs() == shell || dy.abs() == shell;
-                // Inside the rim only the two ends of the row belong to the shell.
-                let step = if rim { 1 } else { 2 * shell.max(1) };
-                let mut dx = -shell;
-                while dx <= shell {
-                    if let Some(cell) = self.cells.get([x + dx, y + dy, z + dz]) {
-                        self.scan_cell(p, cell, search);
-                    }
-                    dx += step;
-                }
-            }
-        }
     }
 
     #[inline]
@@ -140,7 +158,7 @@ impl Target for Nearest {
     #[inline]
     fn find(&self, p: &Vector3<f32>, memory: &mut Memory) -> Option<&Point> {
         if (p - memory.at).norm() >= memory.leeway {
-            *memory = self.search(p);
+            *memory = self.search(p, memory.found);
         }
         let point = &self.points[memory.found? as usize];
         ((point.at - p).norm_squared() <= self.gate_m * self.gate_m).then_some(point)

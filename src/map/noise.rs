@@ -39,7 +39,15 @@ impl Noise {
     /// Beyond the depths of the model sigma grows as z^2, as it does for every sensor that measures
     /// disparity: held at its edge it would make the farthest points the best.
     pub fn axial(&self, z: f32, normal: &Vector3<f32>) -> f32 {
-        let theta = normal.z.abs().min(1.0).acos();
+        self.at(z, normal.z.abs().min(1.0).acos())
+    }
+
+    /// The same of a surface that is faced squarely.
+    pub fn frontal(&self, z: f32) -> f32 {
+        self.at(z, 0.0)
+    }
+
+    fn at(&self, z: f32, theta: f32) -> f32 {
         let beyond = (z / self.farthest).max(1.0);
         self.table.at(z, theta) * beyond * beyond
     }

@@ -28,21 +28,14 @@ pub fn points_of(voxels: &Voxels, noise: &Noise) -> Vec<Point> {
 }
 
 fn neighbourhood(voxels: &Voxels, index: usize) -> Voxel {
-    let mut around = voxels.voxels[index];
-    let [x, y, z] = voxels.cells.place(index);
-    for dz in -1..=1 {
-        for dy in -1..=1 {
-            for dx in -1..=1 {
-                if [dx, dy, dz] == [0; 3] {
-                    continue;
-                }
-                if let Some(other) = voxels.cells.get([x + dx, y + dy, z + dz]) {
-                    let offset = Vector3::new(dx as f32, dy as f32, dz as f32) * voxels.side_m;
-                    around.merge(&voxels.voxels[other], offset);
-                }
-            }
-        }
-    }
+    let mut around = Voxel { pixel: voxels.voxels[index].pixel, ..Voxel::default() };
+    let place = voxels.cells.place(index);
+    let (low, high) = (place.map(|v| v - 1), place.map(|v| v + 1));
+    voxels.cells.each_within(low, high, |other| {
+        let [x, y, z] = voxels.cells.place(other);
+        let apart = [x - place[0], y - place[1], z - place[2]].map(|v| v as f32);
+        around.merge(&voxels.voxels[other], Vector3::from(apart) * voxels.side_m);
+    });
     around
 }
 

@@ -17,6 +17,7 @@ pub struct Projective<'a> {
 }
 
 /// The block that a point of the camera's frame falls in.
+#[inline]
 pub fn block_of(
     camera: &Camera,
     side_px: usize,

@@ -20,8 +20,8 @@ pub struct Sums {
     pub pairs: usize,
     /// Unweighted.
     pub squares_m2: f64,
-    /// |residual| times weight, of every pair.
-    sizes: Vec<f32>,
+    /// |residual| times weight, of every pair; empty where no kernel asks for them.
+    pub sizes: Vec<f32>,
 }
 
 /// A step and how sure it is.
@@ -42,9 +42,14 @@ const LEAST_SHARE: f64 = 0.005;
 const MEDIAN_OVER_SIGMA: f64 = 0.6745;
 
 impl Sums {
+    /// None yet, with room for the sizes of `n` pairs.
+    pub fn with_room(n: usize) -> Self {
+        Sums { sizes: Vec::with_capacity(n), ..Sums::default() }
+    }
+
     /// A pair: the moved point, the standing normal, the distance across, its weight.
     #[inline]
-    pub fn add(&mut self, p: &Vector3<f32>, n: &Vector3<f32>, residual: f64, w2: f64, w: f64) {
+    pub fn add(&mut self, p: &Vector3<f32>, n: &Vector3<f32>, residual: f64, w2: f64) {
         let (p, n) = (p.map(f64::from), n.map(f64::from));
         let m = p.cross(&n);
         let j = [n.x, n.y, n.z, m.x, m.y, m.z];
@@ -64,7 +69,6 @@ impl Sums {
         self.place_squared += p.norm_squared() * w2;
         self.pairs += 1;
         self.squares_m2 += residual * residual;
-        self.sizes.push((residual * w).abs() as f32);
     }
 
     /// Both together.

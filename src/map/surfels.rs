@@ -2,10 +2,11 @@
 //! what the next frame aligns to (after Keller et al., "Real-time 3D reconstruction in dynamic
 //! scenes using point-based fusion", 3DV 2013).
 
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 use super::blocks::Blocks;
 use super::icp::Target;
+use super::motion::Motion;
 use super::point::Point;
 use super::projective::block_of;
 use crate::camera::Camera;
@@ -61,19 +62,17 @@ impl Surfels {
         side_px: usize,
     ) -> Sight<'a> {
         let (width, height) = (camera.width / side_px, camera.height / side_px);
-        let camera_from_map = map_from_camera.inverse();
-        let turn = camera_from_map.rotation.to_rotation_matrix().matrix().map(|v| v as f32);
-        let shift = camera_from_map.translation.vector.map(|v| v as f32);
-        let mut sight = Sight { camera, side_px, width, height, turn, shift, front: Vec::new() };
+        let motion = Motion::of(&map_from_camera.inverse());
+        let mut sight = Sight { camera, side_px, width, height, motion, front: Vec::new() };
         let mut front = vec![Front::default(); width * height];
         for (i, surfel) in self.surfels.iter().enumerate() {
-            let at = turn * surfel.point.at + shift;
+            let at = motion.moved(&surfel.point.at);
             if at.z <= NEAREST_M {
                 continue;
             }
             let Some(block) = sight.block(&at) else { continue };
             // From behind it is not seen.
-            if (turn * surfel.point.normal).dot(&at) < 0.0 {
+            if motion.turned(&surfel.point.normal).dot(&at) < 0.0 {
                 let sigma = surfel.point.across;
                 front[block].meet(Front { z: at.z, sigma, surfel: i as u32 });
             }
@@ -91,14 +90,16 @@ impl Surfels {
         frame: &Observed<'_>,
         fusion: &Fusion,
     ) {
-        let turn = map_from_camera.rotation.to_rotation_matrix().matrix().map(|v| v as f32);
-        let shift = map_from_camera.translation.vector.map(|v| v as f32);
+        let motion = Motion::of(map_from_camera);
         for point in blocks.points.iter().flatten() {
             let facing = -point.normal.dot(&point.at) / point.at.norm();
             // On a slanted surface a block is longer.
             let width_m = blocks.side_px as f32 * point.at.z / frame.focal_px / facing;
-            let moved =
-                Point { at: turn * point.at + shift, normal: turn * point.normal, ..*point };
+            let moved = Point {
+                at: motion.moved(&point.at),
+                normal: motion.turned(&point.normal),
+                ..*point
+            };
             let colour = frame.colour.map(|rgb| colour_of(rgb, point.pixel));
             match sight.same(&self.surfels, &moved, width_m) {
                 Same::Piece(i) => self.surfels[i].observe(&moved, colour, frame.number, fusion),
@@ -175,13 +176,19 @@ impl Front {
     /// The nearer hides the farther; of two that may be one surface the surer shows. (The nearer of
     /// those would be the one with the greater error: the map would come towards the camera.)
     fn meet(&mut self, other: Front) {
-        let apart = SIGMAS * self.sigma.min(1.0).hypot(other.sigma) + HIDES_M;
+        let apart = SIGMAS * both(self.sigma.min(1.0), other.sigma) + HIDES_M;
         let nearer = other.z < self.z - apart;
         let one_surface = (other.z - self.z).abs() <= apart;
         if nearer || one_surface && other.sigma < self.sigma || self.surfel == NOBODY {
             *self = other;
         }
     }
+}
+
+/// Of a difference.
+#[inline]
+fn both(a: f32, b: f32) -> f32 {
+    (a * a + b * b).sqrt()
 }
 
 /// What hides is nearer by at least this: a block of a slanted surface is as deep, m.
@@ -197,8 +204,7 @@ pub struct Sight<'a> {
     width: usize,
     height: usize,
     /// Camera from map.
-    turn: Matrix3<f32>,
-    shift: Vector3<f32>,
+    motion: Motion,
     front: Vec<u32>,
 }
 
@@ -226,7 +232,7 @@ impl Sight<'_> {
     }
 
     fn same(&self, surfels: &[Surfel], p: &Point, width_m: f32) -> Same {
-        let at = self.turn * p.at + self.shift;
+        let at = self.motion.moved(&p.at);
         let Some(block) = self.block(&at) else { return Same::Nothing };
         let mut best: Option<(f32, usize)> = None;
         for neighbour in around(block, self.width, self.height) {
@@ -235,7 +241,7 @@ impl Sight<'_> {
             let off = p.at - surfel.point.at;
             let across = off.dot(&surfel.point.normal);
             let along = (off.norm_squared() - across * across).max(0.0).sqrt();
-            let limit = SIGMAS * p.across.hypot(surfel.point.across) + POSE_M;
+            let limit = SIGMAS * both(p.across, surfel.point.across) + POSE_M;
             if across.abs() < limit
                 && along < SAME_PLACE * width_m
                 && p.normal.dot(&surfel.point.normal) > SAME_NORMAL
@@ -254,7 +260,7 @@ impl Sight<'_> {
     fn free(&self, surfels: &[Surfel], p: &Point, block: usize) -> Same {
         let Some(surfel) = surfels.get(self.front[block] as usize) else { return Same::Nothing };
         let across = (p.at - surfel.point.at).dot(&surfel.point.normal).abs();
-        let limit = SIGMAS * p.across.hypot(surfel.point.across) + POSE_M;
+        let limit = SIGMAS * both(p.across, surfel.point.across) + POSE_M;
         if across < 2.0 * limit && surfel.seen > CONFIRMED { Same::Conflict } else { Same::Nothing }
     }
 }
@@ -275,7 +281,7 @@ impl Target for Seen<'_> {
     #[inline]
     fn find(&self, p: &Vector3<f32>, (): &mut ()) -> Option<&Point> {
         let sight = self.sight;
-        let block = sight.block(&(sight.turn * p + sight.shift))?;
+        let block = sight.block(&sight.motion.moved(p))?;
         let near = |i: u32| {
             let point = &self.surfels.get(i as usize)?.point;
             ((point.at - p).norm_squared() <= self.gate_m * self.gate_m).then_some(point)

@@ -31,26 +31,41 @@ const USUAL: usize = 20_000;
 impl Voxels {
     /// Of a depth image, m, NaN where nothing was measured.
     pub fn of(depth: &[f32], rays: &Rays, side_m: f32) -> Self {
-        let per_metre = 1.0 / side_m;
         let mut cells = Cells::with_room(USUAL);
         let mut voxels: Vec<Voxel> = Vec::with_capacity(USUAL);
         // Neighbouring pixels mostly fall in one cube: it is looked up when they leave it.
-        let (mut here, mut index): (Place, usize) = ([i32::MAX; 3], 0);
-        for (i, (&z, (&x, &y))) in depth.iter().zip(rays.x.iter().zip(&rays.y)).enumerate() {
-            if !(z > 0.0 && z.is_finite()) {
-                continue;
-            }
-            let at = Vector3::new(x * z, y * z, z);
-            let place = place_of(&at, per_metre);
-            if place != here {
-                here = place;
-                index = cells.add(place);
+        let (mut here, mut run) = ([i32::MAX; 3], Run::default());
+        let mut leave = |place: Place, run: &Run| {
+            if run.voxel.n > 0.0 {
+                let index = cells.add(place);
                 if index == voxels.len() {
-                    voxels.push(Voxel { pixel: i as u32, ..Voxel::default() });
+                    voxels.push(Voxel { pixel: run.voxel.pixel, ..Voxel::default() });
                 }
+                voxels[index].join(&run.voxel);
             }
-            voxels[index].add(at - corner(place, side_m));
+        };
+        let mut at = [Vector3::zeros(); STRIP];
+        let mut places = [[0; 3]; STRIP];
+        for begin in (0..depth.len()).step_by(STRIP) {
+            let end = (begin + STRIP).min(depth.len());
+            let strip = depth[begin..end].iter().zip(&rays.x[begin..end]).zip(&rays.y[begin..end]);
+            for ((((&z, &x), &y), at), place) in strip.zip(&mut at).zip(&mut places) {
+                *at = Vector3::new(x * z, y * z, z);
+                *place = place_of(at, 1.0 / side_m);
+            }
+            for (i, (at, &place)) in (begin..end).zip(at.iter().zip(&places)) {
+                if !(at.z > 0.0 && at.z.is_finite()) {
+                    continue;
+                }
+                if place != here {
+                    leave(here, &run);
+                    here = place;
+                    run = Run::begin(place, side_m, i);
+                }
+                run.voxel.add(at - run.corner);
+            }
         }
+        leave(here, &run);
         Voxels { side_m, cells, voxels }
     }
 
@@ -61,6 +76,26 @@ impl Voxels {
     }
 }
 
+/// Pixels worked on at once: what a core keeps at hand.
+const STRIP: usize = 128;
+
+/// Pixels in a row that fall in one cube.
+#[derive(Debug, Clone, Copy, Default)]
+struct Run {
+    voxel: Voxel,
+    corner: Vector3<f32>,
+}
+
+impl Run {
+    fn begin(place: Place, side_m: f32, pixel: usize) -> Self {
+        Run {
+            voxel: Voxel { pixel: pixel as u32, ..Voxel::default() },
+            corner: corner(place, side_m),
+        }
+    }
+}
+
+#[inline]
 fn corner(place: Place, side_m: f32) -> Vector3<f32> {
     Vector3::from(place.map(|v| v as f32)) * side_m
 }
@@ -73,6 +108,16 @@ impl Voxel {
         let products = [p.x * p.x, p.x * p.y, p.x * p.z, p.y * p.y, p.y * p.z, p.z * p.z];
         for (sum, product) in self.squares.iter_mut().zip(products) {
             *sum += product;
+        }
+    }
+
+    /// Add the moments of more pixels of this cube.
+    #[inline]
+    fn join(&mut self, other: &Voxel) {
+        self.n += other.n;
+        self.sum += other.sum;
+        for (sum, more) in self.squares.iter_mut().zip(other.squares) {
+            *sum += more;
         }
     }
 
