@@ -221,7 +221,9 @@ impl<'a> Tracker<'a> {
             return Some(format!("{here} of the points find a neighbour, {needed} are needed"));
         }
         (alignment.matched < LEAST_KEPT * self.matched).then(|| {
-            format!("{here} of the points find a neighbour, {before} did before: a jump, or gone astray")
+            format!(
+                "{here} of the points find a neighbour, {before} did before: a jump, or gone astray"
+            )
         })
     }
 
