@@ -89,6 +89,10 @@ pub enum Times {
     Tilt,
 }
 
+/// Columns of bands are in this unit, px, over their order: so large are bands, and so do the waves
+/// of a saw-tooth fall. A coefficient that few columns of the picture decide is then held to it.
+const BAND_PX: f64 = 0.2;
+
 impl Over {
     pub fn value(self, p: &Place) -> f64 {
         match self {
@@ -202,7 +206,8 @@ impl Basis {
                 let (s, c) = (TAU * p.u / period_px).sin_cos();
                 let (mut sk, mut ck) = (s, c);
                 for (k, pair) in out.chunks_exact_mut(2).enumerate() {
-                    let seen = sinc((k + 1) as f64 * p.side / period_px);
+                    let order = (k + 1) as f64;
+                    let seen = BAND_PX / order * sinc(order * p.side / period_px);
                     pair[0] = seen * sk;
                     pair[1] = seen * ck;
                     (sk, ck) = (sk * c + ck * s, ck * c - sk * s);
