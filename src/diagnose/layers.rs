@@ -78,7 +78,7 @@ impl Survey {
         let mut views: Vec<SurveyedView> = fields
             .par_iter()
             .map(|f| {
-                let (inflation, correlation) = inflation(f);
+                let (inflation, correlation) = inflation(f, &[]);
                 let tiles = tiles(f, camera, rays, start);
                 SurveyedView {
                     name: f.name.clone(),
@@ -151,6 +151,26 @@ impl Survey {
             tolerance: self.tolerance,
             ablation: self.ablation,
         }
+    }
+
+    /// Measure anew what the views' means are worth, with what was found of the bias taken out, px
+    /// by view and pixel. `false`, and nothing is changed, where that changes little.
+    pub fn reweigh(&mut self, fields: &[Field], bias: &[Vec<f32>]) -> bool {
+        const LITTLE: f64 = 1.3;
+        let views = fields.par_iter().zip(bias);
+        let anew: Vec<(f64, Correlation)> = views.map(|(f, b)| inflation(f, b)).collect();
+        let more = |(view, new): (&SurveyedView, &(f64, Correlation))| {
+            new.0 > 0.0 && view.inflation > LITTLE * new.0
+        };
+        if !self.views.iter().zip(&anew).any(more) {
+            return false;
+        }
+        for (view, (inflation, correlation)) in self.views.iter_mut().zip(anew) {
+            if inflation < view.inflation {
+                (view.inflation, view.correlation) = (inflation, correlation);
+            }
+        }
+        true
     }
 
     /// Noise is what changes from frame to frame; `common` is the correlation of two frames of a
@@ -480,9 +500,14 @@ fn view_scatter(blocks: &[Blocks], tolerance: f64) -> f64 {
 
 /// How much less a pixel's mean is worth than the model says: its variance relative to the
 /// model's, and how many pixels make one independent sample. Measured on what is left after a
-/// smooth error is taken out.
-fn inflation(field: &Field) -> (f64, Correlation) {
-    let rough = rough(&field.mean, field);
+/// smooth error, and what is known of the bias (px, by pixel, or empty), is taken out.
+fn inflation(field: &Field, bias: &[f32]) -> (f64, Correlation) {
+    let rough = if bias.is_empty() {
+        rough(&field.mean, field)
+    } else {
+        let left: Vec<f32> = field.mean.iter().zip(bias).map(|(m, b)| m - b).collect();
+        rough(&left, field)
+    };
     let (mut sum, mut n) = (0.0, 0.0);
     for r in rough.iter().filter(|r| r.is_finite()) {
         sum += f64::from(*r).powi(2);
