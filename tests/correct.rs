@@ -117,7 +117,8 @@ fn a_shape_is_its_closed_form_at_chosen_pixels() {
     let camera = sensor().camera;
     let shape = vec![
         bias(Basis::Bowl { disparity_power: 2.0, orders: 2 }, &[0.8, -0.3]),
-        bias(Basis::Banding { period_px: 40.0, harmonics: 1 }, &[0.2, -0.1]),
+        // In fifths of a px.
+        bias(Basis::Banding { period_px: 40.0, harmonics: 1 }, &[1.0, -0.5]),
         bias(Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 1 }, &[-0.05]),
         bias(
             Basis::Curve { over: Over::LogZ, low: 0.0, high: 1.0, nodes: 3, times: Times::Tilt },

@@ -55,7 +55,8 @@ fn exact() -> Vec<(Basis, Vec<f64>, &'static str, f64, f64)> {
         ),
         (
             Basis::Banding { period_px: 37.0, harmonics: 2 },
-            vec![0.2 * phase.cos(), 0.2 * phase.sin(), 0.0, 0.0],
+            // In fifths of a px.
+            vec![phase.cos(), phase.sin(), 0.0, 0.0],
             "amplitude_px",
             0.2,
             sampled,
