@@ -14,6 +14,7 @@ mod freenect;
 mod guide;
 #[cfg(test)]
 mod guide_tests;
+mod lock;
 mod play;
 mod queue;
 mod run;
