@@ -8,6 +8,7 @@
 //! or not there, so a capture goes on where it was interrupted.
 
 mod advice;
+mod advised;
 mod folder;
 mod font;
 mod freenect;
