@@ -1,238 +1,19 @@
-//! `kinoise capture` from outside: a dump by light through the C interface of Debian's fakenect,
-//! a recording that is played, a folder that is filled; and everything that can go wrong.
+//! `kinoise capture` from a recording that is played and a folder that is filled, its screen, and
+//! what can go wrong.
 
 mod common;
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command as Process, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use assert_cmd::assert::Assert;
+use common::capture::{FRAMES, HELD_STILL, folder, frames_of, json, told};
 use common::{BOARD, grid, kinoise, shots, write_depth};
-use kinoise::io::{Assumed, FrameSource, open, write_dump};
-use kinoise::simulate::speckle::Causes;
-use kinoise::simulate::{Physics, Scenery, Shoot, kinect_v1, plan_grid};
-use kinoise::{DepthCode, Frame, Recording, Seed};
-use serde_json::Value;
-
-/// Frames of a view, and of stillness before.
-const FRAMES: usize = 4;
-const HOLD: usize = 2;
-/// What a dump has of each pose: the first still frame, the view, one to spare.
-const HELD_STILL: usize = FRAMES + HOLD;
-
-fn folder() -> tempfile::TempDir {
-    tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a temporary folder")
-}
-
-/// A file of the package libfreenect0.5, or `None` with a line that says what to do.
-fn installed(name: &str) -> Option<PathBuf> {
-    let machines = fs::read_dir("/usr/lib").into_iter().flatten().flatten();
-    let found = machines.map(|m| m.path().join(name)).find(|p| p.is_file());
-    if found.is_none() {
-        println!(
-            "skipped: no {name} below /usr/lib; ./run setup (or apt-get install libfreenect0.5) brings it"
-        );
-    }
-    found
-}
-
-const STAND_IN: &str = "fakenect/libfreenect.so.0.5";
-
-/// `./run test` installs the package wherever it can, so there nothing is skipped.
-#[test]
-fn the_stand_in_is_there_where_it_can_be() {
-    if Path::new("/usr/bin/dpkg-query").exists() {
-        assert!(
-            installed(STAND_IN).is_some(),
-            "run ./run setup, or apt-get install libfreenect0.5"
-        );
-    }
-}
-
-/// Nine views by light, 640 x 480 px as fakenect will have it, and the same as a dump: made once.
-struct ByLight {
-    recording: Recording,
-    dump: PathBuf,
-}
-
-fn by_light() -> &'static ByLight {
-    static MADE: OnceLock<(tempfile::TempDir, ByLight)> = OnceLock::new();
-    &MADE
-        .get_or_init(|| {
-            let folder = folder();
-            let poses = grid(&[1.0, 1.5, 2.0], &[0.0, 30.0, 60.0]).views();
-            let shoot = Shoot {
-                sensor: kinect_v1(1),
-                views: plan_grid(&poses, &Scenery::bare(BOARD), HELD_STILL, false, Seed(3)),
-                physics: Physics::Speckle { causes: Causes::default() },
-                infrared: false,
-                seed: Seed(3),
-            };
-            let root = folder.path().join("simulated");
-            shoot.write_quickly(&root, &|_, _| ()).expect("written");
-            let recording = open(&root, &Assumed::default()).expect("a recording");
-            let dump = folder.path().join("dump");
-            let frames = frames_of(&recording);
-            let stamped = frames.iter().enumerate().map(|(k, f)| (1e9 + k as f64 / 30.0, f));
-            write_dump(&dump, stamped).expect("a dump");
-            (folder, ByLight { recording, dump })
-        })
-        .1
-}
-
-fn frames_of(recording: &Recording) -> Vec<Frame> {
-    let camera = &recording.sensor.camera;
-    let mut source = FrameSource::new(camera.width, camera.height);
-    let frames = recording.views.iter().flat_map(|v| &v.depth);
-    frames.map(|f| source.read(&f.path).expect("a frame")).collect()
-}
-
-/// The command on a dump; what the dump's sensor is comes as options.
-fn from_dump(library: &Path, dump: &Path, output: &Path) -> assert_cmd::Command {
-    let DepthCode::Disparity { offset, slope, .. } = by_light().recording.sensor.code else {
-        panic!("by light there are raw words")
-    };
-    let mut command = kinoise();
-    command
-        .args([
-            "capture", "--source", "freenect", "--plain", "--json", "--frames", "4", "--hold", "2",
-        ])
-        .args(["--distances", "1,1.5,2", "--tilts", "0,30,60"])
-        .args(["--intrinsics", "580,580,319.5,239.5", "--raw-disparity"])
-        .arg(format!("{offset},{slope}"))
-        .arg("--library")
-        .arg(library)
-        .arg(output)
-        .env("FAKENECT_PATH", dump);
-    command
-}
-
-fn json(assert: &Assert) -> Value {
-    serde_json::from_slice(&assert.get_output().stdout).expect("nothing but JSON on stdout")
-}
-
-fn told(assert: &Assert) -> String {
-    String::from_utf8_lossy(&assert.get_output().stderr).into_owned()
-}
-
-/// Frames come out as they went in, bit for bit, view by view; and the recording that was made is
-/// measured where the board stood and diagnosed.
-#[test]
-fn a_dump_by_light_is_captured_calibrated_and_diagnosed() {
-    let Some(library) = installed(STAND_IN) else { return };
-    let (made, folder) = (by_light(), folder());
-    let output = folder.path().join("rec");
-    let done = from_dump(&library, &made.dump, &output).assert().success();
-    let said = json(&done);
-    assert_eq!(said["ending"], "complete");
-    assert_eq!(said["views"].as_array().map(Vec::len), Some(9), "{said}");
-    let captured = open(&output, &Assumed::default()).expect("a recording");
-    assert!(captured.remarks.is_empty() && captured.excluded.is_empty());
-    let shot = frames_of(&made.recording);
-    for view in &captured.views {
-        assert_eq!(view.depth.len(), FRAMES, "{}", view.name);
-        assert!(view.depth.windows(2).all(|w| w[1].timestamp > w[0].timestamp));
-    }
-    for (k, frames) in frames_of(&captured).chunks(FRAMES).enumerate() {
-        // The grid is in order, and so are the names. The view begins with the second still frame.
-        let from = k * HELD_STILL + HOLD - 1;
-        assert!(frames == &shot[from..from + FRAMES], "{}", captured.views[k].name);
-    }
-    let out = folder.path().join("model");
-    let calibrated = kinoise()
-        .args(["calibrate", "--json", "--form", "khoshelham", "-o"])
-        .args([&out, &output])
-        .assert()
-        .success();
-    let views = json(&calibrated)["views"].as_array().expect("views").clone();
-    assert_eq!(views.len(), 9);
-    for (view, z) in views.iter().zip([1.0, 1.0, 1.0, 1.5, 1.5, 1.5, 2.0, 2.0, 2.0]) {
-        // By light the depth is biased by some millimetres.
-        let measured = view["axis_distance_m"].as_f64().expect("a distance");
-        assert!((measured - z).abs() < 0.01 * z, "{} {measured}", view["view"]);
-    }
-    let diagnosed = kinoise()
-        .args(["diagnose", "--json", "--model"])
-        .arg(out.join("model.json"))
-        .arg("-o")
-        .args([&folder.path().join("diagnosis"), &output])
-        .assert();
-    let code = diagnosed.get_output().status.code();
-    assert!(matches!(code, Some(0 | 1)), "{}", told(&diagnosed));
-}
-
-/// The dump ends in the middle of a view: as when the cable is pulled. The whole dump goes on.
-#[test]
-fn an_unplugged_sensor_loses_nothing_that_was_finished_and_the_same_command_goes_on() {
-    let Some(library) = installed(STAND_IN) else { return };
-    let (made, folder) = (by_light(), folder());
-    let (dump, output) = (folder.path().join("dump"), folder.path().join("rec"));
-    common::copy_tree(&made.dump, &dump);
-    let index = fs::read_to_string(dump.join("INDEX.txt")).expect("an index");
-    let lines: Vec<&str> = index.lines().collect();
-    let head = |n: usize| lines[..n].join("\n") + "\n";
-    // Two views and a half.
-    fs::write(dump.join("INDEX.txt"), head(2 * HELD_STILL + 3)).expect("written");
-    let ended = from_dump(&library, &dump, &output).assert().code(2);
-    assert!(told(&ended).contains("no more frames"), "{}", told(&ended));
-    assert_eq!(json(&ended)["views"].as_array().map(Vec::len), Some(2));
-    assert!(!output.join(".partial").exists());
-    // The next file is cut short: fakenect would read beyond its end.
-    fs::write(dump.join("INDEX.txt"), &index).expect("written");
-    let cut = dump.join(lines[4 * HELD_STILL + 1]);
-    let bytes = fs::read(&cut).expect("read");
-    fs::write(&cut, &bytes[..bytes.len() / 2]).expect("written");
-    let damaged = from_dump(&library, &dump, &output).assert().code(2);
-    assert!(told(&damaged).contains("cut short"), "{}", told(&damaged));
-    assert_eq!(json(&damaged)["views"].as_array().map(Vec::len), Some(4));
-    fs::write(&cut, &bytes).expect("written");
-    let done = from_dump(&library, &dump, &output).assert().success();
-    assert_eq!(json(&done)["finished"].as_array().map(Vec::len), Some(5));
-    let again =
-        from_dump(&library, &dump, &output).args(["--retake", "z150-t30"]).assert().success();
-    assert_eq!(json(&again)["finished"], serde_json::json!(["z150-t30"]));
-    assert_eq!(json(&again)["views"].as_array().map(Vec::len), Some(9));
-}
-
-#[test]
-fn a_missing_library_a_foreign_one_and_a_missing_dump_say_what_to_do() {
-    let folder = folder();
-    let output = folder.path().join("rec");
-    let capture = |library: &Path| {
-        let mut command = kinoise();
-        command.args(["capture", "--source", "freenect", "--plain", "--library"]);
-        command.args([library, &output]).env_remove("FAKENECT_PATH");
-        told(&command.assert().code(2))
-    };
-    let missing = capture(Path::new("/nowhere/libfreenect.so"));
-    assert!(missing.contains("apt-get install libfreenect0.5"), "{missing}");
-    assert_eq!(missing.trim().lines().count(), 1, "{missing}");
-    if let Some(foreign) = installed("libc.so.6") {
-        assert!(capture(&foreign).contains("it has no freenect_init"));
-    }
-    if let Some(library) = installed(STAND_IN) {
-        assert!(capture(&library).contains("FAKENECT_PATH"));
-        let mut command = kinoise();
-        command.args(["capture", "--source", "freenect", "--plain", "--library"]);
-        command.args([&library, &output]).env("FAKENECT_PATH", folder.path());
-        assert!(told(&command.assert().code(2)).contains("INDEX.txt"));
-    }
-    assert!(!output.exists(), "nothing was begun");
-}
-
-/// No machine that runs tests has a Kinect; where one has, there is nothing to test.
-#[test]
-fn without_a_sensor_the_real_library_says_so() {
-    let Some(library) = installed("libfreenect.so.0.5") else { return };
-    let folder = folder();
-    let mut command = kinoise();
-    command.args(["capture", "--source", "freenect", "--plain", "--patience", "1", "--library"]);
-    let said = told(&command.args([&library, &folder.path().join("rec")]).assert().code(2));
-    assert!(said.contains("no Kinect is connected") || said.contains("USB"), "{said}");
-}
+use kinoise::Seed;
+use kinoise::io::{Assumed, open};
+use kinoise::simulate::{Scenery, Shoot, plan_grid};
 
 /// Three poses, small pictures, in order.
 fn small() -> &'static Path {
@@ -408,69 +189,100 @@ fn a_full_disk_ends_it_and_what_was_finished_stays() {
     assert_eq!(kept.views.len(), 1);
 }
 
-/// The library of `tests/data/freenect_mock.c`, made once; `None` without a C compiler.
-fn mock() -> Option<&'static Path> {
-    static MADE: OnceLock<Option<(tempfile::TempDir, PathBuf)>> = OnceLock::new();
-    let made = MADE.get_or_init(|| {
-        let folder = folder();
-        let library = folder.path().join("libmock.so");
-        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/freenect_mock.c");
-        let compiled =
-            Process::new("cc").args(["-shared", "-fPIC", "-o"]).args([&library, &source]).status();
-        if !compiled.is_ok_and(|status| status.success()) {
-            println!("skipped: no C compiler (cc) to make the mock of libfreenect with");
-            return None;
-        }
-        Some((folder, library))
-    });
-    made.as_ref().map(|(_, library)| library.as_path())
-}
-
-fn from_mock(library: &Path, output: &Path, frames: &str, then: &str) -> assert_cmd::Command {
-    let mut command = kinoise();
-    command
-        .args(["capture", "--source", "freenect", "--plain", "--json", "--views", "any"])
-        .args(["--frames", "4", "--hold", "2", "--patience", "1", "--library"])
-        .args([library, output])
-        .env("MOCK_FRAMES", frames)
-        .env("MOCK_THEN", then);
-    command
-}
-
-/// Serial, factory calibration and infrared, which the stand-in has not.
+/// The folder's frames are all there, so the sensor stands still with one view on the disk.
 #[test]
-fn a_units_own_serial_calibration_and_infrared_are_recorded() {
-    let Some(library) = mock() else { return };
+fn a_second_capture_into_the_same_recording_is_refused() {
     let folder = folder();
-    let output = folder.path().join("rec");
-    let ended = from_mock(library, &output, "20", "gone").assert().code(2);
-    assert!(told(&ended).contains("the Kinect is gone"), "{}", told(&ended));
-    let recording = open(&output, &Assumed::default()).expect("a recording");
-    assert_eq!(recording.sensor.serial.as_deref(), Some("A00366802050045A"));
-    assert!((recording.sensor.camera.fx - 575.8).abs() < 0.05);
-    // libfreenect's own table has, for word 700, 10 (m 120/(7.5 - m) + 120) mm, m = -25.375 * .1042.
-    let z = recording.sensor.code.metres(700).expect("a depth");
-    assert!((z - 0.8872).abs() < 0.0001, "{z}");
-    let view = &recording.views[0];
-    assert_eq!((view.depth.len(), view.infrared.len()), (4, 4));
-    assert_eq!(view.depth[0].timestamp, view.infrared[0].timestamp);
-    let infrared = kinoise::io::InfraredImage::read(&view.infrared[0].path).expect("an image");
-    assert_eq!((infrared.width, infrared.height), (640, 480));
-    // The 480 rows in the middle of 488, every row its number.
-    assert_eq!((infrared.amplitude[0], infrared.amplitude[640 * 479]), (4, 483));
-    let now = recording.views[0].depth[0].timestamp;
-    assert!(now > 1.7e9, "seconds since 1970: {now}");
+    let (from, output) = (folder.path().join("filled"), folder.path().join("rec"));
+    fill(&from, 0..HELD_STILL + 3);
+    let _first = Running(watch_folder(&from, &output, "30").spawn().expect("started"));
+    let half = output.join(".partial/z150-t00/depth/0001.png");
+    wait_for("half of the second view", || half.is_file());
+    if cfg!(unix) {
+        let second = play(&output).assert().code(2);
+        assert!(told(&second).contains("another capture is writing"), "{}", told(&second));
+    }
+    assert!(half.is_file());
 }
 
 #[test]
-fn a_silent_sensor_a_missing_one_and_another_one_are_told() {
-    let Some(library) = mock() else { return };
+fn what_is_played_does_not_grow_and_what_is_left_out_is_told() {
     let folder = folder();
-    let output = folder.path().join("rec");
-    let none = from_mock(library, &output, "0", "none").assert().code(2);
-    assert!(told(&none).contains("no Kinect is connected"), "{}", told(&none));
-    let other = from_mock(library, &output, "9", "gone").args(["--serial", "B0"]).assert().code(2);
-    assert!(told(&other).contains("but A00366802050045A"), "{}", told(&other));
-    let stalled = from_mock(library, &output, "1", "silent").assert().code(2);
-    assert!(told(&stalled).contains("no frame for 1 s"), "{}", told(&stalled));
+    let from = folder.path().join("from");
+    common::copy_tree(small(), &from);
+    let capture = |output: &Path| {
+        let mut command = kinoise();
+        command.args(["capture", "--plain", "--views", "any", "--frames", "4", "--hold", "2"]);
+        command.arg("--source").arg(format!("play:{}", from.display())).arg(output);
+        command
+    };
+    let itself = capture(&from.join(".")).assert().code(2);
+    assert!(told(&itself).contains("this is the source"), "{}", told(&itself));
+    let views = open(&from, &Assumed::default()).expect("a recording").views;
+    let image = &views[1].depth[0].path;
+    let bytes = fs::read(image).expect("read");
+    fs::write(image, &bytes[..bytes.len() / 2]).expect("written");
+    fs::write(from.join(&views[2].name).join("depth.txt"), "no list").expect("written");
+    let done = capture(&folder.path().join("rec")).assert().success();
+    assert!(told(&done).contains("frame left out: "), "{}", told(&done));
+    assert!(told(&done).contains(&format!("view {} was left out", views[2].name)));
+    assert!(told(&done).contains("2 views are kept"), "{}", told(&done));
+}
+
+/// `script` (util-linux) gives it a terminal: what the keys do, and the terminal is as it was.
+#[cfg(target_os = "linux")]
+#[test]
+fn on_a_terminal_keys_are_heeded_and_the_terminal_is_left_as_it_was() {
+    use std::io::Write;
+
+    if !Path::new("/usr/bin/script").exists() {
+        println!("skipped: no /usr/bin/script (package bsdutils) to make a terminal with");
+        return;
+    }
+    let folder = folder();
+    let (from, output) = (folder.path().join("filled"), folder.path().join("rec"));
+    fill(&from, 0..HELD_STILL);
+    let at = |name: &str| folder.path().join(name);
+    let line = format!(
+        "stty -a > '{}'; '{}' capture --views any --frames 4 --hold 2 --patience 60 \
+         --intrinsics 145,145,79.5,59.5 --units-per-metre 5000 --source 'folder:{}' '{}'; \
+         echo $? > '{}'; stty -a > '{}'",
+        at("before").display(),
+        env!("CARGO_BIN_EXE_kinoise"),
+        from.display(),
+        output.display(),
+        at("code").display(),
+        at("after").display(),
+    );
+    let mut child = Running(
+        Process::new("script")
+            .args(["-q", "-c", &line, "/dev/null"])
+            .env("SHELL", "/bin/sh")
+            .stdin(Stdio::piped())
+            .stdout(fs::File::create(at("shown")).expect("made"))
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("started"),
+    );
+    let mut keys = child.0.stdin.take().expect("piped");
+    let mut press = |bytes: &[u8]| keys.write_all(bytes).expect("pressed");
+    let (view, code) = (output.join("z100-t00/depth.txt"), at("code"));
+    wait_for("a view", || view.is_file());
+    // F2 to F4: escape sequences that end in Q, R and S.
+    press(b"\x1bOQ\x1bOR\x1bOS");
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(view.is_file() && !code.exists(), "function keys are no letters");
+    press(b"r");
+    wait_for("the view is thrown away", || !view.exists());
+    press(b"q");
+    wait_for("the end", || at("after").metadata().is_ok_and(|m| m.len() > 0));
+    assert_eq!(fs::read_to_string(&code).expect("a code").trim(), "0");
+    let read = |name: &str| fs::read_to_string(at(name)).expect("text");
+    assert_eq!(read("before"), read("after"));
+    child.0.wait().expect("ended");
+    let shown = read("shown");
+    let position = |what: &str| shown.find(what).unwrap_or_else(|| panic!("{what:?} in {shown}"));
+    assert!(position("\x1b[?1049h") < position("z100-t00 is on the disk"));
+    assert!(position("\x07") < position("\x1b[?1049l"), "it rings");
+    assert!(position("\x1b[?1049l") < position("0 views are kept"));
 }

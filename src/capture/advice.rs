@@ -34,7 +34,7 @@ impl Step {
             Ok(seen) => seen.pose(),
             Err(why) => return Step::Aim { why: why.clone() },
         };
-        match guide.suggestion().map(|i| &guide.wanted().views[i]) {
+        match guide.suggestion().and_then(|i| guide.wanted().views.get(i)) {
             Some(view) => towards(view, &pose),
             None if guide.wanted().any => Step::Anywhere,
             None => Step::Done,
@@ -70,7 +70,9 @@ impl Step {
                 format!("tilt the board {:.0} degrees {how}", rad.abs().to_degrees())
             }
             Step::Turn { far_side } => {
-                format!("tilt it another way: its {far_side} side farther from the sensor")
+                format!(
+                    "tilt it another way: its {far_side} side, as the sensor sees it, farther away"
+                )
             }
             Step::Hold => "hold it still".into(),
             Step::Anywhere => "hold it still anywhere it has not been".into(),
@@ -96,8 +98,8 @@ fn towards(view: &WantedView, pose: &Pose) -> Step {
     Step::Turn { far_side: side(view.pose.azimuth_rad) }
 }
 
-/// As the picture shows it, by eighths of a turn.
-fn side(azimuth_rad: f64) -> &'static str {
+/// Where its far side is, as the picture shows it, by eighths of a turn.
+pub fn side(azimuth_rad: f64) -> &'static str {
     const SIDES: [&str; 8] = [
         "right",
         "lower right",

@@ -28,6 +28,8 @@ pub enum Event {
     Finished(String),
     /// The view must be thrown away.
     Abandoned { view: String, why: String },
+    /// A view that was whole must be thrown away: a person said so, and it is wanted again.
+    Rejected(String),
     /// The plane was watched long enough.
     Drift(Drift),
     /// Nothing is wanted any more.
@@ -37,9 +39,9 @@ pub enum Event {
 /// What a person can ask for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Command {
-    /// Take the last view again.
+    /// Throw the last view away and take it again.
     Again,
-    /// Go without the view that is suggested.
+    /// Go without the view that is being taken or, while none is, the one that is suggested.
     Skip,
     /// That will do.
     Quit,
@@ -86,8 +88,12 @@ impl Guide {
         let mut events = Vec::new();
         self.sight = sight;
         let stays = self.settle();
-        if !stays && let Some(taking) = self.taking.take() {
-            events.push(self.abandon(taking));
+        if !stays {
+            let why = match &self.sight {
+                Ok(_) => "the target moved".into(),
+                Err(why) => why.clone(),
+            };
+            events.extend(self.abandon(why));
         }
         if let Ok(seen) = &self.sight {
             events.extend(self.warmth.add(stamp, seen.plane.q.z).map(Event::Drift));
@@ -152,16 +158,14 @@ impl Guide {
         Some(Taking { view, kept: 0, new: self.wanted.views.len() > before })
     }
 
-    fn abandon(&mut self, taking: Taking) -> Event {
+    /// Give up the view that is being taken, if one is.
+    fn abandon(&mut self, why: String) -> Option<Event> {
+        let taking = self.taking.take()?;
         let view = self.name(taking.view);
         if taking.new {
             self.wanted.views.pop();
         }
-        let why = match &self.sight {
-            Ok(_) => "the target moved".into(),
-            Err(why) => why.clone(),
-        };
-        Event::Abandoned { view, why }
+        Some(Event::Abandoned { view, why })
     }
 
     /// Keep a suggestion until it is taken, or another is much nearer: words that flicker help
@@ -186,34 +190,36 @@ impl Guide {
 
     /// Do what a person asks; what must be undone is told.
     pub fn obey(&mut self, command: Command) -> Vec<Event> {
-        let mut events = Vec::new();
         match command {
-            Command::Again => {
-                if let Some(last) = self.last.take() {
-                    self.wanted.views[last].state = ViewState::Open;
-                    self.suggestion = Some(last);
-                    // The target must settle anew before it is taken again.
-                    self.still = None;
-                }
-            }
-            Command::Skip => {
-                if let Some(view) = self.suggestion.and_then(|i| self.wanted.views.get_mut(i)) {
-                    view.state = ViewState::Skipped;
-                }
-                if let Some(taking) = self.taking.take_if(|t| Some(t.view) == self.suggestion) {
-                    let view = self.name(taking.view);
-                    events.push(Event::Abandoned { view, why: "skipped".into() });
-                }
-                self.suggest();
-            }
-            Command::Quit => {
-                if let Some(taking) = self.taking.take() {
-                    let view = self.name(taking.view);
-                    events.push(Event::Abandoned { view, why: "stopped".into() });
-                }
-            }
+            Command::Again => self.again(),
+            Command::Skip => self.skip().into_iter().collect(),
+            Command::Quit => self.leave("stopped").into_iter().collect(),
         }
+    }
+
+    /// The capture ends here: half a view is none.
+    pub fn leave(&mut self, why: &str) -> Option<Event> {
+        self.abandon(why.into())
+    }
+
+    fn again(&mut self) -> Vec<Event> {
+        let Some(last) = self.last.take() else { return Vec::new() };
+        let mut events = Vec::from_iter(self.abandon("the one before comes first".into()));
+        self.wanted.views[last].state = ViewState::Open;
+        self.suggestion = Some(last);
+        // The target must settle anew before it is taken again.
+        self.still = None;
+        events.push(Event::Rejected(self.name(last)));
         events
+    }
+
+    fn skip(&mut self) -> Option<Event> {
+        let taking = self.taking.take();
+        let view = taking.map(|t| t.view).or(self.suggestion)?;
+        self.wanted.views.get_mut(view)?.state = ViewState::Skipped;
+        self.suggest();
+        let view = self.name(view);
+        taking.map(|_| Event::Abandoned { view, why: "skipped".into() })
     }
 
     fn name(&self, view: usize) -> String {

@@ -33,6 +33,7 @@ fn story(guide: &mut Guide, sights: impl IntoIterator<Item = Result<Seen, String
             Event::Keep => 'k',
             Event::Finished(_) => 'f',
             Event::Abandoned { .. } => 'a',
+            Event::Rejected(_) => 'r',
             Event::Drift(_) => 'd',
             Event::Done => '.',
         }));
@@ -90,12 +91,38 @@ fn a_bad_view_is_taken_again_and_one_that_cannot_be_had_is_skipped() {
     let mut g = guide(&[1.0, 2.0], &[0.0]);
     let still = || std::iter::repeat_n(Ok(seen(1.0, 0.0)), 4);
     story(&mut g, still());
-    assert!(g.obey(Command::Again).is_empty());
+    assert_eq!(g.obey(Command::Again), [Event::Rejected("z100-t00".into())]);
     assert_eq!(g.wanted().views[0].state, ViewState::Open);
+    assert!(g.obey(Command::Again).is_empty(), "it is gone already");
     assert_eq!(story(&mut g, still()), "- bk k kf");
     g.obey(Command::Skip);
     assert_eq!(g.wanted().views[1].state, ViewState::Skipped);
     assert!(g.wanted().is_done());
+}
+
+/// The suggestion stays with a view until another is much nearer; what is being taken may be
+/// another one.
+#[test]
+fn keys_are_about_what_is_being_taken() {
+    let mut g = Guide::new(Wanted::any(), SHUTTER);
+    let at = |z: f64, n| std::iter::repeat_n(Ok(seen(z, 0.0)), n);
+    assert_eq!(story(&mut g, at(1.0, 4).chain(at(1.4, 3))), "- bk k kf - bk k");
+    let events = g.obey(Command::Skip);
+    assert!(
+        matches!(&events[..], [Event::Abandoned { view, .. }] if view == "z140-t00"),
+        "{events:?}"
+    );
+    assert_eq!(story(&mut g, at(1.4, 4)), "- - - -", "skipped for good");
+    assert_eq!(story(&mut g, at(1.8, 3)), "- bk k");
+    let events = g.obey(Command::Again);
+    assert!(
+        matches!(&events[..], [Event::Abandoned { .. }, Event::Rejected(view)] if view == "z100-t00"),
+        "{events:?}"
+    );
+    assert_eq!(g.wanted().views.len(), 2, "a new view that failed is wanted by nobody");
+    story(&mut g, at(2.2, 3));
+    assert!(matches!(g.leave("stopped"), Some(Event::Abandoned { .. })));
+    assert_eq!(g.wanted().views.len(), 2);
 }
 
 #[test]
@@ -166,4 +193,6 @@ fn the_screen() {
     around.flash = Some("z150-t10".into());
     around.news = "z150-t10 taken".into();
     insta::assert_snapshot!("taken", screen(&g, &around));
+    (around.flash, around.silent_s) = (None, Some(3));
+    assert!(screen(&g, &around).contains("none for 3 s"), "a stream that stands still");
 }

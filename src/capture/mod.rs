@@ -8,12 +8,14 @@
 //! or not there, so a capture goes on where it was interrupted.
 
 mod advice;
+mod advised;
 mod folder;
 mod font;
 mod freenect;
 mod guide;
 #[cfg(test)]
 mod guide_tests;
+mod lock;
 mod play;
 mod queue;
 mod run;

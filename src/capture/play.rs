@@ -41,6 +41,7 @@ impl Playback {
             }
         }
         frames.sort_by(|a, b| a.0.timestamp.total_cmp(&b.0.timestamp));
+        let left_out = recording.excluded.iter().map(ToString::to_string).collect::<Vec<_>>();
         let camera = &recording.sensor.camera;
         Ok(Playback {
             images: FrameSource::new(camera.width, camera.height),
@@ -49,8 +50,23 @@ impl Playback {
             paced,
             previous: None,
             root: root.into(),
-            remarks: recording.remarks,
+            remarks: recording.remarks.into_iter().chain(left_out).collect(),
         })
+    }
+
+    /// An infrared image of the depth frame's size, or none.
+    fn amplitude(&mut self, path: &Path, depth: &Frame) -> Option<Frame> {
+        let size = (depth.width, depth.height);
+        let why = match InfraredImage::read(path) {
+            Ok(image) if (image.width, image.height) == size => {
+                let InfraredImage { width, height, amplitude } = image;
+                return Some(Frame { width, height, words: amplitude });
+            }
+            Ok(image) => format!("{}: {} x {} px", path.display(), image.width, image.height),
+            Err(e) => e.to_string(),
+        };
+        self.remarks.push(format!("infrared left out: {why}"));
+        None
     }
 
     fn keep_pace(&mut self, stamp: f64) {
@@ -72,11 +88,9 @@ impl Source for Playback {
             match self.images.read(&depth.path) {
                 Ok(frame) => {
                     self.keep_pace(depth.timestamp);
-                    return Ok(Arrival::Frame(LiveFrame {
-                        stamp: depth.timestamp,
-                        infrared: infrared.and_then(|i| amplitude(&i.path, &frame)),
-                        depth: frame,
-                    }));
+                    let infrared = infrared.and_then(|i| self.amplitude(&i.path, &frame));
+                    let stamp = depth.timestamp;
+                    return Ok(Arrival::Frame(LiveFrame { stamp, depth: frame, infrared }));
                 }
                 Err(e) => self.remarks.push(format!("frame left out: {e}")),
             }
@@ -88,11 +102,4 @@ impl Source for Playback {
     fn remarks(&self) -> &[String] {
         &self.remarks
     }
-}
-
-/// An infrared image of the depth frame's size, or none.
-fn amplitude(path: &Path, depth: &Frame) -> Option<Frame> {
-    let image = InfraredImage::read(path).ok()?;
-    let same = (image.width, image.height) == (depth.width, depth.height);
-    same.then_some(Frame { width: image.width, height: image.height, words: image.amplitude })
 }

@@ -17,6 +17,9 @@ pub trait Audience {
     /// A frame was dealt with.
     fn frame(&mut self, guide: &Guide);
 
+    /// There has been no frame for so long.
+    fn waiting(&mut self, guide: &Guide, silence: Duration);
+
     /// What a person asks for, if anything.
     fn command(&mut self) -> Option<Command>;
 
@@ -67,15 +70,22 @@ pub fn capture(
     let mut done = Outcome { ending: Ending::Complete, finished: Vec::new(), frames: 0 };
     let mut last_frame = Instant::now();
     let ending = loop {
-        if let Some(ending) = asked(guide, session, audience) {
-            break ending;
+        match asked(guide, session, audience, &mut done.finished) {
+            Ok(None) => {}
+            Ok(Some(ending)) => break ending,
+            Err(e) => break Ending::Failed(e),
         }
         let frame = match newest(source, guide.taking().is_some()) {
             Ok(Arrival::Frame(frame)) => frame,
             Ok(Arrival::Nothing) if last_frame.elapsed() > patience => {
                 break Ending::Stalled(patience);
             }
-            Ok(Arrival::Nothing) => continue,
+            Ok(Arrival::Nothing) => {
+                audience.waiting(guide, last_frame.elapsed());
+                continue;
+            }
+            // A signal may have woken the library.
+            Ok(Arrival::End(_)) | Err(_) if audience.interrupted() => break Ending::Interrupted,
             Ok(Arrival::End(end)) => break Ending::Ended { why: end.why, lost: end.lost },
             Err(e) => break Ending::Failed(e),
         };
@@ -92,6 +102,7 @@ pub fn capture(
         }
     };
     session.abandon();
+    guide.leave("stopped");
     done.ending = ending;
     done
 }
@@ -108,22 +119,33 @@ fn newest(source: &mut dyn Source, every: bool) -> Result<Arrival> {
     Ok(arrival)
 }
 
-fn asked(guide: &mut Guide, session: &mut Session, audience: &mut dyn Audience) -> Option<Ending> {
+/// Do what was asked for; does that end it?
+fn asked(
+    guide: &mut Guide,
+    session: &mut Session,
+    audience: &mut dyn Audience,
+    finished: &mut Vec<String>,
+) -> Result<Option<Ending>> {
     if audience.interrupted() {
-        return Some(Ending::Interrupted);
+        return Ok(Some(Ending::Interrupted));
     }
-    let command = audience.command()?;
+    let Some(command) = audience.command() else { return Ok(None) };
     for event in guide.obey(command) {
-        if matches!(event, Event::Abandoned { .. }) {
-            session.abandon();
+        match &event {
+            Event::Abandoned { .. } => session.abandon(),
+            Event::Rejected(view) => {
+                session.reject(view)?;
+                finished.retain(|v| v != view);
+            }
+            _ => {}
         }
         audience.event(&event);
     }
-    match command {
+    Ok(match command {
         Command::Quit => Some(Ending::Quit),
         _ if guide.wanted().is_done() => Some(Ending::Complete),
         _ => None,
-    }
+    })
 }
 
 /// Do what the events say; true when all is done.
@@ -144,7 +166,8 @@ fn follow(
                 finished.push(view.clone());
             }
             Event::Abandoned { .. } => session.abandon(),
-            Event::Drift(_) => {}
+            // Of keys, not of frames.
+            Event::Rejected(_) | Event::Drift(_) => {}
             Event::Done => done = true,
         }
         audience.event(event);

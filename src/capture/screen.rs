@@ -1,6 +1,6 @@
 //! The screen as text: big letters for the person with the board, a map of what is wanted.
 
-use super::advice::Step;
+use super::advice::{Step, side};
 use super::font::big;
 use super::guide::Guide;
 use super::wanted::{ViewState, Wanted, WantedView};
@@ -31,6 +31,8 @@ pub struct Surroundings {
     pub flash: Option<String>,
     /// The last thing told.
     pub news: String,
+    /// Seconds without a frame, when it has been long.
+    pub silent_s: Option<u64>,
 }
 
 /// Columns of the bar that fills while the target is still.
@@ -41,9 +43,13 @@ const CELL: usize = 5;
 /// Lines for a terminal of this many columns and rows.
 pub fn render(guide: &Guide, around: &Surroundings, columns: usize, rows: usize) -> Vec<Line> {
     let step = Step::of(guide);
-    let (word, sentence) = match &around.flash {
-        Some(view) => ("TAKEN".into(), format!("{view} is on the disk")),
-        None => (step.word(), step.sentence()),
+    let (word, sentence) = match (&around.flash, around.silent_s) {
+        (Some(view), _) => ("TAKEN".into(), format!("{view} is on the disk")),
+        (None, Some(s)) => (
+            "NO FRAMES".into(),
+            format!("none for {s} s: look at the cable, the power, the other program"),
+        ),
+        (None, None) => (step.word(), step.sentence()),
     };
     let mut lines = vec![plain(title(guide, &around.title))];
     let loud = |text: &String| Line { text: text.clone(), style: Style::Loud };
@@ -53,7 +59,7 @@ pub fn render(guide: &Guide, around: &Surroundings, columns: usize, rows: usize)
     lines.push(plain(stillness(guide)));
     lines.extend(map(guide).into_iter().map(plain));
     lines.push(plain(around.news.clone()));
-    let keys = plain("r take the last one again   s skip this one   q stop".into());
+    let keys = plain("r throw the last one away, take it again   s skip this one   q stop".into());
     lines.truncate(rows.saturating_sub(1));
     lines.push(keys);
     for line in &mut lines {
@@ -141,9 +147,13 @@ const LISTED: usize = 8;
 /// Open ones first, as they stand; then the last that were taken.
 fn list(wanted: &Wanted, next: Option<&WantedView>) -> Vec<String> {
     let line = |v: &WantedView| {
-        let turn = v.pose.azimuth_rad.to_degrees().rem_euclid(360.0);
+        let far = if v.is_directed() {
+            format!("far {}", side(v.pose.azimuth_rad))
+        } else {
+            String::new()
+        };
         format!(
-            "{:>4} {:.2} m  {:>3.0}°  towards {turn:>3.0}°  {}",
+            "{:>4} {:.2} m  {:>3.0}°  {far:15}  {}",
             mark(v, next),
             v.pose.z_m,
             v.pose.theta_rad.to_degrees(),

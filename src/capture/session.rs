@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::lock::Lock;
 use super::source::LiveFrame;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
@@ -17,12 +18,15 @@ use crate::view::{RecordingFile, Sensor, ViewNotes};
 const WORKSHOP: &str = ".partial";
 /// A view that is being replaced, until the new one stands.
 const OLD: &str = "old-";
+/// A view that nobody wants any more, on its way out.
+const BAD: &str = "bad-";
 
 /// An open recording.
 pub struct Session {
     root: PathBuf,
     making: Option<Making>,
     remarks: Vec<String>,
+    _lock: Lock,
 }
 
 struct Making {
@@ -38,11 +42,17 @@ impl Session {
     /// Begin a recording in a new or empty folder, or go on with the one that is there.
     ///
     /// # Errors
-    /// When something else is in the folder, another sensor took what is there, or it cannot be
-    /// written.
+    /// When something else is in the folder, another sensor took what is there, another capture
+    /// is writing into it, or it cannot be written.
     pub fn open(root: &Path, sensor: &Sensor) -> Result<Self> {
+        if root.exists() && !root.is_dir() {
+            let remedy = "choose a new folder for the recording";
+            return Err(Error::recording(root, "this is a file", remedy));
+        }
         fs::create_dir_all(root).map_err(|e| failed(root, e))?;
-        let mut session = Session { root: root.into(), making: None, remarks: Vec::new() };
+        let lock = Lock::hold(root)?;
+        let mut session =
+            Session { root: root.into(), making: None, remarks: Vec::new(), _lock: lock };
         let description = root.join(DESCRIPTION);
         if description.is_file() {
             session.same_sensor(&read_description(&description)?, sensor)?;
@@ -94,6 +104,7 @@ impl Session {
                     self.remarks.push(format!("view {view} was being replaced; the old one stays"));
                 }
                 Some(_) => {}
+                None if name.starts_with(BAD) => {}
                 None => self
                     .remarks
                     .push(format!("half of view {name} from an interrupted run was removed")),
@@ -159,11 +170,29 @@ impl Session {
         if replaced {
             fs::rename(&place, &old).map_err(|e| failed(&place, e))?;
         }
-        fs::rename(&making.folder, &place).map_err(|e| failed(&place, e))?;
+        if let Err(e) = fs::rename(&making.folder, &place) {
+            if replaced {
+                let _ = fs::rename(&old, &place);
+            }
+            return Err(failed(&place, e));
+        }
         self.making = None;
         if replaced {
             fs::remove_dir_all(&old).map_err(|e| failed(&old, e))?;
         }
+        sync(&self.root)
+    }
+
+    /// Throw a whole view away, at once: it shall not count as taken, however this run ends.
+    ///
+    /// # Errors
+    /// When it cannot be moved; it then stands as it stood.
+    pub fn reject(&mut self, name: &str) -> Result<()> {
+        let workshop = self.root.join(WORKSHOP);
+        fs::create_dir_all(&workshop).map_err(|e| failed(&workshop, e))?;
+        let (place, bad) = (self.root.join(name), workshop.join(format!("{BAD}{name}")));
+        fs::rename(&place, &bad).map_err(|e| failed(&place, e))?;
+        fs::remove_dir_all(&bad).map_err(|e| failed(&bad, e))?;
         sync(&self.root)
     }
 
@@ -212,12 +241,14 @@ impl Making {
                 for image in entries(&kind)? {
                     sync(&image)?;
                 }
+                sync(&kind)?;
             }
         }
         if self.infrared > 0 {
             write_synced(&self.folder.join("ir.txt"), &self.infrared_list)?;
         }
-        write_synced(&self.folder.join(DEPTH_LIST), &self.depth_list)
+        write_synced(&self.folder.join(DEPTH_LIST), &self.depth_list)?;
+        sync(&self.folder)
     }
 }
 
@@ -226,7 +257,11 @@ fn write_synced(path: &Path, text: &str) -> Result<()> {
     sync(path)
 }
 
+/// Of folders too, where they can be opened.
 fn sync(path: &Path) -> Result<()> {
+    if cfg!(not(unix)) && path.is_dir() {
+        return Ok(());
+    }
     fs::File::open(path).and_then(|file| file.sync_all()).map_err(|e| failed(path, e))
 }
 

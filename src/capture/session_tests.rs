@@ -71,3 +71,37 @@ fn another_sensor_or_somebodys_folder_is_refused() {
     fs::write(folder.path().join("thesis.tex"), "").unwrap();
     assert!(Session::open(folder.path(), &sensor).is_err());
 }
+
+#[test]
+fn two_captures_into_one_recording_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path().join("rec");
+    let mut first = Session::open(&root, &kinect_v1(4)).unwrap();
+    first.begin("a").unwrap();
+    let second = Session::open(&root, &kinect_v1(4));
+    if cfg!(unix) {
+        let refused = second.err().unwrap().to_string();
+        assert!(refused.contains("another capture is writing into it"), "{refused}");
+    }
+    assert!(root.join(WORKSHOP).join("a").is_dir(), "the first one's half view is untouched");
+    drop(first);
+    Session::open(&root, &kinect_v1(4)).unwrap();
+}
+
+#[test]
+fn a_rejected_view_is_gone_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let sensor = kinect_v1(4);
+    let mut session = Session::open(folder.path(), &sensor).unwrap();
+    take(&mut session, "a", 5000);
+    take(&mut session, "b", 5000);
+    session.reject("a").unwrap();
+    assert_eq!(session.taken().unwrap(), ["b"]);
+    drop(session);
+    // As a kill between the rename and the removal leaves it.
+    fs::create_dir_all(folder.path().join(WORKSHOP)).unwrap();
+    fs::rename(folder.path().join("b"), folder.path().join(WORKSHOP).join("bad-b")).unwrap();
+    let session = Session::open(folder.path(), &sensor).unwrap();
+    assert!(session.taken().unwrap().is_empty() && session.remarks().is_empty());
+    assert!(Session::open(Path::new("/dev/null"), &sensor).is_err());
+}

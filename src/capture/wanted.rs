@@ -1,8 +1,4 @@
-//! The views still wanted: the paper's grid, those a diagnosis advised, or any still pose.
-
-use std::path::Path;
-
-use serde::Deserialize;
+//! The views still wanted: a grid's, a list's, or any still pose.
 
 use crate::error::{Error, Result};
 use crate::plane::Plane;
@@ -61,8 +57,22 @@ pub struct Tolerance {
     pub azimuth_rad: Option<f64>,
 }
 
-/// Four fifths of half the grid's pitch: every cell is hit by hand, and no pose belongs to two.
+/// Four fifths of half the paper's pitch: every cell is hit by hand, and no pose belongs to two.
 const GRID: Tolerance = Tolerance { z_m: 0.2, theta_rad: 0.07, azimuth_rad: None };
+
+/// The same share of a finer pitch.
+fn within(values: &[f64], widest: f64) -> f64 {
+    let gaps = values.windows(2).map(|w| 0.4 * (w[1] - w[0]));
+    gaps.fold(widest, f64::min)
+}
+
+/// In order, each once: what two names cannot tell apart is one.
+fn distinct(values: &[f64], unit: f64) -> Vec<f64> {
+    let mut values = values.to_vec();
+    values.sort_by(f64::total_cmp);
+    values.dedup_by_key(|v| (*v / unit).round() as i64);
+    values
+}
 
 /// A view that shall be taken.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,7 +98,7 @@ pub enum ViewState {
 }
 
 impl WantedView {
-    fn new(pose: Pose, tolerance: Tolerance, why: Option<String>) -> Self {
+    pub(super) fn new(pose: Pose, tolerance: Tolerance, why: Option<String>) -> Self {
         let name = pose.name(tolerance.azimuth_rad.is_some());
         WantedView { name, pose, tolerance, why, state: ViewState::Open }
     }
@@ -101,9 +111,14 @@ impl WantedView {
             && self.turn(pose).abs() <= self.tolerance.azimuth_rad.unwrap_or(f64::INFINITY)
     }
 
+    /// Does the direction of its tilt matter?
+    pub fn is_directed(&self) -> bool {
+        self.tolerance.azimuth_rad.is_some() && self.pose.theta_rad > DIRECTED_RAD
+    }
+
     /// How far the direction of the tilt is off, rad in (-pi, pi]; 0 where it does not matter.
     pub fn turn(&self, pose: &Pose) -> f64 {
-        if self.tolerance.azimuth_rad.is_none() || self.pose.theta_rad < DIRECTED_RAD {
+        if !self.is_directed() {
             return 0.0;
         }
         let (sin, cos) = (self.pose.azimuth_rad - pose.azimuth_rad).sin_cos();
@@ -127,13 +142,20 @@ pub struct Wanted {
 }
 
 impl Wanted {
-    /// Every distance, m, at every tilt, rad, whatever its direction.
+    /// Every distance, m, at every tilt, rad, whatever its direction; whole centimetres and
+    /// degrees, and each once.
     pub fn grid(distances_m: &[f64], tilts_rad: &[f64]) -> Self {
-        let view = |z_m: f64, theta_rad: f64| {
-            let pose = Pose { z_m, theta_rad, azimuth_rad: 0.0 };
-            WantedView::new(pose, GRID, None)
+        let distances = distinct(distances_m, 0.01);
+        let tilts = distinct(tilts_rad, 1f64.to_radians());
+        let tolerance = Tolerance {
+            z_m: within(&distances, GRID.z_m),
+            theta_rad: within(&tilts, GRID.theta_rad),
+            azimuth_rad: None,
         };
-        let views = distances_m.iter().flat_map(|&z| tilts_rad.iter().map(move |&t| view(z, t)));
+        let view = |z_m: f64, theta_rad: f64| {
+            WantedView::new(Pose { z_m, theta_rad, azimuth_rad: 0.0 }, tolerance, None)
+        };
+        let views = distances.iter().flat_map(|&z| tilts.iter().map(move |&t| view(z, t)));
         Wanted { views: views.collect(), any: false }
     }
 
@@ -147,42 +169,6 @@ impl Wanted {
     /// Whatever holds still and is not there yet.
     pub fn any() -> Self {
         Wanted { views: Vec::new(), any: true }
-    }
-
-    /// What a diagnosis would like to see next (`diagnosis.json`).
-    ///
-    /// # Errors
-    /// When it is no diagnosis, or advises nothing.
-    pub fn advised(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
-        let said: Advice = serde_json::from_str(&text).map_err(|e| Error::Json {
-            path: path.into(),
-            line: e.line(),
-            what: e.to_string(),
-            remedy: "give the diagnosis.json that kinoise diagnose wrote",
-        })?;
-        let mut views: Vec<WantedView> = Vec::new();
-        for advice in said.findings.into_iter().filter_map(|f| f.next_view) {
-            let Advised { z_m, theta_rad, azimuth_rad, why } = advice;
-            let tolerance = Tolerance {
-                z_m: 0.1 * z_m,
-                theta_rad: 5f64.to_radians(),
-                azimuth_rad: Some(20f64.to_radians()),
-            };
-            let view = WantedView::new(Pose { z_m, theta_rad, azimuth_rad }, tolerance, Some(why));
-            if views.iter().all(|v| v.name != view.name) {
-                views.push(view);
-            }
-        }
-        if views.is_empty() {
-            return Err(Error::Json {
-                path: path.into(),
-                line: 0,
-                what: "the diagnosis advises no further view".into(),
-                remedy: "leave --advise out to take the paper's grid",
-            });
-        }
-        Ok(Wanted { views, any: false })
     }
 
     /// Mark what is on the disk already.
@@ -270,20 +256,22 @@ impl Wanted {
 /// Two poses nearer than this are one view.
 const ANY: Tolerance = Tolerance { z_m: 0.05, theta_rad: 0.05, azimuth_rad: Some(0.35) };
 
-#[derive(Deserialize)]
-struct Advice {
-    findings: Vec<Finding>,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-#[derive(Deserialize)]
-struct Finding {
-    next_view: Option<Advised>,
-}
-
-#[derive(Deserialize)]
-struct Advised {
-    z_m: f64,
-    theta_rad: f64,
-    azimuth_rad: f64,
-    why: String,
+    /// However fine the grid is, no pose belongs to two of its views.
+    #[test]
+    fn a_fine_grid_has_narrow_cells_and_each_name_once() {
+        let wanted = Wanted::grid(&[1.1, 1.0, 1.001, 1.2], &[0.0, 0.0, 0.05]);
+        let names: Vec<&str> = wanted.views.iter().map(|v| v.name.as_str()).collect();
+        assert_eq!(names, ["z100-t00", "z100-t03", "z110-t00", "z110-t03", "z120-t00", "z120-t03"]);
+        for k in 0..=300 {
+            let z_m = 0.95 + 0.001 * f64::from(k);
+            let pose = Pose { z_m, theta_rad: 0.024, azimuth_rad: 0.0 };
+            assert!(wanted.views.iter().filter(|v| v.fits(&pose)).count() <= 1, "{pose:?}");
+        }
+        let Tolerance { z_m, theta_rad, .. } = Wanted::paper().views[0].tolerance;
+        assert!(z_m == GRID.z_m && (theta_rad - GRID.theta_rad).abs() < 1e-3, "the paper's stay");
+    }
 }

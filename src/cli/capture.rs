@@ -3,15 +3,16 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use anyhow::bail;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use kinoise::capture::{
     Audience, Ending, FreenectOptions, FreenectSource, Growing, Guide, Outcome, Playback, Queued,
-    Session, Shutter, Source, ViewState, Wanted, capture,
+    Session, Shutter, Source, ViewState, capture,
 };
 use kinoise::io::Assumed;
 use serde_json::json;
 
 use super::capture_audience::{Log, Screen};
+use super::capture_views::Views;
 use super::common::{Global, Input, say};
 use super::terminal;
 
@@ -49,35 +50,6 @@ pub struct Arguments {
     input: Input,
 }
 
-#[derive(Debug, Args)]
-struct Views {
-    /// Which views are wanted
-    #[arg(long, value_enum, default_value_t = ViewsArgument::Paper)]
-    views: ViewsArgument,
-    /// Own distances in m, in place of the grid's
-    #[arg(long, value_delimiter = ',', value_name = "M,M,..")]
-    distances: Vec<f64>,
-    /// Own tilts in degrees, in place of the grid's
-    #[arg(long, value_delimiter = ',', value_name = "DEG,..")]
-    tilts: Vec<f64>,
-    /// The views that a diagnosis advised
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["views", "distances", "tilts"])]
-    advise: Option<PathBuf>,
-    /// Take this view again; the old one stays until the new one is whole; repeatable
-    #[arg(long, value_name = "VIEW")]
-    retake: Vec<String>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
-enum ViewsArgument {
-    /// 1 to 4 m by 0.5 m, 0 to 80 degrees by 10: 63 views
-    Paper,
-    /// 1 to 4 m by 1 m, 0, 30, 60 and 75 degrees: 16 views
-    Quick,
-    /// Every still pose that is not there yet
-    Any,
-}
-
 #[derive(Debug, Clone)]
 enum SourceArgument {
     Freenect,
@@ -98,41 +70,6 @@ impl FromStr for SourceArgument {
     }
 }
 
-impl Views {
-    fn wanted(&self) -> anyhow::Result<Wanted> {
-        if let Some(path) = &self.advise {
-            return Ok(Wanted::advised(path)?);
-        }
-        if self.views == ViewsArgument::Any {
-            if !self.distances.is_empty() || !self.tilts.is_empty() {
-                bail!("--views any: it knows no grid; leave --distances and --tilts out");
-            }
-            return Ok(Wanted::any());
-        }
-        let (mut distances, mut tilts): (Vec<f64>, Vec<f64>) = match self.views {
-            ViewsArgument::Quick => (vec![1.0, 2.0, 3.0, 4.0], vec![0.0, 30.0, 60.0, 75.0]),
-            _ => (
-                (0..7).map(|i| 1.0 + 0.5 * f64::from(i)).collect(),
-                (0..9).map(|i| f64::from(10 * i)).collect(),
-            ),
-        };
-        if !self.distances.is_empty() {
-            distances.clone_from(&self.distances);
-        }
-        if !self.tilts.is_empty() {
-            tilts.clone_from(&self.tilts);
-        }
-        if distances.iter().any(|z| !(0.1..=9.99).contains(z)) {
-            bail!("--distances: a distance lies between 0.1 and 9.99 m");
-        }
-        if tilts.iter().any(|t| !(0.0..=88.0).contains(t)) {
-            bail!("--tilts: a tilt lies between 0 and 88 degrees");
-        }
-        let tilts: Vec<f64> = tilts.iter().map(|t| t.to_radians()).collect();
-        Ok(Wanted::grid(&distances, &tilts))
-    }
-}
-
 /// An hour at 30 Hz.
 const MOST_FRAMES: usize = 108_000;
 
@@ -143,13 +80,15 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
         }
     }
     let mut wanted = arguments.views.wanted()?;
-    terminal::heed_signals();
+    into_itself(arguments)?;
     let screen = !arguments.plain && terminal::is_interactive();
     let mut source = source(arguments, screen)?;
+    // Until here there is nothing to lose, and Ctrl-C ends the wait for a first image.
+    terminal::heed_signals();
+    let told = source.remarks().len();
     let mut session = Session::open(&arguments.recording, source.sensor())?;
-    for remark in source.remarks().iter().chain(session.remarks()) {
-        say(format!("note: {remark}"));
-    }
+    note(source.remarks());
+    note(session.remarks());
     wanted.mark_taken(&session.taken()?);
     for view in &arguments.views.retake {
         wanted.take_again(view, &session.taken()?)?;
@@ -167,12 +106,41 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
         capture(source.as_mut(), &mut session, &mut guide, audience.as_mut(), patience)
     };
     drop(audience);
+    note(&source.remarks()[told..]);
     if source.dropped() > 0 {
         say(format!("note: {} frames came too fast and were lost", source.dropped()));
     }
     let kept = session.taken()?;
     report(global, arguments, &guide, &done, &kept, source.as_ref())?;
     finish(done.ending, &guide, &arguments.recording, kept.len())
+}
+
+/// Told one by one, up to so many.
+const MOST_NOTES: usize = 12;
+
+fn note(remarks: &[String]) {
+    for remark in remarks.iter().take(MOST_NOTES) {
+        say(format!("note: {remark}"));
+    }
+    if remarks.len() > MOST_NOTES {
+        say(format!("note: and {} more like these", remarks.len() - MOST_NOTES));
+    }
+}
+
+/// What is played or watched must not grow by what is taken from it.
+fn into_itself(arguments: &Arguments) -> anyhow::Result<()> {
+    let (SourceArgument::Folder(from) | SourceArgument::Play(from)) = &arguments.source else {
+        return Ok(());
+    };
+    if let (Ok(from), Ok(to)) = (from.canonicalize(), arguments.recording.canonicalize())
+        && from == to
+    {
+        bail!(
+            "{}: this is the source; choose another folder for the recording",
+            arguments.recording.display()
+        );
+    }
+    Ok(())
 }
 
 fn source(arguments: &Arguments, paced: bool) -> anyhow::Result<Box<dyn Source>> {
@@ -253,7 +221,8 @@ fn finish(ending: Ending, guide: &Guide, root: &Path, kept: usize) -> anyhow::Re
         if kept == 1 { "view is" } else { "views are" },
         root.display()
     );
-    let on = format!("{stands}, {missing} still wanted; the same command goes on");
+    let still = if wanted.any { String::new() } else { format!(", {missing} still wanted") };
+    let on = format!("{stands}{still}; the same command goes on");
     match ending {
         Ending::Complete => {
             let skipped = wanted.count(ViewState::Skipped);

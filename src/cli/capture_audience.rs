@@ -13,6 +13,7 @@ fn words(event: &Event) -> Option<String> {
         Event::Begun(_) | Event::Keep | Event::Done => None,
         Event::Finished(view) => Some(format!("{view} taken")),
         Event::Abandoned { view, why } => Some(format!("{view} thrown away: {why}")),
+        Event::Rejected(view) => Some(format!("{view} thrown away, to be taken again")),
         Event::Drift(d) => Some(format!(
             "the plane at {:.2} m drifts by {:+.2} ± {:.2} mm/min over {:.0} s: {}",
             d.z_m,
@@ -51,6 +52,8 @@ impl Audience for Log {
         }
     }
 
+    fn waiting(&mut self, _: &Guide, _: Duration) {}
+
     fn command(&mut self) -> Option<Command> {
         None
     }
@@ -60,6 +63,10 @@ impl Audience for Log {
     }
 }
 
+/// A silence longer than this is shown.
+const SILENCE: Duration = Duration::from_secs(2);
+/// Until there is news.
+const HINT: &str = "just switched on? leave the board standing for 20 s: the drift is measured";
 /// How long a taken view is shown.
 const FLASH: Duration = Duration::from_millis(700);
 /// Faster than this nobody reads, and terminals fall behind.
@@ -78,27 +85,14 @@ impl Screen {
     pub fn new(title: String) -> Self {
         Screen {
             terminal: Terminal::take(),
-            around: Surroundings { title, ..Surroundings::default() },
+            around: Surroundings { title, news: HINT.into(), ..Surroundings::default() },
             taken_at: None,
             drawn_at: None,
             bell: false,
         }
     }
-}
 
-impl Audience for Screen {
-    fn event(&mut self, event: &Event) {
-        if let Event::Finished(view) = event {
-            self.around.flash = Some(view.clone());
-            self.taken_at = Some(Instant::now());
-            self.bell = true;
-        }
-        if let Some(news) = words(event) {
-            self.around.news = news;
-        }
-    }
-
-    fn frame(&mut self, guide: &Guide) {
+    fn draw(&mut self, guide: &Guide) {
         if self.taken_at.is_some_and(|t| t.elapsed() > FLASH) {
             (self.taken_at, self.around.flash) = (None, None);
         }
@@ -110,9 +104,35 @@ impl Audience for Screen {
             self.drawn_at = Some(Instant::now());
         }
     }
+}
+
+impl Audience for Screen {
+    fn event(&mut self, event: &Event) {
+        if let Event::Finished(view) = event {
+            self.around.flash = Some(view.clone());
+            self.taken_at = Some(Instant::now());
+            self.bell = true;
+        }
+        if let Event::Rejected(_) = event {
+            (self.taken_at, self.around.flash) = (None, None);
+        }
+        if let Some(news) = words(event) {
+            self.around.news = news;
+        }
+    }
+
+    fn frame(&mut self, guide: &Guide) {
+        self.around.silent_s = None;
+        self.draw(guide);
+    }
+
+    fn waiting(&mut self, guide: &Guide, silence: Duration) {
+        self.around.silent_s = (silence > SILENCE).then_some(silence.as_secs());
+        self.draw(guide);
+    }
 
     fn command(&mut self) -> Option<Command> {
-        match self.terminal.as_ref()?.key()? {
+        match self.terminal.as_mut()?.key()? {
             'r' => Some(Command::Again),
             's' => Some(Command::Skip),
             'q' => Some(Command::Quit),

@@ -3,6 +3,7 @@
 mod calibrate;
 mod capture;
 mod capture_audience;
+mod capture_views;
 mod common;
 mod compare;
 mod correct;

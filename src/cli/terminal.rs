@@ -1,5 +1,6 @@
 //! The terminal while capturing: single keys, a screen of its own, and the way back from both.
 
+use std::collections::VecDeque;
 use std::io::{IsTerminal, Read, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -104,12 +105,14 @@ pub use system::heed_signals;
 
 const ENTER: &str = "\x1b[?1049h\x1b[?25l\x1b[2J";
 const LEAVE: &str = "\x1b[0m\x1b[?25h\x1b[?1049l";
+const ESCAPE: u8 = 0x1b;
 /// What the oldest terminals have.
 const USUAL: (usize, usize) = (80, 24);
 
 /// The terminal's other screen, until dropped.
 pub struct Terminal {
     _keys: system::SingleKeys,
+    pressed: VecDeque<char>,
 }
 
 impl Terminal {
@@ -117,7 +120,7 @@ impl Terminal {
     pub fn take() -> Option<Self> {
         let keys = system::SingleKeys::new()?;
         write(ENTER);
-        Some(Terminal { _keys: keys })
+        Some(Terminal { _keys: keys, pressed: VecDeque::new() })
     }
 
     /// Columns and rows.
@@ -144,12 +147,34 @@ impl Terminal {
         write(&text);
     }
 
-    /// A key that was pressed.
-    pub fn key(&self) -> Option<char> {
-        let mut byte = [0];
-        let read = std::io::stdin().lock().read(&mut byte);
-        matches!(read, Ok(1)).then(|| char::from(byte[0]).to_ascii_lowercase())
+    /// A key that was pressed, in small letters.
+    pub fn key(&mut self) -> Option<char> {
+        if self.pressed.is_empty() {
+            let mut bytes = [0; 64];
+            let read = std::io::stdin().lock().read(&mut bytes).unwrap_or(0);
+            self.pressed.extend(letters(&bytes[..read]));
+        }
+        self.pressed.pop_front()
     }
+}
+
+/// Function and arrow keys send escape sequences with letters in them (F3: ESC O R): these are
+/// no letters.
+fn letters(bytes: &[u8]) -> Vec<char> {
+    let mut letters = Vec::new();
+    let mut bytes = bytes.iter();
+    while let Some(&byte) = bytes.next() {
+        if byte != ESCAPE {
+            letters.push(char::from(byte).to_ascii_lowercase());
+            continue;
+        }
+        match bytes.next() {
+            Some(b'O') => _ = bytes.next(),
+            Some(b'[') => _ = bytes.find(|b| (0x40..=0x7e).contains(*b)),
+            _ => {}
+        }
+    }
+    letters
 }
 
 impl Drop for Terminal {
@@ -162,4 +187,18 @@ impl Drop for Terminal {
 fn write(text: &str) {
     let mut err = std::io::stderr().lock();
     let _ = err.write_all(text.as_bytes()).and_then(|()| err.flush());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_letters_are_letters() {
+        assert_eq!(letters(b"R"), ['r']);
+        // F2, F3, up, F5, Alt-q, then a key.
+        assert!(letters(b"\x1bOQ\x1bOR\x1b[A\x1b[15~\x1bq").is_empty());
+        assert_eq!(letters(b"s\x1bOSq"), ['s', 'q']);
+        assert!(letters(b"\x1b").is_empty() && letters(b"").is_empty());
+    }
 }

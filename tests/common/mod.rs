@@ -1,6 +1,7 @@
 //! What the tests share: small recordings with a known truth, images of any kind, the binary.
 #![allow(dead_code)] // every test file uses a part
 
+pub mod capture;
 pub mod rays;
 pub mod speckle;
 

@@ -1,4 +1,4 @@
-/* A Kinect that is not there: what of libfreenect.h (0.5) a capture uses, for tests/capture.rs.
+/* A Kinect that is not there: what of libfreenect.h (0.5) a capture uses, for tests/capture_kinect.rs.
    Unlike fakenect it has a serial, infrared and a factory calibration, and can be pulled out.
    MOCK_FRAMES: frames it gives; MOCK_THEN: "gone" (process_events fails), "silent", "none" (no device). */
 #include <stdint.h>

@@ -1,0 +1,129 @@
+//! The views that a diagnosis would like to see next.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::wanted::{Pose, Tolerance, Wanted, WantedView};
+use crate::error::{Error, Result};
+
+/// What of `diagnosis.json` says so.
+#[derive(Deserialize)]
+struct Diagnosis {
+    findings: Vec<Finding>,
+    /// What it looked at.
+    #[serde(default)]
+    views: Vec<Known>,
+}
+
+#[derive(Deserialize)]
+struct Finding {
+    next_view: Option<Advised>,
+}
+
+#[derive(Deserialize)]
+struct Advised {
+    z_m: f64,
+    theta_rad: f64,
+    azimuth_rad: f64,
+    why: String,
+}
+
+#[derive(Deserialize)]
+struct Known {
+    name: String,
+}
+
+impl Wanted {
+    /// What a diagnosis would like to see next (`diagnosis.json`). A view that it has seen already
+    /// is not the one it asks for: another at the same pose is numbered.
+    ///
+    /// # Errors
+    /// When it is no diagnosis, advises nothing, or a pose that cannot be.
+    pub fn advised(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+        let refuse = |line: usize, what: String, remedy: &'static str| Error::Json {
+            path: path.into(),
+            line,
+            what,
+            remedy,
+        };
+        let remedy = "give the diagnosis.json that kinoise diagnose wrote";
+        let said: Diagnosis =
+            serde_json::from_str(&text).map_err(|e| refuse(e.line(), e.to_string(), remedy))?;
+        let mut views: Vec<WantedView> = Vec::new();
+        for advised in said.findings.into_iter().filter_map(|f| f.next_view) {
+            if !advised.is_possible() {
+                let what =
+                    format!("no board stands at {} m, {} rad", advised.z_m, advised.theta_rad);
+                return Err(refuse(0, what, remedy));
+            }
+            let mut view = advised.view();
+            view.name = unseen(&view.name, &said.views);
+            if views.iter().all(|v| v.name != view.name) {
+                views.push(view);
+            }
+        }
+        if views.is_empty() {
+            let remedy = "leave --advise out to take the paper's grid";
+            return Err(refuse(0, "the diagnosis advises no further view".into(), remedy));
+        }
+        Ok(Wanted { views, any: false })
+    }
+}
+
+impl Advised {
+    fn is_possible(&self) -> bool {
+        (0.1..=9.99).contains(&self.z_m)
+            && (0.0..=88f64.to_radians()).contains(&self.theta_rad)
+            && self.azimuth_rad.abs() < 100.0
+    }
+
+    fn view(self) -> WantedView {
+        let Advised { z_m, theta_rad, azimuth_rad, why } = self;
+        let tolerance = Tolerance {
+            z_m: 0.1 * z_m,
+            theta_rad: 5f64.to_radians(),
+            azimuth_rad: Some(20f64.to_radians()),
+        };
+        WantedView::new(Pose { z_m, theta_rad, azimuth_rad }, tolerance, Some(why))
+    }
+}
+
+/// `name`, or `name-2` and on, that is none of the views seen.
+fn unseen(name: &str, seen: &[Known]) -> String {
+    let is_new = |candidate: &String| seen.iter().all(|v| v.name != *candidate);
+    let numbered = (2..seen.len() + 3).map(|n| format!("{name}-{n}"));
+    std::iter::once(name.to_string()).chain(numbered).find(is_new).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(text: &str) -> Result<Vec<String>> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        Ok(Wanted::advised(file.path())?.views.into_iter().map(|v| v.name).collect())
+    }
+
+    const FACING: &str =
+        r#"{"next_view": {"z_m": 1.5, "theta_rad": 0.0, "azimuth_rad": 0.0, "why": "a or b"}}"#;
+
+    #[test]
+    fn what_the_diagnosis_has_seen_does_not_count_as_taken() {
+        let said =
+            |views: &str| format!(r#"{{"findings": [{FACING}, {FACING}], "views": {views}}}"#);
+        assert_eq!(names(&said("[]")).unwrap(), ["z150-t00"]);
+        assert_eq!(names(&said(r#"[{"name": "z150-t00"}]"#)).unwrap(), ["z150-t00-2"]);
+        let twice = said(r#"[{"name": "z150-t00"}, {"name": "z150-t00-2"}]"#);
+        assert_eq!(names(&twice).unwrap(), ["z150-t00-3"]);
+    }
+
+    #[test]
+    fn a_pose_that_cannot_be_is_refused() {
+        let far = FACING.replace("1.5", "-3.0");
+        let refused = names(&format!(r#"{{"findings": [{far}]}}"#)).unwrap_err().to_string();
+        assert!(refused.contains("no board stands at -3 m"), "{refused}");
+    }
+}
