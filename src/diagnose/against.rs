@@ -24,7 +24,6 @@ use super::tiles::SIDE;
 use crate::error::{Error, Result};
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
-use crate::terms::Axis;
 use crate::view::{Recording, Sensor};
 
 /// The simulated views, in the order of the real ones they belong to.
@@ -308,7 +307,7 @@ impl Baseline {
                 && (own.size.max(1e-6) / lost.size.max(1e-6)).ln().abs() < LOSSES_ALIKE
         });
         // What lies beside the target is no tile's.
-        let on_target = lost.axis != Axis::EdgeDistance;
+        let on_target = lost.family != Some("occlusion-shadow");
         same || on_target && lost_share(real) < 1.2 * lost_share(&self.survey) + LOST_BY_LOT
     }
 
