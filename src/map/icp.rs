@@ -106,12 +106,8 @@ pub fn align<T: Target>(
     while iterations < criteria.most_iterations {
         let sums = Round { target, criteria, pose: &pose, scale }.sum(source, &mut memory);
         iterations += 1;
-        if sums.pairs < FEWEST_PAIRS {
-            ending = Ending::TooFewPairs;
-            last = None;
-            break;
-        }
-        let Some(solution) = sums.solve() else {
+        let enough = sums.pairs >= FEWEST_PAIRS;
+        let Some(solution) = enough.then(|| sums.solve()).flatten() else {
             ending = Ending::TooFewPairs;
             last = None;
             break;
