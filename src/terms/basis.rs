@@ -191,27 +191,13 @@ impl Basis {
                     *g = lift * p.right.powi(i) * p.down.powi(j);
                 }
             }
+            // A patch sees the mean over the disparities, or columns, it spans.
             Basis::Locking { period_px, .. } => {
-                let (s, c) = (TAU * p.disparity / period_px).sin_cos();
-                let (mut sk, mut ck) = (s, c);
-                for (k, pair) in out.chunks_exact_mut(2).enumerate() {
-                    // A patch sees the mean over the disparities it spans.
-                    let seen = smear(p, (k + 1) as f64 / period_px);
-                    pair[0] = seen * sk;
-                    pair[1] = seen * ck;
-                    (sk, ck) = (sk * c + ck * s, ck * c - sk * s);
-                }
+                waves(p.disparity / period_px, |order| smear(p, order / period_px), out);
             }
             Basis::Banding { period_px, .. } => {
-                let (s, c) = (TAU * p.u / period_px).sin_cos();
-                let (mut sk, mut ck) = (s, c);
-                for (k, pair) in out.chunks_exact_mut(2).enumerate() {
-                    let order = (k + 1) as f64;
-                    let seen = BAND_PX / order * sinc(order * p.side / period_px);
-                    pair[0] = seen * sk;
-                    pair[1] = seen * ck;
-                    (sk, ck) = (sk * c + ck * s, ck * c - sk * s);
-                }
+                let seen = |order| BAND_PX / order * sinc(order * p.side / period_px);
+                waves(p.u / period_px, seen, out);
             }
             Basis::EdgeMixing { width_px } => out[0] = (-p.edge / width_px).exp(),
             Basis::RangeExponent { pivot_m, .. } => powers(1.0, (p.z / pivot_m).ln(), out),
@@ -376,6 +362,19 @@ fn sinc(cycles: f64) -> f64 {
 
 fn smear(p: &Place, frequency: f64) -> f64 {
     sinc(frequency * p.slope[0] * p.side) * sinc(frequency * p.slope[1] * p.side)
+}
+
+/// Sine and cosine of a phase, in periods, and of its multiples: each as large as `size` has it for
+/// its order.
+fn waves(phase: f64, size: impl Fn(f64) -> f64, out: &mut [f64]) {
+    let (s, c) = (TAU * phase).sin_cos();
+    let (mut sk, mut ck) = (s, c);
+    for (k, pair) in out.chunks_exact_mut(2).enumerate() {
+        let size = size((k + 1) as f64);
+        pair[0] = size * sk;
+        pair[1] = size * ck;
+        (sk, ck) = (sk * c + ck * s, ck * c - sk * s);
+    }
 }
 
 /// Number of the node below a value, and the way to the next.
