@@ -2,6 +2,8 @@
 //!
 //! Every statistic is one number a view, so that views are the sample.
 
+use std::f32::consts::FRAC_1_SQRT_2;
+
 use rayon::prelude::*;
 
 use super::field::Field;
@@ -137,29 +139,28 @@ const STILL: f64 = 0.6;
 /// taken for it; the first frame where there is but one, or where nearly all stands still.
 pub fn moving(frames: &[Vec<f32>], s: &Structure) -> Vec<f32> {
     match frames {
-        [a, b, ..] if s.lagged[0].is_none_or(|c| c < STILL) => {
-            a.iter().zip(b).map(|(a, b)| (b - a) * std::f32::consts::FRAC_1_SQRT_2).collect()
-        }
+        [a, b, ..] if s.lagged[0].is_none_or(|c| c < STILL) => change(a, b),
         _ => frames[0].clone(),
     }
 }
 
 /// What changes between a view's frames, as orthogonal images that have one frame's variance each.
 fn changes(frames: &[Vec<f32>]) -> Vec<Vec<f32>> {
-    let half = std::f32::consts::FRAC_1_SQRT_2;
-    let less = |a: &[f32], b: &[f32]| -> Vec<f32> {
-        a.iter().zip(b).map(|(a, b)| (b - a) * half).collect()
-    };
     match frames {
         [a, b, c, d, ..] => {
             let sum = |a: &[f32], b: &[f32]| -> Vec<f32> {
-                a.iter().zip(b).map(|(a, b)| (a + b) * half).collect()
+                a.iter().zip(b).map(|(a, b)| (a + b) * FRAC_1_SQRT_2).collect()
             };
-            vec![less(a, b), less(c, d), less(&sum(a, b), &sum(c, d))]
+            vec![change(a, b), change(c, d), change(&sum(a, b), &sum(c, d))]
         }
-        [a, b, ..] => vec![less(a, b)],
+        [a, b, ..] => vec![change(a, b)],
         _ => Vec::new(),
     }
+}
+
+/// From one frame to another, with the variance of one.
+fn change(a: &[f32], b: &[f32]) -> Vec<f32> {
+    a.iter().zip(b).map(|(a, b)| (b - a) * FRAC_1_SQRT_2).collect()
 }
 
 /// Residuals as an image, px, without what is smooth and what is known.
