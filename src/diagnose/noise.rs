@@ -134,32 +134,79 @@ const LEAST_FIXED: f64 = 0.001;
 /// A share that stands still beside one that changes slowly is known to this.
 const BESIDE_ANOTHER: f64 = 0.05;
 
-fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
-    let mut found = Vec::new();
-    let fixed = Mean::of(views, |s| s.fixed_px2);
-    let variance = Mean::of(views, |s| Some(s.variance_px2)).map_or(0.0, |m| m.value);
-    let mut fixed_px2 = 0.0;
-    if let Some(m) = fixed {
+/// Variance that pixels or lines share, as it is looked for.
+struct Shared {
+    families: Vec<&'static str>,
+    statistic: Statistic,
+    axis: Axis,
+    /// What the model has of it, px^2.
+    expected_px2: f64,
+    /// Of all variance: a smaller share is not worth a word.
+    least: f64,
+    words: Option<&'static str>,
+}
+
+impl Shared {
+    /// `m` of the noise's `variance_px2`, both px^2.
+    fn found(self, m: &Mean, variance_px2: f64, level: f64) -> Option<Hanging> {
+        let p = m.p_above(self.expected_px2);
+        let share = (m.value - self.expected_px2) / variance_px2.max(1e-12);
         let sigma = m.value.max(0.0).sqrt();
-        let known_px = known.parameter("fixed-pattern-noise", "sigma_px").unwrap_or(0.0);
-        let expected = known_px * known_px;
-        let p = m.p_above(expected);
-        let share = (m.value - expected) / variance.max(1e-12);
-        fixed_px2 = m.value.max(0.0);
-        if p < level && share > LEAST_FIXED {
-            found.push(Hanging {
-                families: vec!["fixed-pattern-noise"],
-                statistic: Statistic::Bias,
-                axis: Axis::Pixel,
-                interval: [0.0, 0.0],
-                parameters: one("sigma_px", sigma, 0.5 * m.std_error / sigma.max(1e-9)),
-                size_sigma: share.sqrt(),
-                p,
-                nats: nats(&m, expected),
-                words: None,
-            });
-        }
+        (p < level && share > self.least).then(|| Hanging {
+            families: self.families,
+            statistic: self.statistic,
+            axis: self.axis,
+            interval: [0.0, 0.0],
+            parameters: one("sigma_px", sigma, 0.5 * m.std_error / sigma.max(1e-9)),
+            size_sigma: share.sqrt(),
+            p,
+            nats: nats(m, self.expected_px2),
+            words: self.words.map(String::from),
+        })
     }
+}
+
+/// Of the first frame's rough residual, px^2.
+fn variance_px2(views: &[Structure]) -> f64 {
+    Mean::of(views, |s| Some(s.variance_px2)).map_or(0.0, |m| m.value)
+}
+
+/// A correlation of frames: a share of the variance.
+fn of_frames(
+    families: Vec<&'static str>,
+    interval: [f64; 2],
+    (name, share, std_error): (&str, f64, f64),
+    size: f64,
+    (p, nats): (f64, f64),
+) -> Hanging {
+    Hanging {
+        families,
+        statistic: Statistic::Correlation,
+        axis: Axis::Frame,
+        interval,
+        parameters: one(name, share, std_error),
+        size_sigma: size.max(0.0).sqrt(),
+        p,
+        nats,
+        words: None,
+    }
+}
+
+fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
+    let fixed = Mean::of(views, |s| s.fixed_px2);
+    let variance = variance_px2(views);
+    let known_px = known.parameter("fixed-pattern-noise", "sigma_px").unwrap_or(0.0);
+    let pattern = Shared {
+        families: vec!["fixed-pattern-noise"],
+        statistic: Statistic::Bias,
+        axis: Axis::Pixel,
+        expected_px2: known_px * known_px,
+        least: LEAST_FIXED,
+        words: None,
+    };
+    let mut found: Vec<Hanging> =
+        fixed.and_then(|m| pattern.found(&m, variance, level)).into_iter().collect();
+    let fixed_px2 = fixed.map_or(0.0, |m| m.value.max(0.0));
     let Some(first) = Mean::of(views, |s| s.lagged[0]) else { return found };
     let fixed_share = fixed_px2 / variance.max(1e-12);
     let frozen_known = known.parameter("frozen-noise", "fraction").unwrap_or(0.0);
@@ -173,17 +220,9 @@ fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
         let p = first.p_above(fixed_share + frozen_known + rho_known);
         let more = first.value - fixed_share - frozen_known - rho_known;
         if p < level && more > LEAST_CORRELATION {
-            found.push(Hanging {
-                families: vec!["frozen-noise", "temporal-correlation"],
-                statistic: Statistic::Correlation,
-                axis: Axis::Frame,
-                interval: [0.0, 1.0],
-                parameters: one("fraction", first.value, first.std_error),
-                size_sigma: more.max(0.0).sqrt(),
-                p,
-                nats: nats(&first, 0.0),
-                words: None,
-            });
+            let names = vec!["frozen-noise", "temporal-correlation"];
+            let fraction = ("fraction", first.value, first.std_error);
+            found.push(of_frames(names, [0.0, 1.0], fraction, more, (p, nats(&first, 0.0))));
         }
         return found;
     };
@@ -194,31 +233,16 @@ fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
     if slowly && rho_known == 0.0 {
         let s = still.max(0.0) + fixed_share;
         let rho = ((first.value - s) / (1.0 - s).max(1e-6)).clamp(0.0, 1.0);
-        found.push(Hanging {
-            families: vec!["temporal-correlation"],
-            statistic: Statistic::Correlation,
-            axis: Axis::Frame,
-            interval: [1.0, 3.0],
-            parameters: one("rho", rho, first.std_error),
-            size_sigma: rho.sqrt(),
-            p: p_falling,
-            nats: nats(&falling, 0.0),
-            words: None,
-        });
+        let name = vec!["temporal-correlation"];
+        let evidence = (p_falling, nats(&falling, 0.0));
+        found.push(of_frames(name, [1.0, 3.0], ("rho", rho, first.std_error), rho, evidence));
     }
     let floor = if slowly { BESIDE_ANOTHER } else { LEAST_CORRELATION };
     if p_still < level && still - frozen_known > floor {
-        found.push(Hanging {
-            families: vec!["frozen-noise"],
-            statistic: Statistic::Correlation,
-            axis: Axis::Frame,
-            interval: [1.0, 3.0],
-            parameters: one("fraction", still, least.std_error),
-            size_sigma: still.max(0.0).sqrt(),
-            p: p_still,
-            nats: nats(&least, fixed_share + frozen_known),
-            words: None,
-        });
+        let name = vec!["frozen-noise"];
+        let evidence = (p_still, nats(&least, fixed_share + frozen_known));
+        let fraction = ("fraction", still, least.std_error);
+        found.push(of_frames(name, [1.0, 3.0], fraction, still, evidence));
     }
     found
 }
@@ -251,66 +275,38 @@ fn still_share([c1, c2, c3]: [f64; 3], three: bool) -> f64 {
 }
 
 fn lines(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
-    let mut found: Vec<Hanging> = Vec::new();
-    found.extend(fixed_lines(views, level));
-    let variance = Mean::of(views, |s| Some(s.variance_px2)).map_or(0.0, |m| m.value);
-    let rows = Mean::of(views, |s| s.row_px2);
-    let columns = Mean::of(views, |s| s.column_px2);
+    let variance = variance_px2(views);
     let known_px = known.parameter("row-noise", "sigma_px").unwrap_or(0.0);
-    let both = [
-        (rows, vec!["row-noise"], Axis::Row, known_px * known_px),
-        (columns, vec![], Axis::Column, 0.0),
+    let line = |families, statistic, axis, expected_px2, words| Shared {
+        families,
+        statistic,
+        axis,
+        expected_px2,
+        least: LEAST_LINES,
+        words,
+    };
+    let still = "whole columns or rows err by a constant each, from one to the next";
+    let afresh = "each column is shifted as one, afresh in every frame";
+    let row = known_px * known_px;
+    let all = [
+        (
+            Mean::of(views, |s| s.lines_px2),
+            line(vec![], Statistic::Bias, Axis::Column, 0.0, Some(still)),
+        ),
+        (
+            Mean::of(views, |s| s.row_px2),
+            line(vec!["row-noise"], Statistic::Correlation, Axis::Row, row, None),
+        ),
+        (
+            Mean::of(views, |s| s.column_px2),
+            line(vec![], Statistic::Correlation, Axis::Column, 0.0, Some(afresh)),
+        ),
     ];
-    for (m, families, axis, expected) in both {
-        let Some(m) = m else { continue };
-        let p = m.p_above(expected);
-        let share = (m.value - expected) / variance.max(1e-12);
-        if p < level && share > LEAST_LINES {
-            let sigma = m.value.max(0.0).sqrt();
-            let words = families
-                .is_empty()
-                .then(|| "each column is shifted as one, afresh in every frame".to_string());
-            found.push(Hanging {
-                families,
-                statistic: Statistic::Correlation,
-                axis,
-                interval: [0.0, 0.0],
-                parameters: one("sigma_px", sigma, 0.5 * m.std_error / sigma.max(1e-9)),
-                size_sigma: share.sqrt(),
-                p,
-                nats: nats(&m, expected),
-                words,
-            });
-        }
-    }
-    found
+    all.into_iter().filter_map(|(m, line)| line.found(&m?, variance, level)).collect()
 }
 
 /// Share of the variance that lines have in common, worth a word.
 const LEAST_LINES: f64 = 0.0015;
-
-/// Columns that err by a constant each, in every view, from one to the next.
-fn fixed_lines(views: &[Structure], level: f64) -> Option<Hanging> {
-    let variance = Mean::of(views, |s| Some(s.variance_px2)).map_or(0.0, |m| m.value);
-    let m = Mean::of(views, |s| s.lines_px2)?;
-    let p = m.p_above(0.0);
-    let share = m.value / variance.max(1e-12);
-    if p > level || share < LEAST_LINES {
-        return None;
-    }
-    let sigma = m.value.sqrt();
-    Some(Hanging {
-        families: vec![],
-        statistic: Statistic::Bias,
-        axis: Axis::Column,
-        interval: [0.0, 0.0],
-        parameters: one("sigma_px", sigma, 0.5 * m.std_error / sigma.max(1e-9)),
-        size_sigma: share.sqrt(),
-        p,
-        nats: nats(&m, 0.0),
-        words: Some("whole columns or rows err by a constant each, from one to the next".into()),
-    })
-}
 
 /// Motion that is not uniform, and jitter that is no white noise, differ by this share.
 const UNEVEN: f64 = 0.2;
