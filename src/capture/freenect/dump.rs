@@ -3,6 +3,8 @@
 //! fakenect ends the whole process when FAKENECT_PATH is not set or a file is missing, and reads
 //! beyond the end of a file that is cut short. So it is only ever asked for lines that are good.
 
+use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use super::ffi::DEPTH_BYTES;
@@ -62,10 +64,15 @@ fn good(root: &Path, name: &str) -> std::result::Result<(), String> {
         return Err(format!("\"{name}\" is not a file of fakenect-record"));
     }
     if kind == "d" {
-        let bytes = std::fs::read(&file).map_err(|e| format!("{name}: {e}"))?;
-        let header = bytes.iter().position(|b| *b == b'\n').filter(|_| bytes.starts_with(b"P5"));
-        let Some(header) = header else { return Err(format!("{name} is not a PGM image")) };
-        if bytes.len() < header + 1 + DEPTH_BYTES {
+        // Of many large files the first line and the length are enough.
+        let mut header = Vec::new();
+        File::open(&file)
+            .and_then(|f| BufReader::new(f).read_until(b'\n', &mut header))
+            .map_err(|e| format!("{name}: {e}"))?;
+        if !header.starts_with(b"P5") || header.last() != Some(&b'\n') {
+            return Err(format!("{name} is not a PGM image"));
+        }
+        if length < (header.len() + DEPTH_BYTES) as u64 {
             return Err(format!("{name} is cut short ({length} bytes)"));
         }
     } else if length == 0 {
