@@ -43,7 +43,7 @@ pub struct Baseline {
 }
 
 /// Gross errors make the noise of one view in two runs differ, in log variance.
-const ANOTHER_RUN: f64 = 0.22;
+const ANOTHER_RUN: f64 = 0.12;
 
 /// Tails of two recordings are no news within this factor: gross errors come in clumps.
 const TAILS_ALIKE: f64 = 3.0;
@@ -185,6 +185,12 @@ impl Baseline {
     /// The simulated variance in the place of the model's, block by block; `false` where the
     /// simulated views hardly have any.
     pub fn variances(&mut self, survey: &mut Survey) -> bool {
+        // Of noise that hardly changes from frame to frame all is measured, in both or in neither.
+        for (real, twin) in survey.views.iter_mut().zip(&mut self.survey.views) {
+            if real.moving.is_none() || twin.moving.is_none() {
+                (real.moving, twin.moving) = (None, None);
+            }
+        }
         let theirs = self.survey.variance_data();
         let count = |data: &[ViewData]| data.iter().map(|v| v.places.len()).sum::<usize>();
         if 2 * count(&theirs) < count(&survey.variance_data()) {
@@ -196,17 +202,18 @@ impl Baseline {
             let logs: BTreeMap<(u32, u32), f64> = twin
                 .places
                 .iter()
-                .zip(twin.response.iter().zip(&twin.weight))
-                // The engine takes the mean of a logarithm for less than it is, by the error of
-                // both: here by the twin's share.
-                .map(|(p, (y, w))| (patch(p.u, p.v, side), y + 0.5 / w.max(1.0)))
+                .zip(&twin.response)
+                .map(|(p, y)| (patch(p.u, p.v, side), *y))
                 .collect();
+            // Terms that depend on the variance itself must not have the blocks' errors in them: these
+            // are in what they are fitted to.
+            let smooth = logs.values().sum::<f64>() / logs.len().max(1) as f64;
             for t in &mut real.tiles {
+                t.place.variance = t.variance * smooth.exp();
                 match logs.get(&patch(t.place.u, t.place.v, side)) {
                     Some(log) => t.variance *= log.exp(),
                     None => (t.temporal, t.rough_square) = (f64::NAN, f64::NAN),
                 }
-                t.place.variance = t.variance;
             }
         }
         true
@@ -220,9 +227,9 @@ impl Baseline {
         let mean = |v: &ViewData| v.weight.iter().sum::<f64>() / v.weight.len().max(1) as f64;
         for (view, (ours, theirs)) in survey.views.iter_mut().zip(ours.iter().zip(&theirs)) {
             let (w, t) = (mean(ours), mean(theirs));
-            if w + t > 0.0 {
+            if w > 0.0 && t > 0.0 {
                 let clumps = scatter(ours).max(scatter(theirs));
-                view.frames *= t / (w + t) / clumps;
+                view.doubt = clumps * (w + t) / t;
             }
         }
     }

@@ -13,6 +13,7 @@ use super::heldout;
 use super::known::Known;
 use super::lattice::Lattice;
 use super::layers::{BIAS_PRIOR, Survey};
+use super::lines::line_terms;
 use super::missing::missing;
 use super::next_view;
 use super::noise::{Hanging, hanging, tails};
@@ -247,14 +248,16 @@ impl<'a> Case<'a> {
         let own = Steps::of(&lattice, &structure, &self.fields, self.recording);
         let theirs = self.baseline.as_ref().map(|b| b.steps);
         let extra = |p: &Place| (own.at(p) - theirs.map_or(0.0, |s| s.at(p))).max(0.0);
-        let mut compared = false;
         let each = self.level(Self::EACH_LEVEL);
         if let Some(baseline) = &mut self.baseline {
             let more = baseline.too_much(&structure, each);
             baseline.remarks.extend(more);
             baseline.compare(&mut structure, &lattice, &mut self.known);
-            compared = baseline.variances(&mut self.survey);
         }
+        let hangs = hanging(&structure, &self.known, each);
+        self.survey.compare_frames(&self.fields, common(&structure, &hangs, &self.known));
+        let compared =
+            self.baseline.as_mut().is_some_and(|baseline| baseline.variances(&mut self.survey));
         let range_share = self.range_share(&mean.terms);
         // A range in place of a depth makes a disparity, and its noise, smaller.
         let stretch = |p: &Place| {
@@ -262,8 +265,6 @@ impl<'a> Case<'a> {
             (1.0 + range_share.clamp(0.0, 1.0) * (ray - 1.0)).powi(2)
         };
         self.survey.roughen(&self.fields, &mean.px, extra, stretch);
-        let hangs = hanging(&structure, &self.known, each);
-        self.survey.compare_frames(&self.fields, common(&structure, &hangs, &self.known));
         if let Some(baseline) = self.baseline.as_ref().filter(|_| compared) {
             baseline.doubt(&mut self.survey);
         }
@@ -339,12 +340,24 @@ impl<'a> Case<'a> {
     }
 
     /// What neither a mean nor a variance shows: how the noise hangs together, tails, steps.
-    fn texture(&self, scatter: &Scatter, steps: Vec<Finding>) -> Vec<Finding> {
+    fn texture(&self, mean: &Mean, scatter: &Scatter, steps: Vec<Finding>) -> Vec<Finding> {
         let sigma_mm = typical_sigma_mm(&self.fields);
         let mixing = rim::mixing(&self.fields, self.level(Self::EACH_LEVEL))
             .filter(|_| !self.known.has("edge-mixing"));
         let hangs = scatter.hangs.iter().cloned().chain(scatter.tails.clone()).chain(mixing);
-        hangs.map(|h| findings::hanging(h, sigma_mm)).chain(steps).collect()
+        let mut found: Vec<Finding> =
+            hangs.map(|h| findings::hanging(h, sigma_mm)).chain(steps).collect();
+        // Lines that stand still have no name, but they can be learnt.
+        let stands = |f: &&mut Finding| {
+            f.effect.is_none() && f.statistic == Statistic::Bias && f.axis == Axis::Column
+        };
+        if self.baseline.is_none() {
+            found
+                .iter_mut()
+                .filter(stands)
+                .for_each(|f| f.terms = line_terms(&self.fields, &mean.px));
+        }
+        found
     }
 
     fn lost(&self) -> (Vec<Finding>, Vec<Detectable>) {
@@ -411,7 +424,7 @@ impl<'a> Case<'a> {
         let mut curves = self.curves(&scenes, outcomes);
         curves.retain(|f| self.is_news(f, &steps, scatter));
         let mut found: Vec<Finding> = self.ranges.clone().into_iter().chain(curves).collect();
-        found.extend(self.texture(scatter, steps));
+        found.extend(self.texture(&mean, scatter, steps));
         let (lost, more_detectable) = self.lost();
         found.extend(lost);
         found.extend(self.laws(&mean.terms));

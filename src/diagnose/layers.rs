@@ -56,6 +56,8 @@ pub struct SurveyedView {
     pub correlation: Correlation,
     /// Independent frames a view's variance is worth.
     pub frames: f64,
+    /// How many times more uncertain the logarithm of its variance is than by that.
+    pub doubt: f64,
     /// What the variance between frames is to be multiplied by to be all of the noise's; `None`
     /// with a single frame.
     pub moving: Option<f64>,
@@ -86,6 +88,7 @@ impl Survey {
                     inflation,
                     correlation,
                     frames: independent_frames(f),
+                    doubt: 1.0,
                     moving: None,
                 }
             })
@@ -209,8 +212,9 @@ impl Survey {
                 super::tiles::roughen(&mut view.tiles, field, bias, width);
             }
             for t in &mut view.tiles {
-                t.variance = t.variance * stretch(&t.place) + extra(&t.place);
-                t.place.variance = t.variance;
+                let (factor, more) = (stretch(&t.place), extra(&t.place));
+                t.variance = t.variance * factor + more;
+                t.place.variance = t.place.variance * factor + more;
             }
         });
     }
@@ -393,7 +397,7 @@ impl Blocks {
             blocks.places.push(s.place);
             // The mean of log chi^2 / n is about -1 / n.
             blocks.response.push((s.ratio / s.n / kept.max(0.5)).ln() + 1.0 / worth);
-            blocks.weight.push(0.5 * worth / (1.0 + 1.0 / worth));
+            blocks.weight.push(0.5 * worth / (1.0 + 1.0 / worth) / view.doubt);
         }
         blocks
     }

@@ -14,6 +14,7 @@ mod heldout;
 mod known;
 mod lattice;
 mod layers;
+mod lines;
 mod missing;
 mod missing_cells;
 mod missing_fit;

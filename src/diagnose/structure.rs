@@ -164,7 +164,7 @@ fn change(a: &[f32], b: &[f32]) -> Vec<f32> {
 }
 
 /// Residuals as an image, px, without what is smooth and what is known.
-fn rough(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
+pub(super) fn rough(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
     let image = if bias.is_empty() {
         field.image(residuals)
     } else {
@@ -175,7 +175,7 @@ fn rough(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
 }
 
 /// Without gross errors.
-fn calm(image: &[f32]) -> Vec<f32> {
+pub(super) fn calm(image: &[f32]) -> Vec<f32> {
     let mut sizes: Vec<f32> = image.iter().filter(|r| r.is_finite()).map(|r| r.abs()).collect();
     let limit = 6.0 * MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
     let kept = |r: &f32| if limit > 0.0 && r.abs() > limit { f32::NAN } else { *r };
@@ -259,7 +259,7 @@ fn across_views(means: &[Vec<f32>]) -> Vec<Option<f64>> {
 }
 
 /// A pixel's own error changes from pixel to pixel: the box whose mean is taken out, px.
-const PIXEL_BOX: usize = 7;
+pub(super) const PIXEL_BOX: usize = 7;
 
 /// Side of the patches whose own scale their residuals are held against: this share of the
 /// picture's width, px.

@@ -57,18 +57,27 @@ const LARGE: f64 = 0.3;
 /// A recording held against a simulation of the same physics: the size of the noise follows from
 /// what makes it, and what the catalogue calls a cause is often a symptom.
 pub(super) fn symptoms(found: &mut [Finding]) {
-    let made = found
-        .iter()
-        .any(|f| f.size.sigma > LARGE && f.effect.is_some_and(|id| MAKES_NOISE.contains(&id)));
+    let moves = found.iter().any(|f| f.effect == Some("target-motion"));
+    let made = moves
+        || found
+            .iter()
+            .any(|f| f.size.sigma > LARGE && f.effect.is_some_and(|id| MAKES_NOISE.contains(&id)));
     for f in found.iter_mut() {
         let symptom = f.effect.is_some_and(|id| SYMPTOMS.contains(&id));
         for a in f.alternatives.iter_mut().filter(|a| SYMPTOMS.contains(&a.effect)) {
             a.probability *= NO_SYMPTOM;
         }
+        // What moves past the pattern is matched anew in every frame.
+        let renewed = moves && matches!(f.effect, Some("temporal-correlation" | "frame-jitter"));
+        if renewed {
+            f.alternatives.iter_mut().for_each(|a| a.probability *= NO_SYMPTOM);
+        }
         if symptom {
             f.physics.push_str(" Held against a simulation it may be a symptom: light, blur and window change it too.");
         }
-        if made && (symptom || f.status == Status::Recalibrate) {
+        let nameless =
+            f.effect.is_none() && matches!(f.statistic, Statistic::Variance | Statistic::Missing);
+        if renewed || made && (symptom || nameless || f.status == Status::Recalibrate) {
             f.share *= 1e-3;
         }
     }

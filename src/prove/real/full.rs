@@ -20,7 +20,7 @@ use crate::view::Recording;
 /// What is learnt of a recording does not depend on the set it is learnt for.
 const SEED: Seed = Seed(1);
 /// What was hidden behind the first findings is found in the next round.
-const MOST_ROUNDS: usize = 2;
+const MOST_ROUNDS: usize = 3;
 
 /// A recording with a model that it does not contradict.
 pub(super) struct Full {
@@ -96,9 +96,19 @@ fn learn(mut recording: Recording) -> Result<Full> {
             break;
         }
         if round == MOST_ROUNDS {
+            let left: Vec<&str> = done
+                .diagnosis
+                .findings
+                .iter()
+                .filter(|f| f.status != Status::NotIdentifiable)
+                .map(|f| f.effect.unwrap_or(f.axis.id()))
+                .collect();
             return Err(Error::recording(
                 &recording.root,
-                format!("after {MOST_ROUNDS} rounds something is still left to be found"),
+                format!(
+                    "after {MOST_ROUNDS} rounds something is still left to be found: {}",
+                    left.join(", ")
+                ),
                 "leave it out of the trial",
             ));
         }
