@@ -296,6 +296,16 @@ impl Basis {
         }
     }
 
+    /// Is it a shape of the target's surface, without a name?
+    pub fn is_lift(&self) -> bool {
+        match self {
+            Basis::Curve { times, .. } | Basis::Map { times, .. } | Basis::Ring { times, .. } => {
+                *times == Times::Lift
+            }
+            _ => false,
+        }
+    }
+
     /// Does it change within a few pixels?
     pub fn is_fine(&self) -> bool {
         match self {
