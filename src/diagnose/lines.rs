@@ -38,3 +38,7 @@ pub fn line_terms(fields: &[Field], bias: &[Vec<f32>]) -> Vec<Term> {
     };
     vec![profile(Over::Column, &columns), profile(Over::Row, &rows)]
 }
+
+#[cfg(test)]
+#[path = "lines_tests.rs"]
+mod tests;

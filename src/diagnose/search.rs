@@ -107,9 +107,6 @@ impl Outcome {
     }
 }
 
-/// A lift of the surface that planes take up all but such a part of is no lift: a surface that is
-/// tilted or moved as a whole is a plane again.
-const HIDDEN: f64 = 20.0;
 /// Of families that predict as well as the best, the one with the fewest columns is meant.
 const AS_GOOD_NATS: f64 = 2.0;
 /// So they do within this share of a large gain: no family's shape is exact.
@@ -456,7 +453,7 @@ impl<'a> Layer<'a> {
         }
         let k = basis.count();
         let least = self.rules.least.max(LEAST_OF_LARGEST * self.largest);
-        if rms < least || basis.is_lift() && self.raw_rms(basis, beta.as_slice()) > HIDDEN * rms {
+        if rms < least {
             return false;
         }
         let Some((fixed, pixels)) = self.rules.fixed.filter(|_| basis.is_of_picture()) else {
@@ -466,19 +463,6 @@ impl<'a> Layer<'a> {
         // many and for views that cover little of the picture.
         const CLEARLY: f64 = 50.0;
         rms * rms > CLEARLY * fixed * fixed * k as f64 / pixels
-    }
-
-    /// Root mean square of a candidate's fit over the samples as it is.
-    fn raw_rms(&self, basis: &Basis, beta: &[f64]) -> f64 {
-        let mut scratch = Vec::new();
-        let (mut square, mut weight) = (0.0, 0.0);
-        for view in self.coarse {
-            for (p, w) in view.places.iter().zip(&view.weight) {
-                square += w * basis.value(beta, p, &mut scratch).powi(2);
-                weight += w;
-            }
-        }
-        (square / weight).sqrt()
     }
 
     /// Maps with twice as many nodes, where those predict left-out views better.

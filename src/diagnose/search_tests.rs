@@ -144,6 +144,32 @@ fn a_family_that_explains_a_part_is_not_named() {
     assert_eq!(outcome.chosen[0].candidate.basis.axis(), crate::terms::Axis::Column);
 }
 
+/// A board that is tilted as a whole is a plane again, but for what averaging over a patch leaves:
+/// that must not be taken for a lift of metres.
+#[test]
+fn a_lift_that_planes_take_up_is_none() {
+    let lift =
+        Basis::Curve { over: Over::Right, low: -1.0, high: 1.0, nodes: 3, times: Times::Lift };
+    let searched = |tilt: f64, bend: f64| {
+        let mut rng = Seed(9).stream("search/lift");
+        let mut views = session(&mut rng, |_| 0.0);
+        for view in &mut views {
+            for (p, y) in view.places.iter_mut().zip(&mut view.response) {
+                let (right, averaged) = ((p.u - 320.0) / 320.0, 1e-3 * (p.u / 40.0).sin());
+                p.rho = 1.0 / p.disparity;
+                *y += p.disparity.powi(2) * (tilt * averaged + bend * right * right);
+                p.right = right + averaged;
+            }
+            let affine = |p: &Place| [1.0, p.u / 640.0, p.v / 480.0];
+            view.nuisance = view.places.iter().flat_map(affine).collect();
+            view.precision = vec![0.0; 3];
+        }
+        search(&views, &views, &[Candidate::curve(lift.clone())], &RULES, Seed(1)).chosen.len()
+    };
+    assert_eq!(searched(3.0, 0.0), 0, "a tilt of 3 m on a metre");
+    assert_eq!(searched(0.0, 0.01), 1, "a bent board");
+}
+
 #[test]
 fn thresholds_and_chances_are_each_others_inverse() {
     let gains = NoiseGains((1..=600).map(|k| -(1.0 - f64::from(k) / 601.0).ln()).collect());

@@ -44,7 +44,7 @@ pub enum Basis {
     Level,
     /// d log variance / d parameter of the sigma model, on a table over z and theta.
     Recalibrate { z_m: [f64; 2], theta_rad: [f64; 2], columns: Vec<Vec<f64>> },
-    /// A broken line over an axis between evenly spaced nodes.
+    /// A broken line over an axis between evenly spaced nodes; of a lift, without its straight part.
     Curve { over: Over, low: f64, high: f64, nodes: usize, times: Times },
     /// A broken line on a circle.
     Ring { over: Over, period: f64, nodes: usize, times: Times },
@@ -235,6 +235,9 @@ impl Basis {
                 let scale = times.value(p);
                 out[k] = scale * (1.0 - t);
                 out[k + 1] = scale * t;
+                if times == Times::Lift {
+                    without_line(out);
+                }
             }
             Basis::Ring { over, period, nodes, times } => {
                 out.fill(0.0);
@@ -296,16 +299,6 @@ impl Basis {
         }
     }
 
-    /// Is it a shape of the target's surface, without a name?
-    pub fn is_lift(&self) -> bool {
-        match self {
-            Basis::Curve { times, .. } | Basis::Map { times, .. } | Basis::Ring { times, .. } => {
-                *times == Times::Lift
-            }
-            _ => false,
-        }
-    }
-
     /// Does it change within a few pixels?
     pub fn is_fine(&self) -> bool {
         match self {
@@ -334,6 +327,22 @@ impl Basis {
             Basis::Map { .. } => Axis::Pixel,
             Basis::Pair { over, .. } => over[0].axis(),
         }
+    }
+}
+
+/// Take out of the nodes' weights what a straight line over the nodes is: a surface that is moved
+/// or tilted as a whole is a plane again, and no fit to planes can tell how far.
+fn without_line(weights: &mut [f64]) {
+    let n = weights.len() as f64;
+    let middle = 0.5 * (n - 1.0);
+    let squares = n * (n * n - 1.0) / 12.0;
+    let (mut sum, mut moment) = (0.0, 0.0);
+    for (k, w) in weights.iter().enumerate() {
+        sum += w;
+        moment += w * (k as f64 - middle);
+    }
+    for (k, w) in weights.iter_mut().enumerate() {
+        *w -= sum / n + moment / squares * (k as f64 - middle);
     }
 }
 

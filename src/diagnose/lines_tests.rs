@@ -1,0 +1,75 @@
+//! Columns that err by a constant each, under noise that is known.
+
+use rand_distr::{Distribution, StandardNormal};
+
+use super::super::lattice::Words;
+use super::super::shadow::Shadow;
+use super::*;
+use crate::plane::Plane;
+use crate::rng::{Seed, Stream};
+
+const SIZE: [usize; 2] = [64, 48];
+const NOISE_PX: f64 = 0.1;
+
+/// All of a picture, seen square on.
+fn field(rng: &mut Stream, error_px: impl Fn(usize) -> f64) -> Field {
+    let [width, height] = SIZE;
+    let n = width * height;
+    let noisy = |i: usize| {
+        let noise: f64 = StandardNormal.sample(rng);
+        (error_px(i % width) + NOISE_PX * noise) as f32
+    };
+    Field {
+        name: "view".into(),
+        time_s: 0.0,
+        plane: Plane::tilted(1.0, 0.0, 0.0),
+        scale_px_m: 10.0,
+        width,
+        height,
+        pixels: (0..n as u32).collect(),
+        sigma: vec![NOISE_PX as f32; n],
+        spread_px: NOISE_PX as f32,
+        mean: (0..n).map(noisy).collect(),
+        square: vec![0.01; n],
+        count: vec![1; n],
+        measured: vec![1; n],
+        first: Vec::new(),
+        frames: Vec::new(),
+        lines: Vec::new(),
+        reference_distance_m: None,
+        temperature_c: None,
+        ambient_lux: None,
+        light: Vec::new(),
+        words: Words::none(),
+        told: true,
+        shadow: Shadow::default(),
+        rim: None,
+    }
+}
+
+/// Every other column is off by as much as the next is to the other side: nothing of that is
+/// smooth. Five standard errors (0.0032 px) for 128 columns: a chance of 7e-5.
+#[test]
+fn each_column_is_met_and_rows_are_let_be() {
+    let error_px = |u: usize| if u % 2 == 0 { 0.05 } else { -0.05 };
+    let mut rng = Seed(1).stream("lines");
+    let fields: Vec<Field> = (0..20).map(|_| field(&mut rng, error_px)).collect();
+    let [columns, rows] = &line_terms(&fields, &[])[..] else { panic!("two profiles") };
+    assert_eq!((columns.coefficients.len(), rows.coefficients.len()), (SIZE[0], SIZE[1]));
+    let limit = 5.0 * NOISE_PX / f64::sqrt((20 * SIZE[1]) as f64);
+    for (u, c) in columns.coefficients.iter().enumerate() {
+        // What a box of seven takes with it of its middle column: one part in seven.
+        assert!(
+            (c - 8.0 / 7.0 * error_px(u)).abs() < limit || (c - error_px(u)).abs() < limit,
+            "{u}: {c}"
+        );
+    }
+    assert!(rows.coefficients.iter().all(|c| c.abs() < limit));
+    // Known already: nothing is left.
+    let known: Vec<Vec<f32>> = fields
+        .iter()
+        .map(|f| f.pixels.iter().map(|i| error_px(*i as usize % SIZE[0]) as f32).collect())
+        .collect();
+    assert!(line_terms(&fields, &known)[0].coefficients.iter().all(|c| c.abs() < limit));
+    assert!(line_terms(&[], &[]).is_empty());
+}
