@@ -1,7 +1,7 @@
 //! A term's value without its whole row: curves and maps have a few columns that are not zero.
 
 use super::Term;
-use super::basis::{Basis, node};
+use super::basis::{Basis, Times, node};
 use super::place::Place;
 
 impl Term {
@@ -9,7 +9,8 @@ impl Term {
     pub fn value(&self, p: &Place, row: &mut Vec<f64>) -> f64 {
         let b = &self.coefficients[..];
         match self.basis {
-            Basis::Curve { over, low, high, nodes, times } => {
+            // A lift's columns are all of them something: its straight part is taken out.
+            Basis::Curve { over, low, high, nodes, times } if times != Times::Lift => {
                 let (k, t) = node(over.value(p), low, high, nodes);
                 times.value(p) * (b[k] * (1.0 - t) + b[k + 1] * t)
             }
@@ -41,7 +42,7 @@ fn bilinear(b: &[f64], across: usize, (i, s): (usize, f64), (j, t): (usize, f64)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::terms::{Over, Statistic, Times};
+    use crate::terms::{Over, Statistic};
 
     /// The short way against the whole row.
     #[test]
@@ -49,6 +50,7 @@ mod tests {
         let (over, times) = (Over::Disparity, Times::DisparitySquared);
         let bases = [
             Basis::Curve { over, low: 5.0, high: 60.0, nodes: 7, times },
+            Basis::Curve { over, low: 5.0, high: 60.0, nodes: 7, times: Times::Lift },
             Basis::Ring { over, period: 3.0, nodes: 5, times: Times::Lift },
             Basis::Map { width: 640.0, height: 480.0, across: 5, down: 4, times: Times::Tilt },
             Basis::Pair {
@@ -72,5 +74,23 @@ mod tests {
                 assert!((short - whole).abs() < 1e-12, "{:?} {k}: {short} {whole}", term.basis);
             }
         }
+    }
+
+    /// A board that is moved and tilted as a whole is where it was.
+    #[test]
+    fn a_lift_has_no_straight_part() {
+        let basis =
+            Basis::Curve { over: Over::Right, low: -0.5, high: 0.7, nodes: 6, times: Times::Lift };
+        let bent: Vec<f64> = (0..6).map(|k| (2.1 * f64::from(k)).sin()).collect();
+        let moved: Vec<f64> = (0..6).map(|k| bent[k] + 4.0 - 1.5 * k as f64).collect();
+        for k in 0..50 {
+            let right = f64::from(k) * 0.03 - 0.6;
+            let place = Place { right, disparity: 40.0, rho: 2.0, ..Place::default() };
+            let [a, b] = [&bent, &moved].map(|c| basis.value(c, &place, &mut Vec::new()));
+            assert!((a - b).abs() < 1e-10, "{right}: {a} {b}");
+        }
+        let line: Vec<f64> = (0..6).map(|k| 1.0 + f64::from(k)).collect();
+        let place = Place { right: 0.3, disparity: 40.0, rho: 2.0, ..Place::default() };
+        assert!(basis.value(&line, &place, &mut Vec::new()).abs() < 1e-10);
     }
 }
