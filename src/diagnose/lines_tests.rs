@@ -51,7 +51,7 @@ fn field(rng: &mut Stream, error_px: impl Fn(usize) -> f64) -> Field {
 /// smooth. Five standard errors (0.0032 px) for 128 columns: a chance of 7e-5.
 #[test]
 fn each_column_is_met_and_rows_are_let_be() {
-    let error_px = |u: usize| if u % 2 == 0 { 0.05 } else { -0.05 };
+    let error_px = |u: usize| if u.is_multiple_of(2) { 0.05 } else { -0.05 };
     let mut rng = Seed(1).stream("lines");
     let fields: Vec<Field> = (0..20).map(|_| field(&mut rng, error_px)).collect();
     let [columns, rows] = &line_terms(&fields, &[])[..] else { panic!("two profiles") };
