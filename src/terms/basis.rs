@@ -44,7 +44,8 @@ pub enum Basis {
     Level,
     /// d log variance / d parameter of the sigma model, on a table over z and theta.
     Recalibrate { z_m: [f64; 2], theta_rad: [f64; 2], columns: Vec<Vec<f64>> },
-    /// A broken line over an axis between evenly spaced nodes; of a lift, without its straight part.
+    /// A broken line over an axis between evenly spaced nodes; a lift over the target's own
+    /// coordinates is without its straight part.
     Curve { over: Over, low: f64, high: f64, nodes: usize, times: Times },
     /// A broken line on a circle.
     Ring { over: Over, period: f64, nodes: usize, times: Times },
@@ -235,7 +236,7 @@ impl Basis {
                 let scale = times.value(p);
                 out[k] = scale * (1.0 - t);
                 out[k + 1] = scale * t;
-                if times == Times::Lift {
+                if self.is_lift_of_target() {
                     without_line(out);
                 }
             }
@@ -297,6 +298,12 @@ impl Basis {
             Basis::Curve { over, .. } => matches!(over, Over::Column | Over::Row | Over::Radius),
             _ => false,
         }
+    }
+
+    /// Is it a shape of the target's surface over the target's own coordinates?
+    pub(super) fn is_lift_of_target(&self) -> bool {
+        let Basis::Curve { over, times, .. } = self else { return false };
+        *times == Times::Lift && matches!(over, Over::Right | Over::Down)
     }
 
     /// Does it change within a few pixels?

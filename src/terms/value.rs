@@ -1,7 +1,7 @@
 //! A term's value without its whole row: curves and maps have a few columns that are not zero.
 
 use super::Term;
-use super::basis::{Basis, Times, node};
+use super::basis::{Basis, node};
 use super::place::Place;
 
 impl Term {
@@ -9,8 +9,8 @@ impl Term {
     pub fn value(&self, p: &Place, row: &mut Vec<f64>) -> f64 {
         let b = &self.coefficients[..];
         match self.basis {
-            // A lift's columns are all of them something: its straight part is taken out.
-            Basis::Curve { over, low, high, nodes, times } if times != Times::Lift => {
+            // Of a lift's columns none is nothing: its straight part is taken out.
+            Basis::Curve { over, low, high, nodes, times } if !self.basis.is_lift_of_target() => {
                 let (k, t) = node(over.value(p), low, high, nodes);
                 times.value(p) * (b[k] * (1.0 - t) + b[k + 1] * t)
             }
@@ -42,7 +42,7 @@ fn bilinear(b: &[f64], across: usize, (i, s): (usize, f64), (j, t): (usize, f64)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::terms::{Over, Statistic};
+    use crate::terms::{Over, Statistic, Times};
 
     /// The short way against the whole row.
     #[test]
@@ -50,6 +50,7 @@ mod tests {
         let (over, times) = (Over::Disparity, Times::DisparitySquared);
         let bases = [
             Basis::Curve { over, low: 5.0, high: 60.0, nodes: 7, times },
+            Basis::Curve { over: Over::Right, low: -1.0, high: 1.0, nodes: 7, times: Times::Lift },
             Basis::Curve { over, low: 5.0, high: 60.0, nodes: 7, times: Times::Lift },
             Basis::Ring { over, period: 3.0, nodes: 5, times: Times::Lift },
             Basis::Map { width: 640.0, height: 480.0, across: 5, down: 4, times: Times::Tilt },
