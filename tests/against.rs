@@ -43,19 +43,26 @@ impl Sets {
         root
     }
 
-    fn diagnose(&self, real: &Path, simulated: &Path, exit: i32) -> Value {
+    /// Exit code and `diagnosis.json`.
+    fn run(&self, real: &Path, simulated: &Path) -> (Option<i32>, Value) {
         let out = self.folder.path().join("out");
-        let command = common::kinoise()
+        let run = common::kinoise()
             .args(["diagnose", "--against"])
             .args([simulated, real])
             .arg("-o")
             .arg(&out)
-            .assert()
-            .code(exit);
-        let text = String::from_utf8_lossy(&command.get_output().stderr).into_owned();
+            .output()
+            .expect("the program runs");
+        let text = String::from_utf8_lossy(&run.stderr);
         assert!(text.contains("the simulation leaves out"), "{text}");
         let json = std::fs::read(out.join("diagnosis.json")).expect("diagnosis.json");
-        serde_json::from_slice(&json).expect("JSON")
+        (run.status.code(), serde_json::from_slice(&json).expect("JSON"))
+    }
+
+    fn diagnose(&self, real: &Path, simulated: &Path, exit: i32) -> Value {
+        let (code, said) = self.run(real, simulated);
+        assert_eq!(code, Some(exit), "{:?}", names(&said));
+        said
     }
 }
 
@@ -77,17 +84,8 @@ fn two_runs_of_noise_that_stands_still_match() {
         let runs: Vec<PathBuf> =
             (0..4).map(|n| sets.shoot(&format!("{fraction}-{n}"), 40 + n, Some(&still))).collect();
         for pair in runs.chunks(2) {
-            let out = sets.folder.path().join("still");
-            let run = common::kinoise()
-                .args(["diagnose", "--against"])
-                .args([&pair[1], &pair[0]])
-                .arg("-o")
-                .arg(&out)
-                .output()
-                .expect("the program runs");
-            let json = std::fs::read(out.join("diagnosis.json")).expect("diagnosis.json");
-            let said: Value = serde_json::from_slice(&json).expect("JSON");
-            if run.status.code() != Some(0) {
+            let (code, said) = sets.run(&pair[0], &pair[1]);
+            if code != Some(0) {
                 alarms.push(format!("{fraction}: {:?}", names(&said)));
             }
         }

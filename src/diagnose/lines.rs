@@ -1,8 +1,7 @@
 //! Whole columns and rows that err by a constant each: their profile, as terms of the model.
 
 use super::field::Field;
-use super::smooth::high_pass;
-use super::structure::{PIXEL_BOX, calm, rough};
+use super::structure::fine;
 use crate::terms::{Basis, Over, Statistic, Term, Times};
 
 /// Columns and rows of fewer readings over all views are left at nothing.
@@ -17,8 +16,7 @@ pub fn line_terms(fields: &[Field], bias: &[Vec<f32>]) -> Vec<Term> {
     let mut columns = vec![(0.0, 0.0); width];
     let mut rows = vec![(0.0, 0.0); height];
     for (n, field) in fields.iter().enumerate() {
-        let image = calm(&rough(field, &field.mean, bias.get(n).unwrap_or(&none)));
-        let image = high_pass(&image, width, height, PIXEL_BOX);
+        let image = fine(field, bias.get(n).unwrap_or(&none));
         for (i, &r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
             for line in [&mut columns[i % width], &mut rows[i / width]] {
                 line.0 += f64::from(r);

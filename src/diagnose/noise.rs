@@ -1,11 +1,12 @@
 //! What the structure of the noise amounts to: each view is one sample of every statistic.
 
 use serde_json::{Map, json};
-use statrs::distribution::{ChiSquared, Continuous, ContinuousCDF, FisherSnedecor, StudentsT};
+use statrs::distribution::{Continuous, ContinuousCDF, StudentsT};
 
+use super::frames::frames;
 use super::known::Known;
 use super::parameters::estimate;
-use super::structure::{GAUSSIAN_TAIL, Jitter, Structure};
+use super::structure::{GAUSSIAN_TAIL, Structure};
 use crate::terms::{Axis, Statistic};
 
 /// A mismatch of the noise's structure.
@@ -84,7 +85,7 @@ pub fn hanging(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
     found
 }
 
-fn one(name: &str, value: f64, std_error: f64) -> Map<String, serde_json::Value> {
+pub(super) fn one(name: &str, value: f64, std_error: f64) -> Map<String, serde_json::Value> {
     let mut map = Map::new();
     map.insert(name.into(), estimate(value, std_error));
     map
@@ -175,7 +176,7 @@ impl Shared {
 }
 
 /// Of the first frame's rough residual, px^2.
-fn variance_px2(views: &[Structure]) -> f64 {
+pub(super) fn variance_px2(views: &[Structure]) -> f64 {
     Mean::of(views, |s| Some(s.variance_px2)).map_or(0.0, |m| m.value)
 }
 
@@ -315,116 +316,6 @@ fn lines(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
 
 /// Share of the variance that lines have in common, worth a word.
 const LEAST_LINES: f64 = 0.0015;
-
-/// Motion that is not uniform, and jitter that is no white noise, differ by this share.
-const UNEVEN: f64 = 0.2;
-
-/// The frames' means scatter by this factor more before it is called jitter.
-const JITTER: f64 = 2.0;
-
-/// A target that moves by the same velocity in all views.
-struct Motion {
-    /// Along the optical axis, m/s.
-    velocity_mps: f64,
-    std_error: f64,
-    p: f64,
-    nats: f64,
-}
-
-impl Motion {
-    /// Mean of the views' velocities by their errors, which are enlarged by how they disagree.
-    fn of(all: &[Jitter]) -> Option<Self> {
-        let known: Vec<(f64, f64)> = all
-            .iter()
-            .filter(|j| j.trend_px2 > 0.0 && j.freedom > 0.0)
-            .map(|j| {
-                let noise_px2 = j.expected_px2.max(j.scatter_px2 / j.freedom);
-                (j.velocity_mps, j.velocity_mps.powi(2) / j.trend_px2 * noise_px2)
-            })
-            .filter(|(_, variance)| *variance > 0.0)
-            .collect();
-        let n = known.len() as f64;
-        let precision: f64 = known.iter().map(|v| 1.0 / v.1).sum();
-        if known.len() < 3 || !precision.is_finite() {
-            return None;
-        }
-        let velocity_mps = known.iter().map(|v| v.0 / v.1).sum::<f64>() / precision;
-        let left: f64 = known.iter().map(|v| (v.0 - velocity_mps).powi(2) / v.1).sum();
-        let std_error = ((left / (n - 1.0)).max(1.0) / precision).sqrt();
-        let t = velocity_mps / std_error;
-        let p = StudentsT::new(0.0, 1.0, n - 1.0).map_or(1.0, |d| 2.0 * (1.0 - d.cdf(t.abs())));
-        Some(Motion { velocity_mps, std_error, p, nats: 0.5 * n * (t * t / n).ln_1p() })
-    }
-}
-
-fn frames(views: &[Structure], known: &Known, level: f64, rho: f64) -> Vec<Hanging> {
-    let all: Vec<Jitter> = views.iter().filter_map(|s| s.jitter).collect();
-    let freedom: f64 = all.iter().map(|j| j.freedom).sum();
-    if all.len() < 2 || freedom < 2.0 {
-        return Vec::new();
-    }
-    let mut found = Vec::new();
-    let scatter: f64 = all.iter().map(|j| j.scatter_px2).sum();
-    let trend: f64 = all.iter().map(|j| j.trend_px2).sum();
-    let n = all.len() as f64;
-    // Motion: the line explains more than the scatter about it does, or all views move alike.
-    let per_trend = trend / n;
-    let per_scatter = (scatter / freedom).max(all.iter().map(|j| j.expected_px2).sum::<f64>() / n);
-    // Frames that resemble their neighbours wander.
-    let wander = (1.0 + rho) / (1.0 - rho).max(0.05);
-    let f = per_trend / (per_scatter * wander * wander).max(1e-300);
-    let p_line = FisherSnedecor::new(n, freedom).map_or(1.0, |d| 1.0 - d.cdf(f));
-    let steady = Motion::of(&all).filter(|m| m.p < 0.5 * level);
-    let moving =
-        (p_line < 0.5 * level && f > 3.0 || steady.is_some()) && !known.has("target-motion");
-    if moving {
-        let speed = (all.iter().map(|j| j.velocity_mps.powi(2)).sum::<f64>() / n).sqrt();
-        let signed = all.iter().map(|j| j.velocity_mps).sum::<f64>() / n;
-        let Motion { velocity_mps, std_error, p, nats } = steady.unwrap_or(Motion {
-            velocity_mps: speed.copysign(signed),
-            std_error: speed / (2.0 * n).sqrt(),
-            p: p_line,
-            nats: 0.5 * n * f.ln().max(0.0),
-        });
-        let std_error = std_error.hypot(UNEVEN * velocity_mps);
-        found.push(Hanging {
-            families: vec!["target-motion"],
-            statistic: Statistic::Bias,
-            axis: Axis::Frame,
-            interval: [0.0, 0.0],
-            parameters: one("velocity_mps", velocity_mps, std_error),
-            size_sigma: 0.0,
-            p: p.max(1e-300),
-            nats,
-            words: None,
-        });
-    }
-    let known_px = known.parameter("frame-jitter", "sigma_px").unwrap_or(0.0);
-    let ratio: f64 = all
-        .iter()
-        .map(|j| j.scatter_px2 / (j.expected_px2 + known_px * known_px).max(1e-300))
-        .sum();
-    let p_jitter = ChiSquared::new(freedom).map_or(1.0, |d| 1.0 - d.cdf(ratio / JITTER));
-    let jitter_px2 =
-        all.iter().map(|j| j.scatter_px2 - j.freedom * j.expected_px2).sum::<f64>() / freedom;
-    let aside = moving && jitter_px2 < 0.15 * per_trend;
-    if p_jitter < level && jitter_px2 > 0.0 && !aside {
-        let sigma = jitter_px2.sqrt();
-        let variance = Mean::of(views, |s| Some(s.variance_px2)).map_or(1.0, |m| m.value);
-        found.push(Hanging {
-            families: vec!["frame-jitter"],
-            statistic: Statistic::Correlation,
-            axis: Axis::Frame,
-            interval: [0.0, 0.0],
-            parameters: one("sigma_px", sigma, sigma * UNEVEN.hypot(1.0 / (2.0 * freedom).sqrt())),
-            size_sigma: (jitter_px2 / variance.max(1e-12)).sqrt(),
-            p: p_jitter.max(1e-300),
-            nats: 0.5 * freedom * (ratio / freedom).ln().max(0.0),
-            words: None,
-        });
-    }
-    found
-}
 
 /// A tail is heavy from this many times a Gaussian's share on.
 const HEAVY: f64 = 2.5;

@@ -64,13 +64,7 @@ pub fn structures(fields: &[Field], camera: &Camera, bias: &[Vec<f32>]) -> Vec<S
     let none = Vec::new();
     let views: Vec<(&Field, &Vec<f32>)> =
         fields.iter().enumerate().map(|(n, f)| (f, bias.get(n).unwrap_or(&none))).collect();
-    let means: Vec<Vec<f32>> = views
-        .par_iter()
-        .map(|(f, b)| {
-            let image = calm(&rough(f, &f.mean, b));
-            high_pass(&image, f.width, f.height, PIXEL_BOX)
-        })
-        .collect();
+    let means: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| fine(f, b)).collect();
     let with_lines = across_views(&means);
     let means: Vec<Vec<f32>> =
         means.iter().map(|m| without_lines(m, camera.width, SHORT_LINE)).collect();
@@ -164,7 +158,7 @@ fn change(a: &[f32], b: &[f32]) -> Vec<f32> {
 }
 
 /// Residuals as an image, px, without what is smooth and what is known.
-pub(super) fn rough(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
+fn rough(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
     let image = if bias.is_empty() {
         field.image(residuals)
     } else {
@@ -174,8 +168,15 @@ pub(super) fn rough(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> 
     high_pass(&image, field.width, field.height, SMOOTH_PX)
 }
 
+/// The view's mean, px, without what is known, gross errors, and all that does not change from pixel
+/// to pixel.
+pub(super) fn fine(field: &Field, bias: &[f32]) -> Vec<f32> {
+    let image = calm(&rough(field, &field.mean, bias));
+    high_pass(&image, field.width, field.height, PIXEL_BOX)
+}
+
 /// Without gross errors.
-pub(super) fn calm(image: &[f32]) -> Vec<f32> {
+fn calm(image: &[f32]) -> Vec<f32> {
     let mut sizes: Vec<f32> = image.iter().filter(|r| r.is_finite()).map(|r| r.abs()).collect();
     let limit = 6.0 * MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
     let kept = |r: &f32| if limit > 0.0 && r.abs() > limit { f32::NAN } else { *r };
@@ -259,7 +260,7 @@ fn across_views(means: &[Vec<f32>]) -> Vec<Option<f64>> {
 }
 
 /// A pixel's own error changes from pixel to pixel: the box whose mean is taken out, px.
-pub(super) const PIXEL_BOX: usize = 7;
+const PIXEL_BOX: usize = 7;
 
 /// Side of the patches whose own scale their residuals are held against: this share of the
 /// picture's width, px.
