@@ -62,7 +62,7 @@ fn at_line(line: usize) -> String {
 }
 
 impl Error {
-    pub(crate) fn read(path: &Path, cause: std::io::Error) -> Self {
+    pub fn read(path: &Path, cause: std::io::Error) -> Self {
         Error::Io {
             path: path.to_path_buf(),
             cause,
@@ -70,7 +70,7 @@ impl Error {
         }
     }
 
-    pub(crate) fn write(path: &Path, cause: std::io::Error) -> Self {
+    pub fn write(path: &Path, cause: std::io::Error) -> Self {
         Error::Io {
             path: path.to_path_buf(),
             cause,
@@ -78,7 +78,7 @@ impl Error {
         }
     }
 
-    pub(crate) fn recording(path: &Path, what: impl Into<String>, remedy: &'static str) -> Self {
+    pub fn recording(path: &Path, what: impl Into<String>, remedy: &'static str) -> Self {
         Error::Recording { path: path.to_path_buf(), what: what.into(), remedy }
     }
 

@@ -34,7 +34,6 @@ pub mod map;
 pub mod measure;
 pub mod model;
 pub mod plane;
-pub mod prove;
 pub mod report;
 pub mod residual;
 pub mod rng;

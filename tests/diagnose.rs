@@ -3,8 +3,8 @@
 
 mod common;
 
+use crate::common::raytraced::{CATALOGUE, Cell, OUTSIDE};
 use common::rays::{Said, on_disk, order, text};
-use kinoise::prove::rays::{CATALOGUE, Cell, OUTSIDE};
 
 /// 16 clean sets, half of them with correlated noise that the model knows. At a rate of 5 % more
 /// than four alarms have a chance of 8.6e-4.
@@ -19,7 +19,7 @@ fn clean_sets_match() {
         let done = taken[0] + taken[1];
         let views = if done == 0 { 36 } else { [8, 9, 10, 12][done % 4] };
         let order = order(Cell::Null, "", seed, views, 3);
-        let known = kinoise::prove::rays::Set::draw(order.clone()).expect("drawn").known_causes;
+        let known = crate::common::raytraced::Set::draw(order.clone()).expect("drawn").known_causes;
         if taken[known] == 8 {
             continue;
         }

@@ -6,9 +6,9 @@ mod common;
 use std::fs;
 use std::path::Path;
 
+use crate::common::raytraced::{Cell, Set};
 use common::copy_tree;
 use common::rays::{OnDisk, Said, edit, on_disk, order, repaint, said, text, views};
-use kinoise::prove::rays::{Cell, Set};
 use kinoise::{DepthCode, Plane, Seed};
 use rand::seq::SliceRandom;
 use serde_json::Value;

@@ -6,10 +6,10 @@ mod common;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::common::raytraced::Cell;
 use common::kinoise;
 use common::rays::{OnDisk, edit, nulls, on_disk, order, repaint, views, well_formed};
 use kinoise::model::{FitSummary, Provenance};
-use kinoise::prove::rays::Cell;
 use kinoise::scene::Target;
 use kinoise::simulate::{Shoot, kinect_v1};
 use kinoise::{NoiseModel, Seed};

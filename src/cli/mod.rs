@@ -14,9 +14,6 @@ mod effects;
 mod evaluate;
 mod fit;
 mod map;
-mod prove;
-mod prove_solver;
-mod prove_words;
 mod simulate;
 mod simulate_poses;
 mod simulate_recipe;
@@ -64,11 +61,6 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// The catalogue of physical effects: what each does, how it shows, what it is taken for
     Effects(effects::Arguments),
-    /// A blind trial of the diagnosis on concealed sets that anyone can check
-    Prove(prove::Arguments),
-    /// One set of a trial, by a process that is shut in
-    #[command(hide = true)]
-    ProveSolver(prove_solver::Arguments),
     /// The whole road on bundled data
     Demo(demo::Arguments),
 }
@@ -112,9 +104,6 @@ fn one_line(e: &clap::Error) -> String {
 
 fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let global = &arguments.global;
-    if let Command::ProveSolver(_) = arguments.command {
-        prove_solver::shut_in();
-    }
     global.set_threads()?;
     match &arguments.command {
         Command::Capture(a) => capture::run(a, global),
@@ -127,8 +116,6 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         Command::Compare(a) => compare::run(a, global).map(|()| 0),
         Command::Evaluate(a) => evaluate::run(a, global).map(|()| 0),
         Command::Effects(a) => effects::run(a, global).map(|()| 0),
-        Command::Prove(a) => prove::run(a, global),
-        Command::ProveSolver(_) => prove_solver::run(global),
         Command::Demo(a) => demo::run(a, global).map(|()| 0),
     }
 }

@@ -15,7 +15,7 @@ use crate::view::{
     ViewNotes,
 };
 
-pub(crate) const DESCRIPTION: &str = "recording.json";
+pub const DESCRIPTION: &str = "recording.json";
 const VIEW_FILE: &str = "view.json";
 pub(crate) const DEPTH_LIST: &str = "depth.txt";
 const INFRARED_LIST: &str = "ir.txt";

@@ -15,10 +15,11 @@ pub(crate) use dump::INDEX;
 pub use dump::write_dump;
 pub use images::{ColourImage, FrameSource, InfraredImage, encode_pgm16, encode_png16};
 pub(crate) use images::{read_depth, size_of};
-pub(crate) use layout::{DEPTH_LIST, DESCRIPTION, read_description};
+pub use layout::DESCRIPTION;
+pub(crate) use layout::{DEPTH_LIST, read_description};
 pub use layout::{ViewFile, write_recording_file, write_view_notes};
 pub use list::{FrameList, read_list};
-pub(crate) use output::hex;
+pub use output::hex;
 pub use output::{OutputDir, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
 pub use quick::{encode_png16_quickly, encode_rgb};
 

@@ -19,7 +19,7 @@ mod target;
 
 pub(crate) use affine::MAD_TO_SIGMA;
 pub use affine::{AffineFit, Effort, fit_affine_robust};
-pub(crate) use normal_equations::NormalEquations;
+pub use normal_equations::NormalEquations;
 pub use ransac::{
     Consensus, Estimator, InlierCount, Points, RansacOptions, RansacPlane, UniformSampler,
     ransac_plane,

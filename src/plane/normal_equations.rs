@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Sums over rows; memory does not grow with them.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct NormalEquations {
+pub struct NormalEquations {
     normal: Matrix3<f64>,
     right: Vector3<f64>,
     /// Weighted sum of squares of the values.

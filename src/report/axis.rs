@@ -86,7 +86,7 @@ impl Axis {
 }
 
 /// The least of 1, 2, 5 times a power of ten that is not below `value`.
-pub(super) fn round_up(value: f64) -> f64 {
+pub fn round_up(value: f64) -> f64 {
     const ROUNDING: f64 = 1e-9;
     let decade = 10f64.powf(value.log10().floor());
     let mantissa = value / decade * (1.0 - ROUNDING);

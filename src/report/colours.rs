@@ -2,9 +2,9 @@
 
 use plotters::style::RGBColor;
 
-pub(super) const INK: RGBColor = RGBColor(33, 33, 33);
-pub(super) const FAINT: RGBColor = RGBColor(110, 110, 110);
-pub(super) const GRID: RGBColor = RGBColor(225, 225, 225);
+pub const INK: RGBColor = RGBColor(33, 33, 33);
+pub const FAINT: RGBColor = RGBColor(110, 110, 110);
+pub const GRID: RGBColor = RGBColor(225, 225, 225);
 
 /// Viridis (van der Walt and Smith 2015) up to the green that still shows on white.
 const DISTANCES: [u32; 6] = [0x440154, 0x414487, 0x2a788e, 0x22a884, 0x7ad151, 0xbed628];
@@ -16,23 +16,23 @@ const SURFACE: [u32; 6] = [0xffffd9, 0xedf8b1, 0xc7e9b4, 0x7fcdbb, 0x41b6c4, 0x1
 const RESIDUALS: [u32; 5] = [0x054a96, 0x67a9d6, 0xffffff, 0xef8a62, 0xa50f21];
 
 /// Of a distance: dark is near. `share` runs from 0 to 1, as in the others.
-pub(super) fn distance(share: f64) -> RGBColor {
+pub fn distance(share: f64) -> RGBColor {
     between(&DISTANCES, share)
 }
 
 /// Of a sigma on the map: light is small.
-pub(super) fn surface(share: f64) -> RGBColor {
+pub fn surface(share: f64) -> RGBColor {
     between(&SURFACE, share)
 }
 
 /// Of a residual: white is zero, at 0.5.
-pub(super) fn residual(share: f64) -> RGBColor {
+pub fn residual(share: f64) -> RGBColor {
     between(&RESIDUALS, share)
 }
 
 /// The same hue for a thin line: at full lightness the last of the distances' colours is lost on
 /// white.
-pub(super) fn darker(RGBColor(r, g, b): RGBColor) -> RGBColor {
+pub fn darker(RGBColor(r, g, b): RGBColor) -> RGBColor {
     let dim = |c: u8| (f64::from(c) * DARKER).round() as u8;
     RGBColor(dim(r), dim(g), dim(b))
 }

@@ -7,14 +7,14 @@ const STYLE: &str = include_str!("page.css");
 
 /// What one kind of page adds to the style of all.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Kind {
+pub struct Kind {
     /// Class of the body.
     pub class: &'static str,
     pub style: &'static str,
 }
 
 /// The whole document; `kind` where the style of all pages is not enough.
-pub(super) fn document(title: &str, kind: Option<Kind>, body: &Markup) -> Markup {
+pub fn document(title: &str, kind: Option<Kind>, body: &Markup) -> Markup {
     html! {
         (DOCTYPE)
         html lang="en" {

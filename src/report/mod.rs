@@ -3,20 +3,19 @@
 //! A figure is plain data first ([`Figure2`], [`SigmaMap`]: what stands where, with which label),
 //! drawn second, by one function for SVG and PNG alike. The page puts figures and tables together.
 
-mod axis;
+pub mod axis;
 mod base64;
-mod colours;
+pub mod colours;
 mod comparison;
 mod diagnosis_page;
-mod document;
+pub mod document;
 mod figure2;
 mod html;
 mod lines;
 mod map_page;
-mod numbers;
-mod proof_page;
+pub mod numbers;
 mod residual_picture;
-mod sheet;
+pub mod sheet;
 mod sigma_map;
 
 pub use axis::Axis;
@@ -26,6 +25,5 @@ pub use figure2::{Figure2, Group, Overlay, OverlayLine, Point};
 pub use html::{CalibrationPage, calibration_page};
 pub use lines::{Line, LineFigure};
 pub use map_page::map_page;
-pub use proof_page::{ProofPage, proof_page};
 pub use residual_picture::{residual_png, scale_mm};
 pub use sigma_map::{IsoLine, Run, SigmaMap};

@@ -2,13 +2,13 @@
 
 use maud::{Markup, PreEscaped, html};
 
-pub(super) const MM: f64 = 1e3;
-pub(super) const ABSENT: &str = "–";
+pub const MM: f64 = 1e3;
+pub const ABSENT: &str = "–";
 /// Beyond these, powers of ten are easier to read.
 const PLAIN: std::ops::Range<f64> = 1e-3..1e5;
 
 /// A fixed number of decimals.
-pub(super) fn fixed(value: f64, decimals: usize) -> String {
+pub fn fixed(value: f64, decimals: usize) -> String {
     if value.is_finite() {
         crate::units::decimals(value, decimals).replace('-', "−")
     } else {
@@ -17,23 +17,23 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
 }
 
 /// Metres as millimetres, to about three digits.
-pub(super) fn millimetres(metres: f64) -> String {
+pub fn millimetres(metres: f64) -> String {
     let decimals = if metres.abs() * MM < 10.0 { 2 } else { 1 };
     fixed(metres * MM, decimals)
 }
 
-pub(super) fn degrees(radians: f64) -> String {
+pub fn degrees(radians: f64) -> String {
     fixed(radians.to_degrees(), 1)
 }
 
 /// `low – high`, or one number where they print alike.
-pub(super) fn range([low, high]: [f64; 2], decimals: usize) -> String {
+pub fn range([low, high]: [f64; 2], decimals: usize) -> String {
     let [low, high] = [low, high].map(|v| fixed(v, decimals));
     if low == high { low } else { format!("{low} – {high}") }
 }
 
 /// To `digits` significant digits, with a power of ten where that helps.
-pub(super) fn significant(value: f64, digits: usize) -> Markup {
+pub fn significant(value: f64, digits: usize) -> Markup {
     if value == 0.0 || !value.is_finite() {
         return html! { (fixed(value, 0)) };
     }
@@ -50,7 +50,7 @@ pub(super) fn significant(value: f64, digits: usize) -> Markup {
 
 /// A formula in the notation of [`crate::model::SigmaForm::formula`], for the eye; names that
 /// `value` knows are replaced by their numbers.
-pub(super) fn formula(text: &str, value: &dyn Fn(&str) -> Option<f64>) -> Markup {
+pub fn formula(text: &str, value: &dyn Fn(&str) -> Option<f64>) -> Markup {
     let mut out = String::new();
     let mut rest = text;
     while let Some(first) = rest.chars().next() {

@@ -36,7 +36,7 @@ pub fn residual_png(picture: &ResidualPicture, scale_mm: f64) -> Result<Vec<u8>>
 }
 
 /// The same of disparities, px: what is larger than expected is nearer, and blue here too.
-pub(super) fn disparity_png(size: [usize; 2], px: &[f32], scale_px: f64) -> Result<Vec<u8>> {
+pub fn disparity_png(size: [usize; 2], px: &[f32], scale_px: f64) -> Result<Vec<u8>> {
     let shades = px.iter().map(|&v| shade(-v, scale_px)).collect();
     png_of(size[0], size[1], shades)
 }

@@ -18,13 +18,12 @@ use super::axis::Axis;
 use super::colours::{GRID, INK};
 use crate::error::{Error, Result};
 
-pub(super) type Drawn<B, T = ()> =
-    Result<T, DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
+pub type Drawn<B, T = ()> = Result<T, DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 /// A place on the backend.
-pub(super) type Pixel = (i32, i32);
+pub type Pixel = (i32, i32);
 
 /// Something that can be drawn.
-pub(super) trait Drawing {
+pub trait Drawing {
     /// For the error message.
     const WHAT: &'static str;
     /// Width and height, units.
@@ -40,18 +39,18 @@ const OVERSAMPLING: u32 = 2;
 const PNG_TEXT_DROP: i32 = 2;
 /// plotters writes SVG fonts at 1/1.24 of their size (its ratio of line to em); sizes here are
 /// such that both backends agree to the eye.
-pub(super) const TEXT: i32 = 17;
-pub(super) const SMALL: i32 = 15;
+pub const TEXT: i32 = 17;
+pub const SMALL: i32 = 15;
 const TITLE: i32 = 21;
-pub(super) const FONT: &str = "sans-serif";
+pub const FONT: &str = "sans-serif";
 
-pub(super) fn svg(drawing: &impl Drawing) -> Result<String> {
+pub fn svg(drawing: &impl Drawing) -> Result<String> {
     let mut text = String::new();
     on_sheet(drawing, SVGBackend::with_string(&mut text, size_of(drawing, 1)), 1)?;
     Ok(text)
 }
 
-pub(super) fn png(drawing: &impl Drawing) -> Result<Vec<u8>> {
+pub fn png(drawing: &impl Drawing) -> Result<Vec<u8>> {
     let scale = PNG_SCALE * OVERSAMPLING;
     let (width, height) = size_of(drawing, scale);
     let mut image = RgbImage::new(width, height);
@@ -94,7 +93,7 @@ fn font_registered() -> bool {
 }
 
 /// The whole drawing area and the size of a unit, px.
-pub(super) struct Sheet<'a, B: DrawingBackend> {
+pub struct Sheet<'a, B: DrawingBackend> {
     pub root: &'a DrawingArea<B, Shift>,
     pub unit: i32,
     /// What the backend sets text too high, px.
@@ -102,10 +101,10 @@ pub(super) struct Sheet<'a, B: DrawingBackend> {
 }
 
 /// What the plotters chart inside a sheet is like.
-pub(super) type Chart<'a, B, X, Y> = ChartContext<'a, B, Cartesian2d<X, Y>>;
+pub type Chart<'a, B, X, Y> = ChartContext<'a, B, Cartesian2d<X, Y>>;
 
 /// Strokes and gaps of a broken line, units; empty for a whole one.
-pub(super) type Dashes = &'static [i32];
+pub type Dashes = &'static [i32];
 
 impl<B: DrawingBackend> Sheet<'_, B> {
     /// Units to px.

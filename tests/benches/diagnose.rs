@@ -3,12 +3,16 @@
 //! One run takes seconds, so it is timed whole: `cargo bench --bench diagnose`. KINOISE_BENCH_RUNS
 //! is how often (3); the fastest counts, as on a loaded machine the others measure the load.
 
+#[allow(dead_code)]
+#[path = "../common/raytraced/mod.rs"]
+mod raytraced;
+
 use std::fs;
 use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
-use kinoise::prove::rays::{Cell, Order, Set, write};
+use raytraced::{Cell, Order, Set, write};
 
 const SECONDS: f64 = 20.0;
 const MEGABYTES: f64 = 1000.0;

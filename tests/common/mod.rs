@@ -3,6 +3,7 @@
 
 pub mod capture;
 pub mod rays;
+pub mod raytraced;
 pub mod speckle;
 
 use std::path::{Path, PathBuf};

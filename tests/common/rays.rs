@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::common::raytraced::{Cell, Order, Set, write};
 use kinoise::diagnose::{DiagnoseOptions, diagnose};
 use kinoise::io::{Assumed, open};
-use kinoise::prove::rays::{Cell, Order, Set, write};
 use kinoise::{NoiseModel, Seed};
 use serde_json::Value;
 

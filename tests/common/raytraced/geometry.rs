@@ -1,0 +1,183 @@
+//! What a pixel's ray meets: the board, or the wall behind it.
+
+use nalgebra::Vector3;
+
+use kinoise::view::Sensor;
+
+/// A flat board; endless where it has no size.
+#[derive(Debug, Clone)]
+pub struct Board {
+    /// Where its own coordinates begin, m.
+    pub centre: Vector3<f64>,
+    pub right: Vector3<f64>,
+    pub down: Vector3<f64>,
+    /// Away from the sensor, unit length.
+    pub normal: Vector3<f64>,
+    /// Distance of the plane from the sensor, m.
+    pub reach: f64,
+    /// Half width and half height, m.
+    pub half: Option<[f64; 2]>,
+}
+
+impl Board {
+    /// Met by the optical axis at `z`, m, leaning so that depth grows towards `azimuth` by the tangent of
+    /// `theta`; `aim` is the place on the board, m, where the axis meets it; `roll` about its normal, rad.
+    pub fn posed(z: f64, [theta, azimuth]: [f64; 2], aim: [f64; 2], roll: f64) -> Self {
+        let uphill =
+            Vector3::new(azimuth.cos() * theta.cos(), azimuth.sin() * theta.cos(), theta.sin());
+        let level = Vector3::new(-azimuth.sin(), azimuth.cos(), 0.0);
+        // Unrolled, the board's right is turned back by the azimuth within its plane.
+        let turn = roll - azimuth;
+        let right = uphill * turn.cos() + level * turn.sin();
+        let down = level * turn.cos() - uphill * turn.sin();
+        let centre = Vector3::new(0.0, 0.0, z) - right * aim[0] - down * aim[1];
+        let normal = right.cross(&down);
+        let normal = if normal.z < 0.0 { -normal } else { normal };
+        Board { centre, right, down, normal, reach: normal.dot(&centre), half: None }
+    }
+
+    /// Depth along the ray (x, y, 1), m; infinite or negative where they do not meet.
+    pub fn depth(&self, x: f64, y: f64) -> f64 {
+        self.reach / self.normal.dot(&Vector3::new(x, y, 1.0))
+    }
+
+    pub fn place(&self, point: &Vector3<f64>) -> [f64; 2] {
+        let off = point - self.centre;
+        [off.dot(&self.right), off.dot(&self.down)]
+    }
+
+    pub fn holds(&self, [p, q]: [f64; 2]) -> bool {
+        self.half.is_none_or(|[a, b]| p.abs() <= a && q.abs() <= b)
+    }
+
+    /// Corners, `inset` m within its edge, in order around it.
+    pub fn corners(&self, inset: f64) -> Option<[Vector3<f64>; 4]> {
+        let [a, b] = self.half?.map(|h| h - inset);
+        let corner = |(s, t): (f64, f64)| self.centre + self.right * (s * a) + self.down * (t * b);
+        Some([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(corner))
+    }
+}
+
+/// A board, and a wall facing the sensor behind it.
+#[derive(Debug, Clone)]
+pub struct Stage {
+    pub board: Board,
+    /// Depth of the wall, m.
+    pub wall: Option<f64>,
+    /// Tilt of the board and where to, rad.
+    pub theta: f64,
+    pub azimuth: f64,
+}
+
+/// A pixel, and what it looks at.
+#[derive(Debug, Clone, Copy)]
+pub struct Site {
+    pub u: f64,
+    pub v: f64,
+    /// Distance from the principal point over that of the farthest corner.
+    pub radius: f64,
+    /// Of the ray as the camera's description has it.
+    pub x: f64,
+    pub y: f64,
+    /// Depth along the optical axis, m.
+    pub z: f64,
+    /// Column here minus column at the projector, px.
+    pub disparity: f64,
+    pub point: Vector3<f64>,
+    pub on_board: bool,
+    /// On the board, m from its centre.
+    pub place: [f64; 2],
+    /// Tilt of what is met, rad.
+    pub theta: f64,
+    /// Cosine of the angle between ray and normal.
+    pub facing: f64,
+    /// Into the picture from the nearest outline of the board, px; positive on the board.
+    pub edge_px: f64,
+    /// Of the other surface at this pixel, px.
+    pub other_disparity: Option<f64>,
+    /// Share of the light given back.
+    pub albedo: f64,
+}
+
+/// Column at which the projector, `baseline_m` to the right of the camera, sees a point.
+pub fn projector_column(sensor: &Sensor, baseline_m: f64, point: &Vector3<f64>) -> f64 {
+    sensor.camera.cx + sensor.camera.fx * (point.x - baseline_m) / point.z
+}
+
+/// Signed distance, px, of (u, v) from a convex outline; positive inside.
+pub fn inside_px(outline: &[[f64; 2]; 4], u: f64, v: f64) -> f64 {
+    let side = |i: usize| {
+        let ([ua, va], [ub, vb]) = (outline[i], outline[(i + 1) % 4]);
+        let (du, dv) = (ub - ua, vb - va);
+        (du * (v - va) - dv * (u - ua)) / du.hypot(dv)
+    };
+    let depth = (0..4).map(side).fold(f64::INFINITY, f64::min);
+    if depth >= 0.0 { depth } else { -outside_px(outline, u, v) }
+}
+
+fn outside_px(outline: &[[f64; 2]; 4], u: f64, v: f64) -> f64 {
+    let to_side = |i: usize| {
+        let ([ua, va], [ub, vb]) = (outline[i], outline[(i + 1) % 4]);
+        let (du, dv) = (ub - ua, vb - va);
+        let along = ((u - ua) * du + (v - va) * dv) / (du * du + dv * dv);
+        let t = along.clamp(0.0, 1.0);
+        (u - ua - t * du).hypot(v - va - t * dv)
+    };
+    (0..4).map(to_side).fold(f64::INFINITY, f64::min)
+}
+
+/// Does the board stand between `point` and the projector?
+pub fn shaded(stage: &Stage, baseline_m: f64, point: &Vector3<f64>) -> bool {
+    let lamp = Vector3::new(baseline_m, 0.0, 0.0);
+    let normal = stage.board.normal;
+    let (from, to) = (normal.dot(&lamp) - stage.board.reach, normal.dot(point) - stage.board.reach);
+    if from * to >= 0.0 {
+        return false;
+    }
+    let crossing = lamp + (point - lamp) * (from / (from - to));
+    stage.board.holds(stage.board.place(&crossing))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_board_stands_where_it_was_put() {
+        for azimuth in [0.0, 0.7, 1.6, 3.0, -2.0] {
+            let board = Board::posed(1.7, [0.6, azimuth], [0.05, -0.03], 0.04);
+            assert!((board.depth(0.0, 0.0) - 1.7).abs() < 1e-12);
+            assert!((board.normal.z - 0.6f64.cos()).abs() < 1e-12, "tilt");
+            assert!(board.right.dot(&board.down).abs() < 1e-12);
+            let e = 0.01;
+            let uphill = board.depth(e * azimuth.cos(), e * azimuth.sin());
+            let level = board.depth(-e * azimuth.sin(), e * azimuth.cos());
+            assert!((level - 1.7).abs() < 1e-12 && uphill > 1.7);
+            let aim = board.place(&Vector3::new(0.0, 0.0, 1.7));
+            assert!((aim[0] - 0.05).abs() < 1e-12 && (aim[1] + 0.03).abs() < 1e-12);
+            assert!(board.right.x > 0.5, "its right is the picture's right");
+        }
+    }
+
+    #[test]
+    fn the_distance_from_an_outline() {
+        let square = [[0.0, 0.0], [10.0, 0.0], [10.0, 6.0], [0.0, 6.0]];
+        assert_eq!(inside_px(&square, 5.0, 2.0), 2.0);
+        assert_eq!(inside_px(&square, 13.0, 10.0), -5.0);
+    }
+
+    /// Similar triangles: fx b (1/z - 1/wall) px.
+    #[test]
+    fn the_shadow_is_as_wide_as_geometry_says() {
+        let mut board = Board::posed(1.5, [0.0, 0.0], [0.0, 0.0], 0.0);
+        board.half = Some([0.3, 0.2]);
+        let stage = Stage { board, wall: Some(3.0), theta: 0.0, azimuth: 0.0 };
+        let lost = (0..64_000).filter(|i| {
+            let x = (f64::from(*i) / 100.0 - 320.0) / 580.0;
+            let on_wall = (1.5 * x).abs() > 0.3;
+            on_wall && shaded(&stage, 0.075, &(Vector3::new(x, 0.0, 1.0) * 3.0))
+        });
+        let width = lost.count() as f64 / 100.0;
+        assert!((width - 580.0 * 0.075 * (1.0 / 1.5 - 1.0 / 3.0)).abs() < 0.02, "{width}");
+    }
+}

@@ -1,0 +1,127 @@
+//! Windows that make neighbours err together.
+
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use kinoise::rng::{Seed, Stream};
+
+/// Independent standard normal numbers.
+pub fn white(count: usize, mut rng: Stream) -> Vec<f32> {
+    (0..count).map(|_| StandardNormal.sample(&mut rng)).collect()
+}
+
+/// The base noise of a frame before it is shaped.
+pub fn fresh(seed: Seed, view: usize, frame: i64, count: usize) -> Vec<f32> {
+    white(count, seed.stream(&format!("rays/white/{view}/{frame}")))
+}
+
+/// Sum of four uniform numbers, mean 0, variance 1.
+pub fn roundish(rng: &mut Stream) -> f32 {
+    let sum: f32 = (0..4).map(|_| rng.random::<f32>()).sum();
+    (sum - 2.0) * 3f32.sqrt()
+}
+
+/// A separable window, its weights of unit square sum.
+#[derive(Debug, Clone)]
+pub struct Window {
+    /// Odd in number.
+    taps: Vec<f32>,
+}
+
+impl Window {
+    fn of(weights: impl Iterator<Item = f64>) -> Self {
+        let weights: Vec<f64> = weights.collect();
+        let norm = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
+        Window { taps: weights.iter().map(|w| (w / norm) as f32).collect() }
+    }
+
+    /// All pixels alike, `side` px; a fraction falls to the two outermost.
+    pub fn flat(side: f64) -> Self {
+        let reach = ((side - 1.0) / 2.0).ceil() as i32;
+        let rim = (side - f64::from(2 * reach - 1)) / 2.0;
+        Window::of((-reach..=reach).map(|k| if k.abs() == reach { rim } else { 1.0 }))
+    }
+
+    /// A bell that reaches as far as a flat window of `side` px: 2 sqrt(pi) standard deviations.
+    pub fn bell(side: f64) -> Self {
+        let sd = side / (2.0 * std::f64::consts::PI.sqrt());
+        let reach = (4.0 * sd).ceil() as i32;
+        Window::of((-reach..=reach).map(|k| (-0.5 * (f64::from(k) / sd).powi(2)).exp()))
+    }
+
+    /// A tent that reaches as far as a flat window of `side` px: 4/3 of half its foot.
+    pub fn tent(side: f64) -> Self {
+        let half = side * 2.0 / 3.0;
+        let reach = half.ceil() as i32;
+        Window::of((-reach..=reach).map(|k| (1.0 - f64::from(k.abs()) / half).max(0.0)))
+    }
+
+    /// Sum of the correlation over all lags along one axis: what the side of a flat window is.
+    pub fn side(&self) -> f64 {
+        f64::from(self.taps.iter().sum::<f32>()).powi(2)
+    }
+
+    /// Sum of the squared correlation over all lags along one axis.
+    pub fn squares(&self) -> f64 {
+        let n = self.taps.len();
+        let lag = |k: usize| (k..n).map(|i| self.taps[i] * self.taps[i - k]).sum::<f32>();
+        1.0 + 2.0 * (1..n).map(|k| f64::from(lag(k)).powi(2)).sum::<f64>()
+    }
+
+    /// Power at an angular frequency, 1/px; 1 on average.
+    pub fn power(&self, frequency: f64) -> f64 {
+        let reach = (self.taps.len() / 2) as f64;
+        let wave =
+            |(k, tap): (usize, &f32)| f64::from(*tap) * (frequency * (k as f64 - reach)).cos();
+        self.taps.iter().enumerate().map(wave).sum::<f64>().powi(2)
+    }
+
+    /// Blur, the variance kept; the picture goes on at its other end.
+    pub fn blur(&self, field: &mut [f32], width: usize) {
+        let height = field.len() / width;
+        let reach = self.taps.len() / 2;
+        let mut line = Vec::with_capacity(width + 2 * reach);
+        for row in field.chunks_exact_mut(width) {
+            line.clear();
+            line.extend((0..width + 2 * reach).map(|i| row[(i + width - reach) % width]));
+            row.fill(0.0);
+            for (k, tap) in self.taps.iter().enumerate() {
+                row.iter_mut().zip(&line[k..]).for_each(|(out, x)| *out += tap * x);
+            }
+        }
+        let source = field.to_vec();
+        for (v, row) in field.chunks_exact_mut(width).enumerate() {
+            row.fill(0.0);
+            for (k, tap) in self.taps.iter().enumerate() {
+                let from = (v + k + height - reach) % height * width;
+                row.iter_mut().zip(&source[from..from + width]).for_each(|(o, x)| *o += tap * x);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Chi-square of 40 fields' means, each of standard error 1/sqrt(n): 40 with deviation 9.
+    #[test]
+    fn fresh_noise_has_no_mean() {
+        let n = 20_000;
+        let mean = |view| fresh(Seed(5), view, 0, n).iter().sum::<f32>() / n as f32;
+        let chi2 = (0..40).map(|view| n as f32 * mean(view).powi(2)).sum::<f32>();
+        assert!((15.0..75.0).contains(&chi2), "{chi2}");
+    }
+
+    #[test]
+    fn windows_of_a_side_reach_equally_far_and_keep_the_variance() {
+        let windows = [Window::flat(9.0), Window::flat(5.0), Window::bell(8.0), Window::tent(8.0)];
+        for (window, side) in windows.iter().zip([9.0, 5.0, 8.0, 8.0]) {
+            assert!((window.side() / side - 1.0).abs() < 0.02, "{} {side}", window.side());
+            let mut field = fresh(Seed(1), 0, 0, 640 * 480);
+            window.blur(&mut field, 640);
+            let variance = field.iter().map(|x| x * x).sum::<f32>() / field.len() as f32;
+            assert!((variance - 1.0).abs() < 0.08, "{variance}");
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! What travels from the worlds to the seal, the solver and the judge.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use kinoise::correct::Conditions;
+use kinoise::error::Result;
+use kinoise::view::Sensor;
+
+/// Where a set comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum World {
+    /// S1: rays and disparity.
+    Rays,
+    /// S2: dots, light and a block matcher.
+    Light,
+    /// S3: recordings that a real sensor took.
+    Real,
+}
+
+/// What kind of question a set puts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cell {
+    /// Nothing is left out.
+    Null,
+    /// The unit's own sigma is no longer what its model says.
+    Drift,
+    Single,
+    Pair,
+    Triple,
+    /// A cause that the catalogue lacks.
+    Outside,
+    /// What planes cannot show, without a reference distance.
+    Blind,
+    /// The same with reference distances.
+    Referenced,
+    /// An effect beside another that mimics it.
+    Mimic,
+    /// An effect in a few views only.
+    FewViews,
+    /// An effect in one region of the picture only.
+    Region,
+    /// An effect past one distance only.
+    Far,
+    /// An effect late in the session only.
+    Late,
+    /// A term that real data need is struck from the model.
+    Amnesia,
+    /// An effect added to real residuals.
+    Transplant,
+    /// One half of a real recording against a model of the other.
+    Halves,
+}
+
+/// What is ordered of a world.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Asked {
+    pub world: World,
+    pub cell: Cell,
+    /// Effects or causes by name; by lot where none is named.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub names: Vec<String>,
+    /// Expected log-likelihood that who knows the truth gains over the model, nats over the whole
+    /// recording after planes are fitted, for every concealed cause; a world that cannot reach it
+    /// takes what it can and writes the figure it has.
+    pub nats: Option<f64>,
+    pub seed: u64,
+    /// 160x120 instead of 320x240.
+    pub small: bool,
+}
+
+/// One cause that was concealed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Hidden {
+    /// Ids of the catalogue that count as its name; none where the catalogue lacks it.
+    pub names: Vec<String>,
+    /// The formula or the switch that was used, in a word.
+    pub form: String,
+    pub statistic: String,
+    pub axis: String,
+    /// Axes on which it shows as well.
+    #[serde(default)]
+    pub also: Vec<String>,
+    pub interval: Option<[f64; 2]>,
+    /// In the catalogue's names and units where the forms have them in common.
+    pub parameters: Map<String, Value>,
+    pub nats: Option<f64>,
+}
+
+/// The sealed answer to one set.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Truth {
+    pub asked: Asked,
+    /// Empty where the right answer is "match".
+    pub hidden: Vec<Hidden>,
+    /// How the recording was taken; for readers.
+    pub base: Value,
+}
+
+/// A view that the solver never gets: what an ideal sensor of the same unit reports, without noise.
+pub struct ExamView {
+    pub sensor: Sensor,
+    /// Outside the distances or tilts of the recording.
+    pub beyond: bool,
+    /// Of the target's plane, rad.
+    pub theta: f64,
+    pub azimuth: f64,
+    pub conditions: Conditions,
+    /// Mean of what is reported, concealed causes included, m; NaN off the target.
+    pub depth: Vec<f32>,
+    /// What the sensor would report with nothing concealed, m.
+    pub plain: Vec<f32>,
+    /// Standard deviation of one frame's noise with the concealed causes and without, m.
+    pub sigma: Vec<f32>,
+    pub sigma_plain: Vec<f32>,
+}
+
+/// How the target stands in a view: where its plane meets the optical axis, m, its tilt, and where
+/// its depth grows to (0 along the columns), rad.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Pose {
+    pub z_m: f64,
+    pub theta_rad: f64,
+    pub azimuth_rad: f64,
+}
+
+/// A set that is ready to be taken.
+pub trait Sealed: Send + Sync {
+    fn truth(&self) -> Truth;
+
+    /// Write `recording/` and either `model.json` or `simulated/` into `folder`, and nothing else.
+    /// The same bytes every time.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    fn write(&self, folder: &Path) -> Result<()>;
+
+    /// Fresh views for the examination of what was learnt; none where the world has no truth without
+    /// noise.
+    fn exam(&self) -> Vec<ExamView> {
+        Vec::new()
+    }
+
+    /// The same set with one view more, as near to `pose` as its stage permits, and the pose that was
+    /// taken; the other views are the same to the last byte. None where the session is over for good.
+    ///
+    /// # Errors
+    /// Those of making the set.
+    fn with_view(&self, _pose: &Pose) -> Result<Option<(Pose, Box<dyn Sealed>)>> {
+        Ok(None)
+    }
+}
+
+/// What somebody learnt from a recording, put to use on a view they never saw.
+pub trait Predictor {
+    /// Take the predicted bias out of `depth` (m, NaN where there is none).
+    ///
+    /// # Errors
+    /// When the prediction does not fit the view's camera.
+    fn correct(&self, view: &ExamView, depth: &mut [f32]) -> Result<()>;
+
+    /// Predicted standard deviation of one frame's noise at `depth`, m.
+    fn sigma(&self, view: &ExamView, depth: &[f32]) -> Vec<f32>;
+}
