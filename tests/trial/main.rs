@@ -1,53 +1,212 @@
-//! The blind trial: sets whose left-out physics is sealed away, a solver that sees nothing else,
-//! and a judge who opens the seals afterwards.
+//! The blind trial of `kinoise diagnose`, as an example that sees the public library alone:
+//! `./run prove -o DIR [--sets N] [--seed S] [--data RECORDINGS]`, `--check DIR`, `--page DIR`.
 //!
-//! The makers of sets share no formula with the catalogue and no code with the diagnosis; only the
-//! recording and the model file are common ground.
+//! Makers of concealed sets share no formula with the catalogue and no code with the diagnosis
+//! ([`raytraced`], the world of light, and real recordings). Their data and answers are hashed before the first
+//! diagnosis, the verdicts before the first answer is opened; a process that can reach one set and
+//! nothing else diagnoses it; endpoints are chosen before; every failure is on the page.
 
+#[allow(dead_code)] // the product's tests use a part of it too
 #[path = "../common/raytraced/mod.rs"]
-pub mod raytraced;
+mod raytraced;
 
-mod advice;
-pub mod baselines;
+mod baselines;
 mod check;
-mod command;
-mod confine;
-mod examine;
-pub mod gain;
-mod gains;
+mod commitment;
+mod gain;
 mod judge;
-mod kept;
-pub mod light;
+mod light;
 mod make;
 mod page;
 mod plan;
+mod predictor;
 mod proof;
-pub mod real;
-mod rite;
-mod seal;
-mod solve;
-mod solver_command;
-mod summary_text;
-mod verdict;
-mod workers;
-pub mod worlds;
+mod real;
+mod rounds;
+mod solver;
+mod worlds;
 
-pub use advice::{ADVICE_FORMAT, Advice, AdvisedSet, Rediagnosed, SecondRound};
-pub use check::{CheckOptions, Checked, check};
-pub use confine::confine;
-pub use examine::{Examination, Examine, OUR_METHOD, examine_all};
-pub use gains::{Gain, Gains, Method};
-pub use judge::*;
-pub use kept::{KeptCurve, kept_curve};
-pub use plan::{Planned, plan};
-pub use proof::{Ordered, PROOF_FORMAT, Proof, ProvenSet};
-pub use raytraced as rays;
-pub use raytraced::question::*;
-pub use rite::{Trial, prove};
-pub use seal::{Seal, SealedSet, commitment, hash_folder};
-pub use solve::{DATA, Solved};
-pub use worlds::seal;
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::time::Duration;
 
-fn main() -> std::process::ExitCode {
-    command::main()
+use anyhow::{Context, bail};
+use clap::{Args, Parser, Subcommand};
+use indicatif::{ProgressBar, ProgressStyle};
+use kinoise::io::write_atomic;
+
+use check::{CheckOptions, check};
+use proof::{Order, Proof};
+#[allow(unused_imports)] // by their short names in the worlds
+use raytraced::question::{Asked, Cell, Hidden, Pose, Sealed, Truth, World};
+use rounds::{Trial, hold};
+
+/// A blind trial of the diagnosis on concealed sets that anyone can check.
+#[derive(Debug, Parser)]
+#[command(name = "prove", args_conflicts_with_subcommands = true)]
+struct CommandLine {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    trial: Arguments,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Make concealed sets by hand
+    Make(make::Arguments),
+    /// One set of a trial, by a process that is shut in
+    #[command(hide = true)]
+    Solve,
+}
+
+#[derive(Debug, Args)]
+struct Arguments {
+    /// Folder for what is published and for the report; a trial that was interrupted goes on there
+    #[arg(short, long, value_name = "DIR", conflicts_with_all = ["check", "page"])]
+    output: Option<PathBuf>,
+    /// How many sets; their kinds keep their shares
+    #[arg(long, value_name = "N", default_value_t = 60)]
+    sets: usize,
+    /// Seed of all random choices: the same seed gives the same sets
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Real recordings, a folder each: a part of the sets is made of them
+    #[arg(long, value_name = "PATH")]
+    data: Option<PathBuf>,
+    /// Keep every set and all that was written about it, in kept/
+    #[arg(long)]
+    keep: bool,
+    /// Longest time for one diagnosis
+    #[arg(long, value_name = "SECONDS", default_value_t = 900)]
+    limit: u64,
+    /// Check the trial in DIR: hashes, marks, scores, and a sample of sets made again
+    #[arg(long, value_name = "DIR", conflicts_with = "page")]
+    check: Option<PathBuf>,
+    /// With --check: make every set again
+    #[arg(long, requires = "check")]
+    all: bool,
+    /// Draw report.html of the finished trial in DIR again
+    #[arg(long, value_name = "DIR")]
+    page: Option<PathBuf>,
+    /// Print the scores, or what was checked, as JSON on stdout
+    #[arg(long)]
+    json: bool,
+    /// Sets at a time; results do not depend on it [default: all cores]
+    #[arg(long)]
+    threads: Option<usize>,
+}
+
+/// A trial that does not hold; bad input or failure.
+const DOES_NOT_HOLD: u8 = 1;
+const FAILURE: u8 = 2;
+
+fn main() -> ExitCode {
+    let line = CommandLine::parse();
+    let done = match &line.command {
+        Some(Command::Make(a)) => make::run(a).map(|()| 0),
+        Some(Command::Solve) => solver::diagnose_shut_in(),
+        None => run(&line.trial),
+    };
+    match done {
+        Ok(code) => ExitCode::from(code),
+        Err(e) => {
+            eprintln!("prove: {e:#}");
+            ExitCode::from(FAILURE)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> anyhow::Result<u8> {
+    if let Some(data) = arguments.data.as_ref().filter(|d| !d.is_dir()) {
+        bail!("{}: no folder is here; give --data the folder of the recordings", data.display());
+    }
+    if let Some(n) = arguments.threads {
+        rayon::ThreadPoolBuilder::new().num_threads(n.max(1)).build_global()?;
+    }
+    let program = std::env::current_exe().context("where this program lies")?;
+    match (&arguments.check, &arguments.page, &arguments.output) {
+        (Some(folder), _, _) => check_again(folder, program, arguments),
+        (None, Some(folder), _) => page_of(folder, &Proof::read(folder)?.0).map(|()| 0),
+        (None, None, Some(output)) => trial(output, program, arguments).map(|()| 0),
+        (None, None, None) => bail!("no folder was given; say -o DIR, --check DIR or --page DIR"),
+    }
+}
+
+fn page_of(folder: &Path, proof: &Proof) -> anyhow::Result<()> {
+    let path = folder.join("report.html");
+    write_atomic(&path, page::page(proof).as_bytes())?;
+    eprintln!("wrote {}", path.display());
+    Ok(())
+}
+
+fn trial(output: &Path, program: PathBuf, arguments: &Arguments) -> anyhow::Result<()> {
+    if arguments.sets == 0 {
+        bail!("--sets 0: give at least one set");
+    }
+    let trial = Trial {
+        output: std::path::absolute(output).with_context(|| output.display().to_string())?,
+        order: Order { sets: arguments.sets, seed: arguments.seed, real: arguments.data.is_some() },
+        data: arguments.data.clone(),
+        keep: arguments.keep,
+        program,
+        limit: Duration::from_secs(arguments.limit),
+    };
+    let bars = Bars::default();
+    let proof = hold(&trial, &|what, done, all| bars.step(what, done, all))?;
+    drop(bars);
+    print_json(arguments, &proof.scores)?;
+    eprintln!("{}", page::summary(&proof));
+    page_of(&trial.output, &proof)
+}
+
+fn check_again(folder: &Path, program: PathBuf, arguments: &Arguments) -> anyhow::Result<u8> {
+    let options = CheckOptions { data: arguments.data.clone(), all: arguments.all, program };
+    let bars = Bars::default();
+    let checked = check(folder, &options, &|what, done, all| bars.step(what, done, all))?;
+    drop(bars);
+    print_json(arguments, &checked)?;
+    for (what, lines) in [("checked", &checked.checked), ("note", &checked.remarks)] {
+        lines.iter().for_each(|line| eprintln!("{what}: {line}"));
+    }
+    checked.faults.iter().for_each(|fault| eprintln!("DOES NOT HOLD: {fault}"));
+    if checked.faults.is_empty() {
+        eprintln!("the trial holds");
+        return Ok(0);
+    }
+    Ok(DOES_NOT_HOLD)
+}
+
+fn print_json(arguments: &Arguments, value: &impl serde::Serialize) -> anyhow::Result<()> {
+    if arguments.json {
+        let mut out = std::io::stdout().lock();
+        serde_json::to_writer_pretty(&mut out, value)?;
+        writeln!(out)?;
+    }
+    Ok(())
+}
+
+/// One bar after the other on a terminal, nothing elsewhere.
+#[derive(Default)]
+struct Bars(Mutex<Option<(&'static str, ProgressBar)>>);
+
+impl Bars {
+    fn step(&self, what: &'static str, done: usize, all: usize) {
+        let Ok(mut shown) = self.0.lock() else { return };
+        if shown.as_ref().is_none_or(|(now, _)| *now != what) {
+            let hidden = !std::io::stderr().is_terminal();
+            let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(0) };
+            if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {eta}") {
+                bar.set_style(style);
+            }
+            bar.set_message(what);
+            *shown = Some((what, bar));
+        }
+        if let Some((_, bar)) = shown.as_ref() {
+            bar.set_length(all as u64);
+            bar.set_position(done as u64);
+        }
+    }
 }

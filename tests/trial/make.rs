@@ -7,8 +7,9 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use crate::rays::{Cell, Order, Set, write};
-use crate::{Asked, World, light, worlds};
+use crate::raytraced::question::{Asked, World};
+use crate::raytraced::{Cell, Order, Set, write};
+use crate::{light, worlds};
 use anyhow::Context;
 use clap::Args;
 use kinoise::io::sha256_hex;
@@ -92,7 +93,7 @@ impl Arguments {
 
 pub fn run(a: &Arguments) -> anyhow::Result<()> {
     let every: Vec<Vec<String>> = if a.effect == ["all"] {
-        use crate::rays::{CATALOGUE, OUTSIDE};
+        use crate::raytraced::{CATALOGUE, OUTSIDE};
         let causes: Vec<&str> = light::known().collect();
         let list: &[&str] = match a.cell {
             _ if a.light => &causes,

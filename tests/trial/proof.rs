@@ -1,51 +1,42 @@
-//! `proof.json`: everything that was sealed, said, opened and counted.
+//! `proof.json`: everything that was committed to, said, opened and counted; and `summary.json`, a
+//! row a set, for whoever has questions of their own.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use serde::de::DeserializeOwned;
+use kinoise::Error;
+use kinoise::error::Result;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Value, json};
 
-use super::advice::SecondRound;
-use super::gains::Gains;
-use super::judge::{Judged, Marks, Scores};
-use super::seal::Seal;
+use crate::commitment::{Commitments, read_json};
+use crate::gain::Gains;
+use crate::judge::{AdviceMarks, Marks, Scores};
 use crate::raytraced::question::Truth;
-use kinoise::error::{Error, Result};
-use kinoise::io::{self, sha256_hex};
-use kinoise::model::Provenance;
 
-pub const PROOF_FORMAT: &str = "kinoise-proof/1";
-pub const PROOF_FILE: &str = "proof.json";
-pub const SEAL_FILE: &str = "seal.json";
-pub const VERDICTS_FILE: &str = "verdicts.json";
-/// Complete diagnoses, by the name of the set.
-pub const DIAGNOSES: &str = "diagnoses";
+pub const FORMAT: &str = "kinoise-proof/2";
+pub const PROOF: &str = "proof.json";
+pub const SUMMARY: &str = "summary.json";
 
 /// A finished trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Proof {
     pub format: String,
-    pub provenance: Provenance,
-    pub order: Ordered,
+    pub order: Order,
     pub scores: Scores,
-    /// Of the files as they were written, before the first diagnosis and before the opening.
-    pub seal_sha256: String,
-    pub verdicts_sha256: String,
-    pub seal: Seal,
+    /// Of the files as they were written, each before what it commits to: the first round's
+    /// commitments and verdicts, then the second's.
+    pub published: [String; 4],
+    pub commitments: [Commitments; 2],
     /// What kept the solver from the rest of the machine, and for how many sets.
     pub confinement: BTreeMap<String, usize>,
     /// In the order in which they were put.
     pub sets: Vec<ProvenSet>,
-    /// Advised views taken; older trials have none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub second: Option<SecondRound>,
 }
 
 /// What the trial was made from: the same again gives the same sets.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Ordered {
+pub struct Order {
     pub sets: usize,
     pub seed: u64,
     /// With real recordings.
@@ -56,86 +47,71 @@ pub struct Ordered {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ProvenSet {
     pub name: String,
-    pub salt: String,
     pub truth: Truth,
     /// The diagnosis without its curves; they are in `diagnoses/`.
     pub verdict: Option<Value>,
     pub failure: Option<String>,
     pub diagnosis_sha256: Option<String>,
-    pub verdict_sha256: Option<String>,
     pub marks: Marks,
     pub gains: Option<Gains>,
-    /// Ids of the catalogue by baseline, best first.
-    #[serde(default)]
-    pub named_by_others: BTreeMap<String, Vec<String>>,
+    /// What came of the view that the diagnosis asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub advised: Option<Advised>,
     /// The diagnosis took so long; nothing else here depends on the machine.
     pub seconds: f64,
 }
 
-impl ProvenSet {
-    pub fn judged(&self) -> Judged<'_> {
-        Judged {
-            truth: &self.truth,
-            marks: &self.marks,
-            gains: self.gains.as_ref(),
-            named_by_others: &self.named_by_others,
-        }
-    }
+/// The set once more, with the view that was advised.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Advised {
+    pub verdict: Option<Value>,
+    pub failure: Option<String>,
+    pub diagnosis_sha256: Option<String>,
+    pub marks: AdviceMarks,
 }
 
 impl Proof {
     /// Read `proof.json` of a folder.
-    ///
-    /// # Errors
-    /// When it is not there or not a proof.
-    pub fn read(folder: &Path) -> Result<Self> {
-        let path = folder.join(PROOF_FILE);
-        let proof: Proof = read_json(&path)?.0;
-        if proof.format != PROOF_FORMAT {
-            return Err(foreign(&path, format!("format \"{}\"", proof.format)));
+    pub fn read(folder: &Path) -> Result<(Self, String)> {
+        let path = folder.join(PROOF);
+        let (proof, hash): (Proof, String) = read_json(&path)?;
+        if proof.format != FORMAT {
+            return Err(Error::Json {
+                path,
+                line: 0,
+                what: format!("format \"{}\"", proof.format),
+                remedy: "give the folder of a trial made by this version",
+            });
         }
-        Ok(proof)
+        Ok((proof, hash))
+    }
+
+    /// A row a set: the truth, what was said, how it was judged.
+    pub fn summary(&self) -> Value {
+        json!({"order": self.order, "scores": self.scores,
+            "sets": self.sets.iter().map(row).collect::<Vec<_>>()})
     }
 }
 
-/// `verdicts.json`: written when all is said and nothing is opened.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Verdicts {
-    pub format: String,
-    pub seal_sha256: String,
-    pub verdicts: Vec<VerdictLine>,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct VerdictLine {
-    pub name: String,
-    pub diagnosis_sha256: Option<String>,
-    pub verdict_sha256: Option<String>,
-    pub failure: Option<String>,
-}
-
-pub const VERDICTS_FORMAT: &str = "kinoise-verdicts/1";
-
-/// What a JSON file holds, and the hash of its bytes.
-///
-/// # Errors
-/// When it is not there or something else.
-pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<(T, String)> {
-    let bytes = std::fs::read(path).map_err(|e| Error::read(path, e))?;
-    let value = serde_json::from_slice(&bytes).map_err(|e| foreign(path, e.to_string()))?;
-    Ok((value, sha256_hex(&bytes)))
-}
-
-const REMEDY: &str = "give the folder of a trial made by this version of kinoise prove";
-
-fn foreign(path: &Path, what: String) -> Error {
-    Error::Json { path: path.to_path_buf(), line: 0, what, remedy: REMEDY }
-}
-
-/// Write whole or not at all; the hash of the bytes.
-///
-/// # Errors
-/// When the disk refuses.
-pub fn write_json(path: &Path, value: &impl Serialize) -> Result<String> {
-    Ok(sha256_hex(io::write_json(path, value, REMEDY)?.as_bytes()))
+fn row(set: &ProvenSet) -> Value {
+    let asked = &set.truth.asked;
+    let hidden = set.truth.hidden.iter().map(|h| {
+        json!({"names": h.names, "form": h.form, "statistic": h.statistic, "axis": h.axis,
+            "nats": h.nats})
+    });
+    let verdict = set.verdict.as_ref();
+    let findings = verdict.and_then(|v| v.get("findings")?.as_array());
+    let found = findings.into_iter().flatten().map(|f| {
+        let keys = ["status", "effect", "alternatives", "statistic", "axis", "share", "size"];
+        keys.iter().map(|k| ((*k).to_string(), f[*k].clone())).collect::<serde_json::Map<_, _>>()
+    });
+    json!({
+        "name": set.name, "world": asked.world, "cell": asked.cell, "nats": asked.nats,
+        "picture_px": if asked.small { [160, 120] } else { [320, 240] },
+        "hidden": hidden.collect::<Vec<_>>(),
+        "verdict": verdict.map(|v| v["verdict"].clone()),
+        "findings": found.collect::<Vec<_>>(),
+        "first": set.marks.first, "answers": set.marks.answers,
+        "gains": set.gains, "failure": set.failure, "seconds": set.seconds,
+    })
 }

@@ -1,62 +1,48 @@
-//! One set: what was right and what was wrong.
+//! One set against its answer, question by question.
 
+use std::collections::BTreeMap;
+
+use kinoise::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::case::Case;
-use crate::raytraced::question::{Cell, Truth};
-use crate::verdict::Verdict;
-use kinoise::error::{Error, Result};
+use super::verdict::{CERTAIN, Finding, Verdict};
+use crate::raytraced::question::{Cell, Hidden, Truth};
 
-/// What the judge says of one set. `None`: the question does not arise.
+/// What the judge says of one set.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Marks {
-    /// A diagnosis came. One that did not counts as wrong in every respect.
-    pub ran: bool,
     /// The first thing said: a name, "unexplained", "recalibrate", "nothing", or "failed".
     pub first: String,
-    /// Something was found where nothing is hidden.
-    pub false_alarm: Option<bool>,
-    /// Something was found where something is hidden that can be seen.
-    pub detected: Option<bool>,
-    /// The first finding's name is one of the hidden; of those detected.
-    pub first_name: Option<bool>,
-    /// Its name or its first two alternatives; of those detected.
-    pub in_two: Option<bool>,
-    /// The names said are those hidden, no more and no fewer.
-    pub exact: Option<bool>,
-    /// The first finding is on the right axis; of those detected.
-    pub axis: Option<bool>,
-    /// Share of the stretch of that axis, what both hold over what either holds.
+    /// Every question that arose, and whether the answer is yes. Without a diagnosis everything that
+    /// was asked is wrong. The questions are told on the page ([`QUESTIONS`]).
+    pub answers: BTreeMap<String, bool>,
+    /// What the stretch of the finding and that of the label share, over what either holds.
     pub overlap: Option<f64>,
-    /// What the catalogue lacks is called unexplained, with the right statistic and axis.
-    pub abstained: Option<bool>,
-    /// What the catalogue lacks is given a name of its own with 0.9 or more.
-    pub masquerade: Option<bool>,
-    /// A name that is not hidden is said with 0.9 or more.
-    pub confident_wrong: Option<bool>,
-    /// What planes cannot show is said to be so.
-    pub said_blind: Option<bool>,
-    /// Nothing is claimed of what planes cannot show.
-    pub nothing_claimed: Option<bool>,
-    /// A unit that has changed is sent back to calibration.
-    pub recalibrate: Option<bool>,
-    /// The extended model leaves nothing that the tests can see; of those with a name.
-    pub after_clean: Option<bool>,
-    /// Where the finding is one of several, a next view is proposed.
-    pub advice: Option<bool>,
-    pub names: Names,
     pub parameters: Vec<ParameterMark>,
     pub stated: Vec<Stated>,
 }
 
-/// How many names.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Names {
-    pub hidden: usize,
-    pub said: usize,
-    pub right: usize,
-}
+/// What is asked, and of which sets.
+pub const QUESTIONS: [(&str, &str); 14] = [
+    ("ran", "a diagnosis came"),
+    ("false_alarm", "something is found where nothing is hidden"),
+    ("detected", "something is found where something is hidden that can be seen"),
+    ("first_name", "the first finding's name is one of the hidden; of those detected"),
+    ("in_two", "its name or its first two alternatives are; of those detected"),
+    ("exact", "the names said are those hidden, no more and no fewer"),
+    ("axis", "the first finding is on the right axis; of those detected"),
+    (
+        "abstained",
+        "what the catalogue lacks is called unexplained, on the right statistic and axis",
+    ),
+    ("confident_wrong", "a name that is not hidden is said with 0.9 or more"),
+    ("said_blind", "what planes cannot show is said to be so"),
+    ("nothing_claimed", "nothing is claimed of what planes cannot show"),
+    ("recalibrate", "a unit that has changed is sent back to calibration, without a name"),
+    ("after_clean", "the extended model leaves nothing that the tests can see; of those named"),
+    ("advice", "where the finding is one of several, a next view is proposed"),
+];
 
 /// A parameter that the truth and the finding have in common.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -71,40 +57,15 @@ pub struct ParameterMark {
     pub covered: Option<bool>,
 }
 
-/// A probability that was stated, and whether the name was right.
+/// The probability of a finding's best name, and whether it was right.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Stated {
     pub effect: String,
     pub probability: f64,
-    /// The finding's best name, not one of its alternatives.
-    pub best: bool,
     pub right: bool,
 }
 
-impl Marks {
-    /// All that is yes or no, with the names of the scores.
-    pub fn yes_no(&self) -> [(&'static str, Option<bool>); 15] {
-        [
-            ("ran", Some(self.ran)),
-            ("false_alarm", self.false_alarm),
-            ("detected", self.detected),
-            ("first_name", self.first_name),
-            ("in_two", self.in_two),
-            ("exact", self.exact),
-            ("axis", self.axis),
-            ("abstained", self.abstained),
-            ("masquerade", self.masquerade),
-            ("confident_wrong", self.confident_wrong),
-            ("said_blind", self.said_blind),
-            ("nothing_claimed", self.nothing_claimed),
-            ("recalibrate", self.recalibrate),
-            ("after_clean", self.after_clean),
-            ("advice", self.advice),
-        ]
-    }
-}
-
-/// Judge one set. Without a verdict everything that was asked is wrong.
+/// Judge one set.
 ///
 /// # Errors
 /// When the verdict is not a diagnosis.
@@ -116,30 +77,302 @@ pub fn mark(truth: &Truth, verdict: Option<&Value>) -> Result<Marks> {
         })
     };
     let verdict = verdict.map(read).transpose()?;
-    let case = Case { truth, said: verdict.as_ref() };
-    Ok(match truth.asked.cell {
-        Cell::Drift => case.drift(),
-        Cell::Blind => case.blind(),
-        _ if truth.hidden.is_empty() => case.empty(),
-        _ => case.concealed(),
+    Ok(Case { truth, said: verdict.as_ref() }.marks())
+}
+
+/// A truth and what was said to it; nothing where no diagnosis came.
+struct Case<'a> {
+    truth: &'a Truth,
+    said: Option<&'a Verdict>,
+}
+
+impl Case<'_> {
+    fn marks(&self) -> Marks {
+        let first = match (self.said, self.first()) {
+            (None, _) => "failed",
+            (_, None) => "nothing",
+            (_, Some(said)) => said.name().unwrap_or(&said.status),
+        };
+        let answers = [
+            ("ran", Some(self.said.is_some())),
+            ("confident_wrong", Some(self.certain_but_wrong())),
+        ];
+        let more = match self.truth.asked.cell {
+            Cell::Drift => self.drift(),
+            Cell::Blind => self.blind(),
+            _ if self.truth.hidden.is_empty() => vec![("false_alarm", Some(self.alarms()))],
+            _ => self.concealed(),
+        };
+        let all = answers.into_iter().chain(more);
+        Marks {
+            first: first.into(),
+            answers: all.filter_map(|(name, yes)| Some((name.to_string(), yes?))).collect(),
+            overlap: self.best_overlap(),
+            parameters: self.parameters(),
+            stated: self.stated(),
+        }
+    }
+
+    fn alarms(&self) -> bool {
+        self.said.is_none_or(|v| v.verdict == "mismatch" || v.claims().next().is_some())
+    }
+
+    fn drift(&self) -> Vec<(&'static str, Option<bool>)> {
+        let sent_back = self.claims().any(|f| f.status == "recalibrate");
+        let right = sent_back && self.claims().all(|f| f.name().is_none());
+        vec![("detected", Some(self.found())), ("recalibrate", Some(right))]
+    }
+
+    fn blind(&self) -> Vec<(&'static str, Option<bool>)> {
+        let blind = |v: &Verdict| {
+            let unseen = v.cannot_tell.iter().map(|c| c.effect.as_str());
+            let found = v.findings.iter().filter(|f| !f.claims());
+            unseen.chain(found.filter_map(|f| f.effect.as_deref())).any(|id| self.is_hidden(id))
+        };
+        let silent = self.said.is_some_and(|v| v.claims().next().is_none());
+        vec![("said_blind", Some(self.said.is_some_and(blind))), ("nothing_claimed", Some(silent))]
+    }
+
+    fn concealed(&self) -> Vec<(&'static str, Option<bool>)> {
+        let nameless: Vec<&Hidden> = self.hidden().filter(|h| h.names.is_empty()).collect();
+        let has_names = self.hidden().count() > nameless.len();
+        let of_first = |ask: &dyn Fn(&Finding) -> bool| self.first().filter(|_| has_names).map(ask);
+        let unexplained = || self.claims().filter(|f| f.status == "unexplained");
+        let abstained = nameless.iter().all(|h| unexplained().any(|f| f.right_place(h)));
+        let clean = |v: &Verdict| v.after.as_ref().is_some_and(|a| a.verdict == "match");
+        let named = self.claims().any(|f| f.name().is_some());
+        let doubtful = self.claims().find(|f| f.status == "one-of");
+        vec![
+            ("detected", Some(self.found())),
+            ("first_name", of_first(&|f| f.name().is_some_and(|id| self.is_hidden(id)))),
+            ("in_two", of_first(&|f| self.is_among_two(f))),
+            ("exact", nameless.is_empty().then(|| self.exact())),
+            ("axis", of_first(&|f| self.meant(f).any(|h| f.right_axis(h)))),
+            ("abstained", (!nameless.is_empty()).then_some(abstained)),
+            ("after_clean", named.then(|| self.said.is_some_and(clean))),
+            ("advice", doubtful.map(Finding::advises)),
+        ]
+    }
+
+    fn hidden(&self) -> impl Iterator<Item = &Hidden> {
+        self.truth.hidden.iter()
+    }
+
+    fn claims(&self) -> impl Iterator<Item = &Finding> {
+        self.said.into_iter().flat_map(Verdict::claims)
+    }
+
+    fn found(&self) -> bool {
+        self.said.is_some_and(Verdict::finds_something)
+    }
+
+    /// The most important finding, where there is a mismatch at all.
+    fn first(&self) -> Option<&Finding> {
+        self.said.filter(|v| v.finds_something()).and_then(|v| v.claims().next())
+    }
+
+    fn is_hidden(&self, id: &str) -> bool {
+        self.hidden().any(|h| h.names.iter().any(|n| n == id))
+    }
+
+    fn is_among_two(&self, said: &Finding) -> bool {
+        let two = said.alternatives.iter().take(2).map(|a| a.effect.as_str());
+        two.chain(said.name()).any(|id| self.is_hidden(id))
+    }
+
+    /// The hidden causes that a finding can stand for: those of its name, else all.
+    fn meant(&self, said: &Finding) -> impl Iterator<Item = &Hidden> {
+        let id = said.name().filter(|id| self.is_hidden(id)).map(String::from);
+        self.hidden().filter(move |h| id.as_ref().is_none_or(|id| h.names.contains(id)))
+    }
+
+    fn exact(&self) -> bool {
+        let said: Vec<&str> = self.claims().filter_map(Finding::name).collect();
+        let every = self.hidden().all(|h| h.names.iter().any(|n| said.contains(&n.as_str())));
+        every && said.iter().all(|id| self.is_hidden(id))
+    }
+
+    fn certain_but_wrong(&self) -> bool {
+        self.claims().filter_map(Finding::certain_name).any(|id| !self.is_hidden(id))
+    }
+
+    /// Of the finding that meets a label with a stretch best.
+    fn best_overlap(&self) -> Option<f64> {
+        let fits = |f: &Finding, h: &Hidden| match f.name() {
+            Some(id) => h.names.iter().any(|n| n == id),
+            None => h.names.is_empty() && f.right_place(h),
+        };
+        let all = self.claims().flat_map(|f| self.hidden().map(move |h| (f, h)));
+        all.filter(|(f, h)| fits(f, h)).filter_map(|(f, h)| f.overlap(h)).reduce(f64::max)
+    }
+
+    fn parameters(&self) -> Vec<ParameterMark> {
+        let mut marks = Vec::new();
+        for said in self.claims() {
+            let Some(id) = said.name().filter(|id| self.is_hidden(id)) else { continue };
+            for hidden in self.meant(said) {
+                marks.extend(hidden.parameters.iter().filter_map(|(name, truth)| {
+                    parameter(id, name, truth.as_f64()?, said.parameters.get(name)?)
+                }));
+            }
+        }
+        marks
+    }
+
+    fn stated(&self) -> Vec<Stated> {
+        let best = |f: &Finding| {
+            let best = f.alternatives.first().filter(|_| f.name().is_some())?;
+            let right = self.is_hidden(&best.effect);
+            Some(Stated { effect: best.effect.clone(), probability: best.probability?, right })
+        };
+        self.claims().filter_map(best).collect()
+    }
+}
+
+/// Standard deviations of a Gaussian that hold 90 %.
+const NINETY_PERCENT: f64 = 1.644_853_626_951_472_2;
+
+fn parameter(effect: &str, name: &str, truth: f64, estimate: &Value) -> Option<ParameterMark> {
+    let said = estimate.get("value")?.as_f64()?;
+    let off = (said - truth).abs();
+    let relative_error = off / truth.abs();
+    let error = estimate.get("std_error").and_then(Value::as_f64);
+    relative_error.is_finite().then(|| ParameterMark {
+        effect: effect.into(),
+        name: name.into(),
+        truth,
+        said,
+        relative_error,
+        covered: error.map(|e| off <= NINETY_PERCENT * e),
     })
 }
 
-/// What can be said of names without anything else: whether they are a false alarm, or whether
-/// something was seen, the first name is right, and the set of names is.
-pub fn names_alone(truth: &Truth, names: &[String]) -> Vec<(&'static str, bool)> {
-    let hidden = |id: &String| truth.hidden.iter().any(|h| h.names.contains(id));
-    let catalogued = truth.hidden.iter().all(|h| !h.names.is_empty());
-    match truth.asked.cell {
-        Cell::Drift | Cell::Blind => Vec::new(),
-        _ if truth.hidden.is_empty() => vec![("false_alarm", !names.is_empty())],
-        _ if catalogued => {
-            let all = truth.hidden.iter().all(|h| h.names.iter().any(|n| names.contains(n)));
-            let mut marks = vec![("detected", !names.is_empty())];
-            marks.extend(names.first().map(|id| ("first_name", hidden(id))));
-            marks.push(("exact", all && names.iter().all(hidden)));
-            marks
+/// Whether the view that was advised did what it was advised for.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct AdviceMarks {
+    /// The two names in doubt, the better first.
+    pub doubt: Vec<String>,
+    /// What leads the finding of the same statistic with the view.
+    pub after: String,
+    /// Probability of the hidden name among the two, before and after; none where neither is hidden.
+    pub right: Option<[f64; 2]>,
+    /// Afterwards the hidden name leads with 0.9 or more.
+    pub settled: Option<bool>,
+}
+
+/// Judge one set's second verdict beside its first.
+pub fn mark_advice(truth: &Truth, first: Option<&Value>, second: Option<&Value>) -> AdviceMarks {
+    let read = |v: Option<&Value>| -> Option<Verdict> { serde_json::from_value(v?.clone()).ok() };
+    let (before, after) = (read(first), read(second));
+    let Some(asked) = before.as_ref().and_then(Verdict::in_doubt) else {
+        return AdviceMarks::default();
+    };
+    let doubt: Vec<String> = asked.alternatives.iter().take(2).map(|a| a.effect.clone()).collect();
+    let same = |f: &&Finding| f.statistic == asked.statistic && f.name().is_some();
+    let answer = after.as_ref().and_then(|v| v.claims().find(same));
+    let leads = answer.and_then(Finding::name).unwrap_or("nothing").to_string();
+    let hidden = |id: &&String| truth.hidden.iter().any(|h| h.names.contains(id));
+    let right = doubt.iter().find(hidden).map(|id| {
+        let then = after.iter().flat_map(Verdict::claims).map(|f| f.probability(id));
+        [asked.probability(id), then.fold(0.0, f64::max)]
+    });
+    let settled = right.map(|[_, p]| p >= CERTAIN && doubt.iter().any(|id| *id == leads));
+    AdviceMarks { doubt, after: leads, right, settled }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn truth(cell: &str, hidden: Value) -> Truth {
+        let asked = json!({"world": "rays", "cell": cell, "nats": 50.0, "seed": 1, "small": true});
+        serde_json::from_value(json!({"asked": asked, "hidden": hidden, "base": null})).unwrap()
+    }
+
+    fn hidden(names: &[&str], axis: &str) -> Value {
+        json!({"names": names, "form": "f", "statistic": "variance", "axis": axis,
+            "interval": [0.0, 1.0], "parameters": {"growth": 0.5}, "nats": 60.0})
+    }
+
+    fn finding(status: &str, effect: &str, probability: f64) -> Value {
+        json!({"status": status, "effect": effect, "statistic": "variance", "axis": "radius",
+            "interval": [0.5, 1.0],
+            "alternatives": [{"effect": effect, "probability": probability}],
+            "parameters": {"growth": {"value": 0.6, "std_error": 0.1}}})
+    }
+
+    fn verdict(findings: &[Value]) -> Value {
+        let verdict = if findings.is_empty() { "match" } else { "mismatch" };
+        json!({"verdict": verdict, "findings": findings, "after": {"verdict": "match"}})
+    }
+
+    fn yes(truth: &Truth, verdict: &Value) -> Vec<String> {
+        let answers = mark(truth, Some(verdict)).unwrap().answers;
+        answers.into_iter().filter(|a| a.1).map(|a| a.0).collect()
+    }
+
+    #[test]
+    fn a_right_name_is_right_in_every_respect() {
+        let truth = truth("single", json!([hidden(&["vignetting"], "radius")]));
+        let marks = mark(&truth, Some(&verdict(&[finding("named", "vignetting", 0.95)]))).unwrap();
+        for question in ["detected", "first_name", "in_two", "exact", "axis", "after_clean"] {
+            assert_eq!(marks.answers.get(question), Some(&true), "{question}");
         }
-        _ => vec![("detected", !names.is_empty())],
+        assert_eq!(marks.answers.get("confident_wrong"), Some(&false));
+        assert_eq!(marks.overlap, Some(0.5));
+        assert!((marks.parameters[0].relative_error - 0.2).abs() < 1e-12);
+        assert_eq!(marks.parameters[0].covered, Some(true));
+        assert_eq!(
+            marks.stated,
+            [Stated { effect: "vignetting".into(), probability: 0.95, right: true }]
+        );
+    }
+
+    #[test]
+    fn wrong_names_and_silence_count_as_what_they_are() {
+        let truth = truth("single", json!([hidden(&["vignetting"], "radius")]));
+        let wrong = verdict(&[finding("named", "slope-noise", 0.95)]);
+        assert_eq!(
+            yes(&truth, &wrong),
+            ["after_clean", "axis", "confident_wrong", "detected", "ran"]
+        );
+        assert_eq!(yes(&truth, &verdict(&[])), ["ran"]);
+        let none = mark(&truth, None).unwrap();
+        assert!(none.answers.values().all(|yes| !yes) && none.first == "failed");
+    }
+
+    #[test]
+    fn what_the_catalogue_lacks_wants_no_name_and_the_right_place() {
+        let truth = truth("outside", json!([hidden(&[], "radius")]));
+        let open = verdict(&[finding("unexplained", "", 0.0)]);
+        assert!(yes(&truth, &open).contains(&"abstained".into()));
+        let dressed = verdict(&[finding("named", "vignetting", 0.95)]);
+        assert_eq!(yes(&truth, &dressed), ["after_clean", "confident_wrong", "detected", "ran"]);
+    }
+
+    #[test]
+    fn anything_said_of_nothing_is_a_false_alarm() {
+        let truth = truth("null", json!([]));
+        assert_eq!(yes(&truth, &verdict(&[])), ["ran"]);
+        assert!(
+            yes(&truth, &verdict(&[finding("recalibrate", "", 0.0)]))
+                .contains(&"false_alarm".into())
+        );
+        assert_eq!(mark(&truth, None).unwrap().answers["false_alarm"], true);
+    }
+
+    #[test]
+    fn an_advised_view_settles_when_the_hidden_name_leads_with_certainty() {
+        let truth = truth("single", json!([hidden(&["vignetting"], "radius")]));
+        let mut doubtful = finding("one-of", "slope-noise", 0.6);
+        doubtful["alternatives"][1] = json!({"effect": "vignetting", "probability": 0.4});
+        doubtful["next_view"] = json!({"z_m": 1.0, "theta_rad": 0.5, "azimuth_rad": 0.0});
+        let first = verdict(&[doubtful]);
+        let settled = verdict(&[finding("named", "vignetting", 0.97)]);
+        let marks = mark_advice(&truth, Some(&first), Some(&settled));
+        assert_eq!((marks.right, marks.settled), (Some([0.4, 0.97]), Some(true)));
+        assert_eq!(mark_advice(&truth, Some(&first), None).settled, Some(false));
+        assert_eq!(mark_advice(&truth, Some(&settled), Some(&settled)), AdviceMarks::default());
     }
 }

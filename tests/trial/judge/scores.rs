@@ -2,25 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use kinoise::stats::{clopper_pearson, quantile};
 use serde::{Deserialize, Serialize};
 
-use super::certainty::Certainty;
 use super::endpoints::{Endpoint, endpoints};
-use super::learnt::{Learnt, learnt};
-use super::marks::{Marks, names_alone};
-use crate::gains::Gains;
-use crate::raytraced::question::{Cell, Truth, World};
-use kinoise::stats::{clopper_pearson, quantile};
-
-/// A set that was judged.
-#[derive(Debug, Clone, Copy)]
-pub struct Judged<'a> {
-    pub truth: &'a Truth,
-    pub marks: &'a Marks,
-    pub gains: Option<&'a Gains>,
-    /// Ids of the catalogue by baseline, best first.
-    pub named_by_others: &'a BTreeMap<String, Vec<String>>,
-}
+use super::marks::Stated;
+use crate::gain::{Gain, Gains};
+use crate::proof::ProvenSet;
+use crate::raytraced::question::{Cell, Truth};
 
 /// So many of so many.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -45,193 +34,207 @@ impl Rate {
     }
 }
 
-/// Rates by the name of the mark.
+/// Rates by question.
 pub type Rates = BTreeMap<String, Rate>;
 
 /// The whole trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
     pub sets: usize,
-    pub all: Rates,
-    pub by_cell: BTreeMap<String, Rates>,
-    pub by_world: BTreeMap<String, Rates>,
-    /// World and cell, "rays/single".
-    pub by_world_and_cell: BTreeMap<String, Rates>,
-    /// Single causes made by rays, in the catalogue and outside it, by what they are worth, nats.
-    pub by_nats: BTreeMap<String, Rates>,
-    /// Single causes by kind ("rays/single", "rays/outside", "light/single", "light/nameless") and
-    /// strength: nats, but in the world of light the size that was ordered.
-    #[serde(default)]
+    /// By kind of set, "WORLD/CELL"; what the catalogue has no name for is "WORLD/nameless".
+    pub by_kind: BTreeMap<String, Rates>,
+    /// Single causes by kind and strength, nats (in the world of light the size that was ordered).
     pub by_strength: BTreeMap<String, BTreeMap<String, Rates>>,
-    /// Single causes by name; those outside the catalogue by form.
-    pub by_effect: BTreeMap<String, Rates>,
-    /// Of single causes: what was hidden, what was said first, how often.
+    /// Single causes by name and strength; those outside the catalogue by form.
+    pub by_effect: BTreeMap<String, BTreeMap<String, Rates>>,
+    /// Of single causes that were detected: what was hidden, what was said first, how often.
     pub confusion: BTreeMap<String, BTreeMap<String, usize>>,
-    /// Of pairs and triples: harmonic mean of the names' precision and recall.
-    pub names_f1: Option<f64>,
     /// Medians over all sets.
     pub overlap: Option<f64>,
     pub parameter_error: Option<f64>,
     /// Stated 90 % intervals that hold the truth.
     pub coverage: Option<Rate>,
-    /// Of every finding's best name.
-    pub certainty: Certainty,
-    /// Of every name offered.
-    pub certainty_of_all: Certainty,
-    pub learnt: BTreeMap<String, Learnt>,
-    /// The names that baselines give, by baseline.
-    pub others: BTreeMap<String, Rates>,
+    /// Stated probabilities of best names against how often they are right.
+    pub calibration: Vec<Bin>,
+    /// Mean distance of the two over the bins, and Brier's score.
+    pub calibration_error: Option<f64>,
+    pub brier: Option<f64>,
+    /// Gains over the oracle's, by method, inside and outside the recording's distances and tilts.
+    pub gains: BTreeMap<String, [Option<Ratio>; 2]>,
+    /// Advised views after which the hidden name leads with 0.9 or more.
+    pub advice: Option<Rate>,
     pub endpoints: Vec<Endpoint>,
 }
 
+/// Names stated with about the same probability.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Bin {
+    /// Mean of the stated probabilities.
+    pub stated: f64,
+    pub right: Rate,
+}
+
+/// Gains of one method over the oracle's, over sets.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Ratio {
+    /// Sets whose oracle gains something.
+    pub n: usize,
+    pub median: f64,
+    /// 10th percentile.
+    pub low: f64,
+}
+
 /// Score all sets.
-pub fn scores(sets: &[Judged<'_>]) -> Scores {
-    let single = |s: &&Judged<'_>| matches!(s.truth.asked.cell, Cell::Single | Cell::Outside);
-    let singles: Vec<Judged<'_>> = sets.iter().filter(single).copied().collect();
-    let by_rays = |s: &&Judged<'_>| s.truth.asked.world == World::Rays;
-    let of_rays: Vec<Judged<'_>> = singles.iter().filter(by_rays).copied().collect();
+pub fn scores(sets: &[ProvenSet]) -> Scores {
+    let single = |s: &&ProvenSet| matches!(s.truth.asked.cell, Cell::Single | Cell::Outside);
+    let singles: Vec<&ProvenSet> = sets.iter().filter(single).collect();
     let parameters = || sets.iter().flat_map(|s| &s.marks.parameters);
-    let stated = || sets.iter().flat_map(|s| &s.marks.stated);
+    let stated: Vec<&Stated> = sets.iter().flat_map(|s| &s.marks.stated).collect();
     let mut overlaps: Vec<f64> = sets.iter().filter_map(|s| s.marks.overlap).collect();
     let mut errors: Vec<f64> = parameters().map(|p| p.relative_error).collect();
-    let gains: Vec<&Gains> = sets.iter().filter_map(|s| s.gains).collect();
+    let calibration = calibration(&stated);
+    let names = stated.len().max(1) as f64;
+    let off = calibration.iter().map(|b| (b.stated - b.right.rate).abs() * b.right.n as f64);
+    let calibration_error = (!stated.is_empty()).then(|| off.sum::<f64>() / names);
+    let square = |s: &&Stated| (s.probability - f64::from(u8::from(s.right))).powi(2);
+    let brier = (!stated.is_empty()).then(|| stated.iter().map(square).sum::<f64>() / names);
+    let advice = sets.iter().filter_map(|s| s.advised.as_ref()?.marks.settled);
     Scores {
         sets: sets.len(),
-        all: rates(sets.iter()),
-        by_cell: grouped(sets, |t| Some(word(t.asked.cell))),
-        by_world: grouped(sets, |t| Some(word(t.asked.world))),
-        by_world_and_cell: grouped(sets, |t| {
-            Some(format!("{}/{}", word(t.asked.world), word(t.asked.cell)))
-        }),
-        by_nats: grouped(&of_rays, strength),
-        by_strength: by_strength(&singles),
-        by_effect: grouped(&singles, |t| Some(hidden_name(t))),
+        by_kind: grouped(sets.iter(), |s| Some(kind(&s.truth)))
+            .into_iter()
+            .map(|(kind, sets)| (kind, rates(&sets)))
+            .collect(),
+        by_strength: by_strength(&singles, |s| kind(&s.truth)),
+        by_effect: by_strength(&singles, |s| hidden_name(&s.truth)),
         confusion: confusion(&singles),
-        names_f1: names_f1(sets),
         overlap: quantile(&mut overlaps, 0.5),
         parameter_error: quantile(&mut errors, 0.5),
         coverage: Rate::of(parameters().filter_map(|p| p.covered)),
-        certainty: Certainty::of(stated().filter(|s| s.best)),
-        certainty_of_all: Certainty::of(stated()),
-        learnt: learnt(&gains),
-        others: others(sets),
+        calibration,
+        calibration_error,
+        brier,
+        gains: gains(sets),
+        advice: Rate::of(advice),
         endpoints: endpoints(sets),
     }
 }
 
 /// Strengths as they are ordered, nats.
-pub const LEVELS: [f64; 6] = [5.0, 15.0, 50.0, 150.0, 500.0, 5000.0];
+const LEVELS: [f64; 6] = [5.0, 15.0, 50.0, 150.0, 500.0, 5000.0];
 
 /// What the weakest hidden cause is worth, as the nearest of the strengths that are ordered; what
 /// its world says it reached, else what was ordered.
 pub fn level(truth: &Truth) -> Option<f64> {
     let nats = truth.hidden.iter().filter_map(|h| h.nats.or(truth.asked.nats));
-    let least = nats.reduce(f64::min).filter(|n| *n > 0.0)?;
-    let away = |l: &f64| (least / l).ln().abs();
+    let min = nats.reduce(f64::min).filter(|n| *n > 0.0)?;
+    let away = |l: &f64| (min / l).ln().abs();
     LEVELS.into_iter().min_by(|a, b| away(a).total_cmp(&away(b)))
-}
-
-/// The least strength at which a cause is worth knowing, nats.
-const WORTH_NATS: f64 = 50.0;
-
-/// Every hidden cause is worth [`WORTH_NATS`] or more, rounded as [`level`] does; `false` where nothing
-/// is hidden.
-pub fn worth(truth: &Truth) -> bool {
-    level(truth).is_some_and(|nats| nats >= WORTH_NATS)
 }
 
 fn strength(truth: &Truth) -> Option<String> {
     level(truth).map(|l| format!("{:04}", l as u32))
 }
 
-/// A switch of the world of light that has no name in the catalogue stands apart: its name cannot be
-/// right.
-fn kind(truth: &Truth) -> String {
-    let nameless = truth.hidden.iter().all(|h| h.names.is_empty());
-    match truth.asked.world {
-        World::Light if nameless => "light/nameless".into(),
-        world => format!("{}/{}", word(world), word(truth.asked.cell)),
-    }
-}
-
-fn by_strength(singles: &[Judged<'_>]) -> BTreeMap<String, BTreeMap<String, Rates>> {
-    let mut kinds: BTreeMap<String, Vec<Judged<'_>>> = BTreeMap::new();
-    for set in singles {
-        kinds.entry(kind(set.truth)).or_default().push(*set);
-    }
-    kinds.into_iter().map(|(kind, sets)| (kind, grouped(&sets, strength))).collect()
-}
-
 /// As in the files.
-pub(super) fn word(of: impl Serialize) -> String {
+pub fn word(of: impl Serialize) -> String {
     serde_json::to_value(of).ok().and_then(|v| v.as_str().map(String::from)).unwrap_or_default()
 }
 
-fn hidden_name(truth: &Truth) -> String {
-    let names: Vec<&str> = truth
-        .hidden
-        .iter()
-        .map(|h| h.names.first().map_or(h.form.as_str(), String::as_str))
-        .collect();
-    if names.is_empty() { "nothing".into() } else { names.join("+") }
-}
-
-fn rates<'a>(sets: impl Iterator<Item = &'a Judged<'a>>) -> Rates {
-    let mut answers: BTreeMap<&str, Vec<bool>> = BTreeMap::new();
-    for set in sets {
-        for (name, answer) in set.marks.yes_no() {
-            answers.entry(name).or_default().extend(answer);
-        }
+/// A switch of the world of light that has no name in the catalogue stands apart: its name cannot be
+/// right.
+fn kind(truth: &Truth) -> String {
+    let (world, cell) = (word(truth.asked.world), truth.asked.cell);
+    let nameless = truth.hidden.iter().all(|h| h.names.is_empty());
+    match cell {
+        Cell::Single if nameless => format!("{world}/nameless"),
+        cell => format!("{world}/{}", word(cell)),
     }
-    answers.into_iter().filter_map(|(k, v)| Some((k.into(), Rate::of(v.into_iter())?))).collect()
 }
 
-fn grouped(sets: &[Judged<'_>], key: impl Fn(&Truth) -> Option<String>) -> BTreeMap<String, Rates> {
-    let mut groups: BTreeMap<String, Vec<&Judged<'_>>> = BTreeMap::new();
+fn hidden_name(truth: &Truth) -> String {
+    let name = |h: &crate::raytraced::question::Hidden| {
+        h.names.first().map_or(h.form.clone(), String::clone)
+    };
+    truth.hidden.iter().map(name).collect::<Vec<_>>().join("+")
+}
+
+fn grouped<'a>(
+    sets: impl Iterator<Item = &'a ProvenSet>,
+    key: impl Fn(&ProvenSet) -> Option<String>,
+) -> BTreeMap<String, Vec<&'a ProvenSet>> {
+    let mut groups: BTreeMap<String, Vec<&ProvenSet>> = BTreeMap::new();
     for set in sets {
-        if let Some(key) = key(set.truth) {
+        if let Some(key) = key(set) {
             groups.entry(key).or_default().push(set);
         }
     }
-    groups.into_iter().map(|(key, sets)| (key, rates(sets.into_iter()))).collect()
+    groups
 }
 
-fn confusion(singles: &[Judged<'_>]) -> BTreeMap<String, BTreeMap<String, usize>> {
+fn rates(sets: &[&ProvenSet]) -> Rates {
+    let mut answers: BTreeMap<&String, Vec<bool>> = BTreeMap::new();
+    for (question, yes) in sets.iter().flat_map(|s| &s.marks.answers) {
+        answers.entry(question).or_default().push(*yes);
+    }
+    let rate = |(q, all): (&String, Vec<bool>)| Some((q.clone(), Rate::of(all.into_iter())?));
+    answers.into_iter().filter_map(rate).collect()
+}
+
+fn by_strength(
+    singles: &[&ProvenSet],
+    key: impl Fn(&ProvenSet) -> String,
+) -> BTreeMap<String, BTreeMap<String, Rates>> {
+    let by_key = grouped(singles.iter().copied(), |s| Some(key(s)));
+    let levels = |sets: Vec<&ProvenSet>| {
+        let by_level = grouped(sets.into_iter(), |s| strength(&s.truth));
+        by_level.into_iter().map(|(level, sets)| (level, rates(&sets))).collect()
+    };
+    by_key.into_iter().map(|(key, sets)| (key, levels(sets))).collect()
+}
+
+fn confusion(singles: &[&ProvenSet]) -> BTreeMap<String, BTreeMap<String, usize>> {
     let mut table: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
-    for set in singles {
-        let row = table.entry(hidden_name(set.truth)).or_default();
+    for set in singles.iter().filter(|s| s.marks.answers.get("detected") == Some(&true)) {
+        let row = table.entry(hidden_name(&set.truth)).or_default();
         *row.entry(set.marks.first.clone()).or_insert(0) += 1;
     }
     table
 }
 
-/// A baseline's names, judged as ours are.
-fn others(sets: &[Judged<'_>]) -> BTreeMap<String, Rates> {
-    let mut marks: BTreeMap<String, Vec<(&str, bool)>> = BTreeMap::new();
-    for set in sets {
-        for (baseline, names) in set.named_by_others {
-            marks.entry(baseline.clone()).or_default().extend(names_alone(set.truth, names));
-        }
-    }
-    let of = |all: &[(&str, bool)], mark: &str| {
-        Rate::of(all.iter().filter(|m| m.0 == mark).map(|m| m.1)).map(|r| (mark.to_string(), r))
+/// Ten bins of the same width.
+fn calibration(stated: &[&Stated]) -> Vec<Bin> {
+    let bin = |p: f64| ((p * 10.0) as usize).min(9);
+    let of = |k: usize| {
+        let all: Vec<&&Stated> = stated.iter().filter(|s| bin(s.probability) == k).collect();
+        let right = Rate::of(all.iter().map(|s| s.right))?;
+        let sum: f64 = all.iter().map(|s| s.probability).sum();
+        Some(Bin { stated: sum / all.len() as f64, right })
     };
-    marks
-        .into_iter()
-        .map(|(baseline, all)| {
-            let rates = ["false_alarm", "detected", "first_name", "exact"];
-            (baseline, rates.into_iter().filter_map(|m| of(&all, m)).collect())
-        })
-        .collect()
+    (0..10).filter_map(of).collect()
 }
 
-fn names_f1(sets: &[Judged<'_>]) -> Option<f64> {
-    let several = |s: &&Judged<'_>| matches!(s.truth.asked.cell, Cell::Pair | Cell::Triple);
-    let (mut right, mut all) = (0, 0);
-    for set in sets.iter().filter(several) {
-        let names = set.marks.names;
-        right += 2 * names.right;
-        all += names.hidden + names.said;
-    }
-    (all > 0).then(|| right as f64 / all as f64)
+/// Less than this, nats per 1000 pixels, the oracle itself has not gained: a ratio to it means
+/// nothing. It is 15 nats over a recording of 1.5 million pixels, 20 small views of 4 frames.
+const MIN_ORACLE: f64 = 0.01;
+
+/// Gain of `method` over the oracle's, where both are there.
+pub fn ratio(gains: &Gains, method: &str, side: fn(&Gain) -> f64) -> Option<f64> {
+    let (gain, oracle) = (side(gains.methods.get(method)?), side(&gains.oracle));
+    (oracle >= MIN_ORACLE).then(|| gain / oracle).filter(|r| r.is_finite())
+}
+
+pub const SIDES: [fn(&Gain) -> f64; 2] = [|g| g.within, |g| g.beyond];
+
+fn gains(sets: &[ProvenSet]) -> BTreeMap<String, [Option<Ratio>; 2]> {
+    let all: Vec<&Gains> = sets.iter().filter_map(|s| s.gains.as_ref()).collect();
+    let mut names: Vec<&String> = all.iter().flat_map(|g| g.methods.keys()).collect();
+    names.sort();
+    names.dedup();
+    let of = |name: &str, side: fn(&Gain) -> f64| {
+        let mut ratios: Vec<f64> = all.iter().filter_map(|g| ratio(g, name, side)).collect();
+        let (median, low) = (quantile(&mut ratios, 0.5)?, quantile(&mut ratios, 0.1)?);
+        Some(Ratio { n: ratios.len(), median, low })
+    };
+    names.into_iter().map(|n| (n.clone(), SIDES.map(|side| of(n, side)))).collect()
 }

@@ -1,0 +1,168 @@
+//! Hashes that bind everybody: of what the solver gets, of the answers, of what was said.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use kinoise::Error;
+use kinoise::error::Result;
+use kinoise::io::{hex, sha256_hex};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
+use crate::raytraced::question::Pose;
+
+/// Published before the first diagnosis (`commitments.json`), and again before the second round
+/// (`commitments-advised.json`).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Commitments {
+    pub version: String,
+    /// Of the trial's seed as eight bytes, least first: take a large seed where others are to trust it.
+    pub seed_sha256: String,
+    /// Of this program, which diagnoses and judges.
+    pub binary_sha256: String,
+    /// What the trial is judged by, in words.
+    pub endpoints: Vec<String>,
+    /// Wall-clock limit of one diagnosis, s.
+    pub limit_s: u64,
+    /// Of the first round's verdicts; none in the first round.
+    pub after: Option<String>,
+    /// In the order in which they are put.
+    pub sets: Vec<Committed>,
+}
+
+/// One set, as far as anybody may know.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Committed {
+    pub name: String,
+    /// [`hash_folder`] of what the solver gets.
+    pub data_sha256: String,
+    /// [`hash_json`] of the truth, which holds the set's own 64-bit seed: nobody can guess it.
+    pub truth_sha256: String,
+    /// In the second round: the view that was advised and the one that could be taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub view: Option<[Pose; 2]>,
+}
+
+/// Published when all is said and nothing is opened: `verdicts.json`, `verdicts-advised.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Verdicts {
+    /// Of the commitments that they answer.
+    pub commitments_sha256: String,
+    pub verdicts: Vec<VerdictHash>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct VerdictHash {
+    pub name: String,
+    /// Of `diagnosis.json`, every byte; none where no diagnosis came.
+    pub diagnosis_sha256: Option<String>,
+}
+
+/// SHA-256 of compact JSON with sorted keys.
+pub fn hash_json(value: &impl Serialize) -> String {
+    let value = serde_json::to_value(value).unwrap_or(Value::Null);
+    sha256_hex(canonical(&value).as_bytes())
+}
+
+pub fn hash_seed(seed: u64) -> String {
+    sha256_hex(&seed.to_le_bytes())
+}
+
+fn canonical(value: &Value) -> String {
+    match value {
+        Value::Object(map) => {
+            let mut entries: Vec<(&String, &Value)> = map.iter().collect();
+            entries.sort_by_key(|e| e.0);
+            let inside = entries
+                .into_iter()
+                .map(|(k, v)| format!("{}:{}", Value::String(k.clone()), canonical(v)));
+            format!("{{{}}}", inside.collect::<Vec<_>>().join(","))
+        }
+        Value::Array(list) => {
+            format!("[{}]", list.iter().map(canonical).collect::<Vec<_>>().join(","))
+        }
+        other => other.to_string(),
+    }
+}
+
+/// SHA-256 over all files below `root` in the order of their paths: for each the path with '/', a
+/// zero byte, its length as eight bytes, least first, and its bytes.
+pub fn hash_folder(root: &Path) -> Result<String> {
+    let mut files = Vec::new();
+    list(root, &mut files)?;
+    let name = |file: &PathBuf| {
+        let parts = file.strip_prefix(root).unwrap_or(file).components();
+        parts.map(|p| p.as_os_str().to_string_lossy().into_owned()).collect::<Vec<_>>().join("/")
+    };
+    let mut named: Vec<(String, PathBuf)> = files.into_iter().map(|f| (name(&f), f)).collect();
+    named.sort();
+    let mut hash = Sha256::new();
+    for (name, file) in named {
+        let bytes = fs::read(&file).map_err(|e| Error::read(&file, e))?;
+        hash.update(name.as_bytes());
+        hash.update([0]);
+        hash.update((bytes.len() as u64).to_le_bytes());
+        hash.update(&bytes);
+    }
+    Ok(hex(&hash.finalize()))
+}
+
+fn list(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
+    for entry in fs::read_dir(folder).map_err(|e| Error::read(folder, e))? {
+        let path = entry.map_err(|e| Error::read(folder, e))?.path();
+        if path.is_dir() { list(&path, files)? } else { files.push(path) }
+    }
+    Ok(())
+}
+
+const REMEDY: &str = "give the folder of a trial made by this version";
+
+/// What a JSON file holds, and the hash of its bytes.
+pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<(T, String)> {
+    let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
+    let value = serde_json::from_slice(&bytes).map_err(|e| Error::Json {
+        path: path.to_path_buf(),
+        line: e.line(),
+        what: e.to_string(),
+        remedy: REMEDY,
+    })?;
+    Ok((value, sha256_hex(&bytes)))
+}
+
+/// Write whole or not at all; the hash of the bytes.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<String> {
+    Ok(sha256_hex(kinoise::io::write_json(path, value, REMEDY)?.as_bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn the_hash_of_json_does_not_depend_on_the_order_of_keys() {
+        let a = json!({"b": [1.5, null, "x\"y"], "a": {"d": 1e-7, "c": true}});
+        let b = json!({"a": {"c": true, "d": 1e-7}, "b": [1.5, null, "x\"y"]});
+        assert_eq!(hash_json(&a), hash_json(&b));
+        assert_eq!(canonical(&a), r#"{"a":{"c":true,"d":1e-7},"b":[1.5,null,"x\"y"]}"#);
+    }
+
+    #[test]
+    fn a_folder_hash_sees_names_bytes_and_borders() {
+        let make = |files: &[(&str, &str)]| {
+            let dir = tempfile::tempdir().unwrap();
+            for (name, text) in files {
+                let path = dir.path().join(name);
+                fs::create_dir_all(path.parent().unwrap()).unwrap();
+                fs::write(path, text).unwrap();
+            }
+            hash_folder(dir.path()).unwrap()
+        };
+        let one = make(&[("a/x", "12"), ("b", "3")]);
+        assert_eq!(one, make(&[("b", "3"), ("a/x", "12")]));
+        assert_ne!(one, make(&[("a/x", "1"), ("b", "23")]));
+        assert_ne!(one, make(&[("a/y", "12"), ("b", "3")]));
+    }
+}

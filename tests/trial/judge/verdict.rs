@@ -1,0 +1,128 @@
+//! A diagnosis as the judge reads it.
+
+use serde::Deserialize;
+use serde_json::{Map, Value};
+
+use crate::raytraced::question::{Hidden, Pose};
+
+#[derive(Debug, Clone, Default, Deserialize)]
+pub struct Verdict {
+    pub verdict: String,
+    #[serde(default)]
+    pub findings: Vec<Finding>,
+    pub after: Option<After>,
+    #[serde(default)]
+    pub cannot_tell: Vec<CannotTell>,
+}
+
+#[derive(Debug, Clone, Default, Deserialize)]
+pub struct Finding {
+    pub status: String,
+    pub effect: Option<String>,
+    #[serde(default)]
+    pub alternatives: Vec<Alternative>,
+    pub statistic: String,
+    pub axis: String,
+    pub interval: [Option<f64>; 2],
+    #[serde(default)]
+    pub parameters: Map<String, Value>,
+    pub next_view: Option<Value>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+pub struct Alternative {
+    pub effect: String,
+    pub probability: Option<f64>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+pub struct After {
+    pub verdict: String,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+pub struct CannotTell {
+    pub effect: String,
+}
+
+/// A name counts as certain from this probability on.
+pub const CERTAIN: f64 = 0.9;
+
+impl Finding {
+    /// Says that something is there.
+    pub fn claims(&self) -> bool {
+        self.status != "not-identifiable"
+    }
+
+    /// The name it gives.
+    pub fn name(&self) -> Option<&str> {
+        let names = ["named", "one-of"].contains(&self.status.as_str());
+        let best = || self.alternatives.first().map(|a| a.effect.as_str());
+        self.effect.as_deref().or_else(best).filter(|_| names)
+    }
+
+    /// Of a name, 0 where it is not offered.
+    pub fn probability(&self, id: &str) -> f64 {
+        let offered = self.alternatives.iter().find(|a| a.effect == id);
+        offered.and_then(|a| a.probability).unwrap_or(0.0)
+    }
+
+    /// The name, where its probability is stated as 0.9 or more.
+    pub fn certain_name(&self) -> Option<&str> {
+        let sure = self.alternatives.first().and_then(|a| a.probability)? >= CERTAIN;
+        self.name().filter(|_| sure)
+    }
+
+    pub fn advises(&self) -> bool {
+        self.next_view.as_ref().is_some_and(|v| !v.is_null())
+    }
+
+    /// On the axis of the label, or on one on which it shows as well.
+    pub fn right_axis(&self, hidden: &Hidden) -> bool {
+        same_axis(&self.axis, &hidden.axis) || hidden.also.iter().any(|a| same_axis(&self.axis, a))
+    }
+
+    /// Nothing is known by name, but what kind of thing it is and what it depends on.
+    pub fn right_place(&self, hidden: &Hidden) -> bool {
+        self.statistic == hidden.statistic && self.right_axis(hidden)
+    }
+
+    /// What both stretches share over what either holds; `None` where there is nothing to compare.
+    pub fn overlap(&self, hidden: &Hidden) -> Option<f64> {
+        let truth = hidden.interval.filter(|_| self.axis == hidden.axis)?;
+        let [Some(low), Some(high)] = self.interval else { return None };
+        let shared = high.min(truth[1]) - low.max(truth[0]);
+        let either = high.max(truth[1]) - low.min(truth[0]);
+        (either > 0.0).then(|| shared.max(0.0) / either)
+    }
+}
+
+/// Words for one axis: disparity is focal length times baseline over distance.
+fn same_axis(a: &str, b: &str) -> bool {
+    let depth = |axis| ["z", "disparity", "range"].contains(&axis);
+    a == b || depth(a) && depth(b)
+}
+
+impl Verdict {
+    pub fn claims(&self) -> impl Iterator<Item = &Finding> {
+        self.findings.iter().filter(|f| f.claims())
+    }
+
+    /// A mismatch is what a user would act upon.
+    pub fn finds_something(&self) -> bool {
+        self.verdict == "mismatch" && self.claims().next().is_some()
+    }
+
+    /// The first finding that asks for another view.
+    pub fn in_doubt(&self) -> Option<&Finding> {
+        self.claims().find(|f| f.advises())
+    }
+}
+
+/// The view that a verdict asks for, by the first finding that is not sure of its name.
+pub fn advised_view(verdict: &Value) -> Option<Pose> {
+    let verdict: Verdict = serde_json::from_value(verdict.clone()).ok()?;
+    let next = verdict.in_doubt()?.next_view.clone()?;
+    let pose: Pose = serde_json::from_value(next).ok()?;
+    [pose.z_m, pose.theta_rad, pose.azimuth_rad].iter().all(|x| x.is_finite()).then_some(pose)
+}

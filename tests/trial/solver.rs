@@ -1,0 +1,179 @@
+//! A diagnosis by another process, which can reach one set and nothing else.
+
+use std::fs::{self, File};
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use kinoise::diagnose::{DiagnoseOptions, Verdict, diagnose, diagnose_against};
+use kinoise::error::Result;
+use kinoise::io::{Assumed, OutputDir, open, sha256_hex};
+use kinoise::{CalibrateOptions, Error, Form, NoiseModel, Recording};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// The hidden subcommand that shuts itself in and diagnoses.
+const SUBCOMMAND: &str = "solve";
+/// What the solver calls its set and its answer, seen from the folder it is started in.
+const DATA: [&str; 2] = [".", "../out"];
+/// Exit code of a mismatch, as of `kinoise diagnose`.
+const MISMATCH: u8 = 1;
+
+/// What came of one set.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Solved {
+    pub name: String,
+    pub diagnosis_sha256: Option<String>,
+    /// The diagnosis without its curves.
+    pub verdict: Option<Value>,
+    /// Why there is none.
+    pub failure: Option<String>,
+    /// What kept the process from the rest of the machine.
+    pub confinement: String,
+    /// Depends on the machine.
+    pub seconds: f64,
+}
+
+/// Diagnose the set in `scratch/set` by a process of `program`; the answer goes to `scratch/out`.
+/// A diagnosis that fails is an answer too.
+pub fn solve(program: &Path, limit: Duration, name: &str, scratch: &Path) -> Result<Solved> {
+    let out = scratch.join("out");
+    fs::create_dir_all(&out).map_err(|e| Error::write(&out, e))?;
+    let begin = Instant::now();
+    let ended = run(program, limit, scratch)?;
+    let seconds = begin.elapsed().as_secs_f64();
+    let text = |file: &str| fs::read_to_string(scratch.join(file)).unwrap_or_default();
+    let confinement = text("stdout").lines().next().unwrap_or("unknown").to_string();
+    let diagnosis = match ended {
+        None => Err(format!("no answer within {} s", limit.as_secs())),
+        Some(status) if !matches!(status.code(), Some(0 | 1)) => {
+            Err(format!("{status}: {}", text("stderr").lines().last().unwrap_or_default()))
+        }
+        Some(_) => fs::read(out.join("diagnosis.json")).map_err(|e| e.to_string()),
+    };
+    let read = |bytes: Vec<u8>| {
+        let value = serde_json::from_slice(&bytes).map_err(|e| e.to_string())?;
+        Ok((sha256_hex(&bytes), without_curves(value)))
+    };
+    let (diagnosis_sha256, verdict, failure) = match diagnosis.and_then(read) {
+        Ok((hash, verdict)) => (Some(hash), Some(verdict), None),
+        Err(why) => (None, None, Some(why)),
+    };
+    let name = name.into();
+    Ok(Solved { name, diagnosis_sha256, verdict, failure, confinement, seconds })
+}
+
+/// `None` when it had to be ended.
+fn run(program: &Path, limit: Duration, scratch: &Path) -> Result<Option<ExitStatus>> {
+    let to = |name: &str| -> Result<File> {
+        let path = scratch.join(name);
+        File::create(&path).map_err(|e| Error::write(&path, e))
+    };
+    let mut child = Command::new(program)
+        .arg(SUBCOMMAND)
+        .current_dir(scratch.join("set"))
+        .env_clear()
+        .stdin(Stdio::null())
+        .stdout(to("stdout")?)
+        .stderr(to("stderr")?)
+        .spawn()
+        .map_err(|e| Error::read(program, e))?;
+    wait(&mut child, limit).map_err(|e| Error::read(program, e))
+}
+
+fn wait(child: &mut Child, limit: Duration) -> std::io::Result<Option<ExitStatus>> {
+    let begin = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait()? {
+            return Ok(Some(status));
+        }
+        if begin.elapsed() > limit {
+            child.kill()?;
+            child.wait()?;
+            return Ok(None);
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// What is for drawing stays in the complete diagnosis.
+pub fn without_curves(mut diagnosis: Value) -> Value {
+    if let Some(findings) = diagnosis.get_mut("findings").and_then(Value::as_array_mut) {
+        for finding in findings.iter_mut().filter_map(Value::as_object_mut) {
+            finding.shift_remove("curve");
+        }
+    }
+    if let Some(all) = diagnosis.as_object_mut() {
+        for key in ["map", "detectable", "views"] {
+            all.shift_remove(key);
+        }
+    }
+    diagnosis
+}
+
+/// The solver's side: shut in, then what `kinoise diagnose` does.
+pub fn diagnose_shut_in() -> anyhow::Result<u8> {
+    let [set, out] = DATA.map(Path::new);
+    // Before any thread is started: threads that run already would stay free.
+    println!("{}", confine(set, out));
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
+    let recording = open(&set.join("recording"), &Assumed::default())?;
+    let options = DiagnoseOptions::default();
+    let simulated = set.join("simulated");
+    let done = if simulated.exists() {
+        let simulated = open(&simulated, &Assumed::default())?;
+        let model = calibrated(&simulated).or_else(|_| calibrated(&recording))?;
+        diagnose_against(&recording, &simulated, &model, &options, &|_, _| ())?
+    } else {
+        let model = NoiseModel::read(&set.join("model.json"))?;
+        diagnose(&recording, &model, &options, &|_, _| ())?
+    };
+    let folder = OutputDir::create(out)?;
+    let json = serde_json::to_value(&done.diagnosis)?;
+    folder.write("diagnosis.json", format!("{json:#}\n").as_bytes())?;
+    done.model.write(&folder.path().join("model.json"))?;
+    Ok(if done.diagnosis.verdict == Verdict::Mismatch { MISMATCH } else { 0 })
+}
+
+fn calibrated(recording: &Recording) -> anyhow::Result<NoiseModel> {
+    let options = CalibrateOptions { form: Some(Form::Paper), ..Default::default() };
+    let views = kinoise::measure_recording(recording, &options.measure, &|_, _| ())?;
+    Ok(kinoise::model_of(recording, &views, &options)?.model)
+}
+
+/// Shut this process out of everything but reading below `read` and writing below `write`; no
+/// network. Says what is in force, and only what a trial at the door confirms.
+#[cfg(target_os = "linux")]
+fn confine(read: &Path, write: &Path) -> String {
+    use landlock::{
+        ABI, Access, AccessFs, AccessNet, CompatLevel, Compatible, LandlockStatus, Ruleset,
+        RulesetAttr, RulesetCreatedAttr, RulesetError, Scope, path_beneath_rules,
+    };
+    let restrict = || -> std::result::Result<_, RulesetError> {
+        let all = AccessFs::from_all(ABI::V5);
+        Ruleset::default()
+            // What an older kernel lacks is left out; the status says so.
+            .set_compatibility(CompatLevel::BestEffort)
+            .handle_access(all)?
+            .handle_access(AccessNet::from_all(ABI::V4))?
+            .scope(Scope::from_all(ABI::V6))?
+            .create()?
+            .add_rules(path_beneath_rules([read], AccessFs::ReadFile | AccessFs::ReadDir))?
+            .add_rules(path_beneath_rules([write], all))?
+            .restrict_self()
+    };
+    // The root folder can be listed on every Linux, except from inside.
+    let shut = || fs::read_dir("/").is_err();
+    match restrict().map(|status| status.landlock) {
+        Ok(LandlockStatus::Available { effective_abi, .. }) if shut() => {
+            format!("landlock ABI {}", effective_abi as i32)
+        }
+        Ok(_) => "not available on this kernel".into(),
+        Err(e) => format!("not in force: {e}"),
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn confine(_read: &Path, _write: &Path) -> String {
+    "not available on this system".into()
+}
