@@ -11,8 +11,8 @@ pub struct Frame {
     pub width: usize,
     /// Rows, px.
     pub height: usize,
-    /// The words, `width * height` of them; [`DepthCode`] turns them into metres.
-    pub words: Vec<u16>,
+    /// The raw: words, `width * height` of them; [`DepthCode`] turns them into metres.
+    pub raw: Vec<u16>,
 }
 
 /// How a stored word becomes a depth along the optical axis.
@@ -77,7 +77,7 @@ impl DepthCode {
     }
 
     /// The word nearest to depth `z` (m), or the word for "no measurement" when none fits.
-    pub fn word(&self, z: f64) -> u16 {
+    pub fn raw(&self, z: f64) -> u16 {
         let (exact, invalid, top) = match *self {
             DepthCode::Metric { units_per_metre, invalid } => {
                 (z * units_per_metre, invalid, 65535.0)
@@ -157,7 +157,7 @@ mod tests {
         for code in [KINECT, tum] {
             for word in 1..1080u16 {
                 if let Some(z) = code.metres(word) {
-                    assert_eq!(code.word(z), word, "{code:?}");
+                    assert_eq!(code.raw(z), word, "{code:?}");
                 }
             }
         }
@@ -173,9 +173,9 @@ mod tests {
 
     #[test]
     fn no_depth_becomes_no_measurement() {
-        assert_eq!(KINECT.word(f64::NAN), 2047);
-        assert_eq!(KINECT.word(-1.0), 2047);
+        assert_eq!(KINECT.raw(f64::NAN), 2047);
+        assert_eq!(KINECT.raw(-1.0), 2047);
         let tum = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
-        assert_eq!(tum.word(20.0), 0, "does not fit 16 bits");
+        assert_eq!(tum.raw(20.0), 0, "does not fit 16 bits");
     }
 }

@@ -141,11 +141,11 @@ fn others(diagnosis: &Value) -> Vec<(String, f64)> {
 fn double(folder: &Path) {
     let recording = folder.join("recording");
     common::rays::repaint(&recording, |_, frame| {
-        let (width, words) = (frame.width, std::mem::take(&mut frame.words));
+        let (width, words) = (frame.width, std::mem::take(&mut frame.raw));
         for row in words.chunks_exact(width) {
             let wide: Vec<u16> = row.iter().flat_map(|w| [*w, *w]).collect();
-            frame.words.extend_from_slice(&wide);
-            frame.words.extend_from_slice(&wide);
+            frame.raw.extend_from_slice(&wide);
+            frame.raw.extend_from_slice(&wide);
         }
         (frame.width, frame.height) = (2 * width, 2 * frame.height);
     });

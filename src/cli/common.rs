@@ -23,7 +23,7 @@ pub struct Global {
 }
 
 /// More than any machine this runs on has; each costs memory before it helps.
-const MOST_THREADS: usize = 1024;
+const MAX_THREADS: usize = 1024;
 
 impl Global {
     pub fn seed(&self) -> Seed {
@@ -41,8 +41,8 @@ impl Global {
         if n == 0 {
             bail!("--threads 0: give at least one thread");
         }
-        if n > MOST_THREADS {
-            bail!("--threads {n}: give at most {MOST_THREADS}");
+        if n > MAX_THREADS {
+            bail!("--threads {n}: give at most {MAX_THREADS}");
         }
         rayon::ThreadPoolBuilder::new().num_threads(n).build_global().context("--threads")
     }

@@ -140,7 +140,7 @@ fn words(diagnosis: &Diagnosis) -> String {
             .iter()
             .filter_map(|(k, v)| Some(format!("{k} {:.4}", v.get("value")?.as_f64()?)))
             .collect();
-        let size = if f.statistic == Statistic::Missing {
+        let size = if f.statistic == Statistic::Dropout {
             format!("{:.1} % of the pixels lost", 100.0 * f.size.sigma)
         } else {
             format!("{:.2} mm, {:.2} sigma", f.size.mm, f.size.sigma)

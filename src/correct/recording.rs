@@ -112,5 +112,5 @@ pub(super) fn read(root: &Path, job: &Job, sensor: &Sensor) -> Result<Frame> {
 
 /// Depth of every pixel, m; NaN where there is none.
 pub(super) fn metres(frame: &Frame, table: &DepthTable) -> Vec<f32> {
-    frame.words.iter().map(|&word| table.metres(word)).collect()
+    frame.raw.iter().map(|&word| table.metres(word)).collect()
 }

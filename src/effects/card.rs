@@ -20,7 +20,7 @@ pub enum Stage {
     /// Errors of the match: changes `disparity`, px.
     Disparity,
     /// Pixels without an answer: `disparity` becomes NaN.
-    Missing,
+    Dropout,
     /// The read-out of the match: rounds and shifts `disparity`.
     Quantiser,
     /// What the driver makes of it: changes `depth`.
@@ -39,7 +39,7 @@ impl Stage {
         Stage::NoiseInSpace,
         Stage::NoiseTails,
         Stage::Disparity,
-        Stage::Missing,
+        Stage::Dropout,
         Stage::Quantiser,
         Stage::Driver,
         Stage::Word,
@@ -56,7 +56,7 @@ pub struct Parameter {
     pub range: [f64; 2],
     /// A typical size; used where the user names none.
     pub typical: f64,
-    pub words: &'static str,
+    pub summary: &'static str,
 }
 
 /// The face of an effect for people and for the command line.
@@ -65,7 +65,7 @@ pub struct Card {
     pub id: &'static str,
     pub stage: Stage,
     /// What was left out when it is missing, one sentence.
-    pub words: &'static str,
+    pub summary: &'static str,
     /// The first is the strength.
     pub parameters: &'static [Parameter],
     /// The strength at which nature is as if the effect were not there.

@@ -133,7 +133,7 @@ fn decode_png16(path: &Path, bytes: &[u8]) -> Result<Frame> {
     let mut buffer = vec![0; size];
     reader.next_frame(&mut buffer).map_err(damaged)?;
     let words = buffer.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect();
-    Ok(Frame { width, height, words })
+    Ok(Frame { width, height, raw: words })
 }
 
 /// `P5 w h 65535` and little-endian words, against the PGM standard: fakenect writes memory as is.
@@ -151,7 +151,7 @@ fn decode_fakenect_pgm(path: &Path, bytes: &[u8]) -> Result<Frame> {
         .chunks_exact(2)
         .map(|b| u16::from_le_bytes([b[0], b[1]]))
         .collect();
-    Ok(Frame { width, height, words })
+    Ok(Frame { width, height, raw: words })
 }
 
 /// Width, height and greatest value, and the bytes after the single white space that ends them.
@@ -227,7 +227,7 @@ pub fn encode_png16(frame: &Frame) -> Result<Vec<u8>> {
     encoder.set_depth(BitDepth::Sixteen);
     encoder.set_compression(png::Compression::Balanced);
     let mut writer = encoder.write_header().map_err(failed)?;
-    let data: Vec<u8> = frame.words.iter().flat_map(|w| w.to_be_bytes()).collect();
+    let data: Vec<u8> = frame.raw.iter().flat_map(|w| w.to_be_bytes()).collect();
     writer.write_image_data(&data).map_err(failed)?;
     writer.finish().map_err(failed)?;
     Ok(bytes)
@@ -236,7 +236,7 @@ pub fn encode_png16(frame: &Frame) -> Result<Vec<u8>> {
 /// A depth frame as fakenect writes it: a PGM whose words are little-endian.
 pub fn encode_pgm16(frame: &Frame) -> Vec<u8> {
     let mut bytes = format!("P5 {} {} 65535\n", frame.width, frame.height).into_bytes();
-    bytes.extend(frame.words.iter().flat_map(|w| w.to_le_bytes()));
+    bytes.extend(frame.raw.iter().flat_map(|w| w.to_le_bytes()));
     bytes
 }
 
@@ -245,7 +245,7 @@ mod tests {
     use super::*;
 
     fn frame() -> Frame {
-        Frame { width: 5, height: 3, words: (0..15).map(|i| i * 4000 + 7).collect() }
+        Frame { width: 5, height: 3, raw: (0..15).map(|i| i * 4000 + 7).collect() }
     }
 
     #[test]
@@ -274,7 +274,7 @@ mod tests {
         let mut bytes = b"P5 2 1 65535\n".to_vec();
         bytes.extend([0x01, 0x02, 0xff, 0x07]);
         let frame = decode_fakenect_pgm(Path::new("d.pgm"), &bytes).unwrap();
-        assert_eq!(frame.words, [0x0201, 2047]);
+        assert_eq!(frame.raw, [0x0201, 2047]);
         for cut in 0..bytes.len() {
             assert!(decode_fakenect_pgm(Path::new("d.pgm"), &bytes[..cut]).is_err());
         }

@@ -19,7 +19,7 @@ pub fn encode_rgb(width: usize, height: usize, rgb: &[u8]) -> Result<Vec<u8>> {
 /// # Errors
 /// When the frame's size does not match its words.
 pub fn encode_png16_quickly(frame: &Frame) -> Result<Vec<u8>> {
-    let data: Vec<u8> = frame.words.iter().flat_map(|w| w.to_be_bytes()).collect();
+    let data: Vec<u8> = frame.raw.iter().flat_map(|w| w.to_be_bytes()).collect();
     encode([frame.width, frame.height], ColorType::Grayscale, BitDepth::Sixteen, &data)
 }
 

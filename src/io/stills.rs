@@ -160,7 +160,7 @@ fn sample(frame: &Frame, table: &DepthTable) -> Vec<f32> {
     (GRID_PX / 2..frame.height)
         .step_by(GRID_PX)
         .flat_map(|v| (GRID_PX / 2..frame.width).step_by(GRID_PX).map(move |u| v * frame.width + u))
-        .map(|i| table.metres(frame.words[i]))
+        .map(|i| table.metres(frame.raw[i]))
         .collect()
 }
 

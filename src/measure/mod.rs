@@ -260,7 +260,7 @@ impl<'r> FrameReader<'r> {
     }
 
     fn sees_anything(&self, frame: &Frame) -> bool {
-        frame.words.iter().any(|&word| self.table.metres(word).is_finite())
+        frame.raw.iter().any(|&word| self.table.metres(word).is_finite())
     }
 }
 
@@ -290,11 +290,11 @@ fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Targe
 
 /// Mean over the frames, where at least half of them measured; 1/m, NaN elsewhere.
 fn mean_inverse_depth(frames: &[Frame], table: &DepthTable) -> Vec<f32> {
-    let n = frames[0].words.len();
+    let n = frames[0].raw.len();
     let mut sum = vec![0f32; n];
     let mut count = vec![0u8; n];
     for frame in frames {
-        for ((s, c), &word) in sum.iter_mut().zip(&mut count).zip(&frame.words) {
+        for ((s, c), &word) in sum.iter_mut().zip(&mut count).zip(&frame.raw) {
             let z = table.metres(word);
             if z.is_finite() {
                 *s += 1.0 / z;

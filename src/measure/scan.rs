@@ -88,19 +88,19 @@ impl<'a> Scan<'a> {
                 .map(|(frame, k)| self.residual(frame, k))
                 .filter(|e| e.is_finite())
                 .collect();
-            self.cut[cell] = (CUT_SIGMAS * settled_scale(residuals, self.least_scale(cell))) as f32;
+            self.cut[cell] = (CUT_SIGMAS * settled_scale(residuals, self.min_scale(cell))) as f32;
         }
     }
 
     /// A fronto-parallel plane in a coarse code may show no spread at all.
-    fn least_scale(&self, cell: usize) -> f64 {
+    fn min_scale(&self, cell: usize) -> f64 {
         let z = f64::from(self.expected[self.starts[cell]]);
         0.3 * self.bench.step(1.0 / z) * z * z
     }
 
     #[inline]
     fn residual(&self, frame: &Frame, k: usize) -> f32 {
-        self.bench.table.metres(frame.words[self.pixels[k] as usize]) - self.expected[k]
+        self.bench.table.metres(frame.raw[self.pixels[k] as usize]) - self.expected[k]
     }
 
     /// Standard deviation of the perpendicular residual over the whole view, from the cuts.
@@ -139,7 +139,7 @@ impl<'a> Scan<'a> {
             let (mut n, mut total) = (0u32, 0f64);
             for k in self.cell_range(cell) {
                 let i = self.pixels[k] as usize;
-                let z = self.bench.table.metres(frame.words[i]);
+                let z = self.bench.table.metres(frame.raw[i]);
                 let expected = match own {
                     None => self.expected[k],
                     Some(plane) => {
@@ -327,7 +327,7 @@ impl<'a> Scan<'a> {
             for k in self.cell_range(cell) {
                 let i = self.pixels[k] as usize;
                 let (x, y) = self.bench.rays.at(i);
-                let z = self.bench.table.metres(first.words[i]);
+                let z = self.bench.table.metres(first.raw[i]);
                 let e = z - plane.depth(x, y) as f32;
                 if e.abs() < self.cut[cell] {
                     field[i] = e * per_sigma;

@@ -38,11 +38,11 @@ impl Effect {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::terms::{Basis, Over, Statistic, TABLE, Times};
+    use crate::terms::{Basis, Coordinate, Modulation, Statistic, TABLE};
     use proptest::prelude::*;
 
-    fn over() -> impl Strategy<Value = Over> {
-        use Over::*;
+    fn over() -> impl Strategy<Value = Coordinate> {
+        use Coordinate::*;
         prop::sample::select(vec![
             Column,
             Row,
@@ -61,8 +61,8 @@ mod tests {
         ])
     }
 
-    fn times() -> impl Strategy<Value = Times> {
-        use Times::*;
+    fn times() -> impl Strategy<Value = Modulation> {
+        use Modulation::*;
         prop::sample::select(vec![One, DisparitySquared, Lift, Tilt])
     }
 
@@ -161,7 +161,7 @@ mod tests {
                 0 => bad.coefficients.push(0.0),
                 1 => { bad.coefficients.pop(); }
                 2 => bad.coefficients[0] = f64::NAN,
-                _ => bad.statistic = Statistic::Missing,
+                _ => bad.statistic = Statistic::Dropout,
             }
             prop_assert!(bad.fault().is_some());
         }
@@ -170,11 +170,11 @@ mod tests {
     #[test]
     fn impossible_bases_are_refused() {
         let curve = |low, high, nodes| Basis::Curve {
-            over: Over::Radius,
+            over: Coordinate::Radius,
             low,
             high,
             nodes,
-            times: Times::One,
+            times: Modulation::One,
         };
         let bad = [
             Basis::Locking { period_px: 0.0, harmonics: 2 },
@@ -186,9 +186,14 @@ mod tests {
                 height: 480.0,
                 across: usize::MAX,
                 down: 2,
-                times: Times::One,
+                times: Modulation::One,
             },
-            Basis::Ring { over: Over::Azimuth, period: f64::INFINITY, nodes: 4, times: Times::One },
+            Basis::Ring {
+                over: Coordinate::Azimuth,
+                period: f64::INFINITY,
+                nodes: 4,
+                times: Modulation::One,
+            },
             Basis::Recalibrate {
                 z_m: [1.0, 2.0],
                 theta_rad: [0.0, 1.0],

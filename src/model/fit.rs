@@ -58,7 +58,7 @@ pub struct SigmaFit {
 
 /// Distances closer than this count as one.
 pub const DISTANCE_RATIO: f64 = 1.05;
-const MOST_ROUNDS: usize = 60;
+const MAX_ROUNDS: usize = 60;
 /// Largest change of ln sigma over the table at which the weights have settled.
 const SETTLED: f64 = 1e-10;
 
@@ -113,7 +113,7 @@ pub fn fit_all(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
     let mut free: Vec<usize> = (0..start.held.len()).filter(|&i| !start.held[i]).collect();
     let mut p = start.parameters.clone();
     let (mut rounds, mut converged) = (0, false);
-    while rounds < MOST_ROUNDS && !converged {
+    while rounds < MAX_ROUNDS && !converged {
         rounds += 1;
         rows.refer_to(|r| positive(spec.sigma(&p, r.z_m, r.theta_rad), r.sigma_m));
         rows.estimate_extra(free.len());
@@ -162,16 +162,16 @@ fn hold_strays(
 
 /// A surface may not come nearer to zero inside its range than this share of the least sigma
 /// measured: between two distances a parabola can dip to where no sensor is.
-const LEAST_SHARE: f64 = 0.1;
+const MIN_SHARE: f64 = 0.1;
 
 /// Where the surface is least inside its range: at the vertex or the end of z next to it, and at
 /// the least tilt, for no form's tilt term is negative.
-fn least_point(rows: &Rows, spec: &dyn SigmaForm, p: &[f64]) -> Option<(f64, f64)> {
+fn min_point(rows: &Rows, spec: &dyn SigmaForm, p: &[f64]) -> Option<(f64, f64)> {
     let domain = Domain::of(rows, spec.pole(p));
     spec.vertex(p).map(|c| domain.clamp(c, 0.0))
 }
 
-/// Lift a surface that dips too low to [`LEAST_SHARE`] and hold its floor there. True when that
+/// Lift a surface that dips too low to [`MIN_SHARE`] and hold its floor there. True when that
 /// was needed: the rest must be fitted again.
 fn hold_positive(
     rows: &Rows,
@@ -180,8 +180,8 @@ fn hold_positive(
     free: &mut Vec<usize>,
     remarks: &mut Vec<String>,
 ) -> bool {
-    let Some((z, theta)) = least_point(rows, spec, p) else { return false };
-    let floor = LEAST_SHARE * rows.range(|r| r.sigma_m)[0];
+    let Some((z, theta)) = min_point(rows, spec, p) else { return false };
+    let floor = MIN_SHARE * rows.range(|r| r.sigma_m)[0];
     let sigma = spec.sigma(p, z, theta);
     // Once lifted, half the way down again is let be: the surface is positive.
     if sigma >= if free.contains(&0) { floor } else { 0.5 * floor } {
@@ -204,7 +204,7 @@ fn positive_in_range(rows: &Rows, spec: &dyn SigmaForm, p: &[f64]) -> bool {
         sigma.is_finite() && sigma > 0.0
     };
     rows.iter().all(|r| good(r.z_m, r.theta_rad))
-        && least_point(rows, spec, p).is_none_or(|(z, theta)| good(z, theta))
+        && min_point(rows, spec, p).is_none_or(|(z, theta)| good(z, theta))
 }
 
 fn positive(sigma: f64, otherwise: f64) -> f64 {

@@ -17,10 +17,10 @@ const OFF: f64 = 5.0;
 /// thousand tables (normal quantile of 0.999): below, nothing needs to be looked for.
 const PLAINLY_NOISE: f64 = 3.09;
 /// More than this share is no longer a few outliers but a wrong form, and nothing is left out.
-const MOST_SHARE: f64 = 0.2;
-const MOST_ROUNDS: usize = 6;
+const MAX_SHARE: f64 = 0.2;
+const MAX_ROUNDS: usize = 6;
 /// With fewer rows than this beyond the parameters a median of residuals is no scale.
-const LEAST_SPARE_ROWS: f64 = 6.0;
+const MIN_SPARE_ROWS: f64 = 6.0;
 
 /// The forms against which outliers are judged, the most flexible first: what no form can follow
 /// is no fault of the form that is asked for.
@@ -86,10 +86,10 @@ fn judged(table: &SigmaTable, form: Form) -> Option<Sorted> {
             break;
         }
     }
-    let Some(best) = least_cost(table, ends) else {
+    let Some(best) = min_cost(table, ends) else {
         return whole.map(|w| all(table, Some(w)));
     };
-    if best.off.len() as f64 > MOST_SHARE * table.rows.len() as f64 {
+    if best.off.len() as f64 > MAX_SHARE * table.rows.len() as f64 {
         return Some(Sorted { remark: Some(too_many(table, &best.off)), ..all(table, whole) });
     }
     Some(Sorted {
@@ -111,7 +111,7 @@ struct End {
 /// does not carry the form.
 fn rejected(table: &SigmaTable, form: Form, mut surface: Surface) -> Option<End> {
     let mut off = standing_off(table, &surface, &[]);
-    for _ in 0..MOST_ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let fitted = fit_all(&without(table, &off), form).ok()?;
         surface = Surface::of(table, form, &fitted.values(), fitted.free());
         let next = standing_off(table, &surface, &off);
@@ -126,7 +126,7 @@ fn rejected(table: &SigmaTable, form: Form, mut surface: Surface) -> Option<End>
 /// The end with the least bounded loss, sum of min(t^2, OFF^2) over *all* rows, by the smallest
 /// scale any end has: a surface bent towards an outlier costs its neighbours more than the
 /// outlier, and one that left out good rows pays for each.
-fn least_cost(table: &SigmaTable, ends: Vec<End>) -> Option<End> {
+fn min_cost(table: &SigmaTable, ends: Vec<End>) -> Option<End> {
     let scales: Vec<Vec<f64>> =
         ends.iter().map(|e| spread(table, &e.surface, |i| !e.off.contains(&i))).collect();
     let least =
@@ -144,7 +144,7 @@ fn least_cost(table: &SigmaTable, ends: Vec<End>) -> Option<End> {
 fn nothing_to_look_for(table: &SigmaTable, fitted: &SigmaFit) -> bool {
     let surface = Surface::of(table, fitted.form, &fitted.values(), fitted.free());
     let spare = table.rows.len() as f64 - surface.free as f64;
-    if spare < LEAST_SPARE_ROWS {
+    if spare < MIN_SPARE_ROWS {
         return true;
     }
     let square = |(r, sigma): (&SigmaRow, &f64)| {

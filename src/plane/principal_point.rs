@@ -2,7 +2,7 @@
 
 use super::candidate::{Candidate, around_principal_point, candidate, centre_disc};
 use super::grow::Lattice;
-use super::target::{FEWEST_PIXELS, in_front, on_plane, seed_plane};
+use super::target::{MIN_PIXELS, in_front, on_plane, seed_plane};
 use super::{Exclusions, InverseDepthImage, Target};
 use crate::rng::Stream;
 use crate::stats::median_in_place;
@@ -18,7 +18,7 @@ pub(super) fn at_principal_point(
     let camera = image.camera;
     let lattice = Lattice::over(image.w, image.rays, camera.width, camera.height);
     let measured = image.w.iter().filter(|w| w.is_finite()).count();
-    if measured < FEWEST_PIXELS {
+    if measured < MIN_PIXELS {
         return Err(format!("only {measured} of {} pixels carry a depth", image.w.len()));
     }
     let mut best: Option<Candidate> = None;
@@ -169,7 +169,7 @@ fn finish(
             edge += usize::from(fits);
         }
     }
-    if on < FEWEST_PIXELS {
+    if on < MIN_PIXELS {
         return Err(format!("the plane at the principal point has only {on} pixels"));
     }
     let exclusions = Exclusions {

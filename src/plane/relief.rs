@@ -3,7 +3,7 @@
 use super::InverseDepthImage;
 use super::affine::AffineFit;
 use super::grow::{BEND_M, Gauge, Lattice};
-use super::target::FEWEST_PIXELS;
+use super::target::MIN_PIXELS;
 
 /// Connected areas off the plane.
 pub(super) struct Relief {
@@ -25,7 +25,7 @@ pub(super) fn relief(image: &InverseDepthImage<'_>, inside: &[u32], fit: &Affine
     let lattice = Lattice::over(&w, image.rays, camera.width, camera.height);
     let residuals = lattice.residuals(&Gauge { fit, bend_m: BEND_M });
     let off = lattice.off(&residuals);
-    let fewest = FEWEST_PIXELS.div_ceil(lattice.pitch * lattice.pitch);
+    let fewest = MIN_PIXELS.div_ceil(lattice.pitch * lattice.pitch);
     let mut left = off.clone();
     let (mut mask, mut notes) = (vec![false; off.len()], Vec::new());
     for seed in 0..off.len() {

@@ -49,7 +49,7 @@ pub struct InverseDepthImage<'a> {
 }
 
 /// Fewest pixels that make a target.
-pub(super) const FEWEST_PIXELS: usize = 300;
+pub(super) const MIN_PIXELS: usize = 300;
 /// Pixels within this many robust standard deviations belong to the plane.
 const REACH_SIGMAS: f64 = 5.0;
 /// ... and pixels within this distance always do: lens errors of a Kinect bend a near wall by
@@ -162,7 +162,7 @@ fn in_region(
         return Err("its region lies outside the image".into());
     }
     let valid: Vec<u32> = inside.iter().copied().filter(|&i| image.valid(i as usize)).collect();
-    if valid.len() < FEWEST_PIXELS {
+    if valid.len() < MIN_PIXELS {
         return Err(format!(
             "only {} of {} pixels of its region carry a depth",
             valid.len(),
@@ -175,7 +175,7 @@ fn in_region(
     let relief = flat_enough(image, &inside, &valid, &fit)?;
     let flat = |i: u32| !relief.mask[relief.lattice.node_of(i as usize, width)];
     let on = valid.iter().filter(|&&i| flat(i) && on_plane(image, &fit, i as usize)).count();
-    if on < FEWEST_PIXELS {
+    if on < MIN_PIXELS {
         return Err(format!("only {on} pixels of its region lie on one plane"));
     }
     let exclusions = Exclusions {
@@ -200,9 +200,9 @@ fn in_region(
 }
 
 /// A region of which more than this share is off the plane was not drawn around a target.
-const MOST_RELIEF: f64 = 0.5;
+const MAX_RELIEF: f64 = 0.5;
 /// Residual over local noise above which a region is no plane: Herrera's 39 views reach 3.7.
-const MOST_BENT: f64 = 5.0;
+const MAX_BENT: f64 = 5.0;
 
 /// What stands off the plane in a region that is a plane otherwise.
 fn flat_enough(
@@ -212,14 +212,14 @@ fn flat_enough(
     fit: &AffineFit,
 ) -> Result<Relief, String> {
     let relief = relief(image, inside, fit);
-    if relief.share > MOST_RELIEF {
+    if relief.share > MAX_RELIEF {
         return Err(format!(
             "{:.0} % of its region are off the plane that fits it best",
             100.0 * relief.share
         ));
     }
     let bent = fit.scale / image.local_noise(valid).max(image.floor(fit.plane.q.z.abs()));
-    if bent > MOST_BENT {
+    if bent > MAX_BENT {
         return Err(format!(
             "its region is not flat: it is off the best plane by {bent:.1} times its own noise"
         ));

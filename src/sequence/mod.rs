@@ -69,7 +69,7 @@ impl Sequence {
     ///
     /// # Errors
     /// When the file is damaged or not of the sensor's size.
-    pub fn words(&self, moment: &Moment) -> Result<Frame> {
+    pub fn raw_depth(&self, moment: &Moment) -> Result<Frame> {
         read_depth(&moment.depth, self.sensor.camera.width, self.sensor.camera.height)
     }
 
@@ -97,7 +97,7 @@ impl Sequence {
 
 /// Depth of every pixel, m; NaN where there is none.
 pub fn metres(frame: &Frame, table: &DepthTable) -> Vec<f32> {
-    frame.words.iter().map(|&word| table.metres(word)).collect()
+    frame.raw.iter().map(|&word| table.metres(word)).collect()
 }
 
 #[cfg(test)]

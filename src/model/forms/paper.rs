@@ -1,6 +1,6 @@
 //! Yamaguchi et al. 2016, Eq. 1: six parameters.
 
-use super::{MOST_PARAMETERS, SigmaForm, Start, Walk};
+use super::{MAX_PARAMETERS, SigmaForm, Start, Walk};
 use crate::measure::SigmaRow;
 use crate::model::rows::Rows;
 use crate::model::tilt_search::{BestTilt, EXPONENTS, LOG_POLE, TiltSearch};
@@ -19,7 +19,7 @@ pub fn tilt(theta: f64, f: f64) -> f64 {
 }
 
 /// Derivatives of a + b (z - c)^2 by a, b, c.
-pub(super) fn vertex_gradient(p: &[f64], z: f64, out: &mut [f64; MOST_PARAMETERS]) {
+pub(super) fn vertex_gradient(p: &[f64], z: f64, out: &mut [f64; MAX_PARAMETERS]) {
     let off = z - p[2];
     out[0] = 1.0;
     out[1] = off * off;
@@ -136,7 +136,7 @@ impl SigmaForm for Paper {
         if theta == 0.0 { axial } else { axial + p[3] * z.powf(p[4]) * tilt(theta, p[5]) }
     }
 
-    fn gradient(&self, p: &[f64], z: f64, theta: f64, out: &mut [f64; MOST_PARAMETERS]) {
+    fn gradient(&self, p: &[f64], z: f64, theta: f64, out: &mut [f64; MAX_PARAMETERS]) {
         vertex_gradient(p, z, out);
         let unit = z.powf(p[4]) * tilt(theta, p[5]);
         out[3] = unit;

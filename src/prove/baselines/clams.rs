@@ -9,7 +9,7 @@ use super::tiles::Tiles;
 use super::{Baseline, Fitted};
 use crate::camera::Camera;
 use crate::error::Result;
-use crate::terms::Place;
+use crate::terms::PixelContext;
 
 #[derive(Debug, Clone, Copy)]
 pub struct Clams;
@@ -39,7 +39,7 @@ impl Grid {
     }
 
     /// The eight cells about a place, and their shares.
-    fn about(&self, p: &Place) -> [(usize, f64); 8] {
+    fn about(&self, p: &PixelContext) -> [(usize, f64); 8] {
         let node = |share: f64, nodes: usize| {
             let place = share.clamp(0.0, 1.0) * (nodes - 1) as f64;
             let k = (place as usize).min(nodes - 2);
@@ -77,7 +77,7 @@ impl Baseline for Clams {
         let cells: Vec<f64> =
             sum.iter().zip(&weight).map(|(s, w): (&f64, &f64)| s / (w + CAUTION)).collect();
         let parameters = weight.iter().filter(|w| **w > 0.0).count();
-        let bias = move |p: &Place| {
+        let bias = move |p: &PixelContext| {
             let near = grid.about(p).iter().map(|&(k, share)| share * cells[k]).sum::<f64>();
             // From a factor on the depth to px of disparity.
             p.disparity * near

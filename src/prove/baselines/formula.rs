@@ -10,7 +10,7 @@ use symbolic_regression::prelude::{
 
 use super::learnt::AtPlaces;
 use super::polynomial::Frame;
-use crate::terms::Place;
+use crate::terms::PixelContext;
 
 /// Two operands at most.
 pub(super) const ARITY: usize = 2;
@@ -27,8 +27,8 @@ const RADIUS: u16 = 3;
 const TILT: u16 = 4;
 const PHASE: u16 = 5;
 
-pub(super) fn features(frame: &Frame, places: &[Place]) -> Array2<f64> {
-    let one = |p: &Place| {
+pub(super) fn features(frame: &Frame, places: &[PixelContext]) -> Array2<f64> {
+    let one = |p: &PixelContext| {
         let [u, v, d] = frame.of_place(p);
         [u, v, d, p.radius, p.theta, TAU * p.disparity]
     };

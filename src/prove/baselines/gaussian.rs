@@ -10,7 +10,7 @@ use super::polynomial::Frame;
 use super::tiles::{Tile, Tiles};
 use super::{Baseline, Fitted};
 use crate::error::Result;
-use crate::terms::Place;
+use crate::terms::PixelContext;
 
 #[derive(Debug, Clone, Copy)]
 pub struct GaussianProcess;
@@ -25,7 +25,7 @@ const TRIED: [f64; 2] = [2.5, 1.6];
 /// Variance of a plane's coefficients over that of the bias: as good as free.
 const FREE: f64 = 1e3;
 /// Of the standard error, squared: measurements that are alone in their block.
-const LEAST_NOISE: f64 = 1e-12;
+const MIN_NOISE: f64 = 1e-12;
 
 /// What is regressed.
 struct Problem {
@@ -160,7 +160,7 @@ fn of_bias(blocks: &Tiles, frame: &Frame) -> Problem {
             .flat_map(|(view, range)| tiles[range.clone()].iter().map(move |t| plane(view, t)))
             .collect(),
         y: DVector::from_iterator(tiles.len(), tiles.iter().map(|t| t.mean)),
-        noise: tiles.iter().map(|t| t.error_px2().max(LEAST_NOISE)).collect(),
+        noise: tiles.iter().map(|t| t.error_px2().max(MIN_NOISE)).collect(),
     }
 }
 
@@ -218,5 +218,5 @@ impl Baseline for GaussianProcess {
 }
 
 fn at_place(posterior: Posterior, frame: Frame, level: f64) -> AtPlaces {
-    each(move |p: &Place| level + posterior.mean(&frame.of_place(p)))
+    each(move |p: &PixelContext| level + posterior.mean(&frame.of_place(p)))
 }

@@ -2,15 +2,15 @@
 
 use crate::camera::Camera;
 use crate::error::Result;
-use crate::prove::gain::{MOST_LOG_VARIANCE, Stand, plane_of};
+use crate::prove::gain::{MAX_LOG_VARIANCE, Stand, plane_of};
 use crate::prove::question::{ExamView, Predictor};
-use crate::terms::{Pixels, Place};
+use crate::terms::{PixelContext, Pixels};
 
 /// A number for each place.
-pub type AtPlaces = Box<dyn Fn(&[Place]) -> Vec<f64> + Send + Sync>;
+pub type AtPlaces = Box<dyn Fn(&[PixelContext]) -> Vec<f64> + Send + Sync>;
 
 /// Of each place by itself.
-pub fn each(of: impl Fn(&Place) -> f64 + Send + Sync + 'static) -> AtPlaces {
+pub fn each(of: impl Fn(&PixelContext) -> f64 + Send + Sync + 'static) -> AtPlaces {
     Box::new(move |places| places.iter().map(&of).collect())
 }
 
@@ -78,7 +78,7 @@ impl Predictor for Learnt {
     fn sigma(&self, view: &ExamView, depth: &[f32]) -> Vec<f32> {
         let Some(log) = &self.log_variance else { return view.sigma_plain.clone() };
         let log = self.everywhere(view, depth, log);
-        let limit = |l: f64| l.clamp(-MOST_LOG_VARIANCE, MOST_LOG_VARIANCE);
+        let limit = |l: f64| l.clamp(-MAX_LOG_VARIANCE, MAX_LOG_VARIANCE);
         let plain = view.sigma_plain.iter();
         plain.zip(log).map(|(s, l)| (f64::from(*s) * (0.5 * limit(l)).exp()) as f32).collect()
     }

@@ -6,7 +6,7 @@ use super::linear::{Design, fit_log, ratios, solve};
 use super::tiles::{Tile, Tiles};
 use super::{Baseline, Fitted};
 use crate::error::Result;
-use crate::terms::Place;
+use crate::terms::PixelContext;
 
 /// All monomials of up to the third degree.
 #[derive(Debug, Clone, Copy)]
@@ -28,7 +28,7 @@ impl Frame {
         Frame { middle: [w, h, 0.5 * (low + high)], half }
     }
 
-    pub fn of_place(&self, p: &Place) -> [f64; 3] {
+    pub fn of_place(&self, p: &PixelContext) -> [f64; 3] {
         let raw = [p.u, p.v, p.disparity];
         std::array::from_fn(|k| (raw[k] - self.middle[k]) / self.half[k])
     }
@@ -49,7 +49,7 @@ fn monomials() -> Vec<[u8; 3]> {
     all
 }
 
-fn fill(frame: &Frame, exponents: &[[u8; 3]], place: &Place, row: &mut [f64]) {
+fn fill(frame: &Frame, exponents: &[[u8; 3]], place: &PixelContext, row: &mut [f64]) {
     let x = frame.of_place(place);
     for (value, e) in row.iter_mut().zip(exponents) {
         *value = (0..3).map(|k| x[k].powi(i32::from(e[k]))).product();
@@ -72,7 +72,7 @@ impl Baseline for Polynomial {
         let variance = fit_log(tiles, &left, &Design::of_variance(tiles, n, &row).columns);
         let value = move |beta: Vec<f64>| {
             let exponents = monomials();
-            move |p: &Place| {
+            move |p: &PixelContext| {
                 let mut row = [0.0; 20];
                 fill(&frame, &exponents, p, &mut row);
                 row.iter().zip(&beta).map(|(g, b)| g * b).sum()

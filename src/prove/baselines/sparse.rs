@@ -13,7 +13,7 @@ use super::linear::{Design, fit_log, ratios, solve, working};
 use super::tiles::{Tile, Tiles};
 use super::{Baseline, Fitted};
 use crate::error::Result;
-use crate::terms::{Basis, Place, Statistic, Term};
+use crate::terms::{Basis, PixelContext, Statistic, Term};
 
 #[derive(Debug, Clone, Copy)]
 pub struct Sparse;
@@ -258,5 +258,5 @@ fn at_place(mut terms: Vec<Term>) -> Option<AtPlaces> {
     if terms.is_empty() {
         return None;
     }
-    Some(each(move |p: &Place| terms.iter().map(|t| t.value(p, &mut Vec::new())).sum()))
+    Some(each(move |p: &PixelContext| terms.iter().map(|t| t.value(p, &mut Vec::new())).sum()))
 }

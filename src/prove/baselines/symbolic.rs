@@ -28,7 +28,7 @@ use super::polynomial::Frame;
 use super::tiles::Tiles;
 use super::{Baseline, Fitted};
 use crate::error::{Error, Result};
-use crate::terms::Place;
+use crate::terms::PixelContext;
 
 /// How long it searches: formulas tried, for the bias and for the variance each. A limit in time
 /// would give another answer on another day.
@@ -119,7 +119,7 @@ impl Symbolic {
     }
 }
 
-fn places(tiles: &Tiles) -> Vec<Place> {
+fn places(tiles: &Tiles) -> Vec<PixelContext> {
     tiles.tiles.iter().map(|t| t.place).collect()
 }
 

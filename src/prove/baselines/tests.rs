@@ -10,15 +10,15 @@ use crate::plane::Plane;
 use crate::prove::gain::{Oracle, Stand, gain_of, tests::*};
 use crate::prove::question::ExamView;
 use crate::rng::{Seed, Stream};
-use crate::terms::{Pixels, Place};
+use crate::terms::{PixelContext, Pixels};
 
-type Law = dyn Fn(&Place) -> f64;
+type Law = dyn Fn(&PixelContext) -> f64;
 
-fn no_bias(_: &Place) -> f64 {
+fn no_bias(_: &PixelContext) -> f64 {
     0.0
 }
 
-fn no_spread(_: &Place) -> f64 {
+fn no_spread(_: &PixelContext) -> f64 {
     1.0
 }
 
@@ -46,7 +46,7 @@ fn tiles(bias: &Law, spread: &Law, rng: &mut Stream) -> Tiles {
         for v in (1..camera.height - 1).step_by(3) {
             for u in (1..camera.width - 1).step_by(3) {
                 let near = |k: usize| (v + k / 3 - 1) * camera.width + u + k % 3 - 1;
-                let places: Vec<Place> = (0..9).map(|k| stand.place(near(k))).collect();
+                let places: Vec<PixelContext> = (0..9).map(|k| stand.place(near(k))).collect();
                 tiles.push(tile(&places, bias, spread, rng));
             }
         }
@@ -59,9 +59,9 @@ fn tiles(bias: &Law, spread: &Law, rng: &mut Stream) -> Tiles {
 /// 9 pixels of 4 frames.
 const COUNT: f64 = 36.0;
 
-fn tile(places: &[Place], bias: &Law, spread: &Law, rng: &mut Stream) -> Tile {
+fn tile(places: &[PixelContext], bias: &Law, spread: &Law, rng: &mut Stream) -> Tile {
     let variance = SIGMA_PX * SIGMA_PX;
-    let place = Place { side: 3.0, variance, ..places[4] };
+    let place = PixelContext { side: 3.0, variance, ..places[4] };
     let sigma = SIGMA_PX * spread(&place);
     let (mut sum, mut squares) = (0.0, 0.0);
     for p in places {
@@ -108,16 +108,16 @@ fn ratios(baseline: &dyn Baseline, bias: &Law, spread: &Law) -> ([f64; 2], Fitte
 }
 
 /// A cubic that no plane takes: and log variance with a square.
-fn cubic(p: &Place) -> f64 {
+fn cubic(p: &PixelContext) -> f64 {
     let (u, v) = (p.u / 40.0 - 1.0, p.v / 30.0 - 1.0);
     0.15 * u * u * v - 0.1 * v * v + 0.016 * u * v * p.disparity
 }
 
-fn rim(p: &Place) -> f64 {
+fn rim(p: &PixelContext) -> f64 {
     (0.4 * p.radius * p.radius).exp()
 }
 
-fn bowl(p: &Place) -> f64 {
+fn bowl(p: &PixelContext) -> f64 {
     0.25 * p.radius * p.radius
 }
 
@@ -137,7 +137,7 @@ fn a_gaussian_process_learns_inside_and_knows_nothing_beyond() {
     assert!(within > 0.9 && within < 1.001, "{within}");
     assert!(fitted.parameters > 20 && fitted.parameters < 400, "{}", fitted.parameters);
     // A ripple in the inverse depth, and views nearer than any before.
-    let ripple = |p: &Place| 0.2 * (1.4 * p.disparity).sin();
+    let ripple = |p: &PixelContext| 0.2 * (1.4 * p.disparity).sin();
     let ([within, beyond], _) = ratios(&GaussianProcess, &ripple, &no_spread);
     assert!(within > 0.5 && beyond < 0.3, "{within} {beyond}");
 }
@@ -152,8 +152,8 @@ fn a_grid_learns_a_bowl() {
 /// Each effect of the columns by its own name alone, on white data.
 #[test]
 fn sparse_regression_names_what_it_has_columns_for() {
-    let locking = |p: &Place| 0.03 * (std::f64::consts::TAU * p.disparity).sin();
-    let exponent = |p: &Place| (p.z / 2.0).powf(0.4);
+    let locking = |p: &PixelContext| 0.03 * (std::f64::consts::TAU * p.disparity).sin();
+    let exponent = |p: &PixelContext| (p.z / 2.0).powf(0.4);
     let none: (&Law, &Law) = (&no_bias, &no_spread);
     let cases: [(&[&str], &Law, &Law); 5] = [
         (&["radial-disparity-bias"], &bowl, none.1),

@@ -6,20 +6,20 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use crate::correct::Conditions;
-use crate::diagnose::{Field, Known};
+use crate::diagnose::{Field, KnownTerms};
 use crate::error::{Error, Result};
 use crate::io::{Assumed, open};
 use crate::measure::{MeasureOptions, Workbench};
 use crate::model::NoiseModel;
 use crate::prove::gain::Stand;
 use crate::stats::median_in_place;
-use crate::terms::{Pixels, Place};
+use crate::terms::{PixelContext, Pixels};
 use crate::view::{Recording, Sensor};
 
 /// Mean residual of a patch of pixels.
 #[derive(Debug, Clone, Copy)]
 pub struct Tile {
-    pub place: Place,
+    pub place: PixelContext,
     /// Mean residual, px of disparity.
     pub mean: f64,
     /// Mean square of single frames' residuals, px^2.
@@ -71,8 +71,8 @@ impl Tiles {
         let bench = Workbench::new(sensor, MeasureOptions::default());
         let known = match twin {
             // What it leaves in the twin it leaves in the recording.
-            Some(_) => Known::default(),
-            None => Known::of(model, &sensor.camera),
+            Some(_) => KnownTerms::default(),
+            None => KnownTerms::of(model, &sensor.camera),
         };
         let stamps = recording.views.iter().filter_map(|v| v.depth.first());
         let start = stamps.map(|f| f.timestamp).fold(f64::INFINITY, f64::min);
@@ -169,7 +169,7 @@ impl Tiles {
     }
 
     /// Ends of what the tiles span on an axis.
-    pub fn span(&self, of: impl Fn(&Place) -> f64) -> [f64; 2] {
+    pub fn span(&self, of: impl Fn(&PixelContext) -> f64) -> [f64; 2] {
         crate::stats::range(self.tiles.iter().map(|t| of(&t.place)))
     }
 }
@@ -178,7 +178,7 @@ fn merged(tiles: &[&Tile]) -> Tile {
     let count: f64 = tiles.iter().map(|t| t.count).sum();
     let mean =
         |of: &dyn Fn(&Tile) -> f64| tiles.iter().map(|t| t.count * of(t)).sum::<f64>() / count;
-    let places: Vec<Place> = tiles.iter().map(|t| t.place).collect();
+    let places: Vec<PixelContext> = tiles.iter().map(|t| t.place).collect();
     let mut place = places[0];
     let weigh = |of: &dyn Fn(usize) -> f64| {
         tiles.iter().enumerate().map(|(i, t)| t.count * of(i)).sum::<f64>() / count

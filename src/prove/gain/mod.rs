@@ -15,7 +15,7 @@ mod stand;
 #[cfg(test)]
 pub(super) mod tests;
 
-pub(crate) use model::MOST_LOG_VARIANCE;
+pub(crate) use model::MAX_LOG_VARIANCE;
 pub use model::ModelPredictor;
 pub use score::{NONE, Oracle, Unaware, gain_of};
 pub use stand::{Stand, plane_of};

@@ -3,7 +3,7 @@
 use super::stand::{Stand, plane_of};
 use crate::camera::Rays;
 use crate::correct::Correction;
-use crate::diagnose::Known;
+use crate::diagnose::KnownTerms;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
 use crate::model::{NoiseModel, SigmaModel};
@@ -24,7 +24,7 @@ pub struct ModelPredictor {
 
 /// Of the logarithm of a variance: no prediction calls noise ten times what the model file does, or
 /// a tenth. The same for all methods.
-pub(crate) const MOST_LOG_VARIANCE: f64 = 4.6;
+pub(crate) const MAX_LOG_VARIANCE: f64 = 4.6;
 
 impl ModelPredictor {
     /// # Errors
@@ -46,7 +46,7 @@ impl ModelPredictor {
         };
         let camera = &sensor.camera;
         let parameters = fresh.iter().map(numbers).sum();
-        let variance = Known::of(model, camera).variance;
+        let variance = KnownTerms::of(model, camera).variance;
         let scale_px_m = sensor.disparity_px_m().unwrap_or(camera.fx * KINECT_BASELINE_M);
         let fresh = NoiseModel { effects: fresh, ..model.clone() };
         Ok(ModelPredictor {
@@ -88,7 +88,7 @@ impl Predictor for ModelPredictor {
             place.variance = (sigma * self.scale_px_m / (place.z * place.z)).powi(2);
             let log: f64 = terms.iter().map(|t| t.value(&place, &mut row)).sum();
             let log = if log.is_finite() { log } else { 0.0 };
-            (sigma * (0.5 * log.clamp(-MOST_LOG_VARIANCE, MOST_LOG_VARIANCE)).exp()) as f32
+            (sigma * (0.5 * log.clamp(-MAX_LOG_VARIANCE, MAX_LOG_VARIANCE)).exp()) as f32
         };
         (0..depth.len()).map(|i| if on_target[i] { of(i) } else { f32::NAN }).collect()
     }

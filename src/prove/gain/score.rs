@@ -42,7 +42,7 @@ impl Predictor for Unaware {
 /// Per 1000 pixels.
 const PIXELS: f64 = 1000.0;
 /// No depth sensor is surer than this, m: a world without noise has no infinite score.
-const LEAST_SIGMA_M: f64 = 1e-6;
+const MIN_SIGMA_M: f64 = 1e-6;
 
 /// Gain of a prediction over the model file alone.
 ///
@@ -115,7 +115,7 @@ fn pixels(view: &ExamView, predictor: &dyn Predictor) -> Result<Vec<Scored>> {
             });
         }
         let (x, y) = rays.at(i);
-        let [sigma, predicted] = [sigma, predicted].map(|s| s.max(LEAST_SIGMA_M));
+        let [sigma, predicted] = [sigma, predicted].map(|s| s.max(MIN_SIGMA_M));
         pixels.push(Scored { x, y, z: plain, error, sigma, predicted });
     }
     Ok(pixels)

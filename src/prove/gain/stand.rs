@@ -6,7 +6,7 @@ use crate::camera::{Camera, Rays};
 use crate::correct::Conditions;
 use crate::plane::{NormalEquations, Plane};
 use crate::scene::TargetFrame;
-use crate::terms::{Pixels, Place, edge_distances};
+use crate::terms::{PixelContext, Pixels, edge_distances};
 
 /// A plane before a camera.
 pub struct Stand<'a> {
@@ -36,7 +36,7 @@ impl<'a> Stand<'a> {
     }
 
     /// Of pixel `i`.
-    pub fn place(&self, i: usize) -> Place {
+    pub fn place(&self, i: usize) -> PixelContext {
         let mut place = self.pixels.place(i);
         place.side = 1.0;
         place.edge = f64::from(self.edge[i]);

@@ -35,7 +35,7 @@ const FAULTS: [Fault; 8] = [
 /// From here on a cause that is missed is listed, nats.
 const STRONG: f64 = 500.0;
 /// So many pictures in all, and so many sets of a group before the list is folded.
-const MOST_PICTURES: usize = 150;
+const MAX_PICTURES: usize = 150;
 const LONG: usize = 12;
 
 impl Fault {
@@ -103,7 +103,7 @@ type Curve<'a> = &'a dyn Fn(&ProvenSet) -> Option<KeptCurve>;
 pub(super) fn section(proof: &Proof, curve: Curve<'_>) -> Markup {
     let failed: Vec<(&ProvenSet, Vec<Fault>)> =
         proof.sets.iter().map(|s| (s, faults(s))).filter(|(_, f)| !f.is_empty()).collect();
-    let mut left = MOST_PICTURES;
+    let mut left = MAX_PICTURES;
     let mut groups = Vec::new();
     for fault in FAULTS {
         let of: Vec<_> = failed.iter().filter(|(_, f)| f[0] == fault).collect();
@@ -120,7 +120,7 @@ pub(super) fn section(proof: &Proof, curve: Curve<'_>) -> Markup {
                 (weaker(proof)) }
             @for (fault, cards) in &groups { (group(*fault, cards)) }
             @if left == 0 {
-                p.note { "Pictures are drawn for the first " (MOST_PICTURES) " only; every curve is in diagnoses/NAME.json, findings[].curve." }
+                p.note { "Pictures are drawn for the first " (MAX_PICTURES) " only; every curve is in diagnoses/NAME.json, findings[].curve." }
             }
             p.note { "Dots: the first finding’s curve as measured, bars one standard error; line: the extended model. A failure without a picture claimed \
                       nothing, or its diagnosis is not kept beside the page." }
