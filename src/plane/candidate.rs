@@ -2,8 +2,8 @@
 
 use super::affine::{AffineFit, Effort, fit_affine_robust};
 use super::grow::{BEND_M, Gauge, Lattice};
+use super::image::{MIN_PIXELS, on_plane, seed_plane};
 use super::rival::rivals;
-use super::target::{MIN_PIXELS, on_plane, seed_plane};
 use super::{InverseDepthImage, Plane};
 use crate::camera::Camera;
 use crate::rng::Stream;
@@ -59,7 +59,7 @@ pub(super) fn candidate(
     let gauge = Gauge { fit: &fit, bend_m: BEND_M };
     mask.iter_mut().zip(&barred).for_each(|(m, b)| *m &= !b);
     let residuals = lattice.residuals(&gauge);
-    let mask = lattice.with_rim(&mask, &residuals, &barred);
+    let mask = lattice.with_edge(&mask, &residuals, &barred);
     let curved = lattice.curving_away(&mask, &residuals) > CURVED;
     let pixels = pixels_of(image, lattice, &mask);
     let floor = image.floor(fit.plane.q.z.abs());

@@ -5,7 +5,7 @@
 
 use super::affine::AffineFit;
 use super::grow::{Gauge, Lattice};
-use super::target::{InverseDepthImage, seed_plane};
+use super::image::{InverseDepthImage, seed_plane};
 use crate::rng::Stream;
 
 /// Rivals are looked for this many nodes around the target: a tenth of the image's width.
