@@ -1,7 +1,9 @@
 //! What is known about an effect before it acts.
 
+use serde::Serialize;
+
 /// Where in the light's path an effect acts, in order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub enum Stage {
     /// The target's shape and motion: changes `depth`.
     Surface,
@@ -20,6 +22,7 @@ pub enum Stage {
     /// Errors of the match: changes `disparity`, px.
     Disparity,
     /// Pixels without an answer: `disparity` becomes NaN.
+    #[serde(rename = "Missing")]
     Dropout,
     /// The read-out of the match: rounds and shifts `disparity`.
     Quantiser,
@@ -49,7 +52,7 @@ impl Stage {
 /// A knob.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameter {
-    /// With its unit, as in effects.md.
+    /// As given on the command line; it ends with the unit.
     pub name: &'static str,
     pub unit: &'static str,
     /// What is accepted.
@@ -57,6 +60,21 @@ pub struct Parameter {
     /// A typical size; used where the user names none.
     pub typical: f64,
     pub summary: &'static str,
+}
+
+/// Values of an effect's parameters, in the card's order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings(pub(super) Vec<f64>);
+
+impl Settings {
+    pub fn typical(card: &Card) -> Self {
+        Settings(card.parameters.iter().map(|p| p.typical).collect())
+    }
+
+    /// The value of the card's parameter number `index`.
+    pub fn at(&self, index: usize) -> f64 {
+        self.0[index]
+    }
 }
 
 /// The face of an effect for people and for the command line.

@@ -6,17 +6,17 @@
 //! is not there, and every effect draws only from streams of its own name, so that adding one
 //! changes no other.
 
+mod active;
 mod card;
 mod draw;
 mod exposure;
-mod settings;
 mod shape;
 
+pub use active::{Acting, Active};
 pub use ambient_light::ROOM_LUX;
-pub use card::{Card, Parameter, Stage};
+pub use card::{Card, Parameter, Settings, Stage};
 pub use draw::{Draw, Scope, fill_normal};
 pub use exposure::{Exposure, Instant, KINECT_BASELINE_M};
-pub use settings::{Acting, Active, Settings};
 
 use crate::terms::Term;
 use draw::{chance, logistic, normals};
@@ -40,7 +40,7 @@ macro_rules! catalogue {
     ($($module:ident :: $name:ident),* $(,)?) => {
         $(mod $module;)*
 
-        /// Every effect, in the order of effects.md.
+        /// Every effect, in the order of the light's path and of `crate::docs::catalogue`.
         pub static CATALOGUE: &[&dyn Effect] = &[$(&$module::$name),*];
     };
 }
