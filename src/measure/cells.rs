@@ -28,7 +28,7 @@ pub struct Cell {
     /// Independent samples the temporal sigma is worth: a pixel gives one frame less than it has.
     pub n_effective_temporal: f64,
     /// Samples of target pixels without a depth.
-    pub missing: usize,
+    pub dropouts: usize,
     /// Samples farther than the cut from the plane.
     pub cut: usize,
 }
@@ -82,7 +82,7 @@ pub(super) struct Sums {
     pub within_dof: f64,
     /// Between frames: n_f (mean_f - mean)^2.
     pub between: f64,
-    pub missing: usize,
+    pub dropouts: usize,
     pub cut: usize,
     /// Pixels that gave at least one sample.
     pub pixels: f64,
@@ -98,7 +98,7 @@ impl Sums {
         self.within += other.within;
         self.within_dof += other.within_dof;
         self.between += other.between;
-        self.missing += other.missing;
+        self.dropouts += other.dropouts;
         self.cut += other.cut;
         self.pixels += other.pixels;
     }
@@ -162,7 +162,7 @@ impl Context {
             n_effective,
             n_effective_temporal: (s.pixels / self.correlation_squares * (moving_frames - 1.0))
                 .max(1.0),
-            missing: s.missing,
+            dropouts: s.dropouts,
             cut: s.cut,
         })
     }
