@@ -160,7 +160,7 @@ impl std::fmt::Display for Excluded {
     }
 }
 
-/// `recording.json`, as the contract lays it down.
+/// `recording.json` (`crate::docs::layouts`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordingFile {
     /// [`RECORDING_FORMAT`].

@@ -10,7 +10,7 @@ use super::Correction;
 use super::files::{copy, files_below, make_folder_of, makes_a_recording};
 use super::recording::{Corrected, Job, metres, read};
 use super::words::Words;
-use crate::calibrate::Progress;
+use crate::Progress;
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, DepthTable, Frame};
 use crate::io::{INDEX, Layout, encode_pgm16, encode_png16, write_atomic};

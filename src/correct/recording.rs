@@ -8,7 +8,7 @@ use super::again::Again;
 use super::files::{inside, once, refuse_inside};
 use super::words::metric;
 use super::{Conditions, Correction};
-use crate::calibrate::Progress;
+use crate::Progress;
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, DepthTable, FARTHEST_M, Frame};
 use crate::io::{Assumed, FrameSource, Layout, open_uncut, refuse_full};

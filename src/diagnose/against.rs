@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::engine::{DiagnoseOptions, FEWEST_VIEWS, Progress};
+use super::engine::{DiagnoseOptions, FEWEST_VIEWS};
 use super::field::Field;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
@@ -21,6 +21,7 @@ use super::search::ViewData;
 use super::steps::{Steps, lattice};
 use super::structure::{Structure, structures};
 use super::tiles::SIDE;
+use crate::Progress;
 use crate::error::{Error, Result};
 use crate::measure::Workbench;
 use crate::model::NoiseModel;

@@ -29,6 +29,7 @@ use super::structure::structures;
 use super::verdict::{
     after, extend, least_size, merge, not_identifiable, shares, symptoms, view_lines,
 };
+use crate::Progress;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
 use crate::measure::{MeasureOptions, Workbench};
@@ -78,9 +79,6 @@ impl Diagnosed {
         self.fields[view].pixels.iter().zip(mean).map(|(&i, m)| m - at(i)).collect()
     }
 }
-
-/// Steps done, steps in all.
-pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
 
 /// How noise hangs together changes what a few frames show of its size by so much.
 const LEVEL_BESIDE_TEXTURE: f64 = 0.05;

@@ -6,11 +6,12 @@ use rayon::prelude::*;
 use serde_json::Map;
 
 use super::diagnosis::Finding;
-use super::engine::{FEWEST_VIEWS, Progress};
+use super::engine::FEWEST_VIEWS;
 use super::field::Field;
 use super::findings;
 use super::known::KnownTerms;
 use super::parameters::estimate;
+use crate::Progress;
 use crate::error::{Error, Result};
 use crate::measure::Workbench;
 use crate::model::NoiseModel;

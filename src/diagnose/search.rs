@@ -368,7 +368,6 @@ impl<'a> Layer<'a> {
         };
         let (families, curves) = (ranked(true, &fair), ranked(false, &total));
         let threshold = noise.threshold(self.rules.level);
-        self.trace(judged, threshold);
         let best_curve = curves.first().map_or(f64::NEG_INFINITY, |&i| total(i));
         let best_family = families.first().map_or(f64::NEG_INFINITY, |&i| fair(i));
         let named = families
@@ -508,23 +507,6 @@ impl<'a> Layer<'a> {
             k += 1;
         }
         chosen.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    }
-
-    fn trace(&self, judged: &[Option<Judged>], threshold: f64) {
-        if std::env::var_os("KINOISE_TRACE").is_none() {
-            return;
-        }
-        let total = |i: usize| judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| j.gain.total);
-        let mut order: Vec<usize> = (0..self.candidates.len()).collect();
-        order.sort_by(|&a, &b| total(b).total_cmp(&total(a)));
-        eprintln!("threshold {threshold:.1}");
-        for &i in order.iter().take(8) {
-            let c = &self.candidates[i];
-            let text = format!("{:?}", c.basis);
-            let dispersion = judged[i].as_ref().map_or(0.0, |j| j.null.dispersion);
-            let text = &text[..text.len().min(90)];
-            eprintln!("  {:9.1} /{dispersion:5.2} {:?} {text}", total(i), c.family);
-        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! The recording layout: recording.json and one folder a view (contract, section 1).
+//! The recording layout: recording.json and one folder a view (`crate::docs::layouts`).
 
 use std::path::{Path, PathBuf};
 

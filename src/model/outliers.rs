@@ -3,9 +3,10 @@
 //! stiff ones cannot follow an outlier among a few steep views); left out; the rest looked at
 //! again; and the end with the least bounded loss taken.
 
-use super::fit::{SigmaFit, fit_all};
+use super::fit::fit_all;
 use super::forms::Form;
 use super::robust::{self, Surface, spread};
+use super::statistics::SigmaFit;
 use crate::error::Result;
 use crate::measure::{SigmaRow, SigmaTable};
 
@@ -31,7 +32,7 @@ const JUDGES: [Form; 4] = [Form::Paper, Form::Nguyen, Form::Disparity, Form::Kho
 pub struct Sorted {
     pub kept: SigmaTable,
     pub left_out: Vec<SigmaRow>,
-    /// What to tell people of the rows left out, or of too many that stand off.
+    /// A remark about the rows left out, or about too many that stand off.
     pub remark: Option<String>,
     /// The judge's own fit to the rows kept.
     judged_by: Option<SigmaFit>,
@@ -54,7 +55,7 @@ impl Sorted {
     }
 }
 
-/// Fit `form` to `table` without its outliers; they are told in the remarks.
+/// Fit `form` to `table` without its outliers, which the remarks name.
 ///
 /// # Errors
 /// As [`Sorted::fit`].
@@ -94,7 +95,7 @@ fn judged(table: &SigmaTable, form: Form) -> Option<Sorted> {
     }
     Some(Sorted {
         kept: without(table, &best.off),
-        remark: (!best.off.is_empty()).then(|| words(table, &best.off)),
+        remark: (!best.off.is_empty()).then(|| describe(table, &best.off)),
         left_out: best.off.iter().map(|&i| table.rows[i]).collect(),
         judged_by: Some(best.fitted),
     })
@@ -138,7 +139,7 @@ fn min_cost(table: &SigmaTable, ends: Vec<End>) -> Option<End> {
     ends.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
-/// Too few rows to tell, or the fit leaves what sampling explains: no row off by itself (the robust
+/// Too few rows to judge, or the fit leaves what sampling explains: no row off by itself (the robust
 /// scale is never below sampling), and together no more than sampling allows, as there would be if
 /// an outlier had bent the surface.
 fn nothing_to_look_for(table: &SigmaTable, fitted: &SigmaFit) -> bool {
@@ -179,7 +180,7 @@ fn too_many(table: &SigmaTable, off: &[usize]) -> String {
     )
 }
 
-fn words(table: &SigmaTable, left_out: &[usize]) -> String {
+fn describe(table: &SigmaTable, left_out: &[usize]) -> String {
     const SHOWN: usize = 6;
     let mut places: Vec<String> = left_out
         .iter()

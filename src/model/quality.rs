@@ -1,4 +1,4 @@
-//! Plain words about a fit that should not be trusted as it stands.
+//! How well a surface fits, and warnings about a fit that should not be trusted as it stands.
 
 use super::rows::Rows;
 
@@ -52,7 +52,7 @@ impl Quality {
     }
 
     /// What to know before the coefficients, if anything.
-    pub fn words(&self) -> Option<String> {
+    pub fn warning(&self) -> Option<String> {
         const REMEDY: &str = "look in measurements.csv for views that measured something else than one flat target, or try --form auto";
         let sampling = self.sampling_relative.map_or(String::new(), |s| {
             format!(", where the number of samples explains {:.1} %", 1e2 * s)

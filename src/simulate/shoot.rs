@@ -10,7 +10,7 @@ use super::formula::{FormulaSensor, Shot};
 use super::grid::GridView;
 use super::plan::{Scenery, ViewPlan, plan_grid};
 use super::speckle::{Causes, SpeckleSensor};
-use crate::calibrate::Progress;
+use crate::Progress;
 use crate::camera::Rays;
 use crate::effects::{Active, Instant};
 use crate::error::{Error, Result};

@@ -319,7 +319,7 @@ impl Basis {
         }
     }
 
-    /// The axis of effects.md that it runs along.
+    /// The axis that it runs along.
     pub fn axis(&self) -> Axis {
         match self {
             Basis::Bowl { .. } | Basis::Lens { .. } | Basis::RangeNotDepth => Axis::Radius,

@@ -4,15 +4,16 @@ mod disparity;
 mod khoshelham;
 mod nguyen;
 mod paper;
+mod tilt;
 
 use std::fmt;
 use std::str::FromStr;
 
 use super::rows::Rows;
 
-pub use paper::{PAPER_EQ1, tilt};
+pub use paper::PAPER_EQ1;
 
-/// Most parameters a form has.
+/// The largest number of parameters of a form.
 pub const MAX_PARAMETERS: usize = 6;
 
 /// How a parameter is walked while fitting.

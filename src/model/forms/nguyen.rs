@@ -9,7 +9,7 @@ pub(super) struct Nguyen;
 
 /// theta^2 / (pi/2 - theta)^2 / sqrt(z).
 fn tilt(z: f64, theta: f64) -> f64 {
-    super::paper::tilt(theta, std::f64::consts::FRAC_PI_2) / z.sqrt()
+    super::tilt::tilt(theta, std::f64::consts::FRAC_PI_2) / z.sqrt()
 }
 
 impl SigmaForm for Nguyen {
