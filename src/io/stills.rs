@@ -66,7 +66,7 @@ impl Footage {
         }
     }
 
-    /// Cut into views; frames in motion and frames that show nothing are told and left out.
+    /// Cut into views; frames in motion and frames that show nothing are left out, with a remark.
     pub fn recording(self, root: &Path, sensor: Sensor) -> Recording {
         let listed = self.frames.len();
         let (stretches, blank) = stretches(self.frames, &sensor);
