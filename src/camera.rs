@@ -111,7 +111,7 @@ impl Camera {
     /// Normalised image coordinates (x, y), so that the pixel's ray is (x, y, 1): dimensionless.
     ///
     /// With a lens model the ray is found by fixed-point iteration (as OpenCV's undistortPoints);
-    /// NaN where that does not settle, which [`Camera::fault`] tells beforehand.
+    /// NaN where that does not settle, which [`Camera::fault`] reports beforehand.
     pub fn ray(&self, u: f64, v: f64) -> (f64, f64) {
         let (xd, yd) = ((u - self.cx) / self.fx, (v - self.cy) / self.fy);
         match self.distortion {

@@ -156,7 +156,7 @@ impl Active {
         }
     }
 
-    /// Two of a kind would share their random numbers, and nobody could say what they do together.
+    /// Two of a kind would share their random numbers, and so would not be independent.
     ///
     /// # Errors
     /// When an effect is there twice.

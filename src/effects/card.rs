@@ -82,7 +82,7 @@ impl Settings {
 pub struct Card {
     pub id: &'static str,
     pub stage: Stage,
-    /// What was left out when it is missing, one sentence.
+    /// What it does, one sentence.
     pub summary: &'static str,
     /// The first is the strength.
     pub parameters: &'static [Parameter],
@@ -90,7 +90,7 @@ pub struct Card {
     pub identity: f64,
     pub statistic: &'static str,
     pub axis: &'static str,
-    /// The effects it is taken for most easily, by id, and what tells them apart.
+    /// The effects it is taken for most easily, by id, and what distinguishes them.
     pub confused_with: &'static str,
     pub reference: &'static str,
 }

@@ -1,4 +1,4 @@
-//! One frame under way from the surface to the stored word.
+//! One frame under way from the surface to the stored raw value.
 
 use std::collections::HashMap;
 

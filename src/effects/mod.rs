@@ -1,6 +1,6 @@
 //! What physics does to a depth image, one cause a file.
 //!
-//! Light meets the surface, passes the lens, is matched into a disparity and becomes a depth word.
+//! Light meets the surface, passes the lens, is matched into a disparity and becomes a raw depth value.
 //! Each effect belongs to one [`Stage`] of that path; the driver in `simulate` walks the stages in
 //! order and hands every active effect the [`Exposure`] under way. An effect at its card's identity
 //! is not there, and every effect draws only from streams of its own name, so that adding one
@@ -35,7 +35,7 @@ pub trait Effect: Send + Sync {
     }
 }
 
-/// One file, one module, one word in the list: what is in the catalogue.
+/// The catalogue: an effect is one file and one word in this list.
 macro_rules! catalogue {
     ($($module:ident :: $name:ident),* $(,)?) => {
         $(mod $module;)*

@@ -79,7 +79,7 @@ impl Effect for Shape {
     }
 }
 
-/// The terms were found on stored words, whose rounding is part of the variance but not of
+/// The terms were found on raw values, whose rounding is part of the variance but not of
 /// `sigma`: it is added before and taken off after.
 fn scale_variance(exposure: &mut Exposure, log_ratio: &[f32]) {
     let rounding = rounding_variance(exposure);
@@ -90,7 +90,7 @@ fn scale_variance(exposure: &mut Exposure, log_ratio: &[f32]) {
     }
 }
 
-/// Variance of the stored word's rounding at a depth, m^2: uniform over a step.
+/// Variance of a raw value's rounding at a depth, m^2: uniform over a step.
 fn rounding_variance(exposure: &Exposure) -> impl Fn(f32) -> f32 + use<> {
     let code = exposure.sensor.code;
     move |z| {

@@ -23,7 +23,7 @@ pub(super) struct Bin {
     pub mean_m: f64,
 }
 
-/// Why each bin is doubtful, in words; `None` for those that are the target's noise. Compared
+/// Why each bin is doubtful; `None` for those that are the target's noise. Compared
 /// from the largest bin outwards, so that a doubtful one never excuses the next.
 pub(super) fn doubts(bins: &[Bin]) -> Vec<Option<String>> {
     let mut doubts: Vec<Option<String>> = bins.iter().map(|_| None).collect();

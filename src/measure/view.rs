@@ -107,7 +107,7 @@ impl<'r> FrameReader<'r> {
     }
 
     fn sees_anything(&self, frame: &Frame) -> bool {
-        frame.raw.iter().any(|&word| self.table.metres(word).is_finite())
+        frame.raw.iter().any(|&raw| self.table.metres(raw).is_finite())
     }
 }
 
@@ -141,8 +141,8 @@ fn mean_inverse_depth(frames: &[Frame], table: &DepthTable) -> Vec<f32> {
     let mut sum = vec![0f32; n];
     let mut count = vec![0u8; n];
     for frame in frames {
-        for ((s, c), &word) in sum.iter_mut().zip(&mut count).zip(&frame.raw) {
-            let z = table.metres(word);
+        for ((s, c), &raw) in sum.iter_mut().zip(&mut count).zip(&frame.raw) {
+            let z = table.metres(raw);
             if z.is_finite() {
                 *s += 1.0 / z;
                 *c += 1;

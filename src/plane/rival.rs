@@ -1,7 +1,7 @@
 //! Other planes beside the target: what belongs to them is not the target's.
 //!
-//! Where a wall crosses the target's plane, its pixels lie on both. Each alone fits; what tells
-//! them apart is which plane explains their neighbourhood better.
+//! Where a wall crosses the target's plane, its pixels lie on both. Each alone fits; what decides
+//! is which plane explains their neighbourhood better.
 
 use super::affine::AffineFit;
 use super::grow::{Gauge, Lattice};

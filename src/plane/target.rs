@@ -12,7 +12,7 @@ use crate::view::Region;
 /// Find the target: the plane in `region`, or else the one the principal point looks at.
 ///
 /// # Errors
-/// In words, when there is no plane.
+/// Why there is no plane.
 pub fn find_target(
     image: &InverseDepthImage<'_>,
     region: Option<&Region>,

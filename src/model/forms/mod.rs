@@ -38,7 +38,7 @@ pub struct Start {
 /// A formula for sigma.
 pub trait SigmaForm: Sync {
     fn id(&self) -> &'static str;
-    /// In words, with units.
+    /// As text, with units.
     fn formula(&self) -> &'static str;
     /// Where it comes from.
     fn reference(&self) -> &'static str;
