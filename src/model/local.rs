@@ -119,7 +119,7 @@ pub(super) fn polish(rows: &Rows, spec: &dyn SigmaForm, p: &[f64], free: &[usize
     local.scale = columns.column_iter().map(|c| c.norm().max(1e-12)).collect();
     let start = local.to_working(p);
     match trust_region(&local, start, TRUST_REGION_STEPS) {
-        Some(end) => local.parameters(&end),
+        Some(end) => local.parameters(&end.x),
         None => p.to_vec(),
     }
 }

@@ -15,6 +15,15 @@ pub trait LeastSquares {
     fn cost(&self, x: &DVector<f64>) -> f64;
 }
 
+/// The best point on a solver's way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Minimum {
+    /// The place.
+    pub x: DVector<f64>,
+    /// Half the sum of squares there.
+    pub cost: f64,
+}
+
 /// A problem in argmin's terms. Gradient and Hessian are asked for at the same point one after the
 /// other, and both come from one linearisation: the last is kept.
 struct AsArgmin<'a, P> {
@@ -85,7 +94,7 @@ pub fn trust_region<P: LeastSquares>(
     problem: &P,
     start: DVector<f64>,
     max_steps: u64,
-) -> Option<DVector<f64>> {
+) -> Option<Minimum> {
     let initial = problem.cost(&start);
     if !initial.is_finite() {
         return None;
@@ -98,10 +107,14 @@ pub fn trust_region<P: LeastSquares>(
         .configure(|state| state.param(start.clone()).max_iters(max_steps).target_cost(0.0))
         .timer(false)
         .run();
-    let Ok(result) = run else { return Some(start) };
+    let Ok(result) = run else { return Some(Minimum { x: start, cost: initial }) };
     let state = result.state();
-    let better = state.get_best_param().filter(|_| state.get_best_cost() <= initial);
-    Some(better.cloned().unwrap_or(start))
+    Some(match state.get_best_param() {
+        Some(best) if state.get_best_cost() <= initial => {
+            Minimum { x: best.clone(), cost: state.get_best_cost() }
+        }
+        _ => Minimum { x: start, cost: initial },
+    })
 }
 
 struct Plain<F>(F);
@@ -158,7 +171,7 @@ mod tests {
     #[test]
     fn trust_region_walks_the_valley() {
         let end = trust_region(&Valley, DVector::from_vec(vec![-1.2, 1.0]), 200).unwrap();
-        assert!((end[0] - 1.0).abs() < 1e-6 && (end[1] - 1.0).abs() < 1e-6, "{end:?}");
+        assert!((end.x[0] - 1.0).abs() < 1e-6 && (end.x[1] - 1.0).abs() < 1e-6, "{end:?}");
     }
 
     #[test]
