@@ -1,18 +1,19 @@
-//! The main road: recording in, noise model out. Reads like the paper's section II.
-
-mod warnings;
+//! Recording in, noise model out (Yamaguchi et al. 2016, section II).
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::SystemTime;
 
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
+use crate::Progress;
 use crate::error::{Error, Result};
 use crate::io::{hex, sha256_hex};
 use crate::measure::{
-    MeasureOptions, Planes, SigmaKind, SigmaTable, ViewMeasurement, Workbench, measure_view,
+    MeasureOptions, Planes, ReferenceDistance, SigmaKind, SigmaTable, ViewMeasurement, Workbench,
+    measure_view,
 };
 use crate::model::{
     Direction, FitSummary, Form, HeldOut, NoiseModel, Provenance, SigmaFit, SigmaModel,
@@ -29,6 +30,14 @@ pub struct CalibrateOptions {
     pub kind: SigmaKind,
     /// The form to fit; `None` takes the one that predicts left-out distances best.
     pub form: Option<Form>,
+    /// When the model says it was made; now where `None`.
+    pub created: Option<SystemTime>,
+}
+
+impl CalibrateOptions {
+    fn provenance(&self, seed: Option<u64>) -> Provenance {
+        Provenance::at(seed, self.created.unwrap_or_else(SystemTime::now))
+    }
 }
 
 /// All views of a recording, measured.
@@ -55,10 +64,7 @@ pub struct Calibration {
     pub warnings: Vec<String>,
 }
 
-/// Told about progress: views done, views in all.
-pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
-
-/// Measure every view. Views without a plane are excluded and told; the others do not suffer.
+/// Measure every view. A view without a plane is excluded, with its reason; `progress` counts views.
 ///
 /// # Errors
 /// When no view can be measured at all; the message gives the first reason.
@@ -112,13 +118,13 @@ pub fn model_of(
     let table = SigmaTable::of(&measurements.views, options.kind);
     if table.rows.is_empty() {
         return Err(Error::NotEnough {
-            what: format!("no view gives a {}", options.kind.words()),
+            what: format!("no view gives a {}", options.kind.description()),
             remedy: "a temporal sigma needs views of at least two frames".into(),
         });
     }
     let (fit, comparison) = fit_chosen(&table, options.form)?;
-    let warnings = warnings::of(recording, measurements, &fit);
-    let mut provenance = Provenance::now(Some(options.measure.seed.0));
+    let warnings = warnings_of(recording, measurements, &fit);
+    let mut provenance = options.provenance(Some(options.measure.seed.0));
     provenance.options = describe(options, fit.form);
     provenance.sha256 = hashes(recording, measurements)?;
     let model = noise_model(
@@ -131,17 +137,17 @@ pub fn model_of(
     Ok(Calibration { table, fit, comparison, model, warnings })
 }
 
-/// Fit a bare table.
+/// Fit a bare table that was read from `source`; of the options only `form` and `created` count.
 ///
 /// # Errors
 /// As [`model_of`].
 pub fn model_of_table(
     table: &SigmaTable,
-    form: Option<Form>,
     source: &Path,
+    options: &CalibrateOptions,
 ) -> Result<Calibration> {
-    let (fit, comparison) = fit_chosen(table, form)?;
-    let mut provenance = Provenance::now(None);
+    let (fit, comparison) = fit_chosen(table, options.form)?;
+    let mut provenance = options.provenance(None);
     provenance.options.insert("form".into(), json!(fit.form.id()));
     let bytes = std::fs::read(source).map_err(|e| Error::read(source, e))?;
     let name = source.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -193,7 +199,7 @@ fn describe(options: &CalibrateOptions, form: Form) -> Map<String, Value> {
     let value = json!({
         "form": form.id(),
         "form_chosen_by": if options.form.is_some() { "user" } else { "held-out distances" },
-        "sigma": options.kind.words(),
+        "sigma": options.kind.description(),
         "planes": planes,
         "ransac_threshold_m": options.measure.ransac_threshold_m,
         "ransac_iterations": options.measure.ransac_iterations,
@@ -224,4 +230,54 @@ fn hashes(recording: &Recording, measurements: &Measurements) -> Result<Map<Stri
     }
     map.insert("frames".into(), json!(hex(&frames.finalize())));
     Ok(map)
+}
+
+/// What a person should know before trusting the model, the most important first.
+fn warnings_of(recording: &Recording, measurements: &Measurements, fit: &SigmaFit) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for e in &measurements.excluded {
+        warnings.push(e.to_string());
+    }
+    // Views left out while opening stand here too.
+    warnings.extend(recording.remarks.iter().cloned());
+    let total = measurements.views.len();
+    let smooth = measurements.views.iter().filter(|v| v.correlation.persists).count();
+    if smooth > 0 {
+        warnings.push(format!(
+            "in {smooth} of {total} views the residual is smooth over more than 40 px: sigma there holds a \
+             systematic error (lens, bands; see the pictures), and frames do not average it out"
+        ));
+    }
+    warnings.extend(off_reference(&measurements.views));
+    let single = measurements.views.iter().filter(|v| v.frames < 2).count();
+    if single > 0 {
+        warnings.push(format!(
+            "{single} of {total} views have a single frame: no temporal sigma from them"
+        ));
+    }
+    warnings.extend(fit.remarks.iter().cloned());
+    for view in &measurements.views {
+        warnings.extend(view.notes.iter().map(|note| format!("view {}: {note}", view.name)));
+    }
+    warnings
+}
+
+/// One remark for all views whose distance is not what was measured by other means.
+fn off_reference(views: &[ViewMeasurement]) -> Option<String> {
+    let known: Vec<_> = views.iter().filter_map(|v| Some((v, v.reference()?))).collect();
+    let off = known.iter().filter(|(_, r)| r.contradicts());
+    let (view, worst) =
+        off.clone().max_by(|(_, a), (_, b)| a.off_m().abs().total_cmp(&b.off_m().abs()))?;
+    Some(format!(
+        "in {} of {} views with a reference distance the target is not where it says, by more than {}; most in \
+         view {}: {:.3} m on the optical axis for {:.3} m ({:+.1} mm). Check reference_distance_m, the region, and \
+         how words become metres",
+        off.count(),
+        known.len(),
+        ReferenceDistance::describe_tolerance(),
+        view.name,
+        worst.measured_m,
+        worst.reference_m,
+        1e3 * worst.off_m(),
+    ))
 }

@@ -111,7 +111,7 @@ impl Camera {
     /// Normalised image coordinates (x, y), so that the pixel's ray is (x, y, 1): dimensionless.
     ///
     /// With a lens model the ray is found by fixed-point iteration (as OpenCV's undistortPoints);
-    /// NaN where that does not settle, which [`Camera::fault`] tells beforehand.
+    /// NaN where that does not settle, which [`Camera::fault`] reports beforehand.
     pub fn ray(&self, u: f64, v: f64) -> (f64, f64) {
         let (xd, yd) = ((u - self.cx) / self.fx, (v - self.cy) / self.fy);
         match self.distortion {
@@ -149,11 +149,11 @@ impl Camera {
 
 /// 16 megapixels are ten times what any depth sensor has; more is a slip or damage, and the rays
 /// of all pixels would take gigabytes before the first image shows the contradiction.
-const MOST_PIXELS: usize = 1 << 24;
+const MAX_PIXELS: usize = 1 << 24;
 
 pub(crate) fn usable_size(width: usize, height: usize) -> bool {
     let pixels = width.saturating_mul(height);
-    (1..=MOST_PIXELS).contains(&pixels)
+    (1..=MAX_PIXELS).contains(&pixels)
 }
 
 /// Normalised coordinates of every pixel, row-major, `width * height` long.

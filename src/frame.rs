@@ -1,37 +1,37 @@
-//! A depth frame as stored, and how its words become metres.
+//! A depth frame as stored, and how its raw values become metres.
 
 use serde::{Deserialize, Serialize};
 
 use crate::units::shortest;
 
-/// One depth image: 16-bit words, row-major, still in the sensor's own code.
+/// One depth image: 16-bit raw values, row-major, still in the sensor's own code.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
     /// Columns, px.
     pub width: usize,
     /// Rows, px.
     pub height: usize,
-    /// The words, `width * height` of them; [`DepthCode`] turns them into metres.
-    pub words: Vec<u16>,
+    /// Raw values, `width * height` of them; [`DepthCode`] turns them into metres.
+    pub raw: Vec<u16>,
 }
 
-/// How a stored word becomes a depth along the optical axis.
+/// How a raw value becomes a depth along the optical axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DepthCode {
-    /// z = word / units_per_metre (5000 in the TUM layout, 1000 for OpenNI and ROS).
+    /// z = raw / units_per_metre (5000 in the TUM layout, 1000 for OpenNI and ROS).
     Metric {
-        /// Words a metre, 1/m.
+        /// Raw units a metre, 1/m.
         units_per_metre: f64,
-        /// The word for "no measurement"; 0 is one too.
+        /// The raw value for "no measurement"; 0 is one too.
         invalid: u16,
     },
-    /// z = 1 / (offset + slope * word): the 11-bit words of a Kinect v1.
+    /// z = 1 / (offset + slope * raw): the 11-bit values of a Kinect v1.
     Disparity {
-        /// Inverse depth of the word 0, 1/m.
+        /// Inverse depth of the raw value 0, 1/m.
         offset: f64,
-        /// Inverse depth a word, 1/m; negative for a Kinect v1.
+        /// Inverse depth a raw unit, 1/m; negative for a Kinect v1.
         slope: f64,
-        /// The word for "no measurement".
+        /// The raw value for "no measurement".
         invalid: u16,
     },
 }
@@ -39,11 +39,11 @@ pub enum DepthCode {
 /// The JSON face of [`DepthCode::Disparity`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RawDisparity {
-    /// Inverse depth of the word 0, 1/m.
+    /// Inverse depth of the raw value 0, 1/m.
     pub offset: f64,
-    /// Inverse depth a word, 1/m.
+    /// Inverse depth a raw unit, 1/m.
     pub slope: f64,
-    /// The word for "no measurement".
+    /// The raw value for "no measurement".
     #[serde(default = "default_invalid_disparity")]
     pub invalid: u16,
 }
@@ -52,32 +52,32 @@ fn default_invalid_disparity() -> u16 {
     KINECT_NO_MEASUREMENT
 }
 
-/// The word a Kinect v1 writes where it saw no pattern (11 bits, all ones).
+/// The raw value a Kinect v1 writes where it saw no pattern (11 bits, all ones).
 pub const KINECT_NO_MEASUREMENT: u16 = 2047;
 
 impl DepthCode {
-    /// Depth in metres, or `None` for the word that means "no measurement" and for words whose
+    /// Depth in metres, or `None` for the raw value that means "no measurement" and for those whose
     /// depth is not a positive finite number.
-    pub fn metres(&self, word: u16) -> Option<f64> {
+    pub fn metres(&self, raw: u16) -> Option<f64> {
         let z = match *self {
             DepthCode::Metric { units_per_metre, invalid } => {
-                if word == invalid || word == 0 {
+                if raw == invalid || raw == 0 {
                     return None;
                 }
-                f64::from(word) / units_per_metre
+                f64::from(raw) / units_per_metre
             }
             DepthCode::Disparity { offset, slope, invalid } => {
-                if word == invalid {
+                if raw == invalid {
                     return None;
                 }
-                1.0 / (offset + slope * f64::from(word))
+                1.0 / (offset + slope * f64::from(raw))
             }
         };
         (z.is_finite() && z > 0.0 && z < FARTHEST_M).then_some(z)
     }
 
-    /// The word nearest to depth `z` (m), or the word for "no measurement" when none fits.
-    pub fn word(&self, z: f64) -> u16 {
+    /// The raw value nearest to depth `z` (m), or the one for "no measurement" when none fits.
+    pub fn raw(&self, z: f64) -> u16 {
         let (exact, invalid, top) = match *self {
             DepthCode::Metric { units_per_metre, invalid } => {
                 (z * units_per_metre, invalid, 65535.0)
@@ -98,10 +98,10 @@ impl DepthCode {
         }
     }
 
-    /// Depth in metres of each of the 65,536 words; NaN where there is no measurement.
+    /// Depth in metres of each of the 65,536 raw values; NaN where there is no measurement.
     pub fn table(&self) -> DepthTable {
         let metres =
-            (0..=u16::MAX).map(|word| self.metres(word).map_or(f32::NAN, |z| z as f32)).collect();
+            (0..=u16::MAX).map(|raw| self.metres(raw).map_or(f32::NAN, |z| z as f32)).collect();
         DepthTable { metres }
     }
 
@@ -126,11 +126,11 @@ impl DepthCode {
     }
 }
 
-/// Farther than any sensor of this kind can see: 1/(c0 + c1 raw) has a pole, and words just
+/// Farther than any sensor of this kind can see: 1/(c0 + c1 raw) has a pole, and values just
 /// before it would otherwise count as walls a kilometre away.
 pub(crate) const FARTHEST_M: f64 = 100.0;
 
-/// Look-up from word to depth.
+/// Look-up from raw value to depth.
 #[derive(Debug, Clone)]
 pub struct DepthTable {
     metres: Vec<f32>,
@@ -139,8 +139,8 @@ pub struct DepthTable {
 impl DepthTable {
     /// Depth along the optical axis, m; NaN where there is no measurement.
     #[inline]
-    pub fn metres(&self, word: u16) -> f32 {
-        self.metres[usize::from(word)]
+    pub fn metres(&self, raw: u16) -> f32 {
+        self.metres[usize::from(raw)]
     }
 }
 
@@ -152,12 +152,12 @@ mod tests {
         DepthCode::Disparity { offset: 3.3309495161, slope: -0.0030711016, invalid: 2047 };
 
     #[test]
-    fn words_survive_a_round_trip_in_both_codes() {
+    fn raw_values_survive_a_round_trip_in_both_codes() {
         let tum = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
         for code in [KINECT, tum] {
-            for word in 1..1080u16 {
-                if let Some(z) = code.metres(word) {
-                    assert_eq!(code.word(z), word, "{code:?}");
+            for raw in 1..1080u16 {
+                if let Some(z) = code.metres(raw) {
+                    assert_eq!(code.raw(z), raw, "{code:?}");
                 }
             }
         }
@@ -173,9 +173,9 @@ mod tests {
 
     #[test]
     fn no_depth_becomes_no_measurement() {
-        assert_eq!(KINECT.word(f64::NAN), 2047);
-        assert_eq!(KINECT.word(-1.0), 2047);
+        assert_eq!(KINECT.raw(f64::NAN), 2047);
+        assert_eq!(KINECT.raw(-1.0), 2047);
         let tum = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
-        assert_eq!(tum.word(20.0), 0, "does not fit 16 bits");
+        assert_eq!(tum.raw(20.0), 0, "does not fit 16 bits");
     }
 }

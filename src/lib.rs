@@ -19,33 +19,61 @@
 //! Emaru, Kobayashi, Ravankar, "3D map-building from RGB-D data considering noise
 //! characteristics of Kinect" (SII 2016).
 
-pub mod calibrate;
-pub mod camera;
-pub mod capture;
-pub mod compare;
-pub mod correct;
-pub mod diagnose;
-pub mod effects;
+// In layers: a module imports only from those above it (tests/structure.py checks it). The blank
+// lines keep rustfmt from sorting them into one list.
 pub mod error;
-pub mod evaluate;
-pub mod frame;
-pub mod io;
-pub mod map;
-pub mod measure;
-pub mod model;
-pub mod plane;
-pub mod report;
-pub mod residual;
+
 pub mod rng;
-pub mod scene;
-pub mod sequence;
-pub mod simulate;
+pub mod units;
+
 pub mod solve;
 pub mod stats;
-pub mod terms;
-pub mod trajectory;
-pub mod units;
+
+pub mod camera;
+pub mod frame;
+
 pub mod view;
+
+pub mod io;
+
+pub mod trajectory;
+
+pub mod evaluate;
+
+pub mod sequence;
+
+pub mod plane;
+
+pub mod residual;
+
+pub mod terms;
+
+pub mod scene;
+
+pub mod measure;
+
+pub mod model;
+
+pub mod calibrate;
+
+pub mod effects;
+
+pub mod diagnose;
+
+pub mod correct;
+
+pub mod simulate;
+
+pub mod map;
+
+pub mod compare;
+
+pub mod capture;
+
+pub mod report;
+
+/// Called as the work goes on: steps done, steps in all.
+pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
 
 pub use calibrate::{
     CalibrateOptions, Calibration, Measurements, measure as measure_recording, model_of,

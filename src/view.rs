@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// The unit that was recorded: everything `recording.json` says about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensor {
-    /// Make and model, in words.
+    /// Make and model.
     pub name: String,
     /// Which unit it is.
     pub serial: Option<String>,
@@ -20,7 +20,7 @@ pub struct Sensor {
     pub camera: Camera,
     /// Distance between projector and camera, m.
     pub baseline_m: Option<f64>,
-    /// How a stored word becomes a depth.
+    /// How a raw value becomes a depth.
     pub code: DepthCode,
 }
 
@@ -130,7 +130,7 @@ pub struct Recording {
     pub views: Vec<View>,
     /// Views that could not be opened.
     pub excluded: Vec<Excluded>,
-    /// What was found odd while opening, in words.
+    /// What was found odd while opening.
     pub remarks: Vec<String>,
     /// Files that describe the recording (not the frames), for provenance.
     pub described_by: Vec<PathBuf>,
@@ -160,12 +160,12 @@ impl std::fmt::Display for Excluded {
     }
 }
 
-/// `recording.json`, as the contract lays it down.
+/// `recording.json` (`crate::docs::layouts`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordingFile {
     /// [`RECORDING_FORMAT`].
     pub format: String,
-    /// Make and model, in words.
+    /// Make and model.
     pub sensor: String,
     /// Which unit it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -179,13 +179,13 @@ pub struct RecordingFile {
     /// Distance between projector and camera, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub baseline_m: Option<f64>,
-    /// Words a metre, 1/m; this or `raw_disparity`.
+    /// Raw units a metre, 1/m; this or `raw_disparity`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units_per_metre: Option<f64>,
-    /// The word for "no measurement" beside `units_per_metre`; 0 by default.
+    /// The raw value for "no measurement" beside `units_per_metre`; 0 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub invalid: Option<u16>,
-    /// z = 1/(offset + slope word).
+    /// z = 1/(offset + slope raw).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub raw_disparity: Option<RawDisparity>,
 }

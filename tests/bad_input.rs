@@ -509,7 +509,7 @@ fn nothing_but_spoiled_frames() {
 #[test]
 fn a_frame_or_a_view_without_any_depth() {
     let bench = Bench::good();
-    let nothing = Frame { width: 160, height: 120, words: vec![0; 160 * 120] };
+    let nothing = Frame { width: 160, height: 120, raw: vec![0; 160 * 120] };
     write_depth(&bench.file("0002/depth/0001.png"), &nothing);
     write_depth(&bench.file("0005/depth/0000.png"), &nothing);
     write_depth(&bench.file("0005/depth/0001.png"), &nothing);
@@ -531,8 +531,8 @@ fn a_view_without_a_plane() {
         2000 + (state >> 16) as u16 % 18_000
     };
     let words = (0..160 * 120).map(|_| noise()).collect();
-    let random = Frame { width: 160, height: 120, words };
-    let sphere = Frame { width: 160, height: 120, words: sphere() };
+    let random = Frame { width: 160, height: 120, raw: words };
+    let sphere = Frame { width: 160, height: 120, raw: sphere() };
     for (view, frame) in [("0004", &random), ("0007", &sphere)] {
         for name in ["0000", "0001"] {
             write_depth(&bench.file(&format!("{view}/depth/{name}.png")), frame);
@@ -709,7 +709,7 @@ fn too_few_or_too_uniform_views() {
 #[test]
 fn exclusions_are_told_when_the_fit_fails_too() {
     let bench = Bench::of(&[1.0, 1.5, 2.0, 2.5], &[0.0]);
-    let nothing = Frame { width: 160, height: 120, words: vec![0; 160 * 120] };
+    let nothing = Frame { width: 160, height: 120, raw: vec![0; 160 * 120] };
     for view in 0..3 {
         for frame in 0..2 {
             write_depth(&bench.file(&format!("{view:04}/depth/{frame:04}.png")), &nothing);

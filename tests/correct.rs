@@ -12,7 +12,7 @@ use kinoise::io::{Assumed, FrameSource, open_uncut};
 use kinoise::model::{Domain, Effect, FitSummary, Provenance, UNEXPLAINED};
 use kinoise::scene::{Bench, Seen, Target};
 use kinoise::simulate::{FormulaSensor, Physics, Scenery, Shoot, kinect_v1, plan_grid};
-use kinoise::terms::{Basis, Over, Statistic, Term, Times};
+use kinoise::terms::{Basis, Coordinate, Modulation, Statistic, Term};
 use kinoise::view::RecordingFile;
 use kinoise::{DepthCode, Form, Frame, NoiseModel, Plane, Seed, Sensor, SigmaModel};
 use serde_json::{Value, json};
@@ -86,7 +86,7 @@ const SILENT_M: f64 = 1e-9;
 
 fn depths(frame: &Frame) -> Vec<f32> {
     let table = sensor().code.table();
-    frame.words.iter().map(|&w| table.metres(w)).collect()
+    frame.raw.iter().map(|&w| table.metres(w)).collect()
 }
 
 /// Disparity minus the plane's, px, of every pixel.
@@ -121,7 +121,13 @@ fn a_shape_is_its_closed_form_at_chosen_pixels() {
         bias(Basis::Banding { period_px: 40.0, harmonics: 1 }, &[1.0, -0.5]),
         bias(Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 1 }, &[-0.05]),
         bias(
-            Basis::Curve { over: Over::LogZ, low: 0.0, high: 1.0, nodes: 3, times: Times::Tilt },
+            Basis::Curve {
+                over: Coordinate::LogZ,
+                low: 0.0,
+                high: 1.0,
+                nodes: 3,
+                times: Modulation::Tilt,
+            },
             &[0.1, 0.5, 0.3],
         ),
     ];
@@ -175,10 +181,11 @@ fn a_boards_shape_stays_on_the_board() {
 #[test]
 fn a_shape_over_the_session_moves_with_it_and_the_rest_stands() {
     let plane = Plane::tilted(1.0, 0.0, 0.0);
-    let curve = |over, high| Basis::Curve { over, low: 0.0, high, nodes: 2, times: Times::One };
+    let curve =
+        |over, high| Basis::Curve { over, low: 0.0, high, nodes: 2, times: Modulation::One };
     let shape = vec![
-        bias(curve(Over::Session, 100.0), &[0.0, 1.0]),
-        bias(curve(Over::Column, 319.0), &[0.0, 0.5]),
+        bias(curve(Coordinate::Session, 100.0), &[0.0, 1.0]),
+        bias(curve(Coordinate::Column, 319.0), &[0.0, 0.5]),
     ];
     let sessions = [0.0, 25.0, 100.0, 400.0];
     let frames = shots(plane, &[shaped("thermal-drift", shape)], SILENT_M, &sessions);
@@ -211,7 +218,7 @@ fn a_bowl_by_shape_is_the_bowl_by_formula() {
     let by_shape = shots(plane, &[shaped("radial-disparity-bias", vec![bowl])], 0.002, &[0.0]);
     let by_formula =
         shots(plane, &[named("radial-disparity-bias", json!({"k_px": 0.7}))], 0.002, &[0.0]);
-    let apart = by_shape[0].words.iter().zip(&by_formula[0].words).map(|(a, b)| a.abs_diff(*b));
+    let apart = by_shape[0].raw.iter().zip(&by_formula[0].raw).map(|(a, b)| a.abs_diff(*b));
     assert!(apart.max().unwrap_or(0) <= 1);
 }
 
@@ -257,21 +264,23 @@ fn what_a_shape_does_its_correction_undoes() {
     let (camera, plane) = (sensor().camera, Plane::tilted(1.0, 0.8, -0.7));
     let curve =
         |over, [low, high]: [f64; 2], times| Basis::Curve { over, low, high, nodes: 3, times };
-    let map = Basis::Map { width: 320.0, height: 240.0, across: 3, down: 2, times: Times::One };
+    let map =
+        Basis::Map { width: 320.0, height: 240.0, across: 3, down: 2, times: Modulation::One };
     let pair = Basis::Pair {
-        over: [Over::Radius, Over::Disparity],
+        over: [Coordinate::Radius, Coordinate::Disparity],
         low: [0.0, 10.0],
         high: [1.0, 30.0],
         nodes: [2, 2],
     };
-    let ring = Basis::Ring { over: Over::Azimuth, period: 6.3, nodes: 4, times: Times::Tilt };
+    let ring =
+        Basis::Ring { over: Coordinate::Azimuth, period: 6.3, nodes: 4, times: Modulation::Tilt };
     let kinds = [
         bias(Basis::Bowl { disparity_power: 1.0, orders: 2 }, &[2.0, -0.6]),
         bias(Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 2 }, &[-0.1, 0.05]),
         bias(Basis::RangeNotDepth, &[1.0]),
-        bias(curve(Over::Z, [0.5, 4.0], Times::DisparitySquared), &[1.0, 2.0, -1.0]),
-        bias(curve(Over::Theta, [0.0, 1.5], Times::One), &[0.0, 0.6, 0.9]),
-        bias(curve(Over::Session, [0.0, 100.0], Times::Lift), &[0.0, 0.01, 0.02]),
+        bias(curve(Coordinate::Z, [0.5, 4.0], Modulation::DisparitySquared), &[1.0, 2.0, -1.0]),
+        bias(curve(Coordinate::Theta, [0.0, 1.5], Modulation::One), &[0.0, 0.6, 0.9]),
+        bias(curve(Coordinate::Session, [0.0, 100.0], Modulation::Lift), &[0.0, 0.01, 0.02]),
         bias(map, &[0.1, -0.4, 0.6, 0.3, 0.2, -0.5]),
         bias(pair, &[0.5, -0.3, 0.8, 0.4]),
         bias(ring, &[0.4, -0.4, 0.8, 0.2]),
@@ -298,7 +307,7 @@ fn what_a_shape_does_its_correction_undoes() {
 #[test]
 fn what_is_not_the_sensors_bias_stays_in_and_is_told() {
     let across = Basis::Pair {
-        over: [Over::Column, Over::Right],
+        over: [Coordinate::Column, Coordinate::Right],
         low: [0.0, -1.0],
         high: [319.0, 1.0],
         nodes: [2, 2],
@@ -322,11 +331,11 @@ fn what_is_not_the_sensors_bias_stays_in_and_is_told() {
 #[test]
 fn an_unknown_temperature_changes_nothing() {
     let curve = Basis::Curve {
-        over: Over::Temperature,
+        over: Coordinate::Temperature,
         low: 20.0,
         high: 40.0,
         nodes: 2,
-        times: Times::One,
+        times: Modulation::One,
     };
     let effects = vec![shaped(UNEXPLAINED, vec![bias(curve, &[0.5, 1.0])])];
     let correction = Correction::of(&model(&sensor(), effects), &sensor()).expect("a correction");
@@ -508,7 +517,7 @@ fn raw_disparities_become_fine_metric_words_unless_kept() {
     for (a, b) in old.views.iter().zip(&new.views) {
         let a = source.read(&a.depth[0].path).expect("read");
         let b = source.read(&b.depth[0].path).expect("read");
-        for (&raw, &word) in a.words.iter().zip(&b.words) {
+        for (&raw, &word) in a.raw.iter().zip(&b.raw) {
             let (z, better) = (old_table.metres(raw), new_table.metres(word));
             assert_eq!(z.is_nan(), better.is_nan(), "valid stays valid, and invalid invalid");
             let expected = fb / (fb / f64::from(z) - 0.2);
@@ -569,7 +578,7 @@ fn a_film_keeps_its_colour_and_every_frame() {
         let a = source.read(&plain.join(name)).expect("read");
         let b = source.read(&files.at("out").join(name)).expect("read");
         // A word of 0.2 mm each way, and as much again from the rounding of the shifted depth.
-        off += a.words.iter().zip(&b.words).filter(|(a, b)| a.abs_diff(**b) > 3).count();
+        off += a.raw.iter().zip(&b.raw).filter(|(a, b)| a.abs_diff(**b) > 3).count();
     }
     assert!(off < 200, "{off} pixels are elsewhere");
 }

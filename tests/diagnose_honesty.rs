@@ -54,7 +54,7 @@ fn shuffle(disk: &OnDisk) {
         let stage = &set.plans[view].stage;
         let plane = Plane::from_normal(stage.board.normal, stage.board.reach);
         let (mut pixels, mut errors) = (Vec::new(), Vec::new());
-        for (i, &word) in frame.words.iter().enumerate() {
+        for (i, &word) in frame.raw.iter().enumerate() {
             let (x, y) = camera.ray((i % camera.width) as f64, (i / camera.width) as f64);
             let z = plane.depth(x, y);
             let place = stage.board.place(&nalgebra::Vector3::new(x * z, y * z, z));
@@ -68,10 +68,10 @@ fn shuffle(disk: &OnDisk) {
         // A frame's own mean, which correlated noise moves, would stay through any shuffle.
         let mean = errors.iter().sum::<f64>() / errors.len().max(1) as f64;
         errors.iter_mut().for_each(|e| *e -= mean);
-        let sum = frame.words.iter().map(|&w| u64::from(w)).sum::<u64>();
+        let sum = frame.raw.iter().map(|&w| u64::from(w)).sum::<u64>();
         errors.shuffle(&mut Seed(sum).stream("shuffle"));
         for ((i, z), error) in pixels.into_iter().zip(errors) {
-            frame.words[i] = (WORDS * fb / (fb / z + error)).round() as u16;
+            frame.raw[i] = (WORDS * fb / (fb / z + error)).round() as u16;
         }
     });
 }
@@ -86,7 +86,7 @@ fn a_mirrored_picture_has_the_same_name() {
         let before = disk.diagnosis();
         repaint(&disk.recording, |_, frame| {
             let width = frame.width;
-            frame.words.chunks_exact_mut(width).for_each(<[u16]>::reverse);
+            frame.raw.chunks_exact_mut(width).for_each(<[u16]>::reverse);
         });
         let width = disk.set.unit.sensor.camera.width as f64;
         let mirror = |text: &str| {
@@ -141,7 +141,7 @@ fn another_unit_of_depth_has_the_same_findings() {
         repaint(&disk.recording, |_, frame| {
             // Farther than 6.55 m has no word any more; no target is there.
             let double = |w: u16| w.checked_mul(2).unwrap_or(0);
-            frame.words.iter_mut().for_each(|w| *w = double(*w));
+            frame.raw.iter_mut().for_each(|w| *w = double(*w));
         });
         let double = |text: &str| text.replace("5000.0", "10000.0").replace("5000,", "10000,");
         edit(&disk.recording.join("recording.json"), double);

@@ -181,7 +181,7 @@ fn views_without_depth_are_left_out_and_said_so() {
     let disk = clean(52, 8, 3);
     repaint(&disk.recording, |view, frame| {
         if view == 2 || view == 5 {
-            frame.words.fill(0);
+            frame.raw.fill(0);
         }
     });
     let said = run(&disk).said();
@@ -193,7 +193,7 @@ fn views_without_depth_are_left_out_and_said_so() {
         let name = path.file_name().expect("a name").to_string_lossy().into_owned();
         assert!(remarks.contains(&name), "{name} is not in {remarks}");
     }
-    repaint(&disk.recording, |_, frame| frame.words.fill(0));
+    repaint(&disk.recording, |_, frame| frame.raw.fill(0));
     run(&disk).fails(&["0 of 8 views", "at least three views"]);
 }
 

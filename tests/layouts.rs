@@ -112,7 +112,7 @@ fn write_fakenect(root: &Path, frames: &[Frame]) {
         let stamp = 1_316_653_530.0 + k as f64 / 30.0;
         let name = format!("d-{stamp:.6}-{}.pgm", 4_127_230_476u64 + k as u64);
         let mut bytes = format!("P5 {} {} 65535\n", frame.width, frame.height).into_bytes();
-        bytes.extend(frame.words.iter().flat_map(|w| w.to_le_bytes()));
+        bytes.extend(frame.raw.iter().flat_map(|w| w.to_le_bytes()));
         fs::write(root.join(&name), bytes).expect("written");
         let _ = write!(index, "{name}\nr-{stamp:.6}-{k}.ppm\na-{stamp:.6}-{k}.dump\n");
     }
@@ -190,8 +190,8 @@ fn mean_depth(pose: &GridView) -> f64 {
     let rays = sensor.camera.rays();
     let plane = pose.plane();
     let seen = frame(TUM, &plane, 0, 0);
-    let depths: Vec<f64> = (0..seen.words.len())
-        .filter(|&i| seen.words[i] > 0)
+    let depths: Vec<f64> = (0..seen.raw.len())
+        .filter(|&i| seen.raw[i] > 0)
         .map(|i| {
             let (x, y) = rays.at(i);
             plane.depth(x, y)
@@ -241,7 +241,7 @@ fn a_tum_folder_without_intrinsics_says_what_it_assumes() {
 /// A sensor that starts up writes empty frames; they must not count as "still" with all others.
 #[test]
 fn empty_frames_neither_join_nor_part_a_still_stretch() {
-    let empty = Frame { width: 320, height: 240, words: vec![0; 320 * 240] };
+    let empty = Frame { width: 320, height: 240, raw: vec![0; 320 * 240] };
     let mut frames = film(TUM);
     frames.insert(STILL / 2, empty.clone());
     frames.insert(0, empty);
@@ -283,7 +283,7 @@ fn damaged_frames_of_a_film_are_counted() {
 fn a_target_that_jumps_aside_has_moved() {
     let half = |right: bool| {
         let mut frame = frame(TUM, &Plane::tilted(1.0, 0.0, 0.0), 0, usize::from(right));
-        for (i, word) in frame.words.iter_mut().enumerate() {
+        for (i, word) in frame.raw.iter_mut().enumerate() {
             if (i % 320 >= 160) != right {
                 *word = 0;
             }
@@ -348,7 +348,7 @@ fn points(recording: &Recording, view: usize) -> (Vec<Vector3<f64>>, Vec<(f64, f
     let frame = source.read(&view.depth[0].path).expect("read");
     let region = view.notes.region.clone().unwrap_or(Region::Rectangle([0.0, 0.0, 1e9, 1e9]));
     let (mut points, mut rays) = (Vec::new(), Vec::new());
-    for (i, &word) in frame.words.iter().enumerate() {
+    for (i, &word) in frame.raw.iter().enumerate() {
         let (u, v) = ((i % camera.width) as f64, (i / camera.width) as f64);
         if let Some(z) = sensor.code.metres(word).filter(|_| region.contains(u, v)) {
             let (x, y) = ((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy);

@@ -162,7 +162,7 @@ fn damaged_colour_costs_no_pose() {
 fn empty_depth_is_no_map() {
     let dir = tempfile::tempdir().unwrap();
     let folder = film(dir.path(), some(4));
-    let empty = kinoise::Frame { width: 160, height: 120, words: vec![0; 160 * 120] };
+    let empty = kinoise::Frame { width: 160, height: 120, raw: vec![0; 160 * 120] };
     let bytes = kinoise::io::encode_png16(&empty).unwrap();
     for entry in fs::read_dir(folder.join("depth")).unwrap() {
         fs::write(entry.unwrap().path(), &bytes).unwrap();
@@ -255,13 +255,13 @@ fn words_for_nothing_make_no_poses() {
         fs::read_dir(folder.join("depth")).unwrap().map(|e| e.unwrap().path()).collect();
     depths.sort();
     for (k, (path, moment)) in depths.iter().zip(&metric.moments).enumerate() {
-        let metric = metric.words(moment).unwrap();
+        let metric = metric.raw_depth(moment).unwrap();
         let word = |&w: &u16| match w {
             0 => 2047,
             w => ((3.3309 - 5000.0 / f64::from(w)) / 0.003_071_1).round() as u16,
         };
-        let words = metric.words.iter().map(|w| if k == 3 { 2047 } else { word(w) }).collect();
-        let frame = kinoise::Frame { words, ..metric };
+        let words = metric.raw.iter().map(|w| if k == 3 { 2047 } else { word(w) }).collect();
+        let frame = kinoise::Frame { raw: words, ..metric };
         fs::write(path, kinoise::io::encode_png16(&frame).unwrap()).unwrap();
     }
     let (code, said, out) = map_folder(&folder, &[]);
@@ -275,7 +275,7 @@ fn words_for_nothing_make_no_poses() {
 fn a_bare_wall_is_told() {
     let dir = tempfile::tempdir().unwrap();
     let folder = film(dir.path(), some(6));
-    let wall = kinoise::Frame { width: 160, height: 120, words: vec![10_000; 160 * 120] };
+    let wall = kinoise::Frame { width: 160, height: 120, raw: vec![10_000; 160 * 120] };
     let bytes = kinoise::io::encode_png16(&wall).unwrap();
     for entry in fs::read_dir(folder.join("depth")).unwrap() {
         fs::write(entry.unwrap().path(), &bytes).unwrap();

@@ -72,10 +72,10 @@ fn record(root: &Path, plane: &Plane, noise: &Noise, frames: usize, seed: u64) {
                 if rng.random::<f64>() < noise.gross {
                     z += rng.random_range(-0.3..0.3);
                 }
-                sensor.code.word(z)
+                sensor.code.raw(z)
             })
             .collect();
-        let image = Frame { width: sensor.camera.width, height: sensor.camera.height, words };
+        let image = Frame { width: sensor.camera.width, height: sensor.camera.height, raw: words };
         std::fs::write(root.join(format!("0000/depth/{frame}.png")), encode_png16(&image).unwrap())
             .unwrap();
         list.push_str(&format!("{}.0 depth/{frame}.png\n", frame));

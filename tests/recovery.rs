@@ -27,6 +27,7 @@ fn calibrated(seed: u64) -> (Measurements, Calibration) {
         measure: MeasureOptions { seed: Seed(seed), ..MeasureOptions::default() },
         kind: SigmaKind::Spatial,
         form: Some(Form::Paper),
+        ..CalibrateOptions::default()
     };
     let views =
         kinoise::measure_recording(&recording, &options.measure, &|_, _| ()).expect("measured");

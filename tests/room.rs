@@ -333,7 +333,7 @@ fn depth_scatters_by_the_models_sigma() {
     let rays = film.sensor.camera.rays();
     let (picture, depth) = Shutter::new(&film, &film.sensor, &rays).shoot(100);
     let mut scores: Vec<f64> = Vec::new();
-    for (i, &word) in depth.words.iter().enumerate() {
+    for (i, &word) in depth.raw.iter().enumerate() {
         let z = f64::from(picture.seen.depth[i]);
         let sigma = film.sigma.sigma(z, picture.seen.theta(i));
         // Sigma a fiftieth of the depth: the way through disparity stays straight.
@@ -395,7 +395,7 @@ fn the_folder_is_a_tum_sequence_that_the_reader_opens() {
         assert_eq!((colour.width(), colour.height()), (160, 120));
         assert_eq!(colour.color(), image::ColorType::Rgb8);
         let frame = FrameSource::new(160, 120).read(&root.join(&depth[k][1])).unwrap();
-        assert!(frame.words.iter().all(|&w| w < 60_000), "5000 units a metre: below 12 m");
+        assert!(frame.raw.iter().all(|&w| w < 60_000), "5000 units a metre: below 12 m");
     }
     let recording = open(&root, &Assumed::default()).unwrap();
     assert_eq!(recording.sensor.camera, Film::kinect(4).camera);

@@ -2,7 +2,7 @@
 
 /// The map contracts by the size of the distortion: a tenth a round for a Kinect, which settles in
 /// ten; at four fifths a round, where a lens model is about to fold, it takes this many.
-const MOST_ROUNDS: usize = 100;
+const MAX_ROUNDS: usize = 100;
 /// Last change of the normalised coordinates: 1e-7 px at 1000 px of focal length, and below what
 /// single-precision rays resolve.
 const SETTLED: f64 = 1e-10;
@@ -10,7 +10,7 @@ const SETTLED: f64 = 1e-10;
 /// The ray (x, y, 1) that the lens bends to (xd, yd, 1).
 pub(super) fn undistorted(k: &[f64; 5], xd: f64, yd: f64) -> Option<(f64, f64)> {
     let (mut x, mut y) = (xd, yd);
-    for _ in 0..MOST_ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let (dx, dy, radial) = lens(k, x, y);
         let (next_x, next_y) = ((xd - dx) / radial, (yd - dy) / radial);
         let change = (next_x - x).abs().max((next_y - y).abs());

@@ -170,7 +170,7 @@ fn from_frames_to_events() {
         assert!((pose.theta_rad.to_degrees() - tilt).abs() < 0.5, "{pose:?}");
         assert_eq!(story(&mut g, sights), "- bk k kf -");
     }
-    let blank = crate::Frame { width: 320, height: 240, words: vec![0; 320 * 240] };
+    let blank = crate::Frame { width: 320, height: 240, raw: vec![0; 320 * 240] };
     assert!(watcher.look(&blank).is_err());
 }
 

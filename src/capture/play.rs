@@ -60,7 +60,7 @@ impl Playback {
         let why = match InfraredImage::read(path) {
             Ok(image) if (image.width, image.height) == size => {
                 let InfraredImage { width, height, amplitude } = image;
-                return Some(Frame { width, height, words: amplitude });
+                return Some(Frame { width, height, raw: amplitude });
             }
             Ok(image) => format!("{}: {} x {} px", path.display(), image.width, image.height),
             Err(e) => e.to_string(),

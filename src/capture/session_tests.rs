@@ -2,7 +2,7 @@ use super::*;
 use crate::simulate::kinect_v1;
 
 fn frame(stamp: f64, word: u16) -> LiveFrame {
-    let picture = |word| Frame { width: 160, height: 120, words: vec![word; 160 * 120] };
+    let picture = |word| Frame { width: 160, height: 120, raw: vec![word; 160 * 120] };
     LiveFrame { stamp, depth: picture(word), infrared: Some(picture(word / 10)) }
 }
 
@@ -17,7 +17,7 @@ fn take(session: &mut Session, view: &str, word: u16) {
 fn first_word(root: &Path, view: usize) -> u16 {
     let recording = crate::io::open(root, &crate::io::Assumed::default()).unwrap();
     let path = &recording.views[view].depth[0].path;
-    crate::io::read_depth(path, 160, 120).unwrap().words[0]
+    crate::io::read_depth(path, 160, 120).unwrap().raw[0]
 }
 
 #[test]

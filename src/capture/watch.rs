@@ -111,7 +111,7 @@ impl Watcher {
 
     fn take_in(&mut self, frame: &Frame) {
         self.inverse.clear();
-        for row in frame.words.chunks(self.columns).step_by(self.every) {
+        for row in frame.raw.chunks(self.columns).step_by(self.every) {
             let words = row.iter().step_by(self.every);
             self.inverse.extend(words.map(|&word| 1.0 / self.table.metres(word)));
         }

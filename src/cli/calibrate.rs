@@ -9,7 +9,7 @@ use kinoise::stats;
 use kinoise::units::shortest;
 use kinoise::{CalibrateOptions, Calibration, Form, Recording, SigmaKind};
 
-use super::common::{Bar, Global, Input, say};
+use super::common::{Bar, Global, Input, say, source_date};
 use super::words;
 
 #[derive(Debug, Args)]
@@ -96,6 +96,7 @@ impl Arguments {
                 Sigma::Paper => SigmaKind::Paper,
             },
             form: self.fitting.form()?,
+            created: source_date(),
         })
     }
 }

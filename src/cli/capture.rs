@@ -71,12 +71,12 @@ impl FromStr for SourceArgument {
 }
 
 /// An hour at 30 Hz.
-const MOST_FRAMES: usize = 108_000;
+const MAX_FRAMES: usize = 108_000;
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     for (name, n) in [("--frames", arguments.frames), ("--hold", arguments.hold)] {
-        if !(1..=MOST_FRAMES).contains(&n) {
-            bail!("{name} {n}: give a number from 1 to {MOST_FRAMES}");
+        if !(1..=MAX_FRAMES).contains(&n) {
+            bail!("{name} {n}: give a number from 1 to {MAX_FRAMES}");
         }
     }
     let mut wanted = arguments.views.wanted()?;
@@ -116,14 +116,14 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
 }
 
 /// Told one by one, up to so many.
-const MOST_NOTES: usize = 12;
+const MAX_NOTES: usize = 12;
 
 fn note(remarks: &[String]) {
-    for remark in remarks.iter().take(MOST_NOTES) {
+    for remark in remarks.iter().take(MAX_NOTES) {
         say(format!("note: {remark}"));
     }
-    if remarks.len() > MOST_NOTES {
-        say(format!("note: and {} more like these", remarks.len() - MOST_NOTES));
+    if remarks.len() > MAX_NOTES {
+        say(format!("note: and {} more like these", remarks.len() - MAX_NOTES));
     }
 }
 

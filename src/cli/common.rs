@@ -1,6 +1,7 @@
 //! Options and habits all commands share.
 
 use std::io::{IsTerminal, Write};
+use std::time::{Duration, SystemTime};
 
 use anyhow::{Context, bail};
 use clap::Args;
@@ -23,7 +24,7 @@ pub struct Global {
 }
 
 /// More than any machine this runs on has; each costs memory before it helps.
-const MOST_THREADS: usize = 1024;
+const MAX_THREADS: usize = 1024;
 
 impl Global {
     pub fn seed(&self) -> Seed {
@@ -41,8 +42,8 @@ impl Global {
         if n == 0 {
             bail!("--threads 0: give at least one thread");
         }
-        if n > MOST_THREADS {
-            bail!("--threads {n}: give at most {MOST_THREADS}");
+        if n > MAX_THREADS {
+            bail!("--threads {n}: give at most {MAX_THREADS}");
         }
         rayon::ThreadPoolBuilder::new().num_threads(n).build_global().context("--threads")
     }
@@ -108,6 +109,13 @@ pub fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
         .collect::<Result<_, String>>()?;
     let given = parsed.len();
     parsed.try_into().map_err(|_| format!("{given} numbers where {N} are needed, with commas"))
+}
+
+/// When results are to say that they were made: SOURCE_DATE_EPOCH, the convention of reproducible
+/// builds, in s since 1970; `None`, for now, where that is not set.
+pub fn source_date() -> Option<SystemTime> {
+    let seconds = std::env::var("SOURCE_DATE_EPOCH").ok()?.parse().ok()?;
+    SystemTime::UNIX_EPOCH.checked_add(Duration::from_secs(seconds))
 }
 
 /// A bar on a terminal, nothing elsewhere.

@@ -10,7 +10,7 @@ use kinoise::simulate::room::{Film, Room, around_the_desks};
 use kinoise::{CalibrateOptions, Form, NoiseModel, Recording, SigmaModel};
 
 use super::calibrate::calibrate;
-use super::common::{Global, say};
+use super::common::{Global, say, source_date};
 use super::diagnose::examine;
 use super::map::follow;
 use super::words;
@@ -31,6 +31,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let options = CalibrateOptions {
         measure: MeasureOptions { seed: global.seed(), ..MeasureOptions::default() },
         form: Some(Form::Paper),
+        created: source_date(),
         ..CalibrateOptions::default()
     };
     let done = calibrate(&recording, &options, &arguments.output, &[Overlay::PaperEq1])?;

@@ -9,7 +9,7 @@ use kinoise::report::{DiagnosisPage, diagnosis_page};
 use kinoise::terms::Statistic;
 use kinoise::{CalibrateOptions, NoiseModel, Recording};
 
-use super::common::{Bar, Global, Input, say};
+use super::common::{Bar, Global, Input, say, source_date};
 use super::diagnose_pictures;
 
 #[derive(Debug, Args)]
@@ -41,7 +41,7 @@ impl Arguments {
     }
 }
 
-/// A mismatch was found (contract, section 3).
+/// Exit code where a mismatch was found.
 const FOUND: u8 = 1;
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
@@ -94,7 +94,11 @@ pub fn examine(
 }
 
 fn calibrated(recording: &Recording, global: &Global) -> anyhow::Result<NoiseModel> {
-    let mut options = CalibrateOptions { form: Some(kinoise::Form::Paper), ..Default::default() };
+    let mut options = CalibrateOptions {
+        form: Some(kinoise::Form::Paper),
+        created: source_date(),
+        ..Default::default()
+    };
     options.measure.seed = global.seed();
     let bar = Bar::new("views");
     let views =
@@ -140,7 +144,7 @@ fn words(diagnosis: &Diagnosis) -> String {
             .iter()
             .filter_map(|(k, v)| Some(format!("{k} {:.4}", v.get("value")?.as_f64()?)))
             .collect();
-        let size = if f.statistic == Statistic::Missing {
+        let size = if f.statistic == Statistic::Dropout {
             format!("{:.1} % of the pixels lost", 100.0 * f.size.sigma)
         } else {
             format!("{:.2} mm, {:.2} sigma", f.size.mm, f.size.sigma)

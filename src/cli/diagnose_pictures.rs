@@ -9,7 +9,7 @@ use kinoise::view::ViewNotes;
 use kinoise::{Frame, NoiseModel, Seed, Sensor};
 
 /// More frames of a twin than this add nothing that an eye sees.
-const MOST_FRAMES: usize = 16;
+const MAX_FRAMES: usize = 16;
 
 /// `given` is the model that the recording was held against.
 pub fn of(done: &Diagnosed, sensor: &Sensor, given: &NoiseModel, seed: Seed) -> Vec<Picture> {
@@ -47,7 +47,7 @@ struct Twin<'a> {
 
 impl Twin<'_> {
     fn frames(&self, index: usize, field: &Field, session_s: f64) -> Option<Vec<(f64, Frame)>> {
-        let times = field.frames.iter().take(MOST_FRAMES).map(|f| f.0);
+        let times = field.frames.iter().take(MAX_FRAMES).map(|f| f.0);
         let stamps = times.map(|t| field.time_s + t).collect();
         let notes = ViewNotes {
             temperature_c: field.temperature_c,

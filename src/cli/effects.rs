@@ -42,7 +42,7 @@ fn page(card: &Card) -> String {
     let shows = format!("shows in {}, over {}", in_words(card.statistic), card.axis);
     let knobs =
         card.parameters.iter().enumerate().map(|(n, p)| knob(p, (n == 0).then_some(card.identity)));
-    let lines = [card.words.to_string(), shows].into_iter().chain(knobs).chain([
+    let lines = [card.summary.to_string(), shows].into_iter().chain(knobs).chain([
         format!("taken for: {}", card.confused_with),
         format!("source: {}", card.reference),
     ]);
@@ -54,7 +54,7 @@ fn knob(p: &Parameter, identity: Option<f64>) -> String {
     let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
     let off = identity.map_or(String::new(), |value| format!(", off at {value}"));
     let [low, high] = p.range;
-    format!("{} = {low} to {high}{unit}, typical {}{off}: {}", p.name, p.typical, p.words)
+    format!("{} = {low} to {high}{unit}, typical {}{off}: {}", p.name, p.typical, p.summary)
 }
 
 fn in_words(statistic: &str) -> &str {
@@ -86,11 +86,11 @@ fn wrap(text: &str, page: &mut String) {
 }
 
 fn as_json(card: &Card) -> serde_json::Value {
-    let parameter = |p: &Parameter| json!({"name": p.name, "unit": p.unit, "range": p.range, "typical": p.typical, "words": p.words});
+    let parameter = |p: &Parameter| json!({"name": p.name, "unit": p.unit, "range": p.range, "typical": p.typical, "words": p.summary});
     json!({
         "id": card.id,
-        "words": card.words,
-        "stage": format!("{:?}", card.stage),
+        "words": card.summary,
+        "stage": card.stage,
         "statistic": card.statistic,
         "axis": card.axis,
         "parameters": card.parameters.iter().map(parameter).collect::<Vec<_>>(),

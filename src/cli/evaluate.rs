@@ -67,7 +67,7 @@ fn tell(told: &Evaluation, arguments: &Arguments) {
     line(&interval, &told.rpe.rotation.scaled(1f64.to_degrees()), "degrees");
 }
 
-/// Contract, section 3.
+/// The keys of `evaluate --json`.
 pub fn as_json(told: &Evaluation) -> Value {
     json!({
         "ate": spread(&told.ate.error, "m"),

@@ -4,11 +4,11 @@ use anyhow::Context;
 use clap::Args;
 use kinoise::io::OutputDir;
 use kinoise::measure::read_table;
-use kinoise::model_of_table;
 use kinoise::report::CalibrationPage;
+use kinoise::{CalibrateOptions, model_of_table};
 
 use super::calibrate::{Fitting, write_outputs};
-use super::common::{Global, say};
+use super::common::{Global, say, source_date};
 use super::words;
 
 #[derive(Debug, Args)]
@@ -24,7 +24,9 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let table = read_table(&arguments.table)?;
-    let calibration = model_of_table(&table, arguments.fitting.form()?, &arguments.table)
+    let form = arguments.fitting.form()?;
+    let options = CalibrateOptions { form, created: source_date(), ..Default::default() };
+    let calibration = model_of_table(&table, &arguments.table, &options)
         .with_context(|| arguments.table.display().to_string())?;
     let out = OutputDir::create(&arguments.output)?;
     let page = CalibrationPage {

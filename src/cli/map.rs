@@ -139,8 +139,8 @@ impl Tuning {
             voxel_m: self.voxel.unwrap_or(options.voxel_m),
             block_px: self.block.unwrap_or(options.block_px),
             gate_m: self.gate.unwrap_or(options.gate_m),
-            most_iterations: self.iterations.unwrap_or(options.most_iterations),
-            most_counted: self.memory.unwrap_or(options.most_counted),
+            max_iterations: self.iterations.unwrap_or(options.max_iterations),
+            max_counted: self.memory.unwrap_or(options.max_counted),
             colour: !self.no_colour,
             seed,
             ..options

@@ -65,7 +65,7 @@ enum Command {
     Demo(demo::Arguments),
 }
 
-/// Bad input or failure (contract, section 3).
+/// Exit code of bad input or failure.
 const FAILURE: u8 = 2;
 
 pub fn main() -> ExitCode {

@@ -96,11 +96,11 @@ fn plans(
 }
 
 /// An hour at 30 Hz.
-const MOST_FRAMES: usize = 108_000;
+const MAX_FRAMES: usize = 108_000;
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
-    if let Some(n) = arguments.frames.filter(|n| !(1..=MOST_FRAMES).contains(n)) {
-        bail!("--frames {n}: give a number from 1 to {MOST_FRAMES}");
+    if let Some(n) = arguments.frames.filter(|n| !(1..=MAX_FRAMES).contains(n)) {
+        bail!("--frames {n}: give a number from 1 to {MAX_FRAMES}");
     }
     if let Some(path) = &arguments.recipe {
         check_recipe(path, &arguments.output)?;

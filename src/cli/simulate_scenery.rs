@@ -34,7 +34,7 @@ pub struct SceneryArguments {
 }
 
 /// More boxes than this leave no target to see.
-const MOST_CLUTTER: usize = 100;
+const MAX_CLUTTER: usize = 100;
 /// A reference off by more than this is none, m.
 const LARGEST_REFERENCE_ERROR_M: f64 = 1.0;
 
@@ -57,8 +57,8 @@ impl SceneryArguments {
         if self.reference_error.is_some_and(|e| e > LARGEST_REFERENCE_ERROR_M) {
             bail!("--reference-error: more than {LARGEST_REFERENCE_ERROR_M} m is no measurement");
         }
-        if self.clutter > MOST_CLUTTER {
-            bail!("--clutter {}: give at most {MOST_CLUTTER}", self.clutter);
+        if self.clutter > MAX_CLUTTER {
+            bail!("--clutter {}: give at most {MAX_CLUTTER}", self.clutter);
         }
         Ok(Scenery {
             target: if self.wall_target {

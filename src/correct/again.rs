@@ -10,7 +10,7 @@ use super::Correction;
 use super::files::{copy, files_below, make_folder_of, makes_a_recording};
 use super::recording::{Corrected, Job, metres, read};
 use super::words::Words;
-use crate::calibrate::Progress;
+use crate::Progress;
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, DepthTable, Frame};
 use crate::io::{INDEX, Layout, encode_pgm16, encode_png16, write_atomic};
@@ -108,9 +108,9 @@ impl Again<'_> {
     /// Corrected depths as words; what was no measurement stays none.
     fn recode(&self, frame: Frame, before: &[f32], after: &[f32], words: &Words) -> (Frame, Tally) {
         let mut tally = Tally::default();
-        let none = self.code.word(f64::NAN);
+        let none = self.code.raw(f64::NAN);
         let mut new = frame;
-        for (word, (&z, &better)) in new.words.iter_mut().zip(before.iter().zip(after)) {
+        for (word, (&z, &better)) in new.raw.iter_mut().zip(before.iter().zip(after)) {
             let old = *word;
             if z.is_nan() {
                 *word = if self.recodes() { none } else { old };

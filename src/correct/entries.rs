@@ -6,7 +6,7 @@ use super::{Correction, Drift};
 use crate::effects::{Active, KINECT_BASELINE_M};
 use crate::error::{Error, Result};
 use crate::model::{self, NoiseModel};
-use crate::terms::{Basis, Needs, Over, Pixels, Statistic, Term, Times};
+use crate::terms::{Basis, Coordinate, Modulation, Needs, Pixels, Statistic, Term};
 use crate::view::Sensor;
 
 /// Baselines or focal lengths this far apart are not the same sensor's.
@@ -127,11 +127,11 @@ impl Correction {
             "column-banding" => {
                 let teeth = saw_tooth(camera.width, camera.cx, at(0), at(1));
                 let columns = Basis::Curve {
-                    over: Over::Column,
+                    over: Coordinate::Column,
                     low: 0.0,
                     high: (camera.width.max(2) - 1) as f64,
                     nodes: teeth.len(),
-                    times: Times::One,
+                    times: Modulation::One,
                 };
                 self.terms.push(bias(columns, teeth));
             }

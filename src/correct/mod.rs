@@ -22,7 +22,7 @@ use crate::camera::{Camera, Rays};
 use crate::error::{Error, Result};
 use crate::model::NoiseModel;
 use crate::plane::Plane;
-use crate::terms::{Needs, Pixels, Place, Term};
+use crate::terms::{Needs, PixelContext, Pixels, Term};
 use crate::view::Sensor;
 use locking::Locking;
 use slopes::{Noise, Slopes};
@@ -79,7 +79,7 @@ struct Drift {
 /// What is left is less again by the term's steepness, a hundredth for terms of a few tenths of a px
 /// over tens of px: two rounds, and a hundred thousandth of a pixel.
 const SETTLED_PX: f64 = 1e-3;
-const MOST_ROUNDS: usize = 8;
+const MAX_ROUNDS: usize = 8;
 
 impl Correction {
     /// What `model` says about `sensor`.
@@ -162,7 +162,7 @@ impl Correction {
         }
         let mut place = known.place(i);
         let mut d = measured;
-        for _ in 0..MOST_ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             known.stand(&mut place, i, d);
             let bias: f64 = known.terms.iter().map(|t| t.value(&place, scratch)).sum();
             let next = measured - bias;
@@ -205,7 +205,7 @@ struct Known<'a> {
 }
 
 impl Known<'_> {
-    fn place(&self, i: usize) -> Place {
+    fn place(&self, i: usize) -> PixelContext {
         let mut place = self.pixels.place(i);
         place.session_s = self.conditions.session_s;
         place.temperature_c = self.conditions.temperature_c.unwrap_or(0.0);
@@ -214,7 +214,7 @@ impl Known<'_> {
     }
 
     /// Put a surface of this disparity, px, before the pixel, leaning as the picture shows.
-    fn stand(&self, place: &mut Place, i: usize, disparity: f64) {
+    fn stand(&self, place: &mut PixelContext, i: usize, disparity: f64) {
         let Pixels { camera, scale_px_m, .. } = self.pixels;
         place.at_disparity(disparity, scale_px_m);
         if let Some(slopes) = self.slopes {

@@ -8,7 +8,7 @@ use super::again::Again;
 use super::files::{inside, once, refuse_inside};
 use super::words::metric;
 use super::{Conditions, Correction};
-use crate::calibrate::Progress;
+use crate::Progress;
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, DepthTable, FARTHEST_M, Frame};
 use crate::io::{Assumed, FrameSource, Layout, open_uncut, refuse_full};
@@ -112,5 +112,5 @@ pub(super) fn read(root: &Path, job: &Job, sensor: &Sensor) -> Result<Frame> {
 
 /// Depth of every pixel, m; NaN where there is none.
 pub(super) fn metres(frame: &Frame, table: &DepthTable) -> Vec<f32> {
-    frame.words.iter().map(|&word| table.metres(word)).collect()
+    frame.raw.iter().map(|&word| table.metres(word)).collect()
 }

@@ -18,7 +18,7 @@ const CLEARLY: f64 = 3.0;
 /// A pixel farther from the plane than this many of its standard deviations is not of it.
 const OFF_PLANE: f64 = 4.0;
 /// Least variance (px^2) of pixels in a window along its narrower side: not a line of them.
-const LEAST_WIDTH: f64 = 1.0;
+const MIN_WIDTH: f64 = 1.0;
 
 /// The model's noise of a frontal surface, by disparity: a middle window no noisier than this
 /// needs no comparison.
@@ -174,7 +174,7 @@ impl LocalPlane {
         let (uu, uv, vv) = (sums[3] / n - u * u, sums[4] / n - u * v, sums[5] / n - v * v);
         let (ud, vd, dd) = (sums[7] / n - u * d, sums[8] / n - v * d, sums[9] / n - d * d);
         let determinant = uu * vv - uv * uv;
-        if determinant < LEAST_WIDTH * (uu + vv) {
+        if determinant < MIN_WIDTH * (uu + vv) {
             return None;
         }
         let slope = [(vv * ud - uv * vd) / determinant, (uu * vd - uv * ud) / determinant];

@@ -14,8 +14,7 @@ pub(super) struct Words {
 impl Words {
     pub fn of(code: DepthCode) -> Self {
         let metres = |word: &u16| code.metres(*word).unwrap_or(f64::NAN);
-        let valid =
-            || (0..=u16::MAX).filter(|&w| code.metres(w).is_some_and(|z| code.word(z) == w));
+        let valid = || (0..=u16::MAX).filter(|&w| code.metres(w).is_some_and(|z| code.raw(z) == w));
         let near = valid().min_by(|a, b| metres(a).total_cmp(&metres(b)));
         let far = valid().max_by(|a, b| metres(a).total_cmp(&metres(b)));
         Words { code, near: near.unwrap_or(0), far: far.unwrap_or(0) }
@@ -37,13 +36,13 @@ impl Words {
             }
         }
         let z = f64::from(z);
-        let word = self.code.word(z);
+        let word = self.code.raw(z);
         if self.code.metres(word).is_some() {
             return (word, false);
         }
         // The number next to it that does not mean "no measurement": found by a step of the code.
         let step = self.code.step_inverse(z) * z * z;
-        (self.code.word((z - step).max(metres(self.near))), false)
+        (self.code.raw((z - step).max(metres(self.near))), false)
     }
 }
 

@@ -5,12 +5,12 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::engine::{DiagnoseOptions, FEWEST_VIEWS, Progress};
+use super::engine::{DiagnoseOptions, FEWEST_VIEWS};
 use super::field::Field;
-use super::known::Known;
-use super::lattice::Lattice;
+use super::known::KnownTerms;
+use super::lattice::Quantisation;
 use super::layers::{BLOCK_TILES, Survey};
-use super::missing::{MissingFinding, missing};
+use super::missing::{DropoutFinding, missing};
 use super::noise::{Hanging, hanging, still_level, tails};
 use super::partners::{Pose, partners};
 use super::pixels::{common, fixed_px2, measure_tails};
@@ -21,6 +21,7 @@ use super::search::ViewData;
 use super::steps::{Steps, lattice};
 use super::structure::{Structure, structures};
 use super::tiles::SIDE;
+use crate::Progress;
 use crate::error::{Error, Result};
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
@@ -32,10 +33,10 @@ pub struct Baseline {
     survey: Survey,
     structure: Vec<Structure>,
     hangs: Vec<Hanging>,
-    lattice: Lattice,
+    lattice: Quantisation,
     /// Variance with another name.
     pub steps: Steps,
-    lost: Vec<MissingFinding>,
+    lost: Vec<DropoutFinding>,
     mixes: bool,
     heavy: bool,
     /// What was odd, in words.
@@ -82,7 +83,7 @@ impl Baseline {
         let sensor = Sensor { baseline_m: real.baseline_m, ..simulated.sensor.clone() };
         same_sensor(real, &simulated.sensor)?;
         let bench = Workbench::new(&sensor, super::engine::measure_options(options));
-        let known = Known::of(model, &sensor.camera);
+        let known = KnownTerms::of(model, &sensor.camera);
         let (theirs, excluded) = read(simulated, &bench, model, &known, progress);
         let mut remarks: Vec<String> =
             excluded.iter().map(|e| format!("of the simulated recording, {e}")).collect();
@@ -127,7 +128,7 @@ impl Baseline {
         options: &DiagnoseOptions,
     ) -> Self {
         let camera = &bench.sensor.camera;
-        let none = Known::default();
+        let none = KnownTerms::default();
         let mut survey = Survey::of(&fields, camera, &bench.rays);
         let mut structure = structures(&fields, camera, &[]);
         let hangs = hanging(&structure, &none, 0.03 * options.level);
@@ -236,7 +237,12 @@ impl Baseline {
 
     /// Replace each statistic of the real views by its difference to the twin's, on the level of
     /// the simulated recording; what that level is goes to `known`.
-    pub fn compare(&self, structure: &mut [Structure], real: &Lattice, known: &mut Known) {
+    pub fn compare(
+        &self,
+        structure: &mut [Structure],
+        real: &Quantisation,
+        known: &mut KnownTerms,
+    ) {
         let ours = structure;
         let level = |of: &dyn Fn(&Structure) -> Option<f64>| {
             let all: Vec<f64> =
@@ -307,7 +313,7 @@ impl Baseline {
     }
 
     /// Is as much lost in the simulated views, for the same reason or on the whole?
-    pub fn loses_alike(&self, lost: &MissingFinding, real: &Survey) -> bool {
+    pub fn loses_alike(&self, lost: &DropoutFinding, real: &Survey) -> bool {
         let same = self.lost.iter().any(|own| {
             own.family == lost.family
                 && own.axis == lost.axis
@@ -320,7 +326,7 @@ impl Baseline {
 
     /// What the simulation shows and the recording does not, in words.
     pub fn too_much(&self, real: &[Structure], level: f64) -> Vec<String> {
-        let ours = hanging(real, &Known::default(), level);
+        let ours = hanging(real, &KnownTerms::default(), level);
         let names = |all: &[Hanging]| -> Vec<&'static str> {
             all.iter().filter_map(|h| h.families.first().copied()).collect()
         };

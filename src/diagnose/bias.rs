@@ -1,13 +1,13 @@
 //! What may shift the mean: candidates in px of disparity.
 
 use super::candidate::Candidate;
-use super::reach::Reach;
+use super::reach::Extent;
 use super::tiles::SIDE;
 use crate::camera::Camera;
-use crate::terms::{Basis, Over, Times};
+use crate::terms::{Basis, Coordinate, Modulation};
 
 /// All named bias families for a camera.
-pub fn families(camera: &Camera, reach: &Reach) -> Vec<Candidate> {
+pub fn families(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
     let mut all = Vec::new();
     // Two orders for what is nearly a parabola, four for a wavy one.
     for orders in [2, 4] {
@@ -49,7 +49,7 @@ pub fn families(camera: &Camera, reach: &Reach) -> Vec<Candidate> {
 
 /// Periodic in the disparity with a period of one pixel, give or take what focal length and
 /// baseline are off.
-fn locking(all: &mut Vec<Candidate>, reach: &Reach) {
+fn locking(all: &mut Vec<Candidate>, reach: &Extent) {
     const OFF: f64 = 0.03;
     // A quarter of a cycle over the range of disparities.
     let step = 0.25 / (reach.disparity[1] - reach.disparity[0]).max(1.0);
@@ -61,7 +61,7 @@ fn locking(all: &mut Vec<Candidate>, reach: &Reach) {
 }
 
 /// Curves without a name, one axis each, and maps over two.
-pub fn curves(camera: &Camera, reach: &Reach) -> Vec<Candidate> {
+pub fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
     let (width, height) = (camera.width as f64, camera.height as f64);
     let curve = |over, [low, high]: [f64; 2], nodes, times| {
         Candidate::curve(Basis::Curve { over, low, high, nodes, times })
@@ -69,43 +69,43 @@ pub fn curves(camera: &Camera, reach: &Reach) -> Vec<Candidate> {
     let map =
         |across, down, times| Candidate::curve(Basis::Map { width, height, across, down, times });
     let mut all = vec![
-        curve(Over::Column, [0.0, width], 24, Times::One),
-        curve(Over::Column, [0.0, width], 72, Times::One),
-        curve(Over::Row, [0.0, height], 24, Times::One),
-        curve(Over::Row, [0.0, height], 72, Times::One),
-        curve(Over::Radius, [0.0, 1.0], 10, Times::One),
-        curve(Over::Radius, [0.0, 1.0], 10, Times::DisparitySquared),
-        curve(Over::Disparity, reach.disparity, 16, Times::One),
-        curve(Over::Z, reach.z, 24, Times::One),
-        curve(Over::Right, reach.right, 12, Times::Lift),
-        curve(Over::Down, reach.down, 12, Times::Lift),
-        curve(Over::Edge, [0.0, 24.0], 9, Times::One),
+        curve(Coordinate::Column, [0.0, width], 24, Modulation::One),
+        curve(Coordinate::Column, [0.0, width], 72, Modulation::One),
+        curve(Coordinate::Row, [0.0, height], 24, Modulation::One),
+        curve(Coordinate::Row, [0.0, height], 72, Modulation::One),
+        curve(Coordinate::Radius, [0.0, 1.0], 10, Modulation::One),
+        curve(Coordinate::Radius, [0.0, 1.0], 10, Modulation::DisparitySquared),
+        curve(Coordinate::Disparity, reach.disparity, 16, Modulation::One),
+        curve(Coordinate::Z, reach.z, 24, Modulation::One),
+        curve(Coordinate::Right, reach.right, 12, Modulation::Lift),
+        curve(Coordinate::Down, reach.down, 12, Modulation::Lift),
+        curve(Coordinate::Edge, [0.0, 24.0], 9, Modulation::One),
         Candidate::curve(Basis::Ring {
-            over: Over::Disparity,
+            over: Coordinate::Disparity,
             period: 1.0,
             nodes: 12,
-            times: Times::One,
+            times: Modulation::One,
         }),
-        map(8, 6, Times::One),
-        map(8, 6, Times::DisparitySquared),
+        map(8, 6, Modulation::One),
+        map(8, 6, Modulation::DisparitySquared),
     ];
-    all.extend(seams(width, Over::Column));
-    all.extend(seams(height, Over::Row));
+    all.extend(seams(width, Coordinate::Column));
+    all.extend(seams(height, Coordinate::Row));
     all.push(along(camera));
     all.extend(waves(reach));
     if reach.light[1] > 1.05 * reach.light[0] {
-        all.push(curve(Over::Light, reach.light, 8, Times::One));
+        all.push(curve(Coordinate::Light, reach.light, 8, Modulation::One));
     }
     all
 }
 
 /// Two halves of the picture that disagree, at any of these places.
-fn seams(length: f64, over: Over) -> impl Iterator<Item = Candidate> {
+fn seams(length: f64, over: Coordinate) -> impl Iterator<Item = Candidate> {
     const PLACES: usize = 32;
     (2..PLACES - 1).map(move |k| {
         let at = length * k as f64 / PLACES as f64;
         let (low, high) = (at - 1.0, at + 1.0);
-        Candidate::curve(Basis::Curve { over, low, high, nodes: 2, times: Times::One })
+        Candidate::curve(Basis::Curve { over, low, high, nodes: 2, times: Modulation::One })
     })
 }
 
@@ -113,15 +113,20 @@ fn seams(length: f64, over: Over) -> impl Iterator<Item = Candidate> {
 fn along(camera: &Camera) -> Candidate {
     let (x, y) = camera.ray(0.0, 0.0);
     let most = x.hypot(y);
-    let (over, times) = (Over::Along, Times::Tilt);
+    let (over, times) = (Coordinate::Along, Modulation::Tilt);
     Candidate::curve(Basis::Curve { over, low: -most, high: most, nodes: 9, times })
 }
 
 /// Periodic in depth: what a time-of-flight camera's harmonics do.
-fn waves(reach: &Reach) -> impl Iterator<Item = Candidate> {
+fn waves(reach: &Extent) -> impl Iterator<Item = Candidate> {
     let span = reach.z[1] - reach.z[0];
     (3..=16).map(move |cycles| {
         let period = span / f64::from(cycles);
-        Candidate::curve(Basis::Ring { over: Over::Z, period, nodes: 6, times: Times::One })
+        Candidate::curve(Basis::Ring {
+            over: Coordinate::Z,
+            period,
+            nodes: 6,
+            times: Modulation::One,
+        })
     })
 }

@@ -10,8 +10,8 @@ use super::diagnosis::{
 use super::field::Field;
 use super::findings::{self, Scene};
 use super::heldout;
-use super::known::Known;
-use super::lattice::Lattice;
+use super::known::KnownTerms;
+use super::lattice::Quantisation;
 use super::layers::{BIAS_PRIOR, Survey};
 use super::lines::line_terms;
 use super::missing::missing;
@@ -29,12 +29,13 @@ use super::structure::structures;
 use super::verdict::{
     after, extend, least_size, merge, not_identifiable, shares, symptoms, view_lines,
 };
+use crate::Progress;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
 use crate::measure::{MeasureOptions, Workbench};
 use crate::model::NoiseModel;
 use crate::rng::Seed;
-use crate::terms::{Axis, Basis, Place, Statistic, Term, corner_radius};
+use crate::terms::{Axis, Basis, PixelContext, Statistic, Term, corner_radius};
 use crate::view::{Excluded, Recording, Sensor};
 
 /// Settings of a diagnosis.
@@ -78,9 +79,6 @@ impl Diagnosed {
         self.fields[view].pixels.iter().zip(mean).map(|(&i, m)| m - at(i)).collect()
     }
 }
-
-/// Steps done, steps in all.
-pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
 
 /// How noise hangs together changes what a few frames show of its size by so much.
 const LEVEL_BESIDE_TEXTURE: f64 = 0.05;
@@ -126,7 +124,7 @@ struct Case<'a> {
     model: &'a NoiseModel,
     options: &'a DiagnoseOptions,
     bench: Workbench<'a>,
-    known: Known,
+    known: KnownTerms,
     fields: Vec<Field>,
     survey: Survey,
     baseline: Option<Baseline>,
@@ -147,7 +145,7 @@ struct Mean {
 
 /// What scatters about it.
 struct Scatter {
-    lattice: Lattice,
+    lattice: Quantisation,
     hangs: Vec<Hanging>,
     tails: Option<Hanging>,
     /// Of the variance.
@@ -180,7 +178,7 @@ impl<'a> Case<'a> {
             refuse_other_size(model, sensor)?;
         }
         let bench = Workbench::new(sensor, measure_options(options));
-        let known = Known::of(model, &sensor.camera);
+        let known = KnownTerms::of(model, &sensor.camera);
         let Taken { mut fields, excluded, ranges, copies } =
             Taken::of(recording, &bench, model, &known, progress)?;
         let baseline = simulated
@@ -247,7 +245,7 @@ impl<'a> Case<'a> {
         let lattice = lattice(&self.fields, self.recording);
         let own = Steps::of(&lattice, &structure, &self.fields, self.recording);
         let theirs = self.baseline.as_ref().map(|b| b.steps);
-        let extra = |p: &Place| (own.at(p) - theirs.map_or(0.0, |s| s.at(p))).max(0.0);
+        let extra = |p: &PixelContext| (own.at(p) - theirs.map_or(0.0, |s| s.at(p))).max(0.0);
         let each = self.level(Self::EACH_LEVEL);
         if let Some(baseline) = &mut self.baseline {
             let more = baseline.too_much(&structure, each);
@@ -260,7 +258,7 @@ impl<'a> Case<'a> {
             self.baseline.as_mut().is_some_and(|baseline| baseline.variances(&mut self.survey));
         let range_share = self.range_share(&mean.terms);
         // A range in place of a depth makes a disparity, and its noise, smaller.
-        let stretch = |p: &Place| {
+        let stretch = |p: &PixelContext| {
             let ray = 1.0 / (1.0 + p.x * p.x + p.y * p.y).sqrt();
             (1.0 + range_share.clamp(0.0, 1.0) * (ray - 1.0)).powi(2)
         };

@@ -13,11 +13,11 @@ use crate::io::{FrameSource, InfraredImage};
 use crate::measure::{Workbench, view_target};
 use crate::model::SigmaModel;
 use crate::plane::Plane;
-use crate::terms::{Place, Term};
+use crate::terms::{PixelContext, Term};
 use crate::view::{Sensor, View};
 
-use super::known::Known;
-use super::lattice::Words;
+use super::known::KnownTerms;
+use super::lattice::RawHistogram;
 use super::tiles::Places;
 
 /// One view's residuals.
@@ -58,7 +58,7 @@ pub struct Field {
     /// light the surface is, in the image's own units. Empty without an infrared image.
     pub light: Vec<f32>,
     /// How often each stored word occurs on the target.
-    pub words: Words,
+    pub words: RawHistogram,
     /// The target's region was given; else it ends where too little is measured.
     pub told: bool,
     /// What lies beside the target in the first frame.
@@ -85,7 +85,7 @@ impl Field {
         view: &View,
         bench: &Workbench<'_>,
         sigma: &SigmaModel,
-        known: &Known,
+        known: &KnownTerms,
         session_start: f64,
     ) -> Result<Self> {
         let target = view_target(view, bench)?;
@@ -109,7 +109,7 @@ impl Field {
         frames: impl Iterator<Item = (f64, Frame)>,
         bench: &Workbench<'_>,
         sigma: &SigmaModel,
-        known: &Known,
+        known: &KnownTerms,
         session_start: f64,
     ) -> Self {
         let n = self.pixels.len();
@@ -120,7 +120,7 @@ impl Field {
             measured: vec![0; n],
             first: Vec::new(),
             frames: Vec::new(),
-            words: Words::none(),
+            words: RawHistogram::none(),
             ..self.clone()
         };
         field.expose(frames, bench, sigma, known, session_start);
@@ -132,7 +132,7 @@ impl Field {
         frames: impl Iterator<Item = (f64, Frame)>,
         bench: &Workbench<'_>,
         sigma: &SigmaModel,
-        known: &Known,
+        known: &KnownTerms,
         session_start: f64,
     ) {
         self.sigma = self.expected_sigma(&bench.rays, sigma);
@@ -219,7 +219,7 @@ impl Field {
             temperature_c: view.notes.temperature_c,
             ambient_lux: view.notes.ambient_lux,
             light: Vec::new(),
-            words: Words::none(),
+            words: RawHistogram::none(),
             told: view.notes.region.is_some(),
             shadow: Shadow::default(),
             rim: None,
@@ -244,7 +244,7 @@ impl Field {
     }
 
     /// Disparity that the model expects at each pixel, px; its terms of the variance go to sigma.
-    fn known_bias(&mut self, known: &Known, bench: &Workbench<'_>, start: f64) -> Vec<f32> {
+    fn known_bias(&mut self, known: &KnownTerms, bench: &Workbench<'_>, start: f64) -> Vec<f32> {
         let n = self.pixels.len();
         let mut expected: Vec<f32> =
             (0..n).map(|k| self.disparity(k, &bench.rays) as f32).collect();
@@ -254,7 +254,7 @@ impl Field {
         let mut sigma = self.sigma.clone();
         let places = Places::of(self, &bench.sensor.camera, &bench.rays, start);
         let mut row = Vec::new();
-        let mut sum = |terms: &[Term], place: &Place| -> f64 {
+        let mut sum = |terms: &[Term], place: &PixelContext| -> f64 {
             terms.iter().map(|t| t.value(place, &mut row)).sum()
         };
         for k in 0..n {
@@ -273,7 +273,7 @@ impl Field {
         let middle = self.scale_px_m * self.plane.q.z;
         let (mut sx, mut sxx, mut sxy) = (0.0f64, 0.0f64, 0.0f64);
         for k in 0..self.pixels.len() {
-            let word = frame.words[self.pixels[k] as usize];
+            let word = frame.raw[self.pixels[k] as usize];
             let z = table.metres(word);
             if !z.is_finite() {
                 continue;

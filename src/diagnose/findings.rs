@@ -5,14 +5,14 @@ use serde_json::Map;
 use super::candidate::RECALIBRATE;
 use super::diagnosis::{Alternative, Curve, Finding, MapRow, Size, Status};
 use super::layers::{Survey, coarser};
-use super::missing::MissingFinding;
+use super::missing::DropoutFinding;
 use super::noise::Hanging;
 use super::parameters::{of_any_formula, parameters};
 use super::search::{Chosen, Outcome, ViewData};
 use super::shape;
 use crate::effects;
 use crate::stats::range;
-use crate::terms::{Axis, Basis, Place, Statistic, Term, Times};
+use crate::terms::{Axis, Basis, Modulation, PixelContext, Statistic, Term};
 
 /// The data a layer's findings are measured on.
 pub struct Scene<'a> {
@@ -260,19 +260,19 @@ fn size(scene: &Scene<'_>, values: &[Vec<f64>]) -> Size {
     Size { mm: (mm / n).sqrt(), sigma: (sigma / n).sqrt() }
 }
 
-type Coordinate = Box<dyn Fn(&Place) -> f64>;
+type OfPlace = Box<dyn Fn(&PixelContext) -> f64>;
 
 /// The axis along which a term is shown.
 struct Along {
     label: String,
-    value: Coordinate,
+    value: OfPlace,
 }
 
 impl Along {
     fn of(scene: &Scene<'_>, basis: &Basis) -> Self {
         let axis = basis.axis();
         let corner = scene.corner_px;
-        let (label, value): (&str, Coordinate) = match axis {
+        let (label, value): (&str, OfPlace) = match axis {
             Axis::Z => ("depth, m", Box::new(|p| p.z)),
             Axis::DisparityPhase => {
                 let period = match basis {
@@ -292,16 +292,16 @@ impl Along {
             }
             Axis::Theta => ("tilt, rad", Box::new(|p| p.theta)),
             Axis::Azimuth
-                if matches!(basis, Basis::Curve { over: crate::terms::Over::Along, .. }) =>
+                if matches!(basis, Basis::Curve { over: crate::terms::Coordinate::Along, .. }) =>
             {
                 (
                     "from the optical axis along the tilt, ray",
-                    Box::new(|p| crate::terms::Over::Along.value(p)),
+                    Box::new(|p| crate::terms::Coordinate::Along.value(p)),
                 )
             }
             Axis::Azimuth => ("direction of the tilt, rad", Box::new(|p| p.azimuth)),
             Axis::TargetPosition => match basis {
-                Basis::Curve { over: crate::terms::Over::Down, .. } => {
+                Basis::Curve { over: crate::terms::Coordinate::Down, .. } => {
                     ("down on the board, m", Box::new(|p| p.down))
                 }
                 _ => ("right on the board, m", Box::new(|p| p.right)),
@@ -346,7 +346,7 @@ impl Along {
         const BINS: usize = 32;
         let [low, high] =
             range(scene.data.iter().flat_map(|v| v.places.iter().map(|p| (self.value)(p))));
-        let bin = |p: &Place| {
+        let bin = |p: &PixelContext| {
             let place = ((self.value)(p) - low) / (high - low).max(1e-12) * BINS as f64;
             (place as usize).min(BINS - 1)
         };
@@ -414,7 +414,7 @@ pub fn physics(
             Statistic::Variance => "the size of the noise",
             Statistic::Distribution => "the distribution of the errors",
             Statistic::Correlation => "how errors hang together",
-            Statistic::Missing => "where measurements are missing",
+            Statistic::Dropout => "where measurements are missing",
         };
         let shape = shape.map_or(String::new(), |s| format!(": {s}"));
         return format!(
@@ -423,7 +423,7 @@ pub fn physics(
     };
     format!(
         "Left out: {}. It is told by {} along {}. It could be taken for {}.",
-        card.words, card.statistic, card.axis, card.confused_with
+        card.summary, card.statistic, card.axis, card.confused_with
     )
 }
 
@@ -484,7 +484,7 @@ pub fn hanging(found: Hanging, sigma_mm: f64) -> Finding {
 }
 
 /// Something lost as a finding.
-pub fn missing(found: MissingFinding) -> Finding {
+pub fn missing(found: DropoutFinding) -> Finding {
     let status = if found.family.is_some() { Status::Named } else { Status::Unexplained };
     let best = found.rivals.first().map_or(found.gain, |r| r.1);
     let mut alternatives: Vec<Alternative> = Vec::new();
@@ -509,12 +509,12 @@ pub fn missing(found: MissingFinding) -> Finding {
         .family
         .is_none()
         .then(|| format!("more is lost from {:.4} to {:.4}", found.interval[0], found.interval[1]));
-    let words = physics(status, found.family, Statistic::Missing, found.axis, shape.as_deref());
+    let words = physics(status, found.family, Statistic::Dropout, found.axis, shape.as_deref());
     Finding {
         status,
         effect: found.family,
         alternatives,
-        statistic: Statistic::Missing,
+        statistic: Statistic::Dropout,
         axis: found.axis,
         interval: found.interval,
         unit: found.axis.unit(),
@@ -539,7 +539,7 @@ pub fn map(scene: &Scene<'_>, outcome: &Outcome, level: f64) -> Vec<MapRow> {
             // A ripple's period is not the axis's own curve.
             continue;
         }
-        if matches!(look.basis, Basis::Curve { times: Times::DisparitySquared, .. }) {
+        if matches!(look.basis, Basis::Curve { times: Modulation::DisparitySquared, .. }) {
             continue;
         }
         let term = Term {

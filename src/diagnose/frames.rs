@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 
-use super::known::Known;
+use super::known::KnownTerms;
 use super::noise::{Hanging, one, variance_px2};
 use super::structure::{Jitter, Structure};
 use crate::terms::{Axis, Statistic};
@@ -49,7 +49,12 @@ impl Motion {
 }
 
 /// `rho` is the correlation of successive frames that was found.
-pub(super) fn frames(views: &[Structure], known: &Known, level: f64, rho: f64) -> Vec<Hanging> {
+pub(super) fn frames(
+    views: &[Structure],
+    known: &KnownTerms,
+    level: f64,
+    rho: f64,
+) -> Vec<Hanging> {
     let all: Vec<Jitter> = views.iter().filter_map(|s| s.jitter).collect();
     let freedom: f64 = all.iter().map(|j| j.freedom).sum();
     if all.len() < 2 || freedom < 2.0 {

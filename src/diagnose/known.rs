@@ -4,11 +4,11 @@ use serde_json::{Map, Value};
 
 use crate::camera::Camera;
 use crate::model::NoiseModel;
-use crate::terms::{Basis, Over, Statistic, Term, Times};
+use crate::terms::{Basis, Coordinate, Modulation, Statistic, Term};
 
 /// The model's effects as terms, and the rest by name.
 #[derive(Debug, Clone, Default)]
-pub struct Known {
+pub struct KnownTerms {
     /// Of the disparity, px.
     pub bias: Vec<Term>,
     /// Of the logarithm of its variance.
@@ -16,9 +16,9 @@ pub struct Known {
     entries: Vec<(String, Map<String, Value>)>,
 }
 
-impl Known {
+impl KnownTerms {
     pub fn of(model: &NoiseModel, camera: &Camera) -> Self {
-        let mut known = Known::default();
+        let mut known = KnownTerms::default();
         for entry in &model.effects {
             let simple;
             let terms: &[Term] = if entry.shape.is_empty() {
@@ -93,8 +93,11 @@ fn formula(id: &str, parameters: &Map<String, Value>, camera: &Camera) -> Vec<Te
             let values = (0..nodes)
                 .map(|k| 2.0 * (growth * (k as f64 / (nodes - 1) as f64).powi(2)).ln_1p())
                 .collect();
-            let over = Over::Radius;
-            variance(Basis::Curve { over, low: 0.0, high: 1.0, nodes, times: Times::One }, values)
+            let over = Coordinate::Radius;
+            variance(
+                Basis::Curve { over, low: 0.0, high: 1.0, nodes, times: Modulation::One },
+                values,
+            )
         }),
         "slope-noise" => get("sigma_lateral_px")
             .and_then(|lateral_px| variance(Basis::SlopeNoise { lateral_px }, vec![1.0])),
@@ -115,11 +118,11 @@ fn formula(id: &str, parameters: &Map<String, Value>, camera: &Camera) -> Vec<Te
 
 fn columns(camera: &Camera) -> Basis {
     Basis::Curve {
-        over: Over::Column,
+        over: Coordinate::Column,
         low: 0.0,
         high: (camera.width.max(2) - 1) as f64,
         nodes: camera.width.max(2),
-        times: Times::One,
+        times: Modulation::One,
     }
 }
 

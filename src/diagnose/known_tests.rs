@@ -5,10 +5,10 @@ use serde_json::json;
 
 use super::*;
 use crate::diagnose::parameters::parameters as told;
-use crate::diagnose::reach::Reach;
+use crate::diagnose::reach::Extent;
 use crate::model::{Effect, FitSummary, Provenance};
 use crate::simulate::kinect_v1;
-use crate::terms::Place;
+use crate::terms::PixelContext;
 
 fn model(id: &str, parameters: Value) -> NoiseModel {
     let Value::Object(parameters) = parameters else { panic!("an object") };
@@ -21,9 +21,9 @@ fn model(id: &str, parameters: Value) -> NoiseModel {
     }
 }
 
-fn reach() -> Reach {
+fn reach() -> Extent {
     let unit = [0.0, 1.0];
-    Reach {
+    Extent {
         disparity: [10.0, 40.0],
         z: [0.8, 3.2],
         theta: unit,
@@ -54,7 +54,7 @@ fn what_is_known_is_told_with_the_same_numbers() {
     ];
     for (id, name, value) in written {
         for form in [json!(value), json!({"value": value, "std_error": 0.1})] {
-            let known = Known::of(&model(id, json!({ name: form })), &camera);
+            let known = KnownTerms::of(&model(id, json!({ name: form })), &camera);
             assert!(known.has(id) && !known.has("vignetting"));
             assert_eq!(known.parameter(id, name), Some(value));
             let terms: Vec<&Term> = known.bias.iter().chain(&known.variance).collect();
@@ -69,13 +69,13 @@ fn what_is_known_is_told_with_the_same_numbers() {
     }
 }
 
-/// effects.md: growth of the noise at the corner radius.
+/// The card's parameter: growth of the noise at the corner radius.
 #[test]
 fn known_vignetting_grows_as_the_catalogue_says() {
     let camera = kinect_v1(1).camera;
-    let known = Known::of(&model("vignetting", json!({"growth": 0.5})), &camera);
+    let known = KnownTerms::of(&model("vignetting", json!({"growth": 0.5})), &camera);
     for (radius, factor) in [(0.0, 1.0), (0.5, 1.125), (1.0, 1.5)] {
-        let place = Place { radius, ..Place::default() };
+        let place = PixelContext { radius, ..PixelContext::default() };
         let log: f64 = known.variance[0].value(&place, &mut Vec::new());
         assert!(((0.5 * log).exp() - factor).abs() < 1e-3, "{radius}: {log}");
     }
@@ -86,9 +86,11 @@ fn known_vignetting_grows_as_the_catalogue_says() {
 fn known_bands_have_their_period_and_height() {
     let camera = kinect_v1(1).camera;
     let entry = json!({"amplitude_px": 0.2, "period_px": 64.0});
-    let known = Known::of(&model("column-banding", entry), &camera);
-    let at =
-        |u: usize| known.bias[0].value(&Place { u: u as f64, ..Place::default() }, &mut Vec::new());
+    let known = KnownTerms::of(&model("column-banding", entry), &camera);
+    let at = |u: usize| {
+        known.bias[0]
+            .value(&PixelContext { u: u as f64, ..PixelContext::default() }, &mut Vec::new())
+    };
     let values: Vec<f64> = (0..camera.width).map(at).collect();
     let [low, high] = crate::stats::range(values.iter().copied());
     // The last step before a tooth's end is up to one column of 64 short of it.
@@ -100,13 +102,13 @@ fn known_bands_have_their_period_and_height() {
 #[test]
 fn what_has_no_formula_is_known_by_name() {
     let camera = kinect_v1(1).camera;
-    let known = Known::of(&model("spatial-correlation", json!({"length_px": 5.0})), &camera);
+    let known = KnownTerms::of(&model("spatial-correlation", json!({"length_px": 5.0})), &camera);
     assert!(known.bias.is_empty() && known.variance.is_empty());
     assert_eq!(known.parameter("spatial-correlation", "length_px"), Some(5.0));
     assert_eq!(known.parameter("spatial-correlation", "width_px"), None);
     let mut shaped = model("vignetting", json!({"growth": 0.5}));
     let term = Term { statistic: Statistic::Bias, basis: Basis::Level, coefficients: vec![3.0] };
     shaped.effects[0].shape = vec![term.clone()];
-    let known = Known::of(&shaped, &camera);
+    let known = KnownTerms::of(&shaped, &camera);
     assert!(known.variance.is_empty() && known.bias[0].coefficients == term.coefficients);
 }

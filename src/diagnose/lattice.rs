@@ -7,11 +7,11 @@ use crate::view::Sensor;
 
 /// How often each stored word occurs on the targets.
 #[derive(Debug, Clone)]
-pub struct Words(pub Vec<u32>);
+pub struct RawHistogram(pub Vec<u32>);
 
 /// Steps that were found.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Lattice {
+pub struct Quantisation {
     /// All words are multiples of this many units: depth in metres a step.
     pub depth_step_m: Option<f64>,
     /// Occurring disparities are multiples of this, px, give or take a constant.
@@ -30,12 +30,12 @@ const CONTRAST: f64 = 0.4;
 /// Coarsest and finest steps looked for, px.
 const STEPS_PX: [f64; 2] = [1.0 / 3.0, 1.0 / 64.0];
 
-impl Words {
+impl RawHistogram {
     pub fn none() -> Self {
-        Words(vec![0; 1 << 16])
+        RawHistogram(vec![0; 1 << 16])
     }
 
-    pub fn merge(&mut self, other: &Words) {
+    pub fn merge(&mut self, other: &RawHistogram) {
         self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a += b);
     }
 
@@ -49,16 +49,16 @@ impl Words {
     }
 
     /// The lattice the words lie on.
-    pub fn lattice(&self, sensor: &Sensor, scale_px_m: f64) -> Lattice {
+    pub fn lattice(&self, sensor: &Sensor, scale_px_m: f64) -> Quantisation {
         let words = self.occurring();
         if words.len() < FEWEST_WORDS {
-            return Lattice::default();
+            return Quantisation::default();
         }
         let stride = words.iter().fold(0, |g, (w, _)| gcd(g, *w));
         match sensor.code {
             DepthCode::Metric { units_per_metre, .. } => {
                 let (step, resultant) = self.scan(&words, scale_px_m * units_per_metre);
-                Lattice {
+                Quantisation {
                     depth_step_m: (stride > 1).then(|| stride as f64 / units_per_metre),
                     disparity_step_px: step.filter(|_| stride == 1),
                     resultant,
@@ -67,7 +67,7 @@ impl Words {
             DepthCode::Disparity { slope, .. } => {
                 // Words are the lattice; what is left to see is whether only every n-th occurs.
                 let offsets = words.iter().fold(0, |g, (w, _)| gcd(g, w - words[0].0));
-                Lattice {
+                Quantisation {
                     depth_step_m: None,
                     disparity_step_px: Some(offsets.max(1) as f64 * slope.abs() * scale_px_m),
                     resultant: 1.0,
@@ -133,9 +133,9 @@ mod tests {
     use rand::Rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    fn words(step_px: f64, rounding: f64) -> Words {
+    fn words(step_px: f64, rounding: f64) -> RawHistogram {
         let mut rng = Seed(1).stream("lattice");
-        let mut words = Words::none();
+        let mut words = RawHistogram::none();
         let sensor = kinect_v1(1);
         for _ in 0..200_000 {
             let z: f64 = rng.random_range(0.8..3.0);
@@ -146,7 +146,7 @@ mod tests {
             }
             let z = 43.5 / d;
             let z = if rounding > 0.0 { (z / rounding).round() * rounding } else { z };
-            words.0[usize::from(sensor.code.word(z))] += 1;
+            words.0[usize::from(sensor.code.raw(z))] += 1;
         }
         words
     }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::ablation::Ablation;
 use super::bias;
 use super::field::Field;
-use super::reach::Reach;
+use super::reach::Extent;
 use super::scatter::{Left, left_by_fit};
 use super::search::{Outcome, Rules, ViewData, search};
 use super::smooth::{SMOOTH_PX, high_pass};
@@ -16,12 +16,12 @@ use crate::camera::{Camera, Rays};
 use crate::model::SigmaModel;
 use crate::rng::Seed;
 use crate::stats::{Correlation, measure_correlation};
-use crate::terms::Place;
+use crate::terms::PixelContext;
 
 /// The tiles of all views, with how much each view is worth.
 pub struct Survey {
     pub views: Vec<SurveyedView>,
-    pub reach: Reach,
+    pub reach: Extent,
     /// Variance of what each pixel errs by in every view alike, px^2.
     pub fixed_px2: f64,
     pub light: Light,
@@ -40,7 +40,7 @@ pub struct Light {
 
 impl Light {
     /// Of a single pixel.
-    pub fn of(&self, field: &Field, k: usize, p: &Place) -> f64 {
+    pub fn of(&self, field: &Field, k: usize, p: &PixelContext) -> f64 {
         let Some(&light) = field.light.get(k) else { return 1.0 };
         let own = f64::from(light) / (1.0 + self.ambient_share * p.ambient * far(p));
         if self.median > 0.0 && own.is_finite() { own / self.median } else { 1.0 }
@@ -94,7 +94,7 @@ impl Survey {
             })
             .collect();
         let light = relative_light(&mut views);
-        let reach = Reach::of(views.iter().flat_map(|v| v.tiles.iter()));
+        let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter()));
         let (tolerance, ablation) = (MODEL_TOLERANCE, Ablation::None);
         Survey { views, reach, fixed_px2: 0.0, light, tolerance, ablation }
     }
@@ -145,7 +145,7 @@ impl Survey {
     /// The views at these places.
     pub fn subset(&self, which: &[usize]) -> Survey {
         let views: Vec<SurveyedView> = which.iter().map(|&n| self.views[n].clone()).collect();
-        let reach = Reach::of(views.iter().flat_map(|v| v.tiles.iter()));
+        let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter()));
         Survey {
             views,
             reach,
@@ -203,8 +203,8 @@ impl Survey {
         &mut self,
         fields: &[Field],
         bias: &[Vec<f32>],
-        extra: impl Fn(&Place) -> f64 + Sync,
-        stretch: impl Fn(&Place) -> f64 + Sync,
+        extra: impl Fn(&PixelContext) -> f64 + Sync,
+        stretch: impl Fn(&PixelContext) -> f64 + Sync,
     ) {
         let width = fields.first().map_or(0, |f| f.width);
         self.views.par_iter_mut().zip(fields).enumerate().for_each(|(n, (view, field))| {
@@ -273,7 +273,7 @@ fn relative_light(views: &mut [SurveyedView]) -> Light {
 }
 
 /// By this the pattern's light has fallen.
-fn far(p: &Place) -> f64 {
+fn far(p: &PixelContext) -> f64 {
     p.z * p.z * (1.0 + p.x * p.x + p.y * p.y) / p.theta.cos().max(0.05)
 }
 
@@ -367,7 +367,7 @@ fn finite(v: f64) -> f64 {
 
 /// Patches large enough for a variance.
 struct Blocks {
-    places: Vec<Place>,
+    places: Vec<PixelContext>,
     /// Logarithm of the variance over the model's.
     response: Vec<f64>,
     weight: Vec<f64>,
@@ -426,7 +426,7 @@ impl Blocks {
 
 #[derive(Default)]
 struct Sum {
-    place: Place,
+    place: PixelContext,
     n: f64,
     ratio: f64,
 }
@@ -474,12 +474,12 @@ const MODEL_TOLERANCE: f64 = 0.04;
 /// scatter. Enlarged for the laws that so few views have to settle.
 fn view_scatter(blocks: &[Blocks], tolerance: f64) -> f64 {
     let floor = tolerance * tolerance;
-    let levels: Vec<(&Place, f64, f64)> = blocks
+    let levels: Vec<(&PixelContext, f64, f64)> = blocks
         .iter()
         .filter_map(|b| b.level().map(|(level, variance)| (&b.places[0], level, variance)))
         .collect();
     let n = levels.len();
-    let laws = |p: &Place| {
+    let laws = |p: &PixelContext| {
         let steep = p.theta.sin().powi(2);
         [1.0, p.z.ln(), steep, steep * (2.0 * p.azimuth).cos()]
     };

@@ -2,7 +2,7 @@
 
 use super::field::Field;
 use super::structure::fine;
-use crate::terms::{Basis, Over, Statistic, Term, Times};
+use crate::terms::{Basis, Coordinate, Modulation, Statistic, Term};
 
 /// Columns and rows of fewer readings over all views are left at nothing.
 const FEWEST_READINGS: f64 = 200.0;
@@ -30,11 +30,11 @@ pub fn line_terms(fields: &[Field], bias: &[Vec<f32>]) -> Vec<Term> {
         let high = nodes.saturating_sub(1) as f64;
         Term {
             statistic: Statistic::Bias,
-            basis: Basis::Curve { over, low: 0.0, high, nodes, times: Times::One },
+            basis: Basis::Curve { over, low: 0.0, high, nodes, times: Modulation::One },
             coefficients: lines.iter().map(mean).collect(),
         }
     };
-    vec![profile(Over::Column, &columns), profile(Over::Row, &rows)]
+    vec![profile(Coordinate::Column, &columns), profile(Coordinate::Row, &rows)]
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use rand_distr::{Distribution, StandardNormal};
 
-use super::super::lattice::Words;
+use super::super::lattice::RawHistogram;
 use super::super::shadow::Shadow;
 use super::*;
 use crate::plane::Plane;
@@ -40,7 +40,7 @@ fn field(rng: &mut Stream, error_px: impl Fn(usize) -> f64) -> Field {
         temperature_c: None,
         ambient_lux: None,
         light: Vec::new(),
-        words: Words::none(),
+        words: RawHistogram::none(),
         told: true,
         shadow: Shadow::default(),
         rim: None,

@@ -13,21 +13,21 @@ use super::missing_cells::{Cell, cells, fine};
 use super::missing_report::{Told, shadow_finding};
 use super::missing_search::{Judged, Losses};
 use super::missing_shapes::{Shape, Step, curves, steps};
-use super::reach::Reach;
-use super::shadow_test::band;
+use super::occlusion_scan::band;
+use super::reach::Extent;
 use crate::camera::{Camera, Rays};
 use crate::rng::Seed;
 use crate::terms::Axis;
 
 /// Losses that follow an axis.
 #[derive(Debug, Clone)]
-pub struct MissingFinding {
-    /// Id of effects.md; `None` where no family explains it.
+pub struct DropoutFinding {
+    /// Id in the catalogue; `None` where no family explains it.
     pub family: Option<&'static str>,
     pub axis: Axis,
     /// Where it matters, in the axis's unit.
     pub interval: [f64; 2],
-    /// As effects.md names them, each with value and standard error.
+    /// As the catalogue names them, each with value and standard error.
     pub parameters: Map<String, Value>,
     /// Chance that losses without a cause look as much like it anywhere in this layer.
     pub p: f64,
@@ -43,9 +43,9 @@ pub struct MissingFinding {
 
 /// All that was found missing.
 #[derive(Debug, Clone, Default)]
-pub struct MissingOutcome {
+pub struct DropoutOutcome {
     /// Largest gain first.
-    pub findings: Vec<MissingFinding>,
+    pub findings: Vec<DropoutFinding>,
     /// Families with the middle of the faintest whole step that 80 % of such recordings would
     /// show, in degrees or m: what begins farther out is not seen.
     pub detectable: Vec<(&'static str, &'static str, f64)>,
@@ -69,7 +69,7 @@ pub fn missing(
     camera: &Camera,
     _rays: &Rays,
     seed: Seed,
-) -> MissingOutcome {
+) -> DropoutOutcome {
     let told: Vec<bool> = fields.iter().map(|f| f.told).collect();
     let seen = Seen { cells: cells(survey, camera), fine: fine(survey), told };
     let mut outcome = losses(&seen, &survey.reach, camera, seed);
@@ -93,9 +93,9 @@ struct Seen {
     told: Vec<bool>,
 }
 
-fn losses(seen: &Seen, reach: &Reach, camera: &Camera, seed: Seed) -> MissingOutcome {
+fn losses(seen: &Seen, reach: &Extent, camera: &Camera, seed: Seed) -> DropoutOutcome {
     let views = &seen.cells;
-    let mut outcome = MissingOutcome::default();
+    let mut outcome = DropoutOutcome::default();
     if views.iter().filter(|v| !v.is_empty()).count() < FEWEST_VIEWS {
         return outcome;
     }

@@ -7,12 +7,12 @@ use nalgebra::{Matrix3, Vector3};
 use super::layers::Survey;
 use super::tiles::{SIDE, Tile};
 use crate::camera::Camera;
-use crate::terms::Place;
+use crate::terms::PixelContext;
 
 /// Pixel-frames of a patch, and how many of them have no measurement.
 #[derive(Debug, Clone, Copy)]
 pub struct Cell {
-    pub place: Place,
+    pub place: PixelContext,
     pub lost: f64,
     pub asked: f64,
 }
@@ -37,7 +37,7 @@ pub fn cells(survey: &Survey, camera: &Camera) -> Vec<Vec<Cell>> {
                 let key = ((p.v / side) as u32, (p.u / side) as u32, p.edge < RIM_PX);
                 groups.entry(key).or_default().push(i);
             }
-            let places: Vec<Place> = view.tiles.iter().map(|t| t.place).collect();
+            let places: Vec<PixelContext> = view.tiles.iter().map(|t| t.place).collect();
             groups
                 .values()
                 .filter(|g| g.len() >= FEWEST_TILES)

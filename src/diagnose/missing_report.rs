@@ -4,13 +4,13 @@ use serde_json::{Map, Value, json};
 
 use super::diagnosis::Curve;
 use super::field::Field;
-use super::missing::MissingFinding;
+use super::missing::DropoutFinding;
 use super::missing_cells::Cell;
 use super::missing_fit::{Fitted, Point, bounded, fit, points};
 use super::missing_search::Judged;
 use super::missing_shapes::{Shape, Step};
-use super::reach::Reach;
-use super::shadow_test::Band;
+use super::occlusion_scan::Band;
+use super::reach::Extent;
 use crate::camera::Camera;
 use crate::terms::{Axis, Basis};
 
@@ -25,7 +25,7 @@ pub struct Told<'a> {
     pub told: &'a [bool],
     /// Share lost everywhere.
     pub base: f64,
-    pub reach: &'a Reach,
+    pub reach: &'a Extent,
     pub camera: &'a Camera,
 }
 
@@ -38,8 +38,8 @@ impl Told<'_> {
         won: &Judged,
         rivals: Vec<(&'static str, f64)>,
         p: f64,
-    ) -> MissingFinding {
-        let mut finding = MissingFinding {
+    ) -> DropoutFinding {
+        let mut finding = DropoutFinding {
             family: won.shape.family(),
             axis: won.shape.axis(),
             interval: [0.0; 2],
@@ -57,7 +57,7 @@ impl Told<'_> {
         finding
     }
 
-    fn step(&self, step: Step, finding: &mut MissingFinding) {
+    fn step(&self, step: Step, finding: &mut DropoutFinding) {
         let span = if step.axis == Axis::Theta { self.reach.theta } else { self.reach.z };
         let all = bounded(points(self.fine, &|c| step.at(&c.place), span), &step, self.told);
         let own = Fitted { step, std_error: [None; 3] };
@@ -69,7 +69,7 @@ impl Told<'_> {
         finding.curve = binned(&all, step.axis, span, loss);
     }
 
-    fn curve(&self, axis: Axis, basis: &Basis, finding: &mut MissingFinding) {
+    fn curve(&self, axis: Axis, basis: &Basis, finding: &mut DropoutFinding) {
         let (span, at): ([f64; 2], At) = match basis {
             Basis::Curve { over, low, high, .. } => {
                 let over = *over;
@@ -162,7 +162,7 @@ fn binned(
 }
 
 /// A band beside the target.
-pub fn shadow_finding(band: Band, fields: &[Field]) -> MissingFinding {
+pub fn shadow_finding(band: Band, fields: &[Field]) -> DropoutFinding {
     let mut parameters = Map::new();
     if band.lawful {
         parameters.insert("share".into(), estimate(band.share[0], Some(band.share[1])));
@@ -174,7 +174,7 @@ pub fn shadow_finding(band: Band, fields: &[Field]) -> MissingFinding {
         lost += side.map_or(0.0, |s| s.width_px * s.rows as f64);
         asked += f.pixels.len() as f64;
     }
-    MissingFinding {
+    DropoutFinding {
         family: band.lawful.then_some("occlusion-shadow"),
         axis: Axis::EdgeDistance,
         interval: [0.0, band.curve.y.iter().copied().fold(0.0, f64::max)],

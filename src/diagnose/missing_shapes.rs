@@ -1,9 +1,9 @@
 //! What losses may follow: steps on lawful axes, which have a name, and curves, which have none.
 
 use super::missing_cells::{Cell, odds};
-use super::reach::Reach;
+use super::reach::Extent;
 use crate::camera::Camera;
-use crate::terms::{Axis, Basis, Over, Place, Times};
+use crate::terms::{Axis, Basis, Coordinate, Modulation, PixelContext};
 
 /// Beyond `middle` a share is lost; a negative width loses what is below it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,7 +19,7 @@ impl Step {
         if self.axis == Axis::Theta { "grazing-dropout" } else { "range-dropout" }
     }
 
-    pub fn at(&self, p: &Place) -> f64 {
+    pub fn at(&self, p: &PixelContext) -> f64 {
         if self.axis == Axis::Theta { p.theta } else { p.z }
     }
 
@@ -64,7 +64,7 @@ const LEAST_TILT: f64 = 0.1;
 const LEAST_RANGE: f64 = 1.1;
 
 /// All steps on lawful axes.
-pub fn steps(reach: &Reach) -> Vec<Step> {
+pub fn steps(reach: &Extent) -> Vec<Step> {
     let mut all = Vec::new();
     let mut add = |axis, middle, width| {
         all.extend([1.0, 0.3].map(|share| Step { axis, middle, width, share }));
@@ -92,26 +92,26 @@ pub fn steps(reach: &Reach) -> Vec<Step> {
 }
 
 /// Curves without a name.
-pub fn curves(camera: &Camera, reach: &Reach) -> Vec<Shape> {
+pub fn curves(camera: &Camera, reach: &Extent) -> Vec<Shape> {
     let (width, height) = (camera.width as f64, camera.height as f64);
     let mut all = Vec::new();
     let mut curve = |axis, over, [low, high]: [f64; 2], nodes| {
         if high > low {
-            let basis = Basis::Curve { over, low, high, nodes, times: Times::One };
+            let basis = Basis::Curve { over, low, high, nodes, times: Modulation::One };
             all.push(Shape::Curve(axis, basis));
         }
     };
-    curve(Axis::Radius, Over::Radius, [0.0, 1.0], 8);
-    curve(Axis::Column, Over::Column, [0.0, width], 16);
-    curve(Axis::Row, Over::Row, [0.0, height], 12);
-    curve(Axis::EdgeDistance, Over::Edge, [0.0, 24.0], 5);
-    curve(Axis::SessionTime, Over::Session, reach.session, 6);
-    curve(Axis::Z, Over::Z, reach.z, 10);
-    curve(Axis::Theta, Over::Theta, reach.theta, 8);
+    curve(Axis::Radius, Coordinate::Radius, [0.0, 1.0], 8);
+    curve(Axis::Column, Coordinate::Column, [0.0, width], 16);
+    curve(Axis::Row, Coordinate::Row, [0.0, height], 12);
+    curve(Axis::EdgeDistance, Coordinate::Edge, [0.0, 24.0], 5);
+    curve(Axis::SessionTime, Coordinate::Session, reach.session, 6);
+    curve(Axis::Z, Coordinate::Z, reach.z, 10);
+    curve(Axis::Theta, Coordinate::Theta, reach.theta, 8);
     if reach.light[1] > 1.05 * reach.light[0] {
-        curve(Axis::Intensity, Over::Light, reach.light, 8);
+        curve(Axis::Intensity, Coordinate::Light, reach.light, 8);
     }
-    let map = Basis::Map { width, height, across: 8, down: 6, times: Times::One };
+    let map = Basis::Map { width, height, across: 8, down: 6, times: Modulation::One };
     all.push(Shape::Curve(Axis::Pixel, map));
     all
 }

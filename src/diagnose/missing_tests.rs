@@ -2,7 +2,7 @@ use super::*;
 use crate::plane::Plane;
 use crate::rng::Stream;
 use crate::simulate::kinect_v1;
-use crate::terms::Place;
+use crate::terms::PixelContext;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -10,7 +10,11 @@ const VIEWS: usize = 14;
 
 /// Cells of views whose pixels are lost by `loss`, and by chance: in some views more than in
 /// others, and in clumps.
-fn session(share: f64, rng: &mut Stream, loss: impl Fn(&Place) -> f64) -> (Vec<Vec<Cell>>, Camera) {
+fn session(
+    share: f64,
+    rng: &mut Stream,
+    loss: impl Fn(&PixelContext) -> f64,
+) -> (Vec<Vec<Cell>>, Camera) {
     let camera = kinect_v1(1).camera;
     let mut normal = {
         let mut own = crate::rng::Seed(rng.random()).stream("normal");
@@ -31,7 +35,7 @@ fn session(share: f64, rng: &mut Stream, loss: impl Fn(&Place) -> f64) -> (Vec<V
             if !(0.3..5.0).contains(&depth) {
                 continue;
             }
-            let place = Place {
+            let place = PixelContext {
                 u,
                 v,
                 x,
@@ -43,7 +47,7 @@ fn session(share: f64, rng: &mut Stream, loss: impl Fn(&Place) -> f64) -> (Vec<V
                 edge: 30.0,
                 light: 1.0,
                 side: 40.0,
-                ..Place::default()
+                ..PixelContext::default()
             };
             let by_chance = share * (level + clumps[row / 2 * 8 + column / 2] - 1.0).exp();
             let p = 1.0 - (1.0 - by_chance.min(1.0)) * (1.0 - loss(&place));
@@ -56,11 +60,11 @@ fn session(share: f64, rng: &mut Stream, loss: impl Fn(&Place) -> f64) -> (Vec<V
     (views.collect(), camera)
 }
 
-fn find(views: &[Vec<Cell>], camera: &Camera, seed: Seed) -> MissingOutcome {
-    let of = |value: fn(&Place) -> f64| {
+fn find(views: &[Vec<Cell>], camera: &Camera, seed: Seed) -> DropoutOutcome {
+    let of = |value: fn(&PixelContext) -> f64| {
         crate::stats::range(views.iter().flatten().map(|c| value(&c.place)))
     };
-    let mut reach = Reach::of(std::iter::empty());
+    let mut reach = Extent::of(std::iter::empty());
     reach.z = of(|p| p.z);
     reach.theta = of(|p| p.theta);
     reach.session = of(|p| p.session_s);
@@ -69,7 +73,7 @@ fn find(views: &[Vec<Cell>], camera: &Camera, seed: Seed) -> MissingOutcome {
     losses(&seen, &reach, camera, seed)
 }
 
-fn parameter(finding: &MissingFinding, name: &str) -> [f64; 2] {
+fn parameter(finding: &DropoutFinding, name: &str) -> [f64; 2] {
     ["value", "std_error"].map(|of| finding.parameters[name][of].as_f64().unwrap())
 }
 

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::diagnosis::{Finding, NextView};
 use super::evidence::Evidence;
 use super::findings::Scene;
-use super::reach::Reach;
+use super::reach::Extent;
 use super::search::{Chosen, Outcome, ViewData, evidence_of};
 use crate::camera::{Camera, Rays};
 use crate::model::SigmaModel;
@@ -39,7 +39,7 @@ pub struct Outlook<'a> {
     pub scale_px_m: f64,
     pub sigma: &'a SigmaModel,
     /// Extent of the target in use: the next view has no larger one.
-    pub reach: &'a Reach,
+    pub reach: &'a Extent,
     /// Weight of a pixel: over its variance for the mean, as it is for the variance.
     pub worth: f64,
     /// Of a view's own level or plane, as the recording's views have it.
@@ -268,7 +268,7 @@ mod tests {
     use super::*;
     use crate::model::{Domain, Form, PAPER_EQ1};
     use crate::simulate::kinect_v1;
-    use crate::terms::{Basis, Place};
+    use crate::terms::{Basis, PixelContext};
 
     fn sigma() -> SigmaModel {
         let domain = Domain { z_m: [0.3, 9.0], theta_rad: [0.0, 1.3] };
@@ -276,9 +276,9 @@ mod tests {
     }
 
     /// Of a target of this size, m.
-    fn reach([width, height]: [f64; 2]) -> Reach {
+    fn reach([width, height]: [f64; 2]) -> Extent {
         let none = [0.0, 0.0];
-        Reach {
+        Extent {
             disparity: none,
             z: none,
             theta: none,
@@ -316,7 +316,7 @@ mod tests {
         };
         let frontal: Vec<ViewData> =
             [0.9, 1.3].iter().filter_map(|&z| outlook.view(&Plane::tilted(z, 0.0, 0.0))).collect();
-        assert!(frontal[0].places.iter().all(|p: &Place| p.z > 0.0));
+        assert!(frontal[0].places.iter().all(|p: &PixelContext| p.z > 0.0));
         let there = prospects(&frontal, best, rival, &outlook);
         let alone = prospects(&[], best, rival, &outlook);
         (there, alone)

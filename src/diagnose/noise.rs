@@ -4,7 +4,7 @@ use serde_json::{Map, json};
 use statrs::distribution::{Continuous, ContinuousCDF, StudentsT};
 
 use super::frames::frames;
-use super::known::Known;
+use super::known::KnownTerms;
 use super::parameters::estimate;
 use super::structure::{GAUSSIAN_TAIL, Structure};
 use crate::terms::{Axis, Statistic};
@@ -71,7 +71,7 @@ impl Mean {
 }
 
 /// All mismatches of structure at this error rate each.
-pub fn hanging(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
+pub fn hanging(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {
     let mut found = Vec::new();
     found.extend(window(views, known, level));
     found.extend(in_time(views, known, level));
@@ -99,7 +99,7 @@ fn nats(m: &Mean, expected: f64) -> f64 {
 /// Windows that differ by less than this factor are the same.
 const SAME_WINDOW: f64 = 1.12;
 
-fn window(views: &[Structure], known: &Known, level: f64) -> Option<Hanging> {
+fn window(views: &[Structure], known: &KnownTerms, level: f64) -> Option<Hanging> {
     let m = Mean::of(views, |s| s.window_px.map(f64::ln))?;
     let expected = known.parameter("spatial-correlation", "length_px").unwrap_or(1.0).max(1.0);
     let length = m.value.exp();
@@ -201,7 +201,7 @@ fn of_frames(
     }
 }
 
-fn in_time(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
+fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {
     let fixed = Mean::of_pairs(views, |s| s.fixed_px2);
     let variance = variance_px2(views);
     let known_px = known.parameter("fixed-pattern-noise", "sigma_px").unwrap_or(0.0);
@@ -283,7 +283,7 @@ fn still_share([c1, c2, c3]: [f64; 3], three: bool) -> f64 {
     s.clamp(0.0, c3.max(0.0))
 }
 
-fn lines(views: &[Structure], known: &Known, level: f64) -> Vec<Hanging> {
+fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {
     let variance = variance_px2(views);
     let known_px = known.parameter("row-noise", "sigma_px").unwrap_or(0.0);
     let line = |families, statistic, axis, expected_px2, words| Shared {
@@ -330,7 +330,7 @@ const FEWEST_READINGS: f64 = 5000.0;
 
 /// Are the residuals' tails heavier than a Gaussian's? `uneven` says that the noise is of unequal
 /// size where no law was found for it, which makes a tail too.
-pub fn tails(views: &[Structure], known: &Known, level: f64, uneven: bool) -> Option<Hanging> {
+pub fn tails(views: &[Structure], known: &KnownTerms, level: f64, uneven: bool) -> Option<Hanging> {
     if known.has("heavy-tails") {
         return None;
     }

@@ -19,7 +19,7 @@ fn normal(rng: &mut Stream) -> f64 {
 }
 
 /// A model that knows of one parameter.
-fn knowing(id: &str, name: &str, value: f64) -> Known {
+fn knowing(id: &str, name: &str, value: f64) -> KnownTerms {
     let mut parameters = Map::new();
     parameters.insert(name.into(), json!(value));
     let model = NoiseModel {
@@ -29,7 +29,7 @@ fn knowing(id: &str, name: &str, value: f64) -> Known {
         fit: FitSummary::default(),
         provenance: Provenance::now(None),
     };
-    Known::of(&model, &kinect_v1(1).camera)
+    KnownTerms::of(&model, &kinect_v1(1).camera)
 }
 
 /// Statistics of views without any structure, measured with errors.
@@ -71,7 +71,7 @@ fn structures_of_nothing_amount_to_nothing() {
     let mut alarms = Vec::new();
     for seed in 0..400 {
         let mut rng = Seed(seed).stream("noise/null");
-        alarms.extend(names(&hanging(&plain(&mut rng), &Known::default(), LEVEL)));
+        alarms.extend(names(&hanging(&plain(&mut rng), &KnownTerms::default(), LEVEL)));
     }
     println!("{} false alarms in 400: {alarms:?}", alarms.len());
     assert!(alarms.len() <= 10, "{alarms:?}");
@@ -95,7 +95,7 @@ fn each_structure_has_its_name_and_size() {
     for (add, name, key, value) in cases {
         let mut rng = Seed(1).stream(name);
         let views = with(&mut rng, add);
-        let found = hanging(&views, &Known::default(), LEVEL);
+        let found = hanging(&views, &KnownTerms::default(), LEVEL);
         assert_eq!(names(&found), [name]);
         let [estimate, error] = parameter(&found[0], key);
         // Six standard errors, with 13 degrees of freedom: 5e-5.
@@ -135,7 +135,7 @@ fn a_filter_in_time_is_a_filter_and_is_no_news_when_known() {
     };
     let mut rng = Seed(2).stream("noise/filter");
     let views = with(&mut rng, add);
-    let found = hanging(&views, &Known::default(), LEVEL);
+    let found = hanging(&views, &KnownTerms::default(), LEVEL);
     assert_eq!(names(&found)[0], "temporal-correlation");
     let [value, error] = parameter(&found[0], "rho");
     assert!((value - rho).abs() < 6.0 * error && error < 0.05, "{value} +- {error}");
@@ -150,7 +150,7 @@ fn two_frames_leave_two_names() {
     let add = |s: &mut Structure| {
         s.lagged = [s.lagged[0].map(|c| c + 0.4), None, None];
     };
-    let found = hanging(&with(&mut rng, add), &Known::default(), LEVEL);
+    let found = hanging(&with(&mut rng, add), &KnownTerms::default(), LEVEL);
     assert_eq!(found.len(), 1);
     let mut both = found[0].families.clone();
     both.sort_unstable();
@@ -167,7 +167,7 @@ fn columns_that_move_as_one_have_no_name() {
     ];
     for (add, statistic) in cases {
         let mut rng = Seed(4).stream("noise/columns");
-        let found = hanging(&with(&mut rng, add), &Known::default(), LEVEL);
+        let found = hanging(&with(&mut rng, add), &KnownTerms::default(), LEVEL);
         assert_eq!(found.len(), 1);
         assert!(found[0].families.is_empty() && found[0].words.is_some());
         assert_eq!((found[0].statistic, found[0].axis), (statistic, Axis::Column));
@@ -204,7 +204,7 @@ fn frames_that_scatter_as_their_pixels_do_not_move() {
         .filter(|&seed| {
             let mut rng = Seed(seed).stream("noise/frames");
             let views = moving(0.0, 0.0, &mut rng);
-            names(&hanging(&views, &Known::default(), LEVEL))
+            names(&hanging(&views, &KnownTerms::default(), LEVEL))
                 .iter()
                 .any(|n| ["frame-jitter", "target-motion"].contains(n))
         })
@@ -215,13 +215,13 @@ fn frames_that_scatter_as_their_pixels_do_not_move() {
 #[test]
 fn jitter_and_motion_are_told_apart() {
     let mut rng = Seed(6).stream("noise/jitter");
-    let found = hanging(&moving(0.02, 0.0, &mut rng), &Known::default(), LEVEL);
+    let found = hanging(&moving(0.02, 0.0, &mut rng), &KnownTerms::default(), LEVEL);
     assert_eq!(names(&found), ["frame-jitter"]);
     let [value, error] = parameter(&found[0], "sigma_px");
     assert!((value - 0.02).abs() < 5.0 * error && error < 0.004, "{value} +- {error}");
     let known = knowing("frame-jitter", "sigma_px", 0.02);
     assert!(hanging(&moving(0.02, 0.0, &mut rng), &known, LEVEL).is_empty());
-    let found = hanging(&moving(0.0, 0.05, &mut rng), &Known::default(), LEVEL);
+    let found = hanging(&moving(0.0, 0.05, &mut rng), &KnownTerms::default(), LEVEL);
     assert_eq!(names(&found), ["target-motion"]);
 }
 
@@ -238,7 +238,7 @@ fn motion_is_what_all_views_have_in_common() {
                 jitter.velocity_mps *= -1.0;
             }
         }
-        hanging(&views, &Known::default(), LEVEL)
+        hanging(&views, &KnownTerms::default(), LEVEL)
     };
     assert!(!names(&resembling(0.003, true)).contains(&"target-motion"));
     let found = resembling(0.003, false);
@@ -289,12 +289,12 @@ fn tails_are_heavy_when_most_views_have_them() {
         };
         (0..VIEWS).map(view).collect()
     };
-    assert!(tails(&tailed(GAUSSIAN_TAIL, VIEWS), &Known::default(), 1e-3, false).is_none());
+    assert!(tails(&tailed(GAUSSIAN_TAIL, VIEWS), &KnownTerms::default(), 1e-3, false).is_none());
     assert!(
-        tails(&tailed(2e-3, 4), &Known::default(), 1e-3, false).is_none(),
+        tails(&tailed(2e-3, 4), &KnownTerms::default(), 1e-3, false).is_none(),
         "in a few views only"
     );
-    let found = tails(&tailed(2e-3, VIEWS), &Known::default(), 1e-3, false).expect("a tail");
+    let found = tails(&tailed(2e-3, VIEWS), &KnownTerms::default(), 1e-3, false).expect("a tail");
     assert_eq!(found.families, ["heavy-tails"]);
     let fraction = parameter(&found, "fraction")[0];
     assert!(fraction > 2e-3 && fraction < 0.2, "{fraction}");
@@ -307,7 +307,7 @@ fn one_view_is_no_sample() {
     let mut rng = Seed(7).stream("noise/one");
     let add = |s: &mut Structure| s.window_px = Some(5.0);
     let one = &with(&mut rng, add)[..1];
-    assert!(hanging(one, &Known::default(), LEVEL).is_empty());
-    assert!(hanging(&[], &Known::default(), LEVEL).is_empty());
-    assert!(tails(&[], &Known::default(), 1e-3, false).is_none());
+    assert!(hanging(one, &KnownTerms::default(), LEVEL).is_empty());
+    assert!(hanging(&[], &KnownTerms::default(), LEVEL).is_empty());
+    assert!(tails(&[], &KnownTerms::default(), 1e-3, false).is_none());
 }

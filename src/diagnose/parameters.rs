@@ -3,8 +3,8 @@
 use nalgebra::DMatrix;
 use serde_json::{Map, Value, json};
 
-use super::reach::Reach;
-use crate::terms::{Basis, DISPARITY_UNIT_PX, Place};
+use super::reach::Extent;
+use crate::terms::{Basis, DISPARITY_UNIT_PX, PixelContext};
 
 /// A parameter with its standard error.
 pub fn estimate(value: f64, std_error: f64) -> Value {
@@ -39,12 +39,12 @@ fn form(basis: &Basis) -> f64 {
     }
 }
 
-/// The parameters of effects.md for a fitted shape; errors by the delta method.
+/// The catalogue's parameters for a fitted shape; errors by the delta method.
 pub fn parameters(
     basis: &Basis,
     beta: &[f64],
     covariance: &DMatrix<f64>,
-    reach: &Reach,
+    reach: &Extent,
 ) -> Map<String, Value> {
     let mut map = Map::new();
     let mut add = |name: &str, of: &dyn Fn(&[f64]) -> f64| {
@@ -67,20 +67,22 @@ pub fn parameters(
         Basis::Locking { period_px, .. } => {
             add("amplitude_px", &|b| {
                 greatest(|t| {
-                    let p = Place { disparity: t * period_px, ..Place::default() };
+                    let p = PixelContext { disparity: t * period_px, ..PixelContext::default() };
                     value(basis, b, p)
                 })
             });
         }
         Basis::Banding { period_px, .. } => {
             add("amplitude_px", &|b| {
-                greatest(|t| value(basis, b, Place { u: t * period_px, ..Place::default() }))
+                greatest(|t| {
+                    value(basis, b, PixelContext { u: t * period_px, ..PixelContext::default() })
+                })
             });
         }
         Basis::EdgeMixing { .. } => add("amplitude_px", &|b| b[0]),
         Basis::RangeExponent { pivot_m, .. } => add("excess", &|b| {
             // Between the ends of what was seen.
-            let at = |z: f64| value(basis, b, Place { z, ..Place::default() });
+            let at = |z: f64| value(basis, b, PixelContext { z, ..PixelContext::default() });
             let [near, far] = reach.z;
             let _ = pivot_m;
             0.5 * (at(far) - at(near)) / (far / near).ln().max(1e-3)
@@ -127,14 +129,14 @@ pub fn parameters(
     map
 }
 
-fn value(basis: &Basis, beta: &[f64], place: Place) -> f64 {
+fn value(basis: &Basis, beta: &[f64], place: PixelContext) -> f64 {
     basis.value(beta, &place, &mut Vec::new())
 }
 
-fn radius_place(radius: f64, reach: &Reach) -> Place {
+fn radius_place(radius: f64, reach: &Extent) -> PixelContext {
     let middle = (reach.disparity[0] * reach.disparity[1]).sqrt();
     let disparity = if middle.is_finite() { middle } else { DISPARITY_UNIT_PX };
-    Place { radius, disparity, ..Place::default() }
+    PixelContext { radius, disparity, ..PixelContext::default() }
 }
 
 /// The k of k r^2 + constant that comes nearest to a curve over 0 to `far`.

@@ -6,8 +6,8 @@ use rand_distr::{Distribution, StandardNormal};
 use super::*;
 use crate::rng::Seed;
 
-fn reach() -> Reach {
-    Reach {
+fn reach() -> Extent {
+    Extent {
         disparity: [10.0, 40.0],
         z: [0.8, 3.2],
         theta: [0.0, 1.0],

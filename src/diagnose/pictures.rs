@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::engine::Diagnosed;
 use super::field::Field;
-use super::known::Known;
+use super::known::KnownTerms;
 use crate::camera::Rays;
 use crate::frame::Frame;
 use crate::measure::{MeasureOptions, Workbench};
@@ -46,7 +46,7 @@ pub fn pictures(
     retake: Retake<'_>,
 ) -> Vec<ViewPictures> {
     let bench = Workbench::new(sensor, MeasureOptions::default());
-    let known = Known::of(model, &sensor.camera);
+    let known = KnownTerms::of(model, &sensor.camera);
     let start = done.fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
     worth_seeing(done)
         .into_par_iter()

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::field::Field;
-use super::known::Known;
+use super::known::KnownTerms;
 use super::layers::Survey;
 use super::noise::Hanging;
 use super::search::Outcome;
@@ -14,7 +14,7 @@ use crate::measure::Workbench;
 use crate::terms::{Statistic, Term};
 
 /// How much frames of a view resemble one another, by lag, where that was found to be noise.
-pub(super) fn common(structure: &[Structure], hangs: &[Hanging], known: &Known) -> [f64; 3] {
+pub(super) fn common(structure: &[Structure], hangs: &[Hanging], known: &KnownTerms) -> [f64; 3] {
     let in_time = ["frozen-noise", "temporal-correlation"];
     let told = hangs.iter().flat_map(|h| &h.families).any(|f| in_time.contains(f))
         || in_time.iter().any(|id| known.has(id));

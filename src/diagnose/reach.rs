@@ -2,11 +2,11 @@
 
 use super::tiles::Tile;
 use crate::stats::range;
-use crate::terms::Place;
+use crate::terms::PixelContext;
 
 /// Least and greatest of each axis.
 #[derive(Debug, Clone, Copy)]
-pub struct Reach {
+pub struct Extent {
     pub disparity: [f64; 2],
     pub z: [f64; 2],
     pub theta: [f64; 2],
@@ -20,10 +20,10 @@ pub struct Reach {
     pub edge: f64,
 }
 
-impl Reach {
+impl Extent {
     pub fn of<'a>(tiles: impl Iterator<Item = &'a Tile> + Clone) -> Self {
-        let of = |value: fn(&Place) -> f64| range(tiles.clone().map(|t| value(&t.place)));
-        Reach {
+        let of = |value: fn(&PixelContext) -> f64| range(tiles.clone().map(|t| value(&t.place)));
+        Extent {
             disparity: of(|p| p.disparity),
             z: of(|p| p.z),
             theta: of(|p| p.theta),

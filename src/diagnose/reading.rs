@@ -6,11 +6,12 @@ use rayon::prelude::*;
 use serde_json::Map;
 
 use super::diagnosis::Finding;
-use super::engine::{FEWEST_VIEWS, Progress};
+use super::engine::FEWEST_VIEWS;
 use super::field::Field;
 use super::findings;
-use super::known::Known;
+use super::known::KnownTerms;
 use super::parameters::estimate;
+use crate::Progress;
 use crate::error::{Error, Result};
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
@@ -36,7 +37,7 @@ impl Taken {
         recording: &Recording,
         bench: &Workbench<'_>,
         model: &NoiseModel,
-        known: &Known,
+        known: &KnownTerms,
         progress: Progress<'_>,
     ) -> Result<Self> {
         let (mut fields, mut excluded) = read(recording, bench, model, known, progress);
@@ -107,7 +108,7 @@ fn as_ranges(
     recording: &Recording,
     bench: &Workbench<'_>,
     model: &NoiseModel,
-    known: &Known,
+    known: &KnownTerms,
     flat: usize,
 ) -> Option<(Vec<Field>, Vec<Excluded>)> {
     if 2 * flat >= recording.views.len() || known.has("range-not-depth") {
@@ -141,7 +142,7 @@ pub(super) fn read(
     recording: &Recording,
     bench: &Workbench<'_>,
     model: &NoiseModel,
-    known: &Known,
+    known: &KnownTerms,
     progress: Progress<'_>,
 ) -> (Vec<Field>, Vec<Excluded>) {
     let times = recording.views.iter().filter_map(|v| v.depth.first()).map(|f| f.timestamp);

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use serde_json::Map;
 
 use super::diagnosis::{Alternative, CannotTell, Finding, Size, Status};
-use super::known::Known;
+use super::known::KnownTerms;
 use super::parameters::estimate;
 use super::search::NoiseGains;
 use crate::rng::Seed;
@@ -147,7 +147,7 @@ const LEAST_M: f64 = 0.0015;
 const AS_GOOD_NATS: f64 = 3.0;
 
 /// What the references tell, if anything.
-pub fn findings(laws: &[Law], known: &Known, level: f64, seed: Seed) -> Vec<Finding> {
+pub fn findings(laws: &[Law], known: &KnownTerms, level: f64, seed: Seed) -> Vec<Finding> {
     let nulls: Vec<&Null> = laws.iter().map(|l| &l.null).collect();
     if nulls.is_empty() {
         return Vec::new();

@@ -39,7 +39,7 @@ impl Rim {
             on[i as usize] = k as u32;
         }
         let disparity = |i: usize| {
-            let z = f64::from(table.metres(frame.words[i]));
+            let z = f64::from(table.metres(frame.raw[i]));
             if z.is_finite() { field.scale_px_m / z } else { f64::NAN }
         };
         let plane = |i: usize| {

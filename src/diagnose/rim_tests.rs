@@ -1,6 +1,6 @@
 //! Pictures of a board before a wall, whose edge is sharp or mixed over a known width.
 
-use super::super::lattice::Words;
+use super::super::lattice::RawHistogram;
 use super::super::shadow::Shadow;
 use super::*;
 use crate::camera::Camera;
@@ -26,13 +26,13 @@ fn off(u: usize, v: usize) -> usize {
 fn picture(camera: &Camera, beside: impl Fn(usize) -> Option<f64>) -> (Field, Frame) {
     let (width, height) = (camera.width, camera.height);
     let plane = Plane::tilted(BOARD_M, 0.0, 0.0);
-    let mut frame = Frame { width, height, words: vec![0; width * height] };
+    let mut frame = Frame { width, height, raw: vec![0; width * height] };
     let mut pixels = Vec::new();
     for v in 0..height {
         for u in 0..width {
             let away = off(u, v);
             let z = if away == 0 { BOARD_M } else { beside(away).unwrap_or(WALL_M) };
-            frame.words[v * width + u] = CODE.word(z);
+            frame.raw[v * width + u] = CODE.raw(z);
             if away == 0 {
                 pixels.push((v * width + u) as u32);
             }
@@ -60,7 +60,7 @@ fn picture(camera: &Camera, beside: impl Fn(usize) -> Option<f64>) -> (Field, Fr
         temperature_c: None,
         ambient_lux: None,
         light: Vec::new(),
-        words: Words::none(),
+        words: RawHistogram::none(),
         told: false,
         shadow: Shadow::default(),
         rim: None,

@@ -7,11 +7,11 @@ use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain, Null, Rows, gain};
 use super::tiles::SIDE;
 use crate::rng::Seed;
-use crate::terms::{Basis, Over, Place, Term};
+use crate::terms::{Basis, Coordinate, PixelContext, Term};
 
 /// One view's samples.
 pub struct ViewData {
-    pub places: Vec<Place>,
+    pub places: Vec<PixelContext>,
     pub response: Vec<f64>,
     pub weight: Vec<f64>,
     /// Row-major, as many columns as `precision` has entries.
@@ -225,10 +225,10 @@ impl NoiseGains {
 
 /// A view made ready for the candidates.
 struct Prepared<'a> {
-    fine: (&'a [Place], Rows),
-    coarse: (&'a [Place], Rows),
+    fine: (&'a [PixelContext], Rows),
+    coarse: (&'a [PixelContext], Rows),
     /// The fine samples gathered by one coordinate, with a place for each group.
-    groups: Vec<(Over, Vec<Place>, Rows)>,
+    groups: Vec<(Coordinate, Vec<PixelContext>, Rows)>,
 }
 
 struct Layer<'a> {
@@ -368,7 +368,6 @@ impl<'a> Layer<'a> {
         };
         let (families, curves) = (ranked(true, &fair), ranked(false, &total));
         let threshold = noise.threshold(self.rules.level);
-        self.trace(judged, threshold);
         let best_curve = curves.first().map_or(f64::NEG_INFINITY, |&i| total(i));
         let best_family = families.first().map_or(f64::NEG_INFINITY, |&i| fair(i));
         let named = families
@@ -509,23 +508,6 @@ impl<'a> Layer<'a> {
         }
         chosen.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     }
-
-    fn trace(&self, judged: &[Option<Judged>], threshold: f64) {
-        if std::env::var_os("KINOISE_TRACE").is_none() {
-            return;
-        }
-        let total = |i: usize| judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| j.gain.total);
-        let mut order: Vec<usize> = (0..self.candidates.len()).collect();
-        order.sort_by(|&a, &b| total(b).total_cmp(&total(a)));
-        eprintln!("threshold {threshold:.1}");
-        for &i in order.iter().take(8) {
-            let c = &self.candidates[i];
-            let text = format!("{:?}", c.basis);
-            let dispersion = judged[i].as_ref().map_or(0.0, |j| j.null.dispersion);
-            let text = &text[..text.len().min(90)];
-            eprintln!("  {:9.1} /{dispersion:5.2} {:?} {text}", total(i), c.family);
-        }
-    }
 }
 
 /// A nameless curve that is in already, perhaps with other nodes.
@@ -547,7 +529,7 @@ fn one_way(basis: &Basis, beta: &[f64], [near, far]: [f64; 2]) -> bool {
     let mut row = Vec::new();
     let mut at = |k: usize| {
         let z = near * (far / near).powf(k as f64 / (NODES - 1) as f64);
-        basis.value(beta, &Place { z, ..Place::default() }, &mut row)
+        basis.value(beta, &PixelContext { z, ..PixelContext::default() }, &mut row)
     };
     let values: Vec<f64> = (0..NODES).map(&mut at).collect();
     let (mut up, mut down) = (0.0, 0.0);
@@ -647,10 +629,10 @@ fn prepare<'a>(
     let places = &fine.places;
     let side = SIDE as f64;
     let groups = vec![
-        gather(&rows_fine, places, Over::Column, side),
-        gather(&rows_fine, places, Over::Row, side),
-        gather(&rows_fine, places, Over::Disparity, DISPARITY_GROUP_PX),
-        gather(&rows_fine, places, Over::Edge, EDGE_GROUP_PX),
+        gather(&rows_fine, places, Coordinate::Column, side),
+        gather(&rows_fine, places, Coordinate::Row, side),
+        gather(&rows_fine, places, Coordinate::Disparity, DISPARITY_GROUP_PX),
+        gather(&rows_fine, places, Coordinate::Edge, EDGE_GROUP_PX),
     ];
     Some(Prepared {
         groups,
@@ -664,11 +646,16 @@ const DISPARITY_GROUP_PX: f64 = 1.0 / 30.0;
 const EDGE_GROUP_PX: f64 = 0.5;
 
 /// Samples in steps of one coordinate; each group lies where its samples do on average.
-fn gather(rows: &Rows, places: &[Place], over: Over, step: f64) -> (Over, Vec<Place>, Rows) {
+fn gather(
+    rows: &Rows,
+    places: &[PixelContext],
+    over: Coordinate,
+    step: f64,
+) -> (Coordinate, Vec<PixelContext>, Rows) {
     let low = places.iter().map(|p| over.value(p)).fold(f64::INFINITY, f64::min);
     let key = |i: usize| ((over.value(&places[i]) - low) / step) as usize;
     let count = (0..places.len()).map(|i| key(i) + 1).max().unwrap_or(0);
-    let mut sums = vec![(Place::default(), [0.0; 6], 0.0); count];
+    let mut sums = vec![(PixelContext::default(), [0.0; 6], 0.0); count];
     for (i, p) in places.iter().enumerate() {
         let (first, sum, n) = &mut sums[key(i)];
         *first = *p;
@@ -676,9 +663,9 @@ fn gather(rows: &Rows, places: &[Place], over: Over, step: f64) -> (Over, Vec<Pl
         let values = [p.u, p.v, p.disparity, p.z, p.edge, p.radius];
         sum.iter_mut().zip(values).for_each(|(s, v)| *s += v);
     }
-    let mean = |(place, sum, n): &(Place, [f64; 6], f64)| {
+    let mean = |(place, sum, n): &(PixelContext, [f64; 6], f64)| {
         let [u, v, disparity, z, edge, radius] = sum.map(|s| s / f64::max(*n, 1.0));
-        Place { u, v, disparity, z, edge, radius, ..*place }
+        PixelContext { u, v, disparity, z, edge, radius, ..*place }
     };
     (over, sums.iter().map(mean).collect(), rows.grouped(count, key))
 }
@@ -686,7 +673,7 @@ fn gather(rows: &Rows, places: &[Place], over: Over, step: f64) -> (Over, Vec<Pl
 impl Prepared<'_> {
     fn evidence(&self, basis: &Basis) -> Evidence {
         let alone = basis.alone().and_then(|over| self.groups.iter().find(|g| g.0 == over));
-        let (places, rows): (&[Place], &Rows) = if let Some((_, places, rows)) = alone {
+        let (places, rows): (&[PixelContext], &Rows) = if let Some((_, places, rows)) = alone {
             (places, rows)
         } else if basis.is_fine() {
             (self.fine.0, &self.fine.1)

@@ -5,7 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::rng::{Seed, Stream};
-use crate::terms::{Over, Times};
+use crate::terms::{Coordinate, Modulation};
 
 const VIEWS: usize = 12;
 const SAMPLES: usize = 120;
@@ -20,23 +20,23 @@ const RULES: Rules = Rules {
 };
 
 /// Places all over the picture with a free level a view; noise of unit variance, and a bias.
-fn session(rng: &mut Stream, bias: impl Fn(&Place) -> f64) -> Vec<ViewData> {
+fn session(rng: &mut Stream, bias: impl Fn(&PixelContext) -> f64) -> Vec<ViewData> {
     (0..VIEWS)
         .map(|_| {
             let level: f64 = StandardNormal.sample(rng);
             let disparity = rng.random_range(10.0..45.0);
-            let places: Vec<Place> = (0..SAMPLES)
+            let places: Vec<PixelContext> = (0..SAMPLES)
                 .map(|_| {
                     let (u, v) = (rng.random_range(0.0..640.0), rng.random_range(0.0..480.0));
                     let radius = f64::hypot(u - 319.5, v - 239.5) / 399.5;
-                    Place {
+                    PixelContext {
                         u,
                         v,
                         radius,
                         disparity,
                         side: 8.0,
                         z: 43.5 / disparity,
-                        ..Place::default()
+                        ..PixelContext::default()
                     }
                 })
                 .collect();
@@ -61,15 +61,15 @@ fn session(rng: &mut Stream, bias: impl Fn(&Place) -> f64) -> Vec<ViewData> {
 
 fn candidates() -> Vec<Candidate> {
     let curve = |over, high| {
-        Candidate::curve(Basis::Curve { over, low: 0.0, high, nodes: 9, times: Times::One })
+        Candidate::curve(Basis::Curve { over, low: 0.0, high, nodes: 9, times: Modulation::One })
     };
     vec![
         Candidate::named("radial-disparity-bias", Basis::Bowl { disparity_power: 0.0, orders: 1 }),
         Candidate::named("column-banding", Basis::Banding { period_px: 160.0, harmonics: 2 }),
         Candidate::named("pixel-locking", Basis::Locking { period_px: 1.0, harmonics: 2 }),
-        curve(Over::Column, 639.0),
-        curve(Over::Row, 479.0),
-        curve(Over::Radius, 1.0),
+        curve(Coordinate::Column, 639.0),
+        curve(Coordinate::Row, 479.0),
+        curve(Coordinate::Radius, 1.0),
     ]
 }
 
@@ -112,7 +112,7 @@ fn what_was_put_in_is_found_with_its_size() {
 fn two_causes_are_two_terms_whichever_is_larger() {
     for (bowl, stripes) in [(3.0, 0.6), (1.2, 1.5)] {
         let mut rng = Seed(5).stream("search/two");
-        let bias = |p: &Place| {
+        let bias = |p: &PixelContext| {
             bowl * p.radius * p.radius + stripes * (std::f64::consts::TAU * p.u / 160.0).sin()
         };
         let outcome = found(&session(&mut rng, bias), 5);
@@ -148,8 +148,13 @@ fn a_family_that_explains_a_part_is_not_named() {
 /// that must not be taken for a lift of metres.
 #[test]
 fn a_lift_that_planes_take_up_is_none() {
-    let lift =
-        Basis::Curve { over: Over::Right, low: -1.0, high: 1.0, nodes: 3, times: Times::Lift };
+    let lift = Basis::Curve {
+        over: Coordinate::Right,
+        low: -1.0,
+        high: 1.0,
+        nodes: 3,
+        times: Modulation::Lift,
+    };
     let searched = |tilt: f64, bend: f64| {
         let mut rng = Seed(9).stream("search/lift");
         let mut views = session(&mut rng, |_| 0.0);
@@ -160,14 +165,14 @@ fn a_lift_that_planes_take_up_is_none() {
                 *y += p.disparity.powi(2) * (tilt * averaged + bend * right * right);
                 p.right = right + averaged;
             }
-            let affine = |p: &Place| [1.0, p.u / 640.0, p.v / 480.0];
+            let affine = |p: &PixelContext| [1.0, p.u / 640.0, p.v / 480.0];
             view.nuisance = view.places.iter().flat_map(affine).collect();
             view.precision = vec![0.0; 3];
         }
         let outcome = search(&views, &views, &[Candidate::curve(lift.clone())], &RULES, Seed(1));
         let coefficients = outcome.chosen.first().map_or(vec![0.0; 3], |_| outcome.coefficients(0));
         let at = |right| {
-            let place = Place { right, disparity: 1.0, rho: 1.0, ..Place::default() };
+            let place = PixelContext { right, disparity: 1.0, rho: 1.0, ..PixelContext::default() };
             lift.value(&coefficients, &place, &mut Vec::new()).abs()
         };
         [-1.0, 0.0, 1.0].map(at).into_iter().fold(0.0, f64::max)

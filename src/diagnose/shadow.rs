@@ -81,7 +81,7 @@ impl Walk<'_> {
         let mut u = (start - row) as isize + self.step;
         while (0..self.field.width as isize).contains(&u) {
             let i = row + u as usize;
-            let z = f64::from(self.table.metres(self.frame.words[i]));
+            let z = f64::from(self.table.metres(self.frame.raw[i]));
             let plane = self.plane(i);
             let disparity = self.field.scale_px_m / z;
             if !z.is_finite() {

@@ -79,13 +79,13 @@ fn curve(beta: &[f64], at: &dyn Fn(usize) -> f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::terms::{Over, Times};
+    use crate::terms::{Coordinate, Modulation};
 
     fn of(values: impl Fn(f64) -> f64) -> String {
         let nodes = 16;
         let beta: Vec<f64> = (0..nodes).map(|k| values(k as f64 / 15.0)).collect();
-        let over = Over::Row;
-        words(&Basis::Curve { over, low: 0.0, high: 1.0, nodes, times: Times::One }, &beta)
+        let over = Coordinate::Row;
+        words(&Basis::Curve { over, low: 0.0, high: 1.0, nodes, times: Modulation::One }, &beta)
     }
 
     #[test]

@@ -5,13 +5,13 @@ use serde_json::Map;
 use super::diagnosis::{Finding, Size};
 use super::field::Field;
 use super::findings;
-use super::known::Known;
-use super::lattice::{Lattice, Words};
+use super::known::KnownTerms;
+use super::lattice::{Quantisation, RawHistogram};
 use super::parameters::estimate;
 use super::pixels::{fixed_px2, mean_of};
 use super::structure::Structure;
 use crate::frame::DepthCode;
-use crate::terms::{Axis, Place, Statistic};
+use crate::terms::{Axis, PixelContext, Statistic};
 use crate::view::Recording;
 
 /// Variance that comes by other names than sigma: of steps, rows, and pixels.
@@ -24,7 +24,7 @@ pub struct Steps {
 
 impl Steps {
     pub fn of(
-        lattice: &Lattice,
+        lattice: &Quantisation,
         structure: &[Structure],
         fields: &[Field],
         recording: &Recording,
@@ -42,7 +42,7 @@ impl Steps {
     }
 
     /// At a place, px^2.
-    pub fn at(&self, p: &Place) -> f64 {
+    pub fn at(&self, p: &PixelContext) -> f64 {
         let depth_px = self.depth_px_m2 / (p.z * p.z);
         (depth_px * depth_px + self.disparity_px.powi(2)) / 12.0 + self.noise_px2
     }
@@ -52,8 +52,8 @@ pub(super) fn is_raw(recording: &Recording) -> bool {
     matches!(recording.sensor.code, DepthCode::Disparity { .. })
 }
 
-pub(super) fn lattice(fields: &[Field], recording: &Recording) -> Lattice {
-    let mut words = Words::none();
+pub(super) fn lattice(fields: &[Field], recording: &Recording) -> Quantisation {
+    let mut words = RawHistogram::none();
     fields.iter().for_each(|f| words.merge(&f.words));
     words.lattice(&recording.sensor, fields[0].scale_px_m)
 }
@@ -62,8 +62,8 @@ pub(super) fn lattice(fields: &[Field], recording: &Recording) -> Lattice {
 const STEP_SHARE: f64 = 0.1;
 
 pub(super) fn steps(
-    lattice: &Lattice,
-    known: &Known,
+    lattice: &Quantisation,
+    known: &KnownTerms,
     fields: &[Field],
     recording: &Recording,
     sigma_mm: f64,

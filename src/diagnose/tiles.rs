@@ -6,12 +6,12 @@ use super::field::Field;
 use super::smooth::{SMOOTH_PX, high_pass};
 use crate::camera::{Camera, Rays};
 use crate::scene::TargetFrame;
-use crate::terms::{Place, corner_radius, edge_distances};
+use crate::terms::{PixelContext, corner_radius, edge_distances};
 
 /// Mean residual of a patch of pixels.
 #[derive(Debug, Clone, Copy)]
 pub struct Tile {
-    pub place: Place,
+    pub place: PixelContext,
     /// Mean residual, px.
     pub mean: f64,
     /// Mean square of single frames' residuals, px^2.
@@ -61,23 +61,23 @@ impl<'a> Places<'a> {
     }
 
     /// Of the pixel number `k` of the target; its variance is the field's.
-    pub fn pixel(&self, k: usize) -> Place {
+    pub fn pixel(&self, k: usize) -> PixelContext {
         let i = self.field.pixels[k] as usize;
         let (u, v) = ((i % self.camera.width) as f64, (i / self.camera.width) as f64);
         let edge = f64::from(self.edge[i]);
         let (x, y) = self.rays.at(i);
         let place = self.at(u, v, (x, y), edge);
         let variance = self.field.sigma.get(k).map_or(1.0, |s| f64::from(*s).powi(2));
-        Place { side: 1.0, variance, ..place }
+        PixelContext { side: 1.0, variance, ..place }
     }
 
-    fn at(&self, u: f64, v: f64, (x, y): (f64, f64), edge: f64) -> Place {
+    fn at(&self, u: f64, v: f64, (x, y): (f64, f64), edge: f64) -> PixelContext {
         let (field, camera) = (self.field, self.camera);
         let plane = &field.plane;
         let z = plane.depth(x, y);
         let (right, down) = self.board.place(&(Vector3::new(x, y, 1.0) * z));
         let slope = |q: f64, f: f64| field.scale_px_m * q / f;
-        Place {
+        PixelContext {
             u,
             v,
             side: SIDE as f64,
@@ -170,7 +170,7 @@ impl Sums {
         let place = places.at(u, v, places.camera.ray(u, v), self.edge / self.pixels);
         let variance = self.variance / self.pixels;
         Tile {
-            place: Place { light: self.light / self.n, variance, ..place },
+            place: PixelContext { light: self.light / self.n, variance, ..place },
             mean: self.mean / self.n,
             square: self.square / self.n,
             rough_square: self.rough_square / self.rough_n,

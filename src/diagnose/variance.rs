@@ -1,16 +1,16 @@
 //! What may change the size of the noise: candidates for the logarithm of the variance.
 
 use super::candidate::{Candidate, RECALIBRATE};
-use super::reach::Reach;
+use super::reach::Extent;
 use crate::camera::Camera;
 use crate::model::SigmaModel;
-use crate::terms::{Basis, Over, TABLE, Times};
+use crate::terms::{Basis, Coordinate, Modulation, TABLE};
 
 /// Where an excess exponent is counted from, m: the middle (in ratio) of a Kinect's 1 to 4 m.
 const PIVOT_M: f64 = 2.0;
 
 /// All named variance families.
-pub fn families(reach: &Reach, sigma: &SigmaModel) -> Vec<Candidate> {
+pub fn families(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
     let mut all = vec![
         Candidate::named("range-exponent", Basis::RangeExponent { pivot_m: PIVOT_M, orders: 1 }),
         Candidate::named("range-exponent", Basis::RangeExponent { pivot_m: PIVOT_M, orders: 2 }),
@@ -41,7 +41,7 @@ pub fn families(reach: &Reach, sigma: &SigmaModel) -> Vec<Candidate> {
 
 /// The derivatives of log variance after the sigma model's parameters: all of them, and those that
 /// a frontal target decides.
-fn recalibrations(reach: &Reach, sigma: &SigmaModel) -> Vec<Candidate> {
+fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
     let (z_m, theta_rad) = (reach.z, [reach.theta[0], reach.theta[1].max(reach.theta[0] + 1e-3)]);
     let table = |model: &SigmaModel| -> Vec<f64> {
         let at =
@@ -90,37 +90,37 @@ fn recalibrations(reach: &Reach, sigma: &SigmaModel) -> Vec<Candidate> {
 }
 
 /// Curves without a name, one axis each.
-pub fn curves(camera: &Camera, reach: &Reach) -> Vec<Candidate> {
+pub fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
     let (width, height) = (camera.width as f64, camera.height as f64);
     let curve = |over, [low, high]: [f64; 2], nodes| {
-        Candidate::curve(Basis::Curve { over, low, high, nodes, times: Times::One })
+        Candidate::curve(Basis::Curve { over, low, high, nodes, times: Modulation::One })
     };
     let ring = |over, period, nodes| {
-        Candidate::curve(Basis::Ring { over, period, nodes, times: Times::One })
+        Candidate::curve(Basis::Ring { over, period, nodes, times: Modulation::One })
     };
     let mut all = vec![
-        curve(Over::LogZ, reach.z.map(f64::ln), 8),
-        curve(Over::Theta, reach.theta, 6),
-        ring(Over::Azimuth, std::f64::consts::TAU, 8),
-        curve(Over::Radius, [0.0, 1.0], 8),
-        curve(Over::Column, [0.0, width], 12),
-        curve(Over::Row, [0.0, height], 12),
-        ring(Over::Disparity, 1.0, 8),
-        curve(Over::Edge, [0.0, 24.0], 6),
-        curve(Over::Right, reach.right, 8),
-        curve(Over::Down, reach.down, 8),
-        Candidate::curve(Basis::Map { width, height, across: 6, down: 4, times: Times::One }),
+        curve(Coordinate::LogZ, reach.z.map(f64::ln), 8),
+        curve(Coordinate::Theta, reach.theta, 6),
+        ring(Coordinate::Azimuth, std::f64::consts::TAU, 8),
+        curve(Coordinate::Radius, [0.0, 1.0], 8),
+        curve(Coordinate::Column, [0.0, width], 12),
+        curve(Coordinate::Row, [0.0, height], 12),
+        ring(Coordinate::Disparity, 1.0, 8),
+        curve(Coordinate::Edge, [0.0, 24.0], 6),
+        curve(Coordinate::Right, reach.right, 8),
+        curve(Coordinate::Down, reach.down, 8),
+        Candidate::curve(Basis::Map { width, height, across: 6, down: 4, times: Modulation::One }),
         Candidate::curve(Basis::Pair {
-            over: [Over::Right, Over::Down],
+            over: [Coordinate::Right, Coordinate::Down],
             low: [reach.right[0], reach.down[0]],
             high: [reach.right[1], reach.down[1]],
             nodes: [6, 5],
         }),
     ];
     for (over, range) in [
-        (Over::Session, reach.session),
-        (Over::Temperature, reach.temperature),
-        (Over::Light, reach.light),
+        (Coordinate::Session, reach.session),
+        (Coordinate::Temperature, reach.temperature),
+        (Coordinate::Light, reach.light),
     ] {
         if range[1] > range[0] * 1.05 {
             all.push(curve(over, range, 6));

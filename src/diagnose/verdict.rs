@@ -76,7 +76,7 @@ pub(super) fn symptoms(found: &mut [Finding]) {
             f.physics.push_str(" Held against a simulation it may be a symptom: light, blur and window change it too.");
         }
         let nameless =
-            f.effect.is_none() && matches!(f.statistic, Statistic::Variance | Statistic::Missing);
+            f.effect.is_none() && matches!(f.statistic, Statistic::Variance | Statistic::Dropout);
         if renewed || made && (symptom || nameless || f.status == Status::Recalibrate) {
             f.share *= 1e-3;
         }

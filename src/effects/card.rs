@@ -1,7 +1,9 @@
 //! What is known about an effect before it acts.
 
+use serde::Serialize;
+
 /// Where in the light's path an effect acts, in order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub enum Stage {
     /// The target's shape and motion: changes `depth`.
     Surface,
@@ -20,7 +22,8 @@ pub enum Stage {
     /// Errors of the match: changes `disparity`, px.
     Disparity,
     /// Pixels without an answer: `disparity` becomes NaN.
-    Missing,
+    #[serde(rename = "Missing")]
+    Dropout,
     /// The read-out of the match: rounds and shifts `disparity`.
     Quantiser,
     /// What the driver makes of it: changes `depth`.
@@ -39,7 +42,7 @@ impl Stage {
         Stage::NoiseInSpace,
         Stage::NoiseTails,
         Stage::Disparity,
-        Stage::Missing,
+        Stage::Dropout,
         Stage::Quantiser,
         Stage::Driver,
         Stage::Word,
@@ -49,14 +52,29 @@ impl Stage {
 /// A knob.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameter {
-    /// With its unit, as in effects.md.
+    /// As given on the command line; it ends with the unit.
     pub name: &'static str,
     pub unit: &'static str,
     /// What is accepted.
     pub range: [f64; 2],
     /// A typical size; used where the user names none.
     pub typical: f64,
-    pub words: &'static str,
+    pub summary: &'static str,
+}
+
+/// Values of an effect's parameters, in the card's order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings(pub(super) Vec<f64>);
+
+impl Settings {
+    pub fn typical(card: &Card) -> Self {
+        Settings(card.parameters.iter().map(|p| p.typical).collect())
+    }
+
+    /// The value of the card's parameter number `index`.
+    pub fn at(&self, index: usize) -> f64 {
+        self.0[index]
+    }
 }
 
 /// The face of an effect for people and for the command line.
@@ -64,15 +82,15 @@ pub struct Parameter {
 pub struct Card {
     pub id: &'static str,
     pub stage: Stage,
-    /// What was left out when it is missing, one sentence.
-    pub words: &'static str,
+    /// What it does, one sentence.
+    pub summary: &'static str,
     /// The first is the strength.
     pub parameters: &'static [Parameter],
     /// The strength at which nature is as if the effect were not there.
     pub identity: f64,
     pub statistic: &'static str,
     pub axis: &'static str,
-    /// The effects it is taken for most easily, by id, and what tells them apart.
+    /// The effects it is taken for most easily, by id, and what distinguishes them.
     pub confused_with: &'static str,
     pub reference: &'static str,
 }

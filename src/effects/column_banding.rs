@@ -7,21 +7,21 @@ pub struct ColumnBanding;
 static CARD: Card = Card {
     id: "column-banding",
     stage: Stage::Disparity,
-    words: "the firmware applies a correction that is linear in the column in whole steps: what is left is a saw-tooth over the columns, the same in every row",
+    summary: "the firmware applies a correction that is linear in the column in whole steps: what is left is a saw-tooth over the columns, the same in every row",
     parameters: &[
         Parameter {
             name: "amplitude_px",
             unit: "px",
             range: [0.0, 1.0],
             typical: 0.0625,
-            words: "half the height of a tooth: half a step of the read-out",
+            summary: "half the height of a tooth: half a step of the read-out",
         },
         Parameter {
             name: "period_px",
             unit: "px",
             range: [2.0, 640.0],
             typical: 80.0,
-            words: "columns from one step to the next",
+            summary: "columns from one step to the next",
         },
     ],
     identity: 0.0,

@@ -7,13 +7,13 @@ pub struct DepthRounding;
 static CARD: Card = Card {
     id: "depth-rounding",
     stage: Stage::Word,
-    words: "the driver stores depth in whole steps of a constant size: the same gaps at every distance",
+    summary: "the driver stores depth in whole steps of a constant size: the same gaps at every distance",
     parameters: &[Parameter {
         name: "step_m",
         unit: "m",
         range: [0.0, 0.1],
         typical: 0.001,
-        words: "one step of the stored depth",
+        summary: "one step of the stored depth",
     }],
     identity: 0.0,
     statistic: "distribution",

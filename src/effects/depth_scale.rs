@@ -7,13 +7,13 @@ pub struct DepthScale;
 static CARD: Card = Card {
     id: "depth-scale",
     stage: Stage::Driver,
-    words: "focal length or baseline are wrong: every depth is off by the same factor; only reference distances show it",
+    summary: "focal length or baseline are wrong: every depth is off by the same factor; only reference distances show it",
     parameters: &[Parameter {
         name: "scale",
         unit: "",
         range: [0.5, 2.0],
         typical: 1.035,
-        words: "stored depth over true depth",
+        summary: "stored depth over true depth",
     }],
     identity: 1.0,
     statistic: "bias",

@@ -7,13 +7,13 @@ pub struct DisparityOffset;
 static CARD: Card = Card {
     id: "disparity-offset",
     stage: Stage::Quantiser,
-    words: "the stored reference pattern stands at another distance than the firmware believes: every disparity is shifted by a constant, and depth errs with z^2; only reference distances show it",
+    summary: "the stored reference pattern stands at another distance than the firmware believes: every disparity is shifted by a constant, and depth errs with z^2; only reference distances show it",
     parameters: &[Parameter {
         name: "offset_px",
         unit: "px",
         range: [-4.0, 4.0],
         typical: 0.1,
-        words: "added to every disparity: positive brings things nearer",
+        summary: "added to every disparity: positive brings things nearer",
     }],
     identity: 0.0,
     statistic: "bias",

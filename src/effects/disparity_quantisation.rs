@@ -7,13 +7,13 @@ pub struct DisparityQuantisation;
 static CARD: Card = Card {
     id: "disparity-quantisation",
     stage: Stage::Quantiser,
-    words: "the matcher answers in steps of a fraction of a pixel: only some depths occur, their gaps growing with z^2",
+    summary: "the matcher answers in steps of a fraction of a pixel: only some depths occur, their gaps growing with z^2",
     parameters: &[Parameter {
         name: "step_px",
         unit: "px",
         range: [0.0, 4.0],
         typical: 0.125,
-        words: "one step of the disparity",
+        summary: "one step of the disparity",
     }],
     identity: 0.0,
     statistic: "distribution",

@@ -7,13 +7,13 @@ pub struct EdgeMixing;
 static CARD: Card = Card {
     id: "edge-mixing",
     stage: Stage::Optics,
-    words: "at the edge of the target a pixel sees both the target and what is behind, and answers between the two; it needs something behind (--wall)",
+    summary: "at the edge of the target a pixel sees both the target and what is behind, and answers between the two; it needs something behind (--wall)",
     parameters: &[Parameter {
         name: "width_px",
         unit: "px",
         range: [0.0, 32.0],
         typical: 2.0,
-        words: "distance from the edge at which a pixel sees one surface only",
+        summary: "distance from the edge at which a pixel sees one surface only",
     }],
     identity: 0.0,
     statistic: "bias",

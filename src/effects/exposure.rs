@@ -1,4 +1,4 @@
-//! One frame under way from the surface to the stored word.
+//! One frame under way from the surface to the stored raw value.
 
 use std::collections::HashMap;
 
@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use crate::camera::Rays;
 use crate::scene::Seen;
+use crate::terms::corner_radius;
 use crate::view::Sensor;
 
 /// When a frame is taken.
@@ -73,18 +74,8 @@ impl Exposure<'_> {
     pub fn radius(&self) -> impl Fn(usize) -> f64 + use<> {
         let camera = &self.sensor.camera;
         let (width, cx, cy) = (self.seen.width, camera.cx, camera.cy);
-        let corner = self.corner_radius_px();
+        let corner = corner_radius(camera);
         move |i| f64::hypot((i % width) as f64 - cx, (i / width) as f64 - cy) / corner
-    }
-
-    /// Of the farthest corner from the principal point, px.
-    pub fn corner_radius_px(&self) -> f64 {
-        let c = &self.sensor.camera;
-        let (right, bottom) = (c.width as f64 - 1.0, c.height as f64 - 1.0);
-        [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)]
-            .into_iter()
-            .map(|(u, v)| f64::hypot(u - c.cx, v - c.cy))
-            .fold(0.0, f64::max)
     }
 
     /// Depth, m, at which `ray` meets the surface at pixel `i`, taken as flat there and lifted by

@@ -7,13 +7,13 @@ pub struct FixedPatternNoise;
 static CARD: Card = Card {
     id: "fixed-pattern-noise",
     stage: Stage::Disparity,
-    words: "each pixel has a constant error of disparity of its own, the same in every view of this unit",
+    summary: "each pixel has a constant error of disparity of its own, the same in every view of this unit",
     parameters: &[Parameter {
         name: "sigma_px",
         unit: "px",
         range: [0.0, 4.0],
         typical: 0.05,
-        words: "standard deviation over the pixels",
+        summary: "standard deviation over the pixels",
     }],
     identity: 0.0,
     statistic: "bias",

@@ -7,13 +7,13 @@ pub struct FrameJitter;
 static CARD: Card = Card {
     id: "frame-jitter",
     stage: Stage::Disparity,
-    words: "the whole frame is shifted as one, afresh in each frame: vibration, or a reference that trembles",
+    summary: "the whole frame is shifted as one, afresh in each frame: vibration, or a reference that trembles",
     parameters: &[Parameter {
         name: "sigma_px",
         unit: "px",
         range: [0.0, 4.0],
         typical: 0.03,
-        words: "standard deviation of the shift",
+        summary: "standard deviation of the shift",
     }],
     identity: 0.0,
     statistic: "correlation",

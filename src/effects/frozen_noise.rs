@@ -7,13 +7,13 @@ pub struct FrozenNoise;
 static CARD: Card = Card {
     id: "frozen-noise",
     stage: Stage::NoiseAtRest,
-    words: "the grain of laser light stands still while the scene does: part of the noise is the same in every frame of a view and another in the next view",
+    summary: "the grain of laser light stands still while the scene does: part of the noise is the same in every frame of a view and another in the next view",
     parameters: &[Parameter {
         name: "fraction",
         unit: "",
         range: [0.0, 1.0],
         typical: 0.8,
-        words: "of the variance that stands still",
+        summary: "of the variance that stands still",
     }],
     identity: 0.0,
     statistic: "correlation",

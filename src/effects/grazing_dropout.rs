@@ -6,29 +6,29 @@ pub struct GrazingDropout;
 
 static CARD: Card = Card {
     id: "grazing-dropout",
-    stage: Stage::Missing,
-    words: "at grazing angles the pattern smears and the match finds nothing",
+    stage: Stage::Dropout,
+    summary: "at grazing angles the pattern smears and the match finds nothing",
     parameters: &[
         Parameter {
             name: "share",
             unit: "",
             range: [0.0, 1.0],
             typical: 1.0,
-            words: "of the pixels well beyond the angle that are lost",
+            summary: "of the pixels well beyond the angle that are lost",
         },
         Parameter {
             name: "theta50_deg",
             unit: "deg",
             range: [0.0, 90.0],
             typical: 75.0,
-            words: "tilt at which half of that share is lost",
+            summary: "tilt at which half of that share is lost",
         },
         Parameter {
             name: "width_deg",
             unit: "deg",
             range: [0.0, 45.0],
             typical: 2.0,
-            words: "how gradual: from a quarter to three quarters over 2.2 times this",
+            summary: "how gradual: from a quarter to three quarters over 2.2 times this",
         },
     ],
     identity: 0.0,

@@ -7,21 +7,21 @@ pub struct HeavyTails;
 static CARD: Card = Card {
     id: "heavy-tails",
     stage: Stage::NoiseTails,
-    words: "now and then the match locks to a wrong place: errors come from a mixture with a wide part, not from one Gaussian",
+    summary: "now and then the match locks to a wrong place: errors come from a mixture with a wide part, not from one Gaussian",
     parameters: &[
         Parameter {
             name: "fraction",
             unit: "",
             range: [0.0, 1.0],
             typical: 0.02,
-            words: "of the pixels, afresh in every frame",
+            summary: "of the pixels, afresh in every frame",
         },
         Parameter {
             name: "scale",
             unit: "",
             range: [1.0, 100.0],
             typical: 5.0,
-            words: "how many times wider their errors are",
+            summary: "how many times wider their errors are",
         },
     ],
     identity: 0.0,

@@ -8,13 +8,13 @@ pub struct IntensityDependentNoise;
 static CARD: Card = Card {
     id: "intensity-dependent-noise",
     stage: Stage::Variance,
-    words: "a dark surface sends back less of the pattern, and the match is noisier: an infrared picture of a printed target shows it",
+    summary: "a dark surface sends back less of the pattern, and the match is noisier: an infrared picture of a printed target shows it",
     parameters: &[Parameter {
         name: "exponent",
         unit: "",
         range: [0.0, 4.0],
         typical: 0.5,
-        words: "sigma goes with the reflectance to minus this; nothing changes on white paper",
+        summary: "sigma goes with the reflectance to minus this; nothing changes on white paper",
     }],
     identity: 0.0,
     statistic: "variance",

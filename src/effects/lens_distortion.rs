@@ -7,13 +7,13 @@ pub struct LensDistortion;
 static CARD: Card = Card {
     id: "lens-distortion",
     stage: Stage::Optics,
-    words: "the lens bends rays, so that a pixel looks elsewhere than the pinhole says: only planes that are tilted show it",
+    summary: "the lens bends rays, so that a pixel looks elsewhere than the pinhole says: only planes that are tilted show it",
     parameters: &[Parameter {
         name: "k1",
         unit: "",
         range: [-0.2, 0.2],
         typical: -0.05,
-        words: "radial coefficient of Brown and Conrady that the calibration lacks",
+        summary: "radial coefficient of Brown and Conrady that the calibration lacks",
     }],
     identity: 0.0,
     statistic: "bias",

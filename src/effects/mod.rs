@@ -1,22 +1,22 @@
 //! What physics does to a depth image, one cause a file.
 //!
-//! Light meets the surface, passes the lens, is matched into a disparity and becomes a depth word.
+//! Light meets the surface, passes the lens, is matched into a disparity and becomes a raw depth value.
 //! Each effect belongs to one [`Stage`] of that path; the driver in `simulate` walks the stages in
 //! order and hands every active effect the [`Exposure`] under way. An effect at its card's identity
 //! is not there, and every effect draws only from streams of its own name, so that adding one
 //! changes no other.
 
+mod active;
 mod card;
 mod draw;
 mod exposure;
-mod settings;
 mod shape;
 
+pub use active::{Acting, Active};
 pub use ambient_light::ROOM_LUX;
-pub use card::{Card, Parameter, Stage};
+pub use card::{Card, Parameter, Settings, Stage};
 pub use draw::{Draw, Scope, fill_normal};
 pub use exposure::{Exposure, Instant, KINECT_BASELINE_M};
-pub use settings::{Acting, Active, Settings};
 
 use crate::terms::Term;
 use draw::{chance, logistic, normals};
@@ -35,12 +35,12 @@ pub trait Effect: Send + Sync {
     }
 }
 
-/// One file, one module, one word in the list: what is in the catalogue.
+/// The catalogue: an effect is one file and one word in this list.
 macro_rules! catalogue {
     ($($module:ident :: $name:ident),* $(,)?) => {
         $(mod $module;)*
 
-        /// Every effect, in the order of effects.md.
+        /// Every effect, in the order of the light's path and of `crate::docs::catalogue`.
         pub static CATALOGUE: &[&dyn Effect] = &[$(&$module::$name),*];
     };
 }

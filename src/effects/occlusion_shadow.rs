@@ -6,14 +6,14 @@ pub struct OcclusionShadow;
 
 static CARD: Card = Card {
     id: "occlusion-shadow",
-    stage: Stage::Missing,
-    words: "what the target hides from the projector has no pattern and no depth: a band on the background beside the target, fx b (1/z - 1/z_behind) px wide, on one side; it needs something behind (--wall)",
+    stage: Stage::Dropout,
+    summary: "what the target hides from the projector has no pattern and no depth: a band on the background beside the target, fx b (1/z - 1/z_behind) px wide, on one side; it needs something behind (--wall)",
     parameters: &[Parameter {
         name: "share",
         unit: "",
         range: [0.0, 1.0],
         typical: 1.0,
-        words: "of the baseline between camera and projector",
+        summary: "of the baseline between camera and projector",
     }],
     identity: 0.0,
     statistic: "missing",

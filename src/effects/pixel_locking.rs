@@ -9,13 +9,13 @@ pub struct PixelLocking;
 static CARD: Card = Card {
     id: "pixel-locking",
     stage: Stage::Disparity,
-    words: "interpolating the peak of the match leans toward whole pixels: an error periodic in disparity, one wave a pixel, seen as contour lines on tilted planes",
+    summary: "interpolating the peak of the match leans toward whole pixels: an error periodic in disparity, one wave a pixel, seen as contour lines on tilted planes",
     parameters: &[Parameter {
         name: "amplitude_px",
         unit: "px",
         range: [0.0, 0.5],
         typical: 0.05,
-        words: "height of the wave",
+        summary: "height of the wave",
     }],
     identity: 0.0,
     statistic: "bias",

@@ -7,13 +7,13 @@ pub struct RadialDisparityBias;
 static CARD: Card = Card {
     id: "radial-disparity-bias",
     stage: Stage::Disparity,
-    words: "lens or projector off their calibration by a smooth bowl of disparity about the principal point: in depth it grows with z^2",
+    summary: "lens or projector off their calibration by a smooth bowl of disparity about the principal point: in depth it grows with z^2",
     parameters: &[Parameter {
         name: "k_px",
         unit: "px",
         range: [-4.0, 4.0],
         typical: 0.5,
-        words: "disparity too large by this at the corner radius",
+        summary: "disparity too large by this at the corner radius",
     }],
     identity: 0.0,
     statistic: "bias",

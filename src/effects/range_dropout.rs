@@ -6,29 +6,29 @@ pub struct RangeDropout;
 
 static CARD: Card = Card {
     id: "range-dropout",
-    stage: Stage::Missing,
-    words: "too far away the pattern is too faint, too near it is too bright: the match finds nothing",
+    stage: Stage::Dropout,
+    summary: "too far away the pattern is too faint, too near it is too bright: the match finds nothing",
     parameters: &[
         Parameter {
             name: "share",
             unit: "",
             range: [0.0, 1.0],
             typical: 1.0,
-            words: "of the pixels well beyond the distance that are lost",
+            summary: "of the pixels well beyond the distance that are lost",
         },
         Parameter {
             name: "z50_m",
             unit: "m",
             range: [0.0, 20.0],
             typical: 4.0,
-            words: "depth at which half of that share is lost",
+            summary: "depth at which half of that share is lost",
         },
         Parameter {
             name: "width_m",
             unit: "m",
             range: [-2.0, 2.0],
             typical: 0.1,
-            words: "how gradual: from a quarter to three quarters over 2.2 times this; negative loses what is nearer",
+            summary: "how gradual: from a quarter to three quarters over 2.2 times this; negative loses what is nearer",
         },
     ],
     identity: 0.0,

@@ -7,13 +7,13 @@ pub struct RangeExponent;
 static CARD: Card = Card {
     id: "range-exponent",
     stage: Stage::Variance,
-    words: "noise grows with another power of the distance than the form allows",
+    summary: "noise grows with another power of the distance than the form allows",
     parameters: &[Parameter {
         name: "excess",
         unit: "",
         range: [-4.0, 4.0],
         typical: 0.5,
-        words: "added to the exponent of z; nothing changes at 2 m",
+        summary: "added to the exponent of z; nothing changes at 2 m",
     }],
     identity: 0.0,
     statistic: "variance",

@@ -7,13 +7,13 @@ pub struct RangeNotDepth;
 static CARD: Card = Card {
     id: "range-not-depth",
     stage: Stage::Driver,
-    words: "the file holds the length of the ray where depth along the axis is expected: a flat wall becomes a bowl",
+    summary: "the file holds the length of the ray where depth along the axis is expected: a flat wall becomes a bowl",
     parameters: &[Parameter {
         name: "share",
         unit: "",
         range: [0.0, 1.0],
         typical: 1.0,
-        words: "how much of the ray length over the depth is in the file",
+        summary: "how much of the ray length over the depth is in the file",
     }],
     identity: 0.0,
     statistic: "bias",

@@ -7,13 +7,13 @@ pub struct RowNoise;
 static CARD: Card = Card {
     id: "row-noise",
     stage: Stage::Disparity,
-    words: "a row of the picture is read as one and shifted as one, afresh in each frame",
+    summary: "a row of the picture is read as one and shifted as one, afresh in each frame",
     parameters: &[Parameter {
         name: "sigma_px",
         unit: "px",
         range: [0.0, 4.0],
         typical: 0.03,
-        words: "standard deviation of the shift",
+        summary: "standard deviation of the shift",
     }],
     identity: 0.0,
     statistic: "correlation",

@@ -6,7 +6,7 @@ use super::{Card, Draw, Effect, Exposure, Settings, Stage};
 use crate::plane::Plane;
 use crate::scene::Seen;
 use crate::stats::median_in_place;
-use crate::terms::{Needs, Pixels, Place, Statistic, Term, edge_distances};
+use crate::terms::{Needs, PixelContext, Pixels, Statistic, Term, edge_distances};
 
 /// All terms of one statistic together: a bias shifts the disparity, a variance term scales the
 /// variance, at what each pixel sees undisturbed.
@@ -18,7 +18,7 @@ pub struct Shape {
 static BIAS: Card = Card {
     id: "shape-of-bias",
     stage: Stage::Disparity,
-    words: "errors of the disparity as a fit found them, without a formula",
+    summary: "errors of the disparity as a fit found them, without a formula",
     parameters: &[],
     identity: 0.0,
     statistic: "bias",
@@ -30,7 +30,7 @@ static BIAS: Card = Card {
 static VARIANCE: Card = Card {
     id: "shape-of-variance",
     stage: Stage::Variance,
-    words: "changes of the noise as a fit found them, without a formula",
+    summary: "changes of the noise as a fit found them, without a formula",
     statistic: "variance",
     ..BIAS
 };
@@ -79,7 +79,7 @@ impl Effect for Shape {
     }
 }
 
-/// The terms were found on stored words, whose rounding is part of the variance but not of
+/// The terms were found on raw values, whose rounding is part of the variance but not of
 /// `sigma`: it is added before and taken off after.
 fn scale_variance(exposure: &mut Exposure, log_ratio: &[f32]) {
     let rounding = rounding_variance(exposure);
@@ -90,7 +90,7 @@ fn scale_variance(exposure: &mut Exposure, log_ratio: &[f32]) {
     }
 }
 
-/// Variance of the stored word's rounding at a depth, m^2: uniform over a step.
+/// Variance of a raw value's rounding at a depth, m^2: uniform over a step.
 fn rounding_variance(exposure: &Exposure) -> impl Fn(f32) -> f32 + use<> {
     let code = exposure.sensor.code;
     move |z| {
@@ -158,7 +158,7 @@ impl<'a> Scene<'a> {
             && (!needs.temperature || self.exposure.temperature_c.is_some())
     }
 
-    fn place(&self, i: usize) -> Place {
+    fn place(&self, i: usize) -> PixelContext {
         let Exposure { seen, instant, sigma, .. } = self.exposure;
         let mut place = self.pixels.place(i);
         let z = f64::from(seen.depth[i]);

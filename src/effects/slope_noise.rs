@@ -7,13 +7,13 @@ pub struct SlopeNoise;
 static CARD: Card = Card {
     id: "slope-noise",
     stage: Stage::Variance,
-    words: "a pixel does not know to a fraction where it looks: on a slope that is an error of depth, growing with z tan(theta)",
+    summary: "a pixel does not know to a fraction where it looks: on a slope that is an error of depth, growing with z tan(theta)",
     parameters: &[Parameter {
         name: "sigma_lateral_px",
         unit: "px",
         range: [0.0, 10.0],
         typical: 0.8,
-        words: "standard deviation of the place a pixel looks at",
+        summary: "standard deviation of the place a pixel looks at",
     }],
     identity: 0.0,
     statistic: "variance",

@@ -7,13 +7,13 @@ pub struct SpatialCorrelation;
 static CARD: Card = Card {
     id: "spatial-correlation",
     stage: Stage::NoiseInSpace,
-    words: "neighbouring pixels are matched with overlapping windows and err together",
+    summary: "neighbouring pixels are matched with overlapping windows and err together",
     parameters: &[Parameter {
         name: "length_px",
         unit: "px",
         range: [0.0, 64.0],
         typical: 9.0,
-        words: "side of the window: beyond it neighbours are independent",
+        summary: "side of the window: beyond it neighbours are independent",
     }],
     identity: 0.0,
     statistic: "correlation",

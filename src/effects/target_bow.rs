@@ -7,21 +7,21 @@ pub struct TargetBow;
 static CARD: Card = Card {
     id: "target-bow",
     stage: Stage::Surface,
-    words: "the board is bent: its middle stands out towards the sensor, a parabola along its right, fixed on the board and not in the picture",
+    summary: "the board is bent: its middle stands out towards the sensor, a parabola along its right, fixed on the board and not in the picture",
     parameters: &[
         Parameter {
             name: "sagitta_m",
             unit: "m",
             range: [-0.1, 0.1],
             typical: 0.004,
-            words: "rise of the middle over the ends, towards the sensor",
+            summary: "rise of the middle over the ends, towards the sensor",
         },
         Parameter {
             name: "span_m",
             unit: "m",
             range: [0.05, 20.0],
             typical: 1.0,
-            words: "width of the board over which it is counted",
+            summary: "width of the board over which it is counted",
         },
     ],
     identity: 0.0,

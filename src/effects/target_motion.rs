@@ -7,13 +7,13 @@ pub struct TargetMotion;
 static CARD: Card = Card {
     id: "target-motion",
     stage: Stage::Surface,
-    words: "target or sensor moved along the optical axis while the view was taken: frames disagree, and their mean is off",
+    summary: "target or sensor moved along the optical axis while the view was taken: frames disagree, and their mean is off",
     parameters: &[Parameter {
         name: "velocity_mps",
         unit: "m/s",
         range: [-1.0, 1.0],
         typical: 0.005,
-        words: "of the target away from the sensor",
+        summary: "of the target away from the sensor",
     }],
     identity: 0.0,
     statistic: "bias",

@@ -7,13 +7,13 @@ pub struct TemporalCorrelation;
 static CARD: Card = Card {
     id: "temporal-correlation",
     stage: Stage::NoiseInTime,
-    words: "the firmware carries part of a frame over into the next: noise stays the same size and hangs together over frames",
+    summary: "the firmware carries part of a frame over into the next: noise stays the same size and hangs together over frames",
     parameters: &[Parameter {
         name: "rho",
         unit: "",
         range: [0.0, 0.999],
         typical: 0.5,
-        words: "correlation of a pixel's noise from one frame to the next",
+        summary: "correlation of a pixel's noise from one frame to the next",
     }],
     identity: 0.0,
     statistic: "correlation",

@@ -7,21 +7,21 @@ pub struct ThermalDrift;
 static CARD: Card = Card {
     id: "thermal-drift",
     stage: Stage::Driver,
-    words: "the sensor warms itself: its geometry drifts towards a limit in the course of the session",
+    summary: "the sensor warms itself: its geometry drifts towards a limit in the course of the session",
     parameters: &[
         Parameter {
             name: "relative",
             unit: "",
             range: [-0.2, 0.2],
             typical: 0.005,
-            words: "change of depth in the end, as a share of it",
+            summary: "change of depth in the end, as a share of it",
         },
         Parameter {
             name: "time_constant_s",
             unit: "s",
             range: [1.0, 100000.0],
             typical: 900.0,
-            words: "time after which 63 % of it has come",
+            summary: "time after which 63 % of it has come",
         },
     ],
     identity: 0.0,

@@ -7,13 +7,13 @@ pub struct TiltAxisAnisotropy;
 static CARD: Card = Card {
     id: "tilt-axis-anisotropy",
     stage: Stage::Variance,
-    words: "tilt along the baseline stretches the pattern in the matching window, tilt across it only shears it: the first is noisier",
+    summary: "tilt along the baseline stretches the pattern in the matching window, tilt across it only shears it: the first is noisier",
     parameters: &[Parameter {
         name: "ratio",
         unit: "",
         range: [0.2, 5.0],
         typical: 1.5,
-        words: "sigma at 60 degrees of tilt along the baseline over across it",
+        summary: "sigma at 60 degrees of tilt along the baseline over across it",
     }],
     identity: 1.0,
     statistic: "variance",

@@ -7,13 +7,13 @@ pub struct Vignetting;
 static CARD: Card = Card {
     id: "vignetting",
     stage: Stage::Variance,
-    words: "less light reaches the corners of the picture, and less light is more noise",
+    summary: "less light reaches the corners of the picture, and less light is more noise",
     parameters: &[Parameter {
         name: "growth",
         unit: "",
         range: [0.0, 10.0],
         typical: 0.5,
-        words: "by how much sigma is larger at the corner radius, as a share",
+        summary: "by how much sigma is larger at the corner radius, as a share",
     }],
     identity: 0.0,
     statistic: "variance",

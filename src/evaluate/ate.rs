@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use super::{MOST_APART_S, Spread, too_few};
+use super::{MAX_APART_S, Spread, too_few};
 use crate::error::Result;
 use crate::trajectory::{Pose, associate};
 
@@ -26,7 +26,7 @@ const FEWEST: usize = 3;
 /// When fewer than three of them belong to the same moments.
 pub fn absolute(truth: &[Pose], estimate: &[Pose]) -> Result<Ate> {
     let stamps = |poses: &[Pose]| poses.iter().map(|p| p.stamp).collect::<Vec<f64>>();
-    let pairs = associate(&stamps(truth), &stamps(estimate), MOST_APART_S);
+    let pairs = associate(&stamps(truth), &stamps(estimate), MAX_APART_S);
     let place = |pose: &Pose| pose.world_from_camera.translation.vector;
     let matched: Vec<(Vector3<f64>, Vector3<f64>)> =
         pairs.iter().map(|p| (place(&truth[p.first]), place(&estimate[p.second]))).collect();

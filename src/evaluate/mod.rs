@@ -19,7 +19,7 @@ use crate::error::{Error, Result};
 use crate::trajectory::{Pose, read_benchmark};
 
 /// Stamps of one moment differ by less, s (the scripts' `max_difference`).
-pub const MOST_APART_S: f64 = 0.02;
+pub const MAX_APART_S: f64 = 0.02;
 
 /// ATE and RPE of one estimate.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,25 +1,18 @@
-//! A fakenect dump: INDEX.txt and d-<time>-<stamp>.pgm, raw 11-bit words of a Kinect v1.
+//! A fakenect dump: INDEX.txt and d-<time>-<stamp>.pgm, raw 11-bit values of a Kinect v1.
 
 use std::path::Path;
 
-use super::images::encode_pgm16;
+use super::assumed::Assumed;
+use super::encode::encode_pgm16;
+use super::images::size_of;
+use super::list::shorten;
 use super::output::{refuse_full, write_atomic};
 use super::stills::{Film, Footage};
-use super::{Assumed, assumed_sensor, images};
 use crate::error::{Error, Result};
-use crate::frame::{DepthCode, Frame, KINECT_NO_MEASUREMENT};
+use crate::frame::Frame;
 use crate::view::{FrameRef, Sensor};
 
 pub(crate) const INDEX: &str = "INDEX.txt";
-/// z = 1/(3.33095 - 0.0030711 raw): the fit OpenKinect users have shared since 2010.
-const OPENKINECT: DepthCode = DepthCode::Disparity {
-    offset: 3.330_949_516_1,
-    slope: -0.003_071_101_6,
-    invalid: KINECT_NO_MEASUREMENT,
-};
-/// Focal length of a Kinect v1 infrared camera to a percent, and the image centre.
-const KINECT_INTRINSICS: [f64; 4] = [585.0, 585.0, 319.5, 239.5];
-
 pub(super) fn footage(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     let index = root.join(INDEX);
     let text = std::fs::read_to_string(&index).map_err(|e| Error::read(&index, e))?;
@@ -33,7 +26,7 @@ pub(super) fn footage(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor
         let timestamp = stamp(name).ok_or_else(|| Error::Text {
             path: index.clone(),
             line: i + 1,
-            what: format!("\"{}\" is not d-<time>-<stamp>.pgm", super::list::shorten(name)),
+            what: format!("\"{}\" is not d-<time>-<stamp>.pgm", shorten(name)),
             remedy: "record the dump with fakenect-record",
         })?;
         let path = root.join(name);
@@ -51,34 +44,13 @@ pub(super) fn footage(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor
             "record the dump with fakenect-record",
         )
     })?;
-    let size = images::size_of(&first.path)?;
-    let (sensor, assumptions) = sensor(size, assumed)?;
-    remarks.extend(assumptions);
+    let (sensor, remark) = assumed.dump_sensor(size_of(&first.path)?)?;
+    remarks.extend(remark);
     let footage = Footage { frames, film: Film::Video, remarks, described_by: vec![index] };
     Ok((footage, sensor))
 }
 
-/// The Kinect that recorded frames of `size` px, and what had to be assumed about it.
-pub(super) fn sensor(size: (usize, usize), assumed: &Assumed) -> Result<(Sensor, Vec<String>)> {
-    let mut remarks = Vec::new();
-    if assumed.intrinsics.is_none() || assumed.code.is_none() {
-        remarks.push(
-            "a fakenect dump carries no calibration: OpenKinect's depth formula and f = 585 px assumed; \
-             give --intrinsics and --raw-disparity"
-                .into(),
-        );
-    }
-    let sensor = assumed_sensor(
-        "Kinect for Xbox 360 (fakenect dump)",
-        size,
-        assumed.intrinsics.unwrap_or(KINECT_INTRINSICS),
-        assumed.code.unwrap_or(OPENKINECT),
-        &Assumed { baseline_m: assumed.baseline_m.or(Some(KINECT_BASELINE_M)), ..assumed.clone() },
-    )?;
-    Ok((sensor, remarks))
-}
-
-/// Write depth frames as fakenect-record would have: stamps in s, frames of 640 x 480 raw words.
+/// Write depth frames as fakenect-record would have: stamps in s, frames of 640 x 480 raw values.
 /// fakenect plays nothing else.
 ///
 /// # Errors
@@ -104,9 +76,6 @@ pub fn write_dump<'a>(
 
 /// Of a Kinect v1's timestamps.
 const CLOCK_HZ: f64 = 60e6;
-
-/// Projector to camera in every Kinect v1 (LDDIS of the OpenNI device properties: 7.5 cm).
-const KINECT_BASELINE_M: f64 = 0.075;
 
 /// Host time in seconds: the first number of d-<time>-<stamp>.pgm.
 fn stamp(name: &str) -> Option<f64> {

@@ -1,4 +1,4 @@
-//! Depth and infrared images: PNG in both, PGM as fakenect writes it.
+//! Depth, infrared and colour images, read: PNG, PGM as fakenect writes it, JPEG for colour.
 
 use std::fs;
 use std::io::Cursor;
@@ -132,11 +132,11 @@ fn decode_png16(path: &Path, bytes: &[u8]) -> Result<Frame> {
     let size = reader.output_buffer_size().unwrap_or(0);
     let mut buffer = vec![0; size];
     reader.next_frame(&mut buffer).map_err(damaged)?;
-    let words = buffer.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect();
-    Ok(Frame { width, height, words })
+    let raw = buffer.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect();
+    Ok(Frame { width, height, raw })
 }
 
-/// `P5 w h 65535` and little-endian words, against the PGM standard: fakenect writes memory as is.
+/// `P5 w h 65535` and little-endian values, against the PGM standard: fakenect writes memory as is.
 fn decode_fakenect_pgm(path: &Path, bytes: &[u8]) -> Result<Frame> {
     let bad = |what: &str| Error::image(path, what, "expected a fakenect d-*.pgm: P5, size, 65535");
     let (header, data) = pgm_header(bytes).ok_or_else(|| bad("no P5 header"))?;
@@ -147,11 +147,11 @@ fn decode_fakenect_pgm(path: &Path, bytes: &[u8]) -> Result<Frame> {
     if data.len() < 2 * width * height {
         return Err(bad("the image is cut short"));
     }
-    let words = data[..2 * width * height]
+    let raw = data[..2 * width * height]
         .chunks_exact(2)
         .map(|b| u16::from_le_bytes([b[0], b[1]]))
         .collect();
-    Ok(Frame { width, height, words })
+    Ok(Frame { width, height, raw })
 }
 
 /// Width, height and greatest value, and the bytes after the single white space that ends them.
@@ -190,15 +190,11 @@ impl InfraredImage {
             .map_err(|e| Error::read(path, e))?
             .decode()
             .map_err(|e| Error::image(path, e.to_string(), "infrared must be a grey PNG"))?;
-        let amplitude = match image {
+        let ((width, height), amplitude) = match image {
             image::DynamicImage::ImageLuma8(grey) => {
-                return Ok(InfraredImage {
-                    width: grey.width() as usize,
-                    height: grey.height() as usize,
-                    amplitude: grey.into_raw().into_iter().map(u16::from).collect(),
-                });
+                (grey.dimensions(), grey.into_raw().into_iter().map(u16::from).collect())
             }
-            image::DynamicImage::ImageLuma16(grey) => grey,
+            image::DynamicImage::ImageLuma16(grey) => (grey.dimensions(), grey.into_raw()),
             other => {
                 return Err(Error::image(
                     path,
@@ -207,45 +203,17 @@ impl InfraredImage {
                 ));
             }
         };
-        Ok(InfraredImage {
-            width: amplitude.width() as usize,
-            height: amplitude.height() as usize,
-            amplitude: amplitude.into_raw(),
-        })
+        Ok(InfraredImage { width: width as usize, height: height as usize, amplitude })
     }
-}
-
-/// A depth frame as the bytes of a 16-bit grey PNG.
-///
-/// # Errors
-/// When the frame's size does not match its words.
-pub fn encode_png16(frame: &Frame) -> Result<Vec<u8>> {
-    let failed = |e: png::EncodingError| Error::Drawing { what: "depth PNG", why: e.to_string() };
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, frame.width as u32, frame.height as u32);
-    encoder.set_color(ColorType::Grayscale);
-    encoder.set_depth(BitDepth::Sixteen);
-    encoder.set_compression(png::Compression::Balanced);
-    let mut writer = encoder.write_header().map_err(failed)?;
-    let data: Vec<u8> = frame.words.iter().flat_map(|w| w.to_be_bytes()).collect();
-    writer.write_image_data(&data).map_err(failed)?;
-    writer.finish().map_err(failed)?;
-    Ok(bytes)
-}
-
-/// A depth frame as fakenect writes it: a PGM whose words are little-endian.
-pub fn encode_pgm16(frame: &Frame) -> Vec<u8> {
-    let mut bytes = format!("P5 {} {} 65535\n", frame.width, frame.height).into_bytes();
-    bytes.extend(frame.words.iter().flat_map(|w| w.to_le_bytes()));
-    bytes
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::{encode_pgm16, encode_png16};
 
     fn frame() -> Frame {
-        Frame { width: 5, height: 3, words: (0..15).map(|i| i * 4000 + 7).collect() }
+        Frame { width: 5, height: 3, raw: (0..15).map(|i| i * 4000 + 7).collect() }
     }
 
     #[test]
@@ -274,7 +242,7 @@ mod tests {
         let mut bytes = b"P5 2 1 65535\n".to_vec();
         bytes.extend([0x01, 0x02, 0xff, 0x07]);
         let frame = decode_fakenect_pgm(Path::new("d.pgm"), &bytes).unwrap();
-        assert_eq!(frame.words, [0x0201, 2047]);
+        assert_eq!(frame.raw, [0x0201, 2047]);
         for cut in 0..bytes.len() {
             assert!(decode_fakenect_pgm(Path::new("d.pgm"), &bytes[..cut]).is_err());
         }

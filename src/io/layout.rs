@@ -1,13 +1,12 @@
-//! The recording layout: recording.json and one folder a view (contract, section 1).
+//! The recording layout: recording.json and one folder a view (`crate::docs::layouts`).
 
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::entries;
 use super::list::{FrameList, read_list};
-use super::output::write_json;
+use super::output::{entries, write_json};
 use super::unknown::UnknownKeys;
 use crate::error::{Error, Result};
 use crate::view::{
@@ -153,7 +152,7 @@ fn parse<T: serde::de::DeserializeOwned>(path: &Path, text: &str) -> Result<T> {
     })
 }
 
-/// serde's "... at line 3 column 7" without the line, which the error tells in its own words.
+/// serde's "... at line 3 column 7" without the line, which the error has by itself.
 fn without_place(what: &str) -> String {
     what.rsplit_once(" at line ").map_or(what, |(before, _)| before).into()
 }

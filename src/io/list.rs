@@ -10,13 +10,13 @@ use crate::view::FrameRef;
 pub struct FrameList {
     /// In time order.
     pub frames: Vec<FrameRef>,
-    /// In words.
+    /// What was odd about it.
     pub remarks: Vec<String>,
 }
 
 /// Read a list; paths in it are relative to the folder it stands in.
 ///
-/// Files that are missing, stamps out of order and stamps given twice are told, not fatal.
+/// Files that are missing, stamps out of order and stamps given twice are remarks, not errors.
 ///
 /// # Errors
 /// When a line is not "timestamp path".

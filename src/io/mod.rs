@@ -1,60 +1,35 @@
 //! Files in, files out. One reader a file; every layout ends as the same [`Recording`].
 
+mod assumed;
 mod dump;
+mod encode;
 mod folder;
 mod images;
 mod layout;
 mod list;
 mod output;
-mod quick;
 mod stills;
-mod tum;
 mod unknown;
 
+pub use assumed::Assumed;
 pub(crate) use dump::INDEX;
 pub use dump::write_dump;
-pub use images::{ColourImage, FrameSource, InfraredImage, encode_pgm16, encode_png16};
+pub use encode::{encode_pgm16, encode_png16, encode_png16_quickly, encode_rgb};
+pub use images::{ColourImage, FrameSource, InfraredImage};
 pub(crate) use images::{read_depth, size_of};
 pub use layout::DESCRIPTION;
 pub(crate) use layout::{DEPTH_LIST, read_description};
 pub use layout::{ViewFile, write_recording_file, write_view_notes};
 pub use list::{FrameList, read_list};
-pub use output::hex;
 pub use output::{OutputDir, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
-pub use quick::{encode_png16_quickly, encode_rgb};
+pub(crate) use output::entries;
+pub use output::hex;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use crate::camera::Camera;
 use crate::error::{Error, Result};
-use crate::frame::DepthCode;
-use crate::units::shortest;
 use crate::view::{Recording, Sensor};
 use stills::Footage;
-
-/// What the user knows about a folder that does not describe itself.
-#[derive(Debug, Clone, Default)]
-pub struct Assumed {
-    /// fx, fy, cx, cy in px.
-    pub intrinsics: Option<[f64; 4]>,
-    /// How words become metres.
-    pub code: Option<DepthCode>,
-    /// Distance between projector and camera, m.
-    pub baseline_m: Option<f64>,
-}
-
-impl Assumed {
-    /// What was given, under the names of the options.
-    fn given(&self) -> Vec<&'static str> {
-        let code = self.code.map(|code| match code {
-            DepthCode::Metric { .. } => "--units-per-metre",
-            DepthCode::Disparity { .. } => "--raw-disparity",
-        });
-        let intrinsics = self.intrinsics.map(|_| "--intrinsics");
-        let baseline = self.baseline_m.map(|_| "--baseline");
-        [intrinsics, code, baseline].into_iter().flatten().collect()
-    }
-}
 
 /// How the files of a recording lie in its folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,10 +58,10 @@ impl Layout {
             ));
         }
         // A described TUM sequence has its frames at the root, a recording in one folder a view.
-        let sequence = path.join(tum::DEPTH_LIST).is_file();
-        Ok(if path.join(layout::DESCRIPTION).is_file() && !sequence {
+        let sequence = path.join(DEPTH_LIST).is_file();
+        Ok(if path.join(DESCRIPTION).is_file() && !sequence {
             Layout::Recording
-        } else if path.join(dump::INDEX).is_file() {
+        } else if path.join(INDEX).is_file() {
             Layout::Dump
         } else if sequence {
             Layout::Sequence
@@ -121,12 +96,12 @@ fn open_and(
 ) -> Result<Recording> {
     let footage = match Layout::of(path)? {
         Layout::Recording => {
-            refuse(assumed, path)?;
+            assumed.refuse_beside(&path.join(DESCRIPTION))?;
             None
         }
         Layout::Dump => Some(dump::footage(path, assumed)?),
-        Layout::Sequence => Some(tum::footage(path, assumed)?),
-        Layout::Images => Some(folder::footage(path, assumed)?),
+        Layout::Sequence => Some(folder::sequence(path, assumed)?),
+        Layout::Images => Some(folder::images(path, assumed)?),
     };
     let recording = match footage {
         None => layout::open(path)?,
@@ -147,24 +122,8 @@ fn open_and(
     Ok(recording)
 }
 
-/// An option that would have no effect must not look as if it had one.
-fn refuse(assumed: &Assumed, path: &Path) -> Result<()> {
-    let given = assumed.given();
-    if given.is_empty() {
-        return Ok(());
-    }
-    Err(Error::Argument {
-        what: format!(
-            "{}: {} describes its sensor itself",
-            given.join(" and "),
-            path.join(layout::DESCRIPTION).display()
-        ),
-        remedy: "leave the option out, or correct that file",
-    })
-}
-
-/// The sensor of a folder whose images are `size` px, and what had to be assumed: told by its
-/// recording.json, by what is known of a dump, or by `assumed`.
+/// The sensor of a folder whose images are `size` px, and remarks on what had to be assumed: from
+/// its recording.json, from what is usual in a dump, or from `assumed`.
 pub(crate) fn describe_folder(
     root: &Path,
     size: (usize, usize),
@@ -172,49 +131,13 @@ pub(crate) fn describe_folder(
 ) -> Result<(Sensor, Vec<String>)> {
     let description = root.join(DESCRIPTION);
     if description.is_file() {
-        refuse(assumed, root)?;
+        assumed.refuse_beside(&description)?;
         return Ok((read_description(&description)?, Vec::new()));
     }
-    if root.join(INDEX).is_file() {
-        return dump::sensor(size, assumed);
-    }
-    folder::sensor(root, size, assumed)
-}
-
-/// What stands in a folder, in name order.
-pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
-    let failed = |e| Error::read(folder, e);
-    let mut paths = std::fs::read_dir(folder)
-        .map_err(failed)?
-        .map(|entry| entry.map(|e| e.path()))
-        .collect::<std::io::Result<Vec<PathBuf>>>()
-        .map_err(failed)?;
-    paths.sort();
-    Ok(paths)
-}
-
-/// A sensor for folders that carry no description of their own.
-pub(crate) fn assumed_sensor(
-    name: &str,
-    size: (usize, usize),
-    intrinsics: [f64; 4],
-    code: DepthCode,
-    assumed: &Assumed,
-) -> Result<Sensor> {
-    let [fx, fy, cx, cy] = intrinsics;
-    let sensor = Sensor {
-        name: name.into(),
-        serial: None,
-        mode: None,
-        camera: Camera { width: size.0, height: size.1, fx, fy, cx, cy, distortion: None },
-        baseline_m: assumed.baseline_m,
-        code,
+    let (sensor, remark) = if root.join(INDEX).is_file() {
+        assumed.dump_sensor(size)?
+    } else {
+        assumed.images_sensor(root, size)?
     };
-    match sensor.fault() {
-        Some(what) => Err(Error::Argument {
-            what: format!("--intrinsics {}: {what}", intrinsics.map(shortest).join(",")),
-            remedy: "give fx,fy,cx,cy in pixels",
-        }),
-        None => Ok(sensor),
-    }
+    Ok((sensor, remark.into_iter().collect()))
 }

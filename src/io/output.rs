@@ -1,4 +1,5 @@
-//! Outputs appear whole or not at all: written beside their place, then renamed into it.
+//! Files and folders. Outputs appear whole or not at all: written beside their place, then renamed
+//! into it.
 
 use std::fs;
 use std::io::Write;
@@ -98,6 +99,18 @@ pub fn write_json(path: &Path, value: &impl Serialize, remedy: &'static str) -> 
     })?;
     write_atomic(path, text.as_bytes())?;
     Ok(text)
+}
+
+/// What stands in a folder, in name order.
+pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+    let failed = |e| Error::read(folder, e);
+    let mut paths = fs::read_dir(folder)
+        .map_err(failed)?
+        .map(|entry| entry.map(|e| e.path()))
+        .collect::<std::io::Result<Vec<PathBuf>>>()
+        .map_err(failed)?;
+    paths.sort();
+    Ok(paths)
 }
 
 /// SHA-256 as lower-case hexadecimal.

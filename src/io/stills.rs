@@ -66,7 +66,7 @@ impl Footage {
         }
     }
 
-    /// Cut into views; frames in motion and frames that show nothing are told and left out.
+    /// Cut into views; frames in motion and frames that show nothing are left out, with a remark.
     pub fn recording(self, root: &Path, sensor: Sensor) -> Recording {
         let listed = self.frames.len();
         let (stretches, blank) = stretches(self.frames, &sensor);
@@ -160,7 +160,7 @@ fn sample(frame: &Frame, table: &DepthTable) -> Vec<f32> {
     (GRID_PX / 2..frame.height)
         .step_by(GRID_PX)
         .flat_map(|v| (GRID_PX / 2..frame.width).step_by(GRID_PX).map(move |u| v * frame.width + u))
-        .map(|i| table.metres(frame.words[i]))
+        .map(|i| table.metres(frame.raw[i]))
         .collect()
 }
 

@@ -1,4 +1,4 @@
-//! Keys of a JSON file that nobody reads.
+//! Keys of a JSON file that have no effect.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

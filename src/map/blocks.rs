@@ -28,9 +28,9 @@ const SLOPE_AROUND: f32 = 0.05;
 /// Neighbours on each side for the normal.
 const AROUND: usize = EDGE;
 /// Of the 25.
-const FEWEST_AROUND: f32 = 8.0;
+const MIN_AROUND: f32 = 8.0;
 /// Surfaces seen at more than 80 degrees are rims and mistakes.
-const LEAST_FACING: f32 = 0.17;
+const MIN_FACING: f32 = 0.17;
 
 impl Blocks {
     /// Of a depth image, m, NaN where nothing was measured.
@@ -118,7 +118,7 @@ impl Around {
 
     /// (a, b, c) of q = a x + b y + c through the blocks around one.
     fn plane(&self, lane: usize) -> Option<Vector3<f64>> {
-        if self.found[lane] < FEWEST_AROUND {
+        if self.found[lane] < MIN_AROUND {
             return None;
         }
         let [n, x, y, xx, xy, yy, q, xq, yq] = self.sums.map(|sum| f64::from(sum[lane]));
@@ -141,7 +141,7 @@ fn point(
     // n / D of the plane; it looks away from the camera.
     let normal = -plane.try_normalize(f64::MIN_POSITIVE)?.cast::<f32>();
     let facing = -normal.dot(&at) / at.norm();
-    if facing.is_nan() || facing <= LEAST_FACING {
+    if facing.is_nan() || facing <= MIN_FACING {
         return None;
     }
     let axial = noise.axial(z, &normal);

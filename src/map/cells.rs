@@ -22,11 +22,11 @@ struct Brick {
 }
 
 /// Half full at most: probes stay short.
-const LEAST_SLOTS: usize = 1 << 10;
+const MIN_SLOTS: usize = 1 << 10;
 
 impl Default for Cells {
     fn default() -> Self {
-        Cells { slots: vec![0; LEAST_SLOTS], bricks: Vec::new(), places: Vec::new() }
+        Cells { slots: vec![0; MIN_SLOTS], bricks: Vec::new(), places: Vec::new() }
     }
 }
 

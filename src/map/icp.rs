@@ -48,12 +48,12 @@ pub enum Kernel {
 pub struct Criteria {
     pub weights: Weights,
     pub kernel: Kernel,
-    pub most_iterations: usize,
+    pub max_iterations: usize,
     /// A step smaller than both ends it: m and rad.
-    pub least_shift_m: f64,
-    pub least_turn_rad: f64,
+    pub min_shift_m: f64,
+    pub min_turn_rad: f64,
     /// Surfaces that lean more to each other are not one: least cosine of their normals.
-    pub least_cosine: f64,
+    pub min_cosine: f64,
 }
 
 /// Why the loop ended.
@@ -86,7 +86,7 @@ pub struct Alignment {
 }
 
 /// Fewer pairs say nothing about six numbers under noise.
-const FEWEST_PAIRS: usize = 50;
+const MIN_PAIRS: usize = 50;
 /// Points a task: sums are added in this order whatever the number of threads.
 const CHUNK: usize = 2048;
 
@@ -103,10 +103,10 @@ pub fn align<T: Target>(
     let mut last = None;
     let mut ending = Ending::MostIterations;
     let mut iterations = 0;
-    while iterations < criteria.most_iterations {
+    while iterations < criteria.max_iterations {
         let sums = Round { target, criteria, pose: &pose, scale }.sum(source, &mut memory);
         iterations += 1;
-        let enough = sums.pairs >= FEWEST_PAIRS;
+        let enough = sums.pairs >= MIN_PAIRS;
         let Some(solution) = enough.then(|| sums.solve()).flatten() else {
             ending = Ending::TooFewPairs;
             last = None;
@@ -121,7 +121,7 @@ pub fn align<T: Target>(
         pose = renormalised(&(moved(&step) * pose));
         let (shift, turn) = (step.fixed_rows::<3>(0).norm(), step.fixed_rows::<3>(3).norm());
         last = Some((sums, solution));
-        if shift < criteria.least_shift_m && turn < criteria.least_turn_rad {
+        if shift < criteria.min_shift_m && turn < criteria.min_turn_rad {
             ending = Ending::Settled;
             break;
         }
@@ -186,7 +186,7 @@ struct Round<'a, T> {
 impl<T: Target> Round<'_, T> {
     fn sum(&self, source: &[Point], memory: &mut [T::Memory]) -> Sums {
         let motion = Motion::of(self.pose);
-        let any_normal = self.criteria.least_cosine <= -1.0;
+        let any_normal = self.criteria.min_cosine <= -1.0;
         let keep_sizes = self.criteria.kernel != Kernel::Square;
         let part = |(points, memory): (&[Point], &mut [T::Memory])| {
             let mut sums = Sums::with_room(if keep_sizes { points.len() } else { 0 });
@@ -194,7 +194,7 @@ impl<T: Target> Round<'_, T> {
                 let at = motion.moved(&s.at);
                 let Some(d) = self.target.find(&at, memory) else { continue };
                 let lean = || f64::from(motion.turned(&s.normal).dot(&d.normal));
-                if !any_normal && lean() < self.criteria.least_cosine {
+                if !any_normal && lean() < self.criteria.min_cosine {
                     continue;
                 }
                 let residual = f64::from((at - d.at).dot(&d.normal));

@@ -32,7 +32,7 @@ pub const SIGMAS: f32 = 4.0;
 /// make 2.7 times that, half to either side.
 const SLOPE: f32 = 0.012;
 /// A block with fewer pixels than this share is the rim of something.
-const LEAST_FILLED: f32 = 0.4;
+const MIN_FILLED: f32 = 0.4;
 
 /// The mean of a block.
 #[derive(Debug, Clone, Copy, Default)]
@@ -193,7 +193,7 @@ impl Picture<'_> {
     }
 
     fn fewest(&self) -> f32 {
-        LEAST_FILLED * (self.side * self.side) as f32
+        MIN_FILLED * (self.side * self.side) as f32
     }
 
     /// Sigma of one inverse depth, and how far others of its surface may be from it, 1/m.

@@ -46,7 +46,7 @@ pub use tracker::{Fate, FrameReport};
 use prepare::Kitchen;
 use tracker::Tracker;
 
-use crate::calibrate::Progress;
+use crate::Progress;
 use crate::error::{Error, Result};
 use crate::model::NoiseModel;
 use crate::sequence::Sequence;

@@ -55,14 +55,14 @@ fn normal_of(v: &Voxel) -> Option<Vector3<f32>> {
         q[4] - m.y * m.z,
         q[5] - m.z * m.z,
     ];
-    let ([least, middle, most], direction) = least_direction(covariance)?;
+    let ([least, middle, most], direction) = min_direction(covariance)?;
     // A sphere of noise has no normal either: twice as thick as a plane may be.
     (middle > THINNEST * most && least < 0.5 * middle).then(|| direction.cast())
 }
 
 /// Eigenvalues, ascending, and the unit eigenvector of the least, of the symmetric matrix with
 /// these xx, xy, xz, yy, yz, zz: in closed form, by the cosine of a third of an angle (Smith 1961).
-fn least_direction(m: [f64; 6]) -> Option<([f64; 3], Vector3<f64>)> {
+fn min_direction(m: [f64; 6]) -> Option<([f64; 3], Vector3<f64>)> {
     let [xx, xy, xz, yy, yz, zz] = m;
     let mean = (xx + yy + zz) / 3.0;
     let (a, b, c) = (xx - mean, yy - mean, zz - mean);
@@ -101,10 +101,10 @@ mod tests {
     proptest! {
         /// Against nalgebra's iteration.
         #[test]
-        fn the_least_direction_is_an_eigenvector(a in prop::array::uniform9(-1.0f64..1.0)) {
+        fn the_min_direction_is_an_eigenvector(a in prop::array::uniform9(-1.0f64..1.0)) {
             let half = Matrix3::from_row_slice(&a);
             let m = half * half.transpose() + Matrix3::from_diagonal_element(1e-3);
-            let told = least_direction([
+            let told = min_direction([
                 m[(0, 0)], m[(0, 1)], m[(0, 2)], m[(1, 1)], m[(1, 2)], m[(2, 2)],
             ]);
             let mut values: Vec<f64> = SymmetricEigen::new(m).eigenvalues.iter().copied().collect();

@@ -40,15 +40,15 @@ pub struct Options {
     pub block_px: usize,
     /// Neighbours farther than this are none, m.
     pub gate_m: f32,
-    pub most_iterations: usize,
-    pub least_shift_m: f64,
-    pub least_turn_rad: f64,
+    pub max_iterations: usize,
+    pub min_shift_m: f64,
+    pub min_turn_rad: f64,
     /// Least cosine between normals of neighbours.
-    pub least_cosine: f64,
+    pub min_cosine: f64,
     /// Observations of a piece of the map that count at most.
-    pub most_counted: f32,
+    pub max_counted: f32,
     /// Fewer points than this share with a neighbour: lost.
-    pub least_matched: f64,
+    pub min_matched: f64,
     pub seed: Seed,
     /// Read colour for the map.
     pub colour: bool,
@@ -66,12 +66,12 @@ impl Options {
             block_px: 4,
             // Not in the paper: what its peers are run with.
             gate_m: 0.1,
-            most_iterations: 30,
-            least_shift_m: 1e-8,
-            least_turn_rad: 1e-5 * std::f64::consts::PI / 180.0,
-            least_cosine: -1.0,
-            most_counted: 30.0,
-            least_matched: 0.3,
+            max_iterations: 30,
+            min_shift_m: 1e-8,
+            min_turn_rad: 1e-5 * std::f64::consts::PI / 180.0,
+            min_cosine: -1.0,
+            max_counted: 30.0,
+            min_matched: 0.3,
             seed: Seed(1),
             colour: true,
         }
@@ -82,9 +82,9 @@ impl Options {
         Options {
             method: Method::Model,
             kernel: Kernel::Huber,
-            least_cosine: 0.7,
-            least_shift_m: 1e-5,
-            least_turn_rad: 1e-5,
+            min_cosine: 0.7,
+            min_shift_m: 1e-5,
+            min_turn_rad: 1e-5,
             ..Options::paper(Weights::Both, Init::Motion)
         }
     }
@@ -93,10 +93,10 @@ impl Options {
         Criteria {
             weights: self.weights,
             kernel: self.kernel,
-            most_iterations: self.most_iterations,
-            least_shift_m: self.least_shift_m,
-            least_turn_rad: self.least_turn_rad,
-            least_cosine: self.least_cosine,
+            max_iterations: self.max_iterations,
+            min_shift_m: self.min_shift_m,
+            min_turn_rad: self.min_turn_rad,
+            min_cosine: self.min_cosine,
         }
     }
 }
@@ -116,11 +116,11 @@ impl Options {
         if !positive(self.gate_m) || self.gate_m > 2.0 {
             return wrong(format!("--gate {}", self.gate_m), "give a distance up to 2 m");
         }
-        if self.most_iterations == 0 {
+        if self.max_iterations == 0 {
             return wrong("--iterations 0".into(), "give 1 or more");
         }
-        if self.most_counted.is_nan() || self.most_counted < 1.0 {
-            return wrong(format!("--memory {}", self.most_counted), "give 1 or more");
+        if self.max_counted.is_nan() || self.max_counted < 1.0 {
+            return wrong(format!("--memory {}", self.max_counted), "give 1 or more");
         }
         Ok(())
     }

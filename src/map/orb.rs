@@ -17,7 +17,7 @@ use crate::rng::Stream;
 
 /// The paper's; the rest as OpenCV has it.
 const FAST_THRESHOLD: i32 = 50;
-const MOST_FEATURES: i32 = 500;
+const MAX_FEATURES: i32 = 500;
 
 /// Features of one frame.
 #[derive(Debug, Clone)]
@@ -42,7 +42,7 @@ impl Features {
         let mut grey = Mat::default();
         cvt_color_def(&colour, &mut grey, COLOR_RGB2GRAY)?;
         let mut orb = ORB::create(
-            MOST_FEATURES,
+            MAX_FEATURES,
             1.2,
             8,
             31,

@@ -85,7 +85,7 @@ impl<'a> Kitchen<'a> {
     /// When the depth image cannot be read.
     pub fn prepare(&self, moment: &Moment) -> Result<Prepared> {
         let mut stages = Stages::default();
-        let words = stages.time("decode", || self.sequence.words(moment))?;
+        let words = stages.time("decode", || self.sequence.raw_depth(moment))?;
         let depth = stages.time("unproject", || self.metres(&words, moment))?;
         let mut remark = None;
         let wanted = self.options.colour || self.options.init == Init::Orb;

@@ -13,7 +13,7 @@ pub const WITHIN_M: f64 = 0.05;
 pub const TRIES: usize = 500;
 
 /// Three points make a motion; as many again that agree make it more than chance.
-const FEWEST_AGREED: usize = 8;
+const MIN_AGREED: usize = 8;
 
 /// A motion and who agrees with it.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,7 +24,7 @@ pub struct Agreed {
 
 /// The motion that brings most pairs together, fitted to all of those; `None` where too few agree.
 pub fn agreed(pairs: &[PointPair], rng: &mut Stream) -> Option<Agreed> {
-    if pairs.len() < FEWEST_AGREED {
+    if pairs.len() < MIN_AGREED {
         return None;
     }
     let mut best: Option<(usize, Isometry3<f64>)> = None;
@@ -44,7 +44,7 @@ pub fn agreed(pairs: &[PointPair], rng: &mut Stream) -> Option<Agreed> {
         let agreeing: Vec<PointPair> =
             pairs.iter().filter(|p| agrees(&motion, p)).copied().collect();
         count = agreeing.len();
-        if count < FEWEST_AGREED {
+        if count < MIN_AGREED {
             return None;
         }
         motion = align(&agreeing)?;

@@ -37,7 +37,7 @@ pub struct Solution {
 /// A motion is undetermined when it moves the points across their surfaces by less than this, as a
 /// variance, where a fully determined one moves them by 1: normals are uncertain by a few degrees,
 /// so that a bare wall seems to fix a slide along itself to 0.001 to 0.004.
-const LEAST_SHARE: f64 = 0.005;
+const MIN_SHARE: f64 = 0.005;
 /// Gaussian: median of |x| over sigma.
 const MEDIAN_OVER_SIGMA: f64 = 0.6745;
 
@@ -132,7 +132,7 @@ impl Sums {
             let told = along.dot(&(geometry * along));
             weakest = weakest.min(told);
             // What is not determined stays as it was, and is not known at all.
-            if told >= LEAST_SHARE && share > 0.0 {
+            if told >= MIN_SHARE && share > 0.0 {
                 step -= along * (along.dot(&g) / share);
             } else {
                 undetermined.push(Direction::of(&along, told));

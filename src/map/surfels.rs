@@ -36,7 +36,7 @@ pub struct Surfels {
 pub struct Fusion {
     /// A piece never counts for more than this many of its observations: the pose it was put down
     /// with errs too, and that error is not averaged away.
-    pub most_counted: f32,
+    pub max_counted: f32,
 }
 
 /// A piece and an observation are one surface when their distance across it is less than this many
@@ -146,7 +146,7 @@ impl Surfel {
         let normal = self.point.normal * (1.0 - share) + p.normal * share;
         self.point.normal = normal.try_normalize(f32::MIN_POSITIVE).unwrap_or(self.point.normal);
         self.point.axial = p.axial;
-        self.point.across = (mine + new).min(new * fusion.most_counted).max(mine).powf(-0.5);
+        self.point.across = (mine + new).min(new * fusion.max_counted).max(mine).powf(-0.5);
         self.seen += 1;
         self.last = number;
         if let Some(colour) = colour {

@@ -83,7 +83,7 @@ fn a_known_motion_before_a_corner_is_found() {
         let (shift, turn) = error(&told, &motion());
         assert!(shift < 1e-3 && turn < 1e-3, "voxels {weights:?}: {shift} m, {turn} rad");
         assert!(told.undetermined.is_empty() && told.weakest > 0.02, "{told:?}");
-        let robust = Criteria { kernel: Kernel::Tukey, least_cosine: 0.7, ..criteria };
+        let robust = Criteria { kernel: Kernel::Tukey, min_cosine: 0.7, ..criteria };
         let told = projected(&moved, &still, &robust);
         let (shift, turn) = error(&told, &motion());
         assert!(shift < 1e-4 && turn < 1e-4, "blocks {weights:?}: {shift} m, {turn} rad");

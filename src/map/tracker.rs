@@ -68,10 +68,10 @@ impl FrameReport {
 }
 
 /// Fewer points are no picture of anything.
-const FEWEST_POINTS: usize = 200;
+const MIN_POINTS: usize = 200;
 /// From frame to frame the share of points with a neighbour falls to .94 of what it was at worst on
 /// fr1_rpy and 7-Scenes; a metre away in the same room floor and walls still match, at .36 to .48.
-const LEAST_KEPT: f64 = 0.6;
+const MIN_KEPT: f64 = 0.6;
 /// Pieces of the map are sorted out every so many frames.
 const PRUNE_EVERY: u32 = 10;
 
@@ -114,8 +114,8 @@ impl<'a> Tracker<'a> {
         self.number += 1;
         let mut stages = std::mem::take(&mut frame.stages);
         let points = frame.shape.points().len();
-        if points < FEWEST_POINTS {
-            let why = format!("{points} points with a surface, {FEWEST_POINTS} are needed");
+        if points < MIN_POINTS {
+            let why = format!("{points} points with a surface, {MIN_POINTS} are needed");
             return Ok(FrameReport::lost(stamp, why, stages));
         }
         let Some(last) = &self.last else {
@@ -216,11 +216,11 @@ impl<'a> Tracker<'a> {
         }
         let percent = |share: f64| format!("{:.0} %", 100.0 * share);
         let (here, before) = (percent(alignment.matched), percent(self.matched));
-        if alignment.matched < self.options.least_matched {
-            let needed = percent(self.options.least_matched);
+        if alignment.matched < self.options.min_matched {
+            let needed = percent(self.options.min_matched);
             return Some(format!("{here} of the points find a neighbour, {needed} are needed"));
         }
-        (alignment.matched < LEAST_KEPT * self.matched).then(|| {
+        (alignment.matched < MIN_KEPT * self.matched).then(|| {
             format!(
                 "{here} of the points find a neighbour, {before} did before: a jump, or gone astray"
             )
@@ -245,7 +245,7 @@ impl<'a> Tracker<'a> {
                 let sight = self.sight(&self.pose);
                 let observed =
                     Observed { number: self.number, focal_px: self.camera.fx as f32, colour };
-                let fusion = Fusion { most_counted: self.options.most_counted };
+                let fusion = Fusion { max_counted: self.options.max_counted };
                 self.surfels.fuse(&sight, blocks, &self.pose, &observed, &fusion);
                 if self.number.is_multiple_of(PRUNE_EVERY) {
                     self.surfels.prune(self.number);

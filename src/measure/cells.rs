@@ -28,7 +28,7 @@ pub struct Cell {
     /// Independent samples the temporal sigma is worth: a pixel gives one frame less than it has.
     pub n_effective_temporal: f64,
     /// Samples of target pixels without a depth.
-    pub missing: usize,
+    pub dropouts: usize,
     /// Samples farther than the cut from the plane.
     pub cut: usize,
 }
@@ -38,7 +38,7 @@ const BIN_WHEN_RATIO: f64 = 1.10;
 /// ... into bins of at most this ratio: sigma ~ z^2 then varies by 10 % inside a bin, and the
 /// root mean square differs from sigma at the mean depth by less than 0.1 %.
 const BIN_RATIO: f64 = 1.05;
-const MOST_BINS: usize = 48;
+const MAX_BINS: usize = 48;
 
 /// How depth is cut into bins.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,7 +56,7 @@ impl Bins {
         if !tilted {
             return Bins { low, log_ratio: f64::INFINITY, count: 1 };
         }
-        let count = ((range / BIN_RATIO.ln()).ceil() as usize).min(MOST_BINS);
+        let count = ((range / BIN_RATIO.ln()).ceil() as usize).min(MAX_BINS);
         Bins { low, log_ratio: range / count as f64, count }
     }
 
@@ -82,7 +82,7 @@ pub(super) struct Sums {
     pub within_dof: f64,
     /// Between frames: n_f (mean_f - mean)^2.
     pub between: f64,
-    pub missing: usize,
+    pub dropouts: usize,
     pub cut: usize,
     /// Pixels that gave at least one sample.
     pub pixels: f64,
@@ -98,7 +98,7 @@ impl Sums {
         self.within += other.within;
         self.within_dof += other.within_dof;
         self.between += other.between;
-        self.missing += other.missing;
+        self.dropouts += other.dropouts;
         self.cut += other.cut;
         self.pixels += other.pixels;
     }
@@ -124,7 +124,7 @@ pub(super) struct Context {
 const PLANE_PARAMETERS: f64 = 3.0;
 /// The plane cannot have absorbed more than this share of the variance: beyond, the residual is
 /// smooth error rather than correlated noise, and the count of parameters says nothing.
-const MOST_ABSORBED: f64 = 0.05;
+const MAX_ABSORBED: f64 = 0.05;
 
 impl Context {
     pub fn cell(&self, s: &Sums) -> Option<Cell> {
@@ -162,7 +162,7 @@ impl Context {
             n_effective,
             n_effective_temporal: (s.pixels / self.correlation_squares * (moving_frames - 1.0))
                 .max(1.0),
-            missing: s.missing,
+            dropouts: s.dropouts,
             cut: s.cut,
         })
     }
@@ -195,7 +195,7 @@ impl Context {
         let per_plane = PLANE_PARAMETERS * self.correlation_sum / self.view_pixels.max(1.0);
         let share =
             if self.per_frame_planes { 1.0 } else { frozen + (1.0 - frozen) / moving_frames };
-        (per_plane * share).min(MOST_ABSORBED)
+        (per_plane * share).min(MAX_ABSORBED)
     }
 }
 
@@ -204,11 +204,11 @@ fn mean_correlation(rho: f64, frames: f64) -> f64 {
     let n = frames.round().max(2.0);
     // The sum of (n - k) rho^k over k = 1 .. n - 1, closed.
     let sum = rho * (n * (1.0 - rho) - (1.0 - rho.powf(n))) / (1.0 - rho).powi(2);
-    (2.0 * sum / (n * (n - 1.0))).clamp(0.0, MOST_SHARED)
+    (2.0 * sum / (n * (n - 1.0))).clamp(0.0, MAX_SHARED)
 }
 
 /// A filter slower than the view leaves too little of its noise to be scaled up honestly.
-const MOST_SHARED: f64 = 0.8;
+const MAX_SHARED: f64 = 0.8;
 
 #[cfg(test)]
 mod tests {

@@ -23,7 +23,7 @@ pub(super) struct Bin {
     pub mean_m: f64,
 }
 
-/// Why each bin is doubtful, in words; `None` for those that are the target's noise. Compared
+/// Why each bin is doubtful; `None` for those that are the target's noise. Compared
 /// from the largest bin outwards, so that a doubtful one never excuses the next.
 pub(super) fn doubts(bins: &[Bin]) -> Vec<Option<String>> {
     let mut doubts: Vec<Option<String>> = bins.iter().map(|_| None).collect();
@@ -83,7 +83,7 @@ mod tests {
             n,
             n_effective: 200.0,
             n_effective_temporal: 1.0,
-            missing: 0,
+            dropouts: 0,
             cut: 0,
         };
         Bin { cell, mean_m }
@@ -101,15 +101,15 @@ mod tests {
     }
 
     #[test]
-    fn bins_that_see_a_wall_are_told_and_do_not_excuse_the_next() {
+    fn bins_that_see_a_wall_are_doubted_and_do_not_excuse_the_next() {
         let mut bins: Vec<Bin> = (0..10).map(|k| bin(2.0, 0.008, 0.0, 1000 - k)).collect();
         bins[7] = bin(2.4, 0.012 * 5.8, 0.02, 400);
         bins[8] = bin(2.5, 0.013 * 4.0, -0.03, 400);
         // As wide as its neighbours, but all of it 3 sigma behind the plane.
         bins[0] = bin(1.9, 0.0253, 0.024, 400);
-        let told = doubts(&bins);
-        let which: Vec<usize> = (0..10).filter(|&k| told[k].is_some()).collect();
+        let doubted = doubts(&bins);
+        let which: Vec<usize> = (0..10).filter(|&k| doubted[k].is_some()).collect();
         assert_eq!(which, [0, 7, 8]);
-        assert!(told[7].as_ref().unwrap().contains("view.json"));
+        assert!(doubted[7].as_ref().unwrap().contains("view.json"));
     }
 }

@@ -9,7 +9,7 @@ use crate::stats::{median_in_place, normal_cut_factor};
 /// of what is kept is divided by [`normal_cut_factor`], 0.994.
 pub(super) const CUT_SIGMAS: f64 = 3.5;
 /// Cells with fewer pixels than this join their neighbour.
-const FEWEST_CELL_PIXELS: usize = 150;
+const MIN_CELL_PIXELS: usize = 150;
 const CUT_ROUNDS: usize = 6;
 
 /// The target's pixels sorted into bins of depth; small bins join their neighbour.
@@ -39,7 +39,7 @@ pub(super) fn by_cell(
     for group in groups {
         open += group.len();
         sorted.extend(group);
-        if open >= FEWEST_CELL_PIXELS {
+        if open >= MIN_CELL_PIXELS {
             starts.push(sorted.len());
             open = 0;
         }

@@ -29,7 +29,7 @@ pub struct PaperResult {
 
 /// In robust standard deviations; the paper does not print its threshold.
 const THRESHOLD_SIGMAS: f64 = 3.0;
-const LEAST_THRESHOLD_M: f64 = 0.001;
+const MIN_THRESHOLD_M: f64 = 0.001;
 const CONFIDENCE: f64 = 0.999;
 
 pub(super) fn measure(
@@ -42,7 +42,7 @@ pub(super) fn measure(
     let mut points = Points::default();
     for &i in &target.pixels {
         let i = i as usize;
-        let z = bench.table.metres(frame.words[i]);
+        let z = bench.table.metres(frame.raw[i]);
         if z.is_finite() {
             points.push(bench.rays.x[i] * z, bench.rays.y[i] * z, z);
         }
@@ -50,7 +50,7 @@ pub(super) fn measure(
     let threshold_m = bench
         .options
         .ransac_threshold_m
-        .unwrap_or((THRESHOLD_SIGMAS * sigma_perpendicular_m).max(LEAST_THRESHOLD_M));
+        .unwrap_or((THRESHOLD_SIGMAS * sigma_perpendicular_m).max(MIN_THRESHOLD_M));
     let options = RansacOptions {
         threshold_m,
         iterations: bench.options.ransac_iterations,

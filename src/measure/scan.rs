@@ -2,45 +2,44 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::cells::{Cell, Context, Sums};
-use super::doubtful::{Bin, doubts};
 use super::grouping::{CUT_SIGMAS, by_cell, expected, settled_scale};
-use super::lagged::Lagged;
-use super::{Planes, ResidualPicture, ViewMeasurement, Workbench};
+use super::{Planes, Workbench};
 use crate::frame::Frame;
-use crate::plane::{Effort, Plane, Target, fit_affine_robust};
+use crate::plane::{Plane, Target};
 use crate::residual::perpendicular_per_axial;
-use crate::stats::{Correlation, measure_correlation, normal_cut_factor};
+
+/// Frames held while the target and the scale are found; more would not make them surer.
+pub(super) const HELD_FRAMES: usize = 8;
 
 pub(super) struct Scan<'a> {
-    bench: &'a Workbench<'a>,
+    pub(super) bench: &'a Workbench<'a>,
     /// Pixels grouped by cell, in image order inside a cell.
-    pixels: Vec<u32>,
+    pub(super) pixels: Vec<u32>,
     /// First index into `pixels` of each cell, and the end.
-    starts: Vec<usize>,
-    plane: Plane,
+    pub(super) starts: Vec<usize>,
+    pub(super) plane: Plane,
     /// Expected depth, m, pixel by pixel of `pixels`.
-    expected: Vec<f32>,
+    pub(super) expected: Vec<f32>,
     /// Greatest residual kept in each cell, m.
-    cut: Vec<f32>,
-    count: Vec<u32>,
-    sum: Vec<f64>,
-    square: Vec<f64>,
-    frames: Vec<FrameSums>,
-    missing: Vec<usize>,
-    beyond: Vec<usize>,
-    lagged: Lagged,
+    pub(super) cut: Vec<f32>,
+    pub(super) count: Vec<u32>,
+    pub(super) sum: Vec<f64>,
+    pub(super) square: Vec<f64>,
+    pub(super) frames: Vec<FrameSums>,
+    pub(super) dropouts: Vec<usize>,
+    pub(super) beyond: Vec<usize>,
+    pub(super) lagged: Lagged,
     /// Sum of the frames' own planes when they are fitted one by one.
-    own_planes: Vector3<f64>,
+    pub(super) own_planes: Vector3<f64>,
 }
 
 /// Per cell: number and sum of residuals, frame by frame reduced to what the variance between
 /// frames needs.
 #[derive(Debug, Clone, Copy, Default)]
-struct FrameSums {
-    n: f64,
-    sum: f64,
-    mean_square: f64,
+pub(super) struct FrameSums {
+    pub n: f64,
+    pub sum: f64,
+    pub mean_square: f64,
 }
 
 impl<'a> Scan<'a> {
@@ -61,7 +60,7 @@ impl<'a> Scan<'a> {
             sum: vec![0.0; n],
             square: vec![0.0; n],
             frames: vec![FrameSums::default(); cells],
-            missing: vec![0; cells],
+            dropouts: vec![0; cells],
             beyond: vec![0; cells],
             lagged: Lagged::default(),
             own_planes: Vector3::zeros(),
@@ -70,7 +69,7 @@ impl<'a> Scan<'a> {
         scan
     }
 
-    fn cell_range(&self, cell: usize) -> std::ops::Range<usize> {
+    pub(super) fn cell_range(&self, cell: usize) -> std::ops::Range<usize> {
         self.starts[cell]..self.starts[cell + 1]
     }
 
@@ -88,19 +87,19 @@ impl<'a> Scan<'a> {
                 .map(|(frame, k)| self.residual(frame, k))
                 .filter(|e| e.is_finite())
                 .collect();
-            self.cut[cell] = (CUT_SIGMAS * settled_scale(residuals, self.least_scale(cell))) as f32;
+            self.cut[cell] = (CUT_SIGMAS * settled_scale(residuals, self.min_scale(cell))) as f32;
         }
     }
 
     /// A fronto-parallel plane in a coarse code may show no spread at all.
-    fn least_scale(&self, cell: usize) -> f64 {
+    fn min_scale(&self, cell: usize) -> f64 {
         let z = f64::from(self.expected[self.starts[cell]]);
         0.3 * self.bench.step(1.0 / z) * z * z
     }
 
     #[inline]
     fn residual(&self, frame: &Frame, k: usize) -> f32 {
-        self.bench.table.metres(frame.words[self.pixels[k] as usize]) - self.expected[k]
+        self.bench.table.metres(frame.raw[self.pixels[k] as usize]) - self.expected[k]
     }
 
     /// Standard deviation of the perpendicular residual over the whole view, from the cuts.
@@ -132,14 +131,14 @@ impl<'a> Scan<'a> {
     }
 
     fn accumulate(&mut self, frame: &Frame, own: Option<Plane>) {
-        let follow = self.lagged.frames < super::HELD_FRAMES;
+        let follow = self.lagged.frames < HELD_FRAMES;
         let mut residuals = if follow { vec![f32::NAN; self.pixels.len()] } else { Vec::new() };
         for cell in 0..self.cut.len() {
             let cut = self.cut[cell];
             let (mut n, mut total) = (0u32, 0f64);
             for k in self.cell_range(cell) {
                 let i = self.pixels[k] as usize;
-                let z = self.bench.table.metres(frame.words[i]);
+                let z = self.bench.table.metres(frame.raw[i]);
                 let expected = match own {
                     None => self.expected[k],
                     Some(plane) => {
@@ -161,7 +160,7 @@ impl<'a> Scan<'a> {
                 } else if z.is_finite() {
                     self.beyond[cell] += 1;
                 } else {
-                    self.missing[cell] += 1;
+                    self.dropouts[cell] += 1;
                 }
             }
             if n > 0 {
@@ -195,200 +194,55 @@ impl<'a> Scan<'a> {
         let shift = normal.cholesky()?.solve(&right);
         Some(Plane::new(self.plane.q + shift)).filter(Plane::is_finite)
     }
+}
 
-    /// Refit on all frames, and turn the sums into the view's result (names and notes are the
-    /// caller's). `None` when nothing was measured.
-    pub fn finish(self, target: &Target, first: &Frame) -> Option<ViewMeasurement> {
-        let frames = self.lagged.frames;
-        let plane = match self.bench.options.planes {
-            Planes::PerView => self.refit(target),
-            Planes::PerFrame => Plane::new(self.own_planes / frames as f64),
-        };
-        let shift = self.shift_to(&plane);
-        let sums = self.sums(&plane, &shift);
-        let correlation = self.correlation(first, &plane, &sums);
-        let temporal_correlation = self.lagged.correlation();
-        let context = self.context(&correlation, temporal_correlation);
-        let (cells, trusted, notes) = trusted_cells(&sums, &context);
-        let whole = context.cell(&trusted)?;
-        Some(ViewMeasurement {
-            name: String::new(),
-            time_s: 0.0,
-            plane,
-            z_m: whole.z_m,
-            theta_rad: plane.theta(),
-            azimuth_rad: plane.azimuth(),
-            whole,
-            cells,
-            paper: None,
-            correlation,
-            temporal_correlation,
-            frames,
-            exclusions: target.exclusions,
-            reference_distance_m: None,
-            axis_distance_m: plane.depth(0.0, 0.0),
-            infrared: None,
-            picture: self.picture(&shift),
-            notes,
-            digest: [0; 32],
-        })
-    }
+/// Half squared differences of a pixel's residual over one and two frames, over the first frames.
+///
+/// They estimate variance times 1 - rho(lag) without knowing the pixel's own mean, and for a
+/// first-order filter rho(2) = rho(1)^2, so that their ratio is 1 + rho(1).
+#[derive(Debug, Default)]
+pub(super) struct Lagged {
+    pub frames: usize,
+    previous: Vec<f32>,
+    before: Vec<f32>,
+    one: Mean,
+    two: Mean,
+}
 
-    /// The robust plane through the mean of all frames.
-    fn refit(&self, target: &Target) -> Plane {
-        let mut w = vec![f32::NAN; self.bench.sensor.camera.pixels()];
-        let fewest = (self.lagged.frames as u32 / 4).max(1);
-        for (k, &i) in self.pixels.iter().enumerate() {
-            if self.count[k] >= fewest {
-                let mean = self.sum[k] / f64::from(self.count[k]);
-                w[i as usize] = (1.0 / (f64::from(self.expected[k]) + mean)) as f32;
+#[derive(Debug, Clone, Copy, Default)]
+struct Mean {
+    sum: f64,
+    n: f64,
+}
+
+impl Mean {
+    fn half_squared_differences(&mut self, a: &[f32], b: &[f32]) {
+        for (&a, &b) in a.iter().zip(b) {
+            let d = f64::from(b - a);
+            if d.is_finite() {
+                self.sum += 0.5 * d * d;
+                self.n += 1.0;
             }
         }
-        let floor = 0.1 * self.bench.step(self.plane.q.z.abs());
-        fit_affine_robust(
-            &w,
-            &self.bench.rays,
-            &target.pixels,
-            &self.plane,
-            floor,
-            Effort::AllPixels,
-        )
-        .map_or(self.plane, |fit| fit.plane)
     }
 
-    /// By how much the expected depth of each pixel rose with the refit, m.
-    fn shift_to(&self, plane: &Plane) -> Vec<f64> {
-        if self.bench.options.planes == Planes::PerFrame {
-            return vec![0.0; self.pixels.len()];
-        }
-        self.pixels
-            .iter()
-            .zip(&self.expected)
-            .map(|(&i, &old)| {
-                let (x, y) = self.bench.rays.at(i as usize);
-                plane.depth(x, y) - f64::from(old)
-            })
-            .collect()
-    }
-
-    fn sums(&self, plane: &Plane, shift: &[f64]) -> Vec<Sums> {
-        (0..self.cut.len()).map(|cell| self.sums_of(cell, plane, shift)).collect()
-    }
-
-    fn sums_of(&self, cell: usize, plane: &Plane, shift: &[f64]) -> Sums {
-        let mut s = Sums { missing: self.missing[cell], cut: self.beyond[cell], ..Sums::default() };
-        for k in self.cell_range(cell) {
-            let n = f64::from(self.count[k]);
-            if n == 0.0 {
-                continue;
-            }
-            let c = shift[k];
-            let e = self.sum[k] - n * c;
-            let e2 = self.square[k] - 2.0 * c * self.sum[k] + n * c * c;
-            let (x, y) = self.bench.rays.at(self.pixels[k] as usize);
-            let across = perpendicular_per_axial(plane, x, y);
-            s.n += n;
-            s.z += n * (f64::from(self.expected[k]) + c) + e;
-            s.e += e;
-            s.e2 += e2;
-            s.p2 += e2 * across * across;
-            s.pixels += 1.0;
-            if n >= 2.0 {
-                s.within += (self.square[k] - self.sum[k] * self.sum[k] / n).max(0.0);
-                s.within_dof += n - 1.0;
-            }
-        }
-        let f = &self.frames[cell];
-        if f.n > 0.0 && self.lagged.frames > 1 {
-            s.between = (f.mean_square - f.sum * f.sum / f.n).max(0.0);
-        }
-        s
-    }
-
-    fn context(&self, correlation: &Correlation, temporal: Option<f64>) -> Context {
-        let rho = temporal.unwrap_or(0.0).clamp(0.0, 0.95);
-        Context {
-            frames: self.lagged.frames as f64,
-            cut_factor: normal_cut_factor(CUT_SIGMAS),
-            correlation_sum: correlation.sum,
-            correlation_squares: correlation.sum_of_squares,
-            temporal_rho: rho,
-            view_pixels: self.pixels.len() as f64,
-            per_frame_planes: self.bench.options.planes == Planes::PerFrame,
-        }
-    }
-
-    /// Of the first frame's residual, each in units of its cell's standard deviation.
-    fn correlation(&self, first: &Frame, plane: &Plane, sums: &[Sums]) -> Correlation {
-        let camera = &self.bench.sensor.camera;
-        let mut field = vec![f32::NAN; camera.pixels()];
-        for (cell, s) in sums.iter().enumerate() {
-            let per_sigma = 1.0 / (s.e2 / s.n.max(1.0)).sqrt().max(f64::MIN_POSITIVE) as f32;
-            for k in self.cell_range(cell) {
-                let i = self.pixels[k] as usize;
-                let (x, y) = self.bench.rays.at(i);
-                let z = self.bench.table.metres(first.words[i]);
-                let e = z - plane.depth(x, y) as f32;
-                if e.abs() < self.cut[cell] {
-                    field[i] = e * per_sigma;
-                }
-            }
-        }
-        centre(&mut field);
-        measure_correlation(&field, camera.width)
-    }
-
-    fn picture(&self, shift: &[f64]) -> ResidualPicture {
-        let camera = &self.bench.sensor.camera;
-        let shrink = camera.width.div_ceil(PICTURE_WIDTH).max(1);
-        let (width, height) = (camera.width.div_ceil(shrink), camera.height.div_ceil(shrink));
-        let mut sum = vec![0f64; width * height];
-        let mut n = vec![0f64; width * height];
-        for (k, &i) in self.pixels.iter().enumerate() {
-            let i = i as usize;
-            let at = (i / camera.width / shrink) * width + (i % camera.width) / shrink;
-            let count = f64::from(self.count[k]);
-            sum[at] += self.sum[k] - count * shift[k];
-            n[at] += count;
-        }
-        let millimetres = sum
-            .iter()
-            .zip(&n)
-            .map(|(s, &n)| if n > 0.0 { (1000.0 * s / n) as f32 } else { f32::NAN })
-            .collect();
-        ResidualPicture { width, height, millimetres }
+    fn value(&self) -> Option<f64> {
+        (self.n > 0.0 && self.sum > 0.0).then(|| self.sum / self.n)
     }
 }
 
-/// The cells that show the target's noise, their sums as one, and why the others do not.
-fn trusted_cells(sums: &[Sums], context: &Context) -> (Vec<Cell>, Sums, Vec<String>) {
-    let (bins, sums): (Vec<Bin>, Vec<&Sums>) = sums
-        .iter()
-        .filter_map(|s| Some((Bin { cell: context.cell(s)?, mean_m: s.e / s.n }, s)))
-        .unzip();
-    let (mut cells, mut whole, mut notes) = (Vec::new(), Sums::default(), Vec::new());
-    for ((bin, sums), doubt) in bins.iter().zip(sums).zip(doubts(&bins)) {
-        match doubt {
-            Some(why) => notes.push(why),
-            None => {
-                cells.push(bin.cell);
-                whole.merge(sums);
-            }
+impl Lagged {
+    pub fn follow(&mut self, residuals: Vec<f32>) {
+        self.one.half_squared_differences(&self.previous, &residuals);
+        self.two.half_squared_differences(&self.before, &residuals);
+        self.before = std::mem::replace(&mut self.previous, residuals);
+    }
+
+    /// Correlation of the moving part one frame apart; `None` with fewer than four frames.
+    pub fn correlation(&self) -> Option<f64> {
+        if self.frames < 4 {
+            return None;
         }
+        Some((self.two.value()? / self.one.value()? - 1.0).clamp(-1.0, 1.0))
     }
-    (cells, whole, notes)
-}
-
-/// Enough to see a lens's bowl and a firmware's bands; 77 kB a view.
-const PICTURE_WIDTH: usize = 160;
-
-/// Take the mean out: what a frame shares as a whole is not correlation between pixels.
-fn centre(field: &mut [f32]) {
-    let (mut sum, mut n) = (0f64, 0f64);
-    for e in field.iter().filter(|e| e.is_finite()) {
-        sum += f64::from(*e);
-        n += 1.0;
-    }
-    let mean = (sum / n.max(1.0)) as f32;
-    field.iter_mut().for_each(|e| *e -= mean);
 }

@@ -1,7 +1,7 @@
-//! `model.json` (contract, section 4): written and read back bit for bit, refused when foreign.
+//! `model.json` (`crate::docs::layouts`): written and read back bit for bit, refused when foreign.
 
 use std::path::Path;
-use std::time::{Duration, SystemTime};
+use std::time::SystemTime;
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,7 @@ pub struct NoiseModel {
     /// `None` when the model came from a bare table.
     pub sensor: Option<RecordingFile>,
     pub sigma: SigmaModel,
-    /// Physical effects beyond sigma (effects.md).
+    /// Physical effects beyond sigma.
     pub effects: Vec<Effect>,
     pub fit: FitSummary,
     pub provenance: Provenance,
@@ -53,16 +53,18 @@ pub struct Provenance {
     pub options: Map<String, Value>,
     /// SHA-256 of the inputs, by name.
     pub sha256: Map<String, Value>,
-    /// RFC 3339, UTC; SOURCE_DATE_EPOCH where that is set.
+    /// RFC 3339, UTC.
     pub created: String,
 }
 
 impl Provenance {
     /// This program, now.
     pub fn now(seed: Option<u64>) -> Self {
-        let epoch = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|s| s.parse().ok());
-        let time =
-            epoch.map_or_else(SystemTime::now, |s| SystemTime::UNIX_EPOCH + Duration::from_secs(s));
+        Self::at(seed, SystemTime::now())
+    }
+
+    /// This program, at a time that the caller gives.
+    pub fn at(seed: Option<u64>, time: SystemTime) -> Self {
         Provenance {
             tool: "kinoise".into(),
             version: env!("CARGO_PKG_VERSION").into(),
@@ -272,21 +274,11 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn model() -> NoiseModel {
-        NoiseModel {
-            sensor: None,
-            sigma: SigmaModel::paper(),
-            effects: Vec::new(),
-            fit: FitSummary::default(),
-            provenance: Provenance::default(),
-        }
-    }
-
     proptest! {
         /// Any finite doubles survive the file exactly.
         #[test]
         fn numbers_read_back_bit_for_bit(a in 1e-12f64..1.0, b in 1e-300f64..1.0, c in -1.0f64..1.0, s in 1e-300f64..1e300) {
-            let mut model = model();
+            let mut model = NoiseModel::paper();
             model.sigma.parameters[0] = a;
             model.sigma.parameters[1] = b;
             model.sigma.parameters[2] = c;
@@ -299,7 +291,7 @@ mod tests {
 
     #[test]
     fn foreign_newer_and_damaged_files_are_told_apart() {
-        let good = model().to_json().unwrap();
+        let good = NoiseModel::paper().to_json().unwrap();
         let says = |text: &str| NoiseModel::from_json(text).unwrap_err().0;
         assert!(says(&good.replace("kinoise-model/1", "kinoise-model/2")).contains("newer"));
         assert!(
@@ -320,7 +312,7 @@ mod tests {
     /// Every truncation is an error, none a panic.
     #[test]
     fn every_truncation_is_refused() {
-        let good = model().to_json().unwrap();
+        let good = NoiseModel::paper().to_json().unwrap();
         for cut in (0..good.len() - 2).step_by(7) {
             assert!(NoiseModel::from_json(&good[..cut]).is_err(), "cut at {cut}");
         }

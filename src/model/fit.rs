@@ -5,92 +5,19 @@
 //! constant coefficient of variation). The start comes from the data alone, so there is no
 //! "start" to get wrong.
 
-use nalgebra::DMatrix;
-
 use super::forms::{Form, SigmaForm};
 use super::local::polish;
 use super::rows::Rows;
-use super::statistics::report;
-use super::surface::{Direction, Domain, SigmaModel};
+use super::statistics::{SigmaFit, report};
+use super::surface::Domain;
 use crate::error::{Error, Result};
-use crate::measure::{SigmaRow, SigmaTable};
-
-/// A parameter as reported.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Parameter {
-    pub name: &'static str,
-    pub value: f64,
-    /// `None` when the parameter was held.
-    pub std_error: Option<f64>,
-    /// Said where the data do not determine it.
-    pub remark: Option<String>,
-}
-
-/// A fitted form and how well it fits.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SigmaFit {
-    pub form: Form,
-    pub parameters: Vec<Parameter>,
-    /// Covariance of the parameters; rows and columns of held ones are zero.
-    pub covariance: DMatrix<f64>,
-    pub domain: Domain,
-    pub rows: usize,
-    pub views: usize,
-    /// Sigmas that stand far off the surface and were not fitted.
-    pub left_out: Vec<SigmaRow>,
-    /// Views less free parameters (at least 1): what intervals' quantiles use.
-    pub degrees_of_freedom: f64,
-    /// Relative scatter that sampling does not explain, within views and between them.
-    pub extra_within: f64,
-    pub extra_between: f64,
-    /// Root mean square of s - sigma, m, and as a share of sigma.
-    pub rmse_m: f64,
-    pub rmse_relative: f64,
-    /// What `rmse_relative` would be from sampling alone; `None` when no n is known.
-    pub sampling_relative: Option<f64>,
-    pub r2: f64,
-    /// The surface explains so little that the remarks warn of it first.
-    pub poor: bool,
-    pub iterations: usize,
-    pub converged: bool,
-    pub remarks: Vec<String>,
-}
+use crate::measure::SigmaTable;
 
 /// Distances closer than this count as one.
 pub const DISTANCE_RATIO: f64 = 1.05;
-const MOST_ROUNDS: usize = 60;
+const MAX_ROUNDS: usize = 60;
 /// Largest change of ln sigma over the table at which the weights have settled.
 const SETTLED: f64 = 1e-10;
-
-impl SigmaFit {
-    pub fn values(&self) -> Vec<f64> {
-        self.parameters.iter().map(|p| p.value).collect()
-    }
-
-    /// Number of parameters that were fitted.
-    pub fn free(&self) -> usize {
-        self.parameters.iter().filter(|p| p.std_error.is_some()).count()
-    }
-
-    /// Variance of the relative residual, with the free parameters paid for.
-    pub fn relative_variance(&self) -> f64 {
-        let n = self.rows as f64;
-        self.rmse_relative.powi(2) * n / (n - self.free() as f64).max(1.0)
-    }
-
-    /// The surface without the story of its fit, as one along the optical axis.
-    pub fn model(&self) -> SigmaModel {
-        SigmaModel {
-            form: self.form,
-            parameters: self.values(),
-            std_errors: self.parameters.iter().map(|p| p.std_error).collect(),
-            covariance: self.covariance.clone(),
-            domain: self.domain,
-            degrees_of_freedom: self.degrees_of_freedom,
-            direction: Direction::Axial,
-        }
-    }
-}
 
 /// Fit `form` to every row of `table`.
 ///
@@ -102,7 +29,10 @@ pub fn fit_all(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
     let mut rows = Rows::new(table);
     enough(&rows, spec)?;
     let no_start = || Error::NotEnough {
-        what: format!("the form \"{form}\" cannot be fitted to these {} sigmas", rows_words(table)),
+        what: format!(
+            "the form \"{form}\" cannot be fitted to these {} sigmas",
+            describe_rows(table)
+        ),
         remedy: "add views at other distances and tilts, or choose --form khoshelham".into(),
     };
     let first = spec.start(&rows).ok_or_else(no_start)?;
@@ -113,7 +43,7 @@ pub fn fit_all(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
     let mut free: Vec<usize> = (0..start.held.len()).filter(|&i| !start.held[i]).collect();
     let mut p = start.parameters.clone();
     let (mut rounds, mut converged) = (0, false);
-    while rounds < MOST_ROUNDS && !converged {
+    while rounds < MAX_ROUNDS && !converged {
         rounds += 1;
         rows.refer_to(|r| positive(spec.sigma(&p, r.z_m, r.theta_rad), r.sigma_m));
         rows.estimate_extra(free.len());
@@ -162,16 +92,16 @@ fn hold_strays(
 
 /// A surface may not come nearer to zero inside its range than this share of the least sigma
 /// measured: between two distances a parabola can dip to where no sensor is.
-const LEAST_SHARE: f64 = 0.1;
+const MIN_SHARE: f64 = 0.1;
 
 /// Where the surface is least inside its range: at the vertex or the end of z next to it, and at
 /// the least tilt, for no form's tilt term is negative.
-fn least_point(rows: &Rows, spec: &dyn SigmaForm, p: &[f64]) -> Option<(f64, f64)> {
+fn min_point(rows: &Rows, spec: &dyn SigmaForm, p: &[f64]) -> Option<(f64, f64)> {
     let domain = Domain::of(rows, spec.pole(p));
     spec.vertex(p).map(|c| domain.clamp(c, 0.0))
 }
 
-/// Lift a surface that dips too low to [`LEAST_SHARE`] and hold its floor there. True when that
+/// Lift a surface that dips too low to [`MIN_SHARE`] and hold its floor there. True when that
 /// was needed: the rest must be fitted again.
 fn hold_positive(
     rows: &Rows,
@@ -180,8 +110,8 @@ fn hold_positive(
     free: &mut Vec<usize>,
     remarks: &mut Vec<String>,
 ) -> bool {
-    let Some((z, theta)) = least_point(rows, spec, p) else { return false };
-    let floor = LEAST_SHARE * rows.range(|r| r.sigma_m)[0];
+    let Some((z, theta)) = min_point(rows, spec, p) else { return false };
+    let floor = MIN_SHARE * rows.range(|r| r.sigma_m)[0];
     let sigma = spec.sigma(p, z, theta);
     // Once lifted, half the way down again is let be: the surface is positive.
     if sigma >= if free.contains(&0) { floor } else { 0.5 * floor } {
@@ -204,14 +134,14 @@ fn positive_in_range(rows: &Rows, spec: &dyn SigmaForm, p: &[f64]) -> bool {
         sigma.is_finite() && sigma > 0.0
     };
     rows.iter().all(|r| good(r.z_m, r.theta_rad))
-        && least_point(rows, spec, p).is_none_or(|(z, theta)| good(z, theta))
+        && min_point(rows, spec, p).is_none_or(|(z, theta)| good(z, theta))
 }
 
 fn positive(sigma: f64, otherwise: f64) -> f64 {
     if sigma > 1e-3 * otherwise && sigma.is_finite() { sigma } else { otherwise }
 }
 
-fn rows_words(table: &SigmaTable) -> String {
+fn describe_rows(table: &SigmaTable) -> String {
     let [low, high] = table.range(|r| r.z_m);
     format!("{} measured from {low:.2} to {high:.2} m", table.rows.len())
 }

@@ -20,7 +20,7 @@ pub struct HeldOut {
 }
 
 /// More distances than this are put together into as many groups.
-const MOST_FOLDS: usize = 8;
+const MAX_FOLDS: usize = 8;
 
 /// Leave out one distance (or group of neighbouring distances) at a time; views stay whole. Every
 /// row counts: take outliers out first ([`super::sort_out`]), so that all forms are asked the same.
@@ -118,9 +118,9 @@ fn folds(table: &SigmaTable) -> Vec<(usize, usize)> {
         }
         groups.push(group);
     }
-    if group + 1 > MOST_FOLDS || group < 2 {
+    if group + 1 > MAX_FOLDS || group < 2 {
         let n = views.len();
-        groups = (0..n).map(|i| i * MOST_FOLDS.min(n) / n).collect();
+        groups = (0..n).map(|i| i * MAX_FOLDS.min(n) / n).collect();
     }
     views.into_iter().zip(groups).map(|((view, _), fold)| (view, fold)).collect()
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::forms::{MOST_PARAMETERS, SigmaForm, Walk};
+use super::forms::{MAX_PARAMETERS, SigmaForm, Walk};
 use super::rows::Rows;
 use crate::solve::{LeastSquares, trust_region};
 
@@ -94,7 +94,7 @@ pub(super) fn natural_jacobian(
 ) -> DMatrix<f64> {
     let n = rows.len();
     let mut j = DMatrix::zeros(n, free.len());
-    let mut gradient = [0.0; MOST_PARAMETERS];
+    let mut gradient = [0.0; MAX_PARAMETERS];
     for (i, r) in rows.iter().enumerate() {
         spec.gradient(p, r.z_m, r.theta_rad, &mut gradient);
         for (column, &k) in free.iter().enumerate() {

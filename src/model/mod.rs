@@ -14,12 +14,12 @@ mod robust;
 mod rows;
 mod statistics;
 mod surface;
-mod tilt_search;
 
 pub use effect::{Effect, UNEXPLAINED};
 pub use file::{FitSummary, MODEL_FORMAT, NoiseModel, Provenance};
-pub use fit::{DISTANCE_RATIO, Parameter, SigmaFit};
+pub use fit::DISTANCE_RATIO;
 pub use forms::{Form, PAPER_EQ1, SigmaForm};
 pub use heldout::{HeldOut, compare_forms, held_out};
 pub use outliers::{Sorted, fit, sort_out};
+pub use statistics::{Parameter, SigmaFit};
 pub use surface::{Direction, Domain, SigmaModel};

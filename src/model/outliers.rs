@@ -3,9 +3,10 @@
 //! stiff ones cannot follow an outlier among a few steep views); left out; the rest looked at
 //! again; and the end with the least bounded loss taken.
 
-use super::fit::{SigmaFit, fit_all};
+use super::fit::fit_all;
 use super::forms::Form;
 use super::robust::{self, Surface, spread};
+use super::statistics::SigmaFit;
 use crate::error::Result;
 use crate::measure::{SigmaRow, SigmaTable};
 
@@ -17,10 +18,10 @@ const OFF: f64 = 5.0;
 /// thousand tables (normal quantile of 0.999): below, nothing needs to be looked for.
 const PLAINLY_NOISE: f64 = 3.09;
 /// More than this share is no longer a few outliers but a wrong form, and nothing is left out.
-const MOST_SHARE: f64 = 0.2;
-const MOST_ROUNDS: usize = 6;
+const MAX_SHARE: f64 = 0.2;
+const MAX_ROUNDS: usize = 6;
 /// With fewer rows than this beyond the parameters a median of residuals is no scale.
-const LEAST_SPARE_ROWS: f64 = 6.0;
+const MIN_SPARE_ROWS: f64 = 6.0;
 
 /// The forms against which outliers are judged, the most flexible first: what no form can follow
 /// is no fault of the form that is asked for.
@@ -31,7 +32,7 @@ const JUDGES: [Form; 4] = [Form::Paper, Form::Nguyen, Form::Disparity, Form::Kho
 pub struct Sorted {
     pub kept: SigmaTable,
     pub left_out: Vec<SigmaRow>,
-    /// What to tell people of the rows left out, or of too many that stand off.
+    /// A remark about the rows left out, or about too many that stand off.
     pub remark: Option<String>,
     /// The judge's own fit to the rows kept.
     judged_by: Option<SigmaFit>,
@@ -54,7 +55,7 @@ impl Sorted {
     }
 }
 
-/// Fit `form` to `table` without its outliers; they are told in the remarks.
+/// Fit `form` to `table` without its outliers, which the remarks name.
 ///
 /// # Errors
 /// As [`Sorted::fit`].
@@ -86,15 +87,15 @@ fn judged(table: &SigmaTable, form: Form) -> Option<Sorted> {
             break;
         }
     }
-    let Some(best) = least_cost(table, ends) else {
+    let Some(best) = min_cost(table, ends) else {
         return whole.map(|w| all(table, Some(w)));
     };
-    if best.off.len() as f64 > MOST_SHARE * table.rows.len() as f64 {
+    if best.off.len() as f64 > MAX_SHARE * table.rows.len() as f64 {
         return Some(Sorted { remark: Some(too_many(table, &best.off)), ..all(table, whole) });
     }
     Some(Sorted {
         kept: without(table, &best.off),
-        remark: (!best.off.is_empty()).then(|| words(table, &best.off)),
+        remark: (!best.off.is_empty()).then(|| describe(table, &best.off)),
         left_out: best.off.iter().map(|&i| table.rows[i]).collect(),
         judged_by: Some(best.fitted),
     })
@@ -111,7 +112,7 @@ struct End {
 /// does not carry the form.
 fn rejected(table: &SigmaTable, form: Form, mut surface: Surface) -> Option<End> {
     let mut off = standing_off(table, &surface, &[]);
-    for _ in 0..MOST_ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let fitted = fit_all(&without(table, &off), form).ok()?;
         surface = Surface::of(table, form, &fitted.values(), fitted.free());
         let next = standing_off(table, &surface, &off);
@@ -126,7 +127,7 @@ fn rejected(table: &SigmaTable, form: Form, mut surface: Surface) -> Option<End>
 /// The end with the least bounded loss, sum of min(t^2, OFF^2) over *all* rows, by the smallest
 /// scale any end has: a surface bent towards an outlier costs its neighbours more than the
 /// outlier, and one that left out good rows pays for each.
-fn least_cost(table: &SigmaTable, ends: Vec<End>) -> Option<End> {
+fn min_cost(table: &SigmaTable, ends: Vec<End>) -> Option<End> {
     let scales: Vec<Vec<f64>> =
         ends.iter().map(|e| spread(table, &e.surface, |i| !e.off.contains(&i))).collect();
     let least =
@@ -138,13 +139,13 @@ fn least_cost(table: &SigmaTable, ends: Vec<End>) -> Option<End> {
     ends.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
-/// Too few rows to tell, or the fit leaves what sampling explains: no row off by itself (the robust
+/// Too few rows to judge, or the fit leaves what sampling explains: no row off by itself (the robust
 /// scale is never below sampling), and together no more than sampling allows, as there would be if
 /// an outlier had bent the surface.
 fn nothing_to_look_for(table: &SigmaTable, fitted: &SigmaFit) -> bool {
     let surface = Surface::of(table, fitted.form, &fitted.values(), fitted.free());
     let spare = table.rows.len() as f64 - surface.free as f64;
-    if spare < LEAST_SPARE_ROWS {
+    if spare < MIN_SPARE_ROWS {
         return true;
     }
     let square = |(r, sigma): (&SigmaRow, &f64)| {
@@ -179,7 +180,7 @@ fn too_many(table: &SigmaTable, off: &[usize]) -> String {
     )
 }
 
-fn words(table: &SigmaTable, left_out: &[usize]) -> String {
+fn describe(table: &SigmaTable, left_out: &[usize]) -> String {
     const SHOWN: usize = 6;
     let mut places: Vec<String> = left_out
         .iter()

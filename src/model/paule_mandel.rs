@@ -12,14 +12,14 @@ pub(super) fn between(means: &[(f64, f64)], tau_view2: f64) -> (f64, f64) {
 const ROOT_DIGITS: f64 = 1e-12;
 /// Newton's step takes some ten rounds; from far off it starts by doubling, and a double has a
 /// thousand doublings.
-const MOST_NEWTON_STEPS: usize = 1000;
+const MAX_NEWTON_STEPS: usize = 1000;
 
 /// The tau^2 >= 0 at which chi-square (and its slope) is `expected`, or zero where it is less
 /// already. Newton's step: chi-square falls and is convex in tau^2, so from zero the steps never
 /// pass the root (DerSimonian and Kacker 2007).
 pub(super) fn paule_mandel(expected: f64, chi2: impl Fn(f64) -> (f64, f64)) -> f64 {
     let mut tau = 0.0;
-    for _ in 0..MOST_NEWTON_STEPS {
+    for _ in 0..MAX_NEWTON_STEPS {
         let (found, slope) = chi2(tau);
         let step = (expected - found) / slope;
         // Also where nothing is a number any more: then the last tau stands.

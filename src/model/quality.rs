@@ -1,4 +1,4 @@
-//! Plain words about a fit that should not be trusted as it stands.
+//! How well a surface fits, and warnings about a fit that should not be trusted as it stands.
 
 use super::rows::Rows;
 
@@ -17,12 +17,12 @@ pub(super) struct Quality {
 
 /// Above this share the surface misses more of what differs between the views than a coefficient
 /// rounded to one digit would.
-const MOST_UNEXPLAINED: f64 = 0.2;
+const MAX_UNEXPLAINED: f64 = 0.2;
 /// Scatter this many times that of sampling is no accident, whatever the number of rows: chi^2
 /// per degree of freedom is its square.
 const FAR_ABOVE_SAMPLING: f64 = 3.0;
 /// Fewer views cannot disagree with a surface.
-const LEAST_VIEWS: usize = 3;
+const MIN_VIEWS: usize = 3;
 
 impl Quality {
     /// `sigma` is the surface at every row, m.
@@ -48,11 +48,11 @@ impl Quality {
     }
 
     pub fn is_poor(&self) -> bool {
-        self.r2 < 0.0 || self.unexplained > MOST_UNEXPLAINED
+        self.r2 < 0.0 || self.unexplained > MAX_UNEXPLAINED
     }
 
     /// What to know before the coefficients, if anything.
-    pub fn words(&self) -> Option<String> {
+    pub fn warning(&self) -> Option<String> {
         const REMEDY: &str = "look in measurements.csv for views that measured something else than one flat target, or try --form auto";
         let sampling = self.sampling_relative.map_or(String::new(), |s| {
             format!(", where the number of samples explains {:.1} %", 1e2 * s)
@@ -85,7 +85,7 @@ impl Quality {
 /// Said where the views are too few for the intervals to mean much.
 pub(super) fn few_views(views: usize, free: usize) -> Option<String> {
     let seen = if views == 1 { "one view".into() } else { format!("{views} views") };
-    if views < LEAST_VIEWS {
+    if views < MIN_VIEWS {
         return Some(format!(
             "this is no calibration: a surface through {seen} has nothing to check it by; record views at three distances at least, better at five and at several tilts"
         ));

@@ -15,14 +15,14 @@ use crate::stats::median_in_place;
 /// Huber's constant: 95 % efficiency where the errors are Gaussian after all.
 const HUBER: f64 = 1.345;
 /// What has not come to rest by then is judged as it is: leaving out and looking again follows.
-const MOST_ROUNDS: usize = 10;
+const MAX_ROUNDS: usize = 10;
 /// The surface rests when no sigma of it moves by more than this share of a standard deviation:
 /// what follows asks about several of them.
 const RESTS: f64 = 0.1;
 /// A relative error of 0.01 % squared: below it an exact table would call its rounding outliers.
-const LEAST_EXTRA: f64 = 1e-8;
+const MIN_EXTRA: f64 = 1e-8;
 /// A relative variance of one: no sensor's sigma is less certain than that.
-const MOST_EXTRA: f64 = 1.0;
+const MAX_EXTRA: f64 = 1.0;
 /// Relative width at which the search for the extra variance ends: half of it on the scale.
 const EXTRA_DIGITS: f64 = 1e-2;
 
@@ -51,7 +51,7 @@ impl Surface {
 /// Huber's fit of `form`; `None` where the form cannot be fitted.
 pub(super) fn surface(table: &SigmaTable, form: Form) -> Option<Surface> {
     let mut current = Surface::median(table);
-    for _ in 0..MOST_ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let spread = spread(table, &current, |_| true);
         let fitted = fit_all(&pulled_in(table, &current, &spread), form).ok()?;
         let next = Surface::of(table, form, &fitted.values(), fitted.free());
@@ -103,7 +103,7 @@ pub(super) fn spread(
 /// The least extra variance at which the scatter is no longer too wide, by bisection of its
 /// logarithm.
 fn extra_variance(too_wide: impl Fn(f64) -> bool) -> f64 {
-    let (mut low, mut high) = (LEAST_EXTRA, MOST_EXTRA);
+    let (mut low, mut high) = (MIN_EXTRA, MAX_EXTRA);
     if !too_wide(low) {
         return low;
     }

@@ -317,20 +317,11 @@ mod tests {
         });
         let x = DVector::from_fn(n, |i, _| (i as f64).sin());
         let y = DVector::from_fn(n, |i, _| (i as f64 * 0.7).cos());
-        let explicit = x.dot(&covariance.try_inverse().unwrap().clone_owned().mul_to_vector(&y));
+        let explicit = x.dot(&(covariance.try_inverse().unwrap() * &y));
         let (mut xw, mut yw) = (x.as_slice().to_vec(), y.as_slice().to_vec());
         rows.whiten(&mut xw);
         rows.whiten(&mut yw);
         let whitened: f64 = xw.iter().zip(&yw).map(|(a, b)| a * b).sum();
         assert!((whitened / explicit - 1.0).abs() < 1e-9, "{whitened} {explicit}");
-    }
-
-    trait MulToVector {
-        fn mul_to_vector(self, y: &DVector<f64>) -> DVector<f64>;
-    }
-    impl MulToVector for DMatrix<f64> {
-        fn mul_to_vector(self, y: &DVector<f64>) -> DVector<f64> {
-            self * y
-        }
     }
 }

@@ -1,13 +1,84 @@
-//! What is told of a finished fit: covariance, standard errors, figures of merit.
+//! A finished fit: covariance, standard errors, figures of merit.
 
 use nalgebra::DMatrix;
 
-use super::fit::{Parameter, SigmaFit};
 use super::forms::{Form, SigmaForm};
 use super::local::natural_jacobian;
 use super::quality::{Quality, few_views};
 use super::rows::Rows;
-use super::surface::Domain;
+use super::surface::{Direction, Domain, SigmaModel};
+use crate::measure::SigmaRow;
+
+/// A parameter as reported.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    pub name: &'static str,
+    pub value: f64,
+    /// `None` when the parameter was held.
+    pub std_error: Option<f64>,
+    /// Said where the data do not determine it.
+    pub remark: Option<String>,
+}
+
+/// A fitted form and how well it fits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SigmaFit {
+    pub form: Form,
+    pub parameters: Vec<Parameter>,
+    /// Covariance of the parameters; rows and columns of held ones are zero.
+    pub covariance: DMatrix<f64>,
+    pub domain: Domain,
+    pub rows: usize,
+    pub views: usize,
+    /// Sigmas that stand far off the surface and were not fitted.
+    pub left_out: Vec<SigmaRow>,
+    /// Views less free parameters (at least 1): what intervals' quantiles use.
+    pub degrees_of_freedom: f64,
+    /// Relative scatter that sampling does not explain, within views and between them.
+    pub extra_within: f64,
+    pub extra_between: f64,
+    /// Root mean square of s - sigma, m, and as a share of sigma.
+    pub rmse_m: f64,
+    pub rmse_relative: f64,
+    /// What `rmse_relative` would be from sampling alone; `None` when no n is known.
+    pub sampling_relative: Option<f64>,
+    pub r2: f64,
+    /// The surface explains so little that the remarks warn of it first.
+    pub poor: bool,
+    pub iterations: usize,
+    pub converged: bool,
+    pub remarks: Vec<String>,
+}
+
+impl SigmaFit {
+    pub fn values(&self) -> Vec<f64> {
+        self.parameters.iter().map(|p| p.value).collect()
+    }
+
+    /// Number of parameters that were fitted.
+    pub fn free(&self) -> usize {
+        self.parameters.iter().filter(|p| p.std_error.is_some()).count()
+    }
+
+    /// Variance of the relative residual, with the free parameters paid for.
+    pub fn relative_variance(&self) -> f64 {
+        let n = self.rows as f64;
+        self.rmse_relative.powi(2) * n / (n - self.free() as f64).max(1.0)
+    }
+
+    /// The surface without the story of its fit, as one along the optical axis.
+    pub fn model(&self) -> SigmaModel {
+        SigmaModel {
+            form: self.form,
+            parameters: self.values(),
+            std_errors: self.parameters.iter().map(|p| p.std_error).collect(),
+            covariance: self.covariance.clone(),
+            domain: self.domain,
+            degrees_of_freedom: self.degrees_of_freedom,
+            direction: Direction::Axial,
+        }
+    }
+}
 
 /// A parameter whose standard error exceeds this share of its value is called not determined.
 const WEAK: f64 = 0.5;
@@ -43,7 +114,7 @@ pub(super) fn report(
             remarks.push(text);
         }
     }
-    remarks.splice(0..0, few_views(rows.views(), free.len()).into_iter().chain(quality.words()));
+    remarks.splice(0..0, few_views(rows.views(), free.len()).into_iter().chain(quality.warning()));
     SigmaFit {
         form,
         domain: Domain::of(rows, spec.pole(&p)),

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::forms::{Form, MOST_PARAMETERS, PAPER_EQ1};
+use super::forms::{Form, MAX_PARAMETERS, PAPER_EQ1};
 use super::rows::Rows;
 use crate::stats::student_quantile;
 
@@ -132,7 +132,7 @@ impl SigmaModel {
     /// Standard error of the form at `z` and `theta`, m, also outside the domain: root of g' C g
     /// with g the derivatives of sigma by the parameters.
     pub(super) fn std_error(&self, z: f64, theta: f64) -> f64 {
-        let mut gradient = [0.0; MOST_PARAMETERS];
+        let mut gradient = [0.0; MAX_PARAMETERS];
         self.form.spec().gradient(&self.parameters, z, theta, &mut gradient);
         let g = DVector::from_column_slice(&gradient[..self.parameters.len()]);
         g.dot(&(&self.covariance * &g)).max(0.0).sqrt()

@@ -2,8 +2,8 @@
 
 use super::affine::{AffineFit, Effort, fit_affine_robust};
 use super::grow::{BEND_M, Gauge, Lattice};
+use super::image::{MIN_PIXELS, on_plane, seed_plane};
 use super::rival::rivals;
-use super::target::{FEWEST_PIXELS, on_plane, seed_plane};
 use super::{InverseDepthImage, Plane};
 use crate::camera::Camera;
 use crate::rng::Stream;
@@ -59,14 +59,14 @@ pub(super) fn candidate(
     let gauge = Gauge { fit: &fit, bend_m: BEND_M };
     mask.iter_mut().zip(&barred).for_each(|(m, b)| *m &= !b);
     let residuals = lattice.residuals(&gauge);
-    let mask = lattice.with_rim(&mask, &residuals, &barred);
+    let mask = lattice.with_edge(&mask, &residuals, &barred);
     let curved = lattice.curving_away(&mask, &residuals) > CURVED;
     let pixels = pixels_of(image, lattice, &mask);
     let floor = image.floor(fit.plane.q.z.abs());
     let fit = fit_affine_robust(image.w, image.rays, &pixels, &fit.plane, floor, Effort::Sample)?;
     let fit = AffineFit { scale: settled_scale(image, &fit, &pixels), ..fit };
     let nodes = mask.iter().filter(|m| **m).count();
-    if nodes * lattice.pitch * lattice.pitch < FEWEST_PIXELS {
+    if nodes * lattice.pitch * lattice.pitch < MIN_PIXELS {
         return None;
     }
     let mut found = judge(image, lattice, fit, mask, nodes);
@@ -156,7 +156,7 @@ const RELIEF_LARGE: f64 = 8.0;
 const LARGE: f64 = 0.04;
 /// What lies within a centimetre of one plane on a hand is below this, a sheet of paper three
 /// times above, m^2.
-const LEAST_AREA_M2: f64 = 0.02;
+const MIN_AREA_M2: f64 = 0.02;
 
 pub(super) fn centre_disc(camera: &Camera) -> Vec<u32> {
     around_principal_point(camera, (CENTRE_DISC * camera.width as f64).max(3.0))
@@ -192,7 +192,7 @@ fn judge(
     Candidate {
         at_centre: on as f64 / measured.len().max(1) as f64,
         flat: !rough && relief < if large { RELIEF_LARGE } else { RELIEF },
-        roomy: area(image, lattice, &fit.plane, &samples) > LEAST_AREA_M2,
+        roomy: area(image, lattice, &fit.plane, &samples) > MIN_AREA_M2,
         fit,
         mask,
         away_px,

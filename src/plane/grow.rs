@@ -24,8 +24,8 @@ pub(super) struct Lattice {
     mean: Vec<Option<(Vector3<f64>, f64)>>,
 }
 
-/// Nodes across the image; 3 px pitch on a 640 px image.
-const NODES_ACROSS: f64 = 213.0;
+/// Nodes in a row of the image; 3 px pitch on a 640 px image.
+const NODES_A_ROW: f64 = 213.0;
 /// A node is judged by the nodes this far around it: 15 px on a 640 px image, wider than the
 /// matching window of a Kinect v1, 9 px (Konolige and Mihelich 2011), which correlates its noise.
 const AROUND: usize = 2;
@@ -39,8 +39,8 @@ const SPREAD_SIGMAS: f64 = 1.5;
 /// 1.5 where 9 px are correlated; a wall over a fifth of the neighbourhood one of 2.6, and more
 /// where it covers more.
 const SPREAD_PER_ROUGHNESS: f64 = 2.0;
-/// Single nodes at the rim are on the plane within this: they have no neighbourhood to help.
-const RIM_SIGMAS: f64 = 2.5;
+/// Single nodes at the edge are on the plane within this: they have no neighbourhood to help.
+const EDGE_SIGMAS: f64 = 2.5;
 /// In sums residuals count at most this many sigma, so that one gross error decides nothing.
 const CLIP_SIGMAS: f32 = 6.0;
 /// What is off by less just misses the plane: a surface that curves away passes through here.
@@ -68,7 +68,7 @@ impl Gauge<'_> {
 
 impl Lattice {
     pub fn over(w: &[f32], rays: &Rays, width: usize, height: usize) -> Self {
-        let pitch = ((width as f64 / NODES_ACROSS).round() as usize).max(1);
+        let pitch = ((width as f64 / NODES_A_ROW).round() as usize).max(1);
         let (columns, rows) = (width.div_ceil(pitch), height.div_ceil(pitch));
         let mut sample = vec![None; columns * rows];
         let mut mean = vec![None; columns * rows];
@@ -185,9 +185,9 @@ impl Lattice {
     /// Sums over the nodes around each node.
     fn summed_around<const N: usize>(&self, values: &[[f32; N]]) -> Vec<[f32; N]> {
         let add = |a: &mut [f32; N], b: &[f32; N]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
-        let mut across = vec![[0f32; N]; values.len()];
+        let mut along_rows = vec![[0f32; N]; values.len()];
         let mut both = vec![[0f32; N]; values.len()];
-        for (node, sum) in across.iter_mut().enumerate() {
+        for (node, sum) in along_rows.iter_mut().enumerate() {
             let (first, c) = (node - node % self.columns, node % self.columns);
             let (low, high) = (c.saturating_sub(AROUND), (c + AROUND).min(self.columns - 1));
             values[first + low..=first + high].iter().for_each(|v| add(sum, v));
@@ -195,7 +195,7 @@ impl Lattice {
         for (node, sum) in both.iter_mut().enumerate() {
             let (row, c) = (node / self.columns, node % self.columns);
             for r in row.saturating_sub(AROUND)..=(row + AROUND).min(self.rows - 1) {
-                add(sum, &across[r * self.columns + c]);
+                add(sum, &along_rows[r * self.columns + c]);
             }
         }
         both
@@ -231,15 +231,15 @@ impl Lattice {
         f64::from(near) / f64::from(outline.max(1))
     }
 
-    /// The rim that judging by neighbourhoods cost: nodes within a neighbourhood of the set ones
+    /// With the edge that judging by neighbourhoods costs: nodes within a neighbourhood of the set ones
     /// that lie on the plane themselves.
-    pub fn with_rim(&self, mask: &[bool], residuals: &[f32], barred: &[bool]) -> Vec<bool> {
+    pub fn with_edge(&self, mask: &[bool], residuals: &[f32], barred: &[bool]) -> Vec<bool> {
         let mut wide = mask.to_vec();
         for _ in 0..AROUND {
             let near = self.dilated(&wide);
             for node in 0..wide.len() {
                 wide[node] |=
-                    near[node] && !barred[node] && f64::from(residuals[node].abs()) < RIM_SIGMAS;
+                    near[node] && !barred[node] && f64::from(residuals[node].abs()) < EDGE_SIGMAS;
             }
         }
         wide

@@ -9,7 +9,9 @@
 mod affine;
 mod candidate;
 mod grow;
+mod image;
 mod normal_equations;
+mod paper;
 mod principal_point;
 mod ransac;
 mod relief;
@@ -19,12 +21,10 @@ mod target;
 
 pub(crate) use affine::MAD_TO_SIGMA;
 pub use affine::{AffineFit, Effort, fit_affine_robust};
+pub use image::{Exclusions, InverseDepthImage, Target};
 pub use normal_equations::NormalEquations;
-pub use ransac::{
-    Consensus, Estimator, InlierCount, Points, RansacOptions, RansacPlane, UniformSampler,
-    ransac_plane,
-};
-pub use target::{Exclusions, InverseDepthImage, Target, find_target};
+pub use paper::{Points, RansacOptions, RansacPlane, ransac_plane};
+pub use target::find_target;
 
 use nalgebra::{Unit, Vector3};
 

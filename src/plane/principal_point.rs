@@ -2,7 +2,7 @@
 
 use super::candidate::{Candidate, around_principal_point, candidate, centre_disc};
 use super::grow::Lattice;
-use super::target::{FEWEST_PIXELS, in_front, on_plane, seed_plane};
+use super::image::{MIN_PIXELS, in_front, on_plane, seed_plane};
 use super::{Exclusions, InverseDepthImage, Target};
 use crate::rng::Stream;
 use crate::stats::median_in_place;
@@ -18,7 +18,7 @@ pub(super) fn at_principal_point(
     let camera = image.camera;
     let lattice = Lattice::over(image.w, image.rays, camera.width, camera.height);
     let measured = image.w.iter().filter(|w| w.is_finite()).count();
-    if measured < FEWEST_PIXELS {
+    if measured < MIN_PIXELS {
         return Err(format!("only {measured} of {} pixels carry a depth", image.w.len()));
     }
     let mut best: Option<Candidate> = None;
@@ -125,7 +125,7 @@ fn rank(c: &Candidate) -> (bool, bool, bool, i64) {
     (c.flat, c.roomy, c.at_centre >= AT_CENTRE, -(c.away_px as i64))
 }
 
-/// Pixels of the grown region, less its rim, and what was left out.
+/// Pixels of the grown region, less its edge, and what was left out.
 fn finish(
     image: &InverseDepthImage<'_>,
     lattice: &Lattice,
@@ -137,9 +137,9 @@ fn finish(
     let trimmed = lattice.eroded(&filled);
     let core = lattice.eroded(&trimmed);
     let count = |mask: &[bool]| mask.iter().filter(|m| **m).count();
-    let keep_rim = 2 * count(&trimmed) < count(&filled);
+    let keep_edge = 2 * count(&trimmed) < count(&filled);
     let mut notes = Vec::new();
-    if keep_rim {
+    if keep_edge {
         notes.push(
             "the target is too narrow to leave its rim out; mixed edge pixels may widen sigma"
                 .into(),
@@ -158,18 +158,18 @@ fn finish(
             continue;
         }
         let fits = image.valid(i) && on_plane(image, &best.fit, i);
-        // Near the rim only what fits: something else may be seen there.
+        // Near the edge only what fits: something else may be seen there.
         if !core[node] && !fits {
             continue;
         }
-        if trimmed[node] || keep_rim {
+        if trimmed[node] || keep_edge {
             pixels.push(i as u32);
             on += usize::from(fits);
         } else {
             edge += usize::from(fits);
         }
     }
-    if on < FEWEST_PIXELS {
+    if on < MIN_PIXELS {
         return Err(format!("the plane at the principal point has only {on} pixels"));
     }
     let exclusions = Exclusions {

@@ -3,14 +3,14 @@
 use super::InverseDepthImage;
 use super::affine::AffineFit;
 use super::grow::{BEND_M, Gauge, Lattice};
-use super::target::FEWEST_PIXELS;
+use super::image::MIN_PIXELS;
 
 /// Connected areas off the plane.
 pub(super) struct Relief {
     pub lattice: Lattice,
     /// Nodes of the areas and next to them.
     pub mask: Vec<bool>,
-    /// Each area in words.
+    /// A description of each area.
     pub notes: Vec<String>,
     /// Share of the measured nodes that the areas cover.
     pub share: f64,
@@ -25,7 +25,7 @@ pub(super) fn relief(image: &InverseDepthImage<'_>, inside: &[u32], fit: &Affine
     let lattice = Lattice::over(&w, image.rays, camera.width, camera.height);
     let residuals = lattice.residuals(&Gauge { fit, bend_m: BEND_M });
     let off = lattice.off(&residuals);
-    let fewest = FEWEST_PIXELS.div_ceil(lattice.pitch * lattice.pitch);
+    let fewest = MIN_PIXELS.div_ceil(lattice.pitch * lattice.pitch);
     let mut left = off.clone();
     let (mut mask, mut notes) = (vec![false; off.len()], Vec::new());
     for seed in 0..off.len() {
@@ -35,7 +35,7 @@ pub(super) fn relief(image: &InverseDepthImage<'_>, inside: &[u32], fit: &Affine
         let area = lattice.reached(&left, &[seed]);
         left.iter_mut().zip(&area).for_each(|(left, area)| *left &= !area);
         if area.iter().filter(|a| **a).count() >= fewest {
-            notes.push(in_words(image, &lattice, fit, &area));
+            notes.push(describe(image, &lattice, fit, &area));
             mask.iter_mut().zip(&area).for_each(|(mask, area)| *mask |= area);
         }
     }
@@ -47,7 +47,7 @@ pub(super) fn relief(image: &InverseDepthImage<'_>, inside: &[u32], fit: &Affine
     Relief { lattice, mask, notes, share }
 }
 
-fn in_words(
+fn describe(
     image: &InverseDepthImage<'_>,
     lattice: &Lattice,
     fit: &AffineFit,

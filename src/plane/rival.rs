@@ -1,21 +1,21 @@
 //! Other planes beside the target: what belongs to them is not the target's.
 //!
-//! Where a wall crosses the target's plane, its pixels lie on both. Each alone fits; what tells
-//! them apart is which plane explains their neighbourhood better.
+//! Where a wall crosses the target's plane, its pixels lie on both. Each alone fits; what decides
+//! is which plane explains their neighbourhood better.
 
 use super::affine::AffineFit;
 use super::grow::{Gauge, Lattice};
-use super::target::{InverseDepthImage, seed_plane};
+use super::image::{InverseDepthImage, seed_plane};
 use crate::rng::Stream;
 
 /// Rivals are looked for this many nodes around the target: a tenth of the image's width.
 const RING: usize = 20;
 /// Walls and floor, and one more.
-const MOST_RIVALS: usize = 3;
+const MAX_RIVALS: usize = 3;
 /// A plane that holds less of the ring than this is chance, or the target's own bend.
-const LEAST_SHARE: f64 = 0.2;
+const MIN_SHARE: f64 = 0.2;
 /// Fewest nodes in which a plane is looked for: 20 x 20 px on a 640 px image.
-const FEWEST_NODES: usize = 45;
+const MIN_NODES: usize = 45;
 /// A node belongs to a rival when it is this near to it, in robust standard deviations.
 const ON_RIVAL_SIGMAS: f64 = 3.0;
 
@@ -31,9 +31,9 @@ pub(super) fn rivals(
     let mut barred = vec![false; mask.len()];
     let mut ring = ring(lattice, mask);
     let size = count(&ring);
-    for _ in 0..MOST_RIVALS {
+    for _ in 0..MAX_RIVALS {
         let samples = lattice.samples(&ring);
-        if samples.len() < FEWEST_NODES {
+        if samples.len() < MIN_NODES {
             break;
         }
         let Some(rival) = seed_plane(image, &samples, rng) else { break };
@@ -43,7 +43,7 @@ pub(super) fn rivals(
             // NaN is no measurement and not in the ring.
             *node &= f64::from(r.abs()) > ON_RIVAL_SIGMAS;
         }
-        if ((before - count(&ring)) as f64) < LEAST_SHARE * size as f64 {
+        if ((before - count(&ring)) as f64) < MIN_SHARE * size as f64 {
             break;
         }
         // The same yardstick for both, or the noisier plane would win.

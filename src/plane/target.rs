@@ -1,142 +1,18 @@
-//! Which pixels are the target, and which were left out and why.
+//! Which pixels are the target: those of a region, or what the principal point looks at.
 
-use nalgebra::{Matrix3, Vector3};
-
-use super::Plane;
-use super::affine::{AffineFit, Effort, MAD_TO_SIGMA, fit_affine_robust};
+use super::affine::AffineFit;
+use super::image::{
+    Exclusions, InverseDepthImage, MIN_PIXELS, Target, in_front, on_plane, seed_plane,
+};
 use super::principal_point::at_principal_point;
-use super::ransac::{Estimator, InlierCount, UniformSampler, ransac};
 use super::relief::{Relief, relief};
-use crate::camera::{Camera, Rays};
 use crate::rng::Stream;
-use crate::stats::median_in_place;
 use crate::view::Region;
-
-/// The pixels of the target and a first plane through them.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Target {
-    /// Indices into the image, ascending. All pixels of the target's region, also those without a
-    /// measurement and those off the plane: holes and gross errors belong to the sensor's noise.
-    pub pixels: Vec<u32>,
-    pub plane: Plane,
-    /// Robust standard deviation about the plane, inverse depth, 1/m.
-    pub scale: f64,
-    pub exclusions: Exclusions,
-    /// Oddities worth telling.
-    pub notes: Vec<String>,
-}
-
-/// Pixels that were not used, by reason.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Exclusions {
-    /// Pixels considered: the region's, or the whole image.
-    pub considered: usize,
-    /// Without a measurement.
-    pub invalid: usize,
-    /// Measured, but not on the target's plane (or not connected with it).
-    pub off_plane: usize,
-    /// On the plane, but so near the target's edge that the depth may be mixed.
-    pub edge: usize,
-}
-
-/// A depth image as the target search sees it: inverse depth (1/m, NaN = none).
-pub struct InverseDepthImage<'a> {
-    pub w: &'a [f32],
-    pub rays: &'a Rays,
-    pub camera: &'a Camera,
-    /// Step of the depth code in inverse depth at an inverse depth, 1/m.
-    pub step: &'a (dyn Fn(f64) -> f64 + Sync),
-}
-
-/// Fewest pixels that make a target.
-pub(super) const FEWEST_PIXELS: usize = 300;
-/// Pixels within this many robust standard deviations belong to the plane.
-const REACH_SIGMAS: f64 = 5.0;
-/// ... and pixels within this distance always do: lens errors of a Kinect bend a near wall by
-/// 8 mm, while a hand holding a board stands off by more.
-const REACH_FLOOR_M: f64 = 0.010;
-/// Standard deviation below which no structured-light sensor was ever measured, as a + b z^2
-/// (m): half of Khoshelham and Elberink's 1.425e-3 z^2 and a millimetre of rounding.
-const SIGMA_FLOOR_M: f64 = 0.0005;
-const SIGMA_FLOOR_PER_M: f64 = 0.0007;
-
-/// No surface scatters by more than this share of its distance: a Kinect at 8 m reaches 2 %.
-const ROUGHEST: f64 = 0.05;
-
-impl InverseDepthImage<'_> {
-    /// Least standard deviation believed at inverse depth `w`, 1/m.
-    pub(super) fn floor(&self, w: f64) -> f64 {
-        (0.3 * (self.step)(w)).max(SIGMA_FLOOR_M * w * w + SIGMA_FLOOR_PER_M)
-    }
-
-    pub(super) fn reach(&self, w: f64, scale: f64) -> f64 {
-        (REACH_SIGMAS * scale).max(REACH_FLOOR_M * w * w)
-    }
-
-    /// Noise of the image itself, whatever its shape: second differences over eight pixels are
-    /// blind to planes and wider than a matching window's correlation.
-    pub(super) fn local_noise(&self, pixels: &[u32]) -> f64 {
-        const LAG: usize = 8;
-        let width = self.camera.width;
-        let stride = (pixels.len() / 3000).max(1);
-        let mut differences: Vec<f32> = pixels
-            .iter()
-            .step_by(stride)
-            .filter_map(|&i| {
-                let i = i as usize;
-                let u = i % width;
-                (u >= LAG && u + LAG < width)
-                    .then(|| (self.w[i - LAG] - 2.0 * self.w[i] + self.w[i + LAG]).abs())
-            })
-            .filter(|d| d.is_finite())
-            .collect();
-        let mad = f64::from(median_in_place(&mut differences));
-        if mad.is_finite() { MAD_TO_SIGMA * mad / 6f64.sqrt() } else { 0.0 }
-    }
-
-    /// Does the residual of a fit exceed what any sensor scatters?
-    pub(super) fn too_rough(&self, fit: &AffineFit, pixels: &[u32]) -> bool {
-        let mut w: Vec<f32> = pixels.iter().map(|&i| self.w[i as usize]).collect();
-        fit.scale > ROUGHEST * f64::from(median_in_place(&mut w))
-    }
-
-    pub(super) fn valid(&self, i: usize) -> bool {
-        self.w[i].is_finite()
-    }
-}
-
-/// Samples of inverse depth for RANSAC: hypotheses are affine through three pixels.
-struct AffineSamples {
-    rows: Vec<(Vector3<f64>, f64)>,
-}
-
-impl Estimator for AffineSamples {
-    type Model = Vector3<f64>;
-    const MINIMAL: usize = 3;
-
-    fn len(&self) -> usize {
-        self.rows.len()
-    }
-
-    fn hypothesis(&self, sample: &[usize]) -> Option<Vector3<f64>> {
-        let [a, b, c] = [sample[0], sample[1], sample[2]].map(|i| self.rows[i]);
-        let m = Matrix3::from_rows(&[a.0.transpose(), b.0.transpose(), c.0.transpose()]);
-        // Twice the area of the triangle in the normalised image: thin ones extrapolate badly.
-        if m.determinant().abs() < 1e-6 {
-            return None;
-        }
-        m.lu().solve(&Vector3::new(a.1, b.1, c.1)).filter(|q| q.iter().all(|v| v.is_finite()))
-    }
-
-    fn distance(&self, q: &Vector3<f64>, i: usize) -> f64 {
-        (self.rows[i].1 - q.dot(&self.rows[i].0)).abs()
-    }
-}
 
 /// Find the target: the plane in `region`, or else the one the principal point looks at.
 ///
 /// # Errors
-/// In words, when there is no plane.
+/// Why there is no plane.
 pub fn find_target(
     image: &InverseDepthImage<'_>,
     region: Option<&Region>,
@@ -162,7 +38,7 @@ fn in_region(
         return Err("its region lies outside the image".into());
     }
     let valid: Vec<u32> = inside.iter().copied().filter(|&i| image.valid(i as usize)).collect();
-    if valid.len() < FEWEST_PIXELS {
+    if valid.len() < MIN_PIXELS {
         return Err(format!(
             "only {} of {} pixels of its region carry a depth",
             valid.len(),
@@ -175,7 +51,7 @@ fn in_region(
     let relief = flat_enough(image, &inside, &valid, &fit)?;
     let flat = |i: u32| !relief.mask[relief.lattice.node_of(i as usize, width)];
     let on = valid.iter().filter(|&&i| flat(i) && on_plane(image, &fit, i as usize)).count();
-    if on < FEWEST_PIXELS {
+    if on < MIN_PIXELS {
         return Err(format!("only {on} pixels of its region lie on one plane"));
     }
     let exclusions = Exclusions {
@@ -186,7 +62,7 @@ fn in_region(
     };
     let mut notes = relief.notes;
     let share = exclusions.off_plane as f64 / valid.len() as f64;
-    if share > TELL_OFF_PLANE {
+    if share > NOTED_OFF_PLANE {
         notes.push(format!(
             "{:.1} % of the region's measured pixels are not on the target's plane",
             100.0 * share
@@ -200,9 +76,9 @@ fn in_region(
 }
 
 /// A region of which more than this share is off the plane was not drawn around a target.
-const MOST_RELIEF: f64 = 0.5;
+const MAX_RELIEF: f64 = 0.5;
 /// Residual over local noise above which a region is no plane: Herrera's 39 views reach 3.7.
-const MOST_BENT: f64 = 5.0;
+const MAX_BENT: f64 = 5.0;
 
 /// What stands off the plane in a region that is a plane otherwise.
 fn flat_enough(
@@ -212,14 +88,14 @@ fn flat_enough(
     fit: &AffineFit,
 ) -> Result<Relief, String> {
     let relief = relief(image, inside, fit);
-    if relief.share > MOST_RELIEF {
+    if relief.share > MAX_RELIEF {
         return Err(format!(
             "{:.0} % of its region are off the plane that fits it best",
             100.0 * relief.share
         ));
     }
     let bent = fit.scale / image.local_noise(valid).max(image.floor(fit.plane.q.z.abs()));
-    if bent > MOST_BENT {
+    if bent > MAX_BENT {
         return Err(format!(
             "its region is not flat: it is off the best plane by {bent:.1} times its own noise"
         ));
@@ -227,54 +103,5 @@ fn flat_enough(
     Ok(relief)
 }
 
-/// Does the pixel's ray meet the plane before the camera?
-pub(super) fn in_front(image: &InverseDepthImage<'_>, plane: &Plane, i: usize) -> bool {
-    let (x, y) = image.rays.at(i);
-    plane.inverse_depth(x, y) > 0.0
-}
-
-/// Clutter below this share of a region is not worth a line.
-const TELL_OFF_PLANE: f64 = 0.02;
-
-pub(super) fn on_plane(image: &InverseDepthImage<'_>, fit: &AffineFit, i: usize) -> bool {
-    let (x, y) = image.rays.at(i);
-    let expected = fit.plane.inverse_depth(x, y);
-    expected > 0.0 && (f64::from(image.w[i]) - expected).abs() < image.reach(expected, fit.scale)
-}
-
-/// Hypotheses for a seed: enough for a plane that holds a quarter of the window.
-const SEED_HYPOTHESES: usize = 300;
-const SEED_SAMPLES: usize = 900;
-
-/// RANSAC on a sample of `pixels`, then the robust fit on all of them.
-pub(super) fn seed_plane(
-    image: &InverseDepthImage<'_>,
-    pixels: &[u32],
-    rng: &mut Stream,
-) -> Option<AffineFit> {
-    let stride = (pixels.len() / SEED_SAMPLES).max(1);
-    let rows: Vec<(Vector3<f64>, f64)> = pixels
-        .iter()
-        .step_by(stride)
-        .map(|&i| {
-            let (x, y) = image.rays.at(i as usize);
-            (Vector3::new(x, y, 1.0), f64::from(image.w[i as usize]))
-        })
-        .collect();
-    let mut depths: Vec<f32> = rows.iter().map(|r| r.1 as f32).collect();
-    let floor = image.floor(f64::from(median_in_place(&mut depths)));
-    let consensus = InlierCount { threshold: 2.5 * image.local_noise(pixels).max(floor) };
-    let samples = AffineSamples { rows };
-    let jury: Vec<usize> = (0..samples.len()).collect();
-    let (q, _) = ransac(
-        &samples,
-        &consensus,
-        &mut UniformSampler { rng },
-        &jury,
-        SEED_HYPOTHESES,
-        SEED_CONFIDENCE,
-    )?;
-    fit_affine_robust(image.w, image.rays, pixels, &Plane::new(q), floor, Effort::Sample)
-}
-
-const SEED_CONFIDENCE: f64 = 0.9999;
+/// Clutter below this share of a region is not worth a note.
+const NOTED_OFF_PLANE: f64 = 0.02;

@@ -18,9 +18,9 @@ pub struct Axis {
 }
 
 /// More labels than this crowd a figure.
-const MOST_TICKS: usize = 10;
+const MAX_TICKS: usize = 10;
 /// A logarithmic axis wants at least this many labels to be read.
-const FEWEST_LOG_TICKS: usize = 4;
+const MIN_LOG_TICKS: usize = 4;
 /// Share of the value by which an empty range is widened on either side.
 const WIDEN: f64 = 0.05;
 /// Mantissas of round numbers.
@@ -47,12 +47,12 @@ impl Axis {
                 .collect()
         };
         let mut ticks = inside(&ROUND);
-        if ticks.len() > MOST_TICKS {
+        if ticks.len() > MAX_TICKS {
             ticks = inside(&ROUND[..1]);
-        } else if ticks.len() < FEWEST_LOG_TICKS {
+        } else if ticks.len() < MIN_LOG_TICKS {
             ticks = inside(&FINER);
         }
-        if ticks.len() < FEWEST_LOG_TICKS {
+        if ticks.len() < MIN_LOG_TICKS {
             ticks = multiples(low, high);
         }
         Axis { low, high, log: true, ticks }
@@ -102,12 +102,12 @@ fn widened(low: f64, high: f64) -> [f64; 2] {
 }
 
 fn multiples(low: f64, high: f64) -> Vec<f64> {
-    let step = round_up((high - low) / MOST_TICKS as f64);
+    let step = round_up((high - low) / MAX_TICKS as f64);
     let first = (low / step - f64::EPSILON).ceil() as i64;
     (first..)
         .map(|k| k as f64 * step)
         .take_while(|v| *v <= high * (1.0 + f64::EPSILON) + f64::EPSILON)
-        .take(2 * MOST_TICKS)
+        .take(2 * MAX_TICKS)
         .collect()
 }
 

@@ -5,7 +5,7 @@ use crate::map::{FrameReport, MapPoint};
 use super::base64::encode;
 
 /// More points make the page heavy and the map no clearer.
-const MOST_POINTS: usize = 250_000;
+const MAX_POINTS: usize = 250_000;
 /// Sigma is told apart between these, m, on a logarithmic scale.
 const SIGMA_M: [f32; 2] = [0.0005, 0.05];
 /// Places are stored in 16 bits over the map's extent.
@@ -13,7 +13,7 @@ const STEPS: f32 = 65_535.0;
 
 /// The page as text.
 pub fn map_page(title: &str, points: &[MapPoint], frames: &[FrameReport]) -> String {
-    let stride = points.len().div_ceil(MOST_POINTS).max(1);
+    let stride = points.len().div_ceil(MAX_POINTS).max(1);
     let shown: Vec<&MapPoint> =
         points.iter().step_by(stride).filter(|p| p.at.iter().all(|v| v.is_finite())).collect();
     let mut low = [f32::INFINITY; 3];

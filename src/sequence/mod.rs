@@ -1,7 +1,7 @@
 //! A film to map: depth images in time order, with the colour image and the true pose that belong
 //! to each, where there are any. Frames are read one at a time, when they are needed.
 //!
-//! Two layouts (contract, section 2): [`tum`] (depth.txt, rgb.txt, associations, groundtruth.txt)
+//! Two layouts (`crate::docs::layouts`): [`tum`] (depth.txt, rgb.txt, associations, groundtruth.txt)
 //! and [`scenes`] (7-Scenes: frame-XXXXXX.color/.depth/.pose).
 
 mod gaps;
@@ -69,7 +69,7 @@ impl Sequence {
     ///
     /// # Errors
     /// When the file is damaged or not of the sensor's size.
-    pub fn words(&self, moment: &Moment) -> Result<Frame> {
+    pub fn raw_depth(&self, moment: &Moment) -> Result<Frame> {
         read_depth(&moment.depth, self.sensor.camera.width, self.sensor.camera.height)
     }
 
@@ -97,7 +97,7 @@ impl Sequence {
 
 /// Depth of every pixel, m; NaN where there is none.
 pub fn metres(frame: &Frame, table: &DepthTable) -> Vec<f32> {
-    frame.words.iter().map(|&word| table.metres(word)).collect()
+    frame.raw.iter().map(|&word| table.metres(word)).collect()
 }
 
 #[cfg(test)]

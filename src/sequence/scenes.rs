@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vect
 use super::{Moment, Sequence};
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
-use crate::io::{Assumed, assumed_sensor, entries, size_of};
+use crate::io::{Assumed, entries, size_of};
 use crate::trajectory::Pose;
 
 const DEPTH: &str = ".depth.png";
@@ -51,12 +51,10 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     moments.sort_by(|a, b| a.stamp.total_cmp(&b.stamp));
     truth.sort_by(|a, b| a.stamp.total_cmp(&b.stamp));
     let size = size_of(&moments[0].depth)?;
-    let intrinsics = assumed.intrinsics.unwrap_or_else(|| {
+    if assumed.intrinsics.is_none() {
         remarks.push("7-Scenes' own intrinsics 585,585,320,240 assumed; give --intrinsics".into());
-        INTRINSICS
-    });
-    let code = assumed.code.unwrap_or(CODE);
-    let sensor = assumed_sensor("7-Scenes Kinect", size, intrinsics, code, assumed)?;
+    }
+    let sensor = assumed.sensor("7-Scenes Kinect", size, INTRINSICS, CODE)?;
     Ok(Sequence { root: root.to_path_buf(), sensor, moments, truth, remarks })
 }
 

@@ -5,7 +5,7 @@ use super::*;
 use crate::io::encode_png16;
 
 fn depth(path: &Path) {
-    let frame = Frame { width: 8, height: 6, words: vec![5000; 48] };
+    let frame = Frame { width: 8, height: 6, raw: vec![5000; 48] };
     fs::write(path, encode_png16(&frame).unwrap()).unwrap();
 }
 

@@ -11,7 +11,7 @@ use crate::trajectory::{associate, read_benchmark};
 use crate::view::FrameRef;
 
 /// Depth and colour of one moment are less apart, s (associate.py).
-const MOST_APART_S: f64 = 0.02;
+const MAX_APART_S: f64 = 0.02;
 /// Names under which people keep what associate.py printed.
 const ASSOCIATIONS: [&str; 4] =
     ["associations.txt", "association.txt", "associate.txt", "associated.txt"];
@@ -118,7 +118,7 @@ fn nearest(
     remarks.extend(colour.remarks);
     let stamps = |frames: &[FrameRef]| frames.iter().map(|f| f.timestamp).collect::<Vec<f64>>();
     let mut partner = vec![None; depth.len()];
-    for pair in associate(&stamps(depth), &stamps(&colour.frames), MOST_APART_S) {
+    for pair in associate(&stamps(depth), &stamps(&colour.frames), MAX_APART_S) {
         partner[pair.first] = Some(colour.frames[pair.second].path.clone());
     }
     Ok(partner)

@@ -113,9 +113,9 @@ impl Shooting<'_> {
         }
         self.memory = std::mem::take(&mut exposure.memory);
         self.still = std::mem::take(&mut exposure.still);
-        let words = exposure.depth.iter().map(|&z| sensor.code.word(f64::from(z))).collect();
+        let words = exposure.depth.iter().map(|&z| sensor.code.raw(f64::from(z))).collect();
         let (width, height) = (sensor.camera.width, sensor.camera.height);
-        Shot { depth: Frame { width, height, words }, light: exposure.light }
+        Shot { depth: Frame { width, height, raw: words }, light: exposure.light }
     }
 }
 

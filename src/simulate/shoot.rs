@@ -10,7 +10,7 @@ use super::formula::{FormulaSensor, Shot};
 use super::grid::GridView;
 use super::plan::{Scenery, ViewPlan, plan_grid};
 use super::speckle::{Causes, SpeckleSensor};
-use crate::calibrate::Progress;
+use crate::Progress;
 use crate::camera::Rays;
 use crate::effects::{Active, Instant};
 use crate::error::{Error, Result};
@@ -169,7 +169,7 @@ impl Shoot {
         for (stamp, instant) in instants {
             let mut shot = filming.shoot(instant);
             if let Some(mask) = &view.mask {
-                let hidden = shot.depth.words.iter_mut().zip(mask).filter(|(_, shown)| !**shown);
+                let hidden = shot.depth.raw.iter_mut().zip(mask).filter(|(_, shown)| !**shown);
                 hidden.for_each(|(word, _)| *word = KINECT_NO_MEASUREMENT);
             }
             folder.add(stamp, &shot.depth, self.infrared.then_some(&shot.infrared))?;
@@ -187,7 +187,7 @@ impl Shoot {
             let sd = (mean / ELECTRONS_PER_DN + READ_NOISE_DN * READ_NOISE_DN).sqrt();
             (mean + sd * n).round().clamp(0.0, 1023.0) as u16
         });
-        Frame { width: shot.depth.width, height: shot.depth.height, words: words.collect() }
+        Frame { width: shot.depth.width, height: shot.depth.height, raw: words.collect() }
     }
 }
 
@@ -240,7 +240,7 @@ impl ViewFolder {
             let _ = writeln!(self.infrared_list, "{stamp:.6} ir/{name}");
         }
         self.frames += 1;
-        self.sees |= depth.words.iter().any(|&word| self.code.metres(word).is_some());
+        self.sees |= depth.raw.iter().any(|&word| self.code.metres(word).is_some());
         Ok(())
     }
 

@@ -1,10 +1,8 @@
-//! The two argmin solvers the fits use, with every way of running for ever closed.
+//! The two argmin solvers that the fits use, each with a limit on its steps.
 
 use std::cell::RefCell;
 
-use argmin::core::{
-    CostFunction, Error as ArgminError, Executor, Gradient, Hessian, State, TerminationReason,
-};
+use argmin::core::{CostFunction, Error as ArgminError, Executor, Gradient, Hessian, State};
 use argmin::solver::neldermead::NelderMead;
 use argmin::solver::trustregion::{Steihaug, TrustRegion};
 use nalgebra::{DMatrix, DVector};
@@ -17,17 +15,13 @@ pub trait LeastSquares {
     fn cost(&self, x: &DVector<f64>) -> f64;
 }
 
-/// Where a solver stopped and why.
+/// The best point on a solver's way.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Ending {
+pub struct Minimum {
     /// The place.
     pub x: DVector<f64>,
     /// Half the sum of squares there.
     pub cost: f64,
-    /// Steps taken.
-    pub iterations: u64,
-    /// In words.
-    pub reason: String,
 }
 
 /// A problem in argmin's terms. Gradient and Hessian are asked for at the same point one after the
@@ -87,19 +81,20 @@ impl<P: LeastSquares> Hessian for AsArgmin<'_, P> {
     }
 }
 
-/// argmin's line of solvers compares costs; NaN would pass every comparison.
+/// argmin's solvers compare costs; NaN would pass every comparison.
 fn finite_or_huge(cost: f64) -> f64 {
     if cost.is_finite() { cost } else { f64::MAX / 4.0 }
 }
 
 /// Trust region with Steihaug's truncated conjugate gradients on the Gauss-Newton Hessian, from
 /// a start that is already near: the only one of argmin's solvers that almost always converges
-/// on this problem. `None` when the start is outside the domain.
+/// on the fit of sigma. At most `max_steps` steps; the best point on the way, which is the start
+/// where the solver fails. `None` when the start is outside the domain.
 pub fn trust_region<P: LeastSquares>(
     problem: &P,
     start: DVector<f64>,
-    most: u64,
-) -> Option<Ending> {
+    max_steps: u64,
+) -> Option<Minimum> {
     let initial = problem.cost(&start);
     if !initial.is_finite() {
         return None;
@@ -109,32 +104,17 @@ pub fn trust_region<P: LeastSquares>(
     let solver =
         TrustRegion::new(subproblem).with_radius(radius).ok()?.with_max_radius(1e6).ok()?;
     let run = Executor::new(AsArgmin::new(problem), solver)
-        .configure(|state| state.param(start.clone()).max_iters(most).target_cost(0.0))
+        .configure(|state| state.param(start.clone()).max_iters(max_steps).target_cost(0.0))
         .timer(false)
         .run();
-    let Ok(result) = run else {
-        return Some(Ending {
-            x: start,
-            cost: initial,
-            iterations: 0,
-            reason: "solver error".into(),
-        });
-    };
+    let Ok(result) = run else { return Some(Minimum { x: start, cost: initial }) };
     let state = result.state();
-    let (x, cost) = match state.get_best_param() {
-        Some(best) if state.get_best_cost() <= initial => (best.clone(), state.get_best_cost()),
-        _ => (start, initial),
-    };
-    Some(Ending {
-        x,
-        cost,
-        iterations: state.get_iter(),
-        reason: reason(state.get_termination_reason()),
+    Some(match state.get_best_param() {
+        Some(best) if state.get_best_cost() <= initial => {
+            Minimum { x: best.clone(), cost: state.get_best_cost() }
+        }
+        _ => Minimum { x: start, cost: initial },
     })
-}
-
-fn reason(reason: Option<&TerminationReason>) -> String {
-    reason.map_or_else(|| "unknown".into(), ToString::to_string)
 }
 
 struct Plain<F>(F);
@@ -152,7 +132,7 @@ pub fn nelder_mead(
     cost: impl Fn(&[f64]) -> f64,
     start: &[f64],
     edges: &[f64],
-    most: u64,
+    max_steps: u64,
 ) -> Vec<f64> {
     let mut simplex = vec![start.to_vec()];
     for (i, edge) in edges.iter().enumerate() {
@@ -164,7 +144,7 @@ pub fn nelder_mead(
         return start.to_vec();
     };
     let run = Executor::new(Plain(cost), solver)
-        .configure(|state| state.max_iters(most))
+        .configure(|state| state.max_iters(max_steps))
         .timer(false)
         .run();
     run.ok().and_then(|r| r.state().get_best_param().cloned()).unwrap_or_else(|| start.to_vec())

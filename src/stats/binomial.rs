@@ -40,7 +40,7 @@ fn beta(a: f64, b: f64, x: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// diagnosis.md, section 4.4.
+    /// 95 % intervals of (found, asked), percent, as tables of the exact binomial have them.
     #[test]
     fn the_intervals_are_those_of_the_table() {
         let rows = [

@@ -2,13 +2,11 @@
 
 mod binomial;
 mod correlation;
-mod quantile;
-mod truncated;
 
 pub use binomial::{at_least, at_most, clopper_pearson};
 pub use correlation::{Correlation, measure_correlation};
-pub use quantile::quantile;
-pub use truncated::{normal_cut_factor, std_unbias};
+
+use std::f64::consts::PI;
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
@@ -45,6 +43,16 @@ pub fn median(values: &mut [f64]) -> f64 {
     0.5 * (upper + below.iter().copied().fold(f64::NEG_INFINITY, f64::max))
 }
 
+/// The `p`-quantile, 0 to 1, by interpolation between the sorted values (Hyndman and Fan's type 7);
+/// `None` of nothing. Sorts `values`, which hold no NaN.
+pub fn quantile(values: &mut [f64], p: f64) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let at = p * (values.len().checked_sub(1)?) as f64;
+    let (i, rest) = (at.floor() as usize, at.fract());
+    let next = values.get(i + 1).unwrap_or(&values[i]);
+    Some(values[i] + rest * (next - values[i]))
+}
+
 /// Two-sided quantile of Student's t: P(|T| < q) = `level`.
 pub fn student_quantile(level: f64, degrees_of_freedom: f64) -> f64 {
     let p = 0.5 + 0.5 * level;
@@ -53,6 +61,21 @@ pub fn student_quantile(level: f64, degrees_of_freedom: f64) -> f64 {
         return Normal::standard().inverse_cdf(p);
     }
     StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1.0)).map_or(f64::NAN, |t| t.inverse_cdf(p))
+}
+
+/// Variance of a standard normal kept only within +-`cut`: below one, tends to one.
+///
+/// 1 - 2 k phi(k) / (2 Phi(k) - 1) (Johnson, Kotz and Balakrishnan 1994, section 13.10).
+pub fn normal_cut_factor(cut: f64) -> f64 {
+    let density = (-0.5 * cut * cut).exp() / (2.0 * PI).sqrt();
+    let inside = 2.0 * Normal::standard().cdf(cut) - 1.0;
+    1.0 - 2.0 * cut * density / inside
+}
+
+/// The root of an unbiased variance with `n` effective samples is low by this factor:
+/// E[s] = sigma (1 - 1/(4 n)) to first order.
+pub fn std_unbias(n: f64) -> f64 {
+    if n > 1.0 { 1.0 + 1.0 / (4.0 * n) } else { 1.0 }
 }
 
 #[cfg(test)]
@@ -78,5 +101,52 @@ mod tests {
     fn the_median_of_nothing_is_nan() {
         assert!(median_in_place(&mut []).is_nan());
         assert_eq!(median_in_place(&mut [3.0, 1.0, 2.0]), 2.0);
+    }
+
+    /// By hand: value p (n - 1), counted from 0, of the sorted five.
+    #[test]
+    fn quantiles_lie_between_the_sorted_values() {
+        let mut values = [7.0, 1.0, 4.0, 2.0, 11.0];
+        for (p, expected) in
+            [(0.0, 1.0), (0.1, 1.4), (0.25, 2.0), (0.5, 4.0), (0.9, 9.4), (1.0, 11.0)]
+        {
+            approx::assert_relative_eq!(
+                quantile(&mut values, p).unwrap(),
+                expected,
+                epsilon = 1e-12
+            );
+        }
+        assert_eq!(values, [1.0, 2.0, 4.0, 7.0, 11.0], "sorted");
+        assert_eq!(quantile(&mut [3.0], 0.7), Some(3.0));
+        assert_eq!(quantile(&mut [], 0.5), None);
+    }
+
+    /// The middle is the median, of even and odd numbers.
+    #[test]
+    fn the_half_is_the_median() {
+        for n in 1..20 {
+            let mut values: Vec<f64> = (0..n).map(|i| f64::from(i * 7 % 20).sin()).collect();
+            let middle = median(&mut values.clone());
+            approx::assert_relative_eq!(
+                quantile(&mut values, 0.5).unwrap(),
+                middle,
+                epsilon = 1e-15
+            );
+        }
+    }
+
+    #[test]
+    fn the_cut_factor_matches_numerical_integration() {
+        for cut in [1.0f64, 2.0, 3.5] {
+            let n = 200_000;
+            let (mut mass, mut second) = (0.0, 0.0);
+            for i in 0..n {
+                let t = -cut + 2.0 * cut * (i as f64 + 0.5) / n as f64;
+                let p = (-0.5 * t * t).exp();
+                mass += p;
+                second += p * t * t;
+            }
+            assert!((normal_cut_factor(cut) - second / mass).abs() < 1e-8, "{cut}");
+        }
     }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use super::place::{Axis, Place};
+use super::place::{Axis, PixelContext};
 
 /// Disparity at which a term that grows with a power of it is in px: a Kinect at 1.1 m.
 pub const DISPARITY_UNIT_PX: f64 = 40.0;
@@ -46,19 +46,19 @@ pub enum Basis {
     Recalibrate { z_m: [f64; 2], theta_rad: [f64; 2], columns: Vec<Vec<f64>> },
     /// A broken line over an axis between evenly spaced nodes; a lift over the target's own
     /// coordinates is without its straight part.
-    Curve { over: Over, low: f64, high: f64, nodes: usize, times: Times },
+    Curve { over: Coordinate, low: f64, high: f64, nodes: usize, times: Modulation },
     /// A broken line on a circle.
-    Ring { over: Over, period: f64, nodes: usize, times: Times },
+    Ring { over: Coordinate, period: f64, nodes: usize, times: Modulation },
     /// A bilinear map over the picture.
-    Map { width: f64, height: f64, across: usize, down: usize, times: Times },
+    Map { width: f64, height: f64, across: usize, down: usize, times: Modulation },
     /// Two curves at once: a bilinear map over two axes.
-    Pair { over: [Over; 2], low: [f64; 2], high: [f64; 2], nodes: [usize; 2] },
+    Pair { over: [Coordinate; 2], low: [f64; 2], high: [f64; 2], nodes: [usize; 2] },
 }
 
 /// What a curve runs over.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Over {
+pub enum Coordinate {
     Column,
     Row,
     Radius,
@@ -80,7 +80,7 @@ pub enum Over {
 /// What a curve is multiplied by.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Times {
+pub enum Modulation {
     One,
     /// The square of the disparity in units of 40 px: a constant error of depth's own shape.
     DisparitySquared,
@@ -94,51 +94,51 @@ pub enum Times {
 /// of a saw-tooth fall. A coefficient that few columns of the picture decide is then held to it.
 const BAND_PX: f64 = 0.2;
 
-impl Over {
-    pub fn value(self, p: &Place) -> f64 {
+impl Coordinate {
+    pub fn value(self, p: &PixelContext) -> f64 {
         match self {
-            Over::Column => p.u,
-            Over::Row => p.v,
-            Over::Radius => p.radius,
-            Over::Z => p.z,
-            Over::LogZ => p.z.ln(),
-            Over::Disparity => p.disparity,
-            Over::Right => p.right,
-            Over::Down => p.down,
-            Over::Edge => p.edge,
-            Over::Theta => p.theta,
-            Over::Azimuth => p.azimuth,
-            Over::Along => p.x * p.azimuth.cos() + p.y * p.azimuth.sin(),
-            Over::Session => p.session_s,
-            Over::Temperature => p.temperature_c,
-            Over::Light => p.light,
+            Coordinate::Column => p.u,
+            Coordinate::Row => p.v,
+            Coordinate::Radius => p.radius,
+            Coordinate::Z => p.z,
+            Coordinate::LogZ => p.z.ln(),
+            Coordinate::Disparity => p.disparity,
+            Coordinate::Right => p.right,
+            Coordinate::Down => p.down,
+            Coordinate::Edge => p.edge,
+            Coordinate::Theta => p.theta,
+            Coordinate::Azimuth => p.azimuth,
+            Coordinate::Along => p.x * p.azimuth.cos() + p.y * p.azimuth.sin(),
+            Coordinate::Session => p.session_s,
+            Coordinate::Temperature => p.temperature_c,
+            Coordinate::Light => p.light,
         }
     }
 
     pub fn axis(self) -> Axis {
         match self {
-            Over::Column => Axis::Column,
-            Over::Row => Axis::Row,
-            Over::Radius => Axis::Radius,
-            Over::Z | Over::LogZ | Over::Disparity => Axis::Z,
-            Over::Right | Over::Down => Axis::TargetPosition,
-            Over::Edge => Axis::EdgeDistance,
-            Over::Theta => Axis::Theta,
-            Over::Azimuth | Over::Along => Axis::Azimuth,
-            Over::Session => Axis::SessionTime,
-            Over::Temperature => Axis::Temperature,
-            Over::Light => Axis::Intensity,
+            Coordinate::Column => Axis::Column,
+            Coordinate::Row => Axis::Row,
+            Coordinate::Radius => Axis::Radius,
+            Coordinate::Z | Coordinate::LogZ | Coordinate::Disparity => Axis::Z,
+            Coordinate::Right | Coordinate::Down => Axis::TargetPosition,
+            Coordinate::Edge => Axis::EdgeDistance,
+            Coordinate::Theta => Axis::Theta,
+            Coordinate::Azimuth | Coordinate::Along => Axis::Azimuth,
+            Coordinate::Session => Axis::SessionTime,
+            Coordinate::Temperature => Axis::Temperature,
+            Coordinate::Light => Axis::Intensity,
         }
     }
 }
 
-impl Times {
-    pub(super) fn value(self, p: &Place) -> f64 {
+impl Modulation {
+    pub(super) fn value(self, p: &PixelContext) -> f64 {
         match self {
-            Times::One => 1.0,
-            Times::DisparitySquared => (p.disparity / DISPARITY_UNIT_PX).powi(2),
-            Times::Lift => p.disparity / p.rho,
-            Times::Tilt => p.theta.sin(),
+            Modulation::One => 1.0,
+            Modulation::DisparitySquared => (p.disparity / DISPARITY_UNIT_PX).powi(2),
+            Modulation::Lift => p.disparity / p.rho,
+            Modulation::Tilt => p.theta.sin(),
         }
     }
 }
@@ -169,7 +169,7 @@ impl Basis {
     }
 
     /// The columns at a place; `out` has [`Basis::count`] entries.
-    pub fn fill(&self, p: &Place, out: &mut [f64]) {
+    pub fn fill(&self, p: &PixelContext, out: &mut [f64]) {
         match *self {
             Basis::Bowl { disparity_power, .. } => {
                 let scale = if disparity_power == 0.0 {
@@ -262,7 +262,7 @@ impl Basis {
     }
 
     /// Value of the term at a place.
-    pub fn value(&self, coefficients: &[f64], p: &Place, row: &mut Vec<f64>) -> f64 {
+    pub fn value(&self, coefficients: &[f64], p: &PixelContext, row: &mut Vec<f64>) -> f64 {
         row.clear();
         row.resize(self.count(), 0.0);
         self.fill(p, row);
@@ -270,15 +270,17 @@ impl Basis {
     }
 
     /// Does it depend on one coordinate of a view alone?
-    pub fn alone(&self) -> Option<Over> {
+    pub fn alone(&self) -> Option<Coordinate> {
         match self {
-            Basis::Banding { .. } => Some(Over::Column),
-            Basis::Locking { .. } => Some(Over::Disparity),
-            Basis::EdgeMixing { .. } => Some(Over::Edge),
-            Basis::Curve { over, times: Times::One, .. }
-            | Basis::Ring { over, times: Times::One, .. } => match over {
-                Over::Column | Over::Row | Over::Edge => Some(*over),
-                Over::Disparity | Over::Z | Over::LogZ => Some(Over::Disparity),
+            Basis::Banding { .. } => Some(Coordinate::Column),
+            Basis::Locking { .. } => Some(Coordinate::Disparity),
+            Basis::EdgeMixing { .. } => Some(Coordinate::Edge),
+            Basis::Curve { over, times: Modulation::One, .. }
+            | Basis::Ring { over, times: Modulation::One, .. } => match over {
+                Coordinate::Column | Coordinate::Row | Coordinate::Edge => Some(*over),
+                Coordinate::Disparity | Coordinate::Z | Coordinate::LogZ => {
+                    Some(Coordinate::Disparity)
+                }
                 _ => None,
             },
             _ => None,
@@ -287,7 +289,7 @@ impl Basis {
 
     /// Does it depend on the column of the picture alone?
     pub fn of_column_alone(&self) -> bool {
-        self.alone() == Some(Over::Column)
+        self.alone() == Some(Coordinate::Column)
     }
 
     /// Does it stand still in the picture, but for its size?
@@ -295,7 +297,9 @@ impl Basis {
         match self {
             Basis::Banding { .. } => true,
             Basis::Bowl { .. } | Basis::Map { .. } => true,
-            Basis::Curve { over, .. } => matches!(over, Over::Column | Over::Row | Over::Radius),
+            Basis::Curve { over, .. } => {
+                matches!(over, Coordinate::Column | Coordinate::Row | Coordinate::Radius)
+            }
             _ => false,
         }
     }
@@ -303,19 +307,19 @@ impl Basis {
     /// Is it a shape of the target's surface over the target's own coordinates?
     pub(super) fn is_lift_of_target(&self) -> bool {
         let Basis::Curve { over, times, .. } = self else { return false };
-        *times == Times::Lift && matches!(over, Over::Right | Over::Down)
+        *times == Modulation::Lift && matches!(over, Coordinate::Right | Coordinate::Down)
     }
 
     /// Does it change within a few pixels?
     pub fn is_fine(&self) -> bool {
         match self {
             Basis::Locking { .. } | Basis::Ring { .. } | Basis::EdgeMixing { .. } => true,
-            Basis::Curve { over, .. } => matches!(over, Over::Edge),
+            Basis::Curve { over, .. } => matches!(over, Coordinate::Edge),
             _ => false,
         }
     }
 
-    /// The axis of effects.md that it runs along.
+    /// The axis that it runs along.
     pub fn axis(&self) -> Axis {
         match self {
             Basis::Bowl { .. } | Basis::Lens { .. } | Basis::RangeNotDepth => Axis::Radius,
@@ -329,7 +333,7 @@ impl Basis {
             Basis::TiltAxis { .. } => Axis::Azimuth,
             Basis::Intensity { .. } | Basis::Ambient { .. } => Axis::Intensity,
             Basis::Curve { over, .. } => over.axis(),
-            Basis::Ring { over: Over::Disparity, .. } => Axis::DisparityPhase,
+            Basis::Ring { over: Coordinate::Disparity, .. } => Axis::DisparityPhase,
             Basis::Ring { over, .. } => over.axis(),
             Basis::Map { .. } => Axis::Pixel,
             Basis::Pair { over, .. } => over[0].axis(),
@@ -386,7 +390,7 @@ fn sinc(cycles: f64) -> f64 {
     if x.abs() < 1e-6 { 1.0 } else { x.sin() / x }
 }
 
-fn smear(p: &Place, frequency: f64) -> f64 {
+fn smear(p: &PixelContext, frequency: f64) -> f64 {
     sinc(frequency * p.slope[0] * p.side) * sinc(frequency * p.slope[1] * p.side)
 }
 

@@ -9,11 +9,11 @@ mod pixels;
 mod place;
 mod value;
 
-pub use basis::{Basis, DISPARITY_UNIT_PX, Over, TABLE, Times};
+pub use basis::{Basis, Coordinate, DISPARITY_UNIT_PX, Modulation, TABLE};
 pub use edges::edge_distances;
 pub use needs::Needs;
 pub use pixels::Pixels;
-pub use place::{Axis, Place, corner_radius};
+pub use place::{Axis, PixelContext, corner_radius};
 
 use serde::{Deserialize, Serialize};
 
@@ -25,7 +25,8 @@ pub enum Statistic {
     Variance,
     Distribution,
     Correlation,
-    Missing,
+    #[serde(rename = "missing")]
+    Dropout,
 }
 
 /// A term with its size: added to the disparity, px, or to the logarithm of its variance.

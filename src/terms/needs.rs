@@ -1,6 +1,6 @@
 //! What must be known of a place before a term can be evaluated there.
 
-use super::basis::{Basis, Over, Times};
+use super::basis::{Basis, Coordinate, Modulation};
 use super::{Statistic, Term};
 
 /// What a term looks at beside the pixel's place in the picture.
@@ -51,23 +51,23 @@ impl Needs {
         terms.iter().fold(Needs::PIXEL, |needs, term| needs.and(term.needs()))
     }
 
-    fn over(over: Over) -> Needs {
+    fn over(over: Coordinate) -> Needs {
         match over {
-            Over::Column | Over::Row | Over::Radius => Needs::PIXEL,
-            Over::Z | Over::LogZ | Over::Disparity => Needs::DEPTH,
-            Over::Theta | Over::Azimuth | Over::Along => Needs::SURFACE,
-            Over::Right | Over::Down | Over::Edge => Needs::BOARD,
-            Over::Session => Needs { session: true, ..Needs::PIXEL },
-            Over::Temperature => Needs { temperature: true, ..Needs::PIXEL },
-            Over::Light => Needs { light: true, ..Needs::PIXEL },
+            Coordinate::Column | Coordinate::Row | Coordinate::Radius => Needs::PIXEL,
+            Coordinate::Z | Coordinate::LogZ | Coordinate::Disparity => Needs::DEPTH,
+            Coordinate::Theta | Coordinate::Azimuth | Coordinate::Along => Needs::SURFACE,
+            Coordinate::Right | Coordinate::Down | Coordinate::Edge => Needs::BOARD,
+            Coordinate::Session => Needs { session: true, ..Needs::PIXEL },
+            Coordinate::Temperature => Needs { temperature: true, ..Needs::PIXEL },
+            Coordinate::Light => Needs { light: true, ..Needs::PIXEL },
         }
     }
 
-    fn times(times: Times) -> Needs {
+    fn times(times: Modulation) -> Needs {
         match times {
-            Times::One => Needs::PIXEL,
-            Times::DisparitySquared => Needs::DEPTH,
-            Times::Lift | Times::Tilt => Needs::SURFACE,
+            Modulation::One => Needs::PIXEL,
+            Modulation::DisparitySquared => Needs::DEPTH,
+            Modulation::Lift | Modulation::Tilt => Needs::SURFACE,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Places of single pixels, of whatever they look at.
 
-use super::place::{Place, corner_radius};
+use super::place::{PixelContext, corner_radius};
 use crate::camera::{Camera, Rays};
 use crate::plane::Plane;
 
@@ -21,15 +21,25 @@ impl<'a> Pixels<'a> {
 
     /// Where pixel `i` lies in the picture; nothing is known of what it looks at. A single pixel
     /// has no width over which a ripple would fade.
-    pub fn place(&self, i: usize) -> Place {
+    pub fn place(&self, i: usize) -> PixelContext {
         let (u, v) = ((i % self.camera.width) as f64, (i / self.camera.width) as f64);
         let (x, y) = self.rays.at(i);
         let radius = f64::hypot(u - self.camera.cx, v - self.camera.cy) / self.corner;
-        Place { u, v, x, y, radius, light: 1.0, rho: 1.0, variance: 1.0, ..Place::default() }
+        PixelContext {
+            u,
+            v,
+            x,
+            y,
+            radius,
+            light: 1.0,
+            rho: 1.0,
+            variance: 1.0,
+            ..PixelContext::default()
+        }
     }
 }
 
-impl Place {
+impl PixelContext {
     /// `self` with a surface of this disparity, px.
     pub fn at_disparity(&mut self, disparity: f64, scale_px_m: f64) {
         self.disparity = disparity;

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::camera::Camera;
 
-/// The axes of effects.md.
+/// The axes along which a mismatch is located (`crate::docs::catalogue`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Axis {
@@ -29,7 +29,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// As effects.md writes it.
+    /// As `diagnosis.json` writes it.
     pub fn id(self) -> &'static str {
         match self {
             Axis::Z => "z",
@@ -75,7 +75,7 @@ impl std::fmt::Display for Axis {
 
 /// Where a patch (or a pixel) of a plane lies.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Place {
+pub struct PixelContext {
     /// Column and row of the patch's middle, px.
     pub u: f64,
     pub v: f64,
@@ -116,9 +116,9 @@ pub struct Place {
 /// The mean of what a function gives for the members of a group.
 pub type Mean<'a> = dyn Fn(&dyn Fn(usize) -> f64) -> f64 + 'a;
 
-impl Place {
+impl PixelContext {
     /// Move to the mean of the members' places; what is one for the view stays.
-    pub fn average(&mut self, all: &[Place], mean: &Mean<'_>) {
+    pub fn average(&mut self, all: &[PixelContext], mean: &Mean<'_>) {
         self.u = mean(&|i| all[i].u);
         self.v = mean(&|i| all[i].v);
         self.x = mean(&|i| all[i].x);

@@ -2,11 +2,11 @@
 
 use super::Term;
 use super::basis::{Basis, node};
-use super::place::Place;
+use super::place::PixelContext;
 
 impl Term {
     /// At a place, px or nepers of variance. `row` is scratch.
-    pub fn value(&self, p: &Place, row: &mut Vec<f64>) -> f64 {
+    pub fn value(&self, p: &PixelContext, row: &mut Vec<f64>) -> f64 {
         let b = &self.coefficients[..];
         match self.basis {
             // Of a lift's columns none is nothing: its straight part is taken out.
@@ -42,20 +42,26 @@ fn bilinear(b: &[f64], across: usize, (i, s): (usize, f64), (j, t): (usize, f64)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::terms::{Over, Statistic, Times};
+    use crate::terms::{Coordinate, Modulation, Statistic};
 
     /// The short way against the whole row.
     #[test]
     fn the_value_is_the_row_times_the_coefficients() {
-        let (over, times) = (Over::Disparity, Times::DisparitySquared);
+        let (over, times) = (Coordinate::Disparity, Modulation::DisparitySquared);
         let bases = [
             Basis::Curve { over, low: 5.0, high: 60.0, nodes: 7, times },
-            Basis::Curve { over: Over::Right, low: -1.0, high: 1.0, nodes: 7, times: Times::Lift },
-            Basis::Curve { over, low: 5.0, high: 60.0, nodes: 7, times: Times::Lift },
-            Basis::Ring { over, period: 3.0, nodes: 5, times: Times::Lift },
-            Basis::Map { width: 640.0, height: 480.0, across: 5, down: 4, times: Times::Tilt },
+            Basis::Curve {
+                over: Coordinate::Right,
+                low: -1.0,
+                high: 1.0,
+                nodes: 7,
+                times: Modulation::Lift,
+            },
+            Basis::Curve { over, low: 5.0, high: 60.0, nodes: 7, times: Modulation::Lift },
+            Basis::Ring { over, period: 3.0, nodes: 5, times: Modulation::Lift },
+            Basis::Map { width: 640.0, height: 480.0, across: 5, down: 4, times: Modulation::Tilt },
             Basis::Pair {
-                over: [over, Over::Row],
+                over: [over, Coordinate::Row],
                 low: [5.0, 0.0],
                 high: [60.0, 479.0],
                 nodes: [3, 6],
@@ -69,7 +75,14 @@ mod tests {
             for k in 0..200 {
                 let (u, v) = (f64::from(k * 3), f64::from(k * 37 % 480));
                 let disparity = 0.4 * f64::from(k);
-                let place = Place { u, v, disparity, rho: 1.3, theta: 0.4, ..Place::default() };
+                let place = PixelContext {
+                    u,
+                    v,
+                    disparity,
+                    rho: 1.3,
+                    theta: 0.4,
+                    ..PixelContext::default()
+                };
                 let whole = term.basis.value(&term.coefficients, &place, &mut Vec::new());
                 let short = term.value(&place, &mut Vec::new());
                 assert!((short - whole).abs() < 1e-12, "{:?} {k}: {short} {whole}", term.basis);
@@ -80,18 +93,25 @@ mod tests {
     /// A board that is moved and tilted as a whole is where it was.
     #[test]
     fn a_lift_has_no_straight_part() {
-        let basis =
-            Basis::Curve { over: Over::Right, low: -0.5, high: 0.7, nodes: 6, times: Times::Lift };
+        let basis = Basis::Curve {
+            over: Coordinate::Right,
+            low: -0.5,
+            high: 0.7,
+            nodes: 6,
+            times: Modulation::Lift,
+        };
         let bent: Vec<f64> = (0..6).map(|k| (2.1 * f64::from(k)).sin()).collect();
         let moved: Vec<f64> = (0..6).map(|k| bent[k] + 4.0 - 1.5 * k as f64).collect();
         for k in 0..50 {
             let right = f64::from(k) * 0.03 - 0.6;
-            let place = Place { right, disparity: 40.0, rho: 2.0, ..Place::default() };
+            let place =
+                PixelContext { right, disparity: 40.0, rho: 2.0, ..PixelContext::default() };
             let [a, b] = [&bent, &moved].map(|c| basis.value(c, &place, &mut Vec::new()));
             assert!((a - b).abs() < 1e-10, "{right}: {a} {b}");
         }
         let line: Vec<f64> = (0..6).map(|k| 1.0 + f64::from(k)).collect();
-        let place = Place { right: 0.3, disparity: 40.0, rho: 2.0, ..Place::default() };
+        let place =
+            PixelContext { right: 0.3, disparity: 40.0, rho: 2.0, ..PixelContext::default() };
         assert!(basis.value(&line, &place, &mut Vec::new()).abs() < 1e-10);
     }
 }

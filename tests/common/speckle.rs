@@ -76,7 +76,7 @@ impl Watch {
         for &instant in instants {
             let shot = filming.shoot(instant);
             let depth = |w: &u16| code.metres(*w).unwrap_or(f64::NAN);
-            let depths: Vec<f64> = shot.depth.words.iter().map(depth).collect();
+            let depths: Vec<f64> = shot.depth.raw.iter().map(depth).collect();
             let error = |(i, (z, t)): (usize, (&f64, &f64))| match inside(i) && t.is_finite() {
                 true if z.is_nan() => f64::INFINITY,
                 true => FB / z - FB / t,
@@ -84,7 +84,7 @@ impl Watch {
             };
             watch.errors.push(depths.iter().zip(&truth).enumerate().map(error).collect());
             watch.depths.extend(depths);
-            watch.infrared = shot.infrared.words;
+            watch.infrared = shot.infrared.raw;
         }
         watch
     }

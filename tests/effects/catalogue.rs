@@ -93,7 +93,7 @@ fn every_card_is_filled_in() {
         let card = effect.card();
         assert!(STATISTICS.contains(&card.statistic), "{}", card.id);
         assert!(AXES.contains(&card.axis), "{}", card.id);
-        assert!(card.words.len() > 40 && card.reference.len() > 8, "{}", card.id);
+        assert!(card.summary.len() > 40 && card.reference.len() > 8, "{}", card.id);
         let names_another =
             ids().iter().any(|id| *id != card.id && card.confused_with.contains(id));
         assert!(names_another, "{}: {}", card.id, card.confused_with);
@@ -102,7 +102,7 @@ fn every_card_is_filled_in() {
         assert!((strength.range[0]..=strength.range[1]).contains(&card.identity), "{}", card.id);
         for p in card.parameters {
             assert!((p.range[0]..=p.range[1]).contains(&p.typical), "{}: {}", card.id, p.name);
-            assert!(p.words.len() > 8, "{}: {}", card.id, p.name);
+            assert!(p.summary.len() > 8, "{}: {}", card.id, p.name);
         }
     }
 }

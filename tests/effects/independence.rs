@@ -21,7 +21,7 @@ fn stage(effects: Vec<Active>) -> Laboratory {
 
 fn words(effects: Vec<Active>) -> Vec<u16> {
     let instants = [instant(2, 0), instant(2, 1)];
-    stage(effects).shots(&instants).into_iter().flat_map(|s| s.depth.words).collect()
+    stage(effects).shots(&instants).into_iter().flat_map(|s| s.depth.raw).collect()
 }
 
 fn typical_but(id: &str) -> Vec<Active> {

@@ -76,7 +76,7 @@ impl Laboratory {
     pub fn at(&self, instants: &[Instant]) -> Vec<Vec<f64>> {
         let metres = |word: &u16| self.sensor.code.metres(*word).unwrap_or(f64::NAN);
         let shots = self.shots(instants);
-        shots.iter().map(|shot| shot.depth.words.iter().map(metres).collect()).collect()
+        shots.iter().map(|shot| shot.depth.raw.iter().map(metres).collect()).collect()
     }
 
     /// The first frames of view number `view`, 30 a second.

@@ -2,13 +2,13 @@
 
 use kinoise::camera::{Camera, Rays};
 use kinoise::correct::{Conditions, Correction};
-use kinoise::diagnose::Known;
+use kinoise::diagnose::KnownTerms;
 use kinoise::effects::KINECT_BASELINE_M;
 use kinoise::error::Result;
 use kinoise::model::{Effect, NoiseModel, SigmaModel};
 use kinoise::plane::{NormalEquations, Plane};
 use kinoise::scene::TargetFrame;
-use kinoise::terms::{Pixels, Place, Term, edge_distances};
+use kinoise::terms::{Pixels, PixelContext, Term, edge_distances};
 use kinoise::view::Sensor;
 use nalgebra::Vector3;
 
@@ -42,7 +42,7 @@ impl<'a> Stand<'a> {
     }
 
     /// Of pixel `i`.
-    pub fn place(&self, i: usize) -> Place {
+    pub fn place(&self, i: usize) -> PixelContext {
         let mut place = self.pixels.place(i);
         let scale_px_m = self.pixels.scale_px_m;
         place.side = 1.0;
@@ -100,7 +100,7 @@ impl ModelPredictor {
         Ok(ModelPredictor {
             correction: Correction::of(&fresh, sensor)?,
             sigma: model.sigma.clone(),
-            variance: Known::of(model, &sensor.camera).variance,
+            variance: KnownTerms::of(model, &sensor.camera).variance,
             rays: sensor.camera.rays(),
             scale_px_m: scale_px_m(sensor),
         })

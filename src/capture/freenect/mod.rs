@@ -210,7 +210,7 @@ fn complained() -> String {
 /// Little-endian words, as the library unpacks them on every machine it is built for.
 fn picture(bytes: &[u8]) -> Frame {
     let words = bytes.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
-    Frame { width: WIDTH, height: HEIGHT, words }
+    Frame { width: WIDTH, height: HEIGHT, raw: words }
 }
 
 /// The 480 rows in the middle of 488.

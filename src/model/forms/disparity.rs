@@ -1,6 +1,6 @@
 //! Constant disparity noise and a constant floor, added as variances.
 
-use super::{MOST_PARAMETERS, SigmaForm, Start, Walk};
+use super::{MAX_PARAMETERS, SigmaForm, Start, Walk};
 use crate::model::rows::Rows;
 
 #[derive(Debug)]
@@ -27,7 +27,7 @@ impl SigmaForm for Disparity {
         (p[0] * z * z).hypot(p[1])
     }
 
-    fn gradient(&self, p: &[f64], z: f64, theta: f64, out: &mut [f64; MOST_PARAMETERS]) {
+    fn gradient(&self, p: &[f64], z: f64, theta: f64, out: &mut [f64; MAX_PARAMETERS]) {
         let sigma = self.sigma(p, z, theta);
         out[0] = p[0] * z.powi(4) / sigma;
         out[1] = p[1] / sigma;

@@ -1,6 +1,6 @@
 //! sigma = k z^2: constant disparity noise, nothing else.
 
-use super::{MOST_PARAMETERS, SigmaForm, Start, Walk};
+use super::{MAX_PARAMETERS, SigmaForm, Start, Walk};
 use crate::model::rows::Rows;
 
 #[derive(Debug)]
@@ -27,7 +27,7 @@ impl SigmaForm for Khoshelham {
         p[0] * z * z
     }
 
-    fn gradient(&self, _p: &[f64], z: f64, _theta: f64, out: &mut [f64; MOST_PARAMETERS]) {
+    fn gradient(&self, _p: &[f64], z: f64, _theta: f64, out: &mut [f64; MAX_PARAMETERS]) {
         out[0] = z * z;
     }
 

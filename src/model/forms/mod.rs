@@ -4,16 +4,17 @@ mod disparity;
 mod khoshelham;
 mod nguyen;
 mod paper;
+mod tilt;
 
 use std::fmt;
 use std::str::FromStr;
 
 use super::rows::Rows;
 
-pub use paper::{PAPER_EQ1, tilt};
+pub use paper::PAPER_EQ1;
 
-/// Most parameters a form has.
-pub const MOST_PARAMETERS: usize = 6;
+/// The largest number of parameters of a form.
+pub const MAX_PARAMETERS: usize = 6;
 
 /// How a parameter is walked while fitting.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +38,7 @@ pub struct Start {
 /// A formula for sigma.
 pub trait SigmaForm: Sync {
     fn id(&self) -> &'static str;
-    /// In words, with units.
+    /// As text, with units.
     fn formula(&self) -> &'static str;
     /// Where it comes from.
     fn reference(&self) -> &'static str;
@@ -45,7 +46,7 @@ pub trait SigmaForm: Sync {
     /// sigma in m at depth z (m) and tilt theta (rad).
     fn sigma(&self, p: &[f64], z: f64, theta: f64) -> f64;
     /// Derivatives of sigma by the parameters, into the first slots of `out`.
-    fn gradient(&self, p: &[f64], z: f64, theta: f64, out: &mut [f64; MOST_PARAMETERS]);
+    fn gradient(&self, p: &[f64], z: f64, theta: f64, out: &mut [f64; MAX_PARAMETERS]);
     /// Where sigma runs to infinity, rad.
     fn pole(&self, _p: &[f64]) -> Option<f64> {
         None
@@ -128,7 +129,7 @@ mod tests {
             };
             assert_eq!(p.len(), spec.parameters().len());
             for (z, theta) in [(0.8, 0.0), (1.0, 0.6), (3.7, 1.25)] {
-                let mut gradient = [0.0; MOST_PARAMETERS];
+                let mut gradient = [0.0; MAX_PARAMETERS];
                 spec.gradient(&p, z, theta, &mut gradient);
                 for i in 0..p.len() {
                     let h = 1e-6 * p[i].abs().max(1e-6);

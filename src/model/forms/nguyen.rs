@@ -1,7 +1,7 @@
 //! Nguyen, Izadi and Lovell 2012: the paper's predecessor.
 
 use super::paper::{parabola_start, vertex_gradient};
-use super::{MOST_PARAMETERS, SigmaForm, Start, Walk};
+use super::{MAX_PARAMETERS, SigmaForm, Start, Walk};
 use crate::model::rows::Rows;
 
 #[derive(Debug)]
@@ -9,7 +9,7 @@ pub(super) struct Nguyen;
 
 /// theta^2 / (pi/2 - theta)^2 / sqrt(z).
 fn tilt(z: f64, theta: f64) -> f64 {
-    super::paper::tilt(theta, std::f64::consts::FRAC_PI_2) / z.sqrt()
+    super::tilt::tilt(theta, std::f64::consts::FRAC_PI_2) / z.sqrt()
 }
 
 impl SigmaForm for Nguyen {
@@ -33,7 +33,7 @@ impl SigmaForm for Nguyen {
         p[0] + p[1] * (z - p[2]).powi(2) + p[3] * tilt(z, theta)
     }
 
-    fn gradient(&self, p: &[f64], z: f64, theta: f64, out: &mut [f64; MOST_PARAMETERS]) {
+    fn gradient(&self, p: &[f64], z: f64, theta: f64, out: &mut [f64; MAX_PARAMETERS]) {
         vertex_gradient(p, z, out);
         out[3] = tilt(z, theta);
     }

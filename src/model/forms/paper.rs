@@ -1,9 +1,9 @@
 //! Yamaguchi et al. 2016, Eq. 1: six parameters.
 
-use super::{MOST_PARAMETERS, SigmaForm, Start, Walk};
+use super::tilt::{BestTilt, EXPONENTS, LOG_POLE, TiltSearch, tilt};
+use super::{MAX_PARAMETERS, SigmaForm, Start, Walk};
 use crate::measure::SigmaRow;
 use crate::model::rows::Rows;
-use crate::model::tilt_search::{BestTilt, EXPONENTS, LOG_POLE, TiltSearch};
 
 /// a, b, c, d, e, f as printed (m and rad).
 pub const PAPER_EQ1: [f64; 6] = [0.00151, 0.00215, 0.483, 1.88e-6, 2.01, 1.39];
@@ -11,15 +11,8 @@ pub const PAPER_EQ1: [f64; 6] = [0.00151, 0.00215, 0.483, 1.88e-6, 2.01, 1.39];
 #[derive(Debug)]
 pub(super) struct Paper;
 
-/// theta^2 / (f - theta)^2.
-#[inline]
-pub fn tilt(theta: f64, f: f64) -> f64 {
-    let ratio = theta / (f - theta);
-    ratio * ratio
-}
-
 /// Derivatives of a + b (z - c)^2 by a, b, c.
-pub(super) fn vertex_gradient(p: &[f64], z: f64, out: &mut [f64; MOST_PARAMETERS]) {
+pub(super) fn vertex_gradient(p: &[f64], z: f64, out: &mut [f64; MAX_PARAMETERS]) {
     let off = z - p[2];
     out[0] = 1.0;
     out[1] = off * off;
@@ -136,7 +129,7 @@ impl SigmaForm for Paper {
         if theta == 0.0 { axial } else { axial + p[3] * z.powf(p[4]) * tilt(theta, p[5]) }
     }
 
-    fn gradient(&self, p: &[f64], z: f64, theta: f64, out: &mut [f64; MOST_PARAMETERS]) {
+    fn gradient(&self, p: &[f64], z: f64, theta: f64, out: &mut [f64; MAX_PARAMETERS]) {
         vertex_gradient(p, z, out);
         let unit = z.powf(p[4]) * tilt(theta, p[5]);
         out[3] = unit;
@@ -189,8 +182,8 @@ fn with_tilt(rows: &Rows, best: &BestTilt) -> Option<Start> {
     let mut start = parabola_start(rows, |r| r.z_m.powf(best.e) * tilt(r.theta_rad, best.f))?;
     let held = start.held[3];
     start.parameters.extend([best.e, best.f]);
-    start.held.extend([held || best.at_rim[0], held || best.at_rim[1]]);
-    if best.at_rim.contains(&true) {
+    start.held.extend([held || best.at_edge[0], held || best.at_edge[1]]);
+    if best.at_edge.contains(&true) {
         start.remarks.push(format!(
             "the tilt term runs to the edge of what is believed: {}",
             why_no_tilt(rows)
@@ -213,7 +206,7 @@ fn without_tilt(rows: &Rows) -> Option<Start> {
 /// be dressed up as a pole.
 const TILT_MAY_SHOW_DEG: f64 = 70.0;
 
-/// Below this the tilt term of Eq. 1 is under a tenth of the axial one (physics: 71.9-73.5 deg).
+/// Below this the tilt term of Eq. 1 is under a tenth of the axial one (between 0.5 and 4 m that is at 71.9 to 73.5 degrees).
 const TILT_SHOWS_DEG: f64 = 74.0;
 
 fn why_no_tilt(rows: &Rows) -> String {

@@ -105,7 +105,7 @@ fn size(finding: &Finding) -> Markup {
     if !(size.mm.abs() > 0.0 || size.sigma.abs() > 0.0) {
         return html! { "No size in millimetres can be given" };
     }
-    if finding.statistic == Statistic::Missing {
+    if finding.statistic == Statistic::Dropout {
         return html! { b { (percent(size.sigma)) } " of the pixels are lost" };
     }
     html! {

@@ -9,13 +9,13 @@ pub(super) struct Name {
     pub plain: &'static str,
 }
 
-/// The name of an effect of effects.md; an id nobody has put into words names itself.
+/// The name of an effect of the catalogue; an id nobody has put into words names itself.
 pub(super) fn name(id: &'static str) -> Name {
     let known = NAMES.iter().find(|(i, _, _)| *i == id);
     known.map_or(Name { short: id, plain: id }, |&(_, short, plain)| Name { short, plain })
 }
 
-/// Id, short name, plain words; the order of effects.md.
+/// Id, short name, plain words; the order of the catalogue.
 const NAMES: [(&str, &str, &str); 29] = [
     (
         "disparity-quantisation",

@@ -23,7 +23,7 @@ const MILLIMETRES_BELOW_M: f64 = 0.3;
 pub(super) const DIGITS: usize = 3;
 const ERROR_DIGITS: usize = 2;
 /// Values below it are easier with powers of ten.
-const LEAST_PLAIN: f64 = 1e-3;
+const MIN_PLAIN: f64 = 1e-3;
 
 /// `0.125 ± 0.001 px`, or to so many digits where the error is not known; whatever else stands in
 /// the file is shown as it is.
@@ -52,7 +52,7 @@ fn unit(name: &str, value: f64) -> (f64, &'static str) {
 }
 
 fn with_error(value: f64, error: f64) -> Markup {
-    if error.is_nan() || error <= 0.0 || value.abs().max(error) < LEAST_PLAIN {
+    if error.is_nan() || error <= 0.0 || value.abs().max(error) < MIN_PLAIN {
         return html! { (significant(value, DIGITS)) " ± " (significant(error, ERROR_DIGITS)) };
     }
     let decimals = decimals_for(error);
@@ -63,7 +63,7 @@ fn with_error(value: f64, error: f64) -> Markup {
 pub(super) fn words(effect: Option<&str>, name: &str) -> &'static str {
     let card = effect.and_then(effects::find).map(|e| e.card());
     let parameter = card.and_then(|c| c.parameters.iter().find(|p| p.name == name));
-    parameter.map_or("", |p| p.words)
+    parameter.map_or("", |p| p.summary)
 }
 
 /// A parameter's name without its unit: `amplitude_px` is an amplitude.

@@ -6,11 +6,11 @@ use crate::report::numbers::{fixed, significant};
 use crate::terms::{Axis, Statistic};
 
 /// Below this a chance is not told to the digit.
-const LEAST_P: f64 = 1e-6;
+const MIN_P: f64 = 1e-6;
 /// From here on times are told in minutes, s.
 const MINUTES_FROM_S: f64 = 180.0;
 const SECONDS_A_MINUTE: f64 = 60.0;
-const MOST_DECIMALS: i32 = 4;
+const MAX_DECIMALS: i32 = 4;
 
 pub(super) fn axis(axis: Axis) -> &'static str {
     match axis {
@@ -40,7 +40,7 @@ pub(super) fn statistic(statistic: Statistic) -> &'static str {
         Statistic::Variance => "amount of noise",
         Statistic::Distribution => "shape of the noise",
         Statistic::Correlation => "how noise hangs together",
-        Statistic::Missing => "pixels without depth",
+        Statistic::Dropout => "pixels without depth",
     }
 }
 
@@ -76,7 +76,7 @@ pub(super) fn decimals_for(value: f64) -> usize {
     if !(value.is_finite() && value > 0.0) {
         return 2;
     }
-    (1 - value.log10().floor() as i32).clamp(0, MOST_DECIMALS) as usize
+    (1 - value.log10().floor() as i32).clamp(0, MAX_DECIMALS) as usize
 }
 
 /// Millimetres that already are millimetres.
@@ -95,7 +95,7 @@ pub(super) fn percent(share: f64) -> String {
 /// `p = 0.012`, with its sign.
 pub(super) fn p_value(p: f64) -> Markup {
     html! {
-        @if p < LEAST_P { "p < 10" sup { "−6" } }
+        @if p < MIN_P { "p < 10" sup { "−6" } }
         @else { "p = " (significant(p, if p < 1e-3 { 1 } else { 2 })) }
     }
 }
@@ -105,7 +105,7 @@ pub(super) fn chance(p: f64) -> String {
     if p.is_nan() {
         return "how often chance alone would look like this is not known".into();
     }
-    if p < LEAST_P {
+    if p < MIN_P {
         return "chance alone would look like this less than once in a million times".into();
     }
     if p > 0.5 {

@@ -4,7 +4,7 @@ use crate::measure::SigmaRow;
 use crate::model::DISTANCE_RATIO;
 
 /// More colours and shapes than this cannot be told apart.
-pub(super) const MOST_GROUPS: usize = 7;
+pub(super) const MAX_GROUPS: usize = 7;
 /// Distances within a group differ by less than this: sigma ~ z^2 then by less than half.
 const WIDEST_RATIO: f64 = 1.25;
 
@@ -18,7 +18,7 @@ pub(super) fn by_distance(rows: &[SigmaRow]) -> Vec<Vec<SigmaRow>> {
     let natural: Vec<Vec<SigmaRow>> =
         sorted.chunk_by(|a, b| b.z_m <= a.z_m * DISTANCE_RATIO).map(<[SigmaRow]>::to_vec).collect();
     let compact = |g: &Vec<SigmaRow>| g[g.len() - 1].z_m < WIDEST_RATIO * g[0].z_m;
-    if natural.len() <= MOST_GROUPS && natural.iter().all(compact) {
+    if natural.len() <= MAX_GROUPS && natural.iter().all(compact) {
         natural
     } else {
         equal_ratios(&sorted)
@@ -28,7 +28,7 @@ pub(super) fn by_distance(rows: &[SigmaRow]) -> Vec<Vec<SigmaRow>> {
 fn equal_ratios(sorted: &[SigmaRow]) -> Vec<Vec<SigmaRow>> {
     let [low, high] = [sorted[0].z_m, sorted[sorted.len() - 1].z_m];
     let range = (high / low).ln();
-    let count = (range / WIDEST_RATIO.ln()).ceil().clamp(1.0, MOST_GROUPS as f64);
+    let count = (range / WIDEST_RATIO.ln()).ceil().clamp(1.0, MAX_GROUPS as f64);
     let bin = |r: &SigmaRow| ((r.z_m / low).ln() / range * count).min(count - 1.0) as usize;
     sorted.chunk_by(|a, b| bin(a) == bin(b)).map(<[SigmaRow]>::to_vec).collect()
 }
@@ -58,7 +58,7 @@ mod tests {
     fn a_continuous_range_is_cut_into_seven_at_most() {
         let many = rows((0..400).map(|i| 0.5 + 0.01 * f64::from(i)));
         let groups = by_distance(&many);
-        assert!(groups.len() <= MOST_GROUPS);
+        assert!(groups.len() <= MAX_GROUPS);
         assert_eq!(groups.iter().map(Vec::len).sum::<usize>(), 400);
         assert!(groups.windows(2).all(|w| w[0][w[0].len() - 1].z_m < w[1][0].z_m));
     }
@@ -66,6 +66,6 @@ mod tests {
     #[test]
     fn many_separate_distances_are_put_together() {
         let groups = by_distance(&rows((1..=20).map(|i| 0.5 * f64::from(i))));
-        assert!((3..=MOST_GROUPS).contains(&groups.len()));
+        assert!((3..=MAX_GROUPS).contains(&groups.len()));
     }
 }

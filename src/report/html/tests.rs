@@ -1,5 +1,5 @@
 use super::*;
-use crate::calibrate::model_of_table;
+use crate::calibrate::{CalibrateOptions, model_of_table};
 use crate::measure::{Cell, ResidualPicture, SigmaRow, SigmaTable, Spread, ViewMeasurement};
 use crate::model::Form;
 use crate::plane::{Exclusions, Plane};
@@ -19,7 +19,8 @@ fn calibration() -> Calibration {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("table.csv");
     std::fs::write(&path, "z_m,theta_rad,sigma_m\n").unwrap();
-    model_of_table(&SigmaTable { rows }, Some(Form::Khoshelham), &path).unwrap()
+    let options = CalibrateOptions { form: Some(Form::Khoshelham), ..Default::default() };
+    model_of_table(&SigmaTable { rows }, &path, &options).unwrap()
 }
 
 fn view(name: &str) -> ViewMeasurement {
@@ -32,7 +33,7 @@ fn view(name: &str) -> ViewMeasurement {
         n: 5000,
         n_effective: 1234.0,
         n_effective_temporal: 1.0,
-        missing: 0,
+        dropouts: 0,
         cut: 0,
     };
     ViewMeasurement {

@@ -35,7 +35,7 @@ pub(super) fn section(views: &[ViewMeasurement]) -> Markup {
             p.note {
                 "z: mean depth of the target. Axis: depth of its plane on the optical axis; off reference: that less \
                  the distance measured by other means, “(!)” where they differ by more than "
-                (ReferenceDistance::tolerance_words()) ". σ: of one frame over the whole target, along the optical axis. Temporal: of one pixel over the frames. \
+                (ReferenceDistance::describe_tolerance()) ". σ: of one frame over the whole target, along the optical axis. Temporal: of one pixel over the frames. \
                  Perp.: across the plane. Paper: mean depth, tilt and spread of the RANSAC inliers of the first \
                  frame. n: samples (pixels times frames); n effective: independent samples they are worth. Corr.: \
                  length within which neighbouring pixels err together; “+” where it had not died out. Pixels left \

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::render::{Picture, RoomCamera};
 use super::{Pose, Room};
-use crate::calibrate::Progress;
+use crate::Progress;
 use crate::camera::Rays;
 use crate::effects::{Acting, Active, Instant};
 use crate::error::{Error, Result};

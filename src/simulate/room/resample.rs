@@ -35,7 +35,7 @@ pub const GAP_S: f64 = 0.2;
 /// A finite difference over less is mostly the tracker's own noise (0.1 mm at 300 Hz), s.
 const SPEED_SPAN_S: f64 = 0.03;
 /// An hour's frames; more is stamps that are not in seconds.
-const MOST_FRAMES: f64 = 3600.0 * RATE_HZ;
+const MAX_FRAMES: f64 = 3600.0 * RATE_HZ;
 
 /// Every 1/30 s from the first sample to the last; at most `limit` frames.
 ///
@@ -49,7 +49,7 @@ pub fn resample(samples: &[Pose], limit: Option<usize>) -> Result<Resampled> {
     // A rounding error of the stamps must not cost the last frame.
     let whole = ((end - start) * RATE_HZ + 1e-6).floor() + 1.0;
     let frames = limit.map_or(whole, |n| whole.min(n as f64));
-    if frames > MOST_FRAMES {
+    if frames > MAX_FRAMES {
         return Err(Error::Argument {
             what: format!("the trajectory lasts {:.0} s: {whole:.0} frames", end - start),
             remedy: "give --frames, or time stamps in seconds",

@@ -39,5 +39,5 @@ pub fn expose(picture: &Picture, ambient: &Ambient, causes: &Causes, rng: &mut S
         let sd = (light / ELECTRONS_PER_DN + read).sqrt();
         (BLACK_DN + light + sd * noise).round().clamp(0.0, FULL_DN) as u16
     });
-    Frame { width: picture.width, height: picture.height, words: words.collect() }
+    Frame { width: picture.width, height: picture.height, raw: words.collect() }
 }

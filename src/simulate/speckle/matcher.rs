@@ -31,7 +31,7 @@ struct Seen {
 
 impl Seen {
     fn of(picture: &Frame, half: usize) -> Self {
-        let grey: Vec<u32> = picture.words.iter().map(|&w| u32::from(w)).collect();
+        let grey: Vec<u32> = picture.raw.iter().map(|&w| u32::from(w)).collect();
         let squares: Vec<u32> = grey.iter().map(|g| g * g).collect();
         Seen {
             width: picture.width,

@@ -24,8 +24,7 @@ pub struct Pattern {
 
 /// The pattern is the unit's own, whatever the seed of a simulation.
 const UNIT: Seed = Seed(0x4b69_6e65_6374);
-/// Three tiles of 211 places span the 640 columns (Reichinger, "Kinect Pattern Uncovered", from
-/// memory; physics.md, 13).
+/// Three tiles of 211 places span the 640 columns (Reichinger, "Kinect Pattern Uncovered", 2011).
 const PITCH_PX: f64 = 640.0 / 633.0;
 /// Places that hold a dot: about one in nine, a 9 x 9 window sees nine (same source).
 const FILLED: f64 = 0.11;

@@ -139,7 +139,7 @@ impl SpeckleSensor {
         Frame {
             width: infrared.width,
             height: infrared.height,
-            words: found.shift.iter().zip(&found.correlation).map(word).collect(),
+            raw: found.shift.iter().zip(&found.correlation).map(word).collect(),
         }
     }
 }

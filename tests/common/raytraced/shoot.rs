@@ -239,7 +239,7 @@ impl<'a> Still<'a> {
         };
         let camera = &self.set.unit.sensor.camera;
         let words = self.depth(frame).iter().map(word).collect();
-        Frame { width: camera.width, height: camera.height, words }
+        Frame { width: camera.width, height: camera.height, raw: words }
     }
 
     /// Amplitude, 10-bit numbers.

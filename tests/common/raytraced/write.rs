@@ -49,7 +49,7 @@ fn write_view(set: &Set, view: usize, folder: &Path) -> Result<()> {
         if let Some(bits) = set.infrared_bits {
             let camera = &set.unit.sensor.camera;
             let image =
-                Frame { width: camera.width, height: camera.height, words: still.infrared(frame) };
+                Frame { width: camera.width, height: camera.height, raw: still.infrared(frame) };
             save(&folder.join("ir").join(&name), &infrared(&image, bits)?)?;
             let _ = writeln!(infrared_list, "{stamp:.6} ir/{name}");
         }
@@ -67,7 +67,7 @@ fn infrared(image: &Frame, bits: u8) -> Result<Vec<u8>> {
         return encode_png16_quickly(image);
     }
     let failed = |e: png::EncodingError| Error::Drawing { what: "PNG", why: e.to_string() };
-    let data: Vec<u8> = image.words.iter().map(|w| (w >> 2) as u8).collect();
+    let data: Vec<u8> = image.raw.iter().map(|w| (w >> 2) as u8).collect();
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, image.width as u32, image.height as u32);
     encoder.set_color(ColorType::Grayscale);

@@ -10,7 +10,7 @@ pub use gaussian::GaussianProcess;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use kinoise::diagnose::{Field, Known};
+use kinoise::diagnose::{Field, KnownTerms};
 use kinoise::error::{Error, Result};
 use kinoise::io::{Assumed, open};
 use kinoise::measure::{MeasureOptions, Workbench};
@@ -57,8 +57,8 @@ impl Tiles {
         let recording = open("recording")?;
         let known = match twin {
             // What it leaves in the twin it leaves in the recording.
-            Some(_) => Known::default(),
-            None => Known::of(model, &recording.sensor.camera),
+            Some(_) => KnownTerms::default(),
+            None => KnownTerms::of(model, &recording.sensor.camera),
         };
         let mut fields = fields(&recording, model, &known);
         if let Some(twin) = &twin {
@@ -136,7 +136,7 @@ fn merged(tiles: impl Iterator<Item = ([usize; 2], Tile)>) -> Vec<Tile> {
     sums.into_values().map(mean).collect()
 }
 
-fn fields(recording: &Recording, model: &NoiseModel, known: &Known) -> Vec<Field> {
+fn fields(recording: &Recording, model: &NoiseModel, known: &KnownTerms) -> Vec<Field> {
     let bench = Workbench::new(&recording.sensor, MeasureOptions::default());
     let stamps = recording.views.iter().filter_map(|v| v.depth.first());
     let start = stamps.map(|f| f.timestamp).fold(f64::INFINITY, f64::min);

@@ -9,7 +9,7 @@ use kinoise::model::NoiseModel;
 use kinoise::rng::Stream;
 
 /// A term that gains less is not what the recording needs, nats.
-const LEAST_NATS: f64 = 50.0;
+const MIN_NATS: f64 = 50.0;
 /// Terms without a name are told of by where they are only: one set in so many may strike one.
 const NAMELESS_EVERY: u32 = 5;
 
@@ -24,7 +24,7 @@ pub(super) fn strike(
     share: f64,
     rng: &mut Stream,
 ) -> Result<(NoiseModel, Hidden)> {
-    let least = asked.nats.unwrap_or(LEAST_NATS);
+    let least = asked.nats.unwrap_or(MIN_NATS);
     let wanted = |found: &Found| asked.names.contains(&found.form);
     let needed = |found: &Found| found.nats.is_none_or(|nats| nats * share >= least);
     let those = |fits: &dyn Fn(&Found) -> bool| -> Vec<usize> {

@@ -81,22 +81,22 @@ impl Graft {
     pub fn apply(&self, scene: &Scene<'_>, target: &[bool], frame: &Frame, clock: &Clock) -> Frame {
         let code = scene.camera.sensor.code;
         let fb = scene.camera.disparity_px_m();
-        let valid: Vec<bool> = frame.words.iter().map(|&w| code.metres(w).is_some()).collect();
+        let valid: Vec<bool> = frame.raw.iter().map(|&w| code.metres(w).is_some()).collect();
         let off = off(scene, target, frame, &valid);
         let words = Words { frame, valid: &valid, off: &off };
         let places = places(&words, &mut self.stream("step", clock));
-        let noise = self.noise(clock, frame.words.len());
-        let trembling = white(frame.words.len(), self.stream("tremble", clock));
+        let noise = self.noise(clock, frame.raw.len());
+        let trembling = white(frame.raw.len(), self.stream("tremble", clock));
         let tails = self.tails(scene, target, frame, &places, clock);
         let shake = self.shake(frame, clock);
         let mut lost = self.stream("lost", clock);
-        let mut words = frame.words.clone();
+        let mut words = frame.raw.clone();
         for i in 0..words.len() {
             let chance: f64 = lost.random();
             if !valid[i] {
                 continue;
             }
-            let d = disparity(&code, frame.words[i], places[i], fb);
+            let d = disparity(&code, frame.raw[i], places[i], fb);
             let site = scene.site(i, (!target[i]).then(|| fb / d));
             let there = self.there(scene, &site);
             let [_, sigma] = scene.expected(i, &site, &mut Vec::new());
@@ -106,7 +106,7 @@ impl Graft {
             let d = d + there.shift + f64::from(rows) + more + sigma * f64::from(tails[i]);
             words[i] = if chance < there.loss { no_word(&code) } else { self.word(&code, d, fb) };
         }
-        Frame { width: frame.width, height: frame.height, words }
+        Frame { width: frame.width, height: frame.height, raw: words }
     }
 
     fn stream(&self, what: &str, clock: &Clock) -> kinoise::rng::Stream {
@@ -141,7 +141,7 @@ impl Graft {
         places: &[f32],
         clock: &Clock,
     ) -> Vec<f32> {
-        let mut field = vec![0.0; frame.words.len()];
+        let mut field = vec![0.0; frame.raw.len()];
         let widen = |cause: &&Cause| matches!(cause.act, Act::Grain(Phase::Tails, _));
         if !self.causes.iter().any(|c| widen(&c)) {
             return field;
@@ -149,10 +149,10 @@ impl Graft {
         let code = scene.camera.sensor.code;
         let fb = scene.camera.disparity_px_m();
         for (i, residual) in field.iter_mut().enumerate() {
-            if target[i] && code.metres(frame.words[i]).is_some() {
+            if target[i] && code.metres(frame.raw[i]).is_some() {
                 let site = scene.site(i, None);
                 let [bias, sigma] = scene.expected(i, &site, &mut Vec::new());
-                let d = disparity(&code, frame.words[i], places[i], fb);
+                let d = disparity(&code, frame.raw[i], places[i], fb);
                 *residual = ((d - site.disparity - bias) / sigma) as f32;
             }
         }
@@ -178,7 +178,7 @@ impl Graft {
                 _ => {}
             }
         }
-        code.word(z)
+        code.raw(z)
     }
 }
 
@@ -194,7 +194,7 @@ fn off(scene: &Scene<'_>, target: &[bool], frame: &Frame, valid: &[bool]) -> Vec
             DepthCode::Metric { units_per_metre, .. } => fb / d * units_per_metre,
             DepthCode::Disparity { offset, slope, .. } => (d / fb - offset) / slope,
         };
-        (f64::from(frame.words[i]) - expected) as f32
+        (f64::from(frame.raw[i]) - expected) as f32
     };
     let fits = |i: &usize| valid[*i] && target[*i];
     let mut off = vec![f32::NAN; valid.len()];

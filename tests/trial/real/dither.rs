@@ -22,7 +22,7 @@ const LOT_PX: f64 = 4.0;
 /// Every so many pixels are looked at to weigh it.
 const APART: usize = 7;
 const ROUNDS: usize = 10;
-const MOST_WEIGHT: f32 = 30.0;
+const MAX_WEIGHT: f32 = 30.0;
 
 /// A frame, and how far its words are from what is expected there, steps; NaN where nothing is.
 pub(super) struct Words<'a> {
@@ -40,7 +40,7 @@ pub(super) fn places(words: &Words<'_>, rng: &mut Stream) -> Vec<f32> {
     let score = |weight: f32, i: usize| lean[i] + weight * lot[i];
     let looked: Vec<usize> =
         (0..count).step_by(APART).filter(|&i| words.off[i].is_finite()).collect();
-    let (mut low, mut high) = (1e-3f32.ln(), MOST_WEIGHT.ln());
+    let (mut low, mut high) = (1e-3f32.ln(), MAX_WEIGHT.ln());
     for _ in 0..ROUNDS {
         let middle = 0.5 * (low + high);
         let placed = by_rank(looked.iter().map(|&i| (score(middle.exp(), i), i)).collect());
@@ -79,7 +79,7 @@ impl Words<'_> {
         if !self.valid[i] {
             return 0.0;
         }
-        let Frame { width, height, words } = self.frame;
+        let Frame { width, height, raw: words } = self.frame;
         let (u, v) = (i % width, i / width);
         let (across, down) = (REACH.min(u).min(width - 1 - u), REACH.min(v).min(height - 1 - v));
         let (mut sum, mut n) = (0.0, 0);

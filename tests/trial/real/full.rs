@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use serde_json::{Map, Value, json};
 
-use super::FEWEST_VIEWS;
+use super::MIN_VIEWS;
 use super::sources::Source;
 use kinoise::calibrate::{CalibrateOptions, measure, model_of};
 use kinoise::diagnose::{DiagnoseOptions, Diagnosed, Finding, Status, Verdict, diagnose};
@@ -20,7 +20,7 @@ use kinoise::view::Recording;
 /// What is learnt of a recording does not depend on the set it is learnt for.
 const SEED: Seed = Seed(1);
 /// What was hidden behind the first findings is found in the next round.
-const MOST_ROUNDS: usize = 3;
+const MAX_ROUNDS: usize = 3;
 
 /// A recording with a model that it does not contradict.
 pub(super) struct Full {
@@ -87,7 +87,7 @@ fn apart<T: Send>(work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
 fn learn(mut recording: Recording) -> Result<Full> {
     let mut model = calibrated(&recording)?;
     let (mut terms, mut fields) = (Vec::new(), Vec::new());
-    for round in 0..=MOST_ROUNDS {
+    for round in 0..=MAX_ROUNDS {
         let done = examine(&recording, &model)?;
         if round == 0 {
             fields = done.fields;
@@ -95,7 +95,7 @@ fn learn(mut recording: Recording) -> Result<Full> {
         if done.diagnosis.verdict != Verdict::Mismatch {
             break;
         }
-        if round == MOST_ROUNDS {
+        if round == MAX_ROUNDS {
             let left: Vec<&str> = done
                 .diagnosis
                 .findings
@@ -106,7 +106,7 @@ fn learn(mut recording: Recording) -> Result<Full> {
             return Err(Error::recording(
                 &recording.root,
                 format!(
-                    "after {MOST_ROUNDS} rounds something is still left to be found: {}",
+                    "after {MAX_ROUNDS} rounds something is still left to be found: {}",
                     left.join(", ")
                 ),
                 "leave it out of the trial",
@@ -118,7 +118,7 @@ fn learn(mut recording: Recording) -> Result<Full> {
     let mut seen: HashMap<String, Seen> =
         fields.into_iter().map(|f| (f.name, Seen { plane: f.plane, pixels: f.pixels })).collect();
     recording.views.retain(|v| seen.contains_key(&v.name));
-    if recording.views.len() < FEWEST_VIEWS {
+    if recording.views.len() < MIN_VIEWS {
         return Err(Error::recording(
             &recording.root,
             format!("{} views of a plane", recording.views.len()),
@@ -151,7 +151,7 @@ impl Full {
 pub(super) fn learnt(recording: &Recording) -> Result<NoiseModel> {
     apart(|| {
         let mut model = calibrated(recording)?;
-        for _ in 0..MOST_ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             let done = examine(recording, &model)?;
             if done.diagnosis.verdict != Verdict::Mismatch {
                 break;

@@ -45,7 +45,7 @@ use kinoise::rng::{Seed, Stream};
 /// Of the views that a recording has, a set takes at least and at most this share.
 const KEPT: [f64; 2] = [0.6, 0.92];
 /// A diagnosis of fewer says too little.
-const FEWEST_VIEWS: usize = 6;
+const MIN_VIEWS: usize = 6;
 
 /// A set of real views.
 struct Real {
@@ -124,7 +124,7 @@ fn one_of(mut sources: Vec<Source>, rng: &mut Stream, take: Taking<'_>) -> Resul
 /// Views by lot, ascending.
 fn some(all: usize, rng: &mut Stream) -> Vec<usize> {
     let [least, most] = KEPT.map(|share| (share * all as f64).round() as usize);
-    let least = least.max(FEWEST_VIEWS).min(all);
+    let least = least.max(MIN_VIEWS).min(all);
     let count = rng.random_range(least..=most.max(least));
     dealt(all, rng, count)[0].clone()
 }

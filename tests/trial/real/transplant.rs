@@ -46,8 +46,8 @@ const FOREIGN: [&str; 9] = [
 /// One set in so many conceals what the catalogue lacks.
 const FOREIGN_EVERY: u32 = 4;
 /// What shows less, nats or share of the pixels lost, is no question.
-const LEAST_NATS: f64 = 5.0;
-const LEAST_LOST: f64 = 0.002;
+const MIN_NATS: f64 = 5.0;
+const MIN_LOST: f64 = 0.002;
 
 /// The causes to add to `views` of the recording, and what they are.
 ///
@@ -113,7 +113,7 @@ impl Bed<'_> {
             let (cause, gain) = self.cause(name, None)?;
             let unseen = gain.nats == 0.0 && gain.lost == 0.0;
             let by_itself = !matches!(cause.label.statistic, "bias" | "variance" | "missing");
-            if gain.nats >= LEAST_NATS || gain.lost >= LEAST_LOST || by_itself && unseen {
+            if gain.nats >= MIN_NATS || gain.lost >= MIN_LOST || by_itself && unseen {
                 return Ok(vec![name.into()]);
             }
         }

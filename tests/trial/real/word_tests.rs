@@ -83,9 +83,9 @@ fn an_error_added_to_words_is_as_if_it_had_come_before_them() {
             window_px: 1.0,
         };
         let clock = Clock { seed: Seed(1), view, frame: 0, view_s: 0.0, width };
-        let frame = Frame { width, height, words: stored(0.0) };
+        let frame = Frame { width, height, raw: stored(0.0) };
         let changed = graft.apply(&scene, &vec![true; width * height], &frame, &clock);
-        for (sum, words) in sums.iter_mut().zip([changed.words, stored(-0.37)]) {
+        for (sum, words) in sums.iter_mut().zip([changed.raw, stored(-0.37)]) {
             let field: Vec<f64> =
                 words.iter().zip(&exact).map(|(w, e)| f64::from(*w) - e).collect();
             let found = statistics(&field, width);
@@ -109,8 +109,8 @@ fn more_noise_and_fewer_answers() {
     let sigma = scene.expected(0, &scene.site(0, None), &mut Vec::new())[1];
     // Khoshelham's 1.4 mm at 1 m.
     assert!((sigma / (1.4e-3 * camera.disparity_px_m()) - 1.0).abs() < 1e-9);
-    let word = CODE.word(2.0);
-    let frame = Frame { width, height, words: vec![word; width * height] };
+    let word = CODE.raw(2.0);
+    let frame = Frame { width, height, raw: vec![word; width * height] };
     let causes = vec![
         cause("variance", Act::Spread(Box::new(|_, _| 2.0))),
         cause("missing", Act::Loss(Box::new(|_, _| 0.1))),
@@ -120,7 +120,7 @@ fn more_noise_and_fewer_answers() {
     assert_eq!(there, There { shift: 0.0, spread: 2.0, tremble: 0.0, loss: there.loss });
     assert!((there.loss - 0.1).abs() < 1e-12);
     let clock = Clock { seed: Seed(1), view: 0, frame: 0, view_s: 0.0, width };
-    let words = graft.apply(&scene, &vec![true; width * height], &frame, &clock).words;
+    let words = graft.apply(&scene, &vec![true; width * height], &frame, &clock).raw;
     let kept: Vec<f64> =
         words.iter().filter(|w| **w != 2047).map(|w| f64::from(*w) - f64::from(word)).collect();
     let lost = 1.0 - kept.len() as f64 / words.len() as f64;

@@ -166,7 +166,7 @@ pub(super) fn diagnosis(verdict: Verdict, findings: Vec<Finding>) -> Diagnosis {
 
 fn row(i: usize) -> MapRow {
     MapRow {
-        statistic: [Statistic::Bias, Statistic::Variance, Statistic::Missing][i % 3],
+        statistic: [Statistic::Bias, Statistic::Variance, Statistic::Dropout][i % 3],
         axis: [Axis::Radius, Axis::Z, Axis::Theta][i % 3],
         interval: [[118.0, 398.0], [1.62, 3.4], [0.7, 1.1]][i % 3],
         unit: ["px", "m", "rad"][i % 3],

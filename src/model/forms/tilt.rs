@@ -1,10 +1,16 @@
-//! Where the paper's tilt term starts: (e, f) by variable projection.
+//! The tilt term of the paper's form, and where its fit starts: (e, f) by variable projection.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::forms::tilt;
-use super::rows::Rows;
+use crate::model::rows::Rows;
 use crate::solve::nelder_mead;
+
+/// theta^2 / (f - theta)^2.
+#[inline]
+pub fn tilt(theta: f64, f: f64) -> f64 {
+    let ratio = theta / (f - theta);
+    ratio * ratio
+}
 
 /// Variable projection for the paper's tilt term: how much a column z^e theta^2/(f - theta)^2
 /// improves on a parabola in z, as a function of (e, f) alone.
@@ -25,8 +31,8 @@ pub struct BestTilt {
     /// Drop of the weighted chi-square against no tilt term.
     pub gain: f64,
     pub chi2: f64,
-    /// e, f stand at the rim of the search: the data do not bound them.
-    pub at_rim: [bool; 2],
+    /// e, f stand at the edge of the search: the data do not bound them.
+    pub at_edge: [bool; 2],
 }
 
 /// The searched box: exponents from Nguyen's -0.5 to Eq. 1's 2.01 and well beyond, the pole from
@@ -71,9 +77,9 @@ impl<'a> TiltSearch<'a> {
         let mut h: Vec<f64> = powers.iter().zip(tilts).map(|(p, t)| p * t).collect();
         self.rows.whiten(&mut h);
         let h = DVector::from_vec(h);
-        let shadow = self.basis.tr_mul(&h);
+        let projected = self.basis.tr_mul(&h);
         let norm = h.norm_squared();
-        let square = norm - shadow.norm_squared();
+        let square = norm - projected.norm_squared();
         // `left` is orthogonal to the basis already.
         let dot = h.dot(&self.left);
         if dot > 0.0 && square > 1e-12 * norm { dot * dot / square } else { 0.0 }
@@ -116,7 +122,7 @@ impl<'a> TiltSearch<'a> {
             f: self.rows.steepest() + g.exp(),
             gain,
             chi2: self.left.norm_squared() - gain,
-            at_rim: [near(e, EXPONENTS), near(g, LOG_POLE)],
+            at_edge: [near(e, EXPONENTS), near(g, LOG_POLE)],
         }
     }
 }

@@ -6,14 +6,10 @@ use std::sync::Arc;
 use serde_json::{Map, Value, json};
 
 use super::shape::Shape;
-use super::{CATALOGUE, Draw, Effect, Exposure, find};
+use super::{CATALOGUE, Draw, Effect, Exposure, Settings, find};
 use crate::error::{Error, Result};
 use crate::model;
 use crate::rng::Seed;
-
-/// Values of an effect's parameters, in the card's order.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Settings(Vec<f64>);
 
 /// An effect that is switched on.
 #[derive(Clone)]
@@ -40,17 +36,6 @@ impl Deref for Acting {
     }
 }
 
-impl Settings {
-    /// The value of the card's parameter number `index`.
-    pub fn at(&self, index: usize) -> f64 {
-        self.0[index]
-    }
-
-    pub fn typical(effect: &dyn Effect) -> Self {
-        Settings(effect.card().parameters.iter().map(|p| p.typical).collect())
-    }
-}
-
 const KNOWN: &str = "see `kinoise effects` for the ids and their parameters";
 
 fn fault(what: String) -> Error {
@@ -71,7 +56,7 @@ impl Active {
             let hint = near.map_or(String::new(), |n| format!("; did you mean {n}?"));
             fault(format!("effect \"{id}\" is not in the catalogue{hint}"))
         })?;
-        Ok(Active { effect: Acting::Catalogue(effect), settings: Settings::typical(effect) })
+        Ok(Active { effect: Acting::Catalogue(effect), settings: Settings::typical(effect.card()) })
     }
 
     /// `self` with one knob set.
@@ -171,7 +156,7 @@ impl Active {
         }
     }
 
-    /// Two of a kind would share their random numbers, and nobody could say what they do together.
+    /// Two of a kind would share their random numbers, and so would not be independent.
     ///
     /// # Errors
     /// When an effect is there twice.

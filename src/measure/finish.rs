@@ -1,0 +1,210 @@
+//! What the sums of a view's frames come to.
+
+use super::cells::{Cell, Context, Sums};
+use super::doubtful::{Bin, doubts};
+use super::grouping::CUT_SIGMAS;
+use super::scan::Scan;
+use super::{Planes, ResidualPicture, ViewMeasurement};
+use crate::frame::Frame;
+use crate::plane::{Effort, Plane, Target, fit_affine_robust};
+use crate::residual::perpendicular_per_axial;
+use crate::stats::{Correlation, measure_correlation, normal_cut_factor};
+
+impl Scan<'_> {
+    /// Refit on all frames, and turn the sums into the view's result (names and notes are the
+    /// caller's). `None` when nothing was measured.
+    pub fn finish(self, target: &Target, first: &Frame) -> Option<ViewMeasurement> {
+        let frames = self.lagged.frames;
+        let plane = match self.bench.options.planes {
+            Planes::PerView => self.refit(target),
+            Planes::PerFrame => Plane::new(self.own_planes / frames as f64),
+        };
+        let shift = self.shift_to(&plane);
+        let sums = self.sums(&plane, &shift);
+        let correlation = self.correlation(first, &plane, &sums);
+        let temporal_correlation = self.lagged.correlation();
+        let context = self.context(&correlation, temporal_correlation);
+        let (cells, trusted, notes) = trusted_cells(&sums, &context);
+        let whole = context.cell(&trusted)?;
+        Some(ViewMeasurement {
+            name: String::new(),
+            time_s: 0.0,
+            plane,
+            z_m: whole.z_m,
+            theta_rad: plane.theta(),
+            azimuth_rad: plane.azimuth(),
+            whole,
+            cells,
+            paper: None,
+            correlation,
+            temporal_correlation,
+            frames,
+            exclusions: target.exclusions,
+            reference_distance_m: None,
+            axis_distance_m: plane.depth(0.0, 0.0),
+            infrared: None,
+            picture: self.picture(&shift),
+            notes,
+            digest: [0; 32],
+        })
+    }
+
+    /// The robust plane through the mean of all frames.
+    fn refit(&self, target: &Target) -> Plane {
+        let mut w = vec![f32::NAN; self.bench.sensor.camera.pixels()];
+        let fewest = (self.lagged.frames as u32 / 4).max(1);
+        for (k, &i) in self.pixels.iter().enumerate() {
+            if self.count[k] >= fewest {
+                let mean = self.sum[k] / f64::from(self.count[k]);
+                w[i as usize] = (1.0 / (f64::from(self.expected[k]) + mean)) as f32;
+            }
+        }
+        let floor = 0.1 * self.bench.step(self.plane.q.z.abs());
+        fit_affine_robust(
+            &w,
+            &self.bench.rays,
+            &target.pixels,
+            &self.plane,
+            floor,
+            Effort::AllPixels,
+        )
+        .map_or(self.plane, |fit| fit.plane)
+    }
+
+    /// By how much the expected depth of each pixel rose with the refit, m.
+    fn shift_to(&self, plane: &Plane) -> Vec<f64> {
+        if self.bench.options.planes == Planes::PerFrame {
+            return vec![0.0; self.pixels.len()];
+        }
+        self.pixels
+            .iter()
+            .zip(&self.expected)
+            .map(|(&i, &old)| {
+                let (x, y) = self.bench.rays.at(i as usize);
+                plane.depth(x, y) - f64::from(old)
+            })
+            .collect()
+    }
+
+    fn sums(&self, plane: &Plane, shift: &[f64]) -> Vec<Sums> {
+        (0..self.cut.len()).map(|cell| self.sums_of(cell, plane, shift)).collect()
+    }
+
+    fn sums_of(&self, cell: usize, plane: &Plane, shift: &[f64]) -> Sums {
+        let mut s =
+            Sums { dropouts: self.dropouts[cell], cut: self.beyond[cell], ..Sums::default() };
+        for k in self.cell_range(cell) {
+            let n = f64::from(self.count[k]);
+            if n == 0.0 {
+                continue;
+            }
+            let c = shift[k];
+            let e = self.sum[k] - n * c;
+            let e2 = self.square[k] - 2.0 * c * self.sum[k] + n * c * c;
+            let (x, y) = self.bench.rays.at(self.pixels[k] as usize);
+            let per_axial = perpendicular_per_axial(plane, x, y);
+            s.n += n;
+            s.z += n * (f64::from(self.expected[k]) + c) + e;
+            s.e += e;
+            s.e2 += e2;
+            s.p2 += e2 * per_axial * per_axial;
+            s.pixels += 1.0;
+            if n >= 2.0 {
+                s.within += (self.square[k] - self.sum[k] * self.sum[k] / n).max(0.0);
+                s.within_dof += n - 1.0;
+            }
+        }
+        let f = &self.frames[cell];
+        if f.n > 0.0 && self.lagged.frames > 1 {
+            s.between = (f.mean_square - f.sum * f.sum / f.n).max(0.0);
+        }
+        s
+    }
+
+    fn context(&self, correlation: &Correlation, temporal: Option<f64>) -> Context {
+        let rho = temporal.unwrap_or(0.0).clamp(0.0, 0.95);
+        Context {
+            frames: self.lagged.frames as f64,
+            cut_factor: normal_cut_factor(CUT_SIGMAS),
+            correlation_sum: correlation.sum,
+            correlation_squares: correlation.sum_of_squares,
+            temporal_rho: rho,
+            view_pixels: self.pixels.len() as f64,
+            per_frame_planes: self.bench.options.planes == Planes::PerFrame,
+        }
+    }
+
+    /// Of the first frame's residual, each in units of its cell's standard deviation.
+    fn correlation(&self, first: &Frame, plane: &Plane, sums: &[Sums]) -> Correlation {
+        let camera = &self.bench.sensor.camera;
+        let mut field = vec![f32::NAN; camera.pixels()];
+        for (cell, s) in sums.iter().enumerate() {
+            let per_sigma = 1.0 / (s.e2 / s.n.max(1.0)).sqrt().max(f64::MIN_POSITIVE) as f32;
+            for k in self.cell_range(cell) {
+                let i = self.pixels[k] as usize;
+                let (x, y) = self.bench.rays.at(i);
+                let z = self.bench.table.metres(first.raw[i]);
+                let e = z - plane.depth(x, y) as f32;
+                if e.abs() < self.cut[cell] {
+                    field[i] = e * per_sigma;
+                }
+            }
+        }
+        centre(&mut field);
+        measure_correlation(&field, camera.width)
+    }
+
+    fn picture(&self, shift: &[f64]) -> ResidualPicture {
+        let camera = &self.bench.sensor.camera;
+        let shrink = camera.width.div_ceil(PICTURE_WIDTH).max(1);
+        let (width, height) = (camera.width.div_ceil(shrink), camera.height.div_ceil(shrink));
+        let mut sum = vec![0f64; width * height];
+        let mut n = vec![0f64; width * height];
+        for (k, &i) in self.pixels.iter().enumerate() {
+            let i = i as usize;
+            let at = (i / camera.width / shrink) * width + (i % camera.width) / shrink;
+            let count = f64::from(self.count[k]);
+            sum[at] += self.sum[k] - count * shift[k];
+            n[at] += count;
+        }
+        let millimetres = sum
+            .iter()
+            .zip(&n)
+            .map(|(s, &n)| if n > 0.0 { (1000.0 * s / n) as f32 } else { f32::NAN })
+            .collect();
+        ResidualPicture { width, height, millimetres }
+    }
+}
+
+/// The cells that show the target's noise, their sums as one, and why the others do not.
+fn trusted_cells(sums: &[Sums], context: &Context) -> (Vec<Cell>, Sums, Vec<String>) {
+    let (bins, sums): (Vec<Bin>, Vec<&Sums>) = sums
+        .iter()
+        .filter_map(|s| Some((Bin { cell: context.cell(s)?, mean_m: s.e / s.n }, s)))
+        .unzip();
+    let (mut cells, mut whole, mut notes) = (Vec::new(), Sums::default(), Vec::new());
+    for ((bin, sums), doubt) in bins.iter().zip(sums).zip(doubts(&bins)) {
+        match doubt {
+            Some(why) => notes.push(why),
+            None => {
+                cells.push(bin.cell);
+                whole.merge(sums);
+            }
+        }
+    }
+    (cells, whole, notes)
+}
+
+/// Enough to see a lens's bowl and a firmware's bands; 77 kB a view.
+const PICTURE_WIDTH: usize = 160;
+
+/// Take the mean out: what a frame shares as a whole is not correlation between pixels.
+fn centre(field: &mut [f32]) {
+    let (mut sum, mut n) = (0f64, 0f64);
+    for e in field.iter().filter(|e| e.is_finite()) {
+        sum += f64::from(*e);
+        n += 1.0;
+    }
+    let mean = (sum / n.max(1.0)) as f32;
+    field.iter_mut().for_each(|e| *e -= mean);
+}

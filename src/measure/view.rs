@@ -1,0 +1,192 @@
+//! One view: its frames are read once, in order, and only a handful are held.
+
+use super::paper;
+use super::scan::{HELD_FRAMES, Scan};
+use super::{ViewMeasurement, Workbench};
+use crate::error::{Error, Result};
+use crate::frame::{DepthTable, Frame};
+use crate::io::{FrameSource, InfraredImage};
+use crate::plane::{InverseDepthImage, Target, find_target};
+use crate::view::{FrameRef, View};
+
+/// Measure one view.
+///
+/// # Errors
+/// When no frame can be read or none shows a plane; unreadable frames beside good ones are
+/// named in the notes.
+pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasurement> {
+    let camera = &bench.sensor.camera;
+    let mut source = FrameSource::new(camera.width, camera.height);
+    let mut reader = FrameReader::of(view, &mut source, &bench.table);
+    let held = reader.hold(view)?;
+    let target = target_of(view, bench, &held)?;
+    let mut scan = Scan::begin(bench, &target, &held);
+    for frame in &held {
+        scan.add(frame);
+    }
+    while let Some(frame) = reader.next_readable() {
+        scan.add(&frame);
+    }
+    let mut notes = reader.notes;
+    let paper = paper::measure(view, bench, &target, &held[0], scan.sigma_perpendicular());
+    let infrared = infrared_of(view, &target, bench, &mut notes);
+    notes.extend(target.notes.iter().cloned());
+    let mut result = scan.finish(&target, &held[0]).ok_or_else(|| {
+        failed(
+            view,
+            "the residuals of its plane cannot be measured".into(),
+            "record the view again",
+        )
+    })?;
+    result.name = view.name.clone();
+    result.time_s = view.depth[0].timestamp;
+    result.paper = paper;
+    result.infrared = infrared;
+    result.reference_distance_m = view.notes.reference_distance_m;
+    notes.append(&mut result.notes);
+    result.notes = notes;
+    result.digest = source.digest();
+    Ok(result)
+}
+
+/// The target of one view, from its first frames.
+///
+/// # Errors
+/// As [`measure_view`].
+pub fn view_target(view: &View, bench: &Workbench<'_>) -> Result<Target> {
+    let camera = &bench.sensor.camera;
+    let mut source = FrameSource::new(camera.width, camera.height);
+    let mut reader = FrameReader::of(view, &mut source, &bench.table);
+    let held = reader.hold(view)?;
+    target_of(view, bench, &held)
+}
+
+/// Hands out the frames that can be read; the others are named in the notes.
+struct FrameReader<'r> {
+    frames: std::slice::Iter<'r, FrameRef>,
+    source: &'r mut FrameSource,
+    notes: Vec<String>,
+    table: &'r DepthTable,
+}
+
+fn failed(view: &View, what: String, remedy: &'static str) -> Error {
+    Error::View { view: view.name.clone(), what, remedy }
+}
+
+impl<'r> FrameReader<'r> {
+    fn of(view: &'r View, source: &'r mut FrameSource, table: &'r DepthTable) -> Self {
+        FrameReader { frames: view.depth.iter(), source, notes: Vec::new(), table }
+    }
+
+    /// The first readable frames.
+    fn hold(&mut self, view: &View) -> Result<Vec<Frame>> {
+        let mut held = Vec::new();
+        while held.len() < HELD_FRAMES {
+            let Some(frame) = self.next_readable() else { break };
+            held.push(frame);
+        }
+        if held.is_empty() {
+            let why = self.notes.first().cloned().unwrap_or_else(|| "it has no frame".into());
+            return Err(failed(view, why, "record the view again"));
+        }
+        Ok(held)
+    }
+
+    fn next_readable(&mut self) -> Option<Frame> {
+        while let Some(frame_ref) = self.frames.next() {
+            match self.source.read(&frame_ref.path) {
+                Ok(frame) if self.sees_anything(&frame) => return Some(frame),
+                Ok(_) => self.notes.push(format!(
+                    "frame left out: {}: no pixel carries a depth",
+                    frame_ref.path.display()
+                )),
+                Err(e) => self.notes.push(format!("frame left out: {e}")),
+            }
+        }
+        None
+    }
+
+    fn sees_anything(&self, frame: &Frame) -> bool {
+        frame.raw.iter().any(|&raw| self.table.metres(raw).is_finite())
+    }
+}
+
+fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Target> {
+    let mut w = mean_inverse_depth(held, &bench.table);
+    if bench.ranges {
+        for (i, w) in w.iter_mut().enumerate() {
+            let (x, y) = bench.rays.at(i);
+            *w *= (1.0 + x * x + y * y).sqrt() as f32;
+        }
+    }
+    let image = InverseDepthImage {
+        w: &w,
+        rays: &bench.rays,
+        camera: &bench.sensor.camera,
+        step: &|w| bench.step(w),
+    };
+    let mut rng = bench.options.seed.stream(&format!("target/{}", view.name));
+    find_target(&image, view.notes.region.as_ref(), &mut rng).map_err(|what| {
+        failed(
+            view,
+            what,
+            "give the target's region in view.json (roi or polygon), or record the view again",
+        )
+    })
+}
+
+/// Mean over the frames, where at least half of them measured; 1/m, NaN elsewhere.
+fn mean_inverse_depth(frames: &[Frame], table: &DepthTable) -> Vec<f32> {
+    let n = frames[0].raw.len();
+    let mut sum = vec![0f32; n];
+    let mut count = vec![0u8; n];
+    for frame in frames {
+        for ((s, c), &raw) in sum.iter_mut().zip(&mut count).zip(&frame.raw) {
+            let z = table.metres(raw);
+            if z.is_finite() {
+                *s += 1.0 / z;
+                *c += 1;
+            }
+        }
+    }
+    sum.iter()
+        .zip(&count)
+        .map(
+            |(s, &c)| {
+                if 2 * usize::from(c) >= frames.len() && c > 0 {
+                    s / f32::from(c)
+                } else {
+                    f32::NAN
+                }
+            },
+        )
+        .collect()
+}
+
+/// Mean amplitude over the target in the view's first readable infrared image.
+fn infrared_of(
+    view: &View,
+    target: &Target,
+    bench: &Workbench<'_>,
+    notes: &mut Vec<String>,
+) -> Option<f64> {
+    for frame in &view.infrared {
+        match InfraredImage::read(&frame.path) {
+            Ok(image) if image.amplitude.len() == bench.sensor.camera.pixels() => {
+                let sum: f64 =
+                    target.pixels.iter().map(|&i| f64::from(image.amplitude[i as usize])).sum();
+                return Some(sum / target.pixels.len() as f64);
+            }
+            Ok(image) => notes.push(format!(
+                "infrared left out: {} is {} x {} px, the depth {} x {}",
+                frame.path.display(),
+                image.width,
+                image.height,
+                bench.sensor.camera.width,
+                bench.sensor.camera.height
+            )),
+            Err(e) => notes.push(format!("infrared left out: {e}")),
+        }
+    }
+    None
+}
