@@ -28,9 +28,9 @@ const SLOPE_AROUND: f32 = 0.05;
 /// Neighbours on each side for the normal.
 const AROUND: usize = EDGE;
 /// Of the 25.
-const FEWEST_AROUND: f32 = 8.0;
+const MIN_AROUND: f32 = 8.0;
 /// Surfaces seen at more than 80 degrees are rims and mistakes.
-const LEAST_FACING: f32 = 0.17;
+const MIN_FACING: f32 = 0.17;
 
 impl Blocks {
     /// Of a depth image, m, NaN where nothing was measured.
@@ -47,7 +47,7 @@ impl Blocks {
                         let plane = around.plane(lane)?;
                         let centre = (v * side_px + side_px / 2) * camera.width + side_px / 2;
                         let pixel = centre + (u + lane) * side_px;
-                        point(&means, means.place(u + lane, v), &plane, pixel as u32, noise)
+                        point(&means, means.index(u + lane, v), &plane, pixel as u32, noise)
                     }));
                 }
                 row.truncate(width);
@@ -82,14 +82,13 @@ fn each(of: impl Fn(usize) -> f32) -> [f32; LANES] {
 
 impl Around {
     fn of(means: &Means, u: usize, v: usize) -> Self {
-        let here = means.place(u, v);
+        let here = means.index(u, v);
         let centre = [&means.x, &means.y, &means.q].map(|values| lanes(values, here));
         let (sigma, n) = (lanes(&means.sigma_q, here), lanes(&means.n, here));
-        let mut gate = [0.0; LANES];
-        for lane in 0..LANES {
-            let apart = SIGMAS * sigma[lane] / n[lane].sqrt() + SLOPE_AROUND * centre[2][lane];
-            gate[lane] = if n[lane] > 0.0 { apart } else { -1.0 };
-        }
+        let tolerance = each(|i| {
+            let apart = SIGMAS * sigma[i] / n[i].sqrt() + SLOPE_AROUND * centre[2][i];
+            if n[i] > 0.0 { apart } else { -1.0 }
+        });
         let mut sums = [[0f32; LANES]; 9];
         let mut found = [0f32; LANES];
         for dv in 0..=2 * AROUND {
@@ -98,7 +97,7 @@ impl Around {
                 let (n, x) = (lanes(&means.n, there), lanes(&means.x, there));
                 let (y, q) = (lanes(&means.y, there), lanes(&means.q, there));
                 let q = each(|i| q[i] - centre[2][i]);
-                let n = each(|i| if q[i].abs() <= gate[i] { n[i] } else { 0.0 });
+                let n = each(|i| if q[i].abs() <= tolerance[i] { n[i] } else { 0.0 });
                 let (x, y) = (each(|i| x[i] - centre[0][i]), each(|i| y[i] - centre[1][i]));
                 let (nx, ny) = (each(|i| n[i] * x[i]), each(|i| n[i] * y[i]));
                 found = each(|i| found[i] + if n[i] > 0.0 { 1.0 } else { 0.0 });
@@ -118,7 +117,7 @@ impl Around {
 
     /// (a, b, c) of q = a x + b y + c through the blocks around one.
     fn plane(&self, lane: usize) -> Option<Vector3<f64>> {
-        if self.found[lane] < FEWEST_AROUND {
+        if self.found[lane] < MIN_AROUND {
             return None;
         }
         let [n, x, y, xx, xy, yy, q, xq, yq] = self.sums.map(|sum| f64::from(sum[lane]));
@@ -141,10 +140,10 @@ fn point(
     // n / D of the plane; it looks away from the camera.
     let normal = -plane.try_normalize(f64::MIN_POSITIVE)?.cast::<f32>();
     let facing = -normal.dot(&at) / at.norm();
-    if facing.is_nan() || facing <= LEAST_FACING {
+    if facing.is_nan() || facing <= MIN_FACING {
         return None;
     }
-    let axial = noise.axial(z, &normal);
-    let across = noise.across(axial, &at, &normal, means.n[i]);
-    Some(Point { at, normal, axial, across, pixel })
+    let sigma_axial = noise.sigma_axial(z, &normal);
+    let sigma_normal = noise.sigma_normal(sigma_axial, &at, &normal, means.n[i]);
+    Some(Point { at, normal, sigma_axial, sigma_normal, pixel })
 }
