@@ -113,30 +113,27 @@ fn finish(
     iterations: usize,
     points: usize,
 ) -> Alignment {
-    let Some((equations, solution)) = last else {
-        return Alignment {
-            target_from_source: pose,
-            covariance: Matrix6::from_diagonal_element(f64::INFINITY),
-            iterations,
-            termination,
-            inlier_ratio: 0.0,
-            correspondences: 0,
-            rms_m: f64::INFINITY,
-            degenerate_directions: Vec::new(),
-            min_information: 0.0,
-        };
-    };
-    Alignment {
+    let mut alignment = Alignment {
         target_from_source: pose,
-        covariance: solution.covariance,
+        covariance: Matrix6::from_diagonal_element(f64::INFINITY),
         iterations,
         termination,
-        inlier_ratio: equations.correspondences as f64 / points.max(1) as f64,
-        correspondences: equations.correspondences,
-        rms_m: (equations.squares_m2 / equations.correspondences as f64).sqrt(),
-        degenerate_directions: solution.degenerate_directions,
-        min_information: solution.min_information,
+        inlier_ratio: 0.0,
+        correspondences: 0,
+        rms_m: f64::INFINITY,
+        degenerate_directions: Vec::new(),
+        min_information: 0.0,
+    };
+    if let Some((equations, solution)) = last {
+        let n = equations.correspondences;
+        alignment.covariance = solution.covariance;
+        alignment.inlier_ratio = n as f64 / points.max(1) as f64;
+        alignment.correspondences = n;
+        alignment.rms_m = (equations.squares_m2 / n as f64).sqrt();
+        alignment.degenerate_directions = solution.degenerate_directions;
+        alignment.min_information = solution.min_information;
     }
+    alignment
 }
 
 /// One linearisation.
