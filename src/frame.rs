@@ -142,6 +142,11 @@ impl DepthTable {
     pub fn metres(&self, raw: u16) -> f32 {
         self.metres[usize::from(raw)]
     }
+
+    /// Depth of every pixel, m; NaN where there is no measurement.
+    pub fn depths(&self, frame: &Frame) -> Vec<f32> {
+        frame.raw.iter().map(|&word| self.metres(word)).collect()
+    }
 }
 
 #[cfg(test)]

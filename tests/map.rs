@@ -255,7 +255,7 @@ fn words_for_nothing_make_no_poses() {
         fs::read_dir(folder.join("depth")).unwrap().map(|e| e.unwrap().path()).collect();
     depths.sort();
     for (k, (path, moment)) in depths.iter().zip(&metric.moments).enumerate() {
-        let metric = metric.raw_depth(moment).unwrap();
+        let metric = metric.depth(moment).unwrap();
         let word = |&w: &u16| match w {
             0 => 2047,
             w => ((3.3309 - 5000.0 / f64::from(w)) / 0.003_071_1).round() as u16,

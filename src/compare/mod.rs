@@ -1,16 +1,16 @@
 //! The paper's experiment: four variants of one mapper on one sequence, side by side, with what
 //! goes past the paper below them.
 
-mod tables;
+pub mod tables;
 
-pub use tables::{as_json, tables};
+use nalgebra::Isometry3;
 
 use crate::error::{Error, Result};
 use crate::evaluate::{Delta, Evaluation, evaluate};
 use crate::map::{Init, Kernel, Method, Options, Stages, Weights, map};
 use crate::model::NoiseModel;
 use crate::rng::Seed;
-use crate::sequence::Sequence;
+use crate::sequence::{Moment, Sequence};
 use crate::trajectory::Pose;
 
 /// A way to map, by name.
@@ -39,24 +39,23 @@ pub fn of_the_paper() -> Vec<Variant> {
 
 /// One step after the other from the paper's mapper to the default.
 pub fn past_the_paper() -> Vec<Variant> {
-    let weighted = Options { colour: false, ..Options::paper(Weights::Model, Init::None) };
+    let paper = Options { colour: false, ..Options::paper(Weights::Both, Init::None) };
     let best = Options { colour: false, ..Options::best() };
-    let variant = |name, options| Variant { name, of_the_paper: false, options };
     let frames = Options { method: Method::Projective, ..best };
-    vec![
-        variant("paper + both noises", Options { weights: Weights::Both, ..weighted }),
-        variant(
-            "paper + both noises + Tukey",
-            Options { weights: Weights::Both, kernel: Kernel::Tukey, ..weighted },
-        ),
-        variant("projective, plain", Options { weights: Weights::None, ..frames }),
-        variant("projective", frames),
-        variant("frame to map, plain", Options { weights: Weights::None, ..best }),
-        variant("frame to map, square", Options { kernel: Kernel::Square, ..best }),
-        variant("frame to map, Tukey", Options { kernel: Kernel::Tukey, ..best }),
-        variant("frame to map (default)", best),
-        variant("frame to map, ORB start", Options { init: Init::Orb, ..best }),
+    let variant = |(name, options)| Variant { name, of_the_paper: false, options };
+    [
+        ("paper + both noises", paper),
+        ("paper + both noises + Tukey", Options { kernel: Kernel::Tukey, ..paper }),
+        ("projective, plain", Options { weights: Weights::None, ..frames }),
+        ("projective", frames),
+        ("frame to map, plain", Options { weights: Weights::None, ..best }),
+        ("frame to map, square", Options { kernel: Kernel::Square, ..best }),
+        ("frame to map, Tukey", Options { kernel: Kernel::Tukey, ..best }),
+        ("frame to map (default)", best),
+        ("frame to map, ORB start", Options { init: Init::Orb, ..best }),
     ]
+    .map(variant)
+    .into()
 }
 
 /// One run of a variant.
@@ -92,8 +91,8 @@ pub struct Comparison {
     pub remarks: Vec<String>,
 }
 
-/// Told before each run: the variant's name, runs done, runs in all.
-pub type Told<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
+/// Called before each run: the variant's name, runs done, runs in all.
+pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
 
 /// Run all variants, each `repeats` times with another seed.
 ///
@@ -105,7 +104,7 @@ pub fn compare(
     variants: &[Variant],
     repeats: usize,
     seed: Seed,
-    told: Told<'_>,
+    progress: Progress<'_>,
 ) -> Result<Comparison> {
     let delta = Delta::Seconds(1.0);
     if sequence.truth.is_empty() {
@@ -115,18 +114,15 @@ pub fn compare(
             "a comparison needs groundtruth.txt, or frame-XXXXXX.pose.txt beside each frame",
         ));
     }
-    let nowhere = |m: &crate::sequence::Moment| Pose {
-        stamp: m.stamp,
-        world_from_camera: nalgebra::Isometry3::identity(),
-    };
-    let unmoved: Vec<Pose> = sequence.moments.iter().map(nowhere).collect();
+    let unmoved = |m: &Moment| Pose { stamp: m.stamp, world_from_camera: Isometry3::identity() };
+    let unmoved: Vec<Pose> = sequence.moments.iter().map(unmoved).collect();
     let still = evaluate(&sequence.truth, &unmoved, delta)?;
     let mut rows = Vec::new();
     let total = variants.len() * repeats;
     for (k, variant) in variants.iter().enumerate() {
         let mut row = Row { variant: *variant, runs: Vec::new(), failed: None };
         for repeat in 0..repeats {
-            told(variant.name, k * repeats + repeat, total);
+            progress(variant.name, k * repeats + repeat, total);
             let seed = Seed(seed.0.wrapping_add(repeat as u64));
             match run(sequence, model, &Options { seed, ..variant.options }, delta) {
                 Ok(run) => row.runs.push(run),
@@ -153,13 +149,13 @@ fn run(sequence: &Sequence, model: &NoiseModel, options: &Options, delta: Delta)
     let mapped = map(sequence, model, options, &|_, _| ())?;
     let trajectory = mapped.trajectory();
     let evaluation = evaluate(&sequence.truth, &trajectory, delta)?;
-    let steps: Vec<f64> =
-        mapped.frames.iter().filter(|f| f.iterations > 0).map(|f| f.iterations as f64).collect();
+    let aligned = mapped.frames.iter().filter_map(|f| f.alignment.as_ref());
+    let iterations: Vec<f64> = aligned.map(|a| a.iterations as f64).collect();
     let stages: Vec<Stages> = mapped.frames.iter().map(|f| f.stages.clone()).collect();
     Ok(Run {
         seed: options.seed.0,
         evaluation,
-        iterations: steps.iter().sum::<f64>() / steps.len().max(1) as f64,
+        iterations: iterations.iter().sum::<f64>() / iterations.len().max(1) as f64,
         lost: mapped.lost(),
         frames: mapped.frames.len(),
         stages: Stages::medians(&stages),

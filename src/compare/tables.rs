@@ -2,79 +2,58 @@
 
 use std::fmt::Write;
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::{Comparison, Row, Run};
-use crate::evaluate::Spread;
+use crate::evaluate::{Evaluation, Spread};
 
-/// What a table shows of a run.
-struct Table {
-    title: &'static str,
-    of: fn(&Run) -> Spread,
-    still: fn(&Comparison) -> Spread,
-}
-
-const TABLES: [Table; 3] = [
-    Table {
-        title: "Table III. Absolute trajectory error after alignment (mm)",
-        of: |r| r.evaluation.ate.error.scaled(1e3),
-        still: |c| c.still.ate.error.scaled(1e3),
-    },
-    Table {
-        title: "Table IV. Relative pose error over 1 s, translation (mm)",
-        of: |r| r.evaluation.rpe.translation.scaled(1e3),
-        still: |c| c.still.rpe.translation.scaled(1e3),
-    },
-    Table {
-        title: "Table V. Relative pose error over 1 s, rotation (degrees)",
-        of: |r| r.evaluation.rpe.rotation.scaled(180.0 / std::f64::consts::PI),
-        still: |c| c.still.rpe.rotation.scaled(180.0 / std::f64::consts::PI),
-    },
+/// Title, and what the table shows of an evaluation.
+const TABLES: [(&str, fn(&Evaluation) -> Spread); 3] = [
+    ("Table III. Absolute trajectory error after alignment (mm)", |e| e.ate.error.scaled(1e3)),
+    ("Table IV. Relative pose error over 1 s, translation (mm)", |e| e.rpe.translation.scaled(1e3)),
+    ("Table V. Relative pose error over 1 s, rotation (degrees)", |e| {
+        e.rpe.rotation.scaled(180.0 / std::f64::consts::PI)
+    }),
 ];
 
-const HEAD: [&str; 6] = ["rmse", "mean", "median", "std", "min", "max"];
-
 /// All four, as text; with repeats, means over the runs, and the rmse's standard deviation.
-pub fn tables(comparison: &Comparison) -> String {
+pub fn text(comparison: &Comparison) -> String {
     let mut text = format!("{}\n", comparison.sequence);
-    for table in &TABLES {
-        let _ = writeln!(text, "\n{}\n{}", table.title, header(&HEAD));
-        for row in &comparison.rows {
-            let _ = writeln!(text, "{}", line(row, table.of));
-        }
-        let still = (table.still)(comparison);
-        let _ = writeln!(text, "{:<30}{}", "(a camera that stands still)", figures(&still));
-    }
-    let _ = writeln!(
-        text,
-        "\nTable VI. Work per frame\n{}",
-        header(&["iterations", "ms", "lost", "frames"])
-    );
-    for row in &comparison.rows {
-        let _ = match row.runs.first() {
-            Some(run) => writeln!(
-                text,
-                "{:<30}{:>11.1}{:>11.1}{:>11}{:>11}",
-                row.variant.name,
-                run.iterations,
-                run.stages.total(),
-                run.lost,
-                run.frames
-            ),
-            None => writeln!(text, "{:<30}{}", row.variant.name, why(row)),
-        };
-    }
+    // Writing to a String does not fail.
+    let _ = write_tables(&mut text, comparison);
     text
 }
 
-fn header(columns: &[&str]) -> String {
-    columns.iter().fold(" ".repeat(30), |line, c| format!("{line}{c:>11}"))
+fn write_tables(text: &mut String, comparison: &Comparison) -> std::fmt::Result {
+    for (title, of) in &TABLES {
+        let header = header(["rmse", "mean", "median", "std", "min", "max"]);
+        writeln!(text, "\n{title}\n{header}")?;
+        for row in &comparison.rows {
+            writeln!(text, "{:<30}{}", row.variant.name, spreads(row, *of))?;
+        }
+        let still = figures(&of(&comparison.still));
+        writeln!(text, "{:<30}{still}", "(a camera that stands still)")?;
+    }
+    let header = header(["iterations", "ms", "lost", "frames"]);
+    writeln!(text, "\nTable VI. Work per frame\n{header}")?;
+    for row in &comparison.rows {
+        let work = row.runs.first().map(|run| {
+            let ms = run.stages.total();
+            format!("{:>11.1}{ms:>11.1}{:>11}{:>11}", run.iterations, run.lost, run.frames)
+        });
+        writeln!(text, "{:<30}{}", row.variant.name, work.unwrap_or_else(|| failure(row)))?;
+    }
+    Ok(())
 }
 
-fn line(row: &Row, of: fn(&Run) -> Spread) -> String {
-    let spreads: Vec<Spread> = row.runs.iter().map(of).collect();
+fn header<const N: usize>(columns: [&str; N]) -> String {
+    " ".repeat(30) + &columns.map(|c| format!("{c:>11}")).concat()
+}
+
+fn spreads(row: &Row, of: fn(&Evaluation) -> Spread) -> String {
+    let spreads: Vec<Spread> = row.runs.iter().map(|r| of(&r.evaluation)).collect();
     if spreads.is_empty() {
-        return format!("{:<30}{}", row.variant.name, why(row));
+        return failure(row);
     }
     let n = spreads.len() as f64;
     let mean = |f: fn(&Spread) -> f64| spreads.iter().map(f).sum::<f64>() / n;
@@ -87,44 +66,36 @@ fn line(row: &Row, of: fn(&Run) -> Spread) -> String {
         max: mean(|s| s.max),
         pairs: spreads[0].pairs,
     };
-    let mut text = format!("{:<30}{}", row.variant.name, figures(&middle));
+    let mut text = figures(&middle);
     if spreads.len() > 1 {
         let squares = spreads.iter().map(|s| (s.rmse - middle.rmse).powi(2)).sum::<f64>();
-        let _ =
-            write!(text, "   ± {:.3} over {} runs", (squares / (n - 1.0)).sqrt(), spreads.len());
+        let deviation = (squares / (n - 1.0)).sqrt();
+        text += &format!("   ± {deviation:.3} over {} runs", spreads.len());
     }
     text
 }
 
 fn figures(s: &Spread) -> String {
-    [s.rmse, s.mean, s.median, s.std, s.min, s.max]
-        .iter()
-        .fold(String::new(), |line, v| format!("{line}{v:>11.3}"))
+    [s.rmse, s.mean, s.median, s.std, s.min, s.max].map(|v| format!("{v:>11.3}")).concat()
 }
 
-fn why(row: &Row) -> String {
+fn failure(row: &Row) -> String {
     format!("  no figures: {}", row.failed.as_deref().unwrap_or("it was not run"))
 }
 
 /// Everything with full digits, SI.
-pub fn as_json(comparison: &Comparison) -> Value {
-    let spread = |s: &Spread| {
-        json!({"rmse": s.rmse, "mean": s.mean, "median": s.median, "std": s.std,
-            "min": s.min, "max": s.max, "pairs": s.pairs})
-    };
+pub fn json(comparison: &Comparison) -> Value {
     let run = |r: &Run| {
-        let ms: serde_json::Map<String, Value> =
+        let mut object = Map::new();
+        object.insert("seed".into(), json!(r.seed));
+        object.extend(evaluation(&r.evaluation));
+        object.insert("iterations".into(), json!(r.iterations));
+        object.insert("lost".into(), json!(r.lost));
+        object.insert("frames".into(), json!(r.frames));
+        let ms: Map<String, Value> =
             r.stages.each().map(|(name, ms)| (name.into(), json!(ms))).collect();
-        json!({
-            "seed": r.seed,
-            "ate_m": spread(&r.evaluation.ate.error),
-            "rpe_translation_m": spread(&r.evaluation.rpe.translation),
-            "rpe_rotation_rad": spread(&r.evaluation.rpe.rotation),
-            "iterations": r.iterations,
-            "lost": r.lost,
-            "frames": r.frames,
-            "ms": ms,
-        })
+        object.insert("ms".into(), ms.into());
+        Value::Object(object)
     };
     let row = |r: &Row| {
         json!({
@@ -138,11 +109,20 @@ pub fn as_json(comparison: &Comparison) -> Value {
     json!({
         "sequence": comparison.sequence,
         "rows": comparison.rows.iter().map(row).collect::<Vec<Value>>(),
-        "still": {
-            "ate_m": spread(&comparison.still.ate.error),
-            "rpe_translation_m": spread(&comparison.still.rpe.translation),
-            "rpe_rotation_rad": spread(&comparison.still.rpe.rotation),
-        },
+        "still": evaluation(&comparison.still),
         "remarks": comparison.remarks,
     })
+}
+
+fn evaluation(e: &Evaluation) -> Map<String, Value> {
+    let spread = |s: &Spread| {
+        json!({"rmse": s.rmse, "mean": s.mean, "median": s.median, "std": s.std,
+            "min": s.min, "max": s.max, "pairs": s.pairs})
+    };
+    let figures = [
+        ("ate_m", spread(&e.ate.error)),
+        ("rpe_translation_m", spread(&e.rpe.translation)),
+        ("rpe_rotation_rad", spread(&e.rpe.rotation)),
+    ];
+    figures.map(|(name, value)| (name.to_string(), value)).into_iter().collect()
 }

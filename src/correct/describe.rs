@@ -1,43 +1,41 @@
-//! Saying what the words of a folder mean once they are in another code.
+//! Saying what the raw values of a folder mean once they are in another code.
 
 use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::again::Again;
-use super::recording::Job;
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
 use crate::io::{DESCRIPTION, Layout, pretty_json, write_atomic, write_recording_file};
 use crate::view::Sensor;
 
-impl Again<'_> {
-    /// Say in recording.json what the words mean now; what else it says stays.
-    pub fn describe(&self, jobs: &[Job]) -> Result<()> {
-        let sensor = Sensor { code: self.code, ..self.sensor.clone() };
-        match self.layout {
-            Layout::Images => Ok(()),
-            Layout::Dump => {
-                self.list(jobs)?;
-                write_recording_file(self.output, &sensor)
+/// Say in recording.json of `folder` what the raw values mean now; what else it says stays. `images`
+/// are the stamps and names that a dump's index listed.
+pub(super) fn describe(
+    folder: &Path,
+    layout: Layout,
+    sensor: &Sensor,
+    images: impl Iterator<Item = (f64, PathBuf)>,
+) -> Result<()> {
+    match layout {
+        Layout::Images => Ok(()),
+        Layout::Dump => {
+            let mut list = String::from("# timestamp path\n");
+            for (stamp, file) in images {
+                // Writing to a String does not fail.
+                let _ = writeln!(list, "{stamp:.6} {}", file.display());
             }
-            Layout::Recording | Layout::Sequence => {
-                let path = self.output.join(DESCRIPTION);
-                match std::fs::read_to_string(&path) {
-                    Ok(text) => write_atomic(&path, with_code(&text, &self.code)?.as_bytes()),
-                    Err(_) => write_recording_file(self.output, &sensor),
-                }
+            write_atomic(&folder.join("depth.txt"), list.as_bytes())?;
+            write_recording_file(folder, sensor)
+        }
+        Layout::Recording | Layout::Sequence => {
+            let path = folder.join(DESCRIPTION);
+            match std::fs::read_to_string(&path) {
+                Ok(text) => write_atomic(&path, with_code(&text, &sensor.code)?.as_bytes()),
+                Err(_) => write_recording_file(folder, sensor),
             }
         }
-    }
-
-    fn list(&self, jobs: &[Job]) -> Result<()> {
-        let mut list = String::from("# timestamp path\n");
-        for job in jobs {
-            let _ =
-                writeln!(list, "{:.6} {}", job.timestamp, job.file.with_extension("png").display());
-        }
-        write_atomic(&self.output.join("depth.txt"), list.as_bytes())
     }
 }
 

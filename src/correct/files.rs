@@ -1,13 +1,12 @@
 //! The files of a recording beside its depth images.
 
-use std::collections::HashSet;
 use std::path::{Component, Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::io::{DESCRIPTION, INDEX, write_atomic};
 
 /// Folders in folders: more is a link that leads back to where it stands.
-const DEEPEST: usize = 12;
+const MAX_DEPTH: usize = 12;
 
 /// Every file below `root`, as paths relative to it, in name order.
 pub(super) fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
@@ -20,12 +19,12 @@ pub(super) fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
             let path = folder.join(name);
             if !root.join(&path).is_dir() {
                 files.push(path);
-            } else if depth < DEEPEST {
+            } else if depth < MAX_DEPTH {
                 folders.push((path, depth + 1));
             } else {
                 return Err(Error::recording(
                     &root.join(&path),
-                    format!("more than {DEEPEST} folders deep"),
+                    format!("more than {MAX_DEPTH} folders deep"),
                     "take out the link that leads back into the recording",
                 ));
             }
@@ -97,12 +96,6 @@ pub(super) fn refuse_inside(output: &Path, input: &Path) -> Result<()> {
         ));
     }
     Ok(())
-}
-
-/// Each image once, though several lists or lines may name it.
-pub(super) fn once<T>(items: Vec<(PathBuf, T)>) -> Vec<(PathBuf, T)> {
-    let mut known = HashSet::new();
-    items.into_iter().filter(|(path, _)| known.insert(path.clone())).collect()
 }
 
 #[cfg(test)]

@@ -1,19 +1,24 @@
 //! A whole folder written again with the biases taken out of its depth images.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use super::again::Again;
-use super::files::{inside, once, refuse_inside};
-use super::words::metric;
-use super::{Conditions, Correction};
+use super::correction::{Conditions, Correction};
+use super::describe::describe;
+use super::files::{copy, files_below, inside, make_folder_of, makes_a_recording, refuse_inside};
+use super::raw::{RawCode, metric};
 use crate::Progress;
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, DepthTable, FARTHEST_M, Frame};
-use crate::io::{Assumed, FrameSource, Layout, open_uncut, refuse_full};
+use crate::io::{
+    Assumed, FrameSource, INDEX, Layout, encode_pgm16, encode_png16, open_uncut, refuse_full,
+    write_atomic,
+};
 use crate::model::NoiseModel;
-use crate::view::{Recording, Sensor, View};
+use crate::view::{Recording, Sensor};
 
 /// What was done to a recording.
 #[derive(Debug, Clone)]
@@ -27,24 +32,16 @@ pub struct Corrected {
     pub clamped: usize,
     /// Root mean square over all measured pixels of what was taken out, m.
     pub rms_shift_m: f64,
-    /// How the corrected words become metres.
+    /// How the corrected raw values become metres.
     pub code: DepthCode,
     /// Entries of the model that were not taken out.
     pub ignored: Vec<String>,
-    /// What was odd, in words.
+    /// What was odd, in sentences.
     pub remarks: Vec<String>,
 }
 
-/// A depth image to be written again.
-pub(super) struct Job {
-    /// Relative to the recording.
-    pub file: PathBuf,
-    pub timestamp: f64,
-    pub conditions: Conditions,
-}
-
 /// Write the recording at `root` again into `output`, all its files, `model`'s biases taken out of
-/// the depth. Raw disparities become metric words, finer than the read-out's steps, unless
+/// the depth. Raw disparities become metric values, finer than the read-out's steps, unless
 /// `keep_code`.
 ///
 /// # Errors
@@ -62,55 +59,226 @@ pub fn correct_recording(
     refuse_inside(output, root)?;
     refuse_full(output)?;
     let recording = open_uncut(root, assumed)?;
-    let correction = Correction::of(model, &recording.sensor)?;
-    let jobs = jobs(&recording, root)?;
-    let raw = matches!(recording.sensor.code, DepthCode::Disparity { .. });
-    let code = if raw && !keep_code && !correction.is_identity() {
-        metric(farthest(root, &jobs, &recording.sensor, &correction)?)
-    } else {
-        recording.sensor.code
+    let sensor = &recording.sensor;
+    let images = images(&recording, root)?;
+    let mut rewrite = Rewrite {
+        root,
+        output,
+        layout,
+        sensor,
+        correction: Correction::of(model, sensor)?,
+        table: sensor.code.table(),
+        raw: RawCode::of(sensor.code),
     };
+    let disparity = matches!(sensor.code, DepthCode::Disparity { .. });
+    if disparity && !keep_code && !rewrite.correction.is_identity() {
+        rewrite.raw = RawCode::of(metric(rewrite.max_depth(&images)?));
+    }
     std::fs::create_dir_all(output).map_err(|e| Error::write(output, e))?;
-    let again =
-        Again { root, output, layout, sensor: &recording.sensor, correction: &correction, code };
-    again.write(&jobs, &recording, progress)
+    rewrite.write(&images, &recording, progress)
 }
 
-/// The depth images with what is known of each.
-fn jobs(recording: &Recording, root: &Path) -> Result<Vec<Job>> {
+/// A depth image to be written again.
+struct Image {
+    /// Relative to the recording.
+    file: PathBuf,
+    timestamp: f64,
+    conditions: Conditions,
+}
+
+/// The depth images with what is known of each; each once, though several lists may name it.
+fn images(recording: &Recording, root: &Path) -> Result<Vec<Image>> {
     let frames = || recording.views.iter().flat_map(|v| v.depth.iter().map(move |f| (v, f)));
     let begin = frames().map(|(_, f)| f.timestamp).fold(f64::INFINITY, f64::min);
-    let conditions = |view: &View, timestamp: f64| Conditions {
-        session_s: timestamp - begin,
-        temperature_c: view.notes.temperature_c,
-        ambient_lux: view.notes.ambient_lux,
-    };
-    let listed: Result<Vec<_>> = frames()
-        .map(|(v, f)| Ok((inside(root, &f.path)?, (f.timestamp, conditions(v, f.timestamp)))))
-        .collect();
-    let job = |(file, (timestamp, conditions))| Job { file, timestamp, conditions };
-    Ok(once(listed?).into_iter().map(job).collect())
+    let (mut known, mut images) = (HashSet::new(), Vec::new());
+    for (view, frame) in frames() {
+        let (file, timestamp) = (inside(root, &frame.path)?, frame.timestamp);
+        let conditions = Conditions {
+            session_s: timestamp - begin,
+            temperature_c: view.notes.temperature_c,
+            ambient_lux: view.notes.ambient_lux,
+        };
+        if known.insert(file.clone()) {
+            images.push(Image { file, timestamp, conditions });
+        }
+    }
+    Ok(images)
 }
 
-/// The greatest corrected depth, m.
-fn farthest(root: &Path, jobs: &[Job], sensor: &Sensor, correction: &Correction) -> Result<f64> {
-    let table = sensor.code.table();
-    let of = |job: &Job| -> Result<f64> {
-        // What cannot be read is told when it is to be written.
-        let Ok(frame) = read(root, job, sensor) else { return Ok(0.0) };
-        let mut depth = metres(&frame, &table);
-        correction.apply(&mut depth, &job.conditions)?;
-        Ok(depth.iter().filter(|z| z.is_finite()).fold(0f32, |a, &b| a.max(b)).into())
-    };
-    let each: Result<Vec<f64>> = jobs.par_iter().map(of).collect();
-    Ok(each?.into_iter().fold(0.0, f64::max).min(FARTHEST_M))
+/// The recording on its way into another folder.
+struct Rewrite<'a> {
+    root: &'a Path,
+    output: &'a Path,
+    layout: Layout,
+    sensor: &'a Sensor,
+    correction: Correction,
+    table: DepthTable,
+    /// The code that is written.
+    raw: RawCode,
 }
 
-pub(super) fn read(root: &Path, job: &Job, sensor: &Sensor) -> Result<Frame> {
-    FrameSource::new(sensor.camera.width, sensor.camera.height).read(&root.join(&job.file))
+/// What was done to one image, or why it could not be read.
+#[derive(Default)]
+struct Tally {
+    measured: usize,
+    changed: usize,
+    clamped: usize,
+    square_m2: f64,
+    unread: Option<String>,
 }
 
-/// Depth of every pixel, m; NaN where there is none.
-pub(super) fn metres(frame: &Frame, table: &DepthTable) -> Vec<f32> {
-    frame.raw.iter().map(|&word| table.metres(word)).collect()
+impl Rewrite<'_> {
+    fn write(
+        &self,
+        images: &[Image],
+        recording: &Recording,
+        progress: Progress<'_>,
+    ) -> Result<Corrected> {
+        let others = self.other_files(images)?;
+        let (last, first): (Vec<&PathBuf>, Vec<&PathBuf>) =
+            others.iter().partition(|f| makes_a_recording(f));
+        copy(self.root, self.output, &first)?;
+        let done = AtomicUsize::new(0);
+        let each = |image: &Image| {
+            let tally = self.image(image);
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1, images.len());
+            tally
+        };
+        let tallies: Result<Vec<Tally>> = images.par_iter().map(each).collect();
+        let corrected = self.sum(&tallies?, recording)?;
+        copy(self.root, self.output, &last)?;
+        if self.recodes() {
+            let sensor = Sensor { code: self.raw.code, ..self.sensor.clone() };
+            let listed = images.iter().map(|i| (i.timestamp, i.file.with_extension("png")));
+            describe(self.output, self.layout, &sensor, listed)?;
+        }
+        Ok(corrected)
+    }
+
+    fn recodes(&self) -> bool {
+        self.raw.code != self.sensor.code
+    }
+
+    /// Everything but the depth images; of a dump in another code its index too, for it would say
+    /// that the raw values are a Kinect's.
+    fn other_files(&self, images: &[Image]) -> Result<Vec<PathBuf>> {
+        let images: HashSet<&Path> = images.iter().map(|i| i.file.as_path()).collect();
+        let no_dump = self.recodes() && self.layout == Layout::Dump;
+        let mut files = files_below(self.root)?;
+        let left_out = |f: &Path| images.contains(f) || (no_dump && f == Path::new(INDEX));
+        files.retain(|f| !left_out(f));
+        Ok(files)
+    }
+
+    fn read(&self, image: &Image) -> Result<Frame> {
+        let camera = &self.sensor.camera;
+        FrameSource::new(camera.width, camera.height).read(&self.root.join(&image.file))
+    }
+
+    /// Depth, m, as it was and without its biases.
+    fn depths(&self, frame: &Frame, image: &Image) -> Result<(Vec<f32>, Vec<f32>)> {
+        let before = self.table.depths(frame);
+        let mut after = before.clone();
+        self.correction.apply(&mut after, &image.conditions)?;
+        Ok((before, after))
+    }
+
+    /// The greatest corrected depth, m.
+    fn max_depth(&self, images: &[Image]) -> Result<f64> {
+        let of = |image: &Image| -> Result<f64> {
+            // What cannot be read is remarked on when it is to be written.
+            let Ok(frame) = self.read(image) else { return Ok(0.0) };
+            let (_, depth) = self.depths(&frame, image)?;
+            Ok(depth.iter().filter(|z| z.is_finite()).fold(0f32, |a, &b| a.max(b)).into())
+        };
+        let each: Result<Vec<f64>> = images.par_iter().map(of).collect();
+        Ok(each?.into_iter().fold(0.0, f64::max).min(FARTHEST_M))
+    }
+
+    fn image(&self, image: &Image) -> Result<Tally> {
+        let source = self.root.join(&image.file);
+        let mut target = self.output.join(&image.file);
+        let is_pgm = target.extension().is_some_and(|e| e.eq_ignore_ascii_case("pgm"));
+        // Dumps in another code go on as a described sequence, whose images are PNGs.
+        if is_pgm && self.recodes() {
+            target.set_extension("png");
+        }
+        make_folder_of(&target)?;
+        let stored = || std::fs::read(&source).map_err(|e| Error::read(&source, e));
+        let mut frame = match self.read(image) {
+            Ok(frame) => frame,
+            Err(why) => {
+                write_atomic(&target, &stored()?)?;
+                return Ok(Tally { unread: Some(why.to_string()), ..Tally::default() });
+            }
+        };
+        let (before, after) = self.depths(&frame, image)?;
+        let tally = self.recode(&mut frame, &before, &after);
+        let bytes = match (tally.changed, is_pgm) {
+            (0, _) if !self.recodes() => stored()?,
+            (_, true) if !self.recodes() => encode_pgm16(&frame),
+            _ => encode_png16(&frame)?,
+        };
+        write_atomic(&target, &bytes)?;
+        Ok(tally)
+    }
+
+    /// Store corrected depths; what was no measurement stays none.
+    fn recode(&self, frame: &mut Frame, before: &[f32], after: &[f32]) -> Tally {
+        let mut tally = Tally::default();
+        let none = self.raw.code.raw(f64::NAN);
+        for (raw, (&z, &better)) in frame.raw.iter_mut().zip(before.iter().zip(after)) {
+            let old = *raw;
+            if z.is_nan() {
+                *raw = if self.recodes() { none } else { old };
+                continue;
+            }
+            tally.measured += 1;
+            if z == better && !self.recodes() {
+                continue;
+            }
+            let (nearest, clamped) = self.raw.nearest(better);
+            *raw = nearest;
+            tally.clamped += usize::from(clamped);
+            tally.changed += usize::from(if self.recodes() { better != z } else { nearest != old });
+            // Where no depth is left, the end of the code is what was done.
+            let stored = if better.is_finite() { f64::from(better) } else { self.raw.max_m() };
+            tally.square_m2 += (stored - f64::from(z)).powi(2);
+        }
+        tally
+    }
+
+    fn sum(&self, tallies: &[Tally], recording: &Recording) -> Result<Corrected> {
+        let unread: Vec<&String> = tallies.iter().filter_map(|t| t.unread.as_ref()).collect();
+        if let (Some(first), true) = (unread.first(), unread.len() == tallies.len()) {
+            let what = format!("no depth image can be read; the first: {first}");
+            return Err(Error::recording(self.root, what, "record it again"));
+        }
+        let total = |of: fn(&Tally) -> usize| tallies.iter().map(of).sum::<usize>();
+        let measured = total(|t| t.measured);
+        // In the order of the frames, whichever thread was first.
+        let square: f64 = tallies.iter().map(|t| t.square_m2).sum();
+        let mut remarks = recording.remarks.clone();
+        remarks.extend(self.correction.remarks().iter().cloned());
+        let excluded = recording.excluded.iter();
+        remarks
+            .extend(excluded.map(|e| format!("view {} is copied as it is: {}", e.view, e.reason)));
+        remarks.extend(unread.iter().map(|why| format!("copied as it is: {why}")));
+        // A folder of mere images cannot say that its raw values mean something else now.
+        if let (DepthCode::Metric { units_per_metre, .. }, Layout::Images, true) =
+            (self.raw.code, self.layout, self.recodes())
+        {
+            remarks.push(format!("read the corrected folder with --units-per-metre {units_per_metre}, not --raw-disparity"));
+        }
+        Ok(Corrected {
+            frames: tallies.len() - unread.len(),
+            measured,
+            changed: total(|t| t.changed),
+            clamped: total(|t| t.clamped),
+            rms_shift_m: (square / measured.max(1) as f64).sqrt(),
+            code: self.raw.code,
+            ignored: self.correction.ignored().to_vec(),
+            remarks,
+        })
+    }
 }

@@ -8,16 +8,16 @@ use rayon::prelude::*;
 use crate::model::SigmaModel;
 
 /// Half a window's side, px: 13 x 13 px bring the slope's noise to a fiftieth of a pixel's a px.
-const REACH: usize = 6;
-const SIDE: usize = 2 * REACH + 1;
+const HALF: usize = 6;
+const SIDE: usize = 2 * HALF + 1;
 /// A third of the window must be measured.
-const ENOUGH: f64 = 56.0;
+const MIN_PIXELS: f64 = 56.0;
 /// A corner window is believed over the middle one when its variance is this much less: an F-ratio
 /// that noise over a hundred pixels does not reach.
-const CLEARLY: f64 = 3.0;
+const MIN_F_RATIO: f64 = 3.0;
 /// A pixel farther from the plane than this many of its standard deviations is not of it.
-const OFF_PLANE: f64 = 4.0;
-/// Least variance (px^2) of pixels in a window along its narrower side: not a line of them.
+const MAX_DEVIATIONS: f64 = 4.0;
+/// Variance (px^2) of pixels in a window along its narrower side: not a line of them.
 const MIN_WIDTH: f64 = 1.0;
 
 /// The model's noise of a frontal surface, by disparity: a middle window no noisier than this
@@ -31,7 +31,7 @@ pub(super) struct Noise {
 /// Nearer than 0.4 m no sensor of this kind measures: a Kinect has 109 px there.
 const NODES: usize = 256;
 /// Of the model's variance, to let windows of a little more noise pass.
-const GENEROUS: f64 = 1.5;
+const TOLERANCE: f64 = 1.5;
 
 impl Noise {
     pub fn of(sigma: &SigmaModel, scale_px_m: f64) -> Self {
@@ -39,7 +39,7 @@ impl Noise {
             let d = k.max(1) as f64;
             let z = scale_px_m / d;
             let [low, _] = sigma.domain.theta_rad;
-            GENEROUS * (sigma.axial_sigma(z, low) * d / z).powi(2)
+            TOLERANCE * (sigma.axial_sigma(z, low) * d / z).powi(2)
         };
         Noise { variance: (0..NODES).map(variance).collect() }
     }
@@ -135,7 +135,7 @@ impl Table {
         let fit = |left: usize, above: usize| {
             LocalPlane::of(&self.window(span(u, left, self.width), span(v, above, self.height)))
         };
-        let middle = fit(REACH, REACH);
+        let middle = fit(HALF, HALF);
         if let Some(plane) = middle.filter(|p| noise.passes(d, p.variance)) {
             return plane.slope;
         }
@@ -145,7 +145,7 @@ impl Table {
             .filter_map(|(left, above)| fit(left, above))
             .min_by(|a, b| a.variance.total_cmp(&b.variance));
         let chosen = match (middle, best) {
-            (Some(m), Some(b)) if m.variance > CLEARLY * b.variance => Some(b),
+            (Some(m), Some(b)) if m.variance > MIN_F_RATIO * b.variance => Some(b),
             (Some(m), _) => Some(m),
             (None, b) => b,
         };
@@ -167,7 +167,7 @@ impl LocalPlane {
     /// Least squares.
     fn of(sums: &Sums) -> Option<Self> {
         let n = sums[0];
-        if n < ENOUGH {
+        if n < MIN_PIXELS {
             return None;
         }
         let [u, v, d] = [sums[1] / n, sums[2] / n, sums[6] / n];
@@ -185,7 +185,7 @@ impl LocalPlane {
     fn has(&self, u: f64, v: f64, d: f64) -> bool {
         let [cu, cv, cd] = self.centre;
         let off = d - cd - self.slope[0] * (u - cu) - self.slope[1] * (v - cv);
-        off * off <= OFF_PLANE * OFF_PLANE * self.variance.max(f64::MIN_POSITIVE)
+        off * off <= MAX_DEVIATIONS * MAX_DEVIATIONS * self.variance.max(f64::MIN_POSITIVE)
     }
 }
 

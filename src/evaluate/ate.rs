@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use super::{MAX_APART_S, Spread, too_few};
+use super::spread::{Spread, too_few};
 use crate::error::Result;
 use crate::trajectory::{Pose, associate};
 
@@ -18,7 +18,9 @@ pub struct Ate {
 }
 
 /// Fewer positions determine no rotation.
-const FEWEST: usize = 3;
+const MIN_PAIRS: usize = 3;
+/// Stamps of one moment differ by less, s (the scripts' `max_difference`).
+const MAX_DIFFERENCE_S: f64 = 0.02;
 
 /// Of poses in time order.
 ///
@@ -26,7 +28,7 @@ const FEWEST: usize = 3;
 /// When fewer than three of them belong to the same moments.
 pub fn absolute(truth: &[Pose], estimate: &[Pose]) -> Result<Ate> {
     let stamps = |poses: &[Pose]| poses.iter().map(|p| p.stamp).collect::<Vec<f64>>();
-    let pairs = associate(&stamps(truth), &stamps(estimate), MAX_APART_S);
+    let pairs = associate(&stamps(truth), &stamps(estimate), MAX_DIFFERENCE_S);
     let place = |pose: &Pose| pose.world_from_camera.translation.vector;
     let matched: Vec<(Vector3<f64>, Vector3<f64>)> =
         pairs.iter().map(|p| (place(&truth[p.first]), place(&estimate[p.second]))).collect();
@@ -45,7 +47,7 @@ pub fn absolute(truth: &[Pose], estimate: &[Pose]) -> Result<Ate> {
 /// The rigid motion that brings the second points nearest to the first, in the least squares sense
 /// (Horn 1987; by singular values as in the script). `None` of fewer than three pairs.
 pub fn align(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Isometry3<f64>> {
-    if pairs.len() < FEWEST {
+    if pairs.len() < MIN_PAIRS {
         return None;
     }
     let n = pairs.len() as f64;

@@ -15,11 +15,8 @@ pub use spread::Spread;
 
 use std::path::Path;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::trajectory::{Pose, read_benchmark};
-
-/// Stamps of one moment differ by less, s (the scripts' `max_difference`).
-pub const MAX_APART_S: f64 = 0.02;
 
 /// ATE and RPE of one estimate.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,22 +39,6 @@ pub fn evaluate(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Evalu
 /// When a file cannot be read, or as [`evaluate`].
 pub fn evaluate_files(truth: &Path, estimate: &Path, delta: Delta) -> Result<Evaluation> {
     evaluate(&read_benchmark(truth)?.poses, &read_benchmark(estimate)?.poses, delta)
-}
-
-/// The two trajectories share too few moments.
-fn too_few(truth: &[Pose], estimate: &[Pose], pairs: usize) -> Error {
-    let span = |poses: &[Pose]| match (poses.first(), poses.last()) {
-        (Some(a), Some(b)) => format!("{:.2} to {:.2} s", a.stamp, b.stamp),
-        _ => "nothing".into(),
-    };
-    Error::NotEnough {
-        what: format!(
-            "{pairs} poses of the estimate ({}) have a true one ({}) at their time",
-            span(estimate),
-            span(truth)
-        ),
-        remedy: "give the ground truth of this very sequence, in the same clock".into(),
-    }
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use super::{Spread, too_few};
+use super::spread::{Spread, too_few};
 use crate::error::{Error, Result};
 use crate::stats::median;
 use crate::trajectory::Pose;
@@ -33,7 +33,7 @@ pub fn relative(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Rpe> 
     if truth.len() < 2 || estimate.len() < 2 {
         return Err(too_few(truth, estimate, truth.len().min(estimate.len())));
     }
-    let limit = max_apart(truth);
+    let limit = max_difference(truth);
     let true_pose = |stamp: f64| {
         let nearest = truth[nearest(truth.len(), |i| truth[i].stamp, stamp)];
         ((nearest.stamp - stamp).abs() <= limit).then_some(nearest.world_from_camera)
@@ -88,7 +88,7 @@ fn partner(estimate: &[Pose], i: usize, delta: Delta) -> usize {
 }
 
 /// A true pose farther from a stamp than twice the usual interval is not its pose (a gap), s.
-fn max_apart(truth: &[Pose]) -> f64 {
+fn max_difference(truth: &[Pose]) -> f64 {
     let mut intervals: Vec<f64> = truth.windows(2).map(|w| w[1].stamp - w[0].stamp).collect();
     2.0 * median(&mut intervals)
 }

@@ -1,6 +1,8 @@
-//! What the scripts print of a list of errors.
+//! What the scripts print of a list of errors, or why they cannot.
 
+use crate::error::Error;
 use crate::stats::median;
+use crate::trajectory::Pose;
 
 /// A list of errors in figures, in their unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,5 +50,21 @@ impl Spread {
             max: self.max * factor,
             pairs: self.pairs,
         }
+    }
+}
+
+/// The two trajectories share too few moments.
+pub(super) fn too_few(truth: &[Pose], estimate: &[Pose], pairs: usize) -> Error {
+    let span = |poses: &[Pose]| match (poses.first(), poses.last()) {
+        (Some(a), Some(b)) => format!("{:.2} to {:.2} s", a.stamp, b.stamp),
+        _ => "nothing".into(),
+    };
+    Error::NotEnough {
+        what: format!(
+            "{pairs} poses of the estimate ({}) have a true one ({}) at their time",
+            span(estimate),
+            span(truth)
+        ),
+        remedy: "give the ground truth of this very sequence, in the same clock".into(),
     }
 }

@@ -21,11 +21,11 @@ fn the_scripts_figures_to_the_last_digit() {
     for line in expected.lines().filter(|l| !l.starts_with('#')) {
         let words: Vec<&str> = line.split([' ', '|']).filter(|w| !w.is_empty()).collect();
         let file = |kind: &str| folder.join(format!("{}_{kind}.txt", words[0]));
-        let told = |delta| {
+        let evaluated = |delta| {
             evaluate_files(&file("groundtruth"), &file(words[1]), delta).expect("they overlap")
         };
-        let second = told(Delta::Seconds(1.0));
-        let frame = told(Delta::Frames(1));
+        let second = evaluated(Delta::Seconds(1.0));
+        let frame = evaluated(Delta::Frames(1));
         let figures = |rpe: &Rpe| {
             let degrees = rpe.rotation.rmse.to_degrees();
             format!("{} {:.6} {degrees:.6}", rpe.translation.pairs, rpe.translation.rmse)
@@ -60,10 +60,10 @@ fn a_moved_world_is_no_error() {
         .iter()
         .map(|p| Pose { world_from_camera: elsewhere * p.world_from_camera, ..*p })
         .collect();
-    let told = evaluate(&truth, &moved, Delta::Seconds(1.0)).unwrap();
-    assert!(told.ate.error.max < 1e-12, "{:?}", told.ate.error);
-    assert!(told.rpe.translation.max < 1e-12 && told.rpe.rotation.max < 1e-7);
-    let back = told.ate.truth_from_estimate * elsewhere;
+    let found = evaluate(&truth, &moved, Delta::Seconds(1.0)).unwrap();
+    assert!(found.ate.error.max < 1e-12, "{:?}", found.ate.error);
+    assert!(found.rpe.translation.max < 1e-12 && found.rpe.rotation.max < 1e-7);
+    let back = found.ate.truth_from_estimate * elsewhere;
     assert!(back.translation.vector.norm() < 1e-12 && back.rotation.angle() < 1e-12);
 }
 
@@ -79,15 +79,15 @@ fn a_wrong_scale_is_measured() {
             })
             .collect()
     };
-    let told = evaluate(&straight(1.0), &straight(1.01), Delta::Seconds(1.0)).unwrap();
-    assert!((told.rpe.translation.mean - 0.01).abs() < 1e-12);
-    assert!(told.rpe.rotation.max < 1e-9);
+    let found = evaluate(&straight(1.0), &straight(1.01), Delta::Seconds(1.0)).unwrap();
+    assert!((found.rpe.translation.mean - 0.01).abs() < 1e-12);
+    assert!(found.rpe.rotation.max < 1e-9);
     // Evenly spread over 4 s about the middle: root mean square 0.01 * 4 / sqrt(12), but for ends.
-    assert!((told.ate.error.rmse - 0.01 * 4.0 / 12f64.sqrt()).abs() < 2e-4);
+    assert!((found.ate.error.rmse - 0.01 * 4.0 / 12f64.sqrt()).abs() < 2e-4);
 }
 
 #[test]
-fn no_common_time_is_told() {
+fn no_common_time_is_an_error() {
     let late: Vec<Pose> = path(90).iter().map(|p| Pose { stamp: p.stamp + 100.0, ..*p }).collect();
     for (truth, estimate) in [(path(90), late), (path(90), path(1)), (path(2), path(90))] {
         let said = evaluate(&truth, &estimate, Delta::Seconds(1.0)).unwrap_err().to_string();

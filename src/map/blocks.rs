@@ -47,7 +47,7 @@ impl Blocks {
                         let plane = around.plane(lane)?;
                         let centre = (v * side_px + side_px / 2) * camera.width + side_px / 2;
                         let pixel = centre + (u + lane) * side_px;
-                        point(&means, means.place(u + lane, v), &plane, pixel as u32, noise)
+                        point(&means, means.index(u + lane, v), &plane, pixel as u32, noise)
                     }));
                 }
                 row.truncate(width);
@@ -82,14 +82,13 @@ fn each(of: impl Fn(usize) -> f32) -> [f32; LANES] {
 
 impl Around {
     fn of(means: &Means, u: usize, v: usize) -> Self {
-        let here = means.place(u, v);
+        let here = means.index(u, v);
         let centre = [&means.x, &means.y, &means.q].map(|values| lanes(values, here));
         let (sigma, n) = (lanes(&means.sigma_q, here), lanes(&means.n, here));
-        let mut gate = [0.0; LANES];
-        for lane in 0..LANES {
-            let apart = SIGMAS * sigma[lane] / n[lane].sqrt() + SLOPE_AROUND * centre[2][lane];
-            gate[lane] = if n[lane] > 0.0 { apart } else { -1.0 };
-        }
+        let tolerance = each(|i| {
+            let apart = SIGMAS * sigma[i] / n[i].sqrt() + SLOPE_AROUND * centre[2][i];
+            if n[i] > 0.0 { apart } else { -1.0 }
+        });
         let mut sums = [[0f32; LANES]; 9];
         let mut found = [0f32; LANES];
         for dv in 0..=2 * AROUND {
@@ -98,7 +97,7 @@ impl Around {
                 let (n, x) = (lanes(&means.n, there), lanes(&means.x, there));
                 let (y, q) = (lanes(&means.y, there), lanes(&means.q, there));
                 let q = each(|i| q[i] - centre[2][i]);
-                let n = each(|i| if q[i].abs() <= gate[i] { n[i] } else { 0.0 });
+                let n = each(|i| if q[i].abs() <= tolerance[i] { n[i] } else { 0.0 });
                 let (x, y) = (each(|i| x[i] - centre[0][i]), each(|i| y[i] - centre[1][i]));
                 let (nx, ny) = (each(|i| n[i] * x[i]), each(|i| n[i] * y[i]));
                 found = each(|i| found[i] + if n[i] > 0.0 { 1.0 } else { 0.0 });
@@ -144,7 +143,7 @@ fn point(
     if facing.is_nan() || facing <= MIN_FACING {
         return None;
     }
-    let axial = noise.axial(z, &normal);
-    let across = noise.across(axial, &at, &normal, means.n[i]);
-    Some(Point { at, normal, axial, across, pixel })
+    let sigma_axial = noise.sigma_axial(z, &normal);
+    let sigma_normal = noise.sigma_normal(sigma_axial, &at, &normal, means.n[i]);
+    Some(Point { at, normal, sigma_axial, sigma_normal, pixel })
 }

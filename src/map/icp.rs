@@ -1,69 +1,34 @@
-//! Point-to-plane ICP, linearised for small angles. The loop is written once; what is a neighbour
-//! ([`Target`]), what a pair weighs ([`Weights`]) and how outliers fare ([`Kernel`]) are slots.
+//! Point-to-plane ICP, linearised for small angles (Chen and Medioni 1992). The loop is written once;
+//! what is a neighbour ([`Target`]), what a correspondence weighs ([`Weights`]) and how outliers fare
+//! ([`Kernel`]) are slots.
 //!
 //! ```text
-//! cost(M) = sum (((M s - d) . n) w)^2        s moves, d and its normal n stand
+//! cost(M) = sum (((M s - d) . n) w)^2        s of the source moves, d and its normal n stand
 //! ```
 
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use super::direction::Direction;
-use super::motion::Motion;
-use super::point::Point;
-use super::sums::{Solution, Sums};
+use super::normal_equations::{Direction, NormalEquations, Solution};
+use super::options::{Kernel, Options, Weights};
+use super::point::{Motion, Point};
 
 /// Something to align to.
 pub trait Target: Sync {
     /// What a search leaves behind for the next search of the same point.
-    type Memory: Default + Clone + Send;
+    type Cache: Default + Clone + Send;
     /// The neighbour of a place, in the target's frame.
-    fn find(&self, p: &Vector3<f32>, memory: &mut Self::Memory) -> Option<&Point>;
-}
-
-/// What a pair weighs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Weights {
-    /// All the same.
-    None,
-    /// The paper's: 1 / sigma(d_z, theta) of the standing point.
-    Model,
-    /// One over what both points err by together, across the surface, averaged as they are.
-    Both,
-}
-
-/// How residuals far beyond the usual count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kernel {
-    /// As any other.
-    Square,
-    /// With their size, not its square.
-    Huber,
-    /// Less and less, then not at all.
-    Tukey,
-}
-
-/// What to do and when to stop.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Criteria {
-    pub weights: Weights,
-    pub kernel: Kernel,
-    pub max_iterations: usize,
-    /// A step smaller than both ends it: m and rad.
-    pub min_shift_m: f64,
-    pub min_turn_rad: f64,
-    /// Surfaces that lean more to each other are not one: least cosine of their normals.
-    pub min_cosine: f64,
+    fn find(&self, p: &Vector3<f32>, cache: &mut Self::Cache) -> Option<&Point>;
 }
 
 /// Why the loop ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ending {
+pub enum Termination {
     /// The step fell below both thresholds.
-    Settled,
-    MostIterations,
+    Converged,
+    MaxIterations,
     /// Too few points have a neighbour.
-    TooFewPairs,
+    TooFewCorrespondences,
 }
 
 /// Where the moving points are in the target's frame, and how well that is known.
@@ -73,20 +38,20 @@ pub struct Alignment {
     /// Of (shift, turn) about the target's origin, m and rad, its errors taken as independent.
     pub covariance: Matrix6<f64>,
     pub iterations: usize,
-    pub ending: Ending,
+    pub termination: Termination,
     /// Share of the moving points that have a neighbour.
-    pub matched: f64,
-    pub pairs: usize,
-    /// Root mean square of the distances across the surface, m.
+    pub inlier_ratio: f64,
+    pub correspondences: usize,
+    /// Root mean square of the distances along the normals, m.
     pub rms_m: f64,
-    /// Motions that the pairs do not determine; along them the start was kept.
-    pub undetermined: Vec<Direction>,
+    /// Motions that the correspondences do not determine; along them the start was kept.
+    pub degenerate_directions: Vec<Direction>,
     /// The least determined motion's share of what the best has: 0 is none at all.
-    pub weakest: f64,
+    pub min_information: f64,
 }
 
-/// Fewer pairs say nothing about six numbers under noise.
-const MIN_PAIRS: usize = 50;
+/// Fewer say nothing about six numbers under noise.
+const MIN_CORRESPONDENCES: usize = 50;
 /// Points a task: sums are added in this order whatever the number of threads.
 const CHUNK: usize = 2048;
 
@@ -95,38 +60,38 @@ pub fn align<T: Target>(
     source: &[Point],
     target: &T,
     start: Isometry3<f64>,
-    criteria: &Criteria,
+    options: &Options,
 ) -> Alignment {
     let mut pose = start;
-    let mut memory = vec![T::Memory::default(); source.len()];
+    let mut cache = vec![T::Cache::default(); source.len()];
     let mut scale = f64::INFINITY;
     let mut last = None;
-    let mut ending = Ending::MostIterations;
+    let mut termination = Termination::MaxIterations;
     let mut iterations = 0;
-    while iterations < criteria.max_iterations {
-        let sums = Round { target, criteria, pose: &pose, scale }.sum(source, &mut memory);
+    while iterations < options.max_iterations {
+        let equations = Round { target, options, pose: &pose, scale }.sum(source, &mut cache);
         iterations += 1;
-        let enough = sums.pairs >= MIN_PAIRS;
-        let Some(solution) = enough.then(|| sums.solve()).flatten() else {
-            ending = Ending::TooFewPairs;
+        let enough = equations.correspondences >= MIN_CORRESPONDENCES;
+        let Some(solution) = enough.then(|| equations.solve()).flatten() else {
+            termination = Termination::TooFewCorrespondences;
             last = None;
             break;
         };
         // The first round's residuals hold the motion itself: only from the second on is what
         // stands out an outlier.
-        if criteria.kernel != Kernel::Square {
-            scale = sums.typical();
+        if options.kernel != Kernel::Square {
+            scale = equations.robust_sigma();
         }
         let step = solution.step;
         pose = renormalised(&(moved(&step) * pose));
         let (shift, turn) = (step.fixed_rows::<3>(0).norm(), step.fixed_rows::<3>(3).norm());
-        last = Some((sums, solution));
-        if shift < criteria.min_shift_m && turn < criteria.min_turn_rad {
-            ending = Ending::Settled;
+        last = Some((equations, solution));
+        if shift < options.min_shift_m && turn < options.min_turn_rad {
+            termination = Termination::Converged;
             break;
         }
     }
-    finish(pose, last, ending, iterations, source.len())
+    finish(pose, last, termination, iterations, source.len())
 }
 
 /// exp of a small motion: shift and turn about the target's origin.
@@ -143,81 +108,82 @@ pub fn renormalised(pose: &Isometry3<f64>) -> Isometry3<f64> {
 
 fn finish(
     pose: Isometry3<f64>,
-    last: Option<(Sums, Solution)>,
-    ending: Ending,
+    last: Option<(NormalEquations, Solution)>,
+    termination: Termination,
     iterations: usize,
     points: usize,
 ) -> Alignment {
-    let Some((sums, solution)) = last else {
-        return Alignment {
-            target_from_source: pose,
-            covariance: Matrix6::from_diagonal_element(f64::INFINITY),
-            iterations,
-            ending,
-            matched: 0.0,
-            pairs: 0,
-            rms_m: f64::INFINITY,
-            undetermined: Vec::new(),
-            weakest: 0.0,
-        };
-    };
-    Alignment {
+    let mut alignment = Alignment {
         target_from_source: pose,
-        covariance: solution.covariance,
+        covariance: Matrix6::from_diagonal_element(f64::INFINITY),
         iterations,
-        ending,
-        matched: sums.pairs as f64 / points.max(1) as f64,
-        pairs: sums.pairs,
-        rms_m: (sums.squares_m2 / sums.pairs as f64).sqrt(),
-        undetermined: solution.undetermined,
-        weakest: solution.weakest,
+        termination,
+        inlier_ratio: 0.0,
+        correspondences: 0,
+        rms_m: f64::INFINITY,
+        degenerate_directions: Vec::new(),
+        min_information: 0.0,
+    };
+    if let Some((equations, solution)) = last {
+        let n = equations.correspondences;
+        alignment.covariance = solution.covariance;
+        alignment.inlier_ratio = n as f64 / points.max(1) as f64;
+        alignment.correspondences = n;
+        alignment.rms_m = (equations.squares_m2 / n as f64).sqrt();
+        alignment.degenerate_directions = solution.degenerate_directions;
+        alignment.min_information = solution.min_information;
     }
+    alignment
 }
 
 /// One linearisation.
 struct Round<'a, T> {
     target: &'a T,
-    criteria: &'a Criteria,
+    options: &'a Options,
     pose: &'a Isometry3<f64>,
     /// Of weighted residuals that are no outliers.
     scale: f64,
 }
 
 impl<T: Target> Round<'_, T> {
-    fn sum(&self, source: &[Point], memory: &mut [T::Memory]) -> Sums {
+    fn sum(&self, source: &[Point], cache: &mut [T::Cache]) -> NormalEquations {
         let motion = Motion::of(self.pose);
-        let any_normal = self.criteria.min_cosine <= -1.0;
-        let keep_sizes = self.criteria.kernel != Kernel::Square;
-        let part = |(points, memory): (&[Point], &mut [T::Memory])| {
-            let mut sums = Sums::with_room(if keep_sizes { points.len() } else { 0 });
-            for (s, memory) in points.iter().zip(memory) {
+        let any_normal = self.options.min_cosine <= -1.0;
+        let keep_sizes = self.options.kernel != Kernel::Square;
+        let part = |(points, cache): (&[Point], &mut [T::Cache])| {
+            let mut equations =
+                NormalEquations::with_room(if keep_sizes { points.len() } else { 0 });
+            for (s, cache) in points.iter().zip(cache) {
                 let at = motion.moved(&s.at);
-                let Some(d) = self.target.find(&at, memory) else { continue };
+                let Some(d) = self.target.find(&at, cache) else { continue };
                 let lean = || f64::from(motion.turned(&s.normal).dot(&d.normal));
-                if !any_normal && lean() < self.criteria.min_cosine {
+                if !any_normal && lean() < self.options.min_cosine {
                     continue;
                 }
                 let residual = f64::from((at - d.at).dot(&d.normal));
                 let weight = self.weight(s, d);
                 let kept = self.kept(residual * weight);
-                sums.add(&at, &d.normal, residual, weight * weight * kept);
+                equations.add(&at, &d.normal, residual, weight * weight * kept);
                 if keep_sizes {
-                    sums.sizes.push((residual * weight).abs() as f32);
+                    equations.sizes.push((residual * weight).abs() as f32);
                 }
             }
-            sums
+            equations
         };
-        let parts: Vec<Sums> =
-            source.par_chunks(CHUNK).zip(memory.par_chunks_mut(CHUNK)).map(part).collect();
-        parts.into_iter().fold(Sums::default(), Sums::plus)
+        let parts: Vec<NormalEquations> =
+            source.par_chunks(CHUNK).zip(cache.par_chunks_mut(CHUNK)).map(part).collect();
+        parts.into_iter().fold(NormalEquations::default(), NormalEquations::plus)
     }
 
     #[inline]
     fn weight(&self, s: &Point, d: &Point) -> f64 {
-        match self.criteria.weights {
+        match self.options.weights {
             Weights::None => 1.0,
-            Weights::Model => 1.0 / f64::from(d.axial),
-            Weights::Both => 1.0 / f64::from((s.across * s.across + d.across * d.across).sqrt()),
+            Weights::Model => 1.0 / f64::from(d.sigma_axial),
+            Weights::Both => {
+                let (s, d) = (s.sigma_normal, d.sigma_normal);
+                1.0 / f64::from((s * s + d * d).sqrt())
+            }
         }
     }
 
@@ -225,7 +191,7 @@ impl<T: Target> Round<'_, T> {
     #[inline]
     fn kept(&self, weighted: f64) -> f64 {
         let size = (weighted / self.scale).abs();
-        match self.criteria.kernel {
+        match self.options.kernel {
             Kernel::Square => 1.0,
             Kernel::Huber => (HUBER / size).min(1.0),
             Kernel::Tukey if size < TUKEY => (1.0 - (size / TUKEY).powi(2)).powi(2),

@@ -11,7 +11,7 @@ pub const EDGE: usize = 2;
 pub const LANES: usize = 4;
 
 /// One number a block, in rows of `stride` with an empty edge; zero where there is nothing.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Means {
     pub width: usize,
     pub height: usize,
@@ -56,10 +56,9 @@ impl Means {
         let (width, height) = (columns / side, rows / side);
         let stride = width.next_multiple_of(LANES) + 2 * EDGE;
         let size = stride * (height + 2 * EDGE);
-        let mut means = Means { width, height, stride, ..Means::default() };
         let picture = Picture { depth, columns, rays, side, noise };
         let found: Vec<Vec<Mean>> = (0..height).into_par_iter().map(|v| picture.row(v)).collect();
-        let laid = |of: fn(&Mean) -> f32| {
+        let laid_out = |of: fn(&Mean) -> f32| {
             let mut plane = vec![0.0; size];
             for (v, row) in found.iter().enumerate() {
                 let begin = (v + EDGE) * stride + EDGE;
@@ -69,17 +68,21 @@ impl Means {
             }
             plane
         };
-        means.n = laid(|m| m.n);
-        means.x = laid(|m| m.x);
-        means.y = laid(|m| m.y);
-        means.q = laid(|m| m.q);
-        means.sigma_q = laid(|m| m.sigma_q);
-        means
+        Means {
+            width,
+            height,
+            stride,
+            n: laid_out(|m| m.n),
+            x: laid_out(|m| m.x),
+            y: laid_out(|m| m.y),
+            q: laid_out(|m| m.q),
+            sigma_q: laid_out(|m| m.sigma_q),
+        }
     }
 
     /// Where a block's numbers are.
     #[inline]
-    pub fn place(&self, u: usize, v: usize) -> usize {
+    pub fn index(&self, u: usize, v: usize) -> usize {
         (v + EDGE) * self.stride + u + EDGE
     }
 }
@@ -146,15 +149,15 @@ impl Picture<'_> {
     fn mean(&self, columns: &Columns, [u, v]: [usize; 2], scratch: &mut Vec<f32>) -> Mean {
         let of = |values: &[f32]| values[u * self.side..(u + 1) * self.side].iter().sum::<f32>();
         let n = of(&columns.n);
-        if n < self.fewest() {
+        if n < self.min_pixels() {
             return Mean::default();
         }
         let range = u * self.side..(u + 1) * self.side;
         let low = columns.low[range.clone()].iter().fold(f32::INFINITY, |l, &q| l.min(q));
         let high = columns.high[range].iter().fold(0.0f32, |h, &q| h.max(q));
-        let (sigma_q, gate) = self.gate(0.5 * (low + high));
+        let (sigma_q, tolerance) = self.tolerance(0.5 * (low + high));
         // Mostly all is one surface.
-        if high - low <= gate {
+        if high - low <= tolerance {
             let [x, y, q] = [&columns.x, &columns.y, &columns.q].map(|values| of(values) / n);
             return Mean { n, x, y, q, sigma_q };
         }
@@ -175,30 +178,30 @@ impl Picture<'_> {
         scratch.extend(pixels().map(|(_, q)| q).filter(|q| *q > 0.0));
         let half = scratch.len() / 2;
         let middle = *scratch.select_nth_unstable_by(half, f32::total_cmp).1;
-        let (sigma_q, gate) = self.gate(middle);
+        let (sigma_q, tolerance) = self.tolerance(middle);
         let mut sum = Mean { sigma_q, ..Mean::default() };
         for (i, q) in pixels() {
-            if (q - middle).abs() < gate {
+            if (q - middle).abs() < tolerance {
                 sum.n += 1.0;
                 sum.x += self.rays.x[i];
                 sum.y += self.rays.y[i];
                 sum.q += q;
             }
         }
-        if sum.n < self.fewest() {
+        if sum.n < self.min_pixels() {
             return Mean::default();
         }
         let n = sum.n;
         Mean { n, x: sum.x / n, y: sum.y / n, q: sum.q / n, sigma_q }
     }
 
-    fn fewest(&self) -> f32 {
+    fn min_pixels(&self) -> f32 {
         MIN_FILLED * (self.side * self.side) as f32
     }
 
     /// Sigma of one inverse depth, and how far others of its surface may be from it, 1/m.
-    fn gate(&self, q: f32) -> (f32, f32) {
-        let sigma_q = self.noise.frontal(1.0 / q) * q * q;
+    fn tolerance(&self, q: f32) -> (f32, f32) {
+        let sigma_q = self.noise.sigma_frontal(1.0 / q) * q * q;
         (sigma_q, SIGMAS * sigma_q + SLOPE * q)
     }
 }

@@ -1,49 +1,40 @@
 //! The mapper: where the camera was and what it saw, from depth images and a noise model.
 //!
 //! ```text
-//! Sequence -prepare-> points with normals and sigmas -start-> -align-> pose -fuse-> map
+//! Sequence -preprocess-> points with normals and sigmas -start-> -align-> pose -fuse-> map
 //! ```
 //! Three methods share the loop ([`icp`]): the paper's ([`Method::Paper`]), neighbours by projection
 //! ([`Method::Projective`]), and alignment to the map so far ([`Method::Model`]).
 
 mod blocks;
-mod cells;
-mod direction;
-#[cfg_attr(feature = "opencv", path = "orb.rs")]
-#[cfg_attr(not(feature = "opencv"), path = "no_orb.rs")]
-mod features;
-mod grid_map;
+mod frame_report;
 pub mod icp;
+mod index_map;
+mod map_points;
 mod means;
-mod motion;
 mod nearest;
 mod noise;
-mod normals;
+mod normal_equations;
 mod options;
-mod ply;
+#[cfg_attr(not(feature = "opencv"), path = "no_orb.rs")]
+mod orb;
 mod point;
-mod prepare;
-mod projective;
-pub mod rigid;
-mod stages;
-mod sums;
+mod preprocess;
+pub mod ransac;
+mod sparse_grid;
 mod surfels;
-mod tell;
 mod tracker;
 mod voxel;
 
-pub use direction::Direction;
-pub use grid_map::MapPoint;
-pub use icp::{Alignment, Criteria, Ending, Kernel, Weights};
+pub use frame_report::{Fate, FrameReport, Stages, frames_csv};
+pub use icp::{Alignment, Termination};
+pub use map_points::{MapPoint, ply};
 pub use nearest::Nearest;
-pub use options::{Init, Method, Options};
-pub use ply::ply;
+pub use normal_equations::Direction;
+pub use options::{Init, Kernel, Method, Options, Weights};
 pub use point::Point;
-pub use stages::Stages;
-pub use tell::{frames_csv, remarks};
-pub use tracker::{Fate, FrameReport};
 
-use prepare::Kitchen;
+use preprocess::Preprocessor;
 use tracker::Tracker;
 
 use crate::Progress;
@@ -58,7 +49,7 @@ pub struct Mapped {
     /// One a depth image, in time order.
     pub frames: Vec<FrameReport>,
     pub map: Vec<MapPoint>,
-    /// What was odd, in words.
+    /// What was odd, in sentences.
     pub remarks: Vec<String>,
 }
 
@@ -85,42 +76,34 @@ pub fn map(
     options: &Options,
     progress: Progress<'_>,
 ) -> Result<Mapped> {
-    let kitchen = Kitchen::new(sequence, model, options)?;
-    let mut tracker = Tracker::new(&kitchen);
-    let mut remarks = kitchen.remarks();
-    let mut frames: Vec<FrameReport> = Vec::with_capacity(sequence.moments.len());
-    let total = sequence.moments.len();
-    let mut next = sequence.moments.first().map(|m| kitchen.prepare(m));
-    for (k, moment) in sequence.moments.iter().enumerate() {
+    let preprocessor = Preprocessor::new(sequence, model, options)?;
+    let mut tracker = Tracker::new(&preprocessor);
+    let moments = &sequence.moments;
+    let mut frames: Vec<FrameReport> = Vec::with_capacity(moments.len());
+    let prepare = |k: usize| moments.get(k).map(|m| preprocessor.prepare(m));
+    let mut next = prepare(0);
+    for (k, moment) in moments.iter().enumerate() {
         let Some(frame) = next.take() else { break };
         // The next frame is read while this one is aligned.
-        let take = || match frame {
-            Ok(mut frame) => {
-                let remark = frame.remark.take();
-                tracker.take(moment.stamp, frame).map(|report| (report, remark))
-            }
-            Err(e @ Error::Argument { .. }) => Err(e),
-            Err(e) => Ok((FrameReport::unread(moment.stamp, e.to_string()), None)),
-        };
-        let following = || sequence.moments.get(k + 1).map(|m| kitchen.prepare(m));
-        let (taken, prepared) = rayon::join(take, following);
-        let (report, remark) = taken?;
-        remarks.extend(remark);
-        frames.push(report);
+        let (report, prepared) =
+            rayon::join(|| tracker.track(moment.stamp, frame), || prepare(k + 1));
+        frames.push(report?);
         next = prepared;
-        progress(k + 1, total);
+        progress(k + 1, moments.len());
     }
-    remarks.extend(tell::remarks(&frames));
+    let mut remarks = preprocessor.remarks().to_vec();
+    remarks.extend(frames.iter().filter_map(|f| f.remark.clone()));
+    remarks.extend(frame_report::remarks(&frames));
     let mapped = Mapped { frames, map: tracker.into_map(), remarks };
     if mapped.trajectory().len() < 2 {
-        return Err(nothing(sequence, &mapped));
+        return Err(no_map(sequence, &mapped));
     }
     Ok(mapped)
 }
 
-fn nothing(sequence: &Sequence, mapped: &Mapped) -> Error {
+fn no_map(sequence: &Sequence, mapped: &Mapped) -> Error {
     let why = mapped.frames.iter().find_map(|f| match &f.fate {
-        Fate::Lost(why) => Some(why.clone()),
+        Fate::Lost(why) => Some(format!(" ({why})")),
         _ => None,
     });
     Error::recording(
@@ -128,7 +111,7 @@ fn nothing(sequence: &Sequence, mapped: &Mapped) -> Error {
         format!(
             "of {} depth images none follows another{}",
             mapped.frames.len(),
-            why.map(|w| format!(" ({w})")).unwrap_or_default()
+            why.unwrap_or_default()
         ),
         "a sequence to map needs two overlapping depth images or more",
     )

@@ -1,6 +1,7 @@
 //! What stands in for OpenCV's features in a build without them.
 
-use super::rigid::Agreed;
+use nalgebra::Isometry3;
+
 use crate::camera::Rays;
 use crate::error::{Error, Result};
 use crate::io::ColourImage;
@@ -22,7 +23,7 @@ impl Features {
 
     /// # Errors
     /// Never.
-    pub fn motion_to(&self, _: &Features, _: &mut Stream) -> Result<Option<Agreed>> {
+    pub fn motion_to(&self, _: &Features, _: &mut Stream) -> Result<Option<Isometry3<f64>>> {
         Ok(None)
     }
 }

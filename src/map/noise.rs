@@ -9,10 +9,10 @@ use crate::simulate::sigma_table::SigmaTable;
 #[derive(Debug, Clone)]
 pub struct Noise {
     table: SigmaTable,
-    /// The farthest depth that the model was measured at, m.
-    farthest: f32,
+    /// The greatest depth that the model was measured at, m.
+    max_depth_m: f32,
     /// Pixels that err together: the area of the window that neighbours share, px^2.
-    together: f32,
+    correlated_px2: f32,
 }
 
 /// The effect of the catalogue that says how far neighbours err together, and its parameter.
@@ -29,8 +29,8 @@ impl Noise {
         let length = entry.and_then(length).unwrap_or(1.0) as f32;
         Noise {
             table: SigmaTable::of(&model.sigma),
-            farthest: model.sigma.domain.z_m[1] as f32,
-            together: length * length,
+            max_depth_m: model.sigma.domain.z_m[1] as f32,
+            correlated_px2: length * length,
         }
     }
 
@@ -38,24 +38,30 @@ impl Noise {
     ///
     /// Beyond the depths of the model sigma grows as z^2, as it does for every sensor that measures
     /// disparity: held at its edge it would make the farthest points the best.
-    pub fn axial(&self, z: f32, normal: &Vector3<f32>) -> f32 {
+    pub fn sigma_axial(&self, z: f32, normal: &Vector3<f32>) -> f32 {
         self.at(z, normal.z.abs().min(1.0).acos())
     }
 
     /// The same of a surface that is faced squarely.
-    pub fn frontal(&self, z: f32) -> f32 {
+    pub fn sigma_frontal(&self, z: f32) -> f32 {
         self.at(z, 0.0)
     }
 
     fn at(&self, z: f32, theta: f32) -> f32 {
-        let beyond = (z / self.farthest).max(1.0);
+        let beyond = (z / self.max_depth_m).max(1.0);
         self.table.at(z, theta) * beyond * beyond
     }
 
-    /// Sigma, m, of the mean of `n` pixels across their surface: an error of depth moves a point
-    /// along its ray, and of that the normal's part counts.
-    pub fn across(&self, axial: f32, at: &Vector3<f32>, normal: &Vector3<f32>, n: f32) -> f32 {
+    /// Sigma, m, of the mean of `n` pixels along their normal: an error of depth moves a point along
+    /// its ray, and of that the normal's part counts.
+    pub fn sigma_normal(
+        &self,
+        sigma_axial: f32,
+        at: &Vector3<f32>,
+        normal: &Vector3<f32>,
+        n: f32,
+    ) -> f32 {
         let part = (at.dot(normal) / at.z).abs();
-        axial * part / (n / self.together).max(1.0).sqrt()
+        sigma_axial * part / (n / self.correlated_px2).max(1.0).sqrt()
     }
 }

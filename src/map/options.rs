@@ -1,6 +1,5 @@
-//! What `kinoise map` can be told; the paper's Table II where it has a say.
+//! The mapper's settings; the paper's Table II where it gives one.
 
-use super::icp::{Criteria, Kernel, Weights};
 use crate::error::{Error, Result};
 use crate::rng::Seed;
 
@@ -27,6 +26,28 @@ pub enum Init {
     Orb,
 }
 
+/// What a correspondence weighs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Weights {
+    /// All the same.
+    None,
+    /// The paper's: 1 / sigma(d_z, theta) of the target's point.
+    Model,
+    /// One over the joint standard deviation of both points along the normal, averaged as they are.
+    Both,
+}
+
+/// How residuals far beyond the usual count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kernel {
+    /// As any other.
+    Square,
+    /// With their size, not its square.
+    Huber,
+    /// Less and less, then not at all.
+    Tukey,
+}
+
 /// All of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
@@ -39,16 +60,17 @@ pub struct Options {
     /// Side of an image block, px.
     pub block_px: usize,
     /// Neighbours farther than this are none, m.
-    pub gate_m: f32,
+    pub max_correspondence_m: f32,
     pub max_iterations: usize,
+    /// ICP has converged when a step is below both: m and rad.
     pub min_shift_m: f64,
     pub min_turn_rad: f64,
-    /// Least cosine between normals of neighbours.
+    /// Surfaces that lean more to each other are not one: cosine between their normals.
     pub min_cosine: f64,
-    /// Observations of a piece of the map that count at most.
-    pub max_counted: f32,
-    /// Fewer points than this share with a neighbour: lost.
-    pub min_matched: f64,
+    /// Observations of a surfel that count at most.
+    pub max_observations: f32,
+    /// A frame of which a smaller share of points has a neighbour is lost.
+    pub min_inlier_ratio: f64,
     pub seed: Seed,
     /// Read colour for the map.
     pub colour: bool,
@@ -65,13 +87,13 @@ impl Options {
             voxel_m: 0.03,
             block_px: 4,
             // Not in the paper: what its peers are run with.
-            gate_m: 0.1,
+            max_correspondence_m: 0.1,
             max_iterations: 30,
             min_shift_m: 1e-8,
             min_turn_rad: 1e-5 * std::f64::consts::PI / 180.0,
             min_cosine: -1.0,
-            max_counted: 30.0,
-            min_matched: 0.3,
+            max_observations: 30.0,
+            min_inlier_ratio: 0.3,
             seed: Seed(1),
             colour: true,
         }
@@ -89,23 +111,9 @@ impl Options {
         }
     }
 
-    pub fn criteria(&self) -> Criteria {
-        Criteria {
-            weights: self.weights,
-            kernel: self.kernel,
-            max_iterations: self.max_iterations,
-            min_shift_m: self.min_shift_m,
-            min_turn_rad: self.min_turn_rad,
-            min_cosine: self.min_cosine,
-        }
-    }
-}
-
-impl Options {
     /// # Errors
     /// When a number is out of its range.
     pub fn check(&self) -> Result<()> {
-        let positive = |v: f32| v.is_finite() && v > 0.0;
         let wrong = |what: String, remedy| Err(Error::Argument { what, remedy });
         if !(0.002..=1.0).contains(&self.voxel_m) {
             return wrong(format!("--voxel {}", self.voxel_m), "give 0.002 to 1 m");
@@ -113,14 +121,15 @@ impl Options {
         if !(1..=32).contains(&self.block_px) {
             return wrong(format!("--block {}", self.block_px), "give 1 to 32 px");
         }
-        if !positive(self.gate_m) || self.gate_m > 2.0 {
-            return wrong(format!("--gate {}", self.gate_m), "give a distance up to 2 m");
+        let reach = self.max_correspondence_m;
+        if !(reach > 0.0 && reach <= 2.0) {
+            return wrong(format!("--gate {reach}"), "give a distance up to 2 m");
         }
         if self.max_iterations == 0 {
             return wrong("--iterations 0".into(), "give 1 or more");
         }
-        if self.max_counted.is_nan() || self.max_counted < 1.0 {
-            return wrong(format!("--memory {}", self.max_counted), "give 1 or more");
+        if self.max_observations.is_nan() || self.max_observations < 1.0 {
+            return wrong(format!("--memory {}", self.max_observations), "give 1 or more");
         }
         Ok(())
     }

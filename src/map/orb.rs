@@ -3,13 +3,13 @@
 //! Detector, descriptor and matcher are OpenCV's (Rublee et al., "ORB: an efficient alternative to
 //! SIFT or SURF", ICCV 2011).
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 use opencv::core::{DMatch, KeyPoint, Mat, NORM_HAMMING, Vector, no_array};
 use opencv::features2d::{BFMatcher, ORB, ORB_ScoreType};
 use opencv::imgproc::{COLOR_RGB2GRAY, cvt_color_def};
 use opencv::prelude::*;
 
-use super::rigid::{Agreed, PointPair, agreed};
+use super::ransac::{PointPair, ransac};
 use crate::camera::Rays;
 use crate::error::{Error, Result};
 use crate::io::ColourImage;
@@ -70,9 +70,9 @@ impl Features {
     ///
     /// # Errors
     /// When OpenCV fails.
-    pub fn motion_to(&self, target: &Features, rng: &mut Stream) -> Result<Option<Agreed>> {
+    pub fn motion_to(&self, target: &Features, rng: &mut Stream) -> Result<Option<Isometry3<f64>>> {
         let pairs = self.pairs(target).map_err(failed)?;
-        Ok(agreed(&pairs, rng))
+        Ok(ransac(&pairs, rng))
     }
 
     fn pairs(&self, target: &Features) -> opencv::Result<Vec<PointPair>> {

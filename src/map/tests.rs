@@ -4,13 +4,12 @@ use nalgebra::{Isometry3, Vector3};
 use rand_distr::{Distribution, Normal};
 
 use super::blocks::Blocks;
-use super::icp::{Alignment, Criteria, Kernel, Weights, align};
+use super::icp::{Alignment, Termination, align};
+use super::index_map::Projective;
 use super::nearest::Nearest;
 use super::noise::Noise;
-use super::normals::points_of;
-use super::options::{Init, Options};
-use super::projective::Projective;
-use super::voxel::Voxels;
+use super::options::{Init, Kernel, Options, Weights};
+use super::voxel::{Voxels, points_of};
 use crate::camera::Camera;
 use crate::model::NoiseModel;
 use crate::rng::{Seed, Stream};
@@ -55,15 +54,15 @@ fn blocks(depth: &[f32]) -> Blocks {
     Blocks::of(depth, &camera(), &camera().rays(), 4, &noise())
 }
 
-fn projected(source: &[f32], target: &[f32], criteria: &Criteria) -> Alignment {
+fn projected(source: &[f32], target: &[f32], options: &Options) -> Alignment {
     let (camera, source, target) = (camera(), blocks(source), blocks(target));
     let points: Vec<_> = source.points.iter().flatten().copied().collect();
-    let target = Projective { camera: &camera, blocks: &target, gate_m: 0.1 };
-    align(&points, &target, Isometry3::identity(), criteria)
+    let target = Projective { camera: &camera, blocks: &target, max_correspondence_m: 0.1 };
+    align(&points, &target, Isometry3::identity(), options)
 }
 
-fn error(told: &Alignment, truth: &Isometry3<f64>) -> (f64, f64) {
-    let error = told.target_from_source.inverse() * truth;
+fn error(found: &Alignment, truth: &Isometry3<f64>) -> (f64, f64) {
+    let error = found.target_from_source.inverse() * truth;
     (error.translation.vector.norm(), error.rotation.angle())
 }
 
@@ -76,16 +75,17 @@ fn a_known_motion_before_a_corner_is_found() {
     let still = picture(&CORNER, &Isometry3::identity());
     let moved = picture(&CORNER, &motion());
     let (source, target) = (cloud(&moved), cloud(&still));
-    let paper = Options::paper(Weights::None, Init::None).criteria();
+    let paper = Options::paper(Weights::None, Init::None);
     for weights in [Weights::None, Weights::Model, Weights::Both] {
-        let criteria = Criteria { weights, ..paper };
-        let told = align(source.points(), &target, Isometry3::identity(), &criteria);
-        let (shift, turn) = error(&told, &motion());
+        let options = Options { weights, ..paper };
+        let found = align(source.points(), &target, Isometry3::identity(), &options);
+        let (shift, turn) = error(&found, &motion());
         assert!(shift < 1e-3 && turn < 1e-3, "voxels {weights:?}: {shift} m, {turn} rad");
-        assert!(told.undetermined.is_empty() && told.weakest > 0.02, "{told:?}");
-        let robust = Criteria { kernel: Kernel::Tukey, min_cosine: 0.7, ..criteria };
-        let told = projected(&moved, &still, &robust);
-        let (shift, turn) = error(&told, &motion());
+        let determined = found.degenerate_directions.is_empty() && found.min_information > 0.02;
+        assert!(determined, "{found:?}");
+        let robust = Options { kernel: Kernel::Tukey, min_cosine: 0.7, ..options };
+        let found = projected(&moved, &still, &robust);
+        let (shift, turn) = error(&found, &motion());
         assert!(shift < 1e-4 && turn < 1e-4, "blocks {weights:?}: {shift} m, {turn} rad");
     }
 }
@@ -97,14 +97,15 @@ fn what_a_wall_does_not_determine_is_named_and_kept() {
     let away = Isometry3::translation(0.0, 0.0, -0.02);
     let still = noisy(&picture(&wall, &Isometry3::identity()), &mut Seed(1).stream("a"));
     let moved = noisy(&picture(&wall, &away), &mut Seed(1).stream("b"));
-    let paper = Options::paper(Weights::Model, Init::None).criteria();
-    let told = projected(&moved, &still, &paper);
-    let mut names: Vec<String> = told.undetermined.iter().map(ToString::to_string).collect();
+    let paper = Options::paper(Weights::Model, Init::None);
+    let found = projected(&moved, &still, &paper);
+    let mut names: Vec<String> =
+        found.degenerate_directions.iter().map(ToString::to_string).collect();
     names.sort();
     assert_eq!(names.len(), 3, "{names:?}");
     assert!(names.contains(&"turn about z".to_string()), "{names:?}");
     assert!(names.iter().filter(|n| n.starts_with("shift along")).count() == 2, "{names:?}");
-    let t = told.target_from_source.translation.vector;
+    let t = found.target_from_source.translation.vector;
     assert!((t.z + 0.02).abs() < 5e-4 && t.xy().norm() < 1e-3, "{t}");
 }
 
@@ -131,37 +132,37 @@ fn weights_beat_none_where_noise_differs() {
         (0..near.len()).map(|i| if left(i) { near[i] } else { far[i] }).collect()
     };
     let (still, moved) = (two_corners(&Isometry3::identity()), two_corners(&motion()));
-    let paper = Options::paper(Weights::None, Init::None).criteria();
+    let paper = Options::paper(Weights::None, Init::None);
     let (mut won, mut squares) = (0, [0.0; 2]);
     for seed in 0..20 {
         let a = noisy(&still, &mut Seed(seed).stream("still"));
         let b = noisy(&moved, &mut Seed(seed).stream("moved"));
         let errors = [Weights::None, Weights::Model]
-            .map(|weights| error(&projected(&b, &a, &Criteria { weights, ..paper }), &motion()).0);
+            .map(|weights| error(&projected(&b, &a, &Options { weights, ..paper }), &motion()).0);
         won += usize::from(errors[1] < errors[0]);
         squares = [squares[0] + errors[0].powi(2), squares[1] + errors[1].powi(2)];
     }
     assert!(won >= 17 && squares[1] < 0.5 * squares[0], "{won} of 20; {squares:?}");
 }
 
-/// The reported covariance is the scatter of the estimates, to a factor: 40 draws tell a standard
+/// The reported covariance is the scatter of the estimates, to a factor: 40 draws give a standard
 /// deviation to 11 %, and normals that err too cost some more.
 #[test]
-fn the_covariance_tells_the_scatter() {
+fn the_covariance_is_the_scatter() {
     let (still, moved) = (picture(&CORNER, &Isometry3::identity()), picture(&CORNER, &motion()));
-    let criteria = Options::best().criteria();
-    let (mut squares, mut told_squares) = (Vector3::zeros(), Vector3::zeros());
+    let options = Options::best();
+    let (mut squares, mut reported) = (Vector3::zeros(), Vector3::zeros());
     for seed in 0..40 {
         let a = noisy(&still, &mut Seed(seed).stream("still"));
         let b = noisy(&moved, &mut Seed(seed).stream("moved"));
-        let told = projected(&b, &a, &criteria);
+        let found = projected(&b, &a, &options);
         // The covariance is of the target's frame: an error there.
-        let off = told.target_from_source * motion().inverse();
+        let off = found.target_from_source * motion().inverse();
         squares += off.translation.vector.map(|v| v * v);
-        told_squares += told.covariance.diagonal().fixed_rows::<3>(0).into_owned();
+        reported += found.covariance.diagonal().fixed_rows::<3>(0).into_owned();
     }
     for k in 0..3 {
-        let ratio = (squares[k] / told_squares[k]).sqrt();
+        let ratio = (squares[k] / reported[k]).sqrt();
         assert!((0.5..2.5).contains(&ratio), "axis {k}: {ratio}");
     }
 }
@@ -173,14 +174,14 @@ fn nothing_in_nothing_out() {
     let odd: Vec<f32> =
         nan.iter().enumerate().map(|(i, v)| [0.0, -1.0, f32::INFINITY, *v][i % 4]).collect();
     let corner = picture(&CORNER, &Isometry3::identity());
-    let criteria = Options::best().criteria();
+    let options = Options::best();
     for empty in [&nan, &odd] {
         assert!(cloud(empty).points().is_empty());
         assert!(blocks(empty).points.iter().all(Option::is_none));
         for (a, b) in [(empty, &corner), (&corner, empty)] {
-            let told = projected(a, b, &criteria);
-            assert_eq!(told.ending, super::icp::Ending::TooFewPairs);
-            let t = told.target_from_source.translation.vector;
+            let found = projected(a, b, &options);
+            assert_eq!(found.termination, Termination::TooFewCorrespondences);
+            let t = found.target_from_source.translation.vector;
             assert!(t.iter().all(|v| v.is_finite()));
         }
     }

@@ -1,78 +1,23 @@
 //! Frame after frame: start, align, judge, keep.
 
-use nalgebra::{Isometry3, Matrix6};
+use nalgebra::Isometry3;
 
-use super::direction::Direction;
-use super::grid_map::{GridMap, MapPoint, colour_or_grey};
-use super::icp::{Alignment, Ending, align, renormalised};
-use super::options::{Init, Options};
-use super::prepare::{Kitchen, Prepared, Shape};
-use super::projective::Projective;
-use super::stages::Stages;
-use super::surfels::{Fusion, Observed, Seen, Surfels};
+use super::frame_report::{Fate, FrameReport, Stages};
+use super::icp::{Alignment, Termination, align, renormalised};
+use super::index_map::Projective;
+use super::map_points::{MapPoint, PointGrid};
+use super::options::{Init, Method, Options};
+use super::preprocess::{Prepared, Preprocessor, Shape};
+use super::surfels::Surfels;
 use crate::camera::Camera;
-use crate::error::Result;
-
-/// What became of a frame.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Fate {
-    /// The map's frame is this camera's.
-    First,
-    Tracked,
-    /// No pose: why, in words.
-    Lost(String),
-}
-
-/// What is known of a frame in the end.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FrameReport {
-    pub stamp: f64,
-    pub fate: Fate,
-    /// Where the camera was, `map_from_camera`; `None` when lost.
-    pub pose: Option<Isometry3<f64>>,
-    /// Of the last alignment, shift and turn, m and rad.
-    pub covariance: Option<Matrix6<f64>>,
-    pub iterations: usize,
-    pub matched: f64,
-    pub pairs: usize,
-    pub rms_m: f64,
-    pub undetermined: Vec<Direction>,
-    pub weakest: f64,
-    /// Are the depth words those of the frame before, every one?
-    pub repeated: bool,
-    pub stages: Stages,
-}
-
-impl FrameReport {
-    /// A frame whose depth image cannot be read.
-    pub fn unread(stamp: f64, why: String) -> Self {
-        Self::lost(stamp, why, Stages::default())
-    }
-
-    fn lost(stamp: f64, why: String, stages: Stages) -> Self {
-        FrameReport {
-            stamp,
-            fate: Fate::Lost(why),
-            pose: None,
-            covariance: None,
-            iterations: 0,
-            matched: 0.0,
-            pairs: 0,
-            rms_m: 0.0,
-            undetermined: Vec::new(),
-            weakest: 0.0,
-            repeated: false,
-            stages,
-        }
-    }
-}
+use crate::error::{Error, Result};
 
 /// Fewer points are no picture of anything.
 const MIN_POINTS: usize = 200;
 /// From frame to frame the share of points with a neighbour falls to .94 of what it was at worst on
 /// fr1_rpy and 7-Scenes; a metre away in the same room floor and walls still match, at .36 to .48.
-const MIN_KEPT: f64 = 0.6;
-/// Pieces of the map are sorted out every so many frames.
+const MIN_RATIO_KEPT: f64 = 0.6;
+/// Surfels are sorted out every so many frames.
 const PRUNE_EVERY: u32 = 10;
 
 /// The state between frames.
@@ -85,75 +30,76 @@ pub struct Tracker<'a> {
     pose: Isometry3<f64>,
     motion: Isometry3<f64>,
     /// Share of its points that had a neighbour.
-    matched: f64,
+    inlier_ratio: f64,
     surfels: Surfels,
-    grid: GridMap,
+    grid: PointGrid,
     number: u32,
 }
 
 impl<'a> Tracker<'a> {
-    pub fn new(kitchen: &Kitchen<'a>) -> Self {
+    pub fn new(preprocessor: &Preprocessor<'a>) -> Self {
         Tracker {
-            options: kitchen.options,
-            camera: &kitchen.sequence.sensor.camera,
+            options: preprocessor.options,
+            camera: &preprocessor.sequence.sensor.camera,
             last: None,
             pose: Isometry3::identity(),
             motion: Isometry3::identity(),
-            matched: 0.0,
-            surfels: Surfels::default(),
-            grid: GridMap::default(),
+            inlier_ratio: 0.0,
+            surfels: Surfels::new(preprocessor.options.max_observations),
+            grid: PointGrid::default(),
             number: 0,
         }
     }
 
-    /// Take in a frame.
+    /// Take in a frame; one that could not be read is lost.
     ///
     /// # Errors
     /// When OpenCV fails.
-    pub fn take(&mut self, stamp: f64, mut frame: Prepared) -> Result<FrameReport> {
+    pub fn track(&mut self, stamp: f64, frame: Result<Prepared>) -> Result<FrameReport> {
+        let mut frame = match frame {
+            Ok(frame) => frame,
+            Err(e @ Error::Argument { .. }) => return Err(e),
+            Err(e) => return Ok(FrameReport::lost(stamp, e.to_string())),
+        };
         self.number += 1;
         let mut stages = std::mem::take(&mut frame.stages);
         let points = frame.shape.points().len();
-        if points < MIN_POINTS {
-            let why = format!("{points} points with a surface, {MIN_POINTS} are needed");
-            return Ok(FrameReport::lost(stamp, why, stages));
-        }
-        let Some(last) = &self.last else {
-            self.keep(frame, Isometry3::identity(), &mut stages);
-            return Ok(FrameReport {
-                fate: Fate::First,
-                pose: Some(Isometry3::identity()),
-                matched: 1.0,
-                ..FrameReport::lost(stamp, String::new(), stages)
-            });
-        };
-        let repeated = last.words == frame.words;
-        let start = stages.time("start", || self.start(last, &frame))?;
-        let alignment = self.align(last, &frame, start, &mut stages);
-        let mut report = FrameReport {
-            iterations: alignment.iterations,
-            matched: alignment.matched,
-            pairs: alignment.pairs,
-            rms_m: alignment.rms_m,
-            weakest: alignment.weakest,
-            repeated,
-            ..FrameReport::lost(stamp, String::new(), Stages::default())
-        };
-        match self.doubt(&alignment) {
-            Some(why) => report.fate = Fate::Lost(why),
-            None => {
-                let relative = alignment.target_from_source;
-                report.fate = Fate::Tracked;
-                report.covariance = Some(alignment.covariance);
-                report.undetermined = alignment.undetermined;
-                let pose = renormalised(&(self.pose * relative));
-                report.pose = Some(pose);
-                self.matched = report.matched;
-                self.keep(frame, pose, &mut stages);
-            }
+        let few = format!("{points} points with a surface, {MIN_POINTS} are needed");
+        let mut report =
+            FrameReport { remark: frame.remark.take(), ..FrameReport::lost(stamp, few) };
+        if points >= MIN_POINTS {
+            self.follow(frame, &mut report, &mut stages)?;
         }
         report.stages = stages;
         Ok(report)
+    }
+
+    fn follow(
+        &mut self,
+        frame: Prepared,
+        report: &mut FrameReport,
+        stages: &mut Stages,
+    ) -> Result<()> {
+        let Some(last) = &self.last else {
+            report.fate = Fate::First;
+            report.pose = Some(Isometry3::identity());
+            self.keep(frame, Isometry3::identity(), stages);
+            return Ok(());
+        };
+        report.repeated = last.raw == frame.raw;
+        let start = stages.time("start", || self.start(last, &frame))?;
+        let alignment = self.align(last, &frame, start, stages);
+        if let Some(why) = self.doubt(&alignment) {
+            report.fate = Fate::Lost(why);
+        } else {
+            let pose = renormalised(&(self.pose * alignment.target_from_source));
+            report.fate = Fate::Tracked;
+            report.pose = Some(pose);
+            self.inlier_ratio = alignment.inlier_ratio;
+            self.keep(frame, pose, stages);
+        }
+        report.alignment = Some(alignment);
+        Ok(())
     }
 
     /// Where this frame may be in the last one's.
@@ -162,15 +108,12 @@ impl<'a> Tracker<'a> {
             Init::None => Isometry3::identity(),
             Init::Motion | Init::Orb => self.motion,
         };
-        if self.options.init != Init::Orb {
-            return Ok(moved);
-        }
+        // There are features only where they are asked for.
         let (Some(here), Some(there)) = (&frame.features, &last.features) else {
             return Ok(moved);
         };
         let mut rng = self.options.seed.stream(&format!("orb/{}", self.number));
-        let told = here.motion_to(there, &mut rng)?;
-        Ok(told.map_or(moved, |t| t.target_from_source))
+        Ok(here.motion_to(there, &mut rng)?.unwrap_or(moved))
     }
 
     /// In the frame of the last camera.
@@ -181,46 +124,43 @@ impl<'a> Tracker<'a> {
         start: Isometry3<f64>,
         stages: &mut Stages,
     ) -> Alignment {
-        let criteria = self.options.criteria();
+        let options = self.options;
         let source = frame.shape.points();
-        let gate_m = self.options.gate_m;
-        match (&last.shape, self.options.method) {
-            (Shape::Cloud(target), _) => {
-                stages.time("icp", || align(source, target, start, &criteria))
+        let max_correspondence_m = options.max_correspondence_m;
+        match &last.shape {
+            Shape::Cloud(target) => stages.time("icp", || align(source, target, start, options)),
+            Shape::Blocks(blocks, _) if options.method == Method::Projective => {
+                let target = Projective { camera: self.camera, blocks, max_correspondence_m };
+                stages.time("icp", || align(source, &target, start, options))
             }
-            (Shape::Blocks(blocks, _), super::options::Method::Projective) => {
-                let target = Projective { camera: self.camera, blocks, gate_m };
-                stages.time("icp", || align(source, &target, start, &criteria))
-            }
-            (Shape::Blocks(..), _) => {
-                let sight = stages.time("render", || self.sight(&(self.pose * start)));
-                let target = Seen { surfels: &self.surfels.surfels, sight: &sight, gate_m };
-                let found =
-                    stages.time("icp", || align(source, &target, self.pose * start, &criteria));
+            Shape::Blocks(..) => {
+                let start = self.pose * start;
+                let seen = || self.surfels.seen_from(&start, self.camera, options.block_px);
+                let index_map = stages.time("render", seen);
+                let target = self.surfels.target(&index_map, max_correspondence_m);
+                let found = stages.time("icp", || align(source, &target, start, options));
                 let target_from_source = self.pose.inverse() * found.target_from_source;
                 Alignment { target_from_source, ..found }
             }
         }
     }
 
-    fn sight(&self, pose: &Isometry3<f64>) -> super::surfels::Sight<'a> {
-        self.surfels.seen_from(pose, self.camera, self.options.block_px)
-    }
-
     /// Why an alignment is not to be believed.
     fn doubt(&self, alignment: &Alignment) -> Option<String> {
         let pose = &alignment.target_from_source;
-        let finite = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
-        if alignment.ending == Ending::TooFewPairs || !finite.into_iter().all(|v| v.is_finite()) {
+        let mut numbers = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
+        if alignment.termination == Termination::TooFewCorrespondences
+            || !numbers.all(|v| v.is_finite())
+        {
             return Some("too few points find a neighbour".into());
         }
         let percent = |share: f64| format!("{:.0} %", 100.0 * share);
-        let (here, before) = (percent(alignment.matched), percent(self.matched));
-        if alignment.matched < self.options.min_matched {
-            let needed = percent(self.options.min_matched);
+        let (here, before) = (percent(alignment.inlier_ratio), percent(self.inlier_ratio));
+        if alignment.inlier_ratio < self.options.min_inlier_ratio {
+            let needed = percent(self.options.min_inlier_ratio);
             return Some(format!("{here} of the points find a neighbour, {needed} are needed"));
         }
-        (alignment.matched < MIN_KEPT * self.matched).then(|| {
+        (alignment.inlier_ratio < MIN_RATIO_KEPT * self.inlier_ratio).then(|| {
             format!(
                 "{here} of the points find a neighbour, {before} did before: a jump, or gone astray"
             )
@@ -229,8 +169,7 @@ impl<'a> Tracker<'a> {
 
     /// Make a frame part of the map and the one to go on from.
     fn keep(&mut self, frame: Prepared, pose: Isometry3<f64>, stages: &mut Stages) {
-        let first = self.last.is_none();
-        if !first {
+        if self.last.is_some() {
             self.motion = renormalised(&(self.pose.inverse() * pose));
         }
         self.pose = pose;
@@ -239,33 +178,22 @@ impl<'a> Tracker<'a> {
     }
 
     fn fuse(&mut self, frame: &Prepared) {
-        let colour = frame.colour.as_ref().map(|c| c.rgb.as_slice());
-        match (&frame.shape, self.options.method) {
-            (Shape::Blocks(blocks, _), super::options::Method::Model) => {
-                let sight = self.sight(&self.pose);
-                let observed =
-                    Observed { number: self.number, focal_px: self.camera.fx as f32, colour };
-                let fusion = Fusion { max_counted: self.options.max_counted };
-                self.surfels.fuse(&sight, blocks, &self.pose, &observed, &fusion);
+        let rgb = frame.colour.as_ref().map(|c| c.rgb.as_slice());
+        match &frame.shape {
+            Shape::Blocks(blocks, _) if self.options.method == Method::Model => {
+                let index_map =
+                    self.surfels.seen_from(&self.pose, self.camera, self.options.block_px);
+                self.surfels.fuse(&index_map, blocks, &self.pose, self.number, rgb);
                 if self.number.is_multiple_of(PRUNE_EVERY) {
                     self.surfels.prune(self.number);
                 }
             }
-            (shape, _) => self.grid.add(shape.points(), &self.pose, colour),
+            shape => self.grid.add(shape.points(), &self.pose, rgb),
         }
     }
 
     /// The finished map.
     pub fn into_map(self) -> Vec<MapPoint> {
-        if self.surfels.surfels.is_empty() {
-            return self.grid.points();
-        }
-        let point = |s: &super::surfels::Surfel| MapPoint {
-            at: s.point.at,
-            normal: s.point.normal,
-            sigma: s.point.across,
-            colour: colour_or_grey(s.colour, if s.coloured > 0 { 1.0 } else { 0.0 }),
-        };
-        self.surfels.surfels.iter().map(point).collect()
+        if self.surfels.is_empty() { self.grid.points() } else { self.surfels.points() }
     }
 }

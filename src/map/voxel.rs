@@ -1,11 +1,14 @@
-//! Depth image -> voxel grid: one point a cube of space, with the moments that its normal needs.
+//! Depth image -> voxel grid -> points with normals: the paper's front end. A voxel keeps the moments
+//! of its points; a normal is the direction in which a voxel and its neighbours vary least.
 
 use nalgebra::Vector3;
 
-use super::cells::{Cells, Place, place_of};
+use super::noise::Noise;
+use super::point::Point;
+use super::sparse_grid::{Cell, SparseGrid, cell_of};
 use crate::camera::Rays;
 
-/// The pixels whose points fall in one cube; moments about the cube's corner.
+/// The pixels whose points fall in one cell; moments about the cell's corner.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Voxel {
     pub n: f32,
@@ -16,70 +19,70 @@ pub struct Voxel {
     pub pixel: u32,
 }
 
-/// A depth image as occupied cubes.
+/// A depth image as occupied cells.
 #[derive(Debug, Clone)]
 pub struct Voxels {
     pub side_m: f32,
-    pub cells: Cells,
-    /// By the index of its cube.
+    pub grid: SparseGrid,
+    /// By the index of its cell.
     pub voxels: Vec<Voxel>,
 }
 
-/// A Kinect's picture of a room fills about this many cubes of 3 cm.
-const USUAL: usize = 20_000;
+/// A Kinect's picture of a room fills about this many cells of 3 cm.
+const USUAL_CELLS: usize = 20_000;
 
 impl Voxels {
     /// Of a depth image, m, NaN where nothing was measured.
     pub fn of(depth: &[f32], rays: &Rays, side_m: f32) -> Self {
-        let mut cells = Cells::with_room(USUAL);
-        let mut voxels: Vec<Voxel> = Vec::with_capacity(USUAL);
-        // Neighbouring pixels mostly fall in one cube: it is looked up when they leave it.
+        let mut grid = SparseGrid::with_room(USUAL_CELLS);
+        let mut voxels: Vec<Voxel> = Vec::with_capacity(USUAL_CELLS);
+        // Neighbouring pixels mostly fall in one cell: it is looked up when they leave it.
         let (mut here, mut run) = ([i32::MAX; 3], Run::default());
-        let mut leave = |place: Place, run: &Run| {
+        let mut leave = |cell: Cell, run: &Run| {
             if run.voxel.n > 0.0 {
-                let index = cells.add(place);
+                let index = grid.insert(cell);
                 if index == voxels.len() {
                     voxels.push(Voxel { pixel: run.voxel.pixel, ..Voxel::default() });
                 }
-                voxels[index].join(&run.voxel);
+                voxels[index].merge(&run.voxel, Vector3::zeros());
             }
         };
         let mut at = [Vector3::zeros(); STRIP];
-        let mut places = [[0; 3]; STRIP];
+        let mut cells = [[0; 3]; STRIP];
         for begin in (0..depth.len()).step_by(STRIP) {
             let end = (begin + STRIP).min(depth.len());
             let strip = depth[begin..end].iter().zip(&rays.x[begin..end]).zip(&rays.y[begin..end]);
-            for ((((&z, &x), &y), at), place) in strip.zip(&mut at).zip(&mut places) {
+            for ((((&z, &x), &y), at), cell) in strip.zip(&mut at).zip(&mut cells) {
                 *at = Vector3::new(x * z, y * z, z);
-                *place = place_of(at, 1.0 / side_m);
+                *cell = cell_of(at, 1.0 / side_m);
             }
-            for (i, (at, &place)) in (begin..end).zip(at.iter().zip(&places)) {
+            for (i, (at, &cell)) in (begin..end).zip(at.iter().zip(&cells)) {
                 if !(at.z > 0.0 && at.z.is_finite()) {
                     continue;
                 }
-                if place != here {
+                if cell != here {
                     leave(here, &run);
-                    here = place;
-                    run = Run::begin(place, side_m, i);
+                    here = cell;
+                    run = Run::begin(cell, side_m, i);
                 }
                 run.voxel.add(at - run.corner);
             }
         }
         leave(here, &run);
-        Voxels { side_m, cells, voxels }
+        Voxels { side_m, grid, voxels }
     }
 
     /// The mean of a voxel's points, m.
     pub fn mean(&self, index: usize) -> Vector3<f32> {
         let voxel = &self.voxels[index];
-        corner(self.cells.place(index), self.side_m) + voxel.sum / voxel.n
+        corner(self.grid.cell(index), self.side_m) + voxel.sum / voxel.n
     }
 }
 
 /// Pixels worked on at once: what a core keeps at hand.
 const STRIP: usize = 128;
 
-/// Pixels in a row that fall in one cube.
+/// Pixels in a row that fall in one cell.
 #[derive(Debug, Clone, Copy, Default)]
 struct Run {
     voxel: Voxel,
@@ -87,17 +90,17 @@ struct Run {
 }
 
 impl Run {
-    fn begin(place: Place, side_m: f32, pixel: usize) -> Self {
+    fn begin(cell: Cell, side_m: f32, pixel: usize) -> Self {
         Run {
             voxel: Voxel { pixel: pixel as u32, ..Voxel::default() },
-            corner: corner(place, side_m),
+            corner: corner(cell, side_m),
         }
     }
 }
 
 #[inline]
-fn corner(place: Place, side_m: f32) -> Vector3<f32> {
-    Vector3::from(place.map(|v| v as f32)) * side_m
+fn corner(cell: Cell, side_m: f32) -> Vector3<f32> {
+    Vector3::from(cell.map(|v| v as f32)) * side_m
 }
 
 impl Voxel {
@@ -111,19 +114,9 @@ impl Voxel {
         }
     }
 
-    /// Add the moments of more pixels of this cube.
-    #[inline]
-    fn join(&mut self, other: &Voxel) {
-        self.n += other.n;
-        self.sum += other.sum;
-        for (sum, more) in self.squares.iter_mut().zip(other.squares) {
-            *sum += more;
-        }
-    }
-
     /// Add another's moments, whose corner lies at `o` from this one's, m.
     #[inline]
-    pub fn merge(&mut self, other: &Voxel, o: Vector3<f32>) {
+    fn merge(&mut self, other: &Voxel, o: Vector3<f32>) {
         let (s, n) = (other.sum, other.n);
         self.n += n;
         self.sum += s + o * n;
@@ -134,5 +127,118 @@ impl Voxel {
         self.squares[3] += q[3] + o.y * (2.0 * s.y + n * o.y);
         self.squares[4] += q[4] + o.y * s.z + o.z * (s.y + n * o.y);
         self.squares[5] += q[5] + o.z * (2.0 * s.z + n * o.z);
+    }
+}
+
+/// Fewer pixels make no surface.
+const MIN_PIXELS: f32 = 6.0;
+/// The middle principal variance over the greatest: less is a line, which has no normal.
+const MIN_WIDTH_RATIO: f64 = 0.01;
+
+/// The points of a voxel grid with the normals of their neighbourhoods, which are all pixels in the
+/// 3 x 3 x 3 cells around each. Voxels without a surface are left out.
+pub fn points_of(voxels: &Voxels, noise: &Noise) -> Vec<Point> {
+    let point = |index: usize| {
+        let around = neighbourhood(voxels, index);
+        let normal = normal_of(&around)?;
+        let at = voxels.mean(index);
+        let normal = if normal.dot(&at) > 0.0 { -normal } else { normal };
+        let sigma_axial = noise.sigma_axial(at.z, &normal);
+        let voxel = &voxels.voxels[index];
+        let sigma_normal = noise.sigma_normal(sigma_axial, &at, &normal, voxel.n);
+        Some(Point { at, normal, sigma_axial, sigma_normal, pixel: voxel.pixel })
+    };
+    (0..voxels.voxels.len()).filter_map(point).collect()
+}
+
+fn neighbourhood(voxels: &Voxels, index: usize) -> Voxel {
+    let mut around = Voxel { pixel: voxels.voxels[index].pixel, ..Voxel::default() };
+    let cell = voxels.grid.cell(index);
+    let (low, high) = (cell.map(|v| v - 1), cell.map(|v| v + 1));
+    voxels.grid.for_each_within(low, high, |other| {
+        let [x, y, z] = voxels.grid.cell(other);
+        let apart = [x - cell[0], y - cell[1], z - cell[2]].map(|v| v as f32);
+        around.merge(&voxels.voxels[other], Vector3::from(apart) * voxels.side_m);
+    });
+    around
+}
+
+/// Unit vector along which the points vary least; `None` where they are few or on a line.
+fn normal_of(v: &Voxel) -> Option<Vector3<f32>> {
+    if v.n < MIN_PIXELS {
+        return None;
+    }
+    let n = f64::from(v.n);
+    let m = v.sum.map(f64::from) / n;
+    let q = v.squares.map(|s| f64::from(s) / n);
+    let covariance = [
+        q[0] - m.x * m.x,
+        q[1] - m.x * m.y,
+        q[2] - m.x * m.z,
+        q[3] - m.y * m.y,
+        q[4] - m.y * m.z,
+        q[5] - m.z * m.z,
+    ];
+    let ([min, middle, max], direction) = min_variance_direction(covariance)?;
+    // A sphere of noise has no normal either: twice as thick as a plane may be.
+    (middle > MIN_WIDTH_RATIO * max && min < 0.5 * middle).then(|| direction.cast())
+}
+
+/// Eigenvalues, ascending, and the unit eigenvector of the smallest, of the symmetric matrix with
+/// these xx, xy, xz, yy, yz, zz: in closed form, by the cosine of a third of an angle (Smith 1961).
+fn min_variance_direction(m: [f64; 6]) -> Option<([f64; 3], Vector3<f64>)> {
+    let [xx, xy, xz, yy, yz, zz] = m;
+    let mean = (xx + yy + zz) / 3.0;
+    let (a, b, c) = (xx - mean, yy - mean, zz - mean);
+    let off = xy * xy + xz * xz + yz * yz;
+    let p = ((a * a + b * b + c * c + 2.0 * off) / 6.0).sqrt();
+    if p.is_nan() || p <= 0.0 {
+        return None;
+    }
+    let det = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz);
+    let angle = (det / (2.0 * p * p * p)).clamp(-1.0, 1.0).acos() / 3.0;
+    let third = 2.0 * std::f64::consts::FRAC_PI_3;
+    let max = mean + 2.0 * p * angle.cos();
+    let min = mean + 2.0 * p * (angle + third).cos();
+    let middle = 3.0 * mean - max - min;
+    // Rows of M - min I are normal to the eigenvector: the longest of their products is along it.
+    let rows = [
+        Vector3::new(xx - min, xy, xz),
+        Vector3::new(xy, yy - min, yz),
+        Vector3::new(xz, yz, zz - min),
+    ];
+    let products = [rows[0].cross(&rows[1]), rows[0].cross(&rows[2]), rows[1].cross(&rows[2])];
+    let longest = products
+        .into_iter()
+        .max_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
+        .unwrap_or_default();
+    let direction = longest.try_normalize(f64::MIN_POSITIVE)?;
+    Some(([min, middle, max], direction))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix3, SymmetricEigen};
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Against nalgebra's iteration.
+        #[test]
+        fn the_direction_of_least_variance_is_an_eigenvector(a in prop::array::uniform9(-1.0f64..1.0)) {
+            let half = Matrix3::from_row_slice(&a);
+            let m = half * half.transpose() + Matrix3::from_diagonal_element(1e-3);
+            let found = min_variance_direction([
+                m[(0, 0)], m[(0, 1)], m[(0, 2)], m[(1, 1)], m[(1, 2)], m[(2, 2)],
+            ]);
+            let mut values: Vec<f64> = SymmetricEigen::new(m).eigenvalues.iter().copied().collect();
+            values.sort_by(f64::total_cmp);
+            let (found, direction) = found.unwrap();
+            prop_assert!((found[0] - values[0]).abs() < 1e-8 * values[2]);
+            prop_assert!((found[1] - values[1]).abs() < 1e-8 * values[2]);
+            if values[1] - values[0] > 1e-3 * values[2] {
+                prop_assert!((m * direction - direction * values[0]).norm() < 1e-6 * values[2]);
+            }
+        }
     }
 }

@@ -38,7 +38,7 @@ pub fn comparison_page(comparison: &Comparison) -> Result<String> {
         h1 { "Mapping " (comparison.sequence) ", variant by variant" }
         p { "The first four rows are the paper's variants with the parameters of its Table II; those below \
             go past it, one step at a time. Errors are computed as the scripts of the TUM benchmark do." }
-        div.wide { pre { (tables(comparison)) } }
+        div.wide { pre { (tables::text(comparison)) } }
         @for (_, svg) in &figures { figure { div.wide { (PreEscaped(svg)) } } }
         @if !comparison.remarks.is_empty() {
             h2 { "Notes" }

@@ -1,43 +1,20 @@
 //! A film to map: depth images in time order, with the colour image and the true pose that belong
 //! to each, where there are any. Frames are read one at a time, when they are needed.
 //!
-//! Two layouts (`crate::docs::layouts`): [`tum`] (depth.txt, rgb.txt, associations, groundtruth.txt)
-//! and [`scenes`] (7-Scenes: frame-XXXXXX.color/.depth/.pose).
+//! Two layouts: that of the TUM RGB-D benchmark (depth.txt, rgb.txt, associations, groundtruth.txt)
+//! and that of 7-Scenes (frame-XXXXXX.color/.depth/.pose).
 
-mod gaps;
+mod moments;
 mod scenes;
 mod tum;
 
-use std::path::{Path, PathBuf};
+pub use moments::{Moment, Sequence};
 
-use crate::error::{Error, Result};
-use crate::frame::{DepthTable, Frame};
-use crate::io::{Assumed, ColourImage, read_depth};
-use crate::trajectory::Pose;
-use crate::view::Sensor;
+use std::path::Path;
 
-/// One moment of a film.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Moment {
-    /// Of the depth image, s.
-    pub stamp: f64,
-    pub depth: PathBuf,
-    /// The colour image of the same moment.
-    pub colour: Option<PathBuf>,
-}
-
-/// A film, its frames not yet read.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Sequence {
-    pub root: PathBuf,
-    pub sensor: Sensor,
-    /// In time order; no two have the same stamp.
-    pub moments: Vec<Moment>,
-    /// True poses, in time order; empty where there are none.
-    pub truth: Vec<Pose>,
-    /// What was odd, in words.
-    pub remarks: Vec<String>,
-}
+use crate::error::Result;
+use crate::io::Assumed;
+use moments::gaps;
 
 /// Open a folder in one of the two layouts.
 ///
@@ -53,51 +30,8 @@ pub fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
             sequence.moments.len()
         ));
     }
-    sequence.remarks.extend(gaps::remarks(&sequence.moments));
+    sequence.remarks.extend(gaps(&sequence.moments));
     Ok(sequence)
-}
-
-impl Sequence {
-    /// Every `stride`-th moment, at most `limit` of them.
-    pub fn thin(&mut self, stride: usize, limit: Option<usize>) {
-        let moments = std::mem::take(&mut self.moments);
-        let kept = moments.into_iter().step_by(stride.max(1)).take(limit.unwrap_or(usize::MAX));
-        self.moments = kept.collect();
-    }
-
-    /// The words of a depth image.
-    ///
-    /// # Errors
-    /// When the file is damaged or not of the sensor's size.
-    pub fn raw_depth(&self, moment: &Moment) -> Result<Frame> {
-        read_depth(&moment.depth, self.sensor.camera.width, self.sensor.camera.height)
-    }
-
-    /// The colour of a moment, where there is any.
-    ///
-    /// # Errors
-    /// When the file is damaged or not of the depth image's size: pixels would not correspond.
-    pub fn colour(&self, moment: &Moment) -> Result<Option<ColourImage>> {
-        let Some(path) = &moment.colour else { return Ok(None) };
-        let image = ColourImage::read(path)?;
-        let camera = &self.sensor.camera;
-        if (image.width, image.height) != (camera.width, camera.height) {
-            return Err(Error::image(
-                path,
-                format!(
-                    "the colour image is {} x {} px, depth is {} x {}",
-                    image.width, image.height, camera.width, camera.height
-                ),
-                "colour must be registered to depth, pixel by pixel",
-            ));
-        }
-        Ok(Some(image))
-    }
-}
-
-/// Depth of every pixel, m; NaN where there is none.
-pub fn metres(frame: &Frame, table: &DepthTable) -> Vec<f32> {
-    frame.raw.iter().map(|&word| table.metres(word)).collect()
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@ use std::fs;
 use std::path::Path;
 
 use super::*;
+use crate::frame::Frame;
 use crate::io::encode_png16;
 
 fn depth(path: &Path) {
@@ -28,8 +29,8 @@ fn tum(depths: &[f64], colours: &[f64]) -> tempfile::TempDir {
     dir
 }
 
-fn said(sequence: &Sequence, words: &str) -> bool {
-    sequence.remarks.iter().any(|r| r.contains(words))
+fn remarked(sequence: &Sequence, part: &str) -> bool {
+    sequence.remarks.iter().any(|r| r.contains(part))
 }
 
 #[test]
@@ -43,18 +44,18 @@ fn colour_belongs_within_a_fiftieth_of_a_second() {
         .collect();
     // 0.050 is nearer to 0.066 than to 0.033, and each is used once.
     assert_eq!(names, [Some("0.png".into()), None, Some("1.png".into())]);
-    assert!(said(&sequence, "1 of 3 depth images have no colour"), "{:?}", sequence.remarks);
+    assert!(remarked(&sequence, "1 of 3 depth images have no colour"), "{:?}", sequence.remarks);
 }
 
 #[test]
-fn gaps_duplicates_and_missing_files_are_told() {
+fn gaps_duplicates_and_missing_files_are_remarked_on() {
     let dir = tum(&[0.0, 0.033, 0.033, 0.066, 0.1, 1.1], &[]);
     fs::remove_file(dir.path().join("depth/3.png")).unwrap();
     let sequence = open(dir.path(), &Assumed::default()).unwrap();
     assert_eq!(sequence.moments.len(), 4);
-    assert!(said(&sequence, "1 gaps"), "{:?}", sequence.remarks);
-    assert!(said(&sequence, "the stamp of the one before"), "{:?}", sequence.remarks);
-    assert!(said(&sequence, "missing"), "{:?}", sequence.remarks);
+    assert!(remarked(&sequence, "1 gaps"), "{:?}", sequence.remarks);
+    assert!(remarked(&sequence, "the stamp of the one before"), "{:?}", sequence.remarks);
+    assert!(remarked(&sequence, "missing"), "{:?}", sequence.remarks);
 }
 
 #[test]
@@ -79,8 +80,8 @@ fn the_benchmarks_cameras_are_known_by_name() {
     let sequence = open(dir.path(), &Assumed::default()).unwrap();
     assert_eq!(sequence.sensor.camera.fx, 520.9);
     assert!(sequence.sensor.camera.distortion.is_some());
-    let told = Assumed { intrinsics: Some([500.0, 500.0, 4.0, 3.0]), ..Assumed::default() };
-    assert_eq!(open(dir.path(), &told).unwrap().sensor.camera.fx, 500.0);
+    let given = Assumed { intrinsics: Some([500.0, 500.0, 4.0, 3.0]), ..Assumed::default() };
+    assert_eq!(open(dir.path(), &given).unwrap().sensor.camera.fx, 500.0);
 }
 
 #[test]

@@ -3,15 +3,14 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use super::gaps::keep_first_of_each_stamp;
-use super::{Moment, Sequence};
+use super::moments::{Moment, Sequence};
 use crate::error::{Error, Result};
 use crate::io::{Assumed, Layout, open_uncut, read_list};
 use crate::trajectory::{associate, read_benchmark};
 use crate::view::FrameRef;
 
-/// Depth and colour of one moment are less apart, s (associate.py).
-const MAX_APART_S: f64 = 0.02;
+/// Stamps of one moment differ by less, s (associate.py's `max_difference`).
+const MAX_DIFFERENCE_S: f64 = 0.02;
 /// Names under which people keep what associate.py printed.
 const ASSOCIATIONS: [&str; 4] =
     ["associations.txt", "association.txt", "associate.txt", "associated.txt"];
@@ -92,8 +91,8 @@ fn with_colour(
     depth: Vec<FrameRef>,
     remarks: &mut Vec<String>,
 ) -> Result<Vec<Moment>> {
-    let told = ASSOCIATIONS.iter().map(|name| root.join(name)).find(|p| p.is_file());
-    let partner = match told {
+    let associations = ASSOCIATIONS.iter().map(|name| root.join(name)).find(|p| p.is_file());
+    let partner = match associations {
         Some(file) => listed(root, &file, &depth)?,
         None => nearest(root, &depth, remarks)?,
     };
@@ -103,6 +102,16 @@ fn with_colour(
         colour,
     };
     Ok(depth.into_iter().zip(partner).map(moment).collect())
+}
+
+/// Of moments with one stamp the first is kept; a remark on how many were left out.
+fn keep_first_of_each_stamp(moments: &mut Vec<Moment>) -> Option<String> {
+    let before = moments.len();
+    moments.dedup_by(|b, a| a.stamp == b.stamp);
+    let dropped = before - moments.len();
+    (dropped > 0).then(|| {
+        format!("{dropped} depth images have the stamp of the one before; only the first is mapped")
+    })
 }
 
 fn nearest(
@@ -118,7 +127,7 @@ fn nearest(
     remarks.extend(colour.remarks);
     let stamps = |frames: &[FrameRef]| frames.iter().map(|f| f.timestamp).collect::<Vec<f64>>();
     let mut partner = vec![None; depth.len()];
-    for pair in associate(&stamps(depth), &stamps(&colour.frames), MAX_APART_S) {
+    for pair in associate(&stamps(depth), &stamps(&colour.frames), MAX_DIFFERENCE_S) {
         partner[pair.first] = Some(colour.frames[pair.second].path.clone());
     }
     Ok(partner)

@@ -1,11 +1,10 @@
 //! Camera poses in the TUM format: `timestamp tx ty tz qx qy qz qw`, `world_from_camera`.
 
 mod associate;
-mod write;
 
 pub use associate::{Pair, associate};
-pub use write::tum_text;
 
+use std::fmt::Write;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
@@ -26,6 +25,21 @@ pub struct Trajectory {
     pub poses: Vec<Pose>,
     /// Lines left out because another line has their time (freiburg2_desk has some).
     pub repeated: usize,
+}
+
+/// A trajectory file in the TUM format.
+pub fn tum_text(poses: &[Pose]) -> String {
+    let mut text = String::from("# timestamp tx ty tz qx qy qz qw\n");
+    for Pose { stamp, world_from_camera } in poses {
+        let (t, q) = (world_from_camera.translation, world_from_camera.rotation);
+        // Writing to a String does not fail.
+        let _ = writeln!(
+            text,
+            "{stamp:.6} {:.9} {:.9} {:.9} {:.9} {:.9} {:.9} {:.9}",
+            t.x, t.y, t.z, q.i, q.j, q.k, q.w
+        );
+    }
+    text
 }
 
 /// Read a trajectory file; lines that begin with `#` are comments. Of lines with one time the first

@@ -1,11 +1,10 @@
-//! A map without a model behind it: the points of all frames, averaged in cubes.
+//! The finished map: its points, the PLY file, and the points of all frames averaged in cells, for
+//! the methods that keep no surfels.
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::cells::{Cells, place_of};
-use super::motion::Motion;
-use super::point::Point;
-use super::surfels::colour_of;
+use super::point::{Motion, Point};
+use super::sparse_grid::{SparseGrid, cell_of};
 
 /// A point of a finished map.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,21 +12,45 @@ pub struct MapPoint {
     /// m, in the frame of the first camera.
     pub at: Vector3<f32>,
     pub normal: Vector3<f32>,
-    /// Of its place across its surface, m.
+    /// Of its place along its normal, m.
     pub sigma: f32,
     /// Red, green, blue; grey where no colour was seen.
     pub colour: [u8; 3],
 }
 
-/// Side of a cube, m.
+/// The map as a PLY file, binary and little-endian, as MeshLab and CloudCompare read it: places,
+/// normals, colours and `sigma`, m.
+pub fn ply(points: &[MapPoint]) -> Vec<u8> {
+    let header = format!(
+        "ply\nformat binary_little_endian 1.0\ncomment kinoise map; metres; frame of the first camera\n\
+         element vertex {}\n\
+         property float x\nproperty float y\nproperty float z\n\
+         property float nx\nproperty float ny\nproperty float nz\n\
+         property uchar red\nproperty uchar green\nproperty uchar blue\n\
+         property float sigma\nend_header\n",
+        points.len()
+    );
+    let mut bytes = Vec::with_capacity(header.len() + points.len() * 31);
+    bytes.extend_from_slice(header.as_bytes());
+    for point in points {
+        for v in point.at.iter().chain(point.normal.iter()) {
+            bytes.extend_from_slice(&v.to_le_bytes());
+        }
+        bytes.extend_from_slice(&point.colour);
+        bytes.extend_from_slice(&point.sigma.to_le_bytes());
+    }
+    bytes
+}
+
+/// Side of a cell, m.
 const SIDE_M: f32 = 0.03;
 /// For what was never seen in colour.
 const GREY: [u8; 3] = [160; 3];
 
 /// Means weighted by information, 1 / sigma^2.
 #[derive(Debug, Clone, Default)]
-pub struct GridMap {
-    cells: Cells,
+pub struct PointGrid {
+    cells: SparseGrid,
     sums: Vec<Sum>,
 }
 
@@ -42,17 +65,17 @@ struct Sum {
     coloured: f32,
 }
 
-impl GridMap {
+impl PointGrid {
     pub fn add(&mut self, points: &[Point], pose: &Isometry3<f64>, rgb: Option<&[u8]>) {
         let motion = Motion::of(pose);
         for point in points {
             let at = motion.moved(&point.at);
-            let index = self.cells.add(place_of(&at, 1.0 / SIDE_M));
+            let index = self.cells.insert(cell_of(&at, 1.0 / SIDE_M));
             if index == self.sums.len() {
                 self.sums.push(Sum { first: at, ..Sum::default() });
             }
             let sum = &mut self.sums[index];
-            let information = point.across.powi(-2);
+            let information = point.sigma_normal.powi(-2);
             sum.information += information;
             sum.off += (at - sum.first) * information;
             sum.normal += motion.turned(&point.normal) * information;
@@ -68,13 +91,19 @@ impl GridMap {
             at: sum.first + sum.off / sum.information,
             normal: sum.normal.try_normalize(f32::MIN_POSITIVE).unwrap_or_else(Vector3::z),
             sigma: sum.information.powf(-0.5),
-            colour: colour_or_grey(sum.colour, sum.coloured),
+            colour: mean_colour(sum.colour, sum.coloured),
         };
         self.sums.iter().map(point).collect()
     }
 }
 
-/// The mean colour of `n` sums, or grey.
-pub fn colour_or_grey(sum: Vector3<f32>, n: f32) -> [u8; 3] {
+/// Red, green and blue of a pixel, 0 to 255.
+pub fn colour_of(rgb: &[u8], pixel: u32) -> Vector3<f32> {
+    let i = 3 * pixel as usize;
+    Vector3::new(rgb[i], rgb[i + 1], rgb[i + 2]).map(f32::from)
+}
+
+/// Of a sum of `n` colours; grey of none.
+pub fn mean_colour(sum: Vector3<f32>, n: f32) -> [u8; 3] {
     if n > 0.0 { [0, 1, 2].map(|k| (sum[k] / n).round().clamp(0.0, 255.0) as u8) } else { GREY }
 }

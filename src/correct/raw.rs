@@ -1,31 +1,31 @@
-//! From corrected depths to words that are never "no measurement".
+//! From corrected depths to raw values that are never "no measurement".
 
 use crate::frame::{DepthCode, FARTHEST_M};
 
 /// A depth code with its ends.
 #[derive(Debug, Clone)]
-pub(super) struct Words {
-    code: DepthCode,
-    /// Words of the least and of the greatest depth.
+pub(super) struct RawCode {
+    pub code: DepthCode,
+    /// Raw values of the smallest and of the greatest depth.
     near: u16,
     far: u16,
 }
 
-impl Words {
+impl RawCode {
     pub fn of(code: DepthCode) -> Self {
         let metres = |word: &u16| code.metres(*word).unwrap_or(f64::NAN);
         let valid = || (0..=u16::MAX).filter(|&w| code.metres(w).is_some_and(|z| code.raw(z) == w));
         let near = valid().min_by(|a, b| metres(a).total_cmp(&metres(b)));
         let far = valid().max_by(|a, b| metres(a).total_cmp(&metres(b)));
-        Words { code, near: near.unwrap_or(0), far: far.unwrap_or(0) }
+        RawCode { code, near: near.unwrap_or(0), far: far.unwrap_or(0) }
     }
 
-    /// Depth of the farthest word, m.
-    pub fn farthest_m(&self) -> f64 {
+    /// The greatest depth, m.
+    pub fn max_m(&self) -> f64 {
         self.code.metres(self.far).unwrap_or(0.0)
     }
 
-    /// The word nearest to a positive depth (m), and whether the code ended before it.
+    /// The raw value nearest to a positive depth (m), and whether the code ended before it.
     pub fn nearest(&self, z: f32) -> (u16, bool) {
         let metres = |word| self.code.metres(word).unwrap_or(f64::NAN);
         for (end, beyond) in
@@ -46,14 +46,14 @@ impl Words {
     }
 }
 
-/// Words a metre to choose from, the finest first.
+/// Raw values a metre to choose from, the finest first.
 const UNITS: [f64; 6] = [10_000.0, 5000.0, 2000.0, 1000.0, 500.0, TOP / FARTHEST_M];
-/// The greatest word that a depth can have.
+/// The greatest raw value that a depth can have.
 const TOP: f64 = 65534.0;
 
-/// The finest code in metres that reaches `farthest_m`.
-pub(super) fn metric(farthest_m: f64) -> DepthCode {
-    let fits = |units: &&f64| farthest_m * **units <= TOP;
+/// The finest code in metres that reaches `max_m`.
+pub(super) fn metric(max_m: f64) -> DepthCode {
+    let fits = |units: &&f64| max_m * **units <= TOP;
     let units_per_metre = *UNITS.iter().find(fits).unwrap_or(&UNITS[UNITS.len() - 1]);
     DepthCode::Metric { units_per_metre, invalid: 0 }
 }
@@ -66,12 +66,12 @@ mod tests {
         DepthCode::Disparity { offset: 3.3309495161, slope: -0.0030711016, invalid: 2047 };
 
     #[test]
-    fn every_depth_has_a_word_that_is_a_measurement() {
+    fn every_depth_has_a_raw_value_that_is_a_measurement() {
         let odd = DepthCode::Metric { units_per_metre: 1000.0, invalid: 2000 };
         for code in [KINECT, odd, metric(4.0), metric(99.0)] {
-            let words = Words::of(code);
+            let raw = RawCode::of(code);
             for z in [1e-6, 0.3, 0.5, 1.999, 2.0, 2.001, 8.0, 70.0, 1e6, f32::INFINITY] {
-                let (word, clamped) = words.nearest(z);
+                let (word, clamped) = raw.nearest(z);
                 let back = code.metres(word).expect("a measurement");
                 let off = (back - f64::from(z)).abs();
                 let step = code.step_inverse(back) * back * back;
@@ -81,12 +81,12 @@ mod tests {
     }
 
     #[test]
-    fn words_that_are_measurements_stay() {
+    fn raw_values_that_are_measurements_stay() {
         for code in [KINECT, metric(4.0)] {
-            let words = Words::of(code);
+            let raw = RawCode::of(code);
             for word in 1..1000 {
                 let z = code.metres(word).expect("a measurement") as f32;
-                assert_eq!(words.nearest(z), (word, false));
+                assert_eq!(raw.nearest(z), (word, false));
             }
         }
     }

@@ -1,4 +1,4 @@
-//! The rigid motion that most pairs of points agree on: RANSAC, seeded.
+//! The rigid motion that most pairs of points agree on: RANSAC (Fischler and Bolles 1981), seeded.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -8,53 +8,45 @@ use crate::rng::Stream;
 /// Where a point is in the target's frame, and where in the source's, m.
 pub type PointPair = (Vector3<f64>, Vector3<f64>);
 
-/// The paper's.
-pub const WITHIN_M: f64 = 0.05;
-pub const TRIES: usize = 500;
+/// The paper's inlier threshold and number of hypotheses.
+const MAX_DISTANCE_M: f64 = 0.05;
+const HYPOTHESES: usize = 500;
 
 /// Three points make a motion; as many again that agree make it more than chance.
-const MIN_AGREED: usize = 8;
+const MIN_INLIERS: usize = 8;
 
-/// A motion and who agrees with it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Agreed {
-    pub target_from_source: Isometry3<f64>,
-    pub pairs: usize,
-}
-
-/// The motion that brings most pairs together, fitted to all of those; `None` where too few agree.
-pub fn agreed(pairs: &[PointPair], rng: &mut Stream) -> Option<Agreed> {
-    if pairs.len() < MIN_AGREED {
+/// `target_from_source` that brings most pairs together, fitted to all of those; `None` where too few
+/// agree.
+pub fn ransac(pairs: &[PointPair], rng: &mut Stream) -> Option<Isometry3<f64>> {
+    if pairs.len() < MIN_INLIERS {
         return None;
     }
     let mut best: Option<(usize, Isometry3<f64>)> = None;
-    for _ in 0..TRIES {
+    for _ in 0..HYPOTHESES {
         let three: Vec<PointPair> =
             rand::seq::index::sample(rng, pairs.len(), 3).iter().map(|i| pairs[i]).collect();
         let Some(motion) = align(&three) else { continue };
         let votes = pairs.iter().filter(|p| agrees(&motion, p)).count();
-        if best.is_none_or(|(most, _)| votes > most) {
+        if best.is_none_or(|(highest, _)| votes > highest) {
             best = Some((votes, motion));
         }
     }
-    // Once more over all who agree, and over those who agree with that.
+    // Once more over all inliers, and over the inliers of that.
     let mut motion = best?.1;
-    let mut count = 0;
     for _ in 0..2 {
-        let agreeing: Vec<PointPair> =
+        let inliers: Vec<PointPair> =
             pairs.iter().filter(|p| agrees(&motion, p)).copied().collect();
-        count = agreeing.len();
-        if count < MIN_AGREED {
+        if inliers.len() < MIN_INLIERS {
             return None;
         }
-        motion = align(&agreeing)?;
+        motion = align(&inliers)?;
     }
-    Some(Agreed { target_from_source: motion, pairs: count })
+    Some(motion)
 }
 
 fn agrees(motion: &Isometry3<f64>, (to, from): &PointPair) -> bool {
     let moved = motion.rotation * from + motion.translation.vector;
-    (moved - to).norm_squared() < WITHIN_M * WITHIN_M
+    (moved - to).norm_squared() < MAX_DISTANCE_M * MAX_DISTANCE_M
 }
 
 #[cfg(test)]
@@ -76,10 +68,10 @@ mod tests {
             let error = place() * 0.0005;
             pairs.push((truth * nalgebra::Point3::from(p) - nalgebra::Point3::from(-error), p));
         }
-        let pairs: Vec<PointPair> = pairs;
-        let told = agreed(&pairs, &mut Seed(1).stream("ransac")).unwrap();
-        let error = told.target_from_source * truth.inverse();
-        assert!(told.pairs >= 60 && told.pairs < 66, "{}", told.pairs);
+        let found = ransac(&pairs, &mut Seed(1).stream("ransac")).unwrap();
+        let error = found * truth.inverse();
+        let inliers = pairs.iter().filter(|p| agrees(&found, p)).count();
+        assert!((60..66).contains(&inliers), "{inliers}");
         assert!(error.translation.vector.norm() < 2e-3 && error.rotation.angle() < 2e-3);
     }
 
@@ -88,7 +80,7 @@ mod tests {
         let mut rng = Seed(5).stream("pairs");
         let mut place = || Vector3::from_fn(|_, _| rng.random_range(-2.0..2.0));
         let pairs: Vec<PointPair> = (0..60).map(|_| (place(), place())).collect();
-        assert_eq!(agreed(&pairs, &mut Seed(1).stream("ransac")), None);
-        assert_eq!(agreed(&pairs[..2], &mut Seed(1).stream("ransac")), None);
+        assert_eq!(ransac(&pairs, &mut Seed(1).stream("ransac")), None);
+        assert_eq!(ransac(&pairs[..2], &mut Seed(1).stream("ransac")), None);
     }
 }

@@ -1,0 +1,270 @@
+//! What a model says about a sensor's biases, ready to be taken out of its depth.
+
+use super::locking::Locking;
+use super::slopes::Noise;
+use crate::camera::{Camera, Rays};
+use crate::effects::{Active, KINECT_BASELINE_M};
+use crate::error::{Error, Result};
+use crate::model::{self, NoiseModel};
+use crate::terms::{Basis, Coordinate, Modulation, Needs, Pixels, Statistic, Term};
+use crate::view::Sensor;
+
+/// What is known of a frame beside its depths.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Conditions {
+    /// Since the session began, s.
+    pub session_s: f64,
+    /// Degrees Celsius.
+    pub temperature_c: Option<f64>,
+    /// lx.
+    pub ambient_lux: Option<f64>,
+}
+
+impl Conditions {
+    /// A curve over the temperature needs a thermometer.
+    pub(super) fn determine(&self, term: &Term) -> bool {
+        self.temperature_c.is_some() || !term.needs().temperature
+    }
+}
+
+/// The biases of a sensor, ready to be taken out of its depth images.
+#[derive(Debug, Clone)]
+pub struct Correction {
+    pub(super) camera: Camera,
+    pub(super) rays: Rays,
+    /// Disparity in px times depth in m, as the model counts it.
+    pub(super) scale_px_m: f64,
+    /// Stored depth over true depth, the same everywhere.
+    scale: f64,
+    drifts: Vec<Drift>,
+    /// Stored depth over true depth of each pixel; empty where it is one.
+    along_ray: Vec<f32>,
+    /// Error of the disparity of each pixel whatever it sees, px; empty where there is none.
+    still: Vec<f32>,
+    locking: Option<Locking>,
+    /// What depends on more than the pixel.
+    pub(super) terms: Vec<Term>,
+    pub(super) needs: Needs,
+    pub(super) noise: Noise,
+    ignored: Vec<String>,
+    remarks: Vec<String>,
+}
+
+/// Warm-up: depth drifts by `relative` with a time constant.
+#[derive(Debug, Clone, Copy)]
+struct Drift {
+    relative: f64,
+    time_constant_s: f64,
+}
+
+/// Baselines or focal lengths this far apart are not the same sensor's.
+const SAME_SENSOR: f64 = 0.01;
+
+impl Correction {
+    /// What `model` says about `sensor`.
+    ///
+    /// # Errors
+    /// When the model is of a sensor of another resolution, or holds what the catalogue has not.
+    pub fn of(model: &NoiseModel, sensor: &Sensor) -> Result<Self> {
+        let of_model =
+            model.sensor.clone().map(|file| file.sensor()).transpose().map_err(|what| {
+                Error::Argument { what: format!("the model's sensor: {what}"), remedy: REMEDY }
+            })?;
+        if let Some(other) = &of_model {
+            refuse_other_size(other, sensor)?;
+        }
+        let camera = sensor.camera.clone();
+        // Terms are in px of the disparity that the model counts.
+        let scale_px_m = of_model
+            .as_ref()
+            .and_then(Sensor::disparity_px_m)
+            .or(sensor.disparity_px_m())
+            .unwrap_or(camera.fx * KINECT_BASELINE_M);
+        let mut correction = Correction {
+            rays: camera.rays(),
+            scale_px_m,
+            scale: 1.0,
+            drifts: Vec::new(),
+            along_ray: Vec::new(),
+            still: Vec::new(),
+            locking: None,
+            terms: Vec::new(),
+            needs: Needs::default(),
+            noise: Noise::of(&model.sigma, scale_px_m),
+            ignored: Vec::new(),
+            remarks: of_model.iter().flat_map(|other| differences(other, sensor)).collect(),
+            camera,
+        };
+        for entry in &model.effects {
+            correction.add(entry)?;
+        }
+        correction.settle();
+        Ok(correction)
+    }
+
+    /// Is there nothing to take out?
+    pub fn is_identity(&self) -> bool {
+        self.scale == 1.0
+            && self.drifts.is_empty()
+            && self.along_ray.is_empty()
+            && self.still.is_empty()
+            && self.locking.is_none()
+            && self.terms.is_empty()
+    }
+
+    /// Ids of the model's entries, or parts of them, that are no bias of the sensor.
+    pub fn ignored(&self) -> &[String] {
+        &self.ignored
+    }
+
+    /// What is odd about model and sensor together, in sentences.
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
+    }
+
+    /// Stored depth over true depth, the same everywhere in a frame.
+    pub(super) fn factor(&self, conditions: &Conditions) -> f64 {
+        let drift =
+            |d: &Drift| 1.0 - d.relative * (-conditions.session_s / d.time_constant_s).exp_m1();
+        self.scale * self.drifts.iter().map(drift).product::<f64>()
+    }
+
+    /// Disparity without the driver's errors and those of the pixel and of its phase, px.
+    pub(super) fn disparity(&self, i: usize, z: f32, factor: f64) -> f64 {
+        let along = self.along_ray.get(i).copied().map_or(1.0, f64::from);
+        let still = self.still.get(i).copied().map_or(0.0, f64::from);
+        let d = self.scale_px_m * factor * along / f64::from(z) - still;
+        self.locking.as_ref().map_or(d, |locking| locking.unlock(d))
+    }
+
+    fn add(&mut self, entry: &model::Effect) -> Result<()> {
+        if entry.shape.is_empty() {
+            return self.add_formula(entry);
+        }
+        let usable = |t: &&Term| t.is_sensor_bias() && !t.needs().light;
+        self.terms.extend(entry.shape.iter().filter(usable).cloned());
+        if !entry.shape.iter().all(|t| usable(&t)) {
+            self.ignored.push(entry.id.clone());
+        }
+        Ok(())
+    }
+
+    /// An entry that the catalogue's formula stands for.
+    fn add_formula(&mut self, entry: &model::Effect) -> Result<()> {
+        let active = Active::from_model(&entry.id, &entry.parameters)?;
+        if active.is_identity() {
+            return Ok(());
+        }
+        let at = |index: usize| active.settings.at(index);
+        let camera = &self.camera;
+        match entry.id.as_str() {
+            "depth-scale" => self.scale *= at(0),
+            "thermal-drift" => {
+                self.drifts.push(Drift { relative: at(0), time_constant_s: at(1) });
+            }
+            "range-not-depth" => self.along_ray = self.ray_over_depth(at(0)),
+            "disparity-offset" => self.terms.push(bias(Basis::Level, vec![at(0)])),
+            "radial-disparity-bias" => {
+                let bowl = Basis::Bowl { disparity_power: 0.0, orders: 1 };
+                self.terms.push(bias(bowl, vec![at(0)]));
+            }
+            "lens-distortion" => {
+                let lens = Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 1 };
+                self.terms.push(bias(lens, vec![at(0)]));
+            }
+            "column-banding" => {
+                let teeth = saw_tooth(camera.width, camera.cx, at(0), at(1));
+                let columns = Basis::Curve {
+                    over: Coordinate::Column,
+                    low: 0.0,
+                    high: (camera.width.max(2) - 1) as f64,
+                    nodes: teeth.len(),
+                    times: Modulation::One,
+                };
+                self.terms.push(bias(columns, teeth));
+            }
+            "pixel-locking" => self.locking = Some(Locking::new(at(0))),
+            id => self.ignored.push(id.into()),
+        }
+        Ok(())
+    }
+
+    /// 1 + share (ray length over depth - 1), of each pixel.
+    fn ray_over_depth(&self, share: f64) -> Vec<f32> {
+        let factor = |i: usize| {
+            let (x, y) = self.rays.at(i);
+            (1.0 + share * ((1.0 + x * x + y * y).sqrt() - 1.0)) as f32
+        };
+        (0..self.camera.pixels()).map(factor).collect()
+    }
+
+    /// Terms that depend on the pixel alone are added up once for all images.
+    fn settle(&mut self) {
+        let (still, other): (Vec<Term>, Vec<Term>) =
+            self.terms.drain(..).partition(|t| t.needs() == Needs::default());
+        self.terms = other;
+        self.needs = Needs::of(&self.terms);
+        if !still.is_empty() {
+            let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
+            let mut scratch = Vec::new();
+            let mut sum = |i: usize| {
+                let place = pixels.place(i);
+                still.iter().map(|t| t.value(&place, &mut scratch)).sum::<f64>() as f32
+            };
+            self.still = (0..self.camera.pixels()).map(&mut sum).collect();
+        }
+    }
+}
+
+fn bias(basis: Basis, coefficients: Vec<f64>) -> Term {
+    Term { statistic: Statistic::Bias, basis, coefficients }
+}
+
+/// What rounding a correction that is linear in the column to whole steps leaves, px.
+fn saw_tooth(width: usize, cx: f64, amplitude_px: f64, period_px: f64) -> Vec<f64> {
+    let tooth = |u: usize| {
+        let steps = (u as f64 - cx) / period_px;
+        2.0 * amplitude_px * (steps.round() - steps)
+    };
+    (0..width.max(2)).map(tooth).collect()
+}
+
+const REMEDY: &str = "give the model that was made of this very sensor";
+
+fn refuse_other_size(model: &Sensor, sensor: &Sensor) -> Result<()> {
+    let size = |s: &Sensor| [s.camera.width, s.camera.height];
+    if size(model) == size(sensor) {
+        return Ok(());
+    }
+    let ([mw, mh], [w, h]) = (size(model), size(sensor));
+    Err(Error::Argument {
+        what: format!(
+            "the model's sensor has {mw} x {mh} px, the recording's {w} x {h}: its errors lie elsewhere"
+        ),
+        remedy: REMEDY,
+    })
+}
+
+/// Signs that two descriptions may not be of one sensor.
+fn differences(model: &Sensor, sensor: &Sensor) -> Vec<String> {
+    let far = |a: f64, b: f64| (a / b - 1.0).abs() > SAME_SENSOR;
+    let mut differences = Vec::new();
+    if let (Some(a), Some(b)) = (&model.serial, &sensor.serial)
+        && a != b
+    {
+        differences.push(format!("the model is of unit {a}, the recording of unit {b}"));
+    }
+    let (a, b) = (&model.camera, &sensor.camera);
+    if far(a.fx, b.fx) || far(a.fy, b.fy) {
+        differences.push(format!(
+            "the model's focal lengths are {:.1}, {:.1} px, the recording's {:.1}, {:.1}",
+            a.fx, a.fy, b.fx, b.fy
+        ));
+    }
+    if let (Some(a), Some(b)) = (model.baseline_m, sensor.baseline_m)
+        && far(a, b)
+    {
+        differences.push(format!("the model's baseline is {a} m, the recording's {b}"));
+    }
+    differences
+}
