@@ -1,4 +1,4 @@
-//! The knobs of the Kinect by light: causes, never errors.
+//! What can be set about the simulated Kinect: causes, never errors.
 
 use crate::error::{Error, Result};
 

@@ -1,10 +1,10 @@
-//! The dots a projector sends out: fixed for the life of the unit.
+//! The dots a projector sends out, fixed for the life of the unit, and their laser speckle.
 
 use rand::Rng;
 use rand::seq::SliceRandom;
-use rand_distr::{Distribution, Gamma};
+use rand_distr::{Distribution, Gamma, StandardNormal};
 
-use crate::rng::Seed;
+use crate::rng::{Seed, Stream};
 
 /// One beam of the projector.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,7 +25,7 @@ pub struct Pattern {
 /// The pattern is the unit's own, whatever the seed of a simulation.
 const UNIT: Seed = Seed(0x4b69_6e65_6374);
 /// Three tiles of 211 places span the 640 columns (Reichinger, "Kinect Pattern Uncovered", from
-/// memory; physics.md, 13).
+/// memory).
 const PITCH_PX: f64 = 640.0 / 633.0;
 /// Places that hold a dot: about one in nine, a 9 x 9 window sees nine (same source).
 const FILLED: f64 = 0.11;
@@ -87,6 +87,40 @@ fn free_places(columns: usize, rows: usize) -> Vec<usize> {
     // In reading order: memory is walked forward when the dots are drawn.
     chosen.sort_unstable();
     chosen
+}
+
+/// What laser speckle makes of one dot: on a rough surface it is a handful of bright grains.
+///
+/// Grains are placed by the roughness, so they stand still while the scene does. With M grains a
+/// dot's light has the contrast 1 / sqrt(M), and its centre of light lies off by 1 / sqrt(M) of its
+/// radius: the limit of every triangulation with coherent light (Dorsch, Haeusler and Herrmann
+/// 1994, from memory).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grain {
+    /// Light over that of the smooth dot.
+    pub light: f64,
+    /// Shift of its centre along the pattern's x and y, in standard deviations of the beam.
+    pub aside: [f64; 2],
+}
+
+impl Grain {
+    /// A smooth dot.
+    pub const NONE: Grain = Grain { light: 1.0, aside: [0.0; 2] };
+
+    /// Of `count` dots, in their order; `contrast` is sd over mean of a dot's light.
+    pub fn draw(count: usize, contrast: f64, rng: &mut Stream) -> Vec<Grain> {
+        if contrast == 0.0 {
+            return vec![Grain::NONE; count];
+        }
+        let gamma = Gamma::new(contrast.powi(-2), contrast * contrast).expect("positive");
+        let normal = |rng: &mut Stream| -> f64 {
+            let n: f64 = StandardNormal.sample(rng);
+            contrast * n
+        };
+        (0..count)
+            .map(|_| Grain { light: gamma.sample(rng), aside: [normal(rng), normal(rng)] })
+            .collect()
+    }
 }
 
 #[cfg(test)]
