@@ -6,4 +6,4 @@ mod bench;
 mod world;
 
 pub use bench::{Bench, Board, PATCH_SIDE_M, Patch, Print, Target, WHITE};
-pub use world::{Hit, Nothing, Seen, Surface, TargetFrame, World};
+pub use world::{Hit, Seen, Surface, TargetFrame, World};

@@ -66,14 +66,6 @@ pub struct Surface {
     pub theta_rad: Option<f64>,
 }
 
-/// [`Seen::surface`] of a pixel that looks past everything.
-#[derive(Debug, Clone, Copy)]
-pub struct Nothing;
-
-impl Nothing {
-    pub const SURFACE: u16 = u16::MAX;
-}
-
 /// Per pixel, row-major.
 #[derive(Debug, Clone)]
 pub struct Seen {
@@ -83,6 +75,7 @@ pub struct Seen {
     pub depth: Vec<f32>,
     /// Unit normal towards the camera.
     pub normal: Vec<[f32; 3]>,
+    /// Index into `surfaces`; [`Seen::NOTHING`] past everything.
     pub surface: Vec<u16>,
     /// Share of infrared light given back.
     pub albedo: Vec<f32>,
@@ -91,6 +84,8 @@ pub struct Seen {
 }
 
 impl Seen {
+    pub const NOTHING: u16 = u16::MAX;
+
     /// Cast the rays of all pixels from the camera's centre.
     pub fn of(world: &dyn World, camera: &Camera, rays: &Rays) -> Self {
         let hits: Vec<_> = (0..camera.pixels())
@@ -114,19 +109,23 @@ impl Seen {
             // The ray's third component is one: its parameter is the depth.
             seen.depth.push(hit.map_or(f32::NAN, |h| h.t as f32));
             seen.normal.push(hit.map_or([0.0; 3], |h| h.normal.cast::<f32>().into()));
-            seen.surface.push(hit.map_or(Nothing::SURFACE, |h| h.surface));
+            seen.surface.push(hit.map_or(Self::NOTHING, |h| h.surface));
             seen.albedo.push(hit.map_or(0.0, |h| h.albedo as f32));
         }
         seen
     }
 
+    fn surface_at(&self, i: usize) -> Option<&Surface> {
+        self.surfaces.get(usize::from(self.surface[i]))
+    }
+
     pub fn is_target(&self, i: usize) -> bool {
-        self.surfaces.get(usize::from(self.surface[i])).is_some_and(|s| s.is_target)
+        self.surface_at(i).is_some_and(|s| s.is_target)
     }
 
     /// Tilt of the surface at pixel `i` against the optical axis, rad.
     pub fn theta(&self, i: usize) -> f64 {
-        let flat = self.surfaces.get(usize::from(self.surface[i])).and_then(|s| s.theta_rad);
+        let flat = self.surface_at(i).and_then(|s| s.theta_rad);
         flat.unwrap_or_else(|| f64::from(self.normal[i][2].abs().min(1.0)).acos())
     }
 

@@ -78,7 +78,7 @@ pub fn plan_on(
             ..Bench::bare(*plane, Target::Wall)
         },
         mask: Some(mask),
-        // As measured; where nobody looked, the same in all views.
+        // As measured; where it was not, the same in all views.
         ambient_lux: notes.ambient_lux.unwrap_or(ROOM_LUX),
         stamps,
         notes,

@@ -1,9 +1,9 @@
-//! Recordings that nobody took: by formula, by speckle, or as a film of a room.
+//! Recordings that no sensor took: by formula, by speckle, or as a film of a room.
 //!
 //! A [`Shoot`] is a list of [`ViewPlan`]s and a sensor. Its physics is sigma(z, theta) with the
 //! effects of the catalogue ([`FormulaSensor`]), or a Kinect of dots and a matcher in which errors
 //! arise by themselves ([`speckle`]). Output is written in the recording layout and read back by the
-//! same reader as real data; nothing in it tells what was switched on.
+//! same reader as real data; nothing in it says what was switched on.
 
 mod formula;
 mod grid;

@@ -45,7 +45,7 @@ type Memory = HashMap<&'static str, Vec<f32>>;
 const FRAMES_A_THREAD: usize = 2;
 
 impl Film {
-    /// What the TUM layout stores: 1/5000 m, and no word for nothing but 0.
+    /// What the TUM layout stores: 1/5000 m, and 0 for nothing.
     pub const CODE: DepthCode = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
 
     /// A Kinect v1 with the intrinsics that readers of the TUM layout assume (525 px, ROS default),

@@ -9,7 +9,7 @@ use super::body::{PosedBody, Room, Window};
 use super::shading::{Light, SurfacePoint};
 use super::shape::Intersection;
 use crate::camera::{Camera, Rays};
-use crate::scene::{Nothing, Seen, World};
+use crate::scene::{Seen, World};
 
 /// A frame of colour and of true depth.
 #[derive(Debug, Clone)]
@@ -96,7 +96,7 @@ impl<'a> RoomCamera<'a> {
                 height: self.camera.height,
                 depth: vec![f32::NAN; pixels],
                 normal: vec![[0.0; 3]; pixels],
-                surface: vec![Nothing::SURFACE; pixels],
+                surface: vec![Seen::NOTHING; pixels],
                 albedo: vec![0.0; pixels],
                 surfaces: self.room.surfaces(),
                 target: None,

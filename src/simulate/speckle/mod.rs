@@ -23,5 +23,4 @@ mod reference;
 mod sensor;
 
 pub use causes::{Cause, Causes, KNOWN_CAUSES};
-pub use pattern::{Dot, Pattern};
 pub use sensor::{Filming, SpeckleSensor, SpeckleShot};

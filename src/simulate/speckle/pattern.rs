@@ -47,7 +47,7 @@ impl Pattern {
         let pitch = PITCH_PX / focal_px;
         let places = |[low, high]: [f64; 2]| ((high - low) / pitch).ceil() as usize + 1;
         let (columns, rows) = (places(field.x), places(field.y));
-        let energy = Gamma::new(ENERGY_SHAPE, 1.0 / ENERGY_SHAPE).expect("positive parameters");
+        let energy = Gamma::new(ENERGY_SHAPE, 1.0 / ENERGY_SHAPE);
         let mut rng = UNIT.stream("simulate/speckle/energy");
         let mut aside = UNIT.stream("simulate/speckle/aside");
         // Anywhere in its place: on a strict grid of nearly a pixel's pitch all dots of a column
@@ -56,7 +56,7 @@ impl Pattern {
         let dot = |place: usize| Dot {
             x: field.x[0] + within(place % columns),
             y: field.y[0] + within(place / columns),
-            energy: energy.sample(&mut rng),
+            energy: energy.as_ref().map_or(1.0, |e| e.sample(&mut rng)),
         };
         Pattern { dots: free_places(columns, rows).into_iter().map(dot).collect() }
     }
@@ -109,10 +109,10 @@ impl Grain {
 
     /// Of `count` dots, in their order; `contrast` is sd over mean of a dot's light.
     pub fn draw(count: usize, contrast: f64, rng: &mut Stream) -> Vec<Grain> {
-        if contrast == 0.0 {
+        // There is no such distribution without contrast.
+        let Ok(gamma) = Gamma::new(contrast.powi(-2), contrast * contrast) else {
             return vec![Grain::NONE; count];
-        }
-        let gamma = Gamma::new(contrast.powi(-2), contrast * contrast).expect("positive");
+        };
         let normal = |rng: &mut Stream| -> f64 {
             let n: f64 = StandardNormal.sample(rng);
             contrast * n

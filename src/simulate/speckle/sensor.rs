@@ -95,7 +95,7 @@ impl SpeckleSensor {
         let confidence = self.causes.confidence as f32;
         let value = |(&shift, &correlation): (&f32, &f32)| {
             let sure = shift.is_finite() && correlation >= confidence;
-            if sure { self.read_out.word(shift) } else { KINECT_NO_MEASUREMENT }
+            if sure { self.read_out.raw(shift) } else { KINECT_NO_MEASUREMENT }
         };
         Frame {
             width: infrared.width,
@@ -145,13 +145,10 @@ impl Filming<'_> {
 
 /// The sensor's own lens, and what is wrong with it on top.
 fn with_unknown_lens(camera: &Camera, causes: &Causes) -> Camera {
-    let mut true_camera = camera.clone();
-    if causes.lens_k1 != 0.0 || causes.lens_k2 != 0.0 {
-        let known = camera.distortion.unwrap_or_default();
-        let [k1, k2, p1, p2, k3] = known;
-        true_camera.distortion = Some([k1 + causes.lens_k1, k2 + causes.lens_k2, p1, p2, k3]);
-    }
-    true_camera
+    let [k1, k2, p1, p2, k3] = camera.distortion.unwrap_or_default();
+    let bent = [k1 + causes.lens_k1, k2 + causes.lens_k2, p1, p2, k3];
+    let unknown = causes.lens_k1 != 0.0 || causes.lens_k2 != 0.0;
+    Camera { distortion: if unknown { Some(bent) } else { camera.distortion }, ..camera.clone() }
 }
 
 /// Dots wherever picture or reference can see one.
