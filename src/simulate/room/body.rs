@@ -80,9 +80,6 @@ pub type Window = [[f64; 2]; 2];
 
 const EVERYWHERE: Window = [[f64::NEG_INFINITY; 2], [f64::INFINITY; 2]];
 
-/// A corner nearer to the camera's plane than this projects to nowhere, m.
-const MIN_DEPTH_M: f64 = 1e-3;
-
 impl<'a> PosedBody<'a> {
     fn new(index: usize, body: &'a Body, room_from_camera: &Isometry3<f64>) -> Self {
         let camera_from_body = room_from_camera.inv_mul(&body.room_from_body);
@@ -112,13 +109,16 @@ impl<'a> PosedBody<'a> {
         if corners.iter().all(|c| c.z <= 0.0) {
             return None;
         }
-        if corners.iter().any(|c| c.z < MIN_DEPTH_M) {
-            return Some(EVERYWHERE);
-        }
-        let extreme = |k: usize, pick: fn(f64, f64) -> f64| {
-            corners.iter().map(|c| c[k] / c.z).reduce(pick).unwrap_or(f64::NAN)
+        let crosses = corners.iter().any(|c| c.z <= 0.0);
+        let bound = |k: usize, sign: f64| {
+            // What passes the camera's plane goes on without end to the side it is on.
+            if crosses && corners.iter().any(|c| sign * c[k] > 0.0) {
+                return sign * f64::INFINITY;
+            }
+            let ahead = corners.iter().filter(|c| c.z > 0.0).map(|c| sign * c[k] / c.z);
+            sign * ahead.fold(f64::NEG_INFINITY, f64::max)
         };
-        Some([[0, 1].map(|k| extreme(k, f64::min)), [0, 1].map(|k| extreme(k, f64::max))])
+        Some([[0, 1].map(|k| bound(k, -1.0)), [0, 1].map(|k| bound(k, 1.0))])
     }
 
     #[inline]

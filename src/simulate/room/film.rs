@@ -183,6 +183,7 @@ impl<'a> Shutter<'a> {
         *memory = shooting.into_memory();
         shot.depth
     }
+
     /// Of every pixel, m; zero where there is nothing.
     fn sigma_of(&self, seen: &Seen) -> Vec<f32> {
         let of = |(&z, normal): (&f32, &[f32; 3])| {

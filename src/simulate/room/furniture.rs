@@ -138,11 +138,11 @@ pub fn paper([x, y, z]: [f64; 3], turn_deg: f64, which: usize) -> Part {
 
 /// A stack, from the bottom up: how far each book is turned.
 pub fn books([x, y, mut z]: [f64; 3], turns_deg: &[f64], first: usize) -> Vec<Part> {
-    let book = |(k, &turn): (usize, &f64)| {
+    let book = |(k, &turn_deg): (usize, &f64)| {
         let (cover, spine) = (picture(POSTERS + (first + k) % 6), picture(LABELS + k % 3));
         let (shrink, thick) = (1.0 - 0.06 * k as f64, 0.028 + 0.012 * (k % 2) as f64);
         let size = [0.17 * shrink, 0.24 * shrink, thick];
-        let book = cuboid([x, y, z], size, turn, plain([0.94, 0.92, 0.86]));
+        let book = cuboid([x, y, z], size, turn_deg, plain([0.94, 0.92, 0.86]));
         z += thick;
         book.face(Shape::TOP, cover).face(Shape::FRONT, spine).face(Shape::LEFT, spine)
     };

@@ -56,12 +56,12 @@ impl Shape {
         direction: &Vector3<f64>,
     ) -> Option<Intersection> {
         match self {
-            Shape::Cuboid(half) => intersect_cuboid(half, origin, direction),
-            Shape::Ball(radius) => intersect_ball(*radius, origin, direction),
+            Shape::Cuboid(half) => hit_cuboid(half, origin, direction),
+            Shape::Ball(radius) => hit_ball(*radius, origin, direction),
             Shape::Drum { radius, half_height } => {
-                intersect_drum(*radius, *half_height, origin, direction)
+                hit_drum(*radius, *half_height, origin, direction)
             }
-            Shape::Shell(half) => intersect_shell(half, origin, direction),
+            Shape::Shell(half) => hit_shell(half, origin, direction),
         }
     }
 
@@ -185,20 +185,12 @@ fn slabs(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> (f64, f64, 
     (near, far, face)
 }
 
-fn intersect_cuboid(
-    half: &Vector3<f64>,
-    o: &Vector3<f64>,
-    d: &Vector3<f64>,
-) -> Option<Intersection> {
+fn hit_cuboid(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersection> {
     let (near, far, face) = slabs(half, o, d);
     (near <= far && near > 0.0).then_some(Intersection { t: near, face })
 }
 
-fn intersect_shell(
-    half: &Vector3<f64>,
-    o: &Vector3<f64>,
-    d: &Vector3<f64>,
-) -> Option<Intersection> {
+fn hit_shell(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersection> {
     let mut hit = Intersection { t: f64::INFINITY, face: 0 };
     for k in 0..3 {
         let t = (half[k].copysign(d[k]) - o[k]) / d[k];
@@ -209,7 +201,7 @@ fn intersect_shell(
     (hit.t > 0.0 && hit.t.is_finite()).then_some(hit)
 }
 
-fn intersect_ball(radius: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersection> {
+fn hit_ball(radius: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersection> {
     let (a, b) = (d.norm_squared(), o.dot(d));
     let discriminant = b * b - a * (o.norm_squared() - radius * radius);
     if discriminant < 0.0 {
@@ -220,12 +212,7 @@ fn intersect_ball(radius: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Int
 }
 
 /// An endless cylinder and a slab, what they share.
-fn intersect_drum(
-    radius: f64,
-    half: f64,
-    o: &Vector3<f64>,
-    d: &Vector3<f64>,
-) -> Option<Intersection> {
+fn hit_drum(radius: f64, half: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersection> {
     let (side_in, side_out) = across_cylinder(radius, o, d)?;
     let inverse = 1.0 / d.z;
     let (low, high) = ((-half - o.z) * inverse, (half - o.z) * inverse);
