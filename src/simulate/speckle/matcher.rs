@@ -84,10 +84,10 @@ fn match_row(
     (0..2 * half).for_each(|column| add(&mut window, column, 1.0));
     for u in half..image.width - half {
         add(&mut window, u + half, 1.0);
-        let place = image.width - 1 - u;
+        let (place, sum) = (image.width - 1 - u, sum[u]);
         let candidates = mean[place..][..n].iter().zip(&weight[place..][..n]);
         for ((score, w), (m, r)) in scores.iter_mut().zip(&window).zip(candidates) {
-            *score = (w - sum[u] * m) * r;
+            *score = (w - sum * m) * r;
         }
         add(&mut window, u - half, -1.0);
         let (k, top) = best(&scores);
