@@ -9,8 +9,9 @@ use std::path::Path;
 use kinoise::io::{Assumed, FrameSource, open};
 use kinoise::scene::World;
 use kinoise::simulate::room::{
-    Body, CEILING_M, CLEARANCE_M, FLOOR_M, Film, Lay, Paint, Picture, Pose, Room, RoomCamera,
-    Shape, Shutter, Skin, Texture, around_the_desks, looking, place, read_trajectory, resample,
+    Body, CEILING_M, CLEARANCE_M, FLOOR_M, Film, Mapping, Material, Picture, Pose, Room,
+    RoomCamera, Shape, Shutter, Texture, around_the_desks, looking, place, read_trajectory,
+    resample,
 };
 use kinoise::{Camera, Seed, SigmaModel};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
@@ -18,9 +19,9 @@ use rand::Rng;
 
 /// A body alone, white.
 fn alone(shape: Shape, room_from_body: Isometry3<f64>) -> Room {
-    let skin = Skin::all(Paint::new(0, Lay::Fit));
+    let materials = [Material::new(0, Mapping::Fit); Shape::FACES];
     let textures = vec![Texture::new(1, vec![[255; 3]])];
-    Room { bodies: vec![Body { shape, room_from_body, skin }], textures }
+    Room { bodies: vec![Body { shape, room_from_body, materials }], textures }
 }
 
 /// Is a point inside? By each body's definition.

@@ -7,7 +7,7 @@ use super::correction::{Conditions, Correction};
 use super::slopes::Slopes;
 use crate::error::{Error, Result};
 use crate::plane::Plane;
-use crate::terms::{Pixels, PixelContext, Term};
+use crate::terms::{PixelContext, Pixels, Term};
 
 /// The error of a term is taken at the corrected disparity: substituted until it changes by less, px.
 /// What is left is less again by the term's steepness, a hundredth for terms of a few tenths of a px

@@ -21,9 +21,9 @@ pub use layout::DESCRIPTION;
 pub(crate) use layout::{DEPTH_LIST, read_description};
 pub use layout::{ViewFile, write_recording_file, write_view_notes};
 pub use list::{FrameList, read_list};
-pub use output::{OutputDir, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
 pub(crate) use output::entries;
 pub use output::hex;
+pub use output::{OutputDir, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
 
 use std::path::Path;
 

@@ -2,13 +2,12 @@
 
 use nalgebra::Vector3;
 
-use crate::model::NoiseModel;
-use crate::simulate::sigma_table::SigmaTable;
+use crate::model::{NoiseModel, SigmaLookup};
 
 /// Sigma over depth and tilt, looked up, and how many neighbours err as one.
 #[derive(Debug, Clone)]
 pub struct Noise {
-    table: SigmaTable,
+    table: SigmaLookup,
     /// The greatest depth that the model was measured at, m.
     max_depth_m: f32,
     /// Pixels that err together: the area of the window that neighbours share, px^2.
@@ -28,7 +27,7 @@ impl Noise {
         let entry = model.effects.iter().find(|e| e.id == CORRELATION.0);
         let length = entry.and_then(length).unwrap_or(1.0) as f32;
         Noise {
-            table: SigmaTable::of(&model.sigma),
+            table: SigmaLookup::of(&model.sigma),
             max_depth_m: model.sigma.domain.z_m[1] as f32,
             correlated_px2: length * length,
         }

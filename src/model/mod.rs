@@ -12,6 +12,7 @@ mod paule_mandel;
 mod quality;
 mod robust;
 mod rows;
+mod sigma_lookup;
 mod statistics;
 mod surface;
 
@@ -21,5 +22,6 @@ pub use fit::DISTANCE_RATIO;
 pub use forms::{Form, PAPER_EQ1, SigmaForm};
 pub use heldout::{HeldOut, compare_forms, held_out};
 pub use outliers::{Sorted, fit, sort_out};
+pub use sigma_lookup::SigmaLookup;
 pub use statistics::{Parameter, SigmaFit};
 pub use surface::{Direction, Domain, SigmaModel};

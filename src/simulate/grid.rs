@@ -1,6 +1,36 @@
-//! Which poses to shoot.
+//! What is simulated when nothing else is said: a Kinect v1, and the paper's grid of poses.
 
+use crate::camera::Camera;
+use crate::frame::DepthCode;
 use crate::plane::Plane;
+use crate::view::Sensor;
+
+/// A Kinect v1 in normal mode, its image `shrink` times smaller each way (1 = 640 x 480).
+pub fn kinect_v1(shrink: usize) -> Sensor {
+    let s = shrink.max(1) as f64;
+    let centre = |n: usize| (n as f64 - 1.0) / 2.0;
+    let (width, height) = (640 / shrink.max(1), 480 / shrink.max(1));
+    Sensor {
+        name: "simulated Kinect v1".into(),
+        serial: None,
+        mode: Some("normal".into()),
+        camera: Camera {
+            width,
+            height,
+            // 580 px: the focal length OpenNI and ROS give a Kinect v1's infrared camera.
+            fx: 580.0 / s,
+            fy: 580.0 / s,
+            cx: centre(width),
+            cy: centre(height),
+            distortion: None,
+        },
+        baseline_m: Some(0.075),
+        code: DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 },
+    }
+}
+
+/// Frame rate of every sensor of this kind, Hz.
+pub const RATE_HZ: f64 = 30.0;
 
 /// Distances times tilts; the tilt's direction alternates between the image's two axes.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,8 +86,7 @@ impl Grid {
         let mut views = Vec::new();
         for (i, &z_m) in self.distances_m.iter().enumerate() {
             for (j, &theta_rad) in self.tilts_rad.iter().enumerate() {
-                let quarter_turns = (i + j) % 4;
-                let azimuth_rad = std::f64::consts::FRAC_PI_2 * quarter_turns as f64;
+                let azimuth_rad = std::f64::consts::FRAC_PI_2 * ((i + j) % 4) as f64;
                 views.push(GridView { z_m, theta_rad, azimuth_rad });
             }
         }

@@ -1,10 +1,9 @@
 //! Shooting the very views of a recording again: a simulated twin.
 
 use nalgebra::Vector3;
-use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::plan::ViewPlan;
+use super::plan::{ViewPlan, reference};
 use crate::camera::Rays;
 use crate::effects::ROOM_LUX;
 use crate::error::Result;
@@ -46,12 +45,10 @@ fn plan(
     seed: Seed,
 ) -> ViewPlan {
     let plane = target.plane;
-    let reference_distance_m = view.notes.reference_distance_m.map(|_| {
-        let name = format!("simulate/reference/{}", view.name);
-        let off: f64 = StandardNormal.sample(&mut seed.stream(&name));
-        plane.depth(0.0, 0.0) + reference_error_m * off
-    });
-    let reference_distance_m = reference_distance_m.filter(|d| *d > 0.0);
+    let reference_distance_m = view
+        .notes
+        .reference_distance_m
+        .and_then(|_| reference(plane.depth(0.0, 0.0), reference_error_m, seed, &view.name));
     let notes = ViewNotes { reference_distance_m, ..view.notes.clone() };
     let stamps = view.depth.iter().map(|f| f.timestamp).collect();
     plan_on(&view.name, &plane, &target.pixels, &bench.rays, stamps, notes)
@@ -81,7 +78,7 @@ pub fn plan_on(
             ..Bench::bare(*plane, Target::Wall)
         },
         mask: Some(mask),
-        // As measured; where nobody looked, the same in all views.
+        // As measured; where it was not, the same in all views.
         ambient_lux: notes.ambient_lux.unwrap_or(ROOM_LUX),
         stamps,
         notes,

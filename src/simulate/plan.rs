@@ -1,16 +1,16 @@
 //! What to take: the views of a recording before the shutter opens.
 
+use nalgebra::Vector3;
 use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::grid::GridView;
+use super::grid::{GridView, RATE_HZ};
 use crate::camera::{Camera, Rays};
 use crate::effects::Instant;
 use crate::rng::Seed;
 use crate::scene::{Bench, Patch, Print, Seen, Target, WHITE};
 use crate::view::{TargetSize, ViewNotes};
-use nalgebra::Vector3;
 
 /// One view to be taken.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,8 +80,6 @@ impl Scenery {
     }
 }
 
-/// Frame rate of every sensor of this kind, Hz.
-pub const RATE_HZ: f64 = 30.0;
 /// From the start of one view to the start of the next, s: time to move a board.
 const VIEW_INTERVAL_S: f64 = 30.0;
 /// What a room has.
@@ -114,38 +112,41 @@ pub fn plan_grid(
 }
 
 fn view(index: usize, pose: &GridView, scenery: &Scenery, frames: usize, seed: Seed) -> ViewPlan {
-    let mut bench = Bench::bare(pose.plane(), scenery.target);
-    bench.print = scenery.print;
-    bench.wall_m = scenery.wall_gap_m.map(|gap| pose.z_m + gap);
-    bench.clutter = clutter(pose.z_m, scenery.clutter, seed, index);
     let start = index as f64 * VIEW_INTERVAL_S;
     let ambient_lux = ambient_lux(seed, index);
-    let reference = scenery.reference_error_m.map(|error| {
-        let off: f64 =
-            StandardNormal.sample(&mut seed.stream(&format!("simulate/reference/{index}")));
-        pose.z_m + error * off
-    });
-    // A tape never reads less than nothing.
-    let reference = reference.filter(|d| *d > 0.0);
+    let reference_distance_m = scenery
+        .reference_error_m
+        .and_then(|error| reference(pose.z_m, error, seed, &index.to_string()));
     let target = match scenery.target {
         Target::Board(b) => Some(TargetSize { width_m: b.width_m, height_m: b.height_m }),
         Target::Wall => None,
     };
     ViewPlan {
         name: format!("{index:04}"),
-        bench,
+        bench: Bench {
+            print: scenery.print,
+            wall_m: scenery.wall_gap_m.map(|gap| pose.z_m + gap),
+            clutter: clutter(pose.z_m, scenery.clutter, seed, index),
+            ..Bench::bare(pose.plane(), scenery.target)
+        },
         mask: None,
         ambient_lux,
         stamps: (0..frames).map(|k| start + k as f64 / RATE_HZ).collect(),
         notes: ViewNotes {
             // Only a view that says something else has a view.json too.
-            target: target.filter(|_| reference.is_some() || scenery.conditions),
-            reference_distance_m: reference,
+            target: target.filter(|_| reference_distance_m.is_some() || scenery.conditions),
+            reference_distance_m,
             temperature_c: scenery.conditions.then_some(ROOM_TEMPERATURE_C),
             ambient_lux: scenery.conditions.then_some(ambient_lux),
             ..ViewNotes::default()
         },
     }
+}
+
+/// What a tape of this standard deviation, m, reads; never less than nothing.
+pub(super) fn reference(truth_m: f64, error_m: f64, seed: Seed, view: &str) -> Option<f64> {
+    let off: f64 = StandardNormal.sample(&mut seed.stream(&format!("simulate/reference/{view}")));
+    Some(truth_m + error_m * off).filter(|d| *d > 0.0)
 }
 
 /// Boxes nearer than the target, beside the axis by 0.15 to 0.35 of the depth.

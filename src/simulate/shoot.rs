@@ -29,8 +29,19 @@ use crate::view::Sensor;
 pub enum Physics {
     /// sigma(z, theta) and the effects, in light-path order.
     Formula { sigma: SigmaModel, effects: Vec<Active> },
-    /// Dots, a lens, a chip and a matcher.
+    /// Dots, a lens, a chip and a matcher: errors arise by themselves.
     Speckle { causes: Causes },
+}
+
+impl Physics {
+    /// For a recipe.
+    pub(super) fn describe_formula(sigma: &SigmaModel, effects: &[Active]) -> serde_json::Value {
+        serde_json::json!({
+            "world": "formula",
+            "sigma": {"form": sigma.form.spec().id(), "parameters": sigma.parameters},
+            "effects": effects.iter().map(Active::described).collect::<Vec<_>>(),
+        })
+    }
 }
 
 /// Views to be taken by one sensor.
@@ -72,7 +83,7 @@ impl Shoot {
         self.write_as(encode_png16, root, progress)
     }
 
-    /// The same at the quickest compression, which by light takes half the time.
+    /// The same at the quickest compression: half the time of a speckle recording.
     ///
     /// # Errors
     /// As [`Shoot::write`].
@@ -83,11 +94,11 @@ impl Shoot {
     fn write_as(&self, encode: Encode, root: &Path, progress: Progress<'_>) -> Result<Vec<String>> {
         refuse_full(root)?;
         std::fs::create_dir_all(root).map_err(|e| Error::write(root, e))?;
-        let by_light = match &self.physics {
+        let speckle = match &self.physics {
             Physics::Speckle { causes } => Some(SpeckleSensor::new(&self.sensor, causes.clone())),
             Physics::Formula { .. } => None,
         };
-        let described = by_light.as_ref().map_or(&self.sensor, SpeckleSensor::described);
+        let described = speckle.as_ref().map_or(&self.sensor, SpeckleSensor::described);
         write_recording_file(root, described)?;
         let rays = self.sensor.camera.rays();
         let first = self.views.iter().filter_map(|v| v.stamps.first()).copied();
@@ -97,9 +108,9 @@ impl Shoot {
             let mut folder =
                 ViewFolder::new(&root.join(&view.name), self.infrared, &described.code, encode)?;
             let instants = view.instants(index, session);
-            match &by_light {
-                Some(sensor) => self.film(sensor, view, instants, &mut folder)?,
-                None => self.shoot(view, instants, &rays, &mut folder)?,
+            match &speckle {
+                Some(sensor) => self.by_speckle(sensor, view, instants, &mut folder)?,
+                None => self.by_formula(view, instants, &rays, &mut folder)?,
             }
             let blind = !folder.sees;
             folder.finish(view)?;
@@ -114,13 +125,7 @@ impl Shoot {
     /// What was switched on, for a file of its own.
     pub fn recipe(&self) -> serde_json::Value {
         let physics = match &self.physics {
-            Physics::Formula { sigma, effects } => {
-                serde_json::json!({
-                    "world": "formula",
-                    "sigma": {"form": sigma.form.spec().id(), "parameters": sigma.parameters},
-                    "effects": effects.iter().map(Active::described).collect::<Vec<_>>(),
-                })
-            }
+            Physics::Formula { sigma, effects } => Physics::describe_formula(sigma, effects),
             Physics::Speckle { causes } => {
                 serde_json::json!({"world": "speckle", "causes": causes.values()})
             }
@@ -137,8 +142,7 @@ impl Shoot {
         })
     }
 
-    /// By formula.
-    fn shoot(
+    fn by_formula(
         &self,
         view: &ViewPlan,
         instants: impl Iterator<Item = (f64, Instant)>,
@@ -157,8 +161,7 @@ impl Shoot {
         Ok(())
     }
 
-    /// By light.
-    fn film(
+    fn by_speckle(
         &self,
         sensor: &SpeckleSensor,
         view: &ViewPlan,

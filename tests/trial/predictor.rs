@@ -8,7 +8,7 @@ use kinoise::error::Result;
 use kinoise::model::{Effect, NoiseModel, SigmaModel};
 use kinoise::plane::{NormalEquations, Plane};
 use kinoise::scene::TargetFrame;
-use kinoise::terms::{Pixels, PixelContext, Term, edge_distances};
+use kinoise::terms::{PixelContext, Pixels, Term, edge_distances};
 use kinoise::view::Sensor;
 use nalgebra::Vector3;
 

@@ -1,86 +1,145 @@
-//! A shape somewhere in the room, and how it looks.
+//! A room of bodies, and how rays from one point meet them.
 
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
-use super::paint::{Paint, Skin};
-use super::shape::{Shape, Touch};
+use super::material::Material;
+use super::shape::{Intersection, Shape};
+use super::texture::Texture;
+use crate::scene::{Hit, Surface, World};
 
-/// One piece of furniture's part.
+/// A shape somewhere in the room, with the material of each of its faces.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {
     pub shape: Shape,
     pub room_from_body: Isometry3<f64>,
-    pub skin: Skin,
+    pub materials: [Material; Shape::FACES],
 }
 
-impl Body {
-    /// How far a point of the room is from the body's surface, m; negative where it must not be.
-    pub fn clearance(&self, point: &Vector3<f64>) -> f64 {
-        let in_body = self.room_from_body.inverse_transform_point(&(*point).into());
-        self.shape.clearance(&in_body.coords)
+/// Bodies and the textures on them. One body is a [`Shape::Shell`] when there are walls.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Room {
+    pub bodies: Vec<Body>,
+    pub textures: Vec<Texture>,
+}
+
+impl Room {
+    /// How far a point is from the nearest surface, m, with that body's index; negative inside
+    /// furniture and behind walls.
+    pub fn clearance(&self, point: &Vector3<f64>) -> (f64, usize) {
+        let of = |body: &Body| {
+            let in_body = body.room_from_body.inverse_transform_point(&(*point).into());
+            body.shape.clearance(&in_body.coords)
+        };
+        let all = self.bodies.iter().enumerate().map(|(i, body)| (of(body), i));
+        all.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0))
     }
 
-    pub fn paint(&self, face: usize) -> &Paint {
-        &self.skin.0[face]
+    /// The bodies as seen from a pose.
+    pub fn posed(&self, room_from_camera: &Isometry3<f64>) -> impl Iterator<Item = PosedBody<'_>> {
+        let pose = *room_from_camera;
+        self.bodies.iter().enumerate().map(move |(i, body)| PosedBody::new(i, body, &pose))
     }
 }
 
-/// A body as rays of one bundle meet it: all from one point, directions in the bundle's frame.
+impl World for Room {
+    fn cast(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Hit> {
+        let pose = Isometry3::from_parts(Translation3::from(*origin), UnitQuaternion::identity());
+        let hit = |posed: PosedBody<'_>| {
+            let Intersection { t, face } = posed.intersect(direction)?;
+            Some(Hit {
+                t,
+                normal: posed.normal(&posed.point(direction, t), face),
+                surface: posed.surface(face),
+                albedo: f64::from(posed.body.materials[face].albedo),
+            })
+        };
+        self.posed(&pose).filter_map(hit).min_by(|a, b| a.t.total_cmp(&b.t))
+    }
+
+    /// None is the calibration target, and a tilt lasts for one pose only.
+    fn surfaces(&self) -> Vec<Surface> {
+        let any = Surface { is_target: false, theta_rad: None };
+        vec![any; self.bodies.len() * Shape::FACES]
+    }
+}
+
+/// A body as a camera's rays meet it: all from one point, directions in the camera's frame.
 #[derive(Debug, Clone, Copy)]
-pub struct Staged {
-    shape: Shape,
-    body_from_bundle: Matrix3<f64>,
-    /// The rays' common origin in the body's frame, m.
+pub struct PosedBody<'a> {
+    pub body: &'a Body,
+    pub index: usize,
+    body_from_camera: Matrix3<f64>,
+    /// The camera's place in the body's frame, m.
     origin: Vector3<f64>,
-    /// Middle of the body in the bundle's frame, m, and the sphere about it.
-    pub middle: Vector3<f64>,
-    pub reach: f64,
+    /// Nearer than this no ray meets it, m.
+    pub nearest: f64,
 }
 
-impl Staged {
-    /// For rays from `room_from_bundle`'s origin.
-    pub fn new(body: &Body, room_from_bundle: &Isometry3<f64>) -> Self {
-        let bundle_from_body = room_from_bundle.inv_mul(&body.room_from_body);
-        let body_from_bundle = bundle_from_body.inverse();
-        Staged {
-            shape: body.shape,
-            body_from_bundle: body_from_bundle.rotation.to_rotation_matrix().into_inner(),
-            origin: body_from_bundle.translation.vector,
-            middle: bundle_from_body.translation.vector,
-            reach: body.shape.reach(),
-        }
-    }
+/// What a bounding box covers of the ray coordinates x/z and y/z: the lowest and the highest.
+pub type Window = [[f64; 2]; 2];
 
-    /// Nearer than this no ray of the bundle meets it, m.
-    pub fn nearest(&self) -> f64 {
-        match self.shape {
-            // The sphere about a shell tells nothing: it is met behind everything else.
+const EVERYWHERE: Window = [[f64::NEG_INFINITY; 2], [f64::INFINITY; 2]];
+
+impl<'a> PosedBody<'a> {
+    fn new(index: usize, body: &'a Body, room_from_camera: &Isometry3<f64>) -> Self {
+        let camera_from_body = room_from_camera.inv_mul(&body.room_from_body);
+        let body_from_camera = camera_from_body.inverse();
+        let nearest = match body.shape {
+            // A shell is met behind everything else.
             Shape::Shell(_) => f64::INFINITY,
-            _ => self.middle.norm() - self.reach,
+            _ => camera_from_body.translation.vector.norm() - body.shape.radius(),
+        };
+        PosedBody {
+            body,
+            index,
+            body_from_camera: body_from_camera.rotation.to_rotation_matrix().into_inner(),
+            origin: body_from_camera.translation.vector,
+            nearest,
         }
     }
 
-    /// May a ray within the cone about the unit vector `axis` meet it? The cone widens by `slope`
-    /// metres a metre. Never wrong with a no.
-    pub fn is_near(&self, axis: &Vector3<f64>, slope: f64) -> bool {
-        let stray = slope * (self.middle.norm() + self.reach);
-        self.shape.is_near(&self.origin, &(self.body_from_bundle * axis), stray)
+    /// Where in the picture rays may meet it, `None` for nowhere. Never too small.
+    pub fn window(&self) -> Option<Window> {
+        let Some(half) = self.body.shape.half_size() else { return Some(EVERYWHERE) };
+        let corners: [Vector3<f64>; 8] = std::array::from_fn(|k| {
+            let sign = |bit: usize| if k >> bit & 1 == 0 { -1.0 } else { 1.0 };
+            let corner = half.component_mul(&Vector3::new(sign(0), sign(1), sign(2)));
+            self.body_from_camera.tr_mul(&(corner - self.origin))
+        });
+        if corners.iter().all(|c| c.z <= 0.0) {
+            return None;
+        }
+        let crosses = corners.iter().any(|c| c.z <= 0.0);
+        let bound = |k: usize, sign: f64| {
+            // What passes the camera's plane goes on without end to the side it is on.
+            if crosses && corners.iter().any(|c| sign * c[k] > 0.0) {
+                return sign * f64::INFINITY;
+            }
+            let ahead = corners.iter().filter(|c| c.z > 0.0).map(|c| sign * c[k] / c.z);
+            sign * ahead.fold(f64::NEG_INFINITY, f64::max)
+        };
+        Some([[0, 1].map(|k| bound(k, -1.0)), [0, 1].map(|k| bound(k, 1.0))])
     }
 
     #[inline]
-    pub fn touch(&self, direction: &Vector3<f64>) -> Option<Touch> {
-        self.shape.touch(&self.origin, &(self.body_from_bundle * direction))
+    pub fn intersect(&self, direction: &Vector3<f64>) -> Option<Intersection> {
+        self.body.shape.intersect(&self.origin, &(self.body_from_camera * direction))
     }
 
     /// Point of the body's own frame at `t` along a ray, m.
     #[inline]
     pub fn point(&self, direction: &Vector3<f64>, t: f64) -> Vector3<f64> {
-        self.origin + self.body_from_bundle * direction * t
+        self.origin + self.body_from_camera * direction * t
     }
 
-    /// Unit normal in the bundle's frame at a point of the body's frame.
+    /// Unit normal in the camera's frame at a point of the body's frame.
     #[inline]
     pub fn normal(&self, point: &Vector3<f64>, face: usize) -> Vector3<f64> {
-        self.body_from_bundle.tr_mul(&self.shape.normal(point, face))
+        self.body_from_camera.tr_mul(&self.body.shape.normal(point, face))
+    }
+
+    /// The number of a face among [`World::surfaces`].
+    pub fn surface(&self, face: usize) -> u16 {
+        (self.index * Shape::FACES + face) as u16
     }
 }

@@ -19,6 +19,17 @@ pub type Area = [f32; 4];
 /// A printed letter: three by five marks, one column and two rows of space.
 const GLYPH: (usize, usize) = (3, 5);
 const GLYPH_CELL: (f32, f32) = (4.0, 7.0);
+/// Line pitch over the letters' own cell.
+const LEADING: f32 = 1.2;
+
+pub const BLACK: Colour = [22, 22, 26];
+pub const WHITE: Colour = [246, 246, 242];
+/// What things are printed in.
+#[rustfmt::skip]
+const STRONG: [Colour; 10] = [
+    [178, 34, 40], [24, 78, 142], [30, 116, 66], [232, 186, 40], [222, 106, 34],
+    [88, 44, 120], [20, 132, 142], [122, 72, 40], [60, 62, 70], [236, 230, 214],
+];
 
 impl Canvas {
     pub fn new(size: usize, colour: Colour) -> Self {
@@ -87,7 +98,7 @@ impl Canvas {
     }
 
     /// Lines of words in an area: letters `height` high, ragged at the right, some lines short.
-    pub fn words(&mut self, [x0, y0, x1, y1]: Area, height: f32, ink: Colour, rng: &mut Stream) {
+    pub fn words(&mut self, [x0, y0, x1, y1]: Area, height: f32, colour: Colour, rng: &mut Stream) {
         let mark = height / GLYPH.1 as f32;
         let (advance, leading) = (GLYPH_CELL.0 * mark, GLYPH_CELL.1 * mark * LEADING);
         let mut y = y0;
@@ -98,7 +109,7 @@ impl Canvas {
             while x + advance <= end {
                 for _ in 0..rng.random_range(2..9) {
                     if x + advance <= end {
-                        self.glyph([x, y], mark, ink, rng);
+                        self.glyph([x, y], mark, colour, rng);
                     }
                     x += advance;
                 }
@@ -108,17 +119,31 @@ impl Canvas {
         }
     }
 
-    fn glyph(&mut self, [x, y]: [f32; 2], mark: f32, ink: Colour, rng: &mut Stream) {
+    fn glyph(&mut self, [x, y]: [f32; 2], mark: f32, colour: Colour, rng: &mut Stream) {
         for j in 0..GLYPH.1 {
             for i in 0..GLYPH.0 {
                 if rng.random_bool(0.6) {
                     let (left, top) = (x + i as f32 * mark, y + j as f32 * mark);
-                    self.rect([left, top, left + mark, top + mark], ink);
+                    self.rect([left, top, left + mark, top + mark], colour);
                 }
             }
         }
     }
 }
 
-/// Line pitch over the letters' own cell.
-const LEADING: f32 = 1.2;
+pub fn any_colour(rng: &mut Stream) -> Colour {
+    STRONG[rng.random_range(0..STRONG.len())]
+}
+
+/// Black or white, whichever is read better on this background.
+pub fn readable_on(background: Colour) -> Colour {
+    let grey: u16 = background.iter().map(|c| u16::from(*c)).sum::<u16>() / 3;
+    if grey > 125 { BLACK } else { WHITE }
+}
+
+/// A rectangle anywhere in the picture, its sides between these.
+pub fn any_area(rng: &mut Stream, min: f32, max: f32) -> Area {
+    let (w, h) = (rng.random_range(min..max), rng.random_range(min..max));
+    let (x, y) = (rng.random_range(0.0..1.0 - w), rng.random_range(0.0..1.0 - h));
+    [x, y, x + w, y + h]
+}

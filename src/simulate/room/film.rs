@@ -6,8 +6,8 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use super::body::Room;
 use super::render::{Picture, RoomCamera};
-use super::{Pose, Room};
 use crate::Progress;
 use crate::camera::Rays;
 use crate::effects::{Acting, Active, Instant};
@@ -16,11 +16,13 @@ use crate::frame::{DepthCode, Frame};
 use crate::io::{
     encode_png16_quickly, encode_rgb, refuse_full, write_atomic, write_recording_file,
 };
-use crate::model::SigmaModel;
+use crate::model::{SigmaLookup, SigmaModel};
 use crate::rng::Seed;
+use crate::scene::Seen;
 use crate::simulate::formula::FormulaSensor;
-use crate::simulate::kinect_v1;
-use crate::simulate::sigma_table::SigmaTable;
+use crate::simulate::grid::kinect_v1;
+use crate::simulate::shoot::Physics;
+use crate::trajectory::Pose;
 use crate::view::Sensor;
 
 /// A walk through a room with a depth camera.
@@ -43,7 +45,7 @@ type Memory = HashMap<&'static str, Vec<f32>>;
 const FRAMES_A_THREAD: usize = 2;
 
 impl Film {
-    /// What the TUM layout stores: 1/5000 m, and no word for nothing but 0.
+    /// What the TUM layout stores: 1/5000 m, and 0 for nothing.
     pub const CODE: DepthCode = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
 
     /// A Kinect v1 with the intrinsics that readers of the TUM layout assume (525 px, ROS default),
@@ -89,11 +91,7 @@ impl Film {
         serde_json::json!({
             "format": "kinoise-recipe/1",
             "seed": self.seed.0,
-            "physics": {
-                "world": "formula",
-                "sigma": {"form": self.sigma.form.spec().id(), "parameters": self.sigma.parameters},
-                "effects": self.effects.iter().map(Active::described).collect::<Vec<_>>(),
-            },
+            "physics": Physics::describe_formula(&self.sigma, &self.effects),
             "room": {"scene": "office", "frames": self.poses.len()},
         })
     }
@@ -143,7 +141,7 @@ pub struct Shutter<'a> {
     film: &'a Film,
     camera: RoomCamera<'a>,
     depth: FormulaSensor<'a>,
-    table: SigmaTable,
+    sigma: SigmaLookup,
 }
 
 impl<'a> Shutter<'a> {
@@ -154,7 +152,7 @@ impl<'a> Shutter<'a> {
             film,
             camera: RoomCamera::new(&film.room, &sensor.camera, rays),
             depth: FormulaSensor { sensor, rays, sigma, effects, seed: *seed },
-            table: SigmaTable::of(sigma),
+            sigma: SigmaLookup::of(sigma),
         }
     }
 
@@ -179,10 +177,19 @@ impl<'a> Shutter<'a> {
     fn expose_one(&self, picture: &Picture, frame: usize, memory: &mut Memory) -> Frame {
         let since = self.film.poses[frame].stamp - self.film.poses[0].stamp;
         let instant = Instant { view: 0, frame, session_s: since, view_s: since };
-        let sigma = self.table.of_pixels(&picture.seen);
+        let sigma = self.sigma_of(&picture.seen);
         let mut shooting = self.depth.begin_at(&picture.seen, sigma, std::mem::take(memory));
         let shot = shooting.shoot(instant);
         *memory = shooting.into_memory();
         shot.depth
+    }
+
+    /// Of every pixel, m; zero where there is nothing.
+    fn sigma_of(&self, seen: &Seen) -> Vec<f32> {
+        let of = |(&z, normal): (&f32, &[f32; 3])| {
+            let theta = normal[2].abs().min(1.0).acos();
+            if z.is_nan() { 0.0 } else { self.sigma.at(z, theta) }
+        };
+        seen.depth.iter().zip(&seen.normal).map(of).collect()
     }
 }

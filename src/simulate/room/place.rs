@@ -5,9 +5,10 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, Matrix2, Vector2, Vector3};
 
-use super::furnish::CEILING_M;
-use super::{Pose, Room};
+use super::body::Room;
+use super::office::CEILING_M;
 use crate::error::{Error, Result};
+use crate::trajectory::Pose;
 
 /// The sensor keeps this far from everything, m: half the width of a Kinect (0.28 m).
 pub const CLEARANCE_M: f64 = 0.14;
@@ -48,39 +49,32 @@ const GAZE_REACH_M: f64 = 4.0;
 /// # Errors
 /// When it comes too near to furniture or walls however it is placed.
 pub fn place(room: &Room, poses: &[Pose]) -> Result<Placement> {
-    let mut best: Option<Placement> = None;
+    let mut reached = f64::NEG_INFINITY;
     for anchor in anchors(poses) {
-        let placed = (0..TURNS).map(|k| try_turn(room, poses, anchor, k));
+        let placed = (0..TURNS).map(|k| turned(room, poses, anchor, k));
         let widest = placed.max_by(|a, b| a.clearance_m.total_cmp(&b.clearance_m));
         if let Some(found) = widest {
             if found.clearance_m >= CLEARANCE_M {
                 return Ok(found);
             }
-            if best.is_none_or(|b| found.clearance_m > b.clearance_m) {
-                best = Some(found);
-            }
+            reached = reached.max(found.clearance_m);
         }
     }
-    Err(too_large(poses, best))
-}
-
-fn too_large(poses: &[Pose], best: Option<Placement>) -> Error {
     let (low, high) = bounds(poses);
     let size = high - low;
-    let reached = best.map_or(f64::NEG_INFINITY, |b| b.clearance_m);
-    Error::Argument {
+    Err(Error::Argument {
         what: format!(
             "the path ({:.1} x {:.1} m, {:.1} m up and down) does not fit into the room: at best it comes within {reached:.2} m of something, {CLEARANCE_M} m are needed",
             size.x, size.y, size.z
         ),
         remedy: "give a part of it (--frames), or a path in metres with z up around a desk",
-    }
+    })
 }
 
-fn try_turn(room: &Room, poses: &[Pose], anchor: Vector2<f64>, turn: usize) -> Placement {
-    let turned = Vector3::z() * (TAU * turn as f64 / TURNS as f64);
+fn turned(room: &Room, poses: &[Pose], anchor: Vector2<f64>, turn: usize) -> Placement {
+    let turn = Vector3::z() * (TAU * turn as f64 / TURNS as f64);
     let to_middle = Isometry3::translation(-anchor.x, -anchor.y, lift(poses));
-    let room_from_world = Isometry3::new(Vector3::zeros(), turned) * to_middle;
+    let room_from_world = Isometry3::new(Vector3::zeros(), turn) * to_middle;
     let along = poses.iter().map(|p| {
         let position = room_from_world * p.world_from_camera;
         room.clearance(&position.translation.vector).0

@@ -1,19 +1,15 @@
 //! What a camera sees of a room: depth, normals and colour of every pixel.
 //!
-//! Rays of a small tile of the picture go nearly the same way: bodies are sorted out first for
-//! large tiles, then for the small ones in each (cone against sphere, and against the body grown by
-//! the cone's width), and a ray meets only the few that are left.
+//! The picture is cut into small tiles; a ray meets only the bodies whose bounding box covers some
+//! of its tile.
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::body::Staged;
-use super::light::Light;
-use super::shape::Touch;
-use super::texture::rough_log2;
-use super::tiles::{Region, Tile, direction};
-use super::{Room, surface};
+use super::body::{PosedBody, Room, Window};
+use super::shading::{Light, SurfacePoint};
+use super::shape::Intersection;
 use crate::camera::{Camera, Rays};
-use crate::scene::{Nothing, Seen, World};
+use crate::scene::{Seen, World};
 
 /// A frame of colour and of true depth.
 #[derive(Debug, Clone)]
@@ -23,51 +19,73 @@ pub struct Picture {
     pub rgb: Vec<u8>,
 }
 
+/// Pixels a side of a tile.
+const TILE: usize = 8;
+
+/// A square of the picture.
+struct Tile {
+    pixels: Vec<usize>,
+    window: Window,
+}
+
+impl Tile {
+    fn new(camera: &Camera, rays: &Rays, (left, top): (usize, usize)) -> Self {
+        let (right, bottom) = ((left + TILE).min(camera.width), (top + TILE).min(camera.height));
+        let row = |v: usize| (left..right).map(move |u| v * camera.width + u);
+        let pixels: Vec<usize> = (top..bottom).flat_map(row).collect();
+        // Softened edges look half a pixel beyond the outermost rays.
+        let margin = 1.0 / camera.fx.min(camera.fy);
+        let mut window = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+        for (x, y) in pixels.iter().map(|&i| rays.at(i)) {
+            for (k, v) in [x, y].into_iter().enumerate() {
+                window[0][k] = window[0][k].min(v - margin);
+                window[1][k] = window[1][k].max(v + margin);
+            }
+        }
+        Tile { pixels, window }
+    }
+
+    fn overlaps(&self, [low, high]: &Window) -> bool {
+        (0..2).all(|k| low[k] <= self.window[1][k] && high[k] >= self.window[0][k])
+    }
+}
+
 /// A camera that may stand anywhere in a room.
 pub struct RoomCamera<'a> {
     room: &'a Room,
     camera: &'a Camera,
     rays: &'a Rays,
-    regions: Vec<Region>,
+    tiles: Vec<Tile>,
 }
 
 impl<'a> RoomCamera<'a> {
     pub fn new(room: &'a Room, camera: &'a Camera, rays: &'a Rays) -> Self {
-        RoomCamera { room, camera, rays, regions: Region::all(camera, rays) }
+        let corners = (0..camera.height)
+            .step_by(TILE)
+            .flat_map(|v| (0..camera.width).step_by(TILE).map(move |u| (u, v)));
+        let tiles = corners.map(|corner| Tile::new(camera, rays, corner)).collect();
+        RoomCamera { room, camera, rays, tiles }
     }
 
     /// From this pose; on one thread.
     pub fn take(&self, world_from_camera: &Isometry3<f64>) -> Picture {
         let view = View::new(self, world_from_camera);
         let mut picture = self.blank();
-        self.each_tile(&view, |pixels, candidates| {
-            pixels.for_each(|i| view.expose(i, candidates, &mut picture));
-        });
+        for tile in &self.tiles {
+            let bodies = view.bodies_in(tile);
+            tile.pixels.iter().for_each(|&i| view.expose(i, &bodies, &mut picture));
+        }
         let Picture { seen, rgb } = &mut picture;
-        self.each_tile(&view, |pixels, candidates| {
-            let edges = pixels.filter(|&i| is_edge(seen, i));
-            edges.for_each(|i| {
+        for tile in &self.tiles {
+            let edges: Vec<usize> =
+                tile.pixels.iter().copied().filter(|&i| is_edge(seen, i)).collect();
+            let bodies = if edges.is_empty() { continue } else { view.bodies_in(tile) };
+            for i in edges {
                 let middle = [0, 1, 2].map(|c| f32::from(rgb[3 * i + c]));
-                put(rgb, i, view.softened(i, middle, candidates));
-            });
-        });
-        picture
-    }
-
-    /// The pixels of every small tile, with the bodies they may see, nearest first.
-    fn each_tile(
-        &self,
-        view: &View<'_>,
-        mut visit: impl FnMut(&mut dyn Iterator<Item = usize>, &[Candidate]),
-    ) {
-        let all: Vec<usize> = (0..self.room.bodies.len()).collect();
-        for region in &self.regions {
-            let near = view.met(&region.tile, &all);
-            for tile in &region.parts {
-                let candidates = view.sorted(&view.met(tile, &near));
-                visit(&mut tile.patch.pixels(self.camera.width), &candidates);
+                put(rgb, i, view.softened(i, middle, &bodies));
             }
         }
+        picture
     }
 
     fn blank(&self) -> Picture {
@@ -78,7 +96,7 @@ impl<'a> RoomCamera<'a> {
                 height: self.camera.height,
                 depth: vec![f32::NAN; pixels],
                 normal: vec![[0.0; 3]; pixels],
-                surface: vec![Nothing::SURFACE; pixels],
+                surface: vec![Seen::NOTHING; pixels],
                 albedo: vec![0.0; pixels],
                 surfaces: self.room.surfaces(),
                 target: None,
@@ -86,89 +104,75 @@ impl<'a> RoomCamera<'a> {
             rgb: vec![0; 3 * pixels],
         }
     }
-}
 
-/// A body that a tile may see, by its nearest possible distance, m.
-type Candidate = (f64, usize);
+    /// A pixel's ray, its z one.
+    fn direction(&self, i: usize) -> Vector3<f64> {
+        let (x, y) = self.rays.at(i);
+        Vector3::new(x, y, 1.0)
+    }
+}
 
 /// A room as seen from one pose.
 struct View<'a> {
     camera: &'a RoomCamera<'a>,
     light: Light,
-    staged: Vec<Staged>,
-}
-
-/// Where a ray ended.
-struct Meeting {
-    body: usize,
-    touch: Touch,
-    /// In the body's frame, m.
-    point: Vector3<f64>,
-    /// In the camera's frame.
-    normal: Vector3<f64>,
+    /// What may be in the picture, the nearest first.
+    bodies: Vec<(PosedBody<'a>, Window)>,
 }
 
 impl<'a> View<'a> {
     fn new(camera: &'a RoomCamera<'a>, world_from_camera: &Isometry3<f64>) -> Self {
-        View {
-            camera,
-            light: Light::about(world_from_camera),
-            staged: camera.room.bodies.iter().map(|b| Staged::new(b, world_from_camera)).collect(),
-        }
+        let posed = camera.room.posed(world_from_camera);
+        let mut bodies: Vec<_> = posed.filter_map(|p| Some((p, p.window()?))).collect();
+        bodies.sort_by(|(a, _), (b, _)| a.nearest.total_cmp(&b.nearest));
+        View { camera, light: Light::about(world_from_camera), bodies }
     }
 
-    /// Those of the bodies that a tile may see.
-    fn met(&self, tile: &Tile, bodies: &[usize]) -> Vec<usize> {
-        bodies.iter().copied().filter(|&index| tile.meets(&self.staged[index])).collect()
-    }
-
-    /// Nearest first.
-    fn sorted(&self, bodies: &[usize]) -> Vec<Candidate> {
-        let near = |&index: &usize| (self.staged[index].nearest(), index);
-        let mut candidates: Vec<Candidate> = bodies.iter().map(near).collect();
-        candidates.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        candidates
+    fn bodies_in(&self, tile: &Tile) -> Vec<&PosedBody<'a>> {
+        let near = self.bodies.iter().filter(|(_, window)| tile.overlaps(window));
+        near.map(|(body, _)| body).collect()
     }
 
     #[inline]
-    fn meet(&self, direction: &Vector3<f64>, candidates: &[Candidate]) -> Option<Meeting> {
+    fn meet<'b>(
+        &self,
+        direction: &Vector3<f64>,
+        bodies: &[&'b PosedBody<'b>],
+    ) -> Option<SurfacePoint<'b>> {
         let length = direction.norm();
-        let mut best: Option<(usize, Touch)> = None;
-        for &(nearest, index) in candidates {
-            let reached = best.map_or(f64::INFINITY, |(_, touch)| touch.t);
-            if nearest > reached * length {
+        let mut best: Option<(&PosedBody<'b>, Intersection)> = None;
+        for body in bodies {
+            let reached = best.map_or(f64::INFINITY, |(_, at)| at.t);
+            if body.nearest > reached * length {
                 break;
             }
-            if let Some(touch) = self.staged[index].touch(direction)
-                && touch.t < reached
+            if let Some(at) = body.intersect(direction)
+                && at.t < reached
             {
-                best = Some((index, touch));
+                best = Some((body, at));
             }
         }
-        let (body, touch) = best?;
-        let point = self.staged[body].point(direction, touch.t);
-        let normal = self.staged[body].normal(&point, touch.face);
-        Some(Meeting { body, touch, point, normal })
+        best.map(|(body, at)| SurfacePoint::new(body, at, direction))
     }
 
-    fn expose(&self, i: usize, candidates: &[Candidate], picture: &mut Picture) {
-        let direction = direction(self.camera.rays, i);
-        let Some(met) = self.meet(&direction, candidates) else { return };
-        let seen = &mut picture.seen;
-        seen.depth[i] = met.touch.t as f32;
+    fn expose(&self, i: usize, bodies: &[&PosedBody<'_>], picture: &mut Picture) {
+        let direction = self.camera.direction(i);
+        let Some(met) = self.meet(&direction, bodies) else { return };
+        let (seen, face) = (&mut picture.seen, met.at.face);
+        seen.depth[i] = met.at.t as f32;
         seen.normal[i] = met.normal.cast::<f32>().into();
-        seen.surface[i] = surface(met.body, met.touch.face);
-        seen.albedo[i] = self.camera.room.bodies[met.body].paint(met.touch.face).infrared;
+        seen.surface[i] = met.posed.surface(face);
+        seen.albedo[i] = met.posed.body.materials[face].albedo;
         put(&mut picture.rgb, i, self.colour(&met, &direction));
     }
 
     /// Mean of the pixel's middle and of rays beside it, where several bodies share the pixel.
-    fn softened(&self, i: usize, middle: [f32; 3], candidates: &[Candidate]) -> [f32; 3] {
+    fn softened(&self, i: usize, middle: [f32; 3], bodies: &[&PosedBody<'_>]) -> [f32; 3] {
         let Camera { fx, fy, .. } = self.camera.camera;
         let mut sum = middle;
         for [du, dv] in WITHIN_PIXEL {
-            let aside = direction(self.camera.rays, i) + Vector3::new(du / fx, dv / fy, 0.0);
-            if let Some(met) = self.meet(&aside, candidates) {
+            let aside = self.camera.direction(i) + Vector3::new(du / fx, dv / fy, 0.0);
+            if let Some(met) = self.meet(&aside, bodies) {
                 let colour = self.colour(&met, &aside);
                 (0..3).for_each(|c| sum[c] += colour[c]);
             }
@@ -176,35 +180,14 @@ impl<'a> View<'a> {
         sum.map(|c| c / (1 + WITHIN_PIXEL.len()) as f32)
     }
 
-    /// Red, green, blue, 0 to 255.
-    fn colour(&self, met: &Meeting, direction: &Vector3<f64>) -> [f32; 3] {
-        let body = &self.camera.room.bodies[met.body];
-        let paint = body.paint(met.touch.face);
-        let place = body.shape.place(&met.point, met.touch.face);
-        let extent = body.shape.extent(met.touch.face);
-        let (uv, density) =
-            paint.coordinates(place.cast::<f32>().into(), extent.cast::<f32>().into());
-        let texture = &self.camera.room.textures[paint.texture];
-        // A pixel covers (t / f)^2 / cos: half the logarithm of its area in texels.
-        let tilt = (met.normal.dot(direction).abs() / direction.norm()).max(FLATTEST);
-        let side_m = met.touch.t / self.camera.camera.fx;
-        let size = texture.size() as f32;
-        let texels = (side_m * side_m / tilt) as f32 * density * size * size;
-        let lod = 0.5 * rough_log2(texels) + SHARPEN;
-        let point = (direction * met.touch.t).cast::<f32>();
-        let light = self.light.on(&point, &met.normal.cast());
-        let light = light + paint.glow * (1.0 - light);
-        let printed = texture.at(uv, lod);
-        std::array::from_fn(|c| printed[c] * paint.tint[c] * light)
+    fn colour(&self, met: &SurfacePoint<'_>, direction: &Vector3<f64>) -> [f32; 3] {
+        let RoomCamera { room, camera, .. } = self.camera;
+        met.colour(direction, camera.fx, &self.light, &room.textures)
     }
 }
 
 /// Beside the middle, px: with it, three rays in three thirds of the pixel, across and down.
 const WITHIN_PIXEL: [[f64; 2]; 2] = [[-0.33, 0.33], [0.33, -0.33]];
-/// Cosine below which a grazing surface blurs no further.
-const FLATTEST: f64 = 0.05;
-/// Levels: a camera's own sharpening, and corners stay corners. Half a level does not flicker.
-const SHARPEN: f32 = -0.5;
 
 fn put(rgb: &mut [u8], i: usize, colour: [f32; 3]) {
     for (channel, value) in rgb[3 * i..3 * i + 3].iter_mut().zip(colour) {

@@ -20,7 +20,7 @@ pub enum Shape {
 
 /// Where a ray meets a shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Touch {
+pub struct Intersection {
     /// In units of the ray's direction.
     pub t: f64,
     /// See [`Shape::FACES`].
@@ -40,7 +40,7 @@ impl Shape {
     pub const DRUM_TOP: usize = 2;
 
     /// Radius of the sphere about the origin that holds it, m.
-    pub fn reach(&self) -> f64 {
+    pub fn radius(&self) -> f64 {
         match *self {
             Shape::Cuboid(half) | Shape::Shell(half) => half.norm(),
             Shape::Ball(radius) => radius,
@@ -48,30 +48,31 @@ impl Shape {
         }
     }
 
-    /// The first meeting at t > 0; a ray that starts inside a closed body does not meet it.
+    /// The first at t > 0; a ray that starts inside a closed body has none.
     #[inline]
-    pub fn touch(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Touch> {
+    pub fn intersect(
+        &self,
+        origin: &Vector3<f64>,
+        direction: &Vector3<f64>,
+    ) -> Option<Intersection> {
         match self {
-            Shape::Cuboid(half) => touch_cuboid(half, origin, direction),
-            Shape::Ball(radius) => touch_ball(*radius, origin, direction),
+            Shape::Cuboid(half) => hit_cuboid(half, origin, direction),
+            Shape::Ball(radius) => hit_ball(*radius, origin, direction),
             Shape::Drum { radius, half_height } => {
-                touch_drum(*radius, *half_height, origin, direction)
+                hit_drum(*radius, *half_height, origin, direction)
             }
-            Shape::Shell(half) => touch_shell(half, origin, direction),
+            Shape::Shell(half) => hit_shell(half, origin, direction),
         }
     }
 
-    /// May a ray that strays from this one by up to `stray` (m) meet it? Never wrong with a no.
-    #[inline]
-    pub fn is_near(&self, o: &Vector3<f64>, d: &Vector3<f64>, stray: f64) -> bool {
-        let half = match *self {
-            Shape::Cuboid(half) => half,
-            Shape::Ball(r) => Vector3::repeat(r),
-            Shape::Drum { radius, half_height } => Vector3::new(radius, radius, half_height),
-            Shape::Shell(_) => return true,
-        };
-        let (near, far, _) = slabs(&half.add_scalar(stray), o, d);
-        near <= far && far > 0.0
+    /// Half the size of its bounding box, m; a shell is all round.
+    pub fn half_size(&self) -> Option<Vector3<f64>> {
+        match *self {
+            Shape::Cuboid(half) => Some(half),
+            Shape::Ball(radius) => Some(Vector3::repeat(radius)),
+            Shape::Drum { radius, half_height } => Some(Vector3::new(radius, radius, half_height)),
+            Shape::Shell(_) => None,
+        }
     }
 
     /// Unit normal at a point of the surface, on the side it is seen from.
@@ -92,7 +93,7 @@ impl Shape {
     /// Coordinates on the surface, m: to the right and down for somebody who faces it upright
     /// (on level faces x and -y).
     #[inline]
-    pub fn place(&self, point: &Vector3<f64>, face: usize) -> Vector2<f64> {
+    pub fn face_place(&self, point: &Vector3<f64>, face: usize) -> Vector2<f64> {
         let p = point;
         match self {
             Shape::Cuboid(_) => unfold(p, face),
@@ -109,8 +110,8 @@ impl Shape {
         }
     }
 
-    /// Width and height of a face in the coordinates of [`Shape::place`], m.
-    pub fn extent(&self, face: usize) -> Vector2<f64> {
+    /// Width and height of a face in the coordinates of [`Shape::face_place`], m.
+    pub fn face_size(&self, face: usize) -> Vector2<f64> {
         match *self {
             Shape::Cuboid(h) | Shape::Shell(h) => match face / 2 {
                 0 => Vector2::new(2.0 * h.y, 2.0 * h.z),
@@ -184,34 +185,34 @@ fn slabs(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> (f64, f64, 
     (near, far, face)
 }
 
-fn touch_cuboid(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Touch> {
+fn hit_cuboid(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersection> {
     let (near, far, face) = slabs(half, o, d);
-    (near <= far && near > 0.0).then_some(Touch { t: near, face })
+    (near <= far && near > 0.0).then_some(Intersection { t: near, face })
 }
 
-fn touch_shell(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Touch> {
-    let mut hit = Touch { t: f64::INFINITY, face: 0 };
+fn hit_shell(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersection> {
+    let mut hit = Intersection { t: f64::INFINITY, face: 0 };
     for k in 0..3 {
         let t = (half[k].copysign(d[k]) - o[k]) / d[k];
         if t < hit.t {
-            hit = Touch { t, face: 2 * k + usize::from(d[k] > 0.0) };
+            hit = Intersection { t, face: 2 * k + usize::from(d[k] > 0.0) };
         }
     }
     (hit.t > 0.0 && hit.t.is_finite()).then_some(hit)
 }
 
-fn touch_ball(radius: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Touch> {
+fn hit_ball(radius: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersection> {
     let (a, b) = (d.norm_squared(), o.dot(d));
     let discriminant = b * b - a * (o.norm_squared() - radius * radius);
     if discriminant < 0.0 {
         return None;
     }
     let t = (-b - discriminant.sqrt()) / a;
-    (t > 0.0).then_some(Touch { t, face: 0 })
+    (t > 0.0).then_some(Intersection { t, face: 0 })
 }
 
 /// An endless cylinder and a slab, what they share.
-fn touch_drum(radius: f64, half: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Touch> {
+fn hit_drum(radius: f64, half: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersection> {
     let (side_in, side_out) = across_cylinder(radius, o, d)?;
     let inverse = 1.0 / d.z;
     let (low, high) = ((-half - o.z) * inverse, (half - o.z) * inverse);
@@ -222,7 +223,7 @@ fn touch_drum(radius: f64, half: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Opt
         (true, false) => Shape::DRUM_BOTTOM,
         (false, _) => 0,
     };
-    (near <= side_out.min(cap_out) && near > 0.0).then_some(Touch { t: near, face })
+    (near <= side_out.min(cap_out) && near > 0.0).then_some(Intersection { t: near, face })
 }
 
 /// Where a ray enters and leaves the endless cylinder.

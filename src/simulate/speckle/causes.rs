@@ -1,4 +1,4 @@
-//! The knobs of the Kinect by light: causes, never errors.
+//! What can be set about the simulated Kinect: causes, never errors.
 
 use crate::error::{Error, Result};
 
@@ -23,30 +23,30 @@ pub struct Causes {
     pub motion_mps: f64,
 }
 
-/// A knob for people and for the command line.
+/// A cause for people and for the command line.
 #[derive(Debug, Clone, Copy)]
 pub struct Cause {
     pub name: &'static str,
     pub unit: &'static str,
     /// What is accepted.
     pub range: [f64; 2],
-    /// Where it stands when nobody touches it.
+    /// Its value when it is not set.
     pub usual: f64,
     /// What it is, and where the usual value comes from.
-    pub words: &'static str,
+    pub description: &'static str,
     value: fn(&mut Causes) -> &mut f64,
 }
 
-/// One line a knob: field, unit, range, usual value, words.
+/// One line a cause: field, unit, range, usual value, description.
 macro_rules! causes {
-    ($($name:ident [$unit:literal] $low:literal ..= $high:literal, $usual:literal: $words:literal;)*) => {
-        /// Every knob there is.
+    ($($name:ident [$unit:literal] $low:literal ..= $high:literal, $usual:literal: $description:literal;)*) => {
+        /// Every cause there is.
         pub static KNOWN_CAUSES: &[Cause] = &[$(Cause {
             name: stringify!($name),
             unit: $unit,
             range: [$low, $high],
             usual: $usual,
-            words: $words,
+            description: $description,
             value: |causes| &mut causes.$name,
         }),*];
 
@@ -103,10 +103,10 @@ fn fault(what: String) -> Error {
 }
 
 impl Causes {
-    /// `self` with one knob set.
+    /// `self` with one cause set.
     ///
     /// # Errors
-    /// When there is no such knob, or it does not go so far.
+    /// When there is no such cause, or the value is outside its range.
     pub fn with(mut self, name: &str, value: f64) -> Result<Self> {
         let cause = KNOWN_CAUSES.iter().find(|c| c.name == name).ok_or_else(|| {
             let names: Vec<&str> = KNOWN_CAUSES.iter().map(|c| c.name).collect();

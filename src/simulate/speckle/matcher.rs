@@ -5,8 +5,8 @@
 
 use rayon::prelude::*;
 
+use super::correlation::{ColumnProducts, RowPair, WindowedImage, best};
 use super::reference::Reference;
-use super::scores::{ColumnProducts, RowPair, best, window_sums};
 use crate::frame::Frame;
 
 /// What the matcher found for a picture.
@@ -20,76 +20,53 @@ pub struct Match {
 /// Rows a task works on; its first window costs it `2 half` rows more.
 const BAND: usize = 96;
 
-/// The picture with its window sums.
-struct Seen {
-    width: usize,
-    height: usize,
-    grey: Vec<f32>,
-    sum: Vec<u32>,
-    square_sum: Vec<u32>,
-}
-
-impl Seen {
-    fn of(picture: &Frame, half: usize) -> Self {
-        let grey: Vec<u32> = picture.raw.iter().map(|&w| u32::from(w)).collect();
-        let squares: Vec<u32> = grey.iter().map(|g| g * g).collect();
-        Seen {
-            width: picture.width,
-            height: picture.height,
-            sum: window_sums(&grey, picture.width, half),
-            square_sum: window_sums(&squares, picture.width, half),
-            grey: grey.iter().map(|&g| g as f32).collect(),
-        }
-    }
-
-    fn row(&self, v: usize) -> &[f32] {
-        &self.grey[v * self.width..][..self.width]
-    }
-}
-
 /// Match `picture` against `reference`.
 pub fn find(picture: &Frame, reference: &Reference) -> Match {
-    let seen = Seen::of(picture, reference.half_window);
-    let mut shift = vec![f32::NAN; seen.grey.len()];
-    let mut correlation = vec![0f32; seen.grey.len()];
+    let grey: Vec<u32> = picture.raw.iter().map(|&w| u32::from(w)).collect();
+    let image = WindowedImage::new(&grey, picture.width, reference.half_window);
+    let mut shift = vec![f32::NAN; grey.len()];
+    let mut correlation = vec![0f32; grey.len()];
     shift
-        .par_chunks_mut(BAND * seen.width)
-        .zip(correlation.par_chunks_mut(BAND * seen.width))
+        .par_chunks_mut(BAND * image.width)
+        .zip(correlation.par_chunks_mut(BAND * image.width))
         .enumerate()
         .for_each(|(band, (shift, correlation))| {
-            match_band(&seen, reference, band * BAND, shift, correlation);
+            match_band(&image, reference, band * BAND, shift, correlation);
         });
     Match { shift, correlation }
 }
 
 fn match_band(
-    seen: &Seen,
+    image: &WindowedImage,
     reference: &Reference,
     top: usize,
     shift: &mut [f32],
     correlation: &mut [f32],
 ) {
     let half = reference.half_window;
-    let pair = |v: usize| RowPair { picture: seen.row(v), reference: reference.row(v).grey };
+    let pair = |v: usize| RowPair {
+        picture: image.row(&image.grey, v),
+        reference: reference.image.row(&reference.image.grey, v),
+    };
     let first = top.max(half);
-    let end = (top + shift.len() / seen.width).min(seen.height.saturating_sub(half));
+    let end = (top + shift.len() / image.width).min(image.height.saturating_sub(half));
     // A picture smaller than the window has no answer.
-    if first >= end || seen.width <= 2 * half {
+    if first >= end || image.width <= 2 * half {
         return;
     }
-    let mut products = ColumnProducts::new(seen.width, reference.candidates.count);
+    let mut products = ColumnProducts::new(image.width, reference.candidates.count);
     (first - half..=first + half).for_each(|v| products.enter(pair(v)));
     for v in first..end {
         if v > first {
             products.exchange(pair(v + half), pair(v - half - 1));
         }
-        let out = (v - top) * seen.width..(v - top + 1) * seen.width;
-        match_row(seen, reference, v, &products, &mut shift[out.clone()], &mut correlation[out]);
+        let out = (v - top) * image.width..(v - top + 1) * image.width;
+        match_row(image, reference, v, &products, &mut shift[out.clone()], &mut correlation[out]);
     }
 }
 
 fn match_row(
-    seen: &Seen,
+    image: &WindowedImage,
     reference: &Reference,
     v: usize,
     products: &ColumnProducts,
@@ -97,28 +74,26 @@ fn match_row(
     correlation: &mut [f32],
 ) {
     let (half, n) = (reference.half_window, reference.candidates.count);
-    let row = reference.row(v);
-    let area = ((2 * half + 1) as f32).powi(2);
+    let [mean, weight] = [&reference.mean, &reference.weight].map(|r| reference.image.row(r, v));
+    let [sum, contrast] = [&image.sum, &image.contrast].map(|i| image.row(i, v));
     let mut window = vec![0f32; n];
     let mut scores = vec![0f32; n];
     let add = |window: &mut [f32], column: usize, sign: f32| {
         window.iter_mut().zip(products.of(column)).for_each(|(w, p)| *w += sign * p);
     };
     (0..2 * half).for_each(|column| add(&mut window, column, 1.0));
-    for u in half..seen.width - half {
+    for u in half..image.width - half {
         add(&mut window, u + half, 1.0);
-        let place = seen.width - 1 - u;
-        let (mean, weight) = (&row.mean[place..][..n], &row.weight[place..][..n]);
-        let sum = seen.sum[v * seen.width + u] as f32;
-        for (((score, w), m), r) in scores.iter_mut().zip(&window).zip(mean).zip(weight) {
+        let (place, sum) = (image.width - 1 - u, sum[u]);
+        let candidates = mean[place..][..n].iter().zip(&weight[place..][..n]);
+        for ((score, w), (m, r)) in scores.iter_mut().zip(&window).zip(candidates) {
             *score = (w - sum * m) * r;
         }
         add(&mut window, u - half, -1.0);
-        let about_mean = seen.square_sum[v * seen.width + u] as f32 - sum * sum / area;
         let (k, top) = best(&scores);
         // The ends of the range have no neighbour for the parabola.
-        if k > 0 && k + 1 < n && about_mean > 0.0 {
-            correlation[u] = top / about_mean.sqrt();
+        if k > 0 && k + 1 < n && contrast[u] > 0.0 {
+            correlation[u] = top / contrast[u];
             shift[u] = (reference.candidates.first + k as i64) as f32
                 + vertex(scores[k - 1], top, scores[k + 1]);
         }

@@ -1,8 +1,8 @@
-//! The world by light: a Kinect that sees dots and matches them; no error formula anywhere.
+//! A Kinect that sees dots and matches them; no error formula anywhere.
 //!
 //! ```text
-//! pattern -> light -> picture -> detector -> matcher -> read-out -> 11-bit words
-//!            (world)                          (reference)
+//! pattern -> optics -> image -> matcher -> read-out -> 11-bit raw values
+//!            (world)            (reference)
 //! ```
 //! Frames: the camera's optical frame (x right, y down, z forward, m). The projector stands at
 //! (+baseline, 0, 0), turned as the camera: as on a Kinect v1, on the camera's right when looking
@@ -12,18 +12,15 @@
 //! What can be set are [`Causes`]; noise, steps, bias, holes and shadows follow.
 
 mod causes;
-mod detector;
-mod grain;
-mod light;
+mod correlation;
+mod image;
 mod matcher;
 mod moment;
+mod optics;
 mod pattern;
-mod picture;
 mod readout;
 mod reference;
-mod scores;
 mod sensor;
 
 pub use causes::{Cause, Causes, KNOWN_CAUSES};
-pub use pattern::{Dot, Pattern};
 pub use sensor::{Filming, SpeckleSensor, SpeckleShot};

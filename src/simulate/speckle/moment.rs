@@ -18,7 +18,7 @@ pub struct Moment {
 
 /// Of a Kinect v1's laser, nm.
 const WAVELENGTH_NM: f64 = 830.0;
-/// A shift of about a millimetre gives new speckle.
+/// A surface that has moved by about a millimetre shows new speckle.
 const SPECKLE_LENGTH_M: f64 = 1e-3;
 
 impl Moment {

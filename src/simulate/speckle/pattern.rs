@@ -1,10 +1,10 @@
-//! The dots a projector sends out: fixed for the life of the unit.
+//! The dots a projector sends out, fixed for the life of the unit, and their laser speckle.
 
 use rand::Rng;
 use rand::seq::SliceRandom;
-use rand_distr::{Distribution, Gamma};
+use rand_distr::{Distribution, Gamma, StandardNormal};
 
-use crate::rng::Seed;
+use crate::rng::{Seed, Stream};
 
 /// One beam of the projector.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,7 +24,8 @@ pub struct Pattern {
 
 /// The pattern is the unit's own, whatever the seed of a simulation.
 const UNIT: Seed = Seed(0x4b69_6e65_6374);
-/// Three tiles of 211 places span the 640 columns (Reichinger, "Kinect Pattern Uncovered", 2011).
+/// Three tiles of 211 places span the 640 columns (Reichinger, "Kinect Pattern Uncovered", from
+/// memory).
 const PITCH_PX: f64 = 640.0 / 633.0;
 /// Places that hold a dot: about one in nine, a 9 x 9 window sees nine (same source).
 const FILLED: f64 = 0.11;
@@ -46,7 +47,7 @@ impl Pattern {
         let pitch = PITCH_PX / focal_px;
         let places = |[low, high]: [f64; 2]| ((high - low) / pitch).ceil() as usize + 1;
         let (columns, rows) = (places(field.x), places(field.y));
-        let energy = Gamma::new(ENERGY_SHAPE, 1.0 / ENERGY_SHAPE).expect("positive parameters");
+        let energy = Gamma::new(ENERGY_SHAPE, 1.0 / ENERGY_SHAPE);
         let mut rng = UNIT.stream("simulate/speckle/energy");
         let mut aside = UNIT.stream("simulate/speckle/aside");
         // Anywhere in its place: on a strict grid of nearly a pixel's pitch all dots of a column
@@ -55,7 +56,7 @@ impl Pattern {
         let dot = |place: usize| Dot {
             x: field.x[0] + within(place % columns),
             y: field.y[0] + within(place / columns),
-            energy: energy.sample(&mut rng),
+            energy: energy.as_ref().map_or(1.0, |e| e.sample(&mut rng)),
         };
         Pattern { dots: free_places(columns, rows).into_iter().map(dot).collect() }
     }
@@ -86,6 +87,40 @@ fn free_places(columns: usize, rows: usize) -> Vec<usize> {
     // In reading order: memory is walked forward when the dots are drawn.
     chosen.sort_unstable();
     chosen
+}
+
+/// What laser speckle makes of one dot: on a rough surface it is a handful of bright grains.
+///
+/// Grains are placed by the roughness, so they stand still while the scene does. With M grains a
+/// dot's light has the contrast 1 / sqrt(M), and its centre of light lies off by 1 / sqrt(M) of its
+/// radius: the limit of every triangulation with coherent light (Dorsch, Haeusler and Herrmann
+/// 1994, from memory).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grain {
+    /// Light over that of the smooth dot.
+    pub light: f64,
+    /// Shift of its centre along the pattern's x and y, in standard deviations of the beam.
+    pub aside: [f64; 2],
+}
+
+impl Grain {
+    /// A smooth dot.
+    pub const NONE: Grain = Grain { light: 1.0, aside: [0.0; 2] };
+
+    /// Of `count` dots, in their order; `contrast` is sd over mean of a dot's light.
+    pub fn draw(count: usize, contrast: f64, rng: &mut Stream) -> Vec<Grain> {
+        // There is no such distribution without contrast.
+        let Ok(gamma) = Gamma::new(contrast.powi(-2), contrast * contrast) else {
+            return vec![Grain::NONE; count];
+        };
+        let normal = |rng: &mut Stream| -> f64 {
+            let n: f64 = StandardNormal.sample(rng);
+            contrast * n
+        };
+        (0..count)
+            .map(|_| Grain { light: gamma.sample(rng), aside: [normal(rng), normal(rng)] })
+            .collect()
+    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! What the matcher compares with: the pattern on a plane, recorded at the factory.
 
-use super::picture::Picture;
-use super::scores::{LANES, window_sums};
+use super::correlation::{LANES, WindowedImage};
+use super::image::Picture;
 
 /// Distance of the factory's plane, m. The real one is not published; at 2 m the picture moves by
 /// +22 px at 1 m and by -11 px at 4 m.
@@ -38,23 +38,14 @@ impl Candidates {
     }
 }
 
-/// The stored reference in 8 bits, its rows mirrored (see [`super::scores::RowPair`]).
+/// The stored reference in 8 bits, its rows mirrored (see [`super::correlation::RowPair`]).
 pub struct Reference {
     pub candidates: Candidates,
     pub half_window: usize,
-    columns: usize,
-    grey: Vec<f32>,
-    mean: Vec<f32>,
-    /// One over the root of the summed squares about the mean; zero where nothing is to be seen.
-    weight: Vec<f32>,
-}
-
-/// One row of [`Reference`].
-#[derive(Clone, Copy)]
-pub struct ReferenceRow<'a> {
-    pub grey: &'a [f32],
-    pub mean: &'a [f32],
-    pub weight: &'a [f32],
+    pub image: WindowedImage,
+    pub mean: Vec<f32>,
+    /// One over the contrast; zero where nothing is to be seen.
+    pub weight: Vec<f32>,
 }
 
 impl Reference {
@@ -65,30 +56,10 @@ impl Reference {
             .chunks_exact(picture.width)
             .flat_map(|row| row.iter().rev().map(|dn| (dn / top * 255.0).round() as u32))
             .collect();
-        let squares: Vec<u32> = grey.iter().map(|g| g * g).collect();
-        let sums = window_sums(&grey, picture.width, half_window);
-        let square_sums = window_sums(&squares, picture.width, half_window);
+        let image = WindowedImage::new(&grey, picture.width, half_window);
         let area = ((2 * half_window + 1) as f32).powi(2);
-        let weight = |(&sum, &squares): (&u32, &u32)| {
-            let about_mean = squares as f32 - sum as f32 * sum as f32 / area;
-            if about_mean > 0.0 { about_mean.sqrt().recip() } else { 0.0 }
-        };
-        Reference {
-            candidates,
-            half_window,
-            columns: picture.width,
-            grey: grey.iter().map(|&g| g as f32).collect(),
-            mean: sums.iter().map(|&s| s as f32 / area).collect(),
-            weight: sums.iter().zip(&square_sums).map(weight).collect(),
-        }
-    }
-
-    pub fn row(&self, v: usize) -> ReferenceRow<'_> {
-        let span = v * self.columns..(v + 1) * self.columns;
-        ReferenceRow {
-            grey: &self.grey[span.clone()],
-            mean: &self.mean[span.clone()],
-            weight: &self.weight[span],
-        }
+        let mean = image.sum.iter().map(|s| s / area).collect();
+        let weight = image.contrast.iter().map(|&c| if c > 0.0 { c.recip() } else { 0.0 });
+        Reference { candidates, half_window, mean, weight: weight.collect(), image }
     }
 }

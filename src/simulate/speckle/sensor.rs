@@ -1,13 +1,11 @@
-//! The Kinect by light as a whole: made once, then pointed at benches.
+//! The simulated Kinect as a whole: made once, then pointed at benches.
 
 use super::causes::Causes;
-use super::detector::{Ambient, expose};
-use super::grain::Grain;
-use super::light::Optics;
+use super::image::{Picture, expose};
 use super::matcher;
 use super::moment::Moment;
-use super::pattern::{Field, Pattern};
-use super::picture::Picture;
+use super::optics::Optics;
+use super::pattern::{Field, Grain, Pattern};
 use super::readout::ReadOut;
 use super::reference::{Candidates, REFERENCE_M, Reference};
 use crate::camera::Camera;
@@ -54,14 +52,14 @@ impl SpeckleSensor {
         SpeckleSensor { described, camera, baseline_m, causes, pattern, reference, read_out }
     }
 
-    /// As recording.json tells it.
+    /// As recording.json describes it.
     pub fn described(&self) -> &Sensor {
         &self.described
     }
 
     /// Point it at `bench` for one view.
     pub fn begin<'a>(&'a self, bench: &'a Bench, seed: Seed) -> Filming<'a> {
-        Filming { sensor: self, bench, seed, taken: None }
+        Filming { sensor: self, bench, seed, lit: None }
     }
 
     /// The same as long as the target stands still.
@@ -70,24 +68,40 @@ impl SpeckleSensor {
         Grain::draw(self.pattern.dots.len(), self.causes.speckle, &mut rng)
     }
 
-    fn ambient(&self, bench: &Bench) -> Ambient {
+    /// Light that is there without the projector, DN; `None` in the dark.
+    fn ambient(&self, bench: &Bench) -> Option<Vec<f32>> {
         if self.causes.ambient_dn == 0.0 {
-            return Ambient::None;
+            return None;
         }
         let rays = self.camera.rays();
         let seen = Seen::of(bench, &self.camera, &rays);
         let white = self.causes.ambient_dn / WHITE;
-        let light = (0..self.camera.pixels()).map(|i| {
+        let light = |i| {
             let (x, y) = rays.at(i);
             (white * f64::from(seen.albedo[i]) * (1.0 + x * x + y * y).powi(-2)) as f32
-        });
-        Ambient::Light(light.collect())
+        };
+        Some((0..self.camera.pixels()).map(light).collect())
     }
 
     fn picture(&self, world: &dyn World, moment: &Moment, grains: &[Grain]) -> Picture {
         let optics = Optics::at(moment, &self.causes, &self.camera, self.baseline_m);
         let spots = optics.spots(world, &self.pattern, grains);
         Picture::dark(self.camera.width, self.camera.height, 0).with(&spots)
+    }
+
+    /// What the matcher finds in an infrared picture, as raw values.
+    fn read_out(&self, infrared: &Frame) -> Frame {
+        let found = matcher::find(infrared, &self.reference);
+        let confidence = self.causes.confidence as f32;
+        let value = |(&shift, &correlation): (&f32, &f32)| {
+            let sure = shift.is_finite() && correlation >= confidence;
+            if sure { self.read_out.raw(shift) } else { KINECT_NO_MEASUREMENT }
+        };
+        Frame {
+            width: infrared.width,
+            height: infrared.height,
+            raw: found.shift.iter().zip(&found.correlation).map(value).collect(),
+        }
     }
 }
 
@@ -97,62 +111,44 @@ pub struct Filming<'a> {
     bench: &'a Bench,
     seed: Seed,
     /// Light without noise, good as long as nothing moves or warms.
-    taken: Option<Taken>,
+    lit: Option<Lit>,
 }
 
-struct Taken {
+struct Lit {
     moment: Moment,
     dots: Picture,
-    ambient: Ambient,
+    ambient: Option<Vec<f32>>,
 }
 
 impl Filming<'_> {
     pub fn shoot(&mut self, instant: Instant) -> SpeckleShot {
-        let sensor = self.sensor;
-        let moment = Moment::of(&sensor.causes, &instant);
-        if self.taken.as_ref().is_none_or(|t| t.moment != moment) {
-            self.taken = Some(self.take(instant.view, moment));
-        }
-        let Some(Taken { dots, ambient, .. }) = &self.taken else { unreachable!("just taken") };
+        let SpeckleSensor { causes, .. } = self.sensor;
+        let moment = Moment::of(causes, &instant);
+        let lit = match self.lit.take() {
+            Some(lit) if lit.moment == moment => lit,
+            _ => self.light_up(instant.view, moment),
+        };
         let name = format!("simulate/chip/{}/{}", instant.view, instant.frame);
-        let infrared = expose(dots, ambient, &sensor.causes, &mut self.seed.stream(&name));
-        SpeckleShot { depth: sensor.answer(&infrared), infrared }
+        let mut rng = self.seed.stream(&name);
+        let infrared = expose(&lit.dots, lit.ambient.as_deref(), causes, &mut rng);
+        self.lit = Some(lit);
+        SpeckleShot { depth: self.sensor.read_out(&infrared), infrared }
     }
 
-    fn take(&self, view: usize, moment: Moment) -> Taken {
+    fn light_up(&self, view: usize, moment: Moment) -> Lit {
         let bench = moment.bench(&self.sensor.causes, self.bench);
         let grains = self.sensor.grains(self.seed, view, moment.speckle_epoch());
         let dots = self.sensor.picture(&bench, &moment, &grains);
-        Taken { moment, dots, ambient: self.sensor.ambient(&bench) }
-    }
-}
-
-impl SpeckleSensor {
-    /// What the matcher says to an infrared picture, in words.
-    fn answer(&self, infrared: &Frame) -> Frame {
-        let found = matcher::find(infrared, &self.reference);
-        let confidence = self.causes.confidence as f32;
-        let word = |(&shift, &correlation): (&f32, &f32)| {
-            let sure = shift.is_finite() && correlation >= confidence;
-            if sure { self.read_out.word(shift) } else { KINECT_NO_MEASUREMENT }
-        };
-        Frame {
-            width: infrared.width,
-            height: infrared.height,
-            raw: found.shift.iter().zip(&found.correlation).map(word).collect(),
-        }
+        Lit { moment, dots, ambient: self.sensor.ambient(&bench) }
     }
 }
 
 /// The sensor's own lens, and what is wrong with it on top.
 fn with_unknown_lens(camera: &Camera, causes: &Causes) -> Camera {
-    let mut true_camera = camera.clone();
-    if causes.lens_k1 != 0.0 || causes.lens_k2 != 0.0 {
-        let known = camera.distortion.unwrap_or_default();
-        let [k1, k2, p1, p2, k3] = known;
-        true_camera.distortion = Some([k1 + causes.lens_k1, k2 + causes.lens_k2, p1, p2, k3]);
-    }
-    true_camera
+    let [k1, k2, p1, p2, k3] = camera.distortion.unwrap_or_default();
+    let bent = [k1 + causes.lens_k1, k2 + causes.lens_k2, p1, p2, k3];
+    let unknown = causes.lens_k1 != 0.0 || causes.lens_k2 != 0.0;
+    Camera { distortion: if unknown { Some(bent) } else { camera.distortion }, ..camera.clone() }
 }
 
 /// Dots wherever picture or reference can see one.

@@ -2,8 +2,7 @@
 
 use rand::Rng;
 
-use super::canvas::Canvas;
-use super::inks::{BLACK, WHITE, any, area, ink_on};
+use super::canvas::{BLACK, Canvas, WHITE, any_area, any_colour, readable_on};
 use crate::rng::Stream;
 
 /// Six rows of keys, three to one.
@@ -28,13 +27,13 @@ pub fn board(rng: &mut Stream) -> Canvas {
     let mut c = Canvas::new(512, [248, 248, 248]);
     let pens = [[26, 44, 130], [176, 26, 30], BLACK, [18, 110, 60]];
     for _ in 0..7 {
-        let [x, y, _, _] = area(rng, 0.3, 0.31);
+        let [x, y, _, _] = any_area(rng, 0.3, 0.31);
         let pen = pens[rng.random_range(0..pens.len())];
         c.words([x, y, x + 0.3, y + 0.16], 0.026, pen, rng);
     }
     for _ in 0..6 {
         let pen = pens[rng.random_range(0..pens.len())];
-        let field = area(rng, 0.08, 0.2);
+        let field = any_area(rng, 0.08, 0.2);
         c.frame(field, 0.007, pen);
     }
     c.frame([0.0, 0.0, 1.0, 1.0], 0.015, [128, 130, 134]);
@@ -47,10 +46,10 @@ pub fn page(rng: &mut Stream) -> Canvas {
     c.words([0.1, 0.06, 0.9, 0.13], 0.045, BLACK, rng);
     c.words([0.1, 0.18, 0.9, 0.45], 0.026, [40, 40, 44], rng);
     let figure = [0.12, 0.47, 0.5, 0.72];
-    c.rect(figure, any(rng));
+    c.rect(figure, any_colour(rng));
     for k in 0..5 {
         let x = 0.15 + 0.07 * k as f32;
-        c.rect([x, rng.random_range(0.49..0.68), x + 0.045, 0.72], any(rng));
+        c.rect([x, rng.random_range(0.49..0.68), x + 0.045, 0.72], any_colour(rng));
     }
     c.words([0.55, 0.47, 0.9, 0.72], 0.026, [40, 40, 44], rng);
     c.words([0.1, 0.76, 0.9, 0.95], 0.026, [40, 40, 44], rng);
@@ -59,23 +58,23 @@ pub fn page(rng: &mut Stream) -> Canvas {
 
 /// Large title, a picture of coloured shapes, a caption.
 pub fn poster(rng: &mut Stream) -> Canvas {
-    let ground = any(rng);
-    let ink = ink_on(ground);
-    let mut c = Canvas::new(512, ground);
-    c.words([0.06, 0.05, 0.94, 0.2], 0.07, ink, rng);
-    c.rect([0.06, 0.22, 0.94, 0.78], any(rng));
+    let background = any_colour(rng);
+    let text = readable_on(background);
+    let mut c = Canvas::new(512, background);
+    c.words([0.06, 0.05, 0.94, 0.2], 0.07, text, rng);
+    c.rect([0.06, 0.22, 0.94, 0.78], any_colour(rng));
     for _ in 0..60 {
-        let [x0, y0, x1, y1] = area(rng, 0.02, 0.2).map(|v| 0.07 + 0.86 * v);
+        let [x0, y0, x1, y1] = any_area(rng, 0.02, 0.2).map(|v| 0.07 + 0.86 * v);
         let (y0, y1) = (0.22 + 0.56 * y0, 0.22 + 0.56 * y1);
-        let colour = any(rng);
+        let colour = any_colour(rng);
         if rng.random_bool(0.5) {
             c.rect([x0, y0, x1, y1], colour);
         } else {
             c.disc([0.5 * (x0 + x1), 0.5 * (y0 + y1)], 0.3 * (y1 - y0), colour);
         }
     }
-    c.words([0.06, 0.81, 0.94, 0.95], 0.025, ink, rng);
-    c.frame([0.0, 0.0, 1.0, 1.0], 0.012, ink);
+    c.words([0.06, 0.81, 0.94, 0.95], 0.025, text, rng);
+    c.frame([0.0, 0.0, 1.0, 1.0], 0.012, text);
     c
 }
 
@@ -85,13 +84,13 @@ pub fn spines(rng: &mut Stream) -> Canvas {
     let mut x: f32 = 0.0;
     while x < 0.98 {
         let right = (x + rng.random_range(0.022..0.065)).min(1.0);
-        let (top, ground) = (rng.random_range(0.02..0.22), any(rng));
-        let ink = ink_on(ground);
-        c.rect([x + 0.002, top, right - 0.002, 1.0], ground);
+        let (top, background) = (rng.random_range(0.02..0.22), any_colour(rng));
+        let text = readable_on(background);
+        c.rect([x + 0.002, top, right - 0.002, 1.0], background);
         let (low, high) = (rng.random_range(0.25..0.35), rng.random_range(0.6..0.8));
-        c.words([x + 0.008, low, right - 0.004, high], 0.016, ink, rng);
+        c.words([x + 0.008, low, right - 0.004, high], 0.016, text, rng);
         for band in [top + 0.06, 0.88] {
-            c.rect([x + 0.002, band, right - 0.002, band + 0.02], ink);
+            c.rect([x + 0.002, band, right - 0.002, band + 0.02], text);
         }
         x = right;
     }
@@ -104,16 +103,16 @@ pub fn screen(rng: &mut Stream) -> Canvas {
     c.mottle([5, 5], 20.0, rng);
     for (k, window) in [[0.04, 0.08, 0.6, 0.72], [0.42, 0.22, 0.96, 0.9]].into_iter().enumerate() {
         let [x0, y0, x1, y1] = window;
-        let ground = if k == 0 { WHITE } else { [28, 30, 36] };
-        c.rect(window, ground);
+        let background = if k == 0 { WHITE } else { [28, 30, 36] };
+        c.rect(window, background);
         c.rect([x0, y0, x1, y0 + 0.05], [196, 200, 206]);
         c.words([x0 + 0.03, y0 + 0.01, x0 + 0.3, y0 + 0.05], 0.024, BLACK, rng);
-        c.words([x0 + 0.02, y0 + 0.08, x1 - 0.02, y1 - 0.02], 0.024, ink_on(ground), rng);
+        c.words([x0 + 0.02, y0 + 0.08, x1 - 0.02, y1 - 0.02], 0.024, readable_on(background), rng);
     }
     c.rect([0.0, 0.95, 1.0, 1.0], [24, 24, 28]);
     (0..9).for_each(|k| {
         let x = 0.01 + 0.05 * k as f32;
-        c.rect([x, 0.96, x + 0.03, 0.99], any(rng));
+        c.rect([x, 0.96, x + 0.03, 0.99], any_colour(rng));
     });
     c.frame([0.0, 0.0, 1.0, 1.0], 0.02, BLACK);
     c
@@ -125,7 +124,7 @@ pub fn carton(rng: &mut Stream) -> Canvas {
     c.mottle([2, 40], 8.0, rng);
     c.mottle([40, 40], 7.0, rng);
     c.rect([0.0, 0.44, 1.0, 0.54], [206, 178, 132]);
-    let [x, y, _, _] = area(rng, 0.4, 0.41);
+    let [x, y, _, _] = any_area(rng, 0.4, 0.41);
     let label = [x, y, x + 0.36, y + 0.3];
     c.rect(label, WHITE);
     c.words([x + 0.03, y + 0.03, x + 0.34, y + 0.28], 0.035, BLACK, rng);
@@ -135,12 +134,12 @@ pub fn carton(rng: &mut Stream) -> Canvas {
 
 /// What is printed round a cup or a tin.
 pub fn label(rng: &mut Stream) -> Canvas {
-    let ground = any(rng);
-    let mut c = Canvas::new(256, ground);
-    c.rect([0.0, 0.12, 1.0, 0.2], ink_on(ground));
-    c.words([0.05, 0.3, 0.95, 0.6], 0.1, ink_on(ground), rng);
+    let background = any_colour(rng);
+    let mut c = Canvas::new(256, background);
+    c.rect([0.0, 0.12, 1.0, 0.2], readable_on(background));
+    c.words([0.05, 0.3, 0.95, 0.6], 0.1, readable_on(background), rng);
     for k in 0..8 {
-        c.disc([0.06 + 0.125 * k as f32, 0.78], 0.045, any(rng));
+        c.disc([0.06 + 0.125 * k as f32, 0.78], 0.045, any_colour(rng));
     }
     c
 }

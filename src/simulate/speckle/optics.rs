@@ -3,9 +3,8 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::causes::Causes;
-use super::grain::Grain;
 use super::moment::Moment;
-use super::pattern::{Dot, Pattern};
+use super::pattern::{Dot, Grain, Pattern};
 use crate::camera::Camera;
 use crate::scene::{Hit, WHITE, World};
 

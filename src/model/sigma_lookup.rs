@@ -1,11 +1,10 @@
 //! Sigma over depth and tilt, looked up: for scenes in which every pixel has its own tilt.
 
-use crate::model::{Domain, SigmaModel};
-use crate::scene::Seen;
+use super::surface::{Domain, SigmaModel};
 
 /// Bilinear between nodes; outside the model's range its edge holds, as in the model.
 #[derive(Debug, Clone)]
-pub struct SigmaTable {
+pub struct SigmaLookup {
     domain: Domain,
     /// Depth by depth, m.
     nodes: Vec<f32>,
@@ -17,7 +16,7 @@ const DEPTHS: usize = 512;
 /// 0.01 rad from the pole the table errs by 0.6 %, at 0.1 rad by 0.06 %.
 const TILTS: usize = 256;
 
-impl SigmaTable {
+impl SigmaLookup {
     pub fn of(model: &SigmaModel) -> Self {
         let domain = model.domain;
         let ([z0, z1], steepest) = (domain.z_m, domain.theta_rad[1]);
@@ -29,7 +28,7 @@ impl SigmaTable {
                 nodes.push(model.sigma(z, steepest * (1.0 - left * left)) as f32);
             }
         }
-        SigmaTable { domain, nodes }
+        SigmaLookup { domain, nodes }
     }
 
     /// Sigma, m, at depth `z` (m) and tilt `theta` (rad).
@@ -44,17 +43,6 @@ impl SigmaTable {
         let near = node(i, j) + t * (node(i, j + 1) - node(i, j));
         let far = node(i + 1, j) + t * (node(i + 1, j + 1) - node(i + 1, j));
         near + s * (far - near)
-    }
-
-    /// Sigma of every pixel, m; zero where there is nothing.
-    pub fn of_pixels(&self, seen: &Seen) -> Vec<f32> {
-        let pixels = seen.depth.iter().zip(&seen.normal);
-        pixels
-            .map(|(&z, normal)| {
-                let theta = normal[2].abs().min(1.0).acos();
-                if z.is_nan() { 0.0 } else { self.at(z, theta) }
-            })
-            .collect()
     }
 }
 
@@ -73,7 +61,7 @@ mod tests {
     #[test]
     fn the_table_is_the_model_inside_its_range_and_at_its_edge() {
         for model in [SigmaModel::paper(), SigmaModel::nguyen(), SigmaModel::khoshelham()] {
-            let table = SigmaTable::of(&model);
+            let table = SigmaLookup::of(&model);
             for i in 0..=60 {
                 for j in 0..=157 {
                     let (z, theta) = (0.1 * f64::from(i), 0.01 * f64::from(j));

@@ -1,7 +1,38 @@
-//! Sums over the matching window, and the correlation of one picture row with all candidates.
+//! Sums over the matching window, and the products of one picture row with all candidates.
+
+/// A picture with the sums over the window about each pixel, row-major.
+pub struct WindowedImage {
+    pub width: usize,
+    pub height: usize,
+    pub grey: Vec<f32>,
+    pub sum: Vec<f32>,
+    /// Root of the summed squares about the window's mean; zero where nothing is to be seen.
+    pub contrast: Vec<f32>,
+}
+
+impl WindowedImage {
+    pub fn new(grey: &[u32], width: usize, half: usize) -> Self {
+        let squares: Vec<u32> = grey.iter().map(|g| g * g).collect();
+        let area = ((2 * half + 1) as f32).powi(2);
+        let sum: Vec<f32> = window_sums(grey, width, half).iter().map(|&s| s as f32).collect();
+        let contrast =
+            |(&squares, &sum): (&u32, &f32)| (squares as f32 - sum * sum / area).max(0.0).sqrt();
+        WindowedImage {
+            width,
+            height: grey.len() / width,
+            grey: grey.iter().map(|&g| g as f32).collect(),
+            contrast: window_sums(&squares, width, half).iter().zip(&sum).map(contrast).collect(),
+            sum,
+        }
+    }
+
+    pub fn row<'a>(&self, values: &'a [f32], v: usize) -> &'a [f32] {
+        &values[v * self.width..][..self.width]
+    }
+}
 
 /// Sum of each pixel's `(2 half + 1)^2` neighbourhood; zero where it does not fit. Exact.
-pub fn window_sums(values: &[u32], width: usize, half: usize) -> Vec<u32> {
+fn window_sums(values: &[u32], width: usize, half: usize) -> Vec<u32> {
     let height = values.len() / width;
     let side = 2 * half + 1;
     let mut sums = vec![0; values.len()];

@@ -1,10 +1,61 @@
-//! What every pixel of a camera sees of a world: computed once a view.
+//! Surfaces that light can meet, and what every pixel of a camera sees of them, computed once a view.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::{TargetFrame, World};
 use crate::camera::{Camera, Rays};
+use crate::plane::Plane;
+
+/// Surfaces that light can meet.
+pub trait World: Sync {
+    /// The nearest surface along `origin + t * direction`, t > 0 (t in units of `direction`).
+    fn cast(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Hit>;
+
+    /// The surfaces [`Hit::surface`] numbers.
+    fn surfaces(&self) -> Vec<Surface>;
+
+    /// The calibration target's own coordinates, where there is one.
+    fn target(&self) -> Option<TargetFrame> {
+        None
+    }
+}
+
+/// Coordinates on a flat target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TargetFrame {
+    /// Where they begin, m.
+    pub centre: Vector3<f64>,
+    /// Unit vectors along the target: to its right, and down.
+    pub right: Vector3<f64>,
+    pub down: Vector3<f64>,
+}
+
+impl TargetFrame {
+    /// On a plane, its right as near to the image's horizontal as the tilt allows.
+    pub fn on(plane: &Plane, centre: Vector3<f64>) -> Self {
+        let normal = plane.normal().into_inner();
+        let right = Vector3::y().cross(&normal).normalize();
+        TargetFrame { centre, right, down: normal.cross(&right) }
+    }
+
+    /// Of a point, m: right and down of the centre.
+    pub fn place(&self, point: &Vector3<f64>) -> (f64, f64) {
+        let offset = point - self.centre;
+        (offset.dot(&self.right), offset.dot(&self.down))
+    }
+}
+
+/// Where a ray ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    pub t: f64,
+    /// Unit normal on the side the ray came from.
+    pub normal: Vector3<f64>,
+    /// Index into [`World::surfaces`].
+    pub surface: u16,
+    /// Share of infrared light given back, 0 to 1.
+    pub albedo: f64,
+}
 
 /// One connected piece of the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,14 +64,6 @@ pub struct Surface {
     pub is_target: bool,
     /// Tilt against the optical axis, rad, where it is the same all over; `None` when curved.
     pub theta_rad: Option<f64>,
-}
-
-/// [`Seen::surface`] of a pixel that looks past everything.
-#[derive(Debug, Clone, Copy)]
-pub struct Nothing;
-
-impl Nothing {
-    pub const SURFACE: u16 = u16::MAX;
 }
 
 /// Per pixel, row-major.
@@ -32,6 +75,7 @@ pub struct Seen {
     pub depth: Vec<f32>,
     /// Unit normal towards the camera.
     pub normal: Vec<[f32; 3]>,
+    /// Index into `surfaces`; [`Seen::NOTHING`] past everything.
     pub surface: Vec<u16>,
     /// Share of infrared light given back.
     pub albedo: Vec<f32>,
@@ -40,6 +84,8 @@ pub struct Seen {
 }
 
 impl Seen {
+    pub const NOTHING: u16 = u16::MAX;
+
     /// Cast the rays of all pixels from the camera's centre.
     pub fn of(world: &dyn World, camera: &Camera, rays: &Rays) -> Self {
         let hits: Vec<_> = (0..camera.pixels())
@@ -63,19 +109,23 @@ impl Seen {
             // The ray's third component is one: its parameter is the depth.
             seen.depth.push(hit.map_or(f32::NAN, |h| h.t as f32));
             seen.normal.push(hit.map_or([0.0; 3], |h| h.normal.cast::<f32>().into()));
-            seen.surface.push(hit.map_or(Nothing::SURFACE, |h| h.surface));
+            seen.surface.push(hit.map_or(Self::NOTHING, |h| h.surface));
             seen.albedo.push(hit.map_or(0.0, |h| h.albedo as f32));
         }
         seen
     }
 
+    fn surface_at(&self, i: usize) -> Option<&Surface> {
+        self.surfaces.get(usize::from(self.surface[i]))
+    }
+
     pub fn is_target(&self, i: usize) -> bool {
-        self.surfaces.get(usize::from(self.surface[i])).is_some_and(|s| s.is_target)
+        self.surface_at(i).is_some_and(|s| s.is_target)
     }
 
     /// Tilt of the surface at pixel `i` against the optical axis, rad.
     pub fn theta(&self, i: usize) -> f64 {
-        let flat = self.surfaces.get(usize::from(self.surface[i])).and_then(|s| s.theta_rad);
+        let flat = self.surface_at(i).and_then(|s| s.theta_rad);
         flat.unwrap_or_else(|| f64::from(self.normal[i][2].abs().min(1.0)).acos())
     }
 

@@ -1,6 +1,10 @@
-//! Spots become pixels.
+//! Spots become pixels, and pixels the 10-bit numbers of an infrared camera.
 
-use super::light::Spot;
+use super::causes::Causes;
+use super::optics::Spot;
+use crate::effects::fill_normal;
+use crate::frame::Frame;
+use crate::rng::Stream;
 
 /// A picture in DN, before noise; its first column may lie outside the camera's image.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,6 +55,32 @@ fn covered(centre: f64, reach: f64, size: usize) -> std::ops::Range<usize> {
     let low = (centre - reach).ceil().max(0.0);
     let high = (centre + reach).floor().min(size as f64 - 1.0);
     if low <= high { low as usize..high as usize + 1 } else { 0..0 }
+}
+
+/// A 10-bit sensor of this class fills up at some 10,000 electrons.
+const ELECTRONS_PER_DN: f32 = 10.0;
+/// What 10 bits hold.
+const FULL_DN: f32 = 1023.0;
+/// Black is lifted by four read noises, so that 10 bits without a sign cut nothing off.
+const BLACK_DN: f32 = 42.0;
+
+/// One exposure of the chip, with shot and read noise. `ambient` is the light that is there without
+/// the projector, DN, row-major.
+pub fn expose(
+    picture: &Picture,
+    ambient: Option<&[f32]>,
+    causes: &Causes,
+    rng: &mut Stream,
+) -> Frame {
+    let mut noise = vec![0f32; picture.dn.len()];
+    fill_normal(&mut noise, rng);
+    let read = (causes.read_noise_dn * causes.read_noise_dn) as f32;
+    let words = picture.dn.iter().zip(&noise).enumerate().map(|(i, (dots, noise))| {
+        let light = dots + ambient.map_or(0.0, |dn| dn[i]);
+        let sd = (light / ELECTRONS_PER_DN + read).sqrt();
+        (BLACK_DN + light + sd * noise).round().clamp(0.0, FULL_DN) as u16
+    });
+    Frame { width: picture.width, height: picture.height, raw: words.collect() }
 }
 
 #[cfg(test)]
