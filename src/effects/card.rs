@@ -63,6 +63,8 @@ pub struct Parameter {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Card {
     pub id: &'static str,
+    /// What it is called in the middle of a sentence.
+    pub title: &'static str,
     pub stage: Stage,
     /// What was left out when it is missing, one sentence.
     pub words: &'static str,
