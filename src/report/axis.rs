@@ -1,4 +1,4 @@
-//! An axis with round ticks, linear or logarithmic, as plotters wants it.
+//! An axis with round ticks, linear or logarithmic.
 
 use std::ops::Range;
 
@@ -18,9 +18,9 @@ pub struct Axis {
 }
 
 /// More labels than this crowd a figure.
-const MOST_TICKS: usize = 10;
+const MAX_TICKS: usize = 10;
 /// A logarithmic axis wants at least this many labels to be read.
-const FEWEST_LOG_TICKS: usize = 4;
+const MIN_LOG_TICKS: usize = 4;
 /// Share of the value by which an empty range is widened on either side.
 const WIDEN: f64 = 0.05;
 /// Mantissas of round numbers.
@@ -47,15 +47,30 @@ impl Axis {
                 .collect()
         };
         let mut ticks = inside(&ROUND);
-        if ticks.len() > MOST_TICKS {
+        if ticks.len() > MAX_TICKS {
             ticks = inside(&ROUND[..1]);
-        } else if ticks.len() < FEWEST_LOG_TICKS {
+        } else if ticks.len() < MIN_LOG_TICKS {
             ticks = inside(&FINER);
         }
-        if ticks.len() < FEWEST_LOG_TICKS {
+        if ticks.len() < MIN_LOG_TICKS {
             ticks = multiples(low, high);
         }
         Axis { low, high, log: true, ticks }
+    }
+
+    /// With `share` of the range to spare at either end, so that no mark touches the frame.
+    pub fn with_margin([low, high]: [f64; 2], share: f64) -> Self {
+        let spare = share * (high - low);
+        Axis::linear(low - spare, high + spare)
+    }
+
+    /// With half the ticks where there are many, for a small chart.
+    pub fn sparse(mut self) -> Self {
+        if self.ticks.len() > MAX_TICKS / 2 + 1 {
+            let step = self.ticks[1] - self.ticks[0];
+            self.ticks.retain(|t| ((t / step).round() as i64) % 2 == 0);
+        }
+        self
     }
 
     /// Without the ticks below `value`.
@@ -102,12 +117,12 @@ fn widened(low: f64, high: f64) -> [f64; 2] {
 }
 
 fn multiples(low: f64, high: f64) -> Vec<f64> {
-    let step = round_up((high - low) / MOST_TICKS as f64);
+    let step = round_up((high - low) / MAX_TICKS as f64);
     let first = (low / step - f64::EPSILON).ceil() as i64;
     (first..)
         .map(|k| k as f64 * step)
         .take_while(|v| *v <= high * (1.0 + f64::EPSILON) + f64::EPSILON)
-        .take(2 * MOST_TICKS)
+        .take(2 * MAX_TICKS)
         .collect()
 }
 
