@@ -6,7 +6,7 @@ mod warnings;
 use maud::{Markup, html};
 use serde_json::{Map, Value};
 
-use super::document::{Column, document, facts, figure, row, table};
+use super::document::{document, facts, figure, row, table};
 use super::figure2::{Overlay, figure2};
 use super::numbers::{ABSENT, MM, fixed, formula, millimetres, range, significant};
 use super::sigma_map::sigma_map;
@@ -137,20 +137,16 @@ fn published(model: &SigmaModel) -> Markup {
     distances.sort_by(f64::total_cmp);
     distances.dedup_by(|b, a| *b <= *a * DISTANCE_RATIO);
     let theta = model.domain.theta_rad[0];
+    let titles = distances.iter().map(|z| format!(">{} m", fixed(*z, 2)));
+    let columns: Vec<String> = ["at distance".into()].into_iter().chain(titles).collect();
+    let mut rows = vec![row![html! { b { "this sensor" } }]];
+    rows[0].extend(distances.iter().map(|z| with_interval(model, *z, theta)));
+    rows.extend(Overlay::ALL.map(|overlay| {
+        let cells = distances.iter().map(|z| without_interval(&overlay.model(), *z, theta));
+        row![overlay.label()].into_iter().chain(cells).collect()
+    }));
     html! {
-        div.wide { table {
-            thead { tr { th { "at distance" } @for z in &distances { th.n { (fixed(*z, 2)) " m" } } } }
-            tbody {
-                tr.ours {
-                    th { "this sensor" }
-                    @for z in &distances { td.n { (with_interval(model, *z, theta)) } }
-                }
-                @for overlay in Overlay::ALL { tr {
-                    th { (overlay.label()) }
-                    @for z in &distances { td.n { (without_interval(&overlay.model(), *z, theta)) } }
-                } }
-            }
-        } }
+        (table(&columns, rows))
         p.note {
             "At θ = " (fixed(theta.to_degrees(), 1)) "°, the smallest tilt measured. In brackets: the 95 % interval. "
             (ABSENT) ": the source measured no such distance or tilt."
@@ -176,20 +172,15 @@ fn with_interval(model: &SigmaModel, z: f64, theta: f64) -> Markup {
     }
 }
 
-fn without_interval(model: &SigmaModel, z: f64, theta: f64) -> String {
+fn without_interval(model: &SigmaModel, z: f64, theta: f64) -> Markup {
     let [low, high] = model.domain.theta_rad;
     let known = (low..=high).contains(&theta) && measured(model, z);
-    if known { millimetres(model.sigma(z, theta)) } else { ABSENT.into() }
+    html! { @if known { (millimetres(model.sigma(z, theta))) } @else { (ABSENT) } }
 }
 
 fn model(calibration: &Calibration) -> Markup {
     let fit = &calibration.fit;
-    let columns = [
-        Column::Name("parameter"),
-        Column::Number("value"),
-        Column::Number("standard error"),
-        Column::Words("remark"),
-    ];
+    let columns = ["parameter", ">value", ">standard error", "~remark"];
     let parameter = |p: &Parameter| {
         let error = p.std_error.map_or_else(|| html! { "held" }, |e| significant(e, 2));
         row![
@@ -218,13 +209,7 @@ fn model(calibration: &Calibration) -> Markup {
 }
 
 fn forms(calibration: &Calibration) -> Markup {
-    let columns = [
-        Column::Name("form"),
-        Column::Number("log score, nats a view"),
-        Column::Number("rms error"),
-        Column::Number("distances left out"),
-        Column::Words("from"),
-    ];
+    let columns = ["form", ">log score, nats a view", ">rms error", ">distances left out", "~from"];
     let row = |h: &HeldOut| {
         let used = h.form == calibration.fit.form;
         let name = html! { @if used { b { (h.form.id()) } } @else { (h.form.id()) } };

@@ -93,6 +93,18 @@ const SIZE: (u32, u32) = (960, 540);
 /// Of one of two beside each other.
 const SMALL_SIZE: (u32, u32) = (470, 300);
 
+// Room around the axes, px of the SVG.
+const LEFT: i32 = 12;
+const RIGHT: i32 = 20;
+const FOOT: i32 = 8;
+const TITLE_ROOM: i32 = 40;
+/// Above the axes, for the label of y.
+const LABEL_ROOM: i32 = 30;
+const X_TICKS: i32 = 48;
+const Y_TICKS: i32 = 54;
+/// Column to the right.
+const LEGEND: i32 = 225;
+
 impl Chart {
     /// As wide as a page, with a grid; layers and legend are still to be added.
     pub fn new(title: &str, [x, y]: [Axis; 2], labels: [&str; 2]) -> Self {
@@ -110,7 +122,9 @@ impl Chart {
     /// Widens one of two ranges so that a unit is as long in x as in y on a chart as wide as a
     /// page with a legend.
     pub fn equal_units(ranges: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
-        let inner = draw::inner_size(SIZE);
+        let across = SIZE.0 as i32 - LEFT - Y_TICKS - LEGEND;
+        let down = SIZE.1 as i32 - TITLE_ROOM - LABEL_ROOM - X_TICKS - FOOT;
+        let inner = [across, down].map(f64::from);
         let unit = |k: usize| (ranges[k][1] - ranges[k][0]) / inner[k];
         let unit = unit(0).max(unit(1)).max(f64::MIN_POSITIVE);
         [0, 1].map(|k| {

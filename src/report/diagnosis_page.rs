@@ -76,8 +76,6 @@ pub fn diagnosis_page(page: &DiagnosisPage<'_>) -> Result<String> {
         (pictures(page.pictures)?)
         h1.evidence { "The evidence" }
         (sections::map(&diagnosis.map))
-        (sections::alternatives(&diagnosis.findings))
-        (sections::parameters(&diagnosis.findings))
         (sections::views(&diagnosis.views))
         @if !unsettled { (sections::remarks(&diagnosis.remarks)) }
         p.note {

@@ -33,41 +33,36 @@ pub fn document(title: &str, kind: Option<Kind>, body: &Markup) -> Markup {
     }
 }
 
-/// How a column of a table is set.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Column {
-    /// Names the row.
-    Name(&'static str),
-    Text(&'static str),
-    /// To the right.
-    Number(&'static str),
-    /// Small: sentences.
-    Words(&'static str),
-}
-
 /// The cells of a row, each anything that maud can render.
 macro_rules! row {
     ($($cell:expr),* $(,)?) => { vec![$(maud::html! { ($cell) }),*] };
 }
 pub(crate) use row;
 
-/// A table, which scrolls by itself where the page is too narrow.
-pub fn table(columns: &[Column], rows: impl IntoIterator<Item = Vec<Markup>>) -> Markup {
+/// A table by the titles of its columns, which scrolls by itself where the page is too narrow.
+///
+/// The first column names the row. A title after `>` is that of a column of numbers, set to the
+/// right; one after `~` is that of a column of sentences, set small.
+pub fn table<C: AsRef<str>>(columns: &[C], rows: impl IntoIterator<Item = Vec<Markup>>) -> Markup {
+    let columns: Vec<(Option<&str>, &str)> = columns.iter().map(|c| set(c.as_ref())).collect();
     html! {
         div.wide { table class=[(columns.len() > 8).then_some("small")] {
-            thead { tr { @for column in columns { @match column {
-                Column::Number(title) => th.n { (title) },
-                Column::Name(title) | Column::Text(title) | Column::Words(title) => th { (title) },
-            } } } }
+            thead { tr { @for (class, title) in &columns { th class=[class] { (title) } } } }
             tbody { @for cells in rows { tr {
-                @for (column, cell) in columns.iter().zip(cells) { @match column {
-                    Column::Name(_) => th { (cell) },
-                    Column::Text(_) => td { (cell) },
-                    Column::Number(_) => td.n { (cell) },
-                    Column::Words(_) => td.words { (cell) },
-                } }
+                @for (i, ((class, _), cell)) in columns.iter().zip(cells).enumerate() {
+                    @if i == 0 { th class=[class] { (cell) } } @else { td class=[class] { (cell) } }
+                }
             } } }
         } }
+    }
+}
+
+/// Class and title of a column.
+fn set(column: &str) -> (Option<&'static str>, &str) {
+    match (column.strip_prefix('>'), column.strip_prefix('~')) {
+        (Some(title), _) => (Some("n"), title),
+        (_, Some(title)) => (Some("words"), title),
+        _ => (None, column),
     }
 }
 
@@ -140,8 +135,7 @@ mod tests {
 
     #[test]
     fn a_table_is_escaped_and_set_by_column() {
-        let columns = [Column::Name("view"), Column::Number("z m")];
-        let table = table(&columns, [row!["<b>", 2.5]]).into_string();
+        let table = table(&["view", ">z m"], [row!["<b>", 2.5]]).into_string();
         assert!(table.contains(r#"<th>&lt;b&gt;</th><td class="n">2.5</td>"#), "{table}");
     }
 }

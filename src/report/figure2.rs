@@ -30,36 +30,30 @@ impl Overlay {
 
     /// As on the command line.
     pub fn id(self) -> &'static str {
-        match self {
-            Overlay::PaperEq1 => "eq1",
-            Overlay::Nguyen => "nguyen",
-            Overlay::Khoshelham => "khoshelham",
-        }
+        self.card().0
     }
 
     /// As in a legend.
     pub fn label(self) -> &'static str {
-        match self {
-            Overlay::PaperEq1 => "paper, Eq. 1",
-            Overlay::Nguyen => "Nguyen et al. 2012",
-            Overlay::Khoshelham => "Khoshelham 2012",
-        }
+        self.card().1
     }
 
     /// The surface with the range that was measured.
     pub fn model(self) -> SigmaModel {
-        match self {
-            Overlay::PaperEq1 => SigmaModel::paper(),
-            Overlay::Nguyen => SigmaModel::nguyen(),
-            Overlay::Khoshelham => SigmaModel::khoshelham(),
-        }
+        self.card().2()
     }
 
     fn dashes(self) -> Dashes {
+        self.card().3
+    }
+
+    fn card(self) -> (&'static str, &'static str, fn() -> SigmaModel, Dashes) {
         match self {
-            Overlay::PaperEq1 => &[9, 5],
-            Overlay::Nguyen => &[2, 4],
-            Overlay::Khoshelham => &[15, 3],
+            Overlay::PaperEq1 => ("eq1", "paper, Eq. 1", SigmaModel::paper, &[9, 5]),
+            Overlay::Nguyen => ("nguyen", "Nguyen et al. 2012", SigmaModel::nguyen, &[2, 4]),
+            Overlay::Khoshelham => {
+                ("khoshelham", "Khoshelham 2012", SigmaModel::khoshelham, &[15, 3])
+            }
         }
     }
 }

@@ -14,8 +14,8 @@ use crate::model::SigmaModel;
 /// Steps of colour: fine enough to look continuous.
 const SHADES: usize = 36;
 /// Cells of the coloured map; between rows the shade steps, too little to be seen.
-const ROWS: usize = 72;
-const COLUMNS: usize = 240;
+const ROWS: usize = 60;
+const COLUMNS: usize = 180;
 /// Cells in which iso-lines are straight.
 const LINE_CELLS: [usize; 2] = [120, 60];
 /// Share of each axis that shows what lies outside the valid range.
@@ -38,8 +38,7 @@ pub fn sigma_map(table: &SigmaTable, model: &SigmaModel) -> Chart {
     let labels = ["distance z (m)", "tilt θ (degrees)"];
     let mut chart = Chart { grid: false, ..Chart::new("σ over distance and tilt", axes, labels) };
     chart.layers.push(Layer::Hatching);
-    let tile = |t: Tile| Layer::Tile(t.z, t.theta, colour(t.shade).into());
-    chart.layers.extend(tiles(z, theta, &|z, theta| shade(scale.share(sigma(z, theta)))).map(tile));
+    chart.layers.extend(tiles(z, theta, &|z, theta| shade(scale.share(sigma(z, theta)))));
     let corners = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]].map(|[i, j]| [z[i], theta[j]]);
     chart.layers.push(Layer::Line(corners.to_vec(), Stroke::new(INK, 1)));
     let measured = Mark { edge: WHITE.into(), ..Mark::dot(INK, 2) };
@@ -68,41 +67,25 @@ fn colour(shade: usize) -> RGBColor {
     colours::surface((shade as f64 + 0.5) / SHADES as f64)
 }
 
-/// A part of the map of one shade.
-#[derive(Clone, Copy)]
-struct Tile {
-    z: [f64; 2],
-    theta: [f64; 2],
-    shade: usize,
-}
-
-/// Rows of tilt, cut where the shade changes; tiles that go on in the next row are one.
-fn tiles(
-    z: [f64; 2],
-    theta: [f64; 2],
-    shade: &dyn Fn(f64, f64) -> usize,
-) -> impl Iterator<Item = Tile> {
+/// Rows of tilt, cut where the shade changes.
+fn tiles(z: [f64; 2], theta: [f64; 2], shade: &dyn Fn(f64, f64) -> usize) -> Vec<Layer> {
     let edge = |[low, high]: [f64; 2], i: usize, n: usize| low + (high - low) * i as f64 / n as f64;
-    let (mut done, mut open) = (Vec::new(), Vec::<Tile>::new());
-    for i in 0..ROWS {
-        let theta = [i, i + 1].map(|i| edge(theta, i, ROWS));
-        let middle = 0.5 * (theta[0] + theta[1]);
-        let cells = (0..COLUMNS).map(|i| [i, i + 1].map(|i| edge(z, i, COLUMNS)));
-        let cells: Vec<Tile> =
-            cells.map(|z| Tile { z, theta, shade: shade(0.5 * (z[0] + z[1]), middle) }).collect();
-        let runs = cells.chunk_by(|a, b| a.shade == b.shade);
-        let mut row: Vec<Tile> =
-            runs.map(|run| Tile { z: [run[0].z[0], run[run.len() - 1].z[1]], ..run[0] }).collect();
-        for run in &mut row {
-            let same = |below: &Tile| below.z == run.z && below.shade == run.shade;
-            if let Some(k) = open.iter().position(same) {
-                run.theta[0] = open.swap_remove(k).theta[0];
-            }
-        }
-        done.append(&mut open);
-        open = row;
-    }
-    done.into_iter().chain(open)
+    let row = |j: usize| {
+        let theta = [j, j + 1].map(|j| edge(theta, j, ROWS));
+        let shades: Vec<usize> = (0..2 * COLUMNS)
+            .skip(1)
+            .step_by(2)
+            .map(|i| shade(edge(z, i, 2 * COLUMNS), 0.5 * (theta[0] + theta[1])))
+            .collect();
+        let mut end = 0;
+        let runs = shades.chunk_by(|a, b| a == b).map(|run| {
+            let start = end;
+            end += run.len();
+            Layer::Tile([start, end].map(|i| edge(z, i, COLUMNS)), theta, colour(run[0]).into())
+        });
+        runs.collect::<Vec<Layer>>()
+    };
+    (0..ROWS).flat_map(row).collect()
 }
 
 #[cfg(test)]
@@ -122,10 +105,12 @@ mod tests {
 
     #[test]
     fn tiles_cover_the_map_once() {
-        let tiles: Vec<Tile> =
-            tiles([1.0, 3.0], [0.0, 70.0], &|z, theta| (9.0 * z + theta / 10.0) as usize).collect();
-        assert!(tiles.len() > 20 && tiles.len() < ROWS * COLUMNS / 4);
-        let area = |t: &Tile| (t.z[1] - t.z[0]) * (t.theta[1] - t.theta[0]);
+        let tiles = tiles([1.0, 3.0], [0.0, 70.0], &|z, theta| (9.0 * z + theta / 10.0) as usize);
+        assert!(tiles.len() > ROWS && tiles.len() < ROWS * COLUMNS / 4);
+        let area = |tile: &Layer| match tile {
+            Layer::Tile(z, theta, _) => (z[1] - z[0]) * (theta[1] - theta[0]),
+            _ => 0.0,
+        };
         let covered: f64 = tiles.iter().map(area).sum();
         approx::assert_relative_eq!(covered, 140.0, max_relative = 1e-9);
     }

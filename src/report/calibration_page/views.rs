@@ -5,29 +5,28 @@ use maud::{Markup, html};
 use crate::error::Result;
 use crate::measure::{ReferenceDistance, ViewMeasurement};
 use crate::report::axis::Axis;
-use crate::report::document::Column::{self, Name, Number};
 use crate::report::document::{row, table};
 use crate::report::numbers::{ABSENT, MM, degrees, fixed, millimetres};
 use crate::report::residuals::{residual_image, scale};
 
-const COLUMNS: [Column; 17] = [
-    Name("view"),
-    Number("z m"),
-    Number("axis m"),
-    Number("off reference mm"),
-    Number("θ °"),
-    Number("azimuth °"),
-    Number("σ ± s.e. mm"),
-    Number("temporal σ mm"),
-    Number("normal σ mm"),
-    Number("paper z m"),
-    Number("paper θ °"),
-    Number("paper σ mm"),
-    Number("n"),
-    Number("n effective"),
-    Number("corr. px"),
-    Number("frames"),
-    Number("pixels left out"),
+const COLUMNS: [&str; 17] = [
+    "view",
+    ">z m",
+    ">axis m",
+    ">off reference mm",
+    ">θ °",
+    ">azimuth °",
+    ">σ ± s.e. mm",
+    ">temporal σ mm",
+    ">normal σ mm",
+    ">paper z m",
+    ">paper θ °",
+    ">paper σ mm",
+    ">n",
+    ">n effective",
+    ">corr. px",
+    ">frames",
+    ">pixels left out",
 ];
 
 pub(super) fn table_of(views: &[ViewMeasurement]) -> Markup {

@@ -5,22 +5,15 @@ use std::f64::consts::PI;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-use super::{Chart, ColourScale, Entry, Layer, Mark, SIZE, Sample, Stroke};
+use super::{
+    Chart, ColourScale, Entry, FOOT, LABEL_ROOM, LEFT, LEGEND, Layer, Mark, RIGHT, SIZE, Sample,
+    Stroke, TITLE_ROOM, X_TICKS, Y_TICKS,
+};
 use crate::report::axis::Axis;
 use crate::report::colours::{FAINT, INK};
 use crate::report::sheet::{Drawing, Drawn, Pixel, SMALL, Sheet, TEXT};
 
 // All lengths are units.
-const LEFT: i32 = 12;
-const RIGHT: i32 = 20;
-const FOOT: i32 = 8;
-const TITLE_ROOM: i32 = 40;
-/// Above the axes, for the label of y.
-const LABEL_ROOM: i32 = 30;
-const X_TICKS: i32 = 48;
-const Y_TICKS: i32 = 54;
-/// Column for the legend.
-const LEGEND: i32 = 225;
 const LEGEND_GAP: i32 = 22;
 /// From one row of the legend to the next.
 const ROW: i32 = 25;
@@ -32,13 +25,6 @@ const CAP: i32 = 3;
 /// From one line of the hatching to the next.
 const HATCH: i32 = 12;
 const HATCH_INK: RGBColor = RGBColor(205, 205, 205);
-
-/// What is left for the axes of a chart with title and legend.
-pub(super) fn inner_size((width, height): (u32, u32)) -> [f64; 2] {
-    let across = width as i32 - LEFT - Y_TICKS - LEGEND;
-    let down = height as i32 - TITLE_ROOM - LABEL_ROOM - X_TICKS - FOOT;
-    [across, down].map(f64::from)
-}
 
 impl Drawing for Chart {
     const WHAT: &'static str = "chart";

@@ -1,15 +1,15 @@
 //! The sections of the page, one function each.
 
 use maud::{Markup, PreEscaped, html};
+use serde_json::Value;
 
 use super::sentences::{
-    advice, axis, badge, called, capital, chance, description, interval, join, likely, missing,
-    physics, sentence, statistic, title,
+    advice, axis, badge, called, capital, chance, description, interval, join, missing, physics,
+    sentence, statistic, title,
 };
-use super::{curve, parameters as parameter, sentences};
+use super::{curve, parameters, sentences};
 use crate::diagnose::{CannotTell, Diagnosis, Finding, HeldOut, MapRow, Status, Verdict, ViewLine};
 use crate::error::Result;
-use crate::report::document::Column::{Name, Number, Text, Words};
 use crate::report::document::{facts, fold, list, row, table};
 use crate::report::numbers::{count, degrees, fixed, millimetres, p_value, percent, significant};
 use crate::terms::Statistic;
@@ -19,6 +19,8 @@ const OPEN_ROWS: usize = 12;
 /// Longer lists fold away.
 const MAX_OPEN: usize = 6;
 const PX_DECIMALS: usize = 3;
+/// Smaller probabilities are nil.
+const MIN_PROBABILITY: f64 = 0.0005;
 
 pub(super) fn verdict(diagnosis: &Diagnosis) -> Markup {
     let (class, mark) = match diagnosis.verdict {
@@ -91,9 +93,6 @@ fn card((i, finding): (usize, &Finding)) -> Result<Markup> {
                 span class={ "badge " (class) } { (badge) }
             }
             p.lead { (physics(finding)) }
-            @if finding.status == Status::OneOf {
-                (list(likely(finding).map(|(id, p)| html! { b { (percent(p)) " " (title(id)) } ": " (sentence(description(id))) })))
-            }
             div.halves {
                 (facts(finding_facts(finding)))
                 @if let Some(svg) = picture { figure {
@@ -105,33 +104,36 @@ fn card((i, finding): (usize, &Finding)) -> Result<Markup> {
                     }
                 } }
             }
+            (alternatives(finding))
             @if let Some(advice) = advice(finding) { div.todo { p { b { "What to do. " } (advice) } } }
         }
     })
 }
 
 /// Those that are known.
-fn finding_facts(finding: &Finding) -> Vec<(&'static str, Markup)> {
+fn finding_facts(finding: &Finding) -> Vec<(String, Markup)> {
     let place = interval(finding.axis, finding.interval, finding.unit);
     let mut facts = vec![
-        ("What is off", html! { (capital(statistic(finding.statistic))) }),
-        ("Where", html! { (capital(axis(finding.axis))) ": " b { (place) } }),
+        ("What is off".into(), html! { (capital(statistic(finding.statistic))) }),
+        ("Where".into(), html! { (capital(axis(finding.axis))) ": " b { (place) } }),
     ];
-    facts.extend(size(finding).map(|size| ("How large", size)));
+    facts.extend(size(finding).map(|size| ("How large".into(), size)));
     if finding.status != Status::NotIdentifiable {
-        facts.push(("How sure", certainty(finding)));
-        if finding.share.is_finite() {
-            let percent = (100.0 * finding.share).clamp(0.0, 100.0);
-            facts.push((
-                "Share",
-                html! {
-                    span.bar { span style={ "width:" (format!("{percent:.0}")) "%" } {} }
-                    " " b { (fixed(percent, 0)) " %" } " of all that was explained"
-                },
-            ));
-        }
+        facts.push(("How sure".into(), certainty(finding)));
+        facts.extend(share(finding).map(|share| ("Share".into(), share)));
     }
+    facts.extend(finding.parameters.iter().map(|(k, v)| parameter(finding.effect, k, v)));
     facts
+}
+
+fn share(finding: &Finding) -> Option<Markup> {
+    let percent = (100.0 * finding.share).clamp(0.0, 100.0);
+    finding.share.is_finite().then(|| {
+        html! {
+            span.bar { span style={ "width:" (format!("{percent:.0}")) "%" } {} }
+            " " b { (fixed(percent, 0)) " %" } " of all that was explained"
+        }
+    })
 }
 
 fn size(finding: &Finding) -> Option<Markup> {
@@ -148,15 +150,36 @@ fn size(finding: &Finding) -> Option<Markup> {
 }
 
 fn certainty(finding: &Finding) -> Markup {
-    let named = finding.alternatives.first().filter(|_| finding.status == Status::Named);
-    let chance = chance(finding.p_adjusted);
     html! {
-        @match named {
-            Some(best) => { b { (percent(best.probability)) } " that it is this effect; " (chance) },
-            None => (capital(&chance)),
-        }
+        (capital(&chance(finding.p_adjusted)))
         @if finding.p_adjusted.is_finite() { " (" (p_value(finding.p_adjusted)) ")" }
     }
+}
+
+/// `amplitude_px = 0.3 ± 0.1 px`, and what that is.
+fn parameter(effect: Option<&str>, name: &str, value: &Value) -> (String, Markup) {
+    let description = parameters::description(effect, name);
+    let value = html! {
+        b { (parameters::value(name, value, 3)) }
+        @if !description.is_empty() { ": " (description) }
+    };
+    (name.into(), value)
+}
+
+/// Every effect that it could be, best first.
+fn alternatives(finding: &Finding) -> Markup {
+    let none = 1.0 - finding.alternatives.iter().map(|a| a.probability).sum::<f64>();
+    let effects = finding.alternatives.iter().map(|a| {
+        html! {
+            b { (percent(a.probability)) " " (title(a.effect)) }
+            ": " (description(a.effect)) " " code { (a.effect) }
+        }
+    });
+    let none = (none > MIN_PROBABILITY).then(|| html! { b { (percent(none)) " none of these" } });
+    html! { @if !finding.alternatives.is_empty() {
+        h3 { "What it could be" }
+        (list(effects.chain(none)))
+    } }
 }
 
 /// The final test.
@@ -184,7 +207,7 @@ pub(super) fn held_out(held: Option<&HeldOut>) -> Markup {
             "Tested on " (count(held.views.len(), "view")) " that took no part in the search: "
             span.units { (held.views.join(", ")) } "."
         }
-        (table(&[Name(""), Number("before"), Number("after")], rows))
+        (table(&["", ">before", ">after"], rows))
         p {
             @if low > 0.0 { "The extended model predicts such a view better by " }
             @else { "No gain beyond chance: the extended model differs by " }
@@ -225,12 +248,12 @@ pub(super) fn detectable(diagnosis: &Diagnosis) -> Markup {
     let rows = diagnosis.detectable.iter().filter_map(|d| {
         let (strength, least) = d.minimum.iter().next()?;
         let smallest = html! {
-            (parameter::title(strength)) " " b { (parameter::value(strength, least, 2)) }
+            (parameters::title(strength)) " " b { (parameters::value(strength, least, 2)) }
             @for (key, value) in d.minimum.iter().skip(1) {
-                ", at a " (parameter::title(key)) " of " (parameter::value(key, value, 2))
+                ", at a " (parameters::title(key)) " of " (parameters::value(key, value, 2))
             }
         };
-        let description = parameter::description(Some(d.effect), strength);
+        let description = parameters::description(Some(d.effect), strength);
         Some(row![capital(title(d.effect)), smallest, description])
     });
     html! { section {
@@ -246,7 +269,7 @@ pub(super) fn detectable(diagnosis: &Diagnosis) -> Markup {
         }
         @if !names.is_empty() {
             h2 { "How small an effect these views could have shown" }
-            (table(&[Name("effect"), Text("smallest that would be seen"), Words("what the number is")], rows))
+            (table(&["effect", "smallest that would be seen", "~what the number is"], rows))
             p.note { "With a power of 80 %: four of five recordings like this one would show an effect this large." }
         }
     } }
@@ -264,14 +287,7 @@ pub(super) fn cannot_tell(all: &[CannotTell]) -> Markup {
 
 /// Every located mismatch.
 pub(super) fn map(rows: &[MapRow]) -> Markup {
-    let columns = [
-        Number(""),
-        Text("what is off"),
-        Text("along"),
-        Text("where"),
-        Number("size"),
-        Number("chance"),
-    ];
+    let columns = [">", "what is off", "along", "where", ">size", ">chance"];
     let cells = |(i, r): (usize, &MapRow)| {
         row![
             i + 1,
@@ -306,63 +322,17 @@ fn effect_size(row: &MapRow) -> Markup {
     }
 }
 
-/// `1. A bent target` beside the first of a finding's rows.
-fn head(i: usize, finding: &Finding, row: usize) -> String {
-    if row == 0 { format!("{}. {}", i + 1, capital(&called(finding))) } else { String::new() }
-}
-
-pub(super) fn alternatives(findings: &[Finding]) -> Markup {
-    let rows = findings.iter().enumerate().flat_map(|(i, f)| {
-        let none = 1.0 - f.alternatives.iter().map(|a| a.probability).sum::<f64>();
-        let rest = (!f.alternatives.is_empty() && none > 0.0005)
-            .then(|| row!["", "None of these", "", percent(none)]);
-        let alternative = move |(k, a): (usize, &crate::diagnose::Alternative)| {
-            row![
-                head(i, f, k),
-                capital(title(a.effect)),
-                html! { code { (a.effect) } },
-                percent(a.probability)
-            ]
-        };
-        f.alternatives.iter().enumerate().map(alternative).chain(rest)
-    });
-    html! { @if findings.iter().any(|f| !f.alternatives.is_empty()) { section {
-        h2 { "What else it could be" }
-        (table(&[Name("finding"), Text("effect"), Text("id"), Number("probability")], rows))
-    } } }
-}
-
-pub(super) fn parameters(findings: &[Finding]) -> Markup {
-    let columns =
-        [Name("finding"), Text("parameter"), Number("value ± standard error"), Words("what it is")];
-    let rows = findings.iter().enumerate().flat_map(|(i, f)| {
-        f.parameters.iter().enumerate().map(move |(k, (key, value))| {
-            let description = parameter::description(f.effect, key);
-            row![
-                head(i, f, k),
-                html! { code { (key) } },
-                parameter::value(key, value, 3),
-                description
-            ]
-        })
-    });
-    html! { @if findings.iter().any(|f| !f.parameters.is_empty()) { section {
-        h2 { "Parameters" }
-        (table(&columns, rows))
-    } } }
-}
-
 pub(super) fn views(views: &[ViewLine]) -> Markup {
     let columns = [
-        Name("view"),
-        Number("distance m"),
-        Number("tilt °"),
-        Number("azimuth °"),
-        Number("frames"),
-        Number("pixels"),
-        Number("steady error before px"),
-        Number("after px"),
-        Text("used for"),
+        "view",
+        ">distance m",
+        ">tilt °",
+        ">azimuth °",
+        ">frames",
+        ">pixels",
+        ">steady error before px",
+        ">after px",
+        "used for",
     ];
     let cells = |v: &ViewLine| {
         row![

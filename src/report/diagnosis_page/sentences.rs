@@ -9,8 +9,10 @@ use crate::terms::{Axis, Statistic};
 
 /// Below this tilt a target counts as facing the sensor, rad: 3 degrees.
 const FACING_RAD: f64 = 0.0524;
-/// Less likely alternatives stay in the table.
+/// Less likely alternatives do not come into a finding's name.
 const MIN_PROBABILITY: f64 = 0.05;
+/// As many findings come by name into the first sentence.
+const MAX_NAMES: usize = 3;
 /// From here on times are in minutes, s.
 const MINUTES_FROM_S: f64 = 180.0;
 const SECONDS_A_MINUTE: f64 = 60.0;
@@ -28,7 +30,8 @@ pub(super) fn description(id: &'static str) -> &'static str {
 /// The answer in a sentence or two.
 pub(super) fn verdict(diagnosis: &Diagnosis) -> String {
     let effects = missing(&diagnosis.findings);
-    let names = join(&effects.iter().map(|f| called(f)).collect::<Vec<_>>(), "and");
+    let names: Vec<String> = effects.iter().take(MAX_NAMES).map(|f| called(f)).collect();
+    let names = join(&names, "and");
     let recalibrate = diagnosis.findings.iter().any(|f| f.status == Status::Recalibrate);
     match (diagnosis.verdict, effects.is_empty()) {
         (Verdict::Match, _) => format!(
@@ -50,10 +53,12 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> String {
         (Verdict::Mismatch, true) => {
             "Model and recording differ, and these views cannot show why.".into()
         }
-        (Verdict::Mismatch, false) => {
-            let parameters = if recalibrate { " Its own parameters are off as well." } else { "" };
-            format!("The model leaves {} out: {names}.{parameters}", count(effects.len(), "effect"))
-        }
+        (Verdict::Mismatch, false) => format!(
+            "The model leaves {} out{} {names}.{}",
+            count(effects.len(), "effect"),
+            if effects.len() > MAX_NAMES { ", above all" } else { ":" },
+            if recalibrate { " Its own parameters are off as well." } else { "" }
+        ),
     }
 }
 
@@ -69,18 +74,14 @@ pub(super) fn called(finding: &Finding) -> String {
     let unnamed = || format!("an unexplained error over the {}", axis(finding.axis));
     match finding.status {
         Status::OneOf if finding.alternatives.len() > 1 => {
-            join(&likely(finding).map(|(id, _)| title(id).into()).collect::<Vec<_>>(), "or")
+            let likely = finding.alternatives.iter().enumerate();
+            let likely = likely.filter(|(i, a)| *i < 2 || a.probability >= MIN_PROBABILITY);
+            join(&likely.map(|(_, a)| title(a.effect).into()).collect::<Vec<_>>(), "or")
         }
         Status::Unexplained => unnamed(),
         Status::Recalibrate => "parameters that are off".into(),
         _ => finding.effect.map_or_else(unnamed, |id| title(id).into()),
     }
-}
-
-/// The alternatives worth a word, with their probabilities, best first.
-pub(super) fn likely(finding: &Finding) -> impl Iterator<Item = (&'static str, f64)> {
-    let all = finding.alternatives.iter().map(|a| (a.effect, a.probability)).enumerate();
-    all.filter(|(i, (_, p))| *i < 2 || *p >= MIN_PROBABILITY).map(|(_, alternative)| alternative)
 }
 
 /// Class and text of a finding's badge.
@@ -303,6 +304,16 @@ mod tests {
         ] {
             assert_eq!(interval(at, ends, unit), text);
         }
+    }
+
+    #[test]
+    fn titles_fit_into_a_sentence() {
+        for effect in effects::CATALOGUE {
+            for words in [effect.card().title, effect.card().words] {
+                assert!(!words.ends_with('.') && words.starts_with(char::is_lowercase), "{words}");
+            }
+        }
+        assert_eq!(title("not-yet"), "not-yet");
     }
 
     #[test]

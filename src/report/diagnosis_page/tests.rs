@@ -30,7 +30,8 @@ const SAYS: [(&str, &[&str]); 8] = [
         &[
             "The model leaves one effect out: radial disparity bias.",
             "1.84 mm rms, 0.42 times the noise of a single reading",
-            "97 % that it is this effect; chance alone does this about once in 2,500 recordings (p = 4·10 −4 )",
+            "Chance alone does this about once in 2,500 recordings (p = 4·10 −4 )",
+            "97 % radial disparity bias : lens or projector",
             "Distance from the picture's centre: 118 to 398 px",
             "0.312 ± 0.012 px",
             "3.12 mm → 1.17 mm",
@@ -53,9 +54,9 @@ const SAYS: [(&str, &[&str]); 8] = [
         "one-of",
         &[
             "Radial disparity bias or a bent target",
-            "38 % a bent target : The board is bent",
+            "38 % a bent target : the board is bent",
             "hold the target 0.80 m in front of the sensor, tilted by 45° , its right side farthest away",
-            "None of these 5 %",
+            "5 % none of these",
         ],
     ),
     (
