@@ -143,7 +143,7 @@ if [ "$mode" = --quick ]; then concealed small; else concealed all; herrera; fi
 
 # Pages and pictures are looked at, not held; the log holds times. Results have a line each, the many
 # images of a recording one together.
-find . -type f ! -name '*.html' ! -name '*.svg' ! -name log ! -name stats.json ! -name SHA256SUMS -print0 |
+find . -type f ! -name '*.html' ! -name '*.svg' ! -name 'sigma*.png' ! -name log ! -name stats.json ! -name SHA256SUMS -print0 |
   sort -z | xargs -0 sha256sum >SHA256SUMS
 results='/(diagnosis\.json|model\.json|measurements\.csv|trajectory\.txt|map\.ply)$'
 {

@@ -161,8 +161,8 @@ pub fn write_outputs(
 ) -> anyhow::Result<()> {
     let calibration = page.calibration;
     let figure =
-        kinoise::report::Figure2::of(&calibration.table, &calibration.model.sigma, page.overlays);
-    let map = kinoise::report::SigmaMap::of(&calibration.table, &calibration.model.sigma);
+        kinoise::report::figure2(&calibration.table, &calibration.model.sigma, page.overlays);
+    let map = kinoise::report::sigma_map(&calibration.table, &calibration.model.sigma);
     out.write("sigma.svg", figure.svg()?.as_bytes())?;
     out.write("sigma.png", &figure.png()?)?;
     out.write("sigma_map.svg", map.svg()?.as_bytes())?;

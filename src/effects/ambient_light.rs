@@ -6,6 +6,7 @@ pub struct AmbientLight;
 
 static CARD: Card = Card {
     id: "ambient-light",
+    title: "noise from ambient light",
     stage: Stage::Variance,
     summary: "light of the room adds to the pattern and brings its own shot noise: the farther the target, the fainter the pattern against it",
     parameters: &[Parameter {

@@ -81,6 +81,8 @@ impl Settings {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Card {
     pub id: &'static str,
+    /// What it is called in the middle of a sentence.
+    pub title: &'static str,
     pub stage: Stage,
     /// What it does, one sentence.
     pub summary: &'static str,

@@ -6,6 +6,7 @@ pub struct ColumnBanding;
 
 static CARD: Card = Card {
     id: "column-banding",
+    title: "column banding",
     stage: Stage::Disparity,
     summary: "the firmware applies a correction that is linear in the column in whole steps: what is left is a saw-tooth over the columns, the same in every row",
     parameters: &[

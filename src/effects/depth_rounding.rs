@@ -6,6 +6,7 @@ pub struct DepthRounding;
 
 static CARD: Card = Card {
     id: "depth-rounding",
+    title: "depth rounding",
     stage: Stage::Word,
     summary: "the driver stores depth in whole steps of a constant size: the same gaps at every distance",
     parameters: &[Parameter {

@@ -6,6 +6,7 @@ pub struct DepthScale;
 
 static CARD: Card = Card {
     id: "depth-scale",
+    title: "a wrong depth scale",
     stage: Stage::Driver,
     summary: "focal length or baseline are wrong: every depth is off by the same factor; only reference distances show it",
     parameters: &[Parameter {

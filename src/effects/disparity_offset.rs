@@ -6,6 +6,7 @@ pub struct DisparityOffset;
 
 static CARD: Card = Card {
     id: "disparity-offset",
+    title: "a constant disparity offset",
     stage: Stage::Quantiser,
     summary: "the stored reference pattern stands at another distance than the firmware believes: every disparity is shifted by a constant, and depth errs with z^2; only reference distances show it",
     parameters: &[Parameter {

@@ -6,6 +6,7 @@ pub struct DisparityQuantisation;
 
 static CARD: Card = Card {
     id: "disparity-quantisation",
+    title: "disparity quantisation",
     stage: Stage::Quantiser,
     summary: "the matcher answers in steps of a fraction of a pixel: only some depths occur, their gaps growing with z^2",
     parameters: &[Parameter {

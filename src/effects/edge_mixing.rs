@@ -6,6 +6,7 @@ pub struct EdgeMixing;
 
 static CARD: Card = Card {
     id: "edge-mixing",
+    title: "mixed depth at edges",
     stage: Stage::Optics,
     summary: "at the edge of the target a pixel sees both the target and what is behind, and answers between the two; it needs something behind (--wall)",
     parameters: &[Parameter {

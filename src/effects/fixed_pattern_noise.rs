@@ -6,6 +6,7 @@ pub struct FixedPatternNoise;
 
 static CARD: Card = Card {
     id: "fixed-pattern-noise",
+    title: "fixed-pattern noise",
     stage: Stage::Disparity,
     summary: "each pixel has a constant error of disparity of its own, the same in every view of this unit",
     parameters: &[Parameter {

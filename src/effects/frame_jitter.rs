@@ -6,6 +6,7 @@ pub struct FrameJitter;
 
 static CARD: Card = Card {
     id: "frame-jitter",
+    title: "frame jitter",
     stage: Stage::Disparity,
     summary: "the whole frame is shifted as one, afresh in each frame: vibration, or a reference that trembles",
     parameters: &[Parameter {

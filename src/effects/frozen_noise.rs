@@ -6,6 +6,7 @@ pub struct FrozenNoise;
 
 static CARD: Card = Card {
     id: "frozen-noise",
+    title: "frozen noise",
     stage: Stage::NoiseAtRest,
     summary: "the grain of laser light stands still while the scene does: part of the noise is the same in every frame of a view and another in the next view",
     parameters: &[Parameter {

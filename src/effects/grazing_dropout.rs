@@ -6,6 +6,7 @@ pub struct GrazingDropout;
 
 static CARD: Card = Card {
     id: "grazing-dropout",
+    title: "dropout at grazing tilts",
     stage: Stage::Dropout,
     summary: "at grazing angles the pattern smears and the match finds nothing",
     parameters: &[

@@ -6,6 +6,7 @@ pub struct HeavyTails;
 
 static CARD: Card = Card {
     id: "heavy-tails",
+    title: "heavy-tailed noise",
     stage: Stage::NoiseTails,
     summary: "now and then the match locks to a wrong place: errors come from a mixture with a wide part, not from one Gaussian",
     parameters: &[

@@ -7,6 +7,7 @@ pub struct IntensityDependentNoise;
 
 static CARD: Card = Card {
     id: "intensity-dependent-noise",
+    title: "noise that depends on intensity",
     stage: Stage::Variance,
     summary: "a dark surface sends back less of the pattern, and the match is noisier: an infrared picture of a printed target shows it",
     parameters: &[Parameter {

@@ -6,6 +6,7 @@ pub struct LensDistortion;
 
 static CARD: Card = Card {
     id: "lens-distortion",
+    title: "uncorrected lens distortion",
     stage: Stage::Optics,
     summary: "the lens bends rays, so that a pixel looks elsewhere than the pinhole says: only planes that are tilted show it",
     parameters: &[Parameter {

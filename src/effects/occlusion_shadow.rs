@@ -6,6 +6,7 @@ pub struct OcclusionShadow;
 
 static CARD: Card = Card {
     id: "occlusion-shadow",
+    title: "an occlusion shadow",
     stage: Stage::Dropout,
     summary: "what the target hides from the projector has no pattern and no depth: a band on the background beside the target, fx b (1/z - 1/z_behind) px wide, on one side; it needs something behind (--wall)",
     parameters: &[Parameter {

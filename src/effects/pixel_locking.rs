@@ -8,6 +8,7 @@ pub struct PixelLocking;
 
 static CARD: Card = Card {
     id: "pixel-locking",
+    title: "pixel locking",
     stage: Stage::Disparity,
     summary: "interpolating the peak of the match leans toward whole pixels: an error periodic in disparity, one wave a pixel, seen as contour lines on tilted planes",
     parameters: &[Parameter {

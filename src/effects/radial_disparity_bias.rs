@@ -6,6 +6,7 @@ pub struct RadialDisparityBias;
 
 static CARD: Card = Card {
     id: "radial-disparity-bias",
+    title: "radial disparity bias",
     stage: Stage::Disparity,
     summary: "lens or projector off their calibration by a smooth bowl of disparity about the principal point: in depth it grows with z^2",
     parameters: &[Parameter {

@@ -6,6 +6,7 @@ pub struct RangeDropout;
 
 static CARD: Card = Card {
     id: "range-dropout",
+    title: "dropout out of range",
     stage: Stage::Dropout,
     summary: "too far away the pattern is too faint, too near it is too bright: the match finds nothing",
     parameters: &[

@@ -6,6 +6,7 @@ pub struct RangeExponent;
 
 static CARD: Card = Card {
     id: "range-exponent",
+    title: "noise with another power of distance",
     stage: Stage::Variance,
     summary: "noise grows with another power of the distance than the form allows",
     parameters: &[Parameter {

@@ -6,6 +6,7 @@ pub struct RangeNotDepth;
 
 static CARD: Card = Card {
     id: "range-not-depth",
+    title: "range stored as depth",
     stage: Stage::Driver,
     summary: "the file holds the length of the ray where depth along the axis is expected: a flat wall becomes a bowl",
     parameters: &[Parameter {

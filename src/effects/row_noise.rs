@@ -6,6 +6,7 @@ pub struct RowNoise;
 
 static CARD: Card = Card {
     id: "row-noise",
+    title: "row noise",
     stage: Stage::Disparity,
     summary: "a row of the picture is read as one and shifted as one, afresh in each frame",
     parameters: &[Parameter {

@@ -17,6 +17,7 @@ pub struct Shape {
 
 static BIAS: Card = Card {
     id: "shape-of-bias",
+    title: "a measured bias without a formula",
     stage: Stage::Disparity,
     summary: "errors of the disparity as a fit found them, without a formula",
     parameters: &[],
@@ -29,6 +30,7 @@ static BIAS: Card = Card {
 
 static VARIANCE: Card = Card {
     id: "shape-of-variance",
+    title: "a measured variance without a formula",
     stage: Stage::Variance,
     summary: "changes of the noise as a fit found them, without a formula",
     statistic: "variance",

@@ -6,6 +6,7 @@ pub struct SlopeNoise;
 
 static CARD: Card = Card {
     id: "slope-noise",
+    title: "extra noise on slopes",
     stage: Stage::Variance,
     summary: "a pixel does not know to a fraction where it looks: on a slope that is an error of depth, growing with z tan(theta)",
     parameters: &[Parameter {

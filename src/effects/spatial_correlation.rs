@@ -6,6 +6,7 @@ pub struct SpatialCorrelation;
 
 static CARD: Card = Card {
     id: "spatial-correlation",
+    title: "noise correlated between neighbours",
     stage: Stage::NoiseInSpace,
     summary: "neighbouring pixels are matched with overlapping windows and err together",
     parameters: &[Parameter {

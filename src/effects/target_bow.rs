@@ -6,6 +6,7 @@ pub struct TargetBow;
 
 static CARD: Card = Card {
     id: "target-bow",
+    title: "a bent target",
     stage: Stage::Surface,
     summary: "the board is bent: its middle stands out towards the sensor, a parabola along its right, fixed on the board and not in the picture",
     parameters: &[

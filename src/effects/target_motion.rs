@@ -6,6 +6,7 @@ pub struct TargetMotion;
 
 static CARD: Card = Card {
     id: "target-motion",
+    title: "motion during a view",
     stage: Stage::Surface,
     summary: "target or sensor moved along the optical axis while the view was taken: frames disagree, and their mean is off",
     parameters: &[Parameter {

@@ -6,6 +6,7 @@ pub struct TemporalCorrelation;
 
 static CARD: Card = Card {
     id: "temporal-correlation",
+    title: "noise correlated between frames",
     stage: Stage::NoiseInTime,
     summary: "the firmware carries part of a frame over into the next: noise stays the same size and hangs together over frames",
     parameters: &[Parameter {

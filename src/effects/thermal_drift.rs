@@ -6,6 +6,7 @@ pub struct ThermalDrift;
 
 static CARD: Card = Card {
     id: "thermal-drift",
+    title: "thermal drift",
     stage: Stage::Driver,
     summary: "the sensor warms itself: its geometry drifts towards a limit in the course of the session",
     parameters: &[

@@ -6,6 +6,7 @@ pub struct TiltAxisAnisotropy;
 
 static CARD: Card = Card {
     id: "tilt-axis-anisotropy",
+    title: "noise that depends on the tilt axis",
     stage: Stage::Variance,
     summary: "tilt along the baseline stretches the pattern in the matching window, tilt across it only shears it: the first is noisier",
     parameters: &[Parameter {

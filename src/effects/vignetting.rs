@@ -6,6 +6,7 @@ pub struct Vignetting;
 
 static CARD: Card = Card {
     id: "vignetting",
+    title: "vignetting",
     stage: Stage::Variance,
     summary: "less light reaches the corners of the picture, and less light is more noise",
     parameters: &[Parameter {

@@ -1,4 +1,4 @@
-//! An axis with round ticks, linear or logarithmic, as plotters wants it.
+//! An axis with round ticks, linear or logarithmic.
 
 use std::ops::Range;
 
@@ -56,6 +56,21 @@ impl Axis {
             ticks = multiples(low, high);
         }
         Axis { low, high, log: true, ticks }
+    }
+
+    /// With `share` of the range to spare at either end, so that no mark touches the frame.
+    pub fn with_margin([low, high]: [f64; 2], share: f64) -> Self {
+        let spare = share * (high - low);
+        Axis::linear(low - spare, high + spare)
+    }
+
+    /// With half the ticks where there are many, for a small chart.
+    pub fn sparse(mut self) -> Self {
+        if self.ticks.len() > MAX_TICKS / 2 + 1 {
+            let step = self.ticks[1] - self.ticks[0];
+            self.ticks.retain(|t| ((t / step).round() as i64) % 2 == 0);
+        }
+        self
     }
 
     /// Without the ticks below `value`.

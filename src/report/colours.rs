@@ -5,15 +5,18 @@ use plotters::style::RGBColor;
 pub const INK: RGBColor = RGBColor(33, 33, 33);
 pub const FAINT: RGBColor = RGBColor(110, 110, 110);
 pub const GRID: RGBColor = RGBColor(225, 225, 225);
+/// The pages' accent.
+pub const ACCENT: RGBColor = RGBColor(0x1d, 0x91, 0xc0);
 
 /// Viridis (van der Walt and Smith 2015) up to the green that still shows on white.
 const DISTANCES: [u32; 6] = [0x440154, 0x414487, 0x2a788e, 0x22a884, 0x7ad151, 0xbed628];
-
 /// ColorBrewer's YlGnBu up to the blue on which black still shows.
 const SURFACE: [u32; 6] = [0xffffd9, 0xedf8b1, 0xc7e9b4, 0x7fcdbb, 0x41b6c4, 0x1d91c0];
-
 /// ColorBrewer's RdBu, reversed: blue nearer than the plane, red farther.
 const RESIDUALS: [u32; 5] = [0x054a96, 0x67a9d6, 0xffffff, 0xef8a62, 0xa50f21];
+/// ColorBrewer's Dark2 and two of Set1: told apart by colour-blind eyes, four at least in print.
+const LINES: [u32; 8] =
+    [0xd95f02, 0x7570b3, 0xe6ab02, 0x1b9e77, 0xe7298a, 0x377eb8, 0x66a61e, 0xa6761d];
 
 /// Of a distance: dark is near. `share` runs from 0 to 1, as in the others.
 pub fn distance(share: f64) -> RGBColor {
@@ -30,15 +33,19 @@ pub fn residual(share: f64) -> RGBColor {
     between(&RESIDUALS, share)
 }
 
+/// Of the `i`-th of several lines without an order.
+pub fn line(i: usize) -> RGBColor {
+    rgb(LINES[i % LINES.len()])
+}
+
 /// The same hue for a thin line: at full lightness the last of the distances' colours is lost on
 /// white.
 pub fn darker(RGBColor(r, g, b): RGBColor) -> RGBColor {
+    /// At which even the lightest keeps a contrast of 4.5 to white (WCAG 2.1, 1.4.3).
+    const DARKER: f64 = 0.58;
     let dim = |c: u8| (f64::from(c) * DARKER).round() as u8;
     RGBColor(dim(r), dim(g), dim(b))
 }
-
-/// At which even the lightest keeps a contrast of 4.5 to white (WCAG 2.1, 1.4.3).
-const DARKER: f64 = 0.58;
 
 /// Red, green and blue, a byte each.
 fn rgb(colour: u32) -> RGBColor {
@@ -61,10 +68,6 @@ fn between(anchors: &[u32], share: f64) -> RGBColor {
 mod tests {
     use super::*;
 
-    fn luma(RGBColor(r, g, b): RGBColor) -> f64 {
-        0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)
-    }
-
     /// Relative luminance of sRGB, as WCAG 2.1 defines it.
     fn luminance(RGBColor(r, g, b): RGBColor) -> f64 {
         let linear = |c: u8| {
@@ -86,10 +89,10 @@ mod tests {
     fn luminance_is_ordered() {
         for i in 0..20 {
             let [a, b] = [f64::from(i) / 20.0, f64::from(i + 1) / 20.0];
-            assert!(luma(distance(a)) < luma(distance(b)));
-            assert!(luma(surface(a)) > luma(surface(b)));
-            assert!(luma(residual(0.5 * a)) < luma(residual(0.5 * b)));
-            assert!(luma(residual(0.5 + 0.5 * a)) > luma(residual(0.5 + 0.5 * b)));
+            assert!(luminance(distance(a)) < luminance(distance(b)));
+            assert!(luminance(surface(a)) > luminance(surface(b)));
+            assert!(luminance(residual(0.5 * a)) < luminance(residual(0.5 * b)));
+            assert!(luminance(residual(0.5 + 0.5 * a)) > luminance(residual(0.5 + 0.5 * b)));
         }
     }
 }

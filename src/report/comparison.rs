@@ -1,31 +1,34 @@
 //! Figures 6 to 8 and the page of a comparison.
 
-use maud::{PreEscaped, html};
+use maud::html;
+use nalgebra::Vector3;
 
-use super::document::document;
-use super::lines::{Line, LineFigure};
+use super::axis::Axis;
+use super::chart::{Chart, Entry, Layer, Sample, Stroke};
+use super::colours::{self, INK};
+use super::document::{document, figure, list};
+use super::numbers::MM;
 use crate::compare::{Comparison, Row, Run, tables};
 use crate::error::Result;
+use crate::stats::range;
+use crate::trajectory::Pose;
+
+/// Room around the lines, share of their extent.
+const MARGIN: f64 = 0.04;
+
+/// A line by name.
+struct Line {
+    name: String,
+    points: Vec<[f64; 2]>,
+    stroke: Stroke,
+}
 
 /// Fig. 6 (paths from above), Fig. 7 (ATE over time) and Fig. 8 (RPE over time), by file name.
 ///
 /// # Errors
 /// When plotters fails.
 pub fn comparison_figures(comparison: &Comparison) -> Result<Vec<(&'static str, String)>> {
-    let figures = [
-        ("fig6_paths.svg", paths(comparison)),
-        (
-            "fig7_ate.svg",
-            over_time(comparison, "Fig. 7. Absolute trajectory error", |r| &r.evaluation.ate.each),
-        ),
-        (
-            "fig8_rpe.svg",
-            over_time(comparison, "Fig. 8. Relative pose error over 1 s", |r| {
-                &r.evaluation.rpe.each
-            }),
-        ),
-    ];
-    figures.into_iter().map(|(name, figure)| Ok((name, figure.svg()?))).collect()
+    charts(comparison).into_iter().map(|(name, chart)| Ok((name, chart.svg()?))).collect()
 }
 
 /// The page: tables and figures, one self-contained file.
@@ -33,69 +36,90 @@ pub fn comparison_figures(comparison: &Comparison) -> Result<Vec<(&'static str, 
 /// # Errors
 /// When plotters fails.
 pub fn comparison_page(comparison: &Comparison) -> Result<String> {
-    let figures = comparison_figures(comparison)?;
+    let figures = charts(comparison).into_iter().map(|(_, chart)| figure(&chart, &chart.title));
+    let figures = figures.collect::<Result<Vec<_>>>()?;
     let body = html! {
         h1 { "Mapping " (comparison.sequence) ", variant by variant" }
         p { "The first four rows are the paper's variants with the parameters of its Table II; those below \
             go past it, one step at a time. Errors are computed as the scripts of the TUM benchmark do." }
         div.wide { pre { (tables::text(comparison)) } }
-        @for (_, svg) in &figures { figure { div.wide { (PreEscaped(svg)) } } }
-        @if !comparison.remarks.is_empty() {
-            h2 { "Notes" }
-            ul { @for remark in &comparison.remarks { li { (remark) } } }
-        }
+        @for figure in figures { (figure) }
+        @if !comparison.remarks.is_empty() { h2 { "Notes" } }
+        (list(comparison.remarks.iter().map(|remark| html! { (remark) })))
     };
     let title = format!("Mapping {}", comparison.sequence);
     Ok(document(&title, None, &body).into_string())
 }
 
-/// The rows that are drawn: the paper's, and the last way past it.
-fn drawn(comparison: &Comparison) -> impl Iterator<Item = (&Row, &Run)> {
-    let default = comparison.rows.iter().filter(|r| r.variant.name.contains("default"));
-    let paper = comparison.rows.iter().filter(|r| r.variant.of_the_paper);
-    paper.chain(default).filter_map(|row| Some((row, row.runs.first()?)))
+fn charts(comparison: &Comparison) -> [(&'static str, Chart); 3] {
+    let ate = over_time(comparison, |r| &r.evaluation.ate.each);
+    let rpe = over_time(comparison, |r| &r.evaluation.rpe.each);
+    let time = ["time (s)", "error (mm)"];
+    [
+        ("fig6_paths.svg", paths(comparison)),
+        ("fig7_ate.svg", chart("Fig. 7. Absolute trajectory error", time, ate, false)),
+        ("fig8_rpe.svg", chart("Fig. 8. Relative pose error over 1 s", time, rpe, false)),
+    ]
 }
 
-fn paths(comparison: &Comparison) -> LineFigure {
+/// `equal` when both axes are lengths of one plane.
+fn chart(title: &str, labels: [&str; 2], lines: Vec<Line>, equal: bool) -> Chart {
+    let extent = |k: usize| {
+        let [low, high] = range(lines.iter().flat_map(|l| &l.points).map(|p| p[k]));
+        if low <= high { [low, high] } else { [0.0, 1.0] }
+    };
+    let extents = [extent(0), extent(1)];
+    let extents = if equal { Chart::equal_units(extents) } else { extents };
+    let mut chart = Chart::new(title, extents.map(|e| Axis::with_margin(e, MARGIN)), labels);
+    for line in lines {
+        chart.legend.push(Entry::new([Sample::Line(line.stroke)], line.name));
+        chart.layers.push(Layer::Line(line.points, line.stroke));
+    }
+    chart
+}
+
+/// The variants that are drawn: the paper's, and the last way past it; each with its colour.
+fn drawn(comparison: &Comparison) -> impl Iterator<Item = (&Row, &Run, Stroke)> {
+    let default = comparison.rows.iter().filter(|r| r.variant.name.contains("default"));
+    let paper = comparison.rows.iter().filter(|r| r.variant.of_the_paper);
+    paper
+        .chain(default)
+        .filter_map(|row| Some((row, row.runs.first()?)))
+        .enumerate()
+        .map(|(i, (row, run))| (row, run, Stroke::new(colours::line(i), 2)))
+}
+
+fn paths(comparison: &Comparison) -> Chart {
     let within = |stamp: f64| {
-        drawn(comparison).any(|(_, run)| {
+        drawn(comparison).any(|(_, run, _)| {
             let (first, last) = (run.trajectory.first(), run.trajectory.last());
             first.is_some_and(|p| p.stamp <= stamp) && last.is_some_and(|p| p.stamp >= stamp)
         })
     };
-    let level = |p: nalgebra::Vector3<f64>| [p.x, p.y];
+    let from_above = |p: Vector3<f64>| [p.x, p.y];
     let truth = comparison.truth.iter().filter(|p| within(p.stamp));
     let mut lines = vec![Line {
         name: "ground truth".into(),
-        points: truth.map(|p| level(p.world_from_camera.translation.vector)).collect(),
-        is_truth: true,
+        points: truth.map(|p| from_above(p.world_from_camera.translation.vector)).collect(),
+        stroke: Stroke::new(INK, 1),
     }];
-    lines.extend(drawn(comparison).map(|(row, run)| {
+    lines.extend(drawn(comparison).map(|(row, run, stroke)| {
         let aligned = run.evaluation.ate.truth_from_estimate;
-        let place =
-            |p: &crate::trajectory::Pose| level((aligned * p.world_from_camera).translation.vector);
-        Line {
-            name: row.variant.name.into(),
-            points: run.trajectory.iter().map(place).collect(),
-            is_truth: false,
-        }
+        let place = |p: &Pose| from_above((aligned * p.world_from_camera).translation.vector);
+        let points = run.trajectory.iter().map(place).collect();
+        Line { name: row.variant.name.into(), points, stroke }
     }));
-    LineFigure::new("Fig. 6. Paths from above, aligned", ["x (m)", "y (m)"], lines, true)
+    chart("Fig. 6. Paths from above, aligned", ["x (m)", "y (m)"], lines, true)
 }
 
-fn over_time(
-    comparison: &Comparison,
-    title: &str,
-    of: impl Fn(&Run) -> &Vec<(f64, f64)>,
-) -> LineFigure {
+fn over_time(comparison: &Comparison, of: impl Fn(&Run) -> &Vec<(f64, f64)>) -> Vec<Line> {
     let begin = comparison.rows.iter().flat_map(|r| &r.runs).flat_map(|r| r.trajectory.first());
     let begin = begin.map(|p| p.stamp).fold(f64::INFINITY, f64::min);
-    let lines = drawn(comparison)
-        .map(|(row, run)| Line {
+    drawn(comparison)
+        .map(|(row, run, stroke)| Line {
             name: row.variant.name.into(),
-            points: of(run).iter().map(|(t, e)| [t - begin, 1e3 * e]).collect(),
-            is_truth: false,
+            points: of(run).iter().map(|(t, e)| [t - begin, MM * e]).collect(),
+            stroke,
         })
-        .collect();
-    LineFigure::new(title, ["time (s)", "error (mm)"], lines, false)
+        .collect()
 }

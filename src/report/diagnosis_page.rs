@@ -1,21 +1,15 @@
-//! The page of a diagnosis: the answer for everybody on the first screen, the evidence below.
+//! The page of a diagnosis: the answer on the first screen, the evidence below.
 
-mod advice;
 mod curve;
-mod evidence;
-mod findings;
-mod names;
-mod outcome;
 mod parameters;
-mod pictures;
-mod verdict;
-mod words;
+mod sections;
+mod sentences;
 
 use maud::{Markup, html};
 
-pub use pictures::Picture;
-
+use super::axis::Axis;
 use super::document::{Kind, document};
+use super::residuals::residual_image;
 use crate::diagnose::{Diagnosis, Reference, Verdict};
 use crate::error::Result;
 
@@ -26,10 +20,30 @@ const KIND: Kind = Kind { class: "diagnosis", style: include_str!("diagnosis_pag
 pub struct DiagnosisPage<'a> {
     /// Of the page.
     pub title: &'a str,
-    /// All that it tells.
     pub diagnosis: &'a Diagnosis,
     /// Views whose residuals are worth seeing; few, they are large.
     pub pictures: &'a [Picture],
+}
+
+/// The residual of one view before and after, row by row; NaN where there is no data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Under the pictures.
+    pub caption: String,
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// As recorded, against the model that was given.
+    pub before: Vec<f32>,
+    /// As recorded, against the extended model.
+    pub after: Vec<f32>,
+    /// The extended model simulated again, against the model that was given.
+    pub simulated: Option<Vec<f32>>,
+    /// Of disparity: what is larger is nearer.
+    pub unit: &'static str,
+    /// Where the colours end.
+    pub range: f32,
 }
 
 /// The page as text: one self-contained file, no scripts.
@@ -38,64 +52,79 @@ pub struct DiagnosisPage<'a> {
 /// When a picture cannot be drawn.
 pub fn diagnosis_page(page: &DiagnosisPage<'_>) -> Result<String> {
     let diagnosis = page.diagnosis;
+    let unsettled = diagnosis.verdict == Verdict::Inconclusive;
     let body = html! {
-        (heading(page))
-        (verdict::section(diagnosis))
-        @if diagnosis.verdict == Verdict::Inconclusive { (evidence::remarks(&diagnosis.remarks)) }
-        (findings::section(&diagnosis.findings)?)
-        @if diagnosis.verdict == Verdict::Match { (nothing_found(diagnosis)) }
-        (outcome::gained_and_left(diagnosis))
-        (pictures::section(page.pictures)?)
-        (proof(diagnosis))
+        header {
+            h1 { (page.title) }
+            p.sub {
+                "Recording " b { (diagnosis.recording) } ", compared with "
+                @match diagnosis.reference {
+                    Reference::Model => "the noise model calibrated for the sensor.",
+                    Reference::SimulatedRecording => "a simulated recording of the same scene.",
+                }
+            }
+        }
+        (sections::verdict(diagnosis))
+        @if unsettled { (sections::remarks(&diagnosis.remarks)) }
+        (sections::findings(&diagnosis.findings)?)
+        section.outcome {
+            (sections::held_out(diagnosis.heldout.as_ref()))
+            (sections::remaining(diagnosis))
+        }
+        (sections::detectable(diagnosis))
+        (sections::cannot_tell(&diagnosis.cannot_tell))
+        (pictures(page.pictures)?)
+        h1.evidence { "The evidence" }
+        (sections::map(&diagnosis.map))
+        (sections::views(&diagnosis.views))
+        @if !unsettled { (sections::remarks(&diagnosis.remarks)) }
+        p.note {
+            "diagnosis.json has the same as data. σ is the standard deviation of a single reading in the model; sizes \
+             in mm are root mean squares over the recording. A p-value is the chance of a difference this large if \
+             the model were right."
+        }
     };
     Ok(document(page.title, Some(KIND), &body).into_string())
 }
 
-fn heading(page: &DiagnosisPage<'_>) -> Markup {
-    let diagnosis = page.diagnosis;
-    html! {
-        header {
-            h1 { (page.title) }
-            p.sub {
-                "Recording " b { (diagnosis.recording) } ", held against "
-                @match diagnosis.reference {
-                    Reference::Model => "the noise model calibrated for the sensor, here called the simulation",
-                    Reference::SimulatedRecording => "a simulated recording of the same scene",
-                }
-                "."
+fn pictures(pictures: &[Picture]) -> Result<Markup> {
+    let figures = pictures.iter().map(before_after).collect::<Result<Vec<Markup>>>()?;
+    Ok(html! { @if !figures.is_empty() { section {
+        h2 { "Residuals before and after" }
+        p {
+            "The residual of single views about their plane. White is no error, blue too near, red too far, grey no \
+             data. Where everything is explained, the second picture shows noise alone."
+            @if pictures.iter().any(|p| p.simulated.is_some()) {
+                " The twin is simulated with the extended model: it should look like the first picture."
             }
         }
-    }
+        @for figure in figures { (figure) }
+    } } })
 }
 
-/// What it is worth that nothing was found.
-fn nothing_found(diagnosis: &Diagnosis) -> Markup {
-    html! {
-        (outcome::looked_for(diagnosis))
-        (outcome::detectable(&diagnosis.detectable))
-        (outcome::cannot_tell(&diagnosis.cannot_tell))
-    }
-}
-
-fn proof(diagnosis: &Diagnosis) -> Markup {
-    html! {
-        h1.evidence { "The evidence" }
-        (evidence::map(&diagnosis.map))
-        (evidence::alternatives(&diagnosis.findings))
-        (evidence::parameters(&diagnosis.findings))
-        (evidence::held_out(diagnosis.heldout.as_ref()))
-        (evidence::after(diagnosis))
-        @if diagnosis.verdict != Verdict::Match {
-            (outcome::detectable(&diagnosis.detectable))
-            (outcome::cannot_tell(&diagnosis.cannot_tell))
+fn before_after(picture: &Picture) -> Result<Markup> {
+    let twin = picture.simulated.as_ref().map(|twin| ("simulated twin", twin));
+    let titled = [("as recorded", &picture.before), ("with the extended model", &picture.after)];
+    let panel = |(title, values): (&str, &Vec<f32>)| {
+        let alt = format!("{title}: {}", picture.caption);
+        let nearer = -f64::from(picture.range);
+        let image = residual_image([picture.width, picture.height], values, nearer, &alt)?;
+        Ok(html! { div { p.panel-title { (title) } (image) } })
+    };
+    let panels = titled.into_iter().chain(twin).map(panel).collect::<Result<Vec<Markup>>>()?;
+    // An f32's decimals end after the seventh digit.
+    let end = Axis::label((f64::from(picture.range) * 1e6).round() / 1e6);
+    Ok(html! {
+        figure.before-after {
+            div.panels { @for panel in panels { (panel) } }
+            div.scale.disparity {
+                span { "−" (end) " " (picture.unit) ", too far" }
+                span { "0" }
+                span { "too near, +" (end) " " (picture.unit) }
+            }
+            figcaption { (picture.caption) }
         }
-        (evidence::views(&diagnosis.views))
-        @if diagnosis.verdict != Verdict::Inconclusive { (evidence::remarks(&diagnosis.remarks)) }
-        p.note {
-            "The same as data: diagnosis.json. σ is the standard deviation of a single reading that the simulation \
-             expects; sizes in mm are root mean squares over the recording. A p-value is the chance of a difference this large if the simulation were right."
-        }
-    }
+    })
 }
 
 #[cfg(test)]

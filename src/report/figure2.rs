@@ -1,153 +1,186 @@
 //! The paper's Fig. 2: sigma against tilt, a colour a distance, with the fitted curves.
 
-mod draw;
-mod groups;
-mod marks;
-mod overlay;
+use std::str::FromStr;
 
-pub use overlay::Overlay;
+use plotters::style::{Color, RGBColor, WHITE};
 
 use super::axis::Axis;
-use super::sheet;
-use crate::error::Result;
+use super::chart::{Chart, Entry, Layer, Mark, Sample, Stroke};
+use super::colours::{self, INK};
+use super::numbers::{MM, fixed, range as numbers};
+use super::sheet::Dashes;
 use crate::measure::{SigmaRow, SigmaTable};
-use crate::model::{DISTANCE_RATIO, Domain, SigmaModel};
+use crate::model::{DISTANCE_RATIO, SigmaModel};
 use crate::stats::range;
 
-/// A measured sigma, carried along the fitted surface from its own distance to its group's: its
-/// height over the curve is its relative residual.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
-    /// Tilt, degrees.
-    pub theta_deg: f64,
-    /// Sigma, carried to the group's distance, mm.
-    pub sigma_mm: f64,
-    /// Its standard error, carried likewise, mm; none when the table has no n.
-    pub std_error_mm: Option<f64>,
+/// A published surface, drawn beside the fit over the range that its authors measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Overlay {
+    /// The paper's Eq. 1.
+    PaperEq1,
+    /// Nguyen, Izadi and Lovell 2012.
+    Nguyen,
+    /// Khoshelham and Elberink 2012.
+    Khoshelham,
 }
 
-/// Points of about one distance, and the fit there.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Group {
-    /// Median distance of the points, where the curve is drawn, m.
-    pub z_m: f64,
-    /// Least and greatest distance of the points, m.
-    pub range_m: [f64; 2],
-    /// The measured sigmas.
-    pub points: Vec<Point>,
-    /// theta (degrees), sigma (mm), lower and upper end of its 95 % interval.
-    pub curve: Vec<[f64; 4]>,
+impl Overlay {
+    /// The paper first.
+    pub const ALL: [Overlay; 3] = [Overlay::PaperEq1, Overlay::Nguyen, Overlay::Khoshelham];
+
+    /// As on the command line.
+    pub fn id(self) -> &'static str {
+        self.card().0
+    }
+
+    /// As in a legend.
+    pub fn label(self) -> &'static str {
+        self.card().1
+    }
+
+    /// The surface with the range that was measured.
+    pub fn model(self) -> SigmaModel {
+        self.card().2()
+    }
+
+    fn dashes(self) -> Dashes {
+        self.card().3
+    }
+
+    fn card(self) -> (&'static str, &'static str, fn() -> SigmaModel, Dashes) {
+        match self {
+            Overlay::PaperEq1 => ("eq1", "paper, Eq. 1", SigmaModel::paper, &[9, 5]),
+            Overlay::Nguyen => ("nguyen", "Nguyen et al. 2012", SigmaModel::nguyen, &[2, 4]),
+            Overlay::Khoshelham => {
+                ("khoshelham", "Khoshelham 2012", SigmaModel::khoshelham, &[15, 3])
+            }
+        }
+    }
 }
 
-/// A published surface at the distance of a group.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OverlayLine {
-    /// Which surface.
-    pub overlay: Overlay,
-    /// Index of the group whose distance it is drawn at: it has that group's colour and mark.
-    pub group: usize,
-    /// theta (degrees), sigma (mm).
-    pub line: Vec<[f64; 2]>,
+impl FromStr for Overlay {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Overlay::ALL.into_iter().find(|o| o.id() == text).ok_or_else(|| {
+            let known = Overlay::ALL.map(Overlay::id).join(", ");
+            format!("there is no overlay \"{text}\"; the overlays are {known}")
+        })
+    }
 }
 
-/// Everything Fig. 2 shows.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Figure2 {
-    /// Above the figure.
-    pub title: String,
-    /// Tilt, degrees.
-    pub x: Axis,
-    /// Sigma, mm.
-    pub y: Axis,
-    /// By distance, nearest first; at most seven.
-    pub groups: Vec<Group>,
-    /// The published surfaces asked for.
-    pub overlays: Vec<Overlay>,
-    /// None for overlays that never measured these distances.
-    pub lines: Vec<OverlayLine>,
-}
-
+/// More colours and shapes than this cannot be told apart.
+const MAX_GROUPS: usize = 7;
+/// Distances within a group differ by less than this: sigma ~ z^2 then by less than half.
+const MAX_RATIO: f64 = 1.25;
 /// Points of a curve.
 const SAMPLES: usize = 160;
 const LEVEL: f64 = 0.95;
 /// From this ratio of the largest sigma to the smallest a linear axis hides the small ones.
-const LOG_WHEN_RATIO: f64 = 20.0;
+const LOG_FROM_RATIO: f64 = 20.0;
 /// Share of the axis left free beyond the data.
 const MARGIN: f64 = 0.05;
 /// Narrowest tilt axis, degrees.
-const NARROWEST_DEG: f64 = 10.0;
+const MIN_TILT_RANGE_DEG: f64 = 10.0;
 /// Curves, bands and bars are followed to this many times the largest point, not to a pole.
 const BEYOND: f64 = 1.3;
-const MM: f64 = 1e3;
+const BAND_OPACITY: f64 = 0.16;
+/// With more points than this their marks shrink and their edges fade.
+const MANY_POINTS: usize = 120;
+/// How far beside its line an overlay's mark stands, share of the axis.
+const BESIDE: f64 = 0.015;
 
-impl Figure2 {
-    /// Works out all that is drawn.
-    pub fn of(table: &SigmaTable, model: &SigmaModel, overlays: &[Overlay]) -> Self {
-        let groups: Vec<Group> = groups::by_distance(&table.rows)
-            .into_iter()
-            .map(|rows| group_of(&rows, model))
-            .collect();
-        let lines = overlays
-            .iter()
-            .flat_map(|&overlay| {
-                let published = overlay.model();
-                let domain = model.domain;
-                groups.iter().enumerate().filter_map(move |(group, g)| {
-                    let line = overlay_line(&published, g.z_m, &domain)?;
-                    Some(OverlayLine { overlay, group, line })
-                })
-            })
-            .collect();
-        Figure2 {
-            title: "Depth noise against tilt".into(),
-            x: tilt_axis(table, model),
-            y: sigma_axis(&groups),
-            groups,
-            overlays: overlays.to_vec(),
-            lines,
-        }
+/// Points of about one distance, and the fit there; degrees and mm.
+struct Group {
+    /// Median distance of the points, where the curve is drawn, m.
+    z_m: f64,
+    /// Of the points, m.
+    range_m: [f64; 2],
+    /// Tilt, sigma and its standard error, where that is known. Sigma is carried along the fitted
+    /// surface from its own distance to the group's.
+    points: Vec<([f64; 2], Option<f64>)>,
+    /// Tilt, sigma, lower and upper end of its 95 % interval.
+    curve: Vec<[f64; 4]>,
+    colour: RGBColor,
+    mark: Mark,
+}
+
+/// Sigma against tilt, with the fit and the published surfaces at the same distances.
+pub fn figure2(table: &SigmaTable, model: &SigmaModel, overlays: &[Overlay]) -> Chart {
+    let rows = by_distance(&table.rows);
+    let radius = if table.rows.len() > MANY_POINTS { (4, 0.6) } else { (5, 1.0) };
+    let groups: Vec<Group> = rows
+        .iter()
+        .enumerate()
+        .map(|(i, of)| {
+            let colour = colours::distance(i as f64 / (rows.len().max(2) - 1) as f64);
+            let (radius, edge) = (radius.0, INK.mix(radius.1));
+            group(of, model, colour, Mark { shape: i, radius, fill: colour.into(), edge })
+        })
+        .collect();
+    let axes = [tilt_axis(table, model), sigma_axis(&groups)];
+    let mut chart = Chart::new("Depth noise against tilt", axes, ["tilt θ (degrees)", "σ (mm)"]);
+    chart.layers.extend(groups.iter().map(Group::band));
+    let drawn: Vec<bool> =
+        overlays.iter().map(|o| overlay(&mut chart, *o, &groups, model)).collect();
+    chart.layers.extend(groups.iter().map(Group::line));
+    chart.layers.extend(groups.iter().map(Group::error_bars));
+    chart.layers.extend(groups.iter().map(Group::marks));
+    chart.legend = legend(&groups, overlays.iter().copied().zip(drawn).collect());
+    chart
+}
+
+impl Group {
+    fn band(&self) -> Layer {
+        let edges = self.curve.iter().map(|[tilt, _, low, high]| [*tilt, *low, *high]).collect();
+        Layer::Band(edges, self.colour.mix(BAND_OPACITY))
     }
 
-    /// As SVG text.
-    ///
-    /// # Errors
-    /// When plotters fails.
-    pub fn svg(&self) -> Result<String> {
-        sheet::svg(self)
+    fn line(&self) -> Layer {
+        let points = self.curve.iter().map(|[tilt, sigma, ..]| [*tilt, *sigma]).collect();
+        Layer::Line(points, Stroke::new(self.colour, 2))
     }
 
-    /// As the bytes of a PNG.
-    ///
-    /// # Errors
-    /// When plotters or the PNG encoder fails.
-    pub fn png(&self) -> Result<Vec<u8>> {
-        sheet::png(self)
+    fn error_bars(&self) -> Layer {
+        let bar = |([tilt, sigma], error): &([f64; 2], Option<f64>)| {
+            error.map(|e| [*tilt, sigma - e, sigma + e])
+        };
+        Layer::ErrorBars(self.points.iter().filter_map(bar).collect(), Stroke::new(self.colour, 1))
+    }
+
+    fn marks(&self) -> Layer {
+        Layer::Marks(self.points.iter().map(|(at, _)| *at).collect(), self.mark)
+    }
+
+    /// Distances that print alike are one.
+    fn label(&self) -> String {
+        let z = fixed(self.z_m, 2);
+        let range = numbers(self.range_m, 2);
+        if range == z { format!("{z} m") } else { format!("{z} m ({})", numbers(self.range_m, 1)) }
     }
 }
 
-fn group_of(rows: &[SigmaRow], model: &SigmaModel) -> Group {
+fn group(rows: &[SigmaRow], model: &SigmaModel, colour: RGBColor, mark: Mark) -> Group {
     let z_m = rows[rows.len() / 2].z_m;
-    let points = rows
-        .iter()
-        .map(|r| {
-            let carried = MM * model.sigma(z_m, r.theta_rad) / model.sigma(r.z_m, r.theta_rad);
-            Point {
-                theta_deg: r.theta_rad.to_degrees(),
-                sigma_mm: carried * r.sigma_m,
-                std_error_mm: r.std_error_m().map(|e| carried * e),
-            }
-        })
-        .collect();
-    // A published surface has no band.
+    let point = |r: &SigmaRow| {
+        let carried = MM * model.sigma(z_m, r.theta_rad) / model.sigma(r.z_m, r.theta_rad);
+        let error = r.std_error_m().map(|e| carried * e);
+        ([r.theta_rad.to_degrees(), carried * r.sigma_m], error)
+    };
     let exact = model.covariance.iter().all(|c| *c == 0.0);
-    let curve = tilts(model.domain.theta_rad)
-        .map(|theta| {
-            let sigma = model.sigma(z_m, theta);
-            let [low, high] = if exact { [sigma; 2] } else { model.interval(z_m, theta, LEVEL) };
-            [theta.to_degrees(), MM * sigma, MM * low, MM * high]
-        })
-        .collect();
-    Group { z_m, range_m: [rows[0].z_m, rows[rows.len() - 1].z_m], points, curve }
+    let curve = tilts(model.domain.theta_rad).map(|theta| {
+        let sigma = model.sigma(z_m, theta);
+        let [low, high] = if exact { [sigma; 2] } else { model.interval(z_m, theta, LEVEL) };
+        [theta.to_degrees(), MM * sigma, MM * low, MM * high]
+    });
+    Group {
+        z_m,
+        range_m: [rows[0].z_m, rows[rows.len() - 1].z_m],
+        points: rows.iter().map(point).collect(),
+        curve: curve.collect(),
+        colour,
+        mark,
+    }
 }
 
 fn tilts([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
@@ -155,35 +188,74 @@ fn tilts([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
     (0..=steps).map(move |i| low + (high - low) * i as f64 / steps.max(1) as f64)
 }
 
-/// Only where the published surface was measured.
-fn overlay_line(published: &SigmaModel, z_m: f64, shown: &Domain) -> Option<Vec<[f64; 2]>> {
+/// A published surface at every distance where it was measured, in the distance's colour; an open
+/// mark at its squarest end says which distance where colours are lost. Was anything drawn?
+fn overlay(chart: &mut Chart, overlay: Overlay, groups: &[Group], model: &SigmaModel) -> bool {
+    let published = overlay.model();
     let [near, far] = published.domain.z_m;
-    if z_m * DISTANCE_RATIO < near || z_m > far * DISTANCE_RATIO {
-        return None;
-    }
     let [low, high] = published.domain.theta_rad;
-    let both = [shown.theta_rad[0].max(low), shown.theta_rad[1].min(high)];
-    let line = tilts(both).map(|t| [t.to_degrees(), MM * published.sigma(z_m, t)]).collect();
-    (both[1] >= both[0]).then_some(line)
+    let tilt_rad = [model.domain.theta_rad[0].max(low), model.domain.theta_rad[1].min(high)];
+    let before = chart.layers.len();
+    for group in groups {
+        let z = group.z_m;
+        if z * DISTANCE_RATIO < near || z > far * DISTANCE_RATIO || tilt_rad[1] < tilt_rad[0] {
+            continue;
+        }
+        let line: Vec<[f64; 2]> =
+            tilts(tilt_rad).map(|t| [t.to_degrees(), MM * published.sigma(z, t)]).collect();
+        let colour = colours::darker(group.colour);
+        let beside = BESIDE * (chart.x.high - chart.x.low);
+        let visible = line.iter().find(|p| chart.y.contains(p[1]));
+        let marks = visible.map(|[tilt, sigma]| [tilt - beside, *sigma]).into_iter().collect();
+        let mark = Mark { radius: 4, fill: WHITE.into(), edge: colour.into(), ..group.mark };
+        chart.layers.push(Layer::Line(line, Stroke::new(colour, 1).dashed(overlay.dashes())));
+        chart.layers.push(Layer::Marks(marks, mark));
+    }
+    chart.layers.len() > before
+}
+
+fn legend(groups: &[Group], overlays: Vec<(Overlay, bool)>) -> Vec<Entry> {
+    let mut legend = vec![Entry::new([], "distance z:")];
+    legend.extend(groups.iter().map(|group| {
+        let line = Sample::Line(Stroke::new(group.colour, 2));
+        Entry::new([line, Sample::Mark(group.mark)], group.label())
+    }));
+    let fit = [Sample::Band(INK.mix(BAND_OPACITY)), Sample::Line(Stroke::new(INK, 2))];
+    legend.push(Entry::new(fit, "fit, 95 % band"));
+    let open_marks = overlays.iter().any(|(_, drawn)| *drawn);
+    for (overlay, drawn) in overlays {
+        let line = Sample::Line(Stroke::new(INK, 1).dashed(overlay.dashes()));
+        legend.push(Entry::new([line], overlay.label()));
+        if !drawn {
+            legend.push(Entry::new([], "(nothing measured here)"));
+        }
+    }
+    if open_marks {
+        legend.push(Entry::new([], "open marks: their distance"));
+    }
+    let bars = groups.iter().flat_map(|g| &g.points).any(|(_, error)| error.is_some());
+    let points = if bars { "points: measured ± 1 s.e.," } else { "points: measured," };
+    legend.push(Entry::new([], points));
+    legend.push(Entry::new([], "carried to the curve's distance"));
+    legend
 }
 
 fn tilt_axis(table: &SigmaTable, model: &SigmaModel) -> Axis {
-    let [low, high] = table.range(|r| r.theta_rad.to_degrees());
-    let [from, to] = model.domain.theta_rad.map(f64::to_degrees);
-    let [low, high] = [low.min(from), high.max(to)];
-    let spare = MARGIN * (high - low).max(NARROWEST_DEG);
-    Axis::linear(low - spare, high.max(low + NARROWEST_DEG) + spare).ticks_from(0.0)
+    let tilts = table.rows.iter().map(|r| r.theta_rad).chain(model.domain.theta_rad);
+    let [low, high] = range(tilts.map(f64::to_degrees));
+    let spare = MARGIN * (high - low).max(MIN_TILT_RANGE_DEG);
+    Axis::linear(low - spare, high.max(low + MIN_TILT_RANGE_DEG) + spare).ticks_from(0.0)
 }
 
 fn sigma_axis(groups: &[Group]) -> Axis {
     let points = groups.iter().flat_map(|g| &g.points);
-    let measured = range(points.clone().map(|p| p.sigma_mm));
+    let measured = range(points.clone().map(|(at, _)| at[1]));
     let reaching = points
-        .flat_map(|p| [-1.0, 1.0].map(|s| p.sigma_mm + s * p.std_error_mm.unwrap_or(0.0)))
+        .flat_map(|(at, error)| [-1.0, 1.0].map(|side| at[1] + side * error.unwrap_or(0.0)))
         .chain(groups.iter().flat_map(|g| &g.curve).flat_map(|c| [c[2], c[3]]))
         .map(|v| v.clamp(measured[0] / BEYOND, measured[1] * BEYOND));
     let [low, high] = range(reaching.chain(measured));
-    if high > LOG_WHEN_RATIO * low {
+    if high > LOG_FROM_RATIO * low {
         let spare = (high / low).powf(MARGIN);
         Axis::log(low / spare, high * spare)
     } else {
@@ -191,75 +263,25 @@ fn sigma_axis(groups: &[Group]) -> Axis {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::Form;
-
-    fn table(tilts_deg: &[f64], distances: &[f64]) -> SigmaTable {
-        let model = SigmaModel::paper();
-        let row = |z_m: f64, t: f64| SigmaRow {
-            z_m,
-            theta_rad: t.to_radians(),
-            sigma_m: model.sigma(z_m, t.to_radians()),
-            n_effective: Some(100.0),
-            view: 0,
-        };
-        let rows =
-            distances.iter().flat_map(|&z| tilts_deg.iter().map(move |&t| row(z, t))).collect();
-        SigmaTable { rows }
+/// Rows by distance, nearest group first, sorted inside; none of the groups is empty.
+///
+/// Where the distances leave gaps the groups are those of the recording; where they run on,
+/// they are cut into equal ratios (not equal counts, which would put equal distances apart).
+fn by_distance(rows: &[SigmaRow]) -> Vec<Vec<SigmaRow>> {
+    let mut sorted = rows.to_vec();
+    sorted.sort_by(|a, b| a.z_m.total_cmp(&b.z_m));
+    let natural: Vec<Vec<SigmaRow>> =
+        sorted.chunk_by(|a, b| b.z_m <= a.z_m * DISTANCE_RATIO).map(<[SigmaRow]>::to_vec).collect();
+    let compact = |g: &Vec<SigmaRow>| g[g.len() - 1].z_m < MAX_RATIO * g[0].z_m;
+    if natural.len() <= MAX_GROUPS && natural.iter().all(compact) {
+        return natural;
     }
-
-    #[test]
-    fn the_papers_grid_gives_seven_groups_on_a_log_axis() {
-        let table = table(&[0.0, 30.0, 60.0, 76.0], &[1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0]);
-        let figure = Figure2::of(&table, &SigmaModel::paper(), &Overlay::ALL);
-        assert_eq!(figure.groups.len(), 7);
-        assert!(figure.groups.iter().all(|g| g.points.len() == 4));
-        assert!(figure.y.log);
-        assert_eq!(figure.lines.len(), 21);
-        let svg = figure.svg().unwrap();
-        assert!(svg.starts_with("<svg") && svg.contains("sans-serif"));
-        assert!(svg.contains("σ (mm)") && svg.contains("tilt θ (degrees)"));
-    }
-
-    #[test]
-    fn one_tilt_and_one_distance_still_draw() {
-        for (tilts, distances) in [(&[0.0][..], &[1.0, 2.0][..]), (&[20.0], &[1.2])] {
-            let table = table(tilts, distances);
-            let t = tilts[0].to_radians();
-            let domain = Domain { z_m: [distances[0], distances[0]], theta_rad: [t, t] };
-            let model = SigmaModel::published(Form::Khoshelham, &[1.4e-3], domain);
-            let figure = Figure2::of(&table, &model, &[Overlay::PaperEq1]);
-            for axis in [&figure.x, &figure.y] {
-                assert!(axis.low.is_finite() && axis.high > axis.low);
-            }
-            assert!(!figure.y.log && figure.y.low == 0.0);
-            assert!(figure.svg().is_ok());
-        }
-    }
-
-    /// A line is told apart by its pattern (which surface) and its mark and colour (which distance).
-    #[test]
-    fn an_overlay_line_knows_its_group() {
-        let figure =
-            Figure2::of(&table(&[0.0, 9.0], &[1.0, 2.0]), &SigmaModel::paper(), &Overlay::ALL);
-        let pairs: Vec<_> = figure.lines.iter().map(|l| (l.overlay, l.group)).collect();
-        let expected: Vec<_> = Overlay::ALL.into_iter().flat_map(|o| [(o, 0), (o, 1)]).collect();
-        assert_eq!(pairs, expected);
-        for line in &figure.lines {
-            let z = figure.groups[line.group].z_m;
-            approx::assert_relative_eq!(line.line[0][1], MM * line.overlay.model().sigma(z, 0.0));
-        }
-    }
-
-    #[test]
-    fn an_overlay_keeps_to_the_distances_it_measured() {
-        let figure = Figure2::of(
-            &table(&[0.0, 10.0], &[0.6, 1.0]),
-            &SigmaModel::nguyen(),
-            &[Overlay::PaperEq1],
-        );
-        assert_eq!(figure.lines.len(), 1, "0.6 m is nearer than the paper's views");
-    }
+    let [low, high] = [sorted[0].z_m, sorted[sorted.len() - 1].z_m];
+    let extent = (high / low).ln();
+    let count = (extent / MAX_RATIO.ln()).ceil().clamp(1.0, MAX_GROUPS as f64);
+    let bin = |r: &SigmaRow| ((r.z_m / low).ln() / extent * count).min(count - 1.0) as usize;
+    sorted.chunk_by(|a, b| bin(a) == bin(b)).map(<[SigmaRow]>::to_vec).collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,12 +1,13 @@
-//! The map to turn in the hand: one self-contained page with points and path, drawn by WebGL.
+//! The map to look at from all sides: one self-contained page with points and path, drawn by WebGL.
 
+use maud::html;
+
+use super::document::base64;
 use crate::map::{FrameReport, MapPoint};
-
-use super::base64::encode;
 
 /// More points make the page heavy and the map no clearer.
 const MAX_POINTS: usize = 250_000;
-/// Sigma is told apart between these, m, on a logarithmic scale.
+/// Colours show sigma between these, m, on a logarithmic scale.
 const SIGMA_M: [f32; 2] = [0.0005, 0.05];
 /// Places are stored in 16 bits over the map's extent.
 const STEPS: f32 = 65_535.0;
@@ -16,14 +17,12 @@ pub fn map_page(title: &str, points: &[MapPoint], frames: &[FrameReport]) -> Str
     let stride = points.len().div_ceil(MAX_POINTS).max(1);
     let shown: Vec<&MapPoint> =
         points.iter().step_by(stride).filter(|p| p.at.iter().all(|v| v.is_finite())).collect();
-    let mut low = [f32::INFINITY; 3];
-    let mut high = [f32::NEG_INFINITY; 3];
-    for point in &shown {
-        for k in 0..3 {
-            low[k] = low[k].min(point.at[k]);
-            high[k] = high[k].max(point.at[k]);
-        }
-    }
+    let extent = |k: usize| {
+        let at = |p: &&MapPoint| p.at[k];
+        let low = shown.iter().map(at).fold(f32::INFINITY, f32::min);
+        [low, shown.iter().map(at).fold(f32::NEG_INFINITY, f32::max)]
+    };
+    let extents = [0, 1, 2].map(extent);
     let path: Vec<String> = frames
         .iter()
         .filter_map(|f| f.pose)
@@ -33,30 +32,26 @@ pub fn map_page(title: &str, points: &[MapPoint], frames: &[FrameReport]) -> Str
         })
         .collect();
     include_str!("map_page.html")
-        .replace("{{title}}", &escaped(title))
+        .replace("{{title}}", &html! { (title) }.into_string())
         .replace("{{count}}", &shown.len().to_string())
-        .replace("{{low}}", &numbers(low))
-        .replace("{{high}}", &numbers(high))
-        .replace("{{sigma}}", &numbers3(SIGMA_M))
+        .replace("{{low}}", &numbers(extents.map(|e| e[0])))
+        .replace("{{high}}", &numbers(extents.map(|e| e[1])))
+        .replace("{{sigma}}", &numbers(SIGMA_M))
         .replace("{{path}}", &path.join(","))
-        .replace("{{points}}", &encode(&packed(&shown, low, high)))
+        .replace("{{points}}", &base64(&packed(&shown, extents)))
 }
 
-fn numbers(v: [f32; 3]) -> String {
+fn numbers<const N: usize>(v: [f32; N]) -> String {
     v.map(|v| if v.is_finite() { v.to_string() } else { "0".into() }).join(",")
 }
 
-fn numbers3(v: [f32; 2]) -> String {
-    v.map(|v| v.to_string()).join(",")
-}
-
 /// Ten bytes a point: three places in 16 bits, red, green, blue, sigma.
-fn packed(points: &[&MapPoint], low: [f32; 3], high: [f32; 3]) -> Vec<u8> {
+fn packed(points: &[&MapPoint], extents: [[f32; 2]; 3]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(points.len() * 10);
     let decades = (SIGMA_M[1] / SIGMA_M[0]).ln();
     for point in points {
-        for k in 0..3 {
-            let share = (point.at[k] - low[k]) / (high[k] - low[k]).max(f32::MIN_POSITIVE);
+        for (at, [low, high]) in point.at.iter().zip(extents) {
+            let share = (at - low) / (high - low).max(f32::MIN_POSITIVE);
             bytes.extend_from_slice(&((share * STEPS).round() as u16).to_le_bytes());
         }
         bytes.extend_from_slice(&point.colour);
@@ -64,10 +59,6 @@ fn packed(points: &[&MapPoint], low: [f32; 3], high: [f32; 3]) -> Vec<u8> {
         bytes.push((share.clamp(0.0, 1.0) * 255.0).round() as u8);
     }
     bytes
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 #[cfg(test)]

@@ -1,29 +1,28 @@
 //! Drawing and pages. Computes nothing: a number in a report exists as data elsewhere.
 //!
-//! A figure is plain data first ([`Figure2`], [`SigmaMap`]: what stands where, with which label),
-//! drawn second, by one function for SVG and PNG alike. The page puts figures and tables together.
+//! A figure is a [`Chart`] first (what stands where, with which label), drawn second, by one set
+//! of functions for SVG and PNG alike. A page puts charts, tables and sentences into the skeleton
+//! of [`document`]; [`numbers`] decides how a number is written.
 
 pub mod axis;
-mod base64;
+mod calibration_page;
+pub mod chart;
 pub mod colours;
 mod comparison;
 mod diagnosis_page;
 pub mod document;
 mod figure2;
-mod html;
-mod lines;
 mod map_page;
 pub mod numbers;
-mod residual_picture;
+mod residuals;
 pub mod sheet;
 mod sigma_map;
 
 pub use axis::Axis;
+pub use calibration_page::{CalibrationPage, calibration_page};
+pub use chart::Chart;
 pub use comparison::{comparison_figures, comparison_page};
 pub use diagnosis_page::{DiagnosisPage, Picture, diagnosis_page};
-pub use figure2::{Figure2, Group, Overlay, OverlayLine, Point};
-pub use html::{CalibrationPage, calibration_page};
-pub use lines::{Line, LineFigure};
+pub use figure2::{Overlay, figure2};
 pub use map_page::map_page;
-pub use residual_picture::{residual_png, scale_mm};
-pub use sigma_map::{IsoLine, Run, SigmaMap};
+pub use sigma_map::sigma_map;

@@ -6,6 +6,8 @@ pub const MM: f64 = 1e3;
 pub const ABSENT: &str = "–";
 /// Beyond these, powers of ten are easier to read.
 const PLAIN: std::ops::Range<f64> = 1e-3..1e5;
+/// A p-value below it is not given to the digit.
+const MIN_P: f64 = 1e-6;
 
 /// A fixed number of decimals.
 pub fn fixed(value: f64, decimals: usize) -> String {
@@ -18,18 +20,34 @@ pub fn fixed(value: f64, decimals: usize) -> String {
 
 /// Metres as millimetres, to about three digits.
 pub fn millimetres(metres: f64) -> String {
-    let decimals = if metres.abs() * MM < 10.0 { 2 } else { 1 };
-    fixed(metres * MM, decimals)
+    let mm = metres * MM;
+    let decimals = [(0.1, 3), (10.0, 2)].into_iter().find(|(below, _)| mm.abs() < *below);
+    fixed(mm, decimals.map_or(1, |(_, decimals)| decimals))
 }
 
 pub fn degrees(radians: f64) -> String {
     fixed(radians.to_degrees(), 1)
 }
 
+/// With a decimal where one is needed to tell it from 0 or 100 %.
+pub fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    let decimals = usize::from(percent > 99.0 && percent < 100.0 || percent > 0.0 && percent < 1.0);
+    format!("{} %", fixed(percent, decimals))
+}
+
 /// `low – high`, or one number where they print alike.
 pub fn range([low, high]: [f64; 2], decimals: usize) -> String {
     let [low, high] = [low, high].map(|v| fixed(v, decimals));
     if low == high { low } else { format!("{low} – {high}") }
+}
+
+/// Decimals that keep two digits of `value`, four at most.
+pub fn decimals_for(value: f64) -> usize {
+    if !(value.is_finite() && value > 0.0) {
+        return 2;
+    }
+    (1 - value.log10().floor() as i32).clamp(0, 4) as usize
 }
 
 /// To `digits` significant digits, with a power of ten where that helps.
@@ -48,19 +66,42 @@ pub fn significant(value: f64, digits: usize) -> Markup {
     html! { (mantissa) "·10" sup { (exponent) } }
 }
 
+/// `0.125 ± 0.001`: both to the digits that the error leaves.
+pub fn with_error(value: f64, error: f64) -> Markup {
+    if error.is_nan() || error <= 0.0 || value.abs().max(error) < PLAIN.start {
+        return html! { (significant(value, 3)) " ± " (significant(error, 2)) };
+    }
+    let decimals = decimals_for(error);
+    html! { (fixed(value, decimals)) " ± " (fixed(error, decimals)) }
+}
+
+/// `p = 0.012`, with its sign.
+pub fn p_value(p: f64) -> Markup {
+    html! {
+        @if p < MIN_P { "p < 10" sup { "−6" } }
+        @else { "p = " (significant(p, if p < 1e-3 { 1 } else { 2 })) }
+    }
+}
+
+/// `two causes`: small numbers as words.
+pub fn count(n: usize, noun: &str) -> String {
+    const WORDS: [&str; 10] =
+        ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine"];
+    let number = WORDS.get(n).map_or_else(|| n.to_string(), ToString::to_string);
+    format!("{number} {noun}{}", if n == 1 { "" } else { "s" })
+}
+
 /// A formula in the notation of [`crate::model::SigmaForm::formula`], for the eye; names that
 /// `value` knows are replaced by their numbers.
 pub fn formula(text: &str, value: &dyn Fn(&str) -> Option<f64>) -> Markup {
     let mut out = String::new();
     let mut rest = text;
+    let word_end = |text: &str| text.find(|c: char| !c.is_alphanumeric()).unwrap_or(text.len());
     while let Some(first) = rest.chars().next() {
-        let end = rest.find(|c: char| !c.is_alphanumeric()).unwrap_or(rest.len());
-        let length = if end == 0 { first.len_utf8() } else { end };
-        let (token, after) = rest.split_at(length);
+        let (token, after) = rest.split_at(word_end(rest).max(first.len_utf8()));
         rest = after;
         if token == "^" {
-            let end = rest.find(|c: char| !c.is_alphanumeric()).unwrap_or(rest.len());
-            let (power, after) = rest.split_at(end);
+            let (power, after) = rest.split_at(word_end(rest));
             rest = after;
             out.push_str(&html! { sup { (word(power, value)) } }.into_string());
         } else {
@@ -108,9 +149,22 @@ mod tests {
     fn ranges_and_units() {
         assert_eq!(range([0.501, 3.54], 2), "0.50 – 3.54");
         assert_eq!(range([1.0, 1.001], 2), "1.00");
+        assert_eq!(millimetres(0.000_057), "0.057");
         assert_eq!(millimetres(0.00231), "2.31");
-        assert_eq!(millimetres(0.0231), "23.1");
+        assert_eq!(millimetres(-0.0231), "−23.1");
         assert_eq!(degrees(std::f64::consts::PI), "180.0");
+        assert_eq!([percent(0.995), percent(1.0)], ["99.5 %", "100 %"]);
+        assert_eq!(count(2, "cause"), "two causes");
+    }
+
+    #[test]
+    fn errors_and_p_values() {
+        assert_eq!(with_error(0.125, 0.001).into_string(), "0.1250 ± 0.0010");
+        let tiny = "−2.00·10<sup>−5</sup> ± 3.0·10<sup>−6</sup>";
+        assert_eq!(with_error(-2e-5, 3e-6).into_string(), tiny);
+        assert_eq!(p_value(0.0004).into_string(), "p = 4·10<sup>−4</sup>");
+        assert_eq!(p_value(0.31).into_string(), "p = 0.31");
+        assert_eq!(p_value(0.0).into_string(), "p &lt; 10<sup>−6</sup>");
     }
 
     #[test]

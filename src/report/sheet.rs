@@ -10,6 +10,7 @@ use image::imageops::{FilterType, resize};
 use image::{ImageFormat, RgbImage};
 use plotters::chart::MeshStyle;
 use plotters::coord::Shift;
+use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::register_font;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -26,8 +27,16 @@ pub type Pixel = (i32, i32);
 pub trait Drawing {
     /// For the error message.
     const WHAT: &'static str;
-    /// Width and height, units.
+    /// Width and height of most drawings of the kind, units.
     const SIZE: (u32, u32);
+
+    /// Width and height of this one, units.
+    fn size(&self) -> (u32, u32) {
+        Self::SIZE
+    }
+
+    /// # Errors
+    /// When the backend fails.
     fn draw<B: DrawingBackend>(&self, sheet: &Sheet<'_, B>) -> Drawn<B>;
 }
 
@@ -42,17 +51,26 @@ const PNG_TEXT_DROP: i32 = 2;
 pub const TEXT: i32 = 17;
 pub const SMALL: i32 = 15;
 const TITLE: i32 = 21;
-pub const FONT: &str = "sans-serif";
+const FONT: &str = "sans-serif";
 
+/// The drawing as SVG text.
+///
+/// # Errors
+/// When plotters fails.
 pub fn svg(drawing: &impl Drawing) -> Result<String> {
     let mut text = String::new();
-    on_sheet(drawing, SVGBackend::with_string(&mut text, size_of(drawing, 1)), 1)?;
+    on_sheet(drawing, SVGBackend::with_string(&mut text, drawing.size()), 1)?;
     Ok(text)
 }
 
+/// The drawing as the bytes of a PNG.
+///
+/// # Errors
+/// When plotters or the PNG encoder fails.
 pub fn png(drawing: &impl Drawing) -> Result<Vec<u8>> {
     let scale = PNG_SCALE * OVERSAMPLING;
-    let (width, height) = size_of(drawing, scale);
+    let (width, height) = drawing.size();
+    let (width, height) = (width * scale, height * scale);
     let mut image = RgbImage::new(width, height);
     on_sheet(drawing, BitMapBackend::with_buffer(&mut image, (width, height)), scale as i32)?;
     let small = resize(&image, width / OVERSAMPLING, height / OVERSAMPLING, FilterType::Triangle);
@@ -61,17 +79,13 @@ pub fn png(drawing: &impl Drawing) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn size_of<D: Drawing>(_: &D, scale: u32) -> (u32, u32) {
-    (D::SIZE.0 * scale, D::SIZE.1 * scale)
-}
-
 fn failed<D: Drawing, E: std::fmt::Display>(_: &D) -> impl Fn(E) -> Error {
     |e| Error::Drawing { what: D::WHAT, why: e.to_string() }
 }
 
-fn on_sheet<B: DrawingBackend, D: Drawing>(drawing: &D, backend: B, unit: i32) -> Result<()> {
+fn on_sheet<B: DrawingBackend>(drawing: &impl Drawing, backend: B, unit: i32) -> Result<()> {
     if !font_registered() {
-        return Err(Error::Drawing { what: D::WHAT, why: "the built-in font is damaged".into() });
+        return Err(failed(drawing)("the built-in font is damaged"));
     }
     let root = backend.into_drawing_area();
     let draw = || -> Drawn<B> {
@@ -103,7 +117,7 @@ pub struct Sheet<'a, B: DrawingBackend> {
 /// What the plotters chart inside a sheet is like.
 pub type Chart<'a, B, X, Y> = ChartContext<'a, B, Cartesian2d<X, Y>>;
 
-/// Strokes and gaps of a broken line, units; empty for a whole one.
+/// Stroke and gap of a broken line, units; empty for a whole one.
 pub type Dashes = &'static [i32];
 
 impl<B: DrawingBackend> Sheet<'_, B> {
@@ -112,19 +126,23 @@ impl<B: DrawingBackend> Sheet<'_, B> {
         units * self.unit
     }
 
+    /// A line style, its width in units.
     pub fn stroke<C: Color>(&self, colour: &C, width: u32) -> ShapeStyle {
         colour.stroke_width(width * self.unit.unsigned_abs())
     }
 
+    /// # Errors
+    /// When the backend fails, as all that draws here.
     pub fn line(&self, points: &[Pixel], style: ShapeStyle, dashes: Dashes) -> Drawn<B> {
-        if dashes.is_empty() {
-            return self.root.draw(&PathElement::new(points.to_vec(), style));
+        match *dashes {
+            [stroke, gap] => self.root.draw(&DashedPathElement::new(
+                points.to_vec(),
+                self.px(stroke),
+                self.px(gap),
+                style,
+            )),
+            _ => self.root.draw(&PathElement::new(points.to_vec(), style)),
         }
-        let pattern: Vec<f64> = dashes.iter().map(|d| f64::from(self.px(*d))).collect();
-        for piece in broken(points, &pattern) {
-            self.root.draw(&PathElement::new(piece, style))?;
-        }
-        Ok(())
     }
 
     /// Axes and a grid in the style of all figures, with text of this size; labels and ticks are
@@ -143,15 +161,22 @@ impl<B: DrawingBackend> Sheet<'_, B> {
         mesh
     }
 
+    /// # Errors
+    /// See [`Sheet::line`].
     pub fn fill<C: Color>(&self, corners: [Pixel; 2], colour: &C) -> Drawn<B> {
         self.root.draw(&Rectangle::new(corners, colour.filled()))
     }
 
     /// Text whose left (or as `anchor` says) middle is at `at`.
+    ///
+    /// # Errors
+    /// See [`Sheet::line`].
     pub fn text(&self, text: &str, at: Pixel, size: i32, anchor: HPos) -> Drawn<B> {
         self.coloured_text(text, at, size, anchor, &INK)
     }
 
+    /// # Errors
+    /// See [`Sheet::line`].
     pub fn coloured_text<C: Color>(
         &self,
         text: &str,
@@ -169,65 +194,30 @@ impl<B: DrawingBackend> Sheet<'_, B> {
     }
 
     /// Width of a text, px.
+    ///
+    /// # Errors
+    /// See [`Sheet::line`].
     pub fn width(&self, text: &str, size: i32) -> Drawn<B, i32> {
         Ok(self.root.estimate_text_size(text, &self.font(size))?.0 as i32)
     }
 
+    /// The size, at most `size`, at which a text fits into so many units.
+    ///
+    /// # Errors
+    /// See [`Sheet::line`].
+    pub fn fitting(&self, text: &str, size: i32, room: i32) -> Drawn<B, i32> {
+        let (needed, room) = (self.width(text, size)?.max(1), self.px(room));
+        Ok(if needed > room { (size * room / needed).max(SMALL / 2) } else { size })
+    }
+
     /// The figure's title, as large as fits.
+    ///
+    /// # Errors
+    /// See [`Sheet::line`].
     pub fn title(&self, text: &str, width: i32) -> Drawn<B> {
         const LEFT: i32 = 16;
         const MIDDLE: i32 = 22;
-        let needed = self.width(text, TITLE)?.max(1);
-        let room = self.px(width - 2 * LEFT);
-        let size = if needed > room { (TITLE * room / needed).max(SMALL / 2) } else { TITLE };
+        let size = self.fitting(text, TITLE, width - 2 * LEFT)?;
         self.text(text, (self.px(LEFT), self.px(MIDDLE)), size, HPos::Left)
-    }
-}
-
-/// Cut a line into the strokes of a pattern of lengths (stroke, gap, stroke, ...).
-fn broken(points: &[Pixel], pattern: &[f64]) -> Vec<Vec<Pixel>> {
-    let mut pieces = Vec::new();
-    let (mut slot, mut left) = (0, pattern[0]);
-    let mut piece: Vec<Pixel> = points.first().copied().into_iter().collect();
-    for pair in points.windows(2) {
-        let [from, to] = [pair[0], pair[1]].map(|(x, y)| (f64::from(x), f64::from(y)));
-        let length = (to.0 - from.0).hypot(to.1 - from.1);
-        let mut done = 0.0;
-        while length - done > left {
-            done += left;
-            let share = done / length;
-            let at = [from.0 + share * (to.0 - from.0), from.1 + share * (to.1 - from.1)];
-            let at = (at[0].round() as i32, at[1].round() as i32);
-            if slot % 2 == 0 {
-                piece.push(at);
-                pieces.push(std::mem::take(&mut piece));
-            } else {
-                piece = vec![at];
-            }
-            slot += 1;
-            left = pattern[slot % pattern.len()];
-        }
-        left -= length - done;
-        if slot % 2 == 0 {
-            piece.push(pair[1]);
-        }
-    }
-    if piece.len() > 1 {
-        pieces.push(piece);
-    }
-    pieces
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn dashes_alternate_over_corners() {
-        let pieces = broken(&[(0, 0), (10, 0), (10, 10)], &[6.0, 2.0]);
-        assert_eq!(
-            pieces,
-            [vec![(0, 0), (6, 0)], vec![(8, 0), (10, 0), (10, 4)], vec![(10, 6), (10, 10)]]
-        );
     }
 }

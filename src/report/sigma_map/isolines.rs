@@ -1,6 +1,9 @@
 //! Iso-lines of a sampled surface: marching squares, and places for the labels.
 
-use super::IsoLine;
+use crate::report::axis::Axis;
+use crate::report::chart::{Layer, Stroke};
+use crate::report::colours::INK;
+use crate::stats::range;
 
 /// A surface sampled on the corners of a lattice.
 pub(super) struct Grid {
@@ -27,8 +30,7 @@ impl Grid {
     }
 
     pub fn range(&self) -> [f64; 2] {
-        let fold = |[low, high]: [f64; 2], v: &f64| [low.min(*v), high.max(*v)];
-        self.value.iter().fold([f64::INFINITY, f64::NEG_INFINITY], fold)
+        range(self.value.iter().copied())
     }
 
     /// Corners of a cell in turn, each with its value.
@@ -69,17 +71,20 @@ const LABELS_APART: [f64; 2] = [0.08, 0.06];
 /// ... and this far from its sides.
 const LABEL_INSET: f64 = 0.02;
 
-pub(super) fn lines(grid: &Grid, levels: &[f64]) -> Vec<IsoLine> {
+/// Lines at these levels, and labels over them.
+pub(super) fn layers(grid: &Grid, levels: &[f64]) -> impl Iterator<Item = Layer> {
+    let (mut lines, mut labels) = (Vec::new(), Vec::new());
     let mut taken: Vec<[f64; 2]> = Vec::new();
-    levels
-        .iter()
-        .map(|&sigma_mm| {
-            let pieces = grid.pieces(sigma_mm);
-            let label_at = place(grid, &pieces, &taken);
-            taken.extend(label_at);
-            IsoLine { sigma_mm, pieces, label_at }
-        })
-        .collect()
+    for &level in levels {
+        let pieces = grid.pieces(level);
+        if let Some(at) = place(grid, &pieces, &taken) {
+            taken.push(at);
+            labels.push(Layer::Label(at, Axis::label(level)));
+        }
+        let line = |piece: &[[f64; 2]; 2]| Layer::Line(piece.to_vec(), Stroke::new(INK, 1));
+        lines.extend(pieces.iter().map(line));
+    }
+    lines.into_iter().chain(labels)
 }
 
 fn place(grid: &Grid, pieces: &[[[f64; 2]; 2]], taken: &[[f64; 2]]) -> Option<[f64; 2]> {
@@ -111,13 +116,13 @@ mod tests {
     #[test]
     fn a_circle_is_found() {
         let grid = Grid::sample([-2.0, 2.0], [-2.0, 2.0], [80, 80], &|x, y| x.hypot(y));
-        let lines = lines(&grid, &[1.0, 5.0]);
-        assert!(lines[0].pieces.len() > 100);
-        for [p, q] in &lines[0].pieces {
+        let pieces = grid.pieces(1.0);
+        assert!(pieces.len() > 100 && grid.pieces(5.0).is_empty());
+        for [p, q] in &pieces {
             approx::assert_abs_diff_eq!(p[0].hypot(p[1]), 1.0, epsilon = 1e-3);
             assert!((p[0] - q[0]).hypot(p[1] - q[1]) < 0.1);
         }
-        assert!(lines[0].label_at.is_some());
-        assert!(lines[1].pieces.is_empty() && lines[1].label_at.is_none());
+        let layers: Vec<Layer> = layers(&grid, &[1.0, 5.0]).collect();
+        assert_eq!(layers.len(), pieces.len() + 1, "one label, and none for an empty line");
     }
 }

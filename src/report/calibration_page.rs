@@ -1,0 +1,255 @@
+//! The page of a calibration.
+
+mod views;
+mod warnings;
+
+use maud::{Markup, html};
+use serde_json::{Map, Value};
+
+use super::document::{document, facts, figure, row, table};
+use super::figure2::{Overlay, figure2};
+use super::numbers::{ABSENT, MM, fixed, formula, millimetres, range, significant};
+use super::sigma_map::sigma_map;
+use crate::calibrate::{Calibration, Measurements};
+use crate::error::Result;
+use crate::model::{DISTANCE_RATIO, Direction, HeldOut, Parameter, Provenance, SigmaModel};
+use crate::view::Sensor;
+
+/// What the page is about; a bare table has neither sensor nor measurements.
+#[derive(Debug, Clone, Copy)]
+pub struct CalibrationPage<'a> {
+    /// Of the page.
+    pub title: &'a str,
+    /// The unit, when a recording was measured.
+    pub sensor: Option<&'a Sensor>,
+    /// Its views.
+    pub measurements: Option<&'a Measurements>,
+    /// The model with all that belongs to it.
+    pub calibration: &'a Calibration,
+    /// Drawn into Fig. 2.
+    pub overlays: &'a [Overlay],
+}
+
+const FIGURE2: &str = "Noise against tilt. Each point is a measured σ with one standard error; \
+    colour and shape give its distance. Curves are the fit at the median distance of each colour, \
+    over the tilts that were measured. A point is carried along the fitted surface from its own \
+    distance to its curve's, so that its height over the curve is its relative residual; \
+    measurements.csv has it as measured.";
+const MAP: &str = "The fitted σ where it is valid. Dots are the measured cells: far from them the \
+    colour is interpolation.";
+
+/// The page as text.
+///
+/// # Errors
+/// When a picture cannot be drawn.
+pub fn calibration_page(page: &CalibrationPage<'_>) -> Result<String> {
+    let calibration = page.calibration;
+    let (measured, sigma) = (&calibration.table, &calibration.model.sigma);
+    let excluded = page.measurements.map_or(&[][..], |m| &m.excluded);
+    let body = html! {
+        (heading(page))
+        section {
+            h2 { "Result" }
+            p.formula { (with_numbers(sigma)) }
+            (result(page))
+            h3 { "σ facing the target, in mm" }
+            (published(sigma))
+        }
+        (figure(&figure2(measured, sigma, page.overlays), FIGURE2)?)
+        (figure(&sigma_map(measured, sigma), MAP)?)
+        (model(calibration))
+        (warnings::section(&calibration.warnings, excluded))
+        @if let Some(measurements) = page.measurements {
+            (views::table_of(&measurements.views))
+            (views::gallery(&measurements.views)?)
+        }
+        (provenance(&calibration.model.provenance))
+    };
+    Ok(document(page.title, None, &body).into_string())
+}
+
+fn heading(page: &CalibrationPage<'_>) -> Markup {
+    html! {
+        header {
+            h1 { (page.title) }
+            p.sub { @match page.sensor {
+                Some(sensor) => {
+                    (sensor.name)
+                    @if let Some(serial) = &sensor.serial { ", serial " (serial) }
+                    @if let Some(mode) = &sensor.mode { ", " (mode) " mode" }
+                    ", " (sensor.camera.width) " × " (sensor.camera.height) " px"
+                },
+                None => "fitted to a table of sigmas; the recording is not part of this page",
+            } }
+        }
+    }
+}
+
+/// The form with its parameters put in.
+fn with_numbers(model: &SigmaModel) -> Markup {
+    let spec = model.form.spec();
+    let (equation, units) = spec.formula().split_once(" (m").unwrap_or((spec.formula(), ""));
+    let units = units.trim_start_matches(';').trim_end_matches(')').replace("theta", "θ");
+    let value = |name: &str| {
+        let at = spec.parameters().iter().position(|(n, _)| *n == name)?;
+        model.parameters.get(at).copied()
+    };
+    html! { (formula(equation, &value)) " " span.units { "in m; " (units) } }
+}
+
+fn result(page: &CalibrationPage<'_>) -> Markup {
+    let calibration = page.calibration;
+    let (fit, sigma) = (&calibration.model.fit, &calibration.model.sigma);
+    let used = match page.measurements {
+        Some(m) => format!("{} used, {} excluded", m.views.len(), m.excluded.len()),
+        None => format!("{} rows of a table", calibration.table.rows.len()),
+    };
+    let direction = match sigma.direction {
+        Direction::Axial => "along the optical axis",
+        Direction::Perpendicular => "normal to the plane",
+    };
+    let tilts = sigma.domain.theta_rad.map(f64::to_degrees);
+    let poor = if calibration.fit.poor { ": a poor fit, see the warnings" } else { "" };
+    let heldout = fit.heldout.map(|e| format!("{} % rms", fixed(100.0 * e, 1)));
+    facts([
+        ("views", html! { (used) }),
+        ("distance z", html! { (range(sigma.domain.z_m, 2)) " m" }),
+        ("tilt θ", html! { (range(tilts, 1)) "°" }),
+        ("sigma is", html! { "measured " (direction) ", " (fit.samples) " cells" }),
+        (
+            "fit error",
+            html! { (fixed(MM * fit.rmse_m, 2)) " mm rms, r² = " (fixed(fit.r2, 3)) (poor) },
+        ),
+        (
+            "error at distances left out",
+            html! { (heldout.as_deref().unwrap_or("not known: too few distances")) },
+        ),
+    ])
+}
+
+/// Where sensors are compared, m.
+const COMPARED_AT_M: [f64; 3] = [1.0, 2.0, 3.0];
+const LEVEL: f64 = 0.95;
+
+/// The sensor beside the published surfaces, at the ends of its range and the usual distances.
+fn published(model: &SigmaModel) -> Markup {
+    let mut distances: Vec<f64> = COMPARED_AT_M.into_iter().chain(model.domain.z_m).collect();
+    distances.sort_by(f64::total_cmp);
+    distances.dedup_by(|b, a| *b <= *a * DISTANCE_RATIO);
+    let theta = model.domain.theta_rad[0];
+    let titles = distances.iter().map(|z| format!(">{} m", fixed(*z, 2)));
+    let columns: Vec<String> = ["at distance".into()].into_iter().chain(titles).collect();
+    let mut rows = vec![row![html! { b { "this sensor" } }]];
+    rows[0].extend(distances.iter().map(|z| with_interval(model, *z, theta)));
+    rows.extend(Overlay::ALL.map(|overlay| {
+        let cells = distances.iter().map(|z| without_interval(&overlay.model(), *z, theta));
+        row![overlay.label()].into_iter().chain(cells).collect()
+    }));
+    html! {
+        (table(&columns, rows))
+        p.note {
+            "At θ = " (fixed(theta.to_degrees(), 1)) "°, the smallest tilt measured. In brackets: the 95 % interval. "
+            (ABSENT) ": the source measured no such distance or tilt."
+        }
+    }
+}
+
+fn measured(model: &SigmaModel, z: f64) -> bool {
+    let [near, far] = model.domain.z_m;
+    z * DISTANCE_RATIO >= near && z <= far * DISTANCE_RATIO
+}
+
+fn with_interval(model: &SigmaModel, z: f64, theta: f64) -> Markup {
+    let exact = model.covariance.iter().all(|c| *c == 0.0);
+    html! {
+        @if measured(model, z) {
+            b { (millimetres(model.sigma(z, theta))) }
+            @if !exact {
+                @let [low, high] = model.interval(z, theta, LEVEL).map(millimetres);
+                " " span.units { "(" (low) " – " (high) ")" }
+            }
+        } @else { (ABSENT) }
+    }
+}
+
+fn without_interval(model: &SigmaModel, z: f64, theta: f64) -> Markup {
+    let [low, high] = model.domain.theta_rad;
+    let known = (low..=high).contains(&theta) && measured(model, z);
+    html! { @if known { (millimetres(model.sigma(z, theta))) } @else { (ABSENT) } }
+}
+
+fn model(calibration: &Calibration) -> Markup {
+    let fit = &calibration.fit;
+    let columns = ["parameter", ">value", ">standard error", "~remark"];
+    let parameter = |p: &Parameter| {
+        let error = p.std_error.map_or_else(|| html! { "held" }, |e| significant(e, 2));
+        row![
+            html! { i { (p.name) } },
+            significant(p.value, 4),
+            error,
+            p.remark.as_deref().unwrap_or("")
+        ]
+    };
+    html! {
+        section {
+            h2 { "Model" }
+            p {
+                "Form " b { (fit.form.id()) } ": " (fit.form.spec().formula()) ". "
+                span.units { (fit.form.spec().reference()) }
+            }
+            (table(&columns, fit.parameters.iter().map(parameter)))
+            h3 { "How the forms predict distances they have not seen" }
+            @if calibration.comparison.is_empty() {
+                p { "Not known: too few distances to leave one out." }
+            } @else {
+                (forms(calibration))
+            }
+        }
+    }
+}
+
+fn forms(calibration: &Calibration) -> Markup {
+    let columns = ["form", ">log score, nats a view", ">rms error", ">distances left out", "~from"];
+    let row = |h: &HeldOut| {
+        let used = h.form == calibration.fit.form;
+        let name = html! { @if used { b { (h.form.id()) } } @else { (h.form.id()) } };
+        let error = fixed(100.0 * h.rmse_relative, 1) + " %";
+        row![name, fixed(h.log_score, 2), error, h.folds, h.form.spec().reference()]
+    };
+    html! {
+        (table(&columns, calibration.comparison.iter().map(row)))
+        p.note { "Each group of distances is left out of the fit in turn and then predicted; a greater \
+            log score is better. The form used is in bold." }
+    }
+}
+
+/// What it takes to make the model again.
+fn provenance(provenance: &Provenance) -> Markup {
+    let mut all = vec![
+        ("made by".to_string(), format!("{} {}", provenance.tool, provenance.version)),
+        ("on".into(), provenance.created.clone()),
+    ];
+    all.extend(provenance.seed.map(|seed| ("seed".into(), seed.to_string())));
+    all.extend(entries("", &provenance.options));
+    all.extend(entries("SHA-256 of ", &provenance.sha256));
+    html! {
+        section {
+            h2 { "How it was made" }
+            (facts(all.into_iter().map(|(name, value)| (name, html! { (value) }))))
+        }
+    }
+}
+
+fn entries(before: &str, map: &Map<String, Value>) -> impl Iterator<Item = (String, String)> {
+    map.iter().map(move |(name, value)| {
+        let value = match value {
+            Value::Null => "automatic".into(),
+            Value::String(text) => text.clone(),
+            other => other.to_string(),
+        };
+        (format!("{before}{}", name.replace('_', " ")), value)
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,326 @@
+//! What the page says in words: of verdicts, of findings by their status, and what to do next.
+
+use maud::{Markup, html};
+
+use crate::diagnose::{Diagnosis, Finding, NextView, Reference, Status, Verdict};
+use crate::effects;
+use crate::report::numbers::{count, decimals_for, fixed};
+use crate::terms::{Axis, Statistic};
+
+/// Below this tilt a target counts as facing the sensor, rad: 3 degrees.
+const FACING_RAD: f64 = 0.0524;
+/// Less likely alternatives do not come into a finding's name.
+const MIN_PROBABILITY: f64 = 0.05;
+/// As many findings come by name into the first sentence.
+const MAX_NAMES: usize = 3;
+/// From here on times are in minutes, s.
+const MINUTES_FROM_S: f64 = 180.0;
+const SECONDS_A_MINUTE: f64 = 60.0;
+
+/// The catalogue's name of an effect, which fits into a sentence; a new id names itself.
+pub(super) fn title(id: &'static str) -> &'static str {
+    effects::find(id).map_or(id, |effect| effect.card().title)
+}
+
+/// What the catalogue says of it.
+pub(super) fn description(id: &'static str) -> &'static str {
+    effects::find(id).map_or(id, |effect| effect.card().summary)
+}
+
+/// The answer in a sentence or two.
+pub(super) fn verdict(diagnosis: &Diagnosis) -> String {
+    let effects = missing(&diagnosis.findings);
+    let names: Vec<String> = effects.iter().take(MAX_NAMES).map(|f| called(f)).collect();
+    let names = join(&names, "and");
+    let recalibrate = diagnosis.findings.iter().any(|f| f.status == Status::Recalibrate);
+    match (diagnosis.verdict, effects.is_empty()) {
+        (Verdict::Match, _) => format!(
+            "The model explains this recording: nothing differs from {} by more than chance.",
+            match diagnosis.reference {
+                Reference::Model => "the calibrated model",
+                Reference::SimulatedRecording => "the simulated recording",
+            }
+        ),
+        (Verdict::Inconclusive, true) => {
+            "This recording does not settle whether the model is right.".into()
+        }
+        (Verdict::Inconclusive, false) => {
+            format!("This recording does not settle whether the model is right. There are hints of {names}.")
+        }
+        (Verdict::Mismatch, true) if recalibrate => {
+            "The model lacks no effect, but its parameters do not fit this sensor: calibrate it again.".into()
+        }
+        (Verdict::Mismatch, true) => {
+            "Model and recording differ, and these views cannot show why.".into()
+        }
+        (Verdict::Mismatch, false) => format!(
+            "The model leaves {} out{} {names}.{}",
+            count(effects.len(), "effect"),
+            if effects.len() > MAX_NAMES { ", above all" } else { ":" },
+            if recalibrate { " Its own parameters are off as well." } else { "" }
+        ),
+    }
+}
+
+/// The findings that are physics which the model lacks; the rest is about numbers, or cannot be
+/// seen.
+pub(super) fn missing(findings: &[Finding]) -> Vec<&Finding> {
+    let lacking = [Status::Named, Status::OneOf, Status::Unexplained];
+    findings.iter().filter(|f| lacking.contains(&f.status)).collect()
+}
+
+/// What a finding is called in the middle of a sentence.
+pub(super) fn called(finding: &Finding) -> String {
+    let unnamed = || format!("an unexplained error over the {}", axis(finding.axis));
+    match finding.status {
+        Status::OneOf if finding.alternatives.len() > 1 => {
+            let likely = finding.alternatives.iter().enumerate();
+            let likely = likely.filter(|(i, a)| *i < 2 || a.probability >= MIN_PROBABILITY);
+            join(&likely.map(|(_, a)| title(a.effect).into()).collect::<Vec<_>>(), "or")
+        }
+        Status::Unexplained => unnamed(),
+        Status::Recalibrate => "parameters that are off".into(),
+        _ => finding.effect.map_or_else(unnamed, |id| title(id).into()),
+    }
+}
+
+/// Class and text of a finding's badge.
+pub(super) fn badge(status: Status) -> (&'static str, &'static str) {
+    match status {
+        Status::Named => ("named", "effect named"),
+        Status::OneOf => ("one-of", "one of several"),
+        Status::Unexplained => ("unexplained", "measured, not in the catalogue"),
+        Status::Recalibrate => ("recalibrate", "calibrate again"),
+        Status::NotIdentifiable => ("not-identifiable", "cannot be seen here"),
+    }
+}
+
+/// The physics of a finding; what is known from the catalogue where the diagnosis says nothing.
+pub(super) fn physics(finding: &Finding) -> String {
+    if !finding.physics.is_empty() {
+        return sentence(&finding.physics);
+    }
+    let known = finding.effect.map_or("", description);
+    match finding.status {
+        Status::Named | Status::OneOf => sentence(known),
+        Status::Unexplained => {
+            let shape = finding.shape.as_ref().map(|s| format!(" Its curve: {s}."));
+            format!(
+                "No effect of the catalogue explains this error over the {}.{}",
+                axis(finding.axis),
+                shape.unwrap_or_default()
+            )
+        }
+        Status::Recalibrate => "Other parameters of the same model explain the recording.".into(),
+        Status::NotIdentifiable => {
+            format!("Views of a flat target do not show this effect. {}", sentence(known))
+        }
+    }
+}
+
+/// What to do next; nothing where nothing is asked of anybody.
+pub(super) fn advice(finding: &Finding) -> Option<Markup> {
+    let view = finding.next_view.as_ref();
+    let more = match finding.status {
+        Status::Named => "",
+        Status::OneOf if view.is_some() => {
+            "Then diagnose again with this view added to the recording."
+        }
+        Status::OneOf => {
+            "These views do not separate the alternatives. Add views at other distances and tilts, and diagnose again."
+        }
+        Status::Unexplained => {
+            "The simulation can use the measured curve as it is. To find the cause, change one thing at a time \
+             (distance, tilt, place in the picture, light, time since switching on) and see what the curve follows."
+        }
+        Status::Recalibrate => {
+            "Run “kinoise calibrate” on this recording and diagnose again with the new model. No effect has to be \
+             added to the simulation."
+        }
+        Status::NotIdentifiable if view.is_none() && finding.statistic == Statistic::Bias => {
+            "A plane with this error still looks like a plane. Measure the distance from sensor to target with a tape \
+             in a few views at different distances, write it into each view's view.json as “reference_distance_m”, \
+             and diagnose again."
+        }
+        Status::NotIdentifiable => "Add views at other distances and tilts, and diagnose again.",
+    };
+    (view.is_some() || !more.is_empty())
+        .then(|| html! { @if let Some(view) = view { (next_view(view)) } (more) })
+}
+
+/// An instruction to a person holding a target.
+fn next_view(next: &NextView) -> Markup {
+    let tilt = fixed(next.theta_rad.to_degrees(), 0);
+    html! {
+        "Take one more view: hold the target " b { (fixed(next.z_m, 2)) " m" } " in front of the sensor, "
+        @if next.theta_rad.abs() < FACING_RAD { b { "facing it" } ". " }
+        @else { b { "tilted by " (tilt) "°" } ", its " b { (far_side(next.azimuth_rad)) } " farthest away as the sensor sees it. " }
+        @if !next.why.is_empty() { (sentence(&next.why)) " " }
+    }
+}
+
+/// Depth grows towards the azimuth: 0 to the right, a quarter turn down.
+fn far_side(azimuth_rad: f64) -> &'static str {
+    const SIDES: [&str; 8] = [
+        "right side",
+        "lower right corner",
+        "lower side",
+        "lower left corner",
+        "left side",
+        "upper left corner",
+        "upper side",
+        "upper right corner",
+    ];
+    let eighths = (azimuth_rad / std::f64::consts::FRAC_PI_4).round() as i64;
+    SIDES[eighths.rem_euclid(8) as usize]
+}
+
+pub(super) fn axis(axis: Axis) -> &'static str {
+    match axis {
+        Axis::Z => "distance from the sensor",
+        Axis::DisparityPhase => "phase of the disparity",
+        Axis::Column => "column of the picture",
+        Axis::Row => "row of the picture",
+        Axis::Radius => "distance from the picture's centre",
+        Axis::Pixel => "pixel",
+        Axis::Theta => "tilt of the target",
+        Axis::Azimuth => "direction of the tilt",
+        Axis::TargetPosition => "place on the target",
+        Axis::EdgeDistance => "distance from the target's edge",
+        Axis::Intensity => "infrared intensity",
+        Axis::Frame => "time within a view",
+        Axis::SessionTime => "time since the session began",
+        Axis::Temperature => "temperature",
+        Axis::PixelLag => "distance between two pixels",
+        Axis::Residual => "size of the residual",
+    }
+}
+
+/// What of a reading is not as the model has it.
+pub(super) fn statistic(statistic: Statistic) -> &'static str {
+    match statistic {
+        Statistic::Bias => "mean depth",
+        Statistic::Variance => "noise level",
+        Statistic::Distribution => "distribution of the noise",
+        Statistic::Correlation => "correlation of the noise",
+        Statistic::Dropout => "pixels without depth",
+    }
+}
+
+/// A stretch of an axis, in units people use.
+pub(super) fn interval(axis: Axis, [low, high]: [f64; 2], unit: &str) -> String {
+    if !(low.is_finite() && high.is_finite()) {
+        return "over its whole range".into();
+    }
+    let other = format!(" {unit}");
+    let (scale, unit) = match unit {
+        "m" if axis == Axis::TargetPosition => (1e3, " mm"),
+        "m" => (1.0, " m"),
+        "rad" => (1f64.to_degrees(), "°"),
+        "s" if high >= MINUTES_FROM_S => (1.0 / SECONDS_A_MINUTE, " min"),
+        "degrees Celsius" => (1.0, " °C"),
+        "sigma" => (1.0, " σ"),
+        "of the median" => (1.0, " times the median"),
+        "periods" => (1.0, " of a step"),
+        "" | "1" => (1.0, ""),
+        _ => (1.0, other.as_str()),
+    };
+    let decimals = decimals_for(scale * (high - low).abs());
+    let [low, high] = [low, high].map(|v| fixed(scale * v, decimals));
+    if low == high { format!("{low}{unit}") } else { format!("{low} to {high}{unit}") }
+}
+
+/// What a p-value means.
+pub(super) fn chance(p: f64) -> String {
+    if p.is_nan() {
+        return "no test gave a p-value".into();
+    }
+    if p < 1e-6 {
+        return "chance alone does this less than once in a million recordings".into();
+    }
+    if p > 0.5 {
+        return "chance alone does this more often than not".into();
+    }
+    format!("chance alone does this about once in {} recordings", thousands(1.0 / p))
+}
+
+/// To two digits, with a comma at the thousands.
+fn thousands(value: f64) -> String {
+    let unit = 10f64.powf((value.log10().floor() - 1.0).max(0.0));
+    let digits = format!("{:.0}", (value / unit).round() * unit);
+    let (head, tail) = digits.split_at(digits.len() % 3);
+    let groups = tail.as_bytes().chunks(3).map(|c| String::from_utf8_lossy(c).into_owned());
+    let head = (!head.is_empty()).then(|| head.to_string());
+    head.into_iter().chain(groups).collect::<Vec<_>>().join(",")
+}
+
+/// `a, b and c`.
+pub(super) fn join(items: &[String], last: &str) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [head @ .., tail] => format!("{} {last} {tail}", head.join(", ")),
+    }
+}
+
+pub(super) fn capital(words: &str) -> String {
+    let mut chars = words.chars();
+    chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
+}
+
+/// With a capital and a full stop.
+pub(super) fn sentence(words: &str) -> String {
+    let words = capital(words.trim());
+    if words.is_empty() || words.ends_with(['.', '!', '?']) { words } else { words + "." }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_far_side_is_named() {
+        for (degrees, side) in [
+            (0.0, "right side"),
+            (92.0, "lower side"),
+            (-90.0, "upper side"),
+            (180.0, "left side"),
+            (-180.0, "left side"),
+        ] {
+            assert_eq!(far_side(f64::to_radians(degrees)), side);
+        }
+    }
+
+    #[test]
+    fn intervals_have_peoples_units() {
+        for (at, ends, unit, text) in [
+            (Axis::Z, [0.8, 3.204], "m", "0.8 to 3.2 m"),
+            (Axis::TargetPosition, [-0.4, 0.4], "m", "−400 to 400 mm"),
+            (Axis::Theta, [0.0, 0.698_132], "rad", "0 to 40°"),
+            (Axis::Radius, [120.0, 398.4], "px", "120 to 398 px"),
+            (Axis::SessionTime, [0.0, 1260.0], "s", "0 to 21 min"),
+            (Axis::DisparityPhase, [0.0, 0.5], "periods", "0.00 to 0.50 of a step"),
+            (Axis::Row, [f64::NEG_INFINITY, 3.0], "px", "over its whole range"),
+        ] {
+            assert_eq!(interval(at, ends, unit), text);
+        }
+    }
+
+    #[test]
+    fn titles_fit_into_a_sentence() {
+        for effect in effects::CATALOGUE {
+            for words in [effect.card().title, effect.card().words] {
+                assert!(!words.ends_with('.') && words.starts_with(char::is_lowercase), "{words}");
+            }
+        }
+        assert_eq!(title("not-yet"), "not-yet");
+    }
+
+    #[test]
+    fn chances_are_in_times() {
+        assert!(chance(0.0004).contains("once in 2,500 recordings"));
+        assert!(chance(0.0).contains("less than once in a million"));
+        assert_eq!([thousands(12_345.0), thousands(990_000.0)], ["12,000", "990,000"]);
+        assert_eq!(join(&["a", "b", "c"].map(String::from), "and"), "a, b and c");
+    }
+}
