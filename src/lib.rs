@@ -132,6 +132,7 @@
 //!
 //! - [`docs::catalogue`]: the physical effects, what each looks like and what it is confused with
 //! - [`docs::layouts`]: every file that goes in or comes out
+//! - [`docs::capture`]: how to take views with a Kinect
 //! - [`docs::identifiability`]: what views of planes can show, and what they cannot
 //! - [`docs::engine`]: how the diagnosis works, and where in the code
 //!

@@ -6,6 +6,9 @@ pub mod catalogue {}
 #[doc = include_str!("layouts.md")]
 pub mod layouts {}
 
+#[doc = include_str!("capture.md")]
+pub mod capture {}
+
 #[doc = include_str!("identifiability.md")]
 pub mod identifiability {}
 
