@@ -5,7 +5,7 @@ use crate::terms::Basis;
 /// A term that is tried.
 #[derive(Debug, Clone)]
 pub struct Candidate {
-    /// Id of the catalogue; `None` for a curve without a name.
+    /// Id of effects.md; `None` for a curve without a name.
     pub family: Option<&'static str>,
     pub basis: Basis,
 }

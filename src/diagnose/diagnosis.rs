@@ -1,4 +1,4 @@
-//! What a diagnosis says: `diagnosis.json`, see [layouts](crate::docs::layouts).
+//! What a diagnosis says: `diagnosis.json` (contract, section 5).
 
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -60,7 +60,7 @@ pub enum Status {
 #[derive(Debug, Clone, Serialize)]
 pub struct Finding {
     pub status: Status,
-    /// Id of the [catalogue](crate::docs::catalogue).
+    /// Id of effects.md.
     pub effect: Option<&'static str>,
     /// Best first; what is left to one is the chance of none of them.
     pub alternatives: Vec<Alternative>,

@@ -69,7 +69,7 @@ fn what_is_known_is_told_with_the_same_numbers() {
     }
 }
 
-/// Growth of the noise at the corner radius.
+/// effects.md: growth of the noise at the corner radius.
 #[test]
 fn known_vignetting_grows_as_the_catalogue_says() {
     let camera = kinect_v1(1).camera;

@@ -22,12 +22,12 @@ use crate::terms::Axis;
 /// Losses that follow an axis.
 #[derive(Debug, Clone)]
 pub struct MissingFinding {
-    /// Id of the catalogue; `None` where no family explains it.
+    /// Id of effects.md; `None` where no family explains it.
     pub family: Option<&'static str>,
     pub axis: Axis,
     /// Where it matters, in the axis's unit.
     pub interval: [f64; 2],
-    /// As the catalogue names them, each with value and standard error.
+    /// As effects.md names them, each with value and standard error.
     pub parameters: Map<String, Value>,
     /// Chance that losses without a cause look as much like it anywhere in this layer.
     pub p: f64,

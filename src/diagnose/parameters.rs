@@ -39,7 +39,7 @@ fn form(basis: &Basis) -> f64 {
     }
 }
 
-/// The parameters of the catalogue for a fitted shape; errors by the delta method.
+/// The parameters of effects.md for a fitted shape; errors by the delta method.
 pub fn parameters(
     basis: &Basis,
     beta: &[f64],

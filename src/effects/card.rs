@@ -49,7 +49,7 @@ impl Stage {
 /// A knob.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameter {
-    /// With its unit as the suffix.
+    /// With its unit, as in effects.md.
     pub name: &'static str,
     pub unit: &'static str,
     /// What is accepted.

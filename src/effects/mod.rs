@@ -40,7 +40,7 @@ macro_rules! catalogue {
     ($($module:ident :: $name:ident),* $(,)?) => {
         $(mod $module;)*
 
-        /// Every effect, in the order of [the page](crate::docs::catalogue).
+        /// Every effect, in the order of effects.md.
         pub static CATALOGUE: &[&dyn Effect] = &[$(&$module::$name),*];
     };
 }

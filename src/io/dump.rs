@@ -1,4 +1,4 @@
-//! A fakenect dump: `INDEX.txt` and `d-<time>-<stamp>.pgm`, raw 11-bit words of a Kinect v1.
+//! A fakenect dump: INDEX.txt and d-<time>-<stamp>.pgm, raw 11-bit words of a Kinect v1.
 
 use std::path::Path;
 
@@ -33,7 +33,7 @@ pub(super) fn footage(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor
         let timestamp = stamp(name).ok_or_else(|| Error::Text {
             path: index.clone(),
             line: i + 1,
-            what: format!("\"{}\" is not `d-<time>-<stamp>.pgm`", super::list::shorten(name)),
+            what: format!("\"{}\" is not d-<time>-<stamp>.pgm", super::list::shorten(name)),
             remedy: "record the dump with fakenect-record",
         })?;
         let path = root.join(name);
@@ -108,7 +108,7 @@ const CLOCK_HZ: f64 = 60e6;
 /// Projector to camera in every Kinect v1 (LDDIS of the OpenNI device properties: 7.5 cm).
 const KINECT_BASELINE_M: f64 = 0.075;
 
-/// Host time in seconds: the first number of `d-<time>-<stamp>.pgm`.
+/// Host time in seconds: the first number of d-<time>-<stamp>.pgm.
 fn stamp(name: &str) -> Option<f64> {
     let rest = name.strip_prefix("d-")?.strip_suffix(".pgm")?;
     let (time, _) = rest.split_once('-')?;

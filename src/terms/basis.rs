@@ -315,7 +315,7 @@ impl Basis {
         }
     }
 
-    /// The axis that it runs along.
+    /// The axis of effects.md that it runs along.
     pub fn axis(&self) -> Axis {
         match self {
             Basis::Bowl { .. } | Basis::Lens { .. } | Basis::RangeNotDepth => Axis::Radius,

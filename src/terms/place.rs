@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::camera::Camera;
 
-/// The axes of a mismatch; see [the catalogue](crate::docs::catalogue).
+/// The axes of effects.md.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Axis {
@@ -29,7 +29,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// As files have it.
+    /// As effects.md writes it.
     pub fn id(self) -> &'static str {
         match self {
             Axis::Z => "z",
