@@ -21,9 +21,15 @@
 //! ```
 //!
 //! 1. [`io::open`] reads a [`Recording`]: a sensor and the still views it took of a flat target.
-//! 2. [`measure_recording`] fits one plane to each view ([`plane`]) and measures how the depth
-//!    scatters about it ([`mod@measure`]).
-//! 3. [`model_of`] fits sigma(z, theta) to these numbers and gives a [`NoiseModel`] ([`model`]).
+//! 2. [`measure_recording`] finds the target, fits one plane to it ([`plane`]; in inverse depth, where
+//!    a plane is affine in the image, with redescending weights) and measures how the depth scatters
+//!    about it ([`mod@measure`]): over the pixels of a frame, over time, and across the plane. Tails
+//!    are cut at 3.5 sigma and the variance corrected for it. Standard errors count effective
+//!    samples, from the measured correlation of neighbours and of frames. The paper's own method,
+//!    RANSAC and total least squares, is carried along.
+//! 3. [`model_of`] fits sigma(z, theta) to these numbers (variable projection and a trust region,
+//!    relative residuals) and gives a [`NoiseModel`] ([`model`]) with its covariance, what the views
+//!    could not determine, and how well each form predicts distances left out.
 //! 4. [`diagnose::diagnose`] compares the recording with the model, locates what does not agree and
 //!    names its cause from the [catalogue of effects](docs::catalogue). The effects found extend the
 //!    model.
