@@ -1,4 +1,4 @@
-//! A fakenect dump: INDEX.txt and d-<time>-<stamp>.pgm, raw 11-bit words of a Kinect v1.
+//! A fakenect dump: INDEX.txt and `d-<time>-<stamp>.pgm`, raw 11-bit words of a Kinect v1.
 
 use std::path::Path;
 
@@ -108,7 +108,7 @@ const CLOCK_HZ: f64 = 60e6;
 /// Projector to camera in every Kinect v1 (LDDIS of the OpenNI device properties: 7.5 cm).
 const KINECT_BASELINE_M: f64 = 0.075;
 
-/// Host time in seconds: the first number of d-<time>-<stamp>.pgm.
+/// Host time in seconds: the first number of `d-<time>-<stamp>.pgm`.
 fn stamp(name: &str) -> Option<f64> {
     let rest = name.strip_prefix("d-")?.strip_suffix(".pgm")?;
     let (time, _) = rest.split_once('-')?;
