@@ -1,3 +1,5 @@
+# Makes residuals.png, worlds.png and the first table of README.md from four folders: hw (the real walls), f (formula),
+# s (speckle, with --infrared) and room (simulate --room).
 import numpy as np, json
 from PIL import Image
 import matplotlib; matplotlib.use('Agg'); import matplotlib.pyplot as plt
