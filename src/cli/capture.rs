@@ -21,8 +21,8 @@ pub struct Arguments {
     /// The recording: a new folder, or one to go on with
     recording: PathBuf,
     /// freenect (a Kinect v1), folder:DIR (another program fills it), or play:REC (as if live)
-    #[arg(long, value_name = "SOURCE", value_parser = from_where)]
-    source: From,
+    #[arg(long, value_name = "SOURCE", value_parser = source_kind)]
+    source: SourceKind,
     #[command(flatten)]
     views: Views,
     /// Frames of a view
@@ -99,17 +99,17 @@ impl Views {
 }
 
 #[derive(Debug, Clone)]
-enum From {
+enum SourceKind {
     Freenect,
     Folder(PathBuf),
     Play(PathBuf),
 }
 
-fn from_where(text: &str) -> Result<From, String> {
+fn source_kind(text: &str) -> Result<SourceKind, String> {
     match text.split_once(':') {
-        None if text == "freenect" => Ok(From::Freenect),
-        Some(("folder", path)) if !path.is_empty() => Ok(From::Folder(path.into())),
-        Some(("play", path)) if !path.is_empty() => Ok(From::Play(path.into())),
+        None if text == "freenect" => Ok(SourceKind::Freenect),
+        Some(("folder", path)) if !path.is_empty() => Ok(SourceKind::Folder(path.into())),
+        Some(("play", path)) if !path.is_empty() => Ok(SourceKind::Play(path.into())),
         _ => Err("give freenect, folder:DIR or play:REC".into()),
     }
 }
@@ -167,7 +167,7 @@ fn interface(title: Option<String>, stop: Arc<AtomicBool>) -> io::Result<Box<dyn
 
 /// What is played or watched must not grow by what is taken from it.
 fn refuse_own_source(arguments: &Arguments) -> anyhow::Result<()> {
-    let (From::Folder(from) | From::Play(from)) = &arguments.source else {
+    let (SourceKind::Folder(from) | SourceKind::Play(from)) = &arguments.source else {
         return Ok(());
     };
     if let (Ok(from), Ok(to)) = (from.canonicalize(), arguments.recording.canonicalize())
@@ -185,13 +185,13 @@ fn source(arguments: &Arguments, paced: bool) -> anyhow::Result<Box<dyn Source>>
     let assumed = arguments.input.assumed()?;
     let only_freenect =
         [(arguments.serial.is_some(), "--serial"), (arguments.no_infrared, "--no-infrared")];
-    if !matches!(arguments.source, From::Freenect)
+    if !matches!(arguments.source, SourceKind::Freenect)
         && let Some((_, name)) = only_freenect.iter().find(|(given, _)| *given)
     {
         bail!("{name} belongs to --source freenect");
     }
     Ok(match &arguments.source {
-        From::Freenect => {
+        SourceKind::Freenect => {
             let options = FreenectOptions {
                 library: arguments.library.clone(),
                 serial: arguments.serial.clone(),
@@ -201,11 +201,11 @@ fn source(arguments: &Arguments, paced: bool) -> anyhow::Result<Box<dyn Source>>
             };
             Box::new(Threaded::start(move || FreenectSource::open(&options))?)
         }
-        From::Folder(path) => {
+        SourceKind::Folder(path) => {
             let patience = Duration::from_secs(arguments.patience.max(1));
             Box::new(Growing::open(path, &assumed, patience)?)
         }
-        From::Play(path) => Box::new(Playback::open(path, &assumed, paced)?),
+        SourceKind::Play(path) => Box::new(Playback::open(path, &assumed, paced)?),
     })
 }
 

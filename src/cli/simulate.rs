@@ -5,14 +5,14 @@ use clap::{Args, ValueEnum};
 use kinoise::effects::Active;
 use kinoise::io::{Assumed, open, write_json};
 use kinoise::model::{Direction, Domain, PAPER_EQ1};
-use kinoise::simulate::room::Film;
+use kinoise::simulate::room::{Film, Room};
 use kinoise::simulate::speckle::Causes;
 use kinoise::simulate::{Physics, Shoot, ViewPlan, kinect_v1, plan_grid, plan_like};
 use kinoise::{Form, NoiseModel, Sensor, SigmaModel};
 use serde_json::{Value, json};
 
 use super::common::{Bar, Global, MAX_FRAMES, count, notes, say};
-use super::simulate_room::{FilmArguments, RoomArguments, film};
+use super::simulate_room::RoomArguments;
 use super::simulate_scene::{PosesArguments, SceneryArguments};
 
 #[derive(Debug, Args)]
@@ -75,9 +75,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         // A model brings its own sensor; without one it is what TUM readers assume.
         let tum = || Film::kinect(arguments.shrink.unwrap_or(1));
         let sensor = if arguments.model.is_some() { sensor } else { tum() };
-        let (output, frames) = (arguments.output.as_path(), arguments.frames);
-        let film_arguments = FilmArguments { output, frames, sensor, sigma, effects };
-        film(&arguments.room, film_arguments, global)?
+        let room = Room::office(global.seed());
+        let poses = arguments.room.path(&room, arguments.frames)?;
+        let film = Film { sensor, room, poses, sigma, effects, seed: global.seed() };
+        write_film(&film, &arguments.output)?
     } else {
         shoot(arguments, sensor, physics(arguments, sigma, effects)?, global)?
     };
@@ -85,6 +86,16 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         write_json(path, &recipe, "report this as a bug")?;
     }
     global.print_json(&made)
+}
+
+/// Film the office: what programs are told of it, and the recipe.
+fn write_film(film: &Film, output: &Path) -> anyhow::Result<(Value, Value)> {
+    let bar = Bar::new("frames");
+    film.write(output, &|done, all| bar.step(done, all))?;
+    drop(bar);
+    let frames = film.poses.len();
+    say(format!("wrote {frames} frames of a room to {}", output.display()));
+    Ok((json!({"frames": frames, "output": output}), film.recipe()))
 }
 
 /// Shoot the views of a plane: what programs are told of them, and the recipe.

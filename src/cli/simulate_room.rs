@@ -3,14 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use kinoise::effects::Active;
 use kinoise::simulate::room::{
-    CLEARANCE_M, Film, Pose, Resampled, Room, around_the_desks, place, read_trajectory, resample,
+    CLEARANCE_M, Pose, Resampled, Room, around_the_desks, place, read_trajectory, resample,
 };
-use kinoise::{Sensor, SigmaModel};
-use serde_json::{Value, json};
 
-use super::common::{Bar, Global, MAX_FRAMES, count, say};
+use super::common::{MAX_FRAMES, count, say};
 
 #[derive(Debug, Args)]
 pub struct RoomArguments {
@@ -25,36 +22,15 @@ pub struct RoomArguments {
     stride: usize,
 }
 
-/// What the film shares with the other recordings.
-pub struct FilmArguments<'a> {
-    pub output: &'a Path,
-    pub frames: Option<usize>,
-    pub sensor: Sensor,
-    pub sigma: SigmaModel,
-    pub effects: Vec<Active>,
-}
-
-/// Film the office: what programs are told of it, and the recipe.
-pub fn film(
-    arguments: &RoomArguments,
-    film: FilmArguments<'_>,
-    global: &Global,
-) -> anyhow::Result<(Value, Value)> {
-    let room = Room::office(global.seed());
-    let all = match &arguments.trajectory {
-        Some(file) => fitted(file, &room, film.frames, arguments.stride)?,
-        None => around_the_desks(),
-    };
-    let poses: Vec<Pose> =
-        all.into_iter().step_by(arguments.stride).take(film.frames.unwrap_or(usize::MAX)).collect();
-    let FilmArguments { output, sensor, sigma, effects, .. } = film;
-    let film = Film { sensor, room, poses, sigma, effects, seed: global.seed() };
-    let bar = Bar::new("frames");
-    film.write(output, &|done, all| bar.step(done, all))?;
-    drop(bar);
-    let frames = film.poses.len();
-    say(format!("wrote {frames} frames of a room to {}", output.display()));
-    Ok((json!({"frames": frames, "output": output}), film.recipe()))
+impl RoomArguments {
+    /// The poses to film from, at most so many.
+    pub fn path(&self, room: &Room, frames: Option<usize>) -> anyhow::Result<Vec<Pose>> {
+        let all = match &self.trajectory {
+            Some(file) => fitted(file, room, frames, self.stride)?,
+            None => around_the_desks(),
+        };
+        Ok(all.into_iter().step_by(self.stride).take(frames.unwrap_or(usize::MAX)).collect())
+    }
 }
 
 /// The path of a file, at 30 Hz and in the room.
