@@ -33,12 +33,6 @@ impl Global {
         Seed(self.seed)
     }
 
-    /// How many may work at a time.
-    pub fn workers(&self) -> usize {
-        let all = || std::thread::available_parallelism().map_or(1, usize::from);
-        self.threads.unwrap_or_else(all)
-    }
-
     pub fn set_threads(&self) -> anyhow::Result<()> {
         let Some(n) = self.threads else { return Ok(()) };
         rayon::ThreadPoolBuilder::new().num_threads(n).build_global().context("--threads")
