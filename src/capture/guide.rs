@@ -65,7 +65,7 @@ pub struct Guide {
 struct Taking {
     view: usize,
     kept: usize,
-    /// Did not exist before: nobody wants it when it fails.
+    /// It was added for this pose, and goes when it fails.
     new: bool,
 }
 
@@ -89,8 +89,10 @@ impl Guide {
         let mut events = Vec::new();
         self.sighting = sighting;
         if !self.is_still() {
-            let why = self.sighting.as_ref().err().map_or("the target moved", String::as_str);
-            let why = why.to_string();
+            let why = match &self.sighting {
+                Ok(_) => "the target moved".into(),
+                Err(why) => why.clone(),
+            };
             events.extend(self.abandon(&why));
         }
         if let Ok(seen) = &self.sighting {

@@ -101,9 +101,9 @@ const MAX_SILENCE: Duration = Duration::from_secs(2);
 const HINT: &str = "just switched on? leave the board standing for 20 s: the drift is measured";
 /// How long a taken view is shown.
 const FLASH: Duration = Duration::from_millis(700);
-/// Faster than this nobody reads, and terminals fall behind.
+/// Faster than this terminals fall behind, and people cannot read it.
 const REDRAW: Duration = Duration::from_millis(60);
-/// What the oldest terminals have, columns and rows.
+/// Where a terminal does not tell its size: what the oldest have, columns and rows.
 const USUAL: (u16, u16) = (80, 24);
 
 /// The terminal's other screen with big letters, and keys, until dropped.
@@ -132,7 +132,8 @@ impl Screen {
         if self.drawn_at.is_some_and(|t| t.elapsed() < REDRAW) && !self.bell {
             return;
         }
-        let (columns, rows) = terminal::size().unwrap_or(USUAL);
+        let size = terminal::size().ok().filter(|(columns, rows)| *columns > 0 && *rows > 0);
+        let (columns, rows) = size.unwrap_or(USUAL);
         let lines = render(guide, &self.status, columns.into(), rows.into());
         // A terminal that is gone is no reason to stop taking views.
         let _ = draw(&lines, self.bell);
