@@ -33,18 +33,6 @@ pub struct Arguments {
     input: Input,
 }
 
-impl Arguments {
-    /// Of a folder that describes itself.
-    pub fn plain(
-        recording: PathBuf,
-        model: Option<PathBuf>,
-        against: Option<PathBuf>,
-        output: PathBuf,
-    ) -> Self {
-        Arguments { recording, model, against, output, input: Input::default() }
-    }
-}
-
 /// Exit code when a mismatch was found.
 const FOUND: u8 = 1;
 
