@@ -76,10 +76,14 @@ impl Bench {
         self.run("calibrate", &self.recording(), options)
     }
 
+    /// `calibrate` does the same with a table.
     fn fit(&self, table: &str) -> Run {
         let path = self.folder.path().join("table.csv");
         fs::write(&path, table).expect("written");
-        self.run("fit", &path, &[])
+        let [fit, calibrate] = ["fit", "calibrate"].map(|c| self.run(c, &path, &[]));
+        assert_eq!((&fit.code, &fit.stdout), (&calibrate.code, &calibrate.stdout));
+        assert_eq!(fit.stderr, calibrate.stderr);
+        fit
     }
 
     fn run(&self, command: &str, input: &Path, options: &[&str]) -> Run {

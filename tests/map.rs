@@ -295,7 +295,7 @@ fn ground_truth_of_another_time_is_told() {
     fs::write(folder.join("groundtruth.txt"), "1.0 0 0 0 0 0 0 1\n2.0 0 0 0 0 0 0 1\n").unwrap();
     let (code, said, out) = map_folder(&folder, &[]);
     assert_eq!(code, 0, "{said}");
-    assert!(said.contains("not held against the ground truth"), "{said}");
+    assert!(said.contains("not compared with the ground truth"), "{said}");
     let truth = folder.join("groundtruth.txt");
     let estimate = out.join("trajectory.txt");
     let (code, said) = kinoise(&[

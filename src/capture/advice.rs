@@ -4,102 +4,67 @@ use super::guide::Guide;
 use super::wanted::{Pose, WantedView};
 
 /// Something to do.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Step {
-    /// Nothing flat is in the middle of the picture.
-    Aim { why: String },
-    /// Carry the board away from the sensor, or towards it when negative, m.
-    Carry { m: f64 },
-    /// Tilt it more, or less when negative, rad.
-    Tilt { rad: f64 },
-    /// Let its far side point elsewhere in the picture.
-    Turn { far_side: &'static str },
-    /// It is where it should be.
-    Hold,
-    /// It is being taken.
-    Stay { kept: usize, of: usize },
-    /// A new view is taken wherever it holds still.
-    Anywhere,
-    /// All is taken.
-    Done,
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Advice {
+    /// To be read from afar: capitals, digits, and `+-°`.
+    pub word: String,
+    pub sentence: String,
 }
 
-impl Step {
+fn advice(word: impl Into<String>, sentence: impl Into<String>) -> Advice {
+    Advice { word: word.into(), sentence: sentence.into() }
+}
+
+impl Advice {
     /// For the guide's present state.
     pub fn of(guide: &Guide) -> Self {
         if let Some((_, kept)) = guide.taking() {
-            return Step::Stay { kept, of: guide.shutter().frames };
+            let of = guide.shutter().frames;
+            let sentence = format!("taking it: {kept} of {of} frames");
+            return advice(format!("STAY {}", of - kept), sentence);
         }
-        let pose = match guide.sight() {
-            Ok(seen) => seen.pose(),
-            Err(why) => return Step::Aim { why: why.clone() },
+        let pose = match guide.sighting() {
+            Ok(sighting) => sighting.pose(),
+            Err(why) => {
+                let aim = format!("aim the sensor at the middle of the board: {why}");
+                return advice("AIM", aim);
+            }
         };
-        match guide.suggestion().and_then(|i| guide.wanted().views.get(i)) {
+        match guide.suggestion() {
             Some(view) => towards(view, &pose),
-            None if guide.wanted().any => Step::Anywhere,
-            None => Step::Done,
-        }
-    }
-
-    /// In big letters.
-    pub fn word(&self) -> String {
-        match self {
-            Step::Aim { .. } => "AIM".into(),
-            Step::Carry { m } if *m > 0.0 => format!("BACK {:.0}", 100.0 * m),
-            Step::Carry { m } => format!("NEAR {:.0}", -100.0 * m),
-            Step::Tilt { rad } => format!("TILT {:+.0}°", rad.to_degrees()),
-            Step::Turn { .. } => "TURN".into(),
-            Step::Hold | Step::Anywhere => "HOLD".into(),
-            Step::Stay { kept, of } => format!("STAY {}", of - kept),
-            Step::Done => "DONE".into(),
-        }
-    }
-
-    /// In small ones.
-    pub fn sentence(&self) -> String {
-        match self {
-            Step::Aim { why } => format!("aim the sensor at the middle of the board: {why}"),
-            Step::Carry { m } if *m > 0.0 => {
-                format!("carry the board {:.0} cm away from the sensor", 100.0 * m)
-            }
-            Step::Carry { m } => {
-                format!("carry the board {:.0} cm towards the sensor", -100.0 * m)
-            }
-            Step::Tilt { rad } => {
-                let how = if *rad > 0.0 { "more" } else { "less" };
-                format!("tilt the board {:.0} degrees {how}", rad.abs().to_degrees())
-            }
-            Step::Turn { far_side } => {
-                format!(
-                    "tilt it another way: its {far_side} side, as the sensor sees it, farther away"
-                )
-            }
-            Step::Hold => "hold it still".into(),
-            Step::Anywhere => "hold it still anywhere it has not been".into(),
-            Step::Stay { kept, of } => format!("taking it: {kept} of {of} frames"),
-            Step::Done => "all views are taken".into(),
+            None if guide.wanted().any => advice("HOLD", "hold it still anywhere it has not been"),
+            None => advice("DONE", "all views are taken"),
         }
     }
 }
 
 /// The first thing that is not yet right: distance, tilt, direction.
-fn towards(view: &WantedView, pose: &Pose) -> Step {
+fn towards(view: &WantedView, pose: &Pose) -> Advice {
     if view.fits(pose) {
-        return Step::Hold;
+        return advice("HOLD", "hold it still");
     }
-    let m = view.pose.z_m - pose.z_m;
-    if m.abs() > view.tolerance.z_m {
-        return Step::Carry { m };
+    let z_m = view.pose.z_m - pose.z_m;
+    if z_m.abs() > view.tolerance.z_m {
+        let (word, side) = if z_m > 0.0 { ("BACK", "away from") } else { ("NEAR", "towards") };
+        let cm = 100.0 * z_m.abs();
+        let sentence = format!("carry the board {cm:.0} cm {side} the sensor");
+        return advice(format!("{word} {cm:.0}"), sentence);
     }
-    let rad = view.pose.theta_rad - pose.theta_rad;
-    if rad.abs() > view.tolerance.theta_rad {
-        return Step::Tilt { rad };
+    let degrees = (view.pose.theta_rad - pose.theta_rad).to_degrees();
+    if degrees.abs() > view.tolerance.theta_rad.to_degrees() {
+        let how = if degrees > 0.0 { "more" } else { "less" };
+        let sentence = format!("tilt the board {:.0} degrees {how}", degrees.abs());
+        return advice(format!("TILT {degrees:+.0}°"), sentence);
     }
-    Step::Turn { far_side: side(view.pose.azimuth_rad) }
+    let side = far_side(view.pose.azimuth_rad);
+    advice(
+        "TURN",
+        format!("tilt it so that its {side} side, as the sensor sees it, is farther away"),
+    )
 }
 
-/// Where its far side is, as the picture shows it, by eighths of a turn.
-pub fn side(azimuth_rad: f64) -> &'static str {
+/// Which side of the target is farther away, as the picture shows it, by eighths of a turn.
+pub fn far_side(azimuth_rad: f64) -> &'static str {
     const SIDES: [&str; 8] = [
         "right",
         "lower right",

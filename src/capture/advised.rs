@@ -1,4 +1,4 @@
-//! The views that a diagnosis would like to see next.
+//! The views that a diagnosis asks for.
 
 use std::path::Path;
 
@@ -7,22 +7,22 @@ use serde::Deserialize;
 use super::wanted::{Pose, Tolerance, Wanted, WantedView};
 use crate::error::{Error, Result};
 
-/// What of `diagnosis.json` says so.
+/// What of `diagnosis.json` matters here.
 #[derive(Deserialize)]
 struct Diagnosis {
     findings: Vec<Finding>,
-    /// What it looked at.
+    /// The views it has seen.
     #[serde(default)]
-    views: Vec<Known>,
+    views: Vec<KnownView>,
 }
 
 #[derive(Deserialize)]
 struct Finding {
-    next_view: Option<Advised>,
+    next_view: Option<NextView>,
 }
 
 #[derive(Deserialize)]
-struct Advised {
+struct NextView {
     z_m: f64,
     theta_rad: f64,
     azimuth_rad: f64,
@@ -30,13 +30,13 @@ struct Advised {
 }
 
 #[derive(Deserialize)]
-struct Known {
+struct KnownView {
     name: String,
 }
 
 impl Wanted {
-    /// What a diagnosis would like to see next (`diagnosis.json`). A view that it has seen already
-    /// is not the one it asks for: another at the same pose is numbered.
+    /// The views that a diagnosis asks for (`diagnosis.json`). A view that it has seen already is
+    /// not the one it asks for: another at the same pose is numbered.
     ///
     /// # Errors
     /// When it is no diagnosis, advises nothing, or a pose that cannot be.
@@ -49,17 +49,16 @@ impl Wanted {
             remedy,
         };
         let remedy = "give the diagnosis.json that kinoise diagnose wrote";
-        let said: Diagnosis =
+        let diagnosis: Diagnosis =
             serde_json::from_str(&text).map_err(|e| refuse(e.line(), e.to_string(), remedy))?;
         let mut views: Vec<WantedView> = Vec::new();
-        for advised in said.findings.into_iter().filter_map(|f| f.next_view) {
-            if !advised.is_possible() {
-                let what =
-                    format!("no board stands at {} m, {} rad", advised.z_m, advised.theta_rad);
+        for next in diagnosis.findings.into_iter().filter_map(|f| f.next_view) {
+            if !next.is_possible() {
+                let what = format!("no board stands at {} m, {} rad", next.z_m, next.theta_rad);
                 return Err(refuse(0, what, remedy));
             }
-            let mut view = advised.view();
-            view.name = unseen(&view.name, &said.views);
+            let mut view = next.into_wanted();
+            view.name = unseen(&view.name, &diagnosis.views);
             if views.iter().all(|v| v.name != view.name) {
                 views.push(view);
             }
@@ -72,15 +71,15 @@ impl Wanted {
     }
 }
 
-impl Advised {
+impl NextView {
     fn is_possible(&self) -> bool {
         (0.1..=9.99).contains(&self.z_m)
             && (0.0..=88f64.to_radians()).contains(&self.theta_rad)
             && self.azimuth_rad.abs() < 100.0
     }
 
-    fn view(self) -> WantedView {
-        let Advised { z_m, theta_rad, azimuth_rad, why } = self;
+    fn into_wanted(self) -> WantedView {
+        let NextView { z_m, theta_rad, azimuth_rad, why } = self;
         let tolerance = Tolerance {
             z_m: 0.1 * z_m,
             theta_rad: 5f64.to_radians(),
@@ -90,8 +89,8 @@ impl Advised {
     }
 }
 
-/// `name`, or `name-2` and on, that is none of the views seen.
-fn unseen(name: &str, seen: &[Known]) -> String {
+/// `name`, or `name-2` and on, whichever is none of the views seen.
+fn unseen(name: &str, seen: &[KnownView]) -> String {
     let is_new = |candidate: &String| seen.iter().all(|v| v.name != *candidate);
     let numbered = (2..seen.len() + 3).map(|n| format!("{name}-{n}"));
     std::iter::once(name.to_string()).chain(numbered).find(is_new).unwrap_or_default()
@@ -112,11 +111,11 @@ mod tests {
 
     #[test]
     fn what_the_diagnosis_has_seen_does_not_count_as_taken() {
-        let said =
+        let diagnosis =
             |views: &str| format!(r#"{{"findings": [{FACING}, {FACING}], "views": {views}}}"#);
-        assert_eq!(names(&said("[]")).unwrap(), ["z150-t00"]);
-        assert_eq!(names(&said(r#"[{"name": "z150-t00"}]"#)).unwrap(), ["z150-t00-2"]);
-        let twice = said(r#"[{"name": "z150-t00"}, {"name": "z150-t00-2"}]"#);
+        assert_eq!(names(&diagnosis("[]")).unwrap(), ["z150-t00"]);
+        assert_eq!(names(&diagnosis(r#"[{"name": "z150-t00"}]"#)).unwrap(), ["z150-t00-2"]);
+        let twice = diagnosis(r#"[{"name": "z150-t00"}, {"name": "z150-t00-2"}]"#);
         assert_eq!(names(&twice).unwrap(), ["z150-t00-3"]);
     }
 

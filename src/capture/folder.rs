@@ -6,59 +6,38 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::source::{Arrival, LiveFrame, Source};
 use crate::error::{Error, Result};
-use crate::io::{Assumed, describe_folder, read_depth};
+use crate::io::{Assumed, describe_folder, entries, read_depth, size_of};
 use crate::view::Sensor;
 
 /// How often the folder is looked at.
-const LOOK_EVERY: Duration = Duration::from_millis(30);
-/// A file that cannot be read is still being written, for so long at most.
-const WRITING: Duration = Duration::from_secs(2);
+const POLL: Duration = Duration::from_millis(30);
+/// An unreadable file younger than this is still being written.
+const MAX_WRITING: Duration = Duration::from_secs(2);
 
 /// 16-bit PNGs, or a dump's d-*.pgm, in the folder itself or in its `depth` folder.
 pub struct Growing {
     root: PathBuf,
     sensor: Sensor,
     seen: BTreeSet<PathBuf>,
+    /// Not read yet, the oldest last.
     waiting: Vec<PathBuf>,
     remarks: Vec<String>,
 }
 
 impl Growing {
-    /// Wait for the first image for at most `patience`, as the size of the frames is in it.
-    /// Images that are there already are frames too.
+    /// Wait for the first image for at most `patience`, as it has the frames' size. Images that
+    /// are there already are frames too.
     ///
     /// # Errors
     /// When there is no such folder, no image comes, or the intrinsics are not known.
     pub fn open(root: &Path, assumed: &Assumed, patience: Duration) -> Result<Self> {
         if !root.is_dir() {
-            return Err(Error::recording(
-                root,
-                "there is no such folder",
-                "start the program that fills it first, or make it",
-            ));
+            let remedy = "start the program that fills it first, or make it";
+            return Err(Error::recording(root, "there is no such folder", remedy));
         }
-        let begun = Instant::now();
-        let first = loop {
-            if let Some(first) = images(root).into_iter().find(|p| size(p).is_some()) {
-                break first;
-            }
-            if begun.elapsed() > patience {
-                return Err(Error::recording(
-                    root,
-                    format!("no depth image in {} s", patience.as_secs()),
-                    "start the program that writes 16-bit PNGs (or fakenect-record) into it",
-                ));
-            }
-            std::thread::sleep(LOOK_EVERY);
-        };
-        let (sensor, remarks) = describe_folder(root, size(&first).unwrap_or_default(), assumed)?;
-        Ok(Growing {
-            root: root.into(),
-            sensor,
-            seen: BTreeSet::new(),
-            waiting: Vec::new(),
-            remarks,
-        })
+        let (sensor, remarks) = describe_folder(root, first_size(root, patience)?, assumed)?;
+        let (seen, waiting) = (BTreeSet::new(), Vec::new());
+        Ok(Growing { root: root.into(), sensor, seen, waiting, remarks })
     }
 
     /// The next image, when it can be read; younger ones wait for it.
@@ -68,17 +47,17 @@ impl Growing {
             self.waiting.retain(|p| !self.seen.contains(p));
             self.waiting.reverse();
         }
-        let path = self.waiting.last()?.clone();
-        let camera = &self.sensor.camera;
-        let read = read_depth(&path, camera.width, camera.height);
-        let modified = modified(&path);
-        if read.is_err() && modified.elapsed().is_ok_and(|age| age < WRITING) {
+        let path = self.waiting.last()?;
+        let (width, height) = (self.sensor.camera.width, self.sensor.camera.height);
+        let read = read_depth(path, width, height);
+        let modified = modified(path);
+        if read.is_err() && modified.elapsed().is_ok_and(|age| age < MAX_WRITING) {
             return None;
         }
-        self.waiting.pop();
-        self.seen.insert(path);
+        self.seen.extend(self.waiting.pop());
+        let stamp = modified.duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_secs_f64());
         match read {
-            Ok(depth) => Some(LiveFrame { stamp: seconds(modified), depth, infrared: None }),
+            Ok(depth) => Some(LiveFrame { stamp, depth, infrared: None }),
             Err(e) => {
                 self.remarks.push(format!("frame left out: {e}"));
                 None
@@ -101,7 +80,7 @@ impl Source for Growing {
             if begun.elapsed() >= wait {
                 return Ok(Arrival::Nothing);
             }
-            std::thread::sleep(LOOK_EVERY);
+            std::thread::sleep(POLL);
         }
     }
 
@@ -110,30 +89,33 @@ impl Source for Growing {
     }
 }
 
-fn size(path: &Path) -> Option<(usize, usize)> {
-    crate::io::size_of(path).ok()
+/// Size of the first image that can be read, px.
+fn first_size(root: &Path, patience: Duration) -> Result<(usize, usize)> {
+    let begun = Instant::now();
+    loop {
+        if let Some(size) = images(root).iter().find_map(|p| size_of(p).ok()) {
+            return Ok(size);
+        }
+        if begun.elapsed() > patience {
+            return Err(Error::recording(
+                root,
+                format!("no depth image in {} s", patience.as_secs()),
+                "start the program that writes 16-bit PNGs (or fakenect-record) into it",
+            ));
+        }
+        std::thread::sleep(POLL);
+    }
 }
 
 fn modified(path: &Path) -> SystemTime {
     std::fs::metadata(path).and_then(|m| m.modified()).unwrap_or(UNIX_EPOCH)
 }
 
-fn seconds(time: SystemTime) -> f64 {
-    time.duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_secs_f64())
-}
-
 /// Depth images in name order.
 fn images(root: &Path) -> Vec<PathBuf> {
     let inner = root.join("depth");
-    let folder = if inner.is_dir() { inner } else { root.to_path_buf() };
-    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
-        .into_iter()
-        .flatten()
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|path| is_depth(path))
-        .collect();
-    files.sort();
-    files
+    let folder = if inner.is_dir() { &inner } else { root };
+    entries(folder).unwrap_or_default().into_iter().filter(|path| is_depth(path)).collect()
 }
 
 fn is_depth(path: &Path) -> bool {

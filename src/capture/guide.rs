@@ -1,12 +1,12 @@
-//! Decides what becomes of every frame: sights in, events out; it knows neither disk nor screen.
+//! Decides what becomes of every frame: sightings in, events out; it knows neither disk nor screen.
 
-use super::wanted::{Pose, ViewState, Wanted};
-use super::warmth::{Drift, Warmth};
-use super::watch::Seen;
+use super::drift::{Drift, DriftMonitor};
+use super::wanted::{Pose, ViewState, Wanted, WantedView};
+use super::watch::Sighting;
 
 /// A target may wander by this much, root mean square of inverse depth, and still be still, 1/m:
-/// two thirds of a step of a Kinect's words, 2 mm at 1 m and 8 mm at 2 m.
-const STILL_PER_M: f64 = 0.002;
+/// two thirds of a step of a Kinect's raw values, 2 mm at 1 m and 8 mm at 2 m.
+const MAX_STILL_PER_M: f64 = 0.002;
 
 /// How views are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,7 +17,7 @@ pub struct Shutter {
     pub hold: usize,
 }
 
-/// What shall be done about a frame, and what there is to tell.
+/// What is to be done about a frame, and what there is to report.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
     /// A view begins with this frame.
@@ -51,20 +51,21 @@ pub enum Command {
 pub struct Guide {
     wanted: Wanted,
     shutter: Shutter,
-    sight: Result<Seen, String>,
+    sighting: Result<Sighting, String>,
     /// Where the target began to be still, and for how many frames it has been.
-    still: Option<(Seen, usize)>,
+    still: Option<(Sighting, usize)>,
     taking: Option<Taking>,
+    /// Indices of the view to go to and of the one finished last.
     suggestion: Option<usize>,
     last: Option<usize>,
-    warmth: Warmth,
+    drift: DriftMonitor,
 }
 
 #[derive(Clone, Copy)]
 struct Taking {
     view: usize,
     kept: usize,
-    /// Did not exist before: nobody wants it when it fails.
+    /// It was added for this pose, and goes when it fails.
     new: bool,
 }
 
@@ -74,29 +75,28 @@ impl Guide {
         Guide {
             wanted,
             shutter,
-            sight: Err("no frame yet".into()),
+            sighting: Err("no frame yet".into()),
             still: None,
             taking: None,
             suggestion,
             last: None,
-            warmth: Warmth::default(),
+            drift: DriftMonitor::default(),
         }
     }
 
     /// One frame, as the watcher saw it.
-    pub fn see(&mut self, stamp: f64, sight: Result<Seen, String>) -> Vec<Event> {
+    pub fn see(&mut self, stamp: f64, sighting: Result<Sighting, String>) -> Vec<Event> {
         let mut events = Vec::new();
-        self.sight = sight;
-        let stays = self.settle();
-        if !stays {
-            let why = match &self.sight {
+        self.sighting = sighting;
+        if !self.is_still() {
+            let why = match &self.sighting {
                 Ok(_) => "the target moved".into(),
                 Err(why) => why.clone(),
             };
-            events.extend(self.abandon(why));
+            events.extend(self.abandon(&why));
         }
-        if let Ok(seen) = &self.sight {
-            events.extend(self.warmth.add(stamp, seen.plane.q.z).map(Event::Drift));
+        if let Ok(seen) = &self.sighting {
+            events.extend(self.drift.add(stamp, seen.plane.q.z).map(Event::Drift));
         }
         self.shoot(&mut events);
         self.suggest();
@@ -107,20 +107,20 @@ impl Guide {
     }
 
     /// Is the target where it was? If not, stillness begins anew.
-    fn settle(&mut self) -> bool {
-        let Ok(seen) = &self.sight else {
+    fn is_still(&mut self) -> bool {
+        let Ok(seen) = &self.sighting else {
             self.still = None;
-            self.warmth = Warmth::default();
+            self.drift = DriftMonitor::default();
             return false;
         };
         match &mut self.still {
-            Some((anchor, frames)) if seen.moved_since(anchor) < STILL_PER_M => {
+            Some((anchor, frames)) if seen.moved_since(anchor) < MAX_STILL_PER_M => {
                 *frames += 1;
                 true
             }
             _ => {
                 self.still = Some((seen.clone(), 1));
-                self.warmth = Warmth::default();
+                self.drift = DriftMonitor::default();
                 false
             }
         }
@@ -159,17 +159,17 @@ impl Guide {
     }
 
     /// Give up the view that is being taken, if one is.
-    fn abandon(&mut self, why: String) -> Option<Event> {
+    fn abandon(&mut self, why: &str) -> Option<Event> {
         let taking = self.taking.take()?;
         let view = self.name(taking.view);
         if taking.new {
             self.wanted.views.pop();
         }
-        Some(Event::Abandoned { view, why })
+        Some(Event::Abandoned { view, why: why.into() })
     }
 
-    /// Keep a suggestion until it is taken, or another is much nearer: words that flicker help
-    /// nobody.
+    /// Keep a suggestion until it is taken or another is much nearer, so that the advice does not
+    /// flicker.
     fn suggest(&mut self) {
         let pose = self.pose();
         let best = self.wanted.suggestion(pose.as_ref());
@@ -177,10 +177,10 @@ impl Guide {
             self.suggestion = best;
             return;
         };
-        let view = |i: usize| self.wanted.views.get(i).filter(|v| v.state == ViewState::Open);
-        let keep = match (view(now), view(new), pose) {
+        let open = |i: usize| self.wanted.views.get(i).filter(|v| v.is_open());
+        let keep = match (open(now), open(new), pose) {
             (Some(_), _, None) => true,
-            (Some(old), Some(new), Some(pose)) => old.away(&pose) < 2.0 * new.away(&pose),
+            (Some(old), Some(new), Some(pose)) => old.distance(&pose) < 2.0 * new.distance(&pose),
             _ => false,
         };
         if !keep {
@@ -188,7 +188,7 @@ impl Guide {
         }
     }
 
-    /// Do what a person asks; what must be undone is told.
+    /// Do what a person asks; the events say what must be undone.
     pub fn obey(&mut self, command: Command) -> Vec<Event> {
         match command {
             Command::Again => self.again(),
@@ -199,12 +199,12 @@ impl Guide {
 
     /// The capture ends here: half a view is none.
     pub fn leave(&mut self, why: &str) -> Option<Event> {
-        self.abandon(why.into())
+        self.abandon(why)
     }
 
     fn again(&mut self) -> Vec<Event> {
         let Some(last) = self.last.take() else { return Vec::new() };
-        let mut events = Vec::from_iter(self.abandon("the one before comes first".into()));
+        let mut events = Vec::from_iter(self.abandon("the one before comes first"));
         self.wanted.views[last].state = ViewState::Open;
         self.suggestion = Some(last);
         // The target must settle anew before it is taken again.
@@ -232,13 +232,13 @@ impl Guide {
     }
 
     /// The last frame's target, or why there is none.
-    pub fn sight(&self) -> &Result<Seen, String> {
-        &self.sight
+    pub fn sighting(&self) -> &Result<Sighting, String> {
+        &self.sighting
     }
 
     /// Where the target is.
     pub fn pose(&self) -> Option<Pose> {
-        self.sight.as_ref().ok().map(Seen::pose)
+        self.sighting.as_ref().ok().map(Sighting::pose)
     }
 
     /// Frames for which it has been still.
@@ -248,7 +248,7 @@ impl Guide {
 
     /// How far it has moved since it began to be still, m at its distance.
     pub fn moved_m(&self) -> Option<f64> {
-        let (Ok(seen), Some((anchor, _))) = (&self.sight, &self.still) else { return None };
+        let (Ok(seen), Some((anchor, _))) = (&self.sighting, &self.still) else { return None };
         Some(seen.moved_since(anchor) * seen.pose().z_m.powi(2))
     }
 
@@ -258,8 +258,8 @@ impl Guide {
     }
 
     /// Which of the wanted views to go to.
-    pub fn suggestion(&self) -> Option<usize> {
-        self.suggestion
+    pub fn suggestion(&self) -> Option<&WantedView> {
+        self.wanted.views.get(self.suggestion?)
     }
 
     pub fn shutter(&self) -> Shutter {
@@ -268,6 +268,9 @@ impl Guide {
 
     /// Of the present stillness.
     pub fn drift(&self) -> Option<Drift> {
-        self.warmth.drift()
+        self.drift.drift()
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,41 +1,36 @@
 //! Views taken from a running sensor, guided to those that are still wanted.
 //!
 //! ```text
-//! Source -> LiveFrame -> Watcher -> Seen -> Guide -> Event -> Session (disk), Audience (people)
+//! Source -> LiveFrame -> Watcher -> Sighting -> Guide -> Event -> Session (disk), Interface (people)
 //! ```
 //! A [`Source`] is a Kinect through libfreenect, a folder that another program fills, or a
-//! recording that is played. The [`Guide`] is a pure state machine; a view on the disk is whole
-//! or not there, so a capture goes on where it was interrupted.
+//! recording that is played back. The [`Guide`] is a pure state machine; a view on the disk is
+//! whole or not there, so a capture resumes where it was interrupted.
 
 mod advice;
 mod advised;
+mod drift;
 mod folder;
-mod font;
 mod freenect;
 mod guide;
-#[cfg(test)]
-mod guide_tests;
-mod lock;
 mod play;
-mod queue;
 mod run;
 mod screen;
 mod session;
 mod source;
+mod threaded;
 mod wanted;
-mod warmth;
 mod watch;
 
-pub use advice::Step;
+pub use drift::Drift;
 pub use folder::Growing;
 pub use freenect::{FreenectOptions, FreenectSource};
 pub use guide::{Command, Event, Guide, Shutter};
 pub use play::Playback;
-pub use queue::Queued;
-pub use run::{Audience, Ending, Outcome, capture};
-pub use screen::{Line, Style, Surroundings, render};
+pub use run::{Ending, Interface, Outcome, capture};
+pub use screen::{Line, Status, Style, render};
 pub use session::Session;
 pub use source::{Arrival, End, LiveFrame, Source};
-pub use wanted::{Pose, Tolerance, ViewState, Wanted, WantedView};
-pub use warmth::{Drift, Warmth};
-pub use watch::{Seen, Watcher};
+pub use threaded::Threaded;
+pub use wanted::{PAPER_DISTANCES_M, PAPER_TILTS_DEG, Pose, ViewState, Wanted, WantedView};
+pub use watch::{Sighting, Watcher};

@@ -1,4 +1,4 @@
-//! A recording played as if its sensor stood here.
+//! A recording played back as if its sensor stood here.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -10,7 +10,7 @@ use crate::io::{Assumed, FrameSource, InfraredImage, open_uncut};
 use crate::view::{FrameRef, Sensor};
 
 /// Longer pauses between frames (a board being moved) are cut to this, s.
-const LONGEST_PAUSE_S: f64 = 0.5;
+const MAX_PAUSE_S: f64 = 0.5;
 
 /// Frames of a recording in time order.
 pub struct Playback {
@@ -41,7 +41,8 @@ impl Playback {
             }
         }
         frames.sort_by(|a, b| a.0.timestamp.total_cmp(&b.0.timestamp));
-        let left_out = recording.excluded.iter().map(ToString::to_string).collect::<Vec<_>>();
+        let mut remarks = recording.remarks;
+        remarks.extend(recording.excluded.iter().map(ToString::to_string));
         let camera = &recording.sensor.camera;
         Ok(Playback {
             images: FrameSource::new(camera.width, camera.height),
@@ -50,7 +51,7 @@ impl Playback {
             paced,
             previous: None,
             root: root.into(),
-            remarks: recording.remarks.into_iter().chain(left_out).collect(),
+            remarks,
         })
     }
 
@@ -71,7 +72,7 @@ impl Playback {
 
     fn keep_pace(&mut self, stamp: f64) {
         if let (true, Some((before, then))) = (self.paced, self.previous) {
-            let due = Duration::from_secs_f64((stamp - before).clamp(0.0, LONGEST_PAUSE_S));
+            let due = Duration::from_secs_f64((stamp - before).clamp(0.0, MAX_PAUSE_S));
             std::thread::sleep(due.saturating_sub(then.elapsed()));
         }
         self.previous = Some((stamp, Instant::now()));

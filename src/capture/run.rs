@@ -4,13 +4,13 @@ use std::time::{Duration, Instant};
 
 use super::guide::{Command, Event, Guide};
 use super::session::Session;
-use super::source::{Arrival, LiveFrame, Source};
+use super::source::{Arrival, End, LiveFrame, Source};
 use super::watch::Watcher;
 use crate::error::{Error, Result};
 use crate::view::ViewNotes;
 
-/// Who looks on: a screen, or a log.
-pub trait Audience {
+/// Where people follow a capture and steer it: a screen with keys, or a log.
+pub trait Interface {
     /// Something happened.
     fn event(&mut self, event: &Event);
 
@@ -36,8 +36,8 @@ pub enum Ending {
     Quit,
     /// By a signal.
     Interrupted,
-    /// The source ended before all was taken; `lost` when it was needed still.
-    Ended { why: String, lost: bool },
+    /// The source ended before all was taken.
+    Ended(End),
     /// No frame for so long.
     Stalled(Duration),
     /// The disk or the source failed.
@@ -63,48 +63,101 @@ pub fn capture(
     source: &mut dyn Source,
     session: &mut Session,
     guide: &mut Guide,
-    audience: &mut dyn Audience,
+    interface: &mut dyn Interface,
     patience: Duration,
 ) -> Outcome {
-    let mut watcher = Watcher::new(source.sensor());
-    let mut done = Outcome { ending: Ending::Complete, finished: Vec::new(), frames: 0 };
-    let mut last_frame = Instant::now();
+    let watcher = Watcher::new(source.sensor());
+    let last_frame = Instant::now();
+    let (finished, frames) = (Vec::new(), 0);
+    let mut run = Run { session, guide, interface, watcher, last_frame, finished, frames };
     let ending = loop {
-        match asked(guide, session, audience, &mut done.finished) {
+        match run.step(source, patience) {
             Ok(None) => {}
             Ok(Some(ending)) => break ending,
             Err(e) => break Ending::Failed(e),
         }
-        let frame = match newest(source, guide.taking().is_some()) {
-            Ok(Arrival::Frame(frame)) => frame,
-            Ok(Arrival::Nothing) if last_frame.elapsed() > patience => {
-                break Ending::Stalled(patience);
-            }
-            Ok(Arrival::Nothing) => {
-                audience.waiting(guide, last_frame.elapsed());
-                continue;
-            }
-            // A signal may have woken the library.
-            Ok(Arrival::End(_)) | Err(_) if audience.interrupted() => break Ending::Interrupted,
-            Ok(Arrival::End(end)) => break Ending::Ended { why: end.why, lost: end.lost },
-            Err(e) => break Ending::Failed(e),
-        };
-        last_frame = Instant::now();
-        done.frames += 1;
-        let sight = watcher.look(&frame.depth);
-        match follow(guide.see(frame.stamp, sight), &frame, session, audience, &mut done.finished) {
-            Ok(false) => audience.frame(guide),
-            Ok(true) => {
-                audience.frame(guide);
-                break Ending::Complete;
-            }
-            Err(e) => break Ending::Failed(e),
-        }
     };
+    let Run { session, guide, finished, frames, .. } = run;
     session.abandon();
     guide.leave("stopped");
-    done.ending = ending;
-    done
+    Outcome { ending, finished, frames }
+}
+
+struct Run<'a> {
+    session: &'a mut Session,
+    guide: &'a mut Guide,
+    interface: &'a mut dyn Interface,
+    watcher: Watcher,
+    last_frame: Instant,
+    finished: Vec<String>,
+    frames: usize,
+}
+
+impl Run<'_> {
+    /// Answer a key, then look at a frame; does either end the capture?
+    fn step(&mut self, source: &mut dyn Source, patience: Duration) -> Result<Option<Ending>> {
+        if self.interface.interrupted() {
+            return Ok(Some(Ending::Interrupted));
+        }
+        if let Some(command) = self.interface.command() {
+            let events = self.guide.obey(command);
+            self.act(&events, None)?;
+            if command == Command::Quit {
+                return Ok(Some(Ending::Quit));
+            }
+            if self.guide.wanted().is_done() {
+                return Ok(Some(Ending::Complete));
+            }
+        }
+        let arrival = newest(source, self.guide.taking().is_some());
+        let silence = self.last_frame.elapsed();
+        match arrival {
+            Ok(Arrival::Frame(frame)) => self.look(&frame),
+            Ok(Arrival::Nothing) if silence > patience => Ok(Some(Ending::Stalled(patience))),
+            Ok(Arrival::Nothing) => {
+                self.interface.waiting(self.guide, silence);
+                Ok(None)
+            }
+            // A signal may have woken the library.
+            Ok(Arrival::End(_)) | Err(_) if self.interface.interrupted() => {
+                Ok(Some(Ending::Interrupted))
+            }
+            Ok(Arrival::End(end)) => Ok(Some(Ending::Ended(end))),
+            Err(e) => Err(e),
+        }
+    }
+
+    fn look(&mut self, frame: &LiveFrame) -> Result<Option<Ending>> {
+        self.last_frame = Instant::now();
+        self.frames += 1;
+        let sighting = self.watcher.look(&frame.depth);
+        let events = self.guide.see(frame.stamp, sighting);
+        self.act(&events, Some(frame))?;
+        self.interface.frame(self.guide);
+        Ok(events.contains(&Event::Done).then_some(Ending::Complete))
+    }
+
+    /// Do what the events say.
+    fn act(&mut self, events: &[Event], frame: Option<&LiveFrame>) -> Result<()> {
+        for event in events {
+            match event {
+                Event::Begun(view) => self.session.begin(view)?,
+                Event::Keep => frame.map_or(Ok(()), |frame| self.session.keep(frame))?,
+                Event::Finished(view) => {
+                    self.session.finish(&ViewNotes::default())?;
+                    self.finished.push(view.clone());
+                }
+                Event::Abandoned { .. } => self.session.abandon(),
+                Event::Rejected(view) => {
+                    self.session.reject(view)?;
+                    self.finished.retain(|v| v != view);
+                }
+                Event::Drift(_) | Event::Done => {}
+            }
+            self.interface.event(event);
+        }
+        Ok(())
+    }
 }
 
 /// The next frame; of a live sensor, the newest, unless every one is wanted.
@@ -117,60 +170,4 @@ fn newest(source: &mut dyn Source, every: bool) -> Result<Arrival> {
         }
     }
     Ok(arrival)
-}
-
-/// Do what was asked for; does that end it?
-fn asked(
-    guide: &mut Guide,
-    session: &mut Session,
-    audience: &mut dyn Audience,
-    finished: &mut Vec<String>,
-) -> Result<Option<Ending>> {
-    if audience.interrupted() {
-        return Ok(Some(Ending::Interrupted));
-    }
-    let Some(command) = audience.command() else { return Ok(None) };
-    for event in guide.obey(command) {
-        match &event {
-            Event::Abandoned { .. } => session.abandon(),
-            Event::Rejected(view) => {
-                session.reject(view)?;
-                finished.retain(|v| v != view);
-            }
-            _ => {}
-        }
-        audience.event(&event);
-    }
-    Ok(match command {
-        Command::Quit => Some(Ending::Quit),
-        _ if guide.wanted().is_done() => Some(Ending::Complete),
-        _ => None,
-    })
-}
-
-/// Do what the events say; true when all is done.
-fn follow(
-    events: Vec<Event>,
-    frame: &LiveFrame,
-    session: &mut Session,
-    audience: &mut dyn Audience,
-    finished: &mut Vec<String>,
-) -> Result<bool> {
-    let mut done = false;
-    for event in &events {
-        match event {
-            Event::Begun(view) => session.begin(view)?,
-            Event::Keep => session.keep(frame)?,
-            Event::Finished(view) => {
-                session.finish(&ViewNotes::default())?;
-                finished.push(view.clone());
-            }
-            Event::Abandoned { .. } => session.abandon(),
-            // Of keys, not of frames.
-            Event::Rejected(_) | Event::Drift(_) => {}
-            Event::Done => done = true,
-        }
-        audience.event(event);
-    }
-    Ok(done)
 }

@@ -1,7 +1,8 @@
 //! The screen as text: big letters for the person with the board, a map of what is wanted.
 
-use super::advice::{Step, side};
-use super::font::big;
+use font8x8::{BASIC_FONTS, LATIN_FONTS, UnicodeFonts};
+
+use super::advice::{Advice, far_side};
 use super::guide::Guide;
 use super::wanted::{ViewState, Wanted, WantedView};
 
@@ -24,12 +25,12 @@ pub struct Line {
 
 /// What the screen shows beside the guide's state.
 #[derive(Debug, Clone, Default)]
-pub struct Surroundings {
+pub struct Status {
     /// The recording and its sensor.
     pub title: String,
     /// The view that was just taken.
     pub flash: Option<String>,
-    /// The last thing told.
+    /// The latest message.
     pub news: String,
     /// Seconds without a frame, when it has been long.
     pub silent_s: Option<u64>,
@@ -39,40 +40,61 @@ pub struct Surroundings {
 const BAR: usize = 20;
 /// Columns of one cell of the map.
 const CELL: usize = 5;
+const KEYS: &str = "r throw the last one away, take it again   s skip this one   q stop";
 
 /// Lines for a terminal of this many columns and rows.
-pub fn render(guide: &Guide, around: &Surroundings, columns: usize, rows: usize) -> Vec<Line> {
-    let step = Step::of(guide);
-    let (word, sentence) = match (&around.flash, around.silent_s) {
-        (Some(view), _) => ("TAKEN".into(), format!("{view} is on the disk")),
-        (None, Some(s)) => (
-            "NO FRAMES".into(),
-            format!("none for {s} s: look at the cable, the power, the other program"),
-        ),
-        (None, None) => (step.word(), step.sentence()),
+pub fn render(guide: &Guide, status: &Status, columns: usize, rows: usize) -> Vec<Line> {
+    let Advice { word, sentence } = match (&status.flash, status.silent_s) {
+        (Some(view), _) => {
+            Advice { word: "TAKEN".into(), sentence: format!("{view} is on the disk") }
+        }
+        (None, Some(s)) => Advice {
+            word: "NO FRAMES".into(),
+            sentence: format!("none for {s} s: look at the cable, the power, the other program"),
+        },
+        (None, None) => Advice::of(guide),
     };
-    let mut lines = vec![plain(title(guide, &around.title))];
-    let loud = |text: &String| Line { text: text.clone(), style: Style::Loud };
-    lines.extend(big(&word, columns).iter().map(loud));
+    let plain = |text: String| Line { text, style: Style::Plain };
+    let mut lines = vec![plain(title(guide, &status.title))];
+    lines.extend(big(&word, columns).into_iter().map(|text| Line { text, style: Style::Loud }));
     lines.push(plain(sentence));
-    lines.extend(big(&pose(guide), columns).iter().cloned().map(plain));
+    lines.extend(big(&pose(guide), columns).into_iter().map(plain));
     lines.push(plain(stillness(guide)));
     lines.extend(map(guide).into_iter().map(plain));
-    lines.push(plain(around.news.clone()));
-    let keys = plain("r throw the last one away, take it again   s skip this one   q stop".into());
+    lines.push(plain(status.news.clone()));
     lines.truncate(rows.saturating_sub(1));
-    lines.push(keys);
+    lines.push(plain(KEYS.into()));
     for line in &mut lines {
         line.text = line.text.chars().take(columns).collect();
-        if around.flash.is_some() {
+        if status.flash.is_some() {
             line.style = Style::Flash;
         }
     }
     lines
 }
 
-fn plain(text: String) -> Line {
-    Line { text, style: Style::Plain }
+/// Dots of a letter, across and down.
+const DOTS: usize = 8;
+
+/// The text in big letters, two dots above each other in a character; as it is where it does not
+/// fit into `columns`. Letters that are not in the font are left out.
+fn big(text: &str, columns: usize) -> Vec<String> {
+    let letter = |c| BASIC_FONTS.get(c).or_else(|| LATIN_FONTS.get(c));
+    let letters: Vec<[u8; DOTS]> = text.chars().filter_map(letter).collect();
+    if DOTS * letters.len() > columns {
+        return vec![text.into()];
+    }
+    let block = |upper: u8, lower: u8, dot: usize| match (upper >> dot & 1, lower >> dot & 1) {
+        (0, 0) => ' ',
+        (1, 0) => '▀',
+        (0, _) => '▄',
+        _ => '█',
+    };
+    let row = |rows: usize| -> String {
+        let of = |l: &[u8; DOTS]| (0..DOTS).map(|dot| block(l[rows], l[rows + 1], dot)).collect();
+        letters.iter().map(of).collect::<Vec<String>>().concat()
+    };
+    (0..DOTS).step_by(2).map(row).collect()
 }
 
 fn title(guide: &Guide, title: &str) -> String {
@@ -83,10 +105,9 @@ fn title(guide: &Guide, title: &str) -> String {
 }
 
 fn pose(guide: &Guide) -> String {
-    match guide.pose() {
-        Some(pose) => format!("{:.2}M {:.0}°", pose.z_m, pose.theta_rad.to_degrees()),
-        None => "-".into(),
-    }
+    guide
+        .pose()
+        .map_or("-".into(), |pose| format!("{:.2}M {:.0}°", pose.z_m, pose.theta_rad.to_degrees()))
 }
 
 /// How still, and how warm.
@@ -94,19 +115,19 @@ fn stillness(guide: &Guide) -> String {
     let Some(moved) = guide.moved_m() else { return "no board".into() };
     let hold = guide.shutter().hold.max(1);
     let full = BAR * guide.held().min(hold) / hold;
-    let bar: String = (0..BAR).map(|i| if i < full { '█' } else { '░' }).collect();
+    let bar = "█".repeat(full) + &"░".repeat(BAR - full);
     let drift = guide.drift().map_or(String::new(), |d| {
-        let word = if d.is_warming() { "warming up" } else { "steady" };
-        format!("   drift {:+.2} mm/min, {word}", 1e3 * d.per_minute_m)
+        let state = if d.is_warming() { "warming up" } else { "steady" };
+        format!("   drift {:+.2} mm/min, {state}", 1e3 * d.per_minute_m)
     });
     format!("still {bar} {:.1} mm{drift}", 1e3 * moved)
 }
 
 fn map(guide: &Guide) -> Vec<String> {
     let wanted = guide.wanted();
-    let next = guide.suggestion().and_then(|i| wanted.views.get(i));
     let grid = !wanted.any && wanted.views.iter().all(|v| v.tolerance.azimuth_rad.is_none());
-    if grid { table(wanted, next) } else { list(wanted, next) }
+    let draw = if grid { table } else { list };
+    draw(wanted, guide.suggestion())
 }
 
 fn mark(view: &WantedView, next: Option<&WantedView>) -> char {
@@ -129,29 +150,26 @@ fn table(wanted: &Wanted, next: Option<&WantedView>) -> Vec<String> {
     let tilts = distinct(|v| v.pose.theta_rad);
     let head: String =
         tilts.iter().map(|t| format!("{:>CELL$}", format!("{:.0}°", t.to_degrees()))).collect();
-    let mut lines = vec![format!("{:8}{head}", "")];
-    for z in distinct(|v| v.pose.z_m) {
+    let line = |z: f64| {
         let cell = |t: &f64| {
             let view = wanted.views.iter().find(|v| v.pose.z_m == z && v.pose.theta_rad == *t);
             format!("{:>CELL$}", view.map_or(' ', |v| mark(v, next)))
         };
         let cells: String = tilts.iter().map(cell).collect();
-        lines.push(format!("{:>8}{cells}", format!("{z:.2} m")));
-    }
-    lines
+        format!("{:>8}{cells}", format!("{z:.2} m"))
+    };
+    let lines = distinct(|v| v.pose.z_m).into_iter().map(line);
+    std::iter::once(format!("{:8}{head}", "")).chain(lines).collect()
 }
 
-/// Lines of a list: as many as a grid of the paper has.
-const LISTED: usize = 8;
+/// Lines of a list: as many as the paper's grid has.
+const MAX_LISTED: usize = 8;
 
 /// Open ones first, as they stand; then the last that were taken.
 fn list(wanted: &Wanted, next: Option<&WantedView>) -> Vec<String> {
     let line = |v: &WantedView| {
-        let far = if v.is_directed() {
-            format!("far {}", side(v.pose.azimuth_rad))
-        } else {
-            String::new()
-        };
+        let side = if v.is_directed() { far_side(v.pose.azimuth_rad) } else { "" };
+        let far = if side.is_empty() { String::new() } else { format!("far {side}") };
         format!(
             "{:>4} {:.2} m  {:>3.0}°  {far:15}  {}",
             mark(v, next),
@@ -160,8 +178,20 @@ fn list(wanted: &Wanted, next: Option<&WantedView>) -> Vec<String> {
             v.why.as_deref().unwrap_or_default()
         )
     };
-    let is_open = |v: &&WantedView| v.state == ViewState::Open;
-    let open = wanted.views.iter().filter(is_open);
-    let rest = wanted.views.iter().rev().filter(|v| !is_open(v));
-    open.chain(rest).take(LISTED).map(line).collect()
+    let open = wanted.views.iter().filter(|v| v.is_open());
+    let rest = wanted.views.iter().rev().filter(|v| !v.is_open());
+    open.chain(rest).take(MAX_LISTED).map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_that_are_too_wide_for_big_letters_stay_as_they_are() {
+        assert_eq!(big("BACK 20", 40), ["BACK 20"]);
+        let rows = big("BACK 20°", 80);
+        assert_eq!(rows.len(), DOTS / 2);
+        assert!(rows.iter().all(|row| row.chars().count() == 8 * DOTS), "{rows:#?}");
+    }
 }

@@ -1,41 +1,38 @@
-//! A recording on disk that grows view by view: each is whole or not there.
+//! A recording on the disk that grows view by view: each is whole or not there.
 
 use std::fmt::Write as _;
-use std::fs;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-use super::lock::Lock;
 use super::source::LiveFrame;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::io::{
-    DEPTH_LIST, DESCRIPTION, encode_png16_quickly, entries, read_description, write_recording_file,
-    write_view_notes,
+    DEPTH_LIST, DESCRIPTION, encode_png16_quickly, entries, read_description, refuse_full,
+    write_recording_file, write_view_notes,
 };
 use crate::view::{RecordingFile, Sensor, ViewNotes};
 
-/// Views in the making stand in here; readers look for a depth list one level higher.
-const WORKSHOP: &str = ".partial";
-/// A view that is being replaced, until the new one stands.
+/// Unfinished views stand in here; readers look for a depth list one level higher.
+const PARTIAL: &str = ".partial";
+/// Prefix of a view that is being replaced, until the new one stands.
 const OLD: &str = "old-";
-/// A view that nobody wants any more, on its way out.
-const BAD: &str = "bad-";
+/// Prefix of a rejected view that is being removed.
+const REJECTED: &str = "bad-";
 
 /// An open recording.
 pub struct Session {
     root: PathBuf,
-    making: Option<Making>,
+    partial: Option<PartialView>,
     remarks: Vec<String>,
-    _lock: Lock,
+    _lock: Option<File>,
 }
 
-struct Making {
+struct PartialView {
     name: String,
     folder: PathBuf,
-    depth_list: String,
-    infrared_list: String,
-    frames: usize,
-    infrared: usize,
+    depth: ImageList,
+    infrared: ImageList,
 }
 
 impl Session {
@@ -50,70 +47,45 @@ impl Session {
             return Err(Error::recording(root, "this is a file", remedy));
         }
         fs::create_dir_all(root).map_err(|e| failed(root, e))?;
-        let lock = Lock::hold(root)?;
+        let lock = lock(root)?;
         let mut session =
-            Session { root: root.into(), making: None, remarks: Vec::new(), _lock: lock };
+            Session { root: root.into(), partial: None, remarks: vec![], _lock: lock };
         let description = root.join(DESCRIPTION);
-        if description.is_file() {
-            session.same_sensor(&read_description(&description)?, sensor)?;
-            session.tidy()?;
-        } else {
-            session.tidy()?;
-            crate::io::refuse_full(root)?;
+        let resumed = description.is_file();
+        if resumed {
+            refuse_another(&description, sensor)?;
+        }
+        session.recover()?;
+        if !resumed {
+            refuse_full(root)?;
             write_recording_file(root, sensor)?;
         }
         Ok(session)
     }
 
-    fn same_sensor(&mut self, before: &Sensor, now: &Sensor) -> Result<()> {
-        let description = self.root.join(DESCRIPTION);
-        let refuse = |what: String| {
-            let remedy = "plug that sensor in (with the same options), or choose a new folder";
-            Err(Error::Recording { path: description.clone(), what, remedy })
-        };
-        if let (Some(old), Some(new)) = (&before.serial, &now.serial)
-            && old != new
-        {
-            return refuse(format!("these views are of sensor {old}, and this one is {new}"));
-        }
-        let numbers = |s: &Sensor| RecordingFile {
-            serial: None,
-            sensor: String::new(),
-            ..RecordingFile::of(s)
-        };
-        if numbers(before) != numbers(now) {
-            return refuse(
-                "these views were taken with another calibration (size, intrinsics, depth code)"
-                    .into(),
-            );
-        }
-        Ok(())
-    }
-
-    /// Take up what an interrupted run left: half views go, a view that was being replaced stays.
-    fn tidy(&mut self) -> Result<()> {
-        let workshop = self.root.join(WORKSHOP);
-        if !workshop.is_dir() {
+    /// Put right what an interrupted run left: half views go, a view that was being replaced stays.
+    fn recover(&mut self) -> Result<()> {
+        let partial = self.root.join(PARTIAL);
+        if !partial.is_dir() {
             return Ok(());
         }
-        for folder in entries(&workshop)? {
+        for folder in entries(&partial)? {
             let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
             match name.strip_prefix(OLD) {
                 Some(view) if !self.root.join(view).exists() => {
                     fs::rename(&folder, self.root.join(view)).map_err(|e| failed(&folder, e))?;
                     self.remarks.push(format!("view {view} was being replaced; the old one stays"));
                 }
-                Some(_) => {}
-                None if name.starts_with(BAD) => {}
-                None => self
+                None if !name.starts_with(REJECTED) => self
                     .remarks
                     .push(format!("half of view {name} from an interrupted run was removed")),
+                _ => {}
             }
         }
-        fs::remove_dir_all(&workshop).map_err(|e| failed(&workshop, e))
+        fs::remove_dir_all(&partial).map_err(|e| failed(&partial, e))
     }
 
-    /// What was found and done while opening, in words.
+    /// What was found and done while opening, each a sentence.
     pub fn remarks(&self) -> &[String] {
         &self.remarks
     }
@@ -133,18 +105,10 @@ impl Session {
     /// When its folder cannot be made.
     pub fn begin(&mut self, name: &str) -> Result<()> {
         self.abandon();
-        let folder = self.root.join(WORKSHOP).join(name);
-        let depth = folder.join("depth");
-        fs::create_dir_all(&depth).map_err(|e| failed(&depth, e))?;
-        let header = String::from("# timestamp path\n");
-        self.making = Some(Making {
-            name: name.into(),
-            folder,
-            depth_list: header.clone(),
-            infrared_list: header,
-            frames: 0,
-            infrared: 0,
-        });
+        let folder = self.root.join(PARTIAL).join(name);
+        let (depth, infrared) = (ImageList::of("depth"), ImageList::of("ir"));
+        fs::create_dir_all(&folder).map_err(|e| failed(&folder, e))?;
+        self.partial = Some(PartialView { name: name.into(), folder, depth, infrared });
         Ok(())
     }
 
@@ -153,8 +117,13 @@ impl Session {
     /// # Errors
     /// When it cannot be written.
     pub fn keep(&mut self, frame: &LiveFrame) -> Result<()> {
-        let Some(making) = &mut self.making else { return Ok(()) };
-        making.add(frame)
+        let Some(PartialView { folder, depth, infrared, .. }) = &mut self.partial else {
+            return Ok(());
+        };
+        // Both images of a moment have the depth's number.
+        let number = depth.count;
+        depth.add(folder, number, frame.stamp, &frame.depth)?;
+        frame.infrared.as_ref().map_or(Ok(()), |i| infrared.add(folder, number, frame.stamp, i))
     }
 
     /// The view is whole: put it where it belongs, in place of one of that name.
@@ -162,21 +131,21 @@ impl Session {
     /// # Errors
     /// When it cannot be written; an older view of that name then stands as it stood.
     pub fn finish(&mut self, notes: &ViewNotes) -> Result<()> {
-        let Some(making) = &self.making else { return Ok(()) };
-        making.close(notes)?;
-        let place = self.root.join(&making.name);
-        let old = self.root.join(WORKSHOP).join(format!("{OLD}{}", making.name));
+        let Some(view) = &self.partial else { return Ok(()) };
+        view.close(notes)?;
+        let place = self.root.join(&view.name);
+        let old = self.root.join(PARTIAL).join(format!("{OLD}{}", view.name));
         let replaced = place.exists();
         if replaced {
             fs::rename(&place, &old).map_err(|e| failed(&place, e))?;
         }
-        if let Err(e) = fs::rename(&making.folder, &place) {
+        if let Err(e) = fs::rename(&view.folder, &place) {
             if replaced {
                 let _ = fs::rename(&old, &place);
             }
             return Err(failed(&place, e));
         }
-        self.making = None;
+        self.partial = None;
         if replaced {
             fs::remove_dir_all(&old).map_err(|e| failed(&old, e))?;
         }
@@ -188,9 +157,9 @@ impl Session {
     /// # Errors
     /// When it cannot be moved; it then stands as it stood.
     pub fn reject(&mut self, name: &str) -> Result<()> {
-        let workshop = self.root.join(WORKSHOP);
-        fs::create_dir_all(&workshop).map_err(|e| failed(&workshop, e))?;
-        let (place, bad) = (self.root.join(name), workshop.join(format!("{BAD}{name}")));
+        let partial = self.root.join(PARTIAL);
+        fs::create_dir_all(&partial).map_err(|e| failed(&partial, e))?;
+        let (place, bad) = (self.root.join(name), partial.join(format!("{REJECTED}{name}")));
         fs::rename(&place, &bad).map_err(|e| failed(&place, e))?;
         fs::remove_dir_all(&bad).map_err(|e| failed(&bad, e))?;
         sync(&self.root)
@@ -198,8 +167,8 @@ impl Session {
 
     /// Throw the view that was begun away.
     pub fn abandon(&mut self) {
-        if let Some(making) = self.making.take() {
-            let _ = fs::remove_dir_all(making.folder);
+        if let Some(view) = self.partial.take() {
+            let _ = fs::remove_dir_all(view.folder);
         }
     }
 }
@@ -208,61 +177,101 @@ impl Drop for Session {
     fn drop(&mut self) {
         self.abandon();
         // Fails, rightly, when an old view stands in it.
-        let _ = fs::remove_dir(self.root.join(WORKSHOP));
+        let _ = fs::remove_dir(self.root.join(PARTIAL));
     }
 }
 
-impl Making {
-    fn add(&mut self, frame: &LiveFrame) -> Result<()> {
-        let name = format!("{:04}.png", self.frames);
-        self.image("depth", &name, &frame.depth)?;
-        let _ = writeln!(self.depth_list, "{:.6} depth/{name}", frame.stamp);
-        self.frames += 1;
-        if let Some(infrared) = &frame.infrared {
-            self.image("ir", &name, infrared)?;
-            let _ = writeln!(self.infrared_list, "{:.6} ir/{name}", frame.stamp);
-            self.infrared += 1;
-        }
-        Ok(())
-    }
-
-    fn image(&self, kind: &str, name: &str, frame: &Frame) -> Result<()> {
-        let folder = self.folder.join(kind);
-        fs::create_dir_all(&folder).map_err(|e| failed(&folder, e))?;
-        let path = folder.join(name);
-        fs::write(&path, encode_png16_quickly(frame)?).map_err(|e| failed(&path, e))
-    }
-
+impl PartialView {
     /// Everything on the disk itself, the list of the frames last.
     fn close(&self, notes: &ViewNotes) -> Result<()> {
         write_view_notes(&self.folder, notes)?;
-        for kind in ["depth", "ir"].map(|kind| self.folder.join(kind)) {
-            if kind.is_dir() {
-                for image in entries(&kind)? {
-                    sync(&image)?;
-                }
-                sync(&kind)?;
+        for list in [&self.infrared, &self.depth].into_iter().filter(|list| list.count > 0) {
+            let images = self.folder.join(list.kind);
+            for image in entries(&images)? {
+                sync(&image)?;
             }
+            sync(&images)?;
+            let path = self.folder.join(format!("{}.txt", list.kind));
+            fs::write(&path, &list.text).map_err(|e| failed(&path, e))?;
+            sync(&path)?;
         }
-        if self.infrared > 0 {
-            write_synced(&self.folder.join("ir.txt"), &self.infrared_list)?;
-        }
-        write_synced(&self.folder.join(DEPTH_LIST), &self.depth_list)?;
         sync(&self.folder)
     }
 }
 
-fn write_synced(path: &Path, text: &str) -> Result<()> {
-    fs::write(path, text).map_err(|e| failed(path, e))?;
-    sync(path)
+/// Images of one kind in a view, and the list that names them.
+struct ImageList {
+    /// "depth" or "ir": the images' folder, and the list's name.
+    kind: &'static str,
+    text: String,
+    count: usize,
 }
 
-/// Of folders too, where they can be opened.
+impl ImageList {
+    fn of(kind: &'static str) -> Self {
+        ImageList { kind, text: "# timestamp path\n".into(), count: 0 }
+    }
+
+    fn add(&mut self, view: &Path, number: usize, stamp: f64, image: &Frame) -> Result<()> {
+        let path = format!("{}/{number:04}.png", self.kind);
+        let file = view.join(&path);
+        let folder = view.join(self.kind);
+        fs::create_dir_all(&folder).map_err(|e| failed(&folder, e))?;
+        fs::write(&file, encode_png16_quickly(image)?).map_err(|e| failed(&file, e))?;
+        let _ = writeln!(self.text, "{stamp:.6} {path}");
+        self.count += 1;
+        Ok(())
+    }
+}
+
+/// One capture at a time: the folder, locked until it is dropped, however the process ends.
+/// `None` where folders cannot be locked (some network disks, systems without `flock`).
+fn lock(root: &Path) -> Result<Option<File>> {
+    let Ok(folder) = File::open(root) else { return Ok(None) };
+    #[cfg(unix)]
+    {
+        use rustix::fs::{FlockOperation, flock};
+        match flock(&folder, FlockOperation::NonBlockingLockExclusive) {
+            Ok(()) => {}
+            Err(rustix::io::Errno::WOULDBLOCK) => {
+                let remedy = "end that one first (q, or Ctrl-C), or choose a new folder";
+                return Err(Error::recording(root, "another capture is writing into it", remedy));
+            }
+            Err(_) => return Ok(None),
+        }
+    }
+    Ok(Some(folder))
+}
+
+/// A recording is resumed with the sensor that it was begun with.
+fn refuse_another(description: &Path, now: &Sensor) -> Result<()> {
+    let before = read_description(description)?;
+    let refuse = |what: String| {
+        let remedy = "plug that sensor in (with the same options), or choose a new folder";
+        Err(Error::recording(description, what, remedy))
+    };
+    if let (Some(old), Some(new)) = (&before.serial, &now.serial)
+        && old != new
+    {
+        return refuse(format!("these views are of sensor {old}, and this one is {new}"));
+    }
+    let numbers = |s: &Sensor| {
+        let (serial, sensor) = (None, String::new());
+        RecordingFile { serial, sensor, ..RecordingFile::of(s) }
+    };
+    if numbers(&before) != numbers(now) {
+        let what = "these views were taken with another calibration (size, intrinsics, depth code)";
+        return refuse(what.into());
+    }
+    Ok(())
+}
+
+/// To the disk itself; folders too, where they can be opened.
 fn sync(path: &Path) -> Result<()> {
     if cfg!(not(unix)) && path.is_dir() {
         return Ok(());
     }
-    fs::File::open(path).and_then(|file| file.sync_all()).map_err(|e| failed(path, e))
+    File::open(path).and_then(|file| file.sync_all()).map_err(|e| failed(path, e))
 }
 
 fn failed(path: &Path, cause: std::io::Error) -> Error {
@@ -272,5 +281,4 @@ fn failed(path: &Path, cause: std::io::Error) -> Error {
 }
 
 #[cfg(test)]
-#[path = "session_tests.rs"]
 mod tests;

@@ -1,4 +1,4 @@
-//! Where frames come from while they are being taken.
+//! Where frames come from while views are taken.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use crate::view::Sensor;
 pub struct LiveFrame {
     /// Seconds; one clock for as long as the source runs.
     pub stamp: f64,
-    /// In the sensor's own words.
+    /// In the sensor's raw values.
     pub depth: Frame,
     /// Infrared amplitude of the same size, where the source has it.
     pub infrared: Option<Frame>,
@@ -20,7 +20,6 @@ pub struct LiveFrame {
 /// What a source had to give.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Arrival {
-    /// A frame.
     Frame(LiveFrame),
     /// Nothing in the time allowed; more may come.
     Nothing,
@@ -31,7 +30,6 @@ pub enum Arrival {
 /// Why a source came to its end.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct End {
-    /// In words.
     pub why: String,
     /// It went away while it was needed; a recording that was played to its end did not.
     pub lost: bool,
@@ -42,7 +40,7 @@ pub trait Source {
     /// The unit, as `recording.json` will describe it.
     fn sensor(&self) -> &Sensor;
 
-    /// The next frame, waiting for it at most `wait` (about).
+    /// The next frame, waiting for it about `wait` at most.
     ///
     /// # Errors
     /// When the source is damaged in a way that ends the capture.
@@ -58,8 +56,6 @@ pub trait Source {
         0
     }
 
-    /// What was odd while it was opened, in words.
-    fn remarks(&self) -> &[String] {
-        &[]
-    }
+    /// Oddities met so far, each a sentence.
+    fn remarks(&self) -> &[String];
 }

@@ -1,4 +1,4 @@
-//! The views still wanted: a grid's, a list's, or any still pose.
+//! The views still wanted: those of a grid or of a list, or any still pose.
 
 use crate::error::{Error, Result};
 use crate::plane::Plane;
@@ -24,9 +24,9 @@ impl Pose {
     /// A folder's name: centimetres and degrees, so that names sort by distance.
     fn name(&self, with_azimuth: bool) -> String {
         let whole = |v: f64| v.round().max(0.0);
-        let mut name =
-            format!("z{:03}-t{:02}", whole(100.0 * self.z_m), whole(self.theta_rad.to_degrees()));
-        if with_azimuth && self.theta_rad > DIRECTED_RAD {
+        let [cm, degrees] = [100.0 * self.z_m, self.theta_rad.to_degrees()].map(whole);
+        let mut name = format!("z{cm:03}-t{degrees:02}");
+        if with_azimuth && self.theta_rad > MIN_DIRECTED_RAD {
             let turn = self.azimuth_rad.to_degrees().rem_euclid(360.0).round() % 360.0;
             name += &format!("-a{turn:03}");
         }
@@ -44,7 +44,7 @@ impl Pose {
 }
 
 /// Below this tilt a direction means nothing, rad.
-const DIRECTED_RAD: f64 = 0.1;
+const MIN_DIRECTED_RAD: f64 = 0.1;
 
 /// How near a pose must be to count as the one wanted.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,11 +59,13 @@ pub struct Tolerance {
 
 /// Four fifths of half the paper's pitch: every cell is hit by hand, and no pose belongs to two.
 const GRID: Tolerance = Tolerance { z_m: 0.2, theta_rad: 0.07, azimuth_rad: None };
+/// Where any pose will do: two that are nearer than this are one view.
+const ANY: Tolerance = Tolerance { z_m: 0.05, theta_rad: 0.05, azimuth_rad: Some(0.35) };
 
 /// The same share of a finer pitch.
-fn within(values: &[f64], widest: f64) -> f64 {
+fn within(values: &[f64], max: f64) -> f64 {
     let gaps = values.windows(2).map(|w| 0.4 * (w[1] - w[0]));
-    gaps.fold(widest, f64::min)
+    gaps.fold(max, f64::min)
 }
 
 /// In order, each once: what two names cannot tell apart is one.
@@ -74,14 +76,14 @@ fn distinct(values: &[f64], unit: f64) -> Vec<f64> {
     values
 }
 
-/// A view that shall be taken.
+/// A view to be taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WantedView {
     /// The view's folder.
     pub name: String,
     pub pose: Pose,
     pub tolerance: Tolerance,
-    /// What it is good for, where somebody said so.
+    /// What it is good for, where a diagnosis asked for it.
     pub why: Option<String>,
     pub state: ViewState,
 }
@@ -103,7 +105,11 @@ impl WantedView {
         WantedView { name, pose, tolerance, why, state: ViewState::Open }
     }
 
-    /// Is a target at `pose` where it is wanted?
+    pub fn is_open(&self) -> bool {
+        self.state == ViewState::Open
+    }
+
+    /// Is a target at `pose` within the tolerance?
     pub fn fits(&self, pose: &Pose) -> bool {
         let near = |a: f64, b: f64, within: f64| (a - b).abs() <= within;
         near(pose.z_m, self.pose.z_m, self.tolerance.z_m)
@@ -113,7 +119,7 @@ impl WantedView {
 
     /// Does the direction of its tilt matter?
     pub fn is_directed(&self) -> bool {
-        self.tolerance.azimuth_rad.is_some() && self.pose.theta_rad > DIRECTED_RAD
+        self.tolerance.azimuth_rad.is_some() && self.pose.theta_rad > MIN_DIRECTED_RAD
     }
 
     /// How far the direction of the tilt is off, rad in (-pi, pi]; 0 where it does not matter.
@@ -126,12 +132,17 @@ impl WantedView {
     }
 
     /// How far from `pose`, in cells of the paper's grid.
-    pub(super) fn away(&self, pose: &Pose) -> f64 {
+    pub(super) fn distance(&self, pose: &Pose) -> f64 {
         let z = (pose.z_m - self.pose.z_m) / 0.5;
         let theta = (pose.theta_rad - self.pose.theta_rad) / 10f64.to_radians();
         z.hypot(theta).hypot(self.turn(pose))
     }
 }
+
+/// Distances of the paper's grid, m.
+pub const PAPER_DISTANCES_M: [f64; 7] = [1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0];
+/// Tilts of the paper's grid, degrees.
+pub const PAPER_TILTS_DEG: [f64; 9] = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0];
 
 /// The list.
 #[derive(Debug, Clone, PartialEq)]
@@ -157,13 +168,6 @@ impl Wanted {
         };
         let views = distances.iter().flat_map(|&z| tilts.iter().map(move |&t| view(z, t)));
         Wanted { views: views.collect(), any: false }
-    }
-
-    /// The paper's: 1 to 4 m by 0.5 m, 0 to 80 degrees by 10.
-    pub fn paper() -> Self {
-        let tilts: Vec<f64> = (0..9).map(|i| f64::from(10 * i).to_radians()).collect();
-        let distances: Vec<f64> = (0..7).map(|i| 1.0 + 0.5 * f64::from(i)).collect();
-        Wanted::grid(&distances, &tilts)
     }
 
     /// Whatever holds still and is not there yet.
@@ -215,8 +219,7 @@ impl Wanted {
 
     /// Which open view a target at `pose` would make. In a list of any poses a new one is added.
     pub fn claim(&mut self, pose: &Pose) -> Option<usize> {
-        let open = |v: &WantedView| v.state == ViewState::Open;
-        let near = self.nearest(pose, |v| open(v) && v.fits(pose));
+        let near = self.nearest(pose, |v| v.is_open() && v.fits(pose));
         if near.is_some() || !self.any || self.views.iter().any(|v| v.fits(pose)) {
             return near;
         }
@@ -230,16 +233,17 @@ impl Wanted {
 
     /// The open view that takes least moving; the first one when nothing is seen.
     pub fn suggestion(&self, pose: Option<&Pose>) -> Option<usize> {
-        let open = |v: &WantedView| v.state == ViewState::Open;
         match pose {
-            Some(pose) => self.nearest(pose, open),
-            None => self.views.iter().position(open),
+            Some(pose) => self.nearest(pose, WantedView::is_open),
+            None => self.views.iter().position(WantedView::is_open),
         }
     }
 
     fn nearest(&self, pose: &Pose, of: impl Fn(&WantedView) -> bool) -> Option<usize> {
         let chosen = self.views.iter().enumerate().filter(|(_, v)| of(v));
-        chosen.min_by(|(_, a), (_, b)| a.away(pose).total_cmp(&b.away(pose))).map(|(i, _)| i)
+        chosen
+            .min_by(|(_, a), (_, b)| a.distance(pose).total_cmp(&b.distance(pose)))
+            .map(|(i, _)| i)
     }
 
     /// How many views are in this state.
@@ -252,9 +256,6 @@ impl Wanted {
         !self.any && self.count(ViewState::Open) == 0
     }
 }
-
-/// Two poses nearer than this are one view.
-const ANY: Tolerance = Tolerance { z_m: 0.05, theta_rad: 0.05, azimuth_rad: Some(0.35) };
 
 #[cfg(test)]
 mod tests {
@@ -271,7 +272,9 @@ mod tests {
             let pose = Pose { z_m, theta_rad: 0.024, azimuth_rad: 0.0 };
             assert!(wanted.views.iter().filter(|v| v.fits(&pose)).count() <= 1, "{pose:?}");
         }
-        let Tolerance { z_m, theta_rad, .. } = Wanted::paper().views[0].tolerance;
+        let tilts = PAPER_TILTS_DEG.map(f64::to_radians);
+        let paper = Wanted::grid(&PAPER_DISTANCES_M, &tilts);
+        let Tolerance { z_m, theta_rad, .. } = paper.views[0].tolerance;
         assert!(z_m == GRID.z_m && (theta_rad - GRID.theta_rad).abs() < 1e-3, "the paper's stay");
     }
 }

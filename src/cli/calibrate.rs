@@ -1,20 +1,21 @@
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
-use clap::{Args, ValueEnum};
+use anyhow::{Context, bail};
+use clap::Args;
 use kinoise::calibrate::{Measurements, measure, model_of};
 use kinoise::io::{OutputDir, open};
-use kinoise::measure::{MeasureOptions, Planes, write_measurements};
-use kinoise::stats;
+use kinoise::measure::{MeasureOptions, Planes, read_table, write_measurements};
+use kinoise::report::{CalibrationPage, Figure2, Overlay, SigmaMap, calibration_page};
 use kinoise::units::shortest;
-use kinoise::{CalibrateOptions, Calibration, Form, Recording, SigmaKind};
+use kinoise::{CalibrateOptions, Calibration, Form, Recording, SigmaKind, model_of_table, stats};
 
-use super::common::{Bar, Global, Input, say, source_date};
-use super::words;
+use super::calibrate_summary::{as_json, summary};
+use super::common::{Bar, Global, Input, notes, one_of, say};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A recording, a TUM folder, a fakenect dump, or a folder of 16-bit PNGs
+    /// A recording, a TUM folder, a fakenect dump, a folder of 16-bit PNGs, or a table
+    /// z_m,theta_rad,sigma_m[,n] (.csv)
     recording: PathBuf,
     /// Folder for model.json, measurements.csv, sigma.svg and report.html
     #[arg(short, long, value_name = "DIR")]
@@ -24,52 +25,54 @@ pub struct Arguments {
     #[command(flatten)]
     fitting: Fitting,
     /// Which standard deviation the model describes
-    #[arg(long, value_enum, default_value_t = Sigma::Spatial)]
-    sigma: Sigma,
+    #[arg(long, default_value = "spatial", value_parser = one_of([
+        ("spatial", "", SigmaKind::Spatial),
+        ("temporal", "", SigmaKind::Temporal),
+        ("total", "", SigmaKind::Total),
+        ("paper", "", SigmaKind::Paper),
+    ]))]
+    sigma: SigmaKind,
     /// One plane for the still view, or one for every frame of it
-    #[arg(long, value_enum, default_value_t = PlanesArgument::View)]
-    planes: PlanesArgument,
+    #[arg(long, default_value = "view", value_parser = one_of([
+        ("view", "", Planes::PerView),
+        ("frame", "", Planes::PerFrame),
+    ]))]
+    planes: Planes,
     /// The paper's RANSAC threshold in m [default: 3 robust standard deviations of the view]
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     ransac_threshold: Option<f64>,
 }
 
-/// Options of the fit, also of `kinoise fit`.
+/// `kinoise fit`: what `kinoise calibrate` does with a table.
 #[derive(Debug, Args)]
-pub struct Fitting {
+pub struct FitArguments {
+    /// CSV with the columns z_m,theta_rad,sigma_m and optionally n (SI units)
+    table: PathBuf,
+    /// Folder for model.json, sigma.svg and report.html
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    #[command(flatten)]
+    fitting: Fitting,
+}
+
+/// Options of the fit.
+#[derive(Debug, Args)]
+struct Fitting {
     /// paper, nguyen, khoshelham, disparity; auto takes what predicts left-out distances best
     #[arg(long, default_value = "paper")]
     form: String,
     /// Published curves to draw beside the fit: eq1, nguyen, khoshelham
     #[arg(long, value_delimiter = ',', default_value = "eq1")]
-    overlay: Vec<kinoise::report::Overlay>,
+    overlay: Vec<Overlay>,
 }
 
 impl Fitting {
-    pub fn form(&self) -> anyhow::Result<Option<Form>> {
+    fn form(&self) -> anyhow::Result<Option<Form>> {
         if self.form == "auto" {
             return Ok(None);
         }
         self.form.parse().map(Some).map_err(|e: String| anyhow::anyhow!("--form: {e}"))
     }
-
-    pub fn overlays(&self) -> &[kinoise::report::Overlay] {
-        &self.overlay
-    }
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Sigma {
-    Spatial,
-    Temporal,
-    Total,
-    Paper,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum PlanesArgument {
-    View,
-    Frame,
 }
 
 impl Arguments {
@@ -77,35 +80,70 @@ impl Arguments {
         if let Some(t) = self.ransac_threshold
             && !(t > 0.0 && t.is_finite())
         {
-            anyhow::bail!("--ransac-threshold {}: give a positive distance in m", shortest(t));
+            bail!("--ransac-threshold {}: give a positive distance in m", shortest(t));
         }
         Ok(CalibrateOptions {
             measure: MeasureOptions {
-                planes: match self.planes {
-                    PlanesArgument::View => Planes::PerView,
-                    PlanesArgument::Frame => Planes::PerFrame,
-                },
+                planes: self.planes,
                 ransac_threshold_m: self.ransac_threshold,
                 seed: global.seed(),
                 ..MeasureOptions::default()
             },
-            kind: match self.sigma {
-                Sigma::Spatial => SigmaKind::Spatial,
-                Sigma::Temporal => SigmaKind::Temporal,
-                Sigma::Total => SigmaKind::Total,
-                Sigma::Paper => SigmaKind::Paper,
-            },
+            kind: self.sigma,
             form: self.fitting.form()?,
-            created: source_date(),
         })
+    }
+
+    /// A file whose name ends in .csv.
+    fn is_table(&self) -> bool {
+        let csv = self.recording.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"));
+        csv && self.recording.is_file()
+    }
+
+    /// A table has no frames to measure.
+    fn refuse_measuring(&self) -> anyhow::Result<()> {
+        let options = [
+            ("--sigma", self.sigma != SigmaKind::Spatial),
+            ("--planes", self.planes != Planes::PerView),
+            ("--ransac-threshold", self.ransac_threshold.is_some()),
+            ("--intrinsics and the like", self.input != Input::default()),
+        ];
+        match options.iter().find(|(_, given)| *given) {
+            Some((name, _)) => bail!("{name}: a table has no frames to measure; leave it out"),
+            None => Ok(()),
+        }
     }
 }
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
+    if arguments.is_table() {
+        arguments.refuse_measuring()?;
+        return table(&arguments.recording, &arguments.output, &arguments.fitting, global);
+    }
     let options = arguments.options(global)?;
     let recording = open(&arguments.recording, &arguments.input.assumed()?)?;
-    let done = calibrate(&recording, &options, &arguments.output, arguments.fitting.overlays())?;
-    global.print_json(&words::as_json(&done.calibration, Some(&done.measurements)))
+    let overlays = &arguments.fitting.overlay;
+    let done = calibrate(&recording, &options, &arguments.output, overlays)?;
+    global.print_json(&as_json(&done.calibration, Some(&done.measurements)))
+}
+
+pub fn fit(arguments: &FitArguments, global: &Global) -> anyhow::Result<()> {
+    table(&arguments.table, &arguments.output, &arguments.fitting, global)
+}
+
+/// Fit to a table alone.
+fn table(file: &Path, output: &Path, fitting: &Fitting, global: &Global) -> anyhow::Result<()> {
+    let calibration = model_of_table(&read_table(file)?, fitting.form()?, file)
+        .with_context(|| file.display().to_string())?;
+    let page = CalibrationPage {
+        title: &format!("Noise model of {}", file.display()),
+        sensor: None,
+        measurements: None,
+        calibration: &calibration,
+        overlays: &fitting.overlay,
+    };
+    write_outputs(&OutputDir::create(output)?, &page)?;
+    global.print_json(&as_json(&calibration, None))
 }
 
 /// A finished calibration with what it was made from.
@@ -114,23 +152,23 @@ pub struct Done {
     pub calibration: Calibration,
 }
 
-/// Measure, fit, write every output, tell.
+/// Measure, fit, write every output, report.
 pub fn calibrate(
     recording: &Recording,
     options: &CalibrateOptions,
     output: &Path,
-    overlays: &[kinoise::report::Overlay],
+    overlays: &[Overlay],
 ) -> anyhow::Result<Done> {
     let out = OutputDir::create(output)?;
     let bar = Bar::new("views");
     let measurements = measure(recording, &options.measure, &|done, all| bar.step(done, all))?;
     drop(bar);
-    say(opening(recording, &measurements));
+    say(measured(recording, &measurements));
     out.write("measurements.csv", write_measurements(&measurements.views).as_bytes())?;
     let calibration = model_of(recording, &measurements, options).with_context(|| {
         // Without a model there is no list of warnings: this is the only place to say why.
-        measurements.excluded.iter().for_each(|e| say(format!("note: {e}")));
-        recording.remarks.iter().for_each(|r| say(format!("note: {r}")));
+        notes(&measurements.excluded);
+        notes(&recording.remarks);
         let older = if out.path().join("model.json").exists() {
             " (the model.json there is from an earlier run)"
         } else {
@@ -141,7 +179,7 @@ pub fn calibrate(
             out.path().join("measurements.csv").display()
         )
     })?;
-    let page = kinoise::report::CalibrationPage {
+    let page = CalibrationPage {
         title: &format!("Noise of {}", recording.sensor.name),
         sensor: Some(&recording.sensor),
         measurements: Some(&measurements),
@@ -149,35 +187,31 @@ pub fn calibrate(
         overlays,
     };
     write_outputs(&out, &page)?;
-    say(words::summary(&calibration));
-    say(words::warnings(&calibration));
     Ok(Done { measurements, calibration })
 }
 
-/// Model, figures and page.
-pub fn write_outputs(
-    out: &OutputDir,
-    page: &kinoise::report::CalibrationPage<'_>,
-) -> anyhow::Result<()> {
+/// Model, figures and page; a summary for people.
+fn write_outputs(out: &OutputDir, page: &CalibrationPage<'_>) -> anyhow::Result<()> {
     let calibration = page.calibration;
-    let figure =
-        kinoise::report::figure2(&calibration.table, &calibration.model.sigma, page.overlays);
-    let map = kinoise::report::sigma_map(&calibration.table, &calibration.model.sigma);
+    let figure = Figure2::of(&calibration.table, &calibration.model.sigma, page.overlays);
+    let map = SigmaMap::of(&calibration.table, &calibration.model.sigma);
     out.write("sigma.svg", figure.svg()?.as_bytes())?;
     out.write("sigma.png", &figure.png()?)?;
     out.write("sigma_map.svg", map.svg()?.as_bytes())?;
     out.write("sigma_map.png", &map.png()?)?;
-    out.write("report.html", kinoise::report::calibration_page(page)?.as_bytes())?;
+    out.write("report.html", calibration_page(page)?.as_bytes())?;
     let model = out.path().join("model.json");
     calibration.model.write(&model)?;
     say(format!(
         "wrote {}, with sigma.svg, sigma_map.svg and report.html beside it\n",
         model.display()
     ));
+    say(summary(calibration));
+    notes(&calibration.warnings);
     Ok(())
 }
 
-fn opening(recording: &Recording, m: &Measurements) -> String {
+fn measured(recording: &Recording, m: &Measurements) -> String {
     let range = |f: &dyn Fn(&kinoise::ViewMeasurement) -> f64| stats::range(m.views.iter().map(f));
     let [z0, z1] = range(&|v| v.z_m);
     let [t0, t1] = range(&|v| v.theta_rad.to_degrees());

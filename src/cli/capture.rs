@@ -1,35 +1,35 @@
+use std::io;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use anyhow::bail;
 use clap::Args;
 use kinoise::capture::{
-    Audience, Ending, FreenectOptions, FreenectSource, Growing, Guide, Outcome, Playback, Queued,
-    Session, Shutter, Source, ViewState, capture,
+    End, Ending, FreenectOptions, FreenectSource, Growing, Guide, Interface, Outcome,
+    PAPER_DISTANCES_M, PAPER_TILTS_DEG, Playback, Session, Shutter, Source, Threaded, ViewState,
+    Wanted, capture,
 };
-use kinoise::io::Assumed;
 use serde_json::json;
 
-use super::capture_audience::{Log, Screen};
-use super::capture_views::Views;
-use super::common::{Global, Input, say};
-use super::terminal;
+use super::capture_interface::{Log, Screen, is_interactive, stop_signal};
+use super::common::{Global, Input, MAX_FRAMES, between, count, notes, one_of, say};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// The recording: a new folder, or one to go on with
     recording: PathBuf,
     /// freenect (a Kinect v1), folder:DIR (another program fills it), or play:REC (as if live)
-    #[arg(long, value_name = "SOURCE")]
-    source: SourceArgument,
+    #[arg(long, value_name = "SOURCE", value_parser = source_kind)]
+    source: SourceKind,
     #[command(flatten)]
     views: Views,
     /// Frames of a view
-    #[arg(long, value_name = "N", default_value_t = 30)]
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = count(1, MAX_FRAMES))]
     frames: usize,
     /// Frames for which the target must be still before
-    #[arg(long, value_name = "N", default_value_t = 10)]
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(1, MAX_FRAMES))]
     hold: usize,
     /// Seconds without a frame after which the stream is given up
     #[arg(long, value_name = "S", default_value_t = 10)]
@@ -50,86 +50,124 @@ pub struct Arguments {
     input: Input,
 }
 
+/// Which views are to be taken.
+#[derive(Debug, Args)]
+struct Views {
+    /// Which views are wanted
+    #[arg(long, default_value = "paper", value_parser = one_of([
+        ("paper", "1 to 4 m by 0.5 m, 0 to 80 degrees by 10: 63 views", Some(PAPER)),
+        ("quick", "1 to 4 m by 1 m, 0, 30, 60 and 75 degrees: 16 views", Some(QUICK)),
+        ("any", "Every still pose that is not there yet", None),
+    ]))]
+    views: GridOrAny,
+    /// Own distances in m, in place of the grid's
+    #[arg(long, value_delimiter = ',', value_name = "M,M,..", value_parser = between(0.1, 9.99, "m"))]
+    distances: Vec<f64>,
+    /// Own tilts in degrees, in place of the grid's
+    #[arg(long, value_delimiter = ',', value_name = "DEG,..", value_parser = between(0.0, 88.0, "degrees"))]
+    tilts: Vec<f64>,
+    /// The views that a diagnosis advised
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["views", "distances", "tilts"])]
+    advise: Option<PathBuf>,
+    /// Take this view again; the old one stays until the new one is whole; repeatable
+    #[arg(long, value_name = "VIEW")]
+    retake: Vec<String>,
+}
+
+/// Distances in m, and tilts in degrees.
+type Grid = (&'static [f64], &'static [f64]);
+type GridOrAny = Option<Grid>;
+const PAPER: Grid = (&PAPER_DISTANCES_M, &PAPER_TILTS_DEG);
+const QUICK: Grid = (&[1.0, 2.0, 3.0, 4.0], &[0.0, 30.0, 60.0, 75.0]);
+
+impl Views {
+    fn wanted(&self) -> anyhow::Result<Wanted> {
+        if let Some(path) = &self.advise {
+            return Ok(Wanted::advised(path)?);
+        }
+        let own = |own: &[f64], grid: &[f64]| if own.is_empty() { grid } else { own }.to_vec();
+        let Some((distances, tilts)) = self.views else {
+            if !self.distances.is_empty() || !self.tilts.is_empty() {
+                bail!("--views any: it knows no grid; leave --distances and --tilts out");
+            }
+            return Ok(Wanted::any());
+        };
+        let (distances, tilts) = (own(&self.distances, distances), own(&self.tilts, tilts));
+        let tilts: Vec<f64> = tilts.iter().map(|t| t.to_radians()).collect();
+        Ok(Wanted::grid(&distances, &tilts))
+    }
+}
+
 #[derive(Debug, Clone)]
-enum SourceArgument {
+enum SourceKind {
     Freenect,
     Folder(PathBuf),
     Play(PathBuf),
 }
 
-impl FromStr for SourceArgument {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.split_once(':') {
-            None if text == "freenect" => Ok(SourceArgument::Freenect),
-            Some(("folder", path)) if !path.is_empty() => Ok(SourceArgument::Folder(path.into())),
-            Some(("play", path)) if !path.is_empty() => Ok(SourceArgument::Play(path.into())),
-            _ => Err("give freenect, folder:DIR or play:REC".into()),
-        }
+fn source_kind(text: &str) -> Result<SourceKind, String> {
+    match text.split_once(':') {
+        None if text == "freenect" => Ok(SourceKind::Freenect),
+        Some(("folder", path)) if !path.is_empty() => Ok(SourceKind::Folder(path.into())),
+        Some(("play", path)) if !path.is_empty() => Ok(SourceKind::Play(path.into())),
+        _ => Err("give freenect, folder:DIR or play:REC".into()),
     }
 }
 
-/// An hour at 30 Hz.
-const MAX_FRAMES: usize = 108_000;
-
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
-    for (name, n) in [("--frames", arguments.frames), ("--hold", arguments.hold)] {
-        if !(1..=MAX_FRAMES).contains(&n) {
-            bail!("{name} {n}: give a number from 1 to {MAX_FRAMES}");
-        }
-    }
     let mut wanted = arguments.views.wanted()?;
-    into_itself(arguments)?;
-    let screen = !arguments.plain && terminal::is_interactive();
+    refuse_own_source(arguments)?;
+    let screen = !arguments.plain && is_interactive();
     let mut source = source(arguments, screen)?;
     // Until here there is nothing to lose, and Ctrl-C ends the wait for a first image.
-    terminal::heed_signals();
-    let told = source.remarks().len();
+    let stop = stop_signal()?;
+    let noted = source.remarks().len();
     let mut session = Session::open(&arguments.recording, source.sensor())?;
-    note(source.remarks());
-    note(session.remarks());
-    wanted.mark_taken(&session.taken()?);
+    notes(source.remarks());
+    notes(session.remarks());
+    let taken = session.taken()?;
+    wanted.mark_taken(&taken);
     for view in &arguments.views.retake {
-        wanted.take_again(view, &session.taken()?)?;
+        wanted.take_again(view, &taken)?;
     }
     let shutter = Shutter { frames: arguments.frames, hold: arguments.hold };
     let mut guide = Guide::new(wanted, shutter);
-    let mut audience: Box<dyn Audience> = match title(arguments, source.as_ref()) {
-        title if screen => Box::new(Screen::new(title)),
-        _ => Box::new(Log::default()),
-    };
-    let patience = Duration::from_secs(arguments.patience.max(1));
     let done = if guide.wanted().is_done() {
         Outcome { ending: Ending::Complete, finished: Vec::new(), frames: 0 }
     } else {
-        capture(source.as_mut(), &mut session, &mut guide, audience.as_mut(), patience)
+        let mut interface = interface(screen.then(|| title(arguments, source.as_ref())), stop)?;
+        let patience = Duration::from_secs(arguments.patience.max(1));
+        capture(source.as_mut(), &mut session, &mut guide, interface.as_mut(), patience)
     };
-    drop(audience);
-    note(&source.remarks()[told..]);
+    notes(&source.remarks()[noted..]);
     if source.dropped() > 0 {
         say(format!("note: {} frames came too fast and were lost", source.dropped()));
     }
     let kept = session.taken()?;
-    report(global, arguments, &guide, &done, &kept, source.as_ref())?;
-    finish(done.ending, &guide, &arguments.recording, kept.len())
+    global.print_json(&json!({
+        "recording": arguments.recording,
+        "serial": source.sensor().serial,
+        "ending": name_of(&done.ending),
+        "finished": done.finished,
+        "views": kept,
+        "still_wanted": still_wanted(&guide),
+        "frames_seen": done.frames,
+        "frames_lost": source.dropped(),
+    }))?;
+    conclude(done.ending, &guide, &arguments.recording, kept.len())
 }
 
-/// Told one by one, up to so many.
-const MAX_NOTES: usize = 12;
-
-fn note(remarks: &[String]) {
-    for remark in remarks.iter().take(MAX_NOTES) {
-        say(format!("note: {remark}"));
-    }
-    if remarks.len() > MAX_NOTES {
-        say(format!("note: and {} more like these", remarks.len() - MAX_NOTES));
-    }
+/// A screen where there is a title to show on it.
+fn interface(title: Option<String>, stop: Arc<AtomicBool>) -> io::Result<Box<dyn Interface>> {
+    Ok(match title {
+        Some(title) => Box::new(Screen::open(title, stop)?),
+        None => Box::new(Log { stop, waiting: Vec::new() }),
+    })
 }
 
 /// What is played or watched must not grow by what is taken from it.
-fn into_itself(arguments: &Arguments) -> anyhow::Result<()> {
-    let (SourceArgument::Folder(from) | SourceArgument::Play(from)) = &arguments.source else {
+fn refuse_own_source(arguments: &Arguments) -> anyhow::Result<()> {
+    let (SourceKind::Folder(from) | SourceKind::Play(from)) = &arguments.source else {
         return Ok(());
     };
     if let (Ok(from), Ok(to)) = (from.canonicalize(), arguments.recording.canonicalize())
@@ -144,29 +182,30 @@ fn into_itself(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 fn source(arguments: &Arguments, paced: bool) -> anyhow::Result<Box<dyn Source>> {
-    let assumed: Assumed = arguments.input.assumed()?;
+    let assumed = arguments.input.assumed()?;
     let only_freenect =
         [(arguments.serial.is_some(), "--serial"), (arguments.no_infrared, "--no-infrared")];
-    if !matches!(arguments.source, SourceArgument::Freenect)
+    if !matches!(arguments.source, SourceKind::Freenect)
         && let Some((_, name)) = only_freenect.iter().find(|(given, _)| *given)
     {
         bail!("{name} belongs to --source freenect");
     }
     Ok(match &arguments.source {
-        SourceArgument::Freenect => {
+        SourceKind::Freenect => {
             let options = FreenectOptions {
                 library: arguments.library.clone(),
                 serial: arguments.serial.clone(),
                 infrared: !arguments.no_infrared,
                 assumed,
+                dump: std::env::var_os("FAKENECT_PATH").map(PathBuf::from),
             };
-            Box::new(Queued::start(move || FreenectSource::open(&options))?)
+            Box::new(Threaded::start(move || FreenectSource::open(&options))?)
         }
-        SourceArgument::Folder(path) => {
+        SourceKind::Folder(path) => {
             let patience = Duration::from_secs(arguments.patience.max(1));
             Box::new(Growing::open(path, &assumed, patience)?)
         }
-        SourceArgument::Play(path) => Box::new(Playback::open(path, &assumed, paced)?),
+        SourceKind::Play(path) => Box::new(Playback::open(path, &assumed, paced)?),
     })
 }
 
@@ -176,53 +215,30 @@ fn title(arguments: &Arguments, source: &dyn Source) -> String {
     format!("{}   {}{serial}", arguments.recording.display(), sensor.name)
 }
 
-/// The result for programs.
-fn report(
-    global: &Global,
-    arguments: &Arguments,
-    guide: &Guide,
-    done: &Outcome,
-    kept: &[String],
-    source: &dyn Source,
-) -> anyhow::Result<()> {
-    let wanted = guide.wanted();
-    let open: Vec<&str> = wanted
-        .views
-        .iter()
-        .filter(|v| v.state != ViewState::Taken)
-        .map(|v| v.name.as_str())
-        .collect();
-    let ending = match &done.ending {
+fn still_wanted(guide: &Guide) -> Vec<&str> {
+    let views = guide.wanted().views.iter().filter(|v| v.state != ViewState::Taken);
+    views.map(|v| v.name.as_str()).collect()
+}
+
+fn name_of(ending: &Ending) -> &'static str {
+    match ending {
         Ending::Complete => "complete",
         Ending::Quit => "quit",
         Ending::Interrupted => "interrupted",
-        Ending::Ended { .. } => "ended",
+        Ending::Ended(_) => "ended",
         Ending::Stalled(_) => "stalled",
         Ending::Failed(_) => "failed",
-    };
-    global.print_json(&json!({
-        "recording": arguments.recording,
-        "serial": source.sensor().serial,
-        "ending": ending,
-        "finished": done.finished,
-        "views": kept,
-        "still_wanted": open,
-        "frames_seen": done.frames,
-        "frames_lost": source.dropped(),
-    }))
+    }
 }
 
-/// The last words and the exit code.
-fn finish(ending: Ending, guide: &Guide, root: &Path, kept: usize) -> anyhow::Result<u8> {
+/// The closing line and the exit code.
+fn conclude(ending: Ending, guide: &Guide, root: &Path, kept: usize) -> anyhow::Result<u8> {
     let wanted = guide.wanted();
-    let missing = wanted.views.len() - wanted.count(ViewState::Taken);
-    let stands = format!(
-        "{kept} {} kept in {}",
-        if kept == 1 { "view is" } else { "views are" },
-        root.display()
-    );
+    let views_are = if kept == 1 { "view is" } else { "views are" };
+    let stands = format!("{kept} {views_are} kept in {}", root.display());
+    let missing = still_wanted(guide).len();
     let still = if wanted.any { String::new() } else { format!(", {missing} still wanted") };
-    let on = format!("{stands}{still}; the same command goes on");
+    let on = format!("{stands}{still}; give the same command again to resume");
     match ending {
         Ending::Complete => {
             let skipped = wanted.count(ViewState::Skipped);
@@ -235,7 +251,7 @@ fn finish(ending: Ending, guide: &Guide, root: &Path, kept: usize) -> anyhow::Re
             Ok(0)
         }
         // Where anything will do, the end of a recording or of a folder's filling is the end.
-        Ending::Ended { why, lost: false } if wanted.any && kept > 0 => {
+        Ending::Ended(End { why, lost: false }) if wanted.any && kept > 0 => {
             say(format!("done: {why}; {stands}"));
             Ok(0)
         }
@@ -244,9 +260,9 @@ fn finish(ending: Ending, guide: &Guide, root: &Path, kept: usize) -> anyhow::Re
             Ok(0)
         }
         Ending::Interrupted => bail!("interrupted: {on}"),
-        Ending::Ended { why, .. } => bail!("{why}: {on}"),
+        Ending::Ended(End { why, .. }) => bail!("{why}: {on}"),
         Ending::Stalled(after) => bail!(
-            "no frame for {} s: the stream stands still (look at the cable, the power supply, the \
+            "no frame for {} s: the stream has stopped (look at the cable, the power supply, the \
              program that fills the folder): {on}",
             after.as_secs()
         ),

@@ -2,21 +2,19 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
-use kinoise::NoiseModel;
-use kinoise::compare::{compare, of_the_paper, past_the_paper, tables};
+use kinoise::compare::{as_json, compare, of_the_paper, past_the_paper, tables};
 use kinoise::io::OutputDir;
 use kinoise::report::{comparison_figures, comparison_page};
 use kinoise::sequence::open;
 
-use super::common::{Global, Input, say};
+use super::common::{Global, Input, Model, Thinning, notes, say};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// A sequence with ground truth, in the layout of the TUM RGB-D benchmark or of 7-Scenes
     sequence: PathBuf,
-    /// model.json of this sensor [default: the paper's Eq. 1]
-    #[arg(long, value_name = "FILE")]
-    model: Option<PathBuf>,
+    #[command(flatten)]
+    model: Model,
     /// Folder for tables.json, tables.txt, figures and report.html
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
@@ -26,12 +24,8 @@ pub struct Arguments {
     /// Runs of each variant that draws by chance
     #[arg(long, value_name = "N", default_value_t = 1)]
     repeats: usize,
-    /// Take every Nth depth image
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    stride: usize,
-    /// Take the first N of those
-    #[arg(long, value_name = "N")]
-    frames: Option<usize>,
+    #[command(flatten)]
+    thinning: Thinning,
     #[command(flatten)]
     input: Input,
 }
@@ -41,33 +35,25 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         bail!("--repeats 0: give 1 or more");
     }
     let mut sequence = open(&arguments.sequence, &arguments.input.assumed()?)?;
-    sequence.thin(arguments.stride, arguments.frames);
+    sequence.thin(arguments.thinning.stride, arguments.thinning.frames);
     let output = OutputDir::create(&arguments.output)?;
-    let model = match &arguments.model {
-        Some(path) => NoiseModel::read(path)?,
-        None => NoiseModel::paper(),
-    };
+    let model = arguments.model.read()?;
     let mut variants = of_the_paper();
-    if arguments.ablation {
-        variants.extend(past_the_paper());
-    } else {
-        variants.extend(past_the_paper().into_iter().filter(|v| v.name.contains("default")));
-    }
-    let told =
+    let ours = past_the_paper().into_iter();
+    variants.extend(ours.filter(|v| arguments.ablation || v.name.contains("default")));
+    let progress =
         |name: &str, done: usize, all: usize| say(format!("run {} of {all}: {name}", done + 1));
     let comparison =
-        compare(&sequence, &model, &variants, arguments.repeats, global.seed(), &told)?;
-    let text = tables::text(&comparison);
-    let json = tables::json(&comparison);
+        compare(&sequence, &model, &variants, arguments.repeats, global.seed(), &progress)?;
+    let text = tables(&comparison);
+    let json = as_json(&comparison);
     output.write("tables.json", serde_json::to_string_pretty(&json)?.as_bytes())?;
     output.write("tables.txt", text.as_bytes())?;
     for (name, svg) in comparison_figures(&comparison)? {
         output.write(name, svg.as_bytes())?;
     }
     output.write("report.html", comparison_page(&comparison)?.as_bytes())?;
-    for remark in &sequence.remarks {
-        say(format!("note: {remark}"));
-    }
+    notes(&sequence.remarks);
     say(text);
     say(format!("wrote {}", arguments.output.join("report.html").display()));
     global.print_json(&json)

@@ -6,7 +6,7 @@ use kinoise::correct::{Corrected, correct_recording};
 use kinoise::effects::Active;
 use kinoise::{DepthCode, NoiseModel};
 
-use super::common::{Bar, Global, Input, say};
+use super::common::{Bar, Global, Input, notes, say};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -25,12 +25,9 @@ pub struct Arguments {
     input: Input,
 }
 
-/// Remarks shown; a recording of an hour may have thousands.
-const SHOWN: usize = 8;
-
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let model = NoiseModel::read(&arguments.model)?;
-    // Said of the file while its name is at hand.
+    // Here an error can name the file.
     Active::all_of_model(&model.effects).with_context(|| arguments.model.display().to_string())?;
     let bar = Bar::new("frames");
     let corrected = correct_recording(
@@ -42,42 +39,36 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         &|done, all| bar.step(done, all),
     )?;
     drop(bar);
-    tell(&corrected, arguments);
+    report(&corrected, arguments);
     global.print_json(&serde_json::json!({
         "frames": corrected.frames,
         "pixels": corrected.measured,
         "pixels_changed": corrected.changed,
         "rms_shift_mm": 1e3 * corrected.rms_shift_m,
         "clamped": corrected.clamped,
-        "units_per_metre": units_per_metre(&corrected),
+        "units_per_metre": match corrected.code {
+            DepthCode::Metric { units_per_metre, .. } => Some(units_per_metre),
+            DepthCode::Disparity { .. } => None,
+        },
         "not_corrected": corrected.ignored,
         "output": arguments.output,
     }))
 }
 
-fn units_per_metre(corrected: &Corrected) -> Option<f64> {
-    match corrected.code {
-        DepthCode::Metric { units_per_metre, .. } => Some(units_per_metre),
-        DepthCode::Disparity { .. } => None,
-    }
-}
-
-fn tell(corrected: &Corrected, arguments: &Arguments) {
-    for remark in corrected.remarks.iter().take(SHOWN) {
-        say(format!("note: {remark}"));
-    }
-    if corrected.remarks.len() > SHOWN {
-        say(format!("note: and {} more of the kind", corrected.remarks.len() - SHOWN));
-    }
+fn report(corrected: &Corrected, arguments: &Arguments) {
+    notes(&corrected.remarks);
     if !corrected.ignored.is_empty() {
-        say(format!("note: no bias of the sensor, and left in: {}", corrected.ignored.join(", ")));
+        say(format!(
+            "note: no biases of the sensor, and left in: {}",
+            corrected.ignored.join(", ")
+        ));
     }
     if corrected.changed == 0 {
         say(format!("note: {} holds no bias that changes a depth here", arguments.model.display()));
     }
     if corrected.clamped > 0 {
         say(format!(
-            "note: {} corrected depths lie beyond the ends of the depth code and stand at its end",
+            "note: {} corrected depths lie beyond the range of the depth code and are clamped to it",
             corrected.clamped
         ));
     }

@@ -10,10 +10,10 @@ use kinoise::simulate::room::{Film, Room, around_the_desks};
 use kinoise::{CalibrateOptions, Form, NoiseModel, Recording, SigmaModel};
 
 use super::calibrate::calibrate;
-use super::common::{Global, say, source_date};
+use super::calibrate_summary::as_json;
+use super::common::{Global, say};
 use super::diagnose::examine;
 use super::map::follow;
-use super::words;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -31,7 +31,6 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let options = CalibrateOptions {
         measure: MeasureOptions { seed: global.seed(), ..MeasureOptions::default() },
         form: Some(Form::Paper),
-        created: source_date(),
         ..CalibrateOptions::default()
     };
     let done = calibrate(&recording, &options, &arguments.output, &[Overlay::PaperEq1])?;
@@ -40,15 +39,15 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         arguments.output.join("report.html").display()
     ));
     say("\nIs there anything that this model leaves out? There should not be:");
-    let told = arguments.output.join("diagnosis");
-    examine(&recording, None, &done.calibration.model, &told, global)?;
+    let diagnosis = arguments.output.join("diagnosis");
+    examine(&recording, None, &done.calibration.model, &diagnosis, global)?;
     say(format!(
         "{} says how small an error would have been seen.",
-        told.join("report.html").display()
+        diagnosis.join("report.html").display()
     ));
     let model = &done.calibration.model;
     mapped(&recording, model, &arguments.output, global)?;
-    global.print_json(&words::as_json(&done.calibration, Some(&done.measurements)))
+    global.print_json(&as_json(&done.calibration, Some(&done.measurements)))
 }
 
 /// Frames of the film: two seconds.

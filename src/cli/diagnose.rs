@@ -1,16 +1,20 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use kinoise::camera::Rays;
 use kinoise::diagnose::{
-    DiagnoseOptions, Diagnosis, Reference, Status, Verdict, diagnose, diagnose_against,
+    DiagnoseOptions, Diagnosed, Diagnosis, Field, Finding, Reference, Status, Verdict,
+    ViewPictures, diagnose, diagnose_against, pictures,
 };
+use kinoise::effects::{Active, Instant};
 use kinoise::io::{OutputDir, open};
-use kinoise::report::{DiagnosisPage, diagnosis_page};
+use kinoise::report::{DiagnosisPage, Picture, diagnosis_page};
+use kinoise::simulate::{FormulaSensor, plan_on};
 use kinoise::terms::Statistic;
-use kinoise::{CalibrateOptions, NoiseModel, Recording};
+use kinoise::view::ViewNotes;
+use kinoise::{CalibrateOptions, Form, Frame, NoiseModel, Recording, Seed, Sensor};
 
-use super::common::{Bar, Global, Input, say, source_date};
-use super::diagnose_pictures;
+use super::common::{Bar, Global, Input, say};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -29,27 +33,14 @@ pub struct Arguments {
     input: Input,
 }
 
-impl Arguments {
-    /// Of a folder that describes itself.
-    pub fn plain(
-        recording: PathBuf,
-        model: Option<PathBuf>,
-        against: Option<PathBuf>,
-        output: PathBuf,
-    ) -> Self {
-        Arguments { recording, model, against, output, input: Input::default() }
-    }
-}
-
-/// Exit code where a mismatch was found.
+/// Exit code when a mismatch was found.
 const FOUND: u8 = 1;
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     let recording = open(&arguments.recording, &arguments.input.assumed()?)?;
-    let simulated = match &arguments.against {
-        Some(path) => Some(open(path, &arguments.input.assumed()?)?),
-        None => None,
-    };
+    let against = arguments.against.as_ref();
+    let simulated = against.map(|path| anyhow::Ok(open(path, &arguments.input.assumed()?)?));
+    let simulated = simulated.transpose()?;
     let model = match (&arguments.model, &simulated) {
         (Some(path), _) => NoiseModel::read(path)?,
         (None, Some(simulated)) => weights(&recording, simulated, global)?,
@@ -63,7 +54,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     Ok(if diagnosis.verdict == Verdict::Mismatch { FOUND } else { 0 })
 }
 
-/// Diagnose, write every output, tell.
+/// Diagnose, write every output, report.
 pub fn examine(
     recording: &Recording,
     simulated: Option<&Recording>,
@@ -86,19 +77,15 @@ pub fn examine(
     done.model.write(&out.path().join("model.json"))?;
     let held_against = if simulated.is_some() { "simulation" } else { "model" };
     let title = format!("What the {held_against} of {} leaves out", recording.sensor.name);
-    let pictures = diagnose_pictures::of(&done, &recording.sensor, model, global.seed());
+    let pictures = with_twins(&done, &recording.sensor, model, global.seed());
     let page = DiagnosisPage { title: &title, diagnosis, pictures: &pictures };
     out.write("report.html", diagnosis_page(&page)?.as_bytes())?;
-    say(words(diagnosis));
+    say(summary(diagnosis));
     Ok(done.diagnosis)
 }
 
 fn calibrated(recording: &Recording, global: &Global) -> anyhow::Result<NoiseModel> {
-    let mut options = CalibrateOptions {
-        form: Some(kinoise::Form::Paper),
-        created: source_date(),
-        ..Default::default()
-    };
+    let mut options = CalibrateOptions { form: Some(Form::Paper), ..Default::default() };
     options.measure.seed = global.seed();
     let bar = Bar::new("views");
     let views =
@@ -119,7 +106,7 @@ fn weights(
     })
 }
 
-fn words(diagnosis: &Diagnosis) -> String {
+fn summary(diagnosis: &Diagnosis) -> String {
     let held_against = match diagnosis.reference {
         Reference::Model => "the model",
         Reference::SimulatedRecording => "the simulation",
@@ -129,34 +116,8 @@ fn words(diagnosis: &Diagnosis) -> String {
         Verdict::Inconclusive => "inconclusive: these views could not have shown it\n".to_string(),
         Verdict::Mismatch => format!("mismatch: {held_against} leaves out\n"),
     };
-    for f in diagnosis.findings.iter().filter(|f| f.status != Status::NotIdentifiable) {
-        let name = match (f.status, f.effect) {
-            (Status::Recalibrate, _) => "sigma itself is off: calibrate again".to_string(),
-            (Status::OneOf, _) => {
-                let names: Vec<&str> = f.alternatives.iter().take(3).map(|a| a.effect).collect();
-                names.join(" or ")
-            }
-            (_, Some(effect)) => effect.to_string(),
-            (_, None) => format!("something without a name ({})", f.shape.as_deref().unwrap_or("")),
-        };
-        let parameters: Vec<String> = f
-            .parameters
-            .iter()
-            .filter_map(|(k, v)| Some(format!("{k} {:.4}", v.get("value")?.as_f64()?)))
-            .collect();
-        let size = if f.statistic == Statistic::Dropout {
-            format!("{:.1} % of the pixels lost", 100.0 * f.size.sigma)
-        } else {
-            format!("{:.2} mm, {:.2} sigma", f.size.mm, f.size.sigma)
-        };
-        text += &format!(
-            "  {name}: {size}, {:.0} % of it; along {}{}{}\n",
-            100.0 * f.share,
-            f.axis,
-            if parameters.is_empty() { "" } else { "; " },
-            parameters.join(", ")
-        );
-    }
+    let shown = diagnosis.findings.iter().filter(|f| f.status != Status::NotIdentifiable);
+    text.extend(shown.map(line));
     if let Some(h) = &diagnosis.heldout {
         text += &format!(
             "on {} views kept aside: {:.1} nats a view gained [{:.1}, {:.1}], rms {:.3} -> {:.3} mm\n",
@@ -169,4 +130,113 @@ fn words(diagnosis: &Diagnosis) -> String {
         );
     }
     text
+}
+
+/// A finding: what, how large, how much of all, along what, with which parameters.
+fn line(f: &Finding) -> String {
+    let name = match (f.status, f.effect) {
+        (Status::Recalibrate, _) => "sigma itself is off: calibrate again".to_string(),
+        (Status::OneOf, _) => {
+            let names: Vec<&str> = f.alternatives.iter().take(3).map(|a| a.effect).collect();
+            names.join(" or ")
+        }
+        (_, Some(effect)) => effect.to_string(),
+        (_, None) => format!("something without a name ({})", f.shape.as_deref().unwrap_or("")),
+    };
+    let size = if f.statistic == Statistic::Dropout {
+        format!("{:.1} % of the pixels lost", 100.0 * f.size.sigma)
+    } else {
+        format!("{:.2} mm, {:.2} sigma", f.size.mm, f.size.sigma)
+    };
+    let parameters = f.parameters.iter();
+    let parameters: Vec<String> = parameters
+        .filter_map(|(k, v)| Some(format!("{k} {:.4}", v.get("value")?.as_f64()?)))
+        .collect();
+    let parameters = match parameters.join(", ") {
+        none if none.is_empty() => none,
+        some => format!("; {some}"),
+    };
+    format!("  {name}: {size}, {:.0} % of it; along {}{parameters}\n", 100.0 * f.share, f.axis)
+}
+
+/// Where diagnosis and simulator meet: the views worth seeing, each with its simulated twin.
+/// `given` is the model that the recording was held against.
+fn with_twins(done: &Diagnosed, sensor: &Sensor, given: &NoiseModel, seed: Seed) -> Vec<Picture> {
+    let rays = sensor.camera.rays();
+    let effects = shown_effects(&done.model);
+    let twin = Twin { sensor, rays: &rays, model: &done.model, effects: &effects, seed };
+    let session_s = done.fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
+    // Beside a simulated recording, what is shown is a difference already.
+    let retake = |index, field: &Field| {
+        if done.against.is_empty() { twin.frames(index, field, session_s) } else { None }
+    };
+    pictures(done, sensor, given, &retake).into_iter().map(|p| picture(p, done)).collect()
+}
+
+/// Effects that move the plane as a whole: a picture about the plane does not show them.
+const OF_THE_PLANE: [&str; 3] = ["depth-scale", "disparity-offset", "thermal-drift"];
+
+/// All others that the simulator can make.
+fn shown_effects(model: &NoiseModel) -> Vec<Active> {
+    let mut effects = model.effects.clone();
+    effects.retain(|e| {
+        let is_known = Active::all_of_model(std::slice::from_ref(e)).is_ok();
+        is_known && !OF_THE_PLANE.contains(&e.id.as_str())
+    });
+    Active::all_of_model(&effects).unwrap_or_default()
+}
+
+struct Twin<'a> {
+    sensor: &'a Sensor,
+    rays: &'a Rays,
+    model: &'a NoiseModel,
+    effects: &'a [Active],
+    seed: Seed,
+}
+
+/// More frames of a twin than this add nothing that an eye sees.
+const MAX_TWIN_FRAMES: usize = 16;
+
+impl Twin<'_> {
+    fn frames(&self, index: usize, field: &Field, session_s: f64) -> Option<Vec<(f64, Frame)>> {
+        let times = field.frames.iter().take(MAX_TWIN_FRAMES).map(|f| f.0);
+        let stamps = times.map(|t| field.time_s + t).collect();
+        let notes = ViewNotes {
+            temperature_c: field.temperature_c,
+            ambient_lux: field.ambient_lux,
+            ..ViewNotes::default()
+        };
+        let plan = plan_on(&field.name, &field.plane, &field.pixels, self.rays, stamps, notes);
+        let seen = plan.seen(&self.sensor.camera, self.rays);
+        let camera = FormulaSensor {
+            sensor: self.sensor,
+            rays: self.rays,
+            sigma: &self.model.sigma,
+            effects: self.effects,
+            seed: self.seed,
+        };
+        let mut shooting = camera.begin(&seen).under(plan.ambient_lux).at(plan.notes.temperature_c);
+        let shot = |(_, instant): (f64, Instant)| (instant.view_s, shooting.shoot(instant).depth);
+        Some(plan.instants(index, session_s).map(shot).collect())
+    }
+}
+
+fn picture(p: ViewPictures, done: &Diagnosed) -> Picture {
+    let view = &done.diagnosis.views[p.view];
+    let tilt = view.theta_rad.to_degrees();
+    let beyond = if done.against.is_empty() { "" } else { ", recorded minus simulated" };
+    let plural = if view.frames == 1 { "" } else { "s" };
+    Picture {
+        caption: format!(
+            "View {}{beyond}: board at {:.2} m, tilted {tilt:.0}°; mean of {} frame{plural}",
+            view.name, view.z_m, view.frames
+        ),
+        width: p.width,
+        height: p.height,
+        range: p.range_px(),
+        before: p.before,
+        after: p.after,
+        simulated: p.twin,
+        unit: "px",
+    }
 }

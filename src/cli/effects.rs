@@ -15,7 +15,7 @@ pub struct Arguments {
 }
 
 /// Columns of a page of text.
-const PAGE_COLUMNS: usize = 100;
+const MAX_COLUMNS: usize = 100;
 const INDENT: &str = "    ";
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
@@ -39,25 +39,28 @@ fn cards(ids: &[String]) -> anyhow::Result<Vec<&'static Card>> {
 
 fn page(card: &Card) -> String {
     let mut page = format!("{}\n", card.id);
-    let shows = format!("shows in {}, over {}", in_words(card.statistic), card.axis);
-    let knobs =
-        card.parameters.iter().enumerate().map(|(n, p)| knob(p, (n == 0).then_some(card.identity)));
-    let lines = [card.summary.to_string(), shows].into_iter().chain(knobs).chain([
-        format!("taken for: {}", card.confused_with),
+    let shows = format!("shows in {}, over {}", describe(card.statistic), card.axis);
+    let parameters = card
+        .parameters
+        .iter()
+        .enumerate()
+        .map(|(n, p)| parameter(p, (n == 0).then_some(card.identity)));
+    let lines = [card.summary.to_string(), shows].into_iter().chain(parameters).chain([
+        format!("easily taken for: {}", card.confused_with),
         format!("source: {}", card.reference),
     ]);
     lines.for_each(|line| wrap(&line, &mut page));
     page
 }
 
-fn knob(p: &Parameter, identity: Option<f64>) -> String {
+fn parameter(p: &Parameter, identity: Option<f64>) -> String {
     let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
     let off = identity.map_or(String::new(), |value| format!(", off at {value}"));
     let [low, high] = p.range;
     format!("{} = {low} to {high}{unit}, typical {}{off}: {}", p.name, p.typical, p.summary)
 }
 
-fn in_words(statistic: &str) -> &str {
+fn describe(statistic: &str) -> &str {
     match statistic {
         "bias" => "the mean error",
         "variance" => "the size of the noise",
@@ -72,7 +75,7 @@ fn in_words(statistic: &str) -> &str {
 fn wrap(text: &str, page: &mut String) {
     let mut column = 0;
     for word in text.split_whitespace() {
-        if column + 1 + word.len() > PAGE_COLUMNS || column == 0 {
+        if column + 1 + word.len() > MAX_COLUMNS || column == 0 {
             page.push_str(if column == 0 { INDENT } else { "\n      " });
             column = INDENT.len() + 2;
         } else {
@@ -90,7 +93,7 @@ fn as_json(card: &Card) -> serde_json::Value {
     json!({
         "id": card.id,
         "words": card.summary,
-        "stage": card.stage,
+        "stage": format!("{:?}", card.stage),
         "statistic": card.statistic,
         "axis": card.axis,
         "parameters": card.parameters.iter().map(parameter).collect::<Vec<_>>(),

@@ -46,12 +46,12 @@ impl Arguments {
 }
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
-    let told = evaluate_files(&arguments.truth, &arguments.estimate, arguments.delta()?)?;
-    tell(&told, arguments);
-    global.print_json(&as_json(&told))
+    let evaluation = evaluate_files(&arguments.truth, &arguments.estimate, arguments.delta()?)?;
+    report(&evaluation, arguments);
+    global.print_json(&as_json(&evaluation))
 }
 
-fn tell(told: &Evaluation, arguments: &Arguments) {
+fn report(evaluation: &Evaluation, arguments: &Arguments) {
     let line = |name: &str, s: &Spread, unit: &str| {
         say(format!(
             "{name} {unit}: rmse {:.6}  mean {:.6}  median {:.6}  std {:.6}  min {:.6}  max {:.6}  of {} pairs",
@@ -62,17 +62,17 @@ fn tell(told: &Evaluation, arguments: &Arguments) {
         Unit::S => format!("RPE over {} s,", arguments.delta),
         Unit::F => format!("RPE over {} frames,", arguments.delta),
     };
-    line("ATE after alignment,", &told.ate.error, "m");
-    line(&interval, &told.rpe.translation, "m");
-    line(&interval, &told.rpe.rotation.scaled(1f64.to_degrees()), "degrees");
+    line("ATE after alignment,", &evaluation.ate.error, "m");
+    line(&interval, &evaluation.rpe.translation, "m");
+    line(&interval, &evaluation.rpe.rotation.scaled(1f64.to_degrees()), "degrees");
 }
 
-/// The keys of `evaluate --json`.
-pub fn as_json(told: &Evaluation) -> Value {
+/// ATE and RPE, as the TUM scripts name them.
+pub fn as_json(evaluation: &Evaluation) -> Value {
     json!({
-        "ate": spread(&told.ate.error, "m"),
-        "rpe_translation": spread(&told.rpe.translation, "m"),
-        "rpe_rotation": spread(&told.rpe.rotation.scaled(1f64.to_degrees()), "deg"),
+        "ate": spread(&evaluation.ate.error, "m"),
+        "rpe_translation": spread(&evaluation.rpe.translation, "m"),
+        "rpe_rotation": spread(&evaluation.rpe.rotation.scaled(1f64.to_degrees()), "deg"),
     })
 }
 

@@ -1,26 +1,23 @@
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use kinoise::evaluate::{Delta, Evaluation, evaluate};
 use kinoise::io::OutputDir;
-use kinoise::map::{
-    Alignment, Init, Kernel, Mapped, Method, Options, Stages, Weights, frames_csv, map, ply,
-};
+use kinoise::map::{self, Init, Kernel, Mapped, Options, Stages, Weights, frames_csv, ply};
 use kinoise::report::map_page;
 use kinoise::sequence::{Sequence, open};
 use kinoise::trajectory::tum_text;
 use kinoise::{NoiseModel, Seed};
 use serde_json::{Value, json};
 
-use super::common::{Bar, Global, Input, say};
+use super::common::{Bar, Global, Input, Model, Thinning, notes, one_of, say};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// A sequence in the layout of the TUM RGB-D benchmark or of 7-Scenes
     sequence: PathBuf,
-    /// model.json of this sensor [default: the paper's Eq. 1]
-    #[arg(long, value_name = "FILE")]
-    model: Option<PathBuf>,
+    #[command(flatten)]
+    model: Model,
     /// Folder for trajectory.txt, map.ply, stats.json and map.html
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
@@ -31,19 +28,36 @@ pub struct Arguments {
 }
 
 #[derive(Debug, Args)]
-pub struct Tuning {
+struct Tuning {
     /// What frames are aligned to, and how
-    #[arg(long, value_enum, default_value = "best")]
-    method: MethodName,
+    #[arg(long, default_value = "best", value_parser = one_of::<Method, 4>([
+        ("best", "What was measured to be best: model", Options::best),
+        ("paper", "The paper's: 3 cm voxels, exact nearest neighbours, frame to frame", paper),
+        ("projective", "Image blocks, neighbours by projection, frame to frame: the fastest", projective),
+        ("model", "Image blocks, neighbours by projection, frame to map", Options::best),
+    ]))]
+    method: Method,
     /// What a pair of points weighs [default: both; with --method paper: model]
-    #[arg(long, value_enum)]
-    weights: Option<WeightsName>,
+    #[arg(long, value_parser = one_of([
+        ("none", "All the same", Weights::None),
+        ("model", "The paper's 1/sigma(d_z, theta) of the standing point", Weights::Model),
+        ("both", "What both points err by across their surface", Weights::Both),
+    ]))]
+    weights: Option<Weights>,
     /// Where an alignment starts [default: motion; with --method paper: none]
-    #[arg(long, value_enum)]
-    init: Option<InitName>,
+    #[arg(long, value_parser = one_of([
+        ("none", "Where the last frame was", Init::None),
+        ("motion", "As the last two frames moved", Init::Motion),
+        ("orb", "Where ORB features say", Init::Orb),
+    ]))]
+    init: Option<Init>,
     /// How outliers count [default: huber; with --method paper: square]
-    #[arg(long, value_enum)]
-    kernel: Option<KernelName>,
+    #[arg(long, value_parser = one_of([
+        ("square", "", Kernel::Square),
+        ("huber", "", Kernel::Huber),
+        ("tukey", "", Kernel::Tukey),
+    ]))]
+    kernel: Option<Kernel>,
     /// Side of a voxel in m
     #[arg(long, value_name = "M")]
     voxel: Option<f32>,
@@ -59,90 +73,36 @@ pub struct Tuning {
     /// Observations of a piece of the map that count at most
     #[arg(long, value_name = "N")]
     memory: Option<f32>,
-    /// Take every Nth depth image
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub stride: usize,
-    /// Take the first N of those
-    #[arg(long, value_name = "N")]
-    pub frames: Option<usize>,
+    #[command(flatten)]
+    thinning: Thinning,
     /// Do not read colour for the map
     #[arg(long)]
     no_colour: bool,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum MethodName {
-    /// What was measured to be best: model
-    Best,
-    /// The paper's: 3 cm voxels, exact nearest neighbours, frame to frame
-    Paper,
-    /// Image blocks, neighbours by projection, frame to frame: the fastest
-    Projective,
-    /// Image blocks, neighbours by projection, frame to map
-    Model,
+/// The options that a method begins with.
+type Method = fn() -> Options;
+
+fn paper() -> Options {
+    Options::paper(Weights::Model, Init::None)
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum WeightsName {
-    /// All the same
-    None,
-    /// The paper's 1/sigma(d_z, theta) of the standing point
-    Model,
-    /// What both points err by across their surface
-    Both,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum InitName {
-    /// Where the last frame was
-    None,
-    /// As the last two frames moved
-    Motion,
-    /// Where ORB features say
-    Orb,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum KernelName {
-    Square,
-    Huber,
-    Tukey,
+fn projective() -> Options {
+    Options { method: map::Method::Projective, ..Options::best() }
 }
 
 impl Tuning {
-    pub fn options(&self, seed: Seed) -> Options {
-        let mut options = match self.method {
-            MethodName::Best | MethodName::Model => Options::best(),
-            MethodName::Paper => Options::paper(Weights::Model, Init::None),
-            MethodName::Projective => Options { method: Method::Projective, ..Options::best() },
-        };
-        if let Some(weights) = self.weights {
-            options.weights = match weights {
-                WeightsName::None => Weights::None,
-                WeightsName::Model => Weights::Model,
-                WeightsName::Both => Weights::Both,
-            };
-        }
-        if let Some(init) = self.init {
-            options.init = match init {
-                InitName::None => Init::None,
-                InitName::Motion => Init::Motion,
-                InitName::Orb => Init::Orb,
-            };
-        }
-        if let Some(kernel) = self.kernel {
-            options.kernel = match kernel {
-                KernelName::Square => Kernel::Square,
-                KernelName::Huber => Kernel::Huber,
-                KernelName::Tukey => Kernel::Tukey,
-            };
-        }
+    fn options(&self, seed: Seed) -> Options {
+        let options = (self.method)();
         Options {
+            weights: self.weights.unwrap_or(options.weights),
+            init: self.init.unwrap_or(options.init),
+            kernel: self.kernel.unwrap_or(options.kernel),
             voxel_m: self.voxel.unwrap_or(options.voxel_m),
             block_px: self.block.unwrap_or(options.block_px),
-            max_correspondence_m: self.gate.unwrap_or(options.max_correspondence_m),
+            gate_m: self.gate.unwrap_or(options.gate_m),
             max_iterations: self.iterations.unwrap_or(options.max_iterations),
-            max_observations: self.memory.unwrap_or(options.max_observations),
+            max_counted: self.memory.unwrap_or(options.max_counted),
             colour: !self.no_colour,
             seed,
             ..options
@@ -150,22 +110,19 @@ impl Tuning {
     }
 }
 
-pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
+pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let mut sequence = open(&arguments.sequence, &arguments.input.assumed()?)?;
-    sequence.thin(arguments.tuning.stride, arguments.tuning.frames);
-    let model = match &arguments.model {
-        Some(path) => NoiseModel::read(path)?,
-        None => NoiseModel::paper(),
-    };
+    let thinning = &arguments.tuning.thinning;
+    sequence.thin(thinning.stride, thinning.frames);
+    let model = arguments.model.read()?;
     let options = arguments.tuning.options(global.seed());
     options.check()?;
     let title = format!("Map of {}", name_of(&arguments.sequence));
     let stats = follow(&sequence, &model, &options, &title, &arguments.output)?;
-    global.print_json(&stats)?;
-    Ok(0)
+    global.print_json(&stats)
 }
 
-/// Map, write every output, tell; what stats.json says.
+/// Map, write every output, report; what stats.json says.
 pub fn follow(
     sequence: &Sequence,
     model: &NoiseModel,
@@ -176,7 +133,7 @@ pub fn follow(
     let output = OutputDir::create(folder)?;
     let bar = Bar::new("frames");
     let begin = std::time::Instant::now();
-    let mapped = map(sequence, model, options, &|done, all| bar.step(done, all))?;
+    let mapped = map::map(sequence, model, options, &|done, all| bar.step(done, all))?;
     drop(bar);
     let seconds = begin.elapsed().as_secs_f64();
     let against = truth(sequence, &mapped);
@@ -187,10 +144,8 @@ pub fn follow(
     output.write("map.html", page.as_bytes())?;
     output.write("frames.csv", frames_csv(&mapped.frames).as_bytes())?;
     output.write("stats.json", serde_json::to_string_pretty(&stats)?.as_bytes())?;
-    for remark in sequence.remarks.iter().chain(&mapped.remarks) {
-        say(format!("note: {remark}"));
-    }
-    tell(&mapped, &against, folder);
+    notes(sequence.remarks.iter().chain(&mapped.remarks));
+    report(&mapped, &against, folder);
     Ok(stats)
 }
 
@@ -199,19 +154,19 @@ fn truth(sequence: &Sequence, mapped: &Mapped) -> Option<Result<Evaluation, Stri
     if sequence.truth.is_empty() {
         return None;
     }
-    let told = evaluate(&sequence.truth, &mapped.trajectory(), Delta::Seconds(1.0));
-    Some(told.map_err(|e| e.to_string()))
+    let evaluation = evaluate(&sequence.truth, &mapped.trajectory(), Delta::Seconds(1.0));
+    Some(evaluation.map_err(|e| e.to_string()))
 }
 
-fn tell(mapped: &Mapped, against: &Option<Result<Evaluation, String>>, output: &Path) {
+fn report(mapped: &Mapped, against: &Option<Result<Evaluation, String>>, output: &Path) {
     match against {
-        Some(Ok(told)) => say(format!(
+        Some(Ok(evaluation)) => say(format!(
             "against the ground truth: ATE {:.4} m, RPE over 1 s {:.4} m and {:.3} degrees (rmse)",
-            told.ate.error.rmse,
-            told.rpe.translation.rmse,
-            told.rpe.rotation.rmse.to_degrees()
+            evaluation.ate.error.rmse,
+            evaluation.rpe.translation.rmse,
+            evaluation.rpe.rotation.rmse.to_degrees()
         )),
-        Some(Err(why)) => say(format!("note: not held against the ground truth: {why}")),
+        Some(Err(why)) => say(format!("note: not compared with the ground truth: {why}")),
         None => {}
     }
     say(format!(
@@ -229,12 +184,11 @@ fn stats(
     against: &Option<Result<Evaluation, String>>,
     seconds: f64,
 ) -> Value {
-    let aligned: Vec<&Alignment> =
-        mapped.frames.iter().filter_map(|f| f.alignment.as_ref()).collect();
-    let mean = |of: fn(&Alignment) -> f64| {
-        aligned.iter().map(|a| of(a)).sum::<f64>() / aligned.len().max(1) as f64
+    let followed: Vec<_> = mapped.frames.iter().filter(|f| f.iterations > 0).collect();
+    let n = followed.len().max(1) as f64;
+    let mean = |of: &dyn Fn(&kinoise::map::FrameReport) -> f64| {
+        followed.iter().map(|f| of(f)).sum::<f64>() / n
     };
-    let min = |of: fn(&Alignment) -> f64| aligned.iter().map(|a| of(a)).fold(1.0, f64::min);
     let all: Vec<Stages> = mapped.frames.iter().map(|f| f.stages.clone()).collect();
     let mut ms: serde_json::Map<String, Value> =
         Stages::medians(&all).each().map(|(name, v)| (name.to_string(), json!(v))).collect();
@@ -243,10 +197,10 @@ fn stats(
     json!({
         "frames": mapped.frames.len(),
         "lost": mapped.lost(),
-        "iterations": mean(|a| a.iterations as f64),
-        "matched": mean(|a| a.inlier_ratio),
-        "least_matched": min(|a| a.inlier_ratio),
-        "weakest": min(|a| a.min_information),
+        "iterations": mean(&|f| f.iterations as f64),
+        "matched": mean(&|f| f.matched),
+        "least_matched": followed.iter().map(|f| f.matched).fold(1.0, f64::min),
+        "weakest": followed.iter().map(|f| f.weakest).fold(1.0, f64::min),
         "points": mapped.map.len(),
         "ms": ms,
         "seconds": seconds,
@@ -256,12 +210,12 @@ fn stats(
     })
 }
 
-fn name_of(path: &std::path::Path) -> String {
+fn name_of(path: &Path) -> String {
     let whole = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
     whole.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The most memory this process had, MB; of Linux, elsewhere null.
+/// The most memory this process had, MB; known on Linux only.
 fn peak_rss_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;

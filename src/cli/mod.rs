@@ -1,28 +1,20 @@
 //! One file a subcommand: its arguments and `run`.
 
 mod calibrate;
+mod calibrate_summary;
 mod capture;
-mod capture_audience;
-mod capture_views;
+mod capture_interface;
 mod common;
 mod compare;
 mod correct;
 mod demo;
 mod diagnose;
-mod diagnose_pictures;
 mod effects;
 mod evaluate;
-mod fit;
 mod map;
 mod simulate;
-mod simulate_poses;
-mod simulate_recipe;
 mod simulate_room;
-mod simulate_scenery;
-mod simulate_sensor;
-mod simulate_words;
-mod terminal;
-mod words;
+mod simulate_scene;
 
 use std::process::ExitCode;
 
@@ -43,10 +35,11 @@ struct Arguments {
 enum Command {
     /// Take views from a running Kinect, guided to those that matter
     Capture(capture::Arguments),
-    /// Fit sigma(z, theta) to recorded views of a plane: model.json, plots, report
+    /// Fit sigma(z, theta) to recorded views of a plane, or to a table: model.json, plots, report
     Calibrate(calibrate::Arguments),
     /// Fit sigma(z, theta) to a table z_m,theta_rad,sigma_m[,n]
-    Fit(fit::Arguments),
+    #[command(hide = true)]
+    Fit(calibrate::FitArguments),
     /// What a model leaves out of a recording: located, named, modelled, and shown to help
     Diagnose(diagnose::Arguments),
     /// Make a recording, or a film of a room, by formula or by light
@@ -59,7 +52,7 @@ enum Command {
     Compare(compare::Arguments),
     /// ATE and RPE of a trajectory, as the TUM scripts compute them
     Evaluate(evaluate::Arguments),
-    /// The catalogue of physical effects: what each does, how it shows, what it is taken for
+    /// The catalogue of physical effects: what each does, how it shows, what it resembles
     Effects(effects::Arguments),
     /// The whole road on bundled data
     Demo(demo::Arguments),
@@ -97,8 +90,8 @@ fn is_help(e: &clap::Error) -> bool {
 /// What clap says before its usage and its tips, without its "error: ".
 fn one_line(e: &clap::Error) -> String {
     let text = e.to_string();
-    let said = text.split("\n\n").next().unwrap_or_default();
-    let words: Vec<&str> = said.split_whitespace().collect();
+    let message = text.split("\n\n").next().unwrap_or_default();
+    let words: Vec<&str> = message.split_whitespace().collect();
     words.join(" ").trim_start_matches("error: ").to_string()
 }
 
@@ -108,11 +101,11 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     match &arguments.command {
         Command::Capture(a) => capture::run(a, global),
         Command::Calibrate(a) => calibrate::run(a, global).map(|()| 0),
-        Command::Fit(a) => fit::run(a, global).map(|()| 0),
+        Command::Fit(a) => calibrate::fit(a, global).map(|()| 0),
         Command::Diagnose(a) => diagnose::run(a, global),
         Command::Simulate(a) => simulate::run(a, global).map(|()| 0),
         Command::Correct(a) => correct::run(a, global).map(|()| 0),
-        Command::Map(a) => map::run(a, global),
+        Command::Map(a) => map::run(a, global).map(|()| 0),
         Command::Compare(a) => compare::run(a, global).map(|()| 0),
         Command::Evaluate(a) => evaluate::run(a, global).map(|()| 0),
         Command::Effects(a) => effects::run(a, global).map(|()| 0),

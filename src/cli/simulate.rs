@@ -1,27 +1,25 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use kinoise::effects::Active;
-use kinoise::io::{Assumed, open};
-use kinoise::simulate::room::Film;
+use kinoise::io::{Assumed, open, write_json};
+use kinoise::model::{Direction, Domain, PAPER_EQ1};
+use kinoise::simulate::room::{Film, Room};
 use kinoise::simulate::speckle::Causes;
-use kinoise::simulate::{Physics, Shoot, ViewPlan, plan_grid, plan_like};
-use kinoise::{Sensor, SigmaModel};
+use kinoise::simulate::{Physics, Shoot, ViewPlan, kinect_v1, plan_grid, plan_like};
+use kinoise::{Form, NoiseModel, Sensor, SigmaModel};
+use serde_json::{Value, json};
 
-use super::common::{Bar, Global, say};
-use super::simulate_poses::PosesArguments;
-use super::simulate_recipe::{check_recipe, write_recipe};
-use super::simulate_room::{self, FilmArguments, RoomArguments};
-use super::simulate_scenery::SceneryArguments;
-use super::simulate_sensor::sensor_and_noise;
-use super::simulate_words::{tell_of_blind, tell_of_clamped, tell_of_idle};
+use super::common::{Bar, Global, MAX_FRAMES, count, notes, say};
+use super::simulate_room::RoomArguments;
+use super::simulate_scene::{PosesArguments, SceneryArguments};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// New folder for the recording
     output: PathBuf,
-    /// model.json to shoot with [default: the paper's Eq. 1, taken at its word outside 1 to 4 m too]
+    /// model.json to shoot with [default: the paper's Eq. 1, also outside its 1 to 4 m]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// The world: errors by formula, or dots seen and matched in which errors arise by themselves
@@ -31,7 +29,7 @@ pub struct Arguments {
     #[arg(long = "cause", value_name = "NAME=VALUE", allow_hyphen_values = true)]
     causes: Vec<String>,
     /// Add a physical effect (see kinoise effects); repeatable
-    #[arg(long = "effect", value_name = "ID:KEY=VALUE", value_parser = effect)]
+    #[arg(long = "effect", value_name = "ID:KEY=VALUE", value_parser = Active::parse)]
     effects: Vec<Active>,
     /// Shoot the very views of this recording: planes, regions, pixels, frames, timestamps
     #[arg(long, value_name = "REC", conflicts_with_all = ["grid", "distances", "tilts", "azimuths", "frames", "shrink", "board", "wall_target", "patches", "wall", "clutter", "ordered", "conditions"])]
@@ -39,13 +37,13 @@ pub struct Arguments {
     #[command(flatten)]
     poses: PosesArguments,
     /// Frames a view [default: 1]; with --room, of the film [default: the whole path]
-    #[arg(long)]
+    #[arg(long, value_parser = count(1, MAX_FRAMES))]
     frames: Option<usize>,
     #[command(flatten)]
     room: RoomArguments,
     /// Make the image 1 to 8 times smaller each way [default: 1, which is 640 x 480]; not with a
     /// model that carries its own sensor
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count(1, 8))]
     shrink: Option<usize>,
     #[command(flatten)]
     scenery: SceneryArguments,
@@ -65,8 +63,70 @@ enum PhysicsArgument {
     Speckle,
 }
 
-fn effect(text: &str) -> Result<Active, String> {
-    Active::parse(text).map_err(|e| e.to_string())
+pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
+    if let Some(path) = &arguments.recipe {
+        check_recipe(path, &arguments.output)?;
+    }
+    let (model, given) = (arguments.model.as_deref(), &arguments.effects);
+    let (sensor, sigma, mut effects) = sensor_and_noise(model, arguments.shrink, given)?;
+    effects.extend(given.iter().cloned());
+    Active::refuse_twice(&effects)?;
+    let (made, recipe) = if arguments.room.room {
+        // A model brings its own sensor; without one it is what TUM readers assume.
+        let tum = || Film::kinect(arguments.shrink.unwrap_or(1));
+        let sensor = if arguments.model.is_some() { sensor } else { tum() };
+        let room = Room::office(global.seed());
+        let poses = arguments.room.path(&room, arguments.frames)?;
+        let film = Film { sensor, room, poses, sigma, effects, seed: global.seed() };
+        write_film(&film, &arguments.output)?
+    } else {
+        shoot(arguments, sensor, physics(arguments, sigma, effects)?, global)?
+    };
+    if let Some(path) = &arguments.recipe {
+        write_json(path, &recipe, "report this as a bug")?;
+    }
+    global.print_json(&made)
+}
+
+/// Film the office: what programs are told of it, and the recipe.
+fn write_film(film: &Film, output: &Path) -> anyhow::Result<(Value, Value)> {
+    let bar = Bar::new("frames");
+    film.write(output, &|done, all| bar.step(done, all))?;
+    drop(bar);
+    let frames = film.poses.len();
+    say(format!("wrote {frames} frames of a room to {}", output.display()));
+    Ok((json!({"frames": frames, "output": output}), film.recipe()))
+}
+
+/// Shoot the views of a plane: what programs are told of them, and the recipe.
+fn shoot(
+    arguments: &Arguments,
+    sensor: Sensor,
+    physics: Physics,
+    global: &Global,
+) -> anyhow::Result<(Value, Value)> {
+    let (views, recorded_by) = plans(arguments, global)?;
+    let sensor = recorded_by.unwrap_or(sensor);
+    if let Physics::Formula { sigma, effects } = &physics {
+        note_clamped(&views, sigma);
+        note_idle(effects, &arguments.scenery);
+    }
+    let shoot = Shoot { sensor, views, physics, infrared: arguments.infrared, seed: global.seed() };
+    let bar = Bar::new("views");
+    let blind = shoot.write(&arguments.output, &|done, all| bar.step(done, all))?;
+    drop(bar);
+    const UNSEEN: &str = "the target is out of the picture or beyond the depth code";
+    let (output, views) = (arguments.output.display(), shoot.views.len());
+    if blind.len() == views {
+        bail!(
+            "{output}: no view shows any depth: {UNSEEN}; change --distances, --azimuths or --board"
+        );
+    }
+    notes(blind.iter().map(|name| format!("view {name} shows no depth: {UNSEEN}")));
+    let frames: usize = shoot.views.iter().map(|v| v.stamps.len()).sum();
+    say(format!("wrote {views} views, {frames} frames, to {output}"));
+    let made = json!({"views": views, "frames": frames, "output": arguments.output});
+    Ok((made, shoot.recipe()))
 }
 
 /// The views, and the sensor of the recording that is shot again.
@@ -77,85 +137,20 @@ fn plans(
     let seed = global.seed();
     let scenery = arguments.scenery.scenery()?;
     let Some(like) = &arguments.like else {
-        let poses = arguments.poses.views()?;
-        let shuffled = !arguments.poses.ordered;
-        return Ok((
-            plan_grid(&poses, &scenery, arguments.frames.unwrap_or(1), shuffled, seed),
-            None,
-        ));
+        let (frames, shuffled) = (arguments.frames.unwrap_or(1), !arguments.poses.ordered);
+        let plans = plan_grid(&arguments.poses.views()?, &scenery, frames, shuffled, seed);
+        return Ok((plans, None));
     };
     let recording = open(like, &Assumed::default())?;
     let (plans, excluded) = plan_like(&recording, scenery.reference_error_m.unwrap_or(0.0), seed);
-    for view in &excluded {
-        say(format!("note: {view}"));
-    }
+    notes(&excluded);
     if plans.is_empty() {
         bail!("{}: no view shows a plane; see the notes", like.display());
     }
     Ok((plans, Some(recording.sensor)))
 }
 
-/// An hour at 30 Hz.
-const MAX_FRAMES: usize = 108_000;
-
-pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
-    if let Some(n) = arguments.frames.filter(|n| !(1..=MAX_FRAMES).contains(n)) {
-        bail!("--frames {n}: give a number from 1 to {MAX_FRAMES}");
-    }
-    if let Some(path) = &arguments.recipe {
-        check_recipe(path, &arguments.output)?;
-    }
-    let (model, given) = (arguments.model.as_deref(), &arguments.effects);
-    let (sensor, sigma, mut effects) = sensor_and_noise(model, arguments.shrink, given)?;
-    effects.extend(given.iter().cloned());
-    Active::refuse_twice(&effects)?;
-    if arguments.room.room {
-        let shot = FilmArguments {
-            output: &arguments.output,
-            frames: arguments.frames,
-            recipe: arguments.recipe.as_deref(),
-            // A model brings its own sensor; without one it is what TUM readers assume.
-            sensor: if arguments.model.is_some() {
-                sensor
-            } else {
-                Film::kinect(arguments.shrink.unwrap_or(1))
-            },
-            sigma,
-            effects,
-        };
-        return simulate_room::run(&arguments.room, shot, global);
-    }
-    let (views, recorded_by) = plans(arguments, global)?;
-    let sensor = recorded_by.unwrap_or(sensor);
-    let physics = physics(arguments, sigma, effects)?;
-    if let Physics::Formula { sigma, effects } = &physics {
-        tell_of_clamped(&views, sigma);
-        tell_of_idle(effects, &arguments.scenery);
-    }
-    let shoot = Shoot { sensor, views, physics, infrared: arguments.infrared, seed: global.seed() };
-    let bar = Bar::new("views");
-    let blind = shoot.write(&arguments.output, &|done, all| bar.step(done, all))?;
-    drop(bar);
-    if blind.len() == shoot.views.len() {
-        bail!(
-            "{}: no view shows any depth: the target is out of the picture or beyond the depth code; change --distances, --azimuths or --board",
-            arguments.output.display()
-        );
-    }
-    tell_of_blind(&blind);
-    if let Some(path) = &arguments.recipe {
-        write_recipe(path, &shoot.recipe())?;
-    }
-    let frames: usize = shoot.views.iter().map(|v| v.stamps.len()).sum();
-    say(format!(
-        "wrote {} views, {frames} frames, to {}",
-        shoot.views.len(),
-        arguments.output.display()
-    ));
-    global.print_json(&serde_json::json!({"views": shoot.views.len(), "frames": frames, "output": arguments.output}))
-}
-
-/// Which world; each refuses what only the other knows.
+/// Formula or speckle; each refuses the options of the other.
 fn physics(
     arguments: &Arguments,
     sigma: SigmaModel,
@@ -174,8 +169,107 @@ fn physics(
         bail!("--model: it brings effects, which are formulas; by light there is --cause");
     }
     if arguments.model.is_some() {
-        say("note: of the model only the sensor is used: by light sigma comes by itself");
+        say("note: of the model only the sensor is used: by light sigma arises by itself");
     }
     let causes = arguments.causes.iter().try_fold(Causes::default(), |c, text| c.parse(text))?;
     Ok(Physics::Speckle { causes })
+}
+
+/// The model's own sensor, sigma and effects, or a Kinect and Eq. 1. Effects `given` beside a model
+/// must not be in its shapes already: they would count twice.
+fn sensor_and_noise(
+    model: Option<&Path>,
+    shrink: Option<usize>,
+    given: &[Active],
+) -> anyhow::Result<(Sensor, SigmaModel, Vec<Active>)> {
+    let factor = shrink.unwrap_or(1);
+    let Some(path) = model else {
+        return Ok((kinect_v1(factor), eq1_everywhere(), Vec::new()));
+    };
+    let model = NoiseModel::read(path)?;
+    let sensor = match model.sensor {
+        Some(_) if shrink.is_some() => {
+            bail!("--shrink: {} brings its own sensor; leave --shrink out", path.display())
+        }
+        Some(file) => {
+            file.sensor().map_err(|e| anyhow::anyhow!("{}: sensor: {e}", path.display()))?
+        }
+        None => kinect_v1(factor),
+    };
+    if model.sigma.direction == Direction::Perpendicular {
+        say(format!(
+            "note: {} describes distances across the plane; depth noise is 1/cos(tilt) times them",
+            path.display()
+        ));
+    }
+    let effects =
+        Active::all_of_model(&model.effects).with_context(|| path.display().to_string())?;
+    let shaped = |id: &str| model.effects.iter().any(|e| e.id == id && !e.shape.is_empty());
+    if let Some(id) = given.iter().map(|a| a.effect.card().id).find(|id| shaped(id)) {
+        bail!(
+            "--effect {id}: the model brings its shape; take it out of the model, or leave --effect out"
+        );
+    }
+    Ok((sensor, model.sigma, effects))
+}
+
+/// Eq. 1 everywhere a board of this size reaches, short of its pole.
+fn eq1_everywhere() -> SigmaModel {
+    let domain = Domain { z_m: [0.2, 10.0], theta_rad: [0.0, PAPER_EQ1[5] - 0.02] };
+    SigmaModel::published(Form::Paper, &PAPER_EQ1, domain)
+}
+
+/// Views outside the range in which the model was fitted.
+fn note_clamped(views: &[ViewPlan], sigma: &SigmaModel) {
+    let outside = |v: &&ViewPlan| {
+        let plane = &v.bench.plane;
+        // No recording has a tilt of exactly zero; facing the target is inside all the same.
+        let theta = plane.theta().max(sigma.domain.theta_rad[0]);
+        !sigma.domain.contains(plane.depth(0.0, 0.0), theta)
+    };
+    let count = views.iter().filter(outside).count();
+    if count > 0 {
+        let d = sigma.domain;
+        say(format!(
+            "note: {count} of {} views lie outside the model's range (z {:.2} to {:.2} m, tilt up to {:.1} degrees); sigma is clamped to its edge there",
+            views.len(),
+            d.z_m[0],
+            d.z_m[1],
+            d.theta_rad[1].to_degrees()
+        ));
+    }
+}
+
+/// Effects that have nothing to act on in this scene.
+fn note_idle(effects: &[Active], scenery: &SceneryArguments) {
+    for active in effects {
+        let missing = match active.effect.card().id {
+            "occlusion-shadow" | "edge-mixing" if scenery.wall.is_none() => {
+                "something behind the target (--wall)"
+            }
+            "intensity-dependent-noise" if !scenery.patches => {
+                "a target of several greys (--patches)"
+            }
+            _ => continue,
+        };
+        say(format!("note: {} needs {missing} to show much", active.effect.card().id));
+    }
+}
+
+/// A recipe is a new file outside the recording; checked before hours of shooting, not after.
+fn check_recipe(path: &Path, output: &Path) -> anyhow::Result<()> {
+    if path.exists() {
+        bail!("--recipe {}: the file exists; name a new one", path.display());
+    }
+    if path.starts_with(output) {
+        bail!(
+            "--recipe {}: inside the recording it would give the answer away; put it elsewhere",
+            path.display()
+        );
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    if folder.is_some_and(|f| !f.is_dir()) {
+        bail!("--recipe {}: its folder does not exist; make it first", path.display());
+    }
+    Ok(())
 }

@@ -2,16 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
 use clap::Args;
-use kinoise::effects::Active;
 use kinoise::simulate::room::{
-    CLEARANCE_M, Film, Pose, Resampled, Room, around_the_desks, place, read_trajectory, resample,
+    CLEARANCE_M, Pose, Resampled, Room, around_the_desks, place, read_trajectory, resample,
 };
-use kinoise::{Sensor, SigmaModel};
 
-use super::common::{Bar, Global, say};
-use super::simulate_recipe::write_recipe;
+use super::common::{MAX_FRAMES, count, say};
 
 #[derive(Debug, Args)]
 pub struct RoomArguments {
@@ -19,49 +15,22 @@ pub struct RoomArguments {
     #[arg(long, conflicts_with_all = ["like", "grid", "distances", "tilts", "azimuths", "ordered", "board", "wall_target", "patches", "wall", "clutter", "reference_error", "conditions", "infrared", "physics", "causes"])]
     pub room: bool,
     /// Poses to film along: timestamp tx ty tz qx qy qz qw, z up [default: once around the desks]
-    #[arg(long, value_name = "POSES", requires = "room", requires = "room")]
+    #[arg(long, value_name = "POSES", requires = "room")]
     trajectory: Option<PathBuf>,
     /// Take every Nth frame of the path
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "room")]
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "room", value_parser = count(1, MAX_FRAMES))]
     stride: usize,
 }
 
-/// What the film shares with the other recordings.
-pub struct FilmArguments<'a> {
-    pub output: &'a Path,
-    pub frames: Option<usize>,
-    pub recipe: Option<&'a Path>,
-    pub sensor: Sensor,
-    pub sigma: SigmaModel,
-    pub effects: Vec<Active>,
-}
-
-pub fn run(
-    arguments: &RoomArguments,
-    film: FilmArguments<'_>,
-    global: &Global,
-) -> anyhow::Result<()> {
-    if arguments.stride == 0 {
-        bail!("--stride 0: give 1 or more");
+impl RoomArguments {
+    /// The poses to film from, at most so many.
+    pub fn path(&self, room: &Room, frames: Option<usize>) -> anyhow::Result<Vec<Pose>> {
+        let all = match &self.trajectory {
+            Some(file) => fitted(file, room, frames, self.stride)?,
+            None => around_the_desks(),
+        };
+        Ok(all.into_iter().step_by(self.stride).take(frames.unwrap_or(usize::MAX)).collect())
     }
-    let room = Room::office(global.seed());
-    let all = match &arguments.trajectory {
-        Some(file) => fitted(file, &room, film.frames, arguments.stride)?,
-        None => around_the_desks(),
-    };
-    let poses: Vec<Pose> =
-        all.into_iter().step_by(arguments.stride).take(film.frames.unwrap_or(usize::MAX)).collect();
-    let FilmArguments { output, recipe, sensor, sigma, effects, .. } = film;
-    let film = Film { sensor, room, poses, sigma, effects, seed: global.seed() };
-    let bar = Bar::new("frames");
-    film.write(output, &|done, all| bar.step(done, all))?;
-    drop(bar);
-    if let Some(path) = recipe {
-        write_recipe(path, &film.recipe())?;
-    }
-    let frames = film.poses.len();
-    say(format!("wrote {frames} frames of a room to {}", output.display()));
-    global.print_json(&serde_json::json!({"frames": frames, "output": output}))
 }
 
 /// The path of a file, at 30 Hz and in the room.
@@ -85,7 +54,7 @@ fn fitted(
     if !gaps.is_empty() {
         let seconds: f64 = gaps.iter().map(|g| g.seconds()).sum();
         say(format!(
-            "note: {}: {} gaps without poses, {seconds:.1} s in all; the camera glides through them",
+            "note: {}: {} gaps without poses, {seconds:.1} s in all; the path is interpolated there",
             file.display(),
             gaps.len()
         ));

@@ -1,4 +1,4 @@
-//! The dump that the stand-in plays, looked at beforehand.
+//! The dump that fakenect plays, libfreenect's stand-in; each line is checked beforehand.
 //!
 //! fakenect ends the whole process when FAKENECT_PATH is not set or a file is missing, and reads
 //! beyond the end of a file that is cut short. So it is only ever asked for lines that are good.
@@ -11,51 +11,55 @@ use super::ffi::DEPTH_BYTES;
 use crate::error::{Error, Result};
 use crate::io::INDEX;
 
-/// Lines of a dump that can be played.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A dump, and how far it has been played.
+#[derive(Debug)]
 pub struct Dump {
-    pub root: PathBuf,
-    /// How many lines, from the first, are good.
-    pub good: usize,
-    /// What is wrong with the line after them; `None` when the dump simply ends there.
-    pub fault: Option<String>,
+    root: PathBuf,
+    lines: Vec<String>,
+    played: usize,
 }
 
 impl Dump {
-    /// Look at every file of the dump at `root`.
+    /// Read the index of the dump at `root`.
     ///
     /// # Errors
     /// When there is no index, or its first line is already bad.
-    pub fn check(root: &Path) -> Result<Self> {
+    pub fn open(root: &Path) -> Result<Self> {
         let index = root.join(INDEX);
         let text = std::fs::read_to_string(&index).map_err(|e| Error::read(&index, e))?;
         // fakenect ends at the first empty line.
-        let lines: Vec<&str> = text.split('\n').take_while(|line| !line.is_empty()).collect();
-        let mut dump = Dump { root: root.into(), good: 0, fault: None };
-        for (number, line) in lines.iter().enumerate() {
-            if let Err(what) = good(root, line) {
-                dump.fault = Some(format!("{}, line {}: {what}", index.display(), number + 1));
-                break;
-            }
-            dump.good += 1;
-        }
-        if dump.good == 0 {
-            let what = dump.fault.unwrap_or_else(|| format!("{} is empty", index.display()));
-            return Err(Error::sensor(what, "record the dump again with fakenect-record"));
-        }
+        let lines = text.split('\n').take_while(|line| !line.is_empty()).map(String::from);
+        let dump = Dump { root: root.into(), lines: lines.collect(), played: 0 };
+        let first =
+            dump.next_line().unwrap_or_else(|| Err(format!("{} is empty", index.display())));
+        let remedy = "record the dump again with fakenect-record";
+        first.map_err(|what| Error::sensor(what, remedy))?;
         Ok(dump)
     }
 
-    /// Why it ends where it ends.
-    pub fn ending(&self) -> String {
-        match &self.fault {
-            Some(fault) => format!("the dump is damaged: {fault}"),
-            None => format!("the dump in {} has no more frames", self.root.display()),
+    /// Allow fakenect its next line.
+    ///
+    /// # Errors
+    /// A sentence that says why the dump ends here.
+    pub fn advance(&mut self) -> std::result::Result<(), String> {
+        match self.next_line() {
+            None => return Err(format!("the dump in {} has no more frames", self.root.display())),
+            Some(Err(fault)) => return Err(format!("the dump is damaged: {fault}")),
+            Some(Ok(())) => self.played += 1,
         }
+        Ok(())
+    }
+
+    /// Is the next line good? `None` at the end.
+    fn next_line(&self) -> Option<std::result::Result<(), String>> {
+        let name = self.lines.get(self.played)?;
+        let place = || format!("{}, line {}", self.root.join(INDEX).display(), self.played + 1);
+        Some(check(&self.root, name).map_err(|what| format!("{}: {what}", place())))
     }
 }
 
-fn good(root: &Path, name: &str) -> std::result::Result<(), String> {
+/// Is this a file that fakenect can read?
+fn check(root: &Path, name: &str) -> std::result::Result<(), String> {
     let file = root.join(name);
     let length = std::fs::metadata(&file).map_err(|_| format!("{name} is missing"))?.len();
     let kind = name.split('-').next().unwrap_or_default();
@@ -93,21 +97,25 @@ mod tests {
             std::fs::write(folder.path().join(name), bytes).unwrap();
         }
         std::fs::write(folder.path().join(INDEX), index).unwrap();
-        let checked = Dump::check(folder.path());
-        (folder, checked)
+        let opened = Dump::open(folder.path());
+        (folder, opened)
     }
 
     #[test]
     fn only_what_stands_before_the_damage_is_played() {
         let files = [("d-1.0-1.pgm", DEPTH_BYTES), ("d-1.1-2.pgm", DEPTH_BYTES - 1)];
-        let (_folder, checked) = dump(&files, "d-1.0-1.pgm\nd-1.1-2.pgm\nd-1.2-3.pgm\n");
-        let checked = checked.unwrap();
-        assert_eq!(checked.good, 1);
-        assert!(checked.ending().contains("line 2: d-1.1-2.pgm is cut short"), "{checked:?}");
+        let (_folder, opened) = dump(&files, "d-1.0-1.pgm\nd-1.1-2.pgm\nd-1.2-3.pgm\n");
+        let ending = |opened: Result<Dump>| {
+            let mut dump = opened.unwrap();
+            assert_eq!(dump.advance(), Ok(()));
+            dump.advance().unwrap_err()
+        };
+        let cut = ending(opened);
+        assert!(cut.contains("line 2: d-1.1-2.pgm is cut short"), "{cut}");
         let (_folder, cut_name) = dump(&files, "d-1.0-1.pgm\nd-1.1-2.p");
-        assert!(cut_name.unwrap().ending().contains("d-1.1-2.p is missing"));
+        assert!(ending(cut_name).contains("d-1.1-2.p is missing"));
         let (_folder, whole) = dump(&files[..1], "d-1.0-1.pgm\n");
-        assert!(whole.unwrap().ending().contains("no more frames"));
+        assert!(ending(whole).contains("no more frames"));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::view::Sensor;
 /// fx, fy, cx, cy of the depth camera, px, as libfreenect's own point-cloud viewer has them
 /// (examples/glpclview.c, after Nicolas Burrus's calibration of one unit).
 const INTRINSICS: [f64; 4] = [594.21, 591.04, 339.5, 242.7];
-/// z = 1/(3.33095 - 0.0030711 word): same file.
+/// z = 1/(3.33095 - 0.0030711 raw), from the same file.
 const OPENKINECT: DepthCode = DepthCode::Disparity {
     offset: 3.330_949_516_1,
     slope: -0.003_071_101_6,
@@ -20,15 +20,15 @@ const OPENKINECT: DepthCode = DepthCode::Disparity {
 const FACTORY_CENTRE: [f64; 2] = [320.0, 240.0];
 /// The infrared camera has 1280 columns, the depth every second of them.
 const COLUMNS_A_PIXEL: f64 = 2.0;
-/// Words a pixel, and what the matcher is off by, px: libfreenect's registration.c.
-const WORDS_A_PIXEL: f64 = 4.0;
+/// Raw values a pixel, and the matcher's offset, px: libfreenect's registration.c.
+const RAW_A_PIXEL: f64 = 4.0;
 const OFFSET_PX: f64 = 0.375;
 
 /// The numbers a unit's memory holds, as far as they make sense.
 ///
-/// libfreenect converts a word with shift m = ((word - 4 s)/4 - 0.375) p on the reference plane at
+/// libfreenect converts a raw value with shift m = ((raw - 4 s)/4 - 0.375) p on the reference plane at
 /// distance R, p the size of a pixel there, E the distance of the projector and s the unit's
-/// shift: z = R E / (E - m), lengths in cm. So 1/z is affine in the word, and f = R / p.
+/// shift: z = R E / (E - m), lengths in cm. So 1/z is affine in the raw value, and f = R / p.
 pub fn of_factory(plane: &ZeroPlane, const_shift: f64) -> Option<([f64; 4], DepthCode, f64)> {
     let [emitter, reference, pixel] =
         [plane.emitter_distance, plane.reference_distance, plane.reference_pixel_size]
@@ -41,7 +41,7 @@ pub fn of_factory(plane: &ZeroPlane, const_shift: f64) -> Option<([f64; 4], Dept
         return None;
     }
     let per_metre = 100.0 / (reference * emitter);
-    let slope = -per_metre * pixel / WORDS_A_PIXEL;
+    let slope = -per_metre * pixel / RAW_A_PIXEL;
     let offset = per_metre * (emitter + pixel * (const_shift + OFFSET_PX));
     let focal = reference / (COLUMNS_A_PIXEL * pixel);
     let [cx, cy] = FACTORY_CENTRE;
@@ -49,8 +49,8 @@ pub fn of_factory(plane: &ZeroPlane, const_shift: f64) -> Option<([f64; 4], Dept
     Some(([focal, focal, cx, cy], code, emitter / 100.0))
 }
 
-/// The sensor as recording.json tells it: what the user knows, else what the factory wrote, else
-/// what OpenKinect publishes.
+/// The sensor as recording.json describes it: by what the user knows, else by what the factory
+/// wrote, else by what OpenKinect publishes.
 pub fn sensor(
     serial: Option<String>,
     factory: Option<(ZeroPlane, f64)>,
@@ -84,14 +84,14 @@ mod tests {
     use super::*;
 
     /// libfreenect's own defaults, and its formula as registration.c computes it, in mm.
-    fn libfreenect_mm(word: u16) -> f64 {
-        let fixed = (f64::from(word) - 4.0 * 200.0) / 4.0 - 0.375;
+    fn libfreenect_mm(raw: u16) -> f64 {
+        let fixed = (f64::from(raw) - 4.0 * 200.0) / 4.0 - 0.375;
         let metric = fixed * 0.1042;
         10.0 * (metric * 120.0 / (7.5 - metric) + 120.0)
     }
 
     #[test]
-    fn words_become_the_depth_libfreenect_gives_them() {
+    fn raw_values_become_the_depth_libfreenect_gives_them() {
         let plane = ZeroPlane {
             emitter_distance: 7.5,
             colour_distance: 2.3,
@@ -101,10 +101,10 @@ mod tests {
         let ([fx, ..], code, baseline) = of_factory(&plane, 200.0).expect("sensible");
         assert!((fx - 575.8).abs() < 0.05, "OpenNI's focal length: {fx}");
         assert!((baseline - 0.075).abs() < 1e-9);
-        for word in [400u16, 600, 800, 950, 1020] {
-            let z = code.metres(word).expect("a depth");
+        for raw in [400u16, 600, 800, 950, 1020] {
+            let z = code.metres(raw).expect("a depth");
             // The floats of the C structure carry seven digits.
-            assert!((1e3 * z / libfreenect_mm(word) - 1.0).abs() < 1e-5, "{word}: {z}");
+            assert!((1e3 * z / libfreenect_mm(raw) - 1.0).abs() < 1e-5, "{raw}: {z}");
         }
         assert!(of_factory(&ZeroPlane { reference_pixel_size: 0.0, ..plane }, 200.0).is_none());
     }

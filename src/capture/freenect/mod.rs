@@ -5,7 +5,7 @@ mod factory;
 mod ffi;
 
 use std::ffi::CString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant, UNIX_EPOCH};
 
 use super::source::{Arrival, End, LiveFrame, Source};
@@ -14,7 +14,7 @@ use crate::frame::Frame;
 use crate::io::Assumed;
 use crate::view::Sensor;
 use dump::Dump;
-use ffi::{Device, Freenect, HEIGHT, INFRARED_HEIGHT, WIDTH};
+use ffi::{Device, Freenect, HEIGHT, INFRARED_HEIGHT, Loaded, WIDTH};
 
 /// Names under which systems keep the library, most exact first.
 const NAMES: [&str; 6] = [
@@ -41,6 +41,8 @@ pub struct FreenectOptions {
     pub infrared: bool,
     /// In place of what the unit's memory says.
     pub assumed: Assumed,
+    /// What the library plays if it is fakenect, which reads the path from FAKENECT_PATH itself.
+    pub dump: Option<PathBuf>,
 }
 
 /// A running Kinect.
@@ -48,8 +50,8 @@ pub struct FreenectSource {
     device: Device,
     sensor: Sensor,
     infrared: bool,
-    /// The stand-in's dump and the lines played so far.
-    stand_in: Option<(Dump, usize)>,
+    /// What fakenect plays, the stand-in for libfreenect.
+    dump: Option<Dump>,
     remarks: Vec<String>,
 }
 
@@ -59,7 +61,7 @@ impl FreenectSource {
     /// # Errors
     /// When the library is missing or something else, no unit is there, or it cannot be started.
     pub fn open(options: &FreenectOptions) -> Result<Self> {
-        let (library, stand_in) = load(options.library.as_deref())?;
+        let (library, dump) = load(options)?;
         let serial = unit(&library, options.serial.as_deref())?;
         let wanted = serial.as_deref().and_then(|s| CString::new(s).ok());
         let device = library.open(wanted.as_deref()).map_err(|code| {
@@ -78,20 +80,11 @@ impl FreenectSource {
         }
         device.start_depth().map_err(|what| Error::sensor(what + &complained(), PLUG_IN))?;
         // The stand-in aborts when it is asked for a mode it has not.
-        let infrared = options.infrared && stand_in.is_none() && device.start_infrared();
+        let infrared = options.infrared && dump.is_none() && device.start_infrared();
         if options.infrared && !infrared {
             remarks.push("no infrared beside the depth; depth alone is recorded".into());
         }
-        Ok(FreenectSource { device, sensor, infrared, stand_in, remarks })
-    }
-
-    /// Why events cannot be had any more.
-    fn end(&self) -> Arrival {
-        let why = match &self.stand_in {
-            Some((dump, _)) => dump.ending(),
-            None => format!("the Kinect is gone (unplugged, or without power){}", complained()),
-        };
-        Arrival::End(End { why, lost: true })
+        Ok(FreenectSource { device, sensor, infrared, dump, remarks })
     }
 
     fn frame(&self) -> Option<LiveFrame> {
@@ -116,16 +109,15 @@ impl Source for FreenectSource {
             if let Some(frame) = self.frame() {
                 return Ok(Arrival::Frame(frame));
             }
-            if let Some((dump, played)) = &mut self.stand_in {
-                if *played == dump.good {
-                    return Ok(self.end());
-                }
-                *played += 1;
+            if let Some(Err(why)) = self.dump.as_mut().map(Dump::advance) {
+                return Ok(Arrival::End(End { why, lost: true }));
             }
             if self.device.process_events() < 0 {
-                return Ok(self.end());
+                let gone = "the Kinect is gone (unplugged, or without power)";
+                let why = format!("{gone}{}", complained());
+                return Ok(Arrival::End(End { why, lost: true }));
             }
-            if begun.elapsed() >= wait && self.stand_in.is_none() {
+            if begun.elapsed() >= wait && self.dump.is_none() {
                 return Ok(self.frame().map_or(Arrival::Nothing, Arrival::Frame));
             }
         }
@@ -133,7 +125,7 @@ impl Source for FreenectSource {
 
     /// A dump waits; a sensor does not.
     fn live(&self) -> bool {
-        self.stand_in.is_none()
+        self.dump.is_none()
     }
 
     fn remarks(&self) -> &[String] {
@@ -141,44 +133,35 @@ impl Source for FreenectSource {
     }
 }
 
-/// The library, and the dump where it is the stand-in.
-fn load(named: Option<&Path>) -> Result<(Freenect, Option<(Dump, usize)>)> {
-    let candidates: Vec<PathBuf> = match named {
-        Some(path) => vec![path.into()],
+/// The library, and the dump that it plays if it is the stand-in.
+fn load(options: &FreenectOptions) -> Result<(Freenect, Option<Dump>)> {
+    let candidates = match &options.library {
+        Some(path) => vec![path.clone()],
         None => NAMES.map(PathBuf::from).into(),
     };
-    let mut first = String::new();
+    let mut first = None;
     for path in &candidates {
-        let mut stand_in = None;
-        let mut refused = None;
-        let loaded = Freenect::load(path, |is_stand_in| {
-            if is_stand_in {
-                match dump_to_play() {
-                    Ok(dump) => stand_in = Some((dump, 0)),
-                    Err(e) => refused = Some(e),
-                }
-            }
-            refused.as_ref().map_or(Ok(()), |e| Err(e.to_string()))
-        });
-        match loaded {
-            Ok(library) => return Ok((library, stand_in)),
-            Err(_) if refused.is_some() => return Err(refused.unwrap_or_else(no_dump)),
-            Err(why) if first.is_empty() => first = format!("{}: {why}", path.display()),
-            Err(_) => {}
+        let loaded = Loaded::open(path);
+        let dump = match &loaded {
+            Ok(library) if library.is_stand_in() => Some(dump_to_play(options)?),
+            _ => None,
+        };
+        match loaded.and_then(Loaded::start) {
+            Ok(library) => return Ok((library, dump)),
+            Err(why) => drop(first.get_or_insert(format!("{}: {why}", path.display()))),
         }
     }
-    Err(Error::sensor(format!("libfreenect cannot be loaded ({first})"), INSTALL))
+    let why = first.unwrap_or_default();
+    Err(Error::sensor(format!("libfreenect cannot be loaded ({why})"), INSTALL))
 }
 
-fn no_dump() -> Error {
-    Error::sensor(
-        "this libfreenect is the stand-in, and FAKENECT_PATH does not say what it shall play",
-        "set FAKENECT_PATH to a folder made by fakenect-record",
-    )
-}
-
-fn dump_to_play() -> Result<Dump> {
-    Dump::check(Path::new(&std::env::var_os("FAKENECT_PATH").ok_or_else(no_dump)?))
+fn dump_to_play(options: &FreenectOptions) -> Result<Dump> {
+    let missing = || {
+        let what =
+            "this libfreenect is the stand-in, and FAKENECT_PATH does not say what it is to play";
+        Error::sensor(what, "set FAKENECT_PATH to a folder made by fakenect-record")
+    };
+    Dump::open(options.dump.as_ref().ok_or_else(missing)?)
 }
 
 /// Which unit to open: its serial where the library knows it.
@@ -207,7 +190,7 @@ fn complained() -> String {
     }
 }
 
-/// Little-endian words, as the library unpacks them on every machine it is built for.
+/// Little-endian 16-bit values, as the library unpacks them on every machine it is built for.
 fn picture(bytes: &[u8]) -> Frame {
     let words = bytes.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
     Frame { width: WIDTH, height: HEIGHT, raw: words }

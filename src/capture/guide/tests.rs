@@ -1,7 +1,8 @@
-use super::guide::{Command, Event, Guide, Shutter};
-use super::screen::{Surroundings, render};
-use super::wanted::{ViewState, Wanted};
-use super::watch::{Seen, Watcher};
+use super::*;
+use crate::capture::advice::Advice;
+use crate::capture::screen::{Status, render};
+use crate::capture::wanted::{PAPER_DISTANCES_M, PAPER_TILTS_DEG};
+use crate::capture::watch::Watcher;
 use crate::plane::Plane;
 use crate::rng::Seed;
 use crate::scene::{Bench, Board, Target};
@@ -10,9 +11,9 @@ use crate::{Form, SigmaModel};
 
 const SHUTTER: Shutter = Shutter { frames: 3, hold: 2 };
 
-fn seen(z: f64, tilt_deg: f64) -> Seen {
+fn seen(z: f64, tilt_deg: f64) -> Sighting {
     let corners = [(-0.3, -0.2), (0.3, -0.2), (-0.3, 0.2), (0.3, 0.2)];
-    Seen { plane: Plane::tilted(z, tilt_deg.to_radians(), 0.0), corners, pixels: 10_000 }
+    Sighting { plane: Plane::tilted(z, tilt_deg.to_radians(), 0.0), corners }
 }
 
 fn guide(distances_m: &[f64], tilts_deg: &[f64]) -> Guide {
@@ -21,7 +22,7 @@ fn guide(distances_m: &[f64], tilts_deg: &[f64]) -> Guide {
 }
 
 /// A letter an event: b(egun) k(eep) f(inished) a(bandoned) d(rift) . (done), - for none.
-fn story(guide: &mut Guide, sights: impl IntoIterator<Item = Result<Seen, String>>) -> String {
+fn story(guide: &mut Guide, sights: impl IntoIterator<Item = Result<Sighting, String>>) -> String {
     let mut story = String::new();
     for (k, sight) in sights.into_iter().enumerate() {
         let events = guide.see(k as f64 / 30.0, sight);
@@ -74,16 +75,16 @@ fn a_slow_drift_of_the_hand_is_motion_too() {
 }
 
 #[test]
-fn off_the_grid_nothing_is_taken_and_the_way_is_told() {
+fn off_the_grid_nothing_is_taken_and_the_way_is_shown() {
     let mut g = guide(&[1.0, 1.5], &[0.0, 30.0]);
     assert_eq!(story(&mut g, std::iter::repeat_n(Ok(seen(1.25, 15.0)), 4)), "- - - -");
-    assert_eq!(super::Step::of(&g).word(), "NEAR 25");
+    assert_eq!(Advice::of(&g).word, "NEAR 25");
     story(&mut g, [Ok(seen(1.1, 12.0))]);
-    assert_eq!(super::Step::of(&g).word(), "TILT -12°");
+    assert_eq!(Advice::of(&g).word, "TILT -12°");
     story(&mut g, [Ok(seen(1.1, 2.0))]);
-    assert_eq!(super::Step::of(&g).word(), "HOLD");
+    assert_eq!(Advice::of(&g).word, "HOLD");
     story(&mut g, [Err("nothing flat".into())]);
-    assert_eq!(super::Step::of(&g).word(), "AIM");
+    assert_eq!(Advice::of(&g).word, "AIM");
 }
 
 #[test]
@@ -174,25 +175,24 @@ fn from_frames_to_events() {
     assert!(watcher.look(&blank).is_err());
 }
 
-fn screen(guide: &Guide, around: &Surroundings) -> String {
-    let lines = render(guide, around, 80, 24);
+fn screen(guide: &Guide, status: &Status) -> String {
+    let lines = render(guide, status, 80, 24);
     assert!(lines.len() <= 24 && lines.iter().all(|l| l.text.chars().count() <= 80));
     lines.iter().map(|l| format!("{}\n", l.text.trim_end())).collect()
 }
 
 #[test]
 fn the_screen() {
-    let mut g = Guide::new(Wanted::paper(), SHUTTER);
-    let mut around =
-        Surroundings { title: "kinect   Kinect for Xbox 360".into(), ..Default::default() };
+    let mut g = guide(&PAPER_DISTANCES_M, &PAPER_TILTS_DEG);
+    let mut status = Status { title: "kinect   Kinect for Xbox 360".into(), ..Default::default() };
     story(&mut g, std::iter::repeat_n(Ok(seen(1.02, 11.0)), 4));
     story(&mut g, [Ok(seen(1.25, 12.0))]);
-    insta::assert_snapshot!("carry", screen(&g, &around));
+    insta::assert_snapshot!("carry", screen(&g, &status));
     story(&mut g, std::iter::repeat_n(Ok(seen(1.52, 9.0)), 2));
-    insta::assert_snapshot!("stay", screen(&g, &around));
-    around.flash = Some("z150-t10".into());
-    around.news = "z150-t10 taken".into();
-    insta::assert_snapshot!("taken", screen(&g, &around));
-    (around.flash, around.silent_s) = (None, Some(3));
-    assert!(screen(&g, &around).contains("none for 3 s"), "a stream that stands still");
+    insta::assert_snapshot!("stay", screen(&g, &status));
+    status.flash = Some("z150-t10".into());
+    status.news = "z150-t10 taken".into();
+    insta::assert_snapshot!("taken", screen(&g, &status));
+    (status.flash, status.silent_s) = (None, Some(3));
+    assert!(screen(&g, &status).contains("none for 3 s"), "a stream that stands still");
 }

@@ -1,51 +1,46 @@
-//! What a calibration says to people, and to programs.
+//! A calibration in a few lines for people, and as JSON for programs.
+
+use std::fmt::Write as _;
 
 use kinoise::calibrate::Measurements;
 use kinoise::units::decimals;
 use kinoise::{Calibration, SigmaModel};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
-/// A few lines and a table: the surface beside the published ones.
+/// The fit, its surface beside the published ones, and the forms compared.
 pub fn summary(calibration: &Calibration) -> String {
     let fit = &calibration.fit;
     let mut text = format!("{}\n", fit.form.spec().formula());
     for p in &fit.parameters {
+        let value = three_digits_like(p.value, p.std_error);
         let error = p.std_error.map_or("held".into(), |e| format!("± {}", three_digits(e)));
-        text.push_str(&format!(
-            "  {:<3}= {:>12}  {error}\n",
-            p.name,
-            three_digits_like(p.value, p.std_error)
-        ));
+        let _ = writeln!(text, "  {:<3}= {value:>12}  {error}", p.name);
     }
-    text.push_str(&format!(
+    let _ = write!(
+        text,
         "fitted to {} sigmas of {} views: rmse {:.2} mm ({:.1} % of sigma), r2 {:.4}",
         fit.rows,
         fit.views,
         1e3 * fit.rmse_m,
         1e2 * fit.rmse_relative,
         fit.r2
-    ));
+    );
     if let Some(h) = calibration.comparison.iter().find(|h| h.form == fit.form) {
-        text.push_str(&format!("; {:.1} % at distances left out", 1e2 * h.rmse_relative));
+        let _ = write!(text, "; {:.1} % at distances left out", 1e2 * h.rmse_relative);
     }
-    text.push_str("\n\n");
-    text.push_str(&surface(&calibration.model.sigma));
+    text = format!("{text}\n\n{}", surface(&calibration.model.sigma));
     if calibration.comparison.len() > 1 {
-        text.push_str("\nforms by distances left out (error of sigma, log score a view):\n");
+        text += "\nforms by distances left out (error of sigma, log score a view):\n";
         for h in &calibration.comparison {
-            text.push_str(&format!(
-                "  {:<11}{:>7.1} %{:>9.2}\n",
-                h.form.id(),
-                1e2 * h.rmse_relative,
-                h.log_score
-            ));
+            let (form, error) = (h.form.id(), 1e2 * h.rmse_relative);
+            let _ = writeln!(text, "  {form:<11}{error:>7.1} %{:>9.2}", h.log_score);
         }
     }
     text
 }
 
-/// Sigma in mm on a small grid inside the valid domain, with the paper's and the others'.
-pub fn surface(model: &SigmaModel) -> String {
+/// Sigma in mm on a small grid inside the valid domain, with the published ones beside it.
+fn surface(model: &SigmaModel) -> String {
     let mut text = String::from(
         " z (m)  tilt   this sensor (95 %)       paper Eq. 1  Nguyen 2012  Khoshelham 2012   sigma in mm\n",
     );
@@ -60,16 +55,15 @@ pub fn surface(model: &SigmaModel) -> String {
             let [a, b] = model.interval(z, theta, 0.95);
             let [sigma, a, b] = [model.sigma(z, theta), a, b].map(millimetres);
             let own = format!("{sigma} ({a}-{b})");
-            text.push_str(&format!(
-                "{z:>6.2}{theta_deg:>5.0}°   {own:<24}{:>10}{:>13}{:>13}\n",
-                published(&SigmaModel::paper(), z, theta),
-                published(&SigmaModel::nguyen(), z, theta),
-                published(&SigmaModel::khoshelham(), z, theta)
-            ));
+            let models = [SigmaModel::paper(), SigmaModel::nguyen(), SigmaModel::khoshelham()];
+            let [paper, nguyen, khoshelham] = models.map(|model| published(&model, z, theta));
+            let _ = writeln!(
+                text,
+                "{z:>6.2}{theta_deg:>5.0}°   {own:<24}{paper:>10}{nguyen:>13}{khoshelham:>13}"
+            );
         }
     }
-    text.push_str("    -: a distance or tilt its authors have not measured\n");
-    text
+    text + "    -: a distance or tilt its authors have not measured\n"
 }
 
 fn millimetres(metres: f64) -> String {
@@ -112,33 +106,15 @@ fn three_digits_like(v: f64, error: Option<f64>) -> String {
     }
 }
 
-/// The warnings, each on its line; long lists are cut, the report has them all.
-pub fn warnings(calibration: &Calibration) -> String {
-    const SHOWN: usize = 8;
-    let all = &calibration.warnings;
-    let mut text = String::new();
-    for warning in all.iter().take(SHOWN) {
-        text.push_str(&format!("note: {warning}\n"));
-    }
-    if all.len() > SHOWN {
-        text.push_str(&format!("note: {} more in report.html\n", all.len() - SHOWN));
-    }
-    text
-}
-
 /// The result for programs.
 pub fn as_json(calibration: &Calibration, measurements: Option<&Measurements>) -> Value {
     let fit = &calibration.fit;
-    let parameters: serde_json::Map<String, Value> = fit
-        .parameters
-        .iter()
-        .map(|p| {
-            (p.name.into(), json!({"value": p.value, "std_error": p.std_error, "remark": p.remark}))
-        })
-        .collect();
+    let parameters = fit.parameters.iter().map(|p| {
+        (p.name.into(), json!({"value": p.value, "std_error": p.std_error, "remark": p.remark}))
+    });
     let mut value = json!({
         "form": fit.form.id(),
-        "parameters": parameters,
+        "parameters": parameters.collect::<Map<String, Value>>(),
         "valid": {"z_m": fit.domain.z_m, "theta_rad": fit.domain.theta_rad},
         "rows": fit.rows,
         "rmse_m": fit.rmse_m,

@@ -37,7 +37,7 @@ fn views_are_whole_or_not_there_and_are_replaced_whole() {
     let recording = crate::io::open(&root, &crate::io::Assumed::default()).unwrap();
     assert_eq!((recording.views.len(), recording.remarks.len()), (1, 0));
     assert_eq!(recording.views[0].infrared.len(), 3);
-    assert!(!root.join(WORKSHOP).exists());
+    assert!(!root.join(PARTIAL).exists());
 }
 
 /// As a kill between two renames leaves them.
@@ -47,13 +47,13 @@ fn an_interrupted_run_is_tidied_up() {
     let root = folder.path();
     let sensor = kinect_v1(4);
     take(&mut Session::open(root, &sensor).unwrap(), "a", 5000);
-    fs::create_dir_all(root.join(WORKSHOP).join("b")).unwrap();
-    fs::write(root.join(WORKSHOP).join("b").join(DEPTH_LIST), "0 x").unwrap();
-    fs::rename(root.join("a"), root.join(WORKSHOP).join("old-a")).unwrap();
+    fs::create_dir_all(root.join(PARTIAL).join("b")).unwrap();
+    fs::write(root.join(PARTIAL).join("b").join(DEPTH_LIST), "0 x").unwrap();
+    fs::rename(root.join("a"), root.join(PARTIAL).join("old-a")).unwrap();
     let session = Session::open(root, &sensor).unwrap();
     assert_eq!(session.taken().unwrap(), ["a"]);
     assert_eq!(session.remarks().len(), 2, "{:?}", session.remarks());
-    assert!(!root.join(WORKSHOP).exists());
+    assert!(!root.join(PARTIAL).exists());
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn two_captures_into_one_recording_are_refused() {
         let refused = second.err().unwrap().to_string();
         assert!(refused.contains("another capture is writing into it"), "{refused}");
     }
-    assert!(root.join(WORKSHOP).join("a").is_dir(), "the first one's half view is untouched");
+    assert!(root.join(PARTIAL).join("a").is_dir(), "the first one's half view is untouched");
     drop(first);
     Session::open(&root, &kinect_v1(4)).unwrap();
 }
@@ -99,8 +99,8 @@ fn a_rejected_view_is_gone_at_once() {
     assert_eq!(session.taken().unwrap(), ["b"]);
     drop(session);
     // As a kill between the rename and the removal leaves it.
-    fs::create_dir_all(folder.path().join(WORKSHOP)).unwrap();
-    fs::rename(folder.path().join("b"), folder.path().join(WORKSHOP).join("bad-b")).unwrap();
+    fs::create_dir_all(folder.path().join(PARTIAL)).unwrap();
+    fs::rename(folder.path().join("b"), folder.path().join(PARTIAL).join("bad-b")).unwrap();
     let session = Session::open(folder.path(), &sensor).unwrap();
     assert!(session.taken().unwrap().is_empty() && session.remarks().is_empty());
     assert!(Session::open(Path::new("/dev/null"), &sensor).is_err());

@@ -1,12 +1,12 @@
 //! Is the sensor still warming up? While nothing moves, its plane should not either.
 
-/// Shortest stretch of stillness that says anything, s.
-const FIRST_S: f64 = 20.0;
+/// The shortest stretch of stillness that shows a drift, s.
+const MIN_S: f64 = 20.0;
 /// A drift below this is none, m/min at 1 m (it grows as z^2): in the half hour that a session
 /// lasts it stays below a Kinect's sigma there (Khoshelham and Elberink: 1.4 mm z^2).
-const STEADY_M_PER_MINUTE: f64 = 5e-5;
+const MIN_DRIFT_M_PER_MINUTE: f64 = 5e-5;
 /// ... and so is one below this many standard errors.
-const SURE: f64 = 4.0;
+const MIN_STD_ERRORS: f64 = 4.0;
 
 /// How the plane wanders.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,21 +17,22 @@ pub struct Drift {
     pub std_error_m: f64,
     /// Where the plane stands, m.
     pub z_m: f64,
-    /// Watched for so long, s.
+    /// How long it was watched, s.
     pub seconds: f64,
 }
 
 impl Drift {
-    /// Does the sensor still warm up?
+    /// Is the sensor still warming up?
     pub fn is_warming(&self) -> bool {
         let size = self.per_minute_m.abs();
-        size > SURE * self.std_error_m && size > STEADY_M_PER_MINUTE * self.z_m * self.z_m
+        size > MIN_STD_ERRORS * self.std_error_m
+            && size > MIN_DRIFT_M_PER_MINUTE * self.z_m * self.z_m
     }
 }
 
-/// A line through inverse depth over time, as sums.
+/// Fits a line to inverse depth over time, by sums.
 #[derive(Debug, Clone, Default)]
-pub struct Warmth {
+pub struct DriftMonitor {
     first: Option<(f64, f64)>,
     last_t: f64,
     n: f64,
@@ -40,12 +41,12 @@ pub struct Warmth {
     tt: f64,
     tw: f64,
     ww: f64,
-    told_at_s: f64,
+    reported_at_s: f64,
 }
 
-impl Warmth {
-    /// One frame: time, s, and inverse depth on the axis, 1/m. The drift is told after 20 s of
-    /// stillness, and again whenever the time has doubled.
+impl DriftMonitor {
+    /// One frame: time, s, and inverse depth on the axis, 1/m. The drift is reported after 20 s
+    /// of stillness, and again whenever the time has doubled.
     pub fn add(&mut self, stamp: f64, inverse_depth: f64) -> Option<Drift> {
         let (t0, w0) = *self.first.get_or_insert((stamp, inverse_depth));
         // Sums about the first point keep their digits.
@@ -57,10 +58,10 @@ impl Warmth {
         self.tw += t * w;
         self.ww += w * w;
         self.last_t = t;
-        if t < FIRST_S.max(2.0 * self.told_at_s) {
+        if t < MIN_S.max(2.0 * self.reported_at_s) {
             return None;
         }
-        self.told_at_s = t;
+        self.reported_at_s = t;
         self.drift()
     }
 
@@ -69,7 +70,7 @@ impl Warmth {
         let (_, w0) = self.first?;
         let n = self.n;
         let spread = self.tt - self.t * self.t / n;
-        if self.last_t < FIRST_S || n < 10.0 || spread <= 0.0 {
+        if self.last_t < MIN_S || n < 10.0 || spread <= 0.0 {
             return None;
         }
         let together = self.tw - self.t * self.w / n;
@@ -96,15 +97,15 @@ mod tests {
     /// 40 s of a plane at 2 m that recedes by `rate` m/min, jittering by 0.1 mm a frame.
     fn watched(rate: f64) -> Drift {
         let mut rng = Seed(5).stream("jitter");
-        let mut warmth = Warmth::default();
-        let mut told = None;
+        let mut monitor = DriftMonitor::default();
+        let mut reported = None;
         for k in 0..=1200 {
             let t = f64::from(k) / 30.0;
             let jitter: f64 = StandardNormal.sample(&mut rng);
             let z = 2.0 + rate * t / 60.0 + 1e-4 * jitter;
-            told = warmth.add(1e9 + t, 1.0 / z).or(told);
+            reported = monitor.add(1e9 + t, 1.0 / z).or(reported);
         }
-        told.expect("told after 20 and 40 s")
+        reported.expect("reported after 20 and 40 s")
     }
 
     /// The slope's own standard error over 40 s is 1e-4 sqrt(12/1200)/40 * 60 = 1.5e-5 m/min.
@@ -124,7 +125,7 @@ mod tests {
 
     #[test]
     fn nothing_is_said_before_its_time() {
-        let mut warmth = Warmth::default();
-        assert!((0..500).all(|k| warmth.add(f64::from(k) / 30.0, 0.5).is_none()));
+        let mut monitor = DriftMonitor::default();
+        assert!((0..500).all(|k| monitor.add(f64::from(k) / 30.0, 0.5).is_none()));
     }
 }

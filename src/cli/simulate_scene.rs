@@ -1,0 +1,102 @@
+//! What stands before the camera of `kinoise simulate`, and where.
+
+use anyhow::bail;
+use clap::{Args, ValueEnum};
+use kinoise::scene::{Board, PATCH_SIDE_M, Print, Target, WHITE};
+use kinoise::simulate::{Grid, GridView, Scenery};
+use kinoise::units::shortest;
+
+use super::common::{between, count, numbers};
+
+#[derive(Debug, Args)]
+pub struct PosesArguments {
+    /// The poses
+    #[arg(long, value_enum, default_value_t = GridArgument::Paper)]
+    grid: GridArgument,
+    /// Own distances in m, in place of the grid's
+    #[arg(long, value_delimiter = ',', value_name = "M,M,..", allow_hyphen_values = true, value_parser = between(0.1, 20.0, "m"))]
+    distances: Vec<f64>,
+    /// Own tilts in degrees, in place of the grid's
+    #[arg(long, value_delimiter = ',', value_name = "DEG,..", allow_hyphen_values = true, value_parser = between(0.0, 88.8, "degrees"))]
+    tilts: Vec<f64>,
+    /// Own directions of tilt in degrees, 0 along the columns; every pose in each of them
+    #[arg(long, value_delimiter = ',', value_name = "DEG,..", allow_hyphen_values = true)]
+    azimuths: Vec<f64>,
+    /// Take the views in the grid's order, not in random order
+    #[arg(long)]
+    pub ordered: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum GridArgument {
+    /// 1 to 4 m by 0.5 m, 0 to 70 degrees by 10, and 76 for 80: Eq. 1 has its pole at 79.6
+    Paper,
+}
+
+impl PosesArguments {
+    pub fn views(&self) -> anyhow::Result<Vec<GridView>> {
+        let GridArgument::Paper = self.grid;
+        let mut grid = Grid::paper();
+        if !self.distances.is_empty() {
+            grid.distances_m = self.distances.clone();
+        }
+        if !self.tilts.is_empty() {
+            grid.tilts_rad = self.tilts.iter().map(|t| t.to_radians()).collect();
+        }
+        if self.azimuths.iter().any(|a| !a.is_finite()) {
+            bail!("--azimuths: a direction is a number of degrees");
+        }
+        if self.azimuths.is_empty() {
+            return Ok(grid.views());
+        }
+        let azimuths: Vec<f64> = self.azimuths.iter().map(|a| a.to_radians()).collect();
+        Ok(grid.views_towards(&azimuths))
+    }
+}
+
+#[derive(Debug, Args)]
+pub struct SceneryArguments {
+    /// Board width and height in m
+    #[arg(long, value_parser = numbers::<2>, default_value = "1,0.8", value_name = "W,H", allow_hyphen_values = true)]
+    board: [f64; 2],
+    /// The target is a wall that fills the picture
+    #[arg(long, conflicts_with = "board")]
+    wall_target: bool,
+    /// Print grey squares on the target
+    #[arg(long)]
+    pub patches: bool,
+    /// A wall this far behind the target, m
+    #[arg(long, value_name = "M", allow_hyphen_values = true, value_parser = between(0.0, 1e3, "m"))]
+    pub wall: Option<f64>,
+    /// Boxes in the way, beside the target's middle
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = count(0, MAX_CLUTTER))]
+    clutter: usize,
+    /// Write reference distances with this standard deviation, m
+    #[arg(long, value_name = "M", allow_hyphen_values = true, value_parser = between(0.0, 1.0, "m"))]
+    reference_error: Option<f64>,
+    /// Write the temperature of the room into every view
+    #[arg(long)]
+    conditions: bool,
+}
+
+/// More boxes than this leave no target to see.
+const MAX_CLUTTER: usize = 100;
+
+impl SceneryArguments {
+    pub fn scenery(&self) -> anyhow::Result<Scenery> {
+        let [width_m, height_m] = self.board;
+        if !(width_m > 0.0 && height_m > 0.0) {
+            let [w, h] = self.board.map(shortest);
+            bail!("--board {w},{h}: give a width and a height in m");
+        }
+        let board = Target::Board(Board { width_m, height_m });
+        Ok(Scenery {
+            target: if self.wall_target { Target::Wall } else { board },
+            print: if self.patches { Print::Patches(PATCH_SIDE_M) } else { Print::Plain(WHITE) },
+            wall_gap_m: self.wall,
+            clutter: self.clutter,
+            reference_error_m: self.reference_error,
+            conditions: self.conditions,
+        })
+    }
+}
