@@ -1,11 +1,8 @@
 //! What a diagnosis is for: a sensor errs in a way that its sigma does not tell, a recording of a
 //! wall shows it, and the map of another place gets better by it.
 
-mod common;
-
 use std::path::Path;
 
-use common::kinoise;
 use kinoise::effects::Active;
 use kinoise::evaluate::{Delta, evaluate};
 use kinoise::io::Assumed;
@@ -15,6 +12,8 @@ use kinoise::sequence::{Sequence, open};
 use kinoise::simulate::kinect_v1;
 use kinoise::simulate::room::{Film, Room, around_the_desks};
 use kinoise::{NoiseModel, Seed, SigmaModel};
+
+use crate::common::kinoise;
 
 /// A bowl of disparity, three tenths of a pixel at the corner: a Kinect without calibration.
 const BOWL: (&str, &str, f64) = ("radial-disparity-bias", "k_px", 0.3);

@@ -1,19 +1,18 @@
 //! Memory does not grow with the number of frames.
 #![cfg(target_os = "linux")] // peak memory is read from /proc
 
-mod common;
-
 use std::fmt::Write as _;
 use std::fs;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use common::{BOARD, truth, write_depth};
 use kinoise::Seed;
 use kinoise::io::write_recording_file;
 use kinoise::plane::Plane;
 use kinoise::scene::Bench;
 use kinoise::simulate::{kinect_v1, shoot};
+
+use crate::common::{BOARD, truth, write_depth};
 
 const VIEWS: usize = 4;
 const FRAMES: usize = 500;

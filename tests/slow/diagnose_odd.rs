@@ -1,19 +1,19 @@
 //! Small and odd recordings through the real program: what it can say and no more, one message
 //! where it can say nothing, the same bytes for the same seed.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::raytraced::Cell;
-use common::kinoise;
-use common::rays::{OnDisk, edit, nulls, on_disk, order, repaint, views, well_formed};
 use kinoise::model::{FitSummary, Provenance};
 use kinoise::scene::Target;
 use kinoise::simulate::{Shoot, kinect_v1};
 use kinoise::{NoiseModel, Seed};
 use serde_json::{Value, json};
+
+use crate::common;
+use crate::common::kinoise;
+use crate::raytraced::Cell;
+use crate::rays::{OnDisk, edit, nulls, on_disk, order, repaint, views, well_formed};
 
 /// A finished run.
 struct Run {

@@ -1,7 +1,5 @@
 //! `diagnose --against`: somebody else's simulation in the model's place.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
 use kinoise::Seed;
@@ -9,6 +7,8 @@ use kinoise::effects::Active;
 use kinoise::scene::Target;
 use kinoise::simulate::{Physics, Scenery, Shoot, kinect_v1, plan_grid};
 use serde_json::Value;
+
+use crate::common;
 
 struct Sets {
     folder: tempfile::TempDir,
