@@ -1,8 +1,8 @@
 //! The diagnosis on concealed sets of the proof's ray generator, which shares no formula with it:
 //! nothing is found where nothing is, each effect by its name, and no name for what has none.
 
-use crate::raytraced::{CATALOGUE, Cell, OUTSIDE};
 use crate::rays::{Said, on_disk, order, text};
+use crate::raytraced::{CATALOGUE, Cell, OUTSIDE};
 
 /// 16 clean sets, half of them with correlated noise that the model knows. At a rate of 5 % more
 /// than four alarms have a chance of 8.6e-4.

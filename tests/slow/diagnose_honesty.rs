@@ -9,8 +9,8 @@ use rand::seq::SliceRandom;
 use serde_json::Value;
 
 use crate::common::copy_tree;
-use crate::raytraced::{Cell, Set};
 use crate::rays::{OnDisk, Said, edit, on_disk, order, repaint, said, text, views};
+use crate::raytraced::{Cell, Set};
 
 const VIEWS: usize = 12;
 
