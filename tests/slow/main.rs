@@ -8,6 +8,7 @@
 mod common;
 #[path = "../common/rays.rs"]
 mod rays;
+#[allow(dead_code, unused_imports)] // the trial uses all of it
 #[path = "../common/raytraced/mod.rs"]
 mod raytraced;
 
