@@ -141,7 +141,7 @@ fn losses_without_a_cause_are_none() {
 
 /// False alarms are to be 0.1 % of recordings: two in 200 have a chance of 2 %, three of 0.1 %.
 #[test]
-#[ignore = "takes a minute"]
+#[ignore = "slow: two hundred recordings"]
 fn losses_without_a_cause_are_none_in_two_hundred() {
     let alarms = alarms(0..200);
     println!("{} false alarms", alarms.len());

@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::measure::{SigmaRow, SigmaTable};
 
 /// Robust standard deviations of ln(measured/fitted) beyond which a sigma is left out. Measured in
-/// tests/outliers.rs: of clean tables of 30 rows under 1 % lose one (the scale is a median of few
+/// tests/product/outliers.rs: of clean tables of 30 rows under 1 % lose one (the scale is a median of few
 /// and sometimes small), where n is known none of 4,000 (the scale is at least sampling's).
 const OFF: f64 = 5.0;
 /// Chi-square of sampling alone exceeds its mean by so many of its standard deviations once in a

@@ -2,8 +2,6 @@
 #![allow(dead_code)] // every test file uses a part
 
 pub mod capture;
-pub mod rays;
-pub mod raytraced;
 pub mod speckle;
 
 use std::path::{Path, PathBuf};

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::raytraced::{Cell, Order, Set, write};
+use crate::raytraced::{Cell, Order, Set, write};
 use kinoise::diagnose::{DiagnoseOptions, diagnose};
 use kinoise::io::{Assumed, open};
 use kinoise::{NoiseModel, Seed};
@@ -193,7 +193,7 @@ pub fn repaint(recording: &Path, change: impl Fn(usize, &mut kinoise::Frame)) {
             let path = image.expect("an entry").path();
             let mut frame = read_depth(&path);
             change(k, &mut frame);
-            super::write_depth(&path, &frame);
+            crate::common::write_depth(&path, &frame);
         }
     }
 }

@@ -1,8 +1,6 @@
 //! The filmed office: geometry against oracles that share no code with it, ground truth against
 //! the pictures, paths against the furniture, and the folder that is written.
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -16,6 +14,8 @@ use kinoise::simulate::room::{
 use kinoise::{Camera, Seed, SigmaModel};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use rand::Rng;
+
+use crate::common;
 
 /// A body alone, white.
 fn alone(shape: Shape, room_from_body: Isometry3<f64>) -> Room {

@@ -4,7 +4,7 @@
 //! picture. Tolerances are five standard errors, with fewer effective pairs where noise is
 //! correlated: false alarms 6e-7 a comparison.
 
-use crate::laboratory::{
+use super::laboratory::{
     Laboratory, close, column_and_row_means, correlation, difference, mean, sd, variance,
 };
 

@@ -1,11 +1,8 @@
 //! Shapes in and biases out: the simulator against closed forms, the correction against noise.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{copy_tree, good, kinoise, truth};
 use kinoise::correct::{Conditions, Correction, correct_recording};
 use kinoise::effects::Active;
 use kinoise::io::{Assumed, FrameSource, open_uncut};
@@ -16,6 +13,9 @@ use kinoise::terms::{Basis, Coordinate, Modulation, Statistic, Term};
 use kinoise::view::RecordingFile;
 use kinoise::{DepthCode, Form, Frame, NoiseModel, Plane, Seed, Sensor, SigmaModel};
 use serde_json::{Value, json};
+
+use crate::common;
+use crate::common::{copy_tree, good, kinoise, truth};
 
 /// Pixels of half the size each way, words of 0.07 mm.
 fn sensor() -> Sensor {

@@ -8,7 +8,7 @@ use kinoise::model::PAPER_EQ1;
 use kinoise::scene::{Board, Target};
 use kinoise::simulate::{Physics, Scenery, Shoot, kinect_v1, plan_grid};
 
-use crate::laboratory::{Laboratory, difference, instant, sd};
+use super::laboratory::{Laboratory, difference, instant, sd};
 
 /// A tilted board before a wall: something for every effect to act on.
 fn stage(effects: Vec<Active>) -> Laboratory {

@@ -1,19 +1,19 @@
 //! `kinoise capture` from a Kinect: a dump by light through the C interface of Debian's fakenect,
 //! and a mock of libfreenect for what fakenect lacks.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command as Process;
 use std::sync::OnceLock;
 
-use common::capture::{FRAMES, HELD_STILL, HOLD, folder, frames_of, json, told};
-use common::{BOARD, grid, kinoise};
 use kinoise::io::{Assumed, open, write_dump};
 use kinoise::simulate::speckle::Causes;
 use kinoise::simulate::{Physics, Scenery, Shoot, kinect_v1, plan_grid};
 use kinoise::{DepthCode, Recording, Seed};
+
+use crate::common;
+use crate::common::capture::{FRAMES, HELD_STILL, HOLD, folder, frames_of, json, told};
+use crate::common::{BOARD, grid, kinoise};
 
 /// A file of the package libfreenect0.5, or `None` with a line that says what to do.
 fn installed(name: &str) -> Option<PathBuf> {

@@ -1,7 +1,5 @@
 //! `diagnose --against`: somebody else's simulation in the model's place.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
 use kinoise::Seed;
@@ -9,6 +7,8 @@ use kinoise::effects::Active;
 use kinoise::scene::Target;
 use kinoise::simulate::{Physics, Scenery, Shoot, kinect_v1, plan_grid};
 use serde_json::Value;
+
+use crate::common;
 
 struct Sets {
     folder: tempfile::TempDir,
@@ -75,7 +75,7 @@ fn names(diagnosis: &Value) -> Vec<&str> {
 /// Noise that hardly changes from frame to frame is measured alike in both, on which side of any
 /// limit its changes fall. Six pairs of runs at 3 %: two alarms have a chance of 1.3 %.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
+#[ignore = "slow: six pairs of recordings"]
 fn two_runs_of_noise_that_stands_still_match() {
     let sets = Sets::new();
     let mut alarms = Vec::new();
@@ -115,6 +115,7 @@ fn what_a_simulation_leaves_out_is_named_and_what_both_have_is_not() {
 }
 
 #[test]
+#[ignore = "slow: four diagnoses"]
 fn noise_is_compared_with_the_simulated_noise() {
     let sets = Sets::new();
     let clean = sets.shoot("clean", 4, None);
@@ -134,6 +135,7 @@ fn noise_is_compared_with_the_simulated_noise() {
 }
 
 #[test]
+#[ignore = "slow: chance alone decides"]
 fn two_recordings_of_nothing_but_noise_match() {
     let sets = Sets::new();
     let recordings: Vec<PathBuf> =

@@ -1,13 +1,10 @@
 //! One scene, five layouts: every reader must give the same views, and they must be the truth.
 //! Then the real recordings, where they are at hand.
 
-mod common;
-
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use common::{BOARD, BOARD_HEIGHT_M, data, truth, write_depth};
 use kinoise::frame::KINECT_NO_MEASUREMENT;
 use kinoise::io::{Assumed, open, write_recording_file};
 use kinoise::measure::MeasureOptions;
@@ -18,6 +15,9 @@ use kinoise::view::Region;
 use kinoise::{DepthCode, Frame, Measurements, Recording, Seed, Sensor, ViewMeasurement};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rand_distr::{Distribution, StandardNormal};
+
+use crate::common;
+use crate::common::{BOARD, BOARD_HEIGHT_M, data, truth, write_depth};
 
 // ---- the scene --------------------------------------------------------------------------------
 

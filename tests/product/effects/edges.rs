@@ -1,6 +1,6 @@
 //! What happens where the target ends.
 
-use crate::laboratory::{Laboratory, close};
+use super::laboratory::{Laboratory, close};
 
 /// Along the board's middle row: columns of its first and last pixel.
 fn outline(lab: &Laboratory) -> (usize, usize) {

@@ -1,6 +1,6 @@
 //! Pixels without an answer.
 
-use crate::laboratory::{Laboratory, close, line};
+use super::laboratory::{Laboratory, close, line};
 
 /// Share of pixels lost.
 fn lost(lab: &Laboratory) -> f64 {

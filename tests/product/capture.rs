@@ -1,19 +1,19 @@
 //! `kinoise capture` from a recording that is played and a folder that is filled, its screen, and
 //! what can go wrong.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Command as Process, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use common::capture::{FRAMES, HELD_STILL, folder, frames_of, json, told};
-use common::{BOARD, grid, kinoise, shots, write_depth};
 use kinoise::Seed;
 use kinoise::io::{Assumed, open};
 use kinoise::simulate::{Scenery, Shoot, plan_grid};
+
+use crate::common;
+use crate::common::capture::{FRAMES, HELD_STILL, folder, frames_of, json, told};
+use crate::common::{BOARD, grid, kinoise, shots, write_depth};
 
 /// Three poses, small pictures, in order.
 fn small() -> &'static Path {

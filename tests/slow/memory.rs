@@ -1,19 +1,17 @@
 //! Memory does not grow with the number of frames.
-#![cfg(target_os = "linux")] // peak memory is read from /proc
-
-mod common;
 
 use std::fmt::Write as _;
 use std::fs;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use common::{BOARD, truth, write_depth};
 use kinoise::Seed;
 use kinoise::io::write_recording_file;
 use kinoise::plane::Plane;
 use kinoise::scene::Bench;
 use kinoise::simulate::{kinect_v1, shoot};
+
+use crate::common::{BOARD, truth, write_depth};
 
 const VIEWS: usize = 4;
 const FRAMES: usize = 500;
@@ -23,7 +21,6 @@ const IMAGES: usize = 8;
 const MAX_MB: f64 = 300.0;
 
 #[test]
-#[cfg_attr(debug_assertions, ignore = "2,000 frames take minutes without optimisation")]
 fn two_thousand_frames_fit_into_300_megabytes() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let root = folder.path().join("recording");

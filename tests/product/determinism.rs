@@ -1,11 +1,9 @@
 //! The same seed gives the same bytes, whatever the number of threads.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{good, kinoise};
+use crate::common::{good, kinoise};
 
 /// Every file below `root` with its bytes, in name order.
 fn tree(root: &Path) -> Vec<(PathBuf, Vec<u8>)> {

@@ -3,7 +3,7 @@
 use kinoise::Plane;
 use kinoise::effects::Instant;
 
-use crate::laboratory::{Laboratory, ROUNDING_M, close, instant, line, mean};
+use super::laboratory::{Laboratory, ROUNDING_M, close, instant, line, mean};
 
 /// Against a camera whose lens model is the library's, not the effect's.
 #[test]

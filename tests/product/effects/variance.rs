@@ -5,7 +5,7 @@
 
 use kinoise::scene::{PATCH_SIDE_M, Print};
 
-use crate::laboratory::{Laboratory, close, instant, line, sd};
+use super::laboratory::{Laboratory, close, instant, line, sd};
 
 const SIGMA_M: f64 = 0.002;
 const WHOLE_PICTURE: f64 = 0.013;

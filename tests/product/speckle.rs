@@ -5,14 +5,14 @@
 //! Every test has fixed seeds; the false-alarm probabilities say how often another seed would
 //! fail it.
 
-mod common;
-
-use common::speckle::{FB, Watch, frontal, kinect, wall, watch};
 use kinoise::effects::Instant;
 use kinoise::scene::{Bench, Board, Target};
 use kinoise::simulate::speckle::{Causes, SpeckleSensor};
 use kinoise::simulate::{Physics, Scenery, Shoot, kinect_v1, plan_grid};
 use kinoise::{CalibrateOptions, Form, Seed};
+
+use crate::common;
+use crate::common::speckle::{FB, Watch, frontal, kinect, wall, watch};
 
 fn causes(text: &[&str]) -> Causes {
     text.iter().fold(Causes::default(), |c, t| c.parse(t).expect("a cause"))

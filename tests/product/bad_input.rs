@@ -1,15 +1,15 @@
 //! Bad input, through the real program: one message and exit code 2, or the exclusion told and
 //! the rest used. Never a panic, never a number that is none, never half a result.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{copy_tree, good, grid, kinoise, shots, write_depth, write_png};
 use kinoise::Frame;
 use png::{BitDepth, ColorType};
 use proptest::prelude::*;
+
+use crate::common;
+use crate::common::{copy_tree, good, grid, kinoise, shots, write_depth, write_png};
 
 /// A copy of the good recording (or anything else) to spoil, and where the results go.
 struct Bench {

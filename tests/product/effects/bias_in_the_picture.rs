@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use kinoise::scene::{Board, Target, TargetFrame};
 use nalgebra::Vector3;
 
-use crate::laboratory::{
+use super::laboratory::{
     Laboratory, ROUNDING_M, close, column_and_row_means, correlation, line, mean, sd, variance,
 };
 

@@ -1,7 +1,5 @@
 //! Models that must not be believed, and what a model says of its own trust.
 
-mod common;
-
 use std::path::Path;
 
 use kinoise::measure::{Cell, SigmaRow, SigmaTable};
@@ -10,6 +8,8 @@ use kinoise::simulate::Physics;
 use kinoise::{Form, NoiseModel, Seed, SigmaModel};
 use rand_distr::{Distribution, StandardNormal};
 use serde_json::{Value, json};
+
+use crate::common;
 
 /// A good model.json, made by the program from a table.
 fn model_json(folder: &Path) -> Value {

@@ -1,11 +1,11 @@
 //! `simulate --like`: the views of a recording shot again, and the circle closed.
 
-mod common;
-
 use kinoise::io::{Assumed, open};
 use kinoise::measure::MeasureOptions;
 use kinoise::simulate::{Physics, Shoot, plan_like};
 use kinoise::{CalibrateOptions, Calibration, Form, Measurements, Recording, Seed, SigmaModel};
+
+use crate::common;
 
 fn calibrated(recording: &Recording) -> (Measurements, Calibration) {
     let options = CalibrateOptions {

@@ -1,15 +1,12 @@
 //! The diagnosis on concealed sets of the proof's ray generator, which shares no formula with it:
 //! nothing is found where nothing is, each effect by its name, and no name for what has none.
 
-mod common;
-
-use crate::common::raytraced::{CATALOGUE, Cell, OUTSIDE};
-use common::rays::{Said, on_disk, order, text};
+use crate::rays::{Said, on_disk, order, text};
+use crate::raytraced::{CATALOGUE, Cell, OUTSIDE};
 
 /// 16 clean sets, half of them with correlated noise that the model knows. At a rate of 5 % more
 /// than four alarms have a chance of 8.6e-4.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn clean_sets_match() {
     let (mut correlated, mut alarms, mut no_numbers) = (0, Vec::new(), Vec::new());
     let mut taken = [0, 0];
@@ -19,7 +16,7 @@ fn clean_sets_match() {
         let done = taken[0] + taken[1];
         let views = if done == 0 { 36 } else { [8, 9, 10, 12][done % 4] };
         let order = order(Cell::Null, "", seed, views, 3);
-        let known = crate::common::raytraced::Set::draw(order.clone()).expect("drawn").known_causes;
+        let known = crate::raytraced::Set::draw(order.clone()).expect("drawn").known_causes;
         if taken[known] == 8 {
             continue;
         }
@@ -39,7 +36,6 @@ fn clean_sets_match() {
 
 /// One set of each effect of effects.md: the right name first for 24 of 29.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn every_effect_by_its_name() {
     let mut wrong = Vec::new();
     let mut sure_and_wrong = Vec::new();
@@ -72,7 +68,6 @@ fn first_alternative(said: &Said) -> (f64, String) {
 /// Eight causes that the catalogue lacks. They are seen on their own axis or one on which they
 /// show as well, and are not dressed up.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn what_has_no_name_is_given_none() {
     let (mut dressed, mut elsewhere, mut no_numbers) = (Vec::new(), Vec::new(), Vec::new());
     for form in &OUTSIDE[..8] {

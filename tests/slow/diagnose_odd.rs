@@ -1,19 +1,19 @@
 //! Small and odd recordings through the real program: what it can say and no more, one message
 //! where it can say nothing, the same bytes for the same seed.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::raytraced::Cell;
-use common::kinoise;
-use common::rays::{OnDisk, edit, nulls, on_disk, order, repaint, views, well_formed};
 use kinoise::model::{FitSummary, Provenance};
 use kinoise::scene::Target;
 use kinoise::simulate::{Shoot, kinect_v1};
 use kinoise::{NoiseModel, Seed};
 use serde_json::{Value, json};
+
+use crate::common;
+use crate::common::kinoise;
+use crate::rays::{OnDisk, edit, nulls, on_disk, order, repaint, views, well_formed};
+use crate::raytraced::Cell;
 
 /// A finished run.
 struct Run {
@@ -93,7 +93,6 @@ fn claims_nothing(said: &Value) {
 }
 
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn three_views_claim_nothing_that_is_not_there() {
     for seed in 31..34 {
         claims_nothing(&run(&clean(seed, 3, 3)).said());
@@ -102,13 +101,11 @@ fn three_views_claim_nothing_that_is_not_there() {
 }
 
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn two_views_are_refused_with_a_remedy() {
     run(&clean(31, 2, 2)).fails(&["2 of 2 views", "at least three views"]);
 }
 
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn one_frame_a_view_claims_nothing_and_still_sees_a_bowl() {
     for seed in 41..44 {
         let said = run(&clean(seed, 10, 1)).said();
@@ -151,20 +148,17 @@ fn only_steps(said: &Value) {
 }
 
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn one_distance_claims_nothing_about_distance() {
     only_steps(&posed(&[1.2], &[0.0, 15.0, 30.0, 40.0, 50.0]));
 }
 
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn views_square_to_the_axis_claim_nothing_about_tilt() {
     only_steps(&posed(&[0.8, 1.2, 1.6, 2.0, 2.5, 3.0], &[0.0]));
 }
 
 /// 60 x 60 px of every view.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn a_tiny_target_claims_nothing() {
     let disk = clean(51, 8, 3);
     for view in views(&disk.recording) {
@@ -176,7 +170,6 @@ fn a_tiny_target_claims_nothing() {
 
 /// Two of eight views see nothing: they are told of by name and the rest is used.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn views_without_depth_are_left_out_and_said_so() {
     let disk = clean(52, 8, 3);
     repaint(&disk.recording, |view, frame| {
@@ -198,7 +191,6 @@ fn views_without_depth_are_left_out_and_said_so() {
 }
 
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn a_model_without_numbers_is_refused() {
     for (number, needle) in [("\"nothing\"", "a"), ("null", "a"), ("1e999", "model")] {
         let disk = clean(53, 3, 1);
@@ -214,7 +206,6 @@ fn a_model_without_numbers_is_refused() {
 /// Sigma of nought cannot be what anything is held against: refused, or everything is amiss; no
 /// panic and no number that is none.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn a_model_without_noise_is_refused_or_everything_is_amiss() {
     let disk = clean(53, 6, 2);
     edit(&disk.model, |text| {
@@ -234,7 +225,6 @@ fn a_model_without_noise_is_refused_or_everything_is_amiss() {
 
 /// A model says which camera it is of: one of 640 x 480 px is no model of 320 x 240.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn a_model_of_another_resolution_is_refused_or_told_of() {
     let disk = clean(54, 6, 2);
     edit(&disk.model, |text| {
@@ -260,7 +250,6 @@ fn a_model_of_another_resolution_is_refused_or_told_of() {
 
 /// Without a baseline a Kinect's is assumed, or the recording is refused; no panic.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn without_a_baseline_it_is_said_what_is_assumed() {
     let disk = clean(55, 6, 2);
     let bare = |text: &str| {
@@ -283,7 +272,6 @@ fn without_a_baseline_it_is_said_what_is_assumed() {
 
 /// One set with something in every layer.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn the_same_seed_gives_the_same_bytes_on_one_thread_and_two() {
     let disk = bowl(8, 3);
     let bytes = |threads: &str, seed: &str| {
@@ -301,7 +289,6 @@ fn the_same_seed_gives_the_same_bytes_on_one_thread_and_two() {
 }
 
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn exit_codes_are_nought_one_and_two() {
     assert_eq!(run(&clean(31, 8, 3)).code, Some(0));
     assert_eq!(run(&bowl(8, 3)).code, Some(1));
@@ -312,7 +299,6 @@ fn exit_codes_are_nought_one_and_two() {
 
 /// The model that was extended is a model: it can be simulated from, and it corrects.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn the_extended_model_simulates_and_corrects() {
     for effect in ["radial-disparity-bias", "column-banding", "vignetting", "seam"] {
         let cell = if effect == "seam" { Cell::Outside } else { Cell::Single };

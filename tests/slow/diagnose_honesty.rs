@@ -1,17 +1,16 @@
 //! What the diagnosis says must follow the data: no structure, no finding; the same physics in
 //! another guise, the same name; the model it wrote, nothing left.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use crate::common::raytraced::{Cell, Set};
-use common::copy_tree;
-use common::rays::{OnDisk, Said, edit, on_disk, order, repaint, said, text, views};
 use kinoise::{DepthCode, Plane, Seed};
 use rand::seq::SliceRandom;
 use serde_json::Value;
+
+use crate::common::copy_tree;
+use crate::rays::{OnDisk, Said, edit, on_disk, order, repaint, said, text, views};
+use crate::raytraced::{Cell, Set};
 
 const VIEWS: usize = 12;
 
@@ -28,7 +27,6 @@ fn single(effect: &str, words: Option<f64>) -> OnDisk {
 /// Errors change places within each view's target: what followed the place in the picture, or the
 /// neighbour, follows nothing any more.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn shuffled_pixels_have_no_bias_and_no_correlation() {
     for effect in ["radial-disparity-bias", "spatial-correlation"] {
         let disk = single(effect, Some(WORDS));
@@ -78,7 +76,6 @@ fn shuffle(disk: &OnDisk) {
 
 /// Left and right of a picture changed, with the camera's own numbers: the same physics.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn a_mirrored_picture_has_the_same_name() {
     let mut others = Vec::new();
     for effect in ["column-banding", "vignetting", "row-noise"] {
@@ -132,7 +129,6 @@ fn names(said: &Said) -> Vec<String> {
 
 /// Twice the words to a metre, every word doubled: the metres are the same to the last bit.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn another_unit_of_depth_has_the_same_findings() {
     let mut others = Vec::new();
     for effect in ["radial-disparity-bias", "range-exponent"] {
@@ -158,7 +154,6 @@ fn another_unit_of_depth_has_the_same_findings() {
 /// The same views once more under other names are no news: no mismatch comes of them, and what
 /// was found is still what is found.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn views_given_twice_make_no_mismatch() {
     let (mut matches, mut turned) = (0, Vec::new());
     for seed in 901..903 {
@@ -189,7 +184,6 @@ fn twice(disk: &OnDisk) {
 
 /// The loop closes: a recording held against the model that was made of it has nothing left.
 #[test]
-#[cfg_attr(debug_assertions, ignore = "too slow without optimisation")]
 fn the_extended_model_matches_its_own_recording() {
     let mut open = Vec::new();
     for effect in [

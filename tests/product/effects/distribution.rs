@@ -1,6 +1,6 @@
 //! Which values occur.
 
-use crate::laboratory::{Laboratory, ROUNDING_M, close, mean, variance};
+use super::laboratory::{Laboratory, ROUNDING_M, close, mean, variance};
 
 /// The different depths of a frame, in order, m.
 fn distinct(frame: &[f64]) -> Vec<f64> {

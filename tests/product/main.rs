@@ -1,0 +1,27 @@
+//! The product's tests: a module a subject, seconds each. What simulates hundreds of recordings or
+//! diagnoses whole families of causes is in tests/slow.
+//!
+//! Every random number is seeded, so a test that passes once passes always; a false-alarm
+//! probability says how often correct code would fail under another seed.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod against;
+mod bad_input;
+mod capture;
+mod capture_kinect;
+mod correct;
+mod determinism;
+mod effects;
+mod extended_map;
+mod fit;
+mod layouts;
+mod map;
+mod measure;
+mod model_file;
+mod outliers;
+mod room;
+mod speckle;
+mod target;
+mod twin;

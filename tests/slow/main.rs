@@ -1,0 +1,20 @@
+//! Tests of minutes, started by `./run test --slow`: the diagnosis on ray-traced sets, which share no
+//! formula with it, and on odd ones; coverage over hundreds of recordings.
+//!
+//! A single test that takes long stays with its siblings as `#[ignore = "slow: ..."]`; `./run test --slow`
+//! runs those too.
+
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../common/rays.rs"]
+mod rays;
+#[allow(dead_code, unused_imports)] // the trial uses all of it
+#[path = "../common/raytraced/mod.rs"]
+mod raytraced;
+
+mod diagnose;
+mod diagnose_honesty;
+mod diagnose_odd;
+#[cfg(target_os = "linux")] // peak memory is read from /proc
+mod memory;
+mod recovery;
