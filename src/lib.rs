@@ -146,19 +146,10 @@
 //! "3D map-building from RGB-D data considering noise characteristics of Kinect" (SII 2016). It is
 //! "the paper" in these pages.
 
-<<<<<<< HEAD
 // In layers: a module imports only from those above it (tests/structure.py checks it). The blank
 // lines keep rustfmt from sorting them into one list.
-=======
-pub mod calibrate;
-pub mod camera;
-pub mod capture;
-pub mod compare;
-pub mod correct;
-pub mod diagnose;
 pub mod docs;
-pub mod effects;
->>>>>>> 5358dfa2606cd2f9ddca647a59b55057a09fba6a
+
 pub mod error;
 
 pub mod rng;

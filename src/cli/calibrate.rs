@@ -5,12 +5,12 @@ use clap::Args;
 use kinoise::calibrate::{Measurements, measure, model_of};
 use kinoise::io::{OutputDir, open};
 use kinoise::measure::{MeasureOptions, Planes, read_table, write_measurements};
-use kinoise::report::{CalibrationPage, Figure2, Overlay, SigmaMap, calibration_page};
+use kinoise::report::{CalibrationPage, Overlay, calibration_page, figure2, sigma_map};
 use kinoise::units::shortest;
 use kinoise::{CalibrateOptions, Calibration, Form, Recording, SigmaKind, model_of_table, stats};
 
 use super::calibrate_summary::{as_json, summary};
-use super::common::{Bar, Global, Input, notes, one_of, say};
+use super::common::{Bar, Global, Input, notes, one_of, say, source_date};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -91,6 +91,7 @@ impl Arguments {
             },
             kind: self.sigma,
             form: self.fitting.form()?,
+            created: source_date(),
         })
     }
 
@@ -133,7 +134,9 @@ pub fn fit(arguments: &FitArguments, global: &Global) -> anyhow::Result<()> {
 
 /// Fit to a table alone.
 fn table(file: &Path, output: &Path, fitting: &Fitting, global: &Global) -> anyhow::Result<()> {
-    let calibration = model_of_table(&read_table(file)?, fitting.form()?, file)
+    let form = fitting.form()?;
+    let options = CalibrateOptions { form, created: source_date(), ..Default::default() };
+    let calibration = model_of_table(&read_table(file)?, file, &options)
         .with_context(|| file.display().to_string())?;
     let page = CalibrationPage {
         title: &format!("Noise model of {}", file.display()),
@@ -193,8 +196,8 @@ pub fn calibrate(
 /// Model, figures and page; a summary for people.
 fn write_outputs(out: &OutputDir, page: &CalibrationPage<'_>) -> anyhow::Result<()> {
     let calibration = page.calibration;
-    let figure = Figure2::of(&calibration.table, &calibration.model.sigma, page.overlays);
-    let map = SigmaMap::of(&calibration.table, &calibration.model.sigma);
+    let figure = figure2(&calibration.table, &calibration.model.sigma, page.overlays);
+    let map = sigma_map(&calibration.table, &calibration.model.sigma);
     out.write("sigma.svg", figure.svg()?.as_bytes())?;
     out.write("sigma.png", &figure.png()?)?;
     out.write("sigma_map.svg", map.svg()?.as_bytes())?;

@@ -3,6 +3,7 @@
 use std::fmt::Display;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
+use std::time::{Duration, SystemTime};
 
 use anyhow::{Context, bail};
 use clap::Args;
@@ -161,6 +162,13 @@ pub fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
         .collect::<Result<_, String>>()?;
     let given = parsed.len();
     parsed.try_into().map_err(|_| format!("{given} numbers where {N} are needed, with commas"))
+}
+
+/// When results are to say that they were made: SOURCE_DATE_EPOCH, the convention of reproducible
+/// builds, in s since 1970; `None`, for now, where that is not set.
+pub fn source_date() -> Option<SystemTime> {
+    let seconds = std::env::var("SOURCE_DATE_EPOCH").ok()?.parse().ok()?;
+    SystemTime::UNIX_EPOCH.checked_add(Duration::from_secs(seconds))
 }
 
 /// A bar on a terminal, nothing elsewhere.

@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
-use kinoise::compare::{as_json, compare, of_the_paper, past_the_paper, tables};
+use kinoise::compare::{compare, of_the_paper, past_the_paper, tables};
 use kinoise::io::OutputDir;
 use kinoise::report::{comparison_figures, comparison_page};
 use kinoise::sequence::open;
@@ -45,8 +45,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         |name: &str, done: usize, all: usize| say(format!("run {} of {all}: {name}", done + 1));
     let comparison =
         compare(&sequence, &model, &variants, arguments.repeats, global.seed(), &progress)?;
-    let text = tables(&comparison);
-    let json = as_json(&comparison);
+    let text = tables::text(&comparison);
+    let json = tables::json(&comparison);
     output.write("tables.json", serde_json::to_string_pretty(&json)?.as_bytes())?;
     output.write("tables.txt", text.as_bytes())?;
     for (name, svg) in comparison_figures(&comparison)? {

@@ -11,7 +11,7 @@ use kinoise::{CalibrateOptions, Form, NoiseModel, Recording, SigmaModel};
 
 use super::calibrate::calibrate;
 use super::calibrate_summary::as_json;
-use super::common::{Global, say};
+use super::common::{Global, say, source_date};
 use super::diagnose::examine;
 use super::map::follow;
 
@@ -31,6 +31,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let options = CalibrateOptions {
         measure: MeasureOptions { seed: global.seed(), ..MeasureOptions::default() },
         form: Some(Form::Paper),
+        created: source_date(),
         ..CalibrateOptions::default()
     };
     let done = calibrate(&recording, &options, &arguments.output, &[Overlay::PaperEq1])?;

@@ -14,7 +14,7 @@ use kinoise::terms::Statistic;
 use kinoise::view::ViewNotes;
 use kinoise::{CalibrateOptions, Form, Frame, NoiseModel, Recording, Seed, Sensor};
 
-use super::common::{Bar, Global, Input, say};
+use super::common::{Bar, Global, Input, say, source_date};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -85,7 +85,8 @@ pub fn examine(
 }
 
 fn calibrated(recording: &Recording, global: &Global) -> anyhow::Result<NoiseModel> {
-    let mut options = CalibrateOptions { form: Some(Form::Paper), ..Default::default() };
+    let mut options =
+        CalibrateOptions { form: Some(Form::Paper), created: source_date(), ..Default::default() };
     options.measure.seed = global.seed();
     let bar = Bar::new("views");
     let views =

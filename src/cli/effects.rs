@@ -93,7 +93,7 @@ fn as_json(card: &Card) -> serde_json::Value {
     json!({
         "id": card.id,
         "words": card.summary,
-        "stage": format!("{:?}", card.stage),
+        "stage": card.stage,
         "statistic": card.statistic,
         "axis": card.axis,
         "parameters": card.parameters.iter().map(parameter).collect::<Vec<_>>(),

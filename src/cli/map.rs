@@ -3,7 +3,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use kinoise::evaluate::{Delta, Evaluation, evaluate};
 use kinoise::io::OutputDir;
-use kinoise::map::{self, Init, Kernel, Mapped, Options, Stages, Weights, frames_csv, ply};
+use kinoise::map::{
+    self, Alignment, Init, Kernel, Mapped, Options, Stages, Weights, frames_csv, ply,
+};
 use kinoise::report::map_page;
 use kinoise::sequence::{Sequence, open};
 use kinoise::trajectory::tum_text;
@@ -100,9 +102,9 @@ impl Tuning {
             kernel: self.kernel.unwrap_or(options.kernel),
             voxel_m: self.voxel.unwrap_or(options.voxel_m),
             block_px: self.block.unwrap_or(options.block_px),
-            gate_m: self.gate.unwrap_or(options.gate_m),
+            max_correspondence_m: self.gate.unwrap_or(options.max_correspondence_m),
             max_iterations: self.iterations.unwrap_or(options.max_iterations),
-            max_counted: self.memory.unwrap_or(options.max_counted),
+            max_observations: self.memory.unwrap_or(options.max_observations),
             colour: !self.no_colour,
             seed,
             ..options
@@ -184,11 +186,12 @@ fn stats(
     against: &Option<Result<Evaluation, String>>,
     seconds: f64,
 ) -> Value {
-    let followed: Vec<_> = mapped.frames.iter().filter(|f| f.iterations > 0).collect();
-    let n = followed.len().max(1) as f64;
-    let mean = |of: &dyn Fn(&kinoise::map::FrameReport) -> f64| {
-        followed.iter().map(|f| of(f)).sum::<f64>() / n
+    let aligned: Vec<&Alignment> =
+        mapped.frames.iter().filter_map(|f| f.alignment.as_ref()).collect();
+    let mean = |of: fn(&Alignment) -> f64| {
+        aligned.iter().map(|a| of(a)).sum::<f64>() / aligned.len().max(1) as f64
     };
+    let min = |of: fn(&Alignment) -> f64| aligned.iter().map(|a| of(a)).fold(1.0, f64::min);
     let all: Vec<Stages> = mapped.frames.iter().map(|f| f.stages.clone()).collect();
     let mut ms: serde_json::Map<String, Value> =
         Stages::medians(&all).each().map(|(name, v)| (name.to_string(), json!(v))).collect();
@@ -197,10 +200,10 @@ fn stats(
     json!({
         "frames": mapped.frames.len(),
         "lost": mapped.lost(),
-        "iterations": mean(&|f| f.iterations as f64),
-        "matched": mean(&|f| f.matched),
-        "least_matched": followed.iter().map(|f| f.matched).fold(1.0, f64::min),
-        "weakest": followed.iter().map(|f| f.weakest).fold(1.0, f64::min),
+        "iterations": mean(|a| a.iterations as f64),
+        "matched": mean(|a| a.inlier_ratio),
+        "least_matched": min(|a| a.inlier_ratio),
+        "weakest": min(|a| a.min_information),
         "points": mapped.map.len(),
         "ms": ms,
         "seconds": seconds,

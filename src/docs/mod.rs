@@ -27,8 +27,8 @@ mod tests {
 
     fn row(card: &Card) -> String {
         let knobs: Vec<String> = card.parameters.iter().map(knob).collect();
-        let Card { id, statistic, axis, words, .. } = card;
-        format!("| `{id}` | {statistic} | {axis} | {words} | {} |\n", knobs.join(", "))
+        let Card { id, statistic, axis, summary, .. } = card;
+        format!("| `{id}` | {statistic} | {axis} | {summary} | {} |\n", knobs.join(", "))
     }
 
     #[test]

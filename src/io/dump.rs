@@ -1,8 +1,4 @@
-<<<<<<< HEAD
-//! A fakenect dump: INDEX.txt and d-<time>-<stamp>.pgm, raw 11-bit values of a Kinect v1.
-=======
-//! A fakenect dump: INDEX.txt and `d-<time>-<stamp>.pgm`, raw 11-bit words of a Kinect v1.
->>>>>>> 5358dfa2606cd2f9ddca647a59b55057a09fba6a
+//! A fakenect dump: INDEX.txt and `d-<time>-<stamp>.pgm`, raw 11-bit values of a Kinect v1.
 
 use std::path::Path;
 
@@ -81,14 +77,7 @@ pub fn write_dump<'a>(
 /// Of a Kinect v1's timestamps.
 const CLOCK_HZ: f64 = 60e6;
 
-<<<<<<< HEAD
-/// Host time in seconds: the first number of d-<time>-<stamp>.pgm.
-=======
-/// Projector to camera in every Kinect v1 (LDDIS of the OpenNI device properties: 7.5 cm).
-const KINECT_BASELINE_M: f64 = 0.075;
-
 /// Host time in seconds: the first number of `d-<time>-<stamp>.pgm`.
->>>>>>> 5358dfa2606cd2f9ddca647a59b55057a09fba6a
 fn stamp(name: &str) -> Option<f64> {
     let rest = name.strip_prefix("d-")?.strip_suffix(".pgm")?;
     let (time, _) = rest.split_once('-')?;

@@ -1,13 +1,8 @@
 //! A film to map: depth images in time order, with the colour image and the true pose that belong
 //! to each, where there are any. Frames are read one at a time, when they are needed.
 //!
-<<<<<<< HEAD
 //! Two layouts: that of the TUM RGB-D benchmark (depth.txt, rgb.txt, associations, groundtruth.txt)
 //! and that of 7-Scenes (frame-XXXXXX.color/.depth/.pose).
-=======
-//! Two layouts (contract, section 2): `tum` (depth.txt, rgb.txt, associations, groundtruth.txt)
-//! and `scenes` (7-Scenes: frame-XXXXXX.color/.depth/.pose).
->>>>>>> 5358dfa2606cd2f9ddca647a59b55057a09fba6a
 
 mod moments;
 mod scenes;

@@ -309,7 +309,7 @@ mod tests {
     #[test]
     fn titles_fit_into_a_sentence() {
         for effect in effects::CATALOGUE {
-            for words in [effect.card().title, effect.card().words] {
+            for words in [effect.card().title, effect.card().summary] {
                 assert!(!words.ends_with('.') && words.starts_with(char::is_lowercase), "{words}");
             }
         }
