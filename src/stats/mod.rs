@@ -73,7 +73,7 @@ pub fn normal_cut_factor(cut: f64) -> f64 {
 }
 
 /// The root of an unbiased variance with `n` effective samples is low by this factor:
-/// E[s] = sigma (1 - 1/(4 n)) to first order.
+/// `E[s] = sigma (1 - 1/(4 n))` to first order.
 pub fn std_unbias(n: f64) -> f64 {
     if n > 1.0 { 1.0 + 1.0 / (4.0 * n) } else { 1.0 }
 }
