@@ -3,7 +3,7 @@
 //! One run takes seconds, so it is timed whole: `cargo bench --bench diagnose`. KINOISE_BENCH_RUNS
 //! is how often (3); the fastest counts, as on a loaded machine the others measure the load.
 
-#[allow(dead_code)]
+#[allow(dead_code, unused_imports)]
 #[path = "../common/raytraced/mod.rs"]
 mod raytraced;
 

@@ -1,5 +1,5 @@
 //! Tests of minutes, started by `./run test --slow`: the diagnosis on ray-traced sets, which share no
-//! formula with it, and on odd ones; coverage over hundreds of recordings.
+//! formula with it, and on odd ones; what each of its parts is for; coverage over hundreds of recordings.
 //!
 //! A single test that takes long stays with its siblings as `#[ignore = "slow: ..."]`; `./run test --slow`
 //! runs those too.
@@ -13,6 +13,7 @@ mod rays;
 mod raytraced;
 
 mod diagnose;
+mod diagnose_ablation;
 mod diagnose_honesty;
 mod diagnose_odd;
 #[cfg(target_os = "linux")] // peak memory is read from /proc
