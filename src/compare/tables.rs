@@ -7,8 +7,10 @@ use serde_json::{Map, Value, json};
 use super::{Comparison, Row, Run};
 use crate::evaluate::{Evaluation, Spread};
 
-/// Title, and what the table shows of an evaluation.
-const TABLES: [(&str, fn(&Evaluation) -> Spread); 3] = [
+/// What a table shows of an evaluation.
+type Column = fn(&Evaluation) -> Spread;
+
+const TABLES: [(&str, Column); 3] = [
     ("Table III. Absolute trajectory error after alignment (mm)", |e| e.ate.error.scaled(1e3)),
     ("Table IV. Relative pose error over 1 s, translation (mm)", |e| e.rpe.translation.scaled(1e3)),
     ("Table V. Relative pose error over 1 s, rotation (degrees)", |e| {
@@ -50,7 +52,7 @@ fn header<const N: usize>(columns: [&str; N]) -> String {
     " ".repeat(30) + &columns.map(|c| format!("{c:>11}")).concat()
 }
 
-fn spreads(row: &Row, of: fn(&Evaluation) -> Spread) -> String {
+fn spreads(row: &Row, of: Column) -> String {
     let spreads: Vec<Spread> = row.runs.iter().map(|r| of(&r.evaluation)).collect();
     if spreads.is_empty() {
         return failure(row);
