@@ -106,7 +106,7 @@ fn font_registered() -> bool {
     })
 }
 
-/// The whole drawing area and the size of a unit, px.
+/// The whole drawing area and the size of a unit, px. What draws fails when the backend does.
 pub struct Sheet<'a, B: DrawingBackend> {
     pub root: &'a DrawingArea<B, Shift>,
     pub unit: i32,
@@ -131,8 +131,6 @@ impl<B: DrawingBackend> Sheet<'_, B> {
         colour.stroke_width(width * self.unit.unsigned_abs())
     }
 
-    /// # Errors
-    /// When the backend fails, as all that draws here.
     pub fn line(&self, points: &[Pixel], style: ShapeStyle, dashes: Dashes) -> Drawn<B> {
         match *dashes {
             [stroke, gap] => self.root.draw(&DashedPathElement::new(
@@ -161,22 +159,15 @@ impl<B: DrawingBackend> Sheet<'_, B> {
         mesh
     }
 
-    /// # Errors
-    /// See [`Sheet::line`].
     pub fn fill<C: Color>(&self, corners: [Pixel; 2], colour: &C) -> Drawn<B> {
         self.root.draw(&Rectangle::new(corners, colour.filled()))
     }
 
     /// Text whose left (or as `anchor` says) middle is at `at`.
-    ///
-    /// # Errors
-    /// See [`Sheet::line`].
     pub fn text(&self, text: &str, at: Pixel, size: i32, anchor: HPos) -> Drawn<B> {
         self.coloured_text(text, at, size, anchor, &INK)
     }
 
-    /// # Errors
-    /// See [`Sheet::line`].
     pub fn coloured_text<C: Color>(
         &self,
         text: &str,
@@ -194,26 +185,17 @@ impl<B: DrawingBackend> Sheet<'_, B> {
     }
 
     /// Width of a text, px.
-    ///
-    /// # Errors
-    /// See [`Sheet::line`].
     pub fn width(&self, text: &str, size: i32) -> Drawn<B, i32> {
         Ok(self.root.estimate_text_size(text, &self.font(size))?.0 as i32)
     }
 
     /// The size, at most `size`, at which a text fits into so many units.
-    ///
-    /// # Errors
-    /// See [`Sheet::line`].
     pub fn fitting(&self, text: &str, size: i32, room: i32) -> Drawn<B, i32> {
         let (needed, room) = (self.width(text, size)?.max(1), self.px(room));
         Ok(if needed > room { (size * room / needed).max(SMALL / 2) } else { size })
     }
 
     /// The figure's title, as large as fits.
-    ///
-    /// # Errors
-    /// See [`Sheet::line`].
     pub fn title(&self, text: &str, width: i32) -> Drawn<B> {
         const LEFT: i32 = 16;
         const MIDDLE: i32 = 22;

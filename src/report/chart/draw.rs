@@ -200,7 +200,7 @@ fn corners((points, turn, star): (u8, f64, bool), (u, v): Pixel, radius: f64) ->
     const WAIST: f64 = 0.42;
     let half = PI / f64::from(points);
     let corner = |i: u8| {
-        let length = if i % 2 == 0 { 1.0 } else { WAIST } * REACH * radius;
+        let length = if i.is_multiple_of(2) { 1.0 } else { WAIST } * REACH * radius;
         let (sin, cos) = (half * (f64::from(i) + turn)).sin_cos();
         (u + (length * sin).round() as i32, v - (length * cos).round() as i32)
     };
