@@ -1,9 +1,5 @@
 //! An axis with round ticks, linear or logarithmic.
 
-use std::ops::Range;
-
-use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
-
 /// From `low` to `high`, with the values that get a tick and a label.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
@@ -101,7 +97,7 @@ impl Axis {
 }
 
 /// The least of 1, 2, 5 times a power of ten that is not below `value`.
-pub fn round_up(value: f64) -> f64 {
+pub(super) fn round_up(value: f64) -> f64 {
     const ROUNDING: f64 = 1e-9;
     let decade = 10f64.powf(value.log10().floor());
     let mantissa = value / decade * (1.0 - ROUNDING);
@@ -124,30 +120,6 @@ fn multiples(low: f64, high: f64) -> Vec<f64> {
         .take_while(|v| *v <= high * (1.0 + f64::EPSILON) + f64::EPSILON)
         .take(2 * MAX_TICKS)
         .collect()
-}
-
-impl Ranged for Axis {
-    type FormatOption = NoDefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        let length = f64::from(limit.1 - limit.0);
-        limit.0 + (self.share(*value) * length).round() as i32
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, _hint: Hint) -> Vec<f64> {
-        self.ticks.clone()
-    }
-
-    fn range(&self) -> Range<f64> {
-        self.low..self.high
-    }
-}
-
-impl ValueFormatter<f64> for Axis {
-    fn format(value: &f64) -> String {
-        Axis::label(*value)
-    }
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
 //! A chart as data: axes, layers, legend. SVG and PNG are drawn from it by one set of functions.
 
 mod draw;
+mod layers;
+mod sheet;
 
 use plotters::style::{RGBAColor, RGBColor};
 
 use super::axis::Axis;
-use super::sheet::{self, Dashes};
-use crate::error::Result;
 
 /// Everything that a chart shows. Values outside the axes are not drawn.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,7 +51,8 @@ pub enum Layer {
 pub struct Stroke {
     pub colour: RGBAColor,
     pub width: u32,
-    pub dashes: Dashes,
+    /// Lengths of stroke and gap; none for a whole line.
+    pub dashes: Option<[i32; 2]>,
 }
 
 /// How a point looks.
@@ -132,31 +133,15 @@ impl Chart {
             [-0.5, 0.5].map(|side| middle + side * unit * inner[k])
         })
     }
-
-    /// As SVG text.
-    ///
-    /// # Errors
-    /// When plotters fails.
-    pub fn svg(&self) -> Result<String> {
-        sheet::svg(self)
-    }
-
-    /// As the bytes of a PNG.
-    ///
-    /// # Errors
-    /// When plotters or the PNG encoder fails.
-    pub fn png(&self) -> Result<Vec<u8>> {
-        sheet::png(self)
-    }
 }
 
 impl Stroke {
     pub fn new(colour: impl Into<RGBAColor>, width: u32) -> Self {
-        Stroke { colour: colour.into(), width, dashes: &[] }
+        Stroke { colour: colour.into(), width, dashes: None }
     }
 
-    pub fn dashed(self, dashes: Dashes) -> Self {
-        Stroke { dashes, ..self }
+    pub fn dashed(self, stroke_and_gap: [i32; 2]) -> Self {
+        Stroke { dashes: Some(stroke_and_gap), ..self }
     }
 }
 

@@ -2,11 +2,11 @@
 
 use plotters::style::RGBColor;
 
-pub const INK: RGBColor = RGBColor(33, 33, 33);
-pub const FAINT: RGBColor = RGBColor(110, 110, 110);
-pub const GRID: RGBColor = RGBColor(225, 225, 225);
+pub(super) const INK: RGBColor = RGBColor(33, 33, 33);
+pub(super) const FAINT: RGBColor = RGBColor(110, 110, 110);
+pub(super) const GRID: RGBColor = RGBColor(225, 225, 225);
 /// The pages' accent.
-pub const ACCENT: RGBColor = RGBColor(0x1d, 0x91, 0xc0);
+pub(super) const ACCENT: RGBColor = RGBColor(0x1d, 0x91, 0xc0);
 
 /// Viridis (van der Walt and Smith 2015) up to the green that still shows on white.
 const DISTANCES: [u32; 6] = [0x440154, 0x414487, 0x2a788e, 0x22a884, 0x7ad151, 0xbed628];
@@ -19,28 +19,28 @@ const LINES: [u32; 8] =
     [0xd95f02, 0x7570b3, 0xe6ab02, 0x1b9e77, 0xe7298a, 0x377eb8, 0x66a61e, 0xa6761d];
 
 /// Of a distance: dark is near. `share` runs from 0 to 1, as in the others.
-pub fn distance(share: f64) -> RGBColor {
+pub(super) fn distance(share: f64) -> RGBColor {
     between(&DISTANCES, share)
 }
 
 /// Of a sigma on the map: light is small.
-pub fn surface(share: f64) -> RGBColor {
+pub(super) fn surface(share: f64) -> RGBColor {
     between(&SURFACE, share)
 }
 
 /// Of a residual: white is zero, at 0.5.
-pub fn residual(share: f64) -> RGBColor {
+pub(super) fn residual(share: f64) -> RGBColor {
     between(&RESIDUALS, share)
 }
 
 /// Of the `i`-th of several lines without an order.
-pub fn line(i: usize) -> RGBColor {
+pub(super) fn line(i: usize) -> RGBColor {
     rgb(LINES[i % LINES.len()])
 }
 
 /// The same hue for a thin line: at full lightness the last of the distances' colours is lost on
 /// white.
-pub fn darker(RGBColor(r, g, b): RGBColor) -> RGBColor {
+pub(super) fn darker(RGBColor(r, g, b): RGBColor) -> RGBColor {
     /// At which even the lightest keeps a contrast of 4.5 to white (WCAG 2.1, 1.4.3).
     const DARKER: f64 = 0.58;
     let dim = |c: u8| (f64::from(c) * DARKER).round() as u8;

@@ -1,5 +1,7 @@
 //! The page of a diagnosis: the answer on the first screen, the evidence below.
 
+mod advice;
+mod cards;
 mod curve;
 mod parameters;
 mod sections;
@@ -66,7 +68,7 @@ pub fn diagnosis_page(page: &DiagnosisPage<'_>) -> Result<String> {
         }
         (sections::verdict(diagnosis))
         @if unsettled { (sections::remarks(&diagnosis.remarks)) }
-        (sections::findings(&diagnosis.findings)?)
+        (cards::findings(&diagnosis.findings)?)
         section.outcome {
             (sections::held_out(diagnosis.heldout.as_ref()))
             (sections::remaining(diagnosis))

@@ -37,13 +37,13 @@ pub fn document(title: &str, kind: Option<Kind>, body: &Markup) -> Markup {
 macro_rules! row {
     ($($cell:expr),* $(,)?) => { vec![$(maud::html! { ($cell) }),*] };
 }
-pub(crate) use row;
+pub(super) use row;
 
 /// A table by the titles of its columns, which scrolls by itself where the page is too narrow.
 ///
 /// The first column names the row. A title after `>` is that of a column of numbers, set to the
 /// right; one after `~` is that of a column of sentences, set small.
-pub fn table<C: AsRef<str>>(columns: &[C], rows: impl IntoIterator<Item = Vec<Markup>>) -> Markup {
+pub(super) fn table<C: AsRef<str>>(columns: &[C], rows: impl IntoIterator<Item = Vec<Markup>>) -> Markup {
     let columns: Vec<(Option<&str>, &str)> = columns.iter().map(|c| set(c.as_ref())).collect();
     html! {
         div.wide { table class=[(columns.len() > 8).then_some("small")] {
@@ -67,20 +67,20 @@ fn set(column: &str) -> (Option<&'static str>, &str) {
 }
 
 /// Names and what they are.
-pub fn facts<N: AsRef<str>>(facts: impl IntoIterator<Item = (N, Markup)>) -> Markup {
+pub(super) fn facts<N: AsRef<str>>(facts: impl IntoIterator<Item = (N, Markup)>) -> Markup {
     html! {
         dl { @for (name, value) in facts { div { dt { (name.as_ref()) } dd { (value) } } } }
     }
 }
 
 /// A list; nothing where there are no items.
-pub fn list(items: impl IntoIterator<Item = Markup>) -> Markup {
+pub(super) fn list(items: impl IntoIterator<Item = Markup>) -> Markup {
     let mut items = items.into_iter().peekable();
     html! { @if items.peek().is_some() { ul { @for item in items { li { (item) } } } } }
 }
 
 /// What opens on a click; open from the start where it is short.
-pub fn fold(title: &str, open: bool, content: &Markup) -> Markup {
+pub(super) fn fold(title: &str, open: bool, content: &Markup) -> Markup {
     html! { details open[open] { summary { (title) } (content) } }
 }
 
@@ -88,7 +88,7 @@ pub fn fold(title: &str, open: bool, content: &Markup) -> Markup {
 ///
 /// # Errors
 /// When the chart cannot be drawn.
-pub fn figure(chart: &Chart, caption: &str) -> Result<Markup> {
+pub(super) fn figure(chart: &Chart, caption: &str) -> Result<Markup> {
     let svg = chart.svg()?;
     Ok(html! {
         figure {
@@ -99,7 +99,7 @@ pub fn figure(chart: &Chart, caption: &str) -> Result<Markup> {
 }
 
 /// An `img` that carries its pixels.
-pub fn picture(png: &[u8], [width, height]: [usize; 2], alt: &str) -> Markup {
+pub(super) fn picture(png: &[u8], [width, height]: [usize; 2], alt: &str) -> Markup {
     let source = format!("data:image/png;base64,{}", base64(png));
     html! { img alt=(alt) width=(width) height=(height) src=(source); }
 }

@@ -8,7 +8,6 @@ use super::axis::Axis;
 use super::chart::{Chart, Entry, Layer, Mark, Sample, Stroke};
 use super::colours::{self, INK};
 use super::numbers::{MM, fixed, range as numbers};
-use super::sheet::Dashes;
 use crate::measure::{SigmaRow, SigmaTable};
 use crate::model::{DISTANCE_RATIO, SigmaModel};
 use crate::stats::range;
@@ -43,16 +42,16 @@ impl Overlay {
         self.card().2()
     }
 
-    fn dashes(self) -> Dashes {
+    fn dashes(self) -> [i32; 2] {
         self.card().3
     }
 
-    fn card(self) -> (&'static str, &'static str, fn() -> SigmaModel, Dashes) {
+    fn card(self) -> (&'static str, &'static str, fn() -> SigmaModel, [i32; 2]) {
         match self {
-            Overlay::PaperEq1 => ("eq1", "paper, Eq. 1", SigmaModel::paper, &[9, 5]),
-            Overlay::Nguyen => ("nguyen", "Nguyen et al. 2012", SigmaModel::nguyen, &[2, 4]),
+            Overlay::PaperEq1 => ("eq1", "paper, Eq. 1", SigmaModel::paper, [9, 5]),
+            Overlay::Nguyen => ("nguyen", "Nguyen et al. 2012", SigmaModel::nguyen, [2, 4]),
             Overlay::Khoshelham => {
-                ("khoshelham", "Khoshelham 2012", SigmaModel::khoshelham, &[15, 3])
+                ("khoshelham", "Khoshelham 2012", SigmaModel::khoshelham, [15, 3])
             }
         }
     }

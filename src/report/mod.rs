@@ -4,18 +4,17 @@
 //! of functions for SVG and PNG alike. A page puts charts, tables and sentences into the skeleton
 //! of [`document`]; [`numbers`] decides how a number is written.
 
-pub mod axis;
+mod axis;
 mod calibration_page;
 pub mod chart;
-pub mod colours;
+mod colours;
 mod comparison;
 mod diagnosis_page;
 pub mod document;
 mod figure2;
 mod map_page;
-pub mod numbers;
+mod numbers;
 mod residuals;
-pub mod sheet;
 mod sigma_map;
 
 pub use axis::Axis;

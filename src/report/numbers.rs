@@ -2,15 +2,15 @@
 
 use maud::{Markup, PreEscaped, html};
 
-pub const MM: f64 = 1e3;
-pub const ABSENT: &str = "–";
+pub(super) const MM: f64 = 1e3;
+pub(super) const ABSENT: &str = "–";
 /// Beyond these, powers of ten are easier to read.
 const PLAIN: std::ops::Range<f64> = 1e-3..1e5;
 /// A p-value below it is not given to the digit.
 const MIN_P: f64 = 1e-6;
 
 /// A fixed number of decimals.
-pub fn fixed(value: f64, decimals: usize) -> String {
+pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if value.is_finite() {
         crate::units::decimals(value, decimals).replace('-', "−")
     } else {
@@ -19,31 +19,31 @@ pub fn fixed(value: f64, decimals: usize) -> String {
 }
 
 /// Metres as millimetres, to about three digits.
-pub fn millimetres(metres: f64) -> String {
+pub(super) fn millimetres(metres: f64) -> String {
     let mm = metres * MM;
     let decimals = [(0.1, 3), (10.0, 2)].into_iter().find(|(below, _)| mm.abs() < *below);
     fixed(mm, decimals.map_or(1, |(_, decimals)| decimals))
 }
 
-pub fn degrees(radians: f64) -> String {
+pub(super) fn degrees(radians: f64) -> String {
     fixed(radians.to_degrees(), 1)
 }
 
 /// With a decimal where one is needed to tell it from 0 or 100 %.
-pub fn percent(share: f64) -> String {
+pub(super) fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     let decimals = usize::from(percent > 99.0 && percent < 100.0 || percent > 0.0 && percent < 1.0);
     format!("{} %", fixed(percent, decimals))
 }
 
 /// `low – high`, or one number where they print alike.
-pub fn range([low, high]: [f64; 2], decimals: usize) -> String {
+pub(super) fn range([low, high]: [f64; 2], decimals: usize) -> String {
     let [low, high] = [low, high].map(|v| fixed(v, decimals));
     if low == high { low } else { format!("{low} – {high}") }
 }
 
 /// Decimals that keep two digits of `value`, four at most.
-pub fn decimals_for(value: f64) -> usize {
+pub(super) fn decimals_for(value: f64) -> usize {
     if !(value.is_finite() && value > 0.0) {
         return 2;
     }
@@ -51,7 +51,7 @@ pub fn decimals_for(value: f64) -> usize {
 }
 
 /// To `digits` significant digits, with a power of ten where that helps.
-pub fn significant(value: f64, digits: usize) -> Markup {
+pub(super) fn significant(value: f64, digits: usize) -> Markup {
     if value == 0.0 || !value.is_finite() {
         return html! { (fixed(value, 0)) };
     }
@@ -67,7 +67,7 @@ pub fn significant(value: f64, digits: usize) -> Markup {
 }
 
 /// `0.125 ± 0.001`: both to the digits that the error leaves.
-pub fn with_error(value: f64, error: f64) -> Markup {
+pub(super) fn with_error(value: f64, error: f64) -> Markup {
     if error.is_nan() || error <= 0.0 || value.abs().max(error) < PLAIN.start {
         return html! { (significant(value, 3)) " ± " (significant(error, 2)) };
     }
@@ -76,7 +76,7 @@ pub fn with_error(value: f64, error: f64) -> Markup {
 }
 
 /// `p = 0.012`, with its sign.
-pub fn p_value(p: f64) -> Markup {
+pub(super) fn p_value(p: f64) -> Markup {
     html! {
         @if p < MIN_P { "p < 10" sup { "−6" } }
         @else { "p = " (significant(p, if p < 1e-3 { 1 } else { 2 })) }
@@ -84,7 +84,7 @@ pub fn p_value(p: f64) -> Markup {
 }
 
 /// `two causes`: small numbers as words.
-pub fn count(n: usize, noun: &str) -> String {
+pub(super) fn count(n: usize, noun: &str) -> String {
     const WORDS: [&str; 10] =
         ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine"];
     let number = WORDS.get(n).map_or_else(|| n.to_string(), ToString::to_string);
@@ -93,7 +93,7 @@ pub fn count(n: usize, noun: &str) -> String {
 
 /// A formula in the notation of [`crate::model::SigmaForm::formula`], for the eye; names that
 /// `value` knows are replaced by their numbers.
-pub fn formula(text: &str, value: &dyn Fn(&str) -> Option<f64>) -> Markup {
+pub(super) fn formula(text: &str, value: &dyn Fn(&str) -> Option<f64>) -> Markup {
     let mut out = String::new();
     let mut rest = text;
     let word_end = |text: &str| text.find(|c: char| !c.is_alphanumeric()).unwrap_or(text.len());

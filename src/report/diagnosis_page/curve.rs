@@ -34,7 +34,7 @@ pub(super) fn chart(curve: &Curve) -> Option<Chart> {
     let zero = vec![[chart.x.low, 0.0], [chart.x.high, 0.0]];
     let radius = if marks.len() > MANY { 2 } else { 4 };
     chart.layers = vec![
-        Layer::Line(zero, Stroke::new(FAINT, 1).dashed(&[5, 4])),
+        Layer::Line(zero, Stroke::new(FAINT, 1).dashed([5, 4])),
         Layer::Line(line, Stroke::new(ACCENT, 3)),
         Layer::ErrorBars(bars, Stroke::new(INK, 1)),
         Layer::Marks(marks, Mark::dot(INK, radius)),

@@ -1,17 +1,14 @@
-//! The sections of the page, one function each.
+//! The sections of the page but for the findings', one function each.
 
-use maud::{Markup, PreEscaped, html};
-use serde_json::Value;
+use maud::{Markup, html};
 
 use super::sentences::{
-    advice, axis, badge, called, capital, chance, description, interval, join, missing, physics,
-    sentence, statistic, title,
+    axis, called, capital, interval, join, missing, mm, sentence, statistic, title,
 };
-use super::{curve, parameters, sentences};
-use crate::diagnose::{CannotTell, Diagnosis, Finding, HeldOut, MapRow, Status, Verdict, ViewLine};
-use crate::error::Result;
-use crate::report::document::{facts, fold, list, row, table};
-use crate::report::numbers::{count, degrees, fixed, millimetres, p_value, percent, significant};
+use super::{parameters, sentences};
+use crate::diagnose::{CannotTell, Diagnosis, HeldOut, MapRow, Verdict, ViewLine};
+use crate::report::document::{fold, list, row, table};
+use crate::report::numbers::{count, degrees, fixed, p_value, significant};
 use crate::terms::Statistic;
 
 /// Rows of the map that are open; the rest folds away.
@@ -19,8 +16,6 @@ const OPEN_ROWS: usize = 12;
 /// Longer lists fold away.
 const MAX_OPEN: usize = 6;
 const PX_DECIMALS: usize = 3;
-/// Smaller probabilities are nil.
-const MIN_PROBABILITY: f64 = 0.0005;
 
 pub(super) fn verdict(diagnosis: &Diagnosis) -> Markup {
     let (class, mark) = match diagnosis.verdict {
@@ -32,154 +27,40 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Markup {
         section class={ "verdict " (class) } {
             p.mark { (mark) }
             p.sentence { (sentences::verdict(diagnosis)) }
-            div.tiles { @for [label, big, note] in tiles(diagnosis) { div {
-                p.label { (label) }
-                p.big { (capital(&big)) }
-                p.label { (note) }
-            } } }
+            div.tiles { (tiles(diagnosis)) }
         }
     }
 }
 
-/// Label, value and remark of the numbers that go with the verdict.
-fn tiles(diagnosis: &Diagnosis) -> Vec<[String; 3]> {
+/// The numbers that go with the verdict.
+fn tiles(diagnosis: &Diagnosis) -> Markup {
     let held = diagnosis.views.iter().filter(|v| v.held_out).count();
+    let held = format!("{held} of them held out for the final test");
     let found = missing(&diagnosis.findings);
-    let views = count(diagnosis.views.len(), "view");
-    let mut tiles =
-        vec![["Recording".into(), views, format!("{held} of them held out for the final test")]];
-    tiles.push(match found.first() {
-        Some(first) => [
-            "Effects left out".into(),
-            found.len().to_string(),
-            format!("largest: {}", called(first)),
-        ],
-        None => {
-            ["Effects left out".into(), "none found".into(), "see what could have been seen".into()]
-        }
-    });
-    tiles.extend(diagnosis.heldout.as_ref().map(|held| {
-        let [before, after] = [held.rms_mm_before, held.rms_mm_after].map(mm);
-        [
-            "Steady error, held-out views".into(),
-            format!("{before} → {after}"),
-            "before and after".into(),
-        ]
-    }));
-    if !diagnosis.findings.is_empty() {
-        let left = match (diagnosis.after.verdict, diagnosis.after.remaining.len()) {
-            (Verdict::Match, _) => "nothing".into(),
-            (_, 0) => "not settled".into(),
-            (_, left) => count(left, "difference"),
-        };
-        tiles.push(["Still unexplained".into(), left, "when the tests are run again".into()]);
-    }
-    tiles
-}
-
-/// A card for each finding.
-pub(super) fn findings(findings: &[Finding]) -> Result<Markup> {
-    let cards = findings.iter().enumerate().map(card).collect::<Result<Vec<Markup>>>()?;
-    Ok(html! { @if !cards.is_empty() { section.cards { @for card in cards { (card) } } } })
-}
-
-fn card((i, finding): (usize, &Finding)) -> Result<Markup> {
-    let picture = finding.curve.as_ref().and_then(curve::chart).map(|c| c.svg()).transpose()?;
-    let (class, badge) = badge(finding.status);
-    Ok(html! {
-        article.card {
-            header {
-                h2 { (i + 1) ". " (capital(&called(finding))) }
-                span class={ "badge " (class) } { (badge) }
-            }
-            p.lead { (physics(finding)) }
-            div.halves {
-                (facts(finding_facts(finding)))
-                @if let Some(svg) = picture { figure {
-                    div.drawing role="img" aria-label={ "curve of " (called(finding)) } { (PreEscaped(svg)) }
-                    figcaption {
-                        span.dot {} " measured ± standard error " span.line {}
-                        @if finding.status == Status::Unexplained { " curve given to the simulation" }
-                        @else { " simulation with it added" }
-                    }
-                } }
-            }
-            (alternatives(finding))
-            @if let Some(advice) = advice(finding) { div.todo { p { b { "What to do. " } (advice) } } }
-        }
-    })
-}
-
-/// Those that are known.
-fn finding_facts(finding: &Finding) -> Vec<(String, Markup)> {
-    let place = interval(finding.axis, finding.interval, finding.unit);
-    let mut facts = vec![
-        ("What is off".into(), html! { (capital(statistic(finding.statistic))) }),
-        ("Where".into(), html! { (capital(axis(finding.axis))) ": " b { (place) } }),
-    ];
-    facts.extend(size(finding).map(|size| ("How large".into(), size)));
-    if finding.status != Status::NotIdentifiable {
-        facts.push(("How sure".into(), certainty(finding)));
-        facts.extend(share(finding).map(|share| ("Share".into(), share)));
-    }
-    facts.extend(finding.parameters.iter().map(|(k, v)| parameter(finding.effect, k, v)));
-    facts
-}
-
-fn share(finding: &Finding) -> Option<Markup> {
-    let percent = (100.0 * finding.share).clamp(0.0, 100.0);
-    finding.share.is_finite().then(|| {
-        html! {
-            span.bar { span style={ "width:" (format!("{percent:.0}")) "%" } {} }
-            " " b { (fixed(percent, 0)) " %" } " of all that was explained"
-        }
-    })
-}
-
-fn size(finding: &Finding) -> Option<Markup> {
-    let size = finding.size;
-    let noise =
-        if finding.statistic == Statistic::Bias { "of a single reading" } else { "in the model" };
-    (size.mm.abs() > 0.0 || size.sigma.abs() > 0.0).then(|| html! {
-        @if finding.statistic == Statistic::Dropout {
-            b { (percent(size.sigma)) } " of the pixels are lost"
-        } @else {
-            b { (mm(size.mm)) } " rms, " b { (significant(size.sigma, 2)) " times" } " the noise " (noise)
-        }
-    })
-}
-
-fn certainty(finding: &Finding) -> Markup {
-    html! {
-        (capital(&chance(finding.p_adjusted)))
-        @if finding.p_adjusted.is_finite() { " (" (p_value(finding.p_adjusted)) ")" }
-    }
-}
-
-/// `amplitude_px = 0.3 ± 0.1 px`, and what that is.
-fn parameter(effect: Option<&str>, name: &str, value: &Value) -> (String, Markup) {
-    let description = parameters::description(effect, name);
-    let value = html! {
-        b { (parameters::value(name, value, 3)) }
-        @if !description.is_empty() { ": " (description) }
+    let largest = found.first().map(|f| format!("largest: {}", called(f)));
+    let remaining = match (diagnosis.after.verdict, diagnosis.after.remaining.len()) {
+        (Verdict::Match, _) => "nothing".into(),
+        (_, 0) => "not settled".into(),
+        (_, left) => count(left, "difference"),
     };
-    (name.into(), value)
+    html! {
+        (tile("Recording", &count(diagnosis.views.len(), "view"), &held))
+        @match largest {
+            Some(largest) => (tile("Effects left out", &found.len().to_string(), &largest)),
+            None => (tile("Effects left out", "none found", "see what could have been seen")),
+        }
+        @if let Some(held) = &diagnosis.heldout {
+            @let change = format!("{} → {}", mm(held.rms_mm_before), mm(held.rms_mm_after));
+            (tile("Steady error, held-out views", &change, "before and after"))
+        }
+        @if !diagnosis.findings.is_empty() {
+            (tile("Still unexplained", &remaining, "when the tests are run again"))
+        }
+    }
 }
 
-/// Every effect that it could be, best first.
-fn alternatives(finding: &Finding) -> Markup {
-    let none = 1.0 - finding.alternatives.iter().map(|a| a.probability).sum::<f64>();
-    let effects = finding.alternatives.iter().map(|a| {
-        html! {
-            b { (percent(a.probability)) " " (title(a.effect)) }
-            ": " (description(a.effect)) " " code { (a.effect) }
-        }
-    });
-    let none = (none > MIN_PROBABILITY).then(|| html! { b { (percent(none)) " none of these" } });
-    html! { @if !finding.alternatives.is_empty() {
-        h3 { "What it could be" }
-        (list(effects.chain(none)))
-    } }
+fn tile(label: &str, value: &str, remark: &str) -> Markup {
+    html! { div { p.label { (label) } p.big { (capital(value)) } p.label { (remark) } } }
 }
 
 /// The final test.
@@ -362,9 +243,4 @@ pub(super) fn remarks(remarks: &[String]) -> Markup {
         h2 { "Remarks" }
         (list(remarks.iter().map(|remark| html! { (remark) })))
     } } }
-}
-
-/// Of a size that already is in mm.
-fn mm(value: f64) -> String {
-    format!("{} mm", millimetres(1e-3 * value))
 }

@@ -1,14 +1,10 @@
-//! What the page says in words: of verdicts, of findings by their status, and what to do next.
+//! What the page says in words: of the verdict, and of findings by their status.
 
-use maud::{Markup, html};
-
-use crate::diagnose::{Diagnosis, Finding, NextView, Reference, Status, Verdict};
+use crate::diagnose::{Diagnosis, Finding, Reference, Status, Verdict};
 use crate::effects;
-use crate::report::numbers::{count, decimals_for, fixed};
+use crate::report::numbers::{count, decimals_for, fixed, millimetres};
 use crate::terms::{Axis, Statistic};
 
-/// Below this tilt a target counts as facing the sensor, rad: 3 degrees.
-const FACING_RAD: f64 = 0.0524;
 /// Less likely alternatives do not come into a finding's name.
 const MIN_PROBABILITY: f64 = 0.05;
 /// As many findings come by name into the first sentence.
@@ -118,63 +114,6 @@ pub(super) fn physics(finding: &Finding) -> String {
     }
 }
 
-/// What to do next; nothing where nothing is asked of anybody.
-pub(super) fn advice(finding: &Finding) -> Option<Markup> {
-    let view = finding.next_view.as_ref();
-    let more = match finding.status {
-        Status::Named => "",
-        Status::OneOf if view.is_some() => {
-            "Then diagnose again with this view added to the recording."
-        }
-        Status::OneOf => {
-            "These views do not separate the alternatives. Add views at other distances and tilts, and diagnose again."
-        }
-        Status::Unexplained => {
-            "The simulation can use the measured curve as it is. To find the cause, change one thing at a time \
-             (distance, tilt, place in the picture, light, time since switching on) and see what the curve follows."
-        }
-        Status::Recalibrate => {
-            "Run “kinoise calibrate” on this recording and diagnose again with the new model. No effect has to be \
-             added to the simulation."
-        }
-        Status::NotIdentifiable if view.is_none() && finding.statistic == Statistic::Bias => {
-            "A plane with this error still looks like a plane. Measure the distance from sensor to target with a tape \
-             in a few views at different distances, write it into each view's view.json as “reference_distance_m”, \
-             and diagnose again."
-        }
-        Status::NotIdentifiable => "Add views at other distances and tilts, and diagnose again.",
-    };
-    (view.is_some() || !more.is_empty())
-        .then(|| html! { @if let Some(view) = view { (next_view(view)) } (more) })
-}
-
-/// An instruction to a person holding a target.
-fn next_view(next: &NextView) -> Markup {
-    let tilt = fixed(next.theta_rad.to_degrees(), 0);
-    html! {
-        "Take one more view: hold the target " b { (fixed(next.z_m, 2)) " m" } " in front of the sensor, "
-        @if next.theta_rad.abs() < FACING_RAD { b { "facing it" } ". " }
-        @else { b { "tilted by " (tilt) "°" } ", its " b { (far_side(next.azimuth_rad)) } " farthest away as the sensor sees it. " }
-        @if !next.why.is_empty() { (sentence(&next.why)) " " }
-    }
-}
-
-/// Depth grows towards the azimuth: 0 to the right, a quarter turn down.
-fn far_side(azimuth_rad: f64) -> &'static str {
-    const SIDES: [&str; 8] = [
-        "right side",
-        "lower right corner",
-        "lower side",
-        "lower left corner",
-        "left side",
-        "upper left corner",
-        "upper side",
-        "upper right corner",
-    ];
-    let eighths = (azimuth_rad / std::f64::consts::FRAC_PI_4).round() as i64;
-    SIDES[eighths.rem_euclid(8) as usize]
-}
-
 pub(super) fn axis(axis: Axis) -> &'static str {
     match axis {
         Axis::Z => "distance from the sensor",
@@ -230,6 +169,11 @@ pub(super) fn interval(axis: Axis, [low, high]: [f64; 2], unit: &str) -> String 
     if low == high { format!("{low}{unit}") } else { format!("{low} to {high}{unit}") }
 }
 
+/// Of a size that already is in mm.
+pub(super) fn mm(value: f64) -> String {
+    format!("{} mm", millimetres(1e-3 * value))
+}
+
 /// What a p-value means.
 pub(super) fn chance(p: f64) -> String {
     if p.is_nan() {
@@ -277,19 +221,6 @@ pub(super) fn sentence(words: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_far_side_is_named() {
-        for (degrees, side) in [
-            (0.0, "right side"),
-            (92.0, "lower side"),
-            (-90.0, "upper side"),
-            (180.0, "left side"),
-            (-180.0, "left side"),
-        ] {
-            assert_eq!(far_side(f64::to_radians(degrees)), side);
-        }
-    }
 
     #[test]
     fn intervals_have_peoples_units() {

@@ -72,7 +72,7 @@ const SAYS: [(&str, &[&str]); 8] = [
         "match",
         &[
             "The model explains this recording",
-            "(radial disparity bias, pixel locking and a bent target)",
+            "(radial disparity bias and a bent target)",
             "sagitta 0.62 mm , at a span of 1.0 m",
             "A wrong depth scale : A flat board stays flat under it",
         ],

@@ -19,7 +19,7 @@ fn count(chart: &Chart, wanted: impl Fn(&Layer) -> bool) -> usize {
 }
 
 fn is_overlay(layer: &Layer) -> bool {
-    matches!(layer, Layer::Line(_, stroke) if !stroke.dashes.is_empty())
+    matches!(layer, Layer::Line(_, stroke) if stroke.dashes.is_some())
 }
 
 #[test]
@@ -60,7 +60,7 @@ fn an_overlay_has_the_mark_of_its_distance() {
     for (i, pair) in overlays.into_iter().enumerate() {
         let [Layer::Line(line, stroke), Layer::Marks(_, mark)] = pair else { panic!("{pair:?}") };
         let (overlay, group) = (Overlay::ALL[i / 2], i % 2);
-        assert_eq!((stroke.dashes, mark.shape), (overlay.dashes(), group));
+        assert_eq!((stroke.dashes, mark.shape), (Some(overlay.dashes()), group));
         let sigma = overlay.model().sigma([1.0, 2.0][group], 0.0);
         approx::assert_relative_eq!(line[0][1], MM * sigma);
     }
