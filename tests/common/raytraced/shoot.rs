@@ -200,7 +200,7 @@ impl<'a> Still<'a> {
 
     fn image(&self, words: Vec<u16>) -> Frame {
         let camera = &self.set.unit.sensor.camera;
-        Frame { width: camera.width, height: camera.height, words }
+        Frame { width: camera.width, height: camera.height, raw: words }
     }
 }
 

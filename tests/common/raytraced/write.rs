@@ -68,7 +68,7 @@ fn infrared(image: &Frame, bits: u8) -> Result<Vec<u8>> {
         return encode_png16_quickly(image);
     }
     let failed = |e: png::EncodingError| Error::Drawing { what: "PNG", why: e.to_string() };
-    let data: Vec<u8> = image.words.iter().map(|w| (w >> 2) as u8).collect();
+    let data: Vec<u8> = image.raw.iter().map(|w| (w >> 2) as u8).collect();
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, image.width as u32, image.height as u32);
     encoder.set_color(ColorType::Grayscale);

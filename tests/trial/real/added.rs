@@ -131,25 +131,25 @@ fn ground<'a>(full: &'a Full, plans: &'a [Plan]) -> Ground<'a> {
 pub fn add(causes: &[Cause], full: &Full, eye: &Eye<'_>, frame: &Frame, clock: &Clock) -> Frame {
     let unit = eye.world.unit;
     let (code, fb, width) = (unit.sensor.code, unit.disparity_px_m(), frame.width);
-    let sites: Vec<Option<Site>> = (0..frame.words.len())
+    let sites: Vec<Option<Site>> = (0..frame.raw.len())
         .map(|i| {
-            code.metres(frame.words[i])?;
+            code.metres(frame.raw[i])?;
             eye.look((i % width) as f64, (i / width) as f64)
         })
         .collect();
     let seen = &full.seen[eye.plan.view];
-    let mut sigma_px = vec![f64::NAN; frame.words.len()];
+    let mut sigma_px = vec![f64::NAN; frame.raw.len()];
     let known = seen.pixels.iter().zip(&seen.sigma_px);
     known.for_each(|(&i, &sigma)| sigma_px[i as usize] = f64::from(sigma));
     let places = before_rounding(frame, &sites, &sigma_px, unit, &mut clock.stream("step"));
-    let mut noise = fresh(clock, frame.words.len());
+    let mut noise = fresh(clock, frame.raw.len());
     let window_px = area(&full.model, "bias").sqrt();
     if window_px > 1.0 {
         Window::bell(window_px).blur(&mut noise, width);
     }
     let bent = eye.with(causes);
     let (facts, mut lost) = (eye.plan.facts(), clock.stream("lost"));
-    let mut words = frame.words.clone();
+    let mut words = frame.raw.clone();
     for (i, site) in sites.into_iter().enumerate() {
         let chance: f64 = lost.random();
         let Some(mut site) = site else { continue };
@@ -165,9 +165,9 @@ pub fn add(causes: &[Cause], full: &Full, eye: &Eye<'_>, frame: &Frame, clock: &
         let further = sigma * (sum.spread.powi(2) - 1.0).max(0.0).sqrt();
         let d = (d + error + sum.error) / sum.gain + further * f64::from(noise[i]);
         // No depth at all is stored as none.
-        words[i] = code.word(if chance < sum.answer { fb / d } else { f64::NAN });
+        words[i] = code.raw(if chance < sum.answer { fb / d } else { f64::NAN });
     }
-    Frame { width, height: frame.height, words }
+    Frame { width, height: frame.height, raw: words }
 }
 
 /// Where in its step each word's value lay.
@@ -182,7 +182,7 @@ fn before_rounding(
     // By how many steps a word is above what the plane's would be; NaN beside it.
     let off = |(i, site): (usize, &Option<Site>)| match site {
         Some(site) if sigma_px[i].is_finite() => {
-            let at = |place: f64| disparity(&code, frame.words[i], place, fb);
+            let at = |place: f64| disparity(&code, frame.raw[i], place, fb);
             ((at(0.0) - site.disparity) / (at(0.5) - at(-0.5))) as f32
         }
         _ => f32::NAN,

@@ -58,7 +58,7 @@ pub fn places(frame: &Frame, valid: &[bool], off: &[f32], rng: &mut Stream) -> V
 
 /// By how much the neighbours' mean is above a word. Pairs on either side take a slope out.
 fn neighbours_above(frame: &Frame, valid: &[bool], i: usize) -> f32 {
-    let Frame { width, height, words } = frame;
+    let Frame { width, height, raw: words } = frame;
     let (u, v) = (i % width, i / width);
     let (across, down) = (REACH.min(u).min(width - 1 - u), REACH.min(v).min(height - 1 - v));
     let (mut sum, mut n) = (0.0, 0);

@@ -109,10 +109,10 @@ fn an_error_added_to_words_is_as_if_it_had_come_before_them() {
         let off = |words: &[u16]| -> Vec<f32> {
             (0..words.len()).map(|i| f32::from(words[i]) - exact(i)).collect()
         };
-        let frame = Frame { width, height, words: stored(0.0) };
+        let frame = Frame { width, height, raw: stored(0.0) };
         let valid = vec![true; noise.len()];
-        let places = dither::places(&frame, &valid, &off(&frame.words), &mut clock.stream("x"));
-        let values = frame.words.iter().zip(&places).map(|(w, place)| f32::from(*w) + place);
+        let places = dither::places(&frame, &valid, &off(&frame.raw), &mut clock.stream("x"));
+        let values = frame.raw.iter().zip(&places).map(|(w, place)| f32::from(*w) + place);
         let added: Vec<u16> = values.map(|value| (value + 0.37).round() as u16).collect();
         for (sum, words) in sums.iter_mut().zip([added, stored(0.37)]) {
             let field = off(&words);
@@ -144,11 +144,11 @@ fn more_noise_and_fewer_answers() {
     let causes =
         [spread("twice", "", "", &[], |_, _| 2.0), loss("a tenth", "", "", &[], |_, _| 0.1)];
     let clock = Clock { seed: Seed(3), view: 0, frame: 0, view_s: 0.0, width: 320 };
-    let words = added::add(&causes, &full, &eye, &frame, &clock).words;
+    let words = added::add(&causes, &full, &eye, &frame, &clock).raw;
     let (mut n, mut kept, mut squares) = (0.0, 0.0, 0.0);
     for (&i, sigma) in full.seen[0].pixels.iter().zip(&full.seen[0].sigma_px) {
         let disparity = |word: u16| code.metres(word).map(|z| fb / z);
-        let Some(before) = disparity(frame.words[i as usize]) else { continue };
+        let Some(before) = disparity(frame.raw[i as usize]) else { continue };
         n += 1.0;
         if let Some(after) = disparity(words[i as usize]) {
             kept += 1.0;
