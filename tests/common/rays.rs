@@ -1,4 +1,4 @@
-//! Sets of the proof's ray generator on disk, and what the diagnosis says of them.
+//! Raytraced sets on disk, and what the diagnosis says of them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -123,7 +123,7 @@ pub fn nulls(d: &Value) -> Vec<String> {
     found
 }
 
-/// Contract, section 5: fields, words, and ranges.
+/// Fields, words, and ranges of `diagnosis.json`.
 #[track_caller]
 pub fn well_formed(d: &Value) {
     assert_eq!(d["format"], "kinoise-diagnosis/1");

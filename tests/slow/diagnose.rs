@@ -82,7 +82,7 @@ fn what_has_no_name_is_given_none() {
         let label = &disk.set.causes[disk.set.known_causes].label;
         let findings = said.findings();
         let axis = findings.first().map_or(String::new(), |f| text(&f["axis"]));
-        if axis != label.axis && !label.also.contains(&axis.as_str()) {
+        if axis != label.axis && !label.also.contains(&axis) {
             elsewhere.push(format!("{form} on {axis}, not {}", label.axis));
         }
     }

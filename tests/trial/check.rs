@@ -188,7 +188,7 @@ impl Checked {
         }
         let scratch = std::env::temp_dir().join(format!("kinoise-check-{}", std::process::id()));
         let again = each(&sample, ("making sets again", progress), |&i| {
-            let sealed = crate::worlds::seal(&planned[i].asked, data)?;
+            let sealed = crate::plan::conceal(&planned[i].asked, data)?;
             let (name, truth) = (planned[i].name.clone(), sealed.truth());
             let set = Taken { name, truth, sealed, view: None };
             let verdict = std::iter::once(proof.sets[i].verdict.as_ref());

@@ -2,7 +2,7 @@
 //! `./run prove -o DIR [--sets N] [--seed S] [--data RECORDINGS]`, `--check DIR`, `--page DIR`.
 //!
 //! Makers of concealed sets share no formula with the catalogue and no code with the diagnosis
-//! ([`raytraced`], the world of light, and real recordings). Their data and answers are hashed before the first
+//! ([`raytraced`], the speckle simulator, and real recordings). Their data and answers are hashed before the first
 //! diagnosis, the verdicts before the first answer is opened; a process that can reach one set and
 //! nothing else diagnoses it; endpoints are chosen before; every failure is on the page.
 
@@ -15,7 +15,7 @@ mod check;
 mod commitment;
 mod gain;
 mod judge;
-mod light;
+
 mod make;
 mod page;
 mod plan;
@@ -24,7 +24,7 @@ mod proof;
 mod real;
 mod rounds;
 mod solver;
-mod worlds;
+mod speckle;
 
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -39,8 +39,6 @@ use kinoise::io::write_atomic;
 
 use check::{CheckOptions, check};
 use proof::{Order, Proof};
-#[allow(unused_imports)] // by their short names in the worlds
-use raytraced::question::{Asked, Cell, Hidden, Pose, Sealed, Truth, World};
 use rounds::{Trial, hold};
 
 /// A blind trial of the diagnosis on concealed sets that anyone can check.

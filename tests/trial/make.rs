@@ -1,17 +1,18 @@
-//! Scratch driver of the proof's ray generator:
-//! `rays OUTDIR --cell CELL --effect ID[,ID] [--strength S | --nats N] --seed N [--count K] [--views N] [--frames N] [--small]`
+//! `trial make OUT --cell CELL ...`: raytraced sets as the trial makes them, for goldens and a look.
 //!
-//! With `--nats` a set is as the trial seals it: 320x240, `--small` 160x120. With `--light` it is made
-//! of dots, `--effect` names a cause, and `OUT/<name>/` holds `recording/` and `simulated/`.
+//! With `--nats` or `--sealed` a set is the trial's: 320x240, `--small` 160x120; else it is of one
+//! strength: 640x480, `--small` 320x240. With `--light` it is made of dots, `--effect` names a cause,
+//! and `OUT/<name>/` holds `recording/` and `simulated/`.
 
 use std::path::PathBuf;
 use std::time::Instant;
 
-use crate::raytraced::question::{Asked, World};
-use crate::raytraced::{Cell, Order, Set, write};
-use crate::{light, worlds};
 use anyhow::Context;
 use clap::Args;
+
+use crate::raytraced::question::{Asked, World};
+use crate::raytraced::{CATALOGUE, Cell, OUTSIDE, Order, Set, write};
+use crate::speckle;
 use kinoise::io::sha256_hex;
 
 #[derive(Debug, Args)]
@@ -56,76 +57,57 @@ impl Arguments {
         Asked { world, cell, names: effects.to_vec(), nats, seed, small }
     }
 
-    /// `OUT/<name>/`, and its truth where the others have theirs.
-    fn shoot(&self, effects: &[String], seed: u64) -> anyhow::Result<()> {
-        let begin = Instant::now();
+    /// Into `OUT/<name>/`, and its truth where the others have theirs. What was made.
+    fn speckle(&self, effects: &[String], seed: u64) -> anyhow::Result<String> {
         let asked = self.asked(World::Light, effects, seed);
         let name = &sha256_hex(format!("{asked:?}").as_bytes())[..10];
-        let set = worlds::seal(&asked, None)?;
+        let set = speckle::conceal(&asked)?;
         set.write(&self.out.join(name))?;
-        let truth = self.out.join("truth");
-        std::fs::create_dir_all(&truth)?;
-        let told = set.truth();
-        std::fs::write(truth.join(format!("{name}.json")), serde_json::to_vec_pretty(&told)?)?;
-        let causes: Vec<&str> = told.hidden.iter().map(|h| h.form.as_str()).collect();
-        let seconds = begin.elapsed().as_secs_f64();
-        println!("{name} {} {:?} {seconds:.2} s", causes.join("+"), asked.nats);
-        Ok(())
+        let folder = self.out.join("truth");
+        std::fs::create_dir_all(&folder)?;
+        let truth = set.truth();
+        std::fs::write(folder.join(format!("{name}.json")), serde_json::to_vec_pretty(&truth)?)?;
+        let causes: Vec<&str> = truth.hidden.iter().map(|h| h.form.as_str()).collect();
+        Ok(format!("{name} {} {:?}", causes.join("+"), asked.nats))
     }
 
-    fn set(&self, effects: &[String], seed: u64) -> kinoise::error::Result<Set> {
-        let (cell, small) = (self.cell, self.small);
-        if self.nats.is_some() || self.sealed {
-            let asked = self.asked(World::Rays, effects, seed);
-            return Set::sealed(&asked, self.views, self.frames);
-        }
-        Set::draw(Order {
-            cell,
-            effects: effects.to_vec(),
-            strength: self.strength,
-            seed,
-            views: self.views,
-            frames: self.frames,
-            small,
-        })
+    /// Into `OUT/<name>/`, `OUT/model/` and `OUT/truth/`. What was made.
+    fn raytraced(&self, effects: &[String], seed: u64) -> anyhow::Result<String> {
+        let Arguments { cell, strength, views, frames, small, .. } = *self;
+        let set = if self.nats.is_some() || self.sealed {
+            Set::asked(&self.asked(World::Rays, effects, seed), views, frames)?
+        } else {
+            let effects = effects.to_vec();
+            Set::draw(Order { cell, effects, strength, seed, views, frames, small })?
+        };
+        write(&set, &self.out).with_context(|| set.name.clone())?;
+        let forms: Vec<&str> = set.causes.iter().map(|c| c.label.form.as_str()).collect();
+        let worth: Vec<String> = set
+            .concealed
+            .iter()
+            .map(|c| format!("{:.4}:{:.1}", c.strength, c.nats.unwrap_or(f64::NAN)))
+            .collect();
+        Ok(format!("{} {} {}", set.name, forms.join("+"), worth.join("+")))
     }
 }
 
 pub fn run(a: &Arguments) -> anyhow::Result<()> {
-    let every: Vec<Vec<String>> = if a.effect == ["all"] {
-        use crate::raytraced::{CATALOGUE, OUTSIDE};
-        let causes: Vec<&str> = light::known().collect();
-        let list: &[&str] = match a.cell {
-            _ if a.light => &causes,
-            Cell::Outside => &OUTSIDE,
-            _ => &CATALOGUE,
-        };
-        list.iter().map(|id| vec![(*id).to_string()]).collect()
-    } else {
-        vec![a.effect.clone()]
+    let causes: Vec<&str> = speckle::known().collect();
+    let list: &[&str] = match a.cell {
+        _ if a.light => &causes,
+        Cell::Outside => &OUTSIDE,
+        _ => &CATALOGUE,
+    };
+    let every: Vec<Vec<String>> = match a.effect == ["all"] {
+        true => list.iter().map(|id| vec![(*id).to_string()]).collect(),
+        false => vec![a.effect.clone()],
     };
     for effects in every {
         for seed in a.seed..a.seed + a.count {
-            if a.light {
-                a.shoot(&effects, seed)?;
-                continue;
-            }
             let begin = Instant::now();
-            let set = a.set(&effects, seed)?;
-            let drawn = begin.elapsed().as_secs_f64();
-            write(&set, &a.out).with_context(|| set.name.clone())?;
-            let frames: usize = set.plans.iter().map(|p| p.stamps.len()).sum();
-            let ids: Vec<&str> =
-                set.causes.iter().map(|c| c.label.id.unwrap_or(c.label.form)).collect();
-            let written = begin.elapsed().as_secs_f64() - drawn;
-            let told: Vec<String> =
-                set.told().iter().map(|(s, n)| format!("{s:.4}:{n:.1}")).collect();
-            println!(
-                "{} {} {} {frames} frames, drawn {drawn:.3} s, written {written:.2} s",
-                set.name,
-                ids.join("+"),
-                told.join("+"),
-            );
+            let made =
+                if a.light { a.speckle(&effects, seed)? } else { a.raytraced(&effects, seed)? };
+            println!("{made} {:.2} s", begin.elapsed().as_secs_f64());
         }
     }
     Ok(())

@@ -21,11 +21,10 @@ use crate::commitment::{
 };
 use crate::gain::{Gains, examine};
 use crate::judge::{advised_view, endpoints_in_words, mark, mark_advice, scores};
-use crate::plan::plan;
+use crate::plan::{conceal, plan};
 use crate::proof::{Advised, FORMAT, Order, PROOF, Proof, ProvenSet, SUMMARY};
-use crate::raytraced::question::{Pose, Sealed, Truth, World};
+use crate::raytraced::question::{ConcealedSet, Pose, Truth, World};
 use crate::solver::{Solved, solve};
-use crate::worlds;
 
 /// What is wanted.
 pub struct Trial {
@@ -48,7 +47,7 @@ pub type Progress<'a> = &'a (dyn Fn(&'static str, usize, usize) + Sync);
 pub struct Taken {
     pub name: String,
     pub truth: Truth,
-    pub sealed: Box<dyn Sealed>,
+    pub sealed: Box<dyn ConcealedSet>,
     /// In the second round: the view that was advised and the one that could be taken.
     pub view: Option<[Pose; 2]>,
 }
@@ -64,7 +63,7 @@ const BASELINES_IN: u64 = 3;
 pub fn take(order: &Order, data: Option<&Path>, progress: Progress<'_>) -> Result<Vec<Taken>> {
     let planned = plan(order.sets, order.seed, order.real);
     each(&planned, ("making sets", progress), |planned| {
-        let sealed = worlds::seal(&planned.asked, data)?;
+        let sealed = conceal(&planned.asked, data)?;
         Ok(Taken { name: planned.name.clone(), truth: sealed.truth(), sealed, view: None })
     })
 }
@@ -91,7 +90,7 @@ pub fn take_advised<'a>(
 }
 
 /// Write a set's folder into `scratch/set`, and only it; the hash of it.
-pub fn make(sealed: &dyn Sealed, scratch: &Path) -> Result<String> {
+pub fn make(sealed: &dyn ConcealedSet, scratch: &Path) -> Result<String> {
     remove(scratch)?;
     let set = scratch.join("set");
     make_folder(&set)?;

@@ -3,20 +3,15 @@
 use rand::Rng;
 use rand::seq::IndexedRandom;
 
-use super::causes_bias as bias;
-use super::causes_driver as driver;
-use super::causes_missing as missing;
-use super::causes_noise as noise;
-use super::causes_variance as variance;
-use super::kernels::Window;
-use super::outside::{OUTSIDE, outside};
-use super::poses::{Session, Told};
-use super::sets::Order;
-use super::{Cause, Cell, Unit};
+use super::kernels::{Window, lot};
+use super::outside::OUTSIDE;
+use super::poses::{Marked, Session};
+use super::set::Order;
+use super::{Cause, Cell, Draw, Unit, causes_bias, causes_noise, outside};
 use kinoise::error::{Error, Result};
-use kinoise::rng::{Seed, Stream};
+use kinoise::rng::Stream;
 
-/// Ids of effects.md, in its order.
+/// Ids of the library's effects, in the catalogue's order.
 pub const CATALOGUE: [&str; 29] = [
     "disparity-quantisation",
     "depth-rounding",
@@ -76,7 +71,8 @@ const MIMICS: [[&str; 2]; 9] = [
     ["grazing-dropout", "range-dropout"],
 ];
 
-/// What can be confined to some views, a region, far distances or late times and still show there.
+/// What can be confined to some views or far distances, to a region, or to late times, and still
+/// show there.
 const BY_VIEW: [&str; 5] = [
     "pixel-locking",
     "column-banding",
@@ -86,13 +82,6 @@ const BY_VIEW: [&str; 5] = [
 ];
 const BY_REGION: [&str; 5] =
     ["pixel-locking", "column-banding", "vignetting", "range-exponent", "range-dropout"];
-const BY_DISTANCE: [&str; 5] = [
-    "pixel-locking",
-    "column-banding",
-    "radial-disparity-bias",
-    "vignetting",
-    "tilt-axis-anisotropy",
-];
 const BY_TIME: [&str; 6] = [
     "pixel-locking",
     "column-banding",
@@ -102,7 +91,7 @@ const BY_TIME: [&str; 6] = [
     "range-dropout",
 ];
 
-pub(super) fn names(order: &Order, rng: &mut Stream) -> Vec<String> {
+pub fn names(order: &Order, rng: &mut Stream) -> Vec<String> {
     if !order.effects.is_empty() || matches!(order.cell, Cell::Null | Cell::Drift) {
         return order.effects.clone();
     }
@@ -112,11 +101,10 @@ pub(super) fn names(order: &Order, rng: &mut Stream) -> Vec<String> {
         Cell::Single => vec![one(&CATALOGUE, rng)],
         Cell::Outside => vec![one(&OUTSIDE, rng)],
         Cell::Blind | Cell::Referenced => vec![one(&BLIND, rng)],
-        Cell::FewViews => vec![one(&BY_VIEW, rng)],
+        Cell::FewViews | Cell::Far => vec![one(&BY_VIEW, rng)],
         Cell::Region => vec![one(&BY_REGION, rng)],
-        Cell::Far => vec![one(&BY_DISTANCE, rng)],
         Cell::Late => vec![one(&BY_TIME, rng)],
-        Cell::Mimic => bias::lot(&MIMICS, rng).map(String::from).to_vec(),
+        Cell::Mimic => lot(&MIMICS, rng).map(String::from).to_vec(),
         cell => {
             let many = if cell == Cell::Triple { 3 } else { 2 };
             PAIRED.choose_multiple(rng, many).map(|group| one(group, rng)).collect()
@@ -128,20 +116,20 @@ fn any(names: &[String], of: &[&str]) -> bool {
     names.iter().any(|n| of.contains(&n.as_str()))
 }
 
-pub(super) fn words(names: &[String], rng: &mut Stream) -> f64 {
+pub fn units_per_metre(names: &[String], rng: &mut Stream) -> f64 {
     let coarse =
         rng.random::<f64>() < 0.25 && !any(names, &["depth-rounding", "disparity-quantisation"]);
     if coarse { 1000.0 } else { 5000.0 }
 }
 
-pub(super) fn session(order: &Order, names: &[String], rng: &mut Stream) -> Session {
+pub fn session(order: &Order, names: &[String], rng: &mut Stream) -> Session {
     let edged = any(names, &EDGED);
     let boarded = edged || any(names, &["target-bow", "dirty-board"]);
     let steep = any(names, &["grazing-dropout"]);
     let leaning = any(names, &["slope-noise", "tilt-axis-anisotropy", "lens-distortion"]);
     let on_board = boarded || steep || rng.random::<f64>() < if leaning { 0.75 } else { 0.5 };
     let half = on_board.then(|| [rng.random_range(0.5..0.7), rng.random_range(0.4..0.5)]);
-    let told = bias::lot(&[Told::Nothing, Told::Nothing, Told::Outline, Told::Rectangle], rng);
+    let marked = lot(&[Marked::Nothing, Marked::Nothing, Marked::Outline, Marked::Rectangle], rng);
     let references = any(names, &BLIND) || rng.random::<f64>() < 0.25;
     let gap_m = if any(names, &["occlusion-shadow"]) {
         0.8 * order.strength.powf(1.3)
@@ -155,11 +143,11 @@ pub(super) fn session(order: &Order, names: &[String], rng: &mut Stream) -> Sess
         gap_m,
         steepest: if steep { 74f64 } else { 65.0 }.to_radians(),
         region: if edged {
-            Told::Nothing
+            Marked::Nothing
         } else if boarded {
-            Told::Outline
+            Marked::Outline
         } else {
-            told
+            marked
         },
         reference_m: (references && order.cell != Cell::Blind).then_some(0.001),
         conditions: any(names, &["ambient-light", "warm-noise"]) || rng.random::<f64>() < 0.3,
@@ -167,75 +155,38 @@ pub(super) fn session(order: &Order, names: &[String], rng: &mut Stream) -> Sess
 }
 
 /// Correlation that the model knows of.
-pub(super) fn window(order: &Order, names: &[String], rng: &mut Stream) -> Option<Cause> {
+pub fn window(order: &Order, names: &[String], rng: &mut Stream) -> Option<Cause> {
     let own = any(names, &["spatial-correlation", "slope-noise", "heavy-tails"]);
     let chance = if order.cell == Cell::Null { 0.5 } else { 0.2 };
     if rng.random::<f64>() >= chance || own {
         return None;
     }
-    let side = bias::lot(&[3.0, 5.0, 7.0, 9.0], rng);
+    let side = lot(&[3.0, 5.0, 7.0, 9.0], rng);
     let flat = "flat window";
-    let form = bias::lot(&[flat, flat, flat, "gaussian window", "triangular window"], rng);
+    let form = lot(&[flat, flat, flat, "gaussian window", "triangular window"], rng);
     let window = match form {
         "gaussian window" => Window::bell(side),
         "triangular window" => Window::tent(side),
         _ => Window::flat(side),
     };
-    Some(noise::windowed(form, window))
+    Some(causes_noise::windowed(form, window, 1.0))
 }
 
 /// The unit is no longer what its model says.
-pub(super) fn age(unit: &mut Unit, strength: f64, rng: &mut Stream) {
+pub fn age(unit: &mut Unit, strength: f64, rng: &mut Stream) {
     let change = 0.25 * strength;
     let factor = if rng.random::<bool>() { 1.0 + change } else { 1.0 / (1.0 + change) };
     unit.sigma[1] *= factor;
     unit.sigma[0] *= factor.powf(rng.random_range(-0.5..1.0));
 }
 
-/// The cause of this name at strength `s`; `shadow` is the share of a shadow that goes without an
-/// answer. What is drawn of `rng` does not depend on the strength.
-pub(super) fn cause(
-    name: &str,
-    [s, shadow]: [f64; 2],
-    unit: &Unit,
-    session: &Session,
-    seed: Seed,
-    rng: &mut Stream,
-) -> Result<Cause> {
-    let half = session.half.map_or(0.6, |h| h[0]);
-    Ok(match name {
-        "disparity-quantisation" => driver::disparity_quantisation(s, unit, rng),
-        "depth-rounding" => driver::depth_rounding(s),
-        "pixel-locking" => bias::pixel_locking(s, unit, rng),
-        "column-banding" => bias::column_banding(s, unit, rng),
-        "radial-disparity-bias" => bias::radial_disparity_bias(s, unit, rng),
-        "lens-distortion" => bias::lens_distortion(s, rng),
-        "range-not-depth" => driver::range_not_depth(s),
-        "depth-scale" => driver::depth_scale(s, unit, rng),
-        "disparity-offset" => driver::disparity_offset(s, unit, rng),
-        "thermal-drift" => driver::thermal_drift(s, rng),
-        "target-bow" => bias::target_bow(s, half, rng),
-        "target-motion" => bias::target_motion(s, rng),
-        "fixed-pattern-noise" => bias::fixed_pattern_noise(s, unit, seed),
-        "edge-mixing" => bias::edge_mixing(s, unit),
-        "range-exponent" => variance::range_exponent(s, rng),
-        "slope-noise" => variance::slope_noise(s, unit),
-        "tilt-axis-anisotropy" => variance::tilt_axis_anisotropy(s),
-        "vignetting" => variance::vignetting(s, unit, rng),
-        "intensity-dependent-noise" => variance::intensity_dependent_noise(s),
-        "ambient-light" => variance::ambient_light(s, rng),
-        "heavy-tails" => noise::heavy_tails(s, rng),
-        "spatial-correlation" => noise::spatial_correlation(s, rng),
-        "temporal-correlation" => noise::temporal_correlation(s),
-        "frozen-noise" => noise::frozen_noise(s),
-        "row-noise" => noise::row_noise(s, unit),
-        "frame-jitter" => noise::frame_jitter(s, unit, rng),
-        "grazing-dropout" => missing::grazing_dropout(s, rng),
-        "range-dropout" => missing::range_dropout(s, rng),
-        "occlusion-shadow" => missing::occlusion_shadow(shadow, unit),
-        other => outside(other, s, unit, rng).ok_or_else(|| Error::Argument {
-            what: format!("no effect is called \"{other}\""),
-            remedy: "take one of effects.md, or of those outside it",
-        })?,
-    })
+/// The cause of this name. What is drawn of `rng` does not depend on the strength.
+pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Result<Cause> {
+    causes_bias::cause(name, of, rng)
+        .or_else(|| causes_noise::cause(name, of, rng))
+        .or_else(|| outside::cause(name, of, rng))
+        .ok_or_else(|| Error::Argument {
+            what: format!("no effect is called \"{name}\""),
+            remedy: "take one that `kinoise effects` lists, or one of those outside the catalogue",
+        })
 }

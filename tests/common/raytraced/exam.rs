@@ -2,8 +2,7 @@
 
 use rand::Rng;
 
-use super::eye::Eye;
-use super::eye::World;
+use super::eye::{Eye, World};
 use super::poses::{Plan, azimuth};
 use super::question::ExamView;
 use super::shoot::{Sum, slope};
@@ -22,7 +21,7 @@ const STEEPEST_RAD: f64 = 1.3;
 const NO_VIEW: usize = usize::MAX;
 
 /// Fresh views: some within the distances and tilts of the recording, some beyond.
-pub(super) fn views(set: &Set) -> Vec<ExamView> {
+pub fn views(set: &Set) -> Vec<ExamView> {
     let mut rng = set.seed.stream("rays/exam");
     let range = Range::of(&set.plans);
     let mut poses: Vec<(bool, f64, f64)> = Vec::new();

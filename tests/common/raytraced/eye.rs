@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::geometry::{Site, inside_px, projector_column};
+use super::geometry::inside_px;
 use super::poses::{Plan, outline};
 use super::{Act, Cause, Unit};
 
@@ -11,9 +11,39 @@ const FARTHEST_M: f64 = 12.0;
 /// Of a wall behind the board.
 const WALL_ALBEDO: f64 = 0.6;
 
+/// A pixel, and what it looks at.
+#[derive(Debug, Clone, Copy)]
+pub struct Site {
+    pub u: f64,
+    pub v: f64,
+    /// Distance from the principal point over that of the farthest corner.
+    pub radius: f64,
+    /// Of the ray as the camera's description has it.
+    pub x: f64,
+    pub y: f64,
+    /// Depth along the optical axis, m.
+    pub z: f64,
+    /// Column here minus column at the projector, px.
+    pub disparity: f64,
+    pub point: Vector3<f64>,
+    pub on_board: bool,
+    /// On the board, m from its centre.
+    pub place: [f64; 2],
+    /// Tilt of what is met, rad.
+    pub theta: f64,
+    /// Cosine of the angle between ray and normal.
+    pub facing: f64,
+    /// Into the picture from the nearest outline of the board, px; positive on the board.
+    pub edge_px: f64,
+    /// Of the other surface at this pixel, px.
+    pub other_disparity: Option<f64>,
+    /// Share of the light given back.
+    pub albedo: f64,
+}
+
 /// A unit, and what acts on it.
 #[derive(Clone, Copy)]
-pub(super) struct World<'a> {
+pub struct World<'a> {
     pub unit: &'a Unit,
     pub causes: &'a [Cause],
     /// Patches of grey are printed on the board.
@@ -23,9 +53,10 @@ pub(super) struct World<'a> {
 }
 
 /// A camera in front of a stage.
-pub(super) struct Eye<'a> {
-    world: World<'a>,
-    plan: &'a Plan,
+#[derive(Clone, Copy)]
+pub struct Eye<'a> {
+    pub world: World<'a>,
+    pub plan: &'a Plan,
     corner_px: f64,
     /// Of the board in the picture, when a cause asks for it.
     outline: Option<[[f64; 2]; 4]>,
@@ -40,10 +71,18 @@ impl<'a> Eye<'a> {
         Eye { world, plan, corner_px, outline: corners.and_then(|c| outline(world.unit, &c)) }
     }
 
+    /// The same view with these causes at work.
+    pub fn with<'b>(&self, causes: &'b [Cause]) -> Eye<'b>
+    where
+        'a: 'b,
+    {
+        Eye { world: World { causes, ..self.world }, ..*self }
+    }
+
     /// What the pixel's ray meets first.
     pub fn look(&self, u: f64, v: f64) -> Option<Site> {
         let c = &self.world.unit.sensor.camera;
-        let (x, y) = ((u - c.cx) / c.fx, (v - c.cy) / c.fy);
+        let (x, y) = c.ray(u, v);
         let mut ray = (x, y);
         for cause in self.world.causes {
             if let Act::Ray(bend) = &cause.act {
@@ -61,10 +100,8 @@ impl<'a> Eye<'a> {
         let point = ray * z;
         let fb = self.world.unit.disparity_px_m();
         let normal = if on_board { stage.board.normal } else { Vector3::z() };
-        // The camera believes in its own rays.
-        let matched = Vector3::new(x, y, 1.0) * z;
-        let column =
-            projector_column(&self.world.unit.sensor, self.world.unit.baseline_m, &matched);
+        // Where the projector sees what the camera, believing in its own rays, sees here.
+        let column = c.cx + c.fx * (x * z - self.world.unit.baseline_m) / z;
         Some(Site {
             u,
             v,

@@ -1,9 +1,28 @@
-//! Windows that make neighbours err together.
+//! Random numbers, and windows that make neighbours err together.
 
 use rand::Rng;
+use rand::seq::SliceRandom;
 use rand_distr::{Distribution, StandardNormal};
 
-use kinoise::rng::{Seed, Stream};
+use super::Clock;
+use kinoise::rng::Stream;
+
+/// One of `forms`, by lot.
+pub fn lot<T: Copy>(forms: &[T], rng: &mut Stream) -> T {
+    forms[rng.random_range(0..forms.len())]
+}
+
+pub fn sign(rng: &mut Stream) -> f64 {
+    lot(&[-1.0, 1.0], rng)
+}
+
+/// One number of each of `n` equal parts of 0 to 1, in no order.
+pub fn scattered(n: usize, rng: &mut Stream) -> Vec<f64> {
+    let mut places: Vec<f64> =
+        (0..n).map(|i| (i as f64 + rng.random::<f64>()) / n as f64).collect();
+    places.shuffle(rng);
+    places
+}
 
 /// Independent standard normal numbers.
 pub fn white(count: usize, mut rng: Stream) -> Vec<f32> {
@@ -11,8 +30,8 @@ pub fn white(count: usize, mut rng: Stream) -> Vec<f32> {
 }
 
 /// The base noise of a frame before it is shaped.
-pub fn fresh(seed: Seed, view: usize, frame: i64, count: usize) -> Vec<f32> {
-    white(count, seed.stream(&format!("rays/white/{view}/{frame}")))
+pub fn fresh(clock: &Clock, count: usize) -> Vec<f32> {
+    white(count, clock.stream("white"))
 }
 
 /// Sum of four uniform numbers, mean 0, variance 1.
@@ -103,22 +122,14 @@ impl Window {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Chi-square of 40 fields' means, each of standard error 1/sqrt(n): 40 with deviation 9.
-    #[test]
-    fn fresh_noise_has_no_mean() {
-        let n = 20_000;
-        let mean = |view| fresh(Seed(5), view, 0, n).iter().sum::<f32>() / n as f32;
-        let chi2 = (0..40).map(|view| n as f32 * mean(view).powi(2)).sum::<f32>();
-        assert!((15.0..75.0).contains(&chi2), "{chi2}");
-    }
+    use kinoise::rng::Seed;
 
     #[test]
     fn windows_of_a_side_reach_equally_far_and_keep_the_variance() {
         let windows = [Window::flat(9.0), Window::flat(5.0), Window::bell(8.0), Window::tent(8.0)];
         for (window, side) in windows.iter().zip([9.0, 5.0, 8.0, 8.0]) {
             assert!((window.side() / side - 1.0).abs() < 0.02, "{} {side}", window.side());
-            let mut field = fresh(Seed(1), 0, 0, 640 * 480);
+            let mut field = white(640 * 480, Seed(1).stream("white"));
             window.blur(&mut field, 640);
             let variance = field.iter().map(|x| x * x).sum::<f32>() / field.len() as f32;
             assert!((variance - 1.0).abs() < 0.08, "{variance}");

@@ -1,58 +1,51 @@
 //! Concealed recordings by ray geometry: a ray meets the board, the projector sees the same point
 //! at another column, the matched column errs, and the depth is triangulated back.
 //!
-//! One cause acts in one place of that path ([`Act`]) and carries its truth ([`Label`]).
+//! A cause acts in one place of that path ([`Act`]), says what it is ([`question::Hidden`]) and what
+//! knowing of it is worth ([`Worth`]). No formula is shared with the library's effects, simulators
+//! or diagnosis.
 
-mod advised;
-pub(super) mod borrow;
-mod cameras;
 mod causes_bias;
-mod causes_driver;
-mod causes_missing;
 mod causes_noise;
-mod causes_variance;
-mod choices;
+pub mod choices;
+mod confine;
 mod exam;
-mod eye;
-mod gate;
-mod geometry;
-mod ground;
-mod kernels;
-mod nats;
+pub mod eye;
+pub mod geometry;
+pub mod kernels;
+pub mod nats;
 mod outside;
-mod poses;
+pub mod poses;
 pub mod question;
-mod sealed;
-mod sets;
-mod shoot;
+mod set;
+pub mod shoot;
 #[cfg(test)]
-mod tests;
+pub mod tests;
 #[cfg(test)]
 mod tests_nats;
-#[cfg(test)]
-pub(super) mod tests_sealed;
-mod trace;
-mod weigh;
-mod write;
+mod unit;
+pub mod weigh;
+mod worth;
+pub mod write;
 
-pub use cameras::Unit;
 pub use choices::CATALOGUE;
-pub use geometry::{Board, Site, Stage};
 pub use outside::OUTSIDE;
-pub use sealed::seal;
-pub use sets::{Order, Set};
-#[cfg(test)]
-pub(super) use shoot::Still;
-pub use trace::Trace;
-pub use write::write;
-
 pub use question::Cell;
+pub use set::{Order, Set};
+#[cfg(test)]
+pub use shoot::Still;
+pub use unit::Unit;
+pub use write::{conceal, write};
 
-use kinoise::rng::Seed;
+use eye::Site;
+use geometry::Stage;
+use kernels::Window;
+use kinoise::rng::{Seed, Stream};
+use nats::Ground;
+use question::Hidden;
 
-/// What a view's causes may look at beside the pixel.
+/// What the causes of a view may look at beside the pixel.
 pub struct Facts<'a> {
-    /// The view's number.
     pub view: usize,
     pub stage: &'a Stage,
     /// Since the session began, s.
@@ -74,8 +67,15 @@ pub struct Clock {
     pub width: usize,
 }
 
+impl Clock {
+    /// This frame's random numbers for one purpose.
+    pub fn stream(&self, what: &str) -> Stream {
+        self.seed.stream(&format!("rays/{what}/{}/{}", self.view, self.frame))
+    }
+}
+
 /// The order in which noise of unit variance is shaped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Phase {
     InTime,
     AtRest,
@@ -83,19 +83,10 @@ pub enum Phase {
     Tails,
 }
 
-impl Phase {
-    pub const ALL: [Phase; 4] = [Phase::InTime, Phase::AtRest, Phase::InSpace, Phase::Tails];
-}
-
-/// Disparity that whole rows and columns of one frame share, px.
-pub struct Shake {
-    pub rows: Vec<f32>,
-    pub columns: Vec<f32>,
-}
+/// Disparity that whole rows of one frame share, px.
+pub type Rows = [f32];
 
 type AtSite = Box<dyn Fn(&Site, &Facts<'_>) -> f64 + Send + Sync>;
-type Shaker = Box<dyn Fn(&Clock, &mut Shake) + Send + Sync>;
-type Reshape = Box<dyn Fn(&mut [f32], &Clock) + Send + Sync>;
 
 /// Where in the path a cause acts, and how.
 pub enum Act {
@@ -103,104 +94,120 @@ pub enum Act {
     Ray(Box<dyn Fn(f64, f64) -> (f64, f64) + Send + Sync>),
     /// Rise of the board towards the sensor at a place on it, m.
     Lift(Box<dyn Fn([f64; 2]) -> f64 + Send + Sync>),
-    /// How far along its normal the board has gone, m.
-    Move(Box<dyn Fn(&Clock) -> f64 + Send + Sync>),
+    /// How far along its normal the board has gone since the view's first frame, s to m.
+    Move(Box<dyn Fn(f64) -> f64 + Send + Sync>),
     /// Error of the matched column, px of disparity.
     Mismatch(AtSite),
     /// Factor on sigma.
     Spread(AtSite),
     /// Standard deviation of where a pixel looks, px.
     Wander(f64),
-    Grain(Phase, Reshape),
-    Shake(Shaker),
+    /// Shapes a frame's noise of unit variance.
+    Grain(Phase, Box<dyn Fn(&mut [f32], &Clock) + Send + Sync>),
+    /// Adds to the error that a row's pixels share.
+    Shake(Box<dyn Fn(&Clock, &mut Rows) + Send + Sync>),
     /// Probability of no answer.
     Loss(AtSite),
     /// Disparities that occur: `step` px apart, one of them at `phase` steps.
-    Lattice {
-        step: f64,
-        phase: f64,
-    },
+    Lattice { step: f64, phase: f64 },
     /// Factor on the stored depth.
     Gain(AtSite),
     /// Depth is cut down to whole steps, m.
     Floor(f64),
 }
 
-impl Act {
-    fn mismatch(f: impl Fn(&Site, &Facts<'_>) -> f64 + Send + Sync + 'static) -> Self {
-        Act::Mismatch(Box::new(f))
-    }
-
-    fn spread(f: impl Fn(&Site, &Facts<'_>) -> f64 + Send + Sync + 'static) -> Self {
-        Act::Spread(Box::new(f))
-    }
-
-    fn loss(f: impl Fn(&Site, &Facts<'_>) -> f64 + Send + Sync + 'static) -> Self {
-        Act::Loss(Box::new(f))
-    }
-
-    fn gain(f: impl Fn(&Site, &Facts<'_>) -> f64 + Send + Sync + 'static) -> Self {
-        Act::Gain(Box::new(f))
-    }
-
-    fn grain(phase: Phase, f: impl Fn(&mut [f32], &Clock) + Send + Sync + 'static) -> Self {
-        Act::Grain(phase, Box::new(f))
-    }
-
-    fn shake(f: impl Fn(&Clock, &mut Shake) + Send + Sync + 'static) -> Self {
-        Act::Shake(Box::new(f))
-    }
-}
-
-/// The sealed truth of one cause.
-#[derive(Debug, Clone, serde::Serialize)]
-pub struct Label {
-    /// As in the catalogue; `None` for what the catalogue lacks.
-    pub id: Option<&'static str>,
-    /// The formula that was used, in a word.
-    pub form: &'static str,
-    pub statistic: &'static str,
-    pub axis: &'static str,
-    /// Axes on which it shows as well.
-    pub also: &'static [&'static str],
-    pub interval: Option<[f64; 2]>,
-    pub parameters: serde_json::Map<String, serde_json::Value>,
-}
-
-impl Label {
-    fn new(
-        id: Option<&'static str>,
-        form: &'static str,
-        [statistic, axis]: [&'static str; 2],
-        parameters: &[(&str, f64)],
-    ) -> Self {
-        let parameters = parameters.iter().map(|(k, v)| ((*k).into(), (*v).into())).collect();
-        Label { id, form, statistic, axis, also: &[], interval: None, parameters }
-    }
-
-    fn within(self, low: f64, high: f64) -> Self {
-        Label { interval: Some([low, high]), ..self }
-    }
-
-    fn also(self, also: &'static [&'static str]) -> Self {
-        Label { also, ..self }
-    }
+/// How the worth of knowing a cause is counted, nats.
+pub enum Worth {
+    /// From views without noise, with the cause and without it.
+    Seen,
+    /// By a formula, for what shows in no mean and no spread.
+    Formula(Box<dyn Fn(&Ground<'_>) -> f64 + Send + Sync>),
+    /// At no strength is it weak: values that do not occur are seen or not seen, whatever the noise.
+    Never,
 }
 
 /// One thing that was left out of the model.
 pub struct Cause {
-    pub label: Label,
+    pub label: Hidden,
     pub act: Act,
-    /// How its information is counted.
-    pub trace: Trace,
+    worth: Worth,
+    /// What neighbours' noise is seen through, and the share of its variance that is.
+    window: Option<(Window, f64)>,
+}
+
+/// What a cause is drawn for.
+#[derive(Clone, Copy)]
+pub struct Draw<'a> {
+    /// 1 is the middle of what real units show.
+    pub strength: f64,
+    /// Share of a shadow that goes without an answer.
+    pub shadow: f64,
+    pub unit: &'a Unit,
+    /// Half the board's width, m.
+    pub half_m: f64,
+    pub seed: Seed,
 }
 
 impl Cause {
-    fn new(label: Label, act: Act) -> Self {
-        Cause { label, act, trace: Trace::Field }
+    fn new(
+        name: &str,
+        form: &str,
+        [statistic, axis]: [&str; 2],
+        parameters: &[(&str, f64)],
+        act: Act,
+    ) -> Self {
+        let names: &[&str] = if CATALOGUE.contains(&name) { &[name] } else { &[] };
+        let mut label = Hidden::new(names, form, [statistic, axis]);
+        label.parameters = parameters.iter().map(|(k, v)| ((*k).into(), (*v).into())).collect();
+        Cause { label, act, worth: Worth::Seen, window: None }
     }
 
-    fn tracing(self, trace: Trace) -> Self {
-        Cause { trace, ..self }
+    /// It shows between these on its axis only.
+    fn within(mut self, low: f64, high: f64) -> Self {
+        self.label.interval = Some([low, high]);
+        self
     }
+
+    /// It shows on these axes as well.
+    fn also(mut self, axes: &[&str]) -> Self {
+        self.label.also = axes.iter().map(ToString::to_string).collect();
+        self
+    }
+
+    fn worth(self, formula: impl Fn(&Ground<'_>) -> f64 + Send + Sync + 'static) -> Self {
+        Cause { worth: Worth::Formula(Box::new(formula)), ..self }
+    }
+}
+
+/// A cause that acts on the mean error of each pixel's match.
+pub fn bias(
+    name: &str,
+    form: &str,
+    axis: &str,
+    parameters: &[(&str, f64)],
+    f: impl Fn(&Site, &Facts<'_>) -> f64 + Send + Sync + 'static,
+) -> Cause {
+    Cause::new(name, form, ["bias", axis], parameters, Act::Mismatch(Box::new(f)))
+}
+
+/// A cause that makes pixels noisier by a factor.
+pub fn spread(
+    name: &str,
+    form: &str,
+    axis: &str,
+    parameters: &[(&str, f64)],
+    f: impl Fn(&Site, &Facts<'_>) -> f64 + Send + Sync + 'static,
+) -> Cause {
+    Cause::new(name, form, ["variance", axis], parameters, Act::Spread(Box::new(f)))
+}
+
+/// A cause by which pixels go without an answer.
+pub fn loss(
+    name: &str,
+    form: &str,
+    axis: &str,
+    parameters: &[(&str, f64)],
+    f: impl Fn(&Site, &Facts<'_>) -> f64 + Send + Sync + 'static,
+) -> Cause {
+    Cause::new(name, form, ["missing", axis], parameters, Act::Loss(Box::new(f)))
 }

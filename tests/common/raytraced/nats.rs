@@ -10,101 +10,194 @@
 //! | moving board | the same frame by frame, less the view's mean |
 //! | spread | 1/2 (r^2 - 1 - ln r^2), `r` the factor on sigma |
 //! | loss | Kullback-Leibler of the pixel's rate from the whole recording's, both over a floor of strays |
-//! | the rest | [`super::trace`] |
+//! | the rest | the cause's own formula, of [`super::worth`] |
 
-use super::eye::{Eye, World};
-use super::geometry::Site;
-use super::ground::{Ground, Looked, Sample};
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::eye::{Eye, Site, World};
+use super::poses::Plan;
 use super::shoot::{Sum, slope};
-use super::trace::{
-    Trace, of_average, of_effect, of_frozen, of_strays, of_student, of_variance, of_window,
-};
-use super::{Act, Cause, Clock};
+use super::worth::{of_effect, of_variance};
+use super::{Act, Cause, Facts, Set, Unit, Worth};
 
 /// Pixels that any sensor loses now and then: a loss is told apart from these.
 const STRAYS: f64 = 1e-3;
 
-impl Ground<'_> {
+/// A pixel that is looked at.
+pub struct Sample {
+    pub site: Site,
+    /// Standard deviation of a frame's disparity with the known causes, px.
+    pub sigma_px: f64,
+    /// On the board, and where the recording says that the target is.
+    pub on_target: bool,
+}
+
+/// One view, before anything is concealed.
+pub struct Looked<'a> {
+    pub eye: Eye<'a>,
+    pub samples: Vec<Sample>,
+}
+
+/// All views, and how much the noise of neighbours repeats.
+pub struct Ground<'a> {
+    pub unit: &'a Unit,
+    pub views: Vec<Looked<'a>>,
+    /// Pixels that one sample stands for.
+    pub weight: f64,
+    pub repeats: Repeats,
+    /// Error of the reference distances, m.
+    pub reference_m: Option<f64>,
+}
+
+/// Pixels that tell of a mean as much as one alone; along a row; and of a variance: sums of the
+/// noise's correlation over all lags.
+#[derive(Debug, Clone, Copy)]
+pub struct Repeats {
+    pub area: f64,
+    pub row: f64,
+    pub squares: f64,
+}
+
+impl Repeats {
+    pub fn of<'a>(causes: impl IntoIterator<Item = &'a Cause>) -> Self {
+        let mut all = Repeats { area: 1.0, row: 1.0, squares: 1.0 };
+        for (window, share) in causes.into_iter().filter_map(|cause| cause.window.as_ref()) {
+            let (side, squares) = (window.side(), window.squares());
+            all.area = 1.0 + share * (side * side - 1.0);
+            all.row = 1.0 + share * (side - 1.0);
+            all.squares = 1.0 + share * share * (squares * squares - 1.0);
+        }
+        all
+    }
+}
+
+impl<'a> Looked<'a> {
+    fn new(world: World<'a>, plan: &'a Plan, stride: usize) -> Self {
+        let (unit, eye, facts) = (world.unit, Eye::new(world, plan), plan.facts());
+        let (camera, fb) = (&unit.sensor.camera, unit.disparity_px_m());
+        let region = plan.notes.region.as_ref();
+        let mut samples = Vec::new();
+        for v in (stride / 2..camera.height).step_by(stride) {
+            for u in (stride / 2..camera.width).step_by(stride) {
+                let (u, v) = (u as f64, v as f64);
+                let Some(site) = eye.look(u, v) else { continue };
+                let spread = Sum::of(world.causes, &site, &facts).spread;
+                let sigma_px = spread * unit.sigma(site.z, site.theta) * fb / (site.z * site.z);
+                let on_target = site.on_board && region.is_none_or(|r| r.contains(u, v));
+                samples.push(Sample { site, sigma_px, on_target });
+            }
+        }
+        Looked { eye, samples }
+    }
+
+    pub fn plan(&self) -> &'a Plan {
+        self.eye.plan
+    }
+
+    pub fn frames(&self) -> f64 {
+        self.plan().stamps.len() as f64
+    }
+
+    fn on_target(&self) -> impl Iterator<Item = &Sample> {
+        self.samples.iter().filter(|s| s.on_target)
+    }
+
+    /// Sum over the target's samples.
+    pub fn sum(&self, f: impl Fn(&Sample) -> f64) -> f64 {
+        self.on_target().map(f).sum()
+    }
+
+    /// Error of the disparity that the recording holds at the target's samples, px.
+    fn errors(&self, cause: &Cause) -> Vec<f64> {
+        let (one, facts) = (std::slice::from_ref(cause), self.plan().facts());
+        let eye = self.eye.with(one);
+        let error = |site: &Site| match cause.act {
+            Act::Ray(_) | Act::Lift(_) => {
+                let there = eye.look(site.u, site.v).filter(|there| there.on_board);
+                there.map_or(0.0, |there| there.disparity - site.disparity)
+            }
+            _ => {
+                let sum = Sum::of(one, site, &facts);
+                (site.disparity + sum.error) / sum.gain - site.disparity
+            }
+        };
+        self.on_target().map(|s| error(&s.site)).collect()
+    }
+
+    /// Least squares of `delta`, px, at the target's samples by 1, u and v, each over its sigma: the
+    /// plane, in disparity about the principal point, and what it leaves of sum (delta/sigma)^2.
+    fn plane(&self, delta: &[f64]) -> (Vector3<f64>, f64) {
+        let c = &self.eye.world.unit.sensor.camera;
+        let column =
+            |s: &Sample| Vector3::new(1.0, (s.site.u - c.cx) / 100.0, (s.site.v - c.cy) / 100.0);
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        for (s, d) in self.on_target().zip(delta) {
+            let (x, w) = (column(s), s.sigma_px.powi(-2));
+            normal += x * x.transpose() * w;
+            right += x * (w * d);
+        }
+        let plane = normal.cholesky().map_or(Vector3::zeros(), |c| c.solve(&right));
+        let left = |(s, d): (&Sample, &f64)| ((d - column(s).dot(&plane)) / s.sigma_px).powi(2);
+        (plane, self.on_target().zip(delta).map(left).sum())
+    }
+}
+
+impl<'a> Ground<'a> {
+    pub fn of(set: &'a Set) -> Self {
+        // A few pixels at the edges may be all there is to see. Odd, so that even and odd columns are
+        // met alike.
+        let fine = set.causes[set.known_causes..].iter().any(|c| c.label.axis == "edge-distance");
+        let stride = match set.unit.sensor.camera.width {
+            _ if fine => 1,
+            0..=160 => 3,
+            161..=320 => 5,
+            _ => 9,
+        };
+        let views = set.plans.iter().map(|plan| Looked::new(set.world(), plan, stride)).collect();
+        Ground {
+            unit: &set.unit,
+            views,
+            weight: (stride * stride) as f64,
+            repeats: Repeats::of(&set.causes),
+            reference_m: set.session.reference_m,
+        }
+    }
+
     /// Gain by knowing of `cause`; `None` where no strength makes it weak.
     pub fn nats(&self, cause: &Cause) -> Option<f64> {
-        let squares = self.repeats.squares;
-        Some(match (&cause.trace, &cause.act) {
-            (Trace::Comb, _) => return None,
-            (Trace::Field, Act::Ray(_) | Act::Lift(_)) => {
-                self.of_mean(&|look| self.bent(look, cause))
+        Some(match (&cause.worth, &cause.act) {
+            (Worth::Never, _) => return None,
+            (Worth::Formula(formula), _) => formula(self),
+            (_, Act::Ray(_) | Act::Lift(_) | Act::Mismatch(_) | Act::Gain(_)) => {
+                self.of_mean(cause)
             }
-            (Trace::Field, Act::Mismatch(_) | Act::Gain(_)) => {
-                self.of_mean(&|look| self.shifted(look, cause))
-            }
-            (Trace::Field, Act::Move(gone)) => self.of_motion(gone),
-            (Trace::Field, Act::Spread(_) | Act::Wander(_)) => self.of_spread(cause) / squares,
-            (Trace::Field, Act::Loss(_)) => self.of_loss(cause),
-            (Trace::Pixels(px), _) => self.of_pixels(*px),
-            (Trace::Rows(px), _) => self.of_rows(*px),
-            (Trace::Frames(px), _) => self.of_frames(*px),
-            (Trace::Average(weights), _) => {
-                self.views(|look| of_average(weights, look.plan.stamps.len())) / squares
-            }
-            (Trace::Frozen(share), _) => {
-                self.views(|look| of_frozen(*share, look.plan.stamps.len())) / squares
-            }
-            (Trace::Window { window, share }, _) => {
-                self.views(|look| look.frames() * of_window(window, *share))
-            }
-            (Trace::Student(nu), _) => self.views(|look| look.frames()) * of_student(*nu),
-            (Trace::Stray { fraction, scale }, _) => {
-                self.views(|look| look.frames()) * of_strays(*fraction, *scale)
-            }
-            (Trace::FirstFrame(growth), _) => {
-                self.views(|_| of_variance((1.0 + growth).powi(2))) / squares
-            }
-            (Trace::Field, _) => 0.0,
+            (_, Act::Move(gone)) => self.of_motion(gone),
+            (_, Act::Spread(_) | Act::Wander(_)) => self.of_spread(cause) / self.repeats.squares,
+            (_, Act::Loss(_)) => self.of_loss(cause),
+            _ => 0.0,
         })
     }
 
-    /// Gain by knowing that sigma is another's, whose it is at a depth and tilt.
-    pub fn nats_of_age(&self, sigma: &dyn Fn(f64, f64) -> f64) -> f64 {
-        let one = |look: &Looked<'_>| {
-            let gain = |site: &Site| {
-                let believed = self.set.described.sigma(site.z, site.theta);
-                of_variance((sigma(site.z, site.theta) / believed).powi(2))
-            };
-            look.frames() * look.sum(|s| gain(&s.site))
+    /// Gain by knowing that sigma is no longer what is `believed`.
+    pub fn nats_of_age(&self, believed: &Unit, aged: &Unit) -> f64 {
+        let gain = |s: &Sample| {
+            let Site { z, theta, .. } = s.site;
+            of_variance((aged.sigma(z, theta) / believed.sigma(z, theta)).powi(2))
         };
+        let one = |look: &Looked<'_>| look.frames() * look.sum(gain);
         self.weight * self.views.iter().map(one).sum::<f64>() / self.repeats.squares
     }
 
     /// The sum over views of their pixels on the target times `f`.
-    fn views(&self, f: impl Fn(&Looked<'_>) -> f64) -> f64 {
+    pub fn views(&self, f: impl Fn(&Looked<'_>) -> f64) -> f64 {
         self.weight * self.views.iter().map(|look| look.sum(|_| 1.0) * f(look)).sum::<f64>()
     }
 
-    /// Error of the disparity that the recording holds, px.
-    fn shifted(&self, look: &Looked<'_>, cause: &Cause) -> Vec<f64> {
-        let facts = look.plan.facts();
-        let one = std::slice::from_ref(cause);
-        let at = |site: &Site| {
-            let sum = Sum::of(one, site, &facts);
-            (site.disparity + sum.error) / sum.gain - site.disparity
-        };
-        look.on_target().map(|s| at(&s.site)).collect()
-    }
-
-    fn bent(&self, look: &Looked<'_>, cause: &Cause) -> Vec<f64> {
-        let world = World { causes: std::slice::from_ref(cause), ..self.set.world() };
-        let eye = Eye::new(world, look.plan);
-        let at = |site: &Site| {
-            let there = eye.look(site.u, site.v).filter(|there| there.on_board);
-            there.map_or(0.0, |there| there.disparity - site.disparity)
-        };
-        look.on_target().map(|s| at(&s.site)).collect()
-    }
-
-    fn of_mean(&self, delta: &dyn Fn(&Looked<'_>) -> Vec<f64>) -> f64 {
-        let unit = &self.set.unit;
-        let camera = &unit.sensor.camera;
+    fn of_mean(&self, cause: &Cause) -> f64 {
         let one = |look: &Looked<'_>| {
-            let (plane, left) = look.plane([camera.cx, camera.cy], &delta(look));
+            let (plane, left) = look.plane(&look.errors(cause));
             let share = look.frames() * self.weight / self.repeats.area;
             0.5 * share * left + self.of_reference(look, plane[0], share)
         };
@@ -114,27 +207,20 @@ impl Ground<'_> {
     /// What a reference distance tells of a shift of the plane on the axis, px: the tape errs, and
     /// the plane's own depth too.
     fn of_reference(&self, look: &Looked<'_>, shift_px: f64, share: f64) -> f64 {
-        let Some(tape_m) = self.set.session.reference_m else { return 0.0 };
-        let z = look.plan.stage.board.depth(0.0, 0.0);
-        let metres = z * z / self.set.unit.disparity_px_m();
-        let told = share * look.sum(|s| s.sigma_px.powi(-2));
-        let plane_m = metres / told.max(f64::MIN_POSITIVE).sqrt();
+        let Some(tape_m) = self.reference_m else { return 0.0 };
+        let z = look.plan().stage.board.depth(0.0, 0.0);
+        let metres = z * z / self.unit.disparity_px_m();
+        let known = share * look.sum(|s| s.sigma_px.powi(-2));
+        let plane_m = metres / known.max(f64::MIN_POSITIVE).sqrt();
         0.5 * (shift_px * metres).powi(2) / (tape_m * tape_m + plane_m * plane_m)
     }
 
-    fn of_motion(&self, gone: &(dyn Fn(&Clock) -> f64 + Send + Sync)) -> f64 {
+    fn of_motion(&self, gone: &(dyn Fn(f64) -> f64 + Send + Sync)) -> f64 {
         let one = |look: &Looked<'_>| {
-            let stamps = &look.plan.stamps;
-            let clock = |(frame, stamp): (usize, &f64)| Clock {
-                seed: self.set.seed,
-                view: look.plan.view,
-                frame: frame as i64,
-                view_s: stamp - stamps[0],
-                width: self.set.unit.sensor.camera.width,
-            };
-            let way: Vec<f64> = stamps.iter().enumerate().map(|at| gone(&clock(at))).collect();
+            let stamps = &look.plan().stamps;
+            let way: Vec<f64> = stamps.iter().map(|stamp| gone(stamp - stamps[0])).collect();
             let mean = way.iter().sum::<f64>() / look.frames();
-            let reach = look.plan.stage.board.reach;
+            let reach = look.plan().stage.board.reach;
             let moved: f64 = way.iter().map(|g| ((g - mean) / reach).powi(2)).sum();
             // A board nearer by a share has its disparities larger by that share.
             0.5 * moved * look.sum(|s| (s.site.disparity / s.sigma_px).powi(2))
@@ -143,10 +229,10 @@ impl Ground<'_> {
     }
 
     fn of_spread(&self, cause: &Cause) -> f64 {
-        let fb = self.set.unit.disparity_px_m();
+        let fb = self.unit.disparity_px_m();
         let one = |look: &Looked<'_>| {
-            let facts = look.plan.facts();
-            let slope_px = fb * slope(&self.set.unit, look.plan);
+            let facts = look.plan().facts();
+            let slope_px = fb * slope(self.unit, look.plan());
             let ratio = |s: &Sample| match &cause.act {
                 Act::Wander(px) => 1.0 + (slope_px * px / s.sigma_px).powi(2),
                 Act::Spread(f) => f(&s.site, &facts).powi(2),
@@ -160,27 +246,28 @@ impl Ground<'_> {
     /// A shadow falls beside the board; every other loss counts on it.
     fn of_loss(&self, cause: &Cause) -> f64 {
         let beside = cause.label.axis == "edge-distance";
+        let rate = |site: &Site, facts: &Facts<'_>| {
+            let lost = 1.0 - Sum::of(std::slice::from_ref(cause), site, facts).answer;
+            lost + STRAYS * (1.0 - lost)
+        };
         let mut rates: Vec<(f64, f64)> = Vec::new();
         for look in &self.views {
-            let facts = look.plan.facts();
+            let facts = look.plan().facts();
             let counts = look.samples.iter().filter(|s| beside || s.on_target);
-            let rate = |site: &Site| {
-                let lost = 1.0 - Sum::of(std::slice::from_ref(cause), site, &facts).answer;
-                lost + STRAYS * (1.0 - lost)
-            };
-            rates.extend(counts.map(|s| (look.frames(), rate(&s.site))));
+            rates.extend(counts.map(|s| (look.frames(), rate(&s.site, &facts))));
         }
         let all: f64 = rates.iter().map(|(n, _)| n).sum();
         let mean = rates.iter().map(|(n, p)| n * p).sum::<f64>() / all.max(1.0);
-        let told = |p: f64, q: f64| if p > 0.0 { p * (p / q).ln() } else { 0.0 };
-        let gain = |p: f64| told(p, mean) + told(1.0 - p, 1.0 - mean);
+        let term = |p: f64, q: f64| if p > 0.0 { p * (p / q).ln() } else { 0.0 };
+        let gain = |p: f64| term(p, mean) + term(1.0 - p, 1.0 - mean);
         self.weight * rates.iter().map(|(n, p)| n * gain(*p)).sum::<f64>()
     }
 
-    /// A pixel's constant is met again in every frame of every view that shows the target there.
-    fn of_pixels(&self, px: f64) -> f64 {
-        let width = self.set.unit.sensor.camera.width;
-        let mut known = std::collections::BTreeMap::<usize, f64>::new();
+    /// Every pixel's own constant of this size is met again in every frame of every view that shows
+    /// the target there.
+    pub fn of_pixels(&self, px: f64) -> f64 {
+        let width = self.unit.sensor.camera.width;
+        let mut known = BTreeMap::<usize, f64>::new();
         for look in &self.views {
             for s in look.on_target() {
                 let pixel = s.site.v as usize * width + s.site.u as usize;
@@ -190,10 +277,11 @@ impl Ground<'_> {
         self.weight * known.values().map(|q| of_effect(*q)).sum::<f64>()
     }
 
-    fn of_rows(&self, px: f64) -> f64 {
+    /// Every row's own shift of this size, fresh in every frame.
+    pub fn of_rows(&self, px: f64) -> f64 {
         let stride = self.weight.sqrt();
         let one = |look: &Looked<'_>| {
-            let mut rows = std::collections::BTreeMap::<usize, f64>::new();
+            let mut rows = BTreeMap::<usize, f64>::new();
             for s in look.on_target() {
                 let q = stride * (px / s.sigma_px).powi(2) / self.repeats.row;
                 *rows.entry(s.site.v as usize).or_default() += q;
@@ -203,8 +291,8 @@ impl Ground<'_> {
         stride * self.views.iter().map(one).sum::<f64>()
     }
 
-    /// The plane of a view takes the mean of its frames.
-    fn of_frames(&self, px: f64) -> f64 {
+    /// Every frame's own shift of this size; the plane of a view takes the mean of its frames.
+    pub fn of_frames(&self, px: f64) -> f64 {
         let one = |look: &Looked<'_>| {
             let q = self.weight * look.sum(|s| (px / s.sigma_px).powi(2)) / self.repeats.area;
             (look.frames() - 1.0) * of_effect(q)

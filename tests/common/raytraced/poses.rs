@@ -2,12 +2,13 @@
 
 use nalgebra::Vector3;
 use rand::Rng;
-use rand::seq::SliceRandom;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::FRAC_PI_2;
 
 use super::geometry::{Board, Stage, inside_px};
+use super::kernels::scattered;
 use super::{Facts, Unit};
+use kinoise::camera::Camera;
 use kinoise::rng::Stream;
 use kinoise::view::{Region, TargetSize, ViewNotes};
 
@@ -22,15 +23,15 @@ pub struct Session {
     pub gap_m: f64,
     /// The greatest tilt, rad.
     pub steepest: f64,
-    /// Say in every view where the board is: not at all, by its outline, or by a rectangle.
-    pub region: Told,
+    pub region: Marked,
     /// Error of the reference distances, m.
     pub reference_m: Option<f64>,
     pub conditions: bool,
 }
 
+/// What every view's notes say of where the board is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Told {
+pub enum Marked {
     Nothing,
     Outline,
     Rectangle,
@@ -68,16 +69,15 @@ const WALL_ENDS_M: f64 = 5.0;
 const RATE_HZ: f64 = 30.0;
 
 impl Session {
+    /// Half the board's width, m; of a wall, what would be usual.
+    pub fn half_m(&self) -> f64 {
+        self.half.map_or(0.6, |half| half[0])
+    }
+
     /// All views in the order they are taken; distances, tilts and directions are shuffled apart.
     pub fn draw(&self, unit: &Unit, rng: &mut Stream) -> Vec<Plan> {
         let n = self.views;
-        let mut shuffled = || {
-            let mut places: Vec<f64> =
-                (0..n).map(|i| (i as f64 + rng.random::<f64>()) / n as f64).collect();
-            places.shuffle(rng);
-            places
-        };
-        let (near, tilt, turn) = (shuffled(), shuffled(), shuffled());
+        let (near, tilt, turn) = (scattered(n, rng), scattered(n, rng), scattered(n, rng));
         let mut clock = rng.random_range(100.0..10_000.0);
         let begin = clock;
         (0..n)
@@ -97,12 +97,7 @@ impl Session {
         if self.half.is_some() {
             return drawn;
         }
-        // Where the wall leaves the picture, uphill: 1/z (1 - tan(theta) reach) = 1/WALL_ENDS_M.
-        let c = &unit.sensor.camera;
-        let reach = 0.5
-            * (c.width as f64 / c.fx * azimuth.cos().abs()
-                + c.height as f64 / c.fy * azimuth.sin().abs());
-        drawn.min(((1.0 - z / WALL_ENDS_M) / (1.05 * reach)).atan())
+        drawn.min(wall_tilt(&unit.sensor.camera, z, azimuth, WALL_ENDS_M))
     }
 
     /// A view by itself, at depth `z` and tilted; its clock is of the recording and of the session.
@@ -142,11 +137,20 @@ impl Session {
     fn region(&self, unit: &Unit, board: &Board) -> Option<Region> {
         let outline = outline(unit, &board.corners(0.02)?)?;
         match self.region {
-            Told::Nothing => None,
-            Told::Outline => Some(Region::Polygon(outline.map(|p| p.map(tenth)).to_vec())),
-            Told::Rectangle => Some(Region::Rectangle(rectangle(unit, &outline))),
+            Marked::Nothing => None,
+            Marked::Outline => Some(Region::Polygon(outline.map(|p| p.map(tenth)).to_vec())),
+            Marked::Rectangle => Some(Region::Rectangle(rectangle(unit, &outline))),
         }
     }
+}
+
+/// As much as a wall can lean that goes on within the picture no farther than `ends_m`, rad.
+pub fn wall_tilt(c: &Camera, z: f64, azimuth: f64, ends_m: f64) -> f64 {
+    // Where the wall leaves the picture, uphill: 1/z (1 - tan(theta) reach) = 1/ends_m.
+    let reach = 0.5
+        * (c.width as f64 / c.fx * azimuth.cos().abs()
+            + c.height as f64 / c.fy * azimuth.sin().abs());
+    ((1.0 - z / ends_m) / (1.05 * reach)).atan()
 }
 
 fn tenth(px: f64) -> f64 {

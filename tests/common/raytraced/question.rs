@@ -1,4 +1,4 @@
-//! What travels from the worlds to the seal, the solver and the judge.
+//! What travels from the worlds that make sets to the solver and the judge.
 
 use std::path::Path;
 
@@ -13,11 +13,11 @@ use kinoise::view::Sensor;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum World {
-    /// S1: rays and disparity.
+    /// Rays and disparity.
     Rays,
-    /// S2: dots, light and a block matcher.
+    /// Speckle: dots, light and a block matcher.
     Light,
-    /// S3: recordings that a real sensor took.
+    /// Recordings that a real sensor took.
     Real,
 }
 
@@ -65,8 +65,7 @@ pub struct Asked {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub names: Vec<String>,
     /// Expected log-likelihood that who knows the truth gains over the model, nats over the whole
-    /// recording after planes are fitted, for every concealed cause; a world that cannot reach it
-    /// takes what it can and writes the figure it has.
+    /// recording after planes are fitted, for every concealed cause; or as near as can be reached.
     pub nats: Option<f64>,
     pub seed: u64,
     /// 160x120 instead of 320x240.
@@ -91,7 +90,22 @@ pub struct Hidden {
     pub nats: Option<f64>,
 }
 
-/// The sealed answer to one set.
+impl Hidden {
+    pub fn new(names: &[&str], form: &str, [statistic, axis]: [&str; 2]) -> Self {
+        Hidden {
+            names: names.iter().map(ToString::to_string).collect(),
+            form: form.into(),
+            statistic: statistic.into(),
+            axis: axis.into(),
+            also: Vec::new(),
+            interval: None,
+            parameters: Map::new(),
+            nats: None,
+        }
+    }
+}
+
+/// The concealed answer to one set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Truth {
     pub asked: Asked,
@@ -129,14 +143,11 @@ pub struct Pose {
 }
 
 /// A set that is ready to be taken.
-pub trait Sealed: Send + Sync {
+pub trait ConcealedSet: Send + Sync {
     fn truth(&self) -> Truth;
 
     /// Write `recording/` and either `model.json` or `simulated/` into `folder`, and nothing else.
     /// The same bytes every time.
-    ///
-    /// # Errors
-    /// When the disk refuses.
     fn write(&self, folder: &Path) -> Result<()>;
 
     /// Fresh views for the examination of what was learnt; none where the world has no truth without
@@ -147,10 +158,7 @@ pub trait Sealed: Send + Sync {
 
     /// The same set with one view more, as near to `pose` as its stage permits, and the pose that was
     /// taken; the other views are the same to the last byte. None where the session is over for good.
-    ///
-    /// # Errors
-    /// Those of making the set.
-    fn with_view(&self, _pose: &Pose) -> Result<Option<(Pose, Box<dyn Sealed>)>> {
+    fn with_view(&self, _pose: &Pose) -> Result<Option<(Pose, Box<dyn ConcealedSet>)>> {
         Ok(None)
     }
 }
@@ -158,9 +166,6 @@ pub trait Sealed: Send + Sync {
 /// What somebody learnt from a recording, put to use on a view they never saw.
 pub trait Predictor {
     /// Take the predicted bias out of `depth` (m, NaN where there is none).
-    ///
-    /// # Errors
-    /// When the prediction does not fit the view's camera.
     fn correct(&self, view: &ExamView, depth: &mut [f32]) -> Result<()>;
 
     /// Predicted standard deviation of one frame's noise at `depth`, m.

@@ -1,64 +1,65 @@
-//! A set on disk: the recording, the model file, the sealed truth.
+//! A set on disk: the recording, the model file, the truth; and as the trial asks for it.
 
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
 use png::{BitDepth, ColorType, Compression};
+use rand::Rng;
 use rayon::prelude::*;
 
-use super::sets::Set;
+use super::poses::Plan;
+use super::question::{Asked, ConcealedSet, ExamView, Pose, Truth};
 use super::shoot::Still;
+use super::{Set, exam};
 use kinoise::error::{Error, Result};
 use kinoise::frame::Frame;
 use kinoise::io::{encode_png16_quickly, write_recording_file, write_view_notes};
 
 /// Write `set` into `root`: `<name>/`, `model/<name>.json`, `truth/<name>.json`.
-///
-/// # Errors
-/// When the disk refuses.
 pub fn write(set: &Set, root: &Path) -> Result<()> {
     for sub in [&root.join("model"), &root.join("truth")] {
         fs::create_dir_all(sub).map_err(|e| Error::write(sub, e))?;
     }
     recording(set, &root.join(&set.name))?;
     let json = format!("{}.json", set.name);
-    set.described.model(set.known.clone())?.write(&root.join("model").join(&json))?;
+    set.model()?.write(&root.join("model").join(&json))?;
     save(&root.join("truth").join(&json), format!("{:#}\n", set.truth()).as_bytes())
 }
 
-/// The recording alone.
-pub(super) fn recording(set: &Set, folder: &Path) -> Result<()> {
+fn recording(set: &Set, folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
     write_recording_file(folder, &set.described.sensor)?;
-    (0..set.plans.len()).into_par_iter().try_for_each(|view| write_view(set, view, folder))
+    set.plans.par_iter().try_for_each(|plan| {
+        let folder = folder.join(format!("{:04}", plan.view));
+        let still = Still::new(set, plan.view);
+        let stamps = || plan.stamps.iter().copied().enumerate();
+        let depth = stamps().map(|(k, at)| (at, encode_png16_quickly(&still.words(k))));
+        images(&folder, "depth", "png", depth)?;
+        if let Some(bits) = set.infrared_bits {
+            let light = stamps().map(|(k, at)| (at, infrared(&still.infrared(k), bits)));
+            images(&folder, "ir", "png", light)?;
+        }
+        write_view_notes(&folder, &plan.notes)
+    })
 }
 
-fn write_view(set: &Set, view: usize, folder: &Path) -> Result<()> {
-    let folder = folder.join(format!("{view:04}"));
-    for kind in ["depth", "ir"].into_iter().take(1 + usize::from(set.infrared_bits.is_some())) {
-        let images = folder.join(kind);
-        fs::create_dir_all(&images).map_err(|e| Error::write(&images, e))?;
+/// The images of a view, each taken at a time, s, and their list; `kind` is depth or ir.
+pub fn images(
+    view: &Path,
+    kind: &str,
+    ending: &str,
+    images: impl Iterator<Item = (f64, Result<Vec<u8>>)>,
+) -> Result<()> {
+    let folder = view.join(kind);
+    fs::create_dir_all(&folder).map_err(|e| Error::write(&folder, e))?;
+    let mut list = String::new();
+    for (k, (stamp, bytes)) in images.enumerate() {
+        let name = format!("{k:04}.{ending}");
+        save(&folder.join(&name), &bytes?)?;
+        let _ = writeln!(list, "{stamp:.6} {kind}/{name}");
     }
-    let still = Still::new(set, view);
-    let (mut depth_list, mut infrared_list) = (String::new(), String::new());
-    for (frame, stamp) in set.plans[view].stamps.iter().enumerate() {
-        let name = format!("{frame:04}.png");
-        save(&folder.join("depth").join(&name), &encode_png16_quickly(&still.words(frame))?)?;
-        let _ = writeln!(depth_list, "{stamp:.6} depth/{name}");
-        if let Some(bits) = set.infrared_bits {
-            let camera = &set.unit.sensor.camera;
-            let image =
-                Frame { width: camera.width, height: camera.height, raw: still.infrared(frame) };
-            save(&folder.join("ir").join(&name), &infrared(&image, bits)?)?;
-            let _ = writeln!(infrared_list, "{stamp:.6} ir/{name}");
-        }
-    }
-    write_view_notes(&folder, &set.plans[view].notes)?;
-    if set.infrared_bits.is_some() {
-        save(&folder.join("ir.txt"), infrared_list.as_bytes())?;
-    }
-    save(&folder.join("depth.txt"), depth_list.as_bytes())
+    save(&view.join(format!("{kind}.txt")), list.as_bytes())
 }
 
 /// Ten bits as they are, or the upper eight of them.
@@ -81,4 +82,54 @@ fn infrared(image: &Frame, bits: u8) -> Result<Vec<u8>> {
 
 fn save(path: &Path, bytes: &[u8]) -> Result<()> {
     fs::write(path, bytes).map_err(|e| Error::write(path, e))
+}
+
+/// A set as the trial asks for it.
+struct Raytraced {
+    set: Set,
+    asked: Asked,
+}
+
+/// The set that is `asked`.
+pub fn conceal(asked: &Asked) -> Result<Box<dyn ConcealedSet>> {
+    Ok(Box::new(Raytraced { set: Set::asked(asked, None, None)?, asked: asked.clone() }))
+}
+
+impl ConcealedSet for Raytraced {
+    fn truth(&self) -> Truth {
+        Truth { asked: self.asked.clone(), hidden: self.set.hidden(), base: self.set.base() }
+    }
+
+    fn write(&self, folder: &Path) -> Result<()> {
+        recording(&self.set, &folder.join("recording"))?;
+        self.set.model()?.write(&folder.join("model.json"))
+    }
+
+    fn exam(&self) -> Vec<ExamView> {
+        exam::views(&self.set)
+    }
+
+    fn with_view(&self, pose: &Pose) -> Result<Option<(Pose, Box<dyn ConcealedSet>)>> {
+        let mut set = Set::asked(&self.asked, None, None)?;
+        let taken = set.add_view(pose);
+        Ok(Some((taken, Box::new(Raytraced { set, asked: self.asked.clone() }))))
+    }
+}
+
+impl Set {
+    /// Take a view after all others, by the same unit of the same target with the same causes at
+    /// work. A wall leans no farther than it goes on in the picture. The pose that was taken.
+    pub fn add_view(&mut self, pose: &Pose) -> Pose {
+        let mut rng = self.seed.stream("rays/advised");
+        let (stamp, session_s) =
+            self.plans.last().map_or((0.0, 0.0), |p| (p.stamps[0], p.session_s));
+        let pause = rng.random_range(60.0..240.0);
+        let Pose { z_m, theta_rad, azimuth_rad } = *pose;
+        let theta_rad = self.session.within(z_m, theta_rad, azimuth_rad, &self.unit);
+        let clocks = [stamp + pause, session_s + pause];
+        let tilt = [theta_rad, azimuth_rad];
+        let plan = self.session.view(&self.unit, z_m, tilt, clocks, &mut rng);
+        self.plans.push(Plan { view: self.plans.len(), ..plan });
+        Pose { theta_rad, ..*pose }
+    }
 }

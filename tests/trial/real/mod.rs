@@ -4,48 +4,48 @@
 //! What is hidden here cannot be known but by the tool itself: the *full model* of a recording is
 //! what calibration and diagnosis find in it, asked again until they find no more. This is the one
 //! world that takes its truth from what is on trial. It asks less than the others therefore: a term
-//! that was struck must be found and named again from other views than all (amnesia); an effect of
-//! the first world, which shares no formula with the tool, must stand out from residuals that no
-//! simulator made (transplant); and one half of a recording must not contradict what was learnt of
-//! the other (halves).
+//! that was struck must be found and named again from other views than all (amnesia); a raytraced
+//! effect, which shares no formula with the tool, must stand out from residuals that no simulator
+//! made (transplant); and one half of a recording must not contradict what was learnt of the other
+//! (halves).
 //!
 //! Nothing real is in this repository: the words come from the user's own folder of data and go to
 //! the user's own output folder.
 
-mod amnesia;
-mod change;
+mod added;
 mod dither;
 mod full;
-mod gain;
-mod scene;
-mod sources;
 #[cfg(test)]
 mod tests;
-mod transplant;
-#[cfg(test)]
-mod word_tests;
-mod write;
 
-pub use sources::{Source, recordings};
-
-use std::path::Path;
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use rand::Rng;
-use rand::seq::SliceRandom;
-use serde_json::{Value, json};
+use rand::seq::{IndexedRandom, SliceRandom};
+use rayon::prelude::*;
+use serde_json::json;
 
-use super::{Asked, Cell, Hidden, Sealed, Truth};
-use change::Graft;
-use full::{Full, full, learnt};
+use crate::raytraced::eye::Eye;
+use crate::raytraced::question::{Asked, Cell, ConcealedSet, Hidden, Truth};
+use crate::raytraced::write::images;
+use crate::raytraced::{Cause, Clock};
+use full::{Full, UNDESCRIBED, explain, full};
 use kinoise::error::{Error, Result};
+use kinoise::io::{FrameSource, encode_png16_quickly, write_recording_file, write_view_notes};
 use kinoise::model::NoiseModel;
 use kinoise::rng::{Seed, Stream};
+use kinoise::view::ViewNotes;
 
 /// Of the views that a recording has, a set takes at least and at most this share.
 const KEPT: [f64; 2] = [0.6, 0.92];
 /// A diagnosis of fewer says too little.
 const MIN_VIEWS: usize = 6;
+/// A term that gains less is not what the recording needs, nats.
+const MIN_NATS: f64 = 50.0;
+/// Terms without a name are known by where they are only: one set in so many may strike one.
+const NAMELESS_EVERY: u32 = 5;
 
 /// A set of real views.
 struct Real {
@@ -53,88 +53,98 @@ struct Real {
     /// Numbers of the views, ascending.
     views: Vec<usize>,
     model: NoiseModel,
-    graft: Option<Graft>,
+    added: Vec<Cause>,
     truth: Truth,
 }
 
 /// Make the set that is asked for of a recording in `data`, by lot where there are several.
-///
-/// # Errors
-/// When there is none in `data`, or it cannot show what is asked for.
-pub fn seal(asked: &Asked, data: &Path) -> Result<Box<dyn Sealed>> {
+pub fn conceal(asked: &Asked, data: &Path) -> Result<Box<dyn ConcealedSet>> {
     if !matches!(asked.cell, Cell::Amnesia | Cell::Transplant | Cell::Halves) {
         return Err(Error::Argument {
             what: format!("{}: real recordings have no such sets", json!(asked.cell)),
             remedy: "ask for amnesia, transplant or halves",
         });
     }
-    let sources = sources::required(data)?;
-    let seed = Seed(asked.seed);
-    let mut rng = seed.stream("real/set");
-    let set = one_of(sources, &mut rng, &|full, rng| taken(full, asked, seed, rng))?;
-    Ok(Box::new(set))
-}
-
-/// The set of this recording.
-fn taken(full: Arc<Full>, asked: &Asked, seed: Seed, rng: &mut Stream) -> Result<Real> {
-    let all = full.recording.views.len();
-    Ok(match asked.cell {
-        Cell::Amnesia => {
-            let views = some(all, rng);
-            let share = full.measured(&views) / full.measured(&(0..all).collect::<Vec<_>>());
-            let (model, hidden) = amnesia::strike(&full, asked, share, rng)?;
-            Real::new(full, views, model, None, asked, vec![hidden])
-        }
-        Cell::Transplant => {
-            let views = some(all, rng);
-            let (graft, hidden) = transplant::graft(&full, asked, &views, seed, rng)?;
-            let model = full.model.clone();
-            Real::new(full, views, model, Some(graft), asked, hidden)
-        }
-        _ => {
-            let [mine, theirs] = halves(all, rng);
-            let mut other = full.recording.clone();
-            other.views = theirs.iter().map(|&k| full.recording.views[k].clone()).collect();
-            let model = learnt(&other)?;
-            Real::new(full, mine, model, None, asked, Vec::new())
-        }
-    })
-}
-
-type Taking<'a> = &'a dyn Fn(Arc<Full>, &mut Stream) -> Result<Real>;
-
-/// By lot, of those that can be used and can show what is asked for.
-fn one_of(mut sources: Vec<Source>, rng: &mut Stream, take: Taking<'_>) -> Result<Real> {
-    sources.shuffle(rng);
+    let mut rng = Seed(asked.seed).stream("real/set");
+    let mut paths = recordings(data);
+    paths.shuffle(&mut rng);
     let mut whys = Vec::new();
-    for source in &sources {
-        let taken =
-            full(source).and_then(|full| take(full, &mut rng.clone()).map_err(|e| e.to_string()));
-        match taken {
-            Ok(set) => return Ok(set),
+    for path in &paths {
+        let made = full(path)
+            .and_then(|full| taken(full, asked, &mut rng.clone()).map_err(|e| e.to_string()));
+        match made {
+            Ok(set) => return Ok(Box::new(set)),
             Err(why) => whys.push(why),
         }
     }
     Err(Error::Argument {
-        what: whys.join("; "),
-        remedy: "give a folder with another recording, or leave the real sets out",
+        what: match whys.is_empty() {
+            true => format!("{}: no real recording of a plane is here", data.display()),
+            false => whys.join("; "),
+        },
+        remedy: "give a folder with another recording (recording.json and a folder a view), or leave \
+                 the real sets out",
     })
 }
 
-/// Views by lot, ascending.
-fn some(all: usize, rng: &mut Stream) -> Vec<usize> {
-    let [least, most] = KEPT.map(|share| (share * all as f64).round() as usize);
-    let least = least.max(MIN_VIEWS).min(all);
-    let count = rng.random_range(least..=most.max(least));
-    dealt(all, rng, count)[0].clone()
+/// The recordings in `data`, in name order: `data` itself, its folders, and `recording/` in these,
+/// wherever a `recording.json` describes them; and one that is known.
+fn recordings(data: &Path) -> Vec<PathBuf> {
+    let described = |path: &PathBuf| {
+        path.join(kinoise::io::DESCRIPTION).is_file() || path.ends_with(UNDESCRIBED)
+    };
+    let data = data.to_path_buf();
+    if described(&data) {
+        return vec![data];
+    }
+    let entries = fs::read_dir(data).into_iter().flatten();
+    let mut folders: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+    folders.sort();
+    let of =
+        |folder: PathBuf| [folder.clone(), folder.join("recording")].into_iter().find(described);
+    folders.into_iter().filter_map(of).collect()
 }
 
-/// All views, dealt to two.
-fn halves(all: usize, rng: &mut Stream) -> [Vec<usize>; 2] {
-    dealt(all, rng, all / 2)
+/// The set of this recording.
+fn taken(full: Arc<Full>, asked: &Asked, rng: &mut Stream) -> Result<Real> {
+    let all = full.recording.views.len();
+    let (mut model, mut added, mut hidden) = (full.model.clone(), Vec::new(), Vec::new());
+    let views = if asked.cell == Cell::Halves {
+        let [mine, theirs] = dealt(all, all / 2, rng);
+        let mut other = full.recording.clone();
+        other.views = theirs.iter().map(|&k| full.recording.views[k].clone()).collect();
+        model = explain(&other)?.model;
+        mine
+    } else {
+        let [min, max] = KEPT.map(|share| (share * all as f64).round() as usize);
+        let min = min.max(MIN_VIEWS).min(all);
+        let count = rng.random_range(min..=max.max(min));
+        let [views, _] = dealt(all, count, rng);
+        if asked.cell == Cell::Amnesia {
+            let (k, term) = struck(&full, asked, &views, rng)?;
+            model.effects.remove(k);
+            hidden.push(term);
+        } else {
+            added = added::causes(&full, asked, &views, rng)?;
+            hidden.extend(added.iter().map(|cause| cause.label.clone()));
+        }
+        views
+    };
+    let root = &full.recording.root;
+    // data/UNIT/recording is called UNIT.
+    let named = if root.ends_with("recording") { root.parent().unwrap_or(root) } else { root };
+    let base = json!({
+        "recording": named.file_name().unwrap_or_default().to_string_lossy(),
+        "sensor": full.recording.sensor.name,
+        "views": views.iter().map(|&k| &full.recording.views[k].name).collect::<Vec<_>>(),
+        "known": model.effects.iter().map(|e| &e.id).collect::<Vec<_>>(),
+    });
+    let truth = Truth { asked: asked.clone(), hidden, base };
+    Ok(Real { full, views, model, added, truth })
 }
 
-fn dealt(all: usize, rng: &mut Stream, count: usize) -> [Vec<usize>; 2] {
+/// `count` of all views by lot, and the others, both ascending.
+fn dealt(all: usize, count: usize, rng: &mut Stream) -> [Vec<usize>; 2] {
     let mut numbers: Vec<usize> = (0..all).collect();
     numbers.shuffle(rng);
     let mut rest = numbers.split_off(count);
@@ -143,40 +153,83 @@ fn dealt(all: usize, rng: &mut Stream, count: usize) -> [Vec<usize>; 2] {
     [numbers, rest]
 }
 
-impl Real {
-    fn new(
-        full: Arc<Full>,
-        views: Vec<usize>,
-        model: NoiseModel,
-        graft: Option<Graft>,
-        asked: &Asked,
-        hidden: Vec<Hidden>,
-    ) -> Self {
-        let base = base(&full, &views, &model);
-        Real { full, views, model, graft, truth: Truth { asked: asked.clone(), hidden, base } }
+/// Which of the full model's terms is struck, and what that is worth in these views.
+fn struck(
+    full: &Full,
+    asked: &Asked,
+    views: &[usize],
+    rng: &mut Stream,
+) -> Result<(usize, Hidden)> {
+    let all: Vec<usize> = (0..full.seen.len()).collect();
+    let share = full.measured(views) / full.measured(&all);
+    let min = asked.nats.unwrap_or(MIN_NATS);
+    let by_name = !asked.names.is_empty();
+    let fits = |term: &Hidden| match by_name {
+        true => asked.names.contains(&term.form),
+        false => term.nats.is_none_or(|nats| nats * share >= min),
+    };
+    let mut choice: Vec<usize> = (0..full.terms.len()).filter(|&k| fits(&full.terms[k])).collect();
+    if !by_name && rng.random_range(0..NAMELESS_EVERY) > 0 {
+        let named = choice.iter().copied().filter(|&k| !full.terms[k].names.is_empty());
+        let named: Vec<usize> = named.collect();
+        choice = if named.is_empty() { choice } else { named };
     }
+    let Some(&k) = choice.choose(rng) else {
+        let has: Vec<&str> = full.terms.iter().map(|t| t.form.as_str()).collect();
+        return Err(Error::recording(
+            &full.recording.root,
+            format!("no term to strike; its model holds {}", has.join(", ")),
+            "name one of these, or ask for fewer nats",
+        ));
+    };
+    let term = full.terms[k].clone();
+    Ok((k, Hidden { nats: term.nats.map(|nats| nats * share), ..term }))
 }
 
-fn base(full: &Full, views: &[usize], model: &NoiseModel) -> Value {
-    let names: Vec<&str> = views.iter().map(|&k| full.recording.views[k].name.as_str()).collect();
-    let known: Vec<&str> = model.effects.iter().map(|e| e.id.as_str()).collect();
-    let root = &full.recording.root;
-    // data/UNIT/recording is called UNIT.
-    let named = if root.ends_with("recording") { root.parent().unwrap_or(root) } else { root };
-    json!({
-        "recording": named.file_name().unwrap_or_default().to_string_lossy(),
-        "sensor": full.recording.sensor.name,
-        "views": names,
-        "known": known,
-    })
-}
-
-impl Sealed for Real {
+impl ConcealedSet for Real {
     fn truth(&self) -> Truth {
         self.truth.clone()
     }
 
     fn write(&self, folder: &Path) -> Result<()> {
-        write::write(self, folder)
+        let root = folder.join("recording");
+        fs::create_dir_all(&root).map_err(|e| Error::write(&root, e))?;
+        write_recording_file(&root, &self.full.recording.sensor)?;
+        (0..self.views.len())
+            .into_par_iter()
+            .try_for_each(|n| self.write_view(self.views[n], &root.join(format!("{n:04}"))))?;
+        self.model.write(&folder.join("model.json"))
+    }
+}
+
+impl Real {
+    fn write_view(&self, k: usize, folder: &Path) -> Result<()> {
+        let full = &*self.full;
+        let view = &full.recording.views[k];
+        let size = &full.recording.sensor.camera;
+        let mut source = FrameSource::new(size.width, size.height);
+        let plan = full.plan(k);
+        let eye = Eye::new(full.world(), &plan);
+        let start = plan.stamps.first().copied().unwrap_or_default();
+        let frames = view.depth.iter().enumerate().filter_map(|(n, file)| {
+            // What cannot be read, the full model was not learnt from either.
+            let mut frame = source.read(&file.path).ok()?;
+            if !self.added.is_empty() {
+                let seed = Seed(self.truth.asked.seed);
+                let view_s = file.timestamp - start;
+                let clock = Clock { seed, view: k, frame: n as i64, view_s, width: size.width };
+                frame = added::add(&self.added, full, &eye, &frame, &clock);
+            }
+            Some((file.timestamp, encode_png16_quickly(&frame)))
+        });
+        images(folder, "depth", "png", frames)?;
+        if let Some(first) = view.infrared.first() {
+            let ending = first.path.extension().and_then(|e| e.to_str()).unwrap_or("png");
+            let bytes = |path: &Path| fs::read(path).map_err(|e| Error::read(path, e));
+            let light = view.infrared.iter().map(|file| (file.timestamp, bytes(&file.path)));
+            images(folder, "ir", ending, light)?;
+        }
+        // What a person noted on the view might tell.
+        write_view_notes(folder, &ViewNotes { notes: None, ..view.notes.clone() })
     }
 }

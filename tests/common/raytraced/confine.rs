@@ -5,8 +5,8 @@ use std::sync::Arc;
 use rand::Rng;
 use rand::seq::SliceRandom;
 
-use super::causes_bias::lot;
-use super::geometry::Site;
+use super::eye::Site;
+use super::kernels::lot;
 use super::poses::Plan;
 use super::{Act, AtSite, Cause, Cell, Facts, Unit};
 use kinoise::error::{Error, Result};
@@ -14,7 +14,7 @@ use kinoise::rng::Stream;
 
 /// Where a cause acts.
 #[derive(Debug, Clone)]
-pub(super) enum Gate {
+pub enum Gate {
     Views(Vec<usize>),
     /// px.
     Columns([f64; 2]),
@@ -87,11 +87,8 @@ impl Gate {
     }
 
     /// `cause`, confined.
-    ///
-    /// # Errors
-    /// When it does not act pixel by pixel.
     pub fn confine(&self, cause: Cause) -> Result<Cause> {
-        let Cause { mut label, act, trace } = cause;
+        let Cause { mut label, act, worth, window } = cause;
         let here = Arc::new(self.clone());
         let only = |f: AtSite, other: f64| -> AtSite {
             Box::new(move |s, facts| if here.open(s, facts) { f(s, facts) } else { other })
@@ -108,7 +105,8 @@ impl Gate {
                 });
             }
         };
-        (label.also, label.interval) = self.place();
-        Ok(Cause { label, act, trace })
+        let (axes, interval) = self.place();
+        (label.also, label.interval) = (axes.iter().map(ToString::to_string).collect(), interval);
+        Ok(Cause { label, act, worth, window })
     }
 }

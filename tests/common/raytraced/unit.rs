@@ -66,14 +66,20 @@ impl Unit {
         self.sensor.camera.width as f64 / 640.0
     }
 
+    /// Of the stored depth, 1/m.
+    pub fn units_per_metre(&self) -> f64 {
+        match self.sensor.code {
+            DepthCode::Metric { units_per_metre, .. } => units_per_metre,
+            DepthCode::Disparity { .. } => f64::NAN,
+        }
+    }
+
+    /// fx times the baseline, px m.
     pub fn disparity_px_m(&self) -> f64 {
         self.sensor.camera.fx * self.baseline_m
     }
 
     /// The model file's content: what is known of this unit.
-    ///
-    /// # Errors
-    /// Never, unless a number is not finite.
     pub fn model(&self, effects: Vec<Effect>) -> Result<NoiseModel> {
         let domain = Domain { z_m: VALID_M, theta_rad: VALID_RAD };
         Ok(NoiseModel {
@@ -87,21 +93,5 @@ impl Unit {
                 ..Provenance::now(None)
             },
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use kinoise::rng::Seed;
-
-    #[test]
-    fn the_model_file_says_what_the_unit_does() {
-        let unit = Unit::draw(640, 5000.0, &mut Seed(3).stream("unit"));
-        let model = unit.model(Vec::new()).unwrap();
-        for (z, theta) in [(0.5, 0.0), (1.3, 0.4), (3.3, 1.2), (5.0, 1.3)] {
-            assert!((model.sigma.axial_sigma(z, theta) / unit.sigma(z, theta) - 1.0).abs() < 1e-12);
-        }
-        assert_eq!(unit.sensor.fault(), None);
     }
 }

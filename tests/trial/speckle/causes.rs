@@ -4,11 +4,11 @@ use rand::Rng;
 use rand::seq::IndexedRandom;
 use serde_json::{Map, Value};
 
-use super::poses::Session;
-use crate::Hidden;
+use crate::raytraced::question::Hidden;
 use kinoise::error::{Error, Result};
 use kinoise::rng::Stream;
 use kinoise::scene::Target;
+use kinoise::simulate::Scenery;
 use kinoise::simulate::speckle::Causes;
 
 /// A cause that can be concealed.
@@ -106,12 +106,10 @@ pub(super) fn base(rng: &mut Stream) -> Result<Causes> {
 }
 
 impl Switch {
-    /// # Errors
-    /// When no cause is called so.
     pub fn named(name: &str) -> Result<&'static Switch> {
         SWITCHES.iter().find(|s| s.cause == name).ok_or_else(|| Error::Argument {
             what: format!("no cause is called \"{name}\""),
-            remedy: "take one of the causes of the world by light",
+            remedy: "take one of the causes of the speckle simulator",
         })
     }
 
@@ -120,14 +118,11 @@ impl Switch {
     }
 
     /// `base` with the cause switched on, and what that is called.
-    ///
-    /// # Errors
-    /// When the world refuses the value.
     pub fn turn(
         &self,
         base: Causes,
         size: f64,
-        session: &Session,
+        scenery: &Scenery,
         rng: &mut Stream,
     ) -> Result<(Causes, Hidden)> {
         let usual = base.values().get(self.cause).and_then(Value::as_f64).unwrap_or(0.0);
@@ -145,13 +140,15 @@ impl Switch {
             // Most of it within the session.
             causes = causes.with("warm_up_s", rng.random_range(100.0..200.0))?;
         }
-        let told = super::hidden(self, parameters(self.cause, value, &causes, session));
-        Ok((causes, told))
+        let mut hidden = Hidden::new(self.names, self.cause, [self.statistic, self.axis]);
+        hidden.also = self.also.iter().map(ToString::to_string).collect();
+        hidden.parameters = parameters(self.cause, value, &causes, scenery);
+        Ok((causes, hidden))
     }
 }
 
 /// The switch, and in the catalogue's words what follows from it by geometry alone.
-fn parameters(cause: &str, value: f64, causes: &Causes, session: &Session) -> Map<String, Value> {
+fn parameters(cause: &str, value: f64, causes: &Causes, scenery: &Scenery) -> Map<String, Value> {
     let mut all = Map::from_iter([(cause.to_string(), Value::from(value))]);
     let mut say = |name: &str, value: f64| all.insert(name.into(), value.into());
     match cause {
@@ -161,7 +158,7 @@ fn parameters(cause: &str, value: f64, causes: &Causes, session: &Session) -> Ma
         "motion_mps" => drop(say("velocity_mps", value)),
         "bow_m" => {
             say("sagitta_m", value);
-            if let Target::Board(board) = session.scenery.target {
+            if let Target::Board(board) = scenery.target {
                 say("span_m", board.width_m);
             }
         }

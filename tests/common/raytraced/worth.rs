@@ -1,38 +1,10 @@
-//! How much a cause gives away that shows in no mean and no spread: nats by closed forms.
+//! Closed forms of what knowing of a cause is worth that shows in no mean and no spread, nats.
 
 use std::f64::consts::{PI, TAU};
 
 use statrs::function::gamma::ln_gamma;
 
 use super::kernels::Window;
-
-/// How the information of a cause is counted.
-#[derive(Debug, Clone, Default)]
-pub enum Trace {
-    /// From views without noise, with the cause and without it.
-    #[default]
-    Field,
-    /// A moving average over frames, of unit square sum.
-    Average(Vec<f64>),
-    /// This share of the variance stands still within a view.
-    Frozen(f64),
-    /// `share` of the variance comes through a window.
-    Window { window: Window, share: f64 },
-    /// Student's t of unit variance: degrees of freedom.
-    Student(f64),
-    /// A share of Laplace errors of this scale.
-    Stray { fraction: f64, scale: f64 },
-    /// The first frame's spread grows by this share.
-    FirstFrame(f64),
-    /// Every pixel's own constant, px.
-    Pixels(f64),
-    /// Every row's own shift, px.
-    Rows(f64),
-    /// Every frame's own shift, px.
-    Frames(f64),
-    /// Values that do not occur: seen or not seen, whatever the noise.
-    Comb,
-}
 
 /// Share of white noise that the rounding of the stored words adds at the least; without it the
 /// pixels of a smooth window would tell one another exactly.
@@ -141,37 +113,19 @@ mod tests {
         assert!((of_average(&weights, 2) + 0.5 * (1.0 - rho2).ln()).abs() < 1e-12);
         assert!((of_average(&weights, 3) + 0.5 * (1.0 - 2.0 * rho2).ln()).abs() < 1e-12);
         assert_eq!(of_average(&weights, 1), 0.0);
+        assert!((of_frozen(0.5, 2) + 0.5 * 0.75f64.ln()).abs() < 1e-12);
     }
 
-    /// Weak correlation is worth a quarter of the sum over all lags of rho^2.
+    /// Weak correlation is worth a quarter of the sum over all lags of rho^2; a weak tail excess
+    /// kurtosis squared over 48.
     #[test]
-    fn a_weak_window_is_worth_its_squares() {
-        let window = Window::flat(3.0);
+    fn what_is_weak_is_worth_its_squares() {
         let squares = (1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 9.0f64)).powi(2) - 1.0;
         let share = 0.002;
         let weak = 0.25 * share * share * squares;
-        assert!((of_window(&window, share) / weak - 1.0).abs() < 0.02);
-    }
-
-    /// Near the Gaussian: excess kurtosis squared over 48. A few errors so far out that they can only
-    /// be strays: those of a Poisson process whose rate is larger.
-    #[test]
-    fn tails_are_worth_their_divergence() {
-        let nu = 400.0;
-        let kurtosis: f64 = 6.0 / (nu - 4.0);
-        assert!((0.8..1.1).contains(&(of_student(nu) / (kurtosis * kurtosis / 48.0))));
-        let f = 0.01f64;
-        let rate = STRAYS + f;
-        let poisson = rate * (rate / STRAYS).ln() - f;
-        // More than half of them lies among the Gaussian errors, exp(-3 / 4) beyond.
-        assert!((0.3..0.6).contains(&(of_strays(f, STRAY_SCALE) / poisson)));
+        assert!((of_window(&Window::flat(3.0), share) / weak - 1.0).abs() < 0.02);
+        let kurtosis: f64 = 6.0 / (400.0 - 4.0);
+        assert!((0.8..1.1).contains(&(of_student(400.0) / (kurtosis * kurtosis / 48.0))));
         assert!(of_strays(1e-9, 4.0) < 1e-12);
-    }
-
-    #[test]
-    fn what_is_not_there_is_worth_nothing() {
-        assert!(of_frozen(1e-9, 4).abs() < 1e-12 && of_variance(1.0).abs() < 1e-15);
-        assert!(of_effect(0.0) == 0.0 && of_window(&Window::flat(5.0), 0.0).abs() < 1e-15);
-        assert!((of_frozen(0.5, 2) + 0.5 * 0.75f64.ln()).abs() < 1e-12);
     }
 }
