@@ -43,7 +43,10 @@ pub(super) use row;
 ///
 /// The first column names the row. A title after `>` is that of a column of numbers, set to the
 /// right; one after `~` is that of a column of sentences, set small.
-pub(super) fn table<C: AsRef<str>>(columns: &[C], rows: impl IntoIterator<Item = Vec<Markup>>) -> Markup {
+pub(super) fn table<C: AsRef<str>>(
+    columns: &[C],
+    rows: impl IntoIterator<Item = Vec<Markup>>,
+) -> Markup {
     let columns: Vec<(Option<&str>, &str)> = columns.iter().map(|c| set(c.as_ref())).collect();
     html! {
         div.wide { table class=[(columns.len() > 8).then_some("small")] {

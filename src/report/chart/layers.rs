@@ -30,9 +30,8 @@ pub(super) struct Plot<'a, B: DrawingBackend> {
 
 impl<B: DrawingBackend> Plot<'_, B> {
     pub fn at(&self, x: f64, y: f64) -> Pixel {
-        let along = |low: i32, high: i32, share: f64| {
-            low + (share * f64::from(high - low)).round() as i32
-        };
+        let along =
+            |low: i32, high: i32, share: f64| low + (share * f64::from(high - low)).round() as i32;
         let (u, v) = (self.x.share(x), self.y.share(y));
         (along(self.low.0, self.high.0, u), along(self.low.1, self.high.1, v))
     }
@@ -84,7 +83,11 @@ impl<B: DrawingBackend> Plot<'_, B> {
         let there = edges.iter().map(|[x, low, _]| self.clamped(*x, *low));
         let back = edges.iter().rev().map(|[x, _, high]| self.clamped(*x, *high));
         let outline: Vec<Pixel> = there.chain(back).collect();
-        if outline.len() > 2 { self.sheet.root.draw(&Polygon::new(outline, colour)) } else { Ok(()) }
+        if outline.len() > 2 {
+            self.sheet.root.draw(&Polygon::new(outline, colour))
+        } else {
+            Ok(())
+        }
     }
 
     fn error_bar(&self, [x, low, high]: [f64; 3], stroke: Stroke) -> Drawn<B> {
