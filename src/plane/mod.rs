@@ -10,7 +10,6 @@ mod affine;
 mod candidate;
 mod grow;
 mod image;
-mod normal_equations;
 mod paper;
 mod principal_point;
 mod ransac;
@@ -22,7 +21,6 @@ mod target;
 pub(crate) use affine::MAD_TO_SIGMA;
 pub use affine::{AffineFit, Effort, fit_affine_robust};
 pub use image::{Exclusions, InverseDepthImage, Target};
-pub use normal_equations::NormalEquations;
 pub use paper::{Points, RansacOptions, RansacPlane, ransac_plane};
 pub use target::find_target;
 

@@ -12,9 +12,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use crate::least_squares::NormalEquations;
 use kinoise::error::{Error, Result};
 use kinoise::model::NoiseModel;
-use kinoise::plane::NormalEquations;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 

@@ -15,6 +15,7 @@ mod check;
 mod commitment;
 mod gain;
 mod judge;
+mod least_squares;
 
 mod make;
 mod page;
@@ -25,6 +26,7 @@ mod real;
 mod rounds;
 mod solver;
 mod speckle;
+mod trial;
 
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -39,7 +41,7 @@ use kinoise::io::write_atomic;
 
 use check::{CheckOptions, check};
 use proof::{Order, Proof};
-use rounds::{Trial, hold};
+use trial::{Trial, hold};
 
 /// A blind trial of the diagnosis on concealed sets that anyone can check.
 #[derive(Debug, Parser)]
@@ -128,7 +130,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     match (&arguments.check, &arguments.page, &arguments.output) {
         (Some(folder), _, _) => check_again(folder, program, arguments),
         (None, Some(folder), _) => page_of(folder, &Proof::read(folder)?.0).map(|()| 0),
-        (None, None, Some(output)) => trial(output, program, arguments).map(|()| 0),
+        (None, None, Some(output)) => hold_trial(output, program, arguments).map(|()| 0),
         (None, None, None) => bail!("no folder was given; say -o DIR, --check DIR or --page DIR"),
     }
 }
@@ -140,7 +142,7 @@ fn page_of(folder: &Path, proof: &Proof) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn trial(output: &Path, program: PathBuf, arguments: &Arguments) -> anyhow::Result<()> {
+fn hold_trial(output: &Path, program: PathBuf, arguments: &Arguments) -> anyhow::Result<()> {
     if arguments.sets == 0 {
         bail!("--sets 0: give at least one set");
     }

@@ -1,12 +1,13 @@
 //! What was learnt, put to use on a view: where its pixels lie on every axis, and a model file.
 
+use crate::least_squares::NormalEquations;
 use kinoise::camera::{Camera, Rays};
 use kinoise::correct::{Conditions, Correction};
 use kinoise::diagnose::KnownTerms;
 use kinoise::effects::KINECT_BASELINE_M;
 use kinoise::error::Result;
 use kinoise::model::{Effect, NoiseModel, SigmaModel};
-use kinoise::plane::{NormalEquations, Plane};
+use kinoise::plane::Plane;
 use kinoise::scene::TargetFrame;
 use kinoise::terms::{PixelContext, Pixels, Term, edge_distances};
 use kinoise::view::Sensor;

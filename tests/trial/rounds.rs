@@ -1,17 +1,13 @@
-//! The trial: make the sets and commit to them, diagnose them, publish the verdicts, take the views
-//! that were advised and diagnose again, and only then open the answers.
-//!
-//! One [`Round`] does the first half and the second; whatever is finished is kept under `work/`, so
-//! that an interrupted trial goes on where it was.
+//! One pass over sets: they are made, committed to, diagnosed, and the verdicts published. The trial
+//! is two of these; whatever is finished is kept under `work/`, so that an interrupted trial goes on
+//! where it was.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Duration;
 
 use kinoise::error::Result;
-use kinoise::io::{OutputDir, sha256_hex};
+use kinoise::io::sha256_hex;
 use kinoise::{Error, NoiseModel};
 use rayon::prelude::*;
 
@@ -20,25 +16,12 @@ use crate::commitment::{
     write_json,
 };
 use crate::gain::{Gains, examine};
-use crate::judge::{advised_view, endpoints_in_words, mark, mark_advice, scores};
+use crate::judge::{advised_view, endpoints_in_words};
 use crate::plan::{conceal, plan};
-use crate::proof::{Advised, FORMAT, Order, PROOF, Proof, ProvenSet, SUMMARY};
+use crate::proof::Order;
 use crate::raytraced::question::{ConcealedSet, Pose, Truth, World};
 use crate::solver::{Solved, solve};
-
-/// What is wanted.
-pub struct Trial {
-    pub output: PathBuf,
-    pub order: Order,
-    /// Real recordings.
-    pub data: Option<PathBuf>,
-    /// Keep every set and all that the solver wrote.
-    pub keep: bool,
-    /// The program that diagnoses.
-    pub program: PathBuf,
-    /// Of one diagnosis.
-    pub limit: Duration,
-}
+use crate::trial::Trial;
 
 /// What happens, how many are done, how many there are.
 pub type Progress<'a> = &'a (dyn Fn(&'static str, usize, usize) + Sync);
@@ -98,80 +81,22 @@ pub fn make(sealed: &dyn ConcealedSet, scratch: &Path) -> Result<String> {
     hash_folder(&set)
 }
 
-/// Hold the trial, or go on with one that was interrupted.
-pub fn hold(trial: &Trial, progress: Progress<'_>) -> Result<Proof> {
-    let out = OutputDir::create(&trial.output)?;
-    if out.path().join(PROOF).exists() {
-        return Err(refused(out.path(), "a finished trial is here"));
-    }
-    let sets = take(&trial.order, trial.data.as_deref(), progress)?;
-    let first = Round { trial, root: out.path(), index: 0, progress };
-    let one = first.run(&sets, None)?;
-    let verdicts = one.solved.iter().map(|s| s.verdict.as_ref());
-    let again = take_advised(&sets, verdicts, progress)?;
-    let second = Round { index: 1, ..first };
-    let two = second.run(&again, Some(&one.verdicts_sha256))?;
-    // The answers are opened.
-    let mut proven = Vec::new();
-    let gains = first.examine_all(&sets, &one.commitments)?;
-    for ((set, solved), gains) in sets.iter().zip(&one.solved).zip(gains) {
-        let again = two.solved.iter().find(|s| s.name == set.name);
-        let advised = again.map(|s| Advised {
-            marks: mark_advice(&set.truth, solved.verdict.as_ref(), s.verdict.as_ref()),
-            verdict: s.verdict.clone(),
-            failure: s.failure.clone(),
-            diagnosis_sha256: s.diagnosis_sha256.clone(),
-        });
-        proven.push(ProvenSet {
-            name: set.name.clone(),
-            marks: mark(&set.truth, solved.verdict.as_ref())?,
-            truth: set.truth.clone(),
-            verdict: solved.verdict.clone(),
-            failure: solved.failure.clone(),
-            diagnosis_sha256: solved.diagnosis_sha256.clone(),
-            gains,
-            advised,
-            seconds: solved.seconds,
-        });
-    }
-    let mut confinement = BTreeMap::new();
-    for solved in one.solved.iter().chain(&two.solved) {
-        *confinement.entry(solved.confinement.clone()).or_insert(0) += 1;
-    }
-    let proof = Proof {
-        format: FORMAT.into(),
-        order: trial.order.clone(),
-        scores: scores(&proven),
-        published: [
-            one.commitments_sha256,
-            one.verdicts_sha256,
-            two.commitments_sha256,
-            two.verdicts_sha256,
-        ],
-        commitments: [one.commitments, two.commitments],
-        confinement,
-        sets: proven,
-    };
-    write_json(&out.path().join(SUMMARY), &proof.summary())?;
-    write_json(&out.path().join(PROOF), &proof)?;
-    remove(&out.path().join("work"))?;
-    Ok(proof)
-}
-
 /// One pass over sets: committed to, diagnosed, published.
 #[derive(Clone, Copy)]
-struct Round<'a> {
-    trial: &'a Trial,
-    root: &'a Path,
-    index: usize,
-    progress: Progress<'a>,
+pub struct Round<'a> {
+    pub trial: &'a Trial,
+    pub root: &'a Path,
+    /// In [`ROUNDS`].
+    pub index: usize,
+    pub progress: Progress<'a>,
 }
 
-struct Done {
-    commitments: Commitments,
-    commitments_sha256: String,
-    solved: Vec<Solved>,
-    verdicts_sha256: String,
+/// What a round leaves.
+pub struct Done {
+    pub commitments: Commitments,
+    pub commitments_sha256: String,
+    pub solved: Vec<Solved>,
+    pub verdicts_sha256: String,
 }
 
 impl Round<'_> {
@@ -195,7 +120,7 @@ impl Round<'_> {
         self.root.join("work/scratch").join(std::process::id().to_string()).join(name)
     }
 
-    fn run(&self, sets: &[Taken], after: Option<&str>) -> Result<Done> {
+    pub fn run(&self, sets: &[Taken], after: Option<&str>) -> Result<Done> {
         let committed = each(sets, ("hashing sets", self.progress), |set| self.commit(set))?;
         let program = &self.trial.program;
         let binary = fs::read(program).map_err(|e| Error::read(program, e))?;
@@ -282,7 +207,7 @@ impl Round<'_> {
     }
 
     /// What each model that was found gains on views nobody has seen.
-    fn examine_all(&self, sets: &[Taken], known: &Commitments) -> Result<Vec<Option<Gains>>> {
+    pub fn examine_all(&self, sets: &[Taken], known: &Commitments) -> Result<Vec<Option<Gains>>> {
         let pairs: Vec<(&Taken, &Committed)> = sets.iter().zip(&known.sets).collect();
         each(&pairs, ("examining", self.progress), |(set, committed)| {
             let Ok(model) = NoiseModel::read(&self.state("models", &set.name)?) else {
@@ -332,7 +257,7 @@ pub fn each<T: Sync, R: Send>(
     items.par_iter().with_max_len(1).map(one).collect()
 }
 
-fn refused(path: &Path, what: &str) -> Error {
+pub fn refused(path: &Path, what: &str) -> Error {
     Error::recording(
         path,
         what,

@@ -6,7 +6,7 @@ use kinoise::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::verdict::{CERTAIN, Finding, Verdict};
+use super::verdict::{Finding, Verdict};
 use crate::raytraced::question::{Cell, Hidden, Truth};
 
 /// What the judge says of one set.
@@ -247,39 +247,6 @@ fn parameter(effect: &str, name: &str, truth: f64, estimate: &Value) -> Option<P
     })
 }
 
-/// Whether the view that was advised did what it was advised for.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct AdviceMarks {
-    /// The two names in doubt, the better first.
-    pub doubt: Vec<String>,
-    /// What leads the finding of the same statistic with the view.
-    pub after: String,
-    /// Probability of the hidden name among the two, before and after; none where neither is hidden.
-    pub right: Option<[f64; 2]>,
-    /// Afterwards the hidden name leads with 0.9 or more.
-    pub settled: Option<bool>,
-}
-
-/// Judge one set's second verdict beside its first.
-pub fn mark_advice(truth: &Truth, first: Option<&Value>, second: Option<&Value>) -> AdviceMarks {
-    let read = |v: Option<&Value>| -> Option<Verdict> { serde_json::from_value(v?.clone()).ok() };
-    let (before, after) = (read(first), read(second));
-    let Some(asked) = before.as_ref().and_then(Verdict::in_doubt) else {
-        return AdviceMarks::default();
-    };
-    let doubt: Vec<String> = asked.alternatives.iter().take(2).map(|a| a.effect.clone()).collect();
-    let same = |f: &&Finding| f.statistic == asked.statistic && f.name().is_some();
-    let answer = after.as_ref().and_then(|v| v.claims().find(same));
-    let leads = answer.and_then(Finding::name).unwrap_or("nothing").to_string();
-    let hidden = |id: &&String| truth.hidden.iter().any(|h| h.names.contains(id));
-    let right = doubt.iter().find(hidden).map(|id| {
-        let then = after.iter().flat_map(Verdict::claims).map(|f| f.probability(id));
-        [asked.probability(id), then.fold(0.0, f64::max)]
-    });
-    let settled = right.map(|[_, p]| p >= CERTAIN && doubt.iter().any(|id| *id == leads));
-    AdviceMarks { doubt, after: leads, right, settled }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -360,19 +327,5 @@ mod tests {
                 .contains(&"false_alarm".into())
         );
         assert_eq!(mark(&truth, None).unwrap().answers["false_alarm"], true);
-    }
-
-    #[test]
-    fn an_advised_view_settles_when_the_hidden_name_leads_with_certainty() {
-        let truth = truth("single", json!([hidden(&["vignetting"], "radius")]));
-        let mut doubtful = finding("one-of", "slope-noise", 0.6);
-        doubtful["alternatives"][1] = json!({"effect": "vignetting", "probability": 0.4});
-        doubtful["next_view"] = json!({"z_m": 1.0, "theta_rad": 0.5, "azimuth_rad": 0.0});
-        let first = verdict(&[doubtful]);
-        let settled = verdict(&[finding("named", "vignetting", 0.97)]);
-        let marks = mark_advice(&truth, Some(&first), Some(&settled));
-        assert_eq!((marks.right, marks.settled), (Some([0.4, 0.97]), Some(true)));
-        assert_eq!(mark_advice(&truth, Some(&first), None).settled, Some(false));
-        assert_eq!(mark_advice(&truth, Some(&settled), Some(&settled)), AdviceMarks::default());
     }
 }

@@ -1,12 +1,14 @@
 //! What was right and what was wrong: [`mark`] judges one set, [`scores`] all of them, and the five
 //! endpoints say how far the figures that were chosen beforehand got.
 
+mod advice;
 mod endpoints;
 mod marks;
 mod scores;
 mod verdict;
 
+pub use advice::{AdviceMarks, mark_advice};
 pub use endpoints::{Endpoint, Level, endpoints_in_words};
-pub use marks::{AdviceMarks, Marks, QUESTIONS, mark, mark_advice};
+pub use marks::{Marks, QUESTIONS, mark};
 pub use scores::{Rate, Rates, Scores, level, scores, word};
 pub use verdict::advised_view;
