@@ -88,6 +88,9 @@ pub type Rows = [f32];
 
 type AtSite = Box<dyn Fn(&Site, &Facts<'_>) -> f64 + Send + Sync>;
 
+type Reshape = Box<dyn Fn(&mut [f32], &Clock) + Send + Sync>;
+type Shaker = Box<dyn Fn(&Clock, &mut Rows) + Send + Sync>;
+
 /// Where in the path a cause acts, and how.
 pub enum Act {
     /// The ray a pixel looks along instead of (x, y, 1).
@@ -103,9 +106,9 @@ pub enum Act {
     /// Standard deviation of where a pixel looks, px.
     Wander(f64),
     /// Shapes a frame's noise of unit variance.
-    Grain(Phase, Box<dyn Fn(&mut [f32], &Clock) + Send + Sync>),
+    Grain(Phase, Reshape),
     /// Adds to the error that a row's pixels share.
-    Shake(Box<dyn Fn(&Clock, &mut Rows) + Send + Sync>),
+    Shake(Shaker),
     /// Probability of no answer.
     Loss(AtSite),
     /// Disparities that occur: `step` px apart, one of them at `phase` steps.
