@@ -620,7 +620,7 @@ fn depths_beyond_the_code_stand_at_its_end() {
     files.model(&small(vec![shaped(UNEXPLAINED, vec![bias(Basis::Level, &[6.9])])]));
     let (json, said) = files.correct(&recording, &[]);
     assert!(json["clamped"].as_u64() > Some(0), "{json}");
-    assert!(said.contains("beyond the ends"), "{said}");
+    assert!(said.contains("beyond the range of the depth code"), "{said}");
 }
 
 #[test]

@@ -26,6 +26,8 @@ mod real;
 mod rounds;
 mod solver;
 mod speckle;
+#[cfg(all(test, unix))]
+mod tests;
 mod trial;
 
 use std::io::{IsTerminal, Write};
