@@ -121,13 +121,15 @@ fn summary(diagnosis: &Diagnosis) -> String {
     text.extend(shown.map(line));
     if let Some(h) = &diagnosis.heldout {
         text += &format!(
-            "on {} views kept aside: {:.1} nats a view gained [{:.1}, {:.1}], rms {:.3} -> {:.3} mm\n",
+            "on {} views kept aside: {:.1} nats a view gained [{:.1}, {:.1}], rms {:.3} -> {:.3} mm; `kinoise correct` alone: every pixel {:.3} -> {:.3} px\n",
             h.views.len(),
             h.gain,
             h.gain_interval[0],
             h.gain_interval[1],
             h.rms_mm_before,
-            h.rms_mm_after
+            h.rms_mm_after,
+            h.correction_rms_before_px,
+            h.correction_rms_after_px
         );
     }
     text

@@ -42,13 +42,16 @@ pub struct Correction {
     /// Error of the disparity of each pixel whatever it sees, px; empty where there is none.
     still: Vec<f32>,
     locking: Option<Locking>,
-    /// What depends on more than the pixel.
-    pub(super) terms: Vec<Term>,
+    /// What depends on more than the pixel, with the disparities that each was learnt at, px.
+    pub(super) terms: Vec<(Term, [f64; 2])>,
     pub(super) needs: Needs,
     pub(super) noise: Noise,
     ignored: Vec<String>,
     remarks: Vec<String>,
 }
+
+/// Of shapes that do not say where they were learnt.
+const ANYWHERE: [f64; 2] = [0.0, f64::INFINITY];
 
 /// Warm-up: depth drifts by `relative` with a time constant.
 #[derive(Debug, Clone, Copy)]
@@ -117,6 +120,14 @@ impl Correction {
         &self.ignored
     }
 
+    /// Disparities at which all that grows with the disparity was learnt, px.
+    pub(super) fn learnt_px(&self) -> Option<[f64; 2]> {
+        let grows = |(t, _): &&(Term, [f64; 2])| t.basis.still_power().is_some();
+        let ranges = self.terms.iter().filter(grows).map(|(_, learnt)| *learnt);
+        let both = ranges.reduce(|a, b| [a[0].max(b[0]), a[1].min(b[1])])?;
+        (both != ANYWHERE).then_some(both)
+    }
+
     /// What is odd about model and sensor together, in sentences.
     pub fn remarks(&self) -> &[String] {
         &self.remarks
@@ -142,7 +153,8 @@ impl Correction {
             return self.add_formula(entry);
         }
         let usable = |t: &&Term| t.is_sensor_bias() && !t.needs().light;
-        self.terms.extend(entry.shape.iter().filter(usable).cloned());
+        let learnt = entry.learnt_px.unwrap_or(ANYWHERE);
+        self.terms.extend(entry.shape.iter().filter(usable).map(|t| (t.clone(), learnt)));
         if !entry.shape.iter().all(|t| usable(&t)) {
             self.ignored.push(entry.id.clone());
         }
@@ -163,14 +175,14 @@ impl Correction {
                 self.drifts.push(Drift { relative: at(0), time_constant_s: at(1) });
             }
             "range-not-depth" => self.along_ray = self.ray_over_depth(at(0)),
-            "disparity-offset" => self.terms.push(bias(Basis::Level, vec![at(0)])),
+            "disparity-offset" => self.add_term(bias(Basis::Level, vec![at(0)])),
             "radial-disparity-bias" => {
                 let bowl = Basis::Bowl { disparity_power: 0.0, orders: 1 };
-                self.terms.push(bias(bowl, vec![at(0)]));
+                self.add_term(bias(bowl, vec![at(0)]));
             }
             "lens-distortion" => {
                 let lens = Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 1 };
-                self.terms.push(bias(lens, vec![at(0)]));
+                self.add_term(bias(lens, vec![at(0)]));
             }
             "column-banding" => {
                 let teeth = saw_tooth(camera.width, camera.cx, at(0), at(1));
@@ -181,12 +193,16 @@ impl Correction {
                     nodes: teeth.len(),
                     times: Modulation::One,
                 };
-                self.terms.push(bias(columns, teeth));
+                self.add_term(bias(columns, teeth));
             }
             "pixel-locking" => self.locking = Some(Locking::new(at(0))),
             id => self.ignored.push(id.into()),
         }
         Ok(())
+    }
+
+    fn add_term(&mut self, term: Term) {
+        self.terms.push((term, ANYWHERE));
     }
 
     /// 1 + share (ray length over depth - 1), of each pixel.
@@ -200,16 +216,16 @@ impl Correction {
 
     /// Terms that depend on the pixel alone are added up once for all images.
     fn settle(&mut self) {
-        let (still, other): (Vec<Term>, Vec<Term>) =
-            self.terms.drain(..).partition(|t| t.needs() == Needs::default());
+        let (still, other): (Vec<_>, Vec<_>) =
+            self.terms.drain(..).partition(|(t, _)| t.needs() == Needs::default());
         self.terms = other;
-        self.needs = Needs::of(&self.terms);
+        self.needs = Needs::of(self.terms.iter().map(|(t, _)| t));
         if !still.is_empty() {
             let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
             let mut scratch = Vec::new();
             let mut sum = |i: usize| {
                 let place = pixels.place(i);
-                still.iter().map(|t| t.value(&place, &mut scratch)).sum::<f64>() as f32
+                still.iter().map(|(t, _)| t.value(&place, &mut scratch)).sum::<f64>() as f32
             };
             self.still = (0..self.camera.pixels()).map(&mut sum).collect();
         }

@@ -34,7 +34,7 @@ impl Correction {
         let factor = self.factor(conditions);
         let slopes = self.needs.slope.then(|| self.slopes(depth_m, factor));
         let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
-        let terms = self.terms.iter().filter(|t| conditions.determine(t)).collect();
+        let terms = self.terms.iter().filter(|(t, _)| conditions.determine(t)).collect();
         let known =
             Known { conditions, slopes: slopes.as_ref(), pixels, terms, tilt: self.needs.tilt };
         let width = self.camera.width;
@@ -62,7 +62,7 @@ impl Correction {
         let mut d = measured;
         for _ in 0..MAX_ROUNDS {
             known.stand(&mut place, i, d);
-            let bias: f64 = known.terms.iter().map(|t| t.value(&place, scratch)).sum();
+            let bias: f64 = known.terms.iter().map(|t| held(t, &place, scratch)).sum();
             let next = measured - bias;
             if !next.is_finite() {
                 return measured;
@@ -85,13 +85,24 @@ impl Correction {
     }
 }
 
+/// A term's value; what stands still in the picture and grows with the disparity is held where its
+/// learning ended.
+fn held((term, [low, high]): &(Term, [f64; 2]), place: &PixelContext, row: &mut Vec<f64>) -> f64 {
+    let inside = (*low..=*high).contains(&place.disparity);
+    if inside || term.basis.still_power().is_none() {
+        return term.value(place, row);
+    }
+    let disparity = place.disparity.clamp(*low, *high);
+    term.value(&PixelContext { disparity, ..*place }, row)
+}
+
 /// What is known of the places of one image.
 struct Known<'a> {
     conditions: &'a Conditions,
     slopes: Option<&'a Slopes>,
     pixels: Pixels<'a>,
     /// Those that can be evaluated.
-    terms: Vec<&'a Term>,
+    terms: Vec<&'a (Term, [f64; 2])>,
     /// Does any of them ask for the tilt?
     tilt: bool,
 }

@@ -30,6 +30,8 @@ pub struct Corrected {
     pub changed: usize,
     /// Those whose corrected depth lies beyond the ends of the depth code.
     pub clamped: usize,
+    /// Pixels at disparities beyond those that the model was learnt at: held at the edge.
+    pub beyond: usize,
     /// Root mean square over all measured pixels of what was taken out, m.
     pub rms_shift_m: f64,
     /// How the corrected raw values become metres.
@@ -123,6 +125,7 @@ struct Tally {
     measured: usize,
     changed: usize,
     clamped: usize,
+    beyond: usize,
     square_m2: f64,
     unread: Option<String>,
 }
@@ -227,6 +230,10 @@ impl Rewrite<'_> {
     fn recode(&self, frame: &mut Frame, before: &[f32], after: &[f32]) -> Tally {
         let mut tally = Tally::default();
         let none = self.raw.code.raw(f64::NAN);
+        // Half a px beyond is no other distance.
+        let beyond = self.correction.learnt_px().map(|[low, high]| {
+            [self.correction.scale_px_m / (high + 0.5), self.correction.scale_px_m / (low - 0.5)]
+        });
         for (raw, (&z, &better)) in frame.raw.iter_mut().zip(before.iter().zip(after)) {
             let old = *raw;
             if z.is_nan() {
@@ -234,6 +241,8 @@ impl Rewrite<'_> {
                 continue;
             }
             tally.measured += 1;
+            let learnt = |[near, far]: [f64; 2]| far < 0.0 || (near..=far).contains(&f64::from(z));
+            tally.beyond += usize::from(beyond.is_some_and(|ends| !learnt(ends)));
             if z == better && !self.recodes() {
                 continue;
             }
@@ -264,6 +273,16 @@ impl Rewrite<'_> {
         remarks
             .extend(excluded.map(|e| format!("view {} is copied as it is: {}", e.view, e.reason)));
         remarks.extend(unread.iter().map(|why| format!("copied as it is: {why}")));
+        let beyond = total(|t| t.beyond);
+        if let (Some([low, high]), true) = (self.correction.learnt_px(), beyond * 100 > measured) {
+            let metres = |px: f64| self.correction.scale_px_m / px;
+            remarks.push(format!(
+                "{:.0} % of the depths lie outside {:.2} to {:.2} m (disparities of {high:.1} to {low:.1} px), where the correction was learnt: there it is held at the edge",
+                100.0 * beyond as f64 / measured.max(1) as f64,
+                metres(high),
+                metres(low)
+            ));
+        }
         // A folder of mere images cannot say that its raw values mean something else now.
         if let (DepthCode::Metric { units_per_metre, .. }, Layout::Images, true) =
             (self.raw.code, self.layout, self.recodes())
@@ -275,6 +294,7 @@ impl Rewrite<'_> {
             measured,
             changed: total(|t| t.changed),
             clamped: total(|t| t.clamped),
+            beyond: total(|t| t.beyond),
             rms_shift_m: (square / measured.max(1) as f64).sqrt(),
             code: self.raw.code,
             ignored: self.correction.ignored().to_vec(),

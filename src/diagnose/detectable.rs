@@ -3,8 +3,8 @@
 use serde_json::{Map, json};
 
 use super::diagnosis::Detectable;
-use super::layers::{Survey, coarser};
-use super::search::{Outcome, ViewData, evidence_of};
+use super::layers::Survey;
+use super::search::{Outcome, ViewData, coarser, evidence_of};
 use crate::camera::Camera;
 use crate::terms::{Basis, Statistic, Term};
 

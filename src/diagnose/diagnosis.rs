@@ -151,6 +151,9 @@ pub struct HeldOut {
     /// Root mean square of the residual to a plane, every pixel of every frame, px of disparity.
     pub rms_px_before: f64,
     pub rms_px_after: f64,
+    /// The same with what `correct` takes out, and no more.
+    pub correction_rms_before_px: f64,
+    pub correction_rms_after_px: f64,
 }
 
 /// Root mean square of the residual to a plane, every pixel of every frame of every view, px.

@@ -12,7 +12,7 @@ use super::findings::{self, Scene};
 use super::heldout;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
-use super::layers::{BIAS_PRIOR, Survey};
+use super::layers::Survey;
 use super::lines::line_terms;
 use super::missing::missing;
 use super::next_view;
@@ -455,7 +455,7 @@ impl<'a> Case<'a> {
         detectable.extend(more_detectable);
         drop(scenes);
         let remarks = self.remarks();
-        let extended = extend(self.model, &found, self.sensor());
+        let extended = extend(self.model, &found, self.sensor(), self.survey.reach.disparity);
         let diagnosis = Diagnosis {
             format: DIAGNOSIS_FORMAT,
             recording: self.recording.root.display().to_string(),
@@ -465,7 +465,7 @@ impl<'a> Case<'a> {
                 Reference::Model
             },
             verdict: if mismatch { Verdict::Mismatch } else { Verdict::Match },
-            left_out: heldout::left_out(&self.survey, &mean.terms, BIAS_PRIOR),
+            left_out: heldout::left_out(&self.survey, &mean.outcome, &mean.terms),
             after: after(&mean.outcome, &scatter.outcome),
             views: view_lines(&self.fields, &self.survey, &mean.terms, heldout.as_ref()),
             findings: found,

@@ -205,20 +205,6 @@ pub fn score(view: &Evidence, beta: &DVector<f64>) -> f64 {
     beta.dot(&view.b) - 0.5 * beta.dot(&(&view.a * beta))
 }
 
-/// Fit to all views but one.
-pub fn fit_without(views: &[Evidence], left_out: usize, prior: f64) -> Option<DVector<f64>> {
-    let k = views.first()?.b.len();
-    let mut a = DMatrix::identity(k, k) * prior;
-    let mut b = DVector::zeros(k);
-    for (i, v) in views.iter().enumerate() {
-        if i != left_out {
-            a += &v.a;
-            b += &v.b;
-        }
-    }
-    Some(a.cholesky()?.solve(&b))
-}
-
 /// What noise alone may bring for a candidate: b ~ N(0, A) in every view.
 ///
 /// Worked in the eigenvectors of the summed A, in which the views' own A are taken as diagonal:

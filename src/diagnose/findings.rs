@@ -4,11 +4,11 @@ use serde_json::Map;
 
 use super::candidate::RECALIBRATE;
 use super::diagnosis::{Alternative, Curve, Finding, MapRow, Size, Status};
-use super::layers::{Survey, coarser};
+use super::layers::Survey;
 use super::missing::DropoutFinding;
 use super::noise::Hanging;
 use super::parameters::{of_any_formula, parameters};
-use super::search::{Chosen, Outcome, ViewData};
+use super::search::{Chosen, Outcome, ViewData, coarser};
 use super::shape;
 use crate::effects;
 use crate::stats::range;
@@ -98,9 +98,21 @@ pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (k, c) in outcome.chosen.iter().enumerate() {
         let axis = c.candidate.basis.axis();
+        // What planes absorb of a term goes with it.
+        if let (Basis::Affine { .. }, Some(home)) =
+            (&c.candidate.basis, groups.iter_mut().find(|g| g.contains(&k.wrapping_sub(1))))
+        {
+            home.push(k);
+            continue;
+        }
+        let is_map = matches!(c.candidate.basis, Basis::Spline { .. });
         let home = groups.iter().position(|g| {
             let first = &outcome.chosen[g[0]];
             match c.candidate.family {
+                // The smooth rest of a radial cause.
+                None if is_map && first.candidate.family.is_some() => {
+                    first.candidate.basis.axis() == Axis::Radius
+                }
                 Some(family) => {
                     // A curve came first, but this name had explained half of it.
                     let nearly = first.candidate.family.is_none()

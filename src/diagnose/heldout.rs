@@ -5,10 +5,10 @@ use rand::seq::SliceRandom;
 
 use super::diagnosis::{HeldOut, LeftOut};
 use super::engine::DiagnoseOptions;
-use super::evidence::{Rows, gain};
-use super::layers::{Survey, SurveyedView, coarser};
+use super::evidence::Rows;
+use super::layers::{Survey, SurveyedView};
 use super::pixels::terms_of;
-use super::search::ViewData;
+use super::search::{Outcome, ViewData, coarser};
 use crate::camera::Camera;
 use crate::model::NoiseModel;
 use crate::terms::{Statistic, Term};
@@ -57,6 +57,8 @@ pub fn score(
     let gain = gains.iter().sum::<f64>() / views;
     let rms = |terms: &[Term]| rms(&judged_on.views, terms, scale_px_m);
     let (old, new) = (rms(&[]), rms(&bias_terms));
+    let of_sensor: Vec<Term> = bias_terms.iter().filter(|t| t.is_sensor_bias()).cloned().collect();
+    let corrected = rms(&of_sensor);
     Some(HeldOut {
         views: aside.iter().map(|&v| survey.views[v].name.clone()).collect(),
         log_score_before: mean_before,
@@ -67,6 +69,8 @@ pub fn score(
         rms_mm_after: new.mm,
         rms_px_before: old.px,
         rms_px_after: new.px,
+        correction_rms_before_px: old.px,
+        correction_rms_after_px: corrected.px,
     })
 }
 
@@ -176,17 +180,17 @@ pub fn rms_by_view(survey: &Survey, terms: &[Term]) -> Vec<f64> {
         .collect()
 }
 
-/// Every view with coefficients fitted to the others, the shapes as chosen on all: root mean
-/// square of every pixel of every frame to a plane, px, before and after.
-pub fn left_out(survey: &Survey, terms: &[Term], prior: f64) -> Option<LeftOut> {
-    let data: Vec<ViewData> = survey.mean_data().iter().map(coarser).collect();
-    let evidence = super::search::evidence_of(&data, terms);
-    gain(&evidence, prior)?;
+/// Every view with coefficients fitted without it, the shapes as chosen on all: root mean square of
+/// every pixel of every frame to a plane, px, before and after.
+pub fn left_out(survey: &Survey, outcome: &Outcome, terms: &[Term]) -> Option<LeftOut> {
     let (mut sums, mut n) = ([0.0; 2], 0.0);
     let mut by_view = [0.0; 2];
     for (v, view) in survey.views.iter().enumerate() {
-        let beta = super::evidence::fit_without(&evidence, v, prior)?;
-        let mut rest = beta.as_slice();
+        let mut rest: &[f64] = match outcome.left_out.iter().find(|(views, _)| views.contains(&v)) {
+            Some((_, beta)) => beta,
+            None if terms.is_empty() => &[],
+            None => return None,
+        };
         let refitted: Vec<Term> = terms
             .iter()
             .map(|t| {

@@ -6,9 +6,10 @@ use rayon::prelude::*;
 use super::ablation::Ablation;
 use super::bias;
 use super::field::Field;
+use super::joint::refit;
 use super::reach::Extent;
 use super::scatter::{Left, left_by_fit};
-use super::search::{Outcome, Rules, ViewData, search};
+use super::search::{Outcome, Rules, ViewData, coarser, search};
 use super::smooth::{SMOOTH_PX, high_pass};
 use super::tiles::{SIDE, Tile, tiles};
 use super::variance;
@@ -70,7 +71,7 @@ const LEAST_SIGMAS: f64 = 0.007;
 /// A name that explains less than this share of what a nameless curve explains is not the cause.
 const ADEQUATE: f64 = 0.6;
 /// Precision of a coefficient of the bias: a few px at most.
-pub const BIAS_PRIOR: f64 = 0.1;
+const BIAS_PRIOR: f64 = 0.1;
 /// Of one of log variance: a factor of e is already much.
 pub const VARIANCE_PRIOR: f64 = 1.0;
 
@@ -139,7 +140,9 @@ impl Survey {
         let fine = self.mean_data();
         let coarse: Vec<ViewData> = fine.par_iter().map(coarser).collect();
         let candidates = self.ablation.candidates(candidates);
-        search(&fine, &coarse, &candidates, &self.ablation.rules(rules), seed)
+        let found = search(&fine, &coarse, &candidates, &self.ablation.rules(rules), seed);
+        let inflation: Vec<f64> = self.views.iter().map(|v| v.inflation).collect();
+        refit(&fine, &inflation, camera, found)
     }
 
     /// The views at these places.
@@ -321,44 +324,6 @@ fn mean_data(view: &SurveyedView) -> ViewData {
         precision: vec![0.0; 3],
         gathered: Vec::new(),
     }
-}
-
-/// Two tiles by two made one.
-pub fn coarser(fine: &ViewData) -> ViewData {
-    let side = (2 * SIDE) as f64;
-    let p = fine.precision.len();
-    let mut groups: std::collections::BTreeMap<(u32, u32), Vec<usize>> = Default::default();
-    for (i, place) in fine.places.iter().enumerate() {
-        let key = ((place.v / side) as u32, (place.u / side) as u32);
-        groups.entry(key).or_default().push(i);
-    }
-    let mut coarse = ViewData {
-        places: Vec::with_capacity(groups.len()),
-        response: Vec::with_capacity(groups.len()),
-        weight: Vec::with_capacity(groups.len()),
-        nuisance: Vec::with_capacity(groups.len() * p),
-        precision: fine.precision.clone(),
-        gathered: vec![0; fine.places.len()],
-    };
-    for (k, members) in groups.values().enumerate() {
-        members.iter().for_each(|&i| coarse.gathered[i] = k as u32);
-        let weight: f64 = members.iter().map(|&i| fine.weight[i]).sum();
-        let mean = |of: &dyn Fn(usize) -> f64| {
-            if weight > 0.0 {
-                members.iter().map(|&i| fine.weight[i] * of(i)).sum::<f64>() / weight
-            } else {
-                of(members[0])
-            }
-        };
-        let mut place = fine.places[members[0]];
-        place.average(&fine.places, &mean);
-        place.side = side;
-        coarse.places.push(place);
-        coarse.response.push(mean(&|i| fine.response[i]));
-        coarse.weight.push(weight);
-        coarse.nuisance.extend((0..p).map(|q| mean(&|i| fine.nuisance[i * p + q])));
-    }
-    coarse
 }
 
 fn finite(v: f64) -> f64 {

@@ -12,6 +12,7 @@ mod field;
 mod findings;
 mod frames;
 mod heldout;
+mod joint;
 mod known;
 mod lattice;
 mod layers;

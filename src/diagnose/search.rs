@@ -10,6 +10,7 @@ use crate::rng::Seed;
 use crate::terms::{Basis, Coordinate, PixelContext, Term};
 
 /// One view's samples.
+#[derive(Clone)]
 pub struct ViewData {
     pub places: Vec<PixelContext>,
     pub response: Vec<f64>,
@@ -20,6 +21,44 @@ pub struct ViewData {
     pub precision: Vec<f64>,
     /// For larger patches: which of them each sample of the finer data went to.
     pub gathered: Vec<u32>,
+}
+
+/// Two tiles by two made one.
+pub fn coarser(fine: &ViewData) -> ViewData {
+    let side = (2 * SIDE) as f64;
+    let p = fine.precision.len();
+    let mut groups: std::collections::BTreeMap<(u32, u32), Vec<usize>> = Default::default();
+    for (i, place) in fine.places.iter().enumerate() {
+        let key = ((place.v / side) as u32, (place.u / side) as u32);
+        groups.entry(key).or_default().push(i);
+    }
+    let mut coarse = ViewData {
+        places: Vec::with_capacity(groups.len()),
+        response: Vec::with_capacity(groups.len()),
+        weight: Vec::with_capacity(groups.len()),
+        nuisance: Vec::with_capacity(groups.len() * p),
+        precision: fine.precision.clone(),
+        gathered: vec![0; fine.places.len()],
+    };
+    for (k, members) in groups.values().enumerate() {
+        members.iter().for_each(|&i| coarse.gathered[i] = k as u32);
+        let weight: f64 = members.iter().map(|&i| fine.weight[i]).sum();
+        let mean = |of: &dyn Fn(usize) -> f64| {
+            if weight > 0.0 {
+                members.iter().map(|&i| fine.weight[i] * of(i)).sum::<f64>() / weight
+            } else {
+                of(members[0])
+            }
+        };
+        let mut place = fine.places[members[0]];
+        place.average(&fine.places, &mean);
+        place.side = side;
+        coarse.places.push(place);
+        coarse.response.push(mean(&|i| fine.response[i]));
+        coarse.weight.push(weight);
+        coarse.nuisance.extend((0..p).map(|q| mean(&|i| fine.nuisance[i * p + q])));
+    }
+    coarse
 }
 
 /// How a search decides.
@@ -92,6 +131,8 @@ pub struct Outcome {
     pub noise: NoiseGains,
     /// What still stood out when the search ended.
     pub remaining: Option<Chosen>,
+    /// Coefficients as fitted without some views, for these views.
+    pub left_out: Vec<(Vec<usize>, Vec<f64>)>,
 }
 
 impl Outcome {
@@ -156,7 +197,8 @@ pub fn search(
     let evidence = layer.evidence_of(&bases(&chosen));
     let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
     let noise = layer.noise.unwrap_or_default();
-    Outcome { chosen, looks: layer.looks, fit, evidence, noise, remaining }
+    let looks = layer.looks;
+    Outcome { chosen, looks, fit, evidence, noise, remaining, left_out: Vec::new() }
 }
 
 /// Evidence of views on given terms together.

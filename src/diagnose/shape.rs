@@ -13,7 +13,9 @@ pub fn words(basis: &Basis, beta: &[f64]) -> String {
                 format!("periodic in {unit}, period {period:.3}")
             }
         }
-        Basis::Map { .. } => "a smooth pattern that stands still in the picture".into(),
+        Basis::Map { .. } | Basis::Spline { .. } => {
+            "a smooth pattern that stands still in the picture".into()
+        }
         Basis::Pair { over, .. } => {
             format!("depends on {} and {} together", over[0].axis(), over[1].axis())
         }

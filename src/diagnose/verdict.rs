@@ -115,7 +115,12 @@ pub(super) fn after(bias: &Outcome, variance: &Outcome) -> After {
 }
 
 /// The model with what was found.
-pub(super) fn extend(model: &NoiseModel, found: &[Finding], sensor: &Sensor) -> NoiseModel {
+pub(super) fn extend(
+    model: &NoiseModel,
+    found: &[Finding],
+    sensor: &Sensor,
+    learnt_px: [f64; 2],
+) -> NoiseModel {
     let mut extended = model.clone();
     if extended.sensor.is_none() {
         extended.sensor = Some(RecordingFile::of(sensor));
@@ -134,7 +139,10 @@ pub(super) fn extend(model: &NoiseModel, found: &[Finding], sensor: &Sensor) -> 
             // The simulator takes the catalogue's parameters alone.
             parameters.retain(|name, _| card.parameters.iter().any(|p| p.name == name));
         }
-        extended.effects.push(Effect { id: id.into(), parameters, shape: f.terms.clone() });
+        let shape = f.terms.clone();
+        let bias = shape.iter().any(|t| t.statistic == Statistic::Bias);
+        let learnt_px = bias.then_some(learnt_px);
+        extended.effects.push(Effect { id: id.into(), parameters, shape, learnt_px });
     }
     extended
 }

@@ -16,6 +16,9 @@ pub struct Effect {
     /// catalogue with these parameters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shape: Vec<Term>,
+    /// Disparities at which the shape was learnt, px: beyond them it is held at the edge.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub learnt_px: Option<[f64; 2]>,
 }
 
 /// The id of what has no name: its shape is all that is known.
@@ -26,6 +29,10 @@ impl Effect {
     pub fn fault(&self) -> Option<String> {
         if self.id == UNEXPLAINED && self.shape.is_empty() {
             return Some(format!("an {UNEXPLAINED} effect has no shape"));
+        }
+        if self.learnt_px.is_some_and(|[low, high]| !(0.0 < low && low <= high && high.is_finite()))
+        {
+            return Some(format!("effect {}: learnt_px is no range of disparities", self.id));
         }
         let mut terms = self.shape.iter().enumerate();
         terms.find_map(|(k, term)| {
@@ -67,6 +74,8 @@ mod tests {
             Basis::Curve { over, low, high, nodes: 9, times },
             Basis::Ring { over: Coordinate::Azimuth, period: 6.3, nodes: 4, times },
             Basis::Map { width: 640.0, height: 480.0, across: 3, down: 2, times },
+            Basis::Spline { width: 640.0, height: 480.0, across: 4, down: 5, times },
+            Basis::Affine { disparity_power: 2.0 },
             Basis::Pair { over: [over; 2], low: [low; 2], high: [high; 2], nodes: [2, 3] },
         ]
     }

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 
 use super::place::{Axis, PixelContext};
+use super::spline::{cubic, scale};
 
 /// Disparity at which a term that grows with a power of it is in px: a Kinect at 1.1 m.
 pub const DISPARITY_UNIT_PX: f64 = 40.0;
@@ -51,6 +52,10 @@ pub enum Basis {
     Ring { over: Coordinate, period: f64, nodes: usize, times: Modulation },
     /// A bilinear map over the picture.
     Map { width: f64, height: f64, across: usize, down: usize, times: Modulation },
+    /// A smooth map over the picture: products of cubic B-splines.
+    Spline { width: f64, height: f64, across: usize, down: usize, times: Modulation },
+    /// 1, x and y of the ray, times a power of the disparity: what planes absorb of a shape.
+    Affine { disparity_power: f64 },
     /// Two curves at once: a bilinear map over two axes.
     Pair { over: [Coordinate; 2], low: [f64; 2], high: [f64; 2], nodes: [usize; 2] },
 }
@@ -157,7 +162,8 @@ impl Basis {
             Basis::Locking { harmonics, .. } | Basis::Banding { harmonics, .. } => 2 * harmonics,
             Basis::Recalibrate { columns, .. } => columns.len(),
             Basis::Curve { nodes, .. } | Basis::Ring { nodes, .. } => *nodes,
-            Basis::Map { across, down, .. } => across * down,
+            Basis::Map { across, down, .. } | Basis::Spline { across, down, .. } => across * down,
+            Basis::Affine { .. } => 3,
             Basis::Pair { nodes, .. } => nodes[0] * nodes[1],
             Basis::RangeNotDepth
             | Basis::EdgeMixing { .. }
@@ -253,6 +259,22 @@ impl Basis {
                 let (j, t) = node(p.v, 0.0, height - 1.0, down);
                 bilinear((i, s), (j, t), across, times.value(p), out);
             }
+            Basis::Spline { width, height, across, down, times } => {
+                out.fill(0.0);
+                let scale = times.value(p);
+                let (i, of_columns) = cubic(p.u, width - 1.0, across);
+                let (j, of_rows) = cubic(p.v, height - 1.0, down);
+                for (row, b) in of_rows.iter().enumerate() {
+                    let first = (j + row) * across + i;
+                    for (g, a) in out[first..first + 4].iter_mut().zip(of_columns) {
+                        *g = scale * a * b;
+                    }
+                }
+            }
+            Basis::Affine { disparity_power } => {
+                let far = scale(disparity_power, p);
+                out.copy_from_slice(&[far, far * p.x, far * p.y]);
+            }
             Basis::Pair { over, low, high, nodes } => {
                 let (i, s) = node(over[0].value(p), low[0], high[0], nodes[0]);
                 let (j, t) = node(over[1].value(p), low[1], high[1], nodes[1]);
@@ -296,7 +318,8 @@ impl Basis {
     pub fn is_of_picture(&self) -> bool {
         match self {
             Basis::Banding { .. } => true,
-            Basis::Bowl { .. } | Basis::Map { .. } => true,
+            Basis::Bowl { .. } | Basis::Map { .. } | Basis::Spline { .. } => true,
+            Basis::Affine { .. } => true,
             Basis::Curve { over, .. } => {
                 matches!(over, Coordinate::Column | Coordinate::Row | Coordinate::Radius)
             }
@@ -335,7 +358,7 @@ impl Basis {
             Basis::Curve { over, .. } => over.axis(),
             Basis::Ring { over: Coordinate::Disparity, .. } => Axis::DisparityPhase,
             Basis::Ring { over, .. } => over.axis(),
-            Basis::Map { .. } => Axis::Pixel,
+            Basis::Map { .. } | Basis::Spline { .. } | Basis::Affine { .. } => Axis::Pixel,
             Basis::Pair { over, .. } => over[0].axis(),
         }
     }

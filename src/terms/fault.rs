@@ -65,6 +65,15 @@ impl Basis {
                 .any(|side| !(side.is_finite() && **side >= 2.0))
                 .then(|| "width and height must be 2 px or more".to_string())
                 .or_else(|| some_nodes(&[*across, *down])),
+            Basis::Spline { width, height, across, down, .. } => [width, height]
+                .iter()
+                .any(|side| !(side.is_finite() && **side >= 2.0))
+                .then(|| "width and height must be 2 px or more".to_string())
+                .or_else(|| some_nodes(&[*across, *down]))
+                .or_else(|| {
+                    (*across < 4 || *down < 4).then(|| "a cubic spline has 4 nodes or more".into())
+                }),
+            Basis::Affine { disparity_power } => finite("disparity_power", &[*disparity_power]),
             Basis::Pair { low, high, nodes, .. } => rising(low[0], high[0])
                 .or_else(|| rising(low[1], high[1]))
                 .or_else(|| some_nodes(nodes)),

@@ -7,6 +7,7 @@ mod fault;
 mod needs;
 mod pixels;
 mod place;
+mod spline;
 mod value;
 
 pub use basis::{Basis, Coordinate, DISPARITY_UNIT_PX, Modulation, TABLE};
@@ -14,6 +15,7 @@ pub use edges::edge_distances;
 pub use needs::Needs;
 pub use pixels::Pixels;
 pub use place::{Axis, PixelContext, corner_radius};
+pub use spline::Gauge;
 
 use serde::{Deserialize, Serialize};
 

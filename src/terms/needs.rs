@@ -47,8 +47,8 @@ impl Needs {
     }
 
     /// Of all terms together.
-    pub fn of(terms: &[Term]) -> Needs {
-        terms.iter().fold(Needs::PIXEL, |needs, term| needs.and(term.needs()))
+    pub fn of<'a>(terms: impl IntoIterator<Item = &'a Term>) -> Needs {
+        terms.into_iter().fold(Needs::PIXEL, |needs, term| needs.and(term.needs()))
     }
 
     fn over(over: Coordinate) -> Needs {
@@ -75,8 +75,12 @@ impl Needs {
 impl Term {
     pub fn needs(&self) -> Needs {
         match &self.basis {
-            Basis::Bowl { disparity_power, .. } if *disparity_power == 0.0 => Needs::PIXEL,
-            Basis::Bowl { .. } | Basis::RangeNotDepth => Needs::DEPTH,
+            Basis::Bowl { disparity_power, .. } | Basis::Affine { disparity_power }
+                if *disparity_power == 0.0 =>
+            {
+                Needs::PIXEL
+            }
+            Basis::Bowl { .. } | Basis::Affine { .. } | Basis::RangeNotDepth => Needs::DEPTH,
             Basis::Locking { .. } | Basis::RangeExponent { .. } => Needs::DEPTH,
             Basis::Lens { .. } => Needs { slope: true, ..Needs::PIXEL },
             Basis::SlopeNoise { .. } | Basis::TiltAxis { .. } => Needs::SURFACE,
@@ -87,7 +91,7 @@ impl Term {
             Basis::Curve { over, times, .. } | Basis::Ring { over, times, .. } => {
                 Needs::over(*over).and(Needs::times(*times))
             }
-            Basis::Map { times, .. } => Needs::times(*times),
+            Basis::Map { times, .. } | Basis::Spline { times, .. } => Needs::times(*times),
             Basis::Pair { over, .. } => Needs::over(over[0]).and(Needs::over(over[1])),
         }
     }

@@ -3,6 +3,7 @@
 use super::Term;
 use super::basis::{Basis, node};
 use super::place::PixelContext;
+use super::spline::cubic;
 
 impl Term {
     /// At a place, px or nepers of variance. `row` is scratch.
@@ -23,6 +24,15 @@ impl Term {
                 let column = node(p.u, 0.0, width - 1.0, across);
                 let row = node(p.v, 0.0, height - 1.0, down);
                 times.value(p) * bilinear(b, across, column, row)
+            }
+            Basis::Spline { width, height, across, down, times } => {
+                let (i, of_columns) = cubic(p.u, width - 1.0, across);
+                let (j, of_rows) = cubic(p.v, height - 1.0, down);
+                let along = |j: usize| -> f64 {
+                    b[j * across + i..].iter().zip(of_columns).map(|(b, w)| b * w).sum()
+                };
+                let over = of_rows.iter().enumerate().map(|(row, w)| w * along(j + row));
+                times.value(p) * over.sum::<f64>()
             }
             Basis::Pair { over, low, high, nodes } => {
                 let first = node(over[0].value(p), low[0], high[0], nodes[0]);
@@ -60,6 +70,7 @@ mod tests {
             Basis::Curve { over, low: 5.0, high: 60.0, nodes: 7, times: Modulation::Lift },
             Basis::Ring { over, period: 3.0, nodes: 5, times: Modulation::Lift },
             Basis::Map { width: 640.0, height: 480.0, across: 5, down: 4, times: Modulation::Tilt },
+            Basis::Spline { width: 640.0, height: 480.0, across: 5, down: 4, times },
             Basis::Pair {
                 over: [over, Coordinate::Row],
                 low: [5.0, 0.0],

@@ -38,7 +38,7 @@ fn model(sensor: &Sensor, effects: Vec<Effect>) -> NoiseModel {
 
 fn named(id: &str, parameters: Value) -> Effect {
     let parameters = parameters.as_object().expect("an object").clone();
-    Effect { id: id.into(), parameters, shape: Vec::new() }
+    Effect { id: id.into(), parameters, ..Effect::default() }
 }
 
 fn shaped(id: &str, shape: Vec<Term>) -> Effect {

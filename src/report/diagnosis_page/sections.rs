@@ -77,6 +77,11 @@ pub(super) fn held_out(held: Option<&HeldOut>) -> Markup {
             px(held.rms_px_after)
         ],
         row![
+            "the same after kinoise correct alone",
+            px(held.correction_rms_before_px),
+            px(held.correction_rms_after_px)
+        ],
+        row![
             "log score, nats a view",
             fixed(held.log_score_before, 1),
             fixed(held.log_score_after, 1)

@@ -122,6 +122,8 @@ pub(super) fn diagnosis(verdict: Verdict, findings: Vec<Finding>) -> Diagnosis {
             rms_mm_after: 1.17,
             rms_px_before: 0.214,
             rms_px_after: 0.181,
+            correction_rms_before_px: 0.214,
+            correction_rms_after_px: 0.190,
         })
         .filter(|_| !nothing),
         after: After { verdict: Verdict::Match, remaining: Vec::new() },

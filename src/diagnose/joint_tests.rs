@@ -1,0 +1,183 @@
+//! Simulated views of planes: what goes in comes out, and nothing else.
+
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+use crate::rng::{Seed, Stream};
+use crate::simulate::kinect_v1;
+use crate::terms::{PixelContext, corner_radius};
+
+const SCALE_PX_M: f64 = 43.5;
+const NOISE_PX: f64 = 0.05;
+
+/// Views of planes at these distances, m, with a bias, px.
+fn session(z_m: [f64; 2], rng: &mut Stream, bias: impl Fn(&PixelContext) -> f64) -> Vec<ViewData> {
+    let camera = kinect_v1(4).camera;
+    let corner = corner_radius(&camera);
+    (0..12)
+        .map(|_| {
+            let d = SCALE_PX_M / rng.random_range(z_m[0]..z_m[1]);
+            let slope = [rng.random_range(-0.5..0.5) * d, rng.random_range(-0.5..0.5) * d];
+            let mut view = ViewData {
+                places: Vec::new(),
+                response: Vec::new(),
+                weight: Vec::new(),
+                nuisance: Vec::new(),
+                precision: vec![0.0; 3],
+                gathered: Vec::new(),
+            };
+            for v in (2..camera.height).step_by(4) {
+                for u in (2..camera.width).step_by(4) {
+                    let (u, v) = (u as f64, v as f64);
+                    let (x, y) = camera.ray(u, v);
+                    let disparity = d + slope[0] * x + slope[1] * y;
+                    let radius = f64::hypot(u - camera.cx, v - camera.cy) / corner;
+                    let z = SCALE_PX_M / disparity;
+                    let place = PixelContext {
+                        u,
+                        v,
+                        x,
+                        y,
+                        disparity,
+                        z,
+                        radius,
+                        rho: z,
+                        ..Default::default()
+                    };
+                    let noise: f64 = StandardNormal.sample(rng);
+                    view.response.push(bias(&place) + NOISE_PX * noise);
+                    view.weight.push(NOISE_PX.powi(-2));
+                    view.nuisance.extend([1.0, x, y]);
+                    view.places.push(place);
+                }
+            }
+            view
+        })
+        .collect()
+}
+
+fn term(family: Option<&'static str>, basis: Basis) -> Chosen {
+    Chosen {
+        candidate: Candidate { family, basis },
+        rms: 0.1,
+        adequacy: 0.6,
+        gain: 1.0,
+        best_curve: 1.0,
+        rivals: Vec::new(),
+        p: 0.0,
+    }
+}
+
+fn fitted(data: &[ViewData], chosen: Vec<Chosen>) -> Outcome {
+    let found = Outcome {
+        chosen,
+        looks: Vec::new(),
+        fit: None,
+        evidence: Vec::new(),
+        noise: Default::default(),
+        remaining: None,
+        left_out: Vec::new(),
+    };
+    refit(data, &vec![1.0; data.len()], &kinect_v1(4).camera, found)
+}
+
+/// Root mean square of the bias around each view's plane, before and after what the sensor's terms
+/// say, px.
+fn left(data: &[ViewData], outcome: &Outcome) -> [f64; 2] {
+    let (mut squares, mut n) = ([0.0; 2], 0.0);
+    let mut row = Vec::new();
+    for view in data {
+        let x = DMatrix::from_row_slice(view.places.len(), 3, &view.nuisance);
+        let solver = x.clone().svd(true, true);
+        let mut y = DVector::from_vec(view.response.clone());
+        for square in &mut squares {
+            *square += (&y - &x * solver.solve(&y, 1e-12).unwrap()).norm_squared();
+            for (k, c) in outcome.chosen.iter().enumerate() {
+                let basis = c.candidate.basis.clone();
+                let term = Term {
+                    statistic: Statistic::Bias,
+                    basis,
+                    coefficients: outcome.coefficients(k),
+                };
+                if term.is_sensor_bias() {
+                    let values = view.places.iter().map(|p| term.value(p, &mut row));
+                    y -= DVector::from_iterator(view.places.len(), values);
+                }
+            }
+        }
+        n += view.places.len() as f64;
+    }
+    squares.map(|s| (s / n).sqrt())
+}
+
+fn bowl() -> Chosen {
+    let basis = Basis::Bowl { disparity_power: 0.0, orders: 1 };
+    term(Some("radial-disparity-bias"), basis)
+}
+
+fn map() -> Chosen {
+    let (width, height) = (160.0, 120.0);
+    let basis = Basis::Map { width, height, across: 4, down: 3, times: Modulation::One };
+    term(None, basis)
+}
+
+fn smooth(p: &PixelContext) -> f64 {
+    0.15 * (p.u / 25.0).sin() * (p.v / 20.0).cos()
+}
+
+#[test]
+fn a_bowl_and_its_smooth_rest_are_recovered() {
+    let rng = &mut Seed(3).stream("joint/rest");
+    let data = session([0.8, 3.0], rng, |p| 0.3 * p.radius.powi(2) + smooth(p));
+    let outcome = fitted(&data, vec![bowl(), map()]);
+    let maps = |c: &&Chosen| matches!(c.candidate.basis, Basis::Spline { .. });
+    assert_eq!(outcome.chosen.iter().filter(maps).count(), 2);
+    let others = session([0.8, 3.0], rng, |p| 0.3 * p.radius.powi(2) + smooth(p));
+    let [before, after] = left(&others, &outcome);
+    assert!(before > 2.0 * NOISE_PX && after < 1.1 * NOISE_PX, "{before} {after}");
+}
+
+#[test]
+fn a_bowl_alone_needs_no_maps_and_keeps_its_size() {
+    let rng = &mut Seed(4).stream("joint/bowl");
+    let data = session([0.8, 3.0], rng, |p| 0.3 * p.radius.powi(2));
+    let outcome = fitted(&data, vec![bowl()]);
+    assert_eq!(outcome.chosen.len(), 2, "the bowl, and what planes absorb of it");
+    let k = outcome.coefficients(0)[0];
+    assert!((k - 0.3).abs() < 0.01, "{k}");
+}
+
+/// No fit to planes tells it, so it is nothing.
+#[test]
+fn what_planes_absorb_comes_out_as_nothing() {
+    let rng = &mut Seed(5).stream("joint/affine");
+    let data = session([0.8, 3.0], rng, |p| 0.7 - 0.4 * p.x + 0.3 * p.y);
+    let outcome = fitted(&data, vec![bowl(), map()]);
+    let mut row = Vec::new();
+    let mut most = 0.0f64;
+    for p in data.iter().flat_map(|v| &v.places) {
+        let of = |k: usize| (outcome.chosen[k].candidate.basis.clone(), outcome.coefficients(k));
+        let value: f64 = (0..outcome.chosen.len())
+            .map(of)
+            .map(|(basis, beta)| basis.value(&beta, p, &mut row))
+            .sum();
+        most = most.max(value.abs());
+    }
+    assert!(most < 0.05, "{most}");
+}
+
+/// Near views teach nothing of what grows far away; what they teach must not do harm there.
+#[test]
+fn a_correction_from_one_distance_does_no_harm_at_another() {
+    for seed in 0..3 {
+        let rng = &mut Seed(seed).stream("joint/distance");
+        let bias = |p: &PixelContext| 0.2 * p.radius.powi(2) * (p.disparity / 40.0) + smooth(p);
+        let near = session([0.7, 0.9], rng, bias);
+        let far = session([2.0, 3.5], rng, bias);
+        for (taught, judged) in [(&near, &far), (&far, &near)] {
+            let [before, after] = left(judged, &fitted(taught, vec![bowl(), map()]));
+            assert!(after < before, "seed {seed}: {before} {after}");
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! Smooth maps over the picture, and what planes absorb of a shape that stands still in it.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::basis::{Basis, Coordinate, DISPARITY_UNIT_PX, Modulation};
+use super::pixels::Pixels;
+use super::place::PixelContext;
+
+/// Cubic B-splines on `nodes` even places from 0 to `last`: the number of the first of the four that
+/// are not zero at `at`, and their values, which sum to one (de Boor 1978).
+pub(super) fn cubic(at: f64, last: f64, nodes: usize) -> (usize, [f64; 4]) {
+    let spans = nodes - 3;
+    let place = (at / last.max(1e-12) * spans as f64).clamp(0.0, spans as f64);
+    let k = (place as usize).min(spans - 1);
+    let t = place - k as f64;
+    let s = 1.0 - t;
+    let inner = |a: f64| (3.0 * a * a * a - 6.0 * a * a + 4.0) / 6.0;
+    (k, [s * s * s / 6.0, inner(t), inner(s), t * t * t / 6.0])
+}
+
+/// A shape's affine part over the whole picture, which every plane takes up: no fit to planes tells
+/// how large it is.
+#[derive(Debug, Clone)]
+pub struct Gauge {
+    /// Of the disparity, with which the shape grows.
+    pub disparity_power: f64,
+    /// Of 1, x and y of the ray, a column of the shape each.
+    pub affine: Vec<[f64; 3]>,
+}
+
+/// The picture is looked at in pixels so far apart.
+const STRIDE: usize = 4;
+
+impl Gauge {
+    /// `None` for shapes that do not stand still in the picture, and for those that are nothing on
+    /// the optical axis by their physics.
+    pub fn of(basis: &Basis, pixels: &Pixels<'_>) -> Option<Self> {
+        let disparity_power = basis.still_power()?;
+        let count = basis.count();
+        let mut square = Matrix3::zeros();
+        let mut cross = vec![Vector3::zeros(); count];
+        let mut row = vec![0.0; count];
+        let (width, height) = (pixels.camera.width, pixels.camera.height);
+        for v in (STRIDE / 2..height).step_by(STRIDE) {
+            for u in (STRIDE / 2..width).step_by(STRIDE) {
+                let mut place = pixels.place(v * width + u);
+                // There the shape is in px.
+                place.disparity = DISPARITY_UNIT_PX;
+                let ray = Vector3::new(1.0, place.x, place.y);
+                square += ray * ray.transpose();
+                basis.fill(&place, &mut row);
+                cross.iter_mut().zip(&row).for_each(|(c, g)| *c += ray * *g);
+            }
+        }
+        let solver = square.lu();
+        let affine = cross.iter().map(|c| Some(solver.solve(c)?.into())).collect::<Option<_>>()?;
+        Some(Gauge { disparity_power, affine })
+    }
+
+    /// Take the affine part out of the shape's columns.
+    pub fn take_out(&self, p: &PixelContext, columns: &mut [f64]) {
+        let far = scale(self.disparity_power, p);
+        for (g, [a, b, c]) in columns.iter_mut().zip(&self.affine) {
+            *g -= far * (a + b * p.x + c * p.y);
+        }
+    }
+
+    /// The same as a term beside the shape's own.
+    pub fn term(&self, coefficients: &[f64]) -> (Basis, [f64; 3]) {
+        let mut sum = [0.0; 3];
+        for (beta, affine) in coefficients.iter().zip(&self.affine) {
+            sum.iter_mut().zip(affine).for_each(|(s, a)| *s -= beta * a);
+        }
+        (Basis::Affine { disparity_power: self.disparity_power }, sum)
+    }
+}
+
+/// A power of the disparity in units of 40 px.
+pub(super) fn scale(disparity_power: f64, p: &PixelContext) -> f64 {
+    match disparity_power {
+        0.0 => 1.0,
+        2.0 => (p.disparity / DISPARITY_UNIT_PX).powi(2),
+        power => (p.disparity / DISPARITY_UNIT_PX).powf(power),
+    }
+}
+
+impl Basis {
+    /// The power of the disparity with which a shape grows that is otherwise the same in every
+    /// picture, whatever it shows.
+    pub fn still_power(&self) -> Option<f64> {
+        let by = |times: Modulation| match times {
+            Modulation::One => Some(0.0),
+            Modulation::DisparitySquared => Some(2.0),
+            Modulation::Lift | Modulation::Tilt => None,
+        };
+        match self {
+            Basis::Bowl { disparity_power, .. } | Basis::Affine { disparity_power } => {
+                Some(*disparity_power)
+            }
+            Basis::Map { times, .. } | Basis::Spline { times, .. } => by(*times),
+            Basis::Curve {
+                over: Coordinate::Column | Coordinate::Row | Coordinate::Radius,
+                times,
+                ..
+            } => by(*times),
+            _ => None,
+        }
+    }
+
+    /// A size that coefficient number `k` of a bias may well have, in its unit: the standard
+    /// deviation of what is believed before anything was measured.
+    pub fn usual(&self, k: usize) -> f64 {
+        match self {
+            // Herrera, Kannala and Heikkila 2012, fig. 6: up to 4 of a Kinect's steps of 1/8 px
+            // towards the corners.
+            Basis::Bowl { .. } => 0.5,
+            // A depth picture that was calibrated: what is left of k1 (Khoshelham and Elberink
+            // 2012, table 1: 0.003; Smisek, Jancosek and Pajdla 2011: 0.01 to 0.05).
+            Basis::Lens { .. } => 0.02,
+            // All of it or nothing.
+            Basis::RangeNotDepth => 1.0,
+            // A board bends by about 1 mm at 1 m, and by 1.5 mm half a metre from its middle where
+            // it is a bad one.
+            Basis::Bow { .. } => {
+                let degree = if k < 3 {
+                    2
+                } else if k < 7 {
+                    3
+                } else {
+                    4
+                };
+                BOW_M / 0.5f64.powi(degree)
+            }
+            // Shimizu and Okutomi 2001: 0.06 px; without a remedy twice that.
+            Basis::Locking { .. } => 0.1,
+            _ => NAMELESS_PX,
+        }
+    }
+}
+
+/// Of a board, half a metre from its middle, m.
+const BOW_M: f64 = 0.0015;
+/// Errors of a matcher beyond a pixel are gross ones.
+const NAMELESS_PX: f64 = 1.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::kinect_v1;
+
+    #[test]
+    fn splines_sum_to_one_and_bend_smoothly() {
+        for nodes in [4, 5, 20] {
+            let mut before = [0.0; 32];
+            for step in 0..=1000 {
+                let (k, w) = cubic(f64::from(step) * 0.639, 639.0, nodes);
+                assert!((w.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{nodes} {step}");
+                assert!(k + 4 <= nodes && w.iter().all(|w| *w >= 0.0));
+                let mut now = [0.0; 32];
+                now[k..k + 4].copy_from_slice(&w);
+                let moved =
+                    now.iter().zip(&before).map(|(a, b)| f64::abs(a - b)).fold(0.0, f64::max);
+                assert!(step == 0 || moved < 0.02, "{nodes} {step}: {moved}");
+                before = now;
+            }
+        }
+    }
+
+    /// With its gauge a shape has no affine part, and another affine part is none.
+    #[test]
+    fn what_planes_absorb_is_taken_out() {
+        let sensor = kinect_v1(4);
+        let rays = sensor.camera.rays();
+        let pixels = Pixels::new(&sensor.camera, &rays, 43.0);
+        let [width, height] = [sensor.camera.width, sensor.camera.height].map(|n| n as f64);
+        let times = Modulation::DisparitySquared;
+        for basis in [
+            Basis::Bowl { disparity_power: 2.0, orders: 2 },
+            Basis::Spline { width, height, across: 5, down: 4, times },
+            Basis::Affine { disparity_power: 2.0 },
+        ] {
+            let gauge = Gauge::of(&basis, &pixels).unwrap();
+            let mut row = vec![0.0; basis.count()];
+            let mut sums = vec![[0.0; 3]; basis.count()];
+            for v in (2..sensor.camera.height).step_by(4) {
+                for u in (2..sensor.camera.width).step_by(4) {
+                    let mut place = pixels.place(v * sensor.camera.width + u);
+                    place.disparity = 30.0;
+                    basis.fill(&place, &mut row);
+                    gauge.take_out(&place, &mut row);
+                    if matches!(basis, Basis::Affine { .. }) {
+                        assert!(row.iter().all(|g| g.abs() < 1e-9), "{row:?}");
+                    }
+                    for (sum, g) in sums.iter_mut().zip(&row) {
+                        *sum = [sum[0] + g, sum[1] + g * place.x, sum[2] + g * place.y];
+                    }
+                }
+            }
+            assert!(sums.iter().flatten().all(|s| s.abs() < 1e-8), "{sums:?}");
+        }
+    }
+}
