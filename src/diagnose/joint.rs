@@ -33,6 +33,10 @@ const MAPS_CLEARLY: f64 = 3.0;
 /// Beside the maps a term must bring this share of all, and be so clear.
 const TERM_SHARE: f64 = 0.005;
 const TERM_CLEARLY: f64 = 2.0;
+/// A shape of the target, which a correction leaves in, must bring as much beside the maps as they
+/// must bring themselves, and may be larger than usual by no more than this: what is collinear
+/// with the sensor's own error and fits no board is not the board's.
+const LARGEST_USUAL: f64 = 3.0;
 /// A radial name that explains this share of all stands, and the maps are the rest of it.
 const ADEQUATE: f64 = 0.6;
 
@@ -276,6 +280,11 @@ fn is_rough(c: &Candidate) -> bool {
     c.basis.is_fine() || fine_lines || matches!(c.basis, Basis::Banding { .. })
 }
 
+fn is_of_sensor(c: &Candidate) -> bool {
+    let basis = c.basis.clone();
+    Term { statistic: Statistic::Bias, basis, coefficients: Vec::new() }.is_sensor_bias()
+}
+
 /// What the terms are in the end.
 struct Settled {
     terms: Vec<usize>,
@@ -345,9 +354,11 @@ impl Joint<'_> {
                     settled.terms.iter().copied().filter(|o| *o != t).collect();
                 let scores = self.scores(&settled.without, &others, |_| true);
                 let lost = all - total(&scores);
-                let needed =
-                    lost > TERM_SHARE * all && clearly(&settled.scores, &scores) > TERM_CLEARLY;
-                (!needed).then_some((lost, others, scores))
+                let of_target = !is_of_sensor(c);
+                let share = if of_target { MAPS_SHARE } else { TERM_SHARE };
+                let needed = lost > share * all && clearly(&settled.scores, &scores) > TERM_CLEARLY;
+                let believed = !of_target || self.size(settled, t) < LARGEST_USUAL;
+                (!(needed && believed)).then_some((lost, others, scores))
             };
             let next = settled.terms.iter().filter_map(idle).min_by(|a, b| a.0.total_cmp(&b.0));
             let Some((_, others, scores)) = next else { return };
@@ -355,13 +366,22 @@ impl Joint<'_> {
         }
     }
 
+    /// Root mean square of a term's coefficients over their usual sizes.
+    fn size(&self, settled: &Settled, term: usize) -> f64 {
+        let kept = self.kept(&settled.terms);
+        let span = self.columns.span(term);
+        let fits = settled.without.iter().filter_map(|r| r.fit(&kept, &self.precision));
+        let square = |beta: DVector<f64>| -> f64 {
+            span.clone().map(|k| self.precision[k] * beta[k] * beta[k]).sum::<f64>()
+        };
+        let (sum, n) = fits.map(square).fold((0.0, 0.0), |(sum, n), s| (sum + s, n + 1.0));
+        (sum / f64::max(n, 1.0) / span.len() as f64).sqrt()
+    }
+
     /// What a correction takes out must help the parts left out; terms that are needed for the sum
     /// alone, against one that is not the sensor's, do not.
     fn drop_harmful(&self, settled: &mut Settled, chosen: &[Chosen]) {
-        let of_sensor = |t: usize| {
-            let basis = chosen[t].candidate.basis.clone();
-            Term { statistic: Statistic::Bias, basis, coefficients: Vec::new() }.is_sensor_bias()
-        };
+        let of_sensor = |t: usize| is_of_sensor(&chosen[t].candidate);
         while !settled.terms.is_empty() {
             if total(&self.scores(&settled.without, &settled.terms, of_sensor)) >= 0.0 {
                 return;
