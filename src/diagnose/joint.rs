@@ -366,16 +366,15 @@ impl Joint<'_> {
         }
     }
 
-    /// Root mean square of a term's coefficients over their usual sizes.
+    /// The largest of a term's coefficients over its usual size, mean over the fits.
     fn size(&self, settled: &Settled, term: usize) -> f64 {
         let kept = self.kept(&settled.terms);
         let span = self.columns.span(term);
-        let fits = settled.without.iter().filter_map(|r| r.fit(&kept, &self.precision));
-        let square = |beta: DVector<f64>| -> f64 {
-            span.clone().map(|k| self.precision[k] * beta[k] * beta[k]).sum::<f64>()
+        let of = |beta: DVector<f64>| -> f64 {
+            span.clone().map(|k| self.precision[k].sqrt() * beta[k].abs()).fold(0.0, f64::max)
         };
-        let (sum, n) = fits.map(square).fold((0.0, 0.0), |(sum, n), s| (sum + s, n + 1.0));
-        (sum / f64::max(n, 1.0) / span.len() as f64).sqrt()
+        let fits = settled.without.iter().filter_map(|r| r.fit(&kept, &self.precision));
+        fits.map(of).sum::<f64>() / settled.without.len().max(1) as f64
     }
 
     /// What a correction takes out must help the parts left out; terms that are needed for the sum
