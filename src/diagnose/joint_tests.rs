@@ -6,7 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::*;
 use crate::rng::{Seed, Stream};
 use crate::simulate::kinect_v1;
-use crate::terms::{PixelContext, corner_radius};
+use crate::terms::{Basis, Modulation, PixelContext, Statistic, Term, corner_radius};
 
 const SCALE_PX_M: f64 = 43.5;
 const NOISE_PX: f64 = 0.05;

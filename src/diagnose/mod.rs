@@ -13,6 +13,8 @@ mod findings;
 mod frames;
 mod heldout;
 mod joint;
+mod joint_fit;
+mod joint_terms;
 mod known;
 mod lattice;
 mod layers;

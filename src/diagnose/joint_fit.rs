@@ -1,0 +1,224 @@
+//! Normal equations of terms and of a smooth map over the picture together, by parts of the views,
+//! and their penalised solution.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rayon::prelude::*;
+
+use super::evidence::{Evidence, Rows, score};
+use super::search::{Chosen, ViewData};
+use crate::camera::Camera;
+use crate::terms::{Basis, Gauge, Modulation, Pixels};
+
+/// Parts of the views that are left out in turn.
+const FOLDS: usize = 6;
+/// Precision of second differences of a map's nodes, over the mean information on a node.
+pub const SMOOTHNESS: [f64; 5] = [1.0, 0.2, 0.04, 0.008, 0.0016];
+/// Precision of the nodes themselves beside that.
+const RIDGE: f64 = 0.1;
+/// So much the affine part of a map is held to zero, over the mean information on a node.
+const HELD: f64 = 1e4;
+/// Pixels to a node of a map.
+const NODE_PX: usize = 32;
+/// What is fitted: terms, then the nodes of the maps.
+pub struct Columns {
+    pub bases: Vec<Basis>,
+    pub gauges: Vec<Option<Gauge>>,
+    pub maps: [Basis; 2],
+    /// Columns of the terms, and of both maps.
+    pub terms: usize,
+    pub nodes: usize,
+}
+
+impl Columns {
+    pub fn of(chosen: &[Chosen], camera: &Camera) -> Self {
+        let rays = camera.rays();
+        let pixels = Pixels::new(camera, &rays, 1.0);
+        let bases: Vec<Basis> = chosen.iter().map(|c| c.candidate.basis.clone()).collect();
+        let [across, down] = [(camera.width, 6, 20), (camera.height, 5, 15)]
+            .map(|(length, low, high)| (length / NODE_PX).clamp(low, high));
+        let [width, height] = [camera.width, camera.height].map(|n| n as f64);
+        let map = |times| Basis::Spline { width, height, across, down, times };
+        Columns {
+            gauges: bases.iter().map(|b| Gauge::of(b, &pixels)).collect(),
+            terms: bases.iter().map(Basis::count).sum(),
+            nodes: 2 * across * down,
+            bases,
+            maps: [map(Modulation::One), map(Modulation::DisparitySquared)],
+        }
+    }
+
+    /// Normal equations of a view, its plane profiled out.
+    pub fn evidence(&self, view: &ViewData) -> Option<Evidence> {
+        let (y, w) = (view.response.clone(), view.weight.clone());
+        let rows = Rows::new(y, w, view.nuisance.clone(), view.precision.len(), &view.precision)?;
+        Some(rows.reduce(self.terms + self.nodes, |i, row| {
+            let place = &view.places[i];
+            let mut rest = row;
+            for (basis, gauge) in self.bases.iter().zip(&self.gauges) {
+                let (mine, others) = rest.split_at_mut(basis.count());
+                basis.fill(place, mine);
+                if let Some(gauge) = gauge {
+                    gauge.take_out(place, mine);
+                }
+                rest = others;
+            }
+            let (first, second) = rest.split_at_mut(self.nodes / 2);
+            self.maps[0].fill(place, first);
+            self.maps[1].fill(place, second);
+        }))
+    }
+
+    /// Precision of the terms' columns.
+    fn usual(&self) -> DVector<f64> {
+        let of = |b: &Basis| (0..b.count()).map(|k| b.usual(k).powi(-2)).collect::<Vec<_>>();
+        DVector::from_vec(self.bases.iter().flat_map(of).collect())
+    }
+
+    pub fn span(&self, term: usize) -> std::ops::Range<usize> {
+        let first: usize = self.bases[..term].iter().map(Basis::count).sum();
+        first..first + self.bases[term].count()
+    }
+
+    /// What holds the nodes, for a mean information of one on each: smooth, small, and without
+    /// what planes absorb.
+    pub fn penalty(&self, camera: &Camera, smoothness: f64) -> DMatrix<f64> {
+        let Basis::Spline { across, down, .. } = self.maps[0] else {
+            return DMatrix::zeros(0, 0);
+        };
+        let bend = |n: usize| {
+            let d = DMatrix::from_fn(n - 2, n, |i, j| match j.wrapping_sub(i) {
+                0 | 2 => 1.0,
+                1 => -2.0,
+                _ => 0.0,
+            });
+            d.transpose() * d
+        };
+        let (id, unit) = (DMatrix::identity(across, across), DMatrix::identity(down, down));
+        let rough: DMatrix<f64> = unit.kronecker(&bend(across)) + bend(down).kronecker(&id);
+        let n = across * down;
+        let mut one = (rough + DMatrix::identity(n, n) * RIDGE) * smoothness;
+        let rays = camera.rays();
+        if let Some(gauge) = Gauge::of(&self.maps[0], &Pixels::new(camera, &rays, 1.0)) {
+            for k in 0..3 {
+                let c = DVector::from_iterator(n, gauge.affine.iter().map(|a| a[k])).normalize();
+                one.ger(HELD, &c, &c, 1.0);
+            }
+        }
+        let mut both = DMatrix::zeros(2 * n, 2 * n);
+        both.view_mut((0, 0), (n, n)).copy_from(&one);
+        both.view_mut((n, n), (n, n)).copy_from(&one);
+        both
+    }
+}
+
+/// Some views' equations with the nodes of the maps eliminated, if there are maps.
+pub struct Reduced {
+    pub a: DMatrix<f64>,
+    b: DVector<f64>,
+    /// The nodes where all terms are nothing, and what a term's coefficient changes of them.
+    alone: DVector<f64>,
+    pub with: DMatrix<f64>,
+}
+
+impl Reduced {
+    pub fn of(all: &Evidence, terms: usize, penalty: Option<&DMatrix<f64>>) -> Option<Self> {
+        let (a, b) = (all.a.view((0, 0), (terms, terms)).into_owned(), all.b.rows(0, terms));
+        let nodes = all.b.len() - terms;
+        let Some(penalty) = penalty else {
+            let (alone, with) = (DVector::zeros(nodes), DMatrix::zeros(nodes, terms));
+            return Some(Reduced { a, b: b.into_owned(), alone, with });
+        };
+        let factor =
+            Cholesky::<f64, Dyn>::new(all.a.view((terms, terms), (nodes, nodes)) + penalty)?;
+        let cross = all.a.view((terms, 0), (nodes, terms));
+        let alone = factor.solve(&all.b.rows(terms, nodes).into_owned());
+        let with = factor.solve(&cross.into_owned());
+        let less = cross.transpose();
+        Some(Reduced { a: a - &less * &with, b: b - less * &alone, alone, with })
+    }
+
+    /// Coefficients of the terms' columns in `kept`, and of the nodes.
+    pub fn fit(&self, kept: &[usize], precision: &DVector<f64>) -> Option<DVector<f64>> {
+        let n = kept.len();
+        let a = DMatrix::from_fn(n, n, |i, j| {
+            let own = if i == j { precision[kept[i]] } else { 0.0 };
+            self.a[(kept[i], kept[j])] + own
+        });
+        let mine = a.cholesky()?.solve(&DVector::from_fn(n, |i, _| self.b[kept[i]]));
+        let terms = self.b.len();
+        let mut all = DVector::zeros(terms + self.alone.len());
+        kept.iter().zip(mine.iter()).for_each(|(&k, m)| all[k] = *m);
+        let nodes = &self.alone - &self.with * all.rows(0, terms);
+        all.rows_mut(terms, self.alone.len()).copy_from(&nodes);
+        Some(all)
+    }
+}
+
+/// The equations by parts of the views.
+pub struct Joint<'a> {
+    pub columns: &'a Columns,
+    pub views: Vec<Vec<usize>>,
+    parts: Vec<Evidence>,
+    pub all: Evidence,
+    pub precision: DVector<f64>,
+}
+
+fn sum(n: usize, parts: impl Iterator<Item = Evidence>) -> Evidence {
+    let none = Evidence { a: DMatrix::zeros(n, n), b: DVector::zeros(n) };
+    parts.fold(none, |mut sum, part| {
+        sum.a += part.a;
+        sum.b += part.b;
+        sum
+    })
+}
+
+impl<'a> Joint<'a> {
+    pub fn of(columns: &'a Columns, data: &[ViewData]) -> Self {
+        let n = columns.terms + columns.nodes;
+        // Near and far in every part.
+        let z = |v: &usize| data[*v].places.first().map_or(0.0, |p| p.rho);
+        let mut order: Vec<usize> = (0..data.len()).collect();
+        order.sort_by(|a, b| z(a).total_cmp(&z(b)));
+        let folds = FOLDS.min(data.len());
+        let views: Vec<Vec<usize>> =
+            (0..folds).map(|f| order.iter().skip(f).step_by(folds).copied().collect()).collect();
+        let parts: Vec<Evidence> = views
+            .par_iter()
+            .map(|part| sum(n, part.iter().filter_map(|&v| columns.evidence(&data[v]))))
+            .collect();
+        let all = sum(n, parts.iter().cloned());
+        Joint { columns, views, parts, all, precision: columns.usual() }
+    }
+
+    /// Fits without each part.
+    pub fn without(&self, penalty: Option<&DMatrix<f64>>) -> Option<Vec<Reduced>> {
+        let of = |part: &Evidence| {
+            let others = Evidence { a: &self.all.a - &part.a, b: &self.all.b - &part.b };
+            Reduced::of(&others, self.columns.terms, penalty)
+        };
+        self.parts.par_iter().map(of).collect()
+    }
+
+    pub fn kept(&self, terms: &[usize]) -> Vec<usize> {
+        terms.iter().flat_map(|&t| self.columns.span(t)).collect()
+    }
+
+    /// Nats over no term at all on each part left out; only what `applied` says of a term is taken.
+    pub fn scores(
+        &self,
+        without: &[Reduced],
+        terms: &[usize],
+        applied: impl Fn(usize) -> bool + Sync,
+    ) -> Vec<f64> {
+        let kept = self.kept(terms);
+        let of = |(reduced, part): (&Reduced, &Evidence)| {
+            let mut beta = reduced.fit(&kept, &self.precision)?;
+            for &t in terms.iter().filter(|t| !applied(**t)) {
+                self.columns.span(t).for_each(|k| beta[k] = 0.0);
+            }
+            Some(score(part, &beta))
+        };
+        let pairs: Vec<_> = without.iter().zip(&self.parts).collect();
+        pairs.into_par_iter().map(|pair| of(pair).unwrap_or(f64::NEG_INFINITY)).collect()
+    }
+}

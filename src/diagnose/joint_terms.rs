@@ -1,0 +1,207 @@
+//! Which terms the joint fit keeps, and whether it has a smooth rest: by what views left out say.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::candidate::Candidate;
+use super::joint_fit::{Joint, Reduced, SMOOTHNESS};
+use super::search::Chosen;
+use crate::camera::Camera;
+use crate::terms::{Basis, Coordinate, Statistic, Term};
+
+/// Maps take the place of terms where they predict views left out better by this share, and by so
+/// many standard errors over the parts.
+const MAPS_SHARE: f64 = 0.02;
+const MAPS_CLEARLY: f64 = 3.0;
+/// Beside the maps a term must bring this share of all, and be so clear.
+const TERM_SHARE: f64 = 0.005;
+const TERM_CLEARLY: f64 = 2.0;
+/// A shape of the target, which a correction leaves in, must bring as much beside the maps as they
+/// must bring themselves, and may be larger than usual by no more than this: what is collinear
+/// with the sensor's own error and fits no board is not the board's.
+const LARGEST_USUAL: f64 = 3.0;
+/// A curve of the sensor without a name must bring this share beside a shape of the target: less is
+/// what the target's formula misses, and no board's misfit is to be taken out of other pictures.
+const BESIDE_TARGET: f64 = 0.05;
+/// A radial name that explains this share of all stands, and the maps are the rest of it.
+const ADEQUATE: f64 = 0.6;
+
+/// What the terms are in the end.
+pub struct Settled {
+    pub terms: Vec<usize>,
+    pub penalty: Option<DMatrix<f64>>,
+    pub without: Vec<Reduced>,
+    pub scores: Vec<f64>,
+    /// What the maps bring beside the terms, nats.
+    pub maps: f64,
+}
+
+impl Joint<'_> {
+    pub fn settle(&self, chosen: &[Chosen], camera: &Camera) -> Option<Settled> {
+        let everything: Vec<usize> = (0..chosen.len()).collect();
+        let plain = self.without(None)?;
+        let scores = self.scores(&plain, &everything, |_| true);
+        let mut settled =
+            Settled { scores, terms: everything, penalty: None, without: plain, maps: 0.0 };
+        let is_kept = |t: &usize| !is_smooth_and_nameless(&chosen[*t].candidate);
+        let kept: Vec<usize> = settled.terms.iter().copied().filter(is_kept).collect();
+        if let Some(mapped) = self.best_maps(&kept, camera) {
+            let better = total(&mapped.scores) - total(&settled.scores);
+            let slack = MAPS_SHARE * total(&mapped.scores);
+            let clear = clearly(&mapped.scores, &settled.scores) > MAPS_CLEARLY;
+            // A rest that the search saw is told by the maps, unless they are the worse for it.
+            let seen = kept.len() < settled.terms.len();
+            if (clear && better > slack) || (seen && better > -slack) {
+                let alone = total(&self.scores(&settled.without, &kept, |_| true));
+                settled = mapped;
+                self.drop_idle(&mut settled, chosen, alone);
+                settled.maps = total(&settled.scores) - alone;
+            }
+        }
+        if settled.penalty.is_none() {
+            self.drop_misfit_of_target(&mut settled, chosen);
+        }
+        self.drop_harmful(&mut settled, chosen);
+        Some(settled)
+    }
+
+    /// As smooth as predicts the parts left out best.
+    fn best_maps(&self, terms: &[usize], camera: &Camera) -> Option<Settled> {
+        let first = self.columns.terms;
+        let diagonal = self.all.a.diagonal();
+        let unit = diagonal.rows(first, self.columns.nodes / 2).mean();
+        let mut best: Option<Settled> = None;
+        for smoothness in SMOOTHNESS {
+            let penalty = self.columns.penalty(camera, smoothness) * unit;
+            let Some(without) = self.without(Some(&penalty)) else { continue };
+            let scores = self.scores(&without, terms, |_| true);
+            if best.as_ref().is_some_and(|b| total(&b.scores) > total(&scores)) {
+                break;
+            }
+            let (terms, penalty) = (terms.to_vec(), Some(penalty));
+            best = Some(Settled { terms, penalty, without, scores, maps: 0.0 });
+        }
+        best
+    }
+
+    /// Terms that the maps make needless, the most needless first.
+    fn drop_idle(&self, settled: &mut Settled, chosen: &[Chosen], alone: f64) {
+        loop {
+            let all = total(&settled.scores);
+            let named = alone > ADEQUATE * all;
+            let idle = |&t: &usize| {
+                let c = &chosen[t].candidate;
+                if is_rough(c) || (named && is_radial_name(c)) {
+                    return None;
+                }
+                let others: Vec<usize> =
+                    settled.terms.iter().copied().filter(|o| *o != t).collect();
+                let scores = self.scores(&settled.without, &others, |_| true);
+                let lost = all - total(&scores);
+                let of_target = !is_of_sensor(c);
+                let share = if of_target { MAPS_SHARE } else { TERM_SHARE };
+                let needed = lost > share * all && clearly(&settled.scores, &scores) > TERM_CLEARLY;
+                let believed = !of_target || self.size(settled, t) < LARGEST_USUAL;
+                (!(needed && believed)).then_some((lost, others, scores))
+            };
+            let next = settled.terms.iter().filter_map(idle).min_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((_, others, scores)) = next else { return };
+            (settled.terms, settled.scores) = (others, scores);
+        }
+    }
+
+    /// Nameless curves that bring little beside a shape of the target.
+    fn drop_misfit_of_target(&self, settled: &mut Settled, chosen: &[Chosen]) {
+        if settled.terms.iter().all(|&t| is_of_sensor(&chosen[t].candidate)) {
+            return;
+        }
+        loop {
+            let all = total(&settled.scores);
+            let little = |&t: &usize| {
+                let c = &chosen[t].candidate;
+                let others: Vec<usize> =
+                    settled.terms.iter().copied().filter(|o| *o != t).collect();
+                if c.family.is_some() || c.basis.is_fine() || !is_of_sensor(c) {
+                    return None;
+                }
+                let scores = self.scores(&settled.without, &others, |_| true);
+                let lost = all - total(&scores);
+                (lost < BESIDE_TARGET * all).then_some((lost, others, scores))
+            };
+            let next = settled.terms.iter().filter_map(little).min_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((_, others, scores)) = next else { return };
+            (settled.terms, settled.scores) = (others, scores);
+        }
+    }
+
+    /// The largest of a term's coefficients over its usual size, mean over the fits.
+    fn size(&self, settled: &Settled, term: usize) -> f64 {
+        let kept = self.kept(&settled.terms);
+        let span = self.columns.span(term);
+        let of = |beta: DVector<f64>| -> f64 {
+            span.clone().map(|k| self.precision[k].sqrt() * beta[k].abs()).fold(0.0, f64::max)
+        };
+        let fits = settled.without.iter().filter_map(|r| r.fit(&kept, &self.precision));
+        fits.map(of).sum::<f64>() / settled.without.len().max(1) as f64
+    }
+
+    /// What a correction takes out must help the parts left out; terms that are needed for the sum
+    /// alone, against one that is not the sensor's, do not.
+    fn drop_harmful(&self, settled: &mut Settled, chosen: &[Chosen]) {
+        let of_sensor = |t: usize| is_of_sensor(&chosen[t].candidate);
+        while !settled.terms.is_empty() {
+            if total(&self.scores(&settled.without, &settled.terms, of_sensor)) >= 0.0 {
+                return;
+            }
+            let without = |&t: &usize| {
+                let others: Vec<usize> =
+                    settled.terms.iter().copied().filter(|o| *o != t).collect();
+                (total(&self.scores(&settled.without, &others, of_sensor)), others)
+            };
+            let best = settled.terms.iter().map(without).max_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((_, others)) = best else { return };
+            settled.scores = self.scores(&settled.without, &others, |_| true);
+            settled.terms = others;
+        }
+    }
+}
+
+pub fn total(scores: &[f64]) -> f64 {
+    scores.iter().sum()
+}
+
+/// Mean of the differences over its standard error.
+fn clearly(better: &[f64], than: &[f64]) -> f64 {
+    let n = better.len() as f64;
+    let differences = || better.iter().zip(than).map(|(a, b)| a - b);
+    let mean = differences().sum::<f64>() / n;
+    let variance = differences().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    mean / (variance / n).sqrt().max(f64::MIN_POSITIVE)
+}
+
+/// Do the maps say the same, and more?
+pub fn is_smooth_and_nameless(c: &Candidate) -> bool {
+    let still = matches!(
+        c.basis,
+        Basis::Map { .. } | Basis::Curve { over: Coordinate::Radius, nodes: 3.., .. }
+    );
+    c.family.is_none() && still
+}
+
+fn is_radial_name(c: &Candidate) -> bool {
+    c.family.is_some()
+        && matches!(c.basis, Basis::Bowl { .. } | Basis::Lens { .. } | Basis::RangeNotDepth)
+}
+
+/// Can a smooth map stand in for it at all?
+pub fn is_rough(c: &Candidate) -> bool {
+    let fine_lines = matches!(
+        c.basis,
+        Basis::Curve { over: Coordinate::Column | Coordinate::Row, nodes: 2 | 30.., .. }
+    );
+    c.basis.is_fine() || fine_lines || matches!(c.basis, Basis::Banding { .. })
+}
+
+fn is_of_sensor(c: &Candidate) -> bool {
+    let basis = c.basis.clone();
+    Term { statistic: Statistic::Bias, basis, coefficients: Vec::new() }.is_sensor_bias()
+}
