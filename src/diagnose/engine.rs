@@ -27,7 +27,8 @@ use super::search::Outcome;
 use super::steps::{Steps, is_raw, lattice, steps};
 use super::structure::structures;
 use super::verdict::{
-    after, extend, least_size, merge, not_identifiable, shares, symptoms, view_lines,
+    after, echoes, extend, least_size, merge, not_identifiable, shares, symptoms,
+    view_lines,
 };
 use crate::Progress;
 use crate::effects::KINECT_BASELINE_M;
@@ -44,13 +45,21 @@ pub struct DiagnoseOptions {
     pub seed: Seed,
     /// Chance that a clean recording is said to have anything wrong.
     pub level: f64,
+    /// The model was calibrated on this very recording, causes and all: sigma is refitted beside
+    /// whatever is found, and that is no finding.
+    pub calibrated_here: bool,
     /// Nothing, but in tests of what each part is for.
     pub ablation: Ablation,
 }
 
 impl Default for DiagnoseOptions {
     fn default() -> Self {
-        DiagnoseOptions { seed: Seed(1), level: 0.03, ablation: Ablation::None }
+        DiagnoseOptions {
+            seed: Seed(1),
+            level: 0.03,
+            calibrated_here: false,
+            ablation: Ablation::None,
+        }
     }
 }
 
@@ -186,6 +195,7 @@ impl<'a> Case<'a> {
             .transpose()?;
         let mut survey = Survey::of(&fields, &sensor.camera, &bench.rays);
         survey.ablate(options.ablation, &fields);
+        survey.refits_sigma = options.calibrated_here && simulated.is_none();
         survey.fixed_px2 = fixed_px2(&structures(&fields, &sensor.camera, &[]));
         if let Some(baseline) = &baseline {
             baseline.references(&mut fields);
@@ -358,6 +368,18 @@ impl<'a> Case<'a> {
         found
     }
 
+    /// The refit of a sigma that was calibrated here is no finding; where it changes more than noise
+    /// can, the extended model has it.
+    fn take_refit(&self, curves: &mut Vec<Finding>, variance: &Outcome) -> Option<Finding> {
+        if !self.survey.refits_sigma {
+            return None;
+        }
+        let threshold = variance.noise.threshold(self.options.level);
+        let at = curves.iter().position(|f| f.status == Status::Recalibrate)?;
+        // Nats, as long as they are not shares.
+        Some(curves.remove(at)).filter(|f| f.share > threshold)
+    }
+
     fn lost(&self) -> (Vec<Finding>, Vec<Detectable>) {
         let camera = &self.sensor().camera;
         let lost = missing(&self.fields, &self.survey, camera, &self.bench.rays, self.options.seed);
@@ -420,6 +442,7 @@ impl<'a> Case<'a> {
         let sigma_mm = typical_sigma_mm(&self.fields);
         let steps = steps(&scatter.lattice, &self.known, &self.fields, self.recording, sigma_mm);
         let mut curves = self.curves(&scenes, outcomes);
+        let refitted = self.take_refit(&mut curves, &scatter.outcome);
         curves.retain(|f| self.is_news(f, &steps, scatter));
         let mut found: Vec<Finding> = self.ranges.clone().into_iter().chain(curves).collect();
         found.extend(self.texture(&mean, scatter, steps));
@@ -438,6 +461,7 @@ impl<'a> Case<'a> {
         if self.baseline.is_some() {
             symptoms(&mut found);
         }
+        echoes(&mut found);
         merge(&mut found);
         shares(&mut found);
         let heldout = heldout::score(
@@ -455,7 +479,8 @@ impl<'a> Case<'a> {
         detectable.extend(more_detectable);
         drop(scenes);
         let remarks = self.remarks();
-        let extended = extend(self.model, &found, self.sensor());
+        let known = found.iter().chain(&refitted);
+        let extended = extend(self.model, known, self.sensor());
         let diagnosis = Diagnosis {
             format: DIAGNOSIS_FORMAT,
             recording: self.recording.root.display().to_string(),
