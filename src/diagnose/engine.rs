@@ -9,6 +9,7 @@ use super::diagnosis::{
 };
 use super::field::Field;
 use super::findings::{self, Scene};
+use super::form::better_form;
 use super::heldout;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
@@ -27,7 +28,7 @@ use super::search::Outcome;
 use super::steps::{Steps, is_raw, lattice, steps};
 use super::structure::structures;
 use super::verdict::{
-    after, echoes, extend, least_size, merge, not_identifiable, shares, symptoms,
+    after, echoes, extend, fold_into_sigma, least_size, merge, not_identifiable, shares, symptoms,
     view_lines,
 };
 use crate::Progress;
@@ -380,6 +381,20 @@ impl<'a> Case<'a> {
         Some(curves.remove(at)).filter(|f| f.share > threshold)
     }
 
+    /// Where sigma's own form is off, the form that would do better: beside the finding, and as a
+    /// remark.
+    fn tell_form(&self, curves: &mut [Finding], refitted: bool) -> Option<String> {
+        let told = curves.iter_mut().find(|f| f.status == Status::Recalibrate);
+        if self.baseline.is_some() || told.is_none() && !refitted {
+            return None;
+        }
+        let better = better_form(&self.survey, &self.model.sigma, self.fields[0].scale_px_m)?;
+        if let Some(finding) = told {
+            finding.physics += &format!(" The noise follows better: {better}.");
+        }
+        Some(format!("sigma over depth and tilt follows better: {better}"))
+    }
+
     fn lost(&self) -> (Vec<Finding>, Vec<Detectable>) {
         let camera = &self.sensor().camera;
         let lost = missing(&self.fields, &self.survey, camera, &self.bench.rays, self.options.seed);
@@ -444,6 +459,10 @@ impl<'a> Case<'a> {
         let mut curves = self.curves(&scenes, outcomes);
         let refitted = self.take_refit(&mut curves, &scatter.outcome);
         curves.retain(|f| self.is_news(f, &steps, scatter));
+        if self.baseline.is_none() {
+            fold_into_sigma(&mut curves);
+        }
+        let better = self.tell_form(&mut curves, refitted.is_some());
         let mut found: Vec<Finding> = self.ranges.clone().into_iter().chain(curves).collect();
         found.extend(self.texture(&mean, scatter, steps));
         let (lost, more_detectable) = self.lost();
@@ -478,7 +497,8 @@ impl<'a> Case<'a> {
             super::detectable::detectable(&self.survey, &mean.outcome, &scatter.outcome, camera);
         detectable.extend(more_detectable);
         drop(scenes);
-        let remarks = self.remarks();
+        let mut remarks = self.remarks();
+        remarks.extend(better);
         let known = found.iter().chain(&refitted);
         let extended = extend(self.model, known, self.sensor());
         let diagnosis = Diagnosis {

@@ -36,6 +36,7 @@ pub fn families(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
         }
     }
     all.extend(recalibrations(reach, sigma));
+    all.extend(surfaces(reach));
     all
 }
 
@@ -59,6 +60,21 @@ pub fn refit(reach: &Extent) -> Candidate {
         let w = t * t;
         vec![1.0, l, l * l, l.powi(3), l.powi(4), u, w, u * u, u * l, w * l, u * l * l, w * l * l]
     })
+}
+
+/// Free surfaces over depth and tilt, from few columns to many: what a family says that follows
+/// only these two must be said better than by all of them.
+fn surfaces(reach: &Extent) -> Vec<Candidate> {
+    vec![
+        surface(reach, &|l, _| vec![1.0, l, l * l]),
+        surface(reach, &|_, t| vec![1.0, steepness(t)]),
+        surface(reach, &|l, t| vec![1.0, l, l * l, steepness(t), t * t]),
+        surface(reach, &|l, t| {
+            let u = steepness(t);
+            vec![1.0, l, l * l, l.powi(3), u, t * t, u * l, t * t * l]
+        }),
+        refit(reach),
+    ]
 }
 
 /// Twice the logarithm of 1 / cos(theta): by so much log variance along the axis exceeds that

@@ -83,6 +83,26 @@ pub(super) fn symptoms(found: &mut [Finding]) {
     }
 }
 
+/// Where sigma itself is off by more, a law of depth or tilt alone beside it is the rest of the same
+/// misfit: its terms, and nats, go to that finding.
+pub(super) fn fold_into_sigma(found: &mut Vec<Finding>) {
+    let Some(at) = found.iter().position(|f| f.status == Status::Recalibrate) else { return };
+    let mut sigma = found.remove(at);
+    let (rest, others): (Vec<Finding>, Vec<Finding>) =
+        found.drain(..).partition(|f| of_sigma_alone(f) && f.share < sigma.share);
+    *found = others;
+    for f in rest {
+        sigma.share += f.share;
+        sigma.terms.extend(f.terms);
+    }
+    found.insert(at.min(found.len()), sigma);
+}
+
+fn of_sigma_alone(f: &Finding) -> bool {
+    let axis = matches!(f.axis, Axis::Z | Axis::Theta);
+    f.statistic == Statistic::Variance && axis && f.effect.is_none_or(|id| id == "range-exponent")
+}
+
 /// What adds to the spread of one frame, and so to a sigma that was calibrated with it in place.
 const SPREADS: [&str; 6] = [
     "fixed-pattern-noise",
@@ -236,6 +256,21 @@ mod tests {
             share: 100.0,
             size: Size { mm: 1.0, sigma },
             ..findings::named("radial-disparity-bias", 0.99, Statistic::Bias, Axis::Radius)
+        }
+    }
+
+    /// The smaller of the two is the rest of the larger one's misfit; not the other way round.
+    #[test]
+    fn a_law_of_the_depth_beside_a_larger_misfit_of_sigma_is_part_of_it() {
+        for (nats, left) in [(100.0, 1), (2000.0, 2)] {
+            let exponent = Finding {
+                share: nats,
+                ..findings::named("range-exponent", 0.9, Statistic::Variance, Axis::Z)
+            };
+            let mut found = vec![exponent, recalibrate(1.2)];
+            fold_into_sigma(&mut found);
+            assert_eq!(found.len(), left);
+            assert_eq!(found.iter().map(|f| f.share).sum::<f64>(), 900.0 + nats);
         }
     }
 
