@@ -1,6 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use kinoise::calibrate::model_of_any_form;
 use kinoise::camera::Rays;
 use kinoise::diagnose::{
     DiagnoseOptions, Diagnosed, Diagnosis, Field, Finding, Reference, Status, Verdict,
@@ -104,7 +105,11 @@ fn calibrated(recording: &Recording, global: &Global) -> anyhow::Result<NoiseMod
     let views =
         kinoise::measure_recording(recording, &options.measure, &|done, all| bar.step(done, all))?;
     drop(bar);
-    Ok(kinoise::model_of(recording, &views, &options)?.model)
+    let model = model_of_any_form(recording, &views, &options)?.model;
+    if model.sigma.form != Form::Paper {
+        model.fit.remarks.iter().take(1).for_each(|why| say(format!("note: {why}")));
+    }
+    Ok(model)
 }
 
 /// The sigma to weigh by: the simulation's own, or the recording's where that has none.

@@ -35,7 +35,7 @@ use crate::Progress;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
 use crate::measure::{MeasureOptions, Workbench};
-use crate::model::NoiseModel;
+use crate::model::{Form, NoiseModel};
 use crate::rng::Seed;
 use crate::terms::{Axis, Basis, PixelContext, Statistic, Term, corner_radius};
 use crate::view::{Excluded, Recording, Sensor};
@@ -439,6 +439,9 @@ impl<'a> Case<'a> {
 
     fn remarks(&mut self) -> Vec<String> {
         let mut remarks = self.recording.remarks.clone();
+        if self.options.calibrated_here && self.model.sigma.form != Form::Paper {
+            remarks.extend(self.model.fit.remarks.first().cloned());
+        }
         remarks.append(&mut self.copies);
         if self.sensor().baseline_m.is_none() {
             remarks.push(format!(
