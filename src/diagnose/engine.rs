@@ -395,9 +395,10 @@ impl<'a> Case<'a> {
         Some(format!("sigma over depth and tilt follows better: {better}"))
     }
 
-    fn lost(&self) -> (Vec<Finding>, Vec<Detectable>) {
+    fn lost(&mut self) -> (Vec<Finding>, Vec<Detectable>) {
         let camera = &self.sensor().camera;
         let lost = missing(&self.fields, &self.survey, camera, &self.bench.rays, self.options.seed);
+        self.copies.extend(lost.notes);
         let known = |id| self.known.has(id);
         let baseline = self.baseline.as_ref();
         let found = lost
@@ -468,7 +469,9 @@ impl<'a> Case<'a> {
         let better = self.tell_form(&mut curves, refitted.is_some());
         let mut found: Vec<Finding> = self.ranges.clone().into_iter().chain(curves).collect();
         found.extend(self.texture(&mean, scatter, steps));
+        drop(scenes);
         let (lost, more_detectable) = self.lost();
+        let scenes = self.scenes();
         found.extend(lost);
         found.extend(self.laws(&mean.terms));
         let mismatch = found.iter().any(|f| f.status != Status::NotIdentifiable);
