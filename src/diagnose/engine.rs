@@ -283,9 +283,21 @@ impl<'a> Case<'a> {
         let terms = terms_of(&outcome, Statistic::Variance);
         measure_tails(&mut structure, &self.fields, &mean.px, &terms, &self.survey, &self.bench);
         let alike = self.baseline.as_ref().is_some_and(|b| b.tails_alike(&structure));
-        let uneven = outcome.chosen.iter().any(|c| c.candidate.family.is_none());
+        let uneven = outcome.chosen.iter().any(|c| c.candidate.family.is_none())
+            || !terms.iter().all(|t| self.holds_tails(t));
         let tails = tails(&structure, &self.known, each, uneven).filter(|_| !alike);
         Scatter { lattice, hangs, tails, outcome }
+    }
+
+    /// A refit that makes sigma much smaller somewhere rests on noise that steps have swallowed, or
+    /// on a cause that was taken for noise: against it everything has tails.
+    fn holds_tails(&self, term: &Term) -> bool {
+        const MUCH: f64 = -1.4;
+        let mut row = Vec::new();
+        let mut tiles = self.survey.views.iter().flat_map(|v| &v.tiles);
+        !self.survey.refits_sigma
+            || !matches!(term.basis, Basis::Recalibrate { .. })
+            || tiles.all(|t| term.value(&t.place, &mut row) > MUCH)
     }
 
     fn range_share(&self, terms: &[Term]) -> f64 {
