@@ -137,6 +137,32 @@ pub fn model_of(
     Ok(Calibration { table, fit, comparison, model, warnings })
 }
 
+/// [`model_of`], going on with other forms where the one asked for has no positive fit; the model's
+/// remarks then say so. The last, k z^2, fits any sigmas there are.
+///
+/// # Errors
+/// Those of the form asked for, where no form can be fitted.
+pub fn model_of_any_form(
+    recording: &Recording,
+    measurements: &Measurements,
+    options: &CalibrateOptions,
+) -> Result<Calibration> {
+    let first = match model_of(recording, measurements, options) {
+        Err(why) => why,
+        calibration => return calibration,
+    };
+    let others = [Form::Nguyen, Form::Disparity, Form::Khoshelham];
+    for form in others.into_iter().filter(|f| Some(*f) != options.form) {
+        let options = CalibrateOptions { form: Some(form), ..options.clone() };
+        if let Ok(mut calibration) = model_of(recording, measurements, &options) {
+            let note = format!("sigma was fitted with the form \"{form}\": {first}");
+            calibration.model.fit.remarks.insert(0, note);
+            return Ok(calibration);
+        }
+    }
+    Err(first)
+}
+
 /// Fit a bare table that was read from `source`; of the options only `form` and `created` count.
 ///
 /// # Errors

@@ -1,6 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use kinoise::diagnose::DiagnoseOptions;
 use kinoise::io::{Assumed, open};
 use kinoise::map::{Init, Options, Weights};
 use kinoise::measure::MeasureOptions;
@@ -12,7 +13,7 @@ use kinoise::{CalibrateOptions, Form, NoiseModel, Recording, SigmaModel};
 use super::calibrate::calibrate;
 use super::calibrate_summary::as_json;
 use super::common::{Global, say, source_date};
-use super::diagnose::examine;
+use super::diagnose::{HeldAgainst, examine};
 use super::map::follow;
 
 #[derive(Debug, Args)]
@@ -41,7 +42,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     ));
     say("\nIs there anything that this model leaves out? There should not be:");
     let diagnosis = arguments.output.join("diagnosis");
-    examine(&recording, None, &done.calibration.model, &diagnosis, global)?;
+    let options = DiagnoseOptions {
+        seed: global.seed(),
+        calibrated_here: true,
+        ..DiagnoseOptions::default()
+    };
+    let held = HeldAgainst { simulated: None, model: &done.calibration.model, options: &options };
+    examine(&recording, &held, &diagnosis, global)?;
     say(format!(
         "{} says how small an error would have been seen.",
         diagnosis.join("report.html").display()

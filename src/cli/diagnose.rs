@@ -1,6 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use kinoise::calibrate::model_of_any_form;
 use kinoise::camera::Rays;
 use kinoise::diagnose::{
     DiagnoseOptions, Diagnosed, Diagnosis, Field, Finding, Reference, Status, Verdict,
@@ -49,26 +50,38 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
             calibrated(&recording, global)?
         }
     };
-    let diagnosis = examine(&recording, simulated.as_ref(), &model, &arguments.output, global)?;
+    let options = DiagnoseOptions {
+        seed: global.seed(),
+        calibrated_here: arguments.model.is_none() && simulated.is_none(),
+        ..DiagnoseOptions::default()
+    };
+    let held = HeldAgainst { simulated: simulated.as_ref(), model: &model, options: &options };
+    let diagnosis = examine(&recording, &held, &arguments.output, global)?;
     global.print_json(&serde_json::to_value(&diagnosis)?)?;
     Ok(if diagnosis.verdict == Verdict::Mismatch { FOUND } else { 0 })
+}
+
+/// What a recording is held against, and how.
+pub struct HeldAgainst<'a> {
+    pub simulated: Option<&'a Recording>,
+    pub model: &'a NoiseModel,
+    pub options: &'a DiagnoseOptions,
 }
 
 /// Diagnose, write every output, report.
 pub fn examine(
     recording: &Recording,
-    simulated: Option<&Recording>,
-    model: &NoiseModel,
+    held: &HeldAgainst<'_>,
     output: &Path,
     global: &Global,
 ) -> anyhow::Result<Diagnosis> {
     let out = OutputDir::create(output)?;
-    let options = DiagnoseOptions { seed: global.seed(), ..DiagnoseOptions::default() };
+    let HeldAgainst { simulated, model, options } = *held;
     let bar = Bar::new("views");
     let step = |done, all| bar.step(done, all);
     let done = match simulated {
-        Some(simulated) => diagnose_against(recording, simulated, model, &options, &step)?,
-        None => diagnose(recording, model, &options, &step)?,
+        Some(simulated) => diagnose_against(recording, simulated, model, options, &step)?,
+        None => diagnose(recording, model, options, &step)?,
     };
     drop(bar);
     let diagnosis = &done.diagnosis;
@@ -92,7 +105,11 @@ fn calibrated(recording: &Recording, global: &Global) -> anyhow::Result<NoiseMod
     let views =
         kinoise::measure_recording(recording, &options.measure, &|done, all| bar.step(done, all))?;
     drop(bar);
-    Ok(kinoise::model_of(recording, &views, &options)?.model)
+    let model = model_of_any_form(recording, &views, &options)?.model;
+    if model.sigma.form != Form::Paper {
+        model.fit.remarks.iter().take(1).for_each(|why| say(format!("note: {why}")));
+    }
+    Ok(model)
 }
 
 /// The sigma to weigh by: the simulation's own, or the recording's where that has none.

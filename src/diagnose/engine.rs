@@ -9,6 +9,7 @@ use super::diagnosis::{
 };
 use super::field::Field;
 use super::findings::{self, Scene};
+use super::form::better_form;
 use super::heldout;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
@@ -27,13 +28,14 @@ use super::search::Outcome;
 use super::steps::{Steps, is_raw, lattice, steps};
 use super::structure::structures;
 use super::verdict::{
-    after, extend, least_size, merge, not_identifiable, shares, symptoms, view_lines,
+    after, echoes, extend, fold_into_sigma, least_size, merge, not_identifiable, shares, symptoms,
+    view_lines,
 };
 use crate::Progress;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
 use crate::measure::{MeasureOptions, Workbench};
-use crate::model::NoiseModel;
+use crate::model::{Form, NoiseModel};
 use crate::rng::Seed;
 use crate::terms::{Axis, Basis, PixelContext, Statistic, Term, corner_radius};
 use crate::view::{Excluded, Recording, Sensor};
@@ -44,13 +46,21 @@ pub struct DiagnoseOptions {
     pub seed: Seed,
     /// Chance that a clean recording is said to have anything wrong.
     pub level: f64,
+    /// The model was calibrated on this very recording, causes and all: sigma is refitted beside
+    /// whatever is found, and that is no finding.
+    pub calibrated_here: bool,
     /// Nothing, but in tests of what each part is for.
     pub ablation: Ablation,
 }
 
 impl Default for DiagnoseOptions {
     fn default() -> Self {
-        DiagnoseOptions { seed: Seed(1), level: 0.03, ablation: Ablation::None }
+        DiagnoseOptions {
+            seed: Seed(1),
+            level: 0.03,
+            calibrated_here: false,
+            ablation: Ablation::None,
+        }
     }
 }
 
@@ -186,6 +196,7 @@ impl<'a> Case<'a> {
             .transpose()?;
         let mut survey = Survey::of(&fields, &sensor.camera, &bench.rays);
         survey.ablate(options.ablation, &fields);
+        survey.refits_sigma = options.calibrated_here && simulated.is_none();
         survey.fixed_px2 = fixed_px2(&structures(&fields, &sensor.camera, &[]));
         if let Some(baseline) = &baseline {
             baseline.references(&mut fields);
@@ -272,9 +283,21 @@ impl<'a> Case<'a> {
         let terms = terms_of(&outcome, Statistic::Variance);
         measure_tails(&mut structure, &self.fields, &mean.px, &terms, &self.survey, &self.bench);
         let alike = self.baseline.as_ref().is_some_and(|b| b.tails_alike(&structure));
-        let uneven = outcome.chosen.iter().any(|c| c.candidate.family.is_none());
+        let uneven = outcome.chosen.iter().any(|c| c.candidate.family.is_none())
+            || !terms.iter().all(|t| self.holds_tails(t));
         let tails = tails(&structure, &self.known, each, uneven).filter(|_| !alike);
         Scatter { lattice, hangs, tails, outcome }
+    }
+
+    /// A refit that makes sigma much smaller somewhere rests on noise that steps have swallowed, or
+    /// on a cause that was taken for noise: against it everything has tails.
+    fn holds_tails(&self, term: &Term) -> bool {
+        const MUCH: f64 = -1.4;
+        let mut row = Vec::new();
+        let mut tiles = self.survey.views.iter().flat_map(|v| &v.tiles);
+        !self.survey.refits_sigma
+            || !matches!(term.basis, Basis::Recalibrate { .. })
+            || tiles.all(|t| term.value(&t.place, &mut row) > MUCH)
     }
 
     fn range_share(&self, terms: &[Term]) -> f64 {
@@ -358,9 +381,36 @@ impl<'a> Case<'a> {
         found
     }
 
-    fn lost(&self) -> (Vec<Finding>, Vec<Detectable>) {
+    /// The refit of a sigma that was calibrated here is no finding; where it changes more than noise
+    /// can, the extended model has it.
+    fn take_refit(&self, curves: &mut Vec<Finding>, variance: &Outcome) -> Option<Finding> {
+        if !self.survey.refits_sigma {
+            return None;
+        }
+        let threshold = variance.noise.threshold(self.options.level);
+        let at = curves.iter().position(|f| f.status == Status::Recalibrate)?;
+        // Nats, as long as they are not shares.
+        Some(curves.remove(at)).filter(|f| f.share > threshold)
+    }
+
+    /// Where sigma's own form is off, the form that would do better: beside the finding, and as a
+    /// remark.
+    fn tell_form(&self, curves: &mut [Finding], refitted: bool) -> Option<String> {
+        let told = curves.iter_mut().find(|f| f.status == Status::Recalibrate);
+        if self.baseline.is_some() || told.is_none() && !refitted {
+            return None;
+        }
+        let better = better_form(&self.survey, &self.model.sigma, self.fields[0].scale_px_m)?;
+        if let Some(finding) = told {
+            finding.physics += &format!(" The noise follows better: {better}.");
+        }
+        Some(format!("sigma over depth and tilt follows better: {better}"))
+    }
+
+    fn lost(&mut self) -> (Vec<Finding>, Vec<Detectable>) {
         let camera = &self.sensor().camera;
         let lost = missing(&self.fields, &self.survey, camera, &self.bench.rays, self.options.seed);
+        self.copies.extend(lost.notes);
         let known = |id| self.known.has(id);
         let baseline = self.baseline.as_ref();
         let found = lost
@@ -402,6 +452,9 @@ impl<'a> Case<'a> {
 
     fn remarks(&mut self) -> Vec<String> {
         let mut remarks = self.recording.remarks.clone();
+        if self.options.calibrated_here && self.model.sigma.form != Form::Paper {
+            remarks.extend(self.model.fit.remarks.first().cloned());
+        }
         remarks.append(&mut self.copies);
         if self.sensor().baseline_m.is_none() {
             remarks.push(format!(
@@ -420,10 +473,17 @@ impl<'a> Case<'a> {
         let sigma_mm = typical_sigma_mm(&self.fields);
         let steps = steps(&scatter.lattice, &self.known, &self.fields, self.recording, sigma_mm);
         let mut curves = self.curves(&scenes, outcomes);
+        let refitted = self.take_refit(&mut curves, &scatter.outcome);
         curves.retain(|f| self.is_news(f, &steps, scatter));
+        if self.baseline.is_none() {
+            fold_into_sigma(&mut curves);
+        }
+        let better = self.tell_form(&mut curves, refitted.is_some());
         let mut found: Vec<Finding> = self.ranges.clone().into_iter().chain(curves).collect();
         found.extend(self.texture(&mean, scatter, steps));
+        drop(scenes);
         let (lost, more_detectable) = self.lost();
+        let scenes = self.scenes();
         found.extend(lost);
         found.extend(self.laws(&mean.terms));
         let mismatch = found.iter().any(|f| f.status != Status::NotIdentifiable);
@@ -438,6 +498,7 @@ impl<'a> Case<'a> {
         if self.baseline.is_some() {
             symptoms(&mut found);
         }
+        echoes(&mut found);
         merge(&mut found);
         shares(&mut found);
         let heldout = heldout::score(
@@ -454,8 +515,10 @@ impl<'a> Case<'a> {
             super::detectable::detectable(&self.survey, &mean.outcome, &scatter.outcome, camera);
         detectable.extend(more_detectable);
         drop(scenes);
-        let remarks = self.remarks();
-        let extended = extend(self.model, &found, self.sensor(), self.survey.reach.disparity);
+        let mut remarks = self.remarks();
+        remarks.extend(better);
+        let known = found.iter().chain(&refitted);
+        let extended = extend(self.model, known, self.sensor(), self.survey.reach.disparity);
         let diagnosis = Diagnosis {
             format: DIAGNOSIS_FORMAT,
             recording: self.recording.root.display().to_string(),

@@ -9,7 +9,7 @@ use super::field::Field;
 use super::joint::refit;
 use super::reach::Extent;
 use super::scatter::{Left, left_by_fit};
-use super::search::{Outcome, Rules, ViewData, coarser, search};
+use super::search::{Outcome, Rules, ViewData, coarser, search, search_beside};
 use super::smooth::{SMOOTH_PX, high_pass};
 use super::tiles::{SIDE, Tile, tiles};
 use super::variance;
@@ -28,6 +28,8 @@ pub struct Survey {
     pub light: Light,
     /// How well the size of the noise is known from view to view beforehand, in log variance.
     pub tolerance: f64,
+    /// Sigma was calibrated on these very views: it is refitted beside every hypothesis.
+    pub refits_sigma: bool,
     pub ablation: Ablation,
 }
 
@@ -97,7 +99,7 @@ impl Survey {
         let light = relative_light(&mut views);
         let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter()));
         let (tolerance, ablation) = (MODEL_TOLERANCE, Ablation::None);
-        Survey { views, reach, fixed_px2: 0.0, light, tolerance, ablation }
+        Survey { views, reach, fixed_px2: 0.0, light, tolerance, refits_sigma: false, ablation }
     }
 
     /// Root of the weighted harmonic mean of the model's variance, px.
@@ -155,6 +157,7 @@ impl Survey {
             fixed_px2: self.fixed_px2,
             light: self.light,
             tolerance: self.tolerance,
+            refits_sigma: self.refits_sigma,
             ablation: self.ablation,
         }
     }
@@ -249,9 +252,13 @@ impl Survey {
         };
         let mut candidates = variance::families(&self.reach, sigma);
         candidates.extend(variance::curves(camera, &self.reach));
+        let refit = self.refits_sigma.then(|| variance::refit(&self.reach));
+        if refit.is_some() {
+            candidates.retain(variance::beyond_sigma);
+        }
         let data = self.variance_data();
         let candidates = self.ablation.candidates(candidates);
-        search(&data, &data, &candidates, &self.ablation.rules(rules), seed)
+        search_beside(&data, &data, &candidates, refit, &self.ablation.rules(rules), seed)
     }
 }
 

@@ -49,6 +49,8 @@ pub struct DropoutOutcome {
     /// Families with the middle of the faintest whole step that 80 % of such recordings would
     /// show, in degrees or m: what begins farther out is not seen.
     pub detectable: Vec<(&'static str, &'static str, f64)>,
+    /// What is no finding, in words.
+    pub notes: Vec<String>,
 }
 
 /// Fewer views show no rule.
@@ -124,9 +126,30 @@ fn losses(seen: &Seen, reach: &Extent, camera: &Camera, seed: Seed) -> DropoutOu
         explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
         taken.push(won.shape.axis());
         let told = Told { fine: &seen.fine, told: &seen.told, base: losses.base, reach, camera };
-        outcome.findings.push(told.finding(won, rivals(&judged), chance.of_gain(won.gain)));
+        let finding = told.finding(won, rivals(&judged), chance.of_gain(won.gain));
+        match hard_end(&finding) {
+            Some(note) => outcome.notes.push(note),
+            None => outcome.findings.push(finding),
+        }
     }
     outcome
+}
+
+/// An edge this narrow, as a share of its distance, is a limit that a driver or a format has set; a
+/// pattern that grows faint goes gradually.
+const HARD: f64 = 0.02;
+
+/// The note in place of a finding where all is missing beyond a limit (or before one).
+fn hard_end(finding: &DropoutFinding) -> Option<String> {
+    if finding.family != Some("range-dropout") || finding.parameters.contains_key("share") {
+        return None;
+    }
+    let value = |name: &str| finding.parameters.get(name)?.get("value")?.as_f64();
+    let (z, width) = (value("z50_m")?, value("width_m")?);
+    let side = if width > 0.0 { "beyond" } else { "nearer than" };
+    (width.abs() < HARD * z).then(|| {
+        format!("every reading {side} {z:.2} m is missing: the range has a hard end there, set by the sensor's driver or format")
+    })
 }
 
 /// The best step, unless the best curve leaves it behind.

@@ -111,6 +111,16 @@ fn what_is_too_near_is_lost_on_the_near_side() {
     assert!(first.interval[0] == 0.0 && (first.interval[1] - 1.12).abs() < 0.08);
 }
 
+/// A driver's limit, with readings that scatter about it by 1 %: a note, and nothing named.
+#[test]
+fn a_hard_end_of_the_range_is_a_note() {
+    let mut rng = Seed(6).stream("hard");
+    let (views, camera) = session(0.002, &mut rng, |p| 1.0 / (1.0 + ((2.2 - p.z) / 0.013).exp()));
+    let outcome = find(&views, &camera, Seed(6));
+    assert!(outcome.findings.iter().all(|f| f.axis != Axis::Z), "{:?}", outcome.findings);
+    assert!(outcome.notes.len() == 1 && outcome.notes[0].contains("2.2"), "{:?}", outcome.notes);
+}
+
 /// A band of rows has no name, but a place.
 #[test]
 fn rows_that_fail_are_told_by_their_axis() {

@@ -10,6 +10,7 @@ mod engine;
 mod evidence;
 mod field;
 mod findings;
+mod form;
 mod frames;
 mod heldout;
 mod joint;

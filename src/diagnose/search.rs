@@ -165,6 +165,19 @@ pub fn search(
     rules: &Rules,
     seed: Seed,
 ) -> Outcome {
+    search_beside(fine, coarse, candidates, None, rules, seed)
+}
+
+/// The same, with a term that is fitted beside every other, whatever it brings: what it can take
+/// up is nobody else's. It stays in, last of the chosen.
+pub fn search_beside(
+    fine: &[ViewData],
+    coarse: &[ViewData],
+    candidates: &[Candidate],
+    beside: Option<Candidate>,
+    rules: &Rules,
+    seed: Seed,
+) -> Outcome {
     let mut layer = Layer {
         fine,
         coarse,
@@ -173,9 +186,11 @@ pub fn search(
         noise: None,
         looks: Vec::new(),
         largest: 0.0,
+        pinned: None,
         seed,
     };
     let mut chosen: Vec<Chosen> = Vec::new();
+    layer.pinned = beside.map(|candidate| layer.pin(candidate));
     let mut remaining = None;
     while let Some(next) = layer.step(&chosen) {
         let little = chosen.first().is_some_and(|first| next.gain < LEAST_SHARE * first.gain);
@@ -194,6 +209,7 @@ pub fn search(
         layer.look_back(&mut chosen);
     }
     layer.refine_maps(&mut chosen);
+    chosen.extend(layer.pinned.clone());
     let evidence = layer.evidence_of(&bases(&chosen));
     let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
     let noise = layer.noise.unwrap_or_default();
@@ -282,6 +298,8 @@ struct Layer<'a> {
     looks: Vec<Look>,
     /// Root mean square of the largest term so far.
     largest: f64,
+    /// Fitted beside everything.
+    pinned: Option<Chosen>,
     seed: Seed,
 }
 
@@ -336,8 +354,18 @@ impl<'a> Layer<'a> {
         pairs.par_iter().filter_map(|(f, c)| prepare(f, c, &named, &settled)).collect()
     }
 
-    /// The best candidate beside `chosen`, if it brings more than noise can.
+    /// A term that stays, with what it brings alone.
+    fn pin(&self, candidate: Candidate) -> Chosen {
+        let alone = gain(&self.evidence_of(&[&candidate.basis]), self.rules.prior);
+        let gain = alone.map_or(0.0, |g| g.total);
+        let (adequacy, rivals) = (self.rules.adequacy, Vec::new());
+        Chosen { candidate, rms: 0.0, adequacy, gain, best_curve: 0.0, rivals, p: 1.0 }
+    }
+
+    /// The best candidate beside `chosen` and what is pinned, if it brings more than noise can.
     fn step(&mut self, chosen: &[Chosen]) -> Option<Chosen> {
+        let with_pinned: Vec<Chosen> = self.pinned.iter().chain(chosen).cloned().collect();
+        let chosen = &with_pinned[..];
         let views = self.prepare(chosen);
         let before: Vec<Evidence> = views.iter().map(|v| v.coarse.1.reduce(0, |_, _| ())).collect();
         let m = before.first()?.b.len();
@@ -517,7 +545,8 @@ impl<'a> Layer<'a> {
             let total = |terms: &[&Basis]| {
                 gain(&self.evidence_of(terms), self.rules.prior).map_or(0.0, |g| g.total)
             };
-            let old = bases(chosen);
+            let mut old = bases(chosen);
+            old.extend(self.pinned.iter().map(|c| &c.candidate.basis));
             let mut new = old.clone();
             new[k] = &finer;
             let better = total(&new) - total(&old);

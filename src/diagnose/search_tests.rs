@@ -5,7 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::rng::{Seed, Stream};
-use crate::terms::{Coordinate, Modulation};
+use crate::terms::{Axis, Coordinate, Modulation};
 
 const VIEWS: usize = 12;
 const SAMPLES: usize = 120;
@@ -105,6 +105,29 @@ fn what_was_put_in_is_found_with_its_size() {
         // Five standard errors in 8 searches: 5e-6.
         assert!((k - 1.5).abs() < 5.0 * error && error < 0.15, "{k} +- {error}");
         assert!(outcome.chosen[0].p < 1e-4 && outcome.chosen[0].rivals[0].behind == 0.0);
+    }
+}
+
+/// What a pinned term can take up is nobody else's; it stays, last, and others are found beside it.
+#[test]
+fn what_is_pinned_takes_up_its_own() {
+    let over = Coordinate::Radius;
+    let basis = Basis::Curve { over, low: 0.0, high: 1.0, nodes: 5, times: Modulation::One };
+    for (stripes, names) in [(0.0, vec![None]), (1.0, vec![Some("column-banding"), None])] {
+        let mut rng = Seed(9).stream("search/pinned");
+        let views = session(&mut rng, |p| {
+            let wave = (std::f64::consts::TAU * p.u / 160.0).sin();
+            1.5 * p.radius * p.radius + stripes * wave
+        });
+        let pinned = Some(Candidate::curve(basis.clone()));
+        let beyond: Vec<Candidate> =
+            candidates().into_iter().filter(|c| c.basis.axis() != Axis::Radius).collect();
+        let outcome = search_beside(&views, &views, &beyond, pinned, &RULES, Seed(9));
+        assert_eq!(families(&outcome), names);
+        let last = outcome.chosen.len() - 1;
+        let beta = outcome.coefficients(last);
+        // Of 1.5 r^2 from r = 1/4 to r = 3/4.
+        assert!((beta[3] - beta[1] - 0.75).abs() < 0.3, "{beta:?}");
     }
 }
 

@@ -36,13 +36,78 @@ pub fn families(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
         }
     }
     all.extend(recalibrations(reach, sigma));
+    all.extend(surfaces(reach));
     all
+}
+
+/// Does it say more than a sigma over depth and tilt can? What follows these two alone is the form
+/// of sigma, not physics, where sigma was fitted to the same views.
+pub fn beyond_sigma(candidate: &Candidate) -> bool {
+    let of_sigma = match &candidate.basis {
+        Basis::RangeExponent { .. } | Basis::Level | Basis::Recalibrate { .. } => true,
+        Basis::Curve { over, times, .. } => {
+            matches!(over, Coordinate::LogZ | Coordinate::Theta) && *times == Modulation::One
+        }
+        _ => false,
+    };
+    !of_sigma
+}
+
+/// Sigma's level and form, free.
+pub fn refit(reach: &Extent) -> Candidate {
+    surface(reach, &|l, t| {
+        let u = steepness(t);
+        let w = t * t;
+        vec![1.0, l, l * l, l.powi(3), l.powi(4), u, w, u * u, u * l, w * l, u * l * l, w * l * l]
+    })
+}
+
+/// Free surfaces over depth and tilt, from few columns to many: what a family says that follows
+/// only these two must be said better than by all of them.
+fn surfaces(reach: &Extent) -> Vec<Candidate> {
+    vec![
+        surface(reach, &|l, _| vec![1.0, l, l * l]),
+        surface(reach, &|_, t| vec![1.0, steepness(t)]),
+        surface(reach, &|l, t| vec![1.0, l, l * l, steepness(t), t * t]),
+        surface(reach, &|l, t| {
+            let u = steepness(t);
+            vec![1.0, l, l * l, l.powi(3), u, t * t, u * l, t * t * l]
+        }),
+        refit(reach),
+    ]
+}
+
+/// Twice the logarithm of 1 / cos(theta): by so much log variance along the axis exceeds that
+/// across the plane.
+fn steepness(theta: f64) -> f64 {
+    -2.0 * theta.cos().max(0.05).ln()
+}
+
+/// Columns of log depth (-1 to 1 over the reach) and tilt as a change of sigma.
+fn surface(reach: &Extent, columns: &dyn Fn(f64, f64) -> Vec<f64>) -> Candidate {
+    let (z_m, theta_rad) = table_reach(reach);
+    let at = |[low, high]: [f64; 2], k: usize| low + (high - low) * k as f64 / (TABLE - 1) as f64;
+    let log = z_m.map(f64::ln);
+    let rows: Vec<Vec<f64>> = (0..TABLE * TABLE)
+        .map(|n| {
+            let share = (at(z_m, n % TABLE).ln() - log[0]) / (log[1] - log[0]).max(1e-9);
+            columns(2.0 * share - 1.0, at(theta_rad, n / TABLE))
+        })
+        .collect();
+    let columns = (0..rows[0].len()).map(|j| rows.iter().map(|row| row[j]).collect()).collect();
+    Candidate::named(RECALIBRATE, Basis::Recalibrate { z_m, theta_rad, columns })
+}
+
+/// Where a table of sigma's changes is laid out; never empty.
+fn table_reach(reach: &Extent) -> ([f64; 2], [f64; 2]) {
+    let wide = |[low, high]: [f64; 2]| [low, high.max(low + 1e-3)];
+    (wide(reach.z), wide(reach.theta))
 }
 
 /// The derivatives of log variance after the sigma model's parameters: all of them, and those that
 /// a frontal target decides.
 fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
-    let (z_m, theta_rad) = (reach.z, [reach.theta[0], reach.theta[1].max(reach.theta[0] + 1e-3)]);
+    let (z_m, theta_rad) = table_reach(reach);
     let table = |model: &SigmaModel| -> Vec<f64> {
         let at =
             |[low, high]: [f64; 2], k: usize| low + (high - low) * k as f64 / (TABLE - 1) as f64;
