@@ -31,7 +31,9 @@ pub fn refit(fine: &[ViewData], inflation: &[f64], camera: &Camera, found: Outco
         .zip(inflation)
         .map(|(view, own)| {
             let mut view = if rough { view.clone() } else { coarser(view) };
-            view.weight.iter_mut().for_each(|w| *w *= own / common);
+            // A target too small to measure its noise on weighs nothing already.
+            let share = if own.is_finite() { own / common } else { 0.0 };
+            view.weight.iter_mut().for_each(|w| *w *= share);
             view
         })
         .collect();
@@ -44,7 +46,7 @@ pub fn refit(fine: &[ViewData], inflation: &[f64], camera: &Camera, found: Outco
 }
 
 fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     sorted.get(sorted.len() / 2).copied().unwrap_or(1.0)
 }
