@@ -623,6 +623,25 @@ fn depths_beyond_the_code_stand_at_its_end() {
     assert!(said.contains("beyond the range of the depth code"), "{said}");
 }
 
+/// Learnt at 3 to 4 px, 2.7 to 3.6 m, and met by views that are nearer: each is corrected as the
+/// nearest that was learnt, and the share of them is told.
+#[test]
+fn a_shape_is_held_where_its_learning_ended_and_that_is_told() {
+    let files = Files::new();
+    let recording = files.recording(METRIC, Vec::new());
+    let growing = bias(Basis::Bowl { disparity_power: 2.0, orders: 1 }, &[30.0]);
+    let learnt = Effect { learnt_px: Some([3.0, 4.0]), ..shaped(UNEXPLAINED, vec![growing]) };
+    files.model(&small(vec![learnt]));
+    let (_, said) = files.correct(&recording, &[]);
+    assert!(said.contains("outside 2.72 to 3.62 m") && said.contains("held at the edge"), "{said}");
+    let held = tree(&files.at("out"));
+    fs::remove_dir_all(files.at("out")).expect("removed");
+    files.model(&small(vec![bowl(30.0 * (4.0f64 / 40.0).powi(2))]));
+    let (json, said) = files.correct(&recording, &[]);
+    assert!(json["pixels_changed"].as_u64() > Some(100_000), "{json}");
+    assert!(!said.contains("held at the edge") && tree(&files.at("out")) == held, "{said}");
+}
+
 #[test]
 fn a_damaged_image_is_copied_and_told() {
     let files = Files::new();
