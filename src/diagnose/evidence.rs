@@ -307,25 +307,35 @@ fn dispersion(
     let beta = factor.solve(&seen);
     // What each view says beyond the common fit.
     let left: Vec<DVector<f64>> = scores.iter().zip(alone).map(|(b, a)| b - a * &beta).collect();
-    let (mut sum, mut n) = (0.0, 0.0);
+    // Squares that are one each, in the mean, where views scatter by their noise alone.
+    let mut squares = Vec::new();
     for (j, &total) in total.iter().enumerate() {
         if total < 1e-6 * most {
             continue;
         }
         for (left, a) in left.iter().zip(by_view) {
             // A view that says next to nothing would divide by next to nothing.
-            if a[j] > 1e-3 * total {
-                sum += u.column(j).dot(left).powi(2) / a[j];
-                n += 1.0 - a[j] / total;
+            let free = 1.0 - a[j] / total;
+            if a[j] > 1e-3 * total && free > 0.1 {
+                squares.push(u.column(j).dot(left).powi(2) / (a[j] * free));
             }
         }
     }
-    if n < 1.0 {
+    let n = squares.len() as f64;
+    if n < 2.0 {
         return 1.0;
     }
-    // Chance alone scatters the estimate by the root of 2 / n.
-    (sum / n - f64::sqrt(2.0 / n)).max(1.0)
+    // By the median: what a few views have and the others have not is no scatter.
+    let half = squares.len() / 2;
+    let middle = *squares.select_nth_unstable_by(half, f64::total_cmp).1 / CHI2_MEDIAN;
+    (middle / (1.0 + MEDIAN_ERROR / n.sqrt())).max(1.0)
 }
+
+/// Median of the square of a standard normal number.
+const CHI2_MEDIAN: f64 = 0.4549;
+/// Relative standard error of the median of n such squares, times the root of n: 1 / (2 f m) with
+/// their density f at the median m.
+const MEDIAN_ERROR: f64 = 2.33;
 
 #[cfg(test)]
 #[path = "evidence_tests.rs"]

@@ -69,7 +69,7 @@ pub struct SurveyedView {
 /// No more terms than this are looked for in a layer.
 const MOST_TERMS: usize = 10;
 /// A bias smaller than this share of the noise is nobody's concern.
-const LEAST_SIGMAS: f64 = 0.007;
+const LEAST_SIGMAS: f64 = 0.002;
 /// A name that explains less than this share of what a nameless curve explains is not the cause.
 const ADEQUATE: f64 = 0.6;
 /// Precision of a coefficient of the bias: a few px at most.
@@ -440,6 +440,7 @@ impl Sum {
 
 /// A model's sigma is not known better than this from view to view, in log variance.
 const MODEL_TOLERANCE: f64 = 0.04;
+const KNOWN: f64 = 0.01;
 
 /// Variance of the views' own levels beyond what their samples explain (a moment estimate after
 /// DerSimonian and Laird), about laws of the distance and of the tilt: what a law explains is no
@@ -471,6 +472,7 @@ fn view_scatter(blocks: &[Blocks], tolerance: f64) -> f64 {
     let left = squares / free;
     let sampling = levels.iter().map(|l| l.2).sum::<f64>() / n as f64;
     let enlarged = if free > 3.0 { free / (free - 2.0) } else { 3.0 };
+    let floor = if tolerance > MODEL_TOLERANCE { floor } else { KNOWN * KNOWN };
     ((left - sampling) * enlarged).max(floor)
 }
 

@@ -97,7 +97,7 @@ fn nats(m: &Mean, expected: f64) -> f64 {
 }
 
 /// Windows that differ by less than this factor are the same.
-const SAME_WINDOW: f64 = 1.12;
+const SAME_WINDOW: f64 = 1.03;
 
 fn window(views: &[Structure], known: &KnownTerms, level: f64) -> Option<Hanging> {
     let m = Mean::of(views, |s| s.window_px.map(f64::ln))?;
@@ -132,14 +132,14 @@ fn window(views: &[Structure], known: &KnownTerms, level: f64) -> Option<Hanging
 }
 
 /// Mean correlation of near pixels that is worth a word.
-const LEAST_NEAR: f64 = 0.002;
+const LEAST_NEAR: f64 = 0.0005;
 /// As far as neighbours are looked at, px.
 const REACH_PX: f64 = 4.0;
 
 /// Correlations smaller than this are not worth a word.
-const LEAST_CORRELATION: f64 = 0.015;
+const LEAST_CORRELATION: f64 = 0.004;
 /// Share of the variance that pixels repeat in every view, worth a word.
-const LEAST_FIXED: f64 = 0.001;
+const LEAST_FIXED: f64 = 0.0003;
 /// A share that stands still beside one that changes slowly is known to this.
 const BESIDE_ANOTHER: f64 = 0.05;
 
@@ -315,7 +315,7 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {
 }
 
 /// Share of the variance that lines have in common, worth a word.
-const LEAST_LINES: f64 = 0.0015;
+const LEAST_LINES: f64 = 0.0004;
 
 /// A tail is heavy from this many times a Gaussian's share on.
 const HEAVY: f64 = 2.5;
