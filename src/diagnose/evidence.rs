@@ -214,7 +214,8 @@ pub struct Null {
     by_view: Vec<Vec<f64>>,
     total: Vec<f64>,
     prior: f64,
-    /// How much more the views' own fits scatter than their noise explains, at least 1.
+    /// How much more the views' own fits scatter than their noise explains, at least 1: about the
+    /// common fit, or about nothing at all where a few views have what the others have not.
     pub dispersion: f64,
 }
 
@@ -231,7 +232,8 @@ impl Null {
         };
         let by_view: Vec<Vec<f64>> = alone.iter().map(information).collect();
         let total: Vec<f64> = (0..k).map(|j| by_view.iter().map(|a| a[j]).sum()).collect();
-        let dispersion = dispersion(&alone, &by_view, &total, &u, &left, prior);
+        let about_fit = dispersion(&alone, &by_view, &total, &u, &left, prior);
+        let dispersion = about_fit.min(usual_square(&by_view, &total, &u, &left));
         Some(Null { by_view, total, prior, dispersion })
     }
 
@@ -307,28 +309,47 @@ fn dispersion(
     let beta = factor.solve(&seen);
     // What each view says beyond the common fit.
     let left: Vec<DVector<f64>> = scores.iter().zip(alone).map(|(b, a)| b - a * &beta).collect();
-    // Squares that are one each, in the mean, where views scatter by their noise alone.
-    let mut squares = Vec::new();
+    let (mut sum, mut n) = (0.0, 0.0);
     for (j, &total) in total.iter().enumerate() {
         if total < 1e-6 * most {
             continue;
         }
         for (left, a) in left.iter().zip(by_view) {
             // A view that says next to nothing would divide by next to nothing.
-            let free = 1.0 - a[j] / total;
-            if a[j] > 1e-3 * total && free > 0.1 {
-                squares.push(u.column(j).dot(left).powi(2) / (a[j] * free));
+            if a[j] > 1e-3 * total {
+                sum += u.column(j).dot(left).powi(2) / a[j];
+                n += 1.0 - a[j] / total;
             }
         }
     }
-    let n = squares.len() as f64;
-    if n < 2.0 {
+    if n < 1.0 {
         return 1.0;
     }
-    // By the median: what a few views have and the others have not is no scatter.
-    let half = squares.len() / 2;
-    let middle = *squares.select_nth_unstable_by(half, f64::total_cmp).1 / CHI2_MEDIAN;
-    (middle / (1.0 + MEDIAN_ERROR / n.sqrt())).max(1.0)
+    // Chance alone scatters the estimate by the root of 2 / n.
+    (sum / n - f64::sqrt(2.0 / n)).max(1.0)
+}
+
+/// Median of the views' squared scores, over what noise gives them: near 1 where most views have
+/// nothing of the candidate, whatever the others have.
+fn usual_square(
+    by_view: &[Vec<f64>],
+    total: &[f64],
+    u: &DMatrix<f64>,
+    scores: &[DVector<f64>],
+) -> f64 {
+    let most = total.iter().copied().fold(0.0, f64::max);
+    let mut squares = Vec::new();
+    for (j, &total) in total.iter().enumerate().filter(|(_, t)| **t >= 1e-6 * most) {
+        let seen = scores.iter().zip(by_view).filter(|(_, a)| a[j] > 1e-3 * total);
+        squares.extend(seen.map(|(b, a)| u.column(j).dot(b).powi(2) / a[j]));
+    }
+    if squares.is_empty() {
+        return 1.0;
+    }
+    let (half, n) = (squares.len() / 2, squares.len() as f64);
+    let middle = *squares.select_nth_unstable_by(half, f64::total_cmp).1;
+    // By one standard error of the median more, for safety.
+    (middle / CHI2_MEDIAN * (1.0 + MEDIAN_ERROR / n.sqrt())).max(1.0)
 }
 
 /// Median of the square of a standard normal number.

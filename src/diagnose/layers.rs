@@ -69,7 +69,7 @@ pub struct SurveyedView {
 /// No more terms than this are looked for in a layer.
 const MOST_TERMS: usize = 10;
 /// A bias smaller than this share of the noise is nobody's concern.
-const LEAST_SIGMAS: f64 = 0.002;
+const LEAST_SIGMAS: f64 = 0.004;
 /// A name that explains less than this share of what a nameless curve explains is not the cause.
 const ADEQUATE: f64 = 0.6;
 /// Precision of a coefficient of the bias: a few px at most.

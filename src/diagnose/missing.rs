@@ -135,25 +135,24 @@ fn losses(seen: &Seen, reach: &Extent, camera: &Camera, seed: Seed) -> DropoutOu
     outcome
 }
 
-/// An edge that is surely narrower than this share of its distance is a limit that a driver or a
-/// format has set; a pattern that grows faint goes gradually.
-const HARD: f64 = 0.015;
+/// An edge narrower than this share of its distance, and passed by this many widths, is a limit that
+/// a driver or a format has set (noise of 1 % blurs it so); a pattern that grows faint goes gradually.
+const HARD: f64 = 0.01;
+const PASSED: f64 = 5.0;
 
-/// The note in place of a finding where all is missing beyond a limit (or before one), and the views
-/// reach past it.
+/// The note in place of a finding where all is missing beyond a limit (or before one).
 fn hard_end(finding: &DropoutFinding) -> Option<String> {
     if finding.family != Some("range-dropout") || finding.parameters.contains_key("share") {
         return None;
     }
-    let number = |name: &str, of: &str| finding.parameters.get(name)?.get(of)?.as_f64();
-    let (z, width) = (number("z50_m", "value")?, number("width_m", "value")?);
-    let widest = width.abs() + 2.0 * number("width_m", "std_error")?;
-    let (side, past) = if width > 0.0 {
-        ("beyond", finding.interval[1] > z + widest)
-    } else {
-        ("nearer than", finding.interval[0] < z - widest)
+    let value = |name: &str| finding.parameters.get(name)?.get("value")?.as_f64();
+    let (z, width) = (value("z50_m")?, value("width_m")?);
+    let (side, end) = match width > 0.0 {
+        true => ("beyond", finding.interval[1]),
+        false => ("nearer than", finding.interval[0]),
     };
-    (past && widest < HARD * z).then(|| {
+    let past = (end - z) / width > PASSED;
+    (past && width.abs() < HARD * z).then(|| {
         format!("every reading {side} {z:.2} m is missing: the range has a hard end there, set by the sensor's driver or format")
     })
 }

@@ -97,7 +97,7 @@ fn nats(m: &Mean, expected: f64) -> f64 {
 }
 
 /// Windows that differ by less than this factor are the same.
-const SAME_WINDOW: f64 = 1.03;
+const SAME_WINDOW: f64 = 1.12;
 
 fn window(views: &[Structure], known: &KnownTerms, level: f64) -> Option<Hanging> {
     let m = Mean::of(views, |s| s.window_px.map(f64::ln))?;

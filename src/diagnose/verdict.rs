@@ -236,7 +236,7 @@ pub(super) fn view_lines(
 
 /// What is smaller than this, in sigmas, is told of by nobody: models are not better than that.
 pub(super) fn least_size(statistic: Statistic) -> f64 {
-    if statistic == Statistic::Bias { 0.001 } else { 0.003 }
+    if statistic == Statistic::Bias { 0.003 } else { 0.003 }
 }
 
 #[cfg(test)]
