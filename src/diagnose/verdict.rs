@@ -234,10 +234,8 @@ pub(super) fn view_lines(
         .collect()
 }
 
-/// What is smaller than this, in sigmas, is told of by nobody: models are not better than that.
-pub(super) fn least_size(statistic: Statistic) -> f64 {
-    if statistic == Statistic::Bias { 0.003 } else { 0.003 }
-}
+/// A bias or a change of variance smaller than this, in sigmas, is not told.
+pub(super) const LEAST_SIZE: f64 = 0.003;
 
 #[cfg(test)]
 mod tests {

@@ -634,12 +634,23 @@ fn a_shape_is_held_where_its_learning_ended_and_that_is_told() {
     files.model(&small(vec![learnt]));
     let (_, said) = files.correct(&recording, &[]);
     assert!(said.contains("outside 2.72 to 3.62 m") && said.contains("held at the edge"), "{said}");
-    let held = tree(&files.at("out"));
+    let held = raw_values(&files.at("out"));
     fs::remove_dir_all(files.at("out")).expect("removed");
     files.model(&small(vec![bowl(30.0 * (4.0f64 / 40.0).powi(2))]));
     let (json, said) = files.correct(&recording, &[]);
     assert!(json["pixels_changed"].as_u64() > Some(100_000), "{json}");
-    assert!(!said.contains("held at the edge") && tree(&files.at("out")) == held, "{said}");
+    assert!(!said.contains("held at the edge"), "{said}");
+    // What stands still is added up in single precision.
+    let other = raw_values(&files.at("out"));
+    assert!(held.len() == other.len() && held.iter().zip(&other).all(|(a, b)| a.abs_diff(*b) <= 1));
+}
+
+/// Of every frame of a recording, one after another.
+fn raw_values(recording: &Path) -> Vec<u16> {
+    let opened = open_uncut(recording, &Assumed::default()).expect("opened");
+    let mut source = FrameSource::new(160, 120);
+    let frames = opened.views.iter().flat_map(|v| &v.depth);
+    frames.flat_map(|f| source.read(&f.path).expect("read").raw).collect()
 }
 
 #[test]
