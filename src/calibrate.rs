@@ -65,9 +65,7 @@ pub struct Calibration {
 }
 
 /// Measure every view. A view without a plane is excluded, with its reason; `progress` counts views.
-///
-/// # Errors
-/// When no view can be measured at all; the message gives the first reason.
+/// An error when no view can be measured at all; the message gives the first reason.
 pub fn measure(
     recording: &Recording,
     options: &MeasureOptions,
@@ -107,9 +105,8 @@ pub fn measure(
 }
 
 /// Fit the noise model to the measured views.
-///
-/// # Errors
-/// When the views are too few or too alike for the form, or a file that describes them is gone.
+/// An error when the views are too few or too alike for the form, or a file that describes them is
+/// gone.
 pub fn model_of(
     recording: &Recording,
     measurements: &Measurements,
@@ -138,9 +135,6 @@ pub fn model_of(
 }
 
 /// Fit a bare table that was read from `source`; of the options only `form` and `created` count.
-///
-/// # Errors
-/// As [`model_of`].
 pub fn model_of_table(
     table: &SigmaTable,
     source: &Path,
@@ -182,8 +176,8 @@ fn noise_model(
         fit: FitSummary {
             views: fit.views,
             samples: fit.rows,
-            rmse_m: fit.rmse_m,
-            r2: fit.r2,
+            rmse_m: fit.quality.rmse_m,
+            r2: fit.quality.r2,
             heldout: comparison.iter().find(|h| h.form == fit.form).map(|h| h.rmse_relative),
             remarks: fit.remarks.clone(),
         },
@@ -211,9 +205,8 @@ fn describe(options: &CalibrateOptions, form: Form) -> Map<String, Value> {
 }
 
 /// Hash of the description files, and of every view's frames.
-///
-/// # Errors
-/// When a description file can no longer be read: a hash of nothing would vouch for the wrong input.
+/// An error when a description file can no longer be read: a hash of nothing would vouch for the
+/// wrong input.
 fn hashes(recording: &Recording, measurements: &Measurements) -> Result<Map<String, Value>> {
     let mut map = Map::new();
     let mut described = Sha256::new();

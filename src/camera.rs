@@ -4,17 +4,15 @@
 
 mod lens;
 
+use lens::{folds, lens, undistorted};
 use serde::{Deserialize, Serialize};
 
 use crate::units::shortest;
-use lens::{folds, lens, undistorted};
 
 /// Pinhole intrinsics with the Brown-Conrady lens model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
-    /// Columns, px.
     pub width: usize,
-    /// Rows, px.
     pub height: usize,
     /// Focal length along the columns, px.
     pub fx: f64,
@@ -71,6 +69,12 @@ fn listed(k: &[f64; 5]) -> String {
 }
 
 impl Camera {
+    /// Its principal point in the image's middle, square pixels, no lens errors.
+    pub fn centred(width: usize, height: usize, focal_px: f64) -> Self {
+        let [cx, cy] = [width, height].map(|n| (n as f64 - 1.0) / 2.0);
+        Camera { width, height, fx: focal_px, fy: focal_px, cx, cy, distortion: None }
+    }
+
     /// What is wrong with these numbers, if anything. With a lens model every pixel is tried.
     pub fn fault(&self) -> Option<CameraFault> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
@@ -178,19 +182,9 @@ mod tests {
 
     #[test]
     fn zero_focal_length_is_a_fault() {
-        let mut camera = Camera {
-            width: 640,
-            height: 480,
-            fx: 0.0,
-            fy: 578.0,
-            cx: 0.0,
-            cy: 0.0,
-            distortion: None,
-        };
-        assert!(camera.fault().is_some());
-        camera.fx = f64::NAN;
-        assert!(camera.fault().is_some());
-        camera.fx = 580.0;
-        assert!(camera.fault().is_none());
+        for (fx, good) in [(0.0, false), (f64::NAN, false), (580.0, true)] {
+            let camera = Camera { fx, ..Camera::centred(640, 480, 578.0) };
+            assert_eq!(camera.fault().is_none(), good, "{fx}");
+        }
     }
 }

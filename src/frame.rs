@@ -7,9 +7,7 @@ use crate::units::shortest;
 /// One depth image: 16-bit raw values, row-major, still in the sensor's own code.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    /// Columns, px.
     pub width: usize,
-    /// Rows, px.
     pub height: usize,
     /// Raw values, `width * height` of them; [`DepthCode`] turns them into metres.
     pub raw: Vec<u16>,

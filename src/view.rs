@@ -10,9 +10,7 @@ use serde::{Deserialize, Serialize};
 /// The unit that was recorded: everything `recording.json` says about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensor {
-    /// Make and model.
     pub name: String,
-    /// Which unit it is.
     pub serial: Option<String>,
     /// "normal" or "near".
     pub mode: Option<String>,
@@ -74,16 +72,13 @@ impl Region {
 /// Width and height of the target.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TargetSize {
-    /// Width, m.
     pub width_m: f64,
-    /// Height, m.
     pub height_m: f64,
 }
 
 /// What `view.json` may say.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ViewNotes {
-    /// How large the target is.
     pub target: Option<TargetSize>,
     /// Depth of the target's plane on the optical axis, measured by other means, m.
     pub reference_distance_m: Option<f64>,
@@ -93,7 +88,6 @@ pub struct ViewNotes {
     pub temperature_c: Option<f64>,
     /// Light on the target, lx.
     pub ambient_lux: Option<f64>,
-    /// For people.
     pub notes: Option<String>,
 }
 
@@ -102,7 +96,6 @@ pub struct ViewNotes {
 pub struct FrameRef {
     /// Seconds, one clock for the whole recording.
     pub timestamp: f64,
-    /// The image file.
     pub path: PathBuf,
 }
 
@@ -139,7 +132,6 @@ pub struct Recording {
 /// A view that was not used, and why.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excluded {
-    /// Its name.
     pub view: String,
     /// What went wrong, where, and what to do.
     pub reason: String,
@@ -165,9 +157,7 @@ impl std::fmt::Display for Excluded {
 pub struct RecordingFile {
     /// [`RECORDING_FORMAT`].
     pub format: String,
-    /// Make and model.
     pub sensor: String,
-    /// Which unit it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub serial: Option<String>,
     /// "normal" or "near".

@@ -52,15 +52,7 @@ mod tests {
     use crate::camera::{Camera, CameraFault};
 
     fn behind(distortion: [f64; 5]) -> Camera {
-        Camera {
-            width: 640,
-            height: 480,
-            fx: 580.0,
-            fy: 580.0,
-            cx: 319.5,
-            cy: 239.5,
-            distortion: Some(distortion),
-        }
+        Camera { distortion: Some(distortion), ..Camera::centred(640, 480, 580.0) }
     }
 
     #[test]

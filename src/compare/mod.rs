@@ -95,9 +95,7 @@ pub struct Comparison {
 pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
 
 /// Run all variants, each `repeats` times with another seed.
-///
-/// # Errors
-/// When the sequence has no ground truth of its time, or the model is of another sensor.
+/// An error when the sequence has no ground truth of its time, or the model is of another sensor.
 pub fn compare(
     sequence: &Sequence,
     model: &NoiseModel,

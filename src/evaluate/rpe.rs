@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use super::spread::{Spread, too_few};
+use super::{Spread, too_few};
 use crate::error::{Error, Result};
 use crate::stats::median;
 use crate::trajectory::Pose;
@@ -26,9 +26,7 @@ pub struct Rpe {
 }
 
 /// Of poses in time order.
-///
-/// # Errors
-/// When fewer than two motions have true poses at both ends.
+/// An error when fewer than two motions have true poses at both ends.
 pub fn relative(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Rpe> {
     if truth.len() < 2 || estimate.len() < 2 {
         return Err(too_few(truth, estimate, truth.len().min(estimate.len())));

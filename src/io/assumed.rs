@@ -38,9 +38,7 @@ const MILLIMETRES: DepthCode = DepthCode::Metric { units_per_metre: 1000.0, inva
 
 impl Assumed {
     /// An option that would have no effect must not look as if it had one.
-    ///
-    /// # Errors
-    /// When anything is assumed where the file `description` describes the sensor.
+    /// An error when anything is assumed where the file `description` describes the sensor.
     pub(super) fn refuse_beside(&self, description: &Path) -> Result<()> {
         let code = self.code.map(|code| match code {
             DepthCode::Metric { .. } => "--units-per-metre",
@@ -104,9 +102,7 @@ impl Assumed {
     }
 
     /// A sensor with images of this size, px, as usual where nothing else is known.
-    ///
-    /// # Errors
-    /// When the intrinsics are no camera's.
+    /// An error when the intrinsics are no camera's.
     pub(crate) fn sensor(
         &self,
         name: &str,

@@ -1,13 +1,13 @@
 //! The recording layout: recording.json and one folder a view (`crate::docs::layouts`).
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::list::{FrameList, read_list};
 use super::output::{entries, write_json};
-use super::unknown::UnknownKeys;
 use crate::error::{Error, Result};
 use crate::view::{
     Excluded, RECORDING_FORMAT, Recording, RecordingFile, Region, Sensor, TargetSize, View,
@@ -23,7 +23,6 @@ const REMEDY_JSON: &str = "compare it with the recording layout in the README";
 /// `view.json`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ViewFile {
-    /// How large the target is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<TargetSize>,
     /// Depth of the target's plane on the optical axis, measured by other means, m.
@@ -35,13 +34,11 @@ pub struct ViewFile {
     /// The target's corners u, v, px; may reach outside the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub polygon: Option<Vec<[f64; 2]>>,
-    /// Degrees Celsius.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<f64>,
     /// Light on the target, lx.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ambient_lux: Option<f64>,
-    /// For people.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub notes: Option<String>,
 }
@@ -213,9 +210,6 @@ fn remark_on(list: &FrameList, view: &str, remarks: &mut Vec<String>) {
 }
 
 /// Write `view.json` into the view's folder; nothing where nothing is known.
-///
-/// # Errors
-/// When the folder cannot be written.
 pub fn write_view_notes(folder: &Path, notes: &ViewNotes) -> Result<()> {
     if *notes == ViewNotes::default() {
         return Ok(());
@@ -226,11 +220,63 @@ pub fn write_view_notes(folder: &Path, notes: &ViewNotes) -> Result<()> {
 }
 
 /// Write `recording.json` for `sensor` into `root`.
-///
-/// # Errors
-/// When the folder cannot be written.
 pub fn write_recording_file(root: &Path, sensor: &Sensor) -> Result<()> {
     let remedy = "the sensor's numbers must be finite";
     write_json(&root.join(DESCRIPTION), &RecordingFile::of(sensor), remedy)?;
     Ok(())
+}
+
+/// Keys that no part of the program reads, and the files they stand in: a slip of the pen, or a
+/// newer layout. Told, not fatal: files of later versions stay readable.
+#[derive(Default)]
+pub(super) struct UnknownKeys(BTreeMap<String, Vec<PathBuf>>);
+
+impl UnknownKeys {
+    /// Whatever `given` has and `understood` (the same document, read and written again) has not.
+    pub fn note(&mut self, path: &Path, given: &Value, understood: &Value) {
+        for key in unknown_keys(given, understood) {
+            self.0.entry(key).or_default().push(path.to_path_buf());
+        }
+    }
+
+    /// A remark a key, not a remark a file.
+    pub fn remarks(&self) -> impl Iterator<Item = String> {
+        self.0.iter().map(|(key, files)| {
+            let others = match files.len() - 1 {
+                0 => String::new(),
+                n => format!(" and {n} more"),
+            };
+            format!("{}{others}: unknown key \"{key}\", which has no effect", files[0].display())
+        })
+    }
+}
+
+fn unknown_keys(given: &Value, understood: &Value) -> Vec<String> {
+    let Some(given) = given.as_object() else { return Vec::new() };
+    given
+        .iter()
+        // null is how some programs write "not given".
+        .filter(|(_, value)| !value.is_null())
+        .flat_map(|(key, value)| match understood.get(key) {
+            None => vec![key.clone()],
+            Some(known) => {
+                unknown_keys(value, known).iter().map(|inner| format!("{key}.{inner}")).collect()
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn keys_are_found_at_any_depth_and_null_is_not_given() {
+        let given = json!({
+            "roi": [0, 0, 9, 9], "distance_m": 2, "colour": null, "target": {"width_m": 1, "depth_m": 0.1}
+        });
+        let understood = json!({"roi": [0.0, 0.0, 9.0, 9.0], "target": {"width_m": 1.0}});
+        assert_eq!(unknown_keys(&given, &understood), ["distance_m", "target.depth_m"]);
+    }
 }

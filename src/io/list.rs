@@ -8,18 +8,14 @@ use crate::view::FrameRef;
 /// The frames a list names, in time order, and what was odd about it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FrameList {
-    /// In time order.
     pub frames: Vec<FrameRef>,
-    /// What was odd about it.
     pub remarks: Vec<String>,
 }
 
 /// Read a list; paths in it are relative to the folder it stands in.
 ///
 /// Files that are missing, stamps out of order and stamps given twice are remarks, not errors.
-///
-/// # Errors
-/// When a line is not "timestamp path".
+/// An error when a line is not "timestamp path".
 pub fn read_list(path: &Path) -> Result<FrameList> {
     let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
     let folder = path.parent().unwrap_or(Path::new("."));

@@ -10,8 +10,8 @@ use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::normal_equations::{Direction, NormalEquations, Solution};
-use super::options::{Kernel, Options, Weights};
 use super::point::{Motion, Point};
+use super::{Kernel, Options, Weights};
 
 /// Something to align to.
 pub trait Target: Sync {

@@ -3,11 +3,10 @@
 use super::blocks::Blocks;
 use super::frame_report::Stages;
 use super::nearest::Nearest;
-use super::noise::Noise;
-use super::options::{Init, Method, Options};
 use super::orb::Features;
-use super::point::Point;
+use super::point::{Noise, Point};
 use super::voxel::{Voxels, points_of};
+use super::{Init, Method, Options};
 use crate::camera::Rays;
 use crate::correct::{Conditions, Correction};
 use crate::error::Result;
@@ -58,8 +57,7 @@ pub struct Preprocessor<'a> {
 }
 
 impl<'a> Preprocessor<'a> {
-    /// # Errors
-    /// When the model is of another sensor.
+    /// An error when the model is of another sensor.
     pub fn new(sequence: &'a Sequence, model: &NoiseModel, options: &'a Options) -> Result<Self> {
         Ok(Preprocessor {
             sequence,
@@ -77,8 +75,7 @@ impl<'a> Preprocessor<'a> {
         if self.correction.is_identity() { &[] } else { self.correction.remarks() }
     }
 
-    /// # Errors
-    /// When the depth image cannot be read, or OpenCV fails.
+    /// An error when the depth image cannot be read, or OpenCV fails.
     pub fn prepare(&self, moment: &Moment) -> Result<Prepared> {
         let mut stages = Stages::default();
         let raw = stages.time("decode", || self.sequence.depth(moment))?;

@@ -6,9 +6,9 @@ use super::frame_report::{Fate, FrameReport, Stages};
 use super::icp::{Alignment, Termination, align, renormalised};
 use super::index_map::Projective;
 use super::map_points::{MapPoint, PointGrid};
-use super::options::{Init, Method, Options};
 use super::preprocess::{Prepared, Preprocessor, Shape};
 use super::surfels::Surfels;
+use super::{Init, Method, Options};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 
@@ -52,9 +52,7 @@ impl<'a> Tracker<'a> {
     }
 
     /// Take in a frame; one that could not be read is lost.
-    ///
-    /// # Errors
-    /// When OpenCV fails.
+    /// An error when OpenCV fails.
     pub fn track(&mut self, stamp: f64, frame: Result<Prepared>) -> Result<FrameReport> {
         let mut frame = match frame {
             Ok(frame) => frame,

@@ -3,8 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::noise::Noise;
-use super::point::Point;
+use super::point::{Noise, Point};
 use super::sparse_grid::{Cell, SparseGrid, cell_of};
 use crate::camera::Rays;
 

@@ -3,24 +3,20 @@
 //! The first few frames find the target and the scale, the rest stream through accumulators.
 
 mod cells;
-mod csv;
 mod doubtful;
 mod finish;
 mod grouping;
-mod paper;
 mod scan;
 mod table;
 mod view;
 
 pub use cells::{Cell, Spread};
-pub use csv::{read_table, write_measurements};
-pub use paper::PaperResult;
-pub use table::{SigmaKind, SigmaRow, SigmaTable};
+pub use table::{SigmaKind, SigmaRow, SigmaTable, read_table, write_measurements};
 pub use view::{measure_view, view_target};
 
 use crate::camera::Rays;
 use crate::frame::DepthTable;
-use crate::plane::{Exclusions, Plane};
+use crate::plane::{Exclusions, Plane, RansacPlane};
 use crate::rng::Seed;
 use crate::stats::Correlation;
 use crate::view::Sensor;
@@ -68,7 +64,6 @@ pub struct Workbench<'a> {
     pub rays: Rays,
     /// From raw value to m.
     pub table: DepthTable,
-    /// The settings.
     pub options: MeasureOptions,
     /// The raw values hold the length of the ray, not the depth.
     pub ranges: bool,
@@ -95,11 +90,9 @@ impl<'a> Workbench<'a> {
 /// All that was measured in one view.
 #[derive(Debug, Clone)]
 pub struct ViewMeasurement {
-    /// The view's name.
     pub name: String,
     /// Seconds on the recording's clock, first frame.
     pub time_s: f64,
-    /// The default plane fit.
     pub plane: Plane,
     /// Mean depth of the target's pixels, m.
     pub z_m: f64,
@@ -112,12 +105,11 @@ pub struct ViewMeasurement {
     /// The target cut into bins of depth; one bin when it is not strongly tilted.
     pub cells: Vec<Cell>,
     /// The paper's method on the first frame.
-    pub paper: Option<PaperResult>,
+    pub paper: Option<RansacPlane>,
     /// Between neighbouring pixels' residuals.
     pub correlation: Correlation,
     /// Correlation of a pixel with itself one frame later; `None` with fewer than 4 frames.
     pub temporal_correlation: Option<f64>,
-    /// Frames used.
     pub frames: usize,
     /// Pixels left out, by reason.
     pub exclusions: Exclusions,
@@ -146,9 +138,7 @@ impl ViewMeasurement {
 /// The view's mean residual, shrunk for looking at; NaN outside the target.
 #[derive(Debug, Clone)]
 pub struct ResidualPicture {
-    /// Columns, px of the picture.
     pub width: usize,
-    /// Rows, px of the picture.
     pub height: usize,
     /// Axial residual, mm, row-major.
     pub millimetres: Vec<f32>,

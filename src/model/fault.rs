@@ -23,7 +23,7 @@ impl SigmaModel {
     }
 
     fn wrong_shape(&self) -> Option<String> {
-        let p = self.form.spec().parameters().len();
+        let p = self.form.card().parameters.len();
         let fits = self.parameters.len() == p
             && self.covariance.shape() == (p, p)
             && self.std_errors.len() == p;

@@ -40,10 +40,8 @@ pub struct Sorted {
 
 impl Sorted {
     /// Fit `form` to the rows kept.
-    ///
-    /// # Errors
-    /// When they are too few or stand at too few distances for the form, or the solver finds no
-    /// surface that is positive over their range.
+    /// An error when they are too few or stand at too few distances for the form, or the solver
+    /// finds no surface that is positive over their range.
     pub fn fit(&self, form: Form) -> Result<SigmaFit> {
         let mut fitted = match &self.judged_by {
             Some(fitted) if fitted.form == form => fitted.clone(),
@@ -56,9 +54,6 @@ impl Sorted {
 }
 
 /// Fit `form` to `table` without its outliers, which the remarks name.
-///
-/// # Errors
-/// As [`Sorted::fit`].
 pub fn fit(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
     sort_out(table).fit(form)
 }

@@ -75,10 +75,6 @@ impl Rows {
         self.rows.len()
     }
 
-    pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
-    }
-
     pub fn views(&self) -> usize {
         self.blocks.len()
     }

@@ -3,7 +3,7 @@
 use super::affine::{AffineFit, Effort, fit_affine_robust};
 use super::grow::{BEND_M, Gauge, Lattice};
 use super::image::{MIN_PIXELS, on_plane, seed_plane};
-use super::rival::rivals;
+use super::relief::rivals;
 use super::{InverseDepthImage, Plane};
 use crate::camera::Camera;
 use crate::rng::Stream;

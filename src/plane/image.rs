@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Plane;
 use super::affine::{AffineFit, Effort, MAD_TO_SIGMA, fit_affine_robust};
-use super::ransac::{Estimator, InlierCount, UniformSampler, ransac};
+use super::ransac::{Estimator, RansacOptions, UniformSampler, ransac};
 use crate::camera::{Camera, Rays};
 use crate::rng::Stream;
 use crate::stats::median_in_place;
@@ -163,17 +163,14 @@ pub(super) fn seed_plane(
         .collect();
     let mut depths: Vec<f32> = rows.iter().map(|r| r.1 as f32).collect();
     let floor = image.floor(f64::from(median_in_place(&mut depths)));
-    let consensus = InlierCount { threshold: 2.5 * image.local_noise(pixels).max(floor) };
+    let options = RansacOptions {
+        threshold_m: 2.5 * image.local_noise(pixels).max(floor),
+        iterations: SEED_HYPOTHESES,
+        confidence: SEED_CONFIDENCE,
+    };
     let samples = AffineSamples { rows };
     let jury: Vec<usize> = (0..samples.len()).collect();
-    let (q, _) = ransac(
-        &samples,
-        &consensus,
-        &mut UniformSampler { rng },
-        &jury,
-        SEED_HYPOTHESES,
-        SEED_CONFIDENCE,
-    )?;
+    let q = ransac(&samples, &options, &mut UniformSampler { rng }, &jury)?;
     fit_affine_robust(image.w, image.rays, pixels, &Plane::new(q), floor, Effort::Sample)
 }
 

@@ -11,17 +11,15 @@ mod candidate;
 mod grow;
 mod image;
 mod paper;
-mod principal_point;
 mod ransac;
 mod relief;
-mod rival;
-mod shapes;
 mod target;
 
 pub(crate) use affine::MAD_TO_SIGMA;
 pub use affine::{AffineFit, Effort, fit_affine_robust};
 pub use image::{Exclusions, InverseDepthImage, Target};
-pub use paper::{Points, RansacOptions, RansacPlane, ransac_plane};
+pub use paper::{Points, RansacPlane, ransac_plane};
+pub use ransac::RansacOptions;
 pub use target::find_target;
 
 use nalgebra::{Unit, Vector3};

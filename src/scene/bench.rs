@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::world::{Hit, Surface, TargetFrame, World};
+use super::{Hit, Surface, TargetFrame, World};
 use crate::plane::Plane;
 
 /// A flat rectangular board.

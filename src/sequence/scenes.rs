@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use super::moments::{Moment, Sequence};
+use super::{Moment, Sequence};
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
 use crate::io::{Assumed, entries, size_of};

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use super::moments::{Moment, Sequence};
+use super::{Moment, Sequence};
 use crate::error::{Error, Result};
 use crate::io::{Assumed, Layout, open_uncut, read_list};
 use crate::trajectory::{associate, read_benchmark};

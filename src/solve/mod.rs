@@ -18,7 +18,6 @@ pub trait LeastSquares {
 /// The best point on a solver's way.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Minimum {
-    /// The place.
     pub x: DVector<f64>,
     /// Half the sum of squares there.
     pub cost: f64,

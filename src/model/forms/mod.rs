@@ -35,14 +35,21 @@ pub struct Start {
     pub remarks: Vec<String>,
 }
 
+/// What is said of a form.
+pub struct Card {
+    pub id: &'static str,
+    /// As text, with units.
+    pub formula: &'static str,
+    /// Where it comes from.
+    pub reference: &'static str,
+    pub parameters: &'static [(&'static str, Walk)],
+    /// Fewest different distances the form needs.
+    pub distances_needed: usize,
+}
+
 /// A formula for sigma.
 pub trait SigmaForm: Sync {
-    fn id(&self) -> &'static str;
-    /// As text, with units.
-    fn formula(&self) -> &'static str;
-    /// Where it comes from.
-    fn reference(&self) -> &'static str;
-    fn parameters(&self) -> &'static [(&'static str, Walk)];
+    fn card(&self) -> &'static Card;
     /// sigma in m at depth z (m) and tilt theta (rad).
     fn sigma(&self, p: &[f64], z: f64, theta: f64) -> f64;
     /// Derivatives of sigma by the parameters, into the first slots of `out`.
@@ -61,8 +68,6 @@ pub trait SigmaForm: Sync {
     fn limits(&self, _i: usize, _rows: &Rows) -> Option<[f64; 2]> {
         None
     }
-    /// Fewest different distances the form needs.
-    fn distances_needed(&self) -> usize;
     /// What to say of parameter `i` when its standard error is of the size of its value.
     fn why_weak(&self, _i: usize, _rows: &Rows) -> Option<String> {
         None
@@ -90,8 +95,12 @@ impl Form {
         }
     }
 
+    pub fn card(self) -> &'static Card {
+        self.spec().card()
+    }
+
     pub fn id(self) -> &'static str {
-        self.spec().id()
+        self.card().id
     }
 }
 
@@ -127,7 +136,7 @@ mod tests {
                 Form::Khoshelham => vec![1.425e-3],
                 Form::Disparity => vec![1.4e-3, 0.8e-3],
             };
-            assert_eq!(p.len(), spec.parameters().len());
+            assert_eq!(p.len(), form.card().parameters.len());
             for (z, theta) in [(0.8, 0.0), (1.0, 0.6), (3.7, 1.25)] {
                 let mut gradient = [0.0; MAX_PARAMETERS];
                 spec.gradient(&p, z, theta, &mut gradient);

@@ -2,9 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
-use super::material::Material;
 use super::shape::{Intersection, Shape};
-use super::texture::Texture;
+use super::texture::{Material, Texture};
 use crate::scene::{Hit, Surface, World};
 
 /// A shape somewhere in the room, with the material of each of its faces.

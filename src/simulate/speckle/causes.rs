@@ -103,10 +103,8 @@ fn fault(what: String) -> Error {
 }
 
 impl Causes {
-    /// `self` with one cause set.
-    ///
-    /// # Errors
-    /// When there is no such cause, or the value is outside its range.
+    /// `self` with one cause set; an error where there is no such cause, or the value is outside its
+    /// range.
     pub fn with(mut self, name: &str, value: f64) -> Result<Self> {
         let cause = KNOWN_CAUSES.iter().find(|c| c.name == name).ok_or_else(|| {
             let names: Vec<&str> = KNOWN_CAUSES.iter().map(|c| c.name).collect();
@@ -125,9 +123,6 @@ impl Causes {
     }
 
     /// `self` with `key=value` applied.
-    ///
-    /// # Errors
-    /// As [`Causes::with`], and when the text is no such thing.
     pub fn parse(self, text: &str) -> Result<Self> {
         let (name, value) = text
             .split_once('=')
