@@ -21,10 +21,8 @@ use crate::model::{
 };
 use crate::view::{Excluded, Recording, RecordingFile};
 
-/// Settings of a calibration.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CalibrateOptions {
-    /// How views are measured.
     pub measure: MeasureOptions,
     /// Which standard deviation the model describes.
     pub kind: SigmaKind,
@@ -49,16 +47,13 @@ pub struct Measurements {
     pub excluded: Vec<Excluded>,
 }
 
-/// A calibrated sensor.
 #[derive(Debug, Clone)]
 pub struct Calibration {
     /// What was fitted to.
     pub table: SigmaTable,
-    /// The fit with its diagnostics.
     pub fit: SigmaFit,
     /// How well each form predicts distances left out, best first; empty with too few distances.
     pub comparison: Vec<HeldOut>,
-    /// What is exchanged with other programs.
     pub model: NoiseModel,
     /// What to know before trusting it, the most important first.
     pub warnings: Vec<String>,

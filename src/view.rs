@@ -14,11 +14,9 @@ pub struct Sensor {
     pub serial: Option<String>,
     /// "normal" or "near".
     pub mode: Option<String>,
-    /// The depth image's camera.
     pub camera: Camera,
     /// Distance between projector and camera, m.
     pub baseline_m: Option<f64>,
-    /// How a raw value becomes a depth.
     pub code: DepthCode,
 }
 
@@ -69,7 +67,6 @@ impl Region {
     }
 }
 
-/// Width and height of the target.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TargetSize {
     pub width_m: f64,
@@ -108,7 +105,6 @@ pub struct View {
     pub depth: Vec<FrameRef>,
     /// Infrared images in time order; may be none.
     pub infrared: Vec<FrameRef>,
-    /// What its `view.json` says.
     pub notes: ViewNotes,
 }
 
@@ -117,11 +113,9 @@ pub struct View {
 pub struct Recording {
     /// The folder it was opened from.
     pub root: PathBuf,
-    /// The unit that recorded it.
     pub sensor: Sensor,
     /// The views that could be opened.
     pub views: Vec<View>,
-    /// Views that could not be opened.
     pub excluded: Vec<Excluded>,
     /// What was found odd while opening.
     pub remarks: Vec<String>,
@@ -155,18 +149,15 @@ impl std::fmt::Display for Excluded {
 /// `recording.json` (`crate::docs::layouts`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordingFile {
-    /// [`RECORDING_FORMAT`].
     pub format: String,
     pub sensor: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub serial: Option<String>,
-    /// "normal" or "near".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mode: Option<String>,
     /// width, height, fx, fy, cx, cy, distortion; px.
     #[serde(flatten)]
     pub camera: Camera,
-    /// Distance between projector and camera, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub baseline_m: Option<f64>,
     /// Raw units a metre, 1/m; this or `raw_disparity`.
@@ -184,7 +175,6 @@ pub struct RecordingFile {
 pub const RECORDING_FORMAT: &str = "recording/1";
 
 impl RecordingFile {
-    /// The description of `sensor`.
     pub fn of(sensor: &Sensor) -> Self {
         let (units_per_metre, invalid, raw_disparity) = match sensor.code {
             DepthCode::Metric { units_per_metre, invalid } => {

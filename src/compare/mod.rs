@@ -58,7 +58,6 @@ pub fn past_the_paper() -> Vec<Variant> {
     .into()
 }
 
-/// One run of a variant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
     pub seed: u64,

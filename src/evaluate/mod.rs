@@ -17,7 +17,6 @@ use crate::error::{Error, Result};
 use crate::stats::median;
 use crate::trajectory::{Pose, associate, read_benchmark};
 
-/// ATE and RPE of one estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
     pub ate: Ate,
@@ -45,7 +44,6 @@ pub struct Spread {
     pub std: f64,
     pub min: f64,
     pub max: f64,
-    /// How many errors.
     pub pairs: usize,
 }
 
@@ -70,7 +68,6 @@ impl Spread {
         })
     }
 
-    /// Each times `factor`.
     pub fn scaled(&self, factor: f64) -> Self {
         Spread {
             rmse: self.rmse * factor,

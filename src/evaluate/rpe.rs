@@ -7,7 +7,6 @@ use crate::error::{Error, Result};
 use crate::stats::median;
 use crate::trajectory::Pose;
 
-/// The interval over which motions are compared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Delta {
     Seconds(f64),

@@ -13,7 +13,6 @@ use crate::view::Sensor;
 pub struct Assumed {
     /// fx, fy, cx, cy in px.
     pub intrinsics: Option<[f64; 4]>,
-    /// How raw values become metres.
     pub code: Option<DepthCode>,
     /// Distance between projector and camera, m.
     pub baseline_m: Option<f64>,

@@ -9,7 +9,7 @@ use super::layout::{DEPTH_LIST, DESCRIPTION, UnknownKeys, read_sensor};
 use super::list::{read_list, shorten};
 use super::output::{entries, refuse_full, write_atomic};
 use super::stills::{Film, Footage};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, read_text};
 use crate::frame::Frame;
 use crate::view::{FrameRef, Sensor};
 
@@ -63,9 +63,10 @@ pub(super) fn images(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)
 }
 
 pub(crate) const INDEX: &str = "INDEX.txt";
-pub(super) fn footage(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
+/// INDEX.txt and the depth frames that it names.
+pub(super) fn dump(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     let index = root.join(INDEX);
-    let text = std::fs::read_to_string(&index).map_err(|e| Error::read(&index, e))?;
+    let text = read_text(&index)?;
     let mut remarks = Vec::new();
     let mut frames = Vec::new();
     for (i, line) in text.lines().enumerate() {
@@ -73,11 +74,9 @@ pub(super) fn footage(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor
         if !name.starts_with("d-") {
             continue;
         }
-        let timestamp = stamp(name).ok_or_else(|| Error::Text {
-            path: index.clone(),
-            line: i + 1,
-            what: format!("\"{}\" is not d-<time>-<stamp>.pgm", shorten(name)),
-            remedy: "record the dump with fakenect-record",
+        let timestamp = stamp(name).ok_or_else(|| {
+            let what = format!("\"{}\" is not d-<time>-<stamp>.pgm", shorten(name));
+            Error::text(&index, i + 1, what, "record the dump with fakenect-record")
         })?;
         let path = root.join(name);
         if path.is_file() {

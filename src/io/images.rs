@@ -19,7 +19,6 @@ pub struct FrameSource {
     hash: Sha256,
 }
 
-/// What to do about an image that is not what it should be.
 const REMEDY_DEPTH: &str = "depth must be a 16-bit single-channel PNG of the recording's size";
 
 impl FrameSource {

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::list::{FrameList, read_list};
 use super::output::{entries, write_json};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, read_text};
 use crate::view::{
     Excluded, RECORDING_FORMAT, Recording, RecordingFile, Region, Sensor, TargetSize, View,
     ViewNotes,
@@ -25,7 +25,6 @@ const REMEDY_JSON: &str = "compare it with the recording layout in the README";
 pub struct ViewFile {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<TargetSize>,
-    /// Depth of the target's plane on the optical axis, measured by other means, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference_distance_m: Option<f64>,
     /// The target's region u0, v0, u1, v1, px; both edges belong to it.
@@ -36,7 +35,6 @@ pub struct ViewFile {
     pub polygon: Option<Vec<[f64; 2]>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<f64>,
-    /// Light on the target, lx.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ambient_lux: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -113,8 +111,7 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
 }
 
 pub(super) fn read_sensor(path: &Path, unknown: &mut UnknownKeys) -> Result<Sensor> {
-    let wrong =
-        |what: String| Error::Json { path: path.to_path_buf(), line: 0, what, remedy: REMEDY_JSON };
+    let wrong = |what: String| Error::text(path, 0, what, REMEDY_JSON);
     let text = read_text(path)?;
     // Another format has other keys: its name says more than the first key that is missing.
     let Format { format } = parse(path, &text)?;
@@ -136,22 +133,13 @@ struct Format {
     format: String,
 }
 
-fn read_text(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path).map_err(|e| Error::read(path, e))
-}
-
 fn parse<T: serde::de::DeserializeOwned>(path: &Path, text: &str) -> Result<T> {
-    serde_json::from_str(text).map_err(|e| Error::Json {
-        path: path.to_path_buf(),
-        line: e.line(),
-        what: without_place(&e.to_string()),
-        remedy: REMEDY_JSON,
+    serde_json::from_str(text).map_err(|e| {
+        // serde's "... at line 3 column 7" without the line, which the error has by itself.
+        let full = e.to_string();
+        let what = full.rsplit_once(" at line ").map_or(&*full, |(before, _)| before);
+        Error::text(path, e.line(), what, REMEDY_JSON)
     })
-}
-
-/// serde's "... at line 3 column 7" without the line, which the error has by itself.
-fn without_place(what: &str) -> String {
-    what.rsplit_once(" at line ").map_or(what, |(before, _)| before).into()
 }
 
 /// Sub-folders that hold a depth list, in name order.
@@ -197,12 +185,7 @@ fn read_notes(path: &Path, unknown: &mut UnknownKeys) -> Result<ViewNotes> {
     let text = read_text(path)?;
     let file: ViewFile = parse(path, &text)?;
     unknown.note(path, &parse(path, &text)?, &json!(file));
-    file.notes().map_err(|what| Error::Json {
-        path: path.to_path_buf(),
-        line: 0,
-        what,
-        remedy: REMEDY_JSON,
-    })
+    file.notes().map_err(|what| Error::text(path, 0, what, REMEDY_JSON))
 }
 
 fn remark_on(list: &FrameList, view: &str, remarks: &mut Vec<String>) {
@@ -215,15 +198,13 @@ pub fn write_view_notes(folder: &Path, notes: &ViewNotes) -> Result<()> {
         return Ok(());
     }
     let remedy = "the view's numbers must be finite";
-    write_json(&folder.join(VIEW_FILE), &ViewFile::of(notes), remedy)?;
-    Ok(())
+    write_json(&folder.join(VIEW_FILE), &ViewFile::of(notes), remedy).map(drop)
 }
 
 /// Write `recording.json` for `sensor` into `root`.
 pub fn write_recording_file(root: &Path, sensor: &Sensor) -> Result<()> {
     let remedy = "the sensor's numbers must be finite";
-    write_json(&root.join(DESCRIPTION), &RecordingFile::of(sensor), remedy)?;
-    Ok(())
+    write_json(&root.join(DESCRIPTION), &RecordingFile::of(sensor), remedy).map(drop)
 }
 
 /// Keys that no part of the program reads, and the files they stand in: a slip of the pen, or a

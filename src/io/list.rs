@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, read_text};
 use crate::view::FrameRef;
 
 /// The frames a list names, in time order, and what was odd about it.
@@ -17,7 +17,7 @@ pub struct FrameList {
 /// Files that are missing, stamps out of order and stamps given twice are remarks, not errors.
 /// An error when a line is not "timestamp path".
 pub fn read_list(path: &Path) -> Result<FrameList> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+    let text = read_text(path)?;
     let folder = path.parent().unwrap_or(Path::new("."));
     let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut list = FrameList::default();
@@ -26,11 +26,9 @@ pub fn read_list(path: &Path) -> Result<FrameList> {
         if content.is_empty() || content.starts_with('#') {
             continue;
         }
-        let (timestamp, named) = parse(content).ok_or_else(|| Error::Text {
-            path: path.to_path_buf(),
-            line: i + 1,
-            what: format!("\"{}\" is not \"timestamp path\"", shorten(content)),
-            remedy: "write a time in seconds, a space, and a file name",
+        let (timestamp, named) = parse(content).ok_or_else(|| {
+            let what = format!("\"{}\" is not \"timestamp path\"", shorten(content));
+            Error::text(path, i + 1, what, "write a time in seconds, a space, and a file name")
         })?;
         let target: PathBuf = folder.join(named);
         if target.is_file() {

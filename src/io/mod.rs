@@ -68,42 +68,32 @@ impl Layout {
 }
 
 /// Open whatever stands at `path`: a recording, a TUM folder, a fakenect dump or a plain folder
-/// of 16-bit PNGs. Frames are not read, except to find still stretches in a film.
-/// An error when the folder is none of these, is empty, or describes itself wrongly; or when
-/// something is assumed of a recording that describes itself.
+/// of 16-bit PNGs. Frames are not read, except to find still stretches in a film. An error when the
+/// folder is none of these, is empty, or describes itself wrongly; or when something is assumed of a
+/// recording that describes itself.
 pub fn open(path: &Path, assumed: &Assumed) -> Result<Recording> {
-    open_and(path, assumed, Footage::recording)
+    open_and_cut(path, assumed, true)
 }
 
 /// As [`open`], but a film stays whole: one view with all its frames, also those in motion.
 pub fn open_uncut(path: &Path, assumed: &Assumed) -> Result<Recording> {
-    open_and(path, assumed, Footage::uncut)
+    open_and_cut(path, assumed, false)
 }
 
-fn open_and(
-    path: &Path,
-    assumed: &Assumed,
-    cut: impl Fn(Footage, &Path, Sensor) -> Recording,
-) -> Result<Recording> {
-    let footage = match Layout::of(path)? {
+fn open_and_cut(path: &Path, assumed: &Assumed, cut: bool) -> Result<Recording> {
+    let film = |(footage, sensor): (Footage, Sensor)| footage.recording(path, sensor, cut);
+    let recording = match Layout::of(path)? {
         Layout::Recording => {
             assumed.refuse_beside(&path.join(DESCRIPTION))?;
-            None
+            layout::open(path)?
         }
-        Layout::Dump => Some(folder::footage(path, assumed)?),
-        Layout::Sequence => Some(folder::sequence(path, assumed)?),
-        Layout::Images => Some(folder::images(path, assumed)?),
-    };
-    let recording = match footage {
-        None => layout::open(path)?,
-        Some((footage, sensor)) => cut(footage, path, sensor),
+        Layout::Dump => film(folder::dump(path, assumed)?),
+        Layout::Sequence => film(folder::sequence(path, assumed)?),
+        Layout::Images => film(folder::images(path, assumed)?),
     };
     if recording.views.is_empty() {
-        let reason = recording
-            .excluded
-            .first()
-            .map(ToString::to_string)
-            .or_else(|| recording.remarks.first().cloned());
+        let excluded = recording.excluded.first().map(ToString::to_string);
+        let reason = excluded.or_else(|| recording.remarks.first().cloned());
         return Err(Error::recording(
             path,
             reason.unwrap_or_else(|| "no view in it".into()),

@@ -77,12 +77,7 @@ pub fn pretty_json(value: &impl Serialize) -> serde_json::Result<String> {
 /// Write [`pretty_json`] whole or not at all; the text that was written. `remedy` is for a value
 /// that has no form in JSON.
 pub fn write_json(path: &Path, value: &impl Serialize, remedy: &'static str) -> Result<String> {
-    let text = pretty_json(value).map_err(|e| Error::Json {
-        path: path.to_path_buf(),
-        line: 0,
-        what: e.to_string(),
-        remedy,
-    })?;
+    let text = pretty_json(value).map_err(|e| Error::text(path, 0, e.to_string(), remedy))?;
     write_atomic(path, text.as_bytes())?;
     Ok(text)
 }
@@ -104,7 +99,6 @@ pub fn sha256_hex(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
-/// Bytes as lower-case hexadecimal.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }

@@ -175,7 +175,6 @@ const SLOPE: f32 = 0.012;
 /// A block with fewer pixels than this share is the rim of something.
 const MIN_FILLED: f32 = 0.4;
 
-/// The mean of a block.
 #[derive(Debug, Clone, Copy, Default)]
 struct Mean {
     n: f32,
@@ -228,7 +227,6 @@ impl Means {
     }
 }
 
-/// A depth image to be cut up.
 struct Picture<'a> {
     depth: &'a [f32],
     columns: usize,

@@ -13,7 +13,6 @@ use super::normal_equations::{Direction, NormalEquations, Solution};
 use super::point::{Motion, Point};
 use super::{Kernel, Options, Weights};
 
-/// Something to align to.
 pub trait Target: Sync {
     /// What a search leaves behind for the next search of the same point.
     type Cache: Default + Clone + Send;
@@ -21,7 +20,6 @@ pub trait Target: Sync {
     fn find(&self, p: &Vector3<f32>, cache: &mut Self::Cache) -> Option<&Point>;
 }
 
-/// Why the loop ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Termination {
     /// The step fell below both thresholds.
@@ -136,7 +134,6 @@ fn finish(
     alignment
 }
 
-/// One linearisation.
 struct Round<'a, T> {
     target: &'a T,
     options: &'a Options,

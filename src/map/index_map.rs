@@ -111,7 +111,6 @@ impl<'a> IndexMap<'a> {
         block_of(self.camera, self.side_px, [self.width, self.height], &at)
     }
 
-    /// What a block shows.
     #[inline]
     pub fn front(&self, block: usize) -> Option<usize> {
         let index = self.front[block];

@@ -40,7 +40,6 @@ use crate::rng::Seed;
 use crate::sequence::Sequence;
 use crate::trajectory::Pose;
 
-/// What came of a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mapped {
     /// One a depth image, in time order.
@@ -157,16 +156,13 @@ pub enum Kernel {
     Tukey,
 }
 
-/// All of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     pub method: Method,
     pub weights: Weights,
     pub kernel: Kernel,
     pub init: Init,
-    /// Side of a voxel, m.
     pub voxel_m: f32,
-    /// Side of an image block, px.
     pub block_px: usize,
     /// Neighbours farther than this are none, m.
     pub max_correspondence_m: f32,

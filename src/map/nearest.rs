@@ -10,7 +10,6 @@ use super::icp::Target;
 use super::point::Point;
 use super::sparse_grid::{Cell, SparseGrid, cell_of};
 
-/// Points, found by place.
 #[derive(Debug, Clone)]
 pub struct Nearest {
     points: Vec<Point>,

@@ -51,7 +51,6 @@ pub struct NormalEquations {
     pub sizes: Vec<f32>,
 }
 
-/// A step and how sure it is.
 #[derive(Debug, Clone)]
 pub struct Solution {
     /// Shift, m, and turn, rad, about the target's origin.
@@ -99,7 +98,6 @@ impl NormalEquations {
         self.squares_m2 += residual * residual;
     }
 
-    /// Both together.
     pub fn plus(mut self, other: NormalEquations) -> NormalEquations {
         self.h += other.h;
         self.geometry += other.geometry;

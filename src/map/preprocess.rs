@@ -44,7 +44,6 @@ pub struct Prepared {
     pub remark: Option<String>,
 }
 
-/// All that frames share.
 #[derive(Debug, Clone)]
 pub struct Preprocessor<'a> {
     pub sequence: &'a Sequence,

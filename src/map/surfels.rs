@@ -16,7 +16,6 @@ use crate::camera::Camera;
 pub struct Surfel {
     /// In the map's frame.
     point: Point,
-    /// Times it was seen.
     seen: u32,
     /// Number of the frame that saw it last.
     last: u32,
@@ -25,7 +24,6 @@ pub struct Surfel {
     coloured: u32,
 }
 
-/// All pieces.
 #[derive(Debug, Clone)]
 pub struct Surfels {
     surfels: Vec<Surfel>,
@@ -144,7 +142,6 @@ impl Surfels {
         self.surfels.retain(|s| s.seen >= CONFIRMED || now.saturating_sub(s.last) < PROBATION);
     }
 
-    /// The finished map.
     pub fn points(&self) -> Vec<MapPoint> {
         let point = |s: &Surfel| MapPoint {
             at: s.point.at,

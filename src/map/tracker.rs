@@ -20,7 +20,6 @@ const MIN_RATIO_KEPT: f64 = 0.6;
 /// Surfels are sorted out every so many frames.
 const PRUNE_EVERY: u32 = 10;
 
-/// The state between frames.
 pub struct Tracker<'a> {
     options: &'a Options,
     camera: &'a Camera,
@@ -190,7 +189,6 @@ impl<'a> Tracker<'a> {
         }
     }
 
-    /// The finished map.
     pub fn into_map(self) -> Vec<MapPoint> {
         if self.surfels.is_empty() { self.grid.points() } else { self.surfels.points() }
     }

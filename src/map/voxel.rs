@@ -71,7 +71,6 @@ impl Voxels {
         Voxels { side_m, grid, voxels }
     }
 
-    /// The mean of a voxel's points, m.
     pub fn mean(&self, index: usize) -> Vector3<f32> {
         let voxel = &self.voxels[index];
         corner(self.grid.cell(index), self.side_m) + voxel.sum / voxel.n

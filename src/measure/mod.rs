@@ -31,16 +31,13 @@ pub enum Planes {
     PerFrame,
 }
 
-/// Settings of the measurement.
 #[derive(Debug, Clone, Copy)]
 pub struct MeasureOptions {
-    /// One plane a view, or one a frame.
     pub planes: Planes,
     /// The paper's RANSAC threshold, m; by default three robust standard deviations of the view.
     pub ransac_threshold_m: Option<f64>,
     /// Largest number of hypotheses that the paper's RANSAC tries.
     pub ransac_iterations: usize,
-    /// Of all random choices.
     pub seed: Seed,
 }
 
@@ -58,9 +55,7 @@ impl Default for MeasureOptions {
 /// What every view of a recording shares: computed once.
 #[derive(Debug)]
 pub struct Workbench<'a> {
-    /// The unit that recorded.
     pub sensor: &'a Sensor,
-    /// Of all its pixels.
     pub rays: Rays,
     /// From raw value to m.
     pub table: DepthTable,
@@ -70,7 +65,6 @@ pub struct Workbench<'a> {
 }
 
 impl<'a> Workbench<'a> {
-    /// Works out the rays of all pixels and the depth of all raw values.
     pub fn new(sensor: &'a Sensor, options: MeasureOptions) -> Self {
         Workbench {
             sensor,
@@ -100,11 +94,9 @@ pub struct ViewMeasurement {
     pub theta_rad: f64,
     /// Image direction in which depth grows, rad; 0 along the columns.
     pub azimuth_rad: f64,
-    /// The whole target as one.
     pub whole: Cell,
     /// The target cut into bins of depth; one bin when it is not strongly tilted.
     pub cells: Vec<Cell>,
-    /// The paper's method on the first frame.
     pub paper: Option<RansacPlane>,
     /// Between neighbouring pixels' residuals.
     pub correlation: Correlation,
@@ -121,7 +113,6 @@ pub struct ViewMeasurement {
     pub infrared: Option<f64>,
     /// Of the mean residual.
     pub picture: ResidualPicture,
-    /// What was odd about it, for people.
     pub notes: Vec<String>,
     /// SHA-256 of the frames' bytes in order.
     pub digest: [u8; 32],
@@ -140,7 +131,6 @@ impl ViewMeasurement {
 pub struct ResidualPicture {
     pub width: usize,
     pub height: usize,
-    /// Axial residual, mm, row-major.
     pub millimetres: Vec<f32>,
 }
 
@@ -175,7 +165,6 @@ impl ReferenceDistance {
         self.off_m().abs() > self.tolerance_m()
     }
 
-    /// The tolerance, for people.
     pub fn describe_tolerance() -> String {
         format!("{:.0} mm and {:.0} % of the distance", 1e3 * TAPE_M, 1e2 * SCALE_SHARE)
     }

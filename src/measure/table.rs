@@ -34,14 +34,11 @@ impl SigmaKind {
     }
 }
 
-/// One measured sigma.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SigmaRow {
     /// Mean depth of the samples, m.
     pub z_m: f64,
-    /// Tilt of the plane, rad.
     pub theta_rad: f64,
-    /// The standard deviation, m.
     pub sigma_m: f64,
     /// Independent samples behind it; `None` when the table does not say.
     pub n_effective: Option<f64>,
@@ -69,7 +66,6 @@ impl SigmaTable {
         SigmaTable { rows }
     }
 
-    /// Number of different views.
     pub fn views(&self) -> usize {
         let mut seen: Vec<usize> = self.rows.iter().map(|r| r.view).collect();
         seen.sort_unstable();
@@ -77,7 +73,6 @@ impl SigmaTable {
         seen.len()
     }
 
-    /// Least and greatest of a column.
     pub fn range(&self, column: impl Fn(&SigmaRow) -> f64) -> [f64; 2] {
         crate::stats::range(self.rows.iter().map(column))
     }
@@ -189,12 +184,7 @@ const REMEDY_TABLE: &str = "the header is z_m,theta_rad,sigma_m and optionally n
 /// An error when a column is missing or a value is not a usable number; the message names the line.
 pub fn read_table(path: &Path) -> Result<SigmaTable> {
     let file = std::fs::File::open(path).map_err(|e| Error::read(path, e))?;
-    let wrong = |line: usize, what: String| Error::Text {
-        path: path.to_path_buf(),
-        line,
-        what,
-        remedy: REMEDY_TABLE,
-    };
+    let wrong = |line: usize, what: String| Error::text(path, line, what, REMEDY_TABLE);
     let damaged = |e: ::csv::Error| {
         let line = e.position().map_or(1, |p| p.line() as usize);
         match e.into_kind() {

@@ -73,7 +73,6 @@ impl<'r> FrameReader<'r> {
         FrameReader { frames: view.depth.iter(), source, notes: Vec::new(), table }
     }
 
-    /// The first readable frames.
     fn hold(&mut self, view: &View) -> Result<Vec<Frame>> {
         let mut held = Vec::new();
         while held.len() < HELD_FRAMES {

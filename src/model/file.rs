@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 use super::effect::Effect;
 use super::forms::Form;
 use super::{Direction, Domain, SigmaModel};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, read_text};
 use crate::io::{pretty_json, write_atomic};
 use crate::view::RecordingFile;
 
@@ -24,7 +24,6 @@ pub struct NoiseModel {
     /// `None` when the model came from a bare table.
     pub sensor: Option<RecordingFile>,
     pub sigma: SigmaModel,
-    /// Physical effects beyond sigma.
     pub effects: Vec<Effect>,
     pub fit: FitSummary,
     pub provenance: Provenance,
@@ -170,7 +169,7 @@ impl NoiseModel {
 
     /// An error when the file is missing, not a model, damaged, or of a newer format.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+        let text = read_text(path)?;
         Self::from_json(&text).map_err(|(what, remedy)| Error::ModelFile {
             path: path.to_path_buf(),
             what,

@@ -7,12 +7,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::forms::{Form, MAX_PARAMETERS, SigmaForm, Walk};
+use super::forms::{Form, SigmaForm, Walk, natural_jacobian};
 use super::rows::Rows;
 use super::statistics::{SigmaFit, report};
 use super::surface::Domain;
 use crate::error::{Error, Result};
-use crate::measure::SigmaTable;
+use crate::measure::{SigmaRow, SigmaTable};
 use crate::solve::{LeastSquares, trust_region};
 
 /// Distances closer than this count as one.
@@ -40,102 +40,104 @@ pub fn fit_all(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
     rows.refer_to(|r| positive(spec.sigma(&first.parameters, r.z_m, r.theta_rad), r.sigma_m));
     rows.estimate_extra(first.held.iter().filter(|held| !**held).count());
     let start = spec.start(&rows).ok_or_else(no_start)?;
-    let mut remarks = start.remarks;
-    let mut free: Vec<usize> = (0..start.held.len()).filter(|&i| !start.held[i]).collect();
-    let mut p = start.parameters.clone();
+    let free = (0..start.held.len()).filter(|&i| !start.held[i]).collect();
+    let mut fit = Fit { rows, spec, p: start.parameters, free, remarks: start.remarks };
     let (mut rounds, mut converged) = (0, false);
     while rounds < MAX_ROUNDS && !converged {
         rounds += 1;
-        rows.refer_to(|r| positive(spec.sigma(&p, r.z_m, r.theta_rad), r.sigma_m));
-        rows.estimate_extra(free.len());
-        let before: Vec<f64> = rows.reference().to_vec();
-        p = polish(&rows, spec, &p, &free);
-        hold_strays(&rows, spec, &mut p, &mut free, &mut remarks);
-        let change = rows
-            .iter()
-            .zip(&before)
-            .map(|(r, s)| (spec.sigma(&p, r.z_m, r.theta_rad) / s).ln().abs())
-            .fold(0.0, f64::max);
-        converged =
-            change < SETTLED && !hold_positive(&rows, spec, &mut p, &mut free, &mut remarks);
+        converged = fit.round() < SETTLED && !fit.hold_positive();
     }
-    if !positive_in_range(&rows, spec, &p) {
+    if !fit.positive_in_range() {
         return Err(Error::Solver {
             what: format!("the form \"{form}\" is not positive over the range of the data"),
             remedy: "look for outlying views in measurements.csv, or choose another --form",
         });
     }
+    let Fit { mut rows, p, free, remarks, .. } = fit;
     rows.refer_to(|r| spec.sigma(&p, r.z_m, r.theta_rad));
     Ok(report(form, &rows, p, &free, remarks, rounds, converged))
 }
 
-/// Hold free parameters that left where they can be believed at the edge.
-fn hold_strays(
-    rows: &Rows,
-    spec: &dyn SigmaForm,
-    p: &mut [f64],
-    free: &mut Vec<usize>,
-    remarks: &mut Vec<String>,
-) {
-    free.retain(|&i| match spec.limits(i, rows) {
-        Some([low, high]) if !(low..=high).contains(&p[i]) => {
-            p[i] = if p[i] > high { high } else { low };
-            remarks.push(format!(
-                "{} runs out of what is believed and is held at {:.3}",
-                spec.card().parameters[i].0,
-                p[i]
-            ));
-            false
-        }
-        _ => true,
-    });
+/// A fit under way.
+struct Fit<'a> {
+    rows: Rows,
+    spec: &'a dyn SigmaForm,
+    p: Vec<f64>,
+    /// Parameters that are not held.
+    free: Vec<usize>,
+    remarks: Vec<String>,
 }
 
 /// A surface may not come nearer to zero inside its range than this share of the least sigma
 /// measured: between two distances a parabola can dip to where no sensor is.
 const MIN_SHARE: f64 = 0.1;
 
-/// Where the surface is least inside its range: at the vertex or the end of z next to it, and at
-/// the least tilt, for no form's tilt term is negative.
-fn min_point(rows: &Rows, spec: &dyn SigmaForm, p: &[f64]) -> Option<(f64, f64)> {
-    let domain = Domain::of(rows, spec.pole(p));
-    spec.vertex(p).map(|c| domain.clamp(c, 0.0))
-}
-
-/// Lift a surface that dips too low to [`MIN_SHARE`] and hold its floor there. True when that
-/// was needed: the rest must be fitted again.
-fn hold_positive(
-    rows: &Rows,
-    spec: &dyn SigmaForm,
-    p: &mut [f64],
-    free: &mut Vec<usize>,
-    remarks: &mut Vec<String>,
-) -> bool {
-    let Some((z, theta)) = min_point(rows, spec, p) else { return false };
-    let floor = MIN_SHARE * rows.range(|r| r.sigma_m)[0];
-    let sigma = spec.sigma(p, z, theta);
-    // Once lifted, half the way down again is let be: the surface is positive.
-    if sigma >= if free.contains(&0) { floor } else { 0.5 * floor } {
-        return false;
+impl Fit<'_> {
+    /// Weigh by the surface and fit again; the largest change of ln sigma over the table.
+    fn round(&mut self) -> f64 {
+        let Fit { rows, spec, p, free, .. } = self;
+        rows.refer_to(|r| positive(spec.sigma(p, r.z_m, r.theta_rad), r.sigma_m));
+        rows.estimate_extra(free.len());
+        *p = polish(rows, *spec, p, free);
+        self.hold_strays();
+        let (spec, p) = (self.spec, &self.p);
+        let change = |(r, s): (&SigmaRow, &f64)| (spec.sigma(p, r.z_m, r.theta_rad) / s).ln().abs();
+        self.rows.iter().zip(self.rows.reference()).map(change).fold(0.0, f64::max)
     }
-    p[0] += floor - sigma;
-    if free.contains(&0) {
-        free.retain(|&i| i != 0);
-        remarks.push(format!(
-            "a is held: fitted freely the surface falls to {:.2} mm at {z:.2} m; record views near that distance",
-            1e3 * sigma
-        ));
-    }
-    true
-}
 
-fn positive_in_range(rows: &Rows, spec: &dyn SigmaForm, p: &[f64]) -> bool {
-    let good = |z, theta| {
-        let sigma: f64 = spec.sigma(p, z, theta);
-        sigma.is_finite() && sigma > 0.0
-    };
-    rows.iter().all(|r| good(r.z_m, r.theta_rad))
-        && min_point(rows, spec, p).is_none_or(|(z, theta)| good(z, theta))
+    /// Hold free parameters that left where they can be believed at the edge.
+    fn hold_strays(&mut self) {
+        let Fit { rows, spec, p, free, remarks } = self;
+        free.retain(|&i| match spec.limits(i, rows) {
+            Some([low, high]) if !(low..=high).contains(&p[i]) => {
+                p[i] = if p[i] > high { high } else { low };
+                let name = spec.card().parameters[i].0;
+                remarks.push(format!(
+                    "{name} runs out of what is believed and is held at {:.3}",
+                    p[i]
+                ));
+                false
+            }
+            _ => true,
+        });
+    }
+
+    /// Where the surface is least inside its range: at the vertex or the end of z next to it, and
+    /// at the least tilt, for no form's tilt term is negative.
+    fn min_point(&self) -> Option<(f64, f64)> {
+        let domain = Domain::of(&self.rows, self.spec.pole(&self.p));
+        self.spec.vertex(&self.p).map(|c| domain.clamp(c, 0.0))
+    }
+
+    /// Lift a surface that dips too low to [`MIN_SHARE`] and hold its floor there. True when that
+    /// was needed: the rest must be fitted again.
+    fn hold_positive(&mut self) -> bool {
+        let Some((z, theta)) = self.min_point() else { return false };
+        let floor = MIN_SHARE * self.rows.range(|r| r.sigma_m)[0];
+        let sigma = self.spec.sigma(&self.p, z, theta);
+        let is_free = self.free.contains(&0);
+        // Once lifted, half the way down again is let be: the surface is positive.
+        if sigma >= if is_free { floor } else { 0.5 * floor } {
+            return false;
+        }
+        self.p[0] += floor - sigma;
+        if is_free {
+            self.free.retain(|&i| i != 0);
+            self.remarks.push(format!(
+                "a is held: fitted freely the surface falls to {:.2} mm at {z:.2} m; record views near that distance",
+                1e3 * sigma
+            ));
+        }
+        true
+    }
+
+    fn positive_in_range(&self) -> bool {
+        let good = |(z, theta): (f64, f64)| {
+            let sigma = self.spec.sigma(&self.p, z, theta);
+            sigma.is_finite() && sigma > 0.0
+        };
+        self.rows.iter().all(|r| good((r.z_m, r.theta_rad))) && self.min_point().is_none_or(good)
+    }
 }
 
 fn positive(sigma: f64, otherwise: f64) -> f64 {
@@ -250,31 +252,9 @@ impl LeastSquares for Local<'_> {
     }
 }
 
-/// Whitened derivatives of sigma by the free parameters, a row a measurement.
-pub(super) fn natural_jacobian(
-    rows: &Rows,
-    spec: &dyn SigmaForm,
-    p: &[f64],
-    free: &[usize],
-) -> DMatrix<f64> {
-    let n = rows.len();
-    let mut j = DMatrix::zeros(n, free.len());
-    let mut gradient = [0.0; MAX_PARAMETERS];
-    for (i, r) in rows.iter().enumerate() {
-        spec.gradient(p, r.z_m, r.theta_rad, &mut gradient);
-        for (column, &k) in free.iter().enumerate() {
-            j[(i, column)] = gradient[k];
-        }
-    }
-    for column in 0..free.len() {
-        rows.whiten(&mut j.as_mut_slice()[column * n..(column + 1) * n]);
-    }
-    j
-}
-
 const TRUST_REGION_STEPS: u64 = 4;
 
-pub(super) fn polish(rows: &Rows, spec: &dyn SigmaForm, p: &[f64], free: &[usize]) -> Vec<f64> {
+fn polish(rows: &Rows, spec: &dyn SigmaForm, p: &[f64], free: &[usize]) -> Vec<f64> {
     if free.is_empty() {
         return p.to_vec();
     }

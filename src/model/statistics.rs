@@ -3,8 +3,7 @@
 
 use nalgebra::DMatrix;
 
-use super::fit::natural_jacobian;
-use super::forms::{Form, SigmaForm};
+use super::forms::{Form, SigmaForm, natural_jacobian};
 use super::rows::Rows;
 use super::surface::{Direction, Domain, SigmaModel};
 use crate::measure::SigmaRow;
@@ -20,7 +19,6 @@ pub struct Parameter {
     pub remark: Option<String>,
 }
 
-/// A fitted form and how well it fits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SigmaFit {
     pub form: Form,
@@ -48,7 +46,6 @@ impl SigmaFit {
         self.parameters.iter().map(|p| p.value).collect()
     }
 
-    /// Number of parameters that were fitted.
     pub fn free(&self) -> usize {
         self.parameters.iter().filter(|p| p.std_error.is_some()).count()
     }
@@ -193,7 +190,6 @@ fn name_parameters(
         .collect()
 }
 
-/// How a surface fits its rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quality {
     /// Root mean square of s - sigma, m, and as a share of sigma.

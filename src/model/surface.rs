@@ -40,7 +40,6 @@ impl Domain {
         Domain { z_m: rows.range(|r| r.z_m), theta_rad }
     }
 
-    /// The nearest point of the domain.
     pub fn clamp(&self, z: f64, theta: f64) -> (f64, f64) {
         (z.clamp(self.z_m[0], self.z_m[1]), theta.abs().clamp(self.theta_rad[0], self.theta_rad[1]))
     }

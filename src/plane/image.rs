@@ -19,7 +19,6 @@ pub struct Target {
     /// Robust standard deviation about the plane, inverse depth, 1/m.
     pub scale: f64,
     pub exclusions: Exclusions,
-    /// Oddities worth telling.
     pub notes: Vec<String>,
 }
 
@@ -28,7 +27,6 @@ pub struct Target {
 pub struct Exclusions {
     /// Pixels considered: the region's, or the whole image.
     pub considered: usize,
-    /// Without a measurement.
     pub invalid: usize,
     /// Measured, but not on the target's plane (or not connected with it).
     pub off_plane: usize,

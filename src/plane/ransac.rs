@@ -12,7 +12,6 @@ pub trait Estimator {
     type Model: Copy;
     /// Data needed for one hypothesis.
     const MINIMAL: usize;
-    /// Number of data.
     fn len(&self) -> usize;
     /// `None` when the sample is degenerate.
     fn hypothesis(&self, sample: &[usize]) -> Option<Self::Model>;
@@ -50,7 +49,6 @@ impl UniformSampler<'_> {
 pub struct RansacOptions {
     /// Greatest distance of an inlier, in the data's unit; m for the paper's plane.
     pub threshold_m: f64,
-    /// Largest number of hypotheses tried.
     pub iterations: usize,
     pub confidence: f64,
 }

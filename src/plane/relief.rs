@@ -12,7 +12,6 @@ pub(super) struct Relief {
     pub lattice: Lattice,
     /// Nodes of the areas and next to them.
     pub mask: Vec<bool>,
-    /// A description of each area.
     pub notes: Vec<String>,
     /// Share of the measured nodes that the areas cover.
     pub share: f64,

@@ -32,7 +32,6 @@ pub fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     Ok(sequence)
 }
 
-/// One moment of a film.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Moment {
     /// Of the depth image, s.
@@ -42,7 +41,6 @@ pub struct Moment {
     pub colour: Option<PathBuf>,
 }
 
-/// A film, its frames not yet read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sequence {
     pub root: PathBuf,
@@ -51,7 +49,6 @@ pub struct Sequence {
     pub moments: Vec<Moment>,
     /// True poses, in time order; empty where there are none.
     pub truth: Vec<Pose>,
-    /// What was odd, in sentences.
     pub remarks: Vec<String>,
 }
 
@@ -93,7 +90,6 @@ impl Sequence {
 /// A frame this many usual intervals after the one before it: frames are missing between them.
 const GAP: f64 = 3.5;
 
-/// What the stamps say of frames that are missing.
 fn gaps(moments: &[Moment]) -> Option<String> {
     let intervals: Vec<f64> = moments.windows(2).map(|w| w[1].stamp - w[0].stamp).collect();
     let usual = median(&mut intervals.clone());

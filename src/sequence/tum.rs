@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::{Moment, Sequence};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, read_text};
 use crate::io::{Assumed, Layout, open_uncut, read_list};
 use crate::trajectory::{associate, read_benchmark};
 use crate::view::FrameRef;
@@ -135,7 +135,7 @@ fn nearest(
 
 /// "stamp path stamp path" lines: colour and depth in either order.
 fn listed(root: &Path, file: &Path, depth: &[FrameRef]) -> Result<Vec<Option<PathBuf>>> {
-    let text = std::fs::read_to_string(file).map_err(|e| Error::read(file, e))?;
+    let text = read_text(file)?;
     let place: HashMap<&PathBuf, usize> =
         depth.iter().enumerate().map(|(k, f)| (&f.path, k)).collect();
     let mut partner = vec![None; depth.len()];
@@ -146,12 +146,9 @@ fn listed(root: &Path, file: &Path, depth: &[FrameRef]) -> Result<Vec<Option<Pat
         }
         let words: Vec<&str> = content.split_whitespace().collect();
         let [_, one, _, other] = words[..] else {
-            return Err(Error::Text {
-                path: file.to_path_buf(),
-                line: i + 1,
-                what: format!("{} words where \"stamp path stamp path\" is due", words.len()),
-                remedy: "make the file again with associate.py, or take it out",
-            });
+            let what = format!("{} words where \"stamp path stamp path\" is due", words.len());
+            let remedy = "make the file again with associate.py, or take it out";
+            return Err(Error::text(file, i + 1, what, remedy));
         };
         let [one, other] = [one, other].map(|name| root.join(name));
         let (depth_index, colour) = match (place.get(&one), place.get(&other)) {

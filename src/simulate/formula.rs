@@ -63,7 +63,6 @@ impl FormulaSensor<'_> {
     }
 }
 
-/// A frame, and the light it was taken by.
 pub struct Shot {
     pub depth: Frame,
     /// Relative to a white surface at 1 m facing the sensor.

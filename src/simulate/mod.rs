@@ -44,7 +44,6 @@ pub struct Grid {
     pub tilts_rad: Vec<f64>,
 }
 
-/// One pose of the board.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridView {
     /// Depth on the optical axis, m.

@@ -17,7 +17,6 @@ use crate::rng::Seed;
 use crate::scene::{Bench, Patch, Print, Seen, Target, TargetFrame, WHITE};
 use crate::view::{Excluded, Recording, TargetSize, ViewNotes};
 
-/// One view to be taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewPlan {
     pub name: String,
@@ -32,7 +31,6 @@ pub struct ViewPlan {
 }
 
 impl ViewPlan {
-    /// What the camera's pixels see of the view.
     pub fn seen(&self, camera: &Camera, rays: &Rays) -> Seen {
         let mut seen = Seen::of(&self.bench, camera, rays);
         if let Some(mask) = &self.mask {

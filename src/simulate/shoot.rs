@@ -44,13 +44,11 @@ impl Physics {
     }
 }
 
-/// Views to be taken by one sensor.
 #[derive(Debug, Clone)]
 pub struct Shoot {
     pub sensor: Sensor,
     pub views: Vec<ViewPlan>,
     pub physics: Physics,
-    /// Write infrared amplitude images too.
     pub infrared: bool,
     pub seed: Seed,
 }
@@ -197,7 +195,6 @@ const READ_NOISE_DN: f32 = 10.4;
 /// A 10-bit sensor of this class fills up at some 10,000 electrons.
 const ELECTRONS_PER_DN: f32 = 10.0;
 
-/// An image's file.
 type Encode = fn(&Frame) -> Result<Vec<u8>>;
 
 /// A view's folder as it fills.

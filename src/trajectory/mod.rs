@@ -5,7 +5,7 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, read_text};
 
 /// Where a camera was, and when.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,7 +15,6 @@ pub struct Pose {
     pub world_from_camera: Isometry3<f64>,
 }
 
-/// The poses of a file, in time order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     pub poses: Vec<Pose>,
@@ -48,7 +47,7 @@ pub fn read_trajectory(path: &Path) -> Result<Trajectory> {
         let before = read.poses.last().map_or(f64::NEG_INFINITY, |p: &Pose| p.stamp);
         if pose.stamp < before {
             let what = format!("time {} comes after {before}, which is later", pose.stamp);
-            return Err(Fault::new(what, "sort the lines by time"));
+            return Err((what, "sort the lines by time"));
         }
         if pose.stamp > before {
             read.poses.push(pose);
@@ -80,17 +79,19 @@ pub fn read_benchmark(path: &Path) -> Result<Trajectory> {
 }
 
 fn each_line(path: &Path, mut take: impl FnMut(Pose) -> Result<(), Fault>) -> Result<()> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+    let text = read_text(path)?;
     let mut found = false;
     for (i, line) in text.lines().enumerate() {
         let content = line.trim_start_matches('\u{feff}').trim();
         if content.is_empty() || content.starts_with('#') {
             continue;
         }
-        parse(content).and_then(&mut take).map_err(|fault| fault.at(path, i + 1))?;
+        parse(content)
+            .and_then(&mut take)
+            .map_err(|(what, remedy)| Error::text(path, i + 1, what, remedy))?;
         found = true;
     }
-    if found { Ok(()) } else { Err(Fault::new("no pose in it", REMEDY_FORMAT).at(path, 0)) }
+    if found { Ok(()) } else { Err(Error::text(path, 0, "no pose in it", REMEDY_FORMAT)) }
 }
 
 const REMEDY_FORMAT: &str = "write \"timestamp tx ty tz qx qy qz qw\", one pose a line";
@@ -98,40 +99,25 @@ const REMEDY_FORMAT: &str = "write \"timestamp tx ty tz qx qy qz qw\", one pose 
 /// Printed quaternions have three to six decimals; one shorter than this is no rotation.
 const SHORTEST_QUATERNION: f64 = 0.5;
 
-struct Fault {
-    what: String,
-    remedy: &'static str,
-}
-
-impl Fault {
-    fn new(what: impl Into<String>, remedy: &'static str) -> Self {
-        Fault { what: what.into(), remedy }
-    }
-
-    fn at(self, path: &Path, line: usize) -> Error {
-        Error::Text { path: path.to_path_buf(), line, what: self.what, remedy: self.remedy }
-    }
-}
+/// What is wrong with a line, and what to do.
+type Fault = (String, &'static str);
 
 fn parse(line: &str) -> Result<Pose, Fault> {
     let numbers = line
         .split(|c: char| c.is_whitespace() || c == ',')
         .filter(|word| !word.is_empty())
-        .map(|word| {
-            word.parse().map_err(|_| Fault::new(format!("\"{word}\" is no number"), REMEDY_FORMAT))
-        })
+        .map(|word| word.parse().map_err(|_| (format!("\"{word}\" is no number"), REMEDY_FORMAT)))
         .collect::<Result<Vec<f64>, Fault>>()?;
     let [stamp, tx, ty, tz, qx, qy, qz, qw] = numbers[..] else {
-        let what = format!("{} numbers, a pose has 8", numbers.len());
-        return Err(Fault::new(what, REMEDY_FORMAT));
+        return Err((format!("{} numbers, a pose has 8", numbers.len()), REMEDY_FORMAT));
     };
     if numbers.iter().any(|v| !v.is_finite()) {
-        return Err(Fault::new("a number is not finite", "take the line out"));
+        return Err(("a number is not finite".into(), "take the line out"));
     }
     let quaternion = Quaternion::new(qw, qx, qy, qz);
     if quaternion.norm() < SHORTEST_QUATERNION {
         let what = format!("the quaternion {qx} {qy} {qz} {qw} is no rotation");
-        return Err(Fault::new(what, "take the line out, or give qx qy qz qw of length 1"));
+        return Err((what, "take the line out, or give qx qy qz qw of length 1"));
     }
     let rotation = UnitQuaternion::from_quaternion(quaternion);
     let world_from_camera = Isometry3::from_parts(Translation3::new(tx, ty, tz), rotation);

@@ -9,6 +9,8 @@ mod tilt;
 use std::fmt;
 use std::str::FromStr;
 
+use nalgebra::DMatrix;
+
 use super::rows::Rows;
 
 pub use paper::PAPER_EQ1;
@@ -74,7 +76,6 @@ pub trait SigmaForm: Sync {
     }
 }
 
-/// The forms there are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Form {
     Paper,
@@ -119,6 +120,28 @@ impl FromStr for Form {
             format!("there is no form \"{text}\"; the forms are {}", known.join(", "))
         })
     }
+}
+
+/// Whitened derivatives of sigma by the free parameters, a row a measurement.
+pub fn natural_jacobian(
+    rows: &Rows,
+    spec: &dyn SigmaForm,
+    p: &[f64],
+    free: &[usize],
+) -> DMatrix<f64> {
+    let n = rows.len();
+    let mut j = DMatrix::zeros(n, free.len());
+    let mut gradient = [0.0; MAX_PARAMETERS];
+    for (i, r) in rows.iter().enumerate() {
+        spec.gradient(p, r.z_m, r.theta_rad, &mut gradient);
+        for (column, &k) in free.iter().enumerate() {
+            j[(i, column)] = gradient[k];
+        }
+    }
+    for column in 0..free.len() {
+        rows.whiten(&mut j.as_mut_slice()[column * n..(column + 1) * n]);
+    }
+    j
 }
 
 #[cfg(test)]

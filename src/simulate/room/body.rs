@@ -33,7 +33,6 @@ impl Room {
         all.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0))
     }
 
-    /// The bodies as seen from a pose.
     pub fn posed(&self, room_from_camera: &Isometry3<f64>) -> impl Iterator<Item = PosedBody<'_>> {
         let pose = *room_from_camera;
         self.bodies.iter().enumerate().map(move |(i, body)| PosedBody::new(i, body, &pose))

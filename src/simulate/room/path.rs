@@ -171,7 +171,6 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// The path in the room's frame.
     pub fn apply(&self, poses: &[Pose]) -> Vec<Pose> {
         let moved = |p: &Pose| Pose {
             stamp: p.stamp,

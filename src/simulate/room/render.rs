@@ -23,7 +23,6 @@ pub struct Picture {
 /// Pixels a side of a tile.
 const TILE: usize = 8;
 
-/// A square of the picture.
 struct Tile {
     pixels: Vec<usize>,
     window: Window,
@@ -206,7 +205,6 @@ fn is_edge(seen: &Seen, i: usize) -> bool {
         || (v + 1 < seen.height && other(i + seen.width))
 }
 
-/// A small lamp.
 struct Lamp {
     at: Vector3<f32>,
     /// Brightness it gives a white surface 1 m below it, as a share of display white.

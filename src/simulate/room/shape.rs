@@ -20,7 +20,6 @@ pub enum Shape {
     Shell(Vector3<f64>),
 }
 
-/// Where a ray meets a shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intersection {
     /// In units of the ray's direction.

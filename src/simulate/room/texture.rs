@@ -30,7 +30,6 @@ impl Texture {
         Texture { levels }
     }
 
-    /// Texels a side of the full picture.
     pub fn size(&self) -> usize {
         self.levels[0].size
     }
@@ -117,7 +116,6 @@ pub enum Mapping {
     Tiles { side_m: f32, of_m: f32 },
 }
 
-/// One face's look.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
     /// Index into the room's textures.

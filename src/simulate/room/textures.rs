@@ -131,7 +131,6 @@ fn clock(_: &mut Stream) -> Canvas {
     c
 }
 
-/// Panels round a ball.
 fn ball(rng: &mut Stream) -> Canvas {
     let mut c = Canvas::new(256, [214, 52, 44]);
     for k in 0..8 {
@@ -239,7 +238,6 @@ pub fn spines(rng: &mut Stream) -> Canvas {
     c
 }
 
-/// Windows, menus and text.
 pub fn screen(rng: &mut Stream) -> Canvas {
     let mut c = Canvas::new(512, [32, 72, 120]);
     c.mottle([5, 5], 20.0, rng);
@@ -260,7 +258,6 @@ pub fn screen(rng: &mut Stream) -> Canvas {
     c
 }
 
-/// Corrugated board with tape, a label and an arrow.
 pub fn carton(rng: &mut Stream) -> Canvas {
     let mut c = Canvas::new(256, [178, 138, 92]);
     c.mottle([2, 40], 8.0, rng);

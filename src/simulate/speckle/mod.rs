@@ -19,8 +19,9 @@ mod reference;
 
 pub use causes::{Cause, Causes, KNOWN_CAUSES};
 
-use optics::{Moment, Optics};
-use pattern::{Field, Grain, Pattern, Picture, expose};
+use causes::Moment;
+use optics::{Optics, Picture, expose};
+use pattern::{Field, Grain, Pattern};
 use reference::{Candidates, REFERENCE_M, ReadOut, Reference};
 
 use crate::camera::Camera;
@@ -67,7 +68,6 @@ impl SpeckleSensor {
         SpeckleSensor { described, camera, baseline_m, causes, pattern, reference, read_out }
     }
 
-    /// As recording.json describes it.
     pub fn described(&self) -> &Sensor {
         &self.described
     }
@@ -108,7 +108,6 @@ impl SpeckleSensor {
     }
 }
 
-/// The frames of one view, to be taken in order.
 pub struct Filming<'a> {
     sensor: &'a SpeckleSensor,
     bench: &'a Bench,

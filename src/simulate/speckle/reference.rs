@@ -1,8 +1,7 @@
-//! What the matcher compares with, the pattern on a plane as recorded at the factory, and how shifts
-//! against it become 11-bit raw values.
+//! What the matcher compares with, the pattern on a plane as recorded at the factory: its sums over the
+//! matching window, and how shifts against it become 11-bit raw values.
 
-use super::matcher::{LANES, WindowedImage};
-use super::pattern::Picture;
+use super::optics::Picture;
 use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
 
 /// Distance of the factory's plane, m. The real one is not published; at 2 m the picture moves by
@@ -112,6 +111,131 @@ impl ReadOut {
     }
 }
 
+/// A picture with the sums over the window about each pixel, row-major.
+pub struct WindowedImage {
+    pub width: usize,
+    pub height: usize,
+    pub grey: Vec<f32>,
+    pub sum: Vec<f32>,
+    /// Root of the summed squares about the window's mean; zero where nothing is to be seen.
+    pub contrast: Vec<f32>,
+}
+
+impl WindowedImage {
+    pub fn new(grey: &[u32], width: usize, half: usize) -> Self {
+        let squares: Vec<u32> = grey.iter().map(|g| g * g).collect();
+        let area = ((2 * half + 1) as f32).powi(2);
+        let sum: Vec<f32> = window_sums(grey, width, half).iter().map(|&s| s as f32).collect();
+        let contrast =
+            |(&squares, &sum): (&u32, &f32)| (squares as f32 - sum * sum / area).max(0.0).sqrt();
+        WindowedImage {
+            width,
+            height: grey.len() / width,
+            grey: grey.iter().map(|&g| g as f32).collect(),
+            contrast: window_sums(&squares, width, half).iter().zip(&sum).map(contrast).collect(),
+            sum,
+        }
+    }
+
+    pub fn row<'a>(&self, values: &'a [f32], v: usize) -> &'a [f32] {
+        &values[v * self.width..][..self.width]
+    }
+}
+
+/// Sum of each pixel's `(2 half + 1)^2` neighbourhood; zero where it does not fit. Exact.
+fn window_sums(values: &[u32], width: usize, half: usize) -> Vec<u32> {
+    let height = values.len() / width;
+    let side = 2 * half + 1;
+    let mut sums = vec![0; values.len()];
+    let mut columns = vec![0u32; width];
+    for bottom in 0..height {
+        let row = &values[bottom * width..][..width];
+        columns.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
+        if bottom >= side {
+            let old = &values[(bottom - side) * width..][..width];
+            columns.iter_mut().zip(old).for_each(|(sum, value)| *sum -= value);
+        }
+        if bottom + 1 >= side && width >= side {
+            let out = &mut sums[(bottom - half) * width..][..width];
+            let mut sum: u32 = columns[..side - 1].iter().sum();
+            for right in side - 1..width {
+                sum += columns[right];
+                out[right - half] = sum;
+                sum -= columns[right + 1 - side];
+            }
+        }
+    }
+    sums
+}
+
+/// Candidates are worked on in groups of this size: a multiple of any vector register.
+pub const LANES: usize = 8;
+
+/// For every column u and candidate k the products picture(u) * reference(u, k), summed over the
+/// rows of the window; k runs fastest, so that every loop below is a plain vector loop.
+///
+/// Picture and reference hold whole numbers of 10 and 8 bits: 31 rows stay below 2^24, so that
+/// single precision is exact and adding and taking away leaves no trace.
+pub struct ColumnProducts {
+    width: usize,
+    candidates: usize,
+    sums: Vec<f32>,
+}
+
+/// A row of the picture and the same row of the reference, mirrored, so that the candidates of
+/// column u are `reference[width - 1 - u..]` in order.
+#[derive(Clone, Copy)]
+pub struct RowPair<'a> {
+    pub picture: &'a [f32],
+    pub reference: &'a [f32],
+}
+
+impl ColumnProducts {
+    pub fn new(width: usize, candidates: usize) -> Self {
+        ColumnProducts { width, candidates, sums: vec![0.0; width * candidates] }
+    }
+
+    pub fn of(&self, column: usize) -> &[f32] {
+        &self.sums[column * self.candidates..][..self.candidates]
+    }
+
+    pub fn enter(&mut self, row: RowPair) {
+        let n = self.candidates;
+        for (u, sums) in self.sums.chunks_exact_mut(n).enumerate() {
+            let grey = row.picture[u];
+            let reference = &row.reference[self.width - 1 - u..][..n];
+            sums.iter_mut().zip(reference).for_each(|(s, r)| *s += grey * r);
+        }
+    }
+
+    pub fn exchange(&mut self, enters: RowPair, leaves: RowPair) {
+        let n = self.candidates;
+        for (u, sums) in self.sums.chunks_exact_mut(n).enumerate() {
+            let (new, old) = (enters.picture[u], leaves.picture[u]);
+            let place = self.width - 1 - u;
+            let fresh = &enters.reference[place..][..n];
+            let stale = &leaves.reference[place..][..n];
+            for ((s, f), o) in sums.iter_mut().zip(fresh).zip(stale) {
+                *s += new * f - old * o;
+            }
+        }
+    }
+}
+
+/// The largest value and its first place.
+pub fn best(scores: &[f32]) -> (usize, f32) {
+    let mut lanes = [f32::NEG_INFINITY; LANES];
+    for group in scores.chunks_exact(LANES) {
+        for (top, &s) in lanes.iter_mut().zip(group) {
+            // Not f32::max, whose care for NaN costs a branch a lane.
+            *top = if s > *top { s } else { *top };
+        }
+    }
+    let top = lanes.iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b));
+    let place = scores.iter().position(|&s| s == top).unwrap_or(0);
+    (place, top)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -144,5 +268,24 @@ mod tests {
         let raw: std::collections::BTreeSet<u16> =
             (0..4000).map(|k| read_out.raw(k as f32 * 0.01)).collect();
         assert!((70..=90).contains(&raw.len()), "40 px in half pixels: {}", raw.len());
+    }
+
+    #[test]
+    fn window_sums_are_the_sums_over_windows() {
+        let values: Vec<u32> = (0..70u32).map(|i| i * i % 101).collect();
+        let sums = window_sums(&values, 10, 1);
+        let expected: u32 =
+            (2..5).flat_map(|v| (4..7).map(move |u| v * 10 + u)).map(|i| values[i]).sum();
+        assert_eq!(sums[3 * 10 + 5], expected);
+        assert_eq!(sums[0], 0);
+        assert_eq!(sums[6 * 10 + 5], 0, "the last row has no whole window");
+    }
+
+    #[test]
+    fn the_best_is_the_first_of_the_largest() {
+        let mut scores = vec![0.0f32; 24];
+        scores[13] = 2.0;
+        scores[21] = 2.0;
+        assert_eq!(best(&scores), (13, 2.0));
     }
 }
