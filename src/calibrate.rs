@@ -86,10 +86,9 @@ pub fn measure(
         }
     }
     if measurements.views.is_empty() {
-        let first = measurements.excluded.first().map_or_else(
-            || "there is no view".to_string(),
-            |e| format!("view {}: {}", e.view, e.reason),
-        );
+        let first = measurements.excluded.first();
+        let first = first.map(|e| format!("view {}: {}", e.view, e.reason));
+        let first = first.unwrap_or_else(|| "there is no view".to_string());
         return Err(Error::recording(
             &recording.root,
             format!("no view of {total} can be used; the first: {first}"),
@@ -100,8 +99,7 @@ pub fn measure(
 }
 
 /// Fit the noise model to the measured views.
-/// An error when the views are too few or too alike for the form, or a file that describes them is
-/// gone.
+/// An error when the views are too few or too alike for the form, or a description is gone.
 pub fn model_of(
     recording: &Recording,
     measurements: &Measurements,
@@ -160,10 +158,8 @@ fn noise_model(
     kind: SigmaKind,
     provenance: Provenance,
 ) -> NoiseModel {
-    let direction = match kind {
-        SigmaKind::Paper => Direction::Perpendicular,
-        SigmaKind::Spatial | SigmaKind::Temporal | SigmaKind::Total => Direction::Axial,
-    };
+    let across = kind == SigmaKind::Paper;
+    let direction = if across { Direction::Perpendicular } else { Direction::Axial };
     NoiseModel {
         sensor,
         sigma: SigmaModel { direction, ..fit.model() },
@@ -193,15 +189,11 @@ fn describe(options: &CalibrateOptions, form: Form) -> Map<String, Value> {
         "ransac_threshold_m": options.measure.ransac_threshold_m,
         "ransac_iterations": options.measure.ransac_iterations,
     });
-    match value {
-        Value::Object(map) => map,
-        _ => Map::new(),
-    }
+    value.as_object().cloned().unwrap_or_default()
 }
 
-/// Hash of the description files, and of every view's frames.
-/// An error when a description file can no longer be read: a hash of nothing would vouch for the
-/// wrong input.
+/// Hash of the description files, and of every view's frames. An error when one can no longer be
+/// read: a hash of nothing would vouch for the wrong input.
 fn hashes(recording: &Recording, measurements: &Measurements) -> Result<Map<String, Value>> {
     let mut map = Map::new();
     let mut described = Sha256::new();
@@ -222,10 +214,7 @@ fn hashes(recording: &Recording, measurements: &Measurements) -> Result<Map<Stri
 
 /// What a person should know before trusting the model, the most important first.
 fn warnings_of(recording: &Recording, measurements: &Measurements, fit: &SigmaFit) -> Vec<String> {
-    let mut warnings = Vec::new();
-    for e in &measurements.excluded {
-        warnings.push(e.to_string());
-    }
+    let mut warnings: Vec<String> = measurements.excluded.iter().map(ToString::to_string).collect();
     // Views left out while opening stand here too.
     warnings.extend(recording.remarks.iter().cloned());
     let total = measurements.views.len();

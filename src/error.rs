@@ -13,8 +13,7 @@ pub enum Error {
     /// chain of causes would say it twice.
     #[error("{}: {cause}; {remedy}", path.display())]
     Io { path: PathBuf, cause: std::io::Error, remedy: &'static str },
-    /// A line of a text file (JSON, `depth.txt`, a table) that cannot be understood: 1-based, 0 when the
-    /// whole document is meant.
+    /// A line of a text file (JSON, `depth.txt`, a table) that is not understood; 0 is all of it.
     #[error("{}{}: {what}; {remedy}", path.display(), at_line(*line))]
     Text { path: PathBuf, line: usize, what: String, remedy: &'static str },
     /// An image that is damaged or not of the promised kind.

@@ -238,12 +238,4 @@ mod tests {
         assert!(arrow.contains(-3.0, -3.0));
         assert!(!arrow.contains(11.0, 5.0));
     }
-
-    #[test]
-    fn a_description_must_say_how_words_become_metres() {
-        let text = r#"{"format":"recording/1","sensor":"s","width":4,"height":3,
-            "fx":5,"fy":5,"cx":2,"cy":1}"#;
-        let file: RecordingFile = serde_json::from_str(text).unwrap();
-        assert!(file.sensor().unwrap_err().contains("units_per_metre"));
-    }
 }

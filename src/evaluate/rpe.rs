@@ -94,8 +94,7 @@ fn motion(to: &Isometry3<f64>, from: &Isometry3<f64>) -> Isometry3<f64> {
     to.inverse() * from
 }
 
-/// Index of the value nearest to `wanted` in an ascending list: the script's own bisection, which
-/// decides ties.
+/// Index of the value nearest to `wanted`, ascending: the script's own bisection decides ties.
 fn nearest(len: usize, value: impl Fn(usize) -> f64, wanted: f64) -> usize {
     let mut best = 0;
     let mut difference = (value(0) - wanted).abs();

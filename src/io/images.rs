@@ -27,9 +27,7 @@ impl FrameSource {
         FrameSource { width, height, hash: Sha256::new() }
     }
 
-    /// Read one depth frame.
-    /// An error when the file is missing, truncated, of another kind (8 bit, colour) or of another
-    /// size.
+    /// An error when the file is missing, truncated, of another kind (8 bit, colour) or size.
     pub fn read(&mut self, path: &Path) -> Result<Frame> {
         let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
         self.hash.update(&bytes);
@@ -253,14 +251,9 @@ mod tests {
     }
 
     #[test]
-    fn png_round_trip_is_exact() {
+    fn a_png_reads_back_exactly_and_every_truncation_is_an_error_not_a_panic() {
         let bytes = encode_png16(&frame()).unwrap();
         assert_eq!(decode_png16(Path::new("x.png"), &bytes).unwrap(), frame());
-    }
-
-    #[test]
-    fn every_truncation_of_a_png_is_an_error_not_a_panic() {
-        let bytes = encode_png16(&frame()).unwrap();
         let data_end = bytes.len() - 12; // IEND carries no pixels
         for cut in 0..data_end - 4 {
             assert!(decode_png16(Path::new("x.png"), &bytes[..cut]).is_err(), "cut at {cut}");
@@ -268,13 +261,9 @@ mod tests {
     }
 
     #[test]
-    fn pgm_round_trip_is_exact() {
+    fn a_pgm_reads_back_exactly_and_its_words_are_little_endian() {
         let bytes = encode_pgm16(&frame());
         assert_eq!(decode_fakenect_pgm(Path::new("d.pgm"), &bytes).unwrap(), frame());
-    }
-
-    #[test]
-    fn fakenect_words_are_little_endian() {
         let mut bytes = b"P5 2 1 65535\n".to_vec();
         bytes.extend([0x01, 0x02, 0xff, 0x07]);
         let frame = decode_fakenect_pgm(Path::new("d.pgm"), &bytes).unwrap();
@@ -282,12 +271,7 @@ mod tests {
         for cut in 0..bytes.len() {
             assert!(decode_fakenect_pgm(Path::new("d.pgm"), &bytes[..cut]).is_err());
         }
-    }
-
-    #[test]
-    fn a_header_that_claims_a_huge_image_is_refused() {
-        assert!(
-            decode_fakenect_pgm(Path::new("d.pgm"), b"P5 99999999 99999999 65535\n..").is_err()
-        );
+        let huge = b"P5 99999999 99999999 65535\n..";
+        assert!(decode_fakenect_pgm(Path::new("d.pgm"), huge).is_err());
     }
 }

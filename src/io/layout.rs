@@ -99,7 +99,11 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
         remarks: Vec::new(),
         described_by: vec![path],
     };
-    for folder in view_folders(root)? {
+    for folder in entries(root)? {
+        let listed = [DEPTH_LIST, VIEW_FILE].iter().any(|name| folder.join(name).exists());
+        if !(listed && folder.is_dir()) {
+            continue;
+        }
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         match open_view(&folder, &name, &mut recording, &mut unknown) {
             Ok(view) => recording.views.push(view),
@@ -142,13 +146,6 @@ fn parse<T: serde::de::DeserializeOwned>(path: &Path, text: &str) -> Result<T> {
     })
 }
 
-/// Sub-folders that hold a depth list, in name order.
-fn view_folders(root: &Path) -> Result<Vec<PathBuf>> {
-    let mut folders = entries(root)?;
-    folders.retain(|p| p.is_dir() && (p.join(DEPTH_LIST).exists() || p.join(VIEW_FILE).exists()));
-    Ok(folders)
-}
-
 fn open_view(
     folder: &Path,
     name: &str,
@@ -157,7 +154,8 @@ fn open_view(
 ) -> Result<View> {
     let depth_list = folder.join(DEPTH_LIST);
     let depth = read_list(&depth_list)?;
-    remark_on(&depth, name, &mut recording.remarks);
+    let of_view = |remark: &String| format!("view {name}: {remark}");
+    recording.remarks.extend(depth.remarks.iter().map(of_view));
     if depth.frames.is_empty() {
         return Err(Error::recording(
             &depth_list,
@@ -168,7 +166,7 @@ fn open_view(
     let infrared_list = folder.join(INFRARED_LIST);
     let infrared =
         if infrared_list.is_file() { read_list(&infrared_list)? } else { FrameList::default() };
-    remark_on(&infrared, name, &mut recording.remarks);
+    recording.remarks.extend(infrared.remarks.iter().map(of_view));
     let view_file = folder.join(VIEW_FILE);
     let notes = if view_file.is_file() {
         let notes = read_notes(&view_file, unknown)?;
@@ -186,10 +184,6 @@ fn read_notes(path: &Path, unknown: &mut UnknownKeys) -> Result<ViewNotes> {
     let file: ViewFile = parse(path, &text)?;
     unknown.note(path, &parse(path, &text)?, &json!(file));
     file.notes().map_err(|what| Error::text(path, 0, what, REMEDY_JSON))
-}
-
-fn remark_on(list: &FrameList, view: &str, remarks: &mut Vec<String>) {
-    remarks.extend(list.remarks.iter().map(|r| format!("view {view}: {r}")));
 }
 
 /// Write `view.json` into the view's folder; nothing where nothing is known.

@@ -1,6 +1,5 @@
 //! Files in, files out. One reader a file; every layout ends as the same [`Recording`].
 
-mod assumed;
 mod folder;
 mod images;
 mod layout;
@@ -8,9 +7,8 @@ mod list;
 mod output;
 mod stills;
 
-pub use assumed::Assumed;
 pub(crate) use folder::INDEX;
-pub use folder::write_dump;
+pub use folder::{Assumed, write_dump};
 pub use images::{
     ColourImage, FrameSource, InfraredImage, encode_pgm16, encode_png16, encode_png16_quickly,
     encode_rgb,
@@ -18,6 +16,7 @@ pub use images::{
 pub(crate) use images::{read_depth, size_of};
 pub(crate) use layout::{DEPTH_LIST, read_description};
 pub use layout::{DESCRIPTION, ViewFile, write_recording_file, write_view_notes};
+pub(crate) use list::content_lines;
 pub use list::{FrameList, read_list};
 pub(crate) use output::entries;
 pub use output::{OutputDir, hex, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};

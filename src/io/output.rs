@@ -74,8 +74,7 @@ pub fn pretty_json(value: &impl Serialize) -> serde_json::Result<String> {
     Ok(text)
 }
 
-/// Write [`pretty_json`] whole or not at all; the text that was written. `remedy` is for a value
-/// that has no form in JSON.
+/// Write [`pretty_json`] whole or not at all; the text. `remedy` is for what has no form in JSON.
 pub fn write_json(path: &Path, value: &impl Serialize, remedy: &'static str) -> Result<String> {
     let text = pretty_json(value).map_err(|e| Error::text(path, 0, e.to_string(), remedy))?;
     write_atomic(path, text.as_bytes())?;

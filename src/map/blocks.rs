@@ -11,7 +11,6 @@ use super::point::{Noise, Point};
 use crate::camera::{Camera, Rays};
 
 /// Points in the order of a small image.
-#[derive(Debug, Clone)]
 pub struct Blocks {
     pub width: usize,
     pub height: usize,
@@ -20,8 +19,7 @@ pub struct Blocks {
     pub points: Vec<Option<Point>>,
 }
 
-/// Blocks differ by the slope of their surface too: two apart, by this share of their distance (see
-/// [`super::means`]).
+/// Blocks two apart differ by the slope of their surface too, by this share of their distance.
 const SLOPE_AROUND: f32 = 0.05;
 /// Neighbours on each side for the normal.
 const AROUND: usize = EDGE;
@@ -152,7 +150,6 @@ pub const EDGE: usize = 2;
 pub const LANES: usize = 4;
 
 /// One number a block, in rows of `stride` with an empty edge; zero where there is nothing.
-#[derive(Debug, Clone)]
 pub struct Means {
     pub width: usize,
     pub height: usize,

@@ -111,27 +111,25 @@ fn finish(
     iterations: usize,
     points: usize,
 ) -> Alignment {
-    let mut alignment = Alignment {
+    let (correspondences, rms_m, solution) = match last {
+        Some((equations, solution)) => {
+            let n = equations.correspondences;
+            (n, (equations.squares_m2 / n as f64).sqrt(), Some(solution))
+        }
+        None => (0, f64::INFINITY, None),
+    };
+    let unknown = Matrix6::from_diagonal_element(f64::INFINITY);
+    Alignment {
         target_from_source: pose,
-        covariance: Matrix6::from_diagonal_element(f64::INFINITY),
+        covariance: solution.as_ref().map_or(unknown, |s| s.covariance),
         iterations,
         termination,
-        inlier_ratio: 0.0,
-        correspondences: 0,
-        rms_m: f64::INFINITY,
-        degenerate_directions: Vec::new(),
-        min_information: 0.0,
-    };
-    if let Some((equations, solution)) = last {
-        let n = equations.correspondences;
-        alignment.covariance = solution.covariance;
-        alignment.inlier_ratio = n as f64 / points.max(1) as f64;
-        alignment.correspondences = n;
-        alignment.rms_m = (equations.squares_m2 / n as f64).sqrt();
-        alignment.degenerate_directions = solution.degenerate_directions;
-        alignment.min_information = solution.min_information;
+        inlier_ratio: correspondences as f64 / points.max(1) as f64,
+        correspondences,
+        rms_m,
+        min_information: solution.as_ref().map_or(0.0, |s| s.min_information),
+        degenerate_directions: solution.map(|s| s.degenerate_directions).unwrap_or_default(),
     }
-    alignment
 }
 
 struct Round<'a, T> {

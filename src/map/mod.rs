@@ -114,8 +114,7 @@ fn no_map(sequence: &Sequence, mapped: &Mapped) -> Error {
 /// What a frame is aligned to, and how neighbours are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
-    /// The paper's: voxel grid, normals by principal components, exact nearest neighbours, each
-    /// frame to the one before.
+    /// The paper's: voxel grid, exact nearest neighbours, each frame to the one before.
     Paper,
     /// Image blocks, neighbours by projection, each frame to the one before.
     Projective,
@@ -218,24 +217,19 @@ impl Options {
 
     /// An error when a number is out of its range.
     pub fn check(&self) -> Result<()> {
-        let wrong = |what: String, remedy| Err(Error::Argument { what, remedy });
-        if !(0.002..=1.0).contains(&self.voxel_m) {
-            return wrong(format!("--voxel {}", self.voxel_m), "give 0.002 to 1 m");
+        let Options { voxel_m, block_px, max_correspondence_m: reach, .. } = *self;
+        let Options { max_iterations, max_observations, .. } = *self;
+        let checks = [
+            ((0.002..=1.0).contains(&voxel_m), format!("--voxel {voxel_m}"), "give 0.002 to 1 m"),
+            ((1..=32).contains(&block_px), format!("--block {block_px}"), "give 1 to 32 px"),
+            (reach > 0.0 && reach <= 2.0, format!("--gate {reach}"), "give a distance up to 2 m"),
+            (max_iterations > 0, format!("--iterations {max_iterations}"), "give 1 or more"),
+            (max_observations >= 1.0, format!("--memory {max_observations}"), "give 1 or more"),
+        ];
+        match checks.into_iter().find(|(good, ..)| !good) {
+            Some((_, what, remedy)) => Err(Error::Argument { what, remedy }),
+            None => Ok(()),
         }
-        if !(1..=32).contains(&self.block_px) {
-            return wrong(format!("--block {}", self.block_px), "give 1 to 32 px");
-        }
-        let reach = self.max_correspondence_m;
-        if !(reach > 0.0 && reach <= 2.0) {
-            return wrong(format!("--gate {reach}"), "give a distance up to 2 m");
-        }
-        if self.max_iterations == 0 {
-            return wrong("--iterations 0".into(), "give 1 or more");
-        }
-        if self.max_observations.is_nan() || self.max_observations < 1.0 {
-            return wrong(format!("--memory {}", self.max_observations), "give 1 or more");
-        }
-        Ok(())
     }
 }
 

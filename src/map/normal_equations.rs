@@ -51,7 +51,6 @@ pub struct NormalEquations {
     pub sizes: Vec<f32>,
 }
 
-#[derive(Debug, Clone)]
 pub struct Solution {
     /// Shift, m, and turn, rad, about the target's origin.
     pub step: Vector6<f64>,
@@ -73,8 +72,7 @@ impl NormalEquations {
         NormalEquations { sizes: Vec::with_capacity(n), ..Default::default() }
     }
 
-    /// A correspondence: the moved point, the target's normal, the distance along it, and the
-    /// weight of its square.
+    /// The moved point, the target's normal, the distance along it, and the weight of its square.
     #[inline]
     pub fn add(&mut self, p: &Vector3<f32>, n: &Vector3<f32>, residual: f64, w2: f64) {
         let (p, n) = (p.map(f64::from), n.map(f64::from));

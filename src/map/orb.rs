@@ -19,7 +19,6 @@ use crate::rng::Stream;
 const FAST_THRESHOLD: i32 = 50;
 const MAX_FEATURES: i32 = 500;
 
-#[derive(Debug, Clone)]
 pub struct Features {
     descriptors: Mat,
     /// m, optical frame; `None` where no depth was measured.

@@ -12,8 +12,7 @@ pub struct Point {
     pub at: Vector3<f32>,
     /// Unit length, towards the camera.
     pub normal: Vector3<f32>,
-    /// sigma(z, theta) of one measurement along the optical axis, m: the paper's weight is its
-    /// inverse.
+    /// sigma(z, theta) of one measurement along the optical axis, m.
     pub sigma_axial: f32,
     /// Standard deviation of this point, averaged as it is, along its normal, m.
     pub sigma_normal: f32,
@@ -56,7 +55,6 @@ impl Motion {
 }
 
 /// Sigma over depth and tilt, looked up, and how many neighbours err as one.
-#[derive(Debug, Clone)]
 pub struct Noise {
     table: SigmaLookup,
     /// The greatest depth that the model was measured at, m.

@@ -16,7 +16,6 @@ use crate::model::NoiseModel;
 use crate::sequence::{Moment, Sequence};
 
 /// The points of a frame, as its method wants them.
-#[derive(Debug, Clone)]
 pub enum Shape {
     Cloud(Nearest),
     Blocks(Blocks, Vec<Point>),
@@ -32,7 +31,6 @@ impl Shape {
 }
 
 /// A frame, ready to be aligned and to be aligned to.
-#[derive(Debug, Clone)]
 pub struct Prepared {
     pub shape: Shape,
     pub features: Option<Features>,
@@ -44,7 +42,6 @@ pub struct Prepared {
     pub remark: Option<String>,
 }
 
-#[derive(Debug, Clone)]
 pub struct Preprocessor<'a> {
     pub sequence: &'a Sequence,
     pub options: &'a Options,

@@ -7,7 +7,7 @@ use super::icp::{Alignment, Termination, align, renormalised};
 use super::index_map::Projective;
 use super::map_points::{MapPoint, PointGrid};
 use super::preprocess::{Prepared, Preprocessor, Shape};
-use super::surfels::Surfels;
+use super::surfels::{SurfelTarget, Surfels};
 use super::{Init, Method, Options};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
@@ -134,7 +134,8 @@ impl<'a> Tracker<'a> {
                 let start = self.pose * start;
                 let seen = || self.surfels.seen_from(&start, self.camera, options.block_px);
                 let index_map = stages.time("render", seen);
-                let target = self.surfels.target(&index_map, max_correspondence_m);
+                let (surfels, index_map) = (&self.surfels, &index_map);
+                let target = SurfelTarget { surfels, index_map, max_correspondence_m };
                 let found = stages.time("icp", || align(source, &target, start, options));
                 let target_from_source = self.pose.inverse() * found.target_from_source;
                 Alignment { target_from_source, ..found }

@@ -19,7 +19,6 @@ pub struct Voxel {
 }
 
 /// A depth image as occupied cells.
-#[derive(Debug, Clone)]
 pub struct Voxels {
     pub side_m: f32,
     pub grid: SparseGrid,

@@ -103,7 +103,6 @@ impl Sums {
 }
 
 /// What is known about a view when its cells are evaluated.
-#[derive(Debug, Clone, Copy)]
 pub(super) struct Context {
     pub frames: f64,
     /// Variance left by the cut of the tails, as a share.

@@ -10,9 +10,7 @@ use crate::plane::{
 };
 use crate::view::{FrameRef, View};
 
-/// Measure one view.
-/// An error when no frame can be read or none shows a plane; unreadable frames beside good ones are
-/// named in the notes.
+/// An error when no frame can be read or none shows a plane; others that cannot are notes.
 pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasurement> {
     let camera = &bench.sensor.camera;
     let mut source = FrameSource::new(camera.width, camera.height);
@@ -89,7 +87,9 @@ impl<'r> FrameReader<'r> {
     fn next_readable(&mut self) -> Option<Frame> {
         while let Some(frame_ref) = self.frames.next() {
             match self.source.read(&frame_ref.path) {
-                Ok(frame) if self.sees_anything(&frame) => return Some(frame),
+                Ok(f) if f.raw.iter().any(|&raw| self.table.metres(raw).is_finite()) => {
+                    return Some(f);
+                }
                 Ok(_) => self.notes.push(format!(
                     "frame left out: {}: no pixel carries a depth",
                     frame_ref.path.display()
@@ -98,10 +98,6 @@ impl<'r> FrameReader<'r> {
             }
         }
         None
-    }
-
-    fn sees_anything(&self, frame: &Frame) -> bool {
-        frame.raw.iter().any(|&raw| self.table.metres(raw).is_finite())
     }
 }
 

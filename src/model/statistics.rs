@@ -160,8 +160,7 @@ fn covariance(
     full
 }
 
-/// Singular values below this share of the largest are rounding; the variance along them is
-/// then huge but finite.
+/// Singular values below this share of the largest are rounding: a huge but finite variance.
 const UNSEEN: f64 = 1e-10;
 
 fn name_parameters(

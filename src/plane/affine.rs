@@ -69,11 +69,8 @@ pub fn fit_affine_robust(
 fn scale_about(w: &[f32], rays: &Rays, pixels: &[u32], plane: &Plane, floor: f64) -> Option<f64> {
     let mut off: Vec<f32> = pixels
         .iter()
-        .map(|&i| {
-            let i = i as usize;
-            let (x, y) = rays.at(i);
-            (f64::from(w[i]) - plane.inverse_depth(x, y)).abs() as f32
-        })
+        .map(|&i| i as usize)
+        .map(|i| (f64::from(w[i]) - plane.inverse_depth_at(rays, i)).abs() as f32)
         .filter(|r| r.is_finite())
         .collect();
     if off.len() < 12 {

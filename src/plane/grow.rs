@@ -13,7 +13,6 @@ use crate::camera::Rays;
 /// A coarse lattice over the image: one node for every `pitch` x `pitch` pixels.
 ///
 /// Growing on the lattice costs a tenth of growing on pixels, and bridges single dead pixels.
-#[derive(Debug, Clone)]
 pub(super) struct Lattice {
     pub pitch: usize,
     pub columns: usize,
@@ -36,8 +35,7 @@ const MEAN_SIGMAS: f64 = 5.0;
 /// below 1 with a spread of 0.4; a wall that crosses the plane at an angle grows without bound.
 const SPREAD_SIGMAS: f64 = 1.5;
 /// ... or than this many times what adjacent nodes differ: white noise has a ratio of 1, and of
-/// 1.5 where 9 px are correlated; a wall over a fifth of the neighbourhood one of 2.6, and more
-/// where it covers more.
+/// 1.5 where 9 px are correlated; a wall over a fifth of the neighbourhood one of 2.6.
 const SPREAD_PER_ROUGHNESS: f64 = 2.0;
 /// Single nodes at the edge are on the plane within this: they have no neighbourhood to help.
 const EDGE_SIGMAS: f64 = 2.5;
@@ -102,8 +100,7 @@ impl Lattice {
         self.sample.iter().map(Option::is_some)
     }
 
-    /// Residual of each node's mean in sigma of the gauge, at most [`MISS_SIGMAS`]; NaN without a
-    /// measurement.
+    /// Residual of each node's mean in the gauge's sigma, at most [`MISS_SIGMAS`]; NaN without any.
     pub fn residuals(&self, gauge: &Gauge<'_>) -> Vec<f32> {
         let q = gauge.fit.plane.q;
         self.mean
@@ -122,10 +119,9 @@ impl Lattice {
 
     /// Nodes whose neighbourhood, by mean and by spread, is noise about the plane.
     ///
-    /// Noise may be larger there than at the seed (a depth error that does not grow with depth
-    /// is, on the near side of a tilted target), or hold gross errors: then neighbours differ as
-    /// much as the neighbourhood spreads, about the plane. Where another surface begins they do
-    /// not.
+    /// Noise may be larger there than at the seed (a depth error that does not grow with depth, on
+    /// the near side of a tilted target), or hold gross errors: then neighbours differ as much as
+    /// the neighbourhood spreads. Where another surface begins they do not.
     pub fn quiet(&self, residuals: &[f32]) -> Vec<bool> {
         let sums = self.boxed(residuals);
         let rough = self.roughness(residuals);
@@ -143,8 +139,7 @@ impl Lattice {
             .collect()
     }
 
-    /// Half the mean squared difference of adjacent nodes around each node: the variance, were
-    /// the noise white.
+    /// Half the mean squared difference of adjacent nodes: the variance, were the noise white.
     fn roughness(&self, residuals: &[f32]) -> Vec<f64> {
         let pairs: Vec<[f32; 2]> = (0..residuals.len())
             .map(|node| {

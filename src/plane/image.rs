@@ -130,13 +130,11 @@ impl Estimator for AffineSamples {
 
 /// Does the pixel's ray meet the plane before the camera?
 pub(super) fn in_front(image: &InverseDepthImage<'_>, plane: &Plane, i: usize) -> bool {
-    let (x, y) = image.rays.at(i);
-    plane.inverse_depth(x, y) > 0.0
+    plane.inverse_depth_at(image.rays, i) > 0.0
 }
 
 pub(super) fn on_plane(image: &InverseDepthImage<'_>, fit: &AffineFit, i: usize) -> bool {
-    let (x, y) = image.rays.at(i);
-    let expected = fit.plane.inverse_depth(x, y);
+    let expected = fit.plane.inverse_depth_at(image.rays, i);
     expected > 0.0 && (f64::from(image.w[i]) - expected).abs() < image.reach(expected, fit.scale)
 }
 

@@ -23,7 +23,6 @@ pub trait Estimator {
 const MAX_MINIMAL: usize = 3;
 
 /// Choice: uniform, without repetition.
-#[derive(Debug)]
 pub struct UniformSampler<'r> {
     pub rng: &'r mut Stream,
 }

@@ -60,11 +60,10 @@ fn describe(
     let (mut u, mut v, mut off_m, mut square_m) = (0.0, 0.0, 0.0, 0.0);
     for &i in &samples {
         let i = i as usize;
-        let (x, y) = image.rays.at(i);
         let z = 1.0 / f64::from(image.w[i]);
         u += (i % width) as f64 / n;
         v += (i / width) as f64 / n;
-        off_m += (z - fit.plane.depth(x, y)) / n;
+        off_m += (z - fit.plane.depth_at(image.rays, i)) / n;
         square_m += z * z / (image.camera.fx * image.camera.fy);
     }
     let node = (lattice.pitch * lattice.pitch) as f64;

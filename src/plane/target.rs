@@ -12,10 +12,7 @@ use crate::rng::Stream;
 use crate::stats::median_in_place;
 use crate::view::Region;
 
-/// Find the target: the plane in `region`, or else the one the principal point looks at.
-///
-/// # Errors
-/// Why there is no plane.
+/// The plane in `region`, or else the one the principal point looks at; or why there is none.
 pub fn find_target(
     image: &InverseDepthImage<'_>,
     region: Option<&Region>,
@@ -151,9 +148,8 @@ pub(super) fn at_principal_point(
     finish(image, &lattice, &best, measured)
 }
 
-/// A plane that the principal point does not look at is the target only behind something small
-/// and not flat, such as a hand. A flat thing there is the board itself, and what was found is a
-/// wall.
+/// A plane that the principal point does not look at is the target only behind something small and
+/// not flat, such as a hand. A flat thing there is the board, and what was found is a wall.
 fn only_a_hand_between(
     image: &InverseDepthImage<'_>,
     best: &Candidate,
@@ -188,10 +184,8 @@ fn only_a_hand_between(
 fn ahead(image: &InverseDepthImage<'_>, best: &Candidate, pixels: &[u32]) -> Option<f32> {
     let mut ahead: Vec<f32> = pixels
         .iter()
-        .map(|&i| {
-            let (x, y) = image.rays.at(i as usize);
-            image.w[i as usize] - best.fit.plane.inverse_depth(x, y) as f32
-        })
+        .map(|&i| i as usize)
+        .map(|i| image.w[i] - best.fit.plane.inverse_depth_at(image.rays, i) as f32)
         .filter(|d| d.is_finite())
         .collect();
     (!ahead.is_empty()).then(|| median_in_place(&mut ahead))
@@ -206,8 +200,8 @@ fn flat_there(image: &InverseDepthImage<'_>, best: &Candidate, rng: &mut Stream)
         .collect();
     let Some(fit) = seed_plane(image, &around, rng) else { return false };
     let near = |i: &&u32| {
-        let (x, y) = image.rays.at(**i as usize);
-        let off = f64::from(image.w[**i as usize]) - fit.plane.inverse_depth(x, y);
+        let i = **i as usize;
+        let off = f64::from(image.w[i]) - fit.plane.inverse_depth_at(image.rays, i);
         off.abs() < FLAT_SIGMAS * best.fit.scale
     };
     around.iter().filter(near).count() as f64 > FLAT_SHARE * around.len() as f64

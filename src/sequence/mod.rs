@@ -66,9 +66,8 @@ impl Sequence {
         read_depth(&moment.depth, self.sensor.camera.width, self.sensor.camera.height)
     }
 
-    /// The colour of a moment, where there is any.
-    /// An error when the file is damaged or not of the depth image's size: pixels would not
-    /// correspond.
+    /// The colour of a moment, where there is any. An error when the file is damaged or not of the
+    /// depth image's size: pixels would not correspond.
     pub fn colour(&self, moment: &Moment) -> Result<Option<ColourImage>> {
         let Some(path) = &moment.colour else { return Ok(None) };
         let image = ColourImage::read(path)?;

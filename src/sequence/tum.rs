@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Moment, Sequence};
 use crate::error::{Error, Result, read_text};
-use crate::io::{Assumed, Layout, open_uncut, read_list};
+use crate::io::{Assumed, Layout, content_lines, open_uncut, read_list};
 use crate::trajectory::{associate, read_benchmark};
 use crate::view::FrameRef;
 
@@ -139,16 +139,12 @@ fn listed(root: &Path, file: &Path, depth: &[FrameRef]) -> Result<Vec<Option<Pat
     let place: HashMap<&PathBuf, usize> =
         depth.iter().enumerate().map(|(k, f)| (&f.path, k)).collect();
     let mut partner = vec![None; depth.len()];
-    for (i, line) in text.lines().enumerate() {
-        let content = line.trim();
-        if content.is_empty() || content.starts_with('#') {
-            continue;
-        }
+    for (line, content) in content_lines(&text) {
         let words: Vec<&str> = content.split_whitespace().collect();
         let [_, one, _, other] = words[..] else {
             let what = format!("{} words where \"stamp path stamp path\" is due", words.len());
             let remedy = "make the file again with associate.py, or take it out";
-            return Err(Error::text(file, i + 1, what, remedy));
+            return Err(Error::text(file, line, what, remedy));
         };
         let [one, other] = [one, other].map(|name| root.join(name));
         let (depth_index, colour) = match (place.get(&one), place.get(&other)) {

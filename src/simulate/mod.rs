@@ -58,13 +58,11 @@ impl GridView {
     }
 }
 
-/// Eq. 1 has its pole at 79.6 degrees; the last view stands where sigma is still finite and the
-/// tilt term already shows.
+/// Eq. 1 has its pole at 79.6 degrees; here sigma is still finite and the tilt term already shows.
 const STEEPEST_DEG: f64 = 76.0;
 
 impl Grid {
-    /// The paper's: 1 to 4 m by 0.5 m, 0 to 80 degrees by 10; 76 stands in for 80, where Eq. 1 is
-    /// beyond its pole.
+    /// The paper's: 1 to 4 m by 0.5 m, 0 to 80 degrees by 10, but 76 for 80, beyond Eq. 1's pole.
     pub fn paper() -> Self {
         let tilts = (0..8).map(|i| f64::from(10 * i)).chain([STEEPEST_DEG]);
         Grid {

@@ -91,8 +91,7 @@ const ROOM_TEMPERATURE_C: f64 = 22.0;
 /// From a room with drawn curtains to a place at the window, lx.
 const AMBIENT_LUX: [f64; 2] = [100.0, 2000.0];
 
-/// The poses in random order, so that time and distance are not the same axis (`shuffled`), or in
-/// the order given.
+/// The poses as given, or `shuffled`, so that time and distance are not the same axis.
 pub fn plan_grid(
     poses: &[GridView],
     scenery: &Scenery,

@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 use crate::error::{Error, Result, read_text};
+use crate::io::content_lines;
 
 /// Where a camera was, and when.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,14 +82,10 @@ pub fn read_benchmark(path: &Path) -> Result<Trajectory> {
 fn each_line(path: &Path, mut take: impl FnMut(Pose) -> Result<(), Fault>) -> Result<()> {
     let text = read_text(path)?;
     let mut found = false;
-    for (i, line) in text.lines().enumerate() {
-        let content = line.trim_start_matches('\u{feff}').trim();
-        if content.is_empty() || content.starts_with('#') {
-            continue;
-        }
+    for (line, content) in content_lines(&text) {
         parse(content)
             .and_then(&mut take)
-            .map_err(|(what, remedy)| Error::text(path, i + 1, what, remedy))?;
+            .map_err(|(what, remedy)| Error::text(path, line, what, remedy))?;
         found = true;
     }
     if found { Ok(()) } else { Err(Error::text(path, 0, "no pose in it", REMEDY_FORMAT)) }

@@ -3,7 +3,6 @@
 use super::{Card, MAX_PARAMETERS, SigmaForm, Start, Walk};
 use crate::model::rows::Rows;
 
-#[derive(Debug)]
 pub(super) struct Disparity;
 
 impl SigmaForm for Disparity {

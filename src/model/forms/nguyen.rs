@@ -4,7 +4,6 @@ use super::paper::{parabola_start, vertex_gradient};
 use super::{Card, MAX_PARAMETERS, SigmaForm, Start, Walk};
 use crate::model::rows::Rows;
 
-#[derive(Debug)]
 pub(super) struct Nguyen;
 
 /// theta^2 / (pi/2 - theta)^2 / sqrt(z).

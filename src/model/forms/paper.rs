@@ -8,7 +8,6 @@ use crate::model::rows::Rows;
 /// a, b, c, d, e, f as printed (m and rad).
 pub const PAPER_EQ1: [f64; 6] = [0.00151, 0.00215, 0.483, 1.88e-6, 2.01, 1.39];
 
-#[derive(Debug)]
 pub(super) struct Paper;
 
 /// Derivatives of a + b (z - c)^2 by a, b, c.
@@ -67,8 +66,7 @@ pub(super) fn parabola_start(rows: &Rows, h: impl Fn(&SigmaRow) -> f64) -> Optio
     })
 }
 
-/// Do the views differ in tilt at all? Where they do not, the tilt term is one more parabola and
-/// its coefficient anything.
+/// Do the views differ in tilt at all? If not, the tilt term is one more parabola.
 fn tilts_differ(rows: &Rows) -> bool {
     let [least, most] = rows.range(|r| r.theta_rad);
     most - least > ONE_TILT_DEG.to_radians()
@@ -186,8 +184,7 @@ fn without_tilt(rows: &Rows) -> Option<Start> {
     Some(start)
 }
 
-/// Without a view this steep e and f are not even looked for: whatever else grows with tilt would
-/// be dressed up as a pole.
+/// Without a view this steep whatever else grows with tilt would be dressed up as a pole.
 const TILT_MAY_SHOW_DEG: f64 = 70.0;
 
 /// Below this the tilt term of Eq. 1 is under a tenth of the axial one (between 0.5 and 4 m that is at 71.9 to 73.5 degrees).

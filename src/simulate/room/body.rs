@@ -62,7 +62,6 @@ impl World for Room {
 }
 
 /// A body as a camera's rays meet it: all from one point, directions in the camera's frame.
-#[derive(Debug, Clone, Copy)]
 pub struct PosedBody<'a> {
     pub body: &'a Body,
     pub index: usize,

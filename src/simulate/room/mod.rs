@@ -10,7 +10,6 @@
 //! ```
 
 mod body;
-mod canvas;
 mod office;
 mod path;
 mod render;
@@ -182,8 +181,7 @@ impl<'a> Shutter<'a> {
         (picture, depth)
     }
 
-    /// Depth words of consecutive frames. The catalogue's effects may remember: with any, frames go
-    /// in order.
+    /// Depth of consecutive frames. Effects of the catalogue may remember: then frames go in order.
     fn expose(&self, pictures: &[Picture], first: usize, memory: &mut Memory) -> Vec<Frame> {
         if self.film.effects.iter().all(|a| matches!(a.effect, Acting::Shape(_))) {
             let each = |(k, p)| self.expose_one(p, first + k, &mut Memory::new());

@@ -248,8 +248,7 @@ fn level_gaze(pose: &Pose) -> Vector2<f64> {
     (pose.world_from_camera.rotation * Vector3::z()).xy()
 }
 
-/// Eigenvalue ratio below which the lines of sight are parallel and meet nowhere: 0.02 is a spread
-/// of some 8 degrees.
+/// Eigenvalue ratio below which lines of sight are parallel: 0.02 is a spread of some 8 degrees.
 const PARALLEL: f64 = 0.02;
 
 /// The point of the floor plan nearest to all lines of sight.

@@ -44,10 +44,6 @@ impl Tile {
         }
         Tile { pixels, window }
     }
-
-    fn overlaps(&self, [low, high]: &Window) -> bool {
-        (0..2).all(|k| low[k] <= self.window[1][k] && high[k] >= self.window[0][k])
-    }
 }
 
 /// A camera that may stand anywhere in a room.
@@ -123,13 +119,16 @@ struct View<'a> {
 impl<'a> View<'a> {
     fn new(camera: &'a RoomCamera<'a>, world_from_camera: &Isometry3<f64>) -> Self {
         let posed = camera.room.posed(world_from_camera);
-        let mut bodies: Vec<_> = posed.filter_map(|p| Some((p, p.window()?))).collect();
+        let mut bodies: Vec<_> = posed.filter_map(|p| p.window().map(|w| (p, w))).collect();
         bodies.sort_by(|(a, _), (b, _)| a.nearest.total_cmp(&b.nearest));
         View { camera, light: Light::about(world_from_camera), bodies }
     }
 
     fn bodies_in(&self, tile: &Tile) -> Vec<&PosedBody<'a>> {
-        let near = self.bodies.iter().filter(|(_, window)| tile.overlaps(window));
+        let [first, last] = tile.window;
+        let overlaps =
+            |[low, high]: Window| (0..2).all(|k| low[k] <= last[k] && high[k] >= first[k]);
+        let near = self.bodies.iter().filter(|(_, window)| overlaps(*window));
         near.map(|(body, _)| body).collect()
     }
 

@@ -118,8 +118,7 @@ impl Shape {
         }
     }
 
-    /// How far a point is from where it must not be, m: negative inside a body, and for a shell
-    /// negative outside.
+    /// How far a point is from where it must not be, m: inside a body, or outside a shell.
     pub fn clearance(&self, point: &Vector3<f64>) -> f64 {
         match self {
             Shape::Cuboid(half) => outside(&(point.abs() - half)),

@@ -109,8 +109,7 @@ fn fault(what: String) -> Error {
 }
 
 impl Causes {
-    /// `self` with one cause set; an error where there is no such cause, or the value is outside its
-    /// range.
+    /// `self` with one cause set; an error where there is none, or the value is outside its range.
     pub fn with(mut self, name: &str, value: f64) -> Result<Self> {
         let cause = KNOWN_CAUSES.iter().find(|c| c.name == name).ok_or_else(|| {
             let names: Vec<&str> = KNOWN_CAUSES.iter().map(|c| c.name).collect();

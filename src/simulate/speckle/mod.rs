@@ -30,6 +30,7 @@ use crate::frame::{Frame, KINECT_NO_MEASUREMENT};
 use crate::plane::Plane;
 use crate::rng::Seed;
 use crate::scene::{Bench, Seen, Target, WHITE};
+use crate::stats::range;
 use crate::view::Sensor;
 
 /// A structured-light sensor without any formula of its errors.
@@ -164,21 +165,16 @@ fn pattern_for(camera: &Camera, baseline_m: f64, candidates: Candidates) -> Patt
     /// Blur, drift of the wavelength and the width of dots stay inside, px.
     const MARGIN_PX: f64 = 16.0;
     let (right, bottom) = (camera.width as f64 - 1.0, camera.height as f64 - 1.0);
-    let mut field = Field { x: [f64::MAX, f64::MIN], y: [f64::MAX, f64::MIN] };
-    for i in 0..=8 {
-        let share = f64::from(i) / 8.0;
+    let rim = (0..=8).map(|i| f64::from(i) / 8.0).flat_map(|share| {
         let (u, v) = (share * right, share * bottom);
-        for (u, v) in [(u, 0.0), (u, bottom), (0.0, v), (right, v)] {
-            let (x, y) = camera.ray(u, v);
-            field.x = [field.x[0].min(x), field.x[1].max(x)];
-            field.y = [field.y[0].min(y), field.y[1].max(y)];
-        }
-    }
+        [(u, 0.0), (u, bottom), (0.0, v), (right, v)].map(|(u, v)| camera.ray(u, v))
+    });
+    let [x0, x1] = range(rim.clone().map(|(x, _)| x));
+    let [y0, y1] = range(rim.map(|(_, y)| y));
     let (mx, my) = (MARGIN_PX / camera.fx, MARGIN_PX / camera.fy);
     // The projector's x is the camera's less the disparity: least for the nearest surface.
     let nearest = candidates.last() as f64 / camera.fx + baseline_m / REFERENCE_M;
-    field.x = [field.x[0] - nearest - mx, field.x[1] + mx];
-    field.y = [field.y[0] - my, field.y[1] + my];
+    let field = Field { x: [x0 - nearest - mx, x1 + mx], y: [y0 - my, y1 + my] };
     Pattern::over(&field, camera.fx)
 }
 

@@ -12,7 +12,6 @@ use crate::rng::Stream;
 use crate::scene::{Hit, WHITE, World};
 
 /// A dot in the picture: a Gaussian.
-#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spot {
     /// Centre, px.
     pub u: f64,
@@ -36,8 +35,7 @@ pub struct Optics<'a> {
     pub light: f64,
 }
 
-/// Landau, Choo and Beling 2015: 5.90e8 cos / r^2 DN (r in mm) is a dot's mean peak in a 10-bit
-/// picture.
+/// Landau, Choo and Beling 2015: 5.90e8 cos / r^2 DN (r in mm), 10 bits, is a dot's mean peak.
 const PEAK_DN_AT_1_M: f64 = 590.0;
 /// Their Gamma factor has the mean 4.54 * 0.196 and not one.
 const LANDAU_MEAN: f64 = 4.54 * 0.196;
@@ -117,8 +115,7 @@ fn smear(blur_px: f64) -> f64 {
     blur_px * blur_px + PIXEL_VARIANCE
 }
 
-/// Peak of an unblurred mean dot on a white surface at 1 m, DN: so that the blurred one has
-/// Landau's.
+/// Peak of an unblurred mean dot on white at 1 m, DN, so that the blurred one has Landau's.
 fn full_light() -> f64 {
     let beam = BEAM_PX * BEAM_PX;
     PEAK_DN_AT_1_M * LANDAU_MEAN * (beam + smear(LANDAU_BLUR_PX)) / beam
@@ -147,7 +144,6 @@ fn lens_jacobian(camera: &Camera, (x, y): (f64, f64)) -> Matrix2<f64> {
 }
 
 /// A picture in DN, before noise; its first column may lie outside the camera's image.
-#[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
     pub width: usize,
     pub height: usize,

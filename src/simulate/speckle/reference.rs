@@ -7,8 +7,7 @@ use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
 /// Distance of the factory's plane, m. The real one is not published; at 2 m the picture moves by
 /// +22 px at 1 m and by -11 px at 4 m.
 pub const REFERENCE_M: f64 = 2.0;
-/// The matcher looks for surfaces between these depths, m (near mode begins at 0.4 m; beyond 8 m
-/// one step is 0.2 m).
+/// The matcher looks between these depths, m (near mode begins at 0.4 m; at 8 m a step is 0.2 m).
 const NEAREST_M: f64 = 0.4;
 const FARTHEST_M: f64 = 8.0;
 
@@ -34,7 +33,7 @@ impl Candidates {
     }
 }
 
-/// The stored reference in 8 bits, its rows mirrored (see [`super::matcher::RowPair`]).
+/// The stored reference in 8 bits, its rows mirrored (see [`RowPair`]).
 pub struct Reference {
     pub candidates: Candidates,
     pub half_window: usize,
@@ -67,7 +66,6 @@ const RAW_AT_INFINITY: f64 = 1084.6;
 const USUAL_STEP_PX: f64 = 0.125;
 
 /// How a shift becomes a raw value, and a raw value a depth.
-#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReadOut {
     /// Where the matcher answers in coarser steps than its raw values have, px.
     coarse_px: Option<f64>,
