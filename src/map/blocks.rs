@@ -79,8 +79,9 @@ fn each(of: impl Fn(usize) -> f32) -> [f32; LANES] {
 impl Around {
     fn of(means: &Means, u: usize, v: usize) -> Self {
         let here = means.index(u, v);
-        let centre = [&means.x, &means.y, &means.q].map(|values| lanes(values, here));
-        let (sigma, n) = (lanes(&means.sigma_q, here), lanes(&means.n, here));
+        let all = |at: usize| means.planes.each_ref().map(|plane| lanes(plane, at));
+        let [n, x, y, q, sigma] = all(here);
+        let centre = [x, y, q];
         let tolerance = each(|i| {
             let apart = SIGMAS * sigma[i] / n[i].sqrt() + SLOPE_AROUND * centre[2][i];
             if n[i] > 0.0 { apart } else { -1.0 }
@@ -90,8 +91,7 @@ impl Around {
         for dv in 0..=2 * AROUND {
             for du in 0..=2 * AROUND {
                 let there = here + dv * means.stride + du - AROUND * means.stride - AROUND;
-                let (n, x) = (lanes(&means.n, there), lanes(&means.x, there));
-                let (y, q) = (lanes(&means.y, there), lanes(&means.q, there));
+                let [n, x, y, q, _] = all(there);
                 let q = each(|i| q[i] - centre[2][i]);
                 let n = each(|i| if q[i].abs() <= tolerance[i] { n[i] } else { 0.0 });
                 let (x, y) = (each(|i| x[i] - centre[0][i]), each(|i| y[i] - centre[1][i]));
@@ -131,8 +131,9 @@ fn point(
     pixel: u32,
     noise: &Noise,
 ) -> Option<Point> {
-    let z = 1.0 / means.q[i];
-    let at = Vector3::new(means.x[i] * z, means.y[i] * z, z);
+    let [n, x, y, q, _] = means.planes.each_ref().map(|plane| plane[i]);
+    let z = 1.0 / q;
+    let at = Vector3::new(x * z, y * z, z);
     // n / D of the plane; it looks away from the camera.
     let normal = -plane.try_normalize(f64::MIN_POSITIVE)?.cast::<f32>();
     let facing = -normal.dot(&at) / at.norm();
@@ -140,7 +141,7 @@ fn point(
         return None;
     }
     let sigma_axial = noise.sigma_axial(z, &normal);
-    let sigma_normal = noise.sigma_normal(sigma_axial, &at, &normal, means.n[i]);
+    let sigma_normal = noise.sigma_normal(sigma_axial, &at, &normal, n);
     Some(Point { at, normal, sigma_axial, sigma_normal, pixel })
 }
 
@@ -149,19 +150,16 @@ pub const EDGE: usize = 2;
 /// Blocks worked on at once: their sums stay in the registers of any x86-64 or aarch64.
 pub const LANES: usize = 4;
 
-/// One number a block, in rows of `stride` with an empty edge; zero where there is nothing.
-pub struct Means {
-    pub width: usize,
-    pub height: usize,
-    pub stride: usize,
-    /// Pixels in it.
-    pub n: Vec<f32>,
-    /// The ray (x, y, 1), and the inverse depth along z, 1/m.
-    pub x: Vec<f32>,
-    pub y: Vec<f32>,
-    pub q: Vec<f32>,
-    /// Of one inverse depth, faced squarely, 1/m.
-    pub sigma_q: Vec<f32>,
+/// Of a block: n pixels, x and y of the ray (x, y, 1), the inverse depth q along z, and the sigma of
+/// one inverse depth, faced squarely, 1/m. All zero where there is nothing.
+type Mean = [f32; 5];
+
+/// The means of all blocks, number by number, in rows of `stride` with an empty edge.
+struct Means {
+    width: usize,
+    height: usize,
+    stride: usize,
+    planes: [Vec<f32>; 5],
 }
 
 /// Inverse depths on one surface differ by noise, up to this many sigma ...
@@ -172,18 +170,9 @@ const SLOPE: f32 = 0.012;
 /// A block with fewer pixels than this share is the rim of something.
 const MIN_FILLED: f32 = 0.4;
 
-#[derive(Debug, Clone, Copy, Default)]
-struct Mean {
-    n: f32,
-    x: f32,
-    y: f32,
-    q: f32,
-    sigma_q: f32,
-}
-
 impl Means {
     /// Of a depth image of `size`, m, NaN where nothing was measured.
-    pub fn of(
+    fn of(
         depth: &[f32],
         [columns, rows]: [usize; 2],
         rays: &Rays,
@@ -195,31 +184,22 @@ impl Means {
         let size = stride * (height + 2 * EDGE);
         let picture = Picture { depth, columns, rays, side, noise };
         let found: Vec<Vec<Mean>> = (0..height).into_par_iter().map(|v| picture.row(v)).collect();
-        let laid_out = |of: fn(&Mean) -> f32| {
+        let planes = std::array::from_fn(|k| {
             let mut plane = vec![0.0; size];
             for (v, row) in found.iter().enumerate() {
                 let begin = (v + EDGE) * stride + EDGE;
                 for (value, mean) in plane[begin..begin + width].iter_mut().zip(row) {
-                    *value = of(mean);
+                    *value = mean[k];
                 }
             }
             plane
-        };
-        Means {
-            width,
-            height,
-            stride,
-            n: laid_out(|m| m.n),
-            x: laid_out(|m| m.x),
-            y: laid_out(|m| m.y),
-            q: laid_out(|m| m.q),
-            sigma_q: laid_out(|m| m.sigma_q),
-        }
+        });
+        Means { width, height, stride, planes }
     }
 
     /// Where a block's numbers are.
     #[inline]
-    pub fn index(&self, u: usize, v: usize) -> usize {
+    fn index(&self, u: usize, v: usize) -> usize {
         (v + EDGE) * self.stride + u + EDGE
     }
 }
@@ -232,15 +212,8 @@ struct Picture<'a> {
     noise: &'a Noise,
 }
 
-/// Sums over the rows of a block, column by column.
-struct Columns {
-    n: Vec<f32>,
-    x: Vec<f32>,
-    y: Vec<f32>,
-    q: Vec<f32>,
-    low: Vec<f32>,
-    high: Vec<f32>,
-}
+/// Sums over the rows of a block, column by column: n, x, y, q, the least and the greatest q.
+type Columns = [Vec<f32>; 6];
 
 impl Picture<'_> {
     fn row(&self, v: usize) -> Vec<Mean> {
@@ -250,23 +223,15 @@ impl Picture<'_> {
     }
 
     fn columns(&self, v: usize) -> Columns {
-        let zero = || vec![0.0; self.columns];
-        let mut sums = Columns {
-            n: zero(),
-            x: zero(),
-            y: zero(),
-            q: zero(),
-            low: vec![f32::INFINITY; self.columns],
-            high: zero(),
-        };
+        let [inf, zero] = [f32::INFINITY, 0.0];
+        let mut sums = [zero, zero, zero, zero, inf, zero].map(|v| vec![v; self.columns]);
         for row in v * self.side..(v + 1) * self.side {
             let range = row * self.columns..(row + 1) * self.columns;
             let depth = &self.depth[range.clone()];
             let (x, y) = (&self.rays.x[range.clone()], &self.rays.y[range]);
-            let Columns { n, x: sx, y: sy, q: sq, low, high } = &mut sums;
-            let (n, sx, sy, sq) = (&mut n[..], &mut sx[..], &mut sy[..], &mut sq[..]);
+            let [n, sx, sy, sq, low, high] = sums.each_mut().map(|values| values.as_mut_slice());
             let pixels = depth.iter().zip(x).zip(y);
-            let into = n.iter_mut().zip(sx).zip(sy).zip(sq).zip(&mut low[..]).zip(&mut high[..]);
+            let into = n.iter_mut().zip(sx).zip(sy).zip(sq).zip(low).zip(high);
             for (((&z, &x), &y), (((((n, sx), sy), sq), low), high)) in pixels.zip(into) {
                 let q = 1.0 / z;
                 let there = q > 0.0;
@@ -283,19 +248,19 @@ impl Picture<'_> {
     }
 
     fn mean(&self, columns: &Columns, [u, v]: [usize; 2], scratch: &mut Vec<f32>) -> Mean {
-        let of = |values: &[f32]| values[u * self.side..(u + 1) * self.side].iter().sum::<f32>();
-        let n = of(&columns.n);
+        let range = u * self.side..(u + 1) * self.side;
+        let [n, x, y, q, low, high] = columns.each_ref().map(|values| &values[range.clone()]);
+        let n = n.iter().sum::<f32>();
         if n < self.min_pixels() {
             return Mean::default();
         }
-        let range = u * self.side..(u + 1) * self.side;
-        let low = columns.low[range.clone()].iter().fold(f32::INFINITY, |l, &q| l.min(q));
-        let high = columns.high[range].iter().fold(0.0f32, |h, &q| h.max(q));
+        let low = low.iter().fold(f32::INFINITY, |l, &q| l.min(q));
+        let high = high.iter().fold(0.0f32, |h, &q| h.max(q));
         let (sigma_q, tolerance) = self.tolerance(0.5 * (low + high));
         // Mostly all is one surface.
         if high - low <= tolerance {
-            let [x, y, q] = [&columns.x, &columns.y, &columns.q].map(|values| of(values) / n);
-            return Mean { n, x, y, q, sigma_q };
+            let [x, y, q] = [x, y, q].map(|values| values.iter().sum::<f32>() / n);
+            return [n, x, y, q, sigma_q];
         }
         self.larger_part([u, v], scratch)
     }
@@ -315,20 +280,13 @@ impl Picture<'_> {
         let half = scratch.len() / 2;
         let middle = *scratch.select_nth_unstable_by(half, f32::total_cmp).1;
         let (sigma_q, tolerance) = self.tolerance(middle);
-        let mut sum = Mean { sigma_q, ..Mean::default() };
-        for (i, q) in pixels() {
-            if (q - middle).abs() < tolerance {
-                sum.n += 1.0;
-                sum.x += self.rays.x[i];
-                sum.y += self.rays.y[i];
-                sum.q += q;
-            }
+        let (mut n, mut sum) = (0.0, [0.0; 3]);
+        for (i, q) in pixels().filter(|(_, q)| (q - middle).abs() < tolerance) {
+            n += 1.0;
+            sum = [sum[0] + self.rays.x[i], sum[1] + self.rays.y[i], sum[2] + q];
         }
-        if sum.n < self.min_pixels() {
-            return Mean::default();
-        }
-        let n = sum.n;
-        Mean { n, x: sum.x / n, y: sum.y / n, q: sum.q / n, sigma_q }
+        let [x, y, q] = sum.map(|s| s / n);
+        if n < self.min_pixels() { Mean::default() } else { [n, x, y, q, sigma_q] }
     }
 
     fn min_pixels(&self) -> f32 {
@@ -337,7 +295,7 @@ impl Picture<'_> {
 
     /// Sigma of one inverse depth, and how far others of its surface may be from it, 1/m.
     fn tolerance(&self, q: f32) -> (f32, f32) {
-        let sigma_q = self.noise.sigma_frontal(1.0 / q) * q * q;
+        let sigma_q = self.noise.at(1.0 / q, 0.0) * q * q;
         (sigma_q, SIGMAS * sigma_q + SLOPE * q)
     }
 }

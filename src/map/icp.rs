@@ -146,8 +146,8 @@ impl<T: Target> Round<'_, T> {
         let any_normal = self.options.min_cosine <= -1.0;
         let keep_sizes = self.options.kernel != Kernel::Square;
         let part = |(points, cache): (&[Point], &mut [T::Cache])| {
-            let mut equations =
-                NormalEquations::with_room(if keep_sizes { points.len() } else { 0 });
+            let mut equations = NormalEquations::default();
+            equations.sizes.reserve(if keep_sizes { points.len() } else { 0 });
             for (s, cache) in points.iter().zip(cache) {
                 let at = motion.moved(&s.at);
                 let Some(d) = self.target.find(&at, cache) else { continue };

@@ -67,11 +67,6 @@ const MIN_INFORMATION: f64 = 0.005;
 const MEDIAN_OVER_SIGMA: f64 = 0.6745;
 
 impl NormalEquations {
-    /// None yet, with room for the sizes of `n` correspondences.
-    pub fn with_room(n: usize) -> Self {
-        NormalEquations { sizes: Vec::with_capacity(n), ..Default::default() }
-    }
-
     /// The moved point, the target's normal, the distance along it, and the weight of its square.
     #[inline]
     pub fn add(&mut self, p: &Vector3<f32>, n: &Vector3<f32>, residual: f64, w2: f64) {

@@ -90,12 +90,8 @@ impl Noise {
         self.at(z, normal.z.abs().min(1.0).acos())
     }
 
-    /// The same of a surface that is faced squarely.
-    pub fn sigma_frontal(&self, z: f32) -> f32 {
-        self.at(z, 0.0)
-    }
-
-    fn at(&self, z: f32, theta: f32) -> f32 {
+    /// The same at a tilt, rad.
+    pub fn at(&self, z: f32, theta: f32) -> f32 {
         let beyond = (z / self.max_depth_m).max(1.0);
         self.table.at(z, theta) * beyond * beyond
     }

@@ -20,7 +20,8 @@ impl Scan<'_> {
             Planes::PerFrame => Plane::new(self.own_planes / frames as f64),
         };
         let shift = self.shift_to(&plane);
-        let sums = self.sums(&plane, &shift);
+        let cells = 0..self.cut.len();
+        let sums: Vec<Sums> = cells.map(|cell| self.sums_of(cell, &plane, &shift)).collect();
         let correlation = self.correlation(first, &plane, &sums);
         let temporal_correlation = self.lagged.correlation();
         let context = self.context(&correlation, temporal_correlation);
@@ -79,10 +80,6 @@ impl Scan<'_> {
         let rays = &self.bench.rays;
         let rise = |(&i, &old): (&u32, &f32)| plane.depth_at(rays, i as usize) - f64::from(old);
         self.pixels.iter().zip(&self.expected).map(rise).collect()
-    }
-
-    fn sums(&self, plane: &Plane, shift: &[f64]) -> Vec<Sums> {
-        (0..self.cut.len()).map(|cell| self.sums_of(cell, plane, shift)).collect()
     }
 
     fn sums_of(&self, cell: usize, plane: &Plane, shift: &[f64]) -> Sums {

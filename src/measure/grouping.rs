@@ -45,11 +45,6 @@ pub(super) fn by_cell(
     (sorted, starts)
 }
 
-/// Depth at which each pixel's ray meets the plane, m.
-pub(super) fn expected(pixels: &[u32], plane: &Plane, bench: &Workbench<'_>) -> Vec<f32> {
-    pixels.iter().map(|&i| plane.depth_at(&bench.rays, i as usize) as f32).collect()
-}
-
 /// Standard deviation inside +-[`CUT_SIGMAS`] of itself, corrected for the cut.
 pub(super) fn settled_scale(residuals: Vec<f32>, least: f64) -> f64 {
     let mut off: Vec<f32> = residuals.iter().map(|e| e.abs()).collect();

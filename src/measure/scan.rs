@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::grouping::{CUT_SIGMAS, by_cell, expected, settled_scale};
+use super::grouping::{CUT_SIGMAS, by_cell, settled_scale};
 use super::{Planes, Workbench};
 use crate::frame::Frame;
 use crate::plane::{Plane, Target};
@@ -48,9 +48,10 @@ impl<'a> Scan<'a> {
         let (pixels, starts) = by_cell(&target.pixels, &plane, bench);
         let cells = starts.len() - 1;
         let n = pixels.len();
+        let expected = |&i: &u32| plane.depth_at(&bench.rays, i as usize) as f32;
         let mut scan = Scan {
             bench,
-            expected: expected(&pixels, &plane, bench),
+            expected: pixels.iter().map(expected).collect(),
             pixels,
             starts,
             plane,

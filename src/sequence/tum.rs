@@ -61,7 +61,14 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     remarks.extend(recording.remarks);
     let depth = recording.views.into_iter().flat_map(|v| v.depth).collect();
     let mut moments = with_colour(root, depth, &mut remarks)?;
-    remarks.extend(keep_first_of_each_stamp(&mut moments));
+    let before = moments.len();
+    moments.dedup_by(|b, a| a.stamp == b.stamp);
+    if moments.len() < before {
+        let dropped = before - moments.len();
+        remarks.push(format!(
+            "{dropped} depth images have the stamp of the one before; only the first is mapped"
+        ));
+    }
     let truth = root.join("groundtruth.txt");
     let truth = if truth.is_file() {
         read_benchmark(&truth).map(|t| t.poses).unwrap_or_else(|e| {
@@ -102,16 +109,6 @@ fn with_colour(
         colour,
     };
     Ok(depth.into_iter().zip(partner).map(moment).collect())
-}
-
-/// Of moments with one stamp the first is kept; a remark on how many were left out.
-fn keep_first_of_each_stamp(moments: &mut Vec<Moment>) -> Option<String> {
-    let before = moments.len();
-    moments.dedup_by(|b, a| a.stamp == b.stamp);
-    let dropped = before - moments.len();
-    (dropped > 0).then(|| {
-        format!("{dropped} depth images have the stamp of the one before; only the first is mapped")
-    })
 }
 
 fn nearest(

@@ -10,6 +10,7 @@
 //! ```
 
 mod body;
+mod canvas;
 mod office;
 mod path;
 mod render;

@@ -5,7 +5,8 @@
 
 use rand::Rng;
 
-use super::texture::{BLACK, Canvas, Texture, WHITE, any_area, any_colour, readable_on};
+use super::canvas::{BLACK, Canvas, WHITE, any_area, any_colour, readable_on};
+use super::texture::Texture;
 use crate::rng::{Seed, Stream};
 
 type Draw = fn(&mut Stream) -> Canvas;
