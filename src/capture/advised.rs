@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::wanted::{Pose, Tolerance, Wanted, WantedView};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, read_text};
 
 /// What of `diagnosis.json` matters here.
 #[derive(Deserialize)]
@@ -41,8 +41,8 @@ impl Wanted {
     /// # Errors
     /// When it is no diagnosis, advises nothing, or a pose that cannot be.
     pub fn advised(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
-        let refuse = |line: usize, what: String, remedy: &'static str| Error::Json {
+        let text = read_text(path)?;
+        let refuse = |line: usize, what: String, remedy: &'static str| Error::Text {
             path: path.into(),
             line,
             what,

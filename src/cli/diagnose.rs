@@ -216,7 +216,9 @@ impl Twin<'_> {
             effects: self.effects,
             seed: self.seed,
         };
-        let mut shooting = camera.begin(&seen).under(plan.ambient_lux).at(plan.notes.temperature_c);
+        let mut shooting = camera.begin(&seen);
+        (shooting.ambient_lux, shooting.temperature_c) =
+            (plan.ambient_lux, plan.notes.temperature_c);
         let shot = |(_, instant): (f64, Instant)| (instant.view_s, shooting.shoot(instant).depth);
         Some(plan.instants(index, session_s).map(shot).collect())
     }

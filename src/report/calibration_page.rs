@@ -87,11 +87,11 @@ fn heading(page: &CalibrationPage<'_>) -> Markup {
 
 /// The form with its parameters put in.
 fn with_numbers(model: &SigmaModel) -> Markup {
-    let spec = model.form.spec();
-    let (equation, units) = spec.formula().split_once(" (m").unwrap_or((spec.formula(), ""));
+    let card = model.form.card();
+    let (equation, units) = card.formula.split_once(" (m").unwrap_or((card.formula, ""));
     let units = units.trim_start_matches(';').trim_end_matches(')').replace("theta", "θ");
     let value = |name: &str| {
-        let at = spec.parameters().iter().position(|(n, _)| *n == name)?;
+        let at = card.parameters.iter().position(|(n, _)| *n == name)?;
         model.parameters.get(at).copied()
     };
     html! { (formula(equation, &value)) " " span.units { "in m; " (units) } }
@@ -109,7 +109,8 @@ fn result(page: &CalibrationPage<'_>) -> Markup {
         Direction::Perpendicular => "normal to the plane",
     };
     let tilts = sigma.domain.theta_rad.map(f64::to_degrees);
-    let poor = if calibration.fit.poor { ": a poor fit, see the warnings" } else { "" };
+    let poor =
+        if calibration.fit.quality.is_poor() { ": a poor fit, see the warnings" } else { "" };
     let heldout = fit.heldout.map(|e| format!("{} % rms", fixed(100.0 * e, 1)));
     facts([
         ("views", html! { (used) }),
@@ -194,8 +195,8 @@ fn model(calibration: &Calibration) -> Markup {
         section {
             h2 { "Model" }
             p {
-                "Form " b { (fit.form.id()) } ": " (fit.form.spec().formula()) ". "
-                span.units { (fit.form.spec().reference()) }
+                "Form " b { (fit.form.id()) } ": " (fit.form.card().formula) ". "
+                span.units { (fit.form.card().reference) }
             }
             (table(&columns, fit.parameters.iter().map(parameter)))
             h3 { "How the forms predict distances they have not seen" }
@@ -214,7 +215,7 @@ fn forms(calibration: &Calibration) -> Markup {
         let used = h.form == calibration.fit.form;
         let name = html! { @if used { b { (h.form.id()) } } @else { (h.form.id()) } };
         let error = fixed(100.0 * h.rmse_relative, 1) + " %";
-        row![name, fixed(h.log_score, 2), error, h.folds, h.form.spec().reference()]
+        row![name, fixed(h.log_score, 2), error, h.folds, h.form.card().reference]
     };
     html! {
         (table(&columns, calibration.comparison.iter().map(row)))

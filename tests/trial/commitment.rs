@@ -122,7 +122,7 @@ const REMEDY: &str = "give the folder of a trial made by this version";
 /// What a JSON file holds, and the hash of its bytes.
 pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<(T, String)> {
     let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
-    let value = serde_json::from_slice(&bytes).map_err(|e| Error::Json {
+    let value = serde_json::from_slice(&bytes).map_err(|e| Error::Text {
         path: path.to_path_buf(),
         line: e.line(),
         what: e.to_string(),

@@ -76,7 +76,7 @@ impl Proof {
         let path = folder.join(PROOF);
         let (proof, hash): (Proof, String) = read_json(&path)?;
         if proof.format != FORMAT {
-            return Err(Error::Json {
+            return Err(Error::Text {
                 path,
                 line: 0,
                 what: format!("format \"{}\"", proof.format),

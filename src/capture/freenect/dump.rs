@@ -8,7 +8,7 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use super::ffi::DEPTH_BYTES;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, read_text};
 use crate::io::INDEX;
 
 /// A dump, and how far it has been played.
@@ -26,7 +26,7 @@ impl Dump {
     /// When there is no index, or its first line is already bad.
     pub fn open(root: &Path) -> Result<Self> {
         let index = root.join(INDEX);
-        let text = std::fs::read_to_string(&index).map_err(|e| Error::read(&index, e))?;
+        let text = read_text(&index)?;
         // fakenect ends at the first empty line.
         let lines = text.split('\n').take_while(|line| !line.is_empty()).map(String::from);
         let dump = Dump { root: root.into(), lines: lines.collect(), played: 0 };
