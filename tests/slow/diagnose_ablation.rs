@@ -9,8 +9,8 @@ use kinoise::{NoiseModel, Seed};
 use serde_json::{Value, json};
 
 use crate::rays::{edit, repaint};
-use crate::raytraced::question::{Asked, Cell, Sealed, World};
-use crate::raytraced::seal;
+use crate::raytraced::conceal;
+use crate::raytraced::question::{Asked, Cell, ConcealedSet, World};
 
 fn asked(cell: Cell, name: &str, nats: Option<f64>, seed: u64) -> Asked {
     let names = if name.is_empty() { Vec::new() } else { vec![name.to_string()] };
@@ -29,13 +29,13 @@ fn said(folder: &Path, ablation: Ablation) -> Value {
 /// A set, and what is concealed in it.
 struct Taken {
     folder: tempfile::TempDir,
-    sealed: Box<dyn Sealed>,
+    sealed: Box<dyn ConcealedSet>,
 }
 
 impl Taken {
     fn of(asked: &Asked) -> Self {
         let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder");
-        let sealed = seal(asked).expect("a set");
+        let sealed = conceal(asked).expect("a set");
         sealed.write(folder.path()).expect("written");
         Taken { folder, sealed }
     }
@@ -51,7 +51,7 @@ fn alarms(sets: &[Taken], ablation: Ablation) -> usize {
 /// Clean sets whose noise hangs together over seven pixels or more, as the model knows.
 fn correlated() -> Vec<Taken> {
     let wide = |asked: &Asked| {
-        let base = seal(asked).expect("a set").truth().base;
+        let base = conceal(asked).expect("a set").truth().base;
         base["known"][0]["parameters"]["length_px"].as_f64().is_some_and(|px| px > 6.5)
     };
     let sets = (1..).map(|seed| asked(Cell::Null, "", None, seed)).filter(wide);

@@ -258,7 +258,7 @@ fn failures(proof: &Proof) -> Markup {
                     td { @for h in &set.truth.hidden { (h.names.first().unwrap_or(&h.form)) " " } }
                     td.n { @if let Some(n) = level(&set.truth) { (n) } }
                     td { (set.marks.first) }
-                    td { (failed.join(", ")) @if let Some(why) = &set.failure { ": " (why) } }
+                    td { (failed.join(", ")) @if let Some(why) = &set.answer.failure { ": " (why) } }
                 } } }
             } } }
         }

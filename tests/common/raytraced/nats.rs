@@ -14,9 +14,10 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::eye::{Eye, Site, World};
+use super::geometry::least_squares;
 use super::poses::Plan;
 use super::shoot::{Sum, slope};
 use super::worth::{of_effect, of_variance};
@@ -132,13 +133,8 @@ impl<'a> Looked<'a> {
         let c = &self.eye.world.unit.sensor.camera;
         let column =
             |s: &Sample| Vector3::new(1.0, (s.site.u - c.cx) / 100.0, (s.site.v - c.cy) / 100.0);
-        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-        for (s, d) in self.on_target().zip(delta) {
-            let (x, w) = (column(s), s.sigma_px.powi(-2));
-            normal += x * x.transpose() * w;
-            right += x * (w * d);
-        }
-        let plane = normal.cholesky().map_or(Vector3::zeros(), |c| c.solve(&right));
+        let rows = self.on_target().zip(delta).map(|(s, d)| (column(s), *d, s.sigma_px.powi(-2)));
+        let plane = least_squares(rows).unwrap_or_default();
         let left = |(s, d): (&Sample, &f64)| ((d - column(s).dot(&plane)) / s.sigma_px).powi(2);
         (plane, self.on_target().zip(delta).map(left).sum())
     }

@@ -50,8 +50,6 @@ pub enum Cell {
     Late,
     /// A term that real data need is struck from the model.
     Amnesia,
-    /// An effect added to real residuals.
-    Transplant,
     /// One half of a real recording against a model of the other.
     Halves,
 }
@@ -161,13 +159,4 @@ pub trait ConcealedSet: Send + Sync {
     fn with_view(&self, _pose: &Pose) -> Result<Option<(Pose, Box<dyn ConcealedSet>)>> {
         Ok(None)
     }
-}
-
-/// What somebody learnt from a recording, put to use on a view they never saw.
-pub trait Predictor {
-    /// Take the predicted bias out of `depth` (m, NaN where there is none).
-    fn correct(&self, view: &ExamView, depth: &mut [f32]) -> Result<()>;
-
-    /// Predicted standard deviation of one frame's noise at `depth`, m.
-    fn sigma(&self, view: &ExamView, depth: &[f32]) -> Vec<f32>;
 }

@@ -77,7 +77,7 @@ impl Set {
     /// concealed.
     pub fn asked(asked: &Asked, views: Option<usize>, frames: Option<usize>) -> Result<Self> {
         let Asked { cell, seed, small, .. } = *asked;
-        if matches!(cell, Cell::Amnesia | Cell::Transplant | Cell::Halves) {
+        if matches!(cell, Cell::Amnesia | Cell::Halves) {
             return Err(Error::Argument {
                 what: format!("the raytraced world has no cell {cell:?}"),
                 remedy: "take that of real recordings",
