@@ -101,6 +101,11 @@ impl Hidden {
             nats: None,
         }
     }
+
+    /// The first of its names, or its form.
+    pub fn name(&self) -> &str {
+        self.names.first().unwrap_or(&self.form)
+    }
 }
 
 /// The concealed answer to one set.
