@@ -81,7 +81,7 @@ fn view(set: &Set, range: &Range, pose: (bool, f64, f64), rng: &mut Stream) -> E
 /// Mean of what is reported and standard deviation of a frame's noise, m; NaN off the board.
 fn seen(world: World<'_>, plan: &Plan) -> (Vec<f32>, Vec<f32>) {
     let camera = &world.unit.sensor.camera;
-    let (eye, facts) = (Eye::new(world, plan), plan.facts());
+    let eye = Eye::new(world, plan);
     let fb = world.unit.disparity_px_m();
     let (slope, mut tremble, mut cut) = (slope(world.unit, plan), 0.0f64, 0.0);
     for cause in world.causes {
@@ -97,7 +97,7 @@ fn seen(world: World<'_>, plan: &Plan) -> (Vec<f32>, Vec<f32>) {
     for i in 0..n {
         let (u, v) = ((i % camera.width) as f64, (i / camera.width) as f64);
         let Some(site) = eye.look(u, v).filter(|s| s.on_board) else { continue };
-        let sum = Sum::of(world.causes, &site, &facts);
+        let sum = Sum::of(world.causes, &site, plan);
         let z = fb / (site.disparity + sum.error);
         let own = sum.spread * world.unit.sigma(site.z, site.theta);
         depth[i] = (z * sum.gain - cut) as f32;
