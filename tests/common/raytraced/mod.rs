@@ -32,8 +32,6 @@ pub use choices::CATALOGUE;
 pub use outside::OUTSIDE;
 pub use question::Cell;
 pub use set::{Order, Set};
-#[cfg(test)]
-pub use shoot::Still;
 pub use unit::Unit;
 pub use write::{conceal, write};
 
