@@ -3,7 +3,6 @@
 
 use std::path::{Path, PathBuf};
 
-use kinoise::Seed;
 use kinoise::error::Result;
 use kinoise::io::sha256_hex;
 use rand::seq::SliceRandom;
@@ -13,6 +12,7 @@ use crate::commitment::{Commitments, Verdicts, hash_file, hash_json, read_json};
 use crate::judge::{mark, mark_advice, scores};
 use crate::plan::{Planned, plan};
 use crate::proof::Proof;
+use crate::raytraced::kernels::seed_of;
 use crate::raytraced::question::World;
 use crate::rounds::{Progress, ROUNDS, each, remove, take, take_advised};
 use crate::solver::Answer;
@@ -151,8 +151,7 @@ impl Checked {
         }
         if !options.all {
             // Which, nobody can know before the commitments are written.
-            let seed = u64::from_str_radix(proof.published[0].get(..16).unwrap_or("0"), 16);
-            planned.shuffle(&mut Seed(seed.unwrap_or(0)).stream("trial/check"));
+            planned.shuffle(&mut seed_of(&proof.published[0]).stream("trial/check"));
             planned.truncate(MIN_SAMPLE.max(planned.len().div_ceil(SAMPLE_IN)));
         }
         let sets = take(&planned, data, progress)?;

@@ -13,7 +13,7 @@ use clap::Args;
 use crate::raytraced::question::{Asked, World};
 use crate::raytraced::{CATALOGUE, Cell, OUTSIDE, Order, Set, write};
 use crate::speckle;
-use kinoise::io::{sha256_hex, write_json};
+use kinoise::io::sha256_hex;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -62,7 +62,7 @@ fn make(a: &Arguments, names: Vec<String>, seed: u64) -> anyhow::Result<String> 
         set.write(&a.out.join(name))?;
         let (folder, truth) = (a.out.join("truth"), set.truth());
         std::fs::create_dir_all(&folder)?;
-        write_json(&folder.join(format!("{name}.json")), &truth, "report this as a fault")?;
+        std::fs::write(folder.join(format!("{name}.json")), serde_json::to_vec_pretty(&truth)?)?;
         let causes: Vec<&str> = truth.hidden.iter().map(|h| h.form.as_str()).collect();
         return Ok(format!("{name} {} {nats:?}", causes.join("+")));
     }

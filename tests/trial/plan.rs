@@ -143,7 +143,7 @@ fn questions(share: &Share, count: usize, rng: &mut Stream) -> Vec<Asked> {
         nats: share.nats.get((first + i + i / together) % strengths).copied(),
         seed: 0,
         // Not in step with the strengths.
-        small: (i + i / 8 + large) % 8 != 0,
+        small: !(i + i / 8 + large).is_multiple_of(8),
     };
     (0..count).map(question).collect()
 }

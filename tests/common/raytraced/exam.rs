@@ -9,6 +9,7 @@ use super::shoot::{Sum, slope};
 use super::{Act, Set};
 use kinoise::correct::Conditions;
 use kinoise::rng::Stream;
+use kinoise::stats::range;
 
 /// Views among those of the recording.
 const WITHIN: usize = 6;
@@ -23,7 +24,12 @@ const NO_VIEW: usize = usize::MAX;
 /// Fresh views: some within the distances and tilts of the recording, some beyond.
 pub fn views(set: &Set) -> Vec<ExamView> {
     let mut rng = set.seed.stream("rays/exam");
-    let range = Range::of(&set.plans);
+    let end = |of: fn(&Plan) -> f64| set.plans.iter().map(of).fold(0.0, f64::max);
+    let range = Range {
+        z: range(set.plans.iter().map(|p| p.stage.board.depth(0.0, 0.0))),
+        theta: end(|p| p.stage.theta),
+        session_s: end(|p| p.session_s),
+    };
     let mut poses: Vec<(bool, f64, f64)> = Vec::new();
     for k in 0..WITHIN {
         let near = (k as f64 + rng.random::<f64>()) / WITHIN as f64;
@@ -45,18 +51,6 @@ struct Range {
     z: [f64; 2],
     theta: f64,
     session_s: f64,
-}
-
-impl Range {
-    fn of(plans: &[Plan]) -> Self {
-        let z = plans.iter().map(|p| p.stage.board.depth(0.0, 0.0));
-        let end = |of: fn(&Plan) -> f64| plans.iter().map(of).fold(0.0, f64::max);
-        Range {
-            z: [z.clone().fold(f64::INFINITY, f64::min), z.fold(0.0, f64::max)],
-            theta: end(|p| p.stage.theta),
-            session_s: end(|p| p.session_s),
-        }
-    }
 }
 
 fn view(set: &Set, range: &Range, pose: (bool, f64, f64), rng: &mut Stream) -> ExamView {

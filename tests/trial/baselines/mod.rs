@@ -19,8 +19,11 @@ use crate::gain::Predictor;
 use crate::predictor::{plane_of, scale_px_m};
 use crate::raytraced::question::ExamView;
 
-/// By name, what learns from tiles.
-pub const METHODS: [(&str, fn(&Tiles) -> Learnt); 2] =
+/// What learns from tiles.
+type Method = fn(&Tiles) -> Learnt;
+
+/// By name.
+pub const METHODS: [(&str, Method); 2] =
     [("clams-grid", clams::fit), ("gaussian-process", gaussian::fit)];
 
 /// Residuals of a patch of pixels about their view's plane.
