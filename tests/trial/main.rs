@@ -6,7 +6,6 @@
 //! diagnosis, the verdicts before the first answer is opened; a process that can reach one set and
 //! nothing else diagnoses it; endpoints are chosen before; every failure is on the page.
 
-#[allow(dead_code)] // the product's tests use a part of it too
 #[path = "../common/raytraced/mod.rs"]
 mod raytraced;
 

@@ -69,7 +69,7 @@ fn view(set: &Set, range: &Range, pose: (bool, f64, f64), rng: &mut Stream) -> E
     let conditions =
         Conditions { session_s, temperature_c: told.temperature_c, ambient_lux: told.ambient_lux };
     let sensor = set.described.sensor.clone();
-    ExamView { sensor, beyond, theta, azimuth, conditions, depth, plain, sigma, sigma_plain }
+    ExamView { sensor, beyond, conditions, depth, plain, sigma, sigma_plain }
 }
 
 /// Mean of what is reported and standard deviation of a frame's noise, m; NaN off the board.

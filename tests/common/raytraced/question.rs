@@ -123,9 +123,6 @@ pub struct ExamView {
     pub sensor: Sensor,
     /// Outside the distances or tilts of the recording.
     pub beyond: bool,
-    /// Of the target's plane, rad.
-    pub theta: f64,
-    pub azimuth: f64,
     pub conditions: Conditions,
     /// Mean of what is reported, concealed causes included, m; NaN off the target.
     pub depth: Vec<f32>,
