@@ -19,6 +19,7 @@ use crate::model::{
     Direction, FitSummary, Form, HeldOut, NoiseModel, Provenance, SigmaFit, SigmaModel,
     compare_forms, sort_out,
 };
+use crate::rng::Seed;
 use crate::view::{Excluded, Recording, RecordingFile};
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -125,6 +126,22 @@ pub fn model_of(
         provenance,
     );
     Ok(Calibration { table, fit, comparison, model, warnings })
+}
+
+/// The paper's form of sigma for a recording that comes without a model.
+///
+/// # Errors
+/// As [`measure`] and [`model_of`].
+pub fn paper_model(
+    recording: &Recording,
+    seed: Seed,
+    created: Option<SystemTime>,
+    progress: Progress<'_>,
+) -> Result<NoiseModel> {
+    let mut options = CalibrateOptions { form: Some(Form::Paper), created, ..Default::default() };
+    options.measure.seed = seed;
+    let views = measure(recording, &options.measure, progress)?;
+    Ok(model_of(recording, &views, &options)?.model)
 }
 
 /// Fit a bare table that was read from `source`; of the options only `form` and `created` count.

@@ -1,6 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use kinoise::calibrate::paper_model;
 use kinoise::camera::Rays;
 use kinoise::diagnose::{
     DiagnoseOptions, Diagnosed, Diagnosis, Field, Finding, Reference, Status, Verdict,
@@ -12,7 +13,7 @@ use kinoise::report::{DiagnosisPage, Picture, diagnosis_page};
 use kinoise::simulate::{FormulaSensor, plan_on};
 use kinoise::terms::Statistic;
 use kinoise::view::ViewNotes;
-use kinoise::{CalibrateOptions, Form, Frame, NoiseModel, Recording, Seed, Sensor};
+use kinoise::{Frame, NoiseModel, Recording, Seed, Sensor};
 
 use super::common::{Bar, Global, Input, say, source_date};
 
@@ -85,14 +86,9 @@ pub fn examine(
 }
 
 fn calibrated(recording: &Recording, global: &Global) -> anyhow::Result<NoiseModel> {
-    let mut options =
-        CalibrateOptions { form: Some(Form::Paper), created: source_date(), ..Default::default() };
-    options.measure.seed = global.seed();
     let bar = Bar::new("views");
-    let views =
-        kinoise::measure_recording(recording, &options.measure, &|done, all| bar.step(done, all))?;
-    drop(bar);
-    Ok(kinoise::model_of(recording, &views, &options)?.model)
+    let step = |done, all| bar.step(done, all);
+    Ok(paper_model(recording, global.seed(), source_date(), &step)?)
 }
 
 /// The sigma to weigh by: the simulation's own, or the recording's where that has none.

@@ -43,10 +43,7 @@ pub(super) use row;
 ///
 /// The first column names the row. A title after `>` is that of a column of numbers, set to the
 /// right; one after `~` is that of a column of sentences, set small.
-pub(super) fn table<C: AsRef<str>>(
-    columns: &[C],
-    rows: impl IntoIterator<Item = Vec<Markup>>,
-) -> Markup {
+pub fn table<C: AsRef<str>>(columns: &[C], rows: impl IntoIterator<Item = Vec<Markup>>) -> Markup {
     let columns: Vec<(Option<&str>, &str)> = columns.iter().map(|c| set(c.as_ref())).collect();
     html! {
         div.wide { table class=[(columns.len() > 8).then_some("small")] {
@@ -70,7 +67,7 @@ fn set(column: &str) -> (Option<&'static str>, &str) {
 }
 
 /// Names and what they are.
-pub(super) fn facts<N: AsRef<str>>(facts: impl IntoIterator<Item = (N, Markup)>) -> Markup {
+pub fn facts<N: AsRef<str>>(facts: impl IntoIterator<Item = (N, Markup)>) -> Markup {
     html! {
         dl { @for (name, value) in facts { div { dt { (name.as_ref()) } dd { (value) } } } }
     }

@@ -9,8 +9,8 @@ use kinoise::{NoiseModel, Seed};
 use serde_json::{Value, json};
 
 use crate::rays::{edit, repaint};
-use crate::raytraced::question::{Asked, Cell, ConcealedSet, World};
 use crate::raytraced::conceal;
+use crate::raytraced::question::{Asked, Cell, ConcealedSet, World};
 
 fn asked(cell: Cell, name: &str, nats: Option<f64>, seed: u64) -> Asked {
     let names = if name.is_empty() { Vec::new() } else { vec![name.to_string()] };
