@@ -34,7 +34,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         created: source_date(),
         ..CalibrateOptions::default()
     };
-    let done = calibrate(&recording, &options, &arguments.output, &[Overlay::PaperEq1])?;
+    let done = calibrate(&recording, &options, &arguments.output, &Overlay::ALL[..1])?;
     say(format!(
         "The recording was made with the paper's Eq. 1, so the first two columns should agree.\nOpen {} to see it all.",
         arguments.output.join("report.html").display()

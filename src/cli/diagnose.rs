@@ -8,7 +8,7 @@ use kinoise::diagnose::{
 };
 use kinoise::effects::{Active, Instant};
 use kinoise::io::{OutputDir, open};
-use kinoise::report::{DiagnosisPage, Picture, diagnosis_page};
+use kinoise::report::{DiagnosisPage, diagnosis_page};
 use kinoise::simulate::{FormulaSensor, plan_on};
 use kinoise::terms::Statistic;
 use kinoise::view::ViewNotes;
@@ -162,7 +162,7 @@ fn line(f: &Finding) -> String {
 
 /// Where diagnosis and simulator meet: the views worth seeing, each with its simulated twin.
 /// `given` is the model that the recording was held against.
-fn with_twins(done: &Diagnosed, sensor: &Sensor, given: &NoiseModel, seed: Seed) -> Vec<Picture> {
+fn with_twins(done: &Diagnosed, sensor: &Sensor, given: &NoiseModel, seed: Seed) -> Vec<ViewPictures> {
     let rays = sensor.camera.rays();
     let effects = shown_effects(&done.model);
     let twin = Twin { sensor, rays: &rays, model: &done.model, effects: &effects, seed };
@@ -171,7 +171,7 @@ fn with_twins(done: &Diagnosed, sensor: &Sensor, given: &NoiseModel, seed: Seed)
     let retake = |index, field: &Field| {
         if done.against.is_empty() { twin.frames(index, field, session_s) } else { None }
     };
-    pictures(done, sensor, given, &retake).into_iter().map(|p| picture(p, done)).collect()
+    pictures(done, sensor, given, &retake)
 }
 
 /// Effects that move the plane as a whole: a picture about the plane does not show them.
@@ -219,25 +219,5 @@ impl Twin<'_> {
         let mut shooting = camera.begin(&seen).under(plan.ambient_lux).at(plan.notes.temperature_c);
         let shot = |(_, instant): (f64, Instant)| (instant.view_s, shooting.shoot(instant).depth);
         Some(plan.instants(index, session_s).map(shot).collect())
-    }
-}
-
-fn picture(p: ViewPictures, done: &Diagnosed) -> Picture {
-    let view = &done.diagnosis.views[p.view];
-    let tilt = view.theta_rad.to_degrees();
-    let beyond = if done.against.is_empty() { "" } else { ", recorded minus simulated" };
-    let plural = if view.frames == 1 { "" } else { "s" };
-    Picture {
-        caption: format!(
-            "View {}{beyond}: board at {:.2} m, tilted {tilt:.0}°; mean of {} frame{plural}",
-            view.name, view.z_m, view.frames
-        ),
-        width: p.width,
-        height: p.height,
-        range: p.range_px(),
-        before: p.before,
-        after: p.after,
-        simulated: p.twin,
-        unit: "px",
     }
 }

@@ -142,8 +142,8 @@ fn published(model: &SigmaModel) -> Markup {
     let mut rows = vec![row![html! { b { "this sensor" } }]];
     rows[0].extend(distances.iter().map(|z| with_interval(model, *z, theta)));
     rows.extend(Overlay::ALL.map(|overlay| {
-        let cells = distances.iter().map(|z| without_interval(&overlay.model(), *z, theta));
-        row![overlay.label()].into_iter().chain(cells).collect()
+        let cells = distances.iter().map(|z| without_interval(&(overlay.model)(), *z, theta));
+        row![overlay.label].into_iter().chain(cells).collect()
     }));
     html! {
         (table(&columns, rows))
