@@ -78,3 +78,14 @@ pub fn far_side(azimuth_rad: f64) -> &'static str {
     let eighth = (azimuth_rad / std::f64::consts::FRAC_PI_4).round().rem_euclid(8.0);
     SIDES[eighth as usize % 8]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_far_side_is_named() {
+        let sides = [0.0, 92.0, -90.0, 180.0, -180.0].map(|a: f64| far_side(a.to_radians()));
+        assert_eq!(sides, ["right", "lower", "upper", "left", "left"]);
+    }
+}

@@ -22,6 +22,7 @@ mod threaded;
 mod wanted;
 mod watch;
 
+pub use advice::far_side;
 pub use drift::Drift;
 pub use folder::Growing;
 pub use freenect::{FreenectOptions, FreenectSource};

@@ -162,7 +162,12 @@ fn line(f: &Finding) -> String {
 
 /// Where diagnosis and simulator meet: the views worth seeing, each with its simulated twin.
 /// `given` is the model that the recording was held against.
-fn with_twins(done: &Diagnosed, sensor: &Sensor, given: &NoiseModel, seed: Seed) -> Vec<ViewPictures> {
+fn with_twins(
+    done: &Diagnosed,
+    sensor: &Sensor,
+    given: &NoiseModel,
+    seed: Seed,
+) -> Vec<ViewPictures> {
     let rays = sensor.camera.rays();
     let effects = shown_effects(&done.model);
     let twin = Twin { sensor, rays: &rays, model: &done.model, effects: &effects, seed };

@@ -98,7 +98,8 @@ pub fn figure2(table: &SigmaTable, model: &SigmaModel, overlays: &[Overlay]) -> 
         .iter()
         .enumerate()
         .map(|(i, of)| {
-            let colour = colours::distance(i as f64 / (rows.len().max(2) - 1) as f64);
+            let colour =
+                colours::between(&colours::DISTANCES, i as f64 / (rows.len().max(2) - 1) as f64);
             let (radius, edge) = if many { (4, INK.mix(0.6)) } else { (5, INK.into()) };
             group(of, model, colour, Mark { shape: i, radius, fill: colour.into(), edge })
         })
@@ -118,7 +119,8 @@ pub fn figure2(table: &SigmaTable, model: &SigmaModel, overlays: &[Overlay]) -> 
 
 fn group(rows: &[SigmaRow], model: &SigmaModel, colour: RGBColor, mark: Mark) -> Group {
     let z_m = rows[rows.len() / 2].z_m;
-    let carried = |r: &SigmaRow| MM * model.sigma(z_m, r.theta_rad) / model.sigma(r.z_m, r.theta_rad);
+    let carried =
+        |r: &SigmaRow| MM * model.sigma(z_m, r.theta_rad) / model.sigma(r.z_m, r.theta_rad);
     let point = |r: &SigmaRow| [r.theta_rad.to_degrees(), carried(r) * r.sigma_m];
     let bar = |r: &SigmaRow| {
         let ([tilt, sigma], error) = (point(r), carried(r) * r.std_error_m()?);

@@ -59,7 +59,7 @@ fn png([width, height]: [usize; 2], values: &[f32], farther: f64) -> Result<Vec<
 
 fn palette() -> Vec<u8> {
     let last = f64::from(SHADES - 1);
-    let shades = (0..SHADES).map(|i| colours::residual(f64::from(i) / last));
+    let shades = (0..SHADES).map(|i| colours::between(&colours::RESIDUALS, f64::from(i) / last));
     NO_TARGET.into_iter().chain(shades.flat_map(|c| [c.0, c.1, c.2])).collect()
 }
 

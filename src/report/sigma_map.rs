@@ -65,7 +65,7 @@ fn shade(share: f64) -> usize {
 }
 
 fn colour(shade: usize) -> RGBColor {
-    colours::surface((shade as f64 + 0.5) / SHADES as f64)
+    colours::between(&colours::SURFACE, (shade as f64 + 0.5) / SHADES as f64)
 }
 
 type Point = [f64; 2];
@@ -138,9 +138,8 @@ impl Grid {
         let share = |p: Point| [along(&self.x, p[0]), along(&self.y, p[1])];
         let free = |p: &Point| {
             let here = share(*p);
-            let apart = |there: [f64; 2]| {
-                (0..2).any(|k| (here[k] - there[k]).abs() > LABELS_APART[k])
-            };
+            let apart =
+                |there: [f64; 2]| (0..2).any(|k| (here[k] - there[k]).abs() > LABELS_APART[k]);
             here.iter().all(|s| (LABEL_INSET..=1.0 - LABEL_INSET).contains(s))
                 && taken.iter().all(|(at, _)| apart(share(*at)))
         };

@@ -3,6 +3,7 @@
 use maud::{Markup, html};
 
 use super::sentences::sentence;
+use crate::capture::far_side;
 use crate::diagnose::{Finding, NextView, Status};
 use crate::report::numbers::fixed;
 use crate::terms::Statistic;
@@ -43,44 +44,12 @@ pub(super) fn advice(finding: &Finding) -> Option<Markup> {
 /// An instruction to a person holding a target.
 fn next_view(next: &NextView) -> Markup {
     let tilt = fixed(next.theta_rad.to_degrees(), 0);
+    let far = far_side(next.azimuth_rad);
+    let part = if far.contains(' ') { "corner" } else { "side" };
     html! {
         "Take one more view: hold the target " b { (fixed(next.z_m, 2)) " m" } " in front of the sensor, "
         @if next.theta_rad.abs() < FACING_RAD { b { "facing it" } ". " }
-        @else { b { "tilted by " (tilt) "°" } ", its " b { (far_side(next.azimuth_rad)) } " farthest away as the sensor sees it. " }
+        @else { b { "tilted by " (tilt) "°" } ", its " b { (far) " " (part) } " farthest away as the sensor sees it. " }
         @if !next.why.is_empty() { (sentence(&next.why)) " " }
-    }
-}
-
-/// Depth grows towards the azimuth: 0 to the right, a quarter turn down.
-fn far_side(azimuth_rad: f64) -> &'static str {
-    const SIDES: [&str; 8] = [
-        "right side",
-        "lower right corner",
-        "lower side",
-        "lower left corner",
-        "left side",
-        "upper left corner",
-        "upper side",
-        "upper right corner",
-    ];
-    let eighths = (azimuth_rad / std::f64::consts::FRAC_PI_4).round() as i64;
-    SIDES[eighths.rem_euclid(8) as usize]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_far_side_is_named() {
-        for (degrees, side) in [
-            (0.0, "right side"),
-            (92.0, "lower side"),
-            (-90.0, "upper side"),
-            (180.0, "left side"),
-            (-180.0, "left side"),
-        ] {
-            assert_eq!(far_side(f64::to_radians(degrees)), side);
-        }
     }
 }

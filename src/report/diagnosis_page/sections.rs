@@ -37,7 +37,10 @@ fn tiles(diagnosis: &Diagnosis) -> Markup {
     let held = diagnosis.views.iter().filter(|v| v.held_out).count();
     let held = format!("{held} of them held out for the final test");
     let found = missing(&diagnosis.findings);
-    let largest = found.first().map(|f| format!("largest: {}", called(f)));
+    let (number, largest) = match found.first() {
+        Some(largest) => (found.len().to_string(), format!("largest: {}", called(largest))),
+        None => ("none found".into(), "see what could have been seen".into()),
+    };
     let remaining = match (diagnosis.after.verdict, diagnosis.after.remaining.len()) {
         (Verdict::Match, _) => "nothing".into(),
         (_, 0) => "not settled".into(),
@@ -45,10 +48,7 @@ fn tiles(diagnosis: &Diagnosis) -> Markup {
     };
     html! {
         (tile("Recording", &count(diagnosis.views.len(), "view"), &held))
-        @match largest {
-            Some(largest) => (tile("Effects left out", &found.len().to_string(), &largest)),
-            None => (tile("Effects left out", "none found", "see what could have been seen")),
-        }
+        (tile("Effects left out", &number, &largest))
         @if let Some(held) = &diagnosis.heldout {
             @let change = format!("{} → {}", mm(held.rms_mm_before), mm(held.rms_mm_after));
             (tile("Steady error, held-out views", &change, "before and after"))
@@ -69,18 +69,12 @@ pub(super) fn held_out(held: Option<&HeldOut>) -> Markup {
     let [low, high] = held.gain_interval;
     let gain = |v: f64| fixed(v, usize::from(held.gain.abs() < 10.0));
     let px = |v| format!("{} px", fixed(v, PX_DECIMALS));
+    let every = "every pixel of every frame, noise included, rms";
+    let score = [held.log_score_before, held.log_score_after].map(|v| fixed(v, 1));
     let rows = [
         row!["steady error, rms", mm(held.rms_mm_before), mm(held.rms_mm_after)],
-        row![
-            "every pixel of every frame, noise included, rms",
-            px(held.rms_px_before),
-            px(held.rms_px_after)
-        ],
-        row![
-            "log score, nats a view",
-            fixed(held.log_score_before, 1),
-            fixed(held.log_score_after, 1)
-        ],
+        row![every, px(held.rms_px_before), px(held.rms_px_after)],
+        row!["log score, nats a view", score[0], score[1]],
     ];
     html! { div {
         h2 { "What was gained" }
