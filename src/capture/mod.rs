@@ -18,7 +18,6 @@ mod run;
 mod screen;
 mod session;
 mod source;
-mod threaded;
 mod wanted;
 mod watch;
 
@@ -32,6 +31,5 @@ pub use run::{Ending, Interface, Outcome, capture};
 pub use screen::{Line, Status, Style, render};
 pub use session::Session;
 pub use source::{Arrival, End, LiveFrame, Source};
-pub use threaded::Threaded;
 pub use wanted::{PAPER_DISTANCES_M, PAPER_TILTS_DEG, Pose, ViewState, Wanted, WantedView};
 pub use watch::{Sighting, Watcher};

@@ -8,8 +8,8 @@ use anyhow::bail;
 use clap::Args;
 use kinoise::capture::{
     End, Ending, FreenectOptions, FreenectSource, Growing, Guide, Interface, Outcome,
-    PAPER_DISTANCES_M, PAPER_TILTS_DEG, Playback, Session, Shutter, Source, Threaded, ViewState,
-    Wanted, capture,
+    PAPER_DISTANCES_M, PAPER_TILTS_DEG, Playback, Session, Shutter, Source, ViewState, Wanted,
+    capture,
 };
 use serde_json::json;
 
@@ -199,7 +199,7 @@ fn source(arguments: &Arguments, paced: bool) -> anyhow::Result<Box<dyn Source>>
                 assumed,
                 dump: std::env::var_os("FAKENECT_PATH").map(PathBuf::from),
             };
-            Box::new(Threaded::start(move || FreenectSource::open(&options))?)
+            Box::new(FreenectSource::open(options)?)
         }
         SourceKind::Folder(path) => {
             let patience = Duration::from_secs(arguments.patience.max(1));
