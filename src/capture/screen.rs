@@ -55,7 +55,8 @@ pub fn render(guide: &Guide, status: &Status, columns: usize, rows: usize) -> Ve
         (None, None) => Advice::of(guide),
     };
     let plain = |text: String| Line { text, style: Style::Plain };
-    let mut lines = vec![plain(title(guide, &status.title))];
+    let mut lines =
+        vec![plain(format!("{} views taken   {}", guide.wanted().progress(), status.title))];
     lines.extend(big(&word, columns).into_iter().map(|text| Line { text, style: Style::Loud }));
     lines.push(plain(sentence));
     lines.extend(big(&pose(guide), columns).into_iter().map(plain));
@@ -95,13 +96,6 @@ fn big(text: &str, columns: usize) -> Vec<String> {
         letters.iter().map(of).collect::<Vec<String>>().concat()
     };
     (0..DOTS).step_by(2).map(row).collect()
-}
-
-fn title(guide: &Guide, title: &str) -> String {
-    let wanted = guide.wanted();
-    let taken = wanted.count(ViewState::Taken);
-    let of = if wanted.any { String::new() } else { format!(" of {}", wanted.views.len()) };
-    format!("{taken}{of} views taken   {title}")
 }
 
 fn pose(guide: &Guide) -> String {

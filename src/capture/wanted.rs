@@ -251,6 +251,12 @@ impl Wanted {
         self.views.iter().filter(|v| v.state == state).count()
     }
 
+    /// "3 of 63", or "3" where any pose will do.
+    pub fn progress(&self) -> String {
+        let of = if self.any { String::new() } else { format!(" of {}", self.views.len()) };
+        format!("{}{of}", self.count(ViewState::Taken))
+    }
+
     /// Nothing is left to take.
     pub fn is_done(&self) -> bool {
         !self.any && self.count(ViewState::Open) == 0

@@ -1,7 +1,4 @@
-use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use anyhow::bail;
@@ -135,9 +132,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     let done = if guide.wanted().is_done() {
         Outcome { ending: Ending::Complete, finished: Vec::new(), frames: 0 }
     } else {
-        let mut interface = interface(screen.then(|| title(arguments, source.as_ref())), stop)?;
+        let mut interface: Box<dyn Interface> = if screen {
+            Box::new(Screen::open(title(arguments, source.as_ref()), stop.clone())?)
+        } else {
+            Box::new(Log)
+        };
         let patience = Duration::from_secs(arguments.patience.max(1));
-        capture(source.as_mut(), &mut session, &mut guide, interface.as_mut(), patience)
+        capture(source.as_mut(), &mut session, &mut guide, interface.as_mut(), patience, &stop)
     };
     notes(&source.remarks()[noted..]);
     if source.dropped() > 0 {
@@ -155,14 +156,6 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
         "frames_lost": source.dropped(),
     }))?;
     conclude(done.ending, &guide, &arguments.recording, kept.len())
-}
-
-/// A screen where there is a title to show on it.
-fn interface(title: Option<String>, stop: Arc<AtomicBool>) -> io::Result<Box<dyn Interface>> {
-    Ok(match title {
-        Some(title) => Box::new(Screen::open(title, stop)?),
-        None => Box::new(Log { stop, waiting: Vec::new() }),
-    })
 }
 
 /// What is played or watched must not grow by what is taken from it.

@@ -6,7 +6,7 @@ use kinoise::correct::{Corrected, correct_recording};
 use kinoise::effects::Active;
 use kinoise::{DepthCode, NoiseModel};
 
-use super::common::{Bar, Global, Input, notes, say};
+use super::common::{Global, Input, notes, say, with_bar};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -29,16 +29,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let model = NoiseModel::read(&arguments.model)?;
     // Here an error can name the file.
     Active::all_of_model(&model.effects).with_context(|| arguments.model.display().to_string())?;
-    let bar = Bar::new("frames");
-    let corrected = correct_recording(
-        &arguments.recording,
-        &arguments.input.assumed()?,
-        &model,
-        &arguments.output,
-        arguments.keep_code,
-        &|done, all| bar.step(done, all),
-    )?;
-    drop(bar);
+    let (recording, output) = (&arguments.recording, &arguments.output);
+    let assumed = arguments.input.assumed()?;
+    let corrected = with_bar("frames", |step| {
+        correct_recording(recording, &assumed, &model, output, arguments.keep_code, step)
+    })?;
     report(&corrected, arguments);
     global.print_json(&serde_json::json!({
         "frames": corrected.frames,

@@ -1,7 +1,6 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use kinoise::camera::Rays;
 use kinoise::diagnose::{
     DiagnoseOptions, Diagnosed, Diagnosis, Field, Finding, Reference, Status, Verdict,
     ViewPictures, diagnose, diagnose_against, pictures,
@@ -12,9 +11,11 @@ use kinoise::report::{DiagnosisPage, diagnosis_page};
 use kinoise::simulate::{FormulaSensor, plan_on};
 use kinoise::terms::Statistic;
 use kinoise::view::ViewNotes;
-use kinoise::{CalibrateOptions, Form, Frame, NoiseModel, Recording, Seed, Sensor};
+use kinoise::{
+    CalibrateOptions, Form, NoiseModel, Recording, Seed, Sensor, measure_recording, model_of,
+};
 
-use super::common::{Bar, Global, Input, say, source_date};
+use super::common::{Global, Input, say, source_date, with_bar};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -64,13 +65,10 @@ pub fn examine(
 ) -> anyhow::Result<Diagnosis> {
     let out = OutputDir::create(output)?;
     let options = DiagnoseOptions { seed: global.seed(), ..DiagnoseOptions::default() };
-    let bar = Bar::new("views");
-    let step = |done, all| bar.step(done, all);
-    let done = match simulated {
-        Some(simulated) => diagnose_against(recording, simulated, model, &options, &step)?,
-        None => diagnose(recording, model, &options, &step)?,
-    };
-    drop(bar);
+    let done = with_bar("views", |step| match simulated {
+        Some(simulated) => diagnose_against(recording, simulated, model, &options, step),
+        None => diagnose(recording, model, &options, step),
+    })?;
     let diagnosis = &done.diagnosis;
     let json = serde_json::to_value(diagnosis)?;
     out.write("diagnosis.json", format!("{json:#}\n").as_bytes())?;
@@ -88,11 +86,8 @@ fn calibrated(recording: &Recording, global: &Global) -> anyhow::Result<NoiseMod
     let mut options =
         CalibrateOptions { form: Some(Form::Paper), created: source_date(), ..Default::default() };
     options.measure.seed = global.seed();
-    let bar = Bar::new("views");
-    let views =
-        kinoise::measure_recording(recording, &options.measure, &|done, all| bar.step(done, all))?;
-    drop(bar);
-    Ok(kinoise::model_of(recording, &views, &options)?.model)
+    let views = with_bar("views", |step| measure_recording(recording, &options.measure, step))?;
+    Ok(model_of(recording, &views, &options)?.model)
 }
 
 /// The sigma to weigh by: the simulation's own, or the recording's where that has none.
@@ -160,6 +155,11 @@ fn line(f: &Finding) -> String {
     format!("  {name}: {size}, {:.0} % of it; along {}{parameters}\n", 100.0 * f.share, f.axis)
 }
 
+/// Effects that move the plane as a whole: a picture about the plane does not show them.
+const OF_THE_PLANE: [&str; 3] = ["depth-scale", "disparity-offset", "thermal-drift"];
+/// More frames of a twin than this add nothing that an eye sees.
+const MAX_TWIN_FRAMES: usize = 16;
+
 /// Where diagnosis and simulator meet: the views worth seeing, each with its simulated twin.
 /// `given` is the model that the recording was held against.
 fn with_twins(
@@ -168,43 +168,20 @@ fn with_twins(
     given: &NoiseModel,
     seed: Seed,
 ) -> Vec<ViewPictures> {
-    let rays = sensor.camera.rays();
-    let effects = shown_effects(&done.model);
-    let twin = Twin { sensor, rays: &rays, model: &done.model, effects: &effects, seed };
-    let session_s = done.fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
-    // Beside a simulated recording, what is shown is a difference already.
-    let retake = |index, field: &Field| {
-        if done.against.is_empty() { twin.frames(index, field, session_s) } else { None }
-    };
-    pictures(done, sensor, given, &retake)
-}
-
-/// Effects that move the plane as a whole: a picture about the plane does not show them.
-const OF_THE_PLANE: [&str; 3] = ["depth-scale", "disparity-offset", "thermal-drift"];
-
-/// All others that the simulator can make.
-fn shown_effects(model: &NoiseModel) -> Vec<Active> {
-    let mut effects = model.effects.clone();
+    let mut effects = done.model.effects.clone();
     effects.retain(|e| {
         let is_known = Active::all_of_model(std::slice::from_ref(e)).is_ok();
         is_known && !OF_THE_PLANE.contains(&e.id.as_str())
     });
-    Active::all_of_model(&effects).unwrap_or_default()
-}
-
-struct Twin<'a> {
-    sensor: &'a Sensor,
-    rays: &'a Rays,
-    model: &'a NoiseModel,
-    effects: &'a [Active],
-    seed: Seed,
-}
-
-/// More frames of a twin than this add nothing that an eye sees.
-const MAX_TWIN_FRAMES: usize = 16;
-
-impl Twin<'_> {
-    fn frames(&self, index: usize, field: &Field, session_s: f64) -> Option<Vec<(f64, Frame)>> {
+    let effects = Active::all_of_model(&effects).unwrap_or_default();
+    let (rays, sigma) = (sensor.camera.rays(), &done.model.sigma);
+    let camera = FormulaSensor { sensor, rays: &rays, sigma, effects: &effects, seed };
+    let session_s = done.fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
+    let retake = |index, field: &Field| {
+        // Beside a simulated recording, what is shown is a difference already.
+        if !done.against.is_empty() {
+            return None;
+        }
         let times = field.frames.iter().take(MAX_TWIN_FRAMES).map(|f| f.0);
         let stamps = times.map(|t| field.time_s + t).collect();
         let notes = ViewNotes {
@@ -212,17 +189,11 @@ impl Twin<'_> {
             ambient_lux: field.ambient_lux,
             ..ViewNotes::default()
         };
-        let plan = plan_on(&field.name, &field.plane, &field.pixels, self.rays, stamps, notes);
-        let seen = plan.seen(&self.sensor.camera, self.rays);
-        let camera = FormulaSensor {
-            sensor: self.sensor,
-            rays: self.rays,
-            sigma: &self.model.sigma,
-            effects: self.effects,
-            seed: self.seed,
-        };
+        let plan = plan_on(&field.name, &field.plane, &field.pixels, &rays, stamps, notes);
+        let seen = plan.seen(&sensor.camera, &rays);
         let mut shooting = camera.begin(&seen).under(plan.ambient_lux).at(plan.notes.temperature_c);
         let shot = |(_, instant): (f64, Instant)| (instant.view_s, shooting.shoot(instant).depth);
         Some(plan.instants(index, session_s).map(shot).collect())
-    }
+    };
+    pictures(done, sensor, given, &retake)
 }

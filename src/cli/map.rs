@@ -12,7 +12,7 @@ use kinoise::trajectory::tum_text;
 use kinoise::{NoiseModel, Seed};
 use serde_json::{Value, json};
 
-use super::common::{Bar, Global, Input, Model, Thinning, notes, one_of, say};
+use super::common::{Global, Input, Model, Thinning, notes, one_of, say, with_bar};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -133,10 +133,8 @@ pub fn follow(
     folder: &Path,
 ) -> anyhow::Result<Value> {
     let output = OutputDir::create(folder)?;
-    let bar = Bar::new("frames");
     let begin = std::time::Instant::now();
-    let mapped = map::map(sequence, model, options, &|done, all| bar.step(done, all))?;
-    drop(bar);
+    let mapped = with_bar("frames", |step| map::map(sequence, model, options, step))?;
     let seconds = begin.elapsed().as_secs_f64();
     let against = truth(sequence, &mapped);
     let stats = stats(&mapped, options, &against, seconds);

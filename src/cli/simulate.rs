@@ -11,7 +11,7 @@ use kinoise::simulate::{Physics, Shoot, ViewPlan, kinect_v1, plan_grid, plan_lik
 use kinoise::{Form, NoiseModel, Sensor, SigmaModel};
 use serde_json::{Value, json};
 
-use super::common::{Bar, Global, MAX_FRAMES, count, notes, say};
+use super::common::{Global, MAX_FRAMES, count, notes, say, with_bar};
 use super::simulate_room::RoomArguments;
 use super::simulate_scene::{PosesArguments, SceneryArguments};
 
@@ -90,9 +90,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
 
 /// Film the office: what programs are told of it, and the recipe.
 fn write_film(film: &Film, output: &Path) -> anyhow::Result<(Value, Value)> {
-    let bar = Bar::new("frames");
-    film.write(output, &|done, all| bar.step(done, all))?;
-    drop(bar);
+    with_bar("frames", |step| film.write(output, step))?;
     let frames = film.poses.len();
     say(format!("wrote {frames} frames of a room to {}", output.display()));
     Ok((json!({"frames": frames, "output": output}), film.recipe()))
@@ -112,9 +110,7 @@ fn shoot(
         note_idle(effects, &arguments.scenery);
     }
     let shoot = Shoot { sensor, views, physics, infrared: arguments.infrared, seed: global.seed() };
-    let bar = Bar::new("views");
-    let blind = shoot.write(&arguments.output, &|done, all| bar.step(done, all))?;
-    drop(bar);
+    let blind = with_bar("views", |step| shoot.write(&arguments.output, step))?;
     const UNSEEN: &str = "the target is out of the picture or beyond the depth code";
     let (output, views) = (arguments.output.display(), shoot.views.len());
     if blind.len() == views {
