@@ -86,7 +86,7 @@ pub fn capture(
     };
     let Run { session, guide, finished, frames, .. } = run;
     session.abandon();
-    guide.leave("stopped");
+    guide.leave();
     Outcome { ending, finished, frames }
 }
 

@@ -45,13 +45,11 @@ const KEYS: &str = "r throw the last one away, take it again   s skip this one  
 /// Lines for a terminal of this many columns and rows.
 pub fn render(guide: &Guide, status: &Status, columns: usize, rows: usize) -> Vec<Line> {
     let Advice { word, sentence } = match (&status.flash, status.silent_s) {
-        (Some(view), _) => {
-            Advice { word: "TAKEN".into(), sentence: format!("{view} is on the disk") }
+        (Some(view), _) => Advice::new("TAKEN", format!("{view} is on the disk")),
+        (None, Some(s)) => {
+            let look = "look at the cable, the power, the other program";
+            Advice::new("NO FRAMES", format!("none for {s} s: {look}"))
         }
-        (None, Some(s)) => Advice {
-            word: "NO FRAMES".into(),
-            sentence: format!("none for {s} s: look at the cable, the power, the other program"),
-        },
         (None, None) => Advice::of(guide),
     };
     let plain = |text: String| Line { text, style: Style::Plain };
