@@ -1,4 +1,5 @@
 use super::*;
+use crate::frame::Frame;
 use crate::simulate::kinect_v1;
 
 fn frame(stamp: f64, word: u16) -> LiveFrame {
