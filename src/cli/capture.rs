@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::bail;
+use anyhow::{bail, ensure};
 use clap::Args;
 use kinoise::capture::{
     End, Ending, FreenectOptions, FreenectSource, Growing, Guide, Interface, Outcome,
@@ -84,9 +84,8 @@ impl Views {
         }
         let own = |own: &[f64], grid: &[f64]| if own.is_empty() { grid } else { own }.to_vec();
         let Some((distances, tilts)) = self.views else {
-            if !self.distances.is_empty() || !self.tilts.is_empty() {
-                bail!("--views any: it knows no grid; leave --distances and --tilts out");
-            }
+            let none = self.distances.is_empty() && self.tilts.is_empty();
+            ensure!(none, "--views any: it knows no grid; leave --distances and --tilts out");
             return Ok(Wanted::any());
         };
         let (distances, tilts) = (own(&self.distances, distances), own(&self.tilts, tilts));

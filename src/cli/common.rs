@@ -82,9 +82,8 @@ impl Input {
             (None, None) => None,
         };
         if let Some(fault) = code.as_ref().and_then(DepthCode::fault) {
-            bail!(
-                "{fault}; give --units-per-metre or --raw-disparity numbers that turn raw values into metres"
-            );
+            let numbers = "numbers that turn raw values into metres";
+            bail!("{fault}; give --units-per-metre or --raw-disparity {numbers}");
         }
         Ok(Assumed { intrinsics: self.intrinsics, code, baseline_m: self.baseline })
     }

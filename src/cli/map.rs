@@ -140,8 +140,7 @@ pub fn follow(
     let stats = stats(&mapped, options, &against, seconds);
     output.write("trajectory.txt", tum_text(&mapped.trajectory()).as_bytes())?;
     output.write("map.ply", &ply(&mapped.map))?;
-    let page = map_page(title, &mapped.map, &mapped.frames);
-    output.write("map.html", page.as_bytes())?;
+    output.write("map.html", map_page(title, &mapped.map, &mapped.frames).as_bytes())?;
     output.write("frames.csv", frames_csv(&mapped.frames).as_bytes())?;
     output.write("stats.json", serde_json::to_string_pretty(&stats)?.as_bytes())?;
     notes(sequence.remarks.iter().chain(&mapped.remarks));
@@ -169,13 +168,9 @@ fn report(mapped: &Mapped, against: &Option<Result<Evaluation, String>>, output:
         Some(Err(why)) => say(format!("note: not compared with the ground truth: {why}")),
         None => {}
     }
-    say(format!(
-        "{} of {} frames have a pose; {} points; wrote {}",
-        mapped.frames.len() - mapped.lost(),
-        mapped.frames.len(),
-        mapped.map.len(),
-        output.display()
-    ));
+    let (frames, points) = (mapped.frames.len(), mapped.map.len());
+    let (posed, folder) = (frames - mapped.lost(), output.display());
+    say(format!("{posed} of {frames} frames have a pose; {points} points; wrote {folder}"));
 }
 
 fn stats(
