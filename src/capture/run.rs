@@ -40,7 +40,7 @@ pub enum Ending {
     Ended(End),
     /// No frame for so long.
     Stalled(Duration),
-    /// The disk or the source failed.
+    /// The disk failed.
     Failed(Error),
 }
 
@@ -79,7 +79,7 @@ pub fn capture(
         match run.step(source, patience) {
             Ok(None) => {}
             // A signal may have woken the library.
-            Ok(Some(Ending::Ended(_))) | Err(_) if stopped() => break Ending::Interrupted,
+            Ok(Some(Ending::Ended(_))) if stopped() => break Ending::Interrupted,
             Ok(Some(ending)) => break ending,
             Err(e) => break Ending::Failed(e),
         }
@@ -113,7 +113,7 @@ impl Run<'_> {
                 return Ok(Some(Ending::Complete));
             }
         }
-        let arrival = newest(source, self.guide.taking().is_some())?;
+        let arrival = newest(source, self.guide.taking().is_some());
         let silence = self.last_frame.elapsed();
         match arrival {
             Arrival::Frame(frame) => return self.look(&frame),
@@ -158,13 +158,13 @@ impl Run<'_> {
 }
 
 /// The next frame; of a live sensor, the newest, unless every one is wanted.
-fn newest(source: &mut dyn Source, every: bool) -> Result<Arrival> {
-    let mut arrival = source.next(WAIT)?;
+fn newest(source: &mut dyn Source, every: bool) -> Arrival {
+    let mut arrival = source.next(WAIT);
     while source.live() && !every && matches!(arrival, Arrival::Frame(_)) {
-        match source.next(Duration::ZERO)? {
+        match source.next(Duration::ZERO) {
             Arrival::Nothing => break,
             newer => arrival = newer,
         }
     }
-    Ok(arrival)
+    arrival
 }

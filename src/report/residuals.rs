@@ -6,6 +6,7 @@ use super::axis::round_up;
 use super::colours;
 use super::document::picture;
 use crate::error::{Error, Result};
+use crate::stats::quantile;
 
 /// Palette: entry 0 is "no target", the rest run from the most negative to the most positive;
 /// odd in number, so that zero is exactly white.
@@ -19,13 +20,9 @@ const EMPTY_SCALE: f64 = 1.0;
 /// Where the colours end: covers 98 % of the finite values, rounded up to 1, 2 or 5 times a power
 /// of ten.
 pub(super) fn scale(values: &[f32]) -> f64 {
-    let mut sizes: Vec<f32> = values.iter().map(|v| v.abs()).filter(|v| v.is_finite()).collect();
-    if sizes.is_empty() {
-        return EMPTY_SCALE;
-    }
-    let rank = ((sizes.len() - 1) as f64 * COVERED).round() as usize;
-    let (_, size, _) = sizes.select_nth_unstable_by(rank, f32::total_cmp);
-    if *size > 0.0 { round_up(f64::from(*size)) } else { EMPTY_SCALE }
+    let sizes = values.iter().filter(|v| v.is_finite()).map(|v| f64::from(v.abs()));
+    let size = quantile(&mut sizes.collect::<Vec<f64>>(), COVERED);
+    size.filter(|size| *size > 0.0).map_or(EMPTY_SCALE, round_up)
 }
 
 /// Values row by row, white at zero and saturated at `farther` in red, `-farther` in blue; a

@@ -109,13 +109,12 @@ impl Source for FreenectSource {
         &self.sensor
     }
 
-    fn next(&mut self, wait: Duration) -> Result<Arrival> {
-        let arrival = self.arrivals.as_ref().map(|queue| queue.recv_timeout(wait));
-        Ok(match arrival {
+    fn next(&mut self, wait: Duration) -> Arrival {
+        match self.arrivals.as_ref().map(|queue| queue.recv_timeout(wait)) {
             Some(Ok(arrival)) => arrival,
             Some(Err(RecvTimeoutError::Timeout)) => Arrival::Nothing,
             _ => Arrival::End(End { why: "the sensor's thread has ended".into(), lost: true }),
-        })
+        }
     }
 
     fn live(&self) -> bool {
