@@ -194,10 +194,8 @@ fn write_outputs(out: &OutputDir, page: &CalibrationPage<'_>) -> anyhow::Result<
     out.write("report.html", calibration_page(page)?.as_bytes())?;
     let model = out.path().join("model.json");
     calibration.model.write(&model)?;
-    say(format!(
-        "wrote {}, with sigma.svg, sigma_map.svg and report.html beside it\n",
-        model.display()
-    ));
+    let beside = "with sigma.svg, sigma_map.svg and report.html beside it";
+    say(format!("wrote {}, {beside}\n", model.display()));
     say(summary(calibration));
     notes(&calibration.warnings);
     Ok(())
@@ -210,10 +208,9 @@ fn measured(recording: &Recording, m: &Measurements) -> String {
     let frames: usize = m.views.iter().map(|v| v.frames).sum();
     let [f0, f1] = range(&|v| v.frames as f64);
     let each = if f0 == f1 { format!("{f0} a view") } else { format!("{f0} to {f1} a view") };
+    let (name, views, all) =
+        (&recording.sensor.name, m.views.len(), m.views.len() + m.excluded.len());
     format!(
-        "{}: {} of {} views measured, {frames} frames ({each}), z {z0:.2} to {z1:.2} m, tilt {t0:.1} to {t1:.1} degrees",
-        recording.sensor.name,
-        m.views.len(),
-        m.views.len() + m.excluded.len(),
+        "{name}: {views} of {all} views measured, {frames} frames ({each}), z {z0:.2} to {z1:.2} m, tilt {t0:.1} to {t1:.1} degrees"
     )
 }

@@ -159,16 +159,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
 
 /// What is played or watched must not grow by what is taken from it.
 fn refuse_own_source(arguments: &Arguments) -> anyhow::Result<()> {
-    let (SourceKind::Folder(from) | SourceKind::Play(from)) = &arguments.source else {
-        return Ok(());
-    };
-    if let (Ok(from), Ok(to)) = (from.canonicalize(), arguments.recording.canonicalize())
+    let recording = &arguments.recording;
+    if let SourceKind::Folder(from) | SourceKind::Play(from) = &arguments.source
+        && let (Ok(from), Ok(to)) = (from.canonicalize(), recording.canonicalize())
         && from == to
     {
-        bail!(
-            "{}: this is the source; choose another folder for the recording",
-            arguments.recording.display()
-        );
+        let remedy = "choose another folder for the recording";
+        bail!("{}: this is the source; {remedy}", recording.display());
     }
     Ok(())
 }
@@ -231,25 +228,18 @@ fn conclude(ending: Ending, guide: &Guide, root: &Path, kept: usize) -> anyhow::
     let missing = still_wanted(guide).len();
     let still = if wanted.any { String::new() } else { format!(", {missing} still wanted") };
     let on = format!("{stands}{still}; give the same command again to resume");
-    match ending {
-        Ending::Complete => {
-            let skipped = wanted.count(ViewState::Skipped);
-            let but = if skipped > 0 { format!(", {skipped} skipped") } else { String::new() };
-            say(format!("done: {stands}{but}"));
-            Ok(0)
-        }
-        Ending::Quit => {
-            say(format!("stopped: {on}"));
-            Ok(0)
-        }
+    let done = match ending {
+        Ending::Complete => match wanted.count(ViewState::Skipped) {
+            0 => format!("done: {stands}"),
+            skipped => format!("done: {stands}, {skipped} skipped"),
+        },
+        Ending::Quit => format!("stopped: {on}"),
         // Where anything will do, the end of a recording or of a folder's filling is the end.
         Ending::Ended(End { why, lost: false }) if wanted.any && kept > 0 => {
-            say(format!("done: {why}; {stands}"));
-            Ok(0)
+            format!("done: {why}; {stands}")
         }
         Ending::Stalled(after) if wanted.any && kept > 0 => {
-            say(format!("done: no new frame for {} s; {stands}", after.as_secs()));
-            Ok(0)
+            format!("done: no new frame for {} s; {stands}", after.as_secs())
         }
         Ending::Interrupted => bail!("interrupted: {on}"),
         Ending::Ended(End { why, .. }) => bail!("{why}: {on}"),
@@ -259,5 +249,7 @@ fn conclude(ending: Ending, guide: &Guide, root: &Path, kept: usize) -> anyhow::
             after.as_secs()
         ),
         Ending::Failed(e) => bail!("{e}: {on}"),
-    }
+    };
+    say(done);
+    Ok(0)
 }

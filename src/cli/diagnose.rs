@@ -14,6 +14,7 @@ use kinoise::view::ViewNotes;
 use kinoise::{
     CalibrateOptions, Form, NoiseModel, Recording, Seed, Sensor, measure_recording, model_of,
 };
+use serde_json::Value;
 
 use super::common::{Global, Input, say, source_date, with_bar};
 
@@ -38,10 +39,9 @@ pub struct Arguments {
 const FOUND: u8 = 1;
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
-    let recording = open(&arguments.recording, &arguments.input.assumed()?)?;
-    let against = arguments.against.as_ref();
-    let simulated = against.map(|path| anyhow::Ok(open(path, &arguments.input.assumed()?)?));
-    let simulated = simulated.transpose()?;
+    let assumed = arguments.input.assumed()?;
+    let recording = open(&arguments.recording, &assumed)?;
+    let simulated = arguments.against.as_ref().map(|path| open(path, &assumed)).transpose()?;
     let model = match (&arguments.model, &simulated) {
         (Some(path), _) => NoiseModel::read(path)?,
         (None, Some(simulated)) => weights(&recording, simulated, global)?,
@@ -115,14 +115,10 @@ fn summary(diagnosis: &Diagnosis) -> String {
     let shown = diagnosis.findings.iter().filter(|f| f.status != Status::NotIdentifiable);
     text.extend(shown.map(line));
     if let Some(h) = &diagnosis.heldout {
+        let (views, gain, [low, high]) = (h.views.len(), h.gain, h.gain_interval);
+        let (before, after) = (h.rms_mm_before, h.rms_mm_after);
         text += &format!(
-            "on {} views kept aside: {:.1} nats a view gained [{:.1}, {:.1}], rms {:.3} -> {:.3} mm\n",
-            h.views.len(),
-            h.gain,
-            h.gain_interval[0],
-            h.gain_interval[1],
-            h.rms_mm_before,
-            h.rms_mm_after
+            "on {views} views kept aside: {gain:.1} nats a view gained [{low:.1}, {high:.1}], rms {before:.3} -> {after:.3} mm\n"
         );
     }
     text
@@ -144,13 +140,12 @@ fn line(f: &Finding) -> String {
     } else {
         format!("{:.2} mm, {:.2} sigma", f.size.mm, f.size.sigma)
     };
-    let parameters = f.parameters.iter();
-    let parameters: Vec<String> = parameters
-        .filter_map(|(k, v)| Some(format!("{k} {:.4}", v.get("value")?.as_f64()?)))
-        .collect();
-    let parameters = match parameters.join(", ") {
-        none if none.is_empty() => none,
-        some => format!("; {some}"),
+    let parameter =
+        |(k, v): (&String, &Value)| Some(format!("{k} {:.4}", v.get("value")?.as_f64()?));
+    let parameters: Vec<String> = f.parameters.iter().filter_map(parameter).collect();
+    let parameters = match parameters[..] {
+        [] => String::new(),
+        _ => format!("; {}", parameters.join(", ")),
     };
     format!("  {name}: {size}, {:.0} % of it; along {}{parameters}\n", 100.0 * f.share, f.axis)
 }

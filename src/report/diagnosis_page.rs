@@ -1,6 +1,5 @@
 //! The page of a diagnosis: the answer on the first screen, the evidence below.
 
-mod advice;
 mod cards;
 mod curve;
 mod parameters;

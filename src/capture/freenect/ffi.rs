@@ -41,6 +41,12 @@ struct FrameMode {
     is_valid: i8,
 }
 
+impl FrameMode {
+    fn has(&self, bytes: usize) -> bool {
+        self.is_valid != 0 && self.bytes == bytes as i32
+    }
+}
+
 /// A unit's reference plane: lengths in cm (the header's comments say otherwise; its own
 /// conversion to mm says so).
 #[repr(C)]
@@ -283,20 +289,19 @@ impl Freenect {
     }
 
     /// Start depth in 11-bit words, unpacked to 16.
-    pub fn start_depth(&self) -> Result<(), String> {
+    pub fn start_depth(&self) -> Result<(), &'static str> {
         let f = &self.functions;
         // SAFETY: the device is open.
         unsafe {
             let mode = (f.find_depth_mode)(RESOLUTION_MEDIUM, DEPTH_11BIT);
-            if mode.is_valid == 0 || mode.bytes != DEPTH_BYTES as i32 {
-                return Err("it has no 11-bit depth of 640 x 480 px".into());
+            if !mode.has(DEPTH_BYTES) {
+                return Err("it has no 11-bit depth of 640 x 480 px");
             }
             (f.set_depth_callback)(self.device, on_depth);
-            if (f.set_depth_mode)(self.device, mode) < 0 || (f.start_depth)(self.device) < 0 {
-                return Err("depth cannot be started".into());
-            }
+            let started =
+                (f.set_depth_mode)(self.device, mode) >= 0 && (f.start_depth)(self.device) >= 0;
+            if started { Ok(()) } else { Err("depth cannot be started") }
         }
-        Ok(())
     }
 
     /// Start 10-bit infrared; false when the sensor will not.
@@ -305,11 +310,10 @@ impl Freenect {
         // SAFETY: the device is open.
         unsafe {
             let mode = (f.find_video_mode)(RESOLUTION_MEDIUM, VIDEO_IR_10BIT);
-            if mode.is_valid == 0 || mode.bytes != INFRARED_BYTES as i32 {
-                return false;
-            }
             (f.set_video_callback)(self.device, on_video);
-            (f.set_video_mode)(self.device, mode) >= 0 && (f.start_video)(self.device) >= 0
+            mode.has(INFRARED_BYTES)
+                && (f.set_video_mode)(self.device, mode) >= 0
+                && (f.start_video)(self.device) >= 0
         }
     }
 

@@ -59,7 +59,8 @@ impl Unit {
                 remedy: "correct --intrinsics or --raw-disparity",
             });
         }
-        library.start_depth().map_err(|what| Error::sensor(what + &complaint(), PLUG_IN))?;
+        let refused = |what| Error::sensor(format!("{what}{}", complaint()), PLUG_IN);
+        library.start_depth().map_err(refused)?;
         // The stand-in aborts when it is asked for a mode it has not.
         let infrared = options.infrared && dump.is_none() && library.start_infrared();
         if options.infrared && !infrared {
