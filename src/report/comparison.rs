@@ -16,12 +16,8 @@ use crate::trajectory::Pose;
 /// Room around the lines, share of their extent.
 const MARGIN: f64 = 0.04;
 
-/// A line by name.
-struct Line {
-    name: String,
-    points: Vec<[f64; 2]>,
-    stroke: Stroke,
-}
+/// Its name, its points, and how it is drawn.
+type Line = (String, Vec<[f64; 2]>, Stroke);
 
 /// Fig. 6 (paths from above), Fig. 7 (ATE over time) and Fig. 8 (RPE over time), by file name.
 ///
@@ -64,25 +60,23 @@ fn charts(comparison: &Comparison) -> [(&'static str, Chart); 3] {
 /// `equal` when both axes are lengths of one plane.
 fn chart(title: &str, labels: [&str; 2], lines: Vec<Line>, equal: bool) -> Chart {
     let extent = |k: usize| {
-        let [low, high] = range(lines.iter().flat_map(|l| &l.points).map(|p| p[k]));
+        let [low, high] = range(lines.iter().flat_map(|(_, points, _)| points).map(|p| p[k]));
         if low <= high { [low, high] } else { [0.0, 1.0] }
     };
     let extents = [extent(0), extent(1)];
     let extents = if equal { Chart::equal_units(extents) } else { extents };
     let mut chart = Chart::new(title, extents.map(|e| Axis::with_margin(e, MARGIN)), labels);
-    for line in lines {
-        chart.legend.push(Entry::new([Sample::Line(line.stroke)], line.name));
-        chart.layers.push(Layer::Line(line.points, line.stroke));
+    for (name, points, stroke) in lines {
+        chart.legend.push(Entry::new([Sample::Line(stroke)], name));
+        chart.layers.push(Layer::Line(points, stroke));
     }
     chart
 }
 
 /// The variants that are drawn, each in its colour: the paper's, and the last way past it.
 fn lines(comparison: &Comparison, points: impl Fn(&Run) -> Vec<[f64; 2]>) -> Vec<Line> {
-    let line = |(i, (row, run)): (usize, (&Row, &Run))| Line {
-        name: row.variant.name.into(),
-        points: points(run),
-        stroke: Stroke::new(colours::line(i), 2),
+    let line = |(i, (row, run)): (usize, (&Row, &Run))| {
+        (row.variant.name.into(), points(run), Stroke::new(colours::line(i), 2))
     };
     drawn(comparison).enumerate().map(line).collect()
 }
@@ -102,11 +96,8 @@ fn paths(comparison: &Comparison) -> Chart {
     };
     let from_above = |p: &Vector3<f64>| [p.x, p.y];
     let truth = comparison.truth.iter().filter(|p| within(p.stamp));
-    let mut paths = vec![Line {
-        name: "ground truth".into(),
-        points: truth.map(|p| from_above(&p.world_from_camera.translation.vector)).collect(),
-        stroke: Stroke::new(INK, 1),
-    }];
+    let truth = truth.map(|p| from_above(&p.world_from_camera.translation.vector)).collect();
+    let mut paths = vec![("ground truth".into(), truth, Stroke::new(INK, 1))];
     paths.extend(lines(comparison, |run| {
         let aligned = run.evaluation.ate.truth_from_estimate;
         let place = |p: &Pose| from_above(&(aligned * p.world_from_camera).translation.vector);
