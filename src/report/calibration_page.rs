@@ -6,7 +6,7 @@ mod warnings;
 use maud::{Markup, html};
 use serde_json::{Map, Value};
 
-use super::document::{document, facts, figure, row, table};
+use super::document::{Column, document, facts, figure, table, table_of};
 use super::figure2::{Overlay, figure2};
 use super::numbers::{ABSENT, MM, fixed, formula, millimetres, range, significant};
 use super::sigma_map::sigma_map;
@@ -60,7 +60,7 @@ pub fn calibration_page(page: &CalibrationPage<'_>) -> Result<String> {
         (model(calibration))
         (warnings::section(&calibration.warnings, excluded))
         @if let Some(measurements) = page.measurements {
-            (views::table_of(&measurements.views))
+            (views::section(&measurements.views))
             (views::gallery(&measurements.views)?)
         }
         (provenance(&calibration.model.provenance))
@@ -172,19 +172,20 @@ fn sigma_at(model: &SigmaModel, z: f64, theta: f64, own: bool) -> Markup {
 
 fn model(calibration: &Calibration) -> Markup {
     let fit = &calibration.fit;
-    let columns = ["parameter", ">value", ">standard error", "~remark"];
-    let parameter = |p: &Parameter| {
-        let error = p.std_error.map_or_else(|| html! { "held" }, |e| significant(e, 2));
-        let remark = p.remark.as_deref().unwrap_or("");
-        row![html! { i { (p.name) } }, significant(p.value, 4), error, remark]
-    };
-    let forms = ["form", ">log score, nats a view", ">rms error", ">distances left out", "~from"];
-    let form = |h: &HeldOut| {
-        let id = h.form.id();
-        let name = html! { @if h.form == fit.form { b { (id) } } @else { (id) } };
-        let error = fixed(100.0 * h.rmse_relative, 1) + " %";
-        row![name, fixed(h.log_score, 2), error, h.folds, h.form.spec().reference()]
-    };
+    let parameters: [Column<'_, Parameter>; 4] = [
+        ("parameter", &|p| html! { i { (p.name) } }),
+        (">value", &|p| significant(p.value, 4)),
+        (">standard error", &|p| p.std_error.map_or(html! { "held" }, |e| significant(e, 2))),
+        ("~remark", &|p| html! { (p.remark.as_deref().unwrap_or("")) }),
+    ];
+    let used = |h: &HeldOut| h.form == fit.form;
+    let forms: [Column<'_, HeldOut>; 5] = [
+        ("form", &|h| html! { @if used(h) { b { (h.form.id()) } } @else { (h.form.id()) } }),
+        (">log score, nats a view", &|h| html! { (fixed(h.log_score, 2)) }),
+        (">rms error", &|h| html! { (fixed(100.0 * h.rmse_relative, 1)) " %" }),
+        (">distances left out", &|h| html! { (h.folds) }),
+        ("~from", &|h| html! { (h.form.spec().reference()) }),
+    ];
     html! {
         section {
             h2 { "Model" }
@@ -192,12 +193,12 @@ fn model(calibration: &Calibration) -> Markup {
                 "Form " b { (fit.form.id()) } ": " (fit.form.spec().formula()) ". "
                 span.units { (fit.form.spec().reference()) }
             }
-            (table(&columns, fit.parameters.iter().map(parameter)))
+            (table_of(&parameters, &fit.parameters))
             h3 { "How the forms predict distances they have not seen" }
             @if calibration.comparison.is_empty() {
                 p { "Not known: too few distances to leave one out." }
             } @else {
-                (table(&forms, calibration.comparison.iter().map(form)))
+                (table_of(&forms, &calibration.comparison))
                 p.note { "Each group of distances is left out of the fit in turn and then predicted; a greater \
                     log score is better. The form used is in bold." }
             }

@@ -7,7 +7,7 @@ use super::sentences::{
 };
 use super::{parameters, sentences};
 use crate::diagnose::{CannotTell, Diagnosis, HeldOut, MapRow, Verdict, ViewLine};
-use crate::report::document::{fold, list, row, table};
+use crate::report::document::{Column, fold, list, row, table, table_of};
 use crate::report::numbers::{count, degrees, fixed, p_value, significant};
 use crate::terms::Statistic;
 
@@ -198,33 +198,20 @@ fn effect_size(row: &MapRow) -> Markup {
 }
 
 pub(super) fn views(views: &[ViewLine]) -> Markup {
-    let columns = [
-        "view",
-        ">distance m",
-        ">tilt °",
-        ">azimuth °",
-        ">frames",
-        ">pixels",
-        ">steady error before px",
-        ">after px",
-        "used for",
+    let columns: [Column<'_, ViewLine>; 9] = [
+        ("view", &|v| html! { (v.name) }),
+        (">distance m", &|v| html! { (fixed(v.z_m, 3)) }),
+        (">tilt °", &|v| html! { (degrees(v.theta_rad)) }),
+        (">azimuth °", &|v| html! { (degrees(v.azimuth_rad)) }),
+        (">frames", &|v| html! { (v.frames) }),
+        (">pixels", &|v| html! { (v.pixels) }),
+        (">steady error before px", &|v| html! { (fixed(v.bowl_px_before, PX_DECIMALS)) }),
+        (">after px", &|v| html! { (fixed(v.bowl_px_after, PX_DECIMALS)) }),
+        ("used for", &|v| html! { @if v.held_out { b { "final test" } } @else { "search" } }),
     ];
-    let cells = |v: &ViewLine| {
-        row![
-            v.name,
-            fixed(v.z_m, 3),
-            degrees(v.theta_rad),
-            degrees(v.azimuth_rad),
-            v.frames,
-            v.pixels,
-            fixed(v.bowl_px_before, PX_DECIMALS),
-            fixed(v.bowl_px_after, PX_DECIMALS),
-            html! { @if v.held_out { b { "final test" } } @else { "search" } },
-        ]
-    };
     html! { @if !views.is_empty() { section {
         h2 { "Views" }
-        (table(&columns, views.iter().map(cells)))
+        (table_of(&columns, views))
         p.note {
             "Steady error: root mean square of the view's smooth residual, px of disparity. Azimuth: towards the \
              target's far side, 0 is right and 90 down."
