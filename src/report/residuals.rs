@@ -1,17 +1,16 @@
 //! Residuals as pictures: blue nearer than expected, red farther, grey where nothing was measured.
 
 use maud::Markup;
-use plotters::style::RGBColor;
 
 use super::axis::round_up;
 use super::colours;
 use super::document::picture;
-use crate::error::Result;
-use crate::io::encode_rgb;
+use crate::error::{Error, Result};
 use crate::stats::quantile;
 
-/// Shades of either side.
-const STEPS: f64 = 100.0;
+/// Palette (a third of the bytes of full colour): entry 0 is "no target", the rest run from the most
+/// negative to the most positive; odd in number, so that zero is exactly white.
+const SHADES: u8 = 201;
 const NO_TARGET: [u8; 3] = [222, 222, 222];
 /// Share of the pixels that the scale covers; the few beyond it saturate.
 const COVERED: f64 = 0.98;
@@ -41,14 +40,26 @@ pub(super) fn residual_image(
 }
 
 fn png([width, height]: [usize; 2], values: &[f32], farther: f64) -> Result<Vec<u8>> {
-    let colour = |value: &f32| {
-        // In steps, so that few colours occur and the picture packs well.
-        let share = (f64::from(*value) / farther).clamp(-1.0, 1.0);
-        let shade = 0.5 + 0.5 * (STEPS * share).round() / STEPS;
-        let RGBColor(r, g, b) = colours::between(&colours::RESIDUALS, shade);
-        if value.is_finite() { [r, g, b] } else { NO_TARGET }
-    };
-    encode_rgb(width, height, &values.iter().flat_map(colour).collect::<Vec<u8>>())
+    let failed =
+        |e: png::EncodingError| Error::Drawing { what: "the residual picture", why: e.to_string() };
+    let last = f64::from(SHADES - 1);
+    let shades = (0..SHADES).map(|i| colours::between(&colours::RESIDUALS, f64::from(i) / last));
+    let palette = NO_TARGET.into_iter().chain(shades.flat_map(|c| [c.0, c.1, c.2]));
+    let pixels: Vec<u8> = values.iter().map(|&v| shade(f64::from(v) / farther)).collect();
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
+    encoder.set_color(png::ColorType::Indexed);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_palette(palette.collect::<Vec<u8>>());
+    let mut writer = encoder.write_header().map_err(failed)?;
+    writer.write_image_data(&pixels).map_err(failed)?;
+    writer.finish().map_err(failed)?;
+    Ok(bytes)
+}
+
+fn shade(share: f64) -> u8 {
+    let half = f64::from(SHADES / 2);
+    if share.is_finite() { 1 + (half + share.clamp(-1.0, 1.0) * half).round() as u8 } else { 0 }
 }
 
 #[cfg(test)]
