@@ -40,9 +40,7 @@ const MIN_DIRECTED_RAD: f64 = 0.1;
 /// How near a pose must be to count as the one wanted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
-    /// m.
     pub z_m: f64,
-    /// rad.
     pub theta_rad: f64,
     /// rad; `None` when every direction will do.
     pub azimuth_rad: Option<f64>,

@@ -34,8 +34,10 @@ struct Tuning {
     /// What frames are aligned to, and how
     #[arg(long, default_value = "best", value_parser = one_of::<Method, 4>([
         ("best", "What was measured to be best: model", Options::best),
-        ("paper", "The paper's: 3 cm voxels, exact nearest neighbours, frame to frame", paper),
-        ("projective", "Image blocks, neighbours by projection, frame to frame: the fastest", projective),
+        ("paper", "The paper's: 3 cm voxels, exact nearest neighbours, frame to frame",
+            || Options::paper(Weights::Model, Init::None)),
+        ("projective", "Image blocks, neighbours by projection, frame to frame: the fastest",
+            || Options { method: map::Method::Projective, ..Options::best() }),
         ("model", "Image blocks, neighbours by projection, frame to map", Options::best),
     ]))]
     method: Method,
@@ -84,14 +86,6 @@ struct Tuning {
 
 /// The options that a method begins with.
 type Method = fn() -> Options;
-
-fn paper() -> Options {
-    Options::paper(Weights::Model, Init::None)
-}
-
-fn projective() -> Options {
-    Options { method: map::Method::Projective, ..Options::best() }
-}
 
 impl Tuning {
     fn options(&self, seed: Seed) -> Options {
@@ -179,12 +173,11 @@ fn stats(
     against: &Option<Result<Evaluation, String>>,
     seconds: f64,
 ) -> Value {
-    let aligned: Vec<&Alignment> =
-        mapped.frames.iter().filter_map(|f| f.alignment.as_ref()).collect();
+    let aligned = || mapped.frames.iter().filter_map(|f| f.alignment.as_ref());
     let mean = |of: fn(&Alignment) -> f64| {
-        aligned.iter().map(|a| of(a)).sum::<f64>() / aligned.len().max(1) as f64
+        aligned().map(of).sum::<f64>() / aligned().count().max(1) as f64
     };
-    let min = |of: fn(&Alignment) -> f64| aligned.iter().map(|a| of(a)).fold(1.0, f64::min);
+    let min = |of: fn(&Alignment) -> f64| aligned().map(of).fold(1.0, f64::min);
     let all: Vec<Stages> = mapped.frames.iter().map(|f| f.stages.clone()).collect();
     let mut ms: serde_json::Map<String, Value> =
         Stages::medians(&all).each().map(|(name, v)| (name.to_string(), json!(v))).collect();

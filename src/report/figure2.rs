@@ -27,19 +27,20 @@ pub struct Overlay {
 impl Overlay {
     /// The paper's Eq. 1; Nguyen, Izadi and Lovell; Khoshelham and Elberink.
     pub const ALL: [Overlay; 3] = [
-        Overlay::new("eq1", "paper, Eq. 1", SigmaModel::paper, [9, 5]),
-        Overlay::new("nguyen", "Nguyen et al. 2012", SigmaModel::nguyen, [2, 4]),
-        Overlay::new("khoshelham", "Khoshelham 2012", SigmaModel::khoshelham, [15, 3]),
+        Overlay { id: "eq1", label: "paper, Eq. 1", model: SigmaModel::paper, dashes: [9, 5] },
+        Overlay {
+            id: "nguyen",
+            label: "Nguyen et al. 2012",
+            model: SigmaModel::nguyen,
+            dashes: [2, 4],
+        },
+        Overlay {
+            id: "khoshelham",
+            label: "Khoshelham 2012",
+            model: SigmaModel::khoshelham,
+            dashes: [15, 3],
+        },
     ];
-
-    const fn new(
-        id: &'static str,
-        label: &'static str,
-        model: fn() -> SigmaModel,
-        dashes: [i32; 2],
-    ) -> Self {
-        Overlay { id, label, model, dashes }
-    }
 }
 
 impl FromStr for Overlay {

@@ -117,7 +117,12 @@ fn load(options: &FreenectOptions) -> Result<(Freenect, Option<Dump>)> {
     for path in &candidates {
         let loaded = Freenect::load(path);
         let dump = match &loaded {
-            Ok(library) if library.is_stand_in() => Some(dump_to_play(options)?),
+            Ok(library) if library.is_stand_in() => {
+                let what = "this libfreenect is the stand-in, and FAKENECT_PATH does not say what it is to play";
+                let remedy = "set FAKENECT_PATH to a folder made by fakenect-record";
+                let root = options.dump.as_ref().ok_or_else(|| Error::sensor(what, remedy))?;
+                Some(Dump::open(root)?)
+            }
             _ => None,
         };
         match loaded.and_then(Freenect::start) {
@@ -127,15 +132,6 @@ fn load(options: &FreenectOptions) -> Result<(Freenect, Option<Dump>)> {
     }
     let why = first.unwrap_or_default();
     Err(Error::sensor(format!("libfreenect cannot be loaded ({why})"), INSTALL))
-}
-
-fn dump_to_play(options: &FreenectOptions) -> Result<Dump> {
-    let missing = || {
-        let what =
-            "this libfreenect is the stand-in, and FAKENECT_PATH does not say what it is to play";
-        Error::sensor(what, "set FAKENECT_PATH to a folder made by fakenect-record")
-    };
-    Dump::open(options.dump.as_ref().ok_or_else(missing)?)
 }
 
 /// Of the unit to open, where the library knows it.

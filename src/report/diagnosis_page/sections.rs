@@ -164,14 +164,9 @@ pub(super) fn cannot_tell(all: &[CannotTell]) -> Markup {
 pub(super) fn map(rows: &[MapRow]) -> Markup {
     let columns = [">", "what is off", "along", "where", ">size", ">chance"];
     let cells = |(i, r): (usize, &MapRow)| {
-        row![
-            i + 1,
-            capital(statistic(r.statistic)),
-            axis(r.axis),
-            interval(r.axis, r.interval, r.unit),
-            effect_size(r),
-            p_value(r.p_adjusted),
-        ]
+        let place = interval(r.axis, r.interval, r.unit);
+        let (what, size) = (capital(statistic(r.statistic)), effect_size(r));
+        row![i + 1, what, axis(r.axis), place, size, p_value(r.p_adjusted)]
     };
     let numbered = || rows.iter().enumerate();
     html! { @if !rows.is_empty() { section {
