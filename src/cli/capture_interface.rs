@@ -120,14 +120,13 @@ fn draw(lines: &[Line], bell: bool) -> std::io::Result<()> {
     let mut out = Vec::new();
     for (row, line) in (0..).zip(lines) {
         queue!(out, cursor::MoveTo(0, row), SetAttribute(Attribute::Reset))?;
-        match line.style {
-            Style::Plain => {}
-            Style::Loud => {
-                queue!(out, SetAttribute(Attribute::Bold), SetForegroundColor(Color::Yellow))?;
-            }
-            Style::Flash => {
-                queue!(out, SetAttribute(Attribute::Reverse), SetForegroundColor(Color::Green))?;
-            }
+        let style = match line.style {
+            Style::Plain => None,
+            Style::Loud => Some((Attribute::Bold, Color::Yellow)),
+            Style::Flash => Some((Attribute::Reverse, Color::Green)),
+        };
+        if let Some((attribute, colour)) = style {
+            queue!(out, SetAttribute(attribute), SetForegroundColor(colour))?;
         }
         // The rest of the line in the same style: a flash fills the screen.
         queue!(out, Print(&line.text), terminal::Clear(terminal::ClearType::UntilNewLine))?;

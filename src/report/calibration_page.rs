@@ -111,19 +111,15 @@ fn result(page: &CalibrationPage<'_>) -> Markup {
     let tilts = sigma.domain.theta_rad.map(f64::to_degrees);
     let poor = if calibration.fit.poor { ": a poor fit, see the warnings" } else { "" };
     let heldout = fit.heldout.map(|e| format!("{} % rms", fixed(100.0 * e, 1)));
+    let heldout = heldout.as_deref().unwrap_or("not known: too few distances");
+    let error = html! { (fixed(MM * fit.rmse_m, 2)) " mm rms, r² = " (fixed(fit.r2, 3)) (poor) };
     facts([
         ("views", html! { (used) }),
         ("distance z", html! { (range(sigma.domain.z_m, 2)) " m" }),
         ("tilt θ", html! { (range(tilts, 1)) "°" }),
         ("sigma is", html! { "measured " (direction) ", " (fit.samples) " cells" }),
-        (
-            "fit error",
-            html! { (fixed(MM * fit.rmse_m, 2)) " mm rms, r² = " (fixed(fit.r2, 3)) (poor) },
-        ),
-        (
-            "error at distances left out",
-            html! { (heldout.as_deref().unwrap_or("not known: too few distances")) },
-        ),
+        ("fit error", error),
+        ("error at distances left out", html! { (heldout) }),
     ])
 }
 
