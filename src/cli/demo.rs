@@ -34,21 +34,22 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         created: source_date(),
         ..CalibrateOptions::default()
     };
-    let done = calibrate(&recording, &options, &arguments.output, &[Overlay::PaperEq1])?;
+    let (measured, calibration) =
+        calibrate(&recording, &options, &arguments.output, &Overlay::ALL[..1])?;
+    let model = &calibration.model;
     say(format!(
         "The recording was made with the paper's Eq. 1, so the first two columns should agree.\nOpen {} to see it all.",
         arguments.output.join("report.html").display()
     ));
     say("\nIs there anything that this model leaves out? There should not be:");
     let diagnosis = arguments.output.join("diagnosis");
-    examine(&recording, None, &done.calibration.model, &diagnosis, global)?;
+    examine(&recording, None, model, &diagnosis, global)?;
     say(format!(
         "{} says how small an error would have been seen.",
         diagnosis.join("report.html").display()
     ));
-    let model = &done.calibration.model;
     mapped(&recording, model, &arguments.output, global)?;
-    global.print_json(&as_json(&done.calibration, Some(&done.measurements)))
+    global.print_json(&as_json(&calibration, Some(&measured)))
 }
 
 /// Frames of the film: two seconds.

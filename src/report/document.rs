@@ -57,6 +57,16 @@ pub fn table<C: AsRef<str>>(columns: &[C], rows: impl IntoIterator<Item = Vec<Ma
     }
 }
 
+/// A column's title, as of [`table`], and its cell in a row.
+pub(super) type Column<'a, T> = (&'a str, &'a dyn Fn(&T) -> Markup);
+
+/// A table with a row for each of some things.
+pub(super) fn table_of<T>(columns: &[Column<'_, T>], things: &[T]) -> Markup {
+    let titles: Vec<&str> = columns.iter().map(|(title, _)| *title).collect();
+    let cells = |thing| columns.iter().map(|(_, cell)| cell(thing)).collect();
+    table(&titles, things.iter().map(cells))
+}
+
 /// Class and title of a column.
 fn set(column: &str) -> (Option<&'static str>, &str) {
     match (column.strip_prefix('>'), column.strip_prefix('~')) {
