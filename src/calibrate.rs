@@ -19,12 +19,11 @@ use crate::model::{
     Direction, FitSummary, Form, HeldOut, NoiseModel, Provenance, SigmaFit, SigmaModel,
     compare_forms, sort_out,
 };
+use crate::rng::Seed;
 use crate::view::{Excluded, Recording, RecordingFile};
 
-/// Settings of a calibration.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CalibrateOptions {
-    /// How views are measured.
     pub measure: MeasureOptions,
     /// Which standard deviation the model describes.
     pub kind: SigmaKind,
@@ -49,25 +48,20 @@ pub struct Measurements {
     pub excluded: Vec<Excluded>,
 }
 
-/// A calibrated sensor.
 #[derive(Debug, Clone)]
 pub struct Calibration {
     /// What was fitted to.
     pub table: SigmaTable,
-    /// The fit with its diagnostics.
     pub fit: SigmaFit,
     /// How well each form predicts distances left out, best first; empty with too few distances.
     pub comparison: Vec<HeldOut>,
-    /// What is exchanged with other programs.
     pub model: NoiseModel,
     /// What to know before trusting it, the most important first.
     pub warnings: Vec<String>,
 }
 
 /// Measure every view. A view without a plane is excluded, with its reason; `progress` counts views.
-///
-/// # Errors
-/// When no view can be measured at all; the message gives the first reason.
+/// An error when no view can be measured at all; the message gives the first reason.
 pub fn measure(
     recording: &Recording,
     options: &MeasureOptions,
@@ -93,10 +87,9 @@ pub fn measure(
         }
     }
     if measurements.views.is_empty() {
-        let first = measurements.excluded.first().map_or_else(
-            || "there is no view".to_string(),
-            |e| format!("view {}: {}", e.view, e.reason),
-        );
+        let first = measurements.excluded.first();
+        let first = first.map(|e| format!("view {}: {}", e.view, e.reason));
+        let first = first.unwrap_or_else(|| "there is no view".to_string());
         return Err(Error::recording(
             &recording.root,
             format!("no view of {total} can be used; the first: {first}"),
@@ -107,9 +100,7 @@ pub fn measure(
 }
 
 /// Fit the noise model to the measured views.
-///
-/// # Errors
-/// When the views are too few or too alike for the form, or a file that describes them is gone.
+/// An error when the views are too few or too alike for the form, or a description is gone.
 pub fn model_of(
     recording: &Recording,
     measurements: &Measurements,
@@ -137,36 +128,36 @@ pub fn model_of(
     Ok(Calibration { table, fit, comparison, model, warnings })
 }
 
-/// [`model_of`], going on with other forms where the one asked for has no positive fit; the model's
-/// remarks then say so. The last, k z^2, fits any sigmas there are.
+/// The paper's form of sigma for a recording that comes without a model; where it has no positive fit,
+/// another form, which the model's first remark says. The last of them, k z^2, fits any sigmas.
 ///
 /// # Errors
-/// Those of the form asked for, where no form can be fitted.
-pub fn model_of_any_form(
+/// As [`measure`] and [`model_of`].
+pub fn paper_model(
     recording: &Recording,
-    measurements: &Measurements,
-    options: &CalibrateOptions,
-) -> Result<Calibration> {
-    let first = match model_of(recording, measurements, options) {
+    seed: Seed,
+    created: Option<SystemTime>,
+    progress: Progress<'_>,
+) -> Result<NoiseModel> {
+    let mut options = CalibrateOptions { form: Some(Form::Paper), created, ..Default::default() };
+    options.measure.seed = seed;
+    let views = measure(recording, &options.measure, progress)?;
+    let first = match model_of(recording, &views, &options) {
         Err(why) => why,
-        calibration => return calibration,
+        Ok(calibration) => return Ok(calibration.model),
     };
-    let others = [Form::Nguyen, Form::Disparity, Form::Khoshelham];
-    for form in others.into_iter().filter(|f| Some(*f) != options.form) {
-        let options = CalibrateOptions { form: Some(form), ..options.clone() };
-        if let Ok(mut calibration) = model_of(recording, measurements, &options) {
+    for form in [Form::Nguyen, Form::Disparity, Form::Khoshelham] {
+        options.form = Some(form);
+        if let Ok(Calibration { mut model, .. }) = model_of(recording, &views, &options) {
             let note = format!("sigma was fitted with the form \"{form}\": {first}");
-            calibration.model.fit.remarks.insert(0, note);
-            return Ok(calibration);
+            model.fit.remarks.insert(0, note);
+            return Ok(model);
         }
     }
     Err(first)
 }
 
 /// Fit a bare table that was read from `source`; of the options only `form` and `created` count.
-///
-/// # Errors
-/// As [`model_of`].
 pub fn model_of_table(
     table: &SigmaTable,
     source: &Path,
@@ -197,10 +188,8 @@ fn noise_model(
     kind: SigmaKind,
     provenance: Provenance,
 ) -> NoiseModel {
-    let direction = match kind {
-        SigmaKind::Paper => Direction::Perpendicular,
-        SigmaKind::Spatial | SigmaKind::Temporal | SigmaKind::Total => Direction::Axial,
-    };
+    let across = kind == SigmaKind::Paper;
+    let direction = if across { Direction::Perpendicular } else { Direction::Axial };
     NoiseModel {
         sensor,
         sigma: SigmaModel { direction, ..fit.model() },
@@ -208,8 +197,8 @@ fn noise_model(
         fit: FitSummary {
             views: fit.views,
             samples: fit.rows,
-            rmse_m: fit.rmse_m,
-            r2: fit.r2,
+            rmse_m: fit.quality.rmse_m,
+            r2: fit.quality.r2,
             heldout: comparison.iter().find(|h| h.form == fit.form).map(|h| h.rmse_relative),
             remarks: fit.remarks.clone(),
         },
@@ -230,16 +219,11 @@ fn describe(options: &CalibrateOptions, form: Form) -> Map<String, Value> {
         "ransac_threshold_m": options.measure.ransac_threshold_m,
         "ransac_iterations": options.measure.ransac_iterations,
     });
-    match value {
-        Value::Object(map) => map,
-        _ => Map::new(),
-    }
+    value.as_object().cloned().unwrap_or_default()
 }
 
-/// Hash of the description files, and of every view's frames.
-///
-/// # Errors
-/// When a description file can no longer be read: a hash of nothing would vouch for the wrong input.
+/// Hash of the description files, and of every view's frames. An error when one can no longer be
+/// read: a hash of nothing would vouch for the wrong input.
 fn hashes(recording: &Recording, measurements: &Measurements) -> Result<Map<String, Value>> {
     let mut map = Map::new();
     let mut described = Sha256::new();
@@ -260,10 +244,7 @@ fn hashes(recording: &Recording, measurements: &Measurements) -> Result<Map<Stri
 
 /// What a person should know before trusting the model, the most important first.
 fn warnings_of(recording: &Recording, measurements: &Measurements, fit: &SigmaFit) -> Vec<String> {
-    let mut warnings = Vec::new();
-    for e in &measurements.excluded {
-        warnings.push(e.to_string());
-    }
+    let mut warnings: Vec<String> = measurements.excluded.iter().map(ToString::to_string).collect();
     // Views left out while opening stand here too.
     warnings.extend(recording.remarks.iter().cloned());
     let total = measurements.views.len();

@@ -13,16 +13,7 @@ pub enum Error {
     /// chain of causes would say it twice.
     #[error("{}: {cause}; {remedy}", path.display())]
     Io { path: PathBuf, cause: std::io::Error, remedy: &'static str },
-    /// A file that is not the JSON it should be.
-    #[error("{}{}: {what}; {remedy}", path.display(), at_line(*line))]
-    Json {
-        path: PathBuf,
-        /// 1-based; 0 when the whole document is meant.
-        line: usize,
-        what: String,
-        remedy: &'static str,
-    },
-    /// A line of a text file (`depth.txt`, `INDEX.txt`, a table) that cannot be understood.
+    /// A line of a text file (JSON, `depth.txt`, a table) that is not understood; 0 is all of it.
     #[error("{}{}: {what}; {remedy}", path.display(), at_line(*line))]
     Text { path: PathBuf, line: usize, what: String, remedy: &'static str },
     /// An image that is damaged or not of the promised kind.
@@ -54,7 +45,11 @@ pub enum Error {
     Solver { what: String, remedy: &'static str },
 }
 
-/// With this library's [`Error`].
+/// The text of a file.
+pub(crate) fn read_text(path: &Path) -> Result<String> {
+    std::fs::read_to_string(path).map_err(|e| Error::read(path, e))
+}
+
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 fn at_line(line: usize) -> String {
@@ -63,19 +58,22 @@ fn at_line(line: usize) -> String {
 
 impl Error {
     pub fn read(path: &Path, cause: std::io::Error) -> Self {
-        Error::Io {
-            path: path.to_path_buf(),
-            cause,
-            remedy: "check that the path is right and readable",
-        }
+        let remedy = "check that the path is right and readable";
+        Error::Io { path: path.to_path_buf(), cause, remedy }
     }
 
     pub fn write(path: &Path, cause: std::io::Error) -> Self {
-        Error::Io {
-            path: path.to_path_buf(),
-            cause,
-            remedy: "choose a folder that can be written (-o of most commands)",
-        }
+        let remedy = "choose a folder that can be written (-o of most commands)";
+        Error::Io { path: path.to_path_buf(), cause, remedy }
+    }
+
+    pub(crate) fn text(
+        path: &Path,
+        line: usize,
+        what: impl Into<String>,
+        remedy: &'static str,
+    ) -> Self {
+        Error::Text { path: path.to_path_buf(), line, what: what.into(), remedy }
     }
 
     pub fn recording(path: &Path, what: impl Into<String>, remedy: &'static str) -> Self {

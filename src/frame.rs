@@ -7,9 +7,7 @@ use crate::units::shortest;
 /// One depth image: 16-bit raw values, row-major, still in the sensor's own code.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    /// Columns, px.
     pub width: usize,
-    /// Rows, px.
     pub height: usize,
     /// Raw values, `width * height` of them; [`DepthCode`] turns them into metres.
     pub raw: Vec<u16>,
@@ -20,7 +18,6 @@ pub struct Frame {
 pub enum DepthCode {
     /// z = raw / units_per_metre (5000 in the TUM layout, 1000 for OpenNI and ROS).
     Metric {
-        /// Raw units a metre, 1/m.
         units_per_metre: f64,
         /// The raw value for "no measurement"; 0 is one too.
         invalid: u16,
@@ -31,7 +28,6 @@ pub enum DepthCode {
         offset: f64,
         /// Inverse depth a raw unit, 1/m; negative for a Kinect v1.
         slope: f64,
-        /// The raw value for "no measurement".
         invalid: u16,
     },
 }
@@ -39,11 +35,8 @@ pub enum DepthCode {
 /// The JSON face of [`DepthCode::Disparity`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RawDisparity {
-    /// Inverse depth of the raw value 0, 1/m.
     pub offset: f64,
-    /// Inverse depth a raw unit, 1/m.
     pub slope: f64,
-    /// The raw value for "no measurement".
     #[serde(default = "default_invalid_disparity")]
     pub invalid: u16,
 }
@@ -130,7 +123,6 @@ impl DepthCode {
 /// before it would otherwise count as walls a kilometre away.
 pub(crate) const FARTHEST_M: f64 = 100.0;
 
-/// Look-up from raw value to depth.
 #[derive(Debug, Clone)]
 pub struct DepthTable {
     metres: Vec<f32>,

@@ -9,7 +9,6 @@
 
 use crate::plane::Plane;
 
-/// Measured minus expected depth, m.
 #[inline]
 pub fn axial(z: f64, plane: &Plane, x: f64, y: f64) -> f64 {
     z - plane.depth(x, y)

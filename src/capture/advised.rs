@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::wanted::{Pose, Tolerance, Wanted, WantedView};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, read_text};
 
 /// What of `diagnosis.json` matters here.
 #[derive(Deserialize)]
@@ -41,8 +41,8 @@ impl Wanted {
     /// # Errors
     /// When it is no diagnosis, advises nothing, or a pose that cannot be.
     pub fn advised(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
-        let refuse = |line: usize, what: String, remedy: &'static str| Error::Json {
+        let text = read_text(path)?;
+        let refuse = |line: usize, what: String, remedy: &'static str| Error::Text {
             path: path.into(),
             line,
             what,
@@ -53,11 +53,21 @@ impl Wanted {
             serde_json::from_str(&text).map_err(|e| refuse(e.line(), e.to_string(), remedy))?;
         let mut views: Vec<WantedView> = Vec::new();
         for next in diagnosis.findings.into_iter().filter_map(|f| f.next_view) {
-            if !next.is_possible() {
-                let what = format!("no board stands at {} m, {} rad", next.z_m, next.theta_rad);
+            let NextView { z_m, theta_rad, azimuth_rad, why } = next;
+            let possible = (0.1..=9.99).contains(&z_m)
+                && (0.0..=88f64.to_radians()).contains(&theta_rad)
+                && azimuth_rad.abs() < 100.0;
+            if !possible {
+                let what = format!("no board stands at {z_m} m, {theta_rad} rad");
                 return Err(refuse(0, what, remedy));
             }
-            let mut view = next.into_wanted();
+            let tolerance = Tolerance {
+                z_m: 0.1 * z_m,
+                theta_rad: 5f64.to_radians(),
+                azimuth_rad: Some(20f64.to_radians()),
+            };
+            let pose = Pose { z_m, theta_rad, azimuth_rad };
+            let mut view = WantedView::new(pose, tolerance, Some(why));
             view.name = unseen(&view.name, &diagnosis.views);
             if views.iter().all(|v| v.name != view.name) {
                 views.push(view);
@@ -71,29 +81,11 @@ impl Wanted {
     }
 }
 
-impl NextView {
-    fn is_possible(&self) -> bool {
-        (0.1..=9.99).contains(&self.z_m)
-            && (0.0..=88f64.to_radians()).contains(&self.theta_rad)
-            && self.azimuth_rad.abs() < 100.0
-    }
-
-    fn into_wanted(self) -> WantedView {
-        let NextView { z_m, theta_rad, azimuth_rad, why } = self;
-        let tolerance = Tolerance {
-            z_m: 0.1 * z_m,
-            theta_rad: 5f64.to_radians(),
-            azimuth_rad: Some(20f64.to_radians()),
-        };
-        WantedView::new(Pose { z_m, theta_rad, azimuth_rad }, tolerance, Some(why))
-    }
-}
-
 /// `name`, or `name-2` and on, whichever is none of the views seen.
 fn unseen(name: &str, seen: &[KnownView]) -> String {
     let is_new = |candidate: &String| seen.iter().all(|v| v.name != *candidate);
     let numbered = (2..seen.len() + 3).map(|n| format!("{name}-{n}"));
-    std::iter::once(name.to_string()).chain(numbered).find(is_new).unwrap_or_default()
+    [name.to_string()].into_iter().chain(numbered).find(is_new).unwrap_or_default()
 }
 
 #[cfg(test)]

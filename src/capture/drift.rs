@@ -30,61 +30,46 @@ impl Drift {
     }
 }
 
-/// Fits a line to inverse depth over time, by sums.
+/// Fits a line to inverse depth over time.
 #[derive(Debug, Clone, Default)]
 pub struct DriftMonitor {
-    first: Option<(f64, f64)>,
-    last_t: f64,
-    n: f64,
-    t: f64,
-    w: f64,
-    tt: f64,
-    tw: f64,
-    ww: f64,
+    /// Time, s, and inverse depth on the axis, 1/m.
+    points: Vec<(f64, f64)>,
     reported_at_s: f64,
 }
 
 impl DriftMonitor {
-    /// One frame: time, s, and inverse depth on the axis, 1/m. The drift is reported after 20 s
-    /// of stillness, and again whenever the time has doubled.
+    /// One frame. The drift is reported after 20 s of stillness, and again whenever the time has
+    /// doubled.
     pub fn add(&mut self, stamp: f64, inverse_depth: f64) -> Option<Drift> {
-        let (t0, w0) = *self.first.get_or_insert((stamp, inverse_depth));
-        // Sums about the first point keep their digits.
-        let (t, w) = (stamp - t0, inverse_depth - w0);
-        self.n += 1.0;
-        self.t += t;
-        self.w += w;
-        self.tt += t * t;
-        self.tw += t * w;
-        self.ww += w * w;
-        self.last_t = t;
-        if t < MIN_S.max(2.0 * self.reported_at_s) {
+        self.points.push((stamp, inverse_depth));
+        let seconds = stamp - self.points[0].0;
+        if seconds < MIN_S.max(2.0 * self.reported_at_s) {
             return None;
         }
-        self.reported_at_s = t;
+        self.reported_at_s = seconds;
         self.drift()
     }
 
     /// As far as is known.
     pub fn drift(&self) -> Option<Drift> {
-        let (_, w0) = self.first?;
-        let n = self.n;
-        let spread = self.tt - self.t * self.t / n;
-        if self.last_t < MIN_S || n < 10.0 || spread <= 0.0 {
+        let seconds = self.points.last()?.0 - self.points[0].0;
+        let n = self.points.len() as f64;
+        let mean = |of: &dyn Fn(f64, f64) -> f64| {
+            self.points.iter().map(|&(t, w)| of(t, w)).sum::<f64>() / n
+        };
+        let (t, w) = (mean(&|t, _| t), mean(&|_, w| w));
+        let spread = mean(&|ti, _| (ti - t).powi(2));
+        if seconds < MIN_S || n < 10.0 || spread <= 0.0 {
             return None;
         }
-        let together = self.tw - self.t * self.w / n;
-        let slope = together / spread;
-        let left = (self.ww - self.w * self.w / n - slope * together).max(0.0);
+        let slope = mean(&|ti, wi| (ti - t) * (wi - w)) / spread;
+        let left = mean(&|ti, wi| (wi - w - slope * (ti - t)).powi(2));
         let error = (left / (n - 2.0) / spread).sqrt();
-        let z_m = 1.0 / (w0 + self.w / n);
+        let z_m = 1.0 / w;
         let per_minute = 60.0 * z_m * z_m;
-        Some(Drift {
-            per_minute_m: -slope * per_minute,
-            std_error_m: error * per_minute,
-            z_m,
-            seconds: self.last_t,
-        })
+        let (per_minute_m, std_error_m) = (-slope * per_minute, error * per_minute);
+        Some(Drift { per_minute_m, std_error_m, z_m, seconds })
     }
 }
 

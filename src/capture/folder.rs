@@ -36,8 +36,8 @@ impl Growing {
             return Err(Error::recording(root, "there is no such folder", remedy));
         }
         let (sensor, remarks) = describe_folder(root, first_size(root, patience)?, assumed)?;
-        let (seen, waiting) = (BTreeSet::new(), Vec::new());
-        Ok(Growing { root: root.into(), sensor, seen, waiting, remarks })
+        let seen = BTreeSet::new();
+        Ok(Growing { root: root.into(), sensor, seen, waiting: Vec::new(), remarks })
     }
 
     /// The next image, when it can be read; younger ones wait for it.
@@ -71,17 +71,8 @@ impl Source for Growing {
         &self.sensor
     }
 
-    fn next(&mut self, wait: Duration) -> Result<Arrival> {
-        let begun = Instant::now();
-        loop {
-            if let Some(frame) = self.frame() {
-                return Ok(Arrival::Frame(frame));
-            }
-            if begun.elapsed() >= wait {
-                return Ok(Arrival::Nothing);
-            }
-            std::thread::sleep(POLL);
-        }
+    fn next(&mut self, wait: Duration) -> Arrival {
+        poll(wait, || self.frame()).map_or(Arrival::Nothing, Arrival::Frame)
     }
 
     fn remarks(&self) -> &[String] {
@@ -91,17 +82,21 @@ impl Source for Growing {
 
 /// Size of the first image that can be read, px.
 fn first_size(root: &Path, patience: Duration) -> Result<(usize, usize)> {
+    let size = || images(root).iter().find_map(|p| size_of(p).ok());
+    poll(patience, size).ok_or_else(|| {
+        let what = format!("no depth image in {} s", patience.as_secs());
+        let remedy = "start the program that writes 16-bit PNGs (or fakenect-record) into it";
+        Error::recording(root, what, remedy)
+    })
+}
+
+/// Look again and again until there is something, for so long.
+fn poll<T>(wait: Duration, mut look: impl FnMut() -> Option<T>) -> Option<T> {
     let begun = Instant::now();
     loop {
-        if let Some(size) = images(root).iter().find_map(|p| size_of(p).ok()) {
-            return Ok(size);
-        }
-        if begun.elapsed() > patience {
-            return Err(Error::recording(
-                root,
-                format!("no depth image in {} s", patience.as_secs()),
-                "start the program that writes 16-bit PNGs (or fakenect-record) into it",
-            ));
+        let found = look();
+        if found.is_some() || begun.elapsed() >= wait {
+            return found;
         }
         std::thread::sleep(POLL);
     }

@@ -89,10 +89,7 @@ impl Guide {
         let mut events = Vec::new();
         self.sighting = sighting;
         if !self.is_still() {
-            let why = match &self.sighting {
-                Ok(_) => "the target moved".into(),
-                Err(why) => why.clone(),
-            };
+            let why = self.sighting.clone().err().unwrap_or_else(|| "the target moved".into());
             events.extend(self.abandon(&why));
         }
         if let Ok(seen) = &self.sighting {
@@ -108,43 +105,31 @@ impl Guide {
 
     /// Is the target where it was? If not, stillness begins anew.
     fn is_still(&mut self) -> bool {
-        let Ok(seen) = &self.sighting else {
-            self.still = None;
-            self.drift = DriftMonitor::default();
-            return false;
-        };
-        match &mut self.still {
-            Some((anchor, frames)) if seen.moved_since(anchor) < MAX_STILL_PER_M => {
-                *frames += 1;
-                true
-            }
-            _ => {
-                self.still = Some((seen.clone(), 1));
-                self.drift = DriftMonitor::default();
-                false
-            }
+        if let (Ok(seen), Some((anchor, frames))) = (&self.sighting, &mut self.still)
+            && seen.moved_since(anchor) < MAX_STILL_PER_M
+        {
+            *frames += 1;
+            return true;
         }
+        self.still = self.sighting.clone().ok().map(|seen| (seen, 1));
+        self.drift = DriftMonitor::default();
+        false
     }
 
     fn shoot(&mut self, events: &mut Vec<Event>) {
-        let taking = match self.taking {
-            Some(taking) => taking,
-            None => {
-                let Some(taking) = self.begin() else { return };
-                events.push(Event::Begun(self.name(taking.view)));
-                taking
-            }
-        };
-        events.push(Event::Keep);
-        let kept = taking.kept + 1;
-        if kept < self.shutter.frames {
-            self.taking = Some(Taking { kept, ..taking });
-            return;
+        if self.taking.is_none() {
+            self.taking = self.begin();
+            events.extend(self.taking.map(|t| Event::Begun(self.name(t.view))));
         }
-        self.taking = None;
-        self.last = Some(taking.view);
-        self.wanted.views[taking.view].state = ViewState::Taken;
-        events.push(Event::Finished(self.name(taking.view)));
+        let Some(taking) = &mut self.taking else { return };
+        taking.kept += 1;
+        events.push(Event::Keep);
+        if taking.kept >= self.shutter.frames {
+            let view = taking.view;
+            (self.taking, self.last) = (None, Some(view));
+            self.wanted.views[view].state = ViewState::Taken;
+            events.push(Event::Finished(self.name(view)));
+        }
     }
 
     /// A view begins when the target has been still for long enough where one is wanted.
@@ -173,13 +158,9 @@ impl Guide {
     fn suggest(&mut self) {
         let pose = self.pose();
         let best = self.wanted.suggestion(pose.as_ref());
-        let (Some(now), Some(new)) = (self.suggestion, best) else {
-            self.suggestion = best;
-            return;
-        };
-        let open = |i: usize| self.wanted.views.get(i).filter(|v| v.is_open());
-        let keep = match (open(now), open(new), pose) {
-            (Some(_), _, None) => true,
+        let open = |i: Option<usize>| self.wanted.views.get(i?).filter(|v| v.is_open());
+        let keep = match (open(self.suggestion), open(best), pose) {
+            (Some(_), Some(_), None) => true,
             (Some(old), Some(new), Some(pose)) => old.distance(&pose) < 2.0 * new.distance(&pose),
             _ => false,
         };
@@ -193,13 +174,13 @@ impl Guide {
         match command {
             Command::Again => self.again(),
             Command::Skip => self.skip().into_iter().collect(),
-            Command::Quit => self.leave("stopped").into_iter().collect(),
+            Command::Quit => self.leave().into_iter().collect(),
         }
     }
 
     /// The capture ends here: half a view is none.
-    pub fn leave(&mut self, why: &str) -> Option<Event> {
-        self.abandon(why)
+    pub fn leave(&mut self) -> Option<Event> {
+        self.abandon("stopped")
     }
 
     fn again(&mut self) -> Vec<Event> {

@@ -18,10 +18,10 @@ mod run;
 mod screen;
 mod session;
 mod source;
-mod threaded;
 mod wanted;
 mod watch;
 
+pub use advice::far_side;
 pub use drift::Drift;
 pub use folder::Growing;
 pub use freenect::{FreenectOptions, FreenectSource};
@@ -31,6 +31,5 @@ pub use run::{Ending, Interface, Outcome, capture};
 pub use screen::{Line, Status, Style, render};
 pub use session::Session;
 pub use source::{Arrival, End, LiveFrame, Source};
-pub use threaded::Threaded;
 pub use wanted::{PAPER_DISTANCES_M, PAPER_TILTS_DEG, Pose, ViewState, Wanted, WantedView};
 pub use watch::{Sighting, Watcher};

@@ -33,12 +33,11 @@ impl Playback {
         let recording = open_uncut(root, assumed)?;
         let mut frames: Vec<(FrameRef, Option<FrameRef>)> = Vec::new();
         for view in recording.views {
-            let mut infrared = view.infrared.into_iter().peekable();
-            for depth in view.depth {
-                while infrared.next_if(|i| i.timestamp < depth.timestamp).is_some() {}
-                let own = infrared.next_if(|i| i.timestamp == depth.timestamp);
-                frames.push((depth, own));
-            }
+            let infrared = |stamp: f64| {
+                let found = view.infrared.binary_search_by(|i| i.timestamp.total_cmp(&stamp));
+                Some(view.infrared[found.ok()?].clone())
+            };
+            frames.extend(view.depth.into_iter().map(|d| (d.clone(), infrared(d.timestamp))));
         }
         frames.sort_by(|a, b| a.0.timestamp.total_cmp(&b.0.timestamp));
         let mut remarks = recording.remarks;
@@ -57,13 +56,13 @@ impl Playback {
 
     /// An infrared image of the depth frame's size, or none.
     fn amplitude(&mut self, path: &Path, depth: &Frame) -> Option<Frame> {
-        let size = (depth.width, depth.height);
         let why = match InfraredImage::read(path) {
-            Ok(image) if (image.width, image.height) == size => {
-                let InfraredImage { width, height, amplitude } = image;
-                return Some(Frame { width, height, raw: amplitude });
+            Ok(InfraredImage { width, height, amplitude }) => {
+                if (width, height) == (depth.width, depth.height) {
+                    return Some(Frame { width, height, raw: amplitude });
+                }
+                format!("{}: {width} x {height} px", path.display())
             }
-            Ok(image) => format!("{}: {} x {} px", path.display(), image.width, image.height),
             Err(e) => e.to_string(),
         };
         self.remarks.push(format!("infrared left out: {why}"));
@@ -84,20 +83,20 @@ impl Source for Playback {
         &self.sensor
     }
 
-    fn next(&mut self, _wait: Duration) -> Result<Arrival> {
+    fn next(&mut self, _wait: Duration) -> Arrival {
         while let Some((depth, infrared)) = self.frames.next() {
             match self.images.read(&depth.path) {
                 Ok(frame) => {
                     self.keep_pace(depth.timestamp);
                     let infrared = infrared.and_then(|i| self.amplitude(&i.path, &frame));
                     let stamp = depth.timestamp;
-                    return Ok(Arrival::Frame(LiveFrame { stamp, depth: frame, infrared }));
+                    return Arrival::Frame(LiveFrame { stamp, depth: frame, infrared });
                 }
                 Err(e) => self.remarks.push(format!("frame left out: {e}")),
             }
         }
         let why = format!("{} was played to its end", self.root.display());
-        Ok(Arrival::End(End { why, lost: false }))
+        Arrival::End(End { why, lost: false })
     }
 
     fn remarks(&self) -> &[String] {

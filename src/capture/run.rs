@@ -1,5 +1,6 @@
 //! The loop: a frame comes, is looked at, and what the guide says about it is done.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::guide::{Command, Event, Guide};
@@ -11,20 +12,19 @@ use crate::view::ViewNotes;
 
 /// Where people follow a capture and steer it: a screen with keys, or a log.
 pub trait Interface {
-    /// Something happened.
-    fn event(&mut self, event: &Event);
+    /// Something happened, and the guide knows of it.
+    fn event(&mut self, event: &Event, guide: &Guide);
 
     /// A frame was dealt with.
-    fn frame(&mut self, guide: &Guide);
+    fn frame(&mut self, _guide: &Guide) {}
 
     /// There has been no frame for so long.
-    fn waiting(&mut self, guide: &Guide, silence: Duration);
+    fn waiting(&mut self, _guide: &Guide, _silence: Duration) {}
 
     /// What a person asks for, if anything.
-    fn command(&mut self) -> Option<Command>;
-
-    /// Must all end now (Ctrl-C)?
-    fn interrupted(&self) -> bool;
+    fn command(&mut self) -> Option<Command> {
+        None
+    }
 }
 
 /// How a capture came to its end.
@@ -40,7 +40,7 @@ pub enum Ending {
     Ended(End),
     /// No frame for so long.
     Stalled(Duration),
-    /// The disk or the source failed.
+    /// The disk failed.
     Failed(Error),
 }
 
@@ -57,29 +57,36 @@ pub struct Outcome {
 /// How long one wait for a frame lasts: keys are answered between two.
 const WAIT: Duration = Duration::from_millis(50);
 
-/// Take views until nothing is wanted, or something ends it. Finished views are kept whatever
-/// happens; `patience` is how long a stream may stand still.
+/// Take views until nothing is wanted, or something ends it, such as `stop` (Ctrl-C). Finished views
+/// are kept whatever happens; `patience` is how long a stream may stand still.
 pub fn capture(
     source: &mut dyn Source,
     session: &mut Session,
     guide: &mut Guide,
     interface: &mut dyn Interface,
     patience: Duration,
+    stop: &AtomicBool,
 ) -> Outcome {
     let watcher = Watcher::new(source.sensor());
     let last_frame = Instant::now();
     let (finished, frames) = (Vec::new(), 0);
     let mut run = Run { session, guide, interface, watcher, last_frame, finished, frames };
+    let stopped = || stop.load(Ordering::Relaxed);
     let ending = loop {
+        if stopped() {
+            break Ending::Interrupted;
+        }
         match run.step(source, patience) {
             Ok(None) => {}
+            // A signal may have woken the library.
+            Ok(Some(Ending::Ended(_))) if stopped() => break Ending::Interrupted,
             Ok(Some(ending)) => break ending,
             Err(e) => break Ending::Failed(e),
         }
     };
     let Run { session, guide, finished, frames, .. } = run;
     session.abandon();
-    guide.leave("stopped");
+    guide.leave();
     Outcome { ending, finished, frames }
 }
 
@@ -96,9 +103,6 @@ struct Run<'a> {
 impl Run<'_> {
     /// Answer a key, then look at a frame; does either end the capture?
     fn step(&mut self, source: &mut dyn Source, patience: Duration) -> Result<Option<Ending>> {
-        if self.interface.interrupted() {
-            return Ok(Some(Ending::Interrupted));
-        }
         if let Some(command) = self.interface.command() {
             let events = self.guide.obey(command);
             self.act(&events, None)?;
@@ -112,19 +116,12 @@ impl Run<'_> {
         let arrival = newest(source, self.guide.taking().is_some());
         let silence = self.last_frame.elapsed();
         match arrival {
-            Ok(Arrival::Frame(frame)) => self.look(&frame),
-            Ok(Arrival::Nothing) if silence > patience => Ok(Some(Ending::Stalled(patience))),
-            Ok(Arrival::Nothing) => {
-                self.interface.waiting(self.guide, silence);
-                Ok(None)
-            }
-            // A signal may have woken the library.
-            Ok(Arrival::End(_)) | Err(_) if self.interface.interrupted() => {
-                Ok(Some(Ending::Interrupted))
-            }
-            Ok(Arrival::End(end)) => Ok(Some(Ending::Ended(end))),
-            Err(e) => Err(e),
+            Arrival::Frame(frame) => return self.look(&frame),
+            Arrival::End(end) => return Ok(Some(Ending::Ended(end))),
+            Arrival::Nothing if silence > patience => return Ok(Some(Ending::Stalled(patience))),
+            Arrival::Nothing => self.interface.waiting(self.guide, silence),
         }
+        Ok(None)
     }
 
     fn look(&mut self, frame: &LiveFrame) -> Result<Option<Ending>> {
@@ -154,20 +151,20 @@ impl Run<'_> {
                 }
                 Event::Drift(_) | Event::Done => {}
             }
-            self.interface.event(event);
+            self.interface.event(event, self.guide);
         }
         Ok(())
     }
 }
 
 /// The next frame; of a live sensor, the newest, unless every one is wanted.
-fn newest(source: &mut dyn Source, every: bool) -> Result<Arrival> {
-    let mut arrival = source.next(WAIT)?;
+fn newest(source: &mut dyn Source, every: bool) -> Arrival {
+    let mut arrival = source.next(WAIT);
     while source.live() && !every && matches!(arrival, Arrival::Frame(_)) {
-        match source.next(Duration::ZERO)? {
+        match source.next(Duration::ZERO) {
             Arrival::Nothing => break,
             newer => arrival = newer,
         }
     }
-    Ok(arrival)
+    arrival
 }

@@ -45,17 +45,16 @@ const KEYS: &str = "r throw the last one away, take it again   s skip this one  
 /// Lines for a terminal of this many columns and rows.
 pub fn render(guide: &Guide, status: &Status, columns: usize, rows: usize) -> Vec<Line> {
     let Advice { word, sentence } = match (&status.flash, status.silent_s) {
-        (Some(view), _) => {
-            Advice { word: "TAKEN".into(), sentence: format!("{view} is on the disk") }
+        (Some(view), _) => Advice::new("TAKEN", format!("{view} is on the disk")),
+        (None, Some(s)) => {
+            let look = "look at the cable, the power, the other program";
+            Advice::new("NO FRAMES", format!("none for {s} s: {look}"))
         }
-        (None, Some(s)) => Advice {
-            word: "NO FRAMES".into(),
-            sentence: format!("none for {s} s: look at the cable, the power, the other program"),
-        },
         (None, None) => Advice::of(guide),
     };
     let plain = |text: String| Line { text, style: Style::Plain };
-    let mut lines = vec![plain(title(guide, &status.title))];
+    let mut lines =
+        vec![plain(format!("{} views taken   {}", guide.wanted().progress(), status.title))];
     lines.extend(big(&word, columns).into_iter().map(|text| Line { text, style: Style::Loud }));
     lines.push(plain(sentence));
     lines.extend(big(&pose(guide), columns).into_iter().map(plain));
@@ -95,13 +94,6 @@ fn big(text: &str, columns: usize) -> Vec<String> {
         letters.iter().map(of).collect::<Vec<String>>().concat()
     };
     (0..DOTS).step_by(2).map(row).collect()
-}
-
-fn title(guide: &Guide, title: &str) -> String {
-    let wanted = guide.wanted();
-    let taken = wanted.count(ViewState::Taken);
-    let of = if wanted.any { String::new() } else { format!(" of {}", wanted.views.len()) };
-    format!("{taken}{of} views taken   {title}")
 }
 
 fn pose(guide: &Guide) -> String {

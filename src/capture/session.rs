@@ -1,17 +1,15 @@
 //! A recording on the disk that grows view by view: each is whole or not there.
 
-use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
 use super::source::LiveFrame;
 use crate::error::{Error, Result};
-use crate::frame::Frame;
 use crate::io::{
     DEPTH_LIST, DESCRIPTION, encode_png16_quickly, entries, read_description, refuse_full,
     write_recording_file, write_view_notes,
 };
-use crate::view::{RecordingFile, Sensor, ViewNotes};
+use crate::view::{Sensor, ViewNotes};
 
 /// Unfinished views stand in here; readers look for a depth list one level higher.
 const PARTIAL: &str = ".partial";
@@ -31,8 +29,9 @@ pub struct Session {
 struct PartialView {
     name: String,
     folder: PathBuf,
-    depth: ImageList,
-    infrared: ImageList,
+    frames: usize,
+    /// Images of a kind have a folder of that name, and the list that names them.
+    lists: [(&'static str, String); 2],
 }
 
 impl Session {
@@ -47,16 +46,14 @@ impl Session {
             return Err(Error::recording(root, "this is a file", remedy));
         }
         fs::create_dir_all(root).map_err(|e| failed(root, e))?;
-        let lock = lock(root)?;
-        let mut session =
-            Session { root: root.into(), partial: None, remarks: vec![], _lock: lock };
+        let _lock = lock(root)?;
+        let mut session = Session { root: root.into(), partial: None, remarks: vec![], _lock };
         let description = root.join(DESCRIPTION);
-        let resumed = description.is_file();
-        if resumed {
+        if description.is_file() {
             refuse_another(&description, sensor)?;
-        }
-        session.recover()?;
-        if !resumed {
+            session.recover()?;
+        } else {
+            session.recover()?;
             refuse_full(root)?;
             write_recording_file(root, sensor)?;
         }
@@ -106,9 +103,9 @@ impl Session {
     pub fn begin(&mut self, name: &str) -> Result<()> {
         self.abandon();
         let folder = self.root.join(PARTIAL).join(name);
-        let (depth, infrared) = (ImageList::of("depth"), ImageList::of("ir"));
         fs::create_dir_all(&folder).map_err(|e| failed(&folder, e))?;
-        self.partial = Some(PartialView { name: name.into(), folder, depth, infrared });
+        let lists = ["ir", "depth"].map(|kind| (kind, String::new()));
+        self.partial = Some(PartialView { name: name.into(), folder, frames: 0, lists });
         Ok(())
     }
 
@@ -117,13 +114,7 @@ impl Session {
     /// # Errors
     /// When it cannot be written.
     pub fn keep(&mut self, frame: &LiveFrame) -> Result<()> {
-        let Some(PartialView { folder, depth, infrared, .. }) = &mut self.partial else {
-            return Ok(());
-        };
-        // Both images of a moment have the depth's number.
-        let number = depth.count;
-        depth.add(folder, number, frame.stamp, &frame.depth)?;
-        frame.infrared.as_ref().map_or(Ok(()), |i| infrared.add(folder, number, frame.stamp, i))
+        self.partial.as_mut().map_or(Ok(()), |view| view.keep(frame))
     }
 
     /// The view is whole: put it where it belongs, in place of one of that name.
@@ -182,45 +173,34 @@ impl Drop for Session {
 }
 
 impl PartialView {
-    /// Everything on the disk itself, the list of the frames last.
+    fn keep(&mut self, frame: &LiveFrame) -> Result<()> {
+        let images = [frame.infrared.as_ref(), Some(&frame.depth)];
+        for ((kind, list), image) in self.lists.iter_mut().zip(images) {
+            let Some(image) = image else { continue };
+            // Both images of a moment have the depth's number.
+            let path = format!("{kind}/{:04}.png", self.frames);
+            let (folder, file) = (self.folder.join(kind), self.folder.join(&path));
+            fs::create_dir_all(&folder).map_err(|e| failed(&folder, e))?;
+            fs::write(&file, encode_png16_quickly(image)?).map_err(|e| failed(&file, e))?;
+            *list += &format!("{:.6} {path}\n", frame.stamp);
+        }
+        self.frames += 1;
+        Ok(())
+    }
+
+    /// Everything on the disk itself, the list of the depth frames last.
     fn close(&self, notes: &ViewNotes) -> Result<()> {
         write_view_notes(&self.folder, notes)?;
-        for list in [&self.infrared, &self.depth].into_iter().filter(|list| list.count > 0) {
-            let images = self.folder.join(list.kind);
-            for image in entries(&images)? {
-                sync(&image)?;
-            }
+        for (kind, list) in self.lists.iter().filter(|(_, list)| !list.is_empty()) {
+            let images = self.folder.join(kind);
+            entries(&images)?.iter().try_for_each(|image| sync(image))?;
             sync(&images)?;
-            let path = self.folder.join(format!("{}.txt", list.kind));
-            fs::write(&path, &list.text).map_err(|e| failed(&path, e))?;
+            let path = self.folder.join(format!("{kind}.txt"));
+            let text = format!("# timestamp path\n{list}");
+            fs::write(&path, text).map_err(|e| failed(&path, e))?;
             sync(&path)?;
         }
         sync(&self.folder)
-    }
-}
-
-/// Images of one kind in a view, and the list that names them.
-struct ImageList {
-    /// "depth" or "ir": the images' folder, and the list's name.
-    kind: &'static str,
-    text: String,
-    count: usize,
-}
-
-impl ImageList {
-    fn of(kind: &'static str) -> Self {
-        ImageList { kind, text: "# timestamp path\n".into(), count: 0 }
-    }
-
-    fn add(&mut self, view: &Path, number: usize, stamp: f64, image: &Frame) -> Result<()> {
-        let path = format!("{}/{number:04}.png", self.kind);
-        let file = view.join(&path);
-        let folder = view.join(self.kind);
-        fs::create_dir_all(&folder).map_err(|e| failed(&folder, e))?;
-        fs::write(&file, encode_png16_quickly(image)?).map_err(|e| failed(&file, e))?;
-        let _ = writeln!(self.text, "{stamp:.6} {path}");
-        self.count += 1;
-        Ok(())
     }
 }
 
@@ -255,11 +235,8 @@ fn refuse_another(description: &Path, now: &Sensor) -> Result<()> {
     {
         return refuse(format!("these views are of sensor {old}, and this one is {new}"));
     }
-    let numbers = |s: &Sensor| {
-        let (serial, sensor) = (None, String::new());
-        RecordingFile { serial, sensor, ..RecordingFile::of(s) }
-    };
-    if numbers(&before) != numbers(now) {
+    let nameless = |s: &Sensor| Sensor { serial: None, name: String::new(), ..s.clone() };
+    if nameless(&before) != nameless(now) {
         let what = "these views were taken with another calibration (size, intrinsics, depth code)";
         return refuse(what.into());
     }

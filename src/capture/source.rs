@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use crate::error::Result;
 use crate::frame::Frame;
 use crate::view::Sensor;
 
@@ -41,10 +40,7 @@ pub trait Source {
     fn sensor(&self) -> &Sensor;
 
     /// The next frame, waiting for it about `wait` at most.
-    ///
-    /// # Errors
-    /// When the source is damaged in a way that ends the capture.
-    fn next(&mut self, wait: Duration) -> Result<Arrival>;
+    fn next(&mut self, wait: Duration) -> Arrival;
 
     /// Does time go by while nobody asks for frames?
     fn live(&self) -> bool {

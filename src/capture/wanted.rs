@@ -32,15 +32,6 @@ impl Pose {
         }
         name
     }
-
-    /// From a name that [`Pose::name`] made.
-    fn named(name: &str) -> Option<Self> {
-        let mut parts = name.split('-');
-        let mut number = |letter: char| parts.next()?.strip_prefix(letter)?.parse::<f64>().ok();
-        let (z, t) = (number('z')?, number('t')?);
-        let a = number('a').unwrap_or(0.0);
-        Some(Pose { z_m: z / 100.0, theta_rad: t.to_radians(), azimuth_rad: a.to_radians() })
-    }
 }
 
 /// Below this tilt a direction means nothing, rad.
@@ -49,9 +40,7 @@ const MIN_DIRECTED_RAD: f64 = 0.1;
 /// How near a pose must be to count as the one wanted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
-    /// m.
     pub z_m: f64,
-    /// rad.
     pub theta_rad: f64,
     /// rad; `None` when every direction will do.
     pub azimuth_rad: Option<f64>,
@@ -62,18 +51,14 @@ const GRID: Tolerance = Tolerance { z_m: 0.2, theta_rad: 0.07, azimuth_rad: None
 /// Where any pose will do: two that are nearer than this are one view.
 const ANY: Tolerance = Tolerance { z_m: 0.05, theta_rad: 0.05, azimuth_rad: Some(0.35) };
 
-/// The same share of a finer pitch.
-fn within(values: &[f64], max: f64) -> f64 {
-    let gaps = values.windows(2).map(|w| 0.4 * (w[1] - w[0]));
-    gaps.fold(max, f64::min)
-}
-
-/// In order, each once: what two names cannot tell apart is one.
-fn distinct(values: &[f64], unit: f64) -> Vec<f64> {
+/// In order, each once (what two names cannot tell apart is one), and the tolerance: at most `max`,
+/// and the same share of a finer pitch.
+fn pitches(values: &[f64], unit: f64, max: f64) -> (Vec<f64>, f64) {
     let mut values = values.to_vec();
     values.sort_by(f64::total_cmp);
     values.dedup_by_key(|v| (*v / unit).round() as i64);
-    values
+    let within = values.windows(2).map(|w| 0.4 * (w[1] - w[0])).fold(max, f64::min);
+    (values, within)
 }
 
 /// A view to be taken.
@@ -103,6 +88,16 @@ impl WantedView {
     pub(super) fn new(pose: Pose, tolerance: Tolerance, why: Option<String>) -> Self {
         let name = pose.name(tolerance.azimuth_rad.is_some());
         WantedView { name, pose, tolerance, why, state: ViewState::Open }
+    }
+
+    /// From a name that [`Pose::name`] made.
+    fn named(name: &str, tolerance: Tolerance) -> Option<Self> {
+        let mut parts = name.split('-');
+        let mut number = |letter: char| parts.next()?.strip_prefix(letter)?.parse::<f64>().ok();
+        let (z_m, theta_rad) = (number('z')? / 100.0, number('t')?.to_radians());
+        let azimuth_rad = number('a').unwrap_or(0.0).to_radians();
+        let pose = Pose { z_m, theta_rad, azimuth_rad };
+        Some(WantedView { name: name.into(), ..WantedView::new(pose, tolerance, None) })
     }
 
     pub fn is_open(&self) -> bool {
@@ -156,13 +151,9 @@ impl Wanted {
     /// Every distance, m, at every tilt, rad, whatever its direction; whole centimetres and
     /// degrees, and each once.
     pub fn grid(distances_m: &[f64], tilts_rad: &[f64]) -> Self {
-        let distances = distinct(distances_m, 0.01);
-        let tilts = distinct(tilts_rad, 1f64.to_radians());
-        let tolerance = Tolerance {
-            z_m: within(&distances, GRID.z_m),
-            theta_rad: within(&tilts, GRID.theta_rad),
-            azimuth_rad: None,
-        };
+        let (distances, z_m) = pitches(distances_m, 0.01, GRID.z_m);
+        let (tilts, theta_rad) = pitches(tilts_rad, 1f64.to_radians(), GRID.theta_rad);
+        let tolerance = Tolerance { z_m, theta_rad, azimuth_rad: None };
         let view = |z_m: f64, theta_rad: f64| {
             WantedView::new(Pose { z_m, theta_rad, azimuth_rad: 0.0 }, tolerance, None)
         };
@@ -178,16 +169,11 @@ impl Wanted {
     /// Mark what is on the disk already.
     pub fn mark_taken(&mut self, names: &[String]) {
         for name in names {
-            match self.views.iter_mut().find(|v| v.name == *name) {
-                Some(view) => view.state = ViewState::Taken,
-                None if self.any => {
-                    let Some(pose) = Pose::named(name) else { continue };
-                    let mut view = WantedView::new(pose, ANY, None);
-                    view.name.clone_from(name);
-                    view.state = ViewState::Taken;
-                    self.views.push(view);
-                }
-                None => {}
+            if let Some(view) = self.views.iter_mut().find(|v| v.name == *name) {
+                view.state = ViewState::Taken;
+            } else if self.any {
+                let taken = |view| WantedView { state: ViewState::Taken, ..view };
+                self.views.extend(WantedView::named(name, ANY).map(taken));
             }
         }
     }
@@ -197,22 +183,22 @@ impl Wanted {
     /// # Errors
     /// When there is no such view, or its name does not tell its pose.
     pub fn take_again(&mut self, name: &str, taken: &[String]) -> Result<()> {
+        let refuse = |why: &str, remedy: &'static str| Error::Argument {
+            what: format!("--retake {name}: {why}"),
+            remedy,
+        };
         if !taken.iter().any(|t| t == name) {
-            return Err(Error::Argument {
-                what: format!("--retake {name}: there is no such view"),
-                remedy: "give the name of a folder in the recording",
-            });
+            let remedy = "give the name of a folder in the recording";
+            return Err(refuse("there is no such view", remedy));
         }
         if let Some(view) = self.views.iter_mut().find(|v| v.name == name) {
             view.state = ViewState::Open;
             return Ok(());
         }
-        let pose = Pose::named(name).ok_or_else(|| Error::Argument {
-            what: format!("--retake {name}: the name does not say where the target stood"),
-            remedy: "remove the folder and take the view anew",
-        })?;
         let tolerance = if name.contains("-a") { ANY } else { GRID };
-        let view = WantedView { name: name.into(), ..WantedView::new(pose, tolerance, None) };
+        let unclear = "the name does not say where the target stood";
+        let remedy = "remove the folder and take the view anew";
+        let view = WantedView::named(name, tolerance).ok_or_else(|| refuse(unclear, remedy))?;
         self.views.push(view);
         Ok(())
     }
@@ -240,15 +226,20 @@ impl Wanted {
     }
 
     fn nearest(&self, pose: &Pose, of: impl Fn(&WantedView) -> bool) -> Option<usize> {
-        let chosen = self.views.iter().enumerate().filter(|(_, v)| of(v));
-        chosen
-            .min_by(|(_, a), (_, b)| a.distance(pose).total_cmp(&b.distance(pose)))
-            .map(|(i, _)| i)
+        let distance = |i: &usize| self.views[*i].distance(pose);
+        let chosen = (0..self.views.len()).filter(|i| of(&self.views[*i]));
+        chosen.min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
 
     /// How many views are in this state.
     pub fn count(&self, state: ViewState) -> usize {
         self.views.iter().filter(|v| v.state == state).count()
+    }
+
+    /// "3 of 63", or "3" where any pose will do.
+    pub fn progress(&self) -> String {
+        let of = if self.any { String::new() } else { format!(" of {}", self.views.len()) };
+        format!("{}{of}", self.count(ViewState::Taken))
     }
 
     /// Nothing is left to take.

@@ -10,7 +10,7 @@ use kinoise::units::shortest;
 use kinoise::{CalibrateOptions, Calibration, Form, Recording, SigmaKind, model_of_table, stats};
 
 use super::calibrate_summary::{as_json, summary};
-use super::common::{Bar, Global, Input, notes, one_of, say, source_date};
+use super::common::{Global, Input, notes, one_of, say, source_date, with_bar};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -82,17 +82,14 @@ impl Arguments {
         {
             bail!("--ransac-threshold {}: give a positive distance in m", shortest(t));
         }
-        Ok(CalibrateOptions {
-            measure: MeasureOptions {
-                planes: self.planes,
-                ransac_threshold_m: self.ransac_threshold,
-                seed: global.seed(),
-                ..MeasureOptions::default()
-            },
-            kind: self.sigma,
-            form: self.fitting.form()?,
-            created: source_date(),
-        })
+        let measure = MeasureOptions {
+            planes: self.planes,
+            ransac_threshold_m: self.ransac_threshold,
+            seed: global.seed(),
+            ..MeasureOptions::default()
+        };
+        let (form, created) = (self.fitting.form()?, source_date());
+        Ok(CalibrateOptions { measure, kind: self.sigma, form, created })
     }
 
     /// A file whose name ends in .csv.
@@ -124,8 +121,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let options = arguments.options(global)?;
     let recording = open(&arguments.recording, &arguments.input.assumed()?)?;
     let overlays = &arguments.fitting.overlay;
-    let done = calibrate(&recording, &options, &arguments.output, overlays)?;
-    global.print_json(&as_json(&done.calibration, Some(&done.measurements)))
+    let (measured, calibration) = calibrate(&recording, &options, &arguments.output, overlays)?;
+    global.print_json(&as_json(&calibration, Some(&measured)))
 }
 
 pub fn fit(arguments: &FitArguments, global: &Global) -> anyhow::Result<()> {
@@ -149,33 +146,24 @@ fn table(file: &Path, output: &Path, fitting: &Fitting, global: &Global) -> anyh
     global.print_json(&as_json(&calibration, None))
 }
 
-/// A finished calibration with what it was made from.
-pub struct Done {
-    pub measurements: Measurements,
-    pub calibration: Calibration,
-}
-
 /// Measure, fit, write every output, report.
 pub fn calibrate(
     recording: &Recording,
     options: &CalibrateOptions,
     output: &Path,
     overlays: &[Overlay],
-) -> anyhow::Result<Done> {
+) -> anyhow::Result<(Measurements, Calibration)> {
     let out = OutputDir::create(output)?;
-    let bar = Bar::new("views");
-    let measurements = measure(recording, &options.measure, &|done, all| bar.step(done, all))?;
-    drop(bar);
+    let measurements = with_bar("views", |step| measure(recording, &options.measure, step))?;
     say(measured(recording, &measurements));
     out.write("measurements.csv", write_measurements(&measurements.views).as_bytes())?;
     let calibration = model_of(recording, &measurements, options).with_context(|| {
         // Without a model there is no list of warnings: this is the only place to say why.
         notes(&measurements.excluded);
         notes(&recording.remarks);
-        let older = if out.path().join("model.json").exists() {
-            " (the model.json there is from an earlier run)"
-        } else {
-            ""
+        let older = match out.path().join("model.json").exists() {
+            true => " (the model.json there is from an earlier run)",
+            false => "",
         };
         format!(
             "the views were measured ({}) but no model was fitted{older}",
@@ -190,25 +178,24 @@ pub fn calibrate(
         overlays,
     };
     write_outputs(&out, &page)?;
-    Ok(Done { measurements, calibration })
+    Ok((measurements, calibration))
 }
 
 /// Model, figures and page; a summary for people.
 fn write_outputs(out: &OutputDir, page: &CalibrationPage<'_>) -> anyhow::Result<()> {
     let calibration = page.calibration;
-    let figure = figure2(&calibration.table, &calibration.model.sigma, page.overlays);
-    let map = sigma_map(&calibration.table, &calibration.model.sigma);
-    out.write("sigma.svg", figure.svg()?.as_bytes())?;
-    out.write("sigma.png", &figure.png()?)?;
-    out.write("sigma_map.svg", map.svg()?.as_bytes())?;
-    out.write("sigma_map.png", &map.png()?)?;
+    let (table, sigma) = (&calibration.table, &calibration.model.sigma);
+    let charts =
+        [("sigma", figure2(table, sigma, page.overlays)), ("sigma_map", sigma_map(table, sigma))];
+    for (name, chart) in charts {
+        out.write(&format!("{name}.svg"), chart.svg()?.as_bytes())?;
+        out.write(&format!("{name}.png"), &chart.png()?)?;
+    }
     out.write("report.html", calibration_page(page)?.as_bytes())?;
     let model = out.path().join("model.json");
     calibration.model.write(&model)?;
-    say(format!(
-        "wrote {}, with sigma.svg, sigma_map.svg and report.html beside it\n",
-        model.display()
-    ));
+    let beside = "with sigma.svg, sigma_map.svg and report.html beside it";
+    say(format!("wrote {}, {beside}\n", model.display()));
     say(summary(calibration));
     notes(&calibration.warnings);
     Ok(())
@@ -221,10 +208,9 @@ fn measured(recording: &Recording, m: &Measurements) -> String {
     let frames: usize = m.views.iter().map(|v| v.frames).sum();
     let [f0, f1] = range(&|v| v.frames as f64);
     let each = if f0 == f1 { format!("{f0} a view") } else { format!("{f0} to {f1} a view") };
+    let (name, views, all) =
+        (&recording.sensor.name, m.views.len(), m.views.len() + m.excluded.len());
     format!(
-        "{}: {} of {} views measured, {frames} frames ({each}), z {z0:.2} to {z1:.2} m, tilt {t0:.1} to {t1:.1} degrees",
-        recording.sensor.name,
-        m.views.len(),
-        m.views.len() + m.excluded.len(),
+        "{name}: {views} of {all} views measured, {frames} frames ({each}), z {z0:.2} to {z1:.2} m, tilt {t0:.1} to {t1:.1} degrees"
     )
 }

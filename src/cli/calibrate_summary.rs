@@ -10,20 +10,17 @@ use serde_json::{Map, Value, json};
 /// The fit, its surface beside the published ones, and the forms compared.
 pub fn summary(calibration: &Calibration) -> String {
     let fit = &calibration.fit;
-    let mut text = format!("{}\n", fit.form.spec().formula());
+    let mut text = format!("{}\n", fit.form.card().formula);
     for p in &fit.parameters {
         let value = three_digits_like(p.value, p.std_error);
         let error = p.std_error.map_or("held".into(), |e| format!("± {}", three_digits(e)));
         let _ = writeln!(text, "  {:<3}= {value:>12}  {error}", p.name);
     }
+    let (rows, views, r2) = (fit.rows, fit.views, fit.quality.r2);
+    let (rmse_mm, share) = (1e3 * fit.quality.rmse_m, 1e2 * fit.quality.rmse_relative);
     let _ = write!(
         text,
-        "fitted to {} sigmas of {} views: rmse {:.2} mm ({:.1} % of sigma), r2 {:.4}",
-        fit.rows,
-        fit.views,
-        1e3 * fit.rmse_m,
-        1e2 * fit.rmse_relative,
-        fit.r2
+        "fitted to {rows} sigmas of {views} views: rmse {rmse_mm:.2} mm ({share:.1} % of sigma), r2 {r2:.4}"
     );
     if let Some(h) = calibration.comparison.iter().find(|h| h.form == fit.form) {
         let _ = write!(text, "; {:.1} % at distances left out", 1e2 * h.rmse_relative);
@@ -117,9 +114,9 @@ pub fn as_json(calibration: &Calibration, measurements: Option<&Measurements>) -
         "parameters": parameters.collect::<Map<String, Value>>(),
         "valid": {"z_m": fit.domain.z_m, "theta_rad": fit.domain.theta_rad},
         "rows": fit.rows,
-        "rmse_m": fit.rmse_m,
-        "rmse_relative": fit.rmse_relative,
-        "r2": fit.r2,
+        "rmse_m": fit.quality.rmse_m,
+        "rmse_relative": fit.quality.rmse_relative,
+        "r2": fit.quality.r2,
         "comparison": calibration.comparison.iter().map(|h| json!({
             "form": h.form.id(), "log_score": h.log_score, "rmse_relative": h.rmse_relative,
         })).collect::<Vec<_>>(),

@@ -1,15 +1,12 @@
-use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use anyhow::bail;
+use anyhow::{bail, ensure};
 use clap::Args;
 use kinoise::capture::{
     End, Ending, FreenectOptions, FreenectSource, Growing, Guide, Interface, Outcome,
-    PAPER_DISTANCES_M, PAPER_TILTS_DEG, Playback, Session, Shutter, Source, Threaded, ViewState,
-    Wanted, capture,
+    PAPER_DISTANCES_M, PAPER_TILTS_DEG, Playback, Session, Shutter, Source, ViewState, Wanted,
+    capture,
 };
 use serde_json::json;
 
@@ -87,9 +84,8 @@ impl Views {
         }
         let own = |own: &[f64], grid: &[f64]| if own.is_empty() { grid } else { own }.to_vec();
         let Some((distances, tilts)) = self.views else {
-            if !self.distances.is_empty() || !self.tilts.is_empty() {
-                bail!("--views any: it knows no grid; leave --distances and --tilts out");
-            }
+            let none = self.distances.is_empty() && self.tilts.is_empty();
+            ensure!(none, "--views any: it knows no grid; leave --distances and --tilts out");
             return Ok(Wanted::any());
         };
         let (distances, tilts) = (own(&self.distances, distances), own(&self.tilts, tilts));
@@ -135,9 +131,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     let done = if guide.wanted().is_done() {
         Outcome { ending: Ending::Complete, finished: Vec::new(), frames: 0 }
     } else {
-        let mut interface = interface(screen.then(|| title(arguments, source.as_ref())), stop)?;
+        let mut interface: Box<dyn Interface> = if screen {
+            Box::new(Screen::open(title(arguments, source.as_ref()), stop.clone())?)
+        } else {
+            Box::new(Log)
+        };
         let patience = Duration::from_secs(arguments.patience.max(1));
-        capture(source.as_mut(), &mut session, &mut guide, interface.as_mut(), patience)
+        capture(source.as_mut(), &mut session, &mut guide, interface.as_mut(), patience, &stop)
     };
     notes(&source.remarks()[noted..]);
     if source.dropped() > 0 {
@@ -157,26 +157,15 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     conclude(done.ending, &guide, &arguments.recording, kept.len())
 }
 
-/// A screen where there is a title to show on it.
-fn interface(title: Option<String>, stop: Arc<AtomicBool>) -> io::Result<Box<dyn Interface>> {
-    Ok(match title {
-        Some(title) => Box::new(Screen::open(title, stop)?),
-        None => Box::new(Log { stop, waiting: Vec::new() }),
-    })
-}
-
 /// What is played or watched must not grow by what is taken from it.
 fn refuse_own_source(arguments: &Arguments) -> anyhow::Result<()> {
-    let (SourceKind::Folder(from) | SourceKind::Play(from)) = &arguments.source else {
-        return Ok(());
-    };
-    if let (Ok(from), Ok(to)) = (from.canonicalize(), arguments.recording.canonicalize())
+    let recording = &arguments.recording;
+    if let SourceKind::Folder(from) | SourceKind::Play(from) = &arguments.source
+        && let (Ok(from), Ok(to)) = (from.canonicalize(), recording.canonicalize())
         && from == to
     {
-        bail!(
-            "{}: this is the source; choose another folder for the recording",
-            arguments.recording.display()
-        );
+        let remedy = "choose another folder for the recording";
+        bail!("{}: this is the source; {remedy}", recording.display());
     }
     Ok(())
 }
@@ -199,7 +188,7 @@ fn source(arguments: &Arguments, paced: bool) -> anyhow::Result<Box<dyn Source>>
                 assumed,
                 dump: std::env::var_os("FAKENECT_PATH").map(PathBuf::from),
             };
-            Box::new(Threaded::start(move || FreenectSource::open(&options))?)
+            Box::new(FreenectSource::open(options)?)
         }
         SourceKind::Folder(path) => {
             let patience = Duration::from_secs(arguments.patience.max(1));
@@ -239,25 +228,18 @@ fn conclude(ending: Ending, guide: &Guide, root: &Path, kept: usize) -> anyhow::
     let missing = still_wanted(guide).len();
     let still = if wanted.any { String::new() } else { format!(", {missing} still wanted") };
     let on = format!("{stands}{still}; give the same command again to resume");
-    match ending {
-        Ending::Complete => {
-            let skipped = wanted.count(ViewState::Skipped);
-            let but = if skipped > 0 { format!(", {skipped} skipped") } else { String::new() };
-            say(format!("done: {stands}{but}"));
-            Ok(0)
-        }
-        Ending::Quit => {
-            say(format!("stopped: {on}"));
-            Ok(0)
-        }
+    let done = match ending {
+        Ending::Complete => match wanted.count(ViewState::Skipped) {
+            0 => format!("done: {stands}"),
+            skipped => format!("done: {stands}, {skipped} skipped"),
+        },
+        Ending::Quit => format!("stopped: {on}"),
         // Where anything will do, the end of a recording or of a folder's filling is the end.
         Ending::Ended(End { why, lost: false }) if wanted.any && kept > 0 => {
-            say(format!("done: {why}; {stands}"));
-            Ok(0)
+            format!("done: {why}; {stands}")
         }
         Ending::Stalled(after) if wanted.any && kept > 0 => {
-            say(format!("done: no new frame for {} s; {stands}", after.as_secs()));
-            Ok(0)
+            format!("done: no new frame for {} s; {stands}", after.as_secs())
         }
         Ending::Interrupted => bail!("interrupted: {on}"),
         Ending::Ended(End { why, .. }) => bail!("{why}: {on}"),
@@ -267,5 +249,7 @@ fn conclude(ending: Ending, guide: &Guide, root: &Path, kept: usize) -> anyhow::
             after.as_secs()
         ),
         Ending::Failed(e) => bail!("{e}: {on}"),
-    }
+    };
+    say(done);
+    Ok(0)
 }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use crossterm::event::{self, KeyCode, KeyEvent, KeyModifiers};
 use crossterm::style::{Attribute, Color, Print, SetAttribute, SetForegroundColor};
 use crossterm::{cursor, execute, queue, terminal};
-use kinoise::capture::{Command, Event, Guide, Interface, Line, Status, Style, ViewState, render};
+use kinoise::capture::{Command, Event, Guide, Interface, Line, Status, Style, render};
 
 use super::common::say;
 
@@ -51,48 +51,21 @@ fn message(event: &Event) -> Option<String> {
 }
 
 /// One line an event.
-pub struct Log {
-    pub stop: Arc<AtomicBool>,
-    /// Said when the guide knows of the frame.
-    pub waiting: Vec<Event>,
-}
+pub struct Log;
 
 impl Interface for Log {
-    fn event(&mut self, event: &Event) {
-        self.waiting.push(event.clone());
-    }
-
-    fn frame(&mut self, guide: &Guide) {
-        for event in self.waiting.drain(..) {
-            let Some(line) = message(&event) else { continue };
-            match (&event, guide.pose()) {
-                (Event::Finished(_), Some(pose)) => say(format!(
-                    "{line} at {:.2} m, {:.1} degrees ({})",
-                    pose.z_m,
-                    pose.theta_rad.to_degrees(),
-                    progress(guide)
-                )),
-                _ => say(line),
-            }
+    fn event(&mut self, event: &Event, guide: &Guide) {
+        let Some(line) = message(event) else { return };
+        match (event, guide.pose()) {
+            (Event::Finished(_), Some(pose)) => say(format!(
+                "{line} at {:.2} m, {:.1} degrees ({})",
+                pose.z_m,
+                pose.theta_rad.to_degrees(),
+                guide.wanted().progress()
+            )),
+            _ => say(line),
         }
     }
-
-    fn waiting(&mut self, _: &Guide, _: Duration) {}
-
-    fn command(&mut self) -> Option<Command> {
-        None
-    }
-
-    fn interrupted(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
-    }
-}
-
-/// "3 of 63", or "3" where any pose will do.
-fn progress(guide: &Guide) -> String {
-    let wanted = guide.wanted();
-    let of = if wanted.any { String::new() } else { format!(" of {}", wanted.views.len()) };
-    format!("{}{of}", wanted.count(ViewState::Taken))
 }
 
 /// A silence longer than this is shown.
@@ -147,14 +120,13 @@ fn draw(lines: &[Line], bell: bool) -> std::io::Result<()> {
     let mut out = Vec::new();
     for (row, line) in (0..).zip(lines) {
         queue!(out, cursor::MoveTo(0, row), SetAttribute(Attribute::Reset))?;
-        match line.style {
-            Style::Plain => {}
-            Style::Loud => {
-                queue!(out, SetAttribute(Attribute::Bold), SetForegroundColor(Color::Yellow))?;
-            }
-            Style::Flash => {
-                queue!(out, SetAttribute(Attribute::Reverse), SetForegroundColor(Color::Green))?;
-            }
+        let style = match line.style {
+            Style::Plain => None,
+            Style::Loud => Some((Attribute::Bold, Color::Yellow)),
+            Style::Flash => Some((Attribute::Reverse, Color::Green)),
+        };
+        if let Some((attribute, colour)) = style {
+            queue!(out, SetAttribute(attribute), SetForegroundColor(colour))?;
         }
         // The rest of the line in the same style: a flash fills the screen.
         queue!(out, Print(&line.text), terminal::Clear(terminal::ClearType::UntilNewLine))?;
@@ -176,7 +148,7 @@ impl Drop for Screen {
 }
 
 impl Interface for Screen {
-    fn event(&mut self, event: &Event) {
+    fn event(&mut self, event: &Event, _: &Guide) {
         match event {
             Event::Finished(view) => {
                 self.status.flash = Some(view.clone());
@@ -219,9 +191,5 @@ impl Interface for Screen {
             }
         }
         None
-    }
-
-    fn interrupted(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
     }
 }

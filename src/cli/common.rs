@@ -11,7 +11,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use indicatif::{ProgressBar, ProgressStyle};
 use kinoise::frame::KINECT_NO_MEASUREMENT;
 use kinoise::io::Assumed;
-use kinoise::{DepthCode, NoiseModel, Seed};
+use kinoise::{DepthCode, NoiseModel, Progress, Seed};
 
 #[derive(Debug, Args)]
 pub struct Global {
@@ -82,9 +82,8 @@ impl Input {
             (None, None) => None,
         };
         if let Some(fault) = code.as_ref().and_then(DepthCode::fault) {
-            bail!(
-                "{fault}; give --units-per-metre or --raw-disparity numbers that turn raw values into metres"
-            );
+            let numbers = "numbers that turn raw values into metres";
+            bail!("{fault}; give --units-per-metre or --raw-disparity {numbers}");
         }
         Ok(Assumed { intrinsics: self.intrinsics, code, baseline_m: self.baseline })
     }
@@ -171,35 +170,24 @@ pub fn source_date() -> Option<SystemTime> {
     SystemTime::UNIX_EPOCH.checked_add(Duration::from_secs(seconds))
 }
 
-/// A bar on a terminal, nothing elsewhere.
-pub struct Bar(ProgressBar);
-
-impl Bar {
-    pub fn new(what: &'static str) -> Self {
-        if !std::io::stderr().is_terminal() {
-            return Bar(ProgressBar::hidden());
-        }
-        let bar = ProgressBar::new(0);
-        if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {eta}") {
-            bar.set_style(style);
-        }
-        bar.set_message(what);
-        Bar(bar)
+/// Work with a bar on a terminal, and with nothing elsewhere.
+pub fn with_bar<T>(what: &'static str, work: impl FnOnce(Progress<'_>) -> T) -> T {
+    if !std::io::stderr().is_terminal() {
+        return work(&|_, _| ());
     }
-
-    pub fn step(&self, done: usize, total: usize) {
-        self.0.set_length(total as u64);
+    let bar = ProgressBar::new(0).with_message(what);
+    if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {eta}") {
+        bar.set_style(style);
+    }
+    let done = work(&|done, total| {
+        bar.set_length(total as u64);
         // Threads report out of order; a bar never goes back.
-        if done as u64 > self.0.position() {
-            self.0.set_position(done as u64);
+        if done as u64 > bar.position() {
+            bar.set_position(done as u64);
         }
-    }
-}
-
-impl Drop for Bar {
-    fn drop(&mut self) {
-        self.0.finish_and_clear();
-    }
+    });
+    bar.finish_and_clear();
+    done
 }
 
 /// A line for people.

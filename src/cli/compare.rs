@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use anyhow::bail;
+use anyhow::ensure;
 use clap::Args;
 use kinoise::compare::{compare, of_the_paper, past_the_paper, tables};
 use kinoise::io::OutputDir;
@@ -31,9 +31,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
-    if arguments.repeats == 0 {
-        bail!("--repeats 0: give 1 or more");
-    }
+    ensure!(arguments.repeats > 0, "--repeats 0: give 1 or more");
     let mut sequence = open(&arguments.sequence, &arguments.input.assumed()?)?;
     sequence.thin(arguments.thinning.stride, arguments.thinning.frames);
     let output = OutputDir::create(&arguments.output)?;

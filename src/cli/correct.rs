@@ -6,7 +6,7 @@ use kinoise::correct::{Corrected, correct_recording};
 use kinoise::effects::Active;
 use kinoise::{DepthCode, NoiseModel};
 
-use super::common::{Bar, Global, Input, notes, say};
+use super::common::{Global, Input, notes, say, with_bar};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -29,16 +29,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let model = NoiseModel::read(&arguments.model)?;
     // Here an error can name the file.
     Active::all_of_model(&model.effects).with_context(|| arguments.model.display().to_string())?;
-    let bar = Bar::new("frames");
-    let corrected = correct_recording(
-        &arguments.recording,
-        &arguments.input.assumed()?,
-        &model,
-        &arguments.output,
-        arguments.keep_code,
-        &|done, all| bar.step(done, all),
-    )?;
-    drop(bar);
+    let (recording, output) = (&arguments.recording, &arguments.output);
+    let assumed = arguments.input.assumed()?;
+    let corrected = with_bar("frames", |step| {
+        correct_recording(recording, &assumed, &model, output, arguments.keep_code, step)
+    })?;
     report(&corrected, arguments);
     global.print_json(&serde_json::json!({
         "frames": corrected.frames,
@@ -56,28 +51,21 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
 }
 
 fn report(corrected: &Corrected, arguments: &Arguments) {
+    let Corrected { changed, measured, frames, clamped, ignored, .. } = corrected;
     notes(&corrected.remarks);
-    if !corrected.ignored.is_empty() {
-        say(format!(
-            "note: no biases of the sensor, and left in: {}",
-            corrected.ignored.join(", ")
-        ));
+    if !ignored.is_empty() {
+        say(format!("note: no biases of the sensor, and left in: {}", ignored.join(", ")));
     }
-    if corrected.changed == 0 {
+    if *changed == 0 {
         say(format!("note: {} holds no bias that changes a depth here", arguments.model.display()));
     }
-    if corrected.clamped > 0 {
+    if *clamped > 0 {
         say(format!(
-            "note: {} corrected depths lie beyond the range of the depth code and are clamped to it",
-            corrected.clamped
+            "note: {clamped} corrected depths lie beyond the range of the depth code and are clamped to it"
         ));
     }
+    let (rms_mm, output) = (1e3 * corrected.rms_shift_m, arguments.output.display());
     say(format!(
-        "corrected {} of {} depths in {} frames by {:.2} mm (root mean square); wrote {}",
-        corrected.changed,
-        corrected.measured,
-        corrected.frames,
-        1e3 * corrected.rms_shift_m,
-        arguments.output.display()
+        "corrected {changed} of {measured} depths in {frames} frames by {rms_mm:.2} mm (root mean square); wrote {output}"
     ));
 }

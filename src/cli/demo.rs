@@ -35,7 +35,9 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         created: source_date(),
         ..CalibrateOptions::default()
     };
-    let done = calibrate(&recording, &options, &arguments.output, &[Overlay::PaperEq1])?;
+    let (measured, calibration) =
+        calibrate(&recording, &options, &arguments.output, &Overlay::ALL[..1])?;
+    let model = &calibration.model;
     say(format!(
         "The recording was made with the paper's Eq. 1, so the first two columns should agree.\nOpen {} to see it all.",
         arguments.output.join("report.html").display()
@@ -47,15 +49,14 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         calibrated_here: true,
         ..DiagnoseOptions::default()
     };
-    let held = HeldAgainst { simulated: None, model: &done.calibration.model, options: &options };
+    let held = HeldAgainst { simulated: None, model, options: &options };
     examine(&recording, &held, &diagnosis, global)?;
     say(format!(
         "{} says how small an error would have been seen.",
         diagnosis.join("report.html").display()
     ));
-    let model = &done.calibration.model;
     mapped(&recording, model, &arguments.output, global)?;
-    global.print_json(&as_json(&done.calibration, Some(&done.measurements)))
+    global.print_json(&as_json(&calibration, Some(&measured)))
 }
 
 /// Frames of the film: two seconds.

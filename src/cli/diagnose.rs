@@ -1,21 +1,21 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use kinoise::calibrate::model_of_any_form;
-use kinoise::camera::Rays;
+use kinoise::calibrate::paper_model;
 use kinoise::diagnose::{
     DiagnoseOptions, Diagnosed, Diagnosis, Field, Finding, Reference, Status, Verdict,
     ViewPictures, diagnose, diagnose_against, pictures,
 };
 use kinoise::effects::{Active, Instant};
 use kinoise::io::{OutputDir, open};
-use kinoise::report::{DiagnosisPage, Picture, diagnosis_page};
+use kinoise::report::{DiagnosisPage, diagnosis_page};
 use kinoise::simulate::{FormulaSensor, plan_on};
 use kinoise::terms::Statistic;
 use kinoise::view::ViewNotes;
-use kinoise::{CalibrateOptions, Form, Frame, NoiseModel, Recording, Seed, Sensor};
+use kinoise::{Form, NoiseModel, Recording, Seed, Sensor};
+use serde_json::Value;
 
-use super::common::{Bar, Global, Input, say, source_date};
+use super::common::{Global, Input, say, source_date, with_bar};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -38,10 +38,9 @@ pub struct Arguments {
 const FOUND: u8 = 1;
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
-    let recording = open(&arguments.recording, &arguments.input.assumed()?)?;
-    let against = arguments.against.as_ref();
-    let simulated = against.map(|path| anyhow::Ok(open(path, &arguments.input.assumed()?)?));
-    let simulated = simulated.transpose()?;
+    let assumed = arguments.input.assumed()?;
+    let recording = open(&arguments.recording, &assumed)?;
+    let simulated = arguments.against.as_ref().map(|path| open(path, &assumed)).transpose()?;
     let model = match (&arguments.model, &simulated) {
         (Some(path), _) => NoiseModel::read(path)?,
         (None, Some(simulated)) => weights(&recording, simulated, global)?,
@@ -77,13 +76,10 @@ pub fn examine(
 ) -> anyhow::Result<Diagnosis> {
     let out = OutputDir::create(output)?;
     let HeldAgainst { simulated, model, options } = *held;
-    let bar = Bar::new("views");
-    let step = |done, all| bar.step(done, all);
-    let done = match simulated {
-        Some(simulated) => diagnose_against(recording, simulated, model, options, &step)?,
-        None => diagnose(recording, model, options, &step)?,
-    };
-    drop(bar);
+    let done = with_bar("views", |step| match simulated {
+        Some(simulated) => diagnose_against(recording, simulated, model, options, step),
+        None => diagnose(recording, model, options, step),
+    })?;
     let diagnosis = &done.diagnosis;
     let json = serde_json::to_value(diagnosis)?;
     out.write("diagnosis.json", format!("{json:#}\n").as_bytes())?;
@@ -98,14 +94,9 @@ pub fn examine(
 }
 
 fn calibrated(recording: &Recording, global: &Global) -> anyhow::Result<NoiseModel> {
-    let mut options =
-        CalibrateOptions { form: Some(Form::Paper), created: source_date(), ..Default::default() };
-    options.measure.seed = global.seed();
-    let bar = Bar::new("views");
-    let views =
-        kinoise::measure_recording(recording, &options.measure, &|done, all| bar.step(done, all))?;
-    drop(bar);
-    let model = model_of_any_form(recording, &views, &options)?.model;
+    let step =
+        |step: kinoise::Progress<'_>| paper_model(recording, global.seed(), source_date(), step);
+    let model = with_bar("views", step)?;
     if model.sigma.form != Form::Paper {
         model.fit.remarks.iter().take(1).for_each(|why| say(format!("note: {why}")));
     }
@@ -137,16 +128,11 @@ fn summary(diagnosis: &Diagnosis) -> String {
     let shown = diagnosis.findings.iter().filter(|f| f.status != Status::NotIdentifiable);
     text.extend(shown.map(line));
     if let Some(h) = &diagnosis.heldout {
+        let (views, gain, [low, high]) = (h.views.len(), h.gain, h.gain_interval);
+        let (before, after) = (h.rms_mm_before, h.rms_mm_after);
         text += &format!(
-            "on {} views kept aside: {:.1} nats a view gained [{:.1}, {:.1}], rms {:.3} -> {:.3} mm; `kinoise correct` alone: every pixel {:.3} -> {:.3} px\n",
-            h.views.len(),
-            h.gain,
-            h.gain_interval[0],
-            h.gain_interval[1],
-            h.rms_mm_before,
-            h.rms_mm_after,
-            h.correction_rms_before_px,
-            h.correction_rms_after_px
+            "on {views} views kept aside: {gain:.1} nats a view gained [{low:.1}, {high:.1}], rms {before:.3} -> {after:.3} mm; `kinoise correct` alone: every pixel {:.3} -> {:.3} px\n",
+            h.correction_rms_before_px, h.correction_rms_after_px
         );
     }
     text
@@ -168,57 +154,43 @@ fn line(f: &Finding) -> String {
     } else {
         format!("{:.2} mm, {:.2} sigma", f.size.mm, f.size.sigma)
     };
-    let parameters = f.parameters.iter();
-    let parameters: Vec<String> = parameters
-        .filter_map(|(k, v)| Some(format!("{k} {:.4}", v.get("value")?.as_f64()?)))
-        .collect();
-    let parameters = match parameters.join(", ") {
-        none if none.is_empty() => none,
-        some => format!("; {some}"),
+    let parameter =
+        |(k, v): (&String, &Value)| Some(format!("{k} {:.4}", v.get("value")?.as_f64()?));
+    let parameters: Vec<String> = f.parameters.iter().filter_map(parameter).collect();
+    let parameters = match parameters[..] {
+        [] => String::new(),
+        _ => format!("; {}", parameters.join(", ")),
     };
     format!("  {name}: {size}, {:.0} % of it; along {}{parameters}\n", 100.0 * f.share, f.axis)
 }
 
-/// Where diagnosis and simulator meet: the views worth seeing, each with its simulated twin.
-/// `given` is the model that the recording was held against.
-fn with_twins(done: &Diagnosed, sensor: &Sensor, given: &NoiseModel, seed: Seed) -> Vec<Picture> {
-    let rays = sensor.camera.rays();
-    let effects = shown_effects(&done.model);
-    let twin = Twin { sensor, rays: &rays, model: &done.model, effects: &effects, seed };
-    let session_s = done.fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
-    // Beside a simulated recording, what is shown is a difference already.
-    let retake = |index, field: &Field| {
-        if done.against.is_empty() { twin.frames(index, field, session_s) } else { None }
-    };
-    pictures(done, sensor, given, &retake).into_iter().map(|p| picture(p, done)).collect()
-}
-
 /// Effects that move the plane as a whole: a picture about the plane does not show them.
 const OF_THE_PLANE: [&str; 3] = ["depth-scale", "disparity-offset", "thermal-drift"];
+/// More frames of a twin than this add nothing that an eye sees.
+const MAX_TWIN_FRAMES: usize = 16;
 
-/// All others that the simulator can make.
-fn shown_effects(model: &NoiseModel) -> Vec<Active> {
-    let mut effects = model.effects.clone();
+/// Where diagnosis and simulator meet: the views worth seeing, each with its simulated twin.
+/// `given` is the model that the recording was held against.
+fn with_twins(
+    done: &Diagnosed,
+    sensor: &Sensor,
+    given: &NoiseModel,
+    seed: Seed,
+) -> Vec<ViewPictures> {
+    let mut effects = done.model.effects.clone();
     effects.retain(|e| {
         let is_known = Active::all_of_model(std::slice::from_ref(e)).is_ok();
         is_known && !OF_THE_PLANE.contains(&e.id.as_str())
     });
-    Active::all_of_model(&effects).unwrap_or_default()
-}
-
-struct Twin<'a> {
-    sensor: &'a Sensor,
-    rays: &'a Rays,
-    model: &'a NoiseModel,
-    effects: &'a [Active],
-    seed: Seed,
-}
-
-/// More frames of a twin than this add nothing that an eye sees.
-const MAX_TWIN_FRAMES: usize = 16;
-
-impl Twin<'_> {
-    fn frames(&self, index: usize, field: &Field, session_s: f64) -> Option<Vec<(f64, Frame)>> {
+    let effects = Active::all_of_model(&effects).unwrap_or_default();
+    let (rays, sigma) = (sensor.camera.rays(), &done.model.sigma);
+    let camera = FormulaSensor { sensor, rays: &rays, sigma, effects: &effects, seed };
+    let session_s = done.fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
+    let retake = |index, field: &Field| {
+        // Beside a simulated recording, what is shown is a difference already.
+        if !done.against.is_empty() {
+            return None;
+        }
         let times = field.frames.iter().take(MAX_TWIN_FRAMES).map(|f| f.0);
         let stamps = times.map(|t| field.time_s + t).collect();
         let notes = ViewNotes {
@@ -226,37 +198,13 @@ impl Twin<'_> {
             ambient_lux: field.ambient_lux,
             ..ViewNotes::default()
         };
-        let plan = plan_on(&field.name, &field.plane, &field.pixels, self.rays, stamps, notes);
-        let seen = plan.seen(&self.sensor.camera, self.rays);
-        let camera = FormulaSensor {
-            sensor: self.sensor,
-            rays: self.rays,
-            sigma: &self.model.sigma,
-            effects: self.effects,
-            seed: self.seed,
-        };
-        let mut shooting = camera.begin(&seen).under(plan.ambient_lux).at(plan.notes.temperature_c);
+        let plan = plan_on(&field.name, &field.plane, &field.pixels, &rays, stamps, notes);
+        let seen = plan.seen(&sensor.camera, &rays);
+        let mut shooting = camera.begin(&seen);
+        (shooting.ambient_lux, shooting.temperature_c) =
+            (plan.ambient_lux, plan.notes.temperature_c);
         let shot = |(_, instant): (f64, Instant)| (instant.view_s, shooting.shoot(instant).depth);
         Some(plan.instants(index, session_s).map(shot).collect())
-    }
-}
-
-fn picture(p: ViewPictures, done: &Diagnosed) -> Picture {
-    let view = &done.diagnosis.views[p.view];
-    let tilt = view.theta_rad.to_degrees();
-    let beyond = if done.against.is_empty() { "" } else { ", recorded minus simulated" };
-    let plural = if view.frames == 1 { "" } else { "s" };
-    Picture {
-        caption: format!(
-            "View {}{beyond}: board at {:.2} m, tilted {tilt:.0}°; mean of {} frame{plural}",
-            view.name, view.z_m, view.frames
-        ),
-        width: p.width,
-        height: p.height,
-        range: p.range_px(),
-        before: p.before,
-        after: p.after,
-        simulated: p.twin,
-        unit: "px",
-    }
+    };
+    pictures(done, sensor, given, &retake)
 }

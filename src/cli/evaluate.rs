@@ -77,16 +77,10 @@ pub fn as_json(evaluation: &Evaluation) -> Value {
 }
 
 fn spread(s: &Spread, unit: &str) -> Value {
-    let figures = [
-        ("rmse", s.rmse),
-        ("mean", s.mean),
-        ("median", s.median),
-        ("std", s.std),
-        ("min", s.min),
-        ("max", s.max),
-    ];
+    let names = ["rmse", "mean", "median", "std", "min", "max"];
+    let figures = names.into_iter().zip([s.rmse, s.mean, s.median, s.std, s.min, s.max]);
     let mut object: serde_json::Map<String, Value> =
-        figures.iter().map(|(name, v)| (format!("{name}_{unit}"), json!(v))).collect();
+        figures.map(|(name, v)| (format!("{name}_{unit}"), json!(v))).collect();
     object.insert("pairs".into(), json!(s.pairs));
     Value::Object(object)
 }

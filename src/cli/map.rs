@@ -12,7 +12,7 @@ use kinoise::trajectory::tum_text;
 use kinoise::{NoiseModel, Seed};
 use serde_json::{Value, json};
 
-use super::common::{Bar, Global, Input, Model, Thinning, notes, one_of, say};
+use super::common::{Global, Input, Model, Thinning, notes, one_of, say, with_bar};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -34,8 +34,10 @@ struct Tuning {
     /// What frames are aligned to, and how
     #[arg(long, default_value = "best", value_parser = one_of::<Method, 4>([
         ("best", "What was measured to be best: model", Options::best),
-        ("paper", "The paper's: 3 cm voxels, exact nearest neighbours, frame to frame", paper),
-        ("projective", "Image blocks, neighbours by projection, frame to frame: the fastest", projective),
+        ("paper", "The paper's: 3 cm voxels, exact nearest neighbours, frame to frame",
+            || Options::paper(Weights::Model, Init::None)),
+        ("projective", "Image blocks, neighbours by projection, frame to frame: the fastest",
+            || Options { method: map::Method::Projective, ..Options::best() }),
         ("model", "Image blocks, neighbours by projection, frame to map", Options::best),
     ]))]
     method: Method,
@@ -85,14 +87,6 @@ struct Tuning {
 /// The options that a method begins with.
 type Method = fn() -> Options;
 
-fn paper() -> Options {
-    Options::paper(Weights::Model, Init::None)
-}
-
-fn projective() -> Options {
-    Options { method: map::Method::Projective, ..Options::best() }
-}
-
 impl Tuning {
     fn options(&self, seed: Seed) -> Options {
         let options = (self.method)();
@@ -133,17 +127,14 @@ pub fn follow(
     folder: &Path,
 ) -> anyhow::Result<Value> {
     let output = OutputDir::create(folder)?;
-    let bar = Bar::new("frames");
     let begin = std::time::Instant::now();
-    let mapped = map::map(sequence, model, options, &|done, all| bar.step(done, all))?;
-    drop(bar);
+    let mapped = with_bar("frames", |step| map::map(sequence, model, options, step))?;
     let seconds = begin.elapsed().as_secs_f64();
     let against = truth(sequence, &mapped);
     let stats = stats(&mapped, options, &against, seconds);
     output.write("trajectory.txt", tum_text(&mapped.trajectory()).as_bytes())?;
     output.write("map.ply", &ply(&mapped.map))?;
-    let page = map_page(title, &mapped.map, &mapped.frames);
-    output.write("map.html", page.as_bytes())?;
+    output.write("map.html", map_page(title, &mapped.map, &mapped.frames).as_bytes())?;
     output.write("frames.csv", frames_csv(&mapped.frames).as_bytes())?;
     output.write("stats.json", serde_json::to_string_pretty(&stats)?.as_bytes())?;
     notes(sequence.remarks.iter().chain(&mapped.remarks));
@@ -171,13 +162,9 @@ fn report(mapped: &Mapped, against: &Option<Result<Evaluation, String>>, output:
         Some(Err(why)) => say(format!("note: not compared with the ground truth: {why}")),
         None => {}
     }
-    say(format!(
-        "{} of {} frames have a pose; {} points; wrote {}",
-        mapped.frames.len() - mapped.lost(),
-        mapped.frames.len(),
-        mapped.map.len(),
-        output.display()
-    ));
+    let (frames, points) = (mapped.frames.len(), mapped.map.len());
+    let (posed, folder) = (frames - mapped.lost(), output.display());
+    say(format!("{posed} of {frames} frames have a pose; {points} points; wrote {folder}"));
 }
 
 fn stats(
@@ -186,12 +173,11 @@ fn stats(
     against: &Option<Result<Evaluation, String>>,
     seconds: f64,
 ) -> Value {
-    let aligned: Vec<&Alignment> =
-        mapped.frames.iter().filter_map(|f| f.alignment.as_ref()).collect();
+    let aligned = || mapped.frames.iter().filter_map(|f| f.alignment.as_ref());
     let mean = |of: fn(&Alignment) -> f64| {
-        aligned.iter().map(|a| of(a)).sum::<f64>() / aligned.len().max(1) as f64
+        aligned().map(of).sum::<f64>() / aligned().count().max(1) as f64
     };
-    let min = |of: fn(&Alignment) -> f64| aligned.iter().map(|a| of(a)).fold(1.0, f64::min);
+    let min = |of: fn(&Alignment) -> f64| aligned().map(of).fold(1.0, f64::min);
     let all: Vec<Stages> = mapped.frames.iter().map(|f| f.stages.clone()).collect();
     let mut ms: serde_json::Map<String, Value> =
         Stages::medians(&all).each().map(|(name, v)| (name.to_string(), json!(v))).collect();

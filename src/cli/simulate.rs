@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use clap::{Args, ValueEnum};
 use kinoise::effects::Active;
 use kinoise::io::{Assumed, open, write_json};
@@ -11,7 +11,7 @@ use kinoise::simulate::{Physics, Shoot, ViewPlan, kinect_v1, plan_grid, plan_lik
 use kinoise::{Form, NoiseModel, Sensor, SigmaModel};
 use serde_json::{Value, json};
 
-use super::common::{Bar, Global, MAX_FRAMES, count, notes, say};
+use super::common::{Global, MAX_FRAMES, count, notes, say, with_bar};
 use super::simulate_room::RoomArguments;
 use super::simulate_scene::{PosesArguments, SceneryArguments};
 
@@ -90,9 +90,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
 
 /// Film the office: what programs are told of it, and the recipe.
 fn write_film(film: &Film, output: &Path) -> anyhow::Result<(Value, Value)> {
-    let bar = Bar::new("frames");
-    film.write(output, &|done, all| bar.step(done, all))?;
-    drop(bar);
+    with_bar("frames", |step| film.write(output, step))?;
     let frames = film.poses.len();
     say(format!("wrote {frames} frames of a room to {}", output.display()));
     Ok((json!({"frames": frames, "output": output}), film.recipe()))
@@ -112,16 +110,13 @@ fn shoot(
         note_idle(effects, &arguments.scenery);
     }
     let shoot = Shoot { sensor, views, physics, infrared: arguments.infrared, seed: global.seed() };
-    let bar = Bar::new("views");
-    let blind = shoot.write(&arguments.output, &|done, all| bar.step(done, all))?;
-    drop(bar);
+    let blind = with_bar("views", |step| shoot.write(&arguments.output, step))?;
     const UNSEEN: &str = "the target is out of the picture or beyond the depth code";
     let (output, views) = (arguments.output.display(), shoot.views.len());
-    if blind.len() == views {
-        bail!(
-            "{output}: no view shows any depth: {UNSEEN}; change --distances, --azimuths or --board"
-        );
-    }
+    ensure!(
+        blind.len() < views,
+        "{output}: no view shows any depth: {UNSEEN}; change --distances, --azimuths or --board"
+    );
     notes(blind.iter().map(|name| format!("view {name} shows no depth: {UNSEEN}")));
     let frames: usize = shoot.views.iter().map(|v| v.stamps.len()).sum();
     say(format!("wrote {views} views, {frames} frames, to {output}"));
@@ -144,9 +139,7 @@ fn plans(
     let recording = open(like, &Assumed::default())?;
     let (plans, excluded) = plan_like(&recording, scenery.reference_error_m.unwrap_or(0.0), seed);
     notes(&excluded);
-    if plans.is_empty() {
-        bail!("{}: no view shows a plane; see the notes", like.display());
-    }
+    ensure!(!plans.is_empty(), "{}: no view shows a plane; see the notes", like.display());
     Ok((plans, Some(recording.sensor)))
 }
 
@@ -157,17 +150,14 @@ fn physics(
     effects: Vec<Active>,
 ) -> anyhow::Result<Physics> {
     if arguments.physics == PhysicsArgument::Formula {
-        if !arguments.causes.is_empty() {
-            bail!("--cause belongs to --physics speckle; by formula there is --effect");
-        }
+        let foreign = "--cause belongs to --physics speckle; by formula there is --effect";
+        ensure!(arguments.causes.is_empty(), foreign);
         return Ok(Physics::Formula { sigma, effects });
     }
-    if !arguments.effects.is_empty() {
-        bail!("--effect belongs to --physics formula; by light there is --cause");
-    }
-    if !effects.is_empty() {
-        bail!("--model: it brings effects, which are formulas; by light there is --cause");
-    }
+    let foreign = "--effect belongs to --physics formula; by light there is --cause";
+    ensure!(arguments.effects.is_empty(), foreign);
+    let brought = "--model: it brings effects, which are formulas; by light there is --cause";
+    ensure!(effects.is_empty(), brought);
     if arguments.model.is_some() {
         say("note: of the model only the sensor is used: by light sigma arises by itself");
     }
@@ -187,28 +177,23 @@ fn sensor_and_noise(
         return Ok((kinect_v1(factor), eq1_everywhere(), Vec::new()));
     };
     let model = NoiseModel::read(path)?;
+    let file = path.display();
     let sensor = match model.sensor {
         Some(_) if shrink.is_some() => {
-            bail!("--shrink: {} brings its own sensor; leave --shrink out", path.display())
+            bail!("--shrink: {file} brings its own sensor; leave --shrink out")
         }
-        Some(file) => {
-            file.sensor().map_err(|e| anyhow::anyhow!("{}: sensor: {e}", path.display()))?
-        }
+        Some(own) => own.sensor().map_err(|e| anyhow::anyhow!("{file}: sensor: {e}"))?,
         None => kinect_v1(factor),
     };
     if model.sigma.direction == Direction::Perpendicular {
-        say(format!(
-            "note: {} describes distances across the plane; depth noise is 1/cos(tilt) times them",
-            path.display()
-        ));
+        let across = "describes distances across the plane; depth noise is 1/cos(tilt) times them";
+        say(format!("note: {file} {across}"));
     }
-    let effects =
-        Active::all_of_model(&model.effects).with_context(|| path.display().to_string())?;
+    let effects = Active::all_of_model(&model.effects).with_context(|| file.to_string())?;
     let shaped = |id: &str| model.effects.iter().any(|e| e.id == id && !e.shape.is_empty());
     if let Some(id) = given.iter().map(|a| a.effect.card().id).find(|id| shaped(id)) {
-        bail!(
-            "--effect {id}: the model brings its shape; take it out of the model, or leave --effect out"
-        );
+        let remedy = "take it out of the model, or leave --effect out";
+        bail!("--effect {id}: the model brings its shape; {remedy}");
     }
     Ok((sensor, model.sigma, effects))
 }
@@ -227,15 +212,11 @@ fn note_clamped(views: &[ViewPlan], sigma: &SigmaModel) {
         let theta = plane.theta().max(sigma.domain.theta_rad[0]);
         !sigma.domain.contains(plane.depth(0.0, 0.0), theta)
     };
-    let count = views.iter().filter(outside).count();
+    let (count, all) = (views.iter().filter(outside).count(), views.len());
+    let ([near, far], tilt) = (sigma.domain.z_m, sigma.domain.theta_rad[1].to_degrees());
     if count > 0 {
-        let d = sigma.domain;
         say(format!(
-            "note: {count} of {} views lie outside the model's range (z {:.2} to {:.2} m, tilt up to {:.1} degrees); sigma is clamped to its edge there",
-            views.len(),
-            d.z_m[0],
-            d.z_m[1],
-            d.theta_rad[1].to_degrees()
+            "note: {count} of {all} views lie outside the model's range (z {near:.2} to {far:.2} m, tilt up to {tilt:.1} degrees); sigma is clamped to its edge there"
         ));
     }
 }
@@ -258,18 +239,15 @@ fn note_idle(effects: &[Active], scenery: &SceneryArguments) {
 
 /// A recipe is a new file outside the recording; checked before hours of shooting, not after.
 fn check_recipe(path: &Path, output: &Path) -> anyhow::Result<()> {
-    if path.exists() {
-        bail!("--recipe {}: the file exists; name a new one", path.display());
-    }
-    if path.starts_with(output) {
-        bail!(
-            "--recipe {}: inside the recording it would give the answer away; put it elsewhere",
-            path.display()
-        );
-    }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-    if folder.is_some_and(|f| !f.is_dir()) {
-        bail!("--recipe {}: its folder does not exist; make it first", path.display());
-    }
-    Ok(())
+    let fault = if path.exists() {
+        "the file exists; name a new one"
+    } else if path.starts_with(output) {
+        "inside the recording it would give the answer away; put it elsewhere"
+    } else if folder.is_some_and(|f| !f.is_dir()) {
+        "its folder does not exist; make it first"
+    } else {
+        return Ok(());
+    };
+    bail!("--recipe {}: {fault}", path.display())
 }

@@ -41,33 +41,25 @@ fn fitted(
     stride: usize,
 ) -> anyhow::Result<Vec<Pose>> {
     let read = read_trajectory(file)?;
-    if read.repeated > 0 {
-        say(format!(
-            "note: {}: {} lines repeat the time of the line before; they are left out",
-            file.display(),
-            read.repeated
-        ));
+    let (path, repeated) = (file.display(), read.repeated);
+    if repeated > 0 {
+        let what = "lines repeat the time of the line before; they are left out";
+        say(format!("note: {path}: {repeated} {what}"));
     }
     let Resampled { poses, gaps } =
         resample(&read.poses, frames.map(|n| n.saturating_mul(stride)))?;
     let placed = place(room, &poses)?;
     if !gaps.is_empty() {
-        let seconds: f64 = gaps.iter().map(|g| g.seconds()).sum();
+        let (count, seconds) = (gaps.len(), gaps.iter().map(|g| g.seconds()).sum::<f64>());
         say(format!(
-            "note: {}: {} gaps without poses, {seconds:.1} s in all; the path is interpolated there",
-            file.display(),
-            gaps.len()
+            "note: {path}: {count} gaps without poses, {seconds:.1} s in all; the path is interpolated there"
         ));
     }
     let motion = placed.room_from_world;
-    let (shift, turn) = (motion.translation, motion.rotation.euler_angles().2);
+    let (shift, turn) = (motion.translation, motion.rotation.euler_angles().2.to_degrees());
+    let (x, y, z, clearance) = (shift.x, shift.y, shift.z, placed.clearance_m);
     say(format!(
-        "note: path placed by a turn of {:.0} degrees and a shift of ({:.2}, {:.2}, {:.2}) m; never nearer than {:.2} m to anything ({CLEARANCE_M} m are needed)",
-        turn.to_degrees(),
-        shift.x,
-        shift.y,
-        shift.z,
-        placed.clearance_m
+        "note: path placed by a turn of {turn:.0} degrees and a shift of ({x:.2}, {y:.2}, {z:.2}) m; never nearer than {clearance:.2} m to anything ({CLEARANCE_M} m are needed)"
     ));
     Ok(placed.apply(&poses))
 }

@@ -1,18 +1,22 @@
 //! What stands before the camera of `kinoise simulate`, and where.
 
-use anyhow::bail;
-use clap::{Args, ValueEnum};
+use anyhow::ensure;
+use clap::Args;
 use kinoise::scene::{Board, PATCH_SIDE_M, Print, Target, WHITE};
 use kinoise::simulate::{Grid, GridView, Scenery};
 use kinoise::units::shortest;
 
-use super::common::{between, count, numbers};
+use super::common::{between, count, numbers, one_of};
 
 #[derive(Debug, Args)]
 pub struct PosesArguments {
     /// The poses
-    #[arg(long, value_enum, default_value_t = GridArgument::Paper)]
-    grid: GridArgument,
+    #[arg(long, default_value = "paper", value_parser = one_of([(
+        "paper",
+        "1 to 4 m by 0.5 m, 0 to 70 degrees by 10, and 76 for 80: Eq. 1 has its pole at 79.6",
+        Grid::paper as fn() -> Grid,
+    )]))]
+    grid: fn() -> Grid,
     /// Own distances in m, in place of the grid's
     #[arg(long, value_delimiter = ',', value_name = "M,M,..", allow_hyphen_values = true, value_parser = between(0.1, 20.0, "m"))]
     distances: Vec<f64>,
@@ -27,25 +31,17 @@ pub struct PosesArguments {
     pub ordered: bool,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum GridArgument {
-    /// 1 to 4 m by 0.5 m, 0 to 70 degrees by 10, and 76 for 80: Eq. 1 has its pole at 79.6
-    Paper,
-}
-
 impl PosesArguments {
     pub fn views(&self) -> anyhow::Result<Vec<GridView>> {
-        let GridArgument::Paper = self.grid;
-        let mut grid = Grid::paper();
+        let mut grid = (self.grid)();
         if !self.distances.is_empty() {
             grid.distances_m = self.distances.clone();
         }
         if !self.tilts.is_empty() {
             grid.tilts_rad = self.tilts.iter().map(|t| t.to_radians()).collect();
         }
-        if self.azimuths.iter().any(|a| !a.is_finite()) {
-            bail!("--azimuths: a direction is a number of degrees");
-        }
+        let finite = self.azimuths.iter().all(|a| a.is_finite());
+        ensure!(finite, "--azimuths: a direction is a number of degrees");
         if self.azimuths.is_empty() {
             return Ok(grid.views());
         }
@@ -85,10 +81,9 @@ const MAX_CLUTTER: usize = 100;
 impl SceneryArguments {
     pub fn scenery(&self) -> anyhow::Result<Scenery> {
         let [width_m, height_m] = self.board;
-        if !(width_m > 0.0 && height_m > 0.0) {
-            let [w, h] = self.board.map(shortest);
-            bail!("--board {w},{h}: give a width and a height in m");
-        }
+        let [w, h] = self.board.map(shortest);
+        let positive = width_m > 0.0 && height_m > 0.0;
+        ensure!(positive, "--board {w},{h}: give a width and a height in m");
         let board = Target::Board(Board { width_m, height_m });
         Ok(Scenery {
             target: if self.wall_target { Target::Wall } else { board },

@@ -58,7 +58,6 @@ pub fn past_the_paper() -> Vec<Variant> {
     .into()
 }
 
-/// One run of a variant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
     pub seed: u64,
@@ -95,9 +94,7 @@ pub struct Comparison {
 pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
 
 /// Run all variants, each `repeats` times with another seed.
-///
-/// # Errors
-/// When the sequence has no ground truth of its time, or the model is of another sensor.
+/// An error when the sequence has no ground truth of its time, or the model is of another sensor.
 pub fn compare(
     sequence: &Sequence,
     model: &NoiseModel,

@@ -35,8 +35,6 @@ pub type Retake<'a> = &'a (dyn Fn(usize, &Field) -> Option<Vec<(f64, Frame)>> + 
 const VIEWS: usize = 3;
 /// Wider pictures only show grain, px.
 const WIDEST: usize = 400;
-/// A picture covers this share of its pixels; the few beyond saturate.
-const COVERED: f64 = 0.98;
 
 /// Of the views that changed most, spread over the distances. `model` is the one that was given.
 pub fn pictures(
@@ -70,22 +68,6 @@ pub fn pictures(
             ViewPictures { view, width, height, before, after, twin }
         })
         .collect()
-}
-
-impl ViewPictures {
-    /// Where the colours end, px: 1, 2 or 5 times a power of ten.
-    pub fn range_px(&self) -> f32 {
-        let mut sizes: Vec<f32> =
-            self.before.iter().map(|v| v.abs()).filter(|v| v.is_finite()).collect();
-        if sizes.is_empty() {
-            return 1.0;
-        }
-        let rank = ((sizes.len() - 1) as f64 * COVERED) as usize;
-        let (_, size, _) = sizes.select_nth_unstable_by(rank, f32::total_cmp);
-        let decade = 10f32.powf(size.max(1e-4).log10().floor());
-        let mantissa = *size / decade * (1.0 - 1e-6);
-        [1.0, 2.0, 5.0].into_iter().find(|m| *m >= mantissa).unwrap_or(10.0) * decade
-    }
 }
 
 /// The nearest, middle and farthest third of the views, the most changed view of each.

@@ -5,20 +5,18 @@
 //! * ATE: positions of associated poses after the best rigid alignment ([`align`], no scale).
 //! * RPE: the motion over a fixed interval, estimated against true, needs no alignment.
 
-mod ate;
 mod rpe;
-mod spread;
 
-pub use ate::{Ate, absolute, align};
 pub use rpe::{Delta, Rpe, relative};
-pub use spread::Spread;
 
 use std::path::Path;
 
-use crate::error::Result;
-use crate::trajectory::{Pose, read_benchmark};
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-/// ATE and RPE of one estimate.
+use crate::error::{Error, Result};
+use crate::stats::median;
+use crate::trajectory::{Pose, associate, read_benchmark};
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
     pub ate: Ate,
@@ -26,19 +24,132 @@ pub struct Evaluation {
 }
 
 /// Of poses in time order.
-///
-/// # Errors
-/// When too few of them belong to the same moments.
+/// An error when too few of them belong to the same moments.
 pub fn evaluate(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Evaluation> {
     Ok(Evaluation { ate: absolute(truth, estimate)?, rpe: relative(truth, estimate, delta)? })
 }
 
 /// Of two files.
-///
-/// # Errors
-/// When a file cannot be read, or as [`evaluate`].
 pub fn evaluate_files(truth: &Path, estimate: &Path, delta: Delta) -> Result<Evaluation> {
     evaluate(&read_benchmark(truth)?.poses, &read_benchmark(estimate)?.poses, delta)
+}
+
+/// A list of errors in figures, in their unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spread {
+    pub rmse: f64,
+    pub mean: f64,
+    pub median: f64,
+    /// Of the population: divided by n.
+    pub std: f64,
+    pub min: f64,
+    pub max: f64,
+    pub pairs: usize,
+}
+
+impl Spread {
+    /// `None` of nothing.
+    pub fn of(errors: &[f64]) -> Option<Self> {
+        if errors.is_empty() {
+            return None;
+        }
+        let n = errors.len() as f64;
+        let mean = errors.iter().sum::<f64>() / n;
+        let square = errors.iter().map(|e| e * e).sum::<f64>() / n;
+        let variance = errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / n;
+        Some(Spread {
+            rmse: square.sqrt(),
+            mean,
+            median: median(&mut errors.to_vec()),
+            std: variance.sqrt(),
+            min: errors.iter().copied().fold(f64::INFINITY, f64::min),
+            max: errors.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            pairs: errors.len(),
+        })
+    }
+
+    pub fn scaled(&self, factor: f64) -> Self {
+        Spread {
+            rmse: self.rmse * factor,
+            mean: self.mean * factor,
+            median: self.median * factor,
+            std: self.std * factor,
+            min: self.min * factor,
+            max: self.max * factor,
+            pairs: self.pairs,
+        }
+    }
+}
+
+/// The two trajectories share too few moments.
+fn too_few(truth: &[Pose], estimate: &[Pose], pairs: usize) -> Error {
+    let span = |poses: &[Pose]| match (poses.first(), poses.last()) {
+        (Some(a), Some(b)) => format!("{:.2} to {:.2} s", a.stamp, b.stamp),
+        _ => "nothing".into(),
+    };
+    Error::NotEnough {
+        what: format!(
+            "{pairs} poses of the estimate ({}) have a true one ({}) at their time",
+            span(estimate),
+            span(truth)
+        ),
+        remedy: "give the ground truth of this very sequence, in the same clock".into(),
+    }
+}
+
+/// Distances of associated positions after alignment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ate {
+    /// m.
+    pub error: Spread,
+    /// What was aligned: the estimate's world in the true one.
+    pub truth_from_estimate: Isometry3<f64>,
+    /// Stamp of the estimate, s, and its distance, m.
+    pub each: Vec<(f64, f64)>,
+}
+
+/// Fewer positions determine no rotation.
+const MIN_PAIRS: usize = 3;
+/// Stamps of one moment differ by less, s (the scripts' `max_difference`).
+const MAX_DIFFERENCE_S: f64 = 0.02;
+
+/// Of poses in time order.
+/// An error when fewer than three of them belong to the same moments.
+pub fn absolute(truth: &[Pose], estimate: &[Pose]) -> Result<Ate> {
+    let stamps = |poses: &[Pose]| poses.iter().map(|p| p.stamp).collect::<Vec<f64>>();
+    let pairs = associate(&stamps(truth), &stamps(estimate), MAX_DIFFERENCE_S);
+    let place = |pose: &Pose| pose.world_from_camera.translation.vector;
+    let matched: Vec<(Vector3<f64>, Vector3<f64>)> =
+        pairs.iter().map(|p| (place(&truth[p.first]), place(&estimate[p.second]))).collect();
+    let Some(truth_from_estimate) = align(&matched) else {
+        return Err(too_few(truth, estimate, pairs.len()));
+    };
+    let distance = |(t, e): &(Vector3<f64>, Vector3<f64>)| {
+        (truth_from_estimate.rotation * e + truth_from_estimate.translation.vector - t).norm()
+    };
+    let errors: Vec<f64> = matched.iter().map(distance).collect();
+    let error = Spread::of(&errors).ok_or_else(|| too_few(truth, estimate, 0))?;
+    let each = pairs.iter().map(|p| estimate[p.second].stamp).zip(errors).collect();
+    Ok(Ate { error, truth_from_estimate, each })
+}
+
+/// The rigid motion that brings the second points nearest to the first, in the least squares sense
+/// (Horn 1987; by singular values as in the script). `None` of fewer than three pairs.
+pub fn align(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Isometry3<f64>> {
+    if pairs.len() < MIN_PAIRS {
+        return None;
+    }
+    let n = pairs.len() as f64;
+    let to = pairs.iter().map(|p| p.0).sum::<Vector3<f64>>() / n;
+    let from = pairs.iter().map(|p| p.1).sum::<Vector3<f64>>() / n;
+    let spread: Matrix3<f64> = pairs.iter().map(|p| (p.0 - to) * (p.1 - from).transpose()).sum();
+    let svd = spread.svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    // A reflection fits better than any rotation: turn the least certain axis over.
+    let hand = if u.determinant() * v_t.determinant() < 0.0 { -1.0 } else { 1.0 };
+    let turn = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, hand)) * v_t;
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
+    Some(Isometry3::from_parts(Translation3::from(to - rotation * from), rotation))
 }
 
 #[cfg(test)]

@@ -2,12 +2,11 @@
 
 use nalgebra::Isometry3;
 
-use super::spread::{Spread, too_few};
+use super::{Spread, too_few};
 use crate::error::{Error, Result};
 use crate::stats::median;
 use crate::trajectory::Pose;
 
-/// The interval over which motions are compared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Delta {
     Seconds(f64),
@@ -26,9 +25,7 @@ pub struct Rpe {
 }
 
 /// Of poses in time order.
-///
-/// # Errors
-/// When fewer than two motions have true poses at both ends.
+/// An error when fewer than two motions have true poses at both ends.
 pub fn relative(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Rpe> {
     if truth.len() < 2 || estimate.len() < 2 {
         return Err(too_few(truth, estimate, truth.len().min(estimate.len())));
@@ -97,8 +94,7 @@ fn motion(to: &Isometry3<f64>, from: &Isometry3<f64>) -> Isometry3<f64> {
     to.inverse() * from
 }
 
-/// Index of the value nearest to `wanted` in an ascending list: the script's own bisection, which
-/// decides ties.
+/// Index of the value nearest to `wanted`, ascending: the script's own bisection decides ties.
 fn nearest(len: usize, value: impl Fn(usize) -> f64, wanted: f64) -> usize {
     let mut best = 0;
     let mut difference = (value(0) - wanted).abs();

@@ -1,10 +1,10 @@
-//! Depth, infrared and colour images, read: PNG, PGM as fakenect writes it, JPEG for colour.
+//! Depth, infrared and colour images, read and written: PNG, PGM as fakenect writes it; JPEG read.
 
 use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 
-use png::{BitDepth, ColorType};
+use png::{BitDepth, ColorType, Compression};
 use sha2::{Digest, Sha256};
 
 use crate::camera::usable_size;
@@ -19,7 +19,6 @@ pub struct FrameSource {
     hash: Sha256,
 }
 
-/// What to do about an image that is not what it should be.
 const REMEDY_DEPTH: &str = "depth must be a 16-bit single-channel PNG of the recording's size";
 
 impl FrameSource {
@@ -28,10 +27,7 @@ impl FrameSource {
         FrameSource { width, height, hash: Sha256::new() }
     }
 
-    /// Read one depth frame.
-    ///
-    /// # Errors
-    /// When the file is missing, truncated, of another kind (8 bit, colour) or of another size.
+    /// An error when the file is missing, truncated, of another kind (8 bit, colour) or size.
     pub fn read(&mut self, path: &Path) -> Result<Frame> {
         let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
         self.hash.update(&bytes);
@@ -45,9 +41,6 @@ impl FrameSource {
 }
 
 /// One depth frame of this size, px, without a hash.
-///
-/// # Errors
-/// As [`FrameSource::read`].
 pub(crate) fn read_depth(path: &Path, width: usize, height: usize) -> Result<Frame> {
     let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
     decode_sized(path, &bytes, width, height)
@@ -71,18 +64,14 @@ fn decode_sized(path: &Path, bytes: &[u8], width: usize, height: usize) -> Resul
 /// A colour image, PNG or JPEG: red, green, blue, row-major.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColourImage {
-    /// Columns, px.
     pub width: usize,
-    /// Rows, px.
     pub height: usize,
     pub rgb: Vec<u8>,
 }
 
 impl ColourImage {
     /// Read one image.
-    ///
-    /// # Errors
-    /// When the file is not a whole PNG or JPEG.
+    /// An error when the file is not a whole PNG or JPEG.
     pub fn read(path: &Path) -> Result<Self> {
         let damaged = |e: image::ImageError| {
             Error::image(path, e.to_string(), "colour must be a whole PNG or JPEG")
@@ -172,9 +161,7 @@ fn pgm_header(bytes: &[u8]) -> Option<([usize; 3], &[u8])> {
 /// Infrared amplitude, 8 or 16 bit, as numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InfraredImage {
-    /// Columns, px.
     pub width: usize,
-    /// Rows, px.
     pub height: usize,
     /// Row-major, in the image's own units.
     pub amplitude: Vec<u16>,
@@ -182,9 +169,7 @@ pub struct InfraredImage {
 
 impl InfraredImage {
     /// Read one image.
-    ///
-    /// # Errors
-    /// When the file is not a whole grey PNG of 8 or 16 bits.
+    /// An error when the file is not a whole grey PNG of 8 or 16 bits.
     pub fn read(path: &Path) -> Result<Self> {
         let image = image::ImageReader::open(path)
             .map_err(|e| Error::read(path, e))?
@@ -207,6 +192,55 @@ impl InfraredImage {
     }
 }
 
+/// A depth frame as the bytes of a 16-bit grey PNG.
+/// An error when the frame's size does not match its raw values.
+pub fn encode_png16(frame: &Frame) -> Result<Vec<u8>> {
+    encode_depth(frame, Compression::Balanced)
+}
+
+/// As [`encode_png16`], in a tenth of the time and some more bytes.
+pub fn encode_png16_quickly(frame: &Frame) -> Result<Vec<u8>> {
+    encode_depth(frame, Compression::Fast)
+}
+
+/// Red, green, blue, row-major, as the bytes of an 8-bit PNG, at the quickest compression.
+/// An error when there are not three bytes a pixel.
+pub fn encode_rgb(width: usize, height: usize, rgb: &[u8]) -> Result<Vec<u8>> {
+    encode([width, height], (ColorType::Rgb, BitDepth::Eight), Compression::Fast, rgb)
+}
+
+/// A depth frame as fakenect writes it: a PGM whose values are little-endian.
+pub fn encode_pgm16(frame: &Frame) -> Vec<u8> {
+    let mut bytes = format!("P5 {} {} 65535\n", frame.width, frame.height).into_bytes();
+    bytes.extend(frame.raw.iter().flat_map(|w| w.to_le_bytes()));
+    bytes
+}
+
+fn encode_depth(frame: &Frame, compression: Compression) -> Result<Vec<u8>> {
+    let data: Vec<u8> = frame.raw.iter().flat_map(|w| w.to_be_bytes()).collect();
+    let kind = (ColorType::Grayscale, BitDepth::Sixteen);
+    encode([frame.width, frame.height], kind, compression, &data)
+}
+
+fn encode(
+    [width, height]: [usize; 2],
+    (colour, depth): (ColorType, BitDepth),
+    compression: Compression,
+    data: &[u8],
+) -> Result<Vec<u8>> {
+    let failed = |e: png::EncodingError| Error::Drawing { what: "PNG", why: e.to_string() };
+    // What a sensor sees shrinks to less than it was, if only by its filtered rows.
+    let mut bytes = Vec::with_capacity(data.len());
+    let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
+    encoder.set_color(colour);
+    encoder.set_depth(depth);
+    encoder.set_compression(compression);
+    let mut writer = encoder.write_header().map_err(failed)?;
+    writer.write_image_data(data).map_err(failed)?;
+    writer.finish().map_err(failed)?;
+    Ok(bytes)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -217,14 +251,9 @@ mod tests {
     }
 
     #[test]
-    fn png_round_trip_is_exact() {
+    fn a_png_reads_back_exactly_and_every_truncation_is_an_error_not_a_panic() {
         let bytes = encode_png16(&frame()).unwrap();
         assert_eq!(decode_png16(Path::new("x.png"), &bytes).unwrap(), frame());
-    }
-
-    #[test]
-    fn every_truncation_of_a_png_is_an_error_not_a_panic() {
-        let bytes = encode_png16(&frame()).unwrap();
         let data_end = bytes.len() - 12; // IEND carries no pixels
         for cut in 0..data_end - 4 {
             assert!(decode_png16(Path::new("x.png"), &bytes[..cut]).is_err(), "cut at {cut}");
@@ -232,13 +261,9 @@ mod tests {
     }
 
     #[test]
-    fn pgm_round_trip_is_exact() {
+    fn a_pgm_reads_back_exactly_and_its_words_are_little_endian() {
         let bytes = encode_pgm16(&frame());
         assert_eq!(decode_fakenect_pgm(Path::new("d.pgm"), &bytes).unwrap(), frame());
-    }
-
-    #[test]
-    fn fakenect_words_are_little_endian() {
         let mut bytes = b"P5 2 1 65535\n".to_vec();
         bytes.extend([0x01, 0x02, 0xff, 0x07]);
         let frame = decode_fakenect_pgm(Path::new("d.pgm"), &bytes).unwrap();
@@ -246,12 +271,7 @@ mod tests {
         for cut in 0..bytes.len() {
             assert!(decode_fakenect_pgm(Path::new("d.pgm"), &bytes[..cut]).is_err());
         }
-    }
-
-    #[test]
-    fn a_header_that_claims_a_huge_image_is_refused() {
-        assert!(
-            decode_fakenect_pgm(Path::new("d.pgm"), b"P5 99999999 99999999 65535\n..").is_err()
-        );
+        let huge = b"P5 99999999 99999999 65535\n..";
+        assert!(decode_fakenect_pgm(Path::new("d.pgm"), huge).is_err());
     }
 }

@@ -1,14 +1,14 @@
 //! The recording layout: recording.json and one folder a view (`crate::docs::layouts`).
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::list::{FrameList, read_list};
 use super::output::{entries, write_json};
-use super::unknown::UnknownKeys;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, read_text};
 use crate::view::{
     Excluded, RECORDING_FORMAT, Recording, RecordingFile, Region, Sensor, TargetSize, View,
     ViewNotes,
@@ -23,10 +23,8 @@ const REMEDY_JSON: &str = "compare it with the recording layout in the README";
 /// `view.json`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ViewFile {
-    /// How large the target is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<TargetSize>,
-    /// Depth of the target's plane on the optical axis, measured by other means, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference_distance_m: Option<f64>,
     /// The target's region u0, v0, u1, v1, px; both edges belong to it.
@@ -35,13 +33,10 @@ pub struct ViewFile {
     /// The target's corners u, v, px; may reach outside the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub polygon: Option<Vec<[f64; 2]>>,
-    /// Degrees Celsius.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<f64>,
-    /// Light on the target, lx.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ambient_lux: Option<f64>,
-    /// For people.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub notes: Option<String>,
 }
@@ -104,7 +99,11 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
         remarks: Vec::new(),
         described_by: vec![path],
     };
-    for folder in view_folders(root)? {
+    for folder in entries(root)? {
+        let listed = [DEPTH_LIST, VIEW_FILE].iter().any(|name| folder.join(name).exists());
+        if !(listed && folder.is_dir()) {
+            continue;
+        }
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         match open_view(&folder, &name, &mut recording, &mut unknown) {
             Ok(view) => recording.views.push(view),
@@ -116,8 +115,7 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
 }
 
 pub(super) fn read_sensor(path: &Path, unknown: &mut UnknownKeys) -> Result<Sensor> {
-    let wrong =
-        |what: String| Error::Json { path: path.to_path_buf(), line: 0, what, remedy: REMEDY_JSON };
+    let wrong = |what: String| Error::text(path, 0, what, REMEDY_JSON);
     let text = read_text(path)?;
     // Another format has other keys: its name says more than the first key that is missing.
     let Format { format } = parse(path, &text)?;
@@ -139,29 +137,13 @@ struct Format {
     format: String,
 }
 
-fn read_text(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path).map_err(|e| Error::read(path, e))
-}
-
 fn parse<T: serde::de::DeserializeOwned>(path: &Path, text: &str) -> Result<T> {
-    serde_json::from_str(text).map_err(|e| Error::Json {
-        path: path.to_path_buf(),
-        line: e.line(),
-        what: without_place(&e.to_string()),
-        remedy: REMEDY_JSON,
+    serde_json::from_str(text).map_err(|e| {
+        // serde's "... at line 3 column 7" without the line, which the error has by itself.
+        let full = e.to_string();
+        let what = full.rsplit_once(" at line ").map_or(&*full, |(before, _)| before);
+        Error::text(path, e.line(), what, REMEDY_JSON)
     })
-}
-
-/// serde's "... at line 3 column 7" without the line, which the error has by itself.
-fn without_place(what: &str) -> String {
-    what.rsplit_once(" at line ").map_or(what, |(before, _)| before).into()
-}
-
-/// Sub-folders that hold a depth list, in name order.
-fn view_folders(root: &Path) -> Result<Vec<PathBuf>> {
-    let mut folders = entries(root)?;
-    folders.retain(|p| p.is_dir() && (p.join(DEPTH_LIST).exists() || p.join(VIEW_FILE).exists()));
-    Ok(folders)
 }
 
 fn open_view(
@@ -172,7 +154,8 @@ fn open_view(
 ) -> Result<View> {
     let depth_list = folder.join(DEPTH_LIST);
     let depth = read_list(&depth_list)?;
-    remark_on(&depth, name, &mut recording.remarks);
+    let of_view = |remark: &String| format!("view {name}: {remark}");
+    recording.remarks.extend(depth.remarks.iter().map(of_view));
     if depth.frames.is_empty() {
         return Err(Error::recording(
             &depth_list,
@@ -183,7 +166,7 @@ fn open_view(
     let infrared_list = folder.join(INFRARED_LIST);
     let infrared =
         if infrared_list.is_file() { read_list(&infrared_list)? } else { FrameList::default() };
-    remark_on(&infrared, name, &mut recording.remarks);
+    recording.remarks.extend(infrared.remarks.iter().map(of_view));
     let view_file = folder.join(VIEW_FILE);
     let notes = if view_file.is_file() {
         let notes = read_notes(&view_file, unknown)?;
@@ -200,37 +183,75 @@ fn read_notes(path: &Path, unknown: &mut UnknownKeys) -> Result<ViewNotes> {
     let text = read_text(path)?;
     let file: ViewFile = parse(path, &text)?;
     unknown.note(path, &parse(path, &text)?, &json!(file));
-    file.notes().map_err(|what| Error::Json {
-        path: path.to_path_buf(),
-        line: 0,
-        what,
-        remedy: REMEDY_JSON,
-    })
-}
-
-fn remark_on(list: &FrameList, view: &str, remarks: &mut Vec<String>) {
-    remarks.extend(list.remarks.iter().map(|r| format!("view {view}: {r}")));
+    file.notes().map_err(|what| Error::text(path, 0, what, REMEDY_JSON))
 }
 
 /// Write `view.json` into the view's folder; nothing where nothing is known.
-///
-/// # Errors
-/// When the folder cannot be written.
 pub fn write_view_notes(folder: &Path, notes: &ViewNotes) -> Result<()> {
     if *notes == ViewNotes::default() {
         return Ok(());
     }
     let remedy = "the view's numbers must be finite";
-    write_json(&folder.join(VIEW_FILE), &ViewFile::of(notes), remedy)?;
-    Ok(())
+    write_json(&folder.join(VIEW_FILE), &ViewFile::of(notes), remedy).map(drop)
 }
 
 /// Write `recording.json` for `sensor` into `root`.
-///
-/// # Errors
-/// When the folder cannot be written.
 pub fn write_recording_file(root: &Path, sensor: &Sensor) -> Result<()> {
     let remedy = "the sensor's numbers must be finite";
-    write_json(&root.join(DESCRIPTION), &RecordingFile::of(sensor), remedy)?;
-    Ok(())
+    write_json(&root.join(DESCRIPTION), &RecordingFile::of(sensor), remedy).map(drop)
+}
+
+/// Keys that no part of the program reads, and the files they stand in: a slip of the pen, or a
+/// newer layout. Told, not fatal: files of later versions stay readable.
+#[derive(Default)]
+pub(super) struct UnknownKeys(BTreeMap<String, Vec<PathBuf>>);
+
+impl UnknownKeys {
+    /// Whatever `given` has and `understood` (the same document, read and written again) has not.
+    pub fn note(&mut self, path: &Path, given: &Value, understood: &Value) {
+        for key in unknown_keys(given, understood) {
+            self.0.entry(key).or_default().push(path.to_path_buf());
+        }
+    }
+
+    /// A remark a key, not a remark a file.
+    pub fn remarks(&self) -> impl Iterator<Item = String> {
+        self.0.iter().map(|(key, files)| {
+            let others = match files.len() - 1 {
+                0 => String::new(),
+                n => format!(" and {n} more"),
+            };
+            format!("{}{others}: unknown key \"{key}\", which has no effect", files[0].display())
+        })
+    }
+}
+
+fn unknown_keys(given: &Value, understood: &Value) -> Vec<String> {
+    let Some(given) = given.as_object() else { return Vec::new() };
+    given
+        .iter()
+        // null is how some programs write "not given".
+        .filter(|(_, value)| !value.is_null())
+        .flat_map(|(key, value)| match understood.get(key) {
+            None => vec![key.clone()],
+            Some(known) => {
+                unknown_keys(value, known).iter().map(|inner| format!("{key}.{inner}")).collect()
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn keys_are_found_at_any_depth_and_null_is_not_given() {
+        let given = json!({
+            "roi": [0, 0, 9, 9], "distance_m": 2, "colour": null, "target": {"width_m": 1, "depth_m": 0.1}
+        });
+        let understood = json!({"roi": [0.0, 0.0, 9.0, 9.0], "target": {"width_m": 1.0}});
+        assert_eq!(unknown_keys(&given, &understood), ["distance_m", "target.depth_m"]);
+    }
 }

@@ -2,52 +2,47 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, read_text};
 use crate::view::FrameRef;
 
 /// The frames a list names, in time order, and what was odd about it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FrameList {
-    /// In time order.
     pub frames: Vec<FrameRef>,
-    /// What was odd about it.
     pub remarks: Vec<String>,
 }
 
 /// Read a list; paths in it are relative to the folder it stands in.
 ///
 /// Files that are missing, stamps out of order and stamps given twice are remarks, not errors.
-///
-/// # Errors
-/// When a line is not "timestamp path".
+/// An error when a line is not "timestamp path".
 pub fn read_list(path: &Path) -> Result<FrameList> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+    let text = read_text(path)?;
     let folder = path.parent().unwrap_or(Path::new("."));
     let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut list = FrameList::default();
-    for (i, line) in text.lines().enumerate() {
-        let content = line.trim_start_matches('\u{feff}').trim();
-        if content.is_empty() || content.starts_with('#') {
-            continue;
-        }
-        let (timestamp, named) = parse(content).ok_or_else(|| Error::Text {
-            path: path.to_path_buf(),
-            line: i + 1,
-            what: format!("\"{}\" is not \"timestamp path\"", shorten(content)),
-            remedy: "write a time in seconds, a space, and a file name",
+    for (line, content) in content_lines(&text) {
+        let (timestamp, named) = parse(content).ok_or_else(|| {
+            let what = format!("\"{}\" is not \"timestamp path\"", shorten(content));
+            Error::text(path, line, what, "write a time in seconds, a space, and a file name")
         })?;
         let target: PathBuf = folder.join(named);
         if target.is_file() {
             list.frames.push(FrameRef { timestamp, path: target });
         } else {
             list.remarks.push(format!(
-                "{file} line {} names {named}, which is missing; that frame is left out",
-                i + 1
+                "{file} line {line} names {named}, which is missing; that frame is left out"
             ));
         }
     }
     put_in_order(&mut list, &file);
     Ok(list)
+}
+
+/// Lines that are neither empty nor comments, with their numbers from 1.
+pub(crate) fn content_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let trimmed = text.lines().map(|line| line.trim_start_matches('\u{feff}').trim());
+    (1..).zip(trimmed).filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
 }
 
 fn parse(line: &str) -> Option<(f64, &str)> {
@@ -87,42 +82,4 @@ pub(super) fn shorten(line: &str) -> String {
         short.push('…');
     }
     short
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn list_of(text: &str) -> Result<FrameList> {
-        let dir = tempfile::tempdir().unwrap();
-        for name in ["a.png", "b.png"] {
-            std::fs::write(dir.path().join(name), b"").unwrap();
-        }
-        let path = dir.path().join("depth.txt");
-        std::fs::write(&path, text).unwrap();
-        read_list(&path)
-    }
-
-    #[test]
-    fn comments_blank_lines_and_a_missing_file() {
-        let list = list_of("# header\n\n0.0 a.png\n 0.1\tb.png\n0.2 gone.png\n").unwrap();
-        assert_eq!(list.frames.len(), 2);
-        assert_eq!(list.remarks.len(), 1);
-        assert!(list.remarks[0].contains("line 5 names gone.png"), "{:?}", list.remarks);
-    }
-
-    #[test]
-    fn out_of_order_is_sorted_and_told() {
-        let list = list_of("0.2 a.png\n0.1 b.png\n").unwrap();
-        assert!(list.frames[0].path.ends_with("b.png"));
-        assert!(list.remarks[0].contains("out of order"));
-    }
-
-    #[test]
-    fn nonsense_names_its_line() {
-        for bad in ["0.0 a.png\nb.png\n", "0.0 a.png\nnan b.png\n", "0.0 a.png\n1.0\n"] {
-            let message = list_of(bad).unwrap_err().to_string();
-            assert!(message.contains("line 2"), "{message}");
-        }
-    }
 }

@@ -1,35 +1,32 @@
 //! Files in, files out. One reader a file; every layout ends as the same [`Recording`].
 
-mod assumed;
-mod dump;
-mod encode;
 mod folder;
 mod images;
 mod layout;
 mod list;
 mod output;
 mod stills;
-mod unknown;
 
-pub use assumed::Assumed;
-pub(crate) use dump::INDEX;
-pub use dump::write_dump;
-pub use encode::{encode_pgm16, encode_png16, encode_png16_quickly, encode_rgb};
-pub use images::{ColourImage, FrameSource, InfraredImage};
+pub(crate) use folder::INDEX;
+pub use folder::{Assumed, write_dump};
+pub use images::{
+    ColourImage, FrameSource, InfraredImage, encode_pgm16, encode_png16, encode_png16_quickly,
+    encode_rgb,
+};
 pub(crate) use images::{read_depth, size_of};
-pub use layout::DESCRIPTION;
 pub(crate) use layout::{DEPTH_LIST, read_description};
-pub use layout::{ViewFile, write_recording_file, write_view_notes};
+pub use layout::{DESCRIPTION, ViewFile, write_recording_file, write_view_notes};
+pub(crate) use list::content_lines;
 pub use list::{FrameList, read_list};
 pub(crate) use output::entries;
-pub use output::hex;
-pub use output::{OutputDir, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
+pub use output::{OutputDir, hex, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
 
 use std::path::Path;
 
+use stills::Footage;
+
 use crate::error::{Error, Result};
 use crate::view::{Recording, Sensor};
-use stills::Footage;
 
 /// How the files of a recording lie in its folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,9 +43,7 @@ pub enum Layout {
 
 impl Layout {
     /// Of a folder.
-    ///
-    /// # Errors
-    /// When there is no such folder.
+    /// An error when there is no such folder.
     pub fn of(path: &Path) -> Result<Self> {
         if !path.is_dir() {
             return Err(Error::recording(
@@ -72,47 +67,32 @@ impl Layout {
 }
 
 /// Open whatever stands at `path`: a recording, a TUM folder, a fakenect dump or a plain folder
-/// of 16-bit PNGs. Frames are not read, except to find still stretches in a film.
-///
-/// # Errors
-/// When the folder is none of these, is empty, or describes itself wrongly; or when something is
-/// assumed of a recording that describes itself.
+/// of 16-bit PNGs. Frames are not read, except to find still stretches in a film. An error when the
+/// folder is none of these, is empty, or describes itself wrongly; or when something is assumed of a
+/// recording that describes itself.
 pub fn open(path: &Path, assumed: &Assumed) -> Result<Recording> {
-    open_and(path, assumed, Footage::recording)
+    open_and_cut(path, assumed, true)
 }
 
 /// As [`open`], but a film stays whole: one view with all its frames, also those in motion.
-///
-/// # Errors
-/// As [`open`].
 pub fn open_uncut(path: &Path, assumed: &Assumed) -> Result<Recording> {
-    open_and(path, assumed, Footage::uncut)
+    open_and_cut(path, assumed, false)
 }
 
-fn open_and(
-    path: &Path,
-    assumed: &Assumed,
-    cut: impl Fn(Footage, &Path, Sensor) -> Recording,
-) -> Result<Recording> {
-    let footage = match Layout::of(path)? {
+fn open_and_cut(path: &Path, assumed: &Assumed, cut: bool) -> Result<Recording> {
+    let film = |(footage, sensor): (Footage, Sensor)| footage.recording(path, sensor, cut);
+    let recording = match Layout::of(path)? {
         Layout::Recording => {
             assumed.refuse_beside(&path.join(DESCRIPTION))?;
-            None
+            layout::open(path)?
         }
-        Layout::Dump => Some(dump::footage(path, assumed)?),
-        Layout::Sequence => Some(folder::sequence(path, assumed)?),
-        Layout::Images => Some(folder::images(path, assumed)?),
-    };
-    let recording = match footage {
-        None => layout::open(path)?,
-        Some((footage, sensor)) => cut(footage, path, sensor),
+        Layout::Dump => film(folder::dump(path, assumed)?),
+        Layout::Sequence => film(folder::sequence(path, assumed)?),
+        Layout::Images => film(folder::images(path, assumed)?),
     };
     if recording.views.is_empty() {
-        let reason = recording
-            .excluded
-            .first()
-            .map(ToString::to_string)
-            .or_else(|| recording.remarks.first().cloned());
+        let excluded = recording.excluded.first().map(ToString::to_string);
+        let reason = excluded.or_else(|| recording.remarks.first().cloned());
         return Err(Error::recording(
             path,
             reason.unwrap_or_else(|| "no view in it".into()),

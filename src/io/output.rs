@@ -16,9 +16,7 @@ pub struct OutputDir(PathBuf);
 
 impl OutputDir {
     /// Make the folder and try it, so that a run of an hour does not end in "permission denied".
-    ///
-    /// # Errors
-    /// When it cannot be made or written.
+    /// An error when it cannot be made or written.
     pub fn create(path: &Path) -> Result<Self> {
         fs::create_dir_all(path).map_err(|e| Error::write(path, e))?;
         let probe = path.join(format!(".kinoise-{}.tmp", std::process::id()));
@@ -27,15 +25,12 @@ impl OutputDir {
         Ok(OutputDir(path.to_path_buf()))
     }
 
-    /// Where it is.
     pub fn path(&self) -> &Path {
         &self.0
     }
 
     /// Write one file of the output.
-    ///
-    /// # Errors
-    /// When the folder has become unwritable or the disk is full.
+    /// An error when the folder has become unwritable or the disk is full.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<PathBuf> {
         let path = self.0.join(name);
         write_atomic(&path, bytes)?;
@@ -44,9 +39,7 @@ impl OutputDir {
 }
 
 /// Never mix a new recording into somebody's folder.
-///
-/// # Errors
-/// When the folder has something in it.
+/// An error when the folder has something in it.
 pub fn refuse_full(root: &Path) -> Result<()> {
     let full = fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_some());
     if full {
@@ -60,9 +53,7 @@ pub fn refuse_full(root: &Path) -> Result<()> {
 }
 
 /// Write beside `path`, then rename: a kill or a full disk leaves the old file, or none.
-///
-/// # Errors
-/// When the folder cannot be written; the temporary file is then removed.
+/// An error when the folder cannot be written; the temporary file is then removed.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let temporary = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
@@ -76,27 +67,16 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<()> {
 }
 
 /// JSON for people to read, with a line's end at its end.
-///
-/// # Errors
-/// When the value has no form in JSON.
+/// An error when the value has no form in JSON.
 pub fn pretty_json(value: &impl Serialize) -> serde_json::Result<String> {
     let mut text = serde_json::to_string_pretty(value)?;
     text.push('\n');
     Ok(text)
 }
 
-/// Write [`pretty_json`] whole or not at all; the text that was written. `remedy` is for a value
-/// that has no form in JSON.
-///
-/// # Errors
-/// As [`pretty_json`], and when the folder cannot be written.
+/// Write [`pretty_json`] whole or not at all; the text. `remedy` is for what has no form in JSON.
 pub fn write_json(path: &Path, value: &impl Serialize, remedy: &'static str) -> Result<String> {
-    let text = pretty_json(value).map_err(|e| Error::Json {
-        path: path.to_path_buf(),
-        line: 0,
-        what: e.to_string(),
-        remedy,
-    })?;
+    let text = pretty_json(value).map_err(|e| Error::text(path, 0, e.to_string(), remedy))?;
     write_atomic(path, text.as_bytes())?;
     Ok(text)
 }
@@ -118,7 +98,6 @@ pub fn sha256_hex(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
-/// Bytes as lower-case hexadecimal.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }

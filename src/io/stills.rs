@@ -43,50 +43,18 @@ pub(super) struct Footage {
     pub film: Film,
     /// What was found odd while listing them.
     pub remarks: Vec<String>,
-    /// The files that list them.
     pub described_by: Vec<PathBuf>,
 }
 
 impl Footage {
-    /// All frames as one view, in motion or not.
-    pub fn uncut(self, root: &Path, sensor: Sensor) -> Recording {
-        let whole = View {
-            name: root.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-            depth: self.frames,
-            infrared: Vec::new(),
-            notes: ViewNotes::default(),
+    /// `cut` into views, or all frames as one, in motion or not.
+    pub fn recording(self, root: &Path, sensor: Sensor, cut: bool) -> Recording {
+        let (views, mut remarks) = if cut {
+            cut_up(self.frames, self.film, &sensor)
+        } else {
+            let name = root.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            (vec![view(name, self.frames)], Vec::new())
         };
-        Recording {
-            root: root.to_path_buf(),
-            sensor,
-            views: vec![whole],
-            excluded: Vec::new(),
-            remarks: self.remarks,
-            described_by: self.described_by,
-        }
-    }
-
-    /// Cut into views; frames in motion and frames that show nothing are left out, with a remark.
-    pub fn recording(self, root: &Path, sensor: Sensor) -> Recording {
-        let listed = self.frames.len();
-        let (stretches, blank) = stretches(self.frames, &sensor);
-        let readable: usize = stretches.iter().map(Vec::len).sum();
-        let views = views(stretches, self.film);
-        let used: usize = views.iter().map(|v| v.depth.len()).sum();
-        let mut remarks = Vec::new();
-        if let Some((first, others)) = blank.split_first() {
-            remarks.push(format!(
-                "{} of {listed} frames cannot be read or carry no depth; the first: {first}",
-                blank.len()
-            ));
-            remarks.extend(others.iter().map(|why| format!("frame left out: {why}")));
-        }
-        if used < readable {
-            remarks.push(format!(
-                "{} of {listed} frames lie between still stretches (target or sensor moving) and are left out",
-                readable - used
-            ));
-        }
         // Why frames are missing says more than what was assumed about the others.
         remarks.extend(self.remarks);
         Recording {
@@ -98,6 +66,37 @@ impl Footage {
             described_by: self.described_by,
         }
     }
+}
+
+fn view(name: String, depth: Vec<FrameRef>) -> View {
+    View { name, depth, infrared: Vec::new(), notes: ViewNotes::default() }
+}
+
+/// The still stretches; frames in motion and frames that show nothing are left out, with a remark.
+fn cut_up(frames: Vec<FrameRef>, film: Film, sensor: &Sensor) -> (Vec<View>, Vec<String>) {
+    let listed = frames.len();
+    let (stretches, blank) = stretches(frames, sensor);
+    let readable: usize = stretches.iter().map(Vec::len).sum();
+    let shortest = film.shortest().min(stretches.iter().map(Vec::len).max().unwrap_or(0));
+    let long = stretches.into_iter().filter(|stretch| stretch.len() >= shortest);
+    let views: Vec<View> =
+        long.enumerate().map(|(i, depth)| view(name(i, &depth, film), depth)).collect();
+    let used: usize = views.iter().map(|v| v.depth.len()).sum();
+    let mut remarks = Vec::new();
+    if let Some((first, others)) = blank.split_first() {
+        remarks.push(format!(
+            "{} of {listed} frames cannot be read or carry no depth; the first: {first}",
+            blank.len()
+        ));
+        remarks.extend(others.iter().map(|why| format!("frame left out: {why}")));
+    }
+    if used < readable {
+        remarks.push(format!(
+            "{} of {listed} frames lie between still stretches (target or sensor moving) and are left out",
+            readable - used
+        ));
+    }
+    (views, remarks)
 }
 
 /// Runs of frames that agree with their first; and why each of the frames in none is in none.
@@ -130,20 +129,6 @@ fn samples(source: &mut FrameSource, path: &Path, table: &DepthTable) -> Result<
         return Err(format!("{}: no pixel carries a depth", path.display()));
     }
     Ok(samples)
-}
-
-fn views(stretches: Vec<Vec<FrameRef>>, film: Film) -> Vec<View> {
-    let longest = stretches.iter().map(Vec::len).max().unwrap_or(0);
-    let shortest = film.shortest().min(longest);
-    let long = stretches.into_iter().filter(|stretch| stretch.len() >= shortest);
-    long.enumerate()
-        .map(|(i, depth)| View {
-            name: name(i, &depth, film),
-            depth,
-            infrared: Vec::new(),
-            notes: ViewNotes::default(),
-        })
-        .collect()
 }
 
 /// A single capture keeps its file's name; a stretch of a film gets a number.

@@ -9,7 +9,6 @@ use nalgebra::Isometry3;
 use super::icp::Alignment;
 use crate::stats::median;
 
-/// What became of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Fate {
     /// The map's frame is this camera's.
@@ -19,7 +18,6 @@ pub enum Fate {
     Lost(String),
 }
 
-/// What is known of a frame in the end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameReport {
     pub stamp: f64,
@@ -60,7 +58,6 @@ impl FrameReport {
 pub struct Stages(Vec<(&'static str, f64)>);
 
 impl Stages {
-    /// Run and measure.
     pub fn time<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
         let begin = Instant::now();
         let done = work();

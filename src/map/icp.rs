@@ -10,10 +10,9 @@ use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::normal_equations::{Direction, NormalEquations, Solution};
-use super::options::{Kernel, Options, Weights};
 use super::point::{Motion, Point};
+use super::{Kernel, Options, Weights};
 
-/// Something to align to.
 pub trait Target: Sync {
     /// What a search leaves behind for the next search of the same point.
     type Cache: Default + Clone + Send;
@@ -21,7 +20,6 @@ pub trait Target: Sync {
     fn find(&self, p: &Vector3<f32>, cache: &mut Self::Cache) -> Option<&Point>;
 }
 
-/// Why the loop ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Termination {
     /// The step fell below both thresholds.
@@ -113,30 +111,27 @@ fn finish(
     iterations: usize,
     points: usize,
 ) -> Alignment {
-    let mut alignment = Alignment {
+    let (correspondences, rms_m, solution) = match last {
+        Some((equations, solution)) => {
+            let n = equations.correspondences;
+            (n, (equations.squares_m2 / n as f64).sqrt(), Some(solution))
+        }
+        None => (0, f64::INFINITY, None),
+    };
+    let unknown = Matrix6::from_diagonal_element(f64::INFINITY);
+    Alignment {
         target_from_source: pose,
-        covariance: Matrix6::from_diagonal_element(f64::INFINITY),
+        covariance: solution.as_ref().map_or(unknown, |s| s.covariance),
         iterations,
         termination,
-        inlier_ratio: 0.0,
-        correspondences: 0,
-        rms_m: f64::INFINITY,
-        degenerate_directions: Vec::new(),
-        min_information: 0.0,
-    };
-    if let Some((equations, solution)) = last {
-        let n = equations.correspondences;
-        alignment.covariance = solution.covariance;
-        alignment.inlier_ratio = n as f64 / points.max(1) as f64;
-        alignment.correspondences = n;
-        alignment.rms_m = (equations.squares_m2 / n as f64).sqrt();
-        alignment.degenerate_directions = solution.degenerate_directions;
-        alignment.min_information = solution.min_information;
+        inlier_ratio: correspondences as f64 / points.max(1) as f64,
+        correspondences,
+        rms_m,
+        min_information: solution.as_ref().map_or(0.0, |s| s.min_information),
+        degenerate_directions: solution.map(|s| s.degenerate_directions).unwrap_or_default(),
     }
-    alignment
 }
 
-/// One linearisation.
 struct Round<'a, T> {
     target: &'a T,
     options: &'a Options,
@@ -151,8 +146,8 @@ impl<T: Target> Round<'_, T> {
         let any_normal = self.options.min_cosine <= -1.0;
         let keep_sizes = self.options.kernel != Kernel::Square;
         let part = |(points, cache): (&[Point], &mut [T::Cache])| {
-            let mut equations =
-                NormalEquations::with_room(if keep_sizes { points.len() } else { 0 });
+            let mut equations = NormalEquations::default();
+            equations.sizes.reserve(if keep_sizes { points.len() } else { 0 });
             for (s, cache) in points.iter().zip(cache) {
                 let at = motion.moved(&s.at);
                 let Some(d) = self.target.find(&at, cache) else { continue };

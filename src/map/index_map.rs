@@ -15,7 +15,6 @@ const HIDES_M: f32 = 0.03;
 const MIN_DEPTH_M: f32 = 0.2;
 
 /// The points of one image, found by projection.
-#[derive(Debug, Clone)]
 pub struct Projective<'a> {
     pub camera: &'a Camera,
     pub blocks: &'a Blocks,
@@ -65,7 +64,6 @@ fn block_of(
 }
 
 /// Which points of a map a camera sees: the front-most of each block of its image.
-#[derive(Debug, Clone)]
 pub struct IndexMap<'a> {
     pub camera: &'a Camera,
     side_px: usize,
@@ -88,7 +86,7 @@ impl<'a> IndexMap<'a> {
     ) -> Self {
         let (width, height) = (camera.width / side_px, camera.height / side_px);
         let camera_from_map = Motion::of(&map_from_camera.inverse());
-        let mut front = vec![Front::default(); width * height];
+        let mut front = vec![Front::NOTHING; width * height];
         for (i, point) in points.enumerate() {
             let at = camera_from_map.moved(&point.at);
             if at.z <= MIN_DEPTH_M {
@@ -111,7 +109,6 @@ impl<'a> IndexMap<'a> {
         block_of(self.camera, self.side_px, [self.width, self.height], &at)
     }
 
-    /// What a block shows.
     #[inline]
     pub fn front(&self, block: usize) -> Option<usize> {
         let index = self.front[block];
@@ -137,13 +134,9 @@ struct Front {
     index: u32,
 }
 
-impl Default for Front {
-    fn default() -> Self {
-        Front { z: f32::INFINITY, sigma: f32::INFINITY, index: NONE }
-    }
-}
-
 impl Front {
+    const NOTHING: Self = Front { z: f32::INFINITY, sigma: f32::INFINITY, index: NONE };
+
     /// The nearer hides the farther; of two that may be one surface the surer shows. (The nearer of
     /// those would be the one with the greater error: the map would come towards the camera.)
     fn meet(&mut self, other: Front) {

@@ -6,7 +6,6 @@ use nalgebra::{Isometry3, Vector3};
 use super::point::{Motion, Point};
 use super::sparse_grid::{SparseGrid, cell_of};
 
-/// A point of a finished map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapPoint {
     /// m, in the frame of the first camera.

@@ -11,11 +11,8 @@ mod frame_report;
 pub mod icp;
 mod index_map;
 mod map_points;
-mod means;
 mod nearest;
-mod noise;
 mod normal_equations;
-mod options;
 #[cfg_attr(not(feature = "opencv"), path = "no_orb.rs")]
 mod orb;
 mod point;
@@ -31,7 +28,6 @@ pub use icp::{Alignment, Termination};
 pub use map_points::{MapPoint, ply};
 pub use nearest::Nearest;
 pub use normal_equations::Direction;
-pub use options::{Init, Kernel, Method, Options, Weights};
 pub use point::Point;
 
 use preprocess::Preprocessor;
@@ -40,10 +36,10 @@ use tracker::Tracker;
 use crate::Progress;
 use crate::error::{Error, Result};
 use crate::model::NoiseModel;
+use crate::rng::Seed;
 use crate::sequence::Sequence;
 use crate::trajectory::Pose;
 
-/// What came of a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mapped {
     /// One a depth image, in time order.
@@ -67,9 +63,7 @@ impl Mapped {
 }
 
 /// Map a sequence.
-///
-/// # Errors
-/// When the model is of another sensor, OpenCV fails, or not even two frames have a pose.
+/// An error when the model is of another sensor, OpenCV fails, or not even two frames have a pose.
 pub fn map(
     sequence: &Sequence,
     model: &NoiseModel,
@@ -115,6 +109,128 @@ fn no_map(sequence: &Sequence, mapped: &Mapped) -> Error {
         ),
         "a sequence to map needs two overlapping depth images or more",
     )
+}
+
+/// What a frame is aligned to, and how neighbours are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// The paper's: voxel grid, exact nearest neighbours, each frame to the one before.
+    Paper,
+    /// Image blocks, neighbours by projection, each frame to the one before.
+    Projective,
+    /// Image blocks, neighbours by projection, each frame to the map so far.
+    Model,
+}
+
+/// Where an alignment starts from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Init {
+    /// Where the last frame was.
+    None,
+    /// As the last two frames moved.
+    Motion,
+    /// Where ORB features say.
+    Orb,
+}
+
+/// What a correspondence weighs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Weights {
+    /// All the same.
+    None,
+    /// The paper's: 1 / sigma(d_z, theta) of the target's point.
+    Model,
+    /// One over the joint standard deviation of both points along the normal, averaged as they are.
+    Both,
+}
+
+/// How residuals far beyond the usual count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kernel {
+    /// As any other.
+    Square,
+    /// With their size, not its square.
+    Huber,
+    /// Less and less, then not at all.
+    Tukey,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    pub method: Method,
+    pub weights: Weights,
+    pub kernel: Kernel,
+    pub init: Init,
+    pub voxel_m: f32,
+    pub block_px: usize,
+    /// Neighbours farther than this are none, m.
+    pub max_correspondence_m: f32,
+    pub max_iterations: usize,
+    /// ICP has converged when a step is below both: m and rad.
+    pub min_shift_m: f64,
+    pub min_turn_rad: f64,
+    /// Surfaces that lean more to each other are not one: cosine between their normals.
+    pub min_cosine: f64,
+    /// Observations of a surfel that count at most.
+    pub max_observations: f32,
+    /// A frame of which a smaller share of points has a neighbour is lost.
+    pub min_inlier_ratio: f64,
+    pub seed: Seed,
+    /// Read colour for the map.
+    pub colour: bool,
+}
+
+impl Options {
+    /// The paper's Table II.
+    pub fn paper(weights: Weights, init: Init) -> Self {
+        Options {
+            method: Method::Paper,
+            weights,
+            kernel: Kernel::Square,
+            init,
+            voxel_m: 0.03,
+            block_px: 4,
+            // Not in the paper: what its peers are run with.
+            max_correspondence_m: 0.1,
+            max_iterations: 30,
+            min_shift_m: 1e-8,
+            min_turn_rad: 1e-5 * std::f64::consts::PI / 180.0,
+            min_cosine: -1.0,
+            max_observations: 30.0,
+            min_inlier_ratio: 0.3,
+            seed: Seed(1),
+            colour: true,
+        }
+    }
+
+    /// What was measured to be best.
+    pub fn best() -> Self {
+        Options {
+            method: Method::Model,
+            kernel: Kernel::Huber,
+            min_cosine: 0.7,
+            min_shift_m: 1e-5,
+            min_turn_rad: 1e-5,
+            ..Options::paper(Weights::Both, Init::Motion)
+        }
+    }
+
+    /// An error when a number is out of its range.
+    pub fn check(&self) -> Result<()> {
+        let Options { voxel_m, block_px, max_correspondence_m: reach, .. } = *self;
+        let Options { max_iterations, max_observations, .. } = *self;
+        let checks = [
+            ((0.002..=1.0).contains(&voxel_m), format!("--voxel {voxel_m}"), "give 0.002 to 1 m"),
+            ((1..=32).contains(&block_px), format!("--block {block_px}"), "give 1 to 32 px"),
+            (reach > 0.0 && reach <= 2.0, format!("--gate {reach}"), "give a distance up to 2 m"),
+            (max_iterations > 0, format!("--iterations {max_iterations}"), "give 1 or more"),
+            (max_observations >= 1.0, format!("--memory {max_observations}"), "give 1 or more"),
+        ];
+        match checks.into_iter().find(|(good, ..)| !good) {
+            Some((_, what, remedy)) => Err(Error::Argument { what, remedy }),
+            None => Ok(()),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -7,10 +7,10 @@
 use nalgebra::Vector3;
 
 use super::icp::Target;
+use super::index_map::within;
 use super::point::Point;
 use super::sparse_grid::{Cell, SparseGrid, cell_of};
 
-/// Points, found by place.
 #[derive(Debug, Clone)]
 pub struct Nearest {
     points: Vec<Point>,
@@ -45,14 +45,11 @@ struct Search {
     second: f32,
 }
 
-impl Default for Search {
-    fn default() -> Self {
-        Search { nearest: None, best: f32::INFINITY, second: f32::INFINITY }
-    }
+impl Search {
+    const NOTHING: Self = Search { nearest: None, best: f32::INFINITY, second: f32::INFINITY };
 }
 
-/// A search looks this share of a cell's side farther than it must: more is slower now, less is
-/// sooner repeated.
+/// Of a cell's side, how much farther a search looks than it must: less is sooner repeated.
 const MARGIN: f32 = 0.2;
 
 impl Nearest {
@@ -83,23 +80,19 @@ impl Nearest {
     /// All cells as near as a point that is known, and a little farther: for the safe radius.
     fn search(&self, p: &Vector3<f32>, known: Option<u32>) -> NeighbourCache {
         let cell = cell_of(p, 1.0 / self.side_m);
-        let known = known.or_else(|| self.first_in(cell));
+        let first = |cell| self.order.get(self.begins[cell] as usize).copied();
+        let known = known.or_else(|| self.grid.get(cell).and_then(first));
         let Some(known) = known else { return self.search_outwards(p, cell) };
         let nearest = (self.points[known as usize].at - p).norm();
         if nearest > self.max_correspondence_m {
             return self.search_outwards(p, cell);
         }
         let reach = nearest + MARGIN * self.side_m;
-        let mut search = Search::default();
+        let mut search = Search::NOTHING;
         let corner = |sign: f32| cell_of(&p.map(|v| v + sign * reach), 1.0 / self.side_m);
         let (low, high) = (corner(-1.0), corner(1.0));
         self.grid.for_each_within(low, high, |cell| self.scan_cell(p, cell, &mut search));
         self.remember(p, &search, reach)
-    }
-
-    fn first_in(&self, cell: Cell) -> Option<u32> {
-        let cell = self.grid.get(cell)?;
-        self.order.get(self.begins[cell] as usize).copied()
     }
 
     /// Box after larger box of cells, until none that is left can hold a nearer point.
@@ -114,7 +107,7 @@ impl Nearest {
             .max(0.0);
         let mut shell = 1;
         loop {
-            let mut search = Search::default();
+            let mut search = Search::NOTHING;
             let corner = |sign: i32| cell.map(|v| v + sign * shell);
             self.grid.for_each_within(corner(-1), corner(1), |c| self.scan_cell(p, c, &mut search));
             let seen = inside + shell as f32 * self.side_m;
@@ -160,9 +153,7 @@ impl Target for Nearest {
         if (p - cache.at).norm() >= cache.safe_radius {
             *cache = self.search(p, cache.found);
         }
-        let point = &self.points[cache.found? as usize];
-        ((point.at - p).norm_squared() <= self.max_correspondence_m * self.max_correspondence_m)
-            .then_some(point)
+        within(&self.points[cache.found? as usize], p, self.max_correspondence_m)
     }
 }
 

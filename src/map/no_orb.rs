@@ -8,12 +8,10 @@ use crate::io::ColourImage;
 use crate::rng::Stream;
 
 /// There are none.
-#[derive(Debug, Clone)]
 pub struct Features;
 
 impl Features {
-    /// # Errors
-    /// Always: this build has no OpenCV.
+    /// Always an error: this build has no OpenCV.
     pub fn of(_: &ColourImage, _: &[f32], _: &Rays) -> Result<Self> {
         Err(Error::Argument {
             what: "this kinoise was built without OpenCV".into(),
@@ -21,8 +19,6 @@ impl Features {
         })
     }
 
-    /// # Errors
-    /// Never.
     pub fn motion_to(&self, _: &Features, _: &mut Stream) -> Result<Option<Isometry3<f64>>> {
         Ok(None)
     }

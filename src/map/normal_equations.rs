@@ -51,8 +51,6 @@ pub struct NormalEquations {
     pub sizes: Vec<f32>,
 }
 
-/// A step and how sure it is.
-#[derive(Debug, Clone)]
 pub struct Solution {
     /// Shift, m, and turn, rad, about the target's origin.
     pub step: Vector6<f64>,
@@ -69,13 +67,7 @@ const MIN_INFORMATION: f64 = 0.005;
 const MEDIAN_OVER_SIGMA: f64 = 0.6745;
 
 impl NormalEquations {
-    /// None yet, with room for the sizes of `n` correspondences.
-    pub fn with_room(n: usize) -> Self {
-        NormalEquations { sizes: Vec::with_capacity(n), ..Default::default() }
-    }
-
-    /// A correspondence: the moved point, the target's normal, the distance along it, and the
-    /// weight of its square.
+    /// The moved point, the target's normal, the distance along it, and the weight of its square.
     #[inline]
     pub fn add(&mut self, p: &Vector3<f32>, n: &Vector3<f32>, residual: f64, w2: f64) {
         let (p, n) = (p.map(f64::from), n.map(f64::from));
@@ -99,7 +91,6 @@ impl NormalEquations {
         self.squares_m2 += residual * residual;
     }
 
-    /// Both together.
     pub fn plus(mut self, other: NormalEquations) -> NormalEquations {
         self.h += other.h;
         self.geometry += other.geometry;

@@ -19,8 +19,6 @@ use crate::rng::Stream;
 const FAST_THRESHOLD: i32 = 50;
 const MAX_FEATURES: i32 = 500;
 
-/// Features of one frame.
-#[derive(Debug, Clone)]
 pub struct Features {
     descriptors: Mat,
     /// m, optical frame; `None` where no depth was measured.
@@ -29,9 +27,7 @@ pub struct Features {
 
 impl Features {
     /// Of a colour image and the depth, m, of its pixels.
-    ///
-    /// # Errors
-    /// When OpenCV fails.
+    /// An error when OpenCV fails.
     pub fn of(image: &ColourImage, depth: &[f32], rays: &Rays) -> Result<Self> {
         Self::detect(image, depth, rays).map_err(failed)
     }
@@ -67,9 +63,7 @@ impl Features {
 
     /// The motion from this frame to `target`: brute force by Hamming distance, each the other's
     /// nearest, and RANSAC. `None` where too few agree.
-    ///
-    /// # Errors
-    /// When OpenCV fails.
+    /// An error when OpenCV fails.
     pub fn motion_to(&self, target: &Features, rng: &mut Stream) -> Result<Option<Isometry3<f64>>> {
         let pairs = self.pairs(target).map_err(failed)?;
         Ok(ransac(&pairs, rng))

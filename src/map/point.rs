@@ -1,6 +1,9 @@
-//! A measured piece of surface with its standard deviations, and a pose that moves many of them.
+//! A measured piece of surface, its standard deviations as a [`NoiseModel`] says, and a pose that
+//! moves many of them.
 
 use nalgebra::{Isometry3, Vector3};
+
+use crate::model::{NoiseModel, SigmaLookup};
 
 /// A point of a depth image, or the mean of some, with its surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -9,8 +12,7 @@ pub struct Point {
     pub at: Vector3<f32>,
     /// Unit length, towards the camera.
     pub normal: Vector3<f32>,
-    /// sigma(z, theta) of one measurement along the optical axis, m: the paper's weight is its
-    /// inverse.
+    /// sigma(z, theta) of one measurement along the optical axis, m.
     pub sigma_axial: f32,
     /// Standard deviation of this point, averaged as it is, along its normal, m.
     pub sigma_normal: f32,
@@ -49,5 +51,61 @@ impl Motion {
     pub fn moved(&self, p: &Vector3<f32>) -> Vector3<f32> {
         let v = self.turned(p);
         Vector3::new(v.x + self.shift[0], v.y + self.shift[1], v.z + self.shift[2])
+    }
+}
+
+/// Sigma over depth and tilt, looked up, and how many neighbours err as one.
+pub struct Noise {
+    table: SigmaLookup,
+    /// The greatest depth that the model was measured at, m.
+    max_depth_m: f32,
+    /// Pixels that err together: the area of the window that neighbours share, px^2.
+    correlated_px2: f32,
+}
+
+/// The effect of the catalogue that says how far neighbours err together, and its parameter.
+const CORRELATION: (&str, &str) = ("spatial-correlation", "length_px");
+
+impl Noise {
+    pub fn of(model: &NoiseModel) -> Self {
+        let length = |entry: &crate::model::Effect| {
+            let value = entry.parameters.get(CORRELATION.1)?;
+            let number = value.as_f64().or_else(|| value.get("value")?.as_f64());
+            number.filter(|l| l.is_finite() && *l > 1.0)
+        };
+        let entry = model.effects.iter().find(|e| e.id == CORRELATION.0);
+        let length = entry.and_then(length).unwrap_or(1.0) as f32;
+        Noise {
+            table: SigmaLookup::of(&model.sigma),
+            max_depth_m: model.sigma.domain.z_m[1] as f32,
+            correlated_px2: length * length,
+        }
+    }
+
+    /// Standard deviation of a depth `z`, m, on a surface with this normal.
+    ///
+    /// Beyond the depths of the model sigma grows as z^2, as it does for every sensor that measures
+    /// disparity: held at its edge it would make the farthest points the best.
+    pub fn sigma_axial(&self, z: f32, normal: &Vector3<f32>) -> f32 {
+        self.at(z, normal.z.abs().min(1.0).acos())
+    }
+
+    /// The same at a tilt, rad.
+    pub fn at(&self, z: f32, theta: f32) -> f32 {
+        let beyond = (z / self.max_depth_m).max(1.0);
+        self.table.at(z, theta) * beyond * beyond
+    }
+
+    /// Sigma, m, of the mean of `n` pixels along their normal: an error of depth moves a point along
+    /// its ray, and of that the normal's part counts.
+    pub fn sigma_normal(
+        &self,
+        sigma_axial: f32,
+        at: &Vector3<f32>,
+        normal: &Vector3<f32>,
+        n: f32,
+    ) -> f32 {
+        let part = (at.dot(normal) / at.z).abs();
+        sigma_axial * part / (n / self.correlated_px2).max(1.0).sqrt()
     }
 }

@@ -3,11 +3,10 @@
 use super::blocks::Blocks;
 use super::frame_report::Stages;
 use super::nearest::Nearest;
-use super::noise::Noise;
-use super::options::{Init, Method, Options};
 use super::orb::Features;
-use super::point::Point;
+use super::point::{Noise, Point};
 use super::voxel::{Voxels, points_of};
+use super::{Init, Method, Options};
 use crate::camera::Rays;
 use crate::correct::{Conditions, Correction};
 use crate::error::Result;
@@ -17,7 +16,6 @@ use crate::model::NoiseModel;
 use crate::sequence::{Moment, Sequence};
 
 /// The points of a frame, as its method wants them.
-#[derive(Debug, Clone)]
 pub enum Shape {
     Cloud(Nearest),
     Blocks(Blocks, Vec<Point>),
@@ -33,7 +31,6 @@ impl Shape {
 }
 
 /// A frame, ready to be aligned and to be aligned to.
-#[derive(Debug, Clone)]
 pub struct Prepared {
     pub shape: Shape,
     pub features: Option<Features>,
@@ -45,8 +42,6 @@ pub struct Prepared {
     pub remark: Option<String>,
 }
 
-/// All that frames share.
-#[derive(Debug, Clone)]
 pub struct Preprocessor<'a> {
     pub sequence: &'a Sequence,
     pub options: &'a Options,
@@ -58,8 +53,7 @@ pub struct Preprocessor<'a> {
 }
 
 impl<'a> Preprocessor<'a> {
-    /// # Errors
-    /// When the model is of another sensor.
+    /// An error when the model is of another sensor.
     pub fn new(sequence: &'a Sequence, model: &NoiseModel, options: &'a Options) -> Result<Self> {
         Ok(Preprocessor {
             sequence,
@@ -77,8 +71,7 @@ impl<'a> Preprocessor<'a> {
         if self.correction.is_identity() { &[] } else { self.correction.remarks() }
     }
 
-    /// # Errors
-    /// When the depth image cannot be read, or OpenCV fails.
+    /// An error when the depth image cannot be read, or OpenCV fails.
     pub fn prepare(&self, moment: &Moment) -> Result<Prepared> {
         let mut stages = Stages::default();
         let raw = stages.time("decode", || self.sequence.depth(moment))?;

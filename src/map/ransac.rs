@@ -15,8 +15,7 @@ const HYPOTHESES: usize = 500;
 /// Three points make a motion; as many again that agree make it more than chance.
 const MIN_INLIERS: usize = 8;
 
-/// `target_from_source` that brings most pairs together, fitted to all of those; `None` where too few
-/// agree.
+/// `target_from_source` that brings most pairs together, fitted to those; `None` of too few.
 pub fn ransac(pairs: &[PointPair], rng: &mut Stream) -> Option<Isometry3<f64>> {
     if pairs.len() < MIN_INLIERS {
         return None;

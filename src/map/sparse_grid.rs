@@ -6,7 +6,6 @@ use std::collections::HashMap;
 use nalgebra::Vector3;
 use rustc_hash::FxBuildHasher;
 
-/// Integer coordinates of a cell.
 pub type Cell = [i32; 3];
 
 /// From cells to indices 0, 1, 2, ... in order of arrival.
@@ -26,7 +25,6 @@ struct Brick {
 }
 
 impl SparseGrid {
-    /// With room for `n` cells.
     pub fn with_room(n: usize) -> Self {
         SparseGrid { cells: Vec::with_capacity(n), ..Default::default() }
     }
@@ -35,12 +33,10 @@ impl SparseGrid {
         self.cells.len()
     }
 
-    /// The cell of an index.
     pub fn cell(&self, index: usize) -> Cell {
         self.cells[index]
     }
 
-    /// The index of a cell, where it has one.
     #[inline]
     pub fn get(&self, cell: Cell) -> Option<usize> {
         let brick = self.brick(cell.map(|v| v >> 2))?;

@@ -16,7 +16,6 @@ use crate::camera::Camera;
 pub struct Surfel {
     /// In the map's frame.
     point: Point,
-    /// Times it was seen.
     seen: u32,
     /// Number of the frame that saw it last.
     last: u32,
@@ -25,8 +24,6 @@ pub struct Surfel {
     coloured: u32,
 }
 
-/// All pieces.
-#[derive(Debug, Clone)]
 pub struct Surfels {
     surfels: Vec<Surfel>,
     /// A surfel never counts for more than this many of its observations: the pose it was put down
@@ -34,8 +31,7 @@ pub struct Surfels {
     max_observations: f32,
 }
 
-/// Beside [`SIGMAS`] standard deviations a surfel and an observation of it may be this far apart,
-/// m: the pose errs too.
+/// A surfel and an observation may be this much farther apart than [`SIGMAS`], m: the pose errs.
 const POSE_M: f32 = 0.01;
 /// Cosine between their normals: 37 degrees.
 const MIN_COSINE: f32 = 0.8;
@@ -66,17 +62,7 @@ impl Surfels {
         IndexMap::render(points, map_from_camera, camera, side_px)
     }
 
-    /// To align to what `index_map` shows.
-    pub fn target<'a>(
-        &'a self,
-        index_map: &'a IndexMap<'a>,
-        max_correspondence_m: f32,
-    ) -> SurfelTarget<'a> {
-        SurfelTarget { surfels: &self.surfels, index_map, max_correspondence_m }
-    }
-
-    /// Take in what frame `number` saw, with its pixels' red, green and blue. `index_map` is that of
-    /// about this pose.
+    /// Take in what frame `number` saw, with its colours. `index_map` is that of about this pose.
     pub fn fuse(
         &mut self,
         index_map: &IndexMap<'_>,
@@ -144,7 +130,6 @@ impl Surfels {
         self.surfels.retain(|s| s.seen >= CONFIRMED || now.saturating_sub(s.last) < PROBATION);
     }
 
-    /// The finished map.
     pub fn points(&self) -> Vec<MapPoint> {
         let point = |s: &Surfel| MapPoint {
             at: s.point.at,
@@ -196,12 +181,11 @@ impl Surfel {
 }
 
 /// The surfels that an index map shows, to align to.
-#[derive(Debug, Clone, Copy)]
 pub struct SurfelTarget<'a> {
-    surfels: &'a [Surfel],
-    index_map: &'a IndexMap<'a>,
+    pub surfels: &'a Surfels,
+    pub index_map: &'a IndexMap<'a>,
     /// Neighbours farther than this do not count, m.
-    max_correspondence_m: f32,
+    pub max_correspondence_m: f32,
 }
 
 impl Target for SurfelTarget<'_> {
@@ -210,7 +194,8 @@ impl Target for SurfelTarget<'_> {
     #[inline]
     fn find(&self, p: &Vector3<f32>, (): &mut ()) -> Option<&Point> {
         let block = self.index_map.block(p)?;
-        let near = |i: usize| within(&self.surfels[i].point, p, self.max_correspondence_m);
+        let surfels = &self.surfels.surfels;
+        let near = |i: usize| within(&surfels[i].point, p, self.max_correspondence_m);
         self.index_map.front(block).and_then(near).or_else(|| {
             let squared = |point: &Point| (point.at - p).norm_squared();
             let candidates = self.index_map.around(block).filter_map(near);

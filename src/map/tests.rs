@@ -7,15 +7,15 @@ use super::blocks::Blocks;
 use super::icp::{Alignment, Termination, align};
 use super::index_map::Projective;
 use super::nearest::Nearest;
-use super::noise::Noise;
-use super::options::{Init, Kernel, Options, Weights};
+use super::point::Noise;
 use super::voxel::{Voxels, points_of};
+use super::{Init, Kernel, Options, Weights};
 use crate::camera::Camera;
 use crate::model::NoiseModel;
 use crate::rng::{Seed, Stream};
 
 fn camera() -> Camera {
-    Camera { width: 320, height: 240, fx: 262.5, fy: 262.5, cx: 159.5, cy: 119.5, distortion: None }
+    Camera::centred(320, 240, 262.5)
 }
 
 /// Planes n . p = d of a room's corner, and a near wall: every motion is determined.

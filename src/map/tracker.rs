@@ -6,9 +6,9 @@ use super::frame_report::{Fate, FrameReport, Stages};
 use super::icp::{Alignment, Termination, align, renormalised};
 use super::index_map::Projective;
 use super::map_points::{MapPoint, PointGrid};
-use super::options::{Init, Method, Options};
 use super::preprocess::{Prepared, Preprocessor, Shape};
-use super::surfels::Surfels;
+use super::surfels::{SurfelTarget, Surfels};
+use super::{Init, Method, Options};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 
@@ -20,7 +20,6 @@ const MIN_RATIO_KEPT: f64 = 0.6;
 /// Surfels are sorted out every so many frames.
 const PRUNE_EVERY: u32 = 10;
 
-/// The state between frames.
 pub struct Tracker<'a> {
     options: &'a Options,
     camera: &'a Camera,
@@ -52,9 +51,7 @@ impl<'a> Tracker<'a> {
     }
 
     /// Take in a frame; one that could not be read is lost.
-    ///
-    /// # Errors
-    /// When OpenCV fails.
+    /// An error when OpenCV fails.
     pub fn track(&mut self, stamp: f64, frame: Result<Prepared>) -> Result<FrameReport> {
         let mut frame = match frame {
             Ok(frame) => frame,
@@ -137,7 +134,8 @@ impl<'a> Tracker<'a> {
                 let start = self.pose * start;
                 let seen = || self.surfels.seen_from(&start, self.camera, options.block_px);
                 let index_map = stages.time("render", seen);
-                let target = self.surfels.target(&index_map, max_correspondence_m);
+                let (surfels, index_map) = (&self.surfels, &index_map);
+                let target = SurfelTarget { surfels, index_map, max_correspondence_m };
                 let found = stages.time("icp", || align(source, &target, start, options));
                 let target_from_source = self.pose.inverse() * found.target_from_source;
                 Alignment { target_from_source, ..found }
@@ -192,7 +190,6 @@ impl<'a> Tracker<'a> {
         }
     }
 
-    /// The finished map.
     pub fn into_map(self) -> Vec<MapPoint> {
         if self.surfels.is_empty() { self.grid.points() } else { self.surfels.points() }
     }

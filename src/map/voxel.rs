@@ -3,8 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::noise::Noise;
-use super::point::Point;
+use super::point::{Noise, Point};
 use super::sparse_grid::{Cell, SparseGrid, cell_of};
 use crate::camera::Rays;
 
@@ -20,7 +19,6 @@ pub struct Voxel {
 }
 
 /// A depth image as occupied cells.
-#[derive(Debug, Clone)]
 pub struct Voxels {
     pub side_m: f32,
     pub grid: SparseGrid,
@@ -72,7 +70,6 @@ impl Voxels {
         Voxels { side_m, grid, voxels }
     }
 
-    /// The mean of a voxel's points, m.
     pub fn mean(&self, index: usize) -> Vector3<f32> {
         let voxel = &self.voxels[index];
         corner(self.grid.cell(index), self.side_m) + voxel.sum / voxel.n

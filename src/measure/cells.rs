@@ -40,7 +40,6 @@ const BIN_WHEN_RATIO: f64 = 1.10;
 const BIN_RATIO: f64 = 1.05;
 const MAX_BINS: usize = 48;
 
-/// How depth is cut into bins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bins {
     low: f64,
@@ -49,7 +48,6 @@ pub(super) struct Bins {
 }
 
 impl Bins {
-    /// For depths between `low` and `high`, m.
     pub fn between(low: f64, high: f64) -> Self {
         let range = (high / low).ln();
         let tilted = range > BIN_WHEN_RATIO.ln();
@@ -105,7 +103,6 @@ impl Sums {
 }
 
 /// What is known about a view when its cells are evaluated.
-#[derive(Debug, Clone, Copy)]
 pub(super) struct Context {
     pub frames: f64,
     /// Variance left by the cut of the tails, as a share.
@@ -120,7 +117,6 @@ pub(super) struct Context {
     pub per_frame_planes: bool,
 }
 
-/// Parameters of a plane.
 const PLANE_PARAMETERS: f64 = 3.0;
 /// The plane cannot have absorbed more than this share of the variance: beyond, the residual is
 /// smooth error rather than correlated noise, and the count of parameters says nothing.

@@ -11,8 +11,7 @@ use super::cells::Cell;
 const TIMES_NEIGHBOURS: f64 = 2.0;
 /// ... beyond what its own standard error explains.
 const STANDARD_ERRORS: f64 = 3.0;
-/// A bin's mean may be off by this many of its standard deviations: no bin of Herrera's real views,
-/// lens errors and all, is.
+/// A bin's mean may be off by this many standard deviations: none of Herrera's real views is.
 const MEAN_SIGMAS: f64 = 2.0;
 /// Bins towards the middle of the view with which one is compared: their median.
 const COMPARED: usize = 3;

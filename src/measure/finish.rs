@@ -20,7 +20,8 @@ impl Scan<'_> {
             Planes::PerFrame => Plane::new(self.own_planes / frames as f64),
         };
         let shift = self.shift_to(&plane);
-        let sums = self.sums(&plane, &shift);
+        let cells = 0..self.cut.len();
+        let sums: Vec<Sums> = cells.map(|cell| self.sums_of(cell, &plane, &shift)).collect();
         let correlation = self.correlation(first, &plane, &sums);
         let temporal_correlation = self.lagged.correlation();
         let context = self.context(&correlation, temporal_correlation);
@@ -76,18 +77,9 @@ impl Scan<'_> {
         if self.bench.options.planes == Planes::PerFrame {
             return vec![0.0; self.pixels.len()];
         }
-        self.pixels
-            .iter()
-            .zip(&self.expected)
-            .map(|(&i, &old)| {
-                let (x, y) = self.bench.rays.at(i as usize);
-                plane.depth(x, y) - f64::from(old)
-            })
-            .collect()
-    }
-
-    fn sums(&self, plane: &Plane, shift: &[f64]) -> Vec<Sums> {
-        (0..self.cut.len()).map(|cell| self.sums_of(cell, plane, shift)).collect()
+        let rays = &self.bench.rays;
+        let rise = |(&i, &old): (&u32, &f32)| plane.depth_at(rays, i as usize) - f64::from(old);
+        self.pixels.iter().zip(&self.expected).map(rise).collect()
     }
 
     fn sums_of(&self, cell: usize, plane: &Plane, shift: &[f64]) -> Sums {
@@ -142,9 +134,8 @@ impl Scan<'_> {
             let per_sigma = 1.0 / (s.e2 / s.n.max(1.0)).sqrt().max(f64::MIN_POSITIVE) as f32;
             for k in self.cell_range(cell) {
                 let i = self.pixels[k] as usize;
-                let (x, y) = self.bench.rays.at(i);
                 let z = self.bench.table.metres(first.raw[i]);
-                let e = z - plane.depth(x, y) as f32;
+                let e = z - plane.depth_at(&self.bench.rays, i) as f32;
                 if e.abs() < self.cut[cell] {
                     field[i] = e * per_sigma;
                 }

@@ -3,7 +3,7 @@
 use super::Workbench;
 use super::cells::Bins;
 use crate::plane::{MAD_TO_SIGMA, Plane};
-use crate::stats::{median_in_place, normal_cut_factor};
+use crate::stats::{median_in_place, normal_cut_factor, range};
 
 /// Residuals beyond this many standard deviations of their cell are gross errors; the variance
 /// of what is kept is divided by [`normal_cut_factor`], 0.994.
@@ -18,17 +18,9 @@ pub(super) fn by_cell(
     plane: &Plane,
     bench: &Workbench<'_>,
 ) -> (Vec<u32>, Vec<usize>) {
-    let depth = |i: u32| {
-        let (x, y) = bench.rays.at(i as usize);
-        plane.depth(x, y)
-    };
-    let (mut low, mut high) = (f64::INFINITY, 0f64);
-    for &i in pixels {
-        let z = depth(i);
-        low = low.min(z);
-        high = high.max(z);
-    }
-    let bins = Bins::between(low, high);
+    let depth = |i: u32| plane.depth_at(&bench.rays, i as usize);
+    let [low, high] = range(pixels.iter().map(|&i| depth(i)));
+    let bins = Bins::between(low, high.max(0.0));
     let mut groups: Vec<Vec<u32>> = vec![Vec::new(); bins.count];
     for &i in pixels {
         groups[bins.index(depth(i))].push(i);
@@ -51,17 +43,6 @@ pub(super) fn by_cell(
         starts.push(sorted.len());
     }
     (sorted, starts)
-}
-
-/// Depth at which each pixel's ray meets the plane, m.
-pub(super) fn expected(pixels: &[u32], plane: &Plane, bench: &Workbench<'_>) -> Vec<f32> {
-    pixels
-        .iter()
-        .map(|&i| {
-            let (x, y) = bench.rays.at(i as usize);
-            plane.depth(x, y) as f32
-        })
-        .collect()
 }
 
 /// Standard deviation inside +-[`CUT_SIGMAS`] of itself, corrected for the cut.

@@ -3,24 +3,20 @@
 //! The first few frames find the target and the scale, the rest stream through accumulators.
 
 mod cells;
-mod csv;
 mod doubtful;
 mod finish;
 mod grouping;
-mod paper;
 mod scan;
 mod table;
 mod view;
 
 pub use cells::{Cell, Spread};
-pub use csv::{read_table, write_measurements};
-pub use paper::PaperResult;
-pub use table::{SigmaKind, SigmaRow, SigmaTable};
+pub use table::{SigmaKind, SigmaRow, SigmaTable, read_table, write_measurements};
 pub use view::{measure_view, view_target};
 
 use crate::camera::Rays;
 use crate::frame::DepthTable;
-use crate::plane::{Exclusions, Plane};
+use crate::plane::{Exclusions, Plane, RansacPlane};
 use crate::rng::Seed;
 use crate::stats::Correlation;
 use crate::view::Sensor;
@@ -35,16 +31,13 @@ pub enum Planes {
     PerFrame,
 }
 
-/// Settings of the measurement.
 #[derive(Debug, Clone, Copy)]
 pub struct MeasureOptions {
-    /// One plane a view, or one a frame.
     pub planes: Planes,
     /// The paper's RANSAC threshold, m; by default three robust standard deviations of the view.
     pub ransac_threshold_m: Option<f64>,
     /// Largest number of hypotheses that the paper's RANSAC tries.
     pub ransac_iterations: usize,
-    /// Of all random choices.
     pub seed: Seed,
 }
 
@@ -62,20 +55,16 @@ impl Default for MeasureOptions {
 /// What every view of a recording shares: computed once.
 #[derive(Debug)]
 pub struct Workbench<'a> {
-    /// The unit that recorded.
     pub sensor: &'a Sensor,
-    /// Of all its pixels.
     pub rays: Rays,
     /// From raw value to m.
     pub table: DepthTable,
-    /// The settings.
     pub options: MeasureOptions,
     /// The raw values hold the length of the ray, not the depth.
     pub ranges: bool,
 }
 
 impl<'a> Workbench<'a> {
-    /// Works out the rays of all pixels and the depth of all raw values.
     pub fn new(sensor: &'a Sensor, options: MeasureOptions) -> Self {
         Workbench {
             sensor,
@@ -95,11 +84,9 @@ impl<'a> Workbench<'a> {
 /// All that was measured in one view.
 #[derive(Debug, Clone)]
 pub struct ViewMeasurement {
-    /// The view's name.
     pub name: String,
     /// Seconds on the recording's clock, first frame.
     pub time_s: f64,
-    /// The default plane fit.
     pub plane: Plane,
     /// Mean depth of the target's pixels, m.
     pub z_m: f64,
@@ -107,17 +94,14 @@ pub struct ViewMeasurement {
     pub theta_rad: f64,
     /// Image direction in which depth grows, rad; 0 along the columns.
     pub azimuth_rad: f64,
-    /// The whole target as one.
     pub whole: Cell,
     /// The target cut into bins of depth; one bin when it is not strongly tilted.
     pub cells: Vec<Cell>,
-    /// The paper's method on the first frame.
-    pub paper: Option<PaperResult>,
+    pub paper: Option<RansacPlane>,
     /// Between neighbouring pixels' residuals.
     pub correlation: Correlation,
     /// Correlation of a pixel with itself one frame later; `None` with fewer than 4 frames.
     pub temporal_correlation: Option<f64>,
-    /// Frames used.
     pub frames: usize,
     /// Pixels left out, by reason.
     pub exclusions: Exclusions,
@@ -129,7 +113,6 @@ pub struct ViewMeasurement {
     pub infrared: Option<f64>,
     /// Of the mean residual.
     pub picture: ResidualPicture,
-    /// What was odd about it, for people.
     pub notes: Vec<String>,
     /// SHA-256 of the frames' bytes in order.
     pub digest: [u8; 32],
@@ -146,11 +129,8 @@ impl ViewMeasurement {
 /// The view's mean residual, shrunk for looking at; NaN outside the target.
 #[derive(Debug, Clone)]
 pub struct ResidualPicture {
-    /// Columns, px of the picture.
     pub width: usize,
-    /// Rows, px of the picture.
     pub height: usize,
-    /// Axial residual, mm, row-major.
     pub millimetres: Vec<f32>,
 }
 
@@ -185,7 +165,6 @@ impl ReferenceDistance {
         self.off_m().abs() > self.tolerance_m()
     }
 
-    /// The tolerance, for people.
     pub fn describe_tolerance() -> String {
         format!("{:.0} mm and {:.0} % of the distance", 1e3 * TAPE_M, 1e2 * SCALE_SHARE)
     }

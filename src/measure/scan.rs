@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::grouping::{CUT_SIGMAS, by_cell, expected, settled_scale};
+use super::grouping::{CUT_SIGMAS, by_cell, settled_scale};
 use super::{Planes, Workbench};
 use crate::frame::Frame;
 use crate::plane::{Plane, Target};
@@ -33,8 +33,7 @@ pub(super) struct Scan<'a> {
     pub(super) own_planes: Vector3<f64>,
 }
 
-/// Per cell: number and sum of residuals, frame by frame reduced to what the variance between
-/// frames needs.
+/// Per cell: residuals, frame by frame reduced to what the variance between frames needs.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct FrameSums {
     pub n: f64,
@@ -49,9 +48,10 @@ impl<'a> Scan<'a> {
         let (pixels, starts) = by_cell(&target.pixels, &plane, bench);
         let cells = starts.len() - 1;
         let n = pixels.len();
+        let expected = |&i: &u32| plane.depth_at(&bench.rays, i as usize) as f32;
         let mut scan = Scan {
             bench,
-            expected: expected(&pixels, &plane, bench),
+            expected: pixels.iter().map(expected).collect(),
             pixels,
             starts,
             plane,
@@ -73,8 +73,7 @@ impl<'a> Scan<'a> {
         self.starts[cell]..self.starts[cell + 1]
     }
 
-    /// Robust scale of each cell: median absolute deviation, then cut and corrected until it
-    /// settles.
+    /// Robust scale of each cell: median absolute deviation, then cut and corrected to its end.
     fn find_cuts(&mut self, held: &[Frame]) {
         const ENOUGH: usize = 20_000;
         for cell in 0..self.cut.len() {
@@ -141,10 +140,7 @@ impl<'a> Scan<'a> {
                 let z = self.bench.table.metres(frame.raw[i]);
                 let expected = match own {
                     None => self.expected[k],
-                    Some(plane) => {
-                        let (x, y) = self.bench.rays.at(i);
-                        plane.depth(x, y) as f32
-                    }
+                    Some(plane) => plane.depth_at(&self.bench.rays, i) as f32,
                 };
                 let e = z - expected;
                 if e.abs() < cut {

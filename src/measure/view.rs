@@ -1,19 +1,16 @@
 //! One view: its frames are read once, in order, and only a handful are held.
 
-use super::paper;
 use super::scan::{HELD_FRAMES, Scan};
 use super::{ViewMeasurement, Workbench};
 use crate::error::{Error, Result};
 use crate::frame::{DepthTable, Frame};
 use crate::io::{FrameSource, InfraredImage};
-use crate::plane::{InverseDepthImage, Target, find_target};
+use crate::plane::{
+    InverseDepthImage, Points, RansacOptions, RansacPlane, Target, find_target, ransac_plane,
+};
 use crate::view::{FrameRef, View};
 
-/// Measure one view.
-///
-/// # Errors
-/// When no frame can be read or none shows a plane; unreadable frames beside good ones are
-/// named in the notes.
+/// An error when no frame can be read or none shows a plane; others that cannot are notes.
 pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasurement> {
     let camera = &bench.sensor.camera;
     let mut source = FrameSource::new(camera.width, camera.height);
@@ -28,31 +25,27 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
         scan.add(&frame);
     }
     let mut notes = reader.notes;
-    let paper = paper::measure(view, bench, &target, &held[0], scan.sigma_perpendicular());
+    let paper = by_the_paper(view, bench, &target, &held[0], scan.sigma_perpendicular());
     let infrared = infrared_of(view, &target, bench, &mut notes);
     notes.extend(target.notes.iter().cloned());
-    let mut result = scan.finish(&target, &held[0]).ok_or_else(|| {
-        failed(
-            view,
-            "the residuals of its plane cannot be measured".into(),
-            "record the view again",
-        )
+    let measured = scan.finish(&target, &held[0]).ok_or_else(|| {
+        let what = "the residuals of its plane cannot be measured".into();
+        failed(view, what, "record the view again")
     })?;
-    result.name = view.name.clone();
-    result.time_s = view.depth[0].timestamp;
-    result.paper = paper;
-    result.infrared = infrared;
-    result.reference_distance_m = view.notes.reference_distance_m;
-    notes.append(&mut result.notes);
-    result.notes = notes;
-    result.digest = source.digest();
-    Ok(result)
+    notes.extend(measured.notes);
+    Ok(ViewMeasurement {
+        name: view.name.clone(),
+        time_s: view.depth[0].timestamp,
+        paper,
+        infrared,
+        reference_distance_m: view.notes.reference_distance_m,
+        notes,
+        digest: source.digest(),
+        ..measured
+    })
 }
 
 /// The target of one view, from its first frames.
-///
-/// # Errors
-/// As [`measure_view`].
 pub fn view_target(view: &View, bench: &Workbench<'_>) -> Result<Target> {
     let camera = &bench.sensor.camera;
     let mut source = FrameSource::new(camera.width, camera.height);
@@ -78,7 +71,6 @@ impl<'r> FrameReader<'r> {
         FrameReader { frames: view.depth.iter(), source, notes: Vec::new(), table }
     }
 
-    /// The first readable frames.
     fn hold(&mut self, view: &View) -> Result<Vec<Frame>> {
         let mut held = Vec::new();
         while held.len() < HELD_FRAMES {
@@ -95,7 +87,9 @@ impl<'r> FrameReader<'r> {
     fn next_readable(&mut self) -> Option<Frame> {
         while let Some(frame_ref) = self.frames.next() {
             match self.source.read(&frame_ref.path) {
-                Ok(frame) if self.sees_anything(&frame) => return Some(frame),
+                Ok(f) if f.raw.iter().any(|&raw| self.table.metres(raw).is_finite()) => {
+                    return Some(f);
+                }
                 Ok(_) => self.notes.push(format!(
                     "frame left out: {}: no pixel carries a depth",
                     frame_ref.path.display()
@@ -104,10 +98,6 @@ impl<'r> FrameReader<'r> {
             }
         }
         None
-    }
-
-    fn sees_anything(&self, frame: &Frame) -> bool {
-        frame.raw.iter().any(|&raw| self.table.metres(raw).is_finite())
     }
 }
 
@@ -126,13 +116,9 @@ fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Targe
         step: &|w| bench.step(w),
     };
     let mut rng = bench.options.seed.stream(&format!("target/{}", view.name));
-    find_target(&image, view.notes.region.as_ref(), &mut rng).map_err(|what| {
-        failed(
-            view,
-            what,
-            "give the target's region in view.json (roi or polygon), or record the view again",
-        )
-    })
+    let remedy = "give the target's region in view.json (roi or polygon), or record the view again";
+    find_target(&image, view.notes.region.as_ref(), &mut rng)
+        .map_err(|what| failed(view, what, remedy))
 }
 
 /// Mean over the frames, where at least half of them measured; 1/m, NaN elsewhere.
@@ -149,18 +135,11 @@ fn mean_inverse_depth(frames: &[Frame], table: &DepthTable) -> Vec<f32> {
             }
         }
     }
-    sum.iter()
-        .zip(&count)
-        .map(
-            |(s, &c)| {
-                if 2 * usize::from(c) >= frames.len() && c > 0 {
-                    s / f32::from(c)
-                } else {
-                    f32::NAN
-                }
-            },
-        )
-        .collect()
+    let mean = |(s, &c): (f32, &u8)| {
+        let enough = 2 * usize::from(c) >= frames.len() && c > 0;
+        if enough { s / f32::from(c) } else { f32::NAN }
+    };
+    sum.into_iter().zip(&count).map(mean).collect()
 }
 
 /// Mean amplitude over the target in the view's first readable infrared image.
@@ -189,4 +168,40 @@ fn infrared_of(
         }
     }
     None
+}
+
+/// In robust standard deviations; the paper does not print its threshold.
+const THRESHOLD_SIGMAS: f64 = 3.0;
+const MIN_THRESHOLD_M: f64 = 0.001;
+const CONFIDENCE: f64 = 0.999;
+
+/// The paper's own measurement (Yamaguchi et al. 2016, section II), on a view's first frame: RANSAC.
+/// Its sigma is low by the cut of the tails (1.3 % at three standard deviations) and is measured
+/// across the plane: cos(theta) times the axial one for noise along the axis.
+fn by_the_paper(
+    view: &View,
+    bench: &Workbench<'_>,
+    target: &Target,
+    frame: &Frame,
+    sigma_perpendicular_m: f64,
+) -> Option<RansacPlane> {
+    let mut points = Points::default();
+    for &i in &target.pixels {
+        let i = i as usize;
+        let z = bench.table.metres(frame.raw[i]);
+        if z.is_finite() {
+            points.push(bench.rays.x[i] * z, bench.rays.y[i] * z, z);
+        }
+    }
+    let threshold_m = bench
+        .options
+        .ransac_threshold_m
+        .unwrap_or((THRESHOLD_SIGMAS * sigma_perpendicular_m).max(MIN_THRESHOLD_M));
+    let options = RansacOptions {
+        threshold_m,
+        iterations: bench.options.ransac_iterations,
+        confidence: CONFIDENCE,
+    };
+    let mut rng = bench.options.seed.stream(&format!("ransac/{}", view.name));
+    ransac_plane(&points, &options, &mut rng)
 }

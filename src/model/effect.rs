@@ -115,36 +115,17 @@ mod tests {
 
     #[test]
     fn impossible_bases_are_refused() {
-        let curve = |low, high, nodes| Basis::Curve {
-            over: Coordinate::Radius,
-            low,
-            high,
-            nodes,
-            times: Modulation::One,
-        };
+        let (over, times) = (Coordinate::Radius, Modulation::One);
+        let curve = |low, high, nodes| Basis::Curve { over, low, high, nodes, times };
+        let (z_m, theta_rad, columns) = ([1.0, 2.0], [0.0, 1.0], vec![vec![0.0; 3]]);
         let bad = [
             Basis::Locking { period_px: 0.0, harmonics: 2 },
             Basis::Banding { period_px: -8.0, harmonics: 1 },
             Basis::Banding { period_px: 8.0, harmonics: usize::MAX },
             Basis::Bow { degree: usize::MAX },
-            Basis::Map {
-                width: 640.0,
-                height: 480.0,
-                across: usize::MAX,
-                down: 2,
-                times: Modulation::One,
-            },
-            Basis::Ring {
-                over: Coordinate::Azimuth,
-                period: f64::INFINITY,
-                nodes: 4,
-                times: Modulation::One,
-            },
-            Basis::Recalibrate {
-                z_m: [1.0, 2.0],
-                theta_rad: [0.0, 1.0],
-                columns: vec![vec![0.0; 3]],
-            },
+            Basis::Map { width: 640.0, height: 480.0, across: usize::MAX, down: 2, times },
+            Basis::Ring { over: Coordinate::Azimuth, period: f64::INFINITY, nodes: 4, times },
+            Basis::Recalibrate { z_m, theta_rad, columns },
             curve(0.0, 1.0, 1),
             curve(1.0, 1.0, 4),
             curve(f64::NAN, 1.0, 4),

@@ -23,7 +23,7 @@ impl SigmaModel {
     }
 
     fn wrong_shape(&self) -> Option<String> {
-        let p = self.form.spec().parameters().len();
+        let p = self.form.card().parameters.len();
         let fits = self.parameters.len() == p
             && self.covariance.shape() == (p, p)
             && self.std_errors.len() == p;
@@ -165,15 +165,6 @@ mod tests {
         for dof in [0.0, 0.999, -3.0, f64::NAN, f64::INFINITY] {
             assert!(says(|m| m.degrees_of_freedom = dof).contains("degrees_of_freedom"), "{dof}");
         }
-        assert!(says(|m| m.std_errors[0] = Some(-1.0)).contains("std_error"));
-        assert!(says(|m| m.domain.z_m = [2.0, 1.0]).contains("valid range"));
         assert!(says(|m| m.domain.z_m = [0.0, 1.0]).contains("valid range"));
-        assert!(says(|m| m.domain.theta_rad[1] = 1.39).contains("pole"));
-        let flat = says(|m| {
-            (m.form, m.parameters) = (Form::Khoshelham, vec![1e-3]);
-            (m.std_errors, m.covariance) = (vec![None], DMatrix::zeros(1, 1));
-            m.domain.theta_rad[1] = 1.6;
-        });
-        assert!(flat.contains("pi/2"), "{flat}");
     }
 }

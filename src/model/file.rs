@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 use super::effect::Effect;
 use super::forms::Form;
 use super::{Direction, Domain, SigmaModel};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, read_text};
 use crate::io::{pretty_json, write_atomic};
 use crate::view::RecordingFile;
 
@@ -24,7 +24,6 @@ pub struct NoiseModel {
     /// `None` when the model came from a bare table.
     pub sensor: Option<RecordingFile>,
     pub sigma: SigmaModel,
-    /// Physical effects beyond sigma.
     pub effects: Vec<Effect>,
     pub fit: FitSummary,
     pub provenance: Provenance,
@@ -101,13 +100,7 @@ struct SigmaFile {
     formula: String,
     parameters: Map<String, Value>,
     covariance: Vec<Vec<f64>>,
-    valid: Valid,
-}
-
-#[derive(Serialize, Deserialize)]
-struct Valid {
-    z_m: [f64; 2],
-    theta_rad: [f64; 2],
+    valid: Domain,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -132,10 +125,7 @@ impl NoiseModel {
         }
     }
 
-    /// The text of `model.json`.
-    ///
-    /// # Errors
-    /// When a number of the model is not finite.
+    /// The text of `model.json`; an error when a number of the model is not finite.
     pub fn to_json(&self) -> Result<String> {
         let of_effects = || self.effects.iter().find_map(Effect::fault);
         if let Some(what) = self.sigma.fault().or_else(of_effects) {
@@ -144,29 +134,20 @@ impl NoiseModel {
                 remedy: "the model cannot be written; look at the views' warnings",
             });
         }
-        let spec = self.sigma.form.spec();
-        let parameters = spec
-            .parameters()
-            .iter()
-            .zip(self.sigma.parameters.iter().zip(&self.sigma.std_errors))
-            .map(|((name, _), (&value, &std_error))| {
-                (name.to_string(), serde_json::json!(ParameterFile { value, std_error }))
-            })
-            .collect();
+        let SigmaModel { form, parameters, std_errors, covariance, domain, .. } = &self.sigma;
+        let parameter = |((name, _), (&value, &std_error)): (&(&str, _), (&f64, &Option<f64>))| {
+            (name.to_string(), serde_json::json!(ParameterFile { value, std_error }))
+        };
+        let names = form.card().parameters.iter();
         let file = ModelFile {
             format: MODEL_FORMAT.into(),
             sensor: self.sensor.clone(),
             sigma: SigmaFile {
-                form: spec.id().into(),
-                formula: spec.formula().into(),
-                parameters,
-                covariance: self
-                    .sigma
-                    .covariance
-                    .row_iter()
-                    .map(|r| r.iter().copied().collect())
-                    .collect(),
-                valid: Valid { z_m: self.sigma.domain.z_m, theta_rad: self.sigma.domain.theta_rad },
+                form: form.id().into(),
+                formula: form.card().formula.into(),
+                parameters: names.zip(parameters.iter().zip(std_errors)).map(parameter).collect(),
+                covariance: covariance.row_iter().map(|r| r.iter().copied().collect()).collect(),
+                valid: *domain,
             },
             effects: self.effects.clone(),
             fit: FitFile {
@@ -182,16 +163,13 @@ impl NoiseModel {
         })
     }
 
-    /// # Errors
-    /// When the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         write_atomic(path, self.to_json()?.as_bytes())
     }
 
-    /// # Errors
-    /// When the file is missing, not a model, damaged, or of a newer format.
+    /// An error when the file is missing, not a model, damaged, or of a newer format.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+        let text = read_text(path)?;
         Self::from_json(&text).map_err(|(what, remedy)| Error::ModelFile {
             path: path.to_path_buf(),
             what,
@@ -244,7 +222,7 @@ fn read_sigma(file: SigmaFile, fit: &FitFile) -> Result<SigmaModel, (String, &'s
         file.form.parse().map_err(|what| (what, "update kinoise, or make the model again"))?;
     let mut parameters = Vec::new();
     let mut std_errors = Vec::new();
-    for (name, _) in form.spec().parameters() {
+    for (name, _) in form.card().parameters {
         let value = file
             .parameters
             .get(*name)
@@ -263,7 +241,7 @@ fn read_sigma(file: SigmaFile, fit: &FitFile) -> Result<SigmaModel, (String, &'s
         parameters,
         std_errors,
         covariance: DMatrix::from_fn(p, p, |i, j| file.covariance[i][j]),
-        domain: Domain { z_m: file.valid.z_m, theta_rad: file.valid.theta_rad },
+        domain: file.valid,
         degrees_of_freedom: fit.degrees_of_freedom,
         direction: fit.residual,
     })

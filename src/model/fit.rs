@@ -5,13 +5,15 @@
 //! constant coefficient of variation). The start comes from the data alone, so there is no
 //! "start" to get wrong.
 
-use super::forms::{Form, SigmaForm};
-use super::local::polish;
+use nalgebra::{DMatrix, DVector};
+
+use super::forms::{Form, SigmaForm, Walk, natural_jacobian};
 use super::rows::Rows;
 use super::statistics::{SigmaFit, report};
 use super::surface::Domain;
 use crate::error::{Error, Result};
-use crate::measure::SigmaTable;
+use crate::measure::{SigmaRow, SigmaTable};
+use crate::solve::{LeastSquares, trust_region};
 
 /// Distances closer than this count as one.
 pub const DISTANCE_RATIO: f64 = 1.05;
@@ -19,158 +21,250 @@ const MAX_ROUNDS: usize = 60;
 /// Largest change of ln sigma over the table at which the weights have settled.
 const SETTLED: f64 = 1e-10;
 
-/// Fit `form` to every row of `table`.
-///
-/// # Errors
-/// When the table has too few rows or distances for the form, or the solver finds no surface
-/// that is positive over their range.
+/// Fit `form` to every row of `table`; an error when it has too few rows or distances for the form,
+/// or the solver finds no surface that is positive over their range.
 pub fn fit_all(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
     let spec = form.spec();
     let mut rows = Rows::new(table);
     enough(&rows, spec)?;
-    let no_start = || Error::NotEnough {
-        what: format!(
-            "the form \"{form}\" cannot be fitted to these {} sigmas",
-            describe_rows(table)
-        ),
-        remedy: "add views at other distances and tilts, or choose --form khoshelham".into(),
+    let no_start = || {
+        let (n, [low, high]) = (table.rows.len(), table.range(|r| r.z_m));
+        Error::NotEnough {
+            what: format!(
+                "the form \"{form}\" cannot be fitted to these {n} measured from {low:.2} to {high:.2} m sigmas"
+            ),
+            remedy: "add views at other distances and tilts, or choose --form khoshelham".into(),
+        }
     };
     let first = spec.start(&rows).ok_or_else(no_start)?;
     rows.refer_to(|r| positive(spec.sigma(&first.parameters, r.z_m, r.theta_rad), r.sigma_m));
     rows.estimate_extra(first.held.iter().filter(|held| !**held).count());
     let start = spec.start(&rows).ok_or_else(no_start)?;
-    let mut remarks = start.remarks;
-    let mut free: Vec<usize> = (0..start.held.len()).filter(|&i| !start.held[i]).collect();
-    let mut p = start.parameters.clone();
+    let free = (0..start.held.len()).filter(|&i| !start.held[i]).collect();
+    let mut fit = Fit { rows, spec, p: start.parameters, free, remarks: start.remarks };
     let (mut rounds, mut converged) = (0, false);
     while rounds < MAX_ROUNDS && !converged {
         rounds += 1;
-        rows.refer_to(|r| positive(spec.sigma(&p, r.z_m, r.theta_rad), r.sigma_m));
-        rows.estimate_extra(free.len());
-        let before: Vec<f64> = rows.reference().to_vec();
-        p = polish(&rows, spec, &p, &free);
-        hold_strays(&rows, spec, &mut p, &mut free, &mut remarks);
-        let change = rows
-            .iter()
-            .zip(&before)
-            .map(|(r, s)| (spec.sigma(&p, r.z_m, r.theta_rad) / s).ln().abs())
-            .fold(0.0, f64::max);
-        converged =
-            change < SETTLED && !hold_positive(&rows, spec, &mut p, &mut free, &mut remarks);
+        converged = fit.round() < SETTLED && !fit.hold_positive();
     }
-    if !positive_in_range(&rows, spec, &p) {
+    if !fit.positive_in_range() {
         return Err(Error::Solver {
             what: format!("the form \"{form}\" is not positive over the range of the data"),
             remedy: "look for outlying views in measurements.csv, or choose another --form",
         });
     }
+    let Fit { mut rows, p, free, remarks, .. } = fit;
     rows.refer_to(|r| spec.sigma(&p, r.z_m, r.theta_rad));
     Ok(report(form, &rows, p, &free, remarks, rounds, converged))
 }
 
-/// Hold free parameters that left where they can be believed at the edge.
-fn hold_strays(
-    rows: &Rows,
-    spec: &dyn SigmaForm,
-    p: &mut [f64],
-    free: &mut Vec<usize>,
-    remarks: &mut Vec<String>,
-) {
-    free.retain(|&i| match spec.limits(i, rows) {
-        Some([low, high]) if !(low..=high).contains(&p[i]) => {
-            p[i] = if p[i] > high { high } else { low };
-            remarks.push(format!(
-                "{} runs out of what is believed and is held at {:.3}",
-                spec.parameters()[i].0,
-                p[i]
-            ));
-            false
-        }
-        _ => true,
-    });
+/// A fit under way.
+struct Fit<'a> {
+    rows: Rows,
+    spec: &'a dyn SigmaForm,
+    p: Vec<f64>,
+    /// Parameters that are not held.
+    free: Vec<usize>,
+    remarks: Vec<String>,
 }
 
 /// A surface may not come nearer to zero inside its range than this share of the least sigma
 /// measured: between two distances a parabola can dip to where no sensor is.
 const MIN_SHARE: f64 = 0.1;
 
-/// Where the surface is least inside its range: at the vertex or the end of z next to it, and at
-/// the least tilt, for no form's tilt term is negative.
-fn min_point(rows: &Rows, spec: &dyn SigmaForm, p: &[f64]) -> Option<(f64, f64)> {
-    let domain = Domain::of(rows, spec.pole(p));
-    spec.vertex(p).map(|c| domain.clamp(c, 0.0))
-}
-
-/// Lift a surface that dips too low to [`MIN_SHARE`] and hold its floor there. True when that
-/// was needed: the rest must be fitted again.
-fn hold_positive(
-    rows: &Rows,
-    spec: &dyn SigmaForm,
-    p: &mut [f64],
-    free: &mut Vec<usize>,
-    remarks: &mut Vec<String>,
-) -> bool {
-    let Some((z, theta)) = min_point(rows, spec, p) else { return false };
-    let floor = MIN_SHARE * rows.range(|r| r.sigma_m)[0];
-    let sigma = spec.sigma(p, z, theta);
-    // Once lifted, half the way down again is let be: the surface is positive.
-    if sigma >= if free.contains(&0) { floor } else { 0.5 * floor } {
-        return false;
+impl Fit<'_> {
+    /// Weigh by the surface and fit again; the largest change of ln sigma over the table.
+    fn round(&mut self) -> f64 {
+        let Fit { rows, spec, p, free, .. } = self;
+        rows.refer_to(|r| positive(spec.sigma(p, r.z_m, r.theta_rad), r.sigma_m));
+        rows.estimate_extra(free.len());
+        *p = polish(rows, *spec, p, free);
+        self.hold_strays();
+        let (spec, p) = (self.spec, &self.p);
+        let change = |(r, s): (&SigmaRow, &f64)| (spec.sigma(p, r.z_m, r.theta_rad) / s).ln().abs();
+        self.rows.iter().zip(self.rows.reference()).map(change).fold(0.0, f64::max)
     }
-    p[0] += floor - sigma;
-    if free.contains(&0) {
-        free.retain(|&i| i != 0);
-        remarks.push(format!(
-            "a is held: fitted freely the surface falls to {:.2} mm at {z:.2} m; record views near that distance",
-            1e3 * sigma
-        ));
-    }
-    true
-}
 
-fn positive_in_range(rows: &Rows, spec: &dyn SigmaForm, p: &[f64]) -> bool {
-    let good = |z, theta| {
-        let sigma: f64 = spec.sigma(p, z, theta);
-        sigma.is_finite() && sigma > 0.0
-    };
-    rows.iter().all(|r| good(r.z_m, r.theta_rad))
-        && min_point(rows, spec, p).is_none_or(|(z, theta)| good(z, theta))
+    /// Hold free parameters that left where they can be believed at the edge.
+    fn hold_strays(&mut self) {
+        let Fit { rows, spec, p, free, remarks } = self;
+        free.retain(|&i| match spec.limits(i, rows) {
+            Some([low, high]) if !(low..=high).contains(&p[i]) => {
+                p[i] = if p[i] > high { high } else { low };
+                let name = spec.card().parameters[i].0;
+                remarks.push(format!(
+                    "{name} runs out of what is believed and is held at {:.3}",
+                    p[i]
+                ));
+                false
+            }
+            _ => true,
+        });
+    }
+
+    /// Where the surface is least inside its range: at the vertex or the end of z next to it, and
+    /// at the least tilt, for no form's tilt term is negative.
+    fn min_point(&self) -> Option<(f64, f64)> {
+        let domain = Domain::of(&self.rows, self.spec.pole(&self.p));
+        self.spec.vertex(&self.p).map(|c| domain.clamp(c, 0.0))
+    }
+
+    /// Lift a surface that dips too low to [`MIN_SHARE`] and hold its floor there. True when that
+    /// was needed: the rest must be fitted again.
+    fn hold_positive(&mut self) -> bool {
+        let Some((z, theta)) = self.min_point() else { return false };
+        let floor = MIN_SHARE * self.rows.range(|r| r.sigma_m)[0];
+        let sigma = self.spec.sigma(&self.p, z, theta);
+        let is_free = self.free.contains(&0);
+        // Once lifted, half the way down again is let be: the surface is positive.
+        if sigma >= if is_free { floor } else { 0.5 * floor } {
+            return false;
+        }
+        self.p[0] += floor - sigma;
+        if is_free {
+            self.free.retain(|&i| i != 0);
+            self.remarks.push(format!(
+                "a is held: fitted freely the surface falls to {:.2} mm at {z:.2} m; record views near that distance",
+                1e3 * sigma
+            ));
+        }
+        true
+    }
+
+    fn positive_in_range(&self) -> bool {
+        let good = |(z, theta): (f64, f64)| {
+            let sigma = self.spec.sigma(&self.p, z, theta);
+            sigma.is_finite() && sigma > 0.0
+        };
+        self.rows.iter().all(|r| good((r.z_m, r.theta_rad))) && self.min_point().is_none_or(good)
+    }
 }
 
 fn positive(sigma: f64, otherwise: f64) -> f64 {
     if sigma > 1e-3 * otherwise && sigma.is_finite() { sigma } else { otherwise }
 }
 
-fn describe_rows(table: &SigmaTable) -> String {
-    let [low, high] = table.range(|r| r.z_m);
-    format!("{} measured from {low:.2} to {high:.2} m", table.rows.len())
-}
-
 fn enough(rows: &Rows, spec: &dyn SigmaForm) -> Result<()> {
-    let parameters = spec.parameters().len();
+    let parameters = spec.card().parameters.len();
     let free_at_least = parameters.min(4);
     if rows.len() < free_at_least {
         return Err(Error::NotEnough {
             what: format!(
                 "{} measured sigmas are too few for the form \"{}\"",
                 rows.len(),
-                spec.id()
+                spec.card().id
             ),
             remedy: format!("give at least {free_at_least}, better {}", 3 * parameters),
         });
     }
     let distances = rows.distances(DISTANCE_RATIO);
-    let needed = spec.distances_needed();
+    let needed = spec.card().distances_needed;
     if distances < needed {
         return Err(Error::NotEnough {
             what: format!(
                 "the views stand at {distances} different distance{} and the form \"{}\" needs {needed}",
                 if distances == 1 { "" } else { "s" },
-                spec.id()
+                spec.card().id
             ),
             remedy: "record views at other distances, or choose --form khoshelham, which needs one"
                 .into(),
         });
     }
     Ok(())
+}
+
+/// The local problem: fixed weights, scaled working coordinates of the free parameters.
+struct Local<'a> {
+    rows: &'a Rows,
+    spec: &'a dyn SigmaForm,
+    base: &'a [f64],
+    free: &'a [usize],
+    /// Working coordinate = scale * (walked parameter): columns of J then have unit length.
+    scale: Vec<f64>,
+    target: DVector<f64>,
+}
+
+impl Local<'_> {
+    fn walk(&self, i: usize) -> Walk {
+        self.spec.card().parameters[i].1
+    }
+
+    fn to_working(&self, p: &[f64]) -> DVector<f64> {
+        DVector::from_iterator(
+            self.free.len(),
+            self.free.iter().zip(&self.scale).map(|(&i, s)| {
+                s * match self.walk(i) {
+                    Walk::Linear => p[i],
+                    Walk::Log => p[i].max(f64::MIN_POSITIVE).ln(),
+                    Walk::LogAboveTheta => (p[i] - self.rows.steepest()).max(1e-9).ln(),
+                }
+            }),
+        )
+    }
+
+    fn parameters(&self, x: &DVector<f64>) -> Vec<f64> {
+        let mut p = self.base.to_vec();
+        for ((&i, s), x) in self.free.iter().zip(&self.scale).zip(x.iter()) {
+            p[i] = match self.walk(i) {
+                Walk::Linear => x / s,
+                Walk::Log => (x / s).exp(),
+                Walk::LogAboveTheta => self.rows.steepest() + (x / s).exp(),
+            };
+        }
+        p
+    }
+
+    /// d(parameter)/d(working coordinate), without the scale.
+    fn slope(&self, p: &[f64], i: usize) -> f64 {
+        match self.walk(i) {
+            Walk::Linear => 1.0,
+            Walk::Log => p[i],
+            Walk::LogAboveTheta => p[i] - self.rows.steepest(),
+        }
+    }
+
+    fn residual(&self, p: &[f64]) -> DVector<f64> {
+        let mut sigma: Vec<f64> =
+            self.rows.iter().map(|r| self.spec.sigma(p, r.z_m, r.theta_rad)).collect();
+        self.rows.whiten(&mut sigma);
+        DVector::from_vec(sigma) - &self.target
+    }
+
+    fn jacobian(&self, p: &[f64]) -> DMatrix<f64> {
+        let mut j = natural_jacobian(self.rows, self.spec, p, self.free);
+        for (column, (&i, s)) in self.free.iter().zip(&self.scale).enumerate() {
+            let factor = self.slope(p, i) / s;
+            j.column_mut(column).scale_mut(factor);
+        }
+        j
+    }
+}
+
+impl LeastSquares for Local<'_> {
+    fn linearise(&self, x: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let p = self.parameters(x);
+        let r = self.residual(&p);
+        r.iter().all(|v| v.is_finite()).then(|| (r, self.jacobian(&p)))
+    }
+
+    fn cost(&self, x: &DVector<f64>) -> f64 {
+        0.5 * self.residual(&self.parameters(x)).norm_squared()
+    }
+}
+
+const TRUST_REGION_STEPS: u64 = 4;
+
+fn polish(rows: &Rows, spec: &dyn SigmaForm, p: &[f64], free: &[usize]) -> Vec<f64> {
+    if free.is_empty() {
+        return p.to_vec();
+    }
+    let target = rows.whitened_sigmas();
+    let mut local = Local { rows, spec, base: p, free, scale: vec![1.0; free.len()], target };
+    let columns = local.jacobian(p);
+    local.scale = columns.column_iter().map(|c| c.norm().max(1e-12)).collect();
+    let start = local.to_working(p);
+    match trust_region(&local, start, TRUST_REGION_STEPS) {
+        Some(end) => local.parameters(&end.x),
+        None => p.to_vec(),
+    }
 }

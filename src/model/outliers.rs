@@ -40,10 +40,8 @@ pub struct Sorted {
 
 impl Sorted {
     /// Fit `form` to the rows kept.
-    ///
-    /// # Errors
-    /// When they are too few or stand at too few distances for the form, or the solver finds no
-    /// surface that is positive over their range.
+    /// An error when they are too few or stand at too few distances for the form, or the solver
+    /// finds no surface that is positive over their range.
     pub fn fit(&self, form: Form) -> Result<SigmaFit> {
         let mut fitted = match &self.judged_by {
             Some(fitted) if fitted.form == form => fitted.clone(),
@@ -56,9 +54,6 @@ impl Sorted {
 }
 
 /// Fit `form` to `table` without its outliers, which the remarks name.
-///
-/// # Errors
-/// As [`Sorted::fit`].
 pub fn fit(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
     sort_out(table).fit(form)
 }
@@ -108,8 +103,7 @@ struct End {
     fitted: SigmaFit,
 }
 
-/// Leave out what stands off `surface`, fit `form` to the rest, look again. `None` where the rest
-/// does not carry the form.
+/// Leave out what stands off `surface`, fit `form` to the rest, look again; `None` if it cannot.
 fn rejected(table: &SigmaTable, form: Form, mut surface: Surface) -> Option<End> {
     let mut off = standing_off(table, &surface, &[]);
     for _ in 0..MAX_ROUNDS {
@@ -182,19 +176,12 @@ fn too_many(table: &SigmaTable, off: &[usize]) -> String {
 
 fn describe(table: &SigmaTable, left_out: &[usize]) -> String {
     const SHOWN: usize = 6;
-    let mut places: Vec<String> = left_out
-        .iter()
-        .take(SHOWN)
-        .map(|&i| {
-            let r = &table.rows[i];
-            format!(
-                "{:.1} mm at {:.2} m, {:.0} degrees",
-                1e3 * r.sigma_m,
-                r.z_m,
-                r.theta_rad.to_degrees()
-            )
-        })
-        .collect();
+    let place = |&i: &usize| {
+        let SigmaRow { z_m, theta_rad, sigma_m, .. } = table.rows[i];
+        let (mm, degrees) = (1e3 * sigma_m, theta_rad.to_degrees());
+        format!("{mm:.1} mm at {z_m:.2} m, {degrees:.0} degrees")
+    };
+    let mut places: Vec<String> = left_out.iter().take(SHOWN).map(place).collect();
     if left_out.len() > SHOWN {
         places.push("...".into());
     }

@@ -10,8 +10,7 @@ pub(super) fn between(means: &[(f64, f64)], tau_view2: f64) -> (f64, f64) {
 
 /// Relative step at which tau^2 is found: far below any use, far above rounding.
 const ROOT_DIGITS: f64 = 1e-12;
-/// Newton's step takes some ten rounds; from far off it starts by doubling, and a double has a
-/// thousand doublings.
+/// Newton's step takes some ten; from far off it doubles, and a double has a thousand doublings.
 const MAX_NEWTON_STEPS: usize = 1000;
 
 /// The tau^2 >= 0 at which chi-square (and its slope) is `expected`, or zero where it is less

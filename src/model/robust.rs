@@ -100,8 +100,7 @@ pub(super) fn spread(
     sampling.iter().map(|s| (s + extra).sqrt()).collect()
 }
 
-/// The least extra variance at which the scatter is no longer too wide, by bisection of its
-/// logarithm.
+/// The least extra variance at which the scatter is not too wide, by bisection of its logarithm.
 fn extra_variance(too_wide: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (MIN_EXTRA, MAX_EXTRA);
     if !too_wide(low) {

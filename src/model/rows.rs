@@ -75,10 +75,6 @@ impl Rows {
         self.rows.len()
     }
 
-    pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
-    }
-
     pub fn views(&self) -> usize {
         self.blocks.len()
     }
@@ -132,9 +128,8 @@ impl Rows {
         found.max(if self.counted { 1.0 } else { f64::MIN_POSITIVE })
     }
 
-    /// Divide by the reference sigma and rotate so that errors become independent and of unit
-    /// variance: for a view with variances D and shared tau^2, (D + tau^2 11')^(-1/2) in closed
-    /// form.
+    /// Divide by the reference sigma and rotate, so that errors are independent and of unit variance:
+    /// for a view with variances D and shared tau^2, (D + tau^2 11')^(-1/2) in closed form.
     pub fn whiten(&self, column: &mut [f64]) {
         for (value, scale) in column.iter_mut().zip(&self.whitener.scale) {
             *value *= scale;

@@ -1,10 +1,9 @@
-//! A finished fit: covariance, standard errors, figures of merit.
+//! A finished fit: covariance, standard errors, figures of merit, and warnings where it should not be
+//! trusted as it stands.
 
 use nalgebra::DMatrix;
 
-use super::forms::{Form, SigmaForm};
-use super::local::natural_jacobian;
-use super::quality::{Quality, few_views};
+use super::forms::{Form, SigmaForm, natural_jacobian};
 use super::rows::Rows;
 use super::surface::{Direction, Domain, SigmaModel};
 use crate::measure::SigmaRow;
@@ -20,7 +19,6 @@ pub struct Parameter {
     pub remark: Option<String>,
 }
 
-/// A fitted form and how well it fits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SigmaFit {
     pub form: Form,
@@ -37,14 +35,7 @@ pub struct SigmaFit {
     /// Relative scatter that sampling does not explain, within views and between them.
     pub extra_within: f64,
     pub extra_between: f64,
-    /// Root mean square of s - sigma, m, and as a share of sigma.
-    pub rmse_m: f64,
-    pub rmse_relative: f64,
-    /// What `rmse_relative` would be from sampling alone; `None` when no n is known.
-    pub sampling_relative: Option<f64>,
-    pub r2: f64,
-    /// The surface explains so little that the remarks warn of it first.
-    pub poor: bool,
+    pub quality: Quality,
     pub iterations: usize,
     pub converged: bool,
     pub remarks: Vec<String>,
@@ -55,7 +46,6 @@ impl SigmaFit {
         self.parameters.iter().map(|p| p.value).collect()
     }
 
-    /// Number of parameters that were fitted.
     pub fn free(&self) -> usize {
         self.parameters.iter().filter(|p| p.std_error.is_some()).count()
     }
@@ -63,7 +53,7 @@ impl SigmaFit {
     /// Variance of the relative residual, with the free parameters paid for.
     pub fn relative_variance(&self) -> f64 {
         let n = self.rows as f64;
-        self.rmse_relative.powi(2) * n / (n - self.free() as f64).max(1.0)
+        self.quality.rmse_relative.powi(2) * n / (n - self.free() as f64).max(1.0)
     }
 
     /// The surface without the story of its fit, as one along the optical axis.
@@ -95,7 +85,6 @@ pub(super) fn report(
 ) -> SigmaFit {
     let spec = form.spec();
     let quality = Quality::of(rows, rows.reference());
-    let degrees = (rows.views() as f64 - free.len() as f64).max(1.0);
     let scale = if rows.counted() {
         1.0
     } else {
@@ -107,11 +96,10 @@ pub(super) fn report(
     if !converged {
         remarks.push(format!("the weights had not settled after {iterations} rounds"));
     }
-    let weak = parameters.iter().filter(|q| q.std_error.is_some() && q.remark.is_some());
-    for q in weak {
-        let text = q.remark.clone().unwrap_or_default();
-        if !remarks.contains(&text) {
-            remarks.push(text);
+    let fitted = parameters.iter().filter(|q| q.std_error.is_some());
+    for weak in fitted.filter_map(|q| q.remark.as_ref()) {
+        if !remarks.contains(weak) {
+            remarks.push(weak.clone());
         }
     }
     remarks.splice(0..0, few_views(rows.views(), free.len()).into_iter().chain(quality.warning()));
@@ -123,14 +111,10 @@ pub(super) fn report(
         rows: rows.len(),
         views: rows.views(),
         left_out: Vec::new(),
-        degrees_of_freedom: degrees,
+        degrees_of_freedom: (rows.views() as f64 - free.len() as f64).max(1.0),
         extra_within: rows.extra()[0],
         extra_between: rows.extra()[1],
-        rmse_m: quality.rmse_m,
-        rmse_relative: quality.rmse_relative,
-        sampling_relative: quality.sampling_relative,
-        r2: quality.r2,
-        poor: quality.is_poor(),
+        quality,
         iterations,
         converged,
         remarks,
@@ -176,8 +160,7 @@ fn covariance(
     full
 }
 
-/// Singular values below this share of the largest are rounding; the variance along them is
-/// then huge but finite.
+/// Singular values below this share of the largest are rounding: a huge but finite variance.
 const UNSEEN: f64 = 1e-10;
 
 fn name_parameters(
@@ -187,7 +170,8 @@ fn name_parameters(
     free: &[usize],
     covariance: &DMatrix<f64>,
 ) -> Vec<Parameter> {
-    spec.parameters()
+    spec.card()
+        .parameters
         .iter()
         .enumerate()
         .map(|(i, &(name, _))| {
@@ -203,4 +187,99 @@ fn name_parameters(
             Parameter { name, value: p[i], std_error, remark }
         })
         .collect()
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quality {
+    /// Root mean square of s - sigma, m, and as a share of sigma.
+    pub rmse_m: f64,
+    pub rmse_relative: f64,
+    pub r2: f64,
+    /// What rmse_relative would be from sampling alone; `None` when no n is known.
+    pub sampling_relative: Option<f64>,
+    /// Share of sigma's variance over the rows that neither the surface nor sampling explains.
+    pub unexplained: f64,
+}
+
+/// Above this share the surface misses more of what differs between the views than a coefficient
+/// rounded to one digit would.
+const MAX_UNEXPLAINED: f64 = 0.2;
+/// Scatter this many times that of sampling is no accident, whatever the number of rows: chi^2
+/// per degree of freedom is its square.
+const FAR_ABOVE_SAMPLING: f64 = 3.0;
+/// Fewer views cannot disagree with a surface.
+const MIN_VIEWS: usize = 3;
+
+impl Quality {
+    /// `sigma` is the surface at every row, m.
+    pub fn of(rows: &Rows, sigma: &[f64]) -> Self {
+        let n = rows.len() as f64;
+        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / n;
+        let measured = || rows.iter().map(|r| r.sigma_m);
+        let middle = mean(&mut measured());
+        let scatter = mean(&mut measured().map(|s| (s - middle).powi(2)));
+        let left = mean(&mut measured().zip(sigma).map(|(s, m)| (s - m).powi(2)));
+        let relative = mean(&mut measured().zip(sigma).map(|(s, m)| (s / m - 1.0).powi(2)));
+        let sampled = || rows.iter().zip(sigma).map(|(r, m)| (m, r.n_effective.map(|n| 0.5 / n)));
+        let by_sampling = mean(&mut sampled().map(|(m, v)| m * m * v.unwrap_or(0.0)));
+        let sampling = mean(&mut sampled().map(|(_, v)| v.unwrap_or(0.0))).sqrt();
+        let share = |left: f64| if scatter > 0.0 { left / scatter } else { 0.0 };
+        Quality {
+            rmse_m: left.sqrt(),
+            rmse_relative: relative.sqrt(),
+            r2: if scatter > 0.0 { 1.0 - left / scatter } else { 0.0 },
+            sampling_relative: rows.counted().then_some(sampling),
+            unexplained: share((left - by_sampling).max(0.0)),
+        }
+    }
+
+    /// The surface explains so little that the remarks warn of it first.
+    pub fn is_poor(&self) -> bool {
+        self.r2 < 0.0 || self.unexplained > MAX_UNEXPLAINED
+    }
+
+    /// What to know before the coefficients, if anything.
+    pub fn warning(&self) -> Option<String> {
+        const REMEDY: &str = "look in measurements.csv for views that measured something else than one flat target, or try --form auto";
+        let sampling = self.sampling_relative.map_or(String::new(), |s| {
+            format!(", where the number of samples explains {:.1} %", 1e2 * s)
+        });
+        let scatter =
+            format!("sigmas lie {:.0} % off it (rms){sampling}", 1e2 * self.rmse_relative);
+        if self.r2 < 0.0 {
+            return Some(format!(
+                "the fit is useless: one constant sigma would fit better than this surface (r2 {:.2}), {scatter}; {REMEDY}",
+                self.r2
+            ));
+        }
+        if self.is_poor() {
+            return Some(format!(
+                "the fit is poor: the surface and sampling leave {:.0} % of the variance of sigma unexplained (r2 {:.2}), {scatter}; {REMEDY}",
+                1e2 * self.unexplained,
+                self.r2
+            ));
+        }
+        let far =
+            self.sampling_relative.is_some_and(|s| self.rmse_relative > FAR_ABOVE_SAMPLING * s);
+        far.then(|| {
+            format!(
+                "the views differ by more than noise: {scatter}; the intervals allow for it, more frames will not help, other views will"
+            )
+        })
+    }
+}
+
+/// Said where the views are too few for the intervals to mean much.
+pub(super) fn few_views(views: usize, free: usize) -> Option<String> {
+    let seen = if views == 1 { "one view".into() } else { format!("{views} views") };
+    if views < MIN_VIEWS {
+        return Some(format!(
+            "this is no calibration: a surface through {seen} has nothing to check it by; record views at three distances at least, better at five and at several tilts"
+        ));
+    }
+    (views <= free).then(|| {
+        format!(
+            "{seen} for {free} coefficients: the views cannot contradict the surface, and its intervals are guesses; record more views"
+        )
+    })
 }

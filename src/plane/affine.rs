@@ -69,11 +69,8 @@ pub fn fit_affine_robust(
 fn scale_about(w: &[f32], rays: &Rays, pixels: &[u32], plane: &Plane, floor: f64) -> Option<f64> {
     let mut off: Vec<f32> = pixels
         .iter()
-        .map(|&i| {
-            let i = i as usize;
-            let (x, y) = rays.at(i);
-            (f64::from(w[i]) - plane.inverse_depth(x, y)).abs() as f32
-        })
+        .map(|&i| i as usize)
+        .map(|i| (f64::from(w[i]) - plane.inverse_depth_at(rays, i)).abs() as f32)
         .filter(|r| r.is_finite())
         .collect();
     if off.len() < 12 {
@@ -124,15 +121,7 @@ mod tests {
 
     #[test]
     fn thirty_percent_clutter_in_front_moves_the_plane_by_less_than_a_percent_of_sigma() {
-        let camera = Camera {
-            width: 160,
-            height: 120,
-            fx: 145.0,
-            fy: 145.0,
-            cx: 79.5,
-            cy: 59.5,
-            distortion: None,
-        };
+        let camera = Camera::centred(160, 120, 145.0);
         let rays = camera.rays();
         let truth = Plane::tilted(2.0, 0.7, 1.0);
         let sigma = 0.002;
@@ -152,29 +141,16 @@ mod tests {
         // 13,440 good pixels: standard error of the mean is sigma / 116; allow five of them.
         let centre = (fit.plane.inverse_depth(0.0, 0.0) - truth.inverse_depth(0.0, 0.0)).abs();
         assert!(centre < 5.0 * sigma / 116.0, "{centre}");
-        assert!(
-            (fit.scale / sigma - 1.0).abs() < 0.8,
-            "MAD counts the clutter: {}",
-            fit.scale / sigma
-        );
+        let scale = fit.scale / sigma;
+        assert!((scale - 1.0).abs() < 0.8, "MAD counts the clutter: {scale}");
     }
 
     #[test]
     fn too_few_pixels_are_no_plane() {
-        let camera =
-            Camera { width: 3, height: 3, fx: 5.0, fy: 5.0, cx: 1.0, cy: 1.0, distortion: None };
-        let w = vec![1.0; 9];
+        let rays = Camera::centred(3, 3, 5.0).rays();
         let pixels: Vec<u32> = (0..9).collect();
-        assert!(
-            fit_affine_robust(
-                &w,
-                &camera.rays(),
-                &pixels,
-                &Plane::tilted(1.0, 0.0, 0.0),
-                1e-6,
-                Effort::Sample
-            )
-            .is_none()
-        );
+        let start = Plane::tilted(1.0, 0.0, 0.0);
+        let found = fit_affine_robust(&[1.0; 9], &rays, &pixels, &start, 1e-6, Effort::Sample);
+        assert_eq!(found, None);
     }
 }

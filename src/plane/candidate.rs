@@ -3,7 +3,7 @@
 use super::affine::{AffineFit, Effort, fit_affine_robust};
 use super::grow::{BEND_M, Gauge, Lattice};
 use super::image::{MIN_PIXELS, on_plane, seed_plane};
-use super::rival::rivals;
+use super::relief::rivals;
 use super::{InverseDepthImage, Plane};
 use crate::camera::Camera;
 use crate::rng::Stream;
@@ -89,8 +89,8 @@ fn settled_scale(image: &InverseDepthImage<'_>, fit: &AffineFit, pixels: &[u32])
     for _ in 0..SETTLING_ROUNDS {
         let (mut n, mut squares) = (0.0, 0.0);
         for &i in pixels {
-            let (x, y) = image.rays.at(i as usize);
-            let off = f64::from(image.w[i as usize]) - fit.plane.inverse_depth(x, y);
+            let i = i as usize;
+            let off = f64::from(image.w[i]) - fit.plane.inverse_depth_at(image.rays, i);
             if off.abs() < SETTLING_SIGMAS * scale {
                 n += 1.0;
                 squares += off * off;
@@ -154,8 +154,7 @@ const CENTRE_DISC: f64 = 0.0125;
 const RELIEF: f64 = 4.0;
 const RELIEF_LARGE: f64 = 8.0;
 const LARGE: f64 = 0.04;
-/// What lies within a centimetre of one plane on a hand is below this, a sheet of paper three
-/// times above, m^2.
+/// The palm of a hand is below this, a sheet of paper three times above, m^2.
 const MIN_AREA_M2: f64 = 0.02;
 
 pub(super) fn centre_disc(camera: &Camera) -> Vec<u32> {
@@ -202,13 +201,8 @@ fn judge(
 /// Area on the plane that the nodes cover, m^2: a pixel covers z^3 |q| / (fx fy).
 fn area(image: &InverseDepthImage<'_>, lattice: &Lattice, plane: &Plane, samples: &[u32]) -> f64 {
     let node = (lattice.pitch * lattice.pitch) as f64 / (image.camera.fx * image.camera.fy);
-    let cubes: f64 = samples
-        .iter()
-        .map(|&i| {
-            let (x, y) = image.rays.at(i as usize);
-            plane.depth(x, y).powi(3)
-        })
-        .sum();
+    let cube = |&i: &u32| plane.depth_at(image.rays, i as usize).powi(3);
+    let cubes: f64 = samples.iter().map(cube).sum();
     cubes * plane.q.norm() * node
 }
 

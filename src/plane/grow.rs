@@ -13,7 +13,6 @@ use crate::camera::Rays;
 /// A coarse lattice over the image: one node for every `pitch` x `pitch` pixels.
 ///
 /// Growing on the lattice costs a tenth of growing on pixels, and bridges single dead pixels.
-#[derive(Debug, Clone)]
 pub(super) struct Lattice {
     pub pitch: usize,
     pub columns: usize,
@@ -36,8 +35,7 @@ const MEAN_SIGMAS: f64 = 5.0;
 /// below 1 with a spread of 0.4; a wall that crosses the plane at an angle grows without bound.
 const SPREAD_SIGMAS: f64 = 1.5;
 /// ... or than this many times what adjacent nodes differ: white noise has a ratio of 1, and of
-/// 1.5 where 9 px are correlated; a wall over a fifth of the neighbourhood one of 2.6, and more
-/// where it covers more.
+/// 1.5 where 9 px are correlated; a wall over a fifth of the neighbourhood one of 2.6.
 const SPREAD_PER_ROUGHNESS: f64 = 2.0;
 /// Single nodes at the edge are on the plane within this: they have no neighbourhood to help.
 const EDGE_SIGMAS: f64 = 2.5;
@@ -102,8 +100,7 @@ impl Lattice {
         self.sample.iter().map(Option::is_some)
     }
 
-    /// Residual of each node's mean in sigma of the gauge, at most [`MISS_SIGMAS`]; NaN without a
-    /// measurement.
+    /// Residual of each node's mean in the gauge's sigma, at most [`MISS_SIGMAS`]; NaN without any.
     pub fn residuals(&self, gauge: &Gauge<'_>) -> Vec<f32> {
         let q = gauge.fit.plane.q;
         self.mean
@@ -122,10 +119,9 @@ impl Lattice {
 
     /// Nodes whose neighbourhood, by mean and by spread, is noise about the plane.
     ///
-    /// Noise may be larger there than at the seed (a depth error that does not grow with depth
-    /// is, on the near side of a tilted target), or hold gross errors: then neighbours differ as
-    /// much as the neighbourhood spreads, about the plane. Where another surface begins they do
-    /// not.
+    /// Noise may be larger there than at the seed (a depth error that does not grow with depth, on
+    /// the near side of a tilted target), or hold gross errors: then neighbours differ as much as
+    /// the neighbourhood spreads. Where another surface begins they do not.
     pub fn quiet(&self, residuals: &[f32]) -> Vec<bool> {
         let sums = self.boxed(residuals);
         let rough = self.roughness(residuals);
@@ -143,8 +139,7 @@ impl Lattice {
             .collect()
     }
 
-    /// Half the mean squared difference of adjacent nodes around each node: the variance, were
-    /// the noise white.
+    /// Half the mean squared difference of adjacent nodes: the variance, were the noise white.
     fn roughness(&self, residuals: &[f32]) -> Vec<f64> {
         let pairs: Vec<[f32; 2]> = (0..residuals.len())
             .map(|node| {
@@ -243,5 +238,69 @@ impl Lattice {
             }
         }
         wide
+    }
+}
+
+/// Gaps up to this many nodes are crossed: speckle holes, not the gap between two objects.
+const BRIDGE: usize = 2;
+
+impl Lattice {
+    /// Nodes reached from `seeds` over `open` nodes.
+    pub fn reached(&self, open: &[bool], seeds: &[usize]) -> Vec<bool> {
+        let mut mask = vec![false; open.len()];
+        let mut queue: Vec<usize> = Vec::new();
+        for &seed in seeds {
+            if !mask[seed] && open[seed] {
+                mask[seed] = true;
+                queue.push(seed);
+            }
+        }
+        while let Some(node) = queue.pop() {
+            for neighbour in self.around(node, BRIDGE) {
+                if !mask[neighbour] && open[neighbour] {
+                    mask[neighbour] = true;
+                    queue.push(neighbour);
+                }
+            }
+        }
+        mask
+    }
+
+    fn around(&self, node: usize, radius: usize) -> impl Iterator<Item = usize> + '_ {
+        let (c, r) = (node % self.columns, node / self.columns);
+        let columns = c.saturating_sub(radius)..=(c + radius).min(self.columns - 1);
+        let rows = r.saturating_sub(radius)..=(r + radius).min(self.rows - 1);
+        rows.flat_map(move |row| columns.clone().map(move |column| row * self.columns + column))
+    }
+
+    /// Nodes at most `steps` columns and `steps` rows from a set one.
+    pub fn within(&self, mask: &[bool], steps: usize) -> Vec<bool> {
+        let spread = |mask: &[bool], length: usize, at: &dyn Fn(usize, usize) -> usize| {
+            let mut wide = vec![false; mask.len()];
+            for line in 0..mask.len() / length {
+                let (mut forth, mut back) = (usize::MAX, usize::MAX);
+                for k in 0..length {
+                    let (a, b) = (at(line, k), at(line, length - 1 - k));
+                    forth = if mask[a] { 0 } else { forth.saturating_add(1) };
+                    back = if mask[b] { 0 } else { back.saturating_add(1) };
+                    wide[a] |= forth <= steps;
+                    wide[b] |= back <= steps;
+                }
+            }
+            wide
+        };
+        let columns = self.columns;
+        let along_rows = spread(mask, columns, &|row, k| row * columns + k);
+        spread(&along_rows, self.rows, &|column, k| k * columns + column)
+    }
+
+    /// Every node with a set node within one step.
+    pub fn dilated(&self, mask: &[bool]) -> Vec<bool> {
+        (0..mask.len()).map(|n| self.around(n, 1).any(|m| mask[m])).collect()
+    }
+
+    /// Every node whose neighbours inside the image are all set.
+    pub fn eroded(&self, mask: &[bool]) -> Vec<bool> {
+        (0..mask.len()).map(|n| self.around(n, 1).all(|m| mask[m])).collect()
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Plane;
 use super::affine::{AffineFit, Effort, MAD_TO_SIGMA, fit_affine_robust};
-use super::ransac::{Estimator, InlierCount, UniformSampler, ransac};
+use super::ransac::{Estimator, RansacOptions, UniformSampler, ransac};
 use crate::camera::{Camera, Rays};
 use crate::rng::Stream;
 use crate::stats::median_in_place;
@@ -19,7 +19,6 @@ pub struct Target {
     /// Robust standard deviation about the plane, inverse depth, 1/m.
     pub scale: f64,
     pub exclusions: Exclusions,
-    /// Oddities worth telling.
     pub notes: Vec<String>,
 }
 
@@ -28,7 +27,6 @@ pub struct Target {
 pub struct Exclusions {
     /// Pixels considered: the region's, or the whole image.
     pub considered: usize,
-    /// Without a measurement.
     pub invalid: usize,
     /// Measured, but not on the target's plane (or not connected with it).
     pub off_plane: usize,
@@ -132,13 +130,11 @@ impl Estimator for AffineSamples {
 
 /// Does the pixel's ray meet the plane before the camera?
 pub(super) fn in_front(image: &InverseDepthImage<'_>, plane: &Plane, i: usize) -> bool {
-    let (x, y) = image.rays.at(i);
-    plane.inverse_depth(x, y) > 0.0
+    plane.inverse_depth_at(image.rays, i) > 0.0
 }
 
 pub(super) fn on_plane(image: &InverseDepthImage<'_>, fit: &AffineFit, i: usize) -> bool {
-    let (x, y) = image.rays.at(i);
-    let expected = fit.plane.inverse_depth(x, y);
+    let expected = fit.plane.inverse_depth_at(image.rays, i);
     expected > 0.0 && (f64::from(image.w[i]) - expected).abs() < image.reach(expected, fit.scale)
 }
 
@@ -163,17 +159,14 @@ pub(super) fn seed_plane(
         .collect();
     let mut depths: Vec<f32> = rows.iter().map(|r| r.1 as f32).collect();
     let floor = image.floor(f64::from(median_in_place(&mut depths)));
-    let consensus = InlierCount { threshold: 2.5 * image.local_noise(pixels).max(floor) };
+    let options = RansacOptions {
+        threshold_m: 2.5 * image.local_noise(pixels).max(floor),
+        iterations: SEED_HYPOTHESES,
+        confidence: SEED_CONFIDENCE,
+    };
     let samples = AffineSamples { rows };
     let jury: Vec<usize> = (0..samples.len()).collect();
-    let (q, _) = ransac(
-        &samples,
-        &consensus,
-        &mut UniformSampler { rng },
-        &jury,
-        SEED_HYPOTHESES,
-        SEED_CONFIDENCE,
-    )?;
+    let q = ransac(&samples, &options, &mut UniformSampler { rng }, &jury)?;
     fit_affine_robust(image.w, image.rays, pixels, &Plane::new(q), floor, Effort::Sample)
 }
 

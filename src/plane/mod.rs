@@ -11,20 +11,20 @@ mod candidate;
 mod grow;
 mod image;
 mod paper;
-mod principal_point;
 mod ransac;
 mod relief;
-mod rival;
-mod shapes;
 mod target;
 
 pub(crate) use affine::MAD_TO_SIGMA;
 pub use affine::{AffineFit, Effort, fit_affine_robust};
 pub use image::{Exclusions, InverseDepthImage, Target};
-pub use paper::{Points, RansacOptions, RansacPlane, ransac_plane};
+pub use paper::{Points, RansacPlane, ransac_plane};
+pub use ransac::RansacOptions;
 pub use target::find_target;
 
 use nalgebra::{Unit, Vector3};
+
+use crate::camera::Rays;
 
 /// A plane in front of the camera: 1/z = q . (x, y, 1), q in 1/m.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,6 +61,18 @@ impl Plane {
         1.0 / self.inverse_depth(x, y)
     }
 
+    /// As [`Plane::inverse_depth`], of pixel `i`.
+    #[inline]
+    pub fn inverse_depth_at(&self, rays: &Rays, i: usize) -> f64 {
+        let (x, y) = rays.at(i);
+        self.inverse_depth(x, y)
+    }
+
+    /// As [`Plane::depth`], of pixel `i`.
+    pub fn depth_at(&self, rays: &Rays, i: usize) -> f64 {
+        1.0 / self.inverse_depth_at(rays, i)
+    }
+
     /// Unit normal, pointing away from the camera.
     pub fn normal(&self) -> Unit<Vector3<f64>> {
         Unit::new_normalize(self.q)
@@ -92,8 +104,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Points made from the normal form lie on the inverse-depth form, and the pose angles
-        /// come back.
+        /// Points made from the normal form lie on the other, and the pose angles come back.
         #[test]
         fn the_two_forms_agree(z in 0.4f64..6.0, theta in 0.01f64..1.4, azimuth in -3.1f64..3.1,
                                x in -0.4f64..0.4, y in -0.3f64..0.3) {

@@ -1,8 +1,7 @@
 //! RANSAC (Fischler and Bolles 1981).
 //!
-//! The split follows the roles that vary on their own: an [`Estimator`] knows the geometry, a
-//! [`Consensus`] says how good a hypothesis is, a sampler says which points to try. The loop is
-//! written once.
+//! The split follows the roles that vary on their own: an [`Estimator`] knows the geometry, a sampler
+//! says which points to try. The loop, which counts the data within a threshold, is written once.
 
 use rand::Rng;
 
@@ -13,7 +12,6 @@ pub trait Estimator {
     type Model: Copy;
     /// Data needed for one hypothesis.
     const MINIMAL: usize;
-    /// Number of data.
     fn len(&self) -> usize;
     /// `None` when the sample is degenerate.
     fn hypothesis(&self, sample: &[usize]) -> Option<Self::Model>;
@@ -21,28 +19,10 @@ pub trait Estimator {
     fn distance(&self, model: &Self::Model, i: usize) -> f64;
 }
 
-/// Judgement: greater is better.
-pub trait Consensus {
-    fn score(&self, distance: f64) -> f64;
-}
-
-/// The count of data within a threshold, as in Fischler and Bolles (1981).
-#[derive(Debug, Clone, Copy)]
-pub struct InlierCount {
-    pub threshold: f64,
-}
-
-impl Consensus for InlierCount {
-    fn score(&self, distance: f64) -> f64 {
-        f64::from(u8::from(distance < self.threshold))
-    }
-}
-
 /// Data of the largest minimal sample there is: three points of a plane.
 const MAX_MINIMAL: usize = 3;
 
 /// Choice: uniform, without repetition.
-#[derive(Debug)]
 pub struct UniformSampler<'r> {
     pub rng: &'r mut Stream,
 }
@@ -63,38 +43,43 @@ impl UniformSampler<'_> {
     }
 }
 
-/// The best of up to `iterations` hypotheses, judged on `jury`; stops early once a better one is
-/// less likely than `1 - confidence`.
-pub fn ransac<E, C>(
+/// When a search ends, and what lies on a plane.
+#[derive(Debug, Clone, Copy)]
+pub struct RansacOptions {
+    /// Greatest distance of an inlier, in the data's unit; m for the paper's plane.
+    pub threshold_m: f64,
+    pub iterations: usize,
+    pub confidence: f64,
+}
+
+/// The best of up to `iterations` hypotheses by its inliers among the `jury`; stops early once a
+/// better one is less likely than `1 - confidence`.
+pub fn ransac<E: Estimator>(
     data: &E,
-    consensus: &C,
+    options: &RansacOptions,
     sampler: &mut UniformSampler<'_>,
     jury: &[usize],
-    iterations: usize,
-    confidence: f64,
-) -> Option<(E::Model, f64)>
-where
-    E: Estimator,
-    C: Consensus,
-{
+) -> Option<E::Model> {
     debug_assert!(E::MINIMAL <= MAX_MINIMAL);
     if data.len() < E::MINIMAL || jury.is_empty() {
         return None;
     }
-    let mut best: Option<(E::Model, f64)> = None;
-    let mut needed = iterations;
+    let mut best: Option<(E::Model, usize)> = None;
+    let mut needed = options.iterations;
     let mut tried = 0;
-    while tried < needed.min(iterations) {
+    while tried < needed.min(options.iterations) {
         tried += 1;
         let drawn = sampler.draw(E::MINIMAL, data.len());
         let Some(model) = data.hypothesis(&drawn[..E::MINIMAL]) else { continue };
-        let score: f64 = jury.iter().map(|&i| consensus.score(data.distance(&model, i))).sum();
-        if best.is_none_or(|(_, b)| score > b) {
-            best = Some((model, score));
-            needed = hypotheses_needed(score / jury.len() as f64, E::MINIMAL, confidence);
+        let inlier = |i: &&usize| data.distance(&model, **i) < options.threshold_m;
+        let inliers = jury.iter().filter(inlier).count();
+        if best.is_none_or(|(_, most)| inliers > most) {
+            best = Some((model, inliers));
+            let share = inliers as f64 / jury.len() as f64;
+            needed = hypotheses_needed(share, E::MINIMAL, options.confidence);
         }
     }
-    best
+    best.map(|(model, _)| model)
 }
 
 /// log(1 - p) / log(1 - w^m), Fischler and Bolles (1981).

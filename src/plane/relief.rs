@@ -1,16 +1,17 @@
-//! What stands off the target's plane inside a region: a ball on the board, a hand, a wall beside it.
+//! What is not the target's: what stands off its plane inside a region (a ball on the board, a hand),
+//! and other planes beside it. Where a wall crosses the target's plane, its pixels lie on both. Each
+//! alone fits; what decides is which plane explains their neighbourhood better.
 
-use super::InverseDepthImage;
 use super::affine::AffineFit;
 use super::grow::{BEND_M, Gauge, Lattice};
-use super::image::MIN_PIXELS;
+use super::image::{InverseDepthImage, MIN_PIXELS, seed_plane};
+use crate::rng::Stream;
 
 /// Connected areas off the plane.
 pub(super) struct Relief {
     pub lattice: Lattice,
     /// Nodes of the areas and next to them.
     pub mask: Vec<bool>,
-    /// A description of each area.
     pub notes: Vec<String>,
     /// Share of the measured nodes that the areas cover.
     pub share: f64,
@@ -59,11 +60,10 @@ fn describe(
     let (mut u, mut v, mut off_m, mut square_m) = (0.0, 0.0, 0.0, 0.0);
     for &i in &samples {
         let i = i as usize;
-        let (x, y) = image.rays.at(i);
         let z = 1.0 / f64::from(image.w[i]);
         u += (i % width) as f64 / n;
         v += (i / width) as f64 / n;
-        off_m += (z - fit.plane.depth(x, y)) / n;
+        off_m += (z - fit.plane.depth_at(image.rays, i)) / n;
         square_m += z * z / (image.camera.fx * image.camera.fy);
     }
     let node = (lattice.pitch * lattice.pitch) as f64;
@@ -74,4 +74,73 @@ fn describe(
         1000.0 * off_m.abs(),
         if off_m < 0.0 { "before" } else { "behind" },
     )
+}
+
+/// Rivals are looked for this many nodes around the target: a tenth of the image's width.
+const RING: usize = 20;
+/// Walls and floor, and one more.
+const MAX_RIVALS: usize = 3;
+/// A plane that holds less of the ring than this is chance, or the target's own bend.
+const MIN_SHARE: f64 = 0.2;
+/// Fewest nodes in which a plane is looked for: 20 x 20 px on a 640 px image.
+const MIN_NODES: usize = 45;
+/// A node belongs to a rival when it is this near to it, in robust standard deviations.
+const ON_RIVAL_SIGMAS: f64 = 3.0;
+
+/// Nodes that another plane around the target explains better than the target's own.
+pub(super) fn rivals(
+    image: &InverseDepthImage<'_>,
+    lattice: &Lattice,
+    fit: &AffineFit,
+    mask: &[bool],
+    rng: &mut Stream,
+) -> Vec<bool> {
+    let own = neighbourhoods(lattice, fit);
+    let mut barred = vec![false; mask.len()];
+    let mut ring = ring(lattice, mask);
+    let size = count(&ring);
+    for _ in 0..MAX_RIVALS {
+        let samples = lattice.samples(&ring);
+        if samples.len() < MIN_NODES {
+            break;
+        }
+        let Some(rival) = seed_plane(image, &samples, rng) else { break };
+        let residuals = lattice.residuals(&Gauge { fit: &rival, bend_m: 0.0 });
+        let before = count(&ring);
+        for (node, r) in ring.iter_mut().zip(&residuals) {
+            // NaN is no measurement and not in the ring.
+            *node &= f64::from(r.abs()) > ON_RIVAL_SIGMAS;
+        }
+        if ((before - count(&ring)) as f64) < MIN_SHARE * size as f64 {
+            break;
+        }
+        // The same yardstick for both, or the noisier plane would win.
+        let theirs = neighbourhoods(lattice, &AffineFit { scale: fit.scale, ..rival });
+        for ((bar, own), theirs) in barred.iter_mut().zip(&own).zip(&theirs) {
+            *bar |= theirs < own;
+        }
+    }
+    barred
+}
+
+/// Sum of squares about the plane around each node.
+fn neighbourhoods(lattice: &Lattice, fit: &AffineFit) -> Vec<f32> {
+    let residuals = lattice.residuals(&Gauge { fit, bend_m: 0.0 });
+    lattice.boxed(&residuals).iter().map(|sums| sums[2]).collect()
+}
+
+/// Measured nodes around the mask, not next to it.
+fn ring(lattice: &Lattice, mask: &[bool]) -> Vec<bool> {
+    let near = lattice.dilated(mask);
+    lattice
+        .within(mask, RING)
+        .iter()
+        .zip(&near)
+        .zip(lattice.measured())
+        .map(|((within, near), measured)| *within && !near && measured)
+        .collect()
+}
+
+fn count(mask: &[bool]) -> usize {
+    mask.iter().filter(|m| **m).count()
 }

@@ -128,16 +128,9 @@ mod tests {
 
     #[test]
     fn round_numbers_are_one_two_or_five() {
-        for (value, up) in [
-            (0.7, 1.0),
-            (1.0, 1.0),
-            (1.01, 2.0),
-            (2.0, 2.0),
-            (3.0, 5.0),
-            (5.1, 10.0),
-            (0.013, 0.02),
-            (470.0, 500.0),
-        ] {
+        let values = [0.7, 1.0, 1.01, 2.0, 3.0, 5.1, 0.013, 470.0];
+        let round = [1.0, 1.0, 2.0, 2.0, 5.0, 10.0, 0.02, 500.0];
+        for (value, up) in values.into_iter().zip(round) {
             approx::assert_relative_eq!(round_up(value), up, max_relative = 1e-12);
         }
     }
@@ -157,8 +150,7 @@ mod tests {
 
     #[test]
     fn labels_have_no_needless_digits() {
-        let labels: Vec<String> =
-            [0.1 + 0.2, 5.0, 20.0, 0.005].into_iter().map(Axis::label).collect();
+        let labels = [0.1 + 0.2, 5.0, 20.0, 0.005].map(Axis::label);
         assert_eq!(labels, ["0.3", "5", "20", "0.005"]);
     }
 }

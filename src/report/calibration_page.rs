@@ -6,7 +6,7 @@ mod warnings;
 use maud::{Markup, html};
 use serde_json::{Map, Value};
 
-use super::document::{document, facts, figure, row, table};
+use super::document::{Column, document, facts, figure, table, table_of};
 use super::figure2::{Overlay, figure2};
 use super::numbers::{ABSENT, MM, fixed, formula, millimetres, range, significant};
 use super::sigma_map::sigma_map;
@@ -60,7 +60,7 @@ pub fn calibration_page(page: &CalibrationPage<'_>) -> Result<String> {
         (model(calibration))
         (warnings::section(&calibration.warnings, excluded))
         @if let Some(measurements) = page.measurements {
-            (views::table_of(&measurements.views))
+            (views::section(&measurements.views))
             (views::gallery(&measurements.views)?)
         }
         (provenance(&calibration.model.provenance))
@@ -87,11 +87,11 @@ fn heading(page: &CalibrationPage<'_>) -> Markup {
 
 /// The form with its parameters put in.
 fn with_numbers(model: &SigmaModel) -> Markup {
-    let spec = model.form.spec();
-    let (equation, units) = spec.formula().split_once(" (m").unwrap_or((spec.formula(), ""));
+    let card = model.form.card();
+    let (equation, units) = card.formula.split_once(" (m").unwrap_or((card.formula, ""));
     let units = units.trim_start_matches(';').trim_end_matches(')').replace("theta", "θ");
     let value = |name: &str| {
-        let at = spec.parameters().iter().position(|(n, _)| *n == name)?;
+        let at = card.parameters.iter().position(|(n, _)| *n == name)?;
         model.parameters.get(at).copied()
     };
     html! { (formula(equation, &value)) " " span.units { "in m; " (units) } }
@@ -109,21 +109,18 @@ fn result(page: &CalibrationPage<'_>) -> Markup {
         Direction::Perpendicular => "normal to the plane",
     };
     let tilts = sigma.domain.theta_rad.map(f64::to_degrees);
-    let poor = if calibration.fit.poor { ": a poor fit, see the warnings" } else { "" };
+    let poor =
+        if calibration.fit.quality.is_poor() { ": a poor fit, see the warnings" } else { "" };
     let heldout = fit.heldout.map(|e| format!("{} % rms", fixed(100.0 * e, 1)));
+    let heldout = heldout.as_deref().unwrap_or("not known: too few distances");
+    let error = html! { (fixed(MM * fit.rmse_m, 2)) " mm rms, r² = " (fixed(fit.r2, 3)) (poor) };
     facts([
         ("views", html! { (used) }),
         ("distance z", html! { (range(sigma.domain.z_m, 2)) " m" }),
         ("tilt θ", html! { (range(tilts, 1)) "°" }),
         ("sigma is", html! { "measured " (direction) ", " (fit.samples) " cells" }),
-        (
-            "fit error",
-            html! { (fixed(MM * fit.rmse_m, 2)) " mm rms, r² = " (fixed(fit.r2, 3)) (poor) },
-        ),
-        (
-            "error at distances left out",
-            html! { (heldout.as_deref().unwrap_or("not known: too few distances")) },
-        ),
+        ("fit error", error),
+        ("error at distances left out", html! { (heldout) }),
     ])
 }
 
@@ -139,12 +136,12 @@ fn published(model: &SigmaModel) -> Markup {
     let theta = model.domain.theta_rad[0];
     let titles = distances.iter().map(|z| format!(">{} m", fixed(*z, 2)));
     let columns: Vec<String> = ["at distance".into()].into_iter().chain(titles).collect();
-    let mut rows = vec![row![html! { b { "this sensor" } }]];
-    rows[0].extend(distances.iter().map(|z| with_interval(model, *z, theta)));
-    rows.extend(Overlay::ALL.map(|overlay| {
-        let cells = distances.iter().map(|z| without_interval(&overlay.model(), *z, theta));
-        row![overlay.label()].into_iter().chain(cells).collect()
-    }));
+    let row = |name: Markup, model: &SigmaModel, own: bool| {
+        let cells = distances.iter().map(|z| sigma_at(model, *z, theta, own));
+        std::iter::once(name).chain(cells).collect()
+    };
+    let mut rows = vec![row(html! { b { "this sensor" } }, model, true)];
+    rows.extend(Overlay::ALL.map(|o| row(html! { (o.label) }, &(o.model)(), false)));
     html! {
         (table(&columns, rows))
         p.note {
@@ -154,101 +151,84 @@ fn published(model: &SigmaModel) -> Markup {
     }
 }
 
-fn measured(model: &SigmaModel, z: f64) -> bool {
-    let [near, far] = model.domain.z_m;
-    z * DISTANCE_RATIO >= near && z <= far * DISTANCE_RATIO
-}
-
-fn with_interval(model: &SigmaModel, z: f64, theta: f64) -> Markup {
-    let exact = model.covariance.iter().all(|c| *c == 0.0);
-    html! {
-        @if measured(model, z) {
-            b { (millimetres(model.sigma(z, theta))) }
-            @if !exact {
-                @let [low, high] = model.interval(z, theta, LEVEL).map(millimetres);
-                " " span.units { "(" (low) " – " (high) ")" }
-            }
-        } @else { (ABSENT) }
+/// With its interval where it has one; nothing where the source measured no such view.
+fn sigma_at(model: &SigmaModel, z: f64, theta: f64, own: bool) -> Markup {
+    let ([near, far], [low, high]) = (model.domain.z_m, model.domain.theta_rad);
+    if z * DISTANCE_RATIO < near || z > far * DISTANCE_RATIO || theta < low || theta > high {
+        return html! { (ABSENT) };
     }
-}
-
-fn without_interval(model: &SigmaModel, z: f64, theta: f64) -> Markup {
-    let [low, high] = model.domain.theta_rad;
-    let known = (low..=high).contains(&theta) && measured(model, z);
-    html! { @if known { (millimetres(model.sigma(z, theta))) } @else { (ABSENT) } }
+    let sigma = millimetres(model.sigma(z, theta));
+    html! {
+        @if own { b { (sigma) } } @else { (sigma) }
+        @if model.covariance.iter().any(|c| *c != 0.0) {
+            @let [low, high] = model.interval(z, theta, LEVEL).map(millimetres);
+            " " span.units { "(" (low) " – " (high) ")" }
+        }
+    }
 }
 
 fn model(calibration: &Calibration) -> Markup {
     let fit = &calibration.fit;
-    let columns = ["parameter", ">value", ">standard error", "~remark"];
-    let parameter = |p: &Parameter| {
-        let error = p.std_error.map_or_else(|| html! { "held" }, |e| significant(e, 2));
-        row![
-            html! { i { (p.name) } },
-            significant(p.value, 4),
-            error,
-            p.remark.as_deref().unwrap_or("")
-        ]
-    };
+    let parameters: [Column<'_, Parameter>; 4] = [
+        ("parameter", &|p| html! { i { (p.name) } }),
+        (">value", &|p| significant(p.value, 4)),
+        (">standard error", &|p| p.std_error.map_or(html! { "held" }, |e| significant(e, 2))),
+        ("~remark", &|p| html! { (p.remark.as_deref().unwrap_or("")) }),
+    ];
+    let used = |h: &HeldOut| h.form == fit.form;
+    let forms: [Column<'_, HeldOut>; 5] = [
+        ("form", &|h| html! { @if used(h) { b { (h.form.id()) } } @else { (h.form.id()) } }),
+        (">log score, nats a view", &|h| html! { (fixed(h.log_score, 2)) }),
+        (">rms error", &|h| html! { (fixed(100.0 * h.rmse_relative, 1)) " %" }),
+        (">distances left out", &|h| html! { (h.folds) }),
+        ("~from", &|h| html! { (h.form.card().reference) }),
+    ];
     html! {
         section {
             h2 { "Model" }
             p {
-                "Form " b { (fit.form.id()) } ": " (fit.form.spec().formula()) ". "
-                span.units { (fit.form.spec().reference()) }
+                "Form " b { (fit.form.id()) } ": " (fit.form.card().formula) ". "
+                span.units { (fit.form.card().reference) }
             }
-            (table(&columns, fit.parameters.iter().map(parameter)))
+            (table_of(&parameters, &fit.parameters))
             h3 { "How the forms predict distances they have not seen" }
             @if calibration.comparison.is_empty() {
                 p { "Not known: too few distances to leave one out." }
             } @else {
-                (forms(calibration))
+                (table_of(&forms, &calibration.comparison))
+                p.note { "Each group of distances is left out of the fit in turn and then predicted; a greater \
+                    log score is better. The form used is in bold." }
             }
         }
     }
 }
 
-fn forms(calibration: &Calibration) -> Markup {
-    let columns = ["form", ">log score, nats a view", ">rms error", ">distances left out", "~from"];
-    let row = |h: &HeldOut| {
-        let used = h.form == calibration.fit.form;
-        let name = html! { @if used { b { (h.form.id()) } } @else { (h.form.id()) } };
-        let error = fixed(100.0 * h.rmse_relative, 1) + " %";
-        row![name, fixed(h.log_score, 2), error, h.folds, h.form.spec().reference()]
-    };
-    html! {
-        (table(&columns, calibration.comparison.iter().map(row)))
-        p.note { "Each group of distances is left out of the fit in turn and then predicted; a greater \
-            log score is better. The form used is in bold." }
-    }
-}
-
 /// What it takes to make the model again.
-fn provenance(provenance: &Provenance) -> Markup {
+fn provenance(made: &Provenance) -> Markup {
+    let text = |value: &Value| match value {
+        Value::Null => "automatic".into(),
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    };
+    let entries = |before: &'static str, map: &Map<String, Value>| {
+        let entry = |(name, value): (&String, &Value)| {
+            (format!("{before}{}", name.replace('_', " ")), text(value))
+        };
+        map.iter().map(entry).collect::<Vec<_>>()
+    };
     let mut all = vec![
-        ("made by".to_string(), format!("{} {}", provenance.tool, provenance.version)),
-        ("on".into(), provenance.created.clone()),
+        ("made by".to_string(), format!("{} {}", made.tool, made.version)),
+        ("on".into(), made.created.clone()),
     ];
-    all.extend(provenance.seed.map(|seed| ("seed".into(), seed.to_string())));
-    all.extend(entries("", &provenance.options));
-    all.extend(entries("SHA-256 of ", &provenance.sha256));
+    all.extend(made.seed.map(|seed| ("seed".into(), seed.to_string())));
+    all.extend(entries("", &made.options));
+    all.extend(entries("SHA-256 of ", &made.sha256));
     html! {
         section {
             h2 { "How it was made" }
             (facts(all.into_iter().map(|(name, value)| (name, html! { (value) }))))
         }
     }
-}
-
-fn entries(before: &str, map: &Map<String, Value>) -> impl Iterator<Item = (String, String)> {
-    map.iter().map(move |(name, value)| {
-        let value = match value {
-            Value::Null => "automatic".into(),
-            Value::String(text) => text.clone(),
-            other => other.to_string(),
-        };
-        (format!("{before}{}", name.replace('_', " ")), value)
-    })
 }
 
 #[cfg(test)]

@@ -1,8 +1,7 @@
 //! A chart as data: axes, layers, legend. SVG and PNG are drawn from it by one set of functions.
 
 mod draw;
-mod layers;
-mod sheet;
+mod shapes;
 
 use plotters::style::{RGBAColor, RGBColor};
 
@@ -95,16 +94,16 @@ const SIZE: (u32, u32) = (960, 540);
 const SMALL_SIZE: (u32, u32) = (470, 300);
 
 // Room around the axes, px of the SVG.
-const LEFT: i32 = 12;
-const RIGHT: i32 = 20;
-const FOOT: i32 = 8;
-const TITLE_ROOM: i32 = 40;
+const LEFT: f64 = 12.0;
+const RIGHT: f64 = 20.0;
+const FOOT: f64 = 8.0;
+const TITLE_ROOM: f64 = 40.0;
 /// Above the axes, for the label of y.
-const LABEL_ROOM: i32 = 30;
-const X_TICKS: i32 = 48;
-const Y_TICKS: i32 = 54;
+const LABEL_ROOM: f64 = 30.0;
+const X_TICKS: f64 = 48.0;
+const Y_TICKS: f64 = 54.0;
 /// Column to the right.
-const LEGEND: i32 = 225;
+const LEGEND: f64 = 225.0;
 
 impl Chart {
     /// As wide as a page, with a grid; layers and legend are still to be added.
@@ -123,9 +122,9 @@ impl Chart {
     /// Widens one of two ranges so that a unit is as long in x as in y on a chart as wide as a
     /// page with a legend.
     pub fn equal_units(ranges: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
-        let across = SIZE.0 as i32 - LEFT - Y_TICKS - LEGEND;
-        let down = SIZE.1 as i32 - TITLE_ROOM - LABEL_ROOM - X_TICKS - FOOT;
-        let inner = [across, down].map(f64::from);
+        let across = f64::from(SIZE.0) - LEFT - Y_TICKS - LEGEND;
+        let down = f64::from(SIZE.1) - TITLE_ROOM - LABEL_ROOM - X_TICKS - FOOT;
+        let inner = [across, down];
         let unit = |k: usize| (ranges[k][1] - ranges[k][0]) / inner[k];
         let unit = unit(0).max(unit(1)).max(f64::MIN_POSITIVE);
         [0, 1].map(|k| {

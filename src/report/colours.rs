@@ -8,30 +8,15 @@ pub(super) const GRID: RGBColor = RGBColor(225, 225, 225);
 /// The pages' accent.
 pub(super) const ACCENT: RGBColor = RGBColor(0x1d, 0x91, 0xc0);
 
-/// Viridis (van der Walt and Smith 2015) up to the green that still shows on white.
-const DISTANCES: [u32; 6] = [0x440154, 0x414487, 0x2a788e, 0x22a884, 0x7ad151, 0xbed628];
-/// ColorBrewer's YlGnBu up to the blue on which black still shows.
-const SURFACE: [u32; 6] = [0xffffd9, 0xedf8b1, 0xc7e9b4, 0x7fcdbb, 0x41b6c4, 0x1d91c0];
-/// ColorBrewer's RdBu, reversed: blue nearer than the plane, red farther.
-const RESIDUALS: [u32; 5] = [0x054a96, 0x67a9d6, 0xffffff, 0xef8a62, 0xa50f21];
+/// Of distances, dark is near: viridis (van der Walt and Smith 2015) up to the green that still shows on white.
+pub(super) const DISTANCES: [u32; 6] = [0x440154, 0x414487, 0x2a788e, 0x22a884, 0x7ad151, 0xbed628];
+/// Of sigma on the map, light is small: ColorBrewer's YlGnBu up to the blue on which black still shows.
+pub(super) const SURFACE: [u32; 6] = [0xffffd9, 0xedf8b1, 0xc7e9b4, 0x7fcdbb, 0x41b6c4, 0x1d91c0];
+/// White is zero: ColorBrewer's RdBu, reversed, blue nearer than the plane, red farther.
+pub(super) const RESIDUALS: [u32; 5] = [0x054a96, 0x67a9d6, 0xffffff, 0xef8a62, 0xa50f21];
 /// ColorBrewer's Dark2 and two of Set1: told apart by colour-blind eyes, four at least in print.
 const LINES: [u32; 8] =
     [0xd95f02, 0x7570b3, 0xe6ab02, 0x1b9e77, 0xe7298a, 0x377eb8, 0x66a61e, 0xa6761d];
-
-/// Of a distance: dark is near. `share` runs from 0 to 1, as in the others.
-pub(super) fn distance(share: f64) -> RGBColor {
-    between(&DISTANCES, share)
-}
-
-/// Of a sigma on the map: light is small.
-pub(super) fn surface(share: f64) -> RGBColor {
-    between(&SURFACE, share)
-}
-
-/// Of a residual: white is zero, at 0.5.
-pub(super) fn residual(share: f64) -> RGBColor {
-    between(&RESIDUALS, share)
-}
 
 /// Of the `i`-th of several lines without an order.
 pub(super) fn line(i: usize) -> RGBColor {
@@ -53,8 +38,8 @@ fn rgb(colour: u32) -> RGBColor {
     RGBColor(r, g, b)
 }
 
-/// Linear between the anchors, which are evenly spread.
-fn between(anchors: &[u32], share: f64) -> RGBColor {
+/// Linear between the anchors, which are evenly spread over a `share` of 0 to 1.
+pub(super) fn between(anchors: &[u32], share: f64) -> RGBColor {
     let last = anchors.len() - 1;
     let at = share.clamp(0.0, 1.0) * last as f64;
     let i = (at as usize).min(last - 1);
@@ -80,7 +65,7 @@ mod tests {
     #[test]
     fn thin_lines_stand_out_from_white() {
         for i in 0..=20 {
-            let line = darker(distance(f64::from(i) / 20.0));
+            let line = darker(between(&DISTANCES, f64::from(i) / 20.0));
             assert!(1.05 / (luminance(line) + 0.05) >= 4.5, "{line:?}");
         }
     }
@@ -89,10 +74,10 @@ mod tests {
     fn luminance_is_ordered() {
         for i in 0..20 {
             let [a, b] = [f64::from(i) / 20.0, f64::from(i + 1) / 20.0];
-            assert!(luminance(distance(a)) < luminance(distance(b)));
-            assert!(luminance(surface(a)) > luminance(surface(b)));
-            assert!(luminance(residual(0.5 * a)) < luminance(residual(0.5 * b)));
-            assert!(luminance(residual(0.5 + 0.5 * a)) > luminance(residual(0.5 + 0.5 * b)));
+            let rises = |of: &[u32], a, b| luminance(between(of, a)) < luminance(between(of, b));
+            assert!(rises(&DISTANCES, a, b) && rises(&SURFACE, b, a));
+            assert!(rises(&RESIDUALS, 0.5 * a, 0.5 * b));
+            assert!(rises(&RESIDUALS, 0.5 + 0.5 * b, 0.5 + 0.5 * a));
         }
     }
 }

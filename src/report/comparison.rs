@@ -16,12 +16,8 @@ use crate::trajectory::Pose;
 /// Room around the lines, share of their extent.
 const MARGIN: f64 = 0.04;
 
-/// A line by name.
-struct Line {
-    name: String,
-    points: Vec<[f64; 2]>,
-    stroke: Stroke,
-}
+/// Its name, its points, and how it is drawn.
+type Line = (String, Vec<[f64; 2]>, Stroke);
 
 /// Fig. 6 (paths from above), Fig. 7 (ATE over time) and Fig. 8 (RPE over time), by file name.
 ///
@@ -52,74 +48,67 @@ pub fn comparison_page(comparison: &Comparison) -> Result<String> {
 }
 
 fn charts(comparison: &Comparison) -> [(&'static str, Chart); 3] {
-    let ate = over_time(comparison, |r| &r.evaluation.ate.each);
-    let rpe = over_time(comparison, |r| &r.evaluation.rpe.each);
-    let time = ["time (s)", "error (mm)"];
+    let ate = "Fig. 7. Absolute trajectory error";
+    let rpe = "Fig. 8. Relative pose error over 1 s";
     [
         ("fig6_paths.svg", paths(comparison)),
-        ("fig7_ate.svg", chart("Fig. 7. Absolute trajectory error", time, ate, false)),
-        ("fig8_rpe.svg", chart("Fig. 8. Relative pose error over 1 s", time, rpe, false)),
+        ("fig7_ate.svg", over_time(comparison, ate, |r| &r.evaluation.ate.each)),
+        ("fig8_rpe.svg", over_time(comparison, rpe, |r| &r.evaluation.rpe.each)),
     ]
 }
 
 /// `equal` when both axes are lengths of one plane.
 fn chart(title: &str, labels: [&str; 2], lines: Vec<Line>, equal: bool) -> Chart {
     let extent = |k: usize| {
-        let [low, high] = range(lines.iter().flat_map(|l| &l.points).map(|p| p[k]));
+        let [low, high] = range(lines.iter().flat_map(|(_, points, _)| points).map(|p| p[k]));
         if low <= high { [low, high] } else { [0.0, 1.0] }
     };
     let extents = [extent(0), extent(1)];
     let extents = if equal { Chart::equal_units(extents) } else { extents };
     let mut chart = Chart::new(title, extents.map(|e| Axis::with_margin(e, MARGIN)), labels);
-    for line in lines {
-        chart.legend.push(Entry::new([Sample::Line(line.stroke)], line.name));
-        chart.layers.push(Layer::Line(line.points, line.stroke));
+    for (name, points, stroke) in lines {
+        chart.legend.push(Entry::new([Sample::Line(stroke)], name));
+        chart.layers.push(Layer::Line(points, stroke));
     }
     chart
 }
 
-/// The variants that are drawn: the paper's, and the last way past it; each with its colour.
-fn drawn(comparison: &Comparison) -> impl Iterator<Item = (&Row, &Run, Stroke)> {
+/// The variants that are drawn, each in its colour: the paper's, and the last way past it.
+fn lines(comparison: &Comparison, points: impl Fn(&Run) -> Vec<[f64; 2]>) -> Vec<Line> {
+    let line = |(i, (row, run)): (usize, (&Row, &Run))| {
+        (row.variant.name.into(), points(run), Stroke::new(colours::line(i), 2))
+    };
+    drawn(comparison).enumerate().map(line).collect()
+}
+
+fn drawn(comparison: &Comparison) -> impl Iterator<Item = (&Row, &Run)> {
     let default = comparison.rows.iter().filter(|r| r.variant.name.contains("default"));
     let paper = comparison.rows.iter().filter(|r| r.variant.of_the_paper);
-    paper
-        .chain(default)
-        .filter_map(|row| Some((row, row.runs.first()?)))
-        .enumerate()
-        .map(|(i, (row, run))| (row, run, Stroke::new(colours::line(i), 2)))
+    paper.chain(default).filter_map(|row| Some((row, row.runs.first()?)))
 }
 
 fn paths(comparison: &Comparison) -> Chart {
     let within = |stamp: f64| {
-        drawn(comparison).any(|(_, run, _)| {
+        drawn(comparison).any(|(_, run)| {
             let (first, last) = (run.trajectory.first(), run.trajectory.last());
             first.is_some_and(|p| p.stamp <= stamp) && last.is_some_and(|p| p.stamp >= stamp)
         })
     };
-    let from_above = |p: Vector3<f64>| [p.x, p.y];
+    let from_above = |p: &Vector3<f64>| [p.x, p.y];
     let truth = comparison.truth.iter().filter(|p| within(p.stamp));
-    let mut lines = vec![Line {
-        name: "ground truth".into(),
-        points: truth.map(|p| from_above(p.world_from_camera.translation.vector)).collect(),
-        stroke: Stroke::new(INK, 1),
-    }];
-    lines.extend(drawn(comparison).map(|(row, run, stroke)| {
+    let truth = truth.map(|p| from_above(&p.world_from_camera.translation.vector)).collect();
+    let mut paths = vec![("ground truth".into(), truth, Stroke::new(INK, 1))];
+    paths.extend(lines(comparison, |run| {
         let aligned = run.evaluation.ate.truth_from_estimate;
-        let place = |p: &Pose| from_above((aligned * p.world_from_camera).translation.vector);
-        let points = run.trajectory.iter().map(place).collect();
-        Line { name: row.variant.name.into(), points, stroke }
+        let place = |p: &Pose| from_above(&(aligned * p.world_from_camera).translation.vector);
+        run.trajectory.iter().map(place).collect()
     }));
-    chart("Fig. 6. Paths from above, aligned", ["x (m)", "y (m)"], lines, true)
+    chart("Fig. 6. Paths from above, aligned", ["x (m)", "y (m)"], paths, true)
 }
 
-fn over_time(comparison: &Comparison, of: impl Fn(&Run) -> &Vec<(f64, f64)>) -> Vec<Line> {
+fn over_time(comparison: &Comparison, title: &str, of: fn(&Run) -> &Vec<(f64, f64)>) -> Chart {
     let begin = comparison.rows.iter().flat_map(|r| &r.runs).flat_map(|r| r.trajectory.first());
     let begin = begin.map(|p| p.stamp).fold(f64::INFINITY, f64::min);
-    drawn(comparison)
-        .map(|(row, run, stroke)| Line {
-            name: row.variant.name.into(),
-            points: of(run).iter().map(|(t, e)| [t - begin, MM * e]).collect(),
-            stroke,
-        })
-        .collect()
+    let errors = |run: &Run| of(run).iter().map(|(t, e)| [t - begin, MM * e]).collect();
+    chart(title, ["time (s)", "error (mm)"], lines(comparison, errors), false)
 }

@@ -1,6 +1,5 @@
 //! The page of a diagnosis: the answer on the first screen, the evidence below.
 
-mod advice;
 mod cards;
 mod curve;
 mod parameters;
@@ -11,8 +10,8 @@ use maud::{Markup, html};
 
 use super::axis::Axis;
 use super::document::{Kind, document};
-use super::residuals::residual_image;
-use crate::diagnose::{Diagnosis, Reference, Verdict};
+use super::residuals::{residual_image, scale};
+use crate::diagnose::{Diagnosis, Reference, Verdict, ViewPictures};
 use crate::error::Result;
 
 const KIND: Kind = Kind { class: "diagnosis", style: include_str!("diagnosis_page.css") };
@@ -24,28 +23,7 @@ pub struct DiagnosisPage<'a> {
     pub title: &'a str,
     pub diagnosis: &'a Diagnosis,
     /// Views whose residuals are worth seeing; few, they are large.
-    pub pictures: &'a [Picture],
-}
-
-/// The residual of one view before and after, row by row; NaN where there is no data.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Picture {
-    /// Under the pictures.
-    pub caption: String,
-    /// Pixels across.
-    pub width: usize,
-    /// Pixels down.
-    pub height: usize,
-    /// As recorded, against the model that was given.
-    pub before: Vec<f32>,
-    /// As recorded, against the extended model.
-    pub after: Vec<f32>,
-    /// The extended model simulated again, against the model that was given.
-    pub simulated: Option<Vec<f32>>,
-    /// Of disparity: what is larger is nearer.
-    pub unit: &'static str,
-    /// Where the colours end.
-    pub range: f32,
+    pub pictures: &'a [ViewPictures],
 }
 
 /// The page as text: one self-contained file, no scripts.
@@ -75,7 +53,7 @@ pub fn diagnosis_page(page: &DiagnosisPage<'_>) -> Result<String> {
         }
         (sections::detectable(diagnosis))
         (sections::cannot_tell(&diagnosis.cannot_tell))
-        (pictures(page.pictures)?)
+        (pictures(page)?)
         h1.evidence { "The evidence" }
         (sections::map(&diagnosis.map))
         (sections::views(&diagnosis.views))
@@ -89,14 +67,15 @@ pub fn diagnosis_page(page: &DiagnosisPage<'_>) -> Result<String> {
     Ok(document(page.title, Some(KIND), &body).into_string())
 }
 
-fn pictures(pictures: &[Picture]) -> Result<Markup> {
-    let figures = pictures.iter().map(before_after).collect::<Result<Vec<Markup>>>()?;
+fn pictures(page: &DiagnosisPage<'_>) -> Result<Markup> {
+    let figure = |picture| before_after(picture, page.diagnosis);
+    let figures = page.pictures.iter().map(figure).collect::<Result<Vec<Markup>>>()?;
     Ok(html! { @if !figures.is_empty() { section {
         h2 { "Residuals before and after" }
         p {
             "The residual of single views about their plane. White is no error, blue too near, red too far, grey no \
              data. Where everything is explained, the second picture shows noise alone."
-            @if pictures.iter().any(|p| p.simulated.is_some()) {
+            @if page.pictures.iter().any(|p| p.twin.is_some()) {
                 " The twin is simulated with the extended model: it should look like the first picture."
             }
         }
@@ -104,27 +83,37 @@ fn pictures(pictures: &[Picture]) -> Result<Markup> {
     } } })
 }
 
-fn before_after(picture: &Picture) -> Result<Markup> {
-    let twin = picture.simulated.as_ref().map(|twin| ("simulated twin", twin));
+fn before_after(picture: &ViewPictures, diagnosis: &Diagnosis) -> Result<Markup> {
+    let view = &diagnosis.views[picture.view];
+    let beyond = match diagnosis.reference {
+        Reference::Model => "",
+        Reference::SimulatedRecording => ", recorded minus simulated",
+    };
+    let (tilt, plural) = (view.theta_rad.to_degrees(), if view.frames == 1 { "" } else { "s" });
+    let caption = format!(
+        "View {}{beyond}: board at {:.2} m, tilted {tilt:.0}°; mean of {} frame{plural}",
+        view.name, view.z_m, view.frames
+    );
+    let range = scale(&picture.before);
+    let twin = picture.twin.as_ref().map(|twin| ("simulated twin", twin));
     let titled = [("as recorded", &picture.before), ("with the extended model", &picture.after)];
     let panel = |(title, values): (&str, &Vec<f32>)| {
-        let alt = format!("{title}: {}", picture.caption);
-        let nearer = -f64::from(picture.range);
-        let image = residual_image([picture.width, picture.height], values, nearer, &alt)?;
+        let (size, alt) = ([picture.width, picture.height], format!("{title}: {caption}"));
+        // Of disparity: what is larger is nearer.
+        let image = residual_image(size, values, -range, &alt)?;
         Ok(html! { div { p.panel-title { (title) } (image) } })
     };
     let panels = titled.into_iter().chain(twin).map(panel).collect::<Result<Vec<Markup>>>()?;
-    // An f32's decimals end after the seventh digit.
-    let end = Axis::label((f64::from(picture.range) * 1e6).round() / 1e6);
+    let end = Axis::label(range);
     Ok(html! {
         figure.before-after {
             div.panels { @for panel in panels { (panel) } }
             div.scale.disparity {
-                span { "−" (end) " " (picture.unit) ", too far" }
+                span { "−" (end) " px, too far" }
                 span { "0" }
-                span { "too near, +" (end) " " (picture.unit) }
+                span { "too near, +" (end) " px" }
             }
-            figcaption { (picture.caption) }
+            figcaption { (caption) }
         }
     })
 }

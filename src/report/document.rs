@@ -43,10 +43,7 @@ pub(super) use row;
 ///
 /// The first column names the row. A title after `>` is that of a column of numbers, set to the
 /// right; one after `~` is that of a column of sentences, set small.
-pub(super) fn table<C: AsRef<str>>(
-    columns: &[C],
-    rows: impl IntoIterator<Item = Vec<Markup>>,
-) -> Markup {
+pub fn table<C: AsRef<str>>(columns: &[C], rows: impl IntoIterator<Item = Vec<Markup>>) -> Markup {
     let columns: Vec<(Option<&str>, &str)> = columns.iter().map(|c| set(c.as_ref())).collect();
     html! {
         div.wide { table class=[(columns.len() > 8).then_some("small")] {
@@ -60,6 +57,16 @@ pub(super) fn table<C: AsRef<str>>(
     }
 }
 
+/// A column's title, as of [`table`], and its cell in a row.
+pub(super) type Column<'a, T> = (&'a str, &'a dyn Fn(&T) -> Markup);
+
+/// A table with a row for each of some things.
+pub(super) fn table_of<T>(columns: &[Column<'_, T>], things: &[T]) -> Markup {
+    let titles: Vec<&str> = columns.iter().map(|(title, _)| *title).collect();
+    let cells = |thing| columns.iter().map(|(_, cell)| cell(thing)).collect();
+    table(&titles, things.iter().map(cells))
+}
+
 /// Class and title of a column.
 fn set(column: &str) -> (Option<&'static str>, &str) {
     match (column.strip_prefix('>'), column.strip_prefix('~')) {
@@ -70,7 +77,7 @@ fn set(column: &str) -> (Option<&'static str>, &str) {
 }
 
 /// Names and what they are.
-pub(super) fn facts<N: AsRef<str>>(facts: impl IntoIterator<Item = (N, Markup)>) -> Markup {
+pub fn facts<N: AsRef<str>>(facts: impl IntoIterator<Item = (N, Markup)>) -> Markup {
     html! {
         dl { @for (name, value) in facts { div { dt { (name.as_ref()) } dd { (value) } } } }
     }

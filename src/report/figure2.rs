@@ -13,56 +13,42 @@ use crate::model::{DISTANCE_RATIO, SigmaModel};
 use crate::stats::range;
 
 /// A published surface, drawn beside the fit over the range that its authors measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Overlay {
-    /// The paper's Eq. 1.
-    PaperEq1,
-    /// Nguyen, Izadi and Lovell 2012.
-    Nguyen,
-    /// Khoshelham and Elberink 2012.
-    Khoshelham,
+#[derive(Debug, Clone, Copy)]
+pub struct Overlay {
+    /// As on the command line.
+    pub id: &'static str,
+    /// As in a legend.
+    pub label: &'static str,
+    /// The surface with the range that was measured.
+    pub model: fn() -> SigmaModel,
+    dashes: [i32; 2],
 }
 
 impl Overlay {
-    /// The paper first.
-    pub const ALL: [Overlay; 3] = [Overlay::PaperEq1, Overlay::Nguyen, Overlay::Khoshelham];
-
-    /// As on the command line.
-    pub fn id(self) -> &'static str {
-        self.card().0
-    }
-
-    /// As in a legend.
-    pub fn label(self) -> &'static str {
-        self.card().1
-    }
-
-    /// The surface with the range that was measured.
-    pub fn model(self) -> SigmaModel {
-        self.card().2()
-    }
-
-    fn dashes(self) -> [i32; 2] {
-        self.card().3
-    }
-
-    fn card(self) -> (&'static str, &'static str, fn() -> SigmaModel, [i32; 2]) {
-        match self {
-            Overlay::PaperEq1 => ("eq1", "paper, Eq. 1", SigmaModel::paper, [9, 5]),
-            Overlay::Nguyen => ("nguyen", "Nguyen et al. 2012", SigmaModel::nguyen, [2, 4]),
-            Overlay::Khoshelham => {
-                ("khoshelham", "Khoshelham 2012", SigmaModel::khoshelham, [15, 3])
-            }
-        }
-    }
+    /// The paper's Eq. 1; Nguyen, Izadi and Lovell; Khoshelham and Elberink.
+    pub const ALL: [Overlay; 3] = [
+        Overlay { id: "eq1", label: "paper, Eq. 1", model: SigmaModel::paper, dashes: [9, 5] },
+        Overlay {
+            id: "nguyen",
+            label: "Nguyen et al. 2012",
+            model: SigmaModel::nguyen,
+            dashes: [2, 4],
+        },
+        Overlay {
+            id: "khoshelham",
+            label: "Khoshelham 2012",
+            model: SigmaModel::khoshelham,
+            dashes: [15, 3],
+        },
+    ];
 }
 
 impl FromStr for Overlay {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        Overlay::ALL.into_iter().find(|o| o.id() == text).ok_or_else(|| {
-            let known = Overlay::ALL.map(Overlay::id).join(", ");
+        Overlay::ALL.into_iter().find(|o| o.id == text).ok_or_else(|| {
+            let known = Overlay::ALL.map(|o| o.id).join(", ");
             format!("there is no overlay \"{text}\"; the overlays are {known}")
         })
     }
@@ -93,13 +79,14 @@ const BESIDE: f64 = 0.015;
 struct Group {
     /// Median distance of the points, where the curve is drawn, m.
     z_m: f64,
-    /// Of the points, m.
-    range_m: [f64; 2],
-    /// Tilt, sigma and its standard error, where that is known. Sigma is carried along the fitted
-    /// surface from its own distance to the group's.
-    points: Vec<([f64; 2], Option<f64>)>,
-    /// Tilt, sigma, lower and upper end of its 95 % interval.
-    curve: Vec<[f64; 4]>,
+    label: String,
+    /// Sigma is carried along the fitted surface from its own distance to the group's.
+    points: Vec<[f64; 2]>,
+    /// One standard error either way, where it is known.
+    bars: Vec<[f64; 3]>,
+    curve: Vec<[f64; 2]>,
+    /// The curve's 95 % interval.
+    band: Vec<[f64; 3]>,
     colour: RGBColor,
     mark: Mark,
 }
@@ -107,79 +94,65 @@ struct Group {
 /// Sigma against tilt, with the fit and the published surfaces at the same distances.
 pub fn figure2(table: &SigmaTable, model: &SigmaModel, overlays: &[Overlay]) -> Chart {
     let rows = by_distance(&table.rows);
-    let radius = if table.rows.len() > MANY_POINTS { (4, 0.6) } else { (5, 1.0) };
+    let many = table.rows.len() > MANY_POINTS;
     let groups: Vec<Group> = rows
         .iter()
         .enumerate()
         .map(|(i, of)| {
-            let colour = colours::distance(i as f64 / (rows.len().max(2) - 1) as f64);
-            let (radius, edge) = (radius.0, INK.mix(radius.1));
+            let colour =
+                colours::between(&colours::DISTANCES, i as f64 / (rows.len().max(2) - 1) as f64);
+            let (radius, edge) = if many { (4, INK.mix(0.6)) } else { (5, INK.into()) };
             group(of, model, colour, Mark { shape: i, radius, fill: colour.into(), edge })
         })
         .collect();
     let axes = [tilt_axis(table, model), sigma_axis(&groups)];
     let mut chart = Chart::new("Depth noise against tilt", axes, ["tilt θ (degrees)", "σ (mm)"]);
-    chart.layers.extend(groups.iter().map(Group::band));
+    let each = |layer: fn(&Group) -> Layer| groups.iter().map(layer);
+    chart.layers.extend(each(|g| Layer::Band(g.band.clone(), g.colour.mix(BAND_OPACITY))));
     let drawn: Vec<bool> =
-        overlays.iter().map(|o| overlay(&mut chart, *o, &groups, model)).collect();
-    chart.layers.extend(groups.iter().map(Group::line));
-    chart.layers.extend(groups.iter().map(Group::error_bars));
-    chart.layers.extend(groups.iter().map(Group::marks));
-    chart.legend = legend(&groups, overlays.iter().copied().zip(drawn).collect());
+        overlays.iter().map(|o| draw_overlay(&mut chart, o, &groups, model)).collect();
+    chart.layers.extend(each(|g| Layer::Line(g.curve.clone(), Stroke::new(g.colour, 2))));
+    chart.layers.extend(each(|g| Layer::ErrorBars(g.bars.clone(), Stroke::new(g.colour, 1))));
+    chart.layers.extend(each(|g| Layer::Marks(g.points.clone(), g.mark)));
+    chart.legend = legend(&groups, overlays, &drawn);
     chart
-}
-
-impl Group {
-    fn band(&self) -> Layer {
-        let edges = self.curve.iter().map(|[tilt, _, low, high]| [*tilt, *low, *high]).collect();
-        Layer::Band(edges, self.colour.mix(BAND_OPACITY))
-    }
-
-    fn line(&self) -> Layer {
-        let points = self.curve.iter().map(|[tilt, sigma, ..]| [*tilt, *sigma]).collect();
-        Layer::Line(points, Stroke::new(self.colour, 2))
-    }
-
-    fn error_bars(&self) -> Layer {
-        let bar = |([tilt, sigma], error): &([f64; 2], Option<f64>)| {
-            error.map(|e| [*tilt, sigma - e, sigma + e])
-        };
-        Layer::ErrorBars(self.points.iter().filter_map(bar).collect(), Stroke::new(self.colour, 1))
-    }
-
-    fn marks(&self) -> Layer {
-        Layer::Marks(self.points.iter().map(|(at, _)| *at).collect(), self.mark)
-    }
-
-    /// Distances that print alike are one.
-    fn label(&self) -> String {
-        let z = fixed(self.z_m, 2);
-        let range = numbers(self.range_m, 2);
-        if range == z { format!("{z} m") } else { format!("{z} m ({})", numbers(self.range_m, 1)) }
-    }
 }
 
 fn group(rows: &[SigmaRow], model: &SigmaModel, colour: RGBColor, mark: Mark) -> Group {
     let z_m = rows[rows.len() / 2].z_m;
-    let point = |r: &SigmaRow| {
-        let carried = MM * model.sigma(z_m, r.theta_rad) / model.sigma(r.z_m, r.theta_rad);
-        let error = r.std_error_m().map(|e| carried * e);
-        ([r.theta_rad.to_degrees(), carried * r.sigma_m], error)
+    let carried =
+        |r: &SigmaRow| MM * model.sigma(z_m, r.theta_rad) / model.sigma(r.z_m, r.theta_rad);
+    let point = |r: &SigmaRow| [r.theta_rad.to_degrees(), carried(r) * r.sigma_m];
+    let bar = |r: &SigmaRow| {
+        let ([tilt, sigma], error) = (point(r), carried(r) * r.std_error_m()?);
+        Some([tilt, sigma - error, sigma + error])
     };
     let exact = model.covariance.iter().all(|c| *c == 0.0);
-    let curve = tilts(model.domain.theta_rad).map(|theta| {
-        let sigma = model.sigma(z_m, theta);
-        let [low, high] = if exact { [sigma; 2] } else { model.interval(z_m, theta, LEVEL) };
-        [theta.to_degrees(), MM * sigma, MM * low, MM * high]
-    });
+    let interval = |theta: f64| match exact {
+        true => [model.sigma(z_m, theta); 2],
+        false => model.interval(z_m, theta, LEVEL),
+    };
+    let edges = |theta: f64| {
+        let [low, high] = interval(theta);
+        [theta.to_degrees(), MM * low, MM * high]
+    };
+    // Distances that print alike are one.
+    let (z, ends) = (fixed(z_m, 2), [rows[0].z_m, rows[rows.len() - 1].z_m]);
+    let others = if numbers(ends, 2) == z { "".into() } else { format!(" ({})", numbers(ends, 1)) };
     Group {
         z_m,
-        range_m: [rows[0].z_m, rows[rows.len() - 1].z_m],
+        label: format!("{z} m{others}"),
         points: rows.iter().map(point).collect(),
-        curve: curve.collect(),
+        bars: rows.iter().filter_map(bar).collect(),
+        curve: curve(model, z_m, model.domain.theta_rad),
+        band: tilts(model.domain.theta_rad).map(edges).collect(),
         colour,
         mark,
     }
+}
+
+fn curve(model: &SigmaModel, z_m: f64, tilts_rad: [f64; 2]) -> Vec<[f64; 2]> {
+    tilts(tilts_rad).map(|t| [t.to_degrees(), MM * model.sigma(z_m, t)]).collect()
 }
 
 fn tilts([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
@@ -189,53 +162,52 @@ fn tilts([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
 
 /// A published surface at every distance where it was measured, in the distance's colour; an open
 /// mark at its squarest end says which distance where colours are lost. Was anything drawn?
-fn overlay(chart: &mut Chart, overlay: Overlay, groups: &[Group], model: &SigmaModel) -> bool {
-    let published = overlay.model();
+fn draw_overlay(
+    chart: &mut Chart,
+    overlay: &Overlay,
+    groups: &[Group],
+    model: &SigmaModel,
+) -> bool {
+    let published = (overlay.model)();
     let [near, far] = published.domain.z_m;
     let [low, high] = published.domain.theta_rad;
-    let tilt_rad = [model.domain.theta_rad[0].max(low), model.domain.theta_rad[1].min(high)];
+    let tilts_rad = [model.domain.theta_rad[0].max(low), model.domain.theta_rad[1].min(high)];
     let before = chart.layers.len();
     for group in groups {
         let z = group.z_m;
-        if z * DISTANCE_RATIO < near || z > far * DISTANCE_RATIO || tilt_rad[1] < tilt_rad[0] {
+        if z * DISTANCE_RATIO < near || z > far * DISTANCE_RATIO || tilts_rad[1] < tilts_rad[0] {
             continue;
         }
-        let line: Vec<[f64; 2]> =
-            tilts(tilt_rad).map(|t| [t.to_degrees(), MM * published.sigma(z, t)]).collect();
+        let line = curve(&published, z, tilts_rad);
         let colour = colours::darker(group.colour);
         let beside = BESIDE * (chart.x.high - chart.x.low);
         let visible = line.iter().find(|p| chart.y.contains(p[1]));
         let marks = visible.map(|[tilt, sigma]| [tilt - beside, *sigma]).into_iter().collect();
         let mark = Mark { radius: 4, fill: WHITE.into(), edge: colour.into(), ..group.mark };
-        chart.layers.push(Layer::Line(line, Stroke::new(colour, 1).dashed(overlay.dashes())));
+        chart.layers.push(Layer::Line(line, Stroke::new(colour, 1).dashed(overlay.dashes)));
         chart.layers.push(Layer::Marks(marks, mark));
     }
     chart.layers.len() > before
 }
 
-fn legend(groups: &[Group], overlays: Vec<(Overlay, bool)>) -> Vec<Entry> {
+fn legend(groups: &[Group], overlays: &[Overlay], drawn: &[bool]) -> Vec<Entry> {
     let mut legend = vec![Entry::new([], "distance z:")];
     legend.extend(groups.iter().map(|group| {
         let line = Sample::Line(Stroke::new(group.colour, 2));
-        Entry::new([line, Sample::Mark(group.mark)], group.label())
+        Entry::new([line, Sample::Mark(group.mark)], &*group.label)
     }));
     let fit = [Sample::Band(INK.mix(BAND_OPACITY)), Sample::Line(Stroke::new(INK, 2))];
     legend.push(Entry::new(fit, "fit, 95 % band"));
-    let open_marks = overlays.iter().any(|(_, drawn)| *drawn);
-    for (overlay, drawn) in overlays {
-        let line = Sample::Line(Stroke::new(INK, 1).dashed(overlay.dashes()));
-        legend.push(Entry::new([line], overlay.label()));
-        if !drawn {
-            legend.push(Entry::new([], "(nothing measured here)"));
-        }
+    for (overlay, drawn) in overlays.iter().zip(drawn) {
+        let line = Sample::Line(Stroke::new(INK, 1).dashed(overlay.dashes));
+        legend.push(Entry::new([line], overlay.label));
+        legend.extend((!drawn).then(|| Entry::new([], "(nothing measured here)")));
     }
-    if open_marks {
-        legend.push(Entry::new([], "open marks: their distance"));
-    }
-    let bars = groups.iter().flat_map(|g| &g.points).any(|(_, error)| error.is_some());
+    let bars = groups.iter().any(|g| !g.bars.is_empty());
     let points = if bars { "points: measured ± 1 s.e.," } else { "points: measured," };
-    legend.push(Entry::new([], points));
-    legend.push(Entry::new([], "carried to the curve's distance"));
+    let open = drawn.contains(&true).then_some("open marks: their distance");
+    let remarks = open.into_iter().chain([points, "carried to the curve's distance"]);
+    legend.extend(remarks.map(|remark| Entry::new([], remark)));
     legend
 }
 
@@ -247,13 +219,11 @@ fn tilt_axis(table: &SigmaTable, model: &SigmaModel) -> Axis {
 }
 
 fn sigma_axis(groups: &[Group]) -> Axis {
-    let points = groups.iter().flat_map(|g| &g.points);
-    let measured = range(points.clone().map(|(at, _)| at[1]));
-    let reaching = points
-        .flat_map(|(at, error)| [-1.0, 1.0].map(|side| at[1] + side * error.unwrap_or(0.0)))
-        .chain(groups.iter().flat_map(|g| &g.curve).flat_map(|c| [c[2], c[3]]))
-        .map(|v| v.clamp(measured[0] / BEYOND, measured[1] * BEYOND));
-    let [low, high] = range(reaching.chain(measured));
+    let measured = range(groups.iter().flat_map(|g| &g.points).map(|p| p[1]));
+    let reaching = groups.iter().flat_map(|g| g.bars.iter().chain(&g.band));
+    let ends = reaching.flat_map(|[_, low, high]| [*low, *high]);
+    let near = ends.map(|v| v.clamp(measured[0] / BEYOND, measured[1] * BEYOND));
+    let [low, high] = range(near.chain(measured));
     if high > LOG_FROM_RATIO * low {
         let spare = (high / low).powf(MARGIN);
         Axis::log(low / spare, high * spare)

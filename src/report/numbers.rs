@@ -1,6 +1,6 @@
 //! Numbers as people read them, with Unicode's minus and powers of ten.
 
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 pub(super) const MM: f64 = 1e3;
 pub(super) const ABSENT: &str = "–";
@@ -21,8 +21,8 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
 /// Metres as millimetres, to about three digits.
 pub(super) fn millimetres(metres: f64) -> String {
     let mm = metres * MM;
-    let decimals = [(0.1, 3), (10.0, 2)].into_iter().find(|(below, _)| mm.abs() < *below);
-    fixed(mm, decimals.map_or(1, |(_, decimals)| decimals))
+    let decimals = [0.1, 10.0].iter().filter(|below| mm.abs() < **below).count();
+    fixed(mm, 1 + decimals)
 }
 
 pub(super) fn degrees(radians: f64) -> String {
@@ -31,9 +31,9 @@ pub(super) fn degrees(radians: f64) -> String {
 
 /// With a decimal where one is needed to tell it from 0 or 100 %.
 pub(super) fn percent(share: f64) -> String {
-    let percent = 100.0 * share;
-    let decimals = usize::from(percent > 99.0 && percent < 100.0 || percent > 0.0 && percent < 1.0);
-    format!("{} %", fixed(percent, decimals))
+    let near_an_end = |share: f64| share > 0.0 && share < 0.01;
+    let decimals = usize::from(near_an_end(share) || near_an_end(1.0 - share));
+    format!("{} %", fixed(100.0 * share, decimals))
 }
 
 /// `low – high`, or one number where they print alike.
@@ -94,21 +94,14 @@ pub(super) fn count(n: usize, noun: &str) -> String {
 /// A formula in the notation of [`crate::model::SigmaForm::formula`], for the eye; names that
 /// `value` knows are replaced by their numbers.
 pub(super) fn formula(text: &str, value: &dyn Fn(&str) -> Option<f64>) -> Markup {
-    let mut out = String::new();
-    let mut rest = text;
-    let word_end = |text: &str| text.find(|c: char| !c.is_alphanumeric()).unwrap_or(text.len());
-    while let Some(first) = rest.chars().next() {
-        let (token, after) = rest.split_at(word_end(rest).max(first.len_utf8()));
-        rest = after;
-        if token == "^" {
-            let (power, after) = rest.split_at(word_end(rest));
-            rest = after;
-            out.push_str(&html! { sup { (word(power, value)) } }.into_string());
-        } else {
-            out.push_str(&word(token, value).into_string());
-        }
-    }
-    PreEscaped(out)
+    // Words whole, all else letter by letter.
+    let letters: Vec<char> = text.chars().collect();
+    let tokens = letters.chunk_by(|a, b| a.is_alphanumeric() && b.is_alphanumeric());
+    let tokens: Vec<String> = tokens.map(String::from_iter).collect();
+    html! { @for (i, token) in tokens.iter().enumerate() {
+        @if i > 0 && tokens[i - 1] == "^" { sup { (word(token, value)) } }
+        @else if token != "^" { (word(token, value)) }
+    } }
 }
 
 fn word(token: &str, value: &dyn Fn(&str) -> Option<f64>) -> Markup {

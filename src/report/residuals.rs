@@ -6,9 +6,10 @@ use super::axis::round_up;
 use super::colours;
 use super::document::picture;
 use crate::error::{Error, Result};
+use crate::stats::quantile;
 
-/// Palette: entry 0 is "no target", the rest run from the most negative to the most positive;
-/// odd in number, so that zero is exactly white.
+/// Palette (a third of the bytes of full colour): entry 0 is "no target", the rest run from the most
+/// negative to the most positive; odd in number, so that zero is exactly white.
 const SHADES: u8 = 201;
 const NO_TARGET: [u8; 3] = [222, 222, 222];
 /// Share of the pixels that the scale covers; the few beyond it saturate.
@@ -19,13 +20,9 @@ const EMPTY_SCALE: f64 = 1.0;
 /// Where the colours end: covers 98 % of the finite values, rounded up to 1, 2 or 5 times a power
 /// of ten.
 pub(super) fn scale(values: &[f32]) -> f64 {
-    let mut sizes: Vec<f32> = values.iter().map(|v| v.abs()).filter(|v| v.is_finite()).collect();
-    if sizes.is_empty() {
-        return EMPTY_SCALE;
-    }
-    let rank = ((sizes.len() - 1) as f64 * COVERED).round() as usize;
-    let (_, size, _) = sizes.select_nth_unstable_by(rank, f32::total_cmp);
-    if *size > 0.0 { round_up(f64::from(*size)) } else { EMPTY_SCALE }
+    let sizes = values.iter().filter(|v| v.is_finite()).map(|v| f64::from(v.abs()));
+    let size = quantile(&mut sizes.collect::<Vec<f64>>(), COVERED);
+    size.filter(|size| *size > 0.0).map_or(EMPTY_SCALE, round_up)
 }
 
 /// Values row by row, white at zero and saturated at `farther` in red, `-farther` in blue; a
@@ -45,22 +42,19 @@ pub(super) fn residual_image(
 fn png([width, height]: [usize; 2], values: &[f32], farther: f64) -> Result<Vec<u8>> {
     let failed =
         |e: png::EncodingError| Error::Drawing { what: "the residual picture", why: e.to_string() };
-    let shades: Vec<u8> = values.iter().map(|&v| shade(f64::from(v) / farther)).collect();
+    let last = f64::from(SHADES - 1);
+    let shades = (0..SHADES).map(|i| colours::between(&colours::RESIDUALS, f64::from(i) / last));
+    let palette = NO_TARGET.into_iter().chain(shades.flat_map(|c| [c.0, c.1, c.2]));
+    let pixels: Vec<u8> = values.iter().map(|&v| shade(f64::from(v) / farther)).collect();
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
     encoder.set_color(png::ColorType::Indexed);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_palette(palette());
+    encoder.set_palette(palette.collect::<Vec<u8>>());
     let mut writer = encoder.write_header().map_err(failed)?;
-    writer.write_image_data(&shades).map_err(failed)?;
+    writer.write_image_data(&pixels).map_err(failed)?;
     writer.finish().map_err(failed)?;
     Ok(bytes)
-}
-
-fn palette() -> Vec<u8> {
-    let last = f64::from(SHADES - 1);
-    let shades = (0..SHADES).map(|i| colours::residual(f64::from(i) / last));
-    NO_TARGET.into_iter().chain(shades.flat_map(|c| [c.0, c.1, c.2])).collect()
 }
 
 fn shade(share: f64) -> u8 {

@@ -1,7 +1,5 @@
 //! Sigma over distance and tilt, as a map with iso-lines and the cells that were measured.
 
-mod isolines;
-
 use plotters::style::{RGBColor, WHITE};
 
 use super::axis::Axis;
@@ -10,19 +8,23 @@ use super::colours::{self, INK};
 use super::numbers::MM;
 use crate::measure::SigmaTable;
 use crate::model::SigmaModel;
+use crate::stats::range;
 
 /// Steps of colour: fine enough to look continuous.
 const SHADES: usize = 36;
-/// Cells of the coloured map; between rows the shade steps, too little to be seen.
-const ROWS: usize = 60;
-const COLUMNS: usize = 180;
-/// Cells in which iso-lines are straight.
-const LINE_CELLS: [usize; 2] = [120, 60];
+/// Cells of the map across and down; in each the colour is one and iso-lines are straight.
+const CELLS: [usize; 2] = [180, 60];
 /// Share of each axis that shows what lies outside the valid range.
 const MARGIN: f64 = 0.06;
 /// A range narrower than this share of its value, or than this angle, is widened to be seen.
 const MIN_RANGE_SHARE: f64 = 0.04;
 const MIN_RANGE_DEG: f64 = 2.0;
+/// Labels stand at this height of the map where their line comes by, and keep this far apart
+/// (shares of the map) ...
+const LABEL_HEIGHT: f64 = 0.3;
+const LABELS_APART: [f64; 2] = [0.08, 0.06];
+/// ... and this far from its sides.
+const LABEL_INSET: f64 = 0.02;
 
 /// The fitted sigma where it is valid.
 pub fn sigma_map(table: &SigmaTable, model: &SigmaModel) -> Chart {
@@ -30,21 +32,20 @@ pub fn sigma_map(table: &SigmaTable, model: &SigmaModel) -> Chart {
     let theta = at_least(model.domain.theta_rad.map(f64::to_degrees), MIN_RANGE_DEG);
     let below = theta[0].min(0.0);
     let theta = theta.map(|t| t - below);
-    let sigma = |z_m: f64, theta_deg: f64| MM * model.sigma(z_m, theta_deg.to_radians());
-    let grid = isolines::Grid::sample(z, theta, LINE_CELLS, &sigma);
-    let [low, high] = grid.range();
+    let grid = Grid::sample([z, theta], &|z_m, deg| MM * model.sigma(z_m, deg.to_radians()));
+    let [low, high] = range(grid.value.iter().copied());
     let scale = Axis::log(low, high);
     let axes = [Axis::with_margin(z, MARGIN), Axis::with_margin(theta, MARGIN).ticks_from(0.0)];
     let labels = ["distance z (m)", "tilt θ (degrees)"];
     let mut chart = Chart { grid: false, ..Chart::new("σ over distance and tilt", axes, labels) };
     chart.layers.push(Layer::Hatching);
-    chart.layers.extend(tiles(z, theta, &|z, theta| shade(scale.share(sigma(z, theta)))));
+    chart.layers.extend(grid.tiles(&|sigma| shade(scale.share(sigma))));
     let corners = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]].map(|[i, j]| [z[i], theta[j]]);
     chart.layers.push(Layer::Line(corners.to_vec(), Stroke::new(INK, 1)));
     let measured = Mark { edge: WHITE.into(), ..Mark::dot(INK, 2) };
     let cells = table.rows.iter().map(|r| [r.z_m, r.theta_rad.to_degrees()]).collect();
     chart.layers.push(Layer::Marks(cells, measured));
-    chart.layers.extend(isolines::layers(&grid, &scale.ticks));
+    chart.layers.extend(grid.iso_lines(&scale.ticks));
     let colours = (0..SHADES).map(colour).collect();
     chart.scale = Some(ColourScale { title: "σ (mm)".into(), axis: scale, colours });
     chart.legend = vec![
@@ -64,28 +65,98 @@ fn shade(share: f64) -> usize {
 }
 
 fn colour(shade: usize) -> RGBColor {
-    colours::surface((shade as f64 + 0.5) / SHADES as f64)
+    colours::between(&colours::SURFACE, (shade as f64 + 0.5) / SHADES as f64)
 }
 
-/// Rows of tilt, cut where the shade changes.
-fn tiles(z: [f64; 2], theta: [f64; 2], shade: &dyn Fn(f64, f64) -> usize) -> Vec<Layer> {
-    let edge = |[low, high]: [f64; 2], i: usize, n: usize| low + (high - low) * i as f64 / n as f64;
-    let row = |j: usize| {
-        let theta = [j, j + 1].map(|j| edge(theta, j, ROWS));
-        let shades: Vec<usize> = (0..2 * COLUMNS)
-            .skip(1)
-            .step_by(2)
-            .map(|i| shade(edge(z, i, 2 * COLUMNS), 0.5 * (theta[0] + theta[1])))
-            .collect();
-        let mut end = 0;
-        let runs = shades.chunk_by(|a, b| a == b).map(|run| {
-            let start = end;
-            end += run.len();
-            Layer::Tile([start, end].map(|i| edge(z, i, COLUMNS)), theta, colour(run[0]).into())
+type Point = [f64; 2];
+
+/// A surface sampled on the corners of a lattice.
+struct Grid {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    /// Row by row, `x` fastest.
+    value: Vec<f64>,
+}
+
+impl Grid {
+    /// Denser towards the upper end of `y`, where the forms bend to their poles.
+    fn sample([x, y]: [[f64; 2]; 2], f: &dyn Fn(f64, f64) -> f64) -> Self {
+        let along = |[low, high]: [f64; 2], n: usize, share: fn(f64) -> f64| -> Vec<f64> {
+            (0..=n).map(|i| low + (high - low) * share(i as f64 / n as f64)).collect()
+        };
+        let (x, y) = (along(x, CELLS[0], |s| s), along(y, CELLS[1], |s| s * (2.0 - s)));
+        let value = y.iter().flat_map(|&v| x.iter().map(move |&u| f(u, v))).collect();
+        Grid { x, y, value }
+    }
+
+    /// Corners of a cell in turn, each with its value.
+    fn corners(&self, i: usize, j: usize) -> [(Point, f64); 4] {
+        [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
+            .map(|(i, j)| ([self.x[i], self.y[j]], self.value[j * self.x.len() + i]))
+    }
+
+    /// Every row in pieces, cut where the shade of a cell's mean changes.
+    fn tiles(&self, shade: &dyn Fn(f64) -> usize) -> Vec<Layer> {
+        let mut tiles = Vec::new();
+        for j in 0..CELLS[1] {
+            let of = |i| shade(self.corners(i, j).iter().map(|(_, value)| value / 4.0).sum());
+            let shades: Vec<usize> = (0..CELLS[0]).map(of).collect();
+            let mut end = 0;
+            for run in shades.chunk_by(|a, b| a == b) {
+                let x = [self.x[end], self.x[end + run.len()]];
+                tiles.push(Layer::Tile(x, [self.y[j], self.y[j + 1]], colour(run[0]).into()));
+                end += run.len();
+            }
+        }
+        tiles
+    }
+
+    /// By marching squares; labels over the lines.
+    fn iso_lines(&self, levels: &[f64]) -> Vec<Layer> {
+        let (mut layers, mut labels) = (Vec::new(), Vec::<(Point, f64)>::new());
+        for &level in levels {
+            let pieces = self.pieces(level);
+            labels.extend(self.label_place(&pieces, &labels).map(|at| (at, level)));
+            let line = |ends: &[Point; 2]| Layer::Line(ends.to_vec(), Stroke::new(INK, 1));
+            layers.extend(pieces.iter().map(line));
+        }
+        layers.extend(labels.into_iter().map(|(at, v)| Layer::Label(at, Axis::label(v))));
+        layers
+    }
+
+    fn pieces(&self, level: f64) -> Vec<[Point; 2]> {
+        let cells = (0..CELLS[1]).flat_map(|j| (0..CELLS[0]).map(move |i| (i, j)));
+        let pieces = cells.flat_map(|(i, j)| {
+            let crossings = crossings(&self.corners(i, j), level);
+            crossings.chunks_exact(2).map(|p| [p[0], p[1]]).collect::<Vec<_>>()
         });
-        runs.collect::<Vec<Layer>>()
+        pieces.collect()
+    }
+
+    fn label_place(&self, pieces: &[[Point; 2]], taken: &[(Point, f64)]) -> Option<Point> {
+        let along = |axis: &[f64], v: f64| (v - axis[0]) / (axis[axis.len() - 1] - axis[0]);
+        let share = |p: Point| [along(&self.x, p[0]), along(&self.y, p[1])];
+        let free = |p: &Point| {
+            let here = share(*p);
+            let apart =
+                |there: [f64; 2]| (0..2).any(|k| (here[k] - there[k]).abs() > LABELS_APART[k]);
+            here.iter().all(|s| (LABEL_INSET..=1.0 - LABEL_INSET).contains(s))
+                && taken.iter().all(|(at, _)| apart(share(*at)))
+        };
+        let off = |p: &Point| (share(*p)[1] - LABEL_HEIGHT).abs();
+        let starts = pieces.iter().map(|[start, _]| *start);
+        starts.filter(free).min_by(|a, b| off(a).total_cmp(&off(b)))
+    }
+}
+
+/// Where the level crosses the sides of a cell: none, two, or (a saddle) four times.
+fn crossings(corners: &[(Point, f64); 4], level: f64) -> Vec<Point> {
+    let crossing = |k: usize| {
+        let ((p, a), (q, b)) = (corners[k], corners[(k + 1) % 4]);
+        let share = (level - a) / (b - a);
+        ((a < level) != (b < level)).then(|| [0, 1].map(|i| p[i] + share * (q[i] - p[i])))
     };
-    (0..ROWS).flat_map(row).collect()
+    (0..4).filter_map(crossing).collect()
 }
 
 #[cfg(test)]
@@ -105,14 +176,28 @@ mod tests {
 
     #[test]
     fn tiles_cover_the_map_once() {
-        let tiles = tiles([1.0, 3.0], [0.0, 70.0], &|z, theta| (9.0 * z + theta / 10.0) as usize);
-        assert!(tiles.len() > ROWS && tiles.len() < ROWS * COLUMNS / 4);
+        let grid = Grid::sample([[1.0, 3.0], [0.0, 70.0]], &|z, theta| 9.0 * z + theta / 10.0);
+        let tiles = grid.tiles(&|value| value as usize);
+        assert!(tiles.len() > CELLS[1] && tiles.len() < CELLS[0] * CELLS[1] / 4);
         let area = |tile: &Layer| match tile {
             Layer::Tile(z, theta, _) => (z[1] - z[0]) * (theta[1] - theta[0]),
             _ => 0.0,
         };
         let covered: f64 = tiles.iter().map(area).sum();
         approx::assert_relative_eq!(covered, 140.0, max_relative = 1e-9);
+    }
+
+    #[test]
+    fn a_circle_is_found() {
+        let grid = Grid::sample([[-1.1, 1.1]; 2], &|x, y| x.hypot(y));
+        let pieces = grid.pieces(1.0);
+        assert!(pieces.len() > 100 && grid.pieces(5.0).is_empty());
+        for [p, q] in &pieces {
+            approx::assert_abs_diff_eq!(p[0].hypot(p[1]), 1.0, epsilon = 1e-3);
+            assert!((p[0] - q[0]).hypot(p[1] - q[1]) < 0.1);
+        }
+        let layers = grid.iso_lines(&[1.0, 5.0]);
+        assert_eq!(layers.len(), pieces.len() + 1, "one label, and none for an empty line");
     }
 
     #[test]

@@ -2,10 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::world::{Hit, Surface, TargetFrame, World};
+use super::{Hit, Surface, TargetFrame, World};
 use crate::plane::Plane;
 
-/// A flat rectangular board.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Board {
     pub width_m: f64,

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use super::moments::{Moment, Sequence};
-use crate::error::{Error, Result};
+use super::{Moment, Sequence};
+use crate::error::{Error, Result, read_text};
 use crate::frame::DepthCode;
 use crate::io::{Assumed, entries, size_of};
 use crate::trajectory::Pose;
@@ -60,15 +60,11 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
 
 /// A 4 x 4 matrix, `world_from_camera`; `None` where tracking had failed (not finite).
 fn read_pose(path: &Path) -> Result<Option<Isometry3<f64>>> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+    let text = read_text(path)?;
     let numbers: Vec<f64> = text.split_whitespace().filter_map(|w| w.parse().ok()).collect();
     if numbers.len() != 16 {
-        return Err(Error::Text {
-            path: path.to_path_buf(),
-            line: 0,
-            what: format!("{} numbers, a pose has 4 x 4", numbers.len()),
-            remedy: "restore the file, or take it out",
-        });
+        let what = format!("{} numbers, a pose has 4 x 4", numbers.len());
+        return Err(Error::text(path, 0, what, "restore the file, or take it out"));
     }
     if numbers.iter().any(|v| !v.is_finite()) {
         return Ok(None);

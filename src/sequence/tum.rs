@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use super::moments::{Moment, Sequence};
-use crate::error::{Error, Result};
-use crate::io::{Assumed, Layout, open_uncut, read_list};
+use super::{Moment, Sequence};
+use crate::error::{Error, Result, read_text};
+use crate::io::{Assumed, Layout, content_lines, open_uncut, read_list};
 use crate::trajectory::{associate, read_benchmark};
 use crate::view::FrameRef;
 
@@ -61,7 +61,14 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     remarks.extend(recording.remarks);
     let depth = recording.views.into_iter().flat_map(|v| v.depth).collect();
     let mut moments = with_colour(root, depth, &mut remarks)?;
-    remarks.extend(keep_first_of_each_stamp(&mut moments));
+    let before = moments.len();
+    moments.dedup_by(|b, a| a.stamp == b.stamp);
+    if moments.len() < before {
+        let dropped = before - moments.len();
+        remarks.push(format!(
+            "{dropped} depth images have the stamp of the one before; only the first is mapped"
+        ));
+    }
     let truth = root.join("groundtruth.txt");
     let truth = if truth.is_file() {
         read_benchmark(&truth).map(|t| t.poses).unwrap_or_else(|e| {
@@ -104,16 +111,6 @@ fn with_colour(
     Ok(depth.into_iter().zip(partner).map(moment).collect())
 }
 
-/// Of moments with one stamp the first is kept; a remark on how many were left out.
-fn keep_first_of_each_stamp(moments: &mut Vec<Moment>) -> Option<String> {
-    let before = moments.len();
-    moments.dedup_by(|b, a| a.stamp == b.stamp);
-    let dropped = before - moments.len();
-    (dropped > 0).then(|| {
-        format!("{dropped} depth images have the stamp of the one before; only the first is mapped")
-    })
-}
-
 fn nearest(
     root: &Path,
     depth: &[FrameRef],
@@ -135,23 +132,16 @@ fn nearest(
 
 /// "stamp path stamp path" lines: colour and depth in either order.
 fn listed(root: &Path, file: &Path, depth: &[FrameRef]) -> Result<Vec<Option<PathBuf>>> {
-    let text = std::fs::read_to_string(file).map_err(|e| Error::read(file, e))?;
+    let text = read_text(file)?;
     let place: HashMap<&PathBuf, usize> =
         depth.iter().enumerate().map(|(k, f)| (&f.path, k)).collect();
     let mut partner = vec![None; depth.len()];
-    for (i, line) in text.lines().enumerate() {
-        let content = line.trim();
-        if content.is_empty() || content.starts_with('#') {
-            continue;
-        }
+    for (line, content) in content_lines(&text) {
         let words: Vec<&str> = content.split_whitespace().collect();
         let [_, one, _, other] = words[..] else {
-            return Err(Error::Text {
-                path: file.to_path_buf(),
-                line: i + 1,
-                what: format!("{} words where \"stamp path stamp path\" is due", words.len()),
-                remedy: "make the file again with associate.py, or take it out",
-            });
+            let what = format!("{} words where \"stamp path stamp path\" is due", words.len());
+            let remedy = "make the file again with associate.py, or take it out";
+            return Err(Error::text(file, line, what, remedy));
         };
         let [one, other] = [one, other].map(|name| root.join(name));
         let (depth_index, colour) = match (place.get(&one), place.get(&other)) {

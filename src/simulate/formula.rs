@@ -25,12 +25,14 @@ pub struct Shooting<'a> {
     /// In light-path order.
     effects: Vec<&'a Active>,
     seen: &'a Seen,
-    ambient_lux: f64,
-    temperature_c: Option<f64>,
+    /// Of the room, lx: an office's, or what the view says.
+    pub ambient_lux: f64,
+    /// Where it is known.
+    pub temperature_c: Option<f64>,
     /// Of the undisturbed depth, m.
     sigma: Vec<f32>,
     light: Vec<f32>,
-    memory: HashMap<&'static str, Vec<f32>>,
+    pub(super) memory: HashMap<&'static str, Vec<f32>>,
     still: HashMap<&'static str, Vec<f32>>,
 }
 
@@ -61,7 +63,6 @@ impl FormulaSensor<'_> {
     }
 }
 
-/// A frame, and the light it was taken by.
 pub struct Shot {
     pub depth: Frame,
     /// Relative to a white surface at 1 m facing the sensor.
@@ -69,20 +70,6 @@ pub struct Shot {
 }
 
 impl Shooting<'_> {
-    /// In a room of this much light, lx, instead of an office's.
-    pub fn under(self, ambient_lux: f64) -> Self {
-        Shooting { ambient_lux, ..self }
-    }
-
-    /// At this temperature, degrees Celsius, where it is known.
-    pub fn at(self, temperature_c: Option<f64>) -> Self {
-        Shooting { temperature_c, ..self }
-    }
-
-    pub(super) fn into_memory(self) -> HashMap<&'static str, Vec<f32>> {
-        self.memory
-    }
-
     pub fn shoot(&mut self, instant: Instant) -> Shot {
         let FormulaSensor { sensor, rays, seed, .. } = *self.camera;
         let mut exposure = Exposure {

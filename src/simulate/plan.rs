@@ -1,18 +1,22 @@
-//! What to take: the views of a recording before the shutter opens.
+//! What to take: the views of a recording before the shutter opens, also those of a real recording
+//! again, for a simulated twin.
 
 use nalgebra::Vector3;
 use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
 
-use super::grid::{GridView, RATE_HZ};
+use super::{GridView, RATE_HZ};
 use crate::camera::{Camera, Rays};
-use crate::effects::Instant;
+use crate::effects::{Instant, ROOM_LUX};
+use crate::error::Result;
+use crate::measure::{MeasureOptions, Workbench, view_target};
+use crate::plane::{Plane, Target as Found};
 use crate::rng::Seed;
-use crate::scene::{Bench, Patch, Print, Seen, Target, WHITE};
-use crate::view::{TargetSize, ViewNotes};
+use crate::scene::{Bench, Patch, Print, Seen, Target, TargetFrame, WHITE};
+use crate::view::{Excluded, Recording, TargetSize, ViewNotes};
 
-/// One view to be taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewPlan {
     pub name: String,
@@ -27,7 +31,6 @@ pub struct ViewPlan {
 }
 
 impl ViewPlan {
-    /// What the camera's pixels see of the view.
     pub fn seen(&self, camera: &Camera, rays: &Rays) -> Seen {
         let mut seen = Seen::of(&self.bench, camera, rays);
         if let Some(mask) = &self.mask {
@@ -88,15 +91,7 @@ const ROOM_TEMPERATURE_C: f64 = 22.0;
 /// From a room with drawn curtains to a place at the window, lx.
 const AMBIENT_LUX: [f64; 2] = [100.0, 2000.0];
 
-/// The light of a view, drawn whether or not any effect looks at it. Whole lx, as a meter shows.
-fn ambient_lux(seed: Seed, view: usize) -> f64 {
-    let [dim, bright] = AMBIENT_LUX.map(f64::ln);
-    let mut rng = seed.stream(&format!("simulate/ambient/{view}"));
-    rng.random_range(dim..bright).exp().round()
-}
-
-/// The poses in random order, so that time and distance are not the same axis (`shuffled`), or in
-/// the order given.
+/// The poses as given, or `shuffled`, so that time and distance are not the same axis.
 pub fn plan_grid(
     poses: &[GridView],
     scenery: &Scenery,
@@ -113,7 +108,10 @@ pub fn plan_grid(
 
 fn view(index: usize, pose: &GridView, scenery: &Scenery, frames: usize, seed: Seed) -> ViewPlan {
     let start = index as f64 * VIEW_INTERVAL_S;
-    let ambient_lux = ambient_lux(seed, index);
+    // Drawn whether or not any effect looks at it. Whole lx, as a meter shows.
+    let [dim, bright] = AMBIENT_LUX.map(f64::ln);
+    let mut light = seed.stream(&format!("simulate/ambient/{index}"));
+    let ambient_lux = light.random_range(dim..bright).exp().round();
     let reference_distance_m = scenery
         .reference_error_m
         .and_then(|error| reference(pose.z_m, error, seed, &index.to_string()));
@@ -144,7 +142,7 @@ fn view(index: usize, pose: &GridView, scenery: &Scenery, frames: usize, seed: S
 }
 
 /// What a tape of this standard deviation, m, reads; never less than nothing.
-pub(super) fn reference(truth_m: f64, error_m: f64, seed: Seed, view: &str) -> Option<f64> {
+fn reference(truth_m: f64, error_m: f64, seed: Seed, view: &str) -> Option<f64> {
     let off: f64 = StandardNormal.sample(&mut seed.stream(&format!("simulate/reference/{view}")));
     Some(truth_m + error_m * off).filter(|d| *d > 0.0)
 }
@@ -165,4 +163,69 @@ fn clutter(z: f64, count: usize, seed: Seed, view: usize) -> Vec<Patch> {
             }
         })
         .collect()
+}
+
+/// The views of `recording`: same planes, regions, pixels, frames and timestamps. A reference
+/// distance becomes the simulated plane's own, with `reference_error_m` of noise.
+///
+/// Views without a plane are returned beside, with the reason.
+pub fn plan_like(
+    recording: &Recording,
+    reference_error_m: f64,
+    seed: Seed,
+) -> (Vec<ViewPlan>, Vec<Excluded>) {
+    let options = MeasureOptions { seed, ..MeasureOptions::default() };
+    let bench = Workbench::new(&recording.sensor, options);
+    let found: Vec<Result<Found>> =
+        recording.views.par_iter().map(|view| view_target(view, &bench)).collect();
+    let mut plans = Vec::new();
+    let mut excluded = recording.excluded.clone();
+    for (view, target) in recording.views.iter().zip(found) {
+        let Found { plane, pixels, .. } = match target {
+            Ok(target) => target,
+            Err(e) => {
+                excluded.push(Excluded::of(&view.name, &e));
+                continue;
+            }
+        };
+        let mut notes = view.notes.clone();
+        if notes.reference_distance_m.is_some() {
+            let z_m = plane.depth(0.0, 0.0);
+            notes.reference_distance_m = reference(z_m, reference_error_m, seed, &view.name);
+        }
+        let stamps = view.depth.iter().map(|f| f.timestamp).collect();
+        plans.push(plan_on(&view.name, &plane, &pixels, &bench.rays, stamps, notes));
+    }
+    (plans, excluded)
+}
+
+/// A view of these pixels of a plane.
+pub fn plan_on(
+    name: &str,
+    plane: &Plane,
+    pixels: &[u32],
+    rays: &Rays,
+    stamps: Vec<f64>,
+    notes: ViewNotes,
+) -> ViewPlan {
+    let mut mask = vec![false; rays.x.len()];
+    let mut middle = Vector3::zeros();
+    for &i in pixels {
+        mask[i as usize] = true;
+        let (x, y) = rays.at(i as usize);
+        middle += Vector3::new(x, y, 1.0) * plane.depth(x, y);
+    }
+    ViewPlan {
+        name: name.into(),
+        bench: Bench {
+            frame: TargetFrame::on(plane, middle / pixels.len() as f64),
+            // The pixels of the real target are its outline.
+            ..Bench::bare(*plane, Target::Wall)
+        },
+        mask: Some(mask),
+        // As measured; where it was not, the same in all views.
+        ambient_lux: notes.ambient_lux.unwrap_or(ROOM_LUX),
+        stamps,
+        notes,
+    }
 }

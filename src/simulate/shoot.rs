@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
+use super::GridView;
 use super::formula::{FormulaSensor, Shot};
-use super::grid::GridView;
 use super::plan::{Scenery, ViewPlan, plan_grid};
 use super::speckle::{Causes, SpeckleSensor};
 use crate::Progress;
@@ -38,19 +38,17 @@ impl Physics {
     pub(super) fn describe_formula(sigma: &SigmaModel, effects: &[Active]) -> serde_json::Value {
         serde_json::json!({
             "world": "formula",
-            "sigma": {"form": sigma.form.spec().id(), "parameters": sigma.parameters},
+            "sigma": {"form": sigma.form.id(), "parameters": sigma.parameters},
             "effects": effects.iter().map(Active::described).collect::<Vec<_>>(),
         })
     }
 }
 
-/// Views to be taken by one sensor.
 #[derive(Debug, Clone)]
 pub struct Shoot {
     pub sensor: Sensor,
     pub views: Vec<ViewPlan>,
     pub physics: Physics,
-    /// Write infrared amplitude images too.
     pub infrared: bool,
     pub seed: Seed,
 }
@@ -74,19 +72,13 @@ impl Shoot {
         }
     }
 
-    /// Write the whole recording into `root`, a view a folder. Returns the names of the views that
-    /// show no depth at all: the target is out of the picture, or beyond the depth code.
-    ///
-    /// # Errors
-    /// When the folder exists with something in it, or cannot be written.
+    /// Write the whole recording into `root`, new or empty, a view a folder. Returns the names of the
+    /// views that show no depth at all: the target is out of the picture, or beyond the depth code.
     pub fn write(&self, root: &Path, progress: Progress<'_>) -> Result<Vec<String>> {
         self.write_as(encode_png16, root, progress)
     }
 
     /// The same at the quickest compression: half the time of a speckle recording.
-    ///
-    /// # Errors
-    /// As [`Shoot::write`].
     pub fn write_quickly(&self, root: &Path, progress: Progress<'_>) -> Result<Vec<String>> {
         self.write_as(encode_png16_quickly, root, progress)
     }
@@ -152,7 +144,9 @@ impl Shoot {
         let Physics::Formula { sigma, effects } = &self.physics else { return Ok(()) };
         let seen = view.seen(&self.sensor.camera, rays);
         let camera = FormulaSensor { sensor: &self.sensor, rays, sigma, effects, seed: self.seed };
-        let mut shooting = camera.begin(&seen).under(view.ambient_lux).at(view.notes.temperature_c);
+        let mut shooting = camera.begin(&seen);
+        (shooting.ambient_lux, shooting.temperature_c) =
+            (view.ambient_lux, view.notes.temperature_c);
         for (stamp, instant) in instants {
             let shot = shooting.shoot(instant);
             let infrared = self.infrared.then(|| self.amplitude(&shot, instant));
@@ -201,7 +195,6 @@ const READ_NOISE_DN: f32 = 10.4;
 /// A 10-bit sensor of this class fills up at some 10,000 electrons.
 const ELECTRONS_PER_DN: f32 = 10.0;
 
-/// An image's file.
 type Encode = fn(&Frame) -> Result<Vec<u8>>;
 
 /// A view's folder as it fills.

@@ -18,7 +18,6 @@ pub trait LeastSquares {
 /// The best point on a solver's way.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Minimum {
-    /// The place.
     pub x: DVector<f64>,
     /// Half the sum of squares there.
     pub cost: f64,
@@ -37,11 +36,7 @@ struct Linear {
     hessian: DMatrix<f64>,
 }
 
-impl<'a, P: LeastSquares> AsArgmin<'a, P> {
-    fn new(problem: &'a P) -> Self {
-        AsArgmin { problem, last: RefCell::new(None) }
-    }
-
+impl<P: LeastSquares> AsArgmin<'_, P> {
     /// J'r and, by Gauss and Newton, J'J.
     fn linear<T>(&self, at: &DVector<f64>, take: impl Fn(&Linear) -> T) -> T {
         let mut last = self.last.borrow_mut();
@@ -103,7 +98,7 @@ pub fn trust_region<P: LeastSquares>(
     let subproblem = Steihaug::new().with_max_iters(2 * start.len() as u64 + 4);
     let solver =
         TrustRegion::new(subproblem).with_radius(radius).ok()?.with_max_radius(1e6).ok()?;
-    let run = Executor::new(AsArgmin::new(problem), solver)
+    let run = Executor::new(AsArgmin { problem, last: RefCell::new(None) }, solver)
         .configure(|state| state.param(start.clone()).max_iters(max_steps).target_cost(0.0))
         .timer(false)
         .run();

@@ -1,15 +1,12 @@
 //! Camera poses in the TUM format: `timestamp tx ty tz qx qy qz qw`, `world_from_camera`.
 
-mod associate;
-
-pub use associate::{Pair, associate};
-
 use std::fmt::Write;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, read_text};
+use crate::io::content_lines;
 
 /// Where a camera was, and when.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,7 +16,6 @@ pub struct Pose {
     pub world_from_camera: Isometry3<f64>,
 }
 
-/// The poses of a file, in time order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     pub poses: Vec<Pose>,
@@ -44,17 +40,15 @@ pub fn tum_text(poses: &[Pose]) -> String {
 
 /// Read a trajectory file; lines that begin with `#` are comments. Of lines with one time the first
 /// counts.
-///
-/// # Errors
-/// With the line, when it is not eight finite numbers, its quaternion has no length, or its time
-/// is before that of the line above; and when the file holds no pose.
+/// An error, with its line, when it is not eight finite numbers, its quaternion has no length, or
+/// its time is before that of the line above; and when the file holds no pose.
 pub fn read_trajectory(path: &Path) -> Result<Trajectory> {
     let mut read = Trajectory { poses: Vec::new(), repeated: 0 };
     each_line(path, |pose| {
         let before = read.poses.last().map_or(f64::NEG_INFINITY, |p: &Pose| p.stamp);
         if pose.stamp < before {
             let what = format!("time {} comes after {before}, which is later", pose.stamp);
-            return Err(Fault::new(what, "sort the lines by time"));
+            return Err((what, "sort the lines by time"));
         }
         if pose.stamp > before {
             read.poses.push(pose);
@@ -68,10 +62,8 @@ pub fn read_trajectory(path: &Path) -> Result<Trajectory> {
 
 /// Read a trajectory file as the scripts of the TUM benchmark do: lines in any order, and of lines
 /// with one time the last counts.
-///
-/// # Errors
-/// With the line, when it is not eight finite numbers or its quaternion has no length; and when the
-/// file holds no pose.
+/// An error, with its line, when it is not eight finite numbers or its quaternion has no length;
+/// and when the file holds no pose.
 pub fn read_benchmark(path: &Path) -> Result<Trajectory> {
     let mut poses: Vec<Pose> = Vec::new();
     each_line(path, |pose| {
@@ -88,17 +80,15 @@ pub fn read_benchmark(path: &Path) -> Result<Trajectory> {
 }
 
 fn each_line(path: &Path, mut take: impl FnMut(Pose) -> Result<(), Fault>) -> Result<()> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+    let text = read_text(path)?;
     let mut found = false;
-    for (i, line) in text.lines().enumerate() {
-        let content = line.trim_start_matches('\u{feff}').trim();
-        if content.is_empty() || content.starts_with('#') {
-            continue;
-        }
-        parse(content).and_then(&mut take).map_err(|fault| fault.at(path, i + 1))?;
+    for (line, content) in content_lines(&text) {
+        parse(content)
+            .and_then(&mut take)
+            .map_err(|(what, remedy)| Error::text(path, line, what, remedy))?;
         found = true;
     }
-    if found { Ok(()) } else { Err(Fault::new("no pose in it", REMEDY_FORMAT).at(path, 0)) }
+    if found { Ok(()) } else { Err(Error::text(path, 0, "no pose in it", REMEDY_FORMAT)) }
 }
 
 const REMEDY_FORMAT: &str = "write \"timestamp tx ty tz qx qy qz qw\", one pose a line";
@@ -106,42 +96,113 @@ const REMEDY_FORMAT: &str = "write \"timestamp tx ty tz qx qy qz qw\", one pose 
 /// Printed quaternions have three to six decimals; one shorter than this is no rotation.
 const SHORTEST_QUATERNION: f64 = 0.5;
 
-struct Fault {
-    what: String,
-    remedy: &'static str,
-}
-
-impl Fault {
-    fn new(what: impl Into<String>, remedy: &'static str) -> Self {
-        Fault { what: what.into(), remedy }
-    }
-
-    fn at(self, path: &Path, line: usize) -> Error {
-        Error::Text { path: path.to_path_buf(), line, what: self.what, remedy: self.remedy }
-    }
-}
+/// What is wrong with a line, and what to do.
+type Fault = (String, &'static str);
 
 fn parse(line: &str) -> Result<Pose, Fault> {
     let numbers = line
         .split(|c: char| c.is_whitespace() || c == ',')
         .filter(|word| !word.is_empty())
-        .map(|word| {
-            word.parse().map_err(|_| Fault::new(format!("\"{word}\" is no number"), REMEDY_FORMAT))
-        })
+        .map(|word| word.parse().map_err(|_| (format!("\"{word}\" is no number"), REMEDY_FORMAT)))
         .collect::<Result<Vec<f64>, Fault>>()?;
     let [stamp, tx, ty, tz, qx, qy, qz, qw] = numbers[..] else {
-        let what = format!("{} numbers, a pose has 8", numbers.len());
-        return Err(Fault::new(what, REMEDY_FORMAT));
+        return Err((format!("{} numbers, a pose has 8", numbers.len()), REMEDY_FORMAT));
     };
     if numbers.iter().any(|v| !v.is_finite()) {
-        return Err(Fault::new("a number is not finite", "take the line out"));
+        return Err(("a number is not finite".into(), "take the line out"));
     }
     let quaternion = Quaternion::new(qw, qx, qy, qz);
     if quaternion.norm() < SHORTEST_QUATERNION {
         let what = format!("the quaternion {qx} {qy} {qz} {qw} is no rotation");
-        return Err(Fault::new(what, "take the line out, or give qx qy qz qw of length 1"));
+        return Err((what, "take the line out, or give qx qy qz qw of length 1"));
     }
     let rotation = UnitQuaternion::from_quaternion(quaternion);
     let world_from_camera = Isometry3::from_parts(Translation3::new(tx, ty, tz), rotation);
     Ok(Pose { stamp, world_from_camera })
+}
+
+/// Indices into the two lists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Pair {
+    pub first: usize,
+    pub second: usize,
+}
+
+/// Pairs of stamps closer than `limit`, s: the nearest pair first, each stamp once, in the order of
+/// the first list. Both lists in time order.
+///
+/// ```
+/// use kinoise::trajectory::{associate, Pair};
+/// let pairs = associate(&[0.0, 0.1], &[0.011, 0.089, 0.09], 0.02);
+/// assert_eq!(pairs, [Pair { first: 0, second: 0 }, Pair { first: 1, second: 2 }]);
+/// ```
+pub fn associate(first: &[f64], second: &[f64], limit: f64) -> Vec<Pair> {
+    let mut near: Vec<(f64, Pair)> = Vec::new();
+    let mut begin = 0;
+    for (i, &a) in first.iter().enumerate() {
+        // Inclusive here; what the subtraction below makes of the edges decides.
+        while begin < second.len() && second[begin] < a - limit {
+            begin += 1;
+        }
+        let within = second[begin..].iter().take_while(|&&b| b <= a + limit).count();
+        for (k, &b) in second[begin..begin + within].iter().enumerate() {
+            let apart = (a - b).abs();
+            if apart < limit {
+                near.push((apart, Pair { first: i, second: begin + k }));
+            }
+        }
+    }
+    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let (mut used, mut taken) = (vec![false; first.len()], vec![false; second.len()]);
+    let mut pairs: Vec<Pair> = near
+        .into_iter()
+        .filter_map(|(_, pair)| {
+            let free = !used[pair.first] && !taken[pair.second];
+            used[pair.first] |= free;
+            taken[pair.second] |= free;
+            free.then_some(pair)
+        })
+        .collect();
+    pairs.sort();
+    pairs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// The script's own double loop.
+    fn by_the_book(first: &[f64], second: &[f64], limit: f64) -> Vec<Pair> {
+        let mut all = Vec::new();
+        for (i, a) in first.iter().enumerate() {
+            for (j, b) in second.iter().enumerate() {
+                if (a - b).abs() < limit {
+                    all.push(((a - b).abs(), Pair { first: i, second: j }));
+                }
+            }
+        }
+        all.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        let mut pairs: Vec<Pair> = Vec::new();
+        for (_, p) in all {
+            if pairs.iter().all(|q| q.first != p.first && q.second != p.second) {
+                pairs.push(p);
+            }
+        }
+        pairs.sort();
+        pairs
+    }
+
+    proptest! {
+        #[test]
+        fn as_the_script_does(
+            mut a in prop::collection::vec(0.0f64..1.0, 0..40),
+            mut b in prop::collection::vec(0.0f64..1.0, 0..40),
+            limit in 0.0f64..0.2,
+        ) {
+            a.sort_by(f64::total_cmp);
+            b.sort_by(f64::total_cmp);
+            prop_assert_eq!(associate(&a, &b, limit), by_the_book(&a, &b, limit));
+        }
+    }
 }

@@ -611,7 +611,7 @@ fn frames_out_of_order_are_sorted() {
     bench.edit("0006/depth.txt", |t| {
         let mut lines: Vec<&str> = t.lines().collect();
         lines.reverse();
-        lines.join("\n") + "\n"
+        lines.join("\n\n").replace(' ', "\t") + "\n"
     });
     told(bench.calibrate(), "out of order");
     let files = |bench: &Bench| {
@@ -737,8 +737,9 @@ fn a_good_table() {
 fn tables_with_a_bad_cell() {
     for (row, says) in [
         ("1e300,0,0.01", "z_m = 1e300"),
-        ("1500,0,0.01", "millimetres"),
-        ("2,0,1e300", "sigma_m = 1e300"),
+        ("1500,0,0.01", "z_m = 1500 is farther than any"),
+        ("-1e300,0,0.003", "z_m = -1e300 must be positive"),
+        ("2,0,1e300", "sigma_m = 1e300 is no depth noise"),
         ("nan,0,0.01", "z_m"),
         ("inf,0,0.01", "z_m"),
         ("-2,0,0.01", "z_m"),
@@ -750,7 +751,7 @@ fn tables_with_a_bad_cell() {
         ("2,0,NaN", "sigma_m"),
         ("2,0,", "sigma_m"),
         ("2,0,six", "sigma_m"),
-        ("2,0", "line 6"),
+        ("2,0", "2 cells, the header has 3"),
         ("2;0;0.01", "line 6"),
     ] {
         let run = Bench::empty().fit(&format!("{GOOD_TABLE}{row}\n"));
@@ -766,6 +767,7 @@ fn tables_that_are_no_tables() {
         ("z_m,sigma_m\n1,0.002\n", "theta_rad"),
         ("z,theta,sigma\n1,0,0.002\n", "z_m"),
         ("z_m,theta_rad,sigma_m\n", "too few"),
+        ("z_m,theta_rad,sigma_m,n\n1,0,0.002,5\n1,0,0.002,\n", "missing in others"),
         ("z_m,theta_rad,sigma_m\n1,0,0.0019\n2,0,0.006\n", "too few"),
         ("z_m,theta_rad,sigma_m\n2,0,0.006\n2,0,0.006\n2,0,0.006\n2,0.5,0.006\n", "distance"),
         ("{\"format\": \"kinoise-model/1\"}", "z_m"),

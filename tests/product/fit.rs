@@ -227,11 +227,8 @@ fn where_the_form_asked_for_cannot_be_fitted_another_one_is() {
     let shots = crate::common::shots(crate::common::grid(&[1.0, 2.0], &[0.0]), 2, 3);
     shots.write(folder.path(), &|_, _| ()).unwrap();
     let recording = kinoise::io::open(folder.path(), &kinoise::io::Assumed::default()).unwrap();
-    let options = kinoise::CalibrateOptions { form: Some(Form::Paper), ..Default::default() };
-    let measured = kinoise::measure_recording(&recording, &options.measure, &|_, _| ()).unwrap();
-    assert!(kinoise::model_of(&recording, &measured, &options).is_err());
-    let model =
-        kinoise::calibrate::model_of_any_form(&recording, &measured, &options).unwrap().model;
+    let seed = kinoise::Seed(1);
+    let model = kinoise::calibrate::paper_model(&recording, seed, None, &|_, _| ()).unwrap();
     assert_eq!(model.sigma.form, Form::Disparity);
     assert!(model.fit.remarks[0].contains("paper"), "{:?}", model.fit.remarks);
     let ratio = model.sigma.sigma(2.0, 0.0) / kinoise::SigmaModel::paper().sigma(2.0, 0.0);

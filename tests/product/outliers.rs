@@ -138,5 +138,5 @@ fn a_third_of_the_rows_is_no_outlier() {
     let fitted = fit(&table, Form::Paper).unwrap();
     assert!(fitted.left_out.is_empty());
     let words = fitted.remarks.join("\n");
-    assert!(fitted.poor && words.contains("the fit is poor"), "{words}");
+    assert!(fitted.quality.is_poor() && words.contains("the fit is poor"), "{words}");
 }

@@ -34,7 +34,7 @@ fn clean_sets_match() {
     assert!(alarms.len() <= 4, "{alarms:#?}");
 }
 
-/// One set of each effect of effects.md: the right name first for 24 of 29.
+/// One set of each effect of the catalogue: the right name first for 24 of 29.
 #[test]
 fn every_effect_by_its_name() {
     let mut wrong = Vec::new();

@@ -9,8 +9,8 @@ use kinoise::{NoiseModel, Seed};
 use serde_json::{Value, json};
 
 use crate::rays::{edit, repaint};
-use crate::raytraced::question::{Asked, Cell, Sealed, World};
-use crate::raytraced::seal;
+use crate::raytraced::conceal;
+use crate::raytraced::question::{Asked, Cell, ConcealedSet, World};
 
 fn asked(cell: Cell, name: &str, nats: Option<f64>, seed: u64) -> Asked {
     let names = if name.is_empty() { Vec::new() } else { vec![name.to_string()] };
@@ -29,15 +29,15 @@ fn said(folder: &Path, ablation: Ablation) -> Value {
 /// A set, and what is concealed in it.
 struct Taken {
     folder: tempfile::TempDir,
-    sealed: Box<dyn Sealed>,
+    set: Box<dyn ConcealedSet>,
 }
 
 impl Taken {
     fn of(asked: &Asked) -> Self {
         let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder");
-        let sealed = seal(asked).expect("a set");
-        sealed.write(folder.path()).expect("written");
-        Taken { folder, sealed }
+        let set = conceal(asked).expect("a set");
+        set.write(folder.path()).expect("written");
+        Taken { folder, set }
     }
 }
 
@@ -51,7 +51,7 @@ fn alarms(sets: &[Taken], ablation: Ablation) -> usize {
 /// Clean sets whose noise hangs together over seven pixels or more, as the model knows.
 fn correlated() -> Vec<Taken> {
     let wide = |asked: &Asked| {
-        let base = seal(asked).expect("a set").truth().base;
+        let base = conceal(asked).expect("a set").truth().base;
         base["known"][0]["parameters"]["length_px"].as_f64().is_some_and(|px| px > 6.5)
     };
     let sets = (1..).map(|seed| asked(Cell::Null, "", None, seed)).filter(wide);
@@ -83,7 +83,7 @@ fn with_fixed_formulas_more_is_said_that_is_not_there() {
     let total = |ablation| {
         let of = |(name, set): &(&str, Taken)| {
             let said = said(set.folder.path(), ablation);
-            let form = &set.sealed.truth().hidden[0].form;
+            let form = &set.set.truth().hidden[0].form;
             println!("{ablation:?}: {name} as {form}: {}", summary(&said));
             strays(&said, name)
         };

@@ -1,5 +1,6 @@
 //! Hashes that bind everybody: of what the solver gets, of the answers, of what was said.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -62,44 +63,22 @@ pub struct VerdictHash {
 
 /// SHA-256 of compact JSON with sorted keys.
 pub fn hash_json(value: &impl Serialize) -> String {
-    let value = serde_json::to_value(value).unwrap_or(Value::Null);
-    sha256_hex(canonical(&value).as_bytes())
+    let mut value = serde_json::to_value(value).unwrap_or(Value::Null);
+    value.sort_all_objects();
+    sha256_hex(value.to_string().as_bytes())
 }
 
-pub fn hash_seed(seed: u64) -> String {
-    sha256_hex(&seed.to_le_bytes())
-}
-
-fn canonical(value: &Value) -> String {
-    match value {
-        Value::Object(map) => {
-            let mut entries: Vec<(&String, &Value)> = map.iter().collect();
-            entries.sort_by_key(|e| e.0);
-            let inside = entries
-                .into_iter()
-                .map(|(k, v)| format!("{}:{}", Value::String(k.clone()), canonical(v)));
-            format!("{{{}}}", inside.collect::<Vec<_>>().join(","))
-        }
-        Value::Array(list) => {
-            format!("[{}]", list.iter().map(canonical).collect::<Vec<_>>().join(","))
-        }
-        other => other.to_string(),
-    }
+pub fn hash_file(path: &Path) -> Result<String> {
+    Ok(sha256_hex(&fs::read(path).map_err(|e| Error::read(path, e))?))
 }
 
 /// SHA-256 over all files below `root` in the order of their paths: for each the path with '/', a
 /// zero byte, its length as eight bytes, least first, and its bytes.
 pub fn hash_folder(root: &Path) -> Result<String> {
-    let mut files = Vec::new();
-    list(root, &mut files)?;
-    let name = |file: &PathBuf| {
-        let parts = file.strip_prefix(root).unwrap_or(file).components();
-        parts.map(|p| p.as_os_str().to_string_lossy().into_owned()).collect::<Vec<_>>().join("/")
-    };
-    let mut named: Vec<(String, PathBuf)> = files.into_iter().map(|f| (name(&f), f)).collect();
-    named.sort();
+    let mut files = BTreeMap::new();
+    list(root, "", &mut files)?;
     let mut hash = Sha256::new();
-    for (name, file) in named {
+    for (name, file) in files {
         let bytes = fs::read(&file).map_err(|e| Error::read(&file, e))?;
         hash.update(name.as_bytes());
         hash.update([0]);
@@ -109,10 +88,16 @@ pub fn hash_folder(root: &Path) -> Result<String> {
     Ok(hex(&hash.finalize()))
 }
 
-fn list(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
+fn list(folder: &Path, above: &str, files: &mut BTreeMap<String, PathBuf>) -> Result<()> {
     for entry in fs::read_dir(folder).map_err(|e| Error::read(folder, e))? {
-        let path = entry.map_err(|e| Error::read(folder, e))?.path();
-        if path.is_dir() { list(&path, files)? } else { files.push(path) }
+        let entry = entry.map_err(|e| Error::read(folder, e))?;
+        let (name, path) = (entry.file_name(), entry.path());
+        let name = format!("{above}{}", name.to_string_lossy());
+        if path.is_dir() {
+            list(&path, &format!("{name}/"), files)?;
+        } else {
+            files.insert(name, path);
+        }
     }
     Ok(())
 }
@@ -122,7 +107,7 @@ const REMEDY: &str = "give the folder of a trial made by this version";
 /// What a JSON file holds, and the hash of its bytes.
 pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<(T, String)> {
     let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
-    let value = serde_json::from_slice(&bytes).map_err(|e| Error::Json {
+    let value = serde_json::from_slice(&bytes).map_err(|e| Error::Text {
         path: path.to_path_buf(),
         line: e.line(),
         what: e.to_string(),
@@ -144,9 +129,8 @@ mod tests {
     #[test]
     fn the_hash_of_json_does_not_depend_on_the_order_of_keys() {
         let a = json!({"b": [1.5, null, "x\"y"], "a": {"d": 1e-7, "c": true}});
-        let b = json!({"a": {"c": true, "d": 1e-7}, "b": [1.5, null, "x\"y"]});
-        assert_eq!(hash_json(&a), hash_json(&b));
-        assert_eq!(canonical(&a), r#"{"a":{"c":true,"d":1e-7},"b":[1.5,null,"x\"y"]}"#);
+        let text = r#"{"a":{"c":true,"d":1e-7},"b":[1.5,null,"x\"y"]}"#;
+        assert_eq!(hash_json(&a), sha256_hex(text.as_bytes()));
     }
 
     #[test]

@@ -12,15 +12,48 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::least_squares::NormalEquations;
 use kinoise::error::{Error, Result};
 use kinoise::model::NoiseModel;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::baselines::{Clams, GaussianProcess, Tiles};
+use crate::baselines::{METHODS, Tiles};
 use crate::predictor::ModelPredictor;
-use crate::raytraced::question::{ExamView, Predictor};
+use crate::raytraced::geometry::least_squares;
+use crate::raytraced::question::ExamView;
+
+/// What somebody learnt from a recording, put to use on a view they never saw. Who learnt nothing
+/// believes the model file.
+pub trait Predictor {
+    /// Take the predicted bias out of `depth` (m, NaN where there is none).
+    fn correct(&self, _view: &ExamView, _depth: &mut [f32]) -> Result<()> {
+        Ok(())
+    }
+
+    /// Predicted standard deviation of one frame's noise at `depth`, m.
+    fn sigma(&self, view: &ExamView, _depth: &[f32]) -> Vec<f32> {
+        view.sigma_plain.clone()
+    }
+}
+
+/// Who believes the model file.
+struct Unaware;
+
+impl Predictor for Unaware {}
+
+/// Who knows the truth: exact bias, exact noise.
+struct Oracle;
+
+impl Predictor for Oracle {
+    fn correct(&self, view: &ExamView, depth: &mut [f32]) -> Result<()> {
+        depth.copy_from_slice(&view.plain);
+        Ok(())
+    }
+
+    fn sigma(&self, view: &ExamView, _depth: &[f32]) -> Vec<f32> {
+        view.sigma.clone()
+    }
+}
 
 /// Expected log score beyond that of the model file alone, nats per 1000 pixels, mean over the
 /// views. Zero where there is no such view.
@@ -42,58 +75,24 @@ pub struct Gains {
 /// Under this name the diagnosis itself stands among the methods.
 pub const OUR_METHOD: &str = "kinoise";
 
-/// Weigh the model that was `found` from the set in `folder` (`recording/` beside `model.json` or
-/// `simulated/`) on fresh views, with the baselines on the same recording when asked for.
+/// Weigh the model that was `found` from the set in `folder` (`recording/` beside `model.json`) on
+/// fresh views, at least one, with the baselines on the same recording when asked for.
 pub fn examine(
     views: &[ExamView],
     folder: &Path,
     found: &NoiseModel,
     baselines: bool,
-) -> Result<Option<Gains>> {
-    let Some(first) = views.first() else { return Ok(None) };
-    let file = folder.join("model.json");
-    let given = file.exists().then(|| NoiseModel::read(&file)).transpose()?;
-    let mut gains = Gains { oracle: gain_of(views, &Oracle)?, ..Gains::default() };
-    let ours = ModelPredictor::beyond(given.as_ref(), found, &first.sensor)?;
-    gains.methods.insert(OUR_METHOD.into(), gain_of(views, &ours)?);
+) -> Result<Gains> {
+    let given = NoiseModel::read(&folder.join("model.json"))?;
+    let ours = ModelPredictor::beyond(&given, found, &views[0].sensor)?;
+    let mut methods = BTreeMap::from([(OUR_METHOD.to_string(), gain_of(views, &ours)?)]);
     if baselines {
-        let tiles = Tiles::of_folder(folder, given.as_ref().unwrap_or(found))?;
-        let learnt: [(&str, Box<dyn Predictor>); 2] = [
-            ("clams-grid", Box::new(Clams::fit(&tiles))),
-            ("gaussian-process", Box::new(GaussianProcess::fit(&tiles))),
-        ];
-        for (name, predictor) in learnt {
-            gains.methods.insert(name.into(), gain_of(views, predictor.as_ref())?);
+        let tiles = Tiles::of_folder(folder, &given)?;
+        for (name, fit) in METHODS {
+            methods.insert(name.into(), gain_of(views, &fit(&tiles))?);
         }
     }
-    Ok(Some(gains))
-}
-
-/// Who knows the truth: exact bias, exact noise.
-struct Oracle;
-
-/// Who believes the model file.
-struct Unaware;
-
-impl Predictor for Oracle {
-    fn correct(&self, view: &ExamView, depth: &mut [f32]) -> Result<()> {
-        depth.copy_from_slice(&view.plain);
-        Ok(())
-    }
-
-    fn sigma(&self, view: &ExamView, _depth: &[f32]) -> Vec<f32> {
-        view.sigma.clone()
-    }
-}
-
-impl Predictor for Unaware {
-    fn correct(&self, _view: &ExamView, _depth: &mut [f32]) -> Result<()> {
-        Ok(())
-    }
-
-    fn sigma(&self, view: &ExamView, _depth: &[f32]) -> Vec<f32> {
-        view.sigma_plain.clone()
-    }
+    Ok(Gains { oracle: gain_of(views, &Oracle)?, methods })
 }
 
 /// Per 1000 pixels.
@@ -104,7 +103,7 @@ const MIN_SIGMA_M: f64 = 1e-6;
 const MIN_PIXELS: usize = 12;
 
 /// Gain of a prediction over the model file alone.
-pub fn gain_of(views: &[ExamView], predictor: &dyn Predictor) -> Result<Gain> {
+fn gain_of(views: &[ExamView], predictor: &dyn Predictor) -> Result<Gain> {
     let mut sums = [(0.0, 0.0); 2];
     for view in views {
         let Some(plain) = score(view, &Unaware)? else { continue };
@@ -130,8 +129,8 @@ struct Scored {
 
 /// Mean over the pixels of the target, nats; `None` where there are too few for a plane.
 ///
-/// Where the model file alone leaves an error on the plane (one it knows of, or one of the matcher
-/// that its simulation has as well), everybody knows it: errors are counted from `plain`.
+/// Where the model file alone leaves an error on the plane, one that it knows of, everybody knows
+/// it: errors are counted from `plain`.
 fn score(view: &ExamView, predictor: &dyn Predictor) -> Result<Option<f64>> {
     let pixels = pixels(view, predictor)?;
     if pixels.len() < MIN_PIXELS {
@@ -139,13 +138,9 @@ fn score(view: &ExamView, predictor: &dyn Predictor) -> Result<Option<f64>> {
     }
     // What the user's plane takes of the error: affine in inverse depth, weighed by the predicted
     // variance; an error of depth by s is one of inverse depth by s / z^2.
-    let mut sums = NormalEquations::default();
-    for p in &pixels {
-        sums.add(&p.ray, p.error, (p.z * p.z / p.predicted).powi(2));
-    }
-    let Some(q) = sums.solve().filter(|q| q.iter().all(|v| v.is_finite())) else {
-        return Ok(None);
-    };
+    let row = |p: &Scored| (p.ray, p.error, (p.z * p.z / p.predicted).powi(2));
+    let plane = least_squares(pixels.iter().map(row));
+    let Some(q) = plane.filter(|q| q.iter().all(|v| v.is_finite())) else { return Ok(None) };
     let expected = |p: &Scored| {
         let e = (p.error - q.dot(&p.ray)) * p.z * p.z;
         -0.5 * (e * e + p.sigma * p.sigma) / (p.predicted * p.predicted) - p.predicted.ln()

@@ -6,7 +6,6 @@
 //! diagnosis, the verdicts before the first answer is opened; a process that can reach one set and
 //! nothing else diagnoses it; endpoints are chosen before; every failure is on the page.
 
-#[allow(dead_code)] // the product's tests use a part of it too
 #[path = "../common/raytraced/mod.rs"]
 mod raytraced;
 
@@ -15,8 +14,6 @@ mod check;
 mod commitment;
 mod gain;
 mod judge;
-mod least_squares;
-
 mod make;
 mod page;
 mod plan;
@@ -30,10 +27,9 @@ mod speckle;
 mod tests;
 mod trial;
 
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Mutex;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
@@ -112,13 +108,10 @@ fn main() -> ExitCode {
         Some(Command::Solve) => solver::diagnose_shut_in(),
         None => run(&line.trial),
     };
-    match done {
-        Ok(code) => ExitCode::from(code),
-        Err(e) => {
-            eprintln!("prove: {e:#}");
-            ExitCode::from(FAILURE)
-        }
-    }
+    ExitCode::from(done.unwrap_or_else(|e| {
+        eprintln!("prove: {e:#}");
+        FAILURE
+    }))
 }
 
 fn run(arguments: &Arguments) -> anyhow::Result<u8> {
@@ -131,7 +124,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let program = std::env::current_exe().context("where this program lies")?;
     match (&arguments.check, &arguments.page, &arguments.output) {
         (Some(folder), _, _) => check_again(folder, program, arguments),
-        (None, Some(folder), _) => page_of(folder, &Proof::read(folder)?.0).map(|()| 0),
+        (None, Some(folder), _) => page_of(folder, &Proof::read(folder)?).map(|()| 0),
         (None, None, Some(output)) => hold_trial(output, program, arguments).map(|()| 0),
         (None, None, None) => bail!("no folder was given; say -o DIR, --check DIR or --page DIR"),
     }
@@ -156,9 +149,7 @@ fn hold_trial(output: &Path, program: PathBuf, arguments: &Arguments) -> anyhow:
         program,
         limit: Duration::from_secs(arguments.limit),
     };
-    let bars = Bars::default();
-    let proof = hold(&trial, &|what, done, all| bars.step(what, done, all))?;
-    drop(bars);
+    let proof = hold(&trial, &bar()?)?;
     print_json(arguments, &proof.scores)?;
     eprintln!("{}", page::summary(&proof));
     page_of(&trial.output, &proof)
@@ -166,14 +157,15 @@ fn hold_trial(output: &Path, program: PathBuf, arguments: &Arguments) -> anyhow:
 
 fn check_again(folder: &Path, program: PathBuf, arguments: &Arguments) -> anyhow::Result<u8> {
     let options = CheckOptions { data: arguments.data.clone(), all: arguments.all, program };
-    let bars = Bars::default();
-    let checked = check(folder, &options, &|what, done, all| bars.step(what, done, all))?;
-    drop(bars);
+    let checked = check(folder, &options, &bar()?)?;
     print_json(arguments, &checked)?;
-    for (what, lines) in [("checked", &checked.checked), ("note", &checked.remarks)] {
+    for (what, lines) in [
+        ("checked", &checked.checked),
+        ("note", &checked.remarks),
+        ("DOES NOT HOLD", &checked.faults),
+    ] {
         lines.iter().for_each(|line| eprintln!("{what}: {line}"));
     }
-    checked.faults.iter().for_each(|fault| eprintln!("DOES NOT HOLD: {fault}"));
     if checked.faults.is_empty() {
         eprintln!("the trial holds");
         return Ok(0);
@@ -191,24 +183,15 @@ fn print_json(arguments: &Arguments, value: &impl serde::Serialize) -> anyhow::R
 }
 
 /// One bar after the other on a terminal, nothing elsewhere.
-#[derive(Default)]
-struct Bars(Mutex<Option<(&'static str, ProgressBar)>>);
-
-impl Bars {
-    fn step(&self, what: &'static str, done: usize, all: usize) {
-        let Ok(mut shown) = self.0.lock() else { return };
-        if shown.as_ref().is_none_or(|(now, _)| *now != what) {
-            let hidden = !std::io::stderr().is_terminal();
-            let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(0) };
-            if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {eta}") {
-                bar.set_style(style);
-            }
+fn bar() -> anyhow::Result<impl Fn(&'static str, usize, usize) + Sync> {
+    let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {eta}")?;
+    let bar = ProgressBar::new(0).with_style(style);
+    Ok(move |what, done: usize, all: usize| {
+        if done == 0 {
+            bar.reset();
             bar.set_message(what);
-            *shown = Some((what, bar));
         }
-        if let Some((_, bar)) = shown.as_ref() {
-            bar.set_length(all as u64);
-            bar.set_position(done as u64);
-        }
-    }
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    })
 }

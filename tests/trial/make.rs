@@ -51,62 +51,47 @@ fn cell(text: &str) -> Result<Cell, String> {
     serde_json::from_value(text.into()).map_err(|_| format!("no cell is called \"{text}\""))
 }
 
-impl Arguments {
-    fn asked(&self, world: World, effects: &[String], seed: u64) -> Asked {
-        let Arguments { cell, nats, small, .. } = *self;
-        Asked { world, cell, names: effects.to_vec(), nats, seed, small }
-    }
-
-    /// Into `OUT/<name>/`, and its truth where the others have theirs. What was made.
-    fn speckle(&self, effects: &[String], seed: u64) -> anyhow::Result<String> {
-        let asked = self.asked(World::Light, effects, seed);
+/// Into `OUT/<name>/`, `OUT/truth/` and, where there is one, `OUT/model/`. What was made.
+fn make(a: &Arguments, names: Vec<String>, seed: u64) -> anyhow::Result<String> {
+    let Arguments { cell, nats, strength, views, frames, small, .. } = *a;
+    let world = if a.light { World::Light } else { World::Rays };
+    let asked = Asked { world, cell, names, nats, seed, small };
+    if a.light {
         let name = &sha256_hex(format!("{asked:?}").as_bytes())[..10];
         let set = speckle::conceal(&asked)?;
-        set.write(&self.out.join(name))?;
-        let folder = self.out.join("truth");
+        set.write(&a.out.join(name))?;
+        let (folder, truth) = (a.out.join("truth"), set.truth());
         std::fs::create_dir_all(&folder)?;
-        let truth = set.truth();
         std::fs::write(folder.join(format!("{name}.json")), serde_json::to_vec_pretty(&truth)?)?;
         let causes: Vec<&str> = truth.hidden.iter().map(|h| h.form.as_str()).collect();
-        Ok(format!("{name} {} {:?}", causes.join("+"), asked.nats))
+        return Ok(format!("{name} {} {nats:?}", causes.join("+")));
     }
-
-    /// Into `OUT/<name>/`, `OUT/model/` and `OUT/truth/`. What was made.
-    fn raytraced(&self, effects: &[String], seed: u64) -> anyhow::Result<String> {
-        let Arguments { cell, strength, views, frames, small, .. } = *self;
-        let set = if self.nats.is_some() || self.sealed {
-            Set::asked(&self.asked(World::Rays, effects, seed), views, frames)?
-        } else {
-            let effects = effects.to_vec();
-            Set::draw(Order { cell, effects, strength, seed, views, frames, small })?
-        };
-        write(&set, &self.out).with_context(|| set.name.clone())?;
-        let forms: Vec<&str> = set.causes.iter().map(|c| c.label.form.as_str()).collect();
-        let worth: Vec<String> = set
-            .concealed
-            .iter()
-            .map(|c| format!("{:.4}:{:.1}", c.strength, c.nats.unwrap_or(f64::NAN)))
-            .collect();
-        Ok(format!("{} {} {}", set.name, forms.join("+"), worth.join("+")))
-    }
+    let set = if nats.is_some() || a.sealed {
+        Set::asked(&asked, views, frames)?
+    } else {
+        Set::draw(Order { cell, effects: asked.names, strength, seed, views, frames, small })?
+    };
+    write(&set, &a.out).with_context(|| set.name.clone())?;
+    let forms: Vec<&str> = set.causes.iter().map(|c| c.label.form.as_str()).collect();
+    let worth = set.concealed.iter();
+    let worth = worth.map(|c| format!("{:.4}:{:.1}", c.strength, c.nats.unwrap_or(f64::NAN)));
+    Ok(format!("{} {} {}", set.name, forms.join("+"), worth.collect::<Vec<_>>().join("+")))
 }
 
 pub fn run(a: &Arguments) -> anyhow::Result<()> {
-    let causes: Vec<&str> = speckle::known().collect();
-    let list: &[&str] = match a.cell {
-        _ if a.light => &causes,
-        Cell::Outside => &OUTSIDE,
-        _ => &CATALOGUE,
+    let list: Vec<&str> = match a.cell {
+        _ if a.light => speckle::known().collect(),
+        Cell::Outside => OUTSIDE.to_vec(),
+        _ => CATALOGUE.to_vec(),
     };
     let every: Vec<Vec<String>> = match a.effect == ["all"] {
-        true => list.iter().map(|id| vec![(*id).to_string()]).collect(),
+        true => list.into_iter().map(|id| vec![id.to_string()]).collect(),
         false => vec![a.effect.clone()],
     };
     for effects in every {
         for seed in a.seed..a.seed + a.count {
             let begin = Instant::now();
-            let made =
-                if a.light { a.speckle(&effects, seed)? } else { a.raytraced(&effects, seed)? };
+            let made = make(a, effects.clone(), seed)?;
             println!("{made} {:.2} s", begin.elapsed().as_secs_f64());
         }
     }

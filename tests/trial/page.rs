@@ -1,12 +1,12 @@
-//! The page of a trial, for somebody who does not believe it: what may be relied on, the marks, the
-//! power, every failure, and how to check all of it. And the same in a few lines for the terminal.
+//! The page of a trial, for somebody who does not believe it: the marks, the power, every
+//! failure, and how to check all of it. And the same in a few lines for the terminal.
 
 use std::fmt::Write as _;
 
-use kinoise::report::document::document;
+use kinoise::report::document::{document, facts, table};
 use maud::{Markup, html};
 
-use crate::judge::{Endpoint, Level, QUESTIONS, Rate, Rates, level, word};
+use crate::judge::{ByStrength, Endpoint, Level, QUESTIONS, Rate, Ratio, level, word};
 use crate::proof::{Proof, ProvenSet};
 
 /// The questions of the table by kind: the mark, its head.
@@ -33,25 +33,24 @@ pub fn summary(proof: &Proof) -> String {
     for (kind, rates) in &scores.by_kind {
         let _ = write!(text, "\n{kind:<22}");
         for (mark, _) in COLUMNS {
-            let cell = rates.get(mark).map_or(String::new(), |r| format!("{}/{}", r.k, r.n));
-            let _ = write!(text, "{cell:>13}");
+            let _ = write!(text, "{:>13}", count(rates.get(mark)));
         }
     }
     for e in &scores.endpoints {
-        let _ = write!(text, "\n{:<16} {:>6} of {:<4} {}", e.id, figure(e), e.n, reached(e));
+        let _ = write!(text, "\n{:<16} {:>6} of {:<4} {}", e.id, number(e.value), e.n, reached(e));
     }
     text
 }
 
 /// The page as text: one self-contained file, no scripts.
 pub fn page(proof: &Proof) -> String {
+    let scores = &proof.scores;
     let body = html! {
         header { h1 { "A blind trial of kinoise diagnose" } }
-        (reliance(proof))
         (endpoints(proof))
-        (power("What is seen, by kind and strength", &proof.scores.by_strength, "detected"))
-        (power("What is seen, by cause and strength", &proof.scores.by_effect, "detected"))
-        (power("Right name first, of those seen", &proof.scores.by_effect, "first_name"))
+        (power("What is seen, by kind and strength", &scores.by_strength, "detected"))
+        (power("What is seen, by cause and strength", &scores.by_effect, "detected"))
+        (power("Right name first, of those seen", &scores.by_effect, "first_name"))
         (kinds(proof))
         (certainty(proof))
         (gains(proof))
@@ -62,23 +61,32 @@ pub fn page(proof: &Proof) -> String {
     document("A blind trial of kinoise diagnose", None, &body).into_string()
 }
 
-fn percent(x: f64) -> String {
-    format!("{:.0} %", 100.0 * x)
+fn section(title: &str, content: &Markup) -> Markup {
+    html! { section { h2 { (title) } (content) } }
 }
 
-fn share(rate: Option<&Rate>) -> Markup {
-    html! { @match rate {
-        Some(r) => { (r.k) " of " (r.n) " (" (percent(r.interval[0])) " to " (percent(r.interval[1])) ")" },
-        None => "not asked",
-    } }
+fn percent(x: f64) -> String {
+    format!("{:.0} %", 100.0 * x)
 }
 
 fn number(x: Option<f64>) -> String {
     x.map_or("-".into(), |x| format!("{x:.2}"))
 }
 
-fn figure(e: &Endpoint) -> String {
-    number(e.value)
+fn count(rate: Option<&Rate>) -> String {
+    rate.map_or(String::new(), |r| format!("{}/{}", r.k, r.n))
+}
+
+fn share(rate: Option<&Rate>) -> String {
+    rate.map_or("not asked".into(), |r| {
+        let [low, high] = r.interval.map(percent);
+        format!("{} of {} ({low} to {high})", r.k, r.n)
+    })
+}
+
+/// Cells of plain text.
+fn row(cells: impl IntoIterator<Item = String>) -> Vec<Markup> {
+    cells.into_iter().map(|cell| html! { (cell) }).collect()
 }
 
 fn reached(e: &Endpoint) -> &'static str {
@@ -89,196 +97,146 @@ fn reached(e: &Endpoint) -> &'static str {
     }
 }
 
-/// All sets' answers to one question, over the kinds that pass.
-fn pooled(proof: &Proof, question: &str, of: impl Fn(&ProvenSet) -> bool) -> Option<Rate> {
-    let sets = proof.sets.iter().filter(|s| of(s));
-    Rate::of(sets.filter_map(|s| s.marks.answers.get(question).copied()))
-}
-
-fn reliance(proof: &Proof) -> Markup {
-    let any = |_: &ProvenSet| true;
-    let strong = |s: &ProvenSet| level(&s.truth).is_some_and(|n| n >= 500.0);
-    let weak = |s: &ProvenSet| level(&s.truth).is_some_and(|n| n <= 15.0);
-    html! {
-        section {
-            h2 { "What a user may rely on, and what not" }
-            p { (proof.sets.len()) " recordings whose left-out physics was concealed; shares with their 95 % intervals." }
-            ul {
-                li { "A clean recording is called a mismatch in " (share(pooled(proof, "false_alarm", any).as_ref())) "." }
-                li { "A cause worth 500 nats or more over the recording is seen in " (share(pooled(proof, "detected", strong).as_ref()))
-                    "; its name comes first in " (share(pooled(proof, "first_name", strong).as_ref())) " of those." }
-                li { "A cause worth 15 nats or less is seen in " (share(pooled(proof, "detected", weak).as_ref())) "." }
-                li { "What the catalogue lacks is called unexplained, in the right place, in "
-                    (share(pooled(proof, "abstained", any).as_ref())) "." }
-                li { "A wrong name is stated with 90 % or more in " (share(pooled(proof, "confident_wrong", any).as_ref())) "." }
-                li { "A stated 90 % interval of a parameter holds the truth in " (share(proof.scores.coverage.as_ref())) "." }
-            }
-        }
-    }
-}
-
 fn endpoints(proof: &Proof) -> Markup {
-    html! {
-        section {
-            h2 { "The five endpoints, chosen beforehand" }
-            div.wide { table {
-                thead { tr { th { "endpoint" } th.n { "figure" } th.n { "95 %" } th.n { "of" } th { "reached" }
-                    th.n { "p, good" } th { "in words" } } }
-                tbody { @for e in &proof.scores.endpoints { tr {
-                    th { (e.id) } td.n { (figure(e)) }
-                    td.n { @if let Some([low, high]) = e.interval { (format!("{low:.2} to {high:.2}")) } }
-                    td.n { (e.n) } td { (reached(e)) } td.n { (format!("{:.3}", e.p_adjusted[0])) }
-                    td.words { (e.words) }
-                } } }
-            } }
-        }
-    }
+    let heads = ["endpoint", ">figure", ">95 %", ">of", "reached", ">p, good", "~in words"];
+    let line = |e: &Endpoint| {
+        let interval = e.interval.map(|[low, high]| format!("{low:.2} to {high:.2}"));
+        let (n, p) = (e.n.to_string(), format!("{:.3}", e.p_adjusted[0]));
+        let interval = interval.unwrap_or_default();
+        row([e.id.clone(), number(e.value), interval, n, reached(e).into(), p, e.words.clone()])
+    };
+    let rows = proof.scores.endpoints.iter().map(line);
+    section("The five endpoints, chosen beforehand", &table(&heads, rows))
 }
-
-type ByStrength = std::collections::BTreeMap<String, std::collections::BTreeMap<String, Rates>>;
 
 /// Rows by name, columns by strength, a cell as dark as its share.
 fn power(title: &str, rows: &ByStrength, question: &str) -> Markup {
     let mut levels: Vec<&String> = rows.values().flat_map(|r| r.keys()).collect();
     levels.sort();
     levels.dedup();
+    let heads = levels.iter().map(|level| format!(">{}", level.trim_start_matches('0')));
+    let heads: Vec<String> = std::iter::once("nats".into()).chain(heads).collect();
     let cell = |rate: Option<&Rate>| {
-        html! { @match rate {
-            Some(r) => td.n style={ "background: color-mix(in srgb, #2a78b8 " (percent(r.rate).replace(' ', "")) ", transparent)" } { (r.k) "/" (r.n) },
-            None => td {},
-        } }
+        let dark = rate.map_or(0.0, |r| 100.0 * r.rate);
+        let style = format!(
+            "padding: 0 0.4em; background: color-mix(in srgb, #2a78b8 {dark:.0}%, transparent)"
+        );
+        html! { @if rate.is_some() { span style=(style) { (count(rate)) } } }
     };
-    html! {
-        section {
-            h2 { (title) }
-            div.wide { table {
-                thead { tr { th { "nats" } @for level in &levels { th.n { (level.trim_start_matches('0')) } } } }
-                tbody { @for (name, by_level) in rows {
-                    @if by_level.values().any(|r| r.contains_key(question)) { tr {
-                        th { (name) }
-                        @for level in &levels { (cell(by_level.get(*level).and_then(|r| r.get(question)))) }
-                    } }
-                } }
-            } }
-        }
-    }
+    let asked = rows.iter().filter(|(_, r)| r.values().any(|r| r.contains_key(question)));
+    let lines = asked.map(|(name, by_level)| {
+        let cells =
+            levels.iter().map(|level| cell(by_level.get(*level).and_then(|r| r.get(question))));
+        std::iter::once(html! { (name) }).chain(cells).collect()
+    });
+    section(title, &table(&heads, lines))
 }
 
 fn kinds(proof: &Proof) -> Markup {
-    html! {
-        section {
-            h2 { "All kinds of sets" }
-            div.wide { table {
-                thead { tr { th { "kind" } @for (_, head) in COLUMNS { th.n { (head) } } } }
-                tbody { @for (kind, rates) in &proof.scores.by_kind { tr {
-                    th { (kind) }
-                    @for (mark, _) in COLUMNS { td.n { @if let Some(r) = rates.get(mark) { (r.k) "/" (r.n) } } }
-                } } }
-            } }
-            dl { @for (question, words) in QUESTIONS { div { dt { (question) } dd { (words) } } } }
-        }
-    }
+    let heads = COLUMNS.map(|(_, head)| format!(">{head}"));
+    let heads: Vec<String> = std::iter::once("kind".into()).chain(heads).collect();
+    let lines = proof.scores.by_kind.iter().map(|(kind, rates)| {
+        row(std::iter::once(kind.clone()).chain(COLUMNS.map(|(mark, _)| count(rates.get(mark)))))
+    });
+    let words = QUESTIONS.map(|(question, words, _)| (question, html! { (words) }));
+    section("All kinds of sets", &html! { (table(&heads, lines)) (facts(words)) })
 }
 
 fn certainty(proof: &Proof) -> Markup {
     let scores = &proof.scores;
-    html! {
-        section {
-            h2 { "How far stated probabilities hold" }
-            p { "Calibration error " (number(scores.calibration_error)) ", Brier score " (number(scores.brier))
+    let lines = scores.calibration.iter().map(|bin| {
+        let [low, high] = bin.right.interval.map(percent);
+        let right = percent(bin.right.rate);
+        row([percent(bin.stated), right, format!("{low} to {high}"), bin.right.n.to_string()])
+    });
+    section(
+        "How far stated probabilities hold",
+        &html! {
+            p { "A stated 90 % interval of a parameter holds the truth in " (share(scores.coverage.as_ref()))
+                ". Calibration error " (number(scores.calibration_error)) ", Brier score " (number(scores.brier))
                 "; parameters are off by " (number(scores.parameter_error)) " (median, relative); the stated stretch of an axis overlaps the true one by "
                 (number(scores.overlap)) " (median); an advised view settles the name in " (share(scores.advice.as_ref())) "." }
-            div.wide { table {
-                thead { tr { th.n { "stated" } th.n { "right" } th.n { "95 %" } th.n { "names" } } }
-                tbody { @for bin in &scores.calibration { tr {
-                    td.n { (percent(bin.stated)) } td.n { (percent(bin.right.rate)) }
-                    td.n { (percent(bin.right.interval[0])) " to " (percent(bin.right.interval[1])) }
-                    td.n { (bin.right.n) }
-                } } }
-            } }
-        }
-    }
+            (table(&[">stated", ">right", ">95 %", ">names"], lines))
+        },
+    )
 }
 
 fn gains(proof: &Proof) -> Markup {
-    html! {
-        section {
-            h2 { "What was gained on fresh views, over who knows the truth" }
-            div.wide { table {
-                thead { tr { th { "method" } th.n { "inside, median" } th.n { "10th percentile" } th.n { "sets" }
-                    th.n { "outside, median" } th.n { "10th percentile" } th.n { "sets" } } }
-                tbody { @for (method, sides) in &proof.scores.gains { tr {
-                    th { (method) }
-                    @for side in sides { @match side {
-                        Some(r) => { td.n { (format!("{:.2}", r.median)) } td.n { (format!("{:.2}", r.low)) } td.n { (r.n) } },
-                        None => { td {} td {} td {} },
-                    } }
-                } } }
-            } }
-        }
-    }
+    let heads =
+        ["inside, median", "10th percentile", "sets", "outside, median", "10th percentile", "sets"];
+    let heads: Vec<String> =
+        std::iter::once("method".into()).chain(heads.map(|h| format!(">{h}"))).collect();
+    let lines = proof.scores.gains.iter().map(|(method, sides)| {
+        let cells = sides.iter().flat_map(|side| {
+            let of = |x: fn(&Ratio) -> String| side.as_ref().map_or(String::new(), x);
+            [of(|r| number(Some(r.median))), of(|r| number(Some(r.low))), of(|r| r.n.to_string())]
+        });
+        row(std::iter::once(method.clone()).chain(cells))
+    });
+    section("What was gained on fresh views, over who knows the truth", &table(&heads, lines))
 }
 
 fn confusion(proof: &Proof) -> Markup {
-    html! {
-        section {
-            h2 { "What was hidden, and what was said first" }
-            div.wide { table {
-                thead { tr { th { "hidden" } th { "said first, of those seen" } } }
-                tbody { @for (hidden, said) in &proof.scores.confusion { tr {
-                    th { (hidden) }
-                    td { @for (i, (name, n)) in said.iter().enumerate() { @if i > 0 { ", " } (name) " " (n) } }
-                } } }
-            } }
-        }
-    }
+    let lines = proof.scores.confusion.iter().map(|(hidden, said)| {
+        let said: Vec<String> = said.iter().map(|(name, n)| format!("{name} {n}")).collect();
+        row([hidden.clone(), said.join(", ")])
+    });
+    section(
+        "What was hidden, and what was said first",
+        &table(&["hidden", "said first, of those seen"], lines),
+    )
 }
 
-/// A set of which any answer is not what it should be.
-fn failed(set: &ProvenSet) -> Vec<&str> {
-    let wrong = |(question, yes): (&'static str, bool)| {
-        set.marks.answers.get(question).is_some_and(|answer| *answer == yes).then_some(question)
+/// Questions of which the answer is not what it should be.
+fn failed(set: &ProvenSet) -> Vec<&'static str> {
+    let asked = QUESTIONS.iter().map(|q| q.0);
+    let wrong = |question: &&str| {
+        let right = !["false_alarm", "confident_wrong"].contains(question);
+        let graded = ["ran", "detected", "first_name", "abstained", "said_blind"];
+        let graded = !right || graded.contains(question);
+        graded && set.marks.answers.get(*question).is_some_and(|answer| *answer != right)
     };
-    let bad = [("ran", false), ("false_alarm", true), ("detected", false), ("first_name", false)];
-    let worse = [("abstained", false), ("confident_wrong", true), ("said_blind", false)];
-    bad.into_iter().chain(worse).filter_map(wrong).collect()
+    asked.filter(wrong).collect()
 }
 
 fn failures(proof: &Proof) -> Markup {
     let all: Vec<(&ProvenSet, Vec<&str>)> =
         proof.sets.iter().map(|s| (s, failed(s))).filter(|f| !f.1.is_empty()).collect();
-    html! {
-        section {
-            h2 { "Every failure (" (all.len()) " of " (proof.sets.len()) " sets)" }
-            details { summary { "The list" } div.wide { table {
-                thead { tr { th { "set" } th { "kind" } th { "hidden" } th.n { "nats" } th { "said first" } th { "what failed" } } }
-                tbody { @for (set, failed) in all { tr {
-                    th { (set.name) }
-                    td { (word(set.truth.asked.world)) "/" (word(set.truth.asked.cell)) }
-                    td { @for h in &set.truth.hidden { (h.names.first().unwrap_or(&h.form)) " " } }
-                    td.n { @if let Some(n) = level(&set.truth) { (n) } }
-                    td { (set.marks.first) }
-                    td { (failed.join(", ")) @if let Some(why) = &set.failure { ": " (why) } }
-                } } }
-            } } }
-        }
-    }
+    let lines = all.iter().map(|(set, failed)| {
+        let asked = &set.truth.asked;
+        let hidden: Vec<&str> = set.truth.hidden.iter().map(|h| h.name()).collect();
+        let why = set.answer.failure.as_ref().map_or(String::new(), |why| format!(": {why}"));
+        row([
+            set.name.clone(),
+            format!("{}/{}", word(asked.world), word(asked.cell)),
+            hidden.join(" "),
+            level(&set.truth).map_or(String::new(), |n| n.to_string()),
+            set.marks.first.clone(),
+            failed.join(", ") + &why,
+        ])
+    });
+    let heads = ["set", "kind", "hidden", ">nats", "said first", "what failed"];
+    section(
+        &format!("Every failure ({} of {} sets)", all.len(), proof.sets.len()),
+        &html! { details { summary { "The list" } (table(&heads, lines)) } },
+    )
 }
 
 fn method(proof: &Proof) -> Markup {
     let files =
         ["commitments.json", "verdicts.json", "commitments-advised.json", "verdicts-advised.json"];
-    html! {
-        section {
-            h2 { "How it was done, and how to check it" }
+    let hashes = files.iter().zip(&proof.published).map(|(f, h)| (f, html! { code { (h) } }));
+    section(
+        "How it was done, and how to check it",
+        &html! {
             p { "Seed " (proof.order.seed) ", " (proof.order.sets) " sets"
                 @if proof.order.real { ", some of real recordings" } ". The makers of sets share no formula with the catalogue and no code with the diagnosis. "
                 "Data and answers were hashed before the first diagnosis, verdicts before the first answer was opened; where a diagnosis asked for another view, "
                 "it was taken, hashed and diagnosed again. Kept apart from the machine by: "
                 @for (how, n) in &proof.confinement { (how) " (" (n) " diagnoses) " } }
-            dl { @for (file, hash) in files.iter().zip(&proof.published) { div { dt { (file) } dd { code { (hash) } } } } }
+            (facts(hashes))
             p { "Check it: " code { "./run prove --check DIR" } " compares hashes, marks and scores and makes a sample of the sets again; "
                 code { "--all" } " makes every one. " code { "summary.json" } " has a row a set." }
-        }
-    }
+        },
+    )
 }

@@ -7,12 +7,13 @@ use std::path::Path;
 use kinoise::Error;
 use kinoise::error::Result;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use crate::commitment::{Commitments, read_json};
 use crate::gain::Gains;
 use crate::judge::{AdviceMarks, Marks, Scores};
 use crate::raytraced::question::Truth;
+use crate::solver::Answer;
 
 pub const FORMAT: &str = "kinoise-proof/2";
 pub const PROOF: &str = "proof.json";
@@ -24,9 +25,9 @@ pub struct Proof {
     pub format: String,
     pub order: Order,
     pub scores: Scores,
-    /// Of the files as they were written, each before what it commits to: the first round's
+    /// Of the four files as they were written, each before what it commits to: the first round's
     /// commitments and verdicts, then the second's.
-    pub published: [String; 4],
+    pub published: Vec<String>,
     pub commitments: [Commitments; 2],
     /// What kept the solver from the rest of the machine, and for how many sets.
     pub confinement: BTreeMap<String, usize>,
@@ -48,10 +49,8 @@ pub struct Order {
 pub struct ProvenSet {
     pub name: String,
     pub truth: Truth,
-    /// The diagnosis without its curves; they are in `diagnoses/`.
-    pub verdict: Option<Value>,
-    pub failure: Option<String>,
-    pub diagnosis_sha256: Option<String>,
+    #[serde(flatten)]
+    pub answer: Answer,
     pub marks: Marks,
     pub gains: Option<Gains>,
     /// What came of the view that the diagnosis asked for.
@@ -64,26 +63,33 @@ pub struct ProvenSet {
 /// The set once more, with the view that was advised.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Advised {
-    pub verdict: Option<Value>,
-    pub failure: Option<String>,
-    pub diagnosis_sha256: Option<String>,
+    #[serde(flatten)]
+    pub answer: Answer,
     pub marks: AdviceMarks,
 }
 
 impl Proof {
     /// Read `proof.json` of a folder.
-    pub fn read(folder: &Path) -> Result<(Self, String)> {
+    pub fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(PROOF);
-        let (proof, hash): (Proof, String) = read_json(&path)?;
-        if proof.format != FORMAT {
-            return Err(Error::Json {
+        let (proof, _): (Proof, _) = read_json(&path)?;
+        if proof.format != FORMAT || proof.published.len() != 4 {
+            return Err(Error::Text {
                 path,
                 line: 0,
                 what: format!("format \"{}\"", proof.format),
                 remedy: "give the folder of a trial made by this version",
             });
         }
-        Ok((proof, hash))
+        Ok(proof)
+    }
+
+    /// The sets of a round, 0 or 1, and what was said to them.
+    pub fn answers(&self, round: usize) -> impl Iterator<Item = (&ProvenSet, &Answer)> {
+        self.sets.iter().filter_map(move |set| {
+            let answer = if round == 0 { &set.answer } else { &set.advised.as_ref()?.answer };
+            Some((set, answer))
+        })
     }
 
     /// A row a set: the truth, what was said, how it was judged.
@@ -99,11 +105,11 @@ fn row(set: &ProvenSet) -> Value {
         json!({"names": h.names, "form": h.form, "statistic": h.statistic, "axis": h.axis,
             "nats": h.nats})
     });
-    let verdict = set.verdict.as_ref();
+    let verdict = set.answer.verdict.as_ref();
     let findings = verdict.and_then(|v| v.get("findings")?.as_array());
     let found = findings.into_iter().flatten().map(|f| {
         let keys = ["status", "effect", "alternatives", "statistic", "axis", "share", "size"];
-        keys.iter().map(|k| ((*k).to_string(), f[*k].clone())).collect::<serde_json::Map<_, _>>()
+        keys.iter().map(|k| ((*k).to_string(), f[*k].clone())).collect::<Map<_, _>>()
     });
     json!({
         "name": set.name, "world": asked.world, "cell": asked.cell, "nats": asked.nats,
@@ -112,6 +118,6 @@ fn row(set: &ProvenSet) -> Value {
         "verdict": verdict.map(|v| v["verdict"].clone()),
         "findings": found.collect::<Vec<_>>(),
         "first": set.marks.first, "answers": set.marks.answers,
-        "gains": set.gains, "failure": set.failure, "seconds": set.seconds,
+        "gains": set.gains, "failure": set.answer.failure, "seconds": set.seconds,
     })
 }

@@ -10,15 +10,15 @@ use kinoise::error::Result;
 use kinoise::io::sha256_hex;
 use kinoise::{Error, NoiseModel};
 use rayon::prelude::*;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use crate::commitment::{
-    Commitments, Committed, VerdictHash, Verdicts, hash_folder, hash_json, hash_seed, read_json,
-    write_json,
+    Commitments, Committed, VerdictHash, Verdicts, hash_folder, hash_json, read_json, write_json,
 };
 use crate::gain::{Gains, examine};
 use crate::judge::{advised_view, endpoints_in_words};
-use crate::plan::{conceal, plan};
-use crate::proof::Order;
+use crate::plan::{Planned, conceal, learn};
 use crate::raytraced::question::{ConcealedSet, Pose, Truth, World};
 use crate::solver::{Solved, solve};
 use crate::trial::Trial;
@@ -42,11 +42,15 @@ const MAX_ADVISED: usize = 40;
 /// The baselines learn from one set in so many, by the set's seed: they take longer than all else.
 const BASELINES_IN: u64 = 3;
 
-/// All sets of an order, made anew.
-pub fn take(order: &Order, data: Option<&Path>, progress: Progress<'_>) -> Result<Vec<Taken>> {
-    let planned = plan(order.sets, order.seed, order.real);
-    each(&planned, ("making sets", progress), |planned| {
-        let sealed = conceal(&planned.asked, data)?;
+/// The sets of these questions, made anew; `data` is the folder of the real recordings.
+pub fn take(
+    planned: &[Planned],
+    data: Option<&Path>,
+    progress: Progress<'_>,
+) -> Result<Vec<Taken>> {
+    let known = learn(planned, data)?;
+    each(planned, ("making sets", progress), |planned| {
+        let sealed = conceal(&planned.asked, &known)?;
         Ok(Taken { name: planned.name.clone(), truth: sealed.truth(), sealed, view: None })
     })
 }
@@ -72,68 +76,88 @@ pub fn take_advised<'a>(
     })
 }
 
-/// Write a set's folder into `scratch/set`, and only it; the hash of it.
-pub fn make(sealed: &dyn ConcealedSet, scratch: &Path) -> Result<String> {
-    remove(scratch)?;
-    let set = scratch.join("set");
-    make_folder(&set)?;
-    sealed.write(&set)?;
-    hash_folder(&set)
+impl Taken {
+    /// Write the set's folder into `scratch/set`, and only it; what anybody may know of it.
+    pub fn make(&self, scratch: &Path) -> Result<Committed> {
+        remove(scratch)?;
+        let set = scratch.join("set");
+        make_folder(&set)?;
+        self.sealed.write(&set)?;
+        let (name, truth_sha256) = (self.name.clone(), hash_json(&self.truth));
+        Ok(Committed { name, data_sha256: hash_folder(&set)?, truth_sha256, view: self.view })
+    }
 }
 
 /// One pass over sets: committed to, diagnosed, published.
 #[derive(Clone, Copy)]
 pub struct Round<'a> {
     pub trial: &'a Trial,
-    pub root: &'a Path,
+    pub binary_sha256: &'a str,
     /// In [`ROUNDS`].
     pub index: usize,
     pub progress: Progress<'a>,
 }
 
-/// What a round leaves.
+/// What a round leaves, and the hashes of the two files that it published.
 pub struct Done {
     pub commitments: Commitments,
-    pub commitments_sha256: String,
     pub solved: Vec<Solved>,
-    pub verdicts_sha256: String,
+    pub published: [String; 2],
 }
 
 impl Round<'_> {
     fn named(&self, stem: &str) -> PathBuf {
-        self.root.join(format!("{stem}{}", ROUNDS[self.index]))
+        self.trial.output.join(format!("{stem}{}", ROUNDS[self.index]))
     }
 
-    fn file(&self, stem: &str) -> PathBuf {
-        self.root.join(format!("{stem}{}.json", ROUNDS[self.index]))
-    }
-
-    /// Where what is known of a set outlives an interruption.
-    fn state(&self, kind: &str, name: &str) -> Result<PathBuf> {
-        let folder = self.root.join("work").join(format!("{kind}{}", ROUNDS[self.index]));
+    /// A set's file in a folder that is there from now on.
+    fn file(&self, folder: &str, name: &str) -> Result<PathBuf> {
+        let folder = self.named(folder);
         make_folder(&folder)?;
         Ok(folder.join(format!("{name}.json")))
     }
 
+    /// What is known of a set from before an interruption, else the outcome of `work`, kept.
+    fn once<T: Serialize + DeserializeOwned>(
+        &self,
+        kind: &str,
+        name: &str,
+        work: impl FnOnce() -> Result<T>,
+    ) -> Result<T> {
+        let path = self.file(&format!("work/{kind}"), name)?;
+        if let Ok((known, _)) = read_json(&path) {
+            return Ok(known);
+        }
+        let outcome = work()?;
+        write_json(&path, &outcome)?;
+        Ok(outcome)
+    }
+
     /// Nothing of an interrupted process, which may still write, is in the way.
     fn scratch(&self, name: &str) -> PathBuf {
-        self.root.join("work/scratch").join(std::process::id().to_string()).join(name)
+        self.trial.output.join("work/scratch").join(std::process::id().to_string()).join(name)
     }
 
     pub fn run(&self, sets: &[Taken], after: Option<&str>) -> Result<Done> {
-        let committed = each(sets, ("hashing sets", self.progress), |set| self.commit(set))?;
-        let program = &self.trial.program;
-        let binary = fs::read(program).map_err(|e| Error::read(program, e))?;
+        let committed = each(sets, ("hashing sets", self.progress), |set| {
+            // By its truth: another trial's set of this name is no help.
+            self.once("commitments", &hash_json(&set.truth), || {
+                let scratch = self.scratch(&set.name);
+                let committed = set.make(&scratch)?;
+                remove(&scratch)?;
+                Ok(committed)
+            })
+        })?;
         let commitments = Commitments {
             version: env!("CARGO_PKG_VERSION").into(),
-            seed_sha256: hash_seed(self.trial.order.seed),
-            binary_sha256: sha256_hex(&binary),
+            seed_sha256: sha256_hex(&self.trial.order.seed.to_le_bytes()),
+            binary_sha256: self.binary_sha256.into(),
             endpoints: endpoints_in_words(),
             limit_s: self.trial.limit.as_secs(),
             after: after.map(String::from),
             sets: committed,
         };
-        let path = self.file("commitments");
+        let path = self.named("commitments").with_extension("json");
         let commitments_sha256 = if path.exists() {
             let (written, hash): (Commitments, String) = read_json(&path)?;
             if written != commitments {
@@ -145,64 +169,36 @@ impl Round<'_> {
         };
         let pairs: Vec<(&Taken, &Committed)> = sets.iter().zip(&commitments.sets).collect();
         let solved = each(&pairs, ("diagnosing", self.progress), |(set, committed)| {
-            self.diagnose(set, committed)
+            self.once("verdicts", &set.name, || self.diagnose(set, committed))
         })?;
-        let line = |s: &Solved| VerdictHash {
-            name: s.name.clone(),
-            diagnosis_sha256: s.diagnosis_sha256.clone(),
+        let line = |(set, s): (&Taken, &Solved)| VerdictHash {
+            name: set.name.clone(),
+            diagnosis_sha256: s.answer.diagnosis_sha256.clone(),
         };
-        let verdicts = Verdicts {
-            commitments_sha256: commitments_sha256.clone(),
-            verdicts: solved.iter().map(line).collect(),
-        };
-        let verdicts_sha256 = write_json(&self.file("verdicts"), &verdicts)?;
-        Ok(Done { commitments, commitments_sha256, solved, verdicts_sha256 })
-    }
-
-    fn commit(&self, set: &Taken) -> Result<Committed> {
-        let state = self.state("commitments", &set.name)?;
-        let truth_sha256 = hash_json(&set.truth);
-        if let Ok((known, _)) = read_json::<Committed>(&state)
-            && (&known.truth_sha256, known.view) == (&truth_sha256, set.view)
-        {
-            return Ok(known);
-        }
-        let scratch = self.scratch(&set.name);
-        let data_sha256 = make(set.sealed.as_ref(), &scratch)?;
-        remove(&scratch)?;
-        let name = set.name.clone();
-        let committed = Committed { name, data_sha256, truth_sha256, view: set.view };
-        write_json(&state, &committed)?;
-        Ok(committed)
+        let verdicts = sets.iter().zip(&solved).map(line).collect();
+        let verdicts = Verdicts { commitments_sha256: commitments_sha256.clone(), verdicts };
+        let verdicts_sha256 =
+            write_json(&self.named("verdicts").with_extension("json"), &verdicts)?;
+        Ok(Done { commitments, solved, published: [commitments_sha256, verdicts_sha256] })
     }
 
     fn diagnose(&self, set: &Taken, committed: &Committed) -> Result<Solved> {
-        let state = self.state("verdicts", &set.name)?;
-        if let Ok((solved, _)) = read_json::<Solved>(&state) {
-            return Ok(solved);
-        }
-        let scratch = self.scratch(&set.name);
-        remake(set, committed, &scratch)?;
-        let solved = solve(&self.trial.program, self.trial.limit, &set.name, &scratch)?;
-        let keep = |file: &str, to: &Path| {
-            let from = scratch.join("out").join(file);
-            if !from.exists() {
-                return Ok(());
+        let scratch = self.remade(set, committed)?;
+        let solved = solve(&self.trial.program, self.trial.limit, &scratch)?;
+        for (file, folder) in [("diagnosis", "diagnoses"), ("model", "work/models")] {
+            let from = scratch.join("out").join(file).with_extension("json");
+            let to = self.file(folder, &set.name)?;
+            if from.exists() {
+                fs::copy(&from, &to).map_err(|e| Error::write(&to, e))?;
             }
-            fs::copy(&from, to).map(|_| ()).map_err(|e| Error::write(to, e))
-        };
-        make_folder(&self.named("diagnoses"))?;
-        keep("diagnosis.json", &self.named("diagnoses").join(format!("{}.json", set.name)))?;
-        keep("model.json", &self.state("models", &set.name)?)?;
+        }
         if self.trial.keep {
             let kept = self.named("kept").join(&set.name);
             make_folder(&self.named("kept"))?;
             remove(&kept)?;
             fs::rename(&scratch, &kept).map_err(|e| Error::write(&kept, e))?;
-        } else {
-            remove(&scratch)?;
         }
-        write_json(&state, &solved)?;
+        remove(&scratch)?;
         Ok(solved)
     }
 
@@ -210,34 +206,34 @@ impl Round<'_> {
     pub fn examine_all(&self, sets: &[Taken], known: &Commitments) -> Result<Vec<Option<Gains>>> {
         let pairs: Vec<(&Taken, &Committed)> = sets.iter().zip(&known.sets).collect();
         each(&pairs, ("examining", self.progress), |(set, committed)| {
-            let Ok(model) = NoiseModel::read(&self.state("models", &set.name)?) else {
+            let Ok(model) = NoiseModel::read(&self.file("work/models", &set.name)?) else {
                 return Ok(None);
             };
             let views = set.sealed.exam();
-            let state = self.state("gains", &set.name)?;
-            if let Ok((gains, _)) = read_json(&state) {
-                return Ok(gains);
+            if views.is_empty() {
+                return Ok(None);
             }
-            let scratch = self.scratch(&set.name);
-            remake(set, committed, &scratch)?;
-            let baselines = set.truth.asked.seed.is_multiple_of(BASELINES_IN);
-            let gains = examine(&views, &scratch.join("set"), &model, baselines)?;
-            write_json(&state, &gains)?;
-            remove(&scratch)?;
-            Ok(gains)
+            self.once("gains", &set.name, || {
+                let scratch = self.remade(set, committed)?;
+                let baselines = set.truth.asked.seed.is_multiple_of(BASELINES_IN);
+                let gains = examine(&views, &scratch.join("set"), &model, baselines)?;
+                remove(&scratch)?;
+                Ok(Some(gains))
+            })
         })
     }
-}
 
-/// The set that was committed to, or none.
-fn remake(set: &Taken, committed: &Committed, scratch: &Path) -> Result<()> {
-    if make(set.sealed.as_ref(), scratch)? == committed.data_sha256 {
-        return Ok(());
+    /// Where the set is that was committed to, and no other.
+    fn remade(&self, set: &Taken, committed: &Committed) -> Result<PathBuf> {
+        let scratch = self.scratch(&set.name);
+        if set.make(&scratch)? == *committed {
+            return Ok(scratch);
+        }
+        Err(Error::Argument {
+            what: format!("set {} made again is not the one that was committed to", set.name),
+            remedy: "its maker must give the same bytes every time: report this as a fault",
+        })
     }
-    Err(Error::Argument {
-        what: format!("set {} made again is not the one that was committed to", set.name),
-        remedy: "its maker must give the same bytes every time: report this as a fault",
-    })
 }
 
 /// `work` on every item on all threads, in order of the items. Nothing new is begun after a failure.

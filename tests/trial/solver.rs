@@ -2,13 +2,14 @@
 
 use std::fs::{self, File};
 use std::path::Path;
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
+use kinoise::calibrate::paper_model;
 use kinoise::diagnose::{DiagnoseOptions, Verdict, diagnose, diagnose_against};
 use kinoise::error::Result;
-use kinoise::io::{Assumed, OutputDir, open, sha256_hex};
-use kinoise::{CalibrateOptions, Error, Form, NoiseModel, Recording};
+use kinoise::io::{Assumed, OutputDir, open, pretty_json, sha256_hex};
+use kinoise::{Error, NoiseModel, Recording};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -19,48 +20,61 @@ const DATA: [&str; 2] = [".", "../out"];
 /// Exit code of a mismatch, as of `kinoise diagnose`.
 const MISMATCH: u8 = 1;
 
-/// What came of one set.
+/// What was said to one set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Solved {
-    pub name: String,
-    pub diagnosis_sha256: Option<String>,
-    /// The diagnosis without its curves.
+pub struct Answer {
+    /// The diagnosis without its curves; they are in `diagnoses/`.
     pub verdict: Option<Value>,
     /// Why there is none.
     pub failure: Option<String>,
+    pub diagnosis_sha256: Option<String>,
+}
+
+/// An answer, and how it came about.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Solved {
+    #[serde(flatten)]
+    pub answer: Answer,
     /// What kept the process from the rest of the machine.
     pub confinement: String,
     /// Depends on the machine.
     pub seconds: f64,
 }
 
+impl Answer {
+    /// Of the bytes of a `diagnosis.json`, or of why there are none.
+    pub fn of(diagnosis: std::result::Result<Vec<u8>, String>) -> Self {
+        let read = diagnosis.and_then(|bytes| {
+            let verdict = serde_json::from_slice(&bytes).map_err(|e| e.to_string())?;
+            Ok((sha256_hex(&bytes), without_curves(verdict)))
+        });
+        match read {
+            Ok((hash, verdict)) => {
+                Answer { verdict: Some(verdict), failure: None, diagnosis_sha256: Some(hash) }
+            }
+            Err(why) => Answer { verdict: None, failure: Some(why), diagnosis_sha256: None },
+        }
+    }
+}
+
 /// Diagnose the set in `scratch/set` by a process of `program`; the answer goes to `scratch/out`.
 /// A diagnosis that fails is an answer too.
-pub fn solve(program: &Path, limit: Duration, name: &str, scratch: &Path) -> Result<Solved> {
+pub fn solve(program: &Path, limit: Duration, scratch: &Path) -> Result<Solved> {
     let out = scratch.join("out");
     fs::create_dir_all(&out).map_err(|e| Error::write(&out, e))?;
     let begin = Instant::now();
     let ended = run(program, limit, scratch)?;
     let seconds = begin.elapsed().as_secs_f64();
     let text = |file: &str| fs::read_to_string(scratch.join(file)).unwrap_or_default();
-    let confinement = text("stdout").lines().next().unwrap_or("unknown").to_string();
-    let diagnosis = match ended {
+    let answer = Answer::of(match ended {
         None => Err(format!("no answer within {} s", limit.as_secs())),
         Some(status) if !matches!(status.code(), Some(0 | 1)) => {
             Err(format!("{status}: {}", text("stderr").lines().last().unwrap_or_default()))
         }
         Some(_) => fs::read(out.join("diagnosis.json")).map_err(|e| e.to_string()),
-    };
-    let read = |bytes: Vec<u8>| {
-        let value = serde_json::from_slice(&bytes).map_err(|e| e.to_string())?;
-        Ok((sha256_hex(&bytes), without_curves(value)))
-    };
-    let (diagnosis_sha256, verdict, failure) = match diagnosis.and_then(read) {
-        Ok((hash, verdict)) => (Some(hash), Some(verdict), None),
-        Err(why) => (None, None, Some(why)),
-    };
-    let name = name.into();
-    Ok(Solved { name, diagnosis_sha256, verdict, failure, confinement, seconds })
+    });
+    let confinement = text("stdout").lines().next().unwrap_or("unknown").to_string();
+    Ok(Solved { answer, confinement, seconds })
 }
 
 /// `None` when it had to be ended.
@@ -69,6 +83,8 @@ fn run(program: &Path, limit: Duration, scratch: &Path) -> Result<Option<ExitSta
         let path = scratch.join(name);
         File::create(&path).map_err(|e| Error::write(&path, e))
     };
+    let failed = |e| Error::read(program, e);
+    let begin = Instant::now();
     let mut child = Command::new(program)
         .arg(SUBCOMMAND)
         .current_dir(scratch.join("set"))
@@ -77,36 +93,26 @@ fn run(program: &Path, limit: Duration, scratch: &Path) -> Result<Option<ExitSta
         .stdout(to("stdout")?)
         .stderr(to("stderr")?)
         .spawn()
-        .map_err(|e| Error::read(program, e))?;
-    wait(&mut child, limit).map_err(|e| Error::read(program, e))
-}
-
-fn wait(child: &mut Child, limit: Duration) -> std::io::Result<Option<ExitStatus>> {
-    let begin = Instant::now();
-    loop {
-        if let Some(status) = child.try_wait()? {
+        .map_err(failed)?;
+    while begin.elapsed() <= limit {
+        if let Some(status) = child.try_wait().map_err(failed)? {
             return Ok(Some(status));
-        }
-        if begin.elapsed() > limit {
-            child.kill()?;
-            child.wait()?;
-            return Ok(None);
         }
         std::thread::sleep(Duration::from_millis(10));
     }
+    child.kill().and_then(|()| child.wait()).map_err(failed)?;
+    Ok(None)
 }
 
 /// What is for drawing stays in the complete diagnosis.
-pub fn without_curves(mut diagnosis: Value) -> Value {
+fn without_curves(mut diagnosis: Value) -> Value {
     if let Some(findings) = diagnosis.get_mut("findings").and_then(Value::as_array_mut) {
         for finding in findings.iter_mut().filter_map(Value::as_object_mut) {
             finding.shift_remove("curve");
         }
     }
     if let Some(all) = diagnosis.as_object_mut() {
-        for key in ["map", "detectable", "views"] {
-            all.shift_remove(key);
-        }
+        all.retain(|key, _| !["map", "detectable", "views"].contains(&key.as_str()));
     }
     diagnosis
 }
@@ -122,23 +128,17 @@ pub fn diagnose_shut_in() -> anyhow::Result<u8> {
     let simulated = set.join("simulated");
     let done = if simulated.exists() {
         let simulated = open(&simulated, &Assumed::default())?;
-        let model = calibrated(&simulated).or_else(|_| calibrated(&recording))?;
+        let sigma = |recording: &Recording| paper_model(recording, options.seed, None, &|_, _| ());
+        let model = sigma(&simulated).or_else(|_| sigma(&recording))?;
         diagnose_against(&recording, &simulated, &model, &options, &|_, _| ())?
     } else {
         let model = NoiseModel::read(&set.join("model.json"))?;
         diagnose(&recording, &model, &options, &|_, _| ())?
     };
     let folder = OutputDir::create(out)?;
-    let json = serde_json::to_value(&done.diagnosis)?;
-    folder.write("diagnosis.json", format!("{json:#}\n").as_bytes())?;
+    folder.write("diagnosis.json", pretty_json(&done.diagnosis)?.as_bytes())?;
     done.model.write(&folder.path().join("model.json"))?;
     Ok(if done.diagnosis.verdict == Verdict::Mismatch { MISMATCH } else { 0 })
-}
-
-fn calibrated(recording: &Recording) -> anyhow::Result<NoiseModel> {
-    let options = CalibrateOptions { form: Some(Form::Paper), ..Default::default() };
-    let views = kinoise::measure_recording(recording, &options.measure, &|_, _| ())?;
-    Ok(kinoise::model_of(recording, &views, &options)?.model)
 }
 
 /// Shut this process out of everything but reading below `read` and writing below `write`; no

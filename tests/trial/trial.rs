@@ -8,8 +8,9 @@ use std::time::Duration;
 use kinoise::error::Result;
 use kinoise::io::OutputDir;
 
-use crate::commitment::write_json;
+use crate::commitment::{hash_file, write_json};
 use crate::judge::{mark, mark_advice, scores};
+use crate::plan::plan;
 use crate::proof::{Advised, FORMAT, Order, PROOF, Proof, ProvenSet, SUMMARY};
 use crate::rounds::{Progress, Round, refused, remove, take, take_advised};
 
@@ -33,50 +34,43 @@ pub fn hold(trial: &Trial, progress: Progress<'_>) -> Result<Proof> {
     if out.path().join(PROOF).exists() {
         return Err(refused(out.path(), "a finished trial is here"));
     }
-    let sets = take(&trial.order, trial.data.as_deref(), progress)?;
-    let first = Round { trial, root: out.path(), index: 0, progress };
+    let binary_sha256 = &hash_file(&trial.program)?;
+    let sets = take(&plan(&trial.order), trial.data.as_deref(), progress)?;
+    let first = Round { trial, binary_sha256, index: 0, progress };
     let one = first.run(&sets, None)?;
-    let verdicts = one.solved.iter().map(|s| s.verdict.as_ref());
+    let verdicts = one.solved.iter().map(|s| s.answer.verdict.as_ref());
     let again = take_advised(&sets, verdicts, progress)?;
-    let second = Round { index: 1, ..first };
-    let two = second.run(&again, Some(&one.verdicts_sha256))?;
+    let two = Round { index: 1, ..first }.run(&again, Some(&one.published[1]))?;
     // The answers are opened.
-    let mut proven = Vec::new();
     let gains = first.examine_all(&sets, &one.commitments)?;
-    for ((set, solved), gains) in sets.iter().zip(&one.solved).zip(gains) {
-        let again = two.solved.iter().find(|s| s.name == set.name);
-        let advised = again.map(|s| Advised {
-            marks: mark_advice(&set.truth, solved.verdict.as_ref(), s.verdict.as_ref()),
-            verdict: s.verdict.clone(),
-            failure: s.failure.clone(),
-            diagnosis_sha256: s.diagnosis_sha256.clone(),
+    let mut confinement = BTreeMap::new();
+    for solved in one.solved.iter().chain(&two.solved) {
+        *confinement.entry(solved.confinement.clone()).or_insert(0) += 1;
+    }
+    let mut again = again.iter().zip(two.solved).peekable();
+    let mut proven = Vec::new();
+    for ((set, solved), gains) in sets.into_iter().zip(one.solved).zip(gains) {
+        let second = again.next_if(|(s, _)| s.name == set.name).map(|(_, s)| s.answer);
+        let said = solved.answer.verdict.as_ref();
+        let advised = second.map(|answer| Advised {
+            marks: mark_advice(&set.truth, said, answer.verdict.as_ref()),
+            answer,
         });
         proven.push(ProvenSet {
-            name: set.name.clone(),
-            marks: mark(&set.truth, solved.verdict.as_ref())?,
-            truth: set.truth.clone(),
-            verdict: solved.verdict.clone(),
-            failure: solved.failure.clone(),
-            diagnosis_sha256: solved.diagnosis_sha256.clone(),
+            name: set.name,
+            marks: mark(&set.truth, said)?,
+            truth: set.truth,
+            answer: solved.answer,
             gains,
             advised,
             seconds: solved.seconds,
         });
     }
-    let mut confinement = BTreeMap::new();
-    for solved in one.solved.iter().chain(&two.solved) {
-        *confinement.entry(solved.confinement.clone()).or_insert(0) += 1;
-    }
     let proof = Proof {
         format: FORMAT.into(),
         order: trial.order.clone(),
         scores: scores(&proven),
-        published: [
-            one.commitments_sha256,
-            one.verdicts_sha256,
-            two.commitments_sha256,
-            two.verdicts_sha256,
-        ],
+        published: [one.published, two.published].concat(),
         commitments: [one.commitments, two.commitments],
         confinement,
         sets: proven,

@@ -1,40 +1,50 @@
 //! The dump that fakenect plays, libfreenect's stand-in; each line is checked beforehand.
 //!
-//! fakenect ends the whole process when FAKENECT_PATH is not set or a file is missing, and reads
-//! beyond the end of a file that is cut short. So it is only ever asked for lines that are good.
+//! fakenect ends the whole process when a file is missing, and reads beyond the end of one that is cut
+//! short. So it is only ever asked for lines that are good.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::ffi::DEPTH_BYTES;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, read_text};
 use crate::io::INDEX;
 
-/// A dump, and how far it has been played.
+/// Lines of a dump that may still be played, and what is to be said at their end.
 #[derive(Debug)]
 pub struct Dump {
-    root: PathBuf,
-    lines: Vec<String>,
-    played: usize,
+    left: usize,
+    ending: String,
 }
 
 impl Dump {
-    /// Read the index of the dump at `root`.
+    /// Check the dump at `root`.
     ///
     /// # Errors
     /// When there is no index, or its first line is already bad.
     pub fn open(root: &Path) -> Result<Self> {
         let index = root.join(INDEX);
-        let text = std::fs::read_to_string(&index).map_err(|e| Error::read(&index, e))?;
+        let text = read_text(&index)?;
         // fakenect ends at the first empty line.
-        let lines = text.split('\n').take_while(|line| !line.is_empty()).map(String::from);
-        let dump = Dump { root: root.into(), lines: lines.collect(), played: 0 };
-        let first =
-            dump.next_line().unwrap_or_else(|| Err(format!("{} is empty", index.display())));
+        let lines: Vec<&str> = text.split('\n').take_while(|line| !line.is_empty()).collect();
+        let faults =
+            lines.iter().enumerate().filter_map(|(i, name)| Some((i, check(root, name).err()?)));
+        let fault = faults
+            .map(|(i, what)| (i, format!("{}, line {}: {what}", index.display(), i + 1)))
+            .next();
         let remedy = "record the dump again with fakenect-record";
-        first.map_err(|what| Error::sensor(what, remedy))?;
-        Ok(dump)
+        match fault {
+            _ if lines.is_empty() => {
+                Err(Error::sensor(format!("{} is empty", index.display()), remedy))
+            }
+            Some((0, what)) => Err(Error::sensor(what, remedy)),
+            Some((left, what)) => Ok(Dump { left, ending: format!("the dump is damaged: {what}") }),
+            None => {
+                let ending = format!("the dump in {} has no more frames", root.display());
+                Ok(Dump { left: lines.len(), ending })
+            }
+        }
     }
 
     /// Allow fakenect its next line.
@@ -42,19 +52,8 @@ impl Dump {
     /// # Errors
     /// A sentence that says why the dump ends here.
     pub fn advance(&mut self) -> std::result::Result<(), String> {
-        match self.next_line() {
-            None => return Err(format!("the dump in {} has no more frames", self.root.display())),
-            Some(Err(fault)) => return Err(format!("the dump is damaged: {fault}")),
-            Some(Ok(())) => self.played += 1,
-        }
+        self.left = self.left.checked_sub(1).ok_or_else(|| self.ending.clone())?;
         Ok(())
-    }
-
-    /// Is the next line good? `None` at the end.
-    fn next_line(&self) -> Option<std::result::Result<(), String>> {
-        let name = self.lines.get(self.played)?;
-        let place = || format!("{}, line {}", self.root.join(INDEX).display(), self.played + 1);
-        Some(check(&self.root, name).map_err(|what| format!("{}: {what}", place())))
     }
 }
 

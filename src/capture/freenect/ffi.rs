@@ -1,7 +1,7 @@
 //! libfreenect's C interface, loaded when it is needed. All that is unsafe here is in this file.
 //!
 //! Declarations follow libfreenect.h and libfreenect_registration.h of 0.5. Callbacks run on the
-//! thread that calls [`Device::process_events`], and cannot unwind into C: `extern "C"` aborts.
+//! thread that calls [`Freenect::process_events`], and cannot unwind into C: `extern "C"` aborts.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -39,6 +39,12 @@ struct FrameMode {
     padding_bits: i8,
     rate: i8,
     is_valid: i8,
+}
+
+impl FrameMode {
+    fn has(&self, bytes: usize) -> bool {
+        self.is_valid != 0 && self.bytes == bytes as i32
+    }
 }
 
 /// A unit's reference plane: lengths in cm (the header's comments say otherwise; its own
@@ -151,18 +157,18 @@ thread_local! {
 
 /// What the callbacks have brought to the thread that called the library.
 #[derive(Default)]
-struct Mailbox {
-    depth: VecDeque<(SystemTime, Vec<u8>)>,
-    infrared: Option<Vec<u8>>,
-    log: String,
+pub struct Mailbox {
+    /// Depth frames with the time they came, the oldest first.
+    pub depth: VecDeque<(SystemTime, Vec<u8>)>,
+    /// The newest infrared picture.
+    pub infrared: Option<Vec<u8>>,
+    /// The library's last complaint.
+    pub log: String,
 }
 
-fn deliver(put: impl FnOnce(&mut Mailbox)) {
-    let _ = MAILBOX.try_with(|mailbox| {
-        if let Ok(mut mailbox) = mailbox.try_borrow_mut() {
-            put(&mut mailbox);
-        }
-    });
+/// Look into this thread's mailbox, or put something in.
+pub fn mailbox<T>(with: impl FnOnce(&mut Mailbox) -> T) -> T {
+    MAILBOX.with_borrow_mut(with)
 }
 
 /// # Safety
@@ -175,51 +181,46 @@ unsafe fn copied(pixels: *const c_void, bytes: usize) -> Option<Vec<u8>> {
 
 extern "C" fn on_depth(_: Handle, pixels: *mut c_void, _ticks: u32) {
     // SAFETY: the mode that was set has this many bytes a frame.
-    if let Some(bytes) = unsafe { copied(pixels, DEPTH_BYTES) } {
-        deliver(|mailbox| mailbox.depth.push_back((SystemTime::now(), bytes)));
-    }
+    let bytes = unsafe { copied(pixels, DEPTH_BYTES) };
+    mailbox(|mail| mail.depth.extend(bytes.map(|bytes| (SystemTime::now(), bytes))));
 }
 
 extern "C" fn on_video(_: Handle, pixels: *mut c_void, _ticks: u32) {
     // SAFETY: as above; video is started in the 10-bit infrared mode only.
     let bytes = unsafe { copied(pixels, INFRARED_BYTES) };
-    deliver(|mailbox| mailbox.infrared = bytes);
+    mailbox(|mail| mail.infrared = bytes);
 }
 
 extern "C" fn on_log(_: Handle, level: c_int, message: *const c_char) {
     if level <= LOG_ERROR && !message.is_null() {
         // SAFETY: libfreenect hands over a C string.
         let text = unsafe { CStr::from_ptr(message) }.to_string_lossy();
-        deliver(|mailbox| mailbox.log = text.trim().to_string());
+        mailbox(|mail| mail.log = text.trim().to_string());
     }
 }
 
-/// The library's last complaint, which is taken away.
-pub fn complaint() -> String {
-    MAILBOX.with_borrow_mut(|mailbox| std::mem::take(&mut mailbox.log))
-}
-
-/// The oldest depth frame that waits, with the time it came.
-pub fn depth() -> Option<(SystemTime, Vec<u8>)> {
-    MAILBOX.with_borrow_mut(|mailbox| mailbox.depth.pop_front())
-}
-
-/// The newest infrared picture since the last one was taken.
-pub fn infrared() -> Option<Vec<u8>> {
-    MAILBOX.with_borrow_mut(|mailbox| mailbox.infrared.take())
-}
-
-/// A library whose functions were found and none called yet.
-pub struct Loaded {
+/// The library, its context once it is started, and a sensor once one is open.
+pub struct Freenect {
     functions: Functions,
-    library: Library,
+    /// Null before.
+    context: Handle,
+    device: Handle,
+    /// Last: the functions point into it.
+    _library: Library,
 }
 
-impl Loaded {
-    pub fn open(path: &Path) -> Result<Self, String> {
+impl Freenect {
+    /// Find the functions; none is called yet.
+    pub fn load(path: &Path) -> Result<Self, String> {
         // SAFETY: loading runs the library's initialisers; libfreenect and libusb have harmless ones.
         let library = unsafe { Library::new(path) }.map_err(|e| e.to_string())?;
-        Ok(Loaded { functions: Functions::of(&library)?, library })
+        let functions = Functions::of(&library)?;
+        Ok(Freenect {
+            functions,
+            context: ptr::null_mut(),
+            device: ptr::null_mut(),
+            _library: library,
+        })
     }
 
     /// Is it fakenect, which plays a dump and cannot list devices?
@@ -227,39 +228,28 @@ impl Loaded {
         self.functions.list_device_attributes.is_none()
     }
 
-    pub fn start(self) -> Result<Freenect, String> {
-        let Loaded { functions, library } = self;
+    pub fn start(mut self) -> Result<Self, String> {
         // Nothing that an earlier library brought.
         MAILBOX.take();
-        let mut context = ptr::null_mut();
+        let f = &self.functions;
         // SAFETY: as libfreenect.h asks; a null USB context makes it open its own.
-        if unsafe { (functions.init)(&raw mut context, ptr::null_mut()) } < 0 {
-            return Err("freenect_init failed: no access to USB".into());
-        }
-        // SAFETY: the context is initialised.
         unsafe {
-            (functions.set_log_level)(context, LOG_ERROR);
-            (functions.set_log_callback)(context, on_log);
-            if let Some(select) = functions.select_subdevices {
-                select(context, SUBDEVICE_CAMERA);
+            if (f.init)(&raw mut self.context, ptr::null_mut()) < 0 {
+                self.context = ptr::null_mut();
+                return Err("freenect_init failed: no access to USB".into());
+            }
+            (f.set_log_level)(self.context, LOG_ERROR);
+            (f.set_log_callback)(self.context, on_log);
+            if let Some(select) = f.select_subdevices {
+                select(self.context, SUBDEVICE_CAMERA);
             }
         }
-        Ok(Freenect { functions, context, _library: library })
+        Ok(self)
     }
-}
 
-/// A library with a context.
-pub struct Freenect {
-    functions: Functions,
-    context: Handle,
-    /// Last: the functions point into it.
-    _library: Library,
-}
-
-impl Freenect {
     /// Number of sensors; negative when USB cannot be asked.
     pub fn devices(&self) -> i32 {
-        // SAFETY: the context lives as long as self.
+        // SAFETY: the library is started.
         unsafe { (self.functions.num_devices)(self.context) }
     }
 
@@ -275,11 +265,10 @@ impl Freenect {
                 return None;
             }
             let mut item = first;
-            while !item.is_null() {
-                let serial = (*item).serial;
-                let text = (!serial.is_null()).then(|| CStr::from_ptr(serial).to_string_lossy());
+            while let Some(Attributes { next, serial }) = item.as_ref() {
+                let text = (!serial.is_null()).then(|| CStr::from_ptr(*serial).to_string_lossy());
                 serials.push(text.unwrap_or_default().into_owned());
-                item = (*item).next;
+                item = *next;
             }
             free(first);
         }
@@ -287,72 +276,52 @@ impl Freenect {
     }
 
     /// Open a sensor, by its serial or the first.
-    pub fn open(self, serial: Option<&CStr>) -> Result<Device, i32> {
-        let mut device = ptr::null_mut();
-        let (f, context) = (&self.functions, self.context);
-        // SAFETY: the context lives, and the serial is a C string.
+    pub fn open(&mut self, serial: Option<&CStr>) -> Result<(), i32> {
+        let (f, device) = (&self.functions, &raw mut self.device);
+        // SAFETY: the library is started, and the serial is a C string.
         let code = unsafe {
             match serial {
-                Some(serial) => {
-                    (f.open_device_by_camera_serial)(context, &raw mut device, serial.as_ptr())
-                }
-                None => (f.open_device)(context, &raw mut device, 0),
+                Some(s) => (f.open_device_by_camera_serial)(self.context, device, s.as_ptr()),
+                None => (f.open_device)(self.context, device, 0),
             }
         };
-        if code < 0 || device.is_null() { Err(code) } else { Ok(Device { freenect: self, device }) }
+        if code < 0 || self.device.is_null() { Err(code) } else { Ok(()) }
     }
-}
 
-impl Drop for Freenect {
-    fn drop(&mut self) {
-        // SAFETY: shut down once, after every device (a device owns the context it came from).
-        unsafe { (self.functions.shutdown)(self.context) };
-    }
-}
-
-/// An open sensor.
-pub struct Device {
-    freenect: Freenect,
-    device: Handle,
-}
-
-impl Device {
     /// Start depth in 11-bit words, unpacked to 16.
-    pub fn start_depth(&self) -> Result<(), String> {
-        let f = &self.freenect.functions;
+    pub fn start_depth(&self) -> Result<(), &'static str> {
+        let f = &self.functions;
         // SAFETY: the device is open.
         unsafe {
             let mode = (f.find_depth_mode)(RESOLUTION_MEDIUM, DEPTH_11BIT);
-            if mode.is_valid == 0 || mode.bytes != DEPTH_BYTES as i32 {
-                return Err("it has no 11-bit depth of 640 x 480 px".into());
+            if !mode.has(DEPTH_BYTES) {
+                return Err("it has no 11-bit depth of 640 x 480 px");
             }
             (f.set_depth_callback)(self.device, on_depth);
-            if (f.set_depth_mode)(self.device, mode) < 0 || (f.start_depth)(self.device) < 0 {
-                return Err("depth cannot be started".into());
-            }
+            let started =
+                (f.set_depth_mode)(self.device, mode) >= 0 && (f.start_depth)(self.device) >= 0;
+            if started { Ok(()) } else { Err("depth cannot be started") }
         }
-        Ok(())
     }
 
     /// Start 10-bit infrared; false when the sensor will not.
     pub fn start_infrared(&self) -> bool {
-        let f = &self.freenect.functions;
+        let f = &self.functions;
         // SAFETY: the device is open.
         unsafe {
             let mode = (f.find_video_mode)(RESOLUTION_MEDIUM, VIDEO_IR_10BIT);
-            if mode.is_valid == 0 || mode.bytes != INFRARED_BYTES as i32 {
-                return false;
-            }
             (f.set_video_callback)(self.device, on_video);
-            (f.set_video_mode)(self.device, mode) >= 0 && (f.start_video)(self.device) >= 0
+            mode.has(INFRARED_BYTES)
+                && (f.set_video_mode)(self.device, mode) >= 0
+                && (f.start_video)(self.device) >= 0
         }
     }
 
     /// What the factory measured on this unit: its reference plane and shift.
     pub fn zero_plane(&self) -> Option<(ZeroPlane, f64)> {
-        let f = &self.freenect.functions;
+        let f = &self.functions;
         let (copy, destroy) = (f.copy_registration?, f.destroy_registration?);
-        // SAFETY: the copy's tables are freed by its own function.
+        // SAFETY: the device is open, and the copy's tables are freed by its own function.
         unsafe {
             let mut registration = copy(self.device);
             let found = (registration.zero_plane, registration.const_shift);
@@ -364,21 +333,25 @@ impl Device {
     /// Let the library work for at most 0.1 s; negative when the sensor is gone.
     pub fn process_events(&self) -> i32 {
         let mut wait = TimeValue { seconds: 0, microseconds: 100_000 };
-        // SAFETY: the context lives.
-        unsafe {
-            (self.freenect.functions.process_events_timeout)(self.freenect.context, &raw mut wait)
-        }
+        // SAFETY: the library is started.
+        unsafe { (self.functions.process_events_timeout)(self.context, &raw mut wait) }
     }
 }
 
-impl Drop for Device {
+impl Drop for Freenect {
     fn drop(&mut self) {
-        let f = &self.freenect.functions;
-        // SAFETY: stopping what was not started returns an error code, which is ignored.
+        let f = &self.functions;
+        // SAFETY: each once, the device before its context. Stopping what was not started returns
+        // an error code, which is ignored.
         unsafe {
-            (f.stop_depth)(self.device);
-            (f.stop_video)(self.device);
-            (f.close_device)(self.device);
+            if !self.device.is_null() {
+                (f.stop_depth)(self.device);
+                (f.stop_video)(self.device);
+                (f.close_device)(self.device);
+            }
+            if !self.context.is_null() {
+                (f.shutdown)(self.context);
+            }
         }
     }
 }

@@ -1,34 +1,29 @@
-//! A Kinect v1 through libfreenect, which is loaded at run time: nothing is needed to build.
+//! A Kinect v1 through libfreenect, which is loaded at run time: nothing is needed to build. A
+//! thread of its own serves it while a frame is looked at.
 
 mod dump;
 mod factory;
 mod ffi;
+mod unit;
 
-use std::ffi::CString;
 use std::path::PathBuf;
-use std::time::{Duration, Instant, UNIX_EPOCH};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::time::Duration;
 
-use super::source::{Arrival, End, LiveFrame, Source};
+use super::source::{Arrival, End, Source};
 use crate::error::{Error, Result};
-use crate::frame::Frame;
 use crate::io::Assumed;
 use crate::view::Sensor;
-use dump::Dump;
-use ffi::{Device, Freenect, HEIGHT, INFRARED_HEIGHT, Loaded, WIDTH};
+use unit::Unit;
 
-/// Names under which systems keep the library, most exact first.
-const NAMES: [&str; 6] = [
-    "libfreenect.so.0.5",
-    "libfreenect.so.0",
-    "libfreenect.so",
-    "libfreenect.dylib",
-    "/opt/homebrew/lib/libfreenect.dylib",
-    "/usr/local/lib/libfreenect.dylib",
-];
-const INSTALL: &str = "install it (Debian, Ubuntu: apt-get install libfreenect0.5; Fedora: dnf \
-    install libfreenect; macOS: brew install libfreenect), or name the file with --library";
-const PLUG_IN: &str =
-    "plug the Kinect into USB and its own power supply, and see that no other program uses it";
+/// Frames that may wait: two seconds of a Kinect, 37 MB.
+const CAPACITY: usize = 60;
+/// How long the thread waits for a frame before it looks whether anyone still listens.
+const POLL: Duration = Duration::from_millis(100);
+/// A device that takes longer to close is left to the end of the process.
+const MAX_CLOSING: Duration = Duration::from_secs(2);
 
 /// What the user asks of the sensor.
 #[derive(Debug, Clone, Default)]
@@ -45,14 +40,17 @@ pub struct FreenectOptions {
     pub dump: Option<PathBuf>,
 }
 
-/// A running Kinect.
+/// A running Kinect. Frames that do not fit into the queue are lost and counted; those of a dump
+/// wait.
 pub struct FreenectSource {
-    device: Device,
     sensor: Sensor,
-    infrared: bool,
-    /// What fakenect plays, the stand-in for libfreenect.
-    dump: Option<Dump>,
     remarks: Vec<String>,
+    live: bool,
+    /// `None` once nobody listens any more, which ends the thread.
+    arrivals: Option<Receiver<Arrival>>,
+    dropped: Arc<AtomicUsize>,
+    /// Disconnected when the thread has closed the sensor.
+    closed: Receiver<()>,
 }
 
 impl FreenectSource {
@@ -60,41 +58,49 @@ impl FreenectSource {
     ///
     /// # Errors
     /// When the library is missing or something else, no unit is there, or it cannot be started.
-    pub fn open(options: &FreenectOptions) -> Result<Self> {
-        let (library, dump) = load(options)?;
-        let serial = unit(&library, options.serial.as_deref())?;
-        let wanted = serial.as_deref().and_then(|s| CString::new(s).ok());
-        let device = library.open(wanted.as_deref()).map_err(|code| {
-            Error::sensor(
-                format!("the Kinect cannot be opened (code {code}{})", complained()),
-                "see that no other program uses it and that you may use USB devices (on Debian: \
-                 the package libfreenect0.5 brings the udev rules; plug the Kinect in again)",
-            )
-        })?;
-        let (sensor, mut remarks) = factory::sensor(serial, device.zero_plane(), &options.assumed);
-        if let Some(fault) = sensor.fault() {
-            return Err(Error::Argument {
-                what: fault,
-                remedy: "correct --intrinsics or --raw-disparity",
-            });
-        }
-        device.start_depth().map_err(|what| Error::sensor(what + &complained(), PLUG_IN))?;
-        // The stand-in aborts when it is asked for a mode it has not.
-        let infrared = options.infrared && dump.is_none() && device.start_infrared();
-        if options.infrared && !infrared {
-            remarks.push("no infrared beside the depth; depth alone is recorded".into());
-        }
-        Ok(FreenectSource { device, sensor, infrared, dump, remarks })
+    pub fn open(options: FreenectOptions) -> Result<Self> {
+        let (to_queue, arrivals) = sync_channel(CAPACITY);
+        let (to_opened, opened) = sync_channel(1);
+        let (to_closed, closed) = sync_channel(0);
+        let dropped = Arc::new(AtomicUsize::new(0));
+        let count = dropped.clone();
+        std::thread::spawn(move || {
+            // Dropped last, when the sensor is closed.
+            let _closed: SyncSender<()> = to_closed;
+            match Unit::open(&options) {
+                Ok(unit) => {
+                    let about = (unit.sensor.clone(), unit.remarks.clone(), unit.live());
+                    if to_opened.send(Ok(about)).is_ok() {
+                        serve(unit, &to_queue, &count);
+                    }
+                }
+                Err(e) => drop(to_opened.send(Err(e))),
+            }
+        });
+        let lost = |_| Error::sensor("its thread ended before it began", "try again");
+        let (sensor, remarks, live) = opened.recv().map_err(lost)??;
+        Ok(FreenectSource { sensor, remarks, live, arrivals: Some(arrivals), dropped, closed })
     }
+}
 
-    fn frame(&self) -> Option<LiveFrame> {
-        let (arrived, bytes) = ffi::depth()?;
-        let infrared = if self.infrared { ffi::infrared() } else { None };
-        Some(LiveFrame {
-            stamp: arrived.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64(),
-            depth: picture(&bytes),
-            infrared: infrared.map(|bytes| picture(middle_rows(&bytes))),
-        })
+/// Pass arrivals on until the last, or until nobody listens.
+fn serve(mut unit: Unit, to: &SyncSender<Arrival>, dropped: &AtomicUsize) {
+    loop {
+        let arrival = unit.next(POLL);
+        let (is_frame, is_last) =
+            (matches!(arrival, Arrival::Frame(_)), matches!(arrival, Arrival::End(_)));
+        let listened_to = if is_last || !unit.live() {
+            to.send(arrival).is_ok()
+        } else {
+            let sent = to.try_send(arrival);
+            if is_frame && matches!(sent, Err(TrySendError::Full(_))) {
+                dropped.fetch_add(1, Ordering::Relaxed);
+            }
+            !matches!(sent, Err(TrySendError::Disconnected(_)))
+        };
+        if is_last || !listened_to {
+            return;
+        }
     }
 }
 
@@ -103,29 +109,20 @@ impl Source for FreenectSource {
         &self.sensor
     }
 
-    fn next(&mut self, wait: Duration) -> Result<Arrival> {
-        let begun = Instant::now();
-        loop {
-            if let Some(frame) = self.frame() {
-                return Ok(Arrival::Frame(frame));
-            }
-            if let Some(Err(why)) = self.dump.as_mut().map(Dump::advance) {
-                return Ok(Arrival::End(End { why, lost: true }));
-            }
-            if self.device.process_events() < 0 {
-                let gone = "the Kinect is gone (unplugged, or without power)";
-                let why = format!("{gone}{}", complained());
-                return Ok(Arrival::End(End { why, lost: true }));
-            }
-            if begun.elapsed() >= wait && self.dump.is_none() {
-                return Ok(self.frame().map_or(Arrival::Nothing, Arrival::Frame));
-            }
+    fn next(&mut self, wait: Duration) -> Arrival {
+        match self.arrivals.as_ref().map(|queue| queue.recv_timeout(wait)) {
+            Some(Ok(arrival)) => arrival,
+            Some(Err(RecvTimeoutError::Timeout)) => Arrival::Nothing,
+            _ => Arrival::End(End { why: "the sensor's thread has ended".into(), lost: true }),
         }
     }
 
-    /// A dump waits; a sensor does not.
     fn live(&self) -> bool {
-        self.dump.is_none()
+        self.live
+    }
+
+    fn dropped(&self) -> usize {
+        self.dropped.load(Ordering::Relaxed)
     }
 
     fn remarks(&self) -> &[String] {
@@ -133,71 +130,9 @@ impl Source for FreenectSource {
     }
 }
 
-/// The library, and the dump that it plays if it is the stand-in.
-fn load(options: &FreenectOptions) -> Result<(Freenect, Option<Dump>)> {
-    let candidates = match &options.library {
-        Some(path) => vec![path.clone()],
-        None => NAMES.map(PathBuf::from).into(),
-    };
-    let mut first = None;
-    for path in &candidates {
-        let loaded = Loaded::open(path);
-        let dump = match &loaded {
-            Ok(library) if library.is_stand_in() => Some(dump_to_play(options)?),
-            _ => None,
-        };
-        match loaded.and_then(Loaded::start) {
-            Ok(library) => return Ok((library, dump)),
-            Err(why) => drop(first.get_or_insert(format!("{}: {why}", path.display()))),
-        }
+impl Drop for FreenectSource {
+    fn drop(&mut self) {
+        self.arrivals = None;
+        let _ = self.closed.recv_timeout(MAX_CLOSING);
     }
-    let why = first.unwrap_or_default();
-    Err(Error::sensor(format!("libfreenect cannot be loaded ({why})"), INSTALL))
-}
-
-fn dump_to_play(options: &FreenectOptions) -> Result<Dump> {
-    let missing = || {
-        let what =
-            "this libfreenect is the stand-in, and FAKENECT_PATH does not say what it is to play";
-        Error::sensor(what, "set FAKENECT_PATH to a folder made by fakenect-record")
-    };
-    Dump::open(options.dump.as_ref().ok_or_else(missing)?)
-}
-
-/// Which unit to open: its serial where the library knows it.
-fn unit(library: &Freenect, wanted: Option<&str>) -> Result<Option<String>> {
-    if library.devices() < 1 {
-        return Err(Error::sensor("no Kinect is connected (0 devices)", PLUG_IN));
-    }
-    let serials = library.serials();
-    match (wanted, &serials) {
-        (Some(wanted), Some(known)) if !known.iter().any(|s| s == wanted) => Err(Error::sensor(
-            format!("no Kinect {wanted} is connected, but {}", known.join(", ")),
-            "correct --serial",
-        )),
-        (Some(wanted), _) => Ok(Some(wanted.into())),
-        // Later models have zeros for a serial.
-        (None, known) => {
-            Ok(known.iter().flatten().next().filter(|s| s.chars().any(|c| c != '0')).cloned())
-        }
-    }
-}
-
-fn complained() -> String {
-    match ffi::complaint() {
-        said if said.is_empty() => said,
-        said => format!("; libfreenect says: {said}"),
-    }
-}
-
-/// Little-endian 16-bit values, as the library unpacks them on every machine it is built for.
-fn picture(bytes: &[u8]) -> Frame {
-    let words = bytes.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
-    Frame { width: WIDTH, height: HEIGHT, raw: words }
-}
-
-/// The 480 rows in the middle of 488.
-fn middle_rows(bytes: &[u8]) -> &[u8] {
-    let first = 2 * WIDTH * (INFRARED_HEIGHT - HEIGHT) / 2;
-    &bytes[first..first + 2 * WIDTH * HEIGHT]
 }

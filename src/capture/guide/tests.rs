@@ -122,7 +122,7 @@ fn keys_are_about_what_is_being_taken() {
     );
     assert_eq!(g.wanted().views.len(), 2, "a new view that failed is wanted by nobody");
     story(&mut g, at(2.2, 3));
-    assert!(matches!(g.leave("stopped"), Some(Event::Abandoned { .. })));
+    assert!(matches!(g.leave(), Some(Event::Abandoned { .. })));
     assert_eq!(g.wanted().views.len(), 2);
 }
 

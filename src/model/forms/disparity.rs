@@ -1,26 +1,19 @@
 //! Constant disparity noise and a constant floor, added as variances.
 
-use super::{MAX_PARAMETERS, SigmaForm, Start, Walk};
+use super::{Card, MAX_PARAMETERS, SigmaForm, Start, Walk};
 use crate::model::rows::Rows;
 
-#[derive(Debug)]
 pub(super) struct Disparity;
 
 impl SigmaForm for Disparity {
-    fn id(&self) -> &'static str {
-        "disparity"
-    }
-
-    fn formula(&self) -> &'static str {
-        "sigma^2 = s0^2 + (k z^2)^2 (m; z in m); k times fx * baseline is the disparity noise in px"
-    }
-
-    fn reference(&self) -> &'static str {
-        "z = fx b / d with constant noise in d, and a floor from rounding and the target"
-    }
-
-    fn parameters(&self) -> &'static [(&'static str, Walk)] {
-        &[("k", Walk::Log), ("s0", Walk::Log)]
+    fn card(&self) -> &'static Card {
+        &Card {
+            id: "disparity",
+            formula: "sigma^2 = s0^2 + (k z^2)^2 (m; z in m); k times fx * baseline is the disparity noise in px",
+            reference: "z = fx b / d with constant noise in d, and a floor from rounding and the target",
+            parameters: &[("k", Walk::Log), ("s0", Walk::Log)],
+            distances_needed: 2,
+        }
     }
 
     fn sigma(&self, p: &[f64], z: f64, _theta: f64) -> f64 {
@@ -44,24 +37,12 @@ impl SigmaForm for Disparity {
         let least = rows.iter().map(|r| r.sigma_m).fold(f64::INFINITY, f64::min);
         let largest = rows.iter().map(|r| r.sigma_m / (r.z_m * r.z_m)).fold(0.0, f64::max);
         let k = squares[0].max(0.0).sqrt().max(1e-3 * largest);
-        if squares[1] <= 0.0 {
-            return Some(Start {
-                parameters: vec![k, 1e-2 * least],
-                held: vec![false, true],
-                remarks: vec![
-                    "no floor s0 shows in the data; it is held at a hundredth of the least sigma"
-                        .into(),
-                ],
-            });
-        }
+        let no_floor = squares[1] <= 0.0;
+        let held = "no floor s0 shows in the data; it is held at a hundredth of the least sigma";
         Some(Start {
-            parameters: vec![k, squares[1].sqrt()],
-            held: vec![false; 2],
-            remarks: Vec::new(),
+            parameters: vec![k, if no_floor { 1e-2 * least } else { squares[1].sqrt() }],
+            held: vec![false, no_floor],
+            remarks: no_floor.then(|| held.into()).into_iter().collect(),
         })
-    }
-
-    fn distances_needed(&self) -> usize {
-        2
     }
 }

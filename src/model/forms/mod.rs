@@ -9,6 +9,8 @@ mod tilt;
 use std::fmt;
 use std::str::FromStr;
 
+use nalgebra::DMatrix;
+
 use super::rows::Rows;
 
 pub use paper::PAPER_EQ1;
@@ -35,14 +37,21 @@ pub struct Start {
     pub remarks: Vec<String>,
 }
 
+/// What is said of a form.
+pub struct Card {
+    pub id: &'static str,
+    /// As text, with units.
+    pub formula: &'static str,
+    /// Where it comes from.
+    pub reference: &'static str,
+    pub parameters: &'static [(&'static str, Walk)],
+    /// Fewest different distances the form needs.
+    pub distances_needed: usize,
+}
+
 /// A formula for sigma.
 pub trait SigmaForm: Sync {
-    fn id(&self) -> &'static str;
-    /// As text, with units.
-    fn formula(&self) -> &'static str;
-    /// Where it comes from.
-    fn reference(&self) -> &'static str;
-    fn parameters(&self) -> &'static [(&'static str, Walk)];
+    fn card(&self) -> &'static Card;
     /// sigma in m at depth z (m) and tilt theta (rad).
     fn sigma(&self, p: &[f64], z: f64, theta: f64) -> f64;
     /// Derivatives of sigma by the parameters, into the first slots of `out`.
@@ -61,15 +70,12 @@ pub trait SigmaForm: Sync {
     fn limits(&self, _i: usize, _rows: &Rows) -> Option<[f64; 2]> {
         None
     }
-    /// Fewest different distances the form needs.
-    fn distances_needed(&self) -> usize;
     /// What to say of parameter `i` when its standard error is of the size of its value.
     fn why_weak(&self, _i: usize, _rows: &Rows) -> Option<String> {
         None
     }
 }
 
-/// The forms there are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Form {
     Paper,
@@ -90,8 +96,12 @@ impl Form {
         }
     }
 
+    pub fn card(self) -> &'static Card {
+        self.spec().card()
+    }
+
     pub fn id(self) -> &'static str {
-        self.spec().id()
+        self.card().id
     }
 }
 
@@ -112,6 +122,28 @@ impl FromStr for Form {
     }
 }
 
+/// Whitened derivatives of sigma by the free parameters, a row a measurement.
+pub fn natural_jacobian(
+    rows: &Rows,
+    spec: &dyn SigmaForm,
+    p: &[f64],
+    free: &[usize],
+) -> DMatrix<f64> {
+    let n = rows.len();
+    let mut j = DMatrix::zeros(n, free.len());
+    let mut gradient = [0.0; MAX_PARAMETERS];
+    for (i, r) in rows.iter().enumerate() {
+        spec.gradient(p, r.z_m, r.theta_rad, &mut gradient);
+        for (column, &k) in free.iter().enumerate() {
+            j[(i, column)] = gradient[k];
+        }
+    }
+    for column in 0..free.len() {
+        rows.whiten(&mut j.as_mut_slice()[column * n..(column + 1) * n]);
+    }
+    j
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -127,7 +159,7 @@ mod tests {
                 Form::Khoshelham => vec![1.425e-3],
                 Form::Disparity => vec![1.4e-3, 0.8e-3],
             };
-            assert_eq!(p.len(), spec.parameters().len());
+            assert_eq!(p.len(), form.card().parameters.len());
             for (z, theta) in [(0.8, 0.0), (1.0, 0.6), (3.7, 1.25)] {
                 let mut gradient = [0.0; MAX_PARAMETERS];
                 spec.gradient(&p, z, theta, &mut gradient);

@@ -1,10 +1,9 @@
 //! Nguyen, Izadi and Lovell 2012: the paper's predecessor.
 
 use super::paper::{parabola_start, vertex_gradient};
-use super::{MAX_PARAMETERS, SigmaForm, Start, Walk};
+use super::{Card, MAX_PARAMETERS, SigmaForm, Start, Walk};
 use crate::model::rows::Rows;
 
-#[derive(Debug)]
 pub(super) struct Nguyen;
 
 /// theta^2 / (pi/2 - theta)^2 / sqrt(z).
@@ -13,20 +12,19 @@ fn tilt(z: f64, theta: f64) -> f64 {
 }
 
 impl SigmaForm for Nguyen {
-    fn id(&self) -> &'static str {
-        "nguyen"
-    }
-
-    fn formula(&self) -> &'static str {
-        "sigma = a + b (z - c)^2 + d / sqrt(z) * theta^2 / (pi/2 - theta)^2 (m; z in m, theta in rad)"
-    }
-
-    fn reference(&self) -> &'static str {
-        "Nguyen, Izadi and Lovell, 3DIMPVT 2012; theirs: 0.0012, 0.0019, 0.4, 0.0001"
-    }
-
-    fn parameters(&self) -> &'static [(&'static str, Walk)] {
-        &[("a", Walk::Linear), ("b", Walk::Log), ("c", Walk::Linear), ("d", Walk::Log)]
+    fn card(&self) -> &'static Card {
+        &Card {
+            id: "nguyen",
+            formula: "sigma = a + b (z - c)^2 + d / sqrt(z) * theta^2 / (pi/2 - theta)^2 (m; z in m, theta in rad)",
+            reference: "Nguyen, Izadi and Lovell, 3DIMPVT 2012; theirs: 0.0012, 0.0019, 0.4, 0.0001",
+            parameters: &[
+                ("a", Walk::Linear),
+                ("b", Walk::Log),
+                ("c", Walk::Linear),
+                ("d", Walk::Log),
+            ],
+            distances_needed: 3,
+        }
     }
 
     fn sigma(&self, p: &[f64], z: f64, theta: f64) -> f64 {
@@ -48,9 +46,5 @@ impl SigmaForm for Nguyen {
 
     fn start(&self, rows: &Rows) -> Option<Start> {
         parabola_start(rows, |r| tilt(r.z_m, r.theta_rad))
-    }
-
-    fn distances_needed(&self) -> usize {
-        3
     }
 }

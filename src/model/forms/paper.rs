@@ -1,14 +1,13 @@
 //! Yamaguchi et al. 2016, Eq. 1: six parameters.
 
 use super::tilt::{BestTilt, EXPONENTS, LOG_POLE, TiltSearch, tilt};
-use super::{MAX_PARAMETERS, SigmaForm, Start, Walk};
+use super::{Card, MAX_PARAMETERS, SigmaForm, Start, Walk};
 use crate::measure::SigmaRow;
 use crate::model::rows::Rows;
 
 /// a, b, c, d, e, f as printed (m and rad).
 pub const PAPER_EQ1: [f64; 6] = [0.00151, 0.00215, 0.483, 1.88e-6, 2.01, 1.39];
 
-#[derive(Debug)]
 pub(super) struct Paper;
 
 /// Derivatives of a + b (z - c)^2 by a, b, c.
@@ -33,7 +32,6 @@ const VERTEX_REACH_M: f64 = 5.0;
 pub(super) fn parabola_start(rows: &Rows, h: impl Fn(&SigmaRow) -> f64) -> Option<Start> {
     let tilted = tilts_differ(rows) && rows.iter().any(|r| h(r) > 0.0);
     let mut remarks = Vec::new();
-    let mut with_tilt = tilted;
     let columns = |tilt: bool| {
         rows.solve_linear(3 + usize::from(tilt), |r, out| {
             out[0] = 1.0;
@@ -44,37 +42,31 @@ pub(super) fn parabola_start(rows: &Rows, h: impl Fn(&SigmaRow) -> f64) -> Optio
             }
         })
     };
-    let mut q = columns(with_tilt);
-    if with_tilt && q.as_ref().is_none_or(|q| q[3] <= 0.0) {
-        with_tilt = false;
-        q = columns(false);
-    }
+    let full = if tilted { columns(true).filter(|q| q[3] > 0.0) } else { None };
+    let (with_tilt, d) = (full.is_some(), full.as_ref().map_or(0.0, |q| q[3]));
+    let q = full.or_else(|| columns(false));
     let near = |c: f64| (-VERTEX_REACH_M..=VERTEX_REACH_M).contains(&c);
-    let abc = q.as_ref().and_then(|q| vertex(q[0], q[1], q[2])).filter(|abc| near(abc[2]));
-    let (abc, held_c) = match abc {
-        Some(abc) => (abc, false),
-        None => (vertex_held(rows, &mut remarks)?, true),
+    let abc = q.and_then(|q| vertex(q[0], q[1], q[2])).filter(|abc| near(abc[2]));
+    let held_c = abc.is_none();
+    let [a, b, c] = match abc {
+        Some(abc) => abc,
+        None => vertex_held(rows, &mut remarks)?,
     };
-    let d = match (with_tilt, &q) {
-        (true, Some(q)) => q[3],
-        _ => 0.0,
-    };
-    if !with_tilt {
-        remarks.push(if tilted {
-            "tilt adds no noise that these views show: d is held at zero".into()
-        } else {
-            "all views have the same tilt: d is held at zero".into()
-        });
+    match (with_tilt, tilted) {
+        (true, _) => {}
+        (_, true) => {
+            remarks.push("tilt adds no noise that these views show: d is held at zero".into());
+        }
+        _ => remarks.push("all views have the same tilt: d is held at zero".into()),
     }
     Some(Start {
-        parameters: vec![abc[0], abc[1], abc[2], d],
+        parameters: vec![a, b, c, d],
         held: vec![false, false, held_c, !with_tilt],
         remarks,
     })
 }
 
-/// Do the views differ in tilt at all? Where they do not, the tilt term is one more parabola and
-/// its coefficient anything.
+/// Do the views differ in tilt at all? If not, the tilt term is one more parabola.
 fn tilts_differ(rows: &Rows) -> bool {
     let [least, most] = rows.range(|r| r.theta_rad);
     most - least > ONE_TILT_DEG.to_radians()
@@ -101,27 +93,21 @@ fn vertex_held(rows: &Rows, remarks: &mut Vec<String>) -> Option<[f64; 3]> {
 const TILT_WORTH: f64 = 11.3;
 
 impl SigmaForm for Paper {
-    fn id(&self) -> &'static str {
-        "paper"
-    }
-
-    fn formula(&self) -> &'static str {
-        "sigma = a + b (z - c)^2 + d z^e theta^2 / (f - theta)^2 (m; z in m, theta in rad)"
-    }
-
-    fn reference(&self) -> &'static str {
-        "Yamaguchi, Emaru, Kobayashi and Ravankar, SII 2016, Eq. 1"
-    }
-
-    fn parameters(&self) -> &'static [(&'static str, Walk)] {
-        &[
-            ("a", Walk::Linear),
-            ("b", Walk::Log),
-            ("c", Walk::Linear),
-            ("d", Walk::Log),
-            ("e", Walk::Linear),
-            ("f", Walk::LogAboveTheta),
-        ]
+    fn card(&self) -> &'static Card {
+        &Card {
+            id: "paper",
+            formula: "sigma = a + b (z - c)^2 + d z^e theta^2 / (f - theta)^2 (m; z in m, theta in rad)",
+            reference: "Yamaguchi, Emaru, Kobayashi and Ravankar, SII 2016, Eq. 1",
+            parameters: &[
+                ("a", Walk::Linear),
+                ("b", Walk::Log),
+                ("c", Walk::Linear),
+                ("d", Walk::Log),
+                ("e", Walk::Linear),
+                ("f", Walk::LogAboveTheta),
+            ],
+            distances_needed: 3,
+        }
     }
 
     fn sigma(&self, p: &[f64], z: f64, theta: f64) -> f64 {
@@ -153,10 +139,6 @@ impl SigmaForm for Paper {
             Some(best) => with_tilt(rows, &best),
             None => without_tilt(rows),
         }
-    }
-
-    fn distances_needed(&self) -> usize {
-        3
     }
 
     fn limits(&self, i: usize, rows: &Rows) -> Option<[f64; 2]> {
@@ -202,8 +184,7 @@ fn without_tilt(rows: &Rows) -> Option<Start> {
     Some(start)
 }
 
-/// Without a view this steep e and f are not even looked for: whatever else grows with tilt would
-/// be dressed up as a pole.
+/// Without a view this steep whatever else grows with tilt would be dressed up as a pole.
 const TILT_MAY_SHOW_DEG: f64 = 70.0;
 
 /// Below this the tilt term of Eq. 1 is under a tenth of the axial one (between 0.5 and 4 m that is at 71.9 to 73.5 degrees).

@@ -5,35 +5,41 @@ use maud::{Markup, html};
 use crate::error::Result;
 use crate::measure::{ReferenceDistance, ViewMeasurement};
 use crate::report::axis::Axis;
-use crate::report::document::{row, table};
+use crate::report::document::{Column, table_of};
 use crate::report::numbers::{ABSENT, MM, degrees, fixed, millimetres};
 use crate::report::residuals::{residual_image, scale};
 
-const COLUMNS: [&str; 17] = [
-    "view",
-    ">z m",
-    ">axis m",
-    ">off reference mm",
-    ">θ °",
-    ">azimuth °",
-    ">σ ± s.e. mm",
-    ">temporal σ mm",
-    ">normal σ mm",
-    ">paper z m",
-    ">paper θ °",
-    ">paper σ mm",
-    ">n",
-    ">n effective",
-    ">corr. px",
-    ">frames",
-    ">pixels left out",
-];
-
-pub(super) fn table_of(views: &[ViewMeasurement]) -> Markup {
+pub(super) fn section(views: &[ViewMeasurement]) -> Markup {
+    let optional = |text: Option<String>| html! { (text.as_deref().unwrap_or(ABSENT)) };
+    let mm = |metres: f64| html! { (millimetres(metres)) };
+    let columns: [Column<'_, ViewMeasurement>; 17] = [
+        ("view", &|v| html! { (v.name) }),
+        (">z m", &|v| html! { (fixed(v.z_m, 3)) }),
+        (">axis m", &|v| html! { (fixed(v.axis_distance_m, 3)) }),
+        (">off reference mm", &|v| optional(v.reference().map(off_reference))),
+        (">θ °", &|v| html! { (degrees(v.theta_rad)) }),
+        (">azimuth °", &|v| html! { (degrees(v.azimuth_rad)) }),
+        (
+            ">σ ± s.e. mm",
+            &|v| html! { (mm(v.whole.spread.spatial_m)) " ± " (mm(v.whole.std_error_m)) },
+        ),
+        (">temporal σ mm", &|v| optional(v.whole.spread.temporal_m.map(millimetres))),
+        (">normal σ mm", &|v| mm(v.whole.spread.perpendicular_m)),
+        (">paper z m", &|v| optional(v.paper.map(|p| fixed(p.z_m, 3)))),
+        (">paper θ °", &|v| optional(v.paper.map(|p| degrees(p.theta_rad)))),
+        (">paper σ mm", &|v| optional(v.paper.map(|p| millimetres(p.sigma_m)))),
+        (">n", &|v| html! { (v.whole.n) }),
+        (">n effective", &|v| html! { (fixed(v.whole.n_effective, 0)) }),
+        (">corr. px", &|v| html! { (correlation(v)) }),
+        (">frames", &|v| html! { (v.frames) }),
+        (">pixels left out", &|v| {
+            html! { (v.exclusions.invalid) " / " (v.exclusions.off_plane) " / " (v.exclusions.edge) }
+        }),
+    ];
     html! {
         section {
             h2 { "Views" }
-            (table(&COLUMNS, views.iter().map(cells)))
+            (table_of(&columns, views))
             p.note {
                 "z: mean depth of the target. Axis: depth of its plane on the optical axis. Off reference: that \
                  minus the distance measured by other means, “(!)” where they differ by more than "
@@ -45,31 +51,6 @@ pub(super) fn table_of(views: &[ViewMeasurement]) -> Markup {
             }
         }
     }
-}
-
-fn cells(view: &ViewMeasurement) -> Vec<Markup> {
-    let (whole, spread) = (&view.whole, view.whole.spread);
-    let paper = |f: &dyn Fn(&_) -> String| view.paper.as_ref().map_or(ABSENT.into(), f);
-    let out = view.exclusions;
-    row![
-        view.name,
-        fixed(view.z_m, 3),
-        fixed(view.axis_distance_m, 3),
-        view.reference().map_or(ABSENT.into(), off_reference),
-        degrees(view.theta_rad),
-        degrees(view.azimuth_rad),
-        format!("{} ± {}", millimetres(spread.spatial_m), millimetres(whole.std_error_m)),
-        spread.temporal_m.map_or(ABSENT.into(), millimetres),
-        millimetres(spread.perpendicular_m),
-        paper(&|p| fixed(p.z_m, 3)),
-        paper(&|p| degrees(p.theta_rad)),
-        paper(&|p| millimetres(p.sigma_m)),
-        whole.n,
-        fixed(whole.n_effective, 0),
-        correlation(view),
-        view.frames,
-        format!("{} / {} / {}", out.invalid, out.off_plane, out.edge),
-    ]
 }
 
 /// Signed, in mm, and marked where it is too much.

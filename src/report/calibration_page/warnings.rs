@@ -25,21 +25,17 @@ pub(super) fn section(warnings: &[String], excluded: &[Excluded]) -> Markup {
             @if warnings.is_empty() { p { "None." } }
             (list(general.iter().map(|w| html! { (w) })))
             @if !excluded.is_empty() {
-                (long(&format!("{} left out", counted(excluded.len(), "view")), excluded.len(),
-                    &list(excluded.iter().map(|e| html! { b { (e.view) } ": " (e.reason) }))))
+                @let title = format!("{} left out", counted(excluded.len(), "view"));
+                @let items = list(excluded.iter().map(|e| html! { b { (e.view) } ": " (e.reason) }));
+                (fold(&title, excluded.len() <= MAX_OPEN, &items))
             }
             @for group in grouped(&views) {
                 @let items = list(group.iter().map(|w| html! { (w) }));
-                @if group.len() <= MAX_OPEN { (items) } @else {
-                    (long(&format!("{} like: {}", counted(group.len(), "remark"), group[0]), group.len(), &items))
-                }
+                @let title = format!("{} like: {}", counted(group.len(), "remark"), group[0]);
+                @if group.len() <= MAX_OPEN { (items) } @else { (fold(&title, false, &items)) }
             }
         }
     }
-}
-
-fn long(title: &str, length: usize, items: &Markup) -> Markup {
-    fold(title, length <= MAX_OPEN, items)
 }
 
 fn counted(n: usize, noun: &str) -> String {

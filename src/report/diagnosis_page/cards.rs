@@ -1,14 +1,14 @@
 //! A card for each finding: what it is, where, how large, how sure, and what to do next.
 
 use maud::{Markup, PreEscaped, html};
-use serde_json::Value;
 
-use super::advice::advice;
 use super::sentences::{
-    axis, badge, called, capital, chance, description, interval, mm, physics, statistic, title,
+    axis, badge, called, capital, chance, description, interval, mm, physics, sentence, statistic,
+    title,
 };
 use super::{curve, parameters};
-use crate::diagnose::{Finding, Status};
+use crate::capture::far_side;
+use crate::diagnose::{Finding, NextView, Status};
 use crate::error::Result;
 use crate::report::document::{facts, list};
 use crate::report::numbers::{fixed, p_value, percent, significant};
@@ -16,6 +16,8 @@ use crate::terms::Statistic;
 
 /// Smaller probabilities are nil.
 const MIN_PROBABILITY: f64 = 0.0005;
+/// Below this tilt a target counts as facing the sensor, rad: 3 degrees.
+const FACING_RAD: f64 = 0.0524;
 
 pub(super) fn findings(findings: &[Finding]) -> Result<Markup> {
     let cards = findings.iter().enumerate().map(card).collect::<Result<Vec<Markup>>>()?;
@@ -50,59 +52,53 @@ fn card((i, finding): (usize, &Finding)) -> Result<Markup> {
 }
 
 /// Those that are known.
-fn finding_facts(finding: &Finding) -> Vec<(String, Markup)> {
+fn finding_facts(finding: &Finding) -> Vec<(&str, Markup)> {
     let place = interval(finding.axis, finding.interval, finding.unit);
     let mut facts = vec![
-        ("What is off".into(), html! { (capital(statistic(finding.statistic))) }),
-        ("Where".into(), html! { (capital(axis(finding.axis))) ": " b { (place) } }),
+        ("What is off", html! { (capital(statistic(finding.statistic))) }),
+        ("Where", html! { (capital(axis(finding.axis))) ": " b { (place) } }),
     ];
-    facts.extend(size(finding).map(|size| ("How large".into(), size)));
+    let (size, p) = (finding.size, finding.p_adjusted);
+    if size.mm.abs() > 0.0 || size.sigma.abs() > 0.0 {
+        let bias = finding.statistic == Statistic::Bias;
+        let noise = if bias { "of a single reading" } else { "in the model" };
+        facts.push(("How large", html! {
+            @if finding.statistic == Statistic::Dropout {
+                b { (percent(size.sigma)) } " of the pixels are lost"
+            } @else {
+                b { (mm(size.mm)) } " rms, " b { (significant(size.sigma, 2)) " times" } " the noise " (noise)
+            }
+        }));
+    }
     if finding.status != Status::NotIdentifiable {
-        facts.push(("How sure".into(), certainty(finding)));
-        facts.extend(share(finding).map(|share| ("Share".into(), share)));
+        facts.push((
+            "How sure",
+            html! {
+                (capital(&chance(p)))
+                @if p.is_finite() { " (" (p_value(p)) ")" }
+            },
+        ));
+        if finding.share.is_finite() {
+            let percent = fixed((100.0 * finding.share).clamp(0.0, 100.0), 0);
+            facts.push((
+                "Share",
+                html! {
+                    span.bar { span style={ "width:" (percent) "%" } {} }
+                    " " b { (percent) " %" } " of all that was explained"
+                },
+            ));
+        }
     }
-    facts.extend(finding.parameters.iter().map(|(k, v)| parameter(finding.effect, k, v)));
+    // `amplitude_px = 0.3 ± 0.1 px`, and what that is.
+    facts.extend(finding.parameters.iter().map(|(name, value)| {
+        let description = parameters::description(finding.effect, name);
+        let value = html! {
+            b { (parameters::value(name, value, 3)) }
+            @if !description.is_empty() { ": " (description) }
+        };
+        (name.as_str(), value)
+    }));
     facts
-}
-
-fn share(finding: &Finding) -> Option<Markup> {
-    let percent = (100.0 * finding.share).clamp(0.0, 100.0);
-    finding.share.is_finite().then(|| {
-        html! {
-            span.bar { span style={ "width:" (format!("{percent:.0}")) "%" } {} }
-            " " b { (fixed(percent, 0)) " %" } " of all that was explained"
-        }
-    })
-}
-
-fn size(finding: &Finding) -> Option<Markup> {
-    let size = finding.size;
-    let noise =
-        if finding.statistic == Statistic::Bias { "of a single reading" } else { "in the model" };
-    (size.mm.abs() > 0.0 || size.sigma.abs() > 0.0).then(|| html! {
-        @if finding.statistic == Statistic::Dropout {
-            b { (percent(size.sigma)) } " of the pixels are lost"
-        } @else {
-            b { (mm(size.mm)) } " rms, " b { (significant(size.sigma, 2)) " times" } " the noise " (noise)
-        }
-    })
-}
-
-fn certainty(finding: &Finding) -> Markup {
-    html! {
-        (capital(&chance(finding.p_adjusted)))
-        @if finding.p_adjusted.is_finite() { " (" (p_value(finding.p_adjusted)) ")" }
-    }
-}
-
-/// `amplitude_px = 0.3 ± 0.1 px`, and what that is.
-fn parameter(effect: Option<&str>, name: &str, value: &Value) -> (String, Markup) {
-    let description = parameters::description(effect, name);
-    let value = html! {
-        b { (parameters::value(name, value, 3)) }
-        @if !description.is_empty() { ": " (description) }
-    };
-    (name.into(), value)
 }
 
 /// Every effect that it could be, best first.
@@ -119,4 +115,47 @@ fn alternatives(finding: &Finding) -> Markup {
         h3 { "What it could be" }
         (list(effects.chain(none)))
     } }
+}
+
+/// What to do next; nothing where nothing is asked of anybody.
+fn advice(finding: &Finding) -> Option<Markup> {
+    let view = finding.next_view.as_ref();
+    let more = match finding.status {
+        Status::Named => "",
+        Status::OneOf if view.is_some() => {
+            "Then diagnose again with this view added to the recording."
+        }
+        Status::OneOf => {
+            "These views do not separate the alternatives. Add views at other distances and tilts, and diagnose again."
+        }
+        Status::Unexplained => {
+            "The simulation can use the measured curve as it is. To find the cause, change one thing at a time \
+             (distance, tilt, place in the picture, light, time since switching on) and see what the curve follows."
+        }
+        Status::Recalibrate => {
+            "Run “kinoise calibrate” on this recording and diagnose again with the new model. No effect has to be \
+             added to the simulation."
+        }
+        Status::NotIdentifiable if view.is_none() && finding.statistic == Statistic::Bias => {
+            "A plane with this error still looks like a plane. Measure the distance from sensor to target with a tape \
+             in a few views at different distances, write it into each view's view.json as “reference_distance_m”, \
+             and diagnose again."
+        }
+        Status::NotIdentifiable => "Add views at other distances and tilts, and diagnose again.",
+    };
+    (view.is_some() || !more.is_empty())
+        .then(|| html! { @if let Some(view) = view { (next_view(view)) } (more) })
+}
+
+/// An instruction to a person holding a target.
+fn next_view(next: &NextView) -> Markup {
+    let tilt = fixed(next.theta_rad.to_degrees(), 0);
+    let far = far_side(next.azimuth_rad);
+    let part = if far.contains(' ') { "corner" } else { "side" };
+    html! {
+        "Take one more view: hold the target " b { (fixed(next.z_m, 2)) " m" } " in front of the sensor, "
+        @if next.theta_rad.abs() < FACING_RAD { b { "facing it" } ". " }
+        @else { b { "tilted by " (tilt) "°" } ", its " b { (far) " " (part) } " farthest away as the sensor sees it. " }
+        @if !next.why.is_empty() { (sentence(&next.why)) " " }
+    }
 }

@@ -19,11 +19,9 @@ const MAX_ZERO: f64 = 0.6;
 pub(super) fn chart(curve: &Curve) -> Option<Chart> {
     let line = points(curve, &curve.model);
     let marks = points(curve, &curve.y);
-    let mut bars: Vec<[f64; 3]> = Vec::new();
-    for ((x, y), error) in curve.x.iter().zip(&curve.y).zip(&curve.y_std_error) {
-        bars.extend(error.is_finite().then_some([*x, y - error, y + error]));
-    }
-    bars.retain(|bar| bar.iter().all(|v| v.is_finite()));
+    let bars = curve.x.iter().zip(&curve.y).zip(&curve.y_std_error);
+    let bars = bars.map(|((x, y), error)| [*x, y - error, y + error]);
+    let bars: Vec<[f64; 3]> = bars.filter(|bar| bar.iter().all(|v| v.is_finite())).collect();
     let xs = range(marks.iter().chain(&line).map(|p| p[0]));
     if xs[0] > xs[1] {
         return None;
@@ -31,7 +29,7 @@ pub(super) fn chart(curve: &Curve) -> Option<Chart> {
     let heights = heights(range(marks.iter().chain(&line).map(|p| p[1])), &bars);
     let axes = [xs, heights].map(|ends| Axis::with_margin(ends, MARGIN));
     let mut chart = Chart::small(axes, [&curve.x_label, &curve.y_label]);
-    let zero = vec![[chart.x.low, 0.0], [chart.x.high, 0.0]];
+    let zero = [chart.x.low, chart.x.high].map(|x| [x, 0.0]).to_vec();
     let radius = if marks.len() > MANY { 2 } else { 4 };
     chart.layers = vec![
         Layer::Line(zero, Stroke::new(FAINT, 1).dashed([5, 4])),

@@ -7,7 +7,7 @@ use super::sentences::{
 };
 use super::{parameters, sentences};
 use crate::diagnose::{CannotTell, Diagnosis, HeldOut, MapRow, Verdict, ViewLine};
-use crate::report::document::{fold, list, row, table};
+use crate::report::document::{Column, fold, list, row, table, table_of};
 use crate::report::numbers::{count, degrees, fixed, p_value, significant};
 use crate::terms::Statistic;
 
@@ -37,7 +37,10 @@ fn tiles(diagnosis: &Diagnosis) -> Markup {
     let held = diagnosis.views.iter().filter(|v| v.held_out).count();
     let held = format!("{held} of them held out for the final test");
     let found = missing(&diagnosis.findings);
-    let largest = found.first().map(|f| format!("largest: {}", called(f)));
+    let (number, largest) = match found.first() {
+        Some(largest) => (found.len().to_string(), format!("largest: {}", called(largest))),
+        None => ("none found".into(), "see what could have been seen".into()),
+    };
     let remaining = match (diagnosis.after.verdict, diagnosis.after.remaining.len()) {
         (Verdict::Match, _) => "nothing".into(),
         (_, 0) => "not settled".into(),
@@ -45,10 +48,7 @@ fn tiles(diagnosis: &Diagnosis) -> Markup {
     };
     html! {
         (tile("Recording", &count(diagnosis.views.len(), "view"), &held))
-        @match largest {
-            Some(largest) => (tile("Effects left out", &found.len().to_string(), &largest)),
-            None => (tile("Effects left out", "none found", "see what could have been seen")),
-        }
+        (tile("Effects left out", &number, &largest))
         @if let Some(held) = &diagnosis.heldout {
             @let change = format!("{} → {}", mm(held.rms_mm_before), mm(held.rms_mm_after));
             (tile("Steady error, held-out views", &change, "before and after"))
@@ -69,23 +69,17 @@ pub(super) fn held_out(held: Option<&HeldOut>) -> Markup {
     let [low, high] = held.gain_interval;
     let gain = |v: f64| fixed(v, usize::from(held.gain.abs() < 10.0));
     let px = |v| format!("{} px", fixed(v, PX_DECIMALS));
+    let every = "every pixel of every frame, noise included, rms";
+    let score = [held.log_score_before, held.log_score_after].map(|v| fixed(v, 1));
     let rows = [
         row!["steady error, rms", mm(held.rms_mm_before), mm(held.rms_mm_after)],
-        row![
-            "every pixel of every frame, noise included, rms",
-            px(held.rms_px_before),
-            px(held.rms_px_after)
-        ],
+        row![every, px(held.rms_px_before), px(held.rms_px_after)],
         row![
             "the same after kinoise correct alone",
             px(held.correction_rms_before_px),
             px(held.correction_rms_after_px)
         ],
-        row![
-            "log score, nats a view",
-            fixed(held.log_score_before, 1),
-            fixed(held.log_score_after, 1)
-        ],
+        row!["log score, nats a view", score[0], score[1]],
     ];
     html! { div {
         h2 { "What was gained" }
@@ -175,14 +169,9 @@ pub(super) fn cannot_tell(all: &[CannotTell]) -> Markup {
 pub(super) fn map(rows: &[MapRow]) -> Markup {
     let columns = [">", "what is off", "along", "where", ">size", ">chance"];
     let cells = |(i, r): (usize, &MapRow)| {
-        row![
-            i + 1,
-            capital(statistic(r.statistic)),
-            axis(r.axis),
-            interval(r.axis, r.interval, r.unit),
-            effect_size(r),
-            p_value(r.p_adjusted),
-        ]
+        let place = interval(r.axis, r.interval, r.unit);
+        let (what, size) = (capital(statistic(r.statistic)), effect_size(r));
+        row![i + 1, what, axis(r.axis), place, size, p_value(r.p_adjusted)]
     };
     let numbered = || rows.iter().enumerate();
     html! { @if !rows.is_empty() { section {
@@ -209,33 +198,20 @@ fn effect_size(row: &MapRow) -> Markup {
 }
 
 pub(super) fn views(views: &[ViewLine]) -> Markup {
-    let columns = [
-        "view",
-        ">distance m",
-        ">tilt °",
-        ">azimuth °",
-        ">frames",
-        ">pixels",
-        ">steady error before px",
-        ">after px",
-        "used for",
+    let columns: [Column<'_, ViewLine>; 9] = [
+        ("view", &|v| html! { (v.name) }),
+        (">distance m", &|v| html! { (fixed(v.z_m, 3)) }),
+        (">tilt °", &|v| html! { (degrees(v.theta_rad)) }),
+        (">azimuth °", &|v| html! { (degrees(v.azimuth_rad)) }),
+        (">frames", &|v| html! { (v.frames) }),
+        (">pixels", &|v| html! { (v.pixels) }),
+        (">steady error before px", &|v| html! { (fixed(v.bowl_px_before, PX_DECIMALS)) }),
+        (">after px", &|v| html! { (fixed(v.bowl_px_after, PX_DECIMALS)) }),
+        ("used for", &|v| html! { @if v.held_out { b { "final test" } } @else { "search" } }),
     ];
-    let cells = |v: &ViewLine| {
-        row![
-            v.name,
-            fixed(v.z_m, 3),
-            degrees(v.theta_rad),
-            degrees(v.azimuth_rad),
-            v.frames,
-            v.pixels,
-            fixed(v.bowl_px_before, PX_DECIMALS),
-            fixed(v.bowl_px_after, PX_DECIMALS),
-            html! { @if v.held_out { b { "final test" } } @else { "search" } },
-        ]
-    };
     html! { @if !views.is_empty() { section {
         h2 { "Views" }
-        (table(&columns, views.iter().map(cells)))
+        (table_of(&columns, views))
         p.note {
             "Steady error: root mean square of the view's smooth residual, px of disparity. Azimuth: towards the \
              target's far side, 0 is right and 90 down."

@@ -100,12 +100,9 @@ pub(super) fn physics(finding: &Finding) -> String {
     match finding.status {
         Status::Named | Status::OneOf => sentence(known),
         Status::Unexplained => {
-            let shape = finding.shape.as_ref().map(|s| format!(" Its curve: {s}."));
-            format!(
-                "No effect of the catalogue explains this error over the {}.{}",
-                axis(finding.axis),
-                shape.unwrap_or_default()
-            )
+            let shape = finding.shape.as_ref().map_or("".into(), |s| format!(" Its curve: {s}."));
+            let over = axis(finding.axis);
+            format!("No effect of the catalogue explains this error over the {over}.{shape}")
         }
         Status::Recalibrate => "Other parameters of the same model explain the recording.".into(),
         Status::NotIdentifiable => {
@@ -176,26 +173,22 @@ pub(super) fn mm(value: f64) -> String {
 
 /// What a p-value means.
 pub(super) fn chance(p: f64) -> String {
-    if p.is_nan() {
-        return "no test gave a p-value".into();
-    }
-    if p < 1e-6 {
-        return "chance alone does this less than once in a million recordings".into();
-    }
-    if p > 0.5 {
-        return "chance alone does this more often than not".into();
-    }
-    format!("chance alone does this about once in {} recordings", thousands(1.0 / p))
+    let often = match p {
+        _ if p.is_nan() => return "no test gave a p-value".into(),
+        _ if p < 1e-6 => "less than once in a million recordings".into(),
+        _ if p > 0.5 => "more often than not".into(),
+        _ => format!("about once in {} recordings", thousands(1.0 / p)),
+    };
+    format!("chance alone does this {often}")
 }
 
 /// To two digits, with a comma at the thousands.
 fn thousands(value: f64) -> String {
     let unit = 10f64.powf((value.log10().floor() - 1.0).max(0.0));
-    let digits = format!("{:.0}", (value / unit).round() * unit);
-    let (head, tail) = digits.split_at(digits.len() % 3);
-    let groups = tail.as_bytes().chunks(3).map(|c| String::from_utf8_lossy(c).into_owned());
-    let head = (!head.is_empty()).then(|| head.to_string());
-    head.into_iter().chain(groups).collect::<Vec<_>>().join(",")
+    let mut digits = format!("{:.0}", (value / unit).round() * unit);
+    let commas = (3..digits.len()).step_by(3).map(|k| digits.len() - k).collect::<Vec<usize>>();
+    commas.into_iter().for_each(|at| digits.insert(at, ','));
+    digits
 }
 
 /// `a, b and c`.

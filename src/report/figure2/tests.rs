@@ -42,7 +42,7 @@ fn one_tilt_and_one_distance_still_draw() {
         let domain = Domain { z_m: [distances[0], distances[0]], theta_rad: [t, t] };
         let model = SigmaModel::published(Form::Khoshelham, &[1.4e-3], domain);
         let table = table(&[tilt], distances.iter().copied());
-        let chart = figure2(&table, &model, &[Overlay::PaperEq1]);
+        let chart = figure2(&table, &model, &Overlay::ALL[..1]);
         for axis in [&chart.x, &chart.y] {
             assert!(axis.low.is_finite() && axis.high > axis.low);
         }
@@ -60,43 +60,34 @@ fn an_overlay_has_the_mark_of_its_distance() {
     for (i, pair) in overlays.into_iter().enumerate() {
         let [Layer::Line(line, stroke), Layer::Marks(_, mark)] = pair else { panic!("{pair:?}") };
         let (overlay, group) = (Overlay::ALL[i / 2], i % 2);
-        assert_eq!((stroke.dashes, mark.shape), (Some(overlay.dashes()), group));
-        let sigma = overlay.model().sigma([1.0, 2.0][group], 0.0);
+        assert_eq!((stroke.dashes, mark.shape), (Some(overlay.dashes), group));
+        let sigma = (overlay.model)().sigma([1.0, 2.0][group], 0.0);
         approx::assert_relative_eq!(line[0][1], MM * sigma);
     }
 }
 
 #[test]
-fn an_overlay_keeps_to_the_distances_it_measured() {
+fn an_overlay_has_a_name_and_keeps_to_the_distances_it_measured() {
+    for overlay in Overlay::ALL {
+        assert_eq!(overlay.id.parse::<Overlay>().unwrap().label, overlay.label);
+    }
+    assert!("eq2".parse::<Overlay>().unwrap_err().contains("eq1, nguyen, khoshelham"));
     let table = table(&[0.0, 10.0], [0.6, 1.0]);
-    let chart = figure2(&table, &SigmaModel::nguyen(), &[Overlay::PaperEq1]);
+    let chart = figure2(&table, &SigmaModel::nguyen(), &Overlay::ALL[..1]);
     assert_eq!(count(&chart, is_overlay), 1, "0.6 m is nearer than the paper's views");
 }
 
 #[test]
-fn overlays_are_named_as_on_the_command_line() {
-    for overlay in Overlay::ALL {
-        assert_eq!(overlay.id().parse(), Ok(overlay));
-    }
-    assert!("eq2".parse::<Overlay>().unwrap_err().contains("eq1, nguyen, khoshelham"));
-}
-
-#[test]
-fn gaps_make_groups() {
-    let sizes = |distances: &[f64]| -> Vec<usize> {
-        by_distance(&table(&[0.0], distances.iter().copied()).rows).iter().map(Vec::len).collect()
-    };
+fn distances_become_groups_by_their_gaps_or_by_equal_ratios() {
+    let groups = |distances: &[f64]| by_distance(&table(&[0.0], distances.iter().copied()).rows);
+    let sizes = |distances: &[f64]| groups(distances).iter().map(Vec::len).collect::<Vec<_>>();
     assert_eq!(sizes(&[2.0, 1.0, 1.01, 2.02, 3.0, 1.0]), [3, 2, 1]);
     assert_eq!(sizes(&[1.0]), [1]);
     assert!(by_distance(&[]).is_empty());
-}
-
-#[test]
-fn many_distances_are_put_together() {
-    let groups = by_distance(&table(&[0.0], (0..400).map(|i| 0.5 + 0.01 * f64::from(i))).rows);
-    assert!(groups.len() <= MAX_GROUPS);
-    assert_eq!(groups.iter().map(Vec::len).sum::<usize>(), 400);
-    assert!(groups.windows(2).all(|w| w[0][w[0].len() - 1].z_m < w[1][0].z_m));
-    let apart = by_distance(&table(&[0.0], (1..=20).map(|i| 0.5 * f64::from(i))).rows);
-    assert!((3..=MAX_GROUPS).contains(&apart.len()));
+    let many: Vec<f64> = (0..400).map(|i| 0.5 + 0.01 * f64::from(i)).collect();
+    let put_together = groups(&many);
+    assert!(put_together.len() <= MAX_GROUPS && sizes(&many).iter().sum::<usize>() == 400);
+    assert!(put_together.windows(2).all(|w| w[0][w[0].len() - 1].z_m < w[1][0].z_m));
+    let apart: Vec<f64> = (1..=20).map(|i| 0.5 * f64::from(i)).collect();
+    assert!((3..=MAX_GROUPS).contains(&groups(&apart).len()));
 }

@@ -2,9 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
-use super::material::Material;
 use super::shape::{Intersection, Shape};
-use super::texture::Texture;
+use super::texture::{Material, Texture};
 use crate::scene::{Hit, Surface, World};
 
 /// A shape somewhere in the room, with the material of each of its faces.
@@ -34,7 +33,6 @@ impl Room {
         all.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0))
     }
 
-    /// The bodies as seen from a pose.
     pub fn posed(&self, room_from_camera: &Isometry3<f64>) -> impl Iterator<Item = PosedBody<'_>> {
         let pose = *room_from_camera;
         self.bodies.iter().enumerate().map(move |(i, body)| PosedBody::new(i, body, &pose))
@@ -64,7 +62,6 @@ impl World for Room {
 }
 
 /// A body as a camera's rays meet it: all from one point, directions in the camera's frame.
-#[derive(Debug, Clone, Copy)]
 pub struct PosedBody<'a> {
     pub body: &'a Body,
     pub index: usize,

@@ -1,6 +1,8 @@
 //! The bodies a room is made of, each in its own coordinates: where a ray meets it, which way it
 //! faces there, and how far a point is from it.
 
+use std::f64::consts::{PI, TAU};
+
 use nalgebra::{Vector2, Vector3};
 
 /// A closed surface about the origin of its own frame, z up, metres.
@@ -18,7 +20,6 @@ pub enum Shape {
     Shell(Vector3<f64>),
 }
 
-/// Where a ray meets a shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intersection {
     /// In units of the ray's direction.
@@ -30,14 +31,6 @@ pub struct Intersection {
 impl Shape {
     /// Cuboid and shell: -x, +x, -y, +y, -z, +z. Drum: side, bottom, top. Ball: one.
     pub const FACES: usize = 6;
-    pub const LEFT: usize = 0;
-    pub const RIGHT: usize = 1;
-    pub const FRONT: usize = 2;
-    pub const BACK: usize = 3;
-    pub const BOTTOM: usize = 4;
-    pub const TOP: usize = 5;
-    pub const DRUM_BOTTOM: usize = 1;
-    pub const DRUM_TOP: usize = 2;
 
     /// Radius of the sphere about the origin that holds it, m.
     pub fn radius(&self) -> f64 {
@@ -50,18 +43,12 @@ impl Shape {
 
     /// The first at t > 0; a ray that starts inside a closed body has none.
     #[inline]
-    pub fn intersect(
-        &self,
-        origin: &Vector3<f64>,
-        direction: &Vector3<f64>,
-    ) -> Option<Intersection> {
+    pub fn intersect(&self, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersection> {
         match self {
-            Shape::Cuboid(half) => hit_cuboid(half, origin, direction),
-            Shape::Ball(radius) => hit_ball(*radius, origin, direction),
-            Shape::Drum { radius, half_height } => {
-                hit_drum(*radius, *half_height, origin, direction)
-            }
-            Shape::Shell(half) => hit_shell(half, origin, direction),
+            Shape::Cuboid(half) => hit_cuboid(half, o, d),
+            Shape::Ball(radius) => hit_ball(*radius, o, d),
+            Shape::Drum { radius, half_height } => hit_drum(*radius, *half_height, o, d),
+            Shape::Shell(half) => hit_shell(half, o, d),
         }
     }
 
@@ -83,8 +70,8 @@ impl Shape {
             Shape::Shell(_) => -axis(face),
             Shape::Ball(radius) => point / *radius,
             Shape::Drum { radius, .. } => match face {
-                Shape::DRUM_BOTTOM => -Vector3::z(),
-                Shape::DRUM_TOP => Vector3::z(),
+                1 => -Vector3::z(),
+                2 => Vector3::z(),
                 _ => Vector3::new(point.x, point.y, 0.0) / *radius,
             },
         }
@@ -96,12 +83,21 @@ impl Shape {
     pub fn face_place(&self, point: &Vector3<f64>, face: usize) -> Vector2<f64> {
         let p = point;
         match self {
-            Shape::Cuboid(_) => unfold(p, face),
-            Shape::Shell(_) if face < Shape::BOTTOM => {
-                let outside = unfold(p, face);
-                Vector2::new(-outside.x, outside.y)
-            }
-            Shape::Shell(_) => Vector2::new(p.x, -p.y),
+            Shape::Cuboid(_) => match face {
+                0 => Vector2::new(-p.y, -p.z),
+                1 => Vector2::new(p.y, -p.z),
+                2 => Vector2::new(p.x, -p.z),
+                3 => Vector2::new(-p.x, -p.z),
+                4 => Vector2::new(-p.x, -p.y),
+                _ => Vector2::new(p.x, -p.y),
+            },
+            Shape::Shell(_) => match face {
+                0 => Vector2::new(p.y, -p.z),
+                1 => Vector2::new(-p.y, -p.z),
+                2 => Vector2::new(-p.x, -p.z),
+                3 => Vector2::new(p.x, -p.z),
+                _ => Vector2::new(p.x, -p.y),
+            },
             Shape::Ball(radius) => {
                 Vector2::new(p.y.atan2(p.x), -(p.z / radius).clamp(-1.0, 1.0).asin()) * *radius
             }
@@ -113,32 +109,23 @@ impl Shape {
     /// Width and height of a face in the coordinates of [`Shape::face_place`], m.
     pub fn face_size(&self, face: usize) -> Vector2<f64> {
         match *self {
-            Shape::Cuboid(h) | Shape::Shell(h) => match face / 2 {
-                0 => Vector2::new(2.0 * h.y, 2.0 * h.z),
-                1 => Vector2::new(2.0 * h.x, 2.0 * h.z),
-                _ => Vector2::new(2.0 * h.x, 2.0 * h.y),
-            },
-            Shape::Ball(r) => Vector2::new(std::f64::consts::TAU * r, std::f64::consts::PI * r),
+            Shape::Cuboid(h) | Shape::Shell(h) => 2.0 * [h.yz(), h.xz(), h.xy()][(face / 2).min(2)],
+            Shape::Ball(r) => Vector2::new(TAU * r, PI * r),
             Shape::Drum { radius, half_height } if face == 0 => {
-                Vector2::new(std::f64::consts::TAU * radius, 2.0 * half_height)
+                Vector2::new(TAU * radius, 2.0 * half_height)
             }
-            Shape::Drum { radius, .. } => Vector2::new(2.0 * radius, 2.0 * radius),
+            Shape::Drum { radius, .. } => Vector2::repeat(2.0 * radius),
         }
     }
 
-    /// How far a point is from where it must not be, m: negative inside a body, and for a shell
-    /// negative outside.
+    /// How far a point is from where it must not be, m: inside a body, or outside a shell.
     pub fn clearance(&self, point: &Vector3<f64>) -> f64 {
         match self {
             Shape::Cuboid(half) => outside(&(point.abs() - half)),
             Shape::Ball(radius) => point.norm() - radius,
             Shape::Drum { radius, half_height } => {
-                let rim = Vector3::new(
-                    point.x.hypot(point.y) - radius,
-                    point.z.abs() - half_height,
-                    f64::NEG_INFINITY,
-                );
-                outside(&rim)
+                let (side, cap) = (point.x.hypot(point.y) - radius, point.z.abs() - half_height);
+                outside(&Vector3::new(side, cap, f64::NEG_INFINITY))
             }
             Shape::Shell(half) => (half - point.abs()).min(),
         }
@@ -152,25 +139,14 @@ fn axis(face: usize) -> Vector3<f64> {
     normal
 }
 
-fn unfold(p: &Vector3<f64>, face: usize) -> Vector2<f64> {
-    match face {
-        Shape::LEFT => Vector2::new(-p.y, -p.z),
-        Shape::RIGHT => Vector2::new(p.y, -p.z),
-        Shape::FRONT => Vector2::new(p.x, -p.z),
-        Shape::BACK => Vector2::new(-p.x, -p.z),
-        Shape::BOTTOM => Vector2::new(-p.x, -p.y),
-        _ => Vector2::new(p.x, -p.y),
-    }
-}
-
 /// Distance of a point from a product of intervals, given by how much it overshoots in each.
 fn outside(over: &Vector3<f64>) -> f64 {
     over.map(|v| v.max(0.0)).norm() + over.max().min(0.0)
 }
 
-/// Where a ray enters and leaves what three slabs share, and through which face it enters.
+/// What three slabs share: where a ray enters and leaves it, and through which face it enters.
 #[inline]
-fn slabs(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> (f64, f64, usize) {
+fn hit_cuboid(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersection> {
     let (mut near, mut far, mut face) = (f64::NEG_INFINITY, f64::INFINITY, 0);
     for k in 0..3 {
         let inverse = 1.0 / d[k];
@@ -182,11 +158,6 @@ fn slabs(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> (f64, f64, 
         }
         far = far.min(low.max(high));
     }
-    (near, far, face)
-}
-
-fn hit_cuboid(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersection> {
-    let (near, far, face) = slabs(half, o, d);
     (near <= far && near > 0.0).then_some(Intersection { t: near, face })
 }
 
@@ -219,8 +190,8 @@ fn hit_drum(radius: f64, half: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Optio
     let (cap_in, cap_out) = (low.min(high), low.max(high));
     let near = side_in.max(cap_in);
     let face = match (cap_in > side_in, d.z < 0.0) {
-        (true, true) => Shape::DRUM_TOP,
-        (true, false) => Shape::DRUM_BOTTOM,
+        (true, true) => 2,
+        (true, false) => 1,
         (false, _) => 0,
     };
     (near <= side_out.min(cap_out) && near > 0.0).then_some(Intersection { t: near, face })

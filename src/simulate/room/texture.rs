@@ -1,4 +1,5 @@
-//! Pictures on surfaces, with their smaller copies, so that far texture blurs and does not flicker.
+//! What a surface looks like: a picture with its smaller copies, so that far texture blurs and does
+//! not flicker, how it lies there, and its answer to infrared.
 
 /// A square picture that repeats, and its halvings down to one texel.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +30,6 @@ impl Texture {
         Texture { levels }
     }
 
-    /// Texels a side of the full picture.
     pub fn size(&self) -> usize {
         self.levels[0].size
     }
@@ -102,6 +102,73 @@ pub fn fraction(v: f32) -> f32 {
 pub fn rough_log2(v: f32) -> f32 {
     const ONE: f32 = 127.0;
     v.to_bits() as f32 / (1u32 << 23) as f32 - ONE
+}
+
+/// How a texture lies on a face.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Mapping {
+    /// Once over the whole face.
+    Fit,
+    /// Again every so many metres.
+    Repeat(f32),
+    /// In square tiles of this side, m, each cut from another place of the texture, which is
+    /// `of_m` wide: no two tiles look alike, and nothing can be mistaken for its neighbour.
+    Tiles { side_m: f32, of_m: f32 },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Material {
+    /// Index into the room's textures.
+    pub texture: usize,
+    pub mapping: Mapping,
+    /// Factor on red, green and blue.
+    pub tint: [f32; 3],
+    /// Share of the colour that shines by itself (screens, lamps), 0 to 1.
+    pub emission: f32,
+    /// Share of infrared light given back, 0 to 1.
+    pub albedo: f32,
+}
+
+/// Matt paint, paper and wood at 830 nm.
+pub const MATT: f32 = 0.6;
+
+impl Material {
+    pub const fn new(texture: usize, mapping: Mapping) -> Self {
+        Material { texture, mapping, tint: [1.0; 3], emission: 0.0, albedo: MATT }
+    }
+
+    /// Texture coordinates (in pictures) of a place on a face of this `size`, and pictures per m^2.
+    #[inline]
+    pub fn coordinates(&self, place: [f32; 2], size: [f32; 2]) -> ([f32; 2], f32) {
+        match self.mapping {
+            Mapping::Fit => {
+                let scale = size.map(|e| 1.0 / e);
+                (std::array::from_fn(|k| place[k] * scale[k] + 0.5), scale[0] * scale[1])
+            }
+            Mapping::Repeat(metres) => {
+                let scale = 1.0 / metres;
+                (place.map(|p| p * scale), scale * scale)
+            }
+            Mapping::Tiles { side_m, of_m } => {
+                let tiles = place.map(|p| p / side_m);
+                let within = tiles.map(fraction);
+                let cut = scatter([tiles[0] - within[0], tiles[1] - within[1]]);
+                let scale = 1.0 / of_m;
+                let uv = std::array::from_fn(|k| within[k] * side_m * scale + cut[k]);
+                (uv, scale * scale)
+            }
+        }
+    }
+}
+
+/// Two numbers in [0, 1) without a visible pattern: the fractions of multiples of the plastic
+/// number's powers (Roberts' R2 sequence), by the cell, whose numbers are whole.
+fn scatter(cell: [f32; 2]) -> [f32; 2] {
+    const R2: [f32; 2] = [0.754_877_7, 0.569_840_3];
+    // A difference of floats: whole only to rounding, so made whole (a room has +-100 tiles).
+    let [i, j] = cell.map(|c| (c + 1000.5) as i32);
+    let index = (57 * i + 131 * j) as f32;
+    R2.map(|r| fraction(index * r))
 }
 
 #[cfg(test)]

@@ -5,50 +5,25 @@
 
 use rand::Rng;
 
-use super::canvas::{BLACK, Canvas, WHITE};
-use super::printed::{board, carton, keys, label, page, poster, screen, spines};
+use super::canvas::{BLACK, Canvas, WHITE, any_area, any_colour, readable_on};
 use super::texture::Texture;
 use crate::rng::{Seed, Stream};
 
-/// Indices into the room's textures, in the order of [`SINGLE`].
-pub const PLAIN: usize = 0;
-pub const PLASTER: usize = 1;
-pub const CEILING: usize = 2;
-pub const CARPET: usize = 3;
-pub const WOOD: usize = 4;
-pub const CLOTH: usize = 5;
-pub const KEYS: usize = 6;
-pub const WINDOW: usize = 7;
-pub const CLOCK: usize = 8;
-pub const BALL: usize = 9;
-pub const BOARD: usize = 10;
-/// Of the first of each series, in the order of [`SERIES`].
-pub const PAGES: usize = 11;
-pub const POSTERS: usize = 17;
-pub const SPINES: usize = 23;
-pub const SCREENS: usize = 29;
-pub const CARTONS: usize = 32;
-pub const LABELS: usize = 35;
-
 type Draw = fn(&mut Stream) -> Canvas;
 
-/// What there is once: its name and how it is drawn.
-const SINGLE: [(&str, Draw); 11] = [
-    ("plain", plain),
-    ("plaster", plaster),
-    ("ceiling", ceiling),
-    ("carpet", carpet),
-    ("wood", wood),
-    ("cloth", cloth),
-    ("keys", keys),
-    ("window", window),
-    ("clock", clock),
-    ("ball", ball),
-    ("board", board),
-];
-
-/// What there are several of, each different.
-const SERIES: [(&str, usize, Draw); 6] = [
+/// What is drawn: its name, how many there are, each different, and how.
+const KINDS: [(&str, usize, Draw); 17] = [
+    ("plain", 1, plain),
+    ("plaster", 1, plaster),
+    ("ceiling", 1, ceiling),
+    ("carpet", 1, carpet),
+    ("wood", 1, wood),
+    ("cloth", 1, cloth),
+    ("keys", 1, keys),
+    ("window", 1, window),
+    ("clock", 1, clock),
+    ("ball", 1, ball),
+    ("board", 1, board),
     ("page", 6, page),
     ("poster", 6, poster),
     ("spines", 6, spines),
@@ -57,15 +32,14 @@ const SERIES: [(&str, usize, Draw); 6] = [
     ("label", 3, label),
 ];
 
-/// All of them, each from a stream of its own.
-pub fn draw(seed: Seed) -> Vec<Texture> {
-    let one =
-        |name: &str, draw: Draw| draw(&mut seed.stream(&format!("room/print/{name}"))).finish();
-    let single = SINGLE.iter().map(|(name, draw)| one(name, *draw));
-    let series = SERIES.iter().flat_map(|(name, count, draw)| {
-        (0..*count).map(move |k| one(&format!("{name}/{k}"), *draw))
-    });
-    single.chain(series).collect()
+/// All of them by name ("wood", "page/3"), each from a stream of its own.
+pub fn draw(seed: Seed) -> Vec<(String, Texture)> {
+    let one = |(kind, count, draw): (&str, usize, Draw), k: usize| {
+        let name = if count == 1 { kind.to_string() } else { format!("{kind}/{k}") };
+        let texture = draw(&mut seed.stream(&format!("room/print/{name}"))).finish();
+        (name, texture)
+    };
+    KINDS.iter().flat_map(|&kind| (0..kind.1).map(move |k| one(kind, k))).collect()
 }
 
 fn plain(rng: &mut Stream) -> Canvas {
@@ -157,7 +131,6 @@ fn clock(_: &mut Stream) -> Canvas {
     c
 }
 
-/// Panels round a ball.
 fn ball(rng: &mut Stream) -> Canvas {
     let mut c = Canvas::new(256, [214, 52, 44]);
     for k in 0..8 {
@@ -170,5 +143,142 @@ fn ball(rng: &mut Stream) -> Canvas {
     c.rect([0.0, 0.33, 1.0, 0.36], BLACK);
     c.rect([0.0, 0.64, 1.0, 0.67], BLACK);
     c.mottle([64, 64], 6.0, rng);
+    c
+}
+
+/// Six rows of keys, three to one.
+pub fn keys(rng: &mut Stream) -> Canvas {
+    let mut c = Canvas::new(256, [40, 40, 44]);
+    for row in 0..6 {
+        let mut x: f32 = 0.02;
+        while x < 0.95 {
+            let wide = if rng.random_bool(0.12) { 0.1 } else { 0.047 };
+            let y = 0.04 + row as f32 * 0.157;
+            let key = [x, y, (x + wide).min(0.98), y + 0.135];
+            c.rect(key, [206, 206, 200]);
+            c.rect([x + 0.012, y + 0.03, x + 0.026, y + 0.08], BLACK);
+            x += wide + 0.011;
+        }
+    }
+    c
+}
+
+/// A whiteboard after a meeting.
+pub fn board(rng: &mut Stream) -> Canvas {
+    let mut c = Canvas::new(512, [248, 248, 248]);
+    let pens = [[26, 44, 130], [176, 26, 30], BLACK, [18, 110, 60]];
+    for _ in 0..7 {
+        let [x, y, _, _] = any_area(rng, 0.3, 0.31);
+        let pen = pens[rng.random_range(0..pens.len())];
+        c.words([x, y, x + 0.3, y + 0.16], 0.026, pen, rng);
+    }
+    for _ in 0..6 {
+        let pen = pens[rng.random_range(0..pens.len())];
+        let field = any_area(rng, 0.08, 0.2);
+        c.frame(field, 0.007, pen);
+    }
+    c.frame([0.0, 0.0, 1.0, 1.0], 0.015, [128, 130, 134]);
+    c
+}
+
+/// A printed sheet: heading, columns of text, a figure with bars or a photograph.
+pub fn page(rng: &mut Stream) -> Canvas {
+    let mut c = Canvas::new(256, WHITE);
+    c.words([0.1, 0.06, 0.9, 0.13], 0.045, BLACK, rng);
+    c.words([0.1, 0.18, 0.9, 0.45], 0.026, [40, 40, 44], rng);
+    let figure = [0.12, 0.47, 0.5, 0.72];
+    c.rect(figure, any_colour(rng));
+    for k in 0..5 {
+        let x = 0.15 + 0.07 * k as f32;
+        c.rect([x, rng.random_range(0.49..0.68), x + 0.045, 0.72], any_colour(rng));
+    }
+    c.words([0.55, 0.47, 0.9, 0.72], 0.026, [40, 40, 44], rng);
+    c.words([0.1, 0.76, 0.9, 0.95], 0.026, [40, 40, 44], rng);
+    c
+}
+
+/// Large title, a picture of coloured shapes, a caption.
+pub fn poster(rng: &mut Stream) -> Canvas {
+    let background = any_colour(rng);
+    let text = readable_on(background);
+    let mut c = Canvas::new(512, background);
+    c.words([0.06, 0.05, 0.94, 0.2], 0.07, text, rng);
+    c.rect([0.06, 0.22, 0.94, 0.78], any_colour(rng));
+    for _ in 0..60 {
+        let [x0, y0, x1, y1] = any_area(rng, 0.02, 0.2).map(|v| 0.07 + 0.86 * v);
+        let (y0, y1) = (0.22 + 0.56 * y0, 0.22 + 0.56 * y1);
+        let colour = any_colour(rng);
+        if rng.random_bool(0.5) {
+            c.rect([x0, y0, x1, y1], colour);
+        } else {
+            c.disc([0.5 * (x0 + x1), 0.5 * (y0 + y1)], 0.3 * (y1 - y0), colour);
+        }
+    }
+    c.words([0.06, 0.81, 0.94, 0.95], 0.025, text, rng);
+    c.frame([0.0, 0.0, 1.0, 1.0], 0.012, text);
+    c
+}
+
+/// A row of books, their titles along the spines.
+pub fn spines(rng: &mut Stream) -> Canvas {
+    let mut c = Canvas::new(512, [30, 26, 24]);
+    let mut x: f32 = 0.0;
+    while x < 0.98 {
+        let right = (x + rng.random_range(0.022..0.065)).min(1.0);
+        let (top, background) = (rng.random_range(0.02..0.22), any_colour(rng));
+        let text = readable_on(background);
+        c.rect([x + 0.002, top, right - 0.002, 1.0], background);
+        let (low, high) = (rng.random_range(0.25..0.35), rng.random_range(0.6..0.8));
+        c.words([x + 0.008, low, right - 0.004, high], 0.016, text, rng);
+        for band in [top + 0.06, 0.88] {
+            c.rect([x + 0.002, band, right - 0.002, band + 0.02], text);
+        }
+        x = right;
+    }
+    c
+}
+
+pub fn screen(rng: &mut Stream) -> Canvas {
+    let mut c = Canvas::new(512, [32, 72, 120]);
+    c.mottle([5, 5], 20.0, rng);
+    for (k, window) in [[0.04, 0.08, 0.6, 0.72], [0.42, 0.22, 0.96, 0.9]].into_iter().enumerate() {
+        let [x0, y0, x1, y1] = window;
+        let background = if k == 0 { WHITE } else { [28, 30, 36] };
+        c.rect(window, background);
+        c.rect([x0, y0, x1, y0 + 0.05], [196, 200, 206]);
+        c.words([x0 + 0.03, y0 + 0.01, x0 + 0.3, y0 + 0.05], 0.024, BLACK, rng);
+        c.words([x0 + 0.02, y0 + 0.08, x1 - 0.02, y1 - 0.02], 0.024, readable_on(background), rng);
+    }
+    c.rect([0.0, 0.95, 1.0, 1.0], [24, 24, 28]);
+    (0..9).for_each(|k| {
+        let x = 0.01 + 0.05 * k as f32;
+        c.rect([x, 0.96, x + 0.03, 0.99], any_colour(rng));
+    });
+    c.frame([0.0, 0.0, 1.0, 1.0], 0.02, BLACK);
+    c
+}
+
+pub fn carton(rng: &mut Stream) -> Canvas {
+    let mut c = Canvas::new(256, [178, 138, 92]);
+    c.mottle([2, 40], 8.0, rng);
+    c.mottle([40, 40], 7.0, rng);
+    c.rect([0.0, 0.44, 1.0, 0.54], [206, 178, 132]);
+    let [x, y, _, _] = any_area(rng, 0.4, 0.41);
+    let label = [x, y, x + 0.36, y + 0.3];
+    c.rect(label, WHITE);
+    c.words([x + 0.03, y + 0.03, x + 0.34, y + 0.28], 0.035, BLACK, rng);
+    c.words([0.62, 0.78, 0.96, 0.95], 0.07, [70, 44, 26], rng);
+    c
+}
+
+/// What is printed round a cup or a tin.
+pub fn label(rng: &mut Stream) -> Canvas {
+    let background = any_colour(rng);
+    let mut c = Canvas::new(256, background);
+    c.rect([0.0, 0.12, 1.0, 0.2], readable_on(background));
+    c.words([0.05, 0.3, 0.95, 0.6], 0.1, readable_on(background), rng);
+    for k in 0..8 {
+        c.disc([0.06 + 0.125 * k as f32, 0.78], 0.045, any_colour(rng));
+    }
     c
 }

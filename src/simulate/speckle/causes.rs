@@ -1,6 +1,12 @@
-//! What can be set about the simulated Kinect: causes, never errors.
+//! What can be set about the simulated Kinect (causes, never errors), and how sensor and target then
+//! stand at one instant: temperature and motion.
 
+use nalgebra::Vector3;
+
+use crate::effects::Instant;
 use crate::error::{Error, Result};
+use crate::plane::Plane;
+use crate::scene::Bench;
 
 /// What can be otherwise about the sensor, the light, the room and the bench.
 #[derive(Debug, Clone, PartialEq)]
@@ -103,10 +109,7 @@ fn fault(what: String) -> Error {
 }
 
 impl Causes {
-    /// `self` with one cause set.
-    ///
-    /// # Errors
-    /// When there is no such cause, or the value is outside its range.
+    /// `self` with one cause set; an error where there is none, or the value is outside its range.
     pub fn with(mut self, name: &str, value: f64) -> Result<Self> {
         let cause = KNOWN_CAUSES.iter().find(|c| c.name == name).ok_or_else(|| {
             let names: Vec<&str> = KNOWN_CAUSES.iter().map(|c| c.name).collect();
@@ -125,9 +128,6 @@ impl Causes {
     }
 
     /// `self` with `key=value` applied.
-    ///
-    /// # Errors
-    /// As [`Causes::with`], and when the text is no such thing.
     pub fn parse(self, text: &str) -> Result<Self> {
         let (name, value) = text
             .split_once('=')
@@ -154,9 +154,51 @@ impl Causes {
     }
 }
 
+/// What changes from frame to frame beside the noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment {
+    /// Above the temperature at which the reference was recorded, K.
+    pub warmth_k: f64,
+    /// How far the target has moved away since the view began, m.
+    pub moved_m: f64,
+}
+
+/// Of a Kinect v1's laser, nm.
+pub const WAVELENGTH_NM: f64 = 830.0;
+/// A surface that has moved by about a millimetre shows new speckle.
+const SPECKLE_LENGTH_M: f64 = 1e-3;
+
+impl Moment {
+    /// At the factory, when the reference was recorded.
+    pub const FACTORY: Moment = Moment { warmth_k: 0.0, moved_m: 0.0 };
+
+    pub fn of(causes: &Causes, instant: &Instant) -> Self {
+        let share = -(-instant.session_s / causes.warm_up_s).exp_m1();
+        Moment { warmth_k: causes.warm_up_k * share, moved_m: causes.motion_mps * instant.view_s }
+    }
+
+    /// Counts the speckle patterns of a view: the same while the target stands.
+    pub fn speckle_epoch(&self) -> i64 {
+        (self.moved_m / SPECKLE_LENGTH_M).floor() as i64
+    }
+
+    /// The bench as it stands now: the target bowed, and moved along the optical axis.
+    pub fn bench(&self, causes: &Causes, at_rest: &Bench) -> Bench {
+        let by = Vector3::z() * self.moved_m;
+        let normal = at_rest.plane.normal();
+        let mut bench = at_rest.clone();
+        bench.sagitta_m += causes.bow_m;
+        bench.plane =
+            Plane::from_normal(normal.into_inner(), at_rest.plane.distance() + normal.dot(&by));
+        bench.frame.centre += by;
+        bench
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Target;
 
     #[test]
     fn an_unknown_cause_is_refused_with_the_list_of_the_known() {
@@ -174,5 +216,17 @@ mod tests {
         }
         assert!(Causes::default().parse("window_px=8").is_err());
         assert!(Causes::default().parse("light=-1").is_err());
+    }
+
+    #[test]
+    fn a_moving_target_is_where_its_speed_takes_it() {
+        let bench = Bench::bare(Plane::tilted(2.0, 0.7, 0.3), Target::Wall);
+        let causes = Causes::default().with("motion_mps", -0.5).unwrap();
+        let instant = Instant { view: 0, frame: 3, session_s: 0.1, view_s: 0.1 };
+        let moment = Moment::of(&causes, &instant);
+        let moved = moment.bench(&causes, &bench);
+        assert!((moved.plane.depth(0.0, 0.0) - 1.95).abs() < 1e-12);
+        assert!((moved.plane.theta() - 0.7).abs() < 1e-12);
+        assert_ne!(moment.speckle_epoch(), Moment::FACTORY.speckle_epoch());
     }
 }

@@ -5,8 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::correlation::{ColumnProducts, RowPair, WindowedImage, best};
-use super::reference::Reference;
+use super::reference::{ColumnProducts, Reference, RowPair, WindowedImage, best};
 use crate::frame::Frame;
 
 /// What the matcher found for a picture.
@@ -20,7 +19,6 @@ pub struct Match {
 /// Rows a task works on; its first window costs it `2 half` rows more.
 const BAND: usize = 96;
 
-/// Match `picture` against `reference`.
 pub fn find(picture: &Frame, reference: &Reference) -> Match {
     let grey: Vec<u32> = picture.raw.iter().map(|&w| u32::from(w)).collect();
     let image = WindowedImage::new(&grey, picture.width, reference.half_window);

@@ -12,15 +12,185 @@
 //! What can be set are [`Causes`]; noise, steps, bias, holes and shadows follow.
 
 mod causes;
-mod correlation;
-mod image;
 mod matcher;
-mod moment;
 mod optics;
 mod pattern;
-mod readout;
 mod reference;
-mod sensor;
 
 pub use causes::{Cause, Causes, KNOWN_CAUSES};
-pub use sensor::{Filming, SpeckleSensor, SpeckleShot};
+
+use causes::Moment;
+use optics::{Optics, Picture, expose};
+use pattern::{Field, Grain, Pattern};
+use reference::{Candidates, REFERENCE_M, ReadOut, Reference};
+
+use crate::camera::Camera;
+use crate::effects::{Instant, KINECT_BASELINE_M};
+use crate::frame::{Frame, KINECT_NO_MEASUREMENT};
+use crate::plane::Plane;
+use crate::rng::Seed;
+use crate::scene::{Bench, Seen, Target, WHITE};
+use crate::stats::range;
+use crate::view::Sensor;
+
+/// A structured-light sensor without any formula of its errors.
+pub struct SpeckleSensor {
+    /// As its recordings describe it: without the lens it does not know of.
+    described: Sensor,
+    /// As it is.
+    camera: Camera,
+    baseline_m: f64,
+    causes: Causes,
+    pattern: Pattern,
+    reference: Reference,
+    read_out: ReadOut,
+}
+
+/// A frame and the infrared picture it was matched in.
+pub struct SpeckleShot {
+    pub depth: Frame,
+    pub infrared: Frame,
+}
+
+impl SpeckleSensor {
+    /// With the camera and baseline of `sensor` (0.075 m where it has none).
+    pub fn new(sensor: &Sensor, causes: Causes) -> Self {
+        let baseline_m = sensor.baseline_m.unwrap_or(KINECT_BASELINE_M);
+        let camera = with_unknown_lens(&sensor.camera, &causes);
+        let disparity_px_m = camera.fx * baseline_m;
+        let candidates = Candidates::of(disparity_px_m);
+        let nearest_px = candidates.last() as f64;
+        let read_out = ReadOut::new(causes.step_px, disparity_px_m, nearest_px, &sensor.code);
+        let pattern = pattern_for(&camera, baseline_m, candidates);
+        let picture = record_reference(&camera, baseline_m, &causes, &pattern, candidates);
+        let reference = Reference::store(&picture, candidates, causes.half_window());
+        let described =
+            Sensor { baseline_m: Some(baseline_m), code: read_out.code(), ..sensor.clone() };
+        SpeckleSensor { described, camera, baseline_m, causes, pattern, reference, read_out }
+    }
+
+    pub fn described(&self) -> &Sensor {
+        &self.described
+    }
+
+    /// Point it at `bench` for one view.
+    pub fn begin<'a>(&'a self, bench: &'a Bench, seed: Seed) -> Filming<'a> {
+        Filming { sensor: self, bench, seed, lit: None }
+    }
+
+    /// Light that is there without the projector, DN; `None` in the dark.
+    fn ambient(&self, bench: &Bench) -> Option<Vec<f32>> {
+        if self.causes.ambient_dn == 0.0 {
+            return None;
+        }
+        let rays = self.camera.rays();
+        let seen = Seen::of(bench, &self.camera, &rays);
+        let white = self.causes.ambient_dn / WHITE;
+        let light = |i| {
+            let (x, y) = rays.at(i);
+            (white * f64::from(seen.albedo[i]) * (1.0 + x * x + y * y).powi(-2)) as f32
+        };
+        Some((0..self.camera.pixels()).map(light).collect())
+    }
+
+    /// What the matcher finds in an infrared picture, as raw values.
+    fn read_out(&self, infrared: &Frame) -> Frame {
+        let found = matcher::find(infrared, &self.reference);
+        let confidence = self.causes.confidence as f32;
+        let value = |(&shift, &correlation): (&f32, &f32)| {
+            let sure = shift.is_finite() && correlation >= confidence;
+            if sure { self.read_out.raw(shift) } else { KINECT_NO_MEASUREMENT }
+        };
+        Frame {
+            width: infrared.width,
+            height: infrared.height,
+            raw: found.shift.iter().zip(&found.correlation).map(value).collect(),
+        }
+    }
+}
+
+pub struct Filming<'a> {
+    sensor: &'a SpeckleSensor,
+    bench: &'a Bench,
+    seed: Seed,
+    /// Light without noise, good as long as nothing moves or warms.
+    lit: Option<Lit>,
+}
+
+struct Lit {
+    moment: Moment,
+    dots: Picture,
+    ambient: Option<Vec<f32>>,
+}
+
+impl Filming<'_> {
+    pub fn shoot(&mut self, instant: Instant) -> SpeckleShot {
+        let SpeckleSensor { causes, .. } = self.sensor;
+        let moment = Moment::of(causes, &instant);
+        let lit = match self.lit.take() {
+            Some(lit) if lit.moment == moment => lit,
+            _ => self.light_up(instant.view, moment),
+        };
+        let name = format!("simulate/chip/{}/{}", instant.view, instant.frame);
+        let mut rng = self.seed.stream(&name);
+        let infrared = expose(&lit.dots, lit.ambient.as_deref(), causes, &mut rng);
+        self.lit = Some(lit);
+        SpeckleShot { depth: self.sensor.read_out(&infrared), infrared }
+    }
+
+    fn light_up(&self, view: usize, moment: Moment) -> Lit {
+        let SpeckleSensor { camera, causes, pattern, baseline_m, .. } = self.sensor;
+        let bench = moment.bench(causes, self.bench);
+        // The grains are the same as long as the target stands still.
+        let epoch = moment.speckle_epoch();
+        let mut rng = self.seed.stream(&format!("simulate/speckle/{view}/{epoch}"));
+        let grains = Grain::draw(pattern.dots.len(), causes.speckle, &mut rng);
+        let spots =
+            Optics::at(&moment, causes, camera, *baseline_m).spots(&bench, pattern, &grains);
+        let dots = Picture::dark(camera.width, camera.height, 0).with(&spots);
+        Lit { moment, dots, ambient: self.sensor.ambient(&bench) }
+    }
+}
+
+/// The sensor's own lens, and what is wrong with it on top.
+fn with_unknown_lens(camera: &Camera, causes: &Causes) -> Camera {
+    let [k1, k2, p1, p2, k3] = camera.distortion.unwrap_or_default();
+    let bent = [k1 + causes.lens_k1, k2 + causes.lens_k2, p1, p2, k3];
+    let unknown = causes.lens_k1 != 0.0 || causes.lens_k2 != 0.0;
+    Camera { distortion: if unknown { Some(bent) } else { camera.distortion }, ..camera.clone() }
+}
+
+/// Dots wherever picture or reference can see one.
+fn pattern_for(camera: &Camera, baseline_m: f64, candidates: Candidates) -> Pattern {
+    /// Blur, drift of the wavelength and the width of dots stay inside, px.
+    const MARGIN_PX: f64 = 16.0;
+    let (right, bottom) = (camera.width as f64 - 1.0, camera.height as f64 - 1.0);
+    let rim = (0..=8).map(|i| f64::from(i) / 8.0).flat_map(|share| {
+        let (u, v) = (share * right, share * bottom);
+        [(u, 0.0), (u, bottom), (0.0, v), (right, v)].map(|(u, v)| camera.ray(u, v))
+    });
+    let [x0, x1] = range(rim.clone().map(|(x, _)| x));
+    let [y0, y1] = range(rim.map(|(_, y)| y));
+    let (mx, my) = (MARGIN_PX / camera.fx, MARGIN_PX / camera.fy);
+    // The projector's x is the camera's less the disparity: least for the nearest surface.
+    let nearest = candidates.last() as f64 / camera.fx + baseline_m / REFERENCE_M;
+    let field = Field { x: [x0 - nearest - mx, x1 + mx], y: [y0 - my, y1 + my] };
+    Pattern::over(&field, camera.fx)
+}
+
+/// The factory: a white plane across the axis, cold, no speckle, no noise.
+fn record_reference(
+    camera: &Camera,
+    baseline_m: f64,
+    causes: &Causes,
+    pattern: &Pattern,
+    candidates: Candidates,
+) -> Picture {
+    let plane = Bench::bare(Plane::tilted(REFERENCE_M, 0.0, 0.0), Target::Wall);
+    let optics = Optics { light: 1.0, ..Optics::at(&Moment::FACTORY, causes, camera, baseline_m) };
+    let even = vec![Grain::NONE; pattern.dots.len()];
+    // It answers to all columns of a picture.
+    let columns = camera.width + candidates.count - 1;
+    let dark = Picture::dark(columns, camera.height, -candidates.last());
+    dark.with(&optics.spots(&plane, pattern, &even))
+}

@@ -6,8 +6,6 @@ use rand_distr::{Distribution, Gamma, StandardNormal};
 
 use crate::rng::{Seed, Stream};
 
-/// One beam of the projector.
-#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dot {
     /// Normalised coordinates in the projector: its ray is (x, y, 1) when cold.
     pub x: f64,
@@ -17,15 +15,13 @@ pub struct Dot {
 }
 
 /// All dots, in a fixed order.
-#[derive(Debug, Clone, PartialEq)]
 pub struct Pattern {
     pub dots: Vec<Dot>,
 }
 
 /// The pattern is the unit's own, whatever the seed of a simulation.
 const UNIT: Seed = Seed(0x4b69_6e65_6374);
-/// Three tiles of 211 places span the 640 columns (Reichinger, "Kinect Pattern Uncovered", from
-/// memory).
+/// Three tiles of 211 places span 640 columns (Reichinger, "Kinect Pattern Uncovered", by memory).
 const PITCH_PX: f64 = 640.0 / 633.0;
 /// Places that hold a dot: about one in nine, a 9 x 9 window sees nine (same source).
 const FILLED: f64 = 0.11;
@@ -104,7 +100,6 @@ pub struct Grain {
 }
 
 impl Grain {
-    /// A smooth dot.
     pub const NONE: Grain = Grain { light: 1.0, aside: [0.0; 2] };
 
     /// Of `count` dots, in their order; `contrast` is sd over mean of a dot's light.

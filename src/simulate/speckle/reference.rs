@@ -1,13 +1,13 @@
-//! What the matcher compares with: the pattern on a plane, recorded at the factory.
+//! What the matcher compares with, the pattern on a plane as recorded at the factory: its sums over the
+//! matching window, and how shifts against it become 11-bit raw values.
 
-use super::correlation::{LANES, WindowedImage};
-use super::image::Picture;
+use super::optics::Picture;
+use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
 
 /// Distance of the factory's plane, m. The real one is not published; at 2 m the picture moves by
 /// +22 px at 1 m and by -11 px at 4 m.
 pub const REFERENCE_M: f64 = 2.0;
-/// The matcher looks for surfaces between these depths, m (near mode begins at 0.4 m; beyond 8 m
-/// one step is 0.2 m).
+/// The matcher looks between these depths, m (near mode begins at 0.4 m; at 8 m a step is 0.2 m).
 const NEAREST_M: f64 = 0.4;
 const FARTHEST_M: f64 = 8.0;
 
@@ -31,14 +31,9 @@ impl Candidates {
     pub fn last(&self) -> i64 {
         self.first + self.count as i64 - 1
     }
-
-    /// Of the first column of a reference that answers to all columns of a picture, and how many.
-    pub fn reference_columns(&self, width: usize) -> (i64, usize) {
-        (-self.last(), width + self.count - 1)
-    }
 }
 
-/// The stored reference in 8 bits, its rows mirrored (see [`super::correlation::RowPair`]).
+/// The stored reference in 8 bits, its rows mirrored (see [`RowPair`]).
 pub struct Reference {
     pub candidates: Candidates,
     pub half_window: usize,
@@ -61,5 +56,234 @@ impl Reference {
         let mean = image.sum.iter().map(|s| s / area).collect();
         let weight = image.contrast.iter().map(|&c| if c > 0.0 { c.recip() } else { 0.0 });
         Reference { candidates, half_window, mean, weight: weight.collect(), image }
+    }
+}
+
+/// The raw value of infinity on a Kinect v1 (Fisher's 3.331 / 0.003071, OpenKinect).
+const RAW_AT_INFINITY: f64 = 1084.6;
+
+/// What a Kinect v1 reads out, px: one raw value a step.
+const USUAL_STEP_PX: f64 = 0.125;
+
+/// How a shift becomes a raw value, and a raw value a depth.
+pub struct ReadOut {
+    /// Where the matcher answers in coarser steps than its raw values have, px.
+    coarse_px: Option<f64>,
+    /// fx * baseline, px m.
+    disparity_px_m: f64,
+    offset: f64,
+    slope: f64,
+}
+
+impl ReadOut {
+    /// `nearest_px` is the largest shift there is. A recorder's own disparity code is kept, so
+    /// that its description does not betray the step.
+    pub fn new(step_px: f64, disparity_px_m: f64, nearest_px: f64, own: &DepthCode) -> Self {
+        let raw_px = step_px.min(USUAL_STEP_PX);
+        let usual = RAW_AT_INFINITY - disparity_px_m / REFERENCE_M / raw_px;
+        // Finer steps need more values; the nearest surface gets at least 1.
+        let at_reference = usual.max(nearest_px / raw_px + 1.0).round();
+        // shift = fx b (1/z - 1/reference) and shift = (at_reference - raw) raw_px, hence
+        // 1/z = 1/reference + (at_reference - raw) raw_px / (fx b).
+        let per_raw = raw_px / disparity_px_m;
+        let (offset, slope) = match *own {
+            DepthCode::Disparity { offset, slope, .. } => (offset, slope),
+            DepthCode::Metric { .. } => (1.0 / REFERENCE_M + at_reference * per_raw, -per_raw),
+        };
+        let coarse_px = (step_px > USUAL_STEP_PX).then_some(step_px);
+        ReadOut { coarse_px, disparity_px_m, offset, slope }
+    }
+
+    pub fn raw(&self, shift_px: f32) -> u16 {
+        let shift = f64::from(shift_px);
+        let shift = self.coarse_px.map_or(shift, |step| (shift / step).round() * step);
+        let inverse = 1.0 / REFERENCE_M + shift / self.disparity_px_m;
+        let raw = ((inverse - self.offset) / self.slope).round();
+        let fits = raw > 0.0 && raw < f64::from(KINECT_NO_MEASUREMENT);
+        if fits { raw as u16 } else { KINECT_NO_MEASUREMENT }
+    }
+
+    pub fn code(&self) -> DepthCode {
+        let (offset, slope) = (self.offset, self.slope);
+        DepthCode::Disparity { offset, slope, invalid: KINECT_NO_MEASUREMENT }
+    }
+}
+
+/// A picture with the sums over the window about each pixel, row-major.
+pub struct WindowedImage {
+    pub width: usize,
+    pub height: usize,
+    pub grey: Vec<f32>,
+    pub sum: Vec<f32>,
+    /// Root of the summed squares about the window's mean; zero where nothing is to be seen.
+    pub contrast: Vec<f32>,
+}
+
+impl WindowedImage {
+    pub fn new(grey: &[u32], width: usize, half: usize) -> Self {
+        let squares: Vec<u32> = grey.iter().map(|g| g * g).collect();
+        let area = ((2 * half + 1) as f32).powi(2);
+        let sum: Vec<f32> = window_sums(grey, width, half).iter().map(|&s| s as f32).collect();
+        let contrast =
+            |(&squares, &sum): (&u32, &f32)| (squares as f32 - sum * sum / area).max(0.0).sqrt();
+        WindowedImage {
+            width,
+            height: grey.len() / width,
+            grey: grey.iter().map(|&g| g as f32).collect(),
+            contrast: window_sums(&squares, width, half).iter().zip(&sum).map(contrast).collect(),
+            sum,
+        }
+    }
+
+    pub fn row<'a>(&self, values: &'a [f32], v: usize) -> &'a [f32] {
+        &values[v * self.width..][..self.width]
+    }
+}
+
+/// Sum of each pixel's `(2 half + 1)^2` neighbourhood; zero where it does not fit. Exact.
+fn window_sums(values: &[u32], width: usize, half: usize) -> Vec<u32> {
+    let height = values.len() / width;
+    let side = 2 * half + 1;
+    let mut sums = vec![0; values.len()];
+    let mut columns = vec![0u32; width];
+    for bottom in 0..height {
+        let row = &values[bottom * width..][..width];
+        columns.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
+        if bottom >= side {
+            let old = &values[(bottom - side) * width..][..width];
+            columns.iter_mut().zip(old).for_each(|(sum, value)| *sum -= value);
+        }
+        if bottom + 1 >= side && width >= side {
+            let out = &mut sums[(bottom - half) * width..][..width];
+            let mut sum: u32 = columns[..side - 1].iter().sum();
+            for right in side - 1..width {
+                sum += columns[right];
+                out[right - half] = sum;
+                sum -= columns[right + 1 - side];
+            }
+        }
+    }
+    sums
+}
+
+/// Candidates are worked on in groups of this size: a multiple of any vector register.
+pub const LANES: usize = 8;
+
+/// For every column u and candidate k the products picture(u) * reference(u, k), summed over the
+/// rows of the window; k runs fastest, so that every loop below is a plain vector loop.
+///
+/// Picture and reference hold whole numbers of 10 and 8 bits: 31 rows stay below 2^24, so that
+/// single precision is exact and adding and taking away leaves no trace.
+pub struct ColumnProducts {
+    width: usize,
+    candidates: usize,
+    sums: Vec<f32>,
+}
+
+/// A row of the picture and the same row of the reference, mirrored, so that the candidates of
+/// column u are `reference[width - 1 - u..]` in order.
+#[derive(Clone, Copy)]
+pub struct RowPair<'a> {
+    pub picture: &'a [f32],
+    pub reference: &'a [f32],
+}
+
+impl ColumnProducts {
+    pub fn new(width: usize, candidates: usize) -> Self {
+        ColumnProducts { width, candidates, sums: vec![0.0; width * candidates] }
+    }
+
+    pub fn of(&self, column: usize) -> &[f32] {
+        &self.sums[column * self.candidates..][..self.candidates]
+    }
+
+    pub fn enter(&mut self, row: RowPair) {
+        let n = self.candidates;
+        for (u, sums) in self.sums.chunks_exact_mut(n).enumerate() {
+            let grey = row.picture[u];
+            let reference = &row.reference[self.width - 1 - u..][..n];
+            sums.iter_mut().zip(reference).for_each(|(s, r)| *s += grey * r);
+        }
+    }
+
+    pub fn exchange(&mut self, enters: RowPair, leaves: RowPair) {
+        let n = self.candidates;
+        for (u, sums) in self.sums.chunks_exact_mut(n).enumerate() {
+            let (new, old) = (enters.picture[u], leaves.picture[u]);
+            let place = self.width - 1 - u;
+            let fresh = &enters.reference[place..][..n];
+            let stale = &leaves.reference[place..][..n];
+            for ((s, f), o) in sums.iter_mut().zip(fresh).zip(stale) {
+                *s += new * f - old * o;
+            }
+        }
+    }
+}
+
+/// The largest value and its first place.
+pub fn best(scores: &[f32]) -> (usize, f32) {
+    let mut lanes = [f32::NEG_INFINITY; LANES];
+    for group in scores.chunks_exact(LANES) {
+        for (top, &s) in lanes.iter_mut().zip(group) {
+            // Not f32::max, whose care for NaN costs a branch a lane.
+            *top = if s > *top { s } else { *top };
+        }
+    }
+    let top = lanes.iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b));
+    let place = scores.iter().position(|&s| s == top).unwrap_or(0);
+    (place, top)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against triangulation, written down again.
+    #[test]
+    fn raw_values_and_depths_agree_with_triangulation() {
+        let metric = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
+        let read_out = ReadOut::new(0.125, 43.5, 90.0, &metric);
+        for z in [0.5, 1.0, 2.0, 3.3] {
+            let shift = 580.0 * 0.075 / z - 580.0 * 0.075 / REFERENCE_M;
+            let raw = read_out.raw(shift as f32);
+            let found = read_out.code().metres(raw).unwrap();
+            assert!((found - z).abs() <= 0.5 * 2.88e-3 * z * z, "{z}: {found}");
+        }
+        let DepthCode::Disparity { offset, slope, .. } = read_out.code() else { unreachable!() };
+        assert!((offset / -slope - 1084.6).abs() < 1.0, "infinity is where a Kinect has it");
+    }
+
+    /// The description is the recorder's own, or the usual one, whatever the step.
+    #[test]
+    fn the_code_does_not_betray_the_step() {
+        let metric = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
+        let code = |step| ReadOut::new(step, 43.5, 90.0, &metric).code();
+        assert_eq!(code(0.125), code(0.5));
+        let own =
+            DepthCode::Disparity { offset: 3.12, slope: -0.00286, invalid: KINECT_NO_MEASUREMENT };
+        let read_out = ReadOut::new(0.5, 43.5, 90.0, &own);
+        assert_eq!(read_out.code(), own);
+        let raw: std::collections::BTreeSet<u16> =
+            (0..4000).map(|k| read_out.raw(k as f32 * 0.01)).collect();
+        assert!((70..=90).contains(&raw.len()), "40 px in half pixels: {}", raw.len());
+    }
+
+    #[test]
+    fn window_sums_are_the_sums_over_windows() {
+        let values: Vec<u32> = (0..70u32).map(|i| i * i % 101).collect();
+        let sums = window_sums(&values, 10, 1);
+        let expected: u32 =
+            (2..5).flat_map(|v| (4..7).map(move |u| v * 10 + u)).map(|i| values[i]).sum();
+        assert_eq!(sums[3 * 10 + 5], expected);
+        assert_eq!(sums[0], 0);
+        assert_eq!(sums[6 * 10 + 5], 0, "the last row has no whole window");
+    }
+
+    #[test]
+    fn the_best_is_the_first_of_the_largest() {
+        let mut scores = vec![0.0f32; 24];
+        scores[13] = 2.0;
+        scores[21] = 2.0;
+        assert_eq!(best(&scores), (13, 2.0));
     }
 }

@@ -85,7 +85,7 @@ pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
         "range-not-depth" => {
             let share = s.powf(1.5).min(1.0);
             let form = if share < 1.0 { "half undone" } else { "ray length" };
-            let gain = move |s: &super::Site, _: &super::Facts<'_>| {
+            let gain = move |s: &super::Site, _: &super::Plan| {
                 let r2 = s.x * s.x + s.y * s.y;
                 ((1.0 + r2) / (1.0 + (1.0 - share) * r2)).sqrt()
             };
@@ -114,7 +114,7 @@ pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
             let relative = sign(rng) * 0.004 * s;
             let tau_s = rng.random_range(500.0..1200.0);
             let form = lot(&["tanh", "t / (t + tau)"], rng);
-            let gain = move |_: &super::Site, f: &super::Facts<'_>| {
+            let gain = move |_: &super::Site, f: &super::Plan| {
                 let t = f.session_s / tau_s;
                 let warmth = if form == "tanh" { t.tanh() } else { t / (0.6 + t) };
                 1.0 + relative * warmth

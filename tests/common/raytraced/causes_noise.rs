@@ -256,7 +256,7 @@ fn missing(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Cause {
         _ => {
             let (share, baseline_m) = (of.shadow, of.unit.baseline_m);
             loss(name, "shadow rays", "edge-distance", &[("share", share)], move |s, f| {
-                let dark = !s.on_board && shaded(f.stage, baseline_m, &s.point);
+                let dark = !s.on_board && shaded(&f.stage, baseline_m, &s.point);
                 if dark { share } else { 0.0 }
             })
         }

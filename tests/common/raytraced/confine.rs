@@ -8,7 +8,7 @@ use rand::seq::SliceRandom;
 use super::eye::Site;
 use super::kernels::lot;
 use super::poses::Plan;
-use super::{Act, AtSite, Cause, Cell, Facts, Unit};
+use super::{Act, AtSite, Cause, Cell, Unit};
 use kinoise::error::{Error, Result};
 use kinoise::rng::Stream;
 
@@ -65,13 +65,13 @@ impl Gate {
         })
     }
 
-    fn open(&self, site: &Site, facts: &Facts<'_>) -> bool {
+    fn open(&self, site: &Site, plan: &Plan) -> bool {
         match self {
-            Gate::Views(views) => views.contains(&facts.view),
+            Gate::Views(views) => views.contains(&plan.view),
             Gate::Columns([from, to]) => (*from..*to).contains(&site.u),
             Gate::Rows([from, to]) => (*from..*to).contains(&site.v),
             Gate::Far(from) => site.z > *from,
-            Gate::Late([from, _]) => facts.session_s > *from,
+            Gate::Late([from, _]) => plan.session_s > *from,
         }
     }
 
@@ -91,7 +91,7 @@ impl Gate {
         let Cause { mut label, act, worth, window } = cause;
         let here = Arc::new(self.clone());
         let only = |f: AtSite, other: f64| -> AtSite {
-            Box::new(move |s, facts| if here.open(s, facts) { f(s, facts) } else { other })
+            Box::new(move |s, plan| if here.open(s, plan) { f(s, plan) } else { other })
         };
         let act = match act {
             Act::Mismatch(f) => Act::Mismatch(only(f, 0.0)),

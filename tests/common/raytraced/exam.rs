@@ -9,6 +9,7 @@ use super::shoot::{Sum, slope};
 use super::{Act, Set};
 use kinoise::correct::Conditions;
 use kinoise::rng::Stream;
+use kinoise::stats::range;
 
 /// Views among those of the recording.
 const WITHIN: usize = 6;
@@ -23,7 +24,12 @@ const NO_VIEW: usize = usize::MAX;
 /// Fresh views: some within the distances and tilts of the recording, some beyond.
 pub fn views(set: &Set) -> Vec<ExamView> {
     let mut rng = set.seed.stream("rays/exam");
-    let range = Range::of(&set.plans);
+    let end = |of: fn(&Plan) -> f64| set.plans.iter().map(of).fold(0.0, f64::max);
+    let range = Range {
+        z: range(set.plans.iter().map(|p| p.stage.board.depth(0.0, 0.0))),
+        theta: end(|p| p.stage.theta),
+        session_s: end(|p| p.session_s),
+    };
     let mut poses: Vec<(bool, f64, f64)> = Vec::new();
     for k in 0..WITHIN {
         let near = (k as f64 + rng.random::<f64>()) / WITHIN as f64;
@@ -47,18 +53,6 @@ struct Range {
     session_s: f64,
 }
 
-impl Range {
-    fn of(plans: &[Plan]) -> Self {
-        let z = plans.iter().map(|p| p.stage.board.depth(0.0, 0.0));
-        let end = |of: fn(&Plan) -> f64| plans.iter().map(of).fold(0.0, f64::max);
-        Range {
-            z: [z.clone().fold(f64::INFINITY, f64::min), z.fold(0.0, f64::max)],
-            theta: end(|p| p.stage.theta),
-            session_s: end(|p| p.session_s),
-        }
-    }
-}
-
 fn view(set: &Set, range: &Range, pose: (bool, f64, f64), rng: &mut Stream) -> ExamView {
     let (beyond, z, theta) = pose;
     let azimuth = azimuth(rng.random(), rng);
@@ -75,13 +69,13 @@ fn view(set: &Set, range: &Range, pose: (bool, f64, f64), rng: &mut Stream) -> E
     let conditions =
         Conditions { session_s, temperature_c: told.temperature_c, ambient_lux: told.ambient_lux };
     let sensor = set.described.sensor.clone();
-    ExamView { sensor, beyond, theta, azimuth, conditions, depth, plain, sigma, sigma_plain }
+    ExamView { sensor, beyond, conditions, depth, plain, sigma, sigma_plain }
 }
 
 /// Mean of what is reported and standard deviation of a frame's noise, m; NaN off the board.
 fn seen(world: World<'_>, plan: &Plan) -> (Vec<f32>, Vec<f32>) {
     let camera = &world.unit.sensor.camera;
-    let (eye, facts) = (Eye::new(world, plan), plan.facts());
+    let eye = Eye::new(world, plan);
     let fb = world.unit.disparity_px_m();
     let (slope, mut tremble, mut cut) = (slope(world.unit, plan), 0.0f64, 0.0);
     for cause in world.causes {
@@ -97,7 +91,7 @@ fn seen(world: World<'_>, plan: &Plan) -> (Vec<f32>, Vec<f32>) {
     for i in 0..n {
         let (u, v) = ((i % camera.width) as f64, (i / camera.width) as f64);
         let Some(site) = eye.look(u, v).filter(|s| s.on_board) else { continue };
-        let sum = Sum::of(world.causes, &site, &facts);
+        let sum = Sum::of(world.causes, &site, plan);
         let z = fb / (site.disparity + sum.error);
         let own = sum.spread * world.unit.sigma(site.z, site.theta);
         depth[i] = (z * sum.gain - cut) as f32;

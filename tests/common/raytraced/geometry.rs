@@ -1,6 +1,17 @@
 //! What a pixel's ray meets: the board, or the wall behind it.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
+
+/// Coefficients of the columns of weighted rows (columns, value, 1 over its variance); `None` where
+/// the rows do not determine them.
+pub fn least_squares(rows: impl Iterator<Item = (Vector3<f64>, f64, f64)>) -> Option<Vector3<f64>> {
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for (x, value, weight) in rows {
+        normal += x * x.transpose() * weight;
+        right += x * (weight * value);
+    }
+    normal.cholesky().map(|c| c.solve(&right))
+}
 
 /// A flat board; endless where it has no size.
 #[derive(Debug, Clone)]

@@ -5,7 +5,7 @@ use rand::seq::SliceRandom;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::Clock;
-use kinoise::rng::Stream;
+use kinoise::rng::{Seed, Stream};
 
 /// One of `forms`, by lot.
 pub fn lot<T: Copy>(forms: &[T], rng: &mut Stream) -> T {
@@ -14,6 +14,11 @@ pub fn lot<T: Copy>(forms: &[T], rng: &mut Stream) -> T {
 
 pub fn sign(rng: &mut Stream) -> f64 {
     lot(&[-1.0, 1.0], rng)
+}
+
+/// The first 64 bits of a hash.
+pub fn seed_of(sha256: &str) -> Seed {
+    Seed(sha256.get(..16).and_then(|bits| u64::from_str_radix(bits, 16).ok()).unwrap_or_default())
 }
 
 /// One number of each of `n` equal parts of 0 to 1, in no order.
@@ -122,7 +127,6 @@ impl Window {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kinoise::rng::Seed;
 
     #[test]
     fn windows_of_a_side_reach_equally_far_and_keep_the_variance() {

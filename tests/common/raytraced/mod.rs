@@ -32,28 +32,15 @@ pub use choices::CATALOGUE;
 pub use outside::OUTSIDE;
 pub use question::Cell;
 pub use set::{Order, Set};
-#[cfg(test)]
-pub use shoot::Still;
 pub use unit::Unit;
 pub use write::{conceal, write};
 
 use eye::Site;
-use geometry::Stage;
 use kernels::Window;
 use kinoise::rng::{Seed, Stream};
 use nats::Ground;
+use poses::Plan;
 use question::Hidden;
-
-/// What the causes of a view may look at beside the pixel.
-pub struct Facts<'a> {
-    pub view: usize,
-    pub stage: &'a Stage,
-    /// Since the session began, s.
-    pub session_s: f64,
-    /// Light of the room, lx.
-    pub lux: f64,
-    pub temperature_c: f64,
-}
 
 /// Which frame, for causes that are fresh in each.
 #[derive(Debug, Clone, Copy)]
@@ -86,7 +73,7 @@ pub enum Phase {
 /// Disparity that whole rows of one frame share, px.
 pub type Rows = [f32];
 
-type AtSite = Box<dyn Fn(&Site, &Facts<'_>) -> f64 + Send + Sync>;
+type AtSite = Box<dyn Fn(&Site, &Plan) -> f64 + Send + Sync>;
 
 type Reshape = Box<dyn Fn(&mut [f32], &Clock) + Send + Sync>;
 type Shaker = Box<dyn Fn(&Clock, &mut Rows) + Send + Sync>;
@@ -182,35 +169,27 @@ impl Cause {
     }
 }
 
-/// A cause that acts on the mean error of each pixel's match.
-pub fn bias(
-    name: &str,
-    form: &str,
-    axis: &str,
-    parameters: &[(&str, f64)],
-    f: impl Fn(&Site, &Facts<'_>) -> f64 + Send + Sync + 'static,
-) -> Cause {
-    Cause::new(name, form, ["bias", axis], parameters, Act::Mismatch(Box::new(f)))
+/// Causes that act at every pixel by a function of its own.
+macro_rules! at_sites {
+    ($($(#[$doc:meta])* $name:ident: $statistic:literal, $act:path;)*) => {$(
+        $(#[$doc])*
+        pub fn $name(
+            name: &str,
+            form: &str,
+            axis: &str,
+            parameters: &[(&str, f64)],
+            f: impl Fn(&Site, &Plan) -> f64 + Send + Sync + 'static,
+        ) -> Cause {
+            Cause::new(name, form, [$statistic, axis], parameters, $act(Box::new(f)))
+        }
+    )*};
 }
 
-/// A cause that makes pixels noisier by a factor.
-pub fn spread(
-    name: &str,
-    form: &str,
-    axis: &str,
-    parameters: &[(&str, f64)],
-    f: impl Fn(&Site, &Facts<'_>) -> f64 + Send + Sync + 'static,
-) -> Cause {
-    Cause::new(name, form, ["variance", axis], parameters, Act::Spread(Box::new(f)))
-}
-
-/// A cause by which pixels go without an answer.
-pub fn loss(
-    name: &str,
-    form: &str,
-    axis: &str,
-    parameters: &[(&str, f64)],
-    f: impl Fn(&Site, &Facts<'_>) -> f64 + Send + Sync + 'static,
-) -> Cause {
-    Cause::new(name, form, ["missing", axis], parameters, Act::Loss(Box::new(f)))
+at_sites! {
+    /// On the mean error of the match.
+    bias: "bias", Act::Mismatch;
+    /// Noisier by a factor.
+    spread: "variance", Act::Spread;
+    /// Without an answer.
+    loss: "missing", Act::Loss;
 }

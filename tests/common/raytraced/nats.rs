@@ -14,13 +14,14 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::eye::{Eye, Site, World};
+use super::geometry::least_squares;
 use super::poses::Plan;
 use super::shoot::{Sum, slope};
 use super::worth::{of_effect, of_variance};
-use super::{Act, Cause, Facts, Set, Unit, Worth};
+use super::{Act, Cause, Set, Unit, Worth};
 
 /// Pixels that any sensor loses now and then: a loss is told apart from these.
 const STRAYS: f64 = 1e-3;
@@ -75,7 +76,7 @@ impl Repeats {
 
 impl<'a> Looked<'a> {
     fn new(world: World<'a>, plan: &'a Plan, stride: usize) -> Self {
-        let (unit, eye, facts) = (world.unit, Eye::new(world, plan), plan.facts());
+        let (unit, eye) = (world.unit, Eye::new(world, plan));
         let (camera, fb) = (&unit.sensor.camera, unit.disparity_px_m());
         let region = plan.notes.region.as_ref();
         let mut samples = Vec::new();
@@ -83,7 +84,7 @@ impl<'a> Looked<'a> {
             for u in (stride / 2..camera.width).step_by(stride) {
                 let (u, v) = (u as f64, v as f64);
                 let Some(site) = eye.look(u, v) else { continue };
-                let spread = Sum::of(world.causes, &site, &facts).spread;
+                let spread = Sum::of(world.causes, &site, plan).spread;
                 let sigma_px = spread * unit.sigma(site.z, site.theta) * fb / (site.z * site.z);
                 let on_target = site.on_board && region.is_none_or(|r| r.contains(u, v));
                 samples.push(Sample { site, sigma_px, on_target });
@@ -111,7 +112,7 @@ impl<'a> Looked<'a> {
 
     /// Error of the disparity that the recording holds at the target's samples, px.
     fn errors(&self, cause: &Cause) -> Vec<f64> {
-        let (one, facts) = (std::slice::from_ref(cause), self.plan().facts());
+        let one = std::slice::from_ref(cause);
         let eye = self.eye.with(one);
         let error = |site: &Site| match cause.act {
             Act::Ray(_) | Act::Lift(_) => {
@@ -119,7 +120,7 @@ impl<'a> Looked<'a> {
                 there.map_or(0.0, |there| there.disparity - site.disparity)
             }
             _ => {
-                let sum = Sum::of(one, site, &facts);
+                let sum = Sum::of(one, site, self.plan());
                 (site.disparity + sum.error) / sum.gain - site.disparity
             }
         };
@@ -132,13 +133,8 @@ impl<'a> Looked<'a> {
         let c = &self.eye.world.unit.sensor.camera;
         let column =
             |s: &Sample| Vector3::new(1.0, (s.site.u - c.cx) / 100.0, (s.site.v - c.cy) / 100.0);
-        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-        for (s, d) in self.on_target().zip(delta) {
-            let (x, w) = (column(s), s.sigma_px.powi(-2));
-            normal += x * x.transpose() * w;
-            right += x * (w * d);
-        }
-        let plane = normal.cholesky().map_or(Vector3::zeros(), |c| c.solve(&right));
+        let rows = self.on_target().zip(delta).map(|(s, d)| (column(s), *d, s.sigma_px.powi(-2)));
+        let plane = least_squares(rows).unwrap_or_default();
         let left = |(s, d): (&Sample, &f64)| ((d - column(s).dot(&plane)) / s.sigma_px).powi(2);
         (plane, self.on_target().zip(delta).map(left).sum())
     }
@@ -231,11 +227,10 @@ impl<'a> Ground<'a> {
     fn of_spread(&self, cause: &Cause) -> f64 {
         let fb = self.unit.disparity_px_m();
         let one = |look: &Looked<'_>| {
-            let facts = look.plan().facts();
             let slope_px = fb * slope(self.unit, look.plan());
             let ratio = |s: &Sample| match &cause.act {
                 Act::Wander(px) => 1.0 + (slope_px * px / s.sigma_px).powi(2),
-                Act::Spread(f) => f(&s.site, &facts).powi(2),
+                Act::Spread(f) => f(&s.site, look.plan()).powi(2),
                 _ => 1.0,
             };
             look.frames() * look.sum(|s| of_variance(ratio(s)))
@@ -246,15 +241,14 @@ impl<'a> Ground<'a> {
     /// A shadow falls beside the board; every other loss counts on it.
     fn of_loss(&self, cause: &Cause) -> f64 {
         let beside = cause.label.axis == "edge-distance";
-        let rate = |site: &Site, facts: &Facts<'_>| {
-            let lost = 1.0 - Sum::of(std::slice::from_ref(cause), site, facts).answer;
+        let rate = |site: &Site, plan: &Plan| {
+            let lost = 1.0 - Sum::of(std::slice::from_ref(cause), site, plan).answer;
             lost + STRAYS * (1.0 - lost)
         };
         let mut rates: Vec<(f64, f64)> = Vec::new();
         for look in &self.views {
-            let facts = look.plan().facts();
             let counts = look.samples.iter().filter(|s| beside || s.on_target);
-            rates.extend(counts.map(|s| (look.frames(), rate(&s.site, &facts))));
+            rates.extend(counts.map(|s| (look.frames(), rate(&s.site, look.plan()))));
         }
         let all: f64 = rates.iter().map(|(n, _)| n).sum();
         let mean = rates.iter().map(|(n, p)| n * p).sum::<f64>() / all.max(1.0);

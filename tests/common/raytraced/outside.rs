@@ -58,7 +58,7 @@ fn in_mean(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Cause {
     match name {
         "seam" => {
             let (a, at) = (0.15 * size, share * width);
-            let f = move |s: &super::Site, _: &super::Facts<'_>| if s.u > at { a } else { 0.0 };
+            let f = move |s: &super::Site, _: &super::Plan| if s.u > at { a } else { 0.0 };
             bias(name, name, "column", &[("size_px", a)], f).within(at, width)
         }
         "row-banding" => {
@@ -78,7 +78,7 @@ fn in_mean(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Cause {
         }
         "disparity-step" => {
             let (a, at) = (0.12 * size, fb / (1.0 + 2.0 * share));
-            let step = move |s: &super::Site, _: &super::Facts<'_>| {
+            let step = move |s: &super::Site, _: &super::Plan| {
                 if s.disparity > at { a } else { 0.0 }
             };
             bias(name, name, "z", &[("size_px", a)], step)

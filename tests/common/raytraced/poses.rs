@@ -5,9 +5,9 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::FRAC_PI_2;
 
+use super::Unit;
 use super::geometry::{Board, Stage, inside_px};
 use super::kernels::scattered;
-use super::{Facts, Unit};
 use kinoise::camera::Camera;
 use kinoise::rng::Stream;
 use kinoise::view::{Region, TargetSize, ViewNotes};
@@ -37,29 +37,19 @@ pub enum Marked {
     Rectangle,
 }
 
-/// One view.
+/// One view: what its causes may look at beside the pixel.
 #[derive(Debug, Clone)]
 pub struct Plan {
     /// Its number in the session.
     pub view: usize,
     pub stage: Stage,
     pub stamps: Vec<f64>,
+    /// Since the session began, s.
     pub session_s: f64,
+    /// Light of the room, lx.
     pub lux: f64,
     pub temperature_c: f64,
     pub notes: ViewNotes,
-}
-
-impl Plan {
-    pub fn facts(&self) -> Facts<'_> {
-        Facts {
-            view: self.view,
-            stage: &self.stage,
-            session_s: self.session_s,
-            lux: self.lux,
-            temperature_c: self.temperature_c,
-        }
-    }
 }
 
 const NEAREST_M: f64 = 0.8;

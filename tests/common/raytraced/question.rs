@@ -50,8 +50,6 @@ pub enum Cell {
     Late,
     /// A term that real data need is struck from the model.
     Amnesia,
-    /// An effect added to real residuals.
-    Transplant,
     /// One half of a real recording against a model of the other.
     Halves,
 }
@@ -103,6 +101,11 @@ impl Hidden {
             nats: None,
         }
     }
+
+    /// The first of its names, or its form.
+    pub fn name(&self) -> &str {
+        self.names.first().unwrap_or(&self.form)
+    }
 }
 
 /// The concealed answer to one set.
@@ -120,9 +123,6 @@ pub struct ExamView {
     pub sensor: Sensor,
     /// Outside the distances or tilts of the recording.
     pub beyond: bool,
-    /// Of the target's plane, rad.
-    pub theta: f64,
-    pub azimuth: f64,
     pub conditions: Conditions,
     /// Mean of what is reported, concealed causes included, m; NaN off the target.
     pub depth: Vec<f32>,
@@ -161,13 +161,4 @@ pub trait ConcealedSet: Send + Sync {
     fn with_view(&self, _pose: &Pose) -> Result<Option<(Pose, Box<dyn ConcealedSet>)>> {
         Ok(None)
     }
-}
-
-/// What somebody learnt from a recording, put to use on a view they never saw.
-pub trait Predictor {
-    /// Take the predicted bias out of `depth` (m, NaN where there is none).
-    fn correct(&self, view: &ExamView, depth: &mut [f32]) -> Result<()>;
-
-    /// Predicted standard deviation of one frame's noise at `depth`, m.
-    fn sigma(&self, view: &ExamView, depth: &[f32]) -> Vec<f32>;
 }

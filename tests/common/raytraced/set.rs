@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::choices::{age, cause, names, session, units_per_metre, window};
 use super::confine::Gate;
 use super::eye::World;
-use super::kernels::lot;
+use super::kernels::{lot, seed_of};
 use super::poses::{Plan, Session};
 use super::question::{Asked, Hidden};
 use super::{Cause, Cell, Draw, Unit};
@@ -77,7 +77,7 @@ impl Set {
     /// concealed.
     pub fn asked(asked: &Asked, views: Option<usize>, frames: Option<usize>) -> Result<Self> {
         let Asked { cell, seed, small, .. } = *asked;
-        if matches!(cell, Cell::Amnesia | Cell::Transplant | Cell::Halves) {
+        if matches!(cell, Cell::Amnesia | Cell::Halves) {
             return Err(Error::Argument {
                 what: format!("the raytraced world has no cell {cell:?}"),
                 remedy: "take that of real recordings",
@@ -96,7 +96,7 @@ impl Set {
     /// Drawn from `text`; the picture is `width` px wide.
     fn of(order: Order, width: usize, text: &str) -> Result<Self> {
         let digest = sha256_hex(text.as_bytes());
-        let seed = Seed(u64::from_str_radix(&digest[..16], 16).unwrap_or(order.seed));
+        let seed = seed_of(&digest);
         let mut rng = seed.stream("rays/set");
         let (cell, strength) = (order.cell, order.strength);
         let names = names(&order, &mut rng);

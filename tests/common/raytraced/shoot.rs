@@ -5,7 +5,7 @@ use rand::Rng;
 use super::eye::{Eye, Site, World};
 use super::kernels::{fresh, white};
 use super::poses::Plan;
-use super::{Act, Cause, Clock, Facts, Set, Unit};
+use super::{Act, Cause, Clock, Set, Unit};
 use kinoise::frame::Frame;
 
 /// Landau, Choo and Beling 2015: 10-bit numbers from a white surface 1 m away, and read noise.
@@ -27,14 +27,14 @@ pub struct Sum {
 }
 
 impl Sum {
-    pub fn of(causes: &[Cause], site: &Site, facts: &Facts<'_>) -> Self {
+    pub fn of(causes: &[Cause], site: &Site, plan: &Plan) -> Self {
         let mut sum = Sum { error: 0.0, spread: 1.0, gain: 1.0, answer: 1.0 };
         for cause in causes {
             match &cause.act {
-                Act::Mismatch(f) => sum.error += f(site, facts),
-                Act::Spread(f) => sum.spread *= f(site, facts),
-                Act::Gain(f) => sum.gain *= f(site, facts),
-                Act::Loss(f) => sum.answer *= 1.0 - f(site, facts),
+                Act::Mismatch(f) => sum.error += f(site, plan),
+                Act::Spread(f) => sum.spread *= f(site, plan),
+                Act::Gain(f) => sum.gain *= f(site, plan),
+                Act::Loss(f) => sum.answer *= 1.0 - f(site, plan),
                 _ => {}
             }
         }
@@ -77,11 +77,11 @@ impl<'a> Still<'a> {
     pub fn new(set: &'a Set, view: usize) -> Self {
         let plan = &set.plans[view];
         let eye = Eye::new(World { causes: &set.causes, ..set.world() }, plan);
-        let (camera, facts) = (&set.unit.sensor.camera, plan.facts());
+        let camera = &set.unit.sensor.camera;
         let rounding = 1.0 / (12.0 * set.unit.units_per_metre().powi(2));
         let pixel = |i: usize| {
             let site = eye.look((i % camera.width) as f64, (i / camera.width) as f64);
-            site.map_or(NOTHING, |site| pixel(set, &site, &facts, rounding))
+            site.map_or(NOTHING, |site| pixel(set, &site, plan, rounding))
         };
         Still { set, plan, pixels: (0..camera.pixels()).map(pixel).collect() }
     }
@@ -204,8 +204,8 @@ impl<'a> Still<'a> {
     }
 }
 
-fn pixel(set: &Set, site: &Site, facts: &Facts<'_>, rounding: f64) -> Pixel {
-    let sum = Sum::of(&set.causes, site, facts);
+fn pixel(set: &Set, site: &Site, plan: &Plan, rounding: f64) -> Pixel {
+    let sum = Sum::of(&set.causes, site, plan);
     let base = set.unit.sigma(site.z, site.theta);
     let lit = site.facing / site.point.norm_squared();
     Pixel {
@@ -215,6 +215,6 @@ fn pixel(set: &Set, site: &Site, facts: &Facts<'_>, rounding: f64) -> Pixel {
         gain: sum.gain as f32,
         loss: (1.0 - sum.answer) as f32,
         on_board: site.on_board,
-        light: (site.albedo * (DN_AT_1_M * lit + DN_A_LUX * facts.lux)) as f32,
+        light: (site.albedo * (DN_AT_1_M * lit + DN_A_LUX * plan.lux)) as f32,
     }
 }

@@ -68,7 +68,8 @@ impl Laboratory {
             seed: Seed(self.seed),
         };
         let seen = self.seen();
-        let mut shooting = camera.begin(&seen).under(self.lux);
+        let mut shooting = camera.begin(&seen);
+        shooting.ambient_lux = self.lux;
         instants.iter().map(|&instant| shooting.shoot(instant)).collect()
     }
 

@@ -21,19 +21,17 @@ pub struct AdviceMarks {
 
 /// Judge one set's second verdict beside its first.
 pub fn mark_advice(truth: &Truth, first: Option<&Value>, second: Option<&Value>) -> AdviceMarks {
-    let read = |v: Option<&Value>| -> Option<Verdict> { serde_json::from_value(v?.clone()).ok() };
-    let (before, after) = (read(first), read(second));
+    let read = |v: Option<&Value>| v.and_then(|v| Verdict::read(v).ok());
+    let (before, after) = (read(first), read(second).unwrap_or_default());
     let Some(asked) = before.as_ref().and_then(Verdict::in_doubt) else {
         return AdviceMarks::default();
     };
     let doubt: Vec<String> = asked.alternatives.iter().take(2).map(|a| a.effect.clone()).collect();
-    let same = |f: &&Finding| f.statistic == asked.statistic && f.name().is_some();
-    let answer = after.as_ref().and_then(|v| v.claims().find(same));
+    let answer = after.claims().find(|f| f.statistic == asked.statistic && f.name().is_some());
     let leads = answer.and_then(Finding::name).unwrap_or("nothing").to_string();
-    let hidden = |id: &&String| truth.hidden.iter().any(|h| h.names.contains(id));
-    let right_name = doubt.iter().find(hidden);
+    let right_name = doubt.iter().find(|id| truth.hidden.iter().any(|h| h.names.contains(id)));
     let right = right_name.map(|id| {
-        let then = after.iter().flat_map(Verdict::claims).map(|f| f.probability(id));
+        let then = after.claims().map(|f| f.probability(id));
         [asked.probability(id), then.fold(0.0, f64::max)]
     });
     let settled = right_name.zip(right).map(|(id, [_, p])| *id == leads && p >= CERTAIN);
@@ -43,6 +41,7 @@ pub fn mark_advice(truth: &Truth, first: Option<&Value>, second: Option<&Value>)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::judge::marks::tests::{hidden, truth};
     use serde_json::json;
 
     fn finding(names: &[(&str, f64)], next_view: &Value) -> Value {
@@ -56,13 +55,7 @@ mod tests {
 
     #[test]
     fn an_advised_view_settles_when_the_hidden_name_leads_with_certainty() {
-        let asked =
-            json!({"world": "rays", "cell": "single", "nats": 50.0, "seed": 1, "small": true});
-        let hidden = json!([{"names": ["vignetting"], "form": "f", "statistic": "variance",
-            "axis": "radius", "interval": null, "parameters": {}, "nats": 60.0}]);
-        let truth: Truth =
-            serde_json::from_value(json!({"asked": asked, "hidden": hidden, "base": null}))
-                .unwrap();
+        let truth = truth("single", json!([hidden(&["vignetting"], "radius")]));
         let pose = json!({"z_m": 1.0, "theta_rad": 0.5, "azimuth_rad": 0.0});
         let first = finding(&[("slope-noise", 0.6), ("vignetting", 0.4)], &pose);
         let settled = finding(&[("vignetting", 0.97)], &Value::Null);

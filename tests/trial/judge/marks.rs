@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use kinoise::error::{Error, Result};
+use kinoise::error::Result;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -14,35 +14,14 @@ use crate::raytraced::question::{Cell, Hidden, Truth};
 pub struct Marks {
     /// The first thing said: a name, "unexplained", "recalibrate", "nothing", or "failed".
     pub first: String,
-    /// Every question that arose, and whether the answer is yes. Without a diagnosis everything that
-    /// was asked is wrong. The questions are told on the page ([`QUESTIONS`]).
+    /// Every one of [`QUESTIONS`] that arose, and whether the answer is yes. Without a diagnosis
+    /// everything that was asked is wrong.
     pub answers: BTreeMap<String, bool>,
     /// What the stretch of the finding and that of the label share, over what either holds.
     pub overlap: Option<f64>,
     pub parameters: Vec<ParameterMark>,
     pub stated: Vec<Stated>,
 }
-
-/// What is asked, and of which sets.
-pub const QUESTIONS: [(&str, &str); 14] = [
-    ("ran", "a diagnosis came"),
-    ("false_alarm", "something is found where nothing is hidden"),
-    ("detected", "something is found where something is hidden that can be seen"),
-    ("first_name", "the first finding's name is one of the hidden; of those detected"),
-    ("in_two", "its name or its first two alternatives are; of those detected"),
-    ("exact", "the names said are those hidden, no more and no fewer"),
-    ("axis", "the first finding is on the right axis; of those detected"),
-    (
-        "abstained",
-        "what the catalogue lacks is called unexplained, on the right statistic and axis",
-    ),
-    ("confident_wrong", "a name that is not hidden is said with 0.9 or more"),
-    ("said_blind", "what planes cannot show is said to be so"),
-    ("nothing_claimed", "nothing is claimed of what planes cannot show"),
-    ("recalibrate", "a unit that has changed is sent back to calibration, without a name"),
-    ("after_clean", "the extended model leaves nothing that the tests can see; of those named"),
-    ("advice", "where the finding is one of several, a next view is proposed"),
-];
 
 /// A parameter that the truth and the finding have in common.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -65,24 +44,108 @@ pub struct Stated {
     pub right: bool,
 }
 
+/// By name: what is asked of which sets, in words; and the answer, none where it is not asked.
+type Question = (&'static str, &'static str, fn(&Case<'_>) -> Option<bool>);
+
+pub const QUESTIONS: [Question; 14] = [
+    ("ran", "a diagnosis came", |c| Some(c.said.is_some())),
+    ("false_alarm", "something is found where nothing is hidden", |c| {
+        let alarms = |v: &Verdict| v.verdict == "mismatch" || v.claims().next().is_some();
+        c.is(Kind::Empty).then(|| c.said.is_none_or(alarms))
+    }),
+    ("detected", "something is found where something is hidden that can be seen", |c| {
+        (c.is(Kind::Concealed) || c.is(Kind::Drift)).then(|| c.found())
+    }),
+    ("first_name", "the first finding's name is one of the hidden; of those detected", |c| {
+        c.of_first(|f| f.name().is_some_and(|id| c.is_hidden(id)))
+    }),
+    ("in_two", "its name or its first two alternatives are; of those detected", |c| {
+        let two = |f: &Finding| f.alternatives.iter().take(2).any(|a| c.is_hidden(&a.effect));
+        c.of_first(|f| two(f) || f.name().is_some_and(|id| c.is_hidden(id)))
+    }),
+    ("exact", "the names said are those hidden, no more and no fewer", |c| {
+        let asked = c.is(Kind::Concealed) && c.nameless().next().is_none();
+        asked.then(|| {
+            let said: Vec<&str> = c.claims().filter_map(Finding::name).collect();
+            let found = |h: &Hidden| h.names.iter().any(|n| said.contains(&n.as_str()));
+            c.hidden.iter().all(found) && said.iter().all(|id| c.is_hidden(id))
+        })
+    }),
+    ("axis", "the first finding is on the right axis; of those detected", |c| {
+        c.of_first(|f| c.meant(f).any(|h| f.right_axis(h)))
+    }),
+    (
+        "abstained",
+        "what the catalogue lacks is called unexplained, on the right statistic and axis",
+        |c| {
+            let open = |f: &Finding, h| f.status == "unexplained" && f.right_place(h);
+            let asked = c.is(Kind::Concealed) && c.nameless().next().is_some();
+            asked.then(|| c.nameless().all(|h| c.claims().any(|f| open(f, h))))
+        },
+    ),
+    ("confident_wrong", "a name that is not hidden is said with 0.9 or more", |c| {
+        Some(c.claims().filter_map(Finding::certain_name).any(|id| !c.is_hidden(id)))
+    }),
+    ("said_blind", "what planes cannot show is said to be so", |c| {
+        let blind = |v: &Verdict| {
+            let unseen = v.cannot_tell.iter().map(|c| c.effect.as_str());
+            let found = v.findings.iter().filter(|f| !f.claims());
+            unseen.chain(found.filter_map(|f| f.effect.as_deref())).any(|id| c.is_hidden(id))
+        };
+        c.is(Kind::Blind).then(|| c.said.is_some_and(blind))
+    }),
+    ("nothing_claimed", "nothing is claimed of what planes cannot show", |c| {
+        c.is(Kind::Blind).then(|| c.said.is_some() && c.claims().next().is_none())
+    }),
+    ("recalibrate", "a unit that has changed is sent back to calibration, without a name", |c| {
+        let sent_back = || c.claims().any(|f| f.status == "recalibrate");
+        c.is(Kind::Drift).then(|| sent_back() && c.claims().all(|f| f.name().is_none()))
+    }),
+    (
+        "after_clean",
+        "the extended model leaves nothing that the tests can see; of those named",
+        |c| {
+            let asked = c.is(Kind::Concealed) && c.claims().any(|f| f.name().is_some());
+            let after = c.said.and_then(|v| v.after.as_ref());
+            asked.then(|| after.is_some_and(|a| a.verdict == "match"))
+        },
+    ),
+    ("advice", "where the finding is one of several, a next view is proposed", |c| {
+        let doubtful = c.claims().find(|f| f.status == "one-of");
+        doubtful.filter(|_| c.is(Kind::Concealed)).map(|f| f.next_view.is_some())
+    }),
+];
+
 /// Judge one set.
 ///
 /// # Errors
 /// When the verdict is not a diagnosis.
 pub fn mark(truth: &Truth, verdict: Option<&Value>) -> Result<Marks> {
-    let read = |v: &Value| {
-        serde_json::from_value::<Verdict>(v.clone()).map_err(|e| Error::Argument {
-            what: format!("a verdict cannot be read: {e}"),
-            remedy: "it must be a diagnosis.json without its curves",
-        })
+    let said = verdict.map(Verdict::read).transpose()?;
+    let kind = match truth.asked.cell {
+        Cell::Drift => Kind::Drift,
+        Cell::Blind => Kind::Blind,
+        _ if truth.hidden.is_empty() => Kind::Empty,
+        _ => Kind::Concealed,
     };
-    let verdict = verdict.map(read).transpose()?;
-    Ok(Case { truth, said: verdict.as_ref() }.marks())
+    Ok(Case { kind, hidden: &truth.hidden, said: said.as_ref() }.marks())
 }
 
-/// A truth and what was said to it; nothing where no diagnosis came.
-struct Case<'a> {
-    truth: &'a Truth,
+/// What kind of thing is hidden.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Empty,
+    /// Sigma itself.
+    Drift,
+    /// What planes cannot show.
+    Blind,
+    Concealed,
+}
+
+/// What is hidden and what was said to it; nothing where no diagnosis came.
+pub struct Case<'a> {
+    kind: Kind,
+    hidden: &'a [Hidden],
     said: Option<&'a Verdict>,
 }
 
@@ -93,69 +156,18 @@ impl Case<'_> {
             (_, None) => "nothing",
             (_, Some(said)) => said.name().unwrap_or(&said.status),
         };
-        let answers = [
-            ("ran", Some(self.said.is_some())),
-            ("confident_wrong", Some(self.certain_but_wrong())),
-        ];
-        let more = match self.truth.asked.cell {
-            Cell::Drift => self.drift(),
-            Cell::Blind => self.blind(),
-            _ if self.truth.hidden.is_empty() => vec![("false_alarm", Some(self.alarms()))],
-            _ => self.concealed(),
-        };
-        let all = answers.into_iter().chain(more);
+        let answers = QUESTIONS.iter().filter_map(|(id, _, ask)| Some(((*id).into(), ask(self)?)));
         Marks {
             first: first.into(),
-            answers: all.filter_map(|(name, yes)| Some((name.to_string(), yes?))).collect(),
+            answers: answers.collect(),
             overlap: self.best_overlap(),
             parameters: self.parameters(),
             stated: self.stated(),
         }
     }
 
-    fn alarms(&self) -> bool {
-        self.said.is_none_or(|v| v.verdict == "mismatch" || v.claims().next().is_some())
-    }
-
-    fn drift(&self) -> Vec<(&'static str, Option<bool>)> {
-        let sent_back = self.claims().any(|f| f.status == "recalibrate");
-        let right = sent_back && self.claims().all(|f| f.name().is_none());
-        vec![("detected", Some(self.found())), ("recalibrate", Some(right))]
-    }
-
-    fn blind(&self) -> Vec<(&'static str, Option<bool>)> {
-        let blind = |v: &Verdict| {
-            let unseen = v.cannot_tell.iter().map(|c| c.effect.as_str());
-            let found = v.findings.iter().filter(|f| !f.claims());
-            unseen.chain(found.filter_map(|f| f.effect.as_deref())).any(|id| self.is_hidden(id))
-        };
-        let silent = self.said.is_some_and(|v| v.claims().next().is_none());
-        vec![("said_blind", Some(self.said.is_some_and(blind))), ("nothing_claimed", Some(silent))]
-    }
-
-    fn concealed(&self) -> Vec<(&'static str, Option<bool>)> {
-        let nameless: Vec<&Hidden> = self.hidden().filter(|h| h.names.is_empty()).collect();
-        let has_names = self.hidden().count() > nameless.len();
-        let of_first = |ask: &dyn Fn(&Finding) -> bool| self.first().filter(|_| has_names).map(ask);
-        let unexplained = || self.claims().filter(|f| f.status == "unexplained");
-        let abstained = nameless.iter().all(|h| unexplained().any(|f| f.right_place(h)));
-        let clean = |v: &Verdict| v.after.as_ref().is_some_and(|a| a.verdict == "match");
-        let named = self.claims().any(|f| f.name().is_some());
-        let doubtful = self.claims().find(|f| f.status == "one-of");
-        vec![
-            ("detected", Some(self.found())),
-            ("first_name", of_first(&|f| f.name().is_some_and(|id| self.is_hidden(id)))),
-            ("in_two", of_first(&|f| self.is_among_two(f))),
-            ("exact", nameless.is_empty().then(|| self.exact())),
-            ("axis", of_first(&|f| self.meant(f).any(|h| f.right_axis(h)))),
-            ("abstained", (!nameless.is_empty()).then_some(abstained)),
-            ("after_clean", named.then(|| self.said.is_some_and(clean))),
-            ("advice", doubtful.map(Finding::advises)),
-        ]
-    }
-
-    fn hidden(&self) -> impl Iterator<Item = &Hidden> {
-        self.truth.hidden.iter()
+    fn is(&self, kind: Kind) -> bool {
+        self.kind == kind
     }
 
     fn claims(&self) -> impl Iterator<Item = &Finding> {
@@ -168,32 +180,28 @@ impl Case<'_> {
 
     /// The most important finding, where there is a mismatch at all.
     fn first(&self) -> Option<&Finding> {
-        self.said.filter(|v| v.finds_something()).and_then(|v| v.claims().next())
+        self.claims().next().filter(|_| self.found())
+    }
+
+    /// Asked of the first finding, where something with a name is hidden.
+    fn of_first(&self, ask: impl Fn(&Finding) -> bool) -> Option<bool> {
+        let asked = self.is(Kind::Concealed) && self.hidden.iter().any(|h| !h.names.is_empty());
+        self.first().filter(|_| asked).map(ask)
+    }
+
+    /// Hidden causes that the catalogue lacks.
+    fn nameless(&self) -> impl Iterator<Item = &Hidden> {
+        self.hidden.iter().filter(|h| h.names.is_empty())
     }
 
     fn is_hidden(&self, id: &str) -> bool {
-        self.hidden().any(|h| h.names.iter().any(|n| n == id))
-    }
-
-    fn is_among_two(&self, said: &Finding) -> bool {
-        let two = said.alternatives.iter().take(2).map(|a| a.effect.as_str());
-        two.chain(said.name()).any(|id| self.is_hidden(id))
+        self.hidden.iter().any(|h| h.names.iter().any(|n| n == id))
     }
 
     /// The hidden causes that a finding can stand for: those of its name, else all.
     fn meant(&self, said: &Finding) -> impl Iterator<Item = &Hidden> {
         let id = said.name().filter(|id| self.is_hidden(id)).map(String::from);
-        self.hidden().filter(move |h| id.as_ref().is_none_or(|id| h.names.contains(id)))
-    }
-
-    fn exact(&self) -> bool {
-        let said: Vec<&str> = self.claims().filter_map(Finding::name).collect();
-        let every = self.hidden().all(|h| h.names.iter().any(|n| said.contains(&n.as_str())));
-        every && said.iter().all(|id| self.is_hidden(id))
-    }
-
-    fn certain_but_wrong(&self) -> bool {
-        self.claims().filter_map(Finding::certain_name).any(|id| !self.is_hidden(id))
+        self.hidden.iter().filter(move |h| id.as_ref().is_none_or(|id| h.names.contains(id)))
     }
 
     /// Of the finding that meets a label with a stretch best.
@@ -202,7 +210,7 @@ impl Case<'_> {
             Some(id) => h.names.iter().any(|n| n == id),
             None => h.names.is_empty() && f.right_place(h),
         };
-        let all = self.claims().flat_map(|f| self.hidden().map(move |h| (f, h)));
+        let all = self.claims().flat_map(|f| self.hidden.iter().map(move |h| (f, h)));
         all.filter(|(f, h)| fits(f, h)).filter_map(|(f, h)| f.overlap(h)).reduce(f64::max)
     }
 
@@ -248,84 +256,66 @@ fn parameter(effect: &str, name: &str, truth: f64, estimate: &Value) -> Option<P
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use serde_json::json;
 
-    fn truth(cell: &str, hidden: Value) -> Truth {
+    pub fn truth(cell: &str, hidden: Value) -> Truth {
         let asked = json!({"world": "rays", "cell": cell, "nats": 50.0, "seed": 1, "small": true});
         serde_json::from_value(json!({"asked": asked, "hidden": hidden, "base": null})).unwrap()
     }
 
-    fn hidden(names: &[&str], axis: &str) -> Value {
+    pub fn hidden(names: &[&str], axis: &str) -> Value {
         json!({"names": names, "form": "f", "statistic": "variance", "axis": axis,
             "interval": [0.0, 1.0], "parameters": {"growth": 0.5}, "nats": 60.0})
     }
 
-    fn finding(status: &str, effect: &str, probability: f64) -> Value {
-        json!({"status": status, "effect": effect, "statistic": "variance", "axis": "radius",
-            "interval": [0.5, 1.0],
-            "alternatives": [{"effect": effect, "probability": probability}],
-            "parameters": {"growth": {"value": 0.6, "std_error": 0.1}}})
-    }
-
-    fn verdict(findings: &[Value]) -> Value {
-        let verdict = if findings.is_empty() { "match" } else { "mismatch" };
+    fn verdict(found: &[(&str, &str, f64)]) -> Value {
+        let finding = |(status, effect, probability): &(&str, &str, f64)| {
+            json!({"status": status, "effect": effect, "statistic": "variance", "axis": "radius",
+                "interval": [0.5, 1.0],
+                "alternatives": [{"effect": effect, "probability": probability}],
+                "parameters": {"growth": {"value": 0.6, "std_error": 0.1}}})
+        };
+        let verdict = if found.is_empty() { "match" } else { "mismatch" };
+        let findings: Vec<Value> = found.iter().map(finding).collect();
         json!({"verdict": verdict, "findings": findings, "after": {"verdict": "match"}})
     }
 
-    fn yes(truth: &Truth, verdict: &Value) -> Vec<String> {
-        let answers = mark(truth, Some(verdict)).unwrap().answers;
-        answers.into_iter().filter(|a| a.1).map(|a| a.0).collect()
+    /// Names said, against what is hidden: the questions that are answered with yes.
+    #[test]
+    fn right_and_wrong_names_and_silence_count_as_what_they_are() {
+        let vignetting = || truth("single", json!([hidden(&["vignetting"], "radius")]));
+        let seam = || truth("outside", json!([hidden(&[], "radius")]));
+        let (named, wrong) = (("named", "vignetting", 0.95), ("named", "slope-noise", 0.95));
+        let cases = [
+            (vignetting(), vec![named], "after_clean axis detected exact first_name in_two ran"),
+            (vignetting(), vec![wrong], "after_clean axis confident_wrong detected ran"),
+            (vignetting(), vec![], "ran"),
+            (seam(), vec![("unexplained", "", 0.0)], "abstained detected ran"),
+            (seam(), vec![named], "after_clean confident_wrong detected ran"),
+            (truth("null", json!([])), vec![], "ran"),
+            (truth("null", json!([])), vec![("recalibrate", "", 0.0)], "false_alarm ran"),
+        ];
+        for (truth, said, expected) in cases {
+            let answers = mark(&truth, Some(&verdict(&said))).unwrap().answers;
+            let yes: Vec<String> = answers.into_iter().filter(|a| a.1).map(|a| a.0).collect();
+            assert_eq!(yes.join(" "), expected, "{said:?}");
+        }
+        let none = mark(&vignetting(), None).unwrap();
+        assert!(none.answers.values().all(|yes| !yes) && none.first == "failed");
+        assert!(mark(&truth("null", json!([])), None).unwrap().answers["false_alarm"]);
     }
 
     #[test]
-    fn a_right_name_is_right_in_every_respect() {
+    fn stretches_parameters_and_probabilities_are_compared_with_the_truth() {
         let truth = truth("single", json!([hidden(&["vignetting"], "radius")]));
-        let marks = mark(&truth, Some(&verdict(&[finding("named", "vignetting", 0.95)]))).unwrap();
-        for question in ["detected", "first_name", "in_two", "exact", "axis", "after_clean"] {
-            assert_eq!(marks.answers.get(question), Some(&true), "{question}");
-        }
+        let marks = mark(&truth, Some(&verdict(&[("named", "vignetting", 0.95)]))).unwrap();
         assert_eq!(marks.answers.get("confident_wrong"), Some(&false));
         assert_eq!(marks.overlap, Some(0.5));
         assert!((marks.parameters[0].relative_error - 0.2).abs() < 1e-12);
         assert_eq!(marks.parameters[0].covered, Some(true));
-        assert_eq!(
-            marks.stated,
-            [Stated { effect: "vignetting".into(), probability: 0.95, right: true }]
-        );
-    }
-
-    #[test]
-    fn wrong_names_and_silence_count_as_what_they_are() {
-        let truth = truth("single", json!([hidden(&["vignetting"], "radius")]));
-        let wrong = verdict(&[finding("named", "slope-noise", 0.95)]);
-        assert_eq!(
-            yes(&truth, &wrong),
-            ["after_clean", "axis", "confident_wrong", "detected", "ran"]
-        );
-        assert_eq!(yes(&truth, &verdict(&[])), ["ran"]);
-        let none = mark(&truth, None).unwrap();
-        assert!(none.answers.values().all(|yes| !yes) && none.first == "failed");
-    }
-
-    #[test]
-    fn what_the_catalogue_lacks_wants_no_name_and_the_right_place() {
-        let truth = truth("outside", json!([hidden(&[], "radius")]));
-        let open = verdict(&[finding("unexplained", "", 0.0)]);
-        assert!(yes(&truth, &open).contains(&"abstained".into()));
-        let dressed = verdict(&[finding("named", "vignetting", 0.95)]);
-        assert_eq!(yes(&truth, &dressed), ["after_clean", "confident_wrong", "detected", "ran"]);
-    }
-
-    #[test]
-    fn anything_said_of_nothing_is_a_false_alarm() {
-        let truth = truth("null", json!([]));
-        assert_eq!(yes(&truth, &verdict(&[])), ["ran"]);
-        assert!(
-            yes(&truth, &verdict(&[finding("recalibrate", "", 0.0)]))
-                .contains(&"false_alarm".into())
-        );
-        assert_eq!(mark(&truth, None).unwrap().answers["false_alarm"], true);
+        let stated = Stated { effect: "vignetting".into(), probability: 0.95, right: true };
+        assert_eq!(marks.stated, [stated]);
     }
 }

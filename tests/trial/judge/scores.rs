@@ -9,7 +9,7 @@ use super::endpoints::{Endpoint, endpoints};
 use super::marks::Stated;
 use crate::gain::{Gain, Gains};
 use crate::proof::ProvenSet;
-use crate::raytraced::question::{Cell, Truth};
+use crate::raytraced::question::{Cell, Hidden, Truth};
 
 /// So many of so many.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -24,11 +24,7 @@ pub struct Rate {
 impl Rate {
     /// `None` where nothing was tried.
     pub fn of(answers: impl Iterator<Item = bool>) -> Option<Self> {
-        let (mut k, mut n) = (0, 0);
-        for yes in answers {
-            n += 1;
-            k += usize::from(yes);
-        }
+        let (k, n) = answers.fold((0, 0), |(k, n), yes| (k + usize::from(yes), n + 1));
         let interval = clopper_pearson(k, n, 0.95);
         (n > 0).then(|| Rate { k, n, rate: k as f64 / n as f64, interval })
     }
@@ -36,6 +32,8 @@ impl Rate {
 
 /// Rates by question.
 pub type Rates = BTreeMap<String, Rate>;
+/// By a name, and by strength.
+pub type ByStrength = BTreeMap<String, BTreeMap<String, Rates>>;
 
 /// The whole trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -44,9 +42,9 @@ pub struct Scores {
     /// By kind of set, "WORLD/CELL"; what the catalogue has no name for is "WORLD/nameless".
     pub by_kind: BTreeMap<String, Rates>,
     /// Single causes by kind and strength, nats (in the world of light the size that was ordered).
-    pub by_strength: BTreeMap<String, BTreeMap<String, Rates>>,
+    pub by_strength: ByStrength,
     /// Single causes by name and strength; those outside the catalogue by form.
-    pub by_effect: BTreeMap<String, BTreeMap<String, Rates>>,
+    pub by_effect: ByStrength,
     /// Of single causes that were detected: what was hidden, what was said first, how often.
     pub confusion: BTreeMap<String, BTreeMap<String, usize>>,
     /// Medians over all sets.
@@ -86,36 +84,30 @@ pub struct Ratio {
 
 /// Score all sets.
 pub fn scores(sets: &[ProvenSet]) -> Scores {
-    let single = |s: &&ProvenSet| matches!(s.truth.asked.cell, Cell::Single | Cell::Outside);
-    let singles: Vec<&ProvenSet> = sets.iter().filter(single).collect();
+    let all: Vec<&ProvenSet> = sets.iter().collect();
+    let mut singles = all.clone();
+    singles.retain(|s| matches!(s.truth.asked.cell, Cell::Single | Cell::Outside));
     let parameters = || sets.iter().flat_map(|s| &s.marks.parameters);
     let stated: Vec<&Stated> = sets.iter().flat_map(|s| &s.marks.stated).collect();
-    let mut overlaps: Vec<f64> = sets.iter().filter_map(|s| s.marks.overlap).collect();
-    let mut errors: Vec<f64> = parameters().map(|p| p.relative_error).collect();
+    let median = |values: Vec<f64>| quantile(&mut { values }, 0.5);
     let calibration = calibration(&stated);
-    let names = stated.len().max(1) as f64;
+    let mean = |sum: f64| (!stated.is_empty()).then(|| sum / stated.len() as f64);
     let off = calibration.iter().map(|b| (b.stated - b.right.rate).abs() * b.right.n as f64);
-    let calibration_error = (!stated.is_empty()).then(|| off.sum::<f64>() / names);
     let square = |s: &&Stated| (s.probability - f64::from(u8::from(s.right))).powi(2);
-    let brier = (!stated.is_empty()).then(|| stated.iter().map(square).sum::<f64>() / names);
-    let advice = sets.iter().filter_map(|s| s.advised.as_ref()?.marks.settled);
     Scores {
         sets: sets.len(),
-        by_kind: grouped(sets.iter(), |s| Some(kind(&s.truth)))
-            .into_iter()
-            .map(|(kind, sets)| (kind, rates(&sets)))
-            .collect(),
-        by_strength: by_strength(&singles, |s| kind(&s.truth)),
-        by_effect: by_strength(&singles, |s| hidden_name(&s.truth)),
+        by_kind: grouped(&all, |s| Some(kind(&s.truth)), rates),
+        by_strength: by_strength(&singles, kind),
+        by_effect: by_strength(&singles, hidden_name),
         confusion: confusion(&singles),
-        overlap: quantile(&mut overlaps, 0.5),
-        parameter_error: quantile(&mut errors, 0.5),
+        overlap: median(sets.iter().filter_map(|s| s.marks.overlap).collect()),
+        parameter_error: median(parameters().map(|p| p.relative_error).collect()),
         coverage: Rate::of(parameters().filter_map(|p| p.covered)),
+        calibration_error: mean(off.sum()),
+        brier: mean(stated.iter().map(square).sum()),
         calibration,
-        calibration_error,
-        brier,
         gains: gains(sets),
-        advice: Rate::of(advice),
+        advice: Rate::of(sets.iter().filter_map(|s| s.advised.as_ref()?.marks.settled)),
         endpoints: endpoints(sets),
     }
 }
@@ -130,10 +122,6 @@ pub fn level(truth: &Truth) -> Option<f64> {
     let min = nats.reduce(f64::min).filter(|n| *n > 0.0)?;
     let away = |l: &f64| (min / l).ln().abs();
     LEVELS.into_iter().min_by(|a, b| away(a).total_cmp(&away(b)))
-}
-
-fn strength(truth: &Truth) -> Option<String> {
-    level(truth).map(|l| format!("{:04}", l as u32))
 }
 
 /// As in the files.
@@ -153,23 +141,22 @@ fn kind(truth: &Truth) -> String {
 }
 
 fn hidden_name(truth: &Truth) -> String {
-    let name = |h: &crate::raytraced::question::Hidden| {
-        h.names.first().map_or(h.form.clone(), String::clone)
-    };
-    truth.hidden.iter().map(name).collect::<Vec<_>>().join("+")
+    truth.hidden.iter().map(Hidden::name).collect::<Vec<_>>().join("+")
 }
 
-fn grouped<'a>(
-    sets: impl Iterator<Item = &'a ProvenSet>,
+/// What `of` makes of all sets that have a key in common.
+fn grouped<T>(
+    sets: &[&ProvenSet],
     key: impl Fn(&ProvenSet) -> Option<String>,
-) -> BTreeMap<String, Vec<&'a ProvenSet>> {
+    of: impl Fn(&[&ProvenSet]) -> T,
+) -> BTreeMap<String, T> {
     let mut groups: BTreeMap<String, Vec<&ProvenSet>> = BTreeMap::new();
     for set in sets {
         if let Some(key) = key(set) {
             groups.entry(key).or_default().push(set);
         }
     }
-    groups
+    groups.into_iter().map(|(key, sets)| (key, of(&sets))).collect()
 }
 
 fn rates(sets: &[&ProvenSet]) -> Rates {
@@ -181,25 +168,17 @@ fn rates(sets: &[&ProvenSet]) -> Rates {
     answers.into_iter().filter_map(rate).collect()
 }
 
-fn by_strength(
-    singles: &[&ProvenSet],
-    key: impl Fn(&ProvenSet) -> String,
-) -> BTreeMap<String, BTreeMap<String, Rates>> {
-    let by_key = grouped(singles.iter().copied(), |s| Some(key(s)));
-    let levels = |sets: Vec<&ProvenSet>| {
-        let by_level = grouped(sets.into_iter(), |s| strength(&s.truth));
-        by_level.into_iter().map(|(level, sets)| (level, rates(&sets))).collect()
-    };
-    by_key.into_iter().map(|(key, sets)| (key, levels(sets))).collect()
+fn by_strength(singles: &[&ProvenSet], key: fn(&Truth) -> String) -> ByStrength {
+    let strength = |s: &ProvenSet| level(&s.truth).map(|l| format!("{:04}", l as u32));
+    grouped(singles, |s| Some(key(&s.truth)), |sets| grouped(sets, strength, rates))
 }
 
 fn confusion(singles: &[&ProvenSet]) -> BTreeMap<String, BTreeMap<String, usize>> {
-    let mut table: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
-    for set in singles.iter().filter(|s| s.marks.answers.get("detected") == Some(&true)) {
-        let row = table.entry(hidden_name(&set.truth)).or_default();
-        *row.entry(set.marks.first.clone()).or_insert(0) += 1;
-    }
-    table
+    let detected = |s: &ProvenSet| s.marks.answers.get("detected") == Some(&true);
+    let hidden = |s: &ProvenSet| detected(s).then(|| hidden_name(&s.truth));
+    grouped(singles, hidden, |sets| {
+        grouped(sets, |s| Some(s.marks.first.clone()), |sets| sets.len())
+    })
 }
 
 /// Ten bins of the same width.
@@ -227,14 +206,12 @@ pub fn ratio(gains: &Gains, method: &str, side: fn(&Gain) -> f64) -> Option<f64>
 pub const SIDES: [fn(&Gain) -> f64; 2] = [|g| g.within, |g| g.beyond];
 
 fn gains(sets: &[ProvenSet]) -> BTreeMap<String, [Option<Ratio>; 2]> {
-    let all: Vec<&Gains> = sets.iter().filter_map(|s| s.gains.as_ref()).collect();
-    let mut names: Vec<&String> = all.iter().flat_map(|g| g.methods.keys()).collect();
-    names.sort();
-    names.dedup();
+    let all = || sets.iter().filter_map(|s| s.gains.as_ref());
     let of = |name: &str, side: fn(&Gain) -> f64| {
-        let mut ratios: Vec<f64> = all.iter().filter_map(|g| ratio(g, name, side)).collect();
+        let mut ratios: Vec<f64> = all().filter_map(|g| ratio(g, name, side)).collect();
         let (median, low) = (quantile(&mut ratios, 0.5)?, quantile(&mut ratios, 0.1)?);
         Some(Ratio { n: ratios.len(), median, low })
     };
-    names.into_iter().map(|n| (n.clone(), SIDES.map(|side| of(n, side)))).collect()
+    let names = all().flat_map(|g| g.methods.keys());
+    names.map(|n| (n.clone(), SIDES.map(|side| of(n, side)))).collect()
 }

@@ -1,5 +1,6 @@
 //! A diagnosis as the judge reads it.
 
+use kinoise::error::{Error, Result};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
@@ -26,7 +27,7 @@ pub struct Finding {
     pub interval: [Option<f64>; 2],
     #[serde(default)]
     pub parameters: Map<String, Value>,
-    pub next_view: Option<Value>,
+    pub next_view: Option<Pose>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -73,13 +74,12 @@ impl Finding {
         self.name().filter(|_| sure)
     }
 
-    pub fn advises(&self) -> bool {
-        self.next_view.as_ref().is_some_and(|v| !v.is_null())
-    }
-
     /// On the axis of the label, or on one on which it shows as well.
     pub fn right_axis(&self, hidden: &Hidden) -> bool {
-        same_axis(&self.axis, &hidden.axis) || hidden.also.iter().any(|a| same_axis(&self.axis, a))
+        // Words for one axis: disparity is focal length times baseline over distance.
+        let depth = |axis: &str| ["z", "disparity", "range"].contains(&axis);
+        let same = |axis: &String| self.axis == *axis || depth(&self.axis) && depth(axis);
+        same(&hidden.axis) || hidden.also.iter().any(same)
     }
 
     /// Nothing is known by name, but what kind of thing it is and what it depends on.
@@ -97,13 +97,14 @@ impl Finding {
     }
 }
 
-/// Words for one axis: disparity is focal length times baseline over distance.
-fn same_axis(a: &str, b: &str) -> bool {
-    let depth = |axis| ["z", "disparity", "range"].contains(&axis);
-    a == b || depth(a) && depth(b)
-}
-
 impl Verdict {
+    pub fn read(verdict: &Value) -> Result<Self> {
+        Verdict::deserialize(verdict).map_err(|e| Error::Argument {
+            what: format!("a verdict cannot be read: {e}"),
+            remedy: "it must be a diagnosis.json without its curves",
+        })
+    }
+
     pub fn claims(&self) -> impl Iterator<Item = &Finding> {
         self.findings.iter().filter(|f| f.claims())
     }
@@ -115,14 +116,11 @@ impl Verdict {
 
     /// The first finding that asks for another view.
     pub fn in_doubt(&self) -> Option<&Finding> {
-        self.claims().find(|f| f.advises())
+        self.claims().find(|f| f.next_view.is_some())
     }
 }
 
 /// The view that a verdict asks for, by the first finding that is not sure of its name.
 pub fn advised_view(verdict: &Value) -> Option<Pose> {
-    let verdict: Verdict = serde_json::from_value(verdict.clone()).ok()?;
-    let next = verdict.in_doubt()?.next_view.clone()?;
-    let pose: Pose = serde_json::from_value(next).ok()?;
-    [pose.z_m, pose.theta_rad, pose.azimuth_rad].iter().all(|x| x.is_finite()).then_some(pose)
+    Verdict::read(verdict).ok()?.in_doubt()?.next_view
 }

@@ -1,19 +1,15 @@
-//! Recordings that a real sensor took, with something struck from their model, with something added
-//! to them, or with nothing done to them at all.
+//! Recordings that a real sensor took, with something struck from their model or with nothing done
+//! to them at all.
 //!
 //! What is hidden here cannot be known but by the tool itself: the *full model* of a recording is
 //! what calibration and diagnosis find in it, asked again until they find no more. This is the one
 //! world that takes its truth from what is on trial. It asks less than the others therefore: a term
-//! that was struck must be found and named again from other views than all (amnesia); a raytraced
-//! effect, which shares no formula with the tool, must stand out from residuals that no simulator
-//! made (transplant); and one half of a recording must not contradict what was learnt of the other
-//! (halves).
+//! that was struck must be found and named again from other views than all (amnesia); and one half
+//! of a recording must not contradict what was learnt of the other (halves).
 //!
 //! Nothing real is in this repository: the words come from the user's own folder of data and go to
 //! the user's own output folder.
 
-mod added;
-mod dither;
 mod full;
 #[cfg(test)]
 mod tests;
@@ -24,19 +20,17 @@ use std::sync::Arc;
 
 use rand::Rng;
 use rand::seq::{IndexedRandom, SliceRandom};
-use rayon::prelude::*;
 use serde_json::json;
 
-use crate::raytraced::eye::Eye;
 use crate::raytraced::question::{Asked, Cell, ConcealedSet, Hidden, Truth};
 use crate::raytraced::write::images;
-use crate::raytraced::{Cause, Clock};
-use full::{Full, UNDESCRIBED, explain, full};
+pub use full::Full;
+use full::explain;
 use kinoise::error::{Error, Result};
-use kinoise::io::{FrameSource, encode_png16_quickly, write_recording_file, write_view_notes};
+use kinoise::io::{DESCRIPTION, write_recording_file, write_view_notes};
 use kinoise::model::NoiseModel;
 use kinoise::rng::{Seed, Stream};
-use kinoise::view::ViewNotes;
+use kinoise::view::{View, ViewNotes};
 
 /// Of the views that a recording has, a set takes at least and at most this share.
 const KEPT: [f64; 2] = [0.6, 0.92];
@@ -53,46 +47,38 @@ struct Real {
     /// Numbers of the views, ascending.
     views: Vec<usize>,
     model: NoiseModel,
-    added: Vec<Cause>,
     truth: Truth,
 }
 
-/// Make the set that is asked for of a recording in `data`, by lot where there are several.
-pub fn conceal(asked: &Asked, data: &Path) -> Result<Box<dyn ConcealedSet>> {
-    if !matches!(asked.cell, Cell::Amnesia | Cell::Transplant | Cell::Halves) {
-        return Err(Error::Argument {
-            what: format!("{}: real recordings have no such sets", json!(asked.cell)),
-            remedy: "ask for amnesia, transplant or halves",
-        });
-    }
-    let mut rng = Seed(asked.seed).stream("real/set");
-    let mut paths = recordings(data);
-    paths.shuffle(&mut rng);
-    let mut whys = Vec::new();
-    for path in &paths {
-        let made = full(path)
-            .and_then(|full| taken(full, asked, &mut rng.clone()).map_err(|e| e.to_string()));
-        match made {
-            Ok(set) => return Ok(Box::new(set)),
-            Err(why) => whys.push(why),
+/// What the tool finds in each recording in `data`; those are left out in which it does not come to
+/// an end.
+pub fn learn(data: &Path) -> Result<Vec<Arc<Full>>> {
+    let (mut known, mut whys) = (Vec::new(), Vec::new());
+    for path in recordings(data) {
+        match Full::learn(&path) {
+            Ok(full) => known.push(Arc::new(full)),
+            Err(why) => whys.push(why.to_string()),
         }
     }
-    Err(Error::Argument {
-        what: match whys.is_empty() {
-            true => format!("{}: no real recording of a plane is here", data.display()),
-            false => whys.join("; "),
-        },
-        remedy: "give a folder with another recording (recording.json and a folder a view), or leave \
-                 the real sets out",
-    })
+    if known.is_empty() {
+        whys.insert(0, format!("{}: no real recording of a plane is here", data.display()));
+        return Err(of_no_use(&whys));
+    }
+    Ok(known)
+}
+
+fn of_no_use(whys: &[String]) -> Error {
+    Error::Argument {
+        what: whys.join("; "),
+        remedy: "give --data a folder with another recording (recording.json and a folder a view), or \
+                 leave the real sets out",
+    }
 }
 
 /// The recordings in `data`, in name order: `data` itself, its folders, and `recording/` in these,
-/// wherever a `recording.json` describes them; and one that is known.
+/// wherever a `recording.json` describes them.
 fn recordings(data: &Path) -> Vec<PathBuf> {
-    let described = |path: &PathBuf| {
-        path.join(kinoise::io::DESCRIPTION).is_file() || path.ends_with(UNDESCRIBED)
-    };
+    let described = |path: &PathBuf| path.join(DESCRIPTION).is_file();
     let data = data.to_path_buf();
     if described(&data) {
         return vec![data];
@@ -105,10 +91,25 @@ fn recordings(data: &Path) -> Vec<PathBuf> {
     folders.into_iter().filter_map(of).collect()
 }
 
+/// Make the set that is asked for of a known recording, by lot where there are several.
+pub fn conceal(asked: &Asked, known: &[Arc<Full>]) -> Result<Box<dyn ConcealedSet>> {
+    let mut rng = Seed(asked.seed).stream("real/set");
+    let mut known = known.to_vec();
+    known.shuffle(&mut rng);
+    let mut whys = vec![format!("{} of a real recording cannot be had", json!(asked.cell))];
+    for full in known {
+        match taken(full, asked, &mut rng.clone()) {
+            Ok(set) => return Ok(Box::new(set)),
+            Err(why) => whys.push(why.to_string()),
+        }
+    }
+    Err(of_no_use(&whys))
+}
+
 /// The set of this recording.
 fn taken(full: Arc<Full>, asked: &Asked, rng: &mut Stream) -> Result<Real> {
     let all = full.recording.views.len();
-    let (mut model, mut added, mut hidden) = (full.model.clone(), Vec::new(), Vec::new());
+    let (mut model, mut hidden) = (full.model.clone(), Vec::new());
     let views = if asked.cell == Cell::Halves {
         let [mine, theirs] = dealt(all, all / 2, rng);
         let mut other = full.recording.clone();
@@ -120,14 +121,9 @@ fn taken(full: Arc<Full>, asked: &Asked, rng: &mut Stream) -> Result<Real> {
         let min = min.max(MIN_VIEWS).min(all);
         let count = rng.random_range(min..=max.max(min));
         let [views, _] = dealt(all, count, rng);
-        if asked.cell == Cell::Amnesia {
-            let (k, term) = struck(&full, asked, &views, rng)?;
-            model.effects.remove(k);
-            hidden.push(term);
-        } else {
-            added = added::causes(&full, asked, &views, rng)?;
-            hidden.extend(added.iter().map(|cause| cause.label.clone()));
-        }
+        let (k, term) = struck(&full, asked, &views, rng)?;
+        model.effects.remove(k);
+        hidden.push(term);
         views
     };
     let root = &full.recording.root;
@@ -140,7 +136,7 @@ fn taken(full: Arc<Full>, asked: &Asked, rng: &mut Stream) -> Result<Real> {
         "known": model.effects.iter().map(|e| &e.id).collect::<Vec<_>>(),
     });
     let truth = Truth { asked: asked.clone(), hidden, base };
-    Ok(Real { full, views, model, added, truth })
+    Ok(Real { full, views, model, truth })
 }
 
 /// `count` of all views by lot, and the others, both ascending.
@@ -160,8 +156,7 @@ fn struck(
     views: &[usize],
     rng: &mut Stream,
 ) -> Result<(usize, Hidden)> {
-    let all: Vec<usize> = (0..full.seen.len()).collect();
-    let share = full.measured(views) / full.measured(&all);
+    let share = full.share(views);
     let min = asked.nats.unwrap_or(MIN_NATS);
     let by_name = !asked.names.is_empty();
     let fits = |term: &Hidden| match by_name {
@@ -169,10 +164,9 @@ fn struck(
         false => term.nats.is_none_or(|nats| nats * share >= min),
     };
     let mut choice: Vec<usize> = (0..full.terms.len()).filter(|&k| fits(&full.terms[k])).collect();
-    if !by_name && rng.random_range(0..NAMELESS_EVERY) > 0 {
-        let named = choice.iter().copied().filter(|&k| !full.terms[k].names.is_empty());
-        let named: Vec<usize> = named.collect();
-        choice = if named.is_empty() { choice } else { named };
+    let named = |k: &usize| !full.terms[*k].names.is_empty();
+    if !by_name && rng.random_range(0..NAMELESS_EVERY) > 0 && choice.iter().any(named) {
+        choice.retain(named);
     }
     let Some(&k) = choice.choose(rng) else {
         let has: Vec<&str> = full.terms.iter().map(|t| t.form.as_str()).collect();
@@ -195,41 +189,20 @@ impl ConcealedSet for Real {
         let root = folder.join("recording");
         fs::create_dir_all(&root).map_err(|e| Error::write(&root, e))?;
         write_recording_file(&root, &self.full.recording.sensor)?;
-        (0..self.views.len())
-            .into_par_iter()
-            .try_for_each(|n| self.write_view(self.views[n], &root.join(format!("{n:04}"))))?;
+        for (n, &k) in self.views.iter().enumerate() {
+            copy(&self.full.recording.views[k], &root.join(format!("{n:04}")))?;
+        }
         self.model.write(&folder.join("model.json"))
     }
 }
 
-impl Real {
-    fn write_view(&self, k: usize, folder: &Path) -> Result<()> {
-        let full = &*self.full;
-        let view = &full.recording.views[k];
-        let size = &full.recording.sensor.camera;
-        let mut source = FrameSource::new(size.width, size.height);
-        let plan = full.plan(k);
-        let eye = Eye::new(full.world(), &plan);
-        let start = plan.stamps.first().copied().unwrap_or_default();
-        let frames = view.depth.iter().enumerate().filter_map(|(n, file)| {
-            // What cannot be read, the full model was not learnt from either.
-            let mut frame = source.read(&file.path).ok()?;
-            if !self.added.is_empty() {
-                let seed = Seed(self.truth.asked.seed);
-                let view_s = file.timestamp - start;
-                let clock = Clock { seed, view: k, frame: n as i64, view_s, width: size.width };
-                frame = added::add(&self.added, full, &eye, &frame, &clock);
-            }
-            Some((file.timestamp, encode_png16_quickly(&frame)))
-        });
-        images(folder, "depth", "png", frames)?;
-        if let Some(first) = view.infrared.first() {
-            let ending = first.path.extension().and_then(|e| e.to_str()).unwrap_or("png");
-            let bytes = |path: &Path| fs::read(path).map_err(|e| Error::read(path, e));
-            let light = view.infrared.iter().map(|file| (file.timestamp, bytes(&file.path)));
-            images(folder, "ir", ending, light)?;
-        }
-        // What a person noted on the view might tell.
-        write_view_notes(folder, &ViewNotes { notes: None, ..view.notes.clone() })
+/// The view's images as they are. What a person noted on it might tell.
+fn copy(view: &View, folder: &Path) -> Result<()> {
+    for (kind, files) in [("depth", &view.depth), ("ir", &view.infrared)] {
+        let Some(first) = files.first() else { continue };
+        let ending = first.path.extension().and_then(|e| e.to_str()).unwrap_or("png");
+        let bytes = |path: &Path| fs::read(path).map_err(|e| Error::read(path, e));
+        images(folder, kind, ending, files.iter().map(|f| (f.timestamp, bytes(&f.path))))?;
     }
+    write_view_notes(folder, &ViewNotes { notes: None, ..view.notes.clone() })
 }

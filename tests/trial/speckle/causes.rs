@@ -11,16 +11,17 @@ use kinoise::scene::Target;
 use kinoise::simulate::Scenery;
 use kinoise::simulate::speckle::Causes;
 
+use Reach::{Among, Either, Times, Up};
+
 /// A cause that can be concealed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Switch {
     /// Of the speckle world.
     pub cause: &'static str,
     /// Effects that it rightly is called; none where "unexplained" or "recalibrate" is right.
-    pub names: &'static [&'static str],
-    pub statistic: &'static str,
-    pub axis: &'static str,
-    pub also: &'static [&'static str],
+    names: &'static str,
+    /// The statistic, the axis, and the axes on which it shows as well.
+    place: &'static str,
     reach: Reach,
 }
 
@@ -39,62 +40,38 @@ enum Reach {
 
 const fn switch(
     cause: &'static str,
-    names: &'static [&'static str],
-    [statistic, axis]: [&'static str; 2],
-    also: &'static [&'static str],
+    names: &'static str,
+    place: &'static str,
     reach: Reach,
 ) -> Switch {
-    Switch { cause, names, statistic, axis, also, reach }
+    Switch { cause, names, place, reach }
 }
 
-/// An unknown lens both bends the rays and is met again, at the reference's distance, in the disparity:
-/// either name is right. Sunlight adds noise where the pattern is faint: far, and at the corners. A
-/// larger window averages more, so that the noise shrinks as well.
+/// Either name of a lens that nobody knows: it bends the rays, and is met again, at the reference's
+/// distance, in the disparity.
+const LENS: &str = "lens-distortion radial-disparity-bias";
+/// Sunlight adds noise where the pattern is faint: far, and at the corners.
+const SUN: &str = "ambient-light vignetting range-exponent";
+
+/// A larger window averages more, so that the noise shrinks as well. Laser speckle stands still with
+/// the scene.
 pub(super) static SWITCHES: [Switch; 12] = [
-    switch(
-        "lens_k1",
-        &["lens-distortion", "radial-disparity-bias"],
-        ["bias", "radius"],
-        &["pixel"],
-        Reach::Either(0.012),
-    ),
-    switch(
-        "lens_k2",
-        &["lens-distortion", "radial-disparity-bias"],
-        ["bias", "radius"],
-        &["pixel"],
-        Reach::Either(0.03),
-    ),
-    switch(
-        "step_px",
-        &["disparity-quantisation"],
-        ["distribution", "disparity-phase"],
-        &["z"],
-        Reach::Among([0.16, 0.2, 0.25, 0.5]),
-    ),
-    switch(
-        "window_px",
-        &["spatial-correlation"],
-        ["correlation", "pixel-lag"],
-        &["z"],
-        Reach::Among([2.0, 4.0, 6.0, 10.0]),
-    ),
-    switch(
-        "ambient_dn",
-        &["ambient-light", "vignetting", "range-exponent"],
-        ["variance", "intensity"],
-        &["radius", "z"],
-        Reach::Up(120.0),
-    ),
-    switch("warm_up_k", &["thermal-drift"], ["bias", "session-time"], &[], Reach::Either(15.0)),
-    switch("bow_m", &["target-bow"], ["bias", "target-position"], &[], Reach::Either(0.003)),
-    switch("motion_mps", &["target-motion"], ["bias", "frame"], &[], Reach::Either(0.03)),
-    switch("blur_px", &[], ["variance", "z"], &["radius", "theta"], Reach::Times(1.6)),
-    switch("read_noise_dn", &[], ["variance", "z"], &["radius", "intensity"], Reach::Times(4.0)),
-    switch("light", &[], ["variance", "z"], &["radius", "intensity"], Reach::Times(0.5)),
-    // Laser speckle stands still with the scene.
-    switch("speckle", &["frozen-noise"], ["correlation", "frame"], &["z"], Reach::Times(1.6)),
+    switch("lens_k1", LENS, "bias radius pixel", Either(0.012)),
+    switch("lens_k2", LENS, "bias radius pixel", Either(0.03)),
+    switch("step_px", "disparity-quantisation", "distribution disparity-phase z", Among(STEPS)),
+    switch("window_px", "spatial-correlation", "correlation pixel-lag z", Among(WINDOWS)),
+    switch("ambient_dn", SUN, "variance intensity radius z", Up(120.0)),
+    switch("warm_up_k", "thermal-drift", "bias session-time", Either(15.0)),
+    switch("bow_m", "target-bow", "bias target-position", Either(0.003)),
+    switch("motion_mps", "target-motion", "bias frame", Either(0.03)),
+    switch("blur_px", "", "variance z radius theta", Times(1.6)),
+    switch("read_noise_dn", "", "variance z radius intensity", Times(4.0)),
+    switch("light", "", "variance z radius intensity", Times(0.5)),
+    switch("speckle", "frozen-noise", "correlation frame z", Times(1.6)),
 ];
+const STEPS: [f64; 4] = [0.16, 0.2, 0.25, 0.5];
+/// Added to the usual.
+const WINDOWS: [f64; 4] = [2.0, 4.0, 6.0, 10.0];
 
 /// The unit as it is without a cause: no two are alike.
 pub(super) fn base(rng: &mut Stream) -> Result<Causes> {
@@ -129,19 +106,22 @@ impl Switch {
         let sign = if rng.random::<bool>() { 1.0 } else { -1.0 };
         let rank = [0.43, 0.74, 1.3].iter().filter(|limit| size > **limit).count();
         let value = match self.reach {
-            Reach::Either(far) => sign * far * size,
-            Reach::Up(far) => far * size,
-            Reach::Times(factor) => usual * f64::powf(factor, size),
-            Reach::Among(values) if self.cause == "window_px" => usual + values[rank],
-            Reach::Among(values) => values[rank],
+            Either(far) => sign * far * size,
+            Up(far) => far * size,
+            Times(factor) => usual * f64::powf(factor, size),
+            Among(values) if self.cause == "window_px" => usual + values[rank],
+            Among(values) => values[rank],
         };
         let mut causes = base.with(self.cause, value)?;
         if self.cause == "warm_up_k" {
             // Most of it within the session.
             causes = causes.with("warm_up_s", rng.random_range(100.0..200.0))?;
         }
-        let mut hidden = Hidden::new(self.names, self.cause, [self.statistic, self.axis]);
-        hidden.also = self.also.iter().map(ToString::to_string).collect();
+        let names: Vec<&str> = self.names.split_whitespace().collect();
+        let mut place = self.place.split_whitespace();
+        let at = [place.next(), place.next()].map(Option::unwrap_or_default);
+        let mut hidden = Hidden::new(&names, self.cause, at);
+        hidden.also = place.map(String::from).collect();
         hidden.parameters = parameters(self.cause, value, &causes, scenery);
         Ok((causes, hidden))
     }

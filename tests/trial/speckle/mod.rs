@@ -10,13 +10,13 @@ use std::path::Path;
 use rand::Rng;
 use serde_json::{Value, json};
 
-use crate::raytraced::kernels::scattered;
+use crate::raytraced::kernels::{scattered, seed_of};
 use crate::raytraced::poses::wall_tilt;
 use crate::raytraced::question::{Asked, Cell, ConcealedSet, Pose, Truth};
 use causes::{SWITCHES, Switch};
 use kinoise::error::{Error, Result};
 use kinoise::io::sha256_hex;
-use kinoise::rng::{Seed, Stream};
+use kinoise::rng::Stream;
 use kinoise::scene::{Board, Print, Target, WHITE};
 use kinoise::simulate::{GridView, Physics, Scenery, Shoot, kinect_v1, plan_grid};
 use kinoise::view::Sensor;
@@ -56,7 +56,7 @@ fn taken(asked: &Asked, more: Option<&Pose>) -> Result<(Option<Pose>, Speckle)> 
         });
     }
     let digest = sha256_hex(format!("light/{cell:?}/{:?}/{seed}/{small}", asked.names).as_bytes());
-    let seed = Seed(u64::from_str_radix(&digest[..16], 16).unwrap_or(seed));
+    let seed = seed_of(&digest);
     let mut rng = seed.stream("light/set");
     let base = causes::base(&mut rng)?;
     let switch = match (cell, asked.names.first()) {
@@ -94,10 +94,7 @@ fn taken(asked: &Asked, more: Option<&Pose>) -> Result<(Option<Pose>, Speckle)> 
         physics: Physics::Speckle { causes },
         infrared: session.infrared,
         // Neither recording has its noise from the other's seed.
-        seed: Seed(
-            u64::from_str_radix(&sha256_hex(format!("{digest}/{which}").as_bytes())[..16], 16)
-                .unwrap_or_default(),
-        ),
+        seed: seed_of(&sha256_hex(format!("{digest}/{which}").as_bytes())),
     };
     let set = Speckle {
         recording: shoot(on, "recording"),
