@@ -4,11 +4,8 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
+use super::nodes::{DISPARITY_UNIT_PX, bilinear, cubic, disparity_scale, node};
 use super::place::{Axis, PixelContext};
-use super::spline::{cubic, scale};
-
-/// Disparity at which a term that grows with a power of it is in px: a Kinect at 1.1 m.
-pub const DISPARITY_UNIT_PX: f64 = 40.0;
 
 /// A term with everything but its linear coefficients settled. Terms of the bias are in px of
 /// disparity, those of the variance in its natural logarithm.
@@ -272,7 +269,7 @@ impl Basis {
                 }
             }
             Basis::Affine { disparity_power } => {
-                let far = scale(disparity_power, p);
+                let far = disparity_scale(disparity_power, p);
                 out.copy_from_slice(&[far, far * p.x, far * p.y]);
             }
             Basis::Pair { over, low, high, nodes } => {
@@ -427,28 +424,5 @@ fn waves(phase: f64, size: impl Fn(f64) -> f64, out: &mut [f64]) {
         pair[0] = size * sk;
         pair[1] = size * ck;
         (sk, ck) = (sk * c + ck * s, ck * c - sk * s);
-    }
-}
-
-/// Number of the node below a value, and the way to the next.
-pub(super) fn node(value: f64, low: f64, high: f64, nodes: usize) -> (usize, f64) {
-    let last = (nodes - 1) as f64;
-    let place = ((value - low) / (high - low).max(1e-12) * last).clamp(0.0, last);
-    let k = (place as usize).min(nodes - 2);
-    (k, place - k as f64)
-}
-
-fn bilinear(
-    (i, s): (usize, f64),
-    (j, t): (usize, f64),
-    across: usize,
-    scale: f64,
-    out: &mut [f64],
-) {
-    out.fill(0.0);
-    for (dj, wv) in [(0, 1.0 - t), (1, t)] {
-        for (di, wu) in [(0, 1.0 - s), (1, s)] {
-            out[(j + dj) * across + i + di] = scale * wu * wv;
-        }
     }
 }

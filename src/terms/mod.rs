@@ -4,18 +4,20 @@
 mod basis;
 mod edges;
 mod fault;
+mod gauge;
 mod needs;
+mod nodes;
 mod pixels;
 mod place;
-mod spline;
 mod value;
 
-pub use basis::{Basis, Coordinate, DISPARITY_UNIT_PX, Modulation, TABLE};
+pub use basis::{Basis, Coordinate, Modulation, TABLE};
 pub use edges::edge_distances;
+pub use gauge::Gauge;
 pub use needs::Needs;
+pub use nodes::DISPARITY_UNIT_PX;
 pub use pixels::Pixels;
 pub use place::{Axis, PixelContext, corner_radius};
-pub use spline::Gauge;
 
 use serde::{Deserialize, Serialize};
 

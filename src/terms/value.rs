@@ -1,9 +1,9 @@
 //! A term's value without its whole row: curves and maps have a few columns that are not zero.
 
 use super::Term;
-use super::basis::{Basis, node};
+use super::basis::Basis;
+use super::nodes::{cubic, node};
 use super::place::PixelContext;
-use super::spline::cubic;
 
 impl Term {
     /// At a place, px or nepers of variance. `row` is scratch.

@@ -1,22 +1,11 @@
-//! Smooth maps over the picture, and what planes absorb of a shape that stands still in it.
+//! What planes absorb of a shape that stands still in the picture, and what is usual of each.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::basis::{Basis, Coordinate, DISPARITY_UNIT_PX, Modulation};
+use super::basis::{Basis, Coordinate, Modulation};
+use super::nodes::{DISPARITY_UNIT_PX, disparity_scale};
 use super::pixels::Pixels;
 use super::place::PixelContext;
-
-/// Cubic B-splines on `nodes` even places from 0 to `last`: the number of the first of the four that
-/// are not zero at `at`, and their values, which sum to one (de Boor 1978).
-pub(super) fn cubic(at: f64, last: f64, nodes: usize) -> (usize, [f64; 4]) {
-    let spans = nodes - 3;
-    let place = (at / last.max(1e-12) * spans as f64).clamp(0.0, spans as f64);
-    let k = (place as usize).min(spans - 1);
-    let t = place - k as f64;
-    let s = 1.0 - t;
-    let inner = |a: f64| (3.0 * a * a * a - 6.0 * a * a + 4.0) / 6.0;
-    (k, [s * s * s / 6.0, inner(t), inner(s), t * t * t / 6.0])
-}
 
 /// A shape's affine part over the whole picture, which every plane takes up: no fit to planes tells
 /// how large it is.
@@ -59,7 +48,7 @@ impl Gauge {
 
     /// Take the affine part out of the shape's columns.
     pub fn take_out(&self, p: &PixelContext, columns: &mut [f64]) {
-        let far = scale(self.disparity_power, p);
+        let far = disparity_scale(self.disparity_power, p);
         for (g, [a, b, c]) in columns.iter_mut().zip(&self.affine) {
             *g -= far * (a + b * p.x + c * p.y);
         }
@@ -72,15 +61,6 @@ impl Gauge {
             sum.iter_mut().zip(affine).for_each(|(s, a)| *s -= beta * a);
         }
         (Basis::Affine { disparity_power: self.disparity_power }, sum)
-    }
-}
-
-/// A power of the disparity in units of 40 px.
-pub(super) fn scale(disparity_power: f64, p: &PixelContext) -> f64 {
-    match disparity_power {
-        0.0 => 1.0,
-        2.0 => (p.disparity / DISPARITY_UNIT_PX).powi(2),
-        power => (p.disparity / DISPARITY_UNIT_PX).powf(power),
     }
 }
 
@@ -147,24 +127,6 @@ const NAMELESS_PX: f64 = 1.0;
 mod tests {
     use super::*;
     use crate::simulate::kinect_v1;
-
-    #[test]
-    fn splines_sum_to_one_and_bend_smoothly() {
-        for nodes in [4, 5, 20] {
-            let mut before = [0.0; 32];
-            for step in 0..=1000 {
-                let (k, w) = cubic(f64::from(step) * 0.639, 639.0, nodes);
-                assert!((w.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{nodes} {step}");
-                assert!(k + 4 <= nodes && w.iter().all(|w| *w >= 0.0));
-                let mut now = [0.0; 32];
-                now[k..k + 4].copy_from_slice(&w);
-                let moved =
-                    now.iter().zip(&before).map(|(a, b)| f64::abs(a - b)).fold(0.0, f64::max);
-                assert!(step == 0 || moved < 0.02, "{nodes} {step}: {moved}");
-                before = now;
-            }
-        }
-    }
 
     /// With its gauge a shape has no affine part, and another affine part is none.
     #[test]
