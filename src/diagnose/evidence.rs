@@ -125,8 +125,7 @@ impl Rows {
     /// Evidence on the chosen terms and a candidate, the nuisances profiled out. `columns` fills
     /// one row of the candidate's columns.
     pub fn reduce(&self, count: usize, mut columns: impl FnMut(usize, &mut [f64])) -> Evidence {
-        let (p, width) = (self.nuisances, self.width);
-        let m = width - p;
+        let width = self.width;
         let mut g = vec![0.0; count];
         let mut touched = Vec::with_capacity(count);
         let mut a = DMatrix::<f64>::zeros(count, count);
@@ -154,15 +153,84 @@ impl Rows {
             }
         }
         a.fill_upper_triangle_with_lower_triangle();
+        self.profiled(&a, &b, &cross)
+    }
+
+    /// The same for many columns, of which samples near each other touch the same few: `block` is
+    /// the number of a sample's neighbourhood.
+    pub fn reduce_by_blocks(
+        &self,
+        count: usize,
+        block: impl Fn(usize) -> usize,
+        mut columns: impl FnMut(usize, &mut [f64]),
+    ) -> Evidence {
+        let mut a = DMatrix::<f64>::zeros(count, count);
+        let mut b = DVector::<f64>::zeros(count);
+        let mut cross = DMatrix::<f64>::zeros(self.width, count);
+        let mut order: Vec<usize> =
+            (0..self.response.len()).filter(|&i| self.weight[i] > 0.0).collect();
+        order.sort_by_key(|&i| block(i));
+        let mut rows = Vec::new();
+        for members in order.chunk_by(|&i, &j| block(i) == block(j)) {
+            rows.clear();
+            rows.resize(members.len() * count, 0.0);
+            for (&i, row) in members.iter().zip(rows.chunks_exact_mut(count)) {
+                columns(i, row);
+            }
+            let touched: Vec<usize> = (0..count)
+                .filter(|&j| (0..members.len()).any(|r| rows[r * count + j] != 0.0))
+                .collect();
+            let k = touched.len();
+            let weighted = DMatrix::from_fn(members.len(), k + self.width + 1, |r, c| {
+                let i = members[r];
+                let value = match c {
+                    c if c < k => rows[r * count + touched[c]],
+                    c if c < k + self.width => self.beside[i * self.width + c - k],
+                    _ => self.response[i],
+                };
+                self.weight[i].sqrt() * value
+            });
+            let squares = weighted.transpose() * &weighted;
+            for (c, &j) in touched.iter().enumerate() {
+                b[j] += squares[(k + self.width, c)];
+                touched.iter().enumerate().for_each(|(r, &i)| a[(i, j)] += squares[(r, c)]);
+                (0..self.width).for_each(|q| cross[(q, j)] += squares[(k + q, c)]);
+            }
+        }
+        self.profiled(&a, &b, &cross)
+    }
+
+    /// Score of columns alone, the nuisances profiled out: no other term may stand beside.
+    pub fn score(&self, count: usize, mut columns: impl FnMut(usize, &mut [f64])) -> DVector<f64> {
+        let own = &self.inverse * &self.seen;
+        let mut sum = DVector::zeros(count);
+        let mut g = vec![0.0; count];
+        for (i, (&y, &w)) in self.response.iter().zip(&self.weight).enumerate() {
+            if w <= 0.0 {
+                continue;
+            }
+            columns(i, &mut g);
+            let row = &self.beside[i * self.width..][..self.width];
+            let left = w * (y - row.iter().zip(own.iter()).map(|(x, b)| x * b).sum::<f64>());
+            sum.iter_mut().zip(&g).for_each(|(s, g)| *s += left * g);
+        }
+        sum
+    }
+
+    /// Information and score of the chosen terms and a candidate together, `cross` being the
+    /// candidate's against all that is beside it, with the nuisances profiled out.
+    fn profiled(&self, a: &DMatrix<f64>, b: &DVector<f64>, cross: &DMatrix<f64>) -> Evidence {
+        let (p, count) = (self.nuisances, b.len());
+        let m = self.width - p;
         let n = m + count;
         let mut all = DMatrix::<f64>::zeros(n, n);
         let mut right = DVector::<f64>::zeros(n);
         all.view_mut((0, 0), (m, m)).copy_from(&self.own.view((p, p), (m, m)));
-        all.view_mut((m, m), (count, count)).copy_from(&a);
+        all.view_mut((m, m), (count, count)).copy_from(a);
         all.view_mut((0, m), (m, count)).copy_from(&cross.view((p, 0), (m, count)));
         all.view_mut((m, 0), (count, m)).copy_from(&cross.view((p, 0), (m, count)).transpose());
         right.rows_mut(0, m).copy_from(&self.seen.rows(p, m));
-        right.rows_mut(m, count).copy_from(&b);
+        right.rows_mut(m, count).copy_from(b);
         // The nuisances against all of it.
         let mut shared = DMatrix::<f64>::zeros(p, n);
         shared.view_mut((0, 0), (p, m)).copy_from(&self.own.view((0, p), (p, m)));

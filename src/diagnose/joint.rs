@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::candidate::Candidate;
-use super::evidence::{Evidence, Gain};
+use super::evidence::Gain;
 use super::joint_fit::{Columns, Joint, Reduced};
 use super::joint_terms::{Settled, is_rough, is_smooth_and_nameless, total};
 use super::search::{Chosen, Outcome, ViewData, coarser};
@@ -60,8 +60,7 @@ impl Joint<'_> {
         let beyond: Vec<DVector<f64>> = data
             .par_iter()
             .filter_map(|view| {
-                let Evidence { a, b } = self.columns.evidence(view)?;
-                let left = b - a * &first;
+                let left = self.columns.left(view, &first)?;
                 let terms = self.columns.terms;
                 let nodes = left.rows(terms, self.columns.nodes);
                 let mine = left.rows(0, terms) - whole.with.transpose() * nodes;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::evidence::{Evidence, Rows, score};
 use super::search::{Chosen, ViewData};
 use crate::camera::Camera;
-use crate::terms::{Basis, Gauge, Modulation, Pixels};
+use crate::terms::{Basis, Gauge, Modulation, PixelContext, Pixels};
 
 /// Parts of the views that are left out in turn.
 const FOLDS: usize = 6;
@@ -49,23 +49,43 @@ impl Columns {
 
     /// Normal equations of a view, its plane profiled out.
     pub fn evidence(&self, view: &ViewData) -> Option<Evidence> {
-        let (y, w) = (view.response.clone(), view.weight.clone());
-        let rows = Rows::new(y, w, view.nuisance.clone(), view.precision.len(), &view.precision)?;
-        Some(rows.reduce(self.terms + self.nodes, |i, row| {
-            let place = &view.places[i];
-            let mut rest = row;
-            for (basis, gauge) in self.bases.iter().zip(&self.gauges) {
-                let (mine, others) = rest.split_at_mut(basis.count());
-                basis.fill(place, mine);
-                if let Some(gauge) = gauge {
-                    gauge.take_out(place, mine);
-                }
-                rest = others;
+        // Between the same nodes the same splines are not zero.
+        let side = NODE_PX as f64;
+        let across = self.maps[0].count();
+        let block = |i: usize| {
+            let p = &view.places[i];
+            (p.v / side) as usize * across + (p.u / side) as usize
+        };
+        let rows = rows(view, view.response.clone())?;
+        let fill = |i: usize, row: &mut [f64]| self.fill(&view.places[i], row);
+        Some(rows.reduce_by_blocks(self.terms + self.nodes, block, fill))
+    }
+
+    /// What a view says beyond a fit, its plane profiled out: the score that is left.
+    pub fn left(&self, view: &ViewData, beta: &DVector<f64>) -> Option<DVector<f64>> {
+        let count = self.terms + self.nodes;
+        let mut row = vec![0.0; count];
+        let mut of = |(y, place): (&f64, &PixelContext)| {
+            self.fill(place, &mut row);
+            y - row.iter().zip(beta.iter()).map(|(g, b)| g * b).sum::<f64>()
+        };
+        let response = view.response.iter().zip(&view.places).map(&mut of).collect();
+        Some(rows(view, response)?.score(count, |i, row| self.fill(&view.places[i], row)))
+    }
+
+    fn fill(&self, place: &PixelContext, row: &mut [f64]) {
+        let mut rest = row;
+        for (basis, gauge) in self.bases.iter().zip(&self.gauges) {
+            let (mine, others) = rest.split_at_mut(basis.count());
+            basis.fill(place, mine);
+            if let Some(gauge) = gauge {
+                gauge.take_out(place, mine);
             }
-            let (first, second) = rest.split_at_mut(self.nodes / 2);
-            self.maps[0].fill(place, first);
-            self.maps[1].fill(place, second);
-        }))
+            rest = others;
+        }
+        let (first, second) = rest.split_at_mut(self.nodes / 2);
+        self.maps[0].fill(place, first);
+        self.maps[1].fill(place, second);
     }
 
     /// Precision of the terms' columns.
@@ -109,6 +129,11 @@ impl Columns {
         both.view_mut((n, n), (n, n)).copy_from(&one);
         both
     }
+}
+
+fn rows(view: &ViewData, response: Vec<f64>) -> Option<Rows> {
+    let (nuisance, width) = (view.nuisance.clone(), view.precision.len());
+    Rows::new(response, view.weight.clone(), nuisance, width, &view.precision)
 }
 
 /// Some views' equations with the nodes of the maps eliminated, if there are maps.
