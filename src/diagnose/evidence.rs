@@ -58,24 +58,11 @@ impl Rows {
         width: usize,
         precision: &[f64],
     ) -> Option<Self> {
-        let mut own = DMatrix::<f64>::zeros(width, width);
-        let mut seen = DVector::<f64>::zeros(width);
-        for ((&y, &w), row) in response.iter().zip(&weight).zip(beside.chunks_exact(width)) {
-            if w <= 0.0 {
-                continue;
-            }
-            for q in 0..width {
-                let wx = w * row[q];
-                if wx == 0.0 {
-                    continue;
-                }
-                seen[q] += wx * y;
-                for r in 0..=q {
-                    own[(q, r)] += wx * row[r];
-                }
-            }
-        }
-        own.fill_upper_triangle_with_lower_triangle();
+        let root = |i: usize| weight[i].max(0.0).sqrt();
+        let weighted =
+            DMatrix::from_fn(width, response.len(), |q, i| root(i) * beside[i * width + q]);
+        let mut own = &weighted * weighted.transpose();
+        let seen = &weighted * DVector::from_fn(response.len(), |i, _| root(i) * response[i]);
         let p = precision.len();
         for (q, precision) in precision.iter().enumerate() {
             own[(q, q)] += precision;
