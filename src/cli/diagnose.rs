@@ -125,8 +125,15 @@ fn summary(diagnosis: &Diagnosis) -> String {
         Verdict::Inconclusive => "inconclusive: these views could not have shown it\n".to_string(),
         Verdict::Mismatch => format!("mismatch: {held_against} leaves out\n"),
     };
-    let shown = diagnosis.findings.iter().filter(|f| f.status != Status::NotIdentifiable);
-    text.extend(shown.map(line));
+    let told: Vec<&Finding> =
+        diagnosis.findings.iter().filter(|f| f.status != Status::NotIdentifiable).collect();
+    let (main, rest) = told.split_at(main_findings(&told));
+    text.extend(main.iter().map(|f| line(f)));
+    if !rest.is_empty() {
+        let share: f64 = rest.iter().map(|f| f.share).sum();
+        let names: Vec<String> = rest.iter().map(|f| name(f)).collect();
+        text += &format!("  and, {:.0} % of it together: {}\n", 100.0 * share, names.join("; "));
+    }
     if let Some(h) = &diagnosis.heldout {
         let (views, gain, [low, high]) = (h.views.len(), h.gain, h.gain_interval);
         let (before, after) = (h.rms_mm_before, h.rms_mm_after);
@@ -138,17 +145,23 @@ fn summary(diagnosis: &Diagnosis) -> String {
     text
 }
 
+/// This share of the mismatch is told cause by cause, the rest in one line.
+const MAIN_SHARE: f64 = 0.97;
+
+/// How many of the findings, largest first, make up most of the mismatch; all but one are all.
+fn main_findings(findings: &[&Finding]) -> usize {
+    let mut sum = 0.0;
+    let before = |f: &&&Finding| {
+        sum += f.share;
+        sum - f.share < MAIN_SHARE
+    };
+    let main = findings.iter().take_while(before).count();
+    if main + 1 >= findings.len() { findings.len() } else { main }
+}
+
 /// A finding: what, how large, how much of all, along what, with which parameters.
 fn line(f: &Finding) -> String {
-    let name = match (f.status, f.effect) {
-        (Status::Recalibrate, _) => "sigma itself is off: calibrate again".to_string(),
-        (Status::OneOf, _) => {
-            let names: Vec<&str> = f.alternatives.iter().take(3).map(|a| a.effect).collect();
-            names.join(" or ")
-        }
-        (_, Some(effect)) => effect.to_string(),
-        (_, None) => format!("something without a name ({})", f.shape.as_deref().unwrap_or("")),
-    };
+    let name = name(f);
     let size = if f.statistic == Statistic::Dropout {
         format!("{:.1} % of the pixels lost", 100.0 * f.size.sigma)
     } else {
@@ -207,4 +220,16 @@ fn with_twins(
         Some(plan.instants(index, session_s).map(shot).collect())
     };
     pictures(done, sensor, given, &retake)
+}
+
+fn name(f: &Finding) -> String {
+    match (f.status, f.effect) {
+        (Status::Recalibrate, _) => "sigma itself is off: calibrate again".into(),
+        (Status::OneOf, _) => {
+            let names: Vec<&str> = f.alternatives.iter().take(3).map(|a| a.effect).collect();
+            names.join(" or ")
+        }
+        (_, Some(effect)) => effect.into(),
+        (_, None) => format!("something without a name ({})", f.shape.as_deref().unwrap_or("")),
+    }
 }
