@@ -15,7 +15,7 @@ use kinoise::{DepthCode, Form, Frame, NoiseModel, Plane, Seed, Sensor, SigmaMode
 use serde_json::{Value, json};
 
 use crate::common;
-use crate::common::{copy_tree, good, kinoise, truth};
+use crate::common::{copy_tree, good, kinoise, tree, truth};
 
 /// Pixels of half the size each way, words of 0.07 mm.
 fn sensor() -> Sensor {
@@ -422,25 +422,6 @@ fn small(effects: Vec<Effect>) -> NoiseModel {
 fn bowl(k_px: f64) -> Effect {
     let bowl = bias(Basis::Bowl { disparity_power: 0.0, orders: 1 }, &[k_px]);
     shaped("radial-disparity-bias", vec![bowl])
-}
-
-/// Every file with its bytes, in name order.
-fn tree(root: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    let mut files = Vec::new();
-    let mut folders = vec![root.to_path_buf()];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(folder).expect("a folder") {
-            let path = entry.expect("an entry").path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                let name = path.strip_prefix(root).expect("below").to_path_buf();
-                files.push((name, fs::read(&path).expect("read")));
-            }
-        }
-    }
-    files.sort();
-    files
 }
 
 /// Root mean square about the best plane of each view's first frame in units of sigma, by

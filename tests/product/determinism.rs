@@ -3,26 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::{good, kinoise};
-
-/// Every file below `root` with its bytes, in name order.
-fn tree(root: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    let mut files = Vec::new();
-    let mut folders = vec![root.to_path_buf()];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(folder).expect("a folder") {
-            let path = entry.expect("an entry").path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                let name = path.strip_prefix(root).expect("below").to_path_buf();
-                files.push((name, fs::read(&path).expect("read")));
-            }
-        }
-    }
-    files.sort();
-    files
-}
+use crate::common::{good, kinoise, tree};
 
 /// Run with `-o`/the last argument as the output folder; its files and stdout.
 fn run(arguments: &[&str], threads: &str, seed: &str) -> Vec<(PathBuf, Vec<u8>)> {
