@@ -16,9 +16,9 @@ const MAPS_CLEARLY: f64 = 3.0;
 const TERM_SHARE: f64 = 0.005;
 const TERM_CLEARLY: f64 = 2.0;
 /// A shape of the target, which a correction leaves in, must bring as much beside the maps as they
-/// must bring themselves, and may be larger than usual by no more than this: what is collinear
-/// with the sensor's own error and fits no board is not the board's.
-const LARGEST_USUAL: f64 = 3.0;
+/// must bring themselves, and lie within so many of the standard deviations of what is usual (95 % of
+/// them do): what is collinear with the sensor's own error and fits no board is not the board's.
+const LARGEST_USUAL: f64 = 2.0;
 /// A curve of the sensor without a name must bring this share beside a shape of the target: less is
 /// what the target's formula misses, and no board's misfit is to be taken out of other pictures.
 const BESIDE_TARGET: f64 = 0.05;

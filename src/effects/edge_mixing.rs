@@ -8,7 +8,7 @@ static CARD: Card = Card {
     id: "edge-mixing",
     title: "mixed depth at edges",
     stage: Stage::Optics,
-    summary: "at the edge of the target a pixel sees both the target and what is behind, and answers between the two; it needs something behind (--wall)",
+    summary: "at the edge of the target a pixel sees both the target and what is behind, and answers between the two; there must be something behind the target",
     parameters: &[Parameter {
         name: "width_px",
         unit: "px",

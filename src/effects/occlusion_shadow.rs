@@ -8,7 +8,7 @@ static CARD: Card = Card {
     id: "occlusion-shadow",
     title: "an occlusion shadow",
     stage: Stage::Dropout,
-    summary: "what the target hides from the projector has no pattern and no depth: a band on the background beside the target, fx b (1/z - 1/z_behind) px wide, on one side; it needs something behind (--wall)",
+    summary: "what the target hides from the projector has no pattern and no depth: a band on the background beside the target, fx b (1/z - 1/z_behind) px wide, on one side; there must be something behind the target",
     parameters: &[Parameter {
         name: "share",
         unit: "",
