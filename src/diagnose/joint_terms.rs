@@ -64,23 +64,26 @@ impl Joint<'_> {
         Some(settled)
     }
 
-    /// As smooth as predicts the parts left out best.
+    /// The smoothest maps that predict the parts left out within a standard error of the best
+    /// (Breiman et al. 1984).
     fn best_maps(&self, terms: &[usize], camera: &Camera) -> Option<Settled> {
         let first = self.columns.terms;
         let diagonal = self.all.a.diagonal();
         let unit = diagonal.rows(first, self.columns.nodes / 2).mean();
-        let mut best: Option<Settled> = None;
+        let mut all: Vec<Settled> = Vec::new();
         for smoothness in SMOOTHNESS {
             let penalty = self.columns.penalty(camera, smoothness) * unit;
             let Some(without) = self.without(Some(&penalty)) else { continue };
             let scores = self.scores(&without, terms, |_| true);
-            if best.as_ref().is_some_and(|b| total(&b.scores) > total(&scores)) {
+            let worse = all.last().is_some_and(|b| total(&b.scores) > total(&scores));
+            if worse {
                 break;
             }
             let (terms, penalty) = (terms.to_vec(), Some(penalty));
-            best = Some(Settled { terms, penalty, without, scores, maps: 0.0 });
+            all.push(Settled { terms, penalty, without, scores, maps: 0.0 });
         }
-        best
+        let best = all.last()?.scores.clone();
+        all.into_iter().find(|s| clearly(&best, &s.scores) < 1.0)
     }
 
     /// Terms that the maps make needless, the most needless first.
