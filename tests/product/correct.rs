@@ -621,9 +621,11 @@ fn a_shape_is_held_where_its_learning_ended_and_that_is_told() {
     let (json, said) = files.correct(&recording, &[]);
     assert!(json["pixels_changed"].as_u64() > Some(100_000), "{json}");
     assert!(!said.contains("held at the edge"), "{said}");
-    // What stands still is added up in single precision.
-    let other = raw_values(&files.at("out"));
-    assert!(held.len() == other.len() && held.iter().zip(&other).all(|(a, b)| a.abs_diff(*b) <= 1));
+    // Nearer than 2.6 m all is held; what stands still is added up in single precision.
+    let (other, near) = (raw_values(&files.at("out")), 13_000);
+    let pairs = held.iter().zip(&other).filter(|(a, _)| **a < near);
+    assert!(held.len() == other.len() && pairs.clone().count() > 100_000);
+    assert!(pairs.clone().all(|(a, b)| a.abs_diff(*b) <= 1));
 }
 
 /// Of every frame of a recording, one after another.
