@@ -131,8 +131,13 @@ fn summary(diagnosis: &Diagnosis) -> String {
     text.extend(main.iter().map(|f| line(f)));
     if !rest.is_empty() {
         let share: f64 = rest.iter().map(|f| f.share).sum();
-        let names: Vec<String> = rest.iter().map(|f| name(f)).collect();
-        text += &format!("  and, {:.0} % of it together: {}\n", 100.0 * share, names.join("; "));
+        let named = rest.iter().filter(|f| has_name(f));
+        let mut names: Vec<String> = named.map(|f| name(f)).collect();
+        match rest.len() - names.len() {
+            0 => {}
+            nameless => names.push(format!("{nameless} without a name")),
+        }
+        text += &format!("  and, {:.0} % of it together: {}\n", 100.0 * share, names.join(", "));
     }
     if let Some(h) = &diagnosis.heldout {
         let (views, gain, [low, high]) = (h.views.len(), h.gain, h.gain_interval);
@@ -220,6 +225,10 @@ fn with_twins(
         Some(plan.instants(index, session_s).map(shot).collect())
     };
     pictures(done, sensor, given, &retake)
+}
+
+fn has_name(f: &Finding) -> bool {
+    f.effect.is_some() || matches!(f.status, Status::Recalibrate | Status::OneOf)
 }
 
 fn name(f: &Finding) -> String {
