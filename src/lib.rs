@@ -141,6 +141,8 @@
 //! - [`docs::capture`]: how to take views with a Kinect
 //! - [`docs::identifiability`]: what views of planes can show, and what they cannot
 //! - [`docs::engine`]: how the diagnosis works, and where in the code
+//! - [`report`]: the pages; what they say of an effect is on its card in `src/effects`, and the other
+//!   sentences of a diagnosis are in `src/report/diagnosis_page/sentences.rs`
 //!
 //! The method of the calibration and of the paper's mapper: Yamaguchi, Emaru, Kobayashi, Ravankar,
 //! "3D map-building from RGB-D data considering noise characteristics of Kinect" (SII 2016). It is

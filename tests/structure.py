@@ -4,7 +4,7 @@
 Reads the `use` lines and the `crate::`, `super::` and child-module paths of every file (tests left
 out), follows re-exports to the file that defines a name, and checks
   1. that the files' imports hold no circle; what a folder's own mod.rs declares is open to every
-     file of the folder (src/diagnose is left out until it is replaced),
+     file of the folder (src/diagnose is left out: its files import one another),
   2. that a module imports only from modules listed above it in src/lib.rs.
 Prints what breaks a rule and exits with 1.   python3 tests/structure.py [FOLDER]   (default: src)
 """

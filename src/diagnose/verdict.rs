@@ -1,4 +1,5 @@
-//! What is said in the end: findings in order, the extended model, the views.
+//! What is said in the end: findings in order, the extended model, the views. Whether it is a match
+//! is decided in `engine`.
 
 use super::diagnosis::{After, CannotTell, Finding, HeldOut, Remaining, Status, Verdict, ViewLine};
 use super::field::Field;
@@ -157,7 +158,7 @@ pub(super) fn shares(found: &mut [Finding]) {
     });
 }
 
-/// Does anything stand out once all terms are in?
+/// Does anything stand out once all terms are in? The search's own word, not the diagnosis's.
 pub(super) fn after(bias: &Outcome, variance: &Outcome) -> After {
     let mut remaining = Vec::new();
     for (statistic, outcome) in [(Statistic::Bias, bias), (Statistic::Variance, variance)] {

@@ -35,7 +35,8 @@ pub trait Effect: Send + Sync {
     }
 }
 
-/// The catalogue: an effect is one file and one word in this list.
+/// The catalogue: to simulate an effect takes one file and one word in this list. What it takes to
+/// recognise one is in `crate::docs::catalogue`.
 macro_rules! catalogue {
     ($($module:ident :: $name:ident),* $(,)?) => {
         $(mod $module;)*

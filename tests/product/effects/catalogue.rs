@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 use kinoise::effects::{Active, CATALOGUE};
 
-/// docs/effects.md: every id with its parameters.
+/// src/docs/catalogue.md: every id with its parameters.
 const DOCUMENTED: &[(&str, &[&str])] = &[
     ("disparity-quantisation", &["step_px"]),
     ("depth-rounding", &["step_m"]),
