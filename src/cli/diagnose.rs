@@ -139,7 +139,8 @@ fn summary(diagnosis: &Diagnosis) -> String {
         }
         text += &format!("  and, {:.0} % of it together: {}\n", 100.0 * share, names.join(", "));
     }
-    if let Some(h) = &diagnosis.heldout {
+    // Of a match there is nothing to be worth anything.
+    if let Some(h) = diagnosis.heldout.as_ref().filter(|_| diagnosis.verdict == Verdict::Mismatch) {
         let (views, gain, [low, high]) = (h.views.len(), h.gain, h.gain_interval);
         let (before, after) = (h.rms_mm_before, h.rms_mm_after);
         text += &format!(
