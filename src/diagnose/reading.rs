@@ -8,8 +8,8 @@ use serde_json::Map;
 use super::diagnosis::Finding;
 use super::engine::FEWEST_VIEWS;
 use super::field::Field;
-use super::findings;
 use super::known::KnownTerms;
+use super::other_findings::named;
 use super::parameters::estimate;
 use crate::Progress;
 use crate::error::{Error, Result};
@@ -134,7 +134,7 @@ fn ranges() -> Finding {
         parameters,
         p_adjusted: 1e-9,
         terms: vec![range_term()],
-        ..findings::named("range-not-depth", 0.98, Statistic::Bias, Axis::Radius)
+        ..named("range-not-depth", 0.98, Statistic::Bias, Axis::Radius)
     }
 }
 

@@ -206,7 +206,7 @@ pub fn findings(laws: &[Law], known: &KnownTerms, level: f64, seed: Seed) -> Vec
         parameters,
         size: Size { mm: 1e3 * best.rms_m, sigma: best.rms_sigma },
         p_adjusted: noise.p(safe(best)),
-        physics: super::findings::physics(
+        physics: super::naming::physics(
             status,
             Some(best.family),
             Statistic::Bias,

@@ -4,9 +4,9 @@ use serde_json::Map;
 
 use super::diagnosis::{Finding, Size};
 use super::field::Field;
-use super::findings;
 use super::known::KnownTerms;
 use super::lattice::{Quantisation, RawHistogram};
+use super::other_findings::named;
 use super::parameters::estimate;
 use super::pixels::{fixed_px2, mean_of};
 use super::structure::Structure;
@@ -78,7 +78,7 @@ pub(super) fn steps(
             parameters,
             size,
             p_adjusted: 1e-6,
-            ..findings::named(effect, 0.98, Statistic::Distribution, axis)
+            ..named(effect, 0.98, Statistic::Distribution, axis)
         });
     };
     let z = crate::stats::range(fields.iter().map(|f| f.plane.depth(0.0, 0.0)));

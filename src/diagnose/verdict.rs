@@ -3,9 +3,9 @@
 
 use super::diagnosis::{After, CannotTell, Finding, HeldOut, Remaining, Status, Verdict, ViewLine};
 use super::field::Field;
-use super::findings;
 use super::heldout;
 use super::layers::Survey;
+use super::other_findings::named;
 use super::search::Outcome;
 use crate::effects;
 use crate::model::{Effect, NoiseModel, UNEXPLAINED};
@@ -17,7 +17,7 @@ pub(super) fn not_identifiable(what: &CannotTell) -> Finding {
         status: Status::NotIdentifiable,
         alternatives: Vec::new(),
         physics: what.why.clone(),
-        ..findings::named(what.effect, 0.0, Statistic::Bias, Axis::Z)
+        ..named(what.effect, 0.0, Statistic::Bias, Axis::Z)
     }
 }
 
@@ -250,7 +250,7 @@ mod tests {
             effect: None,
             share: 900.0,
             curve: Some(curve),
-            ..findings::named("range-exponent", 0.0, Statistic::Variance, Axis::Z)
+            ..named("range-exponent", 0.0, Statistic::Variance, Axis::Z)
         }
     }
 
@@ -258,7 +258,7 @@ mod tests {
         Finding {
             share: 100.0,
             size: Size { mm: 1.0, sigma },
-            ..findings::named("radial-disparity-bias", 0.99, Statistic::Bias, Axis::Radius)
+            ..named("radial-disparity-bias", 0.99, Statistic::Bias, Axis::Radius)
         }
     }
 
@@ -268,7 +268,7 @@ mod tests {
         for (nats, left) in [(100.0, 1), (2000.0, 2)] {
             let exponent = Finding {
                 share: nats,
-                ..findings::named("range-exponent", 0.9, Statistic::Variance, Axis::Z)
+                ..named("range-exponent", 0.9, Statistic::Variance, Axis::Z)
             };
             let mut found = vec![exponent, recalibrate(1.2)];
             fold_into_sigma(&mut found);

@@ -1,0 +1,163 @@
+//! What the layers show, as findings.
+
+use serde_json::Map;
+
+use super::case::{Case, Mean, Scatter};
+use super::diagnosis::{Detectable, Finding, Status};
+use super::findings;
+use super::form::better_form;
+use super::heldout;
+use super::lines::line_terms;
+use super::missing::missing;
+use super::next_view;
+use super::other_findings;
+use super::pixels::{typical_sigma_mm, typical_sigma_px};
+use super::reference;
+use super::rim;
+use super::scene::Scene;
+use super::search::Outcome;
+use super::steps::is_raw;
+use super::verdict::LEAST_SIZE;
+use crate::terms::{Axis, Basis, Statistic, Term, corner_radius};
+
+/// How noise hangs together changes what a few frames show of its size by so much.
+const LEVEL_BESIDE_TEXTURE: f64 = 0.05;
+
+impl Case<'_> {
+    pub fn scenes(&self) -> [Scene<'_>; 2] {
+        let scale_px_m = self.fields[0].scale_px_m;
+        let corner = corner_radius(&self.sensor().camera);
+        [
+            Scene::bias(&self.survey, scale_px_m, corner),
+            Scene::variance(&self.survey, scale_px_m, corner),
+        ]
+    }
+
+    /// Curves of the mean and of the variance, named or not, with the advised view.
+    pub fn curves(&self, scenes: &[Scene<'_>; 2], outcomes: [&Outcome; 2]) -> Vec<Finding> {
+        let mut found: Vec<Finding> = scenes
+            .iter()
+            .zip(outcomes)
+            .flat_map(|(scene, outcome)| findings::findings(scene, outcome))
+            .collect();
+        let camera = &self.sensor().camera;
+        for (scene, outcome) in scenes.iter().zip(outcomes) {
+            let sigma = &self.model.sigma;
+            if let Some(outlook) = next_view::outlook(scene, sigma, camera, &self.bench.rays) {
+                next_view::advise(&mut found, scene, outcome, &outlook);
+            }
+        }
+        found
+    }
+
+    /// Steps shift the mean within a step, and gross errors add to the variance: neither is news.
+    pub fn is_news(&self, f: &Finding, steps: &[Finding], scatter: &Scatter) -> bool {
+        let scale_px_m = self.fields[0].scale_px_m;
+        let depth_px = |step: f64| step * scale_px_m / self.survey.reach.z[0].powi(2);
+        let coarsest = scatter
+            .lattice
+            .disparity_step_px
+            .unwrap_or(0.0)
+            .max(scatter.lattice.depth_step_m.map_or(0.0, depth_px));
+        let stepped = (!steps.is_empty() || self.baseline.is_some())
+            && f.effect.is_none()
+            && f.statistic == Statistic::Bias
+            && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)
+            && !is_raw(self.recording)
+            && f.size.sigma * typical_sigma_px(&self.fields) < 0.3 * coarsest;
+        let textured = scatter.tails.is_some()
+            || (!scatter.hangs.is_empty() && f.size.sigma < LEVEL_BESIDE_TEXTURE);
+        let tailed = textured && f.status == Status::Recalibrate;
+        !stepped && !tailed && f.size.sigma > self.options.ablation.least_size(LEAST_SIZE)
+    }
+
+    /// What neither a mean nor a variance shows: how the noise hangs together, tails, steps.
+    pub fn texture(&self, mean: &Mean, scatter: &Scatter, steps: Vec<Finding>) -> Vec<Finding> {
+        let sigma_mm = typical_sigma_mm(&self.fields);
+        let mixing = rim::mixing(&self.fields, self.level(Self::EACH_LEVEL))
+            .filter(|_| !self.known.has("edge-mixing"));
+        let hangs = scatter.hangs.iter().cloned().chain(scatter.tails.clone()).chain(mixing);
+        let mut found: Vec<Finding> =
+            hangs.map(|h| other_findings::hanging(h, sigma_mm)).chain(steps).collect();
+        // Lines that stand still have no name, but they can be learnt.
+        let stands = |f: &&mut Finding| {
+            f.effect.is_none() && f.statistic == Statistic::Bias && f.axis == Axis::Column
+        };
+        if self.baseline.is_none() {
+            found
+                .iter_mut()
+                .filter(stands)
+                .for_each(|f| f.terms = line_terms(&self.fields, &mean.px));
+        }
+        found
+    }
+
+    /// The refit of a sigma that was calibrated here is no finding; where it changes more than noise
+    /// can, the extended model has it.
+    pub fn take_refit(&self, curves: &mut Vec<Finding>, variance: &Outcome) -> Option<Finding> {
+        if !self.survey.refits_sigma {
+            return None;
+        }
+        let threshold = variance.noise.threshold(self.options.level);
+        let at = curves.iter().position(|f| f.status == Status::Recalibrate)?;
+        // Nats, as long as they are not shares.
+        Some(curves.remove(at)).filter(|f| f.share > threshold)
+    }
+
+    /// Where sigma's own form is off, the form that would do better: beside the finding, and as a
+    /// remark.
+    pub fn tell_form(&self, curves: &mut [Finding], refitted: bool) -> Option<String> {
+        let told = curves.iter_mut().find(|f| f.status == Status::Recalibrate);
+        if self.baseline.is_some() || told.is_none() && !refitted {
+            return None;
+        }
+        let better = better_form(&self.survey, &self.model.sigma, self.fields[0].scale_px_m)?;
+        if let Some(finding) = told {
+            finding.physics += &format!(" The noise follows better: {better}.");
+        }
+        Some(format!("sigma over depth and tilt follows better: {better}"))
+    }
+
+    pub fn lost(&mut self) -> (Vec<Finding>, Vec<Detectable>) {
+        let camera = &self.sensor().camera;
+        let lost = missing(&self.fields, &self.survey, camera, &self.bench.rays, self.options.seed);
+        self.copies.extend(lost.notes);
+        let known = |id| self.known.has(id);
+        let baseline = self.baseline.as_ref();
+        let found = lost
+            .findings
+            .into_iter()
+            .filter(|m| !m.family.is_some_and(known))
+            .filter(|m| baseline.is_none_or(|b| !b.loses_alike(m, &self.survey)))
+            .map(other_findings::missing)
+            .collect();
+        let least = |&(effect, name, least): &(&'static str, &str, f64)| {
+            let mut minimum = Map::new();
+            minimum.insert(name.into(), serde_json::json!(least));
+            Detectable { effect, minimum }
+        };
+        (found, lost.detectable.iter().map(least).collect())
+    }
+
+    /// Laws of the distance, by reference distances.
+    pub fn laws(&self, bias: &[Term]) -> Vec<Finding> {
+        // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
+        let anchored: Vec<Term> = bias
+            .iter()
+            .filter(|t| matches!(t.basis, Basis::RangeNotDepth | Basis::Lens { .. }))
+            .cloned()
+            .collect();
+        let found = |terms: &[Term]| {
+            let levels = heldout::levels(&self.survey, terms);
+            let laws = reference::laws(&self.fields, &levels);
+            let level = self.level(Self::LAWS_LEVEL);
+            reference::findings(&laws, &self.known, level, self.options.seed)
+        };
+        // A bowl, too, moves the plane on the axis, by what nobody can tell from a law of the
+        // distance: a law must hold with and without it.
+        let with = found(bias);
+        let mut laws = found(&anchored);
+        laws.retain(|l| with.iter().any(|w| w.effect == l.effect));
+        laws
+    }
+}

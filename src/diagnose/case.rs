@@ -1,0 +1,193 @@
+//! A diagnosis under way: the views as they were read, and the searches of their mean and scatter.
+
+use super::ablation::Ablation;
+use super::against::Baseline;
+use super::diagnosis::Finding;
+use super::engine::{DiagnoseOptions, measure_options};
+use super::field::Field;
+use super::known::KnownTerms;
+use super::lattice::Quantisation;
+use super::layers::Survey;
+use super::noise::{Hanging, hanging, tails};
+use super::pixels::{common, fixed_px2, measure_tails, pixel_terms, terms_of};
+use super::reading::{Taken, refuse_other_size};
+use super::search::Outcome;
+use super::steps::{Steps, lattice};
+use super::structure::structures;
+use crate::Progress;
+use crate::error::Result;
+use crate::measure::Workbench;
+use crate::model::NoiseModel;
+use crate::terms::{Basis, PixelContext, Statistic, Term};
+use crate::view::{Excluded, Recording, Sensor};
+
+/// A diagnosis under way.
+pub struct Case<'a> {
+    pub recording: &'a Recording,
+    pub model: &'a NoiseModel,
+    pub options: &'a DiagnoseOptions,
+    pub bench: Workbench<'a>,
+    pub known: KnownTerms,
+    pub fields: Vec<Field>,
+    pub survey: Survey,
+    pub baseline: Option<Baseline>,
+    pub excluded: Vec<Excluded>,
+    /// What was odd about the views, in words.
+    pub copies: Vec<String>,
+    /// Found while reading: the words are ranges.
+    pub ranges: Option<Finding>,
+}
+
+/// What the residuals' mean shows.
+pub struct Mean {
+    pub outcome: Outcome,
+    pub terms: Vec<Term>,
+    /// The terms at every pixel, px.
+    pub px: Vec<Vec<f32>>,
+}
+
+/// What scatters about it.
+pub struct Scatter {
+    pub lattice: Quantisation,
+    pub hangs: Vec<Hanging>,
+    pub tails: Option<Hanging>,
+    /// Of the variance.
+    pub outcome: Outcome,
+}
+
+impl<'a> Case<'a> {
+    pub fn open(
+        recording: &'a Recording,
+        simulated: Option<&Recording>,
+        model: &'a NoiseModel,
+        options: &'a DiagnoseOptions,
+        progress: Progress<'_>,
+    ) -> Result<Self> {
+        let sensor = &recording.sensor;
+        if simulated.is_none() {
+            refuse_other_size(model, sensor)?;
+        }
+        let bench = Workbench::new(sensor, measure_options(options));
+        let known = KnownTerms::of(model, &sensor.camera);
+        let Taken { mut fields, excluded, ranges, copies } =
+            Taken::of(recording, &bench, model, &known, progress)?;
+        let baseline = simulated
+            .map(|s| Baseline::of(s, sensor, &mut fields, model, options, progress))
+            .transpose()?;
+        let mut survey = Survey::of(&fields, &sensor.camera, &bench.rays);
+        survey.ablate(options.ablation, &fields);
+        survey.refits_sigma = options.calibrated_here && simulated.is_none();
+        survey.fixed_px2 = fixed_px2(&structures(&fields, &sensor.camera, &[]));
+        if let Some(baseline) = &baseline {
+            baseline.references(&mut fields);
+            baseline.means(&mut survey);
+        }
+        Ok(Case {
+            recording,
+            model,
+            options,
+            bench,
+            known,
+            fields,
+            survey,
+            baseline,
+            excluded,
+            copies,
+            ranges,
+        })
+    }
+
+    pub fn sensor(&self) -> &'a Sensor {
+        &self.recording.sensor
+    }
+
+    /// One error rate for everything: this share of it to the mean, a quarter to the variance, the
+    /// rest to all others.
+    pub const MEAN_LEVEL: f64 = 0.4;
+    pub const VARIANCE_LEVEL: f64 = 0.25;
+    pub const EACH_LEVEL: f64 = 0.03;
+    pub const LAWS_LEVEL: f64 = 0.1;
+
+    pub fn level(&self, share: f64) -> f64 {
+        share * self.options.level
+    }
+
+    pub fn mean(&mut self) -> Mean {
+        let first = self.search_mean();
+        // What is steep in a bias was taken for noise that hangs together: views count for more
+        // once it is known.
+        let weighed = self.baseline.is_none()
+            && self.options.ablation == Ablation::None
+            && self.survey.reweigh(&self.fields, &first.px);
+        if weighed { self.search_mean() } else { first }
+    }
+
+    fn search_mean(&self) -> Mean {
+        let level = self.level(Self::MEAN_LEVEL);
+        let outcome = self.survey.search_bias(&self.sensor().camera, level, self.options.seed);
+        let terms = terms_of(&outcome, Statistic::Bias);
+        let px = pixel_terms(&self.fields, &terms, &self.survey, &self.bench);
+        Mean { outcome, terms, px }
+    }
+
+    pub fn scatter(&mut self, mean: &Mean) -> Scatter {
+        let camera = &self.recording.sensor.camera;
+        let mut structure = structures(&self.fields, camera, &mean.px);
+        let lattice = lattice(&self.fields, self.recording);
+        let own = Steps::of(&lattice, &structure, &self.fields, self.recording);
+        let theirs = self.baseline.as_ref().map(|b| b.steps);
+        let extra = |p: &PixelContext| (own.at(p) - theirs.map_or(0.0, |s| s.at(p))).max(0.0);
+        let each = self.level(Self::EACH_LEVEL);
+        if let Some(baseline) = &mut self.baseline {
+            let more = baseline.too_much(&structure, each);
+            baseline.remarks.extend(more);
+            baseline.compare(&mut structure, &lattice, &mut self.known);
+        }
+        let hangs = hanging(&structure, &self.known, each);
+        self.survey.compare_frames(&self.fields, common(&structure, &hangs, &self.known));
+        let compared =
+            self.baseline.as_mut().is_some_and(|baseline| baseline.variances(&mut self.survey));
+        let range_share = self.range_share(&mean.terms);
+        // A range in place of a depth makes a disparity, and its noise, smaller.
+        let stretch = |p: &PixelContext| {
+            let ray = 1.0 / (1.0 + p.x * p.x + p.y * p.y).sqrt();
+            (1.0 + range_share.clamp(0.0, 1.0) * (ray - 1.0)).powi(2)
+        };
+        self.survey.roughen(&self.fields, &mean.px, extra, stretch);
+        if let Some(baseline) = self.baseline.as_ref().filter(|_| compared) {
+            baseline.doubt(&mut self.survey);
+        }
+        let level = self.level(Self::VARIANCE_LEVEL);
+        let sigma = &self.model.sigma;
+        let outcome = self.survey.search_variance(sigma, camera, level, self.options.seed);
+        let terms = terms_of(&outcome, Statistic::Variance);
+        measure_tails(&mut structure, &self.fields, &mean.px, &terms, &self.survey, &self.bench);
+        let alike = self.baseline.as_ref().is_some_and(|b| b.tails_alike(&structure));
+        let uneven = outcome.chosen.iter().any(|c| c.candidate.family.is_none())
+            || !terms.iter().all(|t| self.holds_tails(t));
+        let tails = tails(&structure, &self.known, each, uneven).filter(|_| !alike);
+        Scatter { lattice, hangs, tails, outcome }
+    }
+
+    /// A refit that makes sigma much smaller somewhere rests on noise that steps have swallowed, or
+    /// on a cause that was taken for noise: against it everything has tails.
+    fn holds_tails(&self, term: &Term) -> bool {
+        const MUCH: f64 = -1.4;
+        let mut row = Vec::new();
+        let mut tiles = self.survey.views.iter().flat_map(|v| &v.tiles);
+        !self.survey.refits_sigma
+            || !matches!(term.basis, Basis::Recalibrate { .. })
+            || tiles.all(|t| term.value(&t.place, &mut row) > MUCH)
+    }
+
+    pub fn range_share(&self, terms: &[Term]) -> f64 {
+        self.known
+            .bias
+            .iter()
+            .chain(terms)
+            .chain(self.ranges.iter().flat_map(|f| &f.terms))
+            .filter(|t| t.basis == Basis::RangeNotDepth)
+            .map(|t| t.coefficients[0])
+            .sum()
+    }
+}

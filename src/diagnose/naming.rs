@@ -1,0 +1,77 @@
+//! Which names a chosen term may have, and what is said of the physics behind one.
+
+use super::candidate::RECALIBRATE;
+use super::diagnosis::{Alternative, Status};
+use super::search::Chosen;
+use crate::effects;
+use crate::terms::{Axis, Statistic};
+
+/// Odds of a family that needs more columns to say the same: it can bend to what it is not.
+const RICHER: f64 = 0.35;
+
+/// Which names, and how sure.
+pub fn naming(chosen: &Chosen) -> (Status, Option<&'static str>, Vec<Alternative>) {
+    let Some(family) = chosen.candidate.family else {
+        return (Status::Unexplained, None, Vec::new());
+    };
+    let adequacy = chosen.gain / chosen.best_curve.max(1e-9);
+    let none = if chosen.best_curve > 0.0 {
+        1.0 / (1.0 + ((adequacy - chosen.adequacy - 0.06) / 0.05).exp())
+    } else {
+        0.0
+    };
+    let best = chosen.rivals.iter().find(|r| r.family == family).map_or(chosen.gain, |r| r.gain);
+    let mut odds: Vec<(&'static str, f64)> = vec![(family, 1.0)];
+    for rival in chosen.rivals.iter().filter(|r| r.family != family) {
+        let nats = (best - rival.gain).clamp(0.0, 40.0);
+        let behind = rival.behind.clamp(-1.0, 6.0);
+        let richer = rival.basis.count() > chosen.candidate.basis.count();
+        let bent = if richer { RICHER } else { 1.0 };
+        odds.push((rival.family, bent * (-(1.2 * behind + 0.25 * nats)).exp().min(1.0)));
+    }
+    let total: f64 = odds.iter().map(|o| o.1).sum();
+    odds.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let alternatives: Vec<Alternative> = odds
+        .iter()
+        .filter(|o| o.0 != RECALIBRATE)
+        .map(|&(effect, o)| Alternative { effect, probability: (1.0 - none) * o / total })
+        .filter(|a| a.probability > 0.005)
+        .take(5)
+        .collect();
+    if family == RECALIBRATE {
+        return (Status::Recalibrate, None, alternatives);
+    }
+    let sure = alternatives.first().map_or(0.0, |a| a.probability);
+    let status = if sure < 0.6 && alternatives.len() > 1 { Status::OneOf } else { Status::Named };
+    (status, Some(family), alternatives)
+}
+
+/// What was left out, why it looks so, what else it could be.
+pub fn physics(
+    status: Status,
+    effect: Option<&'static str>,
+    statistic: Statistic,
+    axis: Axis,
+    shape: Option<&str>,
+) -> String {
+    if status == Status::Recalibrate {
+        return "Nothing of the physics is missing: the numbers of sigma(z, theta) themselves are off. Calibrate again, or take the factor given here.".into();
+    }
+    let Some(card) = effect.and_then(effects::find).map(|e| e.card()) else {
+        let what = match statistic {
+            Statistic::Bias => "the mean error",
+            Statistic::Variance => "the size of the noise",
+            Statistic::Distribution => "the distribution of the errors",
+            Statistic::Correlation => "how errors hang together",
+            Statistic::Dropout => "where measurements are missing",
+        };
+        let shape = shape.map_or(String::new(), |s| format!(": {s}"));
+        return format!(
+            "Unexplained: {what} depends on {axis}{shape}. No effect of the catalogue explains it; the extended model holds it as the curve that was measured."
+        );
+    };
+    format!(
+        "Left out: {}. It is told by {} along {}. It could be taken for {}.",
+        card.summary, card.statistic, card.axis, card.confused_with
+    )
+}
