@@ -10,9 +10,11 @@ use super::heldout;
 use super::lines::line_terms;
 use super::missing::missing;
 use super::next_view;
+use super::noise::Hanging;
 use super::other_findings;
 use super::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::reference;
+use super::replication_textures;
 use super::rim;
 use super::scene::Scene;
 use super::search::Outcome;
@@ -77,8 +79,14 @@ impl Case<'_> {
         let mixing = rim::mixing(&self.fields, self.level(Self::EACH_LEVEL))
             .filter(|_| !self.known.has("edge-mixing"));
         let hangs = scatter.hangs.iter().cloned().chain(scatter.tails.clone()).chain(mixing);
-        let mut found: Vec<Finding> =
-            hangs.map(|h| other_findings::hanging(h, sigma_mm)).chain(steps).collect();
+        let second = self.survey.second();
+        let told = |h: Hanging| {
+            let (views, fields) = (&scatter.structure, &self.fields);
+            let replicated =
+                replication_textures::replicated(&h, views, fields, &second, &self.known);
+            other_findings::hanging(h, sigma_mm, replicated)
+        };
+        let mut found: Vec<Finding> = hangs.map(told).chain(steps).collect();
         // Lines that stand still have no name, but they can be learnt.
         let stands = |f: &&mut Finding| {
             f.effect.is_none() && f.statistic == Statistic::Bias && f.axis == Axis::Column
@@ -149,7 +157,7 @@ impl Case<'_> {
             .collect();
         let found = |terms: &[Term]| {
             let levels = heldout::levels(&self.survey, terms);
-            let laws = reference::laws(&self.fields, &levels);
+            let laws = reference::laws(&self.fields, &levels, &self.survey.second());
             let level = self.level(Self::LAWS_LEVEL);
             reference::findings(&laws, &self.known, level, self.options.seed)
         };

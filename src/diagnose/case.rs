@@ -13,7 +13,7 @@ use super::pixels::{common, fixed_px2, measure_tails, pixel_terms, terms_of};
 use super::reading::{Taken, refuse_other_size};
 use super::search::Outcome;
 use super::steps::{Steps, lattice};
-use super::structure::structures;
+use super::structure::{Structure, structures};
 use crate::Progress;
 use crate::error::Result;
 use crate::measure::Workbench;
@@ -48,6 +48,8 @@ pub struct Mean {
 
 /// What scatters about it.
 pub struct Scatter {
+    /// One number of each kind a view.
+    pub structure: Vec<Structure>,
     pub lattice: Quantisation,
     pub hangs: Vec<Hanging>,
     pub tails: Option<Hanging>,
@@ -166,7 +168,7 @@ impl<'a> Case<'a> {
         let uneven = outcome.chosen.iter().any(|c| c.candidate.family.is_none())
             || !terms.iter().all(|t| self.holds_tails(t));
         let tails = tails(&structure, &self.known, each, uneven).filter(|_| !alike);
-        Scatter { lattice, hangs, tails, outcome }
+        Scatter { structure, lattice, hangs, tails, outcome }
     }
 
     /// A refit that makes sigma much smaller somewhere rests on noise that steps have swallowed, or

@@ -38,7 +38,14 @@ impl Case<'_> {
         let scenes = self.scenes();
         let outcomes = [&mean.outcome, &scatter.outcome];
         let sigma_mm = typical_sigma_mm(&self.fields);
-        let steps = steps(&scatter.lattice, &self.known, &self.fields, self.recording, sigma_mm);
+        let steps = steps(
+            &scatter.lattice,
+            &self.known,
+            &self.fields,
+            self.recording,
+            sigma_mm,
+            &self.survey.second(),
+        );
         let mut curves = self.curves(&scenes, outcomes);
         let refitted = self.take_refit(&mut curves, &scatter.outcome);
         curves.retain(|f| self.is_news(f, &steps, scatter));

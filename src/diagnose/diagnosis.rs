@@ -73,6 +73,9 @@ pub struct Finding {
     pub parameters: Map<String, Value>,
     pub size: Size,
     pub p_adjusted: f64,
+    /// Each half of the views alone supports it: sign, and size within the joint interval; `None`
+    /// where that was not tested.
+    pub replicated: Option<bool>,
     pub physics: String,
     pub next_view: Option<NextView>,
     /// The curve in words, where it has no name.

@@ -113,6 +113,7 @@ fn finding(
         parameters,
         size: size(scene, &mine),
         p_adjusted: chosen.p,
+        replicated: outcome.halves.as_ref().and_then(|h| h.replicate(group)),
         physics,
         next_view: None,
         shape,

@@ -14,13 +14,20 @@ use super::candidate::Candidate;
 use super::evidence::Gain;
 use super::joint_fit::{Columns, Joint, Reduced};
 use super::joint_terms::{Settled, is_rough, is_smooth_and_nameless, total};
+use super::replication::{Half, Halves};
 use super::search::{Chosen, Outcome, ViewData, coarser};
 use crate::camera::Camera;
 
 /// The terms of a finished search fitted together, with the smooth rest. `fine` are the views' means
 /// in small patches, `inflation` what each view's weights were divided by: a bias is as sure in a
-/// view as in another, for views scatter beyond their noise.
-pub fn refit(fine: &[ViewData], inflation: &[f64], camera: &Camera, found: Outcome) -> Outcome {
+/// view as in another, for views scatter beyond their noise. `second` says which half a view is in.
+pub fn refit(
+    fine: &[ViewData],
+    inflation: &[f64],
+    second: &[bool],
+    camera: &Camera,
+    found: Outcome,
+) -> Outcome {
     if found.chosen.is_empty() {
         return found;
     }
@@ -38,9 +45,9 @@ pub fn refit(fine: &[ViewData], inflation: &[f64], camera: &Camera, found: Outco
         })
         .collect();
     let columns = Columns::of(&found.chosen, camera);
-    let joint = Joint::of(&columns, &data);
+    let joint = Joint::of(&columns, &data, second);
     match joint.settle(&found.chosen, camera) {
-        Some(settled) => joint.posterior(&data, &settled, &found).unwrap_or(found),
+        Some(settled) => joint.posterior(&data, second, &settled, &found).unwrap_or(found),
         None => found,
     }
 }
@@ -52,7 +59,13 @@ fn median(values: &[f64]) -> f64 {
 }
 
 impl Joint<'_> {
-    fn posterior(&self, data: &[ViewData], s: &Settled, found: &Outcome) -> Option<Outcome> {
+    fn posterior(
+        &self,
+        data: &[ViewData],
+        second: &[bool],
+        s: &Settled,
+        found: &Outcome,
+    ) -> Option<Outcome> {
         let kept = self.kept(&s.terms);
         let whole = Reduced::of(&self.all, self.columns.terms, s.penalty.as_ref())?;
         let first = whole.fit(&kept, &self.precision)?;
@@ -92,6 +105,7 @@ impl Joint<'_> {
                 .clone()
                 .filter(|r| s.penalty.is_none() || !is_smooth_and_nameless(&r.candidate)),
             left_out: Vec::new(),
+            halves: self.halves(data, second, s, &precision, &beta),
         };
         let folds = s.without.iter().zip(&self.views);
         outcome.left_out = folds
@@ -124,6 +138,62 @@ impl Joint<'_> {
             covariance,
         });
         Some(outcome)
+    }
+
+    /// The same fit to either half of the views.
+    fn halves(
+        &self,
+        data: &[ViewData],
+        second: &[bool],
+        s: &Settled,
+        precision: &DVector<f64>,
+        whole: &DVector<f64>,
+    ) -> Option<Halves> {
+        let kept = self.kept(&s.terms);
+        let terms = self.columns.terms;
+        let nodes = if s.penalty.is_some() { self.columns.nodes } else { 0 };
+        let columns: Vec<usize> = kept.iter().copied().chain(terms..terms + nodes).collect();
+        let n = columns.len();
+        let part = |a: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| a[(columns[i], columns[j])]);
+        let own = |all: &DVector<f64>| DVector::from_fn(n, |i, _| all[columns[i]]);
+        let mut held = DMatrix::zeros(n, n);
+        kept.iter().enumerate().for_each(|(i, &k)| held[(i, i)] = precision[k]);
+        if let Some(penalty) = &s.penalty {
+            held.view_mut((kept.len(), kept.len()), (nodes, nodes)).copy_from(penalty);
+        }
+        let half = |which: bool| {
+            let evidence = &self.halves[usize::from(which)];
+            let factor = (part(&evidence.a) + &held).cholesky()?;
+            let beta = factor.solve(&own(&evidence.b));
+            let mut all = DVector::zeros(terms + self.columns.nodes);
+            columns.iter().zip(beta.iter()).for_each(|(&c, b)| all[c] = *b);
+            let mine: Vec<&ViewData> = data
+                .iter()
+                .zip(second)
+                .filter(|(_, s)| **s == which)
+                .map(|(view, _)| view)
+                .collect();
+            let beyond =
+                mine.par_iter().filter_map(|v| Some(own(&self.columns.left(v, &all)?))).collect();
+            Some(Half { beta, factor, beyond })
+        };
+        let mut first = 0;
+        let mut next = |count: usize| {
+            first += count;
+            first - count..first
+        };
+        let mut spans = Vec::new();
+        for &t in &s.terms {
+            spans.push(next(self.columns.bases[t].count()));
+            // What planes absorb goes with its term.
+            if self.columns.gauges[t].is_some() {
+                spans.push(next(0));
+            }
+        }
+        if nodes > 0 {
+            spans.extend([next(nodes / 2), next(nodes / 2)]);
+        }
+        Some(Halves::new(part(&self.all.a), own(whole), [half(false)?, half(true)?], spans))
     }
 
     /// The terms with what planes absorb of each, and the maps.

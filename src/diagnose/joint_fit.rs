@@ -185,20 +185,23 @@ pub struct Joint<'a> {
     pub views: Vec<Vec<usize>>,
     parts: Vec<Evidence>,
     pub all: Evidence,
+    /// Of either half of the views.
+    pub halves: [Evidence; 2],
     pub precision: DVector<f64>,
 }
 
-fn sum(n: usize, parts: impl Iterator<Item = Evidence>) -> Evidence {
-    let none = Evidence { a: DMatrix::zeros(n, n), b: DVector::zeros(n) };
-    parts.fold(none, |mut sum, part| {
-        sum.a += part.a;
-        sum.b += part.b;
-        sum
-    })
+fn none(n: usize) -> Evidence {
+    Evidence { a: DMatrix::zeros(n, n), b: DVector::zeros(n) }
+}
+
+fn add(mut sum: Evidence, part: &Evidence) -> Evidence {
+    sum.a += &part.a;
+    sum.b += &part.b;
+    sum
 }
 
 impl<'a> Joint<'a> {
-    pub fn of(columns: &'a Columns, data: &[ViewData]) -> Self {
+    pub fn of(columns: &'a Columns, data: &[ViewData], second: &[bool]) -> Self {
         let n = columns.terms + columns.nodes;
         // Near and far in every part.
         let z = |v: &usize| data[*v].places.first().map_or(0.0, |p| p.rho);
@@ -207,12 +210,24 @@ impl<'a> Joint<'a> {
         let folds = FOLDS.min(data.len());
         let views: Vec<Vec<usize>> =
             (0..folds).map(|f| order.iter().skip(f).step_by(folds).copied().collect()).collect();
-        let parts: Vec<Evidence> = views
+        let sums: Vec<(Evidence, [Evidence; 2])> = views
             .par_iter()
-            .map(|part| sum(n, part.iter().filter_map(|&v| columns.evidence(&data[v]))))
+            .map(|part| {
+                let (mut all, mut halves) = (none(n), [none(n), none(n)]);
+                for &v in part {
+                    if let Some(view) = columns.evidence(&data[v]) {
+                        let half = &mut halves[usize::from(second[v])];
+                        *half = add(std::mem::replace(half, none(0)), &view);
+                        all = add(all, &view);
+                    }
+                }
+                (all, halves)
+            })
             .collect();
-        let all = sum(n, parts.iter().cloned());
-        Joint { columns, views, parts, all, precision: columns.usual() }
+        let all = sums.iter().fold(none(n), |sum, part| add(sum, &part.0));
+        let halves = [0, 1].map(|h| sums.iter().fold(none(n), |sum, part| add(sum, &part.1[h])));
+        let parts = sums.into_iter().map(|part| part.0).collect();
+        Joint { columns, views, parts, all, halves, precision: columns.usual() }
     }
 
     /// Fits without each part.

@@ -78,8 +78,10 @@ fn fitted(data: &[ViewData], chosen: Vec<Chosen>) -> Outcome {
         noise: Default::default(),
         remaining: None,
         left_out: Vec::new(),
+        halves: None,
     };
-    refit(data, &vec![1.0; data.len()], &kinect_v1(4).camera, found)
+    let second: Vec<bool> = (0..data.len()).map(|v| v % 4 == 1 || v % 4 == 2).collect();
+    refit(data, &vec![1.0; data.len()], &second, &kinect_v1(4).camera, found)
 }
 
 /// Root mean square of the bias around each view's plane, before and after what the sensor's terms

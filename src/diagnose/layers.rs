@@ -8,6 +8,7 @@ use super::bias;
 use super::field::Field;
 use super::joint::refit;
 use super::reach::Extent;
+use super::replication::halves;
 use super::scatter::{Left, left_by_fit};
 use super::search::{Outcome, Rules, ViewData, coarser, search, search_beside};
 use super::smooth::{SMOOTH_PX, high_pass};
@@ -64,6 +65,8 @@ pub struct SurveyedView {
     /// What the variance between frames is to be multiplied by to be all of the noise's; `None`
     /// with a single frame.
     pub moving: Option<f64>,
+    /// In the second of the halves that a finding must replicate in.
+    pub second: bool,
 }
 
 /// No more terms than this are looked for in a layer.
@@ -80,9 +83,12 @@ pub const VARIANCE_PRIOR: f64 = 1.0;
 impl Survey {
     pub fn of(fields: &[Field], camera: &Camera, rays: &Rays) -> Self {
         let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
+        let poses: Vec<(f64, f64)> =
+            fields.iter().map(|f| (f.plane.distance(), f.plane.theta())).collect();
         let mut views: Vec<SurveyedView> = fields
             .par_iter()
-            .map(|f| {
+            .zip(halves(&poses))
+            .map(|(f, second)| {
                 let (inflation, correlation) = inflation(f, &[]);
                 let tiles = tiles(f, camera, rays, start);
                 SurveyedView {
@@ -93,6 +99,7 @@ impl Survey {
                     frames: independent_frames(f),
                     doubt: 1.0,
                     moving: None,
+                    second,
                 }
             })
             .collect();
@@ -144,7 +151,8 @@ impl Survey {
         let candidates = self.ablation.candidates(candidates);
         let found = search(&fine, &coarse, &candidates, &self.ablation.rules(rules), seed);
         let inflation: Vec<f64> = self.views.iter().map(|v| v.inflation).collect();
-        refit(&fine, &inflation, camera, found)
+        let second = self.second();
+        refit(&fine, &inflation, &second, camera, found.halved(&second, BIAS_PRIOR))
     }
 
     /// The views at these places.
@@ -259,6 +267,12 @@ impl Survey {
         let data = self.variance_data();
         let candidates = self.ablation.candidates(candidates);
         search_beside(&data, &data, &candidates, refit, &self.ablation.rules(rules), seed)
+            .halved(&self.second(), VARIANCE_PRIOR)
+    }
+
+    /// Which half each view is in.
+    pub fn second(&self) -> Vec<bool> {
+        self.views.iter().map(|v| v.second).collect()
     }
 }
 

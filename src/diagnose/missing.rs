@@ -13,8 +13,10 @@ use super::missing_cells::{Cell, cells, fine};
 use super::missing_report::{Told, shadow_finding};
 use super::missing_search::{Judged, Losses};
 use super::missing_shapes::{Shape, Step, curves, steps};
-use super::occlusion_scan::band;
+use super::occlusion_scan::{Band, band};
 use super::reach::Extent;
+use super::replication::{Measured, agree};
+use super::shadow::Shadow;
 use crate::camera::{Camera, Rays};
 use crate::rng::Seed;
 use crate::terms::Axis;
@@ -37,6 +39,8 @@ pub struct DropoutFinding {
     pub gain: f64,
     /// Share of all pixel-frames that it took.
     pub size: f64,
+    /// Each half of the views alone has it.
+    pub replicated: Option<bool>,
     /// Lost share over the axis.
     pub curve: Curve,
 }
@@ -73,11 +77,13 @@ pub fn missing(
     seed: Seed,
 ) -> DropoutOutcome {
     let told: Vec<bool> = fields.iter().map(|f| f.told).collect();
-    let seen = Seen { cells: cells(survey, camera), fine: fine(survey), told };
+    let second = survey.second();
+    let seen = Seen { cells: cells(survey, camera), fine: fine(survey), told, second };
     let mut outcome = losses(&seen, &survey.reach, camera, seed);
     let shadows: Vec<_> = fields.iter().map(|f| f.shadow).collect();
     if let Some(band) = band(&shadows, SHADOW_LEVEL) {
-        let shadow = shadow_finding(band, fields);
+        let mut shadow = shadow_finding(band, fields);
+        shadow.replicated = bands_agree(&shadows, &seen.second);
         // Where the target's own mask reaches into its shadow, the same losses are seen again.
         outcome.findings.retain(|f| f.family.is_some() || f.size > shadow.size);
         outcome.findings.push(shadow);
@@ -93,6 +99,8 @@ struct Seen {
     fine: Vec<Vec<Cell>>,
     /// Whether a view's region was given.
     told: Vec<bool>,
+    /// Whether it is in the second half.
+    second: Vec<bool>,
 }
 
 fn losses(seen: &Seen, reach: &Extent, camera: &Camera, seed: Seed) -> DropoutOutcome {
@@ -125,8 +133,10 @@ fn losses(seen: &Seen, reach: &Extent, camera: &Camera, seed: Seed) -> DropoutOu
         let more = losses.explained(won);
         explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
         taken.push(won.shape.axis());
+        let replicated = losses.replicate(won, &seen.second);
         let told = Told { fine: &seen.fine, told: &seen.told, base: losses.base, reach, camera };
-        let finding = told.finding(won, rivals(&judged), chance.of_gain(won.gain));
+        let mut finding = told.finding(won, rivals(&judged), chance.of_gain(won.gain));
+        finding.replicated = replicated;
         match hard_end(&finding) {
             Some(note) => outcome.notes.push(note),
             None => outcome.findings.push(finding),
@@ -155,6 +165,18 @@ fn hard_end(finding: &DropoutFinding) -> Option<String> {
     (past && width.abs() < HARD * z).then(|| {
         format!("every reading {side} {z:.2} m is missing: the range has a hard end there, set by the sensor's driver or format")
     })
+}
+
+/// Do the shadows of both halves have the same share of the expected width?
+fn bands_agree(shadows: &[Shadow], second: &[bool]) -> Option<bool> {
+    let half = |which: bool| {
+        let mine = shadows.iter().zip(second).filter(|(_, s)| **s == which);
+        let mine: Vec<Shadow> = mine.map(|(shadow, _)| *shadow).collect();
+        let Band { left, share: [value, std_error], .. } = band(&mine, 1.0)?;
+        Some((left, Measured { value, std_error, views: mine.len() }))
+    };
+    let (first, second) = (half(false)?, half(true)?);
+    Some(first.0 == second.0 && agree([Some(first.1), Some(second.1)])?)
 }
 
 /// The best step, unless the best curve leaves it behind.

@@ -48,6 +48,7 @@ impl Told<'_> {
             rivals,
             gain: won.gain,
             size: 0.0,
+            replicated: None,
             curve: Curve::default(),
         };
         match &won.shape {
@@ -183,6 +184,7 @@ pub fn shadow_finding(band: Band, fields: &[Field]) -> DropoutFinding {
         rivals: vec![("occlusion-shadow", band.gain[0]), ("edge-distance", band.gain[1])],
         gain: band.gain[usize::from(!band.lawful)],
         size: lost / (asked + lost).max(1.0),
+        replicated: None,
         curve: band.curve,
     }
 }

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::evidence::{Evidence, Null, gain};
 use super::missing_cells::{Cell, Scatter, USUAL, Whitener, odds, share};
 use super::missing_shapes::{Shape, Step};
+use super::replication::{Halves, Measured, agree};
 use crate::rng::Seed;
 use crate::terms::Basis;
 
@@ -128,6 +129,29 @@ impl<'a> Losses<'a> {
         };
         let by_view = columns.iter().zip(&a).map(narrow).collect();
         Column { step, by_view, a }
+    }
+
+    /// Do both halves of the views lose by this shape?
+    pub fn replicate(&self, judged: &Judged, second: &[bool]) -> Option<bool> {
+        match &judged.shape {
+            Shape::Step(step) => {
+                let column = self.column(*step);
+                let solve = |(w, y): (&Whitener, &Vec<f64>)| w.solve(y);
+                let whitened: Vec<Vec<f64>> =
+                    self.whiteners.iter().zip(&self.left).map(solve).collect();
+                let scores = column.scores(&whitened);
+                let half = |which: bool| {
+                    let views = column.a.iter().zip(&scores).zip(second);
+                    let mine = views.filter(|(_, s)| **s == which);
+                    Measured::of_scores(mine.map(|((a, b), _)| (*a, *b)))
+                };
+                agree([half(false), half(true)])
+            }
+            Shape::Curve(_, basis) => {
+                let evidence = self.evidence(basis);
+                Halves::of(&evidence, second, CURVE_PRECISION, &[basis.count()])?.replicate(&[0])
+            }
+        }
     }
 
     fn evidence(&self, basis: &Basis) -> Vec<Evidence> {

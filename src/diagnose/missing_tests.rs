@@ -69,7 +69,12 @@ fn find(views: &[Vec<Cell>], camera: &Camera, seed: Seed) -> DropoutOutcome {
     reach.theta = of(|p| p.theta);
     reach.session = of(|p| p.session_s);
     reach.light = [1.0, 1.0];
-    let seen = Seen { cells: views.to_vec(), fine: views.to_vec(), told: vec![true; views.len()] };
+    let seen = Seen {
+        cells: views.to_vec(),
+        fine: views.to_vec(),
+        told: vec![true; views.len()],
+        second: (0..views.len()).map(|v| v % 2 == 1).collect(),
+    };
     losses(&seen, &reach, camera, seed)
 }
 

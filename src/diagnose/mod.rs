@@ -44,6 +44,8 @@ mod pixels;
 mod reach;
 mod reading;
 mod reference;
+mod replication;
+mod replication_textures;
 mod rim;
 mod scatter;
 mod scene;

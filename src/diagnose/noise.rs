@@ -28,14 +28,14 @@ pub struct Hanging {
 
 /// Mean of a statistic over the views, and its standard error.
 #[derive(Debug, Clone, Copy)]
-struct Mean {
-    value: f64,
-    std_error: f64,
-    views: f64,
+pub(super) struct Mean {
+    pub value: f64,
+    pub std_error: f64,
+    pub views: f64,
 }
 
 impl Mean {
-    fn of(views: &[Structure], value: impl Fn(&Structure) -> Option<f64>) -> Option<Self> {
+    pub fn of(views: &[Structure], value: impl Fn(&Structure) -> Option<f64>) -> Option<Self> {
         let values: Vec<(f64, f64)> = views
             .iter()
             .filter_map(|s| Some((value(s).filter(|v| v.is_finite())?, s.pixels)))

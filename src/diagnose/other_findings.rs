@@ -23,6 +23,7 @@ pub fn named(effect: &'static str, probability: f64, statistic: Statistic, axis:
         parameters: Map::new(),
         size: Size::default(),
         p_adjusted: 1.0,
+        replicated: None,
         physics: physics(Status::Named, Some(effect), statistic, axis, None),
         next_view: None,
         shape: None,
@@ -32,7 +33,7 @@ pub fn named(effect: &'static str, probability: f64, statistic: Statistic, axis:
 }
 
 /// A mismatch of structure as a finding; `sigma_mm` is the recording's typical sigma.
-pub fn hanging(found: Hanging, sigma_mm: f64) -> Finding {
+pub fn hanging(found: Hanging, sigma_mm: f64, replicated: Option<bool>) -> Finding {
     let effect = found.families.first().copied();
     let status = match found.families.len() {
         0 => Status::Unexplained,
@@ -57,6 +58,7 @@ pub fn hanging(found: Hanging, sigma_mm: f64) -> Finding {
         parameters: found.parameters,
         size: Size { mm: found.size_sigma * sigma_mm, sigma: found.size_sigma },
         p_adjusted: found.p,
+        replicated,
         physics: physics(status, effect, found.statistic, found.axis, found.words.as_deref()),
         next_view: None,
         shape: found.words,
@@ -104,6 +106,7 @@ pub fn missing(found: DropoutFinding) -> Finding {
         parameters: found.parameters,
         size: Size { mm: 0.0, sigma: found.size },
         p_adjusted: found.p,
+        replicated: found.replicated,
         physics: words,
         next_view: None,
         shape,

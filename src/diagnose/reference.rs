@@ -7,6 +7,7 @@ use serde_json::Map;
 use super::diagnosis::{Alternative, CannotTell, Finding, Size, Status};
 use super::known::KnownTerms;
 use super::parameters::estimate;
+use super::replication::{Measured, agree};
 use super::search::NoiseGains;
 use crate::rng::Seed;
 use crate::terms::{Axis, Statistic};
@@ -30,6 +31,8 @@ pub struct Law {
     pub null: Null,
     /// Degrees of freedom that the references' own error was measured with.
     pub freedom: f64,
+    /// Both halves of the references say the same.
+    pub replicated: Option<bool>,
 }
 
 /// One view with a reference.
@@ -41,6 +44,7 @@ struct Checked {
     session_s: f64,
     px_m: f64,
     sigma_m: f64,
+    second: bool,
 }
 
 /// Fewer references than this can be fitted by anything.
@@ -50,18 +54,26 @@ const WARM_UPS: [f64; 6] = [60.0, 180.0, 480.0, 1200.0, 2400.0, 7200.0];
 
 /// `levels` is what each view's disparity on the optical axis changes by once the found bias is
 /// taken out, px. All laws, with what each gains on references left out; empty where there are too few.
-pub fn laws(fields: &[Field], levels: &[f64]) -> Vec<Law> {
+pub fn laws(fields: &[Field], levels: &[f64], second: &[bool]) -> Vec<Law> {
     let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
     let checked: Vec<Checked> = fields
         .iter()
         .zip(levels)
-        .filter_map(|(f, level)| {
+        .zip(second)
+        .filter_map(|((f, level), &second)| {
             // The plane had bent towards what is now known to be a bias.
             let z = f.scale_px_m / (f.scale_px_m * f.plane.q.z + level);
             let off = z - f.reference_distance_m?;
             let sigma_px = f64::from(f.sigma.get(f.sigma.len() / 2).copied()?);
             let sigma_m = sigma_px * z * z / f.scale_px_m;
-            Some(Checked { z, off, session_s: f.time_s - start, px_m: f.scale_px_m, sigma_m })
+            Some(Checked {
+                z,
+                off,
+                session_s: f.time_s - start,
+                px_m: f.scale_px_m,
+                sigma_m,
+                second,
+            })
         })
         .collect();
     if checked.len() < FEWEST {
@@ -91,6 +103,14 @@ pub fn laws(fields: &[Field], levels: &[f64]) -> Vec<Law> {
                 _ => c.z,
             }));
             let (rms_m, rms_sigma) = (square(&shift), square(&|c| shift(c) / c.sigma_m));
+            let half = |second: bool| {
+                let mine = checked.iter().filter(move |c| c.second == second);
+                Measured::of_scores(mine.map(|c| {
+                    let g = column(c);
+                    (g * g / variance, g * c.off / variance)
+                }))
+            };
+            let replicated = agree([half(false), half(true)]);
             let error_m = variance.sqrt();
             let freedom = (n - LAWS).max(1.0);
             laws.push(Law {
@@ -104,6 +124,7 @@ pub fn laws(fields: &[Field], levels: &[f64]) -> Vec<Law> {
                 gain,
                 null,
                 freedom,
+                replicated,
             });
         }
     };
@@ -206,6 +227,7 @@ pub fn findings(laws: &[Law], known: &KnownTerms, level: f64, seed: Seed) -> Vec
         parameters,
         size: Size { mm: 1e3 * best.rms_m, sigma: best.rms_sigma },
         p_adjusted: noise.p(safe(best)),
+        replicated: best.replicated,
         physics: super::naming::physics(
             status,
             Some(best.family),

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain, Null, Rows, gain};
+use super::replication::Halves;
 use super::tiles::SIDE;
 use crate::rng::Seed;
 use crate::terms::{Basis, Coordinate, PixelContext, Term};
@@ -133,6 +134,8 @@ pub struct Outcome {
     pub remaining: Option<Chosen>,
     /// Coefficients as fitted without some views, for these views.
     pub left_out: Vec<(Vec<usize>, Vec<f64>)>,
+    /// All terms as either half of the views has them.
+    pub halves: Option<Halves>,
 }
 
 impl Outcome {
@@ -140,6 +143,13 @@ impl Outcome {
     pub fn span(&self, k: usize) -> std::ops::Range<usize> {
         let first = self.chosen[..k].iter().map(|c| c.candidate.basis.count()).sum();
         first..first + self.chosen[k].candidate.basis.count()
+    }
+
+    /// With the halves' fits, for views in these halves.
+    pub fn halved(mut self, second: &[bool], prior: f64) -> Self {
+        let counts: Vec<usize> = self.chosen.iter().map(|c| c.candidate.basis.count()).collect();
+        self.halves = Halves::of(&self.evidence, second, prior, &counts);
+        self
     }
 
     pub fn coefficients(&self, k: usize) -> Vec<f64> {
@@ -214,7 +224,7 @@ pub fn search_beside(
     let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
     let noise = layer.noise.unwrap_or_default();
     let looks = layer.looks;
-    Outcome { chosen, looks, fit, evidence, noise, remaining, left_out: Vec::new() }
+    Outcome { chosen, looks, fit, evidence, noise, remaining, left_out: Vec::new(), halves: None }
 }
 
 /// Evidence of views on given terms together.

@@ -53,10 +53,21 @@ pub(super) fn is_raw(recording: &Recording) -> bool {
 }
 
 pub(super) fn lattice(fields: &[Field], recording: &Recording) -> Quantisation {
-    let mut words = RawHistogram::none();
-    fields.iter().for_each(|f| words.merge(&f.words));
-    words.lattice(&recording.sensor, fields[0].scale_px_m)
+    lattice_of(fields.iter(), recording)
 }
+
+fn lattice_of<'a>(fields: impl Iterator<Item = &'a Field>, recording: &Recording) -> Quantisation {
+    let mut words = RawHistogram::none();
+    let mut scale_px_m = 0.0;
+    fields.for_each(|f| {
+        words.merge(&f.words);
+        scale_px_m = f.scale_px_m;
+    });
+    words.lattice(&recording.sensor, scale_px_m)
+}
+
+/// Steps of two halves that differ by less, as a share, are one: the scan's own error twice.
+const SAME_STEP: f64 = 0.005;
 
 /// A step is worth telling when the error it makes is this share of the noise.
 const STEP_SHARE: f64 = 0.1;
@@ -67,9 +78,18 @@ pub(super) fn steps(
     fields: &[Field],
     recording: &Recording,
     sigma_mm: f64,
+    second: &[bool],
 ) -> Vec<Finding> {
     let mut found = Vec::new();
-    let mut add = |effect, axis, interval, name: &str, step: f64, error, size: Size| {
+    let halves = [false, true].map(|half| {
+        let mine = fields.iter().zip(second).filter(|(_, s)| **s == half);
+        lattice_of(mine.map(|(f, _)| f), recording)
+    });
+    let alike = |of: fn(&Quantisation) -> Option<f64>| {
+        let [a, b] = halves.map(|h| of(&h));
+        Some(a.zip(b).is_some_and(|(a, b)| (a / b - 1.0).abs() < SAME_STEP))
+    };
+    let mut add = |effect, axis, interval, name: &str, step: f64, error, size: Size, replicated| {
         let mut parameters = Map::new();
         parameters.insert(name.into(), estimate(step, error));
         found.push(Finding {
@@ -78,6 +98,7 @@ pub(super) fn steps(
             parameters,
             size,
             p_adjusted: 1e-6,
+            replicated,
             ..named(effect, 0.98, Statistic::Distribution, axis)
         });
     };
@@ -93,7 +114,16 @@ pub(super) fn steps(
             let raw = matches!(recording.sensor.code, DepthCode::Disparity { .. });
             let error = if raw { 0.0 } else { 0.002 * step };
             let axis = Axis::DisparityPhase;
-            add("disparity-quantisation", axis, [0.0, 1.0], "step_px", step, error, size);
+            add(
+                "disparity-quantisation",
+                axis,
+                [0.0, 1.0],
+                "step_px",
+                step,
+                error,
+                size,
+                alike(|l| l.disparity_step_px),
+            );
         }
     }
     if let Some(step) = lattice.depth_step_m
@@ -102,7 +132,7 @@ pub(super) fn steps(
         let mm = 1e3 * step / 12f64.sqrt();
         let size = Size { mm, sigma: mm / sigma_mm };
         if size.sigma > STEP_SHARE {
-            add("depth-rounding", Axis::Z, z, "step_m", step, 0.0, size);
+            add("depth-rounding", Axis::Z, z, "step_m", step, 0.0, size, alike(|l| l.depth_step_m));
         }
     }
     found

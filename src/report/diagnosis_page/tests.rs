@@ -29,6 +29,7 @@ fn finding(status: Status, effect: Option<&'static str>) -> Finding {
         parameters: Map::new(),
         size: Size { mm: 1.84, sigma: 0.42 },
         p_adjusted: 0.0004,
+        replicated: Some(true),
         physics: String::new(),
         next_view: None,
         shape: None,

@@ -1,0 +1,180 @@
+//! Do two halves of the views, each alone, say the same? The plainest certificate there is.
+//!
+//! The views are split once, alike in distance and tilt. A finding replicates where the shape that
+//! all views gave it has the same sign in both halves, sizes that agree inside their joint 95 %
+//! interval, and is seen by one half alone along the shape that the other half gave it.
+
+use std::ops::Range;
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::evidence::Evidence;
+
+/// Standard errors from which on a half sees something by itself.
+const SEEN: f64 = 2.0;
+/// Two-sided.
+const INTERVAL: f64 = 0.95;
+/// Views that are neighbours in distance; these are dealt out by tilt.
+const NEIGHBOURS: usize = 4;
+
+/// Which half each view belongs to, from its distance and tilt.
+pub fn halves(poses: &[(f64, f64)]) -> Vec<bool> {
+    let mut order: Vec<usize> = (0..poses.len()).collect();
+    order.sort_by(|&a, &b| poses[a].0.total_cmp(&poses[b].0));
+    let mut second = vec![false; poses.len()];
+    for (k, near) in order.chunks_mut(NEIGHBOURS).enumerate() {
+        near.sort_by(|&a, &b| poses[a].1.total_cmp(&poses[b].1));
+        for (place, &view) in near.iter().enumerate() {
+            // The outer two of four, then the inner two: tilts balance within the group.
+            second[view] = matches!(place, 1 | 2) != (k % 2 == 1);
+        }
+    }
+    second
+}
+
+/// A size that so many views gave.
+#[derive(Debug, Clone, Copy)]
+pub struct Measured {
+    pub value: f64,
+    pub std_error: f64,
+    pub views: usize,
+}
+
+impl Measured {
+    /// Of a single column, by each view's information and score; errors from the views' scatter
+    /// where that is the larger.
+    pub fn of_scores(views: impl Iterator<Item = (f64, f64)>) -> Option<Self> {
+        let all: Vec<(f64, f64)> = views.filter(|(a, _)| *a > 0.0).collect();
+        let (a, b) = all.iter().fold((0.0, 0.0), |sum, v| (sum.0 + v.0, sum.1 + v.1));
+        let value = b / a;
+        let left: f64 = all.iter().map(|(own, score)| (score - value * own).powi(2)).sum();
+        let n = all.len() as f64;
+        let variance = (left * n / (n - 1.0) / (a * a)).max(1.0 / a);
+        (all.len() > 1).then_some(Measured { value, std_error: variance.sqrt(), views: all.len() })
+    }
+
+    fn z(&self) -> f64 {
+        self.value / self.std_error
+    }
+}
+
+/// Same sign, and sizes inside their joint interval.
+fn alike(halves: &[Measured; 2]) -> bool {
+    let [a, b] = halves;
+    let freedom = (a.views + b.views).saturating_sub(2).max(1) as f64;
+    let reach = StudentsT::new(0.0, 1.0, freedom)
+        .map_or(f64::INFINITY, |t| t.inverse_cdf(0.5 + 0.5 * INTERVAL));
+    let apart = (a.value - b.value).abs();
+    a.value * b.value > 0.0 && apart <= reach * a.std_error.hypot(b.std_error)
+}
+
+/// Two sizes of one statistic. `None` where a half has too few views for an error.
+pub fn agree(halves: [Option<Measured>; 2]) -> Option<bool> {
+    let [Some(a), Some(b)] = halves else { return None };
+    Some(alike(&[a, b]) && a.z().abs().max(b.z().abs()) > SEEN)
+}
+
+/// All terms of a layer as each half has them, fitted together.
+pub struct Halves {
+    /// Information of all views.
+    metric: DMatrix<f64>,
+    whole: DVector<f64>,
+    halves: [Half; 2],
+    /// Columns of each chosen term.
+    spans: Vec<Range<usize>>,
+}
+
+/// What one half says.
+pub struct Half {
+    pub beta: DVector<f64>,
+    /// Of the information and the priors.
+    pub factor: Cholesky<f64, Dyn>,
+    /// Every view's score beyond that fit.
+    pub beyond: Vec<DVector<f64>>,
+}
+
+impl Half {
+    /// A weighted sum of the coefficients; errors from the views' scatter where that is the larger.
+    fn measured(&self, weights: &DVector<f64>) -> Option<Measured> {
+        let views = self.beyond.len();
+        let n = views as f64;
+        let reach = self.factor.solve(weights);
+        let scatter: f64 = self.beyond.iter().map(|s| reach.dot(s).powi(2)).sum();
+        let variance = (scatter * n / (n - 1.0)).max(reach.dot(weights));
+        let value = weights.dot(&self.beta);
+        (views > 1).then_some(Measured { value, std_error: variance.sqrt(), views })
+    }
+}
+
+impl Halves {
+    pub fn new(
+        metric: DMatrix<f64>,
+        whole: DVector<f64>,
+        halves: [Half; 2],
+        spans: Vec<Range<usize>>,
+    ) -> Self {
+        Halves { metric, whole, halves, spans }
+    }
+
+    /// From the views' evidence on all terms together; `counts` are the terms' columns.
+    pub fn of(views: &[Evidence], second: &[bool], prior: f64, counts: &[usize]) -> Option<Self> {
+        let n = views.first()?.b.len();
+        if views.len() != second.len() {
+            return None;
+        }
+        let held = DMatrix::identity(n, n) * prior;
+        let sum = |which: Option<bool>| {
+            let mine = views.iter().zip(second).filter(|(_, s)| which.is_none_or(|w| w == **s));
+            let none = (DMatrix::zeros(n, n), DVector::zeros(n));
+            mine.fold(none, |(a, b), (view, _)| (a + &view.a, b + &view.b))
+        };
+        let fit = |which| {
+            let (a, b) = sum(Some(which));
+            let factor = (a + &held).cholesky()?;
+            let beta = factor.solve(&b);
+            let mine = views.iter().zip(second).filter(|(_, s)| **s == which);
+            let beyond = mine.map(|(view, _)| &view.b - &view.a * &beta).collect();
+            Some(Half { beta, factor, beyond })
+        };
+        let (metric, b) = sum(None);
+        let whole = (&metric + &held).cholesky()?.solve(&b);
+        let mut first = 0;
+        let span = |&count: &usize| {
+            first += count;
+            first - count..first
+        };
+        let spans = counts.iter().map(span).collect();
+        Some(Halves { metric, whole, halves: [fit(false)?, fit(true)?], spans })
+    }
+
+    /// Do both halves have these terms, taken as one shape? `None` where the terms have no columns
+    /// of their own, or a half has too few views.
+    pub fn replicate(&self, terms: &[usize]) -> Option<bool> {
+        let columns: Vec<usize> =
+            terms.iter().filter_map(|&t| self.spans.get(t).cloned()).flatten().collect();
+        if columns.is_empty() {
+            return None;
+        }
+        // How far a fit reaches along a shape, the shape itself being one.
+        let along = |shape: &DVector<f64>| {
+            let mut own = DVector::zeros(shape.len());
+            columns.iter().for_each(|&c| own[c] = shape[c]);
+            let weights = &self.metric * &own;
+            let mut mine = DVector::zeros(shape.len());
+            columns.iter().for_each(|&c| mine[c] = weights[c]);
+            let square = mine.dot(&own);
+            mine / square
+        };
+        let [first, second] = &self.halves;
+        let common = along(&self.whole);
+        let sizes = [first.measured(&common)?, second.measured(&common)?];
+        let seen =
+            [first.measured(&along(&second.beta))?.z(), second.measured(&along(&first.beta))?.z()];
+        Some(alike(&sizes) && seen[0].max(seen[1]) > SEEN)
+    }
+}
+
+#[cfg(test)]
+#[path = "replication_tests.rs"]
+mod tests;

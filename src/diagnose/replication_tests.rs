@@ -1,0 +1,79 @@
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+use crate::rng::Seed;
+
+#[test]
+fn halves_are_alike_in_distance_and_tilt() {
+    let poses: Vec<(f64, f64)> =
+        (0..24).map(|i| (1.0 + 0.5 * f64::from(i / 4), 0.3 * f64::from(i % 4))).collect();
+    let second = halves(&poses);
+    for which in [false, true] {
+        let mine: Vec<&(f64, f64)> =
+            poses.iter().zip(&second).filter(|(_, s)| **s == which).map(|(p, _)| p).collect();
+        let mean = |of: fn(&(f64, f64)) -> f64| mine.iter().map(|p| of(p)).sum::<f64>() / 12.0;
+        assert_eq!(mine.len(), 12);
+        approx::assert_abs_diff_eq!(mean(|p| p.0), 2.25, epsilon = 1e-12);
+        approx::assert_abs_diff_eq!(mean(|p| p.1), 0.45, epsilon = 1e-12);
+    }
+    // The order in which views come changes nothing.
+    let turned: Vec<(f64, f64)> = poses.iter().rev().copied().collect();
+    assert!(halves(&turned).iter().rev().eq(&second));
+}
+
+/// Views that each tell `k` coefficients to a standard error of one: `truth` gives a view's own.
+fn views(
+    k: usize,
+    truth: impl Fn(usize) -> f64,
+    rng: &mut crate::rng::Stream,
+) -> (Vec<Evidence>, Vec<bool>) {
+    let all = (0..20).map(|v| {
+        let b = DVector::from_fn(k, |_, _| {
+            let noise: f64 = StandardNormal.sample(rng);
+            truth(v) + noise
+        });
+        Evidence { a: DMatrix::identity(k, k), b }
+    });
+    (all.collect(), (0..20).map(|v| v % 2 == 1).collect())
+}
+
+fn share(k: usize, truth: impl Fn(usize) -> f64) -> f64 {
+    let mut rng = Seed(7).stream("replication");
+    let replicates = || {
+        let (views, second) = views(k, &truth, &mut rng);
+        Halves::of(&views, &second, 1e-6, &[k]).unwrap().replicate(&[0]).unwrap()
+    };
+    std::iter::repeat_with(replicates).take(400).filter(|r| *r).count() as f64 / 400.0
+}
+
+/// One coefficient, and as many as a map has; noise passes one time in ten at most, what all views
+/// have always but for the interval's twentieth, what only one half has never.
+#[test]
+fn noise_does_not_replicate_and_a_common_cause_does() {
+    for k in [1, 40] {
+        let (noise, cause) = (share(k, |_| 0.0), share(k, |_| 1.5));
+        let half = share(k, |v| if v % 2 == 0 { 3.0 } else { 0.0 });
+        assert!(noise < 0.1, "{k} columns: {noise} of noise");
+        assert!(cause > 0.9, "{k} columns: {cause} of a cause");
+        assert!(half < 0.05, "{k} columns: {half} of what one half has");
+    }
+}
+
+#[test]
+fn sizes_that_differ_do_not_agree() {
+    let size = |value, std_error| Some(Measured { value, std_error, views: 8 });
+    assert_eq!(agree([size(1.0, 0.1), size(1.2, 0.1)]), Some(true));
+    assert_eq!(agree([size(1.0, 0.1), size(1.6, 0.1)]), Some(false));
+    assert_eq!(agree([size(0.1, 0.1), size(0.1, 0.1)]), Some(false), "no half sees it");
+    assert_eq!(agree([size(1.0, 0.1), size(-1.0, 0.9)]), Some(false), "other sign");
+    assert_eq!(agree([size(1.0, 0.1), None]), None);
+}
+
+/// By hand: three views of information one that say 1, 2 and 3 have a mean of 2 and a clustered
+/// variance of 2 / 3 * 3 / 2 / 3.
+#[test]
+fn a_size_has_the_scatter_of_its_views() {
+    let m = Measured::of_scores([(1.0, 1.0), (1.0, 2.0), (1.0, 3.0)].into_iter()).unwrap();
+    approx::assert_relative_eq!(m.value, 2.0);
+    approx::assert_relative_eq!(m.std_error, (1f64 / 3.0).sqrt(), max_relative = 1e-12);
+}

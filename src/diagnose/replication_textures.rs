@@ -1,0 +1,90 @@
+//! Does either half of the views show the same texture? Each view is one sample of the statistic
+//! that a finding rests on.
+
+use super::field::Field;
+use super::known::KnownTerms;
+use super::noise::{Hanging, Mean};
+use super::replication::{Measured, agree};
+use super::structure::{GAUSSIAN_TAIL, Structure};
+use crate::terms::{Axis, Statistic};
+
+/// A view's value beyond what the model has, in the statistic's own unit.
+type OfView<'a> = Box<dyn Fn(&Structure) -> Option<f64> + 'a>;
+
+/// `None` where the finding is no mean of the views, or a half has too few of them.
+pub fn replicated(
+    found: &Hanging,
+    structure: &[Structure],
+    fields: &[Field],
+    second: &[bool],
+    known: &KnownTerms,
+) -> Option<bool> {
+    let beyond = statistic(found, known);
+    let half = |which: bool| {
+        let mine = second.iter().enumerate().filter(|(_, s)| **s == which).map(|(v, _)| v);
+        match &beyond {
+            Some(of) => {
+                let views: Vec<Structure> = mine.map(|v| structure[v].clone()).collect();
+                Mean::of(&views, of).map(|m| measured(&m))
+            }
+            None if found.axis == Axis::EdgeDistance => {
+                let rims = mine.filter_map(|v| fields[v].rim);
+                mean(&rims.map(|r| r.mixed_px).collect::<Vec<f64>>())
+            }
+            None => None,
+        }
+    };
+    agree([half(false), half(true)])
+}
+
+/// What a finding is told by, view by view.
+fn statistic<'a>(found: &Hanging, known: &'a KnownTerms) -> Option<OfView<'a>> {
+    let parameter = |id: &str, name: &str| known.parameter(id, name).unwrap_or(0.0);
+    let px2 = |id: &str| parameter(id, "sigma_px").powi(2);
+    let (fixed, rows) = (px2("fixed-pattern-noise"), px2("row-noise"));
+    let frozen = parameter("frozen-noise", "fraction");
+    let share =
+        move |s: &Structure| s.fixed_px2.unwrap_or(0.0).max(0.0) / s.variance_px2.max(1e-12);
+    let last = |s: &Structure| s.lagged[2].or(s.lagged[1]).or(s.lagged[0]);
+    Some(match (found.families.first().copied(), found.axis, found.statistic) {
+        // A part of the noise alone is seen in near pixels, all of it in the window's side.
+        (Some("spatial-correlation"), ..) if found.size_sigma < 1.0 => Box::new(|s| s.near),
+        (Some("spatial-correlation"), ..) => {
+            let side = parameter("spatial-correlation", "length_px").max(1.0);
+            Box::new(move |s| Some(s.window_px?.ln() - side.ln()))
+        }
+        (Some("fixed-pattern-noise"), ..) => Box::new(move |s| Some(s.fixed_px2? - fixed)),
+        (Some("temporal-correlation"), ..) => Box::new(move |s| Some(s.lagged[0]? - last(s)?)),
+        (Some("frozen-noise"), ..) => Box::new(move |s| Some(last(s)? - share(s) - frozen)),
+        (Some("row-noise"), ..) => Box::new(move |s| Some(s.row_px2? - rows)),
+        (Some("heavy-tails"), ..) => {
+            Box::new(|s| (s.tail_pixels > 0.0).then_some(s.tail - GAUSSIAN_TAIL))
+        }
+        (Some("target-motion"), ..) => Box::new(|s| Some(s.jitter?.velocity_mps)),
+        (Some("frame-jitter"), ..) => {
+            let jitter = px2("frame-jitter");
+            Box::new(move |s| {
+                let j = s.jitter?;
+                Some(j.scatter_px2 / j.freedom - j.expected_px2 - jitter)
+            })
+        }
+        (None, Axis::Column, Statistic::Bias) => Box::new(|s| s.lines_px2),
+        (None, Axis::Column, _) => Box::new(|s| s.column_px2),
+        _ => return None,
+    })
+}
+
+fn measured(m: &Mean) -> Measured {
+    Measured { value: m.value, std_error: m.std_error, views: m.views.round() as usize }
+}
+
+fn mean(values: &[f64]) -> Option<Measured> {
+    let n = values.len() as f64;
+    let value = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|v| (v - value).powi(2)).sum::<f64>() / (n - 1.0);
+    (values.len() > 1).then(|| Measured {
+        value,
+        std_error: (variance / n).sqrt(),
+        views: values.len(),
+    })
+}
