@@ -18,12 +18,35 @@ use super::replication_textures;
 use super::rim;
 use super::scene::Scene;
 use super::search::Outcome;
-use super::steps::is_raw;
-use super::verdict::LEAST_SIZE;
+use super::steps::{is_raw, steps};
+use super::verdict::{LEAST_SIZE, echoes, fold_into_sigma, merge, symptoms};
 use crate::terms::{Axis, Basis, Statistic, Term, corner_radius};
 
 /// How noise hangs together changes what a few frames show of its size by so much.
 const LEVEL_BESIDE_TEXTURE: f64 = 0.05;
+
+/// What one run of all layers shows.
+pub struct Battery {
+    pub mean: Mean,
+    pub scatter: Scatter,
+    /// Largest first; their shares are nats.
+    pub found: Vec<Finding>,
+    /// The refit of a sigma that was calibrated on these very views.
+    pub refitted: Option<Finding>,
+    /// The form that sigma would follow better, in words.
+    pub better_form: Option<String>,
+    /// How small a loss would have been seen.
+    pub detectable: Vec<Detectable>,
+}
+
+/// Lines that were learnt are told by their profile alone.
+fn tell_lines_once(found: &mut Vec<Finding>) {
+    let of_columns = |f: &Finding| f.axis == Axis::Column;
+    if found.iter().any(|f| of_columns(f) && !f.terms.is_empty()) {
+        let bare = |f: &Finding| f.statistic == Statistic::Bias && f.terms.is_empty();
+        found.retain(|f| !(of_columns(f) && bare(f)));
+    }
+}
 
 impl Case<'_> {
     pub fn scenes(&self) -> [Scene<'_>; 2] {
@@ -35,15 +58,45 @@ impl Case<'_> {
         ]
     }
 
+    /// All layers, one after the other; `advise` also looks for the views that would settle a name.
+    pub fn battery(&mut self, advise: bool) -> Battery {
+        let mean = self.mean();
+        let scatter = self.scatter(&mean);
+        let sigma_mm = typical_sigma_mm(&self.fields);
+        let second = self.survey.second();
+        let lattice = &scatter.lattice;
+        let steps = steps(lattice, &self.known, &self.fields, self.recording, sigma_mm, &second);
+        let mut curves = self.curves([&mean.outcome, &scatter.outcome], advise);
+        let refitted = self.take_refit(&mut curves, &scatter.outcome);
+        curves.retain(|f| self.is_news(f, &steps, &scatter));
+        if self.baseline.is_none() {
+            fold_into_sigma(&mut curves);
+        }
+        let better_form = self.tell_form(&mut curves, refitted.is_some());
+        let mut found: Vec<Finding> = self.ranges.clone().into_iter().chain(curves).collect();
+        found.extend(self.texture(&mean, &scatter, steps));
+        let (lost, detectable) = self.lost();
+        found.extend(lost);
+        found.extend(self.laws(&mean.terms));
+        tell_lines_once(&mut found);
+        if self.baseline.is_some() {
+            symptoms(&mut found);
+        }
+        echoes(&mut found);
+        merge(&mut found);
+        Battery { mean, scatter, found, refitted, better_form, detectable }
+    }
+
     /// Curves of the mean and of the variance, named or not, with the advised view.
-    pub fn curves(&self, scenes: &[Scene<'_>; 2], outcomes: [&Outcome; 2]) -> Vec<Finding> {
+    fn curves(&self, outcomes: [&Outcome; 2], advise: bool) -> Vec<Finding> {
+        let scenes = self.scenes();
         let mut found: Vec<Finding> = scenes
             .iter()
             .zip(outcomes)
             .flat_map(|(scene, outcome)| findings::findings(scene, outcome))
             .collect();
         let camera = &self.sensor().camera;
-        for (scene, outcome) in scenes.iter().zip(outcomes) {
+        for (scene, outcome) in scenes.iter().zip(outcomes).filter(|_| advise) {
             let sigma = &self.model.sigma;
             if let Some(outlook) = next_view::outlook(scene, sigma, camera, &self.bench.rays) {
                 next_view::advise(&mut found, scene, outcome, &outlook);
@@ -53,7 +106,7 @@ impl Case<'_> {
     }
 
     /// Steps shift the mean within a step, and gross errors add to the variance: neither is news.
-    pub fn is_news(&self, f: &Finding, steps: &[Finding], scatter: &Scatter) -> bool {
+    fn is_news(&self, f: &Finding, steps: &[Finding], scatter: &Scatter) -> bool {
         let scale_px_m = self.fields[0].scale_px_m;
         let depth_px = |step: f64| step * scale_px_m / self.survey.reach.z[0].powi(2);
         let coarsest = scatter
@@ -74,7 +127,7 @@ impl Case<'_> {
     }
 
     /// What neither a mean nor a variance shows: how the noise hangs together, tails, steps.
-    pub fn texture(&self, mean: &Mean, scatter: &Scatter, steps: Vec<Finding>) -> Vec<Finding> {
+    fn texture(&self, mean: &Mean, scatter: &Scatter, steps: Vec<Finding>) -> Vec<Finding> {
         let sigma_mm = typical_sigma_mm(&self.fields);
         let mixing = rim::mixing(&self.fields, self.level(Self::EACH_LEVEL))
             .filter(|_| !self.known.has("edge-mixing"));
@@ -102,7 +155,7 @@ impl Case<'_> {
 
     /// The refit of a sigma that was calibrated here is no finding; where it changes more than noise
     /// can, the extended model has it.
-    pub fn take_refit(&self, curves: &mut Vec<Finding>, variance: &Outcome) -> Option<Finding> {
+    fn take_refit(&self, curves: &mut Vec<Finding>, variance: &Outcome) -> Option<Finding> {
         if !self.survey.refits_sigma {
             return None;
         }
@@ -114,7 +167,7 @@ impl Case<'_> {
 
     /// Where sigma's own form is off, the form that would do better: beside the finding, and as a
     /// remark.
-    pub fn tell_form(&self, curves: &mut [Finding], refitted: bool) -> Option<String> {
+    fn tell_form(&self, curves: &mut [Finding], refitted: bool) -> Option<String> {
         let told = curves.iter_mut().find(|f| f.status == Status::Recalibrate);
         if self.baseline.is_some() || told.is_none() && !refitted {
             return None;
@@ -126,7 +179,7 @@ impl Case<'_> {
         Some(format!("sigma over depth and tilt follows better: {better}"))
     }
 
-    pub fn lost(&mut self) -> (Vec<Finding>, Vec<Detectable>) {
+    fn lost(&mut self) -> (Vec<Finding>, Vec<Detectable>) {
         let camera = &self.sensor().camera;
         let lost = missing(&self.fields, &self.survey, camera, &self.bench.rays, self.options.seed);
         self.copies.extend(lost.notes);
@@ -148,7 +201,7 @@ impl Case<'_> {
     }
 
     /// Laws of the distance, by reference distances.
-    pub fn laws(&self, bias: &[Term]) -> Vec<Finding> {
+    fn laws(&self, bias: &[Term]) -> Vec<Finding> {
         // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
         let anchored: Vec<Term> = bias
             .iter()

@@ -76,14 +76,10 @@ impl<'a> Case<'a> {
         let baseline = simulated
             .map(|s| Baseline::of(s, sensor, &mut fields, model, options, progress))
             .transpose()?;
-        let mut survey = Survey::of(&fields, &sensor.camera, &bench.rays);
-        survey.ablate(options.ablation, &fields);
-        survey.refits_sigma = options.calibrated_here && simulated.is_none();
-        survey.fixed_px2 = fixed_px2(&structures(&fields, &sensor.camera, &[]));
         if let Some(baseline) = &baseline {
             baseline.references(&mut fields);
-            baseline.means(&mut survey);
         }
+        let survey = survey(&fields, &bench, baseline.as_ref(), options);
         Ok(Case {
             recording,
             model,
@@ -97,6 +93,15 @@ impl<'a> Case<'a> {
             copies,
             ranges,
         })
+    }
+
+    /// The same views once more, with other residuals and against another model.
+    pub fn again<'b>(self, fields: Vec<Field>, known: KnownTerms, model: &'b NoiseModel) -> Case<'b>
+    where
+        'a: 'b,
+    {
+        let survey = survey(&fields, &self.bench, self.baseline.as_ref(), self.options);
+        Case { model, known, fields, survey, copies: Vec::new(), ranges: None, ..self }
     }
 
     pub fn sensor(&self) -> &'a Sensor {
@@ -192,4 +197,21 @@ impl<'a> Case<'a> {
             .map(|t| t.coefficients[0])
             .sum()
     }
+}
+
+fn survey(
+    fields: &[Field],
+    bench: &Workbench<'_>,
+    baseline: Option<&Baseline>,
+    options: &DiagnoseOptions,
+) -> Survey {
+    let camera = &bench.sensor.camera;
+    let mut survey = Survey::of(fields, camera, &bench.rays);
+    survey.ablate(options.ablation, fields);
+    survey.refits_sigma = options.calibrated_here && baseline.is_none();
+    survey.fixed_px2 = fixed_px2(&structures(fields, camera, &[]));
+    if let Some(baseline) = baseline {
+        baseline.means(&mut survey);
+    }
+    survey
 }

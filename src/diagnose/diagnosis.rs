@@ -169,6 +169,7 @@ pub struct LeftOut {
     pub mean_of_views_px_after: f64,
 }
 
+/// The battery once more, against the extended model.
 #[derive(Debug, Clone, Serialize)]
 pub struct After {
     pub verdict: Verdict,
@@ -179,6 +180,8 @@ pub struct After {
 pub struct Remaining {
     pub statistic: Statistic,
     pub axis: Axis,
+    /// Of all that either run explains, 0 to 1.
+    pub share: f64,
     pub p_adjusted: f64,
     pub words: String,
 }

@@ -41,6 +41,7 @@ pub struct Diagnosed {
     pub diagnosis: Diagnosis,
     /// The model with what was found.
     pub model: NoiseModel,
+    /// The views, but for their single frames.
     pub fields: Vec<Field>,
     /// Terms of the bias that were found, for pictures.
     pub bias: Vec<Term>,
@@ -105,7 +106,6 @@ fn run(
     progress: Progress<'_>,
 ) -> Result<Diagnosed> {
     let mut case = Case::open(recording, simulated, model, options, progress)?;
-    let mean = case.mean();
-    let scatter = case.scatter(&mean);
-    Ok(case.conclude(mean, &scatter))
+    let battery = case.battery(true);
+    Ok(case.conclude(battery))
 }

@@ -1,6 +1,7 @@
 //! When simulation and recording differ: where, why, and what is gained by knowing.
 
 mod ablation;
+mod again;
 mod against;
 mod against_layers;
 mod against_textures;

@@ -1,12 +1,11 @@
 //! What is said in the end: findings in order, the extended model, the views. Whether it is a match
-//! is decided in `engine`.
+//! is decided in `conclude`.
 
-use super::diagnosis::{After, CannotTell, Finding, HeldOut, Remaining, Status, Verdict, ViewLine};
+use super::diagnosis::{CannotTell, Finding, HeldOut, Status, ViewLine};
 use super::field::Field;
 use super::heldout;
 use super::layers::Survey;
 use super::other_findings::named;
-use super::search::Outcome;
 use crate::effects;
 use crate::model::{Effect, NoiseModel, UNEXPLAINED};
 use crate::terms::{Axis, Statistic, Term};
@@ -156,25 +155,6 @@ pub(super) fn shares(found: &mut [Finding]) {
         let told = |f: &Finding| f.status == Status::NotIdentifiable;
         told(a).cmp(&told(b)).then(b.share.total_cmp(&a.share))
     });
-}
-
-/// Does anything stand out once all terms are in? The search's own word, not the diagnosis's.
-pub(super) fn after(bias: &Outcome, variance: &Outcome) -> After {
-    let mut remaining = Vec::new();
-    for (statistic, outcome) in [(Statistic::Bias, bias), (Statistic::Variance, variance)] {
-        if let Some(left) = &outcome.remaining {
-            let axis = left.candidate.basis.axis();
-            let name = left.candidate.family.unwrap_or("a curve without a name");
-            remaining.push(Remaining {
-                statistic,
-                axis,
-                p_adjusted: left.p,
-                words: format!("{name} would still bring {:.0} nats", left.gain),
-            });
-        }
-    }
-    let verdict = if remaining.is_empty() { Verdict::Match } else { Verdict::Mismatch };
-    After { verdict, remaining }
 }
 
 /// The model with what was found.

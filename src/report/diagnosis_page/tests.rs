@@ -131,6 +131,7 @@ fn cases() -> [(Diagnosis, &'static [&'static str]); 8] {
     several.after.remaining = vec![Remaining {
         statistic: Statistic::Distribution,
         axis: Axis::Residual,
+        share: 0.004,
         p_adjusted: 0.012,
         words: "a few more large errors than simulated".into(),
     }];
