@@ -3,17 +3,15 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use kinoise::calibrate::paper_model;
 use kinoise::diagnose::{
-    DiagnoseOptions, Diagnosed, Diagnosis, Field, Finding, Reference, Status, Verdict,
-    ViewPictures, diagnose, diagnose_against, pictures,
+    DiagnoseOptions, Diagnosed, Diagnosis, Field, Reference, Verdict, ViewPictures, diagnose,
+    diagnose_against, pictures,
 };
 use kinoise::effects::{Active, Instant};
 use kinoise::io::{OutputDir, open};
-use kinoise::report::{DiagnosisPage, diagnosis_page};
+use kinoise::report::{DiagnosisPage, diagnosis_page, story};
 use kinoise::simulate::{FormulaSensor, plan_on};
-use kinoise::terms::Statistic;
 use kinoise::view::ViewNotes;
 use kinoise::{Form, NoiseModel, Recording, Seed, Sensor};
-use serde_json::Value;
 
 use super::common::{Global, Input, say, source_date, with_bar};
 
@@ -122,65 +120,15 @@ fn summary(diagnosis: &Diagnosis) -> String {
     };
     let mut text = match diagnosis.verdict {
         Verdict::Match => format!("match: nothing was found that {held_against} leaves out\n"),
-        Verdict::Inconclusive => "inconclusive: these views could not have shown it\n".to_string(),
+        Verdict::Inconclusive => {
+            "inconclusive: nothing was found, and not everything could be tested\n".to_string()
+        }
         Verdict::Mismatch => format!("mismatch: {held_against} leaves out\n"),
     };
-    let told: Vec<&Finding> =
-        diagnosis.findings.iter().filter(|f| f.status != Status::NotIdentifiable).collect();
-    let (main, rest) = told.split_at(main_findings(&told));
-    text.extend(main.iter().map(|f| line(f)));
-    if !rest.is_empty() {
-        let share: f64 = rest.iter().map(|f| f.share).sum();
-        let named = rest.iter().filter(|f| has_name(f));
-        let mut names: Vec<String> = named.map(|f| name(f)).collect();
-        match rest.len() - names.len() {
-            0 => {}
-            nameless => names.push(format!("{nameless} without a name")),
-        }
-        text += &format!("  and, {:.0} % of it together: {}\n", 100.0 * share, names.join(", "));
-    }
-    // Of a match there is nothing to be worth anything.
-    if let Some(h) = diagnosis.heldout.as_ref().filter(|_| diagnosis.verdict == Verdict::Mismatch) {
-        let (views, gain, [low, high]) = (h.views.len(), h.gain, h.gain_interval);
-        let (before, after) = (h.rms_mm_before, h.rms_mm_after);
-        text += &format!(
-            "on {views} views kept aside: {gain:.1} nats a view gained [{low:.1}, {high:.1}], rms {before:.3} -> {after:.3} mm; `kinoise correct` alone: every pixel {:.3} -> {:.3} px\n",
-            h.correction_rms_before_px, h.correction_rms_after_px
-        );
+    for sentence in story(diagnosis) {
+        text += &format!("  {sentence}\n");
     }
     text
-}
-
-/// This share of the mismatch is told cause by cause, the rest in one line.
-const MAIN_SHARE: f64 = 0.97;
-
-/// How many of the findings, largest first, make up most of the mismatch; all but one are all.
-fn main_findings(findings: &[&Finding]) -> usize {
-    let mut sum = 0.0;
-    let before = |f: &&&Finding| {
-        sum += f.share;
-        sum - f.share < MAIN_SHARE
-    };
-    let main = findings.iter().take_while(before).count();
-    if main + 1 >= findings.len() { findings.len() } else { main }
-}
-
-/// A finding: what, how large, how much of all, along what, with which parameters.
-fn line(f: &Finding) -> String {
-    let name = name(f);
-    let size = if f.statistic == Statistic::Dropout {
-        format!("{:.1} % of the pixels lost", 100.0 * f.size.sigma)
-    } else {
-        format!("{:.2} mm, {:.2} sigma", f.size.mm, f.size.sigma)
-    };
-    let parameter =
-        |(k, v): (&String, &Value)| Some(format!("{k} {:.4}", v.get("value")?.as_f64()?));
-    let parameters: Vec<String> = f.parameters.iter().filter_map(parameter).collect();
-    let parameters = match parameters[..] {
-        [] => String::new(),
-        _ => format!("; {}", parameters.join(", ")),
-    };
-    format!("  {name}: {size}, {:.0} % of it; along {}{parameters}\n", 100.0 * f.share, f.axis)
 }
 
 /// Effects that move the plane as a whole: a picture about the plane does not show them.
@@ -226,20 +174,4 @@ fn with_twins(
         Some(plan.instants(index, session_s).map(shot).collect())
     };
     pictures(done, sensor, given, &retake)
-}
-
-fn has_name(f: &Finding) -> bool {
-    f.effect.is_some() || matches!(f.status, Status::Recalibrate | Status::OneOf)
-}
-
-fn name(f: &Finding) -> String {
-    match (f.status, f.effect) {
-        (Status::Recalibrate, _) => "sigma itself is off: calibrate again".into(),
-        (Status::OneOf, _) => {
-            let names: Vec<&str> = f.alternatives.iter().take(3).map(|a| a.effect).collect();
-            names.join(" or ")
-        }
-        (_, Some(effect)) => effect.into(),
-        (_, None) => format!("something without a name ({})", f.shape.as_deref().unwrap_or("")),
-    }
 }

@@ -1,11 +1,13 @@
 //! The battery once more, against the extended model: the same layers and thresholds on the same
 //! views, with everything that was found taken out of the residuals in memory.
 
+use super::battery::Battery;
 use super::case::{Case, Mean};
-use super::diagnosis::{After, Finding, Remaining, Verdict};
+use super::diagnosis::{After, Finding, Remaining};
 use super::field::Field;
 use super::known::KnownTerms;
 use super::pixels::pixel_terms;
+use super::verdict::verdict;
 use crate::model::{Effect, NoiseModel};
 use crate::terms::Term;
 
@@ -34,13 +36,13 @@ impl Case<'_> {
             }
         }
         let mut case = self.again(fields, known, extended);
-        let left = case.battery(false).found;
+        let battery = case.battery(false);
         for (field, mean) in case.fields.iter_mut().zip(means) {
             field.mean = mean;
             field.first.clear();
         }
         let against = case.baseline.map_or_else(Vec::new, |b| b.fields);
-        Again { after: after(&left, explained), fields: case.fields, against }
+        Again { after: after(&battery, explained), fields: case.fields, against }
     }
 
     /// What the extended model has beyond the one that was given, as terms.
@@ -91,7 +93,7 @@ fn take_out(field: &mut Field, bias: &[f32]) {
     }
 }
 
-fn after(left: &[Finding], explained: f64) -> After {
+fn after(battery: &Battery, explained: f64) -> After {
     let remaining = |f: &Finding| {
         let name = f.effect.unwrap_or("a curve without a name");
         Remaining {
@@ -102,6 +104,7 @@ fn after(left: &[Finding], explained: f64) -> After {
             words: format!("{name} would still bring {:.0} nats", f.share),
         }
     };
-    let verdict = if left.is_empty() { Verdict::Match } else { Verdict::Mismatch };
-    After { verdict, remaining: left.iter().map(remaining).collect() }
+    let Battery { mean, scatter, found, .. } = battery;
+    let verdict = verdict(found, [&mean.outcome, &scatter.outcome]);
+    After { verdict, remaining: found.iter().map(remaining).collect() }
 }

@@ -3,12 +3,12 @@
 use super::battery::Battery;
 use super::case::Case;
 use super::detectable::detectable;
-use super::diagnosis::{DIAGNOSIS_FORMAT, Diagnosis, Reference, Verdict};
+use super::diagnosis::{DIAGNOSIS_FORMAT, Diagnosis, Reference};
 use super::engine::Diagnosed;
 use super::findings;
 use super::heldout;
 use super::reference;
-use super::verdict::{extend, not_identifiable, shares, view_lines};
+use super::verdict::{extend, not_identifiable, shares, untested, verdict, view_lines};
 use crate::effects::KINECT_BASELINE_M;
 use crate::model::Form;
 
@@ -34,7 +34,8 @@ impl Case<'_> {
         let Battery { mean, scatter, mut found, refitted, better_form, detectable: losses } =
             battery;
         let explained: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
-        let verdict = if found.is_empty() { Verdict::Match } else { Verdict::Mismatch };
+        let outcomes = [&mean.outcome, &scatter.outcome];
+        let verdict = verdict(&found, outcomes);
         let cannot_tell = reference::cannot_tell(&self.fields);
         found.extend(cannot_tell.iter().map(not_identifiable));
         shares(&mut found);
@@ -45,7 +46,7 @@ impl Case<'_> {
             self.fields[0].scale_px_m,
             self.options,
         );
-        let (outcomes, level) = ([&mean.outcome, &scatter.outcome], self.options.level);
+        let level = self.options.level;
         let scenes = self.scenes();
         let map =
             scenes.iter().zip(outcomes).flat_map(|(s, o)| findings::map(s, o, level)).collect();
@@ -53,6 +54,7 @@ impl Case<'_> {
         let mut detectable = detectable(&self.survey, &mean.outcome, &scatter.outcome, camera);
         detectable.extend(losses);
         let mut remarks = self.remarks();
+        remarks.extend(untested(outcomes));
         remarks.extend(better_form);
         let known = found.iter().chain(&refitted);
         let extended = extend(self.model, known, self.sensor(), self.survey.reach.disparity);

@@ -43,6 +43,7 @@ pub enum Reference {
 pub enum Verdict {
     Match,
     Mismatch,
+    /// Nothing was found, and the mean or the size of the noise could not be tested.
     Inconclusive,
 }
 
@@ -70,9 +71,12 @@ pub struct Finding {
     pub unit: &'static str,
     /// Of all that was explained, 0 to 1.
     pub share: f64,
+    /// Less than a hundredth of it.
+    pub minor: bool,
     pub parameters: Map<String, Value>,
     pub size: Size,
-    pub p_adjusted: f64,
+    /// `None` where no test gave one.
+    pub p_adjusted: Option<f64>,
     /// Each half of the views alone supports it: sign, and size within the joint interval; `None`
     /// where that was not tested.
     pub replicated: Option<bool>,
@@ -92,7 +96,8 @@ pub struct Finding {
 #[derive(Debug, Clone, Serialize)]
 pub struct Alternative {
     pub effect: &'static str,
-    pub probability: f64,
+    /// `None` where no test weighed the names against one another.
+    pub probability: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, Default, Serialize)]
@@ -182,7 +187,7 @@ pub struct Remaining {
     pub axis: Axis,
     /// Of all that either run explains, 0 to 1.
     pub share: f64,
-    pub p_adjusted: f64,
+    pub p_adjusted: Option<f64>,
     pub words: String,
 }
 

@@ -18,6 +18,9 @@ pub struct Quantisation {
     pub disparity_step_px: Option<f64>,
     /// Length of the mean phase on that lattice, 0 to 1.
     pub resultant: f64,
+    /// Chance of such steps were all words as likely to occur; `None` where the format has the steps.
+    pub depth_p: Option<f64>,
+    pub disparity_p: Option<f64>,
 }
 
 /// Fewer distinct words than this make no lattice.
@@ -57,11 +60,13 @@ impl RawHistogram {
         let stride = words.iter().fold(0, |g, (w, _)| gcd(g, *w));
         match sensor.code {
             DepthCode::Metric { units_per_metre, .. } => {
-                let (step, resultant) = self.scan(&words, scale_px_m * units_per_metre);
+                let (step, resultant, p) = self.scan(&words, scale_px_m * units_per_metre);
                 Quantisation {
                     depth_step_m: (stride > 1).then(|| stride as f64 / units_per_metre),
                     disparity_step_px: step.filter(|_| stride == 1),
                     resultant,
+                    depth_p: (stride > 1).then(|| all_multiples(stride, words.len())),
+                    disparity_p: step.filter(|_| stride == 1).and(Some(p)),
                 }
             }
             DepthCode::Disparity { slope, .. } => {
@@ -71,15 +76,17 @@ impl RawHistogram {
                     depth_step_m: None,
                     disparity_step_px: Some(offsets.max(1) as f64 * slope.abs() * scale_px_m),
                     resultant: 1.0,
+                    depth_p: None,
+                    disparity_p: (offsets > 1).then(|| all_multiples(offsets, words.len() - 1)),
                 }
             }
         }
     }
 
     /// The frequency at which the disparities' phases gather most.
-    fn scan(&self, words: &[(usize, f64)], px_words: f64) -> (Option<f64>, f64) {
+    fn scan(&self, words: &[(usize, f64)], px_words: f64) -> (Option<f64>, f64, f64) {
         if self.contrast(words) < CONTRAST {
-            return (None, 0.0);
+            return (None, 0.0, 1.0);
         }
         let disparities: Vec<(f64, f64, f64)> = words
             .iter()
@@ -87,10 +94,11 @@ impl RawHistogram {
             .map(|&(w, n)| (px_words / w as f64, n.sqrt(), px_words / (w * w) as f64))
             .collect();
         let range = disparities[0].0 - disparities[disparities.len() - 1].0;
-        let mut best = (0.0, 0.0);
+        let mut best = (0.0, 0.0, 0.0);
+        let mut scanned = 0.0;
         let mut frequency = 1.0 / STEPS_PX[0];
         while frequency < 1.0 / STEPS_PX[1] {
-            let (mut c, mut s, mut n) = (0.0, 0.0, 0.0);
+            let (mut c, mut s, mut n, mut squares) = (0.0, 0.0, 0.0, 0.0);
             for &(d, weight, width) in &disparities {
                 // Words coarser than the lattice cannot show it.
                 if width * frequency < 0.35 {
@@ -98,15 +106,20 @@ impl RawHistogram {
                     c += weight * cos;
                     s += weight * sin;
                     n += weight;
+                    squares += weight * weight;
                 }
             }
             let resultant = f64::hypot(c, s) / f64::max(n, 1e-9);
             if n > 0.0 && resultant > best.1 {
-                best = (frequency, resultant);
+                best = (frequency, resultant, n * n / squares);
             }
+            scanned += 1.0;
             frequency += 0.15 / range.max(1.0);
         }
-        ((best.1 > GATHERED).then(|| 1.0 / best.0), best.1)
+        // Rayleigh's test, at each of the scanned frequencies.
+        let (frequency, resultant, words) = best;
+        let p = (scanned * (-words * resultant * resultant).exp()).clamp(f64::MIN_POSITIVE, 1.0);
+        ((resultant > GATHERED).then(|| 1.0 / frequency), resultant, p)
     }
 
     /// How much neighbouring words differ in number, 0 (smooth) to 1 (every other one empty).
@@ -119,6 +132,12 @@ impl RawHistogram {
         }
         differ / f64::max(sum, 1.0)
     }
+}
+
+/// Chance that so many words are all multiples of `step`, or of any coarser one.
+fn all_multiples(step: usize, words: usize) -> f64 {
+    let (step, n) = (step as f64, words as f64);
+    (step.powf(-n) * (1.0 + step / (n - 1.0).max(1.0))).clamp(f64::MIN_POSITIVE, 1.0)
 }
 
 fn gcd(a: usize, b: usize) -> usize {

@@ -63,7 +63,7 @@ const FEWEST_VIEWS: usize = 4;
 const LEVEL: f64 = 0.001;
 const SHADOW_LEVEL: f64 = 0.0005;
 /// A name must explain this share of what the best nameless curve does.
-const ADEQUATE: f64 = 0.6;
+pub const ADEQUATE: f64 = 0.6;
 const MOST_FINDINGS: usize = 3;
 /// A later finding must bring this share of what the first brought.
 const LEAST_SHARE: f64 = 0.1;

@@ -9,17 +9,24 @@ use crate::terms::{Axis, Statistic};
 /// Odds of a family that needs more columns to say the same: it can bend to what it is not.
 const RICHER: f64 = 0.35;
 
+/// Less probable names are not told.
+pub const MIN_PROBABILITY: f64 = 0.005;
+
+/// Chance that the cause has none of the names, where a name gains `named` nats, the best nameless
+/// curve `curve`, and this share of it is `adequate`.
+pub fn none_of_these(named: f64, curve: f64, adequate: f64) -> f64 {
+    if curve <= 0.0 {
+        return 0.0;
+    }
+    1.0 / (1.0 + ((named / curve.max(1e-9) - adequate - 0.06) / 0.05).exp())
+}
+
 /// Which names, and how sure.
 pub fn naming(chosen: &Chosen) -> (Status, Option<&'static str>, Vec<Alternative>) {
     let Some(family) = chosen.candidate.family else {
         return (Status::Unexplained, None, Vec::new());
     };
-    let adequacy = chosen.gain / chosen.best_curve.max(1e-9);
-    let none = if chosen.best_curve > 0.0 {
-        1.0 / (1.0 + ((adequacy - chosen.adequacy - 0.06) / 0.05).exp())
-    } else {
-        0.0
-    };
+    let none = none_of_these(chosen.gain, chosen.best_curve, chosen.adequacy);
     let best = chosen.rivals.iter().find(|r| r.family == family).map_or(chosen.gain, |r| r.gain);
     let mut odds: Vec<(&'static str, f64)> = vec![(family, 1.0)];
     for rival in chosen.rivals.iter().filter(|r| r.family != family) {
@@ -34,14 +41,15 @@ pub fn naming(chosen: &Chosen) -> (Status, Option<&'static str>, Vec<Alternative
     let alternatives: Vec<Alternative> = odds
         .iter()
         .filter(|o| o.0 != RECALIBRATE)
-        .map(|&(effect, o)| Alternative { effect, probability: (1.0 - none) * o / total })
-        .filter(|a| a.probability > 0.005)
+        .map(|&(effect, o)| (effect, (1.0 - none) * o / total))
+        .filter(|a| a.1 > MIN_PROBABILITY)
+        .map(|(effect, p)| Alternative { effect, probability: Some(p) })
         .take(5)
         .collect();
     if family == RECALIBRATE {
         return (Status::Recalibrate, None, alternatives);
     }
-    let sure = alternatives.first().map_or(0.0, |a| a.probability);
+    let sure = alternatives.first().and_then(|a| a.probability).unwrap_or(0.0);
     let status = if sure < 0.6 && alternatives.len() > 1 { Status::OneOf } else { Status::Named };
     (status, Some(family), alternatives)
 }

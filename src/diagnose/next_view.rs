@@ -216,7 +216,7 @@ pub fn outlook<'a>(
 /// Give advice to every finding of the layer that is not sure of its name.
 pub fn advise(found: &mut [Finding], scene: &Scene<'_>, outcome: &Outcome, outlook: &Outlook<'_>) {
     for finding in found.iter_mut().filter(|f| f.statistic == scene.statistic) {
-        let sure = finding.alternatives.first().map_or(0.0, |a| a.probability);
+        let sure = finding.alternatives.first().and_then(|a| a.probability).unwrap_or(0.0);
         let runner_up =
             finding.alternatives.iter().map(|a| a.effect).find(|e| Some(*e) != finding.effect);
         let (Some(name), Some(runner_up), true) = (finding.effect, runner_up, sure < SURE) else {

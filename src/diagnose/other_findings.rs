@@ -3,26 +3,27 @@
 use serde_json::Map;
 
 use super::diagnosis::{Alternative, Finding, Size, Status};
-use super::missing::DropoutFinding;
-use super::naming::physics;
+use super::missing::{ADEQUATE, DropoutFinding};
+use super::naming::{MIN_PROBABILITY, none_of_these, physics};
 use super::noise::Hanging;
 use crate::effects;
 use crate::terms::{Axis, Statistic};
 
-/// A finding with this name and nothing else said yet.
-pub fn named(effect: &'static str, probability: f64, statistic: Statistic, axis: Axis) -> Finding {
+/// A finding with this name and nothing else said yet; no test has weighed the name.
+pub fn named(effect: &'static str, statistic: Statistic, axis: Axis) -> Finding {
     Finding {
         status: Status::Named,
         effect: Some(effect),
-        alternatives: vec![Alternative { effect, probability }],
+        alternatives: vec![Alternative { effect, probability: None }],
         statistic,
         axis,
         interval: [0.0, 0.0],
         unit: axis.unit(),
         share: 0.0,
+        minor: false,
         parameters: Map::new(),
         size: Size::default(),
-        p_adjusted: 1.0,
+        p_adjusted: None,
         replicated: None,
         physics: physics(Status::Named, Some(effect), statistic, axis, None),
         next_view: None,
@@ -40,24 +41,23 @@ pub fn hanging(found: Hanging, sigma_mm: f64, replicated: Option<bool>) -> Findi
         1 => Status::Named,
         _ => Status::OneOf,
     };
-    let n = found.families.len() as f64;
-    let each = if n > 1.0 { 0.96 / n } else { 0.97 };
     Finding {
         status,
         effect,
         alternatives: found
             .families
             .iter()
-            .map(|&effect| Alternative { effect, probability: each })
+            .map(|&effect| Alternative { effect, probability: None })
             .collect(),
         statistic: found.statistic,
         axis: found.axis,
         interval: found.interval,
         unit: found.axis.unit(),
         share: found.nats,
+        minor: false,
         parameters: found.parameters,
         size: Size { mm: found.size_sigma * sigma_mm, sigma: found.size_sigma },
-        p_adjusted: found.p,
+        p_adjusted: Some(found.p),
         replicated,
         physics: physics(status, effect, found.statistic, found.axis, found.words.as_deref()),
         next_view: None,
@@ -70,25 +70,7 @@ pub fn hanging(found: Hanging, sigma_mm: f64, replicated: Option<bool>) -> Findi
 /// Something lost as a finding.
 pub fn missing(found: DropoutFinding) -> Finding {
     let status = if found.family.is_some() { Status::Named } else { Status::Unexplained };
-    let best = found.rivals.first().map_or(found.gain, |r| r.1);
-    let mut alternatives: Vec<Alternative> = Vec::new();
-    if let Some(effect) = found.family {
-        let known: Vec<(&'static str, f64)> = found
-            .rivals
-            .iter()
-            .filter_map(|&(id, gain)| Some((effects::find(id)?.card().id, gain)))
-            .filter(|r| r.0 != effect)
-            .map(|(id, gain)| (id, (0.25 * (gain - best).clamp(-60.0, 0.0)).exp()))
-            .collect();
-        let total = 1.0 + known.iter().map(|k| k.1).sum::<f64>();
-        alternatives.push(Alternative { effect, probability: 0.97 / total });
-        alternatives.extend(
-            known
-                .iter()
-                .map(|&(effect, odds)| Alternative { effect, probability: 0.97 * odds / total })
-                .filter(|a| a.probability > 0.005),
-        );
-    }
+    let alternatives = found.family.map_or_else(Vec::new, |name| weighed(name, &found));
     let shape = found
         .family
         .is_none()
@@ -103,9 +85,10 @@ pub fn missing(found: DropoutFinding) -> Finding {
         interval: found.interval,
         unit: found.axis.unit(),
         share: found.gain,
+        minor: false,
         parameters: found.parameters,
         size: Size { mm: 0.0, sigma: found.size },
-        p_adjusted: found.p,
+        p_adjusted: Some(found.p),
         replicated: found.replicated,
         physics: words,
         next_view: None,
@@ -113,4 +96,27 @@ pub fn missing(found: DropoutFinding) -> Finding {
         curve: Some(found.curve),
         terms: Vec::new(),
     }
+}
+
+/// The names that losses may have, by how well each predicts views left out; what a nameless curve
+/// does better is the chance of none.
+fn weighed(name: &'static str, found: &DropoutFinding) -> Vec<Alternative> {
+    let best = found.rivals.first().map_or(found.gain, |r| r.1);
+    let card = |id: &'static str| effects::find(id).map(|e| e.card().id);
+    let curves = found.rivals.iter().filter(|r| card(r.0).is_none());
+    let curve = curves.map(|r| r.1).fold(0.0, f64::max);
+    let mut odds = vec![(name, 1.0)];
+    let rivals = found.rivals.iter().filter_map(|&(id, gain)| Some((card(id)?, gain)));
+    odds.extend(
+        rivals
+            .filter(|r| r.0 != name)
+            .map(|(id, gain)| (id, (0.25 * (gain - best).clamp(-60.0, 0.0)).exp())),
+    );
+    let total: f64 = odds.iter().map(|o| o.1).sum();
+    let some = 1.0 - none_of_these(found.gain, curve, ADEQUATE);
+    odds.into_iter()
+        .map(|(effect, o)| (effect, some * o / total))
+        .filter(|a| a.0 == name || a.1 > MIN_PROBABILITY)
+        .map(|(effect, p)| Alternative { effect, probability: Some(p) })
+        .collect()
 }

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use serde_json::Map;
+use statrs::distribution::{Binomial, Discrete, DiscreteCDF};
 
 use super::diagnosis::Finding;
 use super::engine::FEWEST_VIEWS;
@@ -42,9 +43,9 @@ impl Taken {
     ) -> Result<Self> {
         let (mut fields, mut excluded) = read(recording, bench, model, known, progress);
         let mut found = None;
-        if let Some(flat) = as_ranges(recording, bench, model, known, fields.len()) {
+        if let Some((flat, p)) = as_ranges(recording, bench, model, known, &fields) {
             (fields, excluded) = flat;
-            found = Some(ranges());
+            found = Some(ranges(p));
         }
         let copies = without_copies(&mut fields);
         if fields.len() < FEWEST_VIEWS {
@@ -103,14 +104,16 @@ fn bits(residuals: &[f32]) -> Vec<u32> {
     residuals.iter().map(|r| r.to_bits()).collect()
 }
 
-/// Do the views become flat once their words are taken for lengths of rays? Then with them.
+/// Do the views become flat once their words are taken for lengths of rays? Then with them, and with
+/// the chance of it were either reading as good as the other (the exact test of McNemar).
 fn as_ranges(
     recording: &Recording,
     bench: &Workbench<'_>,
     model: &NoiseModel,
     known: &KnownTerms,
-    flat: usize,
-) -> Option<(Vec<Field>, Vec<Excluded>)> {
+    as_depths: &[Field],
+) -> Option<((Vec<Field>, Vec<Excluded>), f64)> {
+    let flat = as_depths.len();
     if 2 * flat >= recording.views.len() || known.has("range-not-depth") {
         return None;
     }
@@ -118,7 +121,15 @@ fn as_ranges(
     let mut told = known.clone();
     told.bias.push(range_term());
     let (fields, excluded) = read(recording, &bench, model, &told, &|_, _| ());
-    (fields.len() >= FEWEST_VIEWS && fields.len() > 2 * flat).then_some((fields, excluded))
+    if fields.len() < FEWEST_VIEWS || fields.len() <= 2 * flat {
+        return None;
+    }
+    let only = |these: &[Field], those: &[Field]| {
+        these.iter().filter(|f| those.iter().all(|g| g.name != f.name)).count() as u64
+    };
+    let (won, lost) = (only(&fields, as_depths), only(as_depths, &fields));
+    let p = Binomial::new(0.5, won + lost).map_or(1.0, |b| b.pmf(won) + b.sf(won));
+    Some(((fields, excluded), p))
 }
 
 fn range_term() -> Term {
@@ -126,15 +137,15 @@ fn range_term() -> Term {
 }
 
 /// The finding that goes with [`as_ranges`].
-fn ranges() -> Finding {
+fn ranges(p: f64) -> Finding {
     let mut parameters = Map::new();
     parameters.insert("share".into(), estimate(1.0, 0.01));
     Finding {
         share: 1e6,
         parameters,
-        p_adjusted: 1e-9,
+        p_adjusted: Some(p),
         terms: vec![range_term()],
-        ..named("range-not-depth", 0.98, Statistic::Bias, Axis::Radius)
+        ..named("range-not-depth", Statistic::Bias, Axis::Radius)
     }
 }
 

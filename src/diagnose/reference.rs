@@ -6,6 +6,7 @@ use serde_json::Map;
 
 use super::diagnosis::{Alternative, CannotTell, Finding, Size, Status};
 use super::known::KnownTerms;
+use super::naming::{MIN_PROBABILITY, physics};
 use super::parameters::estimate;
 use super::replication::{Measured, agree};
 use super::search::NoiseGains;
@@ -196,11 +197,13 @@ pub fn findings(laws: &[Law], known: &KnownTerms, level: f64, seed: Seed) -> Vec
         odds.push((family, (0.5 * (most - best.gain.total)).exp()));
     }
     odds.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let total: f64 = odds.iter().map(|o| o.1).sum();
+    // No law at all explains what chance does.
+    let total: f64 = odds.iter().map(|o| o.1).sum::<f64>() + (-0.5 * best.gain.total).exp();
     let alternatives: Vec<Alternative> = odds
         .iter()
-        .map(|&(effect, o)| Alternative { effect, probability: 0.98 * o / total })
-        .filter(|a| a.probability > 0.005)
+        .map(|&(effect, o)| (effect, o / total))
+        .filter(|a| a.1 > MIN_PROBABILITY)
+        .map(|(effect, p)| Alternative { effect, probability: Some(p) })
         .collect();
     let close = odds.get(1).is_some_and(|o| o.1 > (-0.5 * AS_GOOD_NATS).exp());
     let beta = best.gain.beta[0];
@@ -224,17 +227,12 @@ pub fn findings(laws: &[Law], known: &KnownTerms, level: f64, seed: Seed) -> Vec
         interval: best.reach,
         unit: best.axis.unit(),
         share: best.gain.total,
+        minor: false,
         parameters,
         size: Size { mm: 1e3 * best.rms_m, sigma: best.rms_sigma },
-        p_adjusted: noise.p(safe(best)),
+        p_adjusted: Some(noise.p(safe(best))),
         replicated: best.replicated,
-        physics: super::naming::physics(
-            status,
-            Some(best.family),
-            Statistic::Bias,
-            best.axis,
-            None,
-        ),
+        physics: physics(status, Some(best.family), Statistic::Bias, best.axis, None),
         next_view: None,
         shape: None,
         curve: None,

@@ -257,6 +257,11 @@ impl NoiseGains {
         NoiseGains(greatest)
     }
 
+    /// Was there anything to draw from?
+    pub fn is_tested(&self) -> bool {
+        !self.0.is_empty()
+    }
+
     /// Noise is taken to bring next to nothing.
     fn unknown() -> Self {
         NoiseGains(vec![0.0])

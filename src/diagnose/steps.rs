@@ -85,11 +85,19 @@ pub(super) fn steps(
         let mine = fields.iter().zip(second).filter(|(_, s)| **s == half);
         lattice_of(mine.map(|(f, _)| f), recording)
     });
-    let alike = |of: fn(&Quantisation) -> Option<f64>| {
+    let tested = |of: fn(&Quantisation) -> Option<f64>, p: Option<f64>| {
         let [a, b] = halves.map(|h| of(&h));
-        Some(a.zip(b).is_some_and(|(a, b)| (a / b - 1.0).abs() < SAME_STEP))
+        let alike = a.zip(b).is_some_and(|(a, b)| (a / b - 1.0).abs() < SAME_STEP);
+        (Some(alike), p)
     };
-    let mut add = |effect, axis, interval, name: &str, step: f64, error, size: Size, replicated| {
+    let mut add = |effect,
+                   axis,
+                   interval,
+                   name: &str,
+                   step: f64,
+                   error,
+                   size: Size,
+                   (replicated, p_adjusted)| {
         let mut parameters = Map::new();
         parameters.insert(name.into(), estimate(step, error));
         found.push(Finding {
@@ -97,9 +105,9 @@ pub(super) fn steps(
             share: 10.0 + 100.0 * size.sigma * size.sigma,
             parameters,
             size,
-            p_adjusted: 1e-6,
+            p_adjusted,
             replicated,
-            ..named(effect, 0.98, Statistic::Distribution, axis)
+            ..named(effect, Statistic::Distribution, axis)
         });
     };
     let z = crate::stats::range(fields.iter().map(|f| f.plane.depth(0.0, 0.0)));
@@ -122,7 +130,7 @@ pub(super) fn steps(
                 step,
                 error,
                 size,
-                alike(|l| l.disparity_step_px),
+                tested(|l| l.disparity_step_px, lattice.disparity_p),
             );
         }
     }
@@ -132,7 +140,16 @@ pub(super) fn steps(
         let mm = 1e3 * step / 12f64.sqrt();
         let size = Size { mm, sigma: mm / sigma_mm };
         if size.sigma > STEP_SHARE {
-            add("depth-rounding", Axis::Z, z, "step_m", step, 0.0, size, alike(|l| l.depth_step_m));
+            add(
+                "depth-rounding",
+                Axis::Z,
+                z,
+                "step_m",
+                step,
+                0.0,
+                size,
+                tested(|l| l.depth_step_m, lattice.depth_p),
+            );
         }
     }
     found

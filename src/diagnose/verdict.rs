@@ -1,11 +1,13 @@
 //! What is said in the end: findings in order, the extended model, the views. Whether it is a match
 //! is decided in `conclude`.
 
-use super::diagnosis::{CannotTell, Finding, HeldOut, Status, ViewLine};
+use super::diagnosis::{Alternative, CannotTell, Finding, HeldOut, Status, Verdict, ViewLine};
 use super::field::Field;
 use super::heldout;
-use super::layers::Survey;
+use super::layers::{BLOCK_TILES, Survey};
 use super::other_findings::named;
+use super::search::Outcome;
+use super::tiles::SIDE;
 use crate::effects;
 use crate::model::{Effect, NoiseModel, UNEXPLAINED};
 use crate::terms::{Axis, Statistic, Term};
@@ -16,7 +18,7 @@ pub(super) fn not_identifiable(what: &CannotTell) -> Finding {
         status: Status::NotIdentifiable,
         alternatives: Vec::new(),
         physics: what.why.clone(),
-        ..named(what.effect, 0.0, Statistic::Bias, Axis::Z)
+        ..named(what.effect, Statistic::Bias, Axis::Z)
     }
 }
 
@@ -65,12 +67,14 @@ pub(super) fn symptoms(found: &mut [Finding]) {
     for f in found.iter_mut() {
         let symptom = f.effect.is_some_and(|id| SYMPTOMS.contains(&id));
         for a in f.alternatives.iter_mut().filter(|a| SYMPTOMS.contains(&a.effect)) {
-            a.probability *= NO_SYMPTOM;
+            a.probability = a.probability.map(|p| NO_SYMPTOM * p);
         }
         // What moves past the pattern is matched anew in every frame.
         let renewed = moves && matches!(f.effect, Some("temporal-correlation" | "frame-jitter"));
         if renewed {
-            f.alternatives.iter_mut().for_each(|a| a.probability *= NO_SYMPTOM);
+            let halved =
+                |a: &mut Alternative| a.probability = a.probability.map(|p| NO_SYMPTOM * p);
+            f.alternatives.iter_mut().for_each(halved);
         }
         if symptom {
             f.physics.push_str(" Held against a simulation it may be a symptom: light, blur and window change it too.");
@@ -145,16 +149,41 @@ fn excess(f: &Finding) -> f64 {
     1.0 - mean / curve.model.len() as f64
 }
 
+/// A finding of less than this share of the explained mismatch is minor.
+const MINOR: f64 = 0.01;
+
 /// Nats become shares, and the largest comes first.
 pub(super) fn shares(found: &mut [Finding]) {
     let total: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
     for f in found.iter_mut() {
         f.share = if total > 0.0 { f.share.max(0.0) / total } else { 0.0 };
+        f.minor = f.status != Status::NotIdentifiable && f.share < MINOR;
     }
     found.sort_by(|a, b| {
         let told = |f: &Finding| f.status == Status::NotIdentifiable;
         told(a).cmp(&told(b)).then(b.share.total_cmp(&a.share))
     });
+}
+
+/// `outcomes` are the mean's and the variance's: where one could not be searched at all, nothing found
+/// says nothing.
+pub(super) fn verdict(found: &[Finding], outcomes: [&Outcome; 2]) -> Verdict {
+    match (found.is_empty(), outcomes.iter().all(|o| o.noise.is_tested())) {
+        (false, _) => Verdict::Mismatch,
+        (true, true) => Verdict::Match,
+        (true, false) => Verdict::Inconclusive,
+    }
+}
+
+/// What could not be tested, in words.
+pub(super) fn untested([mean, variance]: [&Outcome; 2]) -> Vec<String> {
+    let mean = (!mean.noise.is_tested())
+        .then(|| "the mean error could not be tested: no view has enough of a target".to_string());
+    let side = BLOCK_TILES * SIDE;
+    let variance = (!variance.noise.is_tested()).then(|| {
+        format!("the size of the noise could not be tested: no target fills a patch of {side} x {side} px")
+    });
+    mean.into_iter().chain(variance).collect()
 }
 
 /// The model with what was found.
@@ -230,7 +259,7 @@ mod tests {
             effect: None,
             share: 900.0,
             curve: Some(curve),
-            ..named("range-exponent", 0.0, Statistic::Variance, Axis::Z)
+            ..named("range-exponent", Statistic::Variance, Axis::Z)
         }
     }
 
@@ -238,7 +267,7 @@ mod tests {
         Finding {
             share: 100.0,
             size: Size { mm: 1.0, sigma },
-            ..named("radial-disparity-bias", 0.99, Statistic::Bias, Axis::Radius)
+            ..named("radial-disparity-bias", Statistic::Bias, Axis::Radius)
         }
     }
 
@@ -246,10 +275,8 @@ mod tests {
     #[test]
     fn a_law_of_the_depth_beside_a_larger_misfit_of_sigma_is_part_of_it() {
         for (nats, left) in [(100.0, 1), (2000.0, 2)] {
-            let exponent = Finding {
-                share: nats,
-                ..named("range-exponent", 0.9, Statistic::Variance, Axis::Z)
-            };
+            let exponent =
+                Finding { share: nats, ..named("range-exponent", Statistic::Variance, Axis::Z) };
             let mut found = vec![exponent, recalibrate(1.2)];
             fold_into_sigma(&mut found);
             assert_eq!(found.len(), left);

@@ -5,8 +5,10 @@ mod curve;
 mod parameters;
 mod sections;
 mod sentences;
+mod story;
 
 use maud::{Markup, html};
+pub use story::story;
 
 use super::axis::Axis;
 use super::document::{Kind, document};
@@ -47,6 +49,7 @@ pub fn diagnosis_page(page: &DiagnosisPage<'_>) -> Result<String> {
         (sections::verdict(diagnosis))
         @if unsettled { (sections::remarks(&diagnosis.remarks)) }
         (cards::findings(&diagnosis.findings)?)
+        (cards::small_remains(&diagnosis.findings))
         section.outcome {
             (sections::held_out(diagnosis.heldout.as_ref()))
             (sections::remaining(diagnosis))
@@ -95,6 +98,12 @@ fn before_after(picture: &ViewPictures, diagnosis: &Diagnosis) -> Result<Markup>
         view.name, view.z_m, view.frames
     );
     let range = scale(&picture.before);
+    let caption = match picture.twin.as_deref().map(|twin| distance(&picture.before, twin)) {
+        Some([apart, recorded]) => format!(
+            "{caption}. The twin is {apart:.3} px rms from the recording, whose residual is {recorded:.3} px"
+        ),
+        None => caption,
+    };
     let twin = picture.twin.as_ref().map(|twin| ("simulated twin", twin));
     let titled = [("as recorded", &picture.before), ("with the extended model", &picture.after)];
     let panel = |(title, values): (&str, &Vec<f32>)| {
@@ -116,6 +125,17 @@ fn before_after(picture: &ViewPictures, diagnosis: &Diagnosis) -> Result<Markup>
             figcaption { (caption) }
         }
     })
+}
+
+/// Root mean square of the difference of two pictures, and of the first.
+fn distance(recorded: &[f32], twin: &[f32]) -> [f64; 2] {
+    let (mut apart, mut own, mut n) = (0.0, 0.0, 0.0);
+    for (r, t) in recorded.iter().zip(twin).filter(|(r, t)| (*r + *t).is_finite()) {
+        apart += f64::from(r - t).powi(2);
+        own += f64::from(*r).powi(2);
+        n += 1.0;
+    }
+    [apart, own].map(|square| (square / f64::max(n, 1.0)).sqrt())
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ pub use axis::Axis;
 pub use calibration_page::{CalibrationPage, calibration_page};
 pub use chart::Chart;
 pub use comparison::{comparison_figures, comparison_page};
-pub use diagnosis_page::{DiagnosisPage, diagnosis_page};
+pub use diagnosis_page::{DiagnosisPage, diagnosis_page, story};
 pub use figure2::{Overlay, figure2};
 pub use map_page::map_page;
 pub use sigma_map::sigma_map;

@@ -10,8 +10,8 @@ use super::{curve, parameters};
 use crate::capture::far_side;
 use crate::diagnose::{Finding, NextView, Status};
 use crate::error::Result;
-use crate::report::document::{facts, list};
-use crate::report::numbers::{fixed, p_value, percent, significant};
+use crate::report::document::{facts, fold, list, row, table};
+use crate::report::numbers::{count, fixed, p_value, percent, significant};
 use crate::terms::Statistic;
 
 /// Smaller probabilities are nil.
@@ -20,7 +20,8 @@ const MIN_PROBABILITY: f64 = 0.0005;
 const FACING_RAD: f64 = 0.0524;
 
 pub(super) fn findings(findings: &[Finding]) -> Result<Markup> {
-    let cards = findings.iter().enumerate().map(card).collect::<Result<Vec<Markup>>>()?;
+    let main = findings.iter().filter(|f| !f.minor);
+    let cards = main.enumerate().map(card).collect::<Result<Vec<Markup>>>()?;
     Ok(html! { @if !cards.is_empty() { section.cards { @for card in cards { (card) } } } })
 }
 
@@ -51,6 +52,36 @@ fn card((i, finding): (usize, &Finding)) -> Result<Markup> {
     })
 }
 
+/// Does either half of the views alone support it?
+fn halves(replicated: Option<bool>) -> &'static str {
+    match replicated {
+        Some(true) => "Both show it alike",
+        Some(false) => "They do not agree: either one lacks it, or their sizes differ",
+        None => "Not tested",
+    }
+}
+
+/// What is less than a hundredth of the mismatch: a line, and a table behind it.
+pub(super) fn small_remains(findings: &[Finding]) -> Markup {
+    let minor: Vec<&Finding> = findings.iter().filter(|f| f.minor).collect();
+    let share = fixed(100.0 * minor.iter().map(|f| f.share).sum::<f64>(), 1);
+    let columns = ["what", "what is off", "along", ">of the noise", ">share", "halves", ">chance"];
+    let row = |f: &&Finding| {
+        let p = html! { @if let Some(p) = f.p_adjusted { (p_value(p)) } @else { "–" } };
+        let of_all = format!("{} %", fixed(100.0 * f.share, 2));
+        let size = significant(f.size.sigma, 2);
+        let (what, off) = (capital(&called(f)), capital(statistic(f.statistic)));
+        row![what, off, axis(f.axis), size, of_all, halves(f.replicated), p]
+    };
+    html! { @if !minor.is_empty() { section {
+        (fold(
+            &format!("Small remains: {}, {share} % of the mismatch together", count(minor.len(), "finding")),
+            false,
+            &table(&columns, minor.iter().map(row)),
+        ))
+    } } }
+}
+
 /// Those that are known.
 fn finding_facts(finding: &Finding) -> Vec<(&str, Markup)> {
     let place = interval(finding.axis, finding.interval, finding.unit);
@@ -75,9 +106,10 @@ fn finding_facts(finding: &Finding) -> Vec<(&str, Markup)> {
             "How sure",
             html! {
                 (capital(&chance(p)))
-                @if p.is_finite() { " (" (p_value(p)) ")" }
+                @if let Some(p) = p { " (" (p_value(p)) ")" }
             },
         ));
+        facts.push(("Halves of the views", html! { (halves(finding.replicated)) }));
         if finding.share.is_finite() {
             let percent = fixed((100.0 * finding.share).clamp(0.0, 100.0), 0);
             facts.push((
@@ -103,10 +135,11 @@ fn finding_facts(finding: &Finding) -> Vec<(&str, Markup)> {
 
 /// Every effect that it could be, best first.
 fn alternatives(finding: &Finding) -> Markup {
-    let none = 1.0 - finding.alternatives.iter().map(|a| a.probability).sum::<f64>();
+    let weighed: Option<f64> = finding.alternatives.iter().map(|a| a.probability).sum();
+    let none = weighed.map_or(0.0, |sum| 1.0 - sum);
     let effects = finding.alternatives.iter().map(|a| {
         html! {
-            b { (percent(a.probability)) " " (title(a.effect)) }
+            b { @if let Some(p) = a.probability { (percent(p)) " " } (title(a.effect)) }
             ": " (description(a.effect)) " " code { (a.effect) }
         }
     });

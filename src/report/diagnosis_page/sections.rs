@@ -5,6 +5,7 @@ use maud::{Markup, html};
 use super::sentences::{
     axis, called, capital, interval, join, missing, mm, sentence, statistic, title,
 };
+use super::story::story;
 use super::{parameters, sentences};
 use crate::diagnose::{CannotTell, Diagnosis, HeldOut, MapRow, Verdict, ViewLine};
 use crate::report::document::{Column, fold, list, row, table, table_of};
@@ -27,6 +28,7 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Markup {
         section class={ "verdict " (class) } {
             p.mark { (mark) }
             p.sentence { (sentences::verdict(diagnosis)) }
+            (list(story(diagnosis).iter().map(|sentence| html! { (sentence) })))
             div.tiles { (tiles(diagnosis)) }
         }
     }
@@ -116,7 +118,7 @@ pub(super) fn remaining(diagnosis: &Diagnosis) -> Markup {
         }
         (list(after.remaining.iter().map(|r| html! {
             b { (capital(statistic(r.statistic))) } " over the " (axis(r.axis))
-            @if !r.words.is_empty() { ": " (r.words) } " (" (p_value(r.p_adjusted)) ")"
+            @if !r.words.is_empty() { ": " (r.words) } @if let Some(p) = r.p_adjusted { " (" (p_value(p)) ")" }
         })))
     } }
 }

@@ -50,19 +50,24 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> String {
             "Model and recording differ, and these views cannot show why.".into()
         }
         (Verdict::Mismatch, false) => format!(
-            "The model leaves {} out{} {names}.{}",
+            "{} leaves {} out{} {names}{}.",
+            match diagnosis.reference {
+                Reference::Model => "The model",
+                Reference::SimulatedRecording => "The simulation",
+            },
             count(effects.len(), "effect"),
             if effects.len() > MAX_NAMES { ", above all" } else { ":" },
-            if recalibrate { " Its own parameters are off as well." } else { "" }
+            if recalibrate { "; its own parameters are off as well" } else { "" }
         ),
     }
 }
 
-/// The findings that are physics which the model lacks; the rest is about numbers, or cannot be
-/// seen.
+/// The findings that are physics which the model lacks; the rest is small, about numbers, or cannot
+/// be seen.
 pub(super) fn missing(findings: &[Finding]) -> Vec<&Finding> {
     let lacking = [Status::Named, Status::OneOf, Status::Unexplained];
-    findings.iter().filter(|f| lacking.contains(&f.status)).collect()
+    let lacks = |f: &&Finding| lacking.contains(&f.status) && !f.minor;
+    findings.iter().filter(lacks).collect()
 }
 
 /// What a finding is called in the middle of a sentence.
@@ -71,7 +76,8 @@ pub(super) fn called(finding: &Finding) -> String {
     match finding.status {
         Status::OneOf if finding.alternatives.len() > 1 => {
             let likely = finding.alternatives.iter().enumerate();
-            let likely = likely.filter(|(i, a)| *i < 2 || a.probability >= MIN_PROBABILITY);
+            let likely = likely
+                .filter(|(i, a)| *i < 2 || a.probability.is_some_and(|p| p >= MIN_PROBABILITY));
             join(&likely.map(|(_, a)| title(a.effect).into()).collect::<Vec<_>>(), "or")
         }
         Status::Unexplained => unnamed(),
@@ -172,9 +178,9 @@ pub(super) fn mm(value: f64) -> String {
 }
 
 /// What a p-value means.
-pub(super) fn chance(p: f64) -> String {
+pub(super) fn chance(p: Option<f64>) -> String {
+    let Some(p) = p else { return "no test gave a p-value".into() };
     let often = match p {
-        _ if p.is_nan() => return "no test gave a p-value".into(),
         _ if p < 1e-6 => "less than once in a million recordings".into(),
         _ if p > 0.5 => "more often than not".into(),
         _ => format!("about once in {} recordings", thousands(1.0 / p)),
@@ -242,8 +248,9 @@ mod tests {
 
     #[test]
     fn chances_are_in_times() {
-        assert!(chance(0.0004).contains("once in 2,500 recordings"));
-        assert!(chance(0.0).contains("less than once in a million"));
+        assert!(chance(Some(0.0004)).contains("once in 2,500 recordings"));
+        assert!(chance(Some(0.0)).contains("less than once in a million"));
+        assert!(chance(None).starts_with("no test"));
         assert_eq!([thousands(12_345.0), thousands(990_000.0)], ["12,000", "990,000"]);
         assert_eq!(join(&["a", "b", "c"].map(String::from), "and"), "a, b and c");
     }

@@ -26,9 +26,10 @@ fn finding(status: Status, effect: Option<&'static str>) -> Finding {
         interval: [118.0, 398.0],
         unit: "px",
         share: 0.63,
+        minor: false,
         parameters: Map::new(),
         size: Size { mm: 1.84, sigma: 0.42 },
-        p_adjusted: 0.0004,
+        p_adjusted: Some(0.0004),
         replicated: Some(true),
         physics: String::new(),
         next_view: None,
@@ -39,7 +40,8 @@ fn finding(status: Status, effect: Option<&'static str>) -> Finding {
 }
 
 fn bowl(status: Status, others: [(&'static str, f64); 2]) -> Finding {
-    let alternatives = others.map(|(effect, probability)| Alternative { effect, probability });
+    let alternatives =
+        others.map(|(effect, probability)| Alternative { effect, probability: Some(probability) });
     Finding {
         alternatives: alternatives.into(),
         parameters: map(json!({"k_px": {"value": 0.3123, "std_error": 0.0121}})),
@@ -124,7 +126,7 @@ fn cases() -> [(Diagnosis, &'static [&'static str]); 8] {
         axis: Axis::Z,
         interval: [1.62, 3.4],
         unit: "m",
-        p_adjusted: 1e-9,
+        p_adjusted: Some(1e-9),
         ..finding(Status::Named, Some("range-exponent"))
     };
     let mut several = diagnosis(Mismatch, vec![named.clone(), noise, unexplained()]);
@@ -132,7 +134,7 @@ fn cases() -> [(Diagnosis, &'static [&'static str]); 8] {
         statistic: Statistic::Distribution,
         axis: Axis::Residual,
         share: 0.004,
-        p_adjusted: 0.012,
+        p_adjusted: Some(0.012),
         words: "a few more large errors than simulated".into(),
     }];
     let mut one_of = bowl(Status::OneOf, [("radial-disparity-bias", 0.57), ("target-bow", 0.38)]);
@@ -257,7 +259,7 @@ fn odd_numbers_do_not_break_a_page() {
     let mut odd = finding(Status::Named, Some("of-tomorrow"));
     odd.size = Size { mm: f64::NAN, sigma: f64::NAN };
     odd.share = f64::NAN;
-    odd.p_adjusted = f64::NAN;
+    odd.p_adjusted = None;
     odd.interval = [f64::NEG_INFINITY, f64::INFINITY];
     odd.curve = Some(Curve::default());
     let diagnosis = diagnosis(Verdict::Mismatch, vec![odd]);

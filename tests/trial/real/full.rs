@@ -109,7 +109,12 @@ fn hidden(f: &Finding) -> Hidden {
     let mut names: Vec<&str> = Vec::new();
     if !matches!(f.status, Status::Recalibrate | Status::Unexplained) {
         names.extend(f.effect);
-        names.extend(f.alternatives.iter().filter(|a| a.probability > 0.1).map(|a| a.effect));
+        names.extend(
+            f.alternatives
+                .iter()
+                .filter(|a| a.probability.is_none_or(|p| p > 0.1))
+                .map(|a| a.effect),
+        );
         names.dedup();
     }
     let form = match f.status {

@@ -1,0 +1,126 @@
+//! A diagnosis in a few sentences, for the page's first screen and for the terminal.
+
+use super::sentences::{called, capital, join, mm};
+use crate::capture::far_side;
+use crate::diagnose::{Diagnosis, Finding, NextView, Status, Verdict};
+use crate::report::numbers::{count, fixed};
+use crate::terms::{Basis, Statistic};
+
+/// So many findings have a sentence each; with the verdict, the rest, what is gained and what is left
+/// that makes seven.
+const MAX_SENTENCES: usize = 3;
+/// A second view of a pair of names is worth a word where it sets them this many standard errors apart.
+const SETTLES: f64 = 2.0;
+
+/// The largest findings a sentence each, all others in one, what views kept aside gain, and what the
+/// same tests find against the extended model: six at most, after the verdict's.
+pub fn story(diagnosis: &Diagnosis) -> Vec<String> {
+    if diagnosis.verdict != Verdict::Mismatch {
+        return diagnosis
+            .remarks
+            .first()
+            .filter(|_| unsettled(diagnosis))
+            .cloned()
+            .into_iter()
+            .collect();
+    }
+    let found = diagnosis.findings.iter().filter(|f| f.status != Status::NotIdentifiable);
+    let (main, minor): (Vec<&Finding>, Vec<&Finding>) = found.partition(|f| !f.minor);
+    let (told, more) = main.split_at(main.len().min(MAX_SENTENCES));
+    let mut sentences: Vec<String> = told.iter().map(|f| of(f)).collect();
+    sentences.extend(rest(more, &minor));
+    sentences.extend(gained(diagnosis));
+    sentences.extend(left(diagnosis));
+    sentences
+}
+
+fn unsettled(diagnosis: &Diagnosis) -> bool {
+    diagnosis.verdict == Verdict::Inconclusive
+}
+
+/// A finding: what, how large, how much of all, with which parameters, and what to doubt of it.
+fn of(f: &Finding) -> String {
+    let smooth = |b: &Basis| matches!(b, Basis::Spline { .. } | Basis::Map { .. });
+    let and_rest = f.effect.is_some() && f.terms.iter().any(|t| smooth(&t.basis));
+    let rest = if and_rest { " and a smooth rest of it that no formula follows" } else { "" };
+    let size = match f.statistic {
+        Statistic::Dropout => format!("{} % of the pixels lost", fixed(100.0 * f.size.sigma, 1)),
+        _ => format!("{} rms, {} of the noise", mm(f.size.mm), fixed(f.size.sigma, 2)),
+    };
+    let parameter = |(name, value): (&String, &serde_json::Value)| {
+        Some(format!("{name} {:.4}", value.get("value")?.as_f64()?))
+    };
+    let parameters: Vec<String> = f.parameters.iter().filter_map(parameter).collect();
+    let parameters = match parameters[..] {
+        [] => String::new(),
+        _ => format!(" ({})", parameters.join(", ")),
+    };
+    let halves = match f.replicated {
+        Some(false) => "; the two halves of the views do not agree on it",
+        _ => "",
+    };
+    let next = f.next_view.as_ref().map_or_else(String::new, settled_by);
+    let (name, share) = (capital(&called(f)), fixed(100.0 * f.share, 0));
+    format!("{name}{rest}: {size}, {share} % of the mismatch{parameters}{halves}{next}.")
+}
+
+fn settled_by(view: &NextView) -> String {
+    let pose = match fixed(view.theta_rad.to_degrees(), 0) {
+        tilt if tilt == "0" => "facing the sensor".to_string(),
+        tilt => format!("tilted by {tilt}°, {} side away", far_side(view.azimuth_rad)),
+    };
+    let helps = if view.separation_then > SETTLES { "would settle it" } else { "would help most" };
+    format!("; a view at {} m {pose} {helps}", fixed(view.z_m, 2))
+}
+
+/// Findings without a sentence of their own.
+fn rest(more: &[&Finding], minor: &[&Finding]) -> Option<String> {
+    let percent = |all: &[&Finding]| 100.0 * all.iter().map(|f| f.share).sum::<f64>();
+    let names = |all: &[&Finding]| {
+        let mut names: Vec<String> =
+            all.iter().filter(|f| f.effect.is_some()).map(|f| called(f)).collect();
+        let unnamed = all.len() - names.len();
+        if unnamed > 0 {
+            names.push(format!("{unnamed} without a name"));
+        }
+        join(&names, "and")
+    };
+    let mut parts = Vec::new();
+    if !more.is_empty() {
+        parts.push(format!("{}, {} % of it together", names(more), fixed(percent(more), 0)));
+    }
+    if !minor.is_empty() {
+        let percent = fixed(percent(minor), 1);
+        parts.push(format!("small remains ({}), {percent} % of it together", names(minor)));
+    }
+    (!parts.is_empty()).then(|| capital(&parts.join("; ")) + ".")
+}
+
+fn gained(diagnosis: &Diagnosis) -> Option<String> {
+    let h = diagnosis.heldout.as_ref()?;
+    Some(format!(
+        "On {} kept aside the steady error goes from {} to {} and {} nats a view are gained [{}, {}]; `kinoise correct` alone takes every pixel from {} to {} px rms.",
+        count(h.views.len(), "view"),
+        mm(h.rms_mm_before),
+        mm(h.rms_mm_after),
+        fixed(h.gain, 1),
+        fixed(h.gain_interval[0], 1),
+        fixed(h.gain_interval[1], 1),
+        fixed(h.correction_rms_before_px, 3),
+        fixed(h.correction_rms_after_px, 3),
+    ))
+}
+
+fn left(diagnosis: &Diagnosis) -> Option<String> {
+    let after = &diagnosis.after;
+    let share: f64 = after.remaining.iter().map(|r| r.share).sum();
+    Some(match (after.verdict, after.remaining.len()) {
+        (Verdict::Match, _) => "The same tests find nothing more in the extended model.".into(),
+        (Verdict::Inconclusive, _) => "What the extended model leaves could not be tested.".into(),
+        (Verdict::Mismatch, n) => format!(
+            "The same tests still find {} beside the extended model, {} % of what was explained.",
+            count(n, "difference"),
+            fixed(100.0 * share, 1)
+        ),
+    })
+}
