@@ -51,7 +51,8 @@ impl Case<'_> {
         let map =
             scenes.iter().zip(outcomes).flat_map(|(s, o)| findings::map(s, o, level)).collect();
         drop(scenes);
-        let mut detectable = detectable(&self.survey, &mean.outcome, &scatter.outcome, camera);
+        let mut detectable =
+            detectable(&self.survey, &mean.outcome, &scatter.outcome, camera, self.options);
         detectable.extend(losses);
         let mut remarks = self.remarks();
         remarks.extend(untested(outcomes));

@@ -2,14 +2,15 @@
 
 use serde_json::{Map, json};
 
+use super::case::Case;
 use super::diagnosis::Detectable;
+use super::engine::DiagnoseOptions;
 use super::layers::Survey;
-use super::search::{Outcome, ViewData, coarser, evidence_of};
+use super::power::Gates;
+use super::scene::Scene;
+use super::search::Outcome;
 use crate::camera::Camera;
 use crate::terms::{Basis, Statistic, Term};
-
-/// Nats beyond the threshold that eight recordings in ten would bring.
-const MARGIN: f64 = 4.0;
 
 /// Effect, parameter, shape, and the parameter of a coefficient.
 type Spread = (&'static str, &'static str, Basis, fn(f64) -> f64);
@@ -20,9 +21,24 @@ pub fn detectable(
     bias: &Outcome,
     variance: &Outcome,
     camera: &Camera,
+    options: &DiagnoseOptions,
 ) -> Vec<Detectable> {
-    let mean: Vec<ViewData> = survey.mean_data().iter().map(coarser).collect();
-    let blocks = survey.variance_data();
+    let (level, seed) = (options.level, options.seed);
+    let scenes = [Scene::bias(survey, 1.0, 1.0), Scene::variance(survey, 1.0, 1.0)];
+    let mean = Gates {
+        scene: &scenes[0],
+        outcome: bias,
+        rules: survey.bias_rules(camera, Case::MEAN_LEVEL * level),
+        beside: None,
+        seed,
+    };
+    let blocks = Gates {
+        scene: &scenes[1],
+        outcome: variance,
+        rules: survey.variance_rules(Case::VARIANCE_LEVEL * level),
+        beside: survey.refitted().map(|c| c.basis),
+        seed,
+    };
     let half = |[low, high]: [f64; 2]| (0.5 * (high - low)).powi(2);
     let (fx, fy) = (camera.fx, camera.fy);
     let bow = half(survey.reach.right);
@@ -50,7 +66,7 @@ pub fn detectable(
     ];
     let mut all = Vec::new();
     for (effect, name, basis, unit) in families {
-        add(&mut all, (effect, name), &mean, bias, Statistic::Bias, basis, unit, |a| a);
+        add(&mut all, (effect, name), &mean, Statistic::Bias, basis, unit, |a| a);
     }
     let spreads: Vec<Spread> = vec![
         ("range-exponent", "excess", Basis::RangeExponent { pivot_m: 2.0, orders: 1 }, |a| 0.5 * a),
@@ -61,7 +77,7 @@ pub fn detectable(
         ("tilt-axis-anisotropy", "ratio", Basis::TiltAxis { tilt_power: 2 }, |a| (0.75 * a).exp()),
     ];
     for (effect, name, basis, to) in spreads {
-        add(&mut all, (effect, name), &blocks, variance, Statistic::Variance, basis, vec![1.0], to);
+        add(&mut all, (effect, name), &blocks, Statistic::Variance, basis, vec![1.0], to);
     }
     all
 }
@@ -70,20 +86,14 @@ pub fn detectable(
 fn add(
     all: &mut Vec<Detectable>,
     (effect, name): (&'static str, &'static str),
-    data: &[ViewData],
-    outcome: &Outcome,
+    gates: &Gates<'_>,
     statistic: Statistic,
     basis: Basis,
     unit: Vec<f64>,
     to: impl Fn(f64) -> f64,
 ) {
-    let term = Term { statistic, basis, coefficients: unit.clone() };
-    let unit = nalgebra::DVector::from_vec(unit);
-    let information: f64 =
-        evidence_of(data, &[term]).iter().map(|e| unit.dot(&(&e.a * &unit))).sum();
-    let need = outcome.noise.threshold(0.01) + MARGIN;
-    let least = to((2.0 * need / information).sqrt());
-    if least.is_finite() && information > 0.0 {
+    let term = Term { statistic, basis, coefficients: unit };
+    if let Some(least) = gates.least(&term).map(to).filter(|least| least.is_finite()) {
         let mut minimum = Map::new();
         minimum.insert(name.into(), json!(least));
         all.push(Detectable { effect, minimum });

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::ablation::Ablation;
 use super::bias;
+use super::candidate::Candidate;
 use super::field::Field;
 use super::joint::refit;
 use super::reach::Extent;
@@ -134,8 +135,9 @@ impl Survey {
         self.views.par_iter().map(mean_data).collect()
     }
 
-    pub fn search_bias(&self, camera: &Camera, level: f64, seed: Seed) -> Outcome {
-        let rules = Rules {
+    /// How the search of the mean decides.
+    pub fn bias_rules(&self, camera: &Camera, level: f64) -> Rules {
+        self.ablation.rules(Rules {
             level,
             prior: BIAS_PRIOR,
             adequacy: ADEQUATE,
@@ -143,13 +145,17 @@ impl Survey {
             fixed: (self.fixed_px2 > 0.0).then(|| (self.fixed_px2.sqrt(), self.covered_px(camera))),
             least: LEAST_SIGMAS * self.typical_sigma_px(),
             calibrated: true,
-        };
+        })
+    }
+
+    pub fn search_bias(&self, camera: &Camera, level: f64, seed: Seed) -> Outcome {
+        let rules = self.bias_rules(camera, level);
         let mut candidates = bias::families(camera, &self.reach);
         candidates.extend(bias::curves(camera, &self.reach));
         let fine = self.mean_data();
         let coarse: Vec<ViewData> = fine.par_iter().map(coarser).collect();
         let candidates = self.ablation.candidates(candidates);
-        let found = search(&fine, &coarse, &candidates, &self.ablation.rules(rules), seed);
+        let found = search(&fine, &coarse, &candidates, &rules, seed);
         let inflation: Vec<f64> = self.views.iter().map(|v| v.inflation).collect();
         let second = self.second();
         refit(&fine, &inflation, &second, camera, found.halved(&second, BIAS_PRIOR))
@@ -240,14 +246,9 @@ impl Survey {
         blocks.into_iter().map(|b| b.data(scatter)).collect()
     }
 
-    pub fn search_variance(
-        &self,
-        sigma: &SigmaModel,
-        camera: &Camera,
-        level: f64,
-        seed: Seed,
-    ) -> Outcome {
-        let rules = Rules {
+    /// How the search of the variance decides.
+    pub fn variance_rules(&self, level: f64) -> Rules {
+        self.ablation.rules(Rules {
             level,
             prior: VARIANCE_PRIOR,
             adequacy: ADEQUATE,
@@ -257,16 +258,30 @@ impl Survey {
             // dropped when they are told, by their size on the axis.
             least: 0.0,
             calibrated: true,
-        };
+        })
+    }
+
+    /// What is fitted beside every hypothesis of the variance.
+    pub fn refitted(&self) -> Option<Candidate> {
+        self.refits_sigma.then(|| variance::refit(&self.reach))
+    }
+
+    pub fn search_variance(
+        &self,
+        sigma: &SigmaModel,
+        camera: &Camera,
+        level: f64,
+        seed: Seed,
+    ) -> Outcome {
         let mut candidates = variance::families(&self.reach, sigma);
         candidates.extend(variance::curves(camera, &self.reach));
-        let refit = self.refits_sigma.then(|| variance::refit(&self.reach));
+        let refit = self.refitted();
         if refit.is_some() {
             candidates.retain(variance::beyond_sigma);
         }
         let data = self.variance_data();
         let candidates = self.ablation.candidates(candidates);
-        search_beside(&data, &data, &candidates, refit, &self.ablation.rules(rules), seed)
+        search_beside(&data, &data, &candidates, refit, &self.variance_rules(level), seed)
             .halved(&self.second(), VARIANCE_PRIOR)
     }
 

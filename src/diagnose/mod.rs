@@ -42,6 +42,7 @@ mod parameters;
 mod partners;
 mod pictures;
 mod pixels;
+mod power;
 mod reach;
 mod reading;
 mod reference;

@@ -111,7 +111,7 @@ pub struct Chosen {
 }
 
 /// A later term must be this large beside the largest, root mean square by root mean square.
-const LEAST_OF_LARGEST: f64 = 0.06;
+pub const LEAST_OF_LARGEST: f64 = 0.06;
 
 /// What a single nameless curve saw, before anything was explained.
 #[derive(Debug, Clone)]
@@ -164,7 +164,7 @@ const AS_GOOD_NATS: f64 = 2.0;
 const AS_GOOD_SHARE: f64 = 0.01;
 /// A later term must bring this share of what the first brought: what is less is the first one's
 /// own shape, badly met.
-const LEAST_SHARE: f64 = 0.005;
+pub const LEAST_SHARE: f64 = 0.005;
 
 /// Search a layer. `coarse` has the same views in larger patches, for shapes that do not change
 /// within them.

@@ -12,6 +12,7 @@ mod rays;
 #[path = "../common/raytraced/mod.rs"]
 mod raytraced;
 
+mod detectable;
 mod diagnose;
 mod diagnose_ablation;
 mod diagnose_honesty;

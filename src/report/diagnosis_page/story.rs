@@ -87,7 +87,9 @@ fn rest(more: &[&Finding], minor: &[&Finding]) -> Option<String> {
     };
     let mut parts = Vec::new();
     if !more.is_empty() {
-        parts.push(format!("{}, {} % of it together", names(more), fixed(percent(more), 0)));
+        let called = join(&more.iter().map(|f| called(f)).collect::<Vec<_>>(), "and");
+        let together = if more.len() > 1 { " together" } else { "" };
+        parts.push(format!("{called}, {} % of it{together}", fixed(percent(more), 0)));
     }
     if !minor.is_empty() {
         let percent = fixed(percent(minor), 1);

@@ -1,0 +1,208 @@
+//! What size of a shape a layer's search would see in 80 % of such recordings.
+//!
+//! The gates are those of the search itself: the threshold of the null over the dispersion of the
+//! views, the share of what was found first, and the least sizes. Noise is drawn from the views' own
+//! information, and with the shape added its gain and its size are quadratic in the shape's size.
+
+use nalgebra::{DMatrix, DVector};
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use super::evidence::{Evidence, Null, gain};
+use super::pixels::terms_of;
+use super::scene::{Scene, size};
+use super::search::{LEAST_OF_LARGEST, LEAST_SHARE, Outcome, Rules, evidence_of};
+use super::verdict::LEAST_SIZE;
+use crate::rng::Seed;
+use crate::terms::{Basis, Statistic, Term};
+
+/// Of the recordings, so many show it.
+const POWER: f64 = 0.8;
+const REPLICATES: u64 = 200;
+/// As in the search: a still pattern beside the pixels' own errors.
+const CLEARLY: f64 = 50.0;
+
+/// A layer as it was searched.
+pub struct Gates<'a> {
+    pub scene: &'a Scene<'a>,
+    pub outcome: &'a Outcome,
+    pub rules: Rules,
+    /// Fitted beside everything.
+    pub beside: Option<Basis>,
+    pub seed: Seed,
+}
+
+/// c0 + c1 x + c2 x^2.
+struct Quadratic([f64; 3]);
+
+impl Quadratic {
+    /// Through the values at 0, x and 2 x.
+    fn through([zero, one, two]: [f64; 3], x: f64) -> Self {
+        let bend = 0.5 * (two - 2.0 * one + zero);
+        Quadratic([zero, (one - zero - bend) / x, bend / (x * x)])
+    }
+
+    /// From where on it stays above `level`.
+    fn above(&self, level: f64) -> f64 {
+        let Quadratic([c, b, a]) = self;
+        let root = b * b - 4.0 * a * (c - level);
+        match (*a > 0.0, root > 0.0) {
+            (false, _) => f64::INFINITY,
+            (true, false) => 0.0,
+            (true, true) => ((root.sqrt() - b) / (2.0 * a)).max(0.0),
+        }
+    }
+}
+
+impl Gates<'_> {
+    /// Multiple of the term, which is of size one, that is seen; `None` where none is.
+    pub fn least(&self, unit: &Term) -> Option<f64> {
+        let beside = self.beside.clone().map(|basis| {
+            let coefficients = vec![0.0; basis.count()];
+            Term { statistic: unit.statistic, basis, coefficients }
+        });
+        let m = beside.as_ref().map_or(0, |t| t.basis.count());
+        let terms: Vec<Term> = beside.into_iter().chain([unit.clone()]).collect();
+        let views = evidence_of(&self.left(), &terms);
+        let u = DVector::from_vec([vec![0.0; m], unit.coefficients.clone()].concat());
+        let dispersion = Null::of(&views, m, self.rules.prior)?.dispersion;
+        let first = self.outcome.chosen.first().map_or(0.0, |c| c.gain);
+        let need =
+            (dispersion * self.outcome.noise.threshold(self.rules.level)).max(LEAST_SHARE * first);
+        let sum = views.iter().fold(DMatrix::zeros(u.len(), u.len()), |sum, v| sum + &v.a);
+        let information = u.dot(&(&sum * &u));
+        if !need.is_finite() || information <= 0.0 {
+            return None;
+        }
+        let draw = Draw {
+            roots: views.iter().map(|v| root(&v.a) * dispersion.sqrt()).collect(),
+            views: &views,
+            u: &u,
+            m,
+            step: (2.0 * need / information).sqrt(),
+            prior: self.rules.prior,
+            sum: &sum,
+        };
+        let floor = self.least_rms(&unit.basis);
+        let weight: f64 = self.scene.data.iter().flat_map(|v| &v.weight).sum();
+        let own = size(self.scene, &self.scene.values(unit)).sigma;
+        let sizes: Option<Vec<f64>> = (0..REPLICATES)
+            .into_par_iter()
+            .map(|replicate| {
+                let mut rng = self.seed.stream(&format!("diagnose/power/{replicate}"));
+                let (gain, square, off) = draw.once(&mut rng)?;
+                let told = LEAST_SIZE / own.max(f64::MIN_POSITIVE) - off;
+                Some(gain.above(need).max(square.above(floor * floor * weight)).max(told))
+            })
+            .collect();
+        let mut sizes = sizes?;
+        sizes.sort_by(f64::total_cmp);
+        let least = sizes[(POWER * (sizes.len() - 1) as f64).ceil() as usize];
+        (least > 0.0 && least.is_finite()).then_some(least)
+    }
+
+    /// The views without what was found: it would not be taken for an effect more.
+    fn left(&self) -> Vec<super::search::ViewData> {
+        let found = terms_of(self.outcome, self.scene.statistic);
+        let mut row = Vec::new();
+        let mut views = self.scene.data.clone();
+        for view in &mut views {
+            for (y, place) in view.response.iter_mut().zip(&view.places) {
+                *y -= found.iter().map(|t| t.value(place, &mut row)).sum::<f64>();
+            }
+        }
+        views
+    }
+
+    /// Root mean square that a fit must have, in the response's unit.
+    fn least_rms(&self, basis: &Basis) -> f64 {
+        let largest = self.outcome.chosen.iter().map(|c| c.rms).fold(0.0, f64::max);
+        let still = self
+            .rules
+            .fixed
+            .filter(|_| basis.is_of_picture())
+            .map_or(0.0, |(fixed, px)| fixed * (CLEARLY * basis.count() as f64 / px).sqrt());
+        let least = if self.scene.statistic == Statistic::Bias { self.rules.least } else { 0.0 };
+        least.max(LEAST_OF_LARGEST * largest).max(still)
+    }
+}
+
+/// A square root of a matrix of information.
+fn root(a: &DMatrix<f64>) -> DMatrix<f64> {
+    let eigen = a.clone().symmetric_eigen();
+    let roots = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+    &eigen.eigenvectors * DMatrix::from_diagonal(&roots)
+}
+
+/// Recordings of the shape and of noise.
+struct Draw<'a> {
+    views: &'a [Evidence],
+    roots: Vec<DMatrix<f64>>,
+    u: &'a DVector<f64>,
+    /// Columns beside the shape's.
+    m: usize,
+    step: f64,
+    prior: f64,
+    sum: &'a DMatrix<f64>,
+}
+
+impl Draw<'_> {
+    /// Gain, weighted square of the fit, and the error of its size, over the shape's size.
+    fn once(&self, rng: &mut crate::rng::Stream) -> Option<(Quadratic, Quadratic, f64)> {
+        let noise: Vec<DVector<f64>> = self
+            .roots
+            .iter()
+            .map(|r| r * DVector::from_fn(r.ncols(), |_, _| StandardNormal.sample(rng)))
+            .collect();
+        let (m, k) = (self.m, self.u.len() - self.m);
+        let own = self.sum.view((m, m), (k, k));
+        let mut gains = [0.0; 3];
+        let mut squares = [0.0; 3];
+        let mut off = 0.0;
+        for (n, (g, s)) in gains.iter_mut().zip(&mut squares).enumerate() {
+            let size = n as f64 * self.step;
+            let with = |(v, b): (&Evidence, &DVector<f64>)| Evidence {
+                a: v.a.clone(),
+                b: b + &v.a * self.u * size,
+            };
+            let views: Vec<Evidence> = self.views.iter().zip(&noise).map(with).collect();
+            let whole = gain(&views, self.prior)?;
+            *g = whole.total - self.base(&views)?;
+            let beta = whole.beta.rows(m, k);
+            *s = beta.dot(&(own * beta));
+            if n == 0 {
+                let unit = self.u.rows(m, k);
+                off = unit.dot(&(own * beta)) / unit.dot(&(own * unit));
+            }
+        }
+        let through = |values| Quadratic::through(values, self.step);
+        Some((through(gains), through(squares), off))
+    }
+
+    /// What the columns beside bring alone.
+    fn base(&self, views: &[Evidence]) -> Option<f64> {
+        let m = self.m;
+        if m == 0 {
+            return Some(0.0);
+        }
+        let part = |v: &Evidence| Evidence {
+            a: v.a.view((0, 0), (m, m)).into_owned(),
+            b: v.b.rows(0, m).into_owned(),
+        };
+        let beside: Vec<Evidence> = views.iter().map(part).collect();
+        Some(gain(&beside, self.prior)?.total)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quadratic_is_above_a_level_from_its_larger_root_on() {
+        let square = Quadratic::through([1.0, 4.0, 9.0], 1.0);
+        approx::assert_relative_eq!(square.above(16.0), 3.0, max_relative = 1e-12);
+        assert_eq!(square.above(-1.0), 0.0);
+        assert_eq!(Quadratic::through([0.0, 1.0, 0.0], 1.0).above(2.0), f64::INFINITY);
+    }
+}
