@@ -3,11 +3,12 @@
 use super::battery::Battery;
 use super::case::Case;
 use super::detectable::detectable;
-use super::diagnosis::{DIAGNOSIS_FORMAT, Diagnosis, Reference};
+use super::diagnosis::{DIAGNOSIS_FORMAT, Detectable, Diagnosis, HeldOut, MapRow, Reference};
 use super::engine::Diagnosed;
 use super::findings;
 use super::heldout;
 use super::reference;
+use super::search::Outcome;
 use super::verdict::{extend, not_identifiable, shares, untested, verdict, view_lines};
 use crate::effects::KINECT_BASELINE_M;
 use crate::model::Form;
@@ -30,43 +31,25 @@ impl Case<'_> {
     }
 
     pub fn conclude(mut self, battery: Battery) -> Diagnosed {
-        let camera = &self.recording.sensor.camera;
-        let Battery { mean, scatter, mut found, refitted, better_form, detectable: losses } =
-            battery;
-        let explained: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
+        let Battery { mean, scatter, mut found, refitted, better_form, detectable } = battery;
         let outcomes = [&mean.outcome, &scatter.outcome];
+        let explained: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
         let verdict = verdict(&found, outcomes);
         let cannot_tell = reference::cannot_tell(&self.fields);
         found.extend(cannot_tell.iter().map(not_identifiable));
         shares(&mut found);
-        let heldout = heldout::score(
-            &self.survey,
-            self.model,
-            camera,
-            self.fields[0].scale_px_m,
-            self.options,
-        );
-        let level = self.options.level;
-        let scenes = self.scenes();
-        let map =
-            scenes.iter().zip(outcomes).flat_map(|(s, o)| findings::map(s, o, level)).collect();
-        drop(scenes);
-        let mut detectable =
-            detectable(&self.survey, &mean.outcome, &scatter.outcome, camera, self.options);
-        detectable.extend(losses);
+        let heldout = self.heldout();
+        let map = self.map(outcomes);
+        let detectable = self.detectable(outcomes, detectable);
         let mut remarks = self.remarks();
         remarks.extend(untested(outcomes));
         remarks.extend(better_form);
-        let known = found.iter().chain(&refitted);
-        let extended = extend(self.model, known, self.sensor(), self.survey.reach.disparity);
+        let told = found.iter().chain(&refitted);
+        let extended = extend(self.model, told, self.sensor(), self.survey.reach.disparity);
         let views = view_lines(&self.fields, &self.survey, &mean.terms, heldout.as_ref());
         let left_out = heldout::left_out(&self.survey, &mean.outcome, &mean.terms);
         let recording = self.recording.root.display().to_string();
-        let reference = match self.baseline {
-            Some(_) => Reference::SimulatedRecording,
-            None => Reference::Model,
-        };
-        let excluded = std::mem::take(&mut self.excluded);
+        let (reference, excluded) = (self.reference(), std::mem::take(&mut self.excluded));
         let again = self.after(&extended, &mean, explained);
         let diagnosis = Diagnosis {
             format: DIAGNOSIS_FORMAT,
@@ -92,5 +75,35 @@ impl Case<'_> {
             excluded,
             against: again.against,
         }
+    }
+
+    fn reference(&self) -> Reference {
+        match self.baseline {
+            Some(_) => Reference::SimulatedRecording,
+            None => Reference::Model,
+        }
+    }
+
+    fn heldout(&self) -> Option<HeldOut> {
+        let (camera, scale_px_m) = (&self.sensor().camera, self.fields[0].scale_px_m);
+        heldout::score(&self.survey, self.model, camera, scale_px_m, self.options)
+    }
+
+    fn map(&self, outcomes: [&Outcome; 2]) -> Vec<MapRow> {
+        let level = self.options.level;
+        let layers = self.scenes().into_iter().zip(outcomes);
+        layers.flat_map(|(scene, outcome)| findings::map(&scene, outcome, level)).collect()
+    }
+
+    /// Of what the searches look for, and of losses.
+    fn detectable(
+        &self,
+        [mean, variance]: [&Outcome; 2],
+        losses: Vec<Detectable>,
+    ) -> Vec<Detectable> {
+        let camera = &self.sensor().camera;
+        let mut all = detectable(&self.survey, mean, variance, camera, self.options);
+        all.extend(losses);
+        all
     }
 }

@@ -140,7 +140,7 @@ impl Joint<'_> {
         Some(outcome)
     }
 
-    /// The same fit to either half of the views.
+    /// The same fit to either half of the views, where there are two.
     fn halves(
         &self,
         data: &[ViewData],
@@ -149,6 +149,9 @@ impl Joint<'_> {
         precision: &DVector<f64>,
         whole: &DVector<f64>,
     ) -> Option<Halves> {
+        if !second.contains(&true) {
+            return None;
+        }
         let kept = self.kept(&s.terms);
         let terms = self.columns.terms;
         let nodes = if s.penalty.is_some() { self.columns.nodes } else { 0 };

@@ -163,7 +163,9 @@ impl Survey {
 
     /// The views at these places.
     pub fn subset(&self, which: &[usize]) -> Survey {
-        let views: Vec<SurveyedView> = which.iter().map(|&n| self.views[n].clone()).collect();
+        // A part of the views is asked for no replication.
+        let alone = |&n: &usize| SurveyedView { second: false, ..self.views[n].clone() };
+        let views: Vec<SurveyedView> = which.iter().map(alone).collect();
         let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter()));
         Survey {
             views,

@@ -120,7 +120,7 @@ impl Halves {
     /// From the views' evidence on all terms together; `counts` are the terms' columns.
     pub fn of(views: &[Evidence], second: &[bool], prior: f64, counts: &[usize]) -> Option<Self> {
         let n = views.first()?.b.len();
-        if views.len() != second.len() {
+        if views.len() != second.len() || !second.contains(&true) {
             return None;
         }
         let held = DMatrix::identity(n, n) * prior;

@@ -3,7 +3,7 @@
 use super::sentences::{called, capital, join, mm};
 use crate::capture::far_side;
 use crate::diagnose::{Diagnosis, Finding, NextView, Status, Verdict};
-use crate::report::numbers::{count, fixed};
+use crate::report::numbers::{count, decimals_for, fixed};
 use crate::terms::{Basis, Statistic};
 
 /// So many findings have a sentence each; with the verdict, the rest, what is gained and what is left
@@ -48,7 +48,8 @@ fn of(f: &Finding) -> String {
         _ => format!("{} rms, {} of the noise", mm(f.size.mm), fixed(f.size.sigma, 2)),
     };
     let parameter = |(name, value): (&String, &serde_json::Value)| {
-        Some(format!("{name} {:.4}", value.get("value")?.as_f64()?))
+        let value = value.get("value")?.as_f64()?;
+        Some(format!("{name} {}", fixed(value, decimals_for(value.abs()))))
     };
     let parameters: Vec<String> = f.parameters.iter().filter_map(parameter).collect();
     let parameters = match parameters[..] {
@@ -92,10 +93,18 @@ fn rest(more: &[&Finding], minor: &[&Finding]) -> Option<String> {
         parts.push(format!("{called}, {} % of it{together}", fixed(percent(more), 0)));
     }
     if !minor.is_empty() {
-        let percent = fixed(percent(minor), 1);
-        parts.push(format!("small remains ({}), {percent} % of it together", names(minor)));
+        let share = minor.iter().map(|f| f.share).sum();
+        let percent = small_percent(share);
+        parts.push(format!("small remains ({}), {percent} of it together", names(minor)));
     }
     (!parts.is_empty()).then(|| capital(&parts.join("; ")) + ".")
+}
+
+fn small_percent(share: f64) -> String {
+    match 100.0 * share {
+        p if p < 0.1 => "less than 0.1 %".into(),
+        p => format!("{} %", fixed(p, 1)),
+    }
 }
 
 fn gained(diagnosis: &Diagnosis) -> Option<String> {
@@ -120,9 +129,9 @@ fn left(diagnosis: &Diagnosis) -> Option<String> {
         (Verdict::Match, _) => "The same tests find nothing more in the extended model.".into(),
         (Verdict::Inconclusive, _) => "What the extended model leaves could not be tested.".into(),
         (Verdict::Mismatch, n) => format!(
-            "The same tests still find {} beside the extended model, {} % of what was explained.",
+            "The same tests still find {} beside the extended model, {} of what was explained.",
             count(n, "difference"),
-            fixed(100.0 * share, 1)
+            small_percent(share)
         ),
     })
 }

@@ -270,3 +270,27 @@ fn odd_numbers_do_not_break_a_page() {
     let torn = ViewPictures { before: vec![0.0; 3], ..picture() };
     assert!(rendered(&diagnosis, torn).is_err());
 }
+
+/// Verdict and story together; what is small, and what is not told one by one, has a sentence.
+#[test]
+fn a_story_has_seven_sentences_at_most() {
+    let part = |share, minor| Finding {
+        share,
+        minor,
+        replicated: Some(share < 0.2),
+        ..bowl(Status::Named, [("radial-disparity-bias", 0.97), ("lens-distortion", 0.02)])
+    };
+    let shares = [0.5, 0.2, 0.15, 0.1, 0.04, 0.006, 0.004];
+    let mut told = diagnosis(Verdict::Mismatch, shares.map(|s| part(s, s < 0.01)).to_vec());
+    told.after.verdict = Verdict::Mismatch;
+    let story = story(&told);
+    assert!(story.len() <= 6, "{story:#?}");
+    assert!(story[0].contains("50 % of the mismatch") && story[0].contains("do not agree"));
+    assert!(!story[2].contains("do not agree"), "{}", story[2]);
+    assert!(story[3].contains("14 % of it together; small remains"), "{}", story[3]);
+    assert!(story[3].contains("1.0 % of it together"), "{}", story[3]);
+    for (diagnosis, _) in cases() {
+        let story = super::story(&diagnosis);
+        assert!(story.len() <= 6 && story.iter().all(|s| !s.contains("NaN")), "{story:#?}");
+    }
+}
