@@ -36,6 +36,8 @@ pub struct Case<'a> {
     pub copies: Vec<String>,
     /// Found while reading: the words are ranges.
     pub ranges: Option<Finding>,
+    /// The model has what a first run found.
+    pub extended: bool,
 }
 
 /// What the residuals' mean shows.
@@ -92,6 +94,7 @@ impl<'a> Case<'a> {
             excluded,
             copies,
             ranges,
+            extended: false,
         })
     }
 
@@ -101,7 +104,16 @@ impl<'a> Case<'a> {
         'a: 'b,
     {
         let survey = survey(&fields, &self.bench, self.baseline.as_ref(), self.options);
-        Case { model, known, fields, survey, copies: Vec::new(), ranges: None, ..self }
+        Case {
+            model,
+            known,
+            fields,
+            survey,
+            copies: Vec::new(),
+            ranges: None,
+            extended: true,
+            ..self
+        }
     }
 
     pub fn sensor(&self) -> &'a Sensor {
@@ -148,7 +160,9 @@ impl<'a> Case<'a> {
         if let Some(baseline) = &mut self.baseline {
             let more = baseline.too_much(&structure, each);
             baseline.remarks.extend(more);
+            let found = self.extended.then(|| self.known.clone());
             baseline.compare(&mut structure, &lattice, &mut self.known);
+            found.iter().for_each(|found| self.known.overrule(found));
         }
         let hangs = hanging(&structure, &self.known, each);
         self.survey.compare_frames(&self.fields, common(&structure, &hangs, &self.known));

@@ -52,6 +52,17 @@ impl KnownTerms {
         entry.1.insert(name.into(), value.into());
     }
 
+    /// Take what `found` has for known, whatever was learnt since.
+    pub fn overrule(&mut self, found: &KnownTerms) {
+        for (id, parameters) in &found.entries {
+            for name in parameters.keys() {
+                if let Some(value) = number(parameters, name) {
+                    self.learn(id, name, value);
+                }
+            }
+        }
+    }
+
     pub fn has(&self, id: &str) -> bool {
         self.entries.iter().any(|(known, _)| known == id)
     }
