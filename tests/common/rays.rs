@@ -103,10 +103,18 @@ pub fn text(value: &Value) -> String {
 }
 
 /// JSON has no NaN: a number that is none is a null, which only a standard error, a name, a next
-/// view, and the score of views kept aside may be.
+/// view, the score of views kept aside, and what no test gave may be.
 pub fn nulls(d: &Value) -> Vec<String> {
     fn walk(value: &Value, path: &str, found: &mut Vec<String>) {
-        const MAY: [&str; 4] = ["std_error", "effect", "next_view", "heldout"];
+        const MAY: [&str; 7] = [
+            "std_error",
+            "effect",
+            "next_view",
+            "heldout",
+            "probability",
+            "p_adjusted",
+            "replicated",
+        ];
         match value {
             Value::Null if !MAY.iter().any(|m| path.ends_with(m)) => found.push(path.into()),
             Value::Array(all) => {
