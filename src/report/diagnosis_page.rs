@@ -98,12 +98,14 @@ fn before_after(picture: &ViewPictures, diagnosis: &Diagnosis) -> Result<Markup>
         view.name, view.z_m, view.frames
     );
     let range = scale(&picture.before);
-    let caption = match picture.twin.as_deref().map(|twin| distance(&picture.before, twin)) {
-        Some([apart, recorded]) => format!(
-            "{caption}. The twin is {apart:.3} px rms from the recording, whose residual is {recorded:.3} px"
-        ),
-        None => caption,
-    };
+    let caption = picture.twin.as_deref().map_or(caption.clone(), |twin| {
+        let apart = rms(picture.before.iter().zip(twin).map(|(r, t)| r - t));
+        let [before, after] = [&picture.before, &picture.after].map(|p| rms(p.iter().copied()));
+        format!(
+            "{caption}. The twin is {apart:.3} px rms from the recording, whose residual is {before:.3} px, \
+             and {after:.3} px with the extended model"
+        )
+    });
     let twin = picture.twin.as_ref().map(|twin| ("simulated twin", twin));
     let titled = [("as recorded", &picture.before), ("with the extended model", &picture.after)];
     let panel = |(title, values): (&str, &Vec<f32>)| {
@@ -127,15 +129,11 @@ fn before_after(picture: &ViewPictures, diagnosis: &Diagnosis) -> Result<Markup>
     })
 }
 
-/// Root mean square of the difference of two pictures, and of the first.
-fn distance(recorded: &[f32], twin: &[f32]) -> [f64; 2] {
-    let (mut apart, mut own, mut n) = (0.0, 0.0, 0.0);
-    for (r, t) in recorded.iter().zip(twin).filter(|(r, t)| (*r + *t).is_finite()) {
-        apart += f64::from(r - t).powi(2);
-        own += f64::from(*r).powi(2);
-        n += 1.0;
-    }
-    [apart, own].map(|square| (square / f64::max(n, 1.0)).sqrt())
+/// Root mean square of the pixels that there are.
+fn rms(values: impl Iterator<Item = f32>) -> f64 {
+    let finite = values.filter(|v| v.is_finite()).map(f64::from);
+    let (square, n) = finite.fold((0.0, 0.0), |(sum, n), v| (sum + v * v, n + 1.0));
+    (square / f64::max(n, 1.0)).sqrt()
 }
 
 #[cfg(test)]
