@@ -104,6 +104,9 @@ fn bits(residuals: &[f32]) -> Vec<u32> {
     residuals.iter().map(|r| r.to_bits()).collect()
 }
 
+/// Views that can be used, and those that cannot.
+type Read = (Vec<Field>, Vec<Excluded>);
+
 /// Do the views become flat once their words are taken for lengths of rays? Then with them, and with
 /// the chance of it were either reading as good as the other (the exact test of McNemar).
 fn as_ranges(
@@ -112,7 +115,7 @@ fn as_ranges(
     model: &NoiseModel,
     known: &KnownTerms,
     as_depths: &[Field],
-) -> Option<((Vec<Field>, Vec<Excluded>), f64)> {
+) -> Option<(Read, f64)> {
     let flat = as_depths.len();
     if 2 * flat >= recording.views.len() || known.has("range-not-depth") {
         return None;
@@ -155,7 +158,7 @@ pub(super) fn read(
     model: &NoiseModel,
     known: &KnownTerms,
     progress: Progress<'_>,
-) -> (Vec<Field>, Vec<Excluded>) {
+) -> Read {
     let times = recording.views.iter().filter_map(|v| v.depth.first()).map(|f| f.timestamp);
     let start = times.fold(f64::INFINITY, f64::min);
     let done = AtomicUsize::new(0);
