@@ -8,10 +8,12 @@ use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
+use super::candidate::Candidate;
 use super::evidence::{Evidence, Null, gain};
 use super::pixels::terms_of;
 use super::scene::{Scene, size};
 use super::search::{LEAST_OF_LARGEST, LEAST_SHARE, Outcome, Rules, evidence_of};
+use super::variance::beyond_sigma;
 use super::verdict::LEAST_SIZE;
 use crate::rng::Seed;
 use crate::terms::{Basis, Statistic, Term};
@@ -57,6 +59,10 @@ impl Quadratic {
 impl Gates<'_> {
     /// Multiple of the term, which is of size one, that is seen; `None` where none is.
     pub fn least(&self, unit: &Term) -> Option<f64> {
+        // Beside sigma's own refit, what follows depth and tilt alone is not looked for.
+        if self.beside.is_some() && !beyond_sigma(&Candidate::curve(unit.basis.clone())) {
+            return None;
+        }
         let beside = self.beside.clone().map(|basis| {
             let coefficients = vec![0.0; basis.count()];
             Term { statistic: unit.statistic, basis, coefficients }
