@@ -144,7 +144,7 @@ impl Rows {
     }
 
     /// The same for many columns, of which samples near each other touch the same few: `block` is
-    /// the number of a sample's neighbourhood.
+    /// the number of a sample's neighbourhood, and `columns` fills a whole row.
     pub fn reduce_by_blocks(
         &self,
         count: usize,
@@ -154,37 +154,47 @@ impl Rows {
         let mut a = DMatrix::<f64>::zeros(count, count);
         let mut b = DVector::<f64>::zeros(count);
         let mut cross = DMatrix::<f64>::zeros(self.width, count);
-        let mut order: Vec<usize> =
-            (0..self.response.len()).filter(|&i| self.weight[i] > 0.0).collect();
-        order.sort_by_key(|&i| block(i));
+        let used = (0..self.response.len()).filter(|&i| self.weight[i] > 0.0);
+        let mut order: Vec<(usize, usize)> = used.map(|i| (block(i), i)).collect();
+        order.sort_unstable();
         let mut rows = Vec::new();
-        for members in order.chunk_by(|&i, &j| block(i) == block(j)) {
-            rows.clear();
+        for members in order.chunk_by(|a, b| a.0 == b.0) {
             rows.resize(members.len() * count, 0.0);
-            for (&i, row) in members.iter().zip(rows.chunks_exact_mut(count)) {
+            for (&(_, i), row) in members.iter().zip(rows.chunks_exact_mut(count.max(1))) {
                 columns(i, row);
             }
-            let touched: Vec<usize> = (0..count)
-                .filter(|&j| (0..members.len()).any(|r| rows[r * count + j] != 0.0))
-                .collect();
+            let touched = touched(&rows, count);
+            let weighted = self.weighted(members, &rows, &touched);
+            let squares = &weighted * weighted.transpose();
             let k = touched.len();
-            let weighted = DMatrix::from_fn(members.len(), k + self.width + 1, |r, c| {
-                let i = members[r];
-                let value = match c {
-                    c if c < k => rows[r * count + touched[c]],
-                    c if c < k + self.width => self.beside[i * self.width + c - k],
-                    _ => self.response[i],
-                };
-                self.weight[i].sqrt() * value
-            });
-            let squares = weighted.transpose() * &weighted;
             for (c, &j) in touched.iter().enumerate() {
-                b[j] += squares[(k + self.width, c)];
-                touched.iter().enumerate().for_each(|(r, &i)| a[(i, j)] += squares[(r, c)]);
-                (0..self.width).for_each(|q| cross[(q, j)] += squares[(k + q, c)]);
+                let column = squares.column(c);
+                touched.iter().zip(&column.as_slice()[..k]).for_each(|(&i, s)| a[(i, j)] += s);
+                (0..self.width).for_each(|q| cross[(q, j)] += column[k + q]);
+                b[j] += column[k + self.width];
             }
         }
         self.profiled(&a, &b, &cross)
+    }
+
+    /// A column a sample: its touched columns, what is beside, and the response, times the root of
+    /// its weight.
+    fn weighted(
+        &self,
+        members: &[(usize, usize)],
+        rows: &[f64],
+        touched: &[usize],
+    ) -> DMatrix<f64> {
+        let (count, height) = (rows.len() / members.len(), touched.len() + self.width + 1);
+        let mut all = Vec::with_capacity(members.len() * height);
+        for (n, &(_, i)) in members.iter().enumerate() {
+            let root = self.weight[i].sqrt();
+            let row = &rows[n * count..][..count];
+            all.extend(touched.iter().map(|&j| root * row[j]));
+            all.extend(self.beside[i * self.width..][..self.width].iter().map(|x| root * x));
+            all.push(root * self.response[i]);
+        }
+        DMatrix::from_vec(height, members.len(), all)
     }
 
     /// Score of columns alone, the nuisances profiled out: no other term may stand beside.
@@ -227,6 +237,27 @@ impl Rows {
         right -= &project * self.seen.rows(0, p);
         Evidence { a: all, b: right }
     }
+}
+
+/// The columns of a block of rows that are not zero everywhere.
+fn touched(rows: &[f64], count: usize) -> Vec<usize> {
+    let mut any = vec![false; count];
+    for row in rows.chunks_exact(count.max(1)) {
+        any.iter_mut().zip(row).for_each(|(any, g)| *any |= *g != 0.0);
+    }
+    (0..count).filter(|&j| any[j]).collect()
+}
+
+/// Coefficients of a fit to all views.
+pub fn fit(views: &[Evidence], prior: f64) -> Option<DVector<f64>> {
+    let k = views.first()?.b.len();
+    let mut a = DMatrix::identity(k, k) * prior;
+    let mut b = DVector::zeros(k);
+    for v in views {
+        a += &v.a;
+        b += &v.b;
+    }
+    Some(a.cholesky()?.solve(&b))
 }
 
 /// Gain over no term at all, each view predicted from a fit to the others. `prior` is the

@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use super::candidate::Candidate;
-use super::evidence::{Evidence, Gain, Null, Rows, gain};
+use super::evidence::{Evidence, Gain, Null, Rows, fit, gain};
 use super::tiles::SIDE;
 use crate::rng::Seed;
 use crate::terms::{Basis, Coordinate, PixelContext, Term};
@@ -220,9 +220,7 @@ pub fn search_beside(
 /// Evidence of views on given terms together.
 pub fn evidence_of(data: &[ViewData], terms: &[Term]) -> Vec<Evidence> {
     let bases: Vec<&Basis> = terms.iter().map(|t| &t.basis).collect();
-    data.par_iter()
-        .filter_map(|v| Some(rows(v, v.response.clone(), &bases)?.reduce(0, |_, _| ())))
-        .collect()
+    data.par_iter().filter_map(|v| together(v, &bases)).collect()
 }
 
 /// The greatest gains that noise alone brings, ascending, nats.
@@ -325,10 +323,7 @@ impl<'a> Layer<'a> {
     fn evidence_of(&self, terms: &[&Basis]) -> Vec<Evidence> {
         let fine = terms.iter().any(|b| b.is_fine() || b.of_column_alone());
         let views = if fine { self.fine } else { self.coarse };
-        views
-            .par_iter()
-            .filter_map(|v| Some(rows(v, v.response.clone(), terms)?.reduce(0, |_, _| ())))
-            .collect()
+        views.par_iter().filter_map(|v| together(v, terms)).collect()
     }
 
     /// Terms with a name are fitted anew beside every candidate; those without have many columns
@@ -339,8 +334,8 @@ impl<'a> Layer<'a> {
         let mut settled: Vec<(&Basis, Vec<f64>)> = Vec::new();
         if !nameless.is_empty() {
             let all: Vec<&Basis> = nameless.iter().chain(&named).copied().collect();
-            let fit = gain(&self.evidence_of(&all), self.rules.prior);
-            let beta = fit.map_or_else(Vec::new, |f| f.beta.as_slice().to_vec());
+            let beta = fit(&self.evidence_of(&all), self.rules.prior);
+            let beta = beta.map_or_else(Vec::new, |beta| beta.as_slice().to_vec());
             let mut rest = beta.as_slice();
             for basis in nameless {
                 if rest.len() >= basis.count() {
@@ -662,6 +657,32 @@ fn without(view: &ViewData, settled: &[(&Basis, Vec<f64>)]) -> Vec<f64> {
     response
 }
 
+/// Side of a neighbourhood in patches: few nodes of a curve or a map are within it.
+const NEIGHBOURS: f64 = 8.0;
+
+/// A view's normal equations on these terms together.
+fn together(view: &ViewData, terms: &[&Basis]) -> Option<Evidence> {
+    let rows = rows(view, view.response.clone(), &[])?;
+    let count = terms.iter().map(|b| b.count()).sum();
+    let block = |i: usize| {
+        const ACROSS: usize = 1 << 16;
+        let place = &view.places[i];
+        let side = NEIGHBOURS * place.side.max(1.0);
+        (place.v / side) as usize * ACROSS + (place.u / side) as usize
+    };
+    Some(rows.reduce_by_blocks(count, block, |i, row| fill_all(terms, &view.places[i], row)))
+}
+
+/// The columns of several terms, one after the other.
+fn fill_all(terms: &[&Basis], place: &PixelContext, row: &mut [f64]) {
+    let mut rest = row;
+    for basis in terms {
+        let (mine, others) = rest.split_at_mut(basis.count());
+        basis.fill(place, mine);
+        rest = others;
+    }
+}
+
 /// A view's rows with its nuisances and the terms beside.
 fn rows(view: &ViewData, response: Vec<f64>, beside: &[&Basis]) -> Option<Rows> {
     let p = view.precision.len();
@@ -669,12 +690,7 @@ fn rows(view: &ViewData, response: Vec<f64>, beside: &[&Basis]) -> Option<Rows> 
     let mut columns = vec![0.0; view.places.len() * width];
     for (i, row) in columns.chunks_exact_mut(width).enumerate() {
         row[..p].copy_from_slice(&view.nuisance[i * p..][..p]);
-        let mut rest = &mut row[p..];
-        for basis in beside {
-            let (mine, others) = rest.split_at_mut(basis.count());
-            basis.fill(&view.places[i], mine);
-            rest = others;
-        }
+        fill_all(beside, &view.places[i], &mut row[p..]);
     }
     Rows::new(response, view.weight.clone(), columns, width, &view.precision)
 }
