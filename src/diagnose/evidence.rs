@@ -4,10 +4,13 @@
 //! view's own level) profiled out, log p(view | beta) = beta' b - beta' A beta / 2 + const. The
 //! search then needs only A and b of every view, and so does the simulation of its null.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::rng::Stream;
+use crate::solve::Cholesky;
 
 /// A view's normal equations on the columns under test, in nats: first the terms already chosen,
 /// then the candidate.
@@ -32,74 +35,66 @@ pub struct Gain {
 
 /// One view's data with what is fitted beside every candidate: its own nuisances, and the terms
 /// already chosen.
-pub struct Rows {
-    response: Vec<f64>,
+pub struct Rows<'a> {
     /// Inverse variance, in independent samples.
-    weight: Vec<f64>,
-    /// A row a sample: nuisances, then the chosen terms' columns.
-    beside: Vec<f64>,
+    weight: Cow<'a, [f64]>,
+    /// A row a sample: nuisances, then the chosen terms' columns, then the response.
+    samples: Vec<f64>,
     nuisances: usize,
+    /// Columns beside the candidate's.
     width: usize,
-    /// Normal equations of `beside`, before anything is profiled out.
+    /// Normal equations of what is beside, before anything is profiled out.
     own: DMatrix<f64>,
     seen: DVector<f64>,
     /// Inverse of the nuisances' own block.
     inverse: DMatrix<f64>,
 }
 
-impl Rows {
+impl<'a> Rows<'a> {
     /// `beside` is row-major with `width` columns, of which the first are the nuisances, one for
     /// each entry of `precision`, which holds them to zero (0: free). `None` when the nuisances
     /// cannot be told apart.
     pub fn new(
-        response: Vec<f64>,
-        weight: Vec<f64>,
-        beside: Vec<f64>,
+        response: &[f64],
+        weight: &'a [f64],
+        beside: &[f64],
         width: usize,
         precision: &[f64],
     ) -> Option<Self> {
-        let root = |i: usize| weight[i].max(0.0).sqrt();
-        let weighted =
-            DMatrix::from_fn(width, response.len(), |q, i| root(i) * beside[i * width + q]);
-        let mut own = &weighted * weighted.transpose();
-        let seen = &weighted * DVector::from_fn(response.len(), |i, _| root(i) * response[i]);
+        let mut samples = Vec::with_capacity(response.len() * (width + 1));
+        for (row, y) in beside.chunks_exact(width).zip(response) {
+            samples.extend_from_slice(row);
+            samples.push(*y);
+        }
+        let squares = squares(&samples, weight, width + 1);
+        let mut own = squares.view((0, 0), (width, width)).into_owned();
+        let seen = squares.view((0, width), (width, 1)).column(0).into_owned();
         let p = precision.len();
         for (q, precision) in precision.iter().enumerate() {
             own[(q, q)] += precision;
         }
         let inverse = own.view((0, 0), (p, p)).into_owned().try_inverse()?;
-        Some(Rows { response, weight, beside, nuisances: p, width, own, seen, inverse })
+        let weight = Cow::Borrowed(weight);
+        Some(Rows { weight, samples, nuisances: p, width, own, seen, inverse })
     }
 
     /// Samples that share a key made one: exact for columns that depend on the key alone.
     pub fn grouped(&self, keys: usize, key: impl Fn(usize) -> usize) -> Self {
-        let mut response = vec![0.0; keys];
+        let n = self.width + 1;
         let mut weight = vec![0.0; keys];
-        let mut beside = vec![0.0; keys * self.width];
-        for (i, (&y, &w)) in self.response.iter().zip(&self.weight).enumerate() {
+        let mut samples = vec![0.0; keys * n];
+        for (i, (row, &w)) in self.samples.chunks_exact(n).zip(&*self.weight).enumerate() {
             let k = key(i);
             weight[k] += w;
-            response[k] += w * y;
-            let row = &self.beside[i * self.width..][..self.width];
-            for (sum, x) in beside[k * self.width..][..self.width].iter_mut().zip(row) {
-                *sum += w * x;
-            }
+            samples[k * n..][..n].iter_mut().zip(row).for_each(|(sum, x)| *sum += w * x);
         }
-        for k in 0..keys {
-            let w = weight[k].max(f64::MIN_POSITIVE);
-            response[k] /= w;
-            beside[k * self.width..][..self.width].iter_mut().for_each(|x| *x /= w);
+        for (row, w) in samples.chunks_exact_mut(n).zip(&weight) {
+            let w = w.max(f64::MIN_POSITIVE);
+            row.iter_mut().for_each(|x| *x /= w);
         }
-        Rows {
-            response,
-            weight,
-            beside,
-            nuisances: self.nuisances,
-            width: self.width,
-            own: self.own.clone(),
-            seen: self.seen.clone(),
-            inverse: self.inverse.clone(),
-        }
+        let (own, seen, inverse) = (self.own.clone(), self.seen.clone(), self.inverse.clone());
+        let weight = Cow::Owned(weight);
+        Rows { weight, samples, nuisances: self.nuisances, width: self.width, own, seen, inverse }
     }
 
     /// Weighted square that the nuisances (and chosen terms) explain.
@@ -109,38 +104,47 @@ impl Rows {
         (&self.inverse * seen).dot(&seen)
     }
 
+    /// Sample number `i`: what is beside, and the response.
+    fn sample(&self, i: usize) -> &[f64] {
+        let n = self.width + 1;
+        &self.samples[i * n..][..n]
+    }
+
+    /// Numbers of the samples that weigh anything.
+    fn used(&self) -> impl Iterator<Item = usize> {
+        (0..self.weight.len()).filter(|&i| self.weight[i] > 0.0)
+    }
+
     /// Evidence on the chosen terms and a candidate, the nuisances profiled out. `columns` fills
     /// one row of the candidate's columns.
     pub fn reduce(&self, count: usize, mut columns: impl FnMut(usize, &mut [f64])) -> Evidence {
-        let width = self.width;
+        let n = self.width + 1;
         let mut g = vec![0.0; count];
         let mut touched = Vec::with_capacity(count);
-        let mut a = DMatrix::<f64>::zeros(count, count);
-        let mut b = DVector::<f64>::zeros(count);
-        let mut cross = DMatrix::<f64>::zeros(width, count);
-        for (i, (&y, &w)) in self.response.iter().zip(&self.weight).enumerate() {
-            if w <= 0.0 || count == 0 {
-                continue;
-            }
+        // Row-major, the lower triangle alone.
+        let mut a = vec![0.0; count * count];
+        let mut cross = vec![0.0; count * n];
+        for i in self.used().take_while(|_| count > 0) {
             columns(i, &mut g);
+            let (w, sample) = (self.weight[i], self.sample(i));
             // Curves touch two of their many columns.
             touched.clear();
             touched.extend((0..count).filter(|&j| g[j] != 0.0));
-            let row = &self.beside[i * width..][..width];
-            for (n, &j) in touched.iter().enumerate() {
+            for (t, &j) in touched.iter().enumerate() {
                 let wg = w * g[j];
-                b[j] += wg * y;
-                for &k in &touched[..=n] {
-                    a[(j, k)] += wg * g[k];
+                let into = &mut a[j * count..][..count];
+                if touched.len() == count {
+                    into[..=j].iter_mut().zip(&g).for_each(|(sum, x)| *sum += wg * x);
+                } else {
+                    touched[..=t].iter().for_each(|&k| into[k] += wg * g[k]);
                 }
-                let mut into = cross.column_mut(j);
-                for (sum, x) in into.iter_mut().zip(row) {
-                    *sum += wg * x;
-                }
+                let into = &mut cross[j * n..][..n];
+                into.iter_mut().zip(sample).for_each(|(sum, x)| *sum += wg * x);
             }
         }
+        let mut a = DMatrix::from_row_slice(count, count, &a);
         a.fill_upper_triangle_with_lower_triangle();
-        self.profiled(&a, &b, &cross)
+        self.profiled(&a, &DMatrix::from_vec(n, count, cross))
     }
 
     /// The same for many columns, of which samples near each other touch the same few: `block` is
@@ -151,11 +155,10 @@ impl Rows {
         block: impl Fn(usize) -> usize,
         mut columns: impl FnMut(usize, &mut [f64]),
     ) -> Evidence {
+        let n = self.width + 1;
         let mut a = DMatrix::<f64>::zeros(count, count);
-        let mut b = DVector::<f64>::zeros(count);
-        let mut cross = DMatrix::<f64>::zeros(self.width, count);
-        let used = (0..self.response.len()).filter(|&i| self.weight[i] > 0.0);
-        let mut order: Vec<(usize, usize)> = used.map(|i| (block(i), i)).collect();
+        let mut cross = DMatrix::<f64>::zeros(n, count);
+        let mut order: Vec<(usize, usize)> = self.used().map(|i| (block(i), i)).collect();
         order.sort_unstable();
         let mut rows = Vec::new();
         for members in order.chunk_by(|a, b| a.0 == b.0) {
@@ -166,15 +169,14 @@ impl Rows {
             let touched = touched(&rows, count);
             let weighted = self.weighted(members, &rows, &touched);
             let squares = &weighted * weighted.transpose();
-            let k = touched.len();
             for (c, &j) in touched.iter().enumerate() {
                 let column = squares.column(c);
-                touched.iter().zip(&column.as_slice()[..k]).for_each(|(&i, s)| a[(i, j)] += s);
-                (0..self.width).for_each(|q| cross[(q, j)] += column[k + q]);
-                b[j] += column[k + self.width];
+                let (own, beside) = column.as_slice().split_at(touched.len());
+                touched.iter().zip(own).for_each(|(&i, s)| a[(i, j)] += s);
+                cross.column_mut(j).iter_mut().zip(beside).for_each(|(sum, s)| *sum += s);
             }
         }
-        self.profiled(&a, &b, &cross)
+        self.profiled(&a, &cross)
     }
 
     /// A column a sample: its touched columns, what is beside, and the response, times the root of
@@ -185,14 +187,14 @@ impl Rows {
         rows: &[f64],
         touched: &[usize],
     ) -> DMatrix<f64> {
-        let (count, height) = (rows.len() / members.len(), touched.len() + self.width + 1);
+        let count = rows.len() / members.len();
+        let height = touched.len() + self.width + 1;
         let mut all = Vec::with_capacity(members.len() * height);
         for (n, &(_, i)) in members.iter().enumerate() {
             let root = self.weight[i].sqrt();
             let row = &rows[n * count..][..count];
             all.extend(touched.iter().map(|&j| root * row[j]));
-            all.extend(self.beside[i * self.width..][..self.width].iter().map(|x| root * x));
-            all.push(root * self.response[i]);
+            all.extend(self.sample(i).iter().map(|x| root * x));
         }
         DMatrix::from_vec(height, members.len(), all)
     }
@@ -202,22 +204,20 @@ impl Rows {
         let own = &self.inverse * &self.seen;
         let mut sum = DVector::zeros(count);
         let mut g = vec![0.0; count];
-        for (i, (&y, &w)) in self.response.iter().zip(&self.weight).enumerate() {
-            if w <= 0.0 {
-                continue;
-            }
+        for i in self.used() {
             columns(i, &mut g);
-            let row = &self.beside[i * self.width..][..self.width];
-            let left = w * (y - row.iter().zip(own.iter()).map(|(x, b)| x * b).sum::<f64>());
+            let (row, y) = self.sample(i).split_at(self.width);
+            let fitted: f64 = row.iter().zip(own.iter()).map(|(x, b)| x * b).sum();
+            let left = self.weight[i] * (y[0] - fitted);
             sum.iter_mut().zip(&g).for_each(|(s, g)| *s += left * g);
         }
         sum
     }
 
     /// Information and score of the chosen terms and a candidate together, `cross` being the
-    /// candidate's against all that is beside it, with the nuisances profiled out.
-    fn profiled(&self, a: &DMatrix<f64>, b: &DVector<f64>, cross: &DMatrix<f64>) -> Evidence {
-        let (p, count) = (self.nuisances, b.len());
+    /// candidate's against all that is beside it and the response, with the nuisances profiled out.
+    fn profiled(&self, a: &DMatrix<f64>, cross: &DMatrix<f64>) -> Evidence {
+        let (p, count) = (self.nuisances, a.ncols());
         let m = self.width - p;
         let n = m + count;
         let mut all = DMatrix::<f64>::zeros(n, n);
@@ -227,7 +227,7 @@ impl Rows {
         all.view_mut((0, m), (m, count)).copy_from(&cross.view((p, 0), (m, count)));
         all.view_mut((m, 0), (count, m)).copy_from(&cross.view((p, 0), (m, count)).transpose());
         right.rows_mut(0, m).copy_from(&self.seen.rows(p, m));
-        right.rows_mut(m, count).copy_from(b);
+        right.rows_mut(m, count).copy_from(&cross.row(self.width).transpose());
         // The nuisances against all of it.
         let mut shared = DMatrix::<f64>::zeros(p, n);
         shared.view_mut((0, 0), (p, m)).copy_from(&self.own.view((0, p), (p, m)));
@@ -237,6 +237,22 @@ impl Rows {
         right -= &project * self.seen.rows(0, p);
         Evidence { a: all, b: right }
     }
+}
+
+/// Samples multiplied at once.
+const AT_ONCE: usize = 512;
+
+/// Weighted sums of products of the `n` columns of row-major samples.
+fn squares(samples: &[f64], weight: &[f64], n: usize) -> DMatrix<f64> {
+    let mut sum = DMatrix::zeros(n, n);
+    for (samples, weight) in samples.chunks(AT_ONCE * n).zip(weight.chunks(AT_ONCE)) {
+        let mut rooted = DMatrix::from_column_slice(n, weight.len(), samples);
+        for (mut sample, w) in rooted.column_iter_mut().zip(weight) {
+            sample *= w.max(0.0).sqrt();
+        }
+        sum.gemm(1.0, &rooted, &rooted.transpose(), 1.0);
+    }
+    sum
 }
 
 /// The columns of a block of rows that are not zero everywhere.
@@ -257,7 +273,7 @@ pub fn fit(views: &[Evidence], prior: f64) -> Option<DVector<f64>> {
         a += &v.a;
         b += &v.b;
     }
-    Some(a.cholesky()?.solve(&b))
+    Some(Cholesky::of(a)?.solve(&b))
 }
 
 /// Gain over no term at all, each view predicted from a fit to the others. `prior` is the
@@ -273,17 +289,13 @@ pub fn gain(views: &[Evidence], prior: f64) -> Option<Gain> {
     let by_view: Vec<f64> = views
         .iter()
         .map(|v| {
-            let beta = (&a - &v.a).cholesky()?.solve(&(&b - &v.b));
+            let beta = Cholesky::of(&a - &v.a)?.solve(&(&b - &v.b));
             Some(score(v, &beta))
         })
         .collect::<Option<_>>()?;
-    let whole = a.cholesky()?;
-    Some(Gain {
-        total: by_view.iter().sum(),
-        by_view,
-        beta: whole.solve(&b),
-        covariance: whole.inverse(),
-    })
+    let whole = Cholesky::of(a)?;
+    let covariance = whole.inverse();
+    Some(Gain { total: by_view.iter().sum(), by_view, beta: whole.solve(&b), covariance })
 }
 
 /// Log likelihood of a view with the coefficients `beta` over that without any, nats.

@@ -85,7 +85,7 @@ fn log_score(view: &ViewData, terms: &[Term]) -> Option<f64> {
         .collect();
     let p = view.precision.len();
     let own: f64 = response.iter().zip(&view.weight).map(|(y, w)| w * y * y).sum();
-    let rows = Rows::new(response, view.weight.clone(), view.nuisance.clone(), p, &view.precision)?;
+    let rows = Rows::new(&response, &view.weight, &view.nuisance, p, &view.precision)?;
     Some(-0.5 * (own - rows.explained()))
 }
 

@@ -181,6 +181,7 @@ pub fn search_beside(
     let mut layer = Layer {
         fine,
         coarse,
+        groups: fine.par_iter().map(Grouping::all).collect(),
         candidates,
         rules,
         noise: None,
@@ -281,15 +282,17 @@ impl NoiseGains {
 
 /// A view made ready for the candidates.
 struct Prepared<'a> {
-    fine: (&'a [PixelContext], Rows),
-    coarse: (&'a [PixelContext], Rows),
-    /// The fine samples gathered by one coordinate, with a place for each group.
-    groups: Vec<(Coordinate, Vec<PixelContext>, Rows)>,
+    fine: (&'a [PixelContext], Rows<'a>),
+    coarse: (&'a [PixelContext], Rows<'a>),
+    /// The fine samples gathered by one coordinate.
+    groups: Vec<(&'a Grouping, Rows<'a>)>,
 }
 
 struct Layer<'a> {
     fine: &'a [ViewData],
     coarse: &'a [ViewData],
+    /// Of every view's fine samples.
+    groups: Vec<Vec<Grouping>>,
     candidates: &'a [Candidate],
     rules: &'a Rules,
     noise: Option<NoiseGains>,
@@ -318,7 +321,7 @@ fn bases_where(chosen: &[Chosen], which: impl Fn(&Candidate) -> bool) -> Vec<&Ba
     chosen.iter().map(|c| &c.candidate).filter(|c| which(c)).map(|c| &c.basis).collect()
 }
 
-impl<'a> Layer<'a> {
+impl Layer<'_> {
     /// Evidence of the views on these terms together.
     fn evidence_of(&self, terms: &[&Basis]) -> Vec<Evidence> {
         let fine = terms.iter().any(|b| b.is_fine() || b.of_column_alone());
@@ -328,7 +331,7 @@ impl<'a> Layer<'a> {
 
     /// Terms with a name are fitted anew beside every candidate; those without have many columns
     /// and are taken out as they were fitted.
-    fn prepare(&self, chosen: &[Chosen]) -> Vec<Prepared<'a>> {
+    fn prepare(&self, chosen: &[Chosen]) -> Vec<Prepared<'_>> {
         let named: Vec<&Basis> = bases_where(chosen, |c| c.family.is_some());
         let nameless: Vec<&Basis> = bases_where(chosen, |c| c.family.is_none());
         let mut settled: Vec<(&Basis, Vec<f64>)> = Vec::new();
@@ -345,8 +348,8 @@ impl<'a> Layer<'a> {
                 }
             }
         }
-        let pairs: Vec<(&ViewData, &ViewData)> = self.fine.iter().zip(self.coarse).collect();
-        pairs.par_iter().filter_map(|(f, c)| prepare(f, c, &named, &settled)).collect()
+        let views = self.fine.par_iter().zip(self.coarse).zip(&self.groups);
+        views.filter_map(|((f, c), g)| prepare(f, c, g, &named, &settled)).collect()
     }
 
     /// A term that stays, with what it brings alone.
@@ -662,7 +665,7 @@ const NEIGHBOURS: f64 = 8.0;
 
 /// A view's normal equations on these terms together.
 fn together(view: &ViewData, terms: &[&Basis]) -> Option<Evidence> {
-    let rows = rows(view, view.response.clone(), &[])?;
+    let rows = rows(view, &view.response, &[])?;
     let count = terms.iter().map(|b| b.count()).sum();
     let block = |i: usize| {
         const ACROSS: usize = 1 << 16;
@@ -684,20 +687,24 @@ fn fill_all(terms: &[&Basis], place: &PixelContext, row: &mut [f64]) {
 }
 
 /// A view's rows with its nuisances and the terms beside.
-fn rows(view: &ViewData, response: Vec<f64>, beside: &[&Basis]) -> Option<Rows> {
+fn rows<'a>(view: &'a ViewData, response: &[f64], beside: &[&Basis]) -> Option<Rows<'a>> {
     let p = view.precision.len();
+    if beside.is_empty() {
+        return Rows::new(response, &view.weight, &view.nuisance, p, &view.precision);
+    }
     let width = p + beside.iter().map(|b| b.count()).sum::<usize>();
     let mut columns = vec![0.0; view.places.len() * width];
     for (i, row) in columns.chunks_exact_mut(width).enumerate() {
         row[..p].copy_from_slice(&view.nuisance[i * p..][..p]);
         fill_all(beside, &view.places[i], &mut row[p..]);
     }
-    Rows::new(response, view.weight.clone(), columns, width, &view.precision)
+    Rows::new(response, &view.weight, &columns, width, &view.precision)
 }
 
 fn prepare<'a>(
     fine: &'a ViewData,
     coarse: &'a ViewData,
+    groups: &'a [Grouping],
     beside: &[&Basis],
     settled: &[(&Basis, Vec<f64>)],
 ) -> Option<Prepared<'a>> {
@@ -712,19 +719,12 @@ fn prepare<'a>(
         }
         sums.iter().zip(&coarse.weight).map(|(s, w)| if *w > 0.0 { s / w } else { 0.0 }).collect()
     };
-    let rows_fine = rows(fine, left, beside)?;
-    let places = &fine.places;
-    let side = SIDE as f64;
-    let groups = vec![
-        gather(&rows_fine, places, Coordinate::Column, side),
-        gather(&rows_fine, places, Coordinate::Row, side),
-        gather(&rows_fine, places, Coordinate::Disparity, DISPARITY_GROUP_PX),
-        gather(&rows_fine, places, Coordinate::Edge, EDGE_GROUP_PX),
-    ];
+    let rows_fine = rows(fine, &left, beside)?;
+    let grouped = |g: &'a Grouping| (g, rows_fine.grouped(g.places.len(), |i| g.of[i] as usize));
     Some(Prepared {
-        groups,
-        fine: (places, rows_fine),
-        coarse: (&coarse.places, rows(coarse, left_coarse, beside)?),
+        groups: groups.iter().map(grouped).collect(),
+        fine: (&fine.places, rows_fine),
+        coarse: (&coarse.places, rows(coarse, &left_coarse, beside)?),
     })
 }
 
@@ -732,36 +732,53 @@ fn prepare<'a>(
 const DISPARITY_GROUP_PX: f64 = 1.0 / 30.0;
 const EDGE_GROUP_PX: f64 = 0.5;
 
-/// Samples in steps of one coordinate; each group lies where its samples do on average.
-fn gather(
-    rows: &Rows,
-    places: &[PixelContext],
+/// A view's samples in steps of one coordinate.
+struct Grouping {
     over: Coordinate,
-    step: f64,
-) -> (Coordinate, Vec<PixelContext>, Rows) {
-    let low = places.iter().map(|p| over.value(p)).fold(f64::INFINITY, f64::min);
-    let key = |i: usize| ((over.value(&places[i]) - low) / step) as usize;
-    let count = (0..places.len()).map(|i| key(i) + 1).max().unwrap_or(0);
-    let mut sums = vec![(PixelContext::default(), [0.0; 6], 0.0); count];
-    for (i, p) in places.iter().enumerate() {
-        let (first, sum, n) = &mut sums[key(i)];
-        *first = *p;
-        *n += 1.0;
-        let values = [p.u, p.v, p.disparity, p.z, p.edge, p.radius];
-        sum.iter_mut().zip(values).for_each(|(s, v)| *s += v);
+    /// Each group lies where its samples do on average.
+    places: Vec<PixelContext>,
+    /// The group of each sample.
+    of: Vec<u32>,
+}
+
+impl Grouping {
+    /// By every coordinate that a shape may depend on alone.
+    fn all(view: &ViewData) -> Vec<Self> {
+        let side = SIDE as f64;
+        let steps = [
+            (Coordinate::Column, side),
+            (Coordinate::Row, side),
+            (Coordinate::Disparity, DISPARITY_GROUP_PX),
+            (Coordinate::Edge, EDGE_GROUP_PX),
+        ];
+        steps.map(|(over, step)| Grouping::by(&view.places, over, step)).into()
     }
-    let mean = |(place, sum, n): &(PixelContext, [f64; 6], f64)| {
-        let [u, v, disparity, z, edge, radius] = sum.map(|s| s / f64::max(*n, 1.0));
-        PixelContext { u, v, disparity, z, edge, radius, ..*place }
-    };
-    (over, sums.iter().map(mean).collect(), rows.grouped(count, key))
+
+    fn by(places: &[PixelContext], over: Coordinate, step: f64) -> Self {
+        let low = places.iter().map(|p| over.value(p)).fold(f64::INFINITY, f64::min);
+        let of: Vec<u32> = places.iter().map(|p| ((over.value(p) - low) / step) as u32).collect();
+        let count = of.iter().map(|&k| k as usize + 1).max().unwrap_or(0);
+        let mut sums = vec![(PixelContext::default(), [0.0; 6], 0.0); count];
+        for (p, &k) in places.iter().zip(&of) {
+            let (first, sum, n) = &mut sums[k as usize];
+            *first = *p;
+            *n += 1.0;
+            let values = [p.u, p.v, p.disparity, p.z, p.edge, p.radius];
+            sum.iter_mut().zip(values).for_each(|(s, v)| *s += v);
+        }
+        let mean = |(place, sum, n): &(PixelContext, [f64; 6], f64)| {
+            let [u, v, disparity, z, edge, radius] = sum.map(|s| s / f64::max(*n, 1.0));
+            PixelContext { u, v, disparity, z, edge, radius, ..*place }
+        };
+        Grouping { over, places: sums.iter().map(mean).collect(), of }
+    }
 }
 
 impl Prepared<'_> {
     fn evidence(&self, basis: &Basis) -> Evidence {
-        let alone = basis.alone().and_then(|over| self.groups.iter().find(|g| g.0 == over));
-        let (places, rows): (&[PixelContext], &Rows) = if let Some((_, places, rows)) = alone {
-            (places, rows)
+        let alone = basis.alone().and_then(|over| self.groups.iter().find(|g| g.0.over == over));
+        let (places, rows): (&[PixelContext], &Rows<'_>) = if let Some((group, rows)) = alone {
+            (&group.places, rows)
         } else if basis.is_fine() {
             (self.fine.0, &self.fine.1)
         } else {
