@@ -9,7 +9,7 @@ use crate::camera::Rays;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
 use crate::frame::{DepthTable, Frame};
-use crate::io::{FrameSource, InfraredImage};
+use crate::io::{InfraredImage, read_depth};
 use crate::measure::{Workbench, view_target};
 use crate::model::SigmaModel;
 use crate::plane::Plane;
@@ -88,16 +88,20 @@ impl Field {
         known: &KnownTerms,
         session_start: f64,
     ) -> Result<Self> {
-        let target = view_target(view, bench)?;
+        let (target, held) = view_target(view, bench)?;
         let camera = &bench.sensor.camera;
         let mut field = Field::empty(view, bench.sensor, target.plane, target.pixels);
         field.spread_px = (target.scale * field.scale_px_m) as f32;
-        let mut source = FrameSource::new(camera.width, camera.height);
         let start = view.depth.first().map_or(0.0, |f| f.timestamp);
-        let frames = view
-            .depth
-            .iter()
-            .filter_map(|frame| Some((frame.timestamp - start, source.read(&frame.path).ok()?)));
+        let mut held = held.into_iter().peekable();
+        // Frames that showed the target are not read twice.
+        let frames = view.depth.iter().enumerate().filter_map(|(number, frame)| {
+            let image = match held.next_if(|h| h.0 == number) {
+                Some((_, image)) => image,
+                None => read_depth(&frame.path, camera.width, camera.height).ok()?,
+            };
+            Some((frame.timestamp - start, image))
+        });
         field.expose(frames, bench, sigma, known, session_start);
         field.look(view, &bench.rays);
         Ok(field)
