@@ -8,6 +8,7 @@ use std::borrow::Cow;
 
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
 
 use crate::rng::Stream;
 use crate::solve::Cholesky;
@@ -276,6 +277,9 @@ pub fn fit(views: &[Evidence], prior: f64) -> Option<DVector<f64>> {
     Some(Cholesky::of(a)?.solve(&b))
 }
 
+/// Few unknowns are not worth more threads.
+const VIEWS_AT_ONCE: usize = 4;
+
 /// Gain over no term at all, each view predicted from a fit to the others. `prior` is the
 /// precision that holds a coefficient nothing is known about.
 pub fn gain(views: &[Evidence], prior: f64) -> Option<Gain> {
@@ -287,7 +291,8 @@ pub fn gain(views: &[Evidence], prior: f64) -> Option<Gain> {
         b += &v.b;
     }
     let by_view: Vec<f64> = views
-        .iter()
+        .par_iter()
+        .with_min_len(VIEWS_AT_ONCE)
         .map(|v| {
             let beta = Cholesky::of(&a - &v.a)?.solve(&(&b - &v.b));
             Some(score(v, &beta))

@@ -61,20 +61,38 @@ const TAIL_SIGMAS: f32 = 4.0;
 
 /// Measure all views. `bias` has, view by view, what is known to be no noise, px (or is empty).
 pub fn structures(fields: &[Field], camera: &Camera, bias: &[Vec<f32>]) -> Vec<Structure> {
-    let none = Vec::new();
-    let views: Vec<(&Field, &Vec<f32>)> =
-        fields.iter().enumerate().map(|(n, f)| (f, bias.get(n).unwrap_or(&none))).collect();
-    let means: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| fine(f, b)).collect();
-    let with_lines = across_views(&means);
-    let means: Vec<Vec<f32>> =
-        means.iter().map(|m| without_lines(m, camera.width, SHORT_LINE)).collect();
-    let fixed = across_views(&means);
+    let views = beside_bias(fields, bias);
     let mut all: Vec<Structure> = views.par_iter().map(|(f, b)| structure(f, camera, b)).collect();
-    for (s, (fixed, with_lines)) in all.iter_mut().zip(fixed.into_iter().zip(with_lines)) {
-        s.fixed_px2 = fixed;
-        s.lines_px2 = with_lines.zip(fixed).map(|(all, fixed)| all - fixed);
+    for (s, Still { fixed_px2, with_lines_px2 }) in all.iter_mut().zip(still(&views, camera)) {
+        s.fixed_px2 = fixed_px2;
+        s.lines_px2 = with_lines_px2.zip(fixed_px2).map(|(all, fixed)| all - fixed);
     }
     all
+}
+
+/// [`Structure::fixed_px2`] of all views alone.
+pub fn fixed_px2_by_view(fields: &[Field], camera: &Camera) -> Vec<Option<f64>> {
+    still(&beside_bias(fields, &[]), camera).into_iter().map(|s| s.fixed_px2).collect()
+}
+
+fn beside_bias<'a>(fields: &'a [Field], bias: &'a [Vec<f32>]) -> Vec<(&'a Field, &'a [f32])> {
+    let of = |n: usize| bias.get(n).map_or(&[][..], Vec::as_slice);
+    fields.iter().enumerate().map(|(n, f)| (f, of(n))).collect()
+}
+
+/// Covariance of a view's mean residual with the other views' at the same pixels, px^2: without and
+/// with what whole lines share.
+struct Still {
+    fixed_px2: Option<f64>,
+    with_lines_px2: Option<f64>,
+}
+
+fn still(views: &[(&Field, &[f32])], camera: &Camera) -> Vec<Still> {
+    let mut means: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| fine(f, b)).collect();
+    let with_lines = across_views(&means);
+    means.par_iter_mut().for_each(|m| *m = without_lines(m, camera.width, SHORT_LINE));
+    let pairs = across_views(&means).into_iter().zip(with_lines);
+    pairs.map(|(fixed_px2, with_lines_px2)| Still { fixed_px2, with_lines_px2 }).collect()
 }
 
 fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
@@ -93,9 +111,10 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     let lines = without_lines(&noise, camera.width, LONG_LINE);
     let changes = changes(&frames);
     if !changes.is_empty() {
+        let filled: Vec<Filled> = changes.iter().map(|c| Filled::of(c)).collect();
         let over = |lags: &[usize], step: [usize; 2]| {
             let all: Option<Vec<f64>> =
-                changes.iter().map(|c| covariance(c, camera, lags, step)).collect();
+                filled.iter().map(|c| covariance(c, camera, lags, step)).collect();
             mean(all?.into_iter())
         };
         // Taking out what is smooth leaves a little of everything everywhere: what a diagonal
@@ -191,19 +210,26 @@ const SHORT_LINE: usize = 30;
 /// Minus the mean of each long row and column: noise that a row shares is no window's.
 fn without_lines(image: &[f32], width: usize, least: usize) -> Vec<f32> {
     let mut out = image.to_vec();
-    let height = image.len() / width.max(1);
-    let mut level = |indices: &mut dyn Iterator<Item = usize>| {
-        let line: Vec<usize> = indices.filter(|&i| out[i].is_finite()).collect();
-        if line.len() >= least {
-            let mean = line.iter().map(|&i| f64::from(out[i])).sum::<f64>() / line.len() as f64;
-            line.iter().for_each(|&i| out[i] -= mean as f32);
+    let level = |sum: f64, n: usize| if n >= least { (sum / n as f64) as f32 } else { 0.0 };
+    let mut columns = vec![(0.0, 0); width];
+    for row in out.chunks_exact_mut(width.max(1)) {
+        let (mut sum, mut n) = (0.0, 0);
+        for r in row.iter().filter(|r| r.is_finite()) {
+            sum += f64::from(*r);
+            n += 1;
         }
-    };
-    for v in 0..height {
-        level(&mut (v * width..(v + 1) * width));
+        let mean = level(sum, n);
+        for (r, (sum, n)) in row.iter_mut().zip(&mut columns) {
+            *r -= mean;
+            if r.is_finite() {
+                *sum += f64::from(*r);
+                *n += 1;
+            }
+        }
     }
-    for u in 0..width {
-        level(&mut (0..height).map(|v| v * width + u));
+    let means: Vec<f32> = columns.into_iter().map(|(sum, n)| level(sum, n)).collect();
+    for row in out.chunks_exact_mut(width.max(1)) {
+        row.iter_mut().zip(&means).for_each(|(r, mean)| *r -= mean);
     }
     out
 }
@@ -316,24 +342,52 @@ const FAR: [usize; 12] = [20, 22, 24, 27, 30, 33, 36, 39, 42, 46, 50, 54];
 /// Lags within a window.
 const NEAR: [usize; 4] = [1, 2, 3, 4];
 
-/// Mean product of pixels that are so far apart along `step`, px^2.
-fn covariance(image: &[f32], camera: &Camera, lags: &[usize], step: [usize; 2]) -> Option<f64> {
-    let (w, h) = (camera.width, camera.height);
-    let (mut sum, mut n) = (0.0, 0.0);
-    for lag in lags {
-        let (du, dv) = (lag * step[0], lag * step[1]);
-        for v in 0..h.saturating_sub(dv) {
-            for u in 0..w.saturating_sub(du) {
-                let i = v * w + u;
-                let product = image[i] * image[i + dv * w + du];
-                if product.is_finite() {
-                    sum += f64::from(product);
-                    n += 1.0;
-                }
-            }
+/// An image with nothing where there is none: sums run over it without a question.
+struct Filled {
+    value: Vec<f32>,
+    there: Vec<u8>,
+}
+
+impl Filled {
+    fn of(image: &[f32]) -> Self {
+        Filled {
+            value: image.iter().map(|r| if r.is_finite() { *r } else { 0.0 }).collect(),
+            there: image.iter().map(|r| u8::from(r.is_finite())).collect(),
         }
     }
-    (n > 1000.0).then(|| sum / n)
+}
+
+/// Mean product of pixels that are so far apart along `step`, px^2.
+fn covariance(image: &Filled, camera: &Camera, lags: &[usize], step: [usize; 2]) -> Option<f64> {
+    let (w, h) = (camera.width, camera.height);
+    let (mut sum, mut n) = (0.0, 0u64);
+    for lag in lags {
+        let (du, dv) = (lag * step[0], lag * step[1]);
+        let across = w.saturating_sub(du);
+        for v in 0..h.saturating_sub(dv) {
+            let near = v * w..v * w + across;
+            let far = (v + dv) * w + du..(v + dv) * w + du + across;
+            sum += products(&image.value[near.clone()], &image.value[far.clone()]);
+            let pairs = image.there[near].iter().zip(&image.there[far]);
+            n += u64::from(pairs.map(|(a, b)| u32::from(a & b)).sum::<u32>());
+        }
+    }
+    (n > 1000).then(|| sum / n as f64)
+}
+
+/// Sum of products, in lanes that a processor adds at once.
+fn products(a: &[f32], b: &[f32]) -> f64 {
+    const LANES: usize = 8;
+    let mut lanes = [0.0f64; LANES];
+    let (a, b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest = a.remainder().iter().zip(b.remainder());
+    let rest: f64 = rest.map(|(a, b)| f64::from(a * b)).sum();
+    for (a, b) in a.zip(b) {
+        for ((lane, a), b) in lanes.iter_mut().zip(a).zip(b) {
+            *lane += f64::from(a * b);
+        }
+    }
+    lanes.iter().sum::<f64>() + rest
 }
 
 /// How the frames' means move.
