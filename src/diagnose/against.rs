@@ -4,6 +4,7 @@
 //! structure of the noise view by view. Both sides' errors count.
 
 use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
 
 use super::engine::{DiagnoseOptions, FEWEST_VIEWS};
 use super::field::Field;
@@ -168,7 +169,7 @@ impl Baseline {
         for (real, twin) in survey.views.iter_mut().zip(&self.survey.views) {
             let theirs: HashMap<(u32, u32), f64> =
                 twin.tiles.iter().map(|t| (patch(t.place.u, t.place.v, SIDE), t.mean)).collect();
-            for t in &mut real.tiles {
+            for t in Arc::make_mut(&mut real.tiles) {
                 let mean = theirs.get(&patch(t.place.u, t.place.v, SIDE)).copied();
                 match mean.filter(|m| m.is_finite()) {
                     Some(m) => {
@@ -209,7 +210,7 @@ impl Baseline {
             // Terms that depend on the variance itself must not have the blocks' errors in them: these
             // are in what they are fitted to.
             let smooth = logs.values().sum::<f64>() / logs.len().max(1) as f64;
-            for t in &mut real.tiles {
+            for t in Arc::make_mut(&mut real.tiles) {
                 t.place.variance = t.variance * smooth.exp();
                 match logs.get(&patch(t.place.u, t.place.v, side)) {
                     Some(log) => t.variance *= log.exp(),
@@ -348,7 +349,7 @@ const LOSSES_ALIKE: f64 = 0.4;
 
 /// Of all that was asked of the target's pixels.
 fn lost_share(survey: &Survey) -> f64 {
-    let tiles = || survey.views.iter().flat_map(|v| &v.tiles);
+    let tiles = || survey.views.iter().flat_map(|v| v.tiles.iter());
     let asked: f64 = tiles().map(|t| t.asked).sum();
     tiles().map(|t| t.asked * t.missing).sum::<f64>() / asked.max(1.0)
 }

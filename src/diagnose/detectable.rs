@@ -4,7 +4,7 @@ use serde_json::{Map, json};
 
 use super::diagnosis::Detectable;
 use super::layers::Survey;
-use super::search::{Outcome, ViewData, coarser, evidence_of};
+use super::search::{Outcome, ViewData, evidence_of};
 use crate::camera::Camera;
 use crate::terms::{Basis, Statistic, Term};
 
@@ -21,7 +21,7 @@ pub fn detectable(
     variance: &Outcome,
     camera: &Camera,
 ) -> Vec<Detectable> {
-    let mean: Vec<ViewData> = survey.mean_data().iter().map(coarser).collect();
+    let mean: Vec<ViewData> = survey.coarse_mean_data();
     let blocks = survey.variance_data();
     let half = |[low, high]: [f64; 2]| (0.5 * (high - low)).powi(2);
     let (fx, fy) = (camera.fx, camera.fy);

@@ -19,14 +19,14 @@ use super::missing::missing;
 use super::next_view;
 use super::noise::{Hanging, hanging, tails};
 use super::pixels::{
-    common, fixed_px2, measure_tails, pixel_terms, terms_of, typical_sigma_mm, typical_sigma_px,
+    common, mean_of, measure_tails, pixel_terms, terms_of, typical_sigma_mm, typical_sigma_px,
 };
 use super::reading::{Taken, refuse_other_size};
 use super::reference;
 use super::rim;
 use super::search::Outcome;
 use super::steps::{Steps, is_raw, lattice, steps};
-use super::structure::structures;
+use super::structure::{fixed_px2_by_view, structures};
 use super::verdict::{
     LEAST_SIZE, after, echoes, extend, fold_into_sigma, merge, not_identifiable, shares, symptoms,
     view_lines,
@@ -197,7 +197,8 @@ impl<'a> Case<'a> {
         let mut survey = Survey::of(&fields, &sensor.camera, &bench.rays);
         survey.ablate(options.ablation, &fields);
         survey.refits_sigma = options.calibrated_here && simulated.is_none();
-        survey.fixed_px2 = fixed_px2(&structures(&fields, &sensor.camera, &[]));
+        survey.fixed_px2 =
+            mean_of(fixed_px2_by_view(&fields, &sensor.camera).into_iter().flatten());
         if let Some(baseline) = &baseline {
             baseline.references(&mut fields);
             baseline.means(&mut survey);
@@ -294,7 +295,7 @@ impl<'a> Case<'a> {
     fn holds_tails(&self, term: &Term) -> bool {
         const MUCH: f64 = -1.4;
         let mut row = Vec::new();
-        let mut tiles = self.survey.views.iter().flat_map(|v| &v.tiles);
+        let mut tiles = self.survey.views.iter().flat_map(|v| v.tiles.iter());
         !self.survey.refits_sigma
             || !matches!(term.basis, Basis::Recalibrate { .. })
             || tiles.all(|t| term.value(&t.place, &mut row) > MUCH)
@@ -466,6 +467,8 @@ impl<'a> Case<'a> {
 
     fn conclude(mut self, mean: Mean, scatter: &Scatter) -> Diagnosed {
         let camera = &self.recording.sensor.camera;
+        // Single frames have been seen to.
+        self.fields.iter_mut().for_each(|f| f.first = Vec::new());
         let scenes = self.scenes();
         let outcomes = [&mean.outcome, &scatter.outcome];
         let sigma_mm = typical_sigma_mm(&self.fields);
@@ -499,6 +502,10 @@ impl<'a> Case<'a> {
         echoes(&mut found);
         merge(&mut found);
         shares(&mut found);
+        let level = self.options.level;
+        let map =
+            scenes.iter().zip(outcomes).flat_map(|(s, o)| findings::map(s, o, level)).collect();
+        drop(scenes);
         let heldout = heldout::score(
             &self.survey,
             self.model,
@@ -506,13 +513,9 @@ impl<'a> Case<'a> {
             self.fields[0].scale_px_m,
             self.options,
         );
-        let level = self.options.level;
-        let map =
-            scenes.iter().zip(outcomes).flat_map(|(s, o)| findings::map(s, o, level)).collect();
         let mut detectable =
             super::detectable::detectable(&self.survey, &mean.outcome, &scatter.outcome, camera);
         detectable.extend(more_detectable);
-        drop(scenes);
         let mut remarks = self.remarks();
         remarks.extend(better);
         let known = found.iter().chain(&refitted);

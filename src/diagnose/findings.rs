@@ -8,7 +8,7 @@ use super::layers::Survey;
 use super::missing::DropoutFinding;
 use super::noise::Hanging;
 use super::parameters::{of_any_formula, parameters};
-use super::search::{Chosen, Outcome, ViewData, coarser};
+use super::search::{Chosen, Outcome, ViewData};
 use super::shape;
 use crate::effects;
 use crate::stats::range;
@@ -26,7 +26,7 @@ pub struct Scene<'a> {
 
 impl<'a> Scene<'a> {
     pub fn bias(survey: &'a Survey, scale_px_m: f64, corner_px: f64) -> Self {
-        let data = survey.mean_data().iter().map(coarser).collect();
+        let data = survey.coarse_mean_data();
         Scene { statistic: Statistic::Bias, survey, data, scale_px_m, corner_px }
     }
 

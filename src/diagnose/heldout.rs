@@ -8,7 +8,7 @@ use super::engine::DiagnoseOptions;
 use super::evidence::Rows;
 use super::layers::{Survey, SurveyedView};
 use super::pixels::terms_of;
-use super::search::{Outcome, ViewData, coarser};
+use super::search::{Outcome, ViewData};
 use crate::camera::Camera;
 use crate::model::NoiseModel;
 use crate::terms::{Statistic, Term};
@@ -42,7 +42,7 @@ pub fn score(
     let bias_terms = terms_of(&bias, Statistic::Bias);
     let variance = chosen_on.search_variance(&model.sigma, camera, 0.25 * level, options.seed);
     let variance_terms = terms_of(&variance, Statistic::Variance);
-    let means: Vec<ViewData> = judged_on.mean_data().iter().map(coarser).collect();
+    let means: Vec<ViewData> = judged_on.coarse_mean_data();
     let blocks = judged_on.variance_data();
     let mut before = Vec::new();
     let mut gains = Vec::new();

@@ -282,7 +282,8 @@ impl NoiseGains {
 
 /// A view made ready for the candidates.
 struct Prepared<'a> {
-    fine: (&'a [PixelContext], Rows<'a>),
+    /// Where a candidate is fine and does not depend on one coordinate alone.
+    fine: Option<(&'a [PixelContext], Rows<'a>)>,
     coarse: (&'a [PixelContext], Rows<'a>),
     /// The fine samples gathered by one coordinate.
     groups: Vec<(&'a Grouping, Rows<'a>)>,
@@ -349,7 +350,9 @@ impl Layer<'_> {
             }
         }
         let views = self.fine.par_iter().zip(self.coarse).zip(&self.groups);
-        views.filter_map(|((f, c), g)| prepare(f, c, g, &named, &settled)).collect()
+        let is_fine = |c: &Candidate| c.basis.is_fine() && c.basis.alone().is_none();
+        let keep_fine = self.candidates.iter().any(is_fine);
+        views.filter_map(|((f, c), g)| prepare(f, c, g, keep_fine, &named, &settled)).collect()
     }
 
     /// A term that stays, with what it brings alone.
@@ -534,23 +537,27 @@ impl Layer<'_> {
 
     /// Maps with twice as many nodes, where those predict left-out views better.
     fn refine_maps(&self, chosen: &mut [Chosen]) {
+        let total = |terms: &[&Basis]| {
+            gain(&self.evidence_of(terms), self.rules.prior).map_or(0.0, |g| g.total)
+        };
+        let mut so_far = None;
         for k in 0..chosen.len() {
             let Basis::Map { width, height, across, down, times } = chosen[k].candidate.basis
             else {
                 continue;
             };
             let finer = Basis::Map { width, height, across: 2 * across, down: 2 * down, times };
-            let total = |terms: &[&Basis]| {
-                gain(&self.evidence_of(terms), self.rules.prior).map_or(0.0, |g| g.total)
-            };
             let mut old = bases(chosen);
             old.extend(self.pinned.iter().map(|c| &c.candidate.basis));
             let mut new = old.clone();
             new[k] = &finer;
-            let better = total(&new) - total(&old);
+            let before = *so_far.get_or_insert_with(|| total(&old));
+            let after = total(&new);
+            let better = after - before;
             if self.noise.as_ref().is_some_and(|n| better > n.threshold(self.rules.level)) {
                 chosen[k].gain += better;
                 chosen[k].candidate.basis = finer;
+                so_far = Some(after);
             }
         }
     }
@@ -705,6 +712,7 @@ fn prepare<'a>(
     fine: &'a ViewData,
     coarse: &'a ViewData,
     groups: &'a [Grouping],
+    keep_fine: bool,
     beside: &[&Basis],
     settled: &[(&Basis, Vec<f64>)],
 ) -> Option<Prepared<'a>> {
@@ -721,9 +729,10 @@ fn prepare<'a>(
     };
     let rows_fine = rows(fine, &left, beside)?;
     let grouped = |g: &'a Grouping| (g, rows_fine.grouped(g.places.len(), |i| g.of[i] as usize));
+    let groups = groups.iter().map(grouped).collect();
     Some(Prepared {
-        groups: groups.iter().map(grouped).collect(),
-        fine: (&fine.places, rows_fine),
+        groups,
+        fine: keep_fine.then_some((&fine.places[..], rows_fine)),
         coarse: (&coarse.places, rows(coarse, &left_coarse, beside)?),
     })
 }
@@ -779,8 +788,8 @@ impl Prepared<'_> {
         let alone = basis.alone().and_then(|over| self.groups.iter().find(|g| g.0.over == over));
         let (places, rows): (&[PixelContext], &Rows<'_>) = if let Some((group, rows)) = alone {
             (&group.places, rows)
-        } else if basis.is_fine() {
-            (self.fine.0, &self.fine.1)
+        } else if let Some((places, rows)) = self.fine.as_ref().filter(|_| basis.is_fine()) {
+            (places, rows)
         } else {
             (self.coarse.0, &self.coarse.1)
         };
