@@ -4,7 +4,9 @@ use serde_json::{Map, json};
 
 use super::diagnosis::Detectable;
 use super::layers::Survey;
-use super::search::{Outcome, ViewData, evidence_of};
+use super::outcome::Outcome;
+use super::prepared::evidence_of;
+use super::samples::ViewData;
 use crate::camera::Camera;
 use crate::terms::{Basis, Statistic, Term};
 

@@ -10,6 +10,7 @@ use super::diagnosis::{
 use super::field::Field;
 use super::findings::{self, Scene};
 use super::form::better_form;
+use super::hanging::Hanging;
 use super::heldout;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
@@ -17,16 +18,17 @@ use super::layers::Survey;
 use super::lines::line_terms;
 use super::missing::missing;
 use super::next_view;
-use super::noise::{Hanging, hanging, tails};
+use super::noise::hanging;
+use super::outcome::Outcome;
 use super::pixels::{
     common, mean_of, measure_tails, pixel_terms, terms_of, typical_sigma_mm, typical_sigma_px,
 };
 use super::reading::{Taken, refuse_other_size};
 use super::reference;
 use super::rim;
-use super::search::Outcome;
 use super::steps::{Steps, is_raw, lattice, steps};
 use super::structure::{fixed_px2_by_view, structures};
+use super::tails::tails;
 use super::verdict::{
     LEAST_SIZE, after, echoes, extend, fold_into_sigma, merge, not_identifiable, shares, symptoms,
     view_lines,

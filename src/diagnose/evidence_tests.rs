@@ -4,6 +4,8 @@ use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::super::null::Null;
+use super::super::rows::Rows;
 use super::*;
 use crate::rng::{Seed, Stream};
 

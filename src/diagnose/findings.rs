@@ -4,11 +4,12 @@ use serde_json::Map;
 
 use super::candidate::RECALIBRATE;
 use super::diagnosis::{Alternative, Curve, Finding, MapRow, Size, Status};
+use super::hanging::Hanging;
 use super::layers::Survey;
 use super::missing::DropoutFinding;
-use super::noise::Hanging;
+use super::outcome::{Chosen, Outcome};
 use super::parameters::{of_any_formula, parameters};
-use super::search::{Chosen, Outcome, ViewData};
+use super::samples::ViewData;
 use super::shape;
 use crate::effects;
 use crate::stats::range;

@@ -5,10 +5,11 @@ use rand::seq::SliceRandom;
 
 use super::diagnosis::{HeldOut, LeftOut};
 use super::engine::DiagnoseOptions;
-use super::evidence::Rows;
 use super::layers::{Survey, SurveyedView};
+use super::outcome::Outcome;
 use super::pixels::terms_of;
-use super::search::{Outcome, ViewData};
+use super::rows::Rows;
+use super::samples::ViewData;
 use crate::camera::Camera;
 use crate::model::NoiseModel;
 use crate::terms::{Statistic, Term};

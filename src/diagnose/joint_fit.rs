@@ -4,8 +4,10 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::evidence::{Evidence, Rows, score};
-use super::search::{Chosen, ViewData};
+use super::evidence::{Evidence, score};
+use super::outcome::Chosen;
+use super::rows::Rows;
+use super::samples::ViewData;
 use crate::camera::Camera;
 use crate::solve::Cholesky;
 use crate::terms::{Basis, Gauge, Modulation, PixelContext, Pixels};

@@ -9,9 +9,11 @@ use super::ablation::Ablation;
 use super::bias;
 use super::field::Field;
 use super::joint::refit;
+use super::outcome::{Outcome, Rules};
 use super::reach::Extent;
+use super::samples::{ViewData, coarser};
 use super::scatter::{Left, left_by_fit};
-use super::search::{Outcome, Rules, ViewData, coarser, search, search_beside};
+use super::search::{search, search_beside};
 use super::smooth::{SMOOTH_PX, high_pass};
 use super::tiles::{SIDE, Tile, tiles};
 use super::variance;
@@ -518,7 +520,7 @@ fn rough(residuals: &[f32], field: &Field) -> Vec<f32> {
 /// F frames whose noise is the same by a share rho are worth 1 / (rho^2 + (1 - rho^2) / F).
 fn independent_frames(field: &Field) -> f64 {
     let [first, second, ..] = field.first.as_slice() else { return 1.0 };
-    let rho = super::structure::same_pixel(&rough(first, field), &rough(second, field));
+    let rho = super::texture::same_pixel(&rough(first, field), &rough(second, field));
     let rho = if rho.is_finite() { rho.clamp(0.0, 1.0) } else { 0.0 };
     let frames = field.frames.len() as f64;
     1.0 / (rho * rho + (1.0 - rho * rho) / frames)

@@ -6,13 +6,14 @@ use serde_json::Map;
 
 use super::diagnosis::{Alternative, CannotTell, Finding, Size, Status};
 use super::known::KnownTerms;
+use super::null::NoiseGains;
 use super::parameters::estimate;
-use super::search::NoiseGains;
 use crate::rng::Seed;
 use crate::terms::{Axis, Statistic};
 
-use super::evidence::{Evidence, Gain, Null, gain};
+use super::evidence::{Evidence, Gain, gain};
 use super::field::Field;
+use super::null::Null;
 
 /// A law that the distances may be off by.
 pub struct Law {

@@ -6,7 +6,7 @@ use super::field::Field;
 use super::findings;
 use super::heldout;
 use super::layers::Survey;
-use super::search::Outcome;
+use super::outcome::Outcome;
 use crate::effects;
 use crate::model::{Effect, NoiseModel, UNEXPLAINED};
 use crate::terms::{Axis, Statistic, Term};
