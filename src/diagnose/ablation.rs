@@ -3,7 +3,7 @@
 use super::candidate::Candidate;
 use super::field::Field;
 use super::layers::Survey;
-use super::search::Rules;
+use super::outcome::Rules;
 use crate::stats::Correlation;
 use crate::terms::Basis;
 

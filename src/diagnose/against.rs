@@ -6,17 +6,19 @@
 
 use super::engine::{DiagnoseOptions, FEWEST_VIEWS, measure_options};
 use super::field::Field;
+use super::hanging::Hanging;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
 use super::layers::Survey;
 use super::missing::{DropoutFinding, missing};
-use super::noise::{Hanging, hanging, tails};
+use super::noise::hanging;
 use super::partners::{Pose, partners};
 use super::pixels::{common, measure_tails};
 use super::reading::read;
 use super::rim;
 use super::steps::{Steps, lattice};
 use super::structure::{Structure, structures};
+use super::tails::tails;
 use crate::Progress;
 use crate::error::{Error, Result};
 use crate::measure::Workbench;

@@ -1,12 +1,13 @@
 //! Against a simulated recording: the mean and the size of the noise, patch by patch.
 
 use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
 
 use super::against::Baseline;
 use super::layers::{BLOCK_TILES, Survey};
 use super::pixels::fixed_px2;
+use super::samples::ViewData;
 use super::scatter::{Left, left_by_fit};
-use super::search::ViewData;
 use super::tiles::SIDE;
 
 /// Gross errors make the noise of one view in two runs differ, in log variance.
@@ -19,7 +20,7 @@ impl Baseline {
         for (real, twin) in survey.views.iter_mut().zip(&self.survey.views) {
             let theirs: HashMap<(u32, u32), f64> =
                 twin.tiles.iter().map(|t| (patch(t.place.u, t.place.v, SIDE), t.mean)).collect();
-            for t in &mut real.tiles {
+            for t in Arc::make_mut(&mut real.tiles) {
                 let mean = theirs.get(&patch(t.place.u, t.place.v, SIDE)).copied();
                 match mean.filter(|m| m.is_finite()) {
                     Some(m) => {
@@ -60,7 +61,7 @@ impl Baseline {
             // Terms that depend on the variance itself must not have the blocks' errors in them: these
             // are in what they are fitted to.
             let smooth = logs.values().sum::<f64>() / logs.len().max(1) as f64;
-            for t in &mut real.tiles {
+            for t in Arc::make_mut(&mut real.tiles) {
                 t.place.variance = t.variance * smooth.exp();
                 match logs.get(&patch(t.place.u, t.place.v, side)) {
                     Some(log) => t.variance *= log.exp(),

@@ -1,11 +1,13 @@
 //! Against a simulated recording: the structure of the noise, steps and losses, view by view.
 
 use super::against::Baseline;
+use super::hanging::Hanging;
+use super::in_time::still_level;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
 use super::layers::Survey;
 use super::missing::DropoutFinding;
-use super::noise::{Hanging, hanging, still_level};
+use super::noise::hanging;
 use super::structure::Structure;
 
 /// Tails of two recordings are no news within this factor: gross errors come in clumps.
@@ -125,7 +127,7 @@ const LOSSES_ALIKE: f64 = 0.4;
 
 /// Of all that was asked of the target's pixels.
 fn lost_share(survey: &Survey) -> f64 {
-    let tiles = || survey.views.iter().flat_map(|v| &v.tiles);
+    let tiles = || survey.views.iter().flat_map(|v| v.tiles.iter());
     let asked: f64 = tiles().map(|t| t.asked).sum();
     tiles().map(|t| t.asked * t.missing).sum::<f64>() / asked.max(1.0)
 }

@@ -5,15 +5,17 @@ use super::against::Baseline;
 use super::diagnosis::Finding;
 use super::engine::{DiagnoseOptions, measure_options};
 use super::field::Field;
+use super::hanging::Hanging;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
 use super::layers::Survey;
-use super::noise::{Hanging, hanging, tails};
-use super::pixels::{common, fixed_px2, measure_tails, pixel_terms, terms_of};
+use super::noise::hanging;
+use super::outcome::Outcome;
+use super::pixels::{common, mean_of, measure_tails, pixel_terms, terms_of};
 use super::reading::{Taken, refuse_other_size};
-use super::search::Outcome;
 use super::steps::{Steps, lattice};
-use super::structure::{Structure, structures};
+use super::structure::{Structure, fixed_px2_by_view, structures};
+use super::tails::tails;
 use crate::Progress;
 use crate::error::Result;
 use crate::measure::Workbench;
@@ -195,7 +197,7 @@ impl<'a> Case<'a> {
     fn holds_tails(&self, term: &Term) -> bool {
         const MUCH: f64 = -1.4;
         let mut row = Vec::new();
-        let mut tiles = self.survey.views.iter().flat_map(|v| &v.tiles);
+        let mut tiles = self.survey.views.iter().flat_map(|v| v.tiles.iter());
         !self.survey.refits_sigma
             || !matches!(term.basis, Basis::Recalibrate { .. })
             || tiles.all(|t| term.value(&t.place, &mut row) > MUCH)
@@ -223,7 +225,7 @@ fn survey(
     let mut survey = Survey::of(fields, camera, &bench.rays);
     survey.ablate(options.ablation, fields);
     survey.refits_sigma = options.calibrated_here && baseline.is_none();
-    survey.fixed_px2 = fixed_px2(&structures(fields, camera, &[]));
+    survey.fixed_px2 = mean_of(fixed_px2_by_view(fields, camera).into_iter().flatten());
     if let Some(baseline) = baseline {
         baseline.means(&mut survey);
     }

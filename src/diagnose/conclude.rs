@@ -7,8 +7,8 @@ use super::diagnosis::{DIAGNOSIS_FORMAT, Detectable, Diagnosis, HeldOut, MapRow,
 use super::engine::Diagnosed;
 use super::findings;
 use super::heldout;
+use super::outcome::Outcome;
 use super::reference;
-use super::search::Outcome;
 use super::verdict::{extend, not_identifiable, shares, untested, verdict, view_lines};
 use crate::effects::KINECT_BASELINE_M;
 use crate::model::Form;

@@ -6,9 +6,9 @@ use super::case::Case;
 use super::diagnosis::Detectable;
 use super::engine::DiagnoseOptions;
 use super::layers::Survey;
+use super::outcome::Outcome;
 use super::power::Gates;
 use super::scene::Scene;
-use super::search::Outcome;
 use crate::camera::Camera;
 use crate::terms::{Basis, Statistic, Term};
 

@@ -4,6 +4,8 @@ use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::super::null::Null;
+use super::super::rows::Rows;
 use super::*;
 use crate::rng::{Seed, Stream};
 
@@ -45,12 +47,11 @@ impl View {
         }
     }
 
-    fn rows(&self) -> Rows {
+    fn rows(&self) -> Rows<'_> {
         let beside = join(&self.x, &self.chosen);
         let width = beside.ncols();
         let row_major: Vec<f64> = beside.transpose().as_slice().to_vec();
-        let (y, w) = (self.y.as_slice().to_vec(), self.w.as_slice().to_vec());
-        Rows::new(y, w, row_major, width, &self.precision)
+        Rows::new(self.y.as_slice(), self.w.as_slice(), &row_major, width, &self.precision)
             .expect("nuisances that can be told apart")
     }
 
@@ -192,8 +193,9 @@ fn samples_of_one_key_are_one_sample_for_columns_of_that_key() {
 fn nuisances_that_are_one_and_the_same_are_refused() {
     let twice = |_: usize| [1.0, 1.0];
     let beside: Vec<f64> = (0..10).flat_map(twice).collect();
-    assert!(Rows::new(vec![1.0; 10], vec![1.0; 10], beside.clone(), 2, &[0.0, 0.0]).is_none());
-    assert!(Rows::new(vec![1.0; 10], vec![1.0; 10], beside, 2, &[1.0, 1.0]).is_some());
+    let ones = [1.0; 10];
+    assert!(Rows::new(&ones, &ones, &beside, 2, &[0.0, 0.0]).is_none());
+    assert!(Rows::new(&ones, &ones, &beside, 2, &[1.0, 1.0]).is_some());
 }
 
 const DRAWS: usize = 4000;

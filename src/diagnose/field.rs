@@ -8,17 +8,15 @@ use super::shadow::Shadow;
 use crate::camera::Rays;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
-use crate::frame::{DepthTable, Frame};
-use crate::io::{FrameSource, InfraredImage};
+use crate::frame::Frame;
+use crate::io::{InfraredImage, read_depth};
 use crate::measure::{Workbench, view_target};
 use crate::model::SigmaModel;
 use crate::plane::Plane;
-use crate::terms::{PixelContext, Term};
 use crate::view::{Sensor, View};
 
 use super::known::KnownTerms;
 use super::lattice::RawHistogram;
-use super::tiles::Places;
 
 /// One view's residuals.
 #[derive(Debug, Clone)]
@@ -71,10 +69,6 @@ pub struct Field {
 /// lacks are larger, a residual is no noise: it is kept out of the means and left to the tests of
 /// the tails.
 pub const CLIP_SIGMAS: f32 = 6.0;
-/// Disparities that spread less than this over a view show no slope, px.
-const LEAST_SPREAD_PX: f64 = 0.5;
-/// Single frames kept whole: enough for correlations in time.
-pub const FRAMES_KEPT: usize = 4;
 
 impl Field {
     /// Read the view and collect its residuals.
@@ -88,16 +82,20 @@ impl Field {
         known: &KnownTerms,
         session_start: f64,
     ) -> Result<Self> {
-        let target = view_target(view, bench)?;
+        let (target, held) = view_target(view, bench)?;
         let camera = &bench.sensor.camera;
         let mut field = Field::empty(view, bench.sensor, target.plane, target.pixels);
         field.spread_px = (target.scale * field.scale_px_m) as f32;
-        let mut source = FrameSource::new(camera.width, camera.height);
         let start = view.depth.first().map_or(0.0, |f| f.timestamp);
-        let frames = view
-            .depth
-            .iter()
-            .filter_map(|frame| Some((frame.timestamp - start, source.read(&frame.path).ok()?)));
+        let mut held = held.into_iter().peekable();
+        // Frames that showed the target are not read twice.
+        let frames = view.depth.iter().enumerate().filter_map(|(number, frame)| {
+            let image = match held.next_if(|h| h.0 == number) {
+                Some((_, image)) => image,
+                None => read_depth(&frame.path, camera.width, camera.height).ok()?,
+            };
+            Some((frame.timestamp - start, image))
+        });
         field.expose(frames, bench, sigma, known, session_start);
         field.look(view, &bench.rays);
         Ok(field)
@@ -125,26 +123,6 @@ impl Field {
         };
         field.expose(frames, bench, sigma, known, session_start);
         field
-    }
-
-    fn expose(
-        &mut self,
-        frames: impl Iterator<Item = (f64, Frame)>,
-        bench: &Workbench<'_>,
-        sigma: &SigmaModel,
-        known: &KnownTerms,
-        session_start: f64,
-    ) {
-        self.sigma = self.expected_sigma(&bench.rays, sigma);
-        let expected = self.known_bias(known, bench, session_start);
-        for (time, image) in frames {
-            if self.frames.is_empty() {
-                self.shadow = Shadow::beside(self, &image, &bench.rays, &bench.table);
-                self.rim = Rim::around(self, &image, &bench.rays, &bench.table);
-            }
-            self.add(&image, time, &expected, &bench.table);
-        }
-        self.close();
     }
 
     /// Read the view's first infrared image; one that cannot be read is as none.
@@ -226,95 +204,9 @@ impl Field {
         }
     }
 
-    /// Sigma of the disparity at each pixel, px.
-    fn expected_sigma(&self, rays: &Rays, sigma: &SigmaModel) -> Vec<f32> {
-        let theta = self.plane.theta();
-        let of = |&i: &u32| {
-            let (x, y) = rays.at(i as usize);
-            let z = self.plane.depth(x, y);
-            (sigma.axial_sigma(z, theta) * self.scale_px_m / (z * z)) as f32
-        };
-        self.pixels.iter().map(of).collect()
-    }
-
     /// Disparity of the plane at pixel number `k` of the target, px.
     pub fn disparity(&self, k: usize, rays: &Rays) -> f64 {
         let (x, y) = rays.at(self.pixels[k] as usize);
         self.scale_px_m * self.plane.inverse_depth(x, y)
-    }
-
-    /// Disparity that the model expects at each pixel, px; its terms of the variance go to sigma.
-    fn known_bias(&mut self, known: &KnownTerms, bench: &Workbench<'_>, start: f64) -> Vec<f32> {
-        let n = self.pixels.len();
-        let mut expected: Vec<f32> =
-            (0..n).map(|k| self.disparity(k, &bench.rays) as f32).collect();
-        if known.bias.is_empty() && known.variance.is_empty() {
-            return expected;
-        }
-        let mut sigma = self.sigma.clone();
-        let places = Places::of(self, &bench.sensor.camera, &bench.rays, start);
-        let mut row = Vec::new();
-        let mut sum = |terms: &[Term], place: &PixelContext| -> f64 {
-            terms.iter().map(|t| t.value(place, &mut row)).sum()
-        };
-        for k in 0..n {
-            let place = places.pixel(k);
-            expected[k] += sum(&known.bias, &place) as f32;
-            sigma[k] *= (0.5 * sum(&known.variance, &place)).exp() as f32;
-        }
-        self.sigma = sigma;
-        expected
-    }
-
-    fn add(&mut self, frame: &Frame, time: f64, expected: &[f32], table: &DepthTable) {
-        let keep = self.first.len() < FRAMES_KEPT;
-        let mut residuals = if keep { vec![f32::NAN; self.pixels.len()] } else { Vec::new() };
-        let (mut sum, mut n) = (0.0f64, 0.0f64);
-        let middle = self.scale_px_m * self.plane.q.z;
-        let (mut sx, mut sxx, mut sxy) = (0.0f64, 0.0f64, 0.0f64);
-        for k in 0..self.pixels.len() {
-            let word = frame.raw[self.pixels[k] as usize];
-            let z = table.metres(word);
-            if !z.is_finite() {
-                continue;
-            }
-            self.measured[k] += 1;
-            self.words.0[usize::from(word)] += 1;
-            let e = (self.scale_px_m / f64::from(z)) as f32 - expected[k];
-            if keep {
-                residuals[k] = e;
-            }
-            if e.abs() <= CLIP_SIGMAS * self.sigma[k].max(self.spread_px) {
-                self.count[k] += 1;
-                self.mean[k] += e;
-                self.square[k] += e * e;
-                sum += f64::from(e);
-                n += 1.0;
-                let x = f64::from(expected[k]) - middle;
-                sx += x;
-                sxx += x * x;
-                sxy += x * f64::from(e);
-            }
-        }
-        if keep {
-            self.first.push(residuals);
-        }
-        // A frontal view has one disparity, and no slope.
-        let spread = sxx - sx * sx / f64::max(n, 1.0);
-        let slope = if spread > n * LEAST_SPREAD_PX * LEAST_SPREAD_PX {
-            (sxy - sx * sum / n) / spread
-        } else {
-            0.0
-        };
-        self.lines.push([(sum - slope * sx) / f64::max(n, 1.0), slope]);
-        self.frames.push((time, if n > 0.0 { sum / n } else { f64::NAN }));
-    }
-
-    fn close(&mut self) {
-        for k in 0..self.pixels.len() {
-            let n = f32::from(self.count[k]);
-            self.mean[k] /= n;
-            self.square[k] /= n;
-        }
     }
 }

@@ -5,9 +5,9 @@ use serde_json::Map;
 use super::along::Along;
 use super::diagnosis::{Finding, MapRow};
 use super::naming::{naming, physics};
+use super::outcome::Outcome;
 use super::parameters::{of_any_formula, parameters};
 use super::scene::{Scene, size};
-use super::search::Outcome;
 use super::shape;
 use crate::terms::{Axis, Basis, Modulation, Term};
 

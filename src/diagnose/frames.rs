@@ -2,8 +2,8 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 
+use super::hanging::{Hanging, one, variance_px2};
 use super::known::KnownTerms;
-use super::noise::{Hanging, one, variance_px2};
 use super::structure::{Jitter, Structure};
 use crate::terms::{Axis, Statistic};
 

@@ -5,10 +5,11 @@ use rand::seq::SliceRandom;
 
 use super::diagnosis::{HeldOut, LeftOut};
 use super::engine::DiagnoseOptions;
-use super::evidence::Rows;
 use super::layers::{Survey, SurveyedView};
+use super::outcome::Outcome;
 use super::pixels::terms_of;
-use super::search::{Outcome, ViewData, coarser};
+use super::rows::Rows;
+use super::samples::ViewData;
 use crate::camera::Camera;
 use crate::model::NoiseModel;
 use crate::terms::{Statistic, Term};
@@ -42,7 +43,7 @@ pub fn score(
     let bias_terms = terms_of(&bias, Statistic::Bias);
     let variance = chosen_on.search_variance(&model.sigma, camera, 0.25 * level, options.seed);
     let variance_terms = terms_of(&variance, Statistic::Variance);
-    let means: Vec<ViewData> = judged_on.mean_data().iter().map(coarser).collect();
+    let means: Vec<ViewData> = judged_on.coarse_mean_data();
     let blocks = judged_on.variance_data();
     let mut before = Vec::new();
     let mut gains = Vec::new();
@@ -85,7 +86,7 @@ fn log_score(view: &ViewData, terms: &[Term]) -> Option<f64> {
         .collect();
     let p = view.precision.len();
     let own: f64 = response.iter().zip(&view.weight).map(|(y, w)| w * y * y).sum();
-    let rows = Rows::new(response, view.weight.clone(), view.nuisance.clone(), p, &view.precision)?;
+    let rows = Rows::new(&response, &view.weight, &view.nuisance, p, &view.precision)?;
     Some(-0.5 * (own - rows.explained()))
 }
 

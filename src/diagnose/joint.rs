@@ -14,8 +14,9 @@ use super::candidate::Candidate;
 use super::evidence::Gain;
 use super::joint_fit::{Columns, Joint, Reduced};
 use super::joint_terms::{Settled, is_rough, is_smooth_and_nameless, total};
+use super::outcome::{Chosen, Outcome};
 use super::replication::{Half, Halves};
-use super::search::{Chosen, Outcome, ViewData, coarser};
+use super::samples::{ViewData, coarser};
 use crate::camera::Camera;
 
 /// The terms of a finished search fitted together, with the smooth rest. `fine` are the views' means

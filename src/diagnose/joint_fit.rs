@@ -1,12 +1,15 @@
 //! Normal equations of terms and of a smooth map over the picture together, by parts of the views,
 //! and their penalised solution.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::evidence::{Evidence, Rows, score};
-use super::search::{Chosen, ViewData};
+use super::evidence::{Evidence, score};
+use super::outcome::Chosen;
+use super::rows::Rows;
+use super::samples::ViewData;
 use crate::camera::Camera;
+use crate::solve::Cholesky;
 use crate::terms::{Basis, Gauge, Modulation, PixelContext, Pixels};
 
 /// Parts of the views that are left out in turn.
@@ -56,7 +59,7 @@ impl Columns {
             let p = &view.places[i];
             (p.v / side) as usize * across + (p.u / side) as usize
         };
-        let rows = rows(view, view.response.clone())?;
+        let rows = rows(view, &view.response)?;
         let fill = |i: usize, row: &mut [f64]| self.fill(&view.places[i], row);
         Some(rows.reduce_by_blocks(self.terms + self.nodes, block, fill))
     }
@@ -69,8 +72,8 @@ impl Columns {
             self.fill(place, &mut row);
             y - row.iter().zip(beta.iter()).map(|(g, b)| g * b).sum::<f64>()
         };
-        let response = view.response.iter().zip(&view.places).map(&mut of).collect();
-        Some(rows(view, response)?.score(count, |i, row| self.fill(&view.places[i], row)))
+        let response: Vec<f64> = view.response.iter().zip(&view.places).map(&mut of).collect();
+        Some(rows(view, &response)?.score(count, |i, row| self.fill(&view.places[i], row)))
     }
 
     fn fill(&self, place: &PixelContext, row: &mut [f64]) {
@@ -131,9 +134,8 @@ impl Columns {
     }
 }
 
-fn rows(view: &ViewData, response: Vec<f64>) -> Option<Rows> {
-    let (nuisance, width) = (view.nuisance.clone(), view.precision.len());
-    Rows::new(response, view.weight.clone(), nuisance, width, &view.precision)
+fn rows<'a>(view: &'a ViewData, response: &[f64]) -> Option<Rows<'a>> {
+    Rows::new(response, &view.weight, &view.nuisance, view.precision.len(), &view.precision)
 }
 
 /// Some views' equations with the nodes of the maps eliminated, if there are maps.
@@ -153,11 +155,10 @@ impl Reduced {
             let (alone, with) = (DVector::zeros(nodes), DMatrix::zeros(nodes, terms));
             return Some(Reduced { a, b: b.into_owned(), alone, with });
         };
-        let factor =
-            Cholesky::<f64, Dyn>::new(all.a.view((terms, terms), (nodes, nodes)) + penalty)?;
+        let factor = Cholesky::of(all.a.view((terms, terms), (nodes, nodes)) + penalty)?;
         let cross = all.a.view((terms, 0), (nodes, terms));
         let alone = factor.solve(&all.b.rows(terms, nodes).into_owned());
-        let with = factor.solve(&cross.into_owned());
+        let with = factor.solve_all(cross.into_owned());
         let less = cross.transpose();
         Some(Reduced { a: a - &less * &with, b: b - less * &alone, alone, with })
     }

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::candidate::Candidate;
 use super::joint_fit::{Joint, Reduced, SMOOTHNESS};
-use super::search::Chosen;
+use super::outcome::Chosen;
 use crate::camera::Camera;
 use crate::terms::{Basis, Coordinate, Statistic, Term};
 

@@ -1,5 +1,7 @@
 //! The layers a mismatch may sit in: the mean, and the size of the noise.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -8,10 +10,12 @@ use super::bias;
 use super::candidate::Candidate;
 use super::field::Field;
 use super::joint::refit;
+use super::outcome::{Outcome, Rules};
 use super::reach::Extent;
 use super::replication::halves;
+use super::samples::{ViewData, coarser};
 use super::scatter::{Left, left_by_fit};
-use super::search::{Outcome, Rules, ViewData, coarser, search, search_beside};
+use super::search::{search, search_beside};
 use super::smooth::{SMOOTH_PX, high_pass};
 use super::tiles::{SIDE, Tile, tiles};
 use super::variance;
@@ -55,7 +59,8 @@ impl Light {
 #[derive(Clone)]
 pub struct SurveyedView {
     pub name: String,
-    pub tiles: Vec<Tile>,
+    /// Shared by the surveys of a part of the views.
+    pub tiles: Arc<Vec<Tile>>,
     /// Variance of a pixel's mean in units of the model's, times pixels per independent sample.
     pub inflation: f64,
     pub correlation: Correlation,
@@ -91,7 +96,7 @@ impl Survey {
             .zip(halves(&poses))
             .map(|(f, second)| {
                 let (inflation, correlation) = inflation(f, &[]);
-                let tiles = tiles(f, camera, rays, start);
+                let tiles = Arc::new(tiles(f, camera, rays, start));
                 SurveyedView {
                     name: f.name.clone(),
                     tiles,
@@ -113,7 +118,7 @@ impl Survey {
     /// Root of the weighted harmonic mean of the model's variance, px.
     fn typical_sigma_px(&self) -> f64 {
         let (mut sum, mut n) = (0.0, 0.0);
-        for t in self.views.iter().flat_map(|v| &v.tiles).filter(|t| t.variance > 0.0) {
+        for t in self.views.iter().flat_map(|v| v.tiles.iter()).filter(|t| t.variance > 0.0) {
             sum += t.pixels / t.variance;
             n += t.pixels;
         }
@@ -124,7 +129,7 @@ impl Survey {
     fn covered_px(&self, camera: &Camera) -> f64 {
         let across = camera.width.div_ceil(SIDE);
         let mut seen = vec![false; across * camera.height.div_ceil(SIDE)];
-        for t in self.views.iter().flat_map(|v| &v.tiles) {
+        for t in self.views.iter().flat_map(|v| v.tiles.iter()) {
             seen[t.place.v as usize / SIDE * across + t.place.u as usize / SIDE] = true;
         }
         (seen.iter().filter(|s| **s).count() * SIDE * SIDE) as f64
@@ -133,6 +138,11 @@ impl Survey {
     /// The views' mean residuals, about a plane of their own each.
     pub fn mean_data(&self) -> Vec<ViewData> {
         self.views.par_iter().map(mean_data).collect()
+    }
+
+    /// The same in larger patches.
+    pub fn coarse_mean_data(&self) -> Vec<ViewData> {
+        self.views.par_iter().map(|v| coarser(&mean_data(v))).collect()
     }
 
     /// How the search of the mean decides.
@@ -230,10 +240,11 @@ impl Survey {
     ) {
         let width = fields.first().map_or(0, |f| f.width);
         self.views.par_iter_mut().zip(fields).enumerate().for_each(|(n, (view, field))| {
+            let tiles = Arc::make_mut(&mut view.tiles);
             if let Some(bias) = bias.get(n) {
-                super::tiles::roughen(&mut view.tiles, field, bias, width);
+                super::tiles::roughen(tiles, field, bias, width);
             }
-            for t in &mut view.tiles {
+            for t in tiles {
                 let (factor, more) = (stretch(&t.place), extra(&t.place));
                 t.variance = t.variance * factor + more;
                 t.place.variance = t.place.variance * factor + more;
@@ -297,7 +308,7 @@ impl Survey {
 fn relative_light(views: &mut [SurveyedView]) -> Light {
     let share = ambient_share(views);
     let mut all: Vec<f32> = Vec::new();
-    for tile in views.iter_mut().flat_map(|v| &mut v.tiles) {
+    for tile in views.iter_mut().flat_map(|v| Arc::make_mut(&mut v.tiles)) {
         let p = &mut tile.place;
         p.light /= 1.0 + share * p.ambient * far(p);
         if p.light.is_finite() {
@@ -306,7 +317,7 @@ fn relative_light(views: &mut [SurveyedView]) -> Light {
     }
     let median = f64::from(crate::stats::median_in_place(&mut all));
     let usable = median > 0.0;
-    for tile in views.iter_mut().flat_map(|v| &mut v.tiles) {
+    for tile in views.iter_mut().flat_map(|v| Arc::make_mut(&mut v.tiles)) {
         let light = tile.place.light / median;
         tile.place.light = if usable && light.is_finite() { light } else { 1.0 };
     }
@@ -383,7 +394,7 @@ impl Blocks {
     fn of(view: &SurveyedView) -> Self {
         let side = (BLOCK_TILES * SIDE) as f64;
         let mut sums: std::collections::BTreeMap<(u32, u32), Sum> = Default::default();
-        for t in &view.tiles {
+        for t in view.tiles.iter() {
             let key = ((t.place.v / side) as u32, (t.place.u / side) as u32);
             sums.entry(key).or_default().add(t, view.moving);
         }
@@ -540,7 +551,7 @@ fn rough(residuals: &[f32], field: &Field) -> Vec<f32> {
 /// F frames whose noise is the same by a share rho are worth 1 / (rho^2 + (1 - rho^2) / F).
 fn independent_frames(field: &Field) -> f64 {
     let [first, second, ..] = field.first.as_slice() else { return 1.0 };
-    let rho = super::structure::same_pixel(&rough(first, field), &rough(second, field));
+    let rho = super::texture::same_pixel(&rough(first, field), &rough(second, field));
     let rho = if rho.is_finite() { rho.clamp(0.0, 1.0) } else { 0.0 };
     let frames = field.frames.len() as f64;
     1.0 / (rho * rho + (1.0 - rho * rho) / frames)

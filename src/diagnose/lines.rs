@@ -1,7 +1,7 @@
 //! Whole columns and rows that err by a constant each: their profile, as terms of the model.
 
 use super::field::Field;
-use super::structure::fine;
+use super::texture::fine;
 use crate::terms::{Basis, Coordinate, Modulation, Statistic, Term};
 
 /// Columns and rows of fewer readings over all views are left at nothing.

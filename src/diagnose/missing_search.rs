@@ -4,9 +4,10 @@ use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::evidence::{Evidence, Null, gain};
+use super::evidence::{Evidence, gain};
 use super::missing_cells::{Cell, Scatter, USUAL, Whitener, odds, share};
 use super::missing_shapes::{Shape, Step};
+use super::null::Null;
 use super::replication::{Halves, Measured, agree};
 use crate::rng::Seed;
 use crate::terms::Basis;

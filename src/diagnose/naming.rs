@@ -2,7 +2,7 @@
 
 use super::candidate::RECALIBRATE;
 use super::diagnosis::{Alternative, Status};
-use super::search::Chosen;
+use super::outcome::Chosen;
 use crate::effects;
 use crate::terms::{Axis, Statistic};
 

@@ -10,9 +10,11 @@ use rayon::prelude::*;
 
 use super::diagnosis::{Finding, NextView};
 use super::evidence::Evidence;
+use super::outcome::{Chosen, Outcome};
+use super::prepared::evidence_of;
 use super::reach::Extent;
+use super::samples::ViewData;
 use super::scene::Scene;
-use super::search::{Chosen, Outcome, ViewData, evidence_of};
 use crate::camera::{Camera, Rays};
 use crate::model::SigmaModel;
 use crate::plane::Plane;

@@ -2,8 +2,11 @@
 
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
+use serde_json::{Map, json};
 
+use super::super::in_time::still_share;
 use super::super::structure::Jitter;
+use super::super::tails::{GAUSSIAN_TAIL, tails};
 use super::*;
 use crate::model::{Effect, FitSummary, NoiseModel, Provenance};
 use crate::rng::{Seed, Stream};

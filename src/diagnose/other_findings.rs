@@ -3,9 +3,9 @@
 use serde_json::Map;
 
 use super::diagnosis::{Alternative, Finding, Size, Status};
+use super::hanging::Hanging;
 use super::missing::{ADEQUATE, DropoutFinding};
 use super::naming::{MIN_PROBABILITY, none_of_these, physics};
-use super::noise::Hanging;
 use crate::effects;
 use crate::terms::{Axis, Statistic};
 

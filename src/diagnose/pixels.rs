@@ -3,12 +3,14 @@
 use rayon::prelude::*;
 
 use super::field::Field;
+use super::hanging::Hanging;
 use super::known::KnownTerms;
 use super::layers::Survey;
-use super::noise::Hanging;
-use super::search::Outcome;
+use super::outcome::Outcome;
 use super::smooth::{SMOOTH_PX, high_pass};
-use super::structure::{Structure, moving, tail};
+use super::structure::Structure;
+use super::tails::tail;
+use super::texture::moving;
 use super::tiles::Places;
 use crate::measure::Workbench;
 use crate::terms::{Statistic, Term};
@@ -79,7 +81,7 @@ pub(super) fn measure_tails(
         } else if frames.is_empty() {
             Vec::new()
         } else {
-            vec![tail(&moving(&frames, s), camera)]
+            vec![tail(&moving(&frames, s.lagged[0]), camera)]
         };
         let n: f64 = looks.iter().map(|l| l.1).sum();
         let beyond: f64 = looks.iter().map(|l| l.0 * l.1).sum();

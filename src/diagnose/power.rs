@@ -9,10 +9,14 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::candidate::Candidate;
-use super::evidence::{Evidence, Null, gain};
+use super::evidence::{Evidence, gain};
+use super::judge::LEAST_OF_LARGEST;
+use super::null::Null;
+use super::outcome::{Outcome, Rules};
 use super::pixels::terms_of;
+use super::prepared::evidence_of;
 use super::scene::{Scene, size};
-use super::search::{LEAST_OF_LARGEST, LEAST_SHARE, Outcome, Rules, evidence_of};
+use super::search::LEAST_SHARE;
 use super::variance::beyond_sigma;
 use super::verdict::LEAST_SIZE;
 use crate::rng::Seed;
@@ -108,7 +112,7 @@ impl Gates<'_> {
     }
 
     /// The views without what was found: it would not be taken for an effect more.
-    fn left(&self) -> Vec<super::search::ViewData> {
+    fn left(&self) -> Vec<super::samples::ViewData> {
         let found = terms_of(self.outcome, self.scene.statistic);
         let mut row = Vec::new();
         let mut views = self.scene.data.clone();

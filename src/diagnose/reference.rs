@@ -7,14 +7,15 @@ use serde_json::Map;
 use super::diagnosis::{Alternative, CannotTell, Finding, Size, Status};
 use super::known::KnownTerms;
 use super::naming::{MIN_PROBABILITY, physics};
+use super::null::NoiseGains;
 use super::parameters::estimate;
 use super::replication::{Measured, agree};
-use super::search::NoiseGains;
 use crate::rng::Seed;
 use crate::terms::{Axis, Statistic};
 
-use super::evidence::{Evidence, Gain, Null, gain};
+use super::evidence::{Evidence, Gain, gain};
 use super::field::Field;
+use super::null::Null;
 
 /// A law that the distances may be off by.
 pub struct Law {

@@ -2,10 +2,11 @@
 //! that a finding rests on.
 
 use super::field::Field;
+use super::hanging::{Hanging, Mean};
 use super::known::KnownTerms;
-use super::noise::{Hanging, Mean};
 use super::replication::{Measured, agree};
-use super::structure::{GAUSSIAN_TAIL, Structure};
+use super::structure::Structure;
+use super::tails::GAUSSIAN_TAIL;
 use crate::terms::{Axis, Statistic};
 
 /// A view's value beyond what the model has, in the statistic's own unit.

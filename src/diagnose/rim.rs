@@ -6,7 +6,7 @@
 use serde_json::Map;
 
 use super::field::{CLIP_SIGMAS, Field};
-use super::noise::Hanging;
+use super::hanging::Hanging;
 use super::parameters::estimate;
 use crate::camera::Rays;
 use crate::frame::{DepthTable, Frame};

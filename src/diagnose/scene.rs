@@ -2,7 +2,7 @@
 
 use super::diagnosis::Size;
 use super::layers::Survey;
-use super::search::{ViewData, coarser};
+use super::samples::ViewData;
 use crate::terms::{Statistic, Term};
 
 /// The data a layer's findings are measured on.
@@ -17,7 +17,7 @@ pub struct Scene<'a> {
 
 impl<'a> Scene<'a> {
     pub fn bias(survey: &'a Survey, scale_px_m: f64, corner_px: f64) -> Self {
-        let data = survey.mean_data().iter().map(coarser).collect();
+        let data = survey.coarse_mean_data();
         Scene { statistic: Statistic::Bias, survey, data, scale_px_m, corner_px }
     }
 

@@ -5,7 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::rng::{Seed, Stream};
-use crate::terms::{Axis, Coordinate, Modulation};
+use crate::terms::{Axis, Coordinate, Modulation, PixelContext};
 
 const VIEWS: usize = 12;
 const SAMPLES: usize = 120;

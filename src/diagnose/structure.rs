@@ -2,14 +2,15 @@
 //!
 //! Every statistic is one number a view, so that views are the sample.
 
-use std::f32::consts::FRAC_1_SQRT_2;
-
 use rayon::prelude::*;
 
 use super::field::Field;
-use super::smooth::{SMOOTH_PX, high_pass};
+use super::texture::{
+    FAR, Filled, LONG_LINE, NEAR, SHORT_LINE, calm, changes, covariance, fine, moving, rough,
+    same_pixel, without_lines,
+};
 use crate::camera::Camera;
-use crate::stats::{MAD_TO_SIGMA, measure_correlation, median_in_place};
+use crate::stats::measure_correlation;
 
 /// What one view tells; `None` where it cannot.
 #[derive(Debug, Clone, Default)]
@@ -55,26 +56,40 @@ pub struct Jitter {
     pub velocity_mps: f64,
 }
 
-/// A Gaussian's share beyond four standard deviations.
-pub const GAUSSIAN_TAIL: f64 = 6.334e-5;
-const TAIL_SIGMAS: f32 = 4.0;
-
 /// Measure all views. `bias` has, view by view, what is known to be no noise, px (or is empty).
 pub fn structures(fields: &[Field], camera: &Camera, bias: &[Vec<f32>]) -> Vec<Structure> {
-    let none = Vec::new();
-    let views: Vec<(&Field, &Vec<f32>)> =
-        fields.iter().enumerate().map(|(n, f)| (f, bias.get(n).unwrap_or(&none))).collect();
-    let means: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| fine(f, b)).collect();
-    let with_lines = across_views(&means);
-    let means: Vec<Vec<f32>> =
-        means.iter().map(|m| without_lines(m, camera.width, SHORT_LINE)).collect();
-    let fixed = across_views(&means);
+    let views = beside_bias(fields, bias);
     let mut all: Vec<Structure> = views.par_iter().map(|(f, b)| structure(f, camera, b)).collect();
-    for (s, (fixed, with_lines)) in all.iter_mut().zip(fixed.into_iter().zip(with_lines)) {
-        s.fixed_px2 = fixed;
-        s.lines_px2 = with_lines.zip(fixed).map(|(all, fixed)| all - fixed);
+    for (s, Still { fixed_px2, with_lines_px2 }) in all.iter_mut().zip(still(&views, camera)) {
+        s.fixed_px2 = fixed_px2;
+        s.lines_px2 = with_lines_px2.zip(fixed_px2).map(|(all, fixed)| all - fixed);
     }
     all
+}
+
+/// [`Structure::fixed_px2`] of all views alone.
+pub fn fixed_px2_by_view(fields: &[Field], camera: &Camera) -> Vec<Option<f64>> {
+    still(&beside_bias(fields, &[]), camera).into_iter().map(|s| s.fixed_px2).collect()
+}
+
+fn beside_bias<'a>(fields: &'a [Field], bias: &'a [Vec<f32>]) -> Vec<(&'a Field, &'a [f32])> {
+    let of = |n: usize| bias.get(n).map_or(&[][..], Vec::as_slice);
+    fields.iter().enumerate().map(|(n, f)| (f, of(n))).collect()
+}
+
+/// Covariance of a view's mean residual with the other views' at the same pixels, px^2: without and
+/// with what whole lines share.
+struct Still {
+    fixed_px2: Option<f64>,
+    with_lines_px2: Option<f64>,
+}
+
+fn still(views: &[(&Field, &[f32])], camera: &Camera) -> Vec<Still> {
+    let mut means: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| fine(f, b)).collect();
+    let with_lines = across_views(&means);
+    means.par_iter_mut().for_each(|m| *m = without_lines(m, camera.width, SHORT_LINE));
+    let pairs = across_views(&means).into_iter().zip(with_lines);
+    pairs.map(|(fixed_px2, with_lines_px2)| Still { fixed_px2, with_lines_px2 }).collect()
 }
 
 fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
@@ -89,13 +104,14 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
         let pairs = (0..frames.len() - lag).map(|k| same_pixel(&level[k], &level[k + lag]));
         s.lagged[lag - 1] = mean(pairs);
     }
-    let noise = moving(&frames, &s);
+    let noise = moving(&frames, s.lagged[0]);
     let lines = without_lines(&noise, camera.width, LONG_LINE);
     let changes = changes(&frames);
     if !changes.is_empty() {
+        let filled: Vec<Filled> = changes.iter().map(|c| Filled::of(c)).collect();
         let over = |lags: &[usize], step: [usize; 2]| {
             let all: Option<Vec<f64>> =
-                changes.iter().map(|c| covariance(c, camera, lags, step)).collect();
+                filled.iter().map(|c| covariance(c, camera, lags, step)).collect();
             mean(all?.into_iter())
         };
         // Taking out what is smooth leaves a little of everything everywhere: what a diagonal
@@ -126,111 +142,6 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     s
 }
 
-/// Frames that resemble one another more than this have little noise of their own.
-const STILL: f64 = 0.6;
-
-/// An image of the noise as it changes from frame to frame, so that nothing that stands still is
-/// taken for it; the first frame where there is but one, or where nearly all stands still.
-pub fn moving(frames: &[Vec<f32>], s: &Structure) -> Vec<f32> {
-    match frames {
-        [a, b, ..] if s.lagged[0].is_none_or(|c| c < STILL) => change(a, b),
-        _ => frames[0].clone(),
-    }
-}
-
-/// What changes between a view's frames, as orthogonal images that have one frame's variance each.
-fn changes(frames: &[Vec<f32>]) -> Vec<Vec<f32>> {
-    match frames {
-        [a, b, c, d, ..] => {
-            let sum = |a: &[f32], b: &[f32]| -> Vec<f32> {
-                a.iter().zip(b).map(|(a, b)| (a + b) * FRAC_1_SQRT_2).collect()
-            };
-            vec![change(a, b), change(c, d), change(&sum(a, b), &sum(c, d))]
-        }
-        [a, b, ..] => vec![change(a, b)],
-        _ => Vec::new(),
-    }
-}
-
-/// From one frame to another, with the variance of one.
-fn change(a: &[f32], b: &[f32]) -> Vec<f32> {
-    a.iter().zip(b).map(|(a, b)| (b - a) * FRAC_1_SQRT_2).collect()
-}
-
-/// Residuals as an image, px, without what is smooth and what is known.
-fn rough(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
-    let image = if bias.is_empty() {
-        field.image(residuals)
-    } else {
-        let left: Vec<f32> = residuals.iter().zip(bias).map(|(r, b)| r - b).collect();
-        field.image(&left)
-    };
-    high_pass(&image, field.width, field.height, SMOOTH_PX)
-}
-
-/// The view's mean, px, without what is known, gross errors, and all that does not change from pixel
-/// to pixel.
-pub(super) fn fine(field: &Field, bias: &[f32]) -> Vec<f32> {
-    let image = calm(&rough(field, &field.mean, bias));
-    high_pass(&image, field.width, field.height, PIXEL_BOX)
-}
-
-/// Without gross errors.
-fn calm(image: &[f32]) -> Vec<f32> {
-    let mut sizes: Vec<f32> = image.iter().filter(|r| r.is_finite()).map(|r| r.abs()).collect();
-    let limit = 6.0 * MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
-    let kept = |r: &f32| if limit > 0.0 && r.abs() > limit { f32::NAN } else { *r };
-    image.iter().map(kept).collect()
-}
-
-/// Rows and columns shorter than this are left as they are, px: their mean is mostly noise.
-const LONG_LINE: usize = 150;
-/// The same where a pixel is held against itself, and a line's mean only stands in the way.
-const SHORT_LINE: usize = 30;
-
-/// Minus the mean of each long row and column: noise that a row shares is no window's.
-fn without_lines(image: &[f32], width: usize, least: usize) -> Vec<f32> {
-    let mut out = image.to_vec();
-    let height = image.len() / width.max(1);
-    let mut level = |indices: &mut dyn Iterator<Item = usize>| {
-        let line: Vec<usize> = indices.filter(|&i| out[i].is_finite()).collect();
-        if line.len() >= least {
-            let mean = line.iter().map(|&i| f64::from(out[i])).sum::<f64>() / line.len() as f64;
-            line.iter().for_each(|&i| out[i] -= mean as f32);
-        }
-    };
-    for v in 0..height {
-        level(&mut (v * width..(v + 1) * width));
-    }
-    for u in 0..width {
-        level(&mut (0..height).map(|v| v * width + u));
-    }
-    out
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (mut sum, mut n) = (0.0, 0.0);
-    for v in values.filter(|v| v.is_finite()) {
-        sum += v;
-        n += 1.0;
-    }
-    (n > 0.0).then(|| sum / n)
-}
-
-/// Correlation of two images, pixel by pixel.
-pub fn same_pixel(a: &[f32], b: &[f32]) -> f64 {
-    let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
-    for (&a, &b) in a.iter().zip(b) {
-        let (a, b) = (f64::from(a), f64::from(b));
-        if (a * b).is_finite() {
-            ab += a * b;
-            aa += a * a;
-            bb += b * b;
-        }
-    }
-    if aa * bb > 0.0 { ab / (aa * bb).sqrt() } else { f64::NAN }
-}
-
 /// Mean product of each view's mean residual with the mean of the others', px^2.
 fn across_views(means: &[Vec<f32>]) -> Vec<Option<f64>> {
     let n = means.iter().map(Vec::len).max().unwrap_or(0);
@@ -259,81 +170,13 @@ fn across_views(means: &[Vec<f32>]) -> Vec<Option<f64>> {
     means.par_iter().map(of).collect()
 }
 
-/// A pixel's own error changes from pixel to pixel: the box whose mean is taken out, px.
-const PIXEL_BOX: usize = 7;
-
-/// Side of the patches whose own scale their residuals are held against: this share of the
-/// picture's width, px.
-const PATCHES_ACROSS: usize = 7;
-const SMALLEST_PATCH: usize = 40;
-
-/// Share of residuals beyond four standard deviations of their patch, their number, and how far
-/// out they lie, in standard deviations.
-pub fn tail(image: &[f32], camera: &Camera) -> (f64, f64, f64) {
-    let (mut beyond, mut n, mut size) = (0.0, 0.0, 0.0);
-    let side = (camera.width / PATCHES_ACROSS).max(SMALLEST_PATCH);
-    for v0 in (0..camera.height).step_by(side) {
-        for u0 in (0..camera.width).step_by(side) {
-            let rows = v0..(v0 + side).min(camera.height);
-            let patch: Vec<f32> = rows
-                .flat_map(|v| {
-                    let u1 = (u0 + side).min(camera.width);
-                    image[v * camera.width + u0..v * camera.width + u1].iter().copied()
-                })
-                .filter(|r| r.is_finite())
-                .map(f32::abs)
-                .collect();
-            if patch.len() < side * side / 4 {
-                continue;
-            }
-            let mut sizes = patch.clone();
-            let mad = MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
-            // Coarse words make the median jump; the bulk's own spread bounds it below.
-            let bulk = &mut sizes[..];
-            bulk.sort_unstable_by(f32::total_cmp);
-            let most = &bulk[..bulk.len() * 9 / 10];
-            let square: f64 = most.iter().map(|r| f64::from(*r).powi(2)).sum();
-            // Nine tenths of a Gaussian have 0.72 of its standard deviation... squared 0.6225.
-            let spread = (square / most.len() as f64 / 0.6225).sqrt() as f32;
-            let sigma = mad.max(0.8 * spread);
-            if sigma <= 0.0 {
-                continue;
-            }
-            for r in &patch {
-                n += 1.0;
-                if *r > TAIL_SIGMAS * sigma {
-                    beyond += 1.0;
-                    size += f64::from(r / sigma);
-                }
-            }
-        }
-    }
-    if n > 0.0 { (beyond / n, n, size / f64::max(beyond, 1.0)) } else { (0.0, 0.0, 0.0) }
-}
-
-/// Lags well beyond a Kinect's window, px.
-const FAR: [usize; 12] = [20, 22, 24, 27, 30, 33, 36, 39, 42, 46, 50, 54];
-/// Lags within a window.
-const NEAR: [usize; 4] = [1, 2, 3, 4];
-
-/// Mean product of pixels that are so far apart along `step`, px^2.
-fn covariance(image: &[f32], camera: &Camera, lags: &[usize], step: [usize; 2]) -> Option<f64> {
-    let (w, h) = (camera.width, camera.height);
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (mut sum, mut n) = (0.0, 0.0);
-    for lag in lags {
-        let (du, dv) = (lag * step[0], lag * step[1]);
-        for v in 0..h.saturating_sub(dv) {
-            for u in 0..w.saturating_sub(du) {
-                let i = v * w + u;
-                let product = image[i] * image[i + dv * w + du];
-                if product.is_finite() {
-                    sum += f64::from(product);
-                    n += 1.0;
-                }
-            }
-        }
+    for v in values.filter(|v| v.is_finite()) {
+        sum += v;
+        n += 1.0;
     }
-    (n > 1000.0).then(|| sum / n)
+    (n > 0.0).then(|| sum / n)
 }
 
 /// How the frames' means move.

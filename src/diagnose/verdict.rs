@@ -6,7 +6,7 @@ use super::field::Field;
 use super::heldout;
 use super::layers::{BLOCK_TILES, Survey};
 use super::other_findings::named;
-use super::search::Outcome;
+use super::outcome::Outcome;
 use super::tiles::SIDE;
 use crate::effects;
 use crate::model::{Effect, NoiseModel, UNEXPLAINED};

@@ -15,7 +15,7 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
     let camera = &bench.sensor.camera;
     let mut source = FrameSource::new(camera.width, camera.height);
     let mut reader = FrameReader::of(view, &mut source, &bench.table);
-    let held = reader.hold(view)?;
+    let held: Vec<Frame> = reader.hold(view)?.into_iter().map(|(_, frame)| frame).collect();
     let target = target_of(view, bench, &held)?;
     let mut scan = Scan::begin(bench, &target, &held);
     for frame in &held {
@@ -45,18 +45,19 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
     })
 }
 
-/// The target of one view, from its first frames.
-pub fn view_target(view: &View, bench: &Workbench<'_>) -> Result<Target> {
+/// The target of one view, from its first frames; and these, by their numbers in the view.
+pub fn view_target(view: &View, bench: &Workbench<'_>) -> Result<(Target, Vec<(usize, Frame)>)> {
     let camera = &bench.sensor.camera;
     let mut source = FrameSource::new(camera.width, camera.height);
     let mut reader = FrameReader::of(view, &mut source, &bench.table);
-    let held = reader.hold(view)?;
-    target_of(view, bench, &held)
+    let (numbers, held): (Vec<usize>, Vec<Frame>) = reader.hold(view)?.into_iter().unzip();
+    let target = target_of(view, bench, &held)?;
+    Ok((target, numbers.into_iter().zip(held).collect()))
 }
 
 /// Hands out the frames that can be read; the others are named in the notes.
 struct FrameReader<'r> {
-    frames: std::slice::Iter<'r, FrameRef>,
+    frames: std::iter::Enumerate<std::slice::Iter<'r, FrameRef>>,
     source: &'r mut FrameSource,
     notes: Vec<String>,
     table: &'r DepthTable,
@@ -68,14 +69,14 @@ fn failed(view: &View, what: String, remedy: &'static str) -> Error {
 
 impl<'r> FrameReader<'r> {
     fn of(view: &'r View, source: &'r mut FrameSource, table: &'r DepthTable) -> Self {
-        FrameReader { frames: view.depth.iter(), source, notes: Vec::new(), table }
+        FrameReader { frames: view.depth.iter().enumerate(), source, notes: Vec::new(), table }
     }
 
-    fn hold(&mut self, view: &View) -> Result<Vec<Frame>> {
+    fn hold(&mut self, view: &View) -> Result<Vec<(usize, Frame)>> {
         let mut held = Vec::new();
         while held.len() < HELD_FRAMES {
-            let Some(frame) = self.next_readable() else { break };
-            held.push(frame);
+            let Some(numbered) = self.next_numbered() else { break };
+            held.push(numbered);
         }
         if held.is_empty() {
             let why = self.notes.first().cloned().unwrap_or_else(|| "it has no frame".into());
@@ -85,10 +86,14 @@ impl<'r> FrameReader<'r> {
     }
 
     fn next_readable(&mut self) -> Option<Frame> {
-        while let Some(frame_ref) = self.frames.next() {
+        self.next_numbered().map(|(_, frame)| frame)
+    }
+
+    fn next_numbered(&mut self) -> Option<(usize, Frame)> {
+        while let Some((number, frame_ref)) = self.frames.next() {
             match self.source.read(&frame_ref.path) {
                 Ok(f) if f.raw.iter().any(|&raw| self.table.metres(raw).is_finite()) => {
-                    return Some(f);
+                    return Some((number, f));
                 }
                 Ok(_) => self.notes.push(format!(
                     "frame left out: {}: no pixel carries a depth",

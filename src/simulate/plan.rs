@@ -177,7 +177,7 @@ pub fn plan_like(
     let options = MeasureOptions { seed, ..MeasureOptions::default() };
     let bench = Workbench::new(&recording.sensor, options);
     let found: Vec<Result<Found>> =
-        recording.views.par_iter().map(|view| view_target(view, &bench)).collect();
+        recording.views.par_iter().map(|view| Ok(view_target(view, &bench)?.0)).collect();
     let mut plans = Vec::new();
     let mut excluded = recording.excluded.clone();
     for (view, target) in recording.views.iter().zip(found) {

@@ -1,4 +1,8 @@
-//! The two argmin solvers that the fits use, each with a limit on its steps.
+//! Symmetric systems, and the two argmin solvers that the fits use, each with a limit on its steps.
+
+mod cholesky;
+
+pub use cholesky::Cholesky;
 
 use std::cell::RefCell;
 

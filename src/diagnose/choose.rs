@@ -1,0 +1,176 @@
+//! Which candidate a step takes: the name that explains as much as any, or the best curve.
+
+use super::candidate::Candidate;
+use super::judge::Judged;
+use super::null::NoiseGains;
+use super::outcome::{Chosen, Rival, Rules};
+use crate::terms::Basis;
+
+/// Of families that predict as well as the best, the one with the fewest columns is meant.
+const AS_GOOD_NATS: f64 = 2.0;
+/// So they do within this share of a large gain: no family's shape is exact.
+const AS_GOOD_SHARE: f64 = 0.01;
+/// The candidates of a step, and what each comes to.
+pub struct Choice<'a> {
+    pub candidates: &'a [Candidate],
+    pub judged: &'a [Option<Judged>],
+    pub rules: &'a Rules,
+    pub noise: &'a NoiseGains,
+}
+
+impl Choice<'_> {
+    /// The best, if it brings more than noise can and is not among the `chosen` already.
+    pub fn best(&self, chosen: &[Chosen]) -> Option<Chosen> {
+        let families = self.ranked(true, |i| self.fair(i));
+        let curves = self.ranked(false, |i| self.total(i));
+        let threshold = self.noise.threshold(self.rules.level);
+        let new = |i: usize| {
+            !chosen.iter().any(|c| same_curve(&c.candidate, &self.candidates[i]))
+                && self.is_sensible(i)
+        };
+        let curve = || curves.iter().copied().find(|&i| self.safe(i) > threshold && new(i));
+        let winner = self.name(&families, &curves).or_else(curve)?;
+        Some(Chosen {
+            candidate: self.candidates[winner].clone(),
+            rms: self.judged[winner].as_ref().map_or(0.0, |j| j.rms),
+            adequacy: self.adequacy(winner),
+            gain: self.total(winner),
+            best_curve: self.best_curve(&curves),
+            rivals: self.rivals(winner, &families)?,
+            p: self.noise.p(self.safe(winner)),
+        })
+    }
+
+    fn total(&self, i: usize) -> f64 {
+        self.judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| j.gain.total)
+    }
+
+    /// Views that scatter more than their noise says count for less.
+    fn safe(&self, i: usize) -> f64 {
+        self.judged[i].as_ref().map_or(0.0, |j| j.gain.total / j.null.dispersion)
+    }
+
+    /// A name whose fits to single views disagree is the worse one.
+    fn fair(&self, i: usize) -> f64 {
+        let total = self.total(i);
+        self.judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| {
+            if total > 0.0 { total / j.null.dispersion.sqrt() } else { total }
+        })
+    }
+
+    fn is_sensible(&self, i: usize) -> bool {
+        self.judged[i].as_ref().is_some_and(|j| j.sensible)
+    }
+
+    /// Candidates with or without a name, best first.
+    fn ranked(&self, named: bool, by: impl Fn(usize) -> f64) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.candidates.len())
+            .filter(|&i| self.candidates[i].family.is_some() == named)
+            .collect();
+        order.sort_by(|&a, &b| by(b).total_cmp(&by(a)));
+        order
+    }
+
+    fn best_curve(&self, curves: &[usize]) -> f64 {
+        curves.first().map_or(f64::NEG_INFINITY, |&i| self.total(i))
+    }
+
+    /// The name to take, if any: of those as good as the best the one with the fewest columns.
+    fn name(&self, families: &[usize], curves: &[usize]) -> Option<usize> {
+        let threshold = self.noise.threshold(self.rules.level);
+        let best_curve = self.best_curve(curves);
+        let best_family = families.first().map_or(f64::NEG_INFINITY, |&i| self.fair(i));
+        let slack = AS_GOOD_NATS.max(AS_GOOD_SHARE * best_family);
+        let columns = |i: usize| self.candidates[i].basis.count();
+        families
+            .iter()
+            .copied()
+            .filter(|&i| self.fair(i) > best_family - slack)
+            .min_by_key(|&i| (columns(i), !self.rests_on_a_measurement(i)))
+            .filter(|&i| self.safe(i) > threshold && self.total(i) > self.adequacy(i) * best_curve)
+            // What fewer columns without a name do better is not what the name says.
+            .filter(|&i| {
+                let simpler = |&k: &usize| columns(k) < columns(i) && self.total(k) > self.total(i);
+                !curves.iter().any(simpler)
+            })
+            .filter(|&i| self.is_sensible(i))
+            .filter(|&i| {
+                let clear = self.total(i) > CLEAR * best_curve;
+                clear || self.judged[i].as_ref().is_some_and(steady)
+            })
+    }
+
+    /// The best of every family.
+    fn rivals(&self, winner: usize, families: &[usize]) -> Option<Vec<Rival>> {
+        let won = &self.judged[winner].as_ref()?.gain;
+        let mut rivals: Vec<Rival> = Vec::new();
+        for &i in families {
+            let (Some(family), Some(j)) = (self.candidates[i].family, &self.judged[i]) else {
+                continue;
+            };
+            if rivals.iter().all(|r| r.family != family) {
+                rivals.push(Rival {
+                    family,
+                    basis: self.candidates[i].basis.clone(),
+                    gain: self.fair(i),
+                    behind: behind(&won.by_view, &j.gain.by_view),
+                });
+            }
+        }
+        Some(rivals)
+    }
+
+    /// Light of the room was measured for its own sake; the surface's is made out of an image that
+    /// the room lights too.
+    fn rests_on_a_measurement(&self, i: usize) -> bool {
+        matches!(self.candidates[i].basis, Basis::Ambient { .. })
+    }
+
+    /// The share of the best curve that a name must explain. Bands on a real sensor ride on a
+    /// smooth error of the column that is no band's; the law of sigma has columns for nearly
+    /// everything that happens to go with the distance.
+    fn adequacy(&self, i: usize) -> f64 {
+        match self.candidates[i].basis {
+            Basis::Banding { .. } => BANDS_ADEQUATE.min(self.rules.adequacy),
+            Basis::Recalibrate { .. } | Basis::Level => LAW_ADEQUATE.max(self.rules.adequacy),
+            _ => self.rules.adequacy,
+        }
+    }
+}
+
+/// A nameless curve that is in already, perhaps with other nodes.
+fn same_curve(a: &Candidate, b: &Candidate) -> bool {
+    let key = |c: &Candidate| match c.basis {
+        // A step and a smooth curve are not one.
+        Basis::Curve { over, times, nodes, .. } => Some((format!("{over:?}{}", nodes == 2), times)),
+        Basis::Map { times, .. } => Some(("map".to_string(), times)),
+        _ => None,
+    };
+    let both_nameless = a.family.is_none() && b.family.is_none();
+    both_nameless && (a.basis == b.basis || key(a).is_some_and(|k| Some(k) == key(b)))
+}
+
+/// See [`Choice::adequacy`].
+const LAW_ADEQUATE: f64 = 0.85;
+/// See [`Choice::adequacy`].
+const BANDS_ADEQUATE: f64 = 0.45;
+/// A name that explains this share of what the best nameless curve does is met by its own shape.
+const CLEAR: f64 = 0.85;
+
+/// Views that scatter about a common fit far beyond their noise are explained badly; a name must
+/// then help most of them.
+fn steady(judged: &Judged) -> bool {
+    const WILD: f64 = 3.0;
+    const STEADY: f64 = 2.5;
+    let none = vec![0.0; judged.gain.by_view.len()];
+    judged.null.dispersion < WILD || behind(&judged.gain.by_view, &none) > STEADY
+}
+
+/// Mean difference over the views by its standard error.
+fn behind(winner: &[f64], rival: &[f64]) -> f64 {
+    let n = winner.len() as f64;
+    let differences = || winner.iter().zip(rival).map(|(w, r)| w - r);
+    let mean = differences().sum::<f64>() / n;
+    let variance = differences().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    if variance > 0.0 { mean / (variance / n).sqrt() } else { 0.0 }
+}

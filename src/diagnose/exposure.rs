@@ -1,0 +1,126 @@
+//! Frames laid on a view's plane: what every pixel measures beside what is expected of it.
+
+use super::field::{CLIP_SIGMAS, Field};
+use super::known::KnownTerms;
+use super::rim::Rim;
+use super::shadow::Shadow;
+use super::tiles::Places;
+use crate::camera::Rays;
+use crate::frame::{DepthTable, Frame};
+use crate::measure::Workbench;
+use crate::model::SigmaModel;
+use crate::terms::{PixelContext, Term};
+
+/// Disparities that spread less than this over a view show no slope, px.
+const LEAST_SPREAD_PX: f64 = 0.5;
+/// Single frames kept whole: enough for correlations in time.
+const FRAMES_KEPT: usize = 4;
+
+impl Field {
+    /// Collect the residuals of all frames (time since the first, s).
+    pub fn expose(
+        &mut self,
+        frames: impl Iterator<Item = (f64, Frame)>,
+        bench: &Workbench<'_>,
+        sigma: &SigmaModel,
+        known: &KnownTerms,
+        session_start: f64,
+    ) {
+        self.sigma = self.expected_sigma(&bench.rays, sigma);
+        let expected = self.known_bias(known, bench, session_start);
+        for (time, image) in frames {
+            if self.frames.is_empty() {
+                self.shadow = Shadow::beside(self, &image, &bench.rays, &bench.table);
+                self.rim = Rim::around(self, &image, &bench.rays, &bench.table);
+            }
+            self.add(&image, time, &expected, &bench.table);
+        }
+        self.close();
+    }
+
+    /// Sigma of the disparity at each pixel, px.
+    fn expected_sigma(&self, rays: &Rays, sigma: &SigmaModel) -> Vec<f32> {
+        let theta = self.plane.theta();
+        let of = |&i: &u32| {
+            let (x, y) = rays.at(i as usize);
+            let z = self.plane.depth(x, y);
+            (sigma.axial_sigma(z, theta) * self.scale_px_m / (z * z)) as f32
+        };
+        self.pixels.iter().map(of).collect()
+    }
+
+    /// Disparity that the model expects at each pixel, px; its terms of the variance go to sigma.
+    fn known_bias(&mut self, known: &KnownTerms, bench: &Workbench<'_>, start: f64) -> Vec<f32> {
+        let n = self.pixels.len();
+        let mut expected: Vec<f32> =
+            (0..n).map(|k| self.disparity(k, &bench.rays) as f32).collect();
+        if known.bias.is_empty() && known.variance.is_empty() {
+            return expected;
+        }
+        let mut sigma = self.sigma.clone();
+        let places = Places::of(self, &bench.sensor.camera, &bench.rays, start);
+        let mut row = Vec::new();
+        let mut sum = |terms: &[Term], place: &PixelContext| -> f64 {
+            terms.iter().map(|t| t.value(place, &mut row)).sum()
+        };
+        for k in 0..n {
+            let place = places.pixel(k);
+            expected[k] += sum(&known.bias, &place) as f32;
+            sigma[k] *= (0.5 * sum(&known.variance, &place)).exp() as f32;
+        }
+        self.sigma = sigma;
+        expected
+    }
+
+    fn add(&mut self, frame: &Frame, time: f64, expected: &[f32], table: &DepthTable) {
+        let keep = self.first.len() < FRAMES_KEPT;
+        let mut residuals = if keep { vec![f32::NAN; self.pixels.len()] } else { Vec::new() };
+        let (mut sum, mut n) = (0.0f64, 0.0f64);
+        let middle = self.scale_px_m * self.plane.q.z;
+        let (mut sx, mut sxx, mut sxy) = (0.0f64, 0.0f64, 0.0f64);
+        for k in 0..self.pixels.len() {
+            let word = frame.raw[self.pixels[k] as usize];
+            let z = table.metres(word);
+            if !z.is_finite() {
+                continue;
+            }
+            self.measured[k] += 1;
+            self.words.0[usize::from(word)] += 1;
+            let e = (self.scale_px_m / f64::from(z)) as f32 - expected[k];
+            if keep {
+                residuals[k] = e;
+            }
+            if e.abs() <= CLIP_SIGMAS * self.sigma[k].max(self.spread_px) {
+                self.count[k] += 1;
+                self.mean[k] += e;
+                self.square[k] += e * e;
+                sum += f64::from(e);
+                n += 1.0;
+                let x = f64::from(expected[k]) - middle;
+                sx += x;
+                sxx += x * x;
+                sxy += x * f64::from(e);
+            }
+        }
+        if keep {
+            self.first.push(residuals);
+        }
+        // A frontal view has one disparity, and no slope.
+        let spread = sxx - sx * sx / f64::max(n, 1.0);
+        let slope = if spread > n * LEAST_SPREAD_PX * LEAST_SPREAD_PX {
+            (sxy - sx * sum / n) / spread
+        } else {
+            0.0
+        };
+        self.lines.push([(sum - slope * sx) / f64::max(n, 1.0), slope]);
+        self.frames.push((time, if n > 0.0 { sum / n } else { f64::NAN }));
+    }
+
+    fn close(&mut self) {
+        for k in 0..self.pixels.len() {
+            let n = f32::from(self.count[k]);
+            self.mean[k] /= n;
+            self.square[k] /= n;
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! What pixels repeat: in every view, in every frame of a view, and from frame to frame.
+
+use super::hanging::{Hanging, Mean, Shared, nats, one, variance_px2};
+use super::known::KnownTerms;
+use super::structure::Structure;
+use crate::terms::{Axis, Statistic};
+
+/// Correlations smaller than this are not worth a word.
+const LEAST_CORRELATION: f64 = 0.004;
+/// Share of the variance that pixels repeat in every view, worth a word.
+const LEAST_FIXED: f64 = 0.0003;
+/// A share that stands still beside one that changes slowly is known to this.
+const BESIDE_ANOTHER: f64 = 0.05;
+
+/// A correlation of frames: a share of the variance.
+fn of_frames(
+    families: Vec<&'static str>,
+    interval: [f64; 2],
+    (name, share, std_error): (&str, f64, f64),
+    size: f64,
+    (p, nats): (f64, f64),
+) -> Hanging {
+    Hanging {
+        families,
+        statistic: Statistic::Correlation,
+        axis: Axis::Frame,
+        interval,
+        parameters: one(name, share, std_error),
+        size_sigma: size.max(0.0).sqrt(),
+        p,
+        nats,
+        words: None,
+    }
+}
+
+pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {
+    let fixed = Mean::of_pairs(views, |s| s.fixed_px2);
+    let variance = variance_px2(views);
+    let known_px = known.parameter("fixed-pattern-noise", "sigma_px").unwrap_or(0.0);
+    let pattern = Shared {
+        families: vec!["fixed-pattern-noise"],
+        statistic: Statistic::Bias,
+        axis: Axis::Pixel,
+        expected_px2: known_px * known_px,
+        least: LEAST_FIXED,
+        words: None,
+    };
+    let mut found: Vec<Hanging> =
+        fixed.and_then(|m| pattern.found(&m, variance, level)).into_iter().collect();
+    let fixed_px2 = fixed.map_or(0.0, |m| m.value.max(0.0));
+    let Some(first) = Mean::of(views, |s| s.lagged[0]) else { return found };
+    let fixed_share = fixed_px2 / variance.max(1e-12);
+    let frozen_known = known.parameter("frozen-noise", "fraction").unwrap_or(0.0);
+    let rho_known = known.parameter("temporal-correlation", "rho").unwrap_or(0.0);
+    let last = if views.iter().any(|s| s.lagged[2].is_some()) { 2 } else { 1 };
+    let falling = Mean::of(views, |s| Some(s.lagged[0]? - s.lagged[last]?));
+    let Some((falling, (still, least))) =
+        falling.zip(still_level(views).zip(Mean::of(views, |s| s.lagged[last])))
+    else {
+        // Two frames a view: still or slowly changing, nobody can say.
+        let p = first.p_above(fixed_share + frozen_known + rho_known);
+        let more = first.value - fixed_share - frozen_known - rho_known;
+        if p < level && more > LEAST_CORRELATION {
+            let names = vec!["frozen-noise", "temporal-correlation"];
+            let fraction = ("fraction", first.value, first.std_error);
+            found.push(of_frames(names, [0.0, 1.0], fraction, more, (p, nats(&first, 0.0))));
+        }
+        return found;
+    };
+    let p_falling = falling.p_above(0.0);
+    // What stands still is in the last of them whole.
+    let p_still = least.p_above(fixed_share + frozen_known);
+    let slowly = p_falling < level && falling.value > LEAST_CORRELATION;
+    if slowly && rho_known == 0.0 {
+        let s = still.max(0.0) + fixed_share;
+        let rho = ((first.value - s) / (1.0 - s).max(1e-6)).clamp(0.0, 1.0);
+        let name = vec!["temporal-correlation"];
+        let evidence = (p_falling, nats(&falling, 0.0));
+        found.push(of_frames(name, [1.0, 3.0], ("rho", rho, first.std_error), rho, evidence));
+    }
+    let floor = if slowly { BESIDE_ANOTHER } else { LEAST_CORRELATION };
+    if p_still < level && still - frozen_known > floor {
+        let name = vec!["frozen-noise"];
+        let evidence = (p_still, nats(&least, fixed_share + frozen_known));
+        let fraction = ("fraction", still, least.std_error);
+        found.push(of_frames(name, [1.0, 3.0], fraction, still, evidence));
+    }
+    found
+}
+
+/// Share of the noise that stands still within a view, by the views' mean correlations; `None` with
+/// too few frames.
+pub fn still_level(views: &[Structure]) -> Option<f64> {
+    let mean = |of: &dyn Fn(&Structure) -> Option<f64>| Mean::of(views, of).map(|m| m.value);
+    let (c1, c2, c3) = (mean(&|s| s.lagged[0])?, mean(&|s| s.lagged[1])?, mean(&|s| s.lagged[2]));
+    let share = still_share([c1, c2, c3.unwrap_or(c2 * c2 / c1.max(1e-6))], c3.is_some());
+    let fixed = mean(&|s| s.fixed_px2).unwrap_or(0.0).max(0.0);
+    let variance = mean(&|s| Some(s.variance_px2)).unwrap_or(0.0);
+    Some(share - fixed / variance.max(1e-12))
+}
+
+/// The s of c_k = s + (1 - s) rho^k, from the correlations at lags one to three.
+pub(super) fn still_share([c1, c2, c3]: [f64; 3], three: bool) -> f64 {
+    let (near, far) = (c1 - c2, c2 - c3);
+    if !three {
+        // rho^2 = rho * rho alone cannot be told from a share: what falls is taken as a filter's.
+        return if near > 0.05 * c1 { 0.0 } else { c2 };
+    }
+    if near <= 0.01 {
+        return (c1 + c2 + c3) / 3.0;
+    }
+    let rho = (far / near).clamp(0.0, 0.95);
+    // c1 - c2 = (1 - s) rho (1 - rho); a moving average dies at once and leaves the last.
+    let s = if rho < 0.05 { c3 } else { 1.0 - near / (rho * (1.0 - rho)) };
+    s.clamp(0.0, c3.max(0.0))
+}

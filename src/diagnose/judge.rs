@@ -1,0 +1,93 @@
+//! What a candidate comes to on its own: what it brings, how large it is, and whether it can be meant.
+
+use super::candidate::Candidate;
+use super::evidence::{Evidence, Gain};
+use super::null::{NoiseGains, Null};
+use super::outcome::{Look, Rules};
+use super::samples::ViewData;
+use crate::terms::{Basis, PixelContext};
+
+pub struct Judged {
+    pub gain: Gain,
+    pub null: Null,
+    /// Can it be meant: of a sensible shape, and larger than what constant errors of the pixels
+    /// make by chance.
+    pub sensible: bool,
+    pub rms: f64,
+}
+
+/// A later term must be this large beside the largest, root mean square by root mean square.
+pub const LEAST_OF_LARGEST: f64 = 0.06;
+
+/// What sizes are measured on, and held against.
+pub struct Judge<'a> {
+    pub fine: &'a [ViewData],
+    /// Of all samples.
+    pub weight: f64,
+    pub rules: &'a Rules,
+    /// Root mean square of the largest term so far.
+    pub largest: f64,
+}
+
+impl Judge<'_> {
+    /// Root mean square of a candidate's fit over the samples, the nuisances taken out.
+    pub fn rms(&self, basis: &Basis, m: usize, gain: &Gain, evidence: &[Evidence]) -> f64 {
+        let k = basis.count();
+        let beta = gain.beta.rows(m, k).into_owned();
+        let square: f64 =
+            evidence.iter().map(|e| beta.dot(&(e.a.view((m, m), (k, k)) * &beta))).sum();
+        (square / self.weight).max(0.0).sqrt()
+    }
+
+    pub fn sensible(&self, basis: &Basis, m: usize, gain: &Gain, rms: f64) -> bool {
+        let beta = gain.beta.rows(m, basis.count()).into_owned();
+        if let Basis::RangeExponent { orders: 2.., .. } = basis {
+            let ends = self.fine.iter().flat_map(|v| v.places.iter().map(|p| p.z));
+            return one_way(basis, beta.as_slice(), crate::stats::range(ends));
+        }
+        let k = basis.count();
+        let least = self.rules.least.max(LEAST_OF_LARGEST * self.largest);
+        if rms < least {
+            return false;
+        }
+        let Some((fixed, pixels)) = self.rules.fixed.filter(|_| basis.is_of_picture()) else {
+            return true;
+        };
+        // Seven times what a fit to nothing but the pixels' own errors would make, for the best of
+        // many and for views that cover little of the picture.
+        const CLEARLY: f64 = 50.0;
+        rms * rms > CLEARLY * fixed * fixed * k as f64 / pixels
+    }
+}
+
+/// Up all along, or down: what turns round is no power of z.
+fn one_way(basis: &Basis, beta: &[f64], [near, far]: [f64; 2]) -> bool {
+    const NODES: usize = 24;
+    const BACK: f64 = 0.12;
+    let mut row = Vec::new();
+    let mut at = |k: usize| {
+        let z = near * (far / near).powf(k as f64 / (NODES - 1) as f64);
+        basis.value(beta, &PixelContext { z, ..PixelContext::default() }, &mut row)
+    };
+    let values: Vec<f64> = (0..NODES).map(&mut at).collect();
+    let (mut up, mut down) = (0.0, 0.0);
+    for w in values.windows(2) {
+        let step = w[1] - w[0];
+        if step > 0.0 { up += step } else { down -= step }
+    }
+    f64::min(up, down) < BACK * (up + down)
+}
+
+pub fn looks(candidates: &[Candidate], judged: &[Option<Judged>], noise: &NoiseGains) -> Vec<Look> {
+    let nameless = candidates.iter().zip(judged).filter(|(c, _)| c.family.is_none());
+    nameless
+        .filter_map(|(c, j)| {
+            let j = j.as_ref()?;
+            Some(Look {
+                basis: c.basis.clone(),
+                coefficients: j.gain.beta.as_slice().to_vec(),
+                p: noise.p(j.gain.total / j.null.dispersion),
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,222 @@
+//! What noise alone brings: for one candidate, and for the best of all.
+
+use nalgebra::{DMatrix, DVector};
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use super::evidence::Evidence;
+use crate::rng::{Seed, Stream};
+
+/// What noise alone may bring for a candidate: b ~ N(0, A) in every view.
+///
+/// Worked in the eigenvectors of the summed A, in which the views' own A are taken as diagonal:
+/// exact when the views' A are multiples of one another, and a thousand times quicker.
+pub struct Null {
+    /// Information of each view on each eigenvector.
+    by_view: Vec<Vec<f64>>,
+    total: Vec<f64>,
+    prior: f64,
+    /// How much more the views' own fits scatter than their noise explains, at least 1: about the
+    /// common fit, or about nothing at all where a few views have what the others have not.
+    pub dispersion: f64,
+}
+
+impl Null {
+    /// For the columns from number `chosen` on, given the columns before them.
+    pub fn of(views: &[Evidence], chosen: usize, prior: f64) -> Option<Self> {
+        let k = views.first()?.b.len() - chosen;
+        let (alone, left) = beside_chosen(views, chosen, prior)?;
+        let sum = alone.iter().fold(DMatrix::zeros(k, k), |sum, a| sum + a);
+        let u = sum.symmetric_eigen().eigenvectors;
+        let information = |a: &DMatrix<f64>| -> Vec<f64> {
+            let au = a * &u;
+            (0..k).map(|j| u.column(j).dot(&au.column(j)).max(0.0)).collect()
+        };
+        let by_view: Vec<Vec<f64>> = alone.iter().map(information).collect();
+        let total: Vec<f64> = (0..k).map(|j| by_view.iter().map(|a| a[j]).sum()).collect();
+        let about_fit = dispersion(&alone, &by_view, &total, &u, &left, prior);
+        let dispersion = about_fit.min(usual_square(&by_view, &total, &u, &left));
+        Some(Null { by_view, total, prior, dispersion })
+    }
+
+    /// The gain of one recording of nothing but noise, nats.
+    pub fn draw(&self, rng: &mut Stream) -> f64 {
+        let mut gain = 0.0;
+        let mut b = vec![0.0; self.by_view.len()];
+        for (j, &total) in self.total.iter().enumerate() {
+            let mut sum = 0.0;
+            for (b, a) in b.iter_mut().zip(&self.by_view) {
+                let draw: f64 = StandardNormal.sample(rng);
+                *b = a[j].sqrt() * draw;
+                sum += *b;
+            }
+            for (b, a) in b.iter().zip(&self.by_view) {
+                let beta = (sum - b) / (total - a[j] + self.prior);
+                gain += beta * (b - 0.5 * beta * a[j]);
+            }
+        }
+        gain
+    }
+}
+
+/// Information and score of each view.
+type PerView = (Vec<DMatrix<f64>>, Vec<DVector<f64>>);
+
+/// The candidate's evidence once the chosen terms are fitted with it: its information in each
+/// view, and its score there.
+fn beside_chosen(views: &[Evidence], chosen: usize, prior: f64) -> Option<PerView> {
+    let n = views.first()?.b.len();
+    let k = n - chosen;
+    if chosen == 0 {
+        let split = views.iter().map(|v| (v.a.clone(), v.b.clone()));
+        return Some(split.unzip());
+    }
+    let mut mm = DMatrix::identity(chosen, chosen) * prior;
+    let mut mk = DMatrix::zeros(chosen, k);
+    let mut bm = DVector::zeros(chosen);
+    for v in views {
+        mm += v.a.view((0, 0), (chosen, chosen));
+        mk += v.a.view((0, chosen), (chosen, k));
+        bm += v.b.rows(0, chosen);
+    }
+    let factor = mm.cholesky()?;
+    let (t, beta) = (factor.solve(&mk), factor.solve(&bm));
+    let split = views.iter().map(|v| {
+        let vmm = v.a.view((0, 0), (chosen, chosen));
+        let vmk = v.a.view((0, chosen), (chosen, k));
+        let vkk = v.a.view((chosen, chosen), (k, k));
+        let tm = t.transpose() * vmk;
+        let a = vkk - &tm - tm.transpose() + t.transpose() * vmm * &t;
+        let left_m = v.b.rows(0, chosen) - vmm * &beta;
+        let left_k = v.b.rows(chosen, k) - vmk.transpose() * &beta;
+        (a, left_k - t.transpose() * left_m)
+    });
+    Some(split.unzip())
+}
+
+/// Scatter of the views' scores about the common fit, over what noise gives them.
+fn dispersion(
+    alone: &[DMatrix<f64>],
+    by_view: &[Vec<f64>],
+    total: &[f64],
+    u: &DMatrix<f64>,
+    scores: &[DVector<f64>],
+    prior: f64,
+) -> f64 {
+    let most = total.iter().copied().fold(0.0, f64::max);
+    let k = u.nrows();
+    let whole = alone.iter().fold(DMatrix::identity(k, k) * prior, |sum, a| sum + a);
+    let seen = scores.iter().fold(DVector::zeros(k), |sum, b| sum + b);
+    let Some(factor) = whole.cholesky() else { return 1.0 };
+    let beta = factor.solve(&seen);
+    // What each view says beyond the common fit.
+    let left: Vec<DVector<f64>> = scores.iter().zip(alone).map(|(b, a)| b - a * &beta).collect();
+    let (mut sum, mut n) = (0.0, 0.0);
+    for (j, &total) in total.iter().enumerate() {
+        if total < 1e-6 * most {
+            continue;
+        }
+        for (left, a) in left.iter().zip(by_view) {
+            // A view that says next to nothing would divide by next to nothing.
+            if a[j] > 1e-3 * total {
+                sum += u.column(j).dot(left).powi(2) / a[j];
+                n += 1.0 - a[j] / total;
+            }
+        }
+    }
+    if n < 1.0 {
+        return 1.0;
+    }
+    // Chance alone scatters the estimate by the root of 2 / n.
+    (sum / n - f64::sqrt(2.0 / n)).max(1.0)
+}
+
+/// Median of the views' squared scores, over what noise gives them: near 1 where most views have
+/// nothing of the candidate, whatever the others have.
+fn usual_square(
+    by_view: &[Vec<f64>],
+    total: &[f64],
+    u: &DMatrix<f64>,
+    scores: &[DVector<f64>],
+) -> f64 {
+    let most = total.iter().copied().fold(0.0, f64::max);
+    let mut squares = Vec::new();
+    for (j, &total) in total.iter().enumerate().filter(|(_, t)| **t >= 1e-6 * most) {
+        let seen = scores.iter().zip(by_view).filter(|(_, a)| a[j] > 1e-3 * total);
+        squares.extend(seen.map(|(b, a)| u.column(j).dot(b).powi(2) / a[j]));
+    }
+    if squares.is_empty() {
+        return 1.0;
+    }
+    let (half, n) = (squares.len() / 2, squares.len() as f64);
+    let middle = *squares.select_nth_unstable_by(half, f64::total_cmp).1;
+    // By one standard error of the median more, for safety.
+    (middle / CHI2_MEDIAN * (1.0 + MEDIAN_ERROR / n.sqrt())).max(1.0)
+}
+
+/// Median of the square of a standard normal number.
+const CHI2_MEDIAN: f64 = 0.4549;
+/// Relative standard error of the median of n such squares, times the root of n: 1 / (2 f m) with
+/// their density f at the median m.
+const MEDIAN_ERROR: f64 = 2.33;
+
+/// The greatest gains that noise alone brings, ascending, nats.
+#[derive(Debug, Clone, Default)]
+pub struct NoiseGains(pub(super) Vec<f64>);
+
+/// Simulations of the null.
+const REPLICATES: u64 = 600;
+/// Beyond this quantile the tail of a log likelihood falls as an exponential.
+const TAIL: f64 = 0.1;
+
+impl NoiseGains {
+    pub fn of(nulls: &[&Null], seed: Seed) -> Self {
+        let mut greatest: Vec<f64> = (0..REPLICATES)
+            .into_par_iter()
+            .map(|replicate| {
+                let mut rng = seed.stream(&format!("diagnose/null/{replicate}"));
+                nulls.iter().map(|null| null.draw(&mut rng)).fold(0.0, f64::max)
+            })
+            .collect();
+        greatest.sort_by(f64::total_cmp);
+        NoiseGains(greatest)
+    }
+
+    /// Was there anything to draw from?
+    pub fn is_tested(&self) -> bool {
+        !self.0.is_empty()
+    }
+
+    /// Noise is taken to bring next to nothing.
+    pub fn unknown() -> Self {
+        NoiseGains(vec![0.0])
+    }
+
+    fn cut(&self) -> (f64, f64) {
+        let cut = self.0[((self.0.len() - 1) as f64 * (1.0 - TAIL)) as usize];
+        let tail: Vec<f64> = self.0.iter().filter(|g| **g > cut).map(|g| g - cut).collect();
+        (cut, (tail.iter().sum::<f64>() / tail.len().max(1) as f64).max(0.5))
+    }
+
+    /// Exceeded with probability `level`.
+    pub fn threshold(&self, level: f64) -> f64 {
+        if self.0.is_empty() {
+            return f64::INFINITY;
+        }
+        let (cut, mean_excess) = self.cut();
+        cut + mean_excess * (TAIL / level).ln().max(0.0)
+    }
+
+    /// Chance of exceeding `gain`.
+    pub fn p(&self, gain: f64) -> f64 {
+        if self.0.is_empty() {
+            return 1.0;
+        }
+        let (cut, mean_excess) = self.cut();
+        if gain > cut {
+            return TAIL * (-(gain - cut) / mean_excess).exp();
+        }
+        let above = self.0.len() - self.0.partition_point(|g| *g < gain);
+        (above as f64 / self.0.len() as f64).max(TAIL)
+    }
+}

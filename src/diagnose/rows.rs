@@ -1,0 +1,238 @@
+//! One view's samples, and the evidence that columns make of them.
+
+use std::borrow::Cow;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::evidence::Evidence;
+
+/// One view's data with what is fitted beside every candidate: its own nuisances, and the terms
+/// already chosen.
+pub struct Rows<'a> {
+    /// Inverse variance, in independent samples.
+    weight: Cow<'a, [f64]>,
+    /// A row a sample: nuisances, then the chosen terms' columns, then the response.
+    samples: Vec<f64>,
+    nuisances: usize,
+    /// Columns beside the candidate's.
+    width: usize,
+    /// Normal equations of what is beside, before anything is profiled out.
+    own: DMatrix<f64>,
+    seen: DVector<f64>,
+    /// Inverse of the nuisances' own block.
+    inverse: DMatrix<f64>,
+}
+
+impl<'a> Rows<'a> {
+    /// `beside` is row-major with `width` columns, of which the first are the nuisances, one for
+    /// each entry of `precision`, which holds them to zero (0: free). `None` when the nuisances
+    /// cannot be told apart.
+    pub fn new(
+        response: &[f64],
+        weight: &'a [f64],
+        beside: &[f64],
+        width: usize,
+        precision: &[f64],
+    ) -> Option<Self> {
+        let mut samples = Vec::with_capacity(response.len() * (width + 1));
+        for (row, y) in beside.chunks_exact(width).zip(response) {
+            samples.extend_from_slice(row);
+            samples.push(*y);
+        }
+        let squares = squares(&samples, weight, width + 1);
+        let mut own = squares.view((0, 0), (width, width)).into_owned();
+        let seen = squares.view((0, width), (width, 1)).column(0).into_owned();
+        let p = precision.len();
+        for (q, precision) in precision.iter().enumerate() {
+            own[(q, q)] += precision;
+        }
+        let inverse = own.view((0, 0), (p, p)).into_owned().try_inverse()?;
+        let weight = Cow::Borrowed(weight);
+        Some(Rows { weight, samples, nuisances: p, width, own, seen, inverse })
+    }
+
+    /// Samples that share a key made one: exact for columns that depend on the key alone.
+    pub fn grouped(&self, keys: usize, key: impl Fn(usize) -> usize) -> Self {
+        let n = self.width + 1;
+        let mut weight = vec![0.0; keys];
+        let mut samples = vec![0.0; keys * n];
+        for (i, (row, &w)) in self.samples.chunks_exact(n).zip(&*self.weight).enumerate() {
+            let k = key(i);
+            weight[k] += w;
+            samples[k * n..][..n].iter_mut().zip(row).for_each(|(sum, x)| *sum += w * x);
+        }
+        for (row, w) in samples.chunks_exact_mut(n).zip(&weight) {
+            let w = w.max(f64::MIN_POSITIVE);
+            row.iter_mut().for_each(|x| *x /= w);
+        }
+        let (own, seen, inverse) = (self.own.clone(), self.seen.clone(), self.inverse.clone());
+        let weight = Cow::Owned(weight);
+        Rows { weight, samples, nuisances: self.nuisances, width: self.width, own, seen, inverse }
+    }
+
+    /// Weighted square that the nuisances (and chosen terms) explain.
+    pub fn explained(&self) -> f64 {
+        let p = self.nuisances;
+        let seen = self.seen.rows(0, p);
+        (&self.inverse * seen).dot(&seen)
+    }
+
+    /// Sample number `i`: what is beside, and the response.
+    fn sample(&self, i: usize) -> &[f64] {
+        let n = self.width + 1;
+        &self.samples[i * n..][..n]
+    }
+
+    /// Numbers of the samples that weigh anything.
+    fn used(&self) -> impl Iterator<Item = usize> {
+        (0..self.weight.len()).filter(|&i| self.weight[i] > 0.0)
+    }
+
+    /// Evidence on the chosen terms and a candidate, the nuisances profiled out. `columns` fills
+    /// one row of the candidate's columns.
+    pub fn reduce(&self, count: usize, mut columns: impl FnMut(usize, &mut [f64])) -> Evidence {
+        let n = self.width + 1;
+        let mut g = vec![0.0; count];
+        let mut touched = Vec::with_capacity(count);
+        // Row-major, the lower triangle alone.
+        let mut a = vec![0.0; count * count];
+        let mut cross = vec![0.0; count * n];
+        for i in self.used().take_while(|_| count > 0) {
+            columns(i, &mut g);
+            let (w, sample) = (self.weight[i], self.sample(i));
+            // Curves touch two of their many columns.
+            touched.clear();
+            touched.extend((0..count).filter(|&j| g[j] != 0.0));
+            for (t, &j) in touched.iter().enumerate() {
+                let wg = w * g[j];
+                let into = &mut a[j * count..][..count];
+                if touched.len() == count {
+                    into[..=j].iter_mut().zip(&g).for_each(|(sum, x)| *sum += wg * x);
+                } else {
+                    touched[..=t].iter().for_each(|&k| into[k] += wg * g[k]);
+                }
+                let into = &mut cross[j * n..][..n];
+                into.iter_mut().zip(sample).for_each(|(sum, x)| *sum += wg * x);
+            }
+        }
+        let mut a = DMatrix::from_row_slice(count, count, &a);
+        a.fill_upper_triangle_with_lower_triangle();
+        self.profiled(&a, &DMatrix::from_vec(n, count, cross))
+    }
+
+    /// The same for many columns, of which samples near each other touch the same few: `block` is
+    /// the number of a sample's neighbourhood, and `columns` fills a whole row.
+    pub fn reduce_by_blocks(
+        &self,
+        count: usize,
+        block: impl Fn(usize) -> usize,
+        mut columns: impl FnMut(usize, &mut [f64]),
+    ) -> Evidence {
+        let n = self.width + 1;
+        let mut a = DMatrix::<f64>::zeros(count, count);
+        let mut cross = DMatrix::<f64>::zeros(n, count);
+        let mut order: Vec<(usize, usize)> = self.used().map(|i| (block(i), i)).collect();
+        order.sort_unstable();
+        let mut rows = Vec::new();
+        for members in order.chunk_by(|a, b| a.0 == b.0) {
+            rows.resize(members.len() * count, 0.0);
+            for (&(_, i), row) in members.iter().zip(rows.chunks_exact_mut(count.max(1))) {
+                columns(i, row);
+            }
+            let touched = touched(&rows, count);
+            let weighted = self.weighted(members, &rows, &touched);
+            let squares = &weighted * weighted.transpose();
+            for (c, &j) in touched.iter().enumerate() {
+                let column = squares.column(c);
+                let (own, beside) = column.as_slice().split_at(touched.len());
+                touched.iter().zip(own).for_each(|(&i, s)| a[(i, j)] += s);
+                cross.column_mut(j).iter_mut().zip(beside).for_each(|(sum, s)| *sum += s);
+            }
+        }
+        self.profiled(&a, &cross)
+    }
+
+    /// A column a sample: its touched columns, what is beside, and the response, times the root of
+    /// its weight.
+    fn weighted(
+        &self,
+        members: &[(usize, usize)],
+        rows: &[f64],
+        touched: &[usize],
+    ) -> DMatrix<f64> {
+        let count = rows.len() / members.len();
+        let height = touched.len() + self.width + 1;
+        let mut all = Vec::with_capacity(members.len() * height);
+        for (n, &(_, i)) in members.iter().enumerate() {
+            let root = self.weight[i].sqrt();
+            let row = &rows[n * count..][..count];
+            all.extend(touched.iter().map(|&j| root * row[j]));
+            all.extend(self.sample(i).iter().map(|x| root * x));
+        }
+        DMatrix::from_vec(height, members.len(), all)
+    }
+
+    /// Score of columns alone, the nuisances profiled out: no other term may stand beside.
+    pub fn score(&self, count: usize, mut columns: impl FnMut(usize, &mut [f64])) -> DVector<f64> {
+        let own = &self.inverse * &self.seen;
+        let mut sum = DVector::zeros(count);
+        let mut g = vec![0.0; count];
+        for i in self.used() {
+            columns(i, &mut g);
+            let (row, y) = self.sample(i).split_at(self.width);
+            let fitted: f64 = row.iter().zip(own.iter()).map(|(x, b)| x * b).sum();
+            let left = self.weight[i] * (y[0] - fitted);
+            sum.iter_mut().zip(&g).for_each(|(s, g)| *s += left * g);
+        }
+        sum
+    }
+
+    /// Information and score of the chosen terms and a candidate together, `cross` being the
+    /// candidate's against all that is beside it and the response, with the nuisances profiled out.
+    fn profiled(&self, a: &DMatrix<f64>, cross: &DMatrix<f64>) -> Evidence {
+        let (p, count) = (self.nuisances, a.ncols());
+        let m = self.width - p;
+        let n = m + count;
+        let mut all = DMatrix::<f64>::zeros(n, n);
+        let mut right = DVector::<f64>::zeros(n);
+        all.view_mut((0, 0), (m, m)).copy_from(&self.own.view((p, p), (m, m)));
+        all.view_mut((m, m), (count, count)).copy_from(a);
+        all.view_mut((0, m), (m, count)).copy_from(&cross.view((p, 0), (m, count)));
+        all.view_mut((m, 0), (count, m)).copy_from(&cross.view((p, 0), (m, count)).transpose());
+        right.rows_mut(0, m).copy_from(&self.seen.rows(p, m));
+        right.rows_mut(m, count).copy_from(&cross.row(self.width).transpose());
+        // The nuisances against all of it.
+        let mut shared = DMatrix::<f64>::zeros(p, n);
+        shared.view_mut((0, 0), (p, m)).copy_from(&self.own.view((0, p), (p, m)));
+        shared.view_mut((0, m), (p, count)).copy_from(&cross.view((0, 0), (p, count)));
+        let project = shared.transpose() * &self.inverse;
+        all -= &project * &shared;
+        right -= &project * self.seen.rows(0, p);
+        Evidence { a: all, b: right }
+    }
+}
+
+/// Samples multiplied at once.
+const AT_ONCE: usize = 512;
+
+/// Weighted sums of products of the `n` columns of row-major samples.
+fn squares(samples: &[f64], weight: &[f64], n: usize) -> DMatrix<f64> {
+    let mut sum = DMatrix::zeros(n, n);
+    for (samples, weight) in samples.chunks(AT_ONCE * n).zip(weight.chunks(AT_ONCE)) {
+        let mut rooted = DMatrix::from_column_slice(n, weight.len(), samples);
+        for (mut sample, w) in rooted.column_iter_mut().zip(weight) {
+            sample *= w.max(0.0).sqrt();
+        }
+        sum.gemm(1.0, &rooted, &rooted.transpose(), 1.0);
+    }
+    sum
+}
+
+/// The columns of a block of rows that are not zero everywhere.
+fn touched(rows: &[f64], count: usize) -> Vec<usize> {
+    let mut any = vec![false; count];
+    for row in rows.chunks_exact(count.max(1)) {
+        any.iter_mut().zip(row).for_each(|(any, g)| *any |= *g != 0.0);
+    }
+    (0..count).filter(|&j| any[j]).collect()
+}

@@ -1,0 +1,56 @@
+//! The samples that a search works on.
+
+use super::tiles::SIDE;
+use crate::terms::PixelContext;
+
+/// One view's samples.
+#[derive(Clone)]
+pub struct ViewData {
+    pub places: Vec<PixelContext>,
+    pub response: Vec<f64>,
+    pub weight: Vec<f64>,
+    /// Row-major, as many columns as `precision` has entries.
+    pub nuisance: Vec<f64>,
+    /// Holds each nuisance to zero; 0 leaves it free.
+    pub precision: Vec<f64>,
+    /// For larger patches: which of them each sample of the finer data went to.
+    pub gathered: Vec<u32>,
+}
+
+/// Two tiles by two made one.
+pub fn coarser(fine: &ViewData) -> ViewData {
+    let side = (2 * SIDE) as f64;
+    let p = fine.precision.len();
+    let mut groups: std::collections::BTreeMap<(u32, u32), Vec<usize>> = Default::default();
+    for (i, place) in fine.places.iter().enumerate() {
+        let key = ((place.v / side) as u32, (place.u / side) as u32);
+        groups.entry(key).or_default().push(i);
+    }
+    let mut coarse = ViewData {
+        places: Vec::with_capacity(groups.len()),
+        response: Vec::with_capacity(groups.len()),
+        weight: Vec::with_capacity(groups.len()),
+        nuisance: Vec::with_capacity(groups.len() * p),
+        precision: fine.precision.clone(),
+        gathered: vec![0; fine.places.len()],
+    };
+    for (k, members) in groups.values().enumerate() {
+        members.iter().for_each(|&i| coarse.gathered[i] = k as u32);
+        let weight: f64 = members.iter().map(|&i| fine.weight[i]).sum();
+        let mean = |of: &dyn Fn(usize) -> f64| {
+            if weight > 0.0 {
+                members.iter().map(|&i| fine.weight[i] * of(i)).sum::<f64>() / weight
+            } else {
+                of(members[0])
+            }
+        };
+        let mut place = fine.places[members[0]];
+        place.average(&fine.places, &mean);
+        place.side = side;
+        coarse.places.push(place);
+        coarse.response.push(mean(&|i| fine.response[i]));
+        coarse.weight.push(weight);
+        coarse.nuisance.extend((0..p).map(|q| mean(&|i| fine.nuisance[i * p + q])));
+    }
+    coarse
+}
