@@ -1,18 +1,16 @@
 //! How small an effect this recording could have shown.
 
-use serde_json::{Map, json};
+use serde_json::{Map, Value, json};
 
 use super::diagnosis::Detectable;
 use super::layers::Survey;
 use super::search::{Outcome, ViewData, coarser, evidence_of};
 use crate::camera::Camera;
-use crate::terms::{Basis, Statistic, Term};
+use crate::effects::{self, Smallest};
+use crate::terms::{Statistic, Term};
 
 /// Nats beyond the threshold that eight recordings in ten would bring.
 const MARGIN: f64 = 4.0;
-
-/// Effect, parameter, shape, and the parameter of a coefficient.
-type Spread = (&'static str, &'static str, Basis, fn(f64) -> f64);
 
 /// The least parameter of each family that would be found with 80 % power.
 pub fn detectable(
@@ -21,71 +19,34 @@ pub fn detectable(
     variance: &Outcome,
     camera: &Camera,
 ) -> Vec<Detectable> {
+    let bounds = survey.bounds(camera);
     let mean: Vec<ViewData> = survey.mean_data().iter().map(coarser).collect();
     let blocks = survey.variance_data();
-    let half = |[low, high]: [f64; 2]| (0.5 * (high - low)).powi(2);
-    let (fx, fy) = (camera.fx, camera.fy);
-    let bow = half(survey.reach.right);
-    let families: Vec<(&'static str, &'static str, Basis, Vec<f64>)> = vec![
-        (
-            "radial-disparity-bias",
-            "k_px",
-            Basis::Bowl { disparity_power: 0.0, orders: 1 },
-            vec![1.0],
-        ),
-        ("lens-distortion", "k1", Basis::Lens { fx, fy, orders: 1 }, vec![1.0]),
-        ("target-bow", "sagitta_m", Basis::Bow { degree: 2 }, vec![1.0 / bow, 0.0, 0.0]),
-        (
-            "pixel-locking",
-            "amplitude_px",
-            Basis::Locking { period_px: 1.0, harmonics: 1 },
-            vec![1.0, 0.0],
-        ),
-        (
-            "column-banding",
-            "amplitude_px",
-            Basis::Banding { period_px: camera.width as f64 / 8.0, harmonics: 1 },
-            vec![1.0, 0.0],
-        ),
-    ];
+    let layers = [(Statistic::Bias, &mean, bias), (Statistic::Variance, &blocks, variance)];
     let mut all = Vec::new();
-    for (effect, name, basis, unit) in families {
-        add(&mut all, (effect, name), &mean, bias, Statistic::Bias, basis, unit, |a| a);
-    }
-    let spreads: Vec<Spread> = vec![
-        ("range-exponent", "excess", Basis::RangeExponent { pivot_m: 2.0, orders: 1 }, |a| 0.5 * a),
-        ("vignetting", "growth", Basis::Vignetting { orders: 1 }, |a| (0.5 * a).exp() - 1.0),
-        ("slope-noise", "sigma_lateral_px", Basis::SlopeNoise { lateral_px: 0.2 }, |a| {
-            0.2 * a.sqrt()
-        }),
-        ("tilt-axis-anisotropy", "ratio", Basis::TiltAxis { tilt_power: 2 }, |a| (0.75 * a).exp()),
-    ];
-    for (effect, name, basis, to) in spreads {
-        add(&mut all, (effect, name), &blocks, variance, Statistic::Variance, basis, vec![1.0], to);
+    for (statistic, data, outcome) in layers {
+        for effect in effects::that_change(statistic) {
+            let smallest =
+                effect.smallest(&bounds).and_then(|s| least(s, statistic, data, outcome));
+            all.extend(smallest.map(|minimum| Detectable { effect: effect.card().id, minimum }));
+        }
     }
     all
 }
 
-#[allow(clippy::too_many_arguments)]
-fn add(
-    all: &mut Vec<Detectable>,
-    (effect, name): (&'static str, &'static str),
+fn least(
+    smallest: Smallest,
+    statistic: Statistic,
     data: &[ViewData],
     outcome: &Outcome,
-    statistic: Statistic,
-    basis: Basis,
-    unit: Vec<f64>,
-    to: impl Fn(f64) -> f64,
-) {
-    let term = Term { statistic, basis, coefficients: unit.clone() };
+) -> Option<Map<String, Value>> {
+    let Smallest { parameter, shape, unit, of } = smallest;
+    let term = Term { statistic, basis: shape, coefficients: unit.clone() };
     let unit = nalgebra::DVector::from_vec(unit);
     let information: f64 =
         evidence_of(data, &[term]).iter().map(|e| unit.dot(&(&e.a * &unit))).sum();
     let need = outcome.noise.threshold(0.01) + MARGIN;
-    let least = to((2.0 * need / information).sqrt());
-    if least.is_finite() && information > 0.0 {
-        let mut minimum = Map::new();
-        minimum.insert(name.into(), json!(least));
-        all.push(Detectable { effect, minimum });
-    }
+    let least = of((2.0 * need / information).sqrt());
+    let found = least.is_finite() && information > 0.0;
+    found.then(|| Map::from_iter([(parameter.to_string(), json!(least))]))
 }

@@ -10,7 +10,7 @@ use super::noise::Hanging;
 use super::parameters::{of_any_formula, parameters};
 use super::search::{Chosen, Outcome, ViewData, coarser};
 use super::shape;
-use crate::effects;
+use crate::effects::{self, Fitted};
 use crate::stats::range;
 use crate::terms::{Axis, Basis, Modulation, PixelContext, Statistic, Term};
 
@@ -167,7 +167,9 @@ fn finding(
     });
     let parameters = covariance.map_or_else(Map::new, |c| {
         let Term { basis, coefficients, .. } = &terms[main];
-        of_any_formula(basis, parameters(basis, coefficients, &c, &scene.survey.reach))
+        let (covariance, reach) = (&c, &scene.survey.reach);
+        let fit = Fitted { shape: basis, coefficients, covariance, reach };
+        of_any_formula(chosen.candidate.family, parameters(chosen.candidate.family, &fit))
     });
     let shape =
         effect.is_none().then(|| shape::words(&terms[main].basis, &terms[main].coefficients));

@@ -7,17 +7,17 @@ use super::ablation::Ablation;
 use super::bias;
 use super::field::Field;
 use super::joint::refit;
-use super::reach::Extent;
 use super::scatter::{Left, left_by_fit};
 use super::search::{Outcome, Rules, ViewData, coarser, search, search_beside};
 use super::smooth::{SMOOTH_PX, high_pass};
 use super::tiles::{SIDE, Tile, tiles};
 use super::variance;
 use crate::camera::{Camera, Rays};
+use crate::effects::Bounds;
 use crate::model::SigmaModel;
 use crate::rng::Seed;
 use crate::stats::{Correlation, measure_correlation};
-use crate::terms::PixelContext;
+use crate::terms::{Extent, PixelContext};
 
 /// The tiles of all views, with how much each view is worth.
 pub struct Survey {
@@ -97,7 +97,7 @@ impl Survey {
             })
             .collect();
         let light = relative_light(&mut views);
-        let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter()));
+        let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter().map(|t| &t.place)));
         let (tolerance, ablation) = (MODEL_TOLERANCE, Ablation::None);
         Survey { views, reach, fixed_px2: 0.0, light, tolerance, refits_sigma: false, ablation }
     }
@@ -127,6 +127,11 @@ impl Survey {
         self.views.par_iter().map(mean_data).collect()
     }
 
+    /// What these views can show of an effect.
+    pub fn bounds<'a>(&'a self, camera: &'a Camera) -> Bounds<'a> {
+        Bounds { camera, reach: &self.reach, patch_px: SIDE as f64 }
+    }
+
     pub fn search_bias(&self, camera: &Camera, level: f64, seed: Seed) -> Outcome {
         let rules = Rules {
             level,
@@ -137,8 +142,7 @@ impl Survey {
             least: LEAST_SIGMAS * self.typical_sigma_px(),
             calibrated: true,
         };
-        let mut candidates = bias::families(camera, &self.reach);
-        candidates.extend(bias::curves(camera, &self.reach));
+        let candidates = bias::candidates(&self.bounds(camera));
         let fine = self.mean_data();
         let coarse: Vec<ViewData> = fine.par_iter().map(coarser).collect();
         let candidates = self.ablation.candidates(candidates);
@@ -150,7 +154,7 @@ impl Survey {
     /// The views at these places.
     pub fn subset(&self, which: &[usize]) -> Survey {
         let views: Vec<SurveyedView> = which.iter().map(|&n| self.views[n].clone()).collect();
-        let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter()));
+        let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter().map(|t| &t.place)));
         Survey {
             views,
             reach,
@@ -250,8 +254,7 @@ impl Survey {
             least: 0.0,
             calibrated: true,
         };
-        let mut candidates = variance::families(&self.reach, sigma);
-        candidates.extend(variance::curves(camera, &self.reach));
+        let mut candidates = variance::candidates(&self.bounds(camera), sigma);
         let refit = self.refits_sigma.then(|| variance::refit(&self.reach));
         if refit.is_some() {
             candidates.retain(variance::beyond_sigma);

@@ -33,7 +33,6 @@ mod parameters;
 mod partners;
 mod pictures;
 mod pixels;
-mod reach;
 mod reading;
 mod reference;
 mod rim;

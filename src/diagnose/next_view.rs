@@ -11,13 +11,12 @@ use rayon::prelude::*;
 use super::diagnosis::{Finding, NextView};
 use super::evidence::Evidence;
 use super::findings::Scene;
-use super::reach::Extent;
 use super::search::{Chosen, Outcome, ViewData, evidence_of};
 use crate::camera::{Camera, Rays};
 use crate::model::SigmaModel;
 use crate::plane::Plane;
 use crate::scene::TargetFrame;
-use crate::terms::{Pixels, Statistic, Term};
+use crate::terms::{Extent, Pixels, Statistic, Term};
 
 /// A name this probable needs no further view.
 const SURE: f64 = 0.9;

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::candidate::Candidate;
+use super::candidate::{Candidate, RECALIBRATE};
 use super::evidence::{Evidence, Gain, Null, Rows, gain};
 use super::tiles::SIDE;
 use crate::rng::Seed;
@@ -490,18 +490,18 @@ impl<'a> Layer<'a> {
     /// Light of the room was measured for its own sake; the surface's is made out of an image that
     /// the room lights too.
     fn rests_on_a_measurement(&self, i: usize) -> bool {
-        matches!(self.candidates[i].basis, Basis::Ambient { .. })
+        self.candidates[i].effect().is_some_and(|e| e.rests_on_a_measurement())
     }
 
-    /// The share of the best curve that a name must explain. Bands on a real sensor ride on a
-    /// smooth error of the column that is no band's; the law of sigma has columns for nearly
-    /// everything that happens to go with the distance.
+    /// The share of the best curve that a name must explain. The law of sigma has columns for
+    /// nearly everything that happens to go with the distance.
     fn adequacy(&self, i: usize) -> f64 {
-        match self.candidates[i].basis {
-            Basis::Banding { .. } => BANDS_ADEQUATE.min(self.rules.adequacy),
-            Basis::Recalibrate { .. } | Basis::Level => LAW_ADEQUATE.max(self.rules.adequacy),
-            _ => self.rules.adequacy,
+        let candidate = &self.candidates[i];
+        if candidate.family == Some(RECALIBRATE) {
+            return LAW_ADEQUATE.max(self.rules.adequacy);
         }
+        let own = candidate.effect().and_then(|e| e.must_explain());
+        own.map_or(self.rules.adequacy, |share| share.min(self.rules.adequacy))
     }
 
     /// Root mean square of a candidate's fit over the samples, the nuisances taken out.
@@ -627,8 +627,6 @@ fn looks(candidates: &[Candidate], judged: &[Option<Judged>], noise: &NoiseGains
 
 /// See [`Layer::adequacy`].
 const LAW_ADEQUATE: f64 = 0.85;
-/// See [`Layer::adequacy`].
-const BANDS_ADEQUATE: f64 = 0.45;
 /// A name that explains this share of what the best nameless curve does is met by its own shape.
 const CLEAR: f64 = 0.85;
 

@@ -1,6 +1,8 @@
 //! Sunlight lifts the background and the noise.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Stage};
+use crate::camera::Camera;
+use crate::terms::{Basis, Term};
 
 pub struct AmbientLight;
 
@@ -40,6 +42,30 @@ impl Effect for AmbientLight {
                 exposure.light[i] *= (1.0 + excess) as f32;
             }
         }
+    }
+
+    /// Only where somebody measured the light of the room.
+    fn shapes(&self, bounds: &Bounds) -> Vec<Basis> {
+        let ratios = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0].into_iter();
+        let lit = ratios.filter(|_| bounds.reach.ambient[1] > 0.0);
+        lit.map(|ratio| Basis::Ambient { ratio }).collect()
+    }
+
+    fn rests_on_a_measurement(&self) -> bool {
+        true
+    }
+
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        let Basis::Ambient { ratio } = *fit.shape else { return Vec::new() };
+        vec![fit.estimate("ratio", &|b| ratio * b[0])]
+    }
+
+    fn formula_error(&self) -> f64 {
+        0.3
+    }
+
+    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
+        Some(Term::variance(Basis::Ambient { ratio: known("ratio")? }, vec![1.0]))
     }
 }
 

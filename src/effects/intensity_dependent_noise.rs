@@ -1,7 +1,9 @@
 //! A dark surface is noisier.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Stage};
+use crate::camera::Camera;
 use crate::scene::WHITE;
+use crate::terms::{Basis, Term};
 
 pub struct IntensityDependentNoise;
 
@@ -35,6 +37,28 @@ impl Effect for IntensityDependentNoise {
             let grey = f64::from(*albedo).max(DARKEST) / WHITE;
             *sigma *= grey.powf(-exponent) as f32;
         }
+    }
+
+    /// A target of one grey says nothing.
+    fn shapes(&self, bounds: &Bounds) -> Vec<Basis> {
+        let orders = [1, 2, 3].into_iter().filter(|_| bounds.reach.is_unevenly_lit());
+        orders.map(|orders| Basis::Intensity { orders }).collect()
+    }
+
+    fn plain(&self, _: Basis) -> Basis {
+        Basis::Intensity { orders: 1 }
+    }
+
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        vec![fit.estimate("exponent", &|b| -0.5 * b[0])]
+    }
+
+    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
+        Some(Term::variance(Basis::Intensity { orders: 1 }, vec![-2.0 * known("exponent")?]))
+    }
+
+    fn is_symptom(&self) -> bool {
+        true
     }
 }
 

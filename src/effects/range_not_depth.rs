@@ -1,6 +1,8 @@
 //! The file holds the ray length.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Inverse, Known, Parameter, Settings, Stage};
+use crate::camera::Camera;
+use crate::terms::{Basis, Term};
 
 pub struct RangeNotDepth;
 
@@ -35,5 +37,30 @@ impl Effect for RangeNotDepth {
             let excess = (1.0 + x * x + y * y).sqrt() - 1.0;
             exposure.depth[i] *= (1.0 + share * excess) as f32;
         }
+    }
+
+    fn shapes(&self, _: &Bounds) -> Vec<Basis> {
+        vec![Basis::RangeNotDepth]
+    }
+
+    /// All of it or nothing.
+    fn usual(&self, _: usize) -> f64 {
+        1.0
+    }
+
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        vec![fit.estimate("share", &|b| b[0])]
+    }
+
+    fn formula_error(&self) -> f64 {
+        0.07
+    }
+
+    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
+        Some(Term::bias(Basis::RangeNotDepth, vec![known("share").unwrap_or(1.0)]))
+    }
+
+    fn inverse(&self, settings: &Settings, _: &Camera) -> Option<Inverse> {
+        Some(Inverse::AlongRay { share: settings.at(0) })
     }
 }

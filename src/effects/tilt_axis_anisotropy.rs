@@ -1,6 +1,8 @@
 //! Tilt along the baseline is noisier than tilt across it.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
+use crate::camera::Camera;
+use crate::terms::{Basis, Term};
 
 pub struct TiltAxisAnisotropy;
 
@@ -36,6 +38,29 @@ impl Effect for TiltAxisAnisotropy {
             let tilt = (theta.sin() / REFERENCE_TILT_RAD.sin()).powi(2);
             exposure.sigma[i] *= ratio.powf(0.5 * tilt * (2.0 * azimuth).cos()) as f32;
         }
+    }
+
+    fn shapes(&self, _: &Bounds) -> Vec<Basis> {
+        [1, 2].map(|tilt_power| Basis::TiltAxis { tilt_power }).into()
+    }
+
+    fn plain(&self, _: Basis) -> Basis {
+        Basis::TiltAxis { tilt_power: 1 }
+    }
+
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        let Basis::TiltAxis { tilt_power } = *fit.shape else { return Vec::new() };
+        let at = REFERENCE_TILT_RAD.sin().powi(tilt_power);
+        vec![fit.estimate("ratio", &|b| (b[0] * at).exp())]
+    }
+
+    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
+        Some(Term::variance(Basis::TiltAxis { tilt_power: 2 }, vec![known("ratio")?.ln() / 0.75]))
+    }
+
+    fn smallest(&self, _: &Bounds) -> Option<Smallest> {
+        let (parameter, shape) = ("ratio", Basis::TiltAxis { tilt_power: 2 });
+        Some(Smallest { parameter, shape, unit: vec![1.0], of: |a| (0.75 * a).exp() })
     }
 }
 

@@ -1,4 +1,4 @@
-//! What planes absorb of a shape that stands still in the picture, and what is usual of each.
+//! What planes absorb of a shape that stands still in the picture.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -86,42 +86,7 @@ impl Basis {
             _ => None,
         }
     }
-
-    /// A size that coefficient number `k` of a bias may well have, in its unit: the standard
-    /// deviation of what is believed before anything was measured.
-    pub fn usual(&self, k: usize) -> f64 {
-        match self {
-            // Herrera, Kannala and Heikkila 2012, fig. 6: up to 4 of a Kinect's steps of 1/8 px
-            // towards the corners.
-            Basis::Bowl { .. } => 0.5,
-            // A depth picture that was calibrated: what is left of k1 (Khoshelham and Elberink
-            // 2012, table 1: 0.003; Smisek, Jancosek and Pajdla 2011: 0.01 to 0.05).
-            Basis::Lens { .. } => 0.02,
-            // All of it or nothing.
-            Basis::RangeNotDepth => 1.0,
-            // A board bends by about 1 mm at 1 m, and by 1.5 mm half a metre from its middle where
-            // it is a bad one.
-            Basis::Bow { .. } => {
-                let degree = if k < 3 {
-                    2
-                } else if k < 7 {
-                    3
-                } else {
-                    4
-                };
-                BOW_M / 0.5f64.powi(degree)
-            }
-            // Shimizu and Okutomi 2001: 0.06 px; without a remedy twice that.
-            Basis::Locking { .. } => 0.1,
-            _ => NAMELESS_PX,
-        }
-    }
 }
-
-/// Of a board, half a metre from its middle, m.
-const BOW_M: f64 = 0.0015;
-/// Errors of a matcher beyond a pixel are gross ones.
-const NAMELESS_PX: f64 = 1.0;
 
 #[cfg(test)]
 mod tests {

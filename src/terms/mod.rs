@@ -3,6 +3,7 @@
 
 mod basis;
 mod edges;
+mod extent;
 mod fault;
 mod gauge;
 mod needs;
@@ -13,6 +14,7 @@ mod value;
 
 pub use basis::{Basis, Coordinate, Modulation, TABLE};
 pub use edges::edge_distances;
+pub use extent::Extent;
 pub use gauge::Gauge;
 pub use needs::Needs;
 pub use nodes::DISPARITY_UNIT_PX;
@@ -41,7 +43,30 @@ pub struct Term {
     pub coefficients: Vec<f64>,
 }
 
+impl Statistic {
+    /// As files write it.
+    pub fn id(self) -> &'static str {
+        match self {
+            Statistic::Bias => "bias",
+            Statistic::Variance => "variance",
+            Statistic::Distribution => "distribution",
+            Statistic::Correlation => "correlation",
+            Statistic::Dropout => "missing",
+        }
+    }
+}
+
 impl Term {
+    /// Of the disparity, px.
+    pub fn bias(basis: Basis, coefficients: Vec<f64>) -> Self {
+        Term { statistic: Statistic::Bias, basis, coefficients }
+    }
+
+    /// Of the logarithm of its variance.
+    pub fn variance(basis: Basis, coefficients: Vec<f64>) -> Self {
+        Term { statistic: Statistic::Variance, basis, coefficients }
+    }
+
     /// Is it the sensor's, so that it can be taken out of any picture? A board's shape is not.
     pub fn belongs_to_sensor(&self) -> bool {
         match self.basis {
