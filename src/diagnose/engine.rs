@@ -32,7 +32,7 @@ use super::verdict::{
     view_lines,
 };
 use crate::Progress;
-use crate::effects::KINECT_BASELINE_M;
+use crate::effects::{KINECT_BASELINE_M, RAY_FOR_DEPTH};
 use crate::error::Result;
 use crate::measure::{MeasureOptions, Workbench};
 use crate::model::{Form, NoiseModel};
@@ -296,7 +296,7 @@ impl<'a> Case<'a> {
         let mut row = Vec::new();
         let mut tiles = self.survey.views.iter().flat_map(|v| &v.tiles);
         !self.survey.refits_sigma
-            || !matches!(term.basis, Basis::Recalibrate { .. })
+            || !matches!(term.basis, Basis::Table { .. })
             || tiles.all(|t| term.value(&t.place, &mut row) > MUCH)
     }
 
@@ -306,7 +306,7 @@ impl<'a> Case<'a> {
             .iter()
             .chain(terms)
             .chain(self.ranges.iter().flat_map(|f| &f.terms))
-            .filter(|t| t.basis == Basis::RangeNotDepth)
+            .filter(|t| t.basis == RAY_FOR_DEPTH)
             .map(|t| t.coefficients[0])
             .sum()
     }
@@ -429,11 +429,8 @@ impl<'a> Case<'a> {
     /// Laws of the distance, by reference distances.
     fn laws(&self, bias: &[Term]) -> Vec<Finding> {
         // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
-        let anchored: Vec<Term> = bias
-            .iter()
-            .filter(|t| matches!(t.basis, Basis::RangeNotDepth | Basis::Lens { .. }))
-            .cloned()
-            .collect();
+        let anchored: Vec<Term> =
+            bias.iter().filter(|t| t.basis.is_nothing_ahead()).cloned().collect();
         let found = |terms: &[Term]| {
             let levels = heldout::levels(&self.survey, terms);
             let laws = reference::laws(&self.fields, &levels);

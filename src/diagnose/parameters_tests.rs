@@ -5,7 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::rng::Seed;
-use crate::terms::Extent;
+use crate::terms::{Coordinate, Extent, Modulation};
 
 fn reach() -> Extent {
     Extent {
@@ -52,35 +52,36 @@ fn exact() -> Vec<Case> {
     let sampled = 1.3e-3;
     // At 20 px, the middle of 10 to 40, a bowl that grows with d has half its depth at 40 px.
     let half = 0.5;
-    let bowl = |disparity_power, orders| Basis::Bowl { disparity_power, orders };
-    let lens = |orders| Basis::Lens { fx: 580.0, fy: 580.0, orders };
+    let bowl = |disparity_power, orders| {
+        Basis::powers(Coordinate::RadiusSquared, orders, Modulation::power(disparity_power))
+    };
+    let lens = |orders| {
+        Basis::powers(
+            Coordinate::RaySquared,
+            orders,
+            Modulation::RadialSlope { fx: 580.0, fy: 580.0 },
+        )
+    };
     vec![
         ("radial-disparity-bias", bowl(0.0, 1), vec![0.8], "k_px", 0.8, 1e-12),
         ("radial-disparity-bias", bowl(0.0, 2), vec![-0.8, 0.0], "k_px", -0.8, 1e-12),
         ("radial-disparity-bias", bowl(1.0, 1), vec![0.8], "k_px", 0.8 * half, 1e-12),
         ("lens-distortion", lens(1), vec![-0.05], "k1", -0.05, 1e-12),
         ("lens-distortion", lens(2), vec![-0.05, 0.0], "k1", -0.05, 1e-12),
-        ("range-not-depth", Basis::RangeNotDepth, vec![0.9], "share", 0.9, 1e-12),
+        (
+            "range-not-depth",
+            Basis::powers(Coordinate::Foreshortening, 1, Modulation::Disparity),
+            vec![0.9],
+            "share",
+            0.9,
+            1e-12,
+        ),
         // z = -sagitta (x / half)^2: the middle of the board stands out by it.
-        (
-            "target-bow",
-            Basis::Bow { degree: 2 },
-            vec![-0.02 / 0.36, 0.0, 0.0],
-            "sagitta_m",
-            0.02,
-            1e-12,
-        ),
-        (
-            "target-bow",
-            Basis::Bow { degree: 2 },
-            vec![0.0, 0.02 / 0.16, 0.0],
-            "sagitta_m",
-            -0.02,
-            1e-12,
-        ),
+        ("target-bow", Basis::relief(2), vec![-0.02 / 0.36, 0.0, 0.0], "sagitta_m", 0.02, 1e-12),
+        ("target-bow", Basis::relief(2), vec![0.0, 0.02 / 0.16, 0.0], "sagitta_m", -0.02, 1e-12),
         (
             "pixel-locking",
-            Basis::Locking { period_px: 1.0, harmonics: 2 },
+            Basis::waves(Coordinate::Disparity, 1.0, 2),
             vec![0.1 * phase.cos(), 0.1 * phase.sin(), 0.0, 0.0],
             "amplitude_px",
             0.1,
@@ -88,7 +89,7 @@ fn exact() -> Vec<Case> {
         ),
         (
             "column-banding",
-            Basis::Banding { period_px: 37.0, harmonics: 2 },
+            Basis::waves(Coordinate::Column, 37.0, 2),
             // In fifths of a px.
             vec![phase.cos(), phase.sin(), 0.0, 0.0],
             "amplitude_px",
@@ -97,7 +98,7 @@ fn exact() -> Vec<Case> {
         ),
         (
             "edge-mixing",
-            Basis::EdgeMixing { width_px: 3.0 },
+            Basis::Decay { over: Coordinate::Edge, width: 3.0 },
             vec![-1.5],
             "amplitude_px",
             -1.5,
@@ -106,7 +107,7 @@ fn exact() -> Vec<Case> {
         // sigma grows with z^0.5 more: the logarithm of the variance with 2 * 0.5.
         (
             "range-exponent",
-            Basis::RangeExponent { pivot_m: 2.0, orders: 1 },
+            Basis::powers(Coordinate::LogRatio(2.0), 1, Modulation::One),
             vec![1.0],
             "excess",
             0.5,
@@ -115,16 +116,23 @@ fn exact() -> Vec<Case> {
         // sigma is 1.4 times as large at the corner.
         (
             "vignetting",
-            Basis::Vignetting { orders: 1 },
+            Basis::powers(Coordinate::RadiusSquared, 1, Modulation::One),
             vec![2.0 * 1.4f64.ln()],
             "growth",
             0.4,
             1e-12,
         ),
-        ("vignetting", Basis::Vignetting { orders: 2 }, vec![1.4f64.ln(); 2], "growth", 0.4, 1e-12),
+        (
+            "vignetting",
+            Basis::powers(Coordinate::RadiusSquared, 2, Modulation::One),
+            vec![1.4f64.ln(); 2],
+            "growth",
+            0.4,
+            1e-12,
+        ),
         (
             "slope-noise",
-            Basis::SlopeNoise { lateral_px: 0.6 },
+            Basis::Log1p { over: Coordinate::Blur(0.6) },
             vec![0.25],
             "sigma_lateral_px",
             0.3,
@@ -132,7 +140,7 @@ fn exact() -> Vec<Case> {
         ),
         (
             "intensity-dependent-noise",
-            Basis::Intensity { orders: 1 },
+            Basis::powers(Coordinate::LogLight, 1, Modulation::One),
             vec![-1.6],
             "exponent",
             0.8,
@@ -140,13 +148,25 @@ fn exact() -> Vec<Case> {
         ),
         (
             "intensity-dependent-noise",
-            Basis::Intensity { orders: 2 },
+            Basis::Powers {
+                over: Coordinate::LogLight,
+                orders: 1,
+                level: true,
+                times: Modulation::One,
+            },
             vec![-1.6, 0.3],
             "exponent",
             0.8,
             1e-12,
         ),
-        ("ambient-light", Basis::Ambient { ratio: 0.5 }, vec![1.2], "ratio", 0.6, 1e-12),
+        (
+            "ambient-light",
+            Basis::Log1p { over: Coordinate::Ambient(0.5) },
+            vec![1.2],
+            "ratio",
+            0.6,
+            1e-12,
+        ),
         ("recalibrate", Basis::Level, vec![2.0 * 1.3f64.ln()], "sigma_factor", 1.3, 1e-12),
     ]
 }

@@ -516,7 +516,7 @@ impl<'a> Layer<'a> {
 
     fn sensible(&self, basis: &Basis, m: usize, gain: &Gain, rms: f64) -> bool {
         let beta = gain.beta.rows(m, basis.count()).into_owned();
-        if let Basis::RangeExponent { orders: 2.., .. } = basis {
+        if let Basis::Powers { over: Coordinate::LogRatio(_), orders: 2.., .. } = basis {
             let ends = self.fine.iter().flat_map(|v| v.places.iter().map(|p| p.z));
             return one_way(basis, beta.as_slice(), crate::stats::range(ends));
         }

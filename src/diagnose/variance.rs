@@ -21,14 +21,7 @@ pub fn candidates(bounds: &Bounds, sigma: &SigmaModel) -> Vec<Candidate> {
 /// Does it say more than a sigma over depth and tilt can? What follows these two alone is the form
 /// of sigma, not physics, where sigma was fitted to the same views.
 pub fn beyond_sigma(candidate: &Candidate) -> bool {
-    let of_sigma = match &candidate.basis {
-        Basis::RangeExponent { .. } | Basis::Level | Basis::Recalibrate { .. } => true,
-        Basis::Curve { over, times, .. } => {
-            matches!(over, Coordinate::LogZ | Coordinate::Theta) && *times == Modulation::One
-        }
-        _ => false,
-    };
-    !of_sigma
+    !candidate.basis.is_of_sigma()
 }
 
 /// Sigma's level and form, free.
@@ -73,7 +66,7 @@ fn surface(reach: &Extent, columns: &dyn Fn(f64, f64) -> Vec<f64>) -> Candidate 
         })
         .collect();
     let columns = (0..rows[0].len()).map(|j| rows.iter().map(|row| row[j]).collect()).collect();
-    Candidate::named(RECALIBRATE, Basis::Recalibrate { z_m, theta_rad, columns })
+    Candidate::named(RECALIBRATE, Basis::Table { z_m, theta_rad, columns })
 }
 
 /// Where a table of sigma's changes is laid out; never empty.
@@ -120,13 +113,13 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
         })
         .collect();
     if !bent.is_empty() {
-        let bent = Basis::Recalibrate { z_m, theta_rad, columns: bent };
+        let bent = Basis::Table { z_m, theta_rad, columns: bent };
         all.push(Candidate::named(RECALIBRATE, bent));
     }
     for n in if few < columns.len() { vec![few, columns.len()] } else { vec![few] } {
         if n > 0 {
             let columns = columns[..n].to_vec();
-            all.push(Candidate::named(RECALIBRATE, Basis::Recalibrate { z_m, theta_rad, columns }));
+            all.push(Candidate::named(RECALIBRATE, Basis::Table { z_m, theta_rad, columns }));
         }
     }
     all

@@ -2,7 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Stage};
 use crate::camera::Camera;
-use crate::terms::{Basis, Term};
+use crate::terms::{Basis, Coordinate, ROOM_LUX, Term};
 
 pub struct AmbientLight;
 
@@ -48,7 +48,7 @@ impl Effect for AmbientLight {
     fn shapes(&self, bounds: &Bounds) -> Vec<Basis> {
         let ratios = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0].into_iter();
         let lit = ratios.filter(|_| bounds.reach.ambient[1] > 0.0);
-        lit.map(|ratio| Basis::Ambient { ratio }).collect()
+        lit.map(room).collect()
     }
 
     fn rests_on_a_measurement(&self) -> bool {
@@ -56,7 +56,9 @@ impl Effect for AmbientLight {
     }
 
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
-        let Basis::Ambient { ratio } = *fit.shape else { return Vec::new() };
+        let Basis::Log1p { over: Coordinate::Ambient(ratio) } = *fit.shape else {
+            return Vec::new();
+        };
         vec![fit.estimate("ratio", &|b| ratio * b[0])]
     }
 
@@ -65,9 +67,11 @@ impl Effect for AmbientLight {
     }
 
     fn term(&self, known: Known, _: &Camera) -> Option<Term> {
-        Some(Term::variance(Basis::Ambient { ratio: known("ratio")? }, vec![1.0]))
+        Some(Term::variance(room(known("ratio")?), vec![1.0]))
     }
 }
 
-/// Light on the desk of an office (EN 12464-1), lx.
-pub const ROOM_LUX: f64 = 500.0;
+/// Light of the room against the pattern's.
+fn room(ratio: f64) -> Basis {
+    Basis::Log1p { over: Coordinate::Ambient(ratio) }
+}

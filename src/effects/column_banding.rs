@@ -63,8 +63,7 @@ impl Effect for ColumnBanding {
     }
 
     fn plain(&self, shape: Basis) -> Basis {
-        let Basis::Banding { period_px, .. } = shape else { return shape };
-        stripes(period_px, 1)
+        shape.period().map_or(shape, |period_px| stripes(period_px, 1))
     }
 
     /// Bands on a real sensor ride on a smooth error of the column that is no band's.
@@ -73,7 +72,7 @@ impl Effect for ColumnBanding {
     }
 
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
-        let Basis::Banding { period_px, .. } = *fit.shape else { return Vec::new() };
+        let Basis::Waves { period: period_px, .. } = *fit.shape else { return Vec::new() };
         let at = |t: f64| PixelContext { u: t * period_px, ..PixelContext::default() };
         vec![
             fit.estimate("amplitude_px", &|b| greatest(|t| fit.value(b, at(t)))),
@@ -116,5 +115,5 @@ fn tooth(column: usize, centre: f64, amplitude: f64, period: f64) -> f64 {
 }
 
 fn stripes(period_px: f64, harmonics: usize) -> Basis {
-    Basis::Banding { period_px, harmonics }
+    Basis::waves(Coordinate::Column, period_px, harmonics)
 }

@@ -3,7 +3,7 @@
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Stage};
 use crate::camera::Camera;
 use crate::scene::WHITE;
-use crate::terms::{Basis, Term};
+use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct IntensityDependentNoise;
 
@@ -41,12 +41,13 @@ impl Effect for IntensityDependentNoise {
 
     /// A target of one grey says nothing.
     fn shapes(&self, bounds: &Bounds) -> Vec<Basis> {
-        let orders = [1, 2, 3].into_iter().filter(|_| bounds.reach.is_unevenly_lit());
-        orders.map(|orders| Basis::Intensity { orders }).collect()
+        let kinds = [(1, false), (1, true), (2, true)].into_iter();
+        let seen = kinds.filter(|_| bounds.reach.is_unevenly_lit());
+        seen.map(|(orders, level)| dark(orders, level)).collect()
     }
 
     fn plain(&self, _: Basis) -> Basis {
-        Basis::Intensity { orders: 1 }
+        dark(1, false)
     }
 
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
@@ -54,7 +55,7 @@ impl Effect for IntensityDependentNoise {
     }
 
     fn term(&self, known: Known, _: &Camera) -> Option<Term> {
-        Some(Term::variance(Basis::Intensity { orders: 1 }, vec![-2.0 * known("exponent")?]))
+        Some(Term::variance(dark(1, false), vec![-2.0 * known("exponent")?]))
     }
 
     fn is_symptom(&self) -> bool {
@@ -64,3 +65,8 @@ impl Effect for IntensityDependentNoise {
 
 /// Black velvet still gives back this much.
 const DARKEST: f64 = 0.01;
+
+/// Of the logarithm of the light, with a level: what counts as light is arbitrary.
+fn dark(orders: usize, level: bool) -> Basis {
+    Basis::Powers { over: Coordinate::LogLight, orders, level, times: Modulation::One }
+}

@@ -2,7 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
 use crate::camera::Camera;
-use crate::terms::{Basis, Term};
+use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct LensDistortion;
 
@@ -43,8 +43,8 @@ impl Effect for LensDistortion {
     }
 
     fn plain(&self, shape: Basis) -> Basis {
-        let Basis::Lens { fx, fy, .. } = shape else { return shape };
-        Basis::Lens { fx, fy, orders: 1 }
+        let Basis::Powers { over, times, .. } = shape else { return shape };
+        Basis::powers(over, 1, times)
     }
 
     /// What is left of k1 in a depth picture that was calibrated (Khoshelham and Elberink 2012,
@@ -90,5 +90,6 @@ const ITERATIONS: usize = 20;
 
 /// Rays shifted along the radius, seen through the slope of the target.
 fn bent(camera: &Camera, orders: usize) -> Basis {
-    Basis::Lens { fx: camera.fx, fy: camera.fy, orders }
+    let times = Modulation::RadialSlope { fx: camera.fx, fy: camera.fy };
+    Basis::powers(Coordinate::RaySquared, orders, times)
 }

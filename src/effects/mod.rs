@@ -15,14 +15,15 @@ mod shape;
 mod traces;
 
 pub use active::{Acting, Active};
-pub use ambient_light::ROOM_LUX;
 pub use card::{Card, Parameter, Settings, Stage};
 pub use draw::{Draw, Scope, fill_normal};
 pub use exposure::{Exposure, Instant, KINECT_BASELINE_M};
 pub use fitted::{Estimate, Fitted};
+pub use range_not_depth::RAY_FOR_DEPTH;
 pub use traces::{Bounds, Inverse, Known, Smallest};
 
 use crate::camera::Camera;
+pub use crate::terms::ROOM_LUX;
 use crate::terms::{Basis, Statistic, Term};
 use draw::{chance, logistic, normals};
 use fitted::{greatest, slope_in_square};
@@ -107,8 +108,7 @@ pub trait Effect: Send + Sync {
 /// Errors of a matcher beyond a pixel are gross ones.
 pub const USUAL_PX: f64 = 1.0;
 
-/// The catalogue: an effect takes one file and one word in this list. What is recognised by more
-/// than its shapes is in `crate::docs::catalogue`.
+/// The catalogue: an effect takes one file and one word in this list (`crate::docs::catalogue`).
 macro_rules! catalogue {
     ($($module:ident :: $name:ident),* $(,)?) => {
         $(mod $module;)*

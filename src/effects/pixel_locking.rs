@@ -4,7 +4,7 @@ use std::f32::consts::TAU;
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Inverse, Known, Parameter, Settings, Smallest, Stage, greatest};
 use crate::camera::Camera;
-use crate::terms::{Basis, PixelContext, Term};
+use crate::terms::{Basis, Coordinate, PixelContext, Term};
 
 pub struct PixelLocking;
 
@@ -60,7 +60,7 @@ impl Effect for PixelLocking {
     }
 
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
-        let Basis::Locking { period_px, .. } = *fit.shape else { return Vec::new() };
+        let Basis::Waves { period: period_px, .. } = *fit.shape else { return Vec::new() };
         let at = |t: f64| PixelContext { disparity: t * period_px, ..PixelContext::default() };
         vec![
             fit.estimate("amplitude_px", &|b| greatest(|t| fit.value(b, at(t)))),
@@ -92,5 +92,5 @@ impl Effect for PixelLocking {
 
 /// In the phase of the disparity.
 fn waves(period_px: f64, harmonics: usize) -> Basis {
-    Basis::Locking { period_px, harmonics }
+    Basis::waves(Coordinate::Disparity, period_px, harmonics)
 }

@@ -2,7 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
 use crate::camera::Camera;
-use crate::terms::{Basis, DISPARITY_UNIT_PX, PixelContext, Term};
+use crate::terms::{Basis, Coordinate, DISPARITY_UNIT_PX, Modulation, PixelContext, Term};
 
 pub struct RadialDisparityBias;
 
@@ -55,7 +55,8 @@ impl Effect for RadialDisparityBias {
 
     /// The bowl that comes nearest at the middle (in ratio) of the disparities.
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
-        let Basis::Bowl { disparity_power, .. } = *fit.shape else { return Vec::new() };
+        let Basis::Powers { times, .. } = *fit.shape else { return Vec::new() };
+        let disparity_power = times.power_of_disparity().unwrap_or(0.0);
         let [low, high] = fit.reach.disparity;
         let middle = (low * high).sqrt();
         let disparity = if middle.is_finite() { middle } else { DISPARITY_UNIT_PX };
@@ -81,5 +82,5 @@ impl Effect for RadialDisparityBias {
 
 /// A bowl whose depth goes with a power of the disparity.
 fn bowl(disparity_power: f64, orders: usize) -> Basis {
-    Basis::Bowl { disparity_power, orders }
+    Basis::powers(Coordinate::RadiusSquared, orders, Modulation::power(disparity_power))
 }

@@ -2,7 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
 use crate::camera::Camera;
-use crate::terms::{Basis, PixelContext, Term};
+use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Term};
 
 pub struct RangeExponent;
 
@@ -73,5 +73,5 @@ const PIVOT_M: f64 = 2.0;
 
 /// Of ln z.
 fn power_law(orders: usize) -> Basis {
-    Basis::RangeExponent { pivot_m: PIVOT_M, orders }
+    Basis::powers(Coordinate::LogRatio(PIVOT_M), orders, Modulation::One)
 }

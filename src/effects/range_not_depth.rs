@@ -2,7 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Inverse, Known, Parameter, Settings, Stage};
 use crate::camera::Camera;
-use crate::terms::{Basis, Term};
+use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct RangeNotDepth;
 
@@ -40,7 +40,7 @@ impl Effect for RangeNotDepth {
     }
 
     fn shapes(&self, _: &Bounds) -> Vec<Basis> {
-        vec![Basis::RangeNotDepth]
+        vec![RAY_FOR_DEPTH]
     }
 
     /// All of it or nothing.
@@ -57,10 +57,13 @@ impl Effect for RangeNotDepth {
     }
 
     fn term(&self, known: Known, _: &Camera) -> Option<Term> {
-        Some(Term::bias(Basis::RangeNotDepth, vec![known("share").unwrap_or(1.0)]))
+        Some(Term::bias(RAY_FOR_DEPTH, vec![known("share").unwrap_or(1.0)]))
     }
 
     fn inverse(&self, settings: &Settings, _: &Camera) -> Option<Inverse> {
         Some(Inverse::AlongRay { share: settings.at(0) })
     }
 }
+
+/// What the disparity falls short by where the ray is taken for the depth.
+pub const RAY_FOR_DEPTH: Basis = Basis::powers(Coordinate::Foreshortening, 1, Modulation::Disparity);

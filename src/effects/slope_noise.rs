@@ -2,7 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
 use crate::camera::Camera;
-use crate::terms::{Basis, Term};
+use crate::terms::{Basis, Coordinate, Term};
 
 pub struct SlopeNoise;
 
@@ -43,7 +43,9 @@ impl Effect for SlopeNoise {
     }
 
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
-        let Basis::SlopeNoise { lateral_px } = *fit.shape else { return Vec::new() };
+        let Basis::Log1p { over: Coordinate::Blur(lateral_px) } = *fit.shape else {
+            return Vec::new();
+        };
         vec![fit.estimate("sigma_lateral_px", &|b| lateral_px * b[0].max(0.0).sqrt())]
     }
 
@@ -67,5 +69,5 @@ impl Effect for SlopeNoise {
 
 /// Noise of the place in the picture, through the slope of the target.
 fn blur(lateral_px: f64) -> Basis {
-    Basis::SlopeNoise { lateral_px }
+    Basis::Log1p { over: Coordinate::Blur(lateral_px) }
 }

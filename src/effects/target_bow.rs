@@ -52,11 +52,11 @@ impl Effect for TargetBow {
     }
 
     fn shapes(&self, _: &Bounds) -> Vec<Basis> {
-        [2, 4].map(|degree| Basis::Bow { degree }).into()
+        [2, 4].map(Basis::relief).into()
     }
 
     fn plain(&self, _: Basis) -> Basis {
-        Basis::Bow { degree: 2 }
+        Basis::relief(2)
     }
 
     /// A board bends by about 1 mm at 1 m, and by 1.5 mm half a metre from its middle where it is a
@@ -86,7 +86,7 @@ impl Effect for TargetBow {
 
     fn smallest(&self, bounds: &Bounds) -> Option<Smallest> {
         let unit = vec![1.0 / half_square(bounds.reach.right), 0.0, 0.0];
-        let (parameter, shape) = ("sagitta_m", Basis::Bow { degree: 2 });
+        let (parameter, shape) = ("sagitta_m", Basis::relief(2));
         Some(Smallest { parameter, shape, unit, of: |a| a })
     }
 }

@@ -42,11 +42,11 @@ impl Effect for Vignetting {
     }
 
     fn shapes(&self, _: &Bounds) -> Vec<Basis> {
-        [1, 2].map(|orders| Basis::Vignetting { orders }).into()
+        [1, 2].map(darker).into()
     }
 
     fn plain(&self, _: Basis) -> Basis {
-        Basis::Vignetting { orders: 1 }
+        darker(1)
     }
 
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
@@ -68,11 +68,16 @@ impl Effect for Vignetting {
     }
 
     fn smallest(&self, _: &Bounds) -> Option<Smallest> {
-        let (parameter, shape) = ("growth", Basis::Vignetting { orders: 1 });
+        let (parameter, shape) = ("growth", darker(1));
         Some(Smallest { parameter, shape, unit: vec![1.0], of: |a| (0.5 * a).exp() - 1.0 })
     }
 
     fn is_symptom(&self) -> bool {
         true
     }
+}
+
+/// Towards the corners.
+fn darker(orders: usize) -> Basis {
+    Basis::powers(Coordinate::RadiusSquared, orders, Modulation::One)
 }

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::basis::{Basis, Coordinate, Modulation};
-use super::nodes::{DISPARITY_UNIT_PX, disparity_scale};
+use super::basis::Basis;
+use super::modulation::{DISPARITY_UNIT_PX, Modulation};
 use super::pixels::Pixels;
 use super::place::PixelContext;
 
@@ -11,8 +11,8 @@ use super::place::PixelContext;
 /// how large it is.
 #[derive(Debug, Clone)]
 pub struct Gauge {
-    /// Of the disparity, with which the shape grows.
-    pub disparity_power: f64,
+    /// What the shape grows with.
+    times: Modulation,
     /// Of 1, x and y of the ray, a column of the shape each.
     pub affine: Vec<[f64; 3]>,
 }
@@ -24,7 +24,7 @@ impl Gauge {
     /// `None` for shapes that do not stand still in the picture, and for those that are nothing on
     /// the optical axis by their physics.
     pub fn of(basis: &Basis, pixels: &Pixels<'_>) -> Option<Self> {
-        let disparity_power = basis.still_power()?;
+        let times = Modulation::still(basis.still_power()?);
         let count = basis.count();
         let mut square = Matrix3::zeros();
         let mut cross = vec![Vector3::zeros(); count];
@@ -43,12 +43,12 @@ impl Gauge {
         }
         let solver = square.lu();
         let affine = cross.iter().map(|c| Some(solver.solve(c)?.into())).collect::<Option<_>>()?;
-        Some(Gauge { disparity_power, affine })
+        Some(Gauge { times, affine })
     }
 
     /// Take the affine part out of the shape's columns.
     pub fn take_out(&self, p: &PixelContext, columns: &mut [f64]) {
-        let far = disparity_scale(self.disparity_power, p);
+        let far = self.times.value(p);
         for (g, [a, b, c]) in columns.iter_mut().zip(&self.affine) {
             *g -= far * (a + b * p.x + c * p.y);
         }
@@ -60,31 +60,7 @@ impl Gauge {
         for (beta, affine) in coefficients.iter().zip(&self.affine) {
             sum.iter_mut().zip(affine).for_each(|(s, a)| *s -= beta * a);
         }
-        (Basis::Affine { disparity_power: self.disparity_power }, sum)
-    }
-}
-
-impl Basis {
-    /// The power of the disparity with which a shape grows that is otherwise the same in every
-    /// picture, whatever it shows.
-    pub fn still_power(&self) -> Option<f64> {
-        let by = |times: Modulation| match times {
-            Modulation::One => Some(0.0),
-            Modulation::DisparitySquared => Some(2.0),
-            Modulation::Lift | Modulation::Tilt => None,
-        };
-        match self {
-            Basis::Bowl { disparity_power, .. } | Basis::Affine { disparity_power } => {
-                Some(*disparity_power)
-            }
-            Basis::Map { times, .. } | Basis::Spline { times, .. } => by(*times),
-            Basis::Curve {
-                over: Coordinate::Column | Coordinate::Row | Coordinate::Radius,
-                times,
-                ..
-            } => by(*times),
-            _ => None,
-        }
+        (Basis::Affine { times: self.times }, sum)
     }
 }
 
@@ -92,6 +68,7 @@ impl Basis {
 mod tests {
     use super::*;
     use crate::simulate::kinect_v1;
+    use crate::terms::Coordinate;
 
     /// With its gauge a shape has no affine part, and another affine part is none.
     #[test]
@@ -102,9 +79,9 @@ mod tests {
         let [width, height] = [sensor.camera.width, sensor.camera.height].map(|n| n as f64);
         let times = Modulation::DisparitySquared;
         for basis in [
-            Basis::Bowl { disparity_power: 2.0, orders: 2 },
+            Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(2.0)),
             Basis::Spline { width, height, across: 5, down: 4, times },
-            Basis::Affine { disparity_power: 2.0 },
+            Basis::Affine { times },
         ] {
             let gauge = Gauge::of(&basis, &pixels).unwrap();
             let mut row = vec![0.0; basis.count()];

@@ -2,22 +2,28 @@
 //! `diagnose` and applied by `simulate`, `correct` and `map`.
 
 mod basis;
+mod coordinate;
 mod edges;
 mod extent;
 mod fault;
 mod gauge;
+mod modulation;
 mod needs;
 mod nodes;
 mod pixels;
 mod place;
+mod properties;
+mod series;
 mod value;
+mod written;
 
-pub use basis::{Basis, Coordinate, Modulation, TABLE};
+pub use basis::{Basis, TABLE};
+pub use coordinate::{Coordinate, ROOM_LUX};
 pub use edges::edge_distances;
 pub use extent::Extent;
 pub use gauge::Gauge;
+pub use modulation::{DISPARITY_UNIT_PX, Modulation};
 pub use needs::Needs;
-pub use nodes::DISPARITY_UNIT_PX;
 pub use pixels::Pixels;
 pub use place::{Axis, PixelContext, corner_radius};
 
@@ -37,6 +43,7 @@ pub enum Statistic {
 
 /// A term with its size: added to the disparity, px, or to the logarithm of its variance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(from = "written::Written", into = "written::Written")]
 pub struct Term {
     pub statistic: Statistic,
     pub basis: Basis,
@@ -65,13 +72,5 @@ impl Term {
     /// Of the logarithm of its variance.
     pub fn variance(basis: Basis, coefficients: Vec<f64>) -> Self {
         Term { statistic: Statistic::Variance, basis, coefficients }
-    }
-
-    /// Is it the sensor's, so that it can be taken out of any picture? A board's shape is not.
-    pub fn belongs_to_sensor(&self) -> bool {
-        match self.basis {
-            Basis::Bow { .. } => false,
-            _ => !matches!(self.basis.axis(), Axis::TargetPosition | Axis::EdgeDistance),
-        }
     }
 }
