@@ -15,7 +15,8 @@ const FILE: &str = include_str!("../data/row_ripple.rs");
 const NEXT_WORD: &str = "    radial_disparity_bias::RadialDisparityBias,\n";
 const WORD: &str = "    row_ripple::RowRipple,\n";
 
-const AMPLITUDE_PX: f64 = 0.1;
+/// A twelfth of a full-size pixel: the picture is four times smaller.
+const AMPLITUDE_PX: f64 = 0.02;
 const PERIOD_PX: f64 = 30.0;
 
 /// The program with the effect in it. What it depends on is built once and kept beside what
@@ -117,8 +118,8 @@ fn an_effect_is_one_file_and_one_word() {
     assert!(catalogue.contains("row-ripple") && catalogue.contains("height of the hum"));
 
     let effect = format!("row-ripple:amplitude_px={AMPLITUDE_PX},period_px={PERIOD_PX}");
-    let views = ["--distances", "1,1.5,2,3,4", "--tilts", "0,17,34", "--frames", "2"];
-    let scene = ["--shrink", "4", "--wall-target", "--effect", &effect];
+    let views = ["--distances", "1,1.5,2,3,4", "--tilts", "0,17,34", "--azimuths", "0,90"];
+    let scene = ["--shrink", "4", "--wall-target", "--frames", "2", "--effect", &effect];
     bench.run(&[&["simulate", "recording"][..], &views, &scene].concat());
 
     bench.model("plain.json", Vec::new());
