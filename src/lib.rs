@@ -136,7 +136,8 @@
 //!
 //! # Where to read on
 //!
-//! - [`docs::catalogue`]: the physical effects, what each looks like and what it is confused with
+//! - [`docs::catalogue`]: the physical effects, what each looks like and what it is confused with, and
+//!   how to add one: a file in `src/effects` and a word in its list
 //! - [`docs::layouts`]: every file that goes in or comes out
 //! - [`docs::capture`]: how to take views with a Kinect
 //! - [`docs::identifiability`]: what views of planes can show, and what they cannot

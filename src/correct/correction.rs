@@ -3,10 +3,10 @@
 use super::locking::Locking;
 use super::slopes::Noise;
 use crate::camera::{Camera, Rays};
-use crate::effects::{Active, KINECT_BASELINE_M};
+use crate::effects::{Active, Inverse, KINECT_BASELINE_M};
 use crate::error::{Error, Result};
 use crate::model::{self, NoiseModel};
-use crate::terms::{Basis, Coordinate, Modulation, Needs, Pixels, Statistic, Term};
+use crate::terms::{Needs, Pixels, Term};
 use crate::view::Sensor;
 
 /// What is known of a frame beside its depths.
@@ -167,42 +167,19 @@ impl Correction {
         if active.is_identity() {
             return Ok(());
         }
-        let at = |index: usize| active.settings.at(index);
-        let camera = &self.camera;
-        match entry.id.as_str() {
-            "depth-scale" => self.scale *= at(0),
-            "thermal-drift" => {
-                self.drifts.push(Drift { relative: at(0), time_constant_s: at(1) });
+        match active.effect.inverse(&active.settings, &self.camera) {
+            Some(Inverse::Term(term)) => self.terms.push((term, ANYWHERE)),
+            Some(Inverse::Scale(scale)) => self.scale *= scale,
+            Some(Inverse::Drift { relative, time_constant_s }) => {
+                self.drifts.push(Drift { relative, time_constant_s });
             }
-            "range-not-depth" => self.along_ray = self.ray_over_depth(at(0)),
-            "disparity-offset" => self.add_term(bias(Basis::Level, vec![at(0)])),
-            "radial-disparity-bias" => {
-                let bowl = Basis::Bowl { disparity_power: 0.0, orders: 1 };
-                self.add_term(bias(bowl, vec![at(0)]));
+            Some(Inverse::AlongRay { share }) => self.along_ray = self.ray_over_depth(share),
+            Some(Inverse::Locking { amplitude_px }) => {
+                self.locking = Some(Locking::new(amplitude_px));
             }
-            "lens-distortion" => {
-                let lens = Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 1 };
-                self.add_term(bias(lens, vec![at(0)]));
-            }
-            "column-banding" => {
-                let teeth = saw_tooth(camera.width, camera.cx, at(0), at(1));
-                let columns = Basis::Curve {
-                    over: Coordinate::Column,
-                    low: 0.0,
-                    high: (camera.width.max(2) - 1) as f64,
-                    nodes: teeth.len(),
-                    times: Modulation::One,
-                };
-                self.add_term(bias(columns, teeth));
-            }
-            "pixel-locking" => self.locking = Some(Locking::new(at(0))),
-            id => self.ignored.push(id.into()),
+            None => self.ignored.push(entry.id.clone()),
         }
         Ok(())
-    }
-
-    fn add_term(&mut self, term: Term) {
-        self.terms.push((term, ANYWHERE));
     }
 
     /// 1 + share (ray length over depth - 1), of each pixel.
@@ -230,19 +207,6 @@ impl Correction {
             self.still = (0..self.camera.pixels()).map(&mut sum).collect();
         }
     }
-}
-
-fn bias(basis: Basis, coefficients: Vec<f64>) -> Term {
-    Term { statistic: Statistic::Bias, basis, coefficients }
-}
-
-/// What rounding a correction that is linear in the column to whole steps leaves, px.
-fn saw_tooth(width: usize, cx: f64, amplitude_px: f64, period_px: f64) -> Vec<f64> {
-    let tooth = |u: usize| {
-        let steps = (u as f64 - cx) / period_px;
-        2.0 * amplitude_px * (steps.round() - steps)
-    };
-    (0..width.max(2)).map(tooth).collect()
 }
 
 const REMEDY: &str = "give the model that was made of this very sensor";

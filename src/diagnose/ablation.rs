@@ -5,7 +5,6 @@ use super::field::Field;
 use super::layers::Survey;
 use super::outcome::Rules;
 use crate::stats::Correlation;
-use crate::terms::Basis;
 
 /// Which part is left out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -34,10 +33,13 @@ impl Ablation {
             return all;
         }
         let mut fixed: Vec<Candidate> = Vec::new();
-        for Candidate { family, basis } in all {
-            let basis = if family.is_some() { card(basis) } else { basis };
-            if fixed.iter().all(|c| (c.family, &c.basis) != (family, &basis)) {
-                fixed.push(Candidate { family, basis });
+        for mut candidate in all {
+            if let Some(effect) = candidate.effect() {
+                candidate.basis = effect.plain(candidate.basis);
+            }
+            let same = |c: &Candidate| (c.family, &c.basis) == (candidate.family, &candidate.basis);
+            if !fixed.iter().any(same) {
+                fixed.push(candidate);
             }
         }
         fixed
@@ -46,22 +48,6 @@ impl Ablation {
     /// A size below this, in sigmas, is nobody's concern.
     pub(super) fn least_size(self, least: f64) -> f64 {
         if self == Ablation::UncalibratedThresholds { 0.0 } else { least }
-    }
-}
-
-/// The shape of the catalogue's own formula.
-fn card(basis: Basis) -> Basis {
-    match basis {
-        Basis::Bowl { .. } => Basis::Bowl { disparity_power: 0.0, orders: 1 },
-        Basis::Lens { fx, fy, .. } => Basis::Lens { fx, fy, orders: 1 },
-        Basis::Bow { .. } => Basis::Bow { degree: 2 },
-        Basis::Locking { .. } => Basis::Locking { period_px: 1.0, harmonics: 1 },
-        Basis::Banding { period_px, .. } => Basis::Banding { period_px, harmonics: 1 },
-        Basis::RangeExponent { pivot_m, .. } => Basis::RangeExponent { pivot_m, orders: 1 },
-        Basis::Vignetting { .. } => Basis::Vignetting { orders: 1 },
-        Basis::Intensity { .. } => Basis::Intensity { orders: 1 },
-        Basis::TiltAxis { .. } => Basis::TiltAxis { tilt_power: 1 },
-        other => other,
     }
 }
 

@@ -20,11 +20,7 @@ impl Along {
         let (label, value): (&str, OfPlace) = match axis {
             Axis::Z => ("depth, m", Box::new(|p| p.z)),
             Axis::DisparityPhase => {
-                let period = match basis {
-                    Basis::Locking { period_px, .. } => *period_px,
-                    Basis::Ring { period, .. } => *period,
-                    _ => 1.0,
-                };
+                let period = basis.period().unwrap_or(1.0);
                 (
                     "fraction of a pixel of disparity",
                     Box::new(move |p| (p.disparity / period).rem_euclid(1.0)),

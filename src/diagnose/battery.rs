@@ -20,7 +20,7 @@ use super::rim;
 use super::scene::Scene;
 use super::steps::{is_raw, steps};
 use super::verdict::{LEAST_SIZE, echoes, fold_into_sigma, merge, symptoms};
-use crate::terms::{Axis, Basis, Statistic, Term, corner_radius};
+use crate::terms::{Axis, Statistic, Term, corner_radius};
 
 /// How noise hangs together changes what a few frames show of its size by so much.
 const LEVEL_BESIDE_TEXTURE: f64 = 0.05;
@@ -203,11 +203,8 @@ impl Case<'_> {
     /// Laws of the distance, by reference distances.
     fn laws(&self, bias: &[Term]) -> Vec<Finding> {
         // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
-        let anchored: Vec<Term> = bias
-            .iter()
-            .filter(|t| matches!(t.basis, Basis::RangeNotDepth | Basis::Lens { .. }))
-            .cloned()
-            .collect();
+        let anchored: Vec<Term> =
+            bias.iter().filter(|t| t.basis.is_nothing_ahead()).cloned().collect();
         let found = |terms: &[Term]| {
             let levels = heldout::levels(&self.survey, terms);
             let laws = reference::laws(&self.fields, &levels, &self.survey.second());

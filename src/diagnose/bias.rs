@@ -1,67 +1,19 @@
 //! What may shift the mean: candidates in px of disparity.
 
 use super::candidate::Candidate;
-use super::reach::Extent;
-use super::tiles::SIDE;
 use crate::camera::Camera;
-use crate::terms::{Basis, Coordinate, Modulation};
+use crate::effects::Bounds;
+use crate::terms::{Basis, Coordinate, Extent, Modulation, Statistic};
 
-/// All named bias families for a camera.
-pub fn families(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
-    let mut all = Vec::new();
-    // Two orders for what is nearly a parabola, four for a wavy one.
-    for orders in [2, 4] {
-        for disparity_power in [-1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0] {
-            let bowl = Basis::Bowl { disparity_power, orders };
-            all.push(Candidate::named("radial-disparity-bias", bowl));
-        }
-    }
-    for orders in [1, 2, 4] {
-        let lens = Basis::Lens { fx: camera.fx, fy: camera.fy, orders };
-        all.push(Candidate::named("lens-distortion", lens));
-    }
-    all.push(Candidate::named("range-not-depth", Basis::RangeNotDepth));
-    all.push(Candidate::named("target-bow", Basis::Bow { degree: 2 }));
-    all.push(Candidate::named("target-bow", Basis::Bow { degree: 4 }));
-    locking(&mut all, reach);
-    let width = camera.width as f64;
-    // Bands that do not come again are none: three periods at least.
-    for half_cycles in 6..=64 {
-        let period_px = 2.0 * width / f64::from(half_cycles);
-        // Waves shorter than two tiles look like long ones.
-        let resolved = (period_px / (2.0 * SIDE as f64)) as usize;
-        if resolved > 0 {
-            let banding = Basis::Banding { period_px, harmonics: resolved.min(4) };
-            all.push(Candidate::named("column-banding", banding));
-        }
-        if half_cycles <= 16 && resolved > 4 {
-            let banding = Basis::Banding { period_px, harmonics: resolved.min(8) };
-            all.push(Candidate::named("column-banding", banding));
-        }
-    }
-    for width_px in [0.5, 1.0, 2.0, 4.0, 8.0] {
-        if reach.edge >= 4.0 * width_px {
-            all.push(Candidate::named("edge-mixing", Basis::EdgeMixing { width_px }));
-        }
-    }
+/// The catalogue's biases and the curves without a name.
+pub fn candidates(bounds: &Bounds) -> Vec<Candidate> {
+    let mut all = Candidate::of_catalogue(Statistic::Bias, bounds);
+    all.extend(curves(bounds.camera, bounds.reach));
     all
 }
 
-/// Periodic in the disparity with a period of one pixel, give or take what focal length and
-/// baseline are off.
-fn locking(all: &mut Vec<Candidate>, reach: &Extent) {
-    const OFF: f64 = 0.03;
-    // A quarter of a cycle over the range of disparities.
-    let step = 0.25 / (reach.disparity[1] - reach.disparity[0]).max(1.0);
-    let half = ((OFF / step).ceil() as i64).clamp(1, 12);
-    for k in -half..=half {
-        let period_px = 1.0 / (1.0 + OFF * k as f64 / half as f64);
-        all.push(Candidate::named("pixel-locking", Basis::Locking { period_px, harmonics: 3 }));
-    }
-}
-
 /// Curves without a name, one axis each, and maps over two.
-pub fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
+fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
     let (width, height) = (camera.width as f64, camera.height as f64);
     let curve = |over, [low, high]: [f64; 2], nodes, times| {
         Candidate::curve(Basis::Curve { over, low, high, nodes, times })
@@ -93,7 +45,7 @@ pub fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
     all.extend(seams(height, Coordinate::Row));
     all.push(along(camera));
     all.extend(waves(reach));
-    if reach.light[1] > 1.05 * reach.light[0] {
+    if reach.is_unevenly_lit() {
         all.push(curve(Coordinate::Light, reach.light, 8, Modulation::One));
     }
     all

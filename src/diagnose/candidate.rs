@@ -1,6 +1,7 @@
 //! What could be missing: a shape with, or without, the name of its cause.
 
-use crate::terms::Basis;
+use crate::effects::{self, Bounds, Effect, USUAL_PX};
+use crate::terms::{Basis, Statistic};
 
 /// A term that is tried.
 #[derive(Debug, Clone)]
@@ -20,5 +21,24 @@ impl Candidate {
 
     pub fn curve(basis: Basis) -> Self {
         Candidate { family: None, basis }
+    }
+
+    /// All that the catalogue's effects may look like.
+    pub fn of_catalogue(statistic: Statistic, bounds: &Bounds) -> Vec<Self> {
+        let of = |effect: &'static dyn Effect| {
+            let id = effect.card().id;
+            effect.shapes(bounds).into_iter().map(move |shape| Candidate::named(id, shape))
+        };
+        effects::that_change(statistic).into_iter().flat_map(of).collect()
+    }
+
+    /// The cause that it is the shape of.
+    pub fn effect(&self) -> Option<&'static dyn Effect> {
+        effects::find(self.family?)
+    }
+
+    /// See [`Effect::usual`].
+    pub fn usual(&self, k: usize) -> f64 {
+        self.effect().map_or(USUAL_PX, |e| e.usual(k))
     }
 }

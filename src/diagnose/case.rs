@@ -17,6 +17,7 @@ use super::steps::{Steps, lattice};
 use super::structure::{Structure, fixed_px2_by_view, structures};
 use super::tails::tails;
 use crate::Progress;
+use crate::effects::RAY_FOR_DEPTH;
 use crate::error::Result;
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
@@ -199,7 +200,7 @@ impl<'a> Case<'a> {
         let mut row = Vec::new();
         let mut tiles = self.survey.views.iter().flat_map(|v| v.tiles.iter());
         !self.survey.refits_sigma
-            || !matches!(term.basis, Basis::Recalibrate { .. })
+            || !matches!(term.basis, Basis::Table { .. })
             || tiles.all(|t| term.value(&t.place, &mut row) > MUCH)
     }
 
@@ -209,7 +210,7 @@ impl<'a> Case<'a> {
             .iter()
             .chain(terms)
             .chain(self.ranges.iter().flat_map(|f| &f.terms))
-            .filter(|t| t.basis == Basis::RangeNotDepth)
+            .filter(|t| t.basis == RAY_FOR_DEPTH)
             .map(|t| t.coefficients[0])
             .sum()
     }

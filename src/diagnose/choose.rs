@@ -1,6 +1,6 @@
 //! Which candidate a step takes: the name that explains as much as any, or the best curve.
 
-use super::candidate::Candidate;
+use super::candidate::{Candidate, RECALIBRATE};
 use super::judge::Judged;
 use super::null::NoiseGains;
 use super::outcome::{Chosen, Rival, Rules};
@@ -123,18 +123,18 @@ impl Choice<'_> {
     /// Light of the room was measured for its own sake; the surface's is made out of an image that
     /// the room lights too.
     fn rests_on_a_measurement(&self, i: usize) -> bool {
-        matches!(self.candidates[i].basis, Basis::Ambient { .. })
+        self.candidates[i].effect().is_some_and(|e| e.rests_on_a_measurement())
     }
 
-    /// The share of the best curve that a name must explain. Bands on a real sensor ride on a
-    /// smooth error of the column that is no band's; the law of sigma has columns for nearly
-    /// everything that happens to go with the distance.
+    /// The share of the best curve that a name must explain. The law of sigma has columns for
+    /// nearly everything that happens to go with the distance.
     fn adequacy(&self, i: usize) -> f64 {
-        match self.candidates[i].basis {
-            Basis::Banding { .. } => BANDS_ADEQUATE.min(self.rules.adequacy),
-            Basis::Recalibrate { .. } | Basis::Level => LAW_ADEQUATE.max(self.rules.adequacy),
-            _ => self.rules.adequacy,
+        let candidate = &self.candidates[i];
+        if candidate.family == Some(RECALIBRATE) {
+            return LAW_ADEQUATE.max(self.rules.adequacy);
         }
+        let own = candidate.effect().and_then(|e| e.must_explain());
+        own.map_or(self.rules.adequacy, |share| share.min(self.rules.adequacy))
     }
 }
 
@@ -152,8 +152,6 @@ fn same_curve(a: &Candidate, b: &Candidate) -> bool {
 
 /// See [`Choice::adequacy`].
 const LAW_ADEQUATE: f64 = 0.85;
-/// See [`Choice::adequacy`].
-const BANDS_ADEQUATE: f64 = 0.45;
 /// A name that explains this share of what the best nameless curve does is met by its own shape.
 const CLEAR: f64 = 0.85;
 

@@ -1,6 +1,6 @@
 //! How small an effect this recording could have shown.
 
-use serde_json::{Map, json};
+use serde_json::{Map, Value, json};
 
 use super::case::Case;
 use super::diagnosis::Detectable;
@@ -10,10 +10,8 @@ use super::outcome::Outcome;
 use super::power::Gates;
 use super::scene::Scene;
 use crate::camera::Camera;
-use crate::terms::{Basis, Statistic, Term};
-
-/// Effect, parameter, shape, and the parameter of a coefficient.
-type Spread = (&'static str, &'static str, Basis, fn(f64) -> f64);
+use crate::effects::{self, Smallest};
+use crate::terms::{Statistic, Term};
 
 /// The least parameter of each family that would be found with 80 % power.
 pub fn detectable(
@@ -39,63 +37,24 @@ pub fn detectable(
         beside: survey.refitted().map(|c| c.basis),
         seed,
     };
-    let half = |[low, high]: [f64; 2]| (0.5 * (high - low)).powi(2);
-    let (fx, fy) = (camera.fx, camera.fy);
-    let bow = half(survey.reach.right);
-    let families: Vec<(&'static str, &'static str, Basis, Vec<f64>)> = vec![
-        (
-            "radial-disparity-bias",
-            "k_px",
-            Basis::Bowl { disparity_power: 0.0, orders: 1 },
-            vec![1.0],
-        ),
-        ("lens-distortion", "k1", Basis::Lens { fx, fy, orders: 1 }, vec![1.0]),
-        ("target-bow", "sagitta_m", Basis::Bow { degree: 2 }, vec![1.0 / bow, 0.0, 0.0]),
-        (
-            "pixel-locking",
-            "amplitude_px",
-            Basis::Locking { period_px: 1.0, harmonics: 1 },
-            vec![1.0, 0.0],
-        ),
-        (
-            "column-banding",
-            "amplitude_px",
-            Basis::Banding { period_px: camera.width as f64 / 8.0, harmonics: 1 },
-            vec![1.0, 0.0],
-        ),
-    ];
+    let bounds = survey.bounds(camera);
     let mut all = Vec::new();
-    for (effect, name, basis, unit) in families {
-        add(&mut all, (effect, name), &mean, Statistic::Bias, basis, unit, |a| a);
-    }
-    let spreads: Vec<Spread> = vec![
-        ("range-exponent", "excess", Basis::RangeExponent { pivot_m: 2.0, orders: 1 }, |a| 0.5 * a),
-        ("vignetting", "growth", Basis::Vignetting { orders: 1 }, |a| (0.5 * a).exp() - 1.0),
-        ("slope-noise", "sigma_lateral_px", Basis::SlopeNoise { lateral_px: 0.2 }, |a| {
-            0.2 * a.sqrt()
-        }),
-        ("tilt-axis-anisotropy", "ratio", Basis::TiltAxis { tilt_power: 2 }, |a| (0.75 * a).exp()),
-    ];
-    for (effect, name, basis, to) in spreads {
-        add(&mut all, (effect, name), &blocks, Statistic::Variance, basis, vec![1.0], to);
+    for (statistic, gates) in [(Statistic::Bias, &mean), (Statistic::Variance, &blocks)] {
+        for effect in effects::that_change(statistic) {
+            let smallest = effect.smallest(&bounds).and_then(|s| least(s, statistic, gates));
+            all.extend(smallest.map(|minimum| Detectable { effect: effect.card().id, minimum }));
+        }
     }
     all
 }
 
-#[allow(clippy::too_many_arguments)]
-fn add(
-    all: &mut Vec<Detectable>,
-    (effect, name): (&'static str, &'static str),
-    gates: &Gates<'_>,
+fn least(
+    smallest: Smallest,
     statistic: Statistic,
-    basis: Basis,
-    unit: Vec<f64>,
-    to: impl Fn(f64) -> f64,
-) {
-    let term = Term { statistic, basis, coefficients: unit };
-    if let Some(least) = gates.least(&term).map(to).filter(|least| least.is_finite()) {
-        let mut minimum = Map::new();
-        minimum.insert(name.into(), json!(least));
-        all.push(Detectable { effect, minimum });
-    }
+    gates: &Gates<'_>,
+) -> Option<Map<String, Value>> {
+    let Smallest { parameter, shape, unit, of } = smallest;
+    let term = Term { statistic, basis: shape, coefficients: unit };
+    let least = gates.least(&term).map(of).filter(|least| least.is_finite())?;
+    Some(Map::from_iter([(parameter.to_string(), json!(least))]))
 }

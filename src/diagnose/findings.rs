@@ -9,6 +9,7 @@ use super::outcome::Outcome;
 use super::parameters::{of_any_formula, parameters};
 use super::scene::{Scene, size};
 use super::shape;
+use crate::effects::Fitted;
 use crate::terms::{Axis, Basis, Modulation, Term};
 
 /// All terms of a layer as findings. Terms of one family are one finding, and a nameless curve on
@@ -96,7 +97,9 @@ fn finding(
     });
     let parameters = covariance.map_or_else(Map::new, |c| {
         let Term { basis, coefficients, .. } = &terms[main];
-        of_any_formula(basis, parameters(basis, coefficients, &c, &scene.survey.reach))
+        let (covariance, reach) = (&c, &scene.survey.reach);
+        let fit = Fitted { shape: basis, coefficients, covariance, reach };
+        of_any_formula(chosen.candidate.family, parameters(chosen.candidate.family, &fit))
     });
     let shape =
         effect.is_none().then(|| shape::words(&terms[main].basis, &terms[main].coefficients));

@@ -4,6 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::candidate::Candidate;
 use super::evidence::{Evidence, score};
 use super::outcome::Chosen;
 use super::rows::Rows;
@@ -25,11 +26,17 @@ const NODE_PX: usize = 32;
 /// What is fitted: terms, then the nodes of the maps.
 pub struct Columns {
     pub bases: Vec<Basis>,
+    /// Of every column of the terms.
+    usual: Vec<f64>,
     pub gauges: Vec<Option<Gauge>>,
     pub maps: [Basis; 2],
     /// Columns of the terms, and of both maps.
     pub terms: usize,
     pub nodes: usize,
+}
+
+fn usual(candidate: &Candidate) -> impl Iterator<Item = f64> {
+    (0..candidate.basis.count()).map(|k| candidate.usual(k))
 }
 
 impl Columns {
@@ -45,6 +52,7 @@ impl Columns {
             gauges: bases.iter().map(|b| Gauge::of(b, &pixels)).collect(),
             terms: bases.iter().map(Basis::count).sum(),
             nodes: 2 * across * down,
+            usual: chosen.iter().flat_map(|c| usual(&c.candidate)).collect(),
             bases,
             maps: [map(Modulation::One), map(Modulation::DisparitySquared)],
         }
@@ -93,8 +101,7 @@ impl Columns {
 
     /// Precision of the terms' columns.
     fn usual(&self) -> DVector<f64> {
-        let of = |b: &Basis| (0..b.count()).map(|k| b.usual(k).powi(-2)).collect::<Vec<_>>();
-        DVector::from_vec(self.bases.iter().flat_map(of).collect())
+        DVector::from_iterator(self.terms, self.usual.iter().map(|size| size.powi(-2)))
     }
 
     pub fn span(&self, term: usize) -> std::ops::Range<usize> {

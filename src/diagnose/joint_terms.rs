@@ -6,7 +6,7 @@ use super::candidate::Candidate;
 use super::joint_fit::{Joint, Reduced, SMOOTHNESS};
 use super::outcome::Chosen;
 use crate::camera::Camera;
-use crate::terms::{Basis, Coordinate, Statistic, Term};
+use crate::terms::{Axis, Basis, Coordinate, Statistic, Term};
 
 /// Maps take the place of terms where they predict views left out better by this share, and by so
 /// many standard errors over the parts.
@@ -191,8 +191,7 @@ pub fn is_smooth_and_nameless(c: &Candidate) -> bool {
 }
 
 fn is_radial_name(c: &Candidate) -> bool {
-    c.family.is_some()
-        && matches!(c.basis, Basis::Bowl { .. } | Basis::Lens { .. } | Basis::RangeNotDepth)
+    c.family.is_some() && c.basis.axis() == Axis::Radius
 }
 
 /// Can a smooth map stand in for it at all?
@@ -201,7 +200,7 @@ pub fn is_rough(c: &Candidate) -> bool {
         c.basis,
         Basis::Curve { over: Coordinate::Column | Coordinate::Row, nodes: 2 | 30.., .. }
     );
-    c.basis.is_fine() || fine_lines || matches!(c.basis, Basis::Banding { .. })
+    c.basis.is_fine() || fine_lines || c.basis.period().is_some()
 }
 
 fn is_of_sensor(c: &Candidate) -> bool {

@@ -6,7 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::*;
 use crate::rng::{Seed, Stream};
 use crate::simulate::kinect_v1;
-use crate::terms::{Basis, Modulation, PixelContext, Statistic, Term, corner_radius};
+use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Statistic, Term, corner_radius};
 
 const SCALE_PX_M: f64 = 43.5;
 const NOISE_PX: f64 = 0.05;
@@ -114,7 +114,7 @@ fn left(data: &[ViewData], outcome: &Outcome) -> [f64; 2] {
 }
 
 fn bowl() -> Chosen {
-    let basis = Basis::Bowl { disparity_power: 0.0, orders: 1 };
+    let basis = Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(0.0));
     term(Some("radial-disparity-bias"), basis)
 }
 

@@ -5,7 +5,7 @@ use super::evidence::{Evidence, Gain};
 use super::null::{NoiseGains, Null};
 use super::outcome::{Look, Rules};
 use super::samples::ViewData;
-use crate::terms::{Basis, PixelContext};
+use crate::terms::{Basis, Coordinate, PixelContext};
 
 pub struct Judged {
     pub gain: Gain,
@@ -41,7 +41,7 @@ impl Judge<'_> {
 
     pub fn sensible(&self, basis: &Basis, m: usize, gain: &Gain, rms: f64) -> bool {
         let beta = gain.beta.rows(m, basis.count()).into_owned();
-        if let Basis::RangeExponent { orders: 2.., .. } = basis {
+        if let Basis::Powers { over: Coordinate::LogRatio(_), orders: 2.., .. } = basis {
             let ends = self.fine.iter().flat_map(|v| v.places.iter().map(|p| p.z));
             return one_way(basis, beta.as_slice(), crate::stats::range(ends));
         }

@@ -3,8 +3,9 @@
 use serde_json::{Map, Value};
 
 use crate::camera::Camera;
+use crate::effects;
 use crate::model::NoiseModel;
-use crate::terms::{Basis, Coordinate, Modulation, Statistic, Term};
+use crate::terms::{Statistic, Term};
 
 /// The model's effects as terms, and the rest by name.
 #[derive(Debug, Clone, Default)]
@@ -22,8 +23,9 @@ impl KnownTerms {
         for entry in &model.effects {
             let simple;
             let terms: &[Term] = if entry.shape.is_empty() {
-                simple = formula(&entry.id, &entry.parameters, camera);
-                &simple
+                let known = |name: &str| number(&entry.parameters, name);
+                simple = effects::find(&entry.id).and_then(|e| e.term(&known, camera));
+                simple.as_slice()
             } else {
                 &entry.shape
             };
@@ -76,74 +78,6 @@ impl KnownTerms {
 fn number(parameters: &Map<String, Value>, name: &str) -> Option<f64> {
     let value = parameters.get(name)?;
     value.get("value").unwrap_or(value).as_f64()
-}
-
-/// The catalogue's formula of an entry as a term, where it has one.
-fn formula(id: &str, parameters: &Map<String, Value>, camera: &Camera) -> Vec<Term> {
-    let get = |name: &str| number(parameters, name);
-    let term = |statistic, basis, coefficients| Some(Term { statistic, basis, coefficients });
-    let bias = |basis, coefficients| term(Statistic::Bias, basis, coefficients);
-    let variance = |basis, coefficients| term(Statistic::Variance, basis, coefficients);
-    let found = match id {
-        "radial-disparity-bias" => {
-            get("k_px").and_then(|k| bias(Basis::Bowl { disparity_power: 0.0, orders: 1 }, vec![k]))
-        }
-        "lens-distortion" => get("k1")
-            .and_then(|k| bias(Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 1 }, vec![k])),
-        "range-not-depth" => bias(Basis::RangeNotDepth, vec![get("share").unwrap_or(1.0)]),
-        "pixel-locking" => get("amplitude_px")
-            .and_then(|a| bias(Basis::Locking { period_px: 1.0, harmonics: 1 }, vec![-a, 0.0])),
-        "column-banding" => get("amplitude_px")
-            .zip(get("period_px"))
-            .and_then(|(a, period)| bias(columns(camera), saw_tooth(camera, a, period))),
-        "range-exponent" => get("excess").and_then(|x| {
-            variance(Basis::RangeExponent { pivot_m: 2.0, orders: 1 }, vec![2.0 * x])
-        }),
-        "vignetting" => get("growth").and_then(|growth| {
-            let nodes = 33;
-            let values = (0..nodes)
-                .map(|k| 2.0 * (growth * (k as f64 / (nodes - 1) as f64).powi(2)).ln_1p())
-                .collect();
-            let over = Coordinate::Radius;
-            variance(
-                Basis::Curve { over, low: 0.0, high: 1.0, nodes, times: Modulation::One },
-                values,
-            )
-        }),
-        "slope-noise" => get("sigma_lateral_px")
-            .and_then(|lateral_px| variance(Basis::SlopeNoise { lateral_px }, vec![1.0])),
-        "tilt-axis-anisotropy" => get("ratio").and_then(|ratio| {
-            // Counted at a tilt of 60 degrees.
-            variance(Basis::TiltAxis { tilt_power: 2 }, vec![ratio.ln() / 0.75])
-        }),
-        "intensity-dependent-noise" => {
-            get("exponent").and_then(|x| variance(Basis::Intensity { orders: 1 }, vec![-2.0 * x]))
-        }
-        "ambient-light" => {
-            get("ratio").and_then(|ratio| variance(Basis::Ambient { ratio }, vec![1.0]))
-        }
-        _ => None,
-    };
-    found.into_iter().collect()
-}
-
-fn columns(camera: &Camera) -> Basis {
-    Basis::Curve {
-        over: Coordinate::Column,
-        low: 0.0,
-        high: (camera.width.max(2) - 1) as f64,
-        nodes: camera.width.max(2),
-        times: Modulation::One,
-    }
-}
-
-/// What rounding a correction that is linear in the column to whole steps leaves, px.
-fn saw_tooth(camera: &Camera, amplitude_px: f64, period_px: f64) -> Vec<f64> {
-    let tooth = |u: usize| {
-        let steps = (u as f64 - camera.cx) / period_px;
-        2.0 * amplitude_px * (steps.round() - steps)
-    };
-    (0..camera.width.max(2)).map(tooth).collect()
 }
 
 #[cfg(test)]

@@ -5,10 +5,10 @@ use serde_json::json;
 
 use super::*;
 use crate::diagnose::parameters::parameters as told;
-use crate::diagnose::reach::Extent;
+use crate::effects::Fitted;
 use crate::model::{Effect, FitSummary, Provenance};
 use crate::simulate::kinect_v1;
-use crate::terms::PixelContext;
+use crate::terms::{Basis, Extent, PixelContext};
 
 fn model(id: &str, parameters: Value) -> NoiseModel {
     let Value::Object(parameters) = parameters else { panic!("an object") };
@@ -62,7 +62,9 @@ fn what_is_known_is_told_with_the_same_numbers() {
             let count = terms[0].basis.count();
             assert_eq!(terms[0].coefficients.len(), count, "{id}");
             let none = DMatrix::zeros(count, count);
-            let again = told(&terms[0].basis, &terms[0].coefficients, &none, &reach());
+            let (shape, coefficients) = (&terms[0].basis, &terms[0].coefficients[..]);
+            let (covariance, reach) = (&none, &reach());
+            let again = told(Some(id), &Fitted { shape, coefficients, covariance, reach });
             let found = again[name]["value"].as_f64().unwrap();
             assert!((found / value - 1.0).abs() < 1.3e-3, "{id}: {value} written, {found} told");
         }

@@ -11,7 +11,6 @@ use super::candidate::Candidate;
 use super::field::Field;
 use super::joint::refit;
 use super::outcome::{Outcome, Rules};
-use super::reach::Extent;
 use super::replication::halves;
 use super::samples::{ViewData, coarser};
 use super::scatter::{Left, left_by_fit};
@@ -20,10 +19,11 @@ use super::smooth::{SMOOTH_PX, high_pass};
 use super::tiles::{SIDE, Tile, tiles};
 use super::variance;
 use crate::camera::{Camera, Rays};
+use crate::effects::Bounds;
 use crate::model::SigmaModel;
 use crate::rng::Seed;
 use crate::stats::{Correlation, measure_correlation};
-use crate::terms::PixelContext;
+use crate::terms::{Extent, PixelContext};
 
 /// The tiles of all views, with how much each view is worth.
 pub struct Survey {
@@ -110,7 +110,7 @@ impl Survey {
             })
             .collect();
         let light = relative_light(&mut views);
-        let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter()));
+        let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter().map(|t| &t.place)));
         let (tolerance, ablation) = (MODEL_TOLERANCE, Ablation::None);
         Survey { views, reach, fixed_px2: 0.0, light, tolerance, refits_sigma: false, ablation }
     }
@@ -145,6 +145,11 @@ impl Survey {
         self.views.par_iter().map(|v| coarser(&mean_data(v))).collect()
     }
 
+    /// What these views can show of an effect.
+    pub fn bounds<'a>(&'a self, camera: &'a Camera) -> Bounds<'a> {
+        Bounds { camera, reach: &self.reach, patch_px: SIDE as f64 }
+    }
+
     /// How the search of the mean decides.
     pub fn bias_rules(&self, camera: &Camera, level: f64) -> Rules {
         self.ablation.rules(Rules {
@@ -160,8 +165,7 @@ impl Survey {
 
     pub fn search_bias(&self, camera: &Camera, level: f64, seed: Seed) -> Outcome {
         let rules = self.bias_rules(camera, level);
-        let mut candidates = bias::families(camera, &self.reach);
-        candidates.extend(bias::curves(camera, &self.reach));
+        let candidates = bias::candidates(&self.bounds(camera));
         let fine = self.mean_data();
         let coarse: Vec<ViewData> = fine.par_iter().map(coarser).collect();
         let candidates = self.ablation.candidates(candidates);
@@ -176,7 +180,7 @@ impl Survey {
         // A part of the views is asked for no replication.
         let alone = |&n: &usize| SurveyedView { second: false, ..self.views[n].clone() };
         let views: Vec<SurveyedView> = which.iter().map(alone).collect();
-        let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter()));
+        let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter().map(|t| &t.place)));
         Survey {
             views,
             reach,
@@ -286,8 +290,7 @@ impl Survey {
         level: f64,
         seed: Seed,
     ) -> Outcome {
-        let mut candidates = variance::families(&self.reach, sigma);
-        candidates.extend(variance::curves(camera, &self.reach));
+        let mut candidates = variance::candidates(&self.bounds(camera), sigma);
         let refit = self.refitted();
         if refit.is_some() {
             candidates.retain(variance::beyond_sigma);

@@ -14,12 +14,11 @@ use super::missing_report::{Told, shadow_finding};
 use super::missing_search::{Judged, Losses};
 use super::missing_shapes::{Shape, Step, curves, steps};
 use super::occlusion_scan::{Band, band};
-use super::reach::Extent;
 use super::replication::{Measured, agree};
 use super::shadow::Shadow;
 use crate::camera::{Camera, Rays};
 use crate::rng::Seed;
-use crate::terms::Axis;
+use crate::terms::{Axis, Extent};
 
 /// Losses that follow an axis.
 #[derive(Debug, Clone)]

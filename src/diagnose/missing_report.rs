@@ -10,9 +10,8 @@ use super::missing_fit::{Fitted, Point, bounded, fit, points};
 use super::missing_search::Judged;
 use super::missing_shapes::{Shape, Step};
 use super::occlusion_scan::Band;
-use super::reach::Extent;
 use crate::camera::Camera;
-use crate::terms::{Axis, Basis};
+use crate::terms::{Axis, Basis, Extent};
 
 /// An effect matters from this lost share on.
 const MATTERS: f64 = 0.05;

@@ -1,9 +1,8 @@
 //! What losses may follow: steps on lawful axes, which have a name, and curves, which have none.
 
 use super::missing_cells::{Cell, odds};
-use super::reach::Extent;
 use crate::camera::Camera;
-use crate::terms::{Axis, Basis, Coordinate, Modulation, PixelContext};
+use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, PixelContext};
 
 /// Beyond `middle` a share is lost; a negative width loses what is below it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -108,7 +107,7 @@ pub fn curves(camera: &Camera, reach: &Extent) -> Vec<Shape> {
     curve(Axis::SessionTime, Coordinate::Session, reach.session, 6);
     curve(Axis::Z, Coordinate::Z, reach.z, 10);
     curve(Axis::Theta, Coordinate::Theta, reach.theta, 8);
-    if reach.light[1] > 1.05 * reach.light[0] {
+    if reach.is_unevenly_lit() {
         curve(Axis::Intensity, Coordinate::Light, reach.light, 8);
     }
     let map = Basis::Map { width, height, across: 8, down: 6, times: Modulation::One };

@@ -51,7 +51,6 @@ mod pictures;
 mod pixels;
 mod power;
 mod prepared;
-mod reach;
 mod reading;
 mod reference;
 mod replication;

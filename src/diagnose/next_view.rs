@@ -12,14 +12,13 @@ use super::diagnosis::{Finding, NextView};
 use super::evidence::Evidence;
 use super::outcome::{Chosen, Outcome};
 use super::prepared::evidence_of;
-use super::reach::Extent;
 use super::samples::ViewData;
 use super::scene::Scene;
 use crate::camera::{Camera, Rays};
 use crate::model::SigmaModel;
 use crate::plane::Plane;
 use crate::scene::TargetFrame;
-use crate::terms::{Pixels, Statistic, Term};
+use crate::terms::{Extent, Pixels, Statistic, Term};
 
 /// A name this probable needs no further view.
 const SURE: f64 = 0.9;

@@ -1,7 +1,7 @@
 use super::*;
 use crate::model::{Domain, Form, PAPER_EQ1};
 use crate::simulate::kinect_v1;
-use crate::terms::{Basis, PixelContext};
+use crate::terms::{Basis, Coordinate, Modulation, PixelContext};
 
 fn sigma() -> SigmaModel {
     let domain = Domain { z_m: [0.3, 9.0], theta_rad: [0.0, 1.3] };
@@ -58,9 +58,13 @@ fn confused(best: &Term, rival: &Term, size: [f64; 2]) -> (Prospects, Prospects)
 /// with the ray's angle to the surface, which is the same bowl while the target is faced.
 #[test]
 fn a_bowl_and_the_angle_of_incidence_ask_for_a_tilted_view() {
-    let bowl = term(Basis::Bowl { disparity_power: 0.0, orders: 1 }, vec![0.2]);
-    let incidence = term(Basis::Bowl { disparity_power: 1.0, orders: 2 }, vec![0.0; 2]);
-    let lens = term(Basis::Lens { fx: 145.0, fy: 145.0, orders: 1 }, vec![0.05]);
+    let bowl = term(Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(0.0)), vec![0.2]);
+    let incidence =
+        term(Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(1.0)), vec![0.0; 2]);
+    let lens = term(
+        Basis::powers(Coordinate::RaySquared, 1, Modulation::RadialSlope { fx: 145.0, fy: 145.0 }),
+        vec![0.05],
+    );
     let (there, _) = confused(&bowl, &incidence, WALL_M);
     let best = there.best().unwrap();
     assert!(best.separation > 2.0 * there.now, "{} {best:?}", there.now);
@@ -73,8 +77,9 @@ fn a_bowl_and_the_angle_of_incidence_ask_for_a_tilted_view() {
 
 #[test]
 fn the_advised_view_separates_more_than_most() {
-    let bow = term(Basis::Bow { degree: 2 }, vec![0.02, 0.02, 0.0]);
-    let bowl = term(Basis::Bowl { disparity_power: 0.0, orders: 2 }, vec![0.0; 2]);
+    let bow = term(Basis::relief(2), vec![0.02, 0.02, 0.0]);
+    let bowl =
+        term(Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(0.0)), vec![0.0; 2]);
     for (best, rival) in [(&bow, &bowl), (&bowl_of(0.2), &bow)] {
         let (there, alone) = confused(best, rival, BOARD_M);
         let mut all: Vec<f32> = there.views.iter().map(|p| p.separation as f32).collect();
@@ -92,7 +97,8 @@ fn the_advised_view_separates_more_than_most() {
 #[test]
 fn a_small_board_is_asked_for_near_by() {
     let bowl = bowl_of(0.2);
-    let incidence = term(Basis::Bowl { disparity_power: 1.0, orders: 2 }, vec![0.0; 2]);
+    let incidence =
+        term(Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(1.0)), vec![0.0; 2]);
     let [wall, board] =
         [WALL_M, [0.6, 0.5]].map(|size| confused(&bowl, &incidence, size).0.best().copied());
     let (wall, board) = (wall.unwrap(), board.unwrap());
@@ -100,5 +106,5 @@ fn a_small_board_is_asked_for_near_by() {
 }
 
 fn bowl_of(k: f64) -> Term {
-    term(Basis::Bowl { disparity_power: 0.0, orders: 1 }, vec![k])
+    term(Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(0.0)), vec![k])
 }

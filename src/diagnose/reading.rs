@@ -13,10 +13,11 @@ use super::known::KnownTerms;
 use super::other_findings::named;
 use super::parameters::estimate;
 use crate::Progress;
+use crate::effects::RAY_FOR_DEPTH;
 use crate::error::{Error, Result};
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
-use crate::terms::{Axis, Basis, Statistic, Term};
+use crate::terms::{Axis, Statistic, Term};
 use crate::view::{Excluded, Recording};
 
 /// What could be read of a recording.
@@ -136,7 +137,7 @@ fn as_ranges(
 }
 
 fn range_term() -> Term {
-    Term { statistic: Statistic::Bias, basis: Basis::RangeNotDepth, coefficients: vec![1.0] }
+    Term::bias(RAY_FOR_DEPTH, vec![1.0])
 }
 
 /// The finding that goes with [`as_ranges`].

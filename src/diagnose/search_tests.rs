@@ -64,9 +64,12 @@ fn candidates() -> Vec<Candidate> {
         Candidate::curve(Basis::Curve { over, low: 0.0, high, nodes: 9, times: Modulation::One })
     };
     vec![
-        Candidate::named("radial-disparity-bias", Basis::Bowl { disparity_power: 0.0, orders: 1 }),
-        Candidate::named("column-banding", Basis::Banding { period_px: 160.0, harmonics: 2 }),
-        Candidate::named("pixel-locking", Basis::Locking { period_px: 1.0, harmonics: 2 }),
+        Candidate::named(
+            "radial-disparity-bias",
+            Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(0.0)),
+        ),
+        Candidate::named("column-banding", Basis::waves(Coordinate::Column, 160.0, 2)),
+        Candidate::named("pixel-locking", Basis::waves(Coordinate::Disparity, 1.0, 2)),
         curve(Coordinate::Column, 639.0),
         curve(Coordinate::Row, 479.0),
         curve(Coordinate::Radius, 1.0),

@@ -1,56 +1,27 @@
 //! What may change the size of the noise: candidates for the logarithm of the variance.
 
 use super::candidate::{Candidate, RECALIBRATE};
-use super::reach::Extent;
 use crate::camera::Camera;
+use crate::effects::Bounds;
 use crate::model::SigmaModel;
-use crate::terms::{Basis, Coordinate, Modulation, TABLE};
+use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, Statistic, TABLE};
 
-/// Where an excess exponent is counted from, m: the middle (in ratio) of a Kinect's 1 to 4 m.
-const PIVOT_M: f64 = 2.0;
-
-/// All named variance families.
-pub fn families(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
-    let mut all = vec![
-        Candidate::named("range-exponent", Basis::RangeExponent { pivot_m: PIVOT_M, orders: 1 }),
-        Candidate::named("range-exponent", Basis::RangeExponent { pivot_m: PIVOT_M, orders: 2 }),
-        Candidate::named("range-exponent", Basis::RangeExponent { pivot_m: PIVOT_M, orders: 4 }),
-        Candidate::named("vignetting", Basis::Vignetting { orders: 1 }),
-        Candidate::named("vignetting", Basis::Vignetting { orders: 2 }),
-        Candidate::named(RECALIBRATE, Basis::Level),
-    ];
-    for lateral_px in [0.1, 0.2, 0.4, 0.8, 1.6] {
-        all.push(Candidate::named("slope-noise", Basis::SlopeNoise { lateral_px }));
-    }
-    for tilt_power in [1, 2] {
-        all.push(Candidate::named("tilt-axis-anisotropy", Basis::TiltAxis { tilt_power }));
-    }
-    if reach.light[1] > 1.05 * reach.light[0] {
-        for orders in [1, 2, 3] {
-            all.push(Candidate::named("intensity-dependent-noise", Basis::Intensity { orders }));
-        }
-    }
-    if reach.ambient[1] > 0.0 {
-        for ratio in [0.003, 0.01, 0.03, 0.1, 0.3, 1.0] {
-            all.push(Candidate::named("ambient-light", Basis::Ambient { ratio }));
-        }
-    }
-    all.extend(recalibrations(reach, sigma));
-    all.extend(surfaces(reach));
+/// The catalogue's changes of the noise, those of sigma itself, and the curves without a name.
+pub fn candidates(bounds: &Bounds, sigma: &SigmaModel) -> Vec<Candidate> {
+    let mut all = Candidate::of_catalogue(Statistic::Variance, bounds);
+    // Behind what follows depth or radius, in the order in which the nulls are drawn.
+    let first = |c: &Candidate| matches!(c.basis.axis(), Axis::Z | Axis::Radius);
+    all.insert(all.partition_point(first), Candidate::named(RECALIBRATE, Basis::Level));
+    all.extend(recalibrations(bounds.reach, sigma));
+    all.extend(surfaces(bounds.reach));
+    all.extend(curves(bounds.camera, bounds.reach));
     all
 }
 
 /// Does it say more than a sigma over depth and tilt can? What follows these two alone is the form
 /// of sigma, not physics, where sigma was fitted to the same views.
 pub fn beyond_sigma(candidate: &Candidate) -> bool {
-    let of_sigma = match &candidate.basis {
-        Basis::RangeExponent { .. } | Basis::Level | Basis::Recalibrate { .. } => true,
-        Basis::Curve { over, times, .. } => {
-            matches!(over, Coordinate::LogZ | Coordinate::Theta) && *times == Modulation::One
-        }
-        _ => false,
-    };
-    !of_sigma
+    !candidate.basis.is_of_sigma()
 }
 
 /// Sigma's level and form, free.
@@ -95,7 +66,7 @@ fn surface(reach: &Extent, columns: &dyn Fn(f64, f64) -> Vec<f64>) -> Candidate 
         })
         .collect();
     let columns = (0..rows[0].len()).map(|j| rows.iter().map(|row| row[j]).collect()).collect();
-    Candidate::named(RECALIBRATE, Basis::Recalibrate { z_m, theta_rad, columns })
+    Candidate::named(RECALIBRATE, Basis::Table { z_m, theta_rad, columns })
 }
 
 /// Where a table of sigma's changes is laid out; never empty.
@@ -142,20 +113,20 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
         })
         .collect();
     if !bent.is_empty() {
-        let bent = Basis::Recalibrate { z_m, theta_rad, columns: bent };
+        let bent = Basis::Table { z_m, theta_rad, columns: bent };
         all.push(Candidate::named(RECALIBRATE, bent));
     }
     for n in if few < columns.len() { vec![few, columns.len()] } else { vec![few] } {
         if n > 0 {
             let columns = columns[..n].to_vec();
-            all.push(Candidate::named(RECALIBRATE, Basis::Recalibrate { z_m, theta_rad, columns }));
+            all.push(Candidate::named(RECALIBRATE, Basis::Table { z_m, theta_rad, columns }));
         }
     }
     all
 }
 
 /// Curves without a name, one axis each.
-pub fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
+fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
     let (width, height) = (camera.width as f64, camera.height as f64);
     let curve = |over, [low, high]: [f64; 2], nodes| {
         Candidate::curve(Basis::Curve { over, low, high, nodes, times: Modulation::One })

@@ -38,18 +38,7 @@ pub(super) fn merge(found: &mut Vec<Finding>) {
     });
 }
 
-/// What a matcher does when its light, its blur or its window change.
-const SYMPTOMS: [&str; 8] = [
-    "pixel-locking",
-    "heavy-tails",
-    "range-dropout",
-    "range-exponent",
-    "vignetting",
-    "slope-noise",
-    "column-banding",
-    "intensity-dependent-noise",
-];
-/// Half of them were, in two runs of a world of light that differed in one cause.
+/// Half of the symptoms were, in two runs of a world of light that differed in one cause.
 const NO_SYMPTOM: f64 = 0.5;
 /// What changes how noise is made, and so its size.
 const MAKES_NOISE: [&str; 3] = ["spatial-correlation", "frozen-noise", "disparity-quantisation"];
@@ -65,8 +54,8 @@ pub(super) fn symptoms(found: &mut [Finding]) {
             .iter()
             .any(|f| f.size.sigma > LARGE && f.effect.is_some_and(|id| MAKES_NOISE.contains(&id)));
     for f in found.iter_mut() {
-        let symptom = f.effect.is_some_and(|id| SYMPTOMS.contains(&id));
-        for a in f.alternatives.iter_mut().filter(|a| SYMPTOMS.contains(&a.effect)) {
+        let symptom = f.effect.is_some_and(is_symptom);
+        for a in f.alternatives.iter_mut().filter(|a| is_symptom(a.effect)) {
             a.probability = a.probability.map(|p| NO_SYMPTOM * p);
         }
         // What moves past the pattern is matched anew in every frame.
@@ -85,6 +74,10 @@ pub(super) fn symptoms(found: &mut [Finding]) {
             f.share *= 1e-3;
         }
     }
+}
+
+fn is_symptom(id: &str) -> bool {
+    effects::find(id).is_some_and(|e| e.is_symptom())
 }
 
 /// Where sigma itself is off by more, a law of depth or tilt alone beside it is the rest of the same

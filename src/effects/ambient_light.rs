@@ -1,6 +1,8 @@
 //! Sunlight lifts the background and the noise.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Stage};
+use crate::camera::Camera;
+use crate::terms::{Basis, Coordinate, ROOM_LUX, Term};
 
 pub struct AmbientLight;
 
@@ -41,7 +43,35 @@ impl Effect for AmbientLight {
             }
         }
     }
+
+    /// Only where somebody measured the light of the room.
+    fn shapes(&self, bounds: &Bounds) -> Vec<Basis> {
+        let ratios = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0].into_iter();
+        let lit = ratios.filter(|_| bounds.reach.ambient[1] > 0.0);
+        lit.map(room).collect()
+    }
+
+    fn rests_on_a_measurement(&self) -> bool {
+        true
+    }
+
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        let Basis::Log1p { over: Coordinate::Ambient(ratio) } = *fit.shape else {
+            return Vec::new();
+        };
+        vec![fit.estimate("ratio", &|b| ratio * b[0])]
+    }
+
+    fn formula_error(&self) -> f64 {
+        0.3
+    }
+
+    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
+        Some(Term::variance(room(known("ratio")?), vec![1.0]))
+    }
 }
 
-/// Light on the desk of an office (EN 12464-1), lx.
-pub const ROOM_LUX: f64 = 500.0;
+/// Light of the room against the pattern's.
+fn room(ratio: f64) -> Basis {
+    Basis::Log1p { over: Coordinate::Ambient(ratio) }
+}

@@ -1,6 +1,8 @@
 //! Vertical stripes.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage, greatest};
+use crate::camera::Camera;
+use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Term};
 
 pub struct ColumnBanding;
 
@@ -40,10 +42,78 @@ impl Effect for ColumnBanding {
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let (amplitude, period) = (settings.at(0), settings.at(1));
         let (width, centre) = (exposure.seen.width, exposure.sensor.camera.cx);
-        exposure.shift_disparity(|i| {
-            let bands = ((i % width) as f64 - centre) / period;
-            // What rounding to the nearest whole step leaves, from -1 to 1.
-            2.0 * amplitude * (bands.round() - bands)
-        });
+        exposure.shift_disparity(|i| tooth(i % width, centre, amplitude, period));
     }
+
+    fn shapes(&self, bounds: &Bounds) -> Vec<Basis> {
+        let mut all = Vec::new();
+        // Bands that do not come again are none: three periods at least.
+        for half_cycles in 6..=64 {
+            let period_px = 2.0 * bounds.camera.width as f64 / f64::from(half_cycles);
+            // Waves shorter than two patches look like long ones.
+            let resolved = (period_px / (2.0 * bounds.patch_px)) as usize;
+            if resolved > 0 {
+                all.push(stripes(period_px, resolved.min(4)));
+            }
+            if half_cycles <= 16 && resolved > 4 {
+                all.push(stripes(period_px, resolved.min(8)));
+            }
+        }
+        all
+    }
+
+    fn plain(&self, shape: Basis) -> Basis {
+        shape.period().map_or(shape, |period_px| stripes(period_px, 1))
+    }
+
+    /// Bands on a real sensor ride on a smooth error of the column that is no band's.
+    fn must_explain(&self) -> Option<f64> {
+        Some(0.45)
+    }
+
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        let Basis::Waves { period: period_px, .. } = *fit.shape else { return Vec::new() };
+        let at = |t: f64| PixelContext { u: t * period_px, ..PixelContext::default() };
+        vec![
+            fit.estimate("amplitude_px", &|b| greatest(|t| fit.value(b, at(t)))),
+            Estimate::given("period_px", period_px, 0.02 * period_px),
+        ]
+    }
+
+    fn formula_error(&self) -> f64 {
+        0.3
+    }
+
+    fn term(&self, known: Known, camera: &Camera) -> Option<Term> {
+        let (amplitude, period) = (known("amplitude_px")?, known("period_px")?);
+        let nodes = camera.width.max(2);
+        let columns = Basis::Curve {
+            over: Coordinate::Column,
+            low: 0.0,
+            high: (nodes - 1) as f64,
+            nodes,
+            times: Modulation::One,
+        };
+        let teeth = (0..nodes).map(|u| tooth(u, camera.cx, amplitude, period)).collect();
+        Some(Term::bias(columns, teeth))
+    }
+
+    fn smallest(&self, bounds: &Bounds) -> Option<Smallest> {
+        let shape = stripes(bounds.camera.width as f64 / 8.0, 1);
+        Some(Smallest { parameter: "amplitude_px", shape, unit: vec![1.0, 0.0], of: |a| a })
+    }
+
+    fn is_symptom(&self) -> bool {
+        true
+    }
+}
+
+/// What rounding to the nearest whole step leaves in a column, from -1 to 1 times the amplitude.
+fn tooth(column: usize, centre: f64, amplitude: f64, period: f64) -> f64 {
+    let bands = (column as f64 - centre) / period;
+    2.0 * amplitude * (bands.round() - bands)
+}
+
+fn stripes(period_px: f64, harmonics: usize) -> Basis {
+    Basis::waves(Coordinate::Column, period_px, harmonics)
 }

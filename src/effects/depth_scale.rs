@@ -1,6 +1,7 @@
 //! Depth is off by a factor.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Card, Draw, Effect, Exposure, Inverse, Parameter, Settings, Stage};
+use crate::camera::Camera;
 
 pub struct DepthScale;
 
@@ -31,5 +32,9 @@ impl Effect for DepthScale {
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let scale = settings.at(0) as f32;
         exposure.depth.iter_mut().for_each(|z| *z *= scale);
+    }
+
+    fn inverse(&self, settings: &Settings, _: &Camera) -> Option<Inverse> {
+        Some(Inverse::Scale(settings.at(0)))
     }
 }

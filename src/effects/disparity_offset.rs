@@ -1,6 +1,8 @@
 //! The reference disparity is wrong.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Card, Draw, Effect, Exposure, Inverse, Parameter, Settings, Stage};
+use crate::camera::Camera;
+use crate::terms::{Basis, Term};
 
 pub struct DisparityOffset;
 
@@ -31,5 +33,9 @@ impl Effect for DisparityOffset {
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let offset = settings.at(0);
         exposure.shift_disparity(|_| offset);
+    }
+
+    fn inverse(&self, settings: &Settings, _: &Camera) -> Option<Inverse> {
+        Some(Inverse::Term(Term::bias(Basis::Level, vec![settings.at(0)])))
     }
 }

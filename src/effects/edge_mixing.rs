@@ -1,6 +1,7 @@
 //! Depth mixes with what is behind.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Parameter, Settings, Stage};
+use crate::terms::{Basis, Coordinate};
 
 pub struct EdgeMixing;
 
@@ -34,6 +35,20 @@ impl Effect for EdgeMixing {
         exposure.with_kept(CARD.id, mixing, |e, offsets| {
             e.depth.iter_mut().zip(offsets).for_each(|(z, offset)| *z += offset);
         });
+    }
+
+    fn shapes(&self, bounds: &Bounds) -> Vec<Basis> {
+        let widths = [0.5, 1.0, 2.0, 4.0, 8.0].into_iter();
+        let seen = widths.filter(|width_px| bounds.reach.edge >= 4.0 * width_px);
+        seen.map(|width| Basis::Decay { over: Coordinate::Edge, width }).collect()
+    }
+
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        let Basis::Decay { width, .. } = *fit.shape else { return Vec::new() };
+        vec![
+            fit.estimate("amplitude_px", &|b| b[0]),
+            Estimate::given("width_px", width, 0.4 * width),
+        ]
     }
 }
 

@@ -47,4 +47,8 @@ impl Effect for HeavyTails {
             }
         }
     }
+
+    fn is_symptom(&self) -> bool {
+        true
+    }
 }

@@ -1,7 +1,9 @@
 //! A dark surface is noisier.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Stage};
+use crate::camera::Camera;
 use crate::scene::WHITE;
+use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct IntensityDependentNoise;
 
@@ -36,7 +38,35 @@ impl Effect for IntensityDependentNoise {
             *sigma *= grey.powf(-exponent) as f32;
         }
     }
+
+    /// A target of one grey says nothing.
+    fn shapes(&self, bounds: &Bounds) -> Vec<Basis> {
+        let kinds = [(1, false), (1, true), (2, true)].into_iter();
+        let seen = kinds.filter(|_| bounds.reach.is_unevenly_lit());
+        seen.map(|(orders, level)| dark(orders, level)).collect()
+    }
+
+    fn plain(&self, _: Basis) -> Basis {
+        dark(1, false)
+    }
+
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        vec![fit.estimate("exponent", &|b| -0.5 * b[0])]
+    }
+
+    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
+        Some(Term::variance(dark(1, false), vec![-2.0 * known("exponent")?]))
+    }
+
+    fn is_symptom(&self) -> bool {
+        true
+    }
 }
 
 /// Black velvet still gives back this much.
 const DARKEST: f64 = 0.01;
+
+/// Of the logarithm of the light, with a level: what counts as light is arbitrary.
+fn dark(orders: usize, level: bool) -> Basis {
+    Basis::Powers { over: Coordinate::LogLight, orders, level, times: Modulation::One }
+}

@@ -1,6 +1,8 @@
 //! The ray of a pixel is not where the pinhole says.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
+use crate::camera::Camera;
+use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct LensDistortion;
 
@@ -35,6 +37,41 @@ impl Effect for LensDistortion {
             exposure.depth[i] = exposure.meet(i, true_ray, 0.0) as f32;
         }
     }
+
+    fn shapes(&self, bounds: &Bounds) -> Vec<Basis> {
+        [1, 2, 4].map(|orders| bent(bounds.camera, orders)).into()
+    }
+
+    fn plain(&self, shape: Basis) -> Basis {
+        let Basis::Powers { over, times, .. } = shape else { return shape };
+        Basis::powers(over, 1, times)
+    }
+
+    /// What is left of k1 in a depth picture that was calibrated (Khoshelham and Elberink 2012,
+    /// table 1: 0.003; Smisek, Jancosek and Pajdla 2011: 0.01 to 0.05).
+    fn usual(&self, _: usize) -> f64 {
+        0.02
+    }
+
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        // c1 r^2 + c2 r^4 .. of the ray, as k1 r^2.
+        let radial =
+            |b: &[f64], r: f64| b.iter().rev().fold(0.0, |sum, c| (sum + c) * r * r);
+        vec![fit.estimate("k1", &|b| slope_in_square(|r| radial(b, r), 0.6))]
+    }
+
+    fn formula_error(&self) -> f64 {
+        0.03
+    }
+
+    fn term(&self, known: Known, camera: &Camera) -> Option<Term> {
+        Some(Term::bias(bent(camera, 1), vec![known("k1")?]))
+    }
+
+    fn smallest(&self, bounds: &Bounds) -> Option<Smallest> {
+        let shape = bent(bounds.camera, 1);
+        Some(Smallest { parameter: "k1", shape, unit: vec![1.0], of: |a| a })
+    }
 }
 
 /// The ray that a lens with `k1` brings to (x, y): fixed-point iteration.
@@ -50,3 +87,9 @@ fn undistorted((xd, yd): (f64, f64), k1: f64) -> (f64, f64) {
 /// At a Kinect's corner (0.69) with |k1| = 0.2 each round shrinks the error to a half or less: what
 /// is left is below 1e-4 px.
 const ITERATIONS: usize = 20;
+
+/// Rays shifted along the radius, seen through the slope of the target.
+fn bent(camera: &Camera, orders: usize) -> Basis {
+    let times = Modulation::RadialSlope { fx: camera.fx, fy: camera.fy };
+    Basis::powers(Coordinate::RaySquared, orders, times)
+}

@@ -10,18 +10,27 @@ mod active;
 mod card;
 mod draw;
 mod exposure;
+mod fitted;
 mod shape;
+mod traces;
 
 pub use active::{Acting, Active};
-pub use ambient_light::ROOM_LUX;
 pub use card::{Card, Parameter, Settings, Stage};
 pub use draw::{Draw, Scope, fill_normal};
 pub use exposure::{Exposure, Instant, KINECT_BASELINE_M};
+pub use fitted::{Estimate, Fitted};
+pub use range_not_depth::RAY_FOR_DEPTH;
+pub use traces::{Bounds, Inverse, Known, Smallest};
 
-use crate::terms::Term;
+use crate::camera::Camera;
+pub use crate::terms::ROOM_LUX;
+use crate::terms::{Basis, Statistic, Term};
 use draw::{chance, logistic, normals};
+use fitted::{greatest, slope_in_square};
 
-/// The forward face of a physical effect: what nature does to the exposure.
+/// A physical effect with both its faces: what nature does to an exposure, and what a recording
+/// shows of it. Effects without [`Effect::shapes`] show in textures, losses, edges or reference
+/// distances, and are recognised by measurements of their own.
 pub trait Effect: Send + Sync {
     fn card(&self) -> &'static Card;
 
@@ -33,10 +42,73 @@ pub trait Effect: Send + Sync {
     fn terms(&self) -> &[Term] {
         &[]
     }
+
+    /// What it may look like: of the mean, in px of disparity, or of the logarithm of the variance,
+    /// as the card's statistic has it. A diagnosis tries them all.
+    fn shapes(&self, _: &Bounds) -> Vec<Basis> {
+        Vec::new()
+    }
+
+    /// One of its shapes as the card's formula has it; what only scales that stays free.
+    fn plain(&self, shape: Basis) -> Basis {
+        shape
+    }
+
+    /// A size that coefficient number `k` of its shapes may well have, in its unit: the standard
+    /// deviation of what is believed before anything was measured.
+    fn usual(&self, _k: usize) -> f64 {
+        USUAL_PX
+    }
+
+    /// The share of what the best nameless curve explains that its name must, where less than of
+    /// others will do.
+    fn must_explain(&self) -> Option<f64> {
+        None
+    }
+
+    /// Was the axis that it follows measured for its own sake? Between equals it is then meant.
+    fn rests_on_a_measurement(&self) -> bool {
+        false
+    }
+
+    /// The parameters of a fitted shape.
+    fn estimates(&self, _: &Fitted) -> Vec<Estimate> {
+        Vec::new()
+    }
+
+    /// With another formula of the same physics its parameters come out different by this share
+    /// (measured on ray-traced recordings).
+    fn formula_error(&self) -> f64 {
+        0.0
+    }
+
+    /// What known parameters make of a measurement, where that is a term.
+    fn term(&self, _: Known, _: &Camera) -> Option<Term> {
+        None
+    }
+
+    /// What takes it out of a depth image; nothing for what is no bias of the sensor.
+    fn inverse(&self, settings: &Settings, camera: &Camera) -> Option<Inverse> {
+        let term = self.term(&|name| settings.named(self.card(), name), camera)?;
+        term.is_sensor_bias().then_some(Inverse::Term(term))
+    }
+
+    /// How the smallest of it that could have been found is told.
+    fn smallest(&self, _: &Bounds) -> Option<Smallest> {
+        None
+    }
+
+    /// May it be a symptom of another cause where a recording is held against a simulation? Light,
+    /// blur and window of a matcher change it.
+    fn is_symptom(&self) -> bool {
+        false
+    }
 }
 
-/// The catalogue: to simulate an effect takes one file and one word in this list. What it takes to
-/// recognise one is in `crate::docs::catalogue`.
+/// Errors of a matcher beyond a pixel are gross ones.
+pub const USUAL_PX: f64 = 1.0;
+
+/// The catalogue: an effect takes one file and one word in this list (`crate::docs::catalogue`).
 macro_rules! catalogue {
     ($($module:ident :: $name:ident),* $(,)?) => {
         $(mod $module;)*
@@ -81,4 +153,28 @@ catalogue! {
 /// The effect of this id.
 pub fn find(id: &str) -> Option<&'static dyn Effect> {
     CATALOGUE.iter().copied().find(|e| e.card().id == id)
+}
+
+/// The order in which a diagnosis tries the axes of the cards: it decides ties, and which random
+/// numbers the null of each candidate draws.
+const TRIED: [&str; 9] = [
+    "z",
+    "radius",
+    "theta",
+    "azimuth",
+    "target-position",
+    "disparity-phase",
+    "column",
+    "edge-distance",
+    "intensity",
+];
+
+/// The effects that change this statistic, in the order in which they are looked for.
+pub fn that_change(statistic: Statistic) -> Vec<&'static dyn Effect> {
+    let mut all: Vec<&dyn Effect> =
+        CATALOGUE.iter().copied().filter(|e| e.card().statistic == statistic.id()).collect();
+    all.sort_by_key(|e| {
+        TRIED.iter().position(|axis| *axis == e.card().axis).unwrap_or(TRIED.len())
+    });
+    all
 }

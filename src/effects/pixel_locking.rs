@@ -2,7 +2,9 @@
 
 use std::f32::consts::TAU;
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Inverse, Known, Parameter, Settings, Smallest, Stage, greatest};
+use crate::camera::Camera;
+use crate::terms::{Basis, Coordinate, PixelContext, Term};
 
 pub struct PixelLocking;
 
@@ -37,4 +39,58 @@ impl Effect for PixelLocking {
             *d -= amplitude * (TAU * d.fract()).sin();
         }
     }
+
+    /// A period of one pixel, give or take what focal length and baseline are off.
+    fn shapes(&self, bounds: &Bounds) -> Vec<Basis> {
+        const OFF: f64 = 0.03;
+        // A quarter of a cycle over the range of disparities.
+        let step = 0.25 / (bounds.reach.disparity[1] - bounds.reach.disparity[0]).max(1.0);
+        let half = ((OFF / step).ceil() as i64).clamp(1, 12);
+        let period = |k: i64| 1.0 / (1.0 + OFF * k as f64 / half as f64);
+        (-half..=half).map(|k| waves(period(k), 3)).collect()
+    }
+
+    fn plain(&self, _: Basis) -> Basis {
+        waves(1.0, 1)
+    }
+
+    /// Shimizu and Okutomi 2001: 0.06 px; without a remedy twice that.
+    fn usual(&self, _: usize) -> f64 {
+        0.1
+    }
+
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        let Basis::Waves { period: period_px, .. } = *fit.shape else { return Vec::new() };
+        let at = |t: f64| PixelContext { disparity: t * period_px, ..PixelContext::default() };
+        vec![
+            fit.estimate("amplitude_px", &|b| greatest(|t| fit.value(b, at(t)))),
+            Estimate::given("period_px", period_px, 0.003),
+        ]
+    }
+
+    fn formula_error(&self) -> f64 {
+        0.1
+    }
+
+    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
+        Some(Term::bias(waves(1.0, 1), vec![-known("amplitude_px")?, 0.0]))
+    }
+
+    fn inverse(&self, settings: &Settings, _: &Camera) -> Option<Inverse> {
+        Some(Inverse::Locking { amplitude_px: settings.at(0) })
+    }
+
+    fn smallest(&self, _: &Bounds) -> Option<Smallest> {
+        let (parameter, shape) = ("amplitude_px", waves(1.0, 1));
+        Some(Smallest { parameter, shape, unit: vec![1.0, 0.0], of: |a| a })
+    }
+
+    fn is_symptom(&self) -> bool {
+        true
+    }
+}
+
+/// In the phase of the disparity.
+fn waves(period_px: f64, harmonics: usize) -> Basis {
+    Basis::waves(Coordinate::Disparity, period_px, harmonics)
 }

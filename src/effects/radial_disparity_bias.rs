@@ -1,6 +1,8 @@
 //! A bowl in disparity.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
+use crate::camera::Camera;
+use crate::terms::{Basis, Coordinate, DISPARITY_UNIT_PX, Modulation, PixelContext, Term};
 
 pub struct RadialDisparityBias;
 
@@ -33,4 +35,52 @@ impl Effect for RadialDisparityBias {
         let radius = exposure.radius();
         exposure.shift_disparity(|i| k * radius(i).powi(2));
     }
+
+    /// Two orders for what is nearly a parabola, four for a wavy one.
+    fn shapes(&self, _: &Bounds) -> Vec<Basis> {
+        const POWERS: [f64; 9] = [-1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
+        let of = |orders: usize| POWERS.map(|power| bowl(power, orders));
+        [of(2), of(4)].concat()
+    }
+
+    fn plain(&self, _: Basis) -> Basis {
+        bowl(0.0, 1)
+    }
+
+    /// Herrera, Kannala and Heikkila 2012, fig. 6: up to 4 of a Kinect's steps of 1/8 px towards
+    /// the corners.
+    fn usual(&self, _: usize) -> f64 {
+        0.5
+    }
+
+    /// The bowl that comes nearest at the middle (in ratio) of the disparities.
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        let Basis::Powers { times, .. } = *fit.shape else { return Vec::new() };
+        let disparity_power = times.power_of_disparity().unwrap_or(0.0);
+        let [low, high] = fit.reach.disparity;
+        let middle = (low * high).sqrt();
+        let disparity = if middle.is_finite() { middle } else { DISPARITY_UNIT_PX };
+        let at = |radius: f64| PixelContext { radius, disparity, ..PixelContext::default() };
+        vec![
+            fit.estimate("k_px", &|b| slope_in_square(|r| fit.value(b, at(r)), 1.0)),
+            Estimate::given("disparity_power", disparity_power, 0.25),
+        ]
+    }
+
+    fn formula_error(&self) -> f64 {
+        0.1
+    }
+
+    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
+        Some(Term::bias(bowl(0.0, 1), vec![known("k_px")?]))
+    }
+
+    fn smallest(&self, _: &Bounds) -> Option<Smallest> {
+        Some(Smallest { parameter: "k_px", shape: bowl(0.0, 1), unit: vec![1.0], of: |a| a })
+    }
+}
+
+/// A bowl whose depth goes with a power of the disparity.
+fn bowl(disparity_power: f64, orders: usize) -> Basis {
+    Basis::powers(Coordinate::RadiusSquared, orders, Modulation::power(disparity_power))
 }

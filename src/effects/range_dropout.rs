@@ -54,4 +54,8 @@ impl Effect for RangeDropout {
             }
         }
     }
+
+    fn is_symptom(&self) -> bool {
+        true
+    }
 }

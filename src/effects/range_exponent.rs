@@ -1,6 +1,8 @@
 //! Noise grows with another power of z.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
+use crate::camera::Camera;
+use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Term};
 
 pub struct RangeExponent;
 
@@ -34,7 +36,42 @@ impl Effect for RangeExponent {
             *sigma *= (f64::from(*z) / PIVOT_M).powf(excess) as f32;
         }
     }
+
+    fn shapes(&self, _: &Bounds) -> Vec<Basis> {
+        [1, 2, 4].map(power_law).into()
+    }
+
+    fn plain(&self, _: Basis) -> Basis {
+        power_law(1)
+    }
+
+    /// Between the ends of what was seen.
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        let [near, far] = fit.reach.z;
+        let at = |z: f64| PixelContext { z, ..PixelContext::default() };
+        vec![fit.estimate("excess", &|b| {
+            0.5 * (fit.value(b, at(far)) - fit.value(b, at(near))) / (far / near).ln().max(1e-3)
+        })]
+    }
+
+    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
+        Some(Term::variance(power_law(1), vec![2.0 * known("excess")?]))
+    }
+
+    fn smallest(&self, _: &Bounds) -> Option<Smallest> {
+        let (parameter, shape) = ("excess", power_law(1));
+        Some(Smallest { parameter, shape, unit: vec![1.0], of: |a| 0.5 * a })
+    }
+
+    fn is_symptom(&self) -> bool {
+        true
+    }
 }
 
 /// Where the noise is the form's: the middle (in ratio) of a Kinect's 1 to 4 m.
 const PIVOT_M: f64 = 2.0;
+
+/// Of ln z.
+fn power_law(orders: usize) -> Basis {
+    Basis::powers(Coordinate::LogRatio(PIVOT_M), orders, Modulation::One)
+}

@@ -1,6 +1,8 @@
 //! The file holds the ray length.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Inverse, Known, Parameter, Settings, Stage};
+use crate::camera::Camera;
+use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct RangeNotDepth;
 
@@ -36,4 +38,32 @@ impl Effect for RangeNotDepth {
             exposure.depth[i] *= (1.0 + share * excess) as f32;
         }
     }
+
+    fn shapes(&self, _: &Bounds) -> Vec<Basis> {
+        vec![RAY_FOR_DEPTH]
+    }
+
+    /// All of it or nothing.
+    fn usual(&self, _: usize) -> f64 {
+        1.0
+    }
+
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        vec![fit.estimate("share", &|b| b[0])]
+    }
+
+    fn formula_error(&self) -> f64 {
+        0.07
+    }
+
+    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
+        Some(Term::bias(RAY_FOR_DEPTH, vec![known("share").unwrap_or(1.0)]))
+    }
+
+    fn inverse(&self, settings: &Settings, _: &Camera) -> Option<Inverse> {
+        Some(Inverse::AlongRay { share: settings.at(0) })
+    }
 }
+
+/// What the disparity falls short by where the ray is taken for the depth.
+pub const RAY_FOR_DEPTH: Basis = Basis::powers(Coordinate::Foreshortening, 1, Modulation::Disparity);

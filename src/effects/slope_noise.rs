@@ -1,6 +1,8 @@
 //! Lateral noise becomes depth noise on a slope.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
+use crate::camera::Camera;
+use crate::terms::{Basis, Coordinate, Term};
 
 pub struct SlopeNoise;
 
@@ -35,4 +37,37 @@ impl Effect for SlopeNoise {
             exposure.sigma[i] = f64::from(exposure.sigma[i]).hypot(lateral * slope) as f32;
         }
     }
+
+    fn shapes(&self, _: &Bounds) -> Vec<Basis> {
+        [0.1, 0.2, 0.4, 0.8, 1.6].map(blur).into()
+    }
+
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        let Basis::Log1p { over: Coordinate::Blur(lateral_px) } = *fit.shape else {
+            return Vec::new();
+        };
+        vec![fit.estimate("sigma_lateral_px", &|b| lateral_px * b[0].max(0.0).sqrt())]
+    }
+
+    fn formula_error(&self) -> f64 {
+        0.07
+    }
+
+    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
+        Some(Term::variance(blur(known("sigma_lateral_px")?), vec![1.0]))
+    }
+
+    fn smallest(&self, _: &Bounds) -> Option<Smallest> {
+        let (parameter, shape) = ("sigma_lateral_px", blur(0.2));
+        Some(Smallest { parameter, shape, unit: vec![1.0], of: |a| 0.2 * a.sqrt() })
+    }
+
+    fn is_symptom(&self) -> bool {
+        true
+    }
+}
+
+/// Noise of the place in the picture, through the slope of the target.
+fn blur(lateral_px: f64) -> Basis {
+    Basis::Log1p { over: Coordinate::Blur(lateral_px) }
 }

@@ -1,6 +1,7 @@
 //! The board is not flat.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Parameter, Settings, Smallest, Stage};
+use crate::terms::Basis;
 
 pub struct TargetBow;
 
@@ -49,4 +50,50 @@ impl Effect for TargetBow {
             }
         }
     }
+
+    fn shapes(&self, _: &Bounds) -> Vec<Basis> {
+        [2, 4].map(Basis::relief).into()
+    }
+
+    fn plain(&self, _: Basis) -> Basis {
+        Basis::relief(2)
+    }
+
+    /// A board bends by about 1 mm at 1 m, and by 1.5 mm half a metre from its middle where it is a
+    /// bad one.
+    fn usual(&self, k: usize) -> f64 {
+        let degree = if k < 3 {
+            2
+        } else if k < 7 {
+            3
+        } else {
+            4
+        };
+        BOW_M / 0.5f64.powi(degree)
+    }
+
+    /// Over the reach of the board that was seen, along the side that is bent more.
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        let (right, down) = (half_square(fit.reach.right), half_square(fit.reach.down));
+        vec![fit.estimate("sagitta_m", &|b| {
+            if (b[0] * right).abs() > (b[1] * down).abs() { -b[0] * right } else { -b[1] * down }
+        })]
+    }
+
+    fn formula_error(&self) -> f64 {
+        0.3
+    }
+
+    fn smallest(&self, bounds: &Bounds) -> Option<Smallest> {
+        let unit = vec![1.0 / half_square(bounds.reach.right), 0.0, 0.0];
+        let (parameter, shape) = ("sagitta_m", Basis::relief(2));
+        Some(Smallest { parameter, shape, unit, of: |a| a })
+    }
+}
+
+/// Of a board, half a metre from its middle, m.
+const BOW_M: f64 = 0.0015;
+
+fn half_square([low, high]: [f64; 2]) -> f64 {
+    (0.5 * (high - low)).powi(2)
 }

@@ -1,6 +1,7 @@
 //! Warm-up.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Card, Draw, Effect, Exposure, Inverse, Parameter, Settings, Stage};
+use crate::camera::Camera;
 
 pub struct ThermalDrift;
 
@@ -43,5 +44,9 @@ impl Effect for ThermalDrift {
         let warmth = -(-exposure.instant.session_s / constant).exp_m1();
         let scale = (1.0 + relative * warmth) as f32;
         exposure.depth.iter_mut().for_each(|z| *z *= scale);
+    }
+
+    fn inverse(&self, settings: &Settings, _: &Camera) -> Option<Inverse> {
+        Some(Inverse::Drift { relative: settings.at(0), time_constant_s: settings.at(1) })
     }
 }

@@ -1,6 +1,8 @@
 //! Less light at the corners.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
+use crate::camera::Camera;
+use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct Vignetting;
 
@@ -38,4 +40,44 @@ impl Effect for Vignetting {
             exposure.light[i] /= (factor * factor) as f32;
         }
     }
+
+    fn shapes(&self, _: &Bounds) -> Vec<Basis> {
+        [1, 2].map(darker).into()
+    }
+
+    fn plain(&self, _: Basis) -> Basis {
+        darker(1)
+    }
+
+    fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        vec![fit.estimate("growth", &|b| (0.5 * b.iter().sum::<f64>()).exp() - 1.0)]
+    }
+
+    fn formula_error(&self) -> f64 {
+        0.1
+    }
+
+    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
+        let growth = known("growth")?;
+        let nodes = 33;
+        let values = (0..nodes)
+            .map(|k| 2.0 * (growth * (k as f64 / (nodes - 1) as f64).powi(2)).ln_1p())
+            .collect();
+        let (over, times) = (Coordinate::Radius, Modulation::One);
+        Some(Term::variance(Basis::Curve { over, low: 0.0, high: 1.0, nodes, times }, values))
+    }
+
+    fn smallest(&self, _: &Bounds) -> Option<Smallest> {
+        let (parameter, shape) = ("growth", darker(1));
+        Some(Smallest { parameter, shape, unit: vec![1.0], of: |a| (0.5 * a).exp() - 1.0 })
+    }
+
+    fn is_symptom(&self) -> bool {
+        true
+    }
+}
+
+/// Towards the corners.
+fn darker(orders: usize) -> Basis {
+    Basis::powers(Coordinate::RadiusSquared, orders, Modulation::One)
 }

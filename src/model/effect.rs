@@ -52,21 +52,30 @@ mod tests {
         let (over, times) = (Coordinate::Session, Modulation::Tilt);
         let (low, high) = (-1e6, 1.0 / 3.0);
         vec![
-            Basis::Bowl { disparity_power: -0.7, orders: 2 },
-            Basis::Lens { fx: 580.1, fy: 1e-300, orders: 3 },
-            Basis::RangeNotDepth,
-            Basis::Bow { degree: 4 },
-            Basis::Locking { period_px: 1.0, harmonics: 4 },
-            Basis::Banding { period_px: 80.7, harmonics: 1 },
-            Basis::EdgeMixing { width_px: 2.3 },
-            Basis::RangeExponent { pivot_m: 2.0, orders: 2 },
-            Basis::Vignetting { orders: 3 },
-            Basis::SlopeNoise { lateral_px: 0.8 },
-            Basis::TiltAxis { tilt_power: 2 },
-            Basis::Intensity { orders: 3 },
-            Basis::Ambient { ratio: 1e300 },
+            Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(-0.7)),
+            Basis::powers(
+                Coordinate::RaySquared,
+                3,
+                Modulation::RadialSlope { fx: 580.1, fy: 1e-300 },
+            ),
+            Basis::powers(Coordinate::Foreshortening, 1, Modulation::Disparity),
+            Basis::relief(4),
+            Basis::waves(Coordinate::Disparity, 1.0, 4),
+            Basis::waves(Coordinate::Column, 80.7, 1),
+            Basis::Decay { over: Coordinate::Edge, width: 2.3 },
+            Basis::powers(Coordinate::LogRatio(2.0), 2, Modulation::One),
+            Basis::powers(Coordinate::RadiusSquared, 3, Modulation::One),
+            Basis::Log1p { over: Coordinate::Blur(0.8) },
+            Basis::powers(Coordinate::Alignment, 1, Modulation::TiltPower(2)),
+            Basis::Powers {
+                over: Coordinate::LogLight,
+                orders: 2,
+                level: true,
+                times: Modulation::One,
+            },
+            Basis::Log1p { over: Coordinate::Ambient(1e300) },
             Basis::Level,
-            Basis::Recalibrate {
+            Basis::Table {
                 z_m: [0.5, 4.0],
                 theta_rad: [0.0, 1.3],
                 columns: vec![vec![0.1; TABLE * TABLE]; 2],
@@ -75,7 +84,7 @@ mod tests {
             Basis::Ring { over: Coordinate::Azimuth, period: 6.3, nodes: 4, times },
             Basis::Map { width: 640.0, height: 480.0, across: 3, down: 2, times },
             Basis::Spline { width: 640.0, height: 480.0, across: 4, down: 5, times },
-            Basis::Affine { disparity_power: 2.0 },
+            Basis::Affine { times: Modulation::DisparitySquared },
             Basis::Pair { over: [over; 2], low: [low; 2], high: [high; 2], nodes: [2, 3] },
         ]
     }
@@ -119,13 +128,13 @@ mod tests {
         let curve = |low, high, nodes| Basis::Curve { over, low, high, nodes, times };
         let (z_m, theta_rad, columns) = ([1.0, 2.0], [0.0, 1.0], vec![vec![0.0; 3]]);
         let bad = [
-            Basis::Locking { period_px: 0.0, harmonics: 2 },
-            Basis::Banding { period_px: -8.0, harmonics: 1 },
-            Basis::Banding { period_px: 8.0, harmonics: usize::MAX },
-            Basis::Bow { degree: usize::MAX },
+            Basis::waves(Coordinate::Disparity, 0.0, 2),
+            Basis::waves(Coordinate::Column, -8.0, 1),
+            Basis::waves(Coordinate::Column, 8.0, usize::MAX),
+            Basis::relief(usize::MAX),
             Basis::Map { width: 640.0, height: 480.0, across: usize::MAX, down: 2, times },
             Basis::Ring { over: Coordinate::Azimuth, period: f64::INFINITY, nodes: 4, times },
-            Basis::Recalibrate { z_m, theta_rad, columns },
+            Basis::Table { z_m, theta_rad, columns },
             curve(0.0, 1.0, 1),
             curve(1.0, 1.0, 4),
             curve(f64::NAN, 1.0, 4),

@@ -1,14 +1,16 @@
 //! What can be wrong with a term that comes from a file.
 
 use super::basis::{Basis, TABLE};
+use super::coordinate::Coordinate;
+use super::modulation::Modulation;
 use super::{Statistic, Term};
 
-/// Nodes along one axis, and harmonics or orders of a family: more than any fit has; a file that
+/// Nodes along one axis, and harmonics or orders of a series: more than any fit has; a file that
 /// asks for more is damaged, and would be believed with memory.
 const MOST_NODES: usize = 4096;
 const MOST_ORDERS: usize = 16;
-/// Powers of right and down that a board's shape knows.
-const BOW_DEGREES: std::ops::RangeInclusive<usize> = 2..=4;
+/// Of a polynomial of two coordinates.
+const DEGREES: std::ops::RangeInclusive<usize> = 2..=4;
 
 impl Term {
     /// What is wrong with it, if anything.
@@ -30,54 +32,65 @@ impl Term {
 impl Basis {
     /// What is wrong with the numbers that settle it, if anything.
     pub fn fault(&self) -> Option<String> {
+        let places = self.over().into_iter().flatten().find_map(Coordinate::fault);
+        places.or_else(|| self.times().fault()).or_else(|| self.own_fault())
+    }
+
+    fn own_fault(&self) -> Option<String> {
         match self {
-            Basis::Bowl { disparity_power, orders } => {
-                finite("disparity_power", &[*disparity_power]).or_else(|| some_orders(*orders))
+            Basis::Level | Basis::Log1p { .. } | Basis::Affine { .. } => None,
+            Basis::Powers { orders, .. } => some_orders(*orders),
+            Basis::Polynomial { degree, .. } => {
+                (!DEGREES.contains(degree)).then(|| format!("degree = {degree} is not from 2 to 4"))
             }
-            Basis::Lens { fx, fy, orders } => {
-                positive("fx and fy", &[*fx, *fy]).or_else(|| some_orders(*orders))
+            Basis::Waves { period, harmonics, .. } => {
+                positive("its period", &[*period]).or_else(|| some_orders(*harmonics))
             }
-            Basis::Vignetting { orders } => some_orders(*orders),
-            Basis::Bow { degree } => (!BOW_DEGREES.contains(degree))
-                .then(|| format!("degree = {degree} is not from 2 to 4")),
-            Basis::Locking { period_px, .. } => positive("period_px", &[*period_px]),
-            Basis::Banding { period_px, harmonics } => {
-                positive("period_px", &[*period_px]).or_else(|| some_orders(*harmonics))
-            }
-            Basis::EdgeMixing { width_px } => positive("width_px", &[*width_px]),
-            Basis::RangeExponent { pivot_m, .. } => positive("pivot_m", &[*pivot_m]),
-            Basis::SlopeNoise { lateral_px } => positive("lateral_px", &[*lateral_px]),
-            Basis::TiltAxis { tilt_power } => (!(0..=MOST_ORDERS as i32).contains(tilt_power))
-                .then(|| format!("tilt_power = {tilt_power} is not from 0 to {MOST_ORDERS}")),
-            Basis::Ambient { ratio } => (!(ratio.is_finite() && *ratio >= 0.0))
-                .then(|| "ratio must not be negative".to_string()),
-            Basis::Recalibrate { z_m, theta_rad, columns } => rising(z_m[0], z_m[1])
+            Basis::Decay { width, .. } => positive("its width", &[*width]),
+            Basis::Table { z_m, theta_rad, columns } => rising(z_m[0], z_m[1])
                 .or_else(|| rising(theta_rad[0], theta_rad[1]))
                 .or_else(|| columns.iter().find_map(|column| table(column))),
             Basis::Curve { low, high, nodes, .. } => {
                 rising(*low, *high).or_else(|| some_nodes(&[*nodes]))
             }
             Basis::Ring { period, nodes, .. } => {
-                positive("period", &[*period]).or_else(|| some_nodes(&[*nodes]))
+                positive("its period", &[*period]).or_else(|| some_nodes(&[*nodes]))
             }
-            Basis::Map { width, height, across, down, .. } => [width, height]
-                .iter()
-                .any(|side| !(side.is_finite() && **side >= 2.0))
-                .then(|| "width and height must be 2 px or more".to_string())
-                .or_else(|| some_nodes(&[*across, *down])),
-            Basis::Spline { width, height, across, down, .. } => [width, height]
-                .iter()
-                .any(|side| !(side.is_finite() && **side >= 2.0))
-                .then(|| "width and height must be 2 px or more".to_string())
-                .or_else(|| some_nodes(&[*across, *down]))
-                .or_else(|| {
+            Basis::Map { width, height, across, down, .. } => {
+                picture(*width, *height, [*across, *down])
+            }
+            Basis::Spline { width, height, across, down, .. } => {
+                picture(*width, *height, [*across, *down]).or_else(|| {
                     (*across < 4 || *down < 4).then(|| "a cubic spline has 4 nodes or more".into())
-                }),
-            Basis::Affine { disparity_power } => finite("disparity_power", &[*disparity_power]),
+                })
+            }
             Basis::Pair { low, high, nodes, .. } => rising(low[0], high[0])
                 .or_else(|| rising(low[1], high[1]))
                 .or_else(|| some_nodes(nodes)),
-            Basis::RangeNotDepth | Basis::Intensity { .. } | Basis::Level => None,
+        }
+    }
+}
+
+impl Coordinate {
+    fn fault(self) -> Option<String> {
+        match self {
+            Coordinate::LogRatio(pivot_m) => positive("its pivot", &[pivot_m]),
+            Coordinate::Blur(lateral_px) => positive("its blur", &[lateral_px]),
+            Coordinate::Ambient(ratio) => (!(ratio.is_finite() && ratio >= 0.0))
+                .then(|| "its share of the room's light must not be negative".to_string()),
+            _ => None,
+        }
+    }
+}
+
+impl Modulation {
+    fn fault(self) -> Option<String> {
+        match self {
+            Modulation::DisparityPower(power) => finite("its power of the disparity", &[power]),
+            Modulation::TiltPower(power) => (!(0..=MOST_ORDERS as i32).contains(&power))
+                .then(|| format!("its power of the tilt, {power}, is not from 0 to {MOST_ORDERS}")),
+            Modulation::RadialSlope { fx, fy } => positive("fx and fy", &[fx, fy]),
+            _ => None,
         }
     }
 }
@@ -104,6 +117,14 @@ fn some_orders(orders: usize) -> Option<String> {
 fn some_nodes(nodes: &[usize]) -> Option<String> {
     let bad = nodes.iter().find(|n| !(2..=MOST_NODES).contains(*n))?;
     Some(format!("{bad} nodes are not from 2 to {MOST_NODES}"))
+}
+
+fn picture(width: f64, height: f64, nodes: [usize; 2]) -> Option<String> {
+    [width, height]
+        .iter()
+        .any(|side| !(side.is_finite() && *side >= 2.0))
+        .then(|| "width and height must be 2 px or more".to_string())
+        .or_else(|| some_nodes(&nodes))
 }
 
 fn table(column: &[f64]) -> Option<String> {

@@ -1,9 +1,9 @@
-//! What planes absorb of a shape that stands still in the picture, and what is usual of each.
+//! What planes absorb of a shape that stands still in the picture.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::basis::{Basis, Coordinate, Modulation};
-use super::nodes::{DISPARITY_UNIT_PX, disparity_scale};
+use super::basis::Basis;
+use super::modulation::{DISPARITY_UNIT_PX, Modulation};
 use super::pixels::Pixels;
 use super::place::PixelContext;
 
@@ -11,8 +11,8 @@ use super::place::PixelContext;
 /// how large it is.
 #[derive(Debug, Clone)]
 pub struct Gauge {
-    /// Of the disparity, with which the shape grows.
-    pub disparity_power: f64,
+    /// What the shape grows with.
+    times: Modulation,
     /// Of 1, x and y of the ray, a column of the shape each.
     pub affine: Vec<[f64; 3]>,
 }
@@ -24,7 +24,7 @@ impl Gauge {
     /// `None` for shapes that do not stand still in the picture, and for those that are nothing on
     /// the optical axis by their physics.
     pub fn of(basis: &Basis, pixels: &Pixels<'_>) -> Option<Self> {
-        let disparity_power = basis.still_power()?;
+        let times = Modulation::still(basis.still_power()?);
         let count = basis.count();
         let mut square = Matrix3::zeros();
         let mut cross = vec![Vector3::zeros(); count];
@@ -43,12 +43,12 @@ impl Gauge {
         }
         let solver = square.lu();
         let affine = cross.iter().map(|c| Some(solver.solve(c)?.into())).collect::<Option<_>>()?;
-        Some(Gauge { disparity_power, affine })
+        Some(Gauge { times, affine })
     }
 
     /// Take the affine part out of the shape's columns.
     pub fn take_out(&self, p: &PixelContext, columns: &mut [f64]) {
-        let far = disparity_scale(self.disparity_power, p);
+        let far = self.times.value(p);
         for (g, [a, b, c]) in columns.iter_mut().zip(&self.affine) {
             *g -= far * (a + b * p.x + c * p.y);
         }
@@ -60,73 +60,15 @@ impl Gauge {
         for (beta, affine) in coefficients.iter().zip(&self.affine) {
             sum.iter_mut().zip(affine).for_each(|(s, a)| *s -= beta * a);
         }
-        (Basis::Affine { disparity_power: self.disparity_power }, sum)
+        (Basis::Affine { times: self.times }, sum)
     }
 }
-
-impl Basis {
-    /// The power of the disparity with which a shape grows that is otherwise the same in every
-    /// picture, whatever it shows.
-    pub fn still_power(&self) -> Option<f64> {
-        let by = |times: Modulation| match times {
-            Modulation::One => Some(0.0),
-            Modulation::DisparitySquared => Some(2.0),
-            Modulation::Lift | Modulation::Tilt => None,
-        };
-        match self {
-            Basis::Bowl { disparity_power, .. } | Basis::Affine { disparity_power } => {
-                Some(*disparity_power)
-            }
-            Basis::Map { times, .. } | Basis::Spline { times, .. } => by(*times),
-            Basis::Curve {
-                over: Coordinate::Column | Coordinate::Row | Coordinate::Radius,
-                times,
-                ..
-            } => by(*times),
-            _ => None,
-        }
-    }
-
-    /// A size that coefficient number `k` of a bias may well have, in its unit: the standard
-    /// deviation of what is believed before anything was measured.
-    pub fn usual(&self, k: usize) -> f64 {
-        match self {
-            // Herrera, Kannala and Heikkila 2012, fig. 6: up to 4 of a Kinect's steps of 1/8 px
-            // towards the corners.
-            Basis::Bowl { .. } => 0.5,
-            // A depth picture that was calibrated: what is left of k1 (Khoshelham and Elberink
-            // 2012, table 1: 0.003; Smisek, Jancosek and Pajdla 2011: 0.01 to 0.05).
-            Basis::Lens { .. } => 0.02,
-            // All of it or nothing.
-            Basis::RangeNotDepth => 1.0,
-            // A board bends by about 1 mm at 1 m, and by 1.5 mm half a metre from its middle where
-            // it is a bad one.
-            Basis::Bow { .. } => {
-                let degree = if k < 3 {
-                    2
-                } else if k < 7 {
-                    3
-                } else {
-                    4
-                };
-                BOW_M / 0.5f64.powi(degree)
-            }
-            // Shimizu and Okutomi 2001: 0.06 px; without a remedy twice that.
-            Basis::Locking { .. } => 0.1,
-            _ => NAMELESS_PX,
-        }
-    }
-}
-
-/// Of a board, half a metre from its middle, m.
-const BOW_M: f64 = 0.0015;
-/// Errors of a matcher beyond a pixel are gross ones.
-const NAMELESS_PX: f64 = 1.0;
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::simulate::kinect_v1;
+    use crate::terms::Coordinate;
 
     /// With its gauge a shape has no affine part, and another affine part is none.
     #[test]
@@ -137,9 +79,9 @@ mod tests {
         let [width, height] = [sensor.camera.width, sensor.camera.height].map(|n| n as f64);
         let times = Modulation::DisparitySquared;
         for basis in [
-            Basis::Bowl { disparity_power: 2.0, orders: 2 },
+            Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(2.0)),
             Basis::Spline { width, height, across: 5, down: 4, times },
-            Basis::Affine { disparity_power: 2.0 },
+            Basis::Affine { times },
         ] {
             let gauge = Gauge::of(&basis, &pixels).unwrap();
             let mut row = vec![0.0; basis.count()];

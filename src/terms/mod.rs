@@ -2,20 +2,28 @@
 //! `diagnose` and applied by `simulate`, `correct` and `map`.
 
 mod basis;
+mod coordinate;
 mod edges;
+mod extent;
 mod fault;
 mod gauge;
+mod modulation;
 mod needs;
 mod nodes;
 mod pixels;
 mod place;
+mod properties;
+mod series;
 mod value;
+mod written;
 
-pub use basis::{Basis, Coordinate, Modulation, TABLE};
+pub use basis::{Basis, TABLE};
+pub use coordinate::{Coordinate, ROOM_LUX};
 pub use edges::edge_distances;
+pub use extent::Extent;
 pub use gauge::Gauge;
+pub use modulation::{DISPARITY_UNIT_PX, Modulation};
 pub use needs::Needs;
-pub use nodes::DISPARITY_UNIT_PX;
 pub use pixels::Pixels;
 pub use place::{Axis, PixelContext, corner_radius};
 
@@ -35,18 +43,34 @@ pub enum Statistic {
 
 /// A term with its size: added to the disparity, px, or to the logarithm of its variance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(from = "written::Written", into = "written::Written")]
 pub struct Term {
     pub statistic: Statistic,
     pub basis: Basis,
     pub coefficients: Vec<f64>,
 }
 
-impl Term {
-    /// Is it the sensor's, so that it can be taken out of any picture? A board's shape is not.
-    pub fn belongs_to_sensor(&self) -> bool {
-        match self.basis {
-            Basis::Bow { .. } => false,
-            _ => !matches!(self.basis.axis(), Axis::TargetPosition | Axis::EdgeDistance),
+impl Statistic {
+    /// As files write it.
+    pub fn id(self) -> &'static str {
+        match self {
+            Statistic::Bias => "bias",
+            Statistic::Variance => "variance",
+            Statistic::Distribution => "distribution",
+            Statistic::Correlation => "correlation",
+            Statistic::Dropout => "missing",
         }
+    }
+}
+
+impl Term {
+    /// Of the disparity, px.
+    pub fn bias(basis: Basis, coefficients: Vec<f64>) -> Self {
+        Term { statistic: Statistic::Bias, basis, coefficients }
+    }
+
+    /// Of the logarithm of its variance.
+    pub fn variance(basis: Basis, coefficients: Vec<f64>) -> Self {
+        Term { statistic: Statistic::Variance, basis, coefficients }
     }
 }

@@ -1,9 +1,4 @@
-//! Values between nodes: straight, bilinear and cubic; and powers of the disparity.
-
-use super::place::PixelContext;
-
-/// Disparity at which a term that grows with a power of it is in px: a Kinect at 1.1 m.
-pub const DISPARITY_UNIT_PX: f64 = 40.0;
+//! Values between nodes: straight, bilinear and cubic.
 
 /// Number of the node below a value, and the way to the next.
 pub(super) fn node(value: f64, low: f64, high: f64, nodes: usize) -> (usize, f64) {
@@ -38,15 +33,6 @@ pub(super) fn cubic(at: f64, last: f64, nodes: usize) -> (usize, [f64; 4]) {
     let s = 1.0 - t;
     let inner = |a: f64| (3.0 * a * a * a - 6.0 * a * a + 4.0) / 6.0;
     (k, [s * s * s / 6.0, inner(t), inner(s), t * t * t / 6.0])
-}
-
-/// A power of the disparity in units of 40 px.
-pub(super) fn disparity_scale(disparity_power: f64, p: &PixelContext) -> f64 {
-    match disparity_power {
-        0.0 => 1.0,
-        2.0 => (p.disparity / DISPARITY_UNIT_PX).powi(2),
-        power => (p.disparity / DISPARITY_UNIT_PX).powf(power),
-    }
 }
 
 #[cfg(test)]

@@ -77,7 +77,7 @@ mod tests {
                 high: [60.0, 479.0],
                 nodes: [3, 6],
             },
-            Basis::Banding { period_px: 30.0, harmonics: 2 },
+            Basis::waves(Coordinate::Column, 30.0, 2),
         ];
         for basis in bases {
             let coefficients: Vec<f64> =

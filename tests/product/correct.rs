@@ -116,10 +116,17 @@ fn a_shape_is_its_closed_form_at_chosen_pixels() {
     let plane = Plane::tilted(1.2, 0.6, 0.4);
     let camera = sensor().camera;
     let shape = vec![
-        bias(Basis::Bowl { disparity_power: 2.0, orders: 2 }, &[0.8, -0.3]),
+        bias(Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(2.0)), &[0.8, -0.3]),
         // In fifths of a px.
-        bias(Basis::Banding { period_px: 40.0, harmonics: 1 }, &[1.0, -0.5]),
-        bias(Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 1 }, &[-0.05]),
+        bias(Basis::waves(Coordinate::Column, 40.0, 1), &[1.0, -0.5]),
+        bias(
+            Basis::powers(
+                Coordinate::RaySquared,
+                1,
+                Modulation::RadialSlope { fx: camera.fx, fy: camera.fy },
+            ),
+            &[-0.05],
+        ),
         bias(
             Basis::Curve {
                 over: Coordinate::LogZ,
@@ -160,8 +167,8 @@ fn a_boards_shape_stays_on_the_board() {
     let mut bench = Bench::bare(plane, common::BOARD);
     bench.wall_m = Some(2.0);
     let shape = vec![
-        bias(Basis::Bow { degree: 2 }, &[0.05, 0.0, 0.0]),
-        bias(Basis::EdgeMixing { width_px: 3.0 }, &[-0.5]),
+        bias(Basis::relief(2), &[0.05, 0.0, 0.0]),
+        bias(Basis::Decay { over: Coordinate::Edge, width: 3.0 }, &[-0.5]),
     ];
     let shot = &shots_of(&bench, &[shaped("target-bow", shape)], SILENT_M, &[0.0])[0];
     let depth = depths(shot);
@@ -214,7 +221,7 @@ fn a_variance_shape_scales_the_noise() {
 #[test]
 fn a_bowl_by_shape_is_the_bowl_by_formula() {
     let plane = Plane::tilted(1.5, 0.5, 1.0);
-    let bowl = bias(Basis::Bowl { disparity_power: 0.0, orders: 1 }, &[0.7]);
+    let bowl = bias(Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(0.0)), &[0.7]);
     let by_shape = shots(plane, &[shaped("radial-disparity-bias", vec![bowl])], 0.002, &[0.0]);
     let by_formula =
         shots(plane, &[named("radial-disparity-bias", json!({"k_px": 0.7}))], 0.002, &[0.0]);
@@ -275,16 +282,23 @@ fn what_a_shape_does_its_correction_undoes() {
     let ring =
         Basis::Ring { over: Coordinate::Azimuth, period: 6.3, nodes: 4, times: Modulation::Tilt };
     let kinds = [
-        bias(Basis::Bowl { disparity_power: 1.0, orders: 2 }, &[2.0, -0.6]),
-        bias(Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 2 }, &[-0.1, 0.05]),
-        bias(Basis::RangeNotDepth, &[1.0]),
+        bias(Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(1.0)), &[2.0, -0.6]),
+        bias(
+            Basis::powers(
+                Coordinate::RaySquared,
+                2,
+                Modulation::RadialSlope { fx: camera.fx, fy: camera.fy },
+            ),
+            &[-0.1, 0.05],
+        ),
+        bias(Basis::powers(Coordinate::Foreshortening, 1, Modulation::Disparity), &[1.0]),
         bias(curve(Coordinate::Z, [0.5, 4.0], Modulation::DisparitySquared), &[1.0, 2.0, -1.0]),
         bias(curve(Coordinate::Theta, [0.0, 1.5], Modulation::One), &[0.0, 0.6, 0.9]),
         bias(curve(Coordinate::Session, [0.0, 100.0], Modulation::Lift), &[0.0, 0.01, 0.02]),
         bias(map, &[0.1, -0.4, 0.6, 0.3, 0.2, -0.5]),
         bias(pair, &[0.5, -0.3, 0.8, 0.4]),
         bias(ring, &[0.4, -0.4, 0.8, 0.2]),
-        bias(Basis::Locking { period_px: 3.0, harmonics: 2 }, &[0.1, 0.05, 0.0, 0.02]),
+        bias(Basis::waves(Coordinate::Disparity, 3.0, 2), &[0.1, 0.05, 0.0, 0.02]),
     ];
     let quiet = rms(&residuals(&depths(&shots(plane, &[], 0.001, &[0.0])[0]), &plane));
     for kind in kinds {
@@ -313,8 +327,11 @@ fn what_is_not_the_sensors_bias_stays_in_and_is_told() {
         nodes: [2, 2],
     };
     let effects = vec![
-        shaped("target-bow", vec![bias(Basis::Bow { degree: 2 }, &[0.01, 0.0, 0.0])]),
-        shaped("edge-mixing", vec![bias(Basis::EdgeMixing { width_px: 2.0 }, &[1.0])]),
+        shaped("target-bow", vec![bias(Basis::relief(2), &[0.01, 0.0, 0.0])]),
+        shaped(
+            "edge-mixing",
+            vec![bias(Basis::Decay { over: Coordinate::Edge, width: 2.0 }, &[1.0])],
+        ),
         shaped("vignetting", vec![term(Statistic::Variance, Basis::Level, &[1.0])]),
         shaped(UNEXPLAINED, vec![bias(across, &[1.0; 4])]),
         named("target-motion", json!({"velocity_mps": 0.01})),
@@ -420,7 +437,7 @@ fn small(effects: Vec<Effect>) -> NoiseModel {
 }
 
 fn bowl(k_px: f64) -> Effect {
-    let bowl = bias(Basis::Bowl { disparity_power: 0.0, orders: 1 }, &[k_px]);
+    let bowl = bias(Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(0.0)), &[k_px]);
     shaped("radial-disparity-bias", vec![bowl])
 }
 
@@ -516,7 +533,14 @@ fn the_bytes_do_not_depend_on_the_number_of_threads() {
     let files = Files::new();
     let recording = files.recording(METRIC, Vec::new());
     let camera = kinect_v1(4).camera;
-    let lens = bias(Basis::Lens { fx: camera.fx, fy: camera.fy, orders: 1 }, &[-0.1]);
+    let lens = bias(
+        Basis::powers(
+            Coordinate::RaySquared,
+            1,
+            Modulation::RadialSlope { fx: camera.fx, fy: camera.fy },
+        ),
+        &[-0.1],
+    );
     files.model(&small(vec![bowl(0.5), shaped("lens-distortion", vec![lens])]));
     let (one, _) = files.correct(&recording, &["--threads", "1"]);
     fs::rename(files.at("out"), files.at("one")).expect("moved");
@@ -610,7 +634,8 @@ fn depths_beyond_the_code_stand_at_its_end() {
 fn a_shape_is_held_where_its_learning_ended_and_that_is_told() {
     let files = Files::new();
     let recording = files.recording(METRIC, Vec::new());
-    let growing = bias(Basis::Bowl { disparity_power: 2.0, orders: 1 }, &[30.0]);
+    let growing =
+        bias(Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(2.0)), &[30.0]);
     let learnt = Effect { learnt_px: Some([3.0, 4.0]), ..shaped(UNEXPLAINED, vec![growing]) };
     files.model(&small(vec![learnt]));
     let (_, said) = files.correct(&recording, &[]);

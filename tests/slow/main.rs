@@ -1,5 +1,6 @@
 //! Tests of minutes, started by `./run test --slow`: the diagnosis on ray-traced sets, which share no
-//! formula with it, and on odd ones; what each of its parts is for; coverage over hundreds of recordings.
+//! formula with it, and on odd ones; what each of its parts is for; coverage over hundreds of recordings;
+//! a new effect in a build of its own.
 //!
 //! A single test that takes long stays with its siblings as `#[ignore = "slow: ..."]`; `./run test --slow`
 //! runs those too.
@@ -19,4 +20,6 @@ mod diagnose_honesty;
 mod diagnose_odd;
 #[cfg(target_os = "linux")] // peak memory is read from /proc
 mod memory;
+#[cfg(unix)] // links folders
+mod new_effect;
 mod recovery;

@@ -1,8 +1,7 @@
-//! How far the recording reaches on every axis.
+//! How far a recording reaches on every axis.
 
-use super::tiles::Tile;
+use super::place::PixelContext;
 use crate::stats::range;
-use crate::terms::PixelContext;
 
 /// Least and greatest of each axis.
 #[derive(Debug, Clone, Copy)]
@@ -21,8 +20,8 @@ pub struct Extent {
 }
 
 impl Extent {
-    pub fn of<'a>(tiles: impl Iterator<Item = &'a Tile> + Clone) -> Self {
-        let of = |value: fn(&PixelContext) -> f64| range(tiles.clone().map(|t| value(&t.place)));
+    pub fn of<'a>(places: impl Iterator<Item = &'a PixelContext> + Clone) -> Self {
+        let of = |value: fn(&PixelContext) -> f64| range(places.clone().map(value));
         Extent {
             disparity: of(|p| p.disparity),
             z: of(|p| p.z),
@@ -35,5 +34,10 @@ impl Extent {
             ambient: of(|p| p.ambient),
             edge: of(|p| p.edge)[1],
         }
+    }
+
+    /// Does the light differ by enough to see what goes with it?
+    pub fn is_unevenly_lit(&self) -> bool {
+        self.light[1] > 1.05 * self.light[0]
     }
 }

@@ -1,0 +1,79 @@
+//! From the coefficients of a fitted shape to the parameters that people know an effect by.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::terms::{Basis, Extent, PixelContext};
+
+/// A parameter with its standard error; NaN where that is not known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    pub parameter: &'static str,
+    pub value: f64,
+    pub std_error: f64,
+}
+
+impl Estimate {
+    /// What settles the shape, and was tried in steps.
+    pub fn given(parameter: &'static str, value: f64, std_error: f64) -> Self {
+        Estimate { parameter, value, std_error }
+    }
+}
+
+/// A shape with its coefficients, as a fit found them.
+#[derive(Debug, Clone, Copy)]
+pub struct Fitted<'a> {
+    pub shape: &'a Basis,
+    pub coefficients: &'a [f64],
+    pub covariance: &'a DMatrix<f64>,
+    /// Of the recording.
+    pub reach: &'a Extent,
+}
+
+impl Fitted<'_> {
+    /// A parameter as a function of the coefficients; its error by the delta method.
+    pub fn estimate(&self, parameter: &'static str, of: &dyn Fn(&[f64]) -> f64) -> Estimate {
+        Estimate { parameter, value: of(self.coefficients), std_error: self.delta(of) }
+    }
+
+    /// Of the shape at a place, with these coefficients.
+    pub fn value(&self, coefficients: &[f64], place: PixelContext) -> f64 {
+        self.shape.value(coefficients, &place, &mut Vec::new())
+    }
+
+    fn delta(&self, of: &dyn Fn(&[f64]) -> f64) -> f64 {
+        let (beta, covariance) = (self.coefficients, self.covariance);
+        if covariance.nrows() != beta.len() {
+            return f64::NAN;
+        }
+        let gradient: Vec<f64> = (0..beta.len())
+            .map(|j| {
+                let step = (1e-3 * covariance[(j, j)].max(0.0).sqrt()).max(1e-12);
+                let mut moved = beta.to_vec();
+                moved[j] += step;
+                let up = of(&moved);
+                moved[j] -= 2.0 * step;
+                (up - of(&moved)) / (2.0 * step)
+            })
+            .collect();
+        let g = DVector::from_vec(gradient);
+        g.dot(&(covariance * &g)).max(0.0).sqrt()
+    }
+}
+
+/// The k of k r^2 + constant that comes nearest to a curve over 0 to `far`.
+pub fn slope_in_square(curve: impl Fn(f64) -> f64, far: f64) -> f64 {
+    const NODES: usize = 41;
+    let nodes = || (0..NODES).map(|n| far * n as f64 / (NODES - 1) as f64);
+    // The area of a ring grows with its radius.
+    let weight: f64 = nodes().sum();
+    let mean = |of: &dyn Fn(f64) -> f64| nodes().map(|r| r * of(r)).sum::<f64>() / weight;
+    let (square, level) = (mean(&|r| r * r), mean(&curve));
+    let cross = mean(&|r| (r * r - square) * (curve(r) - level));
+    cross / mean(&|r| (r * r - square).powi(2))
+}
+
+/// Half of the way from the least to the greatest over a period.
+pub fn greatest(curve: impl Fn(f64) -> f64) -> f64 {
+    let [low, high] = crate::stats::range((0..64).map(|k| curve(f64::from(k) / 64.0)));
+    0.5 * (high - low)
+}

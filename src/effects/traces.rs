@@ -1,0 +1,42 @@
+//! What an effect and those who look for it, or take it out again, say to each other.
+
+use crate::camera::Camera;
+use crate::terms::{Basis, Extent, Term};
+
+/// What a recording can show.
+#[derive(Debug, Clone, Copy)]
+pub struct Bounds<'a> {
+    pub camera: &'a Camera,
+    pub reach: &'a Extent,
+    /// Side of the smallest patch that is looked at, px.
+    pub patch_px: f64,
+}
+
+/// Parameters by name, as far as they are known.
+pub type Known<'a> = &'a dyn Fn(&str) -> Option<f64>;
+
+/// What undoes an effect in a depth image.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Inverse {
+    /// Taken off the disparity.
+    Term(Term),
+    /// Stored depth over true depth.
+    Scale(f64),
+    /// Stored depth over true depth rises by `relative` in the course of a session.
+    Drift { relative: f64, time_constant_s: f64 },
+    /// Depth holds this share of what the ray is longer than the depth.
+    AlongRay { share: f64 },
+    /// Disparity is drawn to whole pixels by a sine of this height.
+    Locking { amplitude_px: f64 },
+}
+
+/// How the smallest effect that a recording could have shown is told.
+#[derive(Debug, Clone)]
+pub struct Smallest {
+    pub parameter: &'static str,
+    pub shape: Basis,
+    /// The direction in which the shape's coefficients grow with the effect.
+    pub unit: Vec<f64>,
+    /// The parameter, of so many units.
+    pub of: fn(f64) -> f64,
+}

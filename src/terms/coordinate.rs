@@ -1,0 +1,143 @@
+//! What a shape runs over: a number of the place that is measured.
+
+use serde::{Deserialize, Serialize};
+
+use super::needs::Needs;
+use super::place::{Axis, PixelContext};
+
+/// A number of a place.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Coordinate {
+    Column,
+    Row,
+    Radius,
+    RadiusSquared,
+    /// Of the ray, off the optical axis.
+    RaySquared,
+    /// Depth over the length of the ray, less one.
+    Foreshortening,
+    Z,
+    LogZ,
+    /// Logarithm of the depth over this one, m.
+    LogRatio(f64),
+    Disparity,
+    Right,
+    Down,
+    Edge,
+    Theta,
+    Azimuth,
+    /// Along the direction in which depth grows, from the optical axis, in rays' units.
+    Along,
+    /// From one where the tilt is along the baseline to minus one across it.
+    Alignment,
+    /// Variance that a blur of the place by so many px brings through the slope, over the model's.
+    Blur(f64),
+    Session,
+    Temperature,
+    Light,
+    LogLight,
+    /// Light of the room over the pattern's, where it is this in an office at 1 m.
+    Ambient(f64),
+}
+
+/// Light on the desk of an office (EN 12464-1), lx: what a room's share of the light is counted at.
+pub const ROOM_LUX: f64 = 500.0;
+/// No surface is darker, of the recording's median.
+const DARKEST: f64 = 1e-2;
+
+impl Coordinate {
+    pub fn value(self, p: &PixelContext) -> f64 {
+        match self {
+            Coordinate::Column => p.u,
+            Coordinate::Row => p.v,
+            Coordinate::Radius => p.radius,
+            Coordinate::RadiusSquared => p.radius * p.radius,
+            Coordinate::RaySquared => p.x * p.x + p.y * p.y,
+            Coordinate::Foreshortening => 1.0 / (1.0 + p.x * p.x + p.y * p.y).sqrt() - 1.0,
+            Coordinate::Z => p.z,
+            Coordinate::LogZ => p.z.ln(),
+            Coordinate::LogRatio(pivot_m) => (p.z / pivot_m).ln(),
+            Coordinate::Disparity => p.disparity,
+            Coordinate::Right => p.right,
+            Coordinate::Down => p.down,
+            Coordinate::Edge => p.edge,
+            Coordinate::Theta => p.theta,
+            Coordinate::Azimuth => p.azimuth,
+            Coordinate::Along => p.x * p.azimuth.cos() + p.y * p.azimuth.sin(),
+            Coordinate::Alignment => (2.0 * p.azimuth).cos(),
+            Coordinate::Blur(lateral_px) => {
+                let slope2 = p.slope[0].powi(2) + p.slope[1].powi(2);
+                lateral_px * lateral_px * slope2 / p.variance
+            }
+            Coordinate::Session => p.session_s,
+            Coordinate::Temperature => p.temperature_c,
+            Coordinate::Light => p.light,
+            Coordinate::LogLight => p.light.max(DARKEST).ln(),
+            Coordinate::Ambient(ratio) => {
+                let far = p.z * p.z * (1.0 + p.x * p.x + p.y * p.y) / p.theta.cos().max(0.05);
+                ratio * p.ambient / ROOM_LUX * far
+            }
+        }
+    }
+
+    pub fn axis(self) -> Axis {
+        match self {
+            Coordinate::Column => Axis::Column,
+            Coordinate::Row => Axis::Row,
+            Coordinate::Radius | Coordinate::RadiusSquared => Axis::Radius,
+            Coordinate::RaySquared | Coordinate::Foreshortening => Axis::Radius,
+            Coordinate::Z | Coordinate::LogZ | Coordinate::LogRatio(_) => Axis::Z,
+            Coordinate::Disparity => Axis::Z,
+            Coordinate::Right | Coordinate::Down => Axis::TargetPosition,
+            Coordinate::Edge => Axis::EdgeDistance,
+            Coordinate::Theta | Coordinate::Blur(_) => Axis::Theta,
+            Coordinate::Azimuth | Coordinate::Along | Coordinate::Alignment => Axis::Azimuth,
+            Coordinate::Session => Axis::SessionTime,
+            Coordinate::Temperature => Axis::Temperature,
+            Coordinate::Light | Coordinate::LogLight | Coordinate::Ambient(_) => Axis::Intensity,
+        }
+    }
+
+    pub(super) fn needs(self) -> Needs {
+        match self {
+            Coordinate::Column | Coordinate::Row => Needs::PIXEL,
+            Coordinate::Radius | Coordinate::RadiusSquared => Needs::PIXEL,
+            Coordinate::RaySquared | Coordinate::Foreshortening => Needs::PIXEL,
+            Coordinate::Z | Coordinate::LogZ | Coordinate::LogRatio(_) => Needs::DEPTH,
+            Coordinate::Disparity => Needs::DEPTH,
+            Coordinate::Theta | Coordinate::Azimuth | Coordinate::Along => Needs::SURFACE,
+            Coordinate::Alignment | Coordinate::Blur(_) => Needs::SURFACE,
+            Coordinate::Ambient(_) => Needs::SURFACE,
+            Coordinate::Right | Coordinate::Down | Coordinate::Edge => Needs::BOARD,
+            Coordinate::Session => Needs { session: true, ..Needs::PIXEL },
+            Coordinate::Temperature => Needs { temperature: true, ..Needs::PIXEL },
+            Coordinate::Light | Coordinate::LogLight => Needs { light: true, ..Needs::PIXEL },
+        }
+    }
+
+    /// Does a shape over it stand still in the picture? What follows the ray is geometry, and the
+    /// same for every camera.
+    pub(super) fn is_of_picture(self) -> bool {
+        matches!(
+            self,
+            Coordinate::Column | Coordinate::Row | Coordinate::Radius | Coordinate::RadiusSquared
+        )
+    }
+
+    /// Is it depth or tilt, as sigma is a function of?
+    pub(super) fn is_of_sigma(self) -> bool {
+        matches!(self, Coordinate::Theta)
+            || matches!(self.alone(), Some(Coordinate::Disparity))
+            || matches!(self, Coordinate::LogRatio(_))
+    }
+
+    /// The coordinate that groups of samples of one value are made by.
+    pub(super) fn alone(self) -> Option<Coordinate> {
+        match self {
+            Coordinate::Column | Coordinate::Row | Coordinate::Edge => Some(self),
+            Coordinate::Disparity | Coordinate::Z | Coordinate::LogZ => Some(Coordinate::Disparity),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! What follows for a shape from its coordinates and its modulation.
+
+use super::basis::Basis;
+use super::coordinate::Coordinate;
+use super::modulation::Modulation;
+use super::needs::Needs;
+use super::place::Axis;
+use super::{Statistic, Term};
+
+impl Basis {
+    /// What it runs over, the first before the second.
+    pub(super) fn over(&self) -> [Option<Coordinate>; 2] {
+        match self {
+            Basis::Level => [None, None],
+            Basis::Powers { over, .. }
+            | Basis::Waves { over, .. }
+            | Basis::Decay { over, .. }
+            | Basis::Log1p { over }
+            | Basis::Curve { over, .. }
+            | Basis::Ring { over, .. } => [Some(*over), None],
+            Basis::Polynomial { over, .. } | Basis::Pair { over, .. } => over.map(Some),
+            Basis::Table { .. } => [Some(Coordinate::Z), Some(Coordinate::Theta)],
+            Basis::Map { .. } | Basis::Spline { .. } | Basis::Affine { .. } => {
+                [Some(Coordinate::Column), Some(Coordinate::Row)]
+            }
+        }
+    }
+
+    pub(super) fn times(&self) -> Modulation {
+        match self {
+            Basis::Powers { times, .. }
+            | Basis::Polynomial { times, .. }
+            | Basis::Waves { times, .. }
+            | Basis::Curve { times, .. }
+            | Basis::Ring { times, .. }
+            | Basis::Map { times, .. }
+            | Basis::Spline { times, .. }
+            | Basis::Affine { times } => *times,
+            _ => Modulation::One,
+        }
+    }
+
+    fn is_all(&self, what: fn(Coordinate) -> bool) -> bool {
+        self.over().into_iter().flatten().all(what)
+    }
+
+    /// The axis that it runs along.
+    pub fn axis(&self) -> Axis {
+        match (self.over(), self.period()) {
+            ([Some(Coordinate::Disparity), None], Some(_)) => Axis::DisparityPhase,
+            ([Some(Coordinate::Column), Some(Coordinate::Row)], _) => Axis::Pixel,
+            ([Some(first), _], _) => first.axis(),
+            ([None, _], _) => Axis::Z,
+        }
+    }
+
+    /// After which it comes again.
+    pub fn period(&self) -> Option<f64> {
+        match self {
+            Basis::Waves { period, .. } | Basis::Ring { period, .. } => Some(*period),
+            _ => None,
+        }
+    }
+
+    /// Does it depend on one coordinate of a view alone, and change too fast along it for patches?
+    pub fn alone(&self) -> Option<Coordinate> {
+        let smooth = matches!(self, Basis::Powers { .. } | Basis::Log1p { .. });
+        match self.over() {
+            [Some(over), None] if self.times() == Modulation::One && !smooth => over.alone(),
+            _ => None,
+        }
+    }
+
+    /// Does it depend on the column of the picture alone?
+    pub fn of_column_alone(&self) -> bool {
+        self.alone() == Some(Coordinate::Column)
+    }
+
+    /// Does it stand still in the picture, but for its size?
+    pub fn is_of_picture(&self) -> bool {
+        *self != Basis::Level && self.is_all(Coordinate::is_of_picture)
+    }
+
+    /// The power of the disparity with which a shape grows that is otherwise the same in every
+    /// picture, whatever it shows. What comes again and again has next to no affine part.
+    pub fn still_power(&self) -> Option<f64> {
+        let still = self.is_of_picture() && self.period().is_none();
+        self.times().power_of_disparity().filter(|_| still)
+    }
+
+    /// Is it nothing on the optical axis, by its physics?
+    pub fn is_nothing_ahead(&self) -> bool {
+        matches!(
+            self,
+            Basis::Powers { over: Coordinate::RaySquared | Coordinate::Foreshortening, .. }
+        )
+    }
+
+    /// Does it say no more than a sigma over depth and tilt can?
+    pub fn is_of_sigma(&self) -> bool {
+        let plain = self.times() == Modulation::One && self.period().is_none();
+        plain && self.is_all(Coordinate::is_of_sigma)
+    }
+
+    /// Is it a shape of the target's surface over the target's own coordinates?
+    pub(super) fn is_lift_of_target(&self) -> bool {
+        let Basis::Curve { over, times, .. } = self else { return false };
+        *times == Modulation::Lift && over.axis() == Axis::TargetPosition
+    }
+
+    /// Does it change within a few pixels?
+    pub fn is_fine(&self) -> bool {
+        let over = self.over()[0];
+        over == Some(Coordinate::Edge)
+            || self.period().is_some() && !over.is_some_and(Coordinate::is_of_picture)
+    }
+}
+
+impl Term {
+    pub fn needs(&self) -> Needs {
+        let over = self.basis.over().into_iter().flatten();
+        over.fold(self.basis.times().needs(), |needs, over| needs.and(over.needs()))
+    }
+
+    /// Is it the sensor's, so that it can be taken out of any picture? A board's shape is not.
+    pub fn belongs_to_sensor(&self) -> bool {
+        !matches!(self.basis.axis(), Axis::TargetPosition | Axis::EdgeDistance)
+    }
+
+    /// Is it a bias that can be taken out of a picture of anything?
+    pub fn is_sensor_bias(&self) -> bool {
+        // A curve over two axes belongs to the board when either is the board's.
+        self.statistic == Statistic::Bias && self.belongs_to_sensor() && !self.needs().board
+    }
+}

@@ -1,0 +1,251 @@
+//! Terms as files write them. The kinds that older files know keep their names and numbers; a
+//! shape that none of them holds is written as it is.
+
+use serde::{Deserialize, Serialize};
+
+use super::basis::Basis;
+use super::coordinate::Coordinate;
+use super::modulation::Modulation;
+use super::{Statistic, Term};
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Written {
+    statistic: Statistic,
+    basis: Kind,
+    coefficients: Vec<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+enum Kind {
+    Bowl { disparity_power: f64, orders: usize },
+    Lens { fx: f64, fy: f64, orders: usize },
+    RangeNotDepth,
+    Bow { degree: usize },
+    Locking { period_px: f64, harmonics: usize },
+    Banding { period_px: f64, harmonics: usize },
+    EdgeMixing { width_px: f64 },
+    RangeExponent { pivot_m: f64, orders: usize },
+    Vignetting { orders: usize },
+    SlopeNoise { lateral_px: f64 },
+    TiltAxis { tilt_power: i32 },
+    Intensity { orders: usize },
+    Ambient { ratio: f64 },
+    Level,
+    Recalibrate { z_m: [f64; 2], theta_rad: [f64; 2], columns: Vec<Vec<f64>> },
+    Curve { over: Coordinate, low: f64, high: f64, nodes: usize, times: Modulation },
+    Ring { over: Coordinate, period: f64, nodes: usize, times: Modulation },
+    Map { width: f64, height: f64, across: usize, down: usize, times: Modulation },
+    Spline { width: f64, height: f64, across: usize, down: usize, times: Modulation },
+    Affine { disparity_power: f64 },
+    Pair { over: [Coordinate; 2], low: [f64; 2], high: [f64; 2], nodes: [usize; 2] },
+    // Whatever the kinds above do not hold.
+    Powers { over: Coordinate, orders: usize, level: bool, times: Modulation },
+    Polynomial { over: [Coordinate; 2], degree: usize, times: Modulation },
+    Waves { over: Coordinate, period: f64, harmonics: usize, times: Modulation },
+    Decay { over: Coordinate, width: f64 },
+    Log1p { over: Coordinate },
+    Absorbed { times: Modulation },
+}
+
+impl From<Term> for Written {
+    fn from(Term { statistic, basis, coefficients }: Term) -> Self {
+        Written { statistic, basis: Kind::of(basis, statistic), coefficients }
+    }
+}
+
+impl From<Written> for Term {
+    fn from(Written { statistic, basis, coefficients }: Written) -> Self {
+        Term { statistic, basis: basis.into(), coefficients }
+    }
+}
+
+impl Kind {
+    /// A bowl of the variance that does not change with the disparity is a vignetting.
+    fn of(basis: Basis, statistic: Statistic) -> Self {
+        use Coordinate as C;
+        use Modulation as M;
+        match basis {
+            Basis::Level => Kind::Level,
+            Basis::Powers { over, orders, level, times } => match (over, times, level) {
+                (C::RadiusSquared, M::One, false) if statistic == Statistic::Variance => {
+                    Kind::Vignetting { orders }
+                }
+                (C::RadiusSquared, M::One, false) => Kind::Bowl { disparity_power: 0.0, orders },
+                (C::RadiusSquared, M::DisparityPower(disparity_power), false) => {
+                    Kind::Bowl { disparity_power, orders }
+                }
+                (C::RaySquared, M::RadialSlope { fx, fy }, false) => Kind::Lens { fx, fy, orders },
+                (C::Foreshortening, M::Disparity, false) if orders == 1 => Kind::RangeNotDepth,
+                (C::LogRatio(pivot_m), M::One, false) => Kind::RangeExponent { pivot_m, orders },
+                (C::Alignment, M::TiltPower(tilt_power), false) if orders == 1 => {
+                    Kind::TiltAxis { tilt_power }
+                }
+                (C::LogLight, M::One, false) if orders == 1 => Kind::Intensity { orders: 1 },
+                (C::LogLight, M::One, true) => Kind::Intensity { orders: orders + 1 },
+                _ => Kind::Powers { over, orders, level, times },
+            },
+            Basis::Polynomial { over: [C::Right, C::Down], degree, times: M::Lift } => {
+                Kind::Bow { degree }
+            }
+            Basis::Polynomial { over, degree, times } => Kind::Polynomial { over, degree, times },
+            Basis::Waves { over, period, harmonics, times } => match (over, times) {
+                (C::Disparity, M::One) => Kind::Locking { period_px: period, harmonics },
+                (C::Column, M::One) => Kind::Banding { period_px: period, harmonics },
+                _ => Kind::Waves { over, period, harmonics, times },
+            },
+            Basis::Decay { over: C::Edge, width } => Kind::EdgeMixing { width_px: width },
+            Basis::Decay { over, width } => Kind::Decay { over, width },
+            Basis::Log1p { over: C::Blur(lateral_px) } => Kind::SlopeNoise { lateral_px },
+            Basis::Log1p { over: C::Ambient(ratio) } => Kind::Ambient { ratio },
+            Basis::Log1p { over } => Kind::Log1p { over },
+            Basis::Table { z_m, theta_rad, columns } => {
+                Kind::Recalibrate { z_m, theta_rad, columns }
+            }
+            Basis::Curve { over, low, high, nodes, times } => {
+                Kind::Curve { over, low, high, nodes, times }
+            }
+            Basis::Ring { over, period, nodes, times } => Kind::Ring { over, period, nodes, times },
+            Basis::Map { width, height, across, down, times } => {
+                Kind::Map { width, height, across, down, times }
+            }
+            Basis::Spline { width, height, across, down, times } => {
+                Kind::Spline { width, height, across, down, times }
+            }
+            Basis::Affine { times } => match times.power_of_disparity() {
+                Some(disparity_power) => Kind::Affine { disparity_power },
+                None => Kind::Absorbed { times },
+            },
+            Basis::Pair { over, low, high, nodes } => Kind::Pair { over, low, high, nodes },
+        }
+    }
+}
+
+impl From<Kind> for Basis {
+    fn from(kind: Kind) -> Self {
+        use Coordinate as C;
+        use Modulation as M;
+        match kind {
+            Kind::Bowl { disparity_power, orders } => {
+                Basis::powers(C::RadiusSquared, orders, M::power(disparity_power))
+            }
+            Kind::Lens { fx, fy, orders } => {
+                Basis::powers(C::RaySquared, orders, M::RadialSlope { fx, fy })
+            }
+            Kind::RangeNotDepth => Basis::powers(C::Foreshortening, 1, M::Disparity),
+            Kind::Bow { degree } => Basis::relief(degree),
+            Kind::Locking { period_px, harmonics } => {
+                Basis::waves(C::Disparity, period_px, harmonics)
+            }
+            Kind::Banding { period_px, harmonics } => Basis::waves(C::Column, period_px, harmonics),
+            Kind::EdgeMixing { width_px } => Basis::Decay { over: C::Edge, width: width_px },
+            Kind::RangeExponent { pivot_m, orders } => {
+                Basis::powers(C::LogRatio(pivot_m), orders, M::One)
+            }
+            Kind::Vignetting { orders } => Basis::powers(C::RadiusSquared, orders, M::One),
+            Kind::SlopeNoise { lateral_px } => Basis::Log1p { over: C::Blur(lateral_px) },
+            Kind::TiltAxis { tilt_power } => {
+                Basis::powers(C::Alignment, 1, M::TiltPower(tilt_power))
+            }
+            // The second column is the level: what counts as light is arbitrary.
+            Kind::Intensity { orders } => {
+                let (level, times) = (orders > 1, M::One);
+                let orders = orders - usize::from(level);
+                Basis::Powers { over: C::LogLight, orders, level, times }
+            }
+            Kind::Ambient { ratio } => Basis::Log1p { over: C::Ambient(ratio) },
+            Kind::Level => Basis::Level,
+            Kind::Recalibrate { z_m, theta_rad, columns } => {
+                Basis::Table { z_m, theta_rad, columns }
+            }
+            Kind::Curve { over, low, high, nodes, times } => {
+                Basis::Curve { over, low, high, nodes, times }
+            }
+            Kind::Ring { over, period, nodes, times } => Basis::Ring { over, period, nodes, times },
+            Kind::Map { width, height, across, down, times } => {
+                Basis::Map { width, height, across, down, times }
+            }
+            Kind::Spline { width, height, across, down, times } => {
+                Basis::Spline { width, height, across, down, times }
+            }
+            Kind::Affine { disparity_power } => Basis::Affine { times: M::still(disparity_power) },
+            Kind::Pair { over, low, high, nodes } => Basis::Pair { over, low, high, nodes },
+            Kind::Powers { over, orders, level, times } => {
+                Basis::Powers { over, orders, level, times }
+            }
+            Kind::Polynomial { over, degree, times } => Basis::Polynomial { over, degree, times },
+            Kind::Waves { over, period, harmonics, times } => {
+                Basis::Waves { over, period, harmonics, times }
+            }
+            Kind::Decay { over, width } => Basis::Decay { over, width },
+            Kind::Log1p { over } => Basis::Log1p { over },
+            Kind::Absorbed { times } => Basis::Affine { times },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+
+    /// As files had them before shapes were made of coordinates.
+    fn known() -> Vec<Value> {
+        let table = vec![vec![0.5; 289]];
+        vec![
+            json!({"kind": "bowl", "disparity_power": 0.0, "orders": 2}),
+            json!({"kind": "bowl", "disparity_power": 2.0, "orders": 4}),
+            json!({"kind": "lens", "fx": 580.0, "fy": 581.0, "orders": 1}),
+            json!({"kind": "range-not-depth"}),
+            json!({"kind": "bow", "degree": 4}),
+            json!({"kind": "locking", "period_px": 1.0, "harmonics": 3}),
+            json!({"kind": "banding", "period_px": 80.0, "harmonics": 2}),
+            json!({"kind": "edge-mixing", "width_px": 2.0}),
+            json!({"kind": "range-exponent", "pivot_m": 2.0, "orders": 2}),
+            json!({"kind": "slope-noise", "lateral_px": 0.8}),
+            json!({"kind": "tilt-axis", "tilt_power": 2}),
+            json!({"kind": "intensity", "orders": 1}),
+            json!({"kind": "intensity", "orders": 3}),
+            json!({"kind": "ambient", "ratio": 0.05}),
+            json!({"kind": "level"}),
+            json!({"kind": "recalibrate", "z_m": [0.5, 4.0], "theta_rad": [0.0, 1.2], "columns": table}),
+            json!({"kind": "curve", "over": "log-z", "low": 0.0, "high": 1.0, "nodes": 3, "times": "lift"}),
+            json!({"kind": "ring", "over": "azimuth", "period": 6.3, "nodes": 4, "times": "tilt"}),
+            json!({"kind": "map", "width": 640.0, "height": 480.0, "across": 3, "down": 2, "times": "one"}),
+            json!({"kind": "affine", "disparity_power": 2.0}),
+            json!({"kind": "affine", "disparity_power": 0.5}),
+        ]
+    }
+
+    fn again(statistic: &str, basis: &Value) -> Value {
+        let term = json!({"statistic": statistic, "basis": basis, "coefficients": [0.25]});
+        let read: Term = serde_json::from_value(term).expect("a term");
+        assert_eq!(read.basis.fault(), None, "{basis}");
+        serde_json::to_value(read).expect("JSON")["basis"].clone()
+    }
+
+    #[test]
+    fn what_older_files_hold_is_read_and_written_as_it_was() {
+        for basis in known() {
+            assert_eq!(again("bias", &basis), basis);
+        }
+        let vignetting = json!({"kind": "vignetting", "orders": 2});
+        assert_eq!(again("variance", &vignetting), vignetting);
+    }
+
+    /// What no older kind holds comes back too.
+    #[test]
+    fn other_shapes_are_written_as_they_are() {
+        for basis in [
+            Basis::waves(Coordinate::Row, 30.0, 2),
+            Basis::powers(Coordinate::RadiusSquared, 2, Modulation::DisparitySquared),
+            Basis::Decay { over: Coordinate::Radius, width: 0.1 },
+            Basis::Log1p { over: Coordinate::Light },
+        ] {
+            let term = Term::bias(basis, vec![0.5]);
+            let value = serde_json::to_value(&term).expect("JSON");
+            assert_eq!(serde_json::from_value::<Term>(value).expect("a term"), term);
+        }
+    }
+}
