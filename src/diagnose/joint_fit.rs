@@ -1,7 +1,7 @@
 //! Normal equations of terms and of a smooth map over the picture together, by parts of the views,
 //! and their penalised solution.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 use rayon::prelude::*;
 
 use super::evidence::{Evidence, score};
@@ -70,7 +70,7 @@ impl Columns {
         let mut row = vec![0.0; count];
         let mut of = |(y, place): (&f64, &PixelContext)| {
             self.fill(place, &mut row);
-            y - row.iter().zip(beta.iter()).map(|(g, b)| g * b).sum::<f64>()
+            y - DVectorView::from_slice(&row, count).dot(beta)
         };
         let response: Vec<f64> = view.response.iter().zip(&view.places).map(&mut of).collect();
         Some(rows(view, &response)?.score(count, |i, row| self.fill(&view.places[i], row)))
