@@ -52,12 +52,14 @@ impl Columns {
 
     /// Normal equations of a view, its plane profiled out.
     pub fn evidence(&self, view: &ViewData) -> Option<Evidence> {
+        let Basis::Spline { width, height, across, down, .. } = self.maps[0] else { return None };
         // Between the same nodes the same splines are not zero.
-        let side = NODE_PX as f64;
-        let across = self.maps[0].count();
+        let span = |at: f64, length: f64, nodes: usize| {
+            (at / (length - 1.0) * (nodes - 3) as f64) as usize
+        };
         let block = |i: usize| {
             let p = &view.places[i];
-            (p.v / side) as usize * across + (p.u / side) as usize
+            span(p.v, height, down) * across + span(p.u, width, across)
         };
         let rows = rows(view, &view.response)?;
         let fill = |i: usize, row: &mut [f64]| self.fill(&view.places[i], row);
