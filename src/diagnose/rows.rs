@@ -238,3 +238,7 @@ fn touched(rows: &[f64], count: usize) -> Vec<usize> {
     }
     (0..count).filter(|&j| any[j]).collect()
 }
+
+#[cfg(test)]
+#[path = "rows_tests.rs"]
+mod tests;
