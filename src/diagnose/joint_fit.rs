@@ -1,7 +1,7 @@
 //! Normal equations of terms and of a smooth map over the picture together, by parts of the views,
 //! and their penalised solution.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 use rayon::prelude::*;
 
 use super::candidate::Candidate;
@@ -60,12 +60,14 @@ impl Columns {
 
     /// Normal equations of a view, its plane profiled out.
     pub fn evidence(&self, view: &ViewData) -> Option<Evidence> {
+        let Basis::Spline { width, height, across, down, .. } = self.maps[0] else { return None };
         // Between the same nodes the same splines are not zero.
-        let side = NODE_PX as f64;
-        let across = self.maps[0].count();
+        let span = |at: f64, length: f64, nodes: usize| {
+            (at / (length - 1.0) * (nodes - 3) as f64) as usize
+        };
         let block = |i: usize| {
             let p = &view.places[i];
-            (p.v / side) as usize * across + (p.u / side) as usize
+            span(p.v, height, down) * across + span(p.u, width, across)
         };
         let rows = rows(view, &view.response)?;
         let fill = |i: usize, row: &mut [f64]| self.fill(&view.places[i], row);
@@ -78,7 +80,7 @@ impl Columns {
         let mut row = vec![0.0; count];
         let mut of = |(y, place): (&f64, &PixelContext)| {
             self.fill(place, &mut row);
-            y - row.iter().zip(beta.iter()).map(|(g, b)| g * b).sum::<f64>()
+            y - DVectorView::from_slice(&row, count).dot(beta)
         };
         let response: Vec<f64> = view.response.iter().zip(&view.places).map(&mut of).collect();
         Some(rows(view, &response)?.score(count, |i, row| self.fill(&view.places[i], row)))

@@ -145,10 +145,12 @@ impl<'a> Rows<'a> {
             for (c, &j) in touched.iter().enumerate() {
                 let column = squares.column(c);
                 let (own, beside) = column.as_slice().split_at(touched.len());
-                touched.iter().zip(own).for_each(|(&i, s)| a[(i, j)] += s);
+                // The lower triangle alone.
+                touched[c..].iter().zip(&own[c..]).for_each(|(&i, s)| a[(i, j)] += s);
                 cross.column_mut(j).iter_mut().zip(beside).for_each(|(sum, s)| *sum += s);
             }
         }
+        a.fill_upper_triangle_with_lower_triangle();
         self.profiled(&a, &cross)
     }
 
@@ -236,3 +238,7 @@ fn touched(rows: &[f64], count: usize) -> Vec<usize> {
     }
     (0..count).filter(|&j| any[j]).collect()
 }
+
+#[cfg(test)]
+#[path = "rows_tests.rs"]
+mod tests;

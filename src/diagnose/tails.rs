@@ -42,9 +42,9 @@ pub fn tail(image: &[f32], camera: &Camera) -> (f64, f64, f64) {
             let mut sizes = patch.clone();
             let mad = MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
             // Coarse words make the median jump; the bulk's own spread bounds it below.
-            let bulk = &mut sizes[..];
-            bulk.sort_unstable_by(f32::total_cmp);
-            let most = &bulk[..bulk.len() * 9 / 10];
+            let end = sizes.len() * 9 / 10;
+            sizes.select_nth_unstable_by(end, f32::total_cmp);
+            let most = &sizes[..end];
             let square: f64 = most.iter().map(|r| f64::from(*r).powi(2)).sum();
             // Nine tenths of a Gaussian have 0.72 of its standard deviation... squared 0.6225.
             let spread = (square / most.len() as f64 / 0.6225).sqrt() as f32;

@@ -41,7 +41,8 @@ pub struct Places<'a> {
     edge: Vec<f32>,
     board: TargetFrame,
     corner: f64,
-    session_s: f64,
+    /// What is one for the view.
+    view: PixelContext,
 }
 
 impl<'a> Places<'a> {
@@ -49,6 +50,21 @@ impl<'a> Places<'a> {
     pub fn of(field: &'a Field, camera: &'a Camera, rays: &'a Rays, session_start: f64) -> Self {
         let mut on_target = vec![false; camera.pixels()];
         field.pixels.iter().for_each(|&i| on_target[i as usize] = true);
+        let plane = &field.plane;
+        let slope = |q: f64, f: f64| field.scale_px_m * q / f;
+        let view = PixelContext {
+            side: SIDE as f64,
+            slope: [slope(plane.q.x, camera.fx), slope(plane.q.y, camera.fy)],
+            rho: plane.distance(),
+            theta: plane.theta(),
+            azimuth: plane.azimuth(),
+            session_s: field.time_s - session_start,
+            ambient: field.ambient_lux.unwrap_or(0.0),
+            temperature_c: field.temperature_c.unwrap_or(0.0),
+            light: 1.0,
+            variance: 1.0,
+            ..PixelContext::default()
+        };
         Places {
             field,
             camera,
@@ -56,7 +72,7 @@ impl<'a> Places<'a> {
             edge: edge_distances(&on_target, camera.width),
             board: board_frame(field, rays),
             corner: corner_radius(camera),
-            session_s: field.time_s - session_start,
+            view,
         }
     }
 
@@ -73,31 +89,20 @@ impl<'a> Places<'a> {
 
     fn at(&self, u: f64, v: f64, (x, y): (f64, f64), edge: f64) -> PixelContext {
         let (field, camera) = (self.field, self.camera);
-        let plane = &field.plane;
-        let z = plane.depth(x, y);
+        let z = field.plane.depth(x, y);
         let (right, down) = self.board.place(&(Vector3::new(x, y, 1.0) * z));
-        let slope = |q: f64, f: f64| field.scale_px_m * q / f;
         PixelContext {
             u,
             v,
-            side: SIDE as f64,
             x,
             y,
             disparity: field.scale_px_m / z,
             z,
-            slope: [slope(plane.q.x, camera.fx), slope(plane.q.y, camera.fy)],
             radius: f64::hypot(u - camera.cx, v - camera.cy) / self.corner,
             right,
             down,
-            rho: plane.distance(),
             edge,
-            theta: plane.theta(),
-            azimuth: plane.azimuth(),
-            session_s: self.session_s,
-            ambient: field.ambient_lux.unwrap_or(0.0),
-            temperature_c: field.temperature_c.unwrap_or(0.0),
-            light: 1.0,
-            variance: 1.0,
+            ..self.view
         }
     }
 }

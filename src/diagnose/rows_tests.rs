@@ -1,0 +1,35 @@
+//! Sums over neighbourhoods against sums over samples.
+
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+use crate::rng::Seed;
+
+/// Hat functions along a line of samples, and a column that is nowhere nothing.
+#[test]
+fn neighbourhoods_sum_to_what_single_samples_do() {
+    const SAMPLES: usize = 200;
+    const NODES: usize = 9;
+    let mut rng = Seed(3).stream("rows");
+    let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
+    let response: Vec<f64> = (0..SAMPLES).map(|_| draw()).collect();
+    // One in five says nothing.
+    let weight: Vec<f64> =
+        (0..SAMPLES).map(|i| if i % 5 == 0 { 0.0 } else { draw().abs() }).collect();
+    let beside: Vec<f64> = (0..SAMPLES).flat_map(|i| [1.0, i as f64 / 100.0]).collect();
+    let fill = |i: usize, row: &mut [f64]| {
+        let place = i as f64 / SAMPLES as f64 * (NODES - 1) as f64;
+        for (k, g) in row[..NODES].iter_mut().enumerate() {
+            *g = (1.0 - (place - k as f64).abs()).max(0.0);
+        }
+        row[NODES] = (i as f64).cos();
+    };
+    // The second column beside is a chosen term's, and stays.
+    let rows = Rows::new(&response, &weight, &beside, 2, &[0.5]).expect("a level");
+    let plain = rows.reduce(NODES + 1, fill);
+    for side in [1, 7, SAMPLES] {
+        let blocks = rows.reduce_by_blocks(NODES + 1, |i| i / side, fill);
+        approx::assert_relative_eq!(blocks.a, plain.a, epsilon = 1e-9);
+        approx::assert_relative_eq!(blocks.b, plain.b, epsilon = 1e-9);
+    }
+}
