@@ -28,7 +28,7 @@ use super::search::Outcome;
 use super::steps::{Steps, is_raw, lattice, steps};
 use super::structure::structures;
 use super::verdict::{
-    LEAST_SIZE, after, echoes, extend, fold_into_sigma, merge, not_identifiable, shares, symptoms,
+    MIN_SIZE, after, echoes, extend, fold_into_sigma, merge, not_identifiable, shares, symptoms,
     view_lines,
 };
 use crate::Progress;
@@ -355,7 +355,7 @@ impl<'a> Case<'a> {
         let textured = scatter.tails.is_some()
             || (!scatter.hangs.is_empty() && f.size.sigma < LEVEL_BESIDE_TEXTURE);
         let tailed = textured && f.status == Status::Recalibrate;
-        !stepped && !tailed && f.size.sigma > self.options.ablation.least_size(LEAST_SIZE)
+        !stepped && !tailed && f.size.sigma > self.options.ablation.min_size(MIN_SIZE)
     }
 
     /// What neither a mean nor a variance shows: how the noise hangs together, tails, steps.

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::candidate::Candidate;
 use super::joint_fit::{Joint, Reduced, SMOOTHNESS};
-use super::search::Chosen;
+use super::search::{Chosen, behind};
 use crate::camera::Camera;
 use crate::terms::{Basis, Coordinate, Statistic, Term};
 
@@ -47,7 +47,7 @@ impl Joint<'_> {
         if let Some(mapped) = self.best_maps(&kept, camera) {
             let better = total(&mapped.scores) - total(&settled.scores);
             let slack = MAPS_SHARE * total(&mapped.scores);
-            let clear = clearly(&mapped.scores, &settled.scores) > MAPS_CLEARLY;
+            let clear = behind(&mapped.scores, &settled.scores) > MAPS_CLEARLY;
             // A rest that the search saw is told by the maps, unless they are the worse for it.
             let seen = kept.len() < settled.terms.len();
             if (clear && better > slack) || (seen && better > -slack) {
@@ -83,7 +83,7 @@ impl Joint<'_> {
             all.push(Settled { terms, penalty, without, scores, maps: 0.0 });
         }
         let best = all.last()?.scores.clone();
-        all.into_iter().find(|s| clearly(&best, &s.scores) < 1.0)
+        all.into_iter().find(|s| behind(&best, &s.scores) < 1.0)
     }
 
     /// Terms that the maps make needless, the most needless first.
@@ -102,7 +102,7 @@ impl Joint<'_> {
                 let lost = all - total(&scores);
                 let of_target = !is_of_sensor(c);
                 let share = if of_target { MAPS_SHARE } else { TERM_SHARE };
-                let needed = lost > share * all && clearly(&settled.scores, &scores) > TERM_CLEARLY;
+                let needed = lost > share * all && behind(&settled.scores, &scores) > TERM_CLEARLY;
                 let believed = !of_target || self.size(settled, t) < LARGEST_USUAL;
                 (!(needed && believed)).then_some((lost, others, scores))
             };
@@ -170,15 +170,6 @@ impl Joint<'_> {
 
 pub fn total(scores: &[f64]) -> f64 {
     scores.iter().sum()
-}
-
-/// Mean of the differences over its standard error.
-fn clearly(better: &[f64], than: &[f64]) -> f64 {
-    let n = better.len() as f64;
-    let differences = || better.iter().zip(than).map(|(a, b)| a - b);
-    let mean = differences().sum::<f64>() / n;
-    let variance = differences().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    mean / (variance / n).sqrt().max(f64::MIN_POSITIVE)
 }
 
 /// Do the maps say the same, and more?

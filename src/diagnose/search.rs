@@ -642,7 +642,7 @@ fn steady(judged: &Judged) -> bool {
 }
 
 /// Mean difference over the views by its standard error.
-fn behind(winner: &[f64], rival: &[f64]) -> f64 {
+pub fn behind(winner: &[f64], rival: &[f64]) -> f64 {
     let n = winner.len() as f64;
     let differences = || winner.iter().zip(rival).map(|(w, r)| w - r);
     let mean = differences().sum::<f64>() / n;

@@ -236,7 +236,7 @@ pub(super) fn view_lines(
 }
 
 /// A bias or a change of variance smaller than this, in sigmas, is not told.
-pub(super) const LEAST_SIZE: f64 = 0.005;
+pub(super) const MIN_SIZE: f64 = 0.005;
 
 #[cfg(test)]
 mod tests {
