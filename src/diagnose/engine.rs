@@ -197,6 +197,11 @@ impl<'a> Case<'a> {
         let mut survey = Survey::of(&fields, &sensor.camera, &bench.rays);
         survey.ablate(options.ablation, &fields);
         survey.refits_sigma = options.calibrated_here && simulated.is_none();
+        if simulated.is_none() && !options.calibrated_here && model.fit.views > 0 {
+            let views = Some(model.fit.views as f64);
+            let learnt = known.bias_is_learnt().then_some(views).flatten();
+            survey.learnt_from = [learnt, views];
+        }
         survey.fixed_px2 = fixed_px2(&structures(&fields, &sensor.camera, &[]));
         if let Some(baseline) = &baseline {
             baseline.references(&mut fields);
@@ -429,11 +434,8 @@ impl<'a> Case<'a> {
     /// Laws of the distance, by reference distances.
     fn laws(&self, bias: &[Term]) -> Vec<Finding> {
         // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
-        let anchored: Vec<Term> = bias
-            .iter()
-            .filter(|t| matches!(t.basis, Basis::RangeNotDepth | Basis::Lens { .. }))
-            .cloned()
-            .collect();
+        let is_anchored = |t: &Term| matches!(t.basis, Basis::RangeNotDepth | Basis::Lens { .. });
+        let anchored: Vec<Term> = bias.iter().filter(|t| is_anchored(t)).cloned().collect();
         let found = |terms: &[Term]| {
             let levels = heldout::levels(&self.survey, terms);
             let laws = reference::laws(&self.fields, &levels);
@@ -441,10 +443,18 @@ impl<'a> Case<'a> {
             reference::findings(&laws, &self.known, level, self.options.seed)
         };
         // A bowl, too, moves the plane on the axis, by what nobody can tell from a law of the
-        // distance: a law must hold with and without it.
-        let with = found(bias);
+        // distance: a law must hold with and without it, be it new or the model's.
+        let back = |t: &Term| Term {
+            coefficients: t.coefficients.iter().map(|c| -c).collect(),
+            ..t.clone()
+        };
+        let model: Vec<Term> =
+            self.known.bias.iter().filter(|t| !is_anchored(t)).map(back).collect();
         let mut laws = found(&anchored);
-        laws.retain(|l| with.iter().any(|w| w.effect == l.effect));
+        for others in [bias.to_vec(), [anchored, model].concat()] {
+            let with = found(&others);
+            laws.retain(|l| with.iter().any(|w| w.effect == l.effect));
+        }
         laws
     }
 

@@ -272,6 +272,8 @@ pub struct Null {
     /// How much more the views' own fits scatter than their noise explains, at least 1: about the
     /// common fit, or about nothing at all where a few views have what the others have not.
     pub dispersion: f64,
+    /// The same about the common fit alone.
+    pub about_fit: f64,
 }
 
 impl Null {
@@ -289,7 +291,7 @@ impl Null {
         let total: Vec<f64> = (0..k).map(|j| by_view.iter().map(|a| a[j]).sum()).collect();
         let about_fit = dispersion(&alone, &by_view, &total, &u, &left, prior);
         let dispersion = about_fit.min(usual_square(&by_view, &total, &u, &left));
-        Some(Null { by_view, total, prior, dispersion })
+        Some(Null { by_view, total, prior, dispersion, about_fit })
     }
 
     /// The gain of one recording of nothing but noise, nats.

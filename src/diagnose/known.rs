@@ -14,6 +14,7 @@ pub struct KnownTerms {
     /// Of the logarithm of its variance.
     pub variance: Vec<Term>,
     entries: Vec<(String, Map<String, Value>)>,
+    learnt: bool,
 }
 
 impl KnownTerms {
@@ -29,7 +30,10 @@ impl KnownTerms {
             };
             for term in terms {
                 match term.statistic {
-                    Statistic::Bias => known.bias.push(term.clone()),
+                    Statistic::Bias => {
+                        known.learnt |= !entry.shape.is_empty();
+                        known.bias.push(term.clone());
+                    }
                     Statistic::Variance => known.variance.push(term.clone()),
                     _ => {}
                 }
@@ -50,6 +54,11 @@ impl KnownTerms {
             }
         };
         entry.1.insert(name.into(), value.into());
+    }
+
+    /// Is a part of the bias a shape that was fitted?
+    pub fn bias_is_learnt(&self) -> bool {
+        self.learnt
     }
 
     pub fn has(&self, id: &str) -> bool {

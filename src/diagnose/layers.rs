@@ -30,6 +30,8 @@ pub struct Survey {
     pub tolerance: f64,
     /// Sigma was calibrated on these very views: it is refitted beside every hypothesis.
     pub refits_sigma: bool,
+    /// Views that the model's bias, and its sigma, were learnt from, where these are others.
+    pub learnt_from: [Option<f64>; 2],
     pub ablation: Ablation,
 }
 
@@ -99,7 +101,16 @@ impl Survey {
         let light = relative_light(&mut views);
         let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter()));
         let (tolerance, ablation) = (MODEL_TOLERANCE, Ablation::None);
-        Survey { views, reach, fixed_px2: 0.0, light, tolerance, refits_sigma: false, ablation }
+        Survey {
+            views,
+            reach,
+            fixed_px2: 0.0,
+            light,
+            tolerance,
+            refits_sigma: false,
+            learnt_from: [None; 2],
+            ablation,
+        }
     }
 
     /// Root of the weighted harmonic mean of the model's variance, px.
@@ -136,6 +147,7 @@ impl Survey {
             fixed: (self.fixed_px2 > 0.0).then(|| (self.fixed_px2.sqrt(), self.covered_px(camera))),
             least: LEAST_SIGMAS * self.typical_sigma_px(),
             calibrated: true,
+            learnt_from: self.learnt_from[0],
         };
         let mut candidates = bias::families(camera, &self.reach);
         candidates.extend(bias::curves(camera, &self.reach));
@@ -158,6 +170,7 @@ impl Survey {
             light: self.light,
             tolerance: self.tolerance,
             refits_sigma: self.refits_sigma,
+            learnt_from: self.learnt_from,
             ablation: self.ablation,
         }
     }
@@ -249,6 +262,7 @@ impl Survey {
             // dropped when they are told, by their size on the axis.
             least: 0.0,
             calibrated: true,
+            learnt_from: self.learnt_from[1],
         };
         let mut candidates = variance::families(&self.reach, sigma);
         candidates.extend(variance::curves(camera, &self.reach));

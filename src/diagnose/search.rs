@@ -78,6 +78,9 @@ pub struct Rules {
     pub least: f64,
     /// Judge gains by what noise alone would have brought.
     pub calibrated: bool,
+    /// Views that the model was learnt from, where these views are not among them: its own error is
+    /// theirs scattered about their mean, and stands beside the error of these.
+    pub learnt_from: Option<f64>,
 }
 
 /// A family beside the one that was chosen.
@@ -407,7 +410,8 @@ impl<'a> Layer<'a> {
             } else {
                 NoiseGains::unknown()
             };
-            self.looks = looks(self.candidates, &judged, &noise);
+            let excess = |null: &Null| self.excess(null);
+            self.looks = looks(self.candidates, &judged, &noise, &excess);
             self.noise = Some(noise);
         }
         let noise = self.noise.as_ref()?;
@@ -422,7 +426,8 @@ impl<'a> Layer<'a> {
     ) -> Option<Chosen> {
         let total = |i: usize| judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| j.gain.total);
         // Views that scatter more than their noise says count for less.
-        let safe = |i: usize| judged[i].as_ref().map_or(0.0, |j| j.gain.total / j.null.dispersion);
+        let safe =
+            |i: usize| judged[i].as_ref().map_or(0.0, |j| j.gain.total / self.excess(&j.null));
         // A name whose fits to single views disagree is the worse one.
         let fair = |i: usize| {
             judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| {
@@ -485,6 +490,14 @@ impl<'a> Layer<'a> {
             rivals,
             p: noise.p(safe(winner)),
         })
+    }
+
+    /// How much more than noise the views' common fit may be off from a model that is right.
+    fn excess(&self, null: &Null) -> f64 {
+        match self.rules.learnt_from {
+            Some(views) => null.about_fit * (1.0 + self.fine.len() as f64 / views),
+            None => null.dispersion,
+        }
     }
 
     /// Light of the room was measured for its own sake; the surface's is made out of an image that
@@ -611,7 +624,12 @@ fn one_way(basis: &Basis, beta: &[f64], [near, far]: [f64; 2]) -> bool {
     f64::min(up, down) < BACK * (up + down)
 }
 
-fn looks(candidates: &[Candidate], judged: &[Option<Judged>], noise: &NoiseGains) -> Vec<Look> {
+fn looks(
+    candidates: &[Candidate],
+    judged: &[Option<Judged>],
+    noise: &NoiseGains,
+    excess: &dyn Fn(&Null) -> f64,
+) -> Vec<Look> {
     let nameless = candidates.iter().zip(judged).filter(|(c, _)| c.family.is_none());
     nameless
         .filter_map(|(c, j)| {
@@ -619,7 +637,7 @@ fn looks(candidates: &[Candidate], judged: &[Option<Judged>], noise: &NoiseGains
             Some(Look {
                 basis: c.basis.clone(),
                 coefficients: j.gain.beta.as_slice().to_vec(),
-                p: noise.p(j.gain.total / j.null.dispersion),
+                p: noise.p(j.gain.total / excess(&j.null)),
             })
         })
         .collect()
