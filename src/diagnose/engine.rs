@@ -14,7 +14,7 @@ use super::heldout;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
 use super::layers::Survey;
-use super::lines::line_terms;
+use super::lines::lines;
 use super::missing::missing;
 use super::next_view;
 use super::noise::{Hanging, hanging, tails};
@@ -201,6 +201,7 @@ impl<'a> Case<'a> {
             let views = Some(model.fit.views as f64);
             let learnt = known.bias_is_learnt().then_some(views).flatten();
             survey.learnt_from = [learnt, views];
+            survey.forgive_bias(&known);
         }
         survey.fixed_px2 = fixed_px2(&structures(&fields, &sensor.camera, &[]));
         if let Some(baseline) = &baseline {
@@ -284,12 +285,18 @@ impl<'a> Case<'a> {
         }
         let level = self.level(Self::VARIANCE_LEVEL);
         let sigma = &self.model.sigma;
+        if self.survey.learnt_from[1].is_some() {
+            self.survey.forgive_variance(&self.known, sigma);
+        }
         let outcome = self.survey.search_variance(sigma, camera, level, self.options.seed);
         let terms = terms_of(&outcome, Statistic::Variance);
         measure_tails(&mut structure, &self.fields, &mean.px, &terms, &self.survey, &self.bench);
         let alike = self.baseline.as_ref().is_some_and(|b| b.tails_alike(&structure));
+        let holds = |t: &Term| self.holds_tails(t);
         let uneven = outcome.chosen.iter().any(|c| c.candidate.family.is_none())
-            || !terms.iter().all(|t| self.holds_tails(t));
+            || self.survey.refits_sigma && !terms.iter().all(holds)
+            || self.known.has_uneven_noise()
+            || !self.known.variance.iter().all(holds);
         let tails = tails(&structure, &self.known, each, uneven).filter(|_| !alike);
         Scatter { lattice, hangs, tails, outcome }
     }
@@ -300,8 +307,7 @@ impl<'a> Case<'a> {
         const MUCH: f64 = -1.4;
         let mut row = Vec::new();
         let mut tiles = self.survey.views.iter().flat_map(|v| &v.tiles);
-        !self.survey.refits_sigma
-            || !matches!(term.basis, Basis::Recalibrate { .. })
+        !matches!(term.basis, Basis::Recalibrate { .. })
             || tiles.all(|t| term.value(&t.place, &mut row) > MUCH)
     }
 
@@ -376,24 +382,23 @@ impl<'a> Case<'a> {
             f.effect.is_none() && f.statistic == Statistic::Bias && f.axis == Axis::Column
         };
         if self.baseline.is_none() {
-            found
-                .iter_mut()
-                .filter(stands)
-                .for_each(|f| f.terms = line_terms(&self.fields, &mean.px));
+            for f in found.iter_mut().filter(stands) {
+                let lines = lines(&self.fields, &mean.px);
+                f.terms = lines.terms;
+                f.covariance.variances = lines.variances;
+            }
         }
         found
     }
 
-    /// The refit of a sigma that was calibrated here is no finding; where it changes more than noise
-    /// can, the extended model has it.
-    fn take_refit(&self, curves: &mut Vec<Finding>, variance: &Outcome) -> Option<Finding> {
+    /// The refit of a sigma that was calibrated here is no finding; the extended model has it, for all
+    /// else was fitted beside it.
+    fn take_refit(&self, curves: &mut Vec<Finding>) -> Option<Finding> {
         if !self.survey.refits_sigma {
             return None;
         }
-        let threshold = variance.noise.threshold(self.options.level);
         let at = curves.iter().position(|f| f.status == Status::Recalibrate)?;
-        // Nats, as long as they are not shares.
-        Some(curves.remove(at)).filter(|f| f.share > threshold)
+        Some(curves.remove(at))
     }
 
     /// Where sigma's own form is off, the form that would do better: beside the finding, and as a
@@ -436,11 +441,13 @@ impl<'a> Case<'a> {
         // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
         let is_anchored = |t: &Term| matches!(t.basis, Basis::RangeNotDepth | Basis::Lens { .. });
         let anchored: Vec<Term> = bias.iter().filter(|t| is_anchored(t)).cloned().collect();
+        let excess =
+            self.survey.learnt_from[0].map_or(1.0, |views| 1.0 + self.fields.len() as f64 / views);
         let found = |terms: &[Term]| {
             let levels = heldout::levels(&self.survey, terms);
             let laws = reference::laws(&self.fields, &levels);
             let level = self.level(Self::LAWS_LEVEL);
-            reference::findings(&laws, &self.known, level, self.options.seed)
+            reference::findings(&laws, &self.known, excess, level, self.options.seed)
         };
         // A bowl, too, moves the plane on the axis, by what nobody can tell from a law of the
         // distance: a law must hold with and without it, be it new or the model's.
@@ -481,12 +488,15 @@ impl<'a> Case<'a> {
         let sigma_mm = typical_sigma_mm(&self.fields);
         let steps = steps(&scatter.lattice, &self.known, &self.fields, self.recording, sigma_mm);
         let mut curves = self.curves(&scenes, outcomes);
-        let refitted = self.take_refit(&mut curves, &scatter.outcome);
+        let refitted = self.take_refit(&mut curves);
         curves.retain(|f| self.is_news(f, &steps, scatter));
         if self.baseline.is_none() {
             fold_into_sigma(&mut curves);
         }
-        let better = self.tell_form(&mut curves, refitted.is_some());
+        // Nats, as long as they are not shares.
+        let clear = scatter.outcome.noise.threshold(self.options.level);
+        let clearly = refitted.as_ref().is_some_and(|f| f.share > clear);
+        let better = self.tell_form(&mut curves, clearly);
         let mut found: Vec<Finding> = self.ranges.clone().into_iter().chain(curves).collect();
         found.extend(self.texture(&mean, scatter, steps));
         drop(scenes);

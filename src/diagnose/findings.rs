@@ -11,6 +11,7 @@ use super::parameters::{of_any_formula, parameters};
 use super::search::{Chosen, Outcome, ViewData, coarser};
 use super::shape;
 use crate::effects;
+use crate::model::Covariance;
 use crate::stats::range;
 use crate::terms::{Axis, Basis, Modulation, PixelContext, Statistic, Term};
 
@@ -189,10 +190,20 @@ fn finding(
         shape,
         curve: Some(along.curve(scene, &left, &mine)),
         terms: group.iter().map(|&k| terms[k].clone()).collect(),
+        covariance: covariance_of(outcome, group),
     };
     // Nats for now; the engine turns them into shares.
     finding.share = group.iter().map(|&k| outcome.chosen[k].gain).sum();
     finding
+}
+
+/// Of the terms of a group.
+fn covariance_of(outcome: &Outcome, group: &[usize]) -> Covariance {
+    let Covariance { fit, factors, variances } = &outcome.covariance;
+    let of = |f: &Vec<f64>| -> Vec<f64> {
+        group.iter().filter_map(|&k| f.get(outcome.span(k))).flatten().copied().collect()
+    };
+    Covariance { fit: *fit, factors: factors.iter().map(of).collect(), variances: of(variances) }
 }
 
 fn sum<'a>(layers: impl Iterator<Item = &'a Vec<Vec<f64>>>) -> Vec<Vec<f64>> {
@@ -458,6 +469,7 @@ pub fn named(effect: &'static str, probability: f64, statistic: Statistic, axis:
         shape: None,
         curve: None,
         terms: Vec::new(),
+        covariance: Covariance::default(),
     }
 }
 
@@ -492,6 +504,7 @@ pub fn hanging(found: Hanging, sigma_mm: f64) -> Finding {
         shape: found.words,
         curve: None,
         terms: Vec::new(),
+        covariance: Covariance::default(),
     }
 }
 
@@ -539,6 +552,7 @@ pub fn missing(found: DropoutFinding) -> Finding {
         shape,
         curve: Some(found.curve),
         terms: Vec::new(),
+        covariance: Covariance::default(),
     }
 }
 

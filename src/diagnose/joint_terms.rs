@@ -1,6 +1,7 @@
 //! Which terms the joint fit keeps, and whether it has a smooth rest: by what views left out say.
 
 use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::candidate::Candidate;
 use super::joint_fit::{Joint, Reduced, SMOOTHNESS};
@@ -31,8 +32,10 @@ pub struct Settled {
     pub penalty: Option<DMatrix<f64>>,
     pub without: Vec<Reduced>,
     pub scores: Vec<f64>,
-    /// What the maps bring beside the terms, nats.
+    /// What the maps bring beside the terms, nats, and the chance that nothing brings as much: over
+    /// the parts left out, by Student's t.
     pub maps: f64,
+    pub maps_p: f64,
 }
 
 impl Joint<'_> {
@@ -40,8 +43,14 @@ impl Joint<'_> {
         let everything: Vec<usize> = (0..chosen.len()).collect();
         let plain = self.without(None)?;
         let scores = self.scores(&plain, &everything, |_| true);
-        let mut settled =
-            Settled { scores, terms: everything, penalty: None, without: plain, maps: 0.0 };
+        let mut settled = Settled {
+            scores,
+            terms: everything,
+            penalty: None,
+            without: plain,
+            maps: 0.0,
+            maps_p: 1.0,
+        };
         let is_kept = |t: &usize| !is_smooth_and_nameless(&chosen[*t].candidate);
         let kept: Vec<usize> = settled.terms.iter().copied().filter(is_kept).collect();
         if let Some(mapped) = self.best_maps(&kept, camera) {
@@ -51,10 +60,11 @@ impl Joint<'_> {
             // A rest that the search saw is told by the maps, unless they are the worse for it.
             let seen = kept.len() < settled.terms.len();
             if (clear && better > slack) || (seen && better > -slack) {
-                let alone = total(&self.scores(&settled.without, &kept, |_| true));
+                let alone = self.scores(&settled.without, &kept, |_| true);
                 settled = mapped;
-                self.drop_idle(&mut settled, chosen, alone);
-                settled.maps = total(&settled.scores) - alone;
+                self.drop_idle(&mut settled, chosen, total(&alone));
+                settled.maps = total(&settled.scores) - total(&alone);
+                settled.maps_p = chance(behind(&settled.scores, &alone), alone.len());
             }
         }
         if settled.penalty.is_none() {
@@ -80,7 +90,7 @@ impl Joint<'_> {
                 break;
             }
             let (terms, penalty) = (terms.to_vec(), Some(penalty));
-            all.push(Settled { terms, penalty, without, scores, maps: 0.0 });
+            all.push(Settled { terms, penalty, without, scores, maps: 0.0, maps_p: 1.0 });
         }
         let best = all.last()?.scores.clone();
         all.into_iter().find(|s| behind(&best, &s.scores) < 1.0)
@@ -166,6 +176,12 @@ impl Joint<'_> {
             settled.terms = others;
         }
     }
+}
+
+/// Of a mean over its standard error this large, over so many parts.
+fn chance(t: f64, parts: usize) -> f64 {
+    let law = StudentsT::new(0.0, 1.0, parts.saturating_sub(1).max(1) as f64);
+    law.map_or(1.0, |law| law.sf(t))
 }
 
 pub fn total(scores: &[f64]) -> f64 {

@@ -78,6 +78,7 @@ fn fitted(data: &[ViewData], chosen: Vec<Chosen>) -> Outcome {
         noise: Default::default(),
         remaining: None,
         left_out: Vec::new(),
+        factors: Vec::new(),
     };
     refit(data, &vec![1.0; data.len()], &kinect_v1(4).camera, found)
 }

@@ -5,11 +5,15 @@ use rayon::prelude::*;
 
 use super::ablation::Ablation;
 use super::bias;
+use super::candidate::{Candidate, RECALIBRATE};
+use super::evidence::{Gain, gain};
 use super::field::Field;
-use super::joint::refit;
+use super::joint::{clustered, refit};
 use super::reach::Extent;
 use super::scatter::{Left, left_by_fit};
-use super::search::{Outcome, Rules, ViewData, coarser, search, search_beside};
+use super::search::{
+    Chosen, Outcome, Rules, ViewData, coarser, evidence_of_bases, search, search_beside,
+};
 use super::smooth::{SMOOTH_PX, high_pass};
 use super::tiles::{SIDE, Tile, tiles};
 use super::variance;
@@ -17,7 +21,7 @@ use crate::camera::{Camera, Rays};
 use crate::model::SigmaModel;
 use crate::rng::Seed;
 use crate::stats::{Correlation, measure_correlation};
-use crate::terms::PixelContext;
+use crate::terms::{Basis, PixelContext};
 
 /// The tiles of all views, with how much each view is worth.
 pub struct Survey {
@@ -272,8 +276,57 @@ impl Survey {
         }
         let data = self.variance_data();
         let candidates = self.ablation.candidates(candidates);
-        search_beside(&data, &data, &candidates, refit, &self.ablation.rules(rules), seed)
+        let refits = refit.is_some();
+        let mut found =
+            search_beside(&data, &data, &candidates, refit, &self.ablation.rules(rules), seed);
+        if refits {
+            found = with_best_surface(&data, found, variance::surfaces(&self.reach));
+        }
+        cluster(&mut found);
+        found
     }
+}
+
+/// Beside every hypothesis sigma was as free as can be; told is the surface that predicts views left
+/// out best beside what was found, or none.
+fn with_best_surface(data: &[ViewData], found: Outcome, surfaces: Vec<Candidate>) -> Outcome {
+    let (refit, others): (Vec<Chosen>, Vec<Chosen>) =
+        found.chosen.into_iter().partition(|c| c.candidate.family == Some(RECALIBRATE));
+    let of = |surface: Option<&Candidate>| {
+        let bases: Vec<&Basis> =
+            others.iter().map(|c| &c.candidate).chain(surface).map(|c| &c.basis).collect();
+        let evidence = evidence_of_bases(data, &bases);
+        let fit = if bases.is_empty() { None } else { gain(&evidence, VARIANCE_PRIOR) };
+        (evidence, fit)
+    };
+    let total = |fit: &Option<Gain>| fit.as_ref().map_or(0.0, |f| f.total);
+    let mut best = (None, of(None));
+    let alone = total(&best.1.1);
+    for surface in surfaces {
+        let with = of(Some(&surface));
+        if total(&with.1) > total(&best.1.1) {
+            best = (Some(surface), with);
+        }
+    }
+    let (surface, (evidence, fit)) = best;
+    let gain = total(&fit) - alone;
+    let mut chosen = others;
+    if let (Some(candidate), Some(old)) = (surface, refit.into_iter().next()) {
+        chosen.push(Chosen { candidate, gain, ..old });
+    }
+    Outcome { chosen, fit, evidence, ..found }
+}
+
+/// The covariance of the terms, with the views as the sample.
+fn cluster(found: &mut Outcome) {
+    let Some(fit) = &mut found.fit else { return };
+    let beyond: Vec<DVector<f64>> =
+        found.evidence.iter().map(|e| &e.b - &e.a * &fit.beta).collect();
+    fit.covariance = clustered(&fit.covariance, &beyond);
+    let eigen = fit.covariance.clone().symmetric_eigen();
+    let factor = |k: usize| eigen.eigenvectors.column(k) * eigen.eigenvalues[k].max(0.0).sqrt();
+    found.covariance.factors =
+        (0..eigen.eigenvalues.len()).map(|k| factor(k).as_slice().to_vec()).collect();
 }
 
 /// Light in units of the recording's median, what the room adds taken out.

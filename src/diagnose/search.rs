@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain, Null, Rows, gain};
 use super::tiles::SIDE;
+use crate::model::Covariance;
 use crate::rng::Seed;
 use crate::terms::{Basis, Coordinate, PixelContext, Term};
 
@@ -136,6 +137,8 @@ pub struct Outcome {
     pub remaining: Option<Chosen>,
     /// Coefficients as fitted without some views, for these views.
     pub left_out: Vec<(Vec<usize>, Vec<f64>)>,
+    /// Of all coefficients.
+    pub covariance: Covariance,
 }
 
 impl Outcome {
@@ -217,14 +220,26 @@ pub fn search_beside(
     let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
     let noise = layer.noise.unwrap_or_default();
     let looks = layer.looks;
-    Outcome { chosen, looks, fit, evidence, noise, remaining, left_out: Vec::new() }
+    Outcome {
+        chosen,
+        looks,
+        fit,
+        evidence,
+        noise,
+        remaining,
+        left_out: Vec::new(),
+        covariance: Covariance::default(),
+    }
 }
 
 /// Evidence of views on given terms together.
 pub fn evidence_of(data: &[ViewData], terms: &[Term]) -> Vec<Evidence> {
-    let bases: Vec<&Basis> = terms.iter().map(|t| &t.basis).collect();
+    evidence_of_bases(data, &terms.iter().map(|t| &t.basis).collect::<Vec<_>>())
+}
+
+pub fn evidence_of_bases(data: &[ViewData], bases: &[&Basis]) -> Vec<Evidence> {
     data.par_iter()
-        .filter_map(|v| Some(rows(v, v.response.clone(), &bases)?.reduce(0, |_, _| ())))
+        .filter_map(|v| Some(rows(v, v.response.clone(), bases)?.reduce(0, |_, _| ())))
         .collect()
 }
 
@@ -410,8 +425,8 @@ impl<'a> Layer<'a> {
             } else {
                 NoiseGains::unknown()
             };
-            let excess = |null: &Null| self.excess(null);
-            self.looks = looks(self.candidates, &judged, &noise, &excess);
+            let safe = |j: &Judged| self.safe(j.gain.total, &j.null);
+            self.looks = looks(self.candidates, &judged, &noise, &safe);
             self.noise = Some(noise);
         }
         let noise = self.noise.as_ref()?;
@@ -426,8 +441,7 @@ impl<'a> Layer<'a> {
     ) -> Option<Chosen> {
         let total = |i: usize| judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| j.gain.total);
         // Views that scatter more than their noise says count for less.
-        let safe =
-            |i: usize| judged[i].as_ref().map_or(0.0, |j| j.gain.total / self.excess(&j.null));
+        let safe = |i: usize| judged[i].as_ref().map_or(0.0, |j| self.safe(j.gain.total, &j.null));
         // A name whose fits to single views disagree is the worse one.
         let fair = |i: usize| {
             judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| {
@@ -497,6 +511,19 @@ impl<'a> Layer<'a> {
         match self.rules.learnt_from {
             Some(views) => null.about_fit * (1.0 + self.fine.len() as f64 / views),
             None => null.dispersion,
+        }
+    }
+
+    /// Nats that count against what noise brings. Where the views' own scatter is the noise, it was
+    /// measured on these few views: of a Gaussian that makes a Student's t.
+    fn safe(&self, gain: f64, null: &Null) -> f64 {
+        let nats = gain / self.excess(null);
+        match self.rules.learnt_from {
+            Some(_) if nats > 0.0 => {
+                let freedom = (self.fine.len() as f64 - 1.0).max(1.0);
+                0.5 * freedom * (2.0 * nats / freedom).ln_1p()
+            }
+            _ => nats,
         }
     }
 
@@ -628,7 +655,7 @@ fn looks(
     candidates: &[Candidate],
     judged: &[Option<Judged>],
     noise: &NoiseGains,
-    excess: &dyn Fn(&Null) -> f64,
+    safe: &dyn Fn(&Judged) -> f64,
 ) -> Vec<Look> {
     let nameless = candidates.iter().zip(judged).filter(|(c, _)| c.family.is_none());
     nameless
@@ -637,7 +664,7 @@ fn looks(
             Some(Look {
                 basis: c.basis.clone(),
                 coefficients: j.gain.beta.as_slice().to_vec(),
-                p: noise.p(j.gain.total / excess(&j.null)),
+                p: noise.p(safe(j)),
             })
         })
         .collect()
