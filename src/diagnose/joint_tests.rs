@@ -4,6 +4,7 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
+use crate::model::Covariance;
 use crate::rng::{Seed, Stream};
 use crate::simulate::kinect_v1;
 use crate::terms::{Basis, Modulation, PixelContext, Statistic, Term, corner_radius};
@@ -78,7 +79,7 @@ fn fitted(data: &[ViewData], chosen: Vec<Chosen>) -> Outcome {
         noise: Default::default(),
         remaining: None,
         left_out: Vec::new(),
-        factors: Vec::new(),
+        covariance: Covariance::default(),
     };
     refit(data, &vec![1.0; data.len()], &kinect_v1(4).camera, found)
 }
