@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use kinoise::correct::{Corrected, correct_recording};
+use kinoise::correct::{CorrectOptions, Corrected, correct_recording};
 use kinoise::effects::Active;
 use kinoise::{DepthCode, NoiseModel};
 
@@ -21,6 +21,10 @@ pub struct Arguments {
     /// Leave raw disparities in their code: what is taken out is rounded to its steps again
     #[arg(long)]
     keep_code: bool,
+    /// Also write how sure each corrected depth is: 16-bit images of its standard uncertainty, 10 um a
+    /// unit, into this new folder
+    #[arg(long, value_name = "OUT")]
+    sigma: Option<PathBuf>,
     #[command(flatten)]
     input: Input,
 }
@@ -32,7 +36,9 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let (recording, output) = (&arguments.recording, &arguments.output);
     let assumed = arguments.input.assumed()?;
     let corrected = with_bar("frames", |step| {
-        correct_recording(recording, &assumed, &model, output, arguments.keep_code, step)
+        let sigma = arguments.sigma.as_deref();
+        let options = CorrectOptions { keep_code: arguments.keep_code, sigma };
+        correct_recording(recording, &assumed, &model, output, &options, step)
     })?;
     report(&corrected, arguments);
     global.print_json(&serde_json::json!({

@@ -2,6 +2,7 @@
 
 use super::locking::Locking;
 use super::slopes::Noise;
+use super::uncertainty::Uncertainty;
 use crate::camera::{Camera, Rays};
 use crate::effects::{Active, Inverse, KINECT_BASELINE_M};
 use crate::error::{Error, Result};
@@ -46,6 +47,7 @@ pub struct Correction {
     pub(super) terms: Vec<(Term, [f64; 2])>,
     pub(super) needs: Needs,
     pub(super) noise: Noise,
+    pub(super) uncertainty: Uncertainty,
     ignored: Vec<String>,
     remarks: Vec<String>,
 }
@@ -93,6 +95,7 @@ impl Correction {
             locking: None,
             terms: Vec::new(),
             needs: Needs::default(),
+            uncertainty: Uncertainty::default(),
             noise: Noise::of(&model.sigma, scale_px_m),
             ignored: Vec::new(),
             remarks: of_model.iter().flat_map(|other| differences(other, sensor)).collect(),
@@ -155,6 +158,7 @@ impl Correction {
         let usable = |t: &&Term| t.is_sensor_bias() && !t.needs().light;
         let learnt = entry.learnt_px.unwrap_or(ANYWHERE);
         self.terms.extend(entry.shape.iter().filter(usable).map(|t| (t.clone(), learnt)));
+        self.uncertainty.add(entry, learnt, usable);
         if !entry.shape.iter().all(|t| usable(&t)) {
             self.ignored.push(entry.id.clone());
         }

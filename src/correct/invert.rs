@@ -7,7 +7,7 @@ use super::correction::{Conditions, Correction};
 use super::slopes::Slopes;
 use crate::error::{Error, Result};
 use crate::plane::Plane;
-use crate::terms::{PixelContext, Pixels, Term};
+use crate::terms::{Basis, PixelContext, Pixels, Term};
 
 /// The error of a term is taken at the corrected disparity: substituted until it changes by less, px.
 /// What is left is less again by the term's steepness, a hundredth for terms of a few tenths of a px
@@ -76,7 +76,7 @@ impl Correction {
         d
     }
 
-    fn slopes(&self, depth_m: &[f32], factor: f64) -> Slopes {
+    pub(super) fn slopes(&self, depth_m: &[f32], factor: f64) -> Slopes {
         let disparity = |i: usize| match depth_m[i] {
             z if z > 0.0 => self.disparity(i, z, factor),
             _ => f64::NAN,
@@ -88,27 +88,35 @@ impl Correction {
 /// A term's value; what stands still in the picture and grows with the disparity is held where its
 /// learning ended.
 fn held((term, [low, high]): &(Term, [f64; 2]), place: &PixelContext, row: &mut Vec<f64>) -> f64 {
-    let inside = (*low..=*high).contains(&place.disparity);
-    if inside || term.basis.still_power().is_none() {
-        return term.value(place, row);
+    term.value(&where_held(&term.basis, [*low, *high], place), row)
+}
+
+/// The place itself, or that with the last disparity at which the shape was learnt.
+pub(super) fn where_held(
+    basis: &Basis,
+    [low, high]: [f64; 2],
+    place: &PixelContext,
+) -> PixelContext {
+    let inside = (low..=high).contains(&place.disparity);
+    if inside || basis.still_power().is_none() {
+        return *place;
     }
-    let disparity = place.disparity.clamp(*low, *high);
-    term.value(&PixelContext { disparity, ..*place }, row)
+    PixelContext { disparity: place.disparity.clamp(low, high), ..*place }
 }
 
 /// What is known of the places of one image.
-struct Known<'a> {
-    conditions: &'a Conditions,
-    slopes: Option<&'a Slopes>,
-    pixels: Pixels<'a>,
+pub(super) struct Known<'a> {
+    pub conditions: &'a Conditions,
+    pub slopes: Option<&'a Slopes>,
+    pub pixels: Pixels<'a>,
     /// Those that can be evaluated.
-    terms: Vec<&'a (Term, [f64; 2])>,
+    pub terms: Vec<&'a (Term, [f64; 2])>,
     /// Does any of them ask for the tilt?
-    tilt: bool,
+    pub tilt: bool,
 }
 
 impl Known<'_> {
-    fn place(&self, i: usize) -> PixelContext {
+    pub fn place(&self, i: usize) -> PixelContext {
         let mut place = self.pixels.place(i);
         place.session_s = self.conditions.session_s;
         place.temperature_c = self.conditions.temperature_c.unwrap_or(0.0);
@@ -117,7 +125,7 @@ impl Known<'_> {
     }
 
     /// Put a surface of this disparity, px, before the pixel, leaning as the picture shows.
-    fn stand(&self, place: &mut PixelContext, i: usize, disparity: f64) {
+    pub fn stand(&self, place: &mut PixelContext, i: usize, disparity: f64) {
         let Pixels { camera, scale_px_m, .. } = self.pixels;
         place.at_disparity(disparity, scale_px_m);
         if let Some(slopes) = self.slopes {

@@ -13,6 +13,7 @@ mod locking;
 mod raw;
 mod recording;
 mod slopes;
+mod uncertainty;
 
 pub use correction::{Conditions, Correction};
-pub use recording::{Corrected, correct_recording};
+pub use recording::{CorrectOptions, Corrected, SIGMA_UNITS_PER_METRE, correct_recording};

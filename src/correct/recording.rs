@@ -42,9 +42,19 @@ pub struct Corrected {
     pub remarks: Vec<String>,
 }
 
+/// How a recording is corrected.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct CorrectOptions<'a> {
+    /// Leave raw disparities in their code.
+    pub keep_code: bool,
+    /// A folder for images of the correction's standard uncertainty.
+    pub sigma: Option<&'a Path>,
+}
+
 /// Write the recording at `root` again into `output`, all its files, `model`'s biases taken out of
 /// the depth. Raw disparities become metric values, finer than the read-out's steps, unless
-/// `keep_code`.
+/// `keep_code`. Images of the uncertainty have the depth images' names, 16 bit, in units of 10 um
+/// ([`SIGMA_UNITS_PER_METRE`]); 0 where there is no depth.
 ///
 /// # Errors
 /// When `root` is no recording, the model is of another resolution, or `output` has something in
@@ -54,12 +64,15 @@ pub fn correct_recording(
     assumed: &Assumed,
     model: &NoiseModel,
     output: &Path,
-    keep_code: bool,
+    options: &CorrectOptions<'_>,
     progress: Progress<'_>,
 ) -> Result<Corrected> {
+    let keep_code = options.keep_code;
     let layout = Layout::of(root)?;
-    refuse_inside(output, root)?;
-    refuse_full(output)?;
+    for folder in [Some(output), options.sigma].into_iter().flatten() {
+        refuse_inside(folder, root)?;
+        refuse_full(folder)?;
+    }
     let recording = open_uncut(root, assumed)?;
     let sensor = &recording.sensor;
     let images = images(&recording, root)?;
@@ -71,12 +84,28 @@ pub fn correct_recording(
         correction: Correction::of(model, sensor)?,
         table: sensor.code.table(),
         raw: RawCode::of(sensor.code),
+        sigma: options.sigma,
     };
+    if options.sigma.is_some() && !rewrite.correction.knows_uncertainty() {
+        return Err(Error::Argument {
+            what: "the model does not say how sure its biases are".into(),
+            remedy: "diagnose again with this version, which writes it, or leave out --sigma",
+        });
+    }
     let disparity = matches!(sensor.code, DepthCode::Disparity { .. });
     if disparity && !keep_code && !rewrite.correction.is_identity() {
         rewrite.raw = RawCode::of(metric(rewrite.max_depth(&images)?));
     }
     std::fs::create_dir_all(output).map_err(|e| Error::write(output, e))?;
+    if let Some(folder) = options.sigma {
+        std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
+        let about = serde_json::json!({
+            "format": SIGMA_FORMAT,
+            "units_per_metre": SIGMA_UNITS_PER_METRE,
+            "invalid": 0,
+        });
+        write_atomic(&folder.join("sigma.json"), format!("{about:#}\n").as_bytes())?;
+    }
     rewrite.write(&images, &recording, progress)
 }
 
@@ -117,7 +146,13 @@ struct Rewrite<'a> {
     table: DepthTable,
     /// The code that is written.
     raw: RawCode,
+    /// Where images of the uncertainty go.
+    sigma: Option<&'a Path>,
 }
+
+/// 10 um, so that 16 bit hold 0.65 m.
+pub const SIGMA_UNITS_PER_METRE: f64 = 1e5;
+const SIGMA_FORMAT: &str = "kinoise-correction-sigma/1";
 
 /// What was done to one image, or why it could not be read.
 #[derive(Default)]
@@ -223,7 +258,23 @@ impl Rewrite<'_> {
             _ => encode_png16(&frame)?,
         };
         write_atomic(&target, &bytes)?;
+        if let Some(folder) = self.sigma {
+            self.write_sigma(&folder.join(image.file.with_extension("png")), &after, image)?;
+        }
         Ok(tally)
+    }
+
+    fn write_sigma(&self, target: &Path, depth_m: &[f32], image: &Image) -> Result<()> {
+        let sigma = self.correction.uncertainty_m(depth_m, &image.conditions);
+        let word = |s: &f32| match f64::from(*s) * SIGMA_UNITS_PER_METRE {
+            units if units.is_nan() => 0,
+            // A certain depth is a depth still.
+            units => units.round().clamp(1.0, f64::from(u16::MAX)) as u16,
+        };
+        let (width, height) = (self.sensor.camera.width, self.sensor.camera.height);
+        let frame = Frame { width, height, raw: sigma.iter().map(word).collect() };
+        make_folder_of(target)?;
+        write_atomic(target, &encode_png16(&frame)?)
     }
 
     /// Store corrected depths; what was no measurement stays none.

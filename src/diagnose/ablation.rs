@@ -46,7 +46,7 @@ impl Ablation {
     }
 
     /// A size below this, in sigmas, is nobody's concern.
-    pub(super) fn least_size(self, least: f64) -> f64 {
+    pub(super) fn min_size(self, least: f64) -> f64 {
         if self == Ablation::UncalibratedThresholds { 0.0 } else { least }
     }
 }

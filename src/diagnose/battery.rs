@@ -8,7 +8,7 @@ use super::findings;
 use super::form::better_form;
 use super::hanging::Hanging;
 use super::heldout;
-use super::lines::line_terms;
+use super::lines::lines;
 use super::missing::missing;
 use super::next_view;
 use super::other_findings;
@@ -19,7 +19,7 @@ use super::replication_textures;
 use super::rim;
 use super::scene::Scene;
 use super::steps::{is_raw, steps};
-use super::verdict::{LEAST_SIZE, echoes, fold_into_sigma, merge, symptoms};
+use super::verdict::{MIN_SIZE, echoes, fold_into_sigma, merge, symptoms};
 use crate::terms::{Axis, Statistic, Term, corner_radius};
 
 /// How noise hangs together changes what a few frames show of its size by so much.
@@ -67,12 +67,15 @@ impl Case<'_> {
         let lattice = &scatter.lattice;
         let steps = steps(lattice, &self.known, &self.fields, self.recording, sigma_mm, &second);
         let mut curves = self.curves([&mean.outcome, &scatter.outcome], advise);
-        let refitted = self.take_refit(&mut curves, &scatter.outcome);
+        let refitted = self.take_refit(&mut curves);
         curves.retain(|f| self.is_news(f, &steps, &scatter));
         if self.baseline.is_none() {
             fold_into_sigma(&mut curves);
         }
-        let better_form = self.tell_form(&mut curves, refitted.is_some());
+        // Nats, as long as they are not shares.
+        let clear = scatter.outcome.noise.threshold(self.options.level);
+        let clearly = refitted.as_ref().is_some_and(|f| f.share > clear);
+        let better_form = self.tell_form(&mut curves, clearly);
         let mut found: Vec<Finding> = self.ranges.clone().into_iter().chain(curves).collect();
         found.extend(self.texture(&mean, &scatter, steps));
         let (lost, detectable) = self.lost();
@@ -123,7 +126,7 @@ impl Case<'_> {
         let textured = scatter.tails.is_some()
             || (!scatter.hangs.is_empty() && f.size.sigma < LEVEL_BESIDE_TEXTURE);
         let tailed = textured && f.status == Status::Recalibrate;
-        !stepped && !tailed && f.size.sigma > self.options.ablation.least_size(LEAST_SIZE)
+        !stepped && !tailed && f.size.sigma > self.options.ablation.min_size(MIN_SIZE)
     }
 
     /// What neither a mean nor a variance shows: how the noise hangs together, tails, steps.
@@ -145,24 +148,23 @@ impl Case<'_> {
             f.effect.is_none() && f.statistic == Statistic::Bias && f.axis == Axis::Column
         };
         if self.baseline.is_none() {
-            found
-                .iter_mut()
-                .filter(stands)
-                .for_each(|f| f.terms = line_terms(&self.fields, &mean.px));
+            for f in found.iter_mut().filter(stands) {
+                let lines = lines(&self.fields, &mean.px);
+                f.terms = lines.terms;
+                f.covariance.variances = lines.variances;
+            }
         }
         found
     }
 
-    /// The refit of a sigma that was calibrated here is no finding; where it changes more than noise
-    /// can, the extended model has it.
-    fn take_refit(&self, curves: &mut Vec<Finding>, variance: &Outcome) -> Option<Finding> {
+    /// The refit of a sigma that was calibrated here is no finding; the extended model has it, for all
+    /// else was fitted beside it.
+    fn take_refit(&self, curves: &mut Vec<Finding>) -> Option<Finding> {
         if !self.survey.refits_sigma {
             return None;
         }
-        let threshold = variance.noise.threshold(self.options.level);
         let at = curves.iter().position(|f| f.status == Status::Recalibrate)?;
-        // Nats, as long as they are not shares.
-        Some(curves.remove(at)).filter(|f| f.share > threshold)
+        Some(curves.remove(at))
     }
 
     /// Where sigma's own form is off, the form that would do better: beside the finding, and as a
@@ -205,17 +207,27 @@ impl Case<'_> {
         // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
         let anchored: Vec<Term> =
             bias.iter().filter(|t| t.basis.is_nothing_ahead()).cloned().collect();
+        let excess =
+            self.survey.learnt_from[0].map_or(1.0, |views| 1.0 + self.fields.len() as f64 / views);
         let found = |terms: &[Term]| {
             let levels = heldout::levels(&self.survey, terms);
             let laws = reference::laws(&self.fields, &levels, &self.survey.second());
             let level = self.level(Self::LAWS_LEVEL);
-            reference::findings(&laws, &self.known, level, self.options.seed)
+            reference::findings(&laws, &self.known, excess, level, self.options.seed)
         };
         // A bowl, too, moves the plane on the axis, by what nobody can tell from a law of the
-        // distance: a law must hold with and without it.
-        let with = found(bias);
+        // distance: a law must hold with and without it, be it new or the model's.
+        let back = |t: &Term| Term {
+            coefficients: t.coefficients.iter().map(|c| -c).collect(),
+            ..t.clone()
+        };
+        let model: Vec<Term> =
+            self.known.bias.iter().filter(|t| !t.basis.is_nothing_ahead()).map(back).collect();
         let mut laws = found(&anchored);
-        laws.retain(|l| with.iter().any(|w| w.effect == l.effect));
+        for others in [bias.to_vec(), [anchored, model].concat()] {
+            let with = found(&others);
+            laws.retain(|l| with.iter().any(|w| w.effect == l.effect));
+        }
         laws
     }
 }

@@ -39,6 +39,8 @@ pub struct Case<'a> {
     pub copies: Vec<String>,
     /// Found while reading: the words are ranges.
     pub ranges: Option<Finding>,
+    /// Views that the model's bias, and its sigma, were learnt from, where these are others.
+    learnt_from: [Option<f64>; 2],
     /// The model has what a first run found.
     pub extended: bool,
 }
@@ -84,7 +86,8 @@ impl<'a> Case<'a> {
         if let Some(baseline) = &baseline {
             baseline.references(&mut fields);
         }
-        let survey = survey(&fields, &bench, baseline.as_ref(), options);
+        let learnt_from = learnt_from(model, &known, options, simulated.is_some());
+        let survey = survey(&fields, &bench, baseline.as_ref(), options, (learnt_from, &known));
         Ok(Case {
             recording,
             model,
@@ -97,6 +100,7 @@ impl<'a> Case<'a> {
             excluded,
             copies,
             ranges,
+            learnt_from,
             extended: false,
         })
     }
@@ -106,7 +110,8 @@ impl<'a> Case<'a> {
     where
         'a: 'b,
     {
-        let survey = survey(&fields, &self.bench, self.baseline.as_ref(), self.options);
+        let learnt = (self.learnt_from, &known);
+        let survey = survey(&fields, &self.bench, self.baseline.as_ref(), self.options, learnt);
         Case {
             model,
             known,
@@ -183,12 +188,18 @@ impl<'a> Case<'a> {
         }
         let level = self.level(Self::VARIANCE_LEVEL);
         let sigma = &self.model.sigma;
+        if self.survey.learnt_from[1].is_some() {
+            self.survey.forgive_variance(&self.known, sigma);
+        }
         let outcome = self.survey.search_variance(sigma, camera, level, self.options.seed);
         let terms = terms_of(&outcome, Statistic::Variance);
         measure_tails(&mut structure, &self.fields, &mean.px, &terms, &self.survey, &self.bench);
         let alike = self.baseline.as_ref().is_some_and(|b| b.tails_alike(&structure));
+        let holds = |t: &Term| self.holds_tails(t);
         let uneven = outcome.chosen.iter().any(|c| c.candidate.family.is_none())
-            || !terms.iter().all(|t| self.holds_tails(t));
+            || self.survey.refits_sigma && !terms.iter().all(holds)
+            || self.known.has_uneven_noise()
+            || !self.known.variance.iter().all(holds);
         let tails = tails(&structure, &self.known, each, uneven).filter(|_| !alike);
         Scatter { structure, lattice, hangs, tails, outcome }
     }
@@ -199,8 +210,7 @@ impl<'a> Case<'a> {
         const MUCH: f64 = -1.4;
         let mut row = Vec::new();
         let mut tiles = self.survey.views.iter().flat_map(|v| v.tiles.iter());
-        !self.survey.refits_sigma
-            || !matches!(term.basis, Basis::Table { .. })
+        !matches!(term.basis, Basis::Table { .. })
             || tiles.all(|t| term.value(&t.place, &mut row) > MUCH)
     }
 
@@ -221,6 +231,7 @@ fn survey(
     bench: &Workbench<'_>,
     baseline: Option<&Baseline>,
     options: &DiagnoseOptions,
+    (learnt_from, known): ([Option<f64>; 2], &KnownTerms),
 ) -> Survey {
     let camera = &bench.sensor.camera;
     let mut survey = Survey::of(fields, camera, &bench.rays);
@@ -230,5 +241,21 @@ fn survey(
     if let Some(baseline) = baseline {
         baseline.means(&mut survey);
     }
+    survey.learnt_from = learnt_from;
+    if learnt_from[0].is_some() {
+        survey.forgive_bias(known);
+    }
     survey
+}
+
+/// Views that the model's bias, and its sigma, were learnt from, where these are others.
+fn learnt_from(
+    model: &NoiseModel,
+    known: &KnownTerms,
+    options: &DiagnoseOptions,
+    against: bool,
+) -> [Option<f64>; 2] {
+    let others = !against && !options.calibrated_here && model.fit.views > 0;
+    let views = others.then_some(model.fit.views as f64);
+    [views.filter(|_| known.bias_is_learnt()), views]
 }

@@ -45,9 +45,8 @@ impl Choice<'_> {
         self.judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| j.gain.total)
     }
 
-    /// Views that scatter more than their noise says count for less.
     fn safe(&self, i: usize) -> f64 {
-        self.judged[i].as_ref().map_or(0.0, |j| j.gain.total / j.null.dispersion)
+        self.judged[i].as_ref().map_or(0.0, |j| j.safe(self.rules))
     }
 
     /// A name whose fits to single views disagree is the worse one.
@@ -165,7 +164,7 @@ fn steady(judged: &Judged) -> bool {
 }
 
 /// Mean difference over the views by its standard error.
-fn behind(winner: &[f64], rival: &[f64]) -> f64 {
+pub fn behind(winner: &[f64], rival: &[f64]) -> f64 {
     let n = winner.len() as f64;
     let differences = || winner.iter().zip(rival).map(|(w, r)| w - r);
     let mean = differences().sum::<f64>() / n;

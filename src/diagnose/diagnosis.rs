@@ -3,6 +3,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use crate::model::Covariance;
 use crate::terms::{Axis, Statistic, Term};
 
 pub const DIAGNOSIS_FORMAT: &str = "kinoise-diagnosis/1";
@@ -91,6 +92,9 @@ pub struct Finding {
     /// What the model is given.
     #[serde(skip)]
     pub terms: Vec<Term>,
+    /// Of the terms' coefficients, one term after the other.
+    #[serde(skip)]
+    pub covariance: Covariance,
 }
 
 #[derive(Debug, Clone, Serialize)]

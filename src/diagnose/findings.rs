@@ -10,6 +10,7 @@ use super::parameters::{of_any_formula, parameters};
 use super::scene::{Scene, size};
 use super::shape;
 use crate::effects::Fitted;
+use crate::model::Covariance;
 use crate::terms::{Axis, Basis, Modulation, Term};
 
 /// All terms of a layer as findings. Terms of one family are one finding, and a nameless curve on
@@ -123,10 +124,20 @@ fn finding(
         shape,
         curve: Some(along.curve(scene, &left, &mine)),
         terms: group.iter().map(|&k| terms[k].clone()).collect(),
+        covariance: covariance_of(outcome, group),
     };
     // Nats for now; the engine turns them into shares.
     finding.share = group.iter().map(|&k| outcome.chosen[k].gain).sum();
     finding
+}
+
+/// Of the terms of a group.
+fn covariance_of(outcome: &Outcome, group: &[usize]) -> Covariance {
+    let Covariance { fit, factors, variances } = &outcome.covariance;
+    let of = |f: &Vec<f64>| -> Vec<f64> {
+        group.iter().filter_map(|&k| f.get(outcome.span(k))).flatten().copied().collect()
+    };
+    Covariance { fit: *fit, factors: factors.iter().map(of).collect(), variances: of(variances) }
 }
 
 fn sum<'a>(layers: impl Iterator<Item = &'a Vec<Vec<f64>>>) -> Vec<Vec<f64>> {

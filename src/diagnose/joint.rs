@@ -18,6 +18,8 @@ use super::outcome::{Chosen, Outcome};
 use super::replication::{Half, Halves};
 use super::samples::{ViewData, coarser};
 use crate::camera::Camera;
+use crate::model::Covariance;
+use crate::terms::Gauge;
 
 /// The terms of a finished search fitted together, with the smooth rest. `fine` are the views' means
 /// in small patches, `inflation` what each view's weights were divided by: a bias is as sure in a
@@ -70,17 +72,16 @@ impl Joint<'_> {
         let kept = self.kept(&s.terms);
         let whole = Reduced::of(&self.all, self.columns.terms, s.penalty.as_ref())?;
         let first = whole.fit(&kept, &self.precision)?;
-        // What every view says of the terms beyond the common fit.
-        let beyond: Vec<DVector<f64>> = data
-            .par_iter()
-            .filter_map(|view| {
-                let left = self.columns.left(view, &first)?;
-                let terms = self.columns.terms;
-                let nodes = left.rows(terms, self.columns.nodes);
-                let mine = left.rows(0, terms) - whole.with.transpose() * nodes;
-                Some(DVector::from_fn(kept.len(), |i, _| mine[kept[i]]))
-            })
-            .collect();
+        // What every view says beyond the common fit, of all and of the terms alone.
+        let left: Vec<DVector<f64>> =
+            data.par_iter().filter_map(|view| self.columns.left(view, &first)).collect();
+        let of_terms = |left: &DVector<f64>| {
+            let terms = self.columns.terms;
+            let nodes = left.rows(terms, self.columns.nodes);
+            let mine = left.rows(0, terms) - whole.with.transpose() * nodes;
+            DVector::from_fn(kept.len(), |i, _| mine[kept[i]])
+        };
+        let beyond: Vec<DVector<f64>> = left.iter().map(of_terms).collect();
         let information =
             DMatrix::from_fn(kept.len(), kept.len(), |i, j| whole.a[(kept[i], kept[j])]);
         let held = |dispersion: f64| {
@@ -107,7 +108,12 @@ impl Joint<'_> {
                 .filter(|r| s.penalty.is_none() || !is_smooth_and_nameless(&r.candidate)),
             left_out: Vec::new(),
             halves: self.halves(data, second, s, &precision, &beta),
+            covariance: Covariance::default(),
         };
+        if let Some(error) = self.error(s, &kept, &precision, &left) {
+            outcome.covariance.factors = error.factors.iter().map(|f| self.told(s, f)).collect();
+            outcome.covariance.variances = self.laid_out(s, &error.variances, |_, _| [0.0; 3]);
+        }
         let folds = s.without.iter().zip(&self.views);
         outcome.left_out = folds
             .filter_map(|(r, views)| {
@@ -221,7 +227,7 @@ impl Joint<'_> {
                     gain,
                     best_curve: gain,
                     rivals: Vec::new(),
-                    p: found.noise.p(s.maps),
+                    p: s.maps_p,
                 });
             }
         }
@@ -230,23 +236,33 @@ impl Joint<'_> {
 
     /// The coefficients of [`Joint::chosen`].
     fn told(&self, s: &Settled, beta: &DVector<f64>) -> Vec<f64> {
+        self.laid_out(s, beta, |gauge, mine| gauge.term(mine).1)
+    }
+
+    /// A number for each coefficient of [`Joint::chosen`]; `affine` has those of what planes absorb.
+    fn laid_out(
+        &self,
+        s: &Settled,
+        of_columns: &DVector<f64>,
+        affine: impl Fn(&Gauge, &[f64]) -> [f64; 3],
+    ) -> Vec<f64> {
         let mut told = Vec::new();
         for &t in &s.terms {
-            let mine = &beta.as_slice()[self.columns.span(t)];
+            let mine = &of_columns.as_slice()[self.columns.span(t)];
             told.extend(mine);
             if let Some(gauge) = &self.columns.gauges[t] {
-                told.extend(gauge.term(mine).1);
+                told.extend(affine(gauge, mine));
             }
         }
         if s.penalty.is_some() {
-            told.extend(beta.rows(self.columns.terms, self.columns.nodes).iter());
+            told.extend(of_columns.rows(self.columns.terms, self.columns.nodes).iter());
         }
         told
     }
 }
 
 /// Covariance with the views as the sample (White 1980; Liang and Zeger 1986), where it is the larger.
-fn clustered(inverse: &DMatrix<f64>, beyond: &[DVector<f64>]) -> DMatrix<f64> {
+pub fn clustered(inverse: &DMatrix<f64>, beyond: &[DVector<f64>]) -> DMatrix<f64> {
     let n = beyond.len() as f64;
     let mut square = DMatrix::zeros(inverse.nrows(), inverse.nrows());
     for e in beyond {

@@ -1,8 +1,10 @@
 //! Which terms the joint fit keeps, and whether it has a smooth rest: by what views left out say.
 
 use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::candidate::Candidate;
+use super::choose::behind;
 use super::joint_fit::{Joint, Reduced, SMOOTHNESS};
 use super::outcome::Chosen;
 use crate::camera::Camera;
@@ -31,8 +33,10 @@ pub struct Settled {
     pub penalty: Option<DMatrix<f64>>,
     pub without: Vec<Reduced>,
     pub scores: Vec<f64>,
-    /// What the maps bring beside the terms, nats.
+    /// What the maps bring beside the terms, nats, and the chance that nothing brings as much: over
+    /// the parts left out, by Student's t.
     pub maps: f64,
+    pub maps_p: f64,
 }
 
 impl Joint<'_> {
@@ -40,21 +44,28 @@ impl Joint<'_> {
         let everything: Vec<usize> = (0..chosen.len()).collect();
         let plain = self.without(None)?;
         let scores = self.scores(&plain, &everything, |_| true);
-        let mut settled =
-            Settled { scores, terms: everything, penalty: None, without: plain, maps: 0.0 };
+        let mut settled = Settled {
+            scores,
+            terms: everything,
+            penalty: None,
+            without: plain,
+            maps: 0.0,
+            maps_p: 1.0,
+        };
         let is_kept = |t: &usize| !is_smooth_and_nameless(&chosen[*t].candidate);
         let kept: Vec<usize> = settled.terms.iter().copied().filter(is_kept).collect();
         if let Some(mapped) = self.best_maps(&kept, camera) {
             let better = total(&mapped.scores) - total(&settled.scores);
             let slack = MAPS_SHARE * total(&mapped.scores);
-            let clear = clearly(&mapped.scores, &settled.scores) > MAPS_CLEARLY;
+            let clear = behind(&mapped.scores, &settled.scores) > MAPS_CLEARLY;
             // A rest that the search saw is told by the maps, unless they are the worse for it.
             let seen = kept.len() < settled.terms.len();
             if (clear && better > slack) || (seen && better > -slack) {
-                let alone = total(&self.scores(&settled.without, &kept, |_| true));
+                let alone = self.scores(&settled.without, &kept, |_| true);
                 settled = mapped;
-                self.drop_idle(&mut settled, chosen, alone);
-                settled.maps = total(&settled.scores) - alone;
+                self.drop_idle(&mut settled, chosen, total(&alone));
+                settled.maps = total(&settled.scores) - total(&alone);
+                settled.maps_p = chance(behind(&settled.scores, &alone), alone.len());
             }
         }
         if settled.penalty.is_none() {
@@ -80,10 +91,10 @@ impl Joint<'_> {
                 break;
             }
             let (terms, penalty) = (terms.to_vec(), Some(penalty));
-            all.push(Settled { terms, penalty, without, scores, maps: 0.0 });
+            all.push(Settled { terms, penalty, without, scores, maps: 0.0, maps_p: 1.0 });
         }
         let best = all.last()?.scores.clone();
-        all.into_iter().find(|s| clearly(&best, &s.scores) < 1.0)
+        all.into_iter().find(|s| behind(&best, &s.scores) < 1.0)
     }
 
     /// Terms that the maps make needless, the most needless first.
@@ -102,7 +113,7 @@ impl Joint<'_> {
                 let lost = all - total(&scores);
                 let of_target = !is_of_sensor(c);
                 let share = if of_target { MAPS_SHARE } else { TERM_SHARE };
-                let needed = lost > share * all && clearly(&settled.scores, &scores) > TERM_CLEARLY;
+                let needed = lost > share * all && behind(&settled.scores, &scores) > TERM_CLEARLY;
                 let believed = !of_target || self.size(settled, t) < LARGEST_USUAL;
                 (!(needed && believed)).then_some((lost, others, scores))
             };
@@ -168,17 +179,14 @@ impl Joint<'_> {
     }
 }
 
-pub fn total(scores: &[f64]) -> f64 {
-    scores.iter().sum()
+/// Of a mean over its standard error this large, over so many parts.
+fn chance(t: f64, parts: usize) -> f64 {
+    let law = StudentsT::new(0.0, 1.0, parts.saturating_sub(1).max(1) as f64);
+    law.map_or(1.0, |law| law.sf(t))
 }
 
-/// Mean of the differences over its standard error.
-fn clearly(better: &[f64], than: &[f64]) -> f64 {
-    let n = better.len() as f64;
-    let differences = || better.iter().zip(than).map(|(a, b)| a - b);
-    let mean = differences().sum::<f64>() / n;
-    let variance = differences().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    mean / (variance / n).sqrt().max(f64::MIN_POSITIVE)
+pub fn total(scores: &[f64]) -> f64 {
+    scores.iter().sum()
 }
 
 /// Do the maps say the same, and more?

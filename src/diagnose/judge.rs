@@ -16,6 +16,13 @@ pub struct Judged {
     pub rms: f64,
 }
 
+impl Judged {
+    /// Nats that count against what noise brings.
+    pub fn safe(&self, rules: &Rules) -> f64 {
+        self.null.safe(self.gain.total, self.gain.by_view.len(), rules)
+    }
+}
+
 /// A later term must be this large beside the largest, root mean square by root mean square.
 pub const LEAST_OF_LARGEST: f64 = 0.06;
 
@@ -78,7 +85,12 @@ fn one_way(basis: &Basis, beta: &[f64], [near, far]: [f64; 2]) -> bool {
     f64::min(up, down) < BACK * (up + down)
 }
 
-pub fn looks(candidates: &[Candidate], judged: &[Option<Judged>], noise: &NoiseGains) -> Vec<Look> {
+pub fn looks(
+    candidates: &[Candidate],
+    judged: &[Option<Judged>],
+    rules: &Rules,
+    noise: &NoiseGains,
+) -> Vec<Look> {
     let nameless = candidates.iter().zip(judged).filter(|(c, _)| c.family.is_none());
     nameless
         .filter_map(|(c, j)| {
@@ -86,7 +98,7 @@ pub fn looks(candidates: &[Candidate], judged: &[Option<Judged>], noise: &NoiseG
             Some(Look {
                 basis: c.basis.clone(),
                 coefficients: j.gain.beta.as_slice().to_vec(),
-                p: noise.p(j.gain.total / j.null.dispersion),
+                p: noise.p(j.safe(rules)),
             })
         })
         .collect()

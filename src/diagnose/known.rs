@@ -1,11 +1,13 @@
 //! What the model knows already: it is taken out before anything is looked for.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Map, Value};
 
 use crate::camera::Camera;
 use crate::effects;
-use crate::model::NoiseModel;
-use crate::terms::{Statistic, Term};
+use crate::model::{Covariance, NoiseModel, UNEXPLAINED};
+use crate::terms::{Basis, Statistic, Term};
 
 /// The model's effects as terms, and the rest by name.
 #[derive(Debug, Clone, Default)]
@@ -15,6 +17,8 @@ pub struct KnownTerms {
     /// Of the logarithm of its variance.
     pub variance: Vec<Term>,
     entries: Vec<(String, Map<String, Value>)>,
+    /// Fitted shapes with the covariance of their coefficients.
+    learnt: Vec<(Vec<Term>, Covariance)>,
 }
 
 impl KnownTerms {
@@ -35,6 +39,10 @@ impl KnownTerms {
                     Statistic::Variance => known.variance.push(term.clone()),
                     _ => {}
                 }
+            }
+            if !entry.shape.is_empty() {
+                let covariance = entry.covariance.clone().unwrap_or_default();
+                known.learnt.push((entry.shape.clone(), covariance));
             }
             known.entries.push((entry.id.clone(), entry.parameters.clone()));
         }
@@ -63,6 +71,60 @@ impl KnownTerms {
                 }
             }
         }
+    }
+
+    /// Is a part of the bias a shape that was fitted?
+    pub fn bias_is_learnt(&self) -> bool {
+        self.learnt.iter().flat_map(|(shape, _)| shape).any(|t| t.statistic == Statistic::Bias)
+    }
+
+    /// Does the noise change its size in a way that has no name?
+    pub fn has_uneven_noise(&self) -> bool {
+        let nameless = self.entries.iter().filter(|(id, _)| id == UNEXPLAINED);
+        nameless.count() > 0
+            && self.variance.iter().any(|t| {
+                matches!(
+                    t.basis,
+                    Basis::Curve { .. }
+                        | Basis::Ring { .. }
+                        | Basis::Map { .. }
+                        | Basis::Pair { .. }
+                )
+            })
+    }
+
+    /// What the learnt terms may be off by: terms that err together, by one standard deviation.
+    pub fn errors(&self, statistic: Statistic) -> Vec<Vec<Term>> {
+        let mut parts: BTreeMap<(u32, usize), Vec<Term>> = BTreeMap::new();
+        for (shape, covariance) in &self.learnt {
+            for (k, factor) in covariance.factors.iter().enumerate() {
+                let part = parts.entry((covariance.fit, k)).or_default();
+                let mut rest = &factor[..];
+                for term in shape {
+                    let (mine, others) = rest.split_at(term.coefficients.len().min(rest.len()));
+                    rest = others;
+                    if term.statistic == statistic && mine.iter().any(|c| *c != 0.0) {
+                        part.push(Term { coefficients: mine.to_vec(), ..term.clone() });
+                    }
+                }
+            }
+        }
+        parts.into_values().filter(|part| !part.is_empty()).collect()
+    }
+
+    /// Variance of what learnt profiles of single columns and rows may be off by, px^2.
+    pub fn error_of_lines_px2(&self) -> f64 {
+        let of = |(shape, covariance): &(Vec<Term>, Covariance)| -> f64 {
+            let mut rest = &covariance.variances[..];
+            let mut sum = 0.0;
+            for term in shape {
+                let (mine, others) = rest.split_at(term.coefficients.len().min(rest.len()));
+                rest = others;
+                sum += mine.iter().sum::<f64>() / mine.len().max(1) as f64;
+            }
+            sum
+        };
+        self.learnt.iter().filter(|(_, c)| c.factors.is_empty()).map(of).sum()
     }
 
     pub fn has(&self, id: &str) -> bool {

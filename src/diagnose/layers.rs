@@ -7,10 +7,12 @@ use rayon::prelude::*;
 
 use super::ablation::Ablation;
 use super::bias;
-use super::candidate::Candidate;
+use super::candidate::{Candidate, RECALIBRATE};
+use super::evidence::{Gain, gain};
 use super::field::Field;
-use super::joint::refit;
-use super::outcome::{Outcome, Rules};
+use super::joint::{clustered, refit};
+use super::outcome::{Chosen, Outcome, Rules};
+use super::prepared::evidence_of_bases;
 use super::replication::halves;
 use super::samples::{ViewData, coarser};
 use super::scatter::{Left, left_by_fit};
@@ -23,7 +25,7 @@ use crate::effects::Bounds;
 use crate::model::SigmaModel;
 use crate::rng::Seed;
 use crate::stats::{Correlation, measure_correlation};
-use crate::terms::{Extent, PixelContext};
+use crate::terms::{Basis, Extent, PixelContext};
 
 /// The tiles of all views, with how much each view is worth.
 pub struct Survey {
@@ -36,6 +38,8 @@ pub struct Survey {
     pub tolerance: f64,
     /// Sigma was calibrated on these very views: it is refitted beside every hypothesis.
     pub refits_sigma: bool,
+    /// Views that the model's bias, and its sigma, were learnt from, where these are others.
+    pub learnt_from: [Option<f64>; 2],
     pub ablation: Ablation,
 }
 
@@ -112,7 +116,16 @@ impl Survey {
         let light = relative_light(&mut views);
         let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter().map(|t| &t.place)));
         let (tolerance, ablation) = (MODEL_TOLERANCE, Ablation::None);
-        Survey { views, reach, fixed_px2: 0.0, light, tolerance, refits_sigma: false, ablation }
+        Survey {
+            views,
+            reach,
+            fixed_px2: 0.0,
+            light,
+            tolerance,
+            refits_sigma: false,
+            learnt_from: [None; 2],
+            ablation,
+        }
     }
 
     /// Root of the weighted harmonic mean of the model's variance, px.
@@ -160,6 +173,7 @@ impl Survey {
             fixed: (self.fixed_px2 > 0.0).then(|| (self.fixed_px2.sqrt(), self.covered_px(camera))),
             least: LEAST_SIGMAS * self.typical_sigma_px(),
             calibrated: true,
+            learnt_from: self.learnt_from[0],
         })
     }
 
@@ -188,6 +202,7 @@ impl Survey {
             light: self.light,
             tolerance: self.tolerance,
             refits_sigma: self.refits_sigma,
+            learnt_from: self.learnt_from,
             ablation: self.ablation,
         }
     }
@@ -275,6 +290,7 @@ impl Survey {
             // dropped when they are told, by their size on the axis.
             least: 0.0,
             calibrated: true,
+            learnt_from: self.learnt_from[1],
         })
     }
 
@@ -297,14 +313,62 @@ impl Survey {
         }
         let data = self.variance_data();
         let candidates = self.ablation.candidates(candidates);
-        search_beside(&data, &data, &candidates, refit, &self.variance_rules(level), seed)
-            .halved(&self.second(), VARIANCE_PRIOR)
+        let refits = refit.is_some();
+        let rules = self.variance_rules(level);
+        let mut found = search_beside(&data, &data, &candidates, refit, &rules, seed);
+        if refits {
+            found = with_best_surface(&data, found, variance::surfaces(&self.reach));
+        }
+        cluster(&mut found);
+        found.halved(&self.second(), VARIANCE_PRIOR)
     }
 
     /// Which half each view is in.
     pub fn second(&self) -> Vec<bool> {
         self.views.iter().map(|v| v.second).collect()
     }
+}
+
+/// Beside every hypothesis sigma was as free as can be; told is the surface that predicts views left
+/// out best beside what was found, or none.
+fn with_best_surface(data: &[ViewData], found: Outcome, surfaces: Vec<Candidate>) -> Outcome {
+    let (refit, others): (Vec<Chosen>, Vec<Chosen>) =
+        found.chosen.into_iter().partition(|c| c.candidate.family == Some(RECALIBRATE));
+    let of = |surface: Option<&Candidate>| {
+        let bases: Vec<&Basis> =
+            others.iter().map(|c| &c.candidate).chain(surface).map(|c| &c.basis).collect();
+        let evidence = evidence_of_bases(data, &bases);
+        let fit = if bases.is_empty() { None } else { gain(&evidence, VARIANCE_PRIOR) };
+        (evidence, fit)
+    };
+    let total = |fit: &Option<Gain>| fit.as_ref().map_or(0.0, |f| f.total);
+    let mut best = (None, of(None));
+    let alone = total(&best.1.1);
+    for surface in surfaces {
+        let with = of(Some(&surface));
+        if total(&with.1) > total(&best.1.1) {
+            best = (Some(surface), with);
+        }
+    }
+    let (surface, (evidence, fit)) = best;
+    let gain = total(&fit) - alone;
+    let mut chosen = others;
+    if let (Some(candidate), Some(old)) = (surface, refit.into_iter().next()) {
+        chosen.push(Chosen { candidate, gain, ..old });
+    }
+    Outcome { chosen, fit, evidence, ..found }
+}
+
+/// The covariance of the terms, with the views as the sample.
+fn cluster(found: &mut Outcome) {
+    let Some(fit) = &mut found.fit else { return };
+    let beyond: Vec<DVector<f64>> =
+        found.evidence.iter().map(|e| &e.b - &e.a * &fit.beta).collect();
+    fit.covariance = clustered(&fit.covariance, &beyond);
+    let eigen = fit.covariance.clone().symmetric_eigen();
+    let factor = |k: usize| eigen.eigenvectors.column(k) * eigen.eigenvalues[k].max(0.0).sqrt();
+    found.covariance.factors =
+        (0..eigen.eigenvalues.len()).map(|k| factor(k).as_slice().to_vec()).collect();
 }
 
 /// Light in units of the recording's median, what the room adds taken out.

@@ -79,7 +79,7 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {
     let all = [
         (
             Mean::of_pairs(views, |s| s.lines_px2),
-            line(vec![], Statistic::Bias, Axis::Column, 0.0, Some(still)),
+            line(vec![], Statistic::Bias, Axis::Column, known.error_of_lines_px2(), Some(still)),
         ),
         (
             Mean::of(views, |s| s.row_px2),

@@ -5,6 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::evidence::Evidence;
+use super::outcome::Rules;
 use crate::rng::{Seed, Stream};
 
 /// What noise alone may bring for a candidate: b ~ N(0, A) in every view.
@@ -19,6 +20,8 @@ pub struct Null {
     /// How much more the views' own fits scatter than their noise explains, at least 1: about the
     /// common fit, or about nothing at all where a few views have what the others have not.
     pub dispersion: f64,
+    /// The same about the common fit alone.
+    pub about_fit: f64,
 }
 
 impl Null {
@@ -36,7 +39,19 @@ impl Null {
         let total: Vec<f64> = (0..k).map(|j| by_view.iter().map(|a| a[j]).sum()).collect();
         let about_fit = dispersion(&alone, &by_view, &total, &u, &left, prior);
         let dispersion = about_fit.min(usual_square(&by_view, &total, &u, &left));
-        Some(Null { by_view, total, prior, dispersion })
+        Some(Null { by_view, total, prior, dispersion, about_fit })
+    }
+
+    /// Nats that count against what noise brings, by `rules`, of a gain over so many views: views
+    /// that scatter more than their noise says count for less. Held against what other views taught,
+    /// their scatter is the noise; it was measured on few views, which makes a Student's t of a
+    /// Gaussian.
+    pub fn safe(&self, gain: f64, views: usize, rules: &Rules) -> f64 {
+        let views = views as f64;
+        let Some(learnt_from) = rules.learnt_from else { return gain / self.dispersion };
+        let nats = gain / (self.about_fit * (1.0 + views / learnt_from));
+        let freedom = (views - 1.0).max(1.0);
+        if nats > 0.0 { 0.5 * freedom * (2.0 * nats / freedom).ln_1p() } else { nats }
     }
 
     /// The gain of one recording of nothing but noise, nats.

@@ -7,6 +7,7 @@ use super::hanging::Hanging;
 use super::missing::{ADEQUATE, DropoutFinding};
 use super::naming::{MIN_PROBABILITY, none_of_these, physics};
 use crate::effects;
+use crate::model::Covariance;
 use crate::terms::{Axis, Statistic};
 
 /// A finding with this name and nothing else said yet; no test has weighed the name.
@@ -30,6 +31,7 @@ pub fn named(effect: &'static str, statistic: Statistic, axis: Axis) -> Finding 
         shape: None,
         curve: None,
         terms: Vec::new(),
+        covariance: Covariance::default(),
     }
 }
 
@@ -64,6 +66,7 @@ pub fn hanging(found: Hanging, sigma_mm: f64, replicated: Option<bool>) -> Findi
         shape: found.words,
         curve: None,
         terms: Vec::new(),
+        covariance: Covariance::default(),
     }
 }
 
@@ -95,6 +98,7 @@ pub fn missing(found: DropoutFinding) -> Finding {
         shape,
         curve: Some(found.curve),
         terms: Vec::new(),
+        covariance: Covariance::default(),
     }
 }
 

@@ -4,6 +4,7 @@ use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain};
 use super::null::NoiseGains;
 use super::replication::Halves;
+use crate::model::Covariance;
 use crate::terms::Basis;
 
 /// How a search decides.
@@ -23,6 +24,9 @@ pub struct Rules {
     pub least: f64,
     /// Judge gains by what noise alone would have brought.
     pub calibrated: bool,
+    /// Views that the model was learnt from, where these views are not among them: its own error is
+    /// theirs scattered about their mean, and stands beside the error of these.
+    pub learnt_from: Option<f64>,
 }
 
 /// A family beside the one that was chosen.
@@ -77,6 +81,8 @@ pub struct Outcome {
     pub left_out: Vec<(Vec<usize>, Vec<f64>)>,
     /// All terms as either half of the views has them.
     pub halves: Option<Halves>,
+    /// Of all coefficients.
+    pub covariance: Covariance,
 }
 
 impl Outcome {

@@ -18,7 +18,7 @@ use super::prepared::evidence_of;
 use super::scene::{Scene, size};
 use super::search::LEAST_SHARE;
 use super::variance::beyond_sigma;
-use super::verdict::LEAST_SIZE;
+use super::verdict::MIN_SIZE;
 use crate::rng::Seed;
 use crate::terms::{Basis, Statistic, Term};
 
@@ -101,7 +101,7 @@ impl Gates<'_> {
             .map(|replicate| {
                 let mut rng = self.seed.stream(&format!("diagnose/power/{replicate}"));
                 let (gain, square, off) = draw.once(&mut rng)?;
-                let told = LEAST_SIZE / own.max(f64::MIN_POSITIVE) - off;
+                let told = MIN_SIZE / own.max(f64::MIN_POSITIVE) - off;
                 Some(gain.above(need).max(square.above(floor * floor * weight)).max(told))
             })
             .collect();

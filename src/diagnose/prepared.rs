@@ -11,8 +11,11 @@ use crate::terms::{Basis, Coordinate, PixelContext, Term};
 
 /// Evidence of views on given terms together.
 pub fn evidence_of(data: &[ViewData], terms: &[Term]) -> Vec<Evidence> {
-    let bases: Vec<&Basis> = terms.iter().map(|t| &t.basis).collect();
-    data.par_iter().filter_map(|v| together(v, &bases)).collect()
+    evidence_of_bases(data, &terms.iter().map(|t| &t.basis).collect::<Vec<_>>())
+}
+
+pub fn evidence_of_bases(data: &[ViewData], bases: &[&Basis]) -> Vec<Evidence> {
+    data.par_iter().filter_map(|v| together(v, bases)).collect()
 }
 
 /// A view made ready for the candidates.

@@ -5,17 +5,17 @@ use nalgebra::{DMatrix, DVector};
 use serde_json::Map;
 
 use super::diagnosis::{Alternative, CannotTell, Finding, Size, Status};
+use super::evidence::{Evidence, gain};
+use super::field::Field;
 use super::known::KnownTerms;
 use super::naming::{MIN_PROBABILITY, physics};
-use super::null::NoiseGains;
+use super::null::{NoiseGains, Null};
 use super::parameters::estimate;
 use super::replication::{Measured, agree};
+use super::scatter::{Left, left_by_fit};
+use crate::model::Covariance;
 use crate::rng::Seed;
 use crate::terms::{Axis, Statistic};
-
-use super::evidence::{Evidence, Gain, gain};
-use super::field::Field;
-use super::null::Null;
 
 /// A law that the distances may be off by.
 pub struct Law {
@@ -29,7 +29,10 @@ pub struct Law {
     /// Of one reference, m.
     pub error_m: f64,
     pub settled: Vec<(&'static str, f64)>,
-    pub gain: Gain,
+    /// Nats.
+    pub gain: f64,
+    /// Its coefficient, and the standard error.
+    pub estimate: [f64; 2],
     pub null: Null,
     /// Degrees of freedom that the references' own error was measured with.
     pub freedom: f64,
@@ -41,6 +44,8 @@ pub struct Law {
 #[derive(Debug, Clone, Copy)]
 struct Checked {
     z: f64,
+    /// Slope of the target, along the columns and rows.
+    slope: [f64; 2],
     /// Measured minus reference, m.
     off: f64,
     session_s: f64,
@@ -68,8 +73,12 @@ pub fn laws(fields: &[Field], levels: &[f64], second: &[bool]) -> Vec<Law> {
             let off = z - f.reference_distance_m?;
             let sigma_px = f64::from(f.sigma.get(f.sigma.len() / 2).copied()?);
             let sigma_m = sigma_px * z * z / f.scale_px_m;
+            let steep = f.plane.theta().tan();
+            let (sin, cos) = f.plane.azimuth().sin_cos();
+            let slope = [steep * cos, steep * sin];
             Some(Checked {
                 z,
+                slope,
                 off,
                 session_s: f.time_s - start,
                 px_m: f.scale_px_m,
@@ -81,25 +90,33 @@ pub fn laws(fields: &[Field], levels: &[f64], second: &[bool]) -> Vec<Law> {
     if checked.len() < FEWEST {
         return Vec::new();
     }
-    let variance = scatter(&checked);
+    let beside = if is_tilted(&checked) { 2 } else { 0 };
+    let (variance, free) = scatter(&checked);
     let mut laws = Vec::new();
     let mut add = |family, axis, settled, column: &dyn Fn(&Checked) -> f64| {
-        let views: Vec<Evidence> = checked
-            .iter()
-            .map(|c| {
-                let g = column(c);
-                Evidence {
-                    a: DMatrix::from_element(1, 1, g * g / variance),
-                    b: DVector::from_element(1, g * c.off / variance),
-                }
-            })
-            .collect();
-        if let (Some(gain), Some(null)) = (gain(&views, PRIOR), Null::of(&views, 0, PRIOR)) {
+        let evidence = |with: bool| -> Vec<Evidence> {
+            let of = |c: &Checked| {
+                let mut g = c.slope[..beside].iter().map(|s| c.z * s).collect::<Vec<_>>();
+                g.extend(with.then(|| column(c)));
+                let g = DVector::from_vec(g);
+                Evidence { a: &g * g.transpose() / variance, b: g * (c.off / variance) }
+            };
+            checked.iter().map(of).collect()
+        };
+        let views = evidence(true);
+        let alone = if beside > 0 { gain(&evidence(false), PRIOR) } else { None };
+        if let (Some(mut gain), Some(null)) = (gain(&views, PRIOR), Null::of(&views, beside, PRIOR))
+        {
+            if let Some(alone) = alone {
+                gain.total -= alone.total;
+            }
+            let beta = gain.beta[beside];
+            let beta_error = gain.covariance[(beside, beside)].sqrt();
             let n = checked.len() as f64;
             let square = |of: &dyn Fn(&Checked) -> f64| {
                 (checked.iter().map(|c| of(c).powi(2)).sum::<f64>() / n).sqrt()
             };
-            let shift = |c: &Checked| gain.beta[0] * column(c);
+            let shift = |c: &Checked| beta * column(c);
             let reach = crate::stats::range(checked.iter().map(|c| match axis {
                 Axis::SessionTime => c.session_s,
                 _ => c.z,
@@ -114,7 +131,7 @@ pub fn laws(fields: &[Field], levels: &[f64], second: &[bool]) -> Vec<Law> {
             };
             let replicated = agree([half(false), half(true)]);
             let error_m = variance.sqrt();
-            let freedom = (n - LAWS).max(1.0);
+            let freedom = free.max(1.0);
             laws.push(Law {
                 family,
                 axis,
@@ -123,7 +140,8 @@ pub fn laws(fields: &[Field], levels: &[f64], second: &[bool]) -> Vec<Law> {
                 rms_sigma,
                 error_m,
                 settled,
-                gain,
+                gain: gain.total,
+                estimate: [beta, beta_error],
                 null,
                 freedom,
                 replicated,
@@ -142,24 +160,36 @@ pub fn laws(fields: &[Field], levels: &[f64], second: &[bool]) -> Vec<Law> {
     laws
 }
 
-/// Columns of [`scatter`].
-const LAWS: f64 = 4.0;
 /// A relative error of a few percent, an offset of a few px.
 const PRIOR: f64 = 1.0;
+/// Targets tilted by less, as a slope, and fewer of them than this, do not tell where they were
+/// measured.
+const TILTED: f64 = 0.2;
+const FEWEST_TILTED: usize = 5;
 
-/// Variance of the references' own errors, m^2: what the three laws together leave.
-fn scatter(checked: &[Checked]) -> f64 {
+/// On a tilted target the distance depends on where the optical axis is taken to meet it: by two
+/// angles, which are fitted beside every law where there are views enough.
+fn is_tilted(checked: &[Checked]) -> bool {
+    let steep = |c: &&Checked| c.slope[0].hypot(c.slope[1]) > TILTED;
+    checked.iter().filter(steep).count() >= FEWEST_TILTED && checked.len() >= 2 * FEWEST_TILTED
+}
+
+/// Variance of the references' own errors, m^2, and its degrees of freedom: what the laws together
+/// leave.
+fn scatter(checked: &[Checked]) -> (f64, f64) {
     let n = checked.len();
     let span = checked.iter().map(|c| c.session_s).fold(0.0, f64::max).max(1.0);
-    let columns = DMatrix::from_fn(n, 4, |i, j| {
+    let columns = if is_tilted(checked) { 6 } else { 4 };
+    let columns = DMatrix::from_fn(n, columns, |i, j| {
         let c = &checked[i];
-        [1.0, c.z, c.z * c.z, c.z * c.session_s / span][j]
+        let [right, down] = c.slope;
+        [1.0, c.z, c.z * c.z, c.z * c.session_s / span, c.z * right, c.z * down][j]
     });
     let off = DVector::from_iterator(n, checked.iter().map(|c| c.off));
-    let fitted = columns.clone().svd(true, true).solve(&off, 1e-9).map(|beta| &columns * beta);
-    let left = fitted.map_or_else(|_| off.norm_squared(), |f| (&off - f).norm_squared());
+    let all = Left { squares: off.norm_squared(), free: n as f64 };
+    let left = left_by_fit(columns, &off).unwrap_or(all);
     // A tape is read to half a millimetre at best.
-    (left / (n as f64 - LAWS).max(1.0)).max(0.0005 * 0.0005)
+    ((left.squares / left.free.max(1.0)).max(0.0005 * 0.0005), left.free)
 }
 
 /// A law must move the depth by this many errors of a reference, and by this much, m: tapes and
@@ -170,7 +200,14 @@ const LEAST_M: f64 = 0.0015;
 const AS_GOOD_NATS: f64 = 3.0;
 
 /// What the references tell, if anything.
-pub fn findings(laws: &[Law], known: &KnownTerms, level: f64, seed: Seed) -> Vec<Finding> {
+/// `excess` is how much further than by their own error the levels may be off, in variance.
+pub fn findings(
+    laws: &[Law],
+    known: &KnownTerms,
+    excess: f64,
+    level: f64,
+    seed: Seed,
+) -> Vec<Finding> {
     let nulls: Vec<&Null> = laws.iter().map(|l| &l.null).collect();
     if nulls.is_empty() {
         return Vec::new();
@@ -178,10 +215,10 @@ pub fn findings(laws: &[Law], known: &KnownTerms, level: f64, seed: Seed) -> Vec
     let noise = NoiseGains::of(&nulls, Seed(seed.0 ^ 0x5eed));
     // An error measured on few references makes a Student's t of a Gaussian.
     let safe = |l: &Law| {
-        let gain = (l.gain.total / l.null.dispersion).max(0.0);
+        let gain = (l.gain / l.null.dispersion / excess).max(0.0);
         0.5 * l.freedom * (2.0 * gain / l.freedom).ln_1p()
     };
-    let Some(best) = laws.iter().max_by(|a, b| a.gain.total.total_cmp(&b.gain.total)) else {
+    let Some(best) = laws.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)) else {
         return Vec::new();
     };
     let small = best.rms_m < (CLEARLY * best.error_m).max(LEAST_M);
@@ -193,13 +230,13 @@ pub fn findings(laws: &[Law], known: &KnownTerms, level: f64, seed: Seed) -> Vec
         let most = laws
             .iter()
             .filter(|l| l.family == family)
-            .map(|l| l.gain.total)
+            .map(|l| l.gain)
             .fold(f64::NEG_INFINITY, f64::max);
-        odds.push((family, (0.5 * (most - best.gain.total)).exp()));
+        odds.push((family, (0.5 * (most - best.gain)).exp()));
     }
     odds.sort_by(|a, b| b.1.total_cmp(&a.1));
     // No law at all explains what chance does.
-    let total: f64 = odds.iter().map(|o| o.1).sum::<f64>() + (-0.5 * best.gain.total).exp();
+    let total: f64 = odds.iter().map(|o| o.1).sum::<f64>() + (-0.5 * best.gain).exp();
     let alternatives: Vec<Alternative> = odds
         .iter()
         .map(|&(effect, o)| (effect, o / total))
@@ -207,8 +244,7 @@ pub fn findings(laws: &[Law], known: &KnownTerms, level: f64, seed: Seed) -> Vec
         .map(|(effect, p)| Alternative { effect, probability: Some(p) })
         .collect();
     let close = odds.get(1).is_some_and(|o| o.1 > (-0.5 * AS_GOOD_NATS).exp());
-    let beta = best.gain.beta[0];
-    let error = best.gain.covariance[(0, 0)].sqrt();
+    let [beta, error] = best.estimate;
     let mut parameters = Map::new();
     match best.family {
         "depth-scale" => parameters.insert("scale".into(), estimate(1.0 + beta, error)),
@@ -227,7 +263,7 @@ pub fn findings(laws: &[Law], known: &KnownTerms, level: f64, seed: Seed) -> Vec
         axis: best.axis,
         interval: best.reach,
         unit: best.axis.unit(),
-        share: best.gain.total,
+        share: best.gain,
         minor: false,
         parameters,
         size: Size { mm: 1e3 * best.rms_m, sigma: best.rms_sigma },
@@ -238,6 +274,7 @@ pub fn findings(laws: &[Law], known: &KnownTerms, level: f64, seed: Seed) -> Vec
         shape: None,
         curve: None,
         terms: Vec::new(),
+        covariance: Covariance::default(),
     }]
 }
 

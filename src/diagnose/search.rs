@@ -11,6 +11,7 @@ use super::null::{NoiseGains, Null};
 use super::outcome::{Chosen, Look, Outcome, Rules};
 use super::prepared::{Grouping, Prepared, prepare, together};
 use super::samples::ViewData;
+use crate::model::Covariance;
 use crate::rng::Seed;
 use crate::terms::Basis;
 
@@ -77,7 +78,17 @@ pub fn search_beside(
     let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
     let noise = layer.noise.unwrap_or_default();
     let looks = layer.looks;
-    Outcome { chosen, looks, fit, evidence, noise, remaining, left_out: Vec::new(), halves: None }
+    Outcome {
+        chosen,
+        looks,
+        fit,
+        evidence,
+        noise,
+        remaining,
+        left_out: Vec::new(),
+        halves: None,
+        covariance: Covariance::default(),
+    }
 }
 
 struct Layer<'a> {
@@ -193,7 +204,7 @@ impl Layer<'_> {
             } else {
                 NoiseGains::unknown()
             };
-            self.looks = looks(self.candidates, &judged, &noise);
+            self.looks = looks(self.candidates, &judged, self.rules, &noise);
             self.noise = Some(noise);
         }
         let noise = self.noise.as_ref()?;

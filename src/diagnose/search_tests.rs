@@ -17,6 +17,7 @@ const RULES: Rules = Rules {
     fixed: None,
     least: 0.0,
     calibrated: true,
+    learnt_from: None,
 };
 
 /// Places all over the picture with a free level a view; noise of unit variance, and a bias.

@@ -4,7 +4,7 @@ use super::candidate::{Candidate, RECALIBRATE};
 use crate::camera::Camera;
 use crate::effects::Bounds;
 use crate::model::SigmaModel;
-use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, Statistic, TABLE};
+use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, Statistic, TABLE, Term};
 
 /// The catalogue's changes of the noise, those of sigma itself, and the curves without a name.
 pub fn candidates(bounds: &Bounds, sigma: &SigmaModel) -> Vec<Candidate> {
@@ -35,7 +35,7 @@ pub fn refit(reach: &Extent) -> Candidate {
 
 /// Free surfaces over depth and tilt, from few columns to many: what a family says that follows
 /// only these two must be said better than by all of them.
-fn surfaces(reach: &Extent) -> Vec<Candidate> {
+pub fn surfaces(reach: &Extent) -> Vec<Candidate> {
     vec![
         surface(reach, &|l, _| vec![1.0, l, l * l]),
         surface(reach, &|_, t| vec![1.0, steepness(t)]),
@@ -73,6 +73,41 @@ fn surface(reach: &Extent, columns: &dyn Fn(f64, f64) -> Vec<f64>) -> Candidate 
 fn table_reach(reach: &Extent) -> ([f64; 2], [f64; 2]) {
     let wide = |[low, high]: [f64; 2]| [low, high.max(low + 1e-3)];
     (wide(reach.z), wide(reach.theta))
+}
+
+/// What sigma's own covariance makes of the logarithm of the variance: a term for each of its
+/// directions, by one standard deviation.
+pub fn error_of_sigma(reach: &Extent, sigma: &SigmaModel) -> Vec<Vec<Term>> {
+    let (z_m, theta_rad) = table_reach(reach);
+    let at = |[low, high]: [f64; 2], k: usize| low + (high - low) * k as f64 / (TABLE - 1) as f64;
+    let table = |model: &SigmaModel| -> Vec<f64> {
+        let place = |n: usize| (at(z_m, n % TABLE), at(theta_rad, n / TABLE));
+        let log = |n| {
+            let (z, theta) = place(n);
+            2.0 * model.sigma(z, theta).ln()
+        };
+        (0..TABLE * TABLE).map(log).collect()
+    };
+    let eigen = sigma.covariance.clone().symmetric_eigen();
+    let direction = |k: usize| {
+        let root = eigen.eigenvalues[k].max(0.0).sqrt();
+        let moved = |share: f64| {
+            let mut model = sigma.clone();
+            let by = eigen.eigenvectors.column(k) * (share * root);
+            model.parameters.iter_mut().zip(by.iter()).for_each(|(p, d)| *p += d);
+            table(&model)
+        };
+        // A hundredth of a standard deviation to either side: the slope, though sigma bends.
+        const SMALL: f64 = 0.01;
+        let (up, down) = (moved(SMALL), moved(-SMALL));
+        let column: Vec<f64> = up.iter().zip(&down).map(|(u, d)| (u - d) / (2.0 * SMALL)).collect();
+        let told = column.iter().all(|c| c.is_finite()) && column.iter().any(|c| c.abs() > 1e-4);
+        told.then(|| {
+            let basis = Basis::Table { z_m, theta_rad, columns: vec![column] };
+            vec![Term { statistic: Statistic::Variance, basis, coefficients: vec![1.0] }]
+        })
+    };
+    (0..eigen.eigenvalues.len()).filter_map(direction).collect()
 }
 
 /// The derivatives of log variance after the sigma model's parameters: all of them, and those that

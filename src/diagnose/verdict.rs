@@ -9,7 +9,7 @@ use super::other_findings::named;
 use super::outcome::Outcome;
 use super::tiles::SIDE;
 use crate::effects;
-use crate::model::{Effect, NoiseModel, UNEXPLAINED};
+use crate::model::{Covariance, Effect, NoiseModel, UNEXPLAINED};
 use crate::terms::{Axis, Statistic, Term};
 use crate::view::{RecordingFile, Sensor};
 
@@ -91,6 +91,7 @@ pub(super) fn fold_into_sigma(found: &mut Vec<Finding>) {
     for f in rest {
         sigma.share += f.share;
         sigma.terms.extend(f.terms);
+        sigma.covariance.extend(f.covariance);
     }
     found.insert(at.min(found.len()), sigma);
 }
@@ -190,6 +191,9 @@ pub(super) fn extend<'a>(
     if extended.sensor.is_none() {
         extended.sensor = Some(RecordingFile::of(sensor));
     }
+    // What this diagnosis fitted errs together: its biases, and its variances.
+    let fits = model.effects.iter().filter_map(|e| e.covariance.as_ref()).map(|c| c.fit);
+    let fit = 1 + fits.max().unwrap_or(0);
     for f in found {
         let keeps = matches!(f.status, Status::Named | Status::OneOf) || !f.terms.is_empty();
         if !keeps {
@@ -207,7 +211,10 @@ pub(super) fn extend<'a>(
         let shape = f.terms.clone();
         let bias = shape.iter().any(|t| t.statistic == Statistic::Bias);
         let learnt_px = bias.then_some(learnt_px);
-        extended.effects.push(Effect { id: id.into(), parameters, shape, learnt_px });
+        let covariance = Covariance { fit: fit + u32::from(!bias), ..f.covariance.clone() };
+        let covariance = (!covariance.is_empty()).then(|| covariance.rounded());
+        let id = id.into();
+        extended.effects.push(Effect { id, parameters, shape, learnt_px, covariance });
     }
     extended
 }
@@ -238,7 +245,7 @@ pub(super) fn view_lines(
 }
 
 /// A bias or a change of variance smaller than this, in sigmas, is not told.
-pub(super) const LEAST_SIZE: f64 = 0.005;
+pub(super) const MIN_SIZE: f64 = 0.005;
 
 #[cfg(test)]
 mod tests {

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use super::covariance::Covariance;
 use crate::terms::Term;
 
 /// One physical effect of the model.
@@ -19,6 +20,9 @@ pub struct Effect {
     /// Disparities at which the shape was learnt, px: beyond them it is held at the edge.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub learnt_px: Option<[f64; 2]>,
+    /// Of the shape's coefficients.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<Covariance>,
 }
 
 /// The id of what has no name: its shape is all that is known.
@@ -35,9 +39,14 @@ impl Effect {
             return Some(format!("effect {}: learnt_px is no range of disparities", self.id));
         }
         let mut terms = self.shape.iter().enumerate();
-        terms.find_map(|(k, term)| {
+        let of_shape = terms.find_map(|(k, term)| {
             let fault = term.fault()?;
             Some(format!("effect {}: term {} of its shape: {fault}", self.id, k + 1))
+        });
+        of_shape.or_else(|| {
+            let coefficients = self.shape.iter().map(|t| t.coefficients.len()).sum();
+            let fault = self.covariance.as_ref()?.fault(coefficients)?;
+            Some(format!("effect {}: {fault}", self.id))
         })
     }
 }

@@ -1,5 +1,6 @@
 //! The noise model: sigma(z, theta) with its domain and certainty, and the file it lives in.
 
+mod covariance;
 mod effect;
 mod fault;
 mod file;
@@ -13,6 +14,7 @@ mod rows;
 mod statistics;
 mod surface;
 
+pub use covariance::Covariance;
 pub use effect::{Effect, UNEXPLAINED};
 pub use file::{FitSummary, MODEL_FORMAT, NoiseModel, Provenance};
 pub use fit::DISTANCE_RATIO;

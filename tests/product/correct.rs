@@ -3,10 +3,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use kinoise::correct::{Conditions, Correction, correct_recording};
+use kinoise::correct::{
+    Conditions, CorrectOptions, Correction, SIGMA_UNITS_PER_METRE, correct_recording,
+};
 use kinoise::effects::Active;
 use kinoise::io::{Assumed, FrameSource, open_uncut};
-use kinoise::model::{Domain, Effect, FitSummary, Provenance, UNEXPLAINED};
+use kinoise::model::{Covariance, Domain, Effect, FitSummary, Provenance, UNEXPLAINED};
 use kinoise::scene::{Bench, Seen, Target};
 use kinoise::simulate::{FormulaSensor, Physics, Scenery, Shoot, kinect_v1, plan_grid};
 use kinoise::terms::{Basis, Coordinate, Modulation, Statistic, Term};
@@ -727,8 +729,77 @@ fn the_library_does_what_the_program_does() {
     files.model(&model);
     let (json, _) = files.correct(&recording, &[]);
     let out = files.at("library");
-    let done = correct_recording(&recording, &Assumed::default(), &model, &out, false, &|_, _| ())
-        .expect("done");
+    let done = correct_recording(
+        &recording,
+        &Assumed::default(),
+        &model,
+        &out,
+        &CorrectOptions::default(),
+        &|_, _| (),
+    )
+    .expect("done");
     assert_eq!(json["pixels_changed"], json!(done.changed));
     assert!(tree(&out) == tree(&files.at("out")));
+}
+
+/// Two shapes of one fit err together and a third for itself: by hand, at every pixel, and in the
+/// images that are written.
+#[test]
+fn the_uncertainty_of_a_correction_is_its_covariance() {
+    let grows =
+        |k: f64| bias(Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(2.0)), &[k]);
+    let still =
+        |k: f64| bias(Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(0.0)), &[k]);
+    let of = |shape, fit, factors, variances| Effect {
+        covariance: Some(Covariance { fit, factors, variances }),
+        ..shaped(UNEXPLAINED, vec![shape])
+    };
+    let effects = vec![
+        of(still(0.01), 1, vec![vec![0.2], vec![0.0]], vec![]),
+        of(grows(0.01), 1, vec![vec![-0.1], vec![0.3]], vec![]),
+        of(still(0.01), 2, vec![], vec![0.04]),
+    ];
+    let sensor = sensor();
+    let correction =
+        Correction::of(&model(&sensor, effects.clone()), &sensor).expect("a correction");
+    let camera = &sensor.camera;
+    let depth: Vec<f32> = (0..camera.pixels()).map(|i| 0.7 + 1e-5 * i as f32).collect();
+    let told = correction.uncertainty_m(&depth, &Conditions::default());
+    let corner = kinoise::terms::corner_radius(camera);
+    for i in (0..camera.pixels()).step_by(97) {
+        let (u, v) = ((i % camera.width) as f64, (i / camera.width) as f64);
+        let square = (u - camera.cx).powi(2) + (v - camera.cy).powi(2);
+        let (r2, z) = (square / corner.powi(2), f64::from(depth[i]));
+        let far = (FB / z / 40.0).powi(2);
+        let px2 = (0.2 - 0.1 * far).powi(2) + (0.3 * far).powi(2) + 0.04;
+        let expected = r2 * px2.sqrt() * z * z / FB;
+        assert!((f64::from(told[i]) - expected).abs() < 1e-4 * expected + 1e-9, "{i}");
+    }
+    assert!(correction.uncertainty_m(&[f32::NAN], &Conditions::default())[0].is_nan());
+
+    let files = Files::new();
+    let recording = files.recording(METRIC, Vec::new());
+    files.model(&small(effects));
+    let sigma = files.at("sigma");
+    files.correct(&recording, &["--sigma", sigma.to_str().expect("a path")]);
+    let about: Value =
+        serde_json::from_slice(&fs::read(sigma.join("sigma.json")).expect("read")).expect("json");
+    assert_eq!(about["units_per_metre"], json!(SIGMA_UNITS_PER_METRE));
+    let words =
+        FrameSource::new(160, 120).read(&sigma.join("0001/depth/0000.png")).expect("read").raw;
+    assert!(words[0] > 20 && words[60 * 160 + 80] < 5, "{} {}", words[0], words[60 * 160 + 80]);
+    fs::remove_dir_all(files.at("out")).expect("removed");
+    files.model(&small(vec![bowl(0.5)]));
+    let again = files.at("sigma2");
+    let output = kinoise()
+        .arg("correct")
+        .arg(&recording)
+        .args(["--model", files.at("model.json").to_str().expect("a path")])
+        .args(["-o", files.at("out").to_str().expect("a path")])
+        .args(["--sigma", again.to_str().expect("a path")])
+        .output()
+        .expect("runs");
+    let said = String::from_utf8(output.stderr).expect("text");
+    assert!(output.status.code() == Some(2) && said.contains("how sure"), "{said}");
+    assert!(!again.exists() && !files.at("out").exists(), "nothing was begun");
 }

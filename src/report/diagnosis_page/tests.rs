@@ -36,6 +36,7 @@ fn finding(status: Status, effect: Option<&'static str>) -> Finding {
         shape: None,
         curve: None,
         terms: Vec::new(),
+        covariance: crate::model::Covariance::default(),
     }
 }
 
