@@ -43,7 +43,8 @@ impl Covariance {
             return Some("a factor of its covariance has not a number for every coefficient");
         }
         let own = &self.variances;
-        if !own.is_empty() && !(whole(own) && own.iter().all(|v| *v >= 0.0)) {
+        let fits = own.is_empty() || whole(own) && own.iter().all(|v| *v >= 0.0);
+        if !fits {
             return Some("its variances are not one for every coefficient");
         }
         None

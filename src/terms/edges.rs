@@ -7,42 +7,44 @@ const ACROSS: f32 = 4.0 / 3.0;
 /// Distance of each pixel of the target to the nearest that is not the target's, px; zero off the
 /// target. The picture's border is no edge.
 pub fn edge_distances(on_target: &[bool], width: usize) -> Vec<f32> {
+    if on_target.is_empty() {
+        return Vec::new();
+    }
     let height = on_target.len() / width.max(1);
     let far = (width + height) as f32;
-    let mut distance: Vec<f32> = on_target.iter().map(|&on| if on { far } else { 0.0 }).collect();
-    let mut relax = |i: usize, neighbours: [(bool, usize, f32); 4]| {
-        let reached = neighbours.into_iter().filter(|(inside, ..)| *inside);
-        let best = reached.map(|(_, j, step)| distance[j] + step).fold(far, f32::min);
-        distance[i] = distance[i].min(best);
-    };
-    let at = |i: usize| (i % width, i / width);
-    for i in 0..on_target.len() {
-        let (u, v) = at(i);
-        let (left, up, right) = (u > 0, v > 0, u + 1 < width);
-        relax(
-            i,
-            [
-                (left, i.wrapping_sub(1), STRAIGHT),
-                (up, i.wrapping_sub(width), STRAIGHT),
-                (left && up, i.wrapping_sub(width + 1), ACROSS),
-                (right && up, i.wrapping_sub(width).wrapping_add(1), ACROSS),
-            ],
-        );
+    // A frame of pixels around the picture from which nothing is near.
+    let across = width + 2;
+    let mut framed = vec![far; across * (height + 2)];
+    for (line, on) in framed.chunks_exact_mut(across).skip(1).zip(on_target.chunks_exact(width)) {
+        let inside = line[1..].iter_mut().zip(on);
+        inside.filter(|(_, on)| !**on).for_each(|(d, _)| *d = 0.0);
     }
-    for i in (0..on_target.len()).rev() {
-        let (u, v) = at(i);
-        let (left, down, right) = (u > 0, v + 1 < height, u + 1 < width);
-        relax(
-            i,
-            [
-                (right, i + 1, STRAIGHT),
-                (down, i + width, STRAIGHT),
-                (right && down, i + width + 1, ACROSS),
-                (left && down, (i + width).wrapping_sub(1), ACROSS),
-            ],
-        );
+    for v in 1..=height {
+        let (above, line) = framed.split_at_mut(v * across);
+        let line = &mut line[..across];
+        from_line(&above[(v - 1) * across..], line);
+        for u in 1..=width {
+            line[u] = line[u].min(line[u - 1] + STRAIGHT);
+        }
     }
-    distance
+    for v in (1..=height).rev() {
+        let (line, below) = framed.split_at_mut((v + 1) * across);
+        let line = &mut line[v * across..];
+        from_line(&below[..across], line);
+        for u in (1..=width).rev() {
+            line[u] = line[u].min(line[u + 1] + STRAIGHT);
+        }
+    }
+    let lines = framed.chunks_exact(across).skip(1).take(height);
+    lines.flat_map(|line| &line[1..=width]).copied().collect()
+}
+
+/// What the line before lets a line be at most, inside the frame.
+fn from_line(before: &[f32], line: &mut [f32]) {
+    for (d, near) in line[1..].iter_mut().zip(before.windows(3)) {
+        let across = near[0].min(near[2]) + ACROSS;
+        *d = d.min(near[1] + STRAIGHT).min(across);
+    }
 }
 
 #[cfg(test)]
