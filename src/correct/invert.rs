@@ -5,9 +5,10 @@ use rayon::prelude::*;
 
 use super::correction::{Conditions, Correction};
 use super::slopes::Slopes;
+use super::uncertainty::{Scratch, where_held};
 use crate::error::{Error, Result};
 use crate::plane::Plane;
-use crate::terms::{Basis, PixelContext, Pixels, Term};
+use crate::terms::{PixelContext, Pixels, Term};
 
 /// The error of a term is taken at the corrected disparity: substituted until it changes by less, px.
 /// What is left is less again by the term's steepness, a hundredth for terms of a few tenths of a px
@@ -76,7 +77,36 @@ impl Correction {
         d
     }
 
-    pub(super) fn slopes(&self, depth_m: &[f32], factor: f64) -> Slopes {
+    /// Does the model say how sure its biases are?
+    pub fn knows_uncertainty(&self) -> bool {
+        !self.uncertainty.is_empty()
+    }
+
+    /// Standard uncertainty of the corrected depths `depth_m`, m, as far as the learnt shapes go:
+    /// NaN where there is no depth. What planes cannot see is no part of it.
+    pub fn uncertainty_m(&self, depth_m: &[f32], conditions: &Conditions) -> Vec<f32> {
+        let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
+        let slopes = self.uncertainty.needs.slope.then(|| self.slopes(depth_m, 1.0));
+        let tilt = self.uncertainty.needs.tilt;
+        let known = Known { conditions, slopes: slopes.as_ref(), pixels, terms: Vec::new(), tilt };
+        let width = self.camera.width;
+        let mut sigma = vec![f32::NAN; depth_m.len()];
+        sigma.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
+            let mut scratch = Scratch::default();
+            for (u, sigma) in line.iter_mut().enumerate() {
+                let z = f64::from(depth_m[row * width + u]);
+                if z > 0.0 && z.is_finite() {
+                    let mut place = known.place(row * width + u);
+                    known.stand(&mut place, row * width + u, self.scale_px_m / z);
+                    let px = self.uncertainty.variance(&place, &mut scratch).sqrt();
+                    *sigma = (px * z * z / self.scale_px_m) as f32;
+                }
+            }
+        });
+        sigma
+    }
+
+    fn slopes(&self, depth_m: &[f32], factor: f64) -> Slopes {
         let disparity = |i: usize| match depth_m[i] {
             z if z > 0.0 => self.disparity(i, z, factor),
             _ => f64::NAN,
@@ -91,32 +121,19 @@ fn held((term, [low, high]): &(Term, [f64; 2]), place: &PixelContext, row: &mut 
     term.value(&where_held(&term.basis, [*low, *high], place), row)
 }
 
-/// The place itself, or that with the last disparity at which the shape was learnt.
-pub(super) fn where_held(
-    basis: &Basis,
-    [low, high]: [f64; 2],
-    place: &PixelContext,
-) -> PixelContext {
-    let inside = (low..=high).contains(&place.disparity);
-    if inside || basis.still_power().is_none() {
-        return *place;
-    }
-    PixelContext { disparity: place.disparity.clamp(low, high), ..*place }
-}
-
 /// What is known of the places of one image.
-pub(super) struct Known<'a> {
-    pub conditions: &'a Conditions,
-    pub slopes: Option<&'a Slopes>,
-    pub pixels: Pixels<'a>,
+struct Known<'a> {
+    conditions: &'a Conditions,
+    slopes: Option<&'a Slopes>,
+    pixels: Pixels<'a>,
     /// Those that can be evaluated.
-    pub terms: Vec<&'a (Term, [f64; 2])>,
+    terms: Vec<&'a (Term, [f64; 2])>,
     /// Does any of them ask for the tilt?
-    pub tilt: bool,
+    tilt: bool,
 }
 
 impl Known<'_> {
-    pub fn place(&self, i: usize) -> PixelContext {
+    fn place(&self, i: usize) -> PixelContext {
         let mut place = self.pixels.place(i);
         place.session_s = self.conditions.session_s;
         place.temperature_c = self.conditions.temperature_c.unwrap_or(0.0);
@@ -125,7 +142,7 @@ impl Known<'_> {
     }
 
     /// Put a surface of this disparity, px, before the pixel, leaning as the picture shows.
-    pub fn stand(&self, place: &mut PixelContext, i: usize, disparity: f64) {
+    fn stand(&self, place: &mut PixelContext, i: usize, disparity: f64) {
         let Pixels { camera, scale_px_m, .. } = self.pixels;
         place.at_disparity(disparity, scale_px_m);
         if let Some(slopes) = self.slopes {

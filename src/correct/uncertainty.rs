@@ -2,12 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
-
-use super::correction::{Conditions, Correction};
-use super::invert::Known;
 use crate::model;
-use crate::terms::{Needs, PixelContext, Pixels, Term};
+use crate::terms::{Basis, Needs, PixelContext, Term};
 
 /// The covariance of what a correction takes out.
 #[derive(Debug, Clone, Default)]
@@ -61,12 +57,12 @@ impl Uncertainty {
     }
 
     /// Variance at a place, px^2.
-    fn variance(&self, place: &PixelContext, scratch: &mut Scratch) -> f64 {
+    pub fn variance(&self, place: &PixelContext, scratch: &mut Scratch) -> f64 {
         scratch.parts.clear();
         scratch.parts.resize(self.parts.len(), 0.0);
         let mut own = 0.0;
         for Spread { term: (term, learnt), parts, own: variances } in &self.shapes {
-            let at = super::invert::where_held(&term.basis, *learnt, place);
+            let at = where_held(&term.basis, *learnt, place);
             scratch.row.clear();
             scratch.row.resize(term.basis.count(), 0.0);
             term.basis.fill(&at, &mut scratch.row);
@@ -87,39 +83,21 @@ impl Uncertainty {
 }
 
 #[derive(Default)]
-struct Scratch {
+pub(super) struct Scratch {
     row: Vec<f64>,
     touched: Vec<usize>,
     parts: Vec<f64>,
 }
 
-impl Correction {
-    /// Does the model say how sure its biases are?
-    pub fn knows_uncertainty(&self) -> bool {
-        !self.uncertainty.is_empty()
+/// The place itself, or that with the last disparity at which the shape was learnt.
+pub(super) fn where_held(
+    basis: &Basis,
+    [low, high]: [f64; 2],
+    place: &PixelContext,
+) -> PixelContext {
+    let inside = (low..=high).contains(&place.disparity);
+    if inside || basis.still_power().is_none() {
+        return *place;
     }
-
-    /// Standard uncertainty of the corrected depths `depth_m`, m, as far as the learnt shapes go:
-    /// NaN where there is no depth. What planes cannot see is no part of it.
-    pub fn uncertainty_m(&self, depth_m: &[f32], conditions: &Conditions) -> Vec<f32> {
-        let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
-        let slopes = self.uncertainty.needs.slope.then(|| self.slopes(depth_m, 1.0));
-        let tilt = self.uncertainty.needs.tilt;
-        let known = Known { conditions, slopes: slopes.as_ref(), pixels, terms: Vec::new(), tilt };
-        let width = self.camera.width;
-        let mut sigma = vec![f32::NAN; depth_m.len()];
-        sigma.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
-            let mut scratch = Scratch::default();
-            for (u, sigma) in line.iter_mut().enumerate() {
-                let z = f64::from(depth_m[row * width + u]);
-                if z > 0.0 && z.is_finite() {
-                    let mut place = known.place(row * width + u);
-                    known.stand(&mut place, row * width + u, self.scale_px_m / z);
-                    let px = self.uncertainty.variance(&place, &mut scratch).sqrt();
-                    *sigma = (px * z * z / self.scale_px_m) as f32;
-                }
-            }
-        });
-        sigma
-    }
+    PixelContext { disparity: place.disparity.clamp(low, high), ..*place }
 }
