@@ -71,6 +71,7 @@ impl Joint<'_> {
         if settled.penalty.is_none() {
             self.drop_misfit_of_target(&mut settled, chosen);
         }
+        self.drop_companions(&mut settled, chosen);
         self.drop_harmful(&mut settled, chosen);
         Some(settled)
     }
@@ -128,20 +129,48 @@ impl Joint<'_> {
         if settled.terms.iter().all(|&t| is_of_sensor(&chosen[t].candidate)) {
             return;
         }
+        let concerned = |t: usize| {
+            let c = &chosen[t].candidate;
+            c.family.is_none() && !c.basis.is_fine() && is_of_sensor(c)
+        };
+        self.drop_little(settled, BESIDE_TARGET, &concerned);
+    }
+
+    /// Nameless curves that bring next to nothing beside a name on their own axis: of columns that
+    /// nearly say the same a fit makes two halves.
+    fn drop_companions(&self, settled: &mut Settled, chosen: &[Chosen]) {
+        let named: Vec<Axis> = settled
+            .terms
+            .iter()
+            .map(|&t| &chosen[t].candidate)
+            .filter(|c| c.family.is_some())
+            .map(|c| c.basis.axis())
+            .collect();
+        let concerned = |t: usize| {
+            let c = &chosen[t].candidate;
+            c.family.is_none() && named.contains(&c.basis.axis())
+        };
+        self.drop_little(settled, TERM_SHARE, &concerned);
+    }
+
+    /// Terms among the `concerned` without which the parts left out lose less than this share, the
+    /// one that is missed least first.
+    fn drop_little(&self, settled: &mut Settled, share: f64, concerned: &dyn Fn(usize) -> bool) {
         loop {
             let all = total(&settled.scores);
             let little = |&t: &usize| {
-                let c = &chosen[t].candidate;
                 let others: Vec<usize> =
                     settled.terms.iter().copied().filter(|o| *o != t).collect();
-                if c.family.is_some() || c.basis.is_fine() || !is_of_sensor(c) {
-                    return None;
-                }
                 let scores = self.scores(&settled.without, &others, |_| true);
                 let lost = all - total(&scores);
-                (lost < BESIDE_TARGET * all).then_some((lost, others, scores))
+                (lost < share * all).then_some((lost, others, scores))
             };
-            let next = settled.terms.iter().filter_map(little).min_by(|a, b| a.0.total_cmp(&b.0));
+            let next = settled
+                .terms
+                .iter()
+                .filter(|&&t| concerned(t))
+                .filter_map(little)
+                .min_by(|a, b| a.0.total_cmp(&b.0));
             let Some((_, others, scores)) = next else { return };
             (settled.terms, settled.scores) = (others, scores);
         }

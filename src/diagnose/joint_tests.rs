@@ -239,3 +239,29 @@ fn the_stated_error_is_the_true_one() {
     assert!((0.4..2.0).contains(&(squares / n)), "{}", squares / n);
     assert!((0.75..=0.99).contains(&(inside / n)), "{}", inside / n);
 }
+
+/// A wave and a curve over the same columns: the wave says it all, and keeps its size.
+#[test]
+fn a_nameless_curve_does_not_share_what_a_name_says() {
+    let period_px = 20.0;
+    let bias = |p: &PixelContext| 0.1 * (std::f64::consts::TAU * p.u / period_px).sin();
+    let rng = &mut Seed(6).stream("joint/companion");
+    let data = session([0.8, 3.0], rng, bias);
+    let wave = Basis::waves(Coordinate::Column, period_px, 2);
+    let (over, low, high) = (Coordinate::Column, 0.0, 160.0);
+    let curve = Basis::Curve { over, low, high, nodes: 72, times: Modulation::One };
+    let chosen = vec![term(Some("column-banding"), wave), term(None, curve)];
+    let outcome = fitted(&data, chosen);
+    let families: Vec<_> = outcome.chosen.iter().map(|c| c.candidate.family).collect();
+    assert!(families.iter().all(|f| *f == Some("column-banding")), "{families:?}");
+    let mut row = Vec::new();
+    let value = |u: f64, row: &mut Vec<f64>| -> f64 {
+        let place = PixelContext { u, ..data[0].places[0] };
+        let of = |k: usize| {
+            outcome.chosen[k].candidate.basis.value(&outcome.coefficients(k), &place, row)
+        };
+        (0..outcome.chosen.len()).map(of).sum()
+    };
+    let height = 0.5 * (value(65.0, &mut row) - value(75.0, &mut row));
+    assert!((height - 0.1).abs() < 0.01, "{height}");
+}
