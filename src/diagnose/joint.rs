@@ -19,7 +19,6 @@ use super::replication::{Half, Halves};
 use super::samples::{ViewData, coarser};
 use crate::camera::Camera;
 use crate::model::Covariance;
-use crate::terms::Gauge;
 
 /// The terms of a finished search fitted together, with the smooth rest. `fine` are the views' means
 /// in small patches, `inflation` what each view's weights were divided by: a bias is as sure in a
@@ -50,7 +49,7 @@ pub fn refit(
     let columns = Columns::of(&found.chosen, camera);
     let joint = Joint::of(&columns, &data, second);
     match joint.settle(&found.chosen, camera) {
-        Some(settled) => joint.posterior(&data, second, &settled, &found).unwrap_or(found),
+        Some(settled) => joint.posterior(&data, second, &settled, &found, camera).unwrap_or(found),
         None => found,
     }
 }
@@ -68,6 +67,7 @@ impl Joint<'_> {
         second: &[bool],
         s: &Settled,
         found: &Outcome,
+        camera: &Camera,
     ) -> Option<Outcome> {
         let kept = self.kept(&s.terms);
         let whole = Reduced::of(&self.all, self.columns.terms, s.penalty.as_ref())?;
@@ -110,10 +110,8 @@ impl Joint<'_> {
             halves: self.halves(data, second, s, &precision, &beta),
             covariance: Covariance::default(),
         };
-        if let Some(error) = self.error(s, &kept, &precision, &left) {
-            outcome.covariance.factors = error.factors.iter().map(|f| self.told(s, f)).collect();
-            outcome.covariance.variances = self.laid_out(s, &error.variances, |_, _| [0.0; 3]);
-        }
+        let error = self.error(s, &kept, &precision, &left, camera).unwrap_or_default();
+        outcome.covariance.factors = error.iter().map(|f| self.told(s, f)).collect();
         let folds = s.without.iter().zip(&self.views);
         outcome.left_out = folds
             .filter_map(|(r, views)| {
@@ -236,26 +234,16 @@ impl Joint<'_> {
 
     /// The coefficients of [`Joint::chosen`].
     fn told(&self, s: &Settled, beta: &DVector<f64>) -> Vec<f64> {
-        self.laid_out(s, beta, |gauge, mine| gauge.term(mine).1)
-    }
-
-    /// A number for each coefficient of [`Joint::chosen`]; `affine` has those of what planes absorb.
-    fn laid_out(
-        &self,
-        s: &Settled,
-        of_columns: &DVector<f64>,
-        affine: impl Fn(&Gauge, &[f64]) -> [f64; 3],
-    ) -> Vec<f64> {
         let mut told = Vec::new();
         for &t in &s.terms {
-            let mine = &of_columns.as_slice()[self.columns.span(t)];
+            let mine = &beta.as_slice()[self.columns.span(t)];
             told.extend(mine);
             if let Some(gauge) = &self.columns.gauges[t] {
-                told.extend(affine(gauge, mine));
+                told.extend(gauge.term(mine).1);
             }
         }
         if s.penalty.is_some() {
-            told.extend(of_columns.rows(self.columns.terms, self.columns.nodes).iter());
+            told.extend(beta.rows(self.columns.terms, self.columns.nodes).iter());
         }
         told
     }

@@ -5,27 +5,30 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::joint_fit::Joint;
 use super::joint_terms::Settled;
+use crate::camera::Camera;
 use crate::rng::Seed;
 
-/// Factors are taken until they hold this share of the variance, in units of what is usual. The rest
-/// is each coefficient's own.
+/// Factors are taken until they hold this share of the variance: of the maps' mean over the picture,
+/// px^2, and of the terms' coefficients in units of what is usual.
 const HELD: f64 = 0.98;
-const MAX_FACTORS: usize = 24;
+const MAX_FACTORS: usize = 48;
 /// Rounds of the subspace iteration; its start has so many directions to spare (Halko, Martinsson
 /// and Tropp 2011).
 const ROUNDS: usize = 4;
 const SPARE: usize = 8;
 
 impl Joint<'_> {
-    /// The covariance of all columns' coefficients. `left` is what each view says beyond the fit:
-    /// views scatter beyond their noise, and the posterior is as much wider.
+    /// The covariance of all columns' coefficients, as the sum of the outer products of these. `left`
+    /// is what each view says beyond the fit: views scatter beyond their noise, and the posterior is
+    /// as much wider.
     pub fn error(
         &self,
         s: &Settled,
         kept: &[usize],
         precision: &DVector<f64>,
         left: &[DVector<f64>],
-    ) -> Option<Error> {
+        camera: &Camera,
+    ) -> Option<Vec<DVector<f64>>> {
         let terms = self.columns.terms;
         let nodes = if s.penalty.is_some() { self.columns.nodes } else { 0 };
         let places: Vec<usize> = kept.iter().copied().chain(terms..terms + nodes).collect();
@@ -45,30 +48,30 @@ impl Joint<'_> {
         let scatter: f64 = left.iter().map(|e| mine(e).dot(&(&inverse * mine(e)))).sum();
         let free = inverse.component_mul(&information).sum();
         let dispersion = (scatter / free.max(1.0)).max(1.0);
-        // In units of what is usual, px for the maps, so that no column counts for its unit's sake.
-        let usual =
-            DVector::from_fn(n, |i, _| kept.get(i).map_or(1.0, |&k| self.precision[k].powf(-0.5)));
-        let scaled = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (usual[i] * usual[j]));
-        let spread = |of: &dyn Fn(usize) -> f64| {
+        // With the root of this metric a covariance is one of sizes: a map's nodes are held against
+        // what they make of the picture, for neighbours make up for each other.
+        let mut root = DMatrix::zeros(n, n);
+        for (i, &k) in kept.iter().enumerate() {
+            root[(i, i)] = self.precision[k].sqrt();
+        }
+        if nodes > 0 {
+            let one = Cholesky::<f64, Dyn>::new(self.columns.map_metric(camera))?.l();
+            for first in [kept.len(), kept.len() + nodes / 2] {
+                root.view_mut((first, first), one.shape()).copy_from(&one);
+            }
+        }
+        let sizes = root.transpose() * &inverse * &root;
+        let back = root.transpose();
+        let spread = |f: DVector<f64>| {
+            let mine = back.solve_upper_triangular(&f)?;
             let mut all = DVector::zeros(self.all.b.len());
-            places.iter().enumerate().for_each(|(i, &k)| all[k] = of(i));
-            all
+            for (i, &k) in places.iter().enumerate() {
+                all[k] = dispersion.sqrt() * mine[i];
+            }
+            Some(all)
         };
-        let factors = leading(&scaled);
-        let own = |i: usize| {
-            let told: f64 = factors.iter().map(|f| f[i] * f[i]).sum();
-            dispersion * usual[i].powi(2) * (scaled[(i, i)] - told).max(0.0)
-        };
-        let variances = spread(&own);
-        let of = |f: &DVector<f64>| spread(&|i| dispersion.sqrt() * usual[i] * f[i]);
-        Some(Error { factors: factors.iter().map(of).collect(), variances })
+        leading(&sizes).into_iter().map(spread).collect()
     }
-}
-
-/// A covariance: the sum of the factors' outer products, and variances of each coefficient's own.
-pub struct Error {
-    pub factors: Vec<DVector<f64>>,
-    pub variances: DVector<f64>,
 }
 
 /// The largest eigenvectors of a covariance, each times the root of its eigenvalue.

@@ -228,8 +228,7 @@ fn the_stated_error_is_the_true_one() {
             let part = plane_out(DVector::from_iterator(places.len(), places.iter().map(of)));
             variance += part.component_mul(&part);
         }
-        for (i, p) in places.iter().enumerate() {
-            variance[i] += sum(&|j| outcome.covariance.variances[j], p, 2);
+        for i in 0..places.len() {
             let square = error[i].powi(2) / variance[i];
             squares += square;
             inside += f64::from(square < 1.645f64.powi(2));
