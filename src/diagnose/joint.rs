@@ -19,6 +19,7 @@ use super::replication::{Half, Halves};
 use super::samples::{ViewData, coarser};
 use crate::camera::Camera;
 use crate::model::Covariance;
+use crate::terms::Gauge;
 
 /// The terms of a finished search fitted together, with the smooth rest. `fine` are the views' means
 /// in small patches, `inflation` what each view's weights were divided by: a bias is as sure in a
@@ -110,8 +111,11 @@ impl Joint<'_> {
             halves: self.halves(data, second, s, &precision, &beta),
             covariance: Covariance::default(),
         };
-        let error = self.error(s, &kept, &precision, &left, camera).unwrap_or_default();
-        outcome.covariance.factors = error.iter().map(|f| self.told(s, f)).collect();
+        let planes = (camera, disparities(data));
+        if let Some(error) = self.error(s, &kept, &precision, &left, planes) {
+            outcome.covariance.factors = error.factors.iter().map(|f| self.told(s, f)).collect();
+            outcome.covariance.variances = self.laid_out(s, &error.variances, |_, _| [0.0; 3]);
+        }
         let folds = s.without.iter().zip(&self.views);
         outcome.left_out = folds
             .filter_map(|(r, views)| {
@@ -234,19 +238,38 @@ impl Joint<'_> {
 
     /// The coefficients of [`Joint::chosen`].
     fn told(&self, s: &Settled, beta: &DVector<f64>) -> Vec<f64> {
+        self.laid_out(s, beta, |gauge, mine| gauge.term(mine).1)
+    }
+
+    /// A number for each coefficient of [`Joint::chosen`]; `affine` has those of what planes absorb.
+    fn laid_out(
+        &self,
+        s: &Settled,
+        of_columns: &DVector<f64>,
+        affine: impl Fn(&Gauge, &[f64]) -> [f64; 3],
+    ) -> Vec<f64> {
         let mut told = Vec::new();
         for &t in &s.terms {
-            let mine = &beta.as_slice()[self.columns.span(t)];
+            let mine = &of_columns.as_slice()[self.columns.span(t)];
             told.extend(mine);
             if let Some(gauge) = &self.columns.gauges[t] {
-                told.extend(gauge.term(mine).1);
+                told.extend(affine(gauge, mine));
             }
         }
         if s.penalty.is_some() {
-            told.extend(beta.rows(self.columns.terms, self.columns.nodes).iter());
+            told.extend(of_columns.rows(self.columns.terms, self.columns.nodes).iter());
         }
         told
     }
+}
+
+/// Near, in the middle, and far, px: a tenth, half and nine tenths of the views' samples.
+fn disparities(data: &[ViewData]) -> [f64; 3] {
+    let mut all: Vec<f64> =
+        data.iter().flat_map(|v| v.places.iter().map(|p| p.disparity)).collect();
+    all.sort_by(f64::total_cmp);
+    [0.1, 0.5, 0.9]
+        .map(|share| all.get((share * all.len() as f64) as usize).copied().unwrap_or(1.0))
 }
 
 /// Covariance with the views as the sample (White 1980; Liang and Zeger 1986), where it is the larger.

@@ -7,28 +7,33 @@ use super::joint_fit::Joint;
 use super::joint_terms::Settled;
 use crate::camera::Camera;
 use crate::rng::Seed;
+use crate::terms::Pixels;
 
-/// Factors are taken until they hold this share of the variance: of the maps' mean over the picture,
-/// px^2, and of the terms' coefficients in units of what is usual.
+/// Factors are taken until they hold this share of the variance, place by place. The rest is each
+/// node's own.
 const HELD: f64 = 0.98;
-const MAX_FACTORS: usize = 48;
+const MAX_FACTORS: usize = 40;
+/// The picture is looked at in pixels so far apart, at three distances.
+const STRIDE: usize = 8;
+/// What no place shows is held against what is usual, by this much.
+const SLIGHT: f64 = 1e-6;
 /// Rounds of the subspace iteration; its start has so many directions to spare (Halko, Martinsson
 /// and Tropp 2011).
 const ROUNDS: usize = 4;
 const SPARE: usize = 8;
 
 impl Joint<'_> {
-    /// The covariance of all columns' coefficients, as the sum of the outer products of these. `left`
-    /// is what each view says beyond the fit: views scatter beyond their noise, and the posterior is
-    /// as much wider.
+    /// The covariance of all columns' coefficients. `left` is what each view says beyond the fit:
+    /// views scatter beyond their noise, and the posterior is as much wider. It is to hold on planes
+    /// at these disparities, px.
     pub fn error(
         &self,
         s: &Settled,
         kept: &[usize],
         precision: &DVector<f64>,
         left: &[DVector<f64>],
-        camera: &Camera,
-    ) -> Option<Vec<DVector<f64>>> {
+        (camera, disparities): (&Camera, [f64; 3]),
+    ) -> Option<Error> {
         let terms = self.columns.terms;
         let nodes = if s.penalty.is_some() { self.columns.nodes } else { 0 };
         let places: Vec<usize> = kept.iter().copied().chain(terms..terms + nodes).collect();
@@ -42,36 +47,99 @@ impl Joint<'_> {
             let mut block = held.view_mut((kept.len(), kept.len()), (nodes, nodes));
             block += penalty;
         }
-        let factor = Cholesky::<f64, Dyn>::new(held)?;
-        let inverse = factor.inverse();
+        let inverse = Cholesky::<f64, Dyn>::new(held)?.inverse();
         let mine = |e: &DVector<f64>| DVector::from_fn(n, |i, _| e[places[i]]);
         let scatter: f64 = left.iter().map(|e| mine(e).dot(&(&inverse * mine(e)))).sum();
         let free = inverse.component_mul(&information).sum();
-        let dispersion = (scatter / free.max(1.0)).max(1.0);
-        // With the root of this metric a covariance is one of sizes: a map's nodes are held against
-        // what they make of the picture, for neighbours make up for each other.
-        let mut root = DMatrix::zeros(n, n);
-        for (i, &k) in kept.iter().enumerate() {
-            root[(i, i)] = self.precision[k].sqrt();
+        let covariance = inverse * (scatter / free.max(1.0)).max(1.0);
+        let seen = self.seen(&places, camera, disparities);
+        // With this metric every place counts alike, whatever its variance.
+        let mut metric = DMatrix::zeros(n, n);
+        for row in &seen {
+            row.add_square(1.0 / row.variance(&covariance), &mut metric);
         }
-        if nodes > 0 {
-            let one = Cholesky::<f64, Dyn>::new(self.columns.map_metric(camera))?.l();
-            for first in [kept.len(), kept.len() + nodes / 2] {
-                root.view_mut((first, first), one.shape()).copy_from(&one);
-            }
+        for i in 0..n {
+            let usual = kept.get(i).map_or(1.0, |&k| self.precision[k]);
+            metric[(i, i)] += SLIGHT * seen.len() as f64 * usual;
         }
-        let sizes = root.transpose() * &inverse * &root;
+        let root = Cholesky::<f64, Dyn>::new(metric)?.l();
         let back = root.transpose();
-        let spread = |f: DVector<f64>| {
-            let mine = back.solve_upper_triangular(&f)?;
+        let sizes = &back * &covariance * &root;
+        let factors: Vec<DVector<f64>> = leading(&sizes)
+            .into_iter()
+            .map(|f| back.solve_upper_triangular(&f))
+            .collect::<Option<_>>()?;
+        let told = factors.iter().map(|f| f * f.transpose()).sum::<DMatrix<f64>>();
+        let own = rest(&seen, &(covariance - told), kept.len(), nodes / 2);
+        let all = |of: &dyn Fn(usize) -> f64| {
             let mut all = DVector::zeros(self.all.b.len());
-            for (i, &k) in places.iter().enumerate() {
-                all[k] = dispersion.sqrt() * mine[i];
-            }
-            Some(all)
+            places.iter().enumerate().for_each(|(i, &k)| all[k] = of(i));
+            all
         };
-        leading(&sizes).into_iter().map(spread).collect()
+        Some(Error {
+            variances: all(&|i| own[i]),
+            factors: factors.iter().map(|f| all(&|i| f[i])).collect(),
+        })
     }
+
+    /// The columns as planes that are faced show them.
+    fn seen(&self, places: &[usize], camera: &Camera, disparities: [f64; 3]) -> Vec<Seen> {
+        let rays = camera.rays();
+        let pixels = Pixels::new(camera, &rays, 1.0);
+        let mut row = vec![0.0; self.all.b.len()];
+        let mut seen = Vec::new();
+        for disparity in disparities {
+            for v in (STRIDE / 2..camera.height).step_by(STRIDE) {
+                for u in (STRIDE / 2..camera.width).step_by(STRIDE) {
+                    let mut place = pixels.place(v * camera.width + u);
+                    place.disparity = disparity;
+                    self.columns.fill(&place, &mut row);
+                    let columns = places.iter().map(|&k| row[k]).enumerate();
+                    seen.push(Seen(columns.filter(|(_, g)| *g != 0.0).collect()));
+                }
+            }
+        }
+        seen
+    }
+}
+
+/// A covariance: the sum of the factors' outer products, and variances of each coefficient's own.
+pub struct Error {
+    pub factors: Vec<DVector<f64>>,
+    pub variances: DVector<f64>,
+}
+
+/// A place's columns that are not zero.
+struct Seen(Vec<(usize, f64)>);
+
+impl Seen {
+    fn variance(&self, covariance: &DMatrix<f64>) -> f64 {
+        let row = |&(i, g): &(usize, f64)| -> f64 {
+            g * self.0.iter().map(|&(j, h)| h * covariance[(i, j)]).sum::<f64>()
+        };
+        self.0.iter().map(row).sum::<f64>().max(f64::MIN_POSITIVE)
+    }
+
+    fn add_square(&self, weight: f64, sum: &mut DMatrix<f64>) {
+        for &(i, g) in &self.0 {
+            self.0.iter().for_each(|&(j, h)| sum[(i, j)] += weight * g * h);
+        }
+    }
+}
+
+/// Variances of the first map's nodes that make what is left of every place's, neighbours being
+/// independent.
+fn rest(seen: &[Seen], left: &DMatrix<f64>, first: usize, nodes: usize) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0); left.nrows()];
+    for place in seen {
+        let mine = || place.0.iter().filter(|(i, _)| (first..first + nodes).contains(i));
+        let squares: f64 = mine().map(|(_, g)| g * g).sum();
+        let variance = place.variance(left) / squares.max(f64::MIN_POSITIVE);
+        for &(i, g) in mine() {
+            sums[i] = (sums[i].0 + g * g * variance, sums[i].1 + g * g);
+        }
+    }
+    sums.iter().map(|(sum, n)| if *n > 0.0 { sum / n } else { 0.0 }).collect()
 }
 
 /// The largest eigenvectors of a covariance, each times the root of its eigenvalue.

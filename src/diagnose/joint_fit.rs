@@ -86,7 +86,7 @@ impl Columns {
         Some(rows(view, &response)?.score(count, |i, row| self.fill(&view.places[i], row)))
     }
 
-    fn fill(&self, place: &PixelContext, row: &mut [f64]) {
+    pub fn fill(&self, place: &PixelContext, row: &mut [f64]) {
         let mut rest = row;
         for (basis, gauge) in self.bases.iter().zip(&self.gauges) {
             let (mine, others) = rest.split_at_mut(basis.count());
@@ -109,26 +109,6 @@ impl Columns {
     pub fn span(&self, term: usize) -> std::ops::Range<usize> {
         let first: usize = self.bases[..term].iter().map(Basis::count).sum();
         first..first + self.bases[term].count()
-    }
-
-    /// The mean square over the picture of one map, as a form of its nodes.
-    pub fn map_metric(&self, camera: &Camera) -> DMatrix<f64> {
-        const STRIDE: usize = 4;
-        let n = self.nodes / 2;
-        let mut form = DMatrix::identity(n, n) * f64::EPSILON;
-        let (rows, mut row, mut count) = (camera.height, vec![0.0; n], 0.0);
-        for v in (STRIDE / 2..rows).step_by(STRIDE) {
-            for u in (STRIDE / 2..camera.width).step_by(STRIDE) {
-                let place = PixelContext { u: u as f64, v: v as f64, ..PixelContext::default() };
-                self.maps[0].fill(&place, &mut row);
-                let touched: Vec<usize> = (0..n).filter(|&j| row[j] != 0.0).collect();
-                for &j in &touched {
-                    touched.iter().for_each(|&i| form[(i, j)] += row[i] * row[j]);
-                }
-                count += 1.0;
-            }
-        }
-        form / f64::max(count, 1.0)
     }
 
     /// What holds the nodes, for a mean information of one on each: smooth, small, and without
