@@ -145,7 +145,7 @@
 //! - [`docs::identifiability`]: what views of planes can show, and what they cannot
 //! - [`docs::engine`]: how the diagnosis works, and where in the code
 //! - [`report`]: the pages; what they say of an effect is on its card in `src/effects`, and the other
-//!   sentences of a diagnosis are in `src/report/diagnosis_page/sentences.rs`
+//!   sentences of a diagnosis are in `story.rs` and `sentences.rs` of `src/report/diagnosis_page`
 //!
 //! The method of the calibration and of the paper's mapper: Yamaguchi, Emaru, Kobayashi, Ravankar,
 //! "3D map-building from RGB-D data considering noise characteristics of Kinect" (SII 2016). It is
