@@ -3,7 +3,8 @@
 //! ```text
 //! raw -> z -driver-> disparity -still, locking, terms-> disparity -> z -> raw
 //! ```
-//! A [`Correction`] does one depth image; [`correct_recording`] does all that lie in a folder.
+//! A [`Correction`] does one depth image, and says how sure each corrected depth is where the model
+//! holds the covariance of its biases; [`correct_recording`] does all that lie in a folder.
 
 mod correction;
 mod describe;

@@ -1,5 +1,4 @@
-//! What is said in the end: findings in order, the extended model, the views. Whether it is a match
-//! is decided in `conclude`.
+//! What is said in the end: the verdict, findings in order, the extended model, the views.
 
 use super::diagnosis::{Alternative, CannotTell, Finding, HeldOut, Status, Verdict, ViewLine};
 use super::field::Field;
