@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use super::against::Baseline;
-use super::layers::{BLOCK_TILES, Survey};
+use super::blocks::BLOCK_TILES;
+use super::layers::Survey;
 use super::pixels::fixed_px2;
 use super::samples::ViewData;
 use super::scatter::{Left, left_by_fit};

@@ -5,11 +5,12 @@ use rand::seq::SliceRandom;
 
 use super::diagnosis::{HeldOut, LeftOut};
 use super::engine::DiagnoseOptions;
-use super::layers::{Survey, SurveyedView};
+use super::layers::Survey;
 use super::outcome::Outcome;
 use super::pixels::terms_of;
 use super::rows::Rows;
 use super::samples::ViewData;
+use super::surveyed_view::SurveyedView;
 use crate::camera::Camera;
 use crate::model::NoiseModel;
 use crate::terms::{Statistic, Term};

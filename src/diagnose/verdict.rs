@@ -1,9 +1,10 @@
 //! What is said in the end: the verdict, findings in order, the extended model, the views.
 
+use super::blocks::BLOCK_TILES;
 use super::diagnosis::{Alternative, CannotTell, Finding, HeldOut, Status, Verdict, ViewLine};
 use super::field::Field;
 use super::heldout;
-use super::layers::{BLOCK_TILES, Survey};
+use super::layers::Survey;
 use super::other_findings::named;
 use super::outcome::Outcome;
 use super::tiles::SIDE;

@@ -1,0 +1,83 @@
+//! Infrared amplitudes as the light of surfaces.
+
+use std::sync::Arc;
+
+use super::field::Field;
+use super::surveyed_view::SurveyedView;
+use crate::terms::PixelContext;
+
+/// How infrared amplitudes become the light of surfaces.
+#[derive(Debug, Clone, Copy)]
+pub struct Light {
+    /// Of the recording, in the image's own units; 0 where there is no infrared.
+    median: f64,
+    ambient_share: f64,
+}
+
+impl Light {
+    /// Of a single pixel.
+    pub fn of(&self, field: &Field, k: usize, p: &PixelContext) -> f64 {
+        let Some(&light) = field.light.get(k) else { return 1.0 };
+        let own = f64::from(light) / (1.0 + self.ambient_share * p.ambient * far(p));
+        if self.median > 0.0 && own.is_finite() { own / self.median } else { 1.0 }
+    }
+}
+
+/// Light in units of the recording's median, what the room adds taken out.
+pub fn relative_light(views: &mut [SurveyedView]) -> Light {
+    let share = ambient_share(views);
+    let mut all: Vec<f32> = Vec::new();
+    for tile in views.iter_mut().flat_map(|v| Arc::make_mut(&mut v.tiles)) {
+        let p = &mut tile.place;
+        p.light /= 1.0 + share * p.ambient * far(p);
+        if p.light.is_finite() {
+            all.push(p.light as f32);
+        }
+    }
+    let median = f64::from(crate::stats::median_in_place(&mut all));
+    let usable = median > 0.0;
+    for tile in views.iter_mut().flat_map(|v| Arc::make_mut(&mut v.tiles)) {
+        let light = tile.place.light / median;
+        tile.place.light = if usable && light.is_finite() { light } else { 1.0 };
+    }
+    Light { median: if usable { median } else { 0.0 }, ambient_share: share }
+}
+
+/// By this the pattern's light has fallen.
+fn far(p: &PixelContext) -> f64 {
+    p.z * p.z * (1.0 + p.x * p.x + p.y * p.y) / p.theta.cos().max(0.05)
+}
+
+/// Light of the room in the infrared image, a lux over the pattern at 1 m: amplitude times `far`
+/// is a (1 + share lux far), a line through the views' medians.
+fn ambient_share(views: &[SurveyedView]) -> f64 {
+    let points: Vec<(f64, f64)> = views
+        .iter()
+        .filter_map(|v| {
+            let mut light: Vec<f32> = v.tiles.iter().map(|t| t.place.light as f32).collect();
+            light.retain(|l| l.is_finite());
+            let middle = v.tiles.get(v.tiles.len() / 2)?.place;
+            let x = middle.ambient * far(&middle);
+            let y = f64::from(crate::stats::median_in_place(&mut light));
+            (x > 0.0 && y > 0.0).then_some((x, y))
+        })
+        .collect();
+    if points.len() < 4 {
+        return 0.0;
+    }
+    // Errors are shares of the light.
+    let n: f64 = points.iter().map(|p| p.1.powi(-2)).sum();
+    let (x0, y0) = points.iter().fold((0.0, 0.0), |(x, y), p| {
+        let w = p.1.powi(-2) / n;
+        (x + w * p.0, y + w * p.1)
+    });
+    let (mut xx, mut xy) = (0.0, 0.0);
+    for (x, y) in points {
+        let w = y.powi(-2);
+        xx += w * (x - x0).powi(2);
+        xy += w * (x - x0) * (y - y0);
+    }
+    let slope = if xx > 0.0 { xy / xx } else { 0.0 };
+    let level = y0 - slope * x0;
+    if level > 0.0 { (slope / level).max(0.0) } else { 0.0 }
+}
