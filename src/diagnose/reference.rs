@@ -122,11 +122,16 @@ pub fn laws(fields: &[Field], levels: &[f64], second: &[bool]) -> Vec<Law> {
                 _ => c.z,
             }));
             let (rms_m, rms_sigma) = (square(&shift), square(&|c| shift(c) / c.sigma_m));
+            // The angles as all references have them.
+            let angles = &gain.beta.as_slice()[..beside];
+            let turned = |c: &Checked| -> f64 {
+                angles.iter().zip(c.slope).map(|(angle, slope)| angle * c.z * slope).sum()
+            };
             let half = |second: bool| {
-                let mine = checked.iter().filter(move |c| c.second == second);
+                let mine = checked.iter().filter(|c| c.second == second);
                 Measured::of_scores(mine.map(|c| {
                     let g = column(c);
-                    (g * g / variance, g * c.off / variance)
+                    (g * g / variance, g * (c.off - turned(c)) / variance)
                 }))
             };
             let replicated = agree([half(false), half(true)]);
