@@ -8,6 +8,7 @@ use super::findings;
 use super::form::better_form;
 use super::hanging::Hanging;
 use super::heldout;
+use super::laws;
 use super::lines::lines;
 use super::missing::missing;
 use super::next_view;
@@ -211,7 +212,7 @@ impl Case<'_> {
             self.survey.learnt_from[0].map_or(1.0, |views| 1.0 + self.fields.len() as f64 / views);
         let found = |terms: &[Term]| {
             let levels = heldout::levels(&self.survey, terms);
-            let laws = reference::laws(&self.fields, &levels, &self.survey.second());
+            let laws = laws::laws(&self.fields, &levels, &self.survey.second());
             let level = self.level(Self::LAWS_LEVEL);
             reference::findings(&laws, &self.known, excess, level, self.options.seed)
         };

@@ -33,6 +33,7 @@ mod judge;
 mod known;
 mod known_error;
 mod lattice;
+mod laws;
 mod layer_search;
 mod layers;
 mod light;

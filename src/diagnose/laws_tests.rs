@@ -1,0 +1,61 @@
+//! References of a target that was tilted, and read where the axis was thought to meet it.
+
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+use crate::diagnose::known::KnownTerms;
+use crate::diagnose::reference::findings;
+use crate::rng::Seed;
+
+const PX_M: f64 = 43.5;
+/// Of a reference, m.
+const ERROR_M: f64 = 0.0008;
+
+/// Three rows of distances: faced, turned about one axis, then about the other. By two angles the axis
+/// meets the target elsewhere than was thought, and the disparity is off by `offset_px`. `order` is the
+/// place of each in the session.
+fn references(
+    offset_px: f64,
+    angles: [f64; 2],
+    order: fn(usize) -> usize,
+    seed: u64,
+) -> Vec<Checked> {
+    let mut rng = Seed(seed).stream("laws");
+    let of = |k: usize| {
+        let z = 0.8 + 0.3 * (k % 8) as f64;
+        let slope = [[0.0, 0.0], [1.2, 0.05], [0.02, -1.2]][k / 8];
+        let noise: f64 = StandardNormal.sample(&mut rng);
+        let turned = z * (angles[0] * slope[0] + angles[1] * slope[1]);
+        let off = turned - z * z * offset_px / PX_M + ERROR_M * noise;
+        let (session_s, second) = (60.0 * order(k) as f64, k % 2 == 1);
+        Checked { z, slope, off, session_s, px_m: PX_M, sigma_m: 0.002 * z * z, second }
+    };
+    (0..24).map(of).collect()
+}
+
+fn found(checked: &[Checked]) -> Vec<(Option<&'static str>, f64)> {
+    let told = findings(&of(checked), &KnownTerms::default(), 1.0, 0.003, Seed(1));
+    told.iter().map(|f| (f.effect, f.parameters["offset_px"]["value"].as_f64().unwrap())).collect()
+}
+
+/// In the order of the session they would be a drift.
+#[test]
+fn a_target_read_beside_the_axis_is_no_law() {
+    for seed in 0..8 {
+        let checked = references(0.0, [-0.006, 0.003], |k| k, seed);
+        assert_eq!(found(&checked), [], "seed {seed}");
+    }
+}
+
+/// Taken in no order of distance, so that no drift can look like it.
+#[test]
+fn an_offset_keeps_its_size_beside_it() {
+    for seed in 0..8 {
+        for angles in [[0.0, 0.0], [-0.006, 0.003]] {
+            let told = found(&references(0.06, angles, |k| 7 * k % 24, seed));
+            let &[(effect, offset_px)] = &told[..] else { panic!("seed {seed}: {told:?}") };
+            assert_eq!(effect, Some("disparity-offset"));
+            assert!((offset_px - 0.06).abs() < 0.01, "seed {seed}: {offset_px}");
+        }
+    }
+}
