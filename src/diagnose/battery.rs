@@ -12,6 +12,7 @@ use super::laws;
 use super::lines::lines;
 use super::missing::missing;
 use super::next_view;
+use super::null::beside_model;
 use super::other_findings;
 use super::outcome::Outcome;
 use super::pixels::{typical_sigma_mm, typical_sigma_px};
@@ -208,8 +209,8 @@ impl Case<'_> {
         // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
         let anchored: Vec<Term> =
             bias.iter().filter(|t| t.basis.is_nothing_ahead()).cloned().collect();
-        let excess =
-            self.survey.learnt_from[0].map_or(1.0, |views| 1.0 + self.fields.len() as f64 / views);
+        let views = self.fields.len() as f64;
+        let excess = self.survey.learnt_from[0].map_or(1.0, |others| beside_model(views, others));
         let found = |terms: &[Term]| {
             let levels = heldout::levels(&self.survey, terms);
             let laws = laws::laws(&self.fields, &levels, &self.survey.second());
@@ -225,9 +226,11 @@ impl Case<'_> {
         let model: Vec<Term> =
             self.known.bias.iter().filter(|t| !t.basis.is_nothing_ahead()).map(back).collect();
         let mut laws = found(&anchored);
-        for others in [bias.to_vec(), [anchored, model].concat()] {
-            let with = found(&others);
-            laws.retain(|l| with.iter().any(|w| w.effect == l.effect));
+        for others in [bias.to_vec(), [anchored.clone(), model].concat()] {
+            if others != anchored && !laws.is_empty() {
+                let with = found(&others);
+                laws.retain(|l| with.iter().any(|w| w.effect == l.effect));
+            }
         }
         laws
     }

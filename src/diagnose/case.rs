@@ -111,7 +111,8 @@ impl<'a> Case<'a> {
         'a: 'b,
     {
         let learnt = (self.learnt_from, &known);
-        let survey = survey(&fields, &self.bench, self.baseline.as_ref(), self.options, learnt);
+        let mut survey = survey(&fields, &self.bench, self.baseline.as_ref(), self.options, learnt);
+        survey.ask_no_certainty();
         Case {
             model,
             known,

@@ -17,6 +17,18 @@ pub struct Evidence {
     pub b: DVector<f64>,
 }
 
+impl Evidence {
+    /// Of these views together, on `n` columns that are held by the precision `prior`.
+    pub fn sum<'a>(n: usize, prior: f64, views: impl IntoIterator<Item = &'a Self>) -> Self {
+        let held = Evidence { a: DMatrix::identity(n, n) * prior, b: DVector::zeros(n) };
+        views.into_iter().fold(held, |mut sum, view| {
+            sum.a += &view.a;
+            sum.b += &view.b;
+            sum
+        })
+    }
+}
+
 /// What a set of terms brings on views they were not fitted to.
 #[derive(Debug, Clone)]
 pub struct Gain {
@@ -32,13 +44,7 @@ pub struct Gain {
 
 /// Coefficients of a fit to all views.
 pub fn fit(views: &[Evidence], prior: f64) -> Option<DVector<f64>> {
-    let k = views.first()?.b.len();
-    let mut a = DMatrix::identity(k, k) * prior;
-    let mut b = DVector::zeros(k);
-    for v in views {
-        a += &v.a;
-        b += &v.b;
-    }
+    let Evidence { a, b } = Evidence::sum(views.first()?.b.len(), prior, views);
     Some(Cholesky::of(a)?.solve(&b))
 }
 
@@ -48,13 +54,7 @@ const VIEWS_AT_ONCE: usize = 4;
 /// Gain over no term at all, each view predicted from a fit to the others. `prior` is the
 /// precision that holds a coefficient nothing is known about.
 pub fn gain(views: &[Evidence], prior: f64) -> Option<Gain> {
-    let k = views.first()?.b.len();
-    let mut a = DMatrix::identity(k, k) * prior;
-    let mut b = DVector::zeros(k);
-    for v in views {
-        a += &v.a;
-        b += &v.b;
-    }
+    let Evidence { a, b } = Evidence::sum(views.first()?.b.len(), prior, views);
     let by_view: Vec<f64> = views
         .par_iter()
         .with_min_len(VIEWS_AT_ONCE)

@@ -3,6 +3,7 @@
 use serde_json::Map;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use super::null::student;
 use super::parameters::estimate;
 use super::structure::Structure;
 use crate::terms::{Axis, Statistic};
@@ -79,7 +80,7 @@ pub fn one(name: &str, value: f64, std_error: f64) -> Map<String, serde_json::Va
 
 pub fn nats(m: &Mean, expected: f64) -> f64 {
     let t = (m.value - expected) / m.std_error.max(1e-9);
-    0.5 * m.views * (t * t / m.views).ln_1p()
+    student(0.5 * t * t, m.views)
 }
 
 /// Variance that pixels or lines share, as it is looked for.

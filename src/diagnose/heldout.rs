@@ -3,6 +3,7 @@
 use rand::Rng;
 use rand::seq::SliceRandom;
 
+use super::case::Case;
 use super::diagnosis::{HeldOut, LeftOut};
 use super::engine::DiagnoseOptions;
 use super::layers::Survey;
@@ -13,7 +14,7 @@ use super::samples::ViewData;
 use super::surveyed_view::SurveyedView;
 use crate::camera::Camera;
 use crate::model::NoiseModel;
-use crate::terms::{Statistic, Term};
+use crate::terms::{Statistic, Term, by_term};
 
 /// A share of the views is kept aside.
 const KEPT_ASIDE: usize = 4;
@@ -40,9 +41,10 @@ pub fn score(
     let rest: Vec<usize> = (0..n).filter(|v| !aside.contains(v)).collect();
     let (chosen_on, judged_on) = (survey.subset(&rest), survey.subset(&aside));
     let level = options.level;
-    let bias = chosen_on.search_bias(camera, 0.4 * level, options.seed);
+    let bias = chosen_on.search_bias(camera, Case::MEAN_LEVEL * level, options.seed);
     let bias_terms = terms_of(&bias, Statistic::Bias);
-    let variance = chosen_on.search_variance(&model.sigma, camera, 0.25 * level, options.seed);
+    let variance =
+        chosen_on.search_variance(&model.sigma, camera, Case::VARIANCE_LEVEL * level, options.seed);
     let variance_terms = terms_of(&variance, Statistic::Variance);
     let means: Vec<ViewData> = judged_on.coarse_mean_data();
     let blocks = judged_on.variance_data();
@@ -188,18 +190,14 @@ pub fn left_out(survey: &Survey, outcome: &Outcome, terms: &[Term]) -> Option<Le
     let (mut sums, mut n) = ([0.0; 2], 0.0);
     let mut by_view = [0.0; 2];
     for (v, view) in survey.views.iter().enumerate() {
-        let mut rest: &[f64] = match outcome.left_out.iter().find(|(views, _)| views.contains(&v)) {
-            Some((_, beta)) => beta,
-            None if terms.is_empty() => &[],
-            None => return None,
-        };
-        let refitted: Vec<Term> = terms
-            .iter()
-            .map(|t| {
-                let (mine, others) = rest.split_at(t.basis.count());
-                rest = others;
-                Term { coefficients: mine.to_vec(), ..t.clone() }
-            })
+        let fitted_without: &[f64] =
+            match outcome.left_out.iter().find(|(views, _)| views.contains(&v)) {
+                Some((_, beta)) => beta,
+                None if terms.is_empty() => &[],
+                None => return None,
+            };
+        let refitted: Vec<Term> = by_term(terms, fitted_without)
+            .map(|(t, mine)| Term { coefficients: mine.to_vec(), ..t.clone() })
             .collect();
         let pixels: f64 = view.tiles.iter().filter(|t| t.mean.is_finite()).map(|t| t.pixels).sum();
         let both = sums.iter_mut().zip(&mut by_view).zip([&[][..], &refitted]);

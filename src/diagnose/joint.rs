@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::candidate::Candidate;
 use super::evidence::Gain;
 use super::joint_fit::{Columns, Joint, Reduced};
-use super::joint_terms::{Settled, is_rough, is_smooth_and_nameless, total};
+use super::joint_terms::{Settled, System, is_rough, is_smooth_and_nameless, total};
 use super::outcome::{Chosen, Outcome};
 use super::replication::{Half, Halves};
 use super::samples::{ViewData, coarser};
@@ -23,7 +23,8 @@ use crate::terms::Gauge;
 
 /// The terms of a finished search fitted together, with the smooth rest. `fine` are the views' means
 /// in small patches, `inflation` what each view's weights were divided by: a bias is as sure in a
-/// view as in another, for views scatter beyond their noise. `second` says which half a view is in.
+/// view as in another, for views scatter beyond their noise. `second` says which half a view is in;
+/// where all are in one, nobody asks how sure it is, and there are neither halves nor a covariance.
 pub fn refit(
     fine: &[ViewData],
     inflation: &[f64],
@@ -112,7 +113,10 @@ impl Joint<'_> {
             covariance: Covariance::default(),
         };
         let planes = (camera, disparities(data));
-        if let Some(error) = self.error(s, &kept, &precision, &left, planes) {
+        let is_told = second.contains(&true);
+        if let Some(error) =
+            is_told.then(|| self.error(s, &kept, &precision, &left, planes)).flatten()
+        {
             outcome.covariance.factors = error.factors.iter().map(|f| self.told(s, f)).collect();
             outcome.covariance.variances = self.laid_out(s, &error.variances, |_, _| [0.0; 3]);
         }
@@ -123,7 +127,18 @@ impl Joint<'_> {
             })
             .collect();
         let told = self.told(s, &beta);
-        let mut covariance = DMatrix::zeros(told.len(), told.len());
+        outcome.fit = Some(Gain {
+            total: total(&s.scores),
+            by_view: s.scores.clone(),
+            covariance: self.covariance_of_told(s, &errors, told.len()),
+            beta: DVector::from_vec(told),
+        });
+        Some(outcome)
+    }
+
+    /// The terms' covariance where [`Joint::told`] has their coefficients, zero elsewhere.
+    fn covariance_of_told(&self, s: &Settled, errors: &DMatrix<f64>, told: usize) -> DMatrix<f64> {
+        let mut covariance = DMatrix::zeros(told, told);
         let mut to = 0;
         let places: Vec<usize> = s
             .terms
@@ -140,13 +155,7 @@ impl Joint<'_> {
                 covariance[(p, q)] = errors[(i, j)];
             }
         }
-        outcome.fit = Some(Gain {
-            total: total(&s.scores),
-            by_view: s.scores.clone(),
-            beta: DVector::from_vec(told),
-            covariance,
-        });
-        Some(outcome)
+        covariance
     }
 
     /// The same fit to either half of the views, where there are two.
@@ -162,22 +171,15 @@ impl Joint<'_> {
             return None;
         }
         let kept = self.kept(&s.terms);
-        let terms = self.columns.terms;
-        let nodes = if s.penalty.is_some() { self.columns.nodes } else { 0 };
-        let columns: Vec<usize> = kept.iter().copied().chain(terms..terms + nodes).collect();
+        let System { columns, held } = self.system(s, &kept, precision);
         let n = columns.len();
         let part = |a: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| a[(columns[i], columns[j])]);
         let own = |all: &DVector<f64>| DVector::from_fn(n, |i, _| all[columns[i]]);
-        let mut held = DMatrix::zeros(n, n);
-        kept.iter().enumerate().for_each(|(i, &k)| held[(i, i)] = precision[k]);
-        if let Some(penalty) = &s.penalty {
-            held.view_mut((kept.len(), kept.len()), (nodes, nodes)).copy_from(penalty);
-        }
         let half = |which: bool| {
             let evidence = &self.halves[usize::from(which)];
             let factor = (part(&evidence.a) + &held).cholesky()?;
             let beta = factor.solve(&own(&evidence.b));
-            let mut all = DVector::zeros(terms + self.columns.nodes);
+            let mut all = DVector::zeros(self.all.b.len());
             columns.iter().zip(beta.iter()).for_each(|(&c, b)| all[c] = *b);
             let mine: Vec<&ViewData> = data
                 .iter()
@@ -202,8 +204,9 @@ impl Joint<'_> {
                 spans.push(next(0));
             }
         }
-        if nodes > 0 {
-            spans.extend([next(nodes / 2), next(nodes / 2)]);
+        if s.penalty.is_some() {
+            let nodes = self.columns.nodes / 2;
+            spans.extend([next(nodes), next(nodes)]);
         }
         Some(Halves::new(part(&self.all.a), own(whole), [half(false)?, half(true)?], spans))
     }

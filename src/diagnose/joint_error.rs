@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::joint_fit::Joint;
-use super::joint_terms::Settled;
+use super::joint_terms::{Settled, System};
 use crate::camera::Camera;
 use crate::rng::Seed;
 use crate::terms::Pixels;
@@ -34,20 +34,10 @@ impl Joint<'_> {
         left: &[DVector<f64>],
         (camera, disparities): (&Camera, [f64; 3]),
     ) -> Option<Error> {
-        let terms = self.columns.terms;
-        let nodes = if s.penalty.is_some() { self.columns.nodes } else { 0 };
-        let places: Vec<usize> = kept.iter().copied().chain(terms..terms + nodes).collect();
+        let System { columns: places, held } = self.system(s, kept, precision);
         let n = places.len();
         let information = DMatrix::from_fn(n, n, |i, j| self.all.a[(places[i], places[j])]);
-        let mut held = information.clone();
-        for (i, &k) in kept.iter().enumerate() {
-            held[(i, i)] += precision[k];
-        }
-        if let Some(penalty) = &s.penalty {
-            let mut block = held.view_mut((kept.len(), kept.len()), (nodes, nodes));
-            block += penalty;
-        }
-        let inverse = Cholesky::<f64, Dyn>::new(held)?.inverse();
+        let inverse = Cholesky::<f64, Dyn>::new(&information + held)?.inverse();
         let mine = |e: &DVector<f64>| DVector::from_fn(n, |i, _| e[places[i]]);
         let scatter: f64 = left.iter().map(|e| mine(e).dot(&(&inverse * mine(e)))).sum();
         let free = inverse.component_mul(&information).sum();
@@ -70,7 +60,7 @@ impl Joint<'_> {
             .map(|f| back.solve_upper_triangular(&f))
             .collect::<Option<_>>()?;
         let told = factors.iter().map(|f| f * f.transpose()).sum::<DMatrix<f64>>();
-        let own = rest(&seen, &(covariance - told), kept.len(), nodes / 2);
+        let own = rest(&seen, &(covariance - told), kept.len(), (n - kept.len()) / 2);
         let all = |of: &dyn Fn(usize) -> f64| {
             let mut all = DVector::zeros(self.all.b.len());
             places.iter().enumerate().for_each(|(i, &k)| all[k] = of(i));

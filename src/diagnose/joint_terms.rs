@@ -39,7 +39,26 @@ pub struct Settled {
     pub maps_p: f64,
 }
 
+/// What is solved: the columns that are in it, by number, and what holds them.
+pub struct System {
+    pub columns: Vec<usize>,
+    pub held: DMatrix<f64>,
+}
+
 impl Joint<'_> {
+    /// The terms' columns in `kept`, and the maps' where there are maps.
+    pub fn system(&self, s: &Settled, kept: &[usize], precision: &DVector<f64>) -> System {
+        let terms = self.columns.terms;
+        let nodes = if s.penalty.is_some() { self.columns.nodes } else { 0 };
+        let columns: Vec<usize> = kept.iter().copied().chain(terms..terms + nodes).collect();
+        let mut held = DMatrix::zeros(columns.len(), columns.len());
+        kept.iter().enumerate().for_each(|(i, &k)| held[(i, i)] = precision[k]);
+        if let Some(penalty) = &s.penalty {
+            held.view_mut((kept.len(), kept.len()), (nodes, nodes)).copy_from(penalty);
+        }
+        System { columns, held }
+    }
+
     pub fn settle(&self, chosen: &[Chosen], camera: &Camera) -> Option<Settled> {
         let everything: Vec<usize> = (0..chosen.len()).collect();
         let plain = self.without(None)?;

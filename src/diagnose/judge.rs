@@ -26,6 +26,11 @@ impl Judged {
 /// A later term must be this large beside the largest, root mean square by root mean square.
 pub const LEAST_OF_LARGEST: f64 = 0.06;
 
+/// A pattern that stands still must be, in square, so much more than what a fit to nothing but the
+/// pixels' own errors would make: seven times, for the best of many and for views that cover little
+/// of the picture.
+pub const CLEARLY: f64 = 50.0;
+
 /// What sizes are measured on, and held against.
 pub struct Judge<'a> {
     pub fine: &'a [ViewData],
@@ -60,9 +65,6 @@ impl Judge<'_> {
         let Some((fixed, pixels)) = self.rules.fixed.filter(|_| basis.is_of_picture()) else {
             return true;
         };
-        // Seven times what a fit to nothing but the pixels' own errors would make, for the best of
-        // many and for views that cover little of the picture.
-        const CLEARLY: f64 = 50.0;
         rms * rms > CLEARLY * fixed * fixed * k as f64 / pixels
     }
 }

@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 use crate::camera::Camera;
 use crate::effects;
 use crate::model::{Covariance, NoiseModel, UNEXPLAINED};
-use crate::terms::{Basis, Statistic, Term};
+use crate::terms::{Basis, Statistic, Term, by_term};
 
 /// The model's effects as terms, and the rest by name.
 #[derive(Debug, Clone, Default)]
@@ -80,17 +80,11 @@ impl KnownTerms {
 
     /// Does the noise change its size in a way that has no name?
     pub fn has_uneven_noise(&self) -> bool {
-        let nameless = self.entries.iter().filter(|(id, _)| id == UNEXPLAINED);
-        nameless.count() > 0
-            && self.variance.iter().any(|t| {
-                matches!(
-                    t.basis,
-                    Basis::Curve { .. }
-                        | Basis::Ring { .. }
-                        | Basis::Map { .. }
-                        | Basis::Pair { .. }
-                )
-            })
+        let nameless = |t: &Term| {
+            use Basis::{Curve, Map, Pair, Ring};
+            matches!(t.basis, Curve { .. } | Ring { .. } | Map { .. } | Pair { .. })
+        };
+        self.has(UNEXPLAINED) && self.variance.iter().any(nameless)
     }
 
     /// What the learnt terms may be off by: terms that err together, by one standard deviation.
@@ -99,10 +93,7 @@ impl KnownTerms {
         for (shape, covariance) in &self.learnt {
             for (k, factor) in covariance.factors.iter().enumerate() {
                 let part = parts.entry((covariance.fit, k)).or_default();
-                let mut rest = &factor[..];
-                for term in shape {
-                    let (mine, others) = rest.split_at(term.coefficients.len().min(rest.len()));
-                    rest = others;
+                for (term, mine) in by_term(shape, factor) {
                     if term.statistic == statistic && mine.iter().any(|c| *c != 0.0) {
                         part.push(Term { coefficients: mine.to_vec(), ..term.clone() });
                     }
@@ -114,15 +105,9 @@ impl KnownTerms {
 
     /// Variance of what learnt profiles of single columns and rows may be off by, px^2.
     pub fn error_of_lines_px2(&self) -> f64 {
+        let mean = |mine: &[f64]| mine.iter().sum::<f64>() / mine.len().max(1) as f64;
         let of = |(shape, covariance): &(Vec<Term>, Covariance)| -> f64 {
-            let mut rest = &covariance.variances[..];
-            let mut sum = 0.0;
-            for term in shape {
-                let (mine, others) = rest.split_at(term.coefficients.len().min(rest.len()));
-                rest = others;
-                sum += mine.iter().sum::<f64>() / mine.len().max(1) as f64;
-            }
-            sum
+            by_term(shape, &covariance.variances).map(|(_, mine)| mean(mine)).sum()
         };
         self.learnt.iter().filter(|(_, c)| c.factors.is_empty()).map(of).sum()
     }

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -21,7 +21,7 @@ use crate::terms::{PixelContext, Statistic, Term};
 const LEVEL: f64 = 1e-3;
 
 /// A part of the model's error: terms that err together, by a standard normal number times these.
-pub type Part = Vec<Term>;
+type Part = Vec<Term>;
 
 fn value(part: &Part, place: &PixelContext, row: &mut Vec<f64>) -> f64 {
     part.iter().map(|t| t.value(place, row)).sum()
@@ -45,12 +45,7 @@ fn settled(data: &[ViewData], parts: &[Part]) -> Option<Vec<f64>> {
     };
     let evidence: Vec<Evidence> = data.par_iter().filter_map(of).collect();
     let n = parts.len();
-    let mut a = DMatrix::zeros(n, n);
-    let mut b = DVector::zeros(n);
-    for e in &evidence {
-        a += &e.a;
-        b += &e.b;
-    }
+    let Evidence { a, b } = Evidence::sum(n, 0.0, &evidence);
     // The new views scatter beyond their noise, too.
     let dispersion = Null::of(&evidence, 0, 1.0)?.about_fit;
     let (a, b) = (a / dispersion, b / dispersion);

@@ -21,7 +21,7 @@ use crate::rng::Seed;
 use crate::terms::Basis;
 
 /// No more terms than this are looked for in a layer.
-const MOST_TERMS: usize = 10;
+const MAX_TERMS: usize = 10;
 /// A bias smaller than this share of the noise is not told.
 const LEAST_SIGMAS: f64 = 0.004;
 /// A name that explains less than this share of what a nameless curve explains is not the cause.
@@ -63,7 +63,7 @@ impl Survey {
             level,
             prior: BIAS_PRIOR,
             adequacy: ADEQUATE,
-            most_terms: MOST_TERMS,
+            max_terms: MAX_TERMS,
             fixed: (self.fixed_px2 > 0.0).then(|| (self.fixed_px2.sqrt(), self.covered_px(camera))),
             least: LEAST_SIGMAS * self.typical_sigma_px(),
             calibrated: true,
@@ -89,7 +89,7 @@ impl Survey {
             level,
             prior: VARIANCE_PRIOR,
             adequacy: ADEQUATE,
-            most_terms: MOST_TERMS,
+            max_terms: MAX_TERMS,
             fixed: None,
             // What views differ by as wholes is mostly taken up by their own levels: small terms are
             // dropped when they are told, by their size on the axis.

@@ -82,20 +82,16 @@ impl Survey {
 
     /// The views at these places.
     pub fn subset(&self, which: &[usize]) -> Survey {
-        // A part of the views is asked for no replication.
-        let alone = |&n: &usize| SurveyedView { second: false, ..self.views[n].clone() };
-        let views: Vec<SurveyedView> = which.iter().map(alone).collect();
+        let views: Vec<SurveyedView> = which.iter().map(|&n| self.views[n].clone()).collect();
         let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter().map(|t| &t.place)));
-        Survey {
-            views,
-            reach,
-            fixed_px2: self.fixed_px2,
-            light: self.light,
-            tolerance: self.tolerance,
-            refits_sigma: self.refits_sigma,
-            learnt_from: self.learnt_from,
-            ablation: self.ablation,
-        }
+        let mut part = Survey { views, reach, ..*self };
+        part.ask_no_certainty();
+        part
+    }
+
+    /// Nobody asks how sure a search of these views is: whether halves agree, and the covariance.
+    pub fn ask_no_certainty(&mut self) {
+        self.views.iter_mut().for_each(|v| v.second = false);
     }
 
     /// Measure anew what the views' means are worth, with what was found of the bias taken out, px

@@ -49,9 +49,8 @@ impl Null {
     pub fn safe(&self, gain: f64, views: usize, rules: &Rules) -> f64 {
         let views = views as f64;
         let Some(learnt_from) = rules.learnt_from else { return gain / self.dispersion };
-        let nats = gain / (self.about_fit * (1.0 + views / learnt_from));
-        let freedom = (views - 1.0).max(1.0);
-        if nats > 0.0 { 0.5 * freedom * (2.0 * nats / freedom).ln_1p() } else { nats }
+        let nats = gain / (self.about_fit * beside_model(views, learnt_from));
+        if nats > 0.0 { student(nats, (views - 1.0).max(1.0)) } else { nats }
     }
 
     /// The gain of one recording of nothing but noise, nats.
@@ -72,6 +71,17 @@ impl Null {
         }
         gain
     }
+}
+
+/// Nats of a Gaussian whose error was measured with so many degrees of freedom: of a Student's t.
+pub fn student(nats: f64, freedom: f64) -> f64 {
+    0.5 * freedom * (2.0 * nats / freedom).ln_1p()
+}
+
+/// How much further than by their own error so many views may be off from a model that others
+/// taught, in variance.
+pub fn beside_model(views: f64, learnt_from: f64) -> f64 {
+    1.0 + views / learnt_from
 }
 
 /// Information and score of each view.

@@ -16,7 +16,7 @@ pub struct Rules {
     pub prior: f64,
     /// A name must explain this share of what the best curve does.
     pub adequacy: f64,
-    pub most_terms: usize,
+    pub max_terms: usize,
     /// Constant error of every pixel, px, and pixels of the picture: a pattern that stands still
     /// in the picture must be larger than what these errors make by chance.
     pub fixed: Option<(f64, f64)>,

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::candidate::Candidate;
 use super::evidence::{Evidence, gain};
-use super::judge::LEAST_OF_LARGEST;
+use super::judge::{CLEARLY, LEAST_OF_LARGEST};
 use super::null::Null;
 use super::outcome::{Outcome, Rules};
 use super::pixels::terms_of;
@@ -25,8 +25,6 @@ use crate::terms::{Basis, Statistic, Term};
 /// Of the recordings, so many show it.
 const POWER: f64 = 0.8;
 const REPLICATES: u64 = 200;
-/// As in the search: a still pattern beside the pixels' own errors.
-const CLEARLY: f64 = 50.0;
 
 /// A layer as it was searched.
 pub struct Gates<'a> {
@@ -79,7 +77,7 @@ impl Gates<'_> {
         let first = self.outcome.chosen.first().map_or(0.0, |c| c.gain);
         let need =
             (dispersion * self.outcome.noise.threshold(self.rules.level)).max(LEAST_SHARE * first);
-        let sum = views.iter().fold(DMatrix::zeros(u.len(), u.len()), |sum, v| sum + &v.a);
+        let sum = Evidence::sum(u.len(), 0.0, &views).a;
         let information = u.dot(&(&sum * &u));
         if !need.is_finite() || information <= 0.0 {
             return None;
@@ -93,7 +91,7 @@ impl Gates<'_> {
             prior: self.rules.prior,
             sum: &sum,
         };
-        let floor = self.least_rms(&unit.basis);
+        let floor = self.min_rms(&unit.basis);
         let weight: f64 = self.scene.data.iter().flat_map(|v| &v.weight).sum();
         let own = size(self.scene, &self.scene.values(unit)).sigma;
         let sizes: Option<Vec<f64>> = (0..REPLICATES)
@@ -125,7 +123,7 @@ impl Gates<'_> {
     }
 
     /// Root mean square that a fit must have, in the response's unit.
-    fn least_rms(&self, basis: &Basis) -> f64 {
+    fn min_rms(&self, basis: &Basis) -> f64 {
         let largest = self.outcome.chosen.iter().map(|c| c.rms).fold(0.0, f64::max);
         let still = self
             .rules

@@ -8,7 +8,7 @@ use super::field::Field;
 use super::known::KnownTerms;
 use super::laws::{FEWEST, Law};
 use super::naming::{MIN_PROBABILITY, physics};
-use super::null::{NoiseGains, Null};
+use super::null::{NoiseGains, Null, student};
 use super::parameters::estimate;
 use crate::model::Covariance;
 use crate::rng::Seed;
@@ -38,7 +38,7 @@ pub fn findings(
     // An error measured on few references makes a Student's t of a Gaussian.
     let safe = |l: &Law| {
         let gain = (l.gain / l.null.dispersion / excess).max(0.0);
-        0.5 * l.freedom * (2.0 * gain / l.freedom).ln_1p()
+        student(gain, l.freedom)
     };
     let Some(best) = laws.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)) else {
         return Vec::new();

@@ -126,18 +126,17 @@ impl Halves {
         let held = DMatrix::identity(n, n) * prior;
         let sum = |which: Option<bool>| {
             let mine = views.iter().zip(second).filter(|(_, s)| which.is_none_or(|w| w == **s));
-            let none = (DMatrix::zeros(n, n), DVector::zeros(n));
-            mine.fold(none, |(a, b), (view, _)| (a + &view.a, b + &view.b))
+            Evidence::sum(n, 0.0, mine.map(|(view, _)| view))
         };
         let fit = |which| {
-            let (a, b) = sum(Some(which));
+            let Evidence { a, b } = sum(Some(which));
             let factor = (a + &held).cholesky()?;
             let beta = factor.solve(&b);
             let mine = views.iter().zip(second).filter(|(_, s)| **s == which);
             let beyond = mine.map(|(view, _)| &view.b - &view.a * &beta).collect();
             Some(Half { beta, factor, beyond })
         };
-        let (metric, b) = sum(None);
+        let Evidence { a: metric, b } = sum(None);
         let whole = (&metric + &held).cholesky()?.solve(&b);
         let mut first = 0;
         let span = |&count: &usize| {

@@ -58,7 +58,7 @@ pub fn search_beside(
     let mut remaining = None;
     while let Some(next) = layer.step(&chosen) {
         let little = chosen.first().is_some_and(|first| next.gain < LEAST_SHARE * first.gain);
-        if little || chosen.len() >= rules.most_terms {
+        if little || chosen.len() >= rules.max_terms {
             remaining = Some(next);
             break;
         }

@@ -13,7 +13,7 @@ const RULES: Rules = Rules {
     level: 0.01,
     prior: 1e-6,
     adequacy: 0.7,
-    most_terms: 4,
+    max_terms: 4,
     fixed: None,
     least: 0.0,
     calibrated: true,

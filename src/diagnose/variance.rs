@@ -57,12 +57,12 @@ fn steepness(theta: f64) -> f64 {
 /// Columns of log depth (-1 to 1 over the reach) and tilt as a change of sigma.
 fn surface(reach: &Extent, columns: &dyn Fn(f64, f64) -> Vec<f64>) -> Candidate {
     let (z_m, theta_rad) = table_reach(reach);
-    let at = |[low, high]: [f64; 2], k: usize| low + (high - low) * k as f64 / (TABLE - 1) as f64;
     let log = z_m.map(f64::ln);
     let rows: Vec<Vec<f64>> = (0..TABLE * TABLE)
         .map(|n| {
-            let share = (at(z_m, n % TABLE).ln() - log[0]) / (log[1] - log[0]).max(1e-9);
-            columns(2.0 * share - 1.0, at(theta_rad, n / TABLE))
+            let (z, theta) = table_place(z_m, theta_rad, n);
+            let share = (z.ln() - log[0]) / (log[1] - log[0]).max(1e-9);
+            columns(2.0 * share - 1.0, theta)
         })
         .collect();
     let columns = (0..rows[0].len()).map(|j| rows.iter().map(|row| row[j]).collect()).collect();
@@ -75,19 +75,26 @@ fn table_reach(reach: &Extent) -> ([f64; 2], [f64; 2]) {
     (wide(reach.z), wide(reach.theta))
 }
 
+/// Depth and tilt of a table's entry number `n`.
+fn table_place(z_m: [f64; 2], theta_rad: [f64; 2], n: usize) -> (f64, f64) {
+    let at = |[low, high]: [f64; 2], k: usize| low + (high - low) * k as f64 / (TABLE - 1) as f64;
+    (at(z_m, n % TABLE), at(theta_rad, n / TABLE))
+}
+
+/// A table of the logarithm of the model's variance.
+fn log_variances(model: &SigmaModel, z_m: [f64; 2], theta_rad: [f64; 2]) -> Vec<f64> {
+    let log = |n| {
+        let (z, theta) = table_place(z_m, theta_rad, n);
+        2.0 * model.sigma(z, theta).ln()
+    };
+    (0..TABLE * TABLE).map(log).collect()
+}
+
 /// What sigma's own covariance makes of the logarithm of the variance: a term for each of its
 /// directions, by one standard deviation.
 pub fn error_of_sigma(reach: &Extent, sigma: &SigmaModel) -> Vec<Vec<Term>> {
     let (z_m, theta_rad) = table_reach(reach);
-    let at = |[low, high]: [f64; 2], k: usize| low + (high - low) * k as f64 / (TABLE - 1) as f64;
-    let table = |model: &SigmaModel| -> Vec<f64> {
-        let place = |n: usize| (at(z_m, n % TABLE), at(theta_rad, n / TABLE));
-        let log = |n| {
-            let (z, theta) = place(n);
-            2.0 * model.sigma(z, theta).ln()
-        };
-        (0..TABLE * TABLE).map(log).collect()
-    };
+    let table = |model: &SigmaModel| log_variances(model, z_m, theta_rad);
     let eigen = sigma.covariance.clone().symmetric_eigen();
     let direction = |k: usize| {
         let root = eigen.eigenvalues[k].max(0.0).sqrt();
@@ -114,13 +121,7 @@ pub fn error_of_sigma(reach: &Extent, sigma: &SigmaModel) -> Vec<Vec<Term>> {
 /// a frontal target decides.
 fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
     let (z_m, theta_rad) = table_reach(reach);
-    let table = |model: &SigmaModel| -> Vec<f64> {
-        let at =
-            |[low, high]: [f64; 2], k: usize| low + (high - low) * k as f64 / (TABLE - 1) as f64;
-        (0..TABLE * TABLE)
-            .map(|n| 2.0 * model.sigma(at(z_m, n % TABLE), at(theta_rad, n / TABLE)).ln())
-            .collect()
-    };
+    let table = |model: &SigmaModel| log_variances(model, z_m, theta_rad);
     let base = table(sigma);
     let columns: Vec<Vec<f64>> = (0..sigma.parameters.len())
         .filter_map(|j| {

@@ -63,6 +63,20 @@ impl Statistic {
     }
 }
 
+/// Numbers that were written one term after the other, one a coefficient, term by term; fewer numbers
+/// leave the last terms without.
+pub fn by_term<'a>(
+    terms: &'a [Term],
+    numbers: &'a [f64],
+) -> impl Iterator<Item = (&'a Term, &'a [f64])> {
+    let mut rest = numbers;
+    terms.iter().map(move |term| {
+        let (mine, others) = rest.split_at(term.basis.count().min(rest.len()));
+        rest = others;
+        (term, mine)
+    })
+}
+
 impl Term {
     /// Of the disparity, px.
     pub fn bias(basis: Basis, coefficients: Vec<f64>) -> Self {
