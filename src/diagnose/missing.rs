@@ -16,6 +16,7 @@ use super::missing_shapes::{Shape, Step, curves, steps};
 use super::occlusion_scan::{Band, band};
 use super::replication::{Measured, agree};
 use super::shadow::Shadow;
+use super::tiles::Tile;
 use crate::camera::{Camera, Rays};
 use crate::rng::Seed;
 use crate::terms::{Axis, Extent};
@@ -78,7 +79,8 @@ pub fn missing(
     let told: Vec<bool> = fields.iter().map(|f| f.told).collect();
     let second = survey.second();
     let seen = Seen { cells: cells(survey, camera), fine: fine(survey), told, second };
-    let mut outcome = losses(&seen, &survey.reach, camera, seed);
+    let blur = |z: f64| blur(survey, z);
+    let mut outcome = losses(&seen, &survey.reach, camera, &blur, seed);
     let shadows: Vec<_> = fields.iter().map(|f| f.shadow).collect();
     if let Some(band) = band(&shadows, SHADOW_LEVEL) {
         let mut shadow = shadow_finding(band, fields);
@@ -102,7 +104,25 @@ struct Seen {
     second: Vec<bool>,
 }
 
-fn losses(seen: &Seen, reach: &Extent, camera: &Camera, seed: Seed) -> DropoutOutcome {
+impl Seen {
+    /// Without the patches that a hard end of the range touches.
+    fn inside(&self, end: &HardEnd) -> Seen {
+        let kept = |views: &[Vec<Cell>]| -> Vec<Vec<Cell>> {
+            let inside = |v: &Vec<Cell>| v.iter().filter(|c| !end.touches(c)).cloned().collect();
+            views.iter().map(inside).collect()
+        };
+        let (told, second) = (self.told.clone(), self.second.clone());
+        Seen { cells: kept(&self.cells), fine: kept(&self.fine), told, second }
+    }
+}
+
+fn losses(
+    seen: &Seen,
+    reach: &Extent,
+    camera: &Camera,
+    blur: &dyn Fn(f64) -> f64,
+    seed: Seed,
+) -> DropoutOutcome {
     let views = &seen.cells;
     let mut outcome = DropoutOutcome::default();
     if views.iter().filter(|v| !v.is_empty()).count() < FEWEST_VIEWS {
@@ -112,58 +132,97 @@ fn losses(seen: &Seen, reach: &Extent, camera: &Camera, seed: Seed) -> DropoutOu
     let mut explained: Vec<Vec<f64>> = views.iter().map(|v| vec![0.0; v.len()]).collect();
     let mut taken: Vec<Axis> = Vec::new();
     while outcome.findings.len() < MOST_FINDINGS {
-        let mut losses = Losses::new(views, &explained);
+        let mut ledger = Losses::new(views, &explained);
         let open_steps: Vec<Step> =
             steps.iter().filter(|s| !taken.contains(&s.axis)).copied().collect();
         let open_curves: Vec<Shape> =
             curves.iter().filter(|c| !taken.contains(&c.axis())).cloned().collect();
-        let (first, _) = losses.judge(&open_steps, &open_curves, None);
+        let (first, _) = ledger.judge(&open_steps, &open_curves, None);
         let Some(best) = choose(&first) else { break };
-        losses.scattered_as_left_by(best);
-        let (judged, chance) = losses.judge(&open_steps, &open_curves, Some(seed));
+        ledger.scattered_as_left_by(best);
+        let (judged, chance) = ledger.judge(&open_steps, &open_curves, Some(seed));
         let threshold = chance.threshold(LEVEL);
         if outcome.findings.is_empty() {
-            outcome.detectable = detectable(&losses, &steps, threshold);
+            outcome.detectable = detectable(&ledger, &steps, threshold);
         }
         let Some(won) = choose(&judged).filter(|j| j.gain > threshold) else { break };
         if outcome.findings.first().is_some_and(|f| won.gain < LEAST_SHARE * f.gain) {
             break;
         }
-        let more = losses.explained(won);
+        let more = ledger.explained(won);
         explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
         taken.push(won.shape.axis());
-        let replicated = losses.replicate(won, &seen.second);
-        let told = Told { fine: &seen.fine, told: &seen.told, base: losses.base, reach, camera };
+        let replicated = ledger.replicate(won, &seen.second);
+        let told = Told { fine: &seen.fine, told: &seen.told, base: ledger.base, reach, camera };
         let mut finding = told.finding(won, rivals(&judged), chance.of_gain(won.gain));
         finding.replicated = replicated;
-        match hard_end(&finding) {
-            Some(note) => outcome.notes.push(note),
+        match HardEnd::of(&finding, blur) {
+            // Nothing is learnt beyond the range: what is lost inside it is looked at alone.
+            Some(end) if views.iter().flatten().any(|c| end.touches(c)) => {
+                let mut rest = losses(&seen.inside(&end), reach, camera, blur, seed);
+                rest.notes.insert(0, end.note());
+                return rest;
+            }
+            Some(end) => outcome.notes.push(end.note()),
             None => outcome.findings.push(finding),
         }
     }
     outcome
 }
 
-/// An edge narrower than this share of its distance, and passed by this many widths, is a limit that
-/// a driver or a format has set (noise of 1 % blurs it so); a pattern that grows faint goes gradually.
+/// An edge narrower than this share of its distance, or than the noise there, is a limit that a driver
+/// or a format has set (the noise blurs it so); a pattern that grows faint goes gradually.
 const HARD: f64 = 0.01;
+/// Widths by which the views reach beyond an edge that is known as a whole.
 const PASSED: f64 = 5.0;
+/// One that is hardly reached must be narrower by so many standard errors.
+const SURELY: f64 = 2.0;
+/// Widths of an edge within which patches feel it: 2 % are lost there.
+const FELT: f64 = 4.0;
 
-/// The note in place of a finding where all is missing beyond a limit (or before one).
-fn hard_end(finding: &DropoutFinding) -> Option<String> {
-    if finding.family != Some("range-dropout") || finding.parameters.contains_key("share") {
-        return None;
+/// Beyond it (or before it) all is missing.
+struct HardEnd {
+    z_m: f64,
+    /// Negative where what is nearer is lost.
+    width_m: f64,
+}
+
+impl HardEnd {
+    fn of(finding: &DropoutFinding, blur: &dyn Fn(f64) -> f64) -> Option<Self> {
+        if finding.family != Some("range-dropout") || finding.parameters.contains_key("share") {
+            return None;
+        }
+        let value = |name: &str, of: &str| finding.parameters.get(name)?.get(of)?.as_f64();
+        let (z_m, width_m) = (value("z50_m", "value")?, value("width_m", "value")?);
+        let error = value("width_m", "std_error")?;
+        let limit = f64::max(HARD * z_m, blur(z_m));
+        let end = finding.interval[usize::from(width_m > 0.0)];
+        let doubt = if (end - z_m) / width_m > PASSED { 0.0 } else { SURELY * error };
+        (width_m.abs() + doubt < limit).then_some(HardEnd { z_m, width_m })
     }
-    let value = |name: &str| finding.parameters.get(name)?.get("value")?.as_f64();
-    let (z, width) = (value("z50_m")?, value("width_m")?);
-    let (side, end) = match width > 0.0 {
-        true => ("beyond", finding.interval[1]),
-        false => ("nearer than", finding.interval[0]),
-    };
-    let past = (end - z) / width > PASSED;
-    (past && width.abs() < HARD * z).then(|| {
-        format!("every reading {side} {z:.2} m is missing: the range has a hard end there, set by the sensor's driver or format")
-    })
+
+    fn touches(&self, cell: &Cell) -> bool {
+        let far = cell.place.slope[0].abs() + cell.place.slope[1].abs();
+        let half = 0.5 * cell.place.side * far / cell.place.disparity * cell.place.z;
+        let past = (cell.place.z - self.z_m) * self.width_m.signum();
+        past + half > -FELT * self.width_m.abs()
+    }
+
+    fn note(&self) -> String {
+        let side = if self.width_m > 0.0 { "beyond" } else { "nearer than" };
+        format!(
+            "readings {side} {:.2} m are missing: the range has a hard end there, set by the sensor's driver or format",
+            self.z_m
+        )
+    }
+}
+
+/// Standard deviation of the depth, by the model, where the views come nearest to `z`, m.
+fn blur(survey: &Survey, z: f64) -> f64 {
+    let tiles = survey.views.iter().flat_map(|v| v.tiles.iter());
+    let away = |t: &&Tile| (t.place.z - z).abs();
+    let nearest = tiles.min_by(|a, b| away(a).total_cmp(&away(b)));
+    nearest.map_or(0.0, |t| t.variance.sqrt() / t.place.disparity * z)
 }
 
 /// Do the shadows of both halves have the same share of the expected width?

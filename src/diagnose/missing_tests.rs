@@ -41,6 +41,7 @@ fn session(
                 x,
                 y,
                 z: depth,
+                disparity: 40.0 / depth,
                 theta: plane.theta(),
                 session_s: view as f64,
                 radius: f64::hypot(x, y) / 0.7,
@@ -75,7 +76,8 @@ fn find(views: &[Vec<Cell>], camera: &Camera, seed: Seed) -> DropoutOutcome {
         told: vec![true; views.len()],
         second: (0..views.len()).map(|v| v % 2 == 1).collect(),
     };
-    losses(&seen, &reach, camera, seed)
+    // Eq. 1 without its tilt.
+    losses(&seen, &reach, camera, &|z| 0.0015 + 0.00215 * (z - 0.483).powi(2), seed)
 }
 
 fn parameter(finding: &DropoutFinding, name: &str) -> [f64; 2] {

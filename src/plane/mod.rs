@@ -8,6 +8,7 @@
 
 mod affine;
 mod candidate;
+mod curved;
 mod grow;
 mod image;
 mod paper;

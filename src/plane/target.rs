@@ -3,6 +3,7 @@
 
 use super::affine::AffineFit;
 use super::candidate::{Candidate, around_principal_point, candidate, centre_disc};
+use super::curved::curved_target;
 use super::grow::Lattice;
 use super::image::{
     Exclusions, InverseDepthImage, MIN_PIXELS, Target, in_front, on_plane, seed_plane,
@@ -45,10 +46,14 @@ fn in_region(
             inside.len()
         ));
     }
-    let fit = seed_plane(image, &valid, rng)
+    let flat = seed_plane(image, &valid, rng)
         .filter(|fit| !image.too_rough(fit, &valid))
-        .ok_or("its region holds no plane")?;
-    let relief = flat_enough(image, &inside, &valid, &fit)?;
+        .ok_or_else(|| "its region holds no plane".to_string())
+        .and_then(|fit| Ok((fit, flat_enough(image, &inside, &valid, &fit)?)));
+    let (fit, relief) = match flat {
+        Ok(flat) => flat,
+        Err(why) => return curved_target(image, &inside, &valid).ok_or(why),
+    };
     let flat = |i: u32| !relief.mask[relief.lattice.node_of(i as usize, width)];
     let on = valid.iter().filter(|&&i| flat(i) && on_plane(image, &fit, i as usize)).count();
     if on < MIN_PIXELS {
@@ -138,10 +143,12 @@ pub(super) fn at_principal_point(
             break;
         }
     }
-    let best = best.ok_or("no plane around the principal point")?;
-    if !best.flat {
-        return Err("what the principal point looks at is not flat".into());
-    }
+    let Some(best) = best.filter(|best| best.flat) else {
+        let all: Vec<u32> = (0..image.w.len() as u32).collect();
+        let valid: Vec<u32> = all.iter().copied().filter(|&i| image.valid(i as usize)).collect();
+        return curved_target(image, &all, &valid)
+            .ok_or_else(|| "what the principal point looks at is not flat".into());
+    };
     if best.at_centre < AT_CENTRE {
         only_a_hand_between(image, &best, rng)?;
     }

@@ -267,6 +267,28 @@ fn a_wall_that_fills_the_picture_is_the_target() {
     expect_first("wall", &[Thing::wall(2.0)], 0.0);
 }
 
+/// A driver that stores the range for the depth bends a wall into a bowl. The whole picture is the
+/// target, so that a diagnosis can say what bends it; a room's corner stays none.
+#[test]
+fn a_wall_that_the_sensor_bends_is_the_target() {
+    for [z, theta] in [[1.0, 0.0], [2.5, 0.4], [1.5, 0.9]] {
+        let mut scene = draw(&[Thing::turned(z, theta, 0.7, [20.0, 20.0])], 5);
+        let rays = scene.camera.rays();
+        for (i, w) in scene.w.iter_mut().enumerate() {
+            let (x, y) = rays.at(i);
+            *w /= (1.0 + x * x + y * y).sqrt() as f32;
+        }
+        let target = find(&scene).unwrap();
+        let seen = scene.seen.iter().filter(|s| s.is_some()).count();
+        assert!(target.pixels.len() as f64 > 0.95 * seen as f64, "{z} m, {theta} rad");
+        assert!(target.notes.iter().any(|n| n.contains("smooth but bent")), "{:?}", target.notes);
+        assert!((target.plane.theta() - theta).abs() < 0.15, "{}", target.plane.theta());
+    }
+    let corner = [-0.6, 0.6].map(|theta| Thing::board(2.0, theta, [20.0, 20.0]));
+    let target = find(&draw(&corner, 5));
+    assert!(target.is_err() || !target.unwrap().notes.iter().any(|n| n.contains("bent")));
+}
+
 #[test]
 fn no_plane_no_target() {
     let ball = [Thing::sphere(0.0, 0.0, 1.0, 0.3)];

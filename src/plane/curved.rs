@@ -1,0 +1,147 @@
+//! A surface that is smooth but no plane, over all that was asked for: a wall as a sensor shows it that
+//! gives the range for the depth, or whose lens bends the picture. What bends it is for the diagnosis to
+//! say, so such a view is measured and noted instead of refused. Corners, spheres and clutter are refused
+//! as before: no polynomial follows them.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::Plane;
+use super::affine::{AffineFit, Effort, MAD_TO_SIGMA, fit_affine_robust};
+use super::image::{Exclusions, InverseDepthImage, MIN_PIXELS, Target};
+use crate::stats::median_in_place;
+
+/// Terms of a polynomial of the fourth degree in (x, y): of 1/cos, which the range over a wall
+/// follows, it leaves 0.1 % at 40 degrees off the axis.
+const TERMS: usize = 15;
+const DEGREE: i32 = 4;
+/// Pixels that the polynomial is fitted to.
+const SAMPLES: usize = 6000;
+const ROUNDS: usize = 8;
+/// Tukey's biweight, in standard deviations.
+const TUKEY: f64 = 4.685;
+/// Smooth is what leaves no more than this many times the image's local noise: the same as for a plane.
+const SMOOTH: f64 = 4.0;
+/// ... and what holds this share of the measured pixels within the biweight.
+const HELD: f64 = 0.9;
+/// A picture of which less is measured shows a thing, not a wall.
+const MIN_MEASURED: f64 = 0.6;
+/// The range exceeds the depth by this share at 34 degrees off the axis, a Kinect's corner; nothing that
+/// a sensor does to a plane is larger.
+const MAX_BEND: f64 = 0.21;
+
+/// The whole of `inside` as a target, if one smooth surface fills it. `valid` are its measured pixels.
+pub(super) fn curved_target(
+    image: &InverseDepthImage<'_>,
+    inside: &[u32],
+    valid: &[u32],
+) -> Option<Target> {
+    if valid.len() < MIN_PIXELS || (valid.len() as f64) < MIN_MEASURED * inside.len() as f64 {
+        return None;
+    }
+    let noise = image.local_noise(valid).max(image.floor(mean_inverse_depth(image, valid)));
+    let surface = Surface::fit(image, valid, noise)?;
+    let plane = Plane::new(surface.tangent());
+    let fit = fit_affine_robust(image.w, image.rays, valid, &plane, noise, Effort::Sample)?;
+    let bend = valid
+        .iter()
+        .map(|&i| {
+            let (x, y) = image.rays.at(i as usize);
+            let expected = fit.plane.inverse_depth(x, y);
+            if expected > 0.0 { (surface.at(x, y) / expected - 1.0).abs() } else { f64::INFINITY }
+        })
+        .fold(0.0, f64::max);
+    if bend > MAX_BEND || surface.scale > SMOOTH * noise || surface.held < HELD {
+        return None;
+    }
+    Some(target(image, inside, valid, &fit, bend))
+}
+
+fn target(
+    image: &InverseDepthImage<'_>,
+    inside: &[u32],
+    valid: &[u32],
+    fit: &AffineFit,
+    bend: f64,
+) -> Target {
+    let exclusions = Exclusions {
+        considered: inside.len(),
+        invalid: inside.len() - valid.len(),
+        ..Exclusions::default()
+    };
+    let note = format!(
+        "the surface is smooth but bent, by up to {:.1} % of its distance: taken for a plane that the \
+         sensor bends; if it is itself curved, use a flat one",
+        100.0 * bend
+    );
+    let on_plane = |&i: &u32| fit.plane.inverse_depth_at(image.rays, i as usize);
+    // Holes farther than all that is measured are out of the sensor's range, and no losses.
+    let farthest = valid.iter().map(on_plane).fold(f64::INFINITY, f64::min);
+    let pixels = inside.iter().copied().filter(|i| on_plane(i) >= farthest).collect();
+    Target { pixels, plane: fit.plane, scale: fit.scale, exclusions, notes: vec![note] }
+}
+
+fn mean_inverse_depth(image: &InverseDepthImage<'_>, pixels: &[u32]) -> f64 {
+    pixels.iter().map(|&i| f64::from(image.w[i as usize])).sum::<f64>() / pixels.len() as f64
+}
+
+/// Inverse depth as a polynomial of the ray, 1/m.
+struct Surface {
+    coefficients: SVector<f64, TERMS>,
+    /// Robust standard deviation about it, 1/m.
+    scale: f64,
+    /// Share of the pixels within the biweight.
+    held: f64,
+}
+
+impl Surface {
+    fn fit(image: &InverseDepthImage<'_>, pixels: &[u32], floor: f64) -> Option<Self> {
+        let stride = (pixels.len() / SAMPLES).max(1);
+        let rows: Vec<(SVector<f64, TERMS>, f64)> = pixels
+            .iter()
+            .step_by(stride)
+            .map(|&i| {
+                let (x, y) = image.rays.at(i as usize);
+                (terms(x, y), f64::from(image.w[i as usize]))
+            })
+            .collect();
+        let mut surface =
+            Surface { coefficients: SVector::zeros(), scale: f64::INFINITY, held: 0.0 };
+        for _ in 0..ROUNDS {
+            let mut normal = SMatrix::<f64, TERMS, TERMS>::zeros();
+            let mut right = SVector::<f64, TERMS>::zeros();
+            for (row, w) in &rows {
+                let weight = surface.weight(w - surface.coefficients.dot(row));
+                normal.syger(weight, row, row, 1.0);
+                right += row * (weight * w);
+            }
+            surface.coefficients = normal.cholesky()?.solve(&right);
+            let off = |(row, w): &(SVector<f64, TERMS>, f64)| w - surface.coefficients.dot(row);
+            let mut sizes: Vec<f32> = rows.iter().map(|r| off(r).abs() as f32).collect();
+            surface.scale = (MAD_TO_SIGMA * f64::from(median_in_place(&mut sizes))).max(floor);
+            let held = sizes.iter().filter(|s| f64::from(**s) < TUKEY * surface.scale).count();
+            surface.held = held as f64 / rows.len() as f64;
+        }
+        Some(surface)
+    }
+
+    fn weight(&self, off: f64) -> f64 {
+        let t = off / (TUKEY * self.scale);
+        (1.0 - t * t).max(0.0).powi(2)
+    }
+
+    fn at(&self, x: f64, y: f64) -> f64 {
+        self.coefficients.dot(&terms(x, y))
+    }
+
+    /// The plane that touches it on the axis.
+    fn tangent(&self) -> nalgebra::Vector3<f64> {
+        let c = &self.coefficients;
+        nalgebra::Vector3::new(c[2], c[1], c[0])
+    }
+}
+
+/// 1, y, x, y^2, xy, x^2, ...
+fn terms(x: f64, y: f64) -> SVector<f64, TERMS> {
+    let powers = (0..=DEGREE).flat_map(|d| (0..=d).map(move |k| (k, d - k)));
+    SVector::from_iterator(powers.map(|(k, l)| x.powi(k) * y.powi(l)))
+}
