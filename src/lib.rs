@@ -192,6 +192,8 @@ pub mod calibrate;
 
 pub mod effects;
 
+pub mod fleet;
+
 pub mod diagnose;
 
 pub mod correct;
