@@ -2,7 +2,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use kinoise::fleet::{
-    Change, Comparison, SharedBias, SharedEffect, SharedSigma, Standing, UnitModel, compare,
+    BiasOfUnit, Change, Comparison, ParameterOfUnit, SharedBias, SharedEffect, SharedSigma,
+    Standing, UnitModel, compare,
 };
 
 use super::common::{Global, notes, say};
@@ -55,7 +56,7 @@ fn report_sigma(sigma: &SharedSigma) {
     let width = sigma.standings.iter().map(|s| s.unit.chars().count()).max().unwrap_or(0).max(13);
     let row = |name: &str, cell: &dyn Fn(usize) -> String| {
         let cells: Vec<String> =
-            (0..sigma.places.len()).map(|i| format!("{:>15}", cell(i))).collect();
+            (0..sigma.places.len()).map(|i| format!("{:>17}", cell(i))).collect();
         say(format!("{name:width$}{}", cells.concat()));
     };
     let at = |i: usize| &sigma.places[i];
@@ -63,13 +64,13 @@ fn report_sigma(sigma: &SharedSigma) {
     for (k, standing) in sigma.standings.iter().enumerate() {
         row(&standing.unit, &|i| {
             let unit = &at(i).units[k];
-            format!("{:.2} +- {:.2}", 1e3 * unit.sigma_m, 1e3 * unit.std_error_m)
+            format!("{:.3} +- {:.3}", 1e3 * unit.sigma_m, 1e3 * unit.std_error_m)
         });
     }
-    row("in common", &|i| format!("{:.2}", 1e3 * at(i).common_m));
+    row("in common", &|i| format!("{:.3}", 1e3 * at(i).common_m));
     row("  95 %", &|i| {
         let [low, high] = at(i).common_interval_m;
-        format!("{:.2} to {:.2}", 1e3 * low, 1e3 * high)
+        format!("{:.3} to {:.3}", 1e3 * low, 1e3 * high)
     });
     row("units scatter", &|i| format!("{:.1} %", 1e2 * at(i).scatter));
     row("  95 %", &|i| {
@@ -79,8 +80,8 @@ fn report_sigma(sigma: &SharedSigma) {
     report_standings("sigma", &sigma.standings, &|k| {
         let departure = |i: &usize| at(*i).units[k].departure;
         let places = 0..sigma.places.len();
-        let most = places.max_by(|a, b| departure(a).abs().total_cmp(&departure(b).abs()));
-        most.map_or(String::new(), |i| {
+        let largest = places.max_by(|a, b| departure(a).abs().total_cmp(&departure(b).abs()));
+        largest.map_or(String::new(), |i| {
             let ([low, high], place) = (at(i).units[k].departure_interval, at(i));
             format!(
                 "{:+.0} % ({:+.0} to {:+.0}) at {:.2} m, {:.0} deg",
@@ -97,7 +98,7 @@ fn report_sigma(sigma: &SharedSigma) {
 fn report_bias(bias: &SharedBias) {
     say("\nbias of depth over the picture, mm rms");
     for d in &bias.distances {
-        let of = |u: &kinoise::fleet::BiasOfUnit| {
+        let of = |u: &BiasOfUnit| {
             format!("{} {:.2} (error {:.2})", u.unit, 1e3 * u.rms_m, 1e3 * u.error_rms_m)
         };
         let units: Vec<String> = d.units.iter().map(of).collect();
@@ -136,10 +137,10 @@ fn report_standings(what: &str, standings: &[Standing], how_far: &dyn Fn(usize) 
 }
 
 fn p(p: f64) -> String {
-    if p < 1e-6 {
-        "p < 1e-6".into()
-    } else {
-        format!("p = {p:.2}").replace("p = 0.00", &format!("p = {p:.0e}"))
+    match p {
+        p if p < 1e-6 => "p < 1e-6".into(),
+        p if p < 0.01 => format!("p = {p:.0e}"),
+        p => format!("p = {p:.2}"),
     }
 }
 
@@ -150,7 +151,7 @@ fn report_effect(effect: &SharedEffect) {
     };
     say(format!("{}: in {}{lacks}", effect.id, effect.found_in.join(", ")));
     for parameter in &effect.parameters {
-        let one = |u: &kinoise::fleet::ParameterOfUnit| {
+        let one = |u: &ParameterOfUnit| {
             let error = u.std_error.filter(|s| *s > 0.0);
             let error = error.map_or(String::new(), |s| format!(" +- {s:.2}"));
             format!("{} {:.3}{error}", u.unit, u.value)
@@ -177,36 +178,32 @@ fn report_change(change: &Change) {
     );
     say(span);
     let sigma = &change.sigma;
-    match sigma.largest() {
-        Some(most) if sigma.changed => say(format!(
-            "  sigma has changed ({}): {:.2} to {:.2} mm at {:.2} m, {:.0} deg: {:+.2} mm ({:+.2} to {:+.2})",
-            p(sigma.p_adjusted),
-            1e3 * most.from_m,
-            1e3 * most.to_m,
-            most.z_m,
-            most.theta_rad.to_degrees(),
-            1e3 * most.change_m,
-            1e3 * most.interval_m[0],
-            1e3 * most.interval_m[1],
-        )),
-        _ => say(format!(
-            "  sigma: no change found ({}); one of more than {:.2} mm is excluded at each place (95 %)",
-            p(sigma.p_adjusted),
-            1e3 * sigma.bound_m()
-        )),
-    }
+    let verdict = |changed: bool| if changed { "has changed" } else { "no change found" };
+    let places = sigma.places.iter().map(|at| {
+        let [low, high] = at.interval_m;
+        format!(
+            "    {:.2} m, {:.0} deg: {:.2} to {:.2} mm, {:+.2} mm (95 %: {:+.2} to {:+.2})",
+            at.z_m,
+            at.theta_rad.to_degrees(),
+            1e3 * at.from_m,
+            1e3 * at.to_m,
+            1e3 * at.change_m,
+            1e3 * low,
+            1e3 * high
+        )
+    });
+    say(format!("  sigma: {} ({})", verdict(sigma.changed), p(sigma.p_adjusted)));
+    places.for_each(say);
     if let Some(bias) = &change.bias {
-        let found = if bias.changed { "has changed" } else { "no change found" };
-        let at = bias.distances.iter().map(|d| {
-            format!(
-                "{:.2} mm (error {:.2}) at {:.2} m",
-                1e3 * d.change_rms_m,
-                1e3 * d.error_rms_m,
-                d.z_m
-            )
-        });
-        let sizes = at.collect::<Vec<_>>().join(", ");
-        say(format!("  bias: {found} ({}): {sizes}, rms over the picture", p(bias.p_adjusted)));
+        say(format!("  bias: {} ({})", verdict(bias.changed), p(bias.p_adjusted)));
+        for at in &bias.distances {
+            say(format!(
+                "    {:.2} m: by {:.2} mm rms over the picture (error {:.2})",
+                at.z_m,
+                1e3 * at.change_rms_m,
+                1e3 * at.error_rms_m
+            ));
+        }
     }
     for (ids, when) in [(&change.found_now, "now"), (&change.found_then, "then")] {
         if !ids.is_empty() {

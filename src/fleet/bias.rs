@@ -56,7 +56,7 @@ pub(super) fn shapes(model: &NoiseModel) -> Result<Vec<&Effect>, String> {
     let is_bias = |e: &&Effect| e.shape.iter().any(usable);
     let found: Vec<&Effect> = model.effects.iter().filter(is_bias).collect();
     if found.is_empty() {
-        return Err("holds no measured bias: diagnose it to compare its bias".into());
+        return Err("holds no measured bias: it was not diagnosed, or none was found".into());
     }
     let lacks = |e: &&&Effect| e.covariance.as_ref().is_none_or(|c| c.is_empty());
     match found.iter().find(lacks) {

@@ -62,19 +62,6 @@ pub struct BiasThenAndNow {
     pub error_rms_m: f64,
 }
 
-impl ChangeOfSigma {
-    /// Where it changed by the most metres.
-    pub fn largest(&self) -> Option<&SigmaThenAndNow> {
-        self.places.iter().max_by(|a, b| a.change_m.abs().total_cmp(&b.change_m.abs()))
-    }
-
-    /// A change of more metres than this is excluded everywhere, each place at 95 %.
-    pub fn bound_m(&self) -> f64 {
-        let ends = self.places.iter().flat_map(|p| p.interval_m);
-        ends.map(f64::abs).fold(0.0, f64::max)
-    }
-}
-
 /// Every older model against the newest; `groups` hold the models of a unit in order of time.
 pub(super) fn changes(groups: &[(String, Vec<&UnitModel>)]) -> Result<Vec<Change>> {
     let mut changes = Vec::new();
