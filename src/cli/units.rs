@@ -124,9 +124,6 @@ fn report_standings(what: &str, standings: &[Standing], how_far: &dyn Fn(usize) 
     };
     match names(false)[..] {
         [] => say(format!("no two units share a {what}: each needs its own model")),
-        [only] => {
-            say(format!("in common: no {what}; {only} is left when the others are set aside"))
-        }
         ref core => {
             say(format!("in common: {} share one {what} within the errors", core.join(", ")))
         }

@@ -113,11 +113,12 @@ fn units_of_one_kind_share_a_sigma() {
     assert!(at_least(k, FLEETS as usize, 0.01) > 1e-3, "{k} false alarms in {FLEETS} fleets");
 }
 
-/// One of five is a quarter noisier: it is set aside, alone, and by how much is in its interval.
+/// One of five is a quarter noisier: it is set aside in every fleet, by how much is in its interval, and
+/// another with it no more often than the tests promise.
 #[test]
 fn the_odd_unit_is_told_apart_from_the_others() {
     const FLEETS: usize = 60;
-    let mut covered = 0;
+    let [mut covered, mut others] = [0; 2];
     for seed in 0..FLEETS as u64 {
         let times = |k: u64| if k == 2 { 1.25 } else { 1.0 };
         let one =
@@ -125,16 +126,18 @@ fn the_odd_unit_is_told_apart_from_the_others() {
         let sigma = compare(&(0..5).map(one).collect::<Vec<_>>()).expect("compared").sigma;
         let sigma = sigma.expect("compared");
         let own: Vec<usize> = (0..5).filter(|k| sigma.standings[*k].is_own).collect();
-        assert_eq!(own, [2], "seed {seed}: {:?}", sigma.standings);
+        assert!(own.contains(&2), "seed {seed}: {:?}", sigma.standings);
+        others += usize::from(own.len() > 1);
         let [low, high] = sigma.places[1].units[2].departure_interval;
         covered += usize::from(low <= 0.25 && 0.25 <= high);
     }
     assert!(at_most(covered, FLEETS, 0.95) > 1e-3, "{covered} of {FLEETS}");
+    assert!(at_least(others, FLEETS, 0.01) > 1e-3, "{others} of {FLEETS}");
 }
 
 fn then_and_now(times: f64, seed: u64) -> Comparison {
-    let [then, now] = [1.0, times].map(|t| calibrated(t, 2 * seed + u64::from(t != 1.0) + 50_000));
-    let now = if times == 1.0 { calibrated(1.0, 2 * seed + 50_001) } else { now };
+    let fitted = |(times, k)| calibrated(times, 50_000 + 2 * seed + k);
+    let [then, now] = [(1.0, 0), (times, 1)].map(fitted);
     // Given in the wrong order: the dates decide.
     compare(&[unit("a", "2026-06-01", now), unit("a", "2026-01-01", then)]).expect("compared")
 }
@@ -230,17 +233,22 @@ fn a_bias_that_changed_is_found_and_one_that_did_not_is_not() {
     let k = (0..PAIRS).filter(|s| pair(0.1, *s).changed).count();
     // Two tests share the level.
     assert!(at_least(k, PAIRS as usize, 0.01) > 1e-3, "{k} false alarms in {PAIRS}");
-    for seed in 0..20 {
+    const CHANGED: u64 = 20;
+    let mut ratios = 0.0;
+    for seed in 0..CHANGED {
         let found = pair(0.5, seed);
         assert!(found.changed, "seed {seed}: p {}", found.p_adjusted);
         // A pixel of disparity is z^2 / (fx baseline) of depth.
         let far = found.distances.last().expect("distances");
         let expected = 0.4 * RADIUS_SQUARED_RMS * far.z_m.powi(2) / (580.0 * 0.075);
-        assert!(
-            (far.change_rms_m / expected - 1.0).abs() < 0.25,
-            "seed {seed}: {far:?} {expected}"
-        );
+        // At worst all of the error lies along the bowl: four standard deviations of it.
+        let off = (far.change_rms_m - expected).abs();
+        assert!(off < 4.0 * far.error_rms_m, "seed {seed}: {far:?} {expected}");
+        ratios += far.change_rms_m / expected;
     }
+    // The error is a quarter of the change: of the mean 5 %, and two of these.
+    let mean = ratios / CHANGED as f64;
+    assert!((mean - 1.0).abs() < 0.1, "{mean}");
 }
 
 /// Of r^2 over a 4:3 picture with r = 1 in the corner: u^2 and v^2, uniform up to 0.8 and 0.6, have
@@ -278,6 +286,9 @@ fn units(models: &[&Path]) -> (Option<i32>, String, String) {
     (run.status.code(), text(&run.stdout), text(&run.stderr))
 }
 
+/// A change to a good file.
+type Fault<'a> = &'a dyn Fn(&mut Value);
+
 #[test]
 fn what_cannot_be_compared_is_refused_in_one_line() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -288,8 +299,8 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
     let out: Value = serde_json::from_str(&out).expect("JSON");
     assert_eq!((code, &out["format"]), (Some(0), &json!("kinoise-units/1")));
 
-    let zeros = json!([[0.0; 6]; 6]);
-    let faults: [(&str, &dyn Fn(&mut Value), &str); 10] = [
+    let zeros = json!(vec![vec![0.0; 6]; 6]);
+    let faults: [(&str, Fault<'_>, &str); 10] = [
         ("sensor", &|m| m["sensor"]["sensor"] = json!("Xtion"), "\"Xtion\", not a"),
         ("size", &|m| m["sensor"]["width"] = json!(320), "320 x 480 px, not 640 x 480"),
         ("mode", &|m| m["sensor"]["mode"] = json!("near"), "mode \"near\""),
