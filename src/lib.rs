@@ -36,7 +36,7 @@
 //!    off by as much as that says, and such a difference is no finding.
 //! 5. The model is what everything else runs on: [`simulate`] draws recordings from it, [`correct`]
 //!    takes its biases out of depth images and can say, pixel by pixel, how sure the result is, and
-//!    [`mod@map`] weighs points by its sigma.
+//!    [`mod@map`] weighs points by its sigma. [`fleet`] puts the models of several units side by side.
 //!
 //! Simulated data enters by the same door as real data: [`simulate`] writes a folder, [`io::open`]
 //! reads it. The examples below use that to run anywhere.
@@ -191,6 +191,8 @@ pub mod model;
 pub mod calibrate;
 
 pub mod effects;
+
+pub mod fleet;
 
 pub mod diagnose;
 

@@ -15,6 +15,7 @@ mod map;
 mod simulate;
 mod simulate_room;
 mod simulate_scene;
+mod units;
 
 use std::process::ExitCode;
 
@@ -52,6 +53,8 @@ enum Command {
     Compare(compare::Arguments),
     /// ATE and RPE of a trajectory, as the TUM scripts compute them
     Evaluate(evaluate::Arguments),
+    /// Units of a kind side by side: what is common, what is one unit's own, what changed since
+    Units(units::Arguments),
     /// The catalogue of physical effects: what each does, how it shows, what it resembles
     Effects(effects::Arguments),
     /// The whole road on bundled data
@@ -108,6 +111,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         Command::Map(a) => map::run(a, global).map(|()| 0),
         Command::Compare(a) => compare::run(a, global).map(|()| 0),
         Command::Evaluate(a) => evaluate::run(a, global).map(|()| 0),
+        Command::Units(a) => units::run(a, global).map(|()| 0),
         Command::Effects(a) => effects::run(a, global).map(|()| 0),
         Command::Demo(a) => demo::run(a, global).map(|()| 0),
     }

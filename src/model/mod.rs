@@ -8,7 +8,6 @@ mod fit;
 mod forms;
 mod heldout;
 mod outliers;
-mod paule_mandel;
 mod robust;
 mod rows;
 mod statistics;

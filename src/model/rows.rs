@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::paule_mandel::{between, paule_mandel};
 use crate::measure::{SigmaRow, SigmaTable};
+use crate::stats::{between, paule_mandel};
 
 /// Rows grouped by view. The relative error of a row is taken as the sum of three independent
 /// ones: its sampling error (variance 1/(2 n_effective)), an error of its own (tau_cell) and one

@@ -128,6 +128,20 @@ impl SigmaModel {
         [sigma / reach, sigma * reach]
     }
 
+    /// Covariance of ln sigma at these (z, theta), each taken to the nearest edge of the domain.
+    pub fn log_covariance(&self, places: &[(f64, f64)]) -> DMatrix<f64> {
+        let p = self.parameters.len();
+        let mut slopes = DMatrix::zeros(places.len(), p);
+        for (row, &(z, theta)) in places.iter().enumerate() {
+            let (z, theta) = self.domain.clamp(z, theta);
+            let mut gradient = [0.0; MAX_PARAMETERS];
+            self.form.spec().gradient(&self.parameters, z, theta, &mut gradient);
+            let sigma = self.sigma(z, theta);
+            (0..p).for_each(|k| slopes[(row, k)] = gradient[k] / sigma);
+        }
+        &slopes * &self.covariance * slopes.transpose()
+    }
+
     /// Standard error of the form at `z` and `theta`, m, also outside the domain: root of g' C g
     /// with g the derivatives of sigma by the parameters.
     pub(super) fn std_error(&self, z: f64, theta: f64) -> f64 {

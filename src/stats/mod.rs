@@ -1,8 +1,12 @@
 //! Small statistics the pipeline shares.
 
 mod correlation;
+mod paule_mandel;
+mod random_effects;
 
 pub use correlation::{Correlation, measure_correlation};
+pub use paule_mandel::{between, paule_mandel};
+pub use random_effects::RandomEffects;
 
 use std::f64::consts::PI;
 
@@ -106,6 +110,13 @@ pub fn at_least(k: usize, n: usize, p: f64) -> f64 {
     }
 }
 
+/// P(F > f) of Fisher's F with these degrees of freedom.
+pub fn f_upper(f: f64, above: f64, below: f64) -> f64 {
+    // Past a million degrees of freedom the two agree to six digits.
+    let below = below.min(1e6);
+    beta(0.5 * below, 0.5 * above, below / (below + above * f.max(0.0)))
+}
+
 fn beta(a: f64, b: f64, x: f64) -> f64 {
     checked_beta_reg(a, b, x.clamp(0.0, 1.0)).unwrap_or(f64::NAN)
 }
@@ -118,6 +129,17 @@ mod tests {
     fn student_quantiles_match_the_tables() {
         assert!((student_quantile(0.95, 10.0) - 2.228).abs() < 1e-3);
         assert!((student_quantile(0.95, 1e9) - 1.960).abs() < 1e-3);
+    }
+
+    /// Table values at 5 %, and at 1 % without an end to the degrees of freedom below.
+    #[test]
+    fn tails_of_f_match_the_tables() {
+        for (f, above, below, p) in [(4.965, 1.0, 10.0, 0.05), (2.711, 5.0, 20.0, 0.05)] {
+            assert!((f_upper(f, above, below) / p - 1.0).abs() < 2e-3, "{f}");
+        }
+        assert!((f_upper(3.782, 2.0, 120.0) - 0.0256).abs() < 1e-3);
+        assert!((f_upper(6.635, 1.0, 1e9) / 0.01 - 1.0).abs() < 2e-3);
+        assert_eq!(f_upper(0.0, 3.0, 9.0), 1.0);
     }
 
     #[test]

@@ -25,3 +25,4 @@ mod room;
 mod speckle;
 mod target;
 mod twin;
+mod units;

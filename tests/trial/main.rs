@@ -1,5 +1,6 @@
 //! The blind trial of `kinoise diagnose`, as an example that sees the public library alone:
-//! `./run prove -o DIR [--sets N] [--seed S] [--data RECORDINGS]`, `--check DIR`, `--page DIR`.
+//! `./run prove -o DIR [--sets N] [--seed S] [--data RECORDINGS]`, `--check DIR`, `--page DIR`; in parts
+//! by `--shard I/N -o DIR` on each machine, then `--merge DIR1 DIR2 ... -o DIR`.
 //!
 //! Makers of concealed sets share no formula with the catalogue and no code with the diagnosis
 //! ([`raytraced`], the speckle simulator, and real recordings). Their data and answers are hashed before the first
@@ -21,6 +22,7 @@ mod predictor;
 mod proof;
 mod real;
 mod rounds;
+mod shard;
 mod solver;
 mod speckle;
 #[cfg(all(test, unix))]
@@ -39,6 +41,7 @@ use kinoise::io::write_atomic;
 
 use check::{CheckOptions, check};
 use proof::{Order, Proof};
+use shard::{Shard, gather, hold_shard};
 use trial::{Trial, hold};
 
 /// A blind trial of the diagnosis on concealed sets that anyone can check.
@@ -80,6 +83,18 @@ struct Arguments {
     /// Longest time for one diagnosis
     #[arg(long, value_name = "SECONDS", default_value_t = 900)]
     limit: u64,
+    /// Hold part I of N only: the same plan, every N-th set; merge all parts with --merge
+    #[arg(long, value_name = "I/N", conflicts_with_all = ["check", "page", "merge"])]
+    shard: Option<Shard>,
+    /// Finish the trial whose shards are in these folders, as one trial in -o DIR
+    #[arg(
+        long,
+        value_name = "DIR",
+        num_args = 1..,
+        requires = "output",
+        conflicts_with_all = ["sets", "seed", "limit"]
+    )]
+    merge: Vec<PathBuf>,
     /// Check the trial in DIR: hashes, marks, scores, and a sample of sets made again
     #[arg(long, value_name = "DIR", conflicts_with = "page")]
     check: Option<PathBuf>,
@@ -141,14 +156,31 @@ fn hold_trial(output: &Path, program: PathBuf, arguments: &Arguments) -> anyhow:
     if arguments.sets == 0 {
         bail!("--sets 0: give at least one set");
     }
-    let trial = Trial {
-        output: std::path::absolute(output).with_context(|| output.display().to_string())?,
+    let output = std::path::absolute(output).with_context(|| output.display().to_string())?;
+    let mut trial = Trial {
         order: Order { sets: arguments.sets, seed: arguments.seed, real: arguments.data.is_some() },
         data: arguments.data.clone(),
         keep: arguments.keep,
-        program,
         limit: Duration::from_secs(arguments.limit),
+        program,
+        output,
     };
+    if let Some(shard) = arguments.shard {
+        hold_shard(&trial, shard, &bar()?)?;
+        let Shard { index, of } = shard;
+        let folder = trial.output.display();
+        eprintln!(
+            "shard {index} of {of} is in {folder}; when all are there: --merge DIR1 DIR2 ... -o DIR"
+        );
+        return Ok(());
+    }
+    if !arguments.merge.is_empty() {
+        let (order, limit_s) = gather(&arguments.merge, &trial.program, &trial.output)?;
+        if order.real && trial.data.is_none() {
+            bail!("the shards hold sets of real recordings; give the same --data again");
+        }
+        (trial.order, trial.limit) = (order, Duration::from_secs(limit_s));
+    }
     let proof = hold(&trial, &bar()?)?;
     print_json(arguments, &proof.scores)?;
     eprintln!("{}", page::summary(&proof));

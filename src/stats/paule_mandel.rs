@@ -1,7 +1,7 @@
 //! How much variance there is beyond what sampling explains (Paule and Mandel 1982).
 
 /// Chi-square of the views' means (their squares and variances), and its derivative by tau_view^2.
-pub(super) fn between(means: &[(f64, f64)], tau_view2: f64) -> (f64, f64) {
+pub fn between(means: &[(f64, f64)], tau_view2: f64) -> (f64, f64) {
     means.iter().fold((0.0, 0.0), |(chi2, slope), (square, variance)| {
         let weight = 1.0 / (variance + tau_view2);
         (chi2 + square * weight, slope - square * weight * weight)
@@ -16,7 +16,7 @@ const MAX_NEWTON_STEPS: usize = 1000;
 /// The tau^2 >= 0 at which chi-square (and its slope) is `expected`, or zero where it is less
 /// already. Newton's step: chi-square falls and is convex in tau^2, so from zero the steps never
 /// pass the root (DerSimonian and Kacker 2007).
-pub(super) fn paule_mandel(expected: f64, chi2: impl Fn(f64) -> (f64, f64)) -> f64 {
+pub fn paule_mandel(expected: f64, chi2: impl Fn(f64) -> (f64, f64)) -> f64 {
     let mut tau = 0.0;
     for _ in 0..MAX_NEWTON_STEPS {
         let (found, slope) = chi2(tau);
