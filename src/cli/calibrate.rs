@@ -9,8 +9,19 @@ use kinoise::report::{CalibrationPage, Overlay, calibration_page, figure2, sigma
 use kinoise::units::shortest;
 use kinoise::{CalibrateOptions, Calibration, Form, Recording, SigmaKind, model_of_table, stats};
 
-use super::calibrate_summary::{as_json, summary};
-use super::common::{Global, Input, notes, one_of, say, source_date, with_bar};
+use super::calibrate_summary::{as_json, comparison, formula};
+use super::common::{Global, Input, one_of, source_date};
+use super::console::{beside, detail, detail_recording, next_step, notes, result, say, working};
+
+pub const EXAMPLES: &str = "\
+Examples:
+  kinoise calibrate recording -o out/kinect
+  kinoise calibrate pngs -o out/kinect --intrinsics 525,525,319.5,239.5 --units-per-metre 1000";
+
+pub const FIT_EXAMPLES: &str = "\
+Examples:
+  kinoise fit table.csv -o out/table
+  kinoise fit table.csv -o out/table --form auto";
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -20,22 +31,28 @@ pub struct Arguments {
     /// Folder for model.json, measurements.csv, sigma.svg and report.html
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    #[command(flatten)]
-    input: Input,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Fit")]
     fitting: Fitting,
+    #[command(flatten, next_help_heading = "Measurement")]
+    measuring: Measuring,
+    #[command(flatten, next_help_heading = super::INPUT_HEADING)]
+    input: Input,
+}
+
+#[derive(Debug, Args)]
+struct Measuring {
     /// Which standard deviation the model describes
     #[arg(long, default_value = "spatial", value_parser = one_of([
-        ("spatial", "", SigmaKind::Spatial),
-        ("temporal", "", SigmaKind::Temporal),
-        ("total", "", SigmaKind::Total),
-        ("paper", "", SigmaKind::Paper),
+        ("spatial", "Over the pixels of a frame", SigmaKind::Spatial),
+        ("temporal", "Of a pixel over the frames", SigmaKind::Temporal),
+        ("total", "Over pixels and frames together", SigmaKind::Total),
+        ("paper", "Across the plane, by the paper's method", SigmaKind::Paper),
     ]))]
     sigma: SigmaKind,
-    /// One plane for the still view, or one for every frame of it
+    /// What a plane is fitted to
     #[arg(long, default_value = "view", value_parser = one_of([
-        ("view", "", Planes::PerView),
-        ("frame", "", Planes::PerFrame),
+        ("view", "The whole view, which stands still", Planes::PerView),
+        ("frame", "Every frame of it", Planes::PerFrame),
     ]))]
     planes: Planes,
     /// The paper's RANSAC threshold in m [default: 3 robust standard deviations of the view]
@@ -58,7 +75,7 @@ pub struct FitArguments {
 /// Options of the fit.
 #[derive(Debug, Args)]
 struct Fitting {
-    /// paper, nguyen, khoshelham, disparity; auto takes what predicts left-out distances best
+    /// paper, nguyen, khoshelham or disparity; auto takes what predicts left-out distances best
     #[arg(long, default_value = "paper")]
     form: String,
     /// Published curves to draw beside the fit: eq1, nguyen, khoshelham
@@ -77,19 +94,20 @@ impl Fitting {
 
 impl Arguments {
     fn options(&self, global: &Global) -> anyhow::Result<CalibrateOptions> {
-        if let Some(t) = self.ransac_threshold
+        let Measuring { sigma, planes, ransac_threshold } = self.measuring;
+        if let Some(t) = ransac_threshold
             && !(t > 0.0 && t.is_finite())
         {
             bail!("--ransac-threshold {}: give a positive distance in m", shortest(t));
         }
         let measure = MeasureOptions {
-            planes: self.planes,
-            ransac_threshold_m: self.ransac_threshold,
+            planes,
+            ransac_threshold_m: ransac_threshold,
             seed: global.seed(),
             ..MeasureOptions::default()
         };
         let (form, created) = (self.fitting.form()?, source_date());
-        Ok(CalibrateOptions { measure, kind: self.sigma, form, created })
+        Ok(CalibrateOptions { measure, kind: sigma, form, created })
     }
 
     /// A file whose name ends in .csv.
@@ -100,10 +118,11 @@ impl Arguments {
 
     /// A table has no frames to measure.
     fn refuse_measuring(&self) -> anyhow::Result<()> {
+        let Measuring { sigma, planes, ransac_threshold } = self.measuring;
         let options = [
-            ("--sigma", self.sigma != SigmaKind::Spatial),
-            ("--planes", self.planes != Planes::PerView),
-            ("--ransac-threshold", self.ransac_threshold.is_some()),
+            ("--sigma", sigma != SigmaKind::Spatial),
+            ("--planes", planes != Planes::PerView),
+            ("--ransac-threshold", ransac_threshold.is_some()),
             ("--intrinsics and the like", self.input != Input::default()),
         ];
         match options.iter().find(|(_, given)| *given) {
@@ -122,7 +141,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let recording = open(&arguments.recording, &arguments.input.assumed()?)?;
     let overlays = &arguments.fitting.overlay;
     let (measured, calibration) = calibrate(&recording, &options, &arguments.output, overlays)?;
-    global.print_json(&as_json(&calibration, Some(&measured)))
+    global.print_json(&as_json(&calibration, Some(&measured)))?;
+    let mut next = vec!["diagnose".into(), arguments.recording.clone().into(), "-o".into()];
+    next.push(beside(&arguments.output, "diagnosis").into());
+    next_step(&[next, arguments.input.again()].concat());
+    Ok(())
 }
 
 pub fn fit(arguments: &FitArguments, global: &Global) -> anyhow::Result<()> {
@@ -143,7 +166,11 @@ fn table(file: &Path, output: &Path, fitting: &Fitting, global: &Global) -> anyh
         overlays: &fitting.overlay,
     };
     write_outputs(&OutputDir::create(output)?, &page)?;
-    global.print_json(&as_json(&calibration, None))
+    global.print_json(&as_json(&calibration, None))?;
+    let simulated = beside(output, "simulated");
+    let model = output.join("model.json");
+    next_step(&["simulate".into(), simulated.into(), "-m".into(), model.into()]);
+    Ok(())
 }
 
 /// Measure, fit, write every output, report.
@@ -154,10 +181,13 @@ pub fn calibrate(
     overlays: &[Overlay],
 ) -> anyhow::Result<(Measurements, Calibration)> {
     let out = OutputDir::create(output)?;
-    let measurements = with_bar("views", |step| measure(recording, &options.measure, step))?;
+    detail_recording(recording);
+    detail(format!("settings: {options:?}"));
+    let measurements = working("measuring", |step| measure(recording, &options.measure, step))?;
     say(measured(recording, &measurements));
     out.write("measurements.csv", write_measurements(&measurements.views).as_bytes())?;
-    let calibration = model_of(recording, &measurements, options).with_context(|| {
+    let fitted = working("fitting", |_| model_of(recording, &measurements, options));
+    let calibration = fitted.with_context(|| {
         // Without a model there is no list of warnings: this is the only place to say why.
         notes(&measurements.excluded);
         notes(&recording.remarks);
@@ -187,16 +217,20 @@ fn write_outputs(out: &OutputDir, page: &CalibrationPage<'_>) -> anyhow::Result<
     let (table, sigma) = (&calibration.table, &calibration.model.sigma);
     let charts =
         [("sigma", figure2(table, sigma, page.overlays)), ("sigma_map", sigma_map(table, sigma))];
-    for (name, chart) in charts {
-        out.write(&format!("{name}.svg"), chart.svg()?.as_bytes())?;
-        out.write(&format!("{name}.png"), &chart.png()?)?;
-    }
-    out.write("report.html", calibration_page(page)?.as_bytes())?;
+    working("drawing", |_| -> anyhow::Result<()> {
+        for (name, chart) in charts {
+            out.write(&format!("{name}.svg"), chart.svg()?.as_bytes())?;
+            out.write(&format!("{name}.png"), &chart.png()?)?;
+        }
+        out.write("report.html", calibration_page(page)?.as_bytes())?;
+        Ok(())
+    })?;
     let model = out.path().join("model.json");
     calibration.model.write(&model)?;
     let beside = "with sigma.svg, sigma_map.svg and report.html beside it";
     say(format!("wrote {}, {beside}\n", model.display()));
-    say(summary(calibration));
+    result(formula(calibration));
+    say(comparison(calibration));
     notes(&calibration.warnings);
     Ok(())
 }

@@ -1,3 +1,4 @@
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
@@ -11,55 +12,63 @@ use kinoise::simulate::{Physics, Shoot, ViewPlan, kinect_v1, plan_grid, plan_lik
 use kinoise::{Form, NoiseModel, Sensor, SigmaModel};
 use serde_json::{Value, json};
 
-use super::common::{Global, MAX_FRAMES, count, notes, say, with_bar};
+use super::common::{Global, MAX_FRAMES, count, model_again};
+use super::console::{beside, detail, detail_model, next_step, notes, result, say, working};
 use super::simulate_room::RoomArguments;
 use super::simulate_scene::{PosesArguments, SceneryArguments};
+
+pub const EXAMPLES: &str = "\
+Examples:
+  kinoise simulate out/bowl --effect radial-disparity-bias:k_px=0.3 --frames 4 --shrink 2
+  kinoise simulate out/twin -m out/kinect/model.json --like recording
+  kinoise simulate out/room --room --frames 90";
 
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// New folder for the recording
     output: PathBuf,
-    /// model.json to shoot with [default: the paper's Eq. 1, also outside its 1 to 4 m]
-    #[arg(long, value_name = "FILE")]
+    /// model.json of the sensor [default: the paper's Eq. 1, also outside its 1 to 4 m]
+    #[arg(short, long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// The world: errors by formula, or dots seen and matched in which errors arise by themselves
+    /// How errors come about
     #[arg(long, value_enum, default_value_t = PhysicsArgument::Formula)]
     physics: PhysicsArgument,
-    /// With --physics speckle: set a cause, such as ambient_dn=200; repeatable. An unknown name is answered with the list
+    /// With --physics speckle: set a cause, such as ambient_dn=200; repeatable. An unknown name
+    /// prints the list
     #[arg(long = "cause", value_name = "NAME=VALUE", allow_hyphen_values = true)]
     causes: Vec<String>,
-    /// Add a physical effect (see kinoise effects); repeatable
+    /// Add a physical effect (kinoise effects lists them); repeatable
     #[arg(long = "effect", value_name = "ID:KEY=VALUE", value_parser = Active::parse)]
     effects: Vec<Active>,
-    /// Shoot the very views of this recording: planes, regions, pixels, frames, timestamps
+    /// Simulate the very views of this recording: planes, regions, pixels, frames, timestamps
     #[arg(long, value_name = "REC", conflicts_with_all = ["grid", "distances", "tilts", "azimuths", "frames", "shrink", "board", "wall_target", "patches", "wall", "clutter", "ordered", "conditions"])]
     like: Option<PathBuf>,
-    #[command(flatten)]
-    poses: PosesArguments,
     /// Frames a view [default: 1]; with --room, of the film [default: the whole path]
     #[arg(long, value_parser = count(1, MAX_FRAMES))]
     frames: Option<usize>,
-    #[command(flatten)]
-    room: RoomArguments,
     /// Make the image 1 to 8 times smaller each way [default: 1, which is 640 x 480]; not with a
     /// model that carries its own sensor
     #[arg(long, value_name = "N", value_parser = count(1, 8))]
     shrink: Option<usize>,
-    #[command(flatten)]
-    scenery: SceneryArguments,
     /// Write infrared amplitude images too
     #[arg(long)]
     infrared: bool,
-    /// Write what was switched on to this file; the recording itself never tells
+    /// Write what was switched on to this file; the recording itself does not say
     #[arg(long, value_name = "FILE")]
     recipe: Option<PathBuf>,
+    #[command(flatten, next_help_heading = "Views")]
+    poses: PosesArguments,
+    #[command(flatten, next_help_heading = "Scene")]
+    scenery: SceneryArguments,
+    #[command(flatten, next_help_heading = "Room")]
+    room: RoomArguments,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
 enum PhysicsArgument {
-    /// sigma(z, theta) of the model, and effects
+    /// By formula: sigma(z, theta) of the model, and effects
     Formula,
-    /// A Kinect v1 by light: pattern, lens, chip, block matching
+    /// By light, as in a Kinect v1: pattern, lens, chip and block matching; errors arise by themselves
     Speckle,
 }
 
@@ -85,14 +94,33 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     if let Some(path) = &arguments.recipe {
         write_json(path, &recipe, "report this as a bug")?;
     }
-    global.print_json(&made)
+    global.print_json(&made)?;
+    next_step(&next(arguments));
+    Ok(())
+}
+
+/// What to do with what was simulated.
+fn next(arguments: &Arguments) -> Vec<OsString> {
+    let output = &arguments.output;
+    let (command, suffix) = match (&arguments.like, arguments.room.room) {
+        (Some(real), _) => {
+            let to = beside(output, "diagnosis");
+            let against = vec!["--against".into(), output.into(), "-o".into(), to.into()];
+            return [vec!["diagnose".into(), real.into()], against].concat();
+        }
+        (None, true) => ("map", "map"),
+        (None, false) => ("calibrate", "noise"),
+    };
+    let to = beside(output, suffix);
+    let model = arguments.model.as_deref().filter(|_| arguments.room.room);
+    [vec![command.into(), output.into(), "-o".into(), to.into()], model_again(model)].concat()
 }
 
 /// Film the office: what programs are told of it, and the recipe.
 fn write_film(film: &Film, output: &Path) -> anyhow::Result<(Value, Value)> {
-    with_bar("frames", |step| film.write(output, step))?;
+    working("filming", |step| film.write(output, step))?;
     let frames = film.poses.len();
-    say(format!("wrote {frames} frames of a room to {}", output.display()));
+    result(format!("wrote {frames} frames of a room to {}", output.display()));
     Ok((json!({"frames": frames, "output": output}), film.recipe()))
 }
 
@@ -109,8 +137,9 @@ fn shoot(
         note_clamped(&views, sigma);
         note_idle(effects, &arguments.scenery);
     }
+    detail(format!("effects and physics: {physics:?}"));
     let shoot = Shoot { sensor, views, physics, infrared: arguments.infrared, seed: global.seed() };
-    let blind = with_bar("views", |step| shoot.write(&arguments.output, step))?;
+    let blind = working("filming", |step| shoot.write(&arguments.output, step))?;
     const UNSEEN: &str = "the target is out of the picture or beyond the depth code";
     let (output, views) = (arguments.output.display(), shoot.views.len());
     ensure!(
@@ -119,7 +148,7 @@ fn shoot(
     );
     notes(blind.iter().map(|name| format!("view {name} shows no depth: {UNSEEN}")));
     let frames: usize = shoot.views.iter().map(|v| v.stamps.len()).sum();
-    say(format!("wrote {views} views, {frames} frames, to {output}"));
+    result(format!("wrote {views} views, {frames} frames, to {output}"));
     let made = json!({"views": views, "frames": frames, "output": arguments.output});
     Ok((made, shoot.recipe()))
 }
@@ -177,6 +206,7 @@ fn sensor_and_noise(
         return Ok((kinect_v1(factor), eq1_everywhere(), Vec::new()));
     };
     let model = NoiseModel::read(path)?;
+    detail_model(&model, Some(path));
     let file = path.display();
     let sensor = match model.sensor {
         Some(_) if shrink.is_some() => {

@@ -7,7 +7,8 @@ use kinoise::simulate::room::{
     CLEARANCE_M, Pose, Resampled, Room, around_the_desks, place, read_trajectory, resample,
 };
 
-use super::common::{MAX_FRAMES, count, say};
+use super::common::{MAX_FRAMES, count};
+use super::console::say;
 
 #[derive(Debug, Args)]
 pub struct RoomArguments {
@@ -17,7 +18,7 @@ pub struct RoomArguments {
     /// Poses to film along: timestamp tx ty tz qx qy qz qw, z up [default: once around the desks]
     #[arg(long, value_name = "POSES", requires = "room")]
     trajectory: Option<PathBuf>,
-    /// Take every Nth frame of the path
+    /// Take every Nth pose of the path
     #[arg(long, value_name = "N", default_value_t = 1, requires = "room", value_parser = count(1, MAX_FRAMES))]
     stride: usize,
 }

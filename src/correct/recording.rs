@@ -179,7 +179,7 @@ impl Rewrite<'_> {
         let done = AtomicUsize::new(0);
         let each = |image: &Image| {
             let tally = self.image(image);
-            progress(done.fetch_add(1, Ordering::Relaxed) + 1, images.len());
+            progress.step(done.fetch_add(1, Ordering::Relaxed) + 1, images.len());
             tally
         };
         let tallies: Result<Vec<Tally>> = images.par_iter().map(each).collect();
