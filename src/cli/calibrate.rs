@@ -41,7 +41,7 @@ pub struct Arguments {
 
 #[derive(Debug, Args)]
 struct Measuring {
-    /// Which standard deviation the model describes
+    /// The standard deviation that the model describes
     #[arg(long, default_value = "spatial", value_parser = one_of([
         ("spatial", "Over the pixels of a frame", SigmaKind::Spatial),
         ("temporal", "Of a pixel over the frames", SigmaKind::Temporal),
@@ -76,7 +76,7 @@ pub struct FitArguments {
 #[derive(Debug, Args)]
 struct Fitting {
     /// paper, nguyen, khoshelham or disparity; auto takes what predicts left-out distances best
-    #[arg(long, default_value = "paper")]
+    #[arg(long, default_value = "paper", value_name = "FORM")]
     form: String,
     /// Published curves to draw beside the fit: eq1, nguyen, khoshelham
     #[arg(long, value_delimiter = ',', default_value = "eq1")]

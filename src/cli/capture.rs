@@ -26,7 +26,7 @@ pub struct Arguments {
     /// freenect (a Kinect v1), folder:DIR (another program fills it), or play:REC (as if live)
     #[arg(long, value_name = "SOURCE", value_parser = source_kind)]
     source: SourceKind,
-    /// Frames of a view
+    /// Frames to take of each view
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = count(1, MAX_FRAMES))]
     frames: usize,
     /// Frames for which the target must be still before a view begins
@@ -91,7 +91,7 @@ impl Views {
         let own = |own: &[f64], grid: &[f64]| if own.is_empty() { grid } else { own }.to_vec();
         let Some((distances, tilts)) = self.views else {
             let none = self.distances.is_empty() && self.tilts.is_empty();
-            ensure!(none, "--views any: it knows no grid; leave --distances and --tilts out");
+            ensure!(none, "--views any has no grid; leave --distances and --tilts out");
             return Ok(Wanted::any());
         };
         let (distances, tilts) = (own(&self.distances, distances), own(&self.tilts, tilts));

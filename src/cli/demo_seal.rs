@@ -221,6 +221,9 @@ fn digits(v: f64) -> String {
 
 fn gained(heldout: Option<&HeldOut>) -> String {
     let Some(h) = heldout else { return "No view could be kept out to show a gain.".into() };
+    if h.gain.abs() < 0.05 {
+        return format!("On {} views kept out of the fit nothing is gained.", h.views.len());
+    }
     let [low, high] = h.gain_interval;
     let gain = format!(
         "On {} views kept out of the fit, knowing it gains {:.1} nats a view (95 %: {low:.1} to {high:.1})",

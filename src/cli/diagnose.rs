@@ -192,7 +192,7 @@ fn summary(diagnosis: &Diagnosis) -> String {
     for sentence in story(diagnosis) {
         text += &format!("  {sentence}\n");
     }
-    text
+    text.trim_end().to_string()
 }
 
 /// Effects that move the plane as a whole: a picture about the plane does not show them.

@@ -25,7 +25,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1.0, allow_hyphen_values = true)]
     delta: f64,
     /// The unit of that interval
-    #[arg(long, value_enum, default_value = "s")]
+    #[arg(long, value_enum, default_value = "s", value_name = "UNIT")]
     delta_unit: Unit,
 }
 

@@ -43,11 +43,11 @@ pub struct Arguments {
     /// Simulate the very views of this recording: planes, regions, pixels, frames, timestamps
     #[arg(long, value_name = "REC", conflicts_with_all = ["grid", "distances", "tilts", "azimuths", "frames", "shrink", "board", "wall_target", "patches", "wall", "clutter", "ordered", "conditions"])]
     like: Option<PathBuf>,
-    /// Frames a view [default: 1]; with --room, of the film [default: the whole path]
-    #[arg(long, value_parser = count(1, MAX_FRAMES))]
+    /// Frames of each view [default: 1]; with --room, of the film [default: the whole path]
+    #[arg(long, value_name = "N", value_parser = count(1, MAX_FRAMES))]
     frames: Option<usize>,
-    /// Make the image 1 to 8 times smaller each way [default: 1, which is 640 x 480]; not with a
-    /// model that carries its own sensor
+    /// Make the image 1 to 8 times smaller each way [default: 1, which is 640 x 480]; a model that
+    /// carries its own sensor refuses it
     #[arg(long, value_name = "N", value_parser = count(1, 8))]
     shrink: Option<usize>,
     /// Write infrared amplitude images too
@@ -179,16 +179,19 @@ fn physics(
     effects: Vec<Active>,
 ) -> anyhow::Result<Physics> {
     if arguments.physics == PhysicsArgument::Formula {
-        let foreign = "--cause belongs to --physics speckle; by formula there is --effect";
+        let foreign = "--cause belongs to --physics speckle; with --physics formula give --effect";
         ensure!(arguments.causes.is_empty(), foreign);
         return Ok(Physics::Formula { sigma, effects });
     }
-    let foreign = "--effect belongs to --physics formula; by light there is --cause";
+    let foreign = "--effect belongs to --physics formula; with --physics speckle give --cause";
     ensure!(arguments.effects.is_empty(), foreign);
-    let brought = "--model: it brings effects, which are formulas; by light there is --cause";
+    let brought =
+        "--model: its effects are formulas, which --physics speckle cannot use; give --cause";
     ensure!(effects.is_empty(), brought);
     if arguments.model.is_some() {
-        say("note: of the model only the sensor is used: by light sigma arises by itself");
+        say(
+            "note: only the sensor of the model is used; with --physics speckle the noise arises by itself",
+        );
     }
     let causes = arguments.causes.iter().try_fold(Causes::default(), |c, text| c.parse(text))?;
     Ok(Physics::Speckle { causes })

@@ -60,7 +60,7 @@ fn fitted(
     let (shift, turn) = (motion.translation, motion.rotation.euler_angles().2.to_degrees());
     let (x, y, z, clearance) = (shift.x, shift.y, shift.z, placed.clearance_m);
     say(format!(
-        "note: path placed by a turn of {turn:.0} degrees and a shift of ({x:.2}, {y:.2}, {z:.2}) m; never nearer than {clearance:.2} m to anything ({CLEARANCE_M} m are needed)"
+        "note: the path was placed by a turn of {turn:.0} degrees and a shift of ({x:.2}, {y:.2}, {z:.2}) m; it keeps {clearance:.2} m away from everything ({CLEARANCE_M} m are needed)"
     ));
     Ok(placed.apply(&poses))
 }

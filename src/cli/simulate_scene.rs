@@ -41,7 +41,7 @@ impl PosesArguments {
             grid.tilts_rad = self.tilts.iter().map(|t| t.to_radians()).collect();
         }
         let finite = self.azimuths.iter().all(|a| a.is_finite());
-        ensure!(finite, "--azimuths: a direction is a number of degrees");
+        ensure!(finite, "--azimuths: give finite numbers of degrees");
         if self.azimuths.is_empty() {
             return Ok(grid.views());
         }
@@ -55,7 +55,7 @@ pub struct SceneryArguments {
     /// Board width and height in m
     #[arg(long, value_parser = numbers::<2>, default_value = "1,0.8", value_name = "W,H", allow_hyphen_values = true)]
     board: [f64; 2],
-    /// The target is a wall that fills the picture
+    /// Make the target a wall that fills the picture
     #[arg(long, conflicts_with = "board")]
     wall_target: bool,
     /// Print grey squares on the target
