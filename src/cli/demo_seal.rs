@@ -96,11 +96,12 @@ impl Sealed {
 
 /// How near the diagnosis came to the cause.
 struct Answer<'a> {
-    /// The finding that names it, first or among its alternatives.
+    /// The finding that has its name.
     finding: Option<&'a Finding>,
+    /// That is the first of all.
     first: bool,
-    /// Its probability, where it is an alternative only.
-    among: Option<f64>,
+    /// It is a possible name of another finding, with its probability where that is known.
+    among: Option<Option<f64>>,
     /// Something was found.
     mismatch: bool,
     /// Names of other findings, but for small remains.
@@ -111,14 +112,13 @@ impl<'a> Answer<'a> {
     fn of(id: &str, diagnosis: &'a Diagnosis) -> Self {
         let claims = || diagnosis.findings.iter().filter(|f| f.status != Status::NotIdentifiable);
         let leads = |f: &&Finding| f.effect == Some(id);
-        let alternative = |f: &Finding| f.alternatives.iter().find(|a| a.effect == id).cloned();
-        let led = claims().find(leads);
-        let beside = claims().find(|f| alternative(f).is_some());
-        let among = beside.filter(|_| led.is_none()).and_then(|f| alternative(f)?.probability);
+        let finding = claims().find(leads);
+        let mut alternatives = claims().flat_map(|f| &f.alternatives);
+        let among = alternatives.find(|a| a.effect == id).map(|a| a.probability);
         let others = claims().filter(|f| !f.minor && !leads(f)).filter_map(|f| f.effect);
         Answer {
-            finding: led.or(beside),
-            first: led.is_some() && claims().next().is_some_and(|f| leads(&f)),
+            finding,
+            first: claims().next().is_some_and(|f| leads(&f)),
             among,
             mismatch: diagnosis.verdict == Verdict::Mismatch,
             others: others.collect(),
@@ -127,12 +127,12 @@ impl<'a> Answer<'a> {
 
     /// For programs.
     fn name(&self) -> &'static str {
-        match (self.finding, self.first, self.among) {
-            (Some(_), true, _) => "first",
-            (Some(_), false, None) => "found",
-            (Some(_), false, Some(_)) => "among",
-            (None, ..) if self.mismatch => "other",
-            (None, ..) => "missed",
+        match (self.finding, self.among) {
+            (Some(_), _) if self.first => "first",
+            (Some(_), _) => "found",
+            (None, Some(_)) => "among",
+            (None, None) if self.mismatch => "other",
+            (None, None) => "missed",
         }
     }
 
@@ -142,8 +142,9 @@ impl<'a> Answer<'a> {
             "first" => format!("Right: {id} is the first finding."),
             "found" => format!("Half right: {id} was found, but not first."),
             "among" => {
-                let p = 100.0 * self.among.unwrap_or(0.0);
-                format!("Half right: {id} is among the possible causes, with {p:.0} %.")
+                let p = self.among.flatten().map(|p| format!(", with {:.0} %", 100.0 * p));
+                let p = p.unwrap_or_default();
+                format!("Half right: {id} is among the possible causes{p}.")
             }
             "other" => {
                 format!("Wrong: something was found, but not called {id}. {}", why(id, diagnosis))
@@ -226,7 +227,7 @@ fn gained(heldout: Option<&HeldOut>) -> String {
     }
     let [low, high] = h.gain_interval;
     let gain = format!(
-        "On {} views kept out of the fit, knowing it gains {:.1} nats a view (95 %: {low:.1} to {high:.1})",
+        "On {} views kept out of the fit the extended model gains {:.1} nats a view (95 %: {low:.1} to {high:.1})",
         h.views.len(),
         h.gain
     );
