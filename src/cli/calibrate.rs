@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::Args;
 use kinoise::calibrate::{Measurements, measure, model_of};
-use kinoise::io::{OutputDir, open};
+use kinoise::io::{OutputFolder, open};
 use kinoise::measure::{MeasureOptions, Planes, read_table, write_measurements};
 use kinoise::report::{CalibrationPage, Overlay, calibration_page, figure2, sigma_map};
 use kinoise::units::shortest;
@@ -12,6 +12,7 @@ use kinoise::{CalibrateOptions, Calibration, Form, Recording, SigmaKind, model_o
 use super::calibrate_summary::{as_json, comparison, formula};
 use super::common::{Global, Input, one_of, source_date};
 use super::console::{beside, detail, detail_recording, next_step, notes, result, say, working};
+use super::output::{CALIBRATION, begin};
 
 pub const EXAMPLES: &str = "\
 Examples:
@@ -140,7 +141,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let options = arguments.options(global)?;
     let recording = open(&arguments.recording, &arguments.input.assumed()?)?;
     let overlays = &arguments.fitting.overlay;
-    let (measured, calibration) = calibrate(&recording, &options, &arguments.output, overlays)?;
+    let out = begin(&arguments.output, CALIBRATION, &[&arguments.recording], global)?;
+    let (measured, calibration) = calibrate(&recording, &options, out, overlays)?;
     global.print_json(&as_json(&calibration, Some(&measured)))?;
     let mut next = vec!["diagnose".into(), arguments.recording.clone().into(), "-o".into()];
     next.push(beside(&arguments.output, "diagnosis").into());
@@ -165,7 +167,7 @@ fn table(file: &Path, output: &Path, fitting: &Fitting, global: &Global) -> anyh
         calibration: &calibration,
         overlays: &fitting.overlay,
     };
-    write_outputs(&OutputDir::create(output)?, &page)?;
+    write_outputs(begin(output, CALIBRATION, &[file], global)?, &page)?;
     global.print_json(&as_json(&calibration, None))?;
     let simulated = beside(output, "simulated");
     let model = output.join("model.json");
@@ -177,29 +179,25 @@ fn table(file: &Path, output: &Path, fitting: &Fitting, global: &Global) -> anyh
 pub fn calibrate(
     recording: &Recording,
     options: &CalibrateOptions,
-    output: &Path,
+    out: OutputFolder,
     overlays: &[Overlay],
 ) -> anyhow::Result<(Measurements, Calibration)> {
-    let out = OutputDir::create(output)?;
     detail_recording(recording);
     detail(format!("settings: {options:?}"));
     let measurements = working("measuring", |step| measure(recording, &options.measure, step))?;
     say(measured(recording, &measurements));
     out.write("measurements.csv", write_measurements(&measurements.views).as_bytes())?;
     let fitted = working("fitting", |_| model_of(recording, &measurements, options));
-    let calibration = fitted.with_context(|| {
-        // Without a model there is no list of warnings: this is the only place to say why.
-        notes(&measurements.excluded);
-        notes(&recording.remarks);
-        let older = match out.path().join("model.json").exists() {
-            true => " (the model.json there is from an earlier run)",
-            false => "",
-        };
-        format!(
-            "the views were measured ({}) but no model was fitted{older}",
-            out.path().join("measurements.csv").display()
-        )
-    })?;
+    let calibration = match fitted {
+        Ok(calibration) => calibration,
+        Err(why) => {
+            // Without a model there is no list of warnings: this is the only place to say why.
+            notes(&measurements.excluded);
+            notes(&recording.remarks);
+            let told = measured_only(out)?;
+            return Err(why).context(told);
+        }
+    };
     let page = CalibrationPage {
         title: &format!("Noise of {}", recording.sensor.name),
         sensor: Some(&recording.sensor),
@@ -207,12 +205,25 @@ pub fn calibrate(
         calibration: &calibration,
         overlays,
     };
-    write_outputs(&out, &page)?;
+    write_outputs(out, &page)?;
     Ok((measurements, calibration))
 }
 
-/// Model, figures and page; a summary for people.
-fn write_outputs(out: &OutputDir, page: &CalibrationPage<'_>) -> anyhow::Result<()> {
+/// The measurements of views that no model fits, unless they would replace an earlier run's model.
+fn measured_only(out: OutputFolder) -> anyhow::Result<String> {
+    let place = out.place().to_path_buf();
+    if out.replaces() {
+        let stands = format!("{} stays as it was", place.display());
+        return Ok(format!("the views were measured but no model was fitted, and {stands}"));
+    }
+    out.finish()?;
+    let measurements = place.join("measurements.csv");
+    Ok(format!("the views were measured ({}) but no model was fitted", measurements.display()))
+}
+
+/// Model, figures and page; a summary for people. No model of a fit that explains nothing, unless
+/// forced.
+fn write_outputs(out: OutputFolder, page: &CalibrationPage<'_>) -> anyhow::Result<()> {
     let calibration = page.calibration;
     let (table, sigma) = (&calibration.table, &calibration.model.sigma);
     let charts =
@@ -225,13 +236,27 @@ fn write_outputs(out: &OutputDir, page: &CalibrationPage<'_>) -> anyhow::Result<
         out.write("report.html", calibration_page(page)?.as_bytes())?;
         Ok(())
     })?;
-    let model = out.path().join("model.json");
-    calibration.model.write(&model)?;
-    let beside = "with sigma.svg, sigma_map.svg and report.html beside it";
-    say(format!("wrote {}, {beside}\n", model.display()));
+    let useless = calibration.fit.quality.explains_nothing().filter(|_| !out.forced());
+    if useless.is_none() {
+        calibration.model.write(&out.path().join("model.json"))?;
+    }
+    let place = out.place().to_path_buf();
+    out.finish()?;
+    if useless.is_none() {
+        let beside = "with sigma.svg, sigma_map.svg and report.html beside it";
+        say(format!("wrote {}, {beside}\n", place.join("model.json").display()));
+    }
     result(formula(calibration));
     say(comparison(calibration));
     notes(&calibration.warnings);
+    if let Some(what) = useless {
+        const CAUSES: &str = "how raw values become metres, the intrinsics, and measurements.csv for views that measured something else than one flat target";
+        let page = place.join("report.html");
+        bail!(
+            "{}: {what} and no model.json was written; check {CAUSES}, or write it with --force",
+            page.display()
+        );
+    }
     Ok(())
 }
 

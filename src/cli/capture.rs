@@ -8,6 +8,7 @@ use kinoise::capture::{
     PAPER_DISTANCES_M, PAPER_TILTS_DEG, Playback, Session, Shutter, Source, ViewState, Wanted,
     capture,
 };
+use kinoise::io::refuse_inside;
 use serde_json::json;
 
 use super::capture_interface::{Log, Screen, is_interactive, stop_signal};
@@ -166,12 +167,17 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
 /// What is played or watched must not grow by what is taken from it.
 fn refuse_own_source(arguments: &Arguments) -> anyhow::Result<()> {
     let recording = &arguments.recording;
-    if let SourceKind::Folder(from) | SourceKind::Play(from) = &arguments.source
-        && let (Ok(from), Ok(to)) = (from.canonicalize(), recording.canonicalize())
+    let (SourceKind::Folder(from) | SourceKind::Play(from)) = &arguments.source else {
+        return Ok(());
+    };
+    if let (Ok(from), Ok(to)) = (from.canonicalize(), recording.canonicalize())
         && from == to
     {
         let remedy = "choose another folder for the recording";
         bail!("{}: this is the source; {remedy}", recording.display());
+    }
+    if from.is_dir() {
+        refuse_inside(recording, from)?;
     }
     Ok(())
 }

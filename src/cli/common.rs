@@ -28,6 +28,9 @@ pub struct Global {
     /// Threads to use; the results do not depend on it [default: all cores]
     #[arg(long, global = true, value_name = "N", value_parser = count(1, MAX_THREADS))]
     threads: Option<usize>,
+    /// Write into a folder that holds other files; calibrate: also a model that explains nothing
+    #[arg(long, global = true)]
+    pub force: bool,
 }
 
 /// More than any machine this runs on has; each costs memory before it helps.
@@ -122,6 +125,10 @@ pub struct Model {
 }
 
 impl Model {
+    pub fn path(&self) -> Option<&Path> {
+        self.file.as_deref()
+    }
+
     pub fn read(&self) -> kinoise::Result<NoiseModel> {
         let file = self.file.as_deref();
         let model = file.map_or_else(|| Ok(NoiseModel::paper()), NoiseModel::read)?;

@@ -1,14 +1,14 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
 use clap::Args;
 use kinoise::compare::{compare, of_the_paper, past_the_paper, tables};
-use kinoise::io::OutputDir;
 use kinoise::report::{comparison_figures, comparison_page};
 use kinoise::sequence::open;
 
 use super::common::{Global, Input, Model, Thinning};
 use super::console::{beside, next_step, notes, result, say};
+use super::output::{COMPARISON, begin};
 
 pub const EXAMPLES: &str = "\
 Examples:
@@ -40,8 +40,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     ensure!(arguments.repeats > 0, "--repeats 0: give 1 or more");
     let mut sequence = open(&arguments.sequence, &arguments.input.assumed()?)?;
     sequence.thin(arguments.thinning.stride, arguments.thinning.frames);
-    let output = OutputDir::create(&arguments.output)?;
     let model = arguments.model.read()?;
+    let inputs: Vec<&Path> =
+        arguments.model.path().into_iter().chain([&*arguments.sequence]).collect();
+    let output = begin(&arguments.output, COMPARISON, &inputs, global)?;
     let mut variants = of_the_paper();
     let ours = past_the_paper().into_iter();
     variants.extend(ours.filter(|v| arguments.ablation || v.name.contains("default")));
@@ -57,6 +59,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         output.write(name, svg.as_bytes())?;
     }
     output.write("report.html", comparison_page(&comparison)?.as_bytes())?;
+    output.finish()?;
     notes(&sequence.remarks);
     result(text);
     say(format!("wrote {}", arguments.output.join("report.html").display()));

@@ -1,13 +1,15 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
 use kinoise::correct::{CorrectOptions, Corrected, correct_recording};
 use kinoise::effects::Active;
+use kinoise::io::{Leaves, OutputFolder};
 use kinoise::{DepthCode, NoiseModel};
 
 use super::common::{Global, Input};
 use super::console::{beside, detail_model, next_step, notes, result, say, working};
+use super::output::begin;
 
 pub const EXAMPLES: &str = "\
 Examples:
@@ -40,13 +42,19 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     detail_model(&model, Some(&arguments.model));
     // Here an error can name the file.
     Active::all_of_model(&model.effects).with_context(|| arguments.model.display().to_string())?;
-    let (recording, output) = (&arguments.recording, &arguments.output);
+    let recording: &Path = &arguments.recording;
     let assumed = arguments.input.assumed()?;
+    let inputs: [&Path; 2] = [recording, &arguments.model];
+    let new = |place: &Path| begin(place, Leaves::Recording, &inputs, global);
+    let output = new(&arguments.output)?;
+    let uncertainty = arguments.sigma.as_deref().map(new).transpose()?;
     let corrected = working("correcting", |step| {
-        let sigma = arguments.sigma.as_deref();
+        let sigma = uncertainty.as_ref().map(OutputFolder::path);
         let options = CorrectOptions { keep_code: arguments.keep_code, sigma };
-        correct_recording(recording, &assumed, &model, output, &options, step)
+        correct_recording(recording, &assumed, &model, output.path(), &options, step)
     })?;
+    uncertainty.map_or(Ok(()), OutputFolder::finish)?;
+    output.finish()?;
     report(&corrected, arguments);
     global.print_json(&serde_json::json!({
         "frames": corrected.frames,
@@ -61,6 +69,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         "not_corrected": corrected.ignored,
         "output": arguments.output,
     }))?;
+    let output = &arguments.output;
     let to = beside(output, "diagnosis");
     next_step(&["diagnose".into(), output.into(), "-o".into(), to.into()]);
     Ok(())

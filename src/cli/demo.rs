@@ -4,7 +4,7 @@ use std::time::SystemTime;
 use anyhow::Context;
 use clap::Args;
 use kinoise::diagnose::{DiagnoseOptions, Diagnosis};
-use kinoise::io::{Assumed, open, write_atomic};
+use kinoise::io::{Assumed, Leaves, OutputFolder, open, write_atomic};
 use kinoise::map::{Init, Options, Weights};
 use kinoise::measure::MeasureOptions;
 use kinoise::report::Overlay;
@@ -23,6 +23,7 @@ use super::console::{next_step, result, say, shell, working};
 use super::demo_seal::Sealed;
 use super::diagnose::{HeldAgainst, examine};
 use super::map::follow;
+use super::output::{DEMO, DIAGNOSIS, MAP, begin};
 
 pub const EXAMPLES: &str = "\
 Examples:
@@ -43,7 +44,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let output = &arguments.output;
     let seed = Seed(global.seed.unwrap_or_else(clock));
     say("1. Calibrate: how noisy is the sensor of the bundled recording?\n");
-    let (recording, measured, calibration) = calibrated(seed, output)?;
+    let (recording, measured, calibration) = calibrated(seed, output, global)?;
     let model = &calibration.model;
     say(format!(
         "The recording was simulated with the paper's Eq. 1, so the first two columns should agree.\nOpen {} to see it all.",
@@ -53,17 +54,17 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     say("\n2. Diagnose: the same sensor once more, with one more cause that nobody has chosen.\n");
     let sealed = Sealed::draw(seed)?;
     let film = output.join("sealed");
-    sealed.commit(output, &film)?;
+    sealed.commit(output)?;
     say(sealed.promise());
     filmed(&sealed, &recording.sensor, &model.sigma, &film, seed)?;
-    let (diagnosis, page) = diagnosed(&film, model, output, seed)?;
+    let (diagnosis, page) = diagnosed(&film, model, output, seed, global)?;
     write_atomic(&output.join("sealed.txt"), sealed.text().as_bytes())?;
     let (text, json) = sealed.opened(&diagnosis);
     result(text);
     let check = shell(&["sha256sum".into(), output.join("sealed.txt").into()]);
     say(format!("Check the hash with: {check}\nOpen {} to see how.", page.display()));
 
-    mapped(&recording, model, output, global.seed())?;
+    mapped(&recording, model, output, global)?;
     let mut value = as_json(&calibration, Some(&measured));
     value["sealed"] = json;
     value["seed"] = seed.0.into();
@@ -84,15 +85,18 @@ fn clock() -> u64 {
 fn calibrated(
     seed: Seed,
     output: &Path,
+    global: &Global,
 ) -> anyhow::Result<(Recording, Measurements, kinoise::Calibration)> {
-    let recording = open(&bundled()?, &Assumed::default())?;
+    let path = bundled()?;
+    let recording = open(&path, &Assumed::default())?;
+    let out = begin(output, DEMO, &[&path], global)?;
     let options = CalibrateOptions {
         measure: MeasureOptions { seed, ..MeasureOptions::default() },
         form: Some(Form::Paper),
         created: source_date(),
         ..CalibrateOptions::default()
     };
-    let (measured, calibration) = calibrate(&recording, &options, output, &Overlay::ALL[..1])?;
+    let (measured, calibration) = calibrate(&recording, &options, out, &Overlay::ALL[..1])?;
     Ok((recording, measured, calibration))
 }
 
@@ -127,7 +131,9 @@ fn filmed(
         infrared: true,
         seed,
     };
-    working("filming", |step| shoot.write_quickly(folder, step))?;
+    let out = own(folder)?;
+    working("filming", |step| shoot.write_quickly(out.path(), step))?;
+    out.finish()?;
     say(format!(
         "filmed {} views of {FRAMES_A_VIEW} frames with it: {}\n",
         shoot.views.len(),
@@ -136,18 +142,25 @@ fn filmed(
     Ok(())
 }
 
+/// A recording within the demo's folder: one of an earlier demo goes.
+fn own(folder: &Path) -> kinoise::Result<OutputFolder> {
+    OutputFolder::begin(folder, Leaves::Recording, &[], true)
+}
+
 /// What the calibrated model leaves out of the film, and its page.
 fn diagnosed(
     film: &Path,
     model: &NoiseModel,
     output: &Path,
     seed: Seed,
+    global: &Global,
 ) -> anyhow::Result<(Diagnosis, PathBuf)> {
     let recording = open(film, &Assumed::default())?;
     let options = DiagnoseOptions { seed, ..DiagnoseOptions::default() };
     let folder = output.join("diagnosis");
     let held = HeldAgainst { simulated: None, model, options: &options };
-    let diagnosis = examine(&recording, &held, &folder).context("the sealed recording")?;
+    let out = begin(&folder, DIAGNOSIS, &[film], global)?;
+    let diagnosis = examine(&recording, &held, out).context("the sealed recording")?;
     Ok((diagnosis, folder.join("report.html")))
 }
 
@@ -159,8 +172,9 @@ fn mapped(
     recording: &Recording,
     model: &NoiseModel,
     output: &Path,
-    seed: Seed,
+    global: &Global,
 ) -> anyhow::Result<()> {
+    let seed = global.seed();
     say("\n3. Map: an office, filmed through the calibrated sensor.\n");
     // The same seed makes the same film: one that is there already will do.
     let folder = output.join(format!("office-{}", seed.0));
@@ -173,15 +187,18 @@ fn mapped(
             effects: Vec::new(),
             seed,
         };
-        working("filming", |step| film.write(&folder, step))?;
+        let out = own(&folder)?;
+        working("filming", |step| film.write(out.path(), step))?;
+        out.finish()?;
     }
     let sequence = sequence::open(&folder, &Assumed::default())?;
     let plain = Options { seed, ..Options::paper(Weights::None, Init::None) };
     let best = Options { seed, ..Options::best() };
     result("point-to-plane ICP from frame to frame, without the model:");
-    follow(&sequence, model, &plain, "The office, plain ICP", &output.join("map-plain"))?;
+    let map = |name: &str| begin(&output.join(name), MAP, &[], global);
+    follow(&sequence, model, &plain, "The office, plain ICP", map("map-plain")?)?;
     result("with the model, each frame to the map so far:");
-    follow(&sequence, model, &best, "The office", &output.join("map"))?;
+    follow(&sequence, model, &best, "The office", map("map")?)?;
     say(format!("Open {} and turn it.", output.join("map/map.html").display()));
     Ok(())
 }

@@ -1,6 +1,5 @@
 //! The lot of the demo: a cause and its strength, sealed before the diagnosis, opened after it.
 
-use std::fs;
 use std::path::Path;
 
 use kinoise::Seed;
@@ -55,12 +54,9 @@ impl Sealed {
         )
     }
 
-    /// Write the promise into `output` before anything is filmed. A `film` of an earlier demo goes.
-    pub fn commit(&self, output: &Path, film: &Path) -> kinoise::Result<()> {
+    /// Write the promise into `output` before anything is filmed.
+    pub fn commit(&self, output: &Path) -> kinoise::Result<()> {
         let promise = output.join("sealed.sha256");
-        if promise.is_file() && film.is_dir() {
-            fs::remove_dir_all(film).map_err(|e| kinoise::Error::write(film, e))?;
-        }
         // As `sha256sum --check` reads it.
         write_atomic(&promise, format!("{}  sealed.txt\n", self.hash()).as_bytes())
     }

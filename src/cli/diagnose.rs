@@ -8,7 +8,7 @@ use kinoise::diagnose::{
     diagnose, diagnose_against, pictures,
 };
 use kinoise::effects::{Active, Instant};
-use kinoise::io::{OutputDir, open};
+use kinoise::io::{OutputFolder, open};
 use kinoise::report::{DiagnosisPage, diagnosis_page, story};
 use kinoise::simulate::{FormulaSensor, plan_on};
 use kinoise::view::ViewNotes;
@@ -18,6 +18,7 @@ use super::common::{Global, Input, model_again, source_date};
 use super::console::{
     beside, detail, detail_model, detail_recording, next_step, result, say, shell, working,
 };
+use super::output::{DIAGNOSIS, begin};
 
 pub const EXAMPLES: &str = "\
 Examples:
@@ -44,6 +45,8 @@ pub struct Arguments {
     input: Input,
 }
 
+/// As of a fit of which `calibrate` writes no model.
+const MIN_R2: f64 = 0.5;
 /// Exit code when a mismatch was found.
 const FOUND: u8 = 1;
 
@@ -51,9 +54,16 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     let assumed = arguments.input.assumed()?;
     let recording = open(&arguments.recording, &assumed)?;
     let simulated = arguments.against.as_ref().map(|path| open(path, &assumed)).transpose()?;
+    let others = [&arguments.against, &arguments.model].into_iter().flatten();
+    let inputs: Vec<&Path> = others.chain([&arguments.recording]).map(PathBuf::as_path).collect();
+    let out = begin(&arguments.output, DIAGNOSIS, &inputs, global)?;
     detail_recording(&recording);
     let model = match (&arguments.model, &simulated) {
-        (Some(path), _) => NoiseModel::read(path)?,
+        (Some(path), _) => {
+            let model = NoiseModel::read(path)?;
+            model.refuse_other_size(&recording.sensor)?;
+            model
+        }
         (None, Some(simulated)) => weights(&recording, simulated, global)?,
         (None, None) => {
             say("no --model was given: it is calibrated on this recording first");
@@ -67,7 +77,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
         ..DiagnoseOptions::default()
     };
     let held = HeldAgainst { simulated: simulated.as_ref(), model: &model, options: &options };
-    let diagnosis = examine(&recording, &held, &arguments.output)?;
+    let diagnosis = examine(&recording, &held, out)?;
     global.print_json(&serde_json::to_value(&diagnosis)?)?;
     arguments.reproductions(&diagnosis).iter().for_each(|line| say(line));
     next_step(&arguments.next(&diagnosis));
@@ -130,9 +140,8 @@ pub struct HeldAgainst<'a> {
 pub fn examine(
     recording: &Recording,
     held: &HeldAgainst<'_>,
-    output: &Path,
+    out: OutputFolder,
 ) -> anyhow::Result<Diagnosis> {
-    let out = OutputDir::create(output)?;
     let HeldAgainst { simulated, model, options } = *held;
     detail(format!("settings: {options:?}"));
     let done = working("measuring the views", |step| match simulated {
@@ -151,6 +160,7 @@ pub fn examine(
         out.write("report.html", diagnosis_page(&page)?.as_bytes())?;
         Ok(())
     })?;
+    out.finish()?;
     result(summary(diagnosis));
     Ok(done.diagnosis)
 }
@@ -161,6 +171,12 @@ fn calibrated(recording: &Recording, global: &Global) -> anyhow::Result<NoiseMod
     let model = working("calibrating", step)?;
     if model.sigma.form != Form::Paper {
         model.fit.remarks.iter().take(1).for_each(|why| say(format!("note: {why}")));
+    }
+    if model.fit.r2 < MIN_R2 {
+        let (r2, check) = (model.fit.r2, "how raw values become metres, and the intrinsics");
+        say(format!(
+            "note: the model calibrated here explains little of the noise (r2 {r2:.2}): check {check}"
+        ));
     }
     Ok(model)
 }

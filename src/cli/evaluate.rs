@@ -6,7 +6,7 @@ use kinoise::evaluate::{Delta, Evaluation, Spread, evaluate_files};
 use serde_json::{Value, json};
 
 use super::common::Global;
-use super::console::result;
+use super::console::{notes, result};
 
 pub const EXAMPLES: &str = "\
 Examples:
@@ -71,15 +71,20 @@ fn report(evaluation: &Evaluation, arguments: &Arguments) {
     line("ATE after alignment,", &evaluation.ate.error, "m");
     line(&interval, &evaluation.rpe.translation, "m");
     line(&interval, &evaluation.rpe.rotation.scaled(1f64.to_degrees()), "degrees");
+    notes(&evaluation.remarks);
 }
 
 /// ATE and RPE, as the TUM scripts name them.
 pub fn as_json(evaluation: &Evaluation) -> Value {
-    json!({
+    let mut value = json!({
         "ate": spread(&evaluation.ate.error, "m"),
         "rpe_translation": spread(&evaluation.rpe.translation, "m"),
         "rpe_rotation": spread(&evaluation.rpe.rotation.scaled(1f64.to_degrees()), "deg"),
-    })
+    });
+    if !evaluation.remarks.is_empty() {
+        value["remarks"] = json!(evaluation.remarks);
+    }
+    value
 }
 
 fn spread(s: &Spread, unit: &str) -> Value {

@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use kinoise::evaluate::{Delta, Evaluation, evaluate};
-use kinoise::io::OutputDir;
+use kinoise::io::OutputFolder;
 use kinoise::map::{
     self, Alignment, Init, Kernel, Mapped, Options, Stages, Weights, frames_csv, ply,
 };
@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 
 use super::common::{Global, Input, Model, Thinning, one_of};
 use super::console::{beside, detail, next_step, notes, result, say, working};
+use super::output::{MAP, begin};
 
 pub const EXAMPLES: &str = "\
 Examples:
@@ -120,7 +121,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let options = arguments.tuning.options(global.seed());
     options.check()?;
     let title = format!("Map of {}", name_of(&arguments.sequence));
-    let stats = follow(&sequence, &model, &options, &title, &arguments.output)?;
+    let inputs: Vec<&Path> =
+        arguments.model.path().into_iter().chain([&*arguments.sequence]).collect();
+    let out = begin(&arguments.output, MAP, &inputs, global)?;
+    let stats = follow(&sequence, &model, &options, &title, out)?;
     global.print_json(&stats)?;
     // With true poses there is something to compare with; without them, the same without the model.
     let (command, suffix, plain) = match sequence.truth.is_empty() {
@@ -140,9 +144,8 @@ pub fn follow(
     model: &NoiseModel,
     options: &Options,
     title: &str,
-    folder: &Path,
+    output: OutputFolder,
 ) -> anyhow::Result<Value> {
-    let output = OutputDir::create(folder)?;
     detail(format!("settings: {options:?}"));
     let begin = std::time::Instant::now();
     let mapped = working("mapping", |step| map::map(sequence, model, options, step))?;
@@ -154,8 +157,10 @@ pub fn follow(
     output.write("map.html", map_page(title, &mapped.map, &mapped.frames).as_bytes())?;
     output.write("frames.csv", frames_csv(&mapped.frames).as_bytes())?;
     output.write("stats.json", serde_json::to_string_pretty(&stats)?.as_bytes())?;
+    let folder = output.place().to_path_buf();
+    output.finish()?;
     notes(sequence.remarks.iter().chain(&mapped.remarks));
-    report(&mapped, &against, folder);
+    report(&mapped, &against, &folder);
     Ok(stats)
 }
 

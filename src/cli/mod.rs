@@ -14,6 +14,7 @@ mod diagnose;
 mod effects;
 mod evaluate;
 mod map;
+mod output;
 mod simulate;
 mod simulate_room;
 mod simulate_scene;
@@ -96,6 +97,7 @@ pub fn main() -> ExitCode {
     match run(&arguments) {
         Ok(code) => ExitCode::from(code),
         Err(e) => {
+            output::wait_if_interrupted();
             eprintln!("kinoise: {e:#}");
             ExitCode::from(FAILURE)
         }
@@ -133,6 +135,10 @@ fn subcommand() -> Option<String> {
 fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let global = &arguments.global;
     global.set_up()?;
+    // A capture goes on with the views that are whole, and has its own answer.
+    if !matches!(arguments.command, Command::Capture(_)) {
+        output::discard_when_interrupted()?;
+    }
     match &arguments.command {
         Command::Capture(a) => capture::run(a, global),
         Command::Calibrate(a) => calibrate::run(a, global).map(|()| 0),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use clap::{Args, ValueEnum};
 use kinoise::effects::Active;
-use kinoise::io::{Assumed, open, write_json};
+use kinoise::io::{Assumed, Leaves, OutputFolder, open, write_json};
 use kinoise::model::{Direction, Domain, PAPER_EQ1};
 use kinoise::simulate::room::{Film, Room};
 use kinoise::simulate::speckle::Causes;
@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 
 use super::common::{Global, MAX_FRAMES, count, model_again};
 use super::console::{beside, detail, detail_model, next_step, notes, result, say, working};
+use super::output::begin;
 use super::simulate_room::RoomArguments;
 use super::simulate_scene::{PosesArguments, SceneryArguments};
 
@@ -72,6 +73,15 @@ enum PhysicsArgument {
     Speckle,
 }
 
+impl Arguments {
+    /// The new recording.
+    fn folder(&self, global: &Global) -> kinoise::Result<OutputFolder> {
+        let read = [&self.model, &self.like].into_iter().flatten();
+        let inputs: Vec<&Path> = read.map(PathBuf::as_path).collect();
+        begin(&self.output, Leaves::Recording, &inputs, global)
+    }
+}
+
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     if let Some(path) = &arguments.recipe {
         check_recipe(path, &arguments.output)?;
@@ -87,7 +97,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         let room = Room::office(global.seed());
         let poses = arguments.room.path(&room, arguments.frames)?;
         let film = Film { sensor, room, poses, sigma, effects, seed: global.seed() };
-        write_film(&film, &arguments.output)?
+        write_film(&film, arguments.folder(global)?)?
     } else {
         shoot(arguments, sensor, physics(arguments, sigma, effects)?, global)?
     };
@@ -117,9 +127,10 @@ fn next(arguments: &Arguments) -> Vec<OsString> {
 }
 
 /// Film the office: what programs are told of it, and the recipe.
-fn write_film(film: &Film, output: &Path) -> anyhow::Result<(Value, Value)> {
-    working("filming", |step| film.write(output, step))?;
-    let frames = film.poses.len();
+fn write_film(film: &Film, folder: OutputFolder) -> anyhow::Result<(Value, Value)> {
+    working("filming", |step| film.write(folder.path(), step))?;
+    let (output, frames) = (folder.place().to_path_buf(), film.poses.len());
+    folder.finish()?;
     result(format!("wrote {frames} frames of a room to {}", output.display()));
     Ok((json!({"frames": frames, "output": output}), film.recipe()))
 }
@@ -132,6 +143,9 @@ fn shoot(
     global: &Global,
 ) -> anyhow::Result<(Value, Value)> {
     let (views, recorded_by) = plans(arguments, global)?;
+    if let (Some(path), Some(recorded_by)) = (&arguments.model, &recorded_by) {
+        NoiseModel::read(path)?.refuse_other_size(recorded_by)?;
+    }
     let sensor = recorded_by.unwrap_or(sensor);
     if let Physics::Formula { sigma, effects } = &physics {
         note_clamped(&views, sigma);
@@ -139,13 +153,15 @@ fn shoot(
     }
     detail(format!("effects and physics: {physics:?}"));
     let shoot = Shoot { sensor, views, physics, infrared: arguments.infrared, seed: global.seed() };
-    let blind = working("filming", |step| shoot.write(&arguments.output, step))?;
+    let folder = arguments.folder(global)?;
+    let blind = working("filming", |step| shoot.write(folder.path(), step))?;
     const UNSEEN: &str = "the target is out of the picture or beyond the depth code";
     let (output, views) = (arguments.output.display(), shoot.views.len());
     ensure!(
         blind.len() < views,
         "{output}: no view shows any depth: {UNSEEN}; change --distances, --azimuths or --board"
     );
+    folder.finish()?;
     notes(blind.iter().map(|name| format!("view {name} shows no depth: {UNSEEN}")));
     let frames: usize = shoot.views.iter().map(|v| v.stamps.len()).sum();
     result(format!("wrote {views} views, {frames} frames, to {output}"));

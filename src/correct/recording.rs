@@ -8,14 +8,14 @@ use rayon::prelude::*;
 
 use super::correction::{Conditions, Correction};
 use super::describe::describe;
-use super::files::{copy, files_below, inside, make_folder_of, makes_a_recording, refuse_inside};
+use super::files::{copy, files_below, inside, make_folder_of, makes_a_recording};
 use super::raw::{RawCode, metric};
 use crate::Progress;
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, DepthTable, FARTHEST_M, Frame};
 use crate::io::{
     Assumed, FrameSource, INDEX, Layout, encode_pgm16, encode_png16, open_uncut, refuse_full,
-    write_atomic,
+    refuse_inside, write_atomic,
 };
 use crate::model::NoiseModel;
 use crate::view::{Recording, Sensor};

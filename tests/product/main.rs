@@ -25,4 +25,6 @@ mod outliers;
 mod room;
 mod speckle;
 mod target;
+mod traps_input;
+mod traps_output;
 mod twin;
