@@ -41,6 +41,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let mut sequence = open(&arguments.sequence, &arguments.input.assumed()?)?;
     sequence.thin(arguments.thinning.stride, arguments.thinning.frames);
     let model = arguments.model.read()?;
+    model.refuse_other_size(&sequence.sensor)?;
     let inputs: Vec<&Path> =
         arguments.model.path().into_iter().chain([&*arguments.sequence]).collect();
     let output = begin(&arguments.output, COMPARISON, &inputs, global)?;

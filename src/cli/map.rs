@@ -118,6 +118,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let thinning = &arguments.thinning;
     sequence.thin(thinning.stride, thinning.frames);
     let model = arguments.model.read()?;
+    model.refuse_other_size(&sequence.sensor)?;
     let options = arguments.tuning.options(global.seed());
     options.check()?;
     let title = format!("Map of {}", name_of(&arguments.sequence));

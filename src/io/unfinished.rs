@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 /// What an interruption found.
 #[derive(Debug, Default)]
@@ -19,13 +20,17 @@ pub fn discard_unfinished() -> Interrupted {
     let mut register = register();
     let open = std::mem::take(&mut register.open);
     for open in &open {
-        // Other threads may still be writing into it.
-        for _ in 0..MAX_ROUNDS {
-            discard(&open.staging, &open.parents);
-            if !open.staging.exists() {
-                break;
-            }
-        }
+        // Other threads may still be writing: a file in its place keeps them from making it again.
+        let blocked = |staging: &Path| {
+            let _ = fs::remove_dir_all(staging);
+            fs::File::create_new(staging).is_ok()
+        };
+        let _ = (0..MAX_ROUNDS).any(|_| blocked(&open.staging));
+    }
+    std::thread::sleep(SETTLING);
+    for open in &open {
+        let _ = fs::remove_file(&open.staging);
+        discard(&open.staging, &open.parents);
     }
     let kept = register.finished.clone();
     std::mem::forget(register);
@@ -34,6 +39,8 @@ pub fn discard_unfinished() -> Interrupted {
 
 /// Each takes longer than making a folder.
 const MAX_ROUNDS: usize = 100;
+/// Every thread meets an error of its next write by then, and stops.
+const SETTLING: Duration = Duration::from_millis(100);
 
 /// Remove a folder that is not whole, and the folders that were made for it.
 pub(super) fn discard(staging: &Path, parents: &[PathBuf]) {
