@@ -75,7 +75,7 @@ pub fn measure(
         .par_iter()
         .map(|view| {
             let result = measure_view(view, &bench);
-            progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+            progress.step(done.fetch_add(1, Ordering::Relaxed) + 1, total);
             result
         })
         .collect();

@@ -32,6 +32,24 @@ pub enum CameraFault {
     FocalLength(f64, f64),
     #[error("the principal point cx, cy is not finite")]
     PrincipalPoint,
+    /// cx, cy, width, height, px.
+    #[error(
+        "the principal point ({}, {}) lies outside the image of {} x {} px; check the order fx, fy, cx, cy and \
+         that they belong to this image size", shortest(.0[0]), shortest(.0[1]), .1[0], .1[1]
+    )]
+    Outside([f64; 2], [usize; 2]),
+    /// fx, fy, px.
+    #[error(
+        "fx = {} and fy = {} px differ by more than a quarter, which no depth sensor's do; check the order fx, fy, \
+         cx, cy", shortest(*.0), shortest(*.1)
+    )]
+    Aspect(f64, f64),
+    /// The horizontal field of view, rad.
+    #[error(
+        "a field of view of {:.1} degrees is no depth sensor's ({} to {}); check fx, and that it belongs to this image \
+         size", .0.to_degrees(), FIELD_DEG[0], FIELD_DEG[1]
+    )]
+    FieldOfView(f64),
     #[error("the distortion coefficients are not finite")]
     Coefficients,
     /// A pixel that no ray is bent to: undistortion does not settle there.
@@ -75,6 +93,12 @@ impl Camera {
             Some(CameraFault::FocalLength(fx, fy))
         } else if !cx.is_finite() || !cy.is_finite() {
             Some(CameraFault::PrincipalPoint)
+        } else if !inside(cx, width) || !inside(cy, height) {
+            Some(CameraFault::Outside([cx, cy], [width, height]))
+        } else if !(1.0 / MAX_ASPECT..=MAX_ASPECT).contains(&(fx / fy)) {
+            Some(CameraFault::Aspect(fx, fy))
+        } else if !(FIELD_DEG[0]..=FIELD_DEG[1]).contains(&self.field_of_view().to_degrees()) {
+            Some(CameraFault::FieldOfView(self.field_of_view()))
         } else {
             distortion.and_then(|k| self.lens_fault(k))
         }
@@ -95,6 +119,11 @@ impl Camera {
             }
         }
         folds(&k, farthest).then_some(CameraFault::Fold(k))
+    }
+
+    /// Horizontal, without the lens, rad.
+    fn field_of_view(&self) -> f64 {
+        ((self.cx + 0.5) / self.fx).atan() + ((self.width as f64 - 0.5 - self.cx) / self.fx).atan()
     }
 
     pub fn pixels(&self) -> usize {
@@ -138,6 +167,18 @@ impl Camera {
         }
         Rays { x, y }
     }
+}
+
+/// fx over fy, or its inverse: pixels are square to a percent. With cx and cy in their place it is
+/// 1.33 for images of 4:3 whose principal point is in the middle.
+const MAX_ASPECT: f64 = 1.25;
+/// The widest depth camera has 127 degrees (OAK-D W), and a hundred columns cut out of a Kinect's
+/// image 10. A focal length in mm or as a share of the image's width falls outside, degrees.
+const FIELD_DEG: [f64; 2] = [2.0, 140.0];
+
+/// Is this coordinate, px, on one of `size` pixels?
+fn inside(at: f64, size: usize) -> bool {
+    (-0.5..=size as f64 - 0.5).contains(&at)
 }
 
 /// 16 megapixels are ten times what any depth sensor has; more is a slip or damage, and the rays
@@ -210,45 +251,4 @@ fn lens(k: &[f64; 5], x: f64, y: f64) -> (f64, f64, f64) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn behind(distortion: [f64; 5]) -> Camera {
-        Camera { distortion: Some(distortion), ..Camera::centred(640, 480, 580.0) }
-    }
-
-    #[test]
-    fn a_usable_lens_gives_back_every_pixel() {
-        for k in [[0.0; 5], [-0.26, 0.1, -7.6e-4, 5.0e-3, 0.02], [-0.35, 0.15, 0.0, 0.0, 0.0]] {
-            let camera = behind(k);
-            assert_eq!(camera.fault(), None, "{k:?}");
-            for (u, v) in (0..640).step_by(71).zip((0..480).step_by(53)) {
-                let (x, y) = camera.ray(u as f64, v as f64);
-                let (pu, pv) = camera.project(x, y);
-                assert!((pu - u as f64).hypot(pv - v as f64) < 1e-6, "{k:?}: {pu} {pv}");
-            }
-        }
-    }
-
-    /// A barrel whose bent radius r (1 - 0.8 r^2) never reaches the corners (0.69): it ends at
-    /// r = 1/sqrt(2.4) with 0.43.
-    #[test]
-    fn a_lens_that_does_not_reach_the_corners_is_named() {
-        let camera = behind([-0.8, 0.0, 0.0, 0.0, 0.0]);
-        let fault = camera.fault().expect("no ray");
-        assert!(matches!(fault, CameraFault::NoRay { u: 0, v: 0, .. }), "{fault:?}");
-        assert!(fault.to_string().contains("[-0.8, 0, 0, 0, 0]"), "{fault}");
-        assert!(camera.ray(0.0, 0.0).0.is_nan() && camera.ray(320.0, 240.0).0.is_finite());
-    }
-
-    /// The slope 1 - 7.5 s + 12.5 s^2 is negative between s = 0.2 and 0.4, inside the image.
-    #[test]
-    fn a_lens_that_folds_is_named() {
-        let fault = behind([-2.5, 2.5, 0.0, 0.0, 0.0]).fault().expect("a fault");
-        assert!(fault.to_string().contains("[-2.5, 2.5, 0, 0, 0]"), "{fault}");
-        assert!(folds(&[-2.5, 2.5, 0.0, 0.0, 0.0], 0.5), "k3 = 0");
-        assert!(folds(&[-1.0, 0.0, 0.0, 0.0, 0.0], 0.5), "k2 = k3 = 0");
-        assert!(folds(&[0.0, 0.0, 0.0, 0.0, -1.0], 1.0), "k1 = k2 = 0");
-        assert!(!folds(&[-2.5, 2.5, 0.0, 0.0, 0.0], 0.1) && !folds(&[0.0; 5], 1.0));
-    }
-}
+mod tests;

@@ -157,6 +157,8 @@ pub mod docs;
 
 pub mod error;
 
+pub mod progress;
+
 pub mod rng;
 pub mod units;
 
@@ -208,9 +210,6 @@ pub mod capture;
 
 pub mod report;
 
-/// Called as the work goes on: steps done, steps in all.
-pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
-
 pub use calibrate::{
     CalibrateOptions, Calibration, Measurements, measure as measure_recording, model_of,
     model_of_table,
@@ -221,5 +220,6 @@ pub use frame::{DepthCode, Frame};
 pub use measure::{SigmaKind, SigmaTable, ViewMeasurement};
 pub use model::{Form, NoiseModel, SigmaFit, SigmaModel};
 pub use plane::Plane;
+pub use progress::{Progress, Watch};
 pub use rng::Seed;
 pub use view::{Recording, Sensor, View};

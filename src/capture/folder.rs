@@ -35,7 +35,8 @@ impl Growing {
             let remedy = "start the program that fills it first, or make it";
             return Err(Error::recording(root, "there is no such folder", remedy));
         }
-        let (sensor, remarks) = describe_folder(root, first_size(root, patience)?, assumed)?;
+        let first = first_image(root, patience)?;
+        let (sensor, remarks) = describe_folder(root, &[first], assumed)?;
         let seen = BTreeSet::new();
         Ok(Growing { root: root.into(), sensor, seen, waiting: Vec::new(), remarks })
     }
@@ -80,10 +81,10 @@ impl Source for Growing {
     }
 }
 
-/// Size of the first image that can be read, px.
-fn first_size(root: &Path, patience: Duration) -> Result<(usize, usize)> {
-    let size = || images(root).iter().find_map(|p| size_of(p).ok());
-    poll(patience, size).ok_or_else(|| {
+/// The first image that can be read.
+fn first_image(root: &Path, patience: Duration) -> Result<PathBuf> {
+    let readable = || images(root).into_iter().find(|p| size_of(p).is_ok());
+    poll(patience, readable).ok_or_else(|| {
         let what = format!("no depth image in {} s", patience.as_secs());
         let remedy = "start the program that writes 16-bit PNGs (or fakenect-record) into it";
         Error::recording(root, what, remedy)

@@ -3,14 +3,26 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::Args;
 use kinoise::calibrate::{Measurements, measure, model_of};
-use kinoise::io::{OutputDir, open};
+use kinoise::io::{OutputFolder, open};
 use kinoise::measure::{MeasureOptions, Planes, read_table, write_measurements};
 use kinoise::report::{CalibrationPage, Overlay, calibration_page, figure2, sigma_map};
 use kinoise::units::shortest;
 use kinoise::{CalibrateOptions, Calibration, Form, Recording, SigmaKind, model_of_table, stats};
 
-use super::calibrate_summary::{as_json, summary};
-use super::common::{Global, Input, notes, one_of, say, source_date, with_bar};
+use super::calibrate_summary::{as_json, comparison, formula};
+use super::common::{Global, Input, one_of, source_date};
+use super::console::{beside, detail, detail_recording, next_step, notes, result, say, working};
+use super::output::{CALIBRATION, begin};
+
+pub const EXAMPLES: &str = "\
+Examples:
+  kinoise calibrate recording -o out/kinect
+  kinoise calibrate pngs -o out/kinect --intrinsics 525,525,319.5,239.5 --units-per-metre 1000";
+
+pub const FIT_EXAMPLES: &str = "\
+Examples:
+  kinoise fit table.csv -o out/table
+  kinoise fit table.csv -o out/table --form auto";
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -20,22 +32,28 @@ pub struct Arguments {
     /// Folder for model.json, measurements.csv, sigma.svg and report.html
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    #[command(flatten)]
-    input: Input,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Fit")]
     fitting: Fitting,
-    /// Which standard deviation the model describes
+    #[command(flatten, next_help_heading = "Measurement")]
+    measuring: Measuring,
+    #[command(flatten, next_help_heading = super::INPUT_HEADING)]
+    input: Input,
+}
+
+#[derive(Debug, Args)]
+struct Measuring {
+    /// The standard deviation that the model describes
     #[arg(long, default_value = "spatial", value_parser = one_of([
-        ("spatial", "", SigmaKind::Spatial),
-        ("temporal", "", SigmaKind::Temporal),
-        ("total", "", SigmaKind::Total),
-        ("paper", "", SigmaKind::Paper),
+        ("spatial", "Over the pixels of a frame", SigmaKind::Spatial),
+        ("temporal", "Of a pixel over the frames", SigmaKind::Temporal),
+        ("total", "Over pixels and frames together", SigmaKind::Total),
+        ("paper", "Across the plane, by the paper's method", SigmaKind::Paper),
     ]))]
     sigma: SigmaKind,
-    /// One plane for the still view, or one for every frame of it
+    /// What a plane is fitted to
     #[arg(long, default_value = "view", value_parser = one_of([
-        ("view", "", Planes::PerView),
-        ("frame", "", Planes::PerFrame),
+        ("view", "The whole view, which stands still", Planes::PerView),
+        ("frame", "Every frame of it", Planes::PerFrame),
     ]))]
     planes: Planes,
     /// The paper's RANSAC threshold in m [default: 3 robust standard deviations of the view]
@@ -58,8 +76,8 @@ pub struct FitArguments {
 /// Options of the fit.
 #[derive(Debug, Args)]
 struct Fitting {
-    /// paper, nguyen, khoshelham, disparity; auto takes what predicts left-out distances best
-    #[arg(long, default_value = "paper")]
+    /// paper, nguyen, khoshelham or disparity; auto takes what predicts left-out distances best
+    #[arg(long, default_value = "paper", value_name = "FORM")]
     form: String,
     /// Published curves to draw beside the fit: eq1, nguyen, khoshelham
     #[arg(long, value_delimiter = ',', default_value = "eq1")]
@@ -77,19 +95,20 @@ impl Fitting {
 
 impl Arguments {
     fn options(&self, global: &Global) -> anyhow::Result<CalibrateOptions> {
-        if let Some(t) = self.ransac_threshold
+        let Measuring { sigma, planes, ransac_threshold } = self.measuring;
+        if let Some(t) = ransac_threshold
             && !(t > 0.0 && t.is_finite())
         {
             bail!("--ransac-threshold {}: give a positive distance in m", shortest(t));
         }
         let measure = MeasureOptions {
-            planes: self.planes,
-            ransac_threshold_m: self.ransac_threshold,
+            planes,
+            ransac_threshold_m: ransac_threshold,
             seed: global.seed(),
             ..MeasureOptions::default()
         };
         let (form, created) = (self.fitting.form()?, source_date());
-        Ok(CalibrateOptions { measure, kind: self.sigma, form, created })
+        Ok(CalibrateOptions { measure, kind: sigma, form, created })
     }
 
     /// A file whose name ends in .csv.
@@ -100,10 +119,11 @@ impl Arguments {
 
     /// A table has no frames to measure.
     fn refuse_measuring(&self) -> anyhow::Result<()> {
+        let Measuring { sigma, planes, ransac_threshold } = self.measuring;
         let options = [
-            ("--sigma", self.sigma != SigmaKind::Spatial),
-            ("--planes", self.planes != Planes::PerView),
-            ("--ransac-threshold", self.ransac_threshold.is_some()),
+            ("--sigma", sigma != SigmaKind::Spatial),
+            ("--planes", planes != Planes::PerView),
+            ("--ransac-threshold", ransac_threshold.is_some()),
             ("--intrinsics and the like", self.input != Input::default()),
         ];
         match options.iter().find(|(_, given)| *given) {
@@ -121,8 +141,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let options = arguments.options(global)?;
     let recording = open(&arguments.recording, &arguments.input.assumed()?)?;
     let overlays = &arguments.fitting.overlay;
-    let (measured, calibration) = calibrate(&recording, &options, &arguments.output, overlays)?;
-    global.print_json(&as_json(&calibration, Some(&measured)))
+    let out = begin(&arguments.output, CALIBRATION, &[&arguments.recording], global)?;
+    let (measured, calibration) = calibrate(&recording, &options, out, overlays)?;
+    global.print_json(&as_json(&calibration, Some(&measured)))?;
+    let mut next = vec!["diagnose".into(), arguments.recording.clone().into(), "-o".into()];
+    next.push(beside(&arguments.output, "diagnosis").into());
+    next_step(&[next, arguments.input.again()].concat());
+    Ok(())
 }
 
 pub fn fit(arguments: &FitArguments, global: &Global) -> anyhow::Result<()> {
@@ -142,34 +167,37 @@ fn table(file: &Path, output: &Path, fitting: &Fitting, global: &Global) -> anyh
         calibration: &calibration,
         overlays: &fitting.overlay,
     };
-    write_outputs(&OutputDir::create(output)?, &page)?;
-    global.print_json(&as_json(&calibration, None))
+    write_outputs(begin(output, CALIBRATION, &[file], global)?, &page)?;
+    global.print_json(&as_json(&calibration, None))?;
+    let simulated = beside(output, "simulated");
+    let model = output.join("model.json");
+    next_step(&["simulate".into(), simulated.into(), "-m".into(), model.into()]);
+    Ok(())
 }
 
 /// Measure, fit, write every output, report.
 pub fn calibrate(
     recording: &Recording,
     options: &CalibrateOptions,
-    output: &Path,
+    out: OutputFolder,
     overlays: &[Overlay],
 ) -> anyhow::Result<(Measurements, Calibration)> {
-    let out = OutputDir::create(output)?;
-    let measurements = with_bar("views", |step| measure(recording, &options.measure, step))?;
+    detail_recording(recording);
+    detail(format!("settings: {options:?}"));
+    let measurements = working("measuring", |step| measure(recording, &options.measure, step))?;
     say(measured(recording, &measurements));
     out.write("measurements.csv", write_measurements(&measurements.views).as_bytes())?;
-    let calibration = model_of(recording, &measurements, options).with_context(|| {
-        // Without a model there is no list of warnings: this is the only place to say why.
-        notes(&measurements.excluded);
-        notes(&recording.remarks);
-        let older = match out.path().join("model.json").exists() {
-            true => " (the model.json there is from an earlier run)",
-            false => "",
-        };
-        format!(
-            "the views were measured ({}) but no model was fitted{older}",
-            out.path().join("measurements.csv").display()
-        )
-    })?;
+    let fitted = working("fitting", |_| model_of(recording, &measurements, options));
+    let calibration = match fitted {
+        Ok(calibration) => calibration,
+        Err(why) => {
+            // Without a model there is no list of warnings: this is the only place to say why.
+            notes(&measurements.excluded);
+            notes(&recording.remarks);
+            let told = measured_only(out)?;
+            return Err(why).context(told);
+        }
+    };
     let page = CalibrationPage {
         title: &format!("Noise of {}", recording.sensor.name),
         sensor: Some(&recording.sensor),
@@ -177,27 +205,58 @@ pub fn calibrate(
         calibration: &calibration,
         overlays,
     };
-    write_outputs(&out, &page)?;
+    write_outputs(out, &page)?;
     Ok((measurements, calibration))
 }
 
-/// Model, figures and page; a summary for people.
-fn write_outputs(out: &OutputDir, page: &CalibrationPage<'_>) -> anyhow::Result<()> {
+/// The measurements of views that no model fits, unless they would replace an earlier run's model.
+fn measured_only(out: OutputFolder) -> anyhow::Result<String> {
+    let place = out.place().to_path_buf();
+    if out.replaces() {
+        let stands = format!("{} stays as it was", place.display());
+        return Ok(format!("the views were measured but no model was fitted, and {stands}"));
+    }
+    out.finish()?;
+    let measurements = place.join("measurements.csv");
+    Ok(format!("the views were measured ({}) but no model was fitted", measurements.display()))
+}
+
+/// Model, figures and page; a summary for people. No model of a fit that explains nothing, unless
+/// forced.
+fn write_outputs(out: OutputFolder, page: &CalibrationPage<'_>) -> anyhow::Result<()> {
     let calibration = page.calibration;
     let (table, sigma) = (&calibration.table, &calibration.model.sigma);
     let charts =
         [("sigma", figure2(table, sigma, page.overlays)), ("sigma_map", sigma_map(table, sigma))];
-    for (name, chart) in charts {
-        out.write(&format!("{name}.svg"), chart.svg()?.as_bytes())?;
-        out.write(&format!("{name}.png"), &chart.png()?)?;
+    working("drawing", |_| -> anyhow::Result<()> {
+        for (name, chart) in charts {
+            out.write(&format!("{name}.svg"), chart.svg()?.as_bytes())?;
+            out.write(&format!("{name}.png"), &chart.png()?)?;
+        }
+        out.write("report.html", calibration_page(page)?.as_bytes())?;
+        Ok(())
+    })?;
+    let useless = calibration.fit.quality.explains_nothing().filter(|_| !out.forced());
+    if useless.is_none() {
+        calibration.model.write(&out.path().join("model.json"))?;
     }
-    out.write("report.html", calibration_page(page)?.as_bytes())?;
-    let model = out.path().join("model.json");
-    calibration.model.write(&model)?;
-    let beside = "with sigma.svg, sigma_map.svg and report.html beside it";
-    say(format!("wrote {}, {beside}\n", model.display()));
-    say(summary(calibration));
+    let place = out.place().to_path_buf();
+    out.finish()?;
+    if useless.is_none() {
+        let beside = "with sigma.svg, sigma_map.svg and report.html beside it";
+        say(format!("wrote {}, {beside}\n", place.join("model.json").display()));
+    }
+    result(formula(calibration));
+    say(comparison(calibration));
     notes(&calibration.warnings);
+    if let Some(what) = useless {
+        const CAUSES: &str = "how raw values become metres, the intrinsics, and measurements.csv for views that measured something else than one flat target";
+        let page = place.join("report.html");
+        bail!(
+            "{}: {what} and no model.json was written; check {CAUSES}, or write it with --force",
+            page.display()
+        );
+    }
     Ok(())
 }
 

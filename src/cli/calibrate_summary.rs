@@ -7,8 +7,8 @@ use kinoise::units::decimals;
 use kinoise::{Calibration, SigmaModel};
 use serde_json::{Map, Value, json};
 
-/// The fit, its surface beside the published ones, and the forms compared.
-pub fn summary(calibration: &Calibration) -> String {
+/// The fit: the formula, its parameters, how well it does.
+pub fn formula(calibration: &Calibration) -> String {
     let fit = &calibration.fit;
     let mut text = format!("{}\n", fit.form.card().formula);
     for p in &fit.parameters {
@@ -25,9 +25,14 @@ pub fn summary(calibration: &Calibration) -> String {
     if let Some(h) = calibration.comparison.iter().find(|h| h.form == fit.form) {
         let _ = write!(text, "; {:.1} % at distances left out", 1e2 * h.rmse_relative);
     }
-    text = format!("{text}\n\n{}", surface(&calibration.model.sigma));
+    text
+}
+
+/// The surface beside the published ones, and the forms compared.
+pub fn comparison(calibration: &Calibration) -> String {
+    let mut text = format!("\n{}", surface(&calibration.model.sigma));
     if calibration.comparison.len() > 1 {
-        text += "\nforms by distances left out (error of sigma, log score a view):\n";
+        text += "\nhow each form predicts distances left out (error of sigma, log score a view):\n";
         for h in &calibration.comparison {
             let (form, error) = (h.form.id(), 1e2 * h.rmse_relative);
             let _ = writeln!(text, "  {form:<11}{error:>7.1} %{:>9.2}", h.log_score);
@@ -60,7 +65,7 @@ fn surface(model: &SigmaModel) -> String {
             );
         }
     }
-    text + "    -: a distance or tilt its authors have not measured\n"
+    text + "    -: its authors measured no such distance or tilt\n"
 }
 
 fn millimetres(metres: f64) -> String {

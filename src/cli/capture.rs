@@ -8,65 +8,72 @@ use kinoise::capture::{
     PAPER_DISTANCES_M, PAPER_TILTS_DEG, Playback, Session, Shutter, Source, ViewState, Wanted,
     capture,
 };
+use kinoise::io::refuse_inside;
 use serde_json::json;
 
 use super::capture_interface::{Log, Screen, is_interactive, stop_signal};
-use super::common::{Global, Input, MAX_FRAMES, between, count, notes, one_of, say};
+use super::common::{Global, Input, MAX_FRAMES, between, count, one_of};
+use super::console::{beside, next_step, notes, result, say};
+
+pub const EXAMPLES: &str = "\
+Examples:
+  kinoise capture my-kinect --source freenect --views quick
+  kinoise capture my-kinect --source freenect --advise out/diagnosis/diagnosis.json";
 
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The recording: a new folder, or one to go on with
+    /// The recording: a new folder, or one to continue
     recording: PathBuf,
     /// freenect (a Kinect v1), folder:DIR (another program fills it), or play:REC (as if live)
     #[arg(long, value_name = "SOURCE", value_parser = source_kind)]
     source: SourceKind,
-    #[command(flatten)]
-    views: Views,
-    /// Frames of a view
+    /// Frames to take of each view
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = count(1, MAX_FRAMES))]
     frames: usize,
-    /// Frames for which the target must be still before
+    /// Frames for which the target must be still before a view begins
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(1, MAX_FRAMES))]
     hold: usize,
-    /// Seconds without a frame after which the stream is given up
+    /// Give the stream up after so many seconds without a frame
     #[arg(long, value_name = "S", default_value_t = 10)]
     patience: u64,
-    /// Lines of text, no screen and no keys, also on a terminal
+    /// Print lines of text, without a screen and keys, on a terminal too
     #[arg(long)]
     plain: bool,
     /// libfreenect's file [default: where the system keeps libraries]
     #[arg(long, value_name = "FILE", env = "KINOISE_FREENECT")]
     library: Option<PathBuf>,
-    /// Which Kinect, when several are plugged in
+    /// The Kinect to use, when several are plugged in
     #[arg(long)]
     serial: Option<String>,
-    /// Depth alone, also where the sensor has infrared beside it
+    /// Take depth alone, even where the sensor gives infrared beside it
     #[arg(long)]
     no_infrared: bool,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Views")]
+    views: Views,
+    #[command(flatten, next_help_heading = super::INPUT_HEADING)]
     input: Input,
 }
 
 /// Which views are to be taken.
 #[derive(Debug, Args)]
 struct Views {
-    /// Which views are wanted
+    /// The views to take
     #[arg(long, default_value = "paper", value_parser = one_of([
         ("paper", "1 to 4 m by 0.5 m, 0 to 80 degrees by 10: 63 views", Some(PAPER)),
         ("quick", "1 to 4 m by 1 m, 0, 30, 60 and 75 degrees: 16 views", Some(QUICK)),
-        ("any", "Every still pose that is not there yet", None),
+        ("any", "Every still pose that has not been taken yet", None),
     ]))]
     views: GridOrAny,
-    /// Own distances in m, in place of the grid's
+    /// Distances in m, in place of the grid's
     #[arg(long, value_delimiter = ',', value_name = "M,M,..", value_parser = between(0.1, 9.99, "m"))]
     distances: Vec<f64>,
-    /// Own tilts in degrees, in place of the grid's
+    /// Tilts in degrees, in place of the grid's
     #[arg(long, value_delimiter = ',', value_name = "DEG,..", value_parser = between(0.0, 88.0, "degrees"))]
     tilts: Vec<f64>,
-    /// The views that a diagnosis advised
+    /// Take the views that this diagnosis.json advised
     #[arg(long, value_name = "FILE", conflicts_with_all = ["views", "distances", "tilts"])]
     advise: Option<PathBuf>,
-    /// Take this view again; the old one stays until the new one is whole; repeatable
+    /// Take this view again; the old one stays until the new one is complete; repeatable
     #[arg(long, value_name = "VIEW")]
     retake: Vec<String>,
 }
@@ -85,7 +92,7 @@ impl Views {
         let own = |own: &[f64], grid: &[f64]| if own.is_empty() { grid } else { own }.to_vec();
         let Some((distances, tilts)) = self.views else {
             let none = self.distances.is_empty() && self.tilts.is_empty();
-            ensure!(none, "--views any: it knows no grid; leave --distances and --tilts out");
+            ensure!(none, "--views any has no grid; leave --distances and --tilts out");
             return Ok(Wanted::any());
         };
         let (distances, tilts) = (own(&self.distances, distances), own(&self.tilts, tilts));
@@ -160,12 +167,17 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
 /// What is played or watched must not grow by what is taken from it.
 fn refuse_own_source(arguments: &Arguments) -> anyhow::Result<()> {
     let recording = &arguments.recording;
-    if let SourceKind::Folder(from) | SourceKind::Play(from) = &arguments.source
-        && let (Ok(from), Ok(to)) = (from.canonicalize(), recording.canonicalize())
+    let (SourceKind::Folder(from) | SourceKind::Play(from)) = &arguments.source else {
+        return Ok(());
+    };
+    if let (Ok(from), Ok(to)) = (from.canonicalize(), recording.canonicalize())
         && from == to
     {
         let remedy = "choose another folder for the recording";
         bail!("{}: this is the source; {remedy}", recording.display());
+    }
+    if from.is_dir() {
+        refuse_inside(recording, from)?;
     }
     Ok(())
 }
@@ -250,6 +262,10 @@ fn conclude(ending: Ending, guide: &Guide, root: &Path, kept: usize) -> anyhow::
         ),
         Ending::Failed(e) => bail!("{e}: {on}"),
     };
-    say(done);
+    result(done);
+    if kept > 0 {
+        let to = beside(root, "noise");
+        next_step(&["calibrate".into(), root.into(), "-o".into(), to.into()]);
+    }
     Ok(0)
 }

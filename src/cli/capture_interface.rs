@@ -10,7 +10,7 @@ use crossterm::style::{Attribute, Color, Print, SetAttribute, SetForegroundColor
 use crossterm::{cursor, execute, queue, terminal};
 use kinoise::capture::{Command, Event, Guide, Interface, Line, Status, Style, render};
 
-use super::common::say;
+use super::console::say;
 
 /// Set by Ctrl-C, a hang-up or a polite kill. A file that grows beyond its limit is an error of
 /// the write, not the end of the process.

@@ -1,29 +1,36 @@
-//! The options that commands share, and the ways they report.
+//! The options that commands share.
 
-use std::fmt::Display;
-use std::io::{IsTerminal, Write};
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use indicatif::{ProgressBar, ProgressStyle};
 use kinoise::frame::KINECT_NO_MEASUREMENT;
 use kinoise::io::Assumed;
-use kinoise::{DepthCode, NoiseModel, Progress, Seed};
+use kinoise::units::shortest;
+use kinoise::{DepthCode, NoiseModel, Seed};
+
+use super::console::{Verbosity, detail, detail_model};
 
 #[derive(Debug, Args)]
 pub struct Global {
     /// Print the result as JSON on stdout
     #[arg(long, global = true)]
     pub json: bool,
-    /// Seed of all random choices: the same seed gives the same bytes
-    #[arg(long, global = true, default_value_t = 1, allow_hyphen_values = true)]
-    pub seed: u64,
-    /// Threads; results do not depend on it [default: all cores]
-    #[arg(long, global = true, value_parser = count(1, MAX_THREADS))]
-    pub threads: Option<usize>,
+    #[command(flatten)]
+    verbosity: Verbosity,
+    /// Seed of all random choices: the same seed gives the same bytes [default: 1; demo: the clock]
+    #[arg(long, global = true, value_name = "N", allow_hyphen_values = true)]
+    pub seed: Option<u64>,
+    /// Threads to use; the results do not depend on it [default: all cores]
+    #[arg(long, global = true, value_name = "N", value_parser = count(1, MAX_THREADS))]
+    threads: Option<usize>,
+    /// Write into a folder that holds other files; calibrate: also a model that explains nothing
+    #[arg(long, global = true)]
+    pub force: bool,
 }
 
 /// More than any machine this runs on has; each costs memory before it helps.
@@ -31,12 +38,18 @@ const MAX_THREADS: usize = 1024;
 
 impl Global {
     pub fn seed(&self) -> Seed {
-        Seed(self.seed)
+        Seed(self.seed.unwrap_or(1))
     }
 
-    pub fn set_threads(&self) -> anyhow::Result<()> {
-        let Some(n) = self.threads else { return Ok(()) };
-        rayon::ThreadPoolBuilder::new().num_threads(n).build_global().context("--threads")
+    /// For the whole process: threads, and how much is printed.
+    pub fn set_up(&self) -> anyhow::Result<()> {
+        self.verbosity.set();
+        if let Some(n) = self.threads {
+            rayon::ThreadPoolBuilder::new().num_threads(n).build_global().context("--threads")?;
+        }
+        let (version, threads) = (env!("CARGO_PKG_VERSION"), rayon::current_num_threads());
+        detail(format!("kinoise {version}, seed {}, {threads} threads", self.seed().0));
+        Ok(())
     }
 
     /// The result for programs; people read stderr.
@@ -87,31 +100,70 @@ impl Input {
         }
         Ok(Assumed { intrinsics: self.intrinsics, code, baseline_m: self.baseline })
     }
+
+    /// The same options once more, for another command on the same folder.
+    pub fn again(&self) -> Vec<OsString> {
+        let joined = |all: &[f64]| all.iter().map(|v| shortest(*v)).collect::<Vec<_>>().join(",");
+        let given = [
+            ("--intrinsics", self.intrinsics.map(|v| joined(&v))),
+            ("--units-per-metre", self.units_per_metre.map(shortest)),
+            ("--raw-disparity", self.raw_disparity.map(|v| joined(&v))),
+            ("--baseline", self.baseline.map(shortest)),
+        ];
+        let given =
+            given.into_iter().filter_map(|(name, value)| Some([name.into(), value?.into()]));
+        given.flatten().collect()
+    }
 }
 
 /// For commands that need a model and can do with the paper's.
 #[derive(Debug, Args)]
 pub struct Model {
     /// model.json of this sensor [default: the paper's Eq. 1]
-    #[arg(long = "model", value_name = "FILE")]
+    #[arg(short = 'm', long = "model", value_name = "FILE")]
     file: Option<PathBuf>,
 }
 
 impl Model {
-    pub fn read(&self) -> kinoise::Result<NoiseModel> {
-        self.file.as_deref().map_or_else(|| Ok(NoiseModel::paper()), NoiseModel::read)
+    pub fn path(&self) -> Option<&Path> {
+        self.file.as_deref()
     }
+
+    pub fn read(&self) -> kinoise::Result<NoiseModel> {
+        let file = self.file.as_deref();
+        let model = file.map_or_else(|| Ok(NoiseModel::paper()), NoiseModel::read)?;
+        detail_model(&model, file);
+        Ok(model)
+    }
+
+    /// The same option once more, for another command.
+    pub fn again(&self) -> Vec<OsString> {
+        model_again(self.file.as_deref())
+    }
+}
+
+pub fn model_again(file: Option<&Path>) -> Vec<OsString> {
+    file.map_or_else(Vec::new, |f| vec!["-m".into(), f.into()])
 }
 
 /// For commands that read a sequence.
 #[derive(Debug, Args)]
 pub struct Thinning {
-    /// Take every Nth depth image
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    /// Take every Nth depth image: N times as fast, and N times the motion between two frames
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = count(1, MAX_FRAMES))]
     pub stride: usize,
-    /// Take the first N of those
+    /// Stop after N of those
     #[arg(long, value_name = "N")]
     pub frames: Option<usize>,
+}
+
+impl Thinning {
+    /// The same options once more, for another command.
+    pub fn again(&self) -> Vec<OsString> {
+        let stride = (self.stride > 1).then(|| ["--stride".into(), self.stride.to_string().into()]);
+        let frames = self.frames.map(|n| ["--frames".into(), n.to_string().into()]);
+        stride.into_iter().chain(frames).flatten().collect()
+    }
 }
 
 /// An hour at 30 Hz.
@@ -168,42 +220,4 @@ pub fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
 pub fn source_date() -> Option<SystemTime> {
     let seconds = std::env::var("SOURCE_DATE_EPOCH").ok()?.parse().ok()?;
     SystemTime::UNIX_EPOCH.checked_add(Duration::from_secs(seconds))
-}
-
-/// Work with a bar on a terminal, and with nothing elsewhere.
-pub fn with_bar<T>(what: &'static str, work: impl FnOnce(Progress<'_>) -> T) -> T {
-    if !std::io::stderr().is_terminal() {
-        return work(&|_, _| ());
-    }
-    let bar = ProgressBar::new(0).with_message(what);
-    if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {eta}") {
-        bar.set_style(style);
-    }
-    let done = work(&|done, total| {
-        bar.set_length(total as u64);
-        // Threads report out of order; a bar never goes back.
-        if done as u64 > bar.position() {
-            bar.set_position(done as u64);
-        }
-    });
-    bar.finish_and_clear();
-    done
-}
-
-/// A line for people.
-pub fn say(text: impl AsRef<str>) {
-    let mut err = std::io::stderr().lock();
-    let _ = writeln!(err, "{}", text.as_ref());
-}
-
-/// Notes of one kind that are shown; a recording of an hour may have thousands.
-const MAX_NOTES: usize = 12;
-
-pub fn notes(remarks: impl IntoIterator<Item = impl Display>) {
-    let mut remarks = remarks.into_iter();
-    remarks.by_ref().take(MAX_NOTES).for_each(|remark| say(format!("note: {remark}")));
-    match remarks.count() {
-        0 => {}
-        more => say(format!("note: and {more} more like these")),
-    }
 }

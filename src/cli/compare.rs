@@ -1,32 +1,38 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
 use clap::Args;
 use kinoise::compare::{compare, of_the_paper, past_the_paper, tables};
-use kinoise::io::OutputDir;
 use kinoise::report::{comparison_figures, comparison_page};
 use kinoise::sequence::open;
 
-use super::common::{Global, Input, Model, Thinning, notes, say};
+use super::common::{Global, Input, Model, Thinning};
+use super::console::{beside, next_step, notes, result, say};
+use super::output::{COMPARISON, begin};
+
+pub const EXAMPLES: &str = "\
+Examples:
+  kinoise compare rgbd_dataset_freiburg1_desk -o out/desk -m out/kinect/model.json
+  kinoise compare rgbd_dataset_freiburg1_desk -o out/steps --ablation --repeats 3";
 
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// A sequence with ground truth, in the layout of the TUM RGB-D benchmark or of 7-Scenes
     sequence: PathBuf,
-    #[command(flatten)]
-    model: Model,
     /// Folder for tables.json, tables.txt, figures and report.html
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Also what goes past the paper, one step at a time
+    #[command(flatten)]
+    model: Model,
+    /// Also run each step beyond the paper, one at a time
     #[arg(long)]
     ablation: bool,
-    /// Runs of each variant that draws by chance
+    /// Run each variant that draws random numbers so many times
     #[arg(long, value_name = "N", default_value_t = 1)]
     repeats: usize,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Frames")]
     thinning: Thinning,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = super::INPUT_HEADING)]
     input: Input,
 }
 
@@ -34,8 +40,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     ensure!(arguments.repeats > 0, "--repeats 0: give 1 or more");
     let mut sequence = open(&arguments.sequence, &arguments.input.assumed()?)?;
     sequence.thin(arguments.thinning.stride, arguments.thinning.frames);
-    let output = OutputDir::create(&arguments.output)?;
     let model = arguments.model.read()?;
+    model.refuse_other_size(&sequence.sensor)?;
+    let inputs: Vec<&Path> =
+        arguments.model.path().into_iter().chain([&*arguments.sequence]).collect();
+    let output = begin(&arguments.output, COMPARISON, &inputs, global)?;
     let mut variants = of_the_paper();
     let ours = past_the_paper().into_iter();
     variants.extend(ours.filter(|v| arguments.ablation || v.name.contains("default")));
@@ -51,8 +60,14 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         output.write(name, svg.as_bytes())?;
     }
     output.write("report.html", comparison_page(&comparison)?.as_bytes())?;
+    output.finish()?;
     notes(&sequence.remarks);
-    say(text);
+    result(text);
     say(format!("wrote {}", arguments.output.join("report.html").display()));
-    global.print_json(&json)
+    global.print_json(&json)?;
+    let to = beside(&arguments.output, "map");
+    let next = vec!["map".into(), arguments.sequence.clone().into(), "-o".into(), to.into()];
+    let (model, thinning) = (arguments.model.again(), arguments.thinning.again());
+    next_step(&[next, model, thinning, arguments.input.again()].concat());
+    Ok(())
 }

@@ -1,45 +1,60 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
 use kinoise::correct::{CorrectOptions, Corrected, correct_recording};
 use kinoise::effects::Active;
+use kinoise::io::{Leaves, OutputFolder};
 use kinoise::{DepthCode, NoiseModel};
 
-use super::common::{Global, Input, notes, say, with_bar};
+use super::common::{Global, Input};
+use super::console::{beside, detail_model, next_step, notes, result, say, working};
+use super::output::begin;
+
+pub const EXAMPLES: &str = "\
+Examples:
+  kinoise correct recording -m out/diagnosis/model.json -o corrected
+  kinoise correct recording -m out/diagnosis/model.json -o corrected --sigma uncertainty";
 
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// A recording, a TUM folder, a fakenect dump, or a folder of 16-bit PNGs
     recording: PathBuf,
-    /// model.json of this sensor, as kinoise diagnose writes it
-    #[arg(long, value_name = "FILE")]
-    model: PathBuf,
     /// New folder for the corrected recording
-    #[arg(short, long, value_name = "OUT")]
+    #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Leave raw disparities in their code: what is taken out is rounded to its steps again
+    /// model.json of this sensor, as kinoise diagnose writes it
+    #[arg(short, long, value_name = "FILE")]
+    model: PathBuf,
+    /// Keep raw disparities in their code: the corrected depth is rounded to its steps again
     #[arg(long)]
     keep_code: bool,
-    /// Also write how sure each corrected depth is: 16-bit images of its standard uncertainty, 10 um a
-    /// unit, into this new folder
-    #[arg(long, value_name = "OUT")]
+    /// Also write the standard uncertainty of each corrected depth into this new folder: 16-bit
+    /// images, 10 um a unit
+    #[arg(long, value_name = "DIR")]
     sigma: Option<PathBuf>,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = super::INPUT_HEADING)]
     input: Input,
 }
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let model = NoiseModel::read(&arguments.model)?;
+    detail_model(&model, Some(&arguments.model));
     // Here an error can name the file.
     Active::all_of_model(&model.effects).with_context(|| arguments.model.display().to_string())?;
-    let (recording, output) = (&arguments.recording, &arguments.output);
+    let recording: &Path = &arguments.recording;
     let assumed = arguments.input.assumed()?;
-    let corrected = with_bar("frames", |step| {
-        let sigma = arguments.sigma.as_deref();
+    let inputs: [&Path; 2] = [recording, &arguments.model];
+    let new = |place: &Path| begin(place, Leaves::Recording, &inputs, global);
+    let output = new(&arguments.output)?;
+    let uncertainty = arguments.sigma.as_deref().map(new).transpose()?;
+    let corrected = working("correcting", |step| {
+        let sigma = uncertainty.as_ref().map(OutputFolder::path);
         let options = CorrectOptions { keep_code: arguments.keep_code, sigma };
-        correct_recording(recording, &assumed, &model, output, &options, step)
+        correct_recording(recording, &assumed, &model, output.path(), &options, step)
     })?;
+    uncertainty.map_or(Ok(()), OutputFolder::finish)?;
+    output.finish()?;
     report(&corrected, arguments);
     global.print_json(&serde_json::json!({
         "frames": corrected.frames,
@@ -53,14 +68,21 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         },
         "not_corrected": corrected.ignored,
         "output": arguments.output,
-    }))
+    }))?;
+    let output = &arguments.output;
+    let to = beside(output, "diagnosis");
+    next_step(&["diagnose".into(), output.into(), "-o".into(), to.into()]);
+    Ok(())
 }
 
 fn report(corrected: &Corrected, arguments: &Arguments) {
     let Corrected { changed, measured, frames, clamped, ignored, .. } = corrected;
     notes(&corrected.remarks);
     if !ignored.is_empty() {
-        say(format!("note: no biases of the sensor, and left in: {}", ignored.join(", ")));
+        say(format!(
+            "note: left in, for these are no biases of the sensor: {}",
+            ignored.join(", ")
+        ));
     }
     if *changed == 0 {
         say(format!("note: {} holds no bias that changes a depth here", arguments.model.display()));
@@ -71,7 +93,7 @@ fn report(corrected: &Corrected, arguments: &Arguments) {
         ));
     }
     let (rms_mm, output) = (1e3 * corrected.rms_shift_m, arguments.output.display());
-    say(format!(
+    result(format!(
         "corrected {changed} of {measured} depths in {frames} frames by {rms_mm:.2} mm (root mean square); wrote {output}"
     ));
 }

@@ -1,37 +1,52 @@
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use kinoise::calibrate::paper_model;
 use kinoise::diagnose::{
-    DiagnoseOptions, Diagnosed, Diagnosis, Field, Reference, Verdict, ViewPictures, diagnose,
-    diagnose_against, pictures,
+    DiagnoseOptions, Diagnosed, Diagnosis, Field, Finding, Reference, Verdict, ViewPictures,
+    diagnose, diagnose_against, pictures,
 };
 use kinoise::effects::{Active, Instant};
-use kinoise::io::{OutputDir, open};
+use kinoise::io::{OutputFolder, open};
 use kinoise::report::{DiagnosisPage, diagnosis_page, story};
 use kinoise::simulate::{FormulaSensor, plan_on};
 use kinoise::view::ViewNotes;
 use kinoise::{Form, NoiseModel, Recording, Seed, Sensor};
 
-use super::common::{Global, Input, say, source_date, with_bar};
+use super::common::{Global, Input, model_again, source_date};
+use super::console::{
+    beside, detail, detail_model, detail_recording, next_step, result, say, shell, working,
+};
+use super::output::{DIAGNOSIS, begin};
+
+pub const EXAMPLES: &str = "\
+Examples:
+  kinoise diagnose recording -o out/diagnosis
+  kinoise diagnose recording -o out/difference --against simulated";
 
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// A recording, a TUM folder, a fakenect dump, or a folder of 16-bit PNGs
     recording: PathBuf,
-    /// The model to hold it against [default: one calibrated on the recording itself]
-    #[arg(short, long, value_name = "FILE")]
-    model: Option<PathBuf>,
-    /// A simulated recording of the same views to hold it against: what does that simulation leave out?
-    #[arg(long, value_name = "SIMULATED_REC", conflicts_with = "model")]
-    against: Option<PathBuf>,
     /// Folder for diagnosis.json, model.json and report.html
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    #[command(flatten)]
+    /// Hold the recording against this model [default: one calibrated on the recording itself]
+    #[arg(short, long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Hold the recording against a simulated one of the same views (kinoise simulate --like)
+    #[arg(long, value_name = "SIMULATED_REC", conflicts_with = "model")]
+    against: Option<PathBuf>,
+    /// Exit with 0, not 1, when a mismatch was found
+    #[arg(long)]
+    exit_zero: bool,
+    #[command(flatten, next_help_heading = super::INPUT_HEADING)]
     input: Input,
 }
 
+/// As of a fit of which `calibrate` writes no model.
+const MIN_R2: f64 = 0.5;
 /// Exit code when a mismatch was found.
 const FOUND: u8 = 1;
 
@@ -39,23 +54,79 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     let assumed = arguments.input.assumed()?;
     let recording = open(&arguments.recording, &assumed)?;
     let simulated = arguments.against.as_ref().map(|path| open(path, &assumed)).transpose()?;
+    let others = [&arguments.against, &arguments.model].into_iter().flatten();
+    let inputs: Vec<&Path> = others.chain([&arguments.recording]).map(PathBuf::as_path).collect();
+    let out = begin(&arguments.output, DIAGNOSIS, &inputs, global)?;
+    detail_recording(&recording);
     let model = match (&arguments.model, &simulated) {
-        (Some(path), _) => NoiseModel::read(path)?,
+        (Some(path), _) => {
+            let model = NoiseModel::read(path)?;
+            model.refuse_other_size(&recording.sensor)?;
+            model
+        }
         (None, Some(simulated)) => weights(&recording, simulated, global)?,
         (None, None) => {
-            say("no --model given: calibrated on this recording first");
+            say("no --model was given: it is calibrated on this recording first");
             calibrated(&recording, global)?
         }
     };
+    detail_model(&model, arguments.model.as_deref());
     let options = DiagnoseOptions {
         seed: global.seed(),
         calibrated_here: arguments.model.is_none() && simulated.is_none(),
         ..DiagnoseOptions::default()
     };
     let held = HeldAgainst { simulated: simulated.as_ref(), model: &model, options: &options };
-    let diagnosis = examine(&recording, &held, &arguments.output, global)?;
+    let diagnosis = examine(&recording, &held, out)?;
     global.print_json(&serde_json::to_value(&diagnosis)?)?;
-    Ok(if diagnosis.verdict == Verdict::Mismatch { FOUND } else { 0 })
+    arguments.reproductions(&diagnosis).iter().for_each(|line| say(line));
+    next_step(&arguments.next(&diagnosis));
+    let found = diagnosis.verdict == Verdict::Mismatch && !arguments.exit_zero;
+    Ok(if found { FOUND } else { 0 })
+}
+
+impl Arguments {
+    /// The command that simulates each finding, where a formula of the catalogue does.
+    fn reproductions(&self, diagnosis: &Diagnosis) -> Vec<String> {
+        let named = diagnosis.findings.iter().filter_map(Finding::as_effect);
+        let commands: Vec<String> = named
+            .map(|effect| {
+                let to = beside(&self.output, effect.effect.card().id);
+                let model = model_again(self.model.as_deref());
+                let effect = vec!["--effect".into(), effect.argument().into()];
+                let words = [vec!["simulate".into(), to.into()], self.like(), model, effect];
+                format!("  kinoise {}", shell(&words.concat()))
+            })
+            .collect();
+        let heading = match commands.len() {
+            0 => None,
+            1 => Some("to simulate the finding:".to_string()),
+            _ => Some("to simulate each finding:".to_string()),
+        };
+        heading.into_iter().chain(commands).collect()
+    }
+
+    /// The same views, where the simulator can read them without more options.
+    fn like(&self) -> Vec<OsString> {
+        match self.input.again().is_empty() {
+            true => vec!["--like".into(), self.recording.clone().into()],
+            false => Vec::new(),
+        }
+    }
+
+    /// Take the biases out where any were found; else see the recording's twin.
+    fn next(&self, diagnosis: &Diagnosis) -> Vec<OsString> {
+        let model = ["-m".into(), self.output.join("model.json").into()];
+        let biased = |f: &Finding| f.terms.iter().any(|t| t.is_sensor_bias());
+        if diagnosis.findings.iter().any(biased) {
+            let to = beside(&self.output, "corrected");
+            let correct = ["correct".into(), self.recording.clone().into()];
+            let to = ["-o".into(), to.into()];
+            return [&correct[..], &to, &model, &self.input.again()].concat();
+        }
+        let twin = ["simulate".into(), beside(&self.output, "twin").into()];
+        [&twin[..], &self.like(), &model].concat()
+    }
 }
 
 /// What a recording is held against, and how.
@@ -69,12 +140,11 @@ pub struct HeldAgainst<'a> {
 pub fn examine(
     recording: &Recording,
     held: &HeldAgainst<'_>,
-    output: &Path,
-    global: &Global,
+    out: OutputFolder,
 ) -> anyhow::Result<Diagnosis> {
-    let out = OutputDir::create(output)?;
     let HeldAgainst { simulated, model, options } = *held;
-    let done = with_bar("views", |step| match simulated {
+    detail(format!("settings: {options:?}"));
+    let done = working("measuring the views", |step| match simulated {
         Some(simulated) => diagnose_against(recording, simulated, model, options, step),
         None => diagnose(recording, model, options, step),
     })?;
@@ -84,19 +154,29 @@ pub fn examine(
     done.model.write(&out.path().join("model.json"))?;
     let held_against = if simulated.is_some() { "simulation" } else { "model" };
     let title = format!("What the {held_against} of {} leaves out", recording.sensor.name);
-    let pictures = with_twins(&done, &recording.sensor, model, global.seed());
-    let page = DiagnosisPage { title: &title, diagnosis, pictures: &pictures };
-    out.write("report.html", diagnosis_page(&page)?.as_bytes())?;
-    say(summary(diagnosis));
+    working("drawing the page", |_| -> anyhow::Result<()> {
+        let pictures = with_twins(&done, &recording.sensor, model, options.seed);
+        let page = DiagnosisPage { title: &title, diagnosis, pictures: &pictures };
+        out.write("report.html", diagnosis_page(&page)?.as_bytes())?;
+        Ok(())
+    })?;
+    out.finish()?;
+    result(summary(diagnosis));
     Ok(done.diagnosis)
 }
 
 fn calibrated(recording: &Recording, global: &Global) -> anyhow::Result<NoiseModel> {
     let step =
         |step: kinoise::Progress<'_>| paper_model(recording, global.seed(), source_date(), step);
-    let model = with_bar("views", step)?;
+    let model = working("calibrating", step)?;
     if model.sigma.form != Form::Paper {
         model.fit.remarks.iter().take(1).for_each(|why| say(format!("note: {why}")));
+    }
+    if model.fit.r2 < MIN_R2 {
+        let (r2, check) = (model.fit.r2, "how raw values become metres, and the intrinsics");
+        say(format!(
+            "note: the model calibrated here explains little of the noise (r2 {r2:.2}): check {check}"
+        ));
     }
     Ok(model)
 }
@@ -128,7 +208,7 @@ fn summary(diagnosis: &Diagnosis) -> String {
     for sentence in story(diagnosis) {
         text += &format!("  {sentence}\n");
     }
-    text
+    text.trim_end().to_string()
 }
 
 /// Effects that move the plane as a whole: a picture about the plane does not show them.

@@ -6,12 +6,21 @@ use kinoise::effects::{Active, CATALOGUE, Card, Parameter};
 use serde_json::json;
 
 use super::common::Global;
+use super::console::next_step;
+
+pub const EXAMPLES: &str = "\
+Examples:
+  kinoise effects target-bow vignetting
+  kinoise effects --list";
 
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Only these [default: all]
     #[arg(value_name = "ID")]
     ids: Vec<String>,
+    /// Print the ids alone, one a line
+    #[arg(long)]
+    list: bool,
 }
 
 /// Columns of a page of text.
@@ -23,9 +32,15 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     if global.json {
         return global.print_json(&cards.iter().map(|card| as_json(card)).collect());
     }
-    let pages: Vec<String> = cards.iter().map(|card| page(card)).collect();
+    let page = |card: &&Card| if arguments.list { card.id.to_string() } else { page(card) };
+    let pages: Vec<String> = cards.iter().map(page).collect();
     // The catalogue is the result, not a remark: stdout. A reader that closes early is no failure.
     let _ = writeln!(std::io::stdout().lock(), "{}", pages.join("\n"));
+    if let ([id], false) = (&arguments.ids[..], arguments.list) {
+        let effect = Active::typical(id)?.argument();
+        let to = format!("out/{id}");
+        next_step(&["simulate".into(), to.into(), "--effect".into(), effect.into()]);
+    }
     Ok(())
 }
 

@@ -5,7 +5,13 @@ use clap::{Args, ValueEnum};
 use kinoise::evaluate::{Delta, Evaluation, Spread, evaluate_files};
 use serde_json::{Value, json};
 
-use super::common::{Global, say};
+use super::common::Global;
+use super::console::{notes, result};
+
+pub const EXAMPLES: &str = "\
+Examples:
+  kinoise evaluate --truth groundtruth.txt --estimate out/desk/trajectory.txt
+  kinoise evaluate --truth groundtruth.txt --estimate out/desk/trajectory.txt --delta 30 --delta-unit f";
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -15,11 +21,11 @@ pub struct Arguments {
     /// Estimated poses in the TUM format
     #[arg(long, value_name = "FILE")]
     estimate: PathBuf,
-    /// Interval of the relative error
+    /// The interval over which the relative error is taken
     #[arg(long, value_name = "N", default_value_t = 1.0, allow_hyphen_values = true)]
     delta: f64,
-    /// What the interval is counted in
-    #[arg(long, value_enum, default_value = "s")]
+    /// The unit of that interval
+    #[arg(long, value_enum, default_value = "s", value_name = "UNIT")]
     delta_unit: Unit,
 }
 
@@ -53,7 +59,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
 
 fn report(evaluation: &Evaluation, arguments: &Arguments) {
     let line = |name: &str, s: &Spread, unit: &str| {
-        say(format!(
+        result(format!(
             "{name} {unit}: rmse {:.6}  mean {:.6}  median {:.6}  std {:.6}  min {:.6}  max {:.6}  of {} pairs",
             s.rmse, s.mean, s.median, s.std, s.min, s.max, s.pairs
         ));
@@ -65,15 +71,20 @@ fn report(evaluation: &Evaluation, arguments: &Arguments) {
     line("ATE after alignment,", &evaluation.ate.error, "m");
     line(&interval, &evaluation.rpe.translation, "m");
     line(&interval, &evaluation.rpe.rotation.scaled(1f64.to_degrees()), "degrees");
+    notes(&evaluation.remarks);
 }
 
 /// ATE and RPE, as the TUM scripts name them.
 pub fn as_json(evaluation: &Evaluation) -> Value {
-    json!({
+    let mut value = json!({
         "ate": spread(&evaluation.ate.error, "m"),
         "rpe_translation": spread(&evaluation.rpe.translation, "m"),
         "rpe_rotation": spread(&evaluation.rpe.rotation.scaled(1f64.to_degrees()), "deg"),
-    })
+    });
+    if !evaluation.remarks.is_empty() {
+        value["remarks"] = json!(evaluation.remarks);
+    }
+    value
 }
 
 fn spread(s: &Spread, unit: &str) -> Value {

@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use kinoise::evaluate::{Delta, Evaluation, evaluate};
-use kinoise::io::OutputDir;
+use kinoise::io::OutputFolder;
 use kinoise::map::{
     self, Alignment, Init, Kernel, Mapped, Options, Stages, Weights, frames_csv, ply,
 };
@@ -12,20 +12,29 @@ use kinoise::trajectory::tum_text;
 use kinoise::{NoiseModel, Seed};
 use serde_json::{Value, json};
 
-use super::common::{Global, Input, Model, Thinning, notes, one_of, say, with_bar};
+use super::common::{Global, Input, Model, Thinning, one_of};
+use super::console::{beside, detail, next_step, notes, result, say, working};
+use super::output::{MAP, begin};
+
+pub const EXAMPLES: &str = "\
+Examples:
+  kinoise map rgbd_dataset_freiburg1_desk -m out/kinect/model.json -o out/desk
+  kinoise map rgbd_dataset_freiburg1_desk -o out/quick --stride 2 --frames 200";
 
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// A sequence in the layout of the TUM RGB-D benchmark or of 7-Scenes
     sequence: PathBuf,
-    #[command(flatten)]
-    model: Model,
     /// Folder for trajectory.txt, map.ply, stats.json and map.html
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     #[command(flatten)]
+    model: Model,
+    #[command(flatten, next_help_heading = "Frames")]
+    thinning: Thinning,
+    #[command(flatten, next_help_heading = "Alignment and map")]
     tuning: Tuning,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = super::INPUT_HEADING)]
     input: Input,
 }
 
@@ -33,7 +42,7 @@ pub struct Arguments {
 struct Tuning {
     /// What frames are aligned to, and how
     #[arg(long, default_value = "best", value_parser = one_of::<Method, 4>([
-        ("best", "What was measured to be best: model", Options::best),
+        ("best", "The best measured so far, which is model", Options::best),
         ("paper", "The paper's: 3 cm voxels, exact nearest neighbours, frame to frame",
             || Options::paper(Weights::Model, Init::None)),
         ("projective", "Image blocks, neighbours by projection, frame to frame: the fastest",
@@ -41,11 +50,11 @@ struct Tuning {
         ("model", "Image blocks, neighbours by projection, frame to map", Options::best),
     ]))]
     method: Method,
-    /// What a pair of points weighs [default: both; with --method paper: model]
+    /// How much a pair of points counts [default: both; with --method paper: model]
     #[arg(long, value_parser = one_of([
-        ("none", "All the same", Weights::None),
-        ("model", "The paper's 1/sigma(d_z, theta) of the standing point", Weights::Model),
-        ("both", "What both points err by across their surface", Weights::Both),
+        ("none", "All count the same", Weights::None),
+        ("model", "The paper's: 1/sigma(d_z, theta) of the point in the earlier frame or in the map", Weights::Model),
+        ("both", "By the errors of both points, across their surface", Weights::Both),
     ]))]
     weights: Option<Weights>,
     /// Where an alignment starts [default: motion; with --method paper: none]
@@ -57,9 +66,9 @@ struct Tuning {
     init: Option<Init>,
     /// How outliers count [default: huber; with --method paper: square]
     #[arg(long, value_parser = one_of([
-        ("square", "", Kernel::Square),
-        ("huber", "", Kernel::Huber),
-        ("tukey", "", Kernel::Tukey),
+        ("square", "By their square: not less than others", Kernel::Square),
+        ("huber", "By their distance", Kernel::Huber),
+        ("tukey", "Not at all, when far out", Kernel::Tukey),
     ]))]
     kernel: Option<Kernel>,
     /// Side of a voxel in m
@@ -68,17 +77,15 @@ struct Tuning {
     /// Side of an image block in px
     #[arg(long, value_name = "PX")]
     block: Option<usize>,
-    /// Neighbours farther than this are none, m
+    /// Points farther apart than this are no pair, m
     #[arg(long, value_name = "M")]
     gate: Option<f32>,
-    /// Most iterations of an alignment
+    /// The most iterations of an alignment
     #[arg(long, value_name = "N")]
     iterations: Option<usize>,
-    /// Observations of a piece of the map that count at most
+    /// The most observations of a piece of the map that count
     #[arg(long, value_name = "N")]
     memory: Option<f32>,
-    #[command(flatten)]
-    thinning: Thinning,
     /// Do not read colour for the map
     #[arg(long)]
     no_colour: bool,
@@ -108,14 +115,28 @@ impl Tuning {
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let mut sequence = open(&arguments.sequence, &arguments.input.assumed()?)?;
-    let thinning = &arguments.tuning.thinning;
+    let thinning = &arguments.thinning;
     sequence.thin(thinning.stride, thinning.frames);
     let model = arguments.model.read()?;
+    model.refuse_other_size(&sequence.sensor)?;
     let options = arguments.tuning.options(global.seed());
     options.check()?;
     let title = format!("Map of {}", name_of(&arguments.sequence));
-    let stats = follow(&sequence, &model, &options, &title, &arguments.output)?;
-    global.print_json(&stats)
+    let inputs: Vec<&Path> =
+        arguments.model.path().into_iter().chain([&*arguments.sequence]).collect();
+    let out = begin(&arguments.output, MAP, &inputs, global)?;
+    let stats = follow(&sequence, &model, &options, &title, out)?;
+    global.print_json(&stats)?;
+    // With true poses there is something to compare with; without them, the same without the model.
+    let (command, suffix, plain) = match sequence.truth.is_empty() {
+        false => ("compare", "comparison", &[][..]),
+        true => ("map", "unweighted", &["--weights", "none"][..]),
+    };
+    let to = beside(&arguments.output, suffix);
+    let mut next = vec![command.into(), arguments.sequence.clone().into(), "-o".into(), to.into()];
+    next.extend(plain.iter().map(Into::into));
+    next_step(&[next, arguments.model.again(), thinning.again(), arguments.input.again()].concat());
+    Ok(())
 }
 
 /// Map, write every output, report; what stats.json says.
@@ -124,11 +145,11 @@ pub fn follow(
     model: &NoiseModel,
     options: &Options,
     title: &str,
-    folder: &Path,
+    output: OutputFolder,
 ) -> anyhow::Result<Value> {
-    let output = OutputDir::create(folder)?;
+    detail(format!("settings: {options:?}"));
     let begin = std::time::Instant::now();
-    let mapped = with_bar("frames", |step| map::map(sequence, model, options, step))?;
+    let mapped = working("mapping", |step| map::map(sequence, model, options, step))?;
     let seconds = begin.elapsed().as_secs_f64();
     let against = truth(sequence, &mapped);
     let stats = stats(&mapped, options, &against, seconds);
@@ -137,8 +158,10 @@ pub fn follow(
     output.write("map.html", map_page(title, &mapped.map, &mapped.frames).as_bytes())?;
     output.write("frames.csv", frames_csv(&mapped.frames).as_bytes())?;
     output.write("stats.json", serde_json::to_string_pretty(&stats)?.as_bytes())?;
+    let folder = output.place().to_path_buf();
+    output.finish()?;
     notes(sequence.remarks.iter().chain(&mapped.remarks));
-    report(&mapped, &against, folder);
+    report(&mapped, &against, &folder);
     Ok(stats)
 }
 
@@ -153,7 +176,7 @@ fn truth(sequence: &Sequence, mapped: &Mapped) -> Option<Result<Evaluation, Stri
 
 fn report(mapped: &Mapped, against: &Option<Result<Evaluation, String>>, output: &Path) {
     match against {
-        Some(Ok(evaluation)) => say(format!(
+        Some(Ok(evaluation)) => result(format!(
             "against the ground truth: ATE {:.4} m, RPE over 1 s {:.4} m and {:.3} degrees (rmse)",
             evaluation.ate.error.rmse,
             evaluation.rpe.translation.rmse,
@@ -164,7 +187,7 @@ fn report(mapped: &Mapped, against: &Option<Result<Evaluation, String>>, output:
     }
     let (frames, points) = (mapped.frames.len(), mapped.map.len());
     let (posed, folder) = (frames - mapped.lost(), output.display());
-    say(format!("{posed} of {frames} frames have a pose; {points} points; wrote {folder}"));
+    result(format!("{posed} of {frames} frames have a pose; {points} points; wrote {folder}"));
 }
 
 fn stats(

@@ -6,12 +6,15 @@ mod capture;
 mod capture_interface;
 mod common;
 mod compare;
+mod console;
 mod correct;
 mod demo;
+mod demo_seal;
 mod diagnose;
 mod effects;
 mod evaluate;
 mod map;
+mod output;
 mod simulate;
 mod simulate_room;
 mod simulate_scene;
@@ -24,42 +27,60 @@ use clap::{Parser, Subcommand};
 
 /// How noisy is this depth sensor, and why?
 #[derive(Debug, Parser)]
-#[command(name = "kinoise", version, about, max_term_width = 100)]
+#[command(name = "kinoise", version, about, max_term_width = 100, after_help = EXAMPLES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "General options")]
     global: common::Global,
 }
 
+const EXAMPLES: &str = "\
+Examples:
+  kinoise demo
+  kinoise calibrate recording -o out/kinect";
+
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Take views from a running Kinect, guided to those that matter
+    /// Take views from a running Kinect; the screen guides you to those that matter
+    #[command(after_help = capture::EXAMPLES)]
     Capture(capture::Arguments),
     /// Fit sigma(z, theta) to recorded views of a plane, or to a table: model.json, plots, report
+    #[command(after_help = calibrate::EXAMPLES)]
     Calibrate(calibrate::Arguments),
     /// Fit sigma(z, theta) to a table z_m,theta_rad,sigma_m[,n]
-    #[command(hide = true)]
+    #[command(hide = true, after_help = calibrate::FIT_EXAMPLES)]
     Fit(calibrate::FitArguments),
-    /// What a model leaves out of a recording: located, named, modelled, and shown to help
+    /// Find what a model or a simulation leaves out of a recording, name it and model it
+    #[command(after_help = diagnose::EXAMPLES)]
     Diagnose(diagnose::Arguments),
-    /// Make a recording, or a film of a room, by formula or by light
+    /// Make a recording of a board, or a film of a room
+    #[command(after_help = simulate::EXAMPLES)]
     Simulate(simulate::Arguments),
-    /// Write a recording again with the model's biases taken out of the depth
+    /// Write a recording again, with the model's biases taken out of the depth
+    #[command(after_help = correct::EXAMPLES)]
     Correct(correct::Arguments),
     /// Build a map from a sequence: trajectory, coloured points, statistics
+    #[command(after_help = map::EXAMPLES)]
     Map(map::Arguments),
-    /// The paper's four variants of the mapper side by side: tables, figures, report
+    /// Compare the paper's four variants of the mapper: tables, figures, report
+    #[command(after_help = compare::EXAMPLES)]
     Compare(compare::Arguments),
-    /// ATE and RPE of a trajectory, as the TUM scripts compute them
+    /// Compute ATE and RPE of a trajectory, as the TUM scripts do
+    #[command(after_help = evaluate::EXAMPLES)]
     Evaluate(evaluate::Arguments),
-    /// Units of a kind side by side: what is common, what is one unit's own, what changed since
+    /// Compare units of a kind: what is common, what is one unit's own, what has changed since
     Units(units::Arguments),
-    /// The catalogue of physical effects: what each does, how it shows, what it resembles
+    /// Show the catalogue of physical effects: what each does, how it shows, what it resembles
+    #[command(after_help = effects::EXAMPLES)]
     Effects(effects::Arguments),
-    /// The whole road on bundled data
+    /// Calibrate bundled data, then diagnose a cause drawn by lot and sealed, then map
+    #[command(after_help = demo::EXAMPLES)]
     Demo(demo::Arguments),
 }
+
+/// Over the options of folders that do not describe themselves.
+const INPUT_HEADING: &str = "Input without a recording.json";
 
 /// Exit code of bad input or failure.
 const FAILURE: u8 = 2;
@@ -72,13 +93,14 @@ pub fn main() -> ExitCode {
             return if e.use_stderr() { ExitCode::from(FAILURE) } else { ExitCode::SUCCESS };
         }
         Err(e) => {
-            eprintln!("kinoise: {}; see kinoise --help", one_line(&e));
+            eprintln!("kinoise: {}", one_line(&e));
             return ExitCode::from(FAILURE);
         }
     };
     match run(&arguments) {
         Ok(code) => ExitCode::from(code),
         Err(e) => {
+            output::wait_if_interrupted();
             eprintln!("kinoise: {e:#}");
             ExitCode::from(FAILURE)
         }
@@ -90,17 +112,36 @@ fn is_help(e: &clap::Error) -> bool {
     !e.use_stderr() || e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
 }
 
-/// What clap says before its usage and its tips, without its "error: ".
+/// What clap says, with its tips and without its usage; and where the help is.
 fn one_line(e: &clap::Error) -> String {
     let text = e.to_string();
-    let message = text.split("\n\n").next().unwrap_or_default();
-    let words: Vec<&str> = message.split_whitespace().collect();
-    words.join(" ").trim_start_matches("error: ").to_string()
+    let words = |part: &str| part.split_whitespace().collect::<Vec<_>>().join(" ");
+    let mut parts = text.split("\n\n").map(words);
+    let message = parts.next().unwrap_or_default().trim_start_matches("error: ").to_string();
+    // "to pass '--x' as a value" helps nobody who mistyped an option.
+    let tips = parts.filter_map(|p| p.strip_prefix("tip: ").map(|tip| format!("; {tip}")));
+    let tips = tips.filter(|tip| !tip.starts_with("; to pass "));
+    let help = match subcommand() {
+        Some(name) => format!("kinoise {name} --help"),
+        None => "kinoise --help".into(),
+    };
+    format!("{message}{}; see {help}", tips.collect::<String>())
+}
+
+/// The command that was meant, for the help; options may stand before it.
+fn subcommand() -> Option<String> {
+    let command = <Arguments as clap::CommandFactory>::command();
+    let known = |word: &String| command.find_subcommand(word).is_some();
+    std::env::args().skip(1).find(known)
 }
 
 fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let global = &arguments.global;
-    global.set_threads()?;
+    global.set_up()?;
+    // A capture goes on with the views that are whole, and has its own answer.
+    if !matches!(arguments.command, Command::Capture(_)) {
+        output::discard_when_interrupted()?;
+    }
     match &arguments.command {
         Command::Capture(a) => capture::run(a, global),
         Command::Calibrate(a) => calibrate::run(a, global).map(|()| 0),
@@ -114,5 +155,66 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         Command::Units(a) => units::run(a, global).map(|()| 0),
         Command::Effects(a) => effects::run(a, global).map(|()| 0),
         Command::Demo(a) => demo::run(a, global).map(|()| 0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    fn subcommands() -> Vec<clap::Command> {
+        let mut whole = Arguments::command();
+        whole.build();
+        whole.get_subcommands().filter(|c| c.get_name() != "help").cloned().collect()
+    }
+
+    #[test]
+    fn every_command_has_two_examples_that_parse() {
+        for command in subcommands() {
+            let name = command.get_name();
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            let examples: Vec<&str> =
+                help.lines().filter(|l| l.starts_with("  kinoise ")).collect();
+            assert!(examples.len() >= 2, "{name}: {help}");
+            for example in examples {
+                assert!(example.starts_with(&format!("  kinoise {name}")), "{example}");
+                let words = example.split_whitespace().map(|w| w.trim_matches('\''));
+                let parsed = Arguments::try_parse_from(words);
+                assert!(parsed.is_ok(), "{example}: {}", parsed.err().unwrap());
+            }
+        }
+    }
+
+    /// An option that several commands have is spelt and described by the same letters.
+    #[test]
+    fn options_are_alike_in_all_commands() {
+        for (long, short) in [("output", 'o'), ("model", 'm'), ("quiet", 'q'), ("verbose", 'v')] {
+            for command in subcommands() {
+                let arguments = command.get_arguments().filter(|a| !a.is_positional());
+                for a in arguments.filter(|a| a.get_long() == Some(long)) {
+                    assert_eq!(a.get_short(), Some(short), "{} --{long}", command.get_name());
+                }
+            }
+        }
+    }
+
+    /// Positions, -o, -m, the command's own, input without a description, general.
+    #[test]
+    fn options_come_in_one_order() {
+        let place = |a: &clap::Arg| match (a.get_long(), a.get_help_heading()) {
+            (_, Some("General options")) => 5,
+            (_, Some(INPUT_HEADING)) => 4,
+            (Some("output"), _) => 1,
+            (Some("model"), _) => 2,
+            (None, _) => 0,
+            _ => 3,
+        };
+        for command in subcommands() {
+            let shown = |a: &&clap::Arg| !matches!(a.get_long(), Some("help" | "version"));
+            let places: Vec<i32> = command.get_arguments().filter(shown).map(place).collect();
+            assert!(places.is_sorted(), "{}: {places:?}", command.get_name());
+        }
     }
 }

@@ -1,9 +1,10 @@
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use clap::{Args, ValueEnum};
 use kinoise::effects::Active;
-use kinoise::io::{Assumed, open, write_json};
+use kinoise::io::{Assumed, Leaves, OutputFolder, open, write_json};
 use kinoise::model::{Direction, Domain, PAPER_EQ1};
 use kinoise::simulate::room::{Film, Room};
 use kinoise::simulate::speckle::Causes;
@@ -11,56 +12,74 @@ use kinoise::simulate::{Physics, Shoot, ViewPlan, kinect_v1, plan_grid, plan_lik
 use kinoise::{Form, NoiseModel, Sensor, SigmaModel};
 use serde_json::{Value, json};
 
-use super::common::{Global, MAX_FRAMES, count, notes, say, with_bar};
+use super::common::{Global, MAX_FRAMES, count, model_again};
+use super::console::{beside, detail, detail_model, next_step, notes, result, say, working};
+use super::output::begin;
 use super::simulate_room::RoomArguments;
 use super::simulate_scene::{PosesArguments, SceneryArguments};
+
+pub const EXAMPLES: &str = "\
+Examples:
+  kinoise simulate out/bowl --effect radial-disparity-bias:k_px=0.3 --frames 4 --shrink 2
+  kinoise simulate out/twin -m out/kinect/model.json --like recording
+  kinoise simulate out/room --room --frames 90";
 
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// New folder for the recording
     output: PathBuf,
-    /// model.json to shoot with [default: the paper's Eq. 1, also outside its 1 to 4 m]
-    #[arg(long, value_name = "FILE")]
+    /// model.json of the sensor [default: the paper's Eq. 1, also outside its 1 to 4 m]
+    #[arg(short, long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// The world: errors by formula, or dots seen and matched in which errors arise by themselves
+    /// How errors come about
     #[arg(long, value_enum, default_value_t = PhysicsArgument::Formula)]
     physics: PhysicsArgument,
-    /// With --physics speckle: set a cause, such as ambient_dn=200; repeatable. An unknown name is answered with the list
+    /// With --physics speckle: set a cause, such as ambient_dn=200; repeatable. An unknown name
+    /// prints the list
     #[arg(long = "cause", value_name = "NAME=VALUE", allow_hyphen_values = true)]
     causes: Vec<String>,
-    /// Add a physical effect (see kinoise effects); repeatable
+    /// Add a physical effect (kinoise effects lists them); repeatable
     #[arg(long = "effect", value_name = "ID:KEY=VALUE", value_parser = Active::parse)]
     effects: Vec<Active>,
-    /// Shoot the very views of this recording: planes, regions, pixels, frames, timestamps
+    /// Simulate the very views of this recording: planes, regions, pixels, frames, timestamps
     #[arg(long, value_name = "REC", conflicts_with_all = ["grid", "distances", "tilts", "azimuths", "frames", "shrink", "board", "wall_target", "patches", "wall", "clutter", "ordered", "conditions"])]
     like: Option<PathBuf>,
-    #[command(flatten)]
-    poses: PosesArguments,
-    /// Frames a view [default: 1]; with --room, of the film [default: the whole path]
-    #[arg(long, value_parser = count(1, MAX_FRAMES))]
+    /// Frames of each view [default: 1]; with --room, of the film [default: the whole path]
+    #[arg(long, value_name = "N", value_parser = count(1, MAX_FRAMES))]
     frames: Option<usize>,
-    #[command(flatten)]
-    room: RoomArguments,
-    /// Make the image 1 to 8 times smaller each way [default: 1, which is 640 x 480]; not with a
-    /// model that carries its own sensor
+    /// Make the image 1 to 8 times smaller each way [default: 1, which is 640 x 480]; a model that
+    /// carries its own sensor refuses it
     #[arg(long, value_name = "N", value_parser = count(1, 8))]
     shrink: Option<usize>,
-    #[command(flatten)]
-    scenery: SceneryArguments,
     /// Write infrared amplitude images too
     #[arg(long)]
     infrared: bool,
-    /// Write what was switched on to this file; the recording itself never tells
+    /// Write what was switched on to this file; the recording itself does not say
     #[arg(long, value_name = "FILE")]
     recipe: Option<PathBuf>,
+    #[command(flatten, next_help_heading = "Views")]
+    poses: PosesArguments,
+    #[command(flatten, next_help_heading = "Scene")]
+    scenery: SceneryArguments,
+    #[command(flatten, next_help_heading = "Room")]
+    room: RoomArguments,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
 enum PhysicsArgument {
-    /// sigma(z, theta) of the model, and effects
+    /// By formula: sigma(z, theta) of the model, and effects
     Formula,
-    /// A Kinect v1 by light: pattern, lens, chip, block matching
+    /// By light, as in a Kinect v1: pattern, lens, chip and block matching; errors arise by themselves
     Speckle,
+}
+
+impl Arguments {
+    /// The new recording.
+    fn folder(&self, global: &Global) -> kinoise::Result<OutputFolder> {
+        let read = [&self.model, &self.like].into_iter().flatten();
+        let inputs: Vec<&Path> = read.map(PathBuf::as_path).collect();
+        begin(&self.output, Leaves::Recording, &inputs, global)
+    }
 }
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
@@ -78,21 +97,41 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         let room = Room::office(global.seed());
         let poses = arguments.room.path(&room, arguments.frames)?;
         let film = Film { sensor, room, poses, sigma, effects, seed: global.seed() };
-        write_film(&film, &arguments.output)?
+        write_film(&film, arguments.folder(global)?)?
     } else {
         shoot(arguments, sensor, physics(arguments, sigma, effects)?, global)?
     };
     if let Some(path) = &arguments.recipe {
         write_json(path, &recipe, "report this as a bug")?;
     }
-    global.print_json(&made)
+    global.print_json(&made)?;
+    next_step(&next(arguments));
+    Ok(())
+}
+
+/// What to do with what was simulated.
+fn next(arguments: &Arguments) -> Vec<OsString> {
+    let output = &arguments.output;
+    let (command, suffix) = match (&arguments.like, arguments.room.room) {
+        (Some(real), _) => {
+            let to = beside(output, "diagnosis");
+            let against = vec!["--against".into(), output.into(), "-o".into(), to.into()];
+            return [vec!["diagnose".into(), real.into()], against].concat();
+        }
+        (None, true) => ("map", "map"),
+        (None, false) => ("calibrate", "noise"),
+    };
+    let to = beside(output, suffix);
+    let model = arguments.model.as_deref().filter(|_| arguments.room.room);
+    [vec![command.into(), output.into(), "-o".into(), to.into()], model_again(model)].concat()
 }
 
 /// Film the office: what programs are told of it, and the recipe.
-fn write_film(film: &Film, output: &Path) -> anyhow::Result<(Value, Value)> {
-    with_bar("frames", |step| film.write(output, step))?;
-    let frames = film.poses.len();
-    say(format!("wrote {frames} frames of a room to {}", output.display()));
+fn write_film(film: &Film, folder: OutputFolder) -> anyhow::Result<(Value, Value)> {
+    working("filming", |step| film.write(folder.path(), step))?;
+    let (output, frames) = (folder.place().to_path_buf(), film.poses.len());
+    folder.finish()?;
+    result(format!("wrote {frames} frames of a room to {}", output.display()));
     Ok((json!({"frames": frames, "output": output}), film.recipe()))
 }
 
@@ -104,22 +143,28 @@ fn shoot(
     global: &Global,
 ) -> anyhow::Result<(Value, Value)> {
     let (views, recorded_by) = plans(arguments, global)?;
+    if let (Some(path), Some(recorded_by)) = (&arguments.model, &recorded_by) {
+        NoiseModel::read(path)?.refuse_other_size(recorded_by)?;
+    }
     let sensor = recorded_by.unwrap_or(sensor);
     if let Physics::Formula { sigma, effects } = &physics {
         note_clamped(&views, sigma);
         note_idle(effects, &arguments.scenery);
     }
+    detail(format!("effects and physics: {physics:?}"));
     let shoot = Shoot { sensor, views, physics, infrared: arguments.infrared, seed: global.seed() };
-    let blind = with_bar("views", |step| shoot.write(&arguments.output, step))?;
+    let folder = arguments.folder(global)?;
+    let blind = working("filming", |step| shoot.write(folder.path(), step))?;
     const UNSEEN: &str = "the target is out of the picture or beyond the depth code";
     let (output, views) = (arguments.output.display(), shoot.views.len());
     ensure!(
         blind.len() < views,
         "{output}: no view shows any depth: {UNSEEN}; change --distances, --azimuths or --board"
     );
+    folder.finish()?;
     notes(blind.iter().map(|name| format!("view {name} shows no depth: {UNSEEN}")));
     let frames: usize = shoot.views.iter().map(|v| v.stamps.len()).sum();
-    say(format!("wrote {views} views, {frames} frames, to {output}"));
+    result(format!("wrote {views} views, {frames} frames, to {output}"));
     let made = json!({"views": views, "frames": frames, "output": arguments.output});
     Ok((made, shoot.recipe()))
 }
@@ -150,16 +195,19 @@ fn physics(
     effects: Vec<Active>,
 ) -> anyhow::Result<Physics> {
     if arguments.physics == PhysicsArgument::Formula {
-        let foreign = "--cause belongs to --physics speckle; by formula there is --effect";
+        let foreign = "--cause belongs to --physics speckle; with --physics formula give --effect";
         ensure!(arguments.causes.is_empty(), foreign);
         return Ok(Physics::Formula { sigma, effects });
     }
-    let foreign = "--effect belongs to --physics formula; by light there is --cause";
+    let foreign = "--effect belongs to --physics formula; with --physics speckle give --cause";
     ensure!(arguments.effects.is_empty(), foreign);
-    let brought = "--model: it brings effects, which are formulas; by light there is --cause";
+    let brought =
+        "--model: its effects are formulas, which --physics speckle cannot use; give --cause";
     ensure!(effects.is_empty(), brought);
     if arguments.model.is_some() {
-        say("note: of the model only the sensor is used: by light sigma arises by itself");
+        say(
+            "note: only the sensor of the model is used; with --physics speckle the noise arises by itself",
+        );
     }
     let causes = arguments.causes.iter().try_fold(Causes::default(), |c, text| c.parse(text))?;
     Ok(Physics::Speckle { causes })
@@ -177,6 +225,7 @@ fn sensor_and_noise(
         return Ok((kinect_v1(factor), eq1_everywhere(), Vec::new()));
     };
     let model = NoiseModel::read(path)?;
+    detail_model(&model, Some(path));
     let file = path.display();
     let sensor = match model.sensor {
         Some(_) if shrink.is_some() => {

@@ -7,7 +7,8 @@ use kinoise::simulate::room::{
     CLEARANCE_M, Pose, Resampled, Room, around_the_desks, place, read_trajectory, resample,
 };
 
-use super::common::{MAX_FRAMES, count, say};
+use super::common::{MAX_FRAMES, count};
+use super::console::say;
 
 #[derive(Debug, Args)]
 pub struct RoomArguments {
@@ -17,7 +18,7 @@ pub struct RoomArguments {
     /// Poses to film along: timestamp tx ty tz qx qy qz qw, z up [default: once around the desks]
     #[arg(long, value_name = "POSES", requires = "room")]
     trajectory: Option<PathBuf>,
-    /// Take every Nth frame of the path
+    /// Take every Nth pose of the path
     #[arg(long, value_name = "N", default_value_t = 1, requires = "room", value_parser = count(1, MAX_FRAMES))]
     stride: usize,
 }
@@ -59,7 +60,7 @@ fn fitted(
     let (shift, turn) = (motion.translation, motion.rotation.euler_angles().2.to_degrees());
     let (x, y, z, clearance) = (shift.x, shift.y, shift.z, placed.clearance_m);
     say(format!(
-        "note: path placed by a turn of {turn:.0} degrees and a shift of ({x:.2}, {y:.2}, {z:.2}) m; never nearer than {clearance:.2} m to anything ({CLEARANCE_M} m are needed)"
+        "note: the path was placed by a turn of {turn:.0} degrees and a shift of ({x:.2}, {y:.2}, {z:.2}) m; it keeps {clearance:.2} m away from everything ({CLEARANCE_M} m are needed)"
     ));
     Ok(placed.apply(&poses))
 }

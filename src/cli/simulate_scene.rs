@@ -10,20 +10,20 @@ use super::common::{between, count, numbers, one_of};
 
 #[derive(Debug, Args)]
 pub struct PosesArguments {
-    /// The poses
+    /// The poses to take
     #[arg(long, default_value = "paper", value_parser = one_of([(
         "paper",
         "1 to 4 m by 0.5 m, 0 to 70 degrees by 10, and 76 for 80: Eq. 1 has its pole at 79.6",
         Grid::paper as fn() -> Grid,
     )]))]
     grid: fn() -> Grid,
-    /// Own distances in m, in place of the grid's
+    /// Distances in m, in place of the grid's
     #[arg(long, value_delimiter = ',', value_name = "M,M,..", allow_hyphen_values = true, value_parser = between(0.1, 20.0, "m"))]
     distances: Vec<f64>,
-    /// Own tilts in degrees, in place of the grid's
+    /// Tilts in degrees, in place of the grid's
     #[arg(long, value_delimiter = ',', value_name = "DEG,..", allow_hyphen_values = true, value_parser = between(0.0, 88.8, "degrees"))]
     tilts: Vec<f64>,
-    /// Own directions of tilt in degrees, 0 along the columns; every pose in each of them
+    /// Directions of tilt in degrees, 0 along the columns; every pose is taken in each of them
     #[arg(long, value_delimiter = ',', value_name = "DEG,..", allow_hyphen_values = true)]
     azimuths: Vec<f64>,
     /// Take the views in the grid's order, not in random order
@@ -41,7 +41,7 @@ impl PosesArguments {
             grid.tilts_rad = self.tilts.iter().map(|t| t.to_radians()).collect();
         }
         let finite = self.azimuths.iter().all(|a| a.is_finite());
-        ensure!(finite, "--azimuths: a direction is a number of degrees");
+        ensure!(finite, "--azimuths: give finite numbers of degrees");
         if self.azimuths.is_empty() {
             return Ok(grid.views());
         }
@@ -55,22 +55,22 @@ pub struct SceneryArguments {
     /// Board width and height in m
     #[arg(long, value_parser = numbers::<2>, default_value = "1,0.8", value_name = "W,H", allow_hyphen_values = true)]
     board: [f64; 2],
-    /// The target is a wall that fills the picture
+    /// Make the target a wall that fills the picture
     #[arg(long, conflicts_with = "board")]
     wall_target: bool,
     /// Print grey squares on the target
     #[arg(long)]
     pub patches: bool,
-    /// A wall this far behind the target, m
+    /// Put a wall this far behind the target, m
     #[arg(long, value_name = "M", allow_hyphen_values = true, value_parser = between(0.0, 1e3, "m"))]
     pub wall: Option<f64>,
-    /// Boxes in the way, beside the target's middle
+    /// Put so many boxes in the way, beside the target's middle
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = count(0, MAX_CLUTTER))]
     clutter: usize,
     /// Write reference distances with this standard deviation, m
     #[arg(long, value_name = "M", allow_hyphen_values = true, value_parser = between(0.0, 1.0, "m"))]
     reference_error: Option<f64>,
-    /// Write the temperature of the room into every view
+    /// Write the room's temperature and light into every view
     #[arg(long)]
     conditions: bool,
 }

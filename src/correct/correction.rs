@@ -75,9 +75,7 @@ impl Correction {
             model.sensor.clone().map(|file| file.sensor()).transpose().map_err(|what| {
                 Error::Argument { what: format!("the model's sensor: {what}"), remedy: REMEDY }
             })?;
-        if let Some(other) = &of_model {
-            refuse_other_size(other, sensor)?;
-        }
+        model.refuse_other_size(sensor)?;
         let camera = sensor.camera.clone();
         // Terms are in px of the disparity that the model counts.
         let scale_px_m = of_model
@@ -214,20 +212,6 @@ impl Correction {
 }
 
 const REMEDY: &str = "give the model that was made of this very sensor";
-
-fn refuse_other_size(model: &Sensor, sensor: &Sensor) -> Result<()> {
-    let size = |s: &Sensor| [s.camera.width, s.camera.height];
-    if size(model) == size(sensor) {
-        return Ok(());
-    }
-    let ([mw, mh], [w, h]) = (size(model), size(sensor));
-    Err(Error::Argument {
-        what: format!(
-            "the model's sensor has {mw} x {mh} px, the recording's {w} x {h}: its errors lie elsewhere"
-        ),
-        remedy: REMEDY,
-    })
-}
 
 /// Signs that two descriptions may not be of one sensor.
 fn differences(model: &Sensor, sensor: &Sensor) -> Vec<String> {

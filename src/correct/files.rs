@@ -3,7 +3,7 @@
 use std::path::{Component, Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::io::{DESCRIPTION, INDEX, write_atomic};
+use crate::io::{is_description, write_atomic};
 
 /// Folders in folders: more is a link that leads back to where it stands.
 const MAX_DEPTH: usize = 12;
@@ -36,8 +36,7 @@ pub(super) fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
 
 /// Is it a file without which a folder is no recording, and which therefore comes last?
 pub(super) fn makes_a_recording(file: &Path) -> bool {
-    let name = file.file_name().and_then(|n| n.to_str()).unwrap_or_default();
-    name == DESCRIPTION || name == INDEX || name == "depth.txt"
+    is_description(file.file_name().and_then(|n| n.to_str()).unwrap_or_default())
 }
 
 /// Copy files, those that make a recording of the folder after all others.
@@ -79,23 +78,6 @@ pub(super) fn inside(root: &Path, file: &Path) -> Result<PathBuf> {
         ));
     }
     Ok(parts.iter().collect())
-}
-
-/// # Errors
-/// When `output` lies in `input`: it would become part of what is read.
-pub(super) fn refuse_inside(output: &Path, input: &Path) -> Result<()> {
-    let input = input.canonicalize().map_err(|e| Error::read(input, e))?;
-    let absolute = std::path::absolute(output).map_err(|e| Error::write(output, e))?;
-    // What does not exist yet has no canonical name; the folder it will stand in has.
-    let standing = absolute.ancestors().find_map(|folder| folder.canonicalize().ok());
-    if standing.is_some_and(|folder| folder.starts_with(&input)) {
-        return Err(Error::recording(
-            output,
-            "the output would lie inside the recording that is read",
-            "choose a folder elsewhere",
-        ));
-    }
-    Ok(())
 }
 
 #[cfg(test)]

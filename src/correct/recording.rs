@@ -8,14 +8,14 @@ use rayon::prelude::*;
 
 use super::correction::{Conditions, Correction};
 use super::describe::describe;
-use super::files::{copy, files_below, inside, make_folder_of, makes_a_recording, refuse_inside};
+use super::files::{copy, files_below, inside, make_folder_of, makes_a_recording};
 use super::raw::{RawCode, metric};
 use crate::Progress;
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, DepthTable, FARTHEST_M, Frame};
 use crate::io::{
     Assumed, FrameSource, INDEX, Layout, encode_pgm16, encode_png16, open_uncut, refuse_full,
-    write_atomic,
+    refuse_inside, write_atomic,
 };
 use crate::model::NoiseModel;
 use crate::view::{Recording, Sensor};
@@ -179,7 +179,7 @@ impl Rewrite<'_> {
         let done = AtomicUsize::new(0);
         let each = |image: &Image| {
             let tally = self.image(image);
-            progress(done.fetch_add(1, Ordering::Relaxed) + 1, images.len());
+            progress.step(done.fetch_add(1, Ordering::Relaxed) + 1, images.len());
             tally
         };
         let tallies: Result<Vec<Tally>> = images.par_iter().map(each).collect();

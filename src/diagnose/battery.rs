@@ -64,6 +64,7 @@ impl Case<'_> {
     pub fn battery(&mut self, advise: bool) -> Battery {
         let mean = self.mean();
         let scatter = self.scatter(&mean);
+        self.at("naming, and comparing the halves of the views", "naming what is left");
         let sigma_mm = typical_sigma_mm(&self.fields);
         let second = self.survey.second();
         let lattice = &scatter.lattice;
@@ -80,6 +81,7 @@ impl Case<'_> {
         let better_form = self.tell_form(&mut curves, clearly);
         let mut found: Vec<Finding> = self.ranges.clone().into_iter().chain(curves).collect();
         found.extend(self.texture(&mean, &scatter, steps));
+        self.at("searching the lost pixels", "testing the lost pixels again");
         let (lost, detectable) = self.lost();
         found.extend(lost);
         found.extend(self.laws(&mean.terms));

@@ -29,6 +29,7 @@ pub struct Case<'a> {
     pub recording: &'a Recording,
     pub model: &'a NoiseModel,
     pub options: &'a DiagnoseOptions,
+    pub progress: Progress<'a>,
     pub bench: Workbench<'a>,
     pub known: KnownTerms,
     pub fields: Vec<Field>,
@@ -70,8 +71,9 @@ impl<'a> Case<'a> {
         simulated: Option<&Recording>,
         model: &'a NoiseModel,
         options: &'a DiagnoseOptions,
-        progress: Progress<'_>,
+        progress: Progress<'a>,
     ) -> Result<Self> {
+        progress.stage("measuring the views");
         let sensor = &recording.sensor;
         if simulated.is_none() {
             refuse_other_size(model, sensor)?;
@@ -86,12 +88,14 @@ impl<'a> Case<'a> {
         if let Some(baseline) = &baseline {
             baseline.references(&mut fields);
         }
+        progress.stage("comparing with the model");
         let learnt_from = learnt_from(model, &known, options, simulated.is_some());
         let survey = survey(&fields, &bench, baseline.as_ref(), options, (learnt_from, &known));
         Ok(Case {
             recording,
             model,
             options,
+            progress,
             bench,
             known,
             fields,
@@ -125,6 +129,11 @@ impl<'a> Case<'a> {
         }
     }
 
+    /// Tells what begins: in the first run of the battery, or in the one against the extended model.
+    pub fn at(&self, first: &'static str, again: &'static str) {
+        self.progress.stage(if self.extended { again } else { first });
+    }
+
     pub fn sensor(&self) -> &'a Sensor {
         &self.recording.sensor
     }
@@ -141,6 +150,7 @@ impl<'a> Case<'a> {
     }
 
     pub fn mean(&mut self) -> Mean {
+        self.at("searching the mean error", "testing the mean again");
         let first = self.search_mean();
         // What is steep in a bias was taken for noise that hangs together: views count for more
         // once it is known.
@@ -159,6 +169,7 @@ impl<'a> Case<'a> {
     }
 
     pub fn scatter(&mut self, mean: &Mean) -> Scatter {
+        self.at("searching the noise", "testing the noise again");
         let camera = &self.recording.sensor.camera;
         let mut structure = structures(&self.fields, camera, &mean.px);
         let lattice = lattice(&self.fields, self.recording);

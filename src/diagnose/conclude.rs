@@ -38,8 +38,10 @@ impl Case<'_> {
         let cannot_tell = reference::cannot_tell(&self.fields);
         found.extend(cannot_tell.iter().map(not_identifiable));
         shares(&mut found);
+        self.progress.stage("scoring views kept aside");
         let heldout = self.heldout();
         let map = self.map(outcomes);
+        self.progress.stage("finding what would have been seen");
         let detectable = self.detectable(outcomes, detectable);
         let mut remarks = self.remarks();
         remarks.extend(untested(outcomes));
@@ -50,6 +52,7 @@ impl Case<'_> {
         let left_out = heldout::left_out(&self.survey, &mean.outcome, &mean.terms);
         let recording = self.recording.root.display().to_string();
         let (reference, excluded) = (self.reference(), std::mem::take(&mut self.excluded));
+        self.progress.stage("testing the extended model");
         let again = self.after(&extended, &mean, explained);
         let diagnosis = Diagnosis {
             format: DIAGNOSIS_FORMAT,

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use crate::effects::Active;
 use crate::model::Covariance;
 use crate::terms::{Axis, Statistic, Term};
 
@@ -95,6 +96,29 @@ pub struct Finding {
     /// Of the terms' coefficients, one term after the other.
     #[serde(skip)]
     pub covariance: Covariance,
+}
+
+impl Finding {
+    /// The effect of the catalogue that shows as this finding does, for the simulator: what was not
+    /// measured is typical. `None` for what has no name, and where the strength is not known or
+    /// beyond what the formula takes.
+    pub fn as_effect(&self) -> Option<Active> {
+        let named = matches!(self.status, Status::Named | Status::OneOf);
+        let mut active = Active::typical(self.effect.filter(|_| named)?).ok()?;
+        let card = active.effect.card();
+        for (n, knob) in card.parameters.iter().enumerate() {
+            let [low, high] = knob.range;
+            let value = self.parameters.get(knob.name).and_then(|v| v.get("value")?.as_f64());
+            match value {
+                Some(v) if n > 0 => active = active.with(knob.name, v.clamp(low, high)).ok()?,
+                Some(v) => active = active.with(knob.name, v).ok()?,
+                // A share that is not said is the whole.
+                None if n == 0 && knob.name != "share" => return None,
+                None => {}
+            }
+        }
+        Some(active)
+    }
 }
 
 #[derive(Debug, Clone, Serialize)]

@@ -4,8 +4,11 @@ use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
+use crate::diagnose::diagnosis::Finding;
+use crate::diagnose::other_findings::named;
+use crate::effects::Active;
 use crate::rng::Seed;
-use crate::terms::{Coordinate, Extent, Modulation};
+use crate::terms::{Axis, Coordinate, Extent, Modulation, Statistic};
 
 fn reach() -> Extent {
     Extent {
@@ -179,6 +182,31 @@ fn an_exact_shape_gives_its_parameters() {
         assert!((value / expected - 1.0).abs() <= tolerance, "{basis:?}: {name} = {value}");
         assert!(error == 0.0, "{basis:?}: nothing is uncertain, +- {error}");
     }
+}
+
+/// What is printed of a finding simulates it: it parses, to four digits the same.
+#[test]
+fn a_finding_is_an_effect_that_the_simulator_takes() {
+    for (family, basis, beta, name, expected, tolerance) in exact() {
+        let Some(effect) = effects::find(family) else { continue };
+        let none = DMatrix::zeros(beta.len(), beta.len());
+        let parameters = told(family, &basis, &beta, &none);
+        let id = effect.card().id;
+        let finding = Finding { parameters, ..named(id, Statistic::Bias, Axis::Z) };
+        let active = finding.as_effect();
+        let Some(strength) = effect.card().parameters.iter().find(|p| p.name == name) else {
+            // Mixing is found by its height, and simulated by its width.
+            assert_eq!((family, active.map(|a| a.settings.at(0))), ("edge-mixing", Some(3.0)));
+            continue;
+        };
+        let active = active.unwrap_or_else(|| panic!("{family}: {:?}", strength.range));
+        let read = Active::parse(&active.argument()).expect("it parses");
+        let value = read.parameters()[name].as_f64().expect("a number");
+        assert!((value / expected - 1.0).abs() < tolerance + 1e-3, "{family}: {name} = {value}");
+        assert_eq!(read.argument(), active.argument());
+    }
+    let bow = told("target-bow", &Basis::relief(2), &[0.1, 0.0, 0.0], &DMatrix::zeros(3, 3));
+    assert_eq!(bow["span_m"]["value"].as_f64(), Some(1.2));
 }
 
 /// Standard errors by the delta method against 20,000 draws. A standard deviation is then known

@@ -169,7 +169,7 @@ pub(super) fn read(
         .par_iter()
         .map(|v| {
             let field = Field::read(v, bench, &model.sigma, known, start);
-            progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+            progress.step(done.fetch_add(1, Ordering::Relaxed) + 1, total);
             field
         })
         .collect();

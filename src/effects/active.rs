@@ -10,6 +10,11 @@ use super::{CATALOGUE, Draw, Effect, Exposure, Settings, find};
 use crate::error::{Error, Result};
 use crate::model;
 use crate::rng::Seed;
+use crate::units::shortest;
+
+fn four_digits(v: f64) -> f64 {
+    format!("{v:.3e}").parse().unwrap_or(v)
+}
 
 /// An effect that is switched on.
 #[derive(Clone)]
@@ -42,6 +47,32 @@ fn fault(what: String) -> Error {
     Error::Argument { what, remedy: KNOWN }
 }
 
+/// The id that was probably meant: it holds the text or is held by it, or a few letters differ.
+fn nearest(text: &str) -> Option<&'static str> {
+    let ids = || CATALOGUE.iter().map(|e| e.card().id);
+    let part = |id: &&str| !text.is_empty() && (id.contains(text) || text.contains(id));
+    let away = |id: &str| letters_apart(text, id);
+    ids().find(part).or_else(|| {
+        // A third of the letters wrong is another word.
+        ids().min_by_key(|id| away(id)).filter(|id| 3 * away(id) <= id.len())
+    })
+}
+
+/// Letters to add, drop or change (Levenshtein's distance).
+fn letters_apart(a: &str, b: &str) -> usize {
+    let mut row: Vec<usize> = (0..=b.chars().count()).collect();
+    for (i, x) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.chars().enumerate() {
+            let changed = diagonal + usize::from(x != y);
+            diagonal = row[j + 1];
+            row[j + 1] = changed.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.chars().count()]
+}
+
 impl Active {
     /// By id, all knobs at their typical values.
     ///
@@ -49,10 +80,7 @@ impl Active {
     /// When no effect has this id.
     pub fn typical(id: &str) -> Result<Self> {
         let effect = find(id).ok_or_else(|| {
-            let near = CATALOGUE
-                .iter()
-                .map(|e| e.card().id)
-                .find(|known| known.contains(id) || id.contains(known));
+            let near = nearest(id);
             let hint = near.map_or(String::new(), |n| format!("; did you mean {n}?"));
             fault(format!("effect \"{id}\" is not in the catalogue{hint}"))
         })?;
@@ -181,6 +209,15 @@ impl Active {
         let mut ordered: Vec<&Active> = effects.iter().collect();
         ordered.sort_by_key(place);
         ordered
+    }
+
+    /// As [`Active::parse`] reads it, every parameter given, to four digits.
+    pub fn argument(&self) -> String {
+        let card = self.effect.card();
+        let knobs = card.parameters.iter().zip(&self.settings.0);
+        let knobs: Vec<String> =
+            knobs.map(|(p, &v)| format!("{}={}", p.name, shortest(four_digits(v)))).collect();
+        format!("{}:{}", card.id, knobs.join(","))
     }
 
     /// The parameters by name.

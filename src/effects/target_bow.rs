@@ -75,9 +75,13 @@ impl Effect for TargetBow {
     /// Over the reach of the board that was seen, along the side that is bent more.
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
         let (right, down) = (half_square(fit.reach.right), half_square(fit.reach.down));
-        vec![fit.estimate("sagitta_m", &|b| {
-            if (b[0] * right).abs() > (b[1] * down).abs() { -b[0] * right } else { -b[1] * down }
-        })]
+        let along_right = |b: &[f64]| (b[0] * right).abs() > (b[1] * down).abs();
+        let span = if along_right(fit.coefficients) { fit.reach.right } else { fit.reach.down };
+        vec![
+            fit.estimate("sagitta_m", &|b| if along_right(b) { -b[0] * right } else { -b[1] * down }),
+            // The board's pixels end within a few of its edge.
+            Estimate::given("span_m", span[1] - span[0], f64::NAN),
+        ]
     }
 
     fn formula_error(&self) -> f64 {

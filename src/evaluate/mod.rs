@@ -21,13 +21,50 @@ use crate::trajectory::{Pose, associate, read_benchmark};
 pub struct Evaluation {
     pub ate: Ate,
     pub rpe: Rpe,
+    /// What was found odd.
+    pub remarks: Vec<String>,
 }
 
 /// Of poses in time order.
 /// An error when too few of them belong to the same moments.
 pub fn evaluate(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Evaluation> {
-    Ok(Evaluation { ate: absolute(truth, estimate)?, rpe: relative(truth, estimate, delta)? })
+    let remarks = swapped(truth, estimate).into_iter().collect();
+    Ok(Evaluation {
+        ate: absolute(truth, estimate)?,
+        rpe: relative(truth, estimate, delta)?,
+        remarks,
+    })
 }
+
+/// Estimated trajectories begin at the identity, as this program's do, or as often as there are
+/// images; true ones in a laboratory's coordinates, several times as often.
+fn swapped(truth: &[Pose], estimate: &[Pose]) -> Option<String> {
+    let at_identity = |poses: &[Pose]| {
+        poses.first().is_some_and(|pose| {
+            let Isometry3 { translation, rotation } = pose.world_from_camera;
+            translation.vector.norm() < AT_IDENTITY && rotation.angle() < AT_IDENTITY
+        })
+    };
+    let interval_s = |poses: &[Pose]| {
+        median(&mut poses.windows(2).map(|w| w[1].stamp - w[0].stamp).collect::<Vec<f64>>())
+    };
+    let (of_truth, of_estimate) = (interval_s(truth), interval_s(estimate));
+    const ASK: &str = "are --truth and --estimate swapped?";
+    if at_identity(truth) && !at_identity(estimate) {
+        let sign =
+            "the truth begins at the identity, as an estimate does, and the estimate does not";
+        return Some(format!("{sign}: {ASK}"));
+    }
+    (!at_identity(estimate) && of_truth > DENSER * of_estimate).then(|| {
+        let [truth, estimate] = [of_truth, of_estimate].map(|s| 1e3 * s);
+        format!("the truth has a pose every {truth:.0} ms and the estimate every {estimate:.0} ms: {ASK}")
+    })
+}
+
+/// Of a pose printed with six digits, m and rad.
+const AT_IDENTITY: f64 = 1e-6;
+/// Motion capture has 100 poses a second, images come 30 times: three times as often.
+const DENSER: f64 = 2.0;
 
 /// Of two files.
 pub fn evaluate_files(truth: &Path, estimate: &Path, delta: Delta) -> Result<Evaluation> {

@@ -87,9 +87,14 @@ impl ColourImage {
 
 /// Width and height of an image without decoding it all.
 pub(crate) fn size_of(path: &Path) -> Result<(usize, usize)> {
-    let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
-    let frame = decode(path, &bytes)?;
+    let frame = decode_file(path)?;
     Ok((frame.width, frame.height))
+}
+
+/// A depth frame of any size.
+pub(super) fn decode_file(path: &Path) -> Result<Frame> {
+    let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
+    decode(path, &bytes)
 }
 
 fn decode(path: &Path, bytes: &[u8]) -> Result<Frame> {

@@ -1,14 +1,19 @@
 //! Files in, files out. One reader a file; every layout ends as the same [`Recording`].
 
+mod assumed;
 mod folder;
 mod images;
 mod layout;
 mod list;
 mod output;
+mod output_folder;
+mod raw_values;
 mod stills;
+mod unfinished;
 
+pub use assumed::Assumed;
 pub(crate) use folder::INDEX;
-pub use folder::{Assumed, write_dump};
+pub use folder::write_dump;
 pub use images::{
     ColourImage, FrameSource, InfraredImage, encode_pgm16, encode_png16, encode_png16_quickly,
     encode_rgb,
@@ -19,13 +24,18 @@ pub use layout::{DESCRIPTION, ViewFile, write_recording_file, write_view_notes};
 pub(crate) use list::content_lines;
 pub use list::{FrameList, read_list};
 pub(crate) use output::entries;
-pub use output::{OutputDir, hex, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
+pub use output::{hex, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
+pub(crate) use output_folder::is_description;
+pub use output_folder::{Leaves, OutputFolder, refuse_inside};
+pub use unfinished::{Interrupted, discard_unfinished};
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use raw_values::RawValues;
 use stills::Footage;
 
 use crate::error::{Error, Result};
+use crate::frame::DepthCode;
 use crate::view::{Recording, Sensor};
 
 /// How the files of a recording lie in its folder.
@@ -81,7 +91,7 @@ pub fn open_uncut(path: &Path, assumed: &Assumed) -> Result<Recording> {
 
 fn open_and_cut(path: &Path, assumed: &Assumed, cut: bool) -> Result<Recording> {
     let film = |(footage, sensor): (Footage, Sensor)| footage.recording(path, sensor, cut);
-    let recording = match Layout::of(path)? {
+    let mut recording = match Layout::of(path)? {
         Layout::Recording => {
             assumed.refuse_beside(&path.join(DESCRIPTION))?;
             layout::open(path)?
@@ -99,14 +109,32 @@ fn open_and_cut(path: &Path, assumed: &Assumed, cut: bool) -> Result<Recording> 
             "a view is a folder with depth.txt and depth/*.png beside recording.json",
         ));
     }
+    let frames: Vec<&Path> =
+        recording.views.iter().flat_map(|v| &v.depth).map(|f| f.path.as_path()).collect();
+    let doubt = refuse_impossible(path, recording.sensor.code, &frames)?;
+    recording.remarks.extend(doubt);
     Ok(recording)
 }
 
-/// The sensor of a folder whose images are `size` px, and remarks on what had to be assumed: from
-/// its recording.json, from what is usual in a dump, or from `assumed`.
+/// Whether the raw values in some of these frames can be what `code` takes them for.
+/// An error when they cannot; a remark when it is doubtful.
+pub(crate) fn refuse_impossible(
+    root: &Path,
+    code: DepthCode,
+    frames: &[&Path],
+) -> Result<Option<String>> {
+    let values = RawValues::of(frames.iter());
+    match values.contradiction(code) {
+        Some((what, remedy)) => Err(Error::recording(root, what, remedy)),
+        None => Ok(values.doubt(code)),
+    }
+}
+
+/// The sensor of a folder with these images, and remarks on what had to be assumed: from its
+/// recording.json, from what is usual in a dump, or from `assumed`.
 pub(crate) fn describe_folder(
     root: &Path,
-    size: (usize, usize),
+    images: &[PathBuf],
     assumed: &Assumed,
 ) -> Result<(Sensor, Vec<String>)> {
     let description = root.join(DESCRIPTION);
@@ -114,10 +142,11 @@ pub(crate) fn describe_folder(
         assumed.refuse_beside(&description)?;
         return Ok((read_description(&description)?, Vec::new()));
     }
-    let (sensor, remark) = if root.join(INDEX).is_file() {
-        assumed.dump_sensor(size)?
-    } else {
-        assumed.images_sensor(root, size)?
+    let (sensor, remark) = match images.first() {
+        Some(first) if root.join(INDEX).is_file() => assumed.dump_sensor(size_of(first)?)?,
+        _ => assumed.images_sensor(root, images)?,
     };
-    Ok((sensor, remark.into_iter().collect()))
+    let frames: Vec<&Path> = images.iter().map(PathBuf::as_path).collect();
+    let doubt = refuse_impossible(root, sensor.code, &frames)?;
+    Ok((sensor, remark.into_iter().chain(doubt).collect()))
 }

@@ -10,34 +10,6 @@ use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
 
-/// A folder that was found writable before the work began.
-#[derive(Debug, Clone)]
-pub struct OutputDir(PathBuf);
-
-impl OutputDir {
-    /// Make the folder and try it, so that a run of an hour does not end in "permission denied".
-    /// An error when it cannot be made or written.
-    pub fn create(path: &Path) -> Result<Self> {
-        fs::create_dir_all(path).map_err(|e| Error::write(path, e))?;
-        let probe = path.join(format!(".kinoise-{}.tmp", std::process::id()));
-        fs::write(&probe, b"").map_err(|e| Error::write(path, e))?;
-        fs::remove_file(&probe).map_err(|e| Error::write(path, e))?;
-        Ok(OutputDir(path.to_path_buf()))
-    }
-
-    pub fn path(&self) -> &Path {
-        &self.0
-    }
-
-    /// Write one file of the output.
-    /// An error when the folder has become unwritable or the disk is full.
-    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<PathBuf> {
-        let path = self.0.join(name);
-        write_atomic(&path, bytes)?;
-        Ok(path)
-    }
-}
-
 /// Never mix a new recording into somebody's folder.
 /// An error when the folder has something in it.
 pub fn refuse_full(root: &Path) -> Result<()> {

@@ -83,7 +83,7 @@ pub fn map(
             rayon::join(|| tracker.track(moment.stamp, frame), || prepare(k + 1));
         frames.push(report?);
         next = prepared;
-        progress(k + 1, moments.len());
+        progress.step(k + 1, moments.len());
     }
     let mut remarks = preprocessor.remarks().to_vec();
     remarks.extend(frames.iter().filter_map(|f| f.remark.clone()));

@@ -204,6 +204,10 @@ pub struct Quality {
 /// Above this share the surface misses more of what differs between the views than a coefficient
 /// rounded to one digit would.
 const MAX_UNEXPLAINED: f64 = 0.2;
+/// Below this the surface leaves more of what differs between the views than it explains.
+const MIN_R2: f64 = 0.5;
+/// Of sigma: what uses the model weighs by 1/sigma^2, and would be wrong by a factor of two.
+const MAX_ERROR: f64 = 0.5;
 /// Scatter this many times that of sampling is no accident, whatever the number of rows: chi^2
 /// per degree of freedom is its square.
 const FAR_ABOVE_SAMPLING: f64 = 3.0;
@@ -231,6 +235,16 @@ impl Quality {
             sampling_relative: rows.counted().then_some(sampling),
             unexplained: share((left - by_sampling).max(0.0)),
         }
+    }
+
+    /// Why the surface is no model at all, if so: it misses more than it explains, and sampling is
+    /// not the reason; or a sigma read off it is wrong by half.
+    pub fn explains_nothing(&self) -> Option<String> {
+        let flat = self.r2 < MIN_R2 && self.unexplained > MAX_UNEXPLAINED;
+        (flat || self.rmse_relative > MAX_ERROR).then(|| {
+            let error = 1e2 * self.rmse_relative;
+            format!("the fit explains nothing (r2 {:.2}, sigmas lie {error:.0} % off it)", self.r2)
+        })
     }
 
     /// The surface explains so little that the remarks warn of it first.

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vect
 use super::{Moment, Sequence};
 use crate::error::{Error, Result, read_text};
 use crate::frame::DepthCode;
-use crate::io::{Assumed, entries, size_of};
+use crate::io::{Assumed, entries, refuse_impossible, size_of};
 use crate::trajectory::Pose;
 
 const DEPTH: &str = ".depth.png";
@@ -55,6 +55,8 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
         remarks.push("7-Scenes' own intrinsics 585,585,320,240 assumed; give --intrinsics".into());
     }
     let sensor = assumed.sensor("7-Scenes Kinect", size, INTRINSICS, CODE)?;
+    let frames: Vec<&Path> = moments.iter().map(|m| m.depth.as_path()).collect();
+    remarks.extend(refuse_impossible(root, sensor.code, &frames)?);
     Ok(Sequence { root: root.to_path_buf(), sensor, moments, truth, remarks })
 }
 

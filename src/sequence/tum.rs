@@ -15,30 +15,6 @@ const MAX_DIFFERENCE_S: f64 = 0.02;
 const ASSOCIATIONS: [&str; 4] =
     ["associations.txt", "association.txt", "associate.txt", "associated.txt"];
 
-/// What the benchmark publishes of a colour camera, to which depth is registered.
-struct Published {
-    name: &'static str,
-    /// fx, fy, cx, cy, px.
-    intrinsics: [f64; 4],
-    /// k1, k2, p1, p2, k3. Depth is registered to the picture as the lens bends it: with them the
-    /// RPE over 1 s of freiburg1_rpy falls from 64 to 46 mm.
-    distortion: Option<[f64; 5]>,
-}
-
-const FREIBURG: [Published; 3] = [
-    Published {
-        name: "freiburg1",
-        intrinsics: [517.3, 516.5, 318.6, 255.3],
-        distortion: Some([0.2624, -0.9531, -0.0054, 0.0026, 1.1633]),
-    },
-    Published {
-        name: "freiburg2",
-        intrinsics: [520.9, 521.0, 325.1, 249.7],
-        distortion: Some([0.2312, -0.7849, -0.0033, -0.0001, 0.9172]),
-    },
-    Published { name: "freiburg3", intrinsics: [535.4, 539.2, 320.1, 247.6], distortion: None },
-];
-
 pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     if Layout::of(root)? != Layout::Sequence {
         return Err(Error::recording(
@@ -47,18 +23,8 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
             "give a folder in the layout of the TUM RGB-D benchmark or of 7-Scenes",
         ));
     }
-    let mut remarks = Vec::new();
-    let published = published(root, assumed);
-    let mut assumed = assumed.clone();
-    if let Some(of) = published {
-        assumed.intrinsics = Some(of.intrinsics);
-    }
-    let mut recording = open_uncut(root, &assumed)?;
-    if let Some(of) = published {
-        remarks.push(format!("depth.txt says {}: its published camera is used", of.name));
-        recording.sensor.camera.distortion = of.distortion;
-    }
-    remarks.extend(recording.remarks);
+    let recording = open_uncut(root, assumed)?;
+    let mut remarks = recording.remarks;
     let depth = recording.views.into_iter().flat_map(|v| v.depth).collect();
     let mut moments = with_colour(root, depth, &mut remarks)?;
     let before = moments.len();
@@ -80,16 +46,6 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     };
     let root = root.to_path_buf();
     Ok(Sequence { root, sensor: recording.sensor, moments, truth, remarks })
-}
-
-/// The benchmark's lists name their bag in a comment, and with it the camera.
-fn published(root: &Path, assumed: &Assumed) -> Option<&'static Published> {
-    if assumed.intrinsics.is_some() || root.join("recording.json").is_file() {
-        return None;
-    }
-    let list = std::fs::read_to_string(root.join("depth.txt")).ok()?;
-    let mut head = list.lines().take_while(|line| line.starts_with('#'));
-    head.find_map(|line| FREIBURG.iter().find(|p| line.contains(p.name)))
 }
 
 /// Every depth image with the colour image of its moment.

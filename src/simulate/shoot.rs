@@ -106,7 +106,7 @@ impl Shoot {
             }
             let blind = !folder.sees;
             folder.finish(view)?;
-            progress(done.fetch_add(1, Ordering::Relaxed) + 1, self.views.len());
+            progress.step(done.fetch_add(1, Ordering::Relaxed) + 1, self.views.len());
             Ok(blind.then(|| view.name.clone()))
         };
         let views: Result<Vec<Option<String>>> =

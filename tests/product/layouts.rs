@@ -232,10 +232,12 @@ fn a_tum_folder_is_cut_into_its_still_stretches() {
 }
 
 #[test]
-fn a_tum_folder_without_intrinsics_says_what_it_assumes() {
-    let (recording, _) =
-        read_back(|root| write_tum(root, &film(TUM)[..STILL]), &Assumed::default());
-    assert!(told(&recording, "525,525,319.5,239.5 assumed"), "{:?}", recording.remarks);
+fn a_tum_folder_of_small_images_needs_its_intrinsics() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    write_tum(folder.path(), &film(TUM)[..STILL]);
+    let error = open(folder.path(), &Assumed::default()).expect_err("525 px belong to 640 x 480");
+    let error = error.to_string();
+    assert!(error.contains("320 x 240") && error.contains("--intrinsics"), "{error}");
 }
 
 /// A sensor that starts up writes empty frames; they must not count as "still" with all others.

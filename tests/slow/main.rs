@@ -23,3 +23,4 @@ mod memory;
 #[cfg(unix)] // links folders
 mod new_effect;
 mod recovery;
+mod reproduce;

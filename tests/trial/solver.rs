@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use kinoise::calibrate::paper_model;
 use kinoise::diagnose::{DiagnoseOptions, Verdict, diagnose, diagnose_against};
 use kinoise::error::Result;
-use kinoise::io::{Assumed, OutputDir, open, pretty_json, sha256_hex};
+use kinoise::io::{Assumed, open, pretty_json, sha256_hex, write_atomic};
 use kinoise::{Error, NoiseModel, Recording};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -135,9 +135,9 @@ pub fn diagnose_shut_in() -> anyhow::Result<u8> {
         let model = NoiseModel::read(&set.join("model.json"))?;
         diagnose(&recording, &model, &options, &|_, _| ())?
     };
-    let folder = OutputDir::create(out)?;
-    folder.write("diagnosis.json", pretty_json(&done.diagnosis)?.as_bytes())?;
-    done.model.write(&folder.path().join("model.json"))?;
+    std::fs::create_dir_all(out)?;
+    write_atomic(&out.join("diagnosis.json"), pretty_json(&done.diagnosis)?.as_bytes())?;
+    done.model.write(&out.join("model.json"))?;
     Ok(if done.diagnosis.verdict == Verdict::Mismatch { MISMATCH } else { 0 })
 }
 

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use kinoise::error::Result;
-use kinoise::io::OutputDir;
 
 use crate::commitment::{hash_file, write_json};
 use crate::judge::{mark, mark_advice, scores};
@@ -30,9 +29,10 @@ pub struct Trial {
 
 /// Hold the trial, or go on with one that was interrupted.
 pub fn hold(trial: &Trial, progress: Progress<'_>) -> Result<Proof> {
-    let out = OutputDir::create(&trial.output)?;
-    if out.path().join(PROOF).exists() {
-        return Err(refused(out.path(), "a finished trial is here"));
+    let out = &trial.output;
+    std::fs::create_dir_all(out).map_err(|e| kinoise::Error::write(out, e))?;
+    if out.join(PROOF).exists() {
+        return Err(refused(out, "a finished trial is here"));
     }
     let binary_sha256 = &hash_file(&trial.program)?;
     let sets = take(&plan(&trial.order), trial.data.as_deref(), progress)?;
@@ -75,8 +75,8 @@ pub fn hold(trial: &Trial, progress: Progress<'_>) -> Result<Proof> {
         confinement,
         sets: proven,
     };
-    write_json(&out.path().join(SUMMARY), &proof.summary())?;
-    write_json(&out.path().join(PROOF), &proof)?;
-    remove(&out.path().join("work"))?;
+    write_json(&out.join(SUMMARY), &proof.summary())?;
+    write_json(&out.join(PROOF), &proof)?;
+    remove(&out.join("work"))?;
     Ok(proof)
 }

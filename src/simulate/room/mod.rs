@@ -107,7 +107,7 @@ impl Film {
                 write_atomic(&root.join("rgb").join(&name), &colour)?;
                 write_atomic(&root.join("depth").join(&name), &encode_png16_quickly(depth)?)
             })?;
-            progress(first + poses.len(), self.poses.len());
+            progress.step(first + poses.len(), self.poses.len());
         }
         self.write_lists(root, &sensor)
     }

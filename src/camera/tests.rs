@@ -1,0 +1,68 @@
+use super::*;
+
+fn behind(distortion: [f64; 5]) -> Camera {
+    Camera { distortion: Some(distortion), ..Camera::centred(640, 480, 580.0) }
+}
+
+#[test]
+fn a_usable_lens_gives_back_every_pixel() {
+    for k in [[0.0; 5], [-0.26, 0.1, -7.6e-4, 5.0e-3, 0.02], [-0.35, 0.15, 0.0, 0.0, 0.0]] {
+        let camera = behind(k);
+        assert_eq!(camera.fault(), None, "{k:?}");
+        for (u, v) in (0..640).step_by(71).zip((0..480).step_by(53)) {
+            let (x, y) = camera.ray(u as f64, v as f64);
+            let (pu, pv) = camera.project(x, y);
+            assert!((pu - u as f64).hypot(pv - v as f64) < 1e-6, "{k:?}: {pu} {pv}");
+        }
+    }
+}
+
+#[test]
+fn swapped_and_misplaced_numbers_are_named() {
+    let camera = |[fx, fy, cx, cy]: [f64; 4]| Camera {
+        width: 640,
+        height: 480,
+        fx,
+        fy,
+        cx,
+        cy,
+        distortion: None,
+    };
+    let fault = |numbers| camera(numbers).fault().map(|f| f.to_string()).unwrap_or_default();
+    assert_eq!(fault([585.0, 585.0, 319.5, 239.5]), "");
+    assert_eq!(fault([517.3, 516.5, 318.6, 255.3]), "");
+    for (numbers, says) in [
+        ([319.5, 239.5, 585.0, 585.0], "outside the image"),
+        ([585.0, 319.5, 585.0, 239.5], "differ by more than a quarter"),
+        ([319.5, 239.5, 320.0, 240.0], "differ by more than a quarter"),
+        ([585.0, 585.0, 239.5, 640.0], "outside the image"),
+        ([585.0, 585.0, -1.0, 239.5], "outside the image"),
+        ([0.9, 0.9, 319.5, 239.5], "field of view of 179"),
+        ([4.7, 4.7, 319.5, 239.5], "field of view of 178"),
+        ([58500.0, 58500.0, 319.5, 239.5], "field of view of 0.6"),
+    ] {
+        assert!(fault(numbers).contains(says), "{numbers:?}: {}", fault(numbers));
+    }
+}
+
+/// A barrel whose bent radius r (1 - 0.8 r^2) never reaches the corners (0.69): it ends at
+/// r = 1/sqrt(2.4) with 0.43.
+#[test]
+fn a_lens_that_does_not_reach_the_corners_is_named() {
+    let camera = behind([-0.8, 0.0, 0.0, 0.0, 0.0]);
+    let fault = camera.fault().expect("no ray");
+    assert!(matches!(fault, CameraFault::NoRay { u: 0, v: 0, .. }), "{fault:?}");
+    assert!(fault.to_string().contains("[-0.8, 0, 0, 0, 0]"), "{fault}");
+    assert!(camera.ray(0.0, 0.0).0.is_nan() && camera.ray(320.0, 240.0).0.is_finite());
+}
+
+/// The slope 1 - 7.5 s + 12.5 s^2 is negative between s = 0.2 and 0.4, inside the image.
+#[test]
+fn a_lens_that_folds_is_named() {
+    let fault = behind([-2.5, 2.5, 0.0, 0.0, 0.0]).fault().expect("a fault");
+    assert!(fault.to_string().contains("[-2.5, 2.5, 0, 0, 0]"), "{fault}");
+    assert!(folds(&[-2.5, 2.5, 0.0, 0.0, 0.0], 0.5), "k3 = 0");
+    assert!(folds(&[-1.0, 0.0, 0.0, 0.0, 0.0], 0.5), "k2 = k3 = 0");
+    assert!(folds(&[0.0, 0.0, 0.0, 0.0, -1.0], 1.0), "k1 = k2 = 0");
+    assert!(!folds(&[-2.5, 2.5, 0.0, 0.0, 0.0], 0.1) && !folds(&[0.0; 5], 1.0));
+}

@@ -1,0 +1,219 @@
+//! What people read on stderr: how much of it, the bar, and the next step.
+
+use std::ffi::OsString;
+use std::fmt::Display;
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use kinoise::{NoiseModel, Progress, Recording, Watch};
+
+#[derive(Debug, Args)]
+pub struct Verbosity {
+    /// Print errors and the result only
+    #[arg(short, long, global = true, overrides_with = "verbose")]
+    quiet: bool,
+    /// Print also the settings that were read, the stages of the work and their times
+    #[arg(short, long, global = true, overrides_with = "quiet")]
+    verbose: bool,
+}
+
+const QUIET: u8 = 0;
+const USUAL: u8 = 1;
+const VERBOSE: u8 = 2;
+static LEVEL: AtomicU8 = AtomicU8::new(USUAL);
+
+impl Verbosity {
+    /// From here on, for the whole process.
+    pub fn set(&self) {
+        let level = match (self.quiet, self.verbose) {
+            (true, _) => QUIET,
+            (_, true) => VERBOSE,
+            _ => USUAL,
+        };
+        LEVEL.store(level, Ordering::Relaxed);
+    }
+}
+
+fn print(least: u8, text: &str) {
+    if LEVEL.load(Ordering::Relaxed) >= least {
+        let mut err = std::io::stderr().lock();
+        let _ = writeln!(err, "{text}");
+    }
+}
+
+/// What the command was run for; also with --quiet.
+pub fn result(text: impl AsRef<str>) {
+    print(QUIET, text.as_ref());
+}
+
+/// A line for people.
+pub fn say(text: impl AsRef<str>) {
+    print(USUAL, text.as_ref());
+}
+
+/// With --verbose alone.
+pub fn detail(text: impl AsRef<str>) {
+    print(VERBOSE, text.as_ref());
+}
+
+pub fn detail_recording(recording: &Recording) {
+    let (sensor, camera) = (&recording.sensor, &recording.sensor.camera);
+    detail(format!(
+        "read {}: {}, {} views, {} x {} px, fx {} fy {} cx {} cy {}, {:?}",
+        recording.root.display(),
+        sensor.name,
+        recording.views.len(),
+        camera.width,
+        camera.height,
+        camera.fx,
+        camera.fy,
+        camera.cx,
+        camera.cy,
+        sensor.code
+    ));
+}
+
+pub fn detail_model(model: &NoiseModel, file: Option<&Path>) {
+    let file = file.map_or("built in".into(), |f| f.display().to_string());
+    let ([z0, z1], [t0, t1]) = (model.sigma.domain.z_m, model.sigma.domain.theta_rad);
+    let effects: Vec<&str> = model.effects.iter().map(|e| e.id.as_str()).collect();
+    detail(format!(
+        "model {file}: form {}, z {z0:.2} to {z1:.2} m, tilt {:.1} to {:.1} degrees, effects [{}]",
+        model.sigma.form,
+        t0.to_degrees(),
+        t1.to_degrees(),
+        effects.join(", ")
+    ));
+}
+
+/// Notes of one kind that are shown; a recording of an hour may have thousands.
+const MAX_NOTES: usize = 12;
+
+pub fn notes(remarks: impl IntoIterator<Item = impl Display>) {
+    let mut remarks = remarks.into_iter();
+    remarks.by_ref().take(MAX_NOTES).for_each(|remark| say(format!("note: {remark}")));
+    match remarks.count() {
+        0 => {}
+        more => say(format!("note: and {more} more like these")),
+    }
+}
+
+/// Work that says what it is at: on a terminal in a bar that goes away, with --verbose in a line a
+/// stage with its time.
+pub fn working<T>(stage: &'static str, work: impl FnOnce(Progress<'_>) -> T) -> T {
+    let shows_bar = std::io::stderr().is_terminal() && LEVEL.load(Ordering::Relaxed) > QUIET;
+    let bar = if shows_bar { ProgressBar::no_length() } else { ProgressBar::hidden() };
+    bar.enable_steady_tick(TICK);
+    let stages = Stages { bar, now: Mutex::new((stage, Instant::now())) };
+    stages.show(stage);
+    let done = work(&stages);
+    stages.end();
+    stages.bar.finish_and_clear();
+    done
+}
+
+const TICK: Duration = Duration::from_millis(120);
+const COUNTED: &str = "{msg} {bar:40} {pos}/{len} {eta}";
+const UNCOUNTED: &str = "{msg} {spinner} {elapsed}";
+
+struct Stages {
+    bar: ProgressBar,
+    now: Mutex<(&'static str, Instant)>,
+}
+
+impl Stages {
+    fn show(&self, stage: &'static str) {
+        self.bar.reset();
+        self.bar.unset_length();
+        self.style(UNCOUNTED);
+        self.bar.set_message(stage);
+    }
+
+    fn style(&self, template: &str) {
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            self.bar.set_style(style);
+        }
+    }
+
+    fn end(&self) {
+        let (stage, begun) = *self.now.lock().unwrap_or_else(PoisonError::into_inner);
+        let seconds = begun.elapsed().as_secs_f64();
+        self.bar.suspend(|| detail(format!("{stage}: {seconds:.1} s")));
+    }
+}
+
+impl Watch for Stages {
+    fn stage(&self, name: &'static str) {
+        // What the first stage is called is said twice: by who starts the work, and by the work.
+        let same = self.now.lock().unwrap_or_else(PoisonError::into_inner).0 == name;
+        if same {
+            return;
+        }
+        self.end();
+        *self.now.lock().unwrap_or_else(PoisonError::into_inner) = (name, Instant::now());
+        self.show(name);
+    }
+
+    fn step(&self, done: usize, all: usize) {
+        if self.bar.length().is_none() {
+            self.style(COUNTED);
+            self.bar.set_length(all as u64);
+        }
+        // Threads report out of order; a bar never goes back.
+        if done as u64 > self.bar.position() {
+            self.bar.set_position(done as u64);
+        }
+    }
+}
+
+/// The last line of a command: what to run next, to copy.
+pub fn next_step(words: &[OsString]) {
+    say(format!("next: kinoise {}", shell(words)));
+}
+
+/// Words as a shell reads them back.
+pub fn shell(words: &[OsString]) -> String {
+    words.iter().map(|w| quoted(&w.to_string_lossy())).collect::<Vec<_>>().join(" ")
+}
+
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "@%+=:,./_-".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.into();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+/// A folder for what comes of `path`: its name with what it is, beside it.
+pub fn beside(path: &Path, what: &str) -> PathBuf {
+    let Some(name) = path.file_name() else { return PathBuf::from(what) };
+    let mut name = name.to_os_string();
+    name.push(format!("-{what}"));
+    path.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shell_reads_the_words_back() {
+        let words = ["calibrate", "a b/it's", "-o", "", "$HOME", "out/x-1", "é"];
+        let line = shell(&words.map(OsString::from));
+        let echo = format!("printf '%s\\n' {line}");
+        let run = std::process::Command::new("sh").args(["-c", &echo]).output().expect("sh");
+        let read = String::from_utf8(run.stdout).expect("text");
+        assert_eq!(read.lines().collect::<Vec<_>>(), words);
+    }
+
+    #[test]
+    fn what_comes_of_a_folder_lies_beside_it() {
+        assert_eq!(beside(Path::new("data/kinect/"), "noise"), Path::new("data/kinect-noise"));
+        assert_eq!(beside(Path::new(".."), "noise"), Path::new("noise"));
+    }
+}

@@ -1,0 +1,191 @@
+//! What a folder does not say of its sensor: given by options, read off its values, or as usual.
+
+use std::path::{Path, PathBuf};
+
+use super::images::size_of;
+use super::raw_values::{OPENKINECT, RawValues};
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::frame::DepthCode;
+use crate::units::shortest;
+use crate::view::Sensor;
+
+/// What the user knows about a folder that does not describe itself.
+#[derive(Debug, Clone, Default)]
+pub struct Assumed {
+    /// fx, fy, cx, cy in px.
+    pub intrinsics: Option<[f64; 4]>,
+    pub code: Option<DepthCode>,
+    /// Distance between projector and camera, m.
+    pub baseline_m: Option<f64>,
+}
+
+/// Focal length of a Kinect v1 infrared camera to a percent, and the image centre.
+const KINECT_INTRINSICS: [f64; 4] = [585.0, 585.0, 319.5, 239.5];
+/// Projector to camera in every Kinect v1 (LDDIS of the OpenNI device properties: 7.5 cm).
+const KINECT_BASELINE_M: f64 = 0.075;
+/// What ROS publishes for an uncalibrated PrimeSense camera; the TUM tools assume it too.
+const ROS_INTRINSICS: [f64; 4] = [525.0, 525.0, 319.5, 239.5];
+/// Of the images that these intrinsics belong to, px.
+const USUAL_SIZE: (usize, usize) = (640, 480);
+/// Scale of the PNGs in the TUM benchmark.
+const TUM_CODE: DepthCode = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
+
+/// What the benchmark publishes of a colour camera, to which depth is registered.
+struct Published {
+    name: &'static str,
+    /// fx, fy, cx, cy, px.
+    intrinsics: [f64; 4],
+    /// k1, k2, p1, p2, k3. Depth is registered to the picture as the lens bends it: with them the
+    /// RPE over 1 s of freiburg1_rpy falls from 64 to 46 mm.
+    distortion: Option<[f64; 5]>,
+}
+
+const FREIBURG: [Published; 3] = [
+    Published {
+        name: "freiburg1",
+        intrinsics: [517.3, 516.5, 318.6, 255.3],
+        distortion: Some([0.2624, -0.9531, -0.0054, 0.0026, 1.1633]),
+    },
+    Published {
+        name: "freiburg2",
+        intrinsics: [520.9, 521.0, 325.1, 249.7],
+        distortion: Some([0.2312, -0.7849, -0.0033, -0.0001, 0.9172]),
+    },
+    Published { name: "freiburg3", intrinsics: [535.4, 539.2, 320.1, 247.6], distortion: None },
+];
+
+/// The benchmark's lists name their bag in a comment, and with it the camera; its pictures are all of
+/// one size.
+fn published(list: &Path, size: (usize, usize)) -> Option<&'static Published> {
+    if size != USUAL_SIZE {
+        return None;
+    }
+    let list = std::fs::read_to_string(list).ok()?;
+    let mut head = list.lines().take_while(|line| line.starts_with('#'));
+    head.find_map(|line| FREIBURG.iter().find(|p| line.contains(p.name)))
+}
+
+impl Assumed {
+    /// An option that would have no effect must not look as if it had one.
+    /// An error when anything is assumed where the file `description` describes the sensor.
+    pub(super) fn refuse_beside(&self, description: &Path) -> Result<()> {
+        let code = self.code.map(|code| match code {
+            DepthCode::Metric { .. } => "--units-per-metre",
+            DepthCode::Disparity { .. } => "--raw-disparity",
+        });
+        let intrinsics = self.intrinsics.map(|_| "--intrinsics");
+        let baseline = self.baseline_m.map(|_| "--baseline");
+        let given: Vec<&str> = [intrinsics, code, baseline].into_iter().flatten().collect();
+        if given.is_empty() {
+            return Ok(());
+        }
+        Err(Error::Argument {
+            what: format!(
+                "{}: {} describes its sensor itself",
+                given.join(" and "),
+                description.display()
+            ),
+            remedy: "leave the option out, or correct that file",
+        })
+    }
+
+    /// The Kinect whose fakenect dump has frames of `size` px, and what was assumed of it.
+    pub(super) fn dump_sensor(&self, size: (usize, usize)) -> Result<(Sensor, Option<String>)> {
+        let remark = (self.intrinsics.is_none() || self.code.is_none()).then(|| {
+            "a fakenect dump carries no calibration: OpenKinect's depth formula and f = 585 px assumed; \
+             give --intrinsics and --raw-disparity"
+                .into()
+        });
+        let baseline_m = self.baseline_m.or(Some(KINECT_BASELINE_M));
+        let kinect = Assumed { baseline_m, ..*self };
+        let name = "Kinect for Xbox 360 (fakenect dump)";
+        Ok((kinect.sensor(name, size, KINECT_INTRINSICS, OPENKINECT)?, remark))
+    }
+
+    /// The sensor of a TUM sequence with this depth list and images of `size` px, and what was
+    /// assumed of it.
+    pub(super) fn sequence_sensor(
+        &self,
+        list: &Path,
+        size: (usize, usize),
+    ) -> Result<(Sensor, Option<String>)> {
+        const NAME: &str = "TUM RGB-D sequence";
+        if self.intrinsics.is_none()
+            && let Some(of) = published(list, size)
+        {
+            let mut sensor = self.sensor(NAME, size, of.intrinsics, TUM_CODE)?;
+            sensor.camera.distortion = of.distortion;
+            let remark = format!("depth.txt says {}: its published camera is used", of.name);
+            return Ok((sensor, Some(remark)));
+        }
+        let remark = self.intrinsics.is_none().then(|| {
+            "a TUM folder carries no intrinsics: 525,525,319.5,239.5 assumed; give --intrinsics"
+                .into()
+        });
+        Ok((self.sensor(NAME, size, ROS_INTRINSICS, TUM_CODE)?, remark))
+    }
+
+    /// The sensor of a plain folder with these images, and what was assumed of it. How raw values
+    /// become metres is told, or decided by the values themselves: a guess would give numbers that
+    /// look right.
+    pub(super) fn images_sensor(
+        &self,
+        root: &Path,
+        images: &[PathBuf],
+    ) -> Result<(Sensor, Option<String>)> {
+        let Some(intrinsics) = self.intrinsics else {
+            return Err(Error::recording(
+                root,
+                "a plain folder of PNGs carries no intrinsics",
+                "give --intrinsics fx,fy,cx,cy (and --units-per-metre or --raw-disparity)",
+            ));
+        };
+        let Some(first) = images.first() else {
+            return Err(Error::recording(root, "no image in it", "give a folder of 16-bit PNGs"));
+        };
+        let mut sensor = self.sensor("depth images", size_of(first)?, intrinsics, OPENKINECT)?;
+        if self.code.is_some() {
+            return Ok((sensor, None));
+        }
+        let (code, why) = RawValues::of(images.iter()).code().map_err(|what| {
+            const REMEDY: &str =
+                "give --units-per-metre (1000 = mm, 5000 = TUM) or --raw-disparity";
+            Error::recording(root, what, REMEDY)
+        })?;
+        sensor.code = code;
+        Ok((sensor, Some(format!("{why}; give --units-per-metre or --raw-disparity if not"))))
+    }
+
+    /// A sensor with images of this size, px, as usual where nothing else is known.
+    /// An error when the intrinsics are no camera's, or none are usual for this size.
+    pub(crate) fn sensor(
+        &self,
+        name: &str,
+        (width, height): (usize, usize),
+        usual_intrinsics: [f64; 4],
+        usual_code: DepthCode,
+    ) -> Result<Sensor> {
+        let usual = ((width, height) == USUAL_SIZE).then_some(usual_intrinsics);
+        let intrinsics = self.intrinsics.or(usual).ok_or_else(|| Error::Argument {
+            what: format!("nothing tells the intrinsics of images of {width} x {height} px"),
+            remedy: "give --intrinsics fx,fy,cx,cy in pixels",
+        })?;
+        let [fx, fy, cx, cy] = intrinsics;
+        let sensor = Sensor {
+            name: name.into(),
+            serial: None,
+            mode: None,
+            camera: Camera { width, height, fx, fy, cx, cy, distortion: None },
+            baseline_m: self.baseline_m,
+            code: self.code.unwrap_or(usual_code),
+        };
+        match sensor.fault() {
+            Some(what) => Err(Error::Argument {
+                what: format!("--intrinsics {}: {what}", intrinsics.map(shortest).join(",")),
+                remedy: "give fx,fy,cx,cy in pixels",
+            }),
+            None => Ok(sensor),
+        }
+    }
+}

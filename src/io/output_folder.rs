@@ -1,0 +1,316 @@
+//! The one rule for what a command leaves behind.
+//!
+//! A folder is filled beside its place and put there when it is whole: until then no reader takes it
+//! for a result, however the run ends. It goes to a new or empty place, or over the results of an
+//! earlier run of the same command; over anything else only when forced. It never goes into an input.
+
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::folder::INDEX;
+use super::layout::{DEPTH_LIST, DESCRIPTION};
+use super::output::{entries, write_atomic};
+use super::unfinished::{Open, discard, register};
+use crate::error::{Error, Result};
+
+/// What a command fills its folder with.
+#[derive(Debug, Clone, Copy)]
+pub enum Leaves {
+    /// Files and folders of these names; one that ends in `-` stands for all that begin so.
+    Results {
+        names: &'static [&'static str],
+        /// Of them, what no other command writes: where none is there, the rest is somebody else's.
+        marks: &'static [&'static str],
+    },
+    /// A recording or a sequence: all that is in the folder belongs to it.
+    Recording,
+}
+
+/// Beginning of the names of folders that are being filled.
+const UNFINISHED: &str = ".kinoise-";
+
+/// A folder on its way; thrown away when dropped before [`OutputFolder::finish`].
+#[derive(Debug)]
+pub struct OutputFolder {
+    place: PathBuf,
+    staging: PathBuf,
+    leaves: Leaves,
+    stands: Stands,
+    forced: bool,
+    /// Folders made for this one, the innermost first.
+    parents: Vec<PathBuf>,
+    done: bool,
+}
+
+/// What was at the place in the beginning.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Stands {
+    Nothing,
+    Empty,
+    /// Results of the same command, or a recording to be replaced.
+    Earlier,
+    /// What others wrote: it stays, but for what has the same name.
+    Others,
+}
+
+impl OutputFolder {
+    /// Find out whether the place may be written, before the work begins. `inputs` are the files and
+    /// folders that are read; `force` writes where others have written.
+    /// An error when it may not, or cannot.
+    pub fn begin(place: &Path, leaves: Leaves, inputs: &[&Path], force: bool) -> Result<Self> {
+        for input in inputs.iter().filter(|input| input.is_dir()) {
+            refuse_inside(place, input)?;
+        }
+        let stands = what_stands(place, leaves, force)?;
+        for input in inputs {
+            refuse_replacing(place, leaves, input)?;
+        }
+        let unique = format!("{UNFINISHED}{}-{}", std::process::id(), next_number());
+        let (parents, staging) = if stands == Stands::Nothing {
+            let absolute = std::path::absolute(place).map_err(|e| Error::write(place, e))?;
+            let parent = absolute.parent().unwrap_or(&absolute).to_path_buf();
+            (make_parents(&parent).map_err(|e| Error::write(place, e))?, parent.join(unique))
+        } else {
+            // Within, for it may be a mount or a link: renaming stays on one disk.
+            (Vec::new(), place.join(unique))
+        };
+        let folder = OutputFolder {
+            place: place.to_path_buf(),
+            staging,
+            leaves,
+            stands,
+            forced: force,
+            parents,
+            done: false,
+        };
+        let mut register = register();
+        fs::create_dir(&folder.staging).map_err(|e| Error::write(place, e))?;
+        register.open.push(Open {
+            place: folder.place.clone(),
+            staging: folder.staging.clone(),
+            parents: folder.parents.clone(),
+            stood: stands != Stands::Nothing,
+        });
+        drop(register);
+        Ok(folder)
+    }
+
+    /// Where to write.
+    pub fn path(&self) -> &Path {
+        &self.staging
+    }
+
+    /// Where it will stand.
+    pub fn place(&self) -> &Path {
+        &self.place
+    }
+
+    /// Is it to take the place of earlier results?
+    pub fn replaces(&self) -> bool {
+        self.stands == Stands::Earlier
+    }
+
+    /// Was it begun with `force`?
+    pub fn forced(&self) -> bool {
+        self.forced
+    }
+
+    /// Write one file of the output.
+    /// An error when the folder has become unwritable or the disk is full.
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
+        write_atomic(&self.staging.join(name), bytes)
+    }
+
+    /// Put it in its place.
+    /// An error when that has become impossible; what was written is then kept where it was filled, as
+    /// the message says.
+    pub fn finish(mut self) -> Result<()> {
+        // Held throughout: an interruption finds the folder whole or not there.
+        let mut register = register();
+        let put = match self.stands {
+            Stands::Nothing => fs::rename(&self.staging, &self.place),
+            _ => self.put_inside(),
+        };
+        self.done = true;
+        register.open.retain(|open| open.staging != self.staging);
+        put.map_err(|cause| Error::Recording {
+            path: self.place.clone(),
+            what: format!("{cause}: the results are kept in {}", self.staging.display()),
+            remedy: "move them where they shall be",
+        })?;
+        register.finished.push(self.place.clone());
+        Ok(())
+    }
+
+    /// Into the folder that is there, what marks it as whole last.
+    fn put_inside(&self) -> std::io::Result<()> {
+        let mut new = names(&self.staging)?;
+        new.sort_by_key(|name| (self.comes_last(name), name.clone()));
+        let old = self.staging.with_extension("old");
+        let aside = |name: &OsString| {
+            fs::create_dir_all(&old)?;
+            fs::rename(self.place.join(name), old.join(name))
+        };
+        for name in names(&self.place)?.iter().filter(|name| !is_unfinished(name)) {
+            let from = self.place.join(name);
+            let replaced = match (self.leaves, self.stands) {
+                (Leaves::Recording, _) => true,
+                (_, Stands::Earlier) if !from.is_dir() => !new.contains(name),
+                _ => from.is_dir() && new.contains(name),
+            };
+            if replaced {
+                aside(name)?;
+            }
+        }
+        for name in &new {
+            fs::rename(self.staging.join(name), self.place.join(name))?;
+        }
+        fs::remove_dir(&self.staging)?;
+        if old.exists() { fs::remove_dir_all(&old) } else { Ok(()) }
+    }
+
+    fn comes_last(&self, name: &OsString) -> bool {
+        let name = name.to_string_lossy();
+        match self.leaves {
+            Leaves::Recording => is_description(&name),
+            Leaves::Results { marks, .. } => marks.contains(&&*name),
+        }
+    }
+}
+
+impl Drop for OutputFolder {
+    fn drop(&mut self) {
+        if !self.done {
+            let mut register = register();
+            register.open.retain(|open| open.staging != self.staging);
+            discard(&self.staging, &self.parents);
+        }
+    }
+}
+
+fn next_number() -> usize {
+    static NEXT: AtomicUsize = AtomicUsize::new(0);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
+fn names(folder: &Path) -> std::io::Result<Vec<OsString>> {
+    fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name())).collect()
+}
+
+fn is_unfinished(name: &OsString) -> bool {
+    name.to_string_lossy().starts_with(UNFINISHED)
+}
+
+/// Without which a folder is no recording, and which therefore comes last.
+pub(crate) fn is_description(name: &str) -> bool {
+    [DESCRIPTION, INDEX, DEPTH_LIST].contains(&name)
+}
+
+/// Make the folders that are not there; those that were made, the innermost first.
+fn make_parents(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let missing = folder.ancestors().take_while(|f| !f.exists()).map(Path::to_path_buf).collect();
+    fs::create_dir_all(folder).map(|()| missing)
+}
+
+/// May it be written?
+fn what_stands(place: &Path, leaves: Leaves, force: bool) -> Result<Stands> {
+    if fs::symlink_metadata(place).is_err() {
+        return Ok(Stands::Nothing);
+    }
+    if !place.is_dir() {
+        let cause = std::io::Error::from(std::io::ErrorKind::NotADirectory);
+        return Err(Error::write(place, cause));
+    }
+    let there: Vec<String> = entries(place)?
+        .iter()
+        .filter_map(|path| path.file_name().map(|name| name.to_string_lossy().into_owned()))
+        .filter(|name| !name.starts_with(UNFINISHED))
+        .collect();
+    if there.is_empty() {
+        return Ok(Stands::Empty);
+    }
+    let refuse = |what: String, remedy| Err(Error::recording(place, what, remedy));
+    match leaves {
+        Leaves::Recording if !there.iter().any(|name| is_description(name)) => refuse(
+            format!("the folder is not empty (it holds {})", listed(&there)),
+            "choose a new folder for the recording",
+        ),
+        Leaves::Recording if force => Ok(Stands::Earlier),
+        Leaves::Recording => refuse(
+            "the folder is not empty: it holds a recording".into(),
+            "choose a new folder, or give --force to replace what is there",
+        ),
+        Leaves::Results { names, marks } => {
+            let known = |name: &str| {
+                names.iter().any(|n| *n == name || (n.ends_with('-') && name.starts_with(n)))
+            };
+            let mut others = there.clone();
+            // A file of a common name is this command's where its mark stands beside it.
+            let marked = there.iter().any(|name| marks.contains(&name.as_str()));
+            others.retain(|name| !(marked && known(name)));
+            match (others.is_empty(), force) {
+                (true, _) => Ok(Stands::Earlier),
+                (_, true) => Ok(Stands::Others),
+                _ => refuse(
+                    format!("the folder holds {}, not of this command", listed(&others)),
+                    "choose a new folder, or give --force to write beside it and over what has the same name",
+                ),
+            }
+        }
+    }
+}
+
+/// A few of the names.
+fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 3;
+    let shown = names.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(SHOWN) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
+    }
+}
+
+/// An error when what is written would take the place of `input`.
+fn refuse_replacing(place: &Path, leaves: Leaves, input: &Path) -> Result<()> {
+    // What is not there is its reader's to report.
+    let Ok(input) = input.canonicalize() else { return Ok(()) };
+    let place_is = settled(place)?;
+    let Ok(within) = input.strip_prefix(&place_is) else { return Ok(()) };
+    let first = within.iter().next().unwrap_or_default().to_string_lossy();
+    let replaced = match leaves {
+        Leaves::Recording => true,
+        Leaves::Results { names, .. } => names.contains(&&*first),
+    };
+    if replaced {
+        let what = format!("the output would replace {}, which is read", input.display());
+        return Err(Error::recording(place, what, "choose a folder elsewhere"));
+    }
+    Ok(())
+}
+
+/// An error when `place` lies in the folder `input`, or is it: it would become part of what is read.
+pub fn refuse_inside(place: &Path, input: &Path) -> Result<()> {
+    let input = input.canonicalize().map_err(|e| Error::read(input, e))?;
+    if settled(place)?.starts_with(input) {
+        let what = "the output would lie inside the recording that is read";
+        return Err(Error::recording(place, what, "choose a folder elsewhere"));
+    }
+    Ok(())
+}
+
+/// Without links. What does not exist yet has no canonical name; the folder it will stand in has.
+fn settled(place: &Path) -> Result<PathBuf> {
+    let absolute = std::path::absolute(place).map_err(|e| Error::write(place, e))?;
+    for folder in absolute.ancestors() {
+        if let Ok(standing) = folder.canonicalize() {
+            let rest = absolute.strip_prefix(folder).unwrap_or(Path::new(""));
+            return Ok(if rest.as_os_str().is_empty() { standing } else { standing.join(rest) });
+        }
+    }
+    Ok(absolute)
+}
+
+#[cfg(test)]
+mod tests;

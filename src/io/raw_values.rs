@@ -1,0 +1,301 @@
+//! What the raw values of depth images say of their unit: whether they can be what they are taken for,
+//! and, in a folder that does not say, what they are.
+
+use std::path::Path;
+
+use super::images::decode_file;
+use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
+use crate::stats::{median, quantile};
+use crate::units::{decimals, shortest};
+
+/// z = 1/(3.33095 - 0.0030711 raw): the fit OpenKinect users have shared since 2010.
+pub(super) const OPENKINECT: DepthCode = DepthCode::Disparity {
+    offset: 3.330_949_516_1,
+    slope: -0.003_071_101_6,
+    invalid: KINECT_NO_MEASUREMENT,
+};
+
+/// Frames that are looked at, spread over all.
+const MAX_FRAMES: usize = 12;
+/// What some sensors write for "no measurement" beside 0 (7-Scenes).
+const ALL_ONES: usize = u16::MAX as usize;
+const NO_DISPARITY: usize = KINECT_NO_MEASUREMENT as usize;
+/// OpenKinect's formula has its pole at 1084.6: no Kinect v1 sends what is above, but for 2047.
+const MAX_DISPARITY: usize = 1092;
+/// Of the pixels: the matching window alone leaves 8 of 640 columns of a Kinect without a disparity,
+/// 1.2 %; in depths, 2047 is a value among thousands.
+const MIN_SHARE_WITHOUT: f64 = 0.001;
+/// Of the values with a depth: glitches of the readout, of which no real recording at hand has any.
+const MAX_STRAY_SHARE: f64 = 1e-4;
+
+/// Step of a Kinect v1's disparity in inverse depth, 1/m: measured on the 39 views of Herrera,
+/// Kannala and Heikkila (2012), z steps of 2.86e-3 z^2.
+const KINECT_STEP: f64 = 2.86e-3;
+/// Units in a metre that people write: OpenNI and ROS; TUM.
+const USUAL_UNITS: [f64; 2] = [1000.0, 5000.0];
+/// The four real recordings in such units at hand (7-Scenes, TUM freiburg1, MIT tabletop, JSK) give
+/// 0.98 to 0.99 of their unit; a stereo camera's 1/32 px in millimetres gives 5600, 1.12 of TUM's.
+const SAME_UNIT: f64 = 0.1;
+/// Steps below this many units are mostly the rounding's.
+const MIN_STEP: usize = 4;
+/// Steps without which a lattice is not believed, and the width of their middle half beside the
+/// median: 0.04 to 0.11 in those four. A synthetic scene without steps (ICL-NUIM) has 33 such gaps.
+const MIN_STEPS: usize = 40;
+const MAX_SPREAD: f64 = 0.15;
+/// Nothing that measures depth over a room does so nearer than this, m (a Kinect from 0.4 m).
+const NEAREST_M: f64 = 0.3;
+/// Structured light and time of flight of this class end there, m.
+const FARTHEST_M: f64 = 12.0;
+
+/// How often each raw value occurs in some of a recording's frames.
+pub(super) struct RawValues {
+    counts: Vec<u64>,
+    /// The median value of each frame that has any depth.
+    medians: Vec<f64>,
+}
+
+impl RawValues {
+    /// Frames that cannot be read are left out: their reader says why.
+    pub fn of(paths: impl ExactSizeIterator<Item = impl AsRef<Path>>) -> Self {
+        let stride = paths.len().div_ceil(MAX_FRAMES).max(1);
+        let mut values = RawValues { counts: vec![0; 1 + ALL_ONES], medians: Vec::new() };
+        for path in paths.step_by(stride) {
+            let Ok(frame) = decode_file(path.as_ref()) else { continue };
+            frame.raw.iter().for_each(|&raw| values.counts[usize::from(raw)] += 1);
+            let is_depth = |raw: &u16| !matches!(usize::from(*raw), 0 | NO_DISPARITY | ALL_ONES);
+            let mut depths: Vec<f64> =
+                frame.raw.into_iter().filter(is_depth).map(f64::from).collect();
+            if !depths.is_empty() {
+                values.medians.push(median(&mut depths));
+            }
+        }
+        values
+    }
+
+    fn count(&self, range: std::ops::RangeInclusive<usize>) -> u64 {
+        self.counts[range].iter().sum()
+    }
+
+    /// All that may be a depth in one code or another.
+    fn depths(&self) -> u64 {
+        self.count(1..=ALL_ONES - 1) - self.counts[NO_DISPARITY]
+    }
+
+    /// The smallest and the greatest value that may be a depth.
+    fn ends(&self) -> Option<[usize; 2]> {
+        let mut occurring = (1..ALL_ONES).filter(|&v| v != NO_DISPARITY && self.counts[v] > 0);
+        let first = occurring.next()?;
+        Some([first, occurring.next_back().unwrap_or(first)])
+    }
+
+    fn share_of_stray(&self, beyond: usize) -> f64 {
+        let stray = self.count(beyond + 1..=ALL_ONES - 1);
+        let code = if beyond < NO_DISPARITY { self.counts[NO_DISPARITY] } else { 0 };
+        (stray - code) as f64 / self.depths().max(1) as f64
+    }
+
+    /// The 11 bits of a Kinect v1: 2047 where there is no measurement, and nothing else above what
+    /// has a depth.
+    fn are_disparities(&self) -> bool {
+        let all: u64 = self.counts.iter().sum();
+        let without = self.counts[NO_DISPARITY] as f64 / all.max(1) as f64;
+        self.depths() > 0
+            && without > MIN_SHARE_WITHOUT
+            && self.share_of_stray(MAX_DISPARITY) < MAX_STRAY_SHARE
+    }
+
+    /// Units in a metre if these are the disparity steps of a Kinect: depths then lie
+    /// [`KINECT_STEP`] apart in their inverse.
+    fn kinect_units(&self) -> Option<f64> {
+        let occurring: Vec<usize> =
+            (1..ALL_ONES).filter(|&v| v != NO_DISPARITY && self.counts[v] > 0).collect();
+        let steps = occurring.windows(2).filter(|w| w[1] - w[0] >= MIN_STEP);
+        let mut inverse: Vec<f64> = steps.map(|w| 1.0 / w[0] as f64 - 1.0 / w[1] as f64).collect();
+        if inverse.len() < MIN_STEPS {
+            return None;
+        }
+        let mut at = |share: f64| quantile(&mut inverse, share);
+        let (low, middle, high) = (at(0.25)?, at(0.5)?, at(0.75)?);
+        (high - low < MAX_SPREAD * middle).then_some(KINECT_STEP / middle)
+    }
+
+    /// The usual unit that the steps show.
+    fn stepped_unit(&self) -> Option<f64> {
+        let units = self.kinect_units()?;
+        USUAL_UNITS.into_iter().find(|usual| (units / usual - 1.0).abs() < SAME_UNIT)
+    }
+
+    /// The code that the values can only be, and why; or what they leave open.
+    pub fn code(&self) -> Result<(DepthCode, String), String> {
+        let metric = |units_per_metre| DepthCode::Metric { units_per_metre, invalid: 0 };
+        if self.are_disparities() {
+            let why = "2047 marks missing pixels and no depth is above 1092: raw Kinect disparities, \
+                       by OpenKinect's formula (3.33095,-0.0030711)";
+            return Ok((OPENKINECT, why.into()));
+        }
+        let Some([first, last]) = self.ends() else {
+            return Err("no image shows a depth, so that nothing tells its unit".into());
+        };
+        if let Some(units) = self.stepped_unit() {
+            let named = if units == USUAL_UNITS[0] { "millimetres" } else { "5000 a metre" };
+            let why = format!("depth steps as a Kinect's does in {named}: taken as that");
+            return Ok((metric(units), why));
+        }
+        let [mm, tum] = USUAL_UNITS;
+        let [near, far] = ends_of(&self.medians);
+        // Values that are all below the pole may be disparities without a missing pixel.
+        let only_mm = near / tum < NEAREST_M && near / mm >= NEAREST_M && far / mm <= FARTHEST_M;
+        if only_mm && last > MAX_DISPARITY {
+            let why = format!(
+                "depth taken as millimetres ({:.2} to {:.2} m; at 5000 a metre the nearest image would lie at {:.2} m)",
+                first as f64 / mm,
+                last as f64 / mm,
+                near / tum
+            );
+            return Ok((metric(mm), why));
+        }
+        let [first, last] = [first, last].map(|v| v as f64);
+        let mut readings = format!(
+            "{:.2} to {:.2} m in millimetres, {:.2} to {:.2} m at 5000 a metre",
+            first / mm,
+            last / mm,
+            first / tum,
+            last / tum
+        );
+        if last <= MAX_DISPARITY as f64 {
+            readings += ", or a Kinect's raw disparities";
+        }
+        Err(format!(
+            "a plain folder does not say how raw values become metres, and these ({first} to {last}) leave it open: {readings}"
+        ))
+    }
+
+    /// Why these values cannot be what `code` takes them for, and what to do.
+    pub fn contradiction(&self, code: DepthCode) -> Option<(String, &'static str)> {
+        match code {
+            DepthCode::Metric { invalid, .. } if invalid != KINECT_NO_MEASUREMENT => {
+                let [_, last] = self.ends()?;
+                let all: u64 = self.counts.iter().sum();
+                let share = 1e2 * self.counts[NO_DISPARITY] as f64 / all as f64;
+                self.are_disparities().then(|| {
+                    let what = format!(
+                        "read as lengths, but {share:.1} % of the pixels hold 2047 and none of the others is above {last}: these are raw disparities of a Kinect v1"
+                    );
+                    let remedy = "give --raw-disparity (3.33095,-0.0030711 is OpenKinect's), or raw_disparity in recording.json in place of units_per_metre";
+                    (what, remedy)
+                })
+            }
+            DepthCode::Disparity { invalid: KINECT_NO_MEASUREMENT, .. } => {
+                let [_, last] = self.ends()?;
+                (self.share_of_stray(NO_DISPARITY) > MAX_STRAY_SHARE).then(|| {
+                    let what = format!(
+                        "read as raw disparities, which have 11 bits, but values up to {last} occur: these are lengths"
+                    );
+                    let remedy = "give --units-per-metre (1000 = mm, 5000 = TUM), or units_per_metre in recording.json in place of raw_disparity";
+                    (what, remedy)
+                })
+            }
+            _ => None,
+        }
+    }
+
+    /// Why these values may well not be what `code` takes them for.
+    pub fn doubt(&self, code: DepthCode) -> Option<String> {
+        let DepthCode::Metric { units_per_metre: given, .. } = code else { return None };
+        // A unit that is off by a few percent is a scale, which a diagnosis names.
+        let other = self.stepped_unit().filter(|unit| !(0.5..2.0).contains(&(unit / given)));
+        let shown = shortest(given);
+        if let Some(unit) = other {
+            return Some(format!(
+                "depth is read at {shown} units a metre, but steps as a Kinect's does at {unit}: check --units-per-metre, or units_per_metre in recording.json"
+            ));
+        }
+        let [near, far] = ends_of(&self.medians).map(|raw| raw / given);
+        let odd = near < NEAREST_M || far > FARTHEST_M;
+        (odd && !self.medians.is_empty()).then(|| {
+            let [near, far] = [near, far].map(|z| decimals(z, 2));
+            format!(
+                "at {shown} units a metre the images lie {near} to {far} m away, where a sensor of this kind sees {NEAREST_M} to {FARTHEST_M} m: check --units-per-metre, or units_per_metre in recording.json"
+            )
+        })
+    }
+}
+
+fn ends_of(values: &[f64]) -> [f64; 2] {
+    crate::stats::range(values.iter().copied())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Frames of a wall at these distances, m, in a code; `stepped` as a Kinect's disparities are.
+    fn values(distances_m: &[f64], units: f64, stepped: bool) -> RawValues {
+        let mut values = RawValues { counts: vec![0; 1 + ALL_ONES], medians: Vec::new() };
+        for &z in distances_m {
+            let tilted = (0..20_000).map(|i| z * (1.0 + 0.3 * (f64::from(i) / 20_000.0 - 0.5)));
+            let on_lattice = |z: f64| KINECT_STEP * (1.0 / z / KINECT_STEP).round();
+            let seen = tilted.map(|z| if stepped { 1.0 / on_lattice(z) } else { z });
+            let raw: Vec<usize> = seen.map(|z| (z * units).round() as usize).collect();
+            raw.iter().for_each(|&v| values.counts[v] += 1);
+            values.medians.push(median(&mut raw.iter().map(|&v| v as f64).collect::<Vec<_>>()));
+        }
+        values
+    }
+
+    fn units(values: &RawValues) -> Option<f64> {
+        match values.code().ok()?.0 {
+            DepthCode::Metric { units_per_metre, .. } => Some(units_per_metre),
+            DepthCode::Disparity { .. } => None,
+        }
+    }
+
+    #[test]
+    fn the_steps_of_a_kinect_tell_its_unit() {
+        for unit in USUAL_UNITS {
+            let seen = values(&[1.6, 2.0, 2.7, 3.5], unit, true);
+            assert_eq!(units(&seen), Some(unit), "{:?}", seen.kinect_units());
+            let other = if unit == 1000.0 { 5000.0 } else { 1000.0 };
+            let code = |units_per_metre| DepthCode::Metric { units_per_metre, invalid: 0 };
+            assert!(seen.doubt(code(other)).is_some_and(|d| d.contains("steps as a Kinect's")));
+            assert_eq!(seen.doubt(code(unit)), None);
+            assert_eq!(seen.doubt(code(1.035 * unit)), None, "a scale");
+        }
+    }
+
+    /// 1/32 px of a stereo camera of 0.095 m and 640 px are no Kinect's steps.
+    #[test]
+    fn another_lattice_decides_nothing() {
+        let mut seen = values(&[2.0, 3.0, 4.0, 6.0], 1000.0, true);
+        assert_eq!(seen.stepped_unit(), Some(1000.0));
+        seen = values(&[4.0, 6.0, 8.0], 1000.0 * 5.58, true);
+        assert_eq!(seen.stepped_unit(), None, "{:?}", seen.kinect_units());
+    }
+
+    #[test]
+    fn range_tells_millimetres_and_nothing_else() {
+        assert_eq!(units(&values(&[1.0, 2.0, 4.0], 1000.0, false)), Some(1000.0));
+        let open = values(&[2.0, 4.0], 1000.0, false).code().unwrap_err();
+        assert!(open.contains("1.70 to 4.60 m in millimetres, 0.34 to 0.92 m at 5000"), "{open}");
+        assert!(values(&[1.0, 2.0], 5000.0, false).code().is_err());
+        let low = values(&[0.6, 0.7], 1000.0, false).code().unwrap_err();
+        assert!(low.contains("raw disparities"), "{low}");
+    }
+
+    #[test]
+    fn the_code_2047_tells_disparities() {
+        let mut seen = values(&[0.5, 0.7, 0.9], 1000.0, false);
+        let lengths = DepthCode::Metric { units_per_metre: 1000.0, invalid: 0 };
+        assert!(seen.contradiction(lengths).is_none());
+        assert!(seen.contradiction(OPENKINECT).is_none());
+        seen.counts[NO_DISPARITY] = 2000;
+        assert_eq!(seen.code().map(|c| c.0), Ok(OPENKINECT));
+        let (what, remedy) = seen.contradiction(lengths).unwrap();
+        assert!(what.contains("2047") && remedy.contains("--raw-disparity"), "{what}");
+        // A value above the pole is a depth in millimetres, 2047 among them.
+        seen.counts[1800] = 500;
+        assert!(seen.contradiction(lengths).is_none());
+        seen.counts[3000] = 500;
+        assert!(seen.contradiction(OPENKINECT).unwrap().0.contains("up to 3000"));
+    }
+}

@@ -1,0 +1,69 @@
+//! Every effect of the catalogue, filmed at its typical size where it has something to act on, and
+//! diagnosed: what is printed of a finding must be an effect that the simulator takes.
+
+use kinoise::diagnose::{DiagnoseOptions, Finding, Status, diagnose};
+use kinoise::effects::{Active, CATALOGUE};
+use kinoise::io::{Assumed, open};
+use kinoise::scene::{PATCH_SIDE_M, Print};
+use kinoise::simulate::{Grid, Physics, Scenery, Shoot, kinect_v1, plan_grid};
+use kinoise::{NoiseModel, Seed, SigmaModel};
+
+use crate::common;
+
+/// The sensor of the demo at half its size, and its views.
+fn film(effect: Active, frames: usize) -> Shoot {
+    let distances_m = vec![1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0];
+    let tilts_rad = [0.0f64, 35.0, 60.0, 74.0].map(f64::to_radians).to_vec();
+    let poses = Grid { distances_m, tilts_rad }.views_towards(&[0.0, 1.75]);
+    let scenery = Scenery {
+        print: Print::Patches(PATCH_SIDE_M),
+        wall_gap_m: Some(0.6),
+        reference_error_m: Some(0.003),
+        conditions: true,
+        ..Scenery::bare(common::BOARD)
+    };
+    Shoot {
+        sensor: kinect_v1(4),
+        views: plan_grid(&poses, &scenery, frames, true, Seed(1)),
+        physics: Physics::Formula { sigma: SigmaModel::paper(), effects: vec![effect] },
+        infrared: true,
+        seed: Seed(1),
+    }
+}
+
+fn findings(effect: Active) -> Vec<Finding> {
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a temporary folder");
+    film(effect, 4).write_quickly(folder.path(), &|_, _| ()).expect("written");
+    let recording = open(folder.path(), &Assumed::default()).expect("it opens");
+    let options = DiagnoseOptions::default();
+    let done = diagnose(&recording, &NoiseModel::paper(), &options, &|_, _| ());
+    done.expect("diagnosed").diagnosis.findings
+}
+
+#[test]
+fn what_is_printed_of_every_named_finding_simulates() {
+    let (mut led, mut broken) = (Vec::new(), Vec::new());
+    for effect in CATALOGUE {
+        let id = effect.card().id;
+        for finding in findings(Active::typical(id).expect("known")) {
+            let named = matches!(finding.status, Status::Named | Status::OneOf);
+            let Some(name) = finding.effect.filter(|_| named) else { continue };
+            let printed = finding.as_effect().map(|a| a.argument());
+            println!("{id}: {name}: {printed:?}");
+            let Some(Ok(read)) = printed.as_deref().map(Active::parse) else {
+                broken.push(format!("{id}: {name} {:?}", finding.parameters));
+                continue;
+            };
+            let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder");
+            let mut short = film(read, 1);
+            short.views.truncate(2);
+            short.write_quickly(folder.path(), &|_, _| ()).expect("it simulates");
+            if name == id {
+                led.push(id);
+            }
+        }
+    }
+    assert!(broken.is_empty(), "{broken:#?}");
+    // So that this is not the test of an empty list.
+    assert!(2 * led.len() > CATALOGUE.len(), "{led:?}");
+}
