@@ -70,7 +70,7 @@ impl Sealed {
             .iter()
             .map(|p| Compared::of(p, self.effect.settings.named(card, p.name), answer.finding))
             .collect();
-        let mut lines = vec!["The seal is opened:".to_string()];
+        let mut lines = vec!["\nThe seal is opened:".to_string()];
         lines.extend(self.text.lines().map(|line| format!("  {line}")));
         lines.push(format!("  SHA-256 {}\n", self.hash()));
         lines.push(answer.sentence(card, diagnosis));

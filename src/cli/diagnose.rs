@@ -79,7 +79,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     let held = HeldAgainst { simulated: simulated.as_ref(), model: &model, options: &options };
     let diagnosis = examine(&recording, &held, out)?;
     global.print_json(&serde_json::to_value(&diagnosis)?)?;
-    arguments.reproductions(&diagnosis).iter().for_each(|line| say(line));
+    arguments.reproductions(&diagnosis).iter().for_each(say);
     next_step(&arguments.next(&diagnosis));
     let found = diagnosis.verdict == Verdict::Mismatch && !arguments.exit_zero;
     Ok(if found { FOUND } else { 0 })
