@@ -11,6 +11,7 @@ use kinoise::{CalibrateOptions, Calibration, Form, Recording, SigmaKind, model_o
 
 use super::calibrate_summary::{as_json, summary};
 use super::common::{Global, Input, notes, one_of, say, source_date, with_bar};
+use super::origin::origin;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -141,6 +142,7 @@ fn table(file: &Path, output: &Path, fitting: &Fitting, global: &Global) -> anyh
         measurements: None,
         calibration: &calibration,
         overlays: &fitting.overlay,
+        origin: &origin(file, output, global.seed),
     };
     write_outputs(&OutputDir::create(output)?, &page)?;
     global.print_json(&as_json(&calibration, None))
@@ -176,6 +178,7 @@ pub fn calibrate(
         measurements: Some(&measurements),
         calibration: &calibration,
         overlays,
+        origin: &origin(&recording.root, output, options.measure.seed.0),
     };
     write_outputs(&out, &page)?;
     Ok((measurements, calibration))
@@ -185,8 +188,11 @@ pub fn calibrate(
 fn write_outputs(out: &OutputDir, page: &CalibrationPage<'_>) -> anyhow::Result<()> {
     let calibration = page.calibration;
     let (table, sigma) = (&calibration.table, &calibration.model.sigma);
-    let charts =
-        [("sigma", figure2(table, sigma, page.overlays)), ("sigma_map", sigma_map(table, sigma))];
+    let names = page.names();
+    let charts = [
+        ("sigma", figure2(table, sigma, page.overlays, &names)),
+        ("sigma_map", sigma_map(table, sigma, &names)),
+    ];
     for (name, chart) in charts {
         out.write(&format!("{name}.svg"), chart.svg()?.as_bytes())?;
         out.write(&format!("{name}.png"), &chart.png()?)?;

@@ -8,6 +8,7 @@ use kinoise::report::{comparison_figures, comparison_page};
 use kinoise::sequence::open;
 
 use super::common::{Global, Input, Model, Thinning, notes, say};
+use super::origin::origin;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -50,7 +51,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     for (name, svg) in comparison_figures(&comparison)? {
         output.write(name, svg.as_bytes())?;
     }
-    output.write("report.html", comparison_page(&comparison)?.as_bytes())?;
+    let origin = origin(&arguments.sequence, &arguments.output, global.seed);
+    output.write("report.html", comparison_page(&comparison, &origin)?.as_bytes())?;
     notes(&sequence.remarks);
     say(text);
     say(format!("wrote {}", arguments.output.join("report.html").display()));

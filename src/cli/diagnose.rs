@@ -14,6 +14,7 @@ use kinoise::view::ViewNotes;
 use kinoise::{Form, NoiseModel, Recording, Seed, Sensor};
 
 use super::common::{Global, Input, say, source_date, with_bar};
+use super::origin::origin;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -85,7 +86,8 @@ pub fn examine(
     let held_against = if simulated.is_some() { "simulation" } else { "model" };
     let title = format!("What the {held_against} of {} leaves out", recording.sensor.name);
     let pictures = with_twins(&done, &recording.sensor, model, global.seed());
-    let page = DiagnosisPage { title: &title, diagnosis, pictures: &pictures };
+    let origin = &origin(&recording.root, output, global.seed);
+    let page = DiagnosisPage { title: &title, diagnosis, pictures: &pictures, origin };
     out.write("report.html", diagnosis_page(&page)?.as_bytes())?;
     say(summary(diagnosis));
     Ok(done.diagnosis)

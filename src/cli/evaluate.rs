@@ -1,11 +1,15 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};
-use kinoise::evaluate::{Delta, Evaluation, Spread, evaluate_files};
+use kinoise::evaluate::{Delta, Evaluation, Spread, evaluate};
+use kinoise::io::OutputDir;
+use kinoise::report::{Against, Origin, evaluation_page};
+use kinoise::trajectory::read_benchmark;
 use serde_json::{Value, json};
 
 use super::common::{Global, say};
+use super::origin::origin;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -15,6 +19,9 @@ pub struct Arguments {
     /// Estimated poses in the TUM format
     #[arg(long, value_name = "FILE")]
     estimate: PathBuf,
+    /// Folder for evaluation.json, the plots and report.html
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
     /// Interval of the relative error
     #[arg(long, value_name = "N", default_value_t = 1.0, allow_hyphen_values = true)]
     delta: f64,
@@ -46,9 +53,29 @@ impl Arguments {
 }
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
-    let evaluation = evaluate_files(&arguments.truth, &arguments.estimate, arguments.delta()?)?;
+    let delta = arguments.delta()?;
+    let [truth, estimate] =
+        [read_benchmark(&arguments.truth)?.poses, read_benchmark(&arguments.estimate)?.poses];
+    let evaluation = evaluate(&truth, &estimate, delta)?;
     report(&evaluation, arguments);
+    if let Some(folder) = &arguments.output {
+        let against =
+            Against { truth: &truth, estimate: &estimate, evaluation: &evaluation, delta };
+        write(&against, folder, &origin(&arguments.estimate, folder, global.seed))?;
+    }
     global.print_json(&as_json(&evaluation))
+}
+
+fn write(against: &Against<'_>, folder: &Path, origin: &Origin) -> anyhow::Result<()> {
+    let output = OutputDir::create(folder)?;
+    let json = serde_json::to_string_pretty(&as_json(against.evaluation))?;
+    output.write("evaluation.json", format!("{json}\n").as_bytes())?;
+    for (name, chart) in against.charts() {
+        output.write(name, chart.svg()?.as_bytes())?;
+    }
+    let page = output.write("report.html", evaluation_page(against, origin)?.as_bytes())?;
+    say(format!("wrote {}", page.display()));
+    Ok(())
 }
 
 fn report(evaluation: &Evaluation, arguments: &Arguments) {

@@ -12,6 +12,7 @@ mod diagnose;
 mod effects;
 mod evaluate;
 mod map;
+mod origin;
 mod simulate;
 mod simulate_room;
 mod simulate_scene;

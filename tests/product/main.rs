@@ -21,6 +21,7 @@ mod map;
 mod measure;
 mod model_file;
 mod outliers;
+mod pages;
 mod room;
 mod speckle;
 mod target;

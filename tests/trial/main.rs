@@ -20,6 +20,7 @@ mod plan;
 mod predictor;
 mod proof;
 mod real;
+mod reliance;
 mod rounds;
 mod solver;
 mod speckle;

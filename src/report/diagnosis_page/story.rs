@@ -107,7 +107,7 @@ fn small_percent(share: f64) -> String {
     }
 }
 
-fn gained(diagnosis: &Diagnosis) -> Option<String> {
+pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
     let h = diagnosis.heldout.as_ref()?;
     Some(format!(
         "On {} kept aside the steady error goes from {} to {} and {} nats a view are gained [{}, {}]; `kinoise correct` alone takes every pixel from {} to {} px rms.",
