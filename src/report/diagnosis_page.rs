@@ -16,7 +16,7 @@ use super::axis::Axis;
 use super::document::{Origin, document, section};
 use super::numbers::degrees;
 use super::residuals::{residual_image, scale};
-use crate::diagnose::{Diagnosis, Finding, Reference, ViewPictures};
+use crate::diagnose::{Diagnosis, Finding, Reference, Status, ViewPictures};
 use crate::error::Result;
 
 /// What the page is about.
@@ -69,11 +69,12 @@ pub fn diagnosis_page(page: &DiagnosisPage<'_>) -> Result<String> {
     Ok(document(page.title, page.origin, &[], &body).into_string())
 }
 
-/// The findings that matter and those that do not, the largest in mm first.
+/// The findings that matter and those that do not, the largest in mm first, what cannot be seen last.
 fn by_size(findings: &[Finding]) -> (Vec<&Finding>, Vec<&Finding>) {
     let mut sorted: Vec<&Finding> = findings.iter().collect();
     let mm = |f: &Finding| if f.size.mm.is_finite() { f.size.mm.abs() } else { 0.0 };
-    sorted.sort_by(|a, b| mm(b).total_cmp(&mm(a)));
+    let unseen = |f: &Finding| f.status == Status::NotIdentifiable;
+    sorted.sort_by(|a, b| unseen(a).cmp(&unseen(b)).then(mm(b).total_cmp(&mm(a))));
     sorted.into_iter().partition(|f| !f.minor)
 }
 

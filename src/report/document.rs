@@ -67,7 +67,7 @@ fn footer(origin: &Origin, more: &[(String, Markup)]) -> Markup {
     let mut all = vec![
         ("made by".to_string(), html! { (version) }),
         ("on".into(), html! { (origin.created) }),
-        ("from".into(), html! { (origin.recording) }),
+        ("recording".into(), html! { (origin.recording) }),
         ("command".into(), html! { code { (origin.command) } }),
     ];
     all.extend(origin.seed.map(|seed| ("seed".into(), html! { (seed) })));
@@ -175,13 +175,16 @@ pub fn fold(title: &str, open: bool, content: &Markup) -> Markup {
     html! { details open[open] { summary { (title) } (content) } }
 }
 
-/// A chart with its caption, wide and narrow: the style shows the one that fits.
+/// A chart with its caption (none where its title says it), wide and narrow: the style shows the one
+/// that fits.
 ///
 /// # Errors
 /// When the chart cannot be drawn.
 pub fn figure(chart: &Chart, caption: &str) -> Result<Markup> {
     let label = if chart.title.is_empty() { caption } else { &chart.title };
-    Ok(html! { figure { (drawing(chart, label)?) figcaption { (caption) } } })
+    let caption = (caption != label || chart.title.is_empty()).then_some(caption);
+    let drawing = drawing(chart, label)?;
+    Ok(html! { figure { (drawing) @if let Some(words) = caption { figcaption { (words) } } } })
 }
 
 /// A chart without a caption.

@@ -56,10 +56,19 @@ function home() {
     return all.length ? (Math.min(...all) + Math.max(...all)) / 2 : 0;
   });
   const aspect = canvas.clientWidth / canvas.clientHeight || 1;
-  away = 0.3;
-  for (const p of inside) {
-    const [x, y, z] = seen(p);
-    away = Math.max(away, 1.06 * F * Math.max(Math.abs(x) / aspect, Math.abs(y)) - z, 0.1 - z);
+  // What is near looks larger: the middle of the window is not that of the room, so look again.
+  for (let round = 0; round < 6; round++) {
+    away = 0.3;
+    const places = inside.map(seen);
+    for (const [x, y, z] of places) {
+      away = Math.max(away, 1.06 * F * Math.max(Math.abs(x) / aspect, Math.abs(y)) - z, 0.1 - z);
+    }
+    const [right, down] = turn();
+    const off = [0, 1].map(k => {
+      const ends = places.map(p => p[k] / (p[2] + away));
+      return ends.length ? away * (Math.min(...ends) + Math.max(...ends)) / 2 : 0;
+    });
+    for (let k = 0; k < 3; k++) centre[k] += off[0] * right[k] + off[1] * down[k];
   }
 }
 function matrix() {

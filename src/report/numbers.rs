@@ -104,19 +104,20 @@ pub(super) fn formula(text: &str, value: &dyn Fn(&str) -> Option<f64>) -> Markup
     } }
 }
 
-/// The same as a line of Python (or of most languages), with all digits: `sigma_m = 0.0014*z**2`.
+/// The same as a line of Python, to six digits: `sigma_m = 0.0014*z**2`.
 pub(super) fn plain(text: &str, value: &dyn Fn(&str) -> Option<f64>) -> String {
     let (left, right) = text.split_once('=').unwrap_or(("sigma", text));
     let letters: Vec<char> = right.trim().chars().collect();
     let tokens = letters.chunk_by(|a, b| a.is_alphanumeric() && b.is_alphanumeric());
     let (mut plain, mut operand, mut power) = (String::new(), false, false);
+    let short = |v: f64| format!("{v:.5e}").parse().unwrap_or(v);
     for token in tokens.map(String::from_iter) {
         let starts = token == "(" || token.chars().all(char::is_alphanumeric);
         if starts && operand && !power {
             // Side by side is a product.
             plain = plain.trim_end().to_string() + "*";
         }
-        match (value(&token), token.as_str()) {
+        match (value(&token).map(short), token.as_str()) {
             (Some(v), _) if v < 0.0 => plain += &format!("({v})"),
             (Some(v), _) => plain += &v.to_string(),
             (None, "^") => plain += "**",

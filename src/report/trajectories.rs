@@ -30,6 +30,7 @@ pub(super) fn chart(title: &str, labels: [&str; 2], lines: Vec<Line>, equal: boo
     let extents = [extent(0), extent(1)];
     let extents = if equal { Chart::equal_units(extents) } else { extents };
     let mut chart = Chart::new(title, extents.map(|e| Axis::with_margin(e, MARGIN)), labels);
+    let several = lines.len() > 1;
     for (name, points, stroke) in lines {
         let every = points.len().div_ceil(MAX_TIPS).max(1);
         let tip = |[x, y]: &[f64; 2]| {
@@ -37,7 +38,9 @@ pub(super) fn chart(title: &str, labels: [&str; 2], lines: Vec<Line>, equal: boo
             ([*x, *y], format!("{name}: {} {x_text}, {} {y_text}", labels[0], labels[1]))
         };
         chart.tips.extend(points.iter().step_by(every).map(tip));
-        chart.legend.push(Entry::new([Sample::Line(stroke)], name));
+        if several {
+            chart.legend.push(Entry::new([Sample::Line(stroke)], name));
+        }
         chart.layers.push(Layer::Line(points, stroke));
     }
     chart

@@ -10,8 +10,8 @@ use super::{curve, parameters, table};
 use crate::capture::far_side;
 use crate::diagnose::{Finding, NextView, Status};
 use crate::error::Result;
-use crate::report::document::{drawing, facts, heading, list, prose, section};
-use crate::report::numbers::{fixed, p_value, percent, significant};
+use crate::report::document::{drawing, facts, fold, heading, list, prose, section};
+use crate::report::numbers::{count, fixed, p_value, percent, significant};
 use crate::terms::Statistic;
 
 /// Smaller probabilities are nil.
@@ -20,9 +20,17 @@ const MIN_PROBABILITY: f64 = 0.0005;
 const FACING_RAD: f64 = 0.0524;
 
 pub(super) fn findings(findings: &[&Finding]) -> Result<Markup> {
+    let blind = |f: &&&Finding| f.status == Status::NotIdentifiable;
+    let unseen = findings.iter().filter(blind).count();
     let cards = findings.iter().enumerate().map(card).collect::<Result<Vec<Markup>>>()?;
+    // The largest come first, so that those without a size are the last.
+    let (seen, hidden) = cards.split_at(cards.len() - unseen);
+    let title = format!("{} that these views cannot show", capital(&count(unseen, "effect")));
     Ok(html! { @if !cards.is_empty() {
-        (section("The findings one by one", &html! { @for card in cards { (card) } }))
+        (section("The findings one by one", &html! {
+            @for card in seen { (card) }
+            @if unseen > 0 { (fold(&title, seen.is_empty(), &html! { @for card in hidden { (card) } })) }
+        }))
     } })
 }
 

@@ -13,14 +13,16 @@ const COLUMNS: [&str; 8] =
     ["finding", ">size", ">times σ", ">name", ">chance", "what is off", "where", "~what to do"];
 
 pub(super) fn findings(main: &[&Finding], minor: &[&Finding]) -> Markup {
-    if main.is_empty() && minor.is_empty() {
+    // What cannot be seen has no size; its own parts come after the others'.
+    let seen = main.iter().enumerate().filter(|(_, f)| f.status != Status::NotIdentifiable);
+    let rows: Vec<Vec<Markup>> = seen.map(|(i, f)| line(i, f)).collect();
+    if rows.is_empty() && minor.is_empty() {
         return html! {};
     }
-    let rows = main.iter().enumerate().map(|(i, f)| line(f, Some(i)));
     section(
         "What was found",
         &html! {
-            @if !main.is_empty() {
+            @if !rows.is_empty() {
                 (table(&COLUMNS, rows))
                 p.note {
                     "Size: root mean square over the recording. Times σ: beside the noise of a single reading. Name: \
@@ -38,7 +40,7 @@ pub(super) fn title(i: usize, finding: &Finding) -> String {
     format!("{}. {}", i + 1, capital(&called(finding)))
 }
 
-fn line(f: &Finding, number: Option<usize>) -> Vec<Markup> {
+fn line(i: usize, f: &Finding) -> Vec<Markup> {
     let name = capital(&called(f));
     let size = match f.statistic {
         Statistic::Dropout => format!("{} of pixels", percent(f.size.sigma)),
@@ -48,10 +50,7 @@ fn line(f: &Finding, number: Option<usize>) -> Vec<Markup> {
     let likely = f.alternatives.first().and_then(|a| a.probability);
     let place = interval(f.axis, f.interval, f.unit);
     row![
-        html! { @match number {
-            Some(i) => a href={ "#" (slug(&title(i, f))) } { (name) },
-            None => (name),
-        } },
+        html! { a href={ "#" (slug(&title(i, f))) } { (name) } },
         size,
         html! { @if f.statistic == Statistic::Dropout { "–" } @else { (significant(f.size.sigma, 2)) } },
         html! { @if let Some(p) = likely { (percent(p)) } @else { "–" } },

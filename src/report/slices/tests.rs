@@ -1,3 +1,4 @@
+use super::held::MAX_GROUPS;
 use super::*;
 use crate::model::{Domain, Form};
 
