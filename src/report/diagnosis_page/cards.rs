@@ -3,8 +3,8 @@
 use maud::{Markup, html};
 
 use super::sentences::{
-    axis, badge, called, capital, chance, description, interval, mm, physics, sentence, statistic,
-    title,
+    axis, badge, called, capital, chance, description, halves, interval, mm, physics, sentence,
+    statistic, title,
 };
 use super::{curve, parameters, table};
 use crate::capture::far_side;
@@ -64,15 +64,6 @@ fn card((i, finding): (usize, &&Finding)) -> Result<Markup> {
             @if let Some(advice) = advice(finding) { div.todo { p { b { "What to do. " } (advice) } } }
         }
     })
-}
-
-/// Does either half of the views alone support it?
-pub(super) fn halves(replicated: Option<bool>) -> &'static str {
-    match replicated {
-        Some(true) => "Both show it alike",
-        Some(false) => "They do not agree: either one lacks it, or their sizes differ",
-        None => "Not tested",
-    }
 }
 
 /// Those that are known.

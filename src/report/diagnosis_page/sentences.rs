@@ -172,6 +172,15 @@ pub(super) fn interval(axis: Axis, [low, high]: [f64; 2], unit: &str) -> String 
     if low == high { format!("{low}{unit}") } else { format!("{low} to {high}{unit}") }
 }
 
+/// Does either half of the views alone support it?
+pub(super) fn halves(replicated: Option<bool>) -> &'static str {
+    match replicated {
+        Some(true) => "Both show it alike",
+        Some(false) => "They do not agree: either one lacks it, or their sizes differ",
+        None => "Not tested",
+    }
+}
+
 /// Of a size that already is in mm.
 pub(super) fn mm(value: f64) -> String {
     format!("{} mm", millimetres(1e-3 * value))

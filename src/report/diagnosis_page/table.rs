@@ -2,8 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::cards::halves;
-use super::sentences::{axis, called, capital, interval, mm, statistic};
+use super::sentences::{axis, called, capital, halves, interval, mm, statistic};
 use crate::diagnose::{Finding, Status};
 use crate::report::document::{fold, prose, row, section, slug, table};
 use crate::report::numbers::{count, fixed, p_value, percent, significant};
