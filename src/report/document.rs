@@ -107,8 +107,9 @@ pub fn answer(class: &str, mark: &str, sentence: &str, more: &Markup) -> Markup 
     html! { section.answer.(class) { p.mark { (mark) } p.sentence { (sentence) } (more) } }
 }
 
-/// A sentence whose `commands` stand between backticks.
+/// A sentence whose `commands` stand between backticks and whose squares are `z^2`.
 pub fn prose(text: &str) -> Markup {
+    let text = text.replace("^2", "²");
     html! { @for (i, part) in text.split('`').enumerate() {
         @if i % 2 == 1 { code { (part) } } @else { (part) }
     } }
@@ -250,6 +251,7 @@ mod tests {
         let bare = document("t", &Origin::default(), &[], &html! {}).into_string();
         assert!(!bare.contains("command"), "what is not known is not said");
         assert_eq!(prose("run `a <b>` now").into_string(), "run <code>a &lt;b&gt;</code> now");
+        assert_eq!(prose("with z^2").into_string(), "with z²");
     }
 
     #[test]

@@ -33,7 +33,9 @@ pub(super) fn degrees(radians: f64) -> String {
 pub(super) fn percent(share: f64) -> String {
     let near_an_end = |share: f64| share > 0.0 && share < 0.01;
     let decimals = usize::from(near_an_end(share) || near_an_end(1.0 - share));
-    format!("{} %", fixed(100.0 * share, decimals))
+    // What is not all does not read as all.
+    let shown = if share < 1.0 { share.min(0.999) } else { share };
+    format!("{} %", fixed(100.0 * shown, decimals))
 }
 
 /// `low – high`, or one number where they print alike.
@@ -176,7 +178,7 @@ mod tests {
         assert_eq!(millimetres(0.00231), "2.31");
         assert_eq!(millimetres(-0.0231), "−23.1");
         assert_eq!(degrees(std::f64::consts::PI), "180.0");
-        assert_eq!([percent(0.995), percent(1.0)], ["99.5 %", "100 %"]);
+        assert_eq!([0.995, 0.99996, 1.0].map(percent), ["99.5 %", "99.9 %", "100 %"]);
         assert_eq!(count(2, "cause"), "two causes");
     }
 

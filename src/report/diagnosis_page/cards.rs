@@ -124,7 +124,7 @@ fn alternatives(finding: &Finding) -> Markup {
     let effects = finding.alternatives.iter().map(|a| {
         html! {
             b { @if let Some(p) = a.probability { (percent(p)) " " } (title(a.effect)) }
-            ": " (description(a.effect)) " " code { (a.effect) }
+            ": " (prose(description(a.effect))) " " code { (a.effect) }
         }
     });
     let none = (none > MIN_PROBABILITY).then(|| html! { b { (percent(none)) " none of these" } });
