@@ -111,7 +111,8 @@ fn endpoints(proof: &Proof) -> Markup {
     let heads = ["~mark", ">figure", ">95 %", ">sets", "reached", ">p, good"];
     let line = |e: &Endpoint| {
         let interval = e.interval.map(|[low, high]| format!("{low:.2} to {high:.2}"));
-        let (n, p) = (e.n.to_string(), format!("{:.3}", e.p_adjusted[0]));
+        let (n, p) = (e.n.to_string(), e.p_adjusted[0]);
+        let p = if p < 0.001 { "< 0.001".into() } else { format!("{p:.3}") };
         let figures = [number(e.value), interval.unwrap_or_default(), n, reached(e).into(), p];
         let name = html! { b { (e.id) } br; (e.words) };
         std::iter::once(name).chain(row(figures)).collect()

@@ -157,11 +157,20 @@ fn other(proof: &Proof) -> Vec<Line> {
             format!("A parameter's 90 % interval holds the truth in {}.", of(r)),
         )
     });
+    let alarms = kind("real/halves", "false_alarm").map(|r| {
+        let text = "Half of a real recording against a model of the other half: alarm in";
+        (r.rate <= 1.0 - MOSTLY, format!("{text} {}.", of(r)))
+    });
     let mostly = |rate: Option<&Rate>, text: &str| {
         rate.map(|r| (r.rate >= MOSTLY, format!("{text}: {}.", of(r))))
     };
     [
         coverage,
+        alarms,
+        mostly(
+            kind("real/amnesia", "first_name"),
+            "The first name on a real recording whose model was robbed of a term, of those seen",
+        ),
         mostly(kind("rays/blind", "said_blind"), "What planes cannot show is said to be so"),
         mostly(
             kind("rays/drift", "recalibrate"),
