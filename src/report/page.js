@@ -5,7 +5,7 @@ function key(cell, numeric) {
   const text = cell ? cell.textContent.trim().replaceAll("−", "-").replaceAll(",", "") : "";
   if (!numeric) return text;
   const m = power.exec(text);
-  if (!m) return Infinity;
+  if (!m) return Number.MAX_VALUE;
   return m[1] ? +m[1] * 10 ** +m[2] : m[3] ? 10 ** +m[3] : +m[4];
 }
 for (const head of document.querySelectorAll("thead th")) {

@@ -92,7 +92,7 @@ fn pages(folder: &Path) -> Vec<(String, String)> {
             .into();
     files.push(folder.join("mapped/map.html"));
     let more = std::env::var_os("KINOISE_PAGES").unwrap_or_default();
-    files.extend(std::env::split_paths(&more));
+    files.extend(std::env::split_paths(&more).filter(|path| path.is_file()));
     let read = |path: &PathBuf| {
         let page = fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
         (path.display().to_string(), page)
