@@ -12,6 +12,7 @@ use kinoise::{CalibrateOptions, Calibration, Form, Recording, SigmaKind, model_o
 use super::calibrate_summary::{as_json, comparison, formula};
 use super::common::{Global, Input, one_of, source_date};
 use super::console::{beside, detail, detail_recording, next_step, notes, result, say, working};
+use super::origin::origin;
 use super::output::{CALIBRATION, begin};
 
 pub const EXAMPLES: &str = "\
@@ -166,6 +167,7 @@ fn table(file: &Path, output: &Path, fitting: &Fitting, global: &Global) -> anyh
         measurements: None,
         calibration: &calibration,
         overlays: &fitting.overlay,
+        origin: &origin(file, output, global.seed().0),
     };
     write_outputs(begin(output, CALIBRATION, &[file], global)?, &page)?;
     global.print_json(&as_json(&calibration, None))?;
@@ -204,6 +206,7 @@ pub fn calibrate(
         measurements: Some(&measurements),
         calibration: &calibration,
         overlays,
+        origin: &origin(&recording.root, out.place(), options.measure.seed.0),
     };
     write_outputs(out, &page)?;
     Ok((measurements, calibration))
@@ -226,8 +229,11 @@ fn measured_only(out: OutputFolder) -> anyhow::Result<String> {
 fn write_outputs(out: OutputFolder, page: &CalibrationPage<'_>) -> anyhow::Result<()> {
     let calibration = page.calibration;
     let (table, sigma) = (&calibration.table, &calibration.model.sigma);
-    let charts =
-        [("sigma", figure2(table, sigma, page.overlays)), ("sigma_map", sigma_map(table, sigma))];
+    let names = page.names();
+    let charts = [
+        ("sigma", figure2(table, sigma, page.overlays, &names)),
+        ("sigma_map", sigma_map(table, sigma, &names)),
+    ];
     working("drawing", |_| -> anyhow::Result<()> {
         for (name, chart) in charts {
             out.write(&format!("{name}.svg"), chart.svg()?.as_bytes())?;

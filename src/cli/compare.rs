@@ -8,6 +8,7 @@ use kinoise::sequence::open;
 
 use super::common::{Global, Input, Model, Thinning};
 use super::console::{beside, next_step, notes, result, say};
+use super::origin::origin;
 use super::output::{COMPARISON, begin};
 
 pub const EXAMPLES: &str = "\
@@ -59,7 +60,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     for (name, svg) in comparison_figures(&comparison)? {
         output.write(name, svg.as_bytes())?;
     }
-    output.write("report.html", comparison_page(&comparison)?.as_bytes())?;
+    let origin = origin(&arguments.sequence, &arguments.output, global.seed().0);
+    output.write("report.html", comparison_page(&comparison, &origin)?.as_bytes())?;
     output.finish()?;
     notes(&sequence.remarks);
     result(text);

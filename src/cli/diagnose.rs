@@ -18,6 +18,7 @@ use super::common::{Global, Input, model_again, source_date};
 use super::console::{
     beside, detail, detail_model, detail_recording, next_step, result, say, shell, working,
 };
+use super::origin::origin;
 use super::output::{DIAGNOSIS, begin};
 
 pub const EXAMPLES: &str = "\
@@ -156,7 +157,8 @@ pub fn examine(
     let title = format!("What the {held_against} of {} leaves out", recording.sensor.name);
     working("drawing the page", |_| -> anyhow::Result<()> {
         let pictures = with_twins(&done, &recording.sensor, model, options.seed);
-        let page = DiagnosisPage { title: &title, diagnosis, pictures: &pictures };
+        let origin = &origin(&recording.root, out.place(), options.seed.0);
+        let page = DiagnosisPage { title: &title, diagnosis, pictures: &pictures, origin };
         out.write("report.html", diagnosis_page(&page)?.as_bytes())?;
         Ok(())
     })?;

@@ -2,11 +2,16 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};
-use kinoise::evaluate::{Delta, Evaluation, Spread, evaluate_files};
+use kinoise::evaluate::{Delta, Evaluation, Spread, evaluate};
+use kinoise::io::OutputFolder;
+use kinoise::report::{Against, Origin, evaluation_page};
+use kinoise::trajectory::read_benchmark;
 use serde_json::{Value, json};
 
 use super::common::Global;
-use super::console::{notes, result};
+use super::console::{notes, result, say};
+use super::origin::origin;
+use super::output::{EVALUATION, begin};
 
 pub const EXAMPLES: &str = "\
 Examples:
@@ -21,6 +26,9 @@ pub struct Arguments {
     /// Estimated poses in the TUM format
     #[arg(long, value_name = "FILE")]
     estimate: PathBuf,
+    /// Folder for evaluation.json, the plots and report.html
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
     /// The interval over which the relative error is taken
     #[arg(long, value_name = "N", default_value_t = 1.0, allow_hyphen_values = true)]
     delta: f64,
@@ -52,9 +60,32 @@ impl Arguments {
 }
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
-    let evaluation = evaluate_files(&arguments.truth, &arguments.estimate, arguments.delta()?)?;
+    let delta = arguments.delta()?;
+    let [truth, estimate] =
+        [read_benchmark(&arguments.truth)?.poses, read_benchmark(&arguments.estimate)?.poses];
+    let evaluation = evaluate(&truth, &estimate, delta)?;
     report(&evaluation, arguments);
+    if let Some(folder) = &arguments.output {
+        let against =
+            Against { truth: &truth, estimate: &estimate, evaluation: &evaluation, delta };
+        let inputs = [&*arguments.truth, &*arguments.estimate];
+        let output = begin(folder, EVALUATION, &inputs, global)?;
+        write(&against, output, &origin(&arguments.estimate, folder, global.seed().0))?;
+    }
     global.print_json(&as_json(&evaluation))
+}
+
+fn write(against: &Against<'_>, output: OutputFolder, origin: &Origin) -> anyhow::Result<()> {
+    let json = serde_json::to_string_pretty(&as_json(against.evaluation))?;
+    output.write("evaluation.json", format!("{json}\n").as_bytes())?;
+    for (name, chart) in against.charts() {
+        output.write(name, chart.svg()?.as_bytes())?;
+    }
+    output.write("report.html", evaluation_page(against, origin)?.as_bytes())?;
+    let page = output.place().join("report.html");
+    output.finish()?;
+    say(format!("wrote {}", page.display()));
+    Ok(())
 }
 
 fn report(evaluation: &Evaluation, arguments: &Arguments) {

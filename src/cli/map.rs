@@ -6,7 +6,7 @@ use kinoise::io::OutputFolder;
 use kinoise::map::{
     self, Alignment, Init, Kernel, Mapped, Options, Stages, Weights, frames_csv, ply,
 };
-use kinoise::report::map_page;
+use kinoise::report::{Against, MapPage, map_page};
 use kinoise::sequence::{Sequence, open};
 use kinoise::trajectory::tum_text;
 use kinoise::{NoiseModel, Seed};
@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 
 use super::common::{Global, Input, Model, Thinning, one_of};
 use super::console::{beside, detail, next_step, notes, result, say, working};
+use super::origin::origin;
 use super::output::{MAP, begin};
 
 pub const EXAMPLES: &str = "\
@@ -153,9 +154,23 @@ pub fn follow(
     let seconds = begin.elapsed().as_secs_f64();
     let against = truth(sequence, &mapped);
     let stats = stats(&mapped, options, &against, seconds);
-    output.write("trajectory.txt", tum_text(&mapped.trajectory()).as_bytes())?;
+    let trajectory = mapped.trajectory();
+    output.write("trajectory.txt", tum_text(&trajectory).as_bytes())?;
     output.write("map.ply", &ply(&mapped.map))?;
-    output.write("map.html", map_page(title, &mapped.map, &mapped.frames).as_bytes())?;
+    let evaluation = against.as_ref().and_then(|t| t.as_ref().ok());
+    let page = MapPage {
+        title,
+        points: &mapped.map,
+        frames: &mapped.frames,
+        against: evaluation.map(|evaluation| Against {
+            truth: &sequence.truth,
+            estimate: &trajectory,
+            evaluation,
+            delta: DELTA,
+        }),
+        origin: &origin(&sequence.root, output.place(), options.seed.0),
+    };
+    output.write("map.html", map_page(&page)?.as_bytes())?;
     output.write("frames.csv", frames_csv(&mapped.frames).as_bytes())?;
     output.write("stats.json", serde_json::to_string_pretty(&stats)?.as_bytes())?;
     let folder = output.place().to_path_buf();
@@ -165,12 +180,15 @@ pub fn follow(
     Ok(stats)
 }
 
+/// Interval of the relative error.
+const DELTA: Delta = Delta::Seconds(1.0);
+
 /// Against the sequence's own true poses, where it has any.
 fn truth(sequence: &Sequence, mapped: &Mapped) -> Option<Result<Evaluation, String>> {
     if sequence.truth.is_empty() {
         return None;
     }
-    let evaluation = evaluate(&sequence.truth, &mapped.trajectory(), Delta::Seconds(1.0));
+    let evaluation = evaluate(&sequence.truth, &mapped.trajectory(), DELTA);
     Some(evaluation.map_err(|e| e.to_string()))
 }
 

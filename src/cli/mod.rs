@@ -14,6 +14,7 @@ mod diagnose;
 mod effects;
 mod evaluate;
 mod map;
+mod origin;
 mod output;
 mod simulate;
 mod simulate_room;

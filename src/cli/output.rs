@@ -46,6 +46,11 @@ pub const COMPARISON: Leaves = Leaves::Results {
     marks: &["tables.json"],
 };
 
+pub const EVALUATION: Leaves = Leaves::Results {
+    names: &["evaluation.json", "ate.svg", "rpe.svg", "paths.svg", "report.html"],
+    marks: &["evaluation.json"],
+};
+
 /// A calibration with the rest of the road in folders beside it.
 pub const DEMO: Leaves = Leaves::Results {
     names: &[

@@ -6,7 +6,8 @@ use kinoise::fleet::{
     Standing, UnitModel, compare,
 };
 
-use super::common::{Global, notes, say};
+use super::common::Global;
+use super::console::{notes, result};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
@@ -33,7 +34,7 @@ fn report(comparison: &Comparison) {
         1 => "1 unit".into(),
         n => format!("{n} units"),
     };
-    say(format!("{count} of \"{sensor}\", {width} x {height} px"));
+    result(format!("{count} of \"{sensor}\", {width} x {height} px"));
     if let Some(sigma) = &comparison.sigma {
         report_sigma(sigma);
     }
@@ -41,23 +42,23 @@ fn report(comparison: &Comparison) {
         report_bias(bias);
     }
     if !comparison.effects.is_empty() {
-        say("\neffects, as the models describe them");
+        result("\neffects, as the models describe them");
         comparison.effects.iter().for_each(report_effect);
     }
     if !comparison.changes.is_empty() {
-        say("\nchanged since?");
+        result("\nchanged since?");
         comparison.changes.iter().for_each(report_change);
     }
     notes(&comparison.remarks);
 }
 
 fn report_sigma(sigma: &SharedSigma) {
-    say("\nsigma along the optical axis, mm, with its standard error");
+    result("\nsigma along the optical axis, mm, with its standard error");
     let width = sigma.standings.iter().map(|s| s.unit.chars().count()).max().unwrap_or(0).max(13);
     let row = |name: &str, cell: &dyn Fn(usize) -> String| {
         let cells: Vec<String> =
             (0..sigma.places.len()).map(|i| format!("{:>17}", cell(i))).collect();
-        say(format!("{name:width$}{}", cells.concat()));
+        result(format!("{name:width$}{}", cells.concat()));
     };
     let at = |i: usize| &sigma.places[i];
     row("", &|i| format!("{:.2} m, {:.0} deg", at(i).z_m, at(i).theta_rad.to_degrees()));
@@ -96,13 +97,13 @@ fn report_sigma(sigma: &SharedSigma) {
 }
 
 fn report_bias(bias: &SharedBias) {
-    say("\nbias of depth over the picture, mm rms");
+    result("\nbias of depth over the picture, mm rms");
     for d in &bias.distances {
         let of = |u: &BiasOfUnit| {
             format!("{} {:.2} (error {:.2})", u.unit, 1e3 * u.rms_m, 1e3 * u.error_rms_m)
         };
         let units: Vec<String> = d.units.iter().map(of).collect();
-        say(format!(
+        result(format!(
             "{:.2} m: in common {:.2}, units scatter {:.2}; {}",
             d.z_m,
             1e3 * d.common_rms_m,
@@ -123,13 +124,18 @@ fn report_standings(what: &str, standings: &[Standing], how_far: &dyn Fn(usize) 
         standings.iter().filter(|s| s.is_own == own).map(|s| s.unit.as_str()).collect()
     };
     match names(false)[..] {
-        [] => say(format!("no two units share a {what}: each needs its own model")),
+        [] => result(format!("no two units share a {what}: each needs its own model")),
         ref core => {
-            say(format!("in common: {} share one {what} within the errors", core.join(", ")))
+            result(format!("in common: {} share one {what} within the errors", core.join(", ")))
         }
     }
     for (k, s) in standings.iter().enumerate().filter(|(_, s)| s.is_own) {
-        say(format!("its own: {} has another {what}: {}, {}", s.unit, how_far(k), p(s.p_adjusted)));
+        result(format!(
+            "its own: {} has another {what}: {}, {}",
+            s.unit,
+            how_far(k),
+            p(s.p_adjusted)
+        ));
     }
 }
 
@@ -146,7 +152,7 @@ fn report_effect(effect: &SharedEffect) {
         [] => String::new(),
         units => format!("; not found in {}", units.join(", ")),
     };
-    say(format!("{}: in {}{lacks}", effect.id, effect.found_in.join(", ")));
+    result(format!("{}: in {}{lacks}", effect.id, effect.found_in.join(", ")));
     for parameter in &effect.parameters {
         let one = |u: &ParameterOfUnit| {
             let error = u.std_error.filter(|s| *s > 0.0);
@@ -159,7 +165,7 @@ fn report_effect(effect: &SharedEffect) {
         });
         let unit = Some(parameter.unit).filter(|u| !u.is_empty());
         let unit = unit.map_or(String::new(), |u| format!(", {u}"));
-        say(format!("  {}{unit}: {}{shared}", parameter.name, units.join(", ")));
+        result(format!("  {}{unit}: {}{shared}", parameter.name, units.join(", ")));
     }
 }
 
@@ -173,7 +179,7 @@ fn report_change(change: &Change) {
         day(&change.to_created),
         change.to.display()
     );
-    say(span);
+    result(span);
     let sigma = &change.sigma;
     let verdict = |changed: bool| if changed { "has changed" } else { "no change found" };
     let places = sigma.places.iter().map(|at| {
@@ -189,12 +195,12 @@ fn report_change(change: &Change) {
             1e3 * high
         )
     });
-    say(format!("  sigma: {} ({})", verdict(sigma.changed), p(sigma.p_adjusted)));
-    places.for_each(say);
+    result(format!("  sigma: {} ({})", verdict(sigma.changed), p(sigma.p_adjusted)));
+    places.for_each(result);
     if let Some(bias) = &change.bias {
-        say(format!("  bias: {} ({})", verdict(bias.changed), p(bias.p_adjusted)));
+        result(format!("  bias: {} ({})", verdict(bias.changed), p(bias.p_adjusted)));
         for at in &bias.distances {
-            say(format!(
+            result(format!(
                 "    {:.2} m: by {:.2} mm rms over the picture (error {:.2})",
                 at.z_m,
                 1e3 * at.change_rms_m,
@@ -204,7 +210,7 @@ fn report_change(change: &Change) {
     }
     for (ids, when) in [(&change.found_now, "now"), (&change.found_then, "then")] {
         if !ids.is_empty() {
-            say(format!("  found {when} only: {}", ids.join(", ")));
+            result(format!("  found {when} only: {}", ids.join(", ")));
         }
     }
 }

@@ -18,67 +18,89 @@ const TABLES: [(&str, Column); 3] = [
     }),
 ];
 
-/// All four, as text; with repeats, means over the runs, and the rmse's standard deviation.
+/// One of the four: a row for each variant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    pub title: &'static str,
+    /// Titles, and decimals.
+    pub columns: Vec<(&'static str, usize)>,
+    pub rows: Vec<TableRow>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct TableRow {
+    pub name: &'static str,
+    /// None where the variant has no run.
+    pub figures: Vec<f64>,
+    /// Empty where there is nothing to add.
+    pub remark: String,
+}
+
+/// All four; with repeats, means over the runs, and the rmse's standard deviation.
+pub fn tables(comparison: &Comparison) -> Vec<Table> {
+    let mut tables: Vec<Table> = TABLES
+        .iter()
+        .map(|(title, of)| {
+            let mut rows: Vec<TableRow> = comparison.rows.iter().map(|r| spreads(r, *of)).collect();
+            let (name, remark) = ("(a camera that stands still)", String::new());
+            rows.push(TableRow { name, figures: figures(&of(&comparison.still)), remark });
+            let columns = ["rmse", "mean", "median", "std", "min", "max"].map(|c| (c, 3));
+            Table { title, columns: columns.into(), rows }
+        })
+        .collect();
+    let work = |row: &Row| match row.runs.first() {
+        Some(run) => {
+            let figures =
+                vec![run.iterations, run.stages.total(), run.lost as f64, run.frames as f64];
+            TableRow { name: row.variant.name, figures, remark: String::new() }
+        }
+        None => TableRow { name: row.variant.name, figures: Vec::new(), remark: failure(row) },
+    };
+    tables.push(Table {
+        title: "Table VI. Work per frame",
+        columns: vec![("iterations", 1), ("ms", 1), ("lost", 0), ("frames", 0)],
+        rows: comparison.rows.iter().map(work).collect(),
+    });
+    tables
+}
+
+/// All four, as text.
 pub fn text(comparison: &Comparison) -> String {
     let mut text = format!("{}\n", comparison.sequence);
-    // Writing to a String does not fail.
-    let _ = write_tables(&mut text, comparison);
+    for table in tables(comparison) {
+        let header: String = table.columns.iter().map(|(c, _)| format!("{c:>11}")).collect();
+        // Writing to a String does not fail.
+        let _ = writeln!(text, "\n{}\n{}{header}", table.title, " ".repeat(30));
+        for row in table.rows {
+            let figures = row.figures.iter().zip(&table.columns);
+            let figures: String =
+                figures.map(|(v, (_, d))| format!("{v:>11.d$}", d = *d)).collect();
+            let _ = writeln!(text, "{:<30}{figures}{}", row.name, row.remark);
+        }
+    }
     text
 }
 
-fn write_tables(text: &mut String, comparison: &Comparison) -> std::fmt::Result {
-    for (title, of) in &TABLES {
-        let header = header(["rmse", "mean", "median", "std", "min", "max"]);
-        writeln!(text, "\n{title}\n{header}")?;
-        for row in &comparison.rows {
-            writeln!(text, "{:<30}{}", row.variant.name, spreads(row, *of))?;
-        }
-        let still = figures(&of(&comparison.still));
-        writeln!(text, "{:<30}{still}", "(a camera that stands still)")?;
-    }
-    let header = header(["iterations", "ms", "lost", "frames"]);
-    writeln!(text, "\nTable VI. Work per frame\n{header}")?;
-    for row in &comparison.rows {
-        let work = row.runs.first().map(|run| {
-            let ms = run.stages.total();
-            format!("{:>11.1}{ms:>11.1}{:>11}{:>11}", run.iterations, run.lost, run.frames)
-        });
-        writeln!(text, "{:<30}{}", row.variant.name, work.unwrap_or_else(|| failure(row)))?;
-    }
-    Ok(())
-}
-
-fn header<const N: usize>(columns: [&str; N]) -> String {
-    " ".repeat(30) + &columns.map(|c| format!("{c:>11}")).concat()
-}
-
-fn spreads(row: &Row, of: Column) -> String {
+fn spreads(row: &Row, of: Column) -> TableRow {
     let spreads: Vec<Spread> = row.runs.iter().map(|r| of(&r.evaluation)).collect();
+    let name = row.variant.name;
     if spreads.is_empty() {
-        return failure(row);
+        return TableRow { name, figures: Vec::new(), remark: failure(row) };
     }
     let n = spreads.len() as f64;
-    let mean = |f: fn(&Spread) -> f64| spreads.iter().map(f).sum::<f64>() / n;
-    let middle = Spread {
-        rmse: mean(|s| s.rmse),
-        mean: mean(|s| s.mean),
-        median: mean(|s| s.median),
-        std: mean(|s| s.std),
-        min: mean(|s| s.min),
-        max: mean(|s| s.max),
-        pairs: spreads[0].pairs,
-    };
-    let mut text = figures(&middle);
+    let mean = |k: usize| spreads.iter().map(|s| figures(s)[k]).sum::<f64>() / n;
+    let means: Vec<f64> = (0..6).map(mean).collect();
+    let mut remark = String::new();
     if spreads.len() > 1 {
-        let squares = spreads.iter().map(|s| (s.rmse - middle.rmse).powi(2)).sum::<f64>();
+        let squares = spreads.iter().map(|s| (s.rmse - means[0]).powi(2)).sum::<f64>();
         let deviation = (squares / (n - 1.0)).sqrt();
-        text += &format!("   ± {deviation:.3} over {} runs", spreads.len());
+        remark = format!("   ± {deviation:.3} over {} runs", spreads.len());
     }
-    text
+    TableRow { name, figures: means, remark }
 }
 
-fn figures(s: &Spread) -> String {
-    [s.rmse, s.mean, s.median, s.std, s.min, s.max].map(|v| format!("{v:>11.3}")).concat()
+fn figures(s: &Spread) -> Vec<f64> {
+    vec![s.rmse, s.mean, s.median, s.std, s.min, s.max]
 }
 
 fn failure(row: &Row) -> String {

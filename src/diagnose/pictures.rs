@@ -13,7 +13,7 @@ use crate::measure::{MeasureOptions, Workbench};
 use crate::model::NoiseModel;
 use crate::view::Sensor;
 
-/// One view, row by row, px of disparity; NaN off the target.
+/// One view, row by row, mm of depth, measured minus the plane; NaN off the target.
 #[derive(Debug, Clone)]
 pub struct ViewPictures {
     /// Number among the diagnosed views.
@@ -60,7 +60,8 @@ pub fn pictures(
                 None => recorded.clone(),
             };
             let show = |values: &[f32]| {
-                shrunk(&field.image(&about_plane(field, values, &bench.rays)), field)
+                let depths = in_depth(field, &about_plane(field, values, &bench.rays), &bench.rays);
+                shrunk(&field.image(&depths), field)
             };
             let (width, height, before) = show(&recorded);
             let (_, _, after) = show(&left);
@@ -101,6 +102,15 @@ fn about_plane(field: &Field, values: &[f32], rays: &Rays) -> Vec<f32> {
     let plane = a.lu().solve(&b).unwrap_or_else(Vector3::zeros);
     let pairs = field.pixels.iter().zip(values);
     pairs.map(|(&i, &value)| value - plane.dot(&row(i)) as f32).collect()
+}
+
+/// Errors of the disparity, px, as errors of the depth, mm: a larger disparity is nearer.
+fn in_depth(field: &Field, values: &[f32], rays: &Rays) -> Vec<f32> {
+    let depth = |(k, &px): (usize, &f32)| {
+        let slope = -1e3 * field.scale_px_m / field.disparity(k, rays).powi(2);
+        (slope * f64::from(px)) as f32
+    };
+    values.iter().enumerate().map(depth).collect()
 }
 
 /// Pixels by the square made one, until the picture is narrow enough.

@@ -13,6 +13,14 @@ pub struct Spread {
     pub perpendicular_m: f64,
 }
 
+impl Spread {
+    /// Share of the spatial variance that stays from frame to frame, 0 to 1; `None` with a single frame.
+    pub fn fixed_share(&self) -> Option<f64> {
+        let temporal = self.temporal_m?;
+        Some((1.0 - (temporal / self.spatial_m).powi(2)).clamp(0.0, 1.0))
+    }
+}
+
 /// A bin of depth in a view (or the whole view).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cell {
@@ -31,6 +39,14 @@ pub struct Cell {
     pub dropouts: usize,
     /// Samples farther than the cut from the plane.
     pub cut: usize,
+}
+
+impl Cell {
+    /// Share of the target's samples that have a depth, 0 to 1.
+    pub fn fill_rate(&self) -> f64 {
+        let filled = self.n + self.cut;
+        filled as f64 / (filled + self.dropouts).max(1) as f64
+    }
 }
 
 /// A view is binned when its depth runs over more than this ratio ...

@@ -1,15 +1,19 @@
 //! The page of a calibration.
 
+mod tiles;
 mod views;
 mod warnings;
 
 use maud::{Markup, html};
 use serde_json::{Map, Value};
 
-use super::document::{Column, document, facts, figure, table, table_of};
-use super::figure2::{Overlay, figure2};
-use super::numbers::{ABSENT, MM, fixed, formula, millimetres, range, significant};
+use super::document::{
+    Column, Origin, answer, document, facts, figure, heading, section, table, table_of,
+};
+use super::numbers::{ABSENT, MM, fixed, formula, millimetres, plain, range, significant};
+use super::overlay::Overlay;
 use super::sigma_map::sigma_map;
+use super::slices::{against_distance, figure2, fit_residuals};
 use crate::calibrate::{Calibration, Measurements};
 use crate::error::Result;
 use crate::model::{DISTANCE_RATIO, Direction, HeldOut, Parameter, Provenance, SigmaModel};
@@ -28,47 +32,72 @@ pub struct CalibrationPage<'a> {
     pub calibration: &'a Calibration,
     /// Drawn into Fig. 2.
     pub overlays: &'a [Overlay],
+    pub origin: &'a Origin,
 }
 
-const FIGURE2: &str = "Noise against tilt. Each point is a measured σ with one standard error; \
-    colour and shape give its distance. Curves are the fit at the median distance of each colour, \
-    over the tilts that were measured. A point is carried along the fitted surface from its own \
-    distance to its curve's, so that its height over the curve is its relative residual; \
-    measurements.csv has it as measured.";
-const MAP: &str = "The fitted σ where it is valid. Dots are the measured cells: far from them the \
-    colour is interpolation.";
+impl CalibrationPage<'_> {
+    /// Of the views, by number.
+    pub fn names(&self) -> Vec<&str> {
+        let views = self.measurements.map_or(&[][..], |m| &m.views);
+        views.iter().map(|view| view.name.as_str()).collect()
+    }
+}
+
+const DISTANCE: &str = "Each point is a measured σ with one standard error; colour and shape give \
+    its tilt. Curves are the fit at the median tilt of each colour with its 95 % band, drawn only near \
+    measured distances. Published curves are for the smallest tilt. A point is carried along the \
+    fitted surface from its own tilt to its curve's, so that its height over the curve is its relative \
+    residual; measurements.csv has it as measured.";
+const MAP: &str = "Coverage: the fitted σ near the measured cells, which are the dots. Hatched: \
+    nothing was measured within a step of the paper's grid (a factor of 1.5 in distance, 10° in tilt), \
+    and the model there is a guess.";
+const FIGURE2: &str = "The same against tilt, as in the paper's Fig. 2: colour and shape give the \
+    distance, and curves are drawn only near measured tilts.";
+const RESIDUALS: &str = "Measured σ minus the fit, in percent of the fit, with one standard error \
+    from the number of independent samples. What bends here is not in the form.";
 
 /// The page as text.
 ///
 /// # Errors
 /// When a picture cannot be drawn.
 pub fn calibration_page(page: &CalibrationPage<'_>) -> Result<String> {
-    let calibration = page.calibration;
+    let (calibration, names) = (page.calibration, page.names());
     let (measured, sigma) = (&calibration.table, &calibration.model.sigma);
     let excluded = page.measurements.map_or(&[][..], |m| &m.excluded);
+    let warned = !calibration.warnings.is_empty() || !excluded.is_empty();
+    let warnings = warnings::section(&calibration.warnings, excluded);
     let body = html! {
-        (heading(page))
-        section {
-            h2 { "Result" }
-            p.formula { (with_numbers(sigma)) }
-            (result(page))
-            h3 { "σ facing the target, in mm" }
+        (header(page))
+        (verdict(page))
+        (tiles::tiles(measured, sigma, page.measurements.map_or(&[], |m| &m.views)))
+        (formula_to_copy(sigma))
+        @if warned { (warnings) }
+        (section("σ against distance", &html! {
+            (figure(&against_distance(measured, sigma, &names), DISTANCE)?)
+            (heading(3, "σ facing the target, in mm"))
             (published(sigma))
-        }
-        (figure(&figure2(measured, sigma, page.overlays), FIGURE2)?)
-        (figure(&sigma_map(measured, sigma), MAP)?)
-        (model(calibration))
-        (warnings::section(&calibration.warnings, excluded))
+        }))
+        (section("What was covered", &figure(&sigma_map(measured, sigma, &names), MAP)?))
+        (section(
+            "σ against tilt",
+            &figure(&figure2(measured, sigma, page.overlays, &names), FIGURE2)?,
+        ))
+        (section(
+            "What the fit leaves",
+            &figure(&fit_residuals(measured, sigma, &names), RESIDUALS)?,
+        ))
+        (model(page))
         @if let Some(measurements) = page.measurements {
-            (views::section(&measurements.views))
+            (views::section_of(&measurements.views))
             (views::gallery(&measurements.views)?)
         }
-        (provenance(&calibration.model.provenance))
+        @if !warned { (warnings) }
     };
-    Ok(document(page.title, None, &body).into_string())
+    let made = made(&calibration.model.provenance);
+    Ok(document(page.title, page.origin, &made, &body).into_string())
 }
 
-fn heading(page: &CalibrationPage<'_>) -> Markup {
+fn header(page: &CalibrationPage<'_>) -> Markup {
     html! {
         header {
             h1 { (page.title) }
@@ -85,16 +114,45 @@ fn heading(page: &CalibrationPage<'_>) -> Markup {
     }
 }
 
-/// The form with its parameters put in.
-fn with_numbers(model: &SigmaModel) -> Markup {
+/// Does the surface describe what was measured?
+fn verdict(page: &CalibrationPage<'_>) -> Markup {
+    let calibration = page.calibration;
+    let quality = &calibration.fit.quality;
+    let (share, r2) = (fixed(100.0 * quality.rmse_relative, 1), fixed(quality.r2, 3));
+    let heldout = calibration.model.fit.heldout;
+    let unseen = heldout.map_or_else(String::new, |e| {
+        format!(", and distances left out of the fit to {} %", fixed(100.0 * e, 1))
+    });
+    let warnings = calibration.warnings.len();
+    let more = html! { @if warnings > 0 {
+        p { a href="#warnings" { @if warnings == 1 { "One warning" } @else { (warnings) " warnings" } }
+            " to read before using it." }
+    } };
+    if quality.is_poor() {
+        let sentence = format!(
+            "The fit does not describe this sensor: measured σ lie {share} % off it (rms, r² = {r2})."
+        );
+        return answer("bad", "A poor fit", &sentence, &more);
+    }
+    let sentence = format!("The model gives the measured σ to {share} % (rms, r² = {r2}){unseen}.");
+    answer(if warnings == 0 { "good" } else { "unsure" }, "Calibrated", &sentence, &more)
+}
+
+/// The form with its parameters put in, for the eye and for a program.
+fn formula_to_copy(model: &SigmaModel) -> Markup {
     let card = model.form.card();
     let (equation, units) = card.formula.split_once(" (m").unwrap_or((card.formula, ""));
-    let units = units.trim_start_matches(';').trim_end_matches(')').replace("theta", "θ");
+    let units = units.trim_start_matches(';').trim_start_matches(" ");
+    let units = units.split(')').next().unwrap_or_default();
     let value = |name: &str| {
         let at = card.parameters.iter().position(|(n, _)| *n == name)?;
         model.parameters.get(at).copied()
     };
-    html! { (formula(equation, &value)) " " span.units { "in m; " (units) } }
+    html! { div.formula {
+        p { (formula(equation, &value)) " " span.units { "in m; " (units.replace("theta", "θ")) } }
+        code #formula { (plain(equation, &value)) }
+        button.copy type="button" data-of="formula" { "copy" }
+    } }
 }
 
 fn result(page: &CalibrationPage<'_>) -> Markup {
@@ -109,17 +167,15 @@ fn result(page: &CalibrationPage<'_>) -> Markup {
         Direction::Perpendicular => "normal to the plane",
     };
     let tilts = sigma.domain.theta_rad.map(f64::to_degrees);
-    let poor =
-        if calibration.fit.quality.is_poor() { ": a poor fit, see the warnings" } else { "" };
     let heldout = fit.heldout.map(|e| format!("{} % rms", fixed(100.0 * e, 1)));
     let heldout = heldout.as_deref().unwrap_or("not known: too few distances");
-    let error = html! { (fixed(MM * fit.rmse_m, 2)) " mm rms, r² = " (fixed(fit.r2, 3)) (poor) };
+    let error = html! { (fixed(MM * fit.rmse_m, 2)) " mm rms, r² = " (fixed(fit.r2, 3)) };
     facts([
         ("views", html! { (used) }),
         ("distance z", html! { (range(sigma.domain.z_m, 2)) " m" }),
         ("tilt θ", html! { (range(tilts, 1)) "°" }),
-        ("sigma is", html! { "measured " (direction) ", " (fit.samples) " cells" }),
-        ("fit error", error),
+        ("σ is", html! { "measured " (direction) ", " (fit.samples) " cells" }),
+        ("error of the fit", error),
         ("error at distances left out", html! { (heldout) }),
     ])
 }
@@ -167,7 +223,8 @@ fn sigma_at(model: &SigmaModel, z: f64, theta: f64, own: bool) -> Markup {
     }
 }
 
-fn model(calibration: &Calibration) -> Markup {
+fn model(page: &CalibrationPage<'_>) -> Markup {
+    let calibration = page.calibration;
     let fit = &calibration.fit;
     let parameters: [Column<'_, Parameter>; 4] = [
         ("parameter", &|p| html! { i { (p.name) } }),
@@ -183,15 +240,16 @@ fn model(calibration: &Calibration) -> Markup {
         (">distances left out", &|h| html! { (h.folds) }),
         ("~from", &|h| html! { (h.form.card().reference) }),
     ];
-    html! {
-        section {
-            h2 { "Model" }
+    section(
+        "Model",
+        &html! {
             p {
                 "Form " b { (fit.form.id()) } ": " (fit.form.card().formula) ". "
                 span.units { (fit.form.card().reference) }
             }
+            (result(page))
             (table_of(&parameters, &fit.parameters))
-            h3 { "How the forms predict distances they have not seen" }
+            (heading(3, "How the forms predict distances they have not seen"))
             @if calibration.comparison.is_empty() {
                 p { "Not known: too few distances to leave one out." }
             } @else {
@@ -199,12 +257,12 @@ fn model(calibration: &Calibration) -> Markup {
                 p.note { "Each group of distances is left out of the fit in turn and then predicted; a greater \
                     log score is better. The form used is in bold." }
             }
-        }
-    }
+        },
+    )
 }
 
-/// What it takes to make the model again.
-fn provenance(made: &Provenance) -> Markup {
+/// What it takes to make the model again, beside the page's origin.
+fn made(made: &Provenance) -> Vec<(String, Markup)> {
     let text = |value: &Value| match value {
         Value::Null => "automatic".into(),
         Value::String(text) => text.clone(),
@@ -212,23 +270,14 @@ fn provenance(made: &Provenance) -> Markup {
     };
     let entries = |before: &'static str, map: &Map<String, Value>| {
         let entry = |(name, value): (&String, &Value)| {
-            (format!("{before}{}", name.replace('_', " ")), text(value))
+            (format!("{before}{}", name.replace('_', " ")), html! { (text(value)) })
         };
         map.iter().map(entry).collect::<Vec<_>>()
     };
-    let mut all = vec![
-        ("made by".to_string(), format!("{} {}", made.tool, made.version)),
-        ("on".into(), made.created.clone()),
-    ];
-    all.extend(made.seed.map(|seed| ("seed".into(), seed.to_string())));
-    all.extend(entries("", &made.options));
+    let mut all = entries("", &made.options);
+    all.retain(|(name, _)| name != "seed");
     all.extend(entries("SHA-256 of ", &made.sha256));
-    html! {
-        section {
-            h2 { "How it was made" }
-            (facts(all.into_iter().map(|(name, value)| (name, html! { (value) }))))
-        }
-    }
+    all
 }
 
 #[cfg(test)]

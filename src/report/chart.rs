@@ -23,8 +23,10 @@ pub struct Chart {
     pub layers: Vec<Layer>,
     /// What a colour means, where it stands for a number: above the legend.
     pub scale: Option<ColourScale>,
-    /// To the right of the axes.
+    /// To the right of the axes; below them where the chart is narrow.
     pub legend: Vec<Entry>,
+    /// What a reader who points at a place of the SVG is told.
+    pub tips: Vec<([f64; 2], String)>,
 }
 
 /// Things of one kind, in the units of the axes.
@@ -93,6 +95,13 @@ const SIZE: (u32, u32) = (960, 540);
 /// Of one of two beside each other.
 const SMALL_SIZE: (u32, u32) = (470, 300);
 
+/// Of one on a telephone, without its legend.
+const NARROW_SIZE: (u32, u32) = (400, 320);
+/// From one row of the legend to the next.
+const ROW: f64 = 25.0;
+/// Height of a colour scale below the axes, rows of the legend.
+const SCALE_ROWS: usize = 6;
+
 // Room around the axes, px of the SVG.
 const LEFT: f64 = 12.0;
 const RIGHT: f64 = 20.0;
@@ -109,14 +118,32 @@ impl Chart {
     /// As wide as a page, with a grid; layers and legend are still to be added.
     pub fn new(title: &str, [x, y]: [Axis; 2], labels: [&str; 2]) -> Self {
         let (title, labels) = (title.into(), labels.map(str::to_string));
-        let (layers, scale, legend) = (Vec::new(), None, Vec::new());
-        Chart { title, size: SIZE, x, y, labels, grid: true, layers, scale, legend }
+        let (layers, scale, legend, tips) = (Vec::new(), None, Vec::new(), Vec::new());
+        Chart { title, size: SIZE, x, y, labels, grid: true, layers, scale, legend, tips }
     }
 
     /// Half as wide, without a title.
     pub fn small([x, y]: [Axis; 2], labels: [&str; 2]) -> Self {
         let axes = [x.sparse(), y.sparse()];
         Chart { size: SMALL_SIZE, ..Chart::new("", axes, labels) }
+    }
+
+    /// The same for a telephone, or for half a page: fewer ticks, the legend below. `None` where the
+    /// chart is narrow already.
+    pub fn narrow(&self) -> Option<Self> {
+        if self.size.0 <= SMALL_SIZE.0 {
+            return None;
+        }
+        let sparse = |axis: &Axis| if axis.log { axis.clone() } else { axis.clone().sparse() };
+        let rows = self.legend.len().max(if self.scale.is_some() { SCALE_ROWS } else { 0 });
+        let below = if rows > 0 { rows as u32 * ROW as u32 + X_TICKS as u32 / 2 } else { 0 };
+        let size = (NARROW_SIZE.0, NARROW_SIZE.1 + below);
+        Some(Chart { size, x: sparse(&self.x), y: sparse(&self.y), ..self.clone() })
+    }
+
+    /// Has it its legend below the axes?
+    fn is_narrow(&self) -> bool {
+        self.size.0 == NARROW_SIZE.0
     }
 
     /// Widens one of two ranges so that a unit is as long in x as in y on a chart as wide as a

@@ -1,23 +1,16 @@
 //! Figures 6 to 8 and the page of a comparison.
 
-use maud::html;
+use maud::{Markup, html};
 use nalgebra::Vector3;
 
-use super::axis::Axis;
-use super::chart::{Chart, Entry, Layer, Sample, Stroke};
+use super::chart::{Chart, Stroke};
 use super::colours::{self, INK};
-use super::document::{document, figure, list};
-use super::numbers::MM;
+use super::document::{Origin, document, figure, list, prose, section, table};
+use super::numbers::{MM, fixed};
+use super::trajectories::{Line, chart};
 use crate::compare::{Comparison, Row, Run, tables};
 use crate::error::Result;
-use crate::stats::range;
 use crate::trajectory::Pose;
-
-/// Room around the lines, share of their extent.
-const MARGIN: f64 = 0.04;
-
-/// Its name, its points, and how it is drawn.
-type Line = (String, Vec<[f64; 2]>, Stroke);
 
 /// Fig. 6 (paths from above), Fig. 7 (ATE over time) and Fig. 8 (RPE over time), by file name.
 ///
@@ -31,20 +24,44 @@ pub fn comparison_figures(comparison: &Comparison) -> Result<Vec<(&'static str, 
 ///
 /// # Errors
 /// When plotters fails.
-pub fn comparison_page(comparison: &Comparison) -> Result<String> {
+pub fn comparison_page(comparison: &Comparison, origin: &Origin) -> Result<String> {
     let figures = charts(comparison).into_iter().map(|(_, chart)| figure(&chart, &chart.title));
     let figures = figures.collect::<Result<Vec<_>>>()?;
+    let title = format!("Mapping {}, variant by variant", comparison.sequence);
     let body = html! {
-        h1 { "Mapping " (comparison.sequence) ", variant by variant" }
+        h1 { (title) }
         p { "The first four rows are the paper's variants with the parameters of its Table II; those below \
             go past it, one step at a time. Errors are computed as the scripts of the TUM benchmark do." }
-        div.wide { pre { (tables::text(comparison)) } }
-        @for figure in figures { (figure) }
-        @if !comparison.remarks.is_empty() { h2 { "Notes" } }
-        (list(comparison.remarks.iter().map(|remark| html! { (remark) })))
+        (section("Figures", &html! { div.beside { @for figure in figures { (figure) } } }))
+        @for part in tables::tables(comparison) { (section(part.title, &table_of(&part))) }
+        @if !comparison.remarks.is_empty() {
+            (section("Notes", &list(comparison.remarks.iter().map(|remark| prose(remark)))))
+        }
     };
-    let title = format!("Mapping {}", comparison.sequence);
-    Ok(document(&title, None, &body).into_string())
+    Ok(document(&title, origin, &[], &body).into_string())
+}
+
+fn table_of(part: &tables::Table) -> Markup {
+    let titles = part.columns.iter().map(|(title, _)| format!(">{title}"));
+    let mut titles: Vec<String> = std::iter::once("variant".into()).chain(titles).collect();
+    let remarks = part.rows.iter().any(|row| !row.remark.is_empty());
+    titles.extend(remarks.then(|| "~remark".to_string()));
+    let cells = |row: &tables::TableRow| {
+        let mut cells = vec![html! { (row.name) }];
+        cells.extend(part.columns.iter().enumerate().map(|(i, (_, decimals))| {
+            html! {
+                @if let Some(v) = row.figures.get(i) { (fixed(*v, *decimals)) } @else { "–" }
+            }
+        }));
+        cells.push(prose(row.remark.trim()));
+        cells
+    };
+    let rows = part.rows.iter().map(|row| {
+        let mut cells = cells(row);
+        cells.truncate(titles.len());
+        cells
+    });
+    table(&titles, rows.collect::<Vec<_>>())
 }
 
 fn charts(comparison: &Comparison) -> [(&'static str, Chart); 3] {
@@ -55,22 +72,6 @@ fn charts(comparison: &Comparison) -> [(&'static str, Chart); 3] {
         ("fig7_ate.svg", over_time(comparison, ate, |r| &r.evaluation.ate.each)),
         ("fig8_rpe.svg", over_time(comparison, rpe, |r| &r.evaluation.rpe.each)),
     ]
-}
-
-/// `equal` when both axes are lengths of one plane.
-fn chart(title: &str, labels: [&str; 2], lines: Vec<Line>, equal: bool) -> Chart {
-    let extent = |k: usize| {
-        let [low, high] = range(lines.iter().flat_map(|(_, points, _)| points).map(|p| p[k]));
-        if low <= high { [low, high] } else { [0.0, 1.0] }
-    };
-    let extents = [extent(0), extent(1)];
-    let extents = if equal { Chart::equal_units(extents) } else { extents };
-    let mut chart = Chart::new(title, extents.map(|e| Axis::with_margin(e, MARGIN)), labels);
-    for (name, points, stroke) in lines {
-        chart.legend.push(Entry::new([Sample::Line(stroke)], name));
-        chart.layers.push(Layer::Line(points, stroke));
-    }
-    chart
 }
 
 /// The variants that are drawn, each in its colour: the paper's, and the last way past it.

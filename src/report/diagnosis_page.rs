@@ -1,22 +1,23 @@
-//! The page of a diagnosis: the answer on the first screen, the evidence below.
+//! The page of a diagnosis: the answer and its pictures on the first screen, the evidence below.
 
 mod cards;
 mod curve;
+mod next;
 mod parameters;
 mod sections;
 mod sentences;
 mod story;
+mod table;
 
 use maud::{Markup, html};
 pub use story::story;
 
 use super::axis::Axis;
-use super::document::{Kind, document};
+use super::document::{Origin, document, section};
+use super::numbers::degrees;
 use super::residuals::{residual_image, scale};
-use crate::diagnose::{Diagnosis, Reference, Verdict, ViewPictures};
+use crate::diagnose::{Diagnosis, Finding, Reference, Status, ViewPictures};
 use crate::error::Result;
-
-const KIND: Kind = Kind { class: "diagnosis", style: include_str!("diagnosis_page.css") };
 
 /// What the page is about.
 #[derive(Debug, Clone, Copy)]
@@ -26,15 +27,16 @@ pub struct DiagnosisPage<'a> {
     pub diagnosis: &'a Diagnosis,
     /// Views whose residuals are worth seeing; few, they are large.
     pub pictures: &'a [ViewPictures],
+    pub origin: &'a Origin,
 }
 
-/// The page as text: one self-contained file, no scripts.
+/// The page as text: one self-contained file.
 ///
 /// # Errors
 /// When a picture cannot be drawn.
 pub fn diagnosis_page(page: &DiagnosisPage<'_>) -> Result<String> {
     let diagnosis = page.diagnosis;
-    let unsettled = diagnosis.verdict == Verdict::Inconclusive;
+    let (main, minor) = by_size(&diagnosis.findings);
     let body = html! {
         header {
             h1 { (page.title) }
@@ -47,43 +49,56 @@ pub fn diagnosis_page(page: &DiagnosisPage<'_>) -> Result<String> {
             }
         }
         (sections::verdict(diagnosis))
-        @if unsettled { (sections::remarks(&diagnosis.remarks)) }
-        (cards::findings(&diagnosis.findings)?)
-        (cards::small_remains(&diagnosis.findings))
-        section.outcome {
-            (sections::held_out(diagnosis.heldout.as_ref()))
-            (sections::remaining(diagnosis))
-        }
+        (next::section_of(page))
+        (pictures(page)?)
+        (table::findings(&main, &minor))
+        (cards::findings(&main)?)
+        (sections::held_out(diagnosis.heldout.as_ref()))
+        (sections::remaining(diagnosis))
         (sections::detectable(diagnosis))
         (sections::cannot_tell(&diagnosis.cannot_tell))
-        (pictures(page)?)
-        h1.evidence { "The evidence" }
         (sections::map(&diagnosis.map))
         (sections::views(&diagnosis.views))
-        @if !unsettled { (sections::remarks(&diagnosis.remarks)) }
+        (sections::remarks(&diagnosis.remarks))
         p.note {
             "diagnosis.json has the same as data. σ is the standard deviation of a single reading in the model; sizes \
              in mm are root mean squares over the recording. A p-value is the chance of a difference this large if \
              the model were right."
         }
     };
-    Ok(document(page.title, Some(KIND), &body).into_string())
+    Ok(document(page.title, page.origin, &[], &body).into_string())
+}
+
+/// The findings that matter and those that do not, the largest in mm first, what cannot be seen last.
+fn by_size(findings: &[Finding]) -> (Vec<&Finding>, Vec<&Finding>) {
+    let mut sorted: Vec<&Finding> = findings.iter().collect();
+    let mm = |f: &Finding| if f.size.mm.is_finite() { f.size.mm.abs() } else { 0.0 };
+    let unseen = |f: &Finding| f.status == Status::NotIdentifiable;
+    sorted.sort_by(|a, b| unseen(a).cmp(&unseen(b)).then(mm(b).total_cmp(&mm(a))));
+    sorted.into_iter().partition(|f| !f.minor)
 }
 
 fn pictures(page: &DiagnosisPage<'_>) -> Result<Markup> {
     let figure = |picture| before_after(picture, page.diagnosis);
     let figures = page.pictures.iter().map(figure).collect::<Result<Vec<Markup>>>()?;
-    Ok(html! { @if !figures.is_empty() { section {
-        h2 { "Residuals before and after" }
-        p {
-            "The residual of single views about their plane. White is no error, blue too near, red too far, grey no \
-             data. Where everything is explained, the second picture shows noise alone."
-            @if page.pictures.iter().any(|p| p.twin.is_some()) {
-                " The twin is simulated with the extended model: it should look like the first picture."
+    if figures.is_empty() {
+        return Ok(html! {});
+    }
+    let twins = page.pictures.iter().any(|p| p.twin.is_some());
+    let title = if twins { "Recorded, remaining, simulated" } else { "Recorded and remaining" };
+    Ok(section(
+        title,
+        &html! {
+            p {
+                "Residuals of single views: mean depth minus the plane, along the optical axis, in mm. Blue is nearer, \
+                 red farther, white no error, grey not the target. Where everything is explained, the second \
+                 picture shows noise alone"
+                @if twins { ", and the third, simulated with the extended model, looks like the first" }
+                "."
             }
-        }
-        @for figure in figures { (figure) }
-    } } })
+            @for figure in figures { (figure) }
+        },
+    ))
 }
 
 fn before_after(picture: &ViewPictures, diagnosis: &Diagnosis) -> Result<Markup> {
@@ -92,38 +107,34 @@ fn before_after(picture: &ViewPictures, diagnosis: &Diagnosis) -> Result<Markup>
         Reference::Model => "",
         Reference::SimulatedRecording => ", recorded minus simulated",
     };
-    let (tilt, plural) = (view.theta_rad.to_degrees(), if view.frames == 1 { "" } else { "s" });
-    let caption = format!(
-        "View {}{beyond}: board at {:.2} m, tilted {tilt:.0}°; mean of {} frame{plural}",
-        view.name, view.z_m, view.frames
+    let plural = if view.frames == 1 { "" } else { "s" };
+    let of_view = format!(
+        "View {}{beyond}: {:.2} m, tilt {}°, mean of {} frame{plural}",
+        view.name,
+        view.z_m,
+        degrees(view.theta_rad),
+        view.frames
     );
     let range = scale(&picture.before);
-    let caption = picture.twin.as_deref().map_or(caption.clone(), |twin| {
+    let [before, after] = [&picture.before, &picture.after].map(|p| rms(p.iter().copied()));
+    let twin = picture.twin.as_deref().map_or_else(String::new, |twin| {
         let apart = rms(picture.before.iter().zip(twin).map(|(r, t)| r - t));
-        let [before, after] = [&picture.before, &picture.after].map(|p| rms(p.iter().copied()));
-        format!(
-            "{caption}. The twin is {apart:.3} px rms from the recording, whose residual is {before:.3} px, \
-             and {after:.3} px with the extended model"
-        )
+        format!("; the simulation is {apart:.2} mm from the recording")
     });
-    let twin = picture.twin.as_ref().map(|twin| ("simulated twin", twin));
-    let titled = [("as recorded", &picture.before), ("with the extended model", &picture.after)];
+    let caption = format!("{of_view}. Residual {before:.2} mm rms, remaining {after:.2} mm{twin}.");
+    let simulated = picture.twin.as_ref().map(|twin| ("simulated", twin));
+    let titled = [("recorded", &picture.before), ("remaining", &picture.after)];
     let panel = |(title, values): (&str, &Vec<f32>)| {
         let (size, alt) = ([picture.width, picture.height], format!("{title}: {caption}"));
-        // Of disparity: what is larger is nearer.
-        let image = residual_image(size, values, -range, &alt)?;
-        Ok(html! { div { p.panel-title { (title) } (image) } })
+        let image = residual_image(size, values, range, &alt)?;
+        Ok(html! { div { p { (title) } (image) } })
     };
-    let panels = titled.into_iter().chain(twin).map(panel).collect::<Result<Vec<Markup>>>()?;
+    let panels = titled.into_iter().chain(simulated).map(panel).collect::<Result<Vec<Markup>>>()?;
     let end = Axis::label(range);
     Ok(html! {
-        figure.before-after {
+        figure {
             div.panels { @for panel in panels { (panel) } }
-            div.scale.disparity {
-                span { "−" (end) " px, too far" }
-                span { "0" }
-                span { "too near, +" (end) " px" }
-            }
+            div.scale { span { "−" (end) " mm, nearer" } span { "0" } span { "farther, +" (end) " mm" } }
             figcaption { (caption) }
         }
     })

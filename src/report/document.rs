@@ -1,36 +1,118 @@
-//! The skeleton of a page: one self-contained HTML document without scripts, and the parts that
-//! all pages are made of.
+//! The skeleton of a page: one self-contained HTML document, and the parts that all pages are made of.
+//!
+//! A page reaches for nothing outside itself, and says so to the browser, which would refuse it.
+
+use std::time::SystemTime;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::chart::Chart;
 use crate::error::Result;
+use crate::model::Provenance;
 
 /// How all pages look.
 const STYLE: &str = include_str!("page.css");
+/// Sorts tables, shows what a point is, enlarges pictures; a page can be read without it.
+const SCRIPT: &str = include_str!("page.js");
+/// What a page may load: nothing but what it carries.
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; \
+    img-src data:; base-uri 'none'; form-action 'none'";
 
-/// What one kind of page adds to the style of all.
-#[derive(Debug, Clone, Copy)]
-pub struct Kind {
-    /// Class of the body.
-    pub class: &'static str,
-    pub style: &'static str,
+/// What it takes to make a page again.
+#[derive(Debug, Clone, Default)]
+pub struct Origin {
+    /// What was read, as it was given.
+    pub recording: String,
+    /// What was typed, without what results do not depend on.
+    pub command: String,
+    /// Name of the folder of results.
+    pub folder: String,
+    pub seed: Option<u64>,
+    /// RFC 3339, UTC.
+    pub created: String,
 }
 
-/// The whole document; `kind` where the style of all pages is not enough.
-pub fn document(title: &str, kind: Option<Kind>, body: &Markup) -> Markup {
+impl Origin {
+    /// Now where no time is given.
+    pub fn at(recording: &str, command: &str, seed: Option<u64>, time: Option<SystemTime>) -> Self {
+        let made = Provenance::at(seed, time.unwrap_or_else(SystemTime::now));
+        let [recording, command] = [recording, command].map(String::from);
+        Origin { recording, command, folder: String::new(), seed, created: made.created }
+    }
+}
+
+/// The whole document; the origin is its last section, and `more` belongs to it.
+pub fn document(title: &str, origin: &Origin, more: &[(String, Markup)], body: &Markup) -> Markup {
     html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                meta name="color-scheme" content="light dark";
                 title { (title) }
-                style { (PreEscaped(STYLE)) @if let Some(kind) = kind { (PreEscaped(kind.style)) } }
+                style { (PreEscaped(STYLE)) }
             }
-            body class=[kind.map(|k| k.class)] { main { (body) } }
+            body {
+                main { (body) (footer(origin, more)) }
+                script { (PreEscaped(SCRIPT)) }
+            }
         }
     }
+}
+
+fn footer(origin: &Origin, more: &[(String, Markup)]) -> Markup {
+    let version = format!("kinoise {}", env!("CARGO_PKG_VERSION"));
+    let mut all = vec![
+        ("made by".to_string(), html! { (version) }),
+        ("on".into(), html! { (origin.created) }),
+        ("recording".into(), html! { (origin.recording) }),
+        ("command".into(), html! { code { (origin.command) } }),
+    ];
+    all.extend(origin.seed.map(|seed| ("seed".into(), html! { (seed) })));
+    all.retain(|(_, value)| !matches!(value.0.as_str(), "" | "<code></code>"));
+    all.extend(more.iter().cloned());
+    html! { footer { (section("How this page was made", &facts(all))) } }
+}
+
+/// A part of a page under a heading that can be linked.
+pub fn section(title: &str, content: &Markup) -> Markup {
+    html! { section { (heading(2, title)) (content) } }
+}
+
+/// A heading with an id of its words, and a link to itself.
+pub fn heading(level: u8, title: &str) -> Markup {
+    let id = slug(title);
+    let inner =
+        html! { (title) " " a.anchor href={ "#" (id) } aria-label={ "link to " (title) } { "#" } };
+    html! { @if level == 2 { h2 id=(id) { (inner) } } @else { h3 id=(id) { (inner) } } }
+}
+
+/// Letters and digits in lower case, with hyphens between words.
+pub(super) fn slug(title: &str) -> String {
+    let words = title.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
+    words.map(str::to_lowercase).collect::<Vec<_>>().join("-")
+}
+
+/// Numbers that stand for all: what, the number, a remark.
+pub fn tiles<'a>(tiles: impl IntoIterator<Item = (&'a str, String, String)>) -> Markup {
+    html! { div.tiles { @for (what, value, remark) in tiles {
+        div { p.label { (what) } p.big { (value) } p.label { (remark) } }
+    } } }
+}
+
+/// The answer, before everything else: its class gives the tone, `good`, `bad` or `unsure`.
+pub fn answer(class: &str, mark: &str, sentence: &str, more: &Markup) -> Markup {
+    html! { section.answer.(class) { p.mark { (mark) } p.sentence { (sentence) } (more) } }
+}
+
+/// A sentence whose `commands` stand between backticks and whose squares are `z^2`.
+pub fn prose(text: &str) -> Markup {
+    let text = text.replace("^2", "²");
+    html! { @for (i, part) in text.split('`').enumerate() {
+        @if i % 2 == 1 { code { (part) } } @else { (part) }
+    } }
 }
 
 /// The cells of a row, each anything that maud can render.
@@ -46,7 +128,7 @@ pub(super) use row;
 pub fn table<C: AsRef<str>>(columns: &[C], rows: impl IntoIterator<Item = Vec<Markup>>) -> Markup {
     let columns: Vec<(Option<&str>, &str)> = columns.iter().map(|c| set(c.as_ref())).collect();
     html! {
-        div.wide { table class=[(columns.len() > 8).then_some("small")] {
+        div.wide tabindex="0" { table class=[(columns.len() > 8).then_some("small")] {
             thead { tr { @for (class, title) in &columns { th class=[class] { (title) } } } }
             tbody { @for cells in rows { tr {
                 @for (i, ((class, _), cell)) in columns.iter().zip(cells).enumerate() {
@@ -90,28 +172,40 @@ pub(super) fn list(items: impl IntoIterator<Item = Markup>) -> Markup {
 }
 
 /// What opens on a click; open from the start where it is short.
-pub(super) fn fold(title: &str, open: bool, content: &Markup) -> Markup {
+pub fn fold(title: &str, open: bool, content: &Markup) -> Markup {
     html! { details open[open] { summary { (title) } (content) } }
 }
 
-/// A chart with its caption.
+/// A chart with its caption (none where its title says it), wide and narrow: the style shows the one
+/// that fits.
 ///
 /// # Errors
 /// When the chart cannot be drawn.
-pub(super) fn figure(chart: &Chart, caption: &str) -> Result<Markup> {
-    let svg = chart.svg()?;
+pub fn figure(chart: &Chart, caption: &str) -> Result<Markup> {
+    let label = if chart.title.is_empty() { caption } else { &chart.title };
+    let caption = (caption != label || chart.title.is_empty()).then_some(caption);
+    let drawing = drawing(chart, label)?;
+    Ok(html! { figure { (drawing) @if let Some(words) = caption { figcaption { (words) } } } })
+}
+
+/// A chart without a caption.
+pub(super) fn drawing(chart: &Chart, label: &str) -> Result<Markup> {
+    let narrow = chart.narrow().map(|c| c.svg()).transpose()?;
+    let broad = chart.svg()?;
     Ok(html! {
-        figure {
-            div.wide role="img" aria-label=(caption) { (PreEscaped(svg)) }
-            figcaption { (caption) }
+        div.chart role="img" aria-label=(label) {
+            div.broad[narrow.is_some()] { (PreEscaped(broad)) }
+            @if let Some(svg) = narrow { div.narrow { (PreEscaped(svg)) } }
         }
     })
 }
 
-/// An `img` that carries its pixels.
+/// An `img` that carries its pixels and is shown large on a click.
 pub(super) fn picture(png: &[u8], [width, height]: [usize; 2], alt: &str) -> Markup {
     let source = format!("data:image/png;base64,{}", base64(png));
-    html! { img alt=(alt) width=(width) height=(height) src=(source); }
+    html! { button.zoom type="button" title="enlarge" {
+        img alt=(alt) width=(width) height=(height) src=(source);
+    } }
 }
 
 /// Base64 (RFC 4648).
@@ -141,6 +235,23 @@ mod tests {
             assert_eq!(base64(plain.as_bytes()), coded);
         }
         assert_eq!(base64(&[0xff, 0xfb, 0xf0]), "//vw");
+    }
+
+    #[test]
+    fn a_page_says_where_it_comes_from_and_loads_nothing() {
+        let time = SystemTime::UNIX_EPOCH;
+        let origin = Origin::at("a <b>", "kinoise map a", Some(7), Some(time));
+        let page = document("t", &origin, &[], &section("σ & tilt", &html! {})).into_string();
+        for says in
+            ["a &lt;b&gt;", "<code>kinoise map a</code>", "1970-01-01T00:00:00Z", "<dd>7</dd>"]
+        {
+            assert!(page.contains(says), "{says}");
+        }
+        assert!(page.contains(r##"<h2 id="σ-tilt">"##) && page.contains("default-src 'none'"));
+        let bare = document("t", &Origin::default(), &[], &html! {}).into_string();
+        assert!(!bare.contains("command"), "what is not known is not said");
+        assert_eq!(prose("run `a <b>` now").into_string(), "run <code>a &lt;b&gt;</code> now");
+        assert_eq!(prose("with z^2").into_string(), "with z²");
     }
 
     #[test]

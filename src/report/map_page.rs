@@ -1,50 +1,119 @@
-//! The map to look at from all sides: one self-contained page with points and path, drawn by WebGL.
+//! The map to look at from all sides: points and path drawn by WebGL, and how far off the path is.
 
-use maud::html;
+use maud::{Markup, PreEscaped, html};
+use serde_json::json;
 
-use super::document::base64;
+use super::document::{Origin, base64, document, section, tiles};
+use super::numbers::{ABSENT, fixed};
+use super::trajectories::Against;
+use crate::error::Result;
 use crate::map::{FrameReport, MapPoint};
-use crate::stats::range;
+use crate::stats::{quantile, range};
 
 /// More points make the page heavy and the map no clearer.
 const MAX_POINTS: usize = 250_000;
-/// Colours show sigma between these, m, on a logarithmic scale.
-const SIGMA_M: [f32; 2] = [0.0005, 0.05];
+/// Colours show sigma between these quantiles, on a logarithmic scale.
+const SHOWN: [f64; 2] = [0.02, 0.98];
 /// Places are stored in 16 bits over the map's extent.
 const STEPS: f64 = 65_535.0;
+const SCRIPT: &str = include_str!("map_page.js");
 
-/// The page as text.
-pub fn map_page(title: &str, points: &[MapPoint], frames: &[FrameReport]) -> String {
-    let stride = points.len().div_ceil(MAX_POINTS).max(1);
-    let shown: Vec<&MapPoint> =
-        points.iter().step_by(stride).filter(|p| p.at.iter().all(|v| v.is_finite())).collect();
-    let extents = [0, 1, 2].map(|k| range(shown.iter().map(|p| p.at[k].into())));
-    let places = frames.iter().filter_map(|f| Some(f.pose?.translation));
-    let path: Vec<String> = places.map(|t| format!("{:.3},{:.3},{:.3}", t.x, t.y, t.z)).collect();
-    include_str!("map_page.html")
-        .replace("{{title}}", &html! { (title) }.into_string())
-        .replace("{{count}}", &shown.len().to_string())
-        .replace("{{low}}", &numbers(extents.map(|e| e[0])))
-        .replace("{{high}}", &numbers(extents.map(|e| e[1])))
-        .replace("{{path}}", &path.join(","))
-        .replace("{{points}}", &base64(&packed(&shown, extents)))
+/// What the page is about.
+#[derive(Debug, Clone, Copy)]
+pub struct MapPage<'a> {
+    pub title: &'a str,
+    pub points: &'a [MapPoint],
+    pub frames: &'a [FrameReport],
+    /// Where the sequence has true poses.
+    pub against: Option<Against<'a>>,
+    pub origin: &'a Origin,
 }
 
-fn numbers(v: [f64; 3]) -> String {
-    v.map(|v| if v.is_finite() { (v as f32).to_string() } else { "0".into() }).join(",")
+/// The page as text.
+///
+/// # Errors
+/// When a chart cannot be drawn.
+pub fn map_page(page: &MapPage<'_>) -> Result<String> {
+    let stride = page.points.len().div_ceil(MAX_POINTS).max(1);
+    let finite = |p: &&MapPoint| p.at.iter().all(|v| v.is_finite());
+    let shown: Vec<&MapPoint> = page.points.iter().step_by(stride).filter(finite).collect();
+    let errors = page.against.map(|against| against.parts()).transpose()?;
+    let body = html! {
+        h1 { (page.title) }
+        div.world {
+            canvas #view role="img" aria-label="the map as points, and the camera's path" {}
+            svg #over aria-hidden="true" {}
+        }
+        p #no-webgl hidden { "This browser has no WebGL; open map.ply in MeshLab or CloudCompare instead." }
+        div.controls {
+            button #mode type="button" { "show σ" } button #path type="button" { "hide path" }
+            button #home type="button" { "first view" }
+            div.sigmas #sigmas hidden {}
+        }
+        p.note {
+            "Drag to turn, shift or right drag to move, wheel to zoom. The bar is true at the middle of the map; x \
+             right, y down, z forward in the first camera. σ: of a point along its normal."
+        }
+        (numbers_of(page, shown.len()))
+        @if let Some(errors) = errors { (errors) } @else {
+            (section("Errors", &html! { p { "The sequence has no true poses to compare with." } }))
+        }
+        script type="application/json" id="map-data" { (PreEscaped(data(&shown, page.frames))) }
+        script { (PreEscaped(SCRIPT)) }
+    };
+    Ok(document(page.title, page.origin, &[], &body).into_string())
+}
+
+fn numbers_of(page: &MapPage<'_>, shown: usize) -> Markup {
+    let posed = page.frames.iter().filter(|f| f.pose.is_some()).count();
+    let stamps = range(page.frames.iter().map(|f| f.stamp));
+    let lasts = stamps[1] - stamps[0];
+    let seconds = if lasts >= 0.0 { format!("{} s", fixed(lasts, 1)) } else { ABSENT.into() };
+    let mut sigmas: Vec<f64> = page.points.iter().map(|p| f64::from(p.sigma)).collect();
+    let median = quantile(&mut sigmas, 0.5);
+    let median = median.map_or(ABSENT.into(), |s| format!("{} mm", fixed(1e3 * s, 2)));
+    let drawn = match shown == page.points.len() {
+        true => "all are drawn".to_string(),
+        false => format!("{shown} of them are drawn; map.ply has all"),
+    };
+    tiles([
+        ("frames with a pose", format!("{posed} of {}", page.frames.len()), seconds),
+        ("points", page.points.len().to_string(), drawn),
+        ("σ of a point", median, "median, along its normal".into()),
+    ])
+}
+
+/// What the script reads, as JSON; it holds no text of a user's.
+fn data(shown: &[&MapPoint], frames: &[FrameReport]) -> String {
+    let extents = [0, 1, 2].map(|k| range(shown.iter().map(|p| f64::from(p.at[k]))));
+    let ends = |e: usize| extents.map(|x| if x[e].is_finite() { x[e] as f32 } else { 0.0 });
+    let places = frames.iter().filter_map(|f| Some(f.pose?.translation));
+    let rounded = |v: f64| (v * 1e3).round() / 1e3;
+    let path: Vec<f64> = places.flat_map(|t| [t.x, t.y, t.z]).map(rounded).collect();
+    let sigma = sigmas(shown);
+    json!({"low": ends(0), "high": ends(1), "sigma": sigma, "path": path,
+        "points": base64(&packed(shown, extents, sigma))})
+    .to_string()
+}
+
+/// Between which the colours run, m.
+fn sigmas(shown: &[&MapPoint]) -> [f64; 2] {
+    let positive = shown.iter().map(|p| f64::from(p.sigma)).filter(|s| *s > 0.0 && s.is_finite());
+    let mut all: Vec<f64> = positive.collect();
+    let [low, high] = SHOWN.map(|q| quantile(&mut all, q).unwrap_or(1e-3));
+    [low, high.max(1.1 * low)]
 }
 
 /// Ten bytes a point: three places in 16 bits, red, green, blue, sigma.
-fn packed(points: &[&MapPoint], extents: [[f64; 2]; 3]) -> Vec<u8> {
+fn packed(points: &[&MapPoint], extents: [[f64; 2]; 3], [least, most]: [f64; 2]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(points.len() * 10);
-    let decades = (SIGMA_M[1] / SIGMA_M[0]).ln();
     for point in points {
         for (at, [low, high]) in point.at.iter().zip(extents) {
             let share = (f64::from(*at) - low) / (high - low).max(f64::MIN_POSITIVE);
             bytes.extend_from_slice(&((share * STEPS).round() as u16).to_le_bytes());
         }
         bytes.extend_from_slice(&point.colour);
-        let share = (point.sigma / SIGMA_M[0]).ln() / decades;
+        let share = (f64::from(point.sigma) / least).ln() / (most / least).ln();
         bytes.push((share.clamp(0.0, 1.0) * 255.0).round() as u8);
     }
     bytes
@@ -63,10 +132,16 @@ mod tests {
             sigma: 0.002,
             colour: [k as u8; 3],
         };
-        let page = map_page("a <b>", &(0..10).map(point).collect::<Vec<_>>(), &[]);
-        assert!(page.contains("a &lt;b&gt;") && !page.contains("{{"));
-        assert!(!page.contains("http"), "self-contained");
-        assert!(page.ends_with("</html>\n"));
-        assert!(!map_page("nothing", &[], &[]).contains("inf"), "an empty map makes a page too");
+        let points: Vec<MapPoint> = (0..10).map(point).collect();
+        let origin = &Origin::default();
+        let full = MapPage { title: "a <b>", points: &points, frames: &[], against: None, origin };
+        let page = map_page(&full).unwrap();
+        assert!(page.contains("a &lt;b&gt;") && page.contains("\"sigma\":[0.002"));
+        assert!(!page.contains("http:") && !page.contains("https:"), "self-contained");
+        assert!(page.contains("2.00 mm") && page.ends_with("</html>"));
+        let empty = map_page(&MapPage { points: &[], ..full }).unwrap();
+        let data = empty.split_once("id=\"map-data\">").and_then(|(_, rest)| rest.split_once('<'));
+        let data: serde_json::Value = serde_json::from_str(data.unwrap().0).unwrap();
+        assert_eq!(data["low"], json!([0.0, 0.0, 0.0]), "an empty map makes a page too");
     }
 }

@@ -33,7 +33,9 @@ pub(super) fn degrees(radians: f64) -> String {
 pub(super) fn percent(share: f64) -> String {
     let near_an_end = |share: f64| share > 0.0 && share < 0.01;
     let decimals = usize::from(near_an_end(share) || near_an_end(1.0 - share));
-    format!("{} %", fixed(100.0 * share, decimals))
+    // What is not all does not read as all.
+    let shown = if share < 1.0 { share.min(0.999) } else { share };
+    format!("{} %", fixed(100.0 * shown, decimals))
 }
 
 /// `low – high`, or one number where they print alike.
@@ -104,6 +106,36 @@ pub(super) fn formula(text: &str, value: &dyn Fn(&str) -> Option<f64>) -> Markup
     } }
 }
 
+/// The same as a line of Python, to six digits: `sigma_m = 0.0014*z**2`.
+pub(super) fn plain(text: &str, value: &dyn Fn(&str) -> Option<f64>) -> String {
+    let (left, right) = text.split_once('=').unwrap_or(("sigma", text));
+    let letters: Vec<char> = right.trim().chars().collect();
+    let tokens = letters.chunk_by(|a, b| a.is_alphanumeric() && b.is_alphanumeric());
+    let (mut plain, mut operand, mut power) = (String::new(), false, false);
+    let short = |v: f64| format!("{v:.5e}").parse().unwrap_or(v);
+    for token in tokens.map(String::from_iter) {
+        let starts = token == "(" || token.chars().all(char::is_alphanumeric);
+        if starts && operand && !power {
+            // Side by side is a product.
+            plain = plain.trim_end().to_string() + "*";
+        }
+        match (value(&token).map(short), token.as_str()) {
+            (Some(v), _) if v < 0.0 => plain += &format!("({v})"),
+            (Some(v), _) => plain += &v.to_string(),
+            (None, "^") => plain += "**",
+            (None, token) => plain += token,
+        }
+        if token != " " {
+            operand = token == ")" || starts && token != "(" && token != "sqrt";
+        }
+        power = token == "^";
+    }
+    match left.contains("^2") {
+        true => format!("sigma_m = sqrt({plain})"),
+        false => format!("sigma_m = {plain}"),
+    }
+}
+
 fn word(token: &str, value: &dyn Fn(&str) -> Option<f64>) -> Markup {
     const DIGITS: usize = 4;
     match (value(token), token) {
@@ -146,7 +178,7 @@ mod tests {
         assert_eq!(millimetres(0.00231), "2.31");
         assert_eq!(millimetres(-0.0231), "−23.1");
         assert_eq!(degrees(std::f64::consts::PI), "180.0");
-        assert_eq!([percent(0.995), percent(1.0)], ["99.5 %", "100 %"]);
+        assert_eq!([0.995, 0.99996, 1.0].map(percent), ["99.5 %", "99.9 %", "100 %"]);
         assert_eq!(count(2, "cause"), "two causes");
     }
 
@@ -171,5 +203,16 @@ mod tests {
             formula("sigma = k z^2 * (z - c) < 1", &value).into_string(),
             "<i>σ</i> = 0.001425 <i>z</i><sup>2</sup> · (<i>z</i> − (−0.5000)) &lt; 1"
         );
+        for (text, expected) in [
+            ("sigma = k z^2", "sigma_m = 0.001425*z**2"),
+            (
+                "sigma = k (z - c)^2 + c / sqrt(z) * theta^2",
+                "sigma_m = 0.001425*(z - (-0.5))**2 + (-0.5) / sqrt(z) * theta**2",
+            ),
+            ("sigma^2 = k^2 + (k z^2)^2", "sigma_m = sqrt(0.001425**2 + (0.001425*z**2)**2)"),
+            ("sigma = k z^c theta^2", "sigma_m = 0.001425*z**(-0.5)*theta**2"),
+        ] {
+            assert_eq!(plain(text, &value), expected);
+        }
     }
 }

@@ -1,12 +1,14 @@
-//! Sigma over distance and tilt, as a map with iso-lines and the cells that were measured.
+//! Sigma over distance and tilt where it was measured, as a map with iso-lines; gaps are hatched.
 
 use plotters::style::{RGBColor, WHITE};
 
 use super::axis::Axis;
 use super::chart::{Chart, ColourScale, Entry, Layer, Mark, Sample, Stroke};
 use super::colours::{self, INK};
+use super::coverage::is_measured;
 use super::numbers::MM;
-use crate::measure::SigmaTable;
+use super::slices::tip;
+use crate::measure::{SigmaRow, SigmaTable};
 use crate::model::SigmaModel;
 use crate::stats::range;
 
@@ -26,8 +28,8 @@ const LABELS_APART: [f64; 2] = [0.08, 0.06];
 /// ... and this far from its sides.
 const LABEL_INSET: f64 = 0.02;
 
-/// The fitted sigma where it is valid.
-pub fn sigma_map(table: &SigmaTable, model: &SigmaModel) -> Chart {
+/// The fitted sigma where cells were measured nearby.
+pub fn sigma_map(table: &SigmaTable, model: &SigmaModel, names: &[&str]) -> Chart {
     let z = at_least(model.domain.z_m, MIN_RANGE_SHARE * model.domain.z_m[1]);
     let theta = at_least(model.domain.theta_rad.map(f64::to_degrees), MIN_RANGE_DEG);
     let below = theta[0].min(0.0);
@@ -39,13 +41,17 @@ pub fn sigma_map(table: &SigmaTable, model: &SigmaModel) -> Chart {
     let labels = ["distance z (m)", "tilt θ (degrees)"];
     let mut chart = Chart { grid: false, ..Chart::new("σ over distance and tilt", axes, labels) };
     chart.layers.push(Layer::Hatching);
-    chart.layers.extend(grid.tiles(&|sigma| shade(scale.share(sigma))));
+    let near = |z_m: f64, deg: f64| is_measured(&table.rows, z_m, deg.to_radians());
+    chart
+        .layers
+        .extend(grid.tiles(&|[z, deg], sigma| near(z, deg).then(|| shade(scale.share(sigma)))));
     let corners = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]].map(|[i, j]| [z[i], theta[j]]);
     chart.layers.push(Layer::Line(corners.to_vec(), Stroke::new(INK, 1)));
     let measured = Mark { edge: WHITE.into(), ..Mark::dot(INK, 2) };
-    let cells = table.rows.iter().map(|r| [r.z_m, r.theta_rad.to_degrees()]).collect();
-    chart.layers.push(Layer::Marks(cells, measured));
-    chart.layers.extend(grid.iso_lines(&scale.ticks));
+    let place = |r: &SigmaRow| [r.z_m, r.theta_rad.to_degrees()];
+    chart.layers.push(Layer::Marks(table.rows.iter().map(place).collect(), measured));
+    chart.tips = table.rows.iter().map(|r| (place(r), tip(r, names))).collect();
+    chart.layers.extend(grid.iso_lines(&scale.ticks, &|[z, deg]| near(z, deg)));
     let colours = (0..SHADES).map(colour).collect();
     chart.scale = Some(ColourScale { title: "σ (mm)".into(), axis: scale, colours });
     chart.legend = vec![
@@ -95,27 +101,34 @@ impl Grid {
             .map(|(i, j)| ([self.x[i], self.y[j]], self.value[j * self.x.len() + i]))
     }
 
-    /// Every row in pieces, cut where the shade of a cell's mean changes.
-    fn tiles(&self, shade: &dyn Fn(f64) -> usize) -> Vec<Layer> {
+    /// Every row in pieces, cut where the shade of a cell's mean changes; none where there is no shade.
+    fn tiles(&self, shade: &dyn Fn(Point, f64) -> Option<usize>) -> Vec<Layer> {
         let mut tiles = Vec::new();
         for j in 0..CELLS[1] {
-            let of = |i| shade(self.corners(i, j).iter().map(|(_, value)| value / 4.0).sum());
-            let shades: Vec<usize> = (0..CELLS[0]).map(of).collect();
+            let of = |i| {
+                let corners = self.corners(i, j);
+                let mean = |f: fn(&(Point, f64)) -> f64| corners.iter().map(f).sum::<f64>() / 4.0;
+                shade([mean(|c| c.0[0]), mean(|c| c.0[1])], mean(|c| c.1))
+            };
+            let shades: Vec<Option<usize>> = (0..CELLS[0]).map(of).collect();
             let mut end = 0;
             for run in shades.chunk_by(|a, b| a == b) {
                 let x = [self.x[end], self.x[end + run.len()]];
-                tiles.push(Layer::Tile(x, [self.y[j], self.y[j + 1]], colour(run[0]).into()));
                 end += run.len();
+                if let Some(shade) = run[0] {
+                    tiles.push(Layer::Tile(x, [self.y[j], self.y[j + 1]], colour(shade).into()));
+                }
             }
         }
         tiles
     }
 
     /// By marching squares; labels over the lines.
-    fn iso_lines(&self, levels: &[f64]) -> Vec<Layer> {
+    fn iso_lines(&self, levels: &[f64], shown: &dyn Fn(Point) -> bool) -> Vec<Layer> {
         let (mut layers, mut labels) = (Vec::new(), Vec::<(Point, f64)>::new());
         for &level in levels {
-            let pieces = self.pieces(level);
+            let mut pieces = self.pieces(level);
+            pieces.retain(|[start, end]| shown(*start) && shown(*end));
             labels.extend(self.label_place(&pieces, &labels).map(|at| (at, level)));
             let line = |ends: &[Point; 2]| Layer::Line(ends.to_vec(), Stroke::new(INK, 1));
             layers.extend(pieces.iter().map(line));
@@ -164,11 +177,23 @@ mod tests {
     use super::*;
     use crate::model::{Domain, Form};
 
+    fn cell(z_m: f64, theta_rad: f64, sigma_m: f64) -> SigmaRow {
+        SigmaRow { z_m, theta_rad, sigma_m, n_effective: None, view: 0 }
+    }
+
     #[test]
     fn the_papers_surface_has_labelled_lines() {
         let mut model = SigmaModel::paper();
         model.domain.theta_rad[1] = 1.33;
-        let map = sigma_map(&SigmaTable::default(), &model);
+        let rows: Vec<SigmaRow> = (1..=4)
+            .flat_map(|z| {
+                [0.0, 0.15, 0.9].map(|t| cell(f64::from(z), t, model.sigma(f64::from(z), t)))
+            })
+            .collect();
+        let map = sigma_map(&SigmaTable { rows }, &model, &["a"]);
+        let gap = |l: &Layer| matches!(l, Layer::Tile([z, _], [t, _], _) if *z < 2.0 && (25.0..40.0).contains(t));
+        assert!(!map.layers.iter().any(gap), "nothing was measured there");
+        assert!(map.tips.len() == 12 && map.tips[0].1.contains("a: z 1.000 m"));
         let labels = map.layers.iter().filter(|l| matches!(l, Layer::Label(..)));
         assert!(labels.count() >= 4);
         assert!(map.svg().unwrap().contains("σ (mm)"));
@@ -177,7 +202,7 @@ mod tests {
     #[test]
     fn tiles_cover_the_map_once() {
         let grid = Grid::sample([[1.0, 3.0], [0.0, 70.0]], &|z, theta| 9.0 * z + theta / 10.0);
-        let tiles = grid.tiles(&|value| value as usize);
+        let tiles = grid.tiles(&|_, value| Some(value as usize));
         assert!(tiles.len() > CELLS[1] && tiles.len() < CELLS[0] * CELLS[1] / 4);
         let area = |tile: &Layer| match tile {
             Layer::Tile(z, theta, _) => (z[1] - z[0]) * (theta[1] - theta[0]),
@@ -196,7 +221,7 @@ mod tests {
             approx::assert_abs_diff_eq!(p[0].hypot(p[1]), 1.0, epsilon = 1e-3);
             assert!((p[0] - q[0]).hypot(p[1] - q[1]) < 0.1);
         }
-        let layers = grid.iso_lines(&[1.0, 5.0]);
+        let layers = grid.iso_lines(&[1.0, 5.0], &|_| true);
         assert_eq!(layers.len(), pieces.len() + 1, "one label, and none for an empty line");
     }
 
@@ -204,7 +229,7 @@ mod tests {
     fn a_flat_or_pointlike_surface_still_draws() {
         let domain = Domain { z_m: [2.0, 2.0], theta_rad: [0.0, 0.0] };
         let model = SigmaModel::published(Form::Khoshelham, &[1.4e-3], domain);
-        let map = sigma_map(&SigmaTable::default(), &model);
+        let map = sigma_map(&SigmaTable::default(), &model, &[]);
         for axis in [&map.x, &map.y, &map.scale.as_ref().unwrap().axis] {
             assert!(axis.low.is_finite() && axis.high > axis.low, "{axis:?}");
         }

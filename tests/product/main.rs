@@ -22,6 +22,7 @@ mod map;
 mod measure;
 mod model_file;
 mod outliers;
+mod pages;
 mod room;
 mod speckle;
 mod target;

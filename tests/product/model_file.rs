@@ -199,5 +199,5 @@ fn a_poor_fit_says_so_in_words() {
     println!("{stderr}");
     assert!(stderr.contains("the fit is poor"), "{stderr}");
     let page = std::fs::read_to_string(out.path().join("report.html")).expect("read");
-    assert!(page.contains("a poor fit, see the warnings"));
+    assert!(page.contains("The fit does not describe this sensor"));
 }

@@ -21,6 +21,7 @@ mod plan;
 mod predictor;
 mod proof;
 mod real;
+mod reliance;
 mod rounds;
 mod shard;
 mod solver;

@@ -2,12 +2,15 @@
 //! failure, and how to check all of it. And the same in a few lines for the terminal.
 
 use std::fmt::Write as _;
+use std::time::{Duration, SystemTime};
 
-use kinoise::report::document::{document, facts, table};
+use kinoise::report::Origin;
+use kinoise::report::document::{document, facts, fold, section, table};
 use maud::{Markup, html};
 
 use crate::judge::{ByStrength, Endpoint, Level, QUESTIONS, Rate, Ratio, level, word};
 use crate::proof::{Proof, ProvenSet};
+use crate::reliance::reliance;
 
 /// The questions of the table by kind: the mark, its head.
 const COLUMNS: [(&str, &str); 10] = [
@@ -42,11 +45,13 @@ pub fn summary(proof: &Proof) -> String {
     text
 }
 
-/// The page as text: one self-contained file, no scripts.
+/// The page as text: one self-contained file.
 pub fn page(proof: &Proof) -> String {
+    const TITLE: &str = "A blind trial of kinoise diagnose";
     let scores = &proof.scores;
     let body = html! {
-        header { h1 { "A blind trial of kinoise diagnose" } }
+        header { h1 { (TITLE) } }
+        (reliance(proof))
         (endpoints(proof))
         (power("What is seen, by kind and strength", &scores.by_strength, "detected"))
         (power("What is seen, by cause and strength", &scores.by_effect, "detected"))
@@ -58,11 +63,16 @@ pub fn page(proof: &Proof) -> String {
         (failures(proof))
         (method(proof))
     };
-    document("A blind trial of kinoise diagnose", None, &body).into_string()
+    document(TITLE, &origin(proof), &[], &body).into_string()
 }
 
-fn section(title: &str, content: &Markup) -> Markup {
-    html! { section { h2 { (title) } (content) } }
+fn origin(proof: &Proof) -> Origin {
+    let order = &proof.order;
+    let epoch = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|s| s.parse().ok());
+    let time = epoch.map(|s| SystemTime::UNIX_EPOCH + Duration::from_secs(s));
+    let data = if order.real { " --data RECORDINGS" } else { "" };
+    let command = format!("./run prove -o DIR --sets {} --seed {}{data}", order.sets, order.seed);
+    Origin::at("", &command, Some(order.seed), time)
 }
 
 fn percent(x: f64) -> String {
@@ -98,15 +108,17 @@ fn reached(e: &Endpoint) -> &'static str {
 }
 
 fn endpoints(proof: &Proof) -> Markup {
-    let heads = ["endpoint", ">figure", ">95 %", ">of", "reached", ">p, good", "~in words"];
+    let heads = ["~mark", ">figure", ">95 %", ">sets", "reached", ">p, good"];
     let line = |e: &Endpoint| {
         let interval = e.interval.map(|[low, high]| format!("{low:.2} to {high:.2}"));
-        let (n, p) = (e.n.to_string(), format!("{:.3}", e.p_adjusted[0]));
-        let interval = interval.unwrap_or_default();
-        row([e.id.clone(), number(e.value), interval, n, reached(e).into(), p, e.words.clone()])
+        let (n, p) = (e.n.to_string(), e.p_adjusted[0]);
+        let p = if p < 0.001 { "< 0.001".into() } else { format!("{p:.3}") };
+        let figures = [number(e.value), interval.unwrap_or_default(), n, reached(e).into(), p];
+        let name = html! { b { (e.id) } br; (e.words) };
+        std::iter::once(name).chain(row(figures)).collect()
     };
     let rows = proof.scores.endpoints.iter().map(line);
-    section("The five endpoints, chosen beforehand", &table(&heads, rows))
+    section("The five marks, chosen beforehand", &table(&heads, rows))
 }
 
 /// Rows by name, columns by strength, a cell as dark as its share.
@@ -117,11 +129,8 @@ fn power(title: &str, rows: &ByStrength, question: &str) -> Markup {
     let heads = levels.iter().map(|level| format!(">{}", level.trim_start_matches('0')));
     let heads: Vec<String> = std::iter::once("nats".into()).chain(heads).collect();
     let cell = |rate: Option<&Rate>| {
-        let dark = rate.map_or(0.0, |r| 100.0 * r.rate);
-        let style = format!(
-            "padding: 0 0.4em; background: color-mix(in srgb, #2a78b8 {dark:.0}%, transparent)"
-        );
-        html! { @if rate.is_some() { span style=(style) { (count(rate)) } } }
+        let style = rate.map(|r| format!("--share: {:.0}%", 100.0 * r.rate));
+        html! { @if rate.is_some() { span.share style=[style] { (count(rate)) } } }
     };
     let asked = rows.iter().filter(|(_, r)| r.values().any(|r| r.contains_key(question)));
     let lines = asked.map(|(name, by_level)| {
@@ -218,7 +227,7 @@ fn failures(proof: &Proof) -> Markup {
     let heads = ["set", "kind", "hidden", ">nats", "said first", "what failed"];
     section(
         &format!("Every failure ({} of {} sets)", all.len(), proof.sets.len()),
-        &html! { details { summary { "The list" } (table(&heads, lines)) } },
+        &fold("The list", false, &table(&heads, lines)),
     )
 }
 

@@ -10,7 +10,6 @@ use std::str::FromStr;
 
 use kinoise::Error;
 use kinoise::error::Result;
-use kinoise::io::OutputDir;
 use serde::{Deserialize, Serialize};
 
 use crate::commitment::{Commitments, Verdicts, hash_file, read_json, write_json};
@@ -77,10 +76,11 @@ pub fn hold_shard(trial: &Trial, shard: Shard, progress: Progress<'_>) -> Result
             remedy: "give as many shards as there are sets, or fewer",
         });
     }
-    let out = OutputDir::create(&trial.output)?;
+    let out = &trial.output;
+    std::fs::create_dir_all(out).map_err(|e| Error::write(out, e))?;
     for (file, what) in [(SHARD, "a finished shard is here"), (PROOF, "a finished trial is here")] {
-        if out.path().join(file).exists() {
-            return Err(refused(out.path(), what));
+        if out.join(file).exists() {
+            return Err(refused(out, what));
         }
     }
     let binary_sha256 = hash_file(&trial.program)?;
@@ -96,7 +96,7 @@ pub fn hold_shard(trial: &Trial, shard: Shard, progress: Progress<'_>) -> Result
         published: done.published,
         binary_sha256,
     };
-    write_json(&out.path().join(SHARD), &finished)?;
+    write_json(&out.join(SHARD), &finished)?;
     Ok(())
 }
 
@@ -148,16 +148,16 @@ pub fn gather(folders: &[PathBuf], program: &Path, output: &Path) -> Result<(Ord
             "merge with the build that held the shards",
         ));
     }
-    let out = OutputDir::create(output)?;
-    if out.path().join(PROOF).exists() {
-        return Err(refused(out.path(), "a finished trial is here"));
+    std::fs::create_dir_all(output).map_err(|e| Error::write(output, e))?;
+    if output.join(PROOF).exists() {
+        return Err(refused(output, "a finished trial is here"));
     }
     for (folder, finished) in shards.values() {
         check(folder, finished)?;
     }
     for (folder, _) in shards.values() {
         for name in FOLDERS {
-            copy(&folder.join(name), &out.path().join(name))?;
+            copy(&folder.join(name), &output.join(name))?;
         }
     }
     Ok((first.order.clone(), first.limit_s))

@@ -5,11 +5,11 @@ use maud::{Markup, html};
 use crate::error::Result;
 use crate::measure::{ReferenceDistance, ViewMeasurement};
 use crate::report::axis::Axis;
-use crate::report::document::{Column, table_of};
+use crate::report::document::{Column, section, table_of};
 use crate::report::numbers::{ABSENT, MM, degrees, fixed, millimetres};
 use crate::report::residuals::{residual_image, scale};
 
-pub(super) fn section(views: &[ViewMeasurement]) -> Markup {
+pub(super) fn section_of(views: &[ViewMeasurement]) -> Markup {
     let optional = |text: Option<String>| html! { (text.as_deref().unwrap_or(ABSENT)) };
     let mm = |metres: f64| html! { (millimetres(metres)) };
     let columns: [Column<'_, ViewMeasurement>; 17] = [
@@ -17,7 +17,7 @@ pub(super) fn section(views: &[ViewMeasurement]) -> Markup {
         (">z m", &|v| html! { (fixed(v.z_m, 3)) }),
         (">axis m", &|v| html! { (fixed(v.axis_distance_m, 3)) }),
         (">off reference mm", &|v| optional(v.reference().map(off_reference))),
-        (">θ °", &|v| html! { (degrees(v.theta_rad)) }),
+        (">tilt θ °", &|v| html! { (degrees(v.theta_rad)) }),
         (">azimuth °", &|v| html! { (degrees(v.azimuth_rad)) }),
         (
             ">σ ± s.e. mm",
@@ -36,9 +36,9 @@ pub(super) fn section(views: &[ViewMeasurement]) -> Markup {
             html! { (v.exclusions.invalid) " / " (v.exclusions.off_plane) " / " (v.exclusions.edge) }
         }),
     ];
-    html! {
-        section {
-            h2 { "Views" }
+    section(
+        "Views",
+        &html! {
             (table_of(&columns, views))
             p.note {
                 "z: mean depth of the target. Axis: depth of its plane on the optical axis. Off reference: that \
@@ -49,8 +49,8 @@ pub(super) fn section(views: &[ViewMeasurement]) -> Markup {
                  independent samples they are worth. Corr.: length over which neighbouring pixels err together; “+” \
                  where it had not died out. Pixels left out: without depth / off the plane / at the target's edge."
             }
-        }
-    }
+        },
+    )
 }
 
 /// Signed, in mm, and marked where it is too much.
@@ -67,23 +67,29 @@ fn correlation(view: &ViewMeasurement) -> String {
 
 pub(super) fn gallery(views: &[ViewMeasurement]) -> Result<Markup> {
     let pictures = views.iter().map(picture).collect::<Result<Vec<Markup>>>()?;
-    Ok(html! {
-        section {
-            h2 { "Residuals" }
+    Ok(section(
+        "Residuals",
+        &html! {
             p {
-                "Mean depth minus the plane, along the optical axis. Blue is nearer than the plane, red farther, \
-                 grey is not the target. Each picture has its own scale."
+                "Mean depth minus the plane, along the optical axis, in mm. Blue is nearer than the plane, red \
+                 farther, grey is not the target. Each picture has its own scale; a click enlarges it."
             }
             div.gallery { @for picture in pictures { (picture) } }
-        }
-    })
+        },
+    ))
 }
 
 fn picture(view: &ViewMeasurement) -> Result<Markup> {
     let picture = &view.picture;
     let scale = scale(&picture.millimetres);
     let size = [picture.width, picture.height];
-    let alt = format!("residual of view {}", view.name);
+    let alt = format!(
+        "residual of view {}, {} m, tilt {}°: ±{} mm from blue to red",
+        view.name,
+        fixed(view.z_m, 2),
+        degrees(view.theta_rad),
+        Axis::label(scale)
+    );
     let image = residual_image(size, &picture.millimetres, scale, &alt)?;
     let end = Axis::label(scale);
     Ok(html! {

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::report::document::{fold, list};
+use crate::report::document::{self, fold, list, prose};
 use crate::view::Excluded;
 
 /// Longer lists fold away.
@@ -19,23 +19,23 @@ pub(super) fn section(warnings: &[String], excluded: &[Excluded]) -> Markup {
         .map(String::as_str)
         .filter(|warning| !of_an_excluded(warning))
         .partition(|warning| warning.starts_with(ABOUT_A_VIEW));
-    html! {
-        section {
-            h2 { "Warnings" }
+    document::section(
+        "Warnings",
+        &html! {
             @if warnings.is_empty() { p { "None." } }
-            (list(general.iter().map(|w| html! { (w) })))
+            (list(general.iter().map(|w| prose(w))))
             @if !excluded.is_empty() {
                 @let title = format!("{} left out", counted(excluded.len(), "view"));
-                @let items = list(excluded.iter().map(|e| html! { b { (e.view) } ": " (e.reason) }));
+                @let items = list(excluded.iter().map(|e| html! { b { (e.view) } ": " (prose(&e.reason)) }));
                 (fold(&title, excluded.len() <= MAX_OPEN, &items))
             }
             @for group in grouped(&views) {
-                @let items = list(group.iter().map(|w| html! { (w) }));
+                @let items = list(group.iter().map(|w| prose(w)));
                 @let title = format!("{} like: {}", counted(group.len(), "remark"), group[0]);
                 @if group.len() <= MAX_OPEN { (items) } @else { (fold(&title, false, &items)) }
             }
-        }
-    }
+        },
+    )
 }
 
 fn counted(n: usize, noun: &str) -> String {

@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 
 use image::imageops::{FilterType, resize};
 use image::{ImageFormat, RgbImage};
+use maud::html;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::register_font;
@@ -20,16 +21,23 @@ const PNG_SCALE: u32 = 2;
 const OVERSAMPLING: u32 = 2;
 /// plotters' bitmap centres the box of a line, not the letters, units.
 const PNG_TEXT_DROP: f64 = 2.0;
+/// Radius of the place that answers a pointer, units: a finger hits it, a neighbour stays apart.
+const TIP: i32 = 8;
 
 impl Chart {
-    /// As SVG text.
+    /// As SVG text, with its tips.
     ///
     /// # Errors
     /// When plotters fails.
     pub fn svg(&self) -> Result<String> {
         let mut text = String::new();
         self.draw_on(SVGBackend::with_string(&mut text, self.size), 1, 0.0)?;
-        Ok(text)
+        let tip = |([x, y], words): ([f64; 2], &str)| {
+            let [x, y] = [x, y].map(|v| v.round() as i32);
+            html! { circle.tip cx=(x) cy=(y) r=(TIP) fill="transparent" { title { (words) } } }
+        };
+        let tips = self.tip_places().into_iter().map(|place| tip(place).into_string());
+        Ok(text.replace("</svg>", &(tips.collect::<String>() + "</svg>")))
     }
 
     /// As the bytes of a PNG.

@@ -7,8 +7,8 @@ use plotters::style::text_anchor::HPos;
 use plotters::style::{Color, WHITE};
 
 use super::{
-    Chart, ColourScale, FOOT, LABEL_ROOM, LEFT, LEGEND, Layer, Mark, RIGHT, Sample, Stroke,
-    TITLE_ROOM, X_TICKS, Y_TICKS,
+    Chart, ColourScale, FOOT, LABEL_ROOM, LEFT, LEGEND, Layer, Mark, NARROW_SIZE, RIGHT, ROW,
+    SCALE_ROWS, Sample, Stroke, TITLE_ROOM, X_TICKS, Y_TICKS,
 };
 use crate::report::axis::Axis;
 use crate::report::colours::{FAINT, GRID, INK};
@@ -36,8 +36,6 @@ const SMALL: i32 = 15;
 const TITLE: i32 = 21;
 const TICK: f64 = 5.0;
 const LEGEND_GAP: f64 = 22.0;
-/// From one row of the legend to the next.
-const ROW: f64 = 25.0;
 /// Length of a line's sample.
 const SAMPLE: f64 = 34.0;
 const SCALE_WIDTH: f64 = 24.0;
@@ -52,23 +50,47 @@ const HATCH_INK: RGBColor = RGBColor(205, 205, 205);
 impl Chart {
     /// In the order in which they cover one another.
     pub(super) fn shapes(&self) -> Vec<Shape> {
-        let (width, height) = (f64::from(self.size.0), f64::from(self.size.1));
-        let top = LABEL_ROOM + if self.title.is_empty() { 0.0 } else { TITLE_ROOM };
-        let bare = self.legend.is_empty() && self.scale.is_none();
-        let right = width - if bare { RIGHT } else { LEGEND };
-        let low = [LEFT + Y_TICKS, height - FOOT - X_TICKS];
-        let mut sheet = Sheet { chart: self, low, high: [right, top], shapes: Vec::new() };
+        let (mut sheet, width) = (self.sheet(), f64::from(self.size.0));
+        let ([left, bottom], [right, top]) = (sheet.low, sheet.high);
         let size = fitting(&self.title, TITLE, width - 2.0 * LEFT);
         sheet.text(&self.title, [LEFT, 0.5 * TITLE_ROOM], HPos::Left, size);
         sheet.axes(width - 2.0 * LEFT);
         self.layers.iter().for_each(|layer| sheet.layer(layer));
         let mut corner = [right + LEGEND_GAP, top + 10.0];
-        if let Some(scale) = &self.scale {
-            let rows = self.legend.len() as f64 + 3.0;
-            corner[1] = sheet.scale(scale, corner, low[1] - top - rows * ROW) + ROW;
+        if self.is_narrow() {
+            corner = [left, bottom + X_TICKS + 0.5 * ROW];
+        }
+        match &self.scale {
+            Some(scale) if self.is_narrow() => {
+                sheet.scale(scale, corner, (SCALE_ROWS - 2) as f64 * ROW);
+                corner[0] = 0.5 * width;
+            }
+            Some(scale) => {
+                let rows = self.legend.len() as f64 + 3.0;
+                corner[1] = sheet.scale(scale, corner, bottom - top - rows * ROW) + ROW;
+            }
+            None => {}
         }
         sheet.legend(corner);
         sheet.shapes
+    }
+
+    /// Where the tips stand that are inside the axes.
+    pub(super) fn tip_places(&self) -> Vec<(Point, &str)> {
+        let sheet = self.sheet();
+        let tips = self.tips.iter();
+        tips.filter_map(|(at, text)| Some((sheet.inside(at)?, text.as_str()))).collect()
+    }
+
+    /// An empty one.
+    fn sheet(&self) -> Sheet<'_> {
+        let width = f64::from(self.size.0);
+        let top = LABEL_ROOM + if self.title.is_empty() { 0.0 } else { TITLE_ROOM };
+        let bare = self.legend.is_empty() && self.scale.is_none();
+        let right = width - if bare || self.is_narrow() { RIGHT } else { LEGEND };
+        let height = f64::from(if self.is_narrow() { NARROW_SIZE.1 } else { self.size.1 });
+        let low = [LEFT + Y_TICKS, height - FOOT - X_TICKS];
+        Sheet { chart: self, low, high: [right, top], shapes: Vec::new() }
     }
 }
 
@@ -213,7 +235,7 @@ impl Sheet<'_> {
                 [] => (0.0, SMALL, FAINT),
                 _ => (SAMPLE + 10.0, TEXT, INK),
             };
-            let size = fitting(&entry.text, size, LEGEND - LEGEND_GAP - indent);
+            let size = fitting(&entry.text, size, f64::from(self.chart.size.0) - x - indent);
             let text = entry.text.clone();
             self.shapes.push(Shape::Text(text, [x + indent, y], HPos::Left, size, colour));
         }

@@ -1,16 +1,16 @@
 //! A card for each finding: what it is, where, how large, how sure, and what to do next.
 
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 use super::sentences::{
-    axis, badge, called, capital, chance, description, interval, mm, physics, sentence, statistic,
-    title,
+    axis, badge, called, capital, chance, description, halves, interval, mm, physics, sentence,
+    statistic, title,
 };
-use super::{curve, parameters};
+use super::{curve, parameters, table};
 use crate::capture::far_side;
 use crate::diagnose::{Finding, NextView, Status};
 use crate::error::Result;
-use crate::report::document::{facts, fold, list, row, table};
+use crate::report::document::{drawing, facts, fold, heading, list, prose, section};
 use crate::report::numbers::{count, fixed, p_value, percent, significant};
 use crate::terms::Statistic;
 
@@ -19,30 +19,44 @@ const MIN_PROBABILITY: f64 = 0.0005;
 /// Below this tilt a target counts as facing the sensor, rad: 3 degrees.
 const FACING_RAD: f64 = 0.0524;
 
-pub(super) fn findings(findings: &[Finding]) -> Result<Markup> {
-    let main = findings.iter().filter(|f| !f.minor);
-    let cards = main.enumerate().map(card).collect::<Result<Vec<Markup>>>()?;
-    Ok(html! { @if !cards.is_empty() { section.cards { @for card in cards { (card) } } } })
+pub(super) fn findings(findings: &[&Finding]) -> Result<Markup> {
+    let blind = |f: &&&Finding| f.status == Status::NotIdentifiable;
+    let unseen = findings.iter().filter(blind).count();
+    let cards = findings.iter().enumerate().map(card).collect::<Result<Vec<Markup>>>()?;
+    // The largest come first, so that those without a size are the last.
+    let (seen, hidden) = cards.split_at(cards.len() - unseen);
+    let title = format!("{} that these views cannot show", capital(&count(unseen, "effect")));
+    Ok(html! { @if !cards.is_empty() {
+        (section("The findings one by one", &html! {
+            @for card in seen { (card) }
+            @if unseen > 0 { (fold(&title, seen.is_empty(), &html! { @for card in hidden { (card) } })) }
+        }))
+    } })
 }
 
-fn card((i, finding): (usize, &Finding)) -> Result<Markup> {
-    let picture = finding.curve.as_ref().and_then(curve::chart).map(|c| c.svg()).transpose()?;
+fn card((i, finding): (usize, &&Finding)) -> Result<Markup> {
+    let what = format!(
+        "curve of {}: measured points with standard errors, and the model's line",
+        called(finding)
+    );
+    let chart = finding.curve.as_ref().and_then(curve::chart);
+    let picture = chart.map(|chart| drawing(&chart, &what)).transpose()?;
     let (class, badge) = badge(finding.status);
     Ok(html! {
         article.card {
             header {
-                h2 { (i + 1) ". " (capital(&called(finding))) }
+                (heading(3, &table::title(i, finding)))
                 span class={ "badge " (class) } { (badge) }
             }
-            p.lead { (physics(finding)) }
+            p { (prose(&physics(finding))) }
             div.halves {
                 (facts(finding_facts(finding)))
-                @if let Some(svg) = picture { figure {
-                    div.drawing role="img" aria-label={ "curve of " (called(finding)) } { (PreEscaped(svg)) }
+                @if let Some(drawing) = picture { figure {
+                    (drawing)
                     figcaption {
-                        span.dot {} " measured ± standard error " span.line {}
-                        @if finding.status == Status::Unexplained { " curve given to the simulation" }
-                        @else { " simulation with it added" }
+                        "Points: measured ± standard error. Line: "
+                        @if finding.status == Status::Unexplained { "the curve given to the simulation." }
+                        @else { "the simulation with it added." }
                     }
                 } }
             }
@@ -52,48 +66,18 @@ fn card((i, finding): (usize, &Finding)) -> Result<Markup> {
     })
 }
 
-/// Does either half of the views alone support it?
-fn halves(replicated: Option<bool>) -> &'static str {
-    match replicated {
-        Some(true) => "Both show it alike",
-        Some(false) => "They do not agree: either one lacks it, or their sizes differ",
-        None => "Not tested",
-    }
-}
-
-/// What is less than a hundredth of the mismatch: a line, and a table behind it.
-pub(super) fn small_remains(findings: &[Finding]) -> Markup {
-    let minor: Vec<&Finding> = findings.iter().filter(|f| f.minor).collect();
-    let share = fixed(100.0 * minor.iter().map(|f| f.share).sum::<f64>(), 1);
-    let columns = ["what", "what is off", "along", ">of the noise", ">share", "halves", ">chance"];
-    let row = |f: &&Finding| {
-        let p = html! { @if let Some(p) = f.p_adjusted { (p_value(p)) } @else { "–" } };
-        let of_all = format!("{} %", fixed(100.0 * f.share, 2));
-        let size = significant(f.size.sigma, 2);
-        let (what, off) = (capital(&called(f)), capital(statistic(f.statistic)));
-        row![what, off, axis(f.axis), size, of_all, halves(f.replicated), p]
-    };
-    html! { @if !minor.is_empty() { section {
-        (fold(
-            &format!("Small remains: {}, {share} % of the mismatch together", count(minor.len(), "finding")),
-            false,
-            &table(&columns, minor.iter().map(row)),
-        ))
-    } } }
-}
-
 /// Those that are known.
-fn finding_facts(finding: &Finding) -> Vec<(&str, Markup)> {
+fn finding_facts(finding: &Finding) -> Vec<(String, Markup)> {
     let place = interval(finding.axis, finding.interval, finding.unit);
     let mut facts = vec![
-        ("What is off", html! { (capital(statistic(finding.statistic))) }),
-        ("Where", html! { (capital(axis(finding.axis))) ": " b { (place) } }),
+        ("What is off".into(), html! { (capital(statistic(finding.statistic))) }),
+        ("Where".into(), html! { (capital(axis(finding.axis))) ": " b { (place) } }),
     ];
     let (size, p) = (finding.size, finding.p_adjusted);
     if size.mm.abs() > 0.0 || size.sigma.abs() > 0.0 {
         let bias = finding.statistic == Statistic::Bias;
         let noise = if bias { "of a single reading" } else { "in the model" };
-        facts.push(("How large", html! {
+        facts.push(("How large".into(), html! {
             @if finding.statistic == Statistic::Dropout {
                 b { (percent(size.sigma)) } " of the pixels are lost"
             } @else {
@@ -103,17 +87,17 @@ fn finding_facts(finding: &Finding) -> Vec<(&str, Markup)> {
     }
     if finding.status != Status::NotIdentifiable {
         facts.push((
-            "How sure",
+            "How sure".into(),
             html! {
                 (capital(&chance(p)))
                 @if let Some(p) = p { " (" (p_value(p)) ")" }
             },
         ));
-        facts.push(("Halves of the views", html! { (halves(finding.replicated)) }));
+        facts.push(("Halves of the views".into(), html! { (halves(finding.replicated)) }));
         if finding.share.is_finite() {
             let percent = fixed((100.0 * finding.share).clamp(0.0, 100.0), 0);
             facts.push((
-                "Share",
+                "Share".into(),
                 html! {
                     span.bar { span style={ "width:" (percent) "%" } {} }
                     " " b { (percent) " %" } " of all that was explained"
@@ -128,7 +112,7 @@ fn finding_facts(finding: &Finding) -> Vec<(&str, Markup)> {
             b { (parameters::value(name, value, 3)) }
             @if !description.is_empty() { ": " (description) }
         };
-        (name.as_str(), value)
+        (parameters::title(name), value)
     }));
     facts
 }
@@ -140,12 +124,12 @@ fn alternatives(finding: &Finding) -> Markup {
     let effects = finding.alternatives.iter().map(|a| {
         html! {
             b { @if let Some(p) = a.probability { (percent(p)) " " } (title(a.effect)) }
-            ": " (description(a.effect)) " " code { (a.effect) }
+            ": " (prose(description(a.effect))) " " code { (a.effect) }
         }
     });
     let none = (none > MIN_PROBABILITY).then(|| html! { b { (percent(none)) " none of these" } });
     html! { @if !finding.alternatives.is_empty() {
-        h3 { "What it could be" }
+        p { b { "What it could be" } }
         (list(effects.chain(none)))
     } }
 }
@@ -181,7 +165,7 @@ fn advice(finding: &Finding) -> Option<Markup> {
 }
 
 /// An instruction to a person holding a target.
-fn next_view(next: &NextView) -> Markup {
+pub(super) fn next_view(next: &NextView) -> Markup {
     let tilt = fixed(next.theta_rad.to_degrees(), 0);
     let far = far_side(next.azimuth_rad);
     let part = if far.contains(' ') { "corner" } else { "side" };
@@ -189,6 +173,6 @@ fn next_view(next: &NextView) -> Markup {
         "Take one more view: hold the target " b { (fixed(next.z_m, 2)) " m" } " in front of the sensor, "
         @if next.theta_rad.abs() < FACING_RAD { b { "facing it" } ". " }
         @else { b { "tilted by " (tilt) "°" } ", its " b { (far) " " (part) } " farthest away as the sensor sees it. " }
-        @if !next.why.is_empty() { (sentence(&next.why)) " " }
+        @if !next.why.is_empty() { (prose(&sentence(&next.why))) " " }
     }
 }

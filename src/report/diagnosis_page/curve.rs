@@ -4,6 +4,7 @@ use crate::diagnose::Curve;
 use crate::report::axis::Axis;
 use crate::report::chart::{Chart, Layer, Mark, Stroke};
 use crate::report::colours::{ACCENT, FAINT, INK};
+use crate::report::numbers::{decimals_for, fixed};
 use crate::stats::range;
 
 /// With more points than this they shrink.
@@ -15,7 +16,7 @@ const MAX_BAR: f64 = 1.5;
 /// Zero belongs into the picture when it is no farther than this many times the curve's height.
 const MAX_ZERO: f64 = 0.6;
 
-/// `None` where there is nothing to be seen.
+/// `None` where nothing was measured: no curve without its points.
 pub(super) fn chart(curve: &Curve) -> Option<Chart> {
     let line = points(curve, &curve.model);
     let marks = points(curve, &curve.y);
@@ -23,13 +24,18 @@ pub(super) fn chart(curve: &Curve) -> Option<Chart> {
     let bars = bars.map(|((x, y), error)| [*x, y - error, y + error]);
     let bars: Vec<[f64; 3]> = bars.filter(|bar| bar.iter().all(|v| v.is_finite())).collect();
     let xs = range(marks.iter().chain(&line).map(|p| p[0]));
-    if xs[0] > xs[1] {
+    if marks.is_empty() {
         return None;
     }
     let heights = heights(range(marks.iter().chain(&line).map(|p| p[1])), &bars);
     let axes = [xs, heights].map(|ends| Axis::with_margin(ends, MARGIN));
     let mut chart = Chart::small(axes, [&curve.x_label, &curve.y_label]);
     let zero = [chart.x.low, chart.x.high].map(|x| [x, 0.0]).to_vec();
+    let tip = |[x, y]: &[f64; 2]| {
+        let (x_text, y_text) = (fixed(*x, decimals_for(x.abs())), fixed(*y, decimals_for(y.abs())));
+        ([*x, *y], format!("{}: {x_text}; {}: {y_text}", curve.x_label, curve.y_label))
+    };
+    chart.tips = marks.iter().map(tip).collect();
     let radius = if marks.len() > MANY { 2 } else { 4 };
     chart.layers = vec![
         Layer::Line(zero, Stroke::new(FAINT, 1).dashed([5, 4])),
@@ -80,5 +86,7 @@ mod tests {
         assert!(chart.y.high < 0.4 && chart.y.low <= 0.0);
         assert!(chart.svg().is_ok());
         assert_eq!(super::chart(&Curve::default()), None);
+        let unmeasured = Curve { x: vec![1.0, 2.0], model: vec![0.1, 0.2], ..Default::default() };
+        assert_eq!(super::chart(&unmeasured), None);
     }
 }

@@ -23,6 +23,7 @@ const MILLIMETRES_BELOW_M: f64 = 0.3;
 /// `0.125 ± 0.001 px`, or to so many digits where the error is not known; whatever else stands in
 /// the file is shown as it is.
 pub(super) fn value(name: &str, value: &Value, digits: usize) -> Markup {
+    let (name, _) = split(name);
     let number = |key: &str| value.get(key).and_then(Value::as_f64);
     let Some(v) = value.as_f64().or_else(|| number("value")) else {
         return html! { (value.as_str().map_or_else(|| value.to_string(), str::to_string)) };
@@ -45,10 +46,16 @@ pub(super) fn description(effect: Option<&str>, name: &str) -> &'static str {
     parameter.map_or("", |p| p.summary)
 }
 
+/// The key, and what stands behind a comma: `z50_m, near side`.
+fn split(name: &str) -> (&str, &str) {
+    name.find(',').map_or((name, ""), |at| name.split_at(at))
+}
+
 /// A parameter's name without its unit: `amplitude_px` is an amplitude.
 pub(super) fn title(name: &str) -> String {
+    let (name, rest) = split(name);
     let bare = UNITS.iter().find_map(|(ending, ..)| name.strip_suffix(ending));
-    bare.unwrap_or(name).replace('_', " ")
+    bare.unwrap_or(name).replace('_', " ") + rest
 }
 
 #[cfg(test)]
@@ -68,6 +75,8 @@ mod tests {
             assert_eq!(value(name, &json, 3).into_string(), text);
         }
         assert_eq!(title("time_constant_s"), "time constant");
+        assert_eq!(title("z50_m, near side"), "z50, near side");
+        assert_eq!(value("z50_m, near side", &json!(0.481), 2).into_string(), "0.48 m");
         let span = description(Some("target-bow"), "span_m");
         assert_eq!(span, "width of the board over which it is counted");
     }

@@ -5,10 +5,12 @@ use maud::{Markup, html};
 use super::sentences::{
     axis, called, capital, interval, join, missing, mm, sentence, statistic, title,
 };
-use super::story::story;
+use super::story::gained;
 use super::{parameters, sentences};
-use crate::diagnose::{CannotTell, Diagnosis, HeldOut, MapRow, Verdict, ViewLine};
-use crate::report::document::{Column, fold, list, row, table, table_of};
+use crate::diagnose::{CannotTell, Diagnosis, HeldOut, MapRow, Reference, Verdict, ViewLine};
+use crate::report::document::{
+    self, Column, answer, fold, list, prose, row, section, table, table_of,
+};
 use crate::report::numbers::{count, degrees, fixed, p_value, significant};
 use crate::terms::Statistic;
 
@@ -20,24 +22,40 @@ const PX_DECIMALS: usize = 3;
 
 pub(super) fn verdict(diagnosis: &Diagnosis) -> Markup {
     let (class, mark) = match diagnosis.verdict {
-        Verdict::Match => ("match", "Match"),
-        Verdict::Mismatch => ("mismatch", "Mismatch"),
-        Verdict::Inconclusive => ("inconclusive", "Not settled"),
+        Verdict::Match => ("good", "Match"),
+        Verdict::Mismatch => ("bad", "Mismatch"),
+        Verdict::Inconclusive => ("unsure", "Not settled"),
     };
-    html! {
-        section class={ "verdict " (class) } {
-            p.mark { (mark) }
-            p.sentence { (sentences::verdict(diagnosis)) }
-            (list(story(diagnosis).iter().map(|sentence| html! { (sentence) })))
-            div.tiles { (tiles(diagnosis)) }
+    let subject = match diagnosis.reference {
+        Reference::Model => "The model",
+        Reference::SimulatedRecording => "The simulation",
+    };
+    let sentence = match diagnosis.verdict {
+        Verdict::Match => format!("{subject} reproduces this recording."),
+        Verdict::Mismatch => format!("{subject} does not reproduce this recording."),
+        Verdict::Inconclusive => {
+            format!("Whether {} reproduces this recording is not settled.", subject.to_lowercase())
         }
-    }
+    };
+    let unsettled = diagnosis.verdict == Verdict::Inconclusive;
+    let why = diagnosis.remarks.first().filter(|_| unsettled);
+    answer(
+        class,
+        mark,
+        &sentence,
+        &html! {
+            @if let Some(why) = why { p { (prose(why)) } }
+            @if let Some(gained) = gained(diagnosis) { p { (prose(&gained)) } }
+            p { (prose(&sentences::verdict(diagnosis))) }
+            (tiles(diagnosis))
+        },
+    )
 }
 
 /// The numbers that go with the verdict.
 fn tiles(diagnosis: &Diagnosis) -> Markup {
     let held = diagnosis.views.iter().filter(|v| v.held_out).count();
-    let held = format!("{held} of them held out for the final test");
+    let held = format!("{held} of them kept out for the final test");
     let found = missing(&diagnosis.findings);
     let (number, largest) = match found.first() {
         Some(largest) => (found.len().to_string(), format!("largest: {}", called(largest))),
@@ -48,21 +66,22 @@ fn tiles(diagnosis: &Diagnosis) -> Markup {
         (_, 0) => "not settled".into(),
         (_, left) => count(left, "difference"),
     };
-    html! {
-        (tile("Recording", &count(diagnosis.views.len(), "view"), &held))
-        (tile("Effects left out", &number, &largest))
-        @if let Some(held) = &diagnosis.heldout {
-            @let change = format!("{} → {}", mm(held.rms_mm_before), mm(held.rms_mm_after));
-            (tile("Steady error, held-out views", &change, "before and after"))
-        }
-        @if !diagnosis.findings.is_empty() {
-            (tile("Still unexplained", &remaining, "when the tests are run again"))
-        }
+    let mut tiles = vec![
+        ("recording", capital(&count(diagnosis.views.len(), "view")), held),
+        ("effects left out", capital(&number), largest),
+    ];
+    if let Some(held) = &diagnosis.heldout {
+        let change = format!("{} → {}", mm(held.rms_mm_before), mm(held.rms_mm_after));
+        tiles.push(("smooth residual, views kept out", change, "rms, before and after".into()));
     }
-}
-
-fn tile(label: &str, value: &str, remark: &str) -> Markup {
-    html! { div { p.label { (label) } p.big { (capital(value)) } p.label { (remark) } } }
+    if !diagnosis.findings.is_empty() {
+        tiles.push((
+            "still unexplained",
+            capital(&remaining),
+            "when the tests are run again".into(),
+        ));
+    }
+    document::tiles(tiles)
 }
 
 /// The final test.
@@ -74,7 +93,7 @@ pub(super) fn held_out(held: Option<&HeldOut>) -> Markup {
     let every = "every pixel of every frame, noise included, rms";
     let score = [held.log_score_before, held.log_score_after].map(|v| fixed(v, 1));
     let rows = [
-        row!["steady error, rms", mm(held.rms_mm_before), mm(held.rms_mm_after)],
+        row!["smooth residual, rms", mm(held.rms_mm_before), mm(held.rms_mm_after)],
         row![every, px(held.rms_px_before), px(held.rms_px_after)],
         row![
             "the same after kinoise correct alone",
@@ -83,21 +102,23 @@ pub(super) fn held_out(held: Option<&HeldOut>) -> Markup {
         ],
         row!["log score, nats a view", score[0], score[1]],
     ];
-    html! { div {
-        h2 { "What was gained" }
-        p {
-            "Tested on " (count(held.views.len(), "view")) " that took no part in the search: "
-            span.units { (held.views.join(", ")) } "."
-        }
-        (table(&["", ">before", ">after"], rows))
-        p {
-            @if low > 0.0 { "The extended model predicts such a view better by " }
-            @else { "No gain beyond chance: the extended model differs by " }
-            b { (gain(held.gain)) " nats a view" }
-            " (95 % interval " (gain(low)) " to " (gain(high)) ", by resampling views). "
-            span.units { "A nat more makes what was recorded e ≈ 2.7 times as probable." }
-        }
-    } }
+    section(
+        "What was gained",
+        &html! {
+            p {
+                "Tested on " (count(held.views.len(), "view")) " that took no part in the search: "
+                span.units { (held.views.join(", ")) } "."
+            }
+            (table(&["", ">before", ">after"], rows))
+            p {
+                @if low > 0.0 { "The extended model predicts such a view better by " }
+                @else { "No gain beyond chance: the extended model differs by " }
+                b { (gain(held.gain)) " nats a view" }
+                " (95 % interval " (gain(low)) " to " (gain(high)) ", by resampling views). "
+                span.units { "A nat more makes what was recorded e ≈ 2.7 times as probable." }
+            }
+        },
+    )
 }
 
 /// The same tests against the extended model.
@@ -106,21 +127,23 @@ pub(super) fn remaining(diagnosis: &Diagnosis) -> Markup {
     if diagnosis.findings.is_empty() && after.remaining.is_empty() {
         return html! {};
     }
-    html! { div {
-        h2 { "What remains" }
-        p {
-            "The same tests against the extended model: "
-            @match after.verdict {
-                Verdict::Match => "match. Nothing differs beyond chance.",
-                Verdict::Mismatch => "still a mismatch.",
-                Verdict::Inconclusive => "not settled.",
+    section(
+        "What remains",
+        &html! {
+            p {
+                "The same tests against the extended model: "
+                @match after.verdict {
+                    Verdict::Match => "match. Nothing differs beyond chance.",
+                    Verdict::Mismatch => "still a mismatch.",
+                    Verdict::Inconclusive => "not settled.",
+                }
             }
-        }
-        (list(after.remaining.iter().map(|r| html! {
-            b { (capital(statistic(r.statistic))) } " over the " (axis(r.axis))
-            @if !r.words.is_empty() { ": " (r.words) } @if let Some(p) = r.p_adjusted { " (" (p_value(p)) ")" }
-        })))
-    } }
+            (list(after.remaining.iter().map(|r| html! {
+                b { (capital(statistic(r.statistic))) } " over the " (axis(r.axis))
+                @if !r.words.is_empty() { ": " (prose(&r.words)) } @if let Some(p) = r.p_adjusted { " (" (p_value(p)) ")" }
+            })))
+        },
+    )
 }
 
 /// What the absence of a finding is worth.
@@ -138,46 +161,46 @@ pub(super) fn detectable(diagnosis: &Diagnosis) -> Markup {
         let description = parameters::description(Some(d.effect), strength);
         Some(row![capital(title(d.effect)), smallest, description])
     });
-    html! { section {
-        @if diagnosis.verdict == Verdict::Match {
-            h2 { "What was looked for" }
-            @if names.is_empty() { p { "Every effect of the catalogue, and curves without a name over every axis." } }
-            @else {
-                p {
-                    "Effects of the catalogue (" (join(&names, "and")) "), and curves without a name. None of them \
-                     stands out from chance."
-                }
+    let looked_for = html! {
+        @if names.is_empty() { p { "Every effect of the catalogue, and curves without a name over every axis." } }
+        @else {
+            p {
+                "Effects of the catalogue (" (join(&names, "and")) "), and curves without a name. None of them \
+                 stands out from chance."
             }
         }
-        @if !names.is_empty() {
-            h2 { "How small an effect these views could have shown" }
-            (table(&["effect", "smallest that would be seen", "~what the number is"], rows))
-            p.note { "With a power of 80 %: four of five recordings like this one would show an effect this large." }
-        }
-    } }
+    };
+    let smallest = html! {
+        (table(&["effect", "smallest that would be seen", "~what the number is"], rows))
+        p.note { "With a power of 80 %: four of five recordings like this one would show an effect this large." }
+    };
+    html! {
+        @if diagnosis.verdict == Verdict::Match { (section("What was looked for", &looked_for)) }
+        @if !names.is_empty() { (section("How small an effect these views could have shown", &smallest)) }
+    }
 }
 
 pub(super) fn cannot_tell(all: &[CannotTell]) -> Markup {
     let items = list(all.iter().map(|c| {
-        html! { b { (capital(title(c.effect))) } ": " (sentence(&c.why)) }
+        html! { b { (capital(title(c.effect))) } ": " (prose(&sentence(&c.why))) }
     }));
-    html! { @if !all.is_empty() { section {
-        h2 { "What these views cannot show" }
-        @if all.len() <= MAX_OPEN { (items) } @else { (fold(&capital(&count(all.len(), "effect")), true, &items)) }
-    } } }
+    let items = match all.len() > MAX_OPEN {
+        true => fold(&capital(&count(all.len(), "effect")), true, &items),
+        false => items,
+    };
+    html! { @if !all.is_empty() { (section("What these views cannot show", &items)) } }
 }
 
 /// Every located mismatch.
 pub(super) fn map(rows: &[MapRow]) -> Markup {
-    let columns = [">", "what is off", "along", "where", ">size", ">chance"];
+    let columns = [">no.", "what is off", "along", "where", ">size", ">chance"];
     let cells = |(i, r): (usize, &MapRow)| {
         let place = interval(r.axis, r.interval, r.unit);
         let (what, size) = (capital(statistic(r.statistic)), effect_size(r));
         row![i + 1, what, axis(r.axis), place, size, p_value(r.p_adjusted)]
     };
     let numbered = || rows.iter().enumerate();
-    html! { @if !rows.is_empty() { section {
-        h2 { "Where model and recording differ" }
+    let content = html! {
         (table(&columns, numbered().take(OPEN_ROWS).map(cells)))
         @if rows.len() > OPEN_ROWS {
             @let rest = table(&columns, numbered().skip(OPEN_ROWS).map(cells));
@@ -188,7 +211,8 @@ pub(super) fn map(rows: &[MapRow]) -> Markup {
              an error: in units of σ of a single reading; of all else: as a share of the model's value. p: corrected \
              for the number of places searched."
         }
-    } } }
+    };
+    html! { @if !rows.is_empty() { (section("Where model and recording differ", &content)) } }
 }
 
 fn effect_size(row: &MapRow) -> Markup {
@@ -202,28 +226,26 @@ fn effect_size(row: &MapRow) -> Markup {
 pub(super) fn views(views: &[ViewLine]) -> Markup {
     let columns: [Column<'_, ViewLine>; 9] = [
         ("view", &|v| html! { (v.name) }),
-        (">distance m", &|v| html! { (fixed(v.z_m, 3)) }),
-        (">tilt °", &|v| html! { (degrees(v.theta_rad)) }),
+        (">z m", &|v| html! { (fixed(v.z_m, 3)) }),
+        (">tilt θ °", &|v| html! { (degrees(v.theta_rad)) }),
         (">azimuth °", &|v| html! { (degrees(v.azimuth_rad)) }),
         (">frames", &|v| html! { (v.frames) }),
         (">pixels", &|v| html! { (v.pixels) }),
-        (">steady error before px", &|v| html! { (fixed(v.bowl_px_before, PX_DECIMALS)) }),
+        (">smooth residual before px", &|v| html! { (fixed(v.bowl_px_before, PX_DECIMALS)) }),
         (">after px", &|v| html! { (fixed(v.bowl_px_after, PX_DECIMALS)) }),
         ("used for", &|v| html! { @if v.held_out { b { "final test" } } @else { "search" } }),
     ];
-    html! { @if !views.is_empty() { section {
-        h2 { "Views" }
+    let content = html! {
         (table_of(&columns, views))
         p.note {
-            "Steady error: root mean square of the view's smooth residual, px of disparity. Azimuth: towards the \
-             target's far side, 0 is right and 90 down."
+            "Smooth residual: root mean square over the view, px of disparity. Azimuth: towards the target's far \
+             side, 0 is right and 90 down."
         }
-    } } }
+    };
+    html! { @if !views.is_empty() { (section("Views", &content)) } }
 }
 
 pub(super) fn remarks(remarks: &[String]) -> Markup {
-    html! { @if !remarks.is_empty() { section {
-        h2 { "Remarks" }
-        (list(remarks.iter().map(|remark| html! { (remark) })))
-    } } }
+    let items = list(remarks.iter().map(|remark| prose(remark)));
+    html! { @if !remarks.is_empty() { (section("Remarks", &items)) } }
 }

@@ -89,11 +89,11 @@ pub(super) fn called(finding: &Finding) -> String {
 /// Class and text of a finding's badge.
 pub(super) fn badge(status: Status) -> (&'static str, &'static str) {
     match status {
-        Status::Named => ("named", "effect named"),
-        Status::OneOf => ("one-of", "one of several"),
-        Status::Unexplained => ("unexplained", "measured, not in the catalogue"),
-        Status::Recalibrate => ("recalibrate", "calibrate again"),
-        Status::NotIdentifiable => ("not-identifiable", "cannot be seen here"),
+        Status::Named => ("good", "effect named"),
+        Status::OneOf => ("unsure", "one of several"),
+        Status::Unexplained => ("bad", "measured, not in the catalogue"),
+        Status::Recalibrate => ("bad", "calibrate again"),
+        Status::NotIdentifiable => ("unsure", "cannot be seen here"),
     }
 }
 
@@ -126,7 +126,7 @@ pub(super) fn axis(axis: Axis) -> &'static str {
         Axis::Radius => "distance from the picture's centre",
         Axis::Pixel => "pixel",
         Axis::Theta => "tilt of the target",
-        Axis::Azimuth => "direction of the tilt",
+        Axis::Azimuth => "azimuth of the tilt",
         Axis::TargetPosition => "place on the target",
         Axis::EdgeDistance => "distance from the target's edge",
         Axis::Intensity => "infrared intensity",
@@ -170,6 +170,15 @@ pub(super) fn interval(axis: Axis, [low, high]: [f64; 2], unit: &str) -> String 
     let decimals = decimals_for(scale * (high - low).abs());
     let [low, high] = [low, high].map(|v| fixed(scale * v, decimals));
     if low == high { format!("{low}{unit}") } else { format!("{low} to {high}{unit}") }
+}
+
+/// Does either half of the views alone support it?
+pub(super) fn halves(replicated: Option<bool>) -> &'static str {
+    match replicated {
+        Some(true) => "Both show it alike",
+        Some(false) => "They do not agree: either one lacks it, or their sizes differ",
+        None => "Not tested",
+    }
 }
 
 /// Of a size that already is in mm.

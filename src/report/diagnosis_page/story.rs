@@ -107,10 +107,10 @@ fn small_percent(share: f64) -> String {
     }
 }
 
-fn gained(diagnosis: &Diagnosis) -> Option<String> {
+pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
     let h = diagnosis.heldout.as_ref()?;
     Some(format!(
-        "On {} kept aside the steady error goes from {} to {} and {} nats a view are gained [{}, {}]; `kinoise correct` alone takes every pixel from {} to {} px rms.",
+        "On {} kept aside the smooth residual goes from {} to {} and {} nats a view are gained [{}, {}]; `kinoise correct` alone takes every pixel from {} to {} px rms.",
         count(h.views.len(), "view"),
         mm(h.rms_mm_before),
         mm(h.rms_mm_after),

@@ -10,5 +10,5 @@ mod verdict;
 pub use advice::{AdviceMarks, mark_advice};
 pub use endpoints::{Endpoint, Level, endpoints_in_words};
 pub use marks::{Marks, QUESTIONS, mark};
-pub use scores::{ByStrength, Rate, Ratio, Scores, level, scores, word};
+pub use scores::{ByStrength, Rate, Rates, Ratio, Scores, level, scores, word};
 pub use verdict::advised_view;

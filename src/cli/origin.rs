@@ -1,0 +1,71 @@
+//! What a page says of its making: the recording and the command as they were typed.
+
+use std::path::Path;
+
+use kinoise::report::Origin;
+
+use super::common::source_date;
+
+/// Results do not depend on these.
+const FLAGS: [&str; 5] = ["--json", "--force", "--exit-zero", "-q", "-v"];
+const WITH_VALUE: &str = "--threads";
+const OUTPUT: [&str; 2] = ["-o", "--output"];
+
+/// Of a page in `folder`, made from `recording`, now (or at SOURCE_DATE_EPOCH).
+pub fn origin(recording: &Path, folder: &Path, seed: u64) -> Origin {
+    let typed: Vec<String> =
+        std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned()).collect();
+    let recording = recording.to_string_lossy();
+    let origin = Origin::at(&quoted(&recording), &command(&typed), Some(seed), source_date());
+    Origin { folder: quoted(&name_of(folder)), ..origin }
+}
+
+/// Without what results do not depend on; of the folder of results, its name.
+fn command(typed: &[String]) -> String {
+    let (mut words, mut typed) = (vec!["kinoise".to_string()], typed.iter());
+    while let Some(word) = typed.next() {
+        let (name, value) = word.split_once('=').map_or((&**word, None), |(n, v)| (n, Some(v)));
+        if FLAGS.contains(&name) {
+            continue;
+        }
+        if name == WITH_VALUE {
+            if value.is_none() {
+                typed.next();
+            }
+        } else if OUTPUT.contains(&name) {
+            let folder = value.map_or_else(|| typed.next().cloned(), |v| Some(v.to_string()));
+            words.extend(["-o".into(), quoted(&name_of(Path::new(&folder.unwrap_or_default())))]);
+        } else {
+            words.push(quoted(word));
+        }
+    }
+    words.join(" ")
+}
+
+fn name_of(folder: &Path) -> String {
+    folder.file_name().map_or_else(|| ".".into(), |name| name.to_string_lossy().into_owned())
+}
+
+/// As a shell reads it back.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./,:=+@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_string();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_results_do_not_depend_on_is_left_out() {
+        let typed =
+            ["calibrate", "my rec", "--threads", "2", "--json", "-o", "/tmp/x/out", "--seed", "3"];
+        let typed = typed.map(String::from);
+        assert_eq!(command(&typed), "kinoise calibrate 'my rec' -o out --seed 3");
+        let typed = ["map", "a'b", "--output=/tmp/m", "--threads=1"].map(String::from);
+        assert_eq!(command(&typed), r"kinoise map 'a'\''b' -o m");
+    }
+}

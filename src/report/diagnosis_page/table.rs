@@ -1,0 +1,116 @@
+//! All findings in one table, the largest first; what is small folds away.
+
+use maud::{Markup, html};
+
+use super::sentences::{axis, called, capital, halves, interval, mm, statistic};
+use crate::diagnose::{Finding, Status};
+use crate::report::document::{fold, prose, row, section, slug, table};
+use crate::report::numbers::{count, fixed, p_value, percent, significant};
+use crate::terms::Statistic;
+
+const COLUMNS: [&str; 8] =
+    ["finding", ">size", ">times σ", ">name", ">chance", "what is off", "where", "~what to do"];
+
+pub(super) fn findings(main: &[&Finding], minor: &[&Finding]) -> Markup {
+    // What cannot be seen has no size; its own parts come after the others'.
+    let seen = main.iter().enumerate().filter(|(_, f)| f.status != Status::NotIdentifiable);
+    let rows: Vec<Vec<Markup>> = seen.map(|(i, f)| line(i, f)).collect();
+    if rows.is_empty() && minor.is_empty() {
+        return html! {};
+    }
+    section(
+        "What was found",
+        &html! {
+            @if !rows.is_empty() {
+                (table(&COLUMNS, rows))
+                p.note {
+                    "Size: root mean square over the recording. Times σ: beside the noise of a single reading. Name: \
+                     probability that the first name is right, beside the other names that would explain it. Chance: p of \
+                     a difference this large if the model were right, corrected for the number of places searched."
+                }
+            }
+            (small(minor))
+        },
+    )
+}
+
+/// Where a finding's own part of the page is.
+pub(super) fn title(i: usize, finding: &Finding) -> String {
+    format!("{}. {}", i + 1, capital(&called(finding)))
+}
+
+fn line(i: usize, f: &Finding) -> Vec<Markup> {
+    let name = capital(&called(f));
+    let size = match f.statistic {
+        Statistic::Dropout => format!("{} of pixels", percent(f.size.sigma)),
+        _ if f.size.mm.abs() > 0.0 => mm(f.size.mm),
+        _ => "–".into(),
+    };
+    let likely = f.alternatives.first().and_then(|a| a.probability);
+    let place = interval(f.axis, f.interval, f.unit);
+    row![
+        html! { a href={ "#" (slug(&title(i, f))) } { (name) } },
+        size,
+        html! { @if f.statistic == Statistic::Dropout { "–" } @else { (significant(f.size.sigma, 2)) } },
+        html! { @if let Some(p) = likely { (percent(p)) } @else { "–" } },
+        html! { @if let Some(p) = f.p_adjusted { (p_value(p)) } @else { "–" } },
+        capital(statistic(f.statistic)),
+        html! { (capital(axis(f.axis))) ": " (place) },
+        prose(&short_advice(f)),
+    ]
+}
+
+/// In a few words; the finding's own part says it in full.
+fn short_advice(f: &Finding) -> String {
+    match (f.status, &f.next_view) {
+        (Status::OneOf, Some(view)) | (Status::Unexplained, Some(view)) => {
+            let tilt = fixed(view.theta_rad.to_degrees(), 0);
+            format!("one more view: {} m, tilt {tilt}°", fixed(view.z_m, 2))
+        }
+        (Status::Named, _) if f.statistic == Statistic::Bias => {
+            "`kinoise correct` takes it out".into()
+        }
+        (Status::Named, _) => "nothing: the extended model has it".into(),
+        (Status::OneOf, None) => "views at other distances and tilts".into(),
+        (Status::Unexplained, None) => "vary one condition at a time to find its cause".into(),
+        (Status::Recalibrate, _) => "`kinoise calibrate` again".into(),
+        (Status::NotIdentifiable, _) => "measure distances with a tape".into(),
+    }
+}
+
+/// What is less than a hundredth of the mismatch.
+fn small(minor: &[&Finding]) -> Markup {
+    let share = fixed(100.0 * minor.iter().map(|f| f.share).sum::<f64>(), 1);
+    let columns = [
+        "what",
+        ">size",
+        ">times σ",
+        ">share",
+        ">chance",
+        "what is off",
+        "along",
+        "halves of the views",
+    ];
+    let row = |f: &&Finding| {
+        let p = html! { @if let Some(p) = f.p_adjusted { (p_value(p)) } @else { "–" } };
+        let (size, share) = (mm(f.size.mm), format!("{} %", fixed(100.0 * f.share, 2)));
+        let (what, off) = (capital(&called(f)), capital(statistic(f.statistic)));
+        row![
+            what,
+            size,
+            significant(f.size.sigma, 2),
+            share,
+            p,
+            off,
+            axis(f.axis),
+            halves(f.replicated)
+        ]
+    };
+    html! { @if !minor.is_empty() {
+        (fold(
+            &format!("Small remains: {}, {share} % of the mismatch together", count(minor.len(), "finding")),
+            false,
+            &table(&columns, minor.iter().map(row)),
+        ))
+    } }
+}
