@@ -25,9 +25,9 @@ const SMOOTH: f64 = 4.0;
 const HELD: f64 = 0.9;
 /// A picture of which less is measured shows a thing, not a wall.
 const MIN_MEASURED: f64 = 0.6;
-/// The range exceeds the depth by this share at 34 degrees off the axis, a Kinect's corner; nothing that
-/// a sensor does to a plane is larger.
-const MAX_BEND: f64 = 0.21;
+/// Nothing that a sensor does to a plane is larger than the range in place of the depth, by this factor
+/// for what tilt makes of it. A ball bends more over so small a part of the picture.
+const MAX_BEND: f64 = 1.2;
 
 /// The whole of `inside` as a target, if one smooth surface fills it. `valid` are its measured pixels.
 pub(super) fn curved_target(
@@ -42,15 +42,16 @@ pub(super) fn curved_target(
     let surface = Surface::fit(image, valid, noise)?;
     let plane = Plane::new(surface.tangent());
     let fit = fit_affine_robust(image.w, image.rays, valid, &plane, noise, Effort::Sample)?;
-    let bend = valid
-        .iter()
-        .map(|&i| {
-            let (x, y) = image.rays.at(i as usize);
-            let expected = fit.plane.inverse_depth(x, y);
-            if expected > 0.0 { (surface.at(x, y) / expected - 1.0).abs() } else { f64::INFINITY }
-        })
-        .fold(0.0, f64::max);
-    if bend > MAX_BEND || surface.scale > SMOOTH * noise || surface.held < HELD {
+    let (mut bend, mut range) = (0.0, 0.0);
+    for (x, y) in valid.iter().map(|&i| image.rays.at(i as usize)) {
+        let expected = fit.plane.inverse_depth(x, y);
+        let off = (surface.at(x, y) / expected - 1.0).abs();
+        bend = f64::max(bend, if expected > 0.0 { off } else { f64::INFINITY });
+        range = f64::max(range, (1.0 + x * x + y * y).sqrt() - 1.0);
+    }
+    let rough = image.too_rough(&AffineFit { scale: surface.scale, ..fit }, valid);
+    let smooth = surface.scale < SMOOTH * noise && surface.held > HELD;
+    if rough || !smooth || bend > MAX_BEND * range {
         return None;
     }
     Some(target(image, inside, valid, &fit, bend))

@@ -6,7 +6,7 @@ use crate::frame::Frame;
 use crate::io::encode_png16;
 
 fn depth(path: &Path) {
-    let frame = Frame { width: 8, height: 6, raw: vec![5000; 48] };
+    let frame = Frame { width: 640, height: 480, raw: vec![5000; 640 * 480] };
     fs::write(path, encode_png16(&frame).unwrap()).unwrap();
 }
 

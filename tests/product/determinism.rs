@@ -73,20 +73,20 @@ fn a_model_made_from_a_simulation_of_itself_repeats() {
     let calibrated = || {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let recording = folder.path().join("recording");
+        let out = folder.path().join("out");
         for arguments in [
             vec!["simulate", recording.to_str().expect("plain"), "--shrink", "4"],
             vec![
                 "calibrate",
                 recording.to_str().expect("plain"),
                 "-o",
-                folder.path().to_str().expect("plain"),
+                out.to_str().expect("plain"),
             ],
         ] {
             let output = kinoise().args(&arguments).output().expect("the program runs");
             assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         }
-        ["model.json", "measurements.csv"]
-            .map(|n| fs::read(folder.path().join(n)).expect("written"))
+        ["model.json", "measurements.csv"].map(|n| fs::read(out.join(n)).expect("written"))
     };
     assert_eq!(calibrated(), calibrated());
 }
