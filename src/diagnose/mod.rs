@@ -51,6 +51,7 @@ mod null;
 mod occlusion_scan;
 mod other_findings;
 mod outcome;
+mod pairs;
 mod parameters;
 mod partners;
 mod pictures;
@@ -76,6 +77,7 @@ mod surveyed_view;
 mod tails;
 mod texture;
 mod tiles;
+mod unequal;
 mod variance;
 mod verdict;
 
