@@ -18,6 +18,7 @@ mod diagnosis;
 mod engine;
 mod evidence;
 mod exposure;
+mod few_views;
 mod field;
 mod findings;
 mod form;
