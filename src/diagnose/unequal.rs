@@ -8,34 +8,27 @@ use super::structure::Structure;
 use super::verdict::MIN_SIZE;
 use crate::terms::{Axis, Statistic};
 
-/// Logarithm of each frame's variance over the mean of the others', of rough residuals; nothing
-/// with fewer than three frames, of which none can be blamed.
+/// Logarithm of each frame's mean square over the others', of rough residuals. What frames have in
+/// common, still or slowly changing, is in all of them alike. Nothing with fewer than three frames,
+/// of which none can be blamed.
 pub fn loudness(frames: &[Vec<f32>]) -> [Option<f64>; FRAMES_KEPT] {
     let mut all = [None; FRAMES_KEPT];
     let n = frames.len().min(FRAMES_KEPT);
     if n < 3 {
         return all;
     }
-    let others = (n - 1) as f64;
-    let (mut squares, mut pixels) = ([0.0; FRAMES_KEPT], 0.0);
+    let mut squares = [0.0; FRAMES_KEPT];
     for k in 0..frames[0].len() {
-        let at: [f32; FRAMES_KEPT] = std::array::from_fn(|j| frames.get(j).map_or(0.0, |f| f[k]));
-        let sum: f64 = at.iter().map(|r| f64::from(*r)).sum();
-        if sum.is_finite() {
-            pixels += 1.0;
-            for (square, r) in squares[..n].iter_mut().zip(at) {
-                let r = f64::from(r);
-                *square += (r - (sum - r) / others).powi(2);
-            }
+        let at: [f64; FRAMES_KEPT] =
+            std::array::from_fn(|j| frames.get(j).map_or(0.0, |f| f64::from(f[k]).powi(2)));
+        if at.iter().sum::<f64>().is_finite() {
+            squares.iter_mut().zip(at).for_each(|(square, r)| *square += r);
         }
     }
-    // A frame about the mean of the others has its own variance and a little of each of theirs.
-    let theirs = 1.0 / (others * others);
-    let whole = squares.iter().sum::<f64>() / (1.0 + others * theirs);
-    let own = squares.map(|square| (square - theirs * whole) / (1.0 - theirs));
-    for j in (0..n).filter(|_| pixels > 0.0) {
-        let rest = (whole - own[j]) / others;
-        all[j] = (own[j] > 0.0 && rest > 0.0).then(|| (own[j] / rest).ln());
+    let whole: f64 = squares.iter().sum();
+    for (one, own) in all.iter_mut().zip(squares).take(n) {
+        let rest = (whole - own) / (n - 1) as f64;
+        *one = (own > 0.0 && rest > 0.0).then(|| (own / rest).ln());
     }
     all
 }
