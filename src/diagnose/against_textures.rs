@@ -42,6 +42,7 @@ impl Baseline {
             // Nothing is known of columns: what both have must vanish.
             differ(&mut s.column_px2, twin.column_px2, columns.min(0.0));
             differ(&mut s.lines_px2, twin.lines_px2, 0.0);
+            s.loudness.iter_mut().zip(twin.loudness).for_each(|(r, t)| differ(r, t, 0.0));
             for (k, lag) in lags.iter().enumerate() {
                 if twin.lagged[k].is_some() {
                     differ(&mut s.lagged[k], twin.lagged[k], *lag);

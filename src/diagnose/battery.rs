@@ -2,8 +2,11 @@
 
 use serde_json::Map;
 
+use super::ablation::Ablation;
+use super::bias;
 use super::case::{Case, Mean, Scatter};
 use super::diagnosis::{Detectable, Finding, Status};
+use super::few_views::few_views;
 use super::findings;
 use super::form::better_form;
 use super::hanging::Hanging;
@@ -21,6 +24,7 @@ use super::replication_textures;
 use super::rim;
 use super::scene::Scene;
 use super::steps::{is_raw, steps};
+use super::variance;
 use super::verdict::{MIN_SIZE, echoes, fold_into_sigma, merge, symptoms};
 use crate::terms::{Axis, Statistic, Term, corner_radius};
 
@@ -69,6 +73,7 @@ impl Case<'_> {
         let second = self.survey.second();
         let lattice = &scatter.lattice;
         let steps = steps(lattice, &self.known, &self.fields, self.recording, sigma_mm, &second);
+        let stepped = !steps.is_empty();
         let mut curves = self.curves([&mean.outcome, &scatter.outcome], advise);
         let refitted = self.take_refit(&mut curves);
         curves.retain(|f| self.is_news(f, &steps, &scatter));
@@ -85,6 +90,7 @@ impl Case<'_> {
         let (lost, detectable) = self.lost();
         found.extend(lost);
         found.extend(self.laws(&mean.terms));
+        found.extend(self.few_views([&mean.outcome, &scatter.outcome], stepped));
         tell_lines_once(&mut found);
         if self.baseline.is_some() {
             symptoms(&mut found);
@@ -159,6 +165,32 @@ impl Case<'_> {
             }
         }
         found
+    }
+
+    /// What a few views have alone. Two runs of a world of light, and views beside those that a model
+    /// was learnt from, differ one by one for no reason that could be told.
+    fn few_views(&self, outcomes: [&Outcome; 2], stepped: bool) -> Vec<Finding> {
+        if self.baseline.is_some() || self.options.ablation != Ablation::None {
+            return Vec::new();
+        }
+        let (survey, camera, seed) = (&self.survey, &self.sensor().camera, self.options.seed);
+        let level = self.level(Self::EACH_LEVEL);
+        let [mean, scatter] = self.scenes();
+        let bounds = survey.bounds(camera);
+        let bias = || {
+            let candidates = bias::candidates(&bounds);
+            let rules = survey.bias_rules(camera, level);
+            few_views(&mean, &survey.mean_data(), &candidates, outcomes[0], &rules, seed)
+        };
+        let variance = || {
+            let candidates = variance::candidates(&bounds, &self.model.sigma);
+            let rules = survey.variance_rules(level);
+            few_views(&scatter, &scatter.data, &candidates, outcomes[1], &rules, seed)
+        };
+        let tested = |layer: usize| survey.learnt_from[layer].is_none();
+        // Where the words step, so does the mean of every view, at places of its own.
+        let bias = (tested(0) && !stepped).then(bias).flatten();
+        bias.into_iter().chain(tested(1).then(variance).flatten()).collect()
     }
 
     /// The refit of a sigma that was calibrated here is no finding; the extended model has it, for all

@@ -14,7 +14,7 @@ use crate::terms::{PixelContext, Term};
 /// Disparities that spread less than this over a view show no slope, px.
 const LEAST_SPREAD_PX: f64 = 0.5;
 /// Single frames kept whole: enough for correlations in time.
-const FRAMES_KEPT: usize = 4;
+pub const FRAMES_KEPT: usize = 4;
 
 impl Field {
     /// Collect the residuals of all frames (time since the first, s).

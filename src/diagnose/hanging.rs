@@ -6,6 +6,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::null::student;
 use super::parameters::estimate;
 use super::structure::Structure;
+use super::verdict::MIN_SIZE;
 use crate::terms::{Axis, Statistic};
 
 /// A mismatch of the noise's structure.
@@ -114,6 +115,9 @@ impl Shared {
         })
     }
 }
+
+/// A share of the variance is not told whose square root is smaller than a bias must be.
+pub const LEAST_SHARE: f64 = MIN_SIZE * MIN_SIZE;
 
 /// Of the first frame's rough residual, px^2.
 pub fn variance_px2(views: &[Structure]) -> f64 {

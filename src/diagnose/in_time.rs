@@ -1,12 +1,12 @@
 //! What pixels repeat: in every view, in every frame of a view, and from frame to frame.
 
-use super::hanging::{Hanging, Mean, Shared, nats, one, variance_px2};
+use super::hanging::{Hanging, LEAST_SHARE, Mean, Shared, nats, one, variance_px2};
 use super::known::KnownTerms;
 use super::structure::Structure;
 use crate::terms::{Axis, Statistic};
 
 /// Correlations smaller than this are not worth a word.
-const LEAST_CORRELATION: f64 = 0.004;
+const LEAST_CORRELATION: f64 = 0.002;
 /// Share of the variance that pixels repeat in every view, worth a word.
 const LEAST_FIXED: f64 = 0.0003;
 /// A share that stands still beside one that changes slowly is known to this.
@@ -52,11 +52,8 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hangi
     let fixed_share = fixed_px2 / variance.max(1e-12);
     let frozen_known = known.parameter("frozen-noise", "fraction").unwrap_or(0.0);
     let rho_known = known.parameter("temporal-correlation", "rho").unwrap_or(0.0);
-    let last = if views.iter().any(|s| s.lagged[2].is_some()) { 2 } else { 1 };
-    let falling = Mean::of(views, |s| Some(s.lagged[0]? - s.lagged[last]?));
-    let Some((falling, (still, least))) =
-        falling.zip(still_level(views).zip(Mean::of(views, |s| s.lagged[last])))
-    else {
+    let falling = Mean::of(views, |s| Some(s.lagged[0]? - later(s)?));
+    let Some((falling, still)) = falling.zip(still_level(views)) else {
         // Two frames a view: still or slowly changing, nobody can say.
         let p = first.p_above(fixed_share + frozen_known + rho_known);
         let more = first.value - fixed_share - frozen_known - rho_known;
@@ -68,9 +65,11 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hangi
         return found;
     };
     let p_falling = falling.p_above(0.0);
-    // What stands still is in the last of them whole.
+    let slowly = p_falling < level && falling.value > LEAST_SHARE;
+    // What stands still is in the last of them whole, and in all of them where none fades.
+    let last = |s: &Structure| if slowly { s.lagged[2].or(s.lagged[1]) } else { of_any_two(s) };
+    let Some(least) = Mean::of(views, last) else { return found };
     let p_still = least.p_above(fixed_share + frozen_known);
-    let slowly = p_falling < level && falling.value > LEAST_CORRELATION;
     if slowly && rho_known == 0.0 {
         let s = still.max(0.0) + fixed_share;
         let rho = ((first.value - s) / (1.0 - s).max(1e-6)).clamp(0.0, 1.0);
@@ -86,6 +85,21 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hangi
         found.push(of_frames(name, [1.0, 3.0], fraction, still, evidence));
     }
     found
+}
+
+/// Correlation of frames two or three apart: of four frames two pairs, and one.
+pub fn later(s: &Structure) -> Option<f64> {
+    let (two, three) = (s.lagged[1]?, s.lagged[2]);
+    Some(three.map_or(two, |three| (2.0 * two + three) / 3.0))
+}
+
+/// Correlation of any two frames, each pair of them counted once: of four frames three are next to
+/// one another.
+pub fn of_any_two(s: &Structure) -> Option<f64> {
+    let next = s.lagged[0]?;
+    let Some(rest) = later(s) else { return Some(next) };
+    let share = if s.lagged[2].is_some() { 1.0 / 2.0 } else { 1.0 / 3.0 };
+    Some(next + share * (rest - next))
 }
 
 /// Share of the noise that stands still within a view, by the views' mean correlations; `None` with

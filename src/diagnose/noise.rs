@@ -1,10 +1,12 @@
 //! What the structure of the noise amounts to: each view is one sample of every statistic.
 
 use super::frames::frames;
-use super::hanging::{Hanging, Mean, Shared, nats, one, variance_px2};
+use super::hanging::{Hanging, LEAST_SHARE, Mean, Shared, nats, one, variance_px2};
 use super::in_time::in_time;
 use super::known::KnownTerms;
+use super::pairs::{REACH_PX, window_of};
 use super::structure::Structure;
+use super::unequal::unequal;
 use crate::terms::{Axis, Statistic};
 
 /// All mismatches of structure at this error rate each.
@@ -19,6 +21,7 @@ pub fn hanging(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hangi
         .and_then(|h| h.parameters["rho"]["value"].as_f64())
         .unwrap_or(0.0);
     found.extend(frames(views, known, level, rho));
+    found.extend(unequal(views, level));
     found
 }
 
@@ -48,19 +51,13 @@ fn window(views: &[Structure], known: &KnownTerms, level: f64) -> Option<Hanging
     // A part of the noise alone: seen where neighbours are taken for independent.
     let near = Mean::of(views, |s| s.near)?;
     let p = near.p_above(0.0);
-    (expected == 1.0 && p < level && near.value > LEAST_NEAR).then(|| {
-        // As many pixels make one as a window of this side would have it.
-        let length = (1.0 + 2.0 * REACH_PX * near.value).max(length);
-        let std_error = 2.0 * REACH_PX * near.std_error + 0.2 * (length - 1.0);
-        let size = near.value.sqrt();
-        found([0.0, REACH_PX], length, std_error, size, p, nats(&near, 0.0))
+    (expected == 1.0 && p < level && near.value > LEAST_SHARE).then(|| {
+        let side = window_of(near.value);
+        let std_error = window_of(near.value + near.std_error) - side + 0.2 * (side - 1.0);
+        let (size, length) = (near.value.sqrt(), side.max(length));
+        found([0.0, REACH_PX as f64], length, std_error, size, p, nats(&near, 0.0))
     })
 }
-
-/// Mean correlation of near pixels that is worth a word.
-const LEAST_NEAR: f64 = 0.0005;
-/// As far as neighbours are looked at, px.
-const REACH_PX: f64 = 4.0;
 
 fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {
     let variance = variance_px2(views);
@@ -70,7 +67,7 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {
         statistic,
         axis,
         expected_px2,
-        least: LEAST_LINES,
+        least: if statistic == Statistic::Bias { LEAST_STILL } else { LEAST_SHARE },
         words,
     };
     let still = "whole columns or rows err by a constant each, from one to the next";
@@ -93,8 +90,9 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {
     all.into_iter().filter_map(|(m, line)| line.found(&m?, variance, level)).collect()
 }
 
-/// Share of the variance that lines have in common, worth a word.
-const LEAST_LINES: f64 = 0.0004;
+/// Share of the variance that still lines have in common, worth a word: less is what the shapes found
+/// in the mean leave.
+const LEAST_STILL: f64 = 0.0004;
 
 #[cfg(test)]
 #[path = "noise_tests.rs"]

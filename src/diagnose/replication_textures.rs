@@ -3,6 +3,7 @@
 
 use super::field::Field;
 use super::hanging::{Hanging, Mean};
+use super::in_time::{later, of_any_two};
 use super::known::KnownTerms;
 use super::replication::{Measured, agree};
 use super::structure::Structure;
@@ -46,7 +47,6 @@ fn statistic<'a>(found: &Hanging, known: &'a KnownTerms) -> Option<OfView<'a>> {
     let frozen = parameter("frozen-noise", "fraction");
     let share =
         move |s: &Structure| s.fixed_px2.unwrap_or(0.0).max(0.0) / s.variance_px2.max(1e-12);
-    let last = |s: &Structure| s.lagged[2].or(s.lagged[1]).or(s.lagged[0]);
     Some(match (found.families.first().copied(), found.axis, found.statistic) {
         // A part of the noise alone is seen in near pixels, all of it in the window's side.
         (Some("spatial-correlation"), ..) if found.size_sigma < 1.0 => Box::new(|s| s.near),
@@ -55,8 +55,8 @@ fn statistic<'a>(found: &Hanging, known: &'a KnownTerms) -> Option<OfView<'a>> {
             Box::new(move |s| Some(s.window_px?.ln() - side.ln()))
         }
         (Some("fixed-pattern-noise"), ..) => Box::new(move |s| Some(s.fixed_px2? - fixed)),
-        (Some("temporal-correlation"), ..) => Box::new(move |s| Some(s.lagged[0]? - last(s)?)),
-        (Some("frozen-noise"), ..) => Box::new(move |s| Some(last(s)? - share(s) - frozen)),
+        (Some("temporal-correlation"), ..) => Box::new(|s| Some(s.lagged[0]? - later(s)?)),
+        (Some("frozen-noise"), ..) => Box::new(move |s| Some(of_any_two(s)? - share(s) - frozen)),
         (Some("row-noise"), ..) => Box::new(move |s| Some(s.row_px2? - rows)),
         (Some("heavy-tails"), ..) => {
             Box::new(|s| (s.tail_pixels > 0.0).then_some(s.tail - GAUSSIAN_TAIL))
@@ -71,6 +71,10 @@ fn statistic<'a>(found: &Hanging, known: &'a KnownTerms) -> Option<OfView<'a>> {
         }
         (None, Axis::Column, Statistic::Bias) => Box::new(|s| s.lines_px2),
         (None, Axis::Column, _) => Box::new(|s| s.column_px2),
+        (None, Axis::Frame, _) => {
+            let frame = found.parameters.get("frame")?.as_u64()? as usize;
+            Box::new(move |s| *s.loudness.get(frame)?)
+        }
         _ => return None,
     })
 }

@@ -4,11 +4,13 @@
 
 use rayon::prelude::*;
 
+use super::exposure::FRAMES_KEPT;
 use super::field::Field;
+use super::pairs::Pairs;
 use super::texture::{
-    FAR, Filled, LONG_LINE, NEAR, SHORT_LINE, calm, changes, covariance, fine, moving, rough,
-    same_pixel, without_lines,
+    LONG_LINE, SHORT_LINE, calm, changes, fine, moving, rough, same_pixel, without_lines,
 };
+use super::unequal::loudness;
 use crate::camera::Camera;
 use crate::stats::measure_correlation;
 
@@ -21,10 +23,12 @@ pub struct Structure {
     pub variance_px2: f64,
     /// Side of the window that would make the correlation, px.
     pub window_px: Option<f64>,
-    /// Mean correlation of near pixels of what changes between frames, beyond that of far ones.
+    /// Mean correlation of near pixels of what changes between frames.
     pub near: Option<f64>,
     /// Correlation of a pixel with itself 1, 2 and 3 frames later.
     pub lagged: [Option<f64>; 3],
+    /// Logarithm of each of the first frames' variance over that of the others.
+    pub loudness: [Option<f64>; FRAMES_KEPT],
     /// Covariance of the mean residual with the other views' at the same pixels, px^2.
     pub fixed_px2: Option<f64>,
     /// The part of it that whole columns and rows share, px^2.
@@ -106,26 +110,14 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     }
     let noise = moving(&frames, s.lagged[0]);
     let lines = without_lines(&noise, camera.width, LONG_LINE);
-    let changes = changes(&frames);
-    if !changes.is_empty() {
-        let filled: Vec<Filled> = changes.iter().map(|c| Filled::of(c)).collect();
-        let over = |lags: &[usize], step: [usize; 2]| {
-            let all: Option<Vec<f64>> =
-                filled.iter().map(|c| covariance(c, camera, lags, step)).collect();
-            mean(all?.into_iter())
-        };
-        // Taking out what is smooth leaves a little of everything everywhere: what a diagonal
-        // shows is no row's.
-        let apart = over(&FAR, [1, 1]);
-        let shared = |step| Some(over(&FAR, step)? - apart?);
-        s.row_px2 = shared([1, 0]);
-        s.column_px2 = shared([0, 1]);
-        let beyond = |step, lines: Option<f64>| Some(over(&NEAR, step)? - apart? - lines?.max(0.0));
-        let power = mean(changes.iter().flatten().map(|&r| f64::from(r).powi(2)));
-        s.near = (|| {
-            let along = beyond([1, 0], s.row_px2)? + beyond([0, 1], s.column_px2)?;
-            Some(0.5 * along / power?.max(1e-12))
-        })();
+    s.loudness = loudness(&frames);
+    let images: Vec<Vec<f32>> = field.first.iter().map(|r| field.image(r)).collect();
+    let pairs: Option<Vec<Pairs>> =
+        changes(&images).iter().map(|change| Pairs::of(change, camera.width)).collect();
+    if let Some(pairs) = pairs.filter(|p| !p.is_empty()) {
+        let all = |of: fn(&Pairs) -> Option<f64>| mean(pairs.iter().filter_map(of));
+        (s.row_px2, s.column_px2) = (all(|p| p.row), all(|p| p.column));
+        s.near = all(|p| Some(p.near / p.power.max(1e-12)));
     }
     let correlation = measure_correlation(&lines, camera.width);
     // What whole rows share is no window's: it stands in the correlation at every lag.

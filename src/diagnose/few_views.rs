@@ -1,0 +1,248 @@
+//! What shows in a few of the views and not in the others.
+//!
+//! A fit to all views says nothing of a cause that some of them have: the others outvote it. So each
+//! candidate is also fitted to the views that show it best, one, two, up to a third of them, and pays
+//! for the choice: the logarithm of how many such sets there are.
+
+use nalgebra::{DMatrix, DVector};
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+use statrs::function::factorial::ln_binomial;
+
+use super::along::Along;
+use super::candidate::{Candidate, RECALIBRATE};
+use super::diagnosis::{Alternative, Finding, Status};
+use super::evidence::Evidence;
+use super::naming::physics;
+use super::null::NoiseGains;
+use super::other_findings::named;
+use super::outcome::{Outcome, Rules};
+use super::prepared::evidence_of_bases;
+use super::samples::{ViewData, coarser};
+use super::scene::{Scene, size};
+use crate::rng::{Seed, Stream};
+use crate::solve::Cholesky;
+use crate::terms::{Basis, Term};
+
+/// Candidates with more columns fit single views too freely.
+const MAX_COLUMNS: usize = 16;
+/// Simulations of the null; its tail is an exponential's.
+const REPLICATES: u64 = 200;
+/// What all views share explains at most so many times as much: what it misses in some views is its
+/// own shape, badly met.
+const BESIDE_ALL: f64 = 10.0;
+/// A name must explain this share of what the best curve does: a few views show little of a shape.
+const ADEQUATE: f64 = 0.9;
+
+/// A candidate in the views that show it best.
+struct Best {
+    /// Nats of a common fit to them, what the choice of them costs taken off.
+    gain: f64,
+    views: Vec<usize>,
+    beta: DVector<f64>,
+}
+
+/// One candidate's information, view by view, and how much more than noise its views scatter.
+struct Tried<'a> {
+    candidate: &'a Candidate,
+    evidence: Vec<Evidence>,
+    factors: Vec<DMatrix<f64>>,
+    scatter: f64,
+    prior: f64,
+}
+
+/// Best common fit of these columns to a few views.
+fn best(evidence: &[Evidence], prior: f64) -> Option<Best> {
+    let (n, k) = (evidence.len(), evidence.first()?.b.len());
+    let fit = |e: &Evidence| {
+        let held = &e.a + DMatrix::identity(k, k) * prior;
+        let beta = Cholesky::of(held)?.solve(&e.b);
+        Some((0.5 * beta.dot(&e.b), beta))
+    };
+    let mut order = Vec::with_capacity(n);
+    for (v, e) in evidence.iter().enumerate() {
+        order.push((fit(e)?.0, v));
+    }
+    order.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut sum = Evidence { a: DMatrix::zeros(k, k), b: DVector::zeros(k) };
+    let mut best: Option<Best> = None;
+    for count in 1..=n / 3 {
+        let next = &evidence[order[count - 1].1];
+        sum.a += &next.a;
+        sum.b += &next.b;
+        let (nats, beta) = fit(&sum)?;
+        let gain = nats - ln_binomial(n as u64, count as u64) - 0.5 * k as f64;
+        if best.as_ref().is_none_or(|b| gain > b.gain) {
+            let views = order[..count].iter().map(|o| o.1).collect();
+            best = Some(Best { gain, views, beta });
+        }
+    }
+    best
+}
+
+impl<'a> Tried<'a> {
+    fn of(candidate: &'a Candidate, evidence: Vec<Evidence>, prior: f64) -> Option<Self> {
+        let k = candidate.basis.count();
+        let root = |e: &Evidence| {
+            let eigen = e.a.clone().symmetric_eigen();
+            let roots = eigen.eigenvalues.map(|l| l.max(0.0).sqrt());
+            &eigen.eigenvectors * DMatrix::from_diagonal(&roots)
+        };
+        let factors = evidence.iter().map(root).collect();
+        let mut squares = Vec::new();
+        for e in &evidence {
+            let held = &e.a + DMatrix::identity(k, k) * prior;
+            squares.push(Cholesky::of(held)?.solve(&e.b).dot(&e.b) as f32);
+        }
+        // Most views are as noise is, whatever a few have.
+        let k = k as f64;
+        let expected = k * (1.0 - 2.0 / (9.0 * k)).powi(3);
+        let usual = f64::from(crate::stats::median_in_place(&mut squares));
+        let scatter = (usual / expected).max(1.0);
+        Some(Tried { candidate, evidence, factors, scatter, prior })
+    }
+
+    fn best(&self) -> Option<Best> {
+        let mut best = best(&self.evidence, self.prior)?;
+        best.gain /= self.scatter;
+        Some(best)
+    }
+
+    /// Gain of nothing but noise.
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        let noise = |(e, root): (&Evidence, &DMatrix<f64>)| {
+            let white = DVector::from_fn(root.ncols(), |_, _| StandardNormal.sample(rng));
+            Evidence { a: e.a.clone(), b: root * white }
+        };
+        let evidence: Vec<Evidence> = self.evidence.iter().zip(&self.factors).map(noise).collect();
+        best(&evidence, self.prior).map_or(0.0, |b| b.gain)
+    }
+}
+
+/// The strongest such cause beside what all views share, if noise does not bring as much.
+pub fn few_views(
+    scene: &Scene<'_>,
+    fine: &[ViewData],
+    candidates: &[Candidate],
+    outcome: &Outcome,
+    rules: &Rules,
+    seed: Seed,
+) -> Option<Finding> {
+    let fine: Vec<ViewData> = fine.iter().map(|v| without(v, outcome)).collect();
+    let coarse: Vec<ViewData> = match scene.statistic {
+        crate::terms::Statistic::Bias => fine.par_iter().map(coarser).collect(),
+        _ => fine.clone(),
+    };
+    let tried: Vec<Tried<'_>> = candidates
+        .par_iter()
+        .filter(|c| c.family != Some(RECALIBRATE) && c.basis.count() <= MAX_COLUMNS)
+        // Seams and ripples in depth are many, and nearly the same.
+        .filter(|c| c.family.is_some() || !matches!(c.basis, Basis::Curve { nodes: 2, .. }))
+        .filter_map(|c| {
+            let as_fine = c.basis.is_fine() || c.basis.of_column_alone();
+            let evidence = evidence_of_bases(if as_fine { &fine } else { &coarse }, &[&c.basis]);
+            Tried::of(c, evidence, rules.prior)
+        })
+        .collect();
+    let mut all: Vec<(&Candidate, Best)> =
+        tried.par_iter().filter_map(|t| Some((t.candidate, t.best()?))).collect();
+    all.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
+    let most = all.first()?.1.gain;
+    let shared: f64 = outcome.chosen.iter().map(|c| c.gain.max(0.0)).sum();
+    if most * BESIDE_ALL < shared {
+        return None;
+    }
+    let mut gains: Vec<f64> = (0..REPLICATES)
+        .into_par_iter()
+        .map(|replicate| {
+            let mut rng = seed.stream(&format!("few-views/null/{replicate}"));
+            tried.iter().map(|t| t.draw(&mut rng)).fold(f64::NEG_INFINITY, f64::max)
+        })
+        .collect();
+    gains.sort_by(f64::total_cmp);
+    let noise = NoiseGains(gains);
+    if most < noise.threshold(rules.level) {
+        return None;
+    }
+    let name = all.iter().find(|(c, b)| c.family.is_some() && b.gain > ADEQUATE * most);
+    let (candidate, best) = name.or(all.first())?;
+    Some(told(scene, candidate, best, noise.p(most)))
+}
+
+/// A view without what all views share.
+fn without(view: &ViewData, outcome: &Outcome) -> ViewData {
+    let mut view = view.clone();
+    let mut row = Vec::new();
+    for (k, chosen) in outcome.chosen.iter().enumerate() {
+        let beta = outcome.coefficients(k);
+        for (y, place) in view.response.iter_mut().zip(&view.places) {
+            *y -= chosen.candidate.basis.value(&beta, place, &mut row);
+        }
+    }
+    view
+}
+
+fn told(scene: &Scene<'_>, candidate: &Candidate, best: &Best, p: f64) -> Finding {
+    let (statistic, axis) = (scene.statistic, candidate.basis.axis());
+    let coefficients = best.beta.as_slice().to_vec();
+    let term = Term { statistic, basis: candidate.basis.clone(), coefficients };
+    let mut values = scene.values(&term);
+    let others = (0..values.len()).filter(|v| !best.views.contains(v)).collect::<Vec<_>>();
+    others.into_iter().for_each(|v| values[v].iter_mut().for_each(|x| *x = 0.0));
+    let status = if candidate.family.is_some() { Status::Named } else { Status::Unexplained };
+    let mut names: Vec<&str> =
+        best.views.iter().map(|&v| scene.survey.views[v].name.as_str()).collect();
+    names.sort_unstable();
+    let only = format!("only in the views {}", names.join(", "));
+    let effect = candidate.family;
+    let along = Along::of(scene, &candidate.basis);
+    let finding = named(effect.unwrap_or_default(), statistic, axis);
+    Finding {
+        status,
+        effect,
+        alternatives: effect
+            .map(|effect| Alternative { effect, probability: None })
+            .into_iter()
+            .collect(),
+        interval: along.interval(scene, &values),
+        share: best.gain,
+        size: size(scene, &values),
+        p_adjusted: Some(p),
+        physics: physics(status, effect, statistic, axis, Some(&only))
+            + &if effect.is_some() { format!(" It shows {only}.") } else { String::new() },
+        shape: Some(only),
+        ..finding
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn views(name: &str, size: f64, of: usize) -> Vec<Evidence> {
+        let mut rng = Seed(7).stream(name);
+        let one = |v: usize| {
+            let (a, noise): (f64, f64) = (100.0, StandardNormal.sample(&mut rng));
+            let beta = if v < of { size } else { 0.0 };
+            let b = DVector::from_element(1, a * beta + a.sqrt() * noise);
+            Evidence { a: DMatrix::from_element(1, 1, a), b }
+        };
+        (0..18).map(one).collect()
+    }
+
+    /// Three views of eighteen show what is worth 150 nats in them: 0.5 a beta^2 each.
+    #[test]
+    fn the_views_that_show_it_are_found() {
+        let mut found = best(&views("few-views/three", 1.0, 3), 0.1).unwrap();
+        found.views.sort_unstable();
+        assert_eq!(found.views, [0, 1, 2]);
+        assert!((found.beta[0] - 1.0).abs() < 0.25 && found.gain > 90.0, "{}", found.gain);
+    }
+
+    #[test]
+    fn noise_brings_less_than_the_choice_costs() {
+        let gain = |n: u64| best(&views(&format!("few-views/{n}"), 0.0, 0), 0.1).unwrap().gain;
+        let above = (0..200).filter(|&n| gain(n) > 5.0).count();
+        assert!(above <= 6, "{above} of 200 above 5 nats");
+    }
+}
