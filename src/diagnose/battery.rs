@@ -11,6 +11,7 @@ use super::heldout;
 use super::laws;
 use super::lines::lines;
 use super::missing::missing;
+use super::naming::temper;
 use super::next_view;
 use super::null::beside_model;
 use super::other_findings;
@@ -89,6 +90,7 @@ impl Case<'_> {
         }
         echoes(&mut found);
         merge(&mut found);
+        found.iter_mut().for_each(|f| temper(&mut f.alternatives));
         Battery { mean, scatter, found, refitted, better_form, detectable }
     }
 

@@ -4,7 +4,9 @@ use super::frames::frames;
 use super::hanging::{Hanging, Mean, Shared, nats, one, variance_px2};
 use super::in_time::in_time;
 use super::known::KnownTerms;
+use super::parameters::estimate;
 use super::structure::Structure;
+use super::window::{Window, part};
 use crate::terms::{Axis, Statistic};
 
 /// All mismatches of structure at this error rate each.
@@ -27,15 +29,15 @@ const SAME_WINDOW: f64 = 1.12;
 
 fn window(views: &[Structure], known: &KnownTerms, level: f64) -> Option<Hanging> {
     let m = Mean::of(views, |s| s.window_px.map(f64::ln))?;
-    let expected = known.parameter("spatial-correlation", "length_px").unwrap_or(1.0).max(1.0);
+    let expected = expected_window(known);
     let length = m.value.exp();
     let p = m.p_above(expected.ln());
-    let found = |interval, length, std_error, size_sigma, p, nats| Hanging {
+    let found = |interval, parameters, size_sigma, p, nats| Hanging {
         families: vec!["spatial-correlation"],
         statistic: Statistic::Correlation,
         axis: Axis::PixelLag,
         interval,
-        parameters: one("length_px", length, std_error),
+        parameters,
         size_sigma,
         p,
         nats,
@@ -43,24 +45,31 @@ fn window(views: &[Structure], known: &KnownTerms, level: f64) -> Option<Hanging
     };
     if p < level && length > SAME_WINDOW * expected {
         let nats = nats(&m, expected.ln());
-        return Some(found([0.0, length], length, length * m.std_error, 1.0, p, nats));
+        let parameters = one("length_px", length, length * m.std_error);
+        return Some(found([0.0, length], parameters, 1.0, p, nats));
     }
     // A part of the noise alone: seen where neighbours are taken for independent.
     let near = Mean::of(views, |s| s.near)?;
     let p = near.p_above(0.0);
-    (expected == 1.0 && p < level && near.value > LEAST_NEAR).then(|| {
-        // As many pixels make one as a window of this side would have it.
-        let length = (1.0 + 2.0 * REACH_PX * near.value).max(length);
-        let std_error = 2.0 * REACH_PX * near.std_error + 0.2 * (length - 1.0);
-        let size = near.value.sqrt();
-        found([0.0, REACH_PX], length, std_error, size, p, nats(&near, 0.0))
-    })
+    if expected > 1.0 || p >= level || near.value <= LEAST_NEAR {
+        return None;
+    }
+    let Window { length, share } = part(views)?;
+    let mut parameters = one("length_px", length[0], length[1]);
+    parameters.insert("share".into(), estimate(share[0], share[1]));
+    Some(found([0.0, length[0]], parameters, near.value.sqrt(), p, nats(&near, 0.0)))
+}
+
+/// Side of the window that the model has, px, where a part of the noise alone comes through it with
+/// so much less correlation.
+pub fn expected_window(known: &KnownTerms) -> f64 {
+    let of = |name| known.parameter("spatial-correlation", name);
+    let side = of("length_px").unwrap_or(1.0).max(1.0);
+    1.0 + of("share").unwrap_or(1.0).clamp(0.0, 1.0) * (side - 1.0)
 }
 
 /// Mean correlation of near pixels that is worth a word.
 const LEAST_NEAR: f64 = 0.0005;
-/// As far as neighbours are looked at, px.
-const REACH_PX: f64 = 4.0;
 
 fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {
     let variance = variance_px2(views);

@@ -5,9 +5,10 @@
 use rayon::prelude::*;
 
 use super::field::Field;
+use super::tails::TailCounts;
 use super::texture::{
-    FAR, Filled, LONG_LINE, NEAR, SHORT_LINE, calm, changes, covariance, fine, moving, rough,
-    same_pixel, without_lines,
+    COURSE, FAR, Filled, LONG_LINE, NEAR, SHORT_LINE, calm, changes, covariance, fine, moving,
+    rough, same_pixel, without_lines,
 };
 use crate::camera::Camera;
 use crate::stats::measure_correlation;
@@ -21,7 +22,9 @@ pub struct Structure {
     pub variance_px2: f64,
     /// Side of the window that would make the correlation, px.
     pub window_px: Option<f64>,
-    /// Mean correlation of near pixels of what changes between frames, beyond that of far ones.
+    /// Correlation of pixels 1, 2, 3, ... apart of what changes between frames, beyond that of far
+    /// ones; and its mean over the nearest.
+    pub course: Option<[f64; COURSE]>,
     pub near: Option<f64>,
     /// Correlation of a pixel with itself 1, 2 and 3 frames later.
     pub lagged: [Option<f64>; 3],
@@ -37,9 +40,8 @@ pub struct Structure {
     /// Share of residuals beyond four local standard deviations, and how many were looked at.
     pub tail: f64,
     pub tail_pixels: f64,
-    /// Excess kurtosis inside four local standard deviations would be cut; mean |r| beyond, in
-    /// standard deviations.
-    pub tail_size: f64,
+    /// The same by how far out they lie.
+    pub tails: TailCounts,
 }
 
 /// Frame by frame, the mean residual of the target.
@@ -100,9 +102,10 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     s.variance_px2 = mean(first.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
     let level: Vec<Vec<f32>> =
         frames.iter().map(|f| without_lines(f, camera.width, SHORT_LINE)).collect();
+    let rounded = rounded_share(field.rounding_px2, s.variance_px2);
     for lag in 1..frames.len().min(4) {
         let pairs = (0..frames.len() - lag).map(|k| same_pixel(&level[k], &level[k + lag]));
-        s.lagged[lag - 1] = mean(pairs);
+        s.lagged[lag - 1] = mean(pairs).map(|c| c / (1.0 - rounded));
     }
     let noise = moving(&frames, s.lagged[0]);
     let lines = without_lines(&noise, camera.width, LONG_LINE);
@@ -120,12 +123,16 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
         let shared = |step| Some(over(&FAR, step)? - apart?);
         s.row_px2 = shared([1, 0]);
         s.column_px2 = shared([0, 1]);
-        let beyond = |step, lines: Option<f64>| Some(over(&NEAR, step)? - apart? - lines?.max(0.0));
         let power = mean(changes.iter().flatten().map(|&r| f64::from(r).powi(2)));
-        s.near = (|| {
-            let along = beyond([1, 0], s.row_px2)? + beyond([0, 1], s.column_px2)?;
-            Some(0.5 * along / power?.max(1e-12))
-        })();
+        let at = |lag: usize| {
+            let along =
+                |step, lines: Option<f64>| Some(over(&[lag], step)? - apart? - lines?.max(0.0));
+            let both = along([1, 0], s.row_px2)? + along([0, 1], s.column_px2)?;
+            Some(0.5 * both / power?.max(1e-12))
+        };
+        let course: Option<Vec<f64>> = (1..=COURSE).map(at).collect();
+        s.course = course.and_then(|c| c.try_into().ok());
+        s.near = s.course.map(|c| c[..NEAR].iter().sum::<f64>() / NEAR as f64);
     }
     let correlation = measure_correlation(&lines, camera.width);
     // What whole rows share is no window's: it stands in the correlation at every lag.
@@ -140,6 +147,13 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     s.window_px = Some(window.sqrt());
     s.jitter = jitter(field, &s, window);
     s
+}
+
+/// Share of a variance that is the stored number's own rounding: afresh in every frame as long as the
+/// noise is at least half a step, where it makes a quarter of the whole.
+fn rounded_share(rounding_px2: f64, variance_px2: f64) -> f64 {
+    let share = rounding_px2 / variance_px2.max(1e-12);
+    if share < 0.25 { share } else { 0.0 }
 }
 
 /// Mean product of each view's mean residual with the mean of the others', px^2.

@@ -117,8 +117,9 @@ const PIXEL_BOX: usize = 7;
 
 /// Lags well beyond a Kinect's window, px.
 pub const FAR: [usize; 12] = [20, 22, 24, 27, 30, 33, 36, 39, 42, 46, 50, 54];
-/// Lags within a window.
-pub const NEAR: [usize; 4] = [1, 2, 3, 4];
+/// Lags that a window's side is read from, px, and those of them that lie in most windows.
+pub const COURSE: usize = 16;
+pub const NEAR: usize = 4;
 
 /// An image with nothing where there is none: sums run over it without a question.
 pub struct Filled {

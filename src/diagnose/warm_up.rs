@@ -1,0 +1,103 @@
+//! How large a warm-up is and how fast, whatever its course.
+//!
+//! A session rarely lasts until the drift has come to its end: what it comes to in the end, and when,
+//! then depends on the form of the approach. So the posterior is summed over several, and over time
+//! constants of any length.
+
+use nalgebra::{DMatrix, DVector};
+
+/// A reference, as far as a drift goes.
+#[derive(Debug, Clone)]
+pub struct Reading {
+    pub z: f64,
+    pub session_s: f64,
+    /// Measured minus reference, m.
+    pub off: f64,
+    /// What is fitted beside the drift.
+    pub beside: Vec<f64>,
+}
+
+/// The drift's size in the end and its time constant as the card's own formula fits them best, with
+/// root mean square distances of what other courses would have.
+#[derive(Debug, Clone, Copy)]
+pub struct WarmUp {
+    pub relative: [f64; 2],
+    pub time_constant_s: [f64; 2],
+}
+
+/// Share of the drift that has come after so many time constants: 63 % after one. Heating of one mass,
+/// as on the card; of several, which goes on for longer; and one that ends sooner.
+const COURSES: [fn(f64) -> f64; 3] =
+    [|t| -(-t).exp_m1(), |t| t / (t + (std::f64::consts::E - 1.0).recip()), |t| (0.745 * t).tanh()];
+
+/// Time constants tried, evenly in the logarithm: from this share of the session to so many.
+const TAUS: usize = 240;
+const TAU_SESSIONS: [f64; 2] = [0.02, 20.0];
+/// Sensors drift by a per cent or two at most (the card's source: some mm at 1 to 2 m, in 20 min).
+const USUAL: f64 = 0.02;
+
+/// From references that are off by this `variance` each, m^2; `None` without a time.
+pub fn warm_up(readings: &[Reading], variance: f64) -> Option<WarmUp> {
+    let session = readings.iter().map(|r| r.session_s).fold(0.0, f64::max);
+    let log = TAU_SESSIONS.map(|n| (n * session).ln());
+    let taus = (0..TAUS).map(|k| (log[0] + (log[1] - log[0]) * k as f64 / (TAUS - 1) as f64).exp());
+    let nodes: Vec<Node> = COURSES
+        .iter()
+        .enumerate()
+        .flat_map(|(course, of)| taus.clone().map(move |tau_s| (course, of, tau_s)))
+        .filter_map(|(course, of, tau_s)| {
+            let (evidence, relative) = size(readings, variance, &|t| of(t / tau_s))?;
+            Some(Node { course, tau_s, evidence, relative })
+        })
+        .collect();
+    let told = nodes.iter().filter(|n| n.course == 0);
+    let told = told.max_by(|a, b| a.evidence.total_cmp(&b.evidence))?;
+    let best = nodes.iter().map(|n| n.evidence).fold(f64::NEG_INFINITY, f64::max);
+    let weight = |n: &Node| (n.evidence - best).exp();
+    let total: f64 = nodes.iter().map(weight).sum();
+    let rms = |square: &dyn Fn(&Node) -> f64| {
+        (nodes.iter().map(|n| weight(n) * square(n)).sum::<f64>() / total).sqrt()
+    };
+    let [relative, _] = told.relative;
+    Some(WarmUp {
+        relative: [relative, rms(&|n| (n.relative[0] - relative).powi(2) + n.relative[1].powi(2))],
+        time_constant_s: [told.tau_s, rms(&|n| (n.tau_s - told.tau_s).powi(2))],
+    })
+}
+
+struct Node {
+    course: usize,
+    tau_s: f64,
+    /// Logarithm of the marginal likelihood.
+    evidence: f64,
+    /// With its standard error.
+    relative: [f64; 2],
+}
+
+/// The drift's size by least squares, where its course is known, and how well that fits.
+fn size(
+    readings: &[Reading],
+    variance: f64,
+    course: &dyn Fn(f64) -> f64,
+) -> Option<(f64, [f64; 2])> {
+    let beside = readings.first()?.beside.len();
+    let k = beside + 1;
+    let (mut a, mut b) = (DMatrix::zeros(k, k), DVector::zeros(k));
+    for r in readings {
+        let mut g = r.beside.clone();
+        g.push(r.z * course(r.session_s));
+        let g = DVector::from_vec(g);
+        a += &g * g.transpose() / variance;
+        b += g * (r.off / variance);
+    }
+    for j in 0..k {
+        // What stands beside is free: a whole unit of it is as likely as none.
+        a[(j, j)] += if j == beside { USUAL.powi(-2) } else { 1.0 };
+    }
+    let solved = a.cholesky()?;
+    let beta = solved.solve(&b);
+    let log_determinant = 2.0 * solved.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+    let covariance = solved.inverse();
+    let evidence = 0.5 * (beta.dot(&b) - log_determinant);
+    evidence.is_finite().then(|| (evidence, [beta[beside], covariance[(beside, beside)].sqrt()]))
+}
