@@ -48,7 +48,7 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hangi
     let mut found: Vec<Hanging> =
         fixed.and_then(|m| pattern.found(&m, variance, level)).into_iter().collect();
     let fixed_px2 = fixed.map_or(0.0, |m| m.value.max(0.0));
-    let Some(first) = Mean::of(views, |s| s.lagged[0]) else { return found };
+    let Some(first) = first_lag(views) else { return found };
     let fixed_share = fixed_px2 / variance.max(1e-12);
     let frozen_known = known.parameter("frozen-noise", "fraction").unwrap_or(0.0);
     let rho_known = known.parameter("temporal-correlation", "rho").unwrap_or(0.0);
@@ -86,6 +86,15 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hangi
         found.push(of_frames(name, [1.0, 3.0], fraction, still, evidence));
     }
     found
+}
+
+/// Correlation of a frame with the next. Pixels of white noise correlate by chance to one over the
+/// root of their number, and a few views may happen to agree better than that.
+fn first_lag(views: &[Structure]) -> Option<Mean> {
+    let m = Mean::of(views, |s| s.lagged[0])?;
+    let pairs = |s: &Structure| s.pixels * s.lagged.iter().flatten().count() as f64;
+    let chance = views.iter().map(pairs).sum::<f64>().max(1.0).sqrt().recip();
+    Some(Mean { std_error: m.std_error.max(chance), ..m })
 }
 
 /// Share of the noise that stands still within a view, by the views' mean correlations; `None` with

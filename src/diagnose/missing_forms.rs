@@ -1,8 +1,8 @@
 //! How far the numbers told of a step may be off, whatever the form of its rise.
 //!
 //! A recording often shows no more than the foot of a rise; where its middle lies then depends on
-//! the form. So the posterior is summed over several forms, on a grid that closes in on it, with
-//! priors that are flat in the middle and in the logarithm of the width over what the card allows.
+//! the form. So the posterior is summed over several forms, on a grid that closes in on it: the middle
+//! anywhere that the card allows, the width within a factor of e or so of what the card calls typical.
 
 use rayon::prelude::*;
 use statrs::function::erf::erfc;
@@ -33,8 +33,9 @@ const NARROWEST: f64 = 1e-3;
 /// Root mean square distances of middle and width from those of `told`; the points scatter by the
 /// factor `scatter` more, in variance, than they are expected to.
 pub fn errors(told: &Step, base: f64, points: &[Point], scatter: f64) -> Option<[f64; 2]> {
-    let [middles, widths] = allowed(told)?;
-    let posterior = |rise: &fn(f64) -> f64| Posterior { told, base, points, scatter, rise: *rise };
+    let Allowed { middles, widths, typical } = allowed(told)?;
+    let posterior =
+        |rise: &fn(f64) -> f64| Posterior { told, base, points, scatter, typical, rise: *rise };
     let nodes: Vec<Node> = RISES
         .par_iter()
         .flat_map_iter(|rise| posterior(rise).nodes(middles, widths.map(f64::ln)))
@@ -49,13 +50,23 @@ pub fn errors(told: &Step, base: f64, points: &[Point], scatter: f64) -> Option<
     errors.iter().all(|e| e.is_finite()).then_some(errors)
 }
 
-/// Middles and sizes of widths as the card has them, in the axis's own unit.
-fn allowed(step: &Step) -> Option<[[f64; 2]; 2]> {
+/// In the axis's own unit; widths by their size.
+struct Allowed {
+    middles: [f64; 2],
+    widths: [f64; 2],
+    typical: f64,
+}
+
+fn allowed(step: &Step) -> Option<Allowed> {
     let unit = if step.axis == Axis::Theta { 1f64.to_radians() } else { 1.0 };
     let card = effects::find(step.family())?.card();
-    let range = |k: usize| card.parameters.get(k).map(|p| p.range.map(|x| unit * x));
-    let widest = range(2)?[1];
-    Some([range(1)?, [NARROWEST * widest, widest]])
+    let [_, middle, width] = card.parameters else { return None };
+    let widest = unit * width.range[1];
+    Some(Allowed {
+        middles: middle.range.map(|x| unit * x),
+        widths: [NARROWEST * widest, widest],
+        typical: unit * width.typical,
+    })
 }
 
 /// A place of the grid.
@@ -73,15 +84,16 @@ struct Posterior<'a> {
     base: f64,
     points: &'a [Point],
     scatter: f64,
+    typical: f64,
     rise: fn(f64) -> f64,
 }
 
 impl Posterior<'_> {
-    /// Nats below a perfect fit; infinite as soon as it is beyond `limit`.
+    /// Nats below a perfect fit of a typical width; infinite as soon as it is beyond `limit`.
     fn misfit(&self, middle: f64, width: f64, limit: f64) -> f64 {
         let lost = self.told.share * (1.0 - self.base);
         let toward = self.told.width.signum() / width;
-        let mut sum = 0.0;
+        let mut sum = 0.5 * (width / self.typical).ln().powi(2);
         for p in self.points {
             let loss = self.base + lost * (self.rise)((p.x - middle) * toward);
             sum += 0.5 * misfit(p, loss).powi(2) / self.scatter;

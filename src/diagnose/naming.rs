@@ -113,7 +113,10 @@ mod tests {
             all.iter().filter_map(|a| a.probability).collect()
         };
         assert_eq!(of(&[1.0]), [1.0]);
-        assert!((of(&[0.5])[0] - 0.5).abs() < 1e-12, "as probable as not, whatever the temperature");
+        assert!(
+            (of(&[0.5])[0] - 0.5).abs() < 1e-12,
+            "as probable as not, whatever the temperature"
+        );
         let [first, second] = of(&[0.9, 0.08])[..] else { panic!("two names") };
         assert!(first < 0.9 && second > 0.08 && first + second < 0.98, "{first}, {second}");
         let mut untold = [Alternative { effect: "vignetting", probability: None }];

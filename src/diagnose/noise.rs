@@ -43,22 +43,29 @@ fn window(views: &[Structure], known: &KnownTerms, level: f64) -> Option<Hanging
         nats,
         words: None,
     };
+    let part = part(views).filter(|w| expected == 1.0 && w.share[0] + 2.0 * w.share[1] < WHOLE);
+    let of_part = |Window { length, share }: Window| {
+        let mut parameters = one("length_px", length[0], length[1]);
+        parameters.insert("share".into(), estimate(share[0], share[1]));
+        parameters
+    };
     if p < level && length > SAME_WINDOW * expected {
         let nats = nats(&m, expected.ln());
-        let parameters = one("length_px", length, length * m.std_error);
-        return Some(found([0.0, length], parameters, 1.0, p, nats));
+        let whole = || one("length_px", length, length * m.std_error);
+        let size = part.map_or(1.0, |w| w.share[0].sqrt());
+        let parameters = part.map_or_else(whole, of_part);
+        return Some(found([0.0, length], parameters, size, p, nats));
     }
     // A part of the noise alone: seen where neighbours are taken for independent.
     let near = Mean::of(views, |s| s.near)?;
     let p = near.p_above(0.0);
-    if expected > 1.0 || p >= level || near.value <= LEAST_NEAR {
-        return None;
-    }
-    let Window { length, share } = part(views)?;
-    let mut parameters = one("length_px", length[0], length[1]);
-    parameters.insert("share".into(), estimate(share[0], share[1]));
-    Some(found([0.0, length[0]], parameters, near.value.sqrt(), p, nats(&near, 0.0)))
+    let part = part.filter(|_| p < level && near.value > LEAST_NEAR)?;
+    let (size, nats) = (near.value.sqrt(), nats(&near, 0.0));
+    Some(found([0.0, part.length[0]], of_part(part), size, p, nats))
 }
+
+/// Where less of the noise than this comes through a window, it is told how much.
+const WHOLE: f64 = 0.9;
 
 /// Side of the window that the model has, px, where a part of the noise alone comes through it with
 /// so much less correlation.

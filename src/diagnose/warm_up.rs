@@ -1,8 +1,8 @@
 //! How large a warm-up is and how fast, whatever its course.
 //!
 //! A session rarely lasts until the drift has come to its end: what it comes to in the end, and when,
-//! then depends on the form of the approach. So the posterior is summed over several, and over time
-//! constants of any length.
+//! then depends on the form of the approach. So the posterior is summed over several, and over all time
+//! constants that a sensor may have.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -30,9 +30,11 @@ pub struct WarmUp {
 const COURSES: [fn(f64) -> f64; 3] =
     [|t| -(-t).exp_m1(), |t| t / (t + (std::f64::consts::E - 1.0).recip()), |t| (0.745 * t).tanh()];
 
-/// Time constants tried, evenly in the logarithm: from this share of the session to so many.
+/// Time constants tried, evenly in the logarithm: from this share of the session to so many of it.
 const TAUS: usize = 240;
 const TAU_SESSIONS: [f64; 2] = [0.02, 20.0];
+/// A sensor's housing warms in a quarter of an hour, as on the card, within a factor of e or so.
+const TYPICAL_TAU_S: f64 = 900.0;
 /// Sensors drift by a per cent or two at most (the card's source: some mm at 1 to 2 m, in 20 min).
 const USUAL: f64 = 0.02;
 
@@ -47,7 +49,8 @@ pub fn warm_up(readings: &[Reading], variance: f64) -> Option<WarmUp> {
         .flat_map(|(course, of)| taus.clone().map(move |tau_s| (course, of, tau_s)))
         .filter_map(|(course, of, tau_s)| {
             let (evidence, relative) = size(readings, variance, &|t| of(t / tau_s))?;
-            Some(Node { course, tau_s, evidence, relative })
+            let unlikely = 0.5 * (tau_s / TYPICAL_TAU_S).ln().powi(2);
+            Some(Node { course, tau_s, evidence: evidence - unlikely, relative })
         })
         .collect();
     let told = nodes.iter().filter(|n| n.course == 0);

@@ -1,8 +1,9 @@
 //! The window that a part of the noise comes through, from how correlation falls with distance.
 
 use super::hanging::Mean;
+use super::smooth::SMOOTH_PX;
 use super::structure::Structure;
-use super::texture::COURSE;
+use super::texture::{COURSE, FAR};
 
 /// Its side, px, and the share of the variance that comes through it, each with its standard error.
 #[derive(Debug, Clone, Copy)]
@@ -17,7 +18,7 @@ const FORMS: [fn(f64) -> f64; 2] =
     [|lag| (1.0 - lag).max(0.0), |lag| (-std::f64::consts::PI * lag * lag).exp()];
 
 /// Sides that are tried, px, evenly in the logarithm.
-const SIDES: usize = 800;
+const SIDES: usize = 400;
 const REACH_PX: [f64; 2] = [1.2, 64.0];
 
 /// By the views' mean course; its lags err alike, since it is the same noise that they are made of.
@@ -29,17 +30,42 @@ pub fn part(views: &[Structure]) -> Option<Window> {
     of(&values, variance)
 }
 
+/// The course of noise whose correlation along either axis is `of` the lag, as it is measured: what is
+/// smooth was taken out, and what far pixels along the diagonal share.
+fn seen(of: &dyn Fn(f64) -> f64, lags: usize) -> Vec<f64> {
+    let reach = FAR[FAR.len() - 1];
+    let half = SMOOTH_PX / 2;
+    let mean = |course: &[f64], until: usize| -> Vec<f64> {
+        let at = |lag: isize| course.get(lag.unsigned_abs()).copied().unwrap_or(0.0);
+        let over = |k: usize| {
+            let (k, half) = (k as isize, half as isize);
+            (k - half..=k + half).map(at).sum::<f64>() / SMOOTH_PX as f64
+        };
+        (0..=until).map(over).collect()
+    };
+    let plain: Vec<f64> = (0..=reach + 2 * half).map(|lag| of(lag as f64)).collect();
+    let once = mean(&plain, reach + half);
+    let twice = mean(&once, reach);
+    let at =
+        |u: usize, v: usize| plain[u] * plain[v] - 2.0 * once[u] * once[v] + twice[u] * twice[v];
+    let far = FAR.iter().map(|lag| at(*lag, *lag)).sum::<f64>() / FAR.len() as f64;
+    (1..=lags).map(|lag| at(lag, 0) - far).collect()
+}
+
 fn of(course: &[f64], variance: f64) -> Option<Window> {
     let variance = variance.max(f64::MIN_POSITIVE);
     let log = REACH_PX.map(f64::ln);
     let mut nodes: Vec<[f64; 4]> = Vec::new();
+    let own = seen(&|lag| f64::from(u8::from(lag == 0.0)), course.len());
     for form in FORMS {
         for k in 0..SIDES {
             let side = (log[0] + (log[1] - log[0]) * k as f64 / (SIDES - 1) as f64).exp();
-            let shape: Vec<f64> = (1..=course.len()).map(|lag| form(lag as f64 / side)).collect();
+            let through = seen(&|lag| form(lag / side), course.len());
             let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            let beyond = |of: &[f64]| of.iter().zip(&own).map(|(x, own)| x - own).collect();
+            let (shape, left): (Vec<f64>, Vec<f64>) = (beyond(&through), beyond(course));
             let information = dot(&shape, &shape) / variance;
-            let share = dot(&shape, course) / variance / information;
+            let share = dot(&shape, &left) / variance / information;
             // No more than all comes through; a window that no lag lies in shows nothing.
             if information > 0.0 && (0.0..=1.0).contains(&share) {
                 let evidence = 0.5 * (share * share * information - information.ln());
@@ -76,10 +102,14 @@ mod tests {
             for seed in 0..60 {
                 let mut rng = Seed(seed).stream("window");
                 let truth = [rng.random_range(4.0..12.0), rng.random_range(0.005..0.1)];
-                let course: Vec<f64> = (1..=COURSE)
-                    .map(|lag| {
+                let own = seen(&|lag| f64::from(u8::from(lag == 0.0)), COURSE);
+                let through = seen(&|lag| form(lag / truth[0]), COURSE);
+                let course: Vec<f64> = own
+                    .iter()
+                    .zip(through)
+                    .map(|(own, through)| {
                         let noise: f64 = StandardNormal.sample(&mut rng);
-                        truth[1] * form(lag as f64 / truth[0]) + ERROR * noise
+                        truth[1] * through + (1.0 - truth[1]) * own + ERROR * noise
                     })
                     .collect();
                 let Window { length, share } = of(&course, ERROR * ERROR).expect("a window");
