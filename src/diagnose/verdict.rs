@@ -38,8 +38,7 @@ pub(super) fn merge(found: &mut Vec<Finding>) {
     });
 }
 
-/// Of ten names of such effects in the world of light none was the cause, on development seeds (501,
-/// 777 and 902): with Jeffreys's prior, a chance of 1 in 22.
+/// Of ten such names on development seeds (501, 777, 902) none was the cause: by Jeffreys's prior.
 const NO_SYMPTOM: f64 = 0.045;
 /// What changes how noise is made, and so its size.
 const MAKES_NOISE: [&str; 3] = ["spatial-correlation", "frozen-noise", "disparity-quantisation"];
