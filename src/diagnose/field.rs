@@ -27,8 +27,6 @@ pub struct Field {
     pub plane: Plane,
     /// fx * baseline, px m.
     pub scale_px_m: f64,
-    /// Variance of the stored number's rounding on the optical axis, px^2.
-    pub rounding_px2: f64,
     pub width: usize,
     pub height: usize,
     /// Pixels of the target, ascending.
@@ -178,14 +176,11 @@ impl Field {
 
     fn empty(view: &View, sensor: &Sensor, plane: Plane, pixels: Vec<u32>) -> Self {
         let n = pixels.len();
-        let scale_px_m = sensor.disparity_px_m().unwrap_or(sensor.camera.fx * KINECT_BASELINE_M);
-        let word_px = scale_px_m * sensor.code.step_inverse(plane.depth(0.0, 0.0)).abs();
         Field {
             name: view.name.clone(),
             time_s: view.depth.first().map_or(0.0, |f| f.timestamp),
             plane,
-            scale_px_m,
-            rounding_px2: word_px * word_px / 12.0,
+            scale_px_m: sensor.disparity_px_m().unwrap_or(sensor.camera.fx * KINECT_BASELINE_M),
             width: sensor.camera.width,
             height: sensor.camera.height,
             pixels,

@@ -24,7 +24,6 @@ fn field(rng: &mut Stream, error_px: impl Fn(usize) -> f64) -> Field {
         time_s: 0.0,
         plane: Plane::tilted(1.0, 0.0, 0.0),
         scale_px_m: 10.0,
-        rounding_px2: 0.0,
         width,
         height,
         pixels: (0..n as u32).collect(),

@@ -44,7 +44,6 @@ fn picture(camera: &Camera, beside: impl Fn(usize) -> Option<f64>) -> (Field, Fr
         time_s: 0.0,
         plane,
         scale_px_m: camera.fx * 0.075,
-        rounding_px2: 0.0,
         width,
         height,
         pixels,

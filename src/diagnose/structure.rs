@@ -102,10 +102,9 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     s.variance_px2 = mean(first.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
     let level: Vec<Vec<f32>> =
         frames.iter().map(|f| without_lines(f, camera.width, SHORT_LINE)).collect();
-    let rounded = rounded_share(field.rounding_px2, s.variance_px2);
     for lag in 1..frames.len().min(4) {
         let pairs = (0..frames.len() - lag).map(|k| same_pixel(&level[k], &level[k + lag]));
-        s.lagged[lag - 1] = mean(pairs).map(|c| c / (1.0 - rounded));
+        s.lagged[lag - 1] = mean(pairs);
     }
     let noise = moving(&frames, s.lagged[0]);
     let lines = without_lines(&noise, camera.width, LONG_LINE);
@@ -147,13 +146,6 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     s.window_px = Some(window.sqrt());
     s.jitter = jitter(field, &s, window);
     s
-}
-
-/// Share of a variance that is the stored number's own rounding: afresh in every frame as long as the
-/// noise is at least half a step, where it makes a quarter of the whole.
-fn rounded_share(rounding_px2: f64, variance_px2: f64) -> f64 {
-    let share = rounding_px2 / variance_px2.max(1e-12);
-    if share < 0.25 { share } else { 0.0 }
 }
 
 /// Mean product of each view's mean residual with the mean of the others', px^2.
