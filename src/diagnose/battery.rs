@@ -14,6 +14,7 @@ use super::heldout;
 use super::laws;
 use super::lines::lines;
 use super::missing::missing;
+use super::naming::temper;
 use super::next_view;
 use super::null::beside_model;
 use super::other_findings;
@@ -97,6 +98,7 @@ impl Case<'_> {
         }
         echoes(&mut found);
         merge(&mut found);
+        found.iter_mut().for_each(|f| temper(&mut f.alternatives));
         Battery { mean, scatter, found, refitted, better_form, detectable }
     }
 

@@ -49,6 +49,7 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hangi
         fixed.and_then(|m| pattern.found(&m, variance, level)).into_iter().collect();
     let fixed_px2 = fixed.map_or(0.0, |m| m.value.max(0.0));
     let Some(first) = Mean::of(views, |s| s.lagged[0]) else { return found };
+    let first_error = first.std_error.max(by_chance(views));
     let fixed_share = fixed_px2 / variance.max(1e-12);
     let frozen_known = known.parameter("frozen-noise", "fraction").unwrap_or(0.0);
     let rho_known = known.parameter("temporal-correlation", "rho").unwrap_or(0.0);
@@ -59,7 +60,7 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hangi
         let more = first.value - fixed_share - frozen_known - rho_known;
         if p < level && more > LEAST_CORRELATION {
             let names = vec!["frozen-noise", "temporal-correlation"];
-            let fraction = ("fraction", first.value, first.std_error);
+            let fraction = ("fraction", first.value, first_error);
             found.push(of_frames(names, [0.0, 1.0], fraction, more, (p, nats(&first, 0.0))));
         }
         return found;
@@ -75,7 +76,7 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hangi
         let rho = ((first.value - s) / (1.0 - s).max(1e-6)).clamp(0.0, 1.0);
         let name = vec!["temporal-correlation"];
         let evidence = (p_falling, nats(&falling, 0.0));
-        found.push(of_frames(name, [1.0, 3.0], ("rho", rho, first.std_error), rho, evidence));
+        found.push(of_frames(name, [1.0, 3.0], ("rho", rho, first_error), rho, evidence));
     }
     let floor = if slowly { BESIDE_ANOTHER } else { LEAST_CORRELATION };
     if p_still < level && still - frozen_known > floor {
@@ -100,6 +101,14 @@ pub fn of_any_two(s: &Structure) -> Option<f64> {
     let Some(rest) = later(s) else { return Some(next) };
     let share = if s.lagged[2].is_some() { 1.0 / 2.0 } else { 1.0 / 3.0 };
     Some(next + share * (rest - next))
+}
+
+/// Pixels of white noise correlate by chance to one over the root of their number; a few views may
+/// happen to agree better than that.
+fn by_chance(views: &[Structure]) -> f64 {
+    let pairs = |s: &Structure| s.pixels * s.lagged.iter().flatten().count() as f64;
+    let pairs: f64 = views.iter().map(pairs).sum();
+    if pairs > 0.0 { pairs.sqrt().recip() } else { 0.0 }
 }
 
 /// Share of the noise that stands still within a view, by the views' mean correlations; `None` with

@@ -59,7 +59,7 @@ impl Joint<'_> {
             .into_iter()
             .map(|f| back.solve_upper_triangular(&f))
             .collect::<Option<_>>()?;
-        let told = factors.iter().map(|f| f * f.transpose()).sum::<DMatrix<f64>>();
+        let told = together(&factors, n);
         let own = rest(&seen, &(covariance - told), kept.len(), (n - kept.len()) / 2);
         let all = |of: &dyn Fn(usize) -> f64| {
             let mut all = DVector::zeros(self.all.b.len());
@@ -162,6 +162,11 @@ fn leading(covariance: &DMatrix<f64>) -> Vec<DVector<f64>> {
     factors
 }
 
+/// What factors of `n` coefficients make of the covariance.
+fn together(factors: &[DVector<f64>], n: usize) -> DMatrix<f64> {
+    factors.iter().fold(DMatrix::zeros(n, n), |sum, f| sum + f * f.transpose())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -172,10 +177,12 @@ mod tests {
         let n = 90;
         let columns = DMatrix::from_fn(n, 5, |i, k| ((k + 1) as f64 * i as f64 * 0.21).sin());
         let few = &columns * columns.transpose();
-        let made = leading(&few).iter().map(|f| f * f.transpose()).sum::<DMatrix<f64>>();
+        let made = together(&leading(&few), n);
         assert!((&made - &few).norm() < 0.15 * few.norm(), "{}", (&made - &few).norm());
         assert!((made.trace() / few.trace() - 1.0).abs() < 1.0 - HELD + 1e-9);
         let none = leading(&DMatrix::identity(3, 3));
         assert_eq!(none.len(), 3);
+        // No term is left to be sure of.
+        assert_eq!(together(&leading(&DMatrix::zeros(0, 0)), 0).shape(), (0, 0));
     }
 }

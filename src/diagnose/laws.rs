@@ -7,6 +7,7 @@ use super::field::Field;
 use super::null::Null;
 use super::replication::{Measured, agree};
 use super::scatter::{Left, left_by_fit};
+use super::warm_up::{Reading, WarmUp, warm_up};
 use crate::terms::Axis;
 
 /// A law that the distances may be off by.
@@ -20,7 +21,8 @@ pub struct Law {
     pub rms_sigma: f64,
     /// Of one reference, m.
     pub error_m: f64,
-    pub settled: Vec<(&'static str, f64)>,
+    /// What settles its shape, each with its standard error.
+    pub settled: Vec<(&'static str, [f64; 2])>,
     /// Nats.
     pub gain: f64,
     /// Its coefficient, and the standard error.
@@ -86,7 +88,7 @@ fn of(checked: &[Checked]) -> Vec<Law> {
     let beside = if is_tilted(checked) { 2 } else { 0 };
     let (variance, free) = scatter(checked);
     let mut laws = Vec::new();
-    let mut add = |family, axis, settled, column: &dyn Fn(&Checked) -> f64| {
+    let mut add = |family, axis, column: &dyn Fn(&Checked) -> f64| {
         let evidence = |with: bool| -> Vec<Evidence> {
             let of = |c: &Checked| {
                 let mut g = c.slope[..beside].iter().map(|s| c.z * s).collect::<Vec<_>>();
@@ -137,7 +139,7 @@ fn of(checked: &[Checked]) -> Vec<Law> {
                 rms_m,
                 rms_sigma,
                 error_m,
-                settled,
+                settled: Vec::new(),
                 gain: gain.total,
                 estimate: [beta, beta_error],
                 null,
@@ -146,16 +148,32 @@ fn of(checked: &[Checked]) -> Vec<Law> {
             });
         }
     };
-    add("depth-scale", Axis::Z, Vec::new(), &|c| c.z);
+    add("depth-scale", Axis::Z, &|c| c.z);
     // An offset of the disparity by delta px moves the depth by -z^2 delta / (f b).
-    add("disparity-offset", Axis::Z, Vec::new(), &|c| -c.z * c.z / c.px_m);
+    add("disparity-offset", Axis::Z, &|c| -c.z * c.z / c.px_m);
     for tau in WARM_UPS {
-        let settled = vec![("time_constant_s", tau)];
-        add("thermal-drift", Axis::SessionTime, settled, &|c| {
-            c.z * (1.0 - (-c.session_s / tau).exp())
-        });
+        add("thermal-drift", Axis::SessionTime, &|c| c.z * (1.0 - (-c.session_s / tau).exp()));
+    }
+    if let Some(warm_up) = drift(checked, beside, variance, free) {
+        for law in laws.iter_mut().filter(|l| l.family == "thermal-drift") {
+            law.estimate = warm_up.relative;
+            law.settled = vec![("time_constant_s", warm_up.time_constant_s)];
+        }
     }
     laws
+}
+
+/// The drift's numbers, whatever its course; beside it as many angles as the laws have. The variance
+/// was measured with `free` degrees of freedom, which makes a Student's t of a Gaussian.
+fn drift(checked: &[Checked], beside: usize, variance: f64, free: f64) -> Option<WarmUp> {
+    let reading = |c: &Checked| Reading {
+        z: c.z,
+        session_s: c.session_s,
+        off: c.off,
+        beside: c.slope[..beside].iter().map(|s| c.z * s).collect(),
+    };
+    let readings: Vec<Reading> = checked.iter().map(reading).collect();
+    warm_up(&readings, variance * free / (free - 2.0).max(1.0))
 }
 
 /// A relative error of a few percent, an offset of a few px.

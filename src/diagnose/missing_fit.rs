@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::missing_cells::Cell;
+use super::missing_forms::errors;
 use super::missing_shapes::Step;
 use crate::solve::{LeastSquares, trust_region};
 
@@ -69,11 +70,18 @@ const OFF: f64 = 0.3;
 const TOGETHER: f64 = 16.0;
 /// Shares are known no better.
 const LEAST: f64 = 0.002;
-/// Rises of another form (Gaussian, Gompertz) put the middle up to so many widths elsewhere, and
-/// are by this share of a width steeper.
-const FORM: f64 = 0.5;
 /// A share of its own must lower chi squared by this: 1 % of chance.
 const WORTH: f64 = 6.6;
+
+/// How far a point lies from an expected loss, in its standard errors.
+pub fn misfit(p: &Point, loss: f64) -> f64 {
+    // Between what was expected and what was seen: neither alone may claim certainty.
+    let half = 0.5 * (loss + p.share);
+    let spread = half * (1.0 - half);
+    let variance = spread * TOGETHER / p.asked + (OFF * spread).powi(2) + LEAST * LEAST;
+    let off = if p.at_least { (p.share - loss).max(0.0) } else { p.share - loss };
+    off / variance.sqrt()
+}
 
 /// Middle, logarithm of the width, and logit of the share where it is free.
 struct Problem<'a> {
@@ -96,15 +104,7 @@ impl Problem<'_> {
 
     fn residuals(&self, x: &DVector<f64>) -> DVector<f64> {
         let step = self.step(x);
-        let of = |p: &Point| {
-            let loss = step.loss(p.x, self.base);
-            // Between what was expected and what was seen: neither alone may claim certainty.
-            let half = 0.5 * (loss + p.share);
-            let spread = half * (1.0 - half);
-            let variance = spread * TOGETHER / p.asked + (OFF * spread).powi(2) + LEAST * LEAST;
-            let off = if p.at_least { (p.share - loss).max(0.0) } else { p.share - loss };
-            off / variance.sqrt()
-        };
+        let of = |p: &Point| misfit(p, step.loss(p.x, self.base));
         DVector::from_iterator(self.points.len(), self.points.iter().map(of))
     }
 
@@ -153,14 +153,12 @@ pub fn fit(start: Step, base: f64, points: &[Point]) -> Option<Fitted> {
     let (r, jacobian) = problem.linearise(&end.x)?;
     let freedom = (r.len() - end.x.len().min(r.len() - 1)) as f64;
     let scale = (r.norm_squared() / freedom).max(1.0);
-    let covariance = (jacobian.transpose() * &jacobian).try_inverse()? * scale;
     let step = problem.step(&end.x);
-    let error = |j: usize| covariance[(j, j)].max(0.0).sqrt();
-    let share = problem.free_share.then(|| error(2) * step.share * (1.0 - step.share));
-    let std_error = [
-        Some(error(0).hypot(FORM * step.width)),
-        Some(error(1).hypot(FORM) * step.width.abs()),
-        share,
-    ];
-    Some(Fitted { step, std_error })
+    let of_share = || {
+        let covariance = (jacobian.transpose() * &jacobian).try_inverse()? * scale;
+        Some(covariance[(2, 2)].max(0.0).sqrt() * step.share * (1.0 - step.share))
+    };
+    let share = problem.free_share.then(|| of_share().unwrap_or(f64::INFINITY));
+    let [middle, width] = errors(&step, base, points, scale).map_or([None; 2], |e| e.map(Some));
+    Some(Fitted { step, std_error: [middle, width, share] })
 }

@@ -105,6 +105,33 @@ fn the_grazing_angle_comes_back() {
     assert!(within >= 10, "{within} of 12 within two standard errors");
 }
 
+/// Rises of a Gaussian and of Gompertz, in the units that these have for a width. 90 % of 12 are 11;
+/// 8 or fewer have a chance of 2 %.
+#[test]
+fn the_interval_holds_whatever_the_rise() {
+    let normal = |t: f64| 0.5 * statrs::function::erf::erfc(-t / 2f64.sqrt());
+    let gompertz = |t: f64| (-std::f64::consts::LN_2 * (-t).exp()).exp();
+    let rises: [(&str, &dyn Fn(f64) -> f64); 2] = [("normal", &normal), ("gompertz", &gompertz)];
+    for (name, rise) in rises {
+        let mut held = [0; 2];
+        for seed in 0..12 {
+            let mut rng = Seed(seed).stream("rise");
+            let (middle, width) = (rng.random_range(2.2..3.2), rng.random_range(0.06..0.2));
+            let (views, camera) = session(0.002, &mut rng, |p| rise((p.z - middle) / width));
+            let outcome = find(&views, &camera, Seed(seed));
+            let first = outcome.findings.first().expect("found");
+            assert_eq!(first.family, Some("range-dropout"), "{seed}: {:?}", first.rivals);
+            for (k, (of, truth)) in [("z50_m", middle), ("width_m", width)].into_iter().enumerate()
+            {
+                let [said, error] = parameter(first, of);
+                held[k] += usize::from((said - truth).abs() <= 1.645 * error);
+            }
+        }
+        println!("{name}: {held:?} of 12");
+        assert!(held.iter().all(|n| *n >= 9), "{name}: {held:?}");
+    }
+}
+
 #[test]
 fn what_is_too_near_is_lost_on_the_near_side() {
     let mut rng = Seed(3).stream("near");

@@ -12,6 +12,22 @@ const RICHER: f64 = 0.35;
 /// Less probable names are not told.
 pub const MIN_PROBABILITY: f64 = 0.005;
 
+/// What a finding states as the odds of its names is this power of what the layers make of them:
+/// these count a name's own formula as right and the views as alike. By maximum likelihood on 246 best
+/// names of the development seeds 501, 777 and 902: 1.32, from 1.07 to 1.65 (95 %).
+const TEMPERATURE: f64 = 1.3;
+
+/// The names of a finding, and that it is none of them, with their odds tempered.
+pub fn temper(alternatives: &mut [Alternative]) {
+    let cool = |p: f64| p.max(0.0).powf(1.0 / TEMPERATURE);
+    let stated = || alternatives.iter().filter_map(|a| a.probability);
+    let none = (1.0 - stated().sum::<f64>()).max(0.0);
+    let total = cool(none) + stated().map(cool).sum::<f64>();
+    for a in alternatives.iter_mut().filter(|_| total > 0.0) {
+        a.probability = a.probability.map(|p| cool(p) / total);
+    }
+}
+
 /// Chance that the cause has none of the names, where a name gains `named` nats, the best nameless
 /// curve `curve`, and this share of it is `adequate`.
 pub fn none_of_these(named: f64, curve: f64, adequate: f64) -> f64 {
@@ -82,4 +98,29 @@ pub fn physics(
         "Left out: {}. It is told by {} along {}. It could be taken for {}.",
         card.summary, card.statistic, card.axis, card.confused_with
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tempered_odds_keep_their_order_and_their_sum() {
+        let of = |p: &[f64]| -> Vec<f64> {
+            let tell = |p: &f64| Alternative { effect: "vignetting", probability: Some(*p) };
+            let mut all: Vec<Alternative> = p.iter().map(tell).collect();
+            temper(&mut all);
+            all.iter().filter_map(|a| a.probability).collect()
+        };
+        assert_eq!(of(&[1.0]), [1.0]);
+        assert!(
+            (of(&[0.5])[0] - 0.5).abs() < 1e-12,
+            "as probable as not, whatever the temperature"
+        );
+        let [first, second] = of(&[0.9, 0.08])[..] else { panic!("two names") };
+        assert!(first < 0.9 && second > 0.08 && first + second < 0.98, "{first}, {second}");
+        let mut untold = [Alternative { effect: "vignetting", probability: None }];
+        temper(&mut untold);
+        assert_eq!(untold[0].probability, None);
+    }
 }

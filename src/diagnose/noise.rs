@@ -5,8 +5,10 @@ use super::hanging::{Hanging, LEAST_SHARE, Mean, Shared, nats, one, variance_px2
 use super::in_time::in_time;
 use super::known::KnownTerms;
 use super::pairs::{REACH_PX, window_of};
+use super::parameters::estimate;
 use super::structure::Structure;
 use super::unequal::unequal;
+use super::window::{Window, part};
 use crate::terms::{Axis, Statistic};
 
 /// All mismatches of structure at this error rate each.
@@ -30,33 +32,59 @@ const SAME_WINDOW: f64 = 1.12;
 
 fn window(views: &[Structure], known: &KnownTerms, level: f64) -> Option<Hanging> {
     let m = Mean::of(views, |s| s.window_px.map(f64::ln))?;
-    let expected = known.parameter("spatial-correlation", "length_px").unwrap_or(1.0).max(1.0);
+    let expected = expected_window(known);
     let length = m.value.exp();
     let p = m.p_above(expected.ln());
-    let found = |interval, length, std_error, size_sigma, p, nats| Hanging {
+    let found = |interval, parameters, size_sigma, p, nats| Hanging {
         families: vec!["spatial-correlation"],
         statistic: Statistic::Correlation,
         axis: Axis::PixelLag,
         interval,
-        parameters: one("length_px", length, std_error),
+        parameters,
         size_sigma,
         p,
         nats,
         words: None,
     };
+    let part = part(views).filter(|w| expected == 1.0 && w.share[0] + 2.0 * w.share[1] < WHOLE);
+    let of_part = |Window { length, share }: Window| {
+        let mut parameters = one("length_px", length[0], length[1]);
+        parameters.insert("share".into(), estimate(share[0], share[1]));
+        parameters
+    };
     if p < level && length > SAME_WINDOW * expected {
         let nats = nats(&m, expected.ln());
-        return Some(found([0.0, length], length, length * m.std_error, 1.0, p, nats));
+        let whole = || one("length_px", length, length * m.std_error);
+        let size = part.map_or(1.0, |w| w.share[0].sqrt());
+        let parameters = part.map_or_else(whole, of_part);
+        return Some(found([0.0, length], parameters, size, p, nats));
     }
     // A part of the noise alone: seen where neighbours are taken for independent.
     let near = Mean::of(views, |s| s.near)?;
     let p = near.p_above(0.0);
-    (expected == 1.0 && p < level && near.value > LEAST_SHARE).then(|| {
+    if expected > 1.0 || p >= level || near.value <= LEAST_SHARE {
+        return None;
+    }
+    let (size, nats) = (near.value.sqrt(), nats(&near, 0.0));
+    // Where side and share cannot be told apart: the window through which all would come.
+    let all = || {
         let side = window_of(near.value);
         let std_error = window_of(near.value + near.std_error) - side + 0.2 * (side - 1.0);
-        let (size, length) = (near.value.sqrt(), side.max(length));
-        found([0.0, REACH_PX as f64], length, std_error, size, p, nats(&near, 0.0))
-    })
+        one("length_px", side.max(length), std_error)
+    };
+    let reach = part.map_or(REACH_PX as f64, |w| w.length[0]);
+    Some(found([0.0, reach], part.map_or_else(all, of_part), size, p, nats))
+}
+
+/// Where less of the noise than this comes through a window, it is told how much.
+const WHOLE: f64 = 0.9;
+
+/// Side of the window that the model has, px, where a part of the noise alone comes through it with
+/// so much less correlation.
+pub fn expected_window(known: &KnownTerms) -> f64 {
+    let of = |name| known.parameter("spatial-correlation", name);
+    let side = of("length_px").unwrap_or(1.0).max(1.0);
+    1.0 + of("share").unwrap_or(1.0).clamp(0.0, 1.0) * (side - 1.0)
 }
 
 fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {

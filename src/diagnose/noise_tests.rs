@@ -6,7 +6,7 @@ use serde_json::{Map, json};
 
 use super::super::in_time::still_share;
 use super::super::structure::Jitter;
-use super::super::tails::{GAUSSIAN_TAIL, tails};
+use super::super::tails::{GAUSSIAN_TAIL, TailCounts, tails};
 use super::*;
 use crate::model::{Effect, FitSummary, NoiseModel, Provenance};
 use crate::rng::{Seed, Stream};
@@ -284,11 +284,12 @@ fn what_views_share_errs_as_pairs_do() {
 #[test]
 fn tails_are_heavy_when_most_views_have_them() {
     let tailed = |share: f64, of: usize| -> Vec<Structure> {
-        let view = |k: usize| Structure {
-            tail: if k < of { share } else { GAUSSIAN_TAIL },
-            tail_pixels: 50_000.0,
-            tail_size: 5.5,
-            ..Structure::default()
+        let view = |k: usize| {
+            let (tail, n) = (if k < of { share } else { GAUSSIAN_TAIL }, 50_000.0);
+            // As exponential as a tail of matches gone astray.
+            let between = [0.4, 0.24, 0.2, 0.12, 0.03].map(|part| part * n * tail);
+            let tails = TailCounts { n, beyond: n * tail, between };
+            Structure { tail, tail_pixels: n, tails, ..Structure::default() }
         };
         (0..VIEWS).map(view).collect()
     };

@@ -20,7 +20,7 @@ fn reach() -> Extent {
         session: [0.0, 1000.0],
         temperature: [0.0, 0.0],
         light: [1.0, 1.0],
-        ambient: [0.0, 0.0],
+        ambient: [0.0, 1000.0],
         edge: 100.0,
     }
 }
@@ -136,9 +136,9 @@ fn exact() -> Vec<Case> {
         (
             "slope-noise",
             Basis::Log1p { over: Coordinate::Blur(0.6) },
-            vec![0.25],
+            vec![1.0],
             "sigma_lateral_px",
-            0.3,
+            0.6,
             1e-12,
         ),
         (
@@ -165,9 +165,9 @@ fn exact() -> Vec<Case> {
         (
             "ambient-light",
             Basis::Log1p { over: Coordinate::Ambient(0.5) },
-            vec![1.2],
+            vec![1.0],
             "ratio",
-            0.6,
+            0.5,
             1e-12,
         ),
         ("recalibrate", Basis::Level, vec![2.0 * 1.3f64.ln()], "sigma_factor", 1.3, 1e-12),

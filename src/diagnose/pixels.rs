@@ -9,7 +9,7 @@ use super::layers::Survey;
 use super::outcome::Outcome;
 use super::smooth::{SMOOTH_PX, high_pass};
 use super::structure::Structure;
-use super::tails::tail;
+use super::tails::{TailCounts, tail};
 use super::texture::moving;
 use super::tiles::Places;
 use crate::measure::Workbench;
@@ -83,12 +83,9 @@ pub(super) fn measure_tails(
         } else {
             vec![tail(&moving(&frames, s.lagged[0]), camera)]
         };
-        let n: f64 = looks.iter().map(|l| l.1).sum();
-        let beyond: f64 = looks.iter().map(|l| l.0 * l.1).sum();
-        let size: f64 = looks.iter().map(|l| l.0 * l.1 * l.2).sum();
-        if n > 0.0 {
-            (s.tail, s.tail_pixels, s.tail_size) = (beyond / n, n, size / beyond.max(1.0));
-        }
+        s.tails = TailCounts::default();
+        looks.iter().for_each(|l| s.tails.add(l));
+        (s.tail_pixels, s.tail) = (s.tails.n, s.tails.beyond / s.tails.n.max(1.0));
     });
 }
 

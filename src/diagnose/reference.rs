@@ -73,8 +73,8 @@ pub fn findings(
         "disparity-offset" => parameters.insert("offset_px".into(), estimate(beta, error)),
         _ => parameters.insert("relative".into(), estimate(beta, error)),
     };
-    for (name, value) in &best.settled {
-        parameters.insert((*name).into(), estimate(*value, 0.5 * value));
+    for (name, [value, error]) in &best.settled {
+        parameters.insert((*name).into(), estimate(*value, *error));
     }
     let status = if close { Status::OneOf } else { Status::Named };
     vec![Finding {

@@ -5,6 +5,7 @@ use super::field::Field;
 use super::hanging::{Hanging, Mean};
 use super::in_time::{later, of_any_two};
 use super::known::KnownTerms;
+use super::noise::expected_window;
 use super::replication::{Measured, agree};
 use super::structure::Structure;
 use super::tails::GAUSSIAN_TAIL;
@@ -51,7 +52,7 @@ fn statistic<'a>(found: &Hanging, known: &'a KnownTerms) -> Option<OfView<'a>> {
         // A part of the noise alone is seen in near pixels, all of it in the window's side.
         (Some("spatial-correlation"), ..) if found.size_sigma < 1.0 => Box::new(|s| s.near),
         (Some("spatial-correlation"), ..) => {
-            let side = parameter("spatial-correlation", "length_px").max(1.0);
+            let side = expected_window(known);
             Box::new(move |s| Some(s.window_px?.ln() - side.ln()))
         }
         (Some("fixed-pattern-noise"), ..) => Box::new(move |s| Some(s.fixed_px2? - fixed)),

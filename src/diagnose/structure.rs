@@ -7,8 +7,10 @@ use rayon::prelude::*;
 use super::exposure::FRAMES_KEPT;
 use super::field::Field;
 use super::pairs::Pairs;
+use super::tails::TailCounts;
 use super::texture::{
-    LONG_LINE, SHORT_LINE, calm, changes, fine, moving, rough, same_pixel, without_lines,
+    COURSE, FAR, Filled, LONG_LINE, SHORT_LINE, calm, changes, covariance, fine, moving, rough,
+    same_pixel, without_lines,
 };
 use super::unequal::loudness;
 use crate::camera::Camera;
@@ -23,6 +25,9 @@ pub struct Structure {
     pub variance_px2: f64,
     /// Side of the window that would make the correlation, px.
     pub window_px: Option<f64>,
+    /// Correlation of pixels 1, 2, 3, ... apart of what changes between frames, beyond that of far
+    /// ones.
+    pub course: Option<[f64; COURSE]>,
     /// Mean correlation of near pixels of what changes between frames.
     pub near: Option<f64>,
     /// Correlation of a pixel with itself 1, 2 and 3 frames later.
@@ -41,9 +46,8 @@ pub struct Structure {
     /// Share of residuals beyond four local standard deviations, and how many were looked at.
     pub tail: f64,
     pub tail_pixels: f64,
-    /// Excess kurtosis inside four local standard deviations would be cut; mean |r| beyond, in
-    /// standard deviations.
-    pub tail_size: f64,
+    /// The same by how far out they lie.
+    pub tails: TailCounts,
 }
 
 /// Frame by frame, the mean residual of the target.
@@ -118,6 +122,7 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
         let all = |of: fn(&Pairs) -> Option<f64>| mean(pairs.iter().filter_map(of));
         (s.row_px2, s.column_px2) = (all(|p| p.row), all(|p| p.column));
         s.near = all(|p| Some(p.near / p.power.max(1e-12)));
+        s.course = course(&changes(&frames), camera, [s.row_px2, s.column_px2]);
     }
     let correlation = measure_correlation(&lines, camera.width);
     // What whole rows share is no window's: it stands in the correlation at every lag.
@@ -203,4 +208,30 @@ fn jitter(field: &Field, s: &Structure, correlation_sum: f64) -> Option<Jitter> 
         trend_px2,
         velocity_mps: -tm / tt / disparity * z,
     })
+}
+
+/// Correlation of pixels 1, 2, 3, ... apart along rows and columns, without what far ones and whole
+/// `lines` share, px^2.
+fn course(
+    changes: &[Vec<f32>],
+    camera: &Camera,
+    [row, column]: [Option<f64>; 2],
+) -> Option<[f64; COURSE]> {
+    let filled: Vec<Filled> = changes.iter().map(|c| Filled::of(c)).collect();
+    let over = |lags: &[usize], step: [usize; 2]| {
+        let all: Option<Vec<f64>> =
+            filled.iter().map(|c| covariance(c, camera, lags, step)).collect();
+        mean(all?.into_iter())
+    };
+    // Taking out what is smooth leaves a little of everything everywhere: what a diagonal shows is
+    // no window's.
+    let apart = over(&FAR, [1, 1])?;
+    let power = mean(changes.iter().flatten().map(|&r| f64::from(r).powi(2)))?;
+    let at = |lag: usize| {
+        let along = |step, line: f64| Some(over(&[lag], step)? - apart - line.max(0.0));
+        let both = along([1, 0], row?)? + along([0, 1], column?)?;
+        Some(0.5 * both / power.max(1e-12))
+    };
+    let course: Option<Vec<f64>> = (1..=COURSE).map(at).collect();
+    course?.try_into().ok()
 }

@@ -1,11 +1,11 @@
 //! Residuals beyond four standard deviations: how many, and whether they are too many.
 
-use serde_json::json;
-use statrs::distribution::{Continuous, ContinuousCDF};
+use serde_json::{Map, json};
 
-use super::hanging::{Hanging, Mean, one};
+use super::hanging::{Hanging, Mean};
 use super::known::KnownTerms;
 use super::parameters::estimate;
+use super::strays::{Strays, strays};
 use super::structure::Structure;
 use crate::camera::Camera;
 use crate::stats::{MAD_TO_SIGMA, median_in_place};
@@ -14,16 +14,43 @@ use crate::terms::{Axis, Statistic};
 /// A Gaussian's share beyond four standard deviations.
 pub const GAUSSIAN_TAIL: f64 = 6.334e-5;
 const TAIL_SIGMAS: f32 = 4.0;
+/// What lies beyond the last is no tail of the noise: a few such errors would decide its mean.
+pub const TAIL_EDGES: [f64; 6] = [4.0, 5.0, 6.0, 8.0, 11.0, 16.0];
 
 /// Side of the patches whose own scale their residuals are held against: this share of the
 /// picture's width, px.
 const PATCHES_ACROSS: usize = 7;
 const SMALLEST_PATCH: usize = 40;
 
-/// Share of residuals beyond four standard deviations of their patch, their number, and how far
-/// out they lie, in standard deviations.
-pub fn tail(image: &[f32], camera: &Camera) -> (f64, f64, f64) {
-    let (mut beyond, mut n, mut size) = (0.0, 0.0, 0.0);
+/// How many residuals were looked at, and how many lie between each two of [`TAIL_EDGES`], in
+/// standard deviations of their patch; beyond the first, whatever their size, in all.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct TailCounts {
+    pub n: f64,
+    pub beyond: f64,
+    pub between: [f64; TAIL_EDGES.len() - 1],
+}
+
+impl TailCounts {
+    pub fn add(&mut self, other: &TailCounts) {
+        self.n += other.n;
+        self.beyond += other.beyond;
+        self.between.iter_mut().zip(other.between).for_each(|(a, b)| *a += b);
+    }
+
+    pub fn count(&mut self, sigmas: f32) {
+        self.n += 1.0;
+        self.beyond += f64::from(u8::from(sigmas > TAIL_SIGMAS));
+        let inside = |w: &[f64]| (w[0]..w[1]).contains(&f64::from(sigmas));
+        if let Some(k) = TAIL_EDGES.windows(2).position(inside) {
+            self.between[k] += 1.0;
+        }
+    }
+}
+
+/// The tail of an image's residuals.
+pub fn tail(image: &[f32], camera: &Camera) -> TailCounts {
+    let mut counts = TailCounts::default();
     let side = (camera.width / PATCHES_ACROSS).max(SMALLEST_PATCH);
     for v0 in (0..camera.height).step_by(side) {
         for u0 in (0..camera.width).step_by(side) {
@@ -49,19 +76,12 @@ pub fn tail(image: &[f32], camera: &Camera) -> (f64, f64, f64) {
             // Nine tenths of a Gaussian have 0.72 of its standard deviation... squared 0.6225.
             let spread = (square / most.len() as f64 / 0.6225).sqrt() as f32;
             let sigma = mad.max(0.8 * spread);
-            if sigma <= 0.0 {
-                continue;
-            }
-            for r in &patch {
-                n += 1.0;
-                if *r > TAIL_SIGMAS * sigma {
-                    beyond += 1.0;
-                    size += f64::from(r / sigma);
-                }
+            if sigma > 0.0 {
+                patch.iter().for_each(|r| counts.count(*r / sigma));
             }
         }
     }
-    if n > 0.0 { (beyond / n, n, size / f64::max(beyond, 1.0)) } else { (0.0, 0.0, 0.0) }
+    counts
 }
 
 /// A tail is heavy from this many times a Gaussian's share on.
@@ -70,8 +90,6 @@ const HEAVY: f64 = 2.5;
 const MUCH_HEAVIER: f64 = 6.0;
 /// So heavy it may look without a cause.
 const UNEQUAL: f64 = 1.5;
-/// A tail of another form than two Gaussians moves its parameters by this share.
-const TAIL_FORM: f64 = 0.2;
 /// Views too small to show a tail, in readings.
 const FEWEST_READINGS: f64 = 5000.0;
 
@@ -89,24 +107,24 @@ pub fn tails(views: &[Structure], known: &KnownTerms, level: f64, uneven: bool) 
     if m.value < much * HEAVY * GAUSSIAN_TAIL || m.p_above(expected) > level {
         return None;
     }
-    let size = Mean::of(views, |s| (looked(s) && s.tail > 0.0).then_some(s.tail_size))?;
-    let more = m.value - GAUSSIAN_TAIL;
-    // How far out they lie that are no Gaussian's.
-    let mean = (m.value * size.value - GAUSSIAN_TAIL * beyond_four(1.0).1) / more;
-    let scale = wider(mean);
-    let fraction = (more / beyond_four(scale).0).clamp(0.0, 1.0);
-    let scatter = m.std_error / m.value.max(1e-12);
-    let mut parameters = one("fraction", fraction, fraction * scatter.hypot(TAIL_FORM));
-    let scatter = size.std_error / (size.value - 4.0).max(1e-6);
-    parameters.insert("scale".into(), estimate(scale, scale * scatter.hypot(TAIL_FORM)));
+    let mut counts = TailCounts::default();
+    views.iter().filter(|s| looked(s)).for_each(|s| counts.add(&s.tails));
+    let mut parameters = Map::new();
     parameters.insert("share_beyond_4_sigma".into(), json!(m.value));
+    // Where all that strays is gross it has no scale.
+    let mut size_sigma = 4.0 * m.value.sqrt();
+    if let Some(Strays { fraction, scale }) = strays(&counts, m.std_error / m.value) {
+        parameters.insert("fraction".into(), estimate(fraction[0], fraction[1]));
+        parameters.insert("scale".into(), estimate(scale[0], scale[1]));
+        size_sigma = fraction[0].sqrt() * scale[0];
+    }
     Some(Hanging {
         families: vec!["heavy-tails"],
         statistic: Statistic::Distribution,
         axis: Axis::Residual,
-        interval: [4.0, 4.0 + 2.0 * (size.value - 4.0).max(0.5)],
+        interval: [4.0, 2.0 * mean_size(&counts) - 4.0],
         parameters,
-        size_sigma: fraction.sqrt() * scale,
+        size_sigma,
         p: m.p_above(GAUSSIAN_TAIL),
         nats: m.value
             * views.iter().map(|s| s.tail_pixels).sum::<f64>()
@@ -115,20 +133,10 @@ pub fn tails(views: &[Structure], known: &KnownTerms, level: f64, uneven: bool) 
     })
 }
 
-/// Share of a Gaussian of this standard deviation beyond four, and its mean distance there.
-fn beyond_four(scale: f64) -> (f64, f64) {
-    let normal = statrs::distribution::Normal::standard();
-    let t = 4.0 / scale;
-    let share = 2.0 * normal.sf(t);
-    (share, 2.0 * scale * Continuous::pdf(&normal, t) / share)
-}
-
-/// Standard deviation of a Gaussian whose mean distance beyond four is `mean`, by bisection.
-fn wider(mean: f64) -> f64 {
-    let (mut low, mut high) = (1.1, 20.0);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if beyond_four(middle).1 < mean { low = middle } else { high = middle }
-    }
-    0.5 * (low + high)
+/// Of what lies between the edges, a bin's middle standing for it; at least five.
+fn mean_size(counts: &TailCounts) -> f64 {
+    let all: f64 = counts.between.iter().sum();
+    let middles = TAIL_EDGES.windows(2).map(|w| 0.5 * (w[0] + w[1]));
+    let sum: f64 = counts.between.iter().zip(middles).map(|(n, x)| n * x).sum();
+    if all > 0.0 { sum / all } else { 5.0 }
 }

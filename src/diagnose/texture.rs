@@ -5,6 +5,7 @@ use std::f32::consts::FRAC_1_SQRT_2;
 
 use super::field::Field;
 use super::smooth::{SMOOTH_PX, high_pass};
+use crate::camera::Camera;
 use crate::stats::{MAD_TO_SIGMA, median_in_place};
 
 /// Frames that resemble one another more than this have little noise of their own.
@@ -113,3 +114,61 @@ pub fn same_pixel(a: &[f32], b: &[f32]) -> f64 {
 
 /// A pixel's own error changes from pixel to pixel: the box whose mean is taken out, px.
 const PIXEL_BOX: usize = 7;
+
+/// Lags well beyond a Kinect's window, px.
+pub const FAR: [usize; 12] = [20, 22, 24, 27, 30, 33, 36, 39, 42, 46, 50, 54];
+/// Lags that a window's side is read from, px.
+pub const COURSE: usize = 16;
+
+/// An image with nothing where there is none: sums run over it without a question.
+pub struct Filled {
+    value: Vec<f32>,
+    there: Vec<u8>,
+}
+
+impl Filled {
+    pub fn of(image: &[f32]) -> Self {
+        Filled {
+            value: image.iter().map(|r| if r.is_finite() { *r } else { 0.0 }).collect(),
+            there: image.iter().map(|r| u8::from(r.is_finite())).collect(),
+        }
+    }
+}
+
+/// Mean product of pixels that are so far apart along `step`, px^2.
+pub fn covariance(
+    image: &Filled,
+    camera: &Camera,
+    lags: &[usize],
+    step: [usize; 2],
+) -> Option<f64> {
+    let (w, h) = (camera.width, camera.height);
+    let (mut sum, mut n) = (0.0, 0u64);
+    for lag in lags {
+        let (du, dv) = (lag * step[0], lag * step[1]);
+        let across = w.saturating_sub(du);
+        for v in 0..h.saturating_sub(dv) {
+            let near = v * w..v * w + across;
+            let far = (v + dv) * w + du..(v + dv) * w + du + across;
+            sum += products(&image.value[near.clone()], &image.value[far.clone()]);
+            let pairs = image.there[near].iter().zip(&image.there[far]);
+            n += u64::from(pairs.map(|(a, b)| u32::from(a & b)).sum::<u32>());
+        }
+    }
+    (n > 1000).then(|| sum / n as f64)
+}
+
+/// Sum of products, in lanes that a processor adds at once.
+fn products(a: &[f32], b: &[f32]) -> f64 {
+    const LANES: usize = 8;
+    let mut lanes = [0.0f64; LANES];
+    let (a, b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest = a.remainder().iter().zip(b.remainder());
+    let rest: f64 = rest.map(|(a, b)| f64::from(a * b)).sum();
+    for (a, b) in a.zip(b) {
+        for ((lane, a), b) in lanes.iter_mut().zip(a).zip(b) {
+            *lane += f64::from(a * b);
+        }
+    }
+    lanes.iter().sum::<f64>() + rest
+}

@@ -2,7 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Stage};
 use crate::camera::Camera;
-use crate::terms::{Basis, Coordinate, ROOM_LUX, Term};
+use crate::terms::{Basis, Coordinate, PixelContext, ROOM_LUX, Term};
 
 pub struct AmbientLight;
 
@@ -59,7 +59,16 @@ impl Effect for AmbientLight {
         let Basis::Log1p { over: Coordinate::Ambient(ratio) } = *fit.shape else {
             return Vec::new();
         };
-        vec![fit.estimate("ratio", &|b| ratio * b[0])]
+        let ([_, z], [dim, bright]) = (fit.reach.z, fit.reach.ambient);
+        let ambient = 0.5 * (dim + bright);
+        let excess = ambient / ROOM_LUX * z * z;
+        if excess <= 0.0 {
+            return vec![fit.estimate("ratio", &|b| ratio * b[0])];
+        }
+        // The ratio that makes the noise what it is far away: shapes of other ratios, more or less of
+        // them, agree there and not at a distance of none.
+        let far = PixelContext { z, ambient, ..PixelContext::default() };
+        vec![fit.estimate("ratio", &|b| fit.value(b, far).exp_m1() / excess)]
     }
 
     fn formula_error(&self) -> f64 {

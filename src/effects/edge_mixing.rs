@@ -50,6 +50,11 @@ impl Effect for EdgeMixing {
             Estimate::given("width_px", width, 0.4 * width),
         ]
     }
+
+    /// A blur of the picture spreads an edge as well.
+    fn is_symptom(&self) -> bool {
+        true
+    }
 }
 
 /// By how much each pixel's depth is off, m: of the nearest other surface half at the edge, and

@@ -46,7 +46,9 @@ impl Effect for SlopeNoise {
         let Basis::Log1p { over: Coordinate::Blur(lateral_px) } = *fit.shape else {
             return Vec::new();
         };
-        vec![fit.estimate("sigma_lateral_px", &|b| lateral_px * b[0].max(0.0).sqrt())]
+        // A shape of another width, more or less of it, says the same where it doubles the variance.
+        let doubled = |b: &[f64]| (2f64.powf(b[0]) - 1.0).max(0.0);
+        vec![fit.estimate("sigma_lateral_px", &|b| lateral_px * doubled(b).sqrt())]
     }
 
     fn formula_error(&self) -> f64 {

@@ -1,6 +1,6 @@
 //! Neighbours share a matching window.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Card, Draw, Effect, Exposure, Parameter, Scope, Settings, Stage, normals};
 
 pub struct SpatialCorrelation;
 
@@ -9,13 +9,22 @@ static CARD: Card = Card {
     title: "noise correlated between neighbours",
     stage: Stage::NoiseInSpace,
     summary: "neighbouring pixels are matched with overlapping windows and err together",
-    parameters: &[Parameter {
-        name: "length_px",
-        unit: "px",
-        range: [0.0, 64.0],
-        typical: 9.0,
-        summary: "side of the window: beyond it neighbours are independent",
-    }],
+    parameters: &[
+        Parameter {
+            name: "length_px",
+            unit: "px",
+            range: [0.0, 64.0],
+            typical: 9.0,
+            summary: "side of the window: beyond it neighbours are independent",
+        },
+        Parameter {
+            name: "share",
+            unit: "",
+            range: [0.0, 1.0],
+            typical: 1.0,
+            summary: "of the variance that comes through the window; the rest is each pixel's own",
+        },
+    ],
     identity: 0.0,
     statistic: "correlation",
     axis: "pixel-lag",
@@ -28,12 +37,19 @@ impl Effect for SpatialCorrelation {
         &CARD
     }
 
-    fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
-        let side = settings.at(0);
-        if side > 1.0 {
-            let width = exposure.seen.width;
-            window_mean(&mut exposure.noise, width, side);
+    fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw) {
+        let (side, share, width) = (settings.at(0), settings.at(1), exposure.seen.width);
+        if side <= 1.0 {
+            return;
         }
+        if share >= 1.0 {
+            window_mean(&mut exposure.noise, width, side);
+            return;
+        }
+        let mut matched = normals(exposure.noise.len(), draw.stream(Scope::Frame, "matched"));
+        window_mean(&mut matched, width, side);
+        let (own, through) = ((1.0 - share).sqrt() as f32, share.sqrt() as f32);
+        exposure.noise.iter_mut().zip(matched).for_each(|(x, m)| *x = own * *x + through * m);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
 use crate::camera::Camera;
-use crate::terms::{Basis, Coordinate, Modulation, Term};
+use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Term};
 
 pub struct TiltAxisAnisotropy;
 
@@ -41,27 +41,28 @@ impl Effect for TiltAxisAnisotropy {
     }
 
     fn shapes(&self, _: &Bounds) -> Vec<Basis> {
-        [1, 2].map(along_baseline).into()
+        LAWS.map(along_baseline).into()
     }
 
     fn plain(&self, _: Basis) -> Basis {
-        along_baseline(1)
+        along_baseline(LAWS[0])
     }
 
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
-        let Basis::Powers { times: Modulation::TiltPower(power), .. } = *fit.shape else {
-            return Vec::new();
-        };
-        let at = REFERENCE_TILT_RAD.sin().powi(power);
-        vec![fit.estimate("ratio", &|b| (b[0] * at).exp())]
+        let steep = PixelContext { theta: REFERENCE_TILT_RAD, azimuth: 0.0, ..Default::default() };
+        let ratio = |b: &[f64]| fit.value(b, steep).exp();
+        let mut told = fit.estimate("ratio", &ratio);
+        let by_law = told.value * told.value.ln() * between_laws(fit.reach.theta[1]);
+        told.std_error = told.std_error.hypot(by_law);
+        vec![told]
     }
 
     fn term(&self, known: Known, _: &Camera) -> Option<Term> {
-        Some(Term::variance(along_baseline(2), vec![known("ratio")?.ln() / 0.75]))
+        Some(Term::variance(along_baseline(FORWARD), vec![known("ratio")?.ln() / 0.75]))
     }
 
     fn smallest(&self, _: &Bounds) -> Option<Smallest> {
-        let (parameter, shape) = ("ratio", along_baseline(2));
+        let (parameter, shape) = ("ratio", along_baseline(FORWARD));
         Some(Smallest { parameter, shape, unit: vec![1.0], of: |a| (0.75 * a).exp() })
     }
 }
@@ -69,7 +70,52 @@ impl Effect for TiltAxisAnisotropy {
 /// Where `ratio` is counted; a frontal plane has no direction of tilt.
 const REFERENCE_TILT_RAD: f64 = std::f64::consts::FRAC_PI_3;
 
+/// The law of the card's own formula.
+const FORWARD: Modulation = Modulation::TiltPower(2);
+
+/// How it grows with the tilt: as foreshortening does, or as the gradient of the disparity.
+const LAWS: [Modulation; 3] =
+    [Modulation::TiltPower(1), Modulation::TiltPower(2), Modulation::SlopeSquared];
+
+/// Half of what lies between sin^2 and tan^2 at the reference, as a share of the logarithm of the
+/// ratio, where both fit the recording: a window that is stretched far lies between them. With tilts
+/// evenly up to `steepest` and a signal that grows with their square, the mean tilt that decides is
+/// 5/6 of it.
+fn between_laws(steepest: f64) -> f64 {
+    let decides = (5.0 / 6.0 * steepest).cos() / REFERENCE_TILT_RAD.cos();
+    0.5 * (decides * decides - 1.0).abs()
+}
+
 /// Along the baseline against across it, fading as the tilt does.
-fn along_baseline(tilt_power: i32) -> Basis {
-    Basis::powers(Coordinate::Alignment, 1, Modulation::TiltPower(tilt_power))
+fn along_baseline(law: Modulation) -> Basis {
+    Basis::powers(Coordinate::Alignment, 1, law)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::terms::Extent;
+
+    fn told(law: Modulation, coefficient: f64, steepest: f64) -> Estimate {
+        let mut reach = Extent::of(std::iter::empty());
+        reach.theta = [0.0, steepest];
+        let (shape, covariance) = (along_baseline(law), DMatrix::zeros(1, 1));
+        let coefficients = &[coefficient];
+        let fit = Fitted { shape: &shape, coefficients, covariance: &covariance, reach: &reach };
+        TiltAxisAnisotropy.estimates(&fit)[0]
+    }
+
+    /// Every law says the same of the tilt that the ratio is counted at; a recording whose tilts end
+    /// far below it says less of it than one that passes it.
+    #[test]
+    fn the_ratio_is_counted_at_sixty_degrees() {
+        for (law, at_reference) in LAWS.into_iter().zip([0.75f64.sqrt(), 0.75, 3.0]) {
+            let [near, past] =
+                [0.8, 1.2].map(|steepest| told(law, 1.5f64.ln() / at_reference, steepest));
+            assert!((near.value - 1.5).abs() < 1e-9, "{law:?}: {near:?}");
+            assert!(near.std_error > 4.0 * past.std_error, "{law:?}: {near:?}, {past:?}");
+        }
+    }
 }

@@ -53,8 +53,9 @@ impl Effect for Vignetting {
         vec![fit.estimate("growth", &|b| (0.5 * b.iter().sum::<f64>()).exp() - 1.0)]
     }
 
+    /// Lenses that shade as cos^4 or their rim alone: 0.21 rms of twelve sets, seed 7000.
     fn formula_error(&self) -> f64 {
-        0.1
+        0.2
     }
 
     fn term(&self, known: Known, _: &Camera) -> Option<Term> {

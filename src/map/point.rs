@@ -63,22 +63,24 @@ pub struct Noise {
     correlated_px2: f32,
 }
 
-/// The effect of the catalogue that says how far neighbours err together, and its parameter.
-const CORRELATION: (&str, &str) = ("spatial-correlation", "length_px");
+/// The effect of the catalogue that says how far neighbours err together, its parameter, and the
+/// share of the variance that does; all where it is not told.
+const CORRELATION: [&str; 3] = ["spatial-correlation", "length_px", "share"];
 
 impl Noise {
     pub fn of(model: &NoiseModel) -> Self {
-        let length = |entry: &crate::model::Effect| {
-            let value = entry.parameters.get(CORRELATION.1)?;
+        let entry = model.effects.iter().find(|e| e.id == CORRELATION[0]);
+        let number = |name: &str| {
+            let value = entry?.parameters.get(name)?;
             let number = value.as_f64().or_else(|| value.get("value")?.as_f64());
-            number.filter(|l| l.is_finite() && *l > 1.0)
+            number.filter(|n| n.is_finite())
         };
-        let entry = model.effects.iter().find(|e| e.id == CORRELATION.0);
-        let length = entry.and_then(length).unwrap_or(1.0) as f32;
+        let length = number(CORRELATION[1]).unwrap_or(1.0).max(1.0);
+        let share = number(CORRELATION[2]).unwrap_or(1.0).clamp(0.0, 1.0);
         Noise {
             table: SigmaLookup::of(&model.sigma),
             max_depth_m: model.sigma.domain.z_m[1] as f32,
-            correlated_px2: length * length,
+            correlated_px2: (1.0 + share * (length * length - 1.0)) as f32,
         }
     }
 

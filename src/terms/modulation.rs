@@ -8,6 +8,9 @@ use super::place::PixelContext;
 /// Disparity at which a term that grows with a power of it is in px: a Kinect at 1.1 m.
 pub const DISPARITY_UNIT_PX: f64 = 40.0;
 
+/// The same at 80 degrees: Nguyen, Izadi and Lovell 2012 see nothing beyond.
+const STEEPEST: f64 = 32.2;
+
 /// A factor that changes from place to place.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -25,6 +28,8 @@ pub enum Modulation {
     Tilt,
     /// Its powers.
     TiltPower(i32),
+    /// Square of the target's slope, tan(tilt)^2, no further than anything is seen.
+    SlopeSquared,
     /// By how much the target's disparity changes along the ray, off the optical axis, px.
     RadialSlope {
         fx: f64,
@@ -60,6 +65,7 @@ impl Modulation {
             Modulation::Lift => p.disparity / p.rho,
             Modulation::Tilt => p.theta.sin(),
             Modulation::TiltPower(power) => p.theta.sin().powi(power),
+            Modulation::SlopeSquared => p.theta.tan().powi(2).min(STEEPEST),
             Modulation::RadialSlope { fx, fy } => -(p.slope[0] * p.x * fx + p.slope[1] * p.y * fy),
         }
     }
@@ -70,7 +76,10 @@ impl Modulation {
             Modulation::Disparity
             | Modulation::DisparitySquared
             | Modulation::DisparityPower(_) => Needs::DEPTH,
-            Modulation::Lift | Modulation::Tilt | Modulation::TiltPower(_) => Needs::SURFACE,
+            Modulation::Lift
+            | Modulation::Tilt
+            | Modulation::TiltPower(_)
+            | Modulation::SlopeSquared => Needs::SURFACE,
             Modulation::RadialSlope { .. } => Needs { slope: true, ..Needs::PIXEL },
         }
     }

@@ -18,6 +18,7 @@ mod diagnose;
 mod diagnose_ablation;
 mod diagnose_honesty;
 mod diagnose_odd;
+mod intervals;
 #[cfg(target_os = "linux")] // peak memory is read from /proc
 mod memory;
 #[cfg(unix)] // links folders

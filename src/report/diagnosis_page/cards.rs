@@ -109,7 +109,7 @@ fn finding_facts(finding: &Finding) -> Vec<(String, Markup)> {
     facts.extend(finding.parameters.iter().map(|(name, value)| {
         let description = parameters::description(finding.effect, name);
         let value = html! {
-            b { (parameters::value(name, value, 3)) }
+            b { (parameters::value(finding.effect, name, value, 3)) }
             @if !description.is_empty() { ": " (description) }
         };
         (parameters::title(name), value)

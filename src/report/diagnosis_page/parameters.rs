@@ -3,8 +3,8 @@
 use maud::{Markup, html};
 use serde_json::Value;
 
-use crate::effects;
-use crate::report::numbers::{significant, with_error};
+use crate::effects::{self, Parameter};
+use crate::report::numbers::{decimals_for, fixed, significant, with_error};
 
 /// How a name's ending gives the unit: the ending, what the number is multiplied by, the unit.
 /// Longer endings first.
@@ -20,30 +20,76 @@ const UNITS: [(&str, f64, &str); 7] = [
 /// Lengths below it are in mm, m.
 const MILLIMETRES_BELOW_M: f64 = 0.3;
 
-/// `0.125 ± 0.001 px`, or to so many digits where the error is not known; whatever else stands in
-/// the file is shown as it is.
-pub(super) fn value(name: &str, value: &Value, digits: usize) -> Markup {
+/// Standard errors that hold 90 % of a Gaussian.
+const NINETY_PERCENT: f64 = 1.645;
+
+/// What is known of a number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Known {
+    /// Nobody says how well.
+    Bare(f64),
+    /// With its standard error.
+    Within(f64, f64),
+    /// Its 90 % interval reaches zero: only how large it may be, at most as the catalogue allows.
+    UpTo(f64),
+}
+
+pub(super) fn known(effect: Option<&str>, name: &str, value: &Value) -> Option<Known> {
     let (name, _) = split(name);
     let number = |key: &str| value.get(key).and_then(Value::as_f64);
-    let Some(v) = value.as_f64().or_else(|| number("value")) else {
+    let v = value.as_f64().or_else(|| number("value"))?;
+    Some(match number("std_error") {
+        None => Known::Bare(v),
+        Some(e) if NINETY_PERCENT * e < v.abs() => Known::Within(v, e),
+        Some(e) => {
+            let [low, high] = parameter(effect, name).map_or([f64::MIN, f64::MAX], |p| p.range);
+            Known::UpTo((v + (NINETY_PERCENT * e).copysign(v)).max(low).min(high))
+        }
+    })
+}
+
+/// `0.125 ± 0.001 px`, `up to 0.6 px`, or to so many digits where the error is not known; whatever
+/// else stands in the file is shown as it is.
+pub(super) fn value(effect: Option<&str>, name: &str, value: &Value, digits: usize) -> Markup {
+    let Some(known) = known(effect, name, value) else {
         return html! { (value.as_str().map_or_else(|| value.to_string(), str::to_string)) };
     };
+    let (Known::Bare(v) | Known::Within(v, _) | Known::UpTo(v)) = known;
     let (scale, unit) = match UNITS.iter().find(|(ending, ..)| name.ends_with(ending)) {
         Some(("_m", ..)) if v.abs() < MILLIMETRES_BELOW_M => (1e3, " mm"),
         Some((_, scale, unit)) => (*scale, *unit),
         None => (1.0, ""),
     };
-    match number("std_error") {
-        Some(e) => html! { (with_error(scale * v, scale * e)) (unit) },
-        None => html! { (significant(scale * v, digits)) (unit) },
+    match known {
+        Known::Bare(v) => html! { (significant(scale * v, digits)) (unit) },
+        Known::Within(v, e) => html! { (with_error(scale * v, scale * e)) (unit) },
+        Known::UpTo(v) => html! { "up to " (significant(scale * v, 2)) (unit) },
     }
+}
+
+/// Two digits say themselves how well a number is known, where its error is this share at most.
+const CLEAR: f64 = 0.1;
+
+/// The same in a sentence, by the name it has in files; only what was estimated is told.
+pub(super) fn brief(effect: Option<&str>, name: &str, value: &Value) -> Option<String> {
+    value.get("value")?;
+    let digits = |x: f64| fixed(x, decimals_for(x.abs()));
+    Some(match known(effect, name, value)? {
+        Known::Within(v, e) if e > CLEAR * v.abs() => {
+            format!("{name} {} ± {}", digits(v), digits(e))
+        }
+        Known::Bare(v) | Known::Within(v, _) => format!("{name} {}", digits(v)),
+        Known::UpTo(v) => format!("{name} up to {}", digits(v)),
+    })
+}
+
+fn parameter(effect: Option<&str>, name: &str) -> Option<&'static Parameter> {
+    effect.and_then(effects::find)?.card().parameters.iter().find(|p| p.name == name)
 }
 
 /// What the catalogue says a parameter is.
 pub(super) fn description(effect: Option<&str>, name: &str) -> &'static str {
-    let card = effect.and_then(effects::find).map(|e| e.card());
-    let parameter = card.and_then(|c| c.parameters.iter().find(|p| p.name == name));
-    parameter.map_or("", |p| p.summary)
+    parameter(effect, name).map_or("", |p| p.summary)
 }
 
 /// The key, and what stands behind a comma: `z50_m, near side`.
@@ -69,15 +115,31 @@ mod tests {
             ("step_px", json!({"value": 0.125, "std_error": 0.001}), "0.1250 ± 0.0010 px"),
             ("sagitta_m", json!({"value": 0.00412, "std_error": 0.0003}), "4.12 ± 0.30 mm"),
             ("z50_m", json!(3.2), "3.20 m"),
+            ("width_m", json!({"value": 0.1, "std_error": 0.3}), "up to 0.59 m"),
+            ("width_m", json!({"value": -1.5, "std_error": 3.0}), "up to −2.0 m"),
+            ("width_m", json!({"value": 0.0, "std_error": 0.01}), "up to 16 mm"),
             ("tilt_rad", json!(0.5), "28.6°"),
             ("form", json!("a < b"), "a &lt; b"),
         ] {
-            assert_eq!(value(name, &json, 3).into_string(), text);
+            assert_eq!(value(Some("range-dropout"), name, &json, 3).into_string(), text);
         }
         assert_eq!(title("time_constant_s"), "time constant");
         assert_eq!(title("z50_m, near side"), "z50, near side");
-        assert_eq!(value("z50_m, near side", &json!(0.481), 2).into_string(), "0.48 m");
+        assert_eq!(value(None, "z50_m, near side", &json!(0.481), 2).into_string(), "0.48 m");
         let span = description(Some("target-bow"), "span_m");
         assert_eq!(span, "width of the board over which it is counted");
+    }
+
+    #[test]
+    fn a_sentence_claims_no_more_digits_than_are_known() {
+        for (value, text) in [
+            (json!({"value": 0.31, "std_error": 0.01}), Some("k_px 0.31")),
+            (json!({"value": 0.31, "std_error": 0.1}), Some("k_px 0.31 ± 0.10")),
+            (json!({"value": 0.31, "std_error": 0.9}), Some("k_px up to 1.8")),
+            (json!({"value": 0.31, "std_error": null}), Some("k_px 0.31")),
+            (json!(0.31), None),
+        ] {
+            assert_eq!(brief(Some("radial-disparity-bias"), "k_px", &value).as_deref(), text);
+        }
     }
 }

@@ -153,9 +153,9 @@ pub(super) fn detectable(diagnosis: &Diagnosis) -> Markup {
     let rows = diagnosis.detectable.iter().filter_map(|d| {
         let (strength, least) = d.minimum.iter().next()?;
         let smallest = html! {
-            (parameters::title(strength)) " " b { (parameters::value(strength, least, 2)) }
+            (parameters::title(strength)) " " b { (parameters::value(Some(d.effect), strength, least, 2)) }
             @for (key, value) in d.minimum.iter().skip(1) {
-                ", at a " (parameters::title(key)) " of " (parameters::value(key, value, 2))
+                ", at a " (parameters::title(key)) " of " (parameters::value(Some(d.effect), key, value, 2))
             }
         };
         let description = parameters::description(Some(d.effect), strength);

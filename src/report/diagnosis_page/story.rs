@@ -1,9 +1,10 @@
 //! A diagnosis in a few sentences, for the page's first screen and for the terminal.
 
+use super::parameters::brief;
 use super::sentences::{called, capital, join, mm};
 use crate::capture::far_side;
 use crate::diagnose::{Diagnosis, Finding, NextView, Status, Verdict};
-use crate::report::numbers::{count, decimals_for, fixed};
+use crate::report::numbers::{count, fixed};
 use crate::terms::{Basis, Statistic};
 
 /// So many findings have a sentence each; with the verdict, the rest, what is gained and what is left
@@ -11,7 +12,6 @@ use crate::terms::{Basis, Statistic};
 const MAX_SENTENCES: usize = 3;
 /// A second view of a pair of names is worth a word where it sets them this many standard errors apart.
 const SETTLES: f64 = 2.0;
-
 /// The largest findings a sentence each, all others in one, what views kept aside gain, and what the
 /// same tests find against the extended model: six at most, after the verdict's.
 pub fn story(diagnosis: &Diagnosis) -> Vec<String> {
@@ -47,10 +47,7 @@ fn of(f: &Finding) -> String {
         Statistic::Dropout => format!("{} % of the pixels lost", fixed(100.0 * f.size.sigma, 1)),
         _ => format!("{} rms, {} of the noise", mm(f.size.mm), fixed(f.size.sigma, 2)),
     };
-    let parameter = |(name, value): (&String, &serde_json::Value)| {
-        let value = value.get("value")?.as_f64()?;
-        Some(format!("{name} {}", fixed(value, decimals_for(value.abs()))))
-    };
+    let parameter = |(name, value): (&String, &serde_json::Value)| brief(f.effect, name, value);
     let parameters: Vec<String> = f.parameters.iter().filter_map(parameter).collect();
     let parameters = match parameters[..] {
         [] => String::new(),
