@@ -59,8 +59,9 @@ impl Joint<'_> {
             .into_iter()
             .map(|f| back.solve_upper_triangular(&f))
             .collect::<Option<_>>()?;
-        let told = factors.iter().map(|f| f * f.transpose()).sum::<DMatrix<f64>>();
-        let own = rest(&seen, &(covariance - told), kept.len(), (n - kept.len()) / 2);
+        // Where nothing is left to fit there are no factors.
+        let left = factors.iter().fold(covariance, |left, f| left - f * f.transpose());
+        let own = rest(&seen, &left, kept.len(), (n - kept.len()) / 2);
         let all = |of: &dyn Fn(usize) -> f64| {
             let mut all = DVector::zeros(self.all.b.len());
             places.iter().enumerate().for_each(|(i, &k)| all[k] = of(i));

@@ -17,7 +17,7 @@ use super::variance::error_of_sigma;
 use crate::model::SigmaModel;
 use crate::terms::{PixelContext, Statistic, Term};
 
-/// Chance that a model which is right is said not to hold within its own error.
+/// Chance that a model which is right differs by more than its own error.
 const LEVEL: f64 = 1e-3;
 
 /// A part of the model's error: terms that err together, by a standard normal number times these.
@@ -27,8 +27,9 @@ fn value(part: &Part, place: &PixelContext, row: &mut Vec<f64>) -> f64 {
     part.iter().map(|t| t.value(place, row)).sum()
 }
 
-/// By how much of each part the views differ from the model: the posterior mean. `None` where that
-/// is more than its error explains, or there is nothing to say.
+/// By how much of each part the views differ from the model: the posterior mean, or, where that is
+/// more than the model's error explains, the part of it that its error does. `None` where there is
+/// nothing to say.
 fn settled(data: &[ViewData], parts: &[Part]) -> Option<Vec<f64>> {
     if parts.is_empty() {
         return None;
@@ -55,10 +56,10 @@ fn settled(data: &[ViewData], parts: &[Part]) -> Option<Vec<f64>> {
     // A score of information l has the variance l + l^2 where the part itself has that of one.
     let square: f64 = seen().map(|(b, l)| b * b / (l + l * l)).sum();
     let limit = ChiSquared::new(seen().count().max(1) as f64).ok()?.inverse_cdf(1.0 - LEVEL);
-    if square > limit {
-        return None;
-    }
-    let shrunk = DVector::from_fn(n, |k, _| along[k] / (1.0 + eigen.eigenvalues[k].max(0.0)));
+    // Of a difference so many times as large as the model's error the rest is the views' own.
+    let within = (limit / square.max(limit)).sqrt();
+    let shrunk =
+        DVector::from_fn(n, |k, _| within * along[k] / (1.0 + eigen.eigenvalues[k].max(0.0)));
     Some((eigen.eigenvectors * shrunk).as_slice().to_vec())
 }
 

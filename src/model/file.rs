@@ -41,6 +41,17 @@ pub struct FitSummary {
     pub heldout: Option<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub remarks: Vec<String>,
+    /// Where `diagnose` looked for what sigma leaves out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub searched: Option<Searched>,
+}
+
+/// What a search rested on: a cause that is too small for it may still be missing.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Searched {
+    pub views: usize,
+    /// Views whose distance was measured by other means.
+    pub references: usize,
 }
 
 /// Where a model comes from.

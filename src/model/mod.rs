@@ -16,7 +16,7 @@ mod surface;
 
 pub use covariance::Covariance;
 pub use effect::{Effect, UNEXPLAINED};
-pub use file::{FitSummary, MODEL_FORMAT, NoiseModel, Provenance};
+pub use file::{FitSummary, MODEL_FORMAT, NoiseModel, Provenance, Searched};
 pub use fit::DISTANCE_RATIO;
 pub use forms::{Form, PAPER_EQ1, SigmaForm};
 pub use heldout::{HeldOut, compare_forms, held_out};

@@ -20,6 +20,7 @@ mod layouts;
 mod map;
 mod measure;
 mod model_file;
+mod other_views;
 mod outliers;
 mod room;
 mod speckle;
