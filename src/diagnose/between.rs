@@ -14,6 +14,9 @@ const ROUNDS: usize = 200;
 /// A scatter below this share of a term is none: what noise leaves of it after so many rounds.
 const NONE: f64 = 0.02;
 
+/// Of a variance that the views leave open to this share nothing is told.
+const UNTOLD: f64 = 0.9;
+
 /// Standard deviation between views of each term's size, as a share of it. `views` are the residuals
 /// that the terms were fitted to.
 pub fn between(views: &[ViewData], terms: &[Term]) -> Vec<f64> {
@@ -46,17 +49,24 @@ fn scatter(views: &[Evidence], terms: usize) -> Vec<f64> {
         return vec![0.0; terms];
     }
     let mut variance = DVector::from_element(terms, 1.0);
+    let mut unseen = DVector::zeros(terms);
     for _ in 0..ROUNDS {
         let held = DMatrix::from_diagonal(&variance.map(|t: f64| 1.0 / t.max(f64::MIN_POSITIVE)));
-        let squares = |view: &Evidence| -> Option<DVector<f64>> {
-            let posterior = (&view.a + &held).cholesky()?.inverse();
+        let mut seen = DVector::zeros(terms);
+        unseen.fill(0.0);
+        for view in views {
+            let Some(factor) = (&view.a + &held).cholesky() else { return vec![0.0; terms] };
+            let posterior = factor.inverse();
             let mean = &posterior * &view.b;
-            Some(mean.component_mul(&mean) + posterior.diagonal())
-        };
-        let Some(all) = views.iter().map(squares).collect::<Option<Vec<_>>>() else { break };
-        variance = all.iter().fold(DVector::zeros(terms), |sum, s| sum + s) / n;
+            seen += mean.component_mul(&mean) / n;
+            unseen += posterior.diagonal() / n;
+        }
+        variance = seen + &unseen;
     }
-    variance.iter().map(|t| (t * n / (n - 1.0)).sqrt()).collect()
+    // What planes absorb of a shape no view tells.
+    let told = |(t, unseen): (&f64, &f64)| if *unseen > UNTOLD * t { 0.0 } else { *t };
+    let all = variance.iter().zip(&unseen).map(told);
+    all.map(|t| (t * n / (n - 1.0)).sqrt()).collect()
 }
 
 #[cfg(test)]
@@ -66,20 +76,23 @@ mod tests {
     use super::*;
     use crate::rng::Seed;
 
-    /// Two terms that lean on one another, one of which scatters by 30 % and the other not at all.
+    /// Two terms that lean on one another, one of which scatters by 30 % and the other not at all, and
+    /// a third that cannot be seen.
     #[test]
     fn the_scatter_comes_back_and_none_is_none() {
         let mut rng = Seed(4).stream("between");
         let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
-        let a = DMatrix::from_row_slice(2, 2, &[400.0, 150.0, 150.0, 300.0]);
-        let root = a.clone().cholesky().unwrap().l();
+        let two = DMatrix::from_row_slice(2, 2, &[400.0, 150.0, 150.0, 300.0]);
+        let root = two.clone().cholesky().unwrap().l();
         let mut view = |_| {
             let sizes = DVector::from_vec(vec![0.3 * draw(), 0.0]);
-            let noise = &root * DVector::from_vec(vec![draw(), draw()]);
-            Evidence { a: a.clone(), b: &a * sizes + noise }
+            let seen = &two * sizes + &root * DVector::from_vec(vec![draw(), draw()]);
+            // And one that planes absorb.
+            Evidence { a: two.clone().resize(3, 3, 0.0), b: seen.resize_vertically(3, 0.0) }
         };
         let views: Vec<Evidence> = (0..400).map(&mut view).collect();
-        let found = scatter(&views, 2);
+        let found = scatter(&views, 3);
         assert!((found[0] - 0.3).abs() < 0.04 && found[1] < 0.04, "{found:?}");
+        assert_eq!(found[2], 0.0);
     }
 }
