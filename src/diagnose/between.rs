@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::evidence::Evidence;
 use super::rows::Rows;
 use super::samples::ViewData;
-use crate::terms::{PixelContext, Term};
+use crate::terms::{Basis, PixelContext, Term};
 
 /// Rounds of the expectation-maximisation; it starts at a scatter as large as the terms.
 const ROUNDS: usize = 200;
@@ -22,7 +22,12 @@ const UNTOLD: f64 = 0.9;
 pub fn between(views: &[ViewData], terms: &[Term]) -> Vec<f64> {
     let evidence: Vec<Evidence> = views.par_iter().filter_map(|v| of_view(v, terms)).collect();
     let shares = scatter(&evidence, terms.len());
-    shares.iter().map(|t| if *t > NONE { (1e3 * t).round() / 1e3 } else { 0.0 }).collect()
+    let told = |(share, term): (&f64, &Term)| {
+        // Planes absorb an affine part, whatever its size.
+        let seen = *share > NONE && !matches!(term.basis, Basis::Affine { .. });
+        if seen { (1e3 * share).round() / 1e3 } else { 0.0 }
+    };
+    shares.iter().zip(terms).map(told).collect()
 }
 
 /// What a view says of the terms' sizes beyond their common one.

@@ -95,26 +95,26 @@ impl Joint<'_> {
         Some(settled)
     }
 
-    /// The maps that predict the parts left out best. The smoothest within a standard error of them
-    /// (Breiman et al. 1984) were .01 to .04 raw units worse on a Kinect's other views: near by, where
-    /// the bias is largest, few parts say so, and the standard error is theirs.
+    /// The smoothest maps that predict the parts left out within a standard error of the best
+    /// (Breiman et al. 1984).
     fn best_maps(&self, terms: &[usize], camera: &Camera) -> Option<Settled> {
         let first = self.columns.terms;
         let diagonal = self.all.a.diagonal();
         let unit = diagonal.rows(first, self.columns.nodes / 2).mean();
-        let mut best: Option<Settled> = None;
+        let mut all: Vec<Settled> = Vec::new();
         for smoothness in SMOOTHNESS {
             let penalty = self.columns.penalty(camera, smoothness) * unit;
             let Some(without) = self.without(Some(&penalty)) else { continue };
             let scores = self.scores(&without, terms, |_| true);
-            let worse = best.as_ref().is_some_and(|b| total(&b.scores) > total(&scores));
+            let worse = all.last().is_some_and(|b| total(&b.scores) > total(&scores));
             if worse {
                 break;
             }
             let (terms, penalty) = (terms.to_vec(), Some(penalty));
-            best = Some(Settled { terms, penalty, without, scores, maps: 0.0, maps_p: 1.0 });
+            all.push(Settled { terms, penalty, without, scores, maps: 0.0, maps_p: 1.0 });
         }
-        best
+        let best = all.last()?.scores.clone();
+        all.into_iter().find(|s| behind(&best, &s.scores) < 1.0)
     }
 
     /// Terms that the maps make needless, the most needless first.

@@ -122,6 +122,22 @@ impl KnownTerms {
         scale + offset + drift
     }
 
+    /// What is left of the learnt terms' errors beside these parts: one standard deviation of every
+    /// coefficient, each for itself. Profiles of single lines are not among them.
+    pub fn own_errors(&self, statistic: Statistic) -> Vec<Term> {
+        let fitted = self.learnt.iter().filter(|(_, c)| !c.factors.is_empty());
+        let of = |(shape, covariance): &'_ (Vec<Term>, Covariance)| -> Vec<Term> {
+            let terms = by_term(shape, &covariance.variances);
+            let rooted = terms.map(|(t, mine)| Term {
+                coefficients: mine.iter().map(|v| v.sqrt()).collect(),
+                ..t.clone()
+            });
+            let any = |t: &Term| t.coefficients.iter().any(|c| *c > 0.0);
+            rooted.filter(|t| t.statistic == statistic && any(t)).collect()
+        };
+        fitted.flat_map(of).collect()
+    }
+
     /// Variance of what learnt profiles of single columns and rows may be off by, px^2.
     pub fn error_of_lines_px2(&self) -> f64 {
         let mean = |mine: &[f64]| mine.iter().sum::<f64>() / mine.len().max(1) as f64;
