@@ -43,7 +43,7 @@ pub struct Correction {
     /// Error of the disparity of each pixel whatever it sees, px; empty where there is none.
     still: Vec<f32>,
     locking: Option<Locking>,
-    /// What depends on more than the pixel, with the disparities that each is held beyond, px.
+    /// What depends on more than the pixel, with the disparities that each was learnt at, px.
     pub(super) terms: Vec<(Term, [f64; 2])>,
     pub(super) needs: Needs,
     pub(super) noise: Noise,
@@ -52,11 +52,6 @@ pub struct Correction {
     remarks: Vec<String>,
 }
 
-/// So much farther than the disparities that taught it a shape goes on with its law. Taught by the
-/// farther views of a Kinect, up to 35, 42, 55, 63, 75 or 79 px, two maps {1, disparity squared}
-/// left 1.24, 1.09, .96, 1.00, 1.01 and 1.17 raw units rms on its nearer views, and 1.32, 1.23, 1.10,
-/// 1.02, 1.00 and 1.20 when held at the edge; twice as far was no better.
-const REACH: f64 = 1.2;
 /// Of shapes that do not say where they were learnt.
 const ANYWHERE: [f64; 2] = [0.0, f64::INFINITY];
 
@@ -128,8 +123,8 @@ impl Correction {
         &self.ignored
     }
 
-    /// Disparities between which all that grows with the disparity follows its law, px.
-    pub(super) fn held_beyond_px(&self) -> Option<[f64; 2]> {
+    /// Disparities at which all that grows with the disparity was learnt, px.
+    pub(super) fn learnt_px(&self) -> Option<[f64; 2]> {
         let grows = |(t, _): &&(Term, [f64; 2])| t.basis.still_power().is_some();
         let ranges = self.terms.iter().filter(grows).map(|(_, learnt)| *learnt);
         let both = ranges.reduce(|a, b| [a[0].max(b[0]), a[1].min(b[1])])?;
@@ -161,7 +156,7 @@ impl Correction {
             return self.add_formula(entry);
         }
         let usable = |t: &&Term| t.is_sensor_bias() && !t.needs().light;
-        let learnt = entry.learnt_px.map_or(ANYWHERE, |[low, high]| [low / REACH, high * REACH]);
+        let learnt = entry.learnt_px.unwrap_or(ANYWHERE);
         self.terms.extend(entry.shape.iter().filter(usable).map(|t| (t.clone(), learnt)));
         self.uncertainty.add(entry, learnt, usable);
         if !entry.shape.iter().all(|t| usable(&t)) {

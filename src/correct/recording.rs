@@ -30,7 +30,7 @@ pub struct Corrected {
     pub changed: usize,
     /// Those whose corrected depth lies beyond the ends of the depth code.
     pub clamped: usize,
-    /// Pixels at disparities too far beyond those that the model was learnt at: held at the edge.
+    /// Pixels at disparities beyond those that the model was learnt at: held at the edge.
     pub beyond: usize,
     /// Root mean square over all measured pixels of what was taken out, m.
     pub rms_shift_m: f64,
@@ -282,7 +282,7 @@ impl Rewrite<'_> {
         let mut tally = Tally::default();
         let none = self.raw.code.raw(f64::NAN);
         // Half a px beyond is no other distance.
-        let beyond = self.correction.held_beyond_px().map(|[low, high]| {
+        let beyond = self.correction.learnt_px().map(|[low, high]| {
             [self.correction.scale_px_m / (high + 0.5), self.correction.scale_px_m / (low - 0.5)]
         });
         for (raw, (&z, &better)) in frame.raw.iter_mut().zip(before.iter().zip(after)) {
@@ -325,11 +325,10 @@ impl Rewrite<'_> {
             .extend(excluded.map(|e| format!("view {} is copied as it is: {}", e.view, e.reason)));
         remarks.extend(unread.iter().map(|why| format!("copied as it is: {why}")));
         let beyond = total(|t| t.beyond);
-        let reach = self.correction.held_beyond_px();
-        if let (Some([low, high]), true) = (reach, beyond * 100 > measured) {
+        if let (Some([low, high]), true) = (self.correction.learnt_px(), beyond * 100 > measured) {
             let metres = |px: f64| self.correction.scale_px_m / px;
             remarks.push(format!(
-                "{:.0} % of the depths lie outside {:.2} to {:.2} m (disparities of {high:.1} to {low:.1} px), a fifth more than where the correction was learnt: there it is held at the edge",
+                "{:.0} % of the depths lie outside {:.2} to {:.2} m (disparities of {high:.1} to {low:.1} px), where the correction was learnt: there it is held at the edge",
                 100.0 * beyond as f64 / measured.max(1) as f64,
                 metres(high),
                 metres(low)
