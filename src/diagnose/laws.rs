@@ -52,8 +52,9 @@ pub const FEWEST: usize = 5;
 /// Time constants of a warm-up, s.
 const WARM_UPS: [f64; 6] = [60.0, 180.0, 480.0, 1200.0, 2400.0, 7200.0];
 
-/// What the model knows of the laws is taken out. `levels` is what each view's disparity on the optical axis changes by once the found bias is
-/// taken out, px. All laws, with what each gains on references left out; empty where there are too few.
+/// What the model knows of the laws is taken out. `levels` is what each view's disparity on the
+/// optical axis changes by once the found bias is taken out, px. All laws, with what each gains on
+/// references left out; empty where there are too few.
 pub fn laws(fields: &[Field], levels: &[f64], known: &KnownTerms, second: &[bool]) -> Vec<Law> {
     let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
     let checked: Vec<Checked> = fields
