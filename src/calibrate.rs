@@ -201,6 +201,7 @@ fn noise_model(
             r2: fit.quality.r2,
             heldout: comparison.iter().find(|h| h.form == fit.form).map(|h| h.rmse_relative),
             remarks: fit.remarks.clone(),
+            searched: None,
         },
         provenance,
     }

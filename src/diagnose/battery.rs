@@ -12,11 +12,11 @@ use super::form::better_form;
 use super::hanging::Hanging;
 use super::heldout;
 use super::laws;
+use super::learnt::Learnt;
 use super::lines::lines;
-use super::missing::missing;
+use super::missing::{self, missing};
 use super::naming::temper;
 use super::next_view;
-use super::null::beside_model;
 use super::other_findings;
 use super::outcome::Outcome;
 use super::pixels::{typical_sigma_mm, typical_sigma_px};
@@ -144,8 +144,9 @@ impl Case<'_> {
     /// What neither a mean nor a variance shows: how the noise hangs together, tails, steps.
     fn texture(&self, mean: &Mean, scatter: &Scatter, steps: Vec<Finding>) -> Vec<Finding> {
         let sigma_mm = typical_sigma_mm(&self.fields);
-        let mixing = rim::mixing(&self.fields, self.level(Self::EACH_LEVEL))
-            .filter(|_| !self.known.has("edge-mixing"));
+        let mixing = rim::mixing(&self.fields, self.level(Self::EACH_LEVEL)).filter(|m| {
+            !self.known.has("edge-mixing") && self.stands(m.p, self.level(Self::EACH_LEVEL))
+        });
         let hangs = scatter.hangs.iter().cloned().chain(scatter.tails.clone()).chain(mixing);
         let second = self.survey.second();
         let told = |h: Hanging| {
@@ -228,7 +229,7 @@ impl Case<'_> {
         let found = lost
             .findings
             .into_iter()
-            .filter(|m| !m.family.is_some_and(known))
+            .filter(|m| !m.family.is_some_and(known) && self.stands(m.p, missing::LEVEL))
             .filter(|m| baseline.is_none_or(|b| !b.loses_alike(m, &self.survey)))
             .map(other_findings::missing)
             .collect();
@@ -246,10 +247,15 @@ impl Case<'_> {
         let anchored: Vec<Term> =
             bias.iter().filter(|t| t.basis.is_nothing_ahead()).cloned().collect();
         let views = self.fields.len() as f64;
-        let excess = self.survey.learnt_from[0].map_or(1.0, |others| beside_model(views, others));
+        // The levels are off with the model's bias; and its own references, if any, left a law open.
+        let of_bias = self.learnt_from[0].map(|l| Learnt { searched: false, ..l }.excess(views));
+        let theirs = Learnt::references(self.model).filter(|_| self.learnt_from[1].is_some());
+        let ours = self.fields.iter().filter(|f| f.reference_distance_m.is_some()).count();
+        let of_laws = theirs.map(|l| l.excess(ours as f64));
+        let excess = of_bias.unwrap_or(1.0).max(of_laws.unwrap_or(1.0));
         let found = |terms: &[Term]| {
             let levels = heldout::levels(&self.survey, terms);
-            let laws = laws::laws(&self.fields, &levels, &self.survey.second());
+            let laws = laws::laws(&self.fields, &levels, &self.known, &self.survey.second());
             let level = self.level(Self::LAWS_LEVEL);
             reference::findings(&laws, &self.known, excess, level, self.options.seed)
         };

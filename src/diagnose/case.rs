@@ -1,5 +1,7 @@
 //! A diagnosis under way: the views as they were read, and the searches of their mean and scatter.
 
+use std::sync::Arc;
+
 use super::ablation::Ablation;
 use super::against::Baseline;
 use super::diagnosis::Finding;
@@ -9,6 +11,7 @@ use super::hanging::Hanging;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
 use super::layers::Survey;
+use super::learnt::Learnt;
 use super::noise::hanging;
 use super::outcome::Outcome;
 use super::pixels::{common, mean_of, measure_tails, pixel_terms, terms_of};
@@ -41,7 +44,7 @@ pub struct Case<'a> {
     /// Found while reading: the words are ranges.
     pub ranges: Option<Finding>,
     /// Views that the model's bias, and its sigma, were learnt from, where these are others.
-    learnt_from: [Option<f64>; 2],
+    pub learnt_from: [Option<Learnt>; 2],
     /// The model has what a first run found.
     pub extended: bool,
 }
@@ -184,7 +187,8 @@ impl<'a> Case<'a> {
             baseline.compare(&mut structure, &lattice, &mut self.known);
             found.iter().for_each(|found| self.known.overrule(found));
         }
-        let hangs = hanging(&structure, &self.known, each);
+        let mut hangs = hanging(&structure, &self.known, each);
+        hangs.retain(|h| self.stands(h.p, each));
         self.survey.compare_frames(&self.fields, common(&structure, &hangs, &self.known));
         let compared =
             self.baseline.as_mut().is_some_and(|baseline| baseline.variances(&mut self.survey));
@@ -212,8 +216,16 @@ impl<'a> Case<'a> {
             || self.survey.refits_sigma && !terms.iter().all(holds)
             || self.known.has_uneven_noise()
             || !self.known.variance.iter().all(holds);
-        let tails = tails(&structure, &self.known, each, uneven).filter(|_| !alike);
+        let tails = tails(&structure, &self.known, each, uneven)
+            .filter(|t| !alike && self.stands(t.p, each));
         Scatter { structure, lattice, hangs, tails, outcome }
+    }
+
+    /// Is this chance, of noise alone, small enough where the model's own views left something open
+    /// as well?
+    pub fn stands(&self, p: f64, level: f64) -> bool {
+        let views = self.fields.len() as f64;
+        self.learnt_from[1].map_or(p, |model| model.p(p, views)) <= level
     }
 
     /// A refit that makes sigma much smaller somewhere rests on noise that steps have swallowed, or
@@ -243,7 +255,7 @@ fn survey(
     bench: &Workbench<'_>,
     baseline: Option<&Baseline>,
     options: &DiagnoseOptions,
-    (learnt_from, known): ([Option<f64>; 2], &KnownTerms),
+    (learnt_from, known): ([Option<Learnt>; 2], &KnownTerms),
 ) -> Survey {
     let camera = &bench.sensor.camera;
     let mut survey = Survey::of(fields, camera, &bench.rays);
@@ -254,6 +266,10 @@ fn survey(
         baseline.means(&mut survey);
     }
     survey.learnt_from = learnt_from;
+    if learnt_from[1].is_some() {
+        let of = |statistic| known.between_views(statistic);
+        survey.between = Arc::new([of(Statistic::Bias), of(Statistic::Variance)]);
+    }
     if learnt_from[0].is_some() {
         survey.forgive_bias(known);
     }
@@ -266,8 +282,8 @@ fn learnt_from(
     known: &KnownTerms,
     options: &DiagnoseOptions,
     against: bool,
-) -> [Option<f64>; 2] {
-    let others = !against && !options.calibrated_here && model.fit.views > 0;
-    let views = others.then_some(model.fit.views as f64);
-    [views.filter(|_| known.bias_is_learnt()), views]
+) -> [Option<Learnt>; 2] {
+    let others = !against && !options.calibrated_here;
+    let learnt = Learnt::of(model).filter(|_| others);
+    [learnt.filter(|l| l.searched || known.bias_is_learnt()), learnt]
 }

@@ -1,6 +1,7 @@
 //! From findings to the diagnosis.
 
 use super::battery::Battery;
+use super::between::between;
 use super::case::Case;
 use super::detectable::detectable;
 use super::diagnosis::{DIAGNOSIS_FORMAT, Detectable, Diagnosis, HeldOut, MapRow, Reference};
@@ -11,7 +12,8 @@ use super::outcome::Outcome;
 use super::reference;
 use super::verdict::{extend, not_identifiable, shares, untested, verdict, view_lines};
 use crate::effects::KINECT_BASELINE_M;
-use crate::model::Form;
+use crate::model::{Effect, Form, NoiseModel, Searched};
+use crate::terms::{Statistic, Term};
 
 impl Case<'_> {
     fn remarks(&mut self) -> Vec<String> {
@@ -47,7 +49,10 @@ impl Case<'_> {
         remarks.extend(untested(outcomes));
         remarks.extend(better_form);
         let told = found.iter().chain(&refitted);
-        let extended = extend(self.model, told, self.sensor(), self.survey.reach.disparity);
+        let mut extended = extend(self.model, told, self.sensor(), self.survey.reach.disparity);
+        if self.baseline.is_none() {
+            self.sample(&mut extended);
+        }
         let views = view_lines(&self.fields, &self.survey, &mean.terms, heldout.as_ref());
         let left_out = heldout::left_out(&self.survey, &mean.outcome, &mean.terms);
         let recording = self.recording.root.display().to_string();
@@ -78,6 +83,34 @@ impl Case<'_> {
             excluded,
             against: again.against,
         }
+    }
+
+    /// What `extended` learnt here rests on: how its terms differ from view to view, and how much was
+    /// looked at.
+    fn sample(&self, extended: &mut NoiseModel) {
+        let added = &mut extended.effects[self.model.effects.len()..];
+        for statistic in [Statistic::Bias, Statistic::Variance] {
+            let concerned = |e: &&mut Effect| e.shape.iter().all(|t| t.statistic == statistic);
+            let mut mine: Vec<&mut Effect> = added.iter_mut().filter(concerned).collect();
+            let terms: Vec<Term> = mine.iter().flat_map(|e| e.shape.iter().cloned()).collect();
+            if terms.is_empty() {
+                continue;
+            }
+            let views = match statistic {
+                Statistic::Bias => self.survey.coarse_mean_data(),
+                _ => self.survey.variance_data(),
+            };
+            let mut shares = between(&views, &terms).into_iter();
+            for effect in &mut mine {
+                effect.between_views = shares.by_ref().take(effect.shape.len()).collect();
+            }
+        }
+        let references = self.fields.iter().filter(|f| f.reference_distance_m.is_some()).count();
+        let before = self.model.fit.searched.unwrap_or_default();
+        extended.fit.searched = Some(Searched {
+            views: before.views.max(self.fields.len()),
+            references: before.references.max(references),
+        });
     }
 
     fn reference(&self) -> Reference {

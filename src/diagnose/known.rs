@@ -19,6 +19,8 @@ pub struct KnownTerms {
     entries: Vec<(String, Map<String, Value>)>,
     /// Fitted shapes with the covariance of their coefficients.
     learnt: Vec<(Vec<Term>, Covariance)>,
+    /// What terms differ by from view to view: one standard deviation of each.
+    scatter: Vec<Term>,
 }
 
 impl KnownTerms {
@@ -44,6 +46,8 @@ impl KnownTerms {
                 let covariance = entry.covariance.clone().unwrap_or_default();
                 known.learnt.push((entry.shape.clone(), covariance));
             }
+            let shares = entry.shape.iter().zip(&entry.between_views);
+            known.scatter.extend(shares.filter(|(_, s)| **s > 0.0).map(|(t, s)| t.times(*s)));
             known.entries.push((entry.id.clone(), entry.parameters.clone()));
         }
         known
@@ -87,6 +91,11 @@ impl KnownTerms {
         self.has(UNEXPLAINED) && self.variance.iter().any(nameless)
     }
 
+    /// What single views differ from the known terms by: one standard deviation of each.
+    pub fn between_views(&self, statistic: Statistic) -> Vec<Term> {
+        self.scatter.iter().filter(|t| t.statistic == statistic).cloned().collect()
+    }
+
     /// What the learnt terms may be off by: terms that err together, by one standard deviation.
     pub fn errors(&self, statistic: Statistic) -> Vec<Vec<Term>> {
         let mut parts: BTreeMap<(u32, usize), Vec<Term>> = BTreeMap::new();
@@ -101,6 +110,32 @@ impl KnownTerms {
             }
         }
         parts.into_values().filter(|part| !part.is_empty()).collect()
+    }
+
+    /// What the known laws of the distance make of a depth, m.
+    pub fn law_m(&self, z: f64, session_s: f64, px_m: f64) -> f64 {
+        let of = |id, name| self.parameter(id, name);
+        let scale = of("depth-scale", "scale").map_or(0.0, |scale| (scale - 1.0) * z);
+        let offset = of("disparity-offset", "offset_px").map_or(0.0, |px| -px * z * z / px_m);
+        let warmth = of("thermal-drift", "time_constant_s").map(|tau| -(-session_s / tau).exp_m1());
+        let drift = of("thermal-drift", "relative").zip(warmth).map_or(0.0, |(r, w)| r * w * z);
+        scale + offset + drift
+    }
+
+    /// What is left of the learnt terms' errors beside these parts: one standard deviation of every
+    /// coefficient, each for itself. Profiles of single lines are not among them.
+    pub fn own_errors(&self, statistic: Statistic) -> Vec<Term> {
+        let fitted = self.learnt.iter().filter(|(_, c)| !c.factors.is_empty());
+        let of = |(shape, covariance): &'_ (Vec<Term>, Covariance)| -> Vec<Term> {
+            let terms = by_term(shape, &covariance.variances);
+            let rooted = terms.map(|(t, mine)| Term {
+                coefficients: mine.iter().map(|v| v.sqrt()).collect(),
+                ..t.clone()
+            });
+            let any = |t: &Term| t.coefficients.iter().any(|c| *c > 0.0);
+            rooted.filter(|t| t.statistic == statistic && any(t)).collect()
+        };
+        fitted.flat_map(of).collect()
     }
 
     /// Variance of what learnt profiles of single columns and rows may be off by, px^2.

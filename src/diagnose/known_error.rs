@@ -17,37 +17,81 @@ use super::variance::error_of_sigma;
 use crate::model::SigmaModel;
 use crate::terms::{PixelContext, Statistic, Term};
 
-/// Chance that a model which is right is said not to hold within its own error.
+/// Chance that a model which is right differs by more than its own error.
 const LEVEL: f64 = 1e-3;
 
-/// A part of the model's error: terms that err together, by a standard normal number times these.
-type Part = Vec<Term>;
+/// What the model may be off by: parts that err together, by a standard normal number times their
+/// terms, and terms of which every coefficient errs for itself.
+#[derive(Default)]
+struct Errors {
+    parts: Vec<Vec<Term>>,
+    own: Vec<Term>,
+}
 
-fn value(part: &Part, place: &PixelContext, row: &mut Vec<f64>) -> f64 {
+fn value(part: &[Term], place: &PixelContext, row: &mut Vec<f64>) -> f64 {
     part.iter().map(|t| t.value(place, row)).sum()
 }
 
-/// By how much of each part the views differ from the model: the posterior mean. `None` where that
-/// is more than its error explains, or there is nothing to say.
-fn settled(data: &[ViewData], parts: &[Part]) -> Option<Vec<f64>> {
-    if parts.is_empty() {
-        return None;
+impl Errors {
+    fn of(known: &KnownTerms, statistic: Statistic) -> Self {
+        Errors { parts: known.errors(statistic), own: known.own_errors(statistic) }
     }
-    let of = |view: &ViewData| -> Option<Evidence> {
-        let width = view.precision.len();
-        let rows = Rows::new(&view.response, &view.weight, &view.nuisance, width, &view.precision)?;
-        let mut scratch = Vec::new();
-        Some(rows.reduce(parts.len(), |i, g| {
-            for (g, part) in g.iter_mut().zip(parts) {
-                *g = value(part, &view.places[i], &mut scratch);
-            }
-        }))
-    };
-    let evidence: Vec<Evidence> = data.par_iter().filter_map(of).collect();
-    let n = parts.len();
-    let Evidence { a, b } = Evidence::sum(n, 0.0, &evidence);
+
+    fn count(&self) -> usize {
+        self.parts.len() + self.own.iter().map(|t| t.coefficients.len()).sum::<usize>()
+    }
+
+    fn fill(&self, place: &PixelContext, columns: &mut [f64], row: &mut Vec<f64>) {
+        let (together, mut rest) = columns.split_at_mut(self.parts.len());
+        together.iter_mut().zip(&self.parts).for_each(|(g, part)| *g = value(part, place, row));
+        for term in &self.own {
+            let (mine, others) = rest.split_at_mut(term.coefficients.len());
+            term.basis.fill(place, mine);
+            mine.iter_mut().zip(&term.coefficients).for_each(|(g, sd)| *g *= sd);
+            rest = others;
+        }
+    }
+
+    /// By how much the views differ from the model along each column: the posterior mean, or, where
+    /// that is more than the model's error explains, the part of it that its error does; as terms.
+    /// Empty where there is nothing to say.
+    fn settled(&self, data: &[ViewData]) -> Vec<Term> {
+        let n = self.count();
+        let of = |view: &ViewData| -> Option<Evidence> {
+            let width = view.precision.len();
+            let rows =
+                Rows::new(&view.response, &view.weight, &view.nuisance, width, &view.precision)?;
+            let mut row = Vec::new();
+            Some(rows.reduce(n, |i, g| self.fill(&view.places[i], g, &mut row)))
+        };
+        if n == 0 {
+            return Vec::new();
+        }
+        let evidence: Vec<Evidence> = data.par_iter().filter_map(of).collect();
+        nearest(&evidence, n).map_or_else(Vec::new, |by| self.times(by.as_slice()))
+    }
+
+    fn times(&self, by: &[f64]) -> Vec<Term> {
+        let (together, mut rest) = by.split_at(self.parts.len());
+        let scaled = |(part, by): (&Vec<Term>, &f64)| -> Vec<Term> {
+            part.iter().map(|t| t.times(*by)).collect()
+        };
+        let mut terms: Vec<Term> = self.parts.iter().zip(together).flat_map(scaled).collect();
+        for term in &self.own {
+            let (mine, others) = rest.split_at(term.coefficients.len());
+            let coefficients = mine.iter().zip(&term.coefficients).map(|(b, sd)| b * sd).collect();
+            terms.push(Term { coefficients, ..term.clone() });
+            rest = others;
+        }
+        terms
+    }
+}
+
+/// The posterior mean of standard normal numbers, held within what chance gives them.
+fn nearest(evidence: &[Evidence], n: usize) -> Option<DVector<f64>> {
+    let Evidence { a, b } = Evidence::sum(n, 0.0, evidence);
     // The new views scatter beyond their noise, too.
-    let dispersion = Null::of(&evidence, 0, 1.0)?.about_fit;
+    let dispersion = Null::of(evidence, 0, 1.0)?.about_fit;
     let (a, b) = (a / dispersion, b / dispersion);
     let eigen = a.symmetric_eigen();
     let along = eigen.eigenvectors.transpose() * b;
@@ -55,24 +99,24 @@ fn settled(data: &[ViewData], parts: &[Part]) -> Option<Vec<f64>> {
     // A score of information l has the variance l + l^2 where the part itself has that of one.
     let square: f64 = seen().map(|(b, l)| b * b / (l + l * l)).sum();
     let limit = ChiSquared::new(seen().count().max(1) as f64).ok()?.inverse_cdf(1.0 - LEVEL);
-    if square > limit {
-        return None;
-    }
-    let shrunk = DVector::from_fn(n, |k, _| along[k] / (1.0 + eigen.eigenvalues[k].max(0.0)));
-    Some((eigen.eigenvectors * shrunk).as_slice().to_vec())
+    // Of a difference so many times as large as the model's error the rest is the views' own.
+    let within = (limit / square.max(limit)).sqrt();
+    let shrunk =
+        DVector::from_fn(n, |k, _| within * along[k] / (1.0 + eigen.eigenvalues[k].max(0.0)));
+    Some(eigen.eigenvectors * shrunk)
 }
 
 impl Survey {
     /// Take out of the views' means what the model's biases may be off by.
     pub fn forgive_bias(&mut self, known: &KnownTerms) {
-        let parts = known.errors(Statistic::Bias);
-        let data = self.coarse_mean_data();
-        let Some(by) = settled(&data, &parts) else { return };
+        let off = Errors::of(known, Statistic::Bias).settled(&self.coarse_mean_data());
+        if off.is_empty() {
+            return;
+        }
         self.views.par_iter_mut().for_each(|view| {
             let mut row = Vec::new();
             for t in Arc::make_mut(&mut view.tiles) {
-                let of = |(part, by): (&Part, &f64)| by * value(part, &t.place, &mut row);
-                let off: f64 = parts.iter().zip(&by).map(of).sum();
+                let off = value(&off, &t.place, &mut row);
                 t.square += off * (off - 2.0 * t.mean);
                 t.mean -= off;
             }
@@ -81,15 +125,16 @@ impl Survey {
 
     /// The same for the size of the noise: sigma's own error and that of known terms.
     pub fn forgive_variance(&mut self, known: &KnownTerms, sigma: &SigmaModel) {
-        let mut parts = known.errors(Statistic::Variance);
-        parts.extend(error_of_sigma(&self.reach, sigma));
-        let data = self.variance_data();
-        let Some(by) = settled(&data, &parts) else { return };
+        let mut errors = Errors::of(known, Statistic::Variance);
+        errors.parts.extend(error_of_sigma(&self.reach, sigma));
+        let off = errors.settled(&self.variance_data());
+        if off.is_empty() {
+            return;
+        }
         self.views.par_iter_mut().for_each(|view| {
             let mut row = Vec::new();
             for t in Arc::make_mut(&mut view.tiles) {
-                let of = |(part, by): (&Part, &f64)| by * value(part, &t.place, &mut row);
-                let factor = parts.iter().zip(&by).map(of).sum::<f64>().exp();
+                let factor = value(&off, &t.place, &mut row).exp();
                 t.variance *= factor;
                 t.place.variance *= factor;
             }

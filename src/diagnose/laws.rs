@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::evidence::{Evidence, gain};
 use super::field::Field;
+use super::known::KnownTerms;
 use super::null::Null;
 use super::replication::{Measured, agree};
 use super::scatter::{Left, left_by_fit};
@@ -53,9 +54,10 @@ pub const FEWEST: usize = 5;
 /// Time constants of a warm-up, s.
 const WARM_UPS: [f64; 6] = [60.0, 180.0, 480.0, 1200.0, 2400.0, 7200.0];
 
-/// `levels` is what each view's disparity on the optical axis changes by once the found bias is
-/// taken out, px. All laws, with what each gains on references left out; empty where there are too few.
-pub fn laws(fields: &[Field], levels: &[f64], second: &[bool]) -> Vec<Law> {
+/// What the model knows of the laws is taken out. `levels` is what each view's disparity on the
+/// optical axis changes by once the found bias is taken out, px. All laws, with what each gains on
+/// references left out; empty where there are too few.
+pub fn laws(fields: &[Field], levels: &[f64], known: &KnownTerms, second: &[bool]) -> Vec<Law> {
     let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
     let checked: Vec<Checked> = fields
         .iter()
@@ -64,21 +66,14 @@ pub fn laws(fields: &[Field], levels: &[f64], second: &[bool]) -> Vec<Law> {
         .filter_map(|((f, level), &second)| {
             // The plane had bent towards what is now known to be a bias.
             let z = f.scale_px_m / (f.scale_px_m * f.plane.q.z + level);
-            let off = z - f.reference_distance_m?;
+            let session_s = f.time_s - start;
+            let off = z - f.reference_distance_m? - known.law_m(z, session_s, f.scale_px_m);
             let sigma_px = f64::from(f.sigma.get(f.sigma.len() / 2).copied()?);
             let sigma_m = sigma_px * z * z / f.scale_px_m;
             let steep = f.plane.theta().tan();
             let (sin, cos) = f.plane.azimuth().sin_cos();
             let slope = [steep * cos, steep * sin];
-            Some(Checked {
-                z,
-                slope,
-                off,
-                session_s: f.time_s - start,
-                px_m: f.scale_px_m,
-                sigma_m,
-                second,
-            })
+            Some(Checked { z, slope, off, session_s, px_m: f.scale_px_m, sigma_m, second })
         })
         .collect();
     if checked.len() < FEWEST { Vec::new() } else { of(&checked) }

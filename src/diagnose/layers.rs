@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::ablation::Ablation;
 use super::blocks::{Blocks, MODEL_TOLERANCE, view_scatter};
 use super::field::Field;
+use super::learnt::Learnt;
 use super::light::{Light, relative_light};
 use super::replication::halves;
 use super::samples::{ViewData, coarser};
@@ -14,7 +15,7 @@ use super::surveyed_view::{SurveyedView, independent_frames, inflation, mean_dat
 use super::tiles::tiles;
 use crate::camera::{Camera, Rays};
 use crate::stats::Correlation;
-use crate::terms::{Extent, PixelContext};
+use crate::terms::{Extent, PixelContext, Term};
 
 /// The tiles of all views, with how much each view is worth.
 pub struct Survey {
@@ -28,7 +29,10 @@ pub struct Survey {
     /// Sigma was calibrated on these very views: it is refitted beside every hypothesis.
     pub refits_sigma: bool,
     /// Views that the model's bias, and its sigma, were learnt from, where these are others.
-    pub learnt_from: [Option<f64>; 2],
+    pub learnt_from: [Option<Learnt>; 2],
+    /// What single views differ from the model by, one standard deviation a term: of the mean, and of
+    /// the variance.
+    pub between: Arc<[Vec<Term>; 2]>,
     pub ablation: Ablation,
 }
 
@@ -66,25 +70,27 @@ impl Survey {
             tolerance,
             refits_sigma: false,
             learnt_from: [None; 2],
+            between: Arc::default(),
             ablation,
         }
     }
 
     /// The views' mean residuals, about a plane of their own each.
     pub fn mean_data(&self) -> Vec<ViewData> {
-        self.views.par_iter().map(mean_data).collect()
+        self.views.par_iter().map(|v| mean_data(v).beside(&self.between[0])).collect()
     }
 
     /// The same in larger patches.
     pub fn coarse_mean_data(&self) -> Vec<ViewData> {
-        self.views.par_iter().map(|v| coarser(&mean_data(v))).collect()
+        let coarse = |v| coarser(&mean_data(v)).beside(&self.between[0]);
+        self.views.par_iter().map(coarse).collect()
     }
 
     /// The views at these places.
     pub fn subset(&self, which: &[usize]) -> Survey {
         let views: Vec<SurveyedView> = which.iter().map(|&n| self.views[n].clone()).collect();
         let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter().map(|t| &t.place)));
-        let mut part = Survey { views, reach, ..*self };
+        let mut part = Survey { views, reach, between: self.between.clone(), ..*self };
         part.ask_no_certainty();
         part
     }
@@ -162,7 +168,7 @@ impl Survey {
     pub fn variance_data(&self) -> Vec<ViewData> {
         let blocks: Vec<Blocks> = self.views.par_iter().map(Blocks::of).collect();
         let scatter = view_scatter(&blocks, self.tolerance);
-        blocks.into_iter().map(|b| b.data(scatter)).collect()
+        blocks.into_iter().map(|b| b.data(scatter).beside(&self.between[1])).collect()
     }
 
     /// Which half each view is in.

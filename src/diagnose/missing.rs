@@ -60,7 +60,7 @@ pub struct DropoutOutcome {
 /// Fewer views show no rule.
 const FEWEST_VIEWS: usize = 4;
 /// Chance of a finding on a clean recording: the steps and curves, and the shadow.
-const LEVEL: f64 = 0.001;
+pub const LEVEL: f64 = 0.001;
 const SHADOW_LEVEL: f64 = 0.0005;
 /// A name must explain this share of what the best nameless curve does.
 pub const ADEQUATE: f64 = 0.6;

@@ -202,6 +202,8 @@ pub fn outlook<'a>(
     if worths.is_empty() {
         return None;
     }
+    // Of the view's own nuisances; how known terms scatter is nothing to plan by.
+    let own = if scene.statistic == Statistic::Bias { 3 } else { 1 };
     Some(Outlook {
         statistic: scene.statistic,
         camera,
@@ -210,7 +212,7 @@ pub fn outlook<'a>(
         sigma,
         reach: &scene.survey.reach,
         worth: f64::from(crate::stats::median_in_place(&mut worths)),
-        precision: scene.data.first()?.precision.clone(),
+        precision: scene.data.first()?.precision[..own].to_vec(),
     })
 }
 

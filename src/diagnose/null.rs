@@ -47,10 +47,25 @@ impl Null {
     /// their scatter is the noise; it was measured on few views, which makes a Student's t of a
     /// Gaussian.
     pub fn safe(&self, gain: f64, views: usize, rules: &Rules) -> f64 {
-        let views = views as f64;
-        let Some(learnt_from) = rules.learnt_from else { return gain / self.dispersion };
-        let nats = gain / (self.about_fit * beside_model(views, learnt_from));
-        if nats > 0.0 { student(nats, (views - 1.0).max(1.0)) } else { nats }
+        let nats = gain / self.excess(views, rules);
+        let judged_by_t = rules.learnt_from.is_some() && nats > 0.0;
+        if judged_by_t { student(nats, freedom(views)) } else { nats }
+    }
+
+    /// The gain that counts for so many nats: the other way round.
+    pub fn gain_for(&self, safe: f64, views: usize, rules: &Rules) -> f64 {
+        let nats = if rules.learnt_from.is_some() { gaussian(safe, freedom(views)) } else { safe };
+        nats * self.excess(views, rules)
+    }
+
+    /// How much further than by their noise so many views may be off, in variance.
+    fn excess(&self, views: usize, rules: &Rules) -> f64 {
+        self.scatter(rules) * rules.learnt_from.map_or(1.0, |model| model.excess(views as f64))
+    }
+
+    /// The views' own scatter that counts, over their noise.
+    pub fn scatter(&self, rules: &Rules) -> f64 {
+        if rules.learnt_from.is_some() { self.about_fit } else { self.dispersion }
     }
 
     /// The gain of one recording of nothing but noise, nats.
@@ -73,15 +88,19 @@ impl Null {
     }
 }
 
+/// Degrees of freedom of a scatter about a mean.
+fn freedom(views: usize) -> f64 {
+    (views as f64 - 1.0).max(1.0)
+}
+
 /// Nats of a Gaussian whose error was measured with so many degrees of freedom: of a Student's t.
 pub fn student(nats: f64, freedom: f64) -> f64 {
     0.5 * freedom * (2.0 * nats / freedom).ln_1p()
 }
 
-/// How much further than by their own error so many views may be off from a model that others
-/// taught, in variance.
-pub fn beside_model(views: f64, learnt_from: f64) -> f64 {
-    1.0 + views / learnt_from
+/// The other way round.
+fn gaussian(nats: f64, freedom: f64) -> f64 {
+    0.5 * freedom * (2.0 * nats / freedom).exp_m1()
 }
 
 /// Information and score of each view.
@@ -243,5 +262,36 @@ impl NoiseGains {
         }
         let above = self.0.len() - self.0.partition_point(|g| *g < gain);
         (above as f64 / self.0.len() as f64).max(TAIL)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::learnt::Learnt;
+    use super::*;
+
+    /// What `detectable` asks for is what the search lets pass, with a model of other views and
+    /// without.
+    #[test]
+    fn the_gain_for_so_many_nats_counts_for_as_many() {
+        let (by_view, total) = (Vec::new(), Vec::new());
+        let null = Null { by_view, total, prior: 1.0, dispersion: 1.5, about_fit: 3.0 };
+        let rules = |learnt_from| Rules {
+            level: 0.01,
+            prior: 1.0,
+            adequacy: 0.6,
+            max_terms: 1,
+            fixed: None,
+            least: 0.0,
+            calibrated: true,
+            learnt_from,
+        };
+        let other = |searched| Some(Learnt { views: 20.0, searched });
+        for (learnt_from, factor) in [(None, 0.99), (other(false), 2.0), (other(true), 4.0)] {
+            let rules = rules(learnt_from);
+            let gain = null.gain_for(7.0, 12, &rules);
+            approx::assert_relative_eq!(null.safe(gain, 12, &rules), 7.0, max_relative = 1e-12);
+            assert!(gain > factor * null.dispersion * 7.0, "{gain}");
+        }
     }
 }

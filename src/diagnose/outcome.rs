@@ -2,6 +2,7 @@
 
 use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain};
+use super::learnt::Learnt;
 use super::null::NoiseGains;
 use super::replication::Halves;
 use crate::model::Covariance;
@@ -26,7 +27,7 @@ pub struct Rules {
     pub calibrated: bool,
     /// Views that the model was learnt from, where these views are not among them: its own error is
     /// theirs scattered about their mean, and stands beside the error of these.
-    pub learnt_from: Option<f64>,
+    pub learnt_from: Option<Learnt>,
 }
 
 /// A family beside the one that was chosen.

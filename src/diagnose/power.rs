@@ -73,10 +73,11 @@ impl Gates<'_> {
         let terms: Vec<Term> = beside.into_iter().chain([unit.clone()]).collect();
         let views = evidence_of(&self.left(), &terms);
         let u = DVector::from_vec([vec![0.0; m], unit.coefficients.clone()].concat());
-        let dispersion = Null::of(&views, m, self.rules.prior)?.dispersion;
+        let null = Null::of(&views, m, self.rules.prior)?;
+        let dispersion = null.scatter(&self.rules);
         let first = self.outcome.chosen.first().map_or(0.0, |c| c.gain);
-        let need =
-            (dispersion * self.outcome.noise.threshold(self.rules.level)).max(LEAST_SHARE * first);
+        let threshold = self.outcome.noise.threshold(self.rules.level);
+        let need = null.gain_for(threshold, views.len(), &self.rules).max(LEAST_SHARE * first);
         let sum = Evidence::sum(u.len(), 0.0, &views).a;
         let information = u.dot(&(&sum * &u));
         if !need.is_finite() || information <= 0.0 {

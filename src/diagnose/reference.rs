@@ -43,7 +43,8 @@ pub fn findings(
     let Some(best) = laws.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)) else {
         return Vec::new();
     };
-    let small = best.rms_m < (CLEARLY * best.error_m).max(LEAST_M);
+    // So large a law may be missing in the model, too, where it was learnt from references.
+    let small = best.rms_m < (CLEARLY * best.error_m * excess.sqrt()).max(LEAST_M);
     if small || safe(best) < noise.threshold(level) || known.has(best.family) {
         return Vec::new();
     }

@@ -1,7 +1,7 @@
 //! The samples that a search works on.
 
 use super::tiles::SIDE;
-use crate::terms::PixelContext;
+use crate::terms::{PixelContext, Term};
 
 /// One view's samples.
 #[derive(Clone)]
@@ -15,6 +15,28 @@ pub struct ViewData {
     pub precision: Vec<f64>,
     /// For larger patches: which of them each sample of the finer data went to.
     pub gathered: Vec<u32>,
+}
+
+impl ViewData {
+    /// With these terms beside the view's own nuisances: each is there by a standard normal number.
+    pub fn beside(mut self, terms: &[Term]) -> Self {
+        if terms.is_empty() {
+            return self;
+        }
+        let mut row = Vec::new();
+        let own = self.nuisance.chunks_exact(self.precision.len()).zip(&self.places);
+        let with = |(own, place): (&[f64], &PixelContext)| {
+            let more = terms.iter().map(|t| finite(t.value(place, &mut row)));
+            own.iter().copied().chain(more).collect::<Vec<f64>>()
+        };
+        self.nuisance = own.flat_map(with).collect();
+        self.precision.extend(terms.iter().map(|_| 1.0));
+        self
+    }
+}
+
+pub fn finite(v: f64) -> f64 {
+    if v.is_finite() { v } else { 0.0 }
 }
 
 /// Two tiles by two made one.

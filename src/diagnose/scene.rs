@@ -67,6 +67,7 @@ fn level(view: &ViewData, values: &mut [f64]) {
             }
         }
     }
+    view.precision.iter().enumerate().for_each(|(q, held)| a[(q, q)] += held);
     let Some(fit) = a.lu().solve(&b) else { return };
     for (row, y) in view.nuisance.chunks_exact(p).zip(values) {
         *y -= row.iter().zip(fit.iter()).map(|(x, c)| x * c).sum::<f64>();

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::field::Field;
-use super::samples::ViewData;
+use super::samples::{ViewData, finite};
 use super::smooth::{SMOOTH_PX, high_pass};
 use super::tiles::Tile;
 use crate::stats::{Correlation, measure_correlation};
@@ -73,8 +73,4 @@ pub fn mean_data(view: &SurveyedView) -> ViewData {
         precision: vec![0.0; 3],
         gathered: Vec::new(),
     }
-}
-
-fn finite(v: f64) -> f64 {
-    if v.is_finite() { v } else { 0.0 }
 }

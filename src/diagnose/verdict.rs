@@ -214,7 +214,8 @@ pub(super) fn extend<'a>(
         let covariance = Covariance { fit: fit + u32::from(!bias), ..f.covariance.clone() };
         let covariance = (!covariance.is_empty()).then(|| covariance.rounded());
         let id = id.into();
-        extended.effects.push(Effect { id, parameters, shape, learnt_px, covariance });
+        let effect = Effect { id, parameters, shape, learnt_px, covariance, ..Effect::default() };
+        extended.effects.push(effect);
     }
     extended
 }

@@ -23,6 +23,10 @@ pub struct Effect {
     /// Of the shape's coefficients.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance: Option<Covariance>,
+    /// How much each term of the shape differs from view to view: the standard deviation of its size,
+    /// as a share of it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub between_views: Vec<f64>,
 }
 
 /// The id of what has no name: its shape is all that is known.
@@ -43,6 +47,11 @@ impl Effect {
             let fault = term.fault()?;
             Some(format!("effect {}: term {} of its shape: {fault}", self.id, k + 1))
         });
+        let scatter = &self.between_views;
+        let a_term = scatter.is_empty() || scatter.len() == self.shape.len();
+        if !(a_term && scatter.iter().all(|s| *s >= 0.0 && s.is_finite())) {
+            return Some(format!("effect {}: between_views is not one share a term", self.id));
+        }
         of_shape.or_else(|| {
             let coefficients = self.shape.iter().map(|t| t.coefficients.len()).sum();
             let fault = self.covariance.as_ref()?.fault(coefficients)?;
@@ -111,6 +120,27 @@ mod tests {
         assert_eq!(effect.fault(), None);
         let text = serde_json::to_string(&effect).unwrap();
         assert_eq!(serde_json::from_str::<Effect>(&text).unwrap(), effect);
+    }
+
+    /// Of an older file, of this one, and what makes no sense.
+    #[test]
+    fn the_scatter_between_views_is_a_share_a_term() {
+        let of = |between_views| {
+            let shape = vec![term(Basis::Level), term(Basis::relief(4))];
+            Effect { id: UNEXPLAINED.into(), shape, between_views, ..Effect::default() }
+        };
+        for (scatter, good) in [
+            (vec![], true),
+            (vec![0.0, 0.3], true),
+            (vec![0.3], false),
+            (vec![0.3, -0.1], false),
+            (vec![0.3, f64::NAN], false),
+        ] {
+            assert_eq!(of(scatter.clone()).fault().is_none(), good, "{scatter:?}");
+        }
+        let text = serde_json::to_string(&of(vec![])).unwrap();
+        assert!(!text.contains("between_views"), "{text}");
+        assert_eq!(serde_json::from_str::<Effect>(&text).unwrap(), of(vec![]));
     }
 
     /// A coefficient too many or too few, or one that is no number, is a fault.

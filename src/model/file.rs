@@ -1,7 +1,6 @@
 //! `model.json` (`crate::docs::layouts`): written and read back bit for bit, refused when foreign.
 
 use std::path::Path;
-use std::time::SystemTime;
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -9,6 +8,7 @@ use serde_json::{Map, Value};
 
 use super::effect::Effect;
 use super::forms::Form;
+use super::provenance::{FitSummary, Provenance};
 use super::{Direction, Domain, SigmaModel};
 use crate::error::{Error, Result, read_text};
 use crate::io::{pretty_json, write_atomic};
@@ -27,51 +27,6 @@ pub struct NoiseModel {
     pub effects: Vec<Effect>,
     pub fit: FitSummary,
     pub provenance: Provenance,
-}
-
-/// How the surface was fitted.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct FitSummary {
-    pub views: usize,
-    pub samples: usize,
-    /// Root mean square of measured minus fitted sigma, m.
-    pub rmse_m: f64,
-    pub r2: f64,
-    /// Root mean square relative error at distances left out of the fit.
-    pub heldout: Option<f64>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub remarks: Vec<String>,
-}
-
-/// Where a model comes from.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Provenance {
-    pub tool: String,
-    pub version: String,
-    pub seed: Option<u64>,
-    pub options: Map<String, Value>,
-    /// SHA-256 of the inputs, by name.
-    pub sha256: Map<String, Value>,
-    /// RFC 3339, UTC.
-    pub created: String,
-}
-
-impl Provenance {
-    /// This program, now.
-    pub fn now(seed: Option<u64>) -> Self {
-        Self::at(seed, SystemTime::now())
-    }
-
-    /// This program, at a time that the caller gives.
-    pub fn at(seed: Option<u64>, time: SystemTime) -> Self {
-        Provenance {
-            tool: "kinoise".into(),
-            version: env!("CARGO_PKG_VERSION").into(),
-            seed,
-            created: humantime::format_rfc3339_seconds(time).to_string(),
-            ..Provenance::default()
-        }
-    }
 }
 
 #[derive(Serialize, Deserialize)]

@@ -83,6 +83,12 @@ impl Term {
         Term { statistic: Statistic::Bias, basis, coefficients }
     }
 
+    /// The same shape, larger by `factor`.
+    pub fn times(&self, factor: f64) -> Self {
+        let coefficients = self.coefficients.iter().map(|c| factor * c).collect();
+        Term { coefficients, ..self.clone() }
+    }
+
     /// Of the logarithm of its variance.
     pub fn variance(basis: Basis, coefficients: Vec<f64>) -> Self {
         Term { statistic: Statistic::Variance, basis, coefficients }

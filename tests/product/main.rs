@@ -21,6 +21,7 @@ mod layouts;
 mod map;
 mod measure;
 mod model_file;
+mod other_views;
 mod outliers;
 mod pages;
 mod room;

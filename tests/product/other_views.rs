@@ -1,0 +1,77 @@
+//! Held against a model that other views of the sensor taught: the same sensor is no mismatch, and one
+//! that has changed is.
+
+use kinoise::diagnose::{DiagnoseOptions, Verdict, diagnose};
+use kinoise::effects::Active;
+use kinoise::scene::Target;
+use kinoise::simulate::{Grid, Physics, Shoot, kinect_v1};
+use kinoise::{
+    CalibrateOptions, NoiseModel, Recording, Seed, SigmaModel, io, measure_recording, model_of,
+};
+use tempfile::TempDir;
+
+/// A bowl three times as deep as the noise of so small a sensor: deeper, a wall is not flat.
+const SENSOR: [&str; 2] = ["radial-disparity-bias:k_px=0.05", "vignetting:growth=0.4"];
+
+/// Fifteen views of a wall by a small Kinect with these effects.
+fn views(effects: &[&str], seed: u64) -> (TempDir, Recording) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let distances_m = vec![1.0, 1.4, 2.0, 2.8, 4.0];
+    let poses = Grid { distances_m, tilts_rad: vec![0.0, 0.3, 0.6] }.views();
+    let sigma = SigmaModel::paper();
+    let mut shoot = Shoot::plain(kinect_v1(4), Target::Wall, &poses, 4, sigma.clone(), Seed(seed));
+    let effects = effects.iter().map(|e| Active::parse(e).expect("an effect")).collect();
+    shoot.physics = Physics::Formula { sigma, effects };
+    shoot.write(folder.path(), &|_, _| ()).expect("written");
+    let recording = io::open(folder.path(), &io::Assumed::default()).expect("opened");
+    (folder, recording)
+}
+
+/// Calibrated on views of the sensor, and what is beyond sigma found there.
+fn learnt() -> NoiseModel {
+    let (_folder, recording) = views(&SENSOR, 1);
+    let options = CalibrateOptions::default();
+    let measured = measure_recording(&recording, &options.measure, &|_, _| ()).expect("measured");
+    let model = model_of(&recording, &measured, &options).expect("a fit").model;
+    let here = DiagnoseOptions { calibrated_here: true, ..DiagnoseOptions::default() };
+    let found = diagnose(&recording, &model, &here, &|_, _| ()).expect("diagnosed");
+    assert!(found.model.effects.iter().any(|e| e.id == "radial-disparity-bias"));
+    let shaped = || found.model.effects.iter().filter(|e| !e.shape.is_empty());
+    assert!(shaped().all(|e| e.between_views.len() == e.shape.len()));
+    // These views come from one sensor that never changes: what was injected is alike in all.
+    let first = |e: &kinoise::model::Effect| e.between_views[0];
+    let injected = shaped().filter(|e| SENSOR.iter().any(|s| s.starts_with(&e.id)));
+    let scatter: Vec<_> = injected.map(|e| (e.id.clone(), first(e))).collect();
+    assert!(scatter.iter().all(|(_, share)| *share < 0.3), "{scatter:?}");
+    let searched = found.model.fit.searched.expect("told");
+    assert_eq!((searched.views, searched.references), (15, 0));
+    found.model
+}
+
+#[test]
+fn a_sensor_is_itself_and_a_changed_one_is_not() {
+    let model = learnt();
+    let judge = |effects: &[&str], seed| {
+        let (_folder, recording) = views(effects, seed);
+        let options = DiagnoseOptions::default();
+        let told = diagnose(&recording, &model, &options, &|_, _| ()).expect("diagnosed");
+        (told.diagnosis.verdict, told.diagnosis.findings)
+    };
+    for seed in 2..5 {
+        let (verdict, found) = judge(&SENSOR, seed);
+        let names: Vec<_> = found.iter().map(|f| (f.effect, f.statistic, f.axis)).collect();
+        assert_eq!(verdict, Verdict::Match, "seed {seed}: {names:?}");
+    }
+    let [bowl, vignetting] = SENSOR;
+    for (change, effects) in [
+        ("radial-disparity-bias", vec!["radial-disparity-bias:k_px=0.075", vignetting]),
+        ("vignetting", vec![bowl, "vignetting:growth=0.8"]),
+        ("row-noise", vec![bowl, vignetting, "row-noise:sigma_px=0.03"]),
+        ("spatial-correlation", vec![bowl, vignetting, "spatial-correlation:length_px=3"]),
+    ] {
+        let (verdict, found) = judge(&effects, 7);
+        assert_eq!(verdict, Verdict::Mismatch, "{change}");
+        let names: Vec<_> = found.iter().filter_map(|f| f.effect).collect();
+        assert!(names.contains(&change), "{change}: {names:?}");
+    }
+}
