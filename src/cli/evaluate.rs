@@ -20,15 +20,15 @@ Examples:
 
 #[derive(Debug, Args)]
 pub struct Arguments {
+    /// Folder for evaluation.json, the plots and report.html
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
     /// True poses in the TUM format
     #[arg(long, value_name = "FILE")]
     truth: PathBuf,
     /// Estimated poses in the TUM format
     #[arg(long, value_name = "FILE")]
     estimate: PathBuf,
-    /// Folder for evaluation.json, the plots and report.html
-    #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
     /// The interval over which the relative error is taken
     #[arg(long, value_name = "N", default_value_t = 1.0, allow_hyphen_values = true)]
     delta: f64,

@@ -51,6 +51,7 @@ pub(super) fn known(effect: Option<&str>, name: &str, value: &Value) -> Option<K
 /// `0.125 ± 0.001 px`, `up to 0.6 px`, or to so many digits where the error is not known; whatever
 /// else stands in the file is shown as it is.
 pub(super) fn value(effect: Option<&str>, name: &str, value: &Value, digits: usize) -> Markup {
+    let (name, _) = split(name);
     let Some(known) = known(effect, name, value) else {
         return html! { (value.as_str().map_or_else(|| value.to_string(), str::to_string)) };
     };
