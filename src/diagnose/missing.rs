@@ -175,8 +175,9 @@ fn losses(
 const HARD: f64 = 0.01;
 /// Widths by which the views reach beyond an edge that is known as a whole.
 const PASSED: f64 = 5.0;
-/// One that is hardly reached must be narrower by so many standard errors.
-const SURELY: f64 = 2.0;
+/// One that is hardly reached must be narrower by so many standard errors, which hold the doubt about
+/// the form of its rise as well.
+const SURELY: f64 = 1.0;
 /// Widths of an edge within which patches feel it: 2 % are lost there.
 const FELT: f64 = 4.0;
 
