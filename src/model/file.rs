@@ -16,6 +16,8 @@ use crate::view::RecordingFile;
 
 /// The format this version writes and reads.
 pub const MODEL_FORMAT: &str = "kinoise-model/1";
+/// The name that every command gives it.
+const MODEL: &str = "model.json";
 const FORMAT_FAMILY: &str = "kinoise-model/";
 
 /// A sensor's noise, as exchanged between `calibrate`, `simulate`, `diagnose` and `map`.
@@ -122,11 +124,13 @@ impl NoiseModel {
         write_atomic(path, self.to_json()?.as_bytes())
     }
 
+    /// From a `model.json`, or the folder that holds one.
     /// An error when the file is missing, not a model, damaged, or of a newer format.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = read_text(path)?;
+        let file = if path.is_dir() { path.join(MODEL) } else { path.to_path_buf() };
+        let text = read_text(&file)?;
         Self::from_json(&text).map_err(|(what, remedy)| Error::ModelFile {
-            path: path.to_path_buf(),
+            path: file,
             what,
             remedy,
         })

@@ -185,8 +185,9 @@ fn describe(table: &SigmaTable, left_out: &[usize]) -> String {
     if left_out.len() > SHOWN {
         places.push("...".into());
     }
+    let verbs = if left_out.len() == 1 { "was left" } else { "were left" };
     format!(
-        "{} of {} sigmas stand more than {OFF} robust standard deviations off the surface and were left out of the fit: {}",
+        "{} of {} sigmas {verbs} out of the fit, more than {OFF} robust standard deviations off the surface: {}",
         left_out.len(),
         table.rows.len(),
         places.join("; ")

@@ -201,3 +201,16 @@ fn a_poor_fit_says_so_in_words() {
     let page = std::fs::read_to_string(out.path().join("report.html")).expect("read");
     assert!(page.contains("The fit does not describe this sensor"));
 }
+
+/// Commands print folders, and people give them.
+#[test]
+fn a_folder_stands_for_the_model_in_it() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("model.json");
+    NoiseModel::paper().write(&file).expect("written");
+    let both = [folder.path(), &file].map(|path| NoiseModel::read(path).expect("a model"));
+    assert_eq!(both[0], both[1]);
+    std::fs::remove_file(&file).expect("removed");
+    let why = NoiseModel::read(folder.path()).expect_err("there is none").to_string();
+    assert!(why.contains("model.json"), "{why}");
+}
