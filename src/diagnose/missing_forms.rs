@@ -9,7 +9,9 @@ use statrs::function::erf::erfc;
 
 use super::missing_fit::{Point, misfit};
 use super::missing_shapes::Step;
+use super::posterior::Posterior;
 use crate::effects;
+use crate::stats::even;
 use crate::terms::Axis;
 
 /// From nothing lost to all, one half at 0. A pattern's contrast falls short of a threshold: by
@@ -34,19 +36,15 @@ const NARROWEST: f64 = 1e-3;
 /// factor `scatter` more, in variance, than they are expected to.
 pub fn errors(told: &Step, base: f64, points: &[Point], scatter: f64) -> Option<[f64; 2]> {
     let Allowed { middles, widths, typical } = allowed(told)?;
-    let posterior =
-        |rise: &fn(f64) -> f64| Posterior { told, base, points, scatter, typical, rise: *rise };
+    let rising =
+        |rise: &fn(f64) -> f64| Rising { told, base, points, scatter, typical, rise: *rise };
     let nodes: Vec<Node> = RISES
         .par_iter()
-        .flat_map_iter(|rise| posterior(rise).nodes(middles, widths.map(f64::ln)))
+        .flat_map_iter(|rise| rising(rise).nodes(middles, widths.map(f64::ln)))
         .collect();
-    let best = nodes.iter().map(|n| n.misfit).fold(f64::INFINITY, f64::min);
-    let weight = |n: &Node| n.area * (best - n.misfit).exp();
-    let total: f64 = nodes.iter().map(weight).sum();
-    let rms = |of: &dyn Fn(&Node) -> f64| {
-        (nodes.iter().map(|n| weight(n) * of(n).powi(2)).sum::<f64>() / total).sqrt()
-    };
-    let errors = [rms(&|n| n.middle - told.middle), rms(&|n| n.width - told.width.abs())];
+    let posterior = Posterior::of(nodes, |n| (-n.misfit, n.area))?;
+    let of_middle = posterior.rms(|n| n.middle - told.middle);
+    let errors = [of_middle, posterior.rms(|n| n.width - told.width.abs())];
     errors.iter().all(|e| e.is_finite()).then_some(errors)
 }
 
@@ -79,7 +77,8 @@ struct Node {
     misfit: f64,
 }
 
-struct Posterior<'a> {
+/// A form of the rise, held against the points.
+struct Rising<'a> {
     told: &'a Step,
     base: f64,
     points: &'a [Point],
@@ -88,7 +87,7 @@ struct Posterior<'a> {
     rise: fn(f64) -> f64,
 }
 
-impl Posterior<'_> {
+impl Rising<'_> {
     /// Nats below a perfect fit of a typical width; infinite as soon as it is beyond `limit`.
     fn misfit(&self, middle: f64, width: f64, limit: f64) -> f64 {
         let lost = self.told.share * (1.0 - self.base);
@@ -107,7 +106,7 @@ impl Posterior<'_> {
     /// The last grid's nodes that matter.
     fn nodes(&self, middles: [f64; 2], logs: [f64; 2]) -> Vec<Node> {
         let mut across = around(self.told.middle, self.told.width.abs(), middles);
-        let mut along = even(logs);
+        let mut along: Vec<f64> = even(logs, NODES).collect();
         let mut nodes = Vec::new();
         for _ in 0..ROUNDS {
             let mut best = f64::INFINITY;
@@ -126,10 +125,6 @@ impl Posterior<'_> {
         }
         nodes.into_iter().map(|n| n.2).collect()
     }
-}
-
-fn even([low, high]: [f64; 2]) -> Vec<f64> {
-    (0..NODES).map(|k| low + (high - low) * k as f64 / (NODES - 1) as f64).collect()
 }
 
 /// Denser near a place: in steps that grow from a fraction of `width` to all that is allowed.
@@ -158,7 +153,7 @@ fn closer(grid: &[f64], nodes: impl Iterator<Item = usize>) -> Vec<f64> {
     let (first, last) = nodes.fold((grid.len(), 0), |(a, b), k| (a.min(k), b.max(k)));
     let last_node = grid.len().saturating_sub(1);
     match (grid.get(first.saturating_sub(1).min(last_node)), grid.get((last + 1).min(last_node))) {
-        (Some(low), Some(high)) => even([*low, *high]),
+        (Some(low), Some(high)) => even([*low, *high], NODES).collect(),
         _ => grid.to_vec(),
     }
 }

@@ -60,6 +60,7 @@ mod parameters;
 mod partners;
 mod pictures;
 mod pixels;
+mod posterior;
 mod power;
 mod prepared;
 mod reading;

@@ -8,6 +8,7 @@
 
 use statrs::function::erf::erfc;
 
+use super::posterior::Posterior;
 use super::tails::{TAIL_EDGES, TailCounts};
 
 /// Share and scale of the far errors, each with its standard error; the scale is their standard
@@ -69,15 +70,12 @@ pub fn strays(counts: &TailCounts, scatter: f64) -> Option<Strays> {
             nodes.push([misfit.sum(), fraction, scale]);
         }
     }
-    let best = nodes.iter().map(|n| n[0]).fold(f64::INFINITY, f64::min);
-    let weight = |n: &[f64; 3]| (best - n[0]).exp();
-    let total: f64 = nodes.iter().map(weight).sum();
+    let posterior = Posterior::of(nodes, |n| (-n[0], 1.0))?;
     let of = |k: usize, scatter: f64| {
-        let mean = nodes.iter().map(|n| weight(n) * n[k]).sum::<f64>() / total;
-        let square = nodes.iter().map(|n| weight(n) * (n[k] - mean).powi(2)).sum::<f64>() / total;
-        [mean, square.sqrt().hypot(scatter.hypot(SIGMA) * mean)]
+        let mean = posterior.mean(|n| n[k]);
+        [mean, posterior.rms(|n| n[k] - mean).hypot(scatter.hypot(SIGMA) * mean)]
     };
-    (total > 0.0).then(|| Strays { fraction: of(1, scatter), scale: of(2, 0.0) })
+    Some(Strays { fraction: of(1, scatter), scale: of(2, 0.0) })
 }
 
 #[cfg(test)]

@@ -6,6 +6,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::posterior::Posterior;
+use crate::stats::even;
+
 /// A reference, as far as a drift goes.
 #[derive(Debug, Clone)]
 pub struct Reading {
@@ -45,11 +48,10 @@ pub fn warm_up(readings: &[Reading], variance: f64) -> Option<WarmUp> {
         return None;
     }
     let log = TAU_SESSIONS.map(|n| (n * session).ln());
-    let taus = (0..TAUS).map(|k| (log[0] + (log[1] - log[0]) * k as f64 / (TAUS - 1) as f64).exp());
     let nodes: Vec<Node> = COURSES
         .iter()
         .enumerate()
-        .flat_map(|(course, of)| taus.clone().map(move |tau_s| (course, of, tau_s)))
+        .flat_map(|(course, of)| even(log, TAUS).map(move |log| (course, of, log.exp())))
         .filter_map(|(course, of, tau_s)| {
             let (evidence, relative) = size(readings, variance, &|t| of(t / tau_s))?;
             let unlikely = 0.5 * (tau_s / TYPICAL_TAU_S).ln().powi(2);
@@ -58,16 +60,12 @@ pub fn warm_up(readings: &[Reading], variance: f64) -> Option<WarmUp> {
         .collect();
     let told = nodes.iter().filter(|n| n.course == 0);
     let told = told.max_by(|a, b| a.evidence.total_cmp(&b.evidence))?;
-    let best = nodes.iter().map(|n| n.evidence).fold(f64::NEG_INFINITY, f64::max);
-    let weight = |n: &Node| (n.evidence - best).exp();
-    let total: f64 = nodes.iter().map(weight).sum();
-    let rms = |square: &dyn Fn(&Node) -> f64| {
-        (nodes.iter().map(|n| weight(n) * square(n)).sum::<f64>() / total).sqrt()
-    };
-    let [relative, _] = told.relative;
+    let ([relative, _], tau_s) = (told.relative, told.tau_s);
+    let posterior = Posterior::of(nodes, |n| (n.evidence, 1.0))?;
+    let off = |n: &Node| (n.relative[0] - relative).powi(2) + n.relative[1].powi(2);
     Some(WarmUp {
-        relative: [relative, rms(&|n| (n.relative[0] - relative).powi(2) + n.relative[1].powi(2))],
-        time_constant_s: [told.tau_s, rms(&|n| (n.tau_s - told.tau_s).powi(2))],
+        relative: [relative, posterior.mean(off).sqrt()],
+        time_constant_s: [tau_s, posterior.rms(|n| n.tau_s - tau_s)],
     })
 }
 

@@ -1,9 +1,11 @@
 //! The window that a part of the noise comes through, from how correlation falls with distance.
 
 use super::hanging::Mean;
+use super::posterior::Posterior;
 use super::smooth::SMOOTH_PX;
 use super::structure::Structure;
 use super::texture::{COURSE, FAR};
+use crate::stats::even;
 
 /// Its side, px, and the share of the variance that comes through it, each with its standard error.
 #[derive(Debug, Clone, Copy)]
@@ -64,8 +66,7 @@ fn of(course: &[f64], variance: f64) -> Option<Window> {
     let mut nodes: Vec<[f64; 4]> = Vec::new();
     let own = seen(&|lag| f64::from(u8::from(lag == 0.0)), course.len());
     for form in FORMS {
-        for k in 0..SIDES {
-            let side = (log[0] + (log[1] - log[0]) * k as f64 / (SIDES - 1) as f64).exp();
+        for side in even(log, SIDES).map(f64::exp) {
             let through = seen(&|lag| form(lag / side), course.len());
             let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
             let beyond = |of: &[f64]| of.iter().zip(&own).map(|(x, own)| x - own).collect();
@@ -79,15 +80,11 @@ fn of(course: &[f64], variance: f64) -> Option<Window> {
             }
         }
     }
-    let best = nodes.iter().map(|n| n[0]).fold(f64::NEG_INFINITY, f64::max);
-    let total: f64 = nodes.iter().map(|n| (n[0] - best).exp()).sum();
-    let mean = |of: &dyn Fn(&[f64; 4]) -> f64| {
-        nodes.iter().map(|n| (n[0] - best).exp() * of(n)).sum::<f64>() / total
-    };
-    let (length, share) = (mean(&|n| n[1]), mean(&|n| n[2]));
-    let of_length = mean(&|n| (n[1] - length).powi(2)).sqrt();
-    let of_share = mean(&|n| (n[2] - share).powi(2) + n[3]).sqrt();
-    (total > 0.0).then_some(Window { length: [length, of_length], share: [share, of_share] })
+    let posterior = Posterior::of(nodes, |n| (n[0], 1.0))?;
+    let (length, share) = (posterior.mean(|n| n[1]), posterior.mean(|n| n[2]));
+    let of_length = posterior.rms(|n| n[1] - length);
+    let of_share = posterior.mean(|n| (n[2] - share).powi(2) + n[3]).sqrt();
+    Some(Window { length: [length, of_length], share: [share, of_share] })
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::normal_equations::{Direction, NormalEquations, Solution};
 use super::point::{Motion, Point};
 use super::{Kernel, Options, Weights};
+use crate::stats::TUKEY;
 
 pub trait Target: Sync {
     /// What a search leaves behind for the next search of the same point.
@@ -197,4 +198,3 @@ impl<T: Target> Round<'_, T> {
 
 /// 95 % as good as least squares where there are no outliers (Holland and Welsch 1977).
 const HUBER: f64 = 1.345;
-const TUKEY: f64 = 4.685;

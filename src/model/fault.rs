@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 use super::file::NoiseModel;
 use super::surface::{Domain, SigmaModel};
 use crate::error::{Error, Result};
+use crate::stats::even;
 use crate::view::Sensor;
 
 /// Points a side at which sigma is looked at between the domain's corners. What the forms can do
@@ -73,9 +74,7 @@ impl SigmaModel {
     fn wrong_sigma(&self) -> Option<String> {
         let spec = self.form.spec();
         let Domain { z_m, theta_rad } = self.domain;
-        let along = |[low, high]: [f64; 2]| {
-            (0..GRID).map(move |i| low + (high - low) * i as f64 / (GRID - 1) as f64)
-        };
+        let along = |ends: [f64; 2]| even(ends, GRID);
         let vertex = spec.vertex(&self.parameters).map(|c| c.clamp(z_m[0], z_m[1]));
         vertex.into_iter().chain(along(z_m)).flat_map(|z| along(theta_rad).map(move |t| (z, t))).find_map(
             |(z, theta)| {

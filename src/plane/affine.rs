@@ -4,10 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Plane;
 use crate::camera::Rays;
-use crate::stats::median_in_place;
+use crate::stats::{TUKEY, median_in_place};
 
-/// Tukey's biweight reaches zero here, in standard deviations: 95 % efficient on Gaussian noise.
-const TUKEY: f64 = 4.685;
 pub(crate) use crate::stats::MAD_TO_SIGMA;
 
 /// A robust plane and the scale of what it left.

@@ -8,7 +8,7 @@ use nalgebra::{SMatrix, SVector};
 use super::Plane;
 use super::affine::{AffineFit, Effort, MAD_TO_SIGMA, fit_affine_robust};
 use super::image::{Exclusions, InverseDepthImage, MIN_PIXELS, Target};
-use crate::stats::median_in_place;
+use crate::stats::{TUKEY, median_in_place};
 
 /// Terms of a polynomial of the fourth degree in (x, y): of 1/cos, which the range over a wall
 /// follows, it leaves 0.1 % at 40 degrees off the axis.
@@ -17,8 +17,6 @@ const DEGREE: i32 = 4;
 /// Pixels that the polynomial is fitted to.
 const SAMPLES: usize = 6000;
 const ROUNDS: usize = 8;
-/// Tukey's biweight, in standard deviations.
-const TUKEY: f64 = 4.685;
 /// Smooth is what leaves no more than this many times the image's local noise: the same as for a plane.
 const SMOOTH: f64 = 4.0;
 /// ... and what holds this share of the measured pixels within the biweight.

@@ -17,6 +17,14 @@ use statrs::function::beta::checked_beta_reg;
 /// 1/Phi^-1(3/4), Phi the standard normal distribution.
 pub const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
 
+/// Standard deviations at which Tukey's biweight reaches zero: 95 % efficient on Gaussian noise.
+pub const TUKEY: f64 = 4.685;
+
+/// `n` values from one to the other, both among them, in even steps.
+pub fn even([low, high]: [f64; 2], n: usize) -> impl Iterator<Item = f64> + Clone {
+    (0..n).map(move |k| low + (high - low) * k as f64 / (n - 1) as f64)
+}
+
 /// Least and greatest; infinite and the wrong way round when there are none.
 pub fn range(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
     values

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::model::rows::Rows;
 use crate::solve::nelder_mead;
+use crate::stats::even;
 
 /// theta^2 / (f - theta)^2.
 #[inline]
@@ -95,13 +96,10 @@ impl<'a> TiltSearch<'a> {
 
     /// The best (e, f): a grid over the box, then Nelder-Mead.
     pub fn best(&self) -> BestTilt {
-        let axis = |[low, high]: [f64; 2], n: usize| {
-            (0..n).map(move |i| low + (high - low) * i as f64 / (n - 1) as f64)
-        };
         let tilts: Vec<(f64, Vec<f64>)> =
-            axis(LOG_POLE, GRID[1]).map(|g| (g, self.tilts(g))).collect();
+            even(LOG_POLE, GRID[1]).map(|g| (g, self.tilts(g))).collect();
         let (mut e, mut g, mut gain) = (EXPONENTS[0], LOG_POLE[1], -1.0);
-        for exponent in axis(EXPONENTS, GRID[0]) {
+        for exponent in even(EXPONENTS, GRID[0]) {
             let powers = self.powers(exponent);
             for (log_pole, tilts) in &tilts {
                 let value = self.gain(&powers, tilts);
