@@ -5,7 +5,6 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::evidence::Evidence;
-use super::rows::Rows;
 use super::samples::ViewData;
 use crate::terms::{Basis, PixelContext, Term};
 
@@ -39,8 +38,7 @@ fn of_view(view: &ViewData, terms: &[Term]) -> Option<Evidence> {
     let columns: Vec<Vec<f64>> = view.places.iter().map(&mut sizes).collect();
     let rest = view.response.iter().zip(&columns).map(|(y, g)| y - g.iter().sum::<f64>());
     let rest: Vec<f64> = rest.collect();
-    let p = view.precision.len();
-    let rows = Rows::new(&rest, &view.weight, &view.nuisance, p, &view.precision)?;
+    let rows = view.rows(&rest)?;
     let evidence = rows.reduce(terms.len(), |i, g| g.copy_from_slice(&columns[i]));
     let finite = evidence.a.iter().chain(&evidence.b).all(|x| x.is_finite());
     finite.then_some(evidence)

@@ -9,7 +9,6 @@ use super::engine::DiagnoseOptions;
 use super::layers::Survey;
 use super::outcome::Outcome;
 use super::pixels::terms_of;
-use super::rows::Rows;
 use super::samples::ViewData;
 use super::surveyed_view::SurveyedView;
 use crate::camera::Camera;
@@ -87,9 +86,8 @@ fn log_score(view: &ViewData, terms: &[Term]) -> Option<f64> {
         .zip(&view.places)
         .map(|(y, p)| y - terms.iter().map(|t| t.value(p, &mut row)).sum::<f64>())
         .collect();
-    let p = view.precision.len();
     let own: f64 = response.iter().zip(&view.weight).map(|(y, w)| w * y * y).sum();
-    let rows = Rows::new(&response, &view.weight, &view.nuisance, p, &view.precision)?;
+    let rows = view.rows(&response)?;
     Some(-0.5 * (own - rows.explained()))
 }
 

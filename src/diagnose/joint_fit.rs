@@ -7,7 +7,6 @@ use rayon::prelude::*;
 use super::candidate::Candidate;
 use super::evidence::{Evidence, score};
 use super::outcome::Chosen;
-use super::rows::Rows;
 use super::samples::ViewData;
 use crate::camera::Camera;
 use crate::solve::Cholesky;
@@ -69,7 +68,7 @@ impl Columns {
             let p = &view.places[i];
             span(p.v, height, down) * across + span(p.u, width, across)
         };
-        let rows = rows(view, &view.response)?;
+        let rows = view.rows(&view.response)?;
         let fill = |i: usize, row: &mut [f64]| self.fill(&view.places[i], row);
         Some(rows.reduce_by_blocks(self.terms + self.nodes, block, fill))
     }
@@ -83,7 +82,7 @@ impl Columns {
             y - DVectorView::from_slice(&row, count).dot(beta)
         };
         let response: Vec<f64> = view.response.iter().zip(&view.places).map(&mut of).collect();
-        Some(rows(view, &response)?.score(count, |i, row| self.fill(&view.places[i], row)))
+        Some(view.rows(&response)?.score(count, |i, row| self.fill(&view.places[i], row)))
     }
 
     pub fn fill(&self, place: &PixelContext, row: &mut [f64]) {
@@ -141,10 +140,6 @@ impl Columns {
         both.view_mut((n, n), (n, n)).copy_from(&one);
         both
     }
-}
-
-fn rows<'a>(view: &'a ViewData, response: &[f64]) -> Option<Rows<'a>> {
-    Rows::new(response, &view.weight, &view.nuisance, view.precision.len(), &view.precision)
 }
 
 /// Some views' equations with the nodes of the maps eliminated, if there are maps.

@@ -11,7 +11,6 @@ use super::evidence::Evidence;
 use super::known::KnownTerms;
 use super::layers::Survey;
 use super::null::Null;
-use super::rows::Rows;
 use super::samples::ViewData;
 use super::variance::error_of_sigma;
 use crate::model::SigmaModel;
@@ -58,9 +57,7 @@ impl Errors {
     fn settled(&self, data: &[ViewData]) -> Vec<Term> {
         let n = self.count();
         let of = |view: &ViewData| -> Option<Evidence> {
-            let width = view.precision.len();
-            let rows =
-                Rows::new(&view.response, &view.weight, &view.nuisance, width, &view.precision)?;
+            let rows = view.rows(&view.response)?;
             let mut row = Vec::new();
             Some(rows.reduce(n, |i, g| self.fill(&view.places[i], g, &mut row)))
         };

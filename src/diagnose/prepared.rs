@@ -69,7 +69,7 @@ fn fill_all(terms: &[&Basis], place: &PixelContext, row: &mut [f64]) {
 fn rows<'a>(view: &'a ViewData, response: &[f64], beside: &[&Basis]) -> Option<Rows<'a>> {
     let p = view.precision.len();
     if beside.is_empty() {
-        return Rows::new(response, &view.weight, &view.nuisance, p, &view.precision);
+        return view.rows(response);
     }
     let width = p + beside.iter().map(|b| b.count()).sum::<usize>();
     let mut columns = vec![0.0; view.places.len() * width];

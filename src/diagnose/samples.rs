@@ -1,5 +1,6 @@
 //! The samples that a search works on.
 
+use super::rows::Rows;
 use super::tiles::SIDE;
 use crate::terms::{PixelContext, Term};
 
@@ -18,6 +19,11 @@ pub struct ViewData {
 }
 
 impl ViewData {
+    /// The weighted rows of a `response` at these places, the view's nuisances beside it.
+    pub fn rows(&self, response: &[f64]) -> Option<Rows<'_>> {
+        Rows::new(response, &self.weight, &self.nuisance, self.precision.len(), &self.precision)
+    }
+
     /// With these terms beside the view's own nuisances: each is there by a standard normal number.
     pub fn beside(mut self, terms: &[Term]) -> Self {
         if terms.is_empty() {
