@@ -111,7 +111,7 @@ impl Baseline {
         measure_tails(&mut structure, &fields, &[], &[], &survey, bench);
         let lattice = lattice(&fields, simulated);
         let steps = Steps::of(&lattice, &structure, &fields, simulated);
-        let lost = missing(&fields, &survey, camera, &bench.rays, options.seed).findings;
+        let lost = missing(&fields, &survey, camera, options.seed).findings;
         Baseline {
             mixes: rim::mixing(&fields, 0.03 * options.level).is_some(),
             heavy: tails(&structure, &none, 0.03 * options.level, false).is_some(),

@@ -222,7 +222,7 @@ impl Case<'_> {
 
     fn lost(&mut self) -> (Vec<Finding>, Vec<Detectable>) {
         let camera = &self.sensor().camera;
-        let lost = missing(&self.fields, &self.survey, camera, &self.bench.rays, self.options.seed);
+        let lost = missing(&self.fields, &self.survey, camera, self.options.seed);
         self.copies.extend(lost.notes);
         let known = |id| self.known.has(id);
         let baseline = self.baseline.as_ref();

@@ -48,6 +48,13 @@ pub fn fit(views: &[Evidence], prior: f64) -> Option<DVector<f64>> {
     Some(Cholesky::of(a)?.solve(&b))
 }
 
+/// R with R Rᵀ = `a`: white noise through it is as a score of the information `a`.
+pub fn root(a: &DMatrix<f64>) -> DMatrix<f64> {
+    let eigen = a.clone().symmetric_eigen();
+    let roots = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+    &eigen.eigenvectors * DMatrix::from_diagonal(&roots)
+}
+
 /// Few unknowns are not worth more threads.
 const VIEWS_AT_ONCE: usize = 4;
 

@@ -12,7 +12,7 @@ use statrs::function::factorial::ln_binomial;
 use super::along::Along;
 use super::candidate::{Candidate, RECALIBRATE};
 use super::diagnosis::{Alternative, Finding, Status};
-use super::evidence::Evidence;
+use super::evidence::{self, Evidence, root};
 use super::naming::physics;
 use super::null::NoiseGains;
 use super::other_findings::named;
@@ -21,7 +21,6 @@ use super::prepared::evidence_of_bases;
 use super::samples::{ViewData, coarser};
 use super::scene::{Scene, size};
 use crate::rng::{Seed, Stream};
-use crate::solve::Cholesky;
 use crate::terms::{Basis, Term};
 
 /// Candidates with more columns fit single views too freely.
@@ -52,22 +51,21 @@ struct Tried<'a> {
 }
 
 /// Best common fit of these columns to a few views.
-fn best(evidence: &[Evidence], prior: f64) -> Option<Best> {
-    let (n, k) = (evidence.len(), evidence.first()?.b.len());
+fn best(views: &[Evidence], prior: f64) -> Option<Best> {
+    let (n, k) = (views.len(), views.first()?.b.len());
     let fit = |e: &Evidence| {
-        let held = &e.a + DMatrix::identity(k, k) * prior;
-        let beta = Cholesky::of(held)?.solve(&e.b);
+        let beta = evidence::fit(std::slice::from_ref(e), prior)?;
         Some((0.5 * beta.dot(&e.b), beta))
     };
     let mut order = Vec::with_capacity(n);
-    for (v, e) in evidence.iter().enumerate() {
+    for (v, e) in views.iter().enumerate() {
         order.push((fit(e)?.0, v));
     }
     order.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut sum = Evidence { a: DMatrix::zeros(k, k), b: DVector::zeros(k) };
     let mut best: Option<Best> = None;
     for count in 1..=n / 3 {
-        let next = &evidence[order[count - 1].1];
+        let next = &views[order[count - 1].1];
         sum.a += &next.a;
         sum.b += &next.b;
         let (nats, beta) = fit(&sum)?;
@@ -83,16 +81,10 @@ fn best(evidence: &[Evidence], prior: f64) -> Option<Best> {
 impl<'a> Tried<'a> {
     fn of(candidate: &'a Candidate, evidence: Vec<Evidence>, prior: f64) -> Option<Self> {
         let k = candidate.basis.count();
-        let root = |e: &Evidence| {
-            let eigen = e.a.clone().symmetric_eigen();
-            let roots = eigen.eigenvalues.map(|l| l.max(0.0).sqrt());
-            &eigen.eigenvectors * DMatrix::from_diagonal(&roots)
-        };
-        let factors = evidence.iter().map(root).collect();
+        let factors = evidence.iter().map(|e| root(&e.a)).collect();
         let mut squares = Vec::new();
         for e in &evidence {
-            let held = &e.a + DMatrix::identity(k, k) * prior;
-            squares.push(Cholesky::of(held)?.solve(&e.b).dot(&e.b) as f32);
+            squares.push(evidence::fit(std::slice::from_ref(e), prior)?.dot(&e.b) as f32);
         }
         // Most views are as noise is, whatever a few have.
         let k = k as f64;

@@ -17,7 +17,7 @@ use super::occlusion_scan::{Band, band};
 use super::replication::{Measured, agree};
 use super::shadow::Shadow;
 use super::tiles::Tile;
-use crate::camera::{Camera, Rays};
+use crate::camera::Camera;
 use crate::rng::Seed;
 use crate::terms::{Axis, Extent};
 
@@ -69,13 +69,7 @@ const MOST_FINDINGS: usize = 3;
 const LEAST_SHARE: f64 = 0.1;
 
 /// What the losses of a recording follow.
-pub fn missing(
-    fields: &[Field],
-    survey: &Survey,
-    camera: &Camera,
-    _rays: &Rays,
-    seed: Seed,
-) -> DropoutOutcome {
+pub fn missing(fields: &[Field], survey: &Survey, camera: &Camera, seed: Seed) -> DropoutOutcome {
     let told: Vec<bool> = fields.iter().map(|f| f.told).collect();
     let second = survey.second();
     let seen = Seen { cells: cells(survey, camera), fine: fine(survey), told, second };

@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::candidate::Candidate;
-use super::evidence::{Evidence, gain};
+use super::evidence::{Evidence, gain, root};
 use super::judge::{CLEARLY, LEAST_OF_LARGEST};
 use super::null::Null;
 use super::outcome::{Outcome, Rules};
@@ -134,13 +134,6 @@ impl Gates<'_> {
         let least = if self.scene.statistic == Statistic::Bias { self.rules.least } else { 0.0 };
         least.max(LEAST_OF_LARGEST * largest).max(still)
     }
-}
-
-/// A square root of a matrix of information.
-fn root(a: &DMatrix<f64>) -> DMatrix<f64> {
-    let eigen = a.clone().symmetric_eigen();
-    let roots = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
-    &eigen.eigenvectors * DMatrix::from_diagonal(&roots)
 }
 
 /// Recordings of the shape and of noise.

@@ -4,6 +4,7 @@ use std::ops::Deref;
 use std::sync::Arc;
 
 use serde_json::{Map, Value, json};
+use strsim::levenshtein;
 
 use super::shape::Shape;
 use super::{CATALOGUE, Draw, Effect, Exposure, Settings, find};
@@ -51,26 +52,11 @@ fn fault(what: String) -> Error {
 fn nearest(text: &str) -> Option<&'static str> {
     let ids = || CATALOGUE.iter().map(|e| e.card().id);
     let part = |id: &&str| !text.is_empty() && (id.contains(text) || text.contains(id));
-    let away = |id: &str| letters_apart(text, id);
+    let away = |id: &str| levenshtein(text, id);
     ids().find(part).or_else(|| {
         // A third of the letters wrong is another word.
         ids().min_by_key(|id| away(id)).filter(|id| 3 * away(id) <= id.len())
     })
-}
-
-/// Letters to add, drop or change (Levenshtein's distance).
-fn letters_apart(a: &str, b: &str) -> usize {
-    let mut row: Vec<usize> = (0..=b.chars().count()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.chars().enumerate() {
-            let changed = diagonal + usize::from(x != y);
-            diagonal = row[j + 1];
-            row[j + 1] = changed.min(diagonal + 1).min(row[j] + 1);
-        }
-    }
-    row[b.chars().count()]
 }
 
 impl Active {
