@@ -153,7 +153,7 @@ impl Correction {
         if entry.shape.is_empty() {
             return self.add_formula(entry);
         }
-        let usable = |t: &&Term| t.is_sensor_bias() && !t.needs().light;
+        let usable = |t: &&Term| t.is_correctable();
         let learnt = entry.learnt_px.unwrap_or(ANYWHERE);
         self.terms.extend(entry.shape.iter().filter(usable).map(|t| (t.clone(), learnt)));
         self.uncertainty.add(entry, learnt, usable);

@@ -1,5 +1,6 @@
 //! From findings to the diagnosis.
 
+use super::anchor::anchor;
 use super::battery::Battery;
 use super::between::between;
 use super::case::Case;
@@ -8,6 +9,8 @@ use super::diagnosis::{DIAGNOSIS_FORMAT, Detectable, Diagnosis, HeldOut, MapRow,
 use super::engine::Diagnosed;
 use super::findings;
 use super::heldout;
+use super::known::KnownTerms;
+use super::laws;
 use super::outcome::Outcome;
 use super::reference;
 use super::verdict::{extend, not_identifiable, shares, untested, verdict, view_lines};
@@ -51,6 +54,7 @@ impl Case<'_> {
         let told = found.iter().chain(&refitted);
         let mut extended = extend(self.model, told, self.sensor(), self.survey.reach.disparity);
         if self.baseline.is_none() {
+            self.anchor(&mut extended);
             self.sample(&mut extended);
         }
         let views = view_lines(&self.fields, &self.survey, &mean.terms, heldout.as_ref());
@@ -82,6 +86,19 @@ impl Case<'_> {
             bias_px: mean.px,
             excluded,
             against: again.against,
+        }
+    }
+
+    /// The biases learnt here leave distances as the references have them.
+    fn anchor(&self, extended: &mut NoiseModel) {
+        let camera = &self.sensor().camera;
+        let known = KnownTerms::of(extended, camera);
+        let added = &mut extended.effects[self.model.effects.len()..];
+        let bias = added.iter().flat_map(|e| &e.shape).filter(|t| t.is_correctable());
+        let levels = heldout::levels(&self.survey, &bias.cloned().collect::<Vec<_>>());
+        let checked = laws::checked(&self.fields, &levels, &known, &self.survey.second());
+        if checked.len() >= laws::FEWEST {
+            anchor(added, &checked, laws::scatter(&checked).0, camera);
         }
     }
 

@@ -37,16 +37,25 @@ pub struct Law {
 
 /// One view with a reference.
 #[derive(Debug, Clone, Copy)]
-struct Checked {
-    z: f64,
+pub struct Checked {
+    pub z: f64,
     /// Slope of the target, along the columns and rows.
-    slope: [f64; 2],
+    pub slope: [f64; 2],
     /// Measured minus reference, m.
-    off: f64,
+    pub off: f64,
     session_s: f64,
-    px_m: f64,
+    /// Disparity in px times depth.
+    pub px_m: f64,
     sigma_m: f64,
     second: bool,
+}
+
+#[cfg(test)]
+impl Checked {
+    /// A frontal view.
+    pub fn ahead(z: f64, off: f64, px_m: f64) -> Self {
+        Checked { z, slope: [0.0; 2], off, session_s: 0.0, px_m, sigma_m: 0.002, second: false }
+    }
 }
 
 /// Fewer references than this can be fitted by anything.
@@ -54,12 +63,23 @@ pub const FEWEST: usize = 5;
 /// Time constants of a warm-up, s.
 const WARM_UPS: [f64; 6] = [60.0, 180.0, 480.0, 1200.0, 2400.0, 7200.0];
 
+/// All laws, with what each gains on references left out; none where there are too few. `bent_m` is
+/// by how much the target is bent, if it is: the same plane is then so far from the place that was
+/// measured, at any distance.
+pub fn laws(checked: &[Checked], bent_m: f64) -> Vec<Law> {
+    if checked.len() < FEWEST { Vec::new() } else { of(checked, bent_m) }
+}
+
 /// What the model knows of the laws is taken out. `levels` is what each view's disparity on the
-/// optical axis changes by once the found bias is taken out, px. All laws, with what each gains on
-/// references left out; empty where there are too few.
-pub fn laws(fields: &[Field], levels: &[f64], known: &KnownTerms, second: &[bool]) -> Vec<Law> {
+/// optical axis changes by once the found bias is taken out, px.
+pub fn checked(
+    fields: &[Field],
+    levels: &[f64],
+    known: &KnownTerms,
+    second: &[bool],
+) -> Vec<Checked> {
     let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
-    let checked: Vec<Checked> = fields
+    fields
         .iter()
         .zip(levels)
         .zip(second)
@@ -75,18 +95,23 @@ pub fn laws(fields: &[Field], levels: &[f64], known: &KnownTerms, second: &[bool
             let slope = [steep * cos, steep * sin];
             Some(Checked { z, slope, off, session_s, px_m: f.scale_px_m, sigma_m, second })
         })
-        .collect();
-    if checked.len() < FEWEST { Vec::new() } else { of(&checked) }
+        .collect()
 }
 
-fn of(checked: &[Checked]) -> Vec<Law> {
-    let beside = if is_tilted(checked) { 2 } else { 0 };
+fn of(checked: &[Checked], bent_m: f64) -> Vec<Law> {
+    let angles = if is_tilted(checked) { 2 } else { 0 };
+    let bent = (bent_m > 0.0).then_some(bent_m);
+    // What the distances may be off by for other reasons.
+    let others = |c: &Checked| -> Vec<f64> {
+        c.slope[..angles].iter().map(|s| c.z * s).chain(bent).collect()
+    };
+    let beside = angles + usize::from(bent.is_some());
     let (variance, free) = scatter(checked);
     let mut laws = Vec::new();
     let mut add = |family, axis, column: &dyn Fn(&Checked) -> f64| {
         let evidence = |with: bool| -> Vec<Evidence> {
             let of = |c: &Checked| {
-                let mut g = c.slope[..beside].iter().map(|s| c.z * s).collect::<Vec<_>>();
+                let mut g = others(c);
                 g.extend(with.then(|| column(c)));
                 let g = DVector::from_vec(g);
                 Evidence { a: &g * g.transpose() / variance, b: g * (c.off / variance) }
@@ -112,16 +137,16 @@ fn of(checked: &[Checked]) -> Vec<Law> {
                 _ => c.z,
             }));
             let (rms_m, rms_sigma) = (square(&shift), square(&|c| shift(c) / c.sigma_m));
-            // The angles as all references have them.
-            let angles = &gain.beta.as_slice()[..beside];
-            let turned = |c: &Checked| -> f64 {
-                angles.iter().zip(c.slope).map(|(angle, slope)| angle * c.z * slope).sum()
+            // The others as all references have them.
+            let sizes = &gain.beta.as_slice()[..beside];
+            let moved = |c: &Checked| -> f64 {
+                sizes.iter().zip(others(c)).map(|(size, column)| size * column).sum()
             };
             let half = |second: bool| {
                 let mine = checked.iter().filter(|c| c.second == second);
                 Measured::of_scores(mine.map(|c| {
                     let g = column(c);
-                    (g * g / variance, g * (c.off - turned(c)) / variance)
+                    (g * g / variance, g * (c.off - moved(c)) / variance)
                 }))
             };
             let replicated = agree([half(false), half(true)]);
@@ -149,7 +174,7 @@ fn of(checked: &[Checked]) -> Vec<Law> {
     for tau in WARM_UPS {
         add("thermal-drift", Axis::SessionTime, &|c| c.z * (1.0 - (-c.session_s / tau).exp()));
     }
-    if let Some(warm_up) = drift(checked, beside, variance, free) {
+    if let Some(warm_up) = drift(checked, &others, variance, free) {
         for law in laws.iter_mut().filter(|l| l.family == "thermal-drift") {
             law.estimate = warm_up.relative;
             law.settled = vec![("time_constant_s", warm_up.time_constant_s)];
@@ -158,15 +183,16 @@ fn of(checked: &[Checked]) -> Vec<Law> {
     laws
 }
 
-/// The drift's numbers, whatever its course; beside it as many angles as the laws have. The variance
-/// was measured with `free` degrees of freedom, which makes a Student's t of a Gaussian.
-fn drift(checked: &[Checked], beside: usize, variance: f64, free: f64) -> Option<WarmUp> {
-    let reading = |c: &Checked| Reading {
-        z: c.z,
-        session_s: c.session_s,
-        off: c.off,
-        beside: c.slope[..beside].iter().map(|s| c.z * s).collect(),
-    };
+/// The drift's numbers, whatever its course, beside the `others`. The variance was measured with `free`
+/// degrees of freedom, which makes a Student's t of a Gaussian.
+fn drift(
+    checked: &[Checked],
+    others: &dyn Fn(&Checked) -> Vec<f64>,
+    variance: f64,
+    free: f64,
+) -> Option<WarmUp> {
+    let reading =
+        |c: &Checked| Reading { z: c.z, session_s: c.session_s, off: c.off, beside: others(c) };
     let readings: Vec<Reading> = checked.iter().map(reading).collect();
     warm_up(&readings, variance * free / (free - 2.0).max(1.0))
 }
@@ -187,7 +213,7 @@ fn is_tilted(checked: &[Checked]) -> bool {
 
 /// Variance of the references' own errors, m^2, and its degrees of freedom: what the laws together
 /// leave.
-fn scatter(checked: &[Checked]) -> (f64, f64) {
+pub fn scatter(checked: &[Checked]) -> (f64, f64) {
     let n = checked.len();
     let span = checked.iter().map(|c| c.session_s).fold(0.0, f64::max).max(1.0);
     let columns = if is_tilted(checked) { 6 } else { 4 };

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::missing_cells::Cell;
-use super::missing_forms::errors;
+use super::missing_forms::{Allowed, allowed, errors};
 use super::missing_shapes::Step;
 use crate::solve::{LeastSquares, trust_region};
 
@@ -89,6 +89,8 @@ struct Problem<'a> {
     start: Step,
     base: f64,
     free_share: bool,
+    /// A few lost pixels at the end of the range are the toe of a step anywhere.
+    allowed: Option<&'a Allowed>,
 }
 
 impl Problem<'_> {
@@ -119,11 +121,12 @@ impl Problem<'_> {
 
 impl LeastSquares for Problem<'_> {
     fn linearise(&self, x: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let width = self.step(x).width.abs();
-        let within = 1e-4..1e2;
-        if !within.contains(&width) || x.iter().any(|v| !v.is_finite()) {
+        let step = self.step(x);
+        let admitted = self.allowed.is_none_or(|a| a.admits(&step));
+        if !admitted || x.iter().any(|v| !v.is_finite()) {
             return None;
         }
+        let width = step.width.abs();
         let r = self.residuals(x);
         let mut jacobian = DMatrix::zeros(r.len(), x.len());
         for j in 0..x.len() {
@@ -142,8 +145,9 @@ impl LeastSquares for Problem<'_> {
 
 /// Refine a step found on the grid.
 pub fn fit(start: Step, base: f64, points: &[Point]) -> Option<Fitted> {
+    let allowed = allowed(&start);
     let solve = |free_share: bool| {
-        let problem = Problem { points, start, base, free_share };
+        let problem = Problem { points, start, base, free_share, allowed: allowed.as_ref() };
         let end = trust_region(&problem, problem.start(), 100)?;
         Some((problem, end))
     };

@@ -31,6 +31,8 @@ const ROUNDS: usize = 3;
 const NEGLIGIBLE: f64 = 8.0;
 /// The least width that is tried, as a share of the greatest.
 const NARROWEST: f64 = 1e-3;
+/// As narrow as an edge need be followed: a driver's limit has no width at all.
+const HARD: f64 = 1e-4;
 
 /// Root mean square distances of middle and width from those of `told`; the points scatter by the
 /// factor `scatter` more, in variance, than they are expected to.
@@ -49,13 +51,21 @@ pub fn errors(told: &Step, base: f64, points: &[Point], scatter: f64) -> Option<
 }
 
 /// In the axis's own unit; widths by their size.
-struct Allowed {
+pub struct Allowed {
     middles: [f64; 2],
     widths: [f64; 2],
     typical: f64,
 }
 
-fn allowed(step: &Step) -> Option<Allowed> {
+impl Allowed {
+    pub fn admits(&self, step: &Step) -> bool {
+        let within = |x: f64, [low, high]: [f64; 2]| (low..=high).contains(&x);
+        within(step.middle, self.middles) && within(step.width.abs(), [HARD, self.widths[1]])
+    }
+}
+
+/// What the catalogue allows of such a step.
+pub fn allowed(step: &Step) -> Option<Allowed> {
     let unit = if step.axis == Axis::Theta { 1f64.to_radians() } else { 1.0 };
     let card = effects::find(step.family())?.card();
     let [_, middle, width] = card.parameters else { return None };

@@ -6,6 +6,7 @@ mod against;
 mod against_layers;
 mod against_textures;
 mod along;
+mod anchor;
 mod battery;
 mod between;
 mod bias;

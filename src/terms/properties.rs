@@ -132,4 +132,9 @@ impl Term {
         // A curve over two axes belongs to the board when either is the board's.
         self.statistic == Statistic::Bias && self.belongs_to_sensor() && !self.needs().board
     }
+
+    /// Is it a bias that depth images alone tell enough to take out?
+    pub fn is_correctable(&self) -> bool {
+        self.is_sensor_bias() && !self.needs().light
+    }
 }

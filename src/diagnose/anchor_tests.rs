@@ -1,0 +1,74 @@
+use rand_distr::{Distribution, Normal};
+
+use super::*;
+use crate::model::Covariance;
+use crate::rng::Seed;
+use crate::simulate::kinect_v1;
+use crate::terms::Coordinate;
+
+const PX_M: f64 = 43.5;
+
+/// A bowl with a constant that nobody knows, and its share of the disparity's power.
+fn bowl(power: f64) -> Effect {
+    let basis = Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(power));
+    let term = Term { statistic: Statistic::Bias, basis, coefficients: vec![0.8] };
+    let covariance = Covariance { variances: vec![1e-6], ..Covariance::default() };
+    Effect { shape: vec![term], covariance: Some(covariance), ..Effect::default() }
+}
+
+/// References whose distances are too short by a constant of the disparity.
+fn references(count: usize, power: f64, shift_px: f64, error_m: f64, seed: u64) -> Vec<Checked> {
+    let mut rng = Seed(seed).stream("references");
+    let noise = Normal::new(0.0, error_m).unwrap();
+    let of = |k: usize| {
+        let z = 0.8 + 2.7 * k as f64 / (count - 1) as f64;
+        let px = shift_px * (PX_M / z / DISPARITY_UNIT_PX).powf(power);
+        Checked::ahead(z, -z * z * px / PX_M + noise.sample(&mut rng), PX_M)
+    };
+    (0..count).map(of).collect()
+}
+
+fn shift_of(effect: &Effect) -> [f64; 2] {
+    let affine = effect.shape.last().unwrap();
+    assert!(matches!(affine.basis, Basis::Affine { .. }), "{affine:?}");
+    assert_eq!(affine.coefficients[1..], [0.0; 2]);
+    [affine.coefficients[0], effect.covariance.as_ref().unwrap().variances[1].sqrt()]
+}
+
+/// The constant comes back, for either power, within what is said of its error.
+#[test]
+fn references_tell_the_constant() {
+    let camera = kinect_v1(4).camera;
+    for power in [0.0, 2.0] {
+        let mut inside = 0;
+        for seed in 0..40 {
+            let mut added = [bowl(power)];
+            let checked = references(12, power, 0.2, 0.002, seed);
+            anchor(&mut added, &checked, 0.002f64.powi(2), &camera);
+            let [shift, error] = shift_of(&added[0]);
+            assert!((shift - 0.2).abs() < 0.08, "{power}: {shift}");
+            inside += usize::from((shift - 0.2).abs() < 1.645 * error);
+        }
+        assert!((31..=40).contains(&inside), "{power}: {inside} of 40");
+    }
+}
+
+/// Where there is no bias that stands still, there is nothing to lift.
+#[test]
+fn a_constant_alone_is_nothing() {
+    let camera = kinect_v1(4).camera;
+    let mut added = [Effect::default()];
+    anchor(&mut added, &references(12, 0.0, 0.2, 0.002, 1), 4e-6, &camera);
+    assert!(added[0].shape.is_empty());
+}
+
+/// References that are hardly known say hardly anything.
+#[test]
+fn poor_references_move_little() {
+    let camera = kinect_v1(4).camera;
+    let mut added = [bowl(0.0)];
+    anchor(&mut added, &references(6, 0.0, 0.2, 0.0, 1), 1.0, &camera);
+    let [shift, error] = shift_of(&added[0]);
+    assert!(shift.abs() < 0.01, "{shift}");
+    assert!(error > 0.1, "{error}");
+}
