@@ -6,23 +6,33 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::laws::Checked;
+use super::checked::Checked;
 use crate::camera::Camera;
 use crate::model::Effect;
 use crate::solve::Cholesky;
 use crate::terms::{Basis, DISPARITY_UNIT_PX, Modulation, Pixels, Statistic, Term};
 
-/// Shapes of one power of the disparity.
-struct Family {
+/// Biases of one power of the disparity, whose constant planes do not tell.
+pub struct Family {
     power: f64,
     /// Root mean square over the picture, px: the constant is of no other size than the shapes are.
     usual: f64,
 }
 
+impl Family {
+    /// What its constant, of the usual size, makes of a distance, m.
+    pub fn moves_m(&self, c: &Checked) -> f64 {
+        let disparity = c.px_m / c.z;
+        // A disparity too large by delta px makes the depth too small by z^2 delta / (f b).
+        let by_px = c.z * c.z / c.px_m;
+        by_px * self.usual * (disparity / DISPARITY_UNIT_PX).powf(self.power)
+    }
+}
+
 /// Let the learnt biases of `added` leave the references where they were measured. `checked` is what
 /// the references say with these biases, and all laws, taken out; `variance` that of one, m^2.
 pub fn anchor(added: &mut [Effect], checked: &[Checked], variance: f64, camera: &Camera) {
-    let families = families(added, camera);
+    let families = families(added.iter().flat_map(|e| &e.shape), camera);
     for (Family { power, usual }, [shift, error]) in
         families.iter().zip(constants(&families, checked, variance))
     {
@@ -34,12 +44,11 @@ pub fn anchor(added: &mut [Effect], checked: &[Checked], variance: f64, camera: 
     }
 }
 
-fn families(added: &[Effect], camera: &Camera) -> Vec<Family> {
+pub fn families<'a>(terms: impl Iterator<Item = &'a Term>, camera: &Camera) -> Vec<Family> {
     let rays = camera.rays();
     let pixels = Pixels::new(camera, &rays, 1.0);
     let mut families: Vec<Family> = Vec::new();
-    let terms = added.iter().flat_map(|e| &e.shape).filter(|t| t.is_correctable());
-    for term in terms.filter(|t| !matches!(t.basis, Basis::Affine { .. })) {
+    for term in terms.filter(|t| t.is_correctable() && !matches!(t.basis, Basis::Affine { .. })) {
         let Some(power) = term.basis.still_power() else { continue };
         let square = mean_square(term, &pixels);
         match families.iter_mut().find(|f| f.power == power) {
@@ -73,13 +82,10 @@ fn constants(families: &[Family], checked: &[Checked], variance: f64) -> Vec<[f6
     let mut information = DMatrix::zeros(n + 2, n + 2);
     let mut score = DVector::zeros(n + 2);
     for c in checked {
-        let disparity = c.px_m / c.z;
-        // A disparity too large by delta px makes the depth too small by z^2 delta / (f b).
-        let by_px = c.z * c.z / c.px_m;
-        let of = |f: &Family| by_px * f.usual * (disparity / DISPARITY_UNIT_PX).powf(f.power);
         // On a tilted target the axis meets it elsewhere by two small angles.
         let angles = c.slope.map(|slope| c.z * slope);
-        let row = DVector::from_iterator(n + 2, families.iter().map(of).chain(angles));
+        let row =
+            DVector::from_iterator(n + 2, families.iter().map(|f| f.moves_m(c)).chain(angles));
         score.axpy(-c.off / variance, &row, 1.0);
         information.ger(1.0 / variance, &row, &row, 1.0);
     }

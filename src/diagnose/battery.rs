@@ -3,15 +3,17 @@
 use serde_json::Map;
 
 use super::ablation::Ablation;
+use super::anchor::families;
 use super::bias;
 use super::case::{Case, Mean, Scatter};
+use super::checked::checked;
 use super::diagnosis::{Detectable, Finding, Status};
 use super::few_views::few_views;
 use super::findings;
 use super::form::better_form;
 use super::hanging::Hanging;
 use super::heldout;
-use super::laws;
+use super::laws::{Beside, laws};
 use super::learnt::Learnt;
 use super::lines::lines;
 use super::missing::{self, missing};
@@ -262,26 +264,34 @@ impl Case<'_> {
         let ours = self.fields.iter().filter(|f| f.reference_distance_m.is_some()).count();
         let of_laws = theirs.map(|l| l.excess(ours as f64));
         let excess = of_bias.unwrap_or(1.0).max(of_laws.unwrap_or(1.0));
-        let found = |terms: &[Term]| {
+        let found = |terms: &[Term], beside: &Beside| {
             let levels = heldout::levels(&self.survey, terms);
             let second = self.survey.second();
-            let laws =
-                laws::laws(&laws::checked(&self.fields, &levels, &self.known, &second), bent_m);
+            let laws = laws(&checked(&self.fields, &levels, &self.known, &second), beside);
             let level = self.level(Self::LAWS_LEVEL);
             reference::findings(&laws, &self.known, excess, level, self.options.seed)
         };
-        // A bowl, too, moves the plane on the axis, by what nobody can tell from a law of the
-        // distance: a law must hold with and without it, be it new or the model's.
+        // A bowl, too, moves the plane on the axis, by a constant that nobody knows.
+        let open = families(bias.iter().chain(&self.known.bias), &self.sensor().camera);
+        if !open.is_empty() {
+            let laws = found(bias, &Beside { bent_m, open });
+            if !laws.is_empty() {
+                return laws;
+            }
+        }
+        // It may be all of an offset of the disparity: a law must hold with and without the bowl, be it
+        // new or the model's.
         let back = |t: &Term| Term {
             coefficients: t.coefficients.iter().map(|c| -c).collect(),
             ..t.clone()
         };
         let model: Vec<Term> =
             self.known.bias.iter().filter(|t| !t.basis.is_nothing_ahead()).map(back).collect();
-        let mut laws = found(&anchored);
+        let closed = Beside { bent_m, open: Vec::new() };
+        let mut laws = found(&anchored, &closed);
         for others in [bias.to_vec(), [anchored.clone(), model].concat()] {
             if others != anchored && !laws.is_empty() {
-                let with = found(&others);
+                let with = found(&others, &closed);
                 laws.retain(|l| with.iter().any(|w| w.effect == l.effect));
             }
         }

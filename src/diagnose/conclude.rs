@@ -4,6 +4,7 @@ use super::anchor::anchor;
 use super::battery::Battery;
 use super::between::between;
 use super::case::Case;
+use super::checked::{checked, scatter};
 use super::detectable::detectable;
 use super::diagnosis::{DIAGNOSIS_FORMAT, Detectable, Diagnosis, HeldOut, MapRow, Reference};
 use super::engine::Diagnosed;
@@ -96,9 +97,9 @@ impl Case<'_> {
         let added = &mut extended.effects[self.model.effects.len()..];
         let bias = added.iter().flat_map(|e| &e.shape).filter(|t| t.is_correctable());
         let levels = heldout::levels(&self.survey, &bias.cloned().collect::<Vec<_>>());
-        let checked = laws::checked(&self.fields, &levels, &known, &self.survey.second());
+        let checked = checked(&self.fields, &levels, &known, &self.survey.second());
         if checked.len() >= laws::FEWEST {
-            anchor(added, &checked, laws::scatter(&checked).0, camera);
+            anchor(added, &checked, scatter(&checked).0, camera);
         }
     }
 

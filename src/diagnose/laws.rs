@@ -1,13 +1,12 @@
 //! Laws that distances may be off by, fitted to references.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
+use super::anchor::Family;
+use super::checked::{Checked, is_tilted, scatter};
 use super::evidence::{Evidence, gain};
-use super::field::Field;
-use super::known::KnownTerms;
 use super::null::Null;
 use super::replication::{Measured, agree};
-use super::scatter::{Left, left_by_fit};
 use super::warm_up::{Reading, WarmUp, warm_up};
 use crate::terms::Axis;
 
@@ -35,77 +34,33 @@ pub struct Law {
     pub replicated: Option<bool>,
 }
 
-/// One view with a reference.
-#[derive(Debug, Clone, Copy)]
-pub struct Checked {
-    pub z: f64,
-    /// Slope of the target, along the columns and rows.
-    pub slope: [f64; 2],
-    /// Measured minus reference, m.
-    pub off: f64,
-    session_s: f64,
-    /// Disparity in px times depth.
-    pub px_m: f64,
-    sigma_m: f64,
-    second: bool,
-}
-
-#[cfg(test)]
-impl Checked {
-    /// A frontal view.
-    pub fn ahead(z: f64, off: f64, px_m: f64) -> Self {
-        Checked { z, slope: [0.0; 2], off, session_s: 0.0, px_m, sigma_m: 0.002, second: false }
-    }
-}
-
 /// Fewer references than this can be fitted by anything.
 pub const FEWEST: usize = 5;
 /// Time constants of a warm-up, s.
 const WARM_UPS: [f64; 6] = [60.0, 180.0, 480.0, 1200.0, 2400.0, 7200.0];
 
-/// All laws, with what each gains on references left out; none where there are too few. `bent_m` is
-/// by how much the target is bent, if it is: the same plane is then so far from the place that was
-/// measured, at any distance.
-pub fn laws(checked: &[Checked], bent_m: f64) -> Vec<Law> {
-    if checked.len() < FEWEST { Vec::new() } else { of(checked, bent_m) }
+/// What else distances may be off by.
+#[derive(Default)]
+pub struct Beside {
+    /// How far a bent target may lie from the place on it that was measured, at any distance, m.
+    pub bent_m: f64,
+    /// Biases whose constants are open: an offset of the disparity cannot be told from them.
+    pub open: Vec<Family>,
 }
 
-/// What the model knows of the laws is taken out. `levels` is what each view's disparity on the
-/// optical axis changes by once the found bias is taken out, px.
-pub fn checked(
-    fields: &[Field],
-    levels: &[f64],
-    known: &KnownTerms,
-    second: &[bool],
-) -> Vec<Checked> {
-    let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
-    fields
-        .iter()
-        .zip(levels)
-        .zip(second)
-        .filter_map(|((f, level), &second)| {
-            // The plane had bent towards what is now known to be a bias.
-            let z = f.scale_px_m / (f.scale_px_m * f.plane.q.z + level);
-            let session_s = f.time_s - start;
-            let off = z - f.reference_distance_m? - known.law_m(z, session_s, f.scale_px_m);
-            let sigma_px = f64::from(f.sigma.get(f.sigma.len() / 2).copied()?);
-            let sigma_m = sigma_px * z * z / f.scale_px_m;
-            let steep = f.plane.theta().tan();
-            let (sin, cos) = f.plane.azimuth().sin_cos();
-            let slope = [steep * cos, steep * sin];
-            Some(Checked { z, slope, off, session_s, px_m: f.scale_px_m, sigma_m, second })
-        })
-        .collect()
+/// All laws, with what each gains on references left out; none where there are too few.
+pub fn laws(checked: &[Checked], beside: &Beside) -> Vec<Law> {
+    if checked.len() < FEWEST { Vec::new() } else { of(checked, beside) }
 }
 
-fn of(checked: &[Checked], bent_m: f64) -> Vec<Law> {
+fn of(checked: &[Checked], Beside { bent_m, open }: &Beside) -> Vec<Law> {
     let angles = if is_tilted(checked) { 2 } else { 0 };
-    let bent = (bent_m > 0.0).then_some(bent_m);
-    // What the distances may be off by for other reasons.
+    let bent = (*bent_m > 0.0).then_some(*bent_m);
     let others = |c: &Checked| -> Vec<f64> {
-        c.slope[..angles].iter().map(|s| c.z * s).chain(bent).collect()
+        let angles = c.slope[..angles].iter().map(|s| c.z * s);
+        angles.chain(bent).chain(open.iter().map(|f| f.moves_m(c))).collect()
     };
-    let beside = angles + usize::from(bent.is_some());
+    let beside = angles + usize::from(bent.is_some()) + open.len();
     let (variance, free) = scatter(checked);
     let mut laws = Vec::new();
     let mut add = |family, axis, column: &dyn Fn(&Checked) -> f64| {
@@ -170,7 +125,9 @@ fn of(checked: &[Checked], bent_m: f64) -> Vec<Law> {
     };
     add("depth-scale", Axis::Z, &|c| c.z);
     // An offset of the disparity by delta px moves the depth by -z^2 delta / (f b).
-    add("disparity-offset", Axis::Z, &|c| -c.z * c.z / c.px_m);
+    if open.is_empty() {
+        add("disparity-offset", Axis::Z, &|c| -c.z * c.z / c.px_m);
+    }
     for tau in WARM_UPS {
         add("thermal-drift", Axis::SessionTime, &|c| c.z * (1.0 - (-c.session_s / tau).exp()));
     }
@@ -199,35 +156,6 @@ fn drift(
 
 /// A relative error of a few percent, an offset of a few px.
 const PRIOR: f64 = 1.0;
-/// Targets tilted by less, as a slope, and fewer of them than this, do not tell where they were
-/// measured.
-const TILTED: f64 = 0.2;
-const FEWEST_TILTED: usize = 5;
-
-/// On a tilted target the distance depends on where the optical axis is taken to meet it: by two
-/// angles, which are fitted beside every law where there are views enough.
-fn is_tilted(checked: &[Checked]) -> bool {
-    let steep = |c: &&Checked| c.slope[0].hypot(c.slope[1]) > TILTED;
-    checked.iter().filter(steep).count() >= FEWEST_TILTED && checked.len() >= 2 * FEWEST_TILTED
-}
-
-/// Variance of the references' own errors, m^2, and its degrees of freedom: what the laws together
-/// leave.
-pub fn scatter(checked: &[Checked]) -> (f64, f64) {
-    let n = checked.len();
-    let span = checked.iter().map(|c| c.session_s).fold(0.0, f64::max).max(1.0);
-    let columns = if is_tilted(checked) { 6 } else { 4 };
-    let columns = DMatrix::from_fn(n, columns, |i, j| {
-        let c = &checked[i];
-        let [right, down] = c.slope;
-        [1.0, c.z, c.z * c.z, c.z * c.session_s / span, c.z * right, c.z * down][j]
-    });
-    let off = DVector::from_iterator(n, checked.iter().map(|c| c.off));
-    let all = Left { squares: off.norm_squared(), free: n as f64 };
-    let left = left_by_fit(columns, &off).unwrap_or(all);
-    // A tape is read to half a millimetre at best.
-    ((left.squares / left.free.max(1.0)).max(0.0005 * 0.0005), left.free)
-}
 
 #[cfg(test)]
 #[path = "laws_tests.rs"]

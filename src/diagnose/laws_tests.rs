@@ -34,7 +34,8 @@ fn references(
 }
 
 fn found(checked: &[Checked]) -> Vec<(Option<&'static str>, f64)> {
-    let told = findings(&of(checked, 0.0), &KnownTerms::default(), 1.0, 0.003, Seed(1));
+    let told =
+        findings(&of(checked, &Beside::default()), &KnownTerms::default(), 1.0, 0.003, Seed(1));
     told.iter().map(|f| (f.effect, f.parameters["offset_px"]["value"].as_f64().unwrap())).collect()
 }
 
@@ -68,7 +69,14 @@ fn a_bent_target_is_no_law() {
         let mut checked = references(0.0, [0.0; 2], |k| 7 * k % 24, seed);
         checked.iter_mut().for_each(|c| c.off += 0.004);
         let told = |bent_m| {
-            findings(&of(&checked, bent_m), &KnownTerms::default(), 1.0, 0.003, Seed(1)).len()
+            findings(
+                &of(&checked, &Beside { bent_m, ..Beside::default() }),
+                &KnownTerms::default(),
+                1.0,
+                0.003,
+                Seed(1),
+            )
+            .len()
         };
         alone += told(0.0);
         assert_eq!(told(0.004), 0, "seed {seed}");
@@ -82,7 +90,13 @@ fn an_offset_is_seen_beside_a_bend() {
     for seed in 0..8 {
         let mut checked = references(0.06, [0.0; 2], |k| 7 * k % 24, seed);
         checked.iter_mut().for_each(|c| c.off += 0.004);
-        let told = findings(&of(&checked, 0.004), &KnownTerms::default(), 1.0, 0.003, Seed(1));
+        let told = findings(
+            &of(&checked, &Beside { bent_m: 0.004, ..Beside::default() }),
+            &KnownTerms::default(),
+            1.0,
+            0.003,
+            Seed(1),
+        );
         let [offset] = &told[..] else { panic!("seed {seed}: {}", told.len()) };
         assert_eq!(offset.effect, Some("disparity-offset"));
         let px = offset.parameters["offset_px"]["value"].as_f64().unwrap();

@@ -13,6 +13,7 @@ mod bias;
 mod blocks;
 mod candidate;
 mod case;
+mod checked;
 mod choose;
 mod conclude;
 mod detectable;
