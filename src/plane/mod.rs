@@ -11,6 +11,7 @@ mod candidate;
 mod curved;
 mod grow;
 mod image;
+mod morphology;
 mod paper;
 mod ransac;
 mod relief;
