@@ -64,6 +64,15 @@ impl Gauge<'_> {
     }
 }
 
+#[cfg(test)]
+impl Lattice {
+    /// Of nodes without pixels.
+    pub fn bare(columns: usize, rows: usize) -> Self {
+        let n = columns * rows;
+        Lattice { pitch: 1, columns, rows, sample: vec![None; n], mean: vec![None; n] }
+    }
+}
+
 impl Lattice {
     pub fn over(w: &[f32], rays: &Rays, width: usize, height: usize) -> Self {
         let pitch = ((width as f64 / NODES_A_ROW).round() as usize).max(1);

@@ -60,8 +60,50 @@ impl Lattice {
         (0..mask.len()).map(|n| self.around(n, 1).any(|m| mask[m])).collect()
     }
 
+    /// With gaps of up to two nodes closed, as far as the set itself surrounds them: where an edge
+    /// meets the image's border at a slant, what is outside the image closes nothing.
+    pub fn closed(&self, mask: &[bool]) -> Vec<bool> {
+        // The image is widened by a node on every side, none of them set.
+        let (across, rows) = (self.columns + 2, self.rows + 2);
+        let mut near = vec![false; across * rows];
+        for node in (0..mask.len()).filter(|n| mask[*n]) {
+            let (c, r) = (node % self.columns, node / self.columns);
+            for row in r..=r + 2 {
+                near[row * across + c..=row * across + c + 2].fill(true);
+            }
+        }
+        let surrounded = |node: usize| {
+            let (c, r) = (node % self.columns, node / self.columns);
+            (r..=r + 2).all(|row| near[row * across + c..=row * across + c + 2].iter().all(|n| *n))
+        };
+        (0..mask.len()).map(surrounded).collect()
+    }
+
     /// Every node whose neighbours inside the image are all set.
     pub fn eroded(&self, mask: &[bool]) -> Vec<bool> {
         (0..mask.len()).map(|n| self.around(n, 1).all(|m| mask[m])).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A board whose upper edge leaves the image at a slope of one in five.
+    #[test]
+    fn closing_adds_no_wedge_at_the_border() {
+        let lattice = Lattice::bare(60, 20);
+        let mask: Vec<bool> = (0..1200).map(|n| n % 60 < 20 + 5 * (n / 60)).collect();
+        assert_eq!(lattice.closed(&mask), mask);
+    }
+
+    #[test]
+    fn closing_fills_holes_and_keeps_a_full_image() {
+        let lattice = Lattice::bare(12, 9);
+        let mut mask = vec![true; 108];
+        assert_eq!(lattice.closed(&mask), mask);
+        mask[50] = false;
+        mask[51] = false;
+        assert!(lattice.closed(&mask).iter().all(|m| *m));
     }
 }

@@ -236,7 +236,7 @@ fn finish(
     measured: usize,
 ) -> Result<Target, String> {
     let width = image.camera.width;
-    let filled = lattice.eroded(&lattice.dilated(&best.mask));
+    let filled = lattice.closed(&best.mask);
     let trimmed = lattice.eroded(&filled);
     let core = lattice.eroded(&trimmed);
     let count = |mask: &[bool]| mask.iter().filter(|m| **m).count();
