@@ -14,6 +14,7 @@ mod capture_kinect;
 mod command_line;
 mod correct;
 mod determinism;
+mod distances;
 mod effects;
 mod extended_map;
 mod fit;
