@@ -26,7 +26,7 @@ use super::reference;
 use super::replication_textures;
 use super::rim;
 use super::scene::Scene;
-use super::steps::{is_raw, steps};
+use super::steps::{is_raw, own_step, own_step_note, steps};
 use super::variance;
 use super::verdict::{MIN_SIZE, echoes, fold_into_sigma, merge, symptoms};
 use crate::terms::{Axis, Statistic, Term, corner_radius};
@@ -57,14 +57,6 @@ fn tell_lines_once(found: &mut Vec<Finding>) {
     }
 }
 
-/// How far a bent target's plane may lie from the place on it that was measured, m: of a parabola the
-/// mean is 1.1 root mean squares from its vertex, and 2.2 from its rim.
-fn bent_m(found: &[Finding]) -> f64 {
-    const FROM_PLACE: f64 = 2.0;
-    let bent = |f: &&Finding| f.statistic == Statistic::Bias && f.axis == Axis::TargetPosition;
-    1e-3 * FROM_PLACE * found.iter().filter(bent).map(|f| f.size.mm).fold(0.0, f64::hypot)
-}
-
 impl Case<'_> {
     pub fn scenes(&self) -> [Scene<'_>; 2] {
         let scale_px_m = self.fields[0].scale_px_m;
@@ -84,7 +76,9 @@ impl Case<'_> {
         let second = self.survey.second();
         let lattice = &scatter.lattice;
         let steps = steps(lattice, &self.known, &self.fields, self.recording, sigma_mm, &second);
-        let stepped = !steps.is_empty();
+        let own_step = own_step(lattice, self.recording, self.fields[0].scale_px_m);
+        self.copies.extend(own_step.map(own_step_note));
+        let stepped = !steps.is_empty() || own_step.is_some();
         let mut curves = self.curves([&mean.outcome, &scatter.outcome], advise);
         let refitted = self.take_refit(&mut curves);
         curves.retain(|f| self.is_news(f, &steps, &scatter));
@@ -100,7 +94,7 @@ impl Case<'_> {
         self.at("searching the lost pixels", "testing the lost pixels again");
         let (lost, detectable) = self.lost();
         found.extend(lost);
-        let laws = self.laws(&mean.terms, bent_m(&found));
+        let laws = self.laws(&mean.terms, reference::bent_m(&found));
         found.extend(laws);
         found.extend(self.few_views([&mean.outcome, &scatter.outcome], stepped));
         tell_lines_once(&mut found);

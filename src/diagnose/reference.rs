@@ -12,7 +12,7 @@ use super::null::{NoiseGains, Null, student};
 use super::parameters::estimate;
 use crate::model::Covariance;
 use crate::rng::Seed;
-use crate::terms::Statistic;
+use crate::terms::{Axis, Statistic};
 
 /// A law must move the depth by this many errors of a reference, and by this much, m: tapes and
 /// planes are not better.
@@ -20,6 +20,14 @@ const CLEARLY: f64 = 1.2;
 const LEAST_M: f64 = 0.0015;
 /// Names that predict as well as the best within this many nats cannot be told apart.
 const AS_GOOD_NATS: f64 = 3.0;
+
+/// How far a bent target's plane may lie from the place on it that was measured, m: of a parabola the
+/// mean is 1.1 root mean squares from its vertex, and 2.2 from its rim.
+pub fn bent_m(found: &[Finding]) -> f64 {
+    const FROM_PLACE: f64 = 2.0;
+    let bent = |f: &&Finding| f.statistic == Statistic::Bias && f.axis == Axis::TargetPosition;
+    1e-3 * FROM_PLACE * found.iter().filter(bent).map(|f| f.size.mm).fold(0.0, f64::hypot)
+}
 
 /// What the references tell, if anything.
 /// `excess` is how much further than by their own error the levels may be off, in variance.

@@ -69,6 +69,20 @@ fn lattice_of<'a>(fields: impl Iterator<Item = &'a Field>, recording: &Recording
 /// Steps of two halves that differ by less, as a share, are one: the scan's own error twice.
 const SAME_STEP: f64 = 0.005;
 
+/// The step of a raw recording's own words, px, where that is what is seen: a simulation in the same
+/// words has it too, and sigma holds the error that it makes.
+pub(super) fn own_step(lattice: &Quantisation, recording: &Recording, px_m: f64) -> Option<f64> {
+    let DepthCode::Disparity { slope, .. } = recording.sensor.code else { return None };
+    let word = (slope * px_m).abs();
+    lattice.disparity_step_px.filter(|step| (step / word - 1.0).abs() < SAME_STEP)
+}
+
+pub(super) fn own_step_note(step: f64) -> String {
+    format!(
+        "depths come in the steps of the recording's own raw words, {step:.3} px of disparity; sigma holds the error that they make"
+    )
+}
+
 /// A step is worth telling when the error it makes is this share of the noise.
 const STEP_SHARE: f64 = 0.1;
 
@@ -115,6 +129,7 @@ pub(super) fn steps(
     let sigma_px = f64::from(crate::stats::median_in_place(&mut sigma_px));
     if let Some(step) = lattice.disparity_step_px
         && !known.has("disparity-quantisation")
+        && own_step(lattice, recording, fields[0].scale_px_m).is_none()
     {
         let sigma = step / 12f64.sqrt() / sigma_px;
         if sigma > STEP_SHARE {
