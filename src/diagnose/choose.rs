@@ -10,6 +10,9 @@ use crate::terms::Basis;
 const AS_GOOD_NATS: f64 = 2.0;
 /// So they do within this share of a large gain: no family's shape is exact.
 const AS_GOOD_SHARE: f64 = 0.01;
+/// A formula of the catalogue that is off by more is another formula.
+const FORMULA_ERROR: f64 = 0.1;
+
 /// The candidates of a step, and what each comes to.
 pub struct Choice<'a> {
     pub candidates: &'a [Candidate],
@@ -57,6 +60,16 @@ impl Choice<'_> {
         })
     }
 
+    /// Does it explain as much as the best, where views differ from it by what its formula leaves out
+    /// at second order rather than by their noise? That they scatter says nothing against it then.
+    fn is_as_exact_as_a_formula(&self, i: usize, most: f64) -> bool {
+        let (total, candidate) = (self.total(i), &self.candidates[i]);
+        let Some(judged) = &self.judged[i] else { return false };
+        let error = candidate.effect().map_or(0.0, |e| e.formula_error()).min(FORMULA_ERROR);
+        let numbers = (judged.gain.by_view.len() * candidate.basis.count()) as f64;
+        total > (1.0 - AS_GOOD_SHARE) * most && 2.0 * total * error.powi(2) > numbers
+    }
+
     fn is_sensible(&self, i: usize) -> bool {
         self.judged[i].as_ref().is_some_and(|j| j.sensible)
     }
@@ -79,12 +92,15 @@ impl Choice<'_> {
         let threshold = self.noise.threshold(self.rules.level);
         let best_curve = self.best_curve(curves);
         let best_family = families.first().map_or(f64::NEG_INFINITY, |&i| self.fair(i));
+        let most = families.iter().map(|&i| self.total(i)).fold(0.0, f64::max);
         let slack = AS_GOOD_NATS.max(AS_GOOD_SHARE * best_family);
         let columns = |i: usize| self.candidates[i].basis.count();
         families
             .iter()
             .copied()
-            .filter(|&i| self.fair(i) > best_family - slack)
+            .filter(|&i| {
+                self.fair(i) > best_family - slack || self.is_as_exact_as_a_formula(i, most)
+            })
             .min_by_key(|&i| (columns(i), !self.rests_on_a_measurement(i)))
             .filter(|&i| self.safe(i) > threshold && self.total(i) > self.adequacy(i) * best_curve)
             // What fewer columns without a name do better is not what the name says.
