@@ -14,7 +14,7 @@ use kinoise::simulate::{FormulaSensor, plan_on};
 use kinoise::view::ViewNotes;
 use kinoise::{Form, NoiseModel, Recording, Seed, Sensor};
 
-use super::common::{Global, Input, model_again, source_date};
+use super::common::{Global, Input, model_again, say_differences, source_date};
 use super::console::{
     beside, detail, detail_model, detail_recording, next_step, result, say, shell, working,
 };
@@ -63,6 +63,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
         (Some(path), _) => {
             let model = NoiseModel::read(path)?;
             model.refuse_other_size(&recording.sensor)?;
+            say_differences(path, &model, &recording.sensor);
             model
         }
         (None, Some(simulated)) => weights(&recording, simulated, global)?,

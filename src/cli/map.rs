@@ -118,10 +118,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let mut sequence = open(&arguments.sequence, &arguments.input.assumed()?)?;
     let thinning = &arguments.thinning;
     sequence.thin(thinning.stride, thinning.frames);
-    let model = arguments.model.read()?;
-    model.refuse_other_size(&sequence.sensor)?;
     let options = arguments.tuning.options(global.seed());
     options.check()?;
+    notes(&sequence.remarks);
+    let model = arguments.model.read_for(&sequence)?;
     let title = format!("Map of {}", name_of(&arguments.sequence));
     let inputs: Vec<&Path> =
         arguments.model.path().into_iter().chain([&*arguments.sequence]).collect();
@@ -175,7 +175,7 @@ pub fn follow(
     output.write("stats.json", serde_json::to_string_pretty(&stats)?.as_bytes())?;
     let folder = output.place().to_path_buf();
     output.finish()?;
-    notes(sequence.remarks.iter().chain(&mapped.remarks));
+    notes(&mapped.remarks);
     report(&mapped, &against, &folder);
     Ok(stats)
 }

@@ -361,3 +361,44 @@ fn truth_and_estimate_swapped_are_told() {
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("json");
     assert!(json["remarks"][0].as_str().expect("a remark").contains(ASK));
 }
+
+/// A model of another camera is told at once, with what differs; so is what stands in for a model.
+#[test]
+fn a_sequence_says_whose_model_weighs_it() {
+    let desk = Desk::new();
+    desk.recording("rec", kinect_v1(4).code, &[1.0, 1.5, 2.0, 3.0]);
+    desk.done("calibrate rec -o cal", &[]);
+    let text = fs::read_to_string(desk.at("cal/model.json")).expect("read");
+    let mut other: serde_json::Value = serde_json::from_str(&text).expect("json");
+    for key in ["fx", "fy"] {
+        other["sensor"][key] = (1.1 * other["sensor"][key].as_f64().expect("a number")).into();
+    }
+    fs::write(desk.at("other.json"), other.to_string()).expect("written");
+    desk.done("simulate film --room --frames 4 -m cal/model.json", &[]);
+    for command in ["map film", "compare film", "diagnose rec"] {
+        let line = format!("{command} -m other.json -o out --force");
+        desk.done(&line, &["other.json is another sensor's", "focal lengths are"]);
+        fs::remove_dir_all(desk.at("out")).expect("removed");
+        let (_, said) = desk.run(&format!("{command} -m cal/model.json -o own"));
+        assert!(!said.contains("another sensor's"), "{said}");
+        fs::remove_dir_all(desk.at("own")).expect("removed");
+    }
+    desk.done("map film -o own", &["no --model was given", "Eq. 1, for a Kinect v1 at 1 to 4 m"]);
+}
+
+/// The benchmark publishes its cameras: what replaces one is told.
+#[test]
+fn intrinsics_in_place_of_a_published_camera_are_told() {
+    let desk = Desk::new();
+    let frame = kinoise::Frame { width: 640, height: 480, raw: vec![10_000; 640 * 480] };
+    write_depth(&desk.at("depth/1.png"), &frame);
+    let head = "# file: 'rgbd_dataset_freiburg3_office.bag'";
+    fs::write(desk.at("depth.txt"), format!("{head}\n1.0 depth/1.png\n")).expect("written");
+    let told = |intrinsics| {
+        let assumed = Assumed { intrinsics: Some(intrinsics), ..Assumed::default() };
+        let film = sequence::open(desk.folder.path(), &assumed).expect("a sequence");
+        film.remarks.iter().any(|r| r.contains("--intrinsics replaces freiburg3's"))
+    };
+    assert!(told([525.0, 525.0, 319.5, 239.5]));
+    assert!(!told([535.4, 539.2, 320.1, 247.6]), "it is the published one");
+}
