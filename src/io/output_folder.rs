@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::folder::INDEX;
 use super::layout::{DEPTH_LIST, DESCRIPTION};
-use super::output::{entries, write_atomic};
+use super::output::{entries, listed, write_atomic};
 use super::unfinished::{Open, discard, register};
 use crate::error::{Error, Result};
 
@@ -214,14 +214,22 @@ fn make_parents(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     fs::create_dir_all(folder).map(|()| missing)
 }
 
+fn no_folder(file: &Path) -> Error {
+    Error::recording(file, "this is a file, not a folder", "choose another folder for the output")
+}
+
 /// May it be written?
 fn what_stands(place: &Path, leaves: Leaves, force: bool) -> Result<Stands> {
     if fs::symlink_metadata(place).is_err() {
-        return Ok(Stands::Nothing);
+        // A file on the way there would only say so when the folder is made.
+        let standing = place.ancestors().find(|p| fs::symlink_metadata(p).is_ok());
+        return match standing.filter(|p| !p.as_os_str().is_empty() && !p.is_dir()) {
+            Some(file) => Err(no_folder(file)),
+            None => Ok(Stands::Nothing),
+        };
     }
     if !place.is_dir() {
-        let cause = std::io::Error::from(std::io::ErrorKind::NotADirectory);
-        return Err(Error::write(place, cause));
+        return Err(no_folder(place));
     }
     let there: Vec<String> = entries(place)?
         .iter()
@@ -259,16 +267,6 @@ fn what_stands(place: &Path, leaves: Leaves, force: bool) -> Result<Stands> {
                 ),
             }
         }
-    }
-}
-
-/// A few of the names.
-fn listed(names: &[String]) -> String {
-    const SHOWN: usize = 3;
-    let shown = names.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
-    match names.len().saturating_sub(SHOWN) {
-        0 => shown,
-        more => format!("{shown} and {more} more"),
     }
 }
 
