@@ -4,7 +4,7 @@ use anyhow::Context;
 use clap::Args;
 use kinoise::correct::{CorrectOptions, Corrected, correct_recording};
 use kinoise::effects::Active;
-use kinoise::io::{Leaves, OutputFolder};
+use kinoise::io::{DESCRIPTION, Leaves, OutputFolder};
 use kinoise::{DepthCode, NoiseModel};
 
 use super::common::{Global, Input};
@@ -71,7 +71,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     }))?;
     let output = &arguments.output;
     let to = beside(output, "diagnosis");
-    next_step(&["diagnose".into(), output.into(), "-o".into(), to.into()]);
+    let next = ["diagnose".into(), output.into(), "-o".into(), to.into()];
+    let described = output.join(DESCRIPTION).is_file();
+    let input = if described { Vec::new() } else { arguments.input.again() };
+    next_step(&[&next[..], &input].concat());
     Ok(())
 }
 
@@ -80,8 +83,8 @@ fn report(corrected: &Corrected, arguments: &Arguments) {
     notes(&corrected.remarks);
     if !ignored.is_empty() {
         say(format!(
-            "note: left in, for these are no biases of the sensor: {}",
-            ignored.join(", ")
+            "note: left in, because they are noise or belong to the scene: {}",
+            counted(ignored)
         ));
     }
     if *changed == 0 {
@@ -96,4 +99,20 @@ fn report(corrected: &Corrected, arguments: &Arguments) {
     result(format!(
         "corrected {changed} of {measured} depths in {frames} frames by {rms_mm:.2} mm (root mean square); wrote {output}"
     ));
+}
+
+/// Each name once, with how often it stands there.
+fn counted(names: &[String]) -> String {
+    let mut counts: Vec<(&str, usize)> = Vec::new();
+    for name in names {
+        match counts.iter_mut().find(|(known, _)| known == name) {
+            Some((_, n)) => *n += 1,
+            None => counts.push((name, 1)),
+        }
+    }
+    let times = |(name, n): &(&str, usize)| match n {
+        1 => name.to_string(),
+        _ => format!("{name} ({n} times)"),
+    };
+    counts.iter().map(times).collect::<Vec<_>>().join(", ")
 }
