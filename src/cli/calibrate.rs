@@ -242,7 +242,7 @@ fn write_outputs(out: OutputFolder, page: &CalibrationPage<'_>) -> anyhow::Resul
         out.write("report.html", calibration_page(page)?.as_bytes())?;
         Ok(())
     })?;
-    let useless = calibration.fit.quality.explains_nothing().filter(|_| !out.forced());
+    let useless = calibration.fit.is_no_model().filter(|_| !out.forced());
     if useless.is_none() {
         calibration.model.write(&out.path().join("model.json"))?;
     }
@@ -255,11 +255,10 @@ fn write_outputs(out: OutputFolder, page: &CalibrationPage<'_>) -> anyhow::Resul
     result(formula(calibration));
     say(comparison(calibration));
     notes(&calibration.warnings);
-    if let Some(what) = useless {
-        const CAUSES: &str = "how raw values become metres, the intrinsics, and measurements.csv for views that measured something else than one flat target";
+    if let Some((what, remedy)) = useless {
         let page = place.join("report.html");
         bail!(
-            "{}: {what} and no model.json was written; check {CAUSES}, or write it with --force",
+            "{}: {what} and no model.json was written; {remedy}, or write it with --force",
             page.display()
         );
     }

@@ -121,7 +121,10 @@ mod tests {
         assert!(matches!(&other[..], [one] if one.contains("585.0, 585.0 px")), "{other:?}");
         // A Kinect's step at 2 m is 12.3 mm, whose rounding is 3.5 mm of Eq. 1's 6.5.
         let coded = between(&raw, &sensor(585.0, metric(5000.0)));
-        assert!(matches!(&coded[..], [one] if one.contains("steps of 12.3 mm at 2.0 m")), "{coded:?}");
+        assert!(
+            matches!(&coded[..], [one] if one.contains("steps of 12.3 mm at 2.0 m")),
+            "{coded:?}"
+        );
         // Millimetres or fifths of them: either rounds by far less than sigma.
         let [mm, fifths] = [1000.0, 5000.0].map(|units| sensor(585.0, metric(units)));
         assert_eq!(between(&mm, &fifths), Vec::<String>::new());
