@@ -71,8 +71,11 @@ pub(super) fn missing(findings: &[Finding]) -> Vec<&Finding> {
 }
 
 /// What a finding is called in the middle of a sentence.
-pub(super) fn called(finding: &Finding) -> String {
-    let unnamed = || format!("an unexplained error over the {}", axis(finding.axis));
+pub fn called(finding: &Finding) -> String {
+    let unnamed = || match finding.axis {
+        Axis::Pixel => "an unexplained error from pixel to pixel".into(),
+        axis => format!("an unexplained error over the {}", self::axis(axis)),
+    };
     match finding.status {
         Status::OneOf if finding.alternatives.len() > 1 => {
             let likely = finding.alternatives.iter().enumerate();

@@ -230,7 +230,10 @@ fn picture() -> ViewPictures {
 
 fn rendered(diagnosis: &Diagnosis, picture: ViewPictures) -> Result<String> {
     let origin = &Origin { recording: "rec".into(), folder: "out".into(), ..Origin::default() };
-    diagnosis_page(&DiagnosisPage { title: "Kinect & co", diagnosis, pictures: &[picture], origin })
+    let steps =
+        &[Step { why: "Take the errors out: ".into(), command: "kinoise correct 'a b'".into() }];
+    let (title, shown) = ("Kinect & co", &[picture]);
+    diagnosis_page(&DiagnosisPage { title, diagnosis, pictures: shown, steps, origin })
 }
 
 /// The text of a page without pictures, style and tags; one space between words.
