@@ -63,14 +63,16 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let delta = arguments.delta()?;
     let [truth, estimate] =
         [read_benchmark(&arguments.truth)?.poses, read_benchmark(&arguments.estimate)?.poses];
+    let inputs = [&*arguments.truth, &*arguments.estimate];
+    let new = |place: &PathBuf| begin(place, EVALUATION, &inputs, global);
+    let output = arguments.output.as_ref().map(new).transpose()?;
     let evaluation = evaluate(&truth, &estimate, delta)?;
     report(&evaluation, arguments);
-    if let Some(folder) = &arguments.output {
+    if let Some(output) = output {
         let against =
             Against { truth: &truth, estimate: &estimate, evaluation: &evaluation, delta };
-        let inputs = [&*arguments.truth, &*arguments.estimate];
-        let output = begin(folder, EVALUATION, &inputs, global)?;
-        write(&against, output, &origin(&arguments.estimate, folder, global.seed().0))?;
+        let origin = origin(&arguments.estimate, output.place(), global.seed().0);
+        write(&against, output, &origin)?;
     }
     global.print_json(&as_json(&evaluation))
 }
@@ -97,6 +99,7 @@ fn report(evaluation: &Evaluation, arguments: &Arguments) {
     };
     let interval = match arguments.delta_unit {
         Unit::S => format!("RPE over {} s,", arguments.delta),
+        Unit::F if arguments.delta == 1.0 => "RPE over 1 frame,".into(),
         Unit::F => format!("RPE over {} frames,", arguments.delta),
     };
     line("ATE after alignment,", &evaluation.ate.error, "m");
