@@ -138,6 +138,14 @@ impl Model {
         Ok(model)
     }
 
+    /// For a page.
+    pub fn described(&self, model: &NoiseModel) -> String {
+        let Some(file) = &self.file else { return "the paper's Eq. 1, for a Kinect v1".into() };
+        let sensor = model.sensor.as_ref().map_or(String::new(), |s| format!(" of {}", s.sensor));
+        let made = &model.provenance.created;
+        format!("{}{sensor}, made on {made}", file.display())
+    }
+
     /// For a sequence: in what the model is not its camera's is said before the work begins.
     pub fn read_for(&self, sequence: &Sequence) -> kinoise::Result<NoiseModel> {
         let model = self.read()?;
@@ -156,7 +164,8 @@ impl Model {
                 }
             }
             None => {
-                let held = beyond.map(|share| format!("; {}, where it is held at its edge", percent(share)));
+                let held = beyond
+                    .map(|share| format!("; {}, where it is held at its edge", percent(share)));
                 let held = held.unwrap_or_default();
                 say(format!(
                     "no --model was given: points are weighed by the paper's Eq. 1, for a Kinect v1 at {near} to {far} m{held}"

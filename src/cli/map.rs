@@ -126,7 +126,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let inputs: Vec<&Path> =
         arguments.model.path().into_iter().chain([&*arguments.sequence]).collect();
     let out = begin(&arguments.output, MAP, &inputs, global)?;
-    let stats = follow(&sequence, &model, &options, &title, out)?;
+    let named = Title { title: &title, model: arguments.model.described(&model) };
+    let stats = follow(&sequence, &model, &options, named, out)?;
     global.print_json(&stats)?;
     // With true poses there is something to compare with; without them, the same without the model.
     let (command, suffix, plain) = match sequence.truth.is_empty() {
@@ -140,12 +141,18 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// What the page is called, and what it calls the model.
+pub struct Title<'a> {
+    pub title: &'a str,
+    pub model: String,
+}
+
 /// Map, write every output, report; what stats.json says.
 pub fn follow(
     sequence: &Sequence,
     model: &NoiseModel,
     options: &Options,
-    title: &str,
+    Title { title, model: named }: Title<'_>,
     output: OutputFolder,
 ) -> anyhow::Result<Value> {
     detail(format!("settings: {options:?}"));
@@ -168,6 +175,7 @@ pub fn follow(
             evaluation,
             delta: DELTA,
         }),
+        model: &named,
         origin: &origin(&sequence.root, output.place(), options.seed.0),
     };
     output.write("map.html", map_page(&page)?.as_bytes())?;

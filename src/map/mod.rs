@@ -245,7 +245,8 @@ pub fn outside(sequence: &Sequence, model: &NoiseModel) -> Option<f64> {
     let every = sequence.moments.len().div_ceil(SAMPLED).max(1);
     // A frame that cannot be read is reported when it is mapped.
     for frame in sequence.moments.iter().step_by(every).filter_map(|m| sequence.depth(m).ok()) {
-        for z in frame.raw.iter().map(|&raw| f64::from(table.metres(raw))).filter(|z| z.is_finite()) {
+        for z in frame.raw.iter().map(|&raw| f64::from(table.metres(raw))).filter(|z| z.is_finite())
+        {
             seen += 1;
             beyond += usize::from(!(near..=far).contains(&z));
         }

@@ -7,7 +7,7 @@ use super::axis::Axis;
 use super::chart::{Chart, Entry, Layer, Sample, Stroke};
 use super::colours::{ACCENT, INK, line};
 use super::document::{Origin, document, figure, section, table, tiles};
-use super::numbers::{MM, decimals_for, fixed};
+use super::numbers::{MM, count, decimals_for, fixed};
 use crate::error::Result;
 use crate::evaluate::{Delta, Evaluation, Spread};
 use crate::stats::range;
@@ -103,7 +103,7 @@ impl Against<'_> {
     fn interval(&self) -> String {
         match self.delta {
             Delta::Seconds(s) => format!("{s} s"),
-            Delta::Frames(n) => format!("{n} frames"),
+            Delta::Frames(n) => count(n, "frame"),
         }
     }
 
@@ -137,8 +137,9 @@ impl Against<'_> {
                 format!("rmse over {over}"),
             ),
         ];
-        let charts = self.charts();
-        let figures = charts.iter().map(|(_, chart)| figure(chart, &chart.title));
+        let [paths, over_time @ ..] = self.charts().map(|(_, chart)| chart);
+        let paths = figure(&paths, "both paths, seen along the axis of least motion")?;
+        let figures = over_time.iter().map(|chart| figure(chart, &chart.title));
         let figures = figures.collect::<Result<Vec<Markup>>>()?;
         Ok(html! {
             (tiles(tiled))
@@ -150,6 +151,7 @@ impl Against<'_> {
                 }
             }))
             (section("Over time", &html! { div.beside { @for figure in figures { (figure) } } }))
+            (section("Both paths", &paths))
         })
     }
 }
