@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 pub enum Leaves {
     /// Files and folders of these names; one that ends in `-` stands for all that begin so.
     Results {
-        names: &'static [&'static str],
+        names: &'static [&'static [&'static str]],
         /// Of them, what no other command writes: where none is there, the rest is somebody else's.
         marks: &'static [&'static str],
     },
@@ -252,7 +252,11 @@ fn what_stands(place: &Path, leaves: Leaves, force: bool) -> Result<Stands> {
         ),
         Leaves::Results { names, marks } => {
             let known = |name: &str| {
-                names.iter().any(|n| *n == name || (n.ends_with('-') && name.starts_with(n)))
+                names
+                    .iter()
+                    .copied()
+                    .flatten()
+                    .any(|n| *n == name || (n.ends_with('-') && name.starts_with(n)))
             };
             let mut others = there.clone();
             // A file of a common name is this command's where its mark stands beside it.
@@ -279,7 +283,7 @@ fn refuse_replacing(place: &Path, leaves: Leaves, input: &Path) -> Result<()> {
     let first = within.iter().next().unwrap_or_default().to_string_lossy();
     let replaced = match leaves {
         Leaves::Recording => true,
-        Leaves::Results { names, .. } => names.contains(&&*first),
+        Leaves::Results { names, .. } => names.iter().any(|names| names.contains(&&*first)),
     };
     if replaced {
         let what = format!("the output would replace {}, which is read", input.display());
