@@ -6,7 +6,7 @@ use kinoise::calibrate::{Measurements, measure, model_of};
 use kinoise::io::{OutputFolder, open};
 use kinoise::measure::{MeasureOptions, Planes, read_table, write_measurements};
 use kinoise::report::{CalibrationPage, Overlay, calibration_page, figure2, sigma_map};
-use kinoise::units::shortest;
+use kinoise::units::{counted, shortest};
 use kinoise::{CalibrateOptions, Calibration, Form, Recording, SigmaKind, model_of_table, stats};
 
 use super::calibrate_summary::{as_json, comparison, formula};
@@ -275,6 +275,8 @@ fn measured(recording: &Recording, m: &Measurements) -> String {
     let (name, views, all) =
         (&recording.sensor.name, m.views.len(), m.views.len() + m.excluded.len());
     format!(
-        "{name}: {views} of {all} views measured, {frames} frames ({each}), z {z0:.2} to {z1:.2} m, tilt {t0:.1} to {t1:.1} degrees"
+        "{name}: {views} of {} measured, {} ({each}), z {z0:.2} to {z1:.2} m, tilt {t0:.1} to {t1:.1} degrees",
+        counted(all, "view"),
+        counted(frames, "frame")
     )
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use kinoise::calibrate::Measurements;
-use kinoise::units::decimals;
+use kinoise::units::{counted, decimals};
 use kinoise::{Calibration, SigmaModel};
 use serde_json::{Map, Value, json};
 
@@ -16,11 +16,12 @@ pub fn formula(calibration: &Calibration) -> String {
         let error = p.std_error.map_or("held".into(), |e| format!("± {}", three_digits(e)));
         let _ = writeln!(text, "  {:<3}= {value:>12}  {error}", p.name);
     }
-    let (rows, views, r2) = (fit.rows, fit.views, fit.quality.r2);
+    let [rows, views] = [counted(fit.rows, "sigma"), counted(fit.views, "view")];
+    let r2 = fit.quality.r2;
     let (rmse_mm, share) = (1e3 * fit.quality.rmse_m, 1e2 * fit.quality.rmse_relative);
     let _ = write!(
         text,
-        "fitted to {rows} sigmas of {views} views: rmse {rmse_mm:.2} mm ({share:.1} % of sigma), r2 {r2:.4}"
+        "fitted to {rows} of {views}: rmse {rmse_mm:.2} mm ({share:.1} % of sigma), r2 {r2:.4}"
     );
     if let Some(h) = calibration.comparison.iter().find(|h| h.form == fit.form) {
         let _ = write!(text, "; {:.1} % at distances left out", 1e2 * h.rmse_relative);

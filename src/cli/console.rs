@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use kinoise::units::counted;
 use kinoise::{NoiseModel, Progress, Recording, Watch};
 
 #[derive(Debug, Args)]
@@ -64,10 +65,10 @@ pub fn detail(text: impl AsRef<str>) {
 pub fn detail_recording(recording: &Recording) {
     let (sensor, camera) = (&recording.sensor, &recording.sensor.camera);
     detail(format!(
-        "read {}: {}, {} views, {} x {} px, fx {} fy {} cx {} cy {}, {:?}",
+        "read {}: {}, {}, {} x {} px, fx {} fy {} cx {} cy {}, {:?}",
         recording.root.display(),
         sensor.name,
-        recording.views.len(),
+        counted(recording.views.len(), "view"),
         camera.width,
         camera.height,
         camera.fx,
@@ -181,7 +182,8 @@ pub fn shell(words: &[OsString]) -> String {
     words.iter().map(|w| quoted(&w.to_string_lossy())).collect::<Vec<_>>().join(" ")
 }
 
-fn quoted(word: &str) -> String {
+/// As a shell reads it back.
+pub fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "@%+=:,./_-".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         return word.into();

@@ -5,6 +5,7 @@ use clap::Args;
 use kinoise::correct::{CorrectOptions, Corrected, correct_recording};
 use kinoise::effects::Active;
 use kinoise::io::{DESCRIPTION, Leaves, OutputFolder};
+use kinoise::units::counted;
 use kinoise::{DepthCode, NoiseModel};
 
 use super::common::{Global, Input};
@@ -84,7 +85,7 @@ fn report(corrected: &Corrected, arguments: &Arguments) {
     if !ignored.is_empty() {
         say(format!(
             "note: left in, because they are noise or belong to the scene: {}",
-            counted(ignored)
+            each_once(ignored)
         ));
     }
     if *changed == 0 {
@@ -97,12 +98,13 @@ fn report(corrected: &Corrected, arguments: &Arguments) {
     }
     let (rms_mm, output) = (1e3 * corrected.rms_shift_m, arguments.output.display());
     result(format!(
-        "corrected {changed} of {measured} depths in {frames} frames by {rms_mm:.2} mm (root mean square); wrote {output}"
+        "corrected {changed} of {measured} depths in {} by {rms_mm:.2} mm (root mean square); wrote {output}",
+        counted(*frames, "frame")
     ));
 }
 
 /// Each name once, with how often it stands there.
-fn counted(names: &[String]) -> String {
+fn each_once(names: &[String]) -> String {
     let mut counts: Vec<(&str, usize)> = Vec::new();
     for name in names {
         match counts.iter_mut().find(|(known, _)| known == name) {

@@ -12,6 +12,7 @@ use kinoise::scene::{Board, PATCH_SIDE_M, Print, Target};
 use kinoise::sequence;
 use kinoise::simulate::room::{Film, Room, around_the_desks};
 use kinoise::simulate::{Grid, Physics, Scenery, Shoot, plan_grid};
+use kinoise::units::counted;
 use kinoise::{
     CalibrateOptions, Form, Measurements, NoiseModel, Recording, Seed, Sensor, SigmaModel,
 };
@@ -135,8 +136,8 @@ fn filmed(
     working("filming", |step| shoot.write_quickly(out.path(), step))?;
     out.finish()?;
     say(format!(
-        "filmed {} views of {FRAMES_A_VIEW} frames with it: {}\n",
-        shoot.views.len(),
+        "filmed {} of {FRAMES_A_VIEW} frames with it: {}\n",
+        counted(shoot.views.len(), "view"),
         folder.display()
     ));
     Ok(())

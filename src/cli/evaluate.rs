@@ -6,6 +6,7 @@ use kinoise::evaluate::{Delta, Evaluation, Spread, evaluate};
 use kinoise::io::OutputFolder;
 use kinoise::report::{Against, Origin, evaluation_page};
 use kinoise::trajectory::read_benchmark;
+use kinoise::units::counted;
 use serde_json::{Value, json};
 
 use super::common::Global;
@@ -93,14 +94,19 @@ fn write(against: &Against<'_>, output: OutputFolder, origin: &Origin) -> anyhow
 fn report(evaluation: &Evaluation, arguments: &Arguments) {
     let line = |name: &str, s: &Spread, unit: &str| {
         result(format!(
-            "{name} {unit}: rmse {:.6}  mean {:.6}  median {:.6}  std {:.6}  min {:.6}  max {:.6}  of {} pairs",
-            s.rmse, s.mean, s.median, s.std, s.min, s.max, s.pairs
+            "{name} {unit}: rmse {:.6}  mean {:.6}  median {:.6}  std {:.6}  min {:.6}  max {:.6}  of {}",
+            s.rmse,
+            s.mean,
+            s.median,
+            s.std,
+            s.min,
+            s.max,
+            counted(s.pairs, "pair")
         ));
     };
     let interval = match arguments.delta_unit {
         Unit::S => format!("RPE over {} s,", arguments.delta),
-        Unit::F if arguments.delta == 1.0 => "RPE over 1 frame,".into(),
-        Unit::F => format!("RPE over {} frames,", arguments.delta),
+        Unit::F => format!("RPE over {},", counted(arguments.delta as usize, "frame")),
     };
     line("ATE after alignment,", &evaluation.ate.error, "m");
     line(&interval, &evaluation.rpe.translation, "m");

@@ -9,6 +9,7 @@ use kinoise::map::{
 use kinoise::report::{Against, MapPage, map_page};
 use kinoise::sequence::{Sequence, open};
 use kinoise::trajectory::tum_text;
+use kinoise::units::counted;
 use kinoise::{NoiseModel, Seed};
 use serde_json::{Value, json};
 
@@ -213,7 +214,11 @@ fn report(mapped: &Mapped, against: &Option<Result<Evaluation, String>>, output:
     }
     let (frames, points) = (mapped.frames.len(), mapped.map.len());
     let (posed, folder) = (frames - mapped.lost(), output.display());
-    result(format!("{posed} of {frames} frames have a pose; {points} points; wrote {folder}"));
+    result(format!(
+        "{posed} of {} with a pose; {}; wrote {folder}",
+        counted(frames, "frame"),
+        counted(points, "point")
+    ));
 }
 
 fn stats(

@@ -9,6 +9,7 @@ use kinoise::model::{Direction, Domain, PAPER_EQ1};
 use kinoise::simulate::room::{Film, Room};
 use kinoise::simulate::speckle::Causes;
 use kinoise::simulate::{Physics, Shoot, ViewPlan, kinect_v1, plan_grid, plan_like};
+use kinoise::units::{counted, verb};
 use kinoise::{Form, NoiseModel, Sensor, SigmaModel};
 use serde_json::{Value, json};
 
@@ -138,7 +139,7 @@ fn write_film(film: &Film, folder: OutputFolder) -> anyhow::Result<(Value, Value
     working("filming", |step| film.write(folder.path(), step))?;
     let (output, frames) = (folder.place().to_path_buf(), film.poses.len());
     folder.finish()?;
-    result(format!("wrote {frames} frames of a room to {}", output.display()));
+    result(format!("wrote {} of a room to {}", counted(frames, "frame"), output.display()));
     Ok((json!({"frames": frames, "output": output}), film.recipe()))
 }
 
@@ -171,7 +172,8 @@ fn shoot(
     folder.finish()?;
     notes(blind.iter().map(|name| format!("view {name} shows no depth: {UNSEEN}")));
     let frames: usize = shoot.views.iter().map(|v| v.stamps.len()).sum();
-    result(format!("wrote {views} views, {frames} frames, to {output}"));
+    let [taken, each] = [counted(views, "view"), counted(frames, "frame")];
+    result(format!("wrote {taken}, {each}, to {output}"));
     let made = json!({"views": views, "frames": frames, "output": arguments.output});
     Ok((made, shoot.recipe()))
 }
@@ -272,7 +274,8 @@ fn note_clamped(views: &[ViewPlan], sigma: &SigmaModel) {
     let ([near, far], tilt) = (sigma.domain.z_m, sigma.domain.theta_rad[1].to_degrees());
     if count > 0 {
         say(format!(
-            "note: {count} of {all} views lie outside the model's range (z {near:.2} to {far:.2} m, tilt up to {tilt:.1} degrees); sigma is clamped to its edge there"
+            "note: {count} of {all} views {} outside the model's range (z {near:.2} to {far:.2} m, tilt up to {tilt:.1} degrees); sigma is held at its edge there",
+            verb(count, "lies", "lie")
         ));
     }
 }

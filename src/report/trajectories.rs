@@ -7,11 +7,12 @@ use super::axis::Axis;
 use super::chart::{Chart, Entry, Layer, Sample, Stroke};
 use super::colours::{ACCENT, INK, line};
 use super::document::{Origin, document, figure, section, table, tiles};
-use super::numbers::{MM, count, decimals_for, fixed};
+use super::numbers::{MM, decimals_for, fixed};
 use crate::error::Result;
 use crate::evaluate::{Delta, Evaluation, Spread};
 use crate::stats::range;
 use crate::trajectory::Pose;
+use crate::units::counted;
 
 /// Room around the lines, share of their extent.
 const MARGIN: f64 = 0.04;
@@ -103,7 +104,7 @@ impl Against<'_> {
     fn interval(&self) -> String {
         match self.delta {
             Delta::Seconds(s) => format!("{s} s"),
-            Delta::Frames(n) => count(n, "frame"),
+            Delta::Frames(n) => counted(n, "frame"),
         }
     }
 
@@ -127,7 +128,7 @@ impl Against<'_> {
         ];
         let columns = ["", ">rmse", ">mean", ">median", ">std", ">min", ">max", ">pairs"];
         let mm = |s: &Spread| format!("{} mm", fixed(MM * s.rmse, 1));
-        let remark = |s: &Spread| format!("rmse of {} pairs", s.pairs);
+        let remark = |s: &Spread| format!("rmse of {}", counted(s.pairs, "pair"));
         let tiled = [
             ("absolute trajectory error", mm(&e.ate.error), remark(&e.ate.error)),
             ("relative error, translation", mm(&e.rpe.translation), format!("rmse over {over}")),
