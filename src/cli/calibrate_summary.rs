@@ -31,7 +31,7 @@ pub fn formula(calibration: &Calibration) -> String {
 
 /// The surface beside the published ones, and the forms compared.
 pub fn comparison(calibration: &Calibration) -> String {
-    let mut text = format!("\n{}", surface(&calibration.model.sigma));
+    let mut text = surface(&calibration.model.sigma).map_or(String::new(), |s| format!("\n{s}"));
     if calibration.comparison.len() > 1 {
         text += "\nhow each form predicts distances left out (error of sigma, log score a view):\n";
         for h in &calibration.comparison {
@@ -42,11 +42,11 @@ pub fn comparison(calibration: &Calibration) -> String {
     text
 }
 
-/// Sigma in mm on a small grid inside the valid domain, with the published ones beside it.
-fn surface(model: &SigmaModel) -> String {
-    let mut text = String::from(
-        " z (m)  tilt   this sensor (95 %)       paper Eq. 1  Nguyen 2012  Khoshelham 2012   sigma in mm\n",
-    );
+/// Sigma in mm on a small grid inside the valid domain, with the published ones beside it; nothing
+/// where the domain holds none of the grid.
+fn surface(model: &SigmaModel) -> Option<String> {
+    let mut rows = String::new();
+    let head = " z (m)  tilt   this sensor (95 %)       paper Eq. 1  Nguyen 2012  Khoshelham 2012   sigma in mm\n";
     for z in shown_distances(model) {
         for theta_deg in [0.0f64, 30.0, 60.0, 75.0] {
             let theta = theta_deg.to_radians();
@@ -61,12 +61,13 @@ fn surface(model: &SigmaModel) -> String {
             let models = [SigmaModel::paper(), SigmaModel::nguyen(), SigmaModel::khoshelham()];
             let [paper, nguyen, khoshelham] = models.map(|model| published(&model, z, theta));
             let _ = writeln!(
-                text,
+                rows,
                 "{z:>6.2}{theta_deg:>5.0}°   {own:<24}{paper:>10}{nguyen:>13}{khoshelham:>13}"
             );
         }
     }
-    text + "    -: its authors measured no such distance or tilt\n"
+    const ABSENT: &str = "    -: its authors measured no such distance or tilt\n";
+    (!rows.is_empty()).then(|| format!("{head}{rows}{ABSENT}"))
 }
 
 fn millimetres(metres: f64) -> String {

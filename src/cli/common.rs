@@ -189,7 +189,7 @@ pub fn say_differences(file: &Path, model: &NoiseModel, sensor: &Sensor) {
     let differences = model.differences(sensor);
     if !differences.is_empty() {
         say(format!(
-            "note: {} is another sensor's: {}; it may do harm here: give this sensor's own model",
+            "note: {} seems to be of another sensor: {}; its weights and corrections may do harm here: give this sensor's own model",
             file.display(),
             differences.join("; ")
         ));

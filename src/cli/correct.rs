@@ -71,8 +71,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         "output": arguments.output,
     }))?;
     let output = &arguments.output;
-    let to = beside(output, "diagnosis");
-    let next = ["diagnose".into(), output.into(), "-o".into(), to.into()];
+    // A moving camera's film is mapped; without the model, whose biases are out already.
+    let is_film = ["rgb.txt", "groundtruth.txt"].iter().any(|name| output.join(name).is_file());
+    let (command, suffix) = if is_film { ("map", "map") } else { ("diagnose", "diagnosis") };
+    let to = beside(output, suffix);
+    let next = [command.into(), output.into(), "-o".into(), to.into()];
     let described = output.join(DESCRIPTION).is_file();
     let input = if described { Vec::new() } else { arguments.input.again() };
     next_step(&[&next[..], &input].concat());

@@ -79,7 +79,7 @@ impl After<'_> {
         let mut others = Vec::new();
         for finding in &self.diagnosis.findings {
             let Some(effect) = finding.as_effect() else {
-                others.push(finding);
+                others.extend((!finding.minor).then_some(finding));
                 continue;
             };
             let to = beside(self.folder, effect.effect.card().id);

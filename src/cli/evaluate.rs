@@ -1,4 +1,4 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};
@@ -24,10 +24,10 @@ pub struct Arguments {
     /// Folder for evaluation.json, the plots and report.html
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// True poses in the TUM format
+    /// True poses in the TUM format, or the folder of a sequence
     #[arg(long, value_name = "FILE")]
     truth: PathBuf,
-    /// Estimated poses in the TUM format
+    /// Estimated poses in the TUM format, or the folder of kinoise map
     #[arg(long, value_name = "FILE")]
     estimate: PathBuf,
     /// The interval over which the relative error is taken
@@ -62,9 +62,11 @@ impl Arguments {
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let delta = arguments.delta()?;
+    let truth_file = file_in(&arguments.truth, "groundtruth.txt");
+    let estimate_file = file_in(&arguments.estimate, "trajectory.txt");
     let [truth, estimate] =
-        [read_benchmark(&arguments.truth)?.poses, read_benchmark(&arguments.estimate)?.poses];
-    let inputs = [&*arguments.truth, &*arguments.estimate];
+        [read_benchmark(&truth_file)?.poses, read_benchmark(&estimate_file)?.poses];
+    let inputs = [&*truth_file, &*estimate_file];
     let new = |place: &PathBuf| begin(place, EVALUATION, &inputs, global);
     let output = arguments.output.as_ref().map(new).transpose()?;
     let evaluation = evaluate(&truth, &estimate, delta)?;
@@ -76,6 +78,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         write(&against, output, &origin)?;
     }
     global.print_json(&as_json(&evaluation))
+}
+
+/// A folder stands for the file of this name in it.
+fn file_in(path: &Path, name: &str) -> PathBuf {
+    if path.is_dir() { path.join(name) } else { path.to_path_buf() }
 }
 
 fn write(against: &Against<'_>, output: OutputFolder, origin: &Origin) -> anyhow::Result<()> {

@@ -127,7 +127,7 @@ pub(super) fn check(units: &[UnitModel]) -> Result<Vec<String>> {
 /// In what the second is no unit of the first's kind.
 fn other_kind(first: &RecordingFile, other: &RecordingFile) -> Option<String> {
     if first.sensor != other.sensor {
-        return Some(format!("it is of a \"{}\", not a \"{}\"", other.sensor, first.sensor));
+        return Some(format!("its sensor is \"{}\", not \"{}\"", other.sensor, first.sensor));
     }
     let size = |r: &RecordingFile| (r.camera.width, r.camera.height);
     let ((w, h), (ow, oh)) = (size(first), size(other));

@@ -71,7 +71,7 @@ fn rounding(model: DepthCode, sensor: DepthCode, sigma: &SigmaModel) -> Option<S
     // Of the standard deviation it is half as much, to first order.
     (change > 2.0 * SAME_SIGMA).then(|| {
         format!(
-            "the model's depth is {} (steps of {:.1} mm at {z:.1} m), the recording's {} ({:.1} mm)",
+            "the model's depth is stored {} (steps of {:.1} mm at {z:.1} m), the recording's {} ({:.1} mm)",
             described(model),
             1e3 * step_m(model),
             described(sensor),
@@ -83,9 +83,9 @@ fn rounding(model: DepthCode, sensor: DepthCode, sigma: &SigmaModel) -> Option<S
 fn described(code: DepthCode) -> String {
     match code {
         DepthCode::Metric { units_per_metre, .. } => {
-            format!("stored in {} units per metre", shortest(units_per_metre))
+            format!("in {} units per metre", shortest(units_per_metre))
         }
-        DepthCode::Disparity { .. } => "stored as raw disparities".into(),
+        DepthCode::Disparity { .. } => "as raw disparities".into(),
     }
 }
 

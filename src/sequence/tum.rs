@@ -50,10 +50,16 @@ fn no_sequence(root: &Path) -> Error {
     if let Some(error) = results_in(root) {
         return error;
     }
+    if root.join(DESCRIPTION).is_file() {
+        let what = "it is a recording of still views, no film to map";
+        return Error::recording(
+            root,
+            what,
+            "give a sequence, in the layout of TUM or of 7-Scenes",
+        );
+    }
     let below = entries(root).unwrap_or_default();
-    let films = below.iter().filter(|p| p.is_dir() && p.join("depth.txt").is_file());
-    // The views of a recording have lists too, and are no film.
-    let film = films.filter(|_| !root.join(DESCRIPTION).is_file()).next();
+    let film = below.iter().find(|p| p.is_dir() && p.join("depth.txt").is_file());
     match film.and_then(|p| p.file_name()) {
         Some(name) => Error::recording(
             root,

@@ -378,9 +378,12 @@ fn a_sequence_says_whose_model_weighs_it() {
     for command in ["map film", "compare film", "diagnose rec"] {
         // Four frames are too short a film to compare over a second; what is read is told before.
         let (_, said) = desk.run(&format!("{command} -m other.json -o out"));
-        assert!(said.contains("other.json is another sensor's: the model's focal"), "{said}");
+        assert!(
+            said.contains("other.json seems to be of another sensor: the model's focal"),
+            "{said}"
+        );
         let (_, said) = desk.run(&format!("{command} -m cal/model.json -o own"));
-        assert!(!said.contains("another sensor's"), "{said}");
+        assert!(!said.contains("another sensor"), "{said}");
         for out in ["out", "own"] {
             let _ = fs::remove_dir_all(desk.at(out));
         }
@@ -420,6 +423,7 @@ fn a_folder_that_is_no_recording_says_what_it_is() {
     desk.refused("map set -o out", &["film/ in it does", "give that folder"]);
     fs::rename(desk.at("set/film"), desk.at("film")).expect("moved");
     desk.refused("diagnose set -o out", &["but rec/ in it does", "give that folder"]);
+    desk.refused("map set/rec -o out", &["a recording of still views, no film"]);
     let written = ["holds results of kinoise calibrate (sigma.svg)", "made of"];
     for command in ["calibrate", "map"] {
         desk.refused(&format!("{command} results/cal -o out"), &written);
