@@ -141,7 +141,7 @@ impl Model {
     /// For a page.
     pub fn described(&self, model: &NoiseModel) -> String {
         let Some(file) = &self.file else { return "the paper's Eq. 1, for a Kinect v1".into() };
-        let sensor = model.sensor.as_ref().map_or(String::new(), |s| format!(" of {}", s.sensor));
+        let sensor = model.sensor.as_ref().map_or(String::new(), |s| format!(" ({})", s.sensor));
         let made = &model.provenance.created;
         format!("{}{sensor}, made on {made}", file.display())
     }

@@ -28,7 +28,7 @@ pub struct Arguments {
     /// Also run each step beyond the paper, one at a time
     #[arg(long)]
     ablation: bool,
-    /// Run each variant that draws random numbers so many times
+    /// Number of runs of each variant that draws random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     repeats: usize,
     #[command(flatten, next_help_heading = "Frames")]

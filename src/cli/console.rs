@@ -1,5 +1,6 @@
 //! What people read on stderr: how much of it, the bar, and the next step.
 
+use std::collections::HashSet;
 use std::ffi::OsString;
 use std::fmt::Display;
 use std::io::{IsTerminal, Write};
@@ -96,7 +97,10 @@ pub fn detail_model(model: &NoiseModel, file: Option<&Path>) {
 const MAX_NOTES: usize = 12;
 
 pub fn notes(remarks: impl IntoIterator<Item = impl Display>) {
-    let mut remarks = remarks.into_iter();
+    // Several readers may come upon the same.
+    let mut known = HashSet::new();
+    let mut remarks =
+        remarks.into_iter().map(|r| r.to_string()).filter(|r| known.insert(r.clone()));
     remarks.by_ref().take(MAX_NOTES).for_each(|remark| say(format!("note: {remark}")));
     match remarks.count() {
         0 => {}

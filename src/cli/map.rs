@@ -44,7 +44,7 @@ pub struct Arguments {
 struct Tuning {
     /// What frames are aligned to, and how
     #[arg(long, default_value = "best", value_parser = one_of::<Method, 4>([
-        ("best", "The best measured so far, which is model", Options::best),
+        ("best", "The best measured so far: at present, model", Options::best),
         ("paper", "The paper's: 3 cm voxels, exact nearest neighbours, frame to frame",
             || Options::paper(Weights::Model, Init::None)),
         ("projective", "Image blocks, neighbours by projection, frame to frame: the fastest",
@@ -79,13 +79,13 @@ struct Tuning {
     /// Side of an image block in px
     #[arg(long, value_name = "PX")]
     block: Option<usize>,
-    /// Points farther apart than this are no pair, m
+    /// Greatest distance between the points of a pair, m
     #[arg(long, value_name = "M")]
     gate: Option<f32>,
-    /// The most iterations of an alignment
+    /// Maximum number of iterations of an alignment
     #[arg(long, value_name = "N")]
     iterations: Option<usize>,
-    /// The most observations of a piece of the map that count
+    /// Maximum number of observations that count for a piece of the map
     #[arg(long, value_name = "N")]
     memory: Option<f32>,
     /// Do not read colour for the map
