@@ -72,10 +72,7 @@ pub(super) fn missing(findings: &[Finding]) -> Vec<&Finding> {
 
 /// What a finding is called in the middle of a sentence.
 pub fn called(finding: &Finding) -> String {
-    let unnamed = || match finding.axis {
-        Axis::Pixel => "an unexplained error from pixel to pixel".into(),
-        axis => format!("an unexplained error over the {}", self::axis(axis)),
-    };
+    let unnamed = || format!("an unexplained error {}", along(finding.axis));
     match finding.status {
         Status::OneOf if finding.alternatives.len() > 1 => {
             let likely = finding.alternatives.iter().enumerate();
@@ -86,6 +83,14 @@ pub fn called(finding: &Finding) -> String {
         Status::Unexplained => unnamed(),
         Status::Recalibrate => "parameters that are off".into(),
         _ => finding.effect.map_or_else(unnamed, |id| title(id).into()),
+    }
+}
+
+/// What something changes over, after its name.
+pub(super) fn along(axis: Axis) -> String {
+    match axis {
+        Axis::Pixel => "from pixel to pixel".into(),
+        other => format!("over the {}", self::axis(other)),
     }
 }
 
