@@ -90,6 +90,12 @@ pub(crate) fn nothing_in(root: &Path) -> Result<Error> {
     const REMEDY: &str =
         "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs";
     let there = entries(root)?;
+    // Views have lists as films have; several of them are a recording without its description.
+    let films = |p: &Path| [DESCRIPTION, "groundtruth.txt"].iter().any(|n| p.join(n).is_file());
+    if there.iter().filter(|p| is_view(p) && !films(p)).count() > 1 {
+        let what = "recording.json is missing beside the views in this folder";
+        return Ok(Error::recording(root, what, REMEDY));
+    }
     let holds = |p: &&PathBuf| p.is_dir() && holds_recording(p);
     let below: Vec<String> = there
         .iter()

@@ -428,6 +428,8 @@ fn a_folder_that_is_no_recording_says_what_it_is() {
     for command in ["calibrate", "map"] {
         desk.refused(&format!("{command} results/cal -o out"), &written);
     }
+    fs::remove_file(desk.at("set/rec/recording.json")).expect("removed");
+    desk.refused("calibrate set/rec -o out", &["recording.json is missing beside the views"]);
     let intrinsics = "correct results/cal -m results/cal/model.json -o out --intrinsics 1,1,0,0";
     desk.refused(intrinsics, &written);
 }
