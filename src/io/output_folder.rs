@@ -215,7 +215,7 @@ fn make_parents(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
 }
 
 fn no_folder(file: &Path) -> Error {
-    Error::recording(file, "this is a file, not a folder", "choose another folder for the output")
+    Error::recording(file, "this is a file, not a folder", "give another folder, such as with -o")
 }
 
 /// May it be written?
