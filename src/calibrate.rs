@@ -20,6 +20,7 @@ use crate::model::{
     compare_forms, sort_out,
 };
 use crate::rng::Seed;
+use crate::units::verb;
 use crate::view::{Excluded, Recording, RecordingFile};
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -260,7 +261,8 @@ fn warnings_of(recording: &Recording, measurements: &Measurements, fit: &SigmaFi
     let single = measurements.views.iter().filter(|v| v.frames < 2).count();
     if single > 0 {
         warnings.push(format!(
-            "{single} of {total} views have a single frame: no temporal sigma from them"
+            "{single} of {total} views {} a single frame: no temporal sigma from them",
+            verb(single, "has", "have")
         ));
     }
     warnings.extend(fit.remarks.iter().cloned());

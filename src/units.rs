@@ -26,6 +26,26 @@ pub fn decimals(v: f64, decimals: usize) -> String {
     if is_long(v) && v.abs() > 1.0 { format!("{v:.2e}") } else { format!("{v:.decimals$}") }
 }
 
+/// `1 view`, `2 views`.
+///
+/// ```
+/// use kinoise::units::counted;
+/// assert_eq!([counted(1, "view"), counted(0, "view")], ["1 view", "0 views"]);
+/// ```
+pub fn counted(n: usize, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
+}
+
+/// The verb of so many.
+///
+/// ```
+/// use kinoise::units::verb;
+/// assert_eq!([verb(1, "lies", "lie"), verb(2, "lies", "lie")], ["lies", "lie"]);
+/// ```
+pub fn verb<'a>(n: usize, one: &'a str, more: &'a str) -> &'a str {
+    if n == 1 { one } else { more }
+}
+
 fn is_long(v: f64) -> bool {
     v.is_finite() && v != 0.0 && !(1.0 / MANY_DIGITS..MANY_DIGITS).contains(&v.abs())
 }

@@ -6,7 +6,7 @@ use kinoise::calibrate::{Measurements, measure, model_of};
 use kinoise::io::{OutputFolder, open};
 use kinoise::measure::{MeasureOptions, Planes, read_table, write_measurements};
 use kinoise::report::{CalibrationPage, Overlay, calibration_page, figure2, sigma_map};
-use kinoise::units::shortest;
+use kinoise::units::{counted, shortest};
 use kinoise::{CalibrateOptions, Calibration, Form, Recording, SigmaKind, model_of_table, stats};
 
 use super::calibrate_summary::{as_json, comparison, formula};
@@ -242,7 +242,7 @@ fn write_outputs(out: OutputFolder, page: &CalibrationPage<'_>) -> anyhow::Resul
         out.write("report.html", calibration_page(page)?.as_bytes())?;
         Ok(())
     })?;
-    let useless = calibration.fit.quality.explains_nothing().filter(|_| !out.forced());
+    let useless = calibration.fit.is_no_model().filter(|_| !out.forced());
     if useless.is_none() {
         calibration.model.write(&out.path().join("model.json"))?;
     }
@@ -255,11 +255,10 @@ fn write_outputs(out: OutputFolder, page: &CalibrationPage<'_>) -> anyhow::Resul
     result(formula(calibration));
     say(comparison(calibration));
     notes(&calibration.warnings);
-    if let Some(what) = useless {
-        const CAUSES: &str = "how raw values become metres, the intrinsics, and measurements.csv for views that measured something else than one flat target";
+    if let Some((what, remedy)) = useless {
         let page = place.join("report.html");
         bail!(
-            "{}: {what} and no model.json was written; check {CAUSES}, or write it with --force",
+            "{}: {what} and no model.json was written; {remedy}, or write it with --force",
             page.display()
         );
     }
@@ -276,6 +275,8 @@ fn measured(recording: &Recording, m: &Measurements) -> String {
     let (name, views, all) =
         (&recording.sensor.name, m.views.len(), m.views.len() + m.excluded.len());
     format!(
-        "{name}: {views} of {all} views measured, {frames} frames ({each}), z {z0:.2} to {z1:.2} m, tilt {t0:.1} to {t1:.1} degrees"
+        "{name}: {views} of {} measured, {} ({each}), z {z0:.2} to {z1:.2} m, tilt {t0:.1} to {t1:.1} degrees",
+        counted(all, "view"),
+        counted(frames, "frame")
     )
 }

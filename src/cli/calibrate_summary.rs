@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use kinoise::calibrate::Measurements;
-use kinoise::units::decimals;
+use kinoise::units::{counted, decimals};
 use kinoise::{Calibration, SigmaModel};
 use serde_json::{Map, Value, json};
 
@@ -16,11 +16,12 @@ pub fn formula(calibration: &Calibration) -> String {
         let error = p.std_error.map_or("held".into(), |e| format!("± {}", three_digits(e)));
         let _ = writeln!(text, "  {:<3}= {value:>12}  {error}", p.name);
     }
-    let (rows, views, r2) = (fit.rows, fit.views, fit.quality.r2);
+    let [rows, views] = [counted(fit.rows, "sigma"), counted(fit.views, "view")];
+    let r2 = fit.quality.r2;
     let (rmse_mm, share) = (1e3 * fit.quality.rmse_m, 1e2 * fit.quality.rmse_relative);
     let _ = write!(
         text,
-        "fitted to {rows} sigmas of {views} views: rmse {rmse_mm:.2} mm ({share:.1} % of sigma), r2 {r2:.4}"
+        "fitted to {rows} of {views}: rmse {rmse_mm:.2} mm ({share:.1} % of sigma), r2 {r2:.4}"
     );
     if let Some(h) = calibration.comparison.iter().find(|h| h.form == fit.form) {
         let _ = write!(text, "; {:.1} % at distances left out", 1e2 * h.rmse_relative);
@@ -30,7 +31,7 @@ pub fn formula(calibration: &Calibration) -> String {
 
 /// The surface beside the published ones, and the forms compared.
 pub fn comparison(calibration: &Calibration) -> String {
-    let mut text = format!("\n{}", surface(&calibration.model.sigma));
+    let mut text = surface(&calibration.model.sigma).map_or(String::new(), |s| format!("\n{s}"));
     if calibration.comparison.len() > 1 {
         text += "\nhow each form predicts distances left out (error of sigma, log score a view):\n";
         for h in &calibration.comparison {
@@ -41,11 +42,11 @@ pub fn comparison(calibration: &Calibration) -> String {
     text
 }
 
-/// Sigma in mm on a small grid inside the valid domain, with the published ones beside it.
-fn surface(model: &SigmaModel) -> String {
-    let mut text = String::from(
-        " z (m)  tilt   this sensor (95 %)       paper Eq. 1  Nguyen 2012  Khoshelham 2012   sigma in mm\n",
-    );
+/// Sigma in mm on a small grid inside the valid domain, with the published ones beside it; nothing
+/// where the domain holds none of the grid.
+fn surface(model: &SigmaModel) -> Option<String> {
+    let mut rows = String::new();
+    let head = " z (m)  tilt   this sensor (95 %)       paper Eq. 1  Nguyen 2012  Khoshelham 2012   sigma in mm\n";
     for z in shown_distances(model) {
         for theta_deg in [0.0f64, 30.0, 60.0, 75.0] {
             let theta = theta_deg.to_radians();
@@ -60,12 +61,13 @@ fn surface(model: &SigmaModel) -> String {
             let models = [SigmaModel::paper(), SigmaModel::nguyen(), SigmaModel::khoshelham()];
             let [paper, nguyen, khoshelham] = models.map(|model| published(&model, z, theta));
             let _ = writeln!(
-                text,
+                rows,
                 "{z:>6.2}{theta_deg:>5.0}°   {own:<24}{paper:>10}{nguyen:>13}{khoshelham:>13}"
             );
         }
     }
-    text + "    -: its authors measured no such distance or tilt\n"
+    const ABSENT: &str = "    -: its authors measured no such distance or tilt\n";
+    (!rows.is_empty()).then(|| format!("{head}{rows}{ABSENT}"))
 }
 
 fn millimetres(metres: f64) -> String {

@@ -9,6 +9,7 @@ use kinoise::capture::{
     capture,
 };
 use kinoise::io::refuse_inside;
+use kinoise::units::{counted, verb};
 use serde_json::json;
 
 use super::capture_interface::{Log, Screen, is_interactive, stop_signal};
@@ -148,7 +149,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     };
     notes(&source.remarks()[noted..]);
     if source.dropped() > 0 {
-        say(format!("note: {} frames came too fast and were lost", source.dropped()));
+        say(format!(
+            "note: {} came too fast and {} lost",
+            counted(source.dropped(), "frame"),
+            verb(source.dropped(), "was", "were")
+        ));
     }
     let kept = session.taken()?;
     global.print_json(&json!({

@@ -10,10 +10,12 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use kinoise::frame::KINECT_NO_MEASUREMENT;
 use kinoise::io::Assumed;
+use kinoise::map::outside;
+use kinoise::sequence::Sequence;
 use kinoise::units::shortest;
-use kinoise::{DepthCode, NoiseModel, Seed};
+use kinoise::{DepthCode, NoiseModel, Seed, Sensor};
 
-use super::console::{Verbosity, detail, detail_model};
+use super::console::{Verbosity, detail, detail_model, say};
 
 #[derive(Debug, Args)]
 pub struct Global {
@@ -136,9 +138,61 @@ impl Model {
         Ok(model)
     }
 
+    /// For a page.
+    pub fn described(&self, model: &NoiseModel) -> String {
+        let Some(file) = &self.file else { return "the paper's Eq. 1, for a Kinect v1".into() };
+        let sensor = model.sensor.as_ref().map_or(String::new(), |s| format!(" ({})", s.sensor));
+        let made = &model.provenance.created;
+        format!("{}{sensor}, made on {made}", file.display())
+    }
+
+    /// For a sequence: in what the model is not its camera's is said before the work begins.
+    pub fn read_for(&self, sequence: &Sequence) -> kinoise::Result<NoiseModel> {
+        let model = self.read()?;
+        model.refuse_other_size(&sequence.sensor)?;
+        let beyond = outside(sequence, &model).filter(|share| *share > MAX_OUTSIDE);
+        let percent = |share: f64| format!("{:.0} % of the depths here lie outside", 1e2 * share);
+        let [near, far] = model.sigma.domain.z_m;
+        match &self.file {
+            Some(file) => {
+                say_differences(file, &model, &sequence.sensor);
+                if let Some(share) = beyond {
+                    let outside = percent(share);
+                    say(format!(
+                        "note: {outside} {near:.2} to {far:.2} m, where the model was measured; sigma is held at its edge"
+                    ));
+                }
+            }
+            None => {
+                let held = beyond
+                    .map(|share| format!("; {}, where it is held at its edge", percent(share)));
+                let held = held.unwrap_or_default();
+                say(format!(
+                    "no --model was given: points are weighed by the paper's Eq. 1, for a Kinect v1 at {near} to {far} m{held}"
+                ));
+            }
+        }
+        Ok(model)
+    }
+
     /// The same option once more, for another command.
     pub fn again(&self) -> Vec<OsString> {
         model_again(self.file.as_deref())
+    }
+}
+
+/// A smaller share of depths changes no weight that matters.
+const MAX_OUTSIDE: f64 = 0.1;
+
+/// In what the model in `file` is not this sensor's.
+pub fn say_differences(file: &Path, model: &NoiseModel, sensor: &Sensor) {
+    let differences = model.differences(sensor);
+    if !differences.is_empty() {
+        say(format!(
+            "note: {} seems to be of another sensor: {}; its weights and corrections may do harm here: give this sensor's own model",
+            file.display(),
+            differences.join("; ")
+        ));
     }
 }
 

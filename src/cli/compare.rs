@@ -28,7 +28,7 @@ pub struct Arguments {
     /// Also run each step beyond the paper, one at a time
     #[arg(long)]
     ablation: bool,
-    /// Run each variant that draws random numbers so many times
+    /// Number of runs of each variant that draws random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     repeats: usize,
     #[command(flatten, next_help_heading = "Frames")]
@@ -41,8 +41,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     ensure!(arguments.repeats > 0, "--repeats 0: give 1 or more");
     let mut sequence = open(&arguments.sequence, &arguments.input.assumed()?)?;
     sequence.thin(arguments.thinning.stride, arguments.thinning.frames);
-    let model = arguments.model.read()?;
-    model.refuse_other_size(&sequence.sensor)?;
+    notes(&sequence.remarks);
+    let model = arguments.model.read_for(&sequence)?;
     let inputs: Vec<&Path> =
         arguments.model.path().into_iter().chain([&*arguments.sequence]).collect();
     let output = begin(&arguments.output, COMPARISON, &inputs, global)?;
@@ -63,7 +63,6 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let origin = origin(&arguments.sequence, &arguments.output, global.seed().0);
     output.write("report.html", comparison_page(&comparison, &origin)?.as_bytes())?;
     output.finish()?;
-    notes(&sequence.remarks);
     result(text);
     say(format!("wrote {}", arguments.output.join("report.html").display()));
     global.print_json(&json)?;

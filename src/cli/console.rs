@@ -1,5 +1,6 @@
 //! What people read on stderr: how much of it, the bar, and the next step.
 
+use std::collections::HashSet;
 use std::ffi::OsString;
 use std::fmt::Display;
 use std::io::{IsTerminal, Write};
@@ -10,6 +11,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use kinoise::units::counted;
 use kinoise::{NoiseModel, Progress, Recording, Watch};
 
 #[derive(Debug, Args)]
@@ -64,10 +66,10 @@ pub fn detail(text: impl AsRef<str>) {
 pub fn detail_recording(recording: &Recording) {
     let (sensor, camera) = (&recording.sensor, &recording.sensor.camera);
     detail(format!(
-        "read {}: {}, {} views, {} x {} px, fx {} fy {} cx {} cy {}, {:?}",
+        "read {}: {}, {}, {} x {} px, fx {} fy {} cx {} cy {}, {:?}",
         recording.root.display(),
         sensor.name,
-        recording.views.len(),
+        counted(recording.views.len(), "view"),
         camera.width,
         camera.height,
         camera.fx,
@@ -95,7 +97,10 @@ pub fn detail_model(model: &NoiseModel, file: Option<&Path>) {
 const MAX_NOTES: usize = 12;
 
 pub fn notes(remarks: impl IntoIterator<Item = impl Display>) {
-    let mut remarks = remarks.into_iter();
+    // Several readers may come upon the same.
+    let mut known = HashSet::new();
+    let mut remarks =
+        remarks.into_iter().map(|r| r.to_string()).filter(|r| known.insert(r.clone()));
     remarks.by_ref().take(MAX_NOTES).for_each(|remark| say(format!("note: {remark}")));
     match remarks.count() {
         0 => {}
@@ -181,7 +186,8 @@ pub fn shell(words: &[OsString]) -> String {
     words.iter().map(|w| quoted(&w.to_string_lossy())).collect::<Vec<_>>().join(" ")
 }
 
-fn quoted(word: &str) -> String {
+/// As a shell reads it back.
+pub fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "@%+=:,./_-".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         return word.into();

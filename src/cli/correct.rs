@@ -4,7 +4,8 @@ use anyhow::Context;
 use clap::Args;
 use kinoise::correct::{CorrectOptions, Corrected, correct_recording};
 use kinoise::effects::Active;
-use kinoise::io::{Leaves, OutputFolder};
+use kinoise::io::{DESCRIPTION, Leaves, OutputFolder};
+use kinoise::units::counted;
 use kinoise::{DepthCode, NoiseModel};
 
 use super::common::{Global, Input};
@@ -70,8 +71,14 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         "output": arguments.output,
     }))?;
     let output = &arguments.output;
-    let to = beside(output, "diagnosis");
-    next_step(&["diagnose".into(), output.into(), "-o".into(), to.into()]);
+    // A moving camera's film is mapped; without the model, whose biases are out already.
+    let is_film = ["rgb.txt", "groundtruth.txt"].iter().any(|name| output.join(name).is_file());
+    let (command, suffix) = if is_film { ("map", "map") } else { ("diagnose", "diagnosis") };
+    let to = beside(output, suffix);
+    let next = [command.into(), output.into(), "-o".into(), to.into()];
+    let described = output.join(DESCRIPTION).is_file();
+    let input = if described { Vec::new() } else { arguments.input.again() };
+    next_step(&[&next[..], &input].concat());
     Ok(())
 }
 
@@ -80,8 +87,8 @@ fn report(corrected: &Corrected, arguments: &Arguments) {
     notes(&corrected.remarks);
     if !ignored.is_empty() {
         say(format!(
-            "note: left in, for these are no biases of the sensor: {}",
-            ignored.join(", ")
+            "note: left in, because they are noise or belong to the scene: {}",
+            each_once(ignored)
         ));
     }
     if *changed == 0 {
@@ -94,6 +101,23 @@ fn report(corrected: &Corrected, arguments: &Arguments) {
     }
     let (rms_mm, output) = (1e3 * corrected.rms_shift_m, arguments.output.display());
     result(format!(
-        "corrected {changed} of {measured} depths in {frames} frames by {rms_mm:.2} mm (root mean square); wrote {output}"
+        "corrected {changed} of {measured} depths in {} by {rms_mm:.2} mm (root mean square); wrote {output}",
+        counted(*frames, "frame")
     ));
+}
+
+/// Each name once, with how often it stands there.
+fn each_once(names: &[String]) -> String {
+    let mut counts: Vec<(&str, usize)> = Vec::new();
+    for name in names {
+        match counts.iter_mut().find(|(known, _)| known == name) {
+            Some((_, n)) => *n += 1,
+            None => counts.push((name, 1)),
+        }
+    }
+    let times = |(name, n): &(&str, usize)| match n {
+        1 => name.to_string(),
+        _ => format!("{name} ({n} times)"),
+    };
+    counts.iter().map(times).collect::<Vec<_>>().join(", ")
 }

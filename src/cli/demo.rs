@@ -12,6 +12,7 @@ use kinoise::scene::{Board, PATCH_SIDE_M, Print, Target};
 use kinoise::sequence;
 use kinoise::simulate::room::{Film, Room, around_the_desks};
 use kinoise::simulate::{Grid, Physics, Scenery, Shoot, plan_grid};
+use kinoise::units::counted;
 use kinoise::{
     CalibrateOptions, Form, Measurements, NoiseModel, Recording, Seed, Sensor, SigmaModel,
 };
@@ -22,7 +23,7 @@ use super::common::{Global, source_date};
 use super::console::{next_step, result, say, shell, working};
 use super::demo_seal::Sealed;
 use super::diagnose::{HeldAgainst, examine};
-use super::map::follow;
+use super::map::{Title, follow};
 use super::output::{DEMO, DIAGNOSIS, MAP, begin};
 
 pub const EXAMPLES: &str = "\
@@ -135,8 +136,8 @@ fn filmed(
     working("filming", |step| shoot.write_quickly(out.path(), step))?;
     out.finish()?;
     say(format!(
-        "filmed {} views of {FRAMES_A_VIEW} frames with it: {}\n",
-        shoot.views.len(),
+        "filmed {} of {FRAMES_A_VIEW} frames with it: {}\n",
+        counted(shoot.views.len(), "view"),
         folder.display()
     ));
     Ok(())
@@ -158,7 +159,7 @@ fn diagnosed(
     let recording = open(film, &Assumed::default())?;
     let options = DiagnoseOptions { seed, ..DiagnoseOptions::default() };
     let folder = output.join("diagnosis");
-    let held = HeldAgainst { simulated: None, model, options: &options };
+    let held = HeldAgainst { simulated: None, model, options: &options, input: Vec::new() };
     let out = begin(&folder, DIAGNOSIS, &[film], global)?;
     let diagnosis = examine(&recording, &held, out).context("the sealed recording")?;
     Ok((diagnosis, folder.join("report.html")))
@@ -195,10 +196,11 @@ fn mapped(
     let plain = Options { seed, ..Options::paper(Weights::None, Init::None) };
     let best = Options { seed, ..Options::best() };
     result("point-to-plane ICP from frame to frame, without the model:");
+    let named = |title| Title { title, model: "model.json of this demo".into() };
     let map = |name: &str| begin(&output.join(name), MAP, &[], global);
-    follow(&sequence, model, &plain, "The office, plain ICP", map("map-plain")?)?;
+    follow(&sequence, model, &plain, named("The office, plain ICP"), map("map-plain")?)?;
     result("with the model, each frame to the map so far:");
-    follow(&sequence, model, &best, "The office", map("map")?)?;
+    follow(&sequence, model, &best, named("The office"), map("map")?)?;
     say(format!("Open {} and turn it.", output.join("map/map.html").display()));
     Ok(())
 }

@@ -6,7 +6,7 @@ use kinoise::Seed;
 use kinoise::diagnose::{Diagnosis, Finding, HeldOut, Status, Verdict};
 use kinoise::effects::{Active, CATALOGUE, Card, Parameter};
 use kinoise::io::{hex, sha256_hex, write_atomic};
-use kinoise::units::shortest;
+use kinoise::units::{counted, shortest};
 use rand::Rng;
 use serde_json::{Value, json};
 
@@ -219,12 +219,15 @@ fn digits(v: f64) -> String {
 fn gained(heldout: Option<&HeldOut>) -> String {
     let Some(h) = heldout else { return "No view could be kept out to show a gain.".into() };
     if h.gain.abs() < 0.05 {
-        return format!("On {} views kept out of the fit nothing is gained.", h.views.len());
+        return format!(
+            "On {} kept out of the fit nothing is gained.",
+            counted(h.views.len(), "view")
+        );
     }
     let [low, high] = h.gain_interval;
     let gain = format!(
-        "On {} views kept out of the fit the extended model gains {:.1} nats a view (95 %: {low:.1} to {high:.1})",
-        h.views.len(),
+        "On {} kept out of the fit the extended model gains {:.1} nats a view (95 %: {low:.1} to {high:.1})",
+        counted(h.views.len(), "view"),
         h.gain
     );
     let (before, after) = (h.correction_rms_before_px, h.correction_rms_after_px);

@@ -4,20 +4,19 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use kinoise::calibrate::paper_model;
 use kinoise::diagnose::{
-    DiagnoseOptions, Diagnosed, Diagnosis, Field, Finding, Reference, Verdict, ViewPictures,
-    diagnose, diagnose_against, pictures,
+    DiagnoseOptions, Diagnosed, Diagnosis, Field, Reference, Verdict, ViewPictures, diagnose,
+    diagnose_against, pictures,
 };
 use kinoise::effects::{Active, Instant};
-use kinoise::io::{OutputFolder, open};
-use kinoise::report::{DiagnosisPage, diagnosis_page, story};
+use kinoise::io::{Assumed, DESCRIPTION, OutputFolder, open};
+use kinoise::report::{DiagnosisPage, Step, diagnosis_page, story};
 use kinoise::simulate::{FormulaSensor, plan_on};
 use kinoise::view::ViewNotes;
 use kinoise::{Form, NoiseModel, Recording, Seed, Sensor};
 
-use super::common::{Global, Input, model_again, source_date};
-use super::console::{
-    beside, detail, detail_model, detail_recording, next_step, result, say, shell, working,
-};
+use super::common::{Global, Input, say_differences, source_date};
+use super::console::{detail, detail_model, detail_recording, next_step, result, say, working};
+use super::diagnose_next::{After, NextStep};
 use super::origin::origin;
 use super::output::{DIAGNOSIS, begin};
 
@@ -54,7 +53,13 @@ const FOUND: u8 = 1;
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     let assumed = arguments.input.assumed()?;
     let recording = open(&arguments.recording, &assumed)?;
-    let simulated = arguments.against.as_ref().map(|path| open(path, &assumed)).transpose()?;
+    // What is simulated describes itself, also beside a folder that does not.
+    let described = |path: &Path| path.join(DESCRIPTION).is_file();
+    let other = |path: &PathBuf| match described(path) && !described(&arguments.recording) {
+        true => open(path, &Assumed::default()),
+        false => open(path, &assumed),
+    };
+    let simulated = arguments.against.as_ref().map(other).transpose()?;
     let others = [&arguments.against, &arguments.model].into_iter().flatten();
     let inputs: Vec<&Path> = others.chain([&arguments.recording]).map(PathBuf::as_path).collect();
     let out = begin(&arguments.output, DIAGNOSIS, &inputs, global)?;
@@ -63,6 +68,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
         (Some(path), _) => {
             let model = NoiseModel::read(path)?;
             model.refuse_other_size(&recording.sensor)?;
+            say_differences(path, &model, &recording.sensor);
             model
         }
         (None, Some(simulated)) => weights(&recording, simulated, global)?,
@@ -77,57 +83,24 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
         calibrated_here: arguments.model.is_none() && simulated.is_none(),
         ..DiagnoseOptions::default()
     };
-    let held = HeldAgainst { simulated: simulated.as_ref(), model: &model, options: &options };
+    let held = HeldAgainst {
+        simulated: simulated.as_ref(),
+        model: &model,
+        options: &options,
+        input: arguments.input.again(),
+    };
     let diagnosis = examine(&recording, &held, out)?;
     global.print_json(&serde_json::to_value(&diagnosis)?)?;
-    arguments.reproductions(&diagnosis).iter().for_each(say);
-    next_step(&arguments.next(&diagnosis));
+    let after = After {
+        diagnosis: &diagnosis,
+        recording: &arguments.recording,
+        folder: &arguments.output,
+        input: &held.input,
+    };
+    after.reproductions(arguments.model.as_deref()).iter().for_each(say);
+    after.steps().iter().take(1).for_each(|step| next_step(&step.words));
     let found = diagnosis.verdict == Verdict::Mismatch && !arguments.exit_zero;
     Ok(if found { FOUND } else { 0 })
-}
-
-impl Arguments {
-    /// The command that simulates each finding, where a formula of the catalogue does.
-    fn reproductions(&self, diagnosis: &Diagnosis) -> Vec<String> {
-        let named = diagnosis.findings.iter().filter_map(Finding::as_effect);
-        let commands: Vec<String> = named
-            .map(|effect| {
-                let to = beside(&self.output, effect.effect.card().id);
-                let model = model_again(self.model.as_deref());
-                let effect = vec!["--effect".into(), effect.argument().into()];
-                let words = [vec!["simulate".into(), to.into()], self.like(), model, effect];
-                format!("  kinoise {}", shell(&words.concat()))
-            })
-            .collect();
-        let heading = match commands.len() {
-            0 => None,
-            1 => Some("to simulate the finding:".to_string()),
-            _ => Some("to simulate each finding:".to_string()),
-        };
-        heading.into_iter().chain(commands).collect()
-    }
-
-    /// The same views, where the simulator can read them without more options.
-    fn like(&self) -> Vec<OsString> {
-        match self.input.again().is_empty() {
-            true => vec!["--like".into(), self.recording.clone().into()],
-            false => Vec::new(),
-        }
-    }
-
-    /// Take the biases out where any were found; else see the recording's twin.
-    fn next(&self, diagnosis: &Diagnosis) -> Vec<OsString> {
-        let model = ["-m".into(), self.output.join("model.json").into()];
-        let biased = |f: &Finding| f.terms.iter().any(|t| t.is_sensor_bias());
-        if diagnosis.findings.iter().any(biased) {
-            let to = beside(&self.output, "corrected");
-            let correct = ["correct".into(), self.recording.clone().into()];
-            let to = ["-o".into(), to.into()];
-            return [&correct[..], &to, &model, &self.input.again()].concat();
-        }
-        let twin = ["simulate".into(), beside(&self.output, "twin").into()];
-        [&twin[..], &self.like(), &model].concat()
-    }
 }
 
 /// What a recording is held against, and how.
@@ -135,6 +108,8 @@ pub struct HeldAgainst<'a> {
     pub simulated: Option<&'a Recording>,
     pub model: &'a NoiseModel,
     pub options: &'a DiagnoseOptions,
+    /// The options that the recording was read with, for other commands.
+    pub input: Vec<OsString>,
 }
 
 /// Diagnose, write every output, report.
@@ -143,7 +118,7 @@ pub fn examine(
     held: &HeldAgainst<'_>,
     out: OutputFolder,
 ) -> anyhow::Result<Diagnosis> {
-    let HeldAgainst { simulated, model, options } = *held;
+    let HeldAgainst { simulated, model, options, ref input } = *held;
     detail(format!("settings: {options:?}"));
     let done = working("measuring the views", |step| match simulated {
         Some(simulated) => diagnose_against(recording, simulated, model, options, step),
@@ -158,7 +133,12 @@ pub fn examine(
     working("drawing the page", |_| -> anyhow::Result<()> {
         let pictures = with_twins(&done, &recording.sensor, model, options.seed);
         let origin = &origin(&recording.root, out.place(), options.seed.0);
-        let page = DiagnosisPage { title: &title, diagnosis, pictures: &pictures, origin };
+        // The page names its folder, not where that stands.
+        let folder = PathBuf::from(out.place().file_name().unwrap_or_default());
+        let after = After { diagnosis, recording: &recording.root, folder: &folder, input };
+        let steps: Vec<Step> = after.steps().iter().map(NextStep::on_page).collect();
+        let page =
+            DiagnosisPage { title: &title, diagnosis, pictures: &pictures, steps: &steps, origin };
         out.write("report.html", diagnosis_page(&page)?.as_bytes())?;
         Ok(())
     })?;

@@ -1,4 +1,4 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};
@@ -6,6 +6,7 @@ use kinoise::evaluate::{Delta, Evaluation, Spread, evaluate};
 use kinoise::io::OutputFolder;
 use kinoise::report::{Against, Origin, evaluation_page};
 use kinoise::trajectory::read_benchmark;
+use kinoise::units::counted;
 use serde_json::{Value, json};
 
 use super::common::Global;
@@ -23,10 +24,10 @@ pub struct Arguments {
     /// Folder for evaluation.json, the plots and report.html
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// True poses in the TUM format
+    /// True poses in the TUM format, or the folder of a sequence
     #[arg(long, value_name = "FILE")]
     truth: PathBuf,
-    /// Estimated poses in the TUM format
+    /// Estimated poses in the TUM format, or the folder of kinoise map
     #[arg(long, value_name = "FILE")]
     estimate: PathBuf,
     /// The interval over which the relative error is taken
@@ -61,18 +62,27 @@ impl Arguments {
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let delta = arguments.delta()?;
+    let truth_file = file_in(&arguments.truth, "groundtruth.txt");
+    let estimate_file = file_in(&arguments.estimate, "trajectory.txt");
     let [truth, estimate] =
-        [read_benchmark(&arguments.truth)?.poses, read_benchmark(&arguments.estimate)?.poses];
+        [read_benchmark(&truth_file)?.poses, read_benchmark(&estimate_file)?.poses];
+    let inputs = [&*truth_file, &*estimate_file];
+    let new = |place: &PathBuf| begin(place, EVALUATION, &inputs, global);
+    let output = arguments.output.as_ref().map(new).transpose()?;
     let evaluation = evaluate(&truth, &estimate, delta)?;
     report(&evaluation, arguments);
-    if let Some(folder) = &arguments.output {
+    if let Some(output) = output {
         let against =
             Against { truth: &truth, estimate: &estimate, evaluation: &evaluation, delta };
-        let inputs = [&*arguments.truth, &*arguments.estimate];
-        let output = begin(folder, EVALUATION, &inputs, global)?;
-        write(&against, output, &origin(&arguments.estimate, folder, global.seed().0))?;
+        let origin = origin(&arguments.estimate, output.place(), global.seed().0);
+        write(&against, output, &origin)?;
     }
     global.print_json(&as_json(&evaluation))
+}
+
+/// A folder stands for the file of this name in it.
+fn file_in(path: &Path, name: &str) -> PathBuf {
+    if path.is_dir() { path.join(name) } else { path.to_path_buf() }
 }
 
 fn write(against: &Against<'_>, output: OutputFolder, origin: &Origin) -> anyhow::Result<()> {
@@ -91,13 +101,19 @@ fn write(against: &Against<'_>, output: OutputFolder, origin: &Origin) -> anyhow
 fn report(evaluation: &Evaluation, arguments: &Arguments) {
     let line = |name: &str, s: &Spread, unit: &str| {
         result(format!(
-            "{name} {unit}: rmse {:.6}  mean {:.6}  median {:.6}  std {:.6}  min {:.6}  max {:.6}  of {} pairs",
-            s.rmse, s.mean, s.median, s.std, s.min, s.max, s.pairs
+            "{name} {unit}: rmse {:.6}  mean {:.6}  median {:.6}  std {:.6}  min {:.6}  max {:.6}  of {}",
+            s.rmse,
+            s.mean,
+            s.median,
+            s.std,
+            s.min,
+            s.max,
+            counted(s.pairs, "pair")
         ));
     };
     let interval = match arguments.delta_unit {
         Unit::S => format!("RPE over {} s,", arguments.delta),
-        Unit::F => format!("RPE over {} frames,", arguments.delta),
+        Unit::F => format!("RPE over {},", counted(arguments.delta as usize, "frame")),
     };
     line("ATE after alignment,", &evaluation.ate.error, "m");
     line(&interval, &evaluation.rpe.translation, "m");

@@ -9,6 +9,7 @@ use kinoise::map::{
 use kinoise::report::{Against, MapPage, map_page};
 use kinoise::sequence::{Sequence, open};
 use kinoise::trajectory::tum_text;
+use kinoise::units::counted;
 use kinoise::{NoiseModel, Seed};
 use serde_json::{Value, json};
 
@@ -43,7 +44,7 @@ pub struct Arguments {
 struct Tuning {
     /// What frames are aligned to, and how
     #[arg(long, default_value = "best", value_parser = one_of::<Method, 4>([
-        ("best", "The best measured so far, which is model", Options::best),
+        ("best", "The best measured so far: at present, model", Options::best),
         ("paper", "The paper's: 3 cm voxels, exact nearest neighbours, frame to frame",
             || Options::paper(Weights::Model, Init::None)),
         ("projective", "Image blocks, neighbours by projection, frame to frame: the fastest",
@@ -78,13 +79,13 @@ struct Tuning {
     /// Side of an image block in px
     #[arg(long, value_name = "PX")]
     block: Option<usize>,
-    /// Points farther apart than this are no pair, m
+    /// Greatest distance between the points of a pair, m
     #[arg(long, value_name = "M")]
     gate: Option<f32>,
-    /// The most iterations of an alignment
+    /// Maximum number of iterations of an alignment
     #[arg(long, value_name = "N")]
     iterations: Option<usize>,
-    /// The most observations of a piece of the map that count
+    /// Maximum number of observations that count for a piece of the map
     #[arg(long, value_name = "N")]
     memory: Option<f32>,
     /// Do not read colour for the map
@@ -118,15 +119,16 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let mut sequence = open(&arguments.sequence, &arguments.input.assumed()?)?;
     let thinning = &arguments.thinning;
     sequence.thin(thinning.stride, thinning.frames);
-    let model = arguments.model.read()?;
-    model.refuse_other_size(&sequence.sensor)?;
     let options = arguments.tuning.options(global.seed());
     options.check()?;
+    notes(&sequence.remarks);
+    let model = arguments.model.read_for(&sequence)?;
     let title = format!("Map of {}", name_of(&arguments.sequence));
     let inputs: Vec<&Path> =
         arguments.model.path().into_iter().chain([&*arguments.sequence]).collect();
     let out = begin(&arguments.output, MAP, &inputs, global)?;
-    let stats = follow(&sequence, &model, &options, &title, out)?;
+    let named = Title { title: &title, model: arguments.model.described(&model) };
+    let stats = follow(&sequence, &model, &options, named, out)?;
     global.print_json(&stats)?;
     // With true poses there is something to compare with; without them, the same without the model.
     let (command, suffix, plain) = match sequence.truth.is_empty() {
@@ -140,12 +142,18 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// What the page is called, and what it calls the model.
+pub struct Title<'a> {
+    pub title: &'a str,
+    pub model: String,
+}
+
 /// Map, write every output, report; what stats.json says.
 pub fn follow(
     sequence: &Sequence,
     model: &NoiseModel,
     options: &Options,
-    title: &str,
+    Title { title, model: named }: Title<'_>,
     output: OutputFolder,
 ) -> anyhow::Result<Value> {
     detail(format!("settings: {options:?}"));
@@ -168,6 +176,7 @@ pub fn follow(
             evaluation,
             delta: DELTA,
         }),
+        model: &named,
         origin: &origin(&sequence.root, output.place(), options.seed.0),
     };
     output.write("map.html", map_page(&page)?.as_bytes())?;
@@ -175,7 +184,7 @@ pub fn follow(
     output.write("stats.json", serde_json::to_string_pretty(&stats)?.as_bytes())?;
     let folder = output.place().to_path_buf();
     output.finish()?;
-    notes(sequence.remarks.iter().chain(&mapped.remarks));
+    notes(&mapped.remarks);
     report(&mapped, &against, &folder);
     Ok(stats)
 }
@@ -205,7 +214,11 @@ fn report(mapped: &Mapped, against: &Option<Result<Evaluation, String>>, output:
     }
     let (frames, points) = (mapped.frames.len(), mapped.map.len());
     let (posed, folder) = (frames - mapped.lost(), output.display());
-    result(format!("{posed} of {frames} frames have a pose; {points} points; wrote {folder}"));
+    result(format!(
+        "{posed} of {} with a pose; {}; wrote {folder}",
+        counted(frames, "frame"),
+        counted(points, "point")
+    ));
 }
 
 fn stats(

@@ -11,6 +11,7 @@ mod correct;
 mod demo;
 mod demo_seal;
 mod diagnose;
+mod diagnose_next;
 mod effects;
 mod evaluate;
 mod map;
@@ -50,7 +51,7 @@ enum Command {
     #[command(after_help = calibrate::EXAMPLES)]
     Calibrate(calibrate::Arguments),
     /// Fit sigma(z, theta) to a table z_m,theta_rad,sigma_m[,n]
-    #[command(hide = true, after_help = calibrate::FIT_EXAMPLES)]
+    #[command(after_help = calibrate::FIT_EXAMPLES)]
     Fit(calibrate::FitArguments),
     /// Find what a model or a simulation leaves out of a recording, name it and model it
     #[command(after_help = diagnose::EXAMPLES)]

@@ -5,6 +5,7 @@ use std::path::Path;
 use kinoise::report::Origin;
 
 use super::common::source_date;
+use super::console::quoted;
 
 /// Results do not depend on these.
 const FLAGS: [&str; 5] = ["--json", "--force", "--exit-zero", "-q", "-v"];
@@ -44,15 +45,6 @@ fn command(typed: &[String]) -> String {
 
 fn name_of(folder: &Path) -> String {
     folder.file_name().map_or_else(|| ".".into(), |name| name.to_string_lossy().into_owned())
-}
-
-/// As a shell reads it back.
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "-_./,:=+@%".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        return word.to_string();
-    }
-    format!("'{}'", word.replace('\'', r"'\''"))
 }
 
 #[cfg(test)]

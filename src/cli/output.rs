@@ -10,64 +10,52 @@ use kinoise::io::{Interrupted, Leaves, OutputFolder, discard_unfinished};
 
 use super::common::Global;
 
+const CALIBRATED: &[&str] = &[
+    "model.json",
+    "measurements.csv",
+    "sigma.svg",
+    "sigma.png",
+    "sigma_map.svg",
+    "sigma_map.png",
+    "report.html",
+];
+
 /// Of `calibrate` and `fit`; without a fit the measurements stand alone.
-pub const CALIBRATION: Leaves = Leaves::Results {
-    names: &[
-        "model.json",
-        "measurements.csv",
-        "sigma.svg",
-        "sigma.png",
-        "sigma_map.svg",
-        "sigma_map.png",
-        "report.html",
-    ],
-    marks: &["measurements.csv", "sigma.svg"],
-};
+pub const CALIBRATION: Leaves =
+    Leaves::Results { names: &[CALIBRATED], marks: &["measurements.csv", "sigma.svg"] };
 
 pub const DIAGNOSIS: Leaves = Leaves::Results {
-    names: &["diagnosis.json", "model.json", "report.html"],
+    names: &[&["diagnosis.json", "model.json", "report.html"]],
     marks: &["diagnosis.json"],
 };
 
 pub const MAP: Leaves = Leaves::Results {
-    names: &["trajectory.txt", "map.ply", "map.html", "frames.csv", "stats.json"],
+    names: &[&["trajectory.txt", "map.ply", "map.html", "frames.csv", "stats.json"]],
     marks: &["trajectory.txt"],
 };
 
 pub const COMPARISON: Leaves = Leaves::Results {
-    names: &[
+    names: &[&[
         "tables.json",
         "tables.txt",
         "fig6_paths.svg",
         "fig7_ate.svg",
         "fig8_rpe.svg",
         "report.html",
-    ],
+    ]],
     marks: &["tables.json"],
 };
 
 pub const EVALUATION: Leaves = Leaves::Results {
-    names: &["evaluation.json", "ate.svg", "rpe.svg", "paths.svg", "report.html"],
+    names: &[&["evaluation.json", "ate.svg", "rpe.svg", "paths.svg", "report.html"]],
     marks: &["evaluation.json"],
 };
 
 /// A calibration with the rest of the road in folders beside it.
 pub const DEMO: Leaves = Leaves::Results {
     names: &[
-        "model.json",
-        "measurements.csv",
-        "sigma.svg",
-        "sigma.png",
-        "sigma_map.svg",
-        "sigma_map.png",
-        "report.html",
-        "diagnosis",
-        "map",
-        "map-plain",
-        "office-",
-        "sealed",
-        "sealed.txt",
-        "sealed.sha256",
+        CALIBRATED,
+        &["diagnosis", "map", "map-plain", "office-", "sealed", "sealed.txt", "sealed.sha256"],
     ],
     marks: &["measurements.csv"],
 };

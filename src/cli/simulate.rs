@@ -4,15 +4,16 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use clap::{Args, ValueEnum};
 use kinoise::effects::Active;
-use kinoise::io::{Assumed, Leaves, OutputFolder, open, write_json};
+use kinoise::io::{Leaves, OutputFolder, open, write_json};
 use kinoise::model::{Direction, Domain, PAPER_EQ1};
 use kinoise::simulate::room::{Film, Room};
 use kinoise::simulate::speckle::Causes;
 use kinoise::simulate::{Physics, Shoot, ViewPlan, kinect_v1, plan_grid, plan_like};
+use kinoise::units::{counted, verb};
 use kinoise::{Form, NoiseModel, Sensor, SigmaModel};
 use serde_json::{Value, json};
 
-use super::common::{Global, MAX_FRAMES, count, model_again};
+use super::common::{Global, Input, MAX_FRAMES, count, model_again};
 use super::console::{beside, detail, detail_model, next_step, notes, result, say, working};
 use super::output::begin;
 use super::simulate_room::RoomArguments;
@@ -63,6 +64,8 @@ pub struct Arguments {
     scenery: SceneryArguments,
     #[command(flatten, next_help_heading = "Room")]
     room: RoomArguments,
+    #[command(flatten, next_help_heading = super::INPUT_HEADING)]
+    input: Input,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
@@ -83,6 +86,10 @@ impl Arguments {
 }
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
+    ensure!(
+        arguments.like.is_some() || arguments.input == Input::default(),
+        "--intrinsics and the like tell how to read a recording; give it with --like"
+    );
     if let Some(path) = &arguments.recipe {
         check_recipe(path, &arguments.output)?;
     }
@@ -116,7 +123,8 @@ fn next(arguments: &Arguments) -> Vec<OsString> {
         (Some(real), _) => {
             let to = beside(output, "diagnosis");
             let against = vec!["--against".into(), output.into(), "-o".into(), to.into()];
-            return [vec!["diagnose".into(), real.into()], against].concat();
+            let input = arguments.input.again();
+            return [vec!["diagnose".into(), real.into()], against, input].concat();
         }
         (None, true) => ("map", "map"),
         (None, false) => ("calibrate", "noise"),
@@ -131,7 +139,7 @@ fn write_film(film: &Film, folder: OutputFolder) -> anyhow::Result<(Value, Value
     working("filming", |step| film.write(folder.path(), step))?;
     let (output, frames) = (folder.place().to_path_buf(), film.poses.len());
     folder.finish()?;
-    result(format!("wrote {frames} frames of a room to {}", output.display()));
+    result(format!("wrote {} of a room to {}", counted(frames, "frame"), output.display()));
     Ok((json!({"frames": frames, "output": output}), film.recipe()))
 }
 
@@ -149,7 +157,7 @@ fn shoot(
     let sensor = recorded_by.unwrap_or(sensor);
     if let Physics::Formula { sigma, effects } = &physics {
         note_clamped(&views, sigma);
-        note_idle(effects, &arguments.scenery);
+        note_idle(effects, &arguments.scenery, arguments.like.is_some());
     }
     detail(format!("effects and physics: {physics:?}"));
     let shoot = Shoot { sensor, views, physics, infrared: arguments.infrared, seed: global.seed() };
@@ -164,7 +172,8 @@ fn shoot(
     folder.finish()?;
     notes(blind.iter().map(|name| format!("view {name} shows no depth: {UNSEEN}")));
     let frames: usize = shoot.views.iter().map(|v| v.stamps.len()).sum();
-    result(format!("wrote {views} views, {frames} frames, to {output}"));
+    let [taken, each] = [counted(views, "view"), counted(frames, "frame")];
+    result(format!("wrote {taken}, {each}, to {output}"));
     let made = json!({"views": views, "frames": frames, "output": arguments.output});
     Ok((made, shoot.recipe()))
 }
@@ -181,7 +190,7 @@ fn plans(
         let plans = plan_grid(&arguments.poses.views()?, &scenery, frames, shuffled, seed);
         return Ok((plans, None));
     };
-    let recording = open(like, &Assumed::default())?;
+    let recording = open(like, &arguments.input.assumed()?)?;
     let (plans, excluded) = plan_like(&recording, scenery.reference_error_m.unwrap_or(0.0), seed);
     notes(&excluded);
     ensure!(!plans.is_empty(), "{}: no view shows a plane; see the notes", like.display());
@@ -265,24 +274,27 @@ fn note_clamped(views: &[ViewPlan], sigma: &SigmaModel) {
     let ([near, far], tilt) = (sigma.domain.z_m, sigma.domain.theta_rad[1].to_degrees());
     if count > 0 {
         say(format!(
-            "note: {count} of {all} views lie outside the model's range (z {near:.2} to {far:.2} m, tilt up to {tilt:.1} degrees); sigma is clamped to its edge there"
+            "note: {count} of {all} views {} outside the model's range (z {near:.2} to {far:.2} m, tilt up to {tilt:.1} degrees); sigma is held at its edge there",
+            verb(count, "lies", "lie")
         ));
     }
 }
 
 /// Effects that have nothing to act on in this scene.
-fn note_idle(effects: &[Active], scenery: &SceneryArguments) {
+fn note_idle(effects: &[Active], scenery: &SceneryArguments, like: bool) {
     for active in effects {
         let missing = match active.effect.card().id {
             "occlusion-shadow" | "edge-mixing" if scenery.wall.is_none() => {
-                "something behind the target (--wall)"
+                ("something behind the target", "--wall")
             }
             "intensity-dependent-noise" if !scenery.patches => {
-                "a target of several greys (--patches)"
+                ("a target of several greys", "--patches")
             }
             _ => continue,
         };
-        say(format!("note: {} needs {missing} to show much", active.effect.card().id));
+        let (missing, option) = missing;
+        let how = if like { "views taken --like others have none" } else { option };
+        say(format!("note: {} needs {missing} to show much ({how})", active.effect.card().id));
     }
 }
 

@@ -6,6 +6,7 @@ use clap::Args;
 use kinoise::simulate::room::{
     CLEARANCE_M, Pose, Resampled, Room, around_the_desks, place, read_trajectory, resample,
 };
+use kinoise::units::counted;
 
 use super::common::{MAX_FRAMES, count};
 use super::console::say;
@@ -51,9 +52,10 @@ fn fitted(
         resample(&read.poses, frames.map(|n| n.saturating_mul(stride)))?;
     let placed = place(room, &poses)?;
     if !gaps.is_empty() {
-        let (count, seconds) = (gaps.len(), gaps.iter().map(|g| g.seconds()).sum::<f64>());
+        let (count, seconds) =
+            (counted(gaps.len(), "gap"), gaps.iter().map(|g| g.seconds()).sum::<f64>());
         say(format!(
-            "note: {path}: {count} gaps without poses, {seconds:.1} s in all; the path is interpolated there"
+            "note: {path}: {count} without poses, {seconds:.1} s in all; the path is interpolated there"
         ));
     }
     let motion = placed.room_from_world;

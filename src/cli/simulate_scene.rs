@@ -64,7 +64,7 @@ pub struct SceneryArguments {
     /// Put a wall this far behind the target, m
     #[arg(long, value_name = "M", allow_hyphen_values = true, value_parser = between(0.0, 1e3, "m"))]
     pub wall: Option<f64>,
-    /// Put so many boxes in the way, beside the target's middle
+    /// Number of boxes in the way, beside the target's middle
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = count(0, MAX_CLUTTER))]
     clutter: usize,
     /// Write reference distances with this standard deviation, m

@@ -5,6 +5,7 @@ use kinoise::fleet::{
     BiasOfUnit, Change, Comparison, ParameterOfUnit, SharedBias, SharedEffect, SharedSigma,
     Standing, UnitModel, compare,
 };
+use kinoise::units::counted;
 
 use super::common::Global;
 use super::console::{notes, result};
@@ -30,10 +31,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
 
 fn report(comparison: &Comparison) {
     let Comparison { sensor, width, height, units, .. } = comparison;
-    let count = match units.len() {
-        1 => "1 unit".into(),
-        n => format!("{n} units"),
-    };
+    let count = counted(units.len(), "unit");
     result(format!("{count} of \"{sensor}\", {width} x {height} px"));
     if let Some(sigma) = &comparison.sigma {
         report_sigma(sigma);

@@ -62,9 +62,6 @@ struct Drift {
     time_constant_s: f64,
 }
 
-/// Baselines or focal lengths this far apart are not the same sensor's.
-const SAME_SENSOR: f64 = 0.01;
-
 impl Correction {
     /// What `model` says about `sensor`.
     ///
@@ -96,7 +93,7 @@ impl Correction {
             uncertainty: Uncertainty::default(),
             noise: Noise::of(&model.sigma, scale_px_m),
             ignored: Vec::new(),
-            remarks: of_model.iter().flat_map(|other| differences(other, sensor)).collect(),
+            remarks: model.differences(sensor),
             camera,
         };
         for entry in &model.effects {
@@ -212,27 +209,3 @@ impl Correction {
 }
 
 const REMEDY: &str = "give the model that was made of this very sensor";
-
-/// Signs that two descriptions may not be of one sensor.
-fn differences(model: &Sensor, sensor: &Sensor) -> Vec<String> {
-    let far = |a: f64, b: f64| (a / b - 1.0).abs() > SAME_SENSOR;
-    let mut differences = Vec::new();
-    if let (Some(a), Some(b)) = (&model.serial, &sensor.serial)
-        && a != b
-    {
-        differences.push(format!("the model is of unit {a}, the recording of unit {b}"));
-    }
-    let (a, b) = (&model.camera, &sensor.camera);
-    if far(a.fx, b.fx) || far(a.fy, b.fy) {
-        differences.push(format!(
-            "the model's focal lengths are {:.1}, {:.1} px, the recording's {:.1}, {:.1}",
-            a.fx, a.fy, b.fx, b.fy
-        ));
-    }
-    if let (Some(a), Some(b)) = (model.baseline_m, sensor.baseline_m)
-        && far(a, b)
-    {
-        differences.push(format!("the model's baseline is {a} m, the recording's {b}"));
-    }
-    differences
-}

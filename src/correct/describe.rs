@@ -19,7 +19,6 @@ pub(super) fn describe(
     images: impl Iterator<Item = (f64, PathBuf)>,
 ) -> Result<()> {
     match layout {
-        Layout::Images => Ok(()),
         Layout::Dump => {
             let mut list = String::from("# timestamp path\n");
             for (stamp, file) in images {
@@ -29,7 +28,7 @@ pub(super) fn describe(
             write_atomic(&folder.join("depth.txt"), list.as_bytes())?;
             write_recording_file(folder, sensor)
         }
-        Layout::Recording | Layout::Sequence => {
+        Layout::Recording | Layout::Sequence | Layout::Images => {
             let path = folder.join(DESCRIPTION);
             match std::fs::read_to_string(&path) {
                 Ok(text) => write_atomic(&path, with_code(&text, &sensor.code)?.as_bytes()),

@@ -14,8 +14,8 @@ use crate::Progress;
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, DepthTable, FARTHEST_M, Frame};
 use crate::io::{
-    Assumed, FrameSource, INDEX, Layout, encode_pgm16, encode_png16, open_uncut, refuse_full,
-    refuse_inside, write_atomic,
+    Assumed, DESCRIPTION, FrameSource, INDEX, Layout, encode_pgm16, encode_png16, open_uncut,
+    refuse_full, refuse_inside, write_atomic,
 };
 use crate::model::NoiseModel;
 use crate::view::{Recording, Sensor};
@@ -52,7 +52,7 @@ pub struct CorrectOptions<'a> {
 }
 
 /// Write the recording at `root` again into `output`, all its files, `model`'s biases taken out of
-/// the depth. Raw disparities become metric values, finer than the read-out's steps, unless
+/// the depth. Where nothing described the sensor, recording.json does in `output`. Raw disparities become metric values, finer than the read-out's steps, unless
 /// `keep_code`. Images of the uncertainty have the depth images' names, 16 bit, in units of 10 um
 /// ([`SIGMA_UNITS_PER_METRE`]); 0 where there is no depth.
 ///
@@ -185,7 +185,9 @@ impl Rewrite<'_> {
         let tallies: Result<Vec<Tally>> = images.par_iter().map(each).collect();
         let corrected = self.sum(&tallies?, recording)?;
         copy(self.root, self.output, &last)?;
-        if self.recodes() {
+        // A dump that keeps its code stays one, and fakenect's readers know no other description.
+        let assumed = self.layout != Layout::Dump && !self.root.join(DESCRIPTION).is_file();
+        if self.recodes() || assumed {
             let sensor = Sensor { code: self.raw.code, ..self.sensor.clone() };
             let listed = images.iter().map(|i| (i.timestamp, i.file.with_extension("png")));
             describe(self.output, self.layout, &sensor, listed)?;
@@ -333,12 +335,6 @@ impl Rewrite<'_> {
                 metres(high),
                 metres(low)
             ));
-        }
-        // A folder of mere images cannot say that its raw values mean something else now.
-        if let (DepthCode::Metric { units_per_metre, .. }, Layout::Images, true) =
-            (self.raw.code, self.layout, self.recodes())
-        {
-            remarks.push(format!("read the corrected folder with --units-per-metre {units_per_metre}, not --raw-disparity"));
         }
         Ok(Corrected {
             frames: tallies.len() - unread.len(),

@@ -6,6 +6,7 @@ use super::{Spread, too_few};
 use crate::error::{Error, Result};
 use crate::stats::median;
 use crate::trajectory::Pose;
+use crate::units::counted;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Delta {
@@ -66,7 +67,7 @@ pub fn relative(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Rpe> 
 fn too_short(delta: Delta) -> Error {
     let interval = match delta {
         Delta::Seconds(s) => format!("{s} s"),
-        Delta::Frames(n) => format!("{n} frames"),
+        Delta::Frames(n) => counted(n, "frame"),
     };
     Error::NotEnough {
         what: format!(

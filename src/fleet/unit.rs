@@ -5,6 +5,7 @@ use std::time::SystemTime;
 
 use crate::error::{Error, Result};
 use crate::model::NoiseModel;
+use crate::units::counted;
 use crate::view::RecordingFile;
 
 /// A model and the file that it came from.
@@ -20,7 +21,7 @@ const MIN_DEGREES_OF_FREEDOM: f64 = 3.0;
 impl UnitModel {
     /// A `model.json`, or the folder that holds one.
     pub fn read(path: &Path) -> Result<Self> {
-        let file = if path.is_dir() { path.join("model.json") } else { path.to_path_buf() };
+        let file = NoiseModel::file(path);
         Ok(UnitModel { model: NoiseModel::read(&file)?, path: file })
     }
 
@@ -63,8 +64,9 @@ impl UnitModel {
         }
         if sigma.degrees_of_freedom < MIN_DEGREES_OF_FREEDOM {
             let what = format!(
-                "it was fitted to {} views, too few to say how sure it is ({} degrees of freedom; {MIN_DEGREES_OF_FREEDOM} are needed)",
-                self.model.fit.views, sigma.degrees_of_freedom
+                "it was fitted to {}, too few to say how sure it is ({} degrees of freedom; {MIN_DEGREES_OF_FREEDOM} are needed)",
+                counted(self.model.fit.views, "view"),
+                sigma.degrees_of_freedom
             );
             return Err(self.refused(what, "record more views of this unit"));
         }
@@ -125,7 +127,7 @@ pub(super) fn check(units: &[UnitModel]) -> Result<Vec<String>> {
 /// In what the second is no unit of the first's kind.
 fn other_kind(first: &RecordingFile, other: &RecordingFile) -> Option<String> {
     if first.sensor != other.sensor {
-        return Some(format!("it is of a \"{}\", not a \"{}\"", other.sensor, first.sensor));
+        return Some(format!("its sensor is \"{}\", not \"{}\"", other.sensor, first.sensor));
     }
     let size = |r: &RecordingFile| (r.camera.width, r.camera.height);
     let ((w, h), (ow, oh)) = (size(first), size(other));

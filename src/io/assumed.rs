@@ -111,9 +111,18 @@ impl Assumed {
         size: (usize, usize),
     ) -> Result<(Sensor, Option<String>)> {
         const NAME: &str = "TUM RGB-D sequence";
-        if self.intrinsics.is_none()
-            && let Some(of) = published(list, size)
-        {
+        let known = published(list, size);
+        if let (Some(given), Some(of)) = (self.intrinsics, known) {
+            let remark = format!(
+                "--intrinsics replaces {}'s published camera (depth.txt names it), which is {}{}",
+                of.name,
+                of.intrinsics.map(shortest).join(","),
+                if of.distortion.is_some() { " with a distortion" } else { "" }
+            );
+            let differs = given != of.intrinsics || of.distortion.is_some();
+            return Ok((self.sensor(NAME, size, given, TUM_CODE)?, differs.then_some(remark)));
+        }
+        if let Some(of) = known {
             let mut sensor = self.sensor(NAME, size, of.intrinsics, TUM_CODE)?;
             sensor.camera.distortion = of.distortion;
             let remark = format!("depth.txt says {}: its published camera is used", of.name);

@@ -1,13 +1,13 @@
 //! Folders of depth images without recording.json's views: a TUM sequence, plain PNGs, and a fakenect
 //! dump (INDEX.txt and `d-<time>-<stamp>.pgm`, raw 11-bit values of a Kinect v1).
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::assumed::Assumed;
 use super::images::{encode_pgm16, size_of};
-use super::layout::{DEPTH_LIST, DESCRIPTION, UnknownKeys, read_sensor};
+use super::layout::{DEPTH_LIST, DESCRIPTION, UnknownKeys, is_view, read_sensor};
 use super::list::{read_list, shorten};
-use super::output::{entries, refuse_full, write_atomic};
+use super::output::{entries, listed, refuse_full, write_atomic};
 use super::stills::{Film, Footage};
 use crate::error::{Error, Result, read_text};
 use crate::frame::Frame;
@@ -41,25 +41,105 @@ pub(super) fn sequence(root: &Path, assumed: &Assumed) -> Result<(Footage, Senso
 /// 30 Hz: a plain folder has no clock, and every sensor of this kind runs at it.
 const NOMINAL_INTERVAL_S: f64 = 1.0 / 30.0;
 
-/// 16-bit PNGs in name order; everything else comes from options.
+fn is_image(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) && path.is_file()
+}
+
+/// Does a folder hold images, and no view?
+pub(super) fn is_plain(root: &Path) -> Result<bool> {
+    let files = entries(root)?;
+    Ok(files.iter().any(|p| is_image(p)) && !files.iter().any(|p| is_view(p)))
+}
+
+/// 16-bit PNGs in name order; everything else comes from recording.json or from options.
 pub(super) fn images(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     let mut files = entries(root)?;
-    files.retain(|p| p.is_file() && p.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")));
-    if files.is_empty() {
-        return Err(Error::recording(
-            root,
-            "neither recording.json, depth.txt, INDEX.txt nor a PNG is in this folder",
-            "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs",
-        ));
+    files.retain(|p| is_image(p));
+    // A calibration leaves pictures, which are no depth.
+    if let Some(error) = results_in(root) {
+        return Err(error);
     }
-    let (sensor, remark) = assumed.images_sensor(root, &files)?;
+    if files.is_empty() {
+        return Err(nothing_in(root)?);
+    }
+    let description = root.join(DESCRIPTION);
+    let (mut remarks, mut described_by) = (Vec::new(), Vec::new());
+    let sensor = if description.is_file() {
+        assumed.refuse_beside(&description)?;
+        let mut unknown = UnknownKeys::default();
+        let sensor = read_sensor(&description, &mut unknown)?;
+        remarks.extend(unknown.remarks());
+        described_by.push(description);
+        sensor
+    } else {
+        let (sensor, remark) = assumed.images_sensor(root, &files)?;
+        remarks.extend(remark);
+        sensor
+    };
     let frames = files
         .into_iter()
         .enumerate()
         .map(|(i, path)| FrameRef { timestamp: i as f64 * NOMINAL_INTERVAL_S, path })
         .collect();
-    let remarks = remark.into_iter().collect();
-    Ok((Footage { frames, film: Film::Captures, remarks, described_by: Vec::new() }, sensor))
+    Ok((Footage { frames, film: Film::Captures, remarks, described_by }, sensor))
+}
+
+/// What a folder without a recording holds instead, as far as it is known.
+/// An error when it cannot be listed.
+pub(crate) fn nothing_in(root: &Path) -> Result<Error> {
+    const REMEDY: &str =
+        "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs";
+    let there = entries(root)?;
+    // Views have lists as films have; several of them are a recording without its description.
+    let films = |p: &Path| [DESCRIPTION, "groundtruth.txt"].iter().any(|n| p.join(n).is_file());
+    if there.iter().filter(|p| is_view(p) && !films(p)).count() > 1 {
+        let what = "recording.json is missing beside the views in this folder";
+        return Ok(Error::recording(root, what, REMEDY));
+    }
+    let holds = |p: &&PathBuf| p.is_dir() && holds_recording(p);
+    let below: Vec<String> = there
+        .iter()
+        .filter(holds)
+        .map(|p| format!("{}/", p.file_name().unwrap_or_default().to_string_lossy()))
+        .collect();
+    Ok(match &below[..] {
+        [] => {
+            let what = "neither recording.json, depth.txt, INDEX.txt nor a PNG is in this folder";
+            Error::recording(root, what, REMEDY)
+        }
+        [one] => {
+            let what = format!("this folder holds no recording, but {one} in it does");
+            Error::recording(root, what, "give that folder")
+        }
+        _ => {
+            let what = format!("this folder holds no recording, but {} in it do", listed(&below));
+            Error::recording(root, what, "give one of them")
+        }
+    })
+}
+
+/// Files that together only the results of a command have.
+const RESULTS: [(&[&str], &str); 6] = [
+    (&["diagnosis.json", "report.html"], "diagnose"),
+    (&["sigma.svg", "report.html"], "calibrate"),
+    (&["trajectory.txt", "map.ply"], "map"),
+    (&["tables.json", "report.html"], "compare"),
+    (&["evaluation.json", "report.html"], "evaluate"),
+    (&["sigma.json"], "correct --sigma"),
+];
+
+/// Results taken for what they were made of.
+pub(crate) fn results_in(root: &Path) -> Option<Error> {
+    let of = |names: &[&str]| names.iter().all(|name| root.join(name).is_file());
+    let (names, command) = RESULTS.iter().find(|(names, _)| of(names))?;
+    let what = format!("it holds results of kinoise {command} ({}), no depth images", names[0]);
+    Some(Error::recording(root, what, "give the folder that they were made of"))
+}
+
+fn holds_recording(folder: &Path) -> bool {
+    let marks = [DESCRIPTION, DEPTH_LIST, INDEX];
+    marks.iter().any(|name| folder.join(name).is_file())
+        || entries(folder).is_ok_and(|files| files.iter().any(|p| is_image(p)))
 }
 
 pub(crate) const INDEX: &str = "INDEX.txt";

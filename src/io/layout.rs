@@ -87,6 +87,11 @@ impl ViewFile {
     }
 }
 
+pub(super) fn is_view(folder: &Path) -> bool {
+    let listed = [DEPTH_LIST, VIEW_FILE].iter().any(|name| folder.join(name).exists());
+    listed && folder.is_dir()
+}
+
 pub(super) fn open(root: &Path) -> Result<Recording> {
     let path = root.join(DESCRIPTION);
     let mut unknown = UnknownKeys::default();
@@ -100,8 +105,7 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
         described_by: vec![path],
     };
     for folder in entries(root)? {
-        let listed = [DEPTH_LIST, VIEW_FILE].iter().any(|name| folder.join(name).exists());
-        if !(listed && folder.is_dir()) {
+        if !is_view(&folder) {
             continue;
         }
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();

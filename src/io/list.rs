@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result, read_text};
+use crate::units::{counted, verb};
 use crate::view::FrameRef;
 
 /// The frames a list names, in time order, and what was odd about it.
@@ -62,14 +63,17 @@ fn put_in_order(list: &mut FrameList, file: &str) {
     frames.dedup_by(|b, a| a.timestamp == b.timestamp && a.path == b.path);
     if frames.len() < before {
         list.remarks.push(format!(
-            "{file}: {} lines stand twice; each frame is used once",
-            before - frames.len()
+            "{file}: {} {} twice; each frame is used once",
+            counted(before - frames.len(), "line"),
+            verb(before - frames.len(), "stands", "stand")
         ));
     }
     let shared = frames.windows(2).filter(|w| w[0].timestamp == w[1].timestamp).count();
     if shared > 0 {
         list.remarks.push(format!(
-            "{file}: {shared} frames have the same timestamp as another; all are used"
+            "{file}: {} {} the same timestamp as another; all are used",
+            counted(shared, "frame"),
+            verb(shared, "has", "have")
         ));
     }
 }

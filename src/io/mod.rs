@@ -12,8 +12,8 @@ mod stills;
 mod unfinished;
 
 pub use assumed::Assumed;
-pub(crate) use folder::INDEX;
 pub use folder::write_dump;
+pub(crate) use folder::{INDEX, results_in};
 pub use images::{
     ColourImage, FrameSource, InfraredImage, encode_pgm16, encode_png16, encode_png16_quickly,
     encode_rgb,
@@ -47,7 +47,7 @@ pub enum Layout {
     Sequence,
     /// What fakenect-record writes.
     Dump,
-    /// PNGs and nothing else.
+    /// PNGs; recording.json beside them is read too.
     Images,
 }
 
@@ -62,9 +62,10 @@ impl Layout {
                 "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs",
             ));
         }
-        // A described TUM sequence has its frames at the root, a recording in one folder a view.
+        // A described film or plain folder has its frames at the root, a recording in one folder a view.
         let sequence = path.join(DEPTH_LIST).is_file();
-        Ok(if path.join(DESCRIPTION).is_file() && !sequence {
+        let described = path.join(DESCRIPTION).is_file() && !sequence;
+        Ok(if described && !folder::is_plain(path)? {
             Layout::Recording
         } else if path.join(INDEX).is_file() {
             Layout::Dump

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::folder::INDEX;
 use super::layout::{DEPTH_LIST, DESCRIPTION};
-use super::output::{entries, write_atomic};
+use super::output::{entries, listed, write_atomic};
 use super::unfinished::{Open, discard, register};
 use crate::error::{Error, Result};
 
@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 pub enum Leaves {
     /// Files and folders of these names; one that ends in `-` stands for all that begin so.
     Results {
-        names: &'static [&'static str],
+        names: &'static [&'static [&'static str]],
         /// Of them, what no other command writes: where none is there, the rest is somebody else's.
         marks: &'static [&'static str],
     },
@@ -214,14 +214,22 @@ fn make_parents(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     fs::create_dir_all(folder).map(|()| missing)
 }
 
+fn no_folder(file: &Path) -> Error {
+    Error::recording(file, "this is a file, not a folder", "give another folder, such as with -o")
+}
+
 /// May it be written?
 fn what_stands(place: &Path, leaves: Leaves, force: bool) -> Result<Stands> {
     if fs::symlink_metadata(place).is_err() {
-        return Ok(Stands::Nothing);
+        // A file on the way there would only say so when the folder is made.
+        let standing = place.ancestors().find(|p| fs::symlink_metadata(p).is_ok());
+        return match standing.filter(|p| !p.as_os_str().is_empty() && !p.is_dir()) {
+            Some(file) => Err(no_folder(file)),
+            None => Ok(Stands::Nothing),
+        };
     }
     if !place.is_dir() {
-        let cause = std::io::Error::from(std::io::ErrorKind::NotADirectory);
-        return Err(Error::write(place, cause));
+        return Err(no_folder(place));
     }
     let there: Vec<String> = entries(place)?
         .iter()
@@ -244,7 +252,11 @@ fn what_stands(place: &Path, leaves: Leaves, force: bool) -> Result<Stands> {
         ),
         Leaves::Results { names, marks } => {
             let known = |name: &str| {
-                names.iter().any(|n| *n == name || (n.ends_with('-') && name.starts_with(n)))
+                names
+                    .iter()
+                    .copied()
+                    .flatten()
+                    .any(|n| *n == name || (n.ends_with('-') && name.starts_with(n)))
             };
             let mut others = there.clone();
             // A file of a common name is this command's where its mark stands beside it.
@@ -262,16 +274,6 @@ fn what_stands(place: &Path, leaves: Leaves, force: bool) -> Result<Stands> {
     }
 }
 
-/// A few of the names.
-fn listed(names: &[String]) -> String {
-    const SHOWN: usize = 3;
-    let shown = names.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
-    match names.len().saturating_sub(SHOWN) {
-        0 => shown,
-        more => format!("{shown} and {more} more"),
-    }
-}
-
 /// An error when what is written would take the place of `input`.
 fn refuse_replacing(place: &Path, leaves: Leaves, input: &Path) -> Result<()> {
     // What is not there is its reader's to report.
@@ -281,7 +283,7 @@ fn refuse_replacing(place: &Path, leaves: Leaves, input: &Path) -> Result<()> {
     let first = within.iter().next().unwrap_or_default().to_string_lossy();
     let replaced = match leaves {
         Leaves::Recording => true,
-        Leaves::Results { names, .. } => names.contains(&&*first),
+        Leaves::Results { names, .. } => names.iter().any(|names| names.contains(&&*first)),
     };
     if replaced {
         let what = format!("the output would replace {}, which is read", input.display());

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::images::FrameSource;
 use crate::frame::{DepthTable, Frame};
+use crate::units::verb;
 use crate::view::{FrameRef, Recording, Sensor, View, ViewNotes};
 
 /// How the frames were taken.
@@ -92,8 +93,10 @@ fn cut_up(frames: Vec<FrameRef>, film: Film, sensor: &Sensor) -> (Vec<View>, Vec
     }
     if used < readable {
         remarks.push(format!(
-            "{} of {listed} frames lie between still stretches (target or sensor moving) and are left out",
-            readable - used
+            "{} of {listed} frames {} between still stretches (target or sensor moving) and {} left out",
+            readable - used,
+            verb(readable - used, "lies", "lie"),
+            verb(readable - used, "is", "are")
         ));
     }
     (views, remarks)

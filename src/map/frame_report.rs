@@ -8,6 +8,7 @@ use nalgebra::Isometry3;
 
 use super::icp::Alignment;
 use crate::stats::median;
+use crate::units::verb;
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Fate {
@@ -143,8 +144,9 @@ fn repeated(frames: &[FrameReport]) -> Option<String> {
     let n = frames.iter().filter(|f| f.repeated).count();
     (n > 0).then(|| {
         format!(
-            "{n} of {} depth images are the one before, bit by bit: a frozen driver?",
-            frames.len()
+            "{n} of {} depth images {} the one before, bit by bit: a frozen driver?",
+            frames.len(),
+            verb(n, "is", "are")
         )
     })
 }

@@ -62,7 +62,8 @@ impl Mapped {
     }
 }
 
-/// Map a sequence.
+/// Map a sequence. Whether the model is this sensor's is the caller's to ask:
+/// [`NoiseModel::differences`] and [`outside`].
 /// An error when the model is of another sensor, OpenCV fails, or not even two frames have a pose.
 pub fn map(
     sequence: &Sequence,
@@ -85,8 +86,7 @@ pub fn map(
         next = prepared;
         progress.step(k + 1, moments.len());
     }
-    let mut remarks = preprocessor.remarks().to_vec();
-    remarks.extend(frames.iter().filter_map(|f| f.remark.clone()));
+    let mut remarks: Vec<String> = frames.iter().filter_map(|f| f.remark.clone()).collect();
     remarks.extend(frame_report::remarks(&frames));
     let mapped = Mapped { frames, map: tracker.into_map(), remarks };
     if mapped.trajectory().len() < 2 {
@@ -231,6 +231,27 @@ impl Options {
             None => Ok(()),
         }
     }
+}
+
+/// Frames that stand for a film when its depths are asked for.
+const SAMPLED: usize = 8;
+
+/// Share of the sequence's depths that lie outside the distances at which `model` was measured, where
+/// its sigma is held; of a few frames over the whole. `None` where those show no depth.
+pub fn outside(sequence: &Sequence, model: &NoiseModel) -> Option<f64> {
+    let table = sequence.sensor.code.table();
+    let [near, far] = model.sigma.domain.z_m;
+    let (mut seen, mut beyond) = (0usize, 0usize);
+    let every = sequence.moments.len().div_ceil(SAMPLED).max(1);
+    // A frame that cannot be read is reported when it is mapped.
+    for frame in sequence.moments.iter().step_by(every).filter_map(|m| sequence.depth(m).ok()) {
+        for z in frame.raw.iter().map(|&raw| f64::from(table.metres(raw))).filter(|z| z.is_finite())
+        {
+            seen += 1;
+            beyond += usize::from(!(near..=far).contains(&z));
+        }
+    }
+    (seen > 0).then(|| beyond as f64 / seen as f64)
 }
 
 #[cfg(test)]

@@ -66,11 +66,6 @@ impl<'a> Preprocessor<'a> {
         })
     }
 
-    /// What is odd about model and sensor together.
-    pub fn remarks(&self) -> &[String] {
-        if self.correction.is_identity() { &[] } else { self.correction.remarks() }
-    }
-
     /// An error when the depth image cannot be read, or OpenCV fails.
     pub fn prepare(&self, moment: &Moment) -> Result<Prepared> {
         let mut stages = Stages::default();

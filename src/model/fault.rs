@@ -2,11 +2,8 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::file::NoiseModel;
 use super::surface::{Domain, SigmaModel};
-use crate::error::{Error, Result};
 use crate::stats::even;
-use crate::view::Sensor;
 
 /// Points a side at which sigma is looked at between the domain's corners. What the forms can do
 /// in between (a parabola's vertex is looked at by itself) is smooth on this scale.
@@ -105,24 +102,6 @@ fn is_covariance(covariance: &DMatrix<f64>) -> bool {
     let symmetric = (&correlation - correlation.transpose()).amax() <= ROUNDING;
     let finite = correlation.iter().all(|v| v.is_finite());
     finite && symmetric && SymmetricEigen::new(correlation).eigenvalues.min() >= -ROUNDING
-}
-
-impl NoiseModel {
-    /// Where a sensor errs is counted in its pixels.
-    /// An error when the model is of a sensor of another resolution.
-    pub fn refuse_other_size(&self, sensor: &Sensor) -> Result<()> {
-        let Some(own) = &self.sensor else { return Ok(()) };
-        let [[mw, mh], [w, h]] = [&own.camera, &sensor.camera].map(|c| [c.width, c.height]);
-        if [mw, mh] == [w, h] {
-            return Ok(());
-        }
-        Err(Error::Argument {
-            what: format!(
-                "the model's sensor has {mw} x {mh} px, the recording's {w} x {h}: its errors lie elsewhere"
-            ),
-            remedy: "give the model that was made of this very sensor",
-        })
-    }
 }
 
 #[cfg(test)]

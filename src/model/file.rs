@@ -1,6 +1,6 @@
 //! `model.json` (`crate::docs::layouts`): written and read back bit for bit, refused when foreign.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -124,10 +124,15 @@ impl NoiseModel {
         write_atomic(path, self.to_json()?.as_bytes())
     }
 
+    /// The `model.json` that is meant: a folder stands for the one in it.
+    pub fn file(path: &Path) -> PathBuf {
+        if path.is_dir() { path.join(MODEL) } else { path.to_path_buf() }
+    }
+
     /// From a `model.json`, or the folder that holds one.
     /// An error when the file is missing, not a model, damaged, or of a newer format.
     pub fn read(path: &Path) -> Result<Self> {
-        let file = if path.is_dir() { path.join(MODEL) } else { path.to_path_buf() };
+        let file = Self::file(path);
         let text = read_text(&file)?;
         Self::from_json(&text).map_err(|(what, remedy)| Error::ModelFile {
             path: file,

@@ -7,6 +7,7 @@ mod file;
 mod fit;
 mod forms;
 mod heldout;
+mod other_sensor;
 mod outliers;
 mod provenance;
 mod robust;

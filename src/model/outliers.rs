@@ -9,6 +9,7 @@ use super::robust::{self, Surface, spread};
 use super::statistics::SigmaFit;
 use crate::error::Result;
 use crate::measure::{SigmaRow, SigmaTable};
+use crate::units::verb;
 
 /// Robust standard deviations of ln(measured/fitted) beyond which a sigma is left out. Measured in
 /// tests/product/outliers.rs: of clean tables of 30 rows under 1 % lose one (the scale is a median of few
@@ -168,9 +169,10 @@ fn standing_off(table: &SigmaTable, surface: &Surface, left_out: &[usize]) -> Ve
 
 fn too_many(table: &SigmaTable, off: &[usize]) -> String {
     format!(
-        "{} of {} sigmas stand more than {OFF} robust standard deviations off the surface: too many to be outliers, and none was left out; look for views of another target in measurements.csv, or try --form auto",
+        "{} of {} sigmas {} more than {OFF} robust standard deviations off the surface: too many to be outliers, and none was left out; look for views of another target in measurements.csv, or try --form auto",
         off.len(),
-        table.rows.len()
+        table.rows.len(),
+        verb(off.len(), "stands", "stand")
     )
 }
 
@@ -185,7 +187,7 @@ fn describe(table: &SigmaTable, left_out: &[usize]) -> String {
     if left_out.len() > SHOWN {
         places.push("...".into());
     }
-    let verbs = if left_out.len() == 1 { "was left" } else { "were left" };
+    let verbs = verb(left_out.len(), "was left", "were left");
     format!(
         "{} of {} sigmas {verbs} out of the fit, more than {OFF} robust standard deviations off the surface: {}",
         left_out.len(),

@@ -42,6 +42,17 @@ pub struct SigmaFit {
 }
 
 impl SigmaFit {
+    /// Why this is no model of a sensor at all, if so, and what to do.
+    pub fn is_no_model(&self) -> Option<(String, &'static str)> {
+        const CHECK: &str = "check how raw values become metres, the intrinsics, and measurements.csv for views that measured something else than one flat target";
+        const RECORD: &str = "record views at several distances and tilts";
+        match self.views {
+            1 => Some(("one view is no calibration".into(), RECORD)),
+            n if n < MIN_VIEWS => Some((format!("{n} views are no calibration"), RECORD)),
+            _ => self.quality.explains_nothing().map(|what| (what, CHECK)),
+        }
+    }
+
     pub fn values(&self) -> Vec<f64> {
         self.parameters.iter().map(|p| p.value).collect()
     }

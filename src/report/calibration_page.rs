@@ -17,6 +17,7 @@ use super::slices::{against_distance, figure2, fit_residuals};
 use crate::calibrate::{Calibration, Measurements};
 use crate::error::Result;
 use crate::model::{DISTANCE_RATIO, Direction, HeldOut, Parameter, Provenance, SigmaModel};
+use crate::units::counted;
 use crate::view::Sensor;
 
 /// What the page is about; a bare table has neither sensor nor measurements.
@@ -160,7 +161,7 @@ fn result(page: &CalibrationPage<'_>) -> Markup {
     let (fit, sigma) = (&calibration.model.fit, &calibration.model.sigma);
     let used = match page.measurements {
         Some(m) => format!("{} used, {} excluded", m.views.len(), m.excluded.len()),
-        None => format!("{} rows of a table", calibration.table.rows.len()),
+        None => format!("{} of a table", counted(calibration.table.rows.len(), "row")),
     };
     let direction = match sigma.direction {
         Direction::Axial => "along the optical axis",

@@ -25,14 +25,16 @@ pub fn comparison_figures(comparison: &Comparison) -> Result<Vec<(&'static str, 
 /// # Errors
 /// When plotters fails.
 pub fn comparison_page(comparison: &Comparison, origin: &Origin) -> Result<String> {
-    let figures = charts(comparison).into_iter().map(|(_, chart)| figure(&chart, &chart.title));
+    let [paths, over_time @ ..] = charts(comparison).map(|(_, chart)| chart);
+    let paths = figure(&paths, &paths.title)?;
+    let figures = over_time.iter().map(|chart| figure(chart, &chart.title));
     let figures = figures.collect::<Result<Vec<_>>>()?;
     let title = format!("Mapping {}, variant by variant", comparison.sequence);
     let body = html! {
         h1 { (title) }
         p { "The first four rows are the paper's variants with the parameters of its Table II; those below \
             go past it, one step at a time. Errors are computed as the scripts of the TUM benchmark do." }
-        (section("Figures", &html! { div.beside { @for figure in figures { (figure) } } }))
+        (section("Figures", &html! { (paths) div.beside { @for figure in figures { (figure) } } }))
         @for part in tables::tables(comparison) { (section(part.title, &table_of(&part))) }
         @if !comparison.remarks.is_empty() {
             (section("Notes", &list(comparison.remarks.iter().map(|remark| prose(remark)))))

@@ -10,6 +10,8 @@ mod story;
 mod table;
 
 use maud::{Markup, html};
+pub use next::Step;
+pub use sentences::called;
 pub use story::story;
 
 use super::axis::Axis;
@@ -27,6 +29,8 @@ pub struct DiagnosisPage<'a> {
     pub diagnosis: &'a Diagnosis,
     /// Views whose residuals are worth seeing; few, they are large.
     pub pictures: &'a [ViewPictures],
+    /// The one to begin with first.
+    pub steps: &'a [Step],
     pub origin: &'a Origin,
 }
 

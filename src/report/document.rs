@@ -121,18 +121,27 @@ macro_rules! row {
 }
 pub(super) use row;
 
-/// A table by the titles of its columns, which scrolls by itself where the page is too narrow.
+/// So many columns stand under one another on a phone; a table of more is one to scroll and compare.
+const MAX_STACKED: usize = 8;
+
+/// A table by the titles of its columns. Where the page is too narrow, the cells of a row stand under
+/// its name, each with its title; tables of many columns, or of three, scroll by themselves.
 ///
 /// The first column names the row. A title after `>` is that of a column of numbers, set to the
 /// right; one after `~` is that of a column of sentences, set small.
 pub fn table<C: AsRef<str>>(columns: &[C], rows: impl IntoIterator<Item = Vec<Markup>>) -> Markup {
     let columns: Vec<(Option<&str>, &str)> = columns.iter().map(|c| set(c.as_ref())).collect();
+    let class = match columns.len() {
+        0..=3 => None,
+        4..=MAX_STACKED => Some("stack"),
+        _ => Some("small"),
+    };
     html! {
-        div.wide tabindex="0" { table class=[(columns.len() > 8).then_some("small")] {
+        div.wide tabindex="0" { table class=[class] {
             thead { tr { @for (class, title) in &columns { th class=[class] { (title) } } } }
             tbody { @for cells in rows { tr {
-                @for (i, ((class, _), cell)) in columns.iter().zip(cells).enumerate() {
-                    @if i == 0 { th class=[class] { (cell) } } @else { td class=[class] { (cell) } }
+                @for (i, ((class, title), cell)) in columns.iter().zip(cells).enumerate() {
+                    @if i == 0 { th class=[class] { (cell) } } @else { td class=[class] data-label=(title) { (cell) } }
                 }
             } } }
         } }
@@ -257,6 +266,9 @@ mod tests {
     #[test]
     fn a_table_is_escaped_and_set_by_column() {
         let table = table(&["view", ">z m"], [row!["<b>", 2.5]]).into_string();
-        assert!(table.contains(r#"<th>&lt;b&gt;</th><td class="n">2.5</td>"#), "{table}");
+        assert!(
+            table.contains(r#"<th>&lt;b&gt;</th><td class="n" data-label="z m">2.5</td>"#),
+            "{table}"
+        );
     }
 }

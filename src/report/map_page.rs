@@ -26,6 +26,8 @@ pub struct MapPage<'a> {
     pub frames: &'a [FrameReport],
     /// Where the sequence has true poses.
     pub against: Option<Against<'a>>,
+    /// Whose sigma weighs the points.
+    pub model: &'a str,
     pub origin: &'a Origin,
 }
 
@@ -61,7 +63,8 @@ pub fn map_page(page: &MapPage<'_>) -> Result<String> {
         script type="application/json" id="map-data" { (PreEscaped(data(&shown, page.frames))) }
         script { (PreEscaped(SCRIPT)) }
     };
-    Ok(document(page.title, page.origin, &[], &body).into_string())
+    let model = ("model".to_string(), html! { (page.model) });
+    Ok(document(page.title, page.origin, &[model], &body).into_string())
 }
 
 fn numbers_of(page: &MapPage<'_>, shown: usize) -> Markup {
@@ -134,11 +137,22 @@ mod tests {
         };
         let points: Vec<MapPoint> = (0..10).map(point).collect();
         let origin = &Origin::default();
-        let full = MapPage { title: "a <b>", points: &points, frames: &[], against: None, origin };
+        let full = MapPage {
+            title: "a <b>",
+            points: &points,
+            frames: &[],
+            against: None,
+            model: "Eq. 1",
+            origin,
+        };
         let page = map_page(&full).unwrap();
         assert!(page.contains("a &lt;b&gt;") && page.contains("\"sigma\":[0.002"));
         assert!(!page.contains("http:") && !page.contains("https:"), "self-contained");
-        assert!(page.contains("2.00 mm") && page.ends_with("</html>"));
+        assert!(
+            page.contains("2.00 mm")
+                && page.contains("<dd>Eq. 1</dd>")
+                && page.ends_with("</html>")
+        );
         let empty = map_page(&MapPage { points: &[], ..full }).unwrap();
         let data = empty.split_once("id=\"map-data\">").and_then(|(_, rest)| rest.split_once('<'));
         let data: serde_json::Value = serde_json::from_str(data.unwrap().0).unwrap();

@@ -12,6 +12,7 @@ use crate::error::Result;
 use crate::evaluate::{Delta, Evaluation, Spread};
 use crate::stats::range;
 use crate::trajectory::Pose;
+use crate::units::counted;
 
 /// Room around the lines, share of their extent.
 const MARGIN: f64 = 0.04;
@@ -103,7 +104,7 @@ impl Against<'_> {
     fn interval(&self) -> String {
         match self.delta {
             Delta::Seconds(s) => format!("{s} s"),
-            Delta::Frames(n) => format!("{n} frames"),
+            Delta::Frames(n) => counted(n, "frame"),
         }
     }
 
@@ -127,7 +128,7 @@ impl Against<'_> {
         ];
         let columns = ["", ">rmse", ">mean", ">median", ">std", ">min", ">max", ">pairs"];
         let mm = |s: &Spread| format!("{} mm", fixed(MM * s.rmse, 1));
-        let remark = |s: &Spread| format!("rmse of {} pairs", s.pairs);
+        let remark = |s: &Spread| format!("rmse of {}", counted(s.pairs, "pair"));
         let tiled = [
             ("absolute trajectory error", mm(&e.ate.error), remark(&e.ate.error)),
             ("relative error, translation", mm(&e.rpe.translation), format!("rmse over {over}")),
@@ -137,8 +138,9 @@ impl Against<'_> {
                 format!("rmse over {over}"),
             ),
         ];
-        let charts = self.charts();
-        let figures = charts.iter().map(|(_, chart)| figure(chart, &chart.title));
+        let [paths, over_time @ ..] = self.charts().map(|(_, chart)| chart);
+        let paths = figure(&paths, "both paths, seen along the axis of least motion")?;
+        let figures = over_time.iter().map(|chart| figure(chart, &chart.title));
         let figures = figures.collect::<Result<Vec<Markup>>>()?;
         Ok(html! {
             (tiles(tiled))
@@ -150,6 +152,7 @@ impl Against<'_> {
                 }
             }))
             (section("Over time", &html! { div.beside { @for figure in figures { (figure) } } }))
+            (section("Both paths", &paths))
         })
     }
 }

@@ -14,6 +14,7 @@ use crate::frame::Frame;
 use crate::io::{Assumed, ColourImage, read_depth};
 use crate::stats::median;
 use crate::trajectory::Pose;
+use crate::units::{counted, verb};
 use crate::view::Sensor;
 
 /// Open a folder in one of the two layouts.
@@ -24,8 +25,9 @@ pub fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     let colourless = sequence.moments.iter().filter(|m| m.colour.is_none()).count();
     if colourless > 0 {
         sequence.remarks.push(format!(
-            "{colourless} of {} depth images have no colour image of their moment",
-            sequence.moments.len()
+            "{colourless} of {} depth images {} no colour image of the same moment",
+            sequence.moments.len(),
+            verb(colourless, "has", "have")
         ));
     }
     sequence.remarks.extend(gaps(&sequence.moments));
@@ -95,8 +97,8 @@ fn gaps(moments: &[Moment]) -> Option<String> {
     let found: Vec<usize> = (0..intervals.len()).filter(|&i| intervals[i] > GAP * usual).collect();
     let longest = found.iter().copied().max_by(|&a, &b| intervals[a].total_cmp(&intervals[b]))?;
     Some(format!(
-        "{} gaps in the depth stamps, the longest {:.2} s after {:.6} (usual interval {:.1} ms)",
-        found.len(),
+        "{} in the depth stamps, the longest {:.2} s after {:.6} (usual interval {:.1} ms)",
+        counted(found.len(), "gap"),
         intervals[longest],
         moments[longest].stamp,
         1e3 * usual

@@ -51,8 +51,11 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     moments.sort_by(|a, b| a.stamp.total_cmp(&b.stamp));
     truth.sort_by(|a, b| a.stamp.total_cmp(&b.stamp));
     let size = size_of(&moments[0].depth)?;
-    if assumed.intrinsics.is_none() {
-        remarks.push("7-Scenes' own intrinsics 585,585,320,240 assumed; give --intrinsics".into());
+    let own = "7-Scenes' own intrinsics 585,585,320,240";
+    match assumed.intrinsics {
+        None => remarks.push(format!("{own} are used; give --intrinsics for another camera")),
+        Some(given) if given != INTRINSICS => remarks.push(format!("--intrinsics replaces {own}")),
+        Some(_) => {}
     }
     let sensor = assumed.sensor("7-Scenes Kinect", size, INTRINSICS, CODE)?;
     let frames: Vec<&Path> = moments.iter().map(|m| m.depth.as_path()).collect();

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use super::{Moment, Sequence};
 use crate::error::{Error, Result, read_text};
-use crate::io::{Assumed, Layout, content_lines, open_uncut, read_list};
+use crate::io::{
+    Assumed, DESCRIPTION, Layout, content_lines, entries, open_uncut, read_list, results_in,
+};
 use crate::trajectory::{associate, read_benchmark};
 use crate::view::FrameRef;
 
@@ -17,11 +19,7 @@ const ASSOCIATIONS: [&str; 4] =
 
 pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     if Layout::of(root)? != Layout::Sequence {
-        return Err(Error::recording(
-            root,
-            "no sequence to map: neither depth.txt nor frame-000000.depth.png is in this folder",
-            "give a folder in the layout of the TUM RGB-D benchmark or of 7-Scenes",
-        ));
+        return Err(no_sequence(root));
     }
     let recording = open_uncut(root, assumed)?;
     let mut remarks = recording.remarks;
@@ -46,6 +44,34 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     };
     let root = root.to_path_buf();
     Ok(Sequence { root, sensor: recording.sensor, moments, truth, remarks })
+}
+
+fn no_sequence(root: &Path) -> Error {
+    if let Some(error) = results_in(root) {
+        return error;
+    }
+    if root.join(DESCRIPTION).is_file() {
+        let what = "it is a recording of still views, no film to map";
+        return Error::recording(
+            root,
+            what,
+            "give a sequence, in the layout of TUM or of 7-Scenes",
+        );
+    }
+    let below = entries(root).unwrap_or_default();
+    let film = below.iter().find(|p| p.is_dir() && p.join("depth.txt").is_file());
+    match film.and_then(|p| p.file_name()) {
+        Some(name) => Error::recording(
+            root,
+            format!("this folder holds no sequence, but {}/ in it does", name.to_string_lossy()),
+            "give that folder",
+        ),
+        None => Error::recording(
+            root,
+            "no sequence to map: neither depth.txt nor frame-000000.depth.png is in this folder",
+            "give a folder in the layout of the TUM RGB-D benchmark or of 7-Scenes",
+        ),
+    }
 }
 
 /// Every depth image with the colour image of its moment.

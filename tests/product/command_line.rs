@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::Output;
 
 use kinoise::effects::{Active, CATALOGUE};
+use kinoise::io::{Assumed, open};
 use serde_json::Value;
 
 use crate::common::{good, kinoise};
@@ -97,6 +98,53 @@ fn each_command_names_the_next_and_each_finding_its_simulation() {
     // A bent board is no bias of the sensor: nothing to correct, but a twin to look at.
     let next = next_of(&diagnosed);
     assert!(next.contains("simulate") && run_line(&next).status.success(), "{next}");
+}
+
+/// A plain folder needs its options again in every command that reads it, on the terminal and on the
+/// page; what is corrected needs none.
+#[test]
+fn a_plain_folder_is_read_alike_by_every_next_command() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let bowl = at("bowl");
+    let effect = "--effect=radial-disparity-bias:k_px=1";
+    assert!(run(["simulate", &bowl, effect, "--shrink", "4"]).status.success());
+    let recording = open(Path::new(&bowl), &Assumed::default()).expect("opens");
+    std::fs::create_dir(at("plain")).expect("made");
+    for view in &recording.views {
+        let image = Path::new(&at("plain")).join(format!("{}.png", view.name));
+        std::fs::copy(&view.depth[0].path, image).expect("copied");
+    }
+    let kinoise::DepthCode::Metric { units_per_metre, .. } = recording.sensor.code else {
+        panic!("{:?}", recording.sensor.code)
+    };
+    let camera = &recording.sensor.camera;
+    let options = format!(
+        "--intrinsics {},{},{},{} --units-per-metre {units_per_metre} --baseline 0.075",
+        camera.fx, camera.fy, camera.cx, camera.cy
+    );
+    let plain = run_line(&format!("kinoise calibrate {} -o {} {options}", at("plain"), at("out")));
+    let diagnosed = run_line(&next_of(&plain));
+    let text = stderr(&diagnosed);
+    assert_eq!(diagnosed.status.code(), Some(1), "{text}");
+    let bias = text.lines().find(|l| l.contains("--effect radial-disparity-bias:")).expect(&text);
+    let again = run_line(bias);
+    assert!(again.status.success(), "{bias}: {}", stderr(&again));
+    // Held against its twin, which describes itself.
+    let against = run_line(&next_of(&again));
+    assert!(matches!(against.status.code(), Some(0 | 1)), "{}", stderr(&against));
+
+    let correct = next_of(&diagnosed);
+    assert!(correct.starts_with("kinoise correct ") && correct.ends_with(&options), "{correct}");
+    let page = at("out-diagnosis/report.html");
+    let page = std::fs::read_to_string(&page).expect(&page);
+    let shown = format!("kinoise correct {} -o out-diagnosis-corrected", at("plain"));
+    let shown = format!("{shown} -m out-diagnosis/model.json {options}");
+    assert!(page.contains(&shown), "the page and the terminal say the same: {shown}");
+    let corrected = run_line(&correct);
+    assert!(corrected.status.success(), "{}", stderr(&corrected));
+    let last = run_line(&next_of(&corrected));
+    assert!(matches!(last.status.code(), Some(0 | 1)), "{}", stderr(&last));
 }
 
 fn diagnosed(words: &[&str], to: &Path) -> Output {

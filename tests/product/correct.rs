@@ -488,7 +488,7 @@ fn a_model_without_bias_changes_no_byte() {
         let (json, said) = files.correct(&recording, &[]);
         assert_eq!((&json["pixels_changed"], &json["rms_shift_mm"]), (&json!(0), &json!(0.0)));
         assert!(
-            said.contains("left in, for these are no biases of the sensor: vignetting"),
+            said.contains("left in, because they are noise or belong to the scene: vignetting"),
             "{said}"
         );
         assert!(tree(&recording) == tree(&files.at("out")));
@@ -620,6 +620,40 @@ fn a_dump_of_raw_words_goes_on_as_a_described_sequence() {
     fs::remove_dir_all(files.at("out")).expect("removed");
     files.correct(&dump, &[&options[..], &["--keep-code"]].concat());
     assert!(files.at("out/INDEX.txt").is_file());
+}
+
+/// A plain folder has no place for what its raw values mean, until it is written again: then the next
+/// command reads it without an option.
+#[test]
+fn a_plain_folder_goes_on_as_a_described_one() {
+    let files = Files::new();
+    let raw = files.recording(RAW, Vec::new());
+    let plain = files.at("plain");
+    fs::create_dir(&plain).expect("made");
+    for view in open_uncut(&raw, &Assumed::default()).expect("opened").views {
+        let image = plain.join(format!("{}.png", view.name));
+        fs::copy(&view.depth[0].path, image).expect("copied");
+    }
+    files.model(&small(vec![bowl(0.5)]));
+    let camera = [145.25, 145.0, 79.5, 59.5];
+    let intrinsics = camera.map(|v| v.to_string()).join(",");
+    let code = "--raw-disparity=3.3309495161,-0.0030711016";
+    files.correct(&plain, &["--intrinsics", &intrinsics, code]);
+    let out = files.at("out");
+    let again = kinoise::io::open(&out, &Assumed::default()).expect("described");
+    let seen = &again.sensor.camera;
+    assert_eq!([seen.fx, seen.fy, seen.cx, seen.cy], camera);
+    assert!(matches!(again.sensor.code, DepthCode::Metric { .. }));
+    let names: Vec<String> = again.views.iter().map(|v| v.name.clone()).collect();
+    let assumed = Assumed { intrinsics: Some(camera), code: Some(RAW), baseline_m: None };
+    let before = kinoise::io::open(&plain, &assumed).expect("opened");
+    assert_eq!(names, before.views.iter().map(|v| v.name.clone()).collect::<Vec<_>>());
+    let refused = kinoise::io::open(&out, &assumed).expect_err("it describes itself");
+    assert!(refused.to_string().contains("describes its sensor itself"), "{refused}");
+    // Once more, in a code that stays as it is.
+    fs::rename(&out, files.at("once")).expect("moved");
+    files.correct(&files.at("once"), &[]);
+    assert!(kinoise::io::open(&out, &Assumed::default()).is_ok());
 }
 
 /// 1/z - 4 px of disparity leave nothing behind 2.7 m: the code's end, and told.

@@ -361,3 +361,92 @@ fn truth_and_estimate_swapped_are_told() {
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("json");
     assert!(json["remarks"][0].as_str().expect("a remark").contains(ASK));
 }
+
+/// A model of another camera is told at once, with what differs; so is what stands in for a model.
+#[test]
+fn a_sequence_says_whose_model_weighs_it() {
+    let desk = Desk::new();
+    desk.recording("rec", kinect_v1(4).code, &[1.0, 1.5, 2.0, 3.0]);
+    desk.done("calibrate rec -o cal", &[]);
+    let text = fs::read_to_string(desk.at("cal/model.json")).expect("read");
+    let mut other: serde_json::Value = serde_json::from_str(&text).expect("json");
+    for key in ["fx", "fy"] {
+        other["sensor"][key] = (1.1 * other["sensor"][key].as_f64().expect("a number")).into();
+    }
+    fs::write(desk.at("other.json"), other.to_string()).expect("written");
+    desk.done("simulate film --room --frames 4 -m cal/model.json", &[]);
+    for command in ["map film", "compare film", "diagnose rec"] {
+        // Four frames are too short a film to compare over a second; what is read is told before.
+        let (_, said) = desk.run(&format!("{command} -m other.json -o out"));
+        assert!(
+            said.contains("other.json seems to be of another sensor: the model's focal"),
+            "{said}"
+        );
+        let (_, said) = desk.run(&format!("{command} -m cal/model.json -o own"));
+        assert!(!said.contains("another sensor"), "{said}");
+        for out in ["out", "own"] {
+            let _ = fs::remove_dir_all(desk.at(out));
+        }
+    }
+    desk.done("map film -o own", &["no --model was given", "Eq. 1, for a Kinect v1 at 1 to 4 m"]);
+}
+
+/// The benchmark publishes its cameras: what replaces one is told.
+#[test]
+fn intrinsics_in_place_of_a_published_camera_are_told() {
+    let desk = Desk::new();
+    let frame = kinoise::Frame { width: 640, height: 480, raw: vec![10_000; 640 * 480] };
+    write_depth(&desk.at("depth/1.png"), &frame);
+    let head = "# file: 'rgbd_dataset_freiburg3_office.bag'";
+    fs::write(desk.at("depth.txt"), format!("{head}\n1.0 depth/1.png\n")).expect("written");
+    let told = |intrinsics| {
+        let assumed = Assumed { intrinsics: Some(intrinsics), ..Assumed::default() };
+        let film = sequence::open(desk.folder.path(), &assumed).expect("a sequence");
+        film.remarks.iter().any(|r| r.contains("--intrinsics replaces freiburg3's"))
+    };
+    assert!(told([525.0, 525.0, 319.5, 239.5]));
+    assert!(!told([535.4, 539.2, 320.1, 247.6]), "it is the published one");
+}
+
+// ---- folders that are something else ---------------------------------------------------------
+
+/// The folder above a recording, and what the tool itself has written.
+#[test]
+fn a_folder_that_is_no_recording_says_what_it_is() {
+    let desk = Desk::new();
+    fs::create_dir(desk.at("set")).expect("made");
+    desk.recording("set/rec", kinect_v1(4).code, &[1.0, 1.5, 2.0, 3.0]);
+    desk.done("simulate set/film --room --frames 2 --shrink 4", &[]);
+    desk.done("calibrate set/rec -o results/cal", &[]);
+    let both = ["this folder holds no recording, but film/, rec/ in it do"];
+    desk.refused("calibrate set -o out", &both);
+    desk.refused("map set -o out", &["film/ in it does", "give that folder"]);
+    fs::rename(desk.at("set/film"), desk.at("film")).expect("moved");
+    desk.refused("diagnose set -o out", &["but rec/ in it does", "give that folder"]);
+    desk.refused("map set/rec -o out", &["a recording of still views, no film"]);
+    let written = ["holds results of kinoise calibrate (sigma.svg)", "made of"];
+    for command in ["calibrate", "map"] {
+        desk.refused(&format!("{command} results/cal -o out"), &written);
+    }
+    fs::remove_file(desk.at("set/rec/recording.json")).expect("removed");
+    desk.refused("calibrate set/rec -o out", &["recording.json is missing beside the views"]);
+    let intrinsics = "correct results/cal -m results/cal/model.json -o out --intrinsics 1,1,0,0";
+    desk.refused(intrinsics, &written);
+}
+
+/// A film with a single still stretch is measured, and that is no model.
+#[test]
+fn one_view_makes_no_model() {
+    let desk = Desk::new();
+    desk.recording("rec", kinect_v1(4).code, &[2.0]);
+    for view in open(&desk.at("rec"), &Assumed::default()).expect("opens").views.iter().skip(1) {
+        fs::remove_dir_all(desk.at("rec").join(&view.name)).expect("removed");
+    }
+    desk.refused(
+        "calibrate rec -o out",
+        &["one view is no calibration", "no model.json", "--force"],
+    );
+    assert!(desk.at("out/measurements.csv").is_file());
+    desk.done("calibrate rec -o out --force", &["this is no calibration"]);
+    assert!(desk.at("out/model.json").is_file());
+}

@@ -301,7 +301,7 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
 
     let zeros = json!(vec![vec![0.0; 6]; 6]);
     let faults: [(&str, Fault<'_>, &str); 10] = [
-        ("sensor", &|m| m["sensor"]["sensor"] = json!("Xtion"), "\"Xtion\", not a"),
+        ("sensor", &|m| m["sensor"]["sensor"] = json!("Xtion"), "its sensor is \"Xtion\", not"),
         ("size", &|m| m["sensor"]["width"] = json!(320), "320 x 480 px, not 640 x 480"),
         ("mode", &|m| m["sensor"]["mode"] = json!("near"), "mode \"near\""),
         ("table", &|m| m["sensor"] = Value::Null, "bare table"),

@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use super::*;
 
 const TABLES: Leaves =
-    Leaves::Results { names: &["table.csv", "model.json", "part-"], marks: &["table.csv"] };
+    Leaves::Results { names: &[&["table.csv", "model.json", "part-"]], marks: &["table.csv"] };
 
 fn begin(place: &Path) -> Result<OutputFolder> {
     OutputFolder::begin(place, TABLES, &[], false)

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::sentences::{
-    axis, called, capital, interval, join, missing, mm, sentence, statistic, title,
+    along, axis, called, capital, interval, join, missing, mm, sentence, statistic, title,
 };
 use super::story::gained;
 use super::{parameters, sentences};
@@ -139,7 +139,7 @@ pub(super) fn remaining(diagnosis: &Diagnosis) -> Markup {
                 }
             }
             (list(after.remaining.iter().map(|r| html! {
-                b { (capital(statistic(r.statistic))) } " over the " (axis(r.axis))
+                b { (capital(statistic(r.statistic))) } " " (along(r.axis))
                 @if !r.words.is_empty() { ": " (prose(&r.words)) } @if let Some(p) = r.p_adjusted { " (" (p_value(p)) ")" }
             })))
         },

@@ -71,8 +71,8 @@ pub(super) fn missing(findings: &[Finding]) -> Vec<&Finding> {
 }
 
 /// What a finding is called in the middle of a sentence.
-pub(super) fn called(finding: &Finding) -> String {
-    let unnamed = || format!("an unexplained error over the {}", axis(finding.axis));
+pub fn called(finding: &Finding) -> String {
+    let unnamed = || format!("an unexplained error {}", along(finding.axis));
     match finding.status {
         Status::OneOf if finding.alternatives.len() > 1 => {
             let likely = finding.alternatives.iter().enumerate();
@@ -83,6 +83,14 @@ pub(super) fn called(finding: &Finding) -> String {
         Status::Unexplained => unnamed(),
         Status::Recalibrate => "parameters that are off".into(),
         _ => finding.effect.map_or_else(unnamed, |id| title(id).into()),
+    }
+}
+
+/// What something changes over, after its name.
+pub(super) fn along(axis: Axis) -> String {
+    match axis {
+        Axis::Pixel => "from pixel to pixel".into(),
+        other => format!("over the {}", self::axis(other)),
     }
 }
 

@@ -78,8 +78,10 @@ fn rest(more: &[&Finding], minor: &[&Finding]) -> Option<String> {
         let mut names: Vec<String> =
             all.iter().filter(|f| f.effect.is_some()).map(|f| called(f)).collect();
         let unnamed = all.len() - names.len();
-        if unnamed > 0 {
-            names.push(format!("{unnamed} without a name"));
+        match unnamed {
+            0 => {}
+            1 => names.push("one without a name".into()),
+            n => names.push(format!("{n} without a name")),
         }
         join(&names, "and")
     };
@@ -106,17 +108,28 @@ fn small_percent(share: f64) -> String {
 
 pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
     let h = diagnosis.heldout.as_ref()?;
-    Some(format!(
-        "On {} kept aside the smooth residual goes from {} to {} and {} nats a view are gained [{}, {}]; `kinoise correct` alone takes every pixel from {} to {} px rms.",
-        count(h.views.len(), "view"),
-        mm(h.rms_mm_before),
-        mm(h.rms_mm_after),
-        fixed(h.gain, 1),
-        fixed(h.gain_interval[0], 1),
-        fixed(h.gain_interval[1], 1),
-        fixed(h.correction_rms_before_px, 3),
-        fixed(h.correction_rms_after_px, 3),
-    ))
+    let gain = |v: f64| fixed(v, usize::from(h.gain.abs() < 10.0));
+    let mut gained = vec![format!(
+        "{} nats a view are gained [{}, {}]",
+        gain(h.gain),
+        gain(h.gain_interval[0]),
+        gain(h.gain_interval[1])
+    )];
+    // Where noise alone was found, what is smooth stays as it is.
+    let [before, after] = [h.rms_mm_before, h.rms_mm_after].map(mm);
+    if before != after {
+        gained.insert(0, format!("the smooth residual goes from {before} to {after}"));
+    }
+    let correction = [h.correction_rms_before_px, h.correction_rms_after_px].map(|v| fixed(v, 3));
+    let [before, after] = &correction;
+    let alone = match before == after {
+        true => String::new(),
+        false => {
+            format!("; `kinoise correct` alone takes every pixel from {before} to {after} px rms")
+        }
+    };
+    let aside = count(h.views.len(), "view");
+    Some(format!("On {aside} kept aside {}{alone}.", gained.join(" and ")))
 }
 
 fn left(diagnosis: &Diagnosis) -> Option<String> {

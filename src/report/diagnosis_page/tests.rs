@@ -167,7 +167,7 @@ fn cases() -> [(Diagnosis, &'static [&'static str]); 8] {
                 "0.312 ± 0.012 px",
                 "3.12 mm → 1.17 mm",
                 "The model does not reproduce this recording. On three views kept aside",
-                "kinoise correct rec --model out/model.json -o corrected",
+                "What to do next # Take the errors out: kinoise correct 'a b' Recorded",
                 "kinoise correct takes it out",
                 "match. Nothing differs beyond chance.",
                 "42 nats a view (95 % interval 31 to 55",
@@ -209,7 +209,7 @@ fn cases() -> [(Diagnosis, &'static [&'static str]); 8] {
             diagnosis(Match, vec![]),
             &[
                 "The model reproduces this recording.",
-                "kinoise map SEQUENCE --model out/model.json",
+                "Take the errors out: kinoise correct 'a b'",
                 "The model explains this recording",
                 "(radial disparity bias and a bent target)",
                 "sagitta 0.62 mm , at a span of 1.0 m",
@@ -230,7 +230,10 @@ fn picture() -> ViewPictures {
 
 fn rendered(diagnosis: &Diagnosis, picture: ViewPictures) -> Result<String> {
     let origin = &Origin { recording: "rec".into(), folder: "out".into(), ..Origin::default() };
-    diagnosis_page(&DiagnosisPage { title: "Kinect & co", diagnosis, pictures: &[picture], origin })
+    let steps =
+        &[Step { why: "Take the errors out: ".into(), command: "kinoise correct 'a b'".into() }];
+    let (title, shown) = ("Kinect & co", &[picture]);
+    diagnosis_page(&DiagnosisPage { title, diagnosis, pictures: shown, steps, origin })
 }
 
 /// The text of a page without pictures, style and tags; one space between words.

@@ -1,0 +1,118 @@
+//! What to do with a diagnosis: commands to copy, for the terminal and for the page alike.
+
+use std::ffi::OsString;
+use std::path::Path;
+
+use kinoise::diagnose::{Diagnosis, Finding, Reference, Status, Verdict};
+use kinoise::report::{Step, called};
+
+use super::common::model_again;
+use super::console::{beside, shell};
+
+/// A diagnosis with what its commands need to be run again.
+pub struct After<'a> {
+    pub diagnosis: &'a Diagnosis,
+    pub recording: &'a Path,
+    /// Of the results.
+    pub folder: &'a Path,
+    /// The options that the recording was read with.
+    pub input: &'a [OsString],
+}
+
+pub struct NextStep {
+    why: &'static str,
+    pub words: Vec<OsString>,
+}
+
+impl NextStep {
+    pub fn on_page(&self) -> Step {
+        Step { why: self.why.into(), command: format!("kinoise {}", shell(&self.words)) }
+    }
+}
+
+impl After<'_> {
+    /// The one to begin with first.
+    pub fn steps(&self) -> Vec<NextStep> {
+        let model = ["-m".into(), self.folder.join("model.json").into()];
+        let recording = || OsString::from(self.recording);
+        let to = |what| OsString::from(beside(self.folder, what));
+        let mut steps = Vec::new();
+        let mut step = |why, words: &[OsString], input: &[OsString]| {
+            steps.push(NextStep { why, words: [words, input].concat() });
+        };
+        let has = |status| self.diagnosis.findings.iter().any(|f| f.status == status);
+        if self.corrects() {
+            let why = "Take the errors out of the depth: ";
+            let [m, file] = model.clone();
+            let words = ["correct".into(), recording(), "-o".into(), to("corrected"), m, file];
+            step(why, &words, self.input);
+        }
+        let why = match self.diagnosis.reference {
+            Reference::SimulatedRecording => "Simulate the same views with what was found: ",
+            Reference::Model => "Simulate the same views with the extended model: ",
+        };
+        let twin = ["simulate".into(), to("twin"), "--like".into(), recording()];
+        step(why, &[&twin[..], &model].concat(), self.input);
+        if has(Status::Recalibrate) {
+            let why = "The parameters of the noise are off; fit them again: ";
+            let words = ["calibrate".into(), recording(), "-o".into(), to("calibrated")];
+            step(why, &words, self.input);
+        }
+        if self.diagnosis.verdict != Verdict::Inconclusive {
+            let map = ["map".into(), "SEQUENCE".into(), "-o".into(), to("map")];
+            step("Map a sequence of this sensor with it: ", &[&map[..], &model].concat(), &[]);
+        }
+        steps
+    }
+
+    /// Is there a bias to take out, which views kept aside do not speak against?
+    fn corrects(&self) -> bool {
+        let biased = |f: &Finding| f.terms.iter().any(|t| t.is_sensor_bias());
+        let gains = self.diagnosis.heldout.as_ref().is_none_or(|h| h.gain_interval[0] > 0.0);
+        gains && self.diagnosis.findings.iter().any(biased)
+    }
+
+    /// The command that simulates each finding, where a formula of the catalogue does, by the model
+    /// that was `given`; and why the others have none.
+    pub fn reproductions(&self, given: Option<&Path>) -> Vec<String> {
+        let mut commands = Vec::new();
+        let mut others = Vec::new();
+        for finding in &self.diagnosis.findings {
+            let Some(effect) = finding.as_effect() else {
+                others.extend((!finding.minor).then_some(finding));
+                continue;
+            };
+            let to = beside(self.folder, effect.effect.card().id);
+            let like = ["simulate".into(), to.into(), "--like".into(), self.recording.into()];
+            let effect = ["--effect".into(), effect.argument().into()];
+            let words = [&like[..], &model_again(given), &effect, self.input].concat();
+            commands.push(format!("  kinoise {}", shell(&words)));
+        }
+        let heading = match commands.len() {
+            0 => None,
+            1 => Some("to simulate the finding:".to_string()),
+            _ => Some("to simulate each finding:".to_string()),
+        };
+        heading.into_iter().chain(commands).chain(self.without_formula(&others)).collect()
+    }
+
+    /// Findings that no `--effect` stands for.
+    fn without_formula(&self, findings: &[&Finding]) -> Option<String> {
+        let seen = findings.iter().filter(|f| f.status != Status::NotIdentifiable);
+        let (shaped, bare): (Vec<&Finding>, Vec<&Finding>) =
+            seen.partition(|f| !f.terms.is_empty());
+        let model = self.folder.join("model.json");
+        let brought = format!("measured, and simulated with -m {}", shell(&[model.into()]));
+        let parts = [(shaped, brought), (bare, "of a strength that is not known".to_string())];
+        let parts: Vec<String> = parts
+            .iter()
+            .filter(|(findings, _)| !findings.is_empty())
+            .map(|(findings, what)| format!("{} ({what})", listed(findings)))
+            .collect();
+        (!parts.is_empty()).then(|| format!("  no --effect stands for {}", parts.join(" and ")))
+    }
+}
+
+fn listed(findings: &[&Finding]) -> String {
+    findings.iter().map(|f| called(f)).collect::<Vec<_>>().join(", ")
+}
