@@ -166,6 +166,7 @@ impl Correction {
         if active.is_identity() {
             return Ok(());
         }
+        self.uncertainty.add_law(entry);
         match active.effect.inverse(&active.settings, &self.camera) {
             Some(Inverse::Term(term)) => self.terms.push((term, ANYWHERE)),
             Some(Inverse::Scale(scale)) => self.scale *= scale,

@@ -14,8 +14,8 @@ use crate::Progress;
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, DepthTable, FARTHEST_M, Frame};
 use crate::io::{
-    Assumed, DESCRIPTION, FrameSource, INDEX, Layout, encode_pgm16, encode_png16, open_uncut,
-    refuse_full, refuse_inside, write_atomic,
+    Assumed, DESCRIPTION, FrameSource, INDEX, Layout, encode_corrected, encode_pgm16, encode_png16,
+    is_corrected, open_uncut, refuse_full, refuse_inside, write_atomic,
 };
 use crate::model::NoiseModel;
 use crate::view::{Recording, Sensor};
@@ -76,6 +76,12 @@ pub fn correct_recording(
     let recording = open_uncut(root, assumed)?;
     let sensor = &recording.sensor;
     let images = images(&recording, root)?;
+    if let Some(image) = images.first().filter(|image| is_corrected(&root.join(&image.file))) {
+        return Err(Error::Argument {
+            what: format!("{} is corrected already", root.join(&image.file).display()),
+            remedy: "give the recording that it was made from: a bias is taken out once",
+        });
+    }
     let mut rewrite = Rewrite {
         root,
         output,
@@ -88,8 +94,8 @@ pub fn correct_recording(
     };
     if options.sigma.is_some() && !rewrite.correction.knows_uncertainty() {
         return Err(Error::Argument {
-            what: "the model does not say how sure its biases are".into(),
-            remedy: "diagnose again with this version, which writes it, or leave out --sigma",
+            what: "none of the model's biases has a covariance or a standard error".into(),
+            remedy: "take the model.json of a diagnosis, which has them, or leave out --sigma",
         });
     }
     let disparity = matches!(sensor.code, DepthCode::Disparity { .. });
@@ -257,7 +263,7 @@ impl Rewrite<'_> {
         let bytes = match (tally.changed, is_pgm) {
             (0, _) if !self.recodes() => stored()?,
             (_, true) if !self.recodes() => encode_pgm16(&frame),
-            _ => encode_png16(&frame)?,
+            _ => encode_corrected(&frame)?,
         };
         write_atomic(&target, &bytes)?;
         if let Some(folder) = self.sigma {

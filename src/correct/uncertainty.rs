@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::model;
-use crate::terms::{Basis, Needs, PixelContext, Term};
+use crate::terms::{Basis, Modulation, Needs, PixelContext, Term};
 
 /// The covariance of what a correction takes out.
 #[derive(Debug, Clone, Default)]
@@ -49,6 +49,26 @@ impl Uncertainty {
             let own = covariance.variances.get(span).unwrap_or_default().to_vec();
             self.needs = self.needs.and(term.needs());
             self.shapes.push(Spread { term: (term.clone(), learnt), parts, own });
+        }
+    }
+
+    /// A law of the distance that references determined, and how well.
+    pub fn add_law(&mut self, entry: &model::Effect) {
+        // A drift's is that of its end.
+        let (name, times) = match entry.id.as_str() {
+            "depth-scale" => ("scale", Modulation::Disparity),
+            "disparity-offset" => ("offset_px", Modulation::One),
+            "thermal-drift" => ("relative", Modulation::Disparity),
+            _ => return,
+        };
+        let parameter = entry.parameters.get(name);
+        let error = parameter.and_then(|p| p.get("std_error")).and_then(serde_json::Value::as_f64);
+        if let Some(error) = error.filter(|e| e.is_finite()) {
+            let coefficients = vec![0.0; 3];
+            let term = Term::bias(Basis::Affine { times }, coefficients);
+            let own = vec![error * error, 0.0, 0.0];
+            let anywhere = [0.0, f64::INFINITY];
+            self.shapes.push(Spread { term: (term, anywhere), parts: Vec::new(), own });
         }
     }
 

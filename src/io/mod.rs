@@ -18,7 +18,7 @@ pub use images::{
     ColourImage, FrameSource, InfraredImage, encode_pgm16, encode_png16, encode_png16_quickly,
     encode_rgb,
 };
-pub(crate) use images::{read_depth, size_of};
+pub(crate) use images::{encode_corrected, is_corrected, read_depth, size_of};
 pub(crate) use layout::{DEPTH_LIST, read_description};
 pub use layout::{DESCRIPTION, ViewFile, write_recording_file, write_view_notes};
 pub(crate) use list::content_lines;

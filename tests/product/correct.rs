@@ -480,6 +480,53 @@ fn a_corrected_recording_is_back_at_noise_level() {
 }
 
 #[test]
+fn a_recording_is_corrected_once() {
+    let files = Files::new();
+    let recording =
+        files.recording(METRIC, vec![Active::parse("radial-disparity-bias").expect("an effect")]);
+    files.model(&small(vec![bowl(0.1)]));
+    files.correct(&recording, &[]);
+    let arguments = ["correct", "out", "-m", "model.json", "-o", "again"];
+    let output = kinoise().current_dir(files.at("")).args(arguments).output().expect("it runs");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("is corrected already"), "{said}");
+    assert!(!files.at("again").exists());
+}
+
+/// References give a law its standard error, which is that of the depth: 1 % of it by the scale.
+#[test]
+fn a_law_has_its_own_uncertainty() {
+    let files = Files::new();
+    let recording = files.recording(METRIC, Vec::new());
+    let error = |error: Value| {
+        let scale = json!({"value": 1.02, "std_error": error});
+        files.model(&small(vec![named("depth-scale", json!({"scale": scale}))]));
+        let arguments = ["correct", "rec", "-m", "model.json", "-o", "out", "--sigma", "sigma"];
+        kinoise().current_dir(files.at("")).args(arguments).output().expect("it runs")
+    };
+    let refused = error(Value::Null);
+    assert_eq!(refused.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert!(said.contains("none of the model's biases has a covariance"), "{said}");
+    let output = error(json!(0.01));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let corrected = open_uncut(&files.at("out"), &Assumed::default()).expect("opened");
+    let table = corrected.sensor.code.table();
+    let mut source = FrameSource::new(160, 120);
+    let image = &corrected.views[0].depth[0].path;
+    let depth = source.read(image).expect("read");
+    let relative = image.strip_prefix(files.at("out")).expect("inside");
+    let sigma = source.read(&files.at("sigma").join(relative)).expect("read");
+    assert!(recording.is_dir());
+    for (&raw, &word) in depth.raw.iter().zip(&sigma.raw) {
+        let z = f64::from(table.metres(raw));
+        let expected = 0.01 * z * SIGMA_UNITS_PER_METRE;
+        assert!(z.is_nan() || (f64::from(word) - expected).abs() < 2.0, "{z}: {word}");
+    }
+}
+
+#[test]
 fn a_model_without_bias_changes_no_byte() {
     let files = Files::new();
     files.model(&small(vec![named("vignetting", json!({"growth": 0.4}))]));
