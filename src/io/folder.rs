@@ -31,15 +31,24 @@ pub(super) fn sequence(root: &Path, assumed: &Assumed) -> Result<(Footage, Senso
         described_by.push(description);
         sensor
     } else {
-        let (sensor, remark) = assumed.sequence_sensor(&path, size_of(&first.path)?)?;
+        let (sensor, remark) = assumed.sequence_sensor(&path, size_of(first)?)?;
         remarks.extend(remark);
         sensor
     };
-    Ok((Footage { frames: list.frames, film: Film::Video, remarks, described_by }, sensor))
+    Ok((
+        Footage {
+            frames: list.frames,
+            film: Film::Video,
+            remarks,
+            described_by,
+            ..Footage::default()
+        },
+        sensor,
+    ))
 }
 
 /// 30 Hz: a plain folder has no clock, and every sensor of this kind runs at it.
-const NOMINAL_INTERVAL_S: f64 = 1.0 / 30.0;
+pub(super) const NOMINAL_INTERVAL_S: f64 = 1.0 / 30.0;
 
 /// 16-bit PNGs in name order; everything else comes from options.
 pub(super) fn images(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
@@ -52,14 +61,14 @@ pub(super) fn images(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)
             "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs",
         ));
     }
-    let (sensor, remark) = assumed.images_sensor(root, &files)?;
-    let frames = files
+    let stamped = files
         .into_iter()
         .enumerate()
-        .map(|(i, path)| FrameRef { timestamp: i as f64 * NOMINAL_INTERVAL_S, path })
-        .collect();
+        .map(|(i, p)| FrameRef::file(i as f64 * NOMINAL_INTERVAL_S, p));
+    let frames: Vec<FrameRef> = stamped.collect();
+    let (sensor, remark) = assumed.images_sensor(root, &frames)?;
     let remarks = remark.into_iter().collect();
-    Ok((Footage { frames, film: Film::Captures, remarks, described_by: Vec::new() }, sensor))
+    Ok((Footage { frames, film: Film::Captures, remarks, ..Footage::default() }, sensor))
 }
 
 pub(crate) const INDEX: &str = "INDEX.txt";
@@ -80,7 +89,7 @@ pub(super) fn dump(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> 
         })?;
         let path = root.join(name);
         if path.is_file() {
-            frames.push(FrameRef { timestamp, path });
+            frames.push(FrameRef::file(timestamp, path));
         } else {
             remarks
                 .push(format!("INDEX.txt line {} names {name}, which is missing; left out", i + 1));
@@ -93,9 +102,15 @@ pub(super) fn dump(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> 
             "record the dump with fakenect-record",
         )
     })?;
-    let (sensor, remark) = assumed.dump_sensor(size_of(&first.path)?)?;
+    let (sensor, remark) = assumed.dump_sensor(size_of(first)?)?;
     remarks.extend(remark);
-    let footage = Footage { frames, film: Film::Video, remarks, described_by: vec![index] };
+    let footage = Footage {
+        frames,
+        film: Film::Video,
+        remarks,
+        described_by: vec![index],
+        ..Footage::default()
+    };
     Ok((footage, sensor))
 }
 
