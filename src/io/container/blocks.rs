@@ -50,6 +50,7 @@ pub enum Compression {
     None,
     Bz2,
     Lz4,
+    Zstd,
 }
 
 /// A stretch of a file that is compressed as one.
@@ -60,6 +61,8 @@ pub struct Chunk {
     pub stored: u64,
     pub size: u64,
     pub compression: Compression,
+    /// CRC-32 of what it becomes, where the format has one.
+    pub crc: Option<u32>,
 }
 
 /// Decompressed chunks that are kept: the threads of a machine walk through a few views at a time.
@@ -96,6 +99,19 @@ impl Chunks {
         }
         self.chunks.push(chunk);
         Ok(self.chunks.len() - 1)
+    }
+
+    /// Bytes of a chunk, or of the file where it is in none.
+    pub fn bytes_at(&self, chunk: Option<u32>, at: u64, n: u64, what: &str) -> Result<Vec<u8>> {
+        match chunk {
+            Some(chunk) => self.bytes(chunk as usize, at, n, what),
+            None => self.source.bytes(at, n, what),
+        }
+    }
+
+    /// Before compression.
+    pub fn size(&self, number: usize) -> u64 {
+        self.chunks[number].size
     }
 
     /// Bytes of a chunk as it was before compression.
@@ -140,16 +156,32 @@ const REMEDY: &str = "the file is damaged; copy or record it again";
 
 /// Exactly as many bytes as the chunk claims; memory grows with what is there, not with the claim.
 fn decompress(stored: &[u8], chunk: Chunk) -> Result<Vec<u8>, String> {
-    let mut whole = Vec::new();
-    let reader: Box<dyn Read + '_> = match chunk.compression {
-        Compression::None => Box::new(stored),
-        Compression::Bz2 => Box::new(bzip2::read::BzDecoder::new(stored)),
-        Compression::Lz4 => Box::new(lz4_flex::frame::FrameDecoder::new(stored)),
+    let whole = match chunk.compression {
+        Compression::None => stored.to_vec(),
+        Compression::Bz2 => all_of(bzip2::read::BzDecoder::new(stored), chunk.size)?,
+        Compression::Lz4 => all_of(lz4_flex::frame::FrameDecoder::new(stored), chunk.size)?,
+        Compression::Zstd => unzstd(stored, chunk.size)?,
     };
-    let read = reader.take(chunk.size + 1).read_to_end(&mut whole);
-    read.map_err(|e| e.to_string())?;
-    match whole.len() as u64 == chunk.size {
-        true => Ok(whole),
-        false => Err(format!("it becomes {} bytes, not {}", whole.len(), chunk.size)),
+    if whole.len() as u64 != chunk.size {
+        return Err(format!("it becomes {} bytes, not {}", whole.len(), chunk.size));
+    }
+    if chunk.crc.is_some_and(|crc| crc != crc32fast::hash(&whole)) {
+        return Err("its checksum is another".into());
+    }
+    Ok(whole)
+}
+
+/// At most `max` bytes: an error when there are more.
+pub fn unzstd(stored: &[u8], max: u64) -> Result<Vec<u8>, String> {
+    let reader = ruzstd::decoding::StreamingDecoder::new(stored).map_err(|e| e.to_string())?;
+    all_of(reader, max)
+}
+
+fn all_of(reader: impl Read, max: u64) -> Result<Vec<u8>, String> {
+    let mut whole = Vec::new();
+    reader.take(max + 1).read_to_end(&mut whole).map_err(|e| e.to_string())?;
+    match whole.len() as u64 > max {
+        true => Err(format!("it becomes more than {max} bytes")),
+        false => Ok(whole),
     }
 }

@@ -26,7 +26,10 @@
 mod bag;
 mod blocks;
 mod camera;
+#[cfg(feature = "db3")]
+mod db3;
 mod film;
+mod mcap;
 mod messages;
 mod npy;
 mod npz;
@@ -40,9 +43,10 @@ mod wire;
 
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::assumed::Assumed;
+use super::output::entries;
 use super::stills::Footage;
 use crate::error::{Error, Result};
 use crate::view::Sensor;
@@ -51,15 +55,28 @@ use crate::view::Sensor;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Ros1,
+    Mcap,
+    Db3,
     Npy,
     Npz,
 }
 
 /// What a file of each kind begins with.
-const BEGINNINGS: [(&[u8], Kind); 3] =
-    [(b"#ROSBAG V", Kind::Ros1), (b"\x93NUMPY", Kind::Npy), (b"PK\x03\x04", Kind::Npz)];
+const BEGINNINGS: [(&[u8], Kind); 5] = [
+    (b"#ROSBAG V", Kind::Ros1),
+    (b"\x89MCAP0\r\n", Kind::Mcap),
+    (b"SQLite format 3\0", Kind::Db3),
+    (b"\x93NUMPY", Kind::Npy),
+    (b"PK\x03\x04", Kind::Npz),
+];
 /// Names that promise such a file, so that a damaged one is not taken for something else.
-const EXTENSIONS: [(&str, Kind); 3] = [("bag", Kind::Ros1), ("npy", Kind::Npy), ("npz", Kind::Npz)];
+const EXTENSIONS: [(&str, Kind); 5] = [
+    ("bag", Kind::Ros1),
+    ("mcap", Kind::Mcap),
+    ("db3", Kind::Db3),
+    ("npy", Kind::Npy),
+    ("npz", Kind::Npz),
+];
 
 impl Kind {
     fn of(path: &Path) -> Option<Self> {
@@ -74,19 +91,46 @@ impl Kind {
     }
 }
 
+/// A folder of rosbag2 stands for the file in it.
+const METADATA: &str = "metadata.yaml";
+
 pub(super) fn is_one(path: &Path) -> bool {
-    Kind::of(path).is_some()
+    Kind::of(path).is_some() || path.join(METADATA).is_file()
+}
+
+/// The only bag in a folder of rosbag2.
+fn bag_in(folder: &Path) -> Result<PathBuf> {
+    let mut bags = entries(folder)?;
+    bags.retain(|path| matches!(Kind::of(path), Some(Kind::Mcap | Kind::Db3)));
+    match &bags[..] {
+        [only] => Ok(only.clone()),
+        _ => {
+            let what = format!("{} bags are in this folder of rosbag2", bags.len());
+            let remedy = "give the file itself; parts of a recording: ros2 bag convert makes one";
+            Err(Error::recording(folder, what, remedy))
+        }
+    }
 }
 
 /// The film in a file and the sensor that took it. Of a film of floats every depth is looked at, because
 /// they decide how it is held. An error when the file is damaged or does not say what is needed.
 pub(super) fn open(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     match Kind::of(path) {
+        None if path.is_dir() => open(&bag_in(path)?, assumed),
+        Some(Kind::Mcap) => film::open(mcap::Mcap::open(path)?, assumed),
+        #[cfg(feature = "db3")]
+        Some(Kind::Db3) => film::open(db3::Db3::open(path)?, assumed),
+        #[cfg(not(feature = "db3"))]
+        Some(Kind::Db3) => Err(Error::recording(
+            path,
+            "this kinoise was built without SQLite",
+            "build it with the feature db3, or convert the bag: ros2 bag convert to mcap",
+        )),
         Some(Kind::Ros1) => film::open(ros1::Ros1Bag::open(path)?, assumed),
         Some(Kind::Npy) => stack::open_npy(path, assumed),
         Some(Kind::Npz) => stack::open_npz(path, assumed),
         None => {
-            Err(Error::recording(path, "no bag and no stack", "give a .bag, .npy or .npz file"))
+            Err(Error::recording(path, "no bag and no stack", "give a .bag, .mcap, .db3, .npy or .npz file"))
         }
     }
 }

@@ -79,7 +79,7 @@ impl Ros1Bag {
         if compression == Compression::None && size != record.data {
             return Err(wrong("the chunk's two lengths differ"));
         }
-        let chunk = Chunk { at: record.data_at, stored: record.data, size, compression };
+        let chunk = Chunk { at: record.data_at, stored: record.data, size, compression, crc: None };
         let mut next = record.end();
         let number = self.chunks.push(chunk)? as u32;
         // The index of a chunk's messages stands behind it, a record a connection.
