@@ -28,14 +28,18 @@ impl FrameSource {
         FrameSource { width, height, hash: Sha256::new() }
     }
 
+    /// A frame of a recording, in a file of its own or not.
     /// An error when the file is missing, truncated, of another kind (8 bit, colour) or size.
-    pub fn read(&mut self, frame: &FrameRef) -> Result<Frame> {
-        let path = &frame.path;
-        if let Some(within) = &frame.within {
-            let image = within.store.frame(within.index)?;
-            image.raw.iter().for_each(|word| self.hash.update(word.to_le_bytes()));
-            return sized(path, image, self.width, self.height);
-        }
+    pub fn frame(&mut self, frame: &FrameRef) -> Result<Frame> {
+        let Some(within) = &frame.within else { return self.read(&frame.path) };
+        let image = within.store.frame(within.index)?;
+        let words: Vec<u8> = image.raw.iter().flat_map(|w| w.to_le_bytes()).collect();
+        self.hash.update(&words);
+        sized(&frame.path, image, self.width, self.height)
+    }
+
+    /// One image file. Errors as those of [`FrameSource::frame`].
+    pub fn read(&mut self, path: &Path) -> Result<Frame> {
         let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
         self.hash.update(&bytes);
         sized(path, decode(path, &bytes)?, self.width, self.height)

@@ -146,7 +146,7 @@ fn samples(
     frame: &FrameRef,
     table: &DepthTable,
 ) -> Result<Vec<f32>, String> {
-    let image = source.read(frame).map_err(|e| e.to_string())?;
+    let image = source.frame(frame).map_err(|e| e.to_string())?;
     let samples = sample(&image, table);
     if samples.iter().all(|z| z.is_nan()) {
         return Err(format!("{}: no pixel carries a depth", frame.place()));

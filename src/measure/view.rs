@@ -91,7 +91,7 @@ impl<'r> FrameReader<'r> {
 
     fn next_numbered(&mut self) -> Option<(usize, Frame)> {
         while let Some((number, frame_ref)) = self.frames.next() {
-            match self.source.read(frame_ref) {
+            match self.source.frame(frame_ref) {
                 Ok(f) if f.raw.iter().any(|&raw| self.table.metres(raw).is_finite()) => {
                     return Some((number, f));
                 }

@@ -8,6 +8,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::{Error, Result};
 
+const REMEDY: &str = "the file is damaged; copy or record it again";
+
+/// More is not held at once. Recorders write chunks of 1 to 4 MB, and of one image where that is larger.
+pub const MAX_PIECE: u64 = 256 << 20;
+
 /// A file read at places, from any thread.
 #[derive(Debug)]
 pub struct Source {
@@ -32,6 +37,9 @@ impl Source {
                 self.length
             );
             return Err(self.damaged(said, "the file is cut or damaged; copy or record it again"));
+        }
+        if n > MAX_PIECE {
+            return Err(self.damaged(format!("{what} at byte {at} claims {n} bytes"), REMEDY));
         }
         let mut bytes = vec![0; n as usize];
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
@@ -67,8 +75,6 @@ pub struct Chunk {
 
 /// Decompressed chunks that are kept: the threads of a machine walk through a few views at a time.
 const KEPT: usize = 8;
-/// Recorders write chunks of 1 to 4 MB, and of one image where that is larger.
-const MAX_CHUNK: u64 = 256 << 20;
 
 #[derive(Debug)]
 pub struct Chunks {
@@ -93,7 +99,7 @@ impl Chunks {
             );
             return Err(source.damaged(what, "the file is cut; copy it again or mend it"));
         }
-        if size > MAX_CHUNK && chunk.compression != Compression::None {
+        if size > MAX_PIECE && chunk.compression != Compression::None {
             let what = format!("the chunk at byte {at} claims to become {size} bytes");
             return Err(source.damaged(what, "write it again with chunks below 256 MB"));
         }
@@ -151,8 +157,6 @@ impl Chunks {
         Ok(whole)
     }
 }
-
-const REMEDY: &str = "the file is damaged; copy or record it again";
 
 /// Exactly as many bytes as the chunk claims; memory grows with what is there, not with the claim.
 fn decompress(stored: &[u8], chunk: Chunk) -> Result<Vec<u8>, String> {

@@ -7,13 +7,12 @@ use rusqlite::limits::Limit;
 use rusqlite::{Connection, OpenFlags, params};
 
 use super::bag::{Bag, Message, Topic, kind_of};
-use super::blocks::unzstd;
+use super::blocks::{MAX_PIECE, unzstd};
 use super::wire::Dialect;
 use crate::error::{Error, Result};
 
-const REMEDY: &str = "the file is cut or damaged; copy or record it again, or mend it with sqlite3 FILE .recover";
-/// No image is larger, and none is believed to be.
-const MAX_MESSAGE: u64 = 256 << 20;
+const REMEDY: &str =
+    "the file is cut or damaged; copy or record it again, or mend it with sqlite3 FILE .recover";
 const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
 
 #[derive(Debug)]
@@ -31,7 +30,7 @@ impl Db3 {
         let failed = |e| damaged(path, &e);
         let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
         let database = Connection::open_with_flags(path, flags).map_err(failed)?;
-        database.set_limit(Limit::SQLITE_LIMIT_LENGTH, MAX_MESSAGE as i32).map_err(failed)?;
+        database.set_limit(Limit::SQLITE_LIMIT_LENGTH, MAX_PIECE as i32).map_err(failed)?;
         let (topics, rows) = index(&database).map_err(failed)?;
         Ok(Db3 { path: path.into(), database: Mutex::new(database), topics, rows })
     }
@@ -43,8 +42,7 @@ fn index(database: &Connection) -> rusqlite::Result<(Vec<Topic>, Vec<Vec<i64>>)>
     let each = listed.query_map([], |row| {
         let (kind, format): (String, String) = (row.get(2)?, row.get(3)?);
         let kind = if format == "cdr" { kind_of(&kind) } else { format!("{kind} in {format}") };
-        let topic =
-            Topic { name: row.get(1)?, kind, dialect: Dialect::Cdr, logged_ns: Vec::new() };
+        let topic = Topic { name: row.get(1)?, kind, dialect: Dialect::Cdr, logged_ns: Vec::new() };
         Ok((row.get::<_, i64>(0)?, topic))
     })?;
     let (mut topics, mut rows) = (Vec::new(), Vec::new());
@@ -85,7 +83,7 @@ impl Bag for Db3 {
             let database = self.database.lock().unwrap_or_else(PoisonError::into_inner);
             let of = "SELECT length(data), substr(data, 1, ?) FROM messages WHERE id = ?";
             let mut query = database.prepare(of)?;
-            let limit = limit.min(MAX_MESSAGE) as i64;
+            let limit = limit.min(MAX_PIECE) as i64;
             query.query_row(params![limit, row], |found| {
                 Ok((found.get::<_, i64>(0)? as u64, found.get::<_, Vec<u8>>(1)?))
             })
@@ -96,8 +94,8 @@ impl Bag for Db3 {
             return Ok(Message { bytes, length });
         }
         let (_, stored) = fetched(u64::MAX)?;
-        let mut bytes = unzstd(&stored, MAX_MESSAGE).map_err(|why| {
-            let what = format!("message {number} of {}: {why}", self.topics[topic].name);
+        let mut bytes = unzstd(&stored, MAX_PIECE).map_err(|why| {
+            let what = format!("message {} of {}: {why}", number + 1, self.topics[topic].name);
             Error::image(&self.path, what, REMEDY)
         })?;
         let length = bytes.len() as u64;

@@ -21,7 +21,8 @@ const HEAD: u64 = 9;
 const MESSAGE_HEAD: u64 = 22;
 /// Of a chunk before its records, with the longest name of a compression.
 const CHUNK_HEAD: u64 = 64;
-const REMEDY_CUT: &str = "the recording was interrupted or the file is cut: copy it again, or mend it with mcap recover";
+const REMEDY_CUT: &str =
+    "the recording was interrupted or the file is cut: copy it again, or mend it with mcap recover";
 const REMEDY: &str = "the file is damaged; copy or record it again, or mend it with mcap recover";
 
 #[derive(Debug)]
@@ -158,7 +159,8 @@ impl Walk {
     fn chunk(&mut self, body: u64, length: u64) -> Result<u32> {
         let source = &self.chunks.source;
         let head = source.bytes(body, length.min(CHUNK_HEAD), "a chunk")?;
-        let wrong = |what: &str| source.damaged(format!("the chunk at byte {body}: {what}"), REMEDY);
+        let wrong =
+            |what: &str| source.damaged(format!("the chunk at byte {body}: {what}"), REMEDY);
         let cut = || wrong("its header is cut");
         let (size, crc) = (head.get(16..24).ok_or_else(cut)?, head.get(24..28).ok_or_else(cut)?);
         let name = word32(head.get(28..32).ok_or_else(cut)?) as usize;
@@ -259,7 +261,9 @@ impl Walk {
         let (mut topics, mut of) = (Vec::<Topic>::new(), HashMap::new());
         for id in ids {
             let topic = &self.channels[&id];
-            let same = |t: &Topic| (&t.name, &t.kind, t.dialect) == (&topic.name, &topic.kind, topic.dialect);
+            let same = |t: &Topic| {
+                (&t.name, &t.kind, t.dialect) == (&topic.name, &topic.kind, topic.dialect)
+            };
             let index = topics.iter().position(same).unwrap_or(topics.len());
             if index == topics.len() {
                 topics.push(topic.clone());

@@ -129,8 +129,10 @@ pub(super) fn open(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> 
         Some(Kind::Ros1) => film::open(ros1::Ros1Bag::open(path)?, assumed),
         Some(Kind::Npy) => stack::open_npy(path, assumed),
         Some(Kind::Npz) => stack::open_npz(path, assumed),
-        None => {
-            Err(Error::recording(path, "no bag and no stack", "give a .bag, .mcap, .db3, .npy or .npz file"))
-        }
+        None => Err(Error::recording(
+            path,
+            "no bag and no stack",
+            "give a .bag, .mcap, .db3, .npy or .npz file",
+        )),
     }
 }

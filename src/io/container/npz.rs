@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use flate2::read::DeflateDecoder;
 use zip::{CompressionMethod, ZipArchive};
 
-use super::blocks::Source;
+use super::blocks::{MAX_PIECE, Source};
 use crate::error::{Error, Result};
 
 /// One array of the archive, header and all.
@@ -83,6 +83,9 @@ impl Body {
     pub fn bytes(&self, at: u64, n: u64, what: &str) -> Result<Vec<u8>> {
         match self {
             Body::Plain { source, at: begin } => source.bytes(begin + at, n, what),
+            Body::Deflated(Inflater { source, .. }) if n > MAX_PIECE => {
+                Err(source.damaged(format!("{what} claims {n} bytes"), REMEDY))
+            }
             Body::Deflated(inflater) => inflater.bytes(at, n, what),
         }
     }

@@ -76,8 +76,7 @@ impl Encoding {
             return Some(format!("an image of {width} x {height} px is no depth image"));
         }
         let row = width * self.pixel_bytes();
-        let needed = head.step.checked_mul(height - 1).and_then(|n| n.checked_add(row));
-        (head.step < row || needed.is_none_or(|n| n > head.data)).then(|| {
+        (head.step < row || head.step.checked_mul(height) != Some(head.data)).then(|| {
             format!(
                 "{} bytes in rows of {} do not make an image of {width} x {height} px",
                 head.data, head.step

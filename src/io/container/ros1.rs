@@ -239,6 +239,13 @@ impl<'s> Record<'s> {
         }
         let bytes = source.bytes(at + 4, header, "a record's header")?;
         let data = length(at + 4 + header)?;
+        if at + 8 + header + data > source.length {
+            let what = format!(
+                "the record at byte {at} should have {data} bytes, but the file ends at {}",
+                source.length
+            );
+            return Err(source.damaged(what, REMEDY_INDEX));
+        }
         Ok(Record { fields: Fields { source, at, bytes }, data_at: at + 8 + header, data })
     }
 

@@ -90,7 +90,7 @@ impl Scale {
 pub fn words(metres: &[f32], units_per_metre: f64) -> Vec<u16> {
     let word = |&z: &f32| {
         let steps = (f64::from(z) * units_per_metre).round();
-        if steps >= 1.0 && steps < 65_536.0 { steps as u16 } else { 0 }
+        if (1.0..65_536.0).contains(&steps) { steps as u16 } else { 0 }
     };
     metres.iter().map(word).collect()
 }
