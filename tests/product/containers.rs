@@ -179,7 +179,7 @@ fn every_encoding_of_depth_is_understood() {
     for (bag, count) in [("kinds.bag", 2), ("kinds.mcap", 1)] {
         for topic in ["/big/image", "/metres/image", "/metres_big/image", "/padded/image"]
             .into_iter()
-            .chain(["/png/compressedDepth"])
+            .chain(["/png/image/compressedDepth"])
         {
             let recording = uncut(bag, topic);
             assert_eq!(recording.sensor.code, MILLIMETRES, "{bag}, {topic}");
@@ -187,7 +187,7 @@ fn every_encoding_of_depth_is_understood() {
             assert!(frames[..] == film[..count], "{bag}, {topic}");
         }
         // Inverse depths in steps of 1/10100 a metre, cut off: two millimetres in a hundred.
-        let recording = uncut(bag, "/inverse/compressedDepth");
+        let recording = uncut(bag, "/inverse/image/compressedDepth");
         let table = recording.sensor.code.table();
         let read = frames(&recording);
         assert_eq!(read.len(), count);
@@ -254,7 +254,7 @@ fn topics_are_listed_where_there_is_a_choice() {
         open(&container(name), &assumed).expect_err(name).to_string()
     };
     let several = refused("kinds.bag", None);
-    for said in ["kinds.bag", "/big/image", "/png/compressedDepth", "--topic"] {
+    for said in ["kinds.bag", "/big/image", "/png/image/compressedDepth", "--topic"] {
         assert!(several.contains(said), "{several}");
     }
     let unknown = refused("film.bag", Some("/depth"));
@@ -292,7 +292,7 @@ fn victims() -> Vec<(&'static str, Assumed)> {
         ("film.mcap", Assumed::default()),
         ("film.npz", Assumed::default()),
         ("kinds.bag", topic("/metres/image")),
-        ("kinds.mcap", topic("/png/compressedDepth")),
+        ("kinds.mcap", topic("/png/image/compressedDepth")),
         ("realsense.bag", Assumed::default()),
         ("unchunked.mcap", Assumed::default()),
         ("unindexed.mcap", Assumed::default()),

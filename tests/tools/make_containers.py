@@ -178,10 +178,10 @@ def kinds(m, frames):
         yield "/metres/image", ns, m.image(ns, metres, "32FC1")
         yield "/metres_big/image", ns, m.image(ns, metres, "32FC1", big=1)
         yield "/padded/image", ns, m.image(ns, frame, pad=6)
-        yield "/png/compressedDepth", ns, m.compressed(ns, "16UC1; compressedDepth", bytes(12) + png(frame))
+        yield "/png/image/compressedDepth", ns, m.compressed(ns, "16UC1; compressedDepth", bytes(12) + png(frame))
         words = np.nan_to_num(inverse).astype(np.uint16)
         data = header + png(words)
-        yield "/inverse/compressedDepth", ns, m.compressed(ns, "32FC1; compressedDepth png", data)
+        yield "/inverse/image/compressedDepth", ns, m.compressed(ns, "32FC1; compressedDepth png", data)
 
 
 def realsense(m, frames, unit_behind):

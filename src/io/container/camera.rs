@@ -1,6 +1,7 @@
 //! The camera of a depth topic: its sensor_msgs/CameraInfo.
 
 use super::bag::{Bag, Topic};
+use super::lens::lens;
 use super::messages::CameraInfo;
 use super::topics::damaged;
 use crate::camera::Camera;
@@ -9,8 +10,8 @@ use crate::error::{Error, Result};
 const REMEDY: &str =
     "give --intrinsics fx,fy,cx,cy in pixels, or record the camera_info that belongs to the topic";
 
-/// The camera that took images of `size` px on `depth`, and the topic that says so; nothing where no
-/// topic does. An error when what is said does not belong to the images or is no camera.
+/// The camera that took images of `size` px on `depth`, and who says so; nothing where no topic does.
+/// An error when what is said does not belong to the images or is no camera.
 pub fn camera(
     bag: &dyn Bag,
     depth: usize,
@@ -34,45 +35,32 @@ pub fn camera(
     // Rectified images lie in P, and D is what was taken out of them.
     let rectified = bent && name.contains("_rect") && info.rectified[0] > 0.0;
     let [fx, fy, cx, cy] = if rectified { info.rectified } else { info.intrinsics };
-    let distortion = if rectified { None } else { distortion(&info).map_err(wrong)? };
+    let (distortion, said) = if rectified { (None, None) } else { lens(&info).map_err(wrong)? };
     let (width, height) = size;
     let camera = Camera { width, height, fx, fy, cx, cy, distortion };
     match camera.fault() {
         Some(fault) => Err(wrong(fault.to_string())),
-        None => Ok(Some((camera, from.name.clone()))),
+        None => {
+            let said = said.map_or_else(String::new, |said| format!("; {said}"));
+            Ok(Some((camera, format!("the camera is what {} says{said}", from.name))))
+        }
     }
 }
 
-/// The camera_info in the same namespace, or nearest to it; nothing when two are as near.
+/// The camera_info in the namespace of the images; nothing when there are two. Another camera's, a
+/// colour camera's say, would look as right.
 fn beside(topics: &[Topic], depth: &str) -> Option<usize> {
-    let parts = |name: &str| name.split('/').map(String::from).collect::<Vec<_>>();
-    let depth = parts(depth);
-    let shared = |t: &Topic| parts(&t.name).iter().zip(&depth).take_while(|(a, b)| a == b).count();
-    let infos = topics
-        .iter()
-        .enumerate()
-        .filter(|(_, t)| t.kind == "sensor_msgs/CameraInfo" && !t.logged_ns.is_empty());
-    let near: Vec<(usize, usize)> = infos.map(|(i, t)| (shared(t), i)).collect();
-    let nearest = near.iter().map(|(n, _)| *n).max()?;
-    let mut best = near.iter().filter(|(n, _)| *n == nearest);
-    let (_, topic) = best.next()?;
-    best.next().is_none().then_some(*topic)
-}
-
-/// k1, k2, p1, p2, k3, where that is all there is.
-fn distortion(info: &CameraInfo) -> Result<Option<[f64; 5]>, String> {
-    if info.distortion.iter().all(|&k| k == 0.0) {
-        return Ok(None);
-    }
-    let brown = ["plumb_bob", "rational_polynomial", "Brown Conrady"];
-    let (first, rest) = info.distortion.split_at(info.distortion.len().min(5));
-    if !brown.contains(&&*info.model) || rest.iter().any(|&k| k != 0.0) {
-        return Err(format!(
-            "its lens is \"{}\" with coefficients {:?}, not one of k1, k2, p1, p2, k3 (plumb_bob)",
-            info.model, info.distortion
-        ));
-    }
-    let mut k = [0.0; 5];
-    k[..first.len()].copy_from_slice(first);
-    Ok(Some(k))
+    let (namespace, last) = depth.rsplit_once('/')?;
+    // What a transport or librealsense's recorder adds to a topic's name.
+    let namespace = match last {
+        "compressedDepth" | "data" => namespace.rsplit_once('/')?.0,
+        _ => namespace,
+    };
+    let is_there = |t: &Topic| {
+        let inside = t.name.strip_prefix(namespace).is_some_and(|rest| rest.starts_with('/'));
+        inside && t.kind == "sensor_msgs/CameraInfo" && !t.logged_ns.is_empty()
+    };
+    let mut found = topics.iter().enumerate().filter(|(_, t)| is_there(t));
+    let (topic, _) = found.next()?;
+    found.next().is_none().then_some(topic)
 }

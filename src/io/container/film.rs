@@ -202,8 +202,8 @@ fn sensor(
         None => camera(bag, depth.topic, survey.size)?,
     };
     let mut sensor = match camera {
-        Some((camera, from)) => {
-            remarks.push(format!("{topic}: the camera is what {from} says"));
+        Some((camera, said)) => {
+            remarks.push(format!("{topic}: {said}"));
             let [fx, fy, cx, cy] = [camera.fx, camera.fy, camera.cx, camera.cy];
             let known = Assumed { intrinsics: Some([fx, fy, cx, cy]), ..given };
             let mut sensor = known.sensor(&name, survey.size, [fx, fy, cx, cy], code)?;

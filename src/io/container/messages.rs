@@ -108,7 +108,7 @@ pub fn seconds(ns: i64) -> f64 {
 mod tests {
     #[test]
     fn stamps_are_the_nearest_number_to_their_decimals() {
-        assert_eq!(super::seconds(1_305_031_102.175_304), 1_305_031_102.175_304_001);
+        assert_eq!(super::seconds(1_305_031_102_175_304_001), 1_305_031_102.175_304);
         assert_eq!(super::seconds(33_333_333), 0.033_333_333);
     }
 }

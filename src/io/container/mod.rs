@@ -12,7 +12,8 @@
 //!      blocks.rs                    lengths checked against the file; chunks decompressed, a few kept
 //! messages.rs on wire.rs            a message's fields, in ROS 1's and in CDR's writing
 //! pixels.rs                         an image's depths: 16UC1, 32FC1, compressedDepth
-//! topics.rs camera.rs realsense.rs  which topic holds the depth, and what is said of its camera
+//! topics.rs camera.rs (lens.rs)      which topic holds the depth, and what is said of its camera;
+//! realsense.rs                      in librealsense's own recordings, of its device
 //! film.rs                           a topic as a FrameStore
 //! stack.rs on npy.rs, npz.rs        arrays in place of messages
 //! scale.rs                          16-bit words for depths that are floats
@@ -29,6 +30,7 @@ mod camera;
 #[cfg(feature = "db3")]
 mod db3;
 mod film;
+mod lens;
 mod mcap;
 mod messages;
 mod npy;
