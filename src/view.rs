@@ -1,9 +1,11 @@
 //! A recording: a sensor and the views it took of a planar target.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use crate::camera::Camera;
-use crate::frame::{DepthCode, RawDisparity};
+use crate::error::Result;
+use crate::frame::{DepthCode, Frame, RawDisparity};
 use crate::units::shortest;
 use serde::{Deserialize, Serialize};
 
@@ -93,7 +95,48 @@ pub struct ViewNotes {
 pub struct FrameRef {
     /// Seconds, one clock for the whole recording.
     pub timestamp: f64,
+    /// The image, or the file that holds it among others.
     pub path: PathBuf,
+    /// Which of the frames in `path`; `None` where the file is one image.
+    pub within: Option<Within>,
+}
+
+impl FrameRef {
+    /// An image with a file of its own.
+    pub fn file(timestamp: f64, path: PathBuf) -> Self {
+        FrameRef { timestamp, path, within: None }
+    }
+
+    /// Where it is, for people.
+    pub fn place(&self) -> String {
+        let file = self.path.display();
+        match &self.within {
+            None => file.to_string(),
+            Some(Within { store, index }) => format!("{file}: {}", store.place(*index)),
+        }
+    }
+}
+
+/// A frame of a file that holds many.
+#[derive(Debug, Clone)]
+pub struct Within {
+    pub store: Arc<dyn FrameStore>,
+    pub index: usize,
+}
+
+impl PartialEq for Within {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.store, &other.store) && self.index == other.index
+    }
+}
+
+/// A file that holds many depth frames. It reads one when it is asked for, from any thread, and keeps
+/// no more than a few.
+pub trait FrameStore: std::fmt::Debug + Send + Sync {
+    /// An error, with the place, when the frame is damaged.
+    fn frame(&self, index: usize) -> Result<Frame>;
+    /// Where a frame stands in the file: its topic and number.
+    fn place(&self, index: usize) -> String;
 }
 
 /// One still pose of target and sensor.

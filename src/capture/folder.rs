@@ -7,7 +7,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use super::source::{Arrival, LiveFrame, Source};
 use crate::error::{Error, Result};
 use crate::io::{Assumed, describe_folder, entries, read_depth, size_of};
-use crate::view::Sensor;
+use crate::view::{FrameRef, Sensor};
 
 /// How often the folder is looked at.
 const POLL: Duration = Duration::from_millis(30);
@@ -36,7 +36,7 @@ impl Growing {
             return Err(Error::recording(root, "there is no such folder", remedy));
         }
         let first = first_image(root, patience)?;
-        let (sensor, remarks) = describe_folder(root, &[first], assumed)?;
+        let (sensor, remarks) = describe_folder(root, &[FrameRef::file(0.0, first)], assumed)?;
         let seen = BTreeSet::new();
         Ok(Growing { root: root.into(), sensor, seen, waiting: Vec::new(), remarks })
     }
@@ -50,7 +50,7 @@ impl Growing {
         }
         let path = self.waiting.last()?;
         let (width, height) = (self.sensor.camera.width, self.sensor.camera.height);
-        let read = read_depth(path, width, height);
+        let read = read_depth(&FrameRef::file(0.0, path.clone()), width, height);
         let modified = modified(path);
         if read.is_err() && modified.elapsed().is_ok_and(|age| age < MAX_WRITING) {
             return None;
@@ -83,7 +83,8 @@ impl Source for Growing {
 
 /// The first image that can be read.
 fn first_image(root: &Path, patience: Duration) -> Result<PathBuf> {
-    let readable = || images(root).into_iter().find(|p| size_of(p).is_ok());
+    let readable =
+        || images(root).into_iter().find(|p| size_of(&FrameRef::file(0.0, p.clone())).is_ok());
     poll(patience, readable).ok_or_else(|| {
         let what = format!("no depth image in {} s", patience.as_secs());
         let remedy = "start the program that writes 16-bit PNGs (or fakenect-record) into it";

@@ -85,7 +85,7 @@ impl Source for Playback {
 
     fn next(&mut self, _wait: Duration) -> Arrival {
         while let Some((depth, infrared)) = self.frames.next() {
-            match self.images.read(&depth.path) {
+            match self.images.frame(&depth) {
                 Ok(frame) => {
                     self.keep_pace(depth.timestamp);
                     let infrared = infrared.and_then(|i| self.amplitude(&i.path, &frame));

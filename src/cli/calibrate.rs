@@ -27,8 +27,8 @@ Examples:
 
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A recording, a TUM folder, a fakenect dump, a folder of 16-bit PNGs, or a table
-    /// z_m,theta_rad,sigma_m[,n] (.csv)
+    /// A recording, a TUM folder, a fakenect dump, a folder of 16-bit PNGs, a ROS bag (.bag, .mcap, .db3),
+    /// a NumPy stack (.npy, .npz), or a table z_m,theta_rad,sigma_m[,n] (.csv)
     recording: PathBuf,
     /// Folder for model.json, measurements.csv, sigma.svg and report.html
     #[arg(short, long, value_name = "DIR")]

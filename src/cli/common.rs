@@ -85,6 +85,9 @@ pub struct Input {
     /// Projector-camera distance in m, for folders without recording.json
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     baseline: Option<f64>,
+    /// Depth topic of a bag, or array of a .npz, where there are several
+    #[arg(long, value_name = "NAME")]
+    topic: Option<String>,
 }
 
 impl Input {
@@ -100,7 +103,12 @@ impl Input {
             let numbers = "numbers that turn raw values into metres";
             bail!("{fault}; give --units-per-metre or --raw-disparity {numbers}");
         }
-        Ok(Assumed { intrinsics: self.intrinsics, code, baseline_m: self.baseline })
+        Ok(Assumed {
+            intrinsics: self.intrinsics,
+            code,
+            baseline_m: self.baseline,
+            topic: self.topic.clone(),
+        })
     }
 
     /// The same options once more, for another command on the same folder.
@@ -111,6 +119,7 @@ impl Input {
             ("--units-per-metre", self.units_per_metre.map(shortest)),
             ("--raw-disparity", self.raw_disparity.map(|v| joined(&v))),
             ("--baseline", self.baseline.map(shortest)),
+            ("--topic", self.topic.clone()),
         ];
         let given =
             given.into_iter().filter_map(|(name, value)| Some([name.into(), value?.into()]));

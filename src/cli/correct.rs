@@ -19,7 +19,8 @@ Examples:
 
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A recording, a TUM folder, a fakenect dump, or a folder of 16-bit PNGs
+    /// A recording, a TUM folder, a fakenect dump, a folder of 16-bit PNGs, a ROS bag (.bag, .mcap, .db3),
+    /// or a NumPy stack (.npy, .npz)
     recording: PathBuf,
     /// New folder for the corrected recording
     #[arg(short, long, value_name = "DIR")]

@@ -25,7 +25,8 @@ Examples:
 
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A sequence in the layout of the TUM RGB-D benchmark or of 7-Scenes
+    /// A sequence in the layout of the TUM RGB-D benchmark or of 7-Scenes, a ROS bag (.bag, .mcap, .db3), or
+    /// a NumPy stack (.npy, .npz)
     sequence: PathBuf,
     /// Folder for trajectory.txt, map.ply, stats.json and map.html
     #[arg(short, long, value_name = "DIR")]

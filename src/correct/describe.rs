@@ -11,7 +11,7 @@ use crate::io::{DESCRIPTION, Layout, pretty_json, write_atomic, write_recording_
 use crate::view::Sensor;
 
 /// Say in recording.json of `folder` what the raw values mean now; what else it says stays. `images`
-/// are the stamps and names that a dump's index listed.
+/// are the stamps and names that a dump's index or a container listed.
 pub(super) fn describe(
     folder: &Path,
     layout: Layout,
@@ -19,11 +19,15 @@ pub(super) fn describe(
     images: impl Iterator<Item = (f64, PathBuf)>,
 ) -> Result<()> {
     match layout {
-        Layout::Dump => {
+        Layout::Dump | Layout::Container => {
             let mut list = String::from("# timestamp path\n");
             for (stamp, file) in images {
-                // Writing to a String does not fail.
-                let _ = writeln!(list, "{stamp:.6} {}", file.display());
+                // A dump's names have six digits; a container's stamps are kept as they are. Writing to
+                // a String does not fail.
+                let _ = match layout {
+                    Layout::Dump => writeln!(list, "{stamp:.6} {}", file.display()),
+                    _ => writeln!(list, "{stamp} {}", file.display()),
+                };
             }
             write_atomic(&folder.join("depth.txt"), list.as_bytes())?;
             write_recording_file(folder, sensor)

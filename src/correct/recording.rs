@@ -14,11 +14,11 @@ use crate::Progress;
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, DepthTable, FARTHEST_M, Frame};
 use crate::io::{
-    Assumed, DESCRIPTION, FrameSource, INDEX, Layout, encode_corrected, encode_pgm16, encode_png16,
-    is_corrected, open_uncut, refuse_full, refuse_inside, write_atomic,
+    Assumed, DESCRIPTION, INDEX, Layout, encode_corrected, encode_pgm16, encode_png16,
+    is_corrected, open_uncut, read_depth, refuse_full, refuse_inside, write_atomic,
 };
 use crate::model::NoiseModel;
-use crate::view::{Recording, Sensor};
+use crate::view::{FrameRef, Recording, Sensor};
 
 /// What was done to a recording.
 #[derive(Debug, Clone)]
@@ -117,9 +117,9 @@ pub fn correct_recording(
 
 /// A depth image to be written again.
 struct Image {
-    /// Relative to the recording.
+    /// Relative to the corrected recording; where the source is a file of its own, as it stood there.
     file: PathBuf,
-    timestamp: f64,
+    source: FrameRef,
     conditions: Conditions,
 }
 
@@ -129,14 +129,17 @@ fn images(recording: &Recording, root: &Path) -> Result<Vec<Image>> {
     let begin = frames().map(|(_, f)| f.timestamp).fold(f64::INFINITY, f64::min);
     let (mut known, mut images) = (HashSet::new(), Vec::new());
     for (view, frame) in frames() {
-        let (file, timestamp) = (inside(root, &frame.path)?, frame.timestamp);
+        let file = match &frame.within {
+            Some(within) => format!("depth/{:06}.png", within.index).into(),
+            None => inside(root, &frame.path)?,
+        };
         let conditions = Conditions {
-            session_s: timestamp - begin,
+            session_s: frame.timestamp - begin,
             temperature_c: view.notes.temperature_c,
             ambient_lux: view.notes.ambient_lux,
         };
         if known.insert(file.clone()) {
-            images.push(Image { file, timestamp, conditions });
+            images.push(Image { file, source: frame.clone(), conditions });
         }
     }
     Ok(images)
@@ -195,7 +198,7 @@ impl Rewrite<'_> {
         let assumed = self.layout != Layout::Dump && !self.root.join(DESCRIPTION).is_file();
         if self.recodes() || assumed {
             let sensor = Sensor { code: self.raw.code, ..self.sensor.clone() };
-            let listed = images.iter().map(|i| (i.timestamp, i.file.with_extension("png")));
+            let listed = images.iter().map(|i| (i.source.timestamp, i.file.with_extension("png")));
             describe(self.output, self.layout, &sensor, listed)?;
         }
         Ok(corrected)
@@ -208,6 +211,9 @@ impl Rewrite<'_> {
     /// Everything but the depth images; of a dump in another code its index too, for it would say
     /// that the raw values are a Kinect's.
     fn other_files(&self, images: &[Image]) -> Result<Vec<PathBuf>> {
+        if self.layout == Layout::Container {
+            return Ok(Vec::new());
+        }
         let images: HashSet<&Path> = images.iter().map(|i| i.file.as_path()).collect();
         let no_dump = self.recodes() && self.layout == Layout::Dump;
         let mut files = files_below(self.root)?;
@@ -218,7 +224,7 @@ impl Rewrite<'_> {
 
     fn read(&self, image: &Image) -> Result<Frame> {
         let camera = &self.sensor.camera;
-        FrameSource::new(camera.width, camera.height).read(&self.root.join(&image.file))
+        read_depth(&image.source, camera.width, camera.height)
     }
 
     /// Depth, m, as it was and without its biases.
@@ -242,7 +248,7 @@ impl Rewrite<'_> {
     }
 
     fn image(&self, image: &Image) -> Result<Tally> {
-        let source = self.root.join(&image.file);
+        let source = &image.source;
         let mut target = self.output.join(&image.file);
         let is_pgm = target.extension().is_some_and(|e| e.eq_ignore_ascii_case("pgm"));
         // Dumps in another code go on as a described sequence, whose images are PNGs.
@@ -250,9 +256,10 @@ impl Rewrite<'_> {
             target.set_extension("png");
         }
         make_folder_of(&target)?;
-        let stored = || std::fs::read(&source).map_err(|e| Error::read(&source, e));
+        let stored = || std::fs::read(&source.path).map_err(|e| Error::read(&source.path, e));
         let mut frame = match self.read(image) {
             Ok(frame) => frame,
+            Err(why) if source.within.is_some() => return Err(why),
             Err(why) => {
                 write_atomic(&target, &stored()?)?;
                 return Ok(Tally { unread: Some(why.to_string()), ..Tally::default() });
@@ -261,7 +268,7 @@ impl Rewrite<'_> {
         let (before, after) = self.depths(&frame, image)?;
         let tally = self.recode(&mut frame, &before, &after);
         let bytes = match (tally.changed, is_pgm) {
-            (0, _) if !self.recodes() => stored()?,
+            (0, _) if !self.recodes() && source.within.is_none() => stored()?,
             (_, true) if !self.recodes() => encode_pgm16(&frame),
             _ => encode_corrected(&frame)?,
         };

@@ -92,7 +92,7 @@ impl Field {
         let frames = view.depth.iter().enumerate().filter_map(|(number, frame)| {
             let image = match held.next_if(|h| h.0 == number) {
                 Some((_, image)) => image,
-                None => read_depth(&frame.path, camera.width, camera.height).ok()?,
+                None => read_depth(frame, camera.width, camera.height).ok()?,
             };
             Some((frame.timestamp - start, image))
         });

@@ -1,6 +1,6 @@
 //! What a folder does not say of its sensor: given by options, read off its values, or as usual.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::images::size_of;
 use super::raw_values::{OPENKINECT, RawValues};
@@ -8,7 +8,7 @@ use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
 use crate::units::shortest;
-use crate::view::Sensor;
+use crate::view::{FrameRef, Sensor};
 
 /// What the user knows about a folder that does not describe itself.
 #[derive(Debug, Clone, Default)]
@@ -18,6 +18,8 @@ pub struct Assumed {
     pub code: Option<DepthCode>,
     /// Distance between projector and camera, m.
     pub baseline_m: Option<f64>,
+    /// The depth topic of a bag, or the array of a NumPy archive.
+    pub topic: Option<String>,
 }
 
 /// Focal length of a Kinect v1 infrared camera to a percent, and the image centre.
@@ -90,6 +92,17 @@ impl Assumed {
         })
     }
 
+    /// An error when a topic is chosen where there are none.
+    pub(super) fn refuse_topic(&self, root: &Path) -> Result<()> {
+        match &self.topic {
+            Some(topic) => Err(Error::Argument {
+                what: format!("--topic {topic}: {} is a folder of images", root.display()),
+                remedy: "leave the option out: bags and NumPy archives alone have topics",
+            }),
+            None => Ok(()),
+        }
+    }
+
     /// The Kinect whose fakenect dump has frames of `size` px, and what was assumed of it.
     pub(super) fn dump_sensor(&self, size: (usize, usize)) -> Result<(Sensor, Option<String>)> {
         let remark = (self.intrinsics.is_none() || self.code.is_none()).then(|| {
@@ -98,7 +111,7 @@ impl Assumed {
                 .into()
         });
         let baseline_m = self.baseline_m.or(Some(KINECT_BASELINE_M));
-        let kinect = Assumed { baseline_m, ..*self };
+        let kinect = Assumed { baseline_m, ..self.clone() };
         let name = "Kinect for Xbox 360 (fakenect dump)";
         Ok((kinect.sensor(name, size, KINECT_INTRINSICS, OPENKINECT)?, remark))
     }
@@ -141,7 +154,7 @@ impl Assumed {
     pub(super) fn images_sensor(
         &self,
         root: &Path,
-        images: &[PathBuf],
+        images: &[FrameRef],
     ) -> Result<(Sensor, Option<String>)> {
         let Some(intrinsics) = self.intrinsics else {
             return Err(Error::recording(

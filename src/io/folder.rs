@@ -31,15 +31,24 @@ pub(super) fn sequence(root: &Path, assumed: &Assumed) -> Result<(Footage, Senso
         described_by.push(description);
         sensor
     } else {
-        let (sensor, remark) = assumed.sequence_sensor(&path, size_of(&first.path)?)?;
+        let (sensor, remark) = assumed.sequence_sensor(&path, size_of(first)?)?;
         remarks.extend(remark);
         sensor
     };
-    Ok((Footage { frames: list.frames, film: Film::Video, remarks, described_by }, sensor))
+    Ok((
+        Footage {
+            frames: list.frames,
+            film: Film::Video,
+            remarks,
+            described_by,
+            ..Footage::default()
+        },
+        sensor,
+    ))
 }
 
 /// 30 Hz: a plain folder has no clock, and every sensor of this kind runs at it.
-const NOMINAL_INTERVAL_S: f64 = 1.0 / 30.0;
+pub(super) const NOMINAL_INTERVAL_S: f64 = 1.0 / 30.0;
 
 fn is_image(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) && path.is_file()
@@ -62,6 +71,11 @@ pub(super) fn images(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)
     if files.is_empty() {
         return Err(nothing_in(root)?);
     }
+    let stamped = files
+        .into_iter()
+        .enumerate()
+        .map(|(i, path)| FrameRef::file(i as f64 * NOMINAL_INTERVAL_S, path));
+    let frames: Vec<FrameRef> = stamped.collect();
     let description = root.join(DESCRIPTION);
     let (mut remarks, mut described_by) = (Vec::new(), Vec::new());
     let sensor = if description.is_file() {
@@ -72,16 +86,14 @@ pub(super) fn images(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)
         described_by.push(description);
         sensor
     } else {
-        let (sensor, remark) = assumed.images_sensor(root, &files)?;
+        let (sensor, remark) = assumed.images_sensor(root, &frames)?;
         remarks.extend(remark);
         sensor
     };
-    let frames = files
-        .into_iter()
-        .enumerate()
-        .map(|(i, path)| FrameRef { timestamp: i as f64 * NOMINAL_INTERVAL_S, path })
-        .collect();
-    Ok((Footage { frames, film: Film::Captures, remarks, described_by }, sensor))
+    Ok((
+        Footage { frames, film: Film::Captures, remarks, described_by, ..Footage::default() },
+        sensor,
+    ))
 }
 
 /// What a folder without a recording holds instead, as far as it is known.
@@ -160,7 +172,7 @@ pub(super) fn dump(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> 
         })?;
         let path = root.join(name);
         if path.is_file() {
-            frames.push(FrameRef { timestamp, path });
+            frames.push(FrameRef::file(timestamp, path));
         } else {
             remarks
                 .push(format!("INDEX.txt line {} names {name}, which is missing; left out", i + 1));
@@ -173,9 +185,15 @@ pub(super) fn dump(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> 
             "record the dump with fakenect-record",
         )
     })?;
-    let (sensor, remark) = assumed.dump_sensor(size_of(&first.path)?)?;
+    let (sensor, remark) = assumed.dump_sensor(size_of(first)?)?;
     remarks.extend(remark);
-    let footage = Footage { frames, film: Film::Video, remarks, described_by: vec![index] };
+    let footage = Footage {
+        frames,
+        film: Film::Video,
+        remarks,
+        described_by: vec![index],
+        ..Footage::default()
+    };
     Ok((footage, sensor))
 }
 

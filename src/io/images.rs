@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 use crate::camera::usable_size;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
+use crate::view::FrameRef;
 
 /// Reads frames of one fixed size and keeps the hash of all bytes it has read.
 #[derive(Debug, Clone)]
@@ -27,11 +28,21 @@ impl FrameSource {
         FrameSource { width, height, hash: Sha256::new() }
     }
 
+    /// A frame of a recording, in a file of its own or not.
     /// An error when the file is missing, truncated, of another kind (8 bit, colour) or size.
+    pub fn frame(&mut self, frame: &FrameRef) -> Result<Frame> {
+        let Some(within) = &frame.within else { return self.read(&frame.path) };
+        let image = within.store.frame(within.index)?;
+        let words: Vec<u8> = image.raw.iter().flat_map(|w| w.to_le_bytes()).collect();
+        self.hash.update(&words);
+        sized(&frame.path, image, self.width, self.height)
+    }
+
+    /// One image file. Errors as those of [`FrameSource::frame`].
     pub fn read(&mut self, path: &Path) -> Result<Frame> {
         let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
         self.hash.update(&bytes);
-        decode_sized(path, &bytes, self.width, self.height)
+        sized(path, decode(path, &bytes)?, self.width, self.height)
     }
 
     /// SHA-256 over every byte read so far, in the order it was read.
@@ -41,13 +52,11 @@ impl FrameSource {
 }
 
 /// One depth frame of this size, px, without a hash.
-pub(crate) fn read_depth(path: &Path, width: usize, height: usize) -> Result<Frame> {
-    let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
-    decode_sized(path, &bytes, width, height)
+pub(crate) fn read_depth(frame: &FrameRef, width: usize, height: usize) -> Result<Frame> {
+    sized(&frame.path, read_any(frame)?, width, height)
 }
 
-fn decode_sized(path: &Path, bytes: &[u8], width: usize, height: usize) -> Result<Frame> {
-    let frame = decode(path, bytes)?;
+fn sized(path: &Path, frame: Frame, width: usize, height: usize) -> Result<Frame> {
     if (frame.width, frame.height) != (width, height) {
         return Err(Error::image(
             path,
@@ -85,14 +94,18 @@ impl ColourImage {
     }
 }
 
-/// Width and height of an image without decoding it all.
-pub(crate) fn size_of(path: &Path) -> Result<(usize, usize)> {
-    let frame = decode_file(path)?;
+/// Width and height of a frame.
+pub(crate) fn size_of(frame: &FrameRef) -> Result<(usize, usize)> {
+    let frame = read_any(frame)?;
     Ok((frame.width, frame.height))
 }
 
 /// A depth frame of any size.
-pub(super) fn decode_file(path: &Path) -> Result<Frame> {
+pub(super) fn read_any(frame: &FrameRef) -> Result<Frame> {
+    if let Some(within) = &frame.within {
+        return within.store.frame(within.index);
+    }
+    let path = &frame.path;
     let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
     decode(path, &bytes)
 }
@@ -106,22 +119,24 @@ fn decode(path: &Path, bytes: &[u8]) -> Result<Frame> {
 }
 
 fn decode_png16(path: &Path, bytes: &[u8]) -> Result<Frame> {
+    png16(bytes).map_err(|(what, remedy)| Error::image(path, what, remedy))
+}
+
+/// Or what is wrong and what to do.
+pub(super) fn png16(bytes: &[u8]) -> Result<Frame, (String, &'static str)> {
     let damaged = |e: png::DecodingError| {
-        Error::image(path, format!("not a whole PNG ({e})"), "the file is damaged; record it again")
+        (format!("not a whole PNG ({e})"), "the file is damaged; record it again")
     };
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().map_err(damaged)?;
     let info = reader.info();
     let (width, height) = (info.width as usize, info.height as usize);
     if !usable_size(width, height) {
         // The header is not to be believed with memory before the pixels are there.
-        return Err(Error::image(path, format!("{width} x {height} px PNG"), REMEDY_DEPTH));
+        return Err((format!("{width} x {height} px PNG"), REMEDY_DEPTH));
     }
     if info.bit_depth != BitDepth::Sixteen || info.color_type != ColorType::Grayscale {
-        return Err(Error::image(
-            path,
-            format!("{} bit {:?} PNG", info.bit_depth as u8, info.color_type),
-            REMEDY_DEPTH,
-        ));
+        let what = format!("{} bit {:?} PNG", info.bit_depth as u8, info.color_type);
+        return Err((what, REMEDY_DEPTH));
     }
     let size = reader.output_buffer_size().unwrap_or(0);
     let mut buffer = vec![0; size];

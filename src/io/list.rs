@@ -29,7 +29,7 @@ pub fn read_list(path: &Path) -> Result<FrameList> {
         })?;
         let target: PathBuf = folder.join(named);
         if target.is_file() {
-            list.frames.push(FrameRef { timestamp, path: target });
+            list.frames.push(FrameRef::file(timestamp, target));
         } else {
             list.remarks.push(format!(
                 "{file} line {line} names {named}, which is missing; that frame is left out"

@@ -1,6 +1,7 @@
 //! Files in, files out. One reader a file; every layout ends as the same [`Recording`].
 
 mod assumed;
+mod container;
 mod folder;
 mod images;
 mod layout;
@@ -29,14 +30,14 @@ pub(crate) use output_folder::is_description;
 pub use output_folder::{Leaves, OutputFolder, refuse_inside};
 pub use unfinished::{Interrupted, discard_unfinished};
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use raw_values::RawValues;
 use stills::Footage;
 
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
-use crate::view::{Recording, Sensor};
+use crate::view::{FrameRef, Recording, Sensor};
 
 /// How the files of a recording lie in its folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,18 +50,26 @@ pub enum Layout {
     Dump,
     /// PNGs; recording.json beside them is read too.
     Images,
+    /// One file with many frames: a bag or a stack of arrays.
+    Container,
 }
 
+const WHAT_TO_GIVE: &str = "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs, \
+                            a ROS bag (.bag, .mcap, .db3), or a NumPy stack (.npy, .npz)";
+
 impl Layout {
-    /// Of a folder.
-    /// An error when there is no such folder.
+    /// Of a folder or a file.
+    /// An error when there is neither, or when the file holds no frames.
     pub fn of(path: &Path) -> Result<Self> {
+        if container::is_one(path) {
+            return Ok(Layout::Container);
+        }
         if !path.is_dir() {
-            return Err(Error::recording(
-                path,
-                if path.exists() { "this is not a folder" } else { "there is no such folder" },
-                "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs",
-            ));
+            let what = match path.exists() {
+                true => "this is neither a folder nor a file that holds a film",
+                false => "there is no such folder or file",
+            };
+            return Err(Error::recording(path, what, WHAT_TO_GIVE));
         }
         // A described film or plain folder has its frames at the root, a recording in one folder a view.
         let sequence = path.join(DEPTH_LIST).is_file();
@@ -77,8 +86,8 @@ impl Layout {
     }
 }
 
-/// Open whatever stands at `path`: a recording, a TUM folder, a fakenect dump or a plain folder
-/// of 16-bit PNGs. Frames are not read, except to find still stretches in a film. An error when the
+/// Open whatever stands at `path`: a recording, a TUM folder, a fakenect dump, a plain folder
+/// of 16-bit PNGs, a ROS bag or a NumPy stack. Frames are not read, except to find still stretches in a film. An error when the
 /// folder is none of these, is empty, or describes itself wrongly; or when something is assumed of a
 /// recording that describes itself.
 pub fn open(path: &Path, assumed: &Assumed) -> Result<Recording> {
@@ -92,7 +101,11 @@ pub fn open_uncut(path: &Path, assumed: &Assumed) -> Result<Recording> {
 
 fn open_and_cut(path: &Path, assumed: &Assumed, cut: bool) -> Result<Recording> {
     let film = |(footage, sensor): (Footage, Sensor)| footage.recording(path, sensor, cut);
-    let mut recording = match Layout::of(path)? {
+    let layout = Layout::of(path)?;
+    if layout != Layout::Container {
+        assumed.refuse_topic(path)?;
+    }
+    let mut recording = match layout {
         Layout::Recording => {
             assumed.refuse_beside(&path.join(DESCRIPTION))?;
             layout::open(path)?
@@ -100,6 +113,7 @@ fn open_and_cut(path: &Path, assumed: &Assumed, cut: bool) -> Result<Recording> 
         Layout::Dump => film(folder::dump(path, assumed)?),
         Layout::Sequence => film(folder::sequence(path, assumed)?),
         Layout::Images => film(folder::images(path, assumed)?),
+        Layout::Container => film(container::open(path, assumed)?),
     };
     if recording.views.is_empty() {
         let excluded = recording.excluded.first().map(ToString::to_string);
@@ -110,8 +124,7 @@ fn open_and_cut(path: &Path, assumed: &Assumed, cut: bool) -> Result<Recording> 
             "a view is a folder with depth.txt and depth/*.png beside recording.json",
         ));
     }
-    let frames: Vec<&Path> =
-        recording.views.iter().flat_map(|v| &v.depth).map(|f| f.path.as_path()).collect();
+    let frames: Vec<&FrameRef> = recording.views.iter().flat_map(|v| &v.depth).collect();
     let doubt = refuse_impossible(path, recording.sensor.code, &frames)?;
     recording.remarks.extend(doubt);
     Ok(recording)
@@ -122,9 +135,9 @@ fn open_and_cut(path: &Path, assumed: &Assumed, cut: bool) -> Result<Recording> 
 pub(crate) fn refuse_impossible(
     root: &Path,
     code: DepthCode,
-    frames: &[&Path],
+    frames: &[&FrameRef],
 ) -> Result<Option<String>> {
-    let values = RawValues::of(frames.iter());
+    let values = RawValues::of(frames.iter().copied());
     match values.contradiction(code) {
         Some((what, remedy)) => Err(Error::recording(root, what, remedy)),
         None => Ok(values.doubt(code)),
@@ -135,7 +148,7 @@ pub(crate) fn refuse_impossible(
 /// recording.json, from what is usual in a dump, or from `assumed`.
 pub(crate) fn describe_folder(
     root: &Path,
-    images: &[PathBuf],
+    images: &[FrameRef],
     assumed: &Assumed,
 ) -> Result<(Sensor, Vec<String>)> {
     let description = root.join(DESCRIPTION);
@@ -147,7 +160,7 @@ pub(crate) fn describe_folder(
         Some(first) if root.join(INDEX).is_file() => assumed.dump_sensor(size_of(first)?)?,
         _ => assumed.images_sensor(root, images)?,
     };
-    let frames: Vec<&Path> = images.iter().map(PathBuf::as_path).collect();
+    let frames: Vec<&FrameRef> = images.iter().collect();
     let doubt = refuse_impossible(root, sensor.code, &frames)?;
     Ok((sensor, remark.into_iter().chain(doubt).collect()))
 }

@@ -1,12 +1,11 @@
 //! What the raw values of depth images say of their unit: whether they can be what they are taken for,
 //! and, in a folder that does not say, what they are.
 
-use std::path::Path;
-
-use super::images::decode_file;
+use super::images::read_any;
 use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
 use crate::stats::{median, quantile};
 use crate::units::{decimals, shortest};
+use crate::view::FrameRef;
 
 /// z = 1/(3.33095 - 0.0030711 raw): the fit OpenKinect users have shared since 2010.
 pub(super) const OPENKINECT: DepthCode = DepthCode::Disparity {
@@ -56,11 +55,11 @@ pub(super) struct RawValues {
 
 impl RawValues {
     /// Frames that cannot be read are left out: their reader says why.
-    pub fn of(paths: impl ExactSizeIterator<Item = impl AsRef<Path>>) -> Self {
-        let stride = paths.len().div_ceil(MAX_FRAMES).max(1);
+    pub fn of<'f>(frames: impl ExactSizeIterator<Item = &'f FrameRef>) -> Self {
+        let stride = frames.len().div_ceil(MAX_FRAMES).max(1);
         let mut values = RawValues { counts: vec![0; 1 + ALL_ONES], medians: Vec::new() };
-        for path in paths.step_by(stride) {
-            let Ok(frame) = decode_file(path.as_ref()) else { continue };
+        for frame in frames.step_by(stride) {
+            let Ok(frame) = read_any(frame) else { continue };
             frame.raw.iter().for_each(|&raw| values.counts[usize::from(raw)] += 1);
             let is_depth = |raw: &u16| !matches!(usize::from(*raw), 0 | NO_DISPARITY | ALL_ONES);
             let mut depths: Vec<f64> =
@@ -166,7 +165,7 @@ impl RawValues {
             readings += ", or a Kinect's raw disparities";
         }
         Err(format!(
-            "a plain folder does not say how raw values become metres, and these ({first} to {last}) leave it open: {readings}"
+            "these images do not say how raw values become metres, and these ({first} to {last}) leave it open: {readings}"
         ))
     }
 

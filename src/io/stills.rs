@@ -8,9 +8,10 @@ use crate::units::verb;
 use crate::view::{FrameRef, Recording, Sensor, View, ViewNotes};
 
 /// How the frames were taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) enum Film {
     /// 30 Hz throughout, also while the target is carried: short stretches are motion.
+    #[default]
     Video,
     /// Taken on purpose: a single frame is a view.
     Captures,
@@ -39,23 +40,29 @@ const MOVED_SAMPLES: f64 = 0.10;
 const MOVED_HOLES: f64 = 0.5;
 
 /// Frames that no view file parts, and what is known about them.
+#[derive(Default)]
 pub(super) struct Footage {
     pub frames: Vec<FrameRef>,
     pub film: Film,
     /// What was found odd while listing them.
     pub remarks: Vec<String>,
     pub described_by: Vec<PathBuf>,
+    /// Stamps, s, and degrees Celsius, in time order.
+    pub temperatures: Vec<(f64, f64)>,
 }
 
 impl Footage {
     /// `cut` into views, or all frames as one, in motion or not.
     pub fn recording(self, root: &Path, sensor: Sensor, cut: bool) -> Recording {
-        let (views, mut remarks) = if cut {
+        let (mut views, mut remarks) = if cut {
             cut_up(self.frames, self.film, &sensor)
         } else {
             let name = root.file_name().unwrap_or_default().to_string_lossy().into_owned();
             (vec![view(name, self.frames)], Vec::new())
         };
+        for view in &mut views {
+            view.notes.temperature_c = temperature(&view.depth, &self.temperatures);
+        }
         // Why frames are missing says more than what was assumed about the others.
         remarks.extend(self.remarks);
         Recording {
@@ -67,6 +74,18 @@ impl Footage {
             described_by: self.described_by,
         }
     }
+}
+
+/// The mean while a view was filmed, or the reading nearest to its begin.
+fn temperature(frames: &[FrameRef], readings: &[(f64, f64)]) -> Option<f64> {
+    let (first, last) = (frames.first()?.timestamp, frames.last()?.timestamp);
+    let during: Vec<f64> =
+        readings.iter().filter(|(t, _)| (first..=last).contains(t)).map(|(_, c)| *c).collect();
+    if !during.is_empty() {
+        return Some(during.iter().sum::<f64>() / during.len() as f64);
+    }
+    let apart = |(t, _): &(f64, f64)| (t - first).abs();
+    readings.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).map(|(_, celsius)| *celsius)
 }
 
 fn view(name: String, depth: Vec<FrameRef>) -> View {
@@ -110,7 +129,7 @@ fn stretches(frames: Vec<FrameRef>, sensor: &Sensor) -> (Vec<Vec<FrameRef>>, Vec
     let mut reference = Vec::new();
     let mut blank = Vec::new();
     for frame in frames {
-        match samples(&mut source, &frame.path, &table) {
+        match samples(&mut source, &frame, &table) {
             Ok(samples) => match stretches.last_mut() {
                 Some(stretch) if still(&reference, &samples) => stretch.push(frame),
                 _ => {
@@ -125,11 +144,15 @@ fn stretches(frames: Vec<FrameRef>, sensor: &Sensor) -> (Vec<Vec<FrameRef>>, Vec
 }
 
 /// Depths on the grid, or why the frame has none.
-fn samples(source: &mut FrameSource, path: &Path, table: &DepthTable) -> Result<Vec<f32>, String> {
-    let frame = source.read(path).map_err(|e| e.to_string())?;
-    let samples = sample(&frame, table);
+fn samples(
+    source: &mut FrameSource,
+    frame: &FrameRef,
+    table: &DepthTable,
+) -> Result<Vec<f32>, String> {
+    let image = source.frame(frame).map_err(|e| e.to_string())?;
+    let samples = sample(&image, table);
     if samples.iter().all(|z| z.is_nan()) {
-        return Err(format!("{}: no pixel carries a depth", path.display()));
+        return Err(format!("{}: no pixel carries a depth", frame.place()));
     }
     Ok(samples)
 }
@@ -137,9 +160,10 @@ fn samples(source: &mut FrameSource, path: &Path, table: &DepthTable) -> Result<
 /// A single capture keeps its file's name; a stretch of a film gets a number.
 fn name(index: usize, frames: &[FrameRef], film: Film) -> String {
     match (film, frames) {
-        (Film::Captures, [only]) => {
-            only.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
-        }
+        (Film::Captures, [only]) => match &only.within {
+            Some(within) => format!("{:06}", within.index),
+            None => only.path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        },
         _ => format!("still-{index:03}"),
     }
 }

@@ -91,13 +91,13 @@ impl<'r> FrameReader<'r> {
 
     fn next_numbered(&mut self) -> Option<(usize, Frame)> {
         while let Some((number, frame_ref)) = self.frames.next() {
-            match self.source.read(&frame_ref.path) {
+            match self.source.frame(frame_ref) {
                 Ok(f) if f.raw.iter().any(|&raw| self.table.metres(raw).is_finite()) => {
                     return Some((number, f));
                 }
                 Ok(_) => self.notes.push(format!(
                     "frame left out: {}: no pixel carries a depth",
-                    frame_ref.path.display()
+                    frame_ref.place()
                 )),
                 Err(e) => self.notes.push(format!("frame left out: {e}")),
             }

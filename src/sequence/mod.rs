@@ -15,7 +15,7 @@ use crate::io::{Assumed, ColourImage, read_depth};
 use crate::stats::median;
 use crate::trajectory::Pose;
 use crate::units::{counted, verb};
-use crate::view::Sensor;
+use crate::view::{FrameRef, Sensor};
 
 /// Open a folder in one of the two layouts.
 /// An error when it is neither, a list in it cannot be read, or it holds no depth image.
@@ -38,7 +38,7 @@ pub fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
 pub struct Moment {
     /// Of the depth image, s.
     pub stamp: f64,
-    pub depth: PathBuf,
+    pub depth: FrameRef,
     /// The colour image of the same moment.
     pub colour: Option<PathBuf>,
 }

@@ -9,6 +9,7 @@ use crate::error::{Error, Result, read_text};
 use crate::frame::DepthCode;
 use crate::io::{Assumed, entries, refuse_impossible, size_of};
 use crate::trajectory::Pose;
+use crate::view::FrameRef;
 
 const DEPTH: &str = ".depth.png";
 /// Nominal; the frames carry no stamps.
@@ -46,7 +47,7 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
                 None => remarks.push(format!("{} is no pose; left out", pose.display())),
             }
         }
-        moments.push(Moment { stamp, depth: path, colour });
+        moments.push(Moment { stamp, depth: FrameRef::file(stamp, path), colour });
     }
     moments.sort_by(|a, b| a.stamp.total_cmp(&b.stamp));
     truth.sort_by(|a, b| a.stamp.total_cmp(&b.stamp));
@@ -58,7 +59,7 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
         Some(_) => {}
     }
     let sensor = assumed.sensor("7-Scenes Kinect", size, INTRINSICS, CODE)?;
-    let frames: Vec<&Path> = moments.iter().map(|m| m.depth.as_path()).collect();
+    let frames: Vec<&FrameRef> = moments.iter().map(|m| &m.depth).collect();
     remarks.extend(refuse_impossible(root, sensor.code, &frames)?);
     Ok(Sequence { root: root.to_path_buf(), sensor, moments, truth, remarks })
 }

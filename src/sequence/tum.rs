@@ -18,7 +18,7 @@ const ASSOCIATIONS: [&str; 4] =
     ["associations.txt", "association.txt", "associate.txt", "associated.txt"];
 
 pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
-    if Layout::of(root)? != Layout::Sequence {
+    if !matches!(Layout::of(root)?, Layout::Sequence | Layout::Container) {
         return Err(no_sequence(root));
     }
     let recording = open_uncut(root, assumed)?;
@@ -69,7 +69,7 @@ fn no_sequence(root: &Path) -> Error {
         None => Error::recording(
             root,
             "no sequence to map: neither depth.txt nor frame-000000.depth.png is in this folder",
-            "give a folder in the layout of the TUM RGB-D benchmark or of 7-Scenes",
+            "give a folder in the layout of the TUM RGB-D benchmark or of 7-Scenes, a ROS bag, or a NumPy stack",
         ),
     }
 }
@@ -85,9 +85,9 @@ fn with_colour(
         Some(file) => listed(root, &file, &depth)?,
         None => nearest(root, &depth, remarks)?,
     };
-    let moment = |(f, colour): (FrameRef, Option<PathBuf>)| Moment {
-        stamp: f.timestamp,
-        depth: f.path,
+    let moment = |(depth, colour): (FrameRef, Option<PathBuf>)| Moment {
+        stamp: depth.timestamp,
+        depth,
         colour,
     };
     Ok(depth.into_iter().zip(partner).map(moment).collect())

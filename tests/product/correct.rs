@@ -692,7 +692,12 @@ fn a_plain_folder_goes_on_as_a_described_one() {
     assert_eq!([seen.fx, seen.fy, seen.cx, seen.cy], camera);
     assert!(matches!(again.sensor.code, DepthCode::Metric { .. }));
     let names: Vec<String> = again.views.iter().map(|v| v.name.clone()).collect();
-    let assumed = Assumed { intrinsics: Some(camera), code: Some(RAW), baseline_m: None };
+    let assumed = Assumed {
+        intrinsics: Some(camera),
+        code: Some(RAW),
+        baseline_m: None,
+        ..Assumed::default()
+    };
     let before = kinoise::io::open(&plain, &assumed).expect("opened");
     assert_eq!(names, before.views.iter().map(|v| v.name.clone()).collect::<Vec<_>>());
     let refused = kinoise::io::open(&out, &assumed).expect_err("it describes itself");

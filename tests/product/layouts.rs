@@ -45,7 +45,7 @@ fn sensor(code: DepthCode) -> Sensor {
 
 fn assumed(code: Option<DepthCode>) -> Assumed {
     let c = sensor(TUM).camera;
-    Assumed { intrinsics: Some([c.fx, c.fy, c.cx, c.cy]), code, baseline_m: None }
+    Assumed { intrinsics: Some([c.fx, c.fy, c.cx, c.cy]), code, ..Assumed::default() }
 }
 
 /// Frame `frame` of the board at `plane`; the same noise whatever the code.
@@ -451,7 +451,7 @@ fn a_second_real_unit_as_a_plain_folder() {
             slope: -0.003_071_1,
             invalid: KINECT_NO_MEASUREMENT,
         }),
-        baseline_m: None,
+        ..Assumed::default()
     };
     let recording = open(&root, &assumed).expect("opens");
     let m = measured(&recording);

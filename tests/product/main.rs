@@ -12,6 +12,7 @@ mod bad_input;
 mod capture;
 mod capture_kinect;
 mod command_line;
+mod containers;
 mod correct;
 mod determinism;
 mod distances;

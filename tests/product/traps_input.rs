@@ -162,7 +162,7 @@ fn the_steps_of_real_kinects_tell_their_unit() {
     let assumed = |units: Option<f64>| Assumed {
         intrinsics: Some([585.0, 585.0, 319.5, 239.5]),
         code: units.map(|units_per_metre| DepthCode::Metric { units_per_metre, invalid: 0 }),
-        baseline_m: None,
+        ..Assumed::default()
     };
     for (name, part, unit, other) in [
         ("sevenscenes_a", ".depth.png", 1000.0, 5000.0),

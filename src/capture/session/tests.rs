@@ -18,7 +18,7 @@ fn take(session: &mut Session, view: &str, word: u16) {
 fn first_word(root: &Path, view: usize) -> u16 {
     let recording = crate::io::open(root, &crate::io::Assumed::default()).unwrap();
     let path = &recording.views[view].depth[0].path;
-    crate::io::read_depth(path, 160, 120).unwrap().raw[0]
+    crate::io::read_depth(&crate::view::FrameRef::file(0.0, path.into()), 160, 120).unwrap().raw[0]
 }
 
 #[test]

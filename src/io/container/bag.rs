@@ -1,0 +1,50 @@
+//! What the three formats of ROS have in common: topics, and messages that can be fetched by number.
+
+use std::path::Path;
+
+use super::messages::Dialect;
+use crate::error::Result;
+
+/// Messages of these kinds are read; of others only the topic is known.
+pub const KINDS: [&str; 6] =
+    ["Image", "CompressedImage", "CameraInfo", "Temperature", "Float32", "KeyValue"];
+
+/// A bag that was opened and whose messages can be fetched.
+pub trait Bag: std::fmt::Debug + Send + Sync {
+    fn path(&self) -> &Path;
+    fn topics(&self) -> &[Topic];
+    /// The first `limit` bytes of a message and how long it is.
+    /// An error when the file does not hold what its index says.
+    fn message(&self, topic: usize, number: usize, limit: u64) -> Result<Message>;
+}
+
+#[derive(Debug, Clone)]
+pub struct Topic {
+    pub name: String,
+    /// As in "sensor_msgs/Image", for both generations of ROS.
+    pub kind: String,
+    pub dialect: Dialect,
+    /// When each message was written, ns; empty for kinds that are not read.
+    pub logged_ns: Vec<i64>,
+}
+
+pub struct Message {
+    pub bytes: Vec<u8>,
+    pub length: u64,
+}
+
+impl Topic {
+    /// Without its package: "Image".
+    pub fn short_kind(&self) -> &str {
+        self.kind.rsplit('/').next().unwrap_or_default()
+    }
+
+    pub fn is_read(&self) -> bool {
+        KINDS.contains(&self.short_kind())
+    }
+}
+
+/// "sensor_msgs/msg/Image" as "sensor_msgs/Image".
+pub fn kind_of(name: &str) -> String {
+    name.replacen("/msg/", "/", 1)
+}

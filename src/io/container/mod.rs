@@ -1,0 +1,140 @@
+//! Files that hold a film: ROS bags (.bag, .mcap, .db3) and NumPy stacks (.npy, .npz).
+//!
+//! A film in a file goes the way of a folder of images. [`open`] gives [`Footage`] and a [`Sensor`], as
+//! the readers of `folder.rs` do, and everything behind it (cutting into still views, measuring, mapping,
+//! correcting) takes its frames one at a time. What differs is where the pixels are: a
+//! [`FrameRef`](crate::view::FrameRef) names the file and, in `within`, a
+//! [`FrameStore`](crate::view::FrameStore) and a number.
+//!
+//! ```text
+//! ros1.rs  mcap.rs  db3.rs          the formats: where each message starts, and its bytes    (bag.rs: Bag)
+//!     \      |      /
+//!      blocks.rs                    lengths checked against the file; chunks decompressed, a few kept
+//! messages.rs on wire.rs            a message's fields, in ROS 1's and in CDR's writing
+//! pixels.rs                         an image's depths: 16UC1, 32FC1, compressedDepth
+//! topics.rs camera.rs (lens.rs)      which topic holds the depth, and what is said of its camera;
+//! realsense.rs                      in librealsense's own recordings, of its device
+//! film.rs                           a topic as a FrameStore
+//! stack.rs on npy.rs, npz.rs        arrays in place of messages
+//! scale.rs                          16-bit words for depths that are floats
+//! ```
+//!
+//! Memory holds an index (a place and a time for each message of the kinds that are read), a few
+//! decompressed chunks and the frames in use, whatever the length of the file. No length that a file
+//! claims is believed before the file has been seen to be that long. A file that is cut or has no index is
+//! refused with the tool that mends it: a part of a film is not what was recorded.
+
+mod bag;
+mod blocks;
+mod camera;
+#[cfg(feature = "db3")]
+mod db3;
+mod film;
+mod lens;
+mod mcap;
+mod messages;
+mod npy;
+mod npz;
+mod pixels;
+mod realsense;
+mod ros1;
+mod scale;
+mod stack;
+mod topics;
+mod wire;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use super::assumed::Assumed;
+use super::output::entries;
+use super::stills::Footage;
+use crate::error::{Error, Result};
+use crate::view::Sensor;
+
+/// By the first bytes: names lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Ros1,
+    Mcap,
+    Db3,
+    Npy,
+    Npz,
+}
+
+/// What a file of each kind begins with.
+const BEGINNINGS: [(&[u8], Kind); 5] = [
+    (b"#ROSBAG V", Kind::Ros1),
+    (b"\x89MCAP0\r\n", Kind::Mcap),
+    (b"SQLite format 3\0", Kind::Db3),
+    (b"\x93NUMPY", Kind::Npy),
+    (b"PK\x03\x04", Kind::Npz),
+];
+/// Names that promise such a file, so that a damaged one is not taken for something else.
+const EXTENSIONS: [(&str, Kind); 5] = [
+    ("bag", Kind::Ros1),
+    ("mcap", Kind::Mcap),
+    ("db3", Kind::Db3),
+    ("npy", Kind::Npy),
+    ("npz", Kind::Npz),
+];
+
+impl Kind {
+    fn of(path: &Path) -> Option<Self> {
+        let mut first = [0; 16];
+        let mut file = File::open(path).ok().filter(|_| path.is_file())?;
+        let n = file.read(&mut first).ok()?;
+        let begins = BEGINNINGS.iter().find(|(magic, _)| first[..n].starts_with(magic));
+        let named = |(name, _): &&(&str, Kind)| {
+            path.extension().is_some_and(|e| e.eq_ignore_ascii_case(name))
+        };
+        begins.map(|(_, kind)| *kind).or_else(|| EXTENSIONS.iter().find(named).map(|(_, k)| *k))
+    }
+}
+
+/// A folder of rosbag2 stands for the file in it.
+const METADATA: &str = "metadata.yaml";
+
+pub(super) fn is_one(path: &Path) -> bool {
+    Kind::of(path).is_some() || path.join(METADATA).is_file()
+}
+
+/// The only bag in a folder of rosbag2.
+fn bag_in(folder: &Path) -> Result<PathBuf> {
+    let mut bags = entries(folder)?;
+    bags.retain(|path| matches!(Kind::of(path), Some(Kind::Mcap | Kind::Db3)));
+    match &bags[..] {
+        [only] => Ok(only.clone()),
+        _ => {
+            let what = format!("{} bags are in this folder of rosbag2", bags.len());
+            let remedy = "give the file itself; parts of a recording: ros2 bag convert makes one";
+            Err(Error::recording(folder, what, remedy))
+        }
+    }
+}
+
+/// The film in a file and the sensor that took it. Of a film of floats every depth is looked at, because
+/// they decide how it is held. An error when the file is damaged or does not say what is needed.
+pub(super) fn open(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
+    match Kind::of(path) {
+        None if path.is_dir() => open(&bag_in(path)?, assumed),
+        Some(Kind::Mcap) => film::open(mcap::Mcap::open(path)?, assumed),
+        #[cfg(feature = "db3")]
+        Some(Kind::Db3) => film::open(db3::Db3::open(path)?, assumed),
+        #[cfg(not(feature = "db3"))]
+        Some(Kind::Db3) => Err(Error::recording(
+            path,
+            "this kinoise was built without SQLite",
+            "build it with the feature db3, or convert the bag: ros2 bag convert to mcap",
+        )),
+        Some(Kind::Ros1) => film::open(ros1::Ros1Bag::open(path)?, assumed),
+        Some(Kind::Npy) => stack::open_npy(path, assumed),
+        Some(Kind::Npz) => stack::open_npz(path, assumed),
+        None => Err(Error::recording(
+            path,
+            "no bag and no stack",
+            "give a .bag, .mcap, .db3, .npy or .npz file",
+        )),
+    }
+}

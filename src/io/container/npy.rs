@@ -1,0 +1,202 @@
+//! The header of a .npy file (numpy.lib.format), and the numbers behind it.
+//!
+//! It is a Python dictionary of three known keys; the crates that read it bring a parser of Python's
+//! literals with them.
+
+use super::pixels::{Pixels, each};
+
+/// What one array is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Header {
+    pub number: Number,
+    pub shape: Vec<usize>,
+    /// Bytes before the numbers.
+    pub length: u64,
+}
+
+/// Type and byte order of a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Number {
+    kind: Kind,
+    big_endian: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    U8,
+    U16,
+    I16,
+    I32,
+    U32,
+    I64,
+    F32,
+    F64,
+}
+
+/// Longer than any header of numbers.
+pub const MAX_HEADER: u64 = 16 << 10;
+const MAGIC: &[u8] = b"\x93NUMPY";
+
+impl Header {
+    /// From the first bytes of a file or archive member, at most [`MAX_HEADER`].
+    /// What is wrong, otherwise.
+    pub fn read(first: &[u8]) -> Result<Self, String> {
+        let cut = || "the header is cut".to_string();
+        let rest = first.strip_prefix(MAGIC).ok_or("it does not begin as a .npy file does")?;
+        let ([version, _], rest) = rest.split_first_chunk().ok_or_else(cut)?;
+        let (length, text) = match version {
+            1 => {
+                let (n, text) = rest.split_first_chunk().ok_or_else(cut)?;
+                (usize::from(u16::from_le_bytes(*n)), text)
+            }
+            2 | 3 => {
+                let (n, text) = rest.split_first_chunk().ok_or_else(cut)?;
+                (u32::from_le_bytes(*n) as usize, text)
+            }
+            n => return Err(format!("version {n} of the format is not known")),
+        };
+        let header = text.get(..length).ok_or_else(cut)?;
+        let header = String::from_utf8_lossy(header);
+        let value = |key: &str| {
+            let (_, after) = header.split_once(&format!("'{key}':"))?;
+            Some(after.trim_start())
+        };
+        let missing = |key: &str| format!("the header has no {key}");
+        let order = value("fortran_order").ok_or_else(|| missing("fortran_order"))?;
+        if !order.starts_with("False") {
+            return Err("it is in Fortran's order; save np.ascontiguousarray(a)".into());
+        }
+        let descr = value("descr").ok_or_else(|| missing("descr"))?;
+        let descr = descr.strip_prefix('\'').and_then(|d| d.split_once('\'')).map(|(d, _)| d);
+        let number = descr.and_then(Number::of).ok_or_else(|| {
+            format!("its numbers are {}, not integers or floats", descr.unwrap_or("records"))
+        })?;
+        let shape = value("shape").ok_or_else(|| missing("shape"))?;
+        let shape = shape.strip_prefix('(').and_then(|s| s.split_once(')')).map(|(s, _)| s);
+        let sizes = shape.unwrap_or("?").split(',').map(str::trim).filter(|s| !s.is_empty());
+        let sizes: Option<Vec<usize>> = sizes.map(|s| s.parse().ok()).collect();
+        let shape = sizes.ok_or("the shape is not understood")?;
+        Ok(Header { number, shape, length: (first.len() - text.len() + length) as u64 })
+    }
+
+    /// Of the numbers; nothing when no file can be that long.
+    pub fn bytes(&self) -> Option<u64> {
+        let times = |n: u64, &size: &usize| n.checked_mul(size as u64);
+        self.shape.iter().try_fold(self.number.size() as u64, times)
+    }
+}
+
+impl Number {
+    /// Of "<u2" and the like.
+    fn of(descr: &str) -> Option<Self> {
+        let (order, kind) = descr.split_at_checked(1)?;
+        let kind = match kind {
+            "u1" => Kind::U8,
+            "u2" => Kind::U16,
+            "i2" => Kind::I16,
+            "i4" => Kind::I32,
+            "u4" => Kind::U32,
+            "i8" => Kind::I64,
+            "f4" => Kind::F32,
+            "f8" => Kind::F64,
+            _ => return None,
+        };
+        let big_endian = match order {
+            "<" | "|" | "=" => false,
+            ">" => true,
+            _ => return None,
+        };
+        Some(Number { kind, big_endian })
+    }
+
+    pub fn size(self) -> usize {
+        match self.kind {
+            Kind::U8 => 1,
+            Kind::U16 | Kind::I16 => 2,
+            Kind::I32 | Kind::U32 | Kind::F32 => 4,
+            Kind::I64 | Kind::F64 => 8,
+        }
+    }
+
+    pub fn is_float(self) -> bool {
+        matches!(self.kind, Kind::F32 | Kind::F64)
+    }
+
+    pub fn values(self, bytes: &[u8]) -> Vec<f64> {
+        macro_rules! values {
+            ($kind:ty, $as:expr) => {{
+                let of =
+                    if self.big_endian { <$kind>::from_be_bytes } else { <$kind>::from_le_bytes };
+                each([bytes].into_iter(), of).into_iter().map($as).collect()
+            }};
+        }
+        match self.kind {
+            Kind::U8 => values!(u8, f64::from),
+            Kind::U16 => values!(u16, f64::from),
+            Kind::I16 => values!(i16, f64::from),
+            Kind::I32 => values!(i32, f64::from),
+            Kind::U32 => values!(u32, f64::from),
+            Kind::I64 => values!(i64, |v| v as f64),
+            Kind::F32 => values!(f32, f64::from),
+            Kind::F64 => values!(f64, f64::from),
+        }
+    }
+
+    /// One image: words as they are, floats as metres, of which a value has `per_metre`.
+    /// What is wrong, when integers are no 16-bit words.
+    pub fn pixels(self, bytes: &[u8], per_metre: f64) -> Result<Pixels, String> {
+        if (self.kind, self.big_endian) == (Kind::U16, false) {
+            return Ok(Pixels::Words(each([bytes].into_iter(), u16::from_le_bytes)));
+        }
+        let values = self.values(bytes);
+        if self.is_float() {
+            return Ok(Pixels::Metres(
+                values.into_iter().map(|v| (v / per_metre) as f32).collect(),
+            ));
+        }
+        let word = |v: f64| match (0.0..=65_535.0).contains(&v) {
+            true => Ok(v as u16),
+            false => Err(format!("the value {v} is not of 16 bits")),
+        };
+        values.into_iter().map(word).collect::<Result<_, _>>().map(Pixels::Words)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(dictionary: &str) -> Vec<u8> {
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((dictionary.len() as u16).to_le_bytes());
+        bytes.extend(dictionary.as_bytes());
+        bytes
+    }
+
+    #[test]
+    fn a_header_as_numpy_writes_it() {
+        let bytes = file("{'descr': '>u2', 'fortran_order': False, 'shape': (3, 48, 64), }   \n");
+        let header = Header::read(&bytes).unwrap();
+        assert_eq!(header.shape, [3, 48, 64]);
+        assert_eq!(header.length, bytes.len() as u64);
+        assert_eq!(header.bytes(), Some(2 * 3 * 48 * 64));
+        assert_eq!(header.number.pixels(&[1, 2], 1.0), Ok(Pixels::Words(vec![0x0102])));
+        for cut in 0..bytes.len() {
+            assert!(Header::read(&bytes[..cut]).is_err(), "cut at {cut}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_array_of_numbers_is_refused() {
+        let of = |text: &str| Header::read(&file(text)).unwrap_err();
+        let fortran = of("{'descr': '<u2', 'fortran_order': True, 'shape': (2,), }");
+        assert!(fortran.contains("ascontiguousarray"), "{fortran}");
+        let objects = of("{'descr': '|O', 'fortran_order': False, 'shape': (2,), }");
+        assert!(objects.contains("|O"), "{objects}");
+        let records = of("{'descr': [('a', '<u2')], 'fortran_order': False, 'shape': (2,), }");
+        assert!(records.contains("records"), "{records}");
+        let huge =
+            file("{'descr': '<f8', 'fortran_order': False, 'shape': (4294967296, 4294967296), }");
+        assert_eq!(Header::read(&huge).unwrap().bytes(), None);
+    }
+}
