@@ -200,6 +200,8 @@ pub mod diagnose;
 
 pub mod correct;
 
+pub mod export;
+
 pub mod simulate;
 
 pub mod map;

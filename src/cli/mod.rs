@@ -6,6 +6,7 @@ mod capture;
 mod capture_interface;
 mod common;
 mod compare;
+mod completions;
 mod console;
 mod correct;
 mod demo;
@@ -13,6 +14,8 @@ mod demo_seal;
 mod diagnose;
 mod effects;
 mod evaluate;
+mod export;
+mod man;
 mod map;
 mod origin;
 mod output;
@@ -72,12 +75,21 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// Compare units of a kind: what is common, what is one unit's own, what has changed since
     Units(units::Arguments),
+    /// Write a model as other software reads it: a program, tables, parameters of a mapper
+    #[command(after_help = export::EXAMPLES)]
+    Export(export::Arguments),
     /// Show the catalogue of physical effects: what each does, how it shows, what it resembles
     #[command(after_help = effects::EXAMPLES)]
     Effects(effects::Arguments),
     /// Calibrate bundled data, then diagnose a cause drawn by lot and sealed, then map
     #[command(after_help = demo::EXAMPLES)]
     Demo(demo::Arguments),
+    /// Print the completions of a shell
+    #[command(after_help = completions::EXAMPLES)]
+    Completions(completions::Arguments),
+    /// Write the manual's pages
+    #[command(after_help = man::EXAMPLES)]
+    Man(man::Arguments),
 }
 
 /// Over the options of folders that do not describe themselves.
@@ -129,9 +141,14 @@ fn one_line(e: &clap::Error) -> String {
     format!("{message}{}; see {help}", tips.collect::<String>())
 }
 
+/// All commands with their options.
+fn command() -> clap::Command {
+    <Arguments as clap::CommandFactory>::command()
+}
+
 /// The command that was meant, for the help; options may stand before it.
 fn subcommand() -> Option<String> {
-    let command = <Arguments as clap::CommandFactory>::command();
+    let command = command();
     let known = |word: &String| command.find_subcommand(word).is_some();
     std::env::args().skip(1).find(known)
 }
@@ -156,6 +173,9 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         Command::Units(a) => units::run(a, global).map(|()| 0),
         Command::Effects(a) => effects::run(a, global).map(|()| 0),
         Command::Demo(a) => demo::run(a, global).map(|()| 0),
+        Command::Export(a) => export::run(a, global).map(|()| 0),
+        Command::Completions(a) => completions::run(a).map(|()| 0),
+        Command::Man(a) => man::run(a, global).map(|()| 0),
     }
 }
 

@@ -12,7 +12,7 @@ use super::provenance::{FitSummary, Provenance};
 use super::{Direction, Domain, SigmaModel};
 use crate::error::{Error, Result, read_text};
 use crate::io::{pretty_json, write_atomic};
-use crate::view::RecordingFile;
+use crate::view::{RecordingFile, Sensor};
 
 /// The format this version writes and reads.
 pub const MODEL_FORMAT: &str = "kinoise-model/1";
@@ -80,6 +80,15 @@ impl NoiseModel {
             fit: FitSummary::default(),
             provenance: Provenance::default(),
         }
+    }
+
+    /// The sensor that it was made of; nothing for a model of a bare table.
+    /// An error when its description contradicts itself.
+    pub fn described_sensor(&self) -> Result<Option<Sensor>> {
+        self.sensor.clone().map(RecordingFile::sensor).transpose().map_err(|what| Error::Argument {
+            what: format!("the model's sensor: {what}"),
+            remedy: "give the model that was made of this very sensor",
+        })
     }
 
     /// The text of `model.json`; an error when a number of the model is not finite.

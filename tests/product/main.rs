@@ -15,6 +15,8 @@ mod command_line;
 mod correct;
 mod determinism;
 mod effects;
+mod export_files;
+mod export_programs;
 mod extended_map;
 mod fit;
 mod layouts;
