@@ -192,6 +192,8 @@ pub mod model;
 
 pub mod calibrate;
 
+pub mod metrics;
+
 pub mod effects;
 
 pub mod fleet;

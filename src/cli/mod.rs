@@ -17,6 +17,7 @@ mod evaluate;
 mod export;
 mod man;
 mod map;
+mod metrics;
 mod origin;
 mod output;
 mod simulate;
@@ -55,6 +56,9 @@ enum Command {
     /// Fit sigma(z, theta) to a table z_m,theta_rad,sigma_m[,n]
     #[command(hide = true, after_help = calibrate::FIT_EXAMPLES)]
     Fit(calibrate::FitArguments),
+    /// Give the vendors' figures of a recording: Z-accuracy, spatial and sub-pixel RMS, fill rate
+    #[command(after_help = metrics::EXAMPLES)]
+    Metrics(metrics::Arguments),
     /// Find what a model or a simulation leaves out of a recording, name it and model it
     #[command(after_help = diagnose::EXAMPLES)]
     Diagnose(diagnose::Arguments),
@@ -164,6 +168,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         Command::Capture(a) => capture::run(a, global),
         Command::Calibrate(a) => calibrate::run(a, global).map(|()| 0),
         Command::Fit(a) => calibrate::fit(a, global).map(|()| 0),
+        Command::Metrics(a) => metrics::run(a, global).map(|()| 0),
         Command::Diagnose(a) => diagnose::run(a, global),
         Command::Simulate(a) => simulate::run(a, global).map(|()| 0),
         Command::Correct(a) => correct::run(a, global).map(|()| 0),

@@ -51,6 +51,9 @@ pub const EVALUATION: Leaves = Leaves::Results {
     marks: &["evaluation.json"],
 };
 
+pub const METRICS: Leaves =
+    Leaves::Results { names: &["metrics.json", "report.html"], marks: &["metrics.json"] };
+
 /// A calibration with the rest of the road in folders beside it.
 pub const DEMO: Leaves = Leaves::Results {
     names: &[

@@ -22,6 +22,7 @@ mod fit;
 mod layouts;
 mod map;
 mod measure;
+mod metrics;
 mod model_file;
 mod other_views;
 mod outliers;
