@@ -20,6 +20,7 @@ mod map;
 mod metrics;
 mod origin;
 mod output;
+mod sigma;
 mod simulate;
 mod simulate_room;
 mod simulate_scene;
@@ -68,6 +69,9 @@ enum Command {
     /// Write a recording again, with the model's biases taken out of the depth
     #[command(after_help = correct::EXAMPLES)]
     Correct(correct::Arguments),
+    /// Write a sigma image beside every depth image of a sequence
+    #[command(after_help = sigma::EXAMPLES)]
+    Sigma(sigma::Arguments),
     /// Build a map from a sequence: trajectory, coloured points, statistics
     #[command(after_help = map::EXAMPLES)]
     Map(map::Arguments),
@@ -172,6 +176,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         Command::Diagnose(a) => diagnose::run(a, global),
         Command::Simulate(a) => simulate::run(a, global).map(|()| 0),
         Command::Correct(a) => correct::run(a, global).map(|()| 0),
+        Command::Sigma(a) => sigma::run(a, global).map(|()| 0),
         Command::Map(a) => map::run(a, global).map(|()| 0),
         Command::Compare(a) => compare::run(a, global).map(|()| 0),
         Command::Evaluate(a) => evaluate::run(a, global).map(|()| 0),
