@@ -200,6 +200,8 @@ pub mod fleet;
 
 pub mod diagnose;
 
+pub mod schema;
+
 pub mod correct;
 
 pub mod export;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use crate::camera::Camera;
 use crate::frame::{DepthCode, RawDisparity};
 use crate::units::shortest;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The unit that was recorded: everything `recording.json` says about it.
@@ -147,7 +148,7 @@ impl std::fmt::Display for Excluded {
 }
 
 /// `recording.json` (`crate::docs::layouts`).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RecordingFile {
     pub format: String,
     pub sensor: String,

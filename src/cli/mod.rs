@@ -20,6 +20,7 @@ mod map;
 mod metrics;
 mod origin;
 mod output;
+mod schema;
 mod sigma;
 mod simulate;
 mod simulate_room;
@@ -92,6 +93,9 @@ enum Command {
     /// Calibrate bundled data, then diagnose a cause drawn by lot and sealed, then map
     #[command(after_help = demo::EXAMPLES)]
     Demo(demo::Arguments),
+    /// Print the JSON Schema of a file that kinoise writes
+    #[command(after_help = schema::EXAMPLES)]
+    Schema(schema::Arguments),
     /// Print the completions of a shell
     #[command(after_help = completions::EXAMPLES)]
     Completions(completions::Arguments),
@@ -184,6 +188,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         Command::Effects(a) => effects::run(a, global).map(|()| 0),
         Command::Demo(a) => demo::run(a, global).map(|()| 0),
         Command::Export(a) => export::run(a, global).map(|()| 0),
+        Command::Schema(a) => schema::run(a).map(|()| 0),
         Command::Completions(a) => completions::run(a).map(|()| 0),
         Command::Man(a) => man::run(a, global).map(|()| 0),
     }

@@ -1,8 +1,10 @@
 //! `model.json` (`crate::docs::layouts`): written and read back bit for bit, refused when foreign.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::DMatrix;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -31,7 +33,7 @@ pub struct NoiseModel {
     pub provenance: Provenance,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 struct ModelFile {
     format: String,
     sensor: Option<RecordingFile>,
@@ -41,7 +43,7 @@ struct ModelFile {
     provenance: Provenance,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 struct FitFile {
     /// What sigma is: along the optical axis ("axial") or across the plane ("perpendicular").
     residual: Direction,
@@ -51,16 +53,17 @@ struct FitFile {
     summary: FitSummary,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 struct SigmaFile {
     form: String,
     formula: String,
+    #[schemars(with = "BTreeMap<String, ParameterFile>")]
     parameters: Map<String, Value>,
     covariance: Vec<Vec<f64>>,
     valid: Domain,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 struct ParameterFile {
     value: f64,
     std_error: Option<f64>,
@@ -167,6 +170,11 @@ impl NoiseModel {
             provenance: file.provenance,
         })
     }
+}
+
+/// The JSON Schema of `model.json`.
+pub(crate) fn model_schema() -> schemars::Schema {
+    schemars::schema_for!(ModelFile)
 }
 
 fn check_format(value: &Value) -> Result<(), (String, &'static str)> {

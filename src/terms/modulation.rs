@@ -1,5 +1,6 @@
 //! What a shape is multiplied by.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::needs::Needs;
@@ -9,7 +10,7 @@ use super::place::PixelContext;
 pub const DISPARITY_UNIT_PX: f64 = 40.0;
 
 /// A factor that changes from place to place.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Modulation {
     One,

@@ -28,6 +28,7 @@ mod other_views;
 mod outliers;
 mod pages;
 mod room;
+mod schema;
 mod sigma_images;
 mod speckle;
 mod target;
