@@ -60,7 +60,7 @@ fn report(found: &Metrics) {
     ));
     found.views.iter().for_each(|view| result(row(view, width)));
     if found.by_distance.len() > 1 {
-        result("");
+        result("\nviews that face the sensor within ten degrees (all, where none does)");
         for group in &found.by_distance {
             let [low, high] = group.range_m;
             result(format!(

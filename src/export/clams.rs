@@ -36,16 +36,16 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
     }
     bytes.extend(BIN_M.to_le_bytes());
     bytes.extend([across, down].iter().flat_map(|n| (*n as i32).to_le_bytes()));
-    for block in 0..across * down {
+    let of_block = |block: usize| bins.iter().map(move |bin| bin[block] as f32);
+    for factors in (0..across * down).map(of_block) {
         bytes.extend(FARTHEST_M.to_le_bytes());
         bytes.extend((BINS as i32).to_le_bytes());
         bytes.extend(BIN_M.to_le_bytes());
-        let factors = || (0..BINS).map(|bin| bins[bin][block] as f32);
         // Sums over examples of truth squared and of truth times measurement: their ratio counts.
         vector(&mut bytes, (0..BINS).map(|_| EXAMPLES));
-        vector(&mut bytes, factors().map(|f| EXAMPLES * f));
+        vector(&mut bytes, factors.clone().map(|f| EXAMPLES * f));
         vector(&mut bytes, (0..BINS).map(|_| EXAMPLES));
-        vector(&mut bytes, factors());
+        vector(&mut bytes, factors);
     }
     let mut notes = notes_of_bias(&correction);
     notes.push("the file holds the bias alone: no noise, no intrinsics".into());

@@ -7,6 +7,7 @@
 
 use super::Exported;
 use super::expressions::number;
+use super::program::once;
 use super::tables::{even, known};
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
@@ -35,7 +36,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
         even([1.0 / far, 1.0 / near], NODES).iter().map(|q| px(1.0 / q)).collect();
     let mean_square = sizes.iter().map(|s| s * s).sum::<f64>() / sizes.len() as f64;
     let sigma_px = (mean_square - step_px * step_px / 12.0).max(0.0).sqrt();
-    let [least, most] = crate::stats::range(sizes.into_iter());
+    let [least, most] = crate::stats::range(sizes);
     notes.push(format!(
         "Isaac Sim has one sigma in px: {sigma_px:.3}; the model has {least:.3} to {most:.3} px between {near:.2} and {far:.2} m at {:.0} degrees, and more on steeper surfaces",
         theta.to_degrees()
@@ -44,14 +45,11 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
     if !correction.is_identity() {
         notes.push("the model's biases have no place there".into());
     }
-    let left: Vec<&str> = model
-        .effects
-        .iter()
-        .map(|e| e.id.as_str())
-        .filter(|id| !["spatial-correlation", "disparity-quantisation"].contains(id))
-        .collect();
+    let held = ["spatial-correlation", "disparity-quantisation"];
+    let left = model.effects.iter().map(|e| e.id.as_str()).filter(|id| !held.contains(id));
+    let left = once(left);
     if !left.is_empty() {
-        notes.push(format!("not in the file: {}", left.join(", ")));
+        notes.push(format!("not in the file: {left}"));
     }
     let attributes = [
         ("baselineMM", 1e3 * baseline_m),

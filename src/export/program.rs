@@ -63,6 +63,13 @@ pub(super) fn listed(numbers: &[f64]) -> String {
     lines.join(",\n    ")
 }
 
+/// Ids, each once.
+pub(super) fn once<'a>(ids: impl Iterator<Item = &'a str>) -> String {
+    let mut known: Vec<&str> = Vec::new();
+    ids.for_each(|id| known.extend((!known.contains(&id)).then_some(id)));
+    known.join(", ")
+}
+
 /// What programs leave out of a model, told when they are written.
 pub(super) fn left_out(model: &NoiseModel, correction: Option<&Correction>) -> Vec<String> {
     let mut told = Vec::new();
@@ -70,7 +77,7 @@ pub(super) fn left_out(model: &NoiseModel, correction: Option<&Correction>) -> V
         None => told.push("the model has no sensor: sigma() alone is in the file".to_string()),
         Some(correction) if !correction.unpredicted().is_empty() => told.push(format!(
             "not in the file, for they are more than a pixel's bias and noise: {}",
-            correction.unpredicted().join(", ")
+            once(correction.unpredicted().iter().map(String::as_str))
         )),
         Some(_) => {}
     }

@@ -41,13 +41,13 @@ pub struct ViewMetrics {
     pub frames: Vec<FrameMetrics>,
 }
 
-/// Views at about one distance together.
+/// Views at about one distance together: those that face the sensor, where there are any.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AtDistance {
     /// From, to; m.
     pub range_m: [f64; 2],
     pub views: usize,
-    /// Means over the views; what not every view has is left out.
+    /// Means over the views that have the figure.
     #[serde(flatten)]
     pub mean: FrameMetrics,
     pub temporal_noise: Option<f64>,
@@ -62,6 +62,8 @@ pub struct Metrics {
     pub excluded: Vec<[String; 2]>,
 }
 
+/// The tool asks for a target that is faced; by hand that is within ten degrees.
+const FACED_DEG: f64 = 10.0;
 /// Distances are told by steps of so many metres.
 const STEP_M: f64 = 0.5;
 
@@ -160,19 +162,23 @@ fn points(frame: &Frame, pixels: &[u32], bench: &Workbench<'_>) -> Vec<Vector3<f
 }
 
 fn by_distance(views: &[ViewMetrics]) -> Vec<AtDistance> {
+    let faced = |v: &&ViewMetrics| v.mean.tilt_rad.to_degrees() <= FACED_DEG;
+    let any = views.iter().any(|v| faced(&v));
+    let views: Vec<&ViewMetrics> = views.iter().filter(|v| !any || faced(v)).collect();
     let step = |v: &ViewMetrics| (v.mean.axis_distance_m / STEP_M).floor();
-    let mut steps: Vec<f64> = views.iter().map(step).collect();
+    let mut steps: Vec<f64> = views.iter().map(|v| step(v)).collect();
     steps.sort_by(f64::total_cmp);
     steps.dedup();
     let group = |at: &f64| {
-        let here: Vec<&ViewMetrics> = views.iter().filter(|v| step(v) == *at).collect();
+        let here: Vec<&ViewMetrics> = views.iter().copied().filter(|v| step(v) == *at).collect();
         let means: Vec<FrameMetrics> = here.iter().map(|v| v.mean).collect();
-        let noises: Option<Vec<f64>> = here.iter().map(|v| v.temporal_noise).collect();
+        let noises: Vec<f64> = here.iter().filter_map(|v| v.temporal_noise).collect();
         Some(AtDistance {
             range_m: [at * STEP_M, (at + 1.0) * STEP_M],
             views: here.len(),
             mean: FrameMetrics::mean(&means)?,
-            temporal_noise: noises.map(|n| n.iter().sum::<f64>() / n.len() as f64),
+            temporal_noise: (!noises.is_empty())
+                .then(|| noises.iter().sum::<f64>() / noises.len() as f64),
         })
     };
     steps.iter().filter_map(group).collect()

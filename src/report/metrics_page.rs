@@ -21,6 +21,7 @@ pub fn metrics_page(title: &str, metrics: &Metrics, origin: &Origin) -> Result<S
         (section("By distance", &html! {
             @if metrics.by_distance.len() > 1 { (figure(&over_distance(&metrics.by_distance), "")?) }
             (table_of(&distance_columns(), &metrics.by_distance))
+            p.note { "Means over the views that face the sensor within ten degrees; over all, where none does." }
         }))
         (section("By view", &html! { (table_of(&view_columns(), &metrics.views)) (legend()) }))
         (section("Beside kinoise's sigma", &difference()))

@@ -151,7 +151,7 @@ fn picture(sensor: &Sensor) -> Vec<f32> {
         let ripple = 1.0 + 2e-3 * (12.9898 * i as f64).sin();
         match i % 37 {
             0 => f32::NAN,
-            1 if i % 5 == 0 => 0.0,
+            1 if i.is_multiple_of(5) => 0.0,
             _ => (plane.depth_at(&rays, i) * ripple) as f32,
         }
     };
