@@ -2,12 +2,13 @@
 //!
 //! Optical frame: x right (along the columns u), y down (along the rows v), z forward, metres.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::units::shortest;
 
 /// Pinhole intrinsics with the Brown-Conrady lens model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Camera {
     pub width: usize,
     pub height: usize,

@@ -1,5 +1,6 @@
 //! A depth frame as stored, and how its raw values become metres.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::units::shortest;
@@ -33,7 +34,7 @@ pub enum DepthCode {
 }
 
 /// The JSON face of [`DepthCode::Disparity`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RawDisparity {
     pub offset: f64,
     pub slope: f64,

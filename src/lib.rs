@@ -192,13 +192,19 @@ pub mod model;
 
 pub mod calibrate;
 
+pub mod metrics;
+
 pub mod effects;
 
 pub mod fleet;
 
 pub mod diagnose;
 
+pub mod schema;
+
 pub mod correct;
+
+pub mod export;
 
 pub mod simulate;
 

@@ -7,6 +7,7 @@ use crate::camera::Camera;
 use crate::error::Result;
 use crate::frame::{DepthCode, Frame, RawDisparity};
 use crate::units::shortest;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The unit that was recorded: everything `recording.json` says about it.
@@ -190,7 +191,7 @@ impl std::fmt::Display for Excluded {
 }
 
 /// `recording.json` (`crate::docs::layouts`).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RecordingFile {
     pub format: String,
     pub sensor: String,

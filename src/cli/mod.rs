@@ -6,6 +6,7 @@ mod capture;
 mod capture_interface;
 mod common;
 mod compare;
+mod completions;
 mod console;
 mod correct;
 mod demo;
@@ -14,9 +15,14 @@ mod diagnose;
 mod diagnose_next;
 mod effects;
 mod evaluate;
+mod export;
+mod man;
 mod map;
+mod metrics;
 mod origin;
 mod output;
+mod schema;
+mod sigma;
 mod simulate;
 mod simulate_room;
 mod simulate_scene;
@@ -53,6 +59,9 @@ enum Command {
     /// Fit sigma(z, theta) to a table z_m,theta_rad,sigma_m[,n]
     #[command(after_help = calibrate::FIT_EXAMPLES)]
     Fit(calibrate::FitArguments),
+    /// Give the vendors' figures of a recording: Z-accuracy, spatial and sub-pixel RMS, fill rate
+    #[command(after_help = metrics::EXAMPLES)]
+    Metrics(metrics::Arguments),
     /// Find what a model or a simulation leaves out of a recording, name it and model it
     #[command(after_help = diagnose::EXAMPLES)]
     Diagnose(diagnose::Arguments),
@@ -62,6 +71,9 @@ enum Command {
     /// Write a recording again, with the model's biases taken out of the depth
     #[command(after_help = correct::EXAMPLES)]
     Correct(correct::Arguments),
+    /// Write a sigma image beside every depth image of a sequence
+    #[command(after_help = sigma::EXAMPLES)]
+    Sigma(sigma::Arguments),
     /// Build a map from a sequence: trajectory, coloured points, statistics
     #[command(after_help = map::EXAMPLES)]
     Map(map::Arguments),
@@ -73,12 +85,24 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// Compare units of a kind: what is common, what is one unit's own, what has changed since
     Units(units::Arguments),
+    /// Write a model as other software reads it: a program, tables, parameters of a mapper
+    #[command(after_help = export::EXAMPLES)]
+    Export(export::Arguments),
     /// Show the catalogue of physical effects: what each does, how it shows, what it resembles
     #[command(after_help = effects::EXAMPLES)]
     Effects(effects::Arguments),
     /// Calibrate bundled data, then diagnose a cause drawn by lot and sealed, then map
     #[command(after_help = demo::EXAMPLES)]
     Demo(demo::Arguments),
+    /// Print the JSON Schema of a file that kinoise writes
+    #[command(after_help = schema::EXAMPLES)]
+    Schema(schema::Arguments),
+    /// Print the completions of a shell
+    #[command(after_help = completions::EXAMPLES)]
+    Completions(completions::Arguments),
+    /// Write the manual's pages
+    #[command(after_help = man::EXAMPLES)]
+    Man(man::Arguments),
 }
 
 /// Over the options of folders that do not describe themselves.
@@ -130,9 +154,14 @@ fn one_line(e: &clap::Error) -> String {
     format!("{message}{}; see {help}", tips.collect::<String>())
 }
 
+/// All commands with their options.
+fn command() -> clap::Command {
+    <Arguments as clap::CommandFactory>::command()
+}
+
 /// The command that was meant, for the help; options may stand before it.
 fn subcommand() -> Option<String> {
-    let command = <Arguments as clap::CommandFactory>::command();
+    let command = command();
     let known = |word: &String| command.find_subcommand(word).is_some();
     std::env::args().skip(1).find(known)
 }
@@ -148,15 +177,21 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         Command::Capture(a) => capture::run(a, global),
         Command::Calibrate(a) => calibrate::run(a, global).map(|()| 0),
         Command::Fit(a) => calibrate::fit(a, global).map(|()| 0),
+        Command::Metrics(a) => metrics::run(a, global).map(|()| 0),
         Command::Diagnose(a) => diagnose::run(a, global),
         Command::Simulate(a) => simulate::run(a, global).map(|()| 0),
         Command::Correct(a) => correct::run(a, global).map(|()| 0),
+        Command::Sigma(a) => sigma::run(a, global).map(|()| 0),
         Command::Map(a) => map::run(a, global).map(|()| 0),
         Command::Compare(a) => compare::run(a, global).map(|()| 0),
         Command::Evaluate(a) => evaluate::run(a, global).map(|()| 0),
         Command::Units(a) => units::run(a, global).map(|()| 0),
         Command::Effects(a) => effects::run(a, global).map(|()| 0),
         Command::Demo(a) => demo::run(a, global).map(|()| 0),
+        Command::Export(a) => export::run(a, global).map(|()| 0),
+        Command::Schema(a) => schema::run(a).map(|()| 0),
+        Command::Completions(a) => completions::run(a).map(|()| 0),
+        Command::Man(a) => man::run(a, global).map(|()| 0),
     }
 }
 

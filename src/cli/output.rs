@@ -51,6 +51,12 @@ pub const EVALUATION: Leaves = Leaves::Results {
     marks: &["evaluation.json"],
 };
 
+pub const METRICS: Leaves =
+    Leaves::Results { names: &[&["metrics.json", "report.html"]], marks: &["metrics.json"] };
+
+pub const SIGMA: Leaves =
+    Leaves::Results { names: &[&["sigma", "sigma.txt", "sigma.json"]], marks: &["sigma.txt"] };
+
 /// A calibration with the rest of the road in folders beside it.
 pub const DEMO: Leaves = Leaves::Results {
     names: &[

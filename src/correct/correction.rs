@@ -5,9 +5,9 @@ use super::slopes::Noise;
 use super::uncertainty::Uncertainty;
 use crate::camera::{Camera, Rays};
 use crate::effects::{Active, Inverse, KINECT_BASELINE_M};
-use crate::error::{Error, Result};
-use crate::model::{self, NoiseModel};
-use crate::terms::{Needs, Pixels, Term};
+use crate::error::Result;
+use crate::model::{self, NoiseModel, SigmaModel};
+use crate::terms::{Needs, Pixels, Statistic, Term};
 use crate::view::Sensor;
 
 /// What is known of a frame beside its depths.
@@ -36,19 +36,27 @@ pub struct Correction {
     /// Disparity in px times depth in m, as the model counts it.
     pub(super) scale_px_m: f64,
     /// Stored depth over true depth, the same everywhere.
-    scale: f64,
-    drifts: Vec<Drift>,
+    pub(super) scale: f64,
+    pub(super) drifts: Vec<Drift>,
+    /// Share of the ray's excess over the depth that is stored.
+    pub(super) ray_share: f64,
     /// Stored depth over true depth of each pixel; empty where it is one.
     along_ray: Vec<f32>,
-    /// Error of the disparity of each pixel whatever it sees, px; empty where there is none.
+    /// What depends on the pixel alone.
+    pub(super) still_terms: Vec<Term>,
+    /// Their sum at each pixel, px; empty where there are none.
     still: Vec<f32>,
-    locking: Option<Locking>,
+    pub(super) locking: Option<Locking>,
     /// What depends on more than the pixel, with the disparities that each was learnt at, px.
     pub(super) terms: Vec<(Term, [f64; 2])>,
     pub(super) needs: Needs,
+    /// What changes the logarithm of the noise's variance, with the disparities as above.
+    pub(super) variance: Vec<(Term, [f64; 2])>,
+    pub(super) sigma: SigmaModel,
     pub(super) noise: Noise,
     pub(super) uncertainty: Uncertainty,
     ignored: Vec<String>,
+    unpredicted: Vec<String>,
     remarks: Vec<String>,
 }
 
@@ -57,9 +65,9 @@ const ANYWHERE: [f64; 2] = [0.0, f64::INFINITY];
 
 /// Warm-up: depth drifts by `relative` with a time constant.
 #[derive(Debug, Clone, Copy)]
-struct Drift {
-    relative: f64,
-    time_constant_s: f64,
+pub struct Drift {
+    pub relative: f64,
+    pub time_constant_s: f64,
 }
 
 impl Correction {
@@ -68,10 +76,7 @@ impl Correction {
     /// # Errors
     /// When the model is of a sensor of another resolution, or holds what the catalogue has not.
     pub fn of(model: &NoiseModel, sensor: &Sensor) -> Result<Self> {
-        let of_model =
-            model.sensor.clone().map(|file| file.sensor()).transpose().map_err(|what| {
-                Error::Argument { what: format!("the model's sensor: {what}"), remedy: REMEDY }
-            })?;
+        let of_model = model.described_sensor()?;
         model.refuse_other_size(sensor)?;
         let camera = sensor.camera.clone();
         // Terms are in px of the disparity that the model counts.
@@ -85,14 +90,19 @@ impl Correction {
             scale_px_m,
             scale: 1.0,
             drifts: Vec::new(),
+            ray_share: 0.0,
             along_ray: Vec::new(),
+            still_terms: Vec::new(),
             still: Vec::new(),
             locking: None,
             terms: Vec::new(),
             needs: Needs::default(),
             uncertainty: Uncertainty::default(),
+            variance: Vec::new(),
             noise: Noise::of(&model.sigma, scale_px_m),
+            sigma: model.sigma.clone(),
             ignored: Vec::new(),
+            unpredicted: Vec::new(),
             remarks: model.differences(sensor),
             camera,
         };
@@ -116,6 +126,11 @@ impl Correction {
     /// Ids of the model's entries, or parts of them, that are no bias of the sensor.
     pub fn ignored(&self) -> &[String] {
         &self.ignored
+    }
+
+    /// Ids of the entries, or parts of them, that neither the bias nor the noise of a pixel shows.
+    pub fn unpredicted(&self) -> &[String] {
+        &self.unpredicted
     }
 
     /// Disparities at which all that grows with the disparity was learnt, px.
@@ -153,9 +168,14 @@ impl Correction {
         let usable = |t: &&Term| t.is_correctable();
         let learnt = entry.learnt_px.unwrap_or(ANYWHERE);
         self.terms.extend(entry.shape.iter().filter(usable).map(|t| (t.clone(), learnt)));
+        let variance = entry.shape.iter().filter(|&t| is_predictable_variance(t));
+        self.variance.extend(variance.map(|t| (t.clone(), learnt)));
         self.uncertainty.add(entry, learnt, usable);
         if !entry.shape.iter().all(|t| usable(&t)) {
             self.ignored.push(entry.id.clone());
+        }
+        if !entry.shape.iter().all(|t| usable(&t) || is_predictable_variance(t)) {
+            self.unpredicted.push(entry.id.clone());
         }
         Ok(())
     }
@@ -173,11 +193,23 @@ impl Correction {
             Some(Inverse::Drift { relative, time_constant_s }) => {
                 self.drifts.push(Drift { relative, time_constant_s });
             }
-            Some(Inverse::AlongRay { share }) => self.along_ray = self.ray_over_depth(share),
+            Some(Inverse::AlongRay { share }) => {
+                self.ray_share = share;
+                self.along_ray = self.ray_over_depth(share);
+            }
             Some(Inverse::Locking { amplitude_px }) => {
                 self.locking = Some(Locking::new(amplitude_px));
             }
-            None => self.ignored.push(entry.id.clone()),
+            None => {
+                let card = active.effect.card();
+                let term =
+                    active.effect.term(&|name| active.settings.named(card, name), &self.camera);
+                match term.filter(is_predictable_variance) {
+                    Some(term) => self.variance.push((term, ANYWHERE)),
+                    None => self.unpredicted.push(entry.id.clone()),
+                }
+                self.ignored.push(entry.id.clone());
+            }
         }
         Ok(())
     }
@@ -196,17 +228,24 @@ impl Correction {
         let (still, other): (Vec<_>, Vec<_>) =
             self.terms.drain(..).partition(|(t, _)| t.needs() == Needs::default());
         self.terms = other;
+        self.still_terms = still.into_iter().map(|(t, _)| t).collect();
         self.needs = Needs::of(self.terms.iter().map(|(t, _)| t));
-        if !still.is_empty() {
+        if !self.still_terms.is_empty() {
             let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
             let mut scratch = Vec::new();
             let mut sum = |i: usize| {
                 let place = pixels.place(i);
-                still.iter().map(|(t, _)| t.value(&place, &mut scratch)).sum::<f64>() as f32
+                let all = self.still_terms.iter();
+                all.map(|t| t.value(&place, &mut scratch)).sum::<f64>() as f32
             };
             self.still = (0..self.camera.pixels()).map(&mut sum).collect();
         }
     }
 }
 
-const REMEDY: &str = "give the model that was made of this very sensor";
+/// A change of the noise that follows from the picture, and from nothing of a board or its light.
+fn is_predictable_variance(term: &Term) -> bool {
+    let needs = term.needs();
+    let own = term.belongs_to_sensor() && !needs.board && !needs.light;
+    term.statistic == Statistic::Variance && own
+}

@@ -23,35 +23,64 @@ impl Correction {
     /// # Errors
     /// When the image is not of the sensor's size.
     pub fn apply(&self, depth_m: &mut [f32], conditions: &Conditions) -> Result<()> {
-        if depth_m.len() != self.camera.pixels() {
-            return Err(Error::Argument {
-                what: format!("{} depths for {} pixels", depth_m.len(), self.camera.pixels()),
-                remedy: "give the whole image of the model's sensor, row by row",
-            });
-        }
+        self.refuse_size(depth_m)?;
         if self.is_identity() {
             return Ok(());
         }
-        let factor = self.factor(conditions);
-        let slopes = self.needs.slope.then(|| self.slopes(depth_m, factor));
-        let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
-        let terms = self.terms.iter().filter(|(t, _)| conditions.determine(t)).collect();
-        let known =
-            Known { conditions, slopes: slopes.as_ref(), pixels, terms, tilt: self.needs.tilt };
+        let known = self.known(depth_m, conditions);
         let width = self.camera.width;
         depth_m.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
             let mut scratch = Vec::new();
             for (u, z) in line.iter_mut().enumerate() {
                 if *z > 0.0 {
-                    let i = row * width + u;
-                    let measured = self.disparity(i, *z, factor);
-                    let true_d = self.solve(i, measured, &known, &mut scratch);
-                    let scaled = self.scale_px_m / true_d;
-                    *z = if true_d > 0.0 { scaled as f32 } else { f32::INFINITY };
+                    *z = self.depth(row * width + u, *z, &known, &mut scratch) as f32;
                 }
             }
         });
         Ok(())
+    }
+
+    /// As [`Correction::apply`], in double precision.
+    ///
+    /// # Errors
+    /// When the image is not of the sensor's size.
+    pub fn corrected(&self, depth_m: &[f32], conditions: &Conditions) -> Result<Vec<f64>> {
+        self.refuse_size(depth_m)?;
+        if self.is_identity() {
+            return Ok(depth_m.iter().copied().map(f64::from).collect());
+        }
+        let known = self.known(depth_m, conditions);
+        let mut scratch = Vec::new();
+        let one = |(i, &z): (usize, &f32)| match z > 0.0 {
+            true => self.depth(i, z, &known, &mut scratch),
+            false => f64::from(z),
+        };
+        Ok(depth_m.iter().enumerate().map(one).collect())
+    }
+
+    pub(super) fn refuse_size(&self, depth_m: &[f32]) -> Result<()> {
+        if depth_m.len() == self.camera.pixels() {
+            return Ok(());
+        }
+        Err(Error::Argument {
+            what: format!("{} depths for {} pixels", depth_m.len(), self.camera.pixels()),
+            remedy: "give the whole image of the model's sensor, row by row",
+        })
+    }
+
+    fn known<'a>(&'a self, depth_m: &[f32], conditions: &'a Conditions) -> Known<'a> {
+        let factor = self.factor(conditions);
+        let slopes = self.needs.slope.then(|| self.slopes(depth_m, factor));
+        let terms = self.terms.iter().filter(|(t, _)| conditions.determine(t)).collect();
+        let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
+        Known { conditions, factor, slopes, pixels, terms, tilt: self.needs.tilt }
+    }
+
+    /// The corrected depth of a pixel whose stored depth is `z`, m.
+    fn depth(&self, i: usize, z: f32, known: &Known<'_>, scratch: &mut Vec<f64>) -> f64 {
+        let measured = self.disparity(i, z, known.factor);
+        let d = self.solve(i, measured, known, scratch);
+        if d > 0.0 { self.scale_px_m / d } else { f64::INFINITY }
     }
 
     /// The disparity that the terms turn into `measured`, px.
@@ -88,7 +117,7 @@ impl Correction {
         let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
         let slopes = self.uncertainty.needs.slope.then(|| self.slopes(depth_m, 1.0));
         let tilt = self.uncertainty.needs.tilt;
-        let known = Known { conditions, slopes: slopes.as_ref(), pixels, terms: Vec::new(), tilt };
+        let known = Known { conditions, factor: 1.0, slopes, pixels, terms: Vec::new(), tilt };
         let width = self.camera.width;
         let mut sigma = vec![f32::NAN; depth_m.len()];
         sigma.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
@@ -104,6 +133,40 @@ impl Correction {
             }
         });
         sigma
+    }
+
+    /// Standard deviation of each stored depth, m, as the model predicts it: sigma at the corrected
+    /// depth and the surface's tilt, times what the model's terms of the variance say there; NaN where
+    /// there is no depth.
+    ///
+    /// # Errors
+    /// When the image is not of the sensor's size.
+    pub fn sigma_m(&self, depth_m: &[f32], conditions: &Conditions) -> Result<Vec<f64>> {
+        self.refuse_size(depth_m)?;
+        let mut known = self.known(depth_m, conditions);
+        let slopes = known.slopes.take();
+        known.slopes = slopes.or_else(|| Some(self.slopes(depth_m, known.factor)));
+        known.tilt = true;
+        let variance = || self.variance.iter().filter(|(t, _)| conditions.determine(t));
+        let width = self.camera.width;
+        let mut sigma = vec![f64::NAN; depth_m.len()];
+        sigma.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
+            let mut scratch = Vec::new();
+            for (u, sigma) in line.iter_mut().enumerate() {
+                let (i, z) = (row * width + u, depth_m[row * width + u]);
+                let depth = if z > 0.0 { self.depth(i, z, &known, &mut scratch) } else { 0.0 };
+                if !(depth > 0.0 && depth.is_finite()) {
+                    continue;
+                }
+                let mut place = known.place(i);
+                known.stand(&mut place, i, self.scale_px_m / depth);
+                let plain = self.sigma.axial_sigma(depth, place.theta);
+                place.variance = (plain * place.disparity / depth).powi(2);
+                let terms = variance().map(|t| held(t, &place, &mut scratch));
+                *sigma = plain * (0.5 * terms.sum::<f64>()).exp();
+            }
+        });
+        Ok(sigma)
     }
 
     fn slopes(&self, depth_m: &[f32], factor: f64) -> Slopes {
@@ -124,7 +187,9 @@ fn held((term, [low, high]): &(Term, [f64; 2]), place: &PixelContext, row: &mut 
 /// What is known of the places of one image.
 struct Known<'a> {
     conditions: &'a Conditions,
-    slopes: Option<&'a Slopes>,
+    /// Stored depth over true depth, the same everywhere.
+    factor: f64,
+    slopes: Option<Slopes>,
     pixels: Pixels<'a>,
     /// Those that can be evaluated.
     terms: Vec<&'a (Term, [f64; 2])>,
@@ -145,7 +210,7 @@ impl Known<'_> {
     fn stand(&self, place: &mut PixelContext, i: usize, disparity: f64) {
         let Pixels { camera, scale_px_m, .. } = self.pixels;
         place.at_disparity(disparity, scale_px_m);
-        if let Some(slopes) = self.slopes {
+        if let Some(slopes) = &self.slopes {
             place.slope = slopes.at(i);
             if !self.tilt {
                 return;

@@ -4,7 +4,10 @@ use std::f64::consts::TAU;
 
 /// What to add to a locked disparity, by its phase.
 #[derive(Debug, Clone)]
-pub(super) struct Locking(Vec<f64>);
+pub(super) struct Locking {
+    amplitude_px: f64,
+    shifts: Vec<f64>,
+}
 
 /// Linear between nodes a thousandth of a pixel apart: for a tenth of a pixel of amplitude, where
 /// the inverse bends by a few px per px^2, it errs by 1e-6 px.
@@ -15,7 +18,16 @@ const HALVINGS: usize = 24;
 impl Locking {
     pub fn new(amplitude_px: f64) -> Self {
         let node = |k: usize| shift(k as f64 / NODES as f64, amplitude_px);
-        Locking((0..=NODES).map(node).collect())
+        Locking { amplitude_px, shifts: (0..=NODES).map(node).collect() }
+    }
+
+    pub fn amplitude_px(&self) -> f64 {
+        self.amplitude_px
+    }
+
+    /// What to add at phases evenly spaced from 0 to 1, px.
+    pub fn shifts(&self) -> &[f64] {
+        &self.shifts
     }
 
     /// The disparity before it was locked, px.
@@ -23,7 +35,7 @@ impl Locking {
         let place = locked.rem_euclid(1.0) * NODES as f64;
         let k = (place as usize).min(NODES - 1);
         let t = place - k as f64;
-        locked + self.0[k] * (1.0 - t) + self.0[k + 1] * t
+        locked + self.shifts[k] * (1.0 - t) + self.shifts[k + 1] * t
     }
 }
 

@@ -11,10 +11,14 @@ mod describe;
 mod files;
 mod invert;
 mod locking;
+mod parts;
 mod raw;
 mod recording;
+mod sigma_images;
 mod slopes;
 mod uncertainty;
 
-pub use correction::{Conditions, Correction};
+pub use correction::{Conditions, Correction, Drift};
+pub use parts::{LearntTerm, Parts};
 pub use recording::{CorrectOptions, Corrected, SIGMA_UNITS_PER_METRE, correct_recording};
+pub use sigma_images::{SigmaImages, sigma_images};

@@ -44,6 +44,11 @@ impl Noise {
         Noise { variance: (0..NODES).map(variance).collect() }
     }
 
+    /// The largest variance of a window that needs no comparison, px^2, a node a px of disparity.
+    pub fn limits(&self) -> &[f64] {
+        &self.variance
+    }
+
     fn passes(&self, d: f64, variance: f64) -> bool {
         variance <= self.variance[(d.max(0.0) as usize).min(NODES - 1)]
     }

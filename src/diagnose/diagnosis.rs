@@ -1,5 +1,6 @@
 //! What a diagnosis says: `diagnosis.json` (`crate::docs::layouts`).
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -10,7 +11,7 @@ use crate::terms::{Axis, Statistic, Term};
 pub const DIAGNOSIS_FORMAT: &str = "kinoise-diagnosis/1";
 
 /// All that was found, and all that could not be.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Diagnosis {
     pub format: &'static str,
     pub recording: String,
@@ -32,7 +33,7 @@ pub struct Diagnosis {
     pub remarks: Vec<String>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 pub enum Reference {
     #[serde(rename = "model")]
     Model,
@@ -40,7 +41,7 @@ pub enum Reference {
     SimulatedRecording,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     Match,
@@ -49,7 +50,7 @@ pub enum Verdict {
     Inconclusive,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
     Named,
@@ -60,7 +61,7 @@ pub enum Status {
 }
 
 /// One mismatch.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Finding {
     pub status: Status,
     /// Id in the catalogue.
@@ -121,14 +122,14 @@ impl Finding {
     }
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Alternative {
     pub effect: &'static str,
     /// `None` where no test weighed the names against one another.
     pub probability: Option<f64>,
 }
 
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, JsonSchema)]
 pub struct Size {
     /// Root mean square over the recording.
     pub mm: f64,
@@ -137,7 +138,7 @@ pub struct Size {
 }
 
 /// Points of a curve with their standard errors.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct Curve {
     /// What x is, with its unit.
     pub x_label: String,
@@ -150,7 +151,7 @@ pub struct Curve {
     pub model: Vec<f64>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct NextView {
     pub z_m: f64,
     pub theta_rad: f64,
@@ -161,7 +162,7 @@ pub struct NextView {
     pub why: String,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct MapRow {
     pub statistic: Statistic,
     pub axis: Axis,
@@ -172,7 +173,7 @@ pub struct MapRow {
     pub p_adjusted: f64,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct HeldOut {
     pub views: Vec<String>,
     /// Nats a view.
@@ -193,7 +194,7 @@ pub struct HeldOut {
 }
 
 /// Root mean square of the residual to a plane, every pixel of every frame of every view, px.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct LeftOut {
     pub rms_px_before: f64,
     pub rms_px_after: f64,
@@ -203,13 +204,13 @@ pub struct LeftOut {
 }
 
 /// The battery once more, against the extended model.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct After {
     pub verdict: Verdict,
     pub remaining: Vec<Remaining>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Remaining {
     pub statistic: Statistic,
     pub axis: Axis,
@@ -219,21 +220,21 @@ pub struct Remaining {
     pub words: String,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Detectable {
     pub effect: &'static str,
     /// Least parameter values seen with 80 % power.
     pub minimum: Map<String, Value>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct CannotTell {
     pub effect: &'static str,
     pub why: String,
 }
 
 /// One view, for people.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ViewLine {
     pub name: String,
     pub z_m: f64,

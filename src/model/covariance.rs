@@ -1,10 +1,11 @@
 //! How sure a fitted shape is, and together with which others.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Covariance of the coefficients of an effect's shape, all its terms' one after the other: the sum
 /// of the factors' outer products, and of variances of each coefficient's own.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Covariance {
     /// Shapes of the same fit err together: a factor of one goes with the factor of the same place
     /// of the others.

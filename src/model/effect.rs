@@ -1,5 +1,6 @@
 //! What a model holds beyond sigma: physical effects, with the free shape that was fitted.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -7,7 +8,7 @@ use super::covariance::Covariance;
 use crate::terms::Term;
 
 /// One physical effect of the model.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Effect {
     /// Of the catalogue (`crate::docs::catalogue`), or [`UNEXPLAINED`].
     pub id: String,

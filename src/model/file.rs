@@ -1,8 +1,10 @@
 //! `model.json` (`crate::docs::layouts`): written and read back bit for bit, refused when foreign.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::DMatrix;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -12,7 +14,7 @@ use super::provenance::{FitSummary, Provenance};
 use super::{Direction, Domain, SigmaModel};
 use crate::error::{Error, Result, read_text};
 use crate::io::{pretty_json, write_atomic};
-use crate::view::RecordingFile;
+use crate::view::{RecordingFile, Sensor};
 
 /// The format this version writes and reads.
 pub const MODEL_FORMAT: &str = "kinoise-model/1";
@@ -31,7 +33,7 @@ pub struct NoiseModel {
     pub provenance: Provenance,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 struct ModelFile {
     format: String,
     sensor: Option<RecordingFile>,
@@ -41,7 +43,7 @@ struct ModelFile {
     provenance: Provenance,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 struct FitFile {
     /// What sigma is: along the optical axis ("axial") or across the plane ("perpendicular").
     residual: Direction,
@@ -51,16 +53,17 @@ struct FitFile {
     summary: FitSummary,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 struct SigmaFile {
     form: String,
     formula: String,
+    #[schemars(with = "BTreeMap<String, ParameterFile>")]
     parameters: Map<String, Value>,
     covariance: Vec<Vec<f64>>,
     valid: Domain,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 struct ParameterFile {
     value: f64,
     std_error: Option<f64>,
@@ -80,6 +83,15 @@ impl NoiseModel {
             fit: FitSummary::default(),
             provenance: Provenance::default(),
         }
+    }
+
+    /// The sensor that it was made of; nothing for a model of a bare table.
+    /// An error when its description contradicts itself.
+    pub fn described_sensor(&self) -> Result<Option<Sensor>> {
+        self.sensor.clone().map(RecordingFile::sensor).transpose().map_err(|what| Error::Argument {
+            what: format!("the model's sensor: {what}"),
+            remedy: "give the model that was made of this very sensor",
+        })
     }
 
     /// The text of `model.json`; an error when a number of the model is not finite.
@@ -163,6 +175,11 @@ impl NoiseModel {
             provenance: file.provenance,
         })
     }
+}
+
+/// The JSON Schema of `model.json`.
+pub(crate) fn model_schema() -> schemars::Schema {
+    schemars::schema_for!(ModelFile)
 }
 
 fn check_format(value: &Value) -> Result<(), (String, &'static str)> {

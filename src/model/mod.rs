@@ -17,6 +17,7 @@ mod surface;
 
 pub use covariance::Covariance;
 pub use effect::{Effect, UNEXPLAINED};
+pub(crate) use file::model_schema;
 pub use file::{MODEL_FORMAT, NoiseModel};
 pub use fit::DISTANCE_RATIO;
 pub use forms::{Form, PAPER_EQ1, SigmaForm};

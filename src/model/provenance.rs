@@ -2,11 +2,12 @@
 
 use std::time::SystemTime;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 /// How the surface was fitted.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FitSummary {
     pub views: usize,
     pub samples: usize,
@@ -23,7 +24,7 @@ pub struct FitSummary {
 }
 
 /// What a search rested on: a cause that is too small for it may still be missing.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Searched {
     pub views: usize,
     /// Views whose distance was measured by other means.
@@ -31,7 +32,7 @@ pub struct Searched {
 }
 
 /// Where a model comes from.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Provenance {
     pub tool: String,
     pub version: String,

@@ -1,6 +1,7 @@
 //! The surface sigma(z, theta) with where it holds and how sure it is.
 
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::forms::{Form, MAX_PARAMETERS, PAPER_EQ1};
@@ -8,7 +9,7 @@ use super::rows::Rows;
 use crate::stats::student_quantile;
 
 /// Which distance sigma is the standard deviation of.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Direction {
     /// Along the optical axis: of depth.
@@ -19,7 +20,7 @@ pub enum Direction {
 }
 
 /// Where a surface was measured.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Domain {
     pub z_m: [f64; 2],
     pub theta_rad: [f64; 2],

@@ -1,12 +1,13 @@
 //! What a shape runs over: a number of the place that is measured.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::needs::Needs;
 use super::place::{Axis, PixelContext};
 
 /// A number of a place.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coordinate {
     Column,

@@ -27,10 +27,13 @@ pub use needs::Needs;
 pub use pixels::Pixels;
 pub use place::{Axis, PixelContext, corner_radius};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What of a measurement a term changes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Statistic {
     Bias,
@@ -42,7 +45,7 @@ pub enum Statistic {
 }
 
 /// A term with its size: added to the disparity, px, or to the logarithm of its variance.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(from = "written::Written", into = "written::Written")]
 pub struct Term {
     pub statistic: Statistic,

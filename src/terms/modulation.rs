@@ -1,5 +1,6 @@
 //! What a shape is multiplied by.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::needs::Needs;
@@ -8,11 +9,8 @@ use super::place::PixelContext;
 /// Disparity at which a term that grows with a power of it is in px: a Kinect at 1.1 m.
 pub const DISPARITY_UNIT_PX: f64 = 40.0;
 
-/// The same at 80 degrees: Nguyen, Izadi and Lovell 2012 see nothing beyond.
-const STEEPEST: f64 = 32.2;
-
 /// A factor that changes from place to place.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Modulation {
     One,
@@ -38,6 +36,9 @@ pub enum Modulation {
 }
 
 impl Modulation {
+    /// The largest square of a slope, at 80 degrees: Nguyen, Izadi and Lovell 2012 see nothing beyond.
+    pub const STEEPEST: f64 = 32.2;
+
     /// A power of the disparity.
     pub fn power(disparity_power: f64) -> Self {
         if disparity_power == 0.0 {
@@ -65,7 +66,7 @@ impl Modulation {
             Modulation::Lift => p.disparity / p.rho,
             Modulation::Tilt => p.theta.sin(),
             Modulation::TiltPower(power) => p.theta.sin().powi(power),
-            Modulation::SlopeSquared => p.theta.tan().powi(2).min(STEEPEST),
+            Modulation::SlopeSquared => p.theta.tan().powi(2).min(Self::STEEPEST),
             Modulation::RadialSlope { fx, fy } => -(p.slope[0] * p.x * fx + p.slope[1] * p.y * fy),
         }
     }

@@ -1,6 +1,7 @@
 //! Terms as files write them. The kinds that older files know keep their names and numbers; a
 //! shape that none of them holds is written as it is.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::basis::Basis;
@@ -8,14 +9,14 @@ use super::coordinate::Coordinate;
 use super::modulation::Modulation;
 use super::{Statistic, Term};
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 pub(super) struct Written {
     statistic: Statistic,
     basis: Kind,
     coefficients: Vec<f64>,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 enum Kind {
     Bowl { disparity_power: f64, orders: usize },

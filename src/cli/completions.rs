@@ -1,0 +1,29 @@
+use std::io::Write as _;
+
+use clap::Args;
+use clap_complete::Shell;
+
+use super::command;
+
+pub const EXAMPLES: &str = "\
+Examples:
+  kinoise completions bash
+  kinoise completions zsh
+
+bash reads them in ~/.local/share/bash-completion/completions/kinoise, zsh in _kinoise of a folder in
+its fpath, fish in ~/.config/fish/completions/kinoise.fish.";
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Whose completions to print on stdout
+    #[arg(value_enum)]
+    shell: Shell,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut command(), "kinoise", &mut script);
+    // A reader that closes early is no failure.
+    let _ = std::io::stdout().lock().write_all(&script);
+    Ok(())
+}

@@ -1,0 +1,86 @@
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+use clap::Args;
+use kinoise::NoiseModel;
+use kinoise::export::{ExportFormat, export};
+use kinoise::io::write_atomic;
+
+use super::common::{Global, one_of};
+use super::console::{detail_model, notes, result};
+
+pub const EXAMPLES: &str = "\
+Examples:
+  kinoise export out/kinect/model.json --format python -o kinect_noise.py
+  kinoise export out/kinect/model.json --format elevation-mapping -o sensor.yaml";
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// model.json, or the folder it is in
+    model: PathBuf,
+    /// File to write
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Who is to read it
+    #[arg(long, value_name = "FORMAT", value_parser = one_of(FORMATS))]
+    format: (ExportFormat, &'static str),
+}
+
+type Choice = (&'static str, &'static str, (ExportFormat, &'static str));
+
+const FORMATS: [Choice; 9] = [
+    choice(
+        "python",
+        "A file that needs numpy alone: sigma(), correct(), sample()",
+        ExportFormat::Python,
+    ),
+    choice("c", "A C99 header with the same", ExportFormat::C),
+    choice("npz", "Tables of sigma and of the correction for numpy.load", ExportFormat::Npz),
+    choice("opencv", "The same and the intrinsics for cv::FileStorage", ExportFormat::OpenCv),
+    choice("camera-info", "The intrinsics for ROS' camera_info_manager", ExportFormat::CameraInfo),
+    choice(
+        "elevation-mapping",
+        "Parameters of its structured-light sensor processor",
+        ExportFormat::ElevationMapping,
+    ),
+    choice("isaac", "A depth sensor of Isaac Sim, as a USD layer", ExportFormat::Isaac),
+    choice("clams", "The bias alone, for CLAMS", ExportFormat::Clams),
+    choice("open3d", "The bias alone, for Open3D's DepthNoiseSimulator", ExportFormat::Open3d),
+];
+
+const fn choice(name: &'static str, help: &'static str, format: ExportFormat) -> Choice {
+    (name, help, (format, name))
+}
+
+pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
+    let Arguments { model: file, output, format: (format, name) } = arguments;
+    let model = NoiseModel::read(file)?;
+    detail_model(&model, Some(file));
+    refuse_taken(output, file, global.force)?;
+    let exported = export(&model, *format)?;
+    write_atomic(output, &exported.bytes)?;
+    notes(&exported.notes);
+    result(format!("wrote {}", output.display()));
+    global.print_json(&serde_json::json!({
+        "format": name,
+        "output": output,
+        "bytes": exported.bytes.len(),
+        "notes": exported.notes,
+    }))
+}
+
+/// A file that stands there is replaced when forced, the model never.
+fn refuse_taken(output: &Path, model: &Path, force: bool) -> anyhow::Result<()> {
+    let Ok(standing) = output.canonicalize() else { return Ok(()) };
+    if standing.is_dir() {
+        bail!("{}: this is a folder; give the name of a file", output.display());
+    }
+    let model = if model.is_dir() { model.join("model.json") } else { model.to_path_buf() };
+    if model.canonicalize().is_ok_and(|model| model == standing) {
+        bail!("{}: the output would replace the model; choose another name", output.display());
+    }
+    if !force {
+        bail!("{}: there is such a file; choose another name, or give --force", output.display());
+    }
+    Ok(())
+}

@@ -1,0 +1,99 @@
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use kinoise::io::open;
+use kinoise::metrics::{Metrics, ViewMetrics, metrics};
+use kinoise::report::metrics_page;
+
+use super::common::{Global, Input};
+use super::console::{detail_recording, notes, result, say, working};
+use super::origin::origin;
+use super::output::{METRICS, begin};
+
+pub const EXAMPLES: &str = "\
+Examples:
+  kinoise metrics recording
+  kinoise metrics recording -o out/metrics --json";
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A recording, a TUM folder, a fakenect dump, or a folder of 16-bit PNGs
+    recording: PathBuf,
+    /// Folder for metrics.json and report.html
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    #[command(flatten, next_help_heading = super::INPUT_HEADING)]
+    input: Input,
+}
+
+pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
+    let path: &Path = &arguments.recording;
+    let output = arguments.output.as_deref();
+    let output = output.map(|place| begin(place, METRICS, &[path], global)).transpose()?;
+    let recording = open(path, &arguments.input.assumed()?)?;
+    detail_recording(&recording);
+    let found = working("measuring", |step| metrics(&recording, global.seed(), step))?;
+    notes(&recording.remarks);
+    notes(found.excluded.iter().map(|[view, why]| format!("view {view} was left out: {why}")));
+    report(&found);
+    let value = serde_json::to_value(&found)?;
+    if let Some(output) = output {
+        let place = output.place().to_path_buf();
+        output.write("metrics.json", kinoise::io::pretty_json(&value)?.as_bytes())?;
+        let title = format!("Depth quality of {}", recording.sensor.name);
+        let page = metrics_page(&title, &found, &origin(path, &place, global.seed().0))?;
+        output.write("report.html", page.as_bytes())?;
+        output.finish()?;
+        say(format!("wrote {}", place.join("report.html").display()));
+    }
+    global.print_json(&value)
+}
+
+/// What a figure that is not to be had reads as.
+const ABSENT: &str = "-";
+
+fn report(found: &Metrics) {
+    let width = found.views.iter().map(|v| v.view.chars().count()).max().unwrap_or(4).max(4);
+    result(format!(
+        "{:width$}  distance m  tilt deg  Z-accuracy %  plane-fit RMS mm  sub-pixel RMS px  temporal %  fill %  kinoise sigma mm",
+        "view"
+    ));
+    found.views.iter().for_each(|view| result(row(view, width)));
+    if found.by_distance.len() > 1 {
+        result("\nviews that face the sensor within ten degrees (all, where none does)");
+        for group in &found.by_distance {
+            let [low, high] = group.range_m;
+            result(format!(
+                "{low:.1} to {high:.1} m, {} views: Z-accuracy {} %, plane-fit RMS {:.2} mm, sub-pixel RMS {} px, temporal {} %, fill {:.1} %",
+                group.views,
+                optional(group.mean.z_accuracy.map(|v| 1e2 * v), 2),
+                1e3 * group.mean.plane_fit_rms_m,
+                optional(group.mean.subpixel_rms_px, 3),
+                optional(group.temporal_noise.map(|v| 1e2 * v), 3),
+                1e2 * group.mean.fill_rate
+            ));
+        }
+    }
+    say(
+        "note: the RMS is across a plane through all points of a frame, gross errors and bends with them; kinoise's sigma is along the optical axis and robust",
+    );
+}
+
+fn row(view: &ViewMetrics, width: usize) -> String {
+    let ViewMetrics { view: name, mean, temporal_noise, sigma_m, .. } = view;
+    format!(
+        "{name:width$}  {:>10.3}  {:>8.1}  {:>12}  {:>16.2}  {:>16}  {:>10}  {:>6.1}  {:>16.2}",
+        mean.axis_distance_m,
+        mean.tilt_rad.to_degrees(),
+        optional(mean.z_accuracy.map(|v| 1e2 * v), 2),
+        1e3 * mean.plane_fit_rms_m,
+        optional(mean.subpixel_rms_px, 3),
+        optional(temporal_noise.map(|v| 1e2 * v), 3),
+        1e2 * mean.fill_rate,
+        1e3 * sigma_m
+    )
+}
+
+fn optional(value: Option<f64>, decimals: usize) -> String {
+    value.map_or(ABSENT.into(), |v| format!("{v:.decimals$}"))
+}

@@ -1,0 +1,30 @@
+use std::io::Write as _;
+
+use clap::Args;
+use kinoise::io::pretty_json;
+use kinoise::schema::{SchemaOf, schema};
+
+use super::common::one_of;
+
+pub const EXAMPLES: &str = "\
+Examples:
+  kinoise schema model
+  kinoise schema diagnosis";
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Whose schema to print on stdout
+    #[arg(value_name = "FILE", value_parser = one_of([
+        ("model", "model.json", SchemaOf::Model),
+        ("diagnosis", "diagnosis.json", SchemaOf::Diagnosis),
+        ("measurements", "measurements.csv, a row an object; what is empty is null", SchemaOf::Measurements),
+    ]))]
+    file: SchemaOf,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let text = pretty_json(&schema(arguments.file))?;
+    // A reader that closes early is no failure.
+    let _ = std::io::stdout().lock().write_all(text.as_bytes());
+    Ok(())
+}

@@ -1,0 +1,130 @@
+//! A sigma image beside every depth image of a sequence, for those who weigh depths.
+
+use std::collections::HashSet;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+
+use super::correction::{Conditions, Correction};
+use super::recording::SIGMA_UNITS_PER_METRE;
+use crate::Progress;
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::io::{encode_png16, write_atomic, write_json};
+use crate::model::NoiseModel;
+use crate::sequence::{Moment, Sequence};
+
+/// What was written.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SigmaImages {
+    pub frames: usize,
+    /// Pixels with a depth, in all frames.
+    pub measured: usize,
+    /// Those whose sigma is beyond what an image can hold, and written as the greatest number.
+    pub clamped: usize,
+    /// Those at a depth beyond the range where sigma was measured: its value at the edge is written.
+    pub beyond: usize,
+    /// Mean sigma of the measured pixels, m.
+    pub mean_m: f64,
+}
+
+/// The greatest number of an image.
+const TOP: f64 = 65535.0;
+
+/// Write into `output`: `sigma/*.png`, 16 bit, in units of 10 um ([`SIGMA_UNITS_PER_METRE`]), 0 where
+/// there is no depth; `sigma.txt`, their stamps and paths as TUM lists have them; `sigma.json`, which
+/// says what the numbers mean. An image has the name of its depth image.
+///
+/// # Errors
+/// When the model is of another sensor, a depth image cannot be read, or `output` not written.
+pub fn sigma_images(
+    sequence: &Sequence,
+    model: &NoiseModel,
+    output: &Path,
+    progress: Progress<'_>,
+) -> Result<SigmaImages> {
+    let correction = Correction::of(model, &sequence.sensor)?;
+    let table = sequence.sensor.code.table();
+    let folder = output.join("sigma");
+    std::fs::create_dir_all(&folder).map_err(|e| Error::write(&folder, e))?;
+    let names = names(&sequence.moments);
+    let begin = sequence.moments.first().map_or(0.0, |m| m.stamp);
+    let done = AtomicUsize::new(0);
+    let [near, far] = model.sigma.domain.z_m;
+    let one = |(moment, name): (&Moment, &String)| -> Result<SigmaImages> {
+        let depth = table.depths(&sequence.depth(moment)?);
+        let session_s = moment.stamp - begin;
+        let conditions = Conditions { session_s, ..Conditions::default() };
+        let sigma = correction.sigma_m(&depth, &conditions)?;
+        let mut found = SigmaImages { frames: 1, ..SigmaImages::default() };
+        for (z, sigma) in depth.iter().zip(&sigma).filter(|(_, s)| s.is_finite()) {
+            found.measured += 1;
+            found.mean_m += sigma;
+            found.clamped += usize::from(sigma * SIGMA_UNITS_PER_METRE > TOP);
+            found.beyond += usize::from(!(near..=far).contains(&f64::from(*z)));
+        }
+        let camera = &sequence.sensor.camera;
+        let raw = sigma.iter().map(|s| number(*s)).collect();
+        let frame = Frame { width: camera.width, height: camera.height, raw };
+        write_atomic(&folder.join(name), &encode_png16(&frame)?)?;
+        progress.step(done.fetch_add(1, Ordering::Relaxed) + 1, sequence.moments.len());
+        Ok(found)
+    };
+    let all = sequence.moments.par_iter().zip(&names).map(one).collect::<Result<Vec<_>>>()?;
+    let mut list = String::from("# timestamp path\n");
+    for (moment, name) in sequence.moments.iter().zip(&names) {
+        // Writing to a String does not fail.
+        let _ = writeln!(list, "{:.6} sigma/{name}", moment.stamp);
+    }
+    write_atomic(&output.join("sigma.txt"), list.as_bytes())?;
+    let about = serde_json::json!({
+        "format": "kinoise-sigma/1",
+        "quantity": "standard deviation of the stored depth along the optical axis, as the model predicts it",
+        "unit": "m",
+        "units_per_metre": SIGMA_UNITS_PER_METRE,
+        "invalid": 0,
+        "valid": model.sigma.domain,
+    });
+    write_json(&output.join("sigma.json"), &about, "report this as a bug")?;
+    let mut sum = all.into_iter().fold(SigmaImages::default(), SigmaImages::and);
+    sum.mean_m /= sum.measured.max(1) as f64;
+    Ok(sum)
+}
+
+impl SigmaImages {
+    fn and(self, other: SigmaImages) -> SigmaImages {
+        SigmaImages {
+            frames: self.frames + other.frames,
+            measured: self.measured + other.measured,
+            clamped: self.clamped + other.clamped,
+            beyond: self.beyond + other.beyond,
+            mean_m: self.mean_m + other.mean_m,
+        }
+    }
+}
+
+/// A measured pixel never reads as one without a depth.
+fn number(sigma_m: f64) -> u16 {
+    if sigma_m.is_finite() {
+        (sigma_m * SIGMA_UNITS_PER_METRE).round().clamp(1.0, TOP) as u16
+    } else {
+        0
+    }
+}
+
+/// The depth images' names, where no two are the same; else their stamps.
+fn names(moments: &[Moment]) -> Vec<String> {
+    let of = |m: &Moment| {
+        let stem = m.depth.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let stem = stem.strip_suffix(".depth").unwrap_or(&stem);
+        format!("{stem}.png")
+    };
+    let named: Vec<String> = moments.iter().map(of).collect();
+    let unique: HashSet<&String> = named.iter().collect();
+    if unique.len() == named.len() {
+        return named;
+    }
+    moments.iter().map(|m| format!("{:.6}.png", m.stamp)).collect()
+}

@@ -1,0 +1,112 @@
+//! NumPy's archive of arrays: a zip of .npy files, stored (numpy.lib.format; PKWARE APPNOTE 6.3).
+
+use super::Exported;
+use super::program::correction_of;
+use super::tables::{SigmaTable, even, frontal, notes_of_bias};
+use crate::error::Result;
+use crate::model::NoiseModel;
+
+/// Depths of the correction, evenly in disparity: linear between two, a bowl that grows with the
+/// square of the disparity is met to a hundredth.
+const DEPTHS: usize = 9;
+
+pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
+    let sigma = SigmaTable::of(model);
+    let mut archive = Archive::default();
+    let doubles = |numbers: &[f64]| numbers.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let mut put = |name: &str, shape: &[usize], numbers: &[f64]| {
+        archive.add(name, &array("<f8", shape, doubles(numbers)));
+    };
+    let (n, m) = (sigma.z_m.len(), sigma.theta_rad.len());
+    put("sigma_z_m", &[n], &sigma.z_m);
+    put("sigma_theta_rad", &[m], &sigma.theta_rad);
+    put("sigma_m", &[n, m], &sigma.sigma_m);
+    let mut notes = Vec::new();
+    match correction_of(model)? {
+        None => notes.push("the model has no sensor: sigma's table alone is in the file".into()),
+        Some((_, correction)) => {
+            let camera = correction.parts().camera;
+            put("intrinsics", &[4], &[camera.fx, camera.fy, camera.cx, camera.cy]);
+            put("distortion", &[5], &camera.distortion.unwrap_or_default());
+            let [near, far] = model.sigma.domain.z_m;
+            let depths: Vec<f64> =
+                even([1.0 / far, 1.0 / near], DEPTHS).iter().rev().map(|q| 1.0 / q).collect();
+            put("correction_z_m", &[DEPTHS], &depths);
+            let mut all = Vec::new();
+            for &depth in &depths {
+                let stored = f64::from(depth as f32);
+                let corrected = frontal(&correction, depth)?;
+                all.extend(corrected.iter().flat_map(|z| ((z - stored) as f32).to_le_bytes()));
+            }
+            let shape = [DEPTHS, camera.height, camera.width];
+            archive.add("correction_m", &array("<f4", &shape, all));
+            notes = notes_of_bias(&correction);
+            if !correction.parts().variance.is_empty() {
+                notes.push(
+                    "what changes the noise beside depth and tilt is not in the table".into(),
+                );
+            }
+        }
+    }
+    Ok(Exported { bytes: archive.finish(), notes })
+}
+
+/// An .npy file, version 1.0.
+fn array(kind: &str, shape: &[usize], data: Vec<u8>) -> Vec<u8> {
+    let sizes: String = shape.iter().map(|n| format!("{n}, ")).collect();
+    let mut head = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({sizes}), }}");
+    // Ten bytes before it, a line's end behind it, and all together a multiple of 64.
+    let padding = 63 - (head.len() + 10) % 64;
+    head.push_str(&" ".repeat(padding));
+    head.push('\n');
+    let mut file = b"\x93NUMPY\x01\x00".to_vec();
+    file.extend((head.len() as u16).to_le_bytes());
+    file.extend(head.as_bytes());
+    file.extend(data);
+    file
+}
+
+/// A zip without compression.
+#[derive(Default)]
+struct Archive {
+    bytes: Vec<u8>,
+    directory: Vec<u8>,
+    files: u16,
+}
+
+/// Version 2.0 wrote it, no flags, stored, at midnight of 1980-01-01.
+const COMMON: [u16; 5] = [20, 0, 0, 0, 33];
+
+impl Archive {
+    fn add(&mut self, name: &str, data: &[u8]) {
+        let name = format!("{name}.npy");
+        let begin = self.bytes.len() as u32;
+        let words = |words: &[u16]| words.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<_>>();
+        let size = data.len() as u32;
+        let mut common = words(&COMMON);
+        common.extend([crc32fast::hash(data), size, size].iter().flat_map(|v| v.to_le_bytes()));
+        common.extend(words(&[name.len() as u16, 0]));
+        self.bytes.extend(b"PK\x03\x04");
+        self.bytes.extend(&common);
+        self.bytes.extend(name.as_bytes());
+        self.bytes.extend(data);
+        self.directory.extend(b"PK\x01\x02");
+        self.directory.extend(words(&[20]));
+        self.directory.extend(&common);
+        self.directory.extend(words(&[0, 0, 0, 0, 0]));
+        self.directory.extend(begin.to_le_bytes());
+        self.directory.extend(name.as_bytes());
+        self.files += 1;
+    }
+
+    fn finish(mut self) -> Vec<u8> {
+        let (begin, size) = (self.bytes.len() as u32, self.directory.len() as u32);
+        self.bytes.extend(&self.directory);
+        self.bytes.extend(b"PK\x05\x06");
+        let counts = [0, 0, self.files, self.files];
+        self.bytes.extend(counts.iter().flat_map(|w| w.to_le_bytes()));
+        self.bytes.extend([size, begin].iter().flat_map(|v| v.to_le_bytes()));
+        self.bytes.extend([0, 0]);
+        self.bytes
+    }
+}

@@ -1,0 +1,88 @@
+//! What a program outside needs of a model: one list of terms, written once for each language.
+
+use super::expressions::{Expressions, number, sigma};
+use crate::correct::{Correction, LearntTerm, Parts};
+use crate::error::Result;
+use crate::model::NoiseModel;
+use crate::terms::Term;
+use crate::view::Sensor;
+
+/// A term of the program: its expression, and when it is taken.
+pub(super) struct Line {
+    pub expression: String,
+    /// Disparities beyond which the place is held, px.
+    pub held: Option<[f64; 2]>,
+    pub asks_temperature: bool,
+}
+
+/// The expressions of a model.
+pub(super) struct Program {
+    pub sigma: String,
+    pub still: Vec<Line>,
+    pub bias: Vec<Line>,
+    pub variance: Vec<Line>,
+    pub expressions: Expressions,
+}
+
+impl Program {
+    /// Of a model whose sensor is known where `parts` are given; names begin with `prefix`.
+    pub fn of(model: &NoiseModel, parts: Option<&Parts<'_>>, prefix: &'static str) -> Self {
+        let mut expressions = Expressions::new(prefix);
+        let mut line = |term: &Term, [low, high]: [f64; 2]| {
+            let bounded = high.is_finite() && term.basis.still_power().is_some();
+            Line {
+                expression: expressions.term(term),
+                held: bounded.then_some([low, high]),
+                asks_temperature: term.needs().temperature,
+            }
+        };
+        let mut lines =
+            |terms: &[LearntTerm]| terms.iter().map(|(t, learnt)| line(t, *learnt)).collect();
+        let bias = parts.map_or_else(Vec::new, |p| lines(p.terms));
+        let variance = parts.map_or_else(Vec::new, |p| lines(p.variance));
+        let still = parts.map_or(&[][..], |p| p.still);
+        let still = still.iter().map(|t| line(t, [0.0, f64::INFINITY])).collect();
+        Program { sigma: sigma(&model.sigma, prefix), still, bias, variance, expressions }
+    }
+}
+
+/// The sensor of a model, and what it takes out of its depth; nothing for a model of a bare table.
+pub(super) fn correction_of(model: &NoiseModel) -> Result<Option<(Sensor, Correction)>> {
+    let Some(sensor) = model.described_sensor()? else { return Ok(None) };
+    let correction = Correction::of(model, &sensor)?;
+    Ok(Some((sensor, correction)))
+}
+
+/// A list of numbers, a few a line.
+pub(super) fn listed(numbers: &[f64]) -> String {
+    const A_LINE: usize = 6;
+    let lines: Vec<String> = numbers
+        .chunks(A_LINE)
+        .map(|few| few.iter().copied().map(number).collect::<Vec<_>>().join(", "))
+        .collect();
+    lines.join(",\n    ")
+}
+
+/// Ids, each once.
+pub(super) fn once<'a>(ids: impl Iterator<Item = &'a str>) -> String {
+    let mut known: Vec<&str> = Vec::new();
+    ids.for_each(|id| known.extend((!known.contains(&id)).then_some(id)));
+    known.join(", ")
+}
+
+/// What programs leave out of a model, told when they are written.
+pub(super) fn left_out(model: &NoiseModel, correction: Option<&Correction>) -> Vec<String> {
+    let mut told = Vec::new();
+    match correction {
+        None => told.push("the model has no sensor: sigma() alone is in the file".to_string()),
+        Some(correction) if !correction.unpredicted().is_empty() => told.push(format!(
+            "not in the file, for they are more than a pixel's bias and noise: {}",
+            once(correction.unpredicted().iter().map(String::as_str))
+        )),
+        Some(_) => {}
+    }
+    if model.effects.iter().any(|e| e.covariance.is_some()) {
+        told.push("the file holds best values; how sure they are stays in model.json".into());
+    }
+    told
+}

@@ -1,0 +1,43 @@
+//! Temporal noise as the Depth Quality Tool has it (`calculate_temporal_noise`): of each pixel the
+//! standard deviation of its measured depths over their median; of all pixels, the median.
+
+use crate::frame::DepthCode;
+use crate::stats::median;
+
+/// The raw values of some pixels over a view's frames.
+pub(super) struct TemporalNoise {
+    measured: Vec<Vec<u16>>,
+    frames: usize,
+}
+
+/// Frames that are kept: ten times what a vendor takes, and a view's memory stays below 100 MB.
+const MAX_FRAMES: usize = 100;
+
+impl TemporalNoise {
+    pub fn of(pixels: usize) -> Self {
+        TemporalNoise { measured: vec![Vec::new(); pixels], frames: 0 }
+    }
+
+    /// A frame's raw values, `None` where there is no depth.
+    pub fn add(&mut self, raw: impl Iterator<Item = Option<u16>>) {
+        if self.frames < MAX_FRAMES {
+            self.frames += 1;
+            self.measured.iter_mut().zip(raw).for_each(|(own, raw)| own.extend(raw));
+        }
+    }
+
+    /// A share of the depth; `None` with a single frame. Pixels that were never measured have none.
+    pub fn median_share(&self, code: &DepthCode) -> Option<f64> {
+        let depths = |raw: &Vec<u16>| raw.iter().filter_map(|&r| code.metres(r)).collect();
+        let measured = self.measured.iter().filter(|raw| !raw.is_empty());
+        let mut shares: Vec<f64> = measured.map(|raw| share(depths(raw))).collect();
+        (self.frames > 1 && !shares.is_empty()).then(|| median(&mut shares))
+    }
+}
+
+fn share(mut depths: Vec<f64>) -> f64 {
+    let count = depths.len() as f64;
+    let mean = depths.iter().sum::<f64>() / count;
+    let variance = depths.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / count;
+    variance.sqrt() / median(&mut depths)
+}
