@@ -90,12 +90,13 @@ pub fn physics(
             Statistic::Dropout => "where measurements are missing",
         };
         let shape = shape.map_or(String::new(), |s| format!(": {s}"));
+        let over = axis.in_words();
         let model = match axis {
             Axis::Frame => "has no term for it",
             _ => "holds it as the curve that was measured",
         };
         return format!(
-            "Unexplained: {what} depends on {axis}{shape}. No effect of the catalogue explains it; the extended model {model}."
+            "Unexplained: {what} depends on the {over}{shape}. No effect of the catalogue explains it; the extended model {model}."
         );
     };
     format!(

@@ -6,18 +6,19 @@ use crate::terms::{Axis, Basis};
 pub fn words(basis: &Basis, beta: &[f64]) -> String {
     match basis {
         Basis::Ring { period, over, .. } => {
-            let unit = over.axis();
+            let axis = over.axis();
             if matches!(basis.axis(), Axis::DisparityPhase) {
                 format!("periodic in the disparity, period {period:.3} px")
             } else {
-                format!("periodic in {unit}, period {period:.3}")
+                format!("periodic in the {}, period {period:.3} {}", axis.in_words(), axis.unit())
             }
         }
         Basis::Map { .. } | Basis::Spline { .. } => {
             "a smooth pattern that stands still in the picture".into()
         }
         Basis::Pair { over, .. } => {
-            format!("depends on {} and {} together", over[0].axis(), over[1].axis())
+            let [a, b] = over.map(|o| o.axis().in_words());
+            format!("depends on the {a} and the {b} together")
         }
         Basis::Curve { low, high, nodes, .. } => {
             if *nodes == 2 {

@@ -32,6 +32,28 @@ pub enum Axis {
 }
 
 impl Axis {
+    /// As a sentence calls it, after "the".
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Axis::Z => "distance from the sensor",
+            Axis::DisparityPhase => "phase of the disparity",
+            Axis::Column => "column of the picture",
+            Axis::Row => "row of the picture",
+            Axis::Radius => "distance from the picture's centre",
+            Axis::Pixel => "pixel",
+            Axis::Theta => "tilt of the target",
+            Axis::Azimuth => "azimuth of the tilt",
+            Axis::TargetPosition => "place on the target",
+            Axis::EdgeDistance => "distance from the target's edge",
+            Axis::Intensity => "infrared intensity",
+            Axis::Frame => "time within a view",
+            Axis::SessionTime => "time since the session began",
+            Axis::Temperature => "temperature",
+            Axis::PixelLag => "distance between two pixels",
+            Axis::Residual => "size of the residual",
+        }
+    }
+
     /// As `diagnosis.json` writes it.
     pub fn id(self) -> &'static str {
         match self {

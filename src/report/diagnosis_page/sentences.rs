@@ -126,24 +126,7 @@ pub(super) fn physics(finding: &Finding) -> String {
 }
 
 pub(super) fn axis(axis: Axis) -> &'static str {
-    match axis {
-        Axis::Z => "distance from the sensor",
-        Axis::DisparityPhase => "phase of the disparity",
-        Axis::Column => "column of the picture",
-        Axis::Row => "row of the picture",
-        Axis::Radius => "distance from the picture's centre",
-        Axis::Pixel => "pixel",
-        Axis::Theta => "tilt of the target",
-        Axis::Azimuth => "azimuth of the tilt",
-        Axis::TargetPosition => "place on the target",
-        Axis::EdgeDistance => "distance from the target's edge",
-        Axis::Intensity => "infrared intensity",
-        Axis::Frame => "time within a view",
-        Axis::SessionTime => "time since the session began",
-        Axis::Temperature => "temperature",
-        Axis::PixelLag => "distance between two pixels",
-        Axis::Residual => "size of the residual",
-    }
+    axis.in_words()
 }
 
 /// What of a reading is not as the model has it.

@@ -60,6 +60,11 @@ fn line(i: usize, f: &Finding) -> Vec<Markup> {
     ]
 }
 
+/// Is it an error of what was measured, which no correction takes out?
+fn is_of_target(f: &Finding) -> bool {
+    !f.terms.is_empty() && f.terms.iter().all(|t| !t.belongs_to_sensor())
+}
+
 /// In a few words; the finding's own part says it in full.
 fn short_advice(f: &Finding) -> String {
     match (f.status, &f.next_view) {
@@ -67,6 +72,7 @@ fn short_advice(f: &Finding) -> String {
             let tilt = fixed(view.theta_rad.to_degrees(), 0);
             format!("one more view: {} m, tilt {tilt}°", fixed(view.z_m, 2))
         }
+        (Status::Named, _) if is_of_target(f) => "use a flatter target: the sensor is right".into(),
         (Status::Named, _) if f.statistic == Statistic::Bias => {
             "`kinoise correct` takes it out".into()
         }
