@@ -76,12 +76,6 @@ pub fn correct_recording(
     let recording = open_uncut(root, assumed)?;
     let sensor = &recording.sensor;
     let images = images(&recording, root)?;
-    if let Some(image) = images.first().filter(|image| is_corrected(&root.join(&image.file))) {
-        return Err(Error::Argument {
-            what: format!("{} is corrected already", root.join(&image.file).display()),
-            remedy: "give the recording that it was made from: a bias is taken out once",
-        });
-    }
     let mut rewrite = Rewrite {
         root,
         output,
@@ -94,7 +88,7 @@ pub fn correct_recording(
     };
     if options.sigma.is_some() && !rewrite.correction.knows_uncertainty() {
         return Err(Error::Argument {
-            what: "none of the model's biases has a covariance or a standard error".into(),
+            what: "the model does not say how sure its biases are: none has a covariance or a standard error".into(),
             remedy: "take the model.json of a diagnosis, which has them, or leave out --sigma",
         });
     }
@@ -112,7 +106,15 @@ pub fn correct_recording(
         });
         write_atomic(&folder.join("sigma.json"), format!("{about:#}\n").as_bytes())?;
     }
-    rewrite.write(&images, &recording, progress)
+    let mut corrected = rewrite.write(&images, &recording, progress)?;
+    let already = |image: &&Image| is_corrected(&image.source.path);
+    if let Some(image) = images.first().filter(already).filter(|_| corrected.changed > 0) {
+        corrected.remarks.push(format!(
+            "{} is corrected already: the model must be of a diagnosis of that, for a bias is taken out once",
+            root.join(&image.file).display()
+        ));
+    }
+    Ok(corrected)
 }
 
 /// A depth image to be written again.

@@ -44,7 +44,11 @@ fn colour_belongs_within_a_fiftieth_of_a_second() {
         .collect();
     // 0.050 is nearer to 0.066 than to 0.033, and each is used once.
     assert_eq!(names, [Some("0.png".into()), None, Some("1.png".into())]);
-    assert!(remarked(&sequence, "1 of 3 depth images has no colour image"), "{:?}", sequence.remarks);
+    assert!(
+        remarked(&sequence, "1 of 3 depth images has no colour image"),
+        "{:?}",
+        sequence.remarks
+    );
 }
 
 #[test]

@@ -480,7 +480,7 @@ fn a_corrected_recording_is_back_at_noise_level() {
 }
 
 #[test]
-fn a_recording_is_corrected_once() {
+fn a_second_correction_is_told() {
     let files = Files::new();
     let recording =
         files.recording(METRIC, vec![Active::parse("radial-disparity-bias").expect("an effect")]);
@@ -489,9 +489,8 @@ fn a_recording_is_corrected_once() {
     let arguments = ["correct", "out", "-m", "model.json", "-o", "again"];
     let output = kinoise().current_dir(files.at("")).args(arguments).output().expect("it runs");
     let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(output.status.success(), "{said}");
     assert!(said.contains("is corrected already"), "{said}");
-    assert!(!files.at("again").exists());
 }
 
 /// References give a law its standard error, which is that of the depth: 1 % of it by the scale.
@@ -508,7 +507,7 @@ fn a_law_has_its_own_uncertainty() {
     let refused = error(Value::Null);
     assert_eq!(refused.status.code(), Some(2));
     let said = String::from_utf8_lossy(&refused.stderr);
-    assert!(said.contains("none of the model's biases has a covariance"), "{said}");
+    assert!(said.contains("none has a covariance"), "{said}");
     let output = error(json!(0.01));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let corrected = open_uncut(&files.at("out"), &Assumed::default()).expect("opened");

@@ -176,7 +176,10 @@ fn nothing_is_written_into_an_input() {
     ] {
         desk.refused(line, &["would replace", "which is read"]);
     }
-    desk.refused("calibrate cal/sigma.svg -o new", &["not a folder"]);
+    desk.refused(
+        "calibrate cal/sigma.svg -o new",
+        &["neither a folder nor a file that holds a film"],
+    );
 }
 
 #[cfg(unix)]
