@@ -2,10 +2,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};
-use kinoise::evaluate::{Delta, Evaluation, Spread, evaluate};
+use kinoise::evaluate::{Delta, Evaluation, Spread, clock_offset, evaluate};
 use kinoise::io::OutputFolder;
 use kinoise::report::{Against, Origin, evaluation_page};
-use kinoise::trajectory::read_benchmark;
+use kinoise::trajectory::{Pose, read_benchmark};
 use kinoise::units::counted;
 use serde_json::{Value, json};
 
@@ -17,7 +17,8 @@ use super::output::{EVALUATION, begin};
 pub const EXAMPLES: &str = "\
 Examples:
   kinoise evaluate --truth groundtruth.txt --estimate out/desk/trajectory.txt
-  kinoise evaluate --truth groundtruth.txt --estimate out/desk/trajectory.txt --delta 30 --delta-unit f";
+  kinoise evaluate --truth groundtruth.txt --estimate out/desk/trajectory.txt --delta 30 --delta-unit f
+  kinoise evaluate --truth groundtruth.txt --estimate out/desk/trajectory.txt --offset auto";
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -33,6 +34,10 @@ pub struct Arguments {
     /// The interval over which the relative error is taken
     #[arg(long, value_name = "N", default_value_t = 1.0, allow_hyphen_values = true)]
     delta: f64,
+    /// Seconds to add to the estimate's times first, or auto: as many as both trajectories' turning
+    /// says (it is found always, and told where it is significant)
+    #[arg(long, value_name = "S|auto", value_parser = offset, allow_hyphen_values = true)]
+    offset: Option<Offset>,
     /// The unit of that interval
     #[arg(long, value_enum, default_value = "s", value_name = "UNIT")]
     delta_unit: Unit,
@@ -46,7 +51,35 @@ enum Unit {
     F,
 }
 
+#[derive(Debug, Clone, Copy)]
+enum Offset {
+    Seconds(f64),
+    Auto,
+}
+
+fn offset(text: &str) -> Result<Offset, String> {
+    if text == "auto" {
+        return Ok(Offset::Auto);
+    }
+    let seconds = text.parse().ok().filter(|s: &f64| s.is_finite());
+    seconds.map(Offset::Seconds).ok_or_else(|| "give seconds, or auto".into())
+}
+
 impl Arguments {
+    /// What the estimate's clock is to be set forward by, s.
+    fn shift(&self, truth: &[Pose], estimate: &[Pose]) -> anyhow::Result<f64> {
+        match self.offset {
+            None => Ok(0.0),
+            Some(Offset::Seconds(seconds)) => Ok(seconds),
+            Some(Offset::Auto) => match clock_offset(truth, estimate) {
+                Some(found) => Ok(found.seconds),
+                None => bail!(
+                    "--offset auto: the trajectories turn too little together to tell; give --offset in seconds"
+                ),
+            },
+        }
+    }
+
     fn delta(&self) -> anyhow::Result<Delta> {
         let positive = self.delta.is_finite() && self.delta > 0.0;
         match self.delta_unit {
@@ -64,11 +97,16 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let delta = arguments.delta()?;
     let truth_file = file_in(&arguments.truth, "groundtruth.txt");
     let estimate_file = file_in(&arguments.estimate, "trajectory.txt");
-    let [truth, estimate] =
+    let [truth, mut estimate] =
         [read_benchmark(&truth_file)?.poses, read_benchmark(&estimate_file)?.poses];
     let inputs = [&*truth_file, &*estimate_file];
     let new = |place: &PathBuf| begin(place, EVALUATION, &inputs, global);
     let output = arguments.output.as_ref().map(new).transpose()?;
+    let shift = arguments.shift(&truth, &estimate)?;
+    if arguments.offset.is_some() {
+        estimate.iter_mut().for_each(|pose| pose.stamp += shift);
+        say(format!("the estimate's clock is set by {:+.1} ms", 1e3 * shift));
+    }
     let evaluation = evaluate(&truth, &estimate, delta)?;
     report(&evaluation, arguments);
     if let Some(output) = output {
@@ -128,6 +166,10 @@ pub fn as_json(evaluation: &Evaluation) -> Value {
         "rpe_translation": spread(&evaluation.rpe.translation, "m"),
         "rpe_rotation": spread(&evaluation.rpe.rotation.scaled(1f64.to_degrees()), "deg"),
     });
+    if let Some(offset) = evaluation.offset {
+        value["clock_offset"] =
+            json!({"seconds": offset.seconds, "std_error_s": offset.std_error_s});
+    }
     if !evaluation.remarks.is_empty() {
         value["remarks"] = json!(evaluation.remarks);
     }

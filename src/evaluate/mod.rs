@@ -5,8 +5,10 @@
 //! * ATE: positions of associated poses after the best rigid alignment ([`align`], no scale).
 //! * RPE: the motion over a fixed interval, estimated against true, needs no alignment.
 
+mod offset;
 mod rpe;
 
+pub use offset::{ClockOffset, clock_offset};
 pub use rpe::{Delta, Rpe, relative};
 
 use std::path::Path;
@@ -21,6 +23,8 @@ use crate::trajectory::{Pose, associate, read_benchmark};
 pub struct Evaluation {
     pub ate: Ate,
     pub rpe: Rpe,
+    /// What the estimate's clock lacks of the truth's, where it can be told.
+    pub offset: Option<ClockOffset>,
     /// What was found odd.
     pub remarks: Vec<String>,
 }
@@ -28,10 +32,20 @@ pub struct Evaluation {
 /// Of poses in time order.
 /// An error when too few of them belong to the same moments.
 pub fn evaluate(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Evaluation> {
-    let remarks = swapped(truth, estimate).into_iter().collect();
+    let offset = clock_offset(truth, estimate);
+    let told = offset.filter(ClockOffset::is_significant).map(|o| {
+        let way = if o.seconds > 0.0 { "behind" } else { "ahead of" };
+        format!(
+            "the estimate's clock is {:.1} ± {:.1} ms {way} the truth's, by how both turn",
+            1e3 * o.seconds.abs(),
+            1e3 * o.std_error_s
+        )
+    });
+    let remarks = swapped(truth, estimate).into_iter().chain(told).collect();
     Ok(Evaluation {
         ate: absolute(truth, estimate)?,
         rpe: relative(truth, estimate, delta)?,
+        offset,
         remarks,
     })
 }
@@ -180,13 +194,18 @@ pub fn align(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Isometry3<f64>> {
     let to = pairs.iter().map(|p| p.0).sum::<Vector3<f64>>() / n;
     let from = pairs.iter().map(|p| p.1).sum::<Vector3<f64>>() / n;
     let spread: Matrix3<f64> = pairs.iter().map(|p| (p.0 - to) * (p.1 - from).transpose()).sum();
+    let rotation = nearest_rotation(&spread)?;
+    Some(Isometry3::from_parts(Translation3::from(to - rotation * from), rotation))
+}
+
+/// What turns the second vectors nearest to the first, whose sum of products is `spread`.
+fn nearest_rotation(spread: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
     let svd = spread.svd(true, true);
     let (u, v_t) = (svd.u?, svd.v_t?);
     // A reflection fits better than any rotation: turn the least certain axis over.
     let hand = if u.determinant() * v_t.determinant() < 0.0 { -1.0 } else { 1.0 };
     let turn = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, hand)) * v_t;
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
-    Some(Isometry3::from_parts(Translation3::from(to - rotation * from), rotation))
+    Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn)))
 }
 
 #[cfg(test)]
