@@ -78,7 +78,7 @@ impl After<'_> {
         let mut commands = Vec::new();
         let mut others = Vec::new();
         for finding in &self.diagnosis.findings {
-            let Some(effect) = finding.as_effect() else {
+            let Some(effect) = finding.as_effect().filter(|e| !e.is_identity()) else {
                 others.extend((!finding.minor).then_some(finding));
                 continue;
             };

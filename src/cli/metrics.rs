@@ -64,8 +64,8 @@ fn report(found: &Metrics) {
         for group in &found.by_distance {
             let [low, high] = group.range_m;
             result(format!(
-                "{low:.1} to {high:.1} m, {} views: Z-accuracy {} %, plane-fit RMS {:.2} mm, sub-pixel RMS {} px, temporal {} %, fill {:.1} %",
-                group.views,
+                "{low:.1} to {high:.1} m, {}: Z-accuracy {} %, plane-fit RMS {:.2} mm, sub-pixel RMS {} px, temporal {} %, fill {:.1} %",
+                counted(group.views, "view"),
                 optional(group.mean.z_accuracy.map(|v| 1e2 * v), 2),
                 1e3 * group.mean.plane_fit_rms_m,
                 optional(group.mean.subpixel_rms_px, 3),
