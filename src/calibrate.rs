@@ -19,6 +19,7 @@ use crate::model::{
     Direction, FitSummary, Form, HeldOut, NoiseModel, Provenance, SigmaFit, SigmaModel,
     compare_forms, sort_out,
 };
+use crate::read::read_bytes;
 use crate::rng::Seed;
 use crate::units::verb;
 use crate::view::{Excluded, Recording, RecordingFile};
@@ -164,15 +165,16 @@ pub fn model_of_table(
     source: &Path,
     options: &CalibrateOptions,
 ) -> Result<Calibration> {
-    let (fit, comparison) = fit_chosen(table, options.form)?;
+    let (table, pooled) = table.binned();
+    let (fit, comparison) = fit_chosen(&table, options.form)?;
     let mut provenance = options.provenance(None);
     provenance.options.insert("form".into(), json!(fit.form.id()));
-    let bytes = std::fs::read(source).map_err(|e| Error::read(source, e))?;
+    let bytes = read_bytes(source)?;
     let name = source.file_name().unwrap_or_default().to_string_lossy().into_owned();
     provenance.sha256.insert(name, json!(sha256_hex(&bytes)));
-    let warnings = fit.remarks.clone();
+    let warnings = pooled.into_iter().chain(fit.remarks.iter().cloned()).collect();
     let model = noise_model(None, &fit, &comparison, SigmaKind::Spatial, provenance);
-    Ok(Calibration { table: table.clone(), fit, comparison, model, warnings })
+    Ok(Calibration { table, fit, comparison, model, warnings })
 }
 
 fn fit_chosen(table: &SigmaTable, form: Option<Form>) -> Result<(SigmaFit, Vec<HeldOut>)> {
@@ -232,7 +234,7 @@ fn hashes(recording: &Recording, measurements: &Measurements) -> Result<Map<Stri
     let mut files: Vec<&PathBuf> = recording.described_by.iter().collect();
     files.sort();
     for path in files {
-        described.update(std::fs::read(path).map_err(|e| Error::read(path, e))?);
+        described.update(read_bytes(path)?);
     }
     map.insert("description".into(), json!(hex(&described.finalize())));
     let mut frames = Sha256::new();

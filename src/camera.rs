@@ -26,7 +26,7 @@ pub struct Camera {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum CameraFault {
     /// No pixel, or more than any sensor has; px.
-    #[error("image size {0} x {1} px is not usable")]
+    #[error("width x height, {0} x {1} px, is no image size")]
     Size(usize, usize),
     /// fx, fy, px.
     #[error("focal lengths fx = {}, fy = {} px must be positive", shortest(*.0), shortest(*.1))]

@@ -45,11 +45,6 @@ pub enum Error {
     Solver { what: String, remedy: &'static str },
 }
 
-/// The text of a file.
-pub(crate) fn read_text(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path).map_err(|e| Error::read(path, e))
-}
-
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 fn at_line(line: usize) -> String {

@@ -103,14 +103,18 @@ impl DepthCode {
     pub fn fault(&self) -> Option<String> {
         match *self {
             DepthCode::Metric { units_per_metre, .. } => {
-                (!(units_per_metre.is_finite() && units_per_metre > 0.0)).then(|| {
-                    format!("units_per_metre = {} must be positive", shortest(units_per_metre))
+                let [low, high] = UNITS_PER_METRE;
+                (!(low..=high).contains(&units_per_metre)).then(|| {
+                    let shown = shortest(units_per_metre);
+                    format!("units_per_metre = {shown} is not from {low} to {high}")
                 })
             }
             DepthCode::Disparity { offset, slope, .. } => {
-                (!offset.is_finite() || !slope.is_finite() || slope == 0.0).then(|| {
+                let [fine, coarse] = SLOPE;
+                let good = offset.abs() <= MAX_OFFSET && (fine..=coarse).contains(&slope.abs());
+                (!good).then(|| {
                     format!(
-                        "raw_disparity offset = {}, slope = {} give no depth",
+                        "raw_disparity offset = {}, slope = {} give no depth: the offset is up to {MAX_OFFSET} 1/m, the slope {fine} to {coarse} 1/m either way",
                         shortest(offset),
                         shortest(slope)
                     )
@@ -119,6 +123,13 @@ impl DepthCode {
         }
     }
 }
+
+/// From decimetres to micrometres, of which 16 bit hold 65 mm.
+const UNITS_PER_METRE: [f64; 2] = [10.0, 1e6];
+/// One over the depth of the raw value 0, 1/m: a centimetre.
+const MAX_OFFSET: f64 = 100.0;
+/// Of a raw unit, 1/m. A Kinect has 0.003; the finest is 1/256 px of a stereo pair on a car's roof.
+const SLOPE: [f64; 2] = [1e-7, 1.0];
 
 /// Farther than any sensor of this kind can see: 1/(c0 + c1 raw) has a pole, and values just
 /// before it would otherwise count as walls a kilometre away.

@@ -157,6 +157,8 @@ pub mod docs;
 
 pub mod error;
 
+mod read;
+
 pub mod progress;
 
 pub mod rng;

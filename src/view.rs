@@ -10,6 +10,12 @@ use crate::units::shortest;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// From half of the smallest structured-light module's (1 cm) to twice the longest stereo rig's on a
+/// car's roof (1.5 m).
+const BASELINE_M: [f64; 2] = [0.005, 3.0];
+/// Where a disparity is as large as the image is wide. Stereo cameras on cars see from 2 to 3 m on.
+const MAX_NEAREST_M: f64 = 10.0;
+
 /// The unit that was recorded: everything `recording.json` says about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensor {
@@ -31,12 +37,25 @@ impl Sensor {
 
     /// What is wrong with these numbers, if anything.
     pub fn fault(&self) -> Option<String> {
-        let baseline = self
-            .baseline_m
-            .filter(|b| !(b.is_finite() && *b > 0.0))
-            .map(|b| format!("baseline_m = {} must be positive", shortest(b)));
         let camera = self.camera.fault().map(|fault| fault.to_string());
-        camera.or_else(|| self.code.fault()).or(baseline)
+        camera.or_else(|| self.code.fault()).or_else(|| self.baseline_fault())
+    }
+
+    fn baseline_fault(&self) -> Option<String> {
+        let baseline_m = self.baseline_m?;
+        let shown = shortest(baseline_m);
+        let [low, high] = BASELINE_M;
+        if !(low..=high).contains(&baseline_m) {
+            return Some(format!("baseline_m = {shown} is not from {low} to {high} m"));
+        }
+        let Camera { fx, width, .. } = self.camera;
+        let nearest_m = fx * baseline_m / width as f64;
+        (nearest_m > MAX_NEAREST_M).then(|| {
+            format!(
+                "baseline_m = {shown} and fx = {} px let both eyes meet first {nearest_m:.0} m away",
+                shortest(fx)
+            )
+        })
     }
 }
 

@@ -5,7 +5,8 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::wanted::{Pose, Tolerance, Wanted, WantedView};
-use crate::error::{Error, Result, read_text};
+use crate::error::{Error, Result};
+use crate::read::read_json;
 
 /// What of `diagnosis.json` matters here.
 #[derive(Deserialize)]
@@ -41,7 +42,7 @@ impl Wanted {
     /// # Errors
     /// When it is no diagnosis, advises nothing, or a pose that cannot be.
     pub fn advised(path: &Path) -> Result<Self> {
-        let text = read_text(path)?;
+        let text = read_json(path)?;
         let refuse = |line: usize, what: String, remedy: &'static str| Error::Text {
             path: path.into(),
             line,

@@ -56,17 +56,15 @@ impl Playback {
 
     /// An infrared image of the depth frame's size, or none.
     fn amplitude(&mut self, path: &Path, depth: &Frame) -> Option<Frame> {
-        let why = match InfraredImage::read(path) {
+        match InfraredImage::read(path, [depth.width, depth.height]) {
             Ok(InfraredImage { width, height, amplitude }) => {
-                if (width, height) == (depth.width, depth.height) {
-                    return Some(Frame { width, height, raw: amplitude });
-                }
-                format!("{}: {width} x {height} px", path.display())
+                Some(Frame { width, height, raw: amplitude })
             }
-            Err(e) => e.to_string(),
-        };
-        self.remarks.push(format!("infrared left out: {why}"));
-        None
+            Err(why) => {
+                self.remarks.push(format!("infrared left out: {why}"));
+                None
+            }
+        }
     }
 
     fn keep_pace(&mut self, stamp: f64) {

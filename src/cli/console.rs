@@ -44,8 +44,42 @@ impl Verbosity {
 fn print(least: u8, text: &str) {
     if LEVEL.load(Ordering::Relaxed) >= least {
         let mut err = std::io::stderr().lock();
-        let _ = writeln!(err, "{text}");
+        let _ = writeln!(err, "{}", escaped(text, |c| c == '\n'));
     }
+}
+
+/// Text with what would steer a terminal, or write a line of its own, made visible: names of files and
+/// words in them are anybody's.
+fn escaped(text: &str, kept: impl Fn(char) -> bool) -> String {
+    let steers = |c: char| {
+        // Beside the control characters those that turn the direction of writing, and other line ends.
+        c.is_control() || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    let shown = |c: char| match steers(c) && !kept(c) {
+        true => c.escape_default().to_string(),
+        false => c.into(),
+    };
+    text.chars().map(shown).collect()
+}
+
+/// Longer messages lose their middle: what is said first and what is to be done last stay.
+const MAX_MESSAGE: usize = 1200;
+
+/// A message on one line.
+pub fn one_line(text: &str) -> String {
+    let count = text.chars().count();
+    if count <= MAX_MESSAGE {
+        return escaped(text, |_| false);
+    }
+    let half = MAX_MESSAGE / 2;
+    let head: String = text.chars().take(half).collect();
+    let tail: String = text.chars().skip(count - half).collect();
+    let cut = count - 2 * half;
+    format!(
+        "{} ... ({cut} characters) ... {}",
+        escaped(&head, |_| false),
+        escaped(&tail, |_| false)
+    )
 }
 
 /// What the command was run for; also with --quiet.
@@ -101,7 +135,7 @@ pub fn notes(remarks: impl IntoIterator<Item = impl Display>) {
     let mut known = HashSet::new();
     let mut remarks =
         remarks.into_iter().map(|r| r.to_string()).filter(|r| known.insert(r.clone()));
-    remarks.by_ref().take(MAX_NOTES).for_each(|remark| say(format!("note: {remark}")));
+    remarks.by_ref().take(MAX_NOTES).for_each(|remark| say(format!("note: {}", one_line(&remark))));
     match remarks.count() {
         0 => {}
         more => say(format!("note: and {more} more like these")),

@@ -15,7 +15,9 @@ use kinoise::view::ViewNotes;
 use kinoise::{Form, NoiseModel, Recording, Seed, Sensor};
 
 use super::common::{Global, Input, say_differences, source_date};
-use super::console::{detail, detail_model, detail_recording, next_step, result, say, working};
+use super::console::{
+    detail, detail_model, detail_recording, next_step, one_line, result, say, working,
+};
 use super::diagnose_next::{After, NextStep};
 use super::origin::origin;
 use super::output::{DIAGNOSIS, begin};
@@ -189,7 +191,7 @@ fn summary(diagnosis: &Diagnosis) -> String {
         Verdict::Mismatch => format!("mismatch: {held_against} leaves out\n"),
     };
     for sentence in story(diagnosis) {
-        text += &format!("  {sentence}\n");
+        text += &format!("  {}\n", one_line(&sentence));
     }
     text.trim_end().to_string()
 }

@@ -119,7 +119,7 @@ pub fn main() -> ExitCode {
             return if e.use_stderr() { ExitCode::from(FAILURE) } else { ExitCode::SUCCESS };
         }
         Err(e) => {
-            eprintln!("kinoise: {}", one_line(&e));
+            eprintln!("kinoise: {}", console::one_line(&one_line(&e)));
             return ExitCode::from(FAILURE);
         }
     };
@@ -127,7 +127,7 @@ pub fn main() -> ExitCode {
         Ok(code) => ExitCode::from(code),
         Err(e) => {
             output::wait_if_interrupted();
-            eprintln!("kinoise: {e:#}");
+            eprintln!("kinoise: {}", console::one_line(&format!("{e:#}")));
             ExitCode::from(FAILURE)
         }
     }

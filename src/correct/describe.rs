@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
 use crate::io::{DESCRIPTION, Layout, pretty_json, write_atomic, write_recording_file};
+use crate::read::read_json;
 use crate::view::Sensor;
 
 /// Say in recording.json of `folder` what the raw values mean now; what else it says stays. `images`
@@ -34,7 +35,7 @@ pub(super) fn describe(
         }
         Layout::Recording | Layout::Sequence | Layout::Images => {
             let path = folder.join(DESCRIPTION);
-            match std::fs::read_to_string(&path) {
+            match read_json(&path) {
                 Ok(text) => write_atomic(&path, with_code(&text, &sensor.code)?.as_bytes()),
                 Err(_) => write_recording_file(folder, sensor),
             }

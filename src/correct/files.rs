@@ -1,15 +1,25 @@
 //! The files of a recording beside its depth images.
 
+use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::io::{is_description, write_atomic};
+use crate::io::{is_description, write_atomic_with};
+use crate::read::open;
 
 /// Folders in folders: more is a link that leads back to where it stands.
 const MAX_DEPTH: usize = 12;
 
+/// The longest file that is copied, bytes: an hour of raw video. A sparse file of a terabyte would
+/// fill the disk.
+const MAX_BYTES: u64 = 1 << 35;
+
 /// Every file below `root`, as paths relative to it, in name order.
+///
+/// # Errors
+/// When one is no regular file, or is a link that leads out of `root`: what it names may be private.
 pub(super) fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
+    let real_root = root.canonicalize().map_err(|e| Error::read(root, e))?;
     let mut files = Vec::new();
     let mut folders = vec![(PathBuf::new(), 0)];
     while let Some((folder, depth)) = folders.pop() {
@@ -17,8 +27,13 @@ pub(super) fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
         for entry in std::fs::read_dir(&here).map_err(|e| Error::read(&here, e))? {
             let name = entry.map_err(|e| Error::read(&here, e))?.file_name();
             let path = folder.join(name);
-            if !root.join(&path).is_dir() {
+            let full = root.join(&path);
+            refuse_leading_out(&full, &real_root)?;
+            if full.is_file() {
                 files.push(path);
+            } else if !full.is_dir() {
+                let what = "neither a file nor a folder";
+                return Err(Error::recording(&full, what, "take it out of the recording"));
             } else if depth < MAX_DEPTH {
                 folders.push((path, depth + 1));
             } else {
@@ -34,6 +49,19 @@ pub(super) fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
+/// An error of a link that leads out of `root`, which has no links in it.
+fn refuse_leading_out(path: &Path, root: &Path) -> Result<()> {
+    if !path.is_symlink() {
+        return Ok(());
+    }
+    let target = path.canonicalize().map_err(|e| Error::read(path, e))?;
+    if target.starts_with(root) {
+        return Ok(());
+    }
+    let what = "a link that leads out of the recording";
+    Err(Error::recording(path, what, "copy into the recording what it names, or take it out"))
+}
+
 /// Is it a file without which a folder is no recording, and which therefore comes last?
 pub(super) fn makes_a_recording(file: &Path) -> bool {
     is_description(file.file_name().and_then(|n| n.to_str()).unwrap_or_default())
@@ -44,8 +72,14 @@ pub(super) fn copy(from: &Path, to: &Path, files: &[&PathBuf]) -> Result<()> {
     for file in files {
         let (source, target) = (from.join(file), to.join(file));
         make_folder_of(&target)?;
-        let bytes = std::fs::read(&source).map_err(|e| Error::read(&source, e))?;
-        write_atomic(&target, &bytes)?;
+        let mut reader = open(&source)?;
+        let length = reader.metadata().map_err(|e| Error::read(&source, e))?.len();
+        if length > MAX_BYTES {
+            let what = format!("{} GB, more than is copied ({} GB)", length >> 30, MAX_BYTES >> 30);
+            return Err(Error::recording(&source, what, "take it out of the recording"));
+        }
+        // Piece by piece: it may be longer than memory.
+        write_atomic_with(&target, |file| io::copy(&mut reader, file).map(drop))?;
     }
     Ok(())
 }

@@ -18,6 +18,7 @@ use crate::io::{
     is_corrected, open_uncut, read_depth, refuse_full, refuse_inside, write_atomic,
 };
 use crate::model::NoiseModel;
+use crate::read::read_image;
 use crate::view::{FrameRef, Recording, Sensor};
 
 /// What was done to a recording.
@@ -258,7 +259,7 @@ impl Rewrite<'_> {
             target.set_extension("png");
         }
         make_folder_of(&target)?;
-        let stored = || std::fs::read(&source.path).map_err(|e| Error::read(&source.path, e));
+        let stored = || read_image(&source.path);
         let mut frame = match self.read(image) {
             Ok(frame) => frame,
             Err(why) if source.within.is_some() => return Err(why),

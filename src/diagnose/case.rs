@@ -20,7 +20,7 @@ use super::steps::{Steps, lattice};
 use super::structure::{Structure, fixed_px2_by_view, structures};
 use super::tails::tails;
 use crate::Progress;
-use crate::effects::RAY_FOR_DEPTH;
+use crate::effects::{Active, RAY_FOR_DEPTH};
 use crate::error::Result;
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
@@ -76,6 +76,7 @@ impl<'a> Case<'a> {
         options: &'a DiagnoseOptions,
         progress: Progress<'a>,
     ) -> Result<Self> {
+        Active::check_ranges(&model.effects)?;
         progress.stage("measuring the views");
         let sensor = &recording.sensor;
         if simulated.is_none() {

@@ -128,10 +128,8 @@ impl Field {
     /// Read the view's first infrared image; one that cannot be read is as none.
     fn look(&mut self, view: &View, rays: &Rays) {
         let Some(frame) = view.infrared.first() else { return };
-        let Ok(image) = InfraredImage::read(&frame.path) else { return };
-        if image.width != self.width || image.amplitude.len() < self.width {
-            return;
-        }
+        let size = [self.width, rays.x.len() / self.width];
+        let Ok(image) = InfraredImage::read(&frame.path, size) else { return };
         let n = self.plane.q.normalize();
         let light = self.pixels.iter().map(|&i| {
             let (x, y) = rays.at(i as usize);

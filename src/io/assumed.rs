@@ -7,6 +7,7 @@ use super::raw_values::{OPENKINECT, RawValues};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
+use crate::read::read_text;
 use crate::units::shortest;
 use crate::view::{FrameRef, Sensor};
 
@@ -63,7 +64,7 @@ fn published(list: &Path, size: (usize, usize)) -> Option<&'static Published> {
     if size != USUAL_SIZE {
         return None;
     }
-    let list = std::fs::read_to_string(list).ok()?;
+    let list = read_text(list).ok()?;
     let mut head = list.lines().take_while(|line| line.starts_with('#'));
     head.find_map(|line| FREIBURG.iter().find(|p| line.contains(p.name)))
 }

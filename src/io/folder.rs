@@ -9,8 +9,9 @@ use super::layout::{DEPTH_LIST, DESCRIPTION, UnknownKeys, is_view, read_sensor};
 use super::list::{read_list, shorten};
 use super::output::{entries, listed, refuse_full, write_atomic};
 use super::stills::{Film, Footage};
-use crate::error::{Error, Result, read_text};
+use crate::error::{Error, Result};
 use crate::frame::Frame;
+use crate::read::read_text;
 use crate::view::{FrameRef, Sensor};
 
 /// depth.txt and depth/ as in the TUM benchmark, read as a film of a target. A recording.json

@@ -1,6 +1,5 @@
-//! Depth, infrared and colour images, read and written: PNG, PGM as fakenect writes it; JPEG read.
+//! Depth images read and written, and colour written: PNG, PGM as fakenect writes it.
 
-use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -10,6 +9,7 @@ use sha2::{Digest, Sha256};
 use crate::camera::usable_size;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
+use crate::read::{open, read_image};
 use crate::view::FrameRef;
 
 /// Reads frames of one fixed size and keeps the hash of all bytes it has read.
@@ -40,7 +40,7 @@ impl FrameSource {
 
     /// One image file. Errors as those of [`FrameSource::frame`].
     pub fn read(&mut self, path: &Path) -> Result<Frame> {
-        let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
+        let bytes = read_image(path)?;
         self.hash.update(&bytes);
         sized(path, decode(path, &bytes)?, self.width, self.height)
     }
@@ -70,30 +70,6 @@ fn sized(path: &Path, frame: Frame, width: usize, height: usize) -> Result<Frame
     Ok(frame)
 }
 
-/// A colour image, PNG or JPEG: red, green, blue, row-major.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ColourImage {
-    pub width: usize,
-    pub height: usize,
-    pub rgb: Vec<u8>,
-}
-
-impl ColourImage {
-    /// Read one image.
-    /// An error when the file is not a whole PNG or JPEG.
-    pub fn read(path: &Path) -> Result<Self> {
-        let damaged = |e: image::ImageError| {
-            Error::image(path, e.to_string(), "colour must be a whole PNG or JPEG")
-        };
-        let reader = image::ImageReader::open(path).map_err(|e| Error::read(path, e))?;
-        // By content: names lie.
-        let reader = reader.with_guessed_format().map_err(|e| Error::read(path, e))?;
-        let image = reader.decode().map_err(damaged)?.into_rgb8();
-        let (width, height) = (image.width() as usize, image.height() as usize);
-        Ok(ColourImage { width, height, rgb: image.into_raw() })
-    }
-}
-
 /// Width and height of a frame.
 pub(crate) fn size_of(frame: &FrameRef) -> Result<(usize, usize)> {
     let frame = read_any(frame)?;
@@ -106,7 +82,7 @@ pub(super) fn read_any(frame: &FrameRef) -> Result<Frame> {
         return within.store.frame(within.index);
     }
     let path = &frame.path;
-    let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
+    let bytes = read_image(path)?;
     decode(path, &bytes)
 }
 
@@ -178,40 +154,6 @@ fn pgm_header(bytes: &[u8]) -> Option<([usize; 3], &[u8])> {
     usable_size(width, height).then_some((numbers, rest.get(1..)?))
 }
 
-/// Infrared amplitude, 8 or 16 bit, as numbers.
-#[derive(Debug, Clone, PartialEq)]
-pub struct InfraredImage {
-    pub width: usize,
-    pub height: usize,
-    /// Row-major, in the image's own units.
-    pub amplitude: Vec<u16>,
-}
-
-impl InfraredImage {
-    /// Read one image.
-    /// An error when the file is not a whole grey PNG of 8 or 16 bits.
-    pub fn read(path: &Path) -> Result<Self> {
-        let image = image::ImageReader::open(path)
-            .map_err(|e| Error::read(path, e))?
-            .decode()
-            .map_err(|e| Error::image(path, e.to_string(), "infrared must be a grey PNG"))?;
-        let ((width, height), amplitude) = match image {
-            image::DynamicImage::ImageLuma8(grey) => {
-                (grey.dimensions(), grey.into_raw().into_iter().map(u16::from).collect())
-            }
-            image::DynamicImage::ImageLuma16(grey) => (grey.dimensions(), grey.into_raw()),
-            other => {
-                return Err(Error::image(
-                    path,
-                    format!("{:?} image", other.color()),
-                    "infrared must be a grey PNG of 8 or 16 bits",
-                ));
-            }
-        };
-        Ok(InfraredImage { width: width as usize, height: height as usize, amplitude })
-    }
-}
-
 /// A depth frame as the bytes of a 16-bit grey PNG.
 /// An error when the frame's size does not match its raw values.
 pub fn encode_png16(frame: &Frame) -> Result<Vec<u8>> {
@@ -228,7 +170,7 @@ pub(crate) fn encode_corrected(frame: &Frame) -> Result<Vec<u8>> {
 
 /// Does the image say that its biases are taken out? What cannot be read says nothing.
 pub(crate) fn is_corrected(path: &Path) -> bool {
-    let Ok(file) = std::fs::File::open(path) else { return false };
+    let Ok(file) = open(path) else { return false };
     let Ok(reader) = png::Decoder::new(std::io::BufReader::new(file)).read_info() else {
         return false;
     };

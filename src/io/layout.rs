@@ -8,7 +8,10 @@ use serde_json::{Value, json};
 
 use super::list::{FrameList, read_list};
 use super::output::{entries, write_json};
-use crate::error::{Error, Result, read_text};
+use crate::error::{Error, Result};
+use crate::frame::FARTHEST_M;
+use crate::read::read_json;
+use crate::units::shortest;
 use crate::view::{
     Excluded, RECORDING_FORMAT, Recording, RecordingFile, Region, Sensor, TargetSize, View,
     ViewNotes,
@@ -60,6 +63,7 @@ impl ViewFile {
     }
 
     fn notes(self) -> Result<ViewNotes, String> {
+        self.check_ranges()?;
         let region = match (self.roi, self.polygon) {
             (Some(_), Some(_)) => return Err("both roi and polygon are given; keep one".into()),
             (Some(r), None) => {
@@ -73,9 +77,6 @@ impl ViewFile {
             }
             (None, polygon) => polygon.map(Region::Polygon),
         };
-        if self.reference_distance_m.is_some_and(|d| !(d.is_finite() && d > 0.0)) {
-            return Err("reference_distance_m must be positive".into());
-        }
         Ok(ViewNotes {
             target: self.target,
             reference_distance_m: self.reference_distance_m,
@@ -84,6 +85,31 @@ impl ViewFile {
             ambient_lux: self.ambient_lux,
             notes: self.notes,
         })
+    }
+}
+
+/// What a view's numbers may be.
+const LENGTH_M: [f64; 2] = [1e-3, FARTHEST_M];
+/// Electronics stop long before.
+const TEMPERATURE_C: [f64; 2] = [-100.0, 200.0];
+/// The sun gives 1.3e5 lx.
+const AMBIENT_LUX: [f64; 2] = [0.0, 1e6];
+
+impl ViewFile {
+    fn check_ranges(&self) -> Result<(), String> {
+        let size = self.target.map(|t| [t.width_m, t.height_m]);
+        for (key, value, [low, high]) in [
+            ("width_m", size.map(|s| s[0]), LENGTH_M),
+            ("height_m", size.map(|s| s[1]), LENGTH_M),
+            ("reference_distance_m", self.reference_distance_m, LENGTH_M),
+            ("temperature_c", self.temperature_c, TEMPERATURE_C),
+            ("ambient_lux", self.ambient_lux, AMBIENT_LUX),
+        ] {
+            if let Some(v) = value.filter(|v| !(low..=high).contains(v)) {
+                return Err(format!("{key} = {} is not from {low} to {high}", shortest(v)));
+            }
+        }
+        Ok(())
     }
 }
 
@@ -105,10 +131,14 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
         described_by: vec![path],
     };
     for folder in entries(root)? {
+        let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         if !is_view(&folder) {
+            // What cannot be looked into may be a view.
+            if let (true, Err(e)) = (folder.is_dir(), std::fs::read_dir(&folder)) {
+                recording.excluded.push(Excluded::of(&name, &Error::read(&folder, e)));
+            }
             continue;
         }
-        let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         match open_view(&folder, &name, &mut recording, &mut unknown) {
             Ok(view) => recording.views.push(view),
             Err(e) => recording.excluded.push(Excluded::of(&name, &e)),
@@ -119,14 +149,14 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
 }
 
 pub(super) fn read_sensor(path: &Path, unknown: &mut UnknownKeys) -> Result<Sensor> {
-    let wrong = |what: String| Error::text(path, 0, what, REMEDY_JSON);
-    let text = read_text(path)?;
+    let text = read_json(path)?;
+    let wrong = |what: String| Error::text(path, line_named(&text, &what), what, REMEDY_JSON);
     // Another format has other keys: its name says more than the first key that is missing.
     let Format { format } = parse(path, &text)?;
     if format != RECORDING_FORMAT {
         return Err(wrong(format!("format is \"{format}\", expected \"{RECORDING_FORMAT}\"")));
     }
-    let file: RecordingFile = parse(path, &text)?;
+    let file: RecordingFile = parse(path, &text).map_err(|e| named(path, &text).unwrap_or(e))?;
     unknown.note(path, &parse(path, &text)?, &json!(file));
     file.sensor().map_err(wrong)
 }
@@ -147,6 +177,35 @@ fn parse<T: serde::de::DeserializeOwned>(path: &Path, text: &str) -> Result<T> {
         let full = e.to_string();
         let what = full.rsplit_once(" at line ").map_or(&*full, |(before, _)| before);
         Error::text(path, e.line(), what, REMEDY_JSON)
+    })
+}
+
+/// The line of the first key that a message names; 0 where it names none.
+fn line_named(text: &str, message: &str) -> usize {
+    // "sensor's" is no key.
+    let words = message.split(|c: char| !(c.is_alphanumeric() || "_'".contains(c)));
+    let line_of = |word: &str| {
+        let key = format!("\"{word}\"");
+        let holds = |line: &str| {
+            line.split_once(&key).is_some_and(|(_, rest)| rest.trim_start().starts_with(':'))
+        };
+        text.lines().position(holds)
+    };
+    words.filter(|w| !w.is_empty()).find_map(line_of).map_or(0, |k| k + 1)
+}
+
+/// Which key of a description has a value of the wrong type: serde knows only where the document ends.
+fn named(path: &Path, text: &str) -> Option<Error> {
+    let given: Value = serde_json::from_str(text).ok()?;
+    let good = json!({
+        "format": "", "sensor": "", "width": 1, "height": 1, "fx": 1, "fy": 1, "cx": 1, "cy": 1
+    });
+    given.as_object()?.iter().find_map(|(key, value)| {
+        let mut trial = good.clone();
+        trial[key] = value.clone();
+        let why = serde_json::from_value::<RecordingFile>(trial).err()?;
+        let line = line_named(text, key);
+        Some(Error::text(path, line, format!("{key}: {why}"), REMEDY_JSON))
     })
 }
 
@@ -184,10 +243,10 @@ fn open_view(
 }
 
 fn read_notes(path: &Path, unknown: &mut UnknownKeys) -> Result<ViewNotes> {
-    let text = read_text(path)?;
+    let text = read_json(path)?;
     let file: ViewFile = parse(path, &text)?;
     unknown.note(path, &parse(path, &text)?, &json!(file));
-    file.notes().map_err(|what| Error::text(path, 0, what, REMEDY_JSON))
+    file.notes().map_err(|what| Error::text(path, line_named(&text, &what), what, REMEDY_JSON))
 }
 
 /// Write `view.json` into the view's folder; nothing where nothing is known.

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result, read_text};
+use crate::error::{Error, Result};
+use crate::read::read_text;
 use crate::units::{counted, verb};
 use crate::view::FrameRef;
 

@@ -8,6 +8,7 @@ mod layout;
 mod list;
 mod output;
 mod output_folder;
+mod pictures;
 mod raw_values;
 mod stills;
 mod unfinished;
@@ -15,19 +16,17 @@ mod unfinished;
 pub use assumed::Assumed;
 pub use folder::write_dump;
 pub(crate) use folder::{INDEX, results_in};
-pub use images::{
-    ColourImage, FrameSource, InfraredImage, encode_pgm16, encode_png16, encode_png16_quickly,
-    encode_rgb,
-};
+pub use images::{FrameSource, encode_pgm16, encode_png16, encode_png16_quickly, encode_rgb};
 pub(crate) use images::{encode_corrected, is_corrected, read_depth, size_of};
 pub(crate) use layout::{DEPTH_LIST, read_description};
 pub use layout::{DESCRIPTION, ViewFile, write_recording_file, write_view_notes};
 pub(crate) use list::content_lines;
 pub use list::{FrameList, read_list};
-pub(crate) use output::entries;
+pub(crate) use output::{entries, write_atomic_with};
 pub use output::{hex, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
 pub(crate) use output_folder::is_description;
 pub use output_folder::{Leaves, OutputFolder, refuse_inside};
+pub use pictures::{ColourImage, InfraredImage};
 pub use unfinished::{Interrupted, discard_unfinished};
 
 use std::path::Path;

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::folder::INDEX;
 use super::layout::{DEPTH_LIST, DESCRIPTION};
 use super::output::{entries, listed, write_atomic};
-use super::unfinished::{Open, discard, register};
+use super::unfinished::{Open, UNFINISHED, discard, discard_stale, lock, register};
 use crate::error::{Error, Result};
 
 /// What a command fills its folder with.
@@ -28,9 +28,6 @@ pub enum Leaves {
     Recording,
 }
 
-/// Beginning of the names of folders that are being filled.
-const UNFINISHED: &str = ".kinoise-";
-
 /// A folder on its way; thrown away when dropped before [`OutputFolder::finish`].
 #[derive(Debug)]
 pub struct OutputFolder {
@@ -41,6 +38,8 @@ pub struct OutputFolder {
     forced: bool,
     /// Folders made for this one, the innermost first.
     parents: Vec<PathBuf>,
+    /// Of the folder at the place, until this one is put there, and of this one.
+    _locks: [Option<fs::File>; 2],
     done: bool,
 }
 
@@ -67,6 +66,8 @@ impl OutputFolder {
         for input in inputs {
             refuse_replacing(place, leaves, input)?;
         }
+        // Where nothing stands yet, the first to finish has the place, and the other says so.
+        let of_place = if stands == Stands::Nothing { None } else { lock(place)? };
         let unique = format!("{UNFINISHED}{}-{}", std::process::id(), next_number());
         let (parents, staging) = if stands == Stands::Nothing {
             let absolute = std::path::absolute(place).map_err(|e| Error::write(place, e))?;
@@ -76,13 +77,15 @@ impl OutputFolder {
             // Within, for it may be a mount or a link: renaming stays on one disk.
             (Vec::new(), place.join(unique))
         };
-        let folder = OutputFolder {
+        staging.parent().into_iter().for_each(discard_stale);
+        let mut folder = OutputFolder {
             place: place.to_path_buf(),
             staging,
             leaves,
             stands,
             forced: force,
             parents,
+            _locks: [of_place, None],
             done: false,
         };
         let mut register = register();
@@ -94,6 +97,7 @@ impl OutputFolder {
             stood: stands != Stands::Nothing,
         });
         drop(register);
+        folder._locks[1] = lock(&folder.staging)?;
         Ok(folder)
     }
 
@@ -135,10 +139,15 @@ impl OutputFolder {
         };
         self.done = true;
         register.open.retain(|open| open.staging != self.staging);
-        put.map_err(|cause| Error::Recording {
-            path: self.place.clone(),
-            what: format!("{cause}: the results are kept in {}", self.staging.display()),
-            remedy: "move them where they shall be",
+        put.map_err(|cause| {
+            // Under a name that no later run takes for what a killed one left.
+            let kept = self.staging.with_extension("kept");
+            let kept = fs::rename(&self.staging, &kept).map_or(&self.staging, |()| &kept);
+            Error::Recording {
+                path: self.place.clone(),
+                what: format!("{cause}: the results are kept in {}", kept.display()),
+                remedy: "move them where they shall be",
+            }
         })?;
         register.finished.push(self.place.clone());
         Ok(())

@@ -5,6 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use crate::error::{Error, Result};
+
+/// Beginning of the names of folders that are being filled.
+pub(super) const UNFINISHED: &str = ".kinoise-";
+
 /// What an interruption found.
 #[derive(Debug, Default)]
 pub struct Interrupted {
@@ -47,6 +52,39 @@ pub(super) fn discard(staging: &Path, parents: &[PathBuf]) {
     let _ = fs::remove_dir_all(staging);
     // Fails, rightly, where something else stands in them by now.
     parents.iter().for_each(|parent| drop(fs::remove_dir(parent)));
+}
+
+/// Have a folder for this run alone: two would mix their files.
+/// An error when another run has it.
+pub(super) fn lock(folder: &Path) -> Result<Option<fs::File>> {
+    // Some systems open no folder, and some network disks know no locks.
+    let Ok(file) = fs::File::open(folder) else { return Ok(None) };
+    match file.try_lock() {
+        Err(fs::TryLockError::WouldBlock) => Err(Error::recording(
+            folder,
+            "another run is writing into this folder",
+            "wait until it has ended, or choose another folder",
+        )),
+        _ => Ok(Some(file)),
+    }
+}
+
+/// A folder is locked long before.
+const STALE: Duration = Duration::from_secs(60);
+
+/// Remove from `parent` what runs left that were killed: nobody has it locked. What is set aside for
+/// somebody has an extension, and stays.
+pub(super) fn discard_stale(parent: &Path) {
+    let entries = fs::read_dir(parent).into_iter().flatten().flatten();
+    for entry in entries.filter(|e| e.file_name().to_string_lossy().starts_with(UNFINISHED)) {
+        let path = entry.path();
+        let old = || entry.metadata().ok()?.modified().ok()?.elapsed().ok();
+        let stale = path.extension().is_none() && old().is_some_and(|age| age > STALE);
+        let free = || fs::File::open(&path).is_ok_and(|folder| folder.try_lock().is_ok());
+        if stale && free() {
+            let _ = fs::remove_dir_all(&path);
+        }
+    }
 }
 
 /// The folders of this process.

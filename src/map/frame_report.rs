@@ -178,8 +178,12 @@ pub fn frames_csv(frames: &[FrameReport]) -> String {
         let _ = match &frame.alignment {
             Some(a) => write!(
                 text,
-                ",{},{:.4},{},{:.6},{:.5}",
-                a.iterations, a.inlier_ratio, a.correspondences, a.rms_m, a.min_information
+                ",{},{:.4},{},{},{:.5}",
+                a.iterations,
+                a.inlier_ratio,
+                a.correspondences,
+                a.rms_m.map(|m| format!("{m:.6}")).unwrap_or_default(),
+                a.min_information
             ),
             None => write!(text, ",0,{unaligned_ratio:.4},0,0.000000,0.00000"),
         };

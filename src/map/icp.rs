@@ -41,8 +41,8 @@ pub struct Alignment {
     /// Share of the moving points that have a neighbour.
     pub inlier_ratio: f64,
     pub correspondences: usize,
-    /// Root mean square of the distances along the normals, m.
-    pub rms_m: f64,
+    /// Root mean square of the distances along the normals, m; `None` without correspondences.
+    pub rms_m: Option<f64>,
     /// Motions that the correspondences do not determine; along them the start was kept.
     pub degenerate_directions: Vec<Direction>,
     /// The least determined motion's share of what the best has: 0 is none at all.
@@ -115,9 +115,9 @@ fn finish(
     let (correspondences, rms_m, solution) = match last {
         Some((equations, solution)) => {
             let n = equations.correspondences;
-            (n, (equations.squares_m2 / n as f64).sqrt(), Some(solution))
+            (n, Some((equations.squares_m2 / n as f64).sqrt()), Some(solution))
         }
-        None => (0, f64::INFINITY, None),
+        None => (0, None, None),
     };
     let unknown = Matrix6::from_diagonal_element(f64::INFINITY);
     Alignment {

@@ -63,6 +63,11 @@ pub struct Noise {
     correlated_px2: f32,
 }
 
+/// The least share of an error of depth that moves a point along its normal: the normal itself, of the
+/// few pixels around, is not known to a degree. Of a surface seen edge on nothing would be left, and
+/// the point would be certain.
+const MIN_PART: f32 = 0.02;
+
 /// The effect of the catalogue that says how far neighbours err together, its parameter, and the
 /// share of the variance that does; all where it is not told.
 const CORRELATION: [&str; 3] = ["spatial-correlation", "length_px", "share"];
@@ -107,7 +112,7 @@ impl Noise {
         normal: &Vector3<f32>,
         n: f32,
     ) -> f32 {
-        let part = (at.dot(normal) / at.z).abs();
+        let part = (at.dot(normal) / at.z).abs().max(MIN_PART);
         sigma_axial * part / (n / self.correlated_px2).max(1.0).sqrt()
     }
 }

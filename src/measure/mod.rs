@@ -2,6 +2,7 @@
 //!
 //! The first few frames find the target and the scale, the rest stream through accumulators.
 
+mod binned;
 mod cells;
 mod doubtful;
 mod finish;

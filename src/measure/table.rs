@@ -1,12 +1,14 @@
 //! Tables of sigma: what a model is fitted to; as text, measurements.csv and what somebody else
 //! measured.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use super::{Cell, ViewMeasurement};
 use crate::error::{Error, Result};
 use crate::frame::FARTHEST_M;
 use crate::plane::RansacPlane;
+use crate::read::read_bytes;
 use crate::units::shortest;
 
 /// Which standard deviation a model is fitted to.
@@ -167,7 +169,7 @@ const REMEDY_TABLE: &str = "the header is z_m,theta_rad,sigma_m and optionally n
 /// rows of the same name count as one view; a column `n_effective` is preferred to `n`.
 /// An error when a column is missing or a value is not a usable number; the message names the line.
 pub fn read_table(path: &Path) -> Result<SigmaTable> {
-    let file = std::fs::File::open(path).map_err(|e| Error::read(path, e))?;
+    let text = read_bytes(path)?;
     let wrong = |line: usize, what: String| Error::text(path, line, what, REMEDY_TABLE);
     let damaged = |e: ::csv::Error| {
         let line = e.position().map_or(1, |p| p.line() as usize);
@@ -180,10 +182,8 @@ pub fn read_table(path: &Path) -> Result<SigmaTable> {
             _ => wrong(line, "this is not a line of a table".into()),
         }
     };
-    let mut reader = ::csv::ReaderBuilder::new()
-        .trim(::csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_reader(std::io::BufReader::new(file));
+    let mut reader =
+        ::csv::ReaderBuilder::new().trim(::csv::Trim::All).comment(Some(b'#')).from_reader(&*text);
     let headers = reader.headers().map_err(damaged)?.clone();
     let find = |name: &str| headers.iter().position(|h| h.trim_start_matches('\u{feff}') == name);
     let need =
@@ -191,7 +191,7 @@ pub fn read_table(path: &Path) -> Result<SigmaTable> {
     let columns = [need("z_m")?, need("theta_rad")?, need("sigma_m")?];
     let count = find("n_effective").or_else(|| find("n"));
     let view = find("view");
-    let mut names: Vec<String> = Vec::new();
+    let mut names: HashMap<String, usize> = HashMap::new();
     let mut table = SigmaTable::default();
     for record in reader.records() {
         let record = record.map_err(damaged)?;
@@ -214,7 +214,10 @@ pub fn read_table(path: &Path) -> Result<SigmaTable> {
             _ => None,
         };
         let view = match view {
-            Some(column) => index_of(&mut names, text(column)),
+            Some(column) => {
+                let next = names.len();
+                *names.entry(text(column)).or_insert(next)
+            }
             None => table.rows.len(),
         };
         table.rows.push(SigmaRow { z_m, theta_rad, sigma_m, n_effective, view });
@@ -242,13 +245,6 @@ fn check(z_m: f64, theta_rad: f64, sigma_m: f64) -> Result<(), String> {
         }
         _ => Ok(()),
     }
-}
-
-fn index_of(names: &mut Vec<String>, name: String) -> usize {
-    names.iter().position(|n| *n == name).unwrap_or_else(|| {
-        names.push(name);
-        names.len() - 1
-    })
 }
 
 #[cfg(test)]

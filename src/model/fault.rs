@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::surface::{Domain, SigmaModel};
+use crate::frame::FARTHEST_M;
 use crate::stats::even;
 
 /// Points a side at which sigma is looked at between the domain's corners. What the forms can do
@@ -52,6 +53,12 @@ impl SigmaModel {
                 theta_rad[1]
             ));
         }
+        if z_m[1] > FARTHEST_M {
+            return Some(format!(
+                "the valid range of z ends at {:e} m; no such sensor sees beyond {FARTHEST_M} m",
+                z_m[1]
+            ));
+        }
         let pole = self.form.spec().pole(&self.parameters);
         pole.is_some_and(|pole| pole <= theta_rad[1])
             .then(|| "the valid range of theta reaches the pole of the form".into())
@@ -73,16 +80,18 @@ impl SigmaModel {
         let Domain { z_m, theta_rad } = self.domain;
         let along = |ends: [f64; 2]| even(ends, GRID);
         let vertex = spec.vertex(&self.parameters).map(|c| c.clamp(z_m[0], z_m[1]));
-        vertex.into_iter().chain(along(z_m)).flat_map(|z| along(theta_rad).map(move |t| (z, t))).find_map(
-            |(z, theta)| {
+        vertex
+            .into_iter()
+            .chain(along(z_m))
+            .flat_map(|z| along(theta_rad).map(move |t| (z, t)))
+            .find_map(|(z, theta)| {
                 let sigma = self.sigma(z, theta);
-                (!(sigma.is_finite() && sigma > 0.0)).then(|| {
-                    format!(
-                        "sigma at z = {z:.3} m, theta = {theta:.3} rad is {sigma}, inside the valid range but not positive"
-                    )
-                })
-            },
-        )
+                let at = || format!("sigma at z = {z:.3} m, theta = {theta:.3} rad is {sigma:e} m");
+                if !(sigma.is_finite() && sigma > 0.0) {
+                    return Some(format!("{}, inside the valid range but not positive", at()));
+                }
+                (sigma > FARTHEST_M).then(|| format!("{}, more than any depth", at()))
+            })
     }
 }
 

@@ -12,8 +12,9 @@ use super::effect::Effect;
 use super::forms::Form;
 use super::provenance::{FitSummary, Provenance};
 use super::{Direction, Domain, SigmaModel};
-use crate::error::{Error, Result, read_text};
+use crate::error::{Error, Result};
 use crate::io::{pretty_json, write_atomic};
+use crate::read::read_json;
 use crate::view::{RecordingFile, Sensor};
 
 /// The format this version writes and reads.
@@ -145,7 +146,7 @@ impl NoiseModel {
     /// An error when the file is missing, not a model, damaged, or of a newer format.
     pub fn read(path: &Path) -> Result<Self> {
         let file = Self::file(path);
-        let text = read_text(&file)?;
+        let text = read_json(&file)?;
         Self::from_json(&text).map_err(|(what, remedy)| Error::ModelFile {
             path: file,
             what,
@@ -158,8 +159,11 @@ impl NoiseModel {
             (format!("not whole JSON ({e})"), "the file is damaged; restore it or make it again")
         })?;
         check_format(&value)?;
-        let file: ModelFile = serde_json::from_value(value)
+        // From the text, for its lines.
+        let file: ModelFile = serde_json::from_str(text)
             .map_err(|e| (format!("a part of the model is missing or wrong ({e})"), REMEDY))?;
+        let sensor = file.sensor.clone().map(RecordingFile::sensor).transpose();
+        sensor.map_err(|what| (format!("sensor: {what}"), REMEDY))?;
         let sigma = read_sigma(file.sigma, &file.fit)?;
         if let Some(fault) = sigma.fault() {
             return Err((fault, REMEDY));

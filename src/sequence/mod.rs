@@ -9,7 +9,7 @@ mod tum;
 
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::frame::Frame;
 use crate::io::{Assumed, ColourImage, read_depth};
 use crate::stats::median;
@@ -69,22 +69,11 @@ impl Sequence {
     }
 
     /// The colour of a moment, where there is any. An error when the file is damaged or not of the
-    /// depth image's size: pixels would not correspond.
+    /// depth image's size.
     pub fn colour(&self, moment: &Moment) -> Result<Option<ColourImage>> {
         let Some(path) = &moment.colour else { return Ok(None) };
-        let image = ColourImage::read(path)?;
         let camera = &self.sensor.camera;
-        if (image.width, image.height) != (camera.width, camera.height) {
-            return Err(Error::image(
-                path,
-                format!(
-                    "the colour image is {} x {} px, depth is {} x {}",
-                    image.width, image.height, camera.width, camera.height
-                ),
-                "colour must be registered to depth, pixel by pixel",
-            ));
-        }
-        Ok(Some(image))
+        ColourImage::read(path, [camera.width, camera.height]).map(Some)
     }
 }
 

@@ -5,10 +5,11 @@ use std::path::Path;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::{Moment, Sequence};
-use crate::error::{Error, Result, read_text};
+use crate::error::{Error, Result};
 use crate::frame::DepthCode;
 use crate::io::{Assumed, entries, refuse_impossible, size_of};
-use crate::trajectory::Pose;
+use crate::read::read_text;
+use crate::trajectory::{FARTHEST_PLACE_M, Pose};
 use crate::view::FrameRef;
 
 const DEPTH: &str = ".depth.png";
@@ -70,14 +71,43 @@ fn read_pose(path: &Path) -> Result<Option<Isometry3<f64>>> {
     let numbers: Vec<f64> = text.split_whitespace().filter_map(|w| w.parse().ok()).collect();
     if numbers.len() != 16 {
         let what = format!("{} numbers, a pose has 4 x 4", numbers.len());
-        return Err(Error::text(path, 0, what, "restore the file, or take it out"));
+        return Err(Error::text(path, 0, what, REMEDY_POSE));
     }
     if numbers.iter().any(|v| !v.is_finite()) {
         return Ok(None);
     }
     let turn = Matrix3::from_fn(|i, j| numbers[4 * i + j]);
+    if let Some(what) = fault(&turn, &numbers) {
+        return Err(Error::text(path, 0, what, REMEDY_POSE));
+    }
     // Printed digits leave it a little off a rotation.
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&turn));
+    let near = Rotation3::from_matrix_eps(&turn, f64::EPSILON, MAX_ROUNDS, Rotation3::identity());
+    let rotation = UnitQuaternion::from_rotation_matrix(&near);
     let shift = Vector3::new(numbers[3], numbers[7], numbers[11]);
     Ok(Some(Isometry3::from_parts(Translation3::from(shift), rotation)))
+}
+
+const REMEDY_POSE: &str = "restore the file, or take it out";
+/// Products of rows of printed digits are off by a thousandth.
+const OFF_ROTATION: f64 = 0.01;
+/// The search for the nearest rotation settles in a few from there.
+const MAX_ROUNDS: usize = 100;
+
+/// Why these 4 x 4 numbers, with `turn` for their first corner, are no motion.
+fn fault(turn: &Matrix3<f64>, numbers: &[f64]) -> Option<String> {
+    let off = (turn * turn.transpose() - Matrix3::identity()).amax();
+    if off.is_nan() || off > OFF_ROTATION {
+        return Some(
+            "its 3 x 3 part is no rotation: its rows are not orthogonal unit vectors".into(),
+        );
+    }
+    if turn.determinant() < 0.0 {
+        return Some("its 3 x 3 part is no rotation: it mirrors (its determinant is -1)".into());
+    }
+    let last = [0.0, 0.0, 0.0, 1.0].iter().zip(&numbers[12..]);
+    if last.into_iter().any(|(due, given)| (due - given).abs() > OFF_ROTATION) {
+        return Some("its last line is not 0 0 0 1".into());
+    }
+    let far = [3, 7, 11].iter().any(|&k| numbers[k].abs() > FARTHEST_PLACE_M);
+    far.then(|| "its place is not on earth".into())
 }

@@ -4,10 +4,11 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::{Moment, Sequence};
-use crate::error::{Error, Result, read_text};
+use crate::error::{Error, Result};
 use crate::io::{
     Assumed, DESCRIPTION, Layout, content_lines, entries, open_uncut, read_list, results_in,
 };
+use crate::read::read_text;
 use crate::trajectory::{associate, read_benchmark};
 use crate::view::FrameRef;
 

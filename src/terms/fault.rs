@@ -4,6 +4,7 @@ use super::basis::{Basis, TABLE};
 use super::coordinate::Coordinate;
 use super::modulation::Modulation;
 use super::{Statistic, Term};
+use crate::units::shortest;
 
 /// Nodes along one axis, and harmonics or orders of a series: more than any fit has; a file that
 /// asks for more is damaged, and would be believed with memory.
@@ -11,6 +12,11 @@ const MOST_NODES: usize = 4096;
 const MOST_ORDERS: usize = 16;
 /// Of a polynomial of two coordinates.
 const DEGREES: std::ops::RangeInclusive<usize> = 2..=4;
+
+/// More than any image is wide.
+const MAX_BIAS_PX: f64 = 1e4;
+/// A standard deviation three million times as large.
+const MAX_NEPERS: f64 = 30.0;
 
 impl Term {
     /// What is wrong with it, if anything.
@@ -26,10 +32,38 @@ impl Term {
                     .then(|| format!("{given} coefficients where its basis has {}", needed()))
             })
             .or_else(|| finite("a coefficient", &self.coefficients))
+            .or_else(|| self.absurd())
+    }
+
+    /// Where coefficients are values at nodes, they are errors of disparity or logarithms of a variance.
+    fn absurd(&self) -> Option<String> {
+        if !self.basis.has_nodes() {
+            return None;
+        }
+        let (max, unit) = match self.statistic {
+            Statistic::Bias => (MAX_BIAS_PX, "px"),
+            _ => (MAX_NEPERS, "nepers of variance"),
+        };
+        let off = self.coefficients.iter().find(|c| c.abs() > max)?;
+        Some(format!("a coefficient of {} is not within {max} {unit}", shortest(*off)))
     }
 }
 
 impl Basis {
+    fn has_nodes(&self) -> bool {
+        use Basis::{Curve, Level, Map, Pair, Ring, Spline, Table};
+        matches!(
+            self,
+            Curve { .. }
+                | Level
+                | Map { .. }
+                | Pair { .. }
+                | Ring { .. }
+                | Spline { .. }
+                | Table { .. }
+        )
+    }
+
     /// What is wrong with the numbers that settle it, if anything.
     pub fn fault(&self) -> Option<String> {
         let places = self.over().into_iter().flatten().find_map(Coordinate::fault);

@@ -5,8 +5,10 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
-use crate::error::{Error, Result, read_text};
+use crate::error::{Error, Result};
 use crate::io::content_lines;
+use crate::read::read_text;
+use crate::units::shortest;
 
 /// Where a camera was, and when.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,8 +95,12 @@ fn each_line(path: &Path, mut take: impl FnMut(Pose) -> Result<(), Fault>) -> Re
 
 const REMEDY_FORMAT: &str = "write \"timestamp tx ty tz qx qy qz qw\", one pose a line";
 
-/// Printed quaternions have three to six decimals; one shorter than this is no rotation.
-const SHORTEST_QUATERNION: f64 = 0.5;
+/// Printed quaternions have three to six decimals: one of another length is no rotation.
+const QUATERNION_LENGTH: std::ops::RangeInclusive<f64> = 0.5..=2.0;
+/// Ten times the size of the earth, m: what is farther is damage, and its square has no number.
+pub(crate) const FARTHEST_PLACE_M: f64 = 1e8;
+/// Three thousand years, s: stamps in ns or us since 1970 are more.
+const LATEST_S: f64 = 1e11;
 
 /// What is wrong with a line, and what to do.
 type Fault = (String, &'static str);
@@ -112,8 +118,17 @@ fn parse(line: &str) -> Result<Pose, Fault> {
         return Err(("a number is not finite".into(), "take the line out"));
     }
     let quaternion = Quaternion::new(qw, qx, qy, qz);
-    if quaternion.norm() < SHORTEST_QUATERNION {
-        let what = format!("the quaternion {qx} {qy} {qz} {qw} is no rotation");
+    if stamp.abs() > LATEST_S {
+        let what = format!("the timestamp {stamp} is not in seconds");
+        return Err((what, "give seconds, such as 1305031098.6659"));
+    }
+    if [tx, ty, tz].iter().any(|v| v.abs() > FARTHEST_PLACE_M) {
+        let what = format!("the place {} m is not on earth", [tx, ty, tz].map(shortest).join(" "));
+        return Err((what, "take the line out, or give metres"));
+    }
+    if !QUATERNION_LENGTH.contains(&quaternion.norm()) {
+        let what =
+            format!("the quaternion {} is no rotation", [qx, qy, qz, qw].map(shortest).join(" "));
         return Err((what, "take the line out, or give qx qy qz qw of length 1"));
     }
     let rotation = UnitQuaternion::from_quaternion(quaternion);

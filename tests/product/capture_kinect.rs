@@ -253,7 +253,8 @@ fn a_units_own_serial_calibration_and_infrared_are_recorded() {
     let view = &recording.views[0];
     assert_eq!((view.depth.len(), view.infrared.len()), (4, 4));
     assert_eq!(view.depth[0].timestamp, view.infrared[0].timestamp);
-    let infrared = kinoise::io::InfraredImage::read(&view.infrared[0].path).expect("an image");
+    let infrared =
+        kinoise::io::InfraredImage::read(&view.infrared[0].path, [640, 480]).expect("an image");
     assert_eq!((infrared.width, infrared.height), (640, 480));
     // The 480 rows in the middle of 488, every row its number.
     assert_eq!((infrared.amplitude[0], infrared.amplitude[640 * 479]), (4, 483));

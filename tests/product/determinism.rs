@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::{good, kinoise, tree};
+use crate::common::{copy_tree, good, kinoise, tree, write_depth};
 
 /// Run with `-o`/the last argument as the output folder; its files and stdout.
 fn run(arguments: &[&str], threads: &str, seed: &str) -> Vec<(PathBuf, Vec<u8>)> {
@@ -104,4 +104,36 @@ fn the_bundled_recording_is_what_its_command_makes() {
         .assert()
         .success();
     same(&tree(&bundled), &tree(&made));
+}
+
+/// A sensor that sees everything the other way round is no noisier.
+#[test]
+fn a_mirrored_or_rotated_recording_has_the_same_noise() {
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder");
+    let fitted = |turn: fn(usize, usize) -> usize| {
+        let root = folder.path().join("rec");
+        copy_tree(good(), &root);
+        // The principal point is in the middle: it stays.
+        for (file, _) in
+            tree(&root).iter().filter(|(f, _)| f.extension().is_some_and(|e| e == "png"))
+        {
+            let path = root.join(file);
+            let frame = kinoise::io::FrameSource::new(160, 120).read(&path).expect("a frame");
+            let raw = (0..frame.raw.len()).map(|i| frame.raw[turn(i % 160, i / 160)]).collect();
+            write_depth(&path, &kinoise::Frame { raw, ..frame });
+        }
+        let recording = kinoise::io::open(&root, &Default::default()).expect("a recording");
+        let options =
+            kinoise::CalibrateOptions { form: Some(kinoise::Form::Paper), ..Default::default() };
+        let measured = kinoise::measure_recording(&recording, &options.measure, &|_, _| ());
+        let measured = measured.expect("measured");
+        kinoise::model_of(&recording, &measured, &options).expect("a model").model.sigma
+    };
+    let as_it_is = fitted(|u, v| 160 * v + u);
+    for turned in [fitted(|u, v| 160 * v + 159 - u), fitted(|u, v| 160 * (119 - v) + 159 - u)] {
+        for (z, theta) in [(1.0, 0.0), (2.0, 0.5), (3.0, 0.0), (1.5, 1.0)] {
+            let ratio = turned.sigma(z, theta) / as_it_is.sigma(z, theta);
+            assert!((ratio - 1.0).abs() < 1e-3, "{z} m, {theta} rad: {ratio}");
+        }
+    }
 }

@@ -1,8 +1,11 @@
 //! Whether a finished trial holds: hashes, questions, marks and scores from `proof.json` alone, the
 //! published files against it, and a sample of the sets made again.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
+use kinoise::NoiseModel;
 use kinoise::error::Result;
 use kinoise::io::sha256_hex;
 use rand::seq::SliceRandom;
@@ -11,11 +14,11 @@ use serde::Serialize;
 use crate::commitment::{Commitments, Verdicts, hash_file, hash_json, read_json};
 use crate::judge::{mark, mark_advice, scores};
 use crate::plan::{Planned, plan};
-use crate::proof::Proof;
+use crate::proof::{Proof, ProvenSet};
 use crate::raytraced::kernels::seed_of;
 use crate::raytraced::question::World;
-use crate::rounds::{Progress, ROUNDS, each, remove, take, take_advised};
-use crate::solver::Answer;
+use crate::rounds::{Progress, ROUNDS, Taken, each, remove, take, take_advised};
+use crate::solver::{Answer, solve};
 
 pub struct CheckOptions {
     /// Real recordings; without them their sets are not made again.
@@ -85,6 +88,7 @@ impl Checked {
     fn published(&mut self, folder: &Path, proof: &Proof) -> Result<()> {
         let mut before: Option<String> = None;
         let mut n = 0;
+        let mut confinement = BTreeMap::new();
         for (round, suffix) in ROUNDS.iter().enumerate() {
             let name = format!("commitments{suffix}.json");
             let (file, hash): (Commitments, String) = read_json(&folder.join(&name))?;
@@ -102,6 +106,9 @@ impl Checked {
             let told = proof.answers(round).map(|(set, a)| (&set.name, &a.diagnosis_sha256));
             let lines = file.verdicts.iter().map(|v| (&v.name, &v.diagnosis_sha256));
             self.fault(lines.eq(told), || format!("{name} has other verdicts than proof.json"));
+            for line in &file.verdicts {
+                *confinement.entry(line.confinement.clone()).or_insert(0) += 1;
+            }
             before = Some(verdicts_hash);
             let diagnoses = folder.join(format!("diagnoses{suffix}"));
             for (set, answer) in proof.answers(round).filter(|(_, a)| a.diagnosis_sha256.is_some())
@@ -114,6 +121,11 @@ impl Checked {
                 n += 1;
             }
         }
+        // Trials before it was sealed say nothing of it set by set.
+        let sealed = !confinement.contains_key("");
+        self.fault(!sealed || confinement == proof.confinement, || {
+            "the solvers were confined in another way than proof.json says".into()
+        });
         self.checked
             .push("four published files, each against the one before and proof.json".into());
         self.checked.push(format!("{n} diagnoses against their hashes and verdicts"));
@@ -156,6 +168,7 @@ impl Checked {
         }
         let sets = take(&planned, data, progress)?;
         let scratch = std::env::temp_dir().join(format!("kinoise-check-{}", std::process::id()));
+        let same_build = hash_file(&options.program)? == proof.commitments[0].binary_sha256;
         let again = each(&sets, ("making sets again", progress), |set| {
             let proven = proof.sets.iter().find(|s| s.name == set.name);
             let verdict = proven.filter(|s| s.advised.is_some()).map(|s| s.answer.verdict.as_ref());
@@ -164,16 +177,54 @@ impl Checked {
             for (round, set) in [(0, set)].into_iter().chain(views.iter().map(|v| (1, v))) {
                 let folder = scratch.join(&set.name);
                 let made = set.make(&folder)?;
-                remove(&folder)?;
                 if !proof.commitments[round].sets.contains(&made) {
+                    remove(&folder)?;
                     return Ok(Some(format!("set {}: made again, it is another", set.name)));
                 }
+                if let (0, true, Some(proven)) = (round, same_build, proven) {
+                    let limit = Duration::from_secs(proof.commitments[0].limit_s);
+                    if let Some(fault) = derived(set, proven, options, limit, &folder)? {
+                        remove(&folder)?;
+                        return Ok(Some(format!("set {}: {fault}", set.name)));
+                    }
+                }
+                remove(&folder)?;
             }
             Ok(None)
         });
         let _ = remove(&scratch);
         self.faults.extend(again?.into_iter().flatten());
-        self.checked.push(format!("{} sets made again, with their advised views", sets.len()));
+        let n = sets.len();
+        self.checked.push(format!("{n} sets made again, with their advised views"));
+        if same_build {
+            self.checked.push(format!("{n} sets diagnosed again, and what their models gain"));
+        } else {
+            let what = "verdicts and gains were not derived again: give the build that was used";
+            self.remarks.push(what.into());
+        }
         Ok(())
     }
+}
+
+/// Diagnose the set in `scratch/set` again, and weigh the model that comes of it: what is another than
+/// the proof says, if anything is. An answer that took too long once may come in time now.
+fn derived(
+    set: &Taken,
+    proven: &ProvenSet,
+    options: &CheckOptions,
+    limit: Duration,
+    scratch: &Path,
+) -> Result<Option<String>> {
+    if proven.answer.failure.is_some() {
+        return Ok(None);
+    }
+    let solved = solve(&options.program, limit, scratch)?;
+    if solved.answer.failure.is_none() && solved.answer != proven.answer {
+        return Ok(Some("diagnosed again, it gets another answer".into()));
+    }
+    let gains = match NoiseModel::read(&scratch.join("out/model.json")) {
+        Ok(model) => set.gains(scratch, &model)?,
+        Err(_) => None,
+    };
+    Ok((gains != proven.gains).then(|| "weighed again, its model gains something else".into()))
 }

@@ -59,6 +59,12 @@ pub struct VerdictHash {
     pub name: String,
     /// Of `diagnosis.json`, every byte; none where no diagnosis came.
     pub diagnosis_sha256: Option<String>,
+    /// Of the model with what was found, from which the gains follow.
+    #[serde(default)]
+    pub model_sha256: Option<String>,
+    /// What kept the solver from the rest of the machine; older trials do not say it set by set.
+    #[serde(default)]
+    pub confinement: String,
 }
 
 /// SHA-256 of compact JSON with sorted keys.

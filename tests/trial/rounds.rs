@@ -86,6 +86,17 @@ impl Taken {
         let (name, truth_sha256) = (self.name.clone(), hash_json(&self.truth));
         Ok(Committed { name, data_sha256: hash_folder(&set)?, truth_sha256, view: self.view })
     }
+
+    /// What `model` gains on views nobody has seen, where the set has any; the set lies in
+    /// `scratch/set`.
+    pub fn gains(&self, scratch: &Path, model: &NoiseModel) -> Result<Option<Gains>> {
+        let views = self.sealed.exam();
+        if views.is_empty() {
+            return Ok(None);
+        }
+        let baselines = self.truth.asked.seed.is_multiple_of(BASELINES_IN);
+        examine(&views, &scratch.join("set"), model, baselines).map(Some)
+    }
 }
 
 /// One pass over sets: committed to, diagnosed, published.
@@ -174,6 +185,8 @@ impl Round<'_> {
         let line = |(set, s): (&Taken, &Solved)| VerdictHash {
             name: set.name.clone(),
             diagnosis_sha256: s.answer.diagnosis_sha256.clone(),
+            model_sha256: s.model_sha256.clone(),
+            confinement: s.confinement.clone(),
         };
         let verdicts = sets.iter().zip(&solved).map(line).collect();
         let verdicts = Verdicts { commitments_sha256: commitments_sha256.clone(), verdicts };
@@ -209,16 +222,11 @@ impl Round<'_> {
             let Ok(model) = NoiseModel::read(&self.file("work/models", &set.name)?) else {
                 return Ok(None);
             };
-            let views = set.sealed.exam();
-            if views.is_empty() {
-                return Ok(None);
-            }
             self.once("gains", &set.name, || {
                 let scratch = self.remade(set, committed)?;
-                let baselines = set.truth.asked.seed.is_multiple_of(BASELINES_IN);
-                let gains = examine(&views, &scratch.join("set"), &model, baselines)?;
+                let gains = set.gains(&scratch, &model)?;
                 remove(&scratch)?;
-                Ok(Some(gains))
+                Ok(gains)
             })
         })
     }

@@ -3,7 +3,7 @@
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use kinoise::calibrate::paper_model;
 use kinoise::diagnose::{DiagnoseOptions, Verdict, diagnose, diagnose_against};
@@ -35,6 +35,9 @@ pub struct Answer {
 pub struct Solved {
     #[serde(flatten)]
     pub answer: Answer,
+    /// Of its `model.json`, every byte.
+    #[serde(default)]
+    pub model_sha256: Option<String>,
     /// What kept the process from the rest of the machine.
     pub confinement: String,
     /// Depends on the machine.
@@ -74,7 +77,8 @@ pub fn solve(program: &Path, limit: Duration, scratch: &Path) -> Result<Solved> 
         Some(_) => fs::read(out.join("diagnosis.json")).map_err(|e| e.to_string()),
     });
     let confinement = text("stdout").lines().next().unwrap_or("unknown").to_string();
-    Ok(Solved { answer, confinement, seconds })
+    let model_sha256 = fs::read(out.join("model.json")).ok().map(|bytes| sha256_hex(&bytes));
+    Ok(Solved { answer, model_sha256, confinement, seconds })
 }
 
 /// `None` when it had to be ended.
@@ -128,7 +132,9 @@ pub fn diagnose_shut_in() -> anyhow::Result<u8> {
     let simulated = set.join("simulated");
     let done = if simulated.exists() {
         let simulated = open(&simulated, &Assumed::default())?;
-        let sigma = |recording: &Recording| paper_model(recording, options.seed, None, &|_, _| ());
+        // The model's hash is published: it must not depend on the day.
+        let day = Some(SystemTime::UNIX_EPOCH);
+        let sigma = |recording: &Recording| paper_model(recording, options.seed, day, &|_, _| ());
         let model = sigma(&simulated).or_else(|_| sigma(&recording))?;
         diagnose_against(&recording, &simulated, &model, &options, &|_, _| ())?
     } else {

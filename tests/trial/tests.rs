@@ -9,6 +9,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use crate::check::{CheckOptions, check};
+use crate::judge::scores;
 use crate::plan::plan;
 use crate::proof::{Order, Proof};
 use crate::raytraced::question::World;
@@ -29,7 +30,11 @@ fn order() -> Order {
 fn solver(folder: &Path, verdict: &str) -> PathBuf {
     let path = folder.join("solver.sh");
     let answer = json!({"verdict": verdict, "findings": []});
-    let text = format!("#!/bin/sh\necho nothing\nprintf '%s' '{answer}' > ../out/diagnosis.json\n");
+    let model = kinoise::NoiseModel::paper().to_json().expect("a model");
+    let text = format!(
+        "#!/bin/sh\necho nothing\nprintf '%s' '{answer}' > ../out/diagnosis.json\n\
+         printf '%s' '{model}' > ../out/model.json\n"
+    );
     fs::write(&path, text).expect("written");
     fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("executable");
     path
@@ -64,7 +69,8 @@ fn a_trial_holds_until_something_in_it_is_changed() {
 
     let out = folder.path().join("out");
     let name = &proof.sets[0].name;
-    let changes: [(String, fn(&mut Value)); 6] = [
+    let changes: [(String, fn(&mut Value)); 7] = [
+        ("proof.json".into(), |p| p["confinement"] = json!({"landlock ABI 5": 3})),
         ("proof.json".into(), |p| p["sets"][0]["verdict"]["verdict"] = "mismatch".into()),
         ("proof.json".into(), |p| p["sets"][1]["truth"]["asked"]["seed"] = 1.into()),
         ("proof.json".into(), |p| p["sets"][2]["marks"]["first"] = "vignetting".into()),
@@ -78,6 +84,21 @@ fn a_trial_holds_until_something_in_it_is_changed() {
         assert!(!faults(folder.path(), &program).is_empty(), "{file} was changed unnoticed");
         fs::write(&path, before).expect("put back");
     }
+    // The scores follow from the gains: a forger changes both.
+    let forge = |p: &mut Value| {
+        let mut forged: Proof = serde_json::from_value(p.clone()).expect("a proof");
+        for gains in forged.sets.iter_mut().filter_map(|s| s.gains.as_mut()) {
+            let own = gains.methods.get_mut("kinoise").expect("its own");
+            own.within = 0.99 * gains.oracle.within;
+        }
+        assert!(forged.sets.iter().any(|s| s.gains.is_some()));
+        forged.scores = scores(&forged.sets);
+        *p = json!(forged);
+    };
+    let before = edit(&out.join("proof.json"), forge);
+    let told = faults(folder.path(), &program);
+    assert!(told.iter().any(|f| f.contains("gains something else")), "{told:?}");
+    fs::write(out.join("proof.json"), before).expect("put back");
     assert_eq!(faults(folder.path(), &program), Vec::<String>::new());
     assert_eq!(Proof::read(&out).expect("a proof"), proof);
 }

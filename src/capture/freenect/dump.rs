@@ -8,8 +8,9 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use super::ffi::DEPTH_BYTES;
-use crate::error::{Error, Result, read_text};
+use crate::error::{Error, Result};
 use crate::io::INDEX;
+use crate::read::read_text;
 
 /// Lines of a dump that may still be played, and what is to be said at their end.
 #[derive(Debug)]

@@ -83,7 +83,7 @@ const EXTENSIONS: [(&str, Kind); 5] = [
 impl Kind {
     fn of(path: &Path) -> Option<Self> {
         let mut first = [0; 16];
-        let mut file = File::open(path).ok().filter(|_| path.is_file())?;
+        let mut file = path.is_file().then(|| File::open(path).ok()).flatten()?;
         let n = file.read(&mut first).ok()?;
         let begins = BEGINNINGS.iter().find(|(magic, _)| first[..n].starts_with(magic));
         let named = |(name, _): &&(&str, Kind)| {
