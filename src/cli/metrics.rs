@@ -4,6 +4,7 @@ use clap::Args;
 use kinoise::io::open;
 use kinoise::metrics::{Metrics, ViewMetrics, metrics};
 use kinoise::report::metrics_page;
+use kinoise::units::counted;
 
 use super::common::{Global, Input};
 use super::console::{detail_recording, notes, result, say, working};
