@@ -14,6 +14,7 @@ mod locking;
 mod parts;
 mod raw;
 mod recording;
+mod rewrite;
 mod sigma_images;
 mod slopes;
 mod uncertainty;

@@ -1,0 +1,291 @@
+//! The files of a recording on their way into another folder, the depth images corrected.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+
+use super::correction::{Conditions, Correction};
+use super::describe::describe;
+use super::files::{copy, files_below, inside, make_folder_of, makes_a_recording};
+use super::raw::RawCode;
+use crate::Progress;
+use crate::error::{Error, Result};
+use crate::frame::{DepthCode, DepthTable, FARTHEST_M, Frame};
+use crate::io::{
+    DESCRIPTION, INDEX, Layout, encode_corrected, encode_pgm16, encode_png16, read_depth,
+    write_atomic,
+};
+use crate::read::read_image;
+use crate::view::{FrameRef, Recording, Sensor};
+
+/// What was done to a recording.
+#[derive(Debug, Clone)]
+pub struct Corrected {
+    pub frames: usize,
+    /// Pixels with a measurement, in all frames.
+    pub measured: usize,
+    /// Those whose stored depth is another now.
+    pub changed: usize,
+    /// Those whose corrected depth lies beyond the ends of the depth code.
+    pub clamped: usize,
+    /// Pixels at disparities beyond those that the model was learnt at: held at the edge.
+    pub beyond: usize,
+    /// Root mean square over all measured pixels of what was taken out, m.
+    pub rms_shift_m: f64,
+    /// How the corrected raw values become metres.
+    pub code: DepthCode,
+    /// Entries of the model that were not taken out.
+    pub ignored: Vec<String>,
+    /// What was odd, in sentences.
+    pub remarks: Vec<String>,
+}
+
+/// A depth image to be written again.
+pub(super) struct Image {
+    /// Relative to the corrected recording; where the source is a file of its own, as it stood there.
+    pub file: PathBuf,
+    pub source: FrameRef,
+    conditions: Conditions,
+}
+
+/// The depth images with what is known of each; each once, though several lists may name it.
+pub(super) fn images(recording: &Recording, root: &Path) -> Result<Vec<Image>> {
+    let frames = || recording.views.iter().flat_map(|v| v.depth.iter().map(move |f| (v, f)));
+    let begin = frames().map(|(_, f)| f.timestamp).fold(f64::INFINITY, f64::min);
+    let (mut known, mut images) = (HashSet::new(), Vec::new());
+    for (view, frame) in frames() {
+        let file = match &frame.within {
+            Some(within) => format!("depth/{:06}.png", within.index).into(),
+            None => inside(root, &frame.path)?,
+        };
+        let conditions = Conditions {
+            session_s: frame.timestamp - begin,
+            temperature_c: view.notes.temperature_c,
+            ambient_lux: view.notes.ambient_lux,
+        };
+        if known.insert(file.clone()) {
+            images.push(Image { file, source: frame.clone(), conditions });
+        }
+    }
+    Ok(images)
+}
+
+/// The recording on its way into another folder.
+pub(super) struct Rewrite<'a> {
+    pub root: &'a Path,
+    pub output: &'a Path,
+    pub layout: Layout,
+    pub sensor: &'a Sensor,
+    pub correction: Correction,
+    pub table: DepthTable,
+    /// The code that is written.
+    pub raw: RawCode,
+    /// Where images of the uncertainty go.
+    pub sigma: Option<&'a Path>,
+}
+
+/// 10 um, so that 16 bit hold 0.65 m.
+pub const SIGMA_UNITS_PER_METRE: f64 = 1e5;
+pub(super) const SIGMA_FORMAT: &str = "kinoise-correction-sigma/1";
+
+/// What was done to one image, or why it could not be read.
+#[derive(Default)]
+struct Tally {
+    measured: usize,
+    changed: usize,
+    clamped: usize,
+    beyond: usize,
+    square_m2: f64,
+    unread: Option<String>,
+}
+
+impl Rewrite<'_> {
+    pub fn write(
+        &self,
+        images: &[Image],
+        recording: &Recording,
+        progress: Progress<'_>,
+    ) -> Result<Corrected> {
+        let others = self.other_files(images)?;
+        let (last, first): (Vec<&PathBuf>, Vec<&PathBuf>) =
+            others.iter().partition(|f| makes_a_recording(f));
+        copy(self.root, self.output, &first)?;
+        let done = AtomicUsize::new(0);
+        let each = |image: &Image| {
+            let tally = self.image(image);
+            progress.step(done.fetch_add(1, Ordering::Relaxed) + 1, images.len());
+            tally
+        };
+        let tallies: Result<Vec<Tally>> = images.par_iter().map(each).collect();
+        let corrected = self.sum(&tallies?, recording)?;
+        copy(self.root, self.output, &last)?;
+        // A dump that keeps its code stays one, and fakenect's readers know no other description.
+        let assumed = self.layout != Layout::Dump && !self.root.join(DESCRIPTION).is_file();
+        if self.recodes() || assumed {
+            let sensor = Sensor { code: self.raw.code, ..self.sensor.clone() };
+            let listed = images.iter().map(|i| (i.source.timestamp, i.file.with_extension("png")));
+            describe(self.output, self.layout, &sensor, listed)?;
+        }
+        Ok(corrected)
+    }
+
+    fn recodes(&self) -> bool {
+        self.raw.code != self.sensor.code
+    }
+
+    /// Everything but the depth images; of a dump in another code its index too, for it would say
+    /// that the raw values are a Kinect's.
+    fn other_files(&self, images: &[Image]) -> Result<Vec<PathBuf>> {
+        if self.layout == Layout::Container {
+            return Ok(Vec::new());
+        }
+        let images: HashSet<&Path> = images.iter().map(|i| i.file.as_path()).collect();
+        let no_dump = self.recodes() && self.layout == Layout::Dump;
+        let mut files = files_below(self.root)?;
+        let left_out = |f: &Path| images.contains(f) || (no_dump && f == Path::new(INDEX));
+        files.retain(|f| !left_out(f));
+        Ok(files)
+    }
+
+    fn read(&self, image: &Image) -> Result<Frame> {
+        let camera = &self.sensor.camera;
+        read_depth(&image.source, camera.width, camera.height)
+    }
+
+    /// Depth, m, as it was and without its biases.
+    fn depths(&self, frame: &Frame, image: &Image) -> Result<(Vec<f32>, Vec<f32>)> {
+        let before = self.table.depths(frame);
+        let mut after = before.clone();
+        self.correction.apply(&mut after, &image.conditions)?;
+        Ok((before, after))
+    }
+
+    /// The greatest corrected depth, m.
+    pub fn max_depth(&self, images: &[Image]) -> Result<f64> {
+        let of = |image: &Image| -> Result<f64> {
+            // What cannot be read is remarked on when it is to be written.
+            let Ok(frame) = self.read(image) else { return Ok(0.0) };
+            let (_, depth) = self.depths(&frame, image)?;
+            Ok(depth.iter().filter(|z| z.is_finite()).fold(0f32, |a, &b| a.max(b)).into())
+        };
+        let each: Result<Vec<f64>> = images.par_iter().map(of).collect();
+        Ok(each?.into_iter().fold(0.0, f64::max).min(FARTHEST_M))
+    }
+
+    fn image(&self, image: &Image) -> Result<Tally> {
+        let source = &image.source;
+        let mut target = self.output.join(&image.file);
+        let is_pgm = target.extension().is_some_and(|e| e.eq_ignore_ascii_case("pgm"));
+        // Dumps in another code go on as a described sequence, whose images are PNGs.
+        if is_pgm && self.recodes() {
+            target.set_extension("png");
+        }
+        make_folder_of(&target)?;
+        let stored = || read_image(&source.path);
+        let mut frame = match self.read(image) {
+            Ok(frame) => frame,
+            Err(why) if source.within.is_some() => return Err(why),
+            Err(why) => {
+                write_atomic(&target, &stored()?)?;
+                return Ok(Tally { unread: Some(why.to_string()), ..Tally::default() });
+            }
+        };
+        let (before, after) = self.depths(&frame, image)?;
+        let tally = self.recode(&mut frame, &before, &after);
+        let bytes = match (tally.changed, is_pgm) {
+            (0, _) if !self.recodes() && source.within.is_none() => stored()?,
+            (_, true) if !self.recodes() => encode_pgm16(&frame),
+            _ => encode_corrected(&frame)?,
+        };
+        write_atomic(&target, &bytes)?;
+        if let Some(folder) = self.sigma {
+            self.write_sigma(&folder.join(image.file.with_extension("png")), &after, image)?;
+        }
+        Ok(tally)
+    }
+
+    fn write_sigma(&self, target: &Path, depth_m: &[f32], image: &Image) -> Result<()> {
+        let sigma = self.correction.uncertainty_m(depth_m, &image.conditions);
+        let word = |s: &f32| match f64::from(*s) * SIGMA_UNITS_PER_METRE {
+            units if units.is_nan() => 0,
+            // A certain depth is a depth still.
+            units => units.round().clamp(1.0, f64::from(u16::MAX)) as u16,
+        };
+        let (width, height) = (self.sensor.camera.width, self.sensor.camera.height);
+        let frame = Frame { width, height, raw: sigma.iter().map(word).collect() };
+        make_folder_of(target)?;
+        write_atomic(target, &encode_png16(&frame)?)
+    }
+
+    /// Store corrected depths; what was no measurement stays none.
+    fn recode(&self, frame: &mut Frame, before: &[f32], after: &[f32]) -> Tally {
+        let mut tally = Tally::default();
+        let none = self.raw.code.raw(f64::NAN);
+        // Half a px beyond is no other distance.
+        let beyond = self.correction.learnt_px().map(|[low, high]| {
+            [self.correction.scale_px_m / (high + 0.5), self.correction.scale_px_m / (low - 0.5)]
+        });
+        for (raw, (&z, &better)) in frame.raw.iter_mut().zip(before.iter().zip(after)) {
+            let old = *raw;
+            if z.is_nan() {
+                *raw = if self.recodes() { none } else { old };
+                continue;
+            }
+            tally.measured += 1;
+            let learnt = |[near, far]: [f64; 2]| far < 0.0 || (near..=far).contains(&f64::from(z));
+            tally.beyond += usize::from(beyond.is_some_and(|ends| !learnt(ends)));
+            if z == better && !self.recodes() {
+                continue;
+            }
+            let (nearest, clamped) = self.raw.nearest(better);
+            *raw = nearest;
+            tally.clamped += usize::from(clamped);
+            tally.changed += usize::from(if self.recodes() { better != z } else { nearest != old });
+            // Where no depth is left, the end of the code is what was done.
+            let stored = if better.is_finite() { f64::from(better) } else { self.raw.max_m() };
+            tally.square_m2 += (stored - f64::from(z)).powi(2);
+        }
+        tally
+    }
+
+    fn sum(&self, tallies: &[Tally], recording: &Recording) -> Result<Corrected> {
+        let unread: Vec<&String> = tallies.iter().filter_map(|t| t.unread.as_ref()).collect();
+        if let (Some(first), true) = (unread.first(), unread.len() == tallies.len()) {
+            let what = format!("no depth image can be read; the first: {first}");
+            return Err(Error::recording(self.root, what, "record it again"));
+        }
+        let total = |of: fn(&Tally) -> usize| tallies.iter().map(of).sum::<usize>();
+        let measured = total(|t| t.measured);
+        // In the order of the frames, whichever thread was first.
+        let square: f64 = tallies.iter().map(|t| t.square_m2).sum();
+        let mut remarks = recording.remarks.clone();
+        remarks.extend(self.correction.remarks().iter().cloned());
+        let excluded = recording.excluded.iter();
+        remarks
+            .extend(excluded.map(|e| format!("view {} is copied as it is: {}", e.view, e.reason)));
+        remarks.extend(unread.iter().map(|why| format!("copied as it is: {why}")));
+        let beyond = total(|t| t.beyond);
+        if let (Some([low, high]), true) = (self.correction.learnt_px(), beyond * 100 > measured) {
+            let metres = |px: f64| self.correction.scale_px_m / px;
+            remarks.push(format!(
+                "{:.0} % of the depths lie outside {:.2} to {:.2} m (disparities of {high:.1} to {low:.1} px), where the correction was learnt: there it is held at the edge",
+                100.0 * beyond as f64 / measured.max(1) as f64,
+                metres(high),
+                metres(low)
+            ));
+        }
+        Ok(Corrected {
+            frames: tallies.len() - unread.len(),
+            measured,
+            changed: total(|t| t.changed),
+            clamped: total(|t| t.clamped),
+            beyond: total(|t| t.beyond),
+            rms_shift_m: (square / measured.max(1) as f64).sqrt(),
+            code: self.raw.code,
+            ignored: self.correction.ignored().to_vec(),
+            remarks,
+        })
+    }
+}
