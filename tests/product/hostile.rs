@@ -382,7 +382,7 @@ fn long_values_are_not_echoed_whole() {
 #[test]
 fn a_folder_that_may_not_be_read_is_told() {
     let desk = Desk::new();
-    fs::set_permissions(desk.at("rec/0000"), fs::Permissions::from_mode(0o0)).expect("set");
+    fs::set_permissions(desk.at("rec/0000"), fs::Permissions::from_mode(0o000)).expect("set");
     let readable = fs::read_dir(desk.at("rec/0000")).is_ok();
     let told = desk.done("calibrate rec -o out");
     fs::set_permissions(desk.at("rec/0000"), fs::Permissions::from_mode(0o755)).expect("set");
