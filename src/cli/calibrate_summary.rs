@@ -136,6 +136,7 @@ pub fn as_json(calibration: &Calibration, measurements: Option<&Measurements>) -
             "axis_distance_m": v.axis_distance_m,
             "reference_distance_m": v.reference_distance_m,
             "off_reference_m": v.reference().map(|r| r.off_m()),
+            "off_reference_expanded_m": v.distance_budget.as_ref().map(|b| b.expanded_m),
             "theta_rad": v.theta_rad,
             "azimuth_rad": v.azimuth_rad,
             "sigma_m": v.whole.spread.spatial_m,

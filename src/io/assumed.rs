@@ -201,6 +201,7 @@ impl Assumed {
             camera: Camera { width, height, fx, fy, cx, cy, distortion: None },
             baseline_m: self.baseline_m,
             code: self.code.unwrap_or(usual_code),
+            intrinsics_uncertainty: None,
         };
         match sensor.fault() {
             Some(what) => Err(Error::Argument {

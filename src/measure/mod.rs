@@ -2,6 +2,7 @@
 //!
 //! The first few frames find the target and the scale, the rest stream through accumulators.
 
+mod budget;
 mod cells;
 mod doubtful;
 mod finish;
@@ -10,6 +11,7 @@ mod scan;
 mod table;
 mod view;
 
+pub use budget::flatness_uncertainty_m;
 pub use cells::{Cell, Spread};
 pub use table::{SigmaKind, SigmaRow, SigmaTable, read_table, write_measurements};
 pub use view::{measure_view, view_target};
@@ -18,7 +20,7 @@ use crate::camera::Rays;
 use crate::frame::DepthTable;
 use crate::plane::{Exclusions, Plane, RansacPlane};
 use crate::rng::Seed;
-use crate::stats::Correlation;
+use crate::stats::{Budget, Correlation};
 use crate::view::Sensor;
 
 /// One plane for the still view, or a fresh one for every frame.
@@ -109,6 +111,12 @@ pub struct ViewMeasurement {
     pub reference_distance_m: Option<f64>,
     /// Depth of the plane on the optical axis, m: what a reference distance is compared with.
     pub axis_distance_m: f64,
+    /// Its standard error, from the scatter of the readings, m.
+    pub axis_std_error_m: f64,
+    /// Standard uncertainty of the reference, from `view.json`, m.
+    pub reference_uncertainty_m: Option<f64>,
+    /// Of [`ReferenceDistance::off_m`]; where the reference's own uncertainty is stated.
+    pub distance_budget: Option<Budget>,
     /// Mean infrared amplitude of the target, in the image's own units.
     pub infrared: Option<f64>,
     /// Of the mean residual.

@@ -11,6 +11,7 @@ use serde_json::{Map, Value};
 use super::effect::Effect;
 use super::forms::Form;
 use super::provenance::{FitSummary, Provenance};
+use super::uncertainty::Uncertainty;
 use super::{Direction, Domain, SigmaModel};
 use crate::error::{Error, Result, read_text};
 use crate::io::{pretty_json, write_atomic};
@@ -29,6 +30,8 @@ pub struct NoiseModel {
     pub sensor: Option<RecordingFile>,
     pub sigma: SigmaModel,
     pub effects: Vec<Effect>,
+    /// Budgets of what was measured, where the recording states uncertainties.
+    pub uncertainty: Option<Uncertainty>,
     pub fit: FitSummary,
     pub provenance: Provenance,
 }
@@ -39,6 +42,8 @@ struct ModelFile {
     sensor: Option<RecordingFile>,
     sigma: SigmaFile,
     effects: Vec<Effect>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    uncertainty: Option<Uncertainty>,
     fit: FitFile,
     provenance: Provenance,
 }
@@ -80,6 +85,7 @@ impl NoiseModel {
             sensor: None,
             sigma: SigmaModel::paper(),
             effects: Vec::new(),
+            uncertainty: None,
             fit: FitSummary::default(),
             provenance: Provenance::default(),
         }
@@ -119,6 +125,7 @@ impl NoiseModel {
                 valid: *domain,
             },
             effects: self.effects.clone(),
+            uncertainty: self.uncertainty.clone(),
             fit: FitFile {
                 residual: self.sigma.direction,
                 degrees_of_freedom: self.sigma.degrees_of_freedom,
@@ -171,6 +178,7 @@ impl NoiseModel {
             sensor: file.sensor,
             sigma,
             effects: file.effects,
+            uncertainty: file.uncertainty,
             fit: file.fit.summary,
             provenance: file.provenance,
         })

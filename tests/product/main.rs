@@ -37,4 +37,5 @@ mod target;
 mod traps_input;
 mod traps_output;
 mod twin;
+mod uncertainty;
 mod units;
