@@ -2,7 +2,7 @@
 
 use std::f32::consts::TAU;
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Inverse, Known, Parameter, Settings, Smallest, Stage, greatest};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Inverse, Known, Parameter, Settings, Smallest, Stage, greatest};
 use crate::camera::Camera;
 use crate::terms::{Basis, Coordinate, PixelContext, Term};
 
@@ -55,7 +55,7 @@ impl Effect for PixelLocking {
     }
 
     /// Shimizu and Okutomi 2001: 0.06 px; without a remedy twice that.
-    fn usual(&self, _: usize) -> f64 {
+    fn usual(&self, _: usize, _: Option<&Flat>) -> f64 {
         0.1
     }
 

@@ -1,6 +1,6 @@
 //! A bowl in disparity.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
 use crate::camera::Camera;
 use crate::terms::{Basis, Coordinate, DISPARITY_UNIT_PX, Modulation, PixelContext, Term};
 
@@ -49,7 +49,7 @@ impl Effect for RadialDisparityBias {
 
     /// Herrera, Kannala and Heikkila 2012, fig. 6: up to 4 of a Kinect's steps of 1/8 px towards
     /// the corners.
-    fn usual(&self, _: usize) -> f64 {
+    fn usual(&self, _: usize, _: Option<&Flat>) -> f64 {
         0.5
     }
 

@@ -1,6 +1,6 @@
 //! The file holds the ray length.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Inverse, Known, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Inverse, Known, Parameter, Settings, Stage};
 use crate::camera::Camera;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
 
@@ -44,7 +44,7 @@ impl Effect for RangeNotDepth {
     }
 
     /// All of it or nothing.
-    fn usual(&self, _: usize) -> f64 {
+    fn usual(&self, _: usize, _: Option<&Flat>) -> f64 {
         1.0
     }
 

@@ -10,6 +10,17 @@ pub struct Bounds<'a> {
     pub reach: &'a Extent,
     /// Side of the smallest patch that is looked at, px.
     pub patch_px: f64,
+    /// What is stated of the target's surface.
+    pub flat: Option<Flat>,
+}
+
+/// A target that is stated to be flat, and how much of it was seen, m, about its middle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flat {
+    /// Distance of the two parallel planes that hold its surface, m.
+    pub flatness_m: f64,
+    pub right: [f64; 2],
+    pub down: [f64; 2],
 }
 
 /// Parameters by name, as far as they are known.

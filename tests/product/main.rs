@@ -21,6 +21,7 @@ mod export_files;
 mod export_programs;
 mod extended_map;
 mod fit;
+mod flatness;
 mod layouts;
 mod map;
 mod measure;
