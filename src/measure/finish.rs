@@ -105,8 +105,12 @@ impl Scan<'_> {
     }
 
     fn sums_of(&self, cell: usize, plane: &Plane, shift: &[f64]) -> Sums {
-        let mut s =
-            Sums { dropouts: self.dropouts[cell], cut: self.beyond[cell], ..Sums::default() };
+        let mut s = Sums {
+            dropouts: self.dropouts[cell],
+            cut: self.beyond[cell],
+            bins: 1.0,
+            ..Sums::default()
+        };
         for k in self.cell_range(cell) {
             let n = f64::from(self.count[k]);
             if n == 0.0 {
