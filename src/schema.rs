@@ -77,6 +77,8 @@ struct MeasurementsRow {
     infrared: Option<f64>,
     /// Of the first frame, s.
     time_s: f64,
+    /// `sigma_m` in px of disparity, where the sensor has a disparity.
+    sigma_px: Option<f64>,
     /// Standard error of `axis_distance_m`, from the scatter of the readings, m.
     axis_std_error_m: f64,
     /// Of `reference_distance_m`, as `view.json` gives it, m.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::frame::{DepthCode, Frame, RawDisparity};
+use crate::sensors::SensorKind;
 use crate::units::shortest;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -23,12 +24,19 @@ pub struct Sensor {
     pub code: DepthCode,
     /// How well the intrinsics are known, where the recording says so.
     pub intrinsics_uncertainty: Option<IntrinsicsUncertainty>,
+    /// How it comes to its depth, where that is known.
+    pub kind: Option<SensorKind>,
 }
 
 impl Sensor {
     /// fx * baseline: disparity in px is this over the depth in m.
     pub fn disparity_px_m(&self) -> Option<f64> {
-        self.baseline_m.map(|b| self.camera.fx * b)
+        self.baseline_m.filter(|_| self.may_have_disparity()).map(|b| self.camera.fx * b)
+    }
+
+    /// Not a time-of-flight camera, as far as is known.
+    pub fn may_have_disparity(&self) -> bool {
+        self.kind.is_none_or(SensorKind::has_disparity)
     }
 
     /// What is wrong with these numbers, if anything.
@@ -309,6 +317,8 @@ pub struct RecordingFile {
     pub camera: Camera,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub baseline_m: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kind: Option<SensorKind>,
     /// Standard uncertainties of fx, fy, cx, cy, px.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intrinsics_uncertainty: Option<IntrinsicsUncertainty>,
@@ -343,6 +353,7 @@ impl RecordingFile {
             mode: sensor.mode.clone(),
             camera: sensor.camera.clone(),
             baseline_m: sensor.baseline_m,
+            kind: sensor.kind,
             intrinsics_uncertainty: sensor.intrinsics_uncertainty,
             units_per_metre,
             invalid,
@@ -372,6 +383,7 @@ impl RecordingFile {
             baseline_m: self.baseline_m,
             code,
             intrinsics_uncertainty: self.intrinsics_uncertainty,
+            kind: self.kind,
         };
         match sensor.fault() {
             Some(fault) => Err(fault),

@@ -140,6 +140,7 @@ pub fn as_json(calibration: &Calibration, measurements: Option<&Measurements>) -
             "theta_rad": v.theta_rad,
             "azimuth_rad": v.azimuth_rad,
             "sigma_m": v.whole.spread.spatial_m,
+            "sigma_px": v.sigma_px(&v.whole),
             "sigma_std_error_m": v.whole.std_error_m,
             "sigma_temporal_m": v.whole.spread.temporal_m,
             "sigma_total_m": v.whole.spread.total_m,

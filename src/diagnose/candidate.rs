@@ -1,7 +1,7 @@
 //! What could be missing: a shape with, or without, the name of its cause.
 
 use crate::effects::{self, Bounds, Effect, Flat, USUAL_PX};
-use crate::terms::{Basis, Statistic};
+use crate::terms::{Axis, Basis, Coordinate, Statistic};
 
 /// A term that is tried.
 #[derive(Debug, Clone)]
@@ -32,7 +32,17 @@ impl Candidate {
             let named = move |basis| Candidate { family: Some(id), basis, flat: bounds.flat };
             effect.shapes(bounds).into_iter().map(named)
         };
-        effects::that_change(statistic).into_iter().flat_map(of).collect()
+        let can = |e: &&'static dyn Effect| e.card().applies_to(bounds.kind);
+        effects::that_change(statistic).into_iter().filter(can).flat_map(of).collect()
+    }
+
+    /// Does it follow the disparity itself? There is none in a time-of-flight camera.
+    pub fn is_of_disparity(&self) -> bool {
+        let over = |over: Coordinate| over == Coordinate::Disparity;
+        match self.basis {
+            Basis::Curve { over: axis, .. } | Basis::Ring { over: axis, .. } => over(axis),
+            _ => self.basis.axis() == Axis::DisparityPhase,
+        }
     }
 
     /// The cause that it is the shape of.

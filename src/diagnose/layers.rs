@@ -15,6 +15,7 @@ use super::surveyed_view::{SurveyedView, independent_frames, inflation, mean_dat
 use super::tiles::tiles;
 use crate::camera::{Camera, Rays};
 use crate::effects::Flat;
+use crate::sensors::SensorKind;
 use crate::stats::Correlation;
 use crate::terms::{Extent, PixelContext, Term};
 
@@ -24,6 +25,8 @@ pub struct Survey {
     pub reach: Extent,
     /// Where every view states how flat its target is: the least flat of them.
     pub flat: Option<Flat>,
+    /// Of the camera.
+    pub kind: Option<SensorKind>,
     /// Variance of what each pixel errs by in every view alike, px^2.
     pub fixed_px2: f64,
     pub light: Light,
@@ -75,6 +78,7 @@ impl Survey {
             views,
             reach,
             flat,
+            kind: None,
             fixed_px2: 0.0,
             light,
             tolerance,

@@ -4,6 +4,7 @@ use std::f32::consts::TAU;
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Inverse, Known, Parameter, Settings, Smallest, Stage, greatest};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, PixelContext, Term};
 
 pub struct PixelLocking;
@@ -20,6 +21,7 @@ static CARD: Card = Card {
         typical: 0.05,
         summary: "height of the wave",
     }],
+    kinds: SensorKind::MATCHING,
     identity: 0.0,
     statistic: "bias",
     axis: "disparity-phase",

@@ -2,6 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, DISPARITY_UNIT_PX, Modulation, PixelContext, Term};
 
 pub struct RadialDisparityBias;
@@ -18,6 +19,7 @@ static CARD: Card = Card {
         typical: 0.5,
         summary: "disparity too large by this at the corner radius",
     }],
+    kinds: SensorKind::MATCHING,
     identity: 0.0,
     statistic: "bias",
     axis: "radius",

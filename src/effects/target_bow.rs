@@ -3,6 +3,7 @@
 use super::{
     Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Parameter, Settings, Smallest, Stage,
 };
+use crate::sensors::SensorKind;
 use crate::stats::{even, range};
 use crate::terms::{Basis, PixelContext};
 
@@ -29,6 +30,7 @@ static CARD: Card = Card {
             summary: "width of the board over which it is counted",
         },
     ],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "bias",
     axis: "target-position",

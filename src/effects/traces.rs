@@ -1,6 +1,7 @@
 //! What an effect and those who look for it, or take it out again, say to each other.
 
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Extent, Term};
 
 /// What a recording can show.
@@ -12,6 +13,8 @@ pub struct Bounds<'a> {
     pub patch_px: f64,
     /// What is stated of the target's surface.
     pub flat: Option<Flat>,
+    /// Of the camera, where it is known.
+    pub kind: Option<SensorKind>,
 }
 
 /// A target that is stated to be flat, and how much of it was seen, m, about its middle.

@@ -49,6 +49,7 @@ impl Scan<'_> {
             reference_distance_m: None,
             axis_distance_m,
             axis_std_error_m: self.axis_lever() * to_axis * whole.mean_std_error_m,
+            disparity_px_m: self.bench.sensor.disparity_px_m(),
             reference_uncertainty_m: None,
             distance_budget: None,
             infrared: None,

@@ -113,6 +113,8 @@ pub struct ViewMeasurement {
     pub axis_distance_m: f64,
     /// Its standard error, from the scatter of the readings, m.
     pub axis_std_error_m: f64,
+    /// Disparity in px times depth in m; nothing where the sensor has none.
+    pub disparity_px_m: Option<f64>,
     /// Standard uncertainty of the reference, from `view.json`, m.
     pub reference_uncertainty_m: Option<f64>,
     /// Of [`ReferenceDistance::off_m`]; where the reference's own uncertainty is stated.
@@ -127,6 +129,11 @@ pub struct ViewMeasurement {
 }
 
 impl ViewMeasurement {
+    /// The spatial sigma of a cell in px of disparity: what a matcher errs by.
+    pub fn sigma_px(&self, cell: &Cell) -> Option<f64> {
+        self.disparity_px_m.map(|px_m| cell.spread.spatial_m * px_m / cell.z_m.powi(2))
+    }
+
     /// The distance on the optical axis beside the one that `view.json` gives, if it gives one.
     pub fn reference(&self) -> Option<ReferenceDistance> {
         self.reference_distance_m

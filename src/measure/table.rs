@@ -105,7 +105,7 @@ fn rows_of(view: usize, m: &ViewMeasurement, kind: SigmaKind) -> Vec<SigmaRow> {
 type Column = (&'static str, fn(&ViewMeasurement, &Cell) -> String);
 
 /// Programs go by the names (`crate::docs::layouts`).
-const COLUMNS: [Column; 29] = [
+const COLUMNS: [Column; 30] = [
     ("view", |m, _| quoted(&m.name)),
     ("z_m", |_, cell| number(cell.z_m)),
     ("theta_rad", |m, _| number(m.theta_rad)),
@@ -130,6 +130,7 @@ const COLUMNS: [Column; 29] = [
     ("temporal_correlation", |m, _| optional(m.temporal_correlation)),
     ("infrared", |m, _| optional(m.infrared)),
     ("time_s", |m, _| number(m.time_s)),
+    ("sigma_px", |m, cell| optional(m.sigma_px(cell))),
     ("axis_std_error_m", |m, _| number(m.axis_std_error_m)),
     ("reference_uncertainty_m", |m, _| optional(m.reference_uncertainty_m)),
     ("distance_error_uncertainty_m", |m, _| of_budget(m, |b| Some(b.combined_m))),

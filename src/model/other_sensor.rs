@@ -104,6 +104,7 @@ mod tests {
             baseline_m: Some(0.075),
             code,
             intrinsics_uncertainty: None,
+            kind: None,
         }
     }
 

@@ -32,6 +32,7 @@ pub fn kinect_v1(shrink: usize) -> Sensor {
         baseline_m: Some(0.075),
         code: DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 },
         intrinsics_uncertainty: None,
+        kind: None,
     }
 }
 

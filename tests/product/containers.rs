@@ -66,6 +66,7 @@ fn sensor() -> Sensor {
         baseline_m: None,
         code: MILLIMETRES,
         intrinsics_uncertainty: None,
+        kind: None,
     }
 }
 

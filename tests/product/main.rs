@@ -32,6 +32,7 @@ mod outliers;
 mod pages;
 mod room;
 mod schema;
+mod sensors;
 mod sigma_images;
 mod speckle;
 mod target;

@@ -76,6 +76,7 @@ pub fn sensor(
         baseline_m: Some(assumed.baseline_m.unwrap_or(baseline_m)),
         code: assumed.code.unwrap_or(code),
         intrinsics_uncertainty: None,
+        kind: None,
     };
     (sensor, remarks)
 }

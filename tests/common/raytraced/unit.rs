@@ -56,6 +56,7 @@ impl Unit {
             baseline_m: Some(baseline_m),
             code,
             intrinsics_uncertainty: None,
+            kind: None,
         };
         Unit { sensor, baseline_m, sigma }
     }
