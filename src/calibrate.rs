@@ -1,5 +1,7 @@
 //! Recording in, noise model out (Yamaguchi et al. 2016, section II).
 
+mod uncertainty;
+
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::SystemTime;
@@ -23,6 +25,7 @@ use crate::read::read_bytes;
 use crate::rng::Seed;
 use crate::units::verb;
 use crate::view::{Excluded, Recording, RecordingFile};
+use uncertainty::uncertainty_of;
 
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CalibrateOptions {
@@ -120,13 +123,14 @@ pub fn model_of(
     let mut provenance = options.provenance(Some(options.measure.seed.0));
     provenance.options = describe(options, fit.form);
     provenance.sha256 = hashes(recording, measurements)?;
-    let model = noise_model(
+    let mut model = noise_model(
         Some(RecordingFile::of(&recording.sensor)),
         &fit,
         &comparison,
         options.kind,
         provenance,
     );
+    model.uncertainty = uncertainty_of(recording, &measurements.views, &model.sigma);
     Ok(Calibration { table, fit, comparison, model, warnings })
 }
 
@@ -197,6 +201,7 @@ fn noise_model(
         sensor,
         sigma: SigmaModel { direction, ..fit.model() },
         effects: Vec::new(),
+        uncertainty: None,
         fit: FitSummary {
             views: fit.views,
             samples: fit.rows,

@@ -169,6 +169,7 @@ pub mod stats;
 
 pub mod camera;
 pub mod frame;
+pub mod sensors;
 
 pub mod view;
 

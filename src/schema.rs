@@ -77,6 +77,18 @@ struct MeasurementsRow {
     infrared: Option<f64>,
     /// Of the first frame, s.
     time_s: f64,
+    /// `sigma_m` in px of disparity, where the sensor has a disparity.
+    sigma_px: Option<f64>,
+    /// Standard error of `axis_distance_m`, from the scatter of the readings, m.
+    axis_std_error_m: f64,
+    /// Of `reference_distance_m`, as `view.json` gives it, m.
+    reference_uncertainty_m: Option<f64>,
+    /// Combined standard uncertainty of axis_distance_m - reference_distance_m, m.
+    distance_error_uncertainty_m: Option<f64>,
+    /// Its effective degrees of freedom; empty where they are infinite.
+    distance_error_degrees_of_freedom: Option<f64>,
+    /// Its expanded uncertainty, k = 2, m.
+    distance_error_expanded_m: Option<f64>,
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::frame::{DepthCode, Frame, RawDisparity};
+use crate::sensors::SensorKind;
 use crate::units::shortest;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,18 +28,28 @@ pub struct Sensor {
     /// Distance between projector and camera, m.
     pub baseline_m: Option<f64>,
     pub code: DepthCode,
+    /// How well the intrinsics are known, where the recording says so.
+    pub intrinsics_uncertainty: Option<IntrinsicsUncertainty>,
+    /// How it comes to its depth, where that is known.
+    pub kind: Option<SensorKind>,
 }
 
 impl Sensor {
     /// fx * baseline: disparity in px is this over the depth in m.
     pub fn disparity_px_m(&self) -> Option<f64> {
-        self.baseline_m.map(|b| self.camera.fx * b)
+        self.baseline_m.filter(|_| self.may_have_disparity()).map(|b| self.camera.fx * b)
+    }
+
+    /// Not a time-of-flight camera, as far as is known.
+    pub fn may_have_disparity(&self) -> bool {
+        self.kind.is_none_or(SensorKind::has_disparity)
     }
 
     /// What is wrong with these numbers, if anything.
     pub fn fault(&self) -> Option<String> {
         let camera = self.camera.fault().map(|fault| fault.to_string());
-        camera.or_else(|| self.code.fault()).or_else(|| self.baseline_fault())
+        let uncertainty = || self.intrinsics_uncertainty?.fault(&self.camera);
+        camera.or_else(|| self.code.fault()).or_else(|| self.baseline_fault()).or_else(uncertainty)
     }
 
     fn baseline_fault(&self) -> Option<String> {
@@ -55,6 +66,51 @@ impl Sensor {
                 "baseline_m = {shown} and fx = {} px let both eyes meet first {nearest_m:.0} m away",
                 shortest(fx)
             )
+        })
+    }
+}
+
+/// Standard uncertainties (k = 1) of the intrinsics, px; what is not stated is left out.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct IntrinsicsUncertainty {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fx: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fy: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cx: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cy: Option<f64>,
+}
+
+impl IntrinsicsUncertainty {
+    /// Of fx and fy relative to them; nothing where neither is stated.
+    pub fn focal_relative(&self, camera: &Camera) -> Option<[f64; 2]> {
+        let relative = [self.fx.map(|u| u / camera.fx), self.fy.map(|u| u / camera.fy)];
+        relative.iter().any(Option::is_some).then(|| relative.map(|u| u.unwrap_or(0.0)))
+    }
+
+    /// Of the principal point as an angle, rad; nothing where neither coordinate is stated.
+    pub fn axis_rad(&self, camera: &Camera) -> Option<[f64; 2]> {
+        let angles = [self.cx.map(|u| u / camera.fx), self.cy.map(|u| u / camera.fy)];
+        angles.iter().any(Option::is_some).then(|| angles.map(|u| u.unwrap_or(0.0)))
+    }
+
+    fn fault(&self, camera: &Camera) -> Option<String> {
+        // One that is as large as the number itself says nothing: a unit was mistaken.
+        let (width, height) = (camera.width as f64, camera.height as f64);
+        let stated = [
+            ("fx", self.fx, camera.fx),
+            ("fy", self.fy, camera.fy),
+            ("cx", self.cx, width),
+            ("cy", self.cy, height),
+        ];
+        stated.into_iter().find_map(|(key, u, below)| {
+            let u = u.filter(|u| !(*u > 0.0 && *u < below))?;
+            let (u, below) = (shortest(u), shortest(below));
+            Some(format!(
+                "intrinsics_uncertainty.{key} = {u} must be a standard uncertainty in px, above 0 and below {below}"
+            ))
         })
     }
 }
@@ -93,6 +149,36 @@ impl Region {
 pub struct TargetSize {
     pub width_m: f64,
     pub height_m: f64,
+    /// Distance of the two parallel planes that just hold its surface (ISO 1101), m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flatness_m: Option<f64>,
+}
+
+/// A board of which less than this share of the shorter side is flat is not used as a flat target; a
+/// flatness in millimetres lies beyond it.
+const MAX_FLATNESS: f64 = 0.1;
+
+impl TargetSize {
+    /// Of this width and height, m; nothing is stated of its flatness.
+    pub fn of(width_m: f64, height_m: f64) -> Self {
+        TargetSize { width_m, height_m, flatness_m: None }
+    }
+
+    fn fault(&self) -> Option<String> {
+        for (key, side) in [("width_m", self.width_m), ("height_m", self.height_m)] {
+            if side.is_nan() || side <= 0.0 {
+                return Some(format!("target.{key} = {} must be positive", shortest(side)));
+            }
+        }
+        let side = MAX_FLATNESS * self.width_m.min(self.height_m);
+        let flatness = self.flatness_m.filter(|f| !(*f > 0.0 && *f <= side))?;
+        Some(format!(
+            "target.flatness_m = {} must be above 0 and at most a tenth of the target's shorter side, {}; is it in \
+             millimetres?",
+            shortest(flatness),
+            shortest(side)
+        ))
+    }
 }
 
 /// What `view.json` may say.
@@ -101,6 +187,8 @@ pub struct ViewNotes {
     pub target: Option<TargetSize>,
     /// Depth of the target's plane on the optical axis, measured by other means, m.
     pub reference_distance_m: Option<f64>,
+    /// Its standard uncertainty (k = 1), m.
+    pub reference_uncertainty_m: Option<f64>,
     /// Where the target is in the image; by default what the principal point looks at.
     pub region: Option<Region>,
     /// Temperature of the sensor or the room, degrees Celsius.
@@ -108,6 +196,31 @@ pub struct ViewNotes {
     /// Light on the target, lx.
     pub ambient_lux: Option<f64>,
     pub notes: Option<String>,
+}
+
+impl ViewNotes {
+    /// What is wrong with these numbers, if anything: the key is named.
+    pub fn fault(&self) -> Option<String> {
+        if self.reference_distance_m.is_some_and(|d| !(d.is_finite() && d > 0.0)) {
+            return Some("reference_distance_m must be positive".into());
+        }
+        self.target.and_then(|t| t.fault()).or_else(|| {
+            let u = self.reference_uncertainty_m?;
+            let Some(distance) = self.reference_distance_m else {
+                return Some("reference_uncertainty_m is given without reference_distance_m".into());
+            };
+            // In millimetres it would be larger than the distance in metres.
+            let usable = u > 0.0 && u < distance;
+            (!usable).then(|| {
+                format!(
+                    "reference_uncertainty_m = {} must be above 0 and below reference_distance_m = {}; is it in \
+                     millimetres?",
+                    shortest(u),
+                    shortest(distance)
+                )
+            })
+        })
+    }
 }
 
 /// A frame that can be read when it is needed.
@@ -223,6 +336,11 @@ pub struct RecordingFile {
     pub camera: Camera,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub baseline_m: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kind: Option<SensorKind>,
+    /// Standard uncertainties of fx, fy, cx, cy, px.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intrinsics_uncertainty: Option<IntrinsicsUncertainty>,
     /// Raw units a metre, 1/m; this or `raw_disparity`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units_per_metre: Option<f64>,
@@ -254,6 +372,8 @@ impl RecordingFile {
             mode: sensor.mode.clone(),
             camera: sensor.camera.clone(),
             baseline_m: sensor.baseline_m,
+            kind: sensor.kind,
+            intrinsics_uncertainty: sensor.intrinsics_uncertainty,
             units_per_metre,
             invalid,
             raw_disparity,
@@ -281,6 +401,8 @@ impl RecordingFile {
             camera: self.camera,
             baseline_m: self.baseline_m,
             code,
+            intrinsics_uncertainty: self.intrinsics_uncertainty,
+            kind: self.kind,
         };
         match sensor.fault() {
             Some(fault) => Err(fault),

@@ -11,6 +11,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use kinoise::frame::KINECT_NO_MEASUREMENT;
 use kinoise::io::Assumed;
 use kinoise::map::outside;
+use kinoise::sensors::{PRESETS, Preset};
 use kinoise::sequence::Sequence;
 use kinoise::units::shortest;
 use kinoise::{DepthCode, NoiseModel, Seed, Sensor};
@@ -85,6 +86,11 @@ pub struct Input {
     /// Projector-camera distance in m, for folders without recording.json
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     baseline: Option<f64>,
+    /// A usual camera, for what the folder or bag does not say of its own
+    #[arg(long, value_name = "ID", value_parser = PossibleValuesParser::new(PRESETS.iter().map(|p| {
+        PossibleValue::new(p.id).help(p.describe())
+    })))]
+    sensor: Option<String>,
     /// Depth topic of a bag, or array of a .npz, where there are several
     #[arg(long, value_name = "NAME")]
     topic: Option<String>,
@@ -107,6 +113,7 @@ impl Input {
             intrinsics: self.intrinsics,
             code,
             baseline_m: self.baseline,
+            preset: self.sensor.as_deref().and_then(Preset::find),
             topic: self.topic.clone(),
         })
     }
@@ -119,6 +126,7 @@ impl Input {
             ("--units-per-metre", self.units_per_metre.map(shortest)),
             ("--raw-disparity", self.raw_disparity.map(|v| joined(&v))),
             ("--baseline", self.baseline.map(shortest)),
+            ("--sensor", self.sensor.clone()),
             ("--topic", self.topic.clone()),
         ];
         let given =

@@ -60,8 +60,10 @@ fn page(card: &Card) -> String {
         .iter()
         .enumerate()
         .map(|(n, p)| parameter(p, (n == 0).then_some(card.identity)));
+    let kinds: Vec<&str> = card.kinds.iter().map(|k| k.description()).collect();
     let lines = [card.summary.to_string(), shows].into_iter().chain(parameters).chain([
         format!("easily taken for: {}", card.confused_with),
+        format!("happens to: {}", kinds.join(", ")),
         format!("source: {}", card.reference),
     ]);
     lines.for_each(|line| wrap(&line, &mut page));
@@ -115,5 +117,6 @@ fn as_json(card: &Card) -> serde_json::Value {
         "identity": {card.parameters[0].name: card.identity},
         "confused_with": card.confused_with,
         "reference": card.reference,
+        "kinds": card.kinds,
     })
 }

@@ -17,7 +17,7 @@ use super::laws::{Beside, laws};
 use super::learnt::Learnt;
 use super::lines::lines;
 use super::missing::{self, missing};
-use super::naming::temper;
+use super::naming::{physics, temper};
 use super::next_view;
 use super::other_findings;
 use super::outcome::Outcome;
@@ -29,6 +29,8 @@ use super::scene::Scene;
 use super::steps::{is_raw, own_step, own_step_note, steps};
 use super::variance;
 use super::verdict::{MIN_SIZE, echoes, fold_into_sigma, merge, symptoms};
+use crate::effects;
+use crate::sensors::SensorKind;
 use crate::terms::{Axis, Statistic, Term, corner_radius};
 
 /// How noise hangs together changes what a few frames show of its size by so much.
@@ -54,6 +56,22 @@ fn tell_lines_once(found: &mut Vec<Finding>) {
     if found.iter().any(|f| of_columns(f) && !f.terms.is_empty()) {
         let bare = |f: &Finding| f.statistic == Statistic::Bias && f.terms.is_empty();
         found.retain(|f| !(of_columns(f) && bare(f)));
+    }
+}
+
+fn can_happen(id: &str, kind: Option<SensorKind>) -> bool {
+    effects::find(id).is_none_or(|e| e.card().applies_to(kind))
+}
+
+/// What cannot happen to a camera of this kind is no name for a finding, and no alternative.
+fn forget_impossible(found: &mut [Finding], kind: Option<SensorKind>) {
+    for f in found {
+        f.alternatives.retain(|a| can_happen(a.effect, kind));
+        if f.effect.is_some_and(|id| !can_happen(id, kind)) {
+            (f.effect, f.status) = (None, Status::Unexplained);
+            f.parameters.clear();
+            f.physics = physics(f.status, None, f.statistic, f.axis, None);
+        }
     }
 }
 
@@ -92,10 +110,12 @@ impl Case<'_> {
         let mut found: Vec<Finding> = self.ranges.clone().into_iter().chain(curves).collect();
         found.extend(self.texture(&mean, &scatter, steps));
         self.at("searching the lost pixels", "testing the lost pixels again");
-        let (lost, detectable) = self.lost();
+        let (lost, mut detectable) = self.lost();
+        detectable.retain(|d| can_happen(d.effect, self.sensor().kind));
         found.extend(lost);
         let laws = self.laws(&mean.terms, reference::bent_m(&found));
         found.extend(laws);
+        forget_impossible(&mut found, self.sensor().kind);
         found.extend(self.few_views([&mean.outcome, &scatter.outcome], stepped));
         tell_lines_once(&mut found);
         if self.baseline.is_some() {
@@ -261,7 +281,8 @@ impl Case<'_> {
         let found = |terms: &[Term], beside: &Beside| {
             let levels = heldout::levels(&self.survey, terms);
             let second = self.survey.second();
-            let laws = laws(&checked(&self.fields, &levels, &self.known, &second), beside);
+            let mut laws = laws(&checked(&self.fields, &levels, &self.known, &second), beside);
+            laws.retain(|l| can_happen(l.family, self.sensor().kind));
             let level = self.level(Self::LAWS_LEVEL);
             reference::findings(&laws, &self.known, excess, level, self.options.seed)
         };

@@ -3,12 +3,15 @@
 use super::candidate::Candidate;
 use crate::camera::Camera;
 use crate::effects::Bounds;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Extent, Modulation, Statistic};
 
 /// The catalogue's biases and the curves without a name.
 pub fn candidates(bounds: &Bounds) -> Vec<Candidate> {
     let mut all = Candidate::of_catalogue(Statistic::Bias, bounds);
     all.extend(curves(bounds.camera, bounds.reach));
+    let matches = bounds.kind.is_none_or(SensorKind::has_disparity);
+    all.retain(|c| matches || !c.is_of_disparity());
     all
 }
 

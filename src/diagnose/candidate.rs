@@ -1,7 +1,7 @@
 //! What could be missing: a shape with, or without, the name of its cause.
 
-use crate::effects::{self, Bounds, Effect, USUAL_PX};
-use crate::terms::{Basis, Statistic};
+use crate::effects::{self, Bounds, Effect, Flat, USUAL_PX};
+use crate::terms::{Axis, Basis, Coordinate, Statistic};
 
 /// A term that is tried.
 #[derive(Debug, Clone)]
@@ -9,6 +9,8 @@ pub struct Candidate {
     /// Id in the catalogue; `None` for a curve without a name.
     pub family: Option<&'static str>,
     pub basis: Basis,
+    /// What is stated of the target.
+    pub flat: Option<Flat>,
 }
 
 /// The sigma model's own parameters: nothing is missing, they are off.
@@ -16,20 +18,31 @@ pub const RECALIBRATE: &str = "recalibrate";
 
 impl Candidate {
     pub fn named(family: &'static str, basis: Basis) -> Self {
-        Candidate { family: Some(family), basis }
+        Candidate { family: Some(family), basis, flat: None }
     }
 
     pub fn curve(basis: Basis) -> Self {
-        Candidate { family: None, basis }
+        Candidate { family: None, basis, flat: None }
     }
 
     /// All that the catalogue's effects may look like.
     pub fn of_catalogue(statistic: Statistic, bounds: &Bounds) -> Vec<Self> {
         let of = |effect: &'static dyn Effect| {
             let id = effect.card().id;
-            effect.shapes(bounds).into_iter().map(move |shape| Candidate::named(id, shape))
+            let named = move |basis| Candidate { family: Some(id), basis, flat: bounds.flat };
+            effect.shapes(bounds).into_iter().map(named)
         };
-        effects::that_change(statistic).into_iter().flat_map(of).collect()
+        let can = |e: &&'static dyn Effect| e.card().applies_to(bounds.kind);
+        effects::that_change(statistic).into_iter().filter(can).flat_map(of).collect()
+    }
+
+    /// Does it follow the disparity itself? There is none in a time-of-flight camera.
+    pub fn is_of_disparity(&self) -> bool {
+        let over = |over: Coordinate| over == Coordinate::Disparity;
+        match self.basis {
+            Basis::Curve { over: axis, .. } | Basis::Ring { over: axis, .. } => over(axis),
+            _ => self.basis.axis() == Axis::DisparityPhase,
+        }
     }
 
     /// The cause that it is the shape of.
@@ -39,6 +52,12 @@ impl Candidate {
 
     /// See [`Effect::usual`].
     pub fn usual(&self, k: usize) -> f64 {
-        self.effect().map_or(USUAL_PX, |e| e.usual(k))
+        self.effect().map_or(USUAL_PX, |e| e.usual(k, self.flat.as_ref()))
+    }
+
+    /// Does a fit of it agree with what is stated of the target?
+    pub fn agrees(&self, coefficients: &[f64]) -> bool {
+        let (Some(flat), Some(effect)) = (&self.flat, self.effect()) else { return true };
+        effect.agrees_with(flat, &self.basis, coefficients)
     }
 }

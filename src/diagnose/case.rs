@@ -260,6 +260,7 @@ fn survey(
 ) -> Survey {
     let camera = &bench.sensor.camera;
     let mut survey = Survey::of(fields, camera, &bench.rays);
+    survey.kind = bench.sensor.kind;
     survey.ablate(options.ablation, fields);
     survey.refits_sigma = options.calibrated_here && baseline.is_none();
     survey.fixed_px2 = mean_of(fixed_px2_by_view(fields, camera).into_iter().flatten());

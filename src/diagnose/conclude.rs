@@ -41,7 +41,7 @@ impl Case<'_> {
         let outcomes = [&mean.outcome, &scatter.outcome];
         let explained: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
         let verdict = verdict(&found, outcomes);
-        let cannot_tell = reference::cannot_tell(&self.fields);
+        let cannot_tell = reference::cannot_tell(&self.fields, self.sensor().kind);
         found.extend(cannot_tell.iter().map(not_identifiable));
         shares(&mut found);
         self.progress.stage("scoring views kept aside");

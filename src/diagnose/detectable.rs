@@ -40,7 +40,8 @@ pub fn detectable(
     let bounds = survey.bounds(camera);
     let mut all = Vec::new();
     for (statistic, gates) in [(Statistic::Bias, &mean), (Statistic::Variance, &blocks)] {
-        for effect in effects::that_change(statistic) {
+        let can = effects::that_change(statistic).into_iter();
+        for effect in can.filter(|e| e.card().applies_to(bounds.kind)) {
             let smallest = effect.smallest(&bounds).and_then(|s| least(s, statistic, gates));
             all.extend(smallest.map(|minimum| Detectable { effect: effect.card().id, minimum }));
         }

@@ -138,6 +138,7 @@ pub fn few_views(
         .collect();
     let mut all: Vec<(&Candidate, Best)> =
         tried.par_iter().filter_map(|t| Some((t.candidate, t.best()?))).collect();
+    all.retain(|(candidate, best)| candidate.agrees(best.beta.as_slice()));
     all.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
     let most = all.first()?.1.gain;
     let shared: f64 = outcome.chosen.iter().map(|c| c.gain.max(0.0)).sum();

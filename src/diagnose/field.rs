@@ -50,6 +50,8 @@ pub struct Field {
     /// Each frame's residual as a line in the disparity: at the view's middle, px, and its slope.
     pub lines: Vec<[f64; 2]>,
     pub reference_distance_m: Option<f64>,
+    /// Of the target, as the view states it.
+    pub flatness_m: Option<f64>,
     pub temperature_c: Option<f64>,
     pub ambient_lux: Option<f64>,
     /// Infrared amplitude times the square of the distance over the cosine of the incidence: how
@@ -192,6 +194,7 @@ impl Field {
             frames: Vec::new(),
             lines: Vec::new(),
             reference_distance_m: view.notes.reference_distance_m,
+            flatness_m: view.notes.target.and_then(|t| t.flatness_m),
             temperature_c: view.notes.temperature_c,
             ambient_lux: view.notes.ambient_lux,
             light: Vec::new(),

@@ -219,7 +219,7 @@ impl Joint<'_> {
             chosen.push(term.clone());
             if let Some(gauge) = &self.columns.gauges[t] {
                 let (basis, _) = gauge.term(&[]);
-                let candidate = Candidate { family: term.candidate.family, basis };
+                let candidate = Candidate { basis, ..term.candidate.clone() };
                 chosen.push(Chosen { candidate, gain: 0.0, rivals: Vec::new(), ..term.clone() });
             }
         }

@@ -60,7 +60,7 @@ fn session(z_m: [f64; 2], rng: &mut Stream, bias: impl Fn(&PixelContext) -> f64)
 
 fn term(family: Option<&'static str>, basis: Basis) -> Chosen {
     Chosen {
-        candidate: Candidate { family, basis },
+        candidate: Candidate { family, basis, flat: None },
         rms: 0.1,
         adequacy: 0.6,
         gain: 1.0,

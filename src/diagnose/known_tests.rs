@@ -16,6 +16,7 @@ fn model(id: &str, parameters: Value) -> NoiseModel {
         sensor: None,
         sigma: crate::SigmaModel::paper(),
         effects: vec![Effect { id: id.into(), parameters, ..Effect::default() }],
+        uncertainty: None,
         fit: FitSummary::default(),
         provenance: Provenance::now(None),
     }

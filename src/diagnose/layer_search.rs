@@ -54,7 +54,13 @@ impl Survey {
 
     /// What these views can show of an effect.
     pub fn bounds<'a>(&'a self, camera: &'a Camera) -> Bounds<'a> {
-        Bounds { camera, reach: &self.reach, patch_px: SIDE as f64 }
+        Bounds {
+            camera,
+            reach: &self.reach,
+            patch_px: SIDE as f64,
+            flat: self.flat,
+            kind: self.kind,
+        }
     }
 
     /// How the search of the mean decides.

@@ -14,6 +14,8 @@ use super::samples::{ViewData, coarser};
 use super::surveyed_view::{SurveyedView, independent_frames, inflation, mean_data};
 use super::tiles::tiles;
 use crate::camera::{Camera, Rays};
+use crate::effects::Flat;
+use crate::sensors::SensorKind;
 use crate::stats::Correlation;
 use crate::terms::{Extent, PixelContext, Term};
 
@@ -21,6 +23,10 @@ use crate::terms::{Extent, PixelContext, Term};
 pub struct Survey {
     pub views: Vec<SurveyedView>,
     pub reach: Extent,
+    /// Where every view states how flat its target is: the least flat of them.
+    pub flat: Option<Flat>,
+    /// Of the camera.
+    pub kind: Option<SensorKind>,
     /// Variance of what each pixel errs by in every view alike, px^2.
     pub fixed_px2: f64,
     pub light: Light,
@@ -61,10 +67,18 @@ impl Survey {
             .collect();
         let light = relative_light(&mut views);
         let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter().map(|t| &t.place)));
+        let stated: Option<Vec<f64>> = fields.iter().map(|f| f.flatness_m).collect();
+        let flat = stated.filter(|all| !all.is_empty()).map(|all| Flat {
+            flatness_m: all.into_iter().fold(0.0, f64::max),
+            right: reach.right,
+            down: reach.down,
+        });
         let (tolerance, ablation) = (MODEL_TOLERANCE, Ablation::None);
         Survey {
             views,
             reach,
+            flat,
+            kind: None,
             fixed_px2: 0.0,
             light,
             tolerance,

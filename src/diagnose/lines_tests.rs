@@ -37,6 +37,7 @@ fn field(rng: &mut Stream, error_px: impl Fn(usize) -> f64) -> Field {
         frames: Vec::new(),
         lines: Vec::new(),
         reference_distance_m: None,
+        flatness_m: None,
         temperature_c: None,
         ambient_lux: None,
         light: Vec::new(),

@@ -29,6 +29,7 @@ fn knowing(id: &str, name: &str, value: f64) -> KnownTerms {
         sensor: None,
         sigma: crate::SigmaModel::paper(),
         effects: vec![Effect { id: id.into(), parameters, ..Effect::default() }],
+        uncertainty: None,
         fit: FitSummary::default(),
         provenance: Provenance::now(None),
     };

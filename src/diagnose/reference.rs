@@ -10,8 +10,10 @@ use super::laws::{FEWEST, Law};
 use super::naming::{MIN_PROBABILITY, physics};
 use super::null::{NoiseGains, Null, student};
 use super::parameters::estimate;
+use crate::effects;
 use crate::model::Covariance;
 use crate::rng::Seed;
+use crate::sensors::SensorKind;
 use crate::terms::{Axis, Statistic};
 
 /// A law must move the depth by this many errors of a reference, and by this much, m: tapes and
@@ -110,7 +112,7 @@ pub fn findings(
 }
 
 /// What planes alone never tell.
-pub fn cannot_tell(fields: &[Field]) -> Vec<CannotTell> {
+pub fn cannot_tell(fields: &[Field], kind: Option<SensorKind>) -> Vec<CannotTell> {
     if fields.iter().filter(|f| f.reference_distance_m.is_some()).count() >= FEWEST {
         return Vec::new();
     }
@@ -119,9 +121,11 @@ pub fn cannot_tell(fields: &[Field]) -> Vec<CannotTell> {
             "{what} is not identifiable from planes without a reference distance: every plane takes it up whole. Measure the distance of the target in at least {FEWEST} views with a tape or a rail and give it as reference_distance_m."
         )
     };
-    vec![
+    let mut all = vec![
         CannotTell { effect: "depth-scale", why: why("A wrong scale of the depth") },
         CannotTell { effect: "disparity-offset", why: why("A wrong offset of the disparity") },
         CannotTell { effect: "thermal-drift", why: why("A drift of the scale over the session") },
-    ]
+    ];
+    all.retain(|c| effects::find(c.effect).is_none_or(|e| e.card().applies_to(kind)));
+    all
 }

@@ -57,6 +57,7 @@ fn picture(camera: &Camera, beside: impl Fn(usize) -> Option<f64>) -> (Field, Fr
         frames: Vec::new(),
         lines: Vec::new(),
         reference_distance_m: None,
+        flatness_m: None,
         temperature_c: None,
         ambient_lux: None,
         light: Vec::new(),

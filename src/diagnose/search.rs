@@ -190,6 +190,9 @@ impl Layer<'_> {
                 let evidence: Vec<Evidence> = views.iter().map(|v| v.evidence(&c.basis)).collect();
                 let null = Null::of(&evidence, m, self.rules.prior)?;
                 let mut gain = gain(&evidence, self.rules.prior)?;
+                if !c.agrees(gain.beta.rows(m, c.basis.count()).into_owned().as_slice()) {
+                    return None;
+                }
                 gain.total -= base.total;
                 gain.by_view.iter_mut().zip(&base.by_view).for_each(|(g, b)| *g -= b);
                 let rms = judge.rms(&c.basis, m, &gain, &evidence);

@@ -128,6 +128,7 @@ pub(super) fn steps(
     let mut sigma_px: Vec<f32> = fields.iter().filter_map(|f| f.sigma.first().copied()).collect();
     let sigma_px = f64::from(crate::stats::median_in_place(&mut sigma_px));
     if let Some(step) = lattice.disparity_step_px
+        && recording.sensor.may_have_disparity()
         && !known.has("disparity-quantisation")
         && own_step(lattice, recording, fields[0].scale_px_m).is_none()
     {

@@ -4,6 +4,7 @@ use super::candidate::{Candidate, RECALIBRATE};
 use crate::camera::Camera;
 use crate::effects::Bounds;
 use crate::model::SigmaModel;
+use crate::sensors::SensorKind;
 use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, Statistic, TABLE, Term};
 
 /// The catalogue's changes of the noise, those of sigma itself, and the curves without a name.
@@ -15,6 +16,8 @@ pub fn candidates(bounds: &Bounds, sigma: &SigmaModel) -> Vec<Candidate> {
     all.extend(recalibrations(bounds.reach, sigma));
     all.extend(surfaces(bounds.reach));
     all.extend(curves(bounds.camera, bounds.reach));
+    let matches = bounds.kind.is_none_or(SensorKind::has_disparity);
+    all.retain(|c| matches || !c.is_of_disparity());
     all
 }
 

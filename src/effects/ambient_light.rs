@@ -2,6 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Stage};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, PixelContext, ROOM_LUX, Term};
 
 pub struct AmbientLight;
@@ -18,6 +19,7 @@ static CARD: Card = Card {
         typical: 0.05,
         summary: "light of a room of 500 lx over the pattern's, on a surface facing the sensor at 1 m",
     }],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "variance",
     axis: "intensity",

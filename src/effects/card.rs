@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::sensors::SensorKind;
+
 /// Where in the light's path an effect acts, in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub enum Stage {
@@ -94,6 +96,8 @@ pub struct Card {
     pub summary: &'static str,
     /// The first is the strength.
     pub parameters: &'static [Parameter],
+    /// The cameras that it can happen to.
+    pub kinds: &'static [SensorKind],
     /// The strength at which nature is as if the effect were not there.
     pub identity: f64,
     pub statistic: &'static str,
@@ -101,4 +105,11 @@ pub struct Card {
     /// The effects it is taken for most easily, by id, and what distinguishes them.
     pub confused_with: &'static str,
     pub reference: &'static str,
+}
+
+impl Card {
+    /// Can it happen to a camera of this kind? To one that is not known all can.
+    pub fn applies_to(&self, kind: Option<SensorKind>) -> bool {
+        kind.is_none_or(|kind| self.kinds.contains(&kind))
+    }
 }

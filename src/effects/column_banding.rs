@@ -2,6 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage, greatest};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Term};
 
 pub struct ColumnBanding;
@@ -27,6 +28,7 @@ static CARD: Card = Card {
             summary: "columns from one step to the next",
         },
     ],
+    kinds: SensorKind::MATCHING,
     identity: 0.0,
     statistic: "bias",
     axis: "column",

@@ -1,6 +1,7 @@
 //! The driver rounds the depth to a constant step.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use crate::sensors::SensorKind;
 
 pub struct DepthRounding;
 
@@ -16,6 +17,7 @@ static CARD: Card = Card {
         typical: 0.001,
         summary: "one step of the stored depth",
     }],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "distribution",
     axis: "z",

@@ -2,6 +2,7 @@
 
 use super::{Card, Draw, Effect, Exposure, Inverse, Parameter, Settings, Stage};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 
 pub struct DepthScale;
 
@@ -17,6 +18,7 @@ static CARD: Card = Card {
         typical: 1.035,
         summary: "stored depth over true depth",
     }],
+    kinds: SensorKind::ALL,
     identity: 1.0,
     statistic: "bias",
     axis: "z",

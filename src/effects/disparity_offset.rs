@@ -2,6 +2,7 @@
 
 use super::{Card, Draw, Effect, Exposure, Inverse, Parameter, Settings, Stage};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Term};
 
 pub struct DisparityOffset;
@@ -18,6 +19,7 @@ static CARD: Card = Card {
         typical: 0.1,
         summary: "added to every disparity: positive brings things nearer",
     }],
+    kinds: SensorKind::MATCHING,
     identity: 0.0,
     statistic: "bias",
     axis: "z",

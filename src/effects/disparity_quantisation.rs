@@ -1,6 +1,7 @@
 //! The matcher answers in steps.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use crate::sensors::SensorKind;
 
 pub struct DisparityQuantisation;
 
@@ -16,6 +17,7 @@ static CARD: Card = Card {
         typical: 0.125,
         summary: "one step of the disparity",
     }],
+    kinds: SensorKind::MATCHING,
     identity: 0.0,
     statistic: "distribution",
     axis: "disparity-phase",

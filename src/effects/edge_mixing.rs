@@ -1,6 +1,7 @@
 //! Depth mixes with what is behind.
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Parameter, Settings, Stage};
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate};
 
 pub struct EdgeMixing;
@@ -17,6 +18,7 @@ static CARD: Card = Card {
         typical: 2.0,
         summary: "distance from the edge at which a pixel sees one surface only",
     }],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "bias",
     axis: "edge-distance",

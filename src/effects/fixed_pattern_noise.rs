@@ -1,6 +1,7 @@
 //! Each pixel has its own constant error.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, normals};
+use crate::sensors::SensorKind;
 
 pub struct FixedPatternNoise;
 
@@ -16,6 +17,7 @@ static CARD: Card = Card {
         typical: 0.05,
         summary: "standard deviation over the pixels",
     }],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "bias",
     axis: "pixel",

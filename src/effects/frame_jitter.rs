@@ -1,6 +1,7 @@
 //! The whole frame is shifted as one.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, normals};
+use crate::sensors::SensorKind;
 
 pub struct FrameJitter;
 
@@ -16,6 +17,7 @@ static CARD: Card = Card {
         typical: 0.03,
         summary: "standard deviation of the shift",
     }],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "correlation",
     axis: "frame",

@@ -1,6 +1,7 @@
 //! Laser speckle stands still.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, normals};
+use crate::sensors::SensorKind;
 
 pub struct FrozenNoise;
 
@@ -16,6 +17,7 @@ static CARD: Card = Card {
         typical: 0.8,
         summary: "of the variance that stands still",
     }],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "correlation",
     axis: "frame",

@@ -1,6 +1,7 @@
 //! No depth at grazing angles.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, chance, logistic};
+use crate::sensors::SensorKind;
 
 pub struct GrazingDropout;
 
@@ -32,6 +33,7 @@ static CARD: Card = Card {
             summary: "how gradual: from a quarter to three quarters over 2.2 times this",
         },
     ],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "missing",
     axis: "theta",

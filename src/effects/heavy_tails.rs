@@ -1,6 +1,7 @@
 //! Gross mismatches.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, chance, normals};
+use crate::sensors::SensorKind;
 
 pub struct HeavyTails;
 
@@ -25,6 +26,7 @@ static CARD: Card = Card {
             summary: "how many times wider their errors are",
         },
     ],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "distribution",
     axis: "residual",

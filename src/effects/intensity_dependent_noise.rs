@@ -3,6 +3,7 @@
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Stage};
 use crate::camera::Camera;
 use crate::scene::WHITE;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct IntensityDependentNoise;
@@ -19,6 +20,7 @@ static CARD: Card = Card {
         typical: 0.5,
         summary: "sigma goes with the reflectance to minus this; nothing changes on white paper",
     }],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "variance",
     axis: "intensity",

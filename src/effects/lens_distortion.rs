@@ -1,7 +1,8 @@
 //! The ray of a pixel is not where the pinhole says.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct LensDistortion;
@@ -18,6 +19,7 @@ static CARD: Card = Card {
         typical: -0.05,
         summary: "radial coefficient of Brown and Conrady that the calibration lacks",
     }],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "bias",
     axis: "radius",
@@ -49,7 +51,7 @@ impl Effect for LensDistortion {
 
     /// What is left of k1 in a depth picture that was calibrated (Khoshelham and Elberink 2012,
     /// table 1: 0.003; Smisek, Jancosek and Pajdla 2011: 0.01 to 0.05).
-    fn usual(&self, _: usize) -> f64 {
+    fn usual(&self, _: usize, _: Option<&Flat>) -> f64 {
         0.02
     }
 

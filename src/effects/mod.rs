@@ -20,7 +20,7 @@ pub use draw::{Draw, Scope, fill_normal};
 pub use exposure::{Exposure, Instant, KINECT_BASELINE_M};
 pub use fitted::{Estimate, Fitted};
 pub use range_not_depth::RAY_FOR_DEPTH;
-pub use traces::{Bounds, Inverse, Known, Smallest};
+pub use traces::{Bounds, Flat, Inverse, Known, Smallest};
 
 use crate::camera::Camera;
 pub use crate::terms::ROOM_LUX;
@@ -55,9 +55,15 @@ pub trait Effect: Send + Sync {
     }
 
     /// A size that coefficient number `k` of its shapes may well have, in its unit: the standard
-    /// deviation of what is believed before anything was measured.
-    fn usual(&self, _k: usize) -> f64 {
+    /// deviation of what is believed before anything was measured. `flat` is what is stated of the
+    /// target.
+    fn usual(&self, _k: usize, _flat: Option<&Flat>) -> f64 {
         USUAL_PX
+    }
+
+    /// Can a shape with these coefficients be meant, with what is stated of the target?
+    fn agrees_with(&self, _flat: &Flat, _shape: &Basis, _coefficients: &[f64]) -> bool {
+        true
     }
 
     /// The share of what the best nameless curve explains that its name must, where less than of

@@ -1,6 +1,7 @@
 //! The projector cannot see what the camera sees.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use crate::sensors::SensorKind;
 
 pub struct OcclusionShadow;
 
@@ -16,6 +17,7 @@ static CARD: Card = Card {
         typical: 1.0,
         summary: "of the baseline between camera and projector",
     }],
+    kinds: SensorKind::MATCHING,
     identity: 0.0,
     statistic: "missing",
     axis: "edge-distance",

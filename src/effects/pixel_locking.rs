@@ -2,8 +2,9 @@
 
 use std::f32::consts::TAU;
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Inverse, Known, Parameter, Settings, Smallest, Stage, greatest};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Inverse, Known, Parameter, Settings, Smallest, Stage, greatest};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, PixelContext, Term};
 
 pub struct PixelLocking;
@@ -20,6 +21,7 @@ static CARD: Card = Card {
         typical: 0.05,
         summary: "height of the wave",
     }],
+    kinds: SensorKind::MATCHING,
     identity: 0.0,
     statistic: "bias",
     axis: "disparity-phase",
@@ -55,7 +57,7 @@ impl Effect for PixelLocking {
     }
 
     /// Shimizu and Okutomi 2001: 0.06 px; without a remedy twice that.
-    fn usual(&self, _: usize) -> f64 {
+    fn usual(&self, _: usize, _: Option<&Flat>) -> f64 {
         0.1
     }
 

@@ -1,7 +1,8 @@
 //! A bowl in disparity.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, DISPARITY_UNIT_PX, Modulation, PixelContext, Term};
 
 pub struct RadialDisparityBias;
@@ -18,6 +19,7 @@ static CARD: Card = Card {
         typical: 0.5,
         summary: "disparity too large by this at the corner radius",
     }],
+    kinds: SensorKind::MATCHING,
     identity: 0.0,
     statistic: "bias",
     axis: "radius",
@@ -49,7 +51,7 @@ impl Effect for RadialDisparityBias {
 
     /// Herrera, Kannala and Heikkila 2012, fig. 6: up to 4 of a Kinect's steps of 1/8 px towards
     /// the corners.
-    fn usual(&self, _: usize) -> f64 {
+    fn usual(&self, _: usize, _: Option<&Flat>) -> f64 {
         0.5
     }
 

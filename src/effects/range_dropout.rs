@@ -1,6 +1,7 @@
 //! No depth far away, or too near.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, chance, logistic};
+use crate::sensors::SensorKind;
 
 pub struct RangeDropout;
 
@@ -32,6 +33,7 @@ static CARD: Card = Card {
             summary: "how gradual: from a quarter to three quarters over 2.2 times this; negative loses what is nearer",
         },
     ],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "missing",
     axis: "z",

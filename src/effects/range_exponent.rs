@@ -2,6 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Term};
 
 pub struct RangeExponent;
@@ -18,6 +19,7 @@ static CARD: Card = Card {
         typical: 0.5,
         summary: "added to the exponent of z; nothing changes at 2 m",
     }],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "variance",
     axis: "z",

@@ -1,7 +1,8 @@
 //! The file holds the ray length.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Inverse, Known, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Inverse, Known, Parameter, Settings, Stage};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct RangeNotDepth;
@@ -18,6 +19,7 @@ static CARD: Card = Card {
         typical: 1.0,
         summary: "how much of the ray length over the depth is in the file",
     }],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "bias",
     axis: "radius",
@@ -44,7 +46,7 @@ impl Effect for RangeNotDepth {
     }
 
     /// All of it or nothing.
-    fn usual(&self, _: usize) -> f64 {
+    fn usual(&self, _: usize, _: Option<&Flat>) -> f64 {
         1.0
     }
 

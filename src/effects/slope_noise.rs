@@ -2,6 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Term};
 
 pub struct SlopeNoise;
@@ -18,6 +19,7 @@ static CARD: Card = Card {
         typical: 0.8,
         summary: "standard deviation of the place a pixel looks at",
     }],
+    kinds: SensorKind::MATCHING,
     identity: 0.0,
     statistic: "variance",
     axis: "theta",

@@ -1,6 +1,7 @@
 //! Neighbours share a matching window.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Scope, Settings, Stage, normals};
+use crate::sensors::SensorKind;
 
 pub struct SpatialCorrelation;
 
@@ -25,6 +26,7 @@ static CARD: Card = Card {
             summary: "of the variance that comes through the window; the rest is each pixel's own",
         },
     ],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "correlation",
     axis: "pixel-lag",

@@ -1,7 +1,11 @@
 //! The board is not flat.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Parameter, Settings, Smallest, Stage};
-use crate::terms::Basis;
+use super::{
+    Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Parameter, Settings, Smallest, Stage,
+};
+use crate::sensors::SensorKind;
+use crate::stats::{even, range};
+use crate::terms::{Basis, PixelContext};
 
 pub struct TargetBow;
 
@@ -26,6 +30,7 @@ static CARD: Card = Card {
             summary: "width of the board over which it is counted",
         },
     ],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "bias",
     axis: "target-position",
@@ -60,8 +65,9 @@ impl Effect for TargetBow {
     }
 
     /// A board bends by about 1 mm at 1 m, and by 1.5 mm half a metre from its middle where it is a
-    /// bad one.
-    fn usual(&self, k: usize) -> f64 {
+    /// bad one. One whose flatness is stated bends by anything up to that, either way, over what was
+    /// seen of it: a rectangular distribution.
+    fn usual(&self, k: usize, flat: Option<&Flat>) -> f64 {
         let degree = if k < 3 {
             2
         } else if k < 7 {
@@ -69,7 +75,15 @@ impl Effect for TargetBow {
         } else {
             4
         };
-        BOW_M / 0.5f64.powi(degree)
+        let (bow_m, half_m) = flat.map_or((BOW_M, 0.5), |f| {
+            let half = |[low, high]: [f64; 2]| 0.5 * (high - low);
+            (f.flatness_m / 3f64.sqrt(), half(f.right).max(half(f.down)))
+        });
+        bow_m / half_m.powi(degree)
+    }
+
+    fn agrees_with(&self, flat: &Flat, shape: &Basis, coefficients: &[f64]) -> bool {
+        relief_m(flat, shape, coefficients) <= BEYOND_STATED * flat.flatness_m
     }
 
     /// Over the reach of the board that was seen, along the side that is bent more.
@@ -98,6 +112,62 @@ impl Effect for TargetBow {
 /// Of a board, half a metre from its middle, m.
 const BOW_M: f64 = 0.0015;
 
+/// A bend is fitted beside all else that bends a picture, and to the corners of what was seen: up to
+/// this many times the stated flatness it is a flat board's.
+const BEYOND_STATED: f64 = 2.0;
+
+/// From the lowest to the highest place of a surface over what was seen of it, its slope taken out, m.
+fn relief_m(flat: &Flat, shape: &Basis, coefficients: &[f64]) -> f64 {
+    const NODES: usize = 9;
+    let middle = |[low, high]: [f64; 2]| 0.5 * (low + high);
+    let (at_right, at_down) = (middle(flat.right), middle(flat.down));
+    let mut row = Vec::new();
+    let mut places: Vec<[f64; 3]> = Vec::new();
+    for right in even(flat.right, NODES) {
+        for down in even(flat.down, NODES) {
+            // So far from the sensor that a lift is told in metres.
+            let place = PixelContext { right, down, disparity: 1.0, rho: 1.0, ..Default::default() };
+            let height = shape.value(coefficients, &place, &mut row);
+            places.push([right - at_right, down - at_down, height]);
+        }
+    }
+    // The grid is even about its middle, so that both slopes are had one by one.
+    let slope = |k: usize| {
+        let square: f64 = places.iter().map(|p| p[k] * p[k]).sum();
+        places.iter().map(|p| p[k] * p[2]).sum::<f64>() / square.max(f64::MIN_POSITIVE)
+    };
+    let (across, along) = (slope(0), slope(1));
+    let [low, high] = range(places.iter().map(|p| p[2] - across * p[0] - along * p[1]));
+    high - low
+}
+
 fn half_square([low, high]: [f64; 2]) -> f64 {
     (0.5 * (high - low)).powi(2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FLAT: Flat = Flat { flatness_m: 2e-4, right: [-0.5, 0.5], down: [-0.4, 0.4] };
+
+    /// A sagitta of s over a half width of 0.5 m is s/0.25 right^2; tilts and offsets are no bend.
+    #[test]
+    fn a_board_is_no_more_bent_than_it_is_stated_to_be() {
+        let bent = |sagitta: f64| [-sagitta / 0.25, 0.0, 0.0];
+        let relief = relief_m(&FLAT, &Basis::relief(2), &bent(0.005));
+        assert!((relief - 0.005).abs() < 1e-12, "{relief}");
+        let twist = relief_m(&FLAT, &Basis::relief(2), &[0.0, 0.0, 0.01]);
+        assert!((twist - 2.0 * 0.01 * 0.5 * 0.4).abs() < 1e-12, "{twist}");
+        let agrees = |sagitta| TargetBow.agrees_with(&FLAT, &Basis::relief(2), &bent(sagitta));
+        assert!(agrees(0.0002) && agrees(-0.0003));
+        assert!(!agrees(0.005) && !agrees(-0.005));
+    }
+
+    #[test]
+    fn what_is_stated_takes_the_place_of_what_is_usual() {
+        assert_eq!(TargetBow.usual(0, None), BOW_M / 0.25);
+        let stated = TargetBow.usual(0, Some(&FLAT));
+        assert!((stated - 2e-4 / 3f64.sqrt() / 0.25).abs() < 1e-15, "{stated}");
+    }
 }

@@ -1,6 +1,7 @@
 //! Something moved during the view.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use crate::sensors::SensorKind;
 
 pub struct TargetMotion;
 
@@ -16,6 +17,7 @@ static CARD: Card = Card {
         typical: 0.005,
         summary: "of the target away from the sensor",
     }],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "bias",
     axis: "frame",

@@ -1,6 +1,7 @@
 //! The firmware filters over time.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use crate::sensors::SensorKind;
 
 pub struct TemporalCorrelation;
 
@@ -16,6 +17,7 @@ static CARD: Card = Card {
         typical: 0.5,
         summary: "correlation of a pixel's noise from one frame to the next",
     }],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "correlation",
     axis: "frame",

@@ -2,6 +2,7 @@
 
 use super::{Card, Draw, Effect, Exposure, Inverse, Parameter, Settings, Stage};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 
 pub struct ThermalDrift;
 
@@ -26,6 +27,7 @@ static CARD: Card = Card {
             summary: "time after which 63 % of it has come",
         },
     ],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "bias",
     axis: "session-time",

@@ -2,6 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Term};
 
 pub struct TiltAxisAnisotropy;
@@ -18,6 +19,7 @@ static CARD: Card = Card {
         typical: 1.5,
         summary: "sigma at 60 degrees of tilt along the baseline over across it",
     }],
+    kinds: SensorKind::ALL,
     identity: 1.0,
     statistic: "variance",
     axis: "azimuth",

@@ -1,6 +1,7 @@
 //! What an effect and those who look for it, or take it out again, say to each other.
 
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Extent, Term};
 
 /// What a recording can show.
@@ -10,6 +11,19 @@ pub struct Bounds<'a> {
     pub reach: &'a Extent,
     /// Side of the smallest patch that is looked at, px.
     pub patch_px: f64,
+    /// What is stated of the target's surface.
+    pub flat: Option<Flat>,
+    /// Of the camera, where it is known.
+    pub kind: Option<SensorKind>,
+}
+
+/// A target that is stated to be flat, and how much of it was seen, m, about its middle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flat {
+    /// Distance of the two parallel planes that hold its surface, m.
+    pub flatness_m: f64,
+    pub right: [f64; 2],
+    pub down: [f64; 2],
 }
 
 /// Parameters by name, as far as they are known.

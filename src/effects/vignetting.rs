@@ -2,6 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct Vignetting;
@@ -18,6 +19,7 @@ static CARD: Card = Card {
         typical: 0.5,
         summary: "by how much sigma is larger at the corner radius, as a share",
     }],
+    kinds: SensorKind::ALL,
     identity: 0.0,
     statistic: "variance",
     axis: "radius",

@@ -8,6 +8,7 @@ use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
 use crate::read::read_text;
+use crate::sensors::{PRESET_UNITS_PER_METRE, Preset};
 use crate::units::shortest;
 use crate::view::{FrameRef, Sensor};
 
@@ -19,6 +20,8 @@ pub struct Assumed {
     pub code: Option<DepthCode>,
     /// Distance between projector and camera, m.
     pub baseline_m: Option<f64>,
+    /// A camera of which all else is as usual.
+    pub preset: Option<&'static Preset>,
     /// The depth topic of a bag, or the array of a NumPy archive.
     pub topic: Option<String>,
 }
@@ -79,7 +82,8 @@ impl Assumed {
         });
         let intrinsics = self.intrinsics.map(|_| "--intrinsics");
         let baseline = self.baseline_m.map(|_| "--baseline");
-        let given: Vec<&str> = [intrinsics, code, baseline].into_iter().flatten().collect();
+        let preset = self.preset.map(|_| "--sensor");
+        let given: Vec<&str> = [intrinsics, code, baseline, preset].into_iter().flatten().collect();
         if given.is_empty() {
             return Ok(());
         }
@@ -106,7 +110,8 @@ impl Assumed {
 
     /// The Kinect whose fakenect dump has frames of `size` px, and what was assumed of it.
     pub(super) fn dump_sensor(&self, size: (usize, usize)) -> Result<(Sensor, Option<String>)> {
-        let remark = (self.intrinsics.is_none() || self.code.is_none()).then(|| {
+        let known = self.intrinsics.is_some() || self.preset.is_some();
+        let remark = (!known || self.code.is_none()).then(|| {
             "a fakenect dump carries no calibration: OpenKinect's depth formula and f = 585 px assumed; \
              give --intrinsics and --raw-disparity"
                 .into()
@@ -137,12 +142,13 @@ impl Assumed {
             return Ok((self.sensor(NAME, size, given, TUM_CODE)?, differs.then_some(remark)));
         }
         if let Some(of) = known {
-            let mut sensor = self.sensor(NAME, size, of.intrinsics, TUM_CODE)?;
+            let published = Assumed { intrinsics: Some(of.intrinsics), ..self.clone() };
+            let mut sensor = published.sensor(NAME, size, of.intrinsics, TUM_CODE)?;
             sensor.camera.distortion = of.distortion;
             let remark = format!("depth.txt says {}: its published camera is used", of.name);
             return Ok((sensor, Some(remark)));
         }
-        let remark = self.intrinsics.is_none().then(|| {
+        let remark = (self.intrinsics.is_none() && self.preset.is_none()).then(|| {
             "a TUM folder carries no intrinsics: 525,525,319.5,239.5 assumed; give --intrinsics"
                 .into()
         });
@@ -157,25 +163,37 @@ impl Assumed {
         root: &Path,
         images: &[FrameRef],
     ) -> Result<(Sensor, Option<String>)> {
-        let Some(intrinsics) = self.intrinsics else {
+        if self.intrinsics.is_none() && self.preset.is_none() {
             return Err(Error::recording(
                 root,
                 "a plain folder of PNGs carries no intrinsics",
-                "give --intrinsics fx,fy,cx,cy (and --units-per-metre or --raw-disparity)",
+                "give --intrinsics fx,fy,cx,cy or --sensor (and --units-per-metre or --raw-disparity)",
             ));
-        };
+        }
         let Some(first) = images.first() else {
             return Err(Error::recording(root, "no image in it", "give a folder of 16-bit PNGs"));
         };
-        let mut sensor = self.sensor("depth images", size_of(first)?, intrinsics, OPENKINECT)?;
+        let usual = self.intrinsics.unwrap_or(KINECT_INTRINSICS);
+        let mut sensor = self.sensor("depth images", size_of(first)?, usual, OPENKINECT)?;
         if self.code.is_some() {
             return Ok((sensor, None));
         }
-        let (code, why) = RawValues::of(images.iter()).code().map_err(|what| {
-            const REMEDY: &str =
-                "give --units-per-metre (1000 = mm, 5000 = TUM) or --raw-disparity";
-            Error::recording(root, what, REMEDY)
-        })?;
+        let (code, why) = match (RawValues::of(images.iter()).code(), self.preset) {
+            (Ok(decided), _) => decided,
+            (Err(_), Some(preset)) => {
+                let units_per_metre = PRESET_UNITS_PER_METRE;
+                let millimetres = DepthCode::Metric { units_per_metre, invalid: 0 };
+                (
+                    millimetres,
+                    format!("millimetres assumed, as the driver of {} gives them", preset.id),
+                )
+            }
+            (Err(what), None) => {
+                const REMEDY: &str =
+                    "give --units-per-metre (1000 = mm, 5000 = TUM) or --raw-disparity";
+                return Err(Error::recording(root, what, REMEDY));
+            }
+        };
         sensor.code = code;
         Ok((sensor, Some(format!("{why}; give --units-per-metre or --raw-disparity if not"))))
     }
@@ -189,19 +207,25 @@ impl Assumed {
         usual_intrinsics: [f64; 4],
         usual_code: DepthCode,
     ) -> Result<Sensor> {
-        let usual = ((width, height) == USUAL_SIZE).then_some(usual_intrinsics);
+        // Of a preset that has no images of this shape nothing else is guessed.
+        let usual = match self.preset {
+            Some(preset) => preset.intrinsics((width, height)),
+            None => ((width, height) == USUAL_SIZE).then_some(usual_intrinsics),
+        };
         let intrinsics = self.intrinsics.or(usual).ok_or_else(|| Error::Argument {
             what: format!("nothing tells the intrinsics of images of {width} x {height} px"),
             remedy: "give --intrinsics fx,fy,cx,cy in pixels",
         })?;
         let [fx, fy, cx, cy] = intrinsics;
         let sensor = Sensor {
-            name: name.into(),
+            name: self.preset.map_or(name, |p| p.name).into(),
             serial: None,
             mode: None,
             camera: Camera { width, height, fx, fy, cx, cy, distortion: None },
-            baseline_m: self.baseline_m,
+            baseline_m: self.baseline_m.or(self.preset.and_then(|p| p.baseline_m)),
             code: self.code.unwrap_or(usual_code),
+            intrinsics_uncertainty: None,
+            kind: self.preset.map(|p| p.kind),
         };
         match sensor.fault() {
             Some(what) => Err(Error::Argument {

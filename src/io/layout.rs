@@ -30,6 +30,8 @@ pub struct ViewFile {
     pub target: Option<TargetSize>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference_distance_m: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_uncertainty_m: Option<f64>,
     /// The target's region u0, v0, u1, v1, px; both edges belong to it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub roi: Option<[f64; 4]>,
@@ -54,6 +56,7 @@ impl ViewFile {
         ViewFile {
             target: notes.target,
             reference_distance_m: notes.reference_distance_m,
+            reference_uncertainty_m: notes.reference_uncertainty_m,
             roi,
             polygon,
             temperature_c: notes.temperature_c,
@@ -77,14 +80,19 @@ impl ViewFile {
             }
             (None, polygon) => polygon.map(Region::Polygon),
         };
-        Ok(ViewNotes {
+        let notes = ViewNotes {
             target: self.target,
             reference_distance_m: self.reference_distance_m,
+            reference_uncertainty_m: self.reference_uncertainty_m,
             region,
             temperature_c: self.temperature_c,
             ambient_lux: self.ambient_lux,
             notes: self.notes,
-        })
+        };
+        match notes.fault() {
+            Some(what) => Err(what),
+            None => Ok(notes),
+        }
     }
 }
 

@@ -29,6 +29,8 @@ pub struct Cell {
     pub spread: Spread,
     /// Standard error of the spatial sigma, m.
     pub std_error_m: f64,
+    /// Standard error of the mean depth, m.
+    pub mean_std_error_m: f64,
     /// Samples (pixels times frames) used.
     pub n: usize,
     /// Independent samples they are worth for a variance.
@@ -100,6 +102,8 @@ pub(super) struct Sums {
     pub cut: usize,
     /// Pixels that gave at least one sample.
     pub pixels: f64,
+    /// Bins in it: each has frames' means of its own in `between`.
+    pub bins: f64,
 }
 
 impl Sums {
@@ -115,6 +119,7 @@ impl Sums {
         self.dropouts += other.dropouts;
         self.cut += other.cut;
         self.pixels += other.pixels;
+        self.bins += other.bins;
     }
 }
 
@@ -170,6 +175,7 @@ impl Context {
                 perpendicular_m: root(s.p2 / s.n / self.cut_factor * unbias),
             },
             std_error_m: spatial_m / (2.0 * n_effective).sqrt(),
+            mean_std_error_m: self.mean_std_error_m(s, spatial, frozen, within.unwrap_or(0.0)),
             n: s.n as usize,
             n_effective,
             n_effective_temporal: (s.pixels / self.correlation_squares * (moving_frames - 1.0))
@@ -177,6 +183,29 @@ impl Context {
             dropouts: s.dropouts,
             cut: s.cut,
         })
+    }
+
+    /// From the variance `spatial` of a frame, the share `frozen` of it that no further frame averages
+    /// out, and what whole frames shift by, beside the variance `within` a pixel.
+    fn mean_std_error_m(&self, s: &Sums, spatial: f64, frozen: f64, within: f64) -> f64 {
+        let further = (s.n / s.pixels.max(1.0)).max(1.0) - 1.0;
+        // The mean of a first-order filter: (1 - rho)/(1 + rho) independent frames a frame.
+        let frames = 1.0 + further * (1.0 - self.temporal_rho) / (1.0 + self.temporal_rho);
+        let pixels = (s.pixels / self.correlation_sum.max(1.0)).max(1.0);
+        let of_pixels = spatial * (frozen + (1.0 - frozen) / frames) / pixels;
+        let shared = self.beyond_chance(s, within);
+        let of_frames = if further > 0.0 { shared / s.n / further } else { 0.0 };
+        (of_pixels + of_frames).sqrt()
+    }
+
+    /// Squares between the frames' means beyond what noise makes; nothing below three of its own
+    /// standard errors, for half of all chi-squares lie above their mean.
+    fn beyond_chance(&self, s: &Sums, within: f64) -> f64 {
+        const CLEARLY: f64 = 3.0;
+        let freedom = (self.frames - 1.0).max(0.0) * s.bins.max(1.0);
+        let noise = within * self.correlation_sum.min(s.pixels);
+        let clear = s.between > noise * (freedom + CLEARLY * (2.0 * freedom).sqrt());
+        if clear { s.between - noise * freedom } else { 0.0 }
     }
 
     /// Independent frames per frame, for the part that changes with time: the squares of a
@@ -260,6 +289,15 @@ mod tests {
         assert!((white.n_effective - 10_000.0).abs() < 1.0, "{white:?}");
         let frozen = context.cell(&Sums { within: 0.0, ..base }).unwrap();
         assert!((frozen.n_effective - 1000.0).abs() < 1.0, "{frozen:?}");
+        // Of a unit variance: the mean over 10,000 readings, and over the 1000 that differ.
+        assert!((white.mean_std_error_m - 0.01).abs() < 1e-4, "{white:?}");
+        assert!((frozen.mean_std_error_m - 1000f64.powf(-0.5)).abs() < 1e-4, "{frozen:?}");
+        // Ten frames that jump by a variance of 0.12 as wholes leave a tenth of it in the mean; noise
+        // makes the 9 beside their squares.
+        let between = 1000.0 * 9.0 * 0.12 + 9.0;
+        let jumping = context.cell(&Sums { within: 9000.0, between, ..base }).unwrap();
+        let expected = 0.012 + (1.0 - 0.108) * 1e-4;
+        assert!((jumping.mean_std_error_m.powi(2) - expected).abs() < 1e-6, "{jumping:?}");
     }
 
     /// Against the plain double sum.

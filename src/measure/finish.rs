@@ -1,5 +1,7 @@
 //! What the sums of a view's frames come to.
 
+use nalgebra::{Matrix3, Vector3};
+
 use super::cells::{Cell, Context, Sums};
 use super::doubtful::{Bin, doubts};
 use super::grouping::CUT_SIGMAS;
@@ -27,6 +29,9 @@ impl Scan<'_> {
         let context = self.context(&correlation, temporal_correlation);
         let (cells, trusted, notes) = trusted_cells(&sums, &context);
         let whole = context.cell(&trusted)?;
+        let axis_distance_m = plane.depth(0.0, 0.0);
+        // The same error of the inverse depth, at another depth.
+        let to_axis = (axis_distance_m / whole.z_m).powi(2);
         Some(ViewMeasurement {
             name: String::new(),
             time_s: 0.0,
@@ -42,12 +47,30 @@ impl Scan<'_> {
             frames,
             exclusions: target.exclusions,
             reference_distance_m: None,
-            axis_distance_m: plane.depth(0.0, 0.0),
+            axis_distance_m,
+            axis_std_error_m: self.axis_lever() * to_axis * whole.mean_std_error_m,
+            disparity_px_m: self.bench.sensor.disparity_px_m(),
+            reference_uncertainty_m: None,
+            distance_budget: None,
             infrared: None,
             picture: self.picture(&shift),
             notes,
             digest: [0; 32],
         })
+    }
+
+    /// Standard error of the plane on the optical axis over that at the middle of the pixels: a plane
+    /// is affine in the ray, and less sure away from what it was fitted to.
+    fn axis_lever(&self) -> f64 {
+        let mut normal = Matrix3::zeros();
+        let seen = self.pixels.iter().zip(&self.count).filter(|(_, n)| **n > 0);
+        for (&i, _) in seen {
+            let (x, y) = self.bench.rays.at(i as usize);
+            let row = Vector3::new(x, y, 1.0);
+            normal += row * row.transpose();
+        }
+        let pixels = normal[(2, 2)];
+        normal.try_inverse().map_or(1.0, |inverse| (pixels * inverse[(2, 2)]).max(1.0).sqrt())
     }
 
     /// The robust plane through the mean of all frames.
@@ -83,8 +106,12 @@ impl Scan<'_> {
     }
 
     fn sums_of(&self, cell: usize, plane: &Plane, shift: &[f64]) -> Sums {
-        let mut s =
-            Sums { dropouts: self.dropouts[cell], cut: self.beyond[cell], ..Sums::default() };
+        let mut s = Sums {
+            dropouts: self.dropouts[cell],
+            cut: self.beyond[cell],
+            bins: 1.0,
+            ..Sums::default()
+        };
         for k in self.cell_range(cell) {
             let n = f64::from(self.count[k]);
             if n == 0.0 {

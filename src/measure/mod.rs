@@ -3,6 +3,7 @@
 //! The first few frames find the target and the scale, the rest stream through accumulators.
 
 mod binned;
+mod budget;
 mod cells;
 mod doubtful;
 mod finish;
@@ -11,6 +12,7 @@ mod scan;
 mod table;
 mod view;
 
+pub use budget::flatness_uncertainty_m;
 pub use cells::{Cell, Spread};
 pub use table::{SigmaKind, SigmaRow, SigmaTable, read_table, write_measurements};
 pub use view::{measure_view, view_target};
@@ -19,7 +21,7 @@ use crate::camera::Rays;
 use crate::frame::DepthTable;
 use crate::plane::{Exclusions, Plane, RansacPlane};
 use crate::rng::Seed;
-use crate::stats::Correlation;
+use crate::stats::{Budget, Correlation};
 use crate::view::Sensor;
 
 /// One plane for the still view, or a fresh one for every frame.
@@ -110,6 +112,14 @@ pub struct ViewMeasurement {
     pub reference_distance_m: Option<f64>,
     /// Depth of the plane on the optical axis, m: what a reference distance is compared with.
     pub axis_distance_m: f64,
+    /// Its standard error, from the scatter of the readings, m.
+    pub axis_std_error_m: f64,
+    /// Disparity in px times depth in m; nothing where the sensor has none.
+    pub disparity_px_m: Option<f64>,
+    /// Standard uncertainty of the reference, from `view.json`, m.
+    pub reference_uncertainty_m: Option<f64>,
+    /// Of [`ReferenceDistance::off_m`]; where the reference's own uncertainty is stated.
+    pub distance_budget: Option<Budget>,
     /// Mean infrared amplitude of the target, in the image's own units.
     pub infrared: Option<f64>,
     /// Of the mean residual.
@@ -120,6 +130,11 @@ pub struct ViewMeasurement {
 }
 
 impl ViewMeasurement {
+    /// The spatial sigma of a cell in px of disparity: what a matcher errs by.
+    pub fn sigma_px(&self, cell: &Cell) -> Option<f64> {
+        self.disparity_px_m.map(|px_m| cell.spread.spatial_m * px_m / cell.z_m.powi(2))
+    }
+
     /// The distance on the optical axis beside the one that `view.json` gives, if it gives one.
     pub fn reference(&self) -> Option<ReferenceDistance> {
         self.reference_distance_m

@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::frame::FARTHEST_M;
 use crate::plane::RansacPlane;
 use crate::read::read_bytes;
+use crate::stats::Budget;
 use crate::units::shortest;
 
 /// Which standard deviation a model is fitted to.
@@ -106,7 +107,7 @@ fn rows_of(view: usize, m: &ViewMeasurement, kind: SigmaKind) -> Vec<SigmaRow> {
 type Column = (&'static str, fn(&ViewMeasurement, &Cell) -> String);
 
 /// Programs go by the names (`crate::docs::layouts`).
-const COLUMNS: [Column; 24] = [
+const COLUMNS: [Column; 30] = [
     ("view", |m, _| quoted(&m.name)),
     ("z_m", |_, cell| number(cell.z_m)),
     ("theta_rad", |m, _| number(m.theta_rad)),
@@ -131,6 +132,12 @@ const COLUMNS: [Column; 24] = [
     ("temporal_correlation", |m, _| optional(m.temporal_correlation)),
     ("infrared", |m, _| optional(m.infrared)),
     ("time_s", |m, _| number(m.time_s)),
+    ("sigma_px", |m, cell| optional(m.sigma_px(cell))),
+    ("axis_std_error_m", |m, _| number(m.axis_std_error_m)),
+    ("reference_uncertainty_m", |m, _| optional(m.reference_uncertainty_m)),
+    ("distance_error_uncertainty_m", |m, _| of_budget(m, |b| Some(b.combined_m))),
+    ("distance_error_degrees_of_freedom", |m, _| of_budget(m, |b| b.degrees_of_freedom)),
+    ("distance_error_expanded_m", |m, _| of_budget(m, |b| Some(b.expanded_m))),
 ];
 
 /// measurements.csv: a row a cell, SI units, empty where a statistic cannot be had.
@@ -152,6 +159,10 @@ fn number(v: f64) -> String {
 
 fn optional(v: Option<f64>) -> String {
     v.map_or_else(String::new, number)
+}
+
+fn of_budget(m: &ViewMeasurement, of: impl Fn(&Budget) -> Option<f64>) -> String {
+    optional(m.distance_budget.as_ref().and_then(of))
 }
 
 /// View names are folder names and may hold commas or quotes.

@@ -1,5 +1,6 @@
 //! One view: its frames are read once, in order, and only a handful are held.
 
+use super::budget::distance_budget;
 use super::scan::{HELD_FRAMES, Scan};
 use super::{ViewMeasurement, Workbench};
 use crate::error::{Error, Result};
@@ -33,16 +34,19 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
         failed(view, what, "record the view again")
     })?;
     notes.extend(measured.notes);
-    Ok(ViewMeasurement {
+    let mut measured = ViewMeasurement {
         name: view.name.clone(),
         time_s: view.depth[0].timestamp,
         paper,
         infrared,
         reference_distance_m: view.notes.reference_distance_m,
+        reference_uncertainty_m: view.notes.reference_uncertainty_m,
         notes,
         digest: source.digest(),
         ..measured
-    })
+    };
+    measured.distance_budget = distance_budget(&measured, &view.notes, bench.sensor);
+    Ok(measured)
 }
 
 /// The target of one view, from its first frames; and these, by their numbers in the view.

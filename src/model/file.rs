@@ -11,6 +11,7 @@ use serde_json::{Map, Value};
 use super::effect::Effect;
 use super::forms::Form;
 use super::provenance::{FitSummary, Provenance};
+use super::uncertainty::Uncertainty;
 use super::{Direction, Domain, SigmaModel};
 use crate::error::{Error, Result};
 use crate::io::{pretty_json, write_atomic};
@@ -30,6 +31,8 @@ pub struct NoiseModel {
     pub sensor: Option<RecordingFile>,
     pub sigma: SigmaModel,
     pub effects: Vec<Effect>,
+    /// Budgets of what was measured, where the recording states uncertainties.
+    pub uncertainty: Option<Uncertainty>,
     pub fit: FitSummary,
     pub provenance: Provenance,
 }
@@ -40,6 +43,8 @@ struct ModelFile {
     sensor: Option<RecordingFile>,
     sigma: SigmaFile,
     effects: Vec<Effect>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    uncertainty: Option<Uncertainty>,
     fit: FitFile,
     provenance: Provenance,
 }
@@ -81,6 +86,7 @@ impl NoiseModel {
             sensor: None,
             sigma: SigmaModel::paper(),
             effects: Vec::new(),
+            uncertainty: None,
             fit: FitSummary::default(),
             provenance: Provenance::default(),
         }
@@ -120,6 +126,7 @@ impl NoiseModel {
                 valid: *domain,
             },
             effects: self.effects.clone(),
+            uncertainty: self.uncertainty.clone(),
             fit: FitFile {
                 residual: self.sigma.direction,
                 degrees_of_freedom: self.sigma.degrees_of_freedom,
@@ -175,6 +182,7 @@ impl NoiseModel {
             sensor: file.sensor,
             sigma,
             effects: file.effects,
+            uncertainty: file.uncertainty,
             fit: file.fit.summary,
             provenance: file.provenance,
         })

@@ -14,6 +14,7 @@ mod robust;
 mod rows;
 mod statistics;
 mod surface;
+mod uncertainty;
 
 pub use covariance::Covariance;
 pub use effect::{Effect, UNEXPLAINED};
@@ -26,3 +27,4 @@ pub use outliers::{Sorted, fit, sort_out};
 pub use provenance::{FitSummary, Provenance, Searched};
 pub use statistics::{Parameter, Quality, SigmaFit};
 pub use surface::{Direction, Domain, SigmaLookup, SigmaModel};
+pub use uncertainty::{Conditions, NO_ACCEPTANCE_TEST, Uncertainty, ViewUncertainty};

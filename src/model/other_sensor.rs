@@ -103,6 +103,8 @@ mod tests {
             camera: Camera { width: 640, height: 480, fx, fy, cx, cy, distortion: None },
             baseline_m: Some(0.075),
             code,
+            intrinsics_uncertainty: None,
+            kind: None,
         }
     }
 

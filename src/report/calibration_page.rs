@@ -1,6 +1,7 @@
 //! The page of a calibration.
 
 mod tiles;
+mod uncertainty;
 mod views;
 mod warnings;
 
@@ -88,6 +89,9 @@ pub fn calibration_page(page: &CalibrationPage<'_>) -> Result<String> {
             &figure(&fit_residuals(measured, sigma, &names), RESIDUALS)?,
         ))
         (model(page))
+        @if let Some(uncertainty) = &calibration.model.uncertainty {
+            (uncertainty::section_of(uncertainty))
+        }
         @if let Some(measurements) = page.measurements {
             (views::section_of(&measurements.views))
             (views::gallery(&measurements.views)?)

@@ -31,6 +31,8 @@ pub fn kinect_v1(shrink: usize) -> Sensor {
         camera: Camera::centred(640 / shrink, 480 / shrink, 580.0 / shrink as f64),
         baseline_m: Some(0.075),
         code: DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 },
+        intrinsics_uncertainty: None,
+        kind: None,
     }
 }
 

@@ -116,7 +116,7 @@ fn view(index: usize, pose: &GridView, scenery: &Scenery, frames: usize, seed: S
         .reference_error_m
         .and_then(|error| reference(pose.z_m, error, seed, &index.to_string()));
     let target = match scenery.target {
-        Target::Board(b) => Some(TargetSize { width_m: b.width_m, height_m: b.height_m }),
+        Target::Board(b) => Some(TargetSize::of(b.width_m, b.height_m)),
         Target::Wall => None,
     };
     ViewPlan {

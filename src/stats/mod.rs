@@ -1,9 +1,13 @@
 //! Small statistics the pipeline shares.
 
+mod budget;
 mod correlation;
 mod paule_mandel;
 mod random_effects;
 
+pub use budget::{
+    Budget, COVERAGE_FACTOR, Component, Distribution, Evaluation, rounding_uncertainty,
+};
 pub use correlation::{Correlation, measure_correlation};
 pub use paule_mandel::{between, paule_mandel};
 pub use random_effects::RandomEffects;
@@ -72,6 +76,15 @@ pub fn student_quantile(level: f64, degrees_of_freedom: f64) -> f64 {
         return Normal::standard().inverse_cdf(p);
     }
     StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1.0)).map_or(f64::NAN, |t| t.inverse_cdf(p))
+}
+
+/// P(|T| < k) of Student's t; `None` are infinite degrees of freedom.
+pub fn student_coverage(k: f64, degrees_of_freedom: Option<f64>) -> f64 {
+    let beyond = match degrees_of_freedom.filter(|n| *n < 1e6) {
+        None => Normal::standard().sf(k),
+        Some(n) => StudentsT::new(0.0, 1.0, n).map_or(f64::NAN, |t| t.sf(k)),
+    };
+    1.0 - 2.0 * beyond
 }
 
 /// Variance of a standard normal kept only within +-`cut`: below one, tends to one.

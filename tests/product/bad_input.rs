@@ -277,6 +277,16 @@ fn numbers_that_describe_no_camera() {
         ("\"units_per_metre\": 5000.0", "\"units_per_metre\": -5.0", "units_per_metre"),
         ("\"baseline_m\": 0.075", "\"baseline_m\": -1.0", "baseline_m"),
         (
+            "\"baseline_m\": 0.075",
+            "\"baseline_m\": 0.075, \"intrinsics_uncertainty\": {\"fx\": 0}",
+            "intrinsics_uncertainty.fx = 0 must",
+        ),
+        (
+            "\"baseline_m\": 0.075",
+            "\"baseline_m\": 0.075, \"intrinsics_uncertainty\": {\"cy\": 400}",
+            "intrinsics_uncertainty.cy = 400 must",
+        ),
+        (
             "\"units_per_metre\": 5000.0",
             "\"units_per_metre\": 5000.0, \"raw_disparity\": {\"offset\": 3.0, \"slope\": -0.003}",
             "contradict",
@@ -646,6 +656,24 @@ fn a_broken_view_file_costs_its_view_alone() {
         ("{\"roi\": [60, 50, 80, 70], \"polygon\": [[1, 1], [9, 1], [9, 9]]}", "both"),
         ("{\"reference_distance_m\": -1}", "reference_distance_m"),
         ("{\"reference_distance_m\": 1e999}", "line 1"),
+        ("{\"reference_uncertainty_m\": 0.001}", "without reference_distance_m"),
+        (
+            "{\"reference_distance_m\": 2, \"reference_uncertainty_m\": 0}",
+            "reference_uncertainty_m = 0 must",
+        ),
+        (
+            "{\"reference_distance_m\": 2, \"reference_uncertainty_m\": 3}",
+            "reference_uncertainty_m = 3 must be above 0 and below reference_distance_m = 2; is it in millimetres?",
+        ),
+        ("{\"reference_distance_m\": 2, \"reference_uncertainty_m\": \"1\"}", "line 1"),
+        (
+            "{\"target\": {\"width_m\": 1, \"height_m\": 0.5, \"flatness_m\": 0.2}}",
+            "target.flatness_m = 0.2 must be above 0 and at most a tenth",
+        ),
+        (
+            "{\"target\": {\"width_m\": 1, \"height_m\": -0.5}}",
+            "target.height_m = -0.5 must be positive",
+        ),
     ];
     for few in broken.chunks(3) {
         let bench = Bench::good();

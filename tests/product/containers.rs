@@ -58,7 +58,16 @@ fn sensor() -> Sensor {
     let (width, height) = SIZE;
     let camera = Camera { width, height, fx: 29.0, fy: 29.25, cx: 15.5, cy: 11.75, distortion };
     let name = "a depth camera".into();
-    Sensor { name, serial: None, mode: None, camera, baseline_m: None, code: MILLIMETRES }
+    Sensor {
+        name,
+        serial: None,
+        mode: None,
+        camera,
+        baseline_m: None,
+        code: MILLIMETRES,
+        intrinsics_uncertainty: None,
+        kind: None,
+    }
 }
 
 /// The film in the TUM layout, described.

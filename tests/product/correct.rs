@@ -33,6 +33,7 @@ fn model(sensor: &Sensor, effects: Vec<Effect>) -> NoiseModel {
         sensor: Some(RecordingFile::of(sensor)),
         sigma: truth(),
         effects,
+        uncertainty: None,
         fit: FitSummary::default(),
         provenance: Provenance::default(),
     }

@@ -55,6 +55,7 @@ pub fn model(sensor: &Sensor, effects: Vec<Effect>) -> NoiseModel {
         sensor: Some(RecordingFile::of(sensor)),
         sigma: truth(),
         effects,
+        uncertainty: None,
         fit: FitSummary::default(),
         provenance: Provenance::default(),
     }

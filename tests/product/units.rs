@@ -53,6 +53,7 @@ fn unit(serial: &str, date: &str, sigma: SigmaModel) -> UnitModel {
         sensor: Some(sensor),
         sigma,
         effects: Vec::new(),
+        uncertainty: None,
         fit: FitSummary { views: 24, samples: 24, ..FitSummary::default() },
         provenance: Provenance { created, ..Provenance::default() },
     };

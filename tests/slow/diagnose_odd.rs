@@ -129,6 +129,7 @@ fn posed(distances_m: &[f64], tilts_deg: &[f64]) -> Value {
         sensor: None,
         sigma: common::truth(),
         effects: Vec::new(),
+        uncertainty: None,
         fit: FitSummary::default(),
         provenance: Provenance::now(None),
     }

@@ -75,6 +75,8 @@ pub fn sensor(
         camera: Camera { width: WIDTH, height: HEIGHT, fx, fy, cx, cy, distortion: None },
         baseline_m: Some(assumed.baseline_m.unwrap_or(baseline_m)),
         code: assumed.code.unwrap_or(code),
+        intrinsics_uncertainty: None,
+        kind: None,
     };
     (sensor, remarks)
 }

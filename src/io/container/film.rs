@@ -210,11 +210,11 @@ fn sensor(
             sensor.camera = camera;
             sensor
         }
-        None if assumed.intrinsics.is_none() => {
+        None if assumed.intrinsics.is_none() && assumed.preset.is_none() => {
             return Err(Error::recording(
                 bag.path(),
                 format!("no camera_info topic belongs to {topic}"),
-                "give --intrinsics fx,fy,cx,cy in pixels",
+                "give --intrinsics fx,fy,cx,cy in pixels, or --sensor",
             ));
         }
         None => given.sensor(&name, survey.size, [0.0; 4], code)?,

@@ -229,11 +229,10 @@ fn film(array: Array, beside: Beside, assumed: &Assumed) -> Result<(Footage, Sen
             .map(|units_per_metre| DepthCode::Metric { units_per_metre, invalid: 0 })),
         ..assumed.clone()
     };
-    let Some(intrinsics) = given.intrinsics else {
-        return Err(
-            array.wrong("it carries no intrinsics", "give --intrinsics fx,fy,cx,cy in pixels")
-        );
-    };
+    if given.intrinsics.is_none() && given.preset.is_none() {
+        const GIVE: &str = "give --intrinsics fx,fy,cx,cy in pixels, or --sensor";
+        return Err(array.wrong("it carries no intrinsics", GIVE));
+    }
     let mut remarks = Vec::new();
     let mut stack =
         Stack { array, size: (width, height), values_per_metre: 1.0, units_per_metre: 1.0 };
@@ -252,7 +251,7 @@ fn film(array: Array, beside: Beside, assumed: &Assumed) -> Result<(Footage, Sen
         within: Some(Within { store: store.clone(), index }),
     };
     let frames: Vec<FrameRef> = (0..count).map(frame).collect();
-    let known = Assumed { intrinsics: Some(intrinsics), code: own_code, ..given };
+    let known = Assumed { code: own_code, ..given };
     let (mut sensor, remark) = known.images_sensor(&path, &frames)?;
     remarks.extend(remark);
     if assumed.intrinsics.is_none() {

@@ -12,7 +12,7 @@ use crate::report::residuals::{residual_image, scale};
 pub(super) fn section_of(views: &[ViewMeasurement]) -> Markup {
     let optional = |text: Option<String>| html! { (text.as_deref().unwrap_or(ABSENT)) };
     let mm = |metres: f64| html! { (millimetres(metres)) };
-    let columns: [Column<'_, ViewMeasurement>; 17] = [
+    let columns: [Column<'_, ViewMeasurement>; 18] = [
         ("view", &|v| html! { (v.name) }),
         (">z m", &|v| html! { (fixed(v.z_m, 3)) }),
         (">axis m", &|v| html! { (fixed(v.axis_distance_m, 3)) }),
@@ -23,6 +23,7 @@ pub(super) fn section_of(views: &[ViewMeasurement]) -> Markup {
             ">σ ± s.e. mm",
             &|v| html! { (mm(v.whole.spread.spatial_m)) " ± " (mm(v.whole.std_error_m)) },
         ),
+        (">σ px", &|v| optional(v.sigma_px(&v.whole).map(|px| fixed(px, 3)))),
         (">temporal σ mm", &|v| optional(v.whole.spread.temporal_m.map(millimetres))),
         (">normal σ mm", &|v| mm(v.whole.spread.perpendicular_m)),
         (">paper z m", &|v| optional(v.paper.map(|p| fixed(p.z_m, 3)))),
@@ -44,7 +45,7 @@ pub(super) fn section_of(views: &[ViewMeasurement]) -> Markup {
                 "z: mean depth of the target. Axis: depth of its plane on the optical axis. Off reference: that \
                  minus the distance measured by other means, “(!)” where they differ by more than "
                 (ReferenceDistance::describe_tolerance()) ". σ: of one frame over the whole target, along the optical \
-                 axis. Temporal: of one pixel over the frames. Normal: across the plane. Paper: mean depth, tilt and \
+                 axis; in px of disparity where the sensor has one. Temporal: of one pixel over the frames. Normal: across the plane. Paper: mean depth, tilt and \
                  spread of the RANSAC inliers of the first frame. n: samples (pixels times frames). n effective: \
                  independent samples they are worth. Corr.: length over which neighbouring pixels err together; “+” \
                  where it had not died out. Pixels left out: without depth / off the plane / at the target's edge."

@@ -110,10 +110,11 @@ impl Session {
         let lux = (100f64.ln() + rng.random::<f64>() * 20f64.ln()).exp().round();
         let temperature_c = (10.0 * rng.random_range(20.0..32.0f64)).round() / 10.0;
         let notes = ViewNotes {
-            target: self.half.map(|[a, b]| TargetSize { width_m: 2.0 * a, height_m: 2.0 * b }),
+            target: self.half.map(|[a, b]| TargetSize::of(2.0 * a, 2.0 * b)),
             reference_distance_m: self
                 .reference_m
                 .map(|error| (1e4 * (z + error * off)).round() / 1e4),
+            reference_uncertainty_m: None,
             region: self.region(unit, &board),
             temperature_c: self.conditions.then_some(temperature_c),
             ambient_lux: self.conditions.then_some(lux),

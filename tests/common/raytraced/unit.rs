@@ -48,8 +48,16 @@ impl Unit {
         sigma[..4].iter_mut().for_each(|c| *c *= rng.random_range(1.0 - SPREAD..1.0 + SPREAD));
         let code = DepthCode::Metric { units_per_metre, invalid: 0 };
         let name = "structured-light depth camera".into();
-        let sensor =
-            Sensor { name, serial: None, mode: None, camera, baseline_m: Some(baseline_m), code };
+        let sensor = Sensor {
+            name,
+            serial: None,
+            mode: None,
+            camera,
+            baseline_m: Some(baseline_m),
+            code,
+            intrinsics_uncertainty: None,
+            kind: None,
+        };
         Unit { sensor, baseline_m, sigma }
     }
 
@@ -86,6 +94,7 @@ impl Unit {
             sensor: Some(RecordingFile::of(&self.sensor)),
             sigma: SigmaModel::published(Form::Paper, &self.sigma, domain),
             effects,
+            uncertainty: None,
             fit: FitSummary::default(),
             // The same bytes whenever it is written.
             provenance: Provenance {
