@@ -141,13 +141,13 @@ pub fn rounding_uncertainty(step: f64, sigma: f64) -> f64 {
         return step / 12f64.sqrt();
     }
     let harmonics = (1..=MANY).map(|m| m as f64);
-    let square: f64 = harmonics
-        .map_while(|m| {
-            let exponent = (spread * m).powi(2);
-            (exponent < NEGLIGIBLE)
-                .then(|| 0.5 * (m * std::f64::consts::PI).powi(-2) * (-exponent).exp())
-        })
-        .sum();
+    let squares = harmonics.map_while(|m| {
+        let exponent = (spread * m).powi(2);
+        let height = (m * std::f64::consts::PI).recip();
+        (exponent < NEGLIGIBLE).then(|| 0.5 * height * height * (-exponent).exp())
+    });
+    // A sum of nothing is minus zero.
+    let square = squares.fold(0.0, |sum, s| sum + s);
     step * square.sqrt()
 }
 
@@ -217,6 +217,7 @@ mod tests {
         // A hundredth of a step: all harmonics but the farthest.
         assert!((rounding_uncertainty(1.0, 0.01) - 1.0 / 12f64.sqrt()).abs() < 0.02);
         assert!(rounding_uncertainty(1.0, 1.0) < 1e-8);
+        assert!(rounding_uncertainty(1.0, 3.0).is_sign_positive(), "no minus zero on a page");
         assert_eq!(rounding_uncertainty(0.0, 0.001), 0.0);
     }
 
