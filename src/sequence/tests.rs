@@ -44,7 +44,7 @@ fn colour_belongs_within_a_fiftieth_of_a_second() {
         .collect();
     // 0.050 is nearer to 0.066 than to 0.033, and each is used once.
     assert_eq!(names, [Some("0.png".into()), None, Some("1.png".into())]);
-    assert!(remarked(&sequence, "1 of 3 depth images have no colour"), "{:?}", sequence.remarks);
+    assert!(remarked(&sequence, "1 of 3 depth images has no colour"), "{:?}", sequence.remarks);
 }
 
 #[test]
@@ -53,7 +53,7 @@ fn gaps_duplicates_and_missing_files_are_remarked_on() {
     fs::remove_file(dir.path().join("depth/3.png")).unwrap();
     let sequence = open(dir.path(), &Assumed::default()).unwrap();
     assert_eq!(sequence.moments.len(), 4);
-    assert!(remarked(&sequence, "1 gaps"), "{:?}", sequence.remarks);
+    assert!(remarked(&sequence, "1 gap in"), "{:?}", sequence.remarks);
     assert!(remarked(&sequence, "the stamp of the one before"), "{:?}", sequence.remarks);
     assert!(remarked(&sequence, "missing"), "{:?}", sequence.remarks);
 }
