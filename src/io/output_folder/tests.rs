@@ -128,7 +128,7 @@ fn results_without_a_place_are_kept_and_told() {
     let out = begin(&place).unwrap();
     out.write("table.csv", b"1").unwrap();
     put(&place, &["of another"]);
-    let staging = out.path().to_path_buf();
+    let staging = out.path().with_extension("kept");
     let error = out.finish().unwrap_err().to_string();
     assert!(error.contains(&staging.display().to_string()), "{error}");
     assert_eq!(
