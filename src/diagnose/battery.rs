@@ -3,18 +3,13 @@
 use serde_json::Map;
 
 use super::ablation::Ablation;
-use super::anchor::families;
 use super::bias;
 use super::case::{Case, Mean, Scatter};
-use super::checked::checked;
 use super::diagnosis::{Detectable, Finding, Status};
 use super::few_views::few_views;
 use super::findings;
 use super::form::better_form;
 use super::hanging::Hanging;
-use super::heldout;
-use super::laws::{Beside, laws};
-use super::learnt::Learnt;
 use super::lines::lines;
 use super::missing::{self, missing};
 use super::naming::{physics, temper};
@@ -22,16 +17,15 @@ use super::next_view;
 use super::other_findings;
 use super::outcome::Outcome;
 use super::pixels::{typical_sigma_mm, typical_sigma_px};
-use super::reference;
+use super::reference::{self, can_happen};
 use super::replication_textures;
 use super::rim;
 use super::scene::Scene;
 use super::steps::{is_raw, own_step, own_step_note, steps};
 use super::variance;
 use super::verdict::{MIN_SIZE, echoes, fold_into_sigma, merge, symptoms};
-use crate::effects;
 use crate::sensors::SensorKind;
-use crate::terms::{Axis, Statistic, Term, corner_radius};
+use crate::terms::{Axis, Statistic, corner_radius};
 
 /// How noise hangs together changes what a few frames show of its size by so much.
 const LEVEL_BESIDE_TEXTURE: f64 = 0.05;
@@ -57,10 +51,6 @@ fn tell_lines_once(found: &mut Vec<Finding>) {
         let bare = |f: &Finding| f.statistic == Statistic::Bias && f.terms.is_empty();
         found.retain(|f| !(of_columns(f) && bare(f)));
     }
-}
-
-fn can_happen(id: &str, kind: Option<SensorKind>) -> bool {
-    effects::find(id).is_none_or(|e| e.card().applies_to(kind))
 }
 
 /// What cannot happen to a camera of this kind is no name for a finding, and no alternative.
@@ -264,52 +254,5 @@ impl Case<'_> {
             Detectable { effect, minimum }
         };
         (found, lost.detectable.iter().map(least).collect())
-    }
-
-    /// Laws of the distance, by reference distances.
-    fn laws(&self, bias: &[Term], bent_m: f64) -> Vec<Finding> {
-        // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
-        let anchored: Vec<Term> =
-            bias.iter().filter(|t| t.basis.is_nothing_ahead()).cloned().collect();
-        let views = self.fields.len() as f64;
-        // The levels are off with the model's bias; and its own references, if any, left a law open.
-        let of_bias = self.learnt_from[0].map(|l| Learnt { searched: false, ..l }.excess(views));
-        let theirs = Learnt::references(self.model).filter(|_| self.learnt_from[1].is_some());
-        let ours = self.fields.iter().filter(|f| f.reference_distance_m.is_some()).count();
-        let of_laws = theirs.map(|l| l.excess(ours as f64));
-        let excess = of_bias.unwrap_or(1.0).max(of_laws.unwrap_or(1.0));
-        let found = |terms: &[Term], beside: &Beside| {
-            let levels = heldout::levels(&self.survey, terms);
-            let second = self.survey.second();
-            let mut laws = laws(&checked(&self.fields, &levels, &self.known, &second), beside);
-            laws.retain(|l| can_happen(l.family, self.sensor().kind));
-            let level = self.level(Self::LAWS_LEVEL);
-            reference::findings(&laws, &self.known, excess, level, self.options.seed)
-        };
-        // A bowl, too, moves the plane on the axis, by a constant that nobody knows.
-        let open = families(bias.iter().chain(&self.known.bias), &self.sensor().camera);
-        if !open.is_empty() {
-            let laws = found(bias, &Beside { bent_m, open });
-            if !laws.is_empty() {
-                return laws;
-            }
-        }
-        // It may be all of an offset of the disparity: a law must hold with and without the bowl, be it
-        // new or the model's.
-        let back = |t: &Term| Term {
-            coefficients: t.coefficients.iter().map(|c| -c).collect(),
-            ..t.clone()
-        };
-        let model: Vec<Term> =
-            self.known.bias.iter().filter(|t| !t.basis.is_nothing_ahead()).map(back).collect();
-        let closed = Beside { bent_m, open: Vec::new() };
-        let mut laws = found(&anchored, &closed);
-        for others in [bias.to_vec(), [anchored.clone(), model].concat()] {
-            if others != anchored && !laws.is_empty() {
-                let with = found(&others, &closed);
-                laws.retain(|l| with.iter().any(|w| w.effect == l.effect));
-            }
-        }
-        laws
     }
 }

@@ -100,6 +100,12 @@ pub struct Finding {
 }
 
 impl Finding {
+    /// A law of the distance rests on a number a view, where the others rest on every pixel: that its nats
+    /// are few says nothing of its size.
+    pub fn is_law(&self) -> bool {
+        matches!(self.effect, Some("depth-scale" | "disparity-offset" | "thermal-drift"))
+    }
+
     /// The effect of the catalogue that shows as this finding does, for the simulator: what was not
     /// measured is typical. `None` for what has no name, and where the strength is not known or
     /// beyond what the formula takes.

@@ -3,10 +3,15 @@
 
 use serde_json::Map;
 
+use super::anchor::families;
+use super::case::Case;
+use super::checked::checked;
 use super::diagnosis::{Alternative, CannotTell, Finding, Size, Status};
 use super::field::Field;
+use super::heldout;
 use super::known::KnownTerms;
-use super::laws::{FEWEST, Law};
+use super::laws::{Beside, FEWEST, Law, laws};
+use super::learnt::Learnt;
 use super::naming::{MIN_PROBABILITY, physics};
 use super::null::{NoiseGains, Null, student};
 use super::parameters::estimate;
@@ -14,7 +19,7 @@ use crate::effects;
 use crate::model::Covariance;
 use crate::rng::Seed;
 use crate::sensors::SensorKind;
-use crate::terms::{Axis, Statistic};
+use crate::terms::{Axis, Statistic, Term};
 
 /// A law must move the depth by this many errors of a reference, and by this much, m: tapes and
 /// planes are not better.
@@ -109,6 +114,63 @@ pub fn findings(
         terms: Vec::new(),
         covariance: Covariance::default(),
     }]
+}
+
+/// Does the effect happen to cameras of this kind?
+pub fn can_happen(id: &str, kind: Option<SensorKind>) -> bool {
+    effects::find(id).is_none_or(|e| e.card().applies_to(kind))
+}
+
+impl Case<'_> {
+    /// Laws of the distance, by reference distances.
+    pub(super) fn laws(&self, bias: &[Term], bent_m: f64) -> Vec<Finding> {
+        // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
+        let anchored: Vec<Term> =
+            bias.iter().filter(|t| t.basis.is_nothing_ahead()).cloned().collect();
+        // The catalogue's bowl is nothing there either: by that its offset is told.
+        let of_catalogue = |t: &&Term| t.basis.is_nothing_ahead() || t.basis.is_bowl();
+        let plain: Vec<Term> = bias.iter().filter(of_catalogue).cloned().collect();
+        let views = self.fields.len() as f64;
+        // The levels are off with the model's bias; and its own references, if any, left a law open.
+        let of_bias = self.learnt_from[0].map(|l| Learnt { searched: false, ..l }.excess(views));
+        let theirs = Learnt::references(self.model).filter(|_| self.learnt_from[1].is_some());
+        let ours = self.fields.iter().filter(|f| f.reference_distance_m.is_some()).count();
+        let of_laws = theirs.map(|l| l.excess(ours as f64));
+        let excess = of_bias.unwrap_or(1.0).max(of_laws.unwrap_or(1.0));
+        let found = |terms: &[Term], beside: &Beside| {
+            let levels = heldout::levels(&self.survey, terms);
+            let second = self.survey.second();
+            let mut laws = laws(&checked(&self.fields, &levels, &self.known, &second), beside);
+            laws.retain(|l| can_happen(l.family, self.sensor().kind));
+            let level = self.level(Self::LAWS_LEVEL);
+            findings(&laws, &self.known, excess, level, self.options.seed)
+        };
+        // A bowl, too, moves the plane on the axis, by a constant that nobody knows.
+        let open = families(bias.iter().chain(&self.known.bias), &self.sensor().camera);
+        if !open.is_empty() {
+            let laws = found(bias, &Beside { bent_m, open });
+            if !laws.is_empty() {
+                return laws;
+            }
+        }
+        // It may be all of an offset of the disparity: a law must hold with and without the bowl, be it
+        // new or the model's.
+        let back = |t: &Term| Term {
+            coefficients: t.coefficients.iter().map(|c| -c).collect(),
+            ..t.clone()
+        };
+        let model: Vec<Term> =
+            self.known.bias.iter().filter(|t| !t.basis.is_nothing_ahead()).map(back).collect();
+        let closed = Beside { bent_m, open: Vec::new() };
+        let mut laws = found(&plain, &closed);
+        for others in [anchored.clone(), bias.to_vec(), [anchored, model].concat()] {
+            if others != plain && !laws.is_empty() {
+                let with = found(&others, &closed);
+                laws.retain(|l| with.iter().any(|w| w.effect == l.effect));
+            }
+        }
+        laws
+    }
 }
 
 /// What planes alone never tell.

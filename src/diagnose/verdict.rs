@@ -146,18 +146,12 @@ fn excess(f: &Finding) -> f64 {
 /// A finding of less than this share of the explained mismatch is minor.
 const MINOR: f64 = 0.01;
 
-/// A law of the distance rests on a number a view, where the others rest on every pixel: that its nats are
-/// few says nothing of its size.
-fn is_law(f: &Finding) -> bool {
-    matches!(f.effect, Some("depth-scale" | "disparity-offset" | "thermal-drift"))
-}
-
 /// Nats become shares, and the largest comes first.
 pub(super) fn shares(found: &mut [Finding]) {
     let total: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
     for f in found.iter_mut() {
         f.share = if total > 0.0 { f.share.max(0.0) / total } else { 0.0 };
-        f.minor = f.status != Status::NotIdentifiable && f.share < MINOR && !is_law(f);
+        f.minor = f.status != Status::NotIdentifiable && f.share < MINOR && !f.is_law();
     }
     found.sort_by(|a, b| {
         let told = |f: &Finding| f.status == Status::NotIdentifiable;

@@ -96,6 +96,11 @@ impl Basis {
         )
     }
 
+    /// Is it a polynomial about the principal point, without a constant?
+    pub fn is_bowl(&self) -> bool {
+        matches!(self, Basis::Powers { over: Coordinate::RadiusSquared, .. })
+    }
+
     /// Does it say no more than a sigma over depth and tilt can?
     pub fn is_of_sigma(&self) -> bool {
         let plain = self.times() == Modulation::One && self.period().is_none();

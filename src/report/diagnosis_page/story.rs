@@ -58,8 +58,12 @@ fn of(f: &Finding) -> String {
         _ => "",
     };
     let next = f.next_view.as_ref().map_or_else(String::new, settled_by);
-    let (name, share) = (capital(&called(f)), fixed(100.0 * f.share, 0));
-    format!("{name}{rest}: {size}, {share} % of the mismatch{parameters}{halves}{next}.")
+    let name = capital(&called(f));
+    let share = match f.is_law() {
+        true => "by the reference distances".to_string(),
+        false => format!("{} % of the mismatch", fixed(100.0 * f.share, 0)),
+    };
+    format!("{name}{rest}: {size}, {share}{parameters}{halves}{next}.")
 }
 
 fn settled_by(view: &NextView) -> String {
