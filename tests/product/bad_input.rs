@@ -670,10 +670,7 @@ fn a_broken_view_file_costs_its_view_alone() {
             "{\"target\": {\"width_m\": 1, \"height_m\": 0.5, \"flatness_m\": 0.2}}",
             "target.flatness_m = 0.2 must be above 0 and at most a tenth",
         ),
-        (
-            "{\"target\": {\"width_m\": 1, \"height_m\": -0.5}}",
-            "target.height_m = -0.5 must be positive",
-        ),
+        ("{\"target\": {\"width_m\": 1, \"height_m\": -0.5}}", "height_m = -0.5"),
     ];
     for few in broken.chunks(3) {
         let bench = Bench::good();
