@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use super::axis::Axis;
 use super::chart::{Chart, Entry, Layer, Sample, Stroke};
 use super::colours::{ACCENT, INK, line};
-use super::document::{Origin, document, figure, section, table, tiles};
+use super::document::{Origin, document, figure, list, prose, section, table, tiles};
 use super::numbers::{MM, decimals_for, fixed};
 use crate::error::Result;
 use crate::evaluate::{Delta, Evaluation, Spread};
@@ -149,6 +149,9 @@ impl Against<'_> {
                 p.note {
                     "Computed as the scripts of the TUM RGB-D benchmark do. ATE: distance of positions after the best \
                      rigid alignment. RPE: difference of motions over the interval."
+                }
+                @if !self.evaluation.remarks.is_empty() {
+                    (list(self.evaluation.remarks.iter().map(|remark| prose(remark))))
                 }
             }))
             (section("Over time", &html! { div.beside { @for figure in figures { (figure) } } }))
