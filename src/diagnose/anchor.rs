@@ -59,19 +59,11 @@ pub fn families<'a>(terms: impl Iterator<Item = &'a Term>, camera: &Camera) -> V
     families
 }
 
-/// The picture is looked at in pixels so far apart.
-const STRIDE: usize = 4;
-
 fn mean_square(term: &Term, pixels: &Pixels<'_>) -> f64 {
-    let (width, height) = (pixels.camera.width, pixels.camera.height);
     let (mut sum, mut count, mut row) = (0.0, 0.0, Vec::new());
-    for v in (STRIDE / 2..height).step_by(STRIDE) {
-        for u in (STRIDE / 2..width).step_by(STRIDE) {
-            let mut place = pixels.place(v * width + u);
-            place.disparity = DISPARITY_UNIT_PX;
-            sum += term.value(&place, &mut row).powi(2);
-            count += 1.0;
-        }
+    for place in pixels.sampled() {
+        sum += term.value(&place, &mut row).powi(2);
+        count += 1.0;
     }
     sum / f64::max(count, 1.0)
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::basis::Basis;
-use super::modulation::{DISPARITY_UNIT_PX, Modulation};
+use super::modulation::Modulation;
 use super::pixels::Pixels;
 use super::place::PixelContext;
 
@@ -17,9 +17,6 @@ pub struct Gauge {
     pub affine: Vec<[f64; 3]>,
 }
 
-/// The picture is looked at in pixels so far apart.
-const STRIDE: usize = 4;
-
 impl Gauge {
     /// `None` for shapes that do not stand still in the picture, and for those that are nothing on
     /// the optical axis by their physics.
@@ -29,17 +26,11 @@ impl Gauge {
         let mut square = Matrix3::zeros();
         let mut cross = vec![Vector3::zeros(); count];
         let mut row = vec![0.0; count];
-        let (width, height) = (pixels.camera.width, pixels.camera.height);
-        for v in (STRIDE / 2..height).step_by(STRIDE) {
-            for u in (STRIDE / 2..width).step_by(STRIDE) {
-                let mut place = pixels.place(v * width + u);
-                // There the shape is in px.
-                place.disparity = DISPARITY_UNIT_PX;
-                let ray = Vector3::new(1.0, place.x, place.y);
-                square += ray * ray.transpose();
-                basis.fill(&place, &mut row);
-                cross.iter_mut().zip(&row).for_each(|(c, g)| *c += ray * *g);
-            }
+        for place in pixels.sampled() {
+            let ray = Vector3::new(1.0, place.x, place.y);
+            square += ray * ray.transpose();
+            basis.fill(&place, &mut row);
+            cross.iter_mut().zip(&row).for_each(|(c, g)| *c += ray * *g);
         }
         let solver = square.lu();
         let affine = cross.iter().map(|c| Some(solver.solve(c)?.into())).collect::<Option<_>>()?;

@@ -1,5 +1,6 @@
 //! Places of single pixels, of whatever they look at.
 
+use super::modulation::DISPARITY_UNIT_PX;
 use super::place::{PixelContext, corner_radius};
 use crate::camera::{Camera, Rays};
 use crate::plane::Plane;
@@ -36,6 +37,19 @@ impl<'a> Pixels<'a> {
             variance: 1.0,
             ..PixelContext::default()
         }
+    }
+}
+
+/// The picture is looked at in pixels so far apart.
+const STRIDE: usize = 4;
+
+impl Pixels<'_> {
+    /// Pixels all over the picture, each where a shape that grows with the disparity is in px.
+    pub fn sampled(&self) -> impl Iterator<Item = PixelContext> + '_ {
+        let (width, height) = (self.camera.width, self.camera.height);
+        let row = move |v: usize| (STRIDE / 2..width).step_by(STRIDE).map(move |u| v * width + u);
+        let all = (STRIDE / 2..height).step_by(STRIDE).flat_map(row);
+        all.map(|i| PixelContext { disparity: DISPARITY_UNIT_PX, ..self.place(i) })
     }
 }
 
