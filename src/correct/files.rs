@@ -1,5 +1,6 @@
 //! The files of a recording beside its depth images.
 
+use std::collections::HashSet;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
@@ -14,11 +15,12 @@ const MAX_DEPTH: usize = 12;
 /// fill the disk.
 const MAX_BYTES: u64 = 1 << 35;
 
-/// Every file below `root`, as paths relative to it, in name order.
+/// Every file below `root`, as paths relative to it, in name order. A link may lead out of `root` to
+/// what is `read` as part of the recording, so that folders of links to some of its views will do.
 ///
 /// # Errors
-/// When one is no regular file, or is a link that leads out of `root`: what it names may be private.
-pub(super) fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
+/// When one is no regular file, or stands outside and is not `read`: it may be private.
+pub(super) fn files_below(root: &Path, read: &HashSet<&Path>) -> Result<Vec<PathBuf>> {
     let real_root = root.canonicalize().map_err(|e| Error::read(root, e))?;
     let mut files = Vec::new();
     let mut folders = vec![(PathBuf::new(), 0)];
@@ -28,8 +30,10 @@ pub(super) fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
             let name = entry.map_err(|e| Error::read(&here, e))?.file_name();
             let path = folder.join(name);
             let full = root.join(&path);
-            refuse_leading_out(&full, &real_root)?;
             if full.is_file() {
+                if !read.contains(path.as_path()) {
+                    refuse_outside(&full, &real_root)?;
+                }
                 files.push(path);
             } else if !full.is_dir() {
                 let what = "neither a file nor a folder";
@@ -49,17 +53,14 @@ pub(super) fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// An error of a link that leads out of `root`, which has no links in it.
-fn refuse_leading_out(path: &Path, root: &Path) -> Result<()> {
-    if !path.is_symlink() {
-        return Ok(());
-    }
-    let target = path.canonicalize().map_err(|e| Error::read(path, e))?;
+/// An error of a file that a link names outside of `root`, which has no links in it.
+fn refuse_outside(file: &Path, root: &Path) -> Result<()> {
+    let target = file.canonicalize().map_err(|e| Error::read(file, e))?;
     if target.starts_with(root) {
         return Ok(());
     }
     let what = "a link that leads out of the recording";
-    Err(Error::recording(path, what, "copy into the recording what it names, or take it out"))
+    Err(Error::recording(file, what, "copy into the recording what it names, or take it out"))
 }
 
 /// Is it a file without which a folder is no recording, and which therefore comes last?

@@ -108,7 +108,7 @@ impl Rewrite<'_> {
         recording: &Recording,
         progress: Progress<'_>,
     ) -> Result<Corrected> {
-        let others = self.other_files(images)?;
+        let others = self.other_files(images, &recording.described_by)?;
         let (last, first): (Vec<&PathBuf>, Vec<&PathBuf>) =
             others.iter().partition(|f| makes_a_recording(f));
         copy(self.root, self.output, &first)?;
@@ -137,13 +137,15 @@ impl Rewrite<'_> {
 
     /// Everything but the depth images; of a dump in another code its index too, for it would say
     /// that the raw values are a Kinect's.
-    fn other_files(&self, images: &[Image]) -> Result<Vec<PathBuf>> {
+    fn other_files(&self, images: &[Image], described_by: &[PathBuf]) -> Result<Vec<PathBuf>> {
         if self.layout == Layout::Container {
             return Ok(Vec::new());
         }
         let images: HashSet<&Path> = images.iter().map(|i| i.file.as_path()).collect();
         let no_dump = self.recodes() && self.layout == Layout::Dump;
-        let mut files = files_below(self.root)?;
+        let descriptions = described_by.iter().filter_map(|f| f.strip_prefix(self.root).ok());
+        let read: HashSet<&Path> = images.iter().copied().chain(descriptions).collect();
+        let mut files = files_below(self.root, &read)?;
         let left_out = |f: &Path| images.contains(f) || (no_dump && f == Path::new(INDEX));
         files.retain(|f| !left_out(f));
         Ok(files)

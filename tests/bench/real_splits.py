@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What a correction learnt from some views of a real sensor is worth on its other views.
 
-Splits a recording of planes into halves and into fifths (links, nothing is copied), runs
+Splits a recording of planes into halves and into fifths (copies in a scratch folder), runs
 `kinoise diagnose` on the one part and `kinoise correct` with the model it wrote on the other, and
 measures the root mean square around each view's plane, over pixels, in steps of the raw code.
 Beside it stands what a page of numpy reaches: two smooth maps over the picture, one of them times
@@ -10,7 +10,7 @@ the square of the disparity, fitted to the same views.
     real_splits.py RECORDING [--kinoise BIN] [--halves N] [--folds K] [--seed S] [--jobs J]
     real_splits.py FOLDER_OF_PNGS --intrinsics FX FY CX CY --disparity OFFSET SLOPE --views NAME ...
 """
-import argparse, concurrent.futures, json, os, pathlib, subprocess, sys, tempfile
+import argparse, concurrent.futures, json, pathlib, shutil, subprocess, sys, tempfile
 
 try:
     import numpy as np
@@ -139,11 +139,12 @@ class Page:
         return [w.square(w.d - self.columns[w.name] @ beta) for w in judged]
 
 
-def links(recording, views, folder):
+def copies(recording, views, folder):
+    """A recording of some of the views: copies, for `correct` refuses links that lead out of it."""
     folder.mkdir(parents=True)
-    (folder / "recording.json").symlink_to((recording / "recording.json").resolve())
+    shutil.copy(recording / "recording.json", folder)
     for view in views:
-        (folder / view.name).symlink_to((recording / view.name).resolve())
+        shutil.copytree(recording / view.name, folder / view.name)
     return folder
 
 
@@ -165,7 +166,7 @@ def split(args, recording, about, page, name, taught, judged, work):
     if args.kinoise == "none":
         return row
     here, out = work / name, work / name / "diagnosis"
-    part, rest = links(recording, taught, here / "taught"), links(recording, judged, here / "judged")
+    part, rest = copies(recording, taught, here / "taught"), copies(recording, judged, here / "judged")
     try:
         run(args.kinoise, "--threads", args.threads, "diagnose", part, "-o", out)
         run(args.kinoise, "--threads", args.threads, "correct", rest, "--model", out / "model.json", "-o", here / "corrected")

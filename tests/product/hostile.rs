@@ -295,6 +295,26 @@ fn nothing_outside_a_recording_is_copied() {
     desk.refused(correct, &["rec/pipe"]);
 }
 
+/// Engineers split recordings by links to their views.
+#[test]
+fn views_may_be_links() {
+    let desk = Desk::new();
+    desk.model("model.json", |_| ());
+    desk.done("correct rec -m model.json -o all");
+    fs::create_dir(desk.at("some")).expect("made");
+    for name in ["recording.json", "0000"] {
+        symlink(desk.at("rec").join(name), desk.at("some").join(name)).expect("a link");
+    }
+    desk.done("correct some -m model.json -o out");
+    let image = fs::read_dir(desk.at("rec/0000/depth")).expect("listed").next();
+    let image = image.expect("an image").expect("an entry").file_name();
+    let [one, two] = ["all", "out"]
+        .map(|f| fs::read(desk.at(f).join("0000/depth").join(&image)).expect("there"));
+    assert_eq!(one, two);
+    fs::write(desk.at("rec/0000/notes.txt"), "secret").expect("written");
+    desk.refused("correct some -m model.json -o again", &["some/0000/notes.txt", "leads out"]);
+}
+
 #[test]
 fn pipes_devices_and_sparse_files_are_no_input() {
     let desk = Desk::new();
