@@ -155,7 +155,28 @@ impl Grouping {
     }
 }
 
+/// Which samples a basis is tried on. What stands beside it brings more on the fine ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Patches {
+    Fine,
+    Coarse,
+}
+
 impl Prepared<'_> {
+    pub fn patches(&self, basis: &Basis) -> Patches {
+        let alone = basis.alone().is_some_and(|over| self.groups.iter().any(|g| g.0.over == over));
+        let fine = alone || (self.fine.is_some() && basis.is_fine());
+        if fine { Patches::Fine } else { Patches::Coarse }
+    }
+
+    /// Evidence on what stands beside every candidate. However fine samples are gathered, it is the
+    /// same.
+    pub fn beside(&self, patches: Patches) -> Evidence {
+        let fine = self.groups.first().filter(|_| patches == Patches::Fine);
+        fine.map_or(&self.coarse.1, |(_, rows)| rows).reduce(0, |_, _| ())
+    }
+
+    /// On the basis and what stands beside it, on its own patches.
     pub fn evidence(&self, basis: &Basis) -> Evidence {
         let alone = basis.alone().and_then(|over| self.groups.iter().find(|g| g.0.over == over));
         let (places, rows): (&[PixelContext], &Rows<'_>) = if let Some((group, rows)) = alone {

@@ -9,7 +9,7 @@ use super::evidence::{Evidence, Gain, fit, gain};
 use super::judge::{Judge, Judged, looks};
 use super::null::{NoiseGains, Null};
 use super::outcome::{Chosen, Look, Outcome, Rules};
-use super::prepared::{Grouping, Prepared, prepare, together};
+use super::prepared::{Grouping, Patches, Prepared, prepare, together};
 use super::samples::ViewData;
 use crate::model::Covariance;
 use crate::rng::Seed;
@@ -107,6 +107,44 @@ struct Layer<'a> {
     seed: Seed,
 }
 
+/// Candidates are tried on this.
+struct Trial<'a> {
+    beside: Vec<Chosen>,
+    views: Vec<Prepared<'a>>,
+    /// Columns of what is fitted beside, and what those bring without the candidate on fine and on
+    /// coarse patches.
+    settled: usize,
+    base: [Gain; 2],
+    judge: Judge<'a>,
+}
+
+impl Trial<'_> {
+    /// `None` for a name that is in already: what its shape misses is left to the curves.
+    fn judged(&self, c: &Candidate) -> Option<Judged> {
+        let taken = |old: &Chosen| c.family.is_some() && old.candidate.family == c.family;
+        if self.beside.iter().any(taken) {
+            return None;
+        }
+        let (m, prior) = (self.settled, self.judge.rules.prior);
+        let evidence: Vec<Evidence> = self.views.iter().map(|v| v.evidence(&c.basis)).collect();
+        let null = Null::of(&evidence, m, prior)?;
+        let mut gain = gain(&evidence, prior)?;
+        if !c.agrees(gain.beta.rows(m, c.basis.count()).into_owned().as_slice()) {
+            return None;
+        }
+        let [fine, coarse] = &self.base;
+        let base = match self.views.first()?.patches(&c.basis) {
+            Patches::Fine => fine,
+            Patches::Coarse => coarse,
+        };
+        gain.total -= base.total;
+        gain.by_view.iter_mut().zip(&base.by_view).for_each(|(g, b)| *g -= b);
+        let rms = self.judge.rms(&c.basis, m, &gain, &evidence);
+        let sensible = self.judge.sensible(&c.basis, m, &gain, rms);
+        Some(Judged { gain, null, sensible, rms })
+    }
+}
+
 fn bases(chosen: &[Chosen]) -> Vec<&Basis> {
     bases_where(chosen, |_| true)
 }
@@ -156,50 +194,34 @@ impl Layer<'_> {
         Chosen { candidate, rms: 0.0, adequacy, gain, best_curve: 0.0, rivals, p: 1.0 }
     }
 
-    /// The best candidate beside `chosen` and what is pinned, if it brings more than noise can.
-    fn step(&mut self, chosen: &[Chosen]) -> Option<Chosen> {
-        let with_pinned: Vec<Chosen> = self.pinned.iter().chain(chosen).cloned().collect();
-        let chosen = &with_pinned[..];
-        let views = self.prepare(chosen);
-        let before: Vec<Evidence> = views.iter().map(|v| v.coarse.1.reduce(0, |_, _| ())).collect();
-        let m = before.first()?.b.len();
-        let base = if m > 0 {
-            gain(&before, self.rules.prior)?
-        } else {
-            let none = nalgebra::DVector::zeros(0);
-            Gain {
+    /// What `chosen` and what is pinned leave for a candidate to explain.
+    fn trial(&self, chosen: &[Chosen]) -> Option<Trial<'_>> {
+        let beside: Vec<Chosen> = self.pinned.iter().chain(chosen).cloned().collect();
+        let views = self.prepare(&beside);
+        let settled = views.first()?.beside(Patches::Coarse).b.len();
+        let base = |patches| {
+            let evidence: Vec<Evidence> = views.iter().map(|v| v.beside(patches)).collect();
+            let nothing = Gain {
                 total: 0.0,
                 by_view: vec![0.0; views.len()],
-                beta: none,
+                beta: nalgebra::DVector::zeros(0),
                 covariance: nalgebra::DMatrix::zeros(0, 0),
-            }
+            };
+            if settled > 0 { gain(&evidence, self.rules.prior) } else { Some(nothing) }
         };
+        let base = [base(Patches::Fine)?, base(Patches::Coarse)?];
         let Layer { fine, coarse, rules, largest, .. } = *self;
         let weight = coarse.iter().flat_map(|v| &v.weight).sum();
         let judge = Judge { fine, weight, rules, largest };
-        let judged: Vec<Option<Judged>> = self
-            .candidates
-            .par_iter()
-            .map(|c| {
-                // A name is taken once; what its shape misses is left to the curves.
-                let taken =
-                    c.family.is_some() && chosen.iter().any(|old| old.candidate.family == c.family);
-                if taken {
-                    return None;
-                }
-                let evidence: Vec<Evidence> = views.iter().map(|v| v.evidence(&c.basis)).collect();
-                let null = Null::of(&evidence, m, self.rules.prior)?;
-                let mut gain = gain(&evidence, self.rules.prior)?;
-                if !c.agrees(gain.beta.rows(m, c.basis.count()).into_owned().as_slice()) {
-                    return None;
-                }
-                gain.total -= base.total;
-                gain.by_view.iter_mut().zip(&base.by_view).for_each(|(g, b)| *g -= b);
-                let rms = judge.rms(&c.basis, m, &gain, &evidence);
-                let sensible = judge.sensible(&c.basis, m, &gain, rms);
-                Some(Judged { gain, null, sensible, rms })
-            })
-            .collect();
+        Some(Trial { beside, views, settled, base, judge })
+    }
+
+    /// The best candidate beside `chosen` and what is pinned, if it brings more than noise can.
+    fn step(&mut self, chosen: &[Chosen]) -> Option<Chosen> {
+        let trial = self.trial(chosen)?;
+        let judged: Vec<Option<Judged>> =
+            self.candidates.par_iter().map(|c| trial.judged(c)).collect();
+        let beside = trial.beside;
         if self.noise.is_none() {
             let nulls: Vec<&Null> = judged.iter().flatten().map(|j| &j.null).collect();
             let noise = if self.rules.calibrated {
@@ -211,8 +233,8 @@ impl Layer<'_> {
             self.noise = Some(noise);
         }
         let noise = self.noise.as_ref()?;
-        let candidates = self.candidates;
-        Choice { candidates, judged: &judged, rules, noise }.best(chosen)
+        let (candidates, rules) = (self.candidates, self.rules);
+        Choice { candidates, judged: &judged, rules, noise }.best(&beside)
     }
 
     /// Maps with twice as many nodes, where those predict left-out views better.

@@ -4,6 +4,7 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
+use crate::diagnose::samples::coarser;
 use crate::rng::{Seed, Stream};
 use crate::terms::{Axis, Coordinate, Modulation, PixelContext};
 
@@ -150,6 +151,43 @@ fn two_causes_are_two_terms_whichever_is_larger() {
         assert!(gains[0] >= gains[1], "best first: {gains:?}");
         assert_eq!(outcome.span(1).start, outcome.span(0).end);
     }
+}
+
+/// Sloping boards in small patches, and in patches over which locking fades. What it brings more in
+/// the small ones is not any other candidate's that is tried on them.
+#[test]
+fn what_fades_in_large_patches_is_told_once() {
+    let mut rng = Seed(3).stream("search/fading");
+    let bias = |d: f64| 0.3 * (std::f64::consts::TAU * d).sin();
+    let fine: Vec<ViewData> = (0..VIEWS)
+        .map(|_| {
+            let (near, slope) = (rng.random_range(10.0..40.0), rng.random_range(0.015..0.03));
+            let grid = (0..30).flat_map(|v| (0..40).map(move |u| (f64::from(u), f64::from(v))));
+            let place = |(u, v): (f64, f64)| PixelContext {
+                u: 4.0 * u + 1.5,
+                v: 4.0 * v + 1.5,
+                disparity: near + slope * (4.0 * u + 1.5),
+                slope: [slope, 0.0],
+                side: 4.0,
+                ..PixelContext::default()
+            };
+            let places: Vec<PixelContext> = grid.map(place).collect();
+            let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
+            let nuisance = places.iter().flat_map(|p| [1.0, p.u / 160.0, p.v / 120.0]).collect();
+            ViewData {
+                response: places.iter().map(|p| bias(p.disparity) + noise()).collect(),
+                weight: vec![1.0; places.len()],
+                nuisance,
+                precision: vec![0.0; 3],
+                gathered: Vec::new(),
+                places,
+            }
+        })
+        .collect();
+    let coarse: Vec<ViewData> = fine.iter().map(coarser).collect();
+    let outcome = search(&fine, &coarse, &candidates(), &RULES, Seed(3));
+    assert_eq!(families(&outcome), [Some("pixel-locking")]);
+    assert!(outcome.remaining.is_none());
 }
 
 /// A step over the rows is no family's: it stays a curve on its own axis.
