@@ -1,21 +1,18 @@
-//! The map to look at from all sides: points and path drawn by WebGL, and how far off the path is.
+//! The map to look at from all sides: surfels and path drawn by WebGL, and how far off the path is.
+
+mod scene;
 
 use maud::{Markup, PreEscaped, html};
-use serde_json::json;
 
-use super::document::{Origin, base64, document, section, tiles};
+use super::document::{Origin, document, section, tiles};
 use super::numbers::{ABSENT, fixed};
 use super::trajectories::Against;
 use crate::error::Result;
 use crate::map::{FrameReport, MapPoint};
 use crate::stats::{quantile, range};
 
-/// More points make the page heavy and the map no clearer.
-const MAX_POINTS: usize = 250_000;
-/// Colours show sigma between these quantiles, on a logarithmic scale.
-const SHOWN: [f64; 2] = [0.02, 0.98];
-/// Places are stored in 16 bits over the map's extent.
-const STEPS: f64 = 65_535.0;
+/// Twelve bytes each: more make the page heavy and the map no clearer.
+const MAX_POINTS: usize = 500_000;
 const SCRIPT: &str = include_str!("map_page.js");
 
 /// What the page is about.
@@ -43,24 +40,26 @@ pub fn map_page(page: &MapPage<'_>) -> Result<String> {
     let body = html! {
         h1 { (page.title) }
         div.world {
-            canvas #view role="img" aria-label="the map as points, and the camera's path" {}
+            canvas #view role="img" aria-label="the map as discs, and the camera's path" {}
             svg #over aria-hidden="true" {}
         }
         p #no-webgl hidden { "This browser has no WebGL; open map.ply in MeshLab or CloudCompare instead." }
         div.controls {
             button #mode type="button" { "show σ" } button #path type="button" { "hide path" }
             button #home type="button" { "first view" }
+            label.when { "time " input #when type="range" min="0" value="0" step="1" {} output #stamp {} }
             div.sigmas #sigmas hidden {}
         }
         p.note {
-            "Drag to turn, shift or right drag to move, wheel to zoom. The bar is true at the middle of the map; x \
-             right, y down, z forward in the first camera. σ: of a point along its normal."
+            "Drag to turn, shift or right drag to move, wheel or two fingers to zoom. Each disc lies along the surface \
+             and is as wide as points are apart. The bar is true at the middle of the map; x right, y down, z \
+             forward in the first camera. σ: of a point along its normal."
         }
         (numbers_of(page, shown.len()))
         @if let Some(errors) = errors { (errors) } @else {
             (section("Errors", &html! { p { "The sequence has no true poses to compare with." } }))
         }
-        script type="application/json" id="map-data" { (PreEscaped(data(&shown, page.frames))) }
+        script type="application/json" id="map-data" { (PreEscaped(scene::data(&shown, page.frames, page.against.as_ref()))) }
         script { (PreEscaped(SCRIPT)) }
     };
     let model = ("model".to_string(), html! { (page.model) });
@@ -86,46 +85,11 @@ fn numbers_of(page: &MapPage<'_>, shown: usize) -> Markup {
     ])
 }
 
-/// What the script reads, as JSON; it holds no text of a user's.
-fn data(shown: &[&MapPoint], frames: &[FrameReport]) -> String {
-    let extents = [0, 1, 2].map(|k| range(shown.iter().map(|p| f64::from(p.at[k]))));
-    let ends = |e: usize| extents.map(|x| if x[e].is_finite() { x[e] as f32 } else { 0.0 });
-    let places = frames.iter().filter_map(|f| Some(f.pose?.translation));
-    let rounded = |v: f64| (v * 1e3).round() / 1e3;
-    let path: Vec<f64> = places.flat_map(|t| [t.x, t.y, t.z]).map(rounded).collect();
-    let sigma = sigmas(shown);
-    json!({"low": ends(0), "high": ends(1), "sigma": sigma, "path": path,
-        "points": base64(&packed(shown, extents, sigma))})
-    .to_string()
-}
-
-/// Between which the colours run, m.
-fn sigmas(shown: &[&MapPoint]) -> [f64; 2] {
-    let positive = shown.iter().map(|p| f64::from(p.sigma)).filter(|s| *s > 0.0 && s.is_finite());
-    let mut all: Vec<f64> = positive.collect();
-    let [low, high] = SHOWN.map(|q| quantile(&mut all, q).unwrap_or(1e-3));
-    [low, high.max(1.1 * low)]
-}
-
-/// Ten bytes a point: three places in 16 bits, red, green, blue, sigma.
-fn packed(points: &[&MapPoint], extents: [[f64; 2]; 3], [least, most]: [f64; 2]) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(points.len() * 10);
-    for point in points {
-        for (at, [low, high]) in point.at.iter().zip(extents) {
-            let share = (f64::from(*at) - low) / (high - low).max(f64::MIN_POSITIVE);
-            bytes.extend_from_slice(&((share * STEPS).round() as u16).to_le_bytes());
-        }
-        bytes.extend_from_slice(&point.colour);
-        let share = (f64::from(point.sigma) / least).ln() / (most / least).ln();
-        bytes.push((share.clamp(0.0, 1.0) * 255.0).round() as u8);
-    }
-    bytes
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use nalgebra::Vector3;
+    use serde_json::json;
 
     #[test]
     fn the_page_is_whole_and_carries_every_point() {
