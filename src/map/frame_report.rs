@@ -7,7 +7,9 @@ use std::time::Instant;
 use nalgebra::Isometry3;
 
 use super::icp::Alignment;
+use crate::evaluate::ClockOffset;
 use crate::stats::median;
+use crate::trajectory::Pose;
 use crate::units::verb;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -25,6 +27,8 @@ pub struct FrameReport {
     pub fate: Fate,
     /// Where the camera was, `map_from_camera`; `None` when lost.
     pub pose: Option<Isometry3<f64>>,
+    /// Where features of the colour images alone say that it was, at the colour image's own stamp.
+    pub by_colour: Option<Pose>,
     /// Of every frame that was aligned, whether the result was believed or not.
     pub alignment: Option<Alignment>,
     /// Is the depth image the one before, bit by bit?
@@ -41,6 +45,7 @@ impl FrameReport {
             stamp,
             fate: Fate::Lost(why),
             pose: None,
+            by_colour: None,
             alignment: None,
             repeated: false,
             remark: None,
@@ -96,6 +101,16 @@ pub fn remarks(frames: &[FrameReport]) -> Vec<String> {
         .into_iter()
         .flatten()
         .collect()
+}
+
+/// A film whose clocks disagree: its depth and its colour are not of the same moment.
+pub fn clocks(offset: &ClockOffset) -> String {
+    let [ms, error] = [offset.seconds.abs(), offset.std_error_s].map(|s| 1e3 * s);
+    let way = if offset.seconds > 0.0 { "late" } else { "early" };
+    format!(
+        "the depth images are stamped {ms:.1} ± {error:.1} ms {way} beside the colour images, by how each sees the camera turn: \
+         colour is taken from beside the surface that it belongs to"
+    )
 }
 
 fn lost(frames: &[FrameReport]) -> Option<String> {

@@ -35,6 +35,7 @@ use tracker::Tracker;
 
 use crate::Progress;
 use crate::error::{Error, Result};
+use crate::evaluate::{ClockOffset, clock_offset};
 use crate::model::NoiseModel;
 use crate::rng::Seed;
 use crate::sequence::Sequence;
@@ -54,6 +55,14 @@ impl Mapped {
     pub fn trajectory(&self) -> Vec<Pose> {
         let pose = |f: &FrameReport| Some(Pose { stamp: f.stamp, world_from_camera: f.pose? });
         self.frames.iter().filter_map(pose).collect()
+    }
+
+    /// What the colour images' clock lacks of the depth images', by how each sees the camera turn.
+    /// `None` without [`Init::Orb`], and where the camera turned too little to tell.
+    pub fn clock_offset(&self) -> Option<ClockOffset> {
+        let by_colour: Vec<Pose> = self.frames.iter().filter_map(|f| f.by_colour).collect();
+        // The map's trajectory is smooth enough to be interpolated; that of the features is not.
+        clock_offset(&self.trajectory(), &by_colour)
     }
 
     /// Frames without a pose.
@@ -88,7 +97,9 @@ pub fn map(
     }
     let mut remarks: Vec<String> = frames.iter().filter_map(|f| f.remark.clone()).collect();
     remarks.extend(frame_report::remarks(&frames));
-    let mapped = Mapped { frames, map: tracker.into_map(), remarks };
+    let mut mapped = Mapped { frames, map: tracker.into_map(), remarks };
+    let offset = mapped.clock_offset().filter(ClockOffset::is_significant);
+    mapped.remarks.extend(offset.map(|o| frame_report::clocks(&o)));
     if mapped.trajectory().len() < 2 {
         return Err(no_map(sequence, &mapped));
     }

@@ -35,6 +35,7 @@ pub struct Prepared {
     pub shape: Shape,
     pub features: Option<Features>,
     pub colour: Option<ColourImage>,
+    pub colour_stamp: Option<f64>,
     /// As stored.
     pub raw: Frame,
     pub stages: Stages,
@@ -85,7 +86,8 @@ impl<'a> Preprocessor<'a> {
             _ => None,
         };
         let shape = self.shape(&depth, &mut stages);
-        Ok(Prepared { shape, features, colour, raw, stages, remark })
+        let colour_stamp = moment.colour.as_ref().map(|c| c.timestamp);
+        Ok(Prepared { shape, features, colour, colour_stamp, raw, stages, remark })
     }
 
     /// Depth, m, without the sensor's biases.

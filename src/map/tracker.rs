@@ -11,6 +11,7 @@ use super::surfels::{SurfelTarget, Surfels};
 use super::{Init, Method, Options};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::trajectory::Pose;
 
 /// Fewer points are no picture of anything.
 const MIN_POINTS: usize = 200;
@@ -28,6 +29,8 @@ pub struct Tracker<'a> {
     /// Its pose, and its motion since the one before.
     pose: Isometry3<f64>,
     motion: Isometry3<f64>,
+    /// Its pose by the colour images' features alone.
+    pose_by_colour: Isometry3<f64>,
     /// Share of its points that had a neighbour.
     inlier_ratio: f64,
     surfels: Surfels,
@@ -43,6 +46,7 @@ impl<'a> Tracker<'a> {
             last: None,
             pose: Isometry3::identity(),
             motion: Isometry3::identity(),
+            pose_by_colour: Isometry3::identity(),
             inlier_ratio: 0.0,
             surfels: Surfels::new(preprocessor.options.max_observations),
             grid: PointGrid::default(),
@@ -80,11 +84,16 @@ impl<'a> Tracker<'a> {
         let Some(last) = &self.last else {
             report.fate = Fate::First;
             report.pose = Some(Isometry3::identity());
+            report.by_colour = by_colour(&frame, &self.pose_by_colour);
             self.keep(frame, Isometry3::identity(), stages);
             return Ok(());
         };
         report.repeated = last.raw == frame.raw;
-        let start = stages.time("start", || self.start(last, &frame))?;
+        let seen = stages.time("start", || self.seen_motion(last, &frame))?;
+        let start = seen.unwrap_or(match self.options.init {
+            Init::None => Isometry3::identity(),
+            Init::Motion | Init::Orb => self.motion,
+        });
         let alignment = self.align(last, &frame, start, stages);
         if let Some(why) = self.doubt(&alignment) {
             report.fate = Fate::Lost(why);
@@ -93,24 +102,23 @@ impl<'a> Tracker<'a> {
             report.fate = Fate::Tracked;
             report.pose = Some(pose);
             self.inlier_ratio = alignment.inlier_ratio;
+            let moved = seen.unwrap_or(alignment.target_from_source);
+            self.pose_by_colour = renormalised(&(self.pose_by_colour * moved));
+            report.by_colour = seen.and(by_colour(&frame, &self.pose_by_colour));
             self.keep(frame, pose, stages);
         }
         report.alignment = Some(alignment);
         Ok(())
     }
 
-    /// Where this frame may be in the last one's.
-    fn start(&self, last: &Prepared, frame: &Prepared) -> Result<Isometry3<f64>> {
-        let moved = match self.options.init {
-            Init::None => Isometry3::identity(),
-            Init::Motion | Init::Orb => self.motion,
-        };
-        // There are features only where they are asked for.
+    /// Where this frame is in the last one's, by features of their colour images; there are some only
+    /// where they are asked for.
+    fn seen_motion(&self, last: &Prepared, frame: &Prepared) -> Result<Option<Isometry3<f64>>> {
         let (Some(here), Some(there)) = (&frame.features, &last.features) else {
-            return Ok(moved);
+            return Ok(None);
         };
         let mut rng = self.options.seed.stream(&format!("orb/{}", self.number));
-        Ok(here.motion_to(there, &mut rng)?.unwrap_or(moved))
+        here.motion_to(there, &mut rng)
     }
 
     /// In the frame of the last camera.
@@ -193,4 +201,9 @@ impl<'a> Tracker<'a> {
     pub fn into_map(self) -> Vec<MapPoint> {
         if self.surfels.is_empty() { self.grid.points() } else { self.surfels.points() }
     }
+}
+
+fn by_colour(frame: &Prepared, pose: &Isometry3<f64>) -> Option<Pose> {
+    let stamp = frame.colour_stamp.filter(|_| frame.features.is_some())?;
+    Some(Pose { stamp, world_from_camera: *pose })
 }

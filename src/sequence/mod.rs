@@ -39,8 +39,8 @@ pub struct Moment {
     /// Of the depth image, s.
     pub stamp: f64,
     pub depth: FrameRef,
-    /// The colour image of the same moment.
-    pub colour: Option<PathBuf>,
+    /// The colour image of the same moment, with its own stamp.
+    pub colour: Option<FrameRef>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -71,7 +71,7 @@ impl Sequence {
     /// The colour of a moment, where there is any. An error when the file is damaged or not of the
     /// depth image's size.
     pub fn colour(&self, moment: &Moment) -> Result<Option<ColourImage>> {
-        let Some(path) = &moment.colour else { return Ok(None) };
+        let Some(path) = moment.colour.as_ref().map(|c| &c.path) else { return Ok(None) };
         let camera = &self.sensor.camera;
         ColourImage::read(path, [camera.width, camera.height]).map(Some)
     }

@@ -40,7 +40,7 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
         let Some((name, number)) = stem(&path) else { continue };
         let stamp = number / RATE_HZ;
         let colour = ["color.png", "color.jpg"].map(|kind| root.join(format!("{name}.{kind}")));
-        let colour = colour.into_iter().find(|p| p.is_file());
+        let colour = colour.into_iter().find(|p| p.is_file()).map(|p| FrameRef::file(stamp, p));
         let pose = root.join(format!("{name}.pose.txt"));
         if pose.is_file() {
             match read_pose(&pose)? {

@@ -40,7 +40,7 @@ fn colour_belongs_within_a_fiftieth_of_a_second() {
     let names: Vec<Option<String>> = sequence
         .moments
         .iter()
-        .map(|m| Some(m.colour.as_ref()?.file_name()?.to_string_lossy().into_owned()))
+        .map(|m| Some(m.colour.as_ref()?.path.file_name()?.to_string_lossy().into_owned()))
         .collect();
     // 0.050 is nearer to 0.066 than to 0.033, and each is used once.
     assert_eq!(names, [Some("0.png".into()), None, Some("1.png".into())]);
@@ -69,7 +69,7 @@ fn associations_are_taken_at_their_word() {
     fs::write(dir.path().join("associations.txt"), text).unwrap();
     let sequence = open(dir.path(), &Assumed::default()).unwrap();
     assert!(sequence.moments[0].colour.is_none());
-    assert!(sequence.moments[1].colour.as_ref().unwrap().ends_with("rgb/0.png"));
+    assert!(sequence.moments[1].colour.as_ref().unwrap().path.ends_with("rgb/0.png"));
     fs::write(dir.path().join("associations.txt"), "0.5 rgb/0.png\n").unwrap();
     let error = open(dir.path(), &Assumed::default()).unwrap_err().to_string();
     assert!(error.contains("line 1"), "{error}");

@@ -86,7 +86,7 @@ fn with_colour(
         Some(file) => listed(root, &file, &depth)?,
         None => nearest(root, &depth, remarks)?,
     };
-    let moment = |(depth, colour): (FrameRef, Option<PathBuf>)| Moment {
+    let moment = |(depth, colour): (FrameRef, Option<FrameRef>)| Moment {
         stamp: depth.timestamp,
         depth,
         colour,
@@ -98,7 +98,7 @@ fn nearest(
     root: &Path,
     depth: &[FrameRef],
     remarks: &mut Vec<String>,
-) -> Result<Vec<Option<PathBuf>>> {
+) -> Result<Vec<Option<FrameRef>>> {
     let path = root.join("rgb.txt");
     if !path.is_file() {
         return Ok(vec![None; depth.len()]);
@@ -108,31 +108,34 @@ fn nearest(
     let stamps = |frames: &[FrameRef]| frames.iter().map(|f| f.timestamp).collect::<Vec<f64>>();
     let mut partner = vec![None; depth.len()];
     for pair in associate(&stamps(depth), &stamps(&colour.frames), MAX_DIFFERENCE_S) {
-        partner[pair.first] = Some(colour.frames[pair.second].path.clone());
+        partner[pair.first] = Some(colour.frames[pair.second].clone());
     }
     Ok(partner)
 }
 
 /// "stamp path stamp path" lines: colour and depth in either order.
-fn listed(root: &Path, file: &Path, depth: &[FrameRef]) -> Result<Vec<Option<PathBuf>>> {
+fn listed(root: &Path, file: &Path, depth: &[FrameRef]) -> Result<Vec<Option<FrameRef>>> {
     let text = read_text(file)?;
     let place: HashMap<&PathBuf, usize> =
         depth.iter().enumerate().map(|(k, f)| (&f.path, k)).collect();
     let mut partner = vec![None; depth.len()];
     for (line, content) in content_lines(&text) {
         let words: Vec<&str> = content.split_whitespace().collect();
-        let [_, one, _, other] = words[..] else {
+        let [first, one, second, other] = words[..] else {
             let what = format!("{} words where \"stamp path stamp path\" is due", words.len());
             let remedy = "make the file again with associate.py, or take it out";
             return Err(Error::text(file, line, what, remedy));
         };
         let [one, other] = [one, other].map(|name| root.join(name));
-        let (depth_index, colour) = match (place.get(&one), place.get(&other)) {
-            (_, Some(&k)) => (k, one),
-            (Some(&k), None) => (k, other),
+        let (k, stamp, colour) = match (place.get(&one), place.get(&other)) {
+            (_, Some(&k)) => (k, first, one),
+            (Some(&k), None) => (k, second, other),
             (None, None) => continue,
         };
-        partner[depth_index] = colour.is_file().then_some(colour);
+        // Of a list that has no times the moment is the depth image's.
+        let stamp =
+            stamp.parse().ok().filter(|s: &f64| s.is_finite()).unwrap_or(depth[k].timestamp);
+        partner[k] = colour.is_file().then(|| FrameRef::file(stamp, colour));
     }
     Ok(partner)
 }

@@ -11,6 +11,7 @@ mod against;
 mod bad_input;
 mod capture;
 mod capture_kinect;
+mod clocks;
 mod command_line;
 mod containers;
 mod correct;
