@@ -4,6 +4,8 @@
 //! Every random number is seeded, so a test that passes once passes always; a false-alarm
 //! probability says how often correct code would fail under another seed.
 
+#![forbid(unsafe_code)]
+
 #[path = "../common/mod.rs"]
 mod common;
 
