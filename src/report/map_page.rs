@@ -1,9 +1,10 @@
 //! The map to look at from all sides: points and path drawn by WebGL, and how far off the path is.
 
+use base64::prelude::{BASE64_STANDARD, Engine};
 use maud::{Markup, PreEscaped, html};
 use serde_json::json;
 
-use super::document::{Origin, base64, document, section, tiles};
+use super::document::{Origin, document, section, tiles};
 use super::numbers::{ABSENT, fixed};
 use super::trajectories::Against;
 use crate::error::Result;
@@ -95,7 +96,7 @@ fn data(shown: &[&MapPoint], frames: &[FrameReport]) -> String {
     let path: Vec<f64> = places.flat_map(|t| [t.x, t.y, t.z]).map(rounded).collect();
     let sigma = sigmas(shown);
     json!({"low": ends(0), "high": ends(1), "sigma": sigma, "path": path,
-        "points": base64(&packed(shown, extents, sigma))})
+        "points": BASE64_STANDARD.encode(packed(shown, extents, sigma))})
     .to_string()
 }
 
