@@ -37,6 +37,11 @@ pub(crate) fn write_atomic_with(
     path: &Path,
     write: impl FnOnce(&mut fs::File) -> io::Result<()>,
 ) -> Result<()> {
+    // A device of that name would be gone.
+    if fs::metadata(path).is_ok_and(|standing| !standing.is_file() && !standing.is_dir()) {
+        let what = "a pipe or a device stands there, no file";
+        return Err(Error::recording(path, what, "choose another name"));
+    }
     let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let written = beside(folder).and_then(|mut file| {
         write(file.as_file_mut())?;

@@ -22,6 +22,8 @@ mod effects;
 mod export_files;
 mod export_programs;
 mod extended_map;
+#[cfg(unix)] // bash sets the limits
+mod faults;
 mod fit;
 mod flatness;
 mod hostile;
