@@ -202,8 +202,11 @@ class Page(html.parser.HTMLParser):
     def handle_starttag(self, tag, attributes):
         self.elements.append(tag)
         for name, value in attributes:
-            if name.startswith("on") or (value or "").strip().lower().startswith("javascript:"):
+            calls = name in ("href", "src", "action") and (value or "").strip().lower().startswith("javascript:")
+            if name.startswith("on") or calls:
                 self.handlers.append(f"{tag} {name}={value}")
+            if name == "src" and not (value or "").startswith("data:"):
+                self.handlers.append(f"{tag} src={value}")
             if name in self.NUMBERS and NO_NUMBER.search(value or ""):
                 self.spoilt.append(f"{tag} {name}={value[:60]}")
 

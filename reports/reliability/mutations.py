@@ -178,7 +178,7 @@ FORMATS = ["python", "c", "npz", "opencv", "camera-info", "elevation-mapping", "
 # Of every kind of input, the commands that read it; IN is the spoilt copy, OUT the result. The sizes
 # are such that most runs take a tenth of a second.
 COMMANDS = {
-    "rec": ["calibrate IN -o OUT --sigma temporal --json", "metrics IN -o OUT --json", "metrics IN", "correct IN -m model.json -o OUT",
+    "rec": ["calibrate IN -o OUT --sigma temporal --json", "metrics IN -o OUT --json", "metrics IN", "metrics IN --json", "correct IN -m model.json -o OUT",
             "correct IN -m model.json -o OUT --sigma sigma", "simulate OUT --like IN", "diagnose IN -o OUT",
             "capture OUT --source play:IN --plain --views any --frames 2 --hold 1 --force"],
     "model.json": ["correct rec -m IN -o OUT", "sigma film -m IN -o OUT", "map film -m IN --block 1 -o OUT", "units IN base.json --json",
@@ -191,8 +191,8 @@ COMMANDS = {
                   "simulate OUT --room --trajectory IN --frames 2 --shrink 8"],
     "film": ["map IN --block 1 -o OUT", "sigma IN -m model.json -o OUT", "map IN -o OUT --method paper --json", "correct IN -m model.json -o OUT"],
     "scenes": [f"map IN --block 1 -o OUT {CAMERA}", f"sigma IN -m model.json -o OUT {CAMERA}"],
-    "dump": ["metrics IN -o OUT --force", "metrics IN --json"],
-    "images": [f"metrics IN -o OUT {CAMERA}", f"correct IN -m model.json -o OUT {CAMERA}"],
+    "dump": ["metrics IN --json", "metrics IN"],
+    "images": [f"metrics IN --json {CAMERA}", f"correct IN -m model.json -o OUT {CAMERA}"],
     **{name: [f"metrics IN --json {SMALL}", f"sigma IN -m film-model.json -o OUT {SMALL}", f"correct IN -m film-model.json -o OUT {SMALL}"]
        for name in ["film.bag", "film.mcap", "film.npz", "realsense.bag", "unindexed.mcap", "metres.npy", "film3"]},
 }

@@ -19,15 +19,15 @@ import mutations
 
 # The rows' functions, and how often each tries.
 ROWS = {
-    "spoilt": (mutations.spoilt_inputs, 6000),
-    "kills": (faults.kills, 200),
-    "disks": (faults.full_disks, 200),
+    "spoilt": (mutations.spoilt_inputs, 2000),
+    "kills": (faults.kills, 100),
+    "disks": (faults.full_disks, 60),
     "answers": (faults.lost_answers, 200),
-    "unreadable": (faults.unreadable, 10),
-    "changing": (faults.changing, 120),
-    "two": (faults.two_runs, 100),
+    "unreadable": (faults.unreadable, 3),
+    "changing": (faults.changing, 60),
+    "two": (faults.two_runs, 60),
     "long": (faults.long_recordings, 1),
-    "out": (faults.ways_out, 200),
+    "out": (faults.ways_out, 100),
     "markup": (faults.markup, 10),
 }
 HEAD = "| what was tried | runs | done | refused, with a message | broke |\n|---|--:|--:|--:|--:|"

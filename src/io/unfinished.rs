@@ -75,6 +75,8 @@ const STALE: Duration = Duration::from_secs(60);
 /// Remove from `parent` what runs left that were killed: nobody has it locked. What is set aside for
 /// somebody has an extension, and stays.
 pub fn discard_stale(parent: &Path) {
+    // What a name alone lies in.
+    let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
     let entries = fs::read_dir(parent).into_iter().flatten().flatten();
     for entry in entries.filter(|e| e.file_name().to_string_lossy().starts_with(UNFINISHED)) {
         let path = entry.path();
