@@ -58,7 +58,16 @@ impl Error {
     }
 
     pub fn write(path: &Path, cause: std::io::Error) -> Self {
-        let remedy = "choose a folder that can be written (-o of most commands)";
+        use std::io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+        let remedy = match cause.kind() {
+            StorageFull | QuotaExceeded => {
+                "make room on that disk, then give the same command again"
+            }
+            FileTooLarge => {
+                "raise the limit of files' sizes (ulimit -f), then give the same command again"
+            }
+            _ => "choose a folder that can be written (-o of most commands)",
+        };
         Error::Io { path: path.to_path_buf(), cause, remedy }
     }
 

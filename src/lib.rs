@@ -151,6 +151,8 @@
 //! "3D map-building from RGB-D data considering noise characteristics of Kinect" (SII 2016). It is
 //! "the paper" in these pages.
 
+#![deny(unsafe_code)]
+
 // In layers: a module imports only from those above it (tests/structure.py checks it). The blank
 // lines keep rustfmt from sorting them into one list.
 pub mod docs;

@@ -1,5 +1,7 @@
 //! The thin skin: parse, dispatch, print the error once, exit code.
 
+#![forbid(unsafe_code)]
+
 mod cli;
 
 use std::process::ExitCode;

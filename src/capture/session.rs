@@ -1,13 +1,13 @@
 //! A recording on the disk that grows view by view: each is whole or not there.
 
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
 use super::source::LiveFrame;
 use crate::error::{Error, Result};
 use crate::io::{
     DEPTH_LIST, DESCRIPTION, encode_png16_quickly, entries, read_description, refuse_full,
-    write_recording_file, write_view_notes,
+    sync_folder, write_recording_file, write_view_notes,
 };
 use crate::view::{Sensor, ViewNotes};
 
@@ -205,22 +205,17 @@ impl PartialView {
 }
 
 /// One capture at a time: the folder, locked until it is dropped, however the process ends.
-/// `None` where folders cannot be locked (some network disks, systems without `flock`).
+/// `None` where folders cannot be opened or locked (some systems, some network disks).
 fn lock(root: &Path) -> Result<Option<File>> {
     let Ok(folder) = File::open(root) else { return Ok(None) };
-    #[cfg(unix)]
-    {
-        use rustix::fs::{FlockOperation, flock};
-        match flock(&folder, FlockOperation::NonBlockingLockExclusive) {
-            Ok(()) => {}
-            Err(rustix::io::Errno::WOULDBLOCK) => {
-                let remedy = "end that one first (q, or Ctrl-C), or choose a new folder";
-                return Err(Error::recording(root, "another capture is writing into it", remedy));
-            }
-            Err(_) => return Ok(None),
+    match folder.try_lock() {
+        Ok(()) => Ok(Some(folder)),
+        Err(TryLockError::WouldBlock) => {
+            let remedy = "end that one first (q, or Ctrl-C), or choose a new folder";
+            Err(Error::recording(root, "another capture is writing into it", remedy))
         }
+        Err(TryLockError::Error(_)) => Ok(None),
     }
-    Ok(Some(folder))
 }
 
 /// A recording is resumed with the sensor that it was begun with.
@@ -243,12 +238,14 @@ fn refuse_another(description: &Path, now: &Sensor) -> Result<()> {
     Ok(())
 }
 
-/// To the disk itself; folders too, where they can be opened.
+/// To the disk itself.
 fn sync(path: &Path) -> Result<()> {
-    if cfg!(not(unix)) && path.is_dir() {
-        return Ok(());
-    }
-    File::open(path).and_then(|file| file.sync_all()).map_err(|e| failed(path, e))
+    let synced = if path.is_dir() {
+        sync_folder(path)
+    } else {
+        File::open(path).and_then(|file| file.sync_all())
+    };
+    synced.map_err(|e| failed(path, e))
 }
 
 fn failed(path: &Path, cause: std::io::Error) -> Error {

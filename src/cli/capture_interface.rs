@@ -12,18 +12,14 @@ use kinoise::capture::{Command, Event, Guide, Interface, Line, Status, Style, re
 
 use super::console::say;
 
-/// Set by Ctrl-C, a hang-up or a polite kill. A file that grows beyond its limit is an error of
-/// the write, not the end of the process.
+/// Set by Ctrl-C, a hang-up or a polite kill.
 pub fn stop_signal() -> std::io::Result<Arc<AtomicBool>> {
     use signal_hook::{consts, flag::register};
     let stop = Arc::new(AtomicBool::new(false));
     register(consts::SIGINT, stop.clone())?;
     register(consts::SIGTERM, stop.clone())?;
     #[cfg(unix)]
-    {
-        register(consts::SIGHUP, stop.clone())?;
-        register(consts::SIGXFSZ, Arc::default())?;
-    }
+    register(consts::SIGHUP, stop.clone())?;
     Ok(stop)
 }
 

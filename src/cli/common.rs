@@ -1,7 +1,6 @@
 //! The options that commands share.
 
 use std::ffi::OsString;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
@@ -16,7 +15,7 @@ use kinoise::sequence::Sequence;
 use kinoise::units::shortest;
 use kinoise::{DepthCode, NoiseModel, Seed, Sensor};
 
-use super::console::{Verbosity, detail, detail_model, say};
+use super::console::{Verbosity, answer, detail, detail_model, say};
 
 #[derive(Debug, Args)]
 pub struct Global {
@@ -58,9 +57,7 @@ impl Global {
     /// The result for programs; people read stderr.
     pub fn print_json(&self, value: &serde_json::Value) -> anyhow::Result<()> {
         if self.json {
-            let mut out = std::io::stdout().lock();
-            serde_json::to_writer_pretty(&mut out, value)?;
-            writeln!(out)?;
+            answer(kinoise::io::pretty_json(value)?.as_bytes()).context("stdout")?;
         }
         Ok(())
     }

@@ -1,9 +1,9 @@
-use std::io::Write as _;
-
+use anyhow::Context;
 use clap::Args;
 use clap_complete::Shell;
 
 use super::command;
+use super::console::answer;
 
 pub const EXAMPLES: &str = "\
 Examples:
@@ -23,7 +23,5 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut command(), "kinoise", &mut script);
-    // A reader that closes early is no failure.
-    let _ = std::io::stdout().lock().write_all(&script);
-    Ok(())
+    answer(&script).context("stdout")
 }

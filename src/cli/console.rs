@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::ffi::OsString;
 use std::fmt::Display;
-use std::io::{IsTerminal, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -85,6 +85,20 @@ pub fn one_line(text: &str) -> String {
 /// What the command was run for; also with --quiet.
 pub fn result(text: impl AsRef<str>) {
     print(QUIET, text.as_ref());
+}
+
+/// Why the command gave up.
+pub fn failure(text: &str) {
+    result(format!("kinoise: {}", one_line(text)));
+}
+
+/// What was asked for, on stdout. A reader that closes early is no failure; a full disk is.
+pub fn answer(text: &[u8]) -> std::io::Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(e),
+        _ => Ok(()),
+    }
 }
 
 /// A line for people.

@@ -1,12 +1,10 @@
-use std::io::Write as _;
-
 use anyhow::Context;
 use clap::Args;
 use kinoise::effects::{Active, CATALOGUE, Card, Parameter};
 use serde_json::json;
 
 use super::common::Global;
-use super::console::next_step;
+use super::console::{answer, next_step};
 
 pub const EXAMPLES: &str = "\
 Examples:
@@ -34,8 +32,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     }
     let page = |card: &&Card| if arguments.list { card.id.to_string() } else { page(card) };
     let pages: Vec<String> = cards.iter().map(page).collect();
-    // The catalogue is the result, not a remark: stdout. A reader that closes early is no failure.
-    let _ = writeln!(std::io::stdout().lock(), "{}", pages.join("\n"));
+    // The catalogue is the result, not a remark: stdout.
+    answer(format!("{}\n", pages.join("\n")).as_bytes()).context("stdout")?;
     if let ([id], false) = (&arguments.ids[..], arguments.list) {
         let effect = Active::typical(id)?.argument();
         let to = format!("out/{id}");

@@ -4,7 +4,7 @@ use anyhow::bail;
 use clap::Args;
 use kinoise::NoiseModel;
 use kinoise::export::{ExportFormat, export};
-use kinoise::io::write_atomic;
+use kinoise::io::{discard_stale, write_atomic};
 
 use super::common::{Global, one_of};
 use super::console::{detail_model, notes, result};
@@ -58,6 +58,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     detail_model(&model, Some(file));
     refuse_taken(output, file, global.force)?;
     let exported = export(&model, *format)?;
+    output.parent().into_iter().for_each(discard_stale);
     write_atomic(output, &exported.bytes)?;
     notes(&exported.notes);
     result(format!("wrote {}", output.display()));

@@ -119,7 +119,7 @@ pub fn main() -> ExitCode {
             return if e.use_stderr() { ExitCode::from(FAILURE) } else { ExitCode::SUCCESS };
         }
         Err(e) => {
-            eprintln!("kinoise: {}", console::one_line(&one_line(&e)));
+            console::failure(&one_line(&e));
             return ExitCode::from(FAILURE);
         }
     };
@@ -127,7 +127,7 @@ pub fn main() -> ExitCode {
         Ok(code) => ExitCode::from(code),
         Err(e) => {
             output::wait_if_interrupted();
-            eprintln!("kinoise: {}", console::one_line(&format!("{e:#}")));
+            console::failure(&format!("{e:#}"));
             ExitCode::from(FAILURE)
         }
     }
@@ -169,6 +169,7 @@ fn subcommand() -> Option<String> {
 fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let global = &arguments.global;
     global.set_up()?;
+    output::survive_file_limits()?;
     // A capture goes on with the views that are whole, and has its own answer.
     if !matches!(arguments.command, Command::Capture(_)) {
         output::discard_when_interrupted()?;

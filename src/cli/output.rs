@@ -9,6 +9,7 @@ use std::time::Duration;
 use kinoise::io::{Interrupted, Leaves, OutputFolder, discard_unfinished};
 
 use super::common::Global;
+use super::console::result;
 
 const CALIBRATED: &[&str] = &[
     "model.json",
@@ -80,6 +81,14 @@ static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 /// Sooner than a person notices, and no load.
 const POLL: Duration = Duration::from_millis(50);
 
+/// From here on a file that grows beyond its limit (`ulimit -f`) is an error of the write, as on a full
+/// disk, and not the end of the process.
+pub fn survive_file_limits() -> std::io::Result<()> {
+    #[cfg(unix)]
+    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
+    Ok(())
+}
+
 /// From here on Ctrl-C and a polite kill throw away what is not whole, say what is kept, and end the
 /// process as they would have.
 pub fn discard_when_interrupted() -> std::io::Result<()> {
@@ -94,7 +103,7 @@ pub fn discard_when_interrupted() -> std::io::Result<()> {
             let signal = caught.load(Ordering::Relaxed);
             if signal != 0 {
                 INTERRUPTED.store(true, Ordering::SeqCst);
-                eprintln!("{}", describe(&discard_unfinished()));
+                result(describe(&discard_unfinished()));
                 let _ = signal_hook::low_level::emulate_default_handler(signal as i32);
             }
         }

@@ -1,10 +1,10 @@
-use std::io::Write as _;
-
+use anyhow::Context;
 use clap::Args;
 use kinoise::io::pretty_json;
 use kinoise::schema::{SchemaOf, schema};
 
 use super::common::one_of;
+use super::console::answer;
 
 pub const EXAMPLES: &str = "\
 Examples:
@@ -24,7 +24,5 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let text = pretty_json(&schema(arguments.file))?;
-    // A reader that closes early is no failure.
-    let _ = std::io::stdout().lock().write_all(text.as_bytes());
-    Ok(())
+    answer(text.as_bytes()).context("stdout")
 }

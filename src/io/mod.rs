@@ -22,12 +22,12 @@ pub(crate) use layout::{DEPTH_LIST, read_description};
 pub use layout::{DESCRIPTION, ViewFile, write_recording_file, write_view_notes};
 pub(crate) use list::content_lines;
 pub use list::{FrameList, read_list};
-pub(crate) use output::{entries, write_atomic_with};
+pub(crate) use output::{entries, sync_folder, write_atomic_with};
 pub use output::{hex, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
 pub(crate) use output_folder::is_description;
 pub use output_folder::{Leaves, OutputFolder, refuse_inside};
 pub use pictures::{ColourImage, InfraredImage};
-pub use unfinished::{Interrupted, discard_unfinished};
+pub use unfinished::{Interrupted, discard_stale, discard_unfinished};
 
 use std::path::Path;
 

@@ -2,12 +2,14 @@
 //! into it.
 
 use std::fs;
-use std::io::Write;
+use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
+use tempfile::NamedTempFile;
 
+use super::unfinished::{UNFINISHED, is_being_filled};
 use crate::error::{Error, Result};
 
 /// Never mix a new recording into somebody's folder.
@@ -24,7 +26,7 @@ pub fn refuse_full(root: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Write beside `path`, then rename: a kill or a full disk leaves the old file, or none.
+/// Write beside `path`, then rename: a kill, a full disk or a power cut leaves the old file, or none.
 /// An error when the folder cannot be written; the temporary file is then removed.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<()> {
     write_atomic_with(path, |file| file.write_all(bytes))
@@ -33,17 +35,44 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<()> {
 /// As [`write_atomic`], piece by piece.
 pub(crate) fn write_atomic_with(
     path: &Path,
-    write: impl FnOnce(&mut fs::File) -> std::io::Result<()>,
+    write: impl FnOnce(&mut fs::File) -> io::Result<()>,
 ) -> Result<()> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let temporary = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
-    let written = fs::File::create(&temporary)
-        .and_then(|mut file| write(&mut file).and_then(|()| file.sync_data()))
-        .and_then(|()| fs::rename(&temporary, path));
-    written.map_err(|e| {
-        let _ = fs::remove_file(&temporary);
-        Error::write(path, e)
-    })
+    // A device of that name would be gone.
+    if fs::metadata(path).is_ok_and(|standing| !standing.is_file() && !standing.is_dir()) {
+        let what = "a pipe or a device stands there, no file";
+        return Err(Error::recording(path, what, "choose another name"));
+    }
+    let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let written = beside(folder).and_then(|mut file| {
+        write(file.as_file_mut())?;
+        file.as_file().sync_all()?;
+        file.persist(path)?;
+        // A folder that is being filled is synced once, when it is whole.
+        if is_being_filled(folder) { Ok(()) } else { sync_folder(folder) }
+    });
+    written.map_err(|e| Error::write(path, e))
+}
+
+/// A file of a passing name, with the permissions of any new file. It is locked, which what a killed
+/// run has left is not.
+fn beside(folder: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(UNFINISHED);
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666)); // less the umask
+    let file = builder.tempfile_in(folder)?;
+    // Where there are no locks its youth protects it.
+    let _ = file.as_file().try_lock();
+    Ok(file)
+}
+
+/// The names in a folder, to the disk itself. Some systems open no folders, and some disks sync none.
+pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
+    let Ok(file) = fs::File::open(folder) else { return Ok(()) };
+    match file.sync_all() {
+        Err(e) if ![ErrorKind::InvalidInput, ErrorKind::Unsupported].contains(&e.kind()) => Err(e),
+        _ => Ok(()),
+    }
 }
 
 /// JSON for people to read, with a line's end at its end.
@@ -104,6 +133,19 @@ mod tests {
         fs::write(blocked.join("x"), b"").unwrap();
         assert!(write_atomic(&blocked, b"1").is_err(), "a folder stands there");
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    /// Others shall read results as they read any file: temporary files are their owner's alone.
+    #[cfg(unix)]
+    #[test]
+    fn a_file_has_the_permissions_of_any_new_file() {
+        use std::os::unix::fs::PermissionsExt;
+        let dir = tempfile::tempdir().unwrap();
+        let [plain, atomic] = ["plain", "atomic"].map(|name| dir.path().join(name));
+        fs::write(&plain, b"1").unwrap();
+        write_atomic(&atomic, b"1").unwrap();
+        let mode = |path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&atomic), mode(&plain));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::folder::INDEX;
 use super::layout::{DEPTH_LIST, DESCRIPTION};
-use super::output::{entries, listed, write_atomic};
+use super::output::{entries, listed, sync_folder, write_atomic};
 use super::unfinished::{Open, UNFINISHED, discard, discard_stale, lock, register};
 use crate::error::{Error, Result};
 
@@ -131,12 +131,15 @@ impl OutputFolder {
     /// An error when that has become impossible; what was written is then kept where it was filled, as
     /// the message says.
     pub fn finish(mut self) -> Result<()> {
+        // A power cut too finds it whole or not there: its names are on the disk before its own is.
+        let synced = sync_folders(&self.staging);
         // Held throughout: an interruption finds the folder whole or not there.
         let mut register = register();
-        let put = match self.stands {
-            Stands::Nothing => fs::rename(&self.staging, &self.place),
-            _ => self.put_inside(),
-        };
+        let put = synced.and_then(|()| match self.stands {
+            Stands::Nothing => fs::rename(&self.staging, &self.place)
+                .and_then(|()| self.staging.parent().map_or(Ok(()), sync_folder)),
+            _ => self.put_inside().and_then(|()| sync_folder(&self.place)),
+        });
         self.done = true;
         register.open.retain(|open| open.staging != self.staging);
         put.map_err(|cause| {
@@ -153,31 +156,33 @@ impl OutputFolder {
         Ok(())
     }
 
-    /// Into the folder that is there, what marks it as whole last.
+    /// Into the folder that is there. What marks results as whole is the first of the old to go and the
+    /// last of the new to come, so that a kill leaves no mixture that has it.
     fn put_inside(&self) -> std::io::Result<()> {
         let mut new = names(&self.staging)?;
         new.sort_by_key(|name| (self.comes_last(name), name.clone()));
+        let mut replaced = names(&self.place)?;
+        replaced.retain(|name| !is_unfinished(name) && self.is_replaced(name, new.contains(name)));
+        replaced.sort_by_key(|name| (!self.comes_last(name), name.clone()));
         let old = self.staging.with_extension("old");
-        let aside = |name: &OsString| {
+        for name in &replaced {
             fs::create_dir_all(&old)?;
-            fs::rename(self.place.join(name), old.join(name))
-        };
-        for name in names(&self.place)?.iter().filter(|name| !is_unfinished(name)) {
-            let from = self.place.join(name);
-            let replaced = match (self.leaves, self.stands) {
-                (Leaves::Recording, _) => true,
-                (_, Stands::Earlier) if !from.is_dir() => !new.contains(name),
-                _ => from.is_dir() && new.contains(name),
-            };
-            if replaced {
-                aside(name)?;
-            }
+            fs::rename(self.place.join(name), old.join(name))?;
         }
         for name in &new {
             fs::rename(self.staging.join(name), self.place.join(name))?;
         }
         fs::remove_dir(&self.staging)?;
         if old.exists() { fs::remove_dir_all(&old) } else { Ok(()) }
+    }
+
+    /// Does this name at the place go when the new results come?
+    fn is_replaced(&self, name: &OsString, comes: bool) -> bool {
+        match (self.leaves, self.stands) {
+            (Leaves::Recording, _) => true,
+            (_, Stands::Earlier) if !self.place.join(name).is_dir() => true,
+            _ => self.place.join(name).is_dir() && comes,
+        }
     }
 
     fn comes_last(&self, name: &OsString) -> bool {
@@ -202,6 +207,17 @@ impl Drop for OutputFolder {
 fn next_number() -> usize {
     static NEXT: AtomicUsize = AtomicUsize::new(0);
     NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
+/// A folder and all below it.
+fn sync_folders(folder: &Path) -> std::io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            sync_folders(&entry.path())?;
+        }
+    }
+    sync_folder(folder)
 }
 
 fn names(folder: &Path) -> std::io::Result<Vec<OsString>> {

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crate::error::{Error, Result};
 
-/// Beginning of the names of folders that are being filled.
+/// Beginning of the names of folders that are being filled, and of files that are being written.
 pub(super) const UNFINISHED: &str = ".kinoise-";
 
 /// What an interruption found.
@@ -69,22 +69,32 @@ pub(super) fn lock(folder: &Path) -> Result<Option<fs::File>> {
     }
 }
 
-/// A folder is locked long before.
+/// A folder or a file is locked long before.
 const STALE: Duration = Duration::from_secs(60);
 
 /// Remove from `parent` what runs left that were killed: nobody has it locked. What is set aside for
 /// somebody has an extension, and stays.
-pub(super) fn discard_stale(parent: &Path) {
+pub fn discard_stale(parent: &Path) {
+    // What a name alone lies in.
+    let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
     let entries = fs::read_dir(parent).into_iter().flatten().flatten();
     for entry in entries.filter(|e| e.file_name().to_string_lossy().starts_with(UNFINISHED)) {
         let path = entry.path();
-        let old = || entry.metadata().ok()?.modified().ok()?.elapsed().ok();
-        let stale = path.extension().is_none() && old().is_some_and(|age| age > STALE);
-        let free = || fs::File::open(&path).is_ok_and(|folder| folder.try_lock().is_ok());
-        if stale && free() {
-            let _ = fs::remove_dir_all(&path);
-        }
+        let Ok(about) = entry.metadata() else { continue };
+        let age = about.modified().ok().and_then(|time| time.elapsed().ok());
+        let stale = path.extension().is_none() && age.is_some_and(|age| age > STALE);
+        let free = || fs::File::open(&path).is_ok_and(|open| open.try_lock().is_ok());
+        let _ = match (about.is_dir(), about.is_file()) {
+            (true, _) if stale && free() => fs::remove_dir_all(&path),
+            (_, true) if stale && free() => fs::remove_file(&path),
+            _ => Ok(()),
+        };
     }
+}
+
+/// Is `folder` part of an output that is not in its place yet?
+pub(super) fn is_being_filled(folder: &Path) -> bool {
+    register().open.iter().any(|open| folder.starts_with(&open.staging))
 }
 
 /// The folders of this process.

@@ -463,4 +463,26 @@ fn what_a_killed_run_left_goes_with_the_next() {
     assert!(!desk.at(".kinoise-1-0").exists());
     let stays = [alive.path(), &desk.at(".kinoise-1-1.kept"), &desk.at(".kinoise-1-2")];
     assert!(stays.iter().all(|folder| folder.exists()));
+
+    // So does the file that a killed export was writing.
+    desk.model("model.json", |_| ());
+    for (name, age) in [(".kinoise-old", 3600), (".kinoise-new", 1)] {
+        desk.put(name, "half");
+        let time = std::time::SystemTime::now() - Duration::from_secs(age);
+        let file = fs::File::options().write(true).open(desk.at(name)).expect("there");
+        file.set_modified(time).expect("set");
+    }
+    desk.done("export model.json --format c -o noise.h");
+    assert!(!desk.at(".kinoise-old").exists() && desk.at(".kinoise-new").exists());
+}
+
+/// Renamed over it, a result would take the place of a device for good.
+#[test]
+fn a_result_does_not_replace_a_pipe_or_a_device() {
+    let desk = Desk::new();
+    desk.model("model.json", |_| ());
+    fifo(&desk.at("pipe"));
+    desk.refused("export model.json --format c -o pipe --force", &["pipe", "no file"]);
+    desk.refused("simulate new --shrink 8 --frames 1 --recipe pipe", &["pipe"]);
+    assert!(!fs::metadata(desk.at("pipe")).expect("there").is_file());
 }

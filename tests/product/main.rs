@@ -4,6 +4,8 @@
 //! Every random number is seeded, so a test that passes once passes always; a false-alarm
 //! probability says how often correct code would fail under another seed.
 
+#![forbid(unsafe_code)]
+
 #[path = "../common/mod.rs"]
 mod common;
 
@@ -21,6 +23,8 @@ mod effects;
 mod export_files;
 mod export_programs;
 mod extended_map;
+#[cfg(unix)] // bash sets the limits
+mod faults;
 mod fit;
 mod flatness;
 mod hostile;

@@ -5,6 +5,8 @@
 //! A single test that takes long stays with its siblings as `#[ignore = "slow: ..."]`; `./run test --slow`
 //! runs those too.
 
+#![forbid(unsafe_code)]
+
 #[path = "../common/mod.rs"]
 mod common;
 #[path = "../common/rays.rs"]

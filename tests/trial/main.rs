@@ -7,6 +7,8 @@
 //! diagnosis, the verdicts before the first answer is opened; a process that can reach one set and
 //! nothing else diagnoses it; endpoints are chosen before; every failure is on the page.
 
+#![forbid(unsafe_code)]
+
 #[path = "../common/raytraced/mod.rs"]
 mod raytraced;
 

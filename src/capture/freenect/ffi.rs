@@ -1,7 +1,12 @@
-//! libfreenect's C interface, loaded when it is needed. All that is unsafe here is in this file.
+//! libfreenect's C interface, loaded when it is needed. All that is unsafe in this program is in this
+//! file, and nothing that it makes public can be misused:
 //!
-//! Declarations follow libfreenect.h and libfreenect_registration.h of 0.5. Callbacks run on the
-//! thread that calls [`Freenect::process_events`], and cannot unwind into C: `extern "C"` aborts.
+//! - Declarations follow libfreenect.h and libfreenect_registration.h of 0.5; that the file that is
+//!   loaded keeps to them is its user's promise.
+//! - The library is [`Loaded`], then started ([`Freenect`]), then has an open [`Device`]: each owns the
+//!   one before, so that no call meets a null handle, and all are closed in the opposite order.
+//! - Handles are pointers, so these types stay on their thread. Callbacks run on the thread that
+//!   calls [`Device::process_events`], and cannot unwind into C: `extern "C"` aborts.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -199,28 +204,34 @@ extern "C" fn on_log(_: Handle, level: c_int, message: *const c_char) {
     }
 }
 
-/// The library, its context once it is started, and a sensor once one is open.
-pub struct Freenect {
+/// The library with its functions, none of which has been called.
+pub struct Loaded {
     functions: Functions,
-    /// Null before.
-    context: Handle,
-    device: Handle,
     /// Last: the functions point into it.
     _library: Library,
 }
 
-impl Freenect {
-    /// Find the functions; none is called yet.
+/// The library at work.
+pub struct Freenect {
+    /// Never null.
+    context: Handle,
+    loaded: Loaded,
+}
+
+/// An open sensor.
+pub struct Device {
+    /// Never null.
+    device: Handle,
+    library: Freenect,
+}
+
+impl Loaded {
+    /// Find the functions.
     pub fn load(path: &Path) -> Result<Self, String> {
         // SAFETY: loading runs the library's initialisers; libfreenect and libusb have harmless ones.
         let library = unsafe { Library::new(path) }.map_err(|e| e.to_string())?;
         let functions = Functions::of(&library)?;
-        Ok(Freenect {
-            functions,
-            context: ptr::null_mut(),
-            device: ptr::null_mut(),
-            _library: library,
-        })
+        Ok(Loaded { functions, _library: library })
     }
 
     /// Is it fakenect, which plays a dump and cannot list devices?
@@ -228,34 +239,36 @@ impl Freenect {
         self.functions.list_device_attributes.is_none()
     }
 
-    pub fn start(mut self) -> Result<Self, String> {
+    pub fn start(self) -> Result<Freenect, String> {
         // Nothing that an earlier library brought.
         MAILBOX.take();
         let f = &self.functions;
+        let mut context = ptr::null_mut();
         // SAFETY: as libfreenect.h asks; a null USB context makes it open its own.
         unsafe {
-            if (f.init)(&raw mut self.context, ptr::null_mut()) < 0 {
-                self.context = ptr::null_mut();
+            if (f.init)(&raw mut context, ptr::null_mut()) < 0 || context.is_null() {
                 return Err("freenect_init failed: no access to USB".into());
             }
-            (f.set_log_level)(self.context, LOG_ERROR);
-            (f.set_log_callback)(self.context, on_log);
+            (f.set_log_level)(context, LOG_ERROR);
+            (f.set_log_callback)(context, on_log);
             if let Some(select) = f.select_subdevices {
-                select(self.context, SUBDEVICE_CAMERA);
+                select(context, SUBDEVICE_CAMERA);
             }
         }
-        Ok(self)
+        Ok(Freenect { context, loaded: self })
     }
+}
 
+impl Freenect {
     /// Number of sensors; negative when USB cannot be asked.
     pub fn devices(&self) -> i32 {
         // SAFETY: the library is started.
-        unsafe { (self.functions.num_devices)(self.context) }
+        unsafe { (self.loaded.functions.num_devices)(self.context) }
     }
 
     /// The sensors' serials; `None` when the library cannot tell.
     pub fn serials(&self) -> Option<Vec<String>> {
-        let f = &self.functions;
+        let f = &self.loaded.functions;
         let (list, free) = (f.list_device_attributes?, f.free_device_attributes?);
         let mut first = ptr::null_mut();
         let mut serials = Vec::new();
@@ -276,21 +289,26 @@ impl Freenect {
     }
 
     /// Open a sensor, by its serial or the first.
-    pub fn open(&mut self, serial: Option<&CStr>) -> Result<(), i32> {
-        let (f, device) = (&self.functions, &raw mut self.device);
+    pub fn open(self, serial: Option<&CStr>) -> Result<Device, i32> {
+        let f = &self.loaded.functions;
+        let mut device = ptr::null_mut();
         // SAFETY: the library is started, and the serial is a C string.
         let code = unsafe {
             match serial {
-                Some(s) => (f.open_device_by_camera_serial)(self.context, device, s.as_ptr()),
-                None => (f.open_device)(self.context, device, 0),
+                Some(s) => {
+                    (f.open_device_by_camera_serial)(self.context, &raw mut device, s.as_ptr())
+                }
+                None => (f.open_device)(self.context, &raw mut device, 0),
             }
         };
-        if code < 0 || self.device.is_null() { Err(code) } else { Ok(()) }
+        if code < 0 || device.is_null() { Err(code) } else { Ok(Device { device, library: self }) }
     }
+}
 
+impl Device {
     /// Start depth in 11-bit words, unpacked to 16.
     pub fn start_depth(&self) -> Result<(), &'static str> {
-        let f = &self.functions;
+        let f = self.functions();
         // SAFETY: the device is open.
         unsafe {
             let mode = (f.find_depth_mode)(RESOLUTION_MEDIUM, DEPTH_11BIT);
@@ -306,7 +324,7 @@ impl Freenect {
 
     /// Start 10-bit infrared; false when the sensor will not.
     pub fn start_infrared(&self) -> bool {
-        let f = &self.functions;
+        let f = self.functions();
         // SAFETY: the device is open.
         unsafe {
             let mode = (f.find_video_mode)(RESOLUTION_MEDIUM, VIDEO_IR_10BIT);
@@ -319,7 +337,7 @@ impl Freenect {
 
     /// What the factory measured on this unit: its reference plane and shift.
     pub fn zero_plane(&self) -> Option<(ZeroPlane, f64)> {
-        let f = &self.functions;
+        let f = self.functions();
         let (copy, destroy) = (f.copy_registration?, f.destroy_registration?);
         // SAFETY: the device is open, and the copy's tables are freed by its own function.
         unsafe {
@@ -334,24 +352,29 @@ impl Freenect {
     pub fn process_events(&self) -> i32 {
         let mut wait = TimeValue { seconds: 0, microseconds: 100_000 };
         // SAFETY: the library is started.
-        unsafe { (self.functions.process_events_timeout)(self.context, &raw mut wait) }
+        unsafe { (self.functions().process_events_timeout)(self.library.context, &raw mut wait) }
+    }
+
+    fn functions(&self) -> &Functions {
+        &self.library.loaded.functions
     }
 }
 
 impl Drop for Freenect {
     fn drop(&mut self) {
-        let f = &self.functions;
-        // SAFETY: each once, the device before its context. Stopping what was not started returns
-        // an error code, which is ignored.
+        // SAFETY: once, and after every device, which owns it.
+        unsafe { (self.loaded.functions.shutdown)(self.context) };
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        let f = self.functions();
+        // SAFETY: once. Stopping what was not started returns an error code, which is ignored.
         unsafe {
-            if !self.device.is_null() {
-                (f.stop_depth)(self.device);
-                (f.stop_video)(self.device);
-                (f.close_device)(self.device);
-            }
-            if !self.context.is_null() {
-                (f.shutdown)(self.context);
-            }
+            (f.stop_depth)(self.device);
+            (f.stop_video)(self.device);
+            (f.close_device)(self.device);
         }
     }
 }

@@ -3,6 +3,7 @@
 
 mod dump;
 mod factory;
+#[allow(unsafe_code)] // a C library: the one place of it
 mod ffi;
 mod unit;
 

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant, UNIX_EPOCH};
 use super::FreenectOptions;
 use super::dump::Dump;
 use super::factory;
-use super::ffi::{Freenect, HEIGHT, INFRARED_HEIGHT, Mailbox, WIDTH, mailbox};
+use super::ffi::{Device, Freenect, HEIGHT, INFRARED_HEIGHT, Loaded, Mailbox, WIDTH, mailbox};
 use crate::capture::source::{Arrival, End, LiveFrame};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
@@ -28,7 +28,7 @@ const PLUG_IN: &str =
     "plug the Kinect into USB and its own power supply, and see that no other program uses it";
 
 pub struct Unit {
-    library: Freenect,
+    device: Device,
     pub sensor: Sensor,
     infrared: bool,
     /// What fakenect plays, the stand-in for libfreenect.
@@ -42,17 +42,17 @@ impl Unit {
     /// # Errors
     /// When the library is missing or something else, no unit is there, or it cannot be started.
     pub fn open(options: &FreenectOptions) -> Result<Self> {
-        let (mut library, dump) = load(options)?;
+        let (library, dump) = load(options)?;
         let serial = serial(&library, options.serial.as_deref())?;
         let wanted = serial.as_deref().and_then(|s| CString::new(s).ok());
-        library.open(wanted.as_deref()).map_err(|code| {
+        let device = library.open(wanted.as_deref()).map_err(|code| {
             Error::sensor(
                 format!("the Kinect cannot be opened (code {code}{})", complaint()),
                 "see that no other program uses it and that you may use USB devices (on Debian: \
                  the package libfreenect0.5 brings the udev rules; plug the Kinect in again)",
             )
         })?;
-        let (sensor, mut remarks) = factory::sensor(serial, library.zero_plane(), &options.assumed);
+        let (sensor, mut remarks) = factory::sensor(serial, device.zero_plane(), &options.assumed);
         if let Some(what) = sensor.fault() {
             return Err(Error::Argument {
                 what,
@@ -60,13 +60,13 @@ impl Unit {
             });
         }
         let refused = |what| Error::sensor(format!("{what}{}", complaint()), PLUG_IN);
-        library.start_depth().map_err(refused)?;
+        device.start_depth().map_err(refused)?;
         // The stand-in aborts when it is asked for a mode it has not.
-        let infrared = options.infrared && dump.is_none() && library.start_infrared();
+        let infrared = options.infrared && dump.is_none() && device.start_infrared();
         if options.infrared && !infrared {
             remarks.push("no infrared beside the depth; depth alone is recorded".into());
         }
-        Ok(Unit { library, sensor, infrared, dump, remarks })
+        Ok(Unit { device, sensor, infrared, dump, remarks })
     }
 
     /// A dump waits; a sensor does not.
@@ -83,7 +83,7 @@ impl Unit {
             if let Some(Err(why)) = self.dump.as_mut().map(Dump::advance) {
                 return Arrival::End(End { why, lost: true });
             }
-            if self.library.process_events() < 0 {
+            if self.device.process_events() < 0 {
                 let why =
                     format!("the Kinect is gone (unplugged, or without power){}", complaint());
                 return Arrival::End(End { why, lost: true });
@@ -115,7 +115,7 @@ fn load(options: &FreenectOptions) -> Result<(Freenect, Option<Dump>)> {
     };
     let mut first = None;
     for path in &candidates {
-        let loaded = Freenect::load(path);
+        let loaded = Loaded::load(path);
         let dump = match &loaded {
             Ok(library) if library.is_stand_in() => {
                 let what = "this libfreenect is the stand-in, and FAKENECT_PATH does not say what it is to play";
@@ -125,7 +125,7 @@ fn load(options: &FreenectOptions) -> Result<(Freenect, Option<Dump>)> {
             }
             _ => None,
         };
-        match loaded.and_then(Freenect::start) {
+        match loaded.and_then(Loaded::start) {
             Ok(library) => return Ok((library, dump)),
             Err(why) => drop(first.get_or_insert(format!("{}: {why}", path.display()))),
         }

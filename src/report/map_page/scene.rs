@@ -2,10 +2,10 @@
 
 use std::collections::HashMap;
 
+use base64::prelude::{BASE64_STANDARD, Engine};
 use nalgebra::{Isometry3, Vector3};
 use serde_json::json;
 
-use super::super::document::base64;
 use super::super::trajectories::Against;
 use crate::map::{FrameReport, MapPoint};
 use crate::stats::{quantile, range};
@@ -36,7 +36,7 @@ pub(super) fn data(
         posed.iter().flat_map(|(_, p)| p.rotation.coords.iter().map(|c| rounded(*c))).collect();
     json!({"low": ends(0), "high": ends(1), "sigma": sigma, "spacing": spacing.ends,
         "seconds": seconds, "path": path, "turns": turns, "truth": truth(against),
-        "points": base64(&packed(shown, extents, sigma, &spacing))})
+        "points": BASE64_STANDARD.encode(packed(shown, extents, sigma, &spacing))})
     .to_string()
 }
 
