@@ -234,8 +234,16 @@ impl Options {
             ((0.002..=1.0).contains(&voxel_m), format!("--voxel {voxel_m}"), "give 0.002 to 1 m"),
             ((1..=32).contains(&block_px), format!("--block {block_px}"), "give 1 to 32 px"),
             (reach > 0.0 && reach <= 2.0, format!("--gate {reach}"), "give a distance up to 2 m"),
-            (max_iterations > 0, format!("--iterations {max_iterations}"), "give 1 or more"),
-            (max_observations >= 1.0, format!("--memory {max_observations}"), "give 1 or more"),
+            (
+                (1..=MAX_ITERATIONS).contains(&max_iterations),
+                format!("--iterations {max_iterations}"),
+                "give 1 to 1000",
+            ),
+            (
+                (1.0..=MAX_OBSERVATIONS).contains(&max_observations),
+                format!("--memory {max_observations}"),
+                "give 1 to 108000",
+            ),
         ];
         match checks.into_iter().find(|(good, ..)| !good) {
             Some((_, what, remedy)) => Err(Error::Argument { what, remedy }),
@@ -243,6 +251,11 @@ impl Options {
         }
     }
 }
+
+/// Alignments of real films settle within 30 (the paper's limit); one that has not by now never does.
+const MAX_ITERATIONS: usize = 1000;
+/// A surfel is observed once a frame: an hour at 30 Hz.
+const MAX_OBSERVATIONS: f32 = 108_000.0;
 
 /// Frames that stand for a film when its depths are asked for.
 const SAMPLED: usize = 8;

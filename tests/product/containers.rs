@@ -440,3 +440,56 @@ fn lengths_that_lie_are_not_believed() {
     let bytes = replaced(&npy, b"(2, 24, 32), }      ", 0, b"(65104166, 24, 32), }");
     assert!(refused("words.npy", &bytes, &camera).contains("needs more than"));
 }
+
+/// Room was made for as much text as a record claims.
+#[test]
+fn the_text_of_an_mcap_record_is_as_long_as_the_record() {
+    let whole = fs::read(container("unchunked.mcap")).expect("an MCAP");
+    // Behind the header's record: a schema's kind and length, its number, its name's length.
+    let schema = 8 + 9 + u64::from_le_bytes(whole[9..17].try_into().expect("eight")) as usize;
+    assert_eq!(whole[schema], 3, "a schema follows the header");
+    let mut bytes = whole.clone();
+    bytes[schema + 11..schema + 15].fill(0xff);
+    let said = refused("unchunked.mcap", &bytes, &Assumed::default());
+    assert!(said.contains("4294967295 bytes begins where only"), "{said}");
+}
+
+/// A chunk that is listed a million times is gone through a million times.
+#[test]
+fn a_bag_that_lists_a_chunk_twice_is_refused() {
+    let mut bytes = fs::read(container("film.bag")).expect("a bag");
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four")) as usize;
+    let behind = |field: &[u8]| {
+        bytes.windows(field.len()).position(|w| w == field).expect("the field") + field.len()
+    };
+    // A record is a header and data, each behind its length; what describes the chunk is the last.
+    let (counted, mut last, mut at) = (behind(b"chunk_count="), 0, word(behind(b"index_pos=")));
+    while at < bytes.len() {
+        last = at;
+        at += 4 + word(at);
+        at += 4 + word(at);
+    }
+    bytes.extend_from_within(last..);
+    bytes[counted] += 1;
+    let said = refused("film.bag", &bytes, &Assumed::default());
+    assert!(said.contains("lists a chunk twice"), "{said}");
+}
+
+/// A view may be a query that never ends.
+#[cfg(feature = "db3")]
+#[test]
+fn a_db3_whose_tables_are_none_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("film.db3");
+    let database = rusqlite::Connection::open(&path).expect("made");
+    let endless = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i AS id, \
+                   'depth' AS name, 'sensor_msgs/msg/Image' AS type, 'cdr' AS serialization_format FROM n";
+    database
+        .execute_batch(&format!(
+            "CREATE TABLE messages (id, topic_id, timestamp, data); CREATE VIEW topics AS {endless}"
+        ))
+        .expect("filled");
+    drop(database);
+    let said = open(&path, &Assumed::default()).expect_err("no tables").to_string();
+    assert!(said.contains("no tables of topics"), "{said}");
+}

@@ -118,6 +118,29 @@ fn every_point_of_a_map_is_a_number_and_none_is_certain() {
     }
 }
 
+/// Days of work, and counts that a number does not hold.
+#[test]
+fn options_of_a_map_have_their_ranges() {
+    let desk = Desk::new();
+    desk.film("film", 2);
+    for (option, says) in [
+        ("--iterations 0", "1 to 1000"),
+        ("--iterations 1000000000000", "1 to 1000"),
+        ("--iterations 99999999999999999999999", "--iterations"),
+        ("--memory 0.5", "1 to 108000"),
+        ("--memory inf", "1 to 108000"),
+        ("--memory 1e30", "1 to 108000"),
+        ("--memory NaN", "1 to 108000"),
+        ("--voxel 1e-30", "0.002 to 1 m"),
+        ("--block 100000", "1 to 32 px"),
+        ("--gate inf", "up to 2 m"),
+        ("--stride 1000000000000", "--stride"),
+    ] {
+        desk.refused(&format!("map film -o out {option}"), &[says]);
+    }
+    desk.done("map film -o out --iterations 1000 --memory 108000");
+}
+
 /// An alignment without a pair of points has no distance between them.
 #[test]
 fn a_lost_frame_has_no_number_that_is_none() {

@@ -119,6 +119,9 @@ struct Arguments {
 const DOES_NOT_HOLD: u8 = 1;
 const FAILURE: u8 = 2;
 
+/// More than any machine has.
+const MAX_THREADS: usize = 1024;
+
 fn main() -> ExitCode {
     let line = CommandLine::parse();
     let done = match &line.command {
@@ -137,7 +140,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         bail!("{}: no folder is here; give --data the folder of the recordings", data.display());
     }
     if let Some(n) = arguments.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(n.max(1)).build_global()?;
+        rayon::ThreadPoolBuilder::new().num_threads(n.clamp(1, MAX_THREADS)).build_global()?;
     }
     let program = std::env::current_exe().context("where this program lies")?;
     match (&arguments.check, &arguments.page, &arguments.output) {
@@ -156,12 +159,12 @@ fn page_of(folder: &Path, proof: &Proof) -> anyhow::Result<()> {
 }
 
 fn hold_trial(output: &Path, program: PathBuf, arguments: &Arguments) -> anyhow::Result<()> {
-    if arguments.sets == 0 {
-        bail!("--sets 0: give at least one set");
-    }
+    let order =
+        Order { sets: arguments.sets, seed: arguments.seed, real: arguments.data.is_some() };
+    order.check()?;
     let output = std::path::absolute(output).with_context(|| output.display().to_string())?;
     let mut trial = Trial {
-        order: Order { sets: arguments.sets, seed: arguments.seed, real: arguments.data.is_some() },
+        order,
         data: arguments.data.clone(),
         keep: arguments.keep,
         limit: Duration::from_secs(arguments.limit),

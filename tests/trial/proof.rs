@@ -44,6 +44,20 @@ pub struct Order {
     pub real: bool,
 }
 
+/// The largest trial so far had 1000; a set takes seconds of a core, so many as this a week.
+const MAX_SETS: usize = 100_000;
+
+impl Order {
+    /// An error when nobody can hold a trial of so many sets: the plan alone would fill the memory.
+    pub fn check(&self) -> Result<()> {
+        if (1..=MAX_SETS).contains(&self.sets) {
+            return Ok(());
+        }
+        let what = format!("{} sets are no trial", self.sets);
+        Err(Error::Argument { what, remedy: "give 1 to 100000 sets" })
+    }
+}
+
 /// One set with everything about it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ProvenSet {
@@ -81,6 +95,7 @@ impl Proof {
                 remedy: "give the folder of a trial made by this version",
             });
         }
+        proof.order.check()?;
         Ok(proof)
     }
 
@@ -120,4 +135,20 @@ fn row(set: &ProvenSet) -> Value {
         "first": set.marks.first, "answers": set.marks.answers,
         "gains": set.gains, "failure": set.answer.failure, "seconds": set.seconds,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trial_of_no_sets_or_of_more_than_memory_holds_is_refused() {
+        for (sets, holds) in
+            [(0, false), (1, true), (MAX_SETS, true), (MAX_SETS + 1, false), (usize::MAX, false)]
+        {
+            let checked = Order { sets, seed: 1, real: false }.check();
+            assert_eq!(checked.is_ok(), holds, "{sets}");
+            assert!(holds || checked.unwrap_err().to_string().contains("give 1 to 100000 sets"));
+        }
+    }
 }

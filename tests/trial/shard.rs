@@ -177,6 +177,7 @@ fn read(folder: &Path) -> Result<Finished> {
     if finished.format != FORMAT || !(1..=of).contains(&index) {
         return Err(fault(&path, "this is no shard of this version", "hold the shard again"));
     }
+    finished.order.check()?;
     Ok(finished)
 }
 

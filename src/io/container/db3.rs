@@ -31,9 +31,21 @@ impl Db3 {
         let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
         let database = Connection::open_with_flags(path, flags).map_err(failed)?;
         database.set_limit(Limit::SQLITE_LIMIT_LENGTH, MAX_PIECE as i32).map_err(failed)?;
+        if !are_tables(&database).map_err(failed)? {
+            let what = "no bag of ROS 2: it has no tables of topics and messages";
+            return Err(Error::recording(path, what, REMEDY));
+        }
         let (topics, rows) = index(&database).map_err(failed)?;
         Ok(Db3 { path: path.into(), database: Mutex::new(database), topics, rows })
     }
+}
+
+/// Topics and messages lie in tables. A view of these names may be a query without an end.
+fn are_tables(database: &Connection) -> rusqlite::Result<bool> {
+    let of =
+        "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('topics', 'messages')
+              AND sql NOT LIKE 'CREATE VIRTUAL%'";
+    database.query_row(of, [], |row| row.get::<_, i64>(0)).map(|n| n == 2)
 }
 
 fn index(database: &Connection) -> rusqlite::Result<(Vec<Topic>, Vec<Vec<i64>>)> {

@@ -1,20 +1,27 @@
 //! MCAP (mcap.dev/spec), with messages of either generation of ROS.
 //!
 //! One walk over the outermost records finds everything, with or without a summary: chunks are stepped
-//! over where a message index stands behind them, and looked into where none does. The crate `mcap` reads
-//! the records; places are kept here, because its readers hand messages out in order alone.
+//! over where a message index stands behind them, and looked into where none does. The crate `mcap` is not
+//! used: its readers hand messages out in order alone, and make room for as much text as a record claims.
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use mcap::records::{Record, op};
-
 use super::bag::{Bag, Message, Topic, kind_of};
 use super::blocks::{Chunk, Chunks, Compression, Source};
-use super::wire::Dialect;
+use super::wire::{Damage, Dialect, Wire};
 use crate::error::{Error, Result};
 
-const MAGIC: &[u8] = mcap::MAGIC;
+const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+/// The kinds of records that are read.
+mod op {
+    pub const FOOTER: u8 = 2;
+    pub const SCHEMA: u8 = 3;
+    pub const CHANNEL: u8 = 4;
+    pub const MESSAGE: u8 = 5;
+    pub const CHUNK: u8 = 6;
+    pub const MESSAGE_INDEX: u8 = 7;
+}
 /// Kind and length of a record.
 const HEAD: u64 = 9;
 /// Of a message before its data: channel, number, two times.
@@ -97,6 +104,14 @@ fn word64(bytes: &[u8]) -> u64 {
 
 fn word32(bytes: &[u8]) -> u32 {
     bytes.first_chunk().map_or(0, |b| u32::from_le_bytes(*b))
+}
+
+/// The channel of a message index, and its messages' times and places.
+fn index(body: &[u8]) -> Result<(u16, Vec<(u64, u64)>), Damage> {
+    let mut wire = Wire::new(body, Dialect::Ros1)?;
+    let (channel, length) = (wire.u16()?, wire.u32()? as usize);
+    let entries = wire.take(length)?.as_chunks::<16>().0;
+    Ok((channel, entries.iter().map(|e| (word64(e), word64(&e[8..]))).collect()))
 }
 
 /// What was found so far.
@@ -189,19 +204,14 @@ impl Walk {
 
     fn index(&mut self, body: u64, length: u64, chunk: Option<u32>) -> Result<()> {
         let bytes = self.chunks.source.bytes(body, length, "a message index")?;
-        let Record::MessageIndex(index) = self.parsed(op::MESSAGE_INDEX, &bytes, body)? else {
-            return Ok(());
-        };
-        let channel = index.channel_id;
+        let (channel, entries) = index(&bytes).map_err(|why| self.damaged(body, &why))?;
         let place = |at| Place { chunk, at, channel };
-        self.messages.extend(index.records.iter().map(|e| (channel, e.log_time, place(e.offset))));
+        self.messages.extend(entries.into_iter().map(|(logged, at)| (channel, logged, place(at))));
         Ok(())
     }
 
-    fn parsed<'b>(&self, kind: u8, bytes: &'b [u8], at: u64) -> Result<Record<'b>> {
-        mcap::parse_record(kind, bytes).map_err(|why| {
-            self.chunks.source.damaged(format!("the record at byte {at}: {why}"), REMEDY)
-        })
+    fn damaged(&self, body: u64, why: &str) -> Error {
+        self.chunks.source.damaged(format!("the record at byte {body}: {why}"), REMEDY)
     }
 
     /// A message's place, a schema or a channel, in a chunk or outside of one.
@@ -217,22 +227,32 @@ impl Walk {
             return Ok(());
         }
         let bytes = bytes(body, length)?;
-        match self.parsed(kind, &bytes, at)? {
-            Record::Schema { header, .. } => {
-                self.schemas.insert(header.id, header.name);
-            }
-            Record::Channel(channel) => {
-                let schema = self.schemas.get(&channel.schema_id).map_or("", String::as_str);
-                let (dialect, kind) = match &*channel.message_encoding {
-                    "cdr" => (Dialect::Cdr, kind_of(schema)),
-                    "ros1" => (Dialect::Ros1, kind_of(schema)),
-                    other => (Dialect::Cdr, format!("{schema} in {other}")),
-                };
-                let topic = Topic { name: channel.topic, kind, dialect, logged_ns: Vec::new() };
-                self.channels.insert(channel.id, topic);
-            }
-            _ => {}
-        }
+        let added = match kind {
+            op::SCHEMA => self.schema(&bytes),
+            op::CHANNEL => self.channel(&bytes),
+            _ => Ok(()),
+        };
+        added.map_err(|why| self.damaged(body, &why))
+    }
+
+    fn schema(&mut self, body: &[u8]) -> Result<(), Damage> {
+        let mut wire = Wire::new(body, Dialect::Ros1)?;
+        let (id, name) = (wire.u16()?, wire.text()?);
+        self.schemas.insert(id, name);
+        Ok(())
+    }
+
+    fn channel(&mut self, body: &[u8]) -> Result<(), Damage> {
+        let mut wire = Wire::new(body, Dialect::Ros1)?;
+        let (id, schema) = (wire.u16()?, wire.u16()?);
+        let (name, encoding) = (wire.text()?, wire.text()?);
+        let schema = self.schemas.get(&schema).map_or("", String::as_str);
+        let (dialect, kind) = match &*encoding {
+            "cdr" => (Dialect::Cdr, kind_of(schema)),
+            "ros1" => (Dialect::Ros1, kind_of(schema)),
+            other => (Dialect::Cdr, format!("{schema} in {other}")),
+        };
+        self.channels.insert(id, Topic { name, kind, dialect, logged_ns: Vec::new() });
         Ok(())
     }
 

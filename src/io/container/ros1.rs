@@ -215,6 +215,10 @@ impl Reader {
             return Err(source.damaged(what, REMEDY_INDEX));
         }
         begins.sort_unstable();
+        // Each would be gone through again, with all that its index lists.
+        if begins.windows(2).any(|w| w[0] == w[1]) {
+            return Err(source.damaged("the index lists a chunk twice", REMEDY_INDEX));
+        }
         Ok(begins)
     }
 }

@@ -63,6 +63,10 @@ impl<'a> Wire<'a> {
         self.number().map(u8::from_le_bytes)
     }
 
+    pub fn u16(&mut self) -> Result<u16, Damage> {
+        self.number().map(u16::from_le_bytes)
+    }
+
     pub fn u32(&mut self) -> Result<u32, Damage> {
         self.number().map(u32::from_le_bytes)
     }
