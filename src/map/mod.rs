@@ -18,6 +18,7 @@ mod orb;
 mod point;
 mod preprocess;
 pub mod ransac;
+mod rolling;
 mod sparse_grid;
 mod surfels;
 mod tracker;
@@ -175,6 +176,9 @@ pub struct Options {
     pub max_observations: f32,
     /// A frame of which a smaller share of points has a neighbour is lost.
     pub min_inlier_ratio: f64,
+    /// From the first row of a depth image to the last, s; 0 where all are seen at once. The paper's
+    /// method has no use for it.
+    pub readout_s: f64,
     pub seed: Seed,
     /// Read colour for the map.
     pub colour: bool,
@@ -198,6 +202,7 @@ impl Options {
             min_cosine: -1.0,
             max_observations: 30.0,
             min_inlier_ratio: 0.3,
+            readout_s: 0.0,
             seed: Seed(1),
             colour: true,
         }
@@ -218,13 +223,14 @@ impl Options {
     /// An error when a number is out of its range.
     pub fn check(&self) -> Result<()> {
         let Options { voxel_m, block_px, max_correspondence_m: reach, .. } = *self;
-        let Options { max_iterations, max_observations, .. } = *self;
+        let Options { max_iterations, max_observations, readout_s, .. } = *self;
         let checks = [
             ((0.002..=1.0).contains(&voxel_m), format!("--voxel {voxel_m}"), "give 0.002 to 1 m"),
             ((1..=32).contains(&block_px), format!("--block {block_px}"), "give 1 to 32 px"),
             (reach > 0.0 && reach <= 2.0, format!("--gate {reach}"), "give a distance up to 2 m"),
             (max_iterations > 0, format!("--iterations {max_iterations}"), "give 1 or more"),
             (max_observations >= 1.0, format!("--memory {max_observations}"), "give 1 or more"),
+            ((0.0..=1.0).contains(&readout_s), format!("--readout {readout_s}"), "give 0 to 1 s"),
         ];
         match checks.into_iter().find(|(good, ..)| !good) {
             Some((_, what, remedy)) => Err(Error::Argument { what, remedy }),

@@ -7,6 +7,7 @@ use super::icp::{Alignment, Termination, align, renormalised};
 use super::index_map::Projective;
 use super::map_points::{MapPoint, PointGrid};
 use super::preprocess::{Prepared, Preprocessor, Shape};
+use super::rolling::Velocity;
 use super::surfels::{SurfelTarget, Surfels};
 use super::{Init, Method, Options};
 use crate::camera::Camera;
@@ -25,7 +26,8 @@ pub struct Tracker<'a> {
     camera: &'a Camera,
     /// The last frame with a pose.
     last: Option<Prepared>,
-    /// Its pose, and its motion since the one before.
+    /// Its stamp, s, its pose, and its motion since the one before.
+    stamp: f64,
     pose: Isometry3<f64>,
     motion: Isometry3<f64>,
     /// Share of its points that had a neighbour.
@@ -41,6 +43,7 @@ impl<'a> Tracker<'a> {
             options: preprocessor.options,
             camera: &preprocessor.sequence.sensor.camera,
             last: None,
+            stamp: 0.0,
             pose: Isometry3::identity(),
             motion: Isometry3::identity(),
             inlier_ratio: 0.0,
@@ -73,19 +76,27 @@ impl<'a> Tracker<'a> {
 
     fn follow(
         &mut self,
-        frame: Prepared,
+        mut frame: Prepared,
         report: &mut FrameReport,
         stages: &mut Stages,
     ) -> Result<()> {
         let Some(last) = &self.last else {
             report.fate = Fate::First;
             report.pose = Some(Isometry3::identity());
+            self.stamp = report.stamp;
             self.keep(frame, Isometry3::identity(), stages);
             return Ok(());
         };
         report.repeated = last.raw == frame.raw;
         let start = stages.time("start", || self.start(last, &frame))?;
-        let alignment = self.align(last, &frame, start, stages);
+        let mut alignment = self.align(last, &frame, start, stages);
+        if self.options.readout_s > 0.0 {
+            // Now that the motion is known the rows can be put in their places.
+            let moved = alignment.target_from_source;
+            let velocity = Velocity::of(&moved, report.stamp - self.stamp);
+            frame.shape.straighten(&velocity, self.camera, self.options.readout_s);
+            alignment = self.align(last, &frame, moved, stages);
+        }
         if let Some(why) = self.doubt(&alignment) {
             report.fate = Fate::Lost(why);
         } else {
@@ -93,6 +104,7 @@ impl<'a> Tracker<'a> {
             report.fate = Fate::Tracked;
             report.pose = Some(pose);
             self.inlier_ratio = alignment.inlier_ratio;
+            self.stamp = report.stamp;
             self.keep(frame, pose, stages);
         }
         report.alignment = Some(alignment);
