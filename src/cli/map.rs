@@ -90,7 +90,7 @@ struct Tuning {
     #[arg(long, value_name = "N")]
     memory: Option<f32>,
     /// Time from the first row of a depth image to the last, for a rolling shutter, s (a Kinect v1 takes
-    /// 0.0305) [default: 0, all rows at once]
+    /// about 0.03) [default: 0, all rows at once]
     #[arg(long, value_name = "S")]
     readout: Option<f64>,
     /// Do not read colour for the map
