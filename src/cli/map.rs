@@ -89,6 +89,10 @@ struct Tuning {
     /// Maximum number of observations that count for a piece of the map
     #[arg(long, value_name = "N")]
     memory: Option<f32>,
+    /// Time from the first row of a depth image to the last, for a rolling shutter, s (a Kinect v1 takes
+    /// about 0.03) [default: 0, all rows at once]
+    #[arg(long, value_name = "S")]
+    readout: Option<f64>,
     /// Do not read colour for the map
     #[arg(long)]
     no_colour: bool,
@@ -109,6 +113,7 @@ impl Tuning {
             max_correspondence_m: self.gate.unwrap_or(options.max_correspondence_m),
             max_iterations: self.iterations.unwrap_or(options.max_iterations),
             max_observations: self.memory.unwrap_or(options.max_observations),
+            readout_s: self.readout.unwrap_or(options.readout_s),
             colour: !self.no_colour,
             seed,
             ..options

@@ -295,7 +295,7 @@ impl Picture<'_> {
 
     /// Sigma of one inverse depth, and how far others of its surface may be from it, 1/m.
     fn tolerance(&self, q: f32) -> (f32, f32) {
-        let sigma_q = self.noise.at(1.0 / q, 0.0) * q * q;
+        let sigma_q = self.noise.sigma_facing(1.0 / q) * q * q;
         (sigma_q, SIGMAS * sigma_q + SLOPE * q)
     }
 }

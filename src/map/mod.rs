@@ -18,6 +18,7 @@ mod orb;
 mod point;
 mod preprocess;
 pub mod ransac;
+mod rolling;
 mod sparse_grid;
 mod surfels;
 mod tracker;
@@ -186,6 +187,9 @@ pub struct Options {
     pub max_observations: f32,
     /// A frame of which a smaller share of points has a neighbour is lost.
     pub min_inlier_ratio: f64,
+    /// From the first row of a depth image to the last, s; 0 where all are seen at once. The paper's
+    /// method has no use for it.
+    pub readout_s: f64,
     pub seed: Seed,
     /// Read colour for the map.
     pub colour: bool,
@@ -209,6 +213,7 @@ impl Options {
             min_cosine: -1.0,
             max_observations: 30.0,
             min_inlier_ratio: 0.3,
+            readout_s: 0.0,
             seed: Seed(1),
             colour: true,
         }
@@ -229,7 +234,7 @@ impl Options {
     /// An error when a number is out of its range.
     pub fn check(&self) -> Result<()> {
         let Options { voxel_m, block_px, max_correspondence_m: reach, .. } = *self;
-        let Options { max_iterations, max_observations, .. } = *self;
+        let Options { max_iterations, max_observations, readout_s, .. } = *self;
         let checks = [
             ((0.002..=1.0).contains(&voxel_m), format!("--voxel {voxel_m}"), "give 0.002 to 1 m"),
             ((1..=32).contains(&block_px), format!("--block {block_px}"), "give 1 to 32 px"),
@@ -244,6 +249,7 @@ impl Options {
                 format!("--memory {max_observations}"),
                 "give 1 to 108000",
             ),
+            ((0.0..=1.0).contains(&readout_s), format!("--readout {readout_s}"), "give 0 to 1 s"),
         ];
         match checks.into_iter().find(|(good, ..)| !good) {
             Some((_, what, remedy)) => Err(Error::Argument { what, remedy }),

@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::model::{NoiseModel, SigmaLookup};
+use crate::model::{FacingLookup, NoiseModel, SigmaLookup};
 
 /// A point of a depth image, or the mean of some, with its surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +57,7 @@ impl Motion {
 /// Sigma over depth and tilt, looked up, and how many neighbours err as one.
 pub struct Noise {
     table: SigmaLookup,
+    facing: FacingLookup,
     /// The greatest depth that the model was measured at, m.
     max_depth_m: f32,
     /// Pixels that err together: the area of the window that neighbours share, px^2.
@@ -82,8 +83,10 @@ impl Noise {
         };
         let length = number(CORRELATION[1]).unwrap_or(1.0).max(1.0);
         let share = number(CORRELATION[2]).unwrap_or(1.0).clamp(0.0, 1.0);
+        let table = SigmaLookup::of(&model.sigma);
         Noise {
-            table: SigmaLookup::of(&model.sigma),
+            facing: table.facing(),
+            table,
             max_depth_m: model.sigma.domain.z_m[1] as f32,
             correlated_px2: (1.0 + share * (length * length - 1.0)) as f32,
         }
@@ -94,13 +97,18 @@ impl Noise {
     /// Beyond the depths of the model sigma grows as z^2, as it does for every sensor that measures
     /// disparity: held at its edge it would make the farthest points the best.
     pub fn sigma_axial(&self, z: f32, normal: &Vector3<f32>) -> f32 {
-        self.at(z, normal.z.abs().min(1.0).acos())
+        self.grown(z, self.table.at(z, normal.z.abs().min(1.0).acos()))
     }
 
-    /// The same at a tilt, rad.
-    pub fn at(&self, z: f32, theta: f32) -> f32 {
+    /// The same of a surface that is faced squarely.
+    pub fn sigma_facing(&self, z: f32) -> f32 {
+        self.grown(z, self.facing.at(z))
+    }
+
+    #[inline]
+    fn grown(&self, z: f32, sigma: f32) -> f32 {
         let beyond = (z / self.max_depth_m).max(1.0);
-        self.table.at(z, theta) * beyond * beyond
+        sigma * beyond * beyond
     }
 
     /// Sigma, m, of the mean of `n` pixels along their normal: an error of depth moves a point along

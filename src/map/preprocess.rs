@@ -5,9 +5,10 @@ use super::frame_report::Stages;
 use super::nearest::Nearest;
 use super::orb::Features;
 use super::point::{Noise, Point};
+use super::rolling::Velocity;
 use super::voxel::{Voxels, points_of};
 use super::{Init, Method, Options};
-use crate::camera::Rays;
+use crate::camera::{Camera, Rays};
 use crate::correct::{Conditions, Correction};
 use crate::error::Result;
 use crate::frame::{DepthTable, Frame};
@@ -28,6 +29,19 @@ impl Shape {
             Shape::Blocks(_, points) => points,
         }
     }
+
+    /// As [`Blocks::straightened`]; a cloud of voxels, in which rows are mixed, stays as it is.
+    pub fn straighten(&mut self, velocity: &Velocity, camera: &Camera, readout_s: f64) {
+        if let Shape::Blocks(blocks, points) = self {
+            *blocks = blocks.straightened(velocity, camera, readout_s);
+            *points = listed(blocks);
+        }
+    }
+}
+
+/// Without the blocks that have no point.
+fn listed(blocks: &Blocks) -> Vec<Point> {
+    blocks.points.iter().flatten().copied().collect()
 }
 
 /// A frame, ready to be aligned and to be aligned to.
@@ -113,7 +127,7 @@ impl<'a> Preprocessor<'a> {
                 let camera = &self.sequence.sensor.camera;
                 let blocks = || Blocks::of(depth, camera, rays, options.block_px, noise);
                 let blocks = stages.time("blocks", blocks);
-                let points = blocks.points.iter().flatten().copied().collect();
+                let points = listed(&blocks);
                 Shape::Blocks(blocks, points)
             }
         }

@@ -7,6 +7,7 @@ use super::icp::{Alignment, Termination, align, renormalised};
 use super::index_map::Projective;
 use super::map_points::{MapPoint, PointGrid};
 use super::preprocess::{Prepared, Preprocessor, Shape};
+use super::rolling::Velocity;
 use super::surfels::{SurfelTarget, Surfels};
 use super::{Init, Method, Options};
 use crate::camera::Camera;
@@ -26,7 +27,8 @@ pub struct Tracker<'a> {
     camera: &'a Camera,
     /// The last frame with a pose.
     last: Option<Prepared>,
-    /// Its pose, and its motion since the one before.
+    /// Its stamp, s, its pose, and its motion since the one before.
+    stamp: f64,
     pose: Isometry3<f64>,
     motion: Isometry3<f64>,
     /// Its pose by the colour images' features alone.
@@ -44,6 +46,7 @@ impl<'a> Tracker<'a> {
             options: preprocessor.options,
             camera: &preprocessor.sequence.sensor.camera,
             last: None,
+            stamp: 0.0,
             pose: Isometry3::identity(),
             motion: Isometry3::identity(),
             pose_by_colour: Isometry3::identity(),
@@ -77,7 +80,7 @@ impl<'a> Tracker<'a> {
 
     fn follow(
         &mut self,
-        frame: Prepared,
+        mut frame: Prepared,
         report: &mut FrameReport,
         stages: &mut Stages,
     ) -> Result<()> {
@@ -85,6 +88,7 @@ impl<'a> Tracker<'a> {
             report.fate = Fate::First;
             report.pose = Some(Isometry3::identity());
             report.by_colour = by_colour(&frame, &self.pose_by_colour);
+            self.stamp = report.stamp;
             self.keep(frame, Isometry3::identity(), stages);
             return Ok(());
         };
@@ -94,7 +98,14 @@ impl<'a> Tracker<'a> {
             Init::None => Isometry3::identity(),
             Init::Motion | Init::Orb => self.motion,
         });
-        let alignment = self.align(last, &frame, start, stages);
+        let mut alignment = self.align(last, &frame, start, stages);
+        if self.options.readout_s > 0.0 {
+            // Now that the motion is known the rows can be put in their places.
+            let moved = alignment.target_from_source;
+            let velocity = Velocity::of(&moved, report.stamp - self.stamp);
+            frame.shape.straighten(&velocity, self.camera, self.options.readout_s);
+            alignment = self.align(last, &frame, moved, stages);
+        }
         if let Some(why) = self.doubt(&alignment) {
             report.fate = Fate::Lost(why);
         } else {
@@ -105,6 +116,7 @@ impl<'a> Tracker<'a> {
             let moved = seen.unwrap_or(alignment.target_from_source);
             self.pose_by_colour = renormalised(&(self.pose_by_colour * moved));
             report.by_colour = seen.and(by_colour(&frame, &self.pose_by_colour));
+            self.stamp = report.stamp;
             self.keep(frame, pose, stages);
         }
         report.alignment = Some(alignment);

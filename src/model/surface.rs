@@ -195,6 +195,31 @@ impl SigmaLookup {
         let far = node(i + 1, j) + t * (node(i + 1, j + 1) - node(i + 1, j));
         near + s * (far - near)
     }
+
+    /// The sigmas of a surface that is faced squarely, in a row: quicker to look up than among all tilts.
+    pub fn facing(&self) -> FacingLookup {
+        FacingLookup {
+            z_m: self.domain.z_m,
+            nodes: self.nodes.iter().step_by(TILTS).copied().collect(),
+        }
+    }
+}
+
+/// [`SigmaLookup::at`] a tilt of 0, to the last bit.
+#[derive(Debug, Clone)]
+pub struct FacingLookup {
+    z_m: [f64; 2],
+    nodes: Vec<f32>,
+}
+
+impl FacingLookup {
+    /// Sigma, m, at depth `z` (m).
+    #[inline]
+    pub fn at(&self, z: f32) -> f32 {
+        let [z0, z1] = self.z_m.map(|v| v as f32);
+        let (i, s) = cell((z - z0) / (z1 - z0).max(f32::MIN_POSITIVE), DEPTHS);
+        self.nodes[i] + s * (self.nodes[i + 1] - self.nodes[i])
+    }
 }
 
 /// Node below a share (0 to 1) of the table's length, and the way on to the next.
@@ -220,6 +245,8 @@ mod tests {
                         (f64::from(table.at(z as f32, theta as f32)), model.sigma(z, theta));
                     assert!((found / truth - 1.0).abs() < 0.01, "{z} {theta}: {found} {truth}");
                 }
+                let z = 0.1 * i as f32;
+                assert_eq!(table.facing().at(z), table.at(z, 0.0));
             }
         }
     }
