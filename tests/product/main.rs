@@ -23,6 +23,7 @@ mod export_programs;
 mod extended_map;
 mod fit;
 mod flatness;
+mod fuzz_corpus;
 mod hostile;
 mod invariances;
 mod layouts;
