@@ -83,6 +83,21 @@ fn trajectories_on_a_line_and_in_one_place_have_errors() {
     }
 }
 
+/// Kilometres along and centimetres across: the turn about the way is as sure as the rest.
+#[test]
+fn a_long_straight_path_beside_itself_has_no_error() {
+    let elsewhere = Isometry3::new(Vector3::new(3.0, -2.0, 1.0), Vector3::new(0.5, 1.0, -2.0));
+    for (far, across) in [(2204.0, 0.1), (1e4, 0.02), (1e5, 1.0)] {
+        let places = [[0.1, 0.2, 0.0], [0.8, 1.24, 0.0], [0.1, 0.9, 0.0], [0.5, 0.0, far]];
+        let at = |p: [f64; 3]| [across * p[0], across * p[1], p[2]];
+        let truth: Vec<Pose> = (0..).zip(places).map(|(k, p)| pose(f64::from(k), at(p))).collect();
+        let moved = |p: &Pose| Pose { world_from_camera: elsewhere * p.world_from_camera, ..*p };
+        let estimate: Vec<Pose> = truth.iter().map(moved).collect();
+        let errors = evaluate(&truth, &estimate, Delta::Frames(1)).expect("evaluated");
+        assert!(errors.ate.error.max < 1e-3 * across, "{far}: {} m", errors.ate.error.max);
+    }
+}
+
 /// A described recording of one view whose frames are all `frame`.
 fn recording(root: &Path, sensor: &Sensor, frame: &Frame) {
     fs::create_dir_all(root.join("a")).expect("made");

@@ -28,6 +28,7 @@ mod extended_map;
 mod faults;
 mod fit;
 mod flatness;
+mod fuzz_corpus;
 mod hostile;
 mod invariances;
 mod layouts;
