@@ -137,6 +137,10 @@ class Desk:
             found += [os.path.join(folder, n) for n in folders + files if n.startswith(UNFINISHED)]
         return found
 
+    def tidy(self):
+        for path in self.unfinished():
+            subprocess.run(["rm", "-rf", path], check=True)
+
 
 def tree(path):
     """Names and bytes; None where nothing is."""

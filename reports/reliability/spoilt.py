@@ -126,6 +126,7 @@ def spoilt_inputs(binary, rng, times):
                     desk.keep("spoilt" + suffix, f"{tally.runs}-{kind}")
                 tally.add(ran.code, wrong, f"{line} ({'; '.join(done)})")
                 desk.remove("out")
+                desk.tidy()
             rows.append(tally.row())
             desk.remove("spoilt" + suffix)
     with Desk(binary) as desk:
