@@ -15,8 +15,10 @@ from pathlib import Path
 from typing import NamedTuple, Optional
 from xml.etree import ElementTree
 
-MAX_SECONDS = 20
-"""Of address space, bytes: an allocation beyond it aborts, which a signal tells."""
+# Of processor time, which a busy machine does not stretch; and of a wait for nothing.
+MAX_CPU_SECONDS = 20
+MAX_SECONDS = 300
+# Of address space, bytes: an allocation beyond it aborts, which a signal tells.
 MAX_MEMORY = 4 << 30
 UNFINISHED = ".kinoise-"
 
@@ -37,6 +39,11 @@ class Row(NamedTuple):
     refused: int
     broken: list
     note: str = ""
+
+
+def limit():
+    resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
+    resource.setrlimit(resource.RLIMIT_CPU, (MAX_CPU_SECONDS, MAX_CPU_SECONDS + 1))
 
 
 class Tally:
@@ -82,7 +89,6 @@ class Desk:
 
     def run(self, line, seconds=MAX_SECONDS, **options):
         begin = time.monotonic()
-        limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
         child = self.start(line, **{"preexec_fn": limit, **options})
         try:
             out, err = child.communicate(timeout=seconds)
@@ -130,6 +136,10 @@ class Desk:
         for folder, folders, files in os.walk(self.root):
             found += [os.path.join(folder, n) for n in folders + files if n.startswith(UNFINISHED)]
         return found
+
+    def tidy(self):
+        for path in self.unfinished():
+            subprocess.run(["rm", "-rf", path], check=True)
 
 
 def tree(path):

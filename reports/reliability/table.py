@@ -15,20 +15,21 @@ import time
 from pathlib import Path
 
 import faults
-import mutations
+import inputs
+import spoilt
 
 # The rows' functions, and how often each tries.
 ROWS = {
-    "spoilt": (mutations.spoilt_inputs, 2000),
+    "spoilt": (spoilt.spoilt_inputs, 2000),
     "kills": (faults.kills, 100),
     "disks": (faults.full_disks, 60),
     "answers": (faults.lost_answers, 200),
-    "unreadable": (faults.unreadable, 3),
-    "changing": (faults.changing, 60),
+    "unreadable": (inputs.unreadable, 3),
+    "changing": (inputs.changing, 60),
     "two": (faults.two_runs, 60),
-    "long": (faults.long_recordings, 1),
-    "out": (faults.ways_out, 100),
-    "markup": (faults.markup, 10),
+    "long": (inputs.long_recordings, 1),
+    "out": (inputs.ways_out, 100),
+    "markup": (inputs.markup, 10),
 }
 HEAD = "| what was tried | runs | done | refused, with a message | broke |\n|---|--:|--:|--:|--:|"
 
