@@ -82,7 +82,8 @@ mod tests {
         };
         assert!(apart(&bent) > 0.02, "{}", apart(&bent));
         let straight = bent.straightened(&velocity, &camera, readout_s);
-        assert!(apart(&straight) < 1e-6, "{}", apart(&straight));
+        // Single precision at 2 m has steps of 0.24 um; a dozen of them are added.
+        assert!(apart(&straight) < 3e-6, "{}", apart(&straight));
         // Nothing moves where no time passed.
         let still = bent.straightened(&Velocity::of(&motion, 0.0), &camera, readout_s);
         assert_eq!(still.points, bent.points);
