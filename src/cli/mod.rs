@@ -162,8 +162,9 @@ fn command() -> clap::Command {
 /// The command that was meant, for the help; options may stand before it.
 fn subcommand() -> Option<String> {
     let command = command();
-    let known = |word: &String| command.find_subcommand(word).is_some();
-    std::env::args().skip(1).find(known)
+    // What is not text is no command.
+    let mut words = std::env::args_os().skip(1).filter_map(|word| word.into_string().ok());
+    words.find(|word| command.find_subcommand(word).is_some())
 }
 
 fn run(arguments: &Arguments) -> anyhow::Result<u8> {

@@ -421,6 +421,20 @@ fn long_values_are_not_echoed_whole() {
     assert!(desk.done("calibrate rec -o out").len() < 10_000);
 }
 
+#[test]
+fn words_that_are_no_text_are_refused() {
+    use std::os::unix::ffi::OsStrExt;
+    let odd = std::ffi::OsStr::from_bytes(b"\xff");
+    for words in
+        [vec![odd], vec!["film".as_ref(), odd], vec!["map".as_ref(), "--odd".as_ref(), odd]]
+    {
+        let out = crate::common::kinoise().args(&words).output().expect("run");
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{words:?}: {said}");
+        assert!(said.contains("--help"), "{said}");
+    }
+}
+
 /// Root may look into any folder: without another user to be, there is nothing to see.
 #[test]
 fn a_folder_that_may_not_be_read_is_told() {
