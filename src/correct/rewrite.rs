@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::frame::{DepthCode, DepthTable, FARTHEST_M, Frame};
 use crate::io::{
     DESCRIPTION, INDEX, Layout, encode_corrected, encode_pgm16, encode_png16, read_depth,
-    write_atomic,
+    read_list, write_atomic,
 };
 use crate::read::read_image;
 use crate::view::{FrameRef, Recording, Sensor};
@@ -68,6 +68,16 @@ pub(super) fn images(recording: &Recording, root: &Path) -> Result<Vec<Image>> {
         if known.insert(file.clone()) {
             images.push(Image { file, source: frame.clone(), conditions });
         }
+    }
+    // Written again, these lists would name what is not there.
+    let mut beside: Vec<FrameRef> =
+        recording.views.iter().flat_map(|v| v.infrared.clone()).collect();
+    let colour = root.join("rgb.txt");
+    if colour.is_file() {
+        beside.extend(read_list(&colour).map_or(Vec::new(), |list| list.frames));
+    }
+    for frame in beside.iter().filter(|f| f.within.is_none()) {
+        inside(root, &frame.path)?;
     }
     Ok(images)
 }

@@ -304,6 +304,11 @@ fn nothing_outside_a_recording_is_copied() {
     }
     let desk = Desk::new();
     desk.model("model.json", |_| ());
+    desk.put("elsewhere.png", "secret");
+    desk.put("rec/rgb.txt", "0.0 ../elsewhere.png\n");
+    desk.refused(correct, &["elsewhere.png", "stands outside"]);
+    let desk = Desk::new();
+    desk.model("model.json", |_| ());
     symlink("recording.json", desk.at("rec/again.json")).expect("a link");
     desk.done(correct);
     let [one, two] =
