@@ -69,17 +69,18 @@ pub(super) fn images(recording: &Recording, root: &Path) -> Result<Vec<Image>> {
             images.push(Image { file, source: frame.clone(), conditions });
         }
     }
-    // Written again, these lists would name what is not there.
-    let mut beside: Vec<FrameRef> =
-        recording.views.iter().flat_map(|v| v.infrared.clone()).collect();
-    let colour = root.join("rgb.txt");
-    if colour.is_file() {
-        beside.extend(read_list(&colour).map_or(Vec::new(), |list| list.frames));
-    }
-    for frame in beside.iter().filter(|f| f.within.is_none()) {
-        inside(root, &frame.path)?;
-    }
+    refuse_others_outside(recording, root)?;
     Ok(images)
+}
+
+/// Written again, lists of infrared and colour images would name what is not there.
+fn refuse_others_outside(recording: &Recording, root: &Path) -> Result<()> {
+    let colour = root.join("rgb.txt");
+    let colour = if colour.is_file() { read_list(&colour).ok() } else { None };
+    let colour = colour.iter().flat_map(|list| &list.frames);
+    let infrared = recording.views.iter().flat_map(|v| &v.infrared);
+    let mut files = infrared.chain(colour).filter(|f| f.within.is_none());
+    files.try_for_each(|frame| inside(root, &frame.path).map(drop))
 }
 
 /// The recording on its way into another folder.

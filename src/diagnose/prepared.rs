@@ -163,10 +163,20 @@ pub enum Patches {
 }
 
 impl Prepared<'_> {
+    /// The samples that a basis is tried on, and which they are.
+    fn samples(&self, basis: &Basis) -> (&[PixelContext], &Rows<'_>, Patches) {
+        let alone = basis.alone().and_then(|over| self.groups.iter().find(|g| g.0.over == over));
+        if let Some((group, rows)) = alone {
+            (&group.places, rows, Patches::Fine)
+        } else if let Some((places, rows)) = self.fine.as_ref().filter(|_| basis.is_fine()) {
+            (places, rows, Patches::Fine)
+        } else {
+            (self.coarse.0, &self.coarse.1, Patches::Coarse)
+        }
+    }
+
     pub fn patches(&self, basis: &Basis) -> Patches {
-        let alone = basis.alone().is_some_and(|over| self.groups.iter().any(|g| g.0.over == over));
-        let fine = alone || (self.fine.is_some() && basis.is_fine());
-        if fine { Patches::Fine } else { Patches::Coarse }
+        self.samples(basis).2
     }
 
     /// Evidence on what stands beside every candidate. However fine samples are gathered, it is the
@@ -176,16 +186,9 @@ impl Prepared<'_> {
         fine.map_or(&self.coarse.1, |(_, rows)| rows).reduce(0, |_, _| ())
     }
 
-    /// On the basis and what stands beside it, on its own patches.
+    /// On the basis and what stands beside it.
     pub fn evidence(&self, basis: &Basis) -> Evidence {
-        let alone = basis.alone().and_then(|over| self.groups.iter().find(|g| g.0.over == over));
-        let (places, rows): (&[PixelContext], &Rows<'_>) = if let Some((group, rows)) = alone {
-            (&group.places, rows)
-        } else if let Some((places, rows)) = self.fine.as_ref().filter(|_| basis.is_fine()) {
-            (places, rows)
-        } else {
-            (self.coarse.0, &self.coarse.1)
-        };
+        let (places, rows, _) = self.samples(basis);
         rows.reduce(basis.count(), |i, g| basis.fill(&places[i], g))
     }
 }

@@ -30,6 +30,14 @@ impl Desk {
         self.folder.path().join(name)
     }
 
+    /// The depth images of a film, in time order.
+    fn images(&self, film: &str) -> Vec<PathBuf> {
+        let folder = fs::read_dir(self.at(film).join("depth")).expect("images");
+        let mut images: Vec<PathBuf> = folder.map(|e| e.expect("one").path()).collect();
+        images.sort();
+        images
+    }
+
     fn put(&self, name: &str, bytes: impl AsRef<[u8]>) {
         let path = self.at(name);
         fs::create_dir_all(path.parent().expect("a folder")).expect("made");
@@ -146,11 +154,7 @@ fn options_of_a_map_have_their_ranges() {
 fn a_lost_frame_has_no_number_that_is_none() {
     let desk = Desk::new();
     desk.film("film", 3);
-    let mut images: Vec<PathBuf> = fs::read_dir(desk.at("film/depth"))
-        .expect("images")
-        .map(|e| e.expect("one").path())
-        .collect();
-    images.sort();
+    let images = desk.images("film");
     let flat = kinoise::Frame { width: 160, height: 120, raw: vec![60_000; 160 * 120] };
     crate::common::write_depth(&images[2], &flat);
     desk.done("map film -o out");
@@ -187,11 +191,7 @@ fn poses_that_are_nowhere_are_refused_with_their_line() {
 fn poses_of_7_scenes_that_are_no_rotations_name_their_file() {
     let desk = Desk::new();
     desk.film("film", 3);
-    let mut images: Vec<PathBuf> = fs::read_dir(desk.at("film/depth"))
-        .expect("images")
-        .map(|e| e.expect("one").path())
-        .collect();
-    images.sort();
+    let images = desk.images("film");
     fs::create_dir(desk.at("scenes")).expect("made");
     for (k, image) in images.iter().enumerate() {
         fs::copy(image, desk.at(&format!("scenes/frame-{k:06}.depth.png"))).expect("copied");
