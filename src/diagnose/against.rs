@@ -15,7 +15,6 @@ use super::noise::hanging;
 use super::partners::{Pose, partners};
 use super::pixels::{common, measure_tails};
 use super::reading::read;
-use super::rim;
 use super::steps::{Steps, lattice};
 use super::structure::{Structure, structures};
 use super::tails::tails;
@@ -35,7 +34,6 @@ pub struct Baseline {
     /// Variance with another name.
     pub steps: Steps,
     pub(super) lost: Vec<DropoutFinding>,
-    pub(super) mixes: bool,
     pub(super) heavy: bool,
     /// What was odd, in words.
     pub remarks: Vec<String>,
@@ -111,9 +109,8 @@ impl Baseline {
         measure_tails(&mut structure, &fields, &[], &[], &survey, bench);
         let lattice = lattice(&fields, simulated);
         let steps = Steps::of(&lattice, &structure, &fields, simulated);
-        let lost = missing(&fields, &survey, camera, options.seed).findings;
+        let lost = missing(&fields, None, &survey, camera, options.seed).findings;
         Baseline {
-            mixes: rim::mixing(&fields, 0.03 * options.level).is_some(),
             heavy: tails(&structure, &none, 0.03 * options.level, false).is_some(),
             fields,
             survey,

@@ -68,9 +68,6 @@ impl Baseline {
         if self.heavy {
             known.learn("heavy-tails", "fraction", 0.0);
         }
-        if self.mixes {
-            known.learn("edge-mixing", "width_px", 0.0);
-        }
         let alike = |a: Option<f64>, b: Option<f64>| {
             a.zip(b).is_some_and(|(a, b)| (a / b).ln().abs() < STEPS_ALIKE)
         };

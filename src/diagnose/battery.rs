@@ -7,11 +7,13 @@ use super::bias;
 use super::case::{Case, Mean, Scatter};
 use super::diagnosis::{Detectable, Finding, Status};
 use super::few_views::few_views;
+use super::field::Field;
 use super::findings;
 use super::form::better_form;
 use super::hanging::Hanging;
 use super::lines::lines;
 use super::missing::{self, missing};
+use super::mixing::mixing;
 use super::naming::{physics, temper};
 use super::next_view;
 use super::other_findings;
@@ -19,7 +21,6 @@ use super::outcome::Outcome;
 use super::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::reference::{self, can_happen};
 use super::replication_textures;
-use super::rim;
 use super::scene::Scene;
 use super::steps::{is_raw, own_step, own_step_note, steps};
 use super::variance;
@@ -117,6 +118,11 @@ impl Case<'_> {
         Battery { mean, scatter, found, refitted, better_form, detectable }
     }
 
+    /// The simulated views beside these, one each.
+    fn twins(&self) -> Option<&[Field]> {
+        self.baseline.as_ref().map(|b| &b.fields[..])
+    }
+
     /// Curves of the mean and of the variance, named or not, with the advised view.
     fn curves(&self, outcomes: [&Outcome; 2], advise: bool) -> Vec<Finding> {
         let scenes = self.scenes();
@@ -159,9 +165,9 @@ impl Case<'_> {
     /// What neither a mean nor a variance shows: how the noise hangs together, tails, steps.
     fn texture(&self, mean: &Mean, scatter: &Scatter, steps: Vec<Finding>) -> Vec<Finding> {
         let sigma_mm = typical_sigma_mm(&self.fields);
-        let mixing = rim::mixing(&self.fields, self.level(Self::EACH_LEVEL)).filter(|m| {
-            !self.known.has("edge-mixing") && self.stands(m.p, self.level(Self::EACH_LEVEL))
-        });
+        let level = self.level(Self::EACH_LEVEL);
+        let mixing = mixing(&self.fields, self.twins(), level)
+            .filter(|m| !self.known.has("edge-mixing") && self.stands(m.p, level));
         let hangs = scatter.hangs.iter().cloned().chain(scatter.tails.clone()).chain(mixing);
         let second = self.survey.second();
         let told = |h: Hanging| {
@@ -237,7 +243,7 @@ impl Case<'_> {
 
     fn lost(&mut self) -> (Vec<Finding>, Vec<Detectable>) {
         let camera = &self.sensor().camera;
-        let lost = missing(&self.fields, &self.survey, camera, self.options.seed);
+        let lost = missing(&self.fields, self.twins(), &self.survey, camera, self.options.seed);
         self.copies.extend(lost.notes);
         let known = |id| self.known.has(id);
         let baseline = self.baseline.as_ref();

@@ -1,9 +1,8 @@
 //! Frames laid on a view's plane: what every pixel measures beside what is expected of it.
 
+use super::edges::Edges;
 use super::field::{CLIP_SIGMAS, Field};
 use super::known::KnownTerms;
-use super::rim::Rim;
-use super::shadow::Shadow;
 use super::tiles::Places;
 use crate::camera::Rays;
 use crate::frame::{DepthTable, Frame};
@@ -28,13 +27,17 @@ impl Field {
     ) {
         self.sigma = self.expected_sigma(&bench.rays, sigma);
         let expected = self.known_bias(known, bench, session_start);
+        let mut edges: Option<Edges> = None;
         for (time, image) in frames {
-            if self.frames.is_empty() {
-                self.shadow = Shadow::beside(self, &image, &bench.rays, &bench.table);
-                self.rim = Rim::around(self, &image, &bench.rays, &bench.table);
-            }
+            edges.get_or_insert_with(|| Edges::find(self, &image, &bench.rays, &bench.table)).add(
+                self,
+                &image,
+                &bench.rays,
+                &bench.table,
+            );
             self.add(&image, time, &expected, &bench.table);
         }
+        self.edges = edges.unwrap_or_default();
         self.close();
     }
 

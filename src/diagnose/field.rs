@@ -3,8 +3,7 @@
 //! In disparity a plane is exactly affine in the image, so the residual is taken there, in px of
 //! fx * baseline / z. Nothing is cut by a RANSAC threshold: what strays is clipped, and counted.
 
-use super::rim::Rim;
-use super::shadow::Shadow;
+use super::edges::Edges;
 use crate::camera::Rays;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
@@ -61,10 +60,8 @@ pub struct Field {
     pub words: RawHistogram,
     /// The target's region was given; else it ends where too little is measured.
     pub told: bool,
-    /// What lies beside the target in the first frame.
-    pub shadow: Shadow,
-    /// How sharp the target's edge is in the first frame.
-    pub rim: Option<Rim>,
+    /// Where the target ends before something else.
+    pub edges: Edges,
 }
 
 /// Beyond this many sigmas of the model, or of the view's own residuals where errors the model
@@ -200,8 +197,7 @@ impl Field {
             light: Vec::new(),
             words: RawHistogram::none(),
             told: view.notes.region.is_some(),
-            shadow: Shadow::default(),
-            rim: None,
+            edges: Edges::default(),
         }
     }
 

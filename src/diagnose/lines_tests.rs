@@ -2,8 +2,8 @@
 
 use rand_distr::{Distribution, StandardNormal};
 
+use super::super::edges::Edges;
 use super::super::lattice::RawHistogram;
-use super::super::shadow::Shadow;
 use super::*;
 use crate::plane::Plane;
 use crate::rng::{Seed, Stream};
@@ -43,8 +43,7 @@ fn field(rng: &mut Stream, error_px: impl Fn(usize) -> f64) -> Field {
         light: Vec::new(),
         words: RawHistogram::none(),
         told: true,
-        shadow: Shadow::default(),
-        rim: None,
+        edges: Edges::default(),
     }
 }
 

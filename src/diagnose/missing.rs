@@ -13,9 +13,8 @@ use super::missing_cells::{Cell, cells, fine};
 use super::missing_report::{Told, shadow_finding};
 use super::missing_search::{Judged, Losses};
 use super::missing_shapes::{Shape, Step, curves, steps};
-use super::occlusion_scan::{Band, band};
 use super::replication::{Measured, agree};
-use super::shadow::Shadow;
+use super::shadow::{Band, Sides, band};
 use super::tiles::Tile;
 use crate::camera::Camera;
 use crate::rng::Seed;
@@ -69,18 +68,31 @@ const MOST_FINDINGS: usize = 3;
 const LEAST_SHARE: f64 = 0.1;
 
 /// What the losses of a recording follow.
-pub fn missing(fields: &[Field], survey: &Survey, camera: &Camera, seed: Seed) -> DropoutOutcome {
+///
+/// `twins` are the same views without what is looked for: what is lost beside their targets is
+/// expected.
+pub fn missing(
+    fields: &[Field],
+    twins: Option<&[Field]>,
+    survey: &Survey,
+    camera: &Camera,
+    seed: Seed,
+) -> DropoutOutcome {
     let told: Vec<bool> = fields.iter().map(|f| f.told).collect();
     let second = survey.second();
     let seen = Seen { cells: cells(survey, camera), fine: fine(survey), told, second };
     let blur = |z: f64| blur(survey, z);
     let mut outcome = losses(&seen, &survey.reach, camera, &blur, seed);
-    let shadows: Vec<_> = fields.iter().map(|f| f.shadow).collect();
-    if let Some(band) = band(&shadows, SHADOW_LEVEL) {
+    let sides: Vec<Sides> = (0..fields.len())
+        .map(|v| Sides::of(&fields[v].edges, twins.map(|t| &t[v].edges)))
+        .collect();
+    if let Some(band) = band(&sides, SHADOW_LEVEL) {
         let mut shadow = shadow_finding(band, fields);
-        shadow.replicated = bands_agree(&shadows, &seen.second);
-        // Where the target's own mask reaches into its shadow, the same losses are seen again.
-        outcome.findings.retain(|f| f.family.is_some() || f.size > shadow.size);
+        shadow.replicated = bands_agree(&sides, &seen.second);
+        // Where the target's own mask reaches into its shadow, the same losses are seen again; a
+        // region that was given ends at the target.
+        let grown = seen.told.contains(&false);
+        outcome.findings.retain(|f| !grown || f.family.is_some() || f.size > shadow.size);
         outcome.findings.push(shadow);
     }
     outcome
@@ -221,12 +233,12 @@ fn blur(survey: &Survey, z: f64) -> f64 {
 }
 
 /// Do the shadows of both halves have the same share of the expected width?
-fn bands_agree(shadows: &[Shadow], second: &[bool]) -> Option<bool> {
+fn bands_agree(sides: &[Sides], second: &[bool]) -> Option<bool> {
     let half = |which: bool| {
-        let mine = shadows.iter().zip(second).filter(|(_, s)| **s == which);
-        let mine: Vec<Shadow> = mine.map(|(shadow, _)| *shadow).collect();
-        let Band { left, share: [value, std_error], .. } = band(&mine, 1.0)?;
-        Some((left, Measured { value, std_error, views: mine.len() }))
+        let mine = sides.iter().zip(second).filter(|(_, s)| **s == which);
+        let mine: Vec<Sides> = mine.map(|(sides, _)| *sides).collect();
+        let Band { side, share: [value, std_error], .. } = band(&mine, 1.0)?;
+        Some((side, Measured { value, std_error, views: mine.len() }))
     };
     let (first, second) = (half(false)?, half(true)?);
     Some(first.0 == second.0 && agree([Some(first.1), Some(second.1)])?)

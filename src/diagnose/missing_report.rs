@@ -9,7 +9,7 @@ use super::missing_cells::Cell;
 use super::missing_fit::{Fitted, Point, bounded, fit, points};
 use super::missing_search::Judged;
 use super::missing_shapes::{Shape, Step};
-use super::occlusion_scan::Band;
+use super::shadow::Band;
 use crate::camera::Camera;
 use crate::terms::{Axis, Basis, Extent};
 
@@ -167,11 +167,10 @@ pub fn shadow_finding(band: Band, fields: &[Field]) -> DropoutFinding {
     if band.lawful {
         parameters.insert("share".into(), estimate(band.share[0], Some(band.share[1])));
     }
-    parameters.insert("side".into(), json!(if band.left { "left" } else { "right" }));
+    parameters.insert("side".into(), json!(["left", "right"][band.side]));
     let (mut lost, mut asked) = (0.0, 0.0);
     for f in fields {
-        let side = if band.left { f.shadow.left } else { f.shadow.right };
-        lost += side.map_or(0.0, |s| s.width_px * s.rows as f64);
+        lost += f.edges.lost_px(band.side);
         asked += f.pixels.len() as f64;
     }
     DropoutFinding {

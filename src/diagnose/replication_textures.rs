@@ -1,10 +1,12 @@
 //! Does either half of the views show the same texture? Each view is one sample of the statistic
 //! that a finding rests on.
 
+use super::edges::Edges;
 use super::field::Field;
 use super::hanging::{Hanging, Mean};
 use super::in_time::{later, of_any_two};
 use super::known::KnownTerms;
+use super::mixing::mean_share;
 use super::noise::expected_window;
 use super::replication::{Measured, agree};
 use super::structure::Structure;
@@ -31,8 +33,8 @@ pub fn replicated(
                 Mean::of(&views, of).map(|m| measured(&m))
             }
             None if found.axis == Axis::EdgeDistance => {
-                let rims = mine.filter_map(|v| fields[v].rim);
-                mean(&rims.map(|r| r.mixed_px).collect::<Vec<f64>>())
+                let edges: Vec<&Edges> = mine.map(|v| &fields[v].edges).collect();
+                mean_share(&edges, None, found.interval[1]).map(|m| measured(&m))
             }
             None => None,
         }
@@ -82,15 +84,4 @@ fn statistic<'a>(found: &Hanging, known: &'a KnownTerms) -> Option<OfView<'a>> {
 
 fn measured(m: &Mean) -> Measured {
     Measured { value: m.value, std_error: m.std_error, views: m.views.round() as usize }
-}
-
-fn mean(values: &[f64]) -> Option<Measured> {
-    let n = values.len() as f64;
-    let value = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - value).powi(2)).sum::<f64>() / (n - 1.0);
-    (values.len() > 1).then(|| Measured {
-        value,
-        std_error: (variance / n).sqrt(),
-        views: values.len(),
-    })
 }

@@ -1,0 +1,117 @@
+//! Does depth mix at the target's edge? One share a view; the views are the sample.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::edges::{Edges, INSIDE_PX};
+use super::field::Field;
+use super::hanging::{Hanging, Mean, nats, one};
+use crate::terms::{Axis, Statistic};
+
+/// Widths of the footprint that are tried, px.
+const WIDTHS_PX: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
+/// Wider footprints are told as this, px: the catalogue's limit.
+const WIDEST_PX: f64 = 32.0;
+
+/// What a view's target mixes in, as a share of a full footprint's, with the information on it.
+fn share(edges: &Edges, width: f64) -> Option<(f64, f64)> {
+    let (mut normal, mut cross, mut score) = (Matrix3::zeros(), Vector3::zeros(), Vector3::zeros());
+    let (mut own, mut own_score) = (0.0, 0.0);
+    for (n, s) in edges.inside.iter().enumerate() {
+        // A bias that is smooth over the pixels at the edge is none of the edge's.
+        let x = n as f64 / INSIDE_PX as f64 - 0.5;
+        let smooth = Vector3::new(1.0, x, x * x);
+        let seen = footprint(n, width);
+        normal += s.n * smooth * smooth.transpose();
+        cross += seen * s.step * smooth;
+        score += s.residual * smooth;
+        own += seen * seen * s.square;
+        own_score += seen * s.product;
+    }
+    let solved = normal.cholesky()?.solve(&cross);
+    let information = own - cross.dot(&solved);
+    let value = (own_score - solved.dot(&score)) / information;
+    let sure = information / edges.sigma_px.powi(2);
+    (value.is_finite() && sure > 0.0).then_some((value, sure))
+}
+
+/// Share of the other surface in pixel `n` of the target from the edge, for a square footprint that
+/// reaches `width` px to either side.
+fn footprint(n: usize, width: f64) -> f64 {
+    0.5 * (1.0 - (n as f64 + 0.5) / width).max(0.0)
+}
+
+/// All that a full footprint of this width mixes in, px of the step.
+fn mixed_px(width: f64) -> f64 {
+    (0..WIDEST_PX as usize).map(|n| footprint(n, width)).sum()
+}
+
+/// The full footprint that mixes in so much.
+fn width_px(mixed: f64) -> f64 {
+    let (mut low, mut high) = (0.5, WIDEST_PX);
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        if mixed_px(middle) < mixed { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// The views' mean share at a width, beyond that of the twins where there are any.
+pub fn mean_share(views: &[&Edges], twins: Option<&[&Edges]>, width: f64) -> Option<Mean> {
+    let of = |v: usize| {
+        let (value, sure) = share(views[v], width)?;
+        let Some(twins) = twins else { return Some((value, sure)) };
+        let (expected, as_sure) = share(twins[v], width)?;
+        Some((value - expected, 1.0 / (1.0 / sure + 1.0 / as_sure)))
+    };
+    combined(&(0..views.len()).filter_map(of).collect::<Vec<_>>())
+}
+
+/// Mean of (value, information), with the views' scatter where that is larger than the noise's.
+fn combined(views: &[(f64, f64)]) -> Option<Mean> {
+    let n = views.len() as f64;
+    let sure: f64 = views.iter().map(|v| v.1).sum();
+    let value = views.iter().map(|v| v.0 * v.1).sum::<f64>() / sure;
+    let scatter = views.iter().map(|v| v.1 * (v.0 - value).powi(2)).sum::<f64>() / (n - 1.0);
+    let std_error = (scatter.max(1.0) / sure).sqrt();
+    (n > 1.0 && sure > 0.0).then_some(Mean { value, std_error, views: n })
+}
+
+/// Depth mixed at the edge, where the views agree on it at this level.
+pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<Hanging> {
+    let edges: Vec<&Edges> = fields.iter().map(|f| &f.edges).collect();
+    let twins: Option<Vec<&Edges>> = twins.map(|t| t.iter().map(|f| &f.edges).collect());
+    let at = |w: f64| Some((w, mean_share(&edges, twins.as_deref(), w)?));
+    let (width, mean) = WIDTHS_PX
+        .into_iter()
+        .filter_map(at)
+        .filter(|(_, m)| m.views > FEWEST_VIEWS)
+        .max_by(|a, b| (a.1.value / a.1.std_error).total_cmp(&(b.1.value / b.1.std_error)))?;
+    let p = (WIDTHS_PX.len() as f64 * mean.p_above(0.0)).min(1.0);
+    if p > level {
+        return None;
+    }
+    let full = mixed_px(width);
+    let [mixed, error] = [full * mean.value, full * mean.std_error];
+    let slope = (width_px(mixed + error) - width_px((mixed - error).max(0.0))) / 2.0;
+    let edge = mean.value * footprint(0, width);
+    let seen = edges.iter().filter(|e| e.sigma_px > 0.0);
+    let sigmas: Vec<f64> = seen.map(|e| e.step_px / e.sigma_px).collect();
+    let step_sigmas = sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64;
+    Some(Hanging {
+        families: vec!["edge-mixing"],
+        statistic: Statistic::Bias,
+        axis: Axis::EdgeDistance,
+        interval: [0.0, width],
+        parameters: one("width_px", width_px(mixed), slope),
+        size_sigma: edge * step_sigmas,
+        p,
+        nats: nats(&mean, 0.0),
+        words: Some(format!(
+            "the target's last pixel is off by {:.2} % of the step to what is behind",
+            100.0 * edge
+        )),
+    })
+}
+
+/// Fewer views show no rule.
+const FEWEST_VIEWS: f64 = 2.0;
