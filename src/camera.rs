@@ -29,14 +29,14 @@ pub enum CameraFault {
     #[error("width x height, {0} x {1} px, is no image size")]
     Size(usize, usize),
     /// fx, fy, px.
-    #[error("focal lengths fx = {}, fy = {} px must be positive", shortest(*.0), shortest(*.1))]
+    #[error("{}: focal lengths fx = {}, fy = {} px must be positive", bad_focal(*.0), shortest(*.0), shortest(*.1))]
     FocalLength(f64, f64),
     #[error("the principal point cx, cy is not finite")]
     PrincipalPoint,
     /// cx, cy, width, height, px.
     #[error(
-        "the principal point ({}, {}) lies outside the image of {} x {} px; check the order fx, fy, cx, cy and \
-         that they belong to this image size", shortest(.0[0]), shortest(.0[1]), .1[0], .1[1]
+        "{}: the principal point ({}, {}) lies outside the image of {} x {} px; check the order fx, fy, cx, cy and \
+         that they belong to this image size", bad_centre(*.0, *.1), shortest(.0[0]), shortest(.0[1]), .1[0], .1[1]
     )]
     Outside([f64; 2], [usize; 2]),
     /// fx, fy, px.
@@ -71,6 +71,15 @@ pub enum CameraFault {
          belong to these fx, fy", listed(.0)
     )]
     Fold([f64; 5]),
+}
+
+/// The key that is wrong: a message names it first, and its line is looked for by it.
+fn bad_focal(fx: f64) -> &'static str {
+    if fx.is_finite() && fx > 0.0 { "fy" } else { "fx" }
+}
+
+fn bad_centre([cx, _]: [f64; 2], [width, _]: [usize; 2]) -> &'static str {
+    if inside(cx, width) { "cy" } else { "cx" }
 }
 
 fn listed(k: &[f64; 5]) -> String {

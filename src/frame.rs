@@ -125,7 +125,7 @@ impl DepthCode {
 }
 
 /// From decimetres to micrometres, of which 16 bit hold 65 mm.
-const UNITS_PER_METRE: [f64; 2] = [10.0, 1e6];
+pub const UNITS_PER_METRE: [f64; 2] = [10.0, 1e6];
 /// One over the depth of the raw value 0, 1/m: a centimetre.
 const MAX_OFFSET: f64 = 100.0;
 /// Of a raw unit, 1/m. A Kinect has 0.003; the finest is 1/256 px of a stereo pair on a car's roof.

@@ -1,31 +1,69 @@
 //! Input files: regular ones, of a size that memory holds. A pipe would wait for ever, a device never
 //! ends, and a sparse file of a terabyte is made in a second.
 
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
 
 use crate::error::{Error, Result};
+use crate::units::shortest;
 
 /// Of lists, tables and trajectories, bytes: an hour of poses at 500 Hz.
-const MAX_TEXT: u64 = 1 << 28;
+pub(crate) const MAX_TEXT: u64 = 1 << 28;
 /// Of JSON, bytes, which takes sixteen times its length in memory; a model with the covariance of
 /// every shape has 8 MB.
 const MAX_JSON: u64 = 1 << 25;
+/// Of one text in it, bytes: notes of some pages. What is kept of it goes into every result.
+const MAX_WORDS: usize = 1 << 14;
+/// Of numbers: variances of what is hardly known at all are less, and squares of more have no number.
+const MAX_NUMBER: f64 = 1e30;
 /// Of an image, bytes: 16 megapixels in colour, not compressed, and what is written around them.
-const MAX_IMAGE: u64 = 1 << 26;
+pub(crate) const MAX_IMAGE: u64 = 1 << 26;
+/// What stands around an image's pixels, bytes: profiles and comments.
+const AROUND_IMAGE: u64 = 1 << 20;
 
 /// Open a file to read.
-/// An error when it cannot be, or is a pipe, a device or a socket.
+/// An error when it cannot be, or is a folder, a pipe, a device or a socket.
 pub(crate) fn open(path: &Path) -> Result<File> {
     let failed = |e| Error::read(path, e);
-    let kind = std::fs::metadata(path).map_err(failed)?;
-    // What a folder is read as is the system's to refuse, in its own words.
-    if !kind.is_file() && !kind.is_dir() {
-        let what = "this is a pipe or a device, no file";
-        return Err(Error::recording(path, what, "save what it gives to a file, and give that"));
+    match odd(&std::fs::metadata(path).map_err(failed)?) {
+        Some((what, remedy)) => Err(Error::recording(path, what, remedy)),
+        None => File::open(path).map_err(failed),
     }
-    File::open(path).map_err(failed)
+}
+
+/// What stands there instead of a regular file, and what to do.
+fn odd(kind: &Metadata) -> Option<(&'static str, &'static str)> {
+    if kind.is_file() {
+        None
+    } else if kind.is_dir() {
+        Some(("this is not a regular file, but a folder", "give the file, or take the folder out"))
+    } else {
+        let what = "this is not a regular file, but a pipe or a device";
+        Some((what, "save what it gives to a file, and give that"))
+    }
+}
+
+/// Is there a file of this name?
+/// An error when something else is, which would otherwise be passed over.
+pub(crate) fn is_there(path: &Path) -> Result<bool> {
+    let Ok(kind) = std::fs::metadata(path) else { return Ok(false) };
+    match odd(&kind) {
+        Some((what, remedy)) => Err(Error::recording(path, what, remedy)),
+        None => Ok(true),
+    }
+}
+
+/// The first of these files that is there. Errors as those of [`is_there`].
+pub(crate) fn first_there(paths: impl IntoIterator<Item = PathBuf>) -> Result<Option<PathBuf>> {
+    for path in paths {
+        if is_there(&path)? {
+            return Ok(Some(path));
+        }
+    }
+    Ok(None)
 }
 
 /// All of a file that has `max` bytes or less.
@@ -64,6 +102,34 @@ pub(crate) fn read_json(path: &Path) -> Result<String> {
     text(path, MAX_JSON)
 }
 
+/// The first text or number of a JSON document that nobody means, with its key.
+pub(crate) fn absurd(value: &Value) -> Option<String> {
+    let off = |value: &Value| match value {
+        Value::String(text) if text.len() > MAX_WORDS => {
+            Some(format!("a text of {} bytes, more than the {MAX_WORDS} of any", text.len()))
+        }
+        Value::Number(number) => {
+            let number = number.as_f64().filter(|v| v.abs() > MAX_NUMBER)?;
+            Some(format!("{}, beyond any number that is measured", shortest(number)))
+        }
+        _ => None,
+    };
+    let below = |key: String, value: &Value| {
+        let found = off(value).map(|what| format!(" = {what}")).or_else(|| absurd(value))?;
+        let dot = if found.starts_with([' ', '[']) { "" } else { "." };
+        Some(format!("{key}{dot}{found}"))
+    };
+    match value {
+        Value::Object(entries) => {
+            entries.iter().find_map(|(key, value)| below(key.chars().take(40).collect(), value))
+        }
+        Value::Array(all) => {
+            all.iter().enumerate().find_map(|(i, value)| below(format!("[{i}]"), value))
+        }
+        _ => None,
+    }
+}
+
 /// The bytes of a list, a table or a trajectory.
 pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     bytes(path, MAX_TEXT)
@@ -71,4 +137,31 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>> {
 
 pub(crate) fn read_image(path: &Path) -> Result<Vec<u8>> {
     bytes(path, MAX_IMAGE)
+}
+
+/// A depth image of so many pixels: what does not shrink is stored as it is, with a byte a row and five
+/// a block of 64 kB.
+pub(crate) fn read_depth_image(path: &Path, pixels: usize) -> Result<Vec<u8>> {
+    let raw = 2 * pixels as u64;
+    bytes(path, (raw + raw / 8 + AROUND_IMAGE).min(MAX_IMAGE))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn texts_and_numbers_that_nobody_means_are_named_by_their_key() {
+        let long = "x".repeat(MAX_WORDS + 1);
+        for (document, says) in [
+            (json!({"mode": long}), Some("mode = a text of 16385 bytes")),
+            (json!({"a": [{"b": 1}, {"c": [0, -1e300]}]}), Some("a[1].c[1] = -1e300, beyond")),
+            (json!({"a": {"b": u64::MAX, "c": "words", "d": null}}), None),
+        ] {
+            let said = absurd(&document);
+            assert_eq!(said.is_some(), says.is_some(), "{said:?}");
+            assert!(said.unwrap_or_default().starts_with(says.unwrap_or_default()));
+        }
+    }
 }

@@ -105,9 +105,12 @@ pub fn compare(
 ) -> Result<Comparison> {
     let delta = Delta::Seconds(1.0);
     if sequence.truth.is_empty() {
+        let unused = sequence.unused_truth.as_ref();
         return Err(Error::recording(
             &sequence.root,
-            "no ground truth in it",
+            unused.map_or("no ground truth in it".into(), |why| {
+                format!("its ground truth cannot be used: {why}")
+            }),
             "a comparison needs groundtruth.txt, or frame-XXXXXX.pose.txt beside each frame",
         ));
     }

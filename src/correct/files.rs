@@ -1,19 +1,30 @@
 //! The files of a recording beside its depth images.
 
 use std::collections::HashSet;
-use std::io;
+use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::io::{is_description, write_atomic_with};
-use crate::read::open;
+use crate::read::{MAX_IMAGE, MAX_TEXT, open};
 
 /// Folders in folders: more is a link that leads back to where it stands.
 const MAX_DEPTH: usize = 12;
 
-/// The longest file that is copied, bytes: an hour of raw video. A sparse file of a terabyte would
-/// fill the disk.
-const MAX_BYTES: u64 = 1 << 35;
+/// The longest file that is copied of what no command reads, bytes: ten minutes of a compressed video of
+/// the session. A sparse file of a terabyte would fill the disk.
+const MAX_OTHER: u64 = 1 << 30;
+
+/// The longest file of its kind that is copied: what would be refused as an input is no part of the
+/// recording.
+fn max_bytes(file: &Path) -> u64 {
+    let kind = file.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    match &*kind {
+        "png" | "jpg" | "jpeg" | "pgm" | "ppm" => MAX_IMAGE,
+        "txt" | "csv" | "json" | "yaml" | "yml" | "md" => MAX_TEXT,
+        _ => MAX_OTHER,
+    }
+}
 
 /// Every file below `root`, as paths relative to it, in name order. A link may lead out of `root` to
 /// what is `read` as part of the recording, so that folders of links to some of its views will do.
@@ -75,12 +86,27 @@ pub(super) fn copy(from: &Path, to: &Path, files: &[&PathBuf]) -> Result<()> {
         make_folder_of(&target)?;
         let mut reader = open(&source)?;
         let length = reader.metadata().map_err(|e| Error::read(&source, e))?.len();
-        if length > MAX_BYTES {
-            let what = format!("{} GB, more than is copied ({} GB)", length >> 30, MAX_BYTES >> 30);
+        let max = max_bytes(file);
+        // Piece by piece: it may be longer than memory. It may grow meanwhile.
+        let mut within = reader.by_ref().take(max + 1);
+        let copied = if length > max {
+            length
+        } else {
+            let mut copied = 0;
+            write_atomic_with(&target, |file| {
+                copied = io::copy(&mut within, file)?;
+                Ok(())
+            })?;
+            copied
+        };
+        if copied > max {
+            let what = format!(
+                "{} MB, more than is copied of such a file ({} MB)",
+                copied >> 20,
+                max >> 20
+            );
             return Err(Error::recording(&source, what, "take it out of the recording"));
         }
-        // Piece by piece: it may be longer than memory.
-        write_atomic_with(&target, |file| io::copy(&mut reader, file).map(drop))?;
     }
     Ok(())
 }

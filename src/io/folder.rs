@@ -11,7 +11,7 @@ use super::output::{entries, listed, refuse_full, write_atomic};
 use super::stills::{Film, Footage};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::read::read_text;
+use crate::read::{is_there, read_text};
 use crate::view::{FrameRef, Sensor};
 
 /// depth.txt and depth/ as in the TUM benchmark, read as a film of a target. A recording.json
@@ -25,7 +25,7 @@ pub(super) fn sequence(root: &Path, assumed: &Assumed) -> Result<(Footage, Senso
     let mut remarks = list.remarks;
     let description = root.join(DESCRIPTION);
     let mut described_by = vec![path.clone()];
-    let sensor = if description.is_file() {
+    let sensor = if is_there(&description)? {
         let mut unknown = UnknownKeys::default();
         let sensor = read_sensor(&description, &mut unknown)?;
         remarks.extend(unknown.remarks());
@@ -52,7 +52,11 @@ pub(super) fn sequence(root: &Path, assumed: &Assumed) -> Result<(Footage, Senso
 pub(super) const NOMINAL_INTERVAL_S: f64 = 1.0 / 30.0;
 
 fn is_image(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) && path.is_file()
+    is_called_image(path) && path.is_file()
+}
+
+fn is_called_image(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"))
 }
 
 /// Does a folder hold images, and no view?
@@ -64,7 +68,10 @@ pub(super) fn is_plain(root: &Path) -> Result<bool> {
 /// 16-bit PNGs in name order; everything else comes from recording.json or from options.
 pub(super) fn images(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     let mut files = entries(root)?;
-    files.retain(|p| is_image(p));
+    files.retain(|p| is_called_image(p));
+    let odd = files.extract_if(.., |p| !p.is_file()).collect::<Vec<_>>();
+    let odd = odd.iter().map(|p| format!("{} is not a regular file; left out", p.display()));
+    let mut remarks: Vec<String> = odd.collect();
     // A calibration leaves pictures, which are no depth.
     if let Some(error) = results_in(root) {
         return Err(error);
@@ -78,8 +85,8 @@ pub(super) fn images(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)
         .map(|(i, path)| FrameRef::file(i as f64 * NOMINAL_INTERVAL_S, path));
     let frames: Vec<FrameRef> = stamped.collect();
     let description = root.join(DESCRIPTION);
-    let (mut remarks, mut described_by) = (Vec::new(), Vec::new());
-    let sensor = if description.is_file() {
+    let mut described_by = Vec::new();
+    let sensor = if is_there(&description)? {
         assumed.refuse_beside(&description)?;
         let mut unknown = UnknownKeys::default();
         let sensor = read_sensor(&description, &mut unknown)?;
@@ -175,8 +182,9 @@ pub(super) fn dump(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> 
         if path.is_file() {
             frames.push(FrameRef::file(timestamp, path));
         } else {
-            remarks
-                .push(format!("INDEX.txt line {} names {name}, which is missing; left out", i + 1));
+            let odd = if path.exists() { "is not a regular file" } else { "is missing" };
+            let name = shorten(name);
+            remarks.push(format!("INDEX.txt line {} names {name}, which {odd}; left out", i + 1));
         }
     }
     let first = frames.first().ok_or_else(|| {

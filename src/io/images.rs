@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use crate::camera::usable_size;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::read::{open, read_image};
+use crate::read::{open, read_depth_image, read_image};
 use crate::view::FrameRef;
 
 /// Reads frames of one fixed size and keeps the hash of all bytes it has read.
@@ -40,7 +40,7 @@ impl FrameSource {
 
     /// One image file. Errors as those of [`FrameSource::frame`].
     pub fn read(&mut self, path: &Path) -> Result<Frame> {
-        let bytes = read_image(path)?;
+        let bytes = read_depth_image(path, self.width * self.height)?;
         self.hash.update(&bytes);
         sized(path, decode(path, &bytes)?, self.width, self.height)
     }
@@ -53,7 +53,11 @@ impl FrameSource {
 
 /// One depth frame of this size, px, without a hash.
 pub(crate) fn read_depth(frame: &FrameRef, width: usize, height: usize) -> Result<Frame> {
-    sized(&frame.path, read_any(frame)?, width, height)
+    if frame.within.is_some() {
+        return sized(&frame.path, read_any(frame)?, width, height);
+    }
+    let bytes = read_depth_image(&frame.path, width * height)?;
+    sized(&frame.path, decode(&frame.path, &bytes)?, width, height)
 }
 
 fn sized(path: &Path, frame: Frame, width: usize, height: usize) -> Result<Frame> {

@@ -10,7 +10,7 @@ use super::list::{FrameList, read_list};
 use super::output::{entries, write_json};
 use crate::error::{Error, Result};
 use crate::frame::FARTHEST_M;
-use crate::read::read_json;
+use crate::read::{absurd, is_there, read_json};
 use crate::units::shortest;
 use crate::view::{
     Excluded, RECORDING_FORMAT, Recording, RecordingFile, Region, Sensor, TargetSize, View,
@@ -165,7 +165,11 @@ pub(super) fn read_sensor(path: &Path, unknown: &mut UnknownKeys) -> Result<Sens
         return Err(wrong(format!("format is \"{format}\", expected \"{RECORDING_FORMAT}\"")));
     }
     let file: RecordingFile = parse(path, &text).map_err(|e| named(path, &text).unwrap_or(e))?;
-    unknown.note(path, &parse(path, &text)?, &json!(file));
+    let given = parse(path, &text)?;
+    if let Some(what) = absurd(&given) {
+        return Err(wrong(what));
+    }
+    unknown.note(path, &given, &json!(file));
     file.sensor().map_err(wrong)
 }
 
@@ -236,10 +240,10 @@ fn open_view(
     }
     let infrared_list = folder.join(INFRARED_LIST);
     let infrared =
-        if infrared_list.is_file() { read_list(&infrared_list)? } else { FrameList::default() };
+        if is_there(&infrared_list)? { read_list(&infrared_list)? } else { FrameList::default() };
     recording.remarks.extend(infrared.remarks.iter().map(of_view));
     let view_file = folder.join(VIEW_FILE);
-    let notes = if view_file.is_file() {
+    let notes = if is_there(&view_file)? {
         let notes = read_notes(&view_file, unknown)?;
         recording.described_by.push(view_file);
         notes
@@ -252,9 +256,14 @@ fn open_view(
 
 fn read_notes(path: &Path, unknown: &mut UnknownKeys) -> Result<ViewNotes> {
     let text = read_json(path)?;
+    let wrong = |what: String| Error::text(path, line_named(&text, &what), what, REMEDY_JSON);
     let file: ViewFile = parse(path, &text)?;
-    unknown.note(path, &parse(path, &text)?, &json!(file));
-    file.notes().map_err(|what| Error::text(path, line_named(&text, &what), what, REMEDY_JSON))
+    let given = parse(path, &text)?;
+    if let Some(what) = absurd(&given) {
+        return Err(wrong(what));
+    }
+    unknown.note(path, &given, &json!(file));
+    file.notes().map_err(wrong)
 }
 
 /// Write `view.json` into the view's folder; nothing where nothing is known.

@@ -32,8 +32,10 @@ pub fn read_list(path: &Path) -> Result<FrameList> {
         if target.is_file() {
             list.frames.push(FrameRef::file(timestamp, target));
         } else {
+            let odd = if target.exists() { "is not a regular file" } else { "is missing" };
+            let named = shorten_path(named);
             list.remarks.push(format!(
-                "{file} line {line} names {named}, which is missing; that frame is left out"
+                "{file} line {line} names {named}, which {odd}; that frame is left out"
             ));
         }
     }
@@ -77,6 +79,11 @@ fn put_in_order(list: &mut FrameList, file: &str) {
             verb(shared, "has", "have")
         ));
     }
+}
+
+/// A path as it can be quoted in a message: the longest that systems have is shown.
+fn shorten_path(named: &str) -> String {
+    named.chars().take(1024).collect()
 }
 
 /// A line as it can be quoted in a message.

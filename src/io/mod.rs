@@ -36,6 +36,7 @@ use stills::Footage;
 
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
+use crate::read::is_there;
 use crate::view::{FrameRef, Recording, Sensor};
 
 /// How the files of a recording lie in its folder.
@@ -71,11 +72,11 @@ impl Layout {
             return Err(Error::recording(path, what, WHAT_TO_GIVE));
         }
         // A described film or plain folder has its frames at the root, a recording in one folder a view.
-        let sequence = path.join(DEPTH_LIST).is_file();
-        let described = path.join(DESCRIPTION).is_file() && !sequence;
+        let sequence = is_there(&path.join(DEPTH_LIST))?;
+        let described = is_there(&path.join(DESCRIPTION))? && !sequence;
         Ok(if described && !folder::is_plain(path)? {
             Layout::Recording
-        } else if path.join(INDEX).is_file() {
+        } else if is_there(&path.join(INDEX))? {
             Layout::Dump
         } else if sequence {
             Layout::Sequence
@@ -151,7 +152,7 @@ pub(crate) fn describe_folder(
     assumed: &Assumed,
 ) -> Result<(Sensor, Vec<String>)> {
     let description = root.join(DESCRIPTION);
-    if description.is_file() {
+    if is_there(&description)? {
         assumed.refuse_beside(&description)?;
         return Ok((read_description(&description)?, Vec::new()));
     }

@@ -9,7 +9,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use tempfile::NamedTempFile;
 
-use super::unfinished::{UNFINISHED, is_being_filled};
+use super::unfinished::{is_being_filled, unfinished};
 use crate::error::{Error, Result};
 
 /// Never mix a new recording into somebody's folder.
@@ -57,7 +57,8 @@ pub(crate) fn write_atomic_with(
 /// run has left is not.
 fn beside(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(UNFINISHED);
+    let name = unfinished();
+    builder.prefix(&name);
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666)); // less the umask
     let file = builder.tempfile_in(folder)?;

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::folder::INDEX;
 use super::layout::{DEPTH_LIST, DESCRIPTION};
 use super::output::{entries, listed, sync_folder, write_atomic};
-use super::unfinished::{Open, UNFINISHED, discard, discard_stale, lock, register};
+use super::unfinished::{Open, UNFINISHED, discard, discard_stale, lock, register, unfinished};
 use crate::error::{Error, Result};
 
 /// What a command fills its folder with.
@@ -68,7 +68,7 @@ impl OutputFolder {
         }
         // Where nothing stands yet, the first to finish has the place, and the other says so.
         let of_place = if stands == Stands::Nothing { None } else { lock(place)? };
-        let unique = format!("{UNFINISHED}{}-{}", std::process::id(), next_number());
+        let unique = format!("{}{}", unfinished(), next_number());
         let (parents, staging) = if stands == Stands::Nothing {
             let absolute = std::path::absolute(place).map_err(|e| Error::write(place, e))?;
             let parent = absolute.parent().unwrap_or(&absolute).to_path_buf();

@@ -1,5 +1,6 @@
 //! The folders that this process is filling, so that one that is interrupted can take them away.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -69,7 +70,7 @@ pub(super) fn lock(folder: &Path) -> Result<Option<fs::File>> {
     }
 }
 
-/// A folder or a file is locked long before.
+/// A folder or a file is locked long before, should its process not be known.
 const STALE: Duration = Duration::from_secs(60);
 
 /// Remove from `parent` what runs left that were killed: nobody has it locked. What is set aside for
@@ -82,7 +83,8 @@ pub fn discard_stale(parent: &Path) {
         let path = entry.path();
         let Ok(about) = entry.metadata() else { continue };
         let age = about.modified().ok().and_then(|time| time.elapsed().ok());
-        let stale = path.extension().is_none() && age.is_some_and(|age| age > STALE);
+        let old = age.is_some_and(|age| age > STALE);
+        let stale = path.extension().is_none() && (old || is_of_the_dead(&entry.file_name()));
         let free = || fs::File::open(&path).is_ok_and(|open| open.try_lock().is_ok());
         let _ = match (about.is_dir(), about.is_file()) {
             (true, _) if stale && free() => fs::remove_dir_all(&path),
@@ -90,6 +92,21 @@ pub fn discard_stale(parent: &Path) {
             _ => Ok(()),
         };
     }
+}
+
+/// How the name of what this process has not finished begins.
+pub(super) fn unfinished() -> String {
+    format!("{UNFINISHED}{}-", std::process::id())
+}
+
+/// Is this the name of what a process had not finished that is no more? Where that cannot be told it is
+/// not.
+fn is_of_the_dead(name: &OsStr) -> bool {
+    let name = name.to_string_lossy();
+    let id = name.strip_prefix(UNFINISHED).and_then(|rest| rest.split_once('-'));
+    let Some(id) = id.and_then(|(id, _)| id.parse::<u32>().ok()) else { return false };
+    let processes = Path::new("/proc");
+    processes.join("self").exists() && !processes.join(id.to_string()).exists()
 }
 
 /// Is `folder` part of an output that is not in its place yet?

@@ -51,6 +51,8 @@ pub struct Sequence {
     pub moments: Vec<Moment>,
     /// True poses, in time order; empty where there are none.
     pub truth: Vec<Pose>,
+    /// Why the ground truth that is there is not used.
+    pub unused_truth: Option<String>,
     pub remarks: Vec<String>,
 }
 

@@ -8,7 +8,7 @@ use super::{Moment, Sequence};
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
 use crate::io::{Assumed, entries, refuse_impossible, size_of};
-use crate::read::read_text;
+use crate::read::{first_there, is_there, read_text};
 use crate::trajectory::{FARTHEST_PLACE_M, Pose};
 use crate::view::FrameRef;
 
@@ -40,9 +40,9 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
         let Some((name, number)) = stem(&path) else { continue };
         let stamp = number / RATE_HZ;
         let colour = ["color.png", "color.jpg"].map(|kind| root.join(format!("{name}.{kind}")));
-        let colour = colour.into_iter().find(|p| p.is_file()).map(|p| FrameRef::file(stamp, p));
+        let colour = first_there(colour)?.map(|p| FrameRef::file(stamp, p));
         let pose = root.join(format!("{name}.pose.txt"));
-        if pose.is_file() {
+        if is_there(&pose)? {
             match read_pose(&pose)? {
                 Some(world_from_camera) => truth.push(Pose { stamp, world_from_camera }),
                 None => remarks.push(format!("{} is no pose; left out", pose.display())),
@@ -62,7 +62,7 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     let sensor = assumed.sensor("7-Scenes Kinect", size, INTRINSICS, CODE)?;
     let frames: Vec<&FrameRef> = moments.iter().map(|m| &m.depth).collect();
     remarks.extend(refuse_impossible(root, sensor.code, &frames)?);
-    Ok(Sequence { root: root.to_path_buf(), sensor, moments, truth, remarks })
+    Ok(Sequence { root: root.to_path_buf(), sensor, moments, truth, unused_truth: None, remarks })
 }
 
 /// A 4 x 4 matrix, `world_from_camera`; `None` where tracking had failed (not finite).

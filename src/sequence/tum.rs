@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::io::{
     Assumed, DESCRIPTION, Layout, content_lines, entries, open_uncut, read_list, results_in,
 };
-use crate::read::read_text;
+use crate::read::{first_there, is_there, read_text};
 use crate::trajectory::{associate, read_benchmark};
 use crate::view::FrameRef;
 
@@ -35,16 +35,17 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
         ));
     }
     let truth = root.join("groundtruth.txt");
-    let truth = if truth.is_file() {
-        read_benchmark(&truth).map(|t| t.poses).unwrap_or_else(|e| {
-            remarks.push(format!("the ground truth is not used: {e}"));
-            Vec::new()
-        })
-    } else {
-        Vec::new()
+    let read = is_there(&truth).and_then(|there| match there {
+        true => read_benchmark(&truth).map(|t| t.poses),
+        false => Ok(Vec::new()),
+    });
+    let (truth, unused_truth) = match read {
+        Ok(poses) => (poses, None),
+        Err(e) => (Vec::new(), Some(e.to_string())),
     };
+    remarks.extend(unused_truth.iter().map(|why| format!("the ground truth is not used: {why}")));
     let root = root.to_path_buf();
-    Ok(Sequence { root, sensor: recording.sensor, moments, truth, remarks })
+    Ok(Sequence { root, sensor: recording.sensor, moments, truth, unused_truth, remarks })
 }
 
 fn no_sequence(root: &Path) -> Error {
@@ -81,7 +82,7 @@ fn with_colour(
     depth: Vec<FrameRef>,
     remarks: &mut Vec<String>,
 ) -> Result<Vec<Moment>> {
-    let associations = ASSOCIATIONS.iter().map(|name| root.join(name)).find(|p| p.is_file());
+    let associations = first_there(ASSOCIATIONS.map(|name| root.join(name)))?;
     let partner = match associations {
         Some(file) => listed(root, &file, &depth)?,
         None => nearest(root, &depth, remarks)?,
@@ -100,7 +101,7 @@ fn nearest(
     remarks: &mut Vec<String>,
 ) -> Result<Vec<Option<FrameRef>>> {
     let path = root.join("rgb.txt");
-    if !path.is_file() {
+    if !is_there(&path)? {
         return Ok(vec![None; depth.len()]);
     }
     let colour = read_list(&path)?;

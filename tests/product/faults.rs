@@ -3,57 +3,22 @@
 //! reports/reliability has the same at length.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use kinoise::io::{Assumed, open};
-use kinoise::simulate::room::{Film, Room, around_the_desks};
-use kinoise::{CalibrateOptions, NoiseModel, Seed, SigmaModel, measure_recording, model_of};
+use kinoise::{CalibrateOptions, measure_recording, model_of};
 
 use crate::common::{GOOD_VIEWS, copy_tree, good, tree, write_depth};
+use crate::desk::Desk;
 
-/// A folder to work in, with a recording, a film and a model.
-struct Desk {
-    folder: tempfile::TempDir,
-}
-
-impl Desk {
-    fn new() -> Self {
-        let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder");
-        copy_tree(good(), &folder.path().join("rec"));
-        let film = Film {
-            sensor: Film::kinect(4),
-            room: Room::office(Seed(1)),
-            poses: around_the_desks().into_iter().take(4).collect(),
-            sigma: SigmaModel::paper(),
-            effects: Vec::new(),
-            seed: Seed(1),
-        };
-        film.write(&folder.path().join("film"), &|_, _| ()).expect("written");
-        NoiseModel::paper().write(&folder.path().join("model.json")).expect("written");
-        Desk { folder }
-    }
-
-    fn at(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    /// The program with the words of `line`, started by a shell's `before`.
-    fn shell(&self, before: &str, line: &str) -> Command {
-        let mut command = Command::new("bash");
-        command.current_dir(self.folder.path());
-        command.args([
-            "-c",
-            &format!("{before} exec \"$0\" \"$@\""),
-            env!("CARGO_BIN_EXE_kinoise"),
-        ]);
-        command.args(line.split(' ')).env("SOURCE_DATE_EPOCH", "1700000000");
-        command
-    }
-
-    fn run(&self, line: &str) -> Output {
-        self.shell("", line).output().expect("bash")
-    }
+/// The program with the words of `line`, started by a shell's `before`.
+fn shell(desk: &Desk, before: &str, line: &str) -> Command {
+    let mut command = Command::new("bash");
+    command.current_dir(desk.path());
+    command.args(["-c", &format!("{before} exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_kinoise")]);
+    command.args(line.split(' ')).env("SOURCE_DATE_EPOCH", "1700000000");
+    command
 }
 
 fn said(output: &Output) -> String {
@@ -71,7 +36,7 @@ fn failed(output: &Output, line: &str, needle: &str) {
 /// The limit of a file's size breaks off a write as a full disk does.
 #[test]
 fn a_full_disk_costs_the_run_and_nothing_that_was_there() {
-    let desk = Desk::new();
+    let desk = Desk::furnished();
     for line in [
         "calibrate rec -o out",
         "diagnose rec -m model.json -o out",
@@ -84,18 +49,18 @@ fn a_full_disk_costs_the_run_and_nothing_that_was_there() {
         "simulate out --room --shrink 4 --frames 2",
         "export model.json --format npz -o out",
     ] {
-        let before = tree(desk.folder.path());
-        let limited = |line: &str| desk.shell("ulimit -f 1;", line).output().expect("bash");
+        let before = tree(desk.path());
+        let limited = |line: &str| shell(&desk, "ulimit -f 1;", line).output().expect("bash");
         failed(&limited(line), line, "ulimit -f");
-        assert!(tree(desk.folder.path()) == before, "{line}: something was written");
+        assert!(tree(desk.path()) == before, "{line}: something was written");
         assert!(!desk.at("out").exists(), "{line}");
 
         // Over results of an earlier run, which stay as they are.
-        let done = desk.run(line);
+        let done = shell(&desk, "", line).output().expect("bash");
         assert!(matches!(done.status.code(), Some(0 | 1)), "{line}: {}", said(&done));
-        let before = tree(desk.folder.path());
+        let before = tree(desk.path());
         failed(&limited(&format!("{line} --force")), line, "ulimit -f");
-        assert!(tree(desk.folder.path()) == before, "{line}: the earlier results changed");
+        assert!(tree(desk.path()) == before, "{line}: the earlier results changed");
         if desk.at("out").is_dir() {
             fs::remove_dir_all(desk.at("out")).expect("removed");
         } else {
@@ -107,7 +72,7 @@ fn a_full_disk_costs_the_run_and_nothing_that_was_there() {
 #[cfg(target_os = "linux")] // /dev/full
 #[test]
 fn an_answer_that_nobody_gets_is_a_failure_and_a_lost_message_is_none() {
-    let desk = Desk::new();
+    let desk = Desk::furnished();
     for line in [
         "effects --list",
         "effects --json",
@@ -117,17 +82,17 @@ fn an_answer_that_nobody_gets_is_a_failure_and_a_lost_message_is_none() {
         "calibrate rec -o out --json",
     ] {
         let full = fs::File::options().write(true).open("/dev/full").expect("a device");
-        let output = desk.shell("", line).stdout(full).output().expect("bash");
+        let output = shell(&desk, "", line).stdout(full).output().expect("bash");
         failed(&output, line, "stdout");
         // A reader that has seen enough is no failure.
-        let closed = desk.shell("exec 1> >(:); sleep 0.1;", line).stderr(Stdio::null()).status();
+        let closed = shell(&desk, "exec 1> >(:); sleep 0.1;", line).stderr(Stdio::null()).status();
         assert_eq!(closed.expect("bash").code(), Some(0), "{line}");
         let _ = fs::remove_dir_all(desk.at("out"));
     }
     for (line, code) in [("calibrate rec -o out", 0), ("calibrate none -o none", 2), ("no", 2)] {
         for stderr in ["2>/dev/full", "2>&-", "2> >(:); sleep 0.1"] {
             let _ = fs::remove_dir_all(desk.at("out"));
-            let status = desk.shell(&format!("exec {stderr};"), line).status().expect("bash");
+            let status = shell(&desk, &format!("exec {stderr};"), line).status().expect("bash");
             assert_eq!(status.code(), Some(code), "{line} {stderr}");
         }
     }

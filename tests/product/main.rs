@@ -18,6 +18,7 @@ mod command_line;
 mod containers;
 mod correct;
 mod degenerate;
+mod desk;
 mod determinism;
 mod distances;
 mod effects;
@@ -32,6 +33,8 @@ mod fuzz_corpus;
 mod hostile;
 mod invariances;
 mod layouts;
+#[cfg(unix)] // pipes
+mod limits;
 mod map;
 mod measure;
 mod metrics;

@@ -1,0 +1,160 @@
+//! What every input may be: names, texts, numbers and files have their limits, and what is beyond them is
+//! refused by its name where it is read.
+
+use std::fs;
+
+use serde_json::{Value, json};
+
+use crate::desk::{Desk, fifo};
+
+/// A newline in the sensor's name wrote a line that looked like the program's own.
+#[test]
+fn a_sensors_name_stands_on_one_line() {
+    for (key, name) in [
+        ("sensor", "Kinect\nkinoise: all is well"),
+        ("serial", "A\u{1b}[31m"),
+        ("mode", "normal\r"),
+    ] {
+        let desk = Desk::new();
+        desk.describe(|sensor| sensor[key] = json!(name));
+        for command in ["calibrate rec -o out", "metrics rec", "diagnose rec -o out"] {
+            let says = ["recording.json, line ", key, "control character"];
+            desk.refused(command, &says);
+        }
+        desk.model("model.json", |model| {
+            model["sensor"] = json!({"format": "recording/1", "sensor": "Kinect", "width": 160,
+                "height": 120, "fx": 145, "fy": 145, "cx": 79.5, "cy": 59.5, "units_per_metre": 5000});
+            model["sensor"][key] = json!(name);
+        });
+        desk.refused("export model.json --format c -o noise.h", &["sensor: ", "control character"]);
+    }
+}
+
+/// 20 MB of "mode" were kept in every result.
+#[test]
+fn texts_have_their_length() {
+    let long = "x".repeat(1 << 20);
+    for (key, says) in [("sensor", "1048576"), ("mode", "1048576"), ("anything", "anything")] {
+        let desk = Desk::new();
+        desk.describe(|sensor| sensor[key] = json!(long));
+        desk.refused("calibrate rec -o out", &["recording.json, line ", key, says]);
+    }
+    let desk = Desk::new();
+    desk.put("rec/0000/view.json", format!("{{\n\"notes\": \"{long}\"}}"));
+    let told = desk.done("calibrate rec -o out");
+    assert!(told.contains("view.json, line 2: notes = a text of 1048576 bytes"), "{told}");
+    for pointer in ["/provenance/tool", "/sigma/formula", "/fit/remarks"] {
+        desk.model("model.json", |model| match model.pointer_mut(pointer) {
+            Some(Value::String(text)) => *text = long.clone(),
+            _ => model["fit"]["remarks"] = json!([long]),
+        });
+        desk.refused("export model.json --format c -o noise.h", &["a text of 1048576 bytes"]);
+    }
+    let short = format!("{} notes", "x".repeat(1000));
+    desk.put("rec/0000/view.json", json!({"notes": short}).to_string());
+    assert!(!desk.done("calibrate rec -o out2").contains("0000 was left out"));
+}
+
+#[test]
+fn an_error_of_the_principal_point_has_its_line() {
+    for (key, value) in [("cx", 5000.0), ("cy", -20.0), ("fy", -1.0), ("fx", 0.0)] {
+        let desk = Desk::new();
+        desk.describe(|sensor| sensor[key] = json!(value));
+        let text = fs::read_to_string(desk.at("rec/recording.json")).expect("text");
+        let line = 1 + text.lines().position(|l| l.contains(&format!("\"{key}\""))).expect("there");
+        desk.refused("calibrate rec -o out", &[&format!("recording.json, line {line}: {key}")]);
+    }
+}
+
+/// They were passed over, or called missing.
+#[test]
+fn what_is_no_regular_file_is_told() {
+    for (name, line) in [
+        ("rec/recording.json", "calibrate rec -o out"),
+        ("film/depth.txt", "map film -o out"),
+        ("film/recording.json", "map film -o out"),
+        ("film/groundtruth.txt", "compare film -o out"),
+        ("film/rgb.txt", "map film -o out"),
+        ("film/associations.txt", "map film -o out"),
+    ] {
+        let desk = Desk::furnished();
+        for make in [fifo, |path: &std::path::Path| fs::create_dir(path).expect("made")] {
+            let _ = fs::remove_file(desk.at(name));
+            make(&desk.at(name));
+            desk.refused(line, &[name, "not a regular file"]);
+            let _ = fs::remove_dir(desk.at(name));
+        }
+    }
+    let desk = Desk::furnished();
+    let images = desk.images("film");
+    fs::remove_file(&images[1]).expect("removed");
+    fifo(&images[1]);
+    let told = desk.done("map film -o out");
+    assert!(told.contains("depth.txt line") && told.contains("not a regular file"), "{told}");
+    fs::create_dir(desk.at("plain")).expect("made");
+    for (k, image) in [0, 2, 3].into_iter().enumerate() {
+        fs::copy(&images[image], desk.at(&format!("plain/{k}.png"))).expect("copied");
+    }
+    fifo(&desk.at("plain/9.png"));
+    let told = desk.run("metrics plain --intrinsics 145,145,79.5,59.5 --units-per-metre 5000");
+    let told = String::from_utf8_lossy(&told.stderr);
+    assert!(told.contains("9.png") && told.contains("not a regular file"), "{told}");
+}
+
+/// It said that there is none.
+#[test]
+fn a_comparison_names_the_line_of_its_ground_truth() {
+    let desk = Desk::furnished();
+    let good = fs::read_to_string(desk.at("film/groundtruth.txt")).expect("text");
+    let lines = good.lines().count();
+    desk.put("film/groundtruth.txt", format!("{good}9 1e155 0 0 0 0 0 1\n"));
+    let says = [&*format!("groundtruth.txt, line {}: ", lines + 1), "1e155"];
+    desk.refused("compare film -o out", &says);
+}
+
+/// An image larger than its pixels is not one; a list or a video of gigabytes is none of a recording.
+#[test]
+fn files_of_a_recording_have_the_size_of_their_kind() {
+    let sparse = |desk: &Desk, name: &str, megabytes: u64| {
+        let file = fs::File::create(desk.at(name)).expect("made");
+        file.set_len(megabytes << 20).expect("a disk with sparse files");
+    };
+    for (name, megabytes, says) in [
+        ("rec/extra.png", 65, "(64 MB)"),
+        ("rec/extra.txt", 257, "(256 MB)"),
+        ("rec/extra.mp4", 3000, "(1024 MB)"),
+    ] {
+        let desk = Desk::furnished();
+        sparse(&desk, name, megabytes);
+        desk.refused("correct rec -m model.json -o out", &[name, says]);
+        assert!(!desk.at("out").exists());
+    }
+    let desk = Desk::new();
+    let folder = fs::read_dir(desk.at("rec/0000/depth")).expect("images");
+    for image in folder {
+        let file = fs::File::options().write(true).open(image.expect("one").path()).expect("open");
+        file.set_len(3 << 20).expect("longer");
+    }
+    let told = desk.done("calibrate rec -o out");
+    assert!(told.contains("0000 was left out") && told.contains("MB"), "{told}");
+}
+
+/// A run that begins at once after a kill removes what that one left.
+#[test]
+fn what_the_dead_left_goes_whatever_its_age() {
+    let desk = Desk::new();
+    let mut child = std::process::Command::new("true").spawn().expect("true");
+    let dead = child.id();
+    child.wait().expect("it ends");
+    let alive = std::process::id();
+    for name in [format!(".kinoise-{dead}-0"), format!(".kinoise-{alive}-0")] {
+        fs::create_dir(desk.at(&name)).expect("made");
+    }
+    desk.put(&format!(".kinoise-{dead}-aBcDeF"), "half");
+    desk.put(&format!(".kinoise-{dead}-1.kept/whole"), "");
+    desk.done("calibrate rec -o out");
+    assert!(!desk.at(&format!(".kinoise-{dead}-0")).exists());
+    assert!(!desk.at(&format!(".kinoise-{dead}-aBcDeF")).exists());
+    assert!(desk.at(&format!(".kinoise-{alive}-0")).exists());
+    assert!(desk.at(&format!(".kinoise-{dead}-1.kept")).exists());
+}
