@@ -6,12 +6,14 @@ use kinoise::calibrate::{Measurements, measure, model_of};
 use kinoise::io::{OutputFolder, open};
 use kinoise::measure::{MeasureOptions, Planes, read_table, write_measurements};
 use kinoise::report::{CalibrationPage, Overlay, calibration_page, figure2, sigma_map};
-use kinoise::units::{counted, shortest};
+use kinoise::units::counted;
 use kinoise::{CalibrateOptions, Calibration, Form, Recording, SigmaKind, model_of_table, stats};
 
 use super::calibrate_summary::{as_json, comparison, formula};
-use super::common::{Global, Input, one_of, source_date};
-use super::console::{beside, detail, detail_recording, next_step, notes, result, say, working};
+use super::common::{Global, Input, between, one_of, source_date};
+use super::console::{
+    beside, detail, detail_recording, next_step, notes, result_lines, say, say_lines, working,
+};
 use super::origin::origin;
 use super::output::{CALIBRATION, begin};
 
@@ -58,7 +60,7 @@ struct Measuring {
     ]))]
     planes: Planes,
     /// The paper's RANSAC threshold in m [default: 3 robust standard deviations of the view]
-    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    #[arg(long, value_name = "M", allow_hyphen_values = true, value_parser = between(1e-6, 1.0, "m"))]
     ransac_threshold: Option<f64>,
 }
 
@@ -97,11 +99,6 @@ impl Fitting {
 impl Arguments {
     fn options(&self, global: &Global) -> anyhow::Result<CalibrateOptions> {
         let Measuring { sigma, planes, ransac_threshold } = self.measuring;
-        if let Some(t) = ransac_threshold
-            && !(t > 0.0 && t.is_finite())
-        {
-            bail!("--ransac-threshold {}: give a positive distance in m", shortest(t));
-        }
         let measure = MeasureOptions {
             planes,
             ransac_threshold_m: ransac_threshold,
@@ -252,8 +249,8 @@ fn write_outputs(out: OutputFolder, page: &CalibrationPage<'_>) -> anyhow::Resul
         let beside = "with sigma.svg, sigma_map.svg and report.html beside it";
         say(format!("wrote {}, {beside}\n", place.join("model.json").display()));
     }
-    result(formula(calibration));
-    say(comparison(calibration));
+    result_lines(formula(calibration));
+    say_lines(comparison(calibration));
     notes(&calibration.warnings);
     if let Some((what, remedy)) = useless {
         let page = place.join("report.html");

@@ -35,8 +35,8 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(1, MAX_FRAMES))]
     hold: usize,
     /// Give the stream up after so many seconds without a frame
-    #[arg(long, value_name = "S", default_value_t = 10)]
-    patience: u64,
+    #[arg(long, value_name = "S", default_value_t = 10, value_parser = count(1, MAX_PATIENCE_S))]
+    patience: usize,
     /// Print lines of text, without a screen and keys, on a terminal too
     #[arg(long)]
     plain: bool,
@@ -54,6 +54,9 @@ pub struct Arguments {
     #[command(flatten, next_help_heading = super::INPUT_HEADING)]
     input: Input,
 }
+
+/// A day, s.
+const MAX_PATIENCE_S: usize = 86_400;
 
 /// Which views are to be taken.
 #[derive(Debug, Args)]
@@ -144,7 +147,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
         } else {
             Box::new(Log)
         };
-        let patience = Duration::from_secs(arguments.patience.max(1));
+        let patience = Duration::from_secs(arguments.patience as u64);
         capture(source.as_mut(), &mut session, &mut guide, interface.as_mut(), patience, &stop)
     };
     notes(&source.remarks()[noted..]);
@@ -208,7 +211,7 @@ fn source(arguments: &Arguments, paced: bool) -> anyhow::Result<Box<dyn Source>>
             Box::new(FreenectSource::open(options)?)
         }
         SourceKind::Folder(path) => {
-            let patience = Duration::from_secs(arguments.patience.max(1));
+            let patience = Duration::from_secs(arguments.patience as u64);
             Box::new(Growing::open(path, &assumed, patience)?)
         }
         SourceKind::Play(path) => Box::new(Playback::open(path, &assumed, paced)?),

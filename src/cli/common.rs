@@ -7,12 +7,13 @@ use std::time::{Duration, SystemTime};
 use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use kinoise::frame::KINECT_NO_MEASUREMENT;
+use kinoise::frame::{KINECT_NO_MEASUREMENT, UNITS_PER_METRE};
 use kinoise::io::Assumed;
 use kinoise::map::outside;
 use kinoise::sensors::{PRESETS, Preset};
 use kinoise::sequence::Sequence;
 use kinoise::units::shortest;
+use kinoise::view::BASELINE_M;
 use kinoise::{DepthCode, NoiseModel, Seed, Sensor};
 
 use super::console::{Verbosity, answer, detail, detail_model, say};
@@ -70,18 +71,18 @@ pub struct Input {
     #[arg(
         long,
         value_name = "FX,FY,CX,CY",
-        value_parser = numbers::<4>,
+        value_parser = numbers::<4>(-1.0, MAX_PX, "px"),
         allow_hyphen_values = true
     )]
     intrinsics: Option<[f64; 4]>,
     /// Raw depth values per metre (1000 = mm, 5000 = TUM), for folders without recording.json
-    #[arg(long, value_name = "N", conflicts_with = "raw_disparity")]
+    #[arg(long, value_name = "N", conflicts_with = "raw_disparity", allow_hyphen_values = true, value_parser = between(UNITS_PER_METRE[0], UNITS_PER_METRE[1], "1/m"))]
     units_per_metre: Option<f64>,
     /// Raw Kinect disparities: z = 1/(C0 + C1 raw), for folders without recording.json
-    #[arg(long, value_name = "C0,C1", value_parser = numbers::<2>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "C0,C1", value_parser = numbers::<2>(-MAX_INVERSE_M, MAX_INVERSE_M, "1/m"), allow_hyphen_values = true)]
     raw_disparity: Option<[f64; 2]>,
     /// Projector-camera distance in m, for folders without recording.json
-    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    #[arg(long, value_name = "M", allow_hyphen_values = true, value_parser = between(BASELINE_M[0], BASELINE_M[1], "m"))]
     baseline: Option<f64>,
     /// A usual camera, for what the folder or bag does not say of its own
     #[arg(long, value_name = "ID", value_parser = PossibleValuesParser::new(PRESETS.iter().map(|p| {
@@ -221,7 +222,7 @@ pub struct Thinning {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = count(1, MAX_FRAMES))]
     pub stride: usize,
     /// Stop after N of those
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count(1, MAX_FRAMES))]
     pub frames: Option<usize>,
 }
 
@@ -233,6 +234,11 @@ impl Thinning {
         stride.into_iter().chain(frames).flatten().collect()
     }
 }
+
+/// A focal length of no camera that images of 16 megapixels are read of.
+const MAX_PX: f64 = 1e6;
+/// Inverse depths end at 1 cm.
+const MAX_INVERSE_M: f64 = 100.0;
 
 /// An hour at 30 Hz.
 pub const MAX_FRAMES: usize = 108_000;
@@ -271,16 +277,26 @@ pub fn between(
     }
 }
 
-/// "a,b,..." as exactly `N` numbers, for clap.
+/// "a,b,..." as exactly `N` numbers from `low` to `high`, for clap.
 ///
 /// (clap's `num_args` counts arguments before it splits them at commas, so it cannot say this.)
-pub fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let parsed: Vec<f64> = text
-        .split(',')
-        .map(|part| part.trim().parse().map_err(|_| format!("\"{part}\" is not a number")))
-        .collect::<Result<_, String>>()?;
-    let given = parsed.len();
-    parsed.try_into().map_err(|_| format!("{given} numbers where {N} are needed, with commas"))
+pub fn numbers<const N: usize>(
+    low: f64,
+    high: f64,
+    unit: &'static str,
+) -> impl Fn(&str) -> Result<[f64; N], String> + Clone {
+    move |text| {
+        let one = |part: &str| -> Result<f64, String> {
+            let number = part.trim().parse().map_err(|_| format!("\"{part}\" is not a number"))?;
+            match (low..=high).contains(&number) {
+                true => Ok(number),
+                false => Err(format!("give numbers from {low} to {high} {unit}")),
+            }
+        };
+        let parsed: Vec<f64> = text.split(',').map(one).collect::<Result<_, String>>()?;
+        let given = parsed.len();
+        parsed.try_into().map_err(|_| format!("{given} numbers where {N} are needed, with commas"))
+    }
 }
 
 /// When results are to say that they were made: SOURCE_DATE_EPOCH, the convention of reproducible

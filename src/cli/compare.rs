@@ -1,13 +1,12 @@
 use std::path::{Path, PathBuf};
 
-use anyhow::ensure;
 use clap::Args;
 use kinoise::compare::{compare, of_the_paper, past_the_paper, tables};
 use kinoise::report::{comparison_figures, comparison_page};
 use kinoise::sequence::open;
 
-use super::common::{Global, Input, Model, Thinning};
-use super::console::{beside, next_step, notes, result, say};
+use super::common::{Global, Input, Model, Thinning, count};
+use super::console::{beside, next_step, notes, result_lines, say};
 use super::origin::origin;
 use super::output::{COMPARISON, begin};
 
@@ -15,6 +14,9 @@ pub const EXAMPLES: &str = "\
 Examples:
   kinoise compare rgbd_dataset_freiburg1_desk -o out/desk -m out/kinect/model.json
   kinoise compare rgbd_dataset_freiburg1_desk -o out/steps --ablation --repeats 3";
+
+/// Runs of each variant: their scatter is known well before.
+const MAX_REPEATS: usize = 100;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -29,7 +31,7 @@ pub struct Arguments {
     #[arg(long)]
     ablation: bool,
     /// Number of runs of each variant that draws random numbers
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = count(1, MAX_REPEATS))]
     repeats: usize,
     #[command(flatten, next_help_heading = "Frames")]
     thinning: Thinning,
@@ -38,7 +40,6 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
-    ensure!(arguments.repeats > 0, "--repeats 0: give 1 or more");
     let mut sequence = open(&arguments.sequence, &arguments.input.assumed()?)?;
     sequence.thin(arguments.thinning.stride, arguments.thinning.frames);
     notes(&sequence.remarks);
@@ -63,7 +64,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let origin = origin(&arguments.sequence, &arguments.output, global.seed().0);
     output.write("report.html", comparison_page(&comparison, &origin)?.as_bytes())?;
     output.finish()?;
-    result(text);
+    result_lines(text);
     say(format!("wrote {}", arguments.output.join("report.html").display()));
     global.print_json(&json)?;
     let to = beside(&arguments.output, "map");

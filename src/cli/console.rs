@@ -65,8 +65,32 @@ fn escaped(text: &str, kept: impl Fn(char) -> bool) -> String {
 /// Longer messages lose their middle: what is said first and what is to be done last stay.
 const MAX_MESSAGE: usize = 1200;
 
+/// Digits in a row that are shown: a double has 17, and what is longer is a slip.
+const MAX_DIGITS: usize = 40;
+/// Of a longer number.
+const SHOWN_DIGITS: usize = 17;
+
+/// Numbers of hundreds of digits cut.
+fn short_numbers(text: &str) -> String {
+    let mut short = String::new();
+    let mut rest = text;
+    while let Some(begin) = rest.find(|c: char| c.is_ascii_digit()) {
+        let (before, number) = rest.split_at(begin);
+        let count = number.find(|c: char| !c.is_ascii_digit()).unwrap_or(number.len());
+        short += before;
+        if count > MAX_DIGITS {
+            short += &format!("{}... ({count} digits)", &number[..SHOWN_DIGITS]);
+        } else {
+            short += &number[..count];
+        }
+        rest = &number[count..];
+    }
+    short + rest
+}
+
 /// A message on one line.
 pub fn one_line(text: &str) -> String {
+    let text = &short_numbers(text);
     let count = text.chars().count();
     if count <= MAX_MESSAGE {
         return escaped(text, |_| false);
@@ -82,8 +106,22 @@ pub fn one_line(text: &str) -> String {
     )
 }
 
-/// What the command was run for; also with --quiet.
-pub fn result(text: impl AsRef<str>) {
+/// One line. What would end it within, in somebody's name, is made visible; an empty line before or
+/// after it may be asked for.
+fn print_line(least: u8, text: &str) {
+    let line = text.trim_matches('\n');
+    let begin = text.len() - text.trim_start_matches('\n').len();
+    let (before, after) = (&text[..begin], &text[(begin + line.len()).min(text.len())..]);
+    print(least, &format!("{before}{}{after}", escaped(line, |_| false)));
+}
+
+/// What the command was run for, a line; also with --quiet.
+pub fn result(line: impl AsRef<str>) {
+    print_line(QUIET, line.as_ref());
+}
+
+/// The same in several lines, none of which holds a name of somebody's.
+pub fn result_lines(text: impl AsRef<str>) {
     print(QUIET, text.as_ref());
 }
 
@@ -102,13 +140,18 @@ pub fn answer(text: &[u8]) -> std::io::Result<()> {
 }
 
 /// A line for people.
-pub fn say(text: impl AsRef<str>) {
+pub fn say(line: impl AsRef<str>) {
+    print_line(USUAL, line.as_ref());
+}
+
+/// Lines for people, none of which holds a name of somebody's.
+pub fn say_lines(text: impl AsRef<str>) {
     print(USUAL, text.as_ref());
 }
 
 /// With --verbose alone.
-pub fn detail(text: impl AsRef<str>) {
-    print(VERBOSE, text.as_ref());
+pub fn detail(line: impl AsRef<str>) {
+    print_line(VERBOSE, line.as_ref());
 }
 
 pub fn detail_recording(recording: &Recording) {
@@ -263,6 +306,14 @@ mod tests {
         let run = std::process::Command::new("sh").args(["-c", &echo]).output().expect("sh");
         let read = String::from_utf8(run.stdout).expect("text");
         assert_eq!(read.lines().collect::<Vec<_>>(), words);
+    }
+
+    #[test]
+    fn numbers_of_hundreds_of_digits_are_cut() {
+        let long = "9".repeat(150);
+        let said = one_line(&format!("--delta {long}.5: 12 to 1e300"));
+        assert_eq!(said, format!("--delta {}... (150 digits).5: 12 to 1e300", &long[..17]));
+        assert_eq!(one_line("of 1234567890123456789 s"), "of 1234567890123456789 s");
     }
 
     #[test]

@@ -20,7 +20,7 @@ use kinoise::{
 use super::calibrate::calibrate;
 use super::calibrate_summary::as_json;
 use super::common::{Global, source_date};
-use super::console::{next_step, result, say, shell, working};
+use super::console::{next_step, result, result_lines, say, say_lines, shell, working};
 use super::demo_seal::Sealed;
 use super::diagnose::{HeldAgainst, examine};
 use super::map::{Title, follow};
@@ -47,23 +47,24 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     say("1. Calibrate: how noisy is the sensor of the bundled recording?\n");
     let (recording, measured, calibration) = calibrated(seed, output, global)?;
     let model = &calibration.model;
-    say(format!(
-        "The recording was simulated with the paper's Eq. 1, so the first two columns should agree.\nOpen {} to see it all.",
-        output.join("report.html").display()
-    ));
+    say(
+        "The recording was simulated with the paper's Eq. 1, so the first two columns should agree.",
+    );
+    say(format!("Open {} to see it all.", output.join("report.html").display()));
 
     say("\n2. Diagnose: the same sensor once more, with one more cause that nobody has chosen.\n");
     let sealed = Sealed::draw(seed)?;
     let film = output.join("sealed");
     sealed.commit(output)?;
-    say(sealed.promise());
+    say_lines(sealed.promise());
     filmed(&sealed, &recording.sensor, &model.sigma, &film, seed)?;
     let (diagnosis, page) = diagnosed(&film, model, output, seed, global)?;
     write_atomic(&output.join("sealed.txt"), sealed.text().as_bytes())?;
     let (text, json) = sealed.opened(&diagnosis);
-    result(text);
+    result_lines(text);
     let check = shell(&["sha256sum".into(), output.join("sealed.txt").into()]);
-    say(format!("Check the hash with: {check}\nOpen {} to see how.", page.display()));
+    say(format!("Check the hash with: {check}"));
+    say(format!("Open {} to see how.", page.display()));
 
     mapped(&recording, model, output, global)?;
     let mut value = as_json(&calibration, Some(&measured));

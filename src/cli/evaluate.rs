@@ -6,10 +6,10 @@ use kinoise::evaluate::{Delta, Evaluation, Spread, clock_offset, evaluate};
 use kinoise::io::OutputFolder;
 use kinoise::report::{Against, Origin, evaluation_page};
 use kinoise::trajectory::{Pose, read_benchmark};
-use kinoise::units::counted;
+use kinoise::units::{counted, shortest};
 use serde_json::{Value, json};
 
-use super::common::Global;
+use super::common::{Global, MAX_FRAMES, between};
 use super::console::{notes, result, say};
 use super::origin::origin;
 use super::output::{EVALUATION, begin};
@@ -32,7 +32,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     estimate: PathBuf,
     /// The interval over which the relative error is taken
-    #[arg(long, value_name = "N", default_value_t = 1.0, allow_hyphen_values = true)]
+    #[arg(long, value_name = "N", default_value_t = 1.0, allow_hyphen_values = true, value_parser = between(DELTA_S[0], MAX_FRAMES as f64, "s or frames"))]
     delta: f64,
     /// Seconds to add to the estimate's times first, or auto: as many as both trajectories' turning
     /// says (it is found always, and told where it is significant)
@@ -57,13 +57,24 @@ enum Offset {
     Auto,
 }
 
+/// For the test of every option.
+#[cfg(test)]
+pub fn offset_type() -> std::any::TypeId {
+    std::any::TypeId::of::<Offset>()
+}
+
 fn offset(text: &str) -> Result<Offset, String> {
     if text == "auto" {
         return Ok(Offset::Auto);
     }
-    let seconds = text.parse().ok().filter(|s: &f64| s.is_finite());
-    seconds.map(Offset::Seconds).ok_or_else(|| "give seconds, or auto".into())
+    let seconds = between(-MAX_OFFSET_S, MAX_OFFSET_S, "s")(text);
+    seconds.map(Offset::Seconds).map_err(|why| format!("{why}, or auto"))
 }
+
+/// Three hundred years: clocks that count from 1970, and clocks that count from switching on.
+const MAX_OFFSET_S: f64 = 1e10;
+/// Of an interval: from a stamp's last digits to a day, s.
+const DELTA_S: [f64; 2] = [1e-3, 86_400.0];
 
 impl Arguments {
     /// What the estimate's clock is to be set forward by, s.
@@ -81,14 +92,15 @@ impl Arguments {
     }
 
     fn delta(&self) -> anyhow::Result<Delta> {
-        let positive = self.delta.is_finite() && self.delta > 0.0;
+        let (delta, shown, [low, high]) = (self.delta, shortest(self.delta), DELTA_S);
+        let frames = (1.0..=MAX_FRAMES as f64).contains(&delta) && delta.fract() == 0.0;
         match self.delta_unit {
-            Unit::S if positive => Ok(Delta::Seconds(self.delta)),
-            Unit::F if positive && self.delta.fract() == 0.0 && self.delta < 1e9 => {
-                Ok(Delta::Frames(self.delta as usize))
+            Unit::S if (low..=high).contains(&delta) => Ok(Delta::Seconds(delta)),
+            Unit::F if frames => Ok(Delta::Frames(delta as usize)),
+            Unit::S => bail!("--delta {shown}: give a number of seconds from {low} to {high}"),
+            Unit::F => {
+                bail!("--delta {shown}: give a whole number of frames from 1 to {MAX_FRAMES}")
             }
-            Unit::S => bail!("--delta {}: give a positive number of seconds", self.delta),
-            Unit::F => bail!("--delta {}: give a whole number of frames, 1 or more", self.delta),
         }
     }
 }

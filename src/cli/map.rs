@@ -4,7 +4,8 @@ use clap::Args;
 use kinoise::evaluate::{Delta, Evaluation, evaluate};
 use kinoise::io::OutputFolder;
 use kinoise::map::{
-    self, Alignment, Init, Kernel, Mapped, Options, Stages, Weights, frames_csv, ply,
+    self, Alignment, GATE_M, Init, Kernel, MAX_BLOCK_PX, MAX_ITERATIONS, MAX_OBSERVATIONS,
+    MAX_READOUT_S, Mapped, Options, Stages, VOXEL_M, Weights, frames_csv, ply,
 };
 use kinoise::report::{Against, MapPage, map_page};
 use kinoise::sequence::{Sequence, open};
@@ -13,7 +14,7 @@ use kinoise::units::counted;
 use kinoise::{NoiseModel, Seed};
 use serde_json::{Value, json};
 
-use super::common::{Global, Input, Model, Thinning, one_of};
+use super::common::{Global, Input, Model, Thinning, between, count, one_of};
 use super::console::{beside, detail, next_step, notes, result, say, working};
 use super::origin::origin;
 use super::output::{MAP, begin};
@@ -75,23 +76,23 @@ struct Tuning {
     ]))]
     kernel: Option<Kernel>,
     /// Side of a voxel in m
-    #[arg(long, value_name = "M")]
-    voxel: Option<f32>,
+    #[arg(long, value_name = "M", value_parser = between(VOXEL_M[0], VOXEL_M[1], "m"))]
+    voxel: Option<f64>,
     /// Side of an image block in px
-    #[arg(long, value_name = "PX")]
+    #[arg(long, value_name = "PX", value_parser = count(1, MAX_BLOCK_PX))]
     block: Option<usize>,
     /// Greatest distance between the points of a pair, m
-    #[arg(long, value_name = "M")]
-    gate: Option<f32>,
+    #[arg(long, value_name = "M", value_parser = between(GATE_M[0], GATE_M[1], "m"))]
+    gate: Option<f64>,
     /// Maximum number of iterations of an alignment
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count(1, MAX_ITERATIONS))]
     iterations: Option<usize>,
     /// Maximum number of observations that count for a piece of the map
-    #[arg(long, value_name = "N")]
-    memory: Option<f32>,
+    #[arg(long, value_name = "N", value_parser = between(1.0, MAX_OBSERVATIONS.into(), "observations"))]
+    memory: Option<f64>,
     /// Time from the first row of a depth image to the last, for a rolling shutter, s (a Kinect v1 takes
     /// about 0.03) [default: 0, all rows at once]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = between(0.0, MAX_READOUT_S, "s"))]
     readout: Option<f64>,
     /// Do not read colour for the map
     #[arg(long)]
@@ -108,11 +109,11 @@ impl Tuning {
             weights: self.weights.unwrap_or(options.weights),
             init: self.init.unwrap_or(options.init),
             kernel: self.kernel.unwrap_or(options.kernel),
-            voxel_m: self.voxel.unwrap_or(options.voxel_m),
+            voxel_m: self.voxel.map_or(options.voxel_m, |v| v as f32),
             block_px: self.block.unwrap_or(options.block_px),
-            max_correspondence_m: self.gate.unwrap_or(options.max_correspondence_m),
+            max_correspondence_m: self.gate.map_or(options.max_correspondence_m, |v| v as f32),
             max_iterations: self.iterations.unwrap_or(options.max_iterations),
-            max_observations: self.memory.unwrap_or(options.max_observations),
+            max_observations: self.memory.map_or(options.max_observations, |v| v as f32),
             readout_s: self.readout.unwrap_or(options.readout_s),
             colour: !self.no_colour,
             seed,

@@ -239,6 +239,51 @@ mod tests {
         }
     }
 
+    /// Every option that takes numbers says which: what is no number, what is beyond any, and what fills
+    /// the screen are refused where they are read.
+    #[test]
+    fn every_number_has_a_range() {
+        use std::any::TypeId;
+        let numbers = [
+            TypeId::of::<f64>(),
+            TypeId::of::<f32>(),
+            TypeId::of::<usize>(),
+            TypeId::of::<u64>(),
+            TypeId::of::<[f64; 2]>(),
+            TypeId::of::<[f64; 4]>(),
+            evaluate::offset_type(),
+        ];
+        let long = "9".repeat(200);
+        let mut looked_at = 0;
+        for command in subcommands() {
+            let is_number =
+                |a: &&clap::Arg| numbers.iter().any(|t| a.get_value_parser().type_id() == *t);
+            for argument in command.get_arguments().filter(is_number) {
+                let long_name = argument.get_long().expect("numbers are options");
+                let many = argument.get_value_names().map_or("", |n| n[0].as_str()).matches(',');
+                let times = if argument.get_value_delimiter().is_some() { 0 } else { many.count() };
+                for wrong in ["1e300", "-1e300", "NaN", "inf", "-inf", "1e999", &long, "", "x"] {
+                    // The seed may be any that a word of 64 bit holds.
+                    let value = vec![wrong; times + 1].join(",");
+                    let words = ["kinoise", command.get_name(), &format!("--{long_name}={value}")];
+                    let refused = Arguments::try_parse_from(words).expect_err("out of range");
+                    assert!(
+                        matches!(
+                            refused.kind(),
+                            ErrorKind::ValueValidation | ErrorKind::InvalidValue
+                        ),
+                        "{} --{long_name}={value}: {refused}",
+                        command.get_name()
+                    );
+                    let said = console::one_line(&one_line(&refused));
+                    assert!(said.len() < 400, "{said}");
+                }
+                looked_at += 1;
+            }
+        }
+        assert!(looked_at > 80, "{looked_at} options with numbers");
+    }
+
     /// Positions, -o, -m, the command's own, input without a description, general.
     #[test]
     fn options_come_in_one_order() {

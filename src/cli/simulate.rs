@@ -184,7 +184,7 @@ fn plans(
     global: &Global,
 ) -> anyhow::Result<(Vec<ViewPlan>, Option<Sensor>)> {
     let seed = global.seed();
-    let scenery = arguments.scenery.scenery()?;
+    let scenery = arguments.scenery.scenery();
     let Some(like) = &arguments.like else {
         let (frames, shuffled) = (arguments.frames.unwrap_or(1), !arguments.poses.ordered);
         let plans = plan_grid(&arguments.poses.views()?, &scenery, frames, shuffled, seed);

@@ -4,7 +4,6 @@ use anyhow::ensure;
 use clap::Args;
 use kinoise::scene::{Board, PATCH_SIDE_M, Print, Target, WHITE};
 use kinoise::simulate::{Grid, GridView, Scenery};
-use kinoise::units::shortest;
 
 use super::common::{between, count, numbers, one_of};
 
@@ -24,12 +23,15 @@ pub struct PosesArguments {
     #[arg(long, value_delimiter = ',', value_name = "DEG,..", allow_hyphen_values = true, value_parser = between(0.0, 88.8, "degrees"))]
     tilts: Vec<f64>,
     /// Directions of tilt in degrees, 0 along the columns; every pose is taken in each of them
-    #[arg(long, value_delimiter = ',', value_name = "DEG,..", allow_hyphen_values = true)]
+    #[arg(long, value_delimiter = ',', value_name = "DEG,..", allow_hyphen_values = true, value_parser = between(-360.0, 360.0, "degrees"))]
     azimuths: Vec<f64>,
     /// Take the views in the grid's order, not in random order
     #[arg(long)]
     pub ordered: bool,
 }
+
+/// A view every ten seconds, day and night: a day of them.
+const MAX_VIEWS: usize = 8640;
 
 impl PosesArguments {
     pub fn views(&self) -> anyhow::Result<Vec<GridView>> {
@@ -40,8 +42,11 @@ impl PosesArguments {
         if !self.tilts.is_empty() {
             grid.tilts_rad = self.tilts.iter().map(|t| t.to_radians()).collect();
         }
-        let finite = self.azimuths.iter().all(|a| a.is_finite());
-        ensure!(finite, "--azimuths: give finite numbers of degrees");
+        let views = grid.distances_m.len() * grid.tilts_rad.len() * self.azimuths.len().max(1);
+        ensure!(
+            views <= MAX_VIEWS,
+            "{views} views: give distances, tilts and azimuths for {MAX_VIEWS} or fewer"
+        );
         if self.azimuths.is_empty() {
             return Ok(grid.views());
         }
@@ -53,7 +58,7 @@ impl PosesArguments {
 #[derive(Debug, Args)]
 pub struct SceneryArguments {
     /// Board width and height in m
-    #[arg(long, value_parser = numbers::<2>, default_value = "1,0.8", value_name = "W,H", allow_hyphen_values = true)]
+    #[arg(long, value_parser = numbers::<2>(0.01, 100.0, "m"), default_value = "1,0.8", value_name = "W,H", allow_hyphen_values = true)]
     board: [f64; 2],
     /// Make the target a wall that fills the picture
     #[arg(long, conflicts_with = "board")]
@@ -79,19 +84,16 @@ pub struct SceneryArguments {
 const MAX_CLUTTER: usize = 100;
 
 impl SceneryArguments {
-    pub fn scenery(&self) -> anyhow::Result<Scenery> {
+    pub fn scenery(&self) -> Scenery {
         let [width_m, height_m] = self.board;
-        let [w, h] = self.board.map(shortest);
-        let positive = width_m > 0.0 && height_m > 0.0;
-        ensure!(positive, "--board {w},{h}: give a width and a height in m");
         let board = Target::Board(Board { width_m, height_m });
-        Ok(Scenery {
+        Scenery {
             target: if self.wall_target { Target::Wall } else { board },
             print: if self.patches { Print::Patches(PATCH_SIDE_M) } else { Print::Plain(WHITE) },
             wall_gap_m: self.wall,
             clutter: self.clutter,
             reference_error_m: self.reference_error,
             conditions: self.conditions,
-        })
+        }
     }
 }

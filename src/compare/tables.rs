@@ -66,7 +66,8 @@ pub fn tables(comparison: &Comparison) -> Vec<Table> {
 
 /// All four, as text.
 pub fn text(comparison: &Comparison) -> String {
-    let mut text = format!("{}\n", comparison.sequence);
+    // A name is anybody's: it must not make lines of its own.
+    let mut text = format!("{}\n", comparison.sequence.replace(char::is_control, "?"));
     for table in tables(comparison) {
         let header: String = table.columns.iter().map(|(c, _)| format!("{c:>11}")).collect();
         // Writing to a String does not fail.
@@ -104,7 +105,8 @@ fn figures(s: &Spread) -> Vec<f64> {
 }
 
 fn failure(row: &Row) -> String {
-    format!("  no figures: {}", row.failed.as_deref().unwrap_or("it was not run"))
+    let why = row.failed.as_deref().unwrap_or("it was not run");
+    format!("  no figures: {}", why.replace(char::is_control, "?"))
 }
 
 /// Everything with full digits, SI.

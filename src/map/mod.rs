@@ -236,9 +236,21 @@ impl Options {
         let Options { voxel_m, block_px, max_correspondence_m: reach, .. } = *self;
         let Options { max_iterations, max_observations, readout_s, .. } = *self;
         let checks = [
-            ((0.002..=1.0).contains(&voxel_m), format!("--voxel {voxel_m}"), "give 0.002 to 1 m"),
-            ((1..=32).contains(&block_px), format!("--block {block_px}"), "give 1 to 32 px"),
-            (reach > 0.0 && reach <= 2.0, format!("--gate {reach}"), "give a distance up to 2 m"),
+            (
+                (VOXEL_M[0] as f32..=VOXEL_M[1] as f32).contains(&voxel_m),
+                format!("--voxel {voxel_m}"),
+                "give 0.002 to 1 m",
+            ),
+            (
+                (1..=MAX_BLOCK_PX).contains(&block_px),
+                format!("--block {block_px}"),
+                "give 1 to 32 px",
+            ),
+            (
+                (GATE_M[0] as f32..=GATE_M[1] as f32).contains(&reach),
+                format!("--gate {reach}"),
+                "give 0.001 to 2 m",
+            ),
             (
                 (1..=MAX_ITERATIONS).contains(&max_iterations),
                 format!("--iterations {max_iterations}"),
@@ -249,7 +261,11 @@ impl Options {
                 format!("--memory {max_observations}"),
                 "give 1 to 108000",
             ),
-            ((0.0..=1.0).contains(&readout_s), format!("--readout {readout_s}"), "give 0 to 1 s"),
+            (
+                (0.0..=MAX_READOUT_S).contains(&readout_s),
+                format!("--readout {readout_s}"),
+                "give 0 to 1 s",
+            ),
         ];
         match checks.into_iter().find(|(good, ..)| !good) {
             Some((_, what, remedy)) => Err(Error::Argument { what, remedy }),
@@ -259,9 +275,17 @@ impl Options {
 }
 
 /// Alignments of real films settle within 30 (the paper's limit); one that has not by now never does.
-const MAX_ITERATIONS: usize = 1000;
+pub const MAX_ITERATIONS: usize = 1000;
 /// A surfel is observed once a frame: an hour at 30 Hz.
-const MAX_OBSERVATIONS: f32 = 108_000.0;
+pub const MAX_OBSERVATIONS: f32 = 108_000.0;
+/// Sides of a voxel, from a depth image's grain to a room in a few of them, m.
+pub const VOXEL_M: [f64; 2] = [0.002, 1.0];
+/// Beyond it a block is the whole picture of a small sensor.
+pub const MAX_BLOCK_PX: usize = 32;
+/// Distances in a pair of points, from the grain to those of other things, m.
+pub const GATE_M: [f64; 2] = [0.001, 2.0];
+/// No shutter takes longer for a picture, s.
+pub const MAX_READOUT_S: f64 = 1.0;
 
 /// Frames that stand for a film when its depths are asked for.
 const SAMPLED: usize = 8;

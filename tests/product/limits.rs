@@ -30,6 +30,26 @@ fn a_sensors_name_stands_on_one_line() {
     }
 }
 
+/// Of names that no file says: folders have them.
+#[test]
+fn names_of_folders_make_no_lines_of_their_own() {
+    let desk = Desk::new();
+    fs::rename(desk.at("rec/0000"), desk.at("rec/0000\nkinoise: all is well")).expect("renamed");
+    for line in ["calibrate rec -o out", "metrics rec -o out2", "calibrate rec -v -o out3"] {
+        let told = desk.done(line);
+        assert!(!told.contains("\nkinoise: all"), "{line}: {told}");
+    }
+    let odd = desk.path().join("out\nkinoise: all is well");
+    let output = crate::common::kinoise()
+        .current_dir(desk.path())
+        .args(["calibrate", "rec", "-o"])
+        .arg(&odd)
+        .output()
+        .expect("run");
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && !told.contains("\nkinoise: all"), "{told}");
+}
+
 /// 20 MB of "mode" were kept in every result.
 #[test]
 fn texts_have_their_length() {
