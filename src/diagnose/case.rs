@@ -76,7 +76,7 @@ impl<'a> Case<'a> {
         options: &'a DiagnoseOptions,
         progress: Progress<'a>,
     ) -> Result<Self> {
-        Active::check_ranges(&model.effects)?;
+        Active::check_model(&model.effects)?;
         progress.stage("measuring the views");
         let sensor = &recording.sensor;
         if simulated.is_none() {

@@ -205,8 +205,22 @@ pub(super) fn extend<'a>(
         };
         let mut parameters = f.parameters.clone();
         if let Some(card) = effects::find(id).filter(|_| f.terms.is_empty()).map(|e| e.card()) {
-            // The simulator takes the catalogue's parameters alone.
-            parameters.retain(|name, _| card.parameters.iter().any(|p| p.name == name));
+            // The simulator takes the catalogue's parameters alone, within their ranges.
+            parameters.retain(|name, estimate| {
+                let Some(known) = card.parameters.iter().find(|p| p.name == name) else {
+                    return false;
+                };
+                let value = match estimate.get_mut("value") {
+                    Some(value) => value,
+                    None => estimate,
+                };
+                let Some(number) = value.as_f64() else { return false };
+                let held = number.clamp(known.range[0], known.range[1]);
+                if held != number {
+                    *value = held.into();
+                }
+                true
+            });
         }
         let shape = f.terms.clone();
         let bias = shape.iter().any(|t| t.statistic == Statistic::Bias);

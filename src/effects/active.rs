@@ -131,23 +131,17 @@ impl Active {
         Ok(active)
     }
 
-    /// Does every formula of a model have parameters that its effect can have? Names that the catalogue
-    /// has not are not asked about: what a diagnosis says beside a formula is no setting.
+    /// Are these effects that the catalogue knows, and have their formulas its parameters, within their
+    /// ranges? What a diagnosis says beside a fitted shape is no setting, and not looked at.
     ///
     /// # Errors
-    /// When a parameter is outside its range.
-    pub fn check_ranges(effects: &[model::Effect]) -> Result<()> {
-        for entry in effects.iter().filter(|e| e.shape.is_empty()) {
-            let Some(card) = find(&entry.id).map(|e| e.card()) else { continue };
-            for (key, value) in &entry.parameters {
-                let number = value.get("value").unwrap_or(value).as_f64();
-                let known = card.parameters.iter().any(|p| p.name == key);
-                if let (true, Some(number)) = (known, number) {
-                    Active::typical(&entry.id)?.with(key, number)?;
-                }
-            }
-        }
-        Ok(())
+    /// When one is not.
+    pub fn check_model(effects: &[model::Effect]) -> Result<()> {
+        effects.iter().try_for_each(|entry| match &entry.shape[..] {
+            [] => Active::from_model(&entry.id, &entry.parameters).map(drop),
+            _ if entry.id == model::UNEXPLAINED => Ok(()),
+            _ => Active::typical(&entry.id).map(drop),
+        })
     }
 
     /// All that a model holds: formulas, and fitted shapes where an effect has one.

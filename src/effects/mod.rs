@@ -11,6 +11,7 @@ mod card;
 mod draw;
 mod exposure;
 mod fitted;
+mod model_file;
 mod shape;
 mod traces;
 

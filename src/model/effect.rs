@@ -33,14 +33,18 @@ pub struct Effect {
 /// The id of what has no name: its shape is all that is known.
 pub const UNEXPLAINED: &str = "unexplained";
 
+/// No disparity is larger than an image is wide.
+const MAX_PX: f64 = 65_536.0;
+/// Of a term's size, from view to view, as a share of it.
+const MAX_SCATTER: f64 = 1e3;
+
 impl Effect {
     /// What is wrong with it, if anything.
     pub fn fault(&self) -> Option<String> {
         if self.id == UNEXPLAINED && self.shape.is_empty() {
             return Some(format!("an {UNEXPLAINED} effect has no shape"));
         }
-        if self.learnt_px.is_some_and(|[low, high]| !(0.0 < low && low <= high && high.is_finite()))
-        {
+        if self.learnt_px.is_some_and(|[low, high]| !(0.0 < low && low <= high && high <= MAX_PX)) {
             return Some(format!("effect {}: learnt_px is no range of disparities", self.id));
         }
         let mut terms = self.shape.iter().enumerate();
@@ -50,7 +54,7 @@ impl Effect {
         });
         let scatter = &self.between_views;
         let a_term = scatter.is_empty() || scatter.len() == self.shape.len();
-        if !(a_term && scatter.iter().all(|s| *s >= 0.0 && s.is_finite())) {
+        if !(a_term && scatter.iter().all(|s| (0.0..=MAX_SCATTER).contains(s))) {
             return Some(format!("effect {}: between_views is not one share a term", self.id));
         }
         of_shape.or_else(|| {
@@ -75,7 +79,7 @@ mod tests {
             Basis::powers(
                 Coordinate::RaySquared,
                 3,
-                Modulation::RadialSlope { fx: 580.1, fy: 1e-300 },
+                Modulation::RadialSlope { fx: 580.1, fy: 1745.3 / 3.0 },
             ),
             Basis::powers(Coordinate::Foreshortening, 1, Modulation::Disparity),
             Basis::relief(4),
@@ -92,7 +96,7 @@ mod tests {
                 level: true,
                 times: Modulation::One,
             },
-            Basis::Log1p { over: Coordinate::Ambient(1e300) },
+            Basis::Log1p { over: Coordinate::Ambient(1.0 / 3.0) },
             Basis::Level,
             Basis::Table {
                 z_m: [0.5, 4.0],
@@ -178,6 +182,17 @@ mod tests {
             curve(0.0, 1.0, 1),
             curve(1.0, 1.0, 4),
             curve(f64::NAN, 1.0, 4),
+            curve(-1e308, 1e308, 4),
+            Basis::waves(Coordinate::Column, 1e-9, 1),
+            Basis::Decay { over: Coordinate::Edge, width: 1e300 },
+            Basis::Log1p { over: Coordinate::Blur(1e200) },
+            Basis::Map { width: 1e12, height: 480.0, across: 3, down: 2, times },
+            Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(300.0)),
+            Basis::Table {
+                z_m: [0.5, 1e6],
+                theta_rad: [0.0, 1.0],
+                columns: vec![vec![0.0; TABLE * TABLE]],
+            },
         ];
         for basis in bad {
             assert!(basis.fault().is_some(), "{basis:?}");

@@ -1,9 +1,12 @@
 //! What can be wrong with a term that comes from a file.
 
+use std::f64::consts::FRAC_PI_2;
+
 use super::basis::{Basis, TABLE};
 use super::coordinate::Coordinate;
 use super::modulation::Modulation;
 use super::{Statistic, Term};
+use crate::frame::FARTHEST_M;
 use crate::units::shortest;
 
 /// Nodes along one axis, and harmonics or orders of a series: more than any fit has; a file that
@@ -12,6 +15,21 @@ const MOST_NODES: usize = 4096;
 const MOST_ORDERS: usize = 16;
 /// Of a polynomial of two coordinates.
 const DEGREES: std::ops::RangeInclusive<usize> = 2..=4;
+
+/// Ends and periods of axes, in their units: four months in s, more than anything else has.
+const MAX_END: f64 = 1e7;
+/// Periods and widths: finer ones are between two samples of any axis.
+const MIN_PERIOD: f64 = 1e-4;
+/// Of series, whose coefficients have the units of their orders. Fits have up to some thousands.
+const MAX_COEFFICIENT: f64 = 1e6;
+/// Depths that a shape may be about, m.
+const PIVOT_M: [f64; 2] = [1e-2, FARTHEST_M];
+const BLUR_PX: [f64; 2] = [1e-6, 1e4];
+/// Of the room's light: a sensor that sees nothing else at a thousandth of an office's.
+const MAX_AMBIENT: f64 = 1e6;
+const MAX_POWER: f64 = 16.0;
+const FOCAL_PX: [f64; 2] = [1.0, 1e6];
+const PICTURE_PX: [f64; 2] = [2.0, 65_536.0];
 
 /// More than any image is wide.
 const MAX_BIAS_PX: f64 = 1e4;
@@ -37,10 +55,8 @@ impl Term {
 
     /// Where coefficients are values at nodes, they are errors of disparity or logarithms of a variance.
     fn absurd(&self) -> Option<String> {
-        if !self.basis.has_nodes() {
-            return None;
-        }
         let (max, unit) = match self.statistic {
+            _ if !self.basis.has_nodes() => (MAX_COEFFICIENT, "in its units"),
             Statistic::Bias => (MAX_BIAS_PX, "px"),
             _ => (MAX_NEPERS, "nepers of variance"),
         };
@@ -78,17 +94,21 @@ impl Basis {
                 (!DEGREES.contains(degree)).then(|| format!("degree = {degree} is not from 2 to 4"))
             }
             Basis::Waves { period, harmonics, .. } => {
-                positive("its period", &[*period]).or_else(|| some_orders(*harmonics))
+                within("period", &[*period], [MIN_PERIOD, MAX_END])
+                    .or_else(|| some_orders(*harmonics))
             }
-            Basis::Decay { width, .. } => positive("its width", &[*width]),
+            Basis::Decay { width, .. } => within("width", &[*width], [MIN_PERIOD, MAX_END]),
             Basis::Table { z_m, theta_rad, columns } => rising(z_m[0], z_m[1])
                 .or_else(|| rising(theta_rad[0], theta_rad[1]))
+                .or_else(|| within("z_m", z_m, [0.0, FARTHEST_M]))
+                .or_else(|| within("theta_rad", theta_rad, [0.0, FRAC_PI_2]))
                 .or_else(|| columns.iter().find_map(|column| table(column))),
             Basis::Curve { low, high, nodes, .. } => {
                 rising(*low, *high).or_else(|| some_nodes(&[*nodes]))
             }
             Basis::Ring { period, nodes, .. } => {
-                positive("its period", &[*period]).or_else(|| some_nodes(&[*nodes]))
+                within("period", &[*period], [MIN_PERIOD, MAX_END])
+                    .or_else(|| some_nodes(&[*nodes]))
             }
             Basis::Map { width, height, across, down, .. } => {
                 picture(*width, *height, [*across, *down])
@@ -108,10 +128,11 @@ impl Basis {
 impl Coordinate {
     fn fault(self) -> Option<String> {
         match self {
-            Coordinate::LogRatio(pivot_m) => positive("its pivot", &[pivot_m]),
-            Coordinate::Blur(lateral_px) => positive("its blur", &[lateral_px]),
-            Coordinate::Ambient(ratio) => (!(ratio.is_finite() && ratio >= 0.0))
-                .then(|| "its share of the room's light must not be negative".to_string()),
+            Coordinate::LogRatio(pivot_m) => within("its pivot", &[pivot_m], PIVOT_M),
+            Coordinate::Blur(lateral_px) => within("its blur", &[lateral_px], BLUR_PX),
+            Coordinate::Ambient(ratio) => {
+                within("its share of the room's light", &[ratio], [0.0, MAX_AMBIENT])
+            }
             _ => None,
         }
     }
@@ -120,10 +141,12 @@ impl Coordinate {
 impl Modulation {
     fn fault(self) -> Option<String> {
         match self {
-            Modulation::DisparityPower(power) => finite("its power of the disparity", &[power]),
+            Modulation::DisparityPower(power) => {
+                within("its power of the disparity", &[power], [-MAX_POWER, MAX_POWER])
+            }
             Modulation::TiltPower(power) => (!(0..=MOST_ORDERS as i32).contains(&power))
                 .then(|| format!("its power of the tilt, {power}, is not from 0 to {MOST_ORDERS}")),
-            Modulation::RadialSlope { fx, fy } => positive("fx and fy", &[fx, fy]),
+            Modulation::RadialSlope { fx, fy } => within("fx or fy", &[fx, fy], FOCAL_PX),
             _ => None,
         }
     }
@@ -133,14 +156,15 @@ fn finite(name: &str, values: &[f64]) -> Option<String> {
     values.iter().any(|v| !v.is_finite()).then(|| format!("{name} is not finite"))
 }
 
-fn positive(name: &str, values: &[f64]) -> Option<String> {
-    let good = values.iter().all(|v| v.is_finite() && *v > 0.0);
-    (!good).then(|| format!("{name} must be positive"))
+fn within(name: &str, values: &[f64], [low, high]: [f64; 2]) -> Option<String> {
+    let off = values.iter().find(|v| !(low..=high).contains(*v))?;
+    Some(format!("{name} = {} is not from {low} to {high}", shortest(*off)))
 }
 
 fn rising(low: f64, high: f64) -> Option<String> {
-    let good = low.is_finite() && high.is_finite() && low < high;
-    (!good).then(|| "its axis must rise from a lower to a higher end".to_string())
+    within("low or high", &[low, high], [-MAX_END, MAX_END]).or_else(|| {
+        (low >= high).then(|| "its axis must rise from a lower to a higher end".to_string())
+    })
 }
 
 fn some_orders(orders: usize) -> Option<String> {
@@ -154,11 +178,7 @@ fn some_nodes(nodes: &[usize]) -> Option<String> {
 }
 
 fn picture(width: f64, height: f64, nodes: [usize; 2]) -> Option<String> {
-    [width, height]
-        .iter()
-        .any(|side| !(side.is_finite() && *side >= 2.0))
-        .then(|| "width and height must be 2 px or more".to_string())
-        .or_else(|| some_nodes(&nodes))
+    within("width or height", &[width, height], PICTURE_PX).or_else(|| some_nodes(&nodes))
 }
 
 fn table(column: &[f64]) -> Option<String> {

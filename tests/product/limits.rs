@@ -75,6 +75,62 @@ fn texts_have_their_length() {
     assert!(!desk.done("calibrate rec -o out2").contains("0000 was left out"));
 }
 
+/// "match" was said of a bowl by a name that the catalogue has not: nothing of it acted.
+#[test]
+fn what_an_effect_has_not_is_refused_wherever_a_model_is_read() {
+    let desk = Desk::furnished();
+    let bowl = |parameters| json!([{"id": "radial-disparity-bias", "parameters": parameters}]);
+    let shape = json!([{"id": "bananas", "shape": [
+        {"statistic": "variance", "basis": {"kind": "level"}, "coefficients": [0.1]}]}]);
+    for (effects, says) in [
+        (bowl(json!({"bowl_px": {"value": 3, "std_error": 0.1}})), "bowl_px"),
+        (bowl(json!({"k_px": 1, "foo": 1})), "foo"),
+        (bowl(json!({"k_px": 1e300})), "k_px"),
+        (bowl(json!({"k_px": "1"})), "k_px"),
+        (json!([{"id": "radial-bias"}]), "radial-bias"),
+        (shape, "bananas"),
+    ] {
+        desk.model("odd.json", |model| model["effects"] = effects);
+        for line in [
+            "diagnose rec -m odd.json -o out",
+            "correct rec -m odd.json -o out",
+            "simulate out --shrink 8 --frames 1 -m odd.json",
+            "map film -m odd.json -o out",
+            "compare film -m odd.json -o out",
+            "sigma film -m odd.json -o out",
+            "export odd.json --format python -o out.py",
+            "units odd.json model.json",
+        ] {
+            desk.refused(line, &["odd.json: ", says]);
+        }
+    }
+}
+
+/// Ends of +-1e308 overflow where they are subtracted.
+#[test]
+fn every_number_of_a_model_has_a_range() {
+    let desk = Desk::new();
+    let curve = |low: f64, high: f64, c: f64| {
+        json!([{"id": "unexplained", "shape": [{"statistic": "bias", "basis": {"kind": "curve",
+            "over": "log-z", "low": low, "high": high, "nodes": 3, "times": "one"},
+            "coefficients": [c, 0, 0]}]}])
+    };
+    let cases: [(&str, Value, &str); 6] = [
+        ("/effects", curve(-1e308, 1e308, 0.1), "1e308"),
+        ("/effects", curve(-1e12, 1.0, 0.1), "low"),
+        ("/effects", curve(0.0, 1.0, 1e20), "coefficient"),
+        ("/fit/rmse_m", json!(1e300), "fit.rmse_m = 1e300"),
+        ("/fit/degrees_of_freedom", json!(-1), "degrees_of_freedom"),
+        ("/sigma/covariance/0/0", json!(1e308), "sigma.covariance[0][0] = 1e308"),
+    ];
+    for (pointer, value, says) in cases {
+        desk.model("model.json", |model| *model.pointer_mut(pointer).expect(pointer) = value);
+        desk.refused("diagnose rec -m model.json -o out", &["model.json: ", says]);
+    }
+    desk.model("model.json", |model| model["effects"] = curve(0.0, 1.0, 0.1));
+    desk.done("correct rec -m model.json -o out");
+}
+
 #[test]
 fn an_error_of_the_principal_point_has_its_line() {
     for (key, value) in [("cx", 5000.0), ("cy", -20.0), ("fy", -1.0), ("fx", 0.0)] {
