@@ -8,11 +8,13 @@ use super::checked::{checked, scatter};
 use super::detectable::detectable;
 use super::diagnosis::{DIAGNOSIS_FORMAT, Detectable, Diagnosis, HeldOut, MapRow, Reference};
 use super::engine::Diagnosed;
+use super::far_off::far_off;
 use super::findings;
 use super::heldout;
 use super::known::KnownTerms;
 use super::laws;
 use super::outcome::Outcome;
+use super::pixels::typical_sigma_mm;
 use super::reference;
 use super::verdict::{extend, not_identifiable, shares, untested, verdict, view_lines};
 use crate::effects::KINECT_BASELINE_M;
@@ -40,6 +42,9 @@ impl Case<'_> {
         let Battery { mean, scatter, mut found, refitted, better_form, detectable } = battery;
         let outcomes = [&mean.outcome, &scatter.outcome];
         let explained: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
+        if found.is_empty() {
+            found.extend(far_off(&self.survey, typical_sigma_mm(&self.fields)));
+        }
         let verdict = verdict(&found, outcomes);
         let cannot_tell = reference::cannot_tell(&self.fields, self.sensor().kind);
         found.extend(cannot_tell.iter().map(not_identifiable));

@@ -8,10 +8,13 @@ use crate::camera::Rays;
 use crate::frame::{DepthTable, Frame};
 use crate::measure::Workbench;
 use crate::model::SigmaModel;
+use crate::stats::{MAD_TO_SIGMA, median_in_place};
 use crate::terms::{PixelContext, Term};
 
 /// Disparities that spread less than this over a view show no slope, px.
 const LEAST_SPREAD_PX: f64 = 0.5;
+/// A model that is right spreads residuals as the view itself does, to a few per cent.
+const FAR_OFF: f32 = 2.0;
 /// Single frames kept whole: enough for correlations in time.
 pub const FRAMES_KEPT: usize = 4;
 
@@ -27,15 +30,19 @@ impl Field {
     ) {
         self.sigma = self.expected_sigma(&bench.rays, sigma);
         let expected = self.known_bias(known, bench, session_start);
+        let mut clip_px = self.spread_px;
         let mut edges: Option<Edges> = None;
         for (time, image) in frames {
+            if self.frames.is_empty() && !known.bias.is_empty() {
+                clip_px = self.spread_beside(&image, &expected, &bench.table);
+            }
             edges.get_or_insert_with(|| Edges::find(self, &image, &bench.rays, &bench.table)).add(
                 self,
                 &image,
                 &bench.rays,
                 &bench.table,
             );
-            self.add(&image, time, &expected, &bench.table);
+            self.add(&image, time, &expected, &bench.table, clip_px);
         }
         self.edges = edges.unwrap_or_default();
         self.close();
@@ -75,7 +82,27 @@ impl Field {
         expected
     }
 
-    fn add(&mut self, frame: &Frame, time: f64, expected: &[f32], table: &DepthTable) {
+    /// The spread to clip by, px: the view's own, or that about what the model expects where the model is
+    /// wrong by far more. Clipped by the view's own, a model of a bowl that is not there would leave no
+    /// pixel to tell it by.
+    fn spread_beside(&self, frame: &Frame, expected: &[f32], table: &DepthTable) -> f32 {
+        let off = |(&i, &d): (&u32, &f32)| {
+            let z = table.metres(frame.raw[i as usize]);
+            z.is_finite().then(|| ((self.scale_px_m / f64::from(z)) as f32 - d).abs())
+        };
+        let mut all: Vec<f32> = self.pixels.iter().zip(expected).filter_map(off).collect();
+        let spread = MAD_TO_SIGMA as f32 * median_in_place(&mut all);
+        if spread > FAR_OFF * self.spread_px { spread } else { self.spread_px }
+    }
+
+    fn add(
+        &mut self,
+        frame: &Frame,
+        time: f64,
+        expected: &[f32],
+        table: &DepthTable,
+        clip_px: f32,
+    ) {
         let keep = self.first.len() < FRAMES_KEPT;
         let mut residuals = if keep { vec![f32::NAN; self.pixels.len()] } else { Vec::new() };
         let (mut sum, mut n) = (0.0f64, 0.0f64);
@@ -93,7 +120,7 @@ impl Field {
             if keep {
                 residuals[k] = e;
             }
-            if e.abs() <= CLIP_SIGMAS * self.sigma[k].max(self.spread_px) {
+            if e.abs() <= CLIP_SIGMAS * self.sigma[k].max(clip_px) {
                 self.count[k] += 1;
                 self.mean[k] += e;
                 self.square[k] += e * e;

@@ -22,6 +22,7 @@ mod edges;
 mod engine;
 mod evidence;
 mod exposure;
+mod far_off;
 mod few_views;
 mod field;
 mod findings;

@@ -131,6 +131,30 @@ fn every_number_of_a_model_has_a_range() {
     desk.done("correct rec -m model.json -o out");
 }
 
+/// Clipped about a bowl that is not there, no pixel was left to tell it by.
+#[test]
+fn a_model_that_is_far_off_is_no_inconclusive_answer() {
+    let desk = Desk::new();
+    desk.done("simulate three --shrink 8 --frames 4 --distances 1,2,3 --tilts 0");
+    desk.done("simulate six --shrink 8 --frames 4 --distances 1,1.5,2 --tilts 0,30");
+    for (views, k_px, says) in [
+        ("three", 2.0, "mean error"),
+        ("three", 4.0, "mean error"),
+        ("six", 2.0, "Radial disparity bias"),
+        ("six", 4.0, "mean error"),
+    ] {
+        desk.model("model.json", |model| {
+            let bowl = json!({"id": "radial-disparity-bias", "parameters": {"k_px": k_px}});
+            model["effects"] = json!([bowl]);
+        });
+        let output = desk.run(&format!("diagnose {views} -m model.json -o out --force"));
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{views} {k_px}: {told}");
+        let file = fs::read_to_string(desk.at("out/diagnosis.json")).expect("text");
+        assert!(told.contains(says) || file.contains(says), "{views} {k_px}: {told}");
+    }
+}
+
 #[test]
 fn an_error_of_the_principal_point_has_its_line() {
     for (key, value) in [("cx", 5000.0), ("cy", -20.0), ("fy", -1.0), ("fx", 0.0)] {
