@@ -16,6 +16,7 @@ use super::laws;
 use super::outcome::Outcome;
 use super::pixels::typical_sigma_mm;
 use super::reference;
+use super::thinned;
 use super::verdict::{extend, not_identifiable, shares, untested, verdict, view_lines};
 use crate::effects::KINECT_BASELINE_M;
 use crate::model::{Effect, Form, NoiseModel, Searched};
@@ -28,6 +29,8 @@ impl Case<'_> {
             remarks.extend(self.model.fit.remarks.first().cloned());
         }
         remarks.append(&mut self.copies);
+        let camera = &self.sensor().camera;
+        remarks.extend(thinned::told(camera.width, camera.height));
         if self.sensor().baseline_m.is_none() {
             remarks.push(format!(
                 "the recording gives no baseline_m: {KINECT_BASELINE_M} m, a Kinect v1's, is assumed; all disparities scale with it"

@@ -53,6 +53,7 @@ fn field(camera: &Camera, z: f64, rng: &mut Stream, answer: Answer<'_>) -> Field
         width,
         height,
         pixels,
+        edge: Vec::new(),
         sigma: vec![NOISE_PX as f32; n],
         spread_px: NOISE_PX as f32,
         mean: vec![0.0; n],

@@ -29,22 +29,23 @@ impl Field {
         session_start: f64,
     ) {
         self.sigma = self.expected_sigma(&bench.rays, sigma);
-        let expected = self.known_bias(known, bench, session_start);
+        let mut expected = self.known_bias(known, bench, session_start);
         let mut clip_px = self.spread_px;
-        let mut edges: Option<Edges> = None;
+        let mut edges = Edges::default();
         for (time, image) in frames {
-            if self.frames.is_empty() && !known.bias.is_empty() {
-                clip_px = self.spread_beside(&image, &expected, &bench.table);
+            if self.frames.is_empty() {
+                if !known.bias.is_empty() {
+                    clip_px = self.spread_beside(&image, &expected, &bench.table);
+                }
+                edges = Edges::find(self, &image, &bench.rays, &bench.table);
+                if self.edge.is_empty() {
+                    self.thin(&mut expected);
+                }
             }
-            edges.get_or_insert_with(|| Edges::find(self, &image, &bench.rays, &bench.table)).add(
-                self,
-                &image,
-                &bench.rays,
-                &bench.table,
-            );
+            edges.add(self, &image, &bench.rays, &bench.table);
             self.add(&image, time, &expected, &bench.table, clip_px);
         }
-        self.edges = edges.unwrap_or_default();
+        self.edges = edges;
         self.close();
     }
 

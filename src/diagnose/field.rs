@@ -30,6 +30,9 @@ pub struct Field {
     pub height: usize,
     /// Pixels of the target, ascending.
     pub pixels: Vec<u32>,
+    /// Of each, its distance from the target's edge, px, where not all pixels of the target are here;
+    /// empty otherwise.
+    pub edge: Vec<f32>,
     /// Model's standard deviation of the disparity of each pixel, px.
     pub sigma: Vec<f32>,
     /// Robust standard deviation of the view's residuals, px.
@@ -181,6 +184,7 @@ impl Field {
             width: sensor.camera.width,
             height: sensor.camera.height,
             pixels,
+            edge: Vec::new(),
             sigma: Vec::new(),
             spread_px: 0.0,
             mean: vec![0.0; n],

@@ -27,6 +27,7 @@ fn field(rng: &mut Stream, error_px: impl Fn(usize) -> f64) -> Field {
         width,
         height,
         pixels: (0..n as u32).collect(),
+        edge: Vec::new(),
         sigma: vec![NOISE_PX as f32; n],
         spread_px: NOISE_PX as f32,
         mean: (0..n).map(noisy).collect(),

@@ -85,6 +85,7 @@ mod structure;
 mod surveyed_view;
 mod tails;
 mod texture;
+mod thinned;
 mod tiles;
 mod unequal;
 mod variance;

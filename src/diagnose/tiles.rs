@@ -48,8 +48,6 @@ pub struct Places<'a> {
 impl<'a> Places<'a> {
     /// `session_start` on the recording's clock, s.
     pub fn of(field: &'a Field, camera: &'a Camera, rays: &'a Rays, session_start: f64) -> Self {
-        let mut on_target = vec![false; camera.pixels()];
-        field.pixels.iter().for_each(|&i| on_target[i as usize] = true);
         let plane = &field.plane;
         let slope = |q: f64, f: f64| field.scale_px_m * q / f;
         let view = PixelContext {
@@ -69,7 +67,7 @@ impl<'a> Places<'a> {
             field,
             camera,
             rays,
-            edge: edge_distances(&on_target, camera.width),
+            edge: edges(field, camera),
             board: board_frame(field, rays),
             corner: corner_radius(camera),
             view,
@@ -105,6 +103,18 @@ impl<'a> Places<'a> {
             ..self.view
         }
     }
+}
+
+/// Distance of each pixel from the target's edge, px.
+fn edges(field: &Field, camera: &Camera) -> Vec<f32> {
+    if field.edge.is_empty() {
+        let mut on_target = vec![false; camera.pixels()];
+        field.pixels.iter().for_each(|&i| on_target[i as usize] = true);
+        return edge_distances(&on_target, camera.width);
+    }
+    let mut edge = vec![0.0; camera.pixels()];
+    field.pixels.iter().zip(&field.edge).for_each(|(&i, &e)| edge[i as usize] = e);
+    edge
 }
 
 /// The tiles of a view.
