@@ -2,6 +2,7 @@
 //!
 //! Optical frame: x right (along the columns u), y down (along the rows v), z forward, metres.
 
+use nalgebra::RealField;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -250,13 +251,16 @@ fn folds(k: &[f64; 5], farthest: f64) -> bool {
     places.any(|s| slope(s) <= 0.0)
 }
 
-/// Tangential shift and radial factor of the Brown-Conrady model at the undistorted (x, y).
-fn lens(k: &[f64; 5], x: f64, y: f64) -> (f64, f64, f64) {
+/// Tangential shift and radial factor of the Brown-Conrady model at the undistorted (x, y), in either
+/// precision.
+#[inline]
+pub(crate) fn lens<T: RealField + Copy>(k: &[T; 5], x: T, y: T) -> (T, T, T) {
     let [k1, k2, p1, p2, k3] = *k;
     let r2 = x * x + y * y;
-    let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-    let dx = 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
-    let dy = p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
+    let radial = T::one() + r2 * (k1 + r2 * (k2 + r2 * k3));
+    let two = T::one() + T::one();
+    let dx = two * p1 * x * y + p2 * (r2 + two * x * x);
+    let dy = p1 * (r2 + two * y * y) + two * p2 * x * y;
     (dx, dy, radial)
 }
 

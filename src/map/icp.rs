@@ -9,10 +9,10 @@
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
+use super::batch::{Batch, Robust};
 use super::normal_equations::{Direction, NormalEquations, Solution};
 use super::point::{Motion, Point};
-use super::{Kernel, Options, Weights};
-use crate::stats::TUKEY;
+use super::{Kernel, Method, Options, Weights};
 
 pub trait Target: Sync {
     /// What a search leaves behind for the next search of the same point.
@@ -63,15 +63,27 @@ pub fn align<T: Target>(
 ) -> Alignment {
     let mut pose = start;
     let mut cache = vec![T::Cache::default(); source.len()];
+    let mut few = Few::of(source, options);
     let mut scale = f64::INFINITY;
     let mut last = None;
     let mut termination = Termination::MaxIterations;
     let mut iterations = 0;
     while iterations < options.max_iterations {
-        let equations = Round { target, options, pose: &pose, scale }.sum(source, &mut cache);
+        few.enough |= 2 * iterations >= options.max_iterations;
+        let coarse = !few.enough;
+        let (points, cache) = if coarse {
+            (&*few.points, &mut cache[..few.points.len()])
+        } else {
+            (source, &mut *cache)
+        };
+        let equations = Round { target, options, pose: &pose, scale }.sum(points, cache);
         iterations += 1;
         let enough = equations.correspondences >= MIN_CORRESPONDENCES;
         let Some(solution) = enough.then(|| equations.solve()).flatten() else {
+            if coarse {
+                few.enough = true;
+                continue;
+            }
             termination = Termination::TooFewCorrespondences;
             last = None;
             break;
@@ -85,12 +97,35 @@ pub fn align<T: Target>(
         pose = renormalised(&(moved(&step) * pose));
         let (shift, turn) = (step.fixed_rows::<3>(0).norm(), step.fixed_rows::<3>(3).norm());
         last = Some((equations, solution));
-        if shift < options.min_shift_m && turn < options.min_turn_rad {
+        if coarse {
+            few.enough = shift < NEAR && turn < NEAR;
+        } else if shift < options.min_shift_m && turn < options.min_turn_rad {
             termination = Termination::Converged;
             break;
         }
     }
     finish(pose, last, termination, iterations, source.len())
+}
+
+/// The points of the first rounds: far from the goal a few tell the way as well as all. The paper's
+/// method goes without.
+struct Few {
+    points: Vec<Point>,
+    /// From here on it takes all.
+    enough: bool,
+}
+
+/// One in so many.
+const FEW: usize = 4;
+/// Steps below this, m and rad, are fine ones.
+const NEAR: f64 = 1e-3;
+
+impl Few {
+    fn of(source: &[Point], options: &Options) -> Self {
+        let enough = options.method == Method::Paper || source.len() < FEW * CHUNK / 2;
+        let step = if enough { source.len().max(1) } else { FEW };
+        Few { points: source.iter().step_by(step).copied().collect(), enough }
+    }
 }
 
 /// exp of a small motion: shift and turn about the target's origin.
@@ -144,57 +179,35 @@ struct Round<'a, T> {
 impl<T: Target> Round<'_, T> {
     fn sum(&self, source: &[Point], cache: &mut [T::Cache]) -> NormalEquations {
         let motion = Motion::of(self.pose);
-        let any_normal = self.options.min_cosine <= -1.0;
-        let keep_sizes = self.options.kernel != Kernel::Square;
+        let min_cosine = self.options.min_cosine as f32;
+        let any_normal = min_cosine <= -1.0;
+        let robust = Robust { kernel: self.options.kernel, scale: self.scale as f32 };
         let part = |(points, cache): (&[Point], &mut [T::Cache])| {
-            let mut equations = NormalEquations::default();
-            equations.sizes.reserve(if keep_sizes { points.len() } else { 0 });
+            let mut batch = Batch::new(robust.kernel, points.len());
             for (s, cache) in points.iter().zip(cache) {
                 let at = motion.moved(&s.at);
                 let Some(d) = self.target.find(&at, cache) else { continue };
-                let lean = || f64::from(motion.turned(&s.normal).dot(&d.normal));
-                if !any_normal && lean() < self.options.min_cosine {
-                    continue;
-                }
-                let residual = f64::from((at - d.at).dot(&d.normal));
-                let weight = self.weight(s, d);
-                let kept = self.kept(residual * weight);
-                equations.add(&at, &d.normal, residual, weight * weight * kept);
-                if keep_sizes {
-                    equations.sizes.push((residual * weight).abs() as f32);
+                if any_normal || motion.turned(&s.normal).dot(&d.normal) >= min_cosine {
+                    batch.push(&at, d, self.variance(s, d), &robust);
                 }
             }
-            equations
+            batch.finish(&robust)
         };
         let parts: Vec<NormalEquations> =
             source.par_chunks(CHUNK).zip(cache.par_chunks_mut(CHUNK)).map(part).collect();
         parts.into_iter().fold(NormalEquations::default(), NormalEquations::plus)
     }
 
+    /// One over what the square of a residual weighs.
     #[inline]
-    fn weight(&self, s: &Point, d: &Point) -> f64 {
+    fn variance(&self, s: &Point, d: &Point) -> f32 {
         match self.options.weights {
             Weights::None => 1.0,
-            Weights::Model => 1.0 / f64::from(d.sigma_axial),
+            Weights::Model => d.sigma_axial * d.sigma_axial,
             Weights::Both => {
                 let (s, d) = (s.sigma_normal, d.sigma_normal);
-                1.0 / f64::from((s * s + d * d).sqrt())
+                s * s + d * d
             }
         }
     }
-
-    /// The kernel's weight of a weighted residual.
-    #[inline]
-    fn kept(&self, weighted: f64) -> f64 {
-        let size = (weighted / self.scale).abs();
-        match self.options.kernel {
-            Kernel::Square => 1.0,
-            Kernel::Huber => (HUBER / size).min(1.0),
-            Kernel::Tukey if size < TUKEY => (1.0 - (size / TUKEY).powi(2)).powi(2),
-            Kernel::Tukey => 0.0,
-        }
-    }
 }
-
-/// 95 % as good as least squares where there are no outliers (Holland and Welsch 1977).
-const HUBER: f64 = 1.345;

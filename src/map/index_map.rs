@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Vector3};
 use super::blocks::Blocks;
 use super::icp::Target;
 use super::point::{Motion, Point};
-use crate::camera::Camera;
+use crate::camera::{Camera, lens};
 
 /// Two places may be one surface when they are no more than this many standard deviations apart.
 pub const SIGMAS: f32 = 4.0;
@@ -16,10 +16,17 @@ const MIN_DEPTH_M: f32 = 0.2;
 
 /// The points of one image, found by projection.
 pub struct Projective<'a> {
-    pub camera: &'a Camera,
-    pub blocks: &'a Blocks,
+    grid: BlockGrid,
+    points: &'a [Option<Point>],
     /// Neighbours farther than this do not count, m.
-    pub max_correspondence_m: f32,
+    max_correspondence_m: f32,
+}
+
+impl<'a> Projective<'a> {
+    pub fn new(camera: &Camera, blocks: &'a Blocks, max_correspondence_m: f32) -> Self {
+        let grid = BlockGrid::of(camera, blocks.side_px);
+        Projective { grid, points: &blocks.points, max_correspondence_m }
+    }
 }
 
 impl Target for Projective<'_> {
@@ -27,9 +34,7 @@ impl Target for Projective<'_> {
 
     #[inline]
     fn find(&self, p: &Vector3<f32>, (): &mut ()) -> Option<&Point> {
-        let Blocks { width, height, side_px, points } = self.blocks;
-        let point = points[block_of(self.camera, *side_px, [*width, *height], p)?].as_ref()?;
-        within(point, p, self.max_correspondence_m)
+        within(self.points[self.grid.block(p)?].as_ref()?, p, self.max_correspondence_m)
     }
 }
 
@@ -39,36 +44,50 @@ pub fn within<'a>(point: &'a Point, p: &Vector3<f32>, max_m: f32) -> Option<&'a 
     ((point.at - p).norm_squared() <= max_m * max_m).then_some(point)
 }
 
-/// The block that a point of the camera's frame falls in.
-#[inline]
-fn block_of(
-    camera: &Camera,
-    side_px: usize,
-    [width, height]: [usize; 2],
-    p: &Vector3<f32>,
-) -> Option<usize> {
-    if p.z.is_nan() || p.z <= 0.0 {
-        return None;
+/// Where points of the camera's frame fall in its image of blocks.
+struct BlockGrid {
+    /// In blocks.
+    focal: [f32; 2],
+    centre: [f32; 2],
+    distortion: Option<[f32; 5]>,
+    width: usize,
+    height: usize,
+}
+
+impl BlockGrid {
+    fn of(camera: &Camera, side_px: usize) -> Self {
+        let side = side_px as f64;
+        BlockGrid {
+            focal: [camera.fx, camera.fy].map(|f| (f / side) as f32),
+            // Pixel centres are whole numbers.
+            centre: [camera.cx, camera.cy].map(|c| ((c + 0.5) / side) as f32),
+            distortion: camera.distortion.map(|k| k.map(|k| k as f32)),
+            width: camera.width / side_px,
+            height: camera.height / side_px,
+        }
     }
-    let (x, y) = (p.x / p.z, p.y / p.z);
-    let (u, v) = if camera.distortion.is_some() {
-        let (u, v) = camera.project(f64::from(x), f64::from(y));
-        (u as f32, v as f32)
-    } else {
-        (camera.fx as f32 * x + camera.cx as f32, camera.fy as f32 * y + camera.cy as f32)
-    };
-    // Pixel centres are whole numbers.
-    let (u, v) = ((u + 0.5) / side_px as f32, (v + 0.5) / side_px as f32);
-    let inside = u >= 0.0 && v >= 0.0 && u < width as f32 && v < height as f32;
-    inside.then(|| v as usize * width + u as usize)
+
+    #[inline]
+    fn block(&self, p: &Vector3<f32>) -> Option<usize> {
+        if p.z.is_nan() || p.z <= 0.0 {
+            return None;
+        }
+        let near = 1.0 / p.z;
+        let (mut x, mut y) = (p.x * near, p.y * near);
+        if let Some(k) = &self.distortion {
+            let (dx, dy, radial) = lens(k, x, y);
+            (x, y) = (x * radial + dx, y * radial + dy);
+        }
+        let (u, v) = (self.focal[0] * x + self.centre[0], self.focal[1] * y + self.centre[1]);
+        let inside = u >= 0.0 && v >= 0.0 && u < self.width as f32 && v < self.height as f32;
+        inside.then(|| v as usize * self.width + u as usize)
+    }
 }
 
 /// Which points of a map a camera sees: the front-most of each block of its image.
 pub struct IndexMap<'a> {
     pub camera: &'a Camera,
-    side_px: usize,
-    width: usize,
-    height: usize,
+    grid: BlockGrid,
     camera_from_map: Motion,
     /// Index of the point that a block shows, [`NONE`] where it shows none.
     front: Vec<u32>,
@@ -84,29 +103,28 @@ impl<'a> IndexMap<'a> {
         camera: &'a Camera,
         side_px: usize,
     ) -> Self {
-        let (width, height) = (camera.width / side_px, camera.height / side_px);
+        let grid = BlockGrid::of(camera, side_px);
         let camera_from_map = Motion::of(&map_from_camera.inverse());
-        let mut front = vec![Front::NOTHING; width * height];
+        let mut front = vec![Front::NOTHING; grid.width * grid.height];
         for (i, point) in points.enumerate() {
             let at = camera_from_map.moved(&point.at);
             if at.z <= MIN_DEPTH_M {
                 continue;
             }
-            let Some(block) = block_of(camera, side_px, [width, height], &at) else { continue };
+            let Some(block) = grid.block(&at) else { continue };
             // From behind it is not seen.
             if camera_from_map.turned(&point.normal).dot(&at) < 0.0 {
                 front[block].meet(Front { z: at.z, sigma: point.sigma_normal, index: i as u32 });
             }
         }
         let front = front.into_iter().map(|f| f.index).collect();
-        IndexMap { camera, side_px, width, height, camera_from_map, front }
+        IndexMap { camera, grid, camera_from_map, front }
     }
 
     /// The block that a place of the map's frame falls in.
     #[inline]
     pub fn block(&self, at: &Vector3<f32>) -> Option<usize> {
-        let at = self.camera_from_map.moved(at);
-        block_of(self.camera, self.side_px, [self.width, self.height], &at)
+        self.grid.block(&self.camera_from_map.moved(at))
     }
 
     #[inline]
@@ -117,11 +135,12 @@ impl<'a> IndexMap<'a> {
 
     /// What a block and its eight neighbours show, row by row.
     pub fn around(&self, block: usize) -> impl Iterator<Item = usize> + '_ {
-        let (u, v) = (block % self.width, block / self.width);
-        let rows = v.saturating_sub(1)..=(v + 1).min(self.height - 1);
+        let BlockGrid { width, height, .. } = self.grid;
+        let (u, v) = (block % width, block / width);
+        let rows = v.saturating_sub(1)..=(v + 1).min(height - 1);
         rows.flat_map(move |row| {
-            let columns = u.saturating_sub(1)..=(u + 1).min(self.width - 1);
-            columns.filter_map(move |column| self.front(row * self.width + column))
+            let columns = u.saturating_sub(1)..=(u + 1).min(width - 1);
+            columns.filter_map(move |column| self.front(row * width + column))
         })
     }
 }

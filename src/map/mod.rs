@@ -6,6 +6,7 @@
 //! Three methods share the loop ([`icp`]): the paper's ([`Method::Paper`]), neighbours by projection
 //! ([`Method::Projective`]), and alignment to the map so far ([`Method::Model`]).
 
+mod batch;
 mod blocks;
 mod frame_report;
 pub mod icp;

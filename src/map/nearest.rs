@@ -15,19 +15,31 @@ use super::sparse_grid::{Cell, SparseGrid, cell_of};
 pub struct Nearest {
     points: Vec<Point>,
     grid: SparseGrid,
-    /// The points of cell `i` are `order[begins[i]..begins[i + 1]]`.
-    begins: Vec<u32>,
-    order: Vec<u32>,
+    /// The first point of each cell; of a voxel grid's points most cells hold one.
+    heads: Vec<Entry>,
+    /// The others.
+    rest: Vec<Entry>,
     side_m: f32,
     /// Neighbours farther than this do not count, m.
     max_correspondence_m: f32,
 }
 
+/// A point where a search passes by.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    at: Vector3<f32>,
+    point: u32,
+    /// The next of the same cell in `rest`, [`NONE`] for the last.
+    next: u32,
+}
+
+const NONE: u32 = u32::MAX;
+
 /// What a search leaves behind for the next search of the same point.
 #[derive(Debug, Clone, Copy)]
 pub struct NeighbourCache {
     at: Vector3<f32>,
-    /// How far the point may move before it must be searched for again, m.
+    /// How far the point may move before it must be searched for again, m; below 0 where it never was.
     safe_radius: f32,
     found: Option<u32>,
 }
@@ -55,39 +67,45 @@ const MARGIN: f32 = 0.2;
 impl Nearest {
     pub fn new(points: Vec<Point>, side_m: f32, max_correspondence_m: f32) -> Self {
         let mut grid = SparseGrid::with_room(points.len());
-        let cells: Vec<usize> =
-            points.iter().map(|p| grid.insert(cell_of(&p.at, 1.0 / side_m))).collect();
-        let mut begins = vec![0u32; grid.len() + 1];
-        for &cell in &cells {
-            begins[cell + 1] += 1;
+        let mut heads: Vec<Entry> = Vec::with_capacity(points.len());
+        let mut rest = Vec::new();
+        for (i, point) in points.iter().enumerate() {
+            let cell = grid.insert(cell_of(&point.at, 1.0 / side_m));
+            let mut entry = Entry { at: point.at, point: i as u32, next: NONE };
+            match heads.get_mut(cell) {
+                Some(head) => {
+                    entry.next = std::mem::replace(&mut head.next, rest.len() as u32);
+                    rest.push(entry);
+                }
+                None => heads.push(entry),
+            }
         }
-        for i in 0..grid.len() {
-            begins[i + 1] += begins[i];
-        }
-        let mut next = begins.clone();
-        let mut order = vec![0; points.len()];
-        for (i, &cell) in cells.iter().enumerate() {
-            order[next[cell] as usize] = i as u32;
-            next[cell] += 1;
-        }
-        Nearest { points, grid, begins, order, side_m, max_correspondence_m }
+        Nearest { points, grid, heads, rest, side_m, max_correspondence_m }
     }
 
     pub fn points(&self) -> &[Point] {
         &self.points
     }
 
-    /// All cells as near as a point that is known, and a little farther: for the safe radius.
-    fn search(&self, p: &Vector3<f32>, known: Option<u32>) -> NeighbourCache {
+    /// What is nearest to a place, and how far it may move until that is asked again.
+    fn search(&self, p: &Vector3<f32>, last: &NeighbourCache) -> NeighbourCache {
         let cell = cell_of(p, 1.0 / self.side_m);
-        let first = |cell| self.order.get(self.begins[cell] as usize).copied();
-        let known = known.or_else(|| self.grid.get(cell).and_then(first));
-        let Some(known) = known else { return self.search_outwards(p, cell) };
-        let nearest = (self.points[known as usize].at - p).norm();
-        if nearest > self.max_correspondence_m {
-            return self.search_outwards(p, cell);
+        let known = match last.found {
+            Some(i) => Some(self.points[i as usize].at),
+            None => self.grid.get(cell).map(|cell| self.heads[cell].at),
+        };
+        let nearest = known.map_or(f32::INFINITY, |known| (known - p).norm());
+        if nearest <= self.max_correspondence_m {
+            self.search_within(p, nearest + MARGIN * self.side_m)
+        } else {
+            // What had no neighbour mostly has none still: all that is near enough is looked at once.
+            let none = last.found.is_none() && last.safe_radius >= 0.0;
+            self.search_outwards(p, cell, if none { i32::MAX } else { 1 })
         }
-        let reach = nearest + MARGIN * self.side_m;
+    }
+
+    /// All cells as near as that.
+    fn search_within(&self, p: &Vector3<f32>, reach: f32) -> NeighbourCache {
         let mut search = Search::NOTHING;
         let corner = |sign: f32| cell_of(&p.map(|v| v + sign * reach), 1.0 / self.side_m);
         let (low, high) = (corner(-1.0), corner(1.0));
@@ -96,7 +114,7 @@ impl Nearest {
     }
 
     /// Box after larger box of cells, until none that is left can hold a nearer point.
-    fn search_outwards(&self, p: &Vector3<f32>, cell: Cell) -> NeighbourCache {
+    fn search_outwards(&self, p: &Vector3<f32>, cell: Cell, begin: i32) -> NeighbourCache {
         // From the point to the border of its own cell; a shell more is a side more.
         let inside = (0..3)
             .map(|k| {
@@ -105,16 +123,18 @@ impl Nearest {
             })
             .fold(f32::INFINITY, f32::min)
             .max(0.0);
-        let mut shell = 1;
+        // As many shells as show all that counts, and a margin.
+        let last = (self.max_correspondence_m / self.side_m).ceil() as i32;
+        let mut shell = begin.min(last);
         loop {
             let mut search = Search::NOTHING;
             let corner = |sign: i32| cell.map(|v| v + sign * shell);
             self.grid.for_each_within(corner(-1), corner(1), |c| self.scan_cell(p, c, &mut search));
             let seen = inside + shell as f32 * self.side_m;
-            if search.best.sqrt() <= seen || seen > self.max_correspondence_m {
+            if shell == last || search.best.sqrt() <= seen {
                 return self.remember(p, &search, seen);
             }
-            shell += 1;
+            shell = (2 * shell).min(last);
         }
     }
 
@@ -132,14 +152,19 @@ impl Nearest {
 
     #[inline]
     fn scan_cell(&self, p: &Vector3<f32>, cell: usize, search: &mut Search) {
-        for &i in &self.order[self.begins[cell] as usize..self.begins[cell + 1] as usize] {
-            let distance = (self.points[i as usize].at - p).norm_squared();
+        let mut entry = &self.heads[cell];
+        loop {
+            let distance = (entry.at - p).norm_squared();
             if distance < search.best {
                 search.second = search.best;
                 search.best = distance;
-                search.nearest = Some(i);
+                search.nearest = Some(entry.point);
             } else if distance < search.second {
                 search.second = distance;
+            }
+            match self.rest.get(entry.next as usize) {
+                Some(next) => entry = next,
+                None => return,
             }
         }
     }
@@ -151,7 +176,7 @@ impl Target for Nearest {
     #[inline]
     fn find(&self, p: &Vector3<f32>, cache: &mut NeighbourCache) -> Option<&Point> {
         if (p - cache.at).norm() >= cache.safe_radius {
-            *cache = self.search(p, cache.found);
+            *cache = self.search(p, cache);
         }
         within(&self.points[cache.found? as usize], p, self.max_correspondence_m)
     }

@@ -35,15 +35,15 @@ type Triangle = SVector<f64, 21>;
 #[derive(Debug, Clone, Default)]
 pub struct NormalEquations {
     /// J' W J; J = [n, p x n].
-    h: Triangle,
+    pub h: Triangle,
     /// The same, every correspondence counting one: what the scene determines, whatever its noise.
-    geometry: Triangle,
+    pub geometry: Triangle,
     /// J' W r.
-    g: Vector6<f64>,
-    cost: f64,
-    weight: f64,
-    place: Vector3<f64>,
-    place_squared: f64,
+    pub g: Vector6<f64>,
+    pub cost: f64,
+    pub weight: f64,
+    pub place: Vector3<f64>,
+    pub place_squared: f64,
     pub correspondences: usize,
     /// Unweighted.
     pub squares_m2: f64,
@@ -67,30 +67,6 @@ const MIN_INFORMATION: f64 = 0.005;
 const MEDIAN_OVER_SIGMA: f64 = 0.6745;
 
 impl NormalEquations {
-    /// The moved point, the target's normal, the distance along it, and the weight of its square.
-    #[inline]
-    pub fn add(&mut self, p: &Vector3<f32>, n: &Vector3<f32>, residual: f64, w2: f64) {
-        let (p, n) = (p.map(f64::from), n.map(f64::from));
-        let m = p.cross(&n);
-        let j = [n.x, n.y, n.z, m.x, m.y, m.z];
-        let mut k = 0;
-        for a in 0..6 {
-            let wa = w2 * j[a];
-            self.g[a] += wa * residual;
-            for &jb in &j[a..] {
-                self.h[k] += wa * jb;
-                self.geometry[k] += j[a] * jb;
-                k += 1;
-            }
-        }
-        self.cost += w2 * residual * residual;
-        self.weight += w2;
-        self.place += p * w2;
-        self.place_squared += p.norm_squared() * w2;
-        self.correspondences += 1;
-        self.squares_m2 += residual * residual;
-    }
-
     pub fn plus(mut self, other: NormalEquations) -> NormalEquations {
         self.h += other.h;
         self.geometry += other.geometry;
@@ -108,8 +84,8 @@ impl NormalEquations {
     /// Sigma of the weighted residuals that are no outliers, from their median.
     pub fn robust_sigma(&self) -> f64 {
         let median = f64::from(crate::stats::median_in_place(&mut self.sizes.clone()));
-        // All exactly zero, as in a made-up scene: any scale will do.
-        (median / MEDIAN_OVER_SIGMA).max(f64::from(f32::MIN_POSITIVE))
+        // All exactly zero, as in a made-up scene: any scale will do whose square is a number.
+        (median / MEDIAN_OVER_SIGMA).max(f64::from(f32::MIN_POSITIVE.sqrt()))
     }
 
     /// The step that makes the cost least; `None` where the sums are no numbers or weigh nothing.

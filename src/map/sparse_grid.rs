@@ -1,27 +1,40 @@
 //! Cubic cells of space with a number each: a hash table of bricks, 4 x 4 x 4 cells that lie together
 //! in memory, for who asks for one cell asks for its neighbours next.
 
-use std::collections::HashMap;
-
 use nalgebra::Vector3;
-use rustc_hash::FxBuildHasher;
 
 pub type Cell = [i32; 3];
 
 /// From cells to indices 0, 1, 2, ... in order of arrival.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct SparseGrid {
-    /// Index of a brick by a quarter of its cells' coordinates.
-    brick_of: HashMap<Cell, u32, FxBuildHasher>,
+    /// The first brick of each slot, [`NONE`] where there is none; a power of two of them.
+    slots: Vec<u32>,
     bricks: Vec<Brick>,
+    /// The brick that was written to last: the next cell is mostly in it, too.
+    recent: u32,
     cells: Vec<Cell>,
 }
 
 #[derive(Debug, Clone)]
 struct Brick {
+    /// A quarter of its cells' coordinates.
+    at: Cell,
+    /// The next brick of the same slot.
+    next: u32,
     /// A bit a cell, x fastest.
     occupied: u64,
     index: [u32; 64],
+}
+
+const NONE: u32 = u32::MAX;
+/// A room of 4 m has 32^3 bricks of 3 cm cells, of which surfaces fill a tenth.
+const SLOTS: usize = 1 << 12;
+
+impl Default for SparseGrid {
+    fn default() -> Self {
+        SparseGrid { slots: vec![NONE; SLOTS], bricks: Vec::new(), recent: NONE, cells: Vec::new() }
+    }
 }
 
 impl SparseGrid {
@@ -47,10 +60,7 @@ impl SparseGrid {
     /// The index of a cell, a new one if it had none.
     #[inline]
     pub fn insert(&mut self, cell: Cell) -> usize {
-        let brick = *self.brick_of.entry(cell.map(|v| v >> 2)).or_insert_with(|| {
-            self.bricks.push(Brick { occupied: 0, index: [0; 64] });
-            self.bricks.len() as u32 - 1
-        });
+        let brick = self.brick_to_write(cell.map(|v| v >> 2));
         let (brick, bit) = (&mut self.bricks[brick as usize], bit(cell));
         if brick.occupied >> bit & 1 == 0 {
             brick.occupied |= 1 << bit;
@@ -63,6 +73,12 @@ impl SparseGrid {
     /// Visit the indices of all cells in a box, both corners included.
     #[inline]
     pub fn for_each_within(&self, low: Cell, high: Cell, mut visit: impl FnMut(usize)) {
+        self.for_each_cell_within(low, high, |index, _| visit(index));
+    }
+
+    /// The same, with the cells.
+    #[inline]
+    pub fn for_each_cell_within(&self, low: Cell, high: Cell, mut visit: impl FnMut(usize, Cell)) {
         let [x, y, z] = [0, 1, 2].map(|k| low[k] >> 2..=high[k] >> 2);
         for z in z {
             for y in y.clone() {
@@ -70,7 +86,10 @@ impl SparseGrid {
                     let Some(brick) = self.brick([x, y, z]) else { continue };
                     let mut left = brick.occupied & inside([x, y, z], low, high);
                     while left != 0 {
-                        visit(brick.index[left.trailing_zeros() as usize] as usize);
+                        let bit = left.trailing_zeros() as i32;
+                        let within = [bit & 3, bit >> 2 & 3, bit >> 4];
+                        let cell = [4 * x + within[0], 4 * y + within[1], 4 * z + within[2]];
+                        visit(brick.index[bit as usize] as usize, cell);
                         left &= left - 1;
                     }
                 }
@@ -80,7 +99,51 @@ impl SparseGrid {
 
     #[inline]
     fn brick(&self, at: Cell) -> Option<&Brick> {
-        self.brick_of.get(&at).map(|&i| &self.bricks[i as usize])
+        let mut i = self.slots[self.slot(at)];
+        while i != NONE {
+            let brick = &self.bricks[i as usize];
+            if brick.at == at {
+                return Some(brick);
+            }
+            i = brick.next;
+        }
+        None
+    }
+
+    #[inline]
+    fn brick_to_write(&mut self, at: Cell) -> u32 {
+        if self.bricks.get(self.recent as usize).is_none_or(|brick| brick.at != at) {
+            let mut i = self.slots[self.slot(at)];
+            while i != NONE && self.bricks[i as usize].at != at {
+                i = self.bricks[i as usize].next;
+            }
+            self.recent = if i == NONE { self.new_brick(at) } else { i };
+        }
+        self.recent
+    }
+
+    fn new_brick(&mut self, at: Cell) -> u32 {
+        let i = self.bricks.len() as u32;
+        self.bricks.push(Brick { at, next: NONE, occupied: 0, index: [0; 64] });
+        if self.bricks.len() <= self.slots.len() {
+            self.link(i);
+        } else {
+            self.slots = vec![NONE; 2 * self.slots.len()];
+            (0..self.bricks.len() as u32).for_each(|i| self.link(i));
+        }
+        i
+    }
+
+    fn link(&mut self, i: u32) {
+        let slot = self.slot(self.bricks[i as usize].at);
+        self.bricks[i as usize].next = std::mem::replace(&mut self.slots[slot], i);
+    }
+
+    /// Bricks side by side are in slots side by side, and no two of a box of 5 x 5 x 5 share one.
+    #[inline]
+    fn slot(&self, [x, y, z]: Cell) -> usize {
+        let place = x.wrapping_add(y.wrapping_mul(19)).wrapping_add(z.wrapping_mul(367));
+        place as usize & (self.slots.len() - 1)
     }
 }
 
@@ -108,17 +171,23 @@ fn inside(brick: Cell, low: Cell, high: Cell) -> u64 {
 /// The cell of side 1 / `per_metre` that holds a point.
 #[inline]
 pub fn cell_of(at: &Vector3<f32>, per_metre: f32) -> Cell {
+    [at.x, at.y, at.z].map(|v| cell_along(v, per_metre))
+}
+
+/// One of its coordinates.
+#[inline]
+pub fn cell_along(v: f32, per_metre: f32) -> i32 {
     // floor() is a call into the C library on plain x86-64, and a checked cast is four
     // instructions a number. The sum with 1.5 * 2^23 has a step of 1: its last bits are the whole
     // number, up to 2^22; a cell beyond, or NaN, is some cell.
     const WHOLE: f32 = 12_582_912.0;
-    [at.x, at.y, at.z]
-        .map(|v| (v * per_metre - 0.5 + WHOLE).to_bits() as i32 - WHOLE.to_bits() as i32)
+    ((v * per_metre - 0.5 + WHOLE).to_bits() as i32).wrapping_sub(WHOLE.to_bits() as i32)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::HashMap;
 
     #[test]
     fn it_is_a_map() {

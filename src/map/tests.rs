@@ -57,7 +57,7 @@ fn blocks(depth: &[f32]) -> Blocks {
 fn projected(source: &[f32], target: &[f32], options: &Options) -> Alignment {
     let (camera, source, target) = (camera(), blocks(source), blocks(target));
     let points: Vec<_> = source.points.iter().flatten().copied().collect();
-    let target = Projective { camera: &camera, blocks: &target, max_correspondence_m: 0.1 };
+    let target = Projective::new(&camera, &target, 0.1);
     align(&points, &target, Isometry3::identity(), options)
 }
 

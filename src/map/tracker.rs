@@ -147,7 +147,7 @@ impl<'a> Tracker<'a> {
         match &last.shape {
             Shape::Cloud(target) => stages.time("icp", || align(source, target, start, options)),
             Shape::Blocks(blocks, _) if options.method == Method::Projective => {
-                let target = Projective { camera: self.camera, blocks, max_correspondence_m };
+                let target = Projective::new(self.camera, blocks, max_correspondence_m);
                 stages.time("icp", || align(source, &target, start, options))
             }
             Shape::Blocks(..) => {

@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 
 use super::point::{Noise, Point};
-use super::sparse_grid::{Cell, SparseGrid, cell_of};
+use super::sparse_grid::{Cell, SparseGrid, cell_along};
 use crate::camera::Rays;
 
 /// The pixels whose points fall in one cell; moments about the cell's corner.
@@ -42,26 +42,37 @@ impl Voxels {
                 if index == voxels.len() {
                     voxels.push(Voxel { pixel: run.voxel.pixel, ..Voxel::default() });
                 }
-                voxels[index].merge(&run.voxel, Vector3::zeros());
+                voxels[index].plus(&run.voxel);
             }
         };
-        let mut at = [Vector3::zeros(); STRIP];
-        let mut cells = [[0; 3]; STRIP];
+        let mut at = [[0.0; STRIP]; 3];
+        let mut cells = [[0; STRIP]; 3];
         for begin in (0..depth.len()).step_by(STRIP) {
-            let end = (begin + STRIP).min(depth.len());
-            let strip = depth[begin..end].iter().zip(&rays.x[begin..end]).zip(&rays.y[begin..end]);
-            for ((((&z, &x), &y), at), cell) in strip.zip(&mut at).zip(&mut cells) {
-                *at = Vector3::new(x * z, y * z, z);
-                *cell = cell_of(at, 1.0 / side_m);
+            let strip = begin..(begin + STRIP).min(depth.len());
+            let n = strip.len();
+            let depth = &depth[strip.clone()];
+            let ([xs, ys, zs], rays) = (&mut at, [&rays.x[strip.clone()], &rays.y[strip]]);
+            zs[..n].copy_from_slice(depth);
+            for (place, ray) in [xs, ys].into_iter().zip(rays) {
+                for ((place, &ray), &z) in place.iter_mut().zip(ray).zip(depth) {
+                    *place = ray * z;
+                }
             }
-            for (i, (at, &cell)) in (begin..end).zip(at.iter().zip(&cells)) {
+            for (cells, places) in cells.iter_mut().zip(&at) {
+                for (cell, &place) in cells.iter_mut().zip(places) {
+                    *cell = cell_along(place, 1.0 / side_m);
+                }
+            }
+            for i in 0..n {
+                let at = Vector3::new(at[0][i], at[1][i], at[2][i]);
                 if !(at.z > 0.0 && at.z.is_finite()) {
                     continue;
                 }
+                let cell = [cells[0][i], cells[1][i], cells[2][i]];
                 if cell != here {
                     leave(here, &run);
                     here = cell;
-                    run = Run::begin(cell, side_m, i);
+                    run = Run::begin(cell, side_m, begin + i);
                 }
                 run.voxel.add(at - run.corner);
             }
@@ -111,6 +122,16 @@ impl Voxel {
         }
     }
 
+    /// Add another's moments about the same corner.
+    #[inline]
+    fn plus(&mut self, other: &Voxel) {
+        self.n += other.n;
+        self.sum += other.sum;
+        for (sum, more) in self.squares.iter_mut().zip(other.squares) {
+            *sum += more;
+        }
+    }
+
     /// Add another's moments, whose corner lies at `o` from this one's, m.
     #[inline]
     fn merge(&mut self, other: &Voxel, o: Vector3<f32>) {
@@ -152,8 +173,7 @@ fn neighbourhood(voxels: &Voxels, index: usize) -> Voxel {
     let mut around = Voxel { pixel: voxels.voxels[index].pixel, ..Voxel::default() };
     let cell = voxels.grid.cell(index);
     let (low, high) = (cell.map(|v| v - 1), cell.map(|v| v + 1));
-    voxels.grid.for_each_within(low, high, |other| {
-        let [x, y, z] = voxels.grid.cell(other);
+    voxels.grid.for_each_cell_within(low, high, |other, [x, y, z]| {
         let apart = [x - cell[0], y - cell[1], z - cell[2]].map(|v| v as f32);
         around.merge(&voxels.voxels[other], Vector3::from(apart) * voxels.side_m);
     });
@@ -194,9 +214,11 @@ fn min_variance_direction(m: [f64; 6]) -> Option<([f64; 3], Vector3<f64>)> {
     }
     let det = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz);
     let angle = (det / (2.0 * p * p * p)).clamp(-1.0, 1.0).acos() / 3.0;
-    let third = 2.0 * std::f64::consts::FRAC_PI_3;
-    let max = mean + 2.0 * p * angle.cos();
-    let min = mean + 2.0 * p * (angle + third).cos();
+    // cos(a + 120 degrees) from cos(a); a is 60 degrees at most.
+    let cos = angle.cos();
+    let sin = (1.0 - cos * cos).max(0.0).sqrt();
+    let max = mean + 2.0 * p * cos;
+    let min = mean - p * (cos + 3f64.sqrt() * sin);
     let middle = 3.0 * mean - max - min;
     // Rows of M - min I are normal to the eigenvector: the longest of their products is along it.
     let rows = [

@@ -1,0 +1,168 @@
+//! Correspondences by the dozen: what each adds to the normal equations is summed side by side, in
+//! single precision, as the registers of a core hold it.
+//!
+//! A chunk of 2048 leaves a rounding error of 1e-6 of its sums, far below their noise; chunks are added
+//! in double precision.
+
+use nalgebra::Vector3;
+
+use super::Kernel;
+use super::normal_equations::NormalEquations;
+use super::point::Point;
+use crate::stats::TUKEY;
+
+/// Two registers of plain x86-64 or aarch64, one of newer.
+pub const LANES: usize = 8;
+type Lanes = [f32; LANES];
+
+/// 95 % as good as least squares where there are no outliers (Holland and Welsch 1977).
+const HUBER: f32 = 1.345;
+
+#[inline]
+fn each(of: impl Fn(usize) -> f32) -> Lanes {
+    std::array::from_fn(of)
+}
+
+/// Of the nine products of three numbers by three, or six by six, each once.
+const PAIRS: usize = 21;
+
+/// Sums over correspondences, lane by lane; as in [`NormalEquations`].
+#[derive(Default)]
+pub struct Batch {
+    /// The moved points, what they are matched with and its normals, and the variance of each distance.
+    at: [Lanes; 3],
+    to: [Lanes; 3],
+    normal: [Lanes; 3],
+    variance: Lanes,
+    filled: usize,
+
+    h: [Lanes; PAIRS],
+    geometry: [Lanes; PAIRS],
+    g: [Lanes; 6],
+    cost: Lanes,
+    weight: Lanes,
+    place: [Lanes; 3],
+    place_squared: Lanes,
+    squares_m2: Lanes,
+    correspondences: usize,
+    sizes: Vec<f32>,
+}
+
+impl Batch {
+    /// With room for so many sizes, where a kernel asks for them.
+    pub fn new(kernel: Kernel, points: usize) -> Self {
+        let room = if kernel == Kernel::Square { 0 } else { points + LANES };
+        Batch { sizes: Vec::with_capacity(room), ..Batch::default() }
+    }
+
+    /// A moved point, its neighbour, and the variance of the distance between them along the
+    /// neighbour's normal.
+    #[inline]
+    pub fn push(&mut self, at: &Vector3<f32>, to: &Point, variance: f32, robust: &Robust) {
+        let i = self.filled;
+        for k in 0..3 {
+            self.at[k][i] = at[k];
+            self.to[k][i] = to.at[k];
+            self.normal[k][i] = to.normal[k];
+        }
+        self.variance[i] = variance;
+        self.filled += 1;
+        if self.filled == LANES {
+            self.add(robust);
+        }
+    }
+
+    fn add(&mut self, robust: &Robust) {
+        let (p, n) = (&self.at, &self.normal);
+        let off: [Lanes; 3] = [0, 1, 2].map(|k| each(|i| p[k][i] - self.to[k][i]));
+        let r = each(|i| off[0][i] * n[0][i] + off[1][i] * n[1][i] + off[2][i] * n[2][i]);
+        let w2 = each(|i| 1.0 / self.variance[i]);
+        let squared = each(|i| r[i] * r[i] * w2[i]);
+        if robust.kernel != Kernel::Square {
+            self.sizes.extend(each(|i| squared[i].sqrt()));
+        }
+        let w2 = robust.weighted(&w2, &squared);
+        let cross = |a: usize, b: usize| each(|i| p[a][i] * n[b][i] - p[b][i] * n[a][i]);
+        let j = [n[0], n[1], n[2], cross(1, 2), cross(2, 0), cross(0, 1)];
+        let mut k = 0;
+        for a in 0..6 {
+            let wj = each(|i| w2[i] * j[a][i]);
+            plus(&mut self.g[a], |i| wj[i] * r[i]);
+            for jb in &j[a..] {
+                plus(&mut self.h[k], |i| wj[i] * jb[i]);
+                plus(&mut self.geometry[k], |i| j[a][i] * jb[i]);
+                k += 1;
+            }
+        }
+        plus(&mut self.cost, |i| w2[i] * r[i] * r[i]);
+        plus(&mut self.weight, |i| w2[i]);
+        for k in 0..3 {
+            plus(&mut self.place[k], |i| p[k][i] * w2[i]);
+        }
+        let length2 = each(|i| p[0][i] * p[0][i] + p[1][i] * p[1][i] + p[2][i] * p[2][i]);
+        plus(&mut self.place_squared, |i| length2[i] * w2[i]);
+        plus(&mut self.squares_m2, |i| r[i] * r[i]);
+        self.correspondences += self.filled;
+        self.filled = 0;
+    }
+
+    pub fn finish(mut self, robust: &Robust) -> NormalEquations {
+        let left = self.filled;
+        for i in left..LANES {
+            // Adds nothing.
+            [self.normal[0][i], self.normal[1][i], self.normal[2][i]] = [0.0; 3];
+            self.variance[i] = f32::INFINITY;
+        }
+        if left > 0 {
+            self.add(robust);
+            self.sizes.truncate(self.correspondences);
+        }
+        let total = |lanes: &Lanes| lanes.iter().map(|&v| f64::from(v)).sum::<f64>();
+        NormalEquations {
+            h: self.h.each_ref().map(total).into(),
+            geometry: self.geometry.each_ref().map(total).into(),
+            g: self.g.each_ref().map(total).into(),
+            cost: total(&self.cost),
+            weight: total(&self.weight),
+            place: self.place.each_ref().map(total).into(),
+            place_squared: total(&self.place_squared),
+            correspondences: self.correspondences,
+            squares_m2: total(&self.squares_m2),
+            sizes: self.sizes,
+        }
+    }
+}
+
+#[inline]
+fn plus(sum: &mut Lanes, of: impl Fn(usize) -> f32) {
+    for (i, sum) in sum.iter_mut().enumerate() {
+        *sum += of(i);
+    }
+}
+
+/// How outliers fare.
+pub struct Robust {
+    pub kernel: Kernel,
+    /// Of weighted residuals that are no outliers.
+    pub scale: f32,
+}
+
+impl Robust {
+    /// The weights `w2` with the kernel's, for weighted residuals of these squares.
+    #[inline]
+    fn weighted(&self, w2: &Lanes, squared: &Lanes) -> Lanes {
+        let limit = |sigmas: f32| (sigmas * self.scale) * (sigmas * self.scale);
+        match self.kernel {
+            Kernel::Square => *w2,
+            Kernel::Huber => {
+                let limit = limit(HUBER);
+                each(|i| w2[i] * (limit / squared[i]).min(1.0).sqrt())
+            }
+            Kernel::Tukey => {
+                let limit = limit(TUKEY as f32);
+                let left = each(|i| (1.0 - squared[i] / limit).max(0.0));
+                each(|i| w2[i] * left[i] * left[i])
+            }
+        }
+    }
+}
