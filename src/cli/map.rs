@@ -164,11 +164,12 @@ pub fn follow(
     output: OutputFolder,
 ) -> anyhow::Result<Value> {
     detail(format!("settings: {options:?}"));
-    let begin = std::time::Instant::now();
+    let (begin, used) = (std::time::Instant::now(), cpu_seconds());
     let mapped = working("mapping", |step| map::map(sequence, model, options, step))?;
     let seconds = begin.elapsed().as_secs_f64();
+    let cpu = used.and_then(|used| Some(cpu_seconds()? - used));
     let against = truth(sequence, &mapped);
-    let stats = stats(&mapped, options, &against, seconds);
+    let stats = stats(&mapped, options, &against, [Some(seconds), cpu]);
     let trajectory = mapped.trajectory();
     output.write("trajectory.txt", tum_text(&trajectory).as_bytes())?;
     output.write("map.ply", &ply(&mapped.map))?;
@@ -232,7 +233,7 @@ fn stats(
     mapped: &Mapped,
     options: &Options,
     against: &Option<Result<Evaluation, String>>,
-    seconds: f64,
+    [seconds, cpu_seconds]: [Option<f64>; 2],
 ) -> Value {
     let aligned = || mapped.frames.iter().filter_map(|f| f.alignment.as_ref());
     let mean = |of: fn(&Alignment) -> f64| {
@@ -254,6 +255,7 @@ fn stats(
         "points": mapped.map.len(),
         "ms": ms,
         "seconds": seconds,
+        "cpu_seconds": cpu_seconds,
         "peak_rss_mb": peak_rss_mb(),
         "settings": format!("{options:?}"),
         "truth": against.as_ref().and_then(|t| t.as_ref().ok()).map(super::evaluate::as_json),
@@ -271,4 +273,14 @@ fn peak_rss_mb() -> Option<f64> {
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
     let kilobytes: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
     Some(kilobytes / 1024.0)
+}
+
+/// What this process's threads have computed so far, s; known on Linux only.
+fn cpu_seconds() -> Option<f64> {
+    let threads = std::fs::read_dir("/proc/self/task").ok()?;
+    let nanoseconds = |thread: std::io::Result<std::fs::DirEntry>| -> Option<f64> {
+        let times = std::fs::read_to_string(thread.ok()?.path().join("schedstat")).ok()?;
+        times.split_whitespace().next()?.parse().ok()
+    };
+    Some(threads.filter_map(nanoseconds).sum::<f64>() * 1e-9)
 }
