@@ -41,6 +41,9 @@ pub struct Alignment {
     /// Share of the moving points that have a neighbour.
     pub inlier_ratio: f64,
     pub correspondences: usize,
+    /// The distances along the normals over what their weights expect, as a robust sigma: 1 where the
+    /// noise model says all.
+    pub misfit: f64,
     /// Root mean square of the distances along the normals, m; `None` without correspondences.
     pub rms_m: Option<f64>,
     /// Motions that the correspondences do not determine; along them the start was kept.
@@ -104,7 +107,7 @@ pub fn align<T: Target>(
             break;
         }
     }
-    finish(pose, last, termination, iterations, source.len())
+    Alignment { misfit: scale, ..finish(pose, last, termination, iterations, source.len()) }
 }
 
 /// The points of the first rounds: far from the goal a few tell the way as well as all. The paper's
@@ -162,6 +165,7 @@ fn finish(
         termination,
         inlier_ratio: correspondences as f64 / points.max(1) as f64,
         correspondences,
+        misfit: f64::INFINITY,
         rms_m,
         min_information: solution.as_ref().map_or(0.0, |s| s.min_information),
         degenerate_directions: solution.map(|s| s.degenerate_directions).unwrap_or_default(),

@@ -113,6 +113,7 @@ impl<'a> Tracker<'a> {
             report.fate = Fate::Tracked;
             report.pose = Some(pose);
             self.inlier_ratio = alignment.inlier_ratio;
+            self.surfels.remember(self.options.max_observations, alignment.misfit);
             let moved = seen.unwrap_or(alignment.target_from_source);
             self.pose_by_colour = renormalised(&(self.pose_by_colour * moved));
             report.by_colour = seen.and(by_colour(&frame, &self.pose_by_colour));
