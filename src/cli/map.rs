@@ -87,7 +87,8 @@ struct Tuning {
     /// Maximum number of iterations of an alignment
     #[arg(long, value_name = "N", value_parser = count(1, MAX_ITERATIONS))]
     iterations: Option<usize>,
-    /// Maximum number of observations that count for a piece of the map
+    /// Maximum number of observations that count for a piece of the map; fewer do where frames fit it
+    /// worse than the noise model expects
     #[arg(long, value_name = "N", value_parser = between(1.0, MAX_OBSERVATIONS.into(), "observations"))]
     memory: Option<f64>,
     /// Time from the first row of a depth image to the last, for a rolling shutter, s (a Kinect v1 takes

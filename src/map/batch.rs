@@ -166,3 +166,49 @@ impl Robust {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against one after the other in double precision; 2 x 8 and 3 that are left.
+    #[test]
+    fn side_by_side_is_as_one_by_one() {
+        let wave = |i: usize, k: f32| (i as f32 * k).sin();
+        let robust = Robust { kernel: Kernel::Huber, scale: 0.5 };
+        let mut batch = Batch::new(robust.kernel, 19);
+        let (mut h, mut g, mut sizes) = ([[0f64; 6]; 6], [0f64; 6], Vec::new());
+        for i in 0..19 {
+            let at = Vector3::new(wave(i, 1.3), wave(i, 0.7), 2.0 + wave(i, 2.1));
+            let normal = Vector3::new(wave(i, 0.9), wave(i, 1.9), -1.5).normalize();
+            let to = at + Vector3::new(wave(i, 3.1), wave(i, 2.3), wave(i, 4.1)) * 0.01;
+            let point = Point { at: to, normal, sigma_axial: 0.0, sigma_normal: 0.0, pixel: 0 };
+            let variance = 1e-5 * (2.0 + wave(i, 5.3));
+            batch.push(&at, &point, variance, &robust);
+            let (p, n) = (at.cast::<f64>(), normal.cast::<f64>());
+            let (r, m) = ((p - to.cast::<f64>()).dot(&n), p.cross(&n));
+            let size = r.abs() / f64::from(variance).sqrt();
+            let w2 = (f64::from(HUBER) * 0.5 / size).min(1.0) / f64::from(variance);
+            let j = [n.x, n.y, n.z, m.x, m.y, m.z];
+            for a in 0..6 {
+                g[a] += w2 * j[a] * r;
+                (0..6).for_each(|b| h[a][b] += w2 * j[a] * j[b]);
+            }
+            sizes.push(size);
+        }
+        let sums = batch.finish(&robust);
+        assert_eq!((sums.correspondences, sums.sizes.len()), (19, 19));
+        let largest = h.iter().flatten().fold(0.0f64, |l, v| l.max(v.abs()));
+        let mut k = 0;
+        for a in 0..6 {
+            assert!((sums.g[a] - g[a]).abs() < 1e-5 * largest);
+            for b in a..6 {
+                assert!((sums.h[k] - h[a][b]).abs() < 1e-5 * largest);
+                k += 1;
+            }
+        }
+        for (found, size) in sums.sizes.iter().zip(&sizes) {
+            assert!((f64::from(*found) / size - 1.0).abs() < 1e-3, "{found} {size}");
+        }
+    }
+}

@@ -12,8 +12,6 @@ use crate::camera::{Camera, Rays};
 
 /// Points in the order of a small image.
 pub struct Blocks {
-    pub width: usize,
-    pub height: usize,
     /// Pixels a block, each way.
     pub side_px: usize,
     pub points: Vec<Option<Point>>,
@@ -50,7 +48,7 @@ impl Blocks {
                 row
             })
             .collect();
-        Blocks { width, height, side_px, points }
+        Blocks { side_px, points }
     }
 }
 

@@ -1,7 +1,7 @@
 //! A rolling shutter made straight: the rows of a depth image are exposed one after the other while
 //! the camera moves. Each point is moved to where the camera would have seen it from its place at
-//! the middle row (after Ringaby and Forssen, "Scan rectification for structured light range sensors
-//! with rolling shutters", ICCV 2011).
+//! the middle row (after Ringaby and Forssén, "Scan Rectification for Structured Light Range Sensors
+//! with Rolling Shutters", ICCV 2011).
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -75,7 +75,7 @@ mod tests {
             Some(Point { at, normal, sigma_axial: 1.0, sigma_normal: 1.0, pixel: row as u32 * 640 })
         };
         let points: Vec<_> = [0, 100, 239, 479].into_iter().map(seen_by).collect();
-        let bent = Blocks { width: 4, height: 1, side_px: 4, points };
+        let bent = Blocks { side_px: 4, points };
         let apart = |blocks: &Blocks| {
             let off = |p: &Point| (p.at.cast::<f64>() - still).norm();
             blocks.points.iter().flatten().map(off).fold(0.0, f64::max)

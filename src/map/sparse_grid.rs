@@ -42,10 +42,6 @@ impl SparseGrid {
         SparseGrid { cells: Vec::with_capacity(n), ..Default::default() }
     }
 
-    pub fn len(&self) -> usize {
-        self.cells.len()
-    }
-
     pub fn cell(&self, index: usize) -> Cell {
         self.cells[index]
     }
@@ -198,7 +194,7 @@ mod tests {
             let expected = *oracle.entry(cell).or_insert(next);
             assert_eq!(grid.insert(cell), expected);
         }
-        assert_eq!(grid.len(), oracle.len());
+        assert_eq!(grid.cells.len(), oracle.len());
         for (cell, index) in &oracle {
             assert_eq!(grid.get(*cell), Some(*index));
             assert_eq!(grid.cell(*index), *cell);

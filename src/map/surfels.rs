@@ -217,3 +217,22 @@ impl Target for SurfelTarget<'_> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn where_the_noise_model_explains_less_less_is_remembered() {
+        let after = |max, misfit| {
+            let mut surfels = Surfels::new(max);
+            surfels.remember(max, misfit);
+            surfels.max_observations
+        };
+        assert_eq!(after(30.0, f64::INFINITY), 30.0, "no kernel, no misfit");
+        assert_eq!(after(30.0, 1.0), 30.0);
+        assert!((after(30.0, 2.0 * SOUND) - 7.5).abs() < 1e-3);
+        assert_eq!(after(30.0, 10.0), MIN_OBSERVATIONS);
+        assert_eq!(after(2.0, 10.0), 2.0, "never more than asked for");
+    }
+}
