@@ -96,8 +96,8 @@ impl Batch {
         }
         plus(&mut self.cost, |i| w2[i] * r[i] * r[i]);
         plus(&mut self.weight, |i| w2[i]);
-        for k in 0..3 {
-            plus(&mut self.place[k], |i| p[k][i] * w2[i]);
+        for (sum, p) in self.place.iter_mut().zip(p) {
+            plus(sum, |i| p[i] * w2[i]);
         }
         let length2 = each(|i| p[0][i] * p[0][i] + p[1][i] * p[1][i] + p[2][i] * p[2][i]);
         plus(&mut self.place_squared, |i| length2[i] * w2[i]);
@@ -169,6 +169,8 @@ impl Robust {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Matrix6, Vector6};
+
     use super::*;
 
     /// Against one after the other in double precision; 2 x 8 and 3 that are left.
@@ -177,7 +179,8 @@ mod tests {
         let wave = |i: usize, k: f32| (i as f32 * k).sin();
         let robust = Robust { kernel: Kernel::Huber, scale: 0.5 };
         let mut batch = Batch::new(robust.kernel, 19);
-        let (mut h, mut g, mut sizes) = ([[0f64; 6]; 6], [0f64; 6], Vec::new());
+        let (mut h, mut g) = (Matrix6::<f64>::zeros(), Vector6::<f64>::zeros());
+        let mut sizes = Vec::new();
         for i in 0..19 {
             let at = Vector3::new(wave(i, 1.3), wave(i, 0.7), 2.0 + wave(i, 2.1));
             let normal = Vector3::new(wave(i, 0.9), wave(i, 1.9), -1.5).normalize();
@@ -189,23 +192,17 @@ mod tests {
             let (r, m) = ((p - to.cast::<f64>()).dot(&n), p.cross(&n));
             let size = r.abs() / f64::from(variance).sqrt();
             let w2 = (f64::from(HUBER) * 0.5 / size).min(1.0) / f64::from(variance);
-            let j = [n.x, n.y, n.z, m.x, m.y, m.z];
-            for a in 0..6 {
-                g[a] += w2 * j[a] * r;
-                (0..6).for_each(|b| h[a][b] += w2 * j[a] * j[b]);
-            }
+            let j = Vector6::new(n.x, n.y, n.z, m.x, m.y, m.z);
+            h += w2 * j * j.transpose();
+            g += w2 * r * j;
             sizes.push(size);
         }
         let sums = batch.finish(&robust);
         assert_eq!((sums.correspondences, sums.sizes.len()), (19, 19));
-        let largest = h.iter().flatten().fold(0.0f64, |l, v| l.max(v.abs()));
-        let mut k = 0;
-        for a in 0..6 {
-            assert!((sums.g[a] - g[a]).abs() < 1e-5 * largest);
-            for b in a..6 {
-                assert!((sums.h[k] - h[a][b]).abs() < 1e-5 * largest);
-                k += 1;
-            }
+        assert!((sums.g - g).amax() < 1e-5 * h.amax());
+        let pairs = (0..6).flat_map(|a| (a..6).map(move |b| (a, b)));
+        for (found, place) in sums.h.iter().zip(pairs) {
+            assert!((found - h[place]).abs() < 1e-5 * h.amax(), "{place:?}");
         }
         for (found, size) in sums.sizes.iter().zip(&sizes) {
             assert!((f64::from(*found) / size - 1.0).abs() < 1e-3, "{found} {size}");
