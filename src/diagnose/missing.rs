@@ -9,6 +9,7 @@ use serde_json::{Map, Value};
 use super::diagnosis::Curve;
 use super::field::Field;
 use super::layers::Survey;
+use super::margins::Margins;
 use super::missing_cells::{Cell, cells, fine};
 use super::missing_report::{Told, shadow_finding};
 use super::missing_search::{Judged, Losses};
@@ -80,9 +81,12 @@ pub fn missing(
 ) -> DropoutOutcome {
     let told: Vec<bool> = fields.iter().map(|f| f.told).collect();
     let second = survey.second();
-    let seen = Seen { cells: cells(survey, camera), fine: fine(survey), told, second };
+    let margins = Margins::of(fields);
+    let (cells, fine) = (cells(survey, camera, &margins), fine(survey, &margins));
+    let seen = Seen { cells, fine, told, second };
     let blur = |z: f64| blur(survey, z);
     let mut outcome = losses(&seen, &survey.reach, camera, &blur, seed);
+    outcome.notes.extend(margins.notes());
     let sides: Vec<Sides> = (0..fields.len())
         .map(|v| Sides::of(&fields[v].edges, twins.map(|t| &t[v].edges)))
         .collect();

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 
 use super::layers::Survey;
+use super::margins::Margins;
 use super::tiles::{SIDE, Tile};
 use crate::camera::Camera;
 use crate::terms::PixelContext;
@@ -25,14 +26,14 @@ const RIM_PX: f64 = 8.0;
 const FEWEST_TILES: usize = 2;
 
 /// The cells of all views.
-pub fn cells(survey: &Survey, camera: &Camera) -> Vec<Vec<Cell>> {
+pub fn cells(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<Cell>> {
     let side = (camera.width.div_ceil(ACROSS * SIDE) * SIDE) as f64;
     survey
         .views
         .iter()
         .map(|view| {
             let mut groups: BTreeMap<(u32, u32, bool), Vec<usize>> = BTreeMap::new();
-            for (i, t) in view.tiles.iter().enumerate() {
+            for (i, t) in view.tiles.iter().enumerate().filter(|(_, t)| margins.hold(t)) {
                 let p = &t.place;
                 let key = ((p.v / side) as u32, (p.u / side) as u32, p.edge < RIM_PX);
                 groups.entry(key).or_default().push(i);
@@ -56,9 +57,10 @@ pub fn cells(survey: &Survey, camera: &Camera) -> Vec<Vec<Cell>> {
 }
 
 /// Every tile a cell of its own: for where and how much, not for whether.
-pub fn fine(survey: &Survey) -> Vec<Vec<Cell>> {
+pub fn fine(survey: &Survey, margins: &Margins) -> Vec<Vec<Cell>> {
     let cell = |t: &Tile| Cell { place: t.place, lost: t.asked * t.missing, asked: t.asked };
-    survey.views.iter().map(|v| v.tiles.iter().map(cell).collect()).collect()
+    let held = |v: &[Tile]| v.iter().filter(|t| margins.hold(t)).map(cell).collect();
+    survey.views.iter().map(|v| held(&v.tiles)).collect()
 }
 
 /// Losses below this share are all the same.

@@ -45,6 +45,7 @@ mod layers;
 mod learnt;
 mod light;
 mod lines;
+mod margins;
 mod missing;
 mod missing_cells;
 mod missing_fit;
