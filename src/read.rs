@@ -18,7 +18,7 @@ const MAX_JSON: u64 = 1 << 25;
 /// Of one text in it, bytes: notes of some pages. What is kept of it goes into every result.
 const MAX_WORDS: usize = 1 << 14;
 /// Of numbers: variances of what is hardly known at all are less, and squares of more have no number.
-const MAX_NUMBER: f64 = 1e30;
+pub(crate) const MAX_NUMBER: f64 = 1e30;
 /// Of an image, bytes: 16 megapixels in colour, not compressed, and what is written around them.
 pub(crate) const MAX_IMAGE: u64 = 1 << 26;
 /// What stands around an image's pixels, bytes: profiles and comments.

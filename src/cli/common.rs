@@ -71,7 +71,7 @@ pub struct Input {
     #[arg(
         long,
         value_name = "FX,FY,CX,CY",
-        value_parser = numbers::<4>(-1.0, MAX_PX, "px"),
+        value_parser = numbers::<4>(-MAX_PX, MAX_PX, "px"),
         allow_hyphen_values = true
     )]
     intrinsics: Option<[f64; 4]>,

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::surface::{Domain, SigmaModel};
 use crate::frame::FARTHEST_M;
+use crate::read::MAX_NUMBER;
 use crate::stats::even;
 
 /// Points a side at which sigma is looked at between the domain's corners. What the forms can do
@@ -35,8 +36,11 @@ impl SigmaModel {
                 self.form
             ));
         }
-        let finite = self.parameters.iter().chain(self.covariance.iter()).all(|v| v.is_finite());
-        (!finite).then(|| "a parameter or covariance is not finite".into())
+        // What is written must be read again.
+        let mut numbers = self.parameters.iter().chain(self.covariance.iter());
+        let measured = numbers.all(|v| v.abs() <= MAX_NUMBER);
+        (!measured)
+            .then(|| "a parameter or covariance is beyond any number that is measured".into())
     }
 
     fn wrong_domain(&self) -> Option<String> {
