@@ -16,7 +16,7 @@ use kinoise::{Form, NoiseModel, Recording, Seed, Sensor};
 
 use super::common::{Global, Input, say_differences, source_date};
 use super::console::{
-    detail, detail_model, detail_recording, next_step, one_line, result_lines, say, working,
+    detail, detail_model, detail_recording, next_step, notes, one_line, result_lines, say, working,
 };
 use super::diagnose_next::{After, NextStep};
 use super::origin::origin;
@@ -146,6 +146,7 @@ pub fn examine(
         Ok(())
     })?;
     out.finish()?;
+    notes(&done.excluded);
     result_lines(summary(diagnosis));
     Ok(done.diagnosis)
 }

@@ -18,6 +18,7 @@ use super::naming::{physics, temper};
 use super::next_view;
 use super::other_findings;
 use super::outcome::Outcome;
+use super::overstated::overstated;
 use super::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::reference::{self, can_happen};
 use super::replication_textures;
@@ -159,7 +160,9 @@ impl Case<'_> {
         let textured = scatter.tails.is_some()
             || (!scatter.hangs.is_empty() && f.size.sigma < LEVEL_BESIDE_TEXTURE);
         let tailed = textured && f.status == Status::Recalibrate;
-        !stepped && !tailed && f.size.sigma > self.options.ablation.min_size(MIN_SIZE)
+        // What each half of the views has otherwise, and no physics has a name for, is their scatter.
+        let scattered = f.status == Status::Unexplained && f.replicated == Some(false);
+        !stepped && !tailed && !scattered && f.size.sigma > self.options.ablation.min_size(MIN_SIZE)
     }
 
     /// What neither a mean nor a variance shows: how the noise hangs together, tails, steps.
@@ -168,7 +171,12 @@ impl Case<'_> {
         let level = self.level(Self::EACH_LEVEL);
         let mixing = mixing(&self.fields, self.twins(), level)
             .filter(|m| !self.known.has("edge-mixing") && self.stands(m.p, level));
+        let overstated = match self.baseline {
+            None => overstated(&scatter.structure, &self.known, level),
+            Some(_) => Vec::new(),
+        };
         let hangs = scatter.hangs.iter().cloned().chain(scatter.tails.clone()).chain(mixing);
+        let hangs = hangs.chain(overstated);
         let second = self.survey.second();
         let told = |h: Hanging| {
             let (views, fields) = (&scatter.structure, &self.fields);

@@ -99,7 +99,9 @@ impl Edges {
                 if let Some(crossing) = looked.crossing(i as isize, stride, noise) {
                     edges.crossings.push(crossing);
                     step -= crossing.step;
-                    sigma += noise;
+                    // As the residuals are scaled.
+                    let own = plane(field, rays, crossing.last);
+                    sigma += noise * (own + crossing.step) / own;
                 }
             }
         }
@@ -127,7 +129,9 @@ impl Edges {
         for c in &self.crossings {
             for (n, sums) in self.inside.iter_mut().enumerate().skip(fair) {
                 let i = c.last - n as isize * c.stride;
-                let residual = field.scale_px_m / depth(i) - plane(field, rays, i);
+                // Depth mixes, not disparity: the share of the step in depth, times the step in px.
+                let (own, seen) = (plane(field, rays, i), field.scale_px_m / depth(i));
+                let residual = (seen - own) * (own + c.step) / seen;
                 // What is nearer to the other surface is not this one's.
                 if residual.abs() < 0.5 * c.step.abs() {
                     sums.n += 1.0;
@@ -161,6 +165,11 @@ impl Edges {
         let beside = Beside { lost, shaded: side.shaded_px, rows: side.rows as f64 };
         (side.rows >= FEWEST_ROWS).then_some(beside)
     }
+}
+
+/// Disparity half-way in depth between two.
+fn half_way(a: f64, b: f64) -> f64 {
+    2.0 * a * b / (a + b)
 }
 
 /// Pixels beside the edge that may lie in the shadow.
@@ -207,7 +216,7 @@ impl Looked<'_> {
         // The last pixel nearer to the target than to what is behind; the region may reach into the
         // shadow.
         let nearer = |n: &isize| {
-            let i = at(*n).filter(|i| disparity(*i) > 0.5 * (there + self.plane(*i)));
+            let i = at(*n).filter(|i| disparity(*i) > half_way(there, self.plane(*i)));
             i.is_some()
         };
         let last = (-farthest..=behind as isize).rev().find(nearer)?;

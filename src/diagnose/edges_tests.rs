@@ -31,7 +31,7 @@ fn depth_in(u: isize, v: isize) -> isize {
     inside(u, &BOARD[0]).min(inside(v, &BOARD[1]))
 }
 
-/// What a pixel answers with: share of the wall's disparity by its way into the board, or nothing.
+/// What a pixel answers with: share of the wall's depth by its way into the board, or nothing.
 type Answer<'a> = &'a dyn Fn(isize, &mut Stream) -> Option<f64>;
 
 /// A board at `z`, seen in three frames.
@@ -73,7 +73,7 @@ fn field(camera: &Camera, z: f64, rng: &mut Stream, answer: Answer<'_>) -> Field
         edges: Edges::default(),
     };
     let noise = Normal::new(0.0, NOISE_PX).unwrap();
-    let [board, wall] = [z, WALL_M].map(|z| scale_px_m / z);
+    let [board, wall] = [z, WALL_M];
     for k in 0..3 {
         let mut frame = Frame { width, height, raw: vec![0; width * height] };
         for i in 0..width * height {
@@ -85,7 +85,8 @@ fn field(camera: &Camera, z: f64, rng: &mut Stream, answer: Answer<'_>) -> Field
             let Some(share) = answer(asked, rng) else { continue };
             let own = if inside >= 0 { board } else { wall };
             let other = if inside >= 0 { wall } else { board };
-            let disparity = own + share * (other - own) + noise.sample(rng);
+            let mixed = scale_px_m / (own + share * (other - own));
+            let disparity = mixed + noise.sample(rng);
             frame.raw[i] = CODE.raw(scale_px_m / disparity);
         }
         if k == 0 {

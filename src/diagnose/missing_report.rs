@@ -165,7 +165,7 @@ fn binned(
 pub fn shadow_finding(band: Band, fields: &[Field]) -> DropoutFinding {
     let mut parameters = Map::new();
     if band.lawful {
-        parameters.insert("share".into(), estimate(band.share[0], Some(band.share[1])));
+        parameters.insert("share".into(), estimate(band.share[0].min(1.0), Some(band.share[1])));
     }
     parameters.insert("side".into(), json!(["left", "right"][band.side]));
     let (mut lost, mut asked) = (0.0, 0.0);

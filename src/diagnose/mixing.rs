@@ -8,7 +8,7 @@ use super::hanging::{Hanging, Mean, nats, one};
 use crate::terms::{Axis, Statistic};
 
 /// Widths of the footprint that are tried, px.
-const WIDTHS_PX: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
+const WIDTHS_PX: [f64; 7] = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
 /// Wider footprints are told as this, px: the catalogue's limit.
 const WIDEST_PX: f64 = 32.0;
 
@@ -55,8 +55,9 @@ fn width_px(mixed: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// The views' mean share at a width, beyond that of the twins where there are any.
-pub fn mean_share(views: &[&Edges], twins: Option<&[&Edges]>, width: f64) -> Option<Mean> {
+/// The views' mean share at a width, beyond that of the twins where there are any, and how well it
+/// explains them: the root of twice its nats, by the noise alone, with its sign.
+pub fn mean_share(views: &[&Edges], twins: Option<&[&Edges]>, width: f64) -> Option<(Mean, f64)> {
     let of = |v: usize| {
         let (value, sure) = share(views[v], width)?;
         let Some(twins) = twins else { return Some((value, sure)) };
@@ -67,13 +68,14 @@ pub fn mean_share(views: &[&Edges], twins: Option<&[&Edges]>, width: f64) -> Opt
 }
 
 /// Mean of (value, information), with the views' scatter where that is larger than the noise's.
-fn combined(views: &[(f64, f64)]) -> Option<Mean> {
+fn combined(views: &[(f64, f64)]) -> Option<(Mean, f64)> {
     let n = views.len() as f64;
     let sure: f64 = views.iter().map(|v| v.1).sum();
     let value = views.iter().map(|v| v.0 * v.1).sum::<f64>() / sure;
     let scatter = views.iter().map(|v| v.1 * (v.0 - value).powi(2)).sum::<f64>() / (n - 1.0);
     let std_error = (scatter.max(1.0) / sure).sqrt();
-    (n > 1.0 && sure > 0.0).then_some(Mean { value, std_error, views: n })
+    let explained = value * sure.sqrt();
+    (n > 1.0 && sure > 0.0).then_some((Mean { value, std_error, views: n }, explained))
 }
 
 /// Depth mixed at the edge, where the views agree on it at this level.
@@ -81,11 +83,11 @@ pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<H
     let edges: Vec<&Edges> = fields.iter().map(|f| &f.edges).collect();
     let twins: Option<Vec<&Edges>> = twins.map(|t| t.iter().map(|f| &f.edges).collect());
     let at = |w: f64| Some((w, mean_share(&edges, twins.as_deref(), w)?));
-    let (width, mean) = WIDTHS_PX
+    let (width, (mean, _)) = WIDTHS_PX
         .into_iter()
         .filter_map(at)
-        .filter(|(_, m)| m.views > FEWEST_VIEWS)
-        .max_by(|a, b| (a.1.value / a.1.std_error).total_cmp(&(b.1.value / b.1.std_error)))?;
+        .filter(|(_, (m, _))| m.views > FEWEST_VIEWS)
+        .max_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
     let p = (WIDTHS_PX.len() as f64 * mean.p_above(0.0)).min(1.0);
     if p > level {
         return None;

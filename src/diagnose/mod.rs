@@ -60,6 +60,7 @@ mod noise;
 mod null;
 mod other_findings;
 mod outcome;
+mod overstated;
 mod pairs;
 mod parameters;
 mod partners;

@@ -24,7 +24,7 @@ pub fn replicated(
     second: &[bool],
     known: &KnownTerms,
 ) -> Option<bool> {
-    let beyond = statistic(found, known);
+    let beyond = beyond_known(found, known);
     let half = |which: bool| {
         let mine = second.iter().enumerate().filter(|(_, s)| **s == which).map(|(v, _)| v);
         match &beyond {
@@ -34,7 +34,7 @@ pub fn replicated(
             }
             None if found.axis == Axis::EdgeDistance => {
                 let edges: Vec<&Edges> = mine.map(|v| &fields[v].edges).collect();
-                mean_share(&edges, None, found.interval[1]).map(|m| measured(&m))
+                mean_share(&edges, None, found.interval[1]).map(|(m, _)| measured(&m))
             }
             None => None,
         }
@@ -43,7 +43,7 @@ pub fn replicated(
 }
 
 /// What a finding is told by, view by view.
-fn statistic<'a>(found: &Hanging, known: &'a KnownTerms) -> Option<OfView<'a>> {
+pub fn beyond_known<'a>(found: &Hanging, known: &'a KnownTerms) -> Option<OfView<'a>> {
     let parameter = |id: &str, name: &str| known.parameter(id, name).unwrap_or(0.0);
     let px2 = |id: &str| parameter(id, "sigma_px").powi(2);
     let (fixed, rows) = (px2("fixed-pattern-noise"), px2("row-noise"));

@@ -7,6 +7,9 @@ use crate::read::read_text;
 use crate::units::{counted, verb};
 use crate::view::FrameRef;
 
+/// Stamps from here on are no times, s: thirty thousand years.
+const LATEST_S: f64 = 1e12;
+
 /// The frames a list names, in time order, and what was odd about it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FrameList {
@@ -51,7 +54,7 @@ pub(crate) fn content_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 
 fn parse(line: &str) -> Option<(f64, &str)> {
     let (stamp, path) = line.split_once(char::is_whitespace)?;
-    let timestamp: f64 = stamp.parse().ok().filter(|t: &f64| t.is_finite())?;
+    let timestamp: f64 = stamp.parse().ok().filter(|t: &f64| t.abs() < LATEST_S)?;
     let path = path.trim();
     (!path.is_empty()).then_some((timestamp, path))
 }

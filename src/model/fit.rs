@@ -31,7 +31,7 @@ pub fn fit_all(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
         let (n, [low, high]) = (table.rows.len(), table.range(|r| r.z_m));
         Error::NotEnough {
             what: format!(
-                "the form \"{form}\" cannot be fitted to these {n} measured from {low:.2} to {high:.2} m sigmas"
+                "the form \"{form}\" cannot be fitted to these {n} sigmas, measured from {low:.2} to {high:.2} m"
             ),
             remedy: "add views at other distances and tilts, or choose --form khoshelham".into(),
         }
