@@ -7,7 +7,9 @@ use super::field::Field;
 use super::hanging::{Hanging, Mean, nats, one};
 use crate::terms::{Axis, Statistic};
 
-/// Widths of the footprint that are tried, px.
+/// Widths of the footprint that decide whether depth mixes, px.
+const TRIED_PX: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
+/// And that tell how far, px.
 const WIDTHS_PX: [f64; 7] = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
 /// Wider footprints are told as this, px: the catalogue's limit.
 const WIDEST_PX: f64 = 32.0;
@@ -82,13 +84,13 @@ fn combined(views: &[(f64, f64)]) -> Option<(Mean, f64)> {
 pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<Hanging> {
     let edges: Vec<&Edges> = fields.iter().map(|f| &f.edges).collect();
     let twins: Option<Vec<&Edges>> = twins.map(|t| t.iter().map(|f| &f.edges).collect());
-    let at = |w: f64| Some((w, mean_share(&edges, twins.as_deref(), w)?));
-    let (width, (mean, _)) = WIDTHS_PX
-        .into_iter()
-        .filter_map(at)
-        .filter(|(_, (m, _))| m.views > FEWEST_VIEWS)
-        .max_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
-    let p = (WIDTHS_PX.len() as f64 * mean.p_above(0.0)).min(1.0);
+    let at = |w: &f64| Some((*w, mean_share(&edges, twins.as_deref(), *w)?));
+    let best = |widths: &[f64]| {
+        let seen = widths.iter().filter_map(at).filter(|(_, (m, _))| m.views > FEWEST_VIEWS);
+        seen.max_by(|a, b| a.1.1.total_cmp(&b.1.1))
+    };
+    let p = (TRIED_PX.len() as f64 * best(&TRIED_PX)?.1.0.p_above(0.0)).min(1.0);
+    let (width, (mean, _)) = best(&WIDTHS_PX)?;
     if p > level {
         return None;
     }

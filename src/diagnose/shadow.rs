@@ -58,13 +58,16 @@ struct Law {
     freedom: f64,
 }
 
-/// What is lost as a share of `of`, a ratio of sums: rare losses are counts.
+/// What is lost as a share of `of`, view by view. A small shadow says little; views differ for reasons of
+/// their own, so that a large one does not say all.
 fn law(views: &[Beside], of: impl Fn(&Beside) -> f64) -> Law {
-    let all: f64 = views.iter().map(&of).sum();
-    let share = views.iter().map(|v| v.lost).sum::<f64>() / all;
-    let off: f64 = views.iter().map(|v| (v.lost - share * of(v)).powi(2)).sum();
-    // Views that weigh little are no sample of the error.
-    let n = (all * all / views.iter().map(|v| of(v).powi(2)).sum::<f64>()).max(1.5);
+    let usual = views.iter().map(&of).sum::<f64>() / views.len() as f64;
+    let weighed: Vec<[f64; 2]> =
+        views.iter().map(|v| [of(v) / (of(v) + usual), v.lost / of(v)]).collect();
+    let all: f64 = weighed.iter().map(|[w, _]| w).sum();
+    let share = weighed.iter().map(|[w, share]| w * share).sum::<f64>() / all;
+    let off: f64 = weighed.iter().map(|[w, own]| (w * (own - share)).powi(2)).sum();
+    let n = (all * all / weighed.iter().map(|[w, _]| w * w).sum::<f64>()).max(1.5);
     Law { share, std_error: (off * n / (n - 1.0)).sqrt() / all, freedom: n - 1.0 }
 }
 

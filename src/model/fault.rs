@@ -39,8 +39,9 @@ impl SigmaModel {
         // What is written must be read again.
         let mut numbers = self.parameters.iter().chain(self.covariance.iter());
         let measured = numbers.all(|v| v.abs() <= MAX_NUMBER);
-        (!measured)
-            .then(|| "a parameter or covariance is beyond any number that is measured".into())
+        (!measured).then(|| {
+            "a parameter or covariance is not finite, or beyond any number that is measured".into()
+        })
     }
 
     fn wrong_domain(&self) -> Option<String> {
