@@ -21,8 +21,8 @@ const BEHIND_PX: usize = 4;
 const BELOW_SIGMAS: f64 = 3.0;
 /// And the step is so many, so that a pixel half-way is three from either surface.
 const STEP_SIGMAS: f64 = 6.0;
-/// Beyond the shadow's end a matching window sees a part of it: half of a Kinect's nine pixels.
-const FRINGE_PX: usize = 5;
+/// Beyond the shadow's end a matching window sees a part of it: half of a Kinect's nine pixels, of 640.
+const FRINGE: f64 = 4.5 / 640.0;
 /// Pixels beyond that, which show how much is lost anyway.
 const BEYOND_PX: usize = 8;
 
@@ -147,7 +147,7 @@ impl Edges {
                     let lost = |n: &usize| !depth(c.last + (n + 1) as isize * c.stride).is_finite();
                     pixels.filter(lost).count() as f64
                 };
-                let beyond = shadow + FRINGE_PX;
+                let beyond = shadow + fringe_px(field.width);
                 let anyway = lost(beyond..beyond + BEYOND_PX) / BEYOND_PX as f64;
                 self.sides[side].lost_px += lost(0..shadow) - anyway * shadow as f64;
             }
@@ -175,6 +175,11 @@ fn half_way(a: f64, b: f64) -> f64 {
 /// Pixels beside the edge that may lie in the shadow.
 fn shadow_px(step: f64) -> usize {
     step.abs().ceil() as usize + 1
+}
+
+/// Pixels beyond a shadow that are neither in it nor beyond it.
+fn fringe_px(width: usize) -> usize {
+    (FRINGE * width as f64).ceil() as usize
 }
 
 /// Disparity of the target's plane, px.
@@ -226,7 +231,7 @@ impl Looked<'_> {
         if step > -STEP_SIGMAS * sigma || inside > 0 || !(inside..=last.min(0)).all(in_region) {
             return None;
         }
-        let room = last + (shadow_px(step) + FRINGE_PX + BEYOND_PX) as isize;
+        let room = last + (shadow_px(step) + fringe_px(self.field.width) + BEYOND_PX) as isize;
         let side = match stride {
             -1 => Some(0),
             1 => Some(1),
