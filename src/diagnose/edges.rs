@@ -88,31 +88,26 @@ const FEWEST_ROWS: usize = 8;
 impl Edges {
     /// Where the lines cross the edge, by the view's first frame.
     pub fn find(field: &Field, frame: &Frame, rays: &Rays, table: &DepthTable) -> Self {
-        let mut on = vec![false; frame.raw.len()];
-        field.pixels.iter().for_each(|&i| on[i as usize] = true);
-        let looked = Looked { field, frame, rays, table, on };
+        let looked = Looked { field, frame, rays, table, on: field.on_target() };
         let mut edges = Edges::default();
         let (mut sigma, mut step, width) = (0.0, 0.0, field.width as isize);
         for (k, &i) in field.pixels.iter().enumerate() {
             for stride in [-1, 1, -width, width] {
                 let noise = f64::from(field.sigma[k].max(field.spread_px));
-                if let Some(crossing) = looked.crossing(i as isize, stride, noise) {
-                    edges.crossings.push(crossing);
-                    step -= crossing.step;
-                    // As the residuals are scaled.
-                    let own = plane(field, rays, crossing.last);
-                    sigma += noise * (own + crossing.step) / own;
+                let Some(crossing) = looked.crossing(i as isize, stride, noise) else { continue };
+                step -= crossing.step;
+                // As the residuals are scaled.
+                let own = looked.plane(crossing.last);
+                sigma += noise * (own + crossing.step) / own;
+                if let Some(side) = crossing.side {
+                    edges.sides[side].rows += 1;
+                    edges.sides[side].shaded_px -= crossing.step;
                 }
+                edges.crossings.push(crossing);
             }
         }
         let n = edges.crossings.len().max(1) as f64;
         (edges.sigma_px, edges.step_px) = (sigma / n, step / n);
-        for crossing in &edges.crossings {
-            if let Some(side) = crossing.side {
-                edges.sides[side].rows += 1;
-                edges.sides[side].shaded_px -= crossing.step;
-            }
-        }
         edges
     }
 
@@ -130,7 +125,7 @@ impl Edges {
             for (n, sums) in self.inside.iter_mut().enumerate().skip(fair) {
                 let i = c.last - n as isize * c.stride;
                 // Depth mixes, not disparity: the share of the step in depth, times the step in px.
-                let (own, seen) = (plane(field, rays, i), field.scale_px_m / depth(i));
+                let (own, seen) = (field.plane_at(i as usize, rays), field.scale_px_m / depth(i));
                 let residual = (seen - own) * (own + c.step) / seen;
                 // What is nearer to the other surface is not this one's.
                 if residual.abs() < 0.5 * c.step.abs() {
@@ -180,12 +175,6 @@ fn shadow_px(step: f64) -> usize {
 /// Pixels beyond a shadow that are neither in it nor beyond it.
 fn fringe_px(width: usize) -> usize {
     (FRINGE * width as f64).ceil() as usize
-}
-
-/// Disparity of the target's plane, px.
-fn plane(field: &Field, rays: &Rays, i: isize) -> f64 {
-    let (x, y) = rays.at(i as usize);
-    field.scale_px_m * field.plane.inverse_depth(x, y)
 }
 
 struct Looked<'a> {
@@ -242,7 +231,7 @@ impl Looked<'_> {
     }
 
     fn plane(&self, i: isize) -> f64 {
-        plane(self.field, self.rays, i)
+        self.field.plane_at(i as usize, self.rays)
     }
 
     /// The pixel `n` strides on, in the same row or column.

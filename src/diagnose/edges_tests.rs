@@ -3,7 +3,6 @@
 use rand::Rng;
 use rand_distr::{Distribution, Normal};
 
-use super::super::lattice::RawHistogram;
 use super::super::mixing::mixing;
 use super::super::shadow::{Sides, band};
 use super::*;
@@ -45,32 +44,11 @@ fn field(camera: &Camera, z: f64, rng: &mut Stream, answer: Answer<'_>) -> Field
         .map(|i| i as u32)
         .collect();
     let n = pixels.len();
+    let plane = Plane::tilted(z, 0.0, 0.0);
     let mut field = Field {
-        name: "view".into(),
-        time_s: 0.0,
-        plane: Plane::tilted(z, 0.0, 0.0),
-        scale_px_m,
-        width,
-        height,
-        pixels,
-        edge: Vec::new(),
         sigma: vec![NOISE_PX as f32; n],
         spread_px: NOISE_PX as f32,
-        mean: vec![0.0; n],
-        square: vec![0.01; n],
-        count: vec![3; n],
-        measured: vec![3; n],
-        first: Vec::new(),
-        frames: Vec::new(),
-        lines: Vec::new(),
-        reference_distance_m: None,
-        flatness_m: None,
-        temperature_c: None,
-        ambient_lux: None,
-        light: Vec::new(),
-        words: RawHistogram::none(),
-        told: false,
-        edges: Edges::default(),
+        ..Field::unseen(plane, scale_px_m, [width, height], pixels)
     };
     let noise = Normal::new(0.0, NOISE_PX).unwrap();
     let [board, wall] = [z, WALL_M];

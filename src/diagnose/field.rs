@@ -175,14 +175,36 @@ impl Field {
     }
 
     fn empty(view: &View, sensor: &Sensor, plane: Plane, pixels: Vec<u32>) -> Self {
-        let n = pixels.len();
+        let scale_px_m = sensor.disparity_px_m().unwrap_or(sensor.camera.fx * KINECT_BASELINE_M);
+        let size = [sensor.camera.width, sensor.camera.height];
         Field {
             name: view.name.clone(),
             time_s: view.depth.first().map_or(0.0, |f| f.timestamp),
+            reference_distance_m: view.notes.reference_distance_m,
+            flatness_m: view.notes.target.and_then(|t| t.flatness_m),
+            temperature_c: view.notes.temperature_c,
+            ambient_lux: view.notes.ambient_lux,
+            told: view.notes.region.is_some(),
+            ..Field::unseen(plane, scale_px_m, size, pixels)
+        }
+    }
+
+    /// These pixels of a picture about a plane, before anything is measured at them and with nothing
+    /// known of the view.
+    pub(super) fn unseen(
+        plane: Plane,
+        scale_px_m: f64,
+        [width, height]: [usize; 2],
+        pixels: Vec<u32>,
+    ) -> Self {
+        let n = pixels.len();
+        Field {
+            name: String::new(),
+            time_s: 0.0,
             plane,
-            scale_px_m: sensor.disparity_px_m().unwrap_or(sensor.camera.fx * KINECT_BASELINE_M),
-            width: sensor.camera.width,
-            height: sensor.camera.height,
+            scale_px_m,
+            width,
+            height,
             pixels,
             edge: Vec::new(),
             sigma: Vec::new(),
@@ -194,20 +216,32 @@ impl Field {
             first: Vec::new(),
             frames: Vec::new(),
             lines: Vec::new(),
-            reference_distance_m: view.notes.reference_distance_m,
-            flatness_m: view.notes.target.and_then(|t| t.flatness_m),
-            temperature_c: view.notes.temperature_c,
-            ambient_lux: view.notes.ambient_lux,
+            reference_distance_m: None,
+            flatness_m: None,
+            temperature_c: None,
+            ambient_lux: None,
             light: Vec::new(),
             words: RawHistogram::none(),
-            told: view.notes.region.is_some(),
+            told: false,
             edges: Edges::default(),
         }
     }
 
     /// Disparity of the plane at pixel number `k` of the target, px.
     pub fn disparity(&self, k: usize, rays: &Rays) -> f64 {
-        let (x, y) = rays.at(self.pixels[k] as usize);
+        self.plane_at(self.pixels[k] as usize, rays)
+    }
+
+    /// Disparity of the plane at pixel `i` of the picture, px.
+    pub fn plane_at(&self, i: usize, rays: &Rays) -> f64 {
+        let (x, y) = rays.at(i);
         self.scale_px_m * self.plane.inverse_depth(x, y)
+    }
+
+    /// Whether each pixel of the picture is one of the target's.
+    pub fn on_target(&self) -> Vec<bool> {
+        let mut on = vec![false; self.width * self.height];
+        self.pixels.iter().for_each(|&i| on[i as usize] = true);
+        on
     }
 }

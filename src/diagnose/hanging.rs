@@ -40,10 +40,15 @@ impl Mean {
             .iter()
             .filter_map(|s| Some((value(s).filter(|v| v.is_finite())?, s.pixels)))
             .collect();
+        Mean::weighed(&values)
+    }
+
+    /// Of values, each with how much there is of what it was measured on.
+    pub fn weighed(values: &[(f64, f64)]) -> Option<Self> {
         let middle = values.iter().map(|v| v.1).sum::<f64>() / values.len().max(1) as f64;
-        // A small target says little; views differ for reasons of their own, so that a large one
+        // A small one says little; views differ for reasons of their own, so that a large one
         // does not say all.
-        let weight = |pixels: f64| if middle > 0.0 { pixels / (pixels + middle) } else { 1.0 };
+        let weight = |size: f64| if middle > 0.0 { size / (size + middle) } else { 1.0 };
         let total: f64 = values.iter().map(|v| weight(v.1)).sum();
         let squares: f64 = values.iter().map(|v| weight(v.1).powi(2)).sum();
         let n = total * total / squares.max(f64::MIN_POSITIVE);

@@ -2,8 +2,6 @@
 
 use rand_distr::{Distribution, StandardNormal};
 
-use super::super::edges::Edges;
-use super::super::lattice::RawHistogram;
 use super::*;
 use crate::plane::Plane;
 use crate::rng::{Seed, Stream};
@@ -20,31 +18,14 @@ fn field(rng: &mut Stream, error_px: impl Fn(usize) -> f64) -> Field {
         (error_px(i % width) + NOISE_PX * noise) as f32
     };
     Field {
-        name: "view".into(),
-        time_s: 0.0,
-        plane: Plane::tilted(1.0, 0.0, 0.0),
-        scale_px_m: 10.0,
-        width,
-        height,
-        pixels: (0..n as u32).collect(),
-        edge: Vec::new(),
         sigma: vec![NOISE_PX as f32; n],
         spread_px: NOISE_PX as f32,
         mean: (0..n).map(noisy).collect(),
         square: vec![0.01; n],
         count: vec![1; n],
         measured: vec![1; n],
-        first: Vec::new(),
-        frames: Vec::new(),
-        lines: Vec::new(),
-        reference_distance_m: None,
-        flatness_m: None,
-        temperature_c: None,
-        ambient_lux: None,
-        light: Vec::new(),
-        words: RawHistogram::none(),
         told: true,
-        edges: Edges::default(),
+        ..Field::unseen(Plane::tilted(1.0, 0.0, 0.0), 10.0, SIZE, (0..n as u32).collect())
     }
 }
 

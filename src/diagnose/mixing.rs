@@ -11,6 +11,8 @@ use crate::terms::{Axis, Statistic};
 const TRIED_PX: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
 /// And that tell how far, px.
 const WIDTHS_PX: [f64; 7] = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
+/// So few views show no rule.
+const TOO_FEW_VIEWS: f64 = 2.0;
 /// Wider footprints are told as this, px: the catalogue's limit.
 const WIDEST_PX: f64 = 32.0;
 
@@ -86,14 +88,14 @@ pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<H
     let twins: Option<Vec<&Edges>> = twins.map(|t| t.iter().map(|f| &f.edges).collect());
     let at = |w: &f64| Some((*w, mean_share(&edges, twins.as_deref(), *w)?));
     let best = |widths: &[f64]| {
-        let seen = widths.iter().filter_map(at).filter(|(_, (m, _))| m.views > FEWEST_VIEWS);
+        let seen = widths.iter().filter_map(at).filter(|(_, (m, _))| m.views > TOO_FEW_VIEWS);
         seen.max_by(|a, b| a.1.1.total_cmp(&b.1.1))
     };
     let p = (TRIED_PX.len() as f64 * best(&TRIED_PX)?.1.0.p_above(0.0)).min(1.0);
-    let (width, (mean, _)) = best(&WIDTHS_PX)?;
     if p > level {
         return None;
     }
+    let (width, (mean, _)) = best(&WIDTHS_PX)?;
     let full = mixed_px(width);
     let [mixed, error] = [full * mean.value, full * mean.std_error];
     let slope = (width_px(mixed + error) - width_px((mixed - error).max(0.0))) / 2.0;
@@ -116,6 +118,3 @@ pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<H
         )),
     })
 }
-
-/// Fewer views show no rule.
-const FEWEST_VIEWS: f64 = 2.0;

@@ -7,6 +7,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::diagnosis::Curve;
 use super::edges::{Beside, Edges};
+use super::hanging::Mean;
 use super::null::student;
 
 /// Losses beside the target.
@@ -52,78 +53,59 @@ impl Sides {
     }
 }
 
-struct Law {
-    share: f64,
-    std_error: f64,
-    freedom: f64,
+/// What is lost as a share of `of`, view by view.
+fn law(views: &[Beside], of: impl Fn(&Beside) -> f64) -> Option<Mean> {
+    Mean::weighed(&views.iter().map(|v| (v.lost / of(v), of(v))).collect::<Vec<_>>())
 }
 
-/// What is lost as a share of `of`, view by view. A small shadow says little; views differ for reasons of
-/// their own, so that a large one does not say all.
-fn law(views: &[Beside], of: impl Fn(&Beside) -> f64) -> Law {
-    let usual = views.iter().map(&of).sum::<f64>() / views.len() as f64;
-    let weighed: Vec<[f64; 2]> =
-        views.iter().map(|v| [of(v) / (of(v) + usual), v.lost / of(v)]).collect();
-    let all: f64 = weighed.iter().map(|[w, _]| w).sum();
-    let share = weighed.iter().map(|[w, share]| w * share).sum::<f64>() / all;
-    let off: f64 = weighed.iter().map(|[w, own]| (w * (own - share)).powi(2)).sum();
-    let n = (all * all / weighed.iter().map(|[w, _]| w * w).sum::<f64>()).max(1.5);
-    Law { share, std_error: (off * n / (n - 1.0)).sqrt() / all, freedom: n - 1.0 }
+fn t(share: &Mean) -> f64 {
+    // Without any loss there is neither a share nor an error.
+    if share.value > 0.0 { share.value / share.std_error.max(1e-9 * share.value) } else { 0.0 }
 }
 
-impl Law {
-    fn t(&self) -> f64 {
-        // Without any loss there is neither a share nor an error.
-        if self.share > 0.0 { self.share / self.std_error.max(1e-9 * self.share) } else { 0.0 }
-    }
-
-    /// What it is worth: a share that the views agree on, and whole pixels that are explained.
-    fn nats(&self, views: &[Beside], of: impl Fn(&Beside) -> f64) -> f64 {
-        let square = |px: f64, v: &Beside| (px / v.rows / BORDER_PX).powi(2);
-        let explained = |v: &Beside| square(v.lost, v) - square(v.lost - self.share * of(v), v);
-        student(0.5 * self.t().powi(2), self.freedom)
-            + 0.5 * views.iter().map(explained).sum::<f64>()
-    }
+/// What a share of `of` is worth: that the views agree on it, and whole pixels that it explains.
+fn nats(share: &Mean, views: &[Beside], of: impl Fn(&Beside) -> f64) -> f64 {
+    let square = |px: f64, v: &Beside| (px / v.rows / BORDER_PX).powi(2);
+    let explained = |v: &Beside| square(v.lost, v) - square(v.lost - share.value * of(v), v);
+    student(0.5 * t(share).powi(2), share.views - 1.0)
+        + 0.5 * views.iter().map(explained).sum::<f64>()
 }
 
 /// The band that the views agree on, if there is one at this level.
 pub fn band(views: &[Sides], level: f64) -> Option<Band> {
     let seen = |side: usize| -> Vec<Beside> { views.iter().filter_map(|s| s.0[side]).collect() };
     let sides = [seen(0), seen(1)];
-    let share = |side: usize| {
+    let laws = [0, 1].map(|side: usize| {
         let views = &sides[side];
-        if views.len() < FEWEST_VIEWS { 0.0 } else { law(views, |v| v.shaded).share }
-    };
+        (views.len() >= FEWEST_VIEWS).then(|| law(views, |v| v.shaded)).flatten()
+    });
+    let share = |side: usize| laws[side].map_or(0.0, |law| law.value);
     let side = usize::from(share(1) > share(0));
-    let views = &sides[side];
-    if views.len() < FEWEST_VIEWS {
-        return None;
-    }
-    let lawful = law(views, |v| v.shaded);
-    let even = law(views, |v| v.rows);
-    let t = StudentsT::new(0.0, 1.0, lawful.freedom).ok()?;
+    let (views, lawful) = (&sides[side], laws[side]?);
+    let even = law(views, |v| v.rows)?;
+    let student = StudentsT::new(0.0, 1.0, lawful.views - 1.0).ok()?;
     // Two sides were looked at.
-    let p = (2.0 * t.sf(lawful.t())).min(1.0);
+    let p = (2.0 * student.sf(t(&lawful))).min(1.0);
     if p > level {
         return None;
     }
-    let one_sided = share(1 - side) < OTHER_SIDE * lawful.share;
-    let gain = [lawful.nats(views, |v| v.shaded), even.nats(views, |v| v.rows)];
+    let one_sided = share(1 - side) < OTHER_SIDE * lawful.value;
+    let gain = [nats(&lawful, views, |v| v.shaded), nats(&even, views, |v| v.rows)];
     Some(Band {
         side,
-        lawful: one_sided && lawful.share < WIDEST && gain[0] > ADEQUATE * gain[1],
-        share: [lawful.share, lawful.std_error],
+        lawful: one_sided && lawful.value < WIDEST && gain[0] > ADEQUATE * gain[1],
+        share: [lawful.value, lawful.std_error],
         gain,
         p,
-        curve: curve(views, &lawful),
+        curve: curve(views, lawful.value),
     })
 }
 
-fn curve(views: &[Beside], law: &Law) -> Curve {
+fn curve(views: &[Beside], share: f64) -> Curve {
     let mut widths: Vec<[f64; 2]> =
         views.iter().map(|v| [v.shaded, v.lost].map(|px| px / v.rows)).collect();
     widths.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let model: Vec<f64> = widths.iter().map(|w| law.share * w[0]).collect();
+    let model: Vec<f64> = widths.iter().map(|w| share * w[0]).collect();
     let off: f64 = widths.iter().zip(&model).map(|(w, m)| (w[1] - m).powi(2)).sum();
     let scatter = (off / (widths.len() as f64 - 1.0)).sqrt();
     Curve {

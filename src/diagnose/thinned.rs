@@ -44,9 +44,7 @@ impl Field {
         if !kept.iter().any(|k| *k) {
             return;
         }
-        let mut on_target = vec![false; width * height];
-        self.pixels.iter().for_each(|&i| on_target[i as usize] = true);
-        let edge = edge_distances(&on_target, width);
+        let edge = edge_distances(&self.on_target(), width);
         keep(&mut self.pixels, &kept);
         keep(&mut self.sigma, &kept);
         keep(expected, &kept);

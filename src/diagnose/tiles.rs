@@ -108,9 +108,7 @@ impl<'a> Places<'a> {
 /// Distance of each pixel from the target's edge, px.
 fn edges(field: &Field, camera: &Camera) -> Vec<f32> {
     if field.edge.is_empty() {
-        let mut on_target = vec![false; camera.pixels()];
-        field.pixels.iter().for_each(|&i| on_target[i as usize] = true);
-        return edge_distances(&on_target, camera.width);
+        return edge_distances(&field.on_target(), camera.width);
     }
     let mut edge = vec![0.0; camera.pixels()];
     field.pixels.iter().zip(&field.edge).for_each(|(&i, &e)| edge[i as usize] = e);
