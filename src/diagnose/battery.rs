@@ -1,6 +1,6 @@
 //! What the layers show, as findings.
 
-use serde_json::Map;
+use serde_json::{Map, Value};
 
 use super::ablation::Ablation;
 use super::bias;
@@ -18,12 +18,12 @@ use super::naming::{physics, temper};
 use super::next_view;
 use super::other_findings;
 use super::outcome::Outcome;
-use super::overstated::overstated;
+use super::overstated::SHARE;
 use super::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::reference::{self, can_happen};
 use super::replication_textures;
 use super::scene::Scene;
-use super::steps::{is_raw, own_step, own_step_note, steps};
+use super::steps::{COARSE_SIGMAS, is_raw, own_step, own_step_note, steps};
 use super::variance;
 use super::verdict::{MIN_SIZE, echoes, fold_into_sigma, merge, symptoms};
 use crate::sensors::SensorKind;
@@ -88,10 +88,10 @@ impl Case<'_> {
         let steps = steps(lattice, &self.known, &self.fields, self.recording, sigma_mm, &second);
         let own_step = own_step(lattice, self.recording, self.fields[0].scale_px_m);
         self.copies.extend(own_step.map(own_step_note));
-        let stepped = !steps.is_empty() || own_step.is_some();
+        let stepped = lattice.is_some();
         let mut curves = self.curves([&mean.outcome, &scatter.outcome], advise);
         let refitted = self.take_refit(&mut curves);
-        curves.retain(|f| self.is_news(f, &steps, &scatter));
+        curves.retain(|f| self.is_news(f, &scatter));
         if self.baseline.is_none() {
             fold_into_sigma(&mut curves);
         }
@@ -143,20 +143,20 @@ impl Case<'_> {
     }
 
     /// Steps shift the mean within a step, and gross errors add to the variance: neither is news.
-    fn is_news(&self, f: &Finding, steps: &[Finding], scatter: &Scatter) -> bool {
-        let scale_px_m = self.fields[0].scale_px_m;
-        let depth_px = |step: f64| step * scale_px_m / self.survey.reach.z[0].powi(2);
-        let coarsest = scatter
-            .lattice
-            .disparity_step_px
-            .unwrap_or(0.0)
-            .max(scatter.lattice.depth_step_m.map_or(0.0, depth_px));
-        let stepped = (!steps.is_empty() || self.baseline.is_some())
+    fn is_news(&self, f: &Finding, scatter: &Scatter) -> bool {
+        let coarsest = scatter.lattice.step_px(self.fields[0].scale_px_m, self.survey.reach.z[0]);
+        let sigma_px = typical_sigma_px(&self.fields);
+        let of_steps = match f.statistic {
+            Statistic::Bias => true,
+            // The error of a fine step is as good as noise, of a twelfth of its square.
+            Statistic::Variance => coarsest > COARSE_SIGMAS * sigma_px,
+            _ => false,
+        };
+        let stepped = of_steps
             && f.effect.is_none()
-            && f.statistic == Statistic::Bias
             && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)
             && !is_raw(self.recording)
-            && f.size.sigma * typical_sigma_px(&self.fields) < 0.3 * coarsest;
+            && f.size.sigma * sigma_px < 0.3 * coarsest;
         let textured = scatter.tails.is_some()
             || (!scatter.hangs.is_empty() && f.size.sigma < LEVEL_BESIDE_TEXTURE);
         let tailed = textured && f.status == Status::Recalibrate;
@@ -165,18 +165,25 @@ impl Case<'_> {
         !stepped && !tailed && !scattered && f.size.sigma > self.options.ablation.min_size(MIN_SIZE)
     }
 
+    /// Is what was measured clearly more than twice of what the model has?
+    fn is_more(&self, families: &[&'static str], parameters: &Map<String, Value>) -> bool {
+        let more = |id: &&str| {
+            parameters.iter().all(|(name, measured)| {
+                let of = |what: &str| measured.get(what).and_then(Value::as_f64).unwrap_or(0.0);
+                let had = self.known.parameter(id, name).unwrap_or(0.0);
+                SHARE * (of("value") - 2.0 * of("std_error")) > had
+            })
+        };
+        families.iter().all(|id| !self.known.has(id) || more(id))
+    }
+
     /// What neither a mean nor a variance shows: how the noise hangs together, tails, steps.
     fn texture(&self, mean: &Mean, scatter: &Scatter, steps: Vec<Finding>) -> Vec<Finding> {
         let sigma_mm = typical_sigma_mm(&self.fields);
         let level = self.level(Self::EACH_LEVEL);
         let mixing = mixing(&self.fields, self.twins(), level)
-            .filter(|m| !self.known.has("edge-mixing") && self.stands(m.p, level));
-        let overstated = match self.baseline {
-            None => overstated(&scatter.structure, &self.known, level),
-            Some(_) => Vec::new(),
-        };
+            .filter(|m| self.is_more(&m.families, &m.parameters) && self.stands(m.p, level));
         let hangs = scatter.hangs.iter().cloned().chain(scatter.tails.clone()).chain(mixing);
-        let hangs = hangs.chain(overstated);
         let second = self.survey.second();
         let told = |h: Hanging| {
             let (views, fields) = (&scatter.structure, &self.fields);
@@ -184,7 +191,8 @@ impl Case<'_> {
                 replication_textures::replicated(&h, views, fields, &second, &self.known);
             other_findings::hanging(h, sigma_mm, replicated)
         };
-        let mut found: Vec<Finding> = hangs.map(told).chain(steps).collect();
+        let hangs = hangs.map(told).chain(self.overstated(scatter));
+        let mut found: Vec<Finding> = hangs.chain(steps).collect();
         // Lines that stand still have no name, but they can be learnt.
         let stands = |f: &&mut Finding| {
             f.effect.is_none() && f.statistic == Statistic::Bias && f.axis == Axis::Column
@@ -253,12 +261,13 @@ impl Case<'_> {
         let camera = &self.sensor().camera;
         let lost = missing(&self.fields, self.twins(), &self.survey, camera, self.options.seed);
         self.copies.extend(lost.notes);
-        let known = |id| self.known.has(id);
         let baseline = self.baseline.as_ref();
         let found = lost
             .findings
             .into_iter()
-            .filter(|m| !m.family.is_some_and(known) && self.stands(m.p, missing::LEVEL))
+            .filter(|m| {
+                m.family.is_none_or(|id| !self.known.has(id)) && self.stands(m.p, missing::LEVEL)
+            })
             .filter(|m| baseline.is_none_or(|b| !b.loses_alike(m, &self.survey)))
             .map(other_findings::missing)
             .collect();

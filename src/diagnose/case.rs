@@ -16,7 +16,7 @@ use super::noise::hanging;
 use super::outcome::Outcome;
 use super::pixels::{common, mean_of, measure_tails, pixel_terms, terms_of};
 use super::reading::{Taken, refuse_other_size};
-use super::steps::{Steps, lattice};
+use super::steps::{Steps, forget_windows, is_raw, lattice};
 use super::structure::{Structure, fixed_px2_by_view, structures};
 use super::tails::tails;
 use crate::Progress;
@@ -178,6 +178,9 @@ impl<'a> Case<'a> {
         let mut structure = structures(&self.fields, camera, &mean.px);
         let lattice = lattice(&self.fields, self.recording);
         let own = Steps::of(&lattice, &structure, &self.fields, self.recording);
+        if !is_raw(self.recording) {
+            forget_windows(&mut structure, &self.fields, &lattice);
+        }
         let theirs = self.baseline.as_ref().map(|b| b.steps);
         let extra = |p: &PixelContext| (own.at(p) - theirs.map_or(0.0, |s| s.at(p))).max(0.0);
         let each = self.level(Self::EACH_LEVEL);

@@ -122,6 +122,15 @@ impl KnownTerms {
         scale + offset + drift
     }
 
+    /// The coefficient of a known law of the distance, as it is fitted to references.
+    pub fn law(&self, family: &str) -> Option<f64> {
+        match family {
+            "depth-scale" => self.parameter(family, "scale").map(|scale| scale - 1.0),
+            "disparity-offset" => self.parameter(family, "offset_px"),
+            _ => self.parameter(family, "relative"),
+        }
+    }
+
     /// What is left of the learnt terms' errors beside these parts: one standard deviation of every
     /// coefficient, each for itself. Profiles of single lines are not among them.
     pub fn own_errors(&self, statistic: Statistic) -> Vec<Term> {
@@ -149,6 +158,20 @@ impl KnownTerms {
 
     pub fn has(&self, id: &str) -> bool {
         self.entries.iter().any(|(known, _)| known == id)
+    }
+
+    /// The parameters of an entry, as they are told.
+    pub fn in_words(&self, id: &str) -> String {
+        let entry = self.entries.iter().find(|(known, _)| known == id);
+        let numbers =
+            entry.iter().flat_map(|(_, p)| p.keys().filter_map(|n| Some((n, number(p, n)?))));
+        numbers.map(|(name, value)| format!("{name} {value:.4}")).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Standard error of a parameter; 0 where the model states none.
+    pub fn std_error(&self, id: &str, name: &str) -> f64 {
+        let of = |(_, p): &(String, Map<String, Value>)| p.get(name)?.get("std_error")?.as_f64();
+        self.entries.iter().find(|(known, _)| known == id).and_then(of).unwrap_or(0.0)
     }
 
     /// A parameter of an entry.

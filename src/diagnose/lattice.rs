@@ -30,8 +30,26 @@ const FEWEST_WORDS: usize = 12;
 const GATHERED: f64 = 0.6;
 /// Neighbouring words that alternate between crowded and empty by this share.
 const CONTRAST: f64 = 0.4;
+/// Words wider than this share of a step cannot show it.
+const COARSE: f64 = 0.35;
+/// Phases gathered less than this belong to none: a dozen words by chance gather so much.
+const GATHERED_AT_ALL: f64 = 0.4;
+/// What a scale of the depth, or the error of a step, may change it by, as a share.
+const STEP_ERROR: f64 = 0.02;
 /// Coarsest and finest steps looked for, px.
 const STEPS_PX: [f64; 2] = [1.0 / 3.0, 1.0 / 64.0];
+
+impl Quantisation {
+    pub fn is_some(&self) -> bool {
+        self.depth_step_m.is_some() || self.disparity_step_px.is_some()
+    }
+
+    /// The coarser step at this depth, px.
+    pub fn step_px(&self, scale_px_m: f64, z: f64) -> f64 {
+        let depth = self.depth_step_m.map_or(0.0, |step| step * scale_px_m / (z * z));
+        self.disparity_step_px.unwrap_or(0.0).max(depth)
+    }
+}
 
 impl RawHistogram {
     pub fn none() -> Self {
@@ -101,7 +119,7 @@ impl RawHistogram {
             let (mut c, mut s, mut n, mut squares) = (0.0, 0.0, 0.0, 0.0);
             for &(d, weight, width) in &disparities {
                 // Words coarser than the lattice cannot show it.
-                if width * frequency < 0.35 {
+                if width * frequency < COARSE {
                     let (sin, cos) = (TAU * frequency * d).sin_cos();
                     c += weight * cos;
                     s += weight * sin;
@@ -120,6 +138,51 @@ impl RawHistogram {
         let (frequency, resultant, words) = best;
         let p = (scanned * (-words * resultant * resultant).exp()).clamp(f64::MIN_POSITIVE, 1.0);
         ((resultant > GATHERED).then(|| 1.0 / frequency), resultant, p)
+    }
+
+    /// Do the disparities lie on a lattice of this step, give or take what a scale or its own error
+    /// makes of it? `None` where too few words could show it.
+    pub fn on_disparities(&self, step: f64, sensor: &Sensor, scale_px_m: f64) -> Option<bool> {
+        let disparity = |w: usize| Some(scale_px_m / sensor.code.metres(u16::try_from(w).ok()?)?);
+        let fine = |&(w, n): &(usize, f64)| {
+            let d = disparity(w)?;
+            let width = (disparity(w + 1)? - d).abs();
+            (width < COARSE * step).then_some((d, n.sqrt()))
+        };
+        let words: Vec<(f64, f64)> = self.occurring().iter().filter_map(fine).collect();
+        let range = crate::stats::range(words.iter().map(|w| w.0));
+        if words.len() < FEWEST_WORDS || range[1] - range[0] < step {
+            return None;
+        }
+        let total: f64 = words.iter().map(|w| w.1).sum();
+        let gathered = |step: f64| {
+            let sum = |part: fn(f64) -> f64| -> f64 {
+                words.iter().map(|(d, weight)| weight * part(TAU * d / step)).sum()
+            };
+            sum(f64::cos).hypot(sum(f64::sin)) / total
+        };
+        let cycles = (range[1] - range[0]) / step;
+        let tries = (2.0 * STEP_ERROR * cycles / 0.15).ceil().clamp(1.0, 1e4);
+        let tried = |k: f64| step * (1.0 - STEP_ERROR + 2.0 * STEP_ERROR * k / tries);
+        let tries = (0..=tries as usize).map(|k| gathered(tried(k as f64)));
+        Some(tries.fold(0.0, f64::max) > GATHERED_AT_ALL)
+    }
+
+    /// Are most depths multiples of this step? `None` where the words are no finer.
+    pub fn on_depths(&self, step_m: f64, sensor: &Sensor) -> Option<bool> {
+        let words = self.occurring();
+        let depth = |w: usize| sensor.code.metres(u16::try_from(w).ok()?);
+        let (mut multiples, mut all) = (0.0, 0.0);
+        for &(w, n) in &words {
+            let (Some(z), Some(next)) = (depth(w), depth(w + 1)) else { continue };
+            let unit = (next - z).abs();
+            if unit < COARSE * step_m {
+                let off = (z / step_m - (z / step_m).round()).abs() * step_m;
+                multiples += if off <= 0.5 * unit * 1.001 { n } else { 0.0 };
+                all += n;
+            }
+        }
+        (words.len() >= FEWEST_WORDS && all > 0.0).then_some(multiples > 0.5 * all)
     }
 
     /// How much neighbouring words differ in number, 0 (smooth) to 1 (every other one empty).

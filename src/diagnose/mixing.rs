@@ -59,6 +59,27 @@ fn width_px(mixed: f64) -> f64 {
     0.5 * (low + high)
 }
 
+/// The views' mean share of a footprint's own curve, of whatever width, and the curve's size at the
+/// edge in sigmas. No bias is fitted beside it: none is a quarter of the step.
+pub fn whole_share(views: &[&Edges], width: f64) -> Option<(Mean, f64)> {
+    let of = |edges: &&Edges| {
+        let sums = || edges.inside.iter().enumerate().map(|(n, s)| (footprint(n, width), s));
+        let own: f64 = sums().map(|(seen, s)| seen * seen * s.square).sum();
+        let score: f64 = sums().map(|(seen, s)| seen * s.product).sum();
+        (own > 0.0).then_some((score / own, own))
+    };
+    let seen: Vec<(f64, f64)> = views.iter().filter_map(of).collect();
+    (seen.len() as f64 > TOO_FEW_VIEWS).then_some(())?;
+    Some((Mean::weighed(&seen)?, footprint(0, width) * step_sigmas(views)))
+}
+
+/// The step to what is behind in sigmas of the noise: the views' mean.
+fn step_sigmas(views: &[&Edges]) -> f64 {
+    let seen = views.iter().filter(|e| e.sigma_px > 0.0);
+    let sigmas: Vec<f64> = seen.map(|e| e.step_px / e.sigma_px).collect();
+    sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64
+}
+
 /// The views' mean share at a width, beyond that of the twins where there are any, and how well it
 /// explains them: the root of twice its nats, by the noise alone, with its sign.
 pub fn mean_share(views: &[&Edges], twins: Option<&[&Edges]>, width: f64) -> Option<(Mean, f64)> {
@@ -100,16 +121,13 @@ pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<H
     let [mixed, error] = [full * mean.value, full * mean.std_error];
     let slope = (width_px(mixed + error) - width_px((mixed - error).max(0.0))) / 2.0;
     let edge = mean.value * footprint(0, width);
-    let seen = edges.iter().filter(|e| e.sigma_px > 0.0);
-    let sigmas: Vec<f64> = seen.map(|e| e.step_px / e.sigma_px).collect();
-    let step_sigmas = sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64;
     Some(Hanging {
         families: vec!["edge-mixing"],
         statistic: Statistic::Bias,
         axis: Axis::EdgeDistance,
         interval: [0.0, width],
         parameters: one("width_px", width_px(mixed), slope),
-        size_sigma: edge * step_sigmas,
+        size_sigma: edge * step_sigmas(&edges),
         p,
         nats: nats(&mean, 0.0),
         words: Some(format!(

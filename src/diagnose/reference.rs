@@ -14,6 +14,8 @@ use super::laws::{Beside, FEWEST, Law, laws};
 use super::learnt::Learnt;
 use super::naming::{MIN_PROBABILITY, physics};
 use super::null::{NoiseGains, Null, student};
+use super::other_findings::named;
+use super::overstated::SHARE;
 use super::parameters::estimate;
 use crate::effects;
 use crate::model::Covariance;
@@ -60,8 +62,14 @@ pub fn findings(
     };
     // So large a law may be missing in the model, too, where it was learnt from references.
     let small = best.rms_m < (CLEARLY * best.error_m * excess.sqrt()).max(LEAST_M);
-    if small || safe(best) < noise.threshold(level) || known.has(best.family) {
+    if small || safe(best) < noise.threshold(level) {
         return Vec::new();
+    }
+    let [beta, error] = best.estimate;
+    if let Some(had) = known.law(best.family) {
+        // Sessions and references differ by a part of a law; not by half of it.
+        let other = beta.abs() - 2.0 * error > SHARE * had.abs();
+        return Vec::from_iter(other.then(|| contradicted(best, noise.p(safe(best)))));
     }
     let mut odds: Vec<(&'static str, f64)> = Vec::new();
     for family in ["depth-scale", "disparity-offset", "thermal-drift"] {
@@ -82,7 +90,6 @@ pub fn findings(
         .map(|(effect, p)| Alternative { effect, probability: Some(p) })
         .collect();
     let close = odds.get(1).is_some_and(|o| o.1 > (-0.5 * AS_GOOD_NATS).exp());
-    let [beta, error] = best.estimate;
     let mut parameters = Map::new();
     match best.family {
         "depth-scale" => parameters.insert("scale".into(), estimate(1.0 + beta, error)),
@@ -114,6 +121,30 @@ pub fn findings(
         terms: Vec::new(),
         covariance: Covariance::default(),
     }]
+}
+
+/// References that contradict what the model has of this law.
+fn contradicted(law: &Law, p: f64) -> Finding {
+    let shape = format!(
+        "the model's {} is off by {:.1} mm at the references' distances, more than half of it",
+        law.family,
+        1e3 * law.rms_m
+    );
+    Finding {
+        status: Status::Unexplained,
+        effect: None,
+        alternatives: Vec::new(),
+        interval: law.reach,
+        share: law.gain,
+        size: Size { mm: 1e3 * law.rms_m, sigma: law.rms_sigma },
+        p_adjusted: Some(p),
+        replicated: law.replicated,
+        physics: format!(
+            "Not of this sensor: {shape}. Take it out of the model, or learn it again from references."
+        ),
+        shape: Some(shape),
+        ..named(law.family, Statistic::Bias, law.axis)
+    }
 }
 
 /// Does the effect happen to cameras of this kind?

@@ -43,41 +43,44 @@ pub fn replicated(
 }
 
 /// What a finding is told by, view by view.
-pub fn beyond_known<'a>(found: &Hanging, known: &'a KnownTerms) -> Option<OfView<'a>> {
-    let parameter = |id: &str, name: &str| known.parameter(id, name).unwrap_or(0.0);
-    let px2 = |id: &str| parameter(id, "sigma_px").powi(2);
-    let (fixed, rows) = (px2("fixed-pattern-noise"), px2("row-noise"));
-    let frozen = parameter("frozen-noise", "fraction");
-    let share =
-        move |s: &Structure| s.fixed_px2.unwrap_or(0.0).max(0.0) / s.variance_px2.max(1e-12);
+fn beyond_known<'a>(found: &Hanging, known: &'a KnownTerms) -> Option<OfView<'a>> {
     Some(match (found.families.first().copied(), found.axis, found.statistic) {
         // A part of the noise alone is seen in near pixels, all of it in the window's side.
         (Some("spatial-correlation"), ..) if found.size_sigma < 1.0 => Box::new(|s| s.near),
-        (Some("spatial-correlation"), ..) => {
-            let side = expected_window(known);
-            Box::new(move |s| Some(s.window_px?.ln() - side.ln()))
-        }
-        (Some("fixed-pattern-noise"), ..) => Box::new(move |s| Some(s.fixed_px2? - fixed)),
+        // Beside what stands still, which the finding is told without.
         (Some("temporal-correlation"), ..) => Box::new(|s| Some(s.lagged[0]? - later(s)?)),
-        (Some("frozen-noise"), ..) => Box::new(move |s| Some(of_any_two(s)? - share(s) - frozen)),
-        (Some("row-noise"), ..) => Box::new(move |s| Some(s.row_px2? - rows)),
-        (Some("heavy-tails"), ..) => {
-            Box::new(|s| (s.tail_pixels > 0.0).then_some(s.tail - GAUSSIAN_TAIL))
-        }
         (Some("target-motion"), ..) => Box::new(|s| Some(s.jitter?.velocity_mps)),
-        (Some("frame-jitter"), ..) => {
-            let jitter = px2("frame-jitter");
-            Box::new(move |s| {
-                let j = s.jitter?;
-                Some(j.scatter_px2 / j.freedom - j.expected_px2 - jitter)
-            })
-        }
+        (Some(id), ..) => return beyond(id, known),
         (None, Axis::Column, Statistic::Bias) => Box::new(|s| s.lines_px2),
         (None, Axis::Column, _) => Box::new(|s| s.column_px2),
         (None, Axis::Frame, _) => {
             let frame = found.parameters.get("frame")?.as_u64()? as usize;
             Box::new(move |s| *s.loudness.get(frame)?)
         }
+        _ => return None,
+    })
+}
+
+/// A view's texture of this name beyond what the model has of it.
+pub fn beyond<'a>(id: &str, known: &'a KnownTerms) -> Option<OfView<'a>> {
+    let parameter = |name: &str| known.parameter(id, name).unwrap_or(0.0);
+    let (px2, fraction, rho) =
+        (parameter("sigma_px").powi(2), parameter("fraction"), parameter("rho"));
+    let still = |s: &Structure| s.fixed_px2.unwrap_or(0.0).max(0.0) / s.variance_px2.max(1e-12);
+    Some(match id {
+        "spatial-correlation" => {
+            let side = expected_window(known);
+            Box::new(move |s| Some(s.window_px?.ln() - side.ln()))
+        }
+        "fixed-pattern-noise" => Box::new(move |s| Some(s.fixed_px2? - px2)),
+        "temporal-correlation" => Box::new(move |s| Some(s.lagged[0]? - rho)),
+        "frozen-noise" => Box::new(move |s| Some(of_any_two(s)? - still(s) - fraction)),
+        "row-noise" => Box::new(move |s| Some(s.row_px2? - px2)),
+        "heavy-tails" => Box::new(|s| Some(s.tail_share()? - GAUSSIAN_TAIL)),
+        "frame-jitter" => Box::new(move |s| {
+            let j = s.jitter?;
+            Some(j.scatter_px2 / j.freedom - j.expected_px2 - px2)
+        }),
         _ => return None,
     })
 }

@@ -58,6 +58,15 @@ fn law(views: &[Beside], of: impl Fn(&Beside) -> f64) -> Option<Mean> {
     Mean::weighed(&views.iter().map(|v| (v.lost / of(v), of(v))).collect::<Vec<_>>())
 }
 
+/// Of the side that loses more.
+pub fn largest_share(views: &[Sides]) -> Option<Mean> {
+    let side = |side: usize| {
+        let seen: Vec<Beside> = views.iter().filter_map(|s| s.0[side]).collect();
+        (seen.len() >= FEWEST_VIEWS).then(|| law(&seen, |v| v.shaded)).flatten()
+    };
+    [side(0)?, side(1)?].into_iter().max_by(|a, b| a.value.total_cmp(&b.value))
+}
+
 fn t(share: &Mean) -> f64 {
     // Without any loss there is neither a share nor an error.
     if share.value > 0.0 { share.value / share.std_error.max(1e-9 * share.value) } else { 0.0 }

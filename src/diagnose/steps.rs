@@ -8,7 +8,7 @@ use super::known::KnownTerms;
 use super::lattice::{Quantisation, RawHistogram};
 use super::other_findings::named;
 use super::parameters::estimate;
-use super::pixels::{fixed_px2, mean_of};
+use super::pixels::{fixed_px2, mean_of, typical_sigma_mm, typical_sigma_px};
 use super::structure::Structure;
 use crate::frame::DepthCode;
 use crate::terms::{Axis, PixelContext, Statistic};
@@ -81,6 +81,53 @@ pub(super) fn own_step_note(step: f64) -> String {
     format!(
         "depths come in the steps of the recording's own raw words, {step:.3} px of disparity; sigma holds the error that they make"
     )
+}
+
+/// A step of fewer sigmas errs as if by noise, of a twelfth of its square: Widrow and Kollar,
+/// Quantization Noise, 2008. What coarser ones leave follows the surface.
+pub(super) const COARSE_SIGMAS: f64 = 2.0;
+
+/// Neighbours in one coarse step err alike: such views show no window.
+pub(super) fn forget_windows(
+    structure: &mut [Structure],
+    fields: &[Field],
+    lattice: &Quantisation,
+) {
+    for (s, f) in structure.iter_mut().zip(fields) {
+        let sigma = f.sigma.get(f.sigma.len() / 2).map_or(0.0, |s| f64::from(*s));
+        let step = lattice.step_px(f.scale_px_m, f.plane.depth(0.0, 0.0));
+        if step > COARSE_SIGMAS * sigma {
+            (s.window_px, s.near, s.course) = (None, None, None);
+        }
+    }
+}
+
+/// Steps that the model has and the words do not lie on: each with its axis, and the error that it
+/// would make in sigmas.
+pub(super) fn contradicted(
+    fields: &[Field],
+    known: &KnownTerms,
+    recording: &Recording,
+) -> Vec<(&'static str, Axis, f64)> {
+    let mut words = RawHistogram::none();
+    fields.iter().for_each(|f| words.merge(&f.words));
+    let (sigma_px, sigma_mm) = (typical_sigma_px(fields), typical_sigma_mm(fields));
+    let sensor = &recording.sensor;
+    let disparity = known.parameter("disparity-quantisation", "step_px").and_then(|step| {
+        let lies = words.on_disparities(step, sensor, fields[0].scale_px_m)?;
+        let sigma = step / 12f64.sqrt() / sigma_px;
+        (!lies && sigma > STEP_SHARE).then_some((
+            "disparity-quantisation",
+            Axis::DisparityPhase,
+            sigma,
+        ))
+    });
+    let depth = known.parameter("depth-rounding", "step_m").and_then(|step| {
+        let sigma = 1e3 * step / 12f64.sqrt() / sigma_mm;
+        let lies = words.on_depths(step, sensor)?;
+        (!lies && sigma > STEP_SHARE).then_some(("depth-rounding", Axis::Z, sigma))
+    });
+    disparity.into_iter().chain(depth).collect()
 }
 
 /// A step is worth telling when the error it makes is this share of the noise.

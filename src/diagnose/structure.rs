@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::exposure::FRAMES_KEPT;
 use super::field::Field;
 use super::pairs::Pairs;
-use super::tails::TailCounts;
+use super::tails::{FEWEST_READINGS, TailCounts};
 use super::texture::{
     COURSE, FAR, Filled, LONG_LINE, SHORT_LINE, calm, changes, covariance, fine, moving, rough,
     same_pixel, without_lines,
@@ -48,6 +48,13 @@ pub struct Structure {
     pub tail_pixels: f64,
     /// The same by how far out they lie.
     pub tails: TailCounts,
+}
+
+impl Structure {
+    /// Share beyond four local standard deviations, where enough was looked at.
+    pub fn tail_share(&self) -> Option<f64> {
+        (self.tail_pixels > FEWEST_READINGS).then_some(self.tail)
+    }
 }
 
 /// Frame by frame, the mean residual of the target.

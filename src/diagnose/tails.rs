@@ -1,6 +1,7 @@
 //! Residuals beyond four standard deviations: how many, and whether they are too many.
 
 use serde_json::{Map, json};
+use statrs::function::erf::erfc;
 
 use super::hanging::{Hanging, Mean};
 use super::known::KnownTerms;
@@ -84,6 +85,8 @@ pub fn tail(image: &[f32], camera: &Camera) -> TailCounts {
     counts
 }
 
+/// Standard errors that a model's scale may be off by.
+pub const SURELY: f64 = 2.0;
 /// A tail is heavy from this many times a Gaussian's share on.
 const HEAVY: f64 = 2.5;
 /// So much more where the size of the noise is uneven.
@@ -91,24 +94,26 @@ const MUCH_HEAVIER: f64 = 6.0;
 /// So heavy it may look without a cause.
 const UNEQUAL: f64 = 1.5;
 /// Views too small to show a tail, in readings.
-const FEWEST_READINGS: f64 = 5000.0;
+pub const FEWEST_READINGS: f64 = 5000.0;
 
 /// Are the residuals' tails heavier than a Gaussian's? `uneven` says that the noise is of unequal
 /// size where no law was found for it, which makes a tail too.
 pub fn tails(views: &[Structure], known: &KnownTerms, level: f64, uneven: bool) -> Option<Hanging> {
-    if known.has("heavy-tails") {
+    let mixture = Mixture::of(known);
+    // A simulation's tails are compared elsewhere.
+    if known.has("heavy-tails") && mixture.is_none() {
         return None;
     }
-    let looked = |s: &Structure| s.tail_pixels > FEWEST_READINGS;
-    let m = Mean::of(views, |s| looked(s).then_some(s.tail))?;
+    let own = mixture.map_or(GAUSSIAN_TAIL, |m| m.tail(1.0, SURELY).max(GAUSSIAN_TAIL));
+    let m = Mean::of(views, Structure::tail_share)?;
     // Patches of unequal noise, and steps of the words, make a tail of a Gaussian too.
     let much = if uneven { MUCH_HEAVIER } else { 1.0 };
-    let expected = much * UNEQUAL * GAUSSIAN_TAIL;
-    if m.value < much * HEAVY * GAUSSIAN_TAIL || m.p_above(expected) > level {
+    let expected = much * UNEQUAL * own;
+    if m.value < much * HEAVY * own || m.p_above(expected) > level {
         return None;
     }
     let mut counts = TailCounts::default();
-    views.iter().filter(|s| looked(s)).for_each(|s| counts.add(&s.tails));
+    views.iter().filter(|s| s.tail_share().is_some()).for_each(|s| counts.add(&s.tails));
     let mut parameters = Map::new();
     parameters.insert("share_beyond_4_sigma".into(), json!(m.value));
     // Where all that strays is gross it has no scale.
@@ -125,12 +130,56 @@ pub fn tails(views: &[Structure], known: &KnownTerms, level: f64, uneven: bool) 
         interval: [4.0, 2.0 * mean_size(&counts) - 4.0],
         parameters,
         size_sigma,
-        p: m.p_above(GAUSSIAN_TAIL),
-        nats: m.value
-            * views.iter().map(|s| s.tail_pixels).sum::<f64>()
-            * (m.value / GAUSSIAN_TAIL).ln(),
+        p: m.p_above(own),
+        nats: m.value * views.iter().map(|s| s.tail_pixels).sum::<f64>() * (m.value / own).ln(),
         words: None,
     })
+}
+
+/// The model's heavy tails: noise of which a share is drawn so many times wider.
+#[derive(Debug, Clone, Copy)]
+pub struct Mixture {
+    fraction: f64,
+    scale: f64,
+    scale_error: f64,
+}
+
+impl Mixture {
+    pub fn of(known: &KnownTerms) -> Option<Self> {
+        let at = |name| known.parameter("heavy-tails", name);
+        let scale_error = known.std_error("heavy-tails", "scale");
+        let mixture = Mixture { fraction: at("fraction")?, scale: at("scale")?, scale_error };
+        (mixture.fraction > 0.0 && mixture.scale > 1.0).then_some(mixture)
+    }
+
+    /// Share of the readings beyond `t` of the narrow part's standard deviations.
+    fn beyond(&self, t: f64) -> f64 {
+        let gaussian = |t: f64| erfc(t * std::f64::consts::FRAC_1_SQRT_2);
+        (1.0 - self.fraction) * gaussian(t) + self.fraction * gaussian(t / self.scale)
+    }
+
+    /// Standard deviation by the median, over that of the narrow part.
+    pub fn width(&self) -> f64 {
+        let (mut low, mut high) = (0.0, self.scale);
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if self.beyond(middle) > 0.5 { low = middle } else { high = middle }
+        }
+        MAD_TO_SIGMA * high
+    }
+
+    /// Share beyond four standard deviations where there is this share of the strays, and their scale
+    /// is off by so many of its standard errors: that of weak tails is hardly known.
+    pub fn tail(&self, share: f64, errors: f64) -> f64 {
+        let scale = (self.scale + errors * self.scale_error).max(1.0);
+        let other = Mixture { fraction: share * self.fraction, scale, ..*self };
+        other.beyond(4.0 * other.width())
+    }
+
+    /// Of the strays, over the noise's standard deviation.
+    pub fn size_sigma(&self) -> f64 {
+        self.fraction.sqrt() * self.scale
+    }
 }
 
 /// Of what lies between the edges, a bin's middle standing for it; at least five.
@@ -139,4 +188,34 @@ fn mean_size(counts: &TailCounts) -> f64 {
     let middles = TAIL_EDGES.windows(2).map(|w| 0.5 * (w[0] + w[1]));
     let sum: f64 = counts.between.iter().zip(middles).map(|(n, x)| n * x).sum();
     if all > 0.0 { sum / all } else { 5.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against a Monte-Carlo draw of the catalogue's mixture.
+    #[test]
+    fn a_mixture_is_as_wide_and_as_heavy_as_what_is_drawn_from_it() {
+        use crate::rng::Seed;
+        use rand::Rng;
+        use rand_distr::{Distribution, StandardNormal};
+        let mut rng = Seed(3).stream("mixture");
+        for (fraction, scale) in [(0.05, 8.0), (0.3, 3.0), (1.0, 100.0)] {
+            let mixture = Mixture { fraction, scale, scale_error: 0.0 };
+            let mut drawn: Vec<f32> = (0..400_000)
+                .map(|_| {
+                    let one: f64 = StandardNormal.sample(&mut rng);
+                    let wide = rng.random_bool(fraction);
+                    (if wide { scale * one } else { one }).abs() as f32
+                })
+                .collect();
+            let sigma = MAD_TO_SIGMA * f64::from(median_in_place(&mut drawn));
+            assert!((mixture.width() / sigma - 1.0).abs() < 0.01, "{sigma} {}", mixture.width());
+            let beyond = drawn.iter().filter(|d| f64::from(**d) > 4.0 * sigma).count() as f64;
+            let share = beyond / drawn.len() as f64;
+            let error = 5.0 * (share / drawn.len() as f64).sqrt();
+            assert!((mixture.tail(1.0, 0.0) - share).abs() < error + 0.03 * share, "{share}");
+        }
+    }
 }

@@ -229,7 +229,12 @@ pub(super) fn extend<'a>(
         let covariance = (!covariance.is_empty()).then(|| covariance.rounded());
         let id = id.into();
         let effect = Effect { id, parameters, shape, learnt_px, covariance, ..Effect::default() };
-        extended.effects.push(effect);
+        // What has no shape is measured whole: it takes the place of what the model had.
+        let same = |e: &&mut Effect| e.id == effect.id && e.shape.is_empty();
+        match extended.effects.iter_mut().find(same).filter(|_| effect.shape.is_empty()) {
+            Some(had) => *had = effect,
+            None => extended.effects.push(effect),
+        }
     }
     extended
 }

@@ -17,7 +17,7 @@ mod traces;
 
 pub use active::{Acting, Active};
 pub use card::{Card, Parameter, Settings, Stage};
-pub use draw::{Draw, Scope, fill_normal};
+pub use draw::{Draw, Scope, fill_normal, logistic};
 pub use exposure::{Exposure, Instant, KINECT_BASELINE_M};
 pub use fitted::{Estimate, Fitted};
 pub use range_not_depth::RAY_FOR_DEPTH;
@@ -26,7 +26,7 @@ pub use traces::{Bounds, Flat, Inverse, Known, Smallest};
 use crate::camera::Camera;
 pub use crate::terms::ROOM_LUX;
 use crate::terms::{Basis, Statistic, Term};
-use draw::{chance, logistic, normals};
+use draw::{chance, normals};
 use fitted::{greatest, slope_in_square};
 
 /// A physical effect with both its faces: what nature does to an exposure, and what a recording

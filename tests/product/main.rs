@@ -13,6 +13,7 @@ mod against;
 mod bad_input;
 mod capture;
 mod capture_kinect;
+mod claims;
 mod clocks;
 mod command_line;
 mod containers;

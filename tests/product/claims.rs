@@ -1,0 +1,89 @@
+//! What a model claims is held against the recording: too much of an effect is no match.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use crate::common::kinoise;
+
+/// Before a wall, so that the target's edges tell something too.
+const VIEWS: [&str; 13] = [
+    "simulate",
+    "--shrink",
+    "4",
+    "--frames",
+    "8",
+    "--wall",
+    "1",
+    "--reference-error",
+    "0.001",
+    "--distances",
+    "0.8,1.2,1.6,2,2.5,3",
+    "--tilts",
+    "0,30,60",
+];
+
+fn run(folder: &Path, arguments: &[&str]) {
+    let output = kinoise().current_dir(folder).args(arguments).output().expect("the program runs");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code().is_some_and(|code| code < 2), "{arguments:?}: {stderr}");
+}
+
+/// The verdict on a recording by the clean sensor's model with this effect, and whether it says that
+/// the model has too much.
+fn told(folder: &Path, recording: &str, id: &str, parameters: &Value) -> (String, bool) {
+    let text = std::fs::read(folder.join("calibrated/model.json")).expect("a model");
+    let mut model: Value = serde_json::from_slice(&text).expect("JSON");
+    model["effects"] = json!([{ "id": id, "parameters": parameters }]);
+    std::fs::write(folder.join("model.json"), model.to_string()).expect("written");
+    run(folder, &["diagnose", recording, "-m", "model.json", "-o", "told", "--force", "-q"]);
+    let text = std::fs::read(folder.join("told/diagnosis.json")).expect("a diagnosis");
+    let diagnosis: Value = serde_json::from_slice(&text).expect("JSON");
+    let findings = diagnosis["findings"].as_array().expect("a list");
+    let too_much =
+        |f: &Value| f["physics"].as_str().is_some_and(|p| p.contains("out of the model"));
+    (diagnosis["verdict"].as_str().expect("a word").into(), findings.iter().any(too_much))
+}
+
+/// Each claim on the recording of a sensor without it, and on that of a sensor that has it.
+#[test]
+fn a_model_that_has_too_much_of_an_effect_is_contradicted_and_a_true_one_is_not() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let at = folder.path();
+    run(at, &[&VIEWS[..], &["clean"]].concat());
+    run(at, &["calibrate", "clean", "-o", "calibrated", "-q"]);
+    let claims = [
+        ("heavy-tails", json!({"fraction": 0.05, "scale": 8.0}), true),
+        ("heavy-tails", json!({"fraction": 1.0, "scale": 100.0}), false),
+        ("temporal-correlation", json!({"rho": 0.4}), true),
+        ("frozen-noise", json!({"fraction": 0.4}), true),
+        ("spatial-correlation", json!({"length_px": 7.0}), true),
+        ("fixed-pattern-noise", json!({"sigma_px": 0.05}), true),
+        ("row-noise", json!({"sigma_px": 0.05}), true),
+        ("frame-jitter", json!({"sigma_px": 0.1}), true),
+        ("disparity-quantisation", json!({"step_px": 0.125}), true),
+        ("disparity-quantisation", json!({"step_px": 4.0}), false),
+        ("depth-rounding", json!({"step_m": 0.01}), true),
+        ("edge-mixing", json!({"width_px": 2.0}), true),
+        ("edge-mixing", json!({"width_px": 32.0}), false),
+        ("occlusion-shadow", json!({"share": 1.0}), true),
+        ("range-dropout", json!({"share": 1.0, "z50_m": 2.8, "width_m": 0.2}), true),
+        ("grazing-dropout", json!({"share": 1.0, "theta50_deg": 60.0, "width_deg": 4.0}), true),
+        ("depth-scale", json!({"scale": 1.02}), true),
+        ("depth-scale", json!({"scale": 2.0}), false),
+        ("disparity-offset", json!({"offset_px": 1.0}), true),
+    ];
+    for (k, (id, parameters, usable)) in claims.iter().enumerate() {
+        let clean = told(at, "clean", id, parameters);
+        assert_eq!(clean, ("mismatch".into(), true), "{id} {parameters} on a clean recording");
+        let values = parameters.as_object().expect("an object").iter();
+        let values: Vec<String> = values.map(|(name, v)| format!("{name}={v}")).collect();
+        let effect = format!("{id}:{}", values.join(","));
+        // Where the effect leaves no plane to see there is nothing to compare.
+        if *usable {
+            let recording = format!("true{k}");
+            run(at, &[&VIEWS[..], &[&recording, "--effect", &effect, "--seed", "5"]].concat());
+            assert!(!told(at, &recording, id, parameters).1, "{effect} is in the recording");
+        }
+    }
+}
