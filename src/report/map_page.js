@@ -138,9 +138,11 @@ function strip(buffer, colour, kind, count) {
   gl.vertexAttribPointer(at("place"), 3, gl.FLOAT, false, 0, 0); gl.drawArrays(kind, 0, count);
 }
 // The first points are spread over the whole map: what moves shows as many as are smooth, what stands still all.
-let share = 1, moved = 0, last = 0;
+let share = 1, moved = 0, last = 0, painted = 0;
 function paint(points) {
-  canvas.width = canvas.clientWidth * devicePixelRatio; canvas.height = canvas.clientHeight * devicePixelRatio;
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight].map(side => Math.round(side * devicePixelRatio));
+  // To set a size, even the same, makes the buffers anew.
+  if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
   gl.viewport(0, 0, canvas.width, canvas.height); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   gl.uniformMatrix4fv(uniform("m"), false, matrix());
   const r = turn();
@@ -163,14 +165,18 @@ function paint(points) {
   }
   overlay();
 }
-const again = () => requestAnimationFrame(now => {
-  const moving = now - moved < 150, took = now - last;
-  if (moving && took < 400) share = Math.min(1, Math.max(share * (took > 40 ? 0.7 : took < 22 ? 1.2 : 1), 20000 / n));
-  last = now;
-  paint(moving ? Math.ceil(Math.min(1, share) * n) : n);
-  waiting = false;
-  if (moving && share < 1) draw();
-});
+// From one frame of a movement to the next is what a frame takes, however long: a slow machine needs it the most.
+const again = () => {
+  const goesOn = performance.now() - painted < 150;
+  requestAnimationFrame(now => {
+    const took = now - last, moving = now - moved < (goesOn ? Math.max(150, 2 * took) : 150);
+    if (moving && goesOn) share = Math.min(1, Math.max(share * (took > 40 ? Math.max(0.2, 30 / took) : took < 22 ? 1.2 : 1), 20000 / n));
+    last = now;
+    paint(moving ? Math.ceil(Math.min(1, share) * n) : n);
+    painted = performance.now(); waiting = false;
+    if (moving) draw();
+  });
+};
 let waiting = false;
 function draw() { if (!waiting) { waiting = true; again(); } }
 function move() { moved = performance.now(); draw(); }

@@ -1,59 +1,130 @@
 #!/usr/bin/env python3
-"""What a learnt model is worth to the map: film and plane views of one simulated sensor, seed after seed.
+"""What a learnt model is worth to the map, as a CSV with a row a map.
 
-A sensor with the given effects takes views of a wall; `calibrate` fits sigma alone and `diagnose` extends
-the model with the causes it finds. The same sensor films the office, and the film is mapped with both.
-Prints a row a seed (ATE and RPE over 1 s, m) and how often the extended model is the worse one.
+films: real sequences with ground truth. `calibrate` and `diagnose` learn from a recording; every film is
+    mapped raw with equal weights, with Eq. 1 and with the calibrated sigma, and without the biases found
+    with Eq. 1 and with the calibrated sigma.
+seeds: for each --effect (several of one sensor: joined by +) a simulated sensor a seed. It takes views of
+    a wall, from which `calibrate` fits sigma alone and `diagnose` extends the model with the causes it
+    finds. The same sensor films the office, and the film is mapped with both. Tells how often the
+    extended model is the worse one.
 
-    map_worth.py [--kinoise BIN] [--seeds N] [--effect ID:KEY=VALUE]... [--frames N] [--shrink N]
+    map_worth.py [--kinoise BIN] --csv FILE films --recording DIR FILM...
+    map_worth.py [--kinoise BIN] --csv FILE seeds [--seeds N] [--effect ID:KEY=VALUE]... [--frames N] [--shrink N]
 """
-import argparse, json, pathlib, subprocess, sys, tempfile
+import argparse, csv, json, pathlib, subprocess, sys, tempfile
 
 DISTANCES, TILTS = "1,1.5,2,3,4", "0,17,34"
+# Of the boards' reference distances, m: without any a model cannot learn a scale. A tape measure's.
+REFERENCE_ERROR_M = 0.002
+# The paper's Eq. 1 where it was measured.
+EQ_1 = dict(a=0.00151, b=0.00215, c=0.483, d=1.88e-6, e=2.01, f=1.39)
+EQ_1_VALID = {"z_m": [1.0, 4.0], "theta_rad": [0.0, 1.38]}
+METHODS = "best", "projective", "paper"
+ERRORS = "ate_m", "rpe_m", "rpe_degrees", "lost"
 
 
 def arguments():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     p.add_argument("--kinoise", default="target/release/kinoise")
-    p.add_argument("--seeds", type=int, default=10)
-    p.add_argument("--effect", action="append", default=[])
-    p.add_argument("--frames", type=int, default=40, help="of the film")
-    p.add_argument("--shrink", type=int, default=2, help="of 640 x 480 px")
+    p.add_argument("--csv", required=True, type=pathlib.Path, help="file to write")
+    kinds = p.add_subparsers(dest="kind", required=True)
+    films = kinds.add_parser("films")
+    films.add_argument("--recording", required=True, help="of the sensor to learn")
+    films.add_argument("films", nargs="+", type=pathlib.Path)
+    seeds = kinds.add_parser("seeds")
+    seeds.add_argument("--seeds", type=int, default=10)
+    seeds.add_argument("--effect", action="append", default=[])
+    seeds.add_argument("--frames", type=int, default=40, help="of the film")
+    seeds.add_argument("--shrink", type=int, default=2, help="of 640 x 480 px")
     return p.parse_args()
+
+
+class Kinoise:
+    def __init__(self, program, seed=1):
+        self.begin = [program, "--quiet", "--seed", str(seed)]
+
+    def __call__(self, *words):
+        done = subprocess.run([*self.begin, *map(str, words)], capture_output=True, text=True)
+        if done.returncode not in (0, 1):  # 1: something was found
+            sys.exit(f"{' '.join(map(str, words))}: {done.stderr}")
+
+    def learn(self, recording, at):
+        """The bare model's file, the extended one's, and the causes found."""
+        bare, extended = at / "bare/model.json", at / "extended/model.json"
+        self("calibrate", recording, "-o", bare.parent)
+        self("diagnose", recording, "--model", bare, "-o", extended.parent)
+        found = json.loads(extended.read_text()).get("effects", [])
+        return bare, extended, " ".join(e["id"] for e in found) or "nothing"
+
+    def errors(self, film, *words):
+        with tempfile.TemporaryDirectory() as out:
+            self("map", film, "-o", out, "--no-colour", "--force", *words)
+            stats = json.loads((pathlib.Path(out) / "stats.json").read_text())
+        truth = stats["truth"]
+        numbers = (truth["ate"]["rmse_m"], truth["rpe_translation"]["rmse_m"], truth["rpe_rotation"]["rmse_deg"])
+        return *(f"{n:.5f}" for n in numbers), stats["lost"]
+
+
+def films(kinoise, a, at):
+    bare, extended, found = kinoise.learn(a.recording, at)
+    print(f"learnt: {found}", flush=True)
+    biases = at / "eq1-with-biases.json"
+    biases.write_text(json.dumps(with_eq_1(json.loads(extended.read_text()))))
+    yield "film", "method", "sigma", "depth", *ERRORS
+    for film in a.films:
+        for method in METHODS:
+            maps = [
+                ("none", "raw", ["--weights", "none"]),
+                ("Eq. 1", "raw", []),
+                ("calibrated", "raw", ["-m", bare]),
+                ("Eq. 1", "corrected", ["-m", biases]),
+                ("calibrated", "corrected", ["-m", extended]),
+            ]
+            for sigma, depth, words in maps:
+                yield film.name, method, sigma, depth, *kinoise.errors(film, "--method", method, *words)
+
+
+def with_eq_1(model):
+    """The same biases, with the paper's sigma of pixels that err each for itself."""
+    effects = [e for e in model["effects"] if e["id"] != "spatial-correlation"]
+    parameters = {name: {"value": value, "std_error": None} for name, value in EQ_1.items()}
+    sigma = {**model["sigma"], "form": "paper", "parameters": parameters, "valid": EQ_1_VALID}
+    sigma["covariance"] = [[0.0] * len(EQ_1)] * len(EQ_1)
+    return {**model, "sigma": sigma, "effects": effects}
+
+
+def seeds(_, a, at):
+    yield "effect", "seed", *(f"{kind}_{e}" for kind in ("bare", "extended") for e in ERRORS), "found"
+    for effect in a.effect or ["radial-disparity-bias:k_px=0.3"]:
+        yield from sensors(a, at, effect)
+
+
+def sensors(a, at, effect):
+    worse = [0, 0]
+    common = ["--shrink", a.shrink, *(word for part in effect.split("+") for word in ("--effect", part))]
+    for seed in range(1, a.seeds + 1):
+        kinoise, here = Kinoise(a.kinoise, seed), at / f"{effect}-{seed}"
+        kinoise("simulate", here / "wall", "--wall-target", "--distances", DISTANCES, "--tilts", TILTS,
+                "--azimuths", "0", "--frames", 2, "--reference-error", REFERENCE_ERROR_M, *common)
+        kinoise("simulate", here / "film", "--room", "--frames", a.frames, *common)
+        *models, found = kinoise.learn(here / "wall", here)
+        before, after = (kinoise.errors(here / "film", "-m", model) for model in models)
+        worse = [n + (float(b) < float(e)) for n, b, e in zip(worse, before, after)]
+        yield effect, seed, *before, *after, found
+    print(f"{effect}: the extended model is worse in {worse[0]} of {a.seeds} seeds by ATE, in {worse[1]} by RPE")
 
 
 def main():
     a = arguments()
-    causes = [word for effect in a.effect or ["radial-disparity-bias:k_px=0.3"] for word in ("--effect", effect)]
-
-    def kinoise(seed, *words):
-        done = subprocess.run([a.kinoise, "--seed", str(seed), *map(str, words)], capture_output=True, text=True)
-        if done.returncode not in (0, 1):  # 1: something was found
-            sys.exit(done.stderr)
-
-    def errors(seed, film, model, out):
-        kinoise(seed, "map", film, "-m", model, "-o", out, "--no-colour")
-        truth = json.loads((out / "stats.json").read_text())["truth"]
-        return truth["ate"]["rmse_m"], truth["rpe_translation"]["rmse_m"]
-
-    print("seed  bare: ATE     RPE  extended: ATE     RPE  found", flush=True)
-    worse = [0, 0]
-    for seed in range(1, a.seeds + 1):
-        with tempfile.TemporaryDirectory() as folder:
-            at = pathlib.Path(folder)
-            small = ["--shrink", a.shrink, *causes]
-            kinoise(seed, "simulate", at / "wall", "--wall-target", "--distances", DISTANCES, "--tilts", TILTS,
-                    "--azimuths", "0", "--frames", 2, *small)
-            kinoise(seed, "simulate", at / "film", "--room", "--frames", a.frames, *small)
-            kinoise(seed, "calibrate", at / "wall", "-o", at / "bare")
-            kinoise(seed, "diagnose", at / "wall", "--model", at / "bare/model.json", "-o", at / "extended")
-            bare = errors(seed, at / "film", at / "bare/model.json", at / "map-bare")
-            extended = errors(seed, at / "film", at / "extended/model.json", at / "map-extended")
-            found = json.loads((at / "extended/model.json").read_text()).get("effects", [])
-            names = ", ".join(e["id"] for e in found) or "nothing"
-            print(f"{seed:4}  {bare[0]:9.4f} {bare[1]:7.4f}  {extended[0]:13.4f} {extended[1]:7.4f}  {names}", flush=True)
-            worse = [n + (e > b) for n, e, b in zip(worse, extended, bare)]
-    print(f"the extended model is worse in {worse[0]} of {a.seeds} seeds by ATE, in {worse[1]} by RPE")
+    beside = a.csv.with_suffix(".part")
+    with tempfile.TemporaryDirectory() as folder, beside.open("w", newline="") as out:
+        table = csv.writer(out, lineterminator="\n")
+        for row in {"films": films, "seeds": seeds}[a.kind](Kinoise(a.kinoise), a, pathlib.Path(folder)):
+            table.writerow(row)
+            out.flush()  # what is there is of use when it is stopped
+            print(*row, sep="  ", flush=True)
+    beside.replace(a.csv)
 
 
 if __name__ == "__main__":
