@@ -160,10 +160,11 @@ pub(crate) fn read_image(path: &Path) -> Result<Vec<u8>> {
     bytes(path, MAX_IMAGE)
 }
 
-/// A depth image of so many pixels: what does not shrink is stored as it is, with a byte a row and five
+/// A depth image of this width and height, px: what does not shrink is stored as it is, with a byte a row and five
 /// a block of 64 kB.
-pub(crate) fn read_depth_image(path: &Path, pixels: usize) -> Result<Vec<u8>> {
-    let raw = 2 * pixels as u64;
+pub(crate) fn read_depth_image(path: &Path, [width, height]: [usize; 2]) -> Result<Vec<u8>> {
+    // Any size may be asked for.
+    let raw = (width as u64).saturating_mul(height as u64).min(MAX_IMAGE) * 2;
     bytes(path, (raw + raw / 8 + AROUND_IMAGE).min(MAX_IMAGE))
 }
 
