@@ -71,6 +71,17 @@ impl Error {
         Error::Io { path: path.to_path_buf(), cause, remedy }
     }
 
+    /// Where the message names no file: of this one, or of this folder.
+    pub fn of(self, path: &Path) -> Self {
+        let named = |what: String| format!("{}: {what}", path.display());
+        match self {
+            Error::Argument { what, remedy } => Error::Argument { what: named(what), remedy },
+            Error::NotEnough { what, remedy } => Error::NotEnough { what: named(what), remedy },
+            Error::Solver { what, remedy } => Error::Solver { what: named(what), remedy },
+            named => named,
+        }
+    }
+
     pub(crate) fn text(
         path: &Path,
         line: usize,

@@ -35,6 +35,7 @@ pub enum DepthCode {
 
 /// The JSON face of [`DepthCode::Disparity`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(expecting = "an object with offset and slope")]
 pub struct RawDisparity {
     pub offset: f64,
     pub slope: f64,

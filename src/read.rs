@@ -130,6 +130,27 @@ pub(crate) fn absurd(value: &Value) -> Option<String> {
     }
 }
 
+/// What serde says of a JSON document, without the names of this program's types and without the line,
+/// which messages have by themselves.
+pub(crate) fn plainly(error: &serde_json::Error) -> String {
+    let full = error.to_string();
+    let what = full.rsplit_once(" at line ").map_or(&*full, |(before, _)| before);
+    let Some((before, expected)) = what.split_once(", expected ") else { return what.into() };
+    let plain = match expected {
+        "f64" => "a number",
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, 0 or above",
+        "a sequence" => "a list, in [ ]",
+        "a map" => "an object, in { }",
+        "a string" => "a text",
+        "a boolean" => "true or false",
+        other if other.starts_with("struct ") || other.starts_with("internally tagged enum ") => {
+            "an object, in { }"
+        }
+        other => other,
+    };
+    format!("{before}, expected {plain}")
+}
+
 /// The bytes of a list, a table or a trajectory.
 pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     bytes(path, MAX_TEXT)
@@ -139,10 +160,11 @@ pub(crate) fn read_image(path: &Path) -> Result<Vec<u8>> {
     bytes(path, MAX_IMAGE)
 }
 
-/// A depth image of so many pixels: what does not shrink is stored as it is, with a byte a row and five
+/// A depth image of this width and height, px: what does not shrink is stored as it is, with a byte a row and five
 /// a block of 64 kB.
-pub(crate) fn read_depth_image(path: &Path, pixels: usize) -> Result<Vec<u8>> {
-    let raw = 2 * pixels as u64;
+pub(crate) fn read_depth_image(path: &Path, [width, height]: [usize; 2]) -> Result<Vec<u8>> {
+    // Any size may be asked for.
+    let raw = (width as u64).saturating_mul(height as u64).min(MAX_IMAGE) * 2;
     bytes(path, (raw + raw / 8 + AROUND_IMAGE).min(MAX_IMAGE))
 }
 

@@ -15,6 +15,16 @@ pub fn shortest(v: f64) -> String {
     if is_long(v) { format!("{v:e}") } else { format!("{v}") }
 }
 
+/// Rounded to so many significant digits: what was calculated has no more to tell.
+///
+/// ```
+/// use kinoise::units::to_digits;
+/// assert_eq!(to_digits(0.1 * 0.8, 4), 0.08);
+/// ```
+pub fn to_digits(v: f64, digits: usize) -> f64 {
+    format!("{v:.*e}", digits.saturating_sub(1)).parse().unwrap_or(v)
+}
+
 /// With this many decimals, or to three digits with a power of ten where the number is huge.
 ///
 /// ```

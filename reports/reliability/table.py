@@ -19,11 +19,13 @@ from pathlib import Path
 import builds
 import faults
 import inputs
+import places
 import spoilt
 
 # The rows' functions, and how often each tries.
 ROWS = {
     "spoilt": (spoilt.spoilt_inputs, 2000),
+    "places": (places.places, 400),
     "kills": (faults.kills, 100),
     "disks": (faults.full_disks, 60),
     "answers": (faults.lost_answers, 200),

@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::wanted::{Pose, Tolerance, Wanted, WantedView};
 use crate::error::{Error, Result};
-use crate::read::read_json;
+use crate::read::{plainly, read_json};
 
 /// What of `diagnosis.json` matters here.
 #[derive(Deserialize)]
@@ -51,7 +51,7 @@ impl Wanted {
         };
         let remedy = "give the diagnosis.json that kinoise diagnose wrote";
         let diagnosis: Diagnosis =
-            serde_json::from_str(&text).map_err(|e| refuse(e.line(), e.to_string(), remedy))?;
+            serde_json::from_str(&text).map_err(|e| refuse(e.line(), plainly(&e), remedy))?;
         let mut views: Vec<WantedView> = Vec::new();
         for next in diagnosis.findings.into_iter().filter_map(|f| f.next_view) {
             let NextView { z_m, theta_rad, azimuth_rad, why } = next;

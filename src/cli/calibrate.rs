@@ -186,7 +186,9 @@ pub fn calibrate(
     let measurements = working("measuring", |step| measure(recording, &options.measure, step))?;
     say(measured(recording, &measurements));
     out.write("measurements.csv", write_measurements(&measurements.views).as_bytes())?;
-    let fitted = working("fitting", |_| model_of(recording, &measurements, options));
+    let fitted = working("fitting", |_| {
+        model_of(recording, &measurements, options).map_err(|e| e.of(&recording.root))
+    });
     let calibration = match fitted {
         Ok(calibration) => calibration,
         Err(why) => {

@@ -26,7 +26,7 @@ pub struct Global {
     #[command(flatten)]
     verbosity: Verbosity,
     /// Seed of all random choices: the same seed gives the same bytes [default: 1; demo: the clock]
-    #[arg(long, global = true, value_name = "N", allow_hyphen_values = true)]
+    #[arg(long, global = true, value_name = "N", allow_hyphen_values = true, value_parser = seed)]
     pub seed: Option<u64>,
     /// Threads to use; the results do not depend on it [default: all cores]
     #[arg(long, global = true, value_name = "N", value_parser = count(1, MAX_THREADS))]
@@ -164,7 +164,9 @@ impl Model {
     /// For a sequence: in what the model is not its camera's is said before the work begins.
     pub fn read_for(&self, sequence: &Sequence) -> kinoise::Result<NoiseModel> {
         let model = self.read()?;
-        model.refuse_other_size(&sequence.sensor)?;
+        if let Some(file) = &self.file {
+            model.refuse_other_size(&sequence.sensor).map_err(|e| e.of(file))?;
+        }
         let beyond = outside(sequence, &model).filter(|share| *share > MAX_OUTSIDE);
         let percent = |share: f64| format!("{:.0} % of the depths here lie outside", 1e2 * share);
         let [near, far] = model.sigma.domain.z_m;
@@ -263,6 +265,10 @@ pub fn count(low: usize, high: usize) -> impl Fn(&str) -> Result<usize, String> 
         Ok(n) if (low..=high).contains(&n) => Ok(n),
         _ => Err(format!("give a whole number from {low} to {high}")),
     }
+}
+
+fn seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("give a whole number from 0 to {}", u64::MAX))
 }
 
 /// For clap: a number from `low` to `high`.

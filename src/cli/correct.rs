@@ -4,7 +4,7 @@ use anyhow::Context;
 use clap::Args;
 use kinoise::correct::{CorrectOptions, Corrected, correct_recording};
 use kinoise::effects::Active;
-use kinoise::io::{DESCRIPTION, Leaves, OutputFolder};
+use kinoise::io::{DESCRIPTION, Leaves, OutputFolder, refuse_nested};
 use kinoise::units::counted;
 use kinoise::{DepthCode, NoiseModel};
 
@@ -48,6 +48,9 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let assumed = arguments.input.assumed()?;
     let inputs: [&Path; 2] = [recording, &arguments.model];
     let new = |place: &Path| begin(place, Leaves::Recording, &inputs, global);
+    if let Some(sigma) = &arguments.sigma {
+        refuse_nested(sigma, &arguments.output)?;
+    }
     let output = new(&arguments.output)?;
     let uncertainty = arguments.sigma.as_deref().map(new).transpose()?;
     let corrected = working("correcting", |step| {

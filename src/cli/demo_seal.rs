@@ -6,7 +6,7 @@ use kinoise::Seed;
 use kinoise::diagnose::{Diagnosis, Finding, HeldOut, Status, Verdict};
 use kinoise::effects::{Active, CATALOGUE, Card, Parameter};
 use kinoise::io::{hex, sha256_hex, write_atomic};
-use kinoise::units::{counted, shortest};
+use kinoise::units::{counted, shortest, to_digits};
 use rand::Rng;
 use serde_json::{Value, json};
 
@@ -213,7 +213,7 @@ impl Compared {
 const NORMAL_95: f64 = 1.96;
 
 fn digits(v: f64) -> String {
-    shortest(format!("{v:.2e}").parse().unwrap_or(v))
+    shortest(to_digits(v, 3))
 }
 
 fn gained(heldout: Option<&HeldOut>) -> String {

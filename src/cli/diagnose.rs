@@ -70,7 +70,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     let model = match (&arguments.model, &simulated) {
         (Some(path), _) => {
             let model = NoiseModel::read(path)?;
-            model.refuse_other_size(&recording.sensor)?;
+            model.refuse_other_size(&recording.sensor).map_err(|e| e.of(path))?;
             say_differences(path, &model, &recording.sensor);
             model
         }
@@ -154,7 +154,7 @@ pub fn examine(
 fn calibrated(recording: &Recording, global: &Global) -> anyhow::Result<NoiseModel> {
     let step =
         |step: kinoise::Progress<'_>| paper_model(recording, global.seed(), source_date(), step);
-    let model = working("calibrating", step)?;
+    let model = working("calibrating", step).map_err(|e| e.of(&recording.root))?;
     if model.sigma.form != Form::Paper {
         model.fit.remarks.iter().take(1).for_each(|why| say(format!("note: {why}")));
     }

@@ -37,6 +37,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     detail_model(&model, Some(&arguments.model));
     let output = begin(&arguments.output, SIGMA, &[path, &arguments.model], global)?;
     let mut sequence = open(path, &arguments.input.assumed()?)?;
+    model.refuse_other_size(&sequence.sensor).map_err(|e| e.of(&arguments.model))?;
     sequence.thin(arguments.thinning.stride, arguments.thinning.frames);
     notes(&sequence.remarks);
     let written =

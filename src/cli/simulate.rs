@@ -152,7 +152,8 @@ fn shoot(
 ) -> anyhow::Result<(Value, Value)> {
     let (views, recorded_by) = plans(arguments, global)?;
     if let (Some(path), Some(recorded_by)) = (&arguments.model, &recorded_by) {
-        NoiseModel::read(path)?.refuse_other_size(recorded_by)?;
+        let model = NoiseModel::read(path)?;
+        model.refuse_other_size(recorded_by).map_err(|e| e.of(path))?;
     }
     let sensor = recorded_by.unwrap_or(sensor);
     if let Physics::Formula { sigma, effects } = &physics {

@@ -20,11 +20,6 @@ impl RawCode {
         RawCode { code, near: near.unwrap_or(0), far: far.unwrap_or(0) }
     }
 
-    /// The greatest depth, m.
-    pub fn max_m(&self) -> f64 {
-        self.code.metres(self.far).unwrap_or(0.0)
-    }
-
     /// The raw value nearest to a positive depth (m), and whether the code ended before it.
     pub fn nearest(&self, z: f32) -> (u16, bool) {
         let metres = |word| self.code.metres(word).unwrap_or(f64::NAN);

@@ -53,7 +53,7 @@ pub fn correct_recording(
         output,
         layout,
         sensor,
-        correction: Correction::of(model, sensor)?,
+        correction: Correction::of(model, sensor).map_err(|e| e.of(root))?,
         table: sensor.code.table(),
         raw: RawCode::of(sensor.code),
         sigma: options.sigma,

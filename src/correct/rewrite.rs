@@ -256,8 +256,11 @@ impl Rewrite<'_> {
             *raw = nearest;
             tally.clamped += usize::from(clamped);
             tally.changed += usize::from(if self.recodes() { better != z } else { nearest != old });
-            // Where no depth is left, the end of the code is what was done.
-            let stored = if better.is_finite() { f64::from(better) } else { self.raw.max_m() };
+            // Beyond the code its end is what was done.
+            let stored = match clamped {
+                true => self.raw.code.metres(nearest).unwrap_or(0.0),
+                false => f64::from(better),
+            };
             tally.square_m2 += (stored - f64::from(z)).powi(2);
         }
         tally

@@ -11,11 +11,7 @@ use super::{CATALOGUE, Draw, Effect, Exposure, Settings, find};
 use crate::error::{Error, Result};
 use crate::model;
 use crate::rng::Seed;
-use crate::units::shortest;
-
-fn four_digits(v: f64) -> f64 {
-    format!("{v:.3e}").parse().unwrap_or(v)
-}
+use crate::units::{shortest, to_digits};
 
 /// An effect that is switched on.
 #[derive(Clone)]
@@ -51,7 +47,8 @@ fn fault(what: String) -> Error {
 /// The id that was probably meant: it holds the text or is held by it, or a few letters differ.
 fn nearest(text: &str) -> Option<&'static str> {
     let ids = || CATALOGUE.iter().map(|e| e.card().id);
-    let part = |id: &&str| !text.is_empty() && (id.contains(text) || text.contains(id));
+    // A letter or two stand in any word.
+    let part = |id: &&str| text.len() > 2 && (id.contains(text) || text.contains(id));
     let away = |id: &str| levenshtein(text, id);
     ids().find(part).or_else(|| {
         // A third of the letters wrong is another word.
@@ -66,8 +63,13 @@ impl Active {
     /// When no effect has this id.
     pub fn typical(id: &str) -> Result<Self> {
         let effect = find(id).ok_or_else(|| {
-            let near = nearest(id);
-            let hint = near.map_or(String::new(), |n| format!("; did you mean {n}?"));
+            let hint = nearest(id).map_or_else(
+                || {
+                    let ids: Vec<&str> = CATALOGUE.iter().map(|e| e.card().id).collect();
+                    format!(", which has {}", ids.join(", "))
+                },
+                |near| format!("; did you mean {near}?"),
+            );
             fault(format!("effect \"{id}\" is not in the catalogue{hint}"))
         })?;
         Ok(Active { effect: Acting::Catalogue(effect), settings: Settings::typical(effect.card()) })
@@ -215,7 +217,7 @@ impl Active {
         let card = self.effect.card();
         let knobs = card.parameters.iter().zip(&self.settings.0);
         let knobs: Vec<String> =
-            knobs.map(|(p, &v)| format!("{}={}", p.name, shortest(four_digits(v)))).collect();
+            knobs.map(|(p, &v)| format!("{}={}", p.name, shortest(to_digits(v, 4)))).collect();
         format!("{}:{}", card.id, knobs.join(","))
     }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::Active;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::model::NoiseModel;
 
 impl NoiseModel {
@@ -14,12 +14,7 @@ impl NoiseModel {
     pub fn read(path: &Path) -> Result<Self> {
         let file = Self::file(path);
         let model = Self::read_unchecked(&file)?;
-        match Active::check_model(&model.effects) {
-            Ok(()) => Ok(model),
-            Err(Error::Argument { what, remedy }) => {
-                Err(Error::ModelFile { path: file, what, remedy })
-            }
-            Err(other) => Err(other),
-        }
+        Active::check_model(&model.effects).map_err(|e| e.of(&file))?;
+        Ok(model)
     }
 }

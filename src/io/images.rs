@@ -40,7 +40,7 @@ impl FrameSource {
 
     /// One image file. Errors as those of [`FrameSource::frame`].
     pub fn read(&mut self, path: &Path) -> Result<Frame> {
-        let bytes = read_depth_image(path, self.width * self.height)?;
+        let bytes = read_depth_image(path, [self.width, self.height])?;
         self.hash.update(&bytes);
         sized(path, decode(path, &bytes)?, self.width, self.height)
     }
@@ -56,7 +56,7 @@ pub(crate) fn read_depth(frame: &FrameRef, width: usize, height: usize) -> Resul
     if frame.within.is_some() {
         return sized(&frame.path, read_any(frame)?, width, height);
     }
-    let bytes = read_depth_image(&frame.path, width * height)?;
+    let bytes = read_depth_image(&frame.path, [width, height])?;
     sized(&frame.path, decode(&frame.path, &bytes)?, width, height)
 }
 

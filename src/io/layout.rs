@@ -10,7 +10,7 @@ use super::list::{FrameList, read_list};
 use super::output::{entries, write_json};
 use crate::error::{Error, Result};
 use crate::frame::FARTHEST_M;
-use crate::read::{absurd, is_there, read_json};
+use crate::read::{absurd, is_there, plainly, read_json};
 use crate::units::shortest;
 use crate::view::{
     Excluded, RECORDING_FORMAT, Recording, RecordingFile, Region, Sensor, TargetSize, View,
@@ -164,7 +164,10 @@ pub(super) fn read_sensor(path: &Path, unknown: &mut UnknownKeys) -> Result<Sens
     if format != RECORDING_FORMAT {
         return Err(wrong(format!("format is \"{format}\", expected \"{RECORDING_FORMAT}\"")));
     }
-    let file: RecordingFile = parse(path, &text).map_err(|e| named(path, &text).unwrap_or(e))?;
+    let good = json!({
+        "format": "", "sensor": "", "width": 1, "height": 1, "fx": 1, "fy": 1, "cx": 1, "cy": 1
+    });
+    let file = parse_named::<RecordingFile>(path, &text, &good)?;
     let given = parse(path, &text)?;
     if let Some(what) = absurd(&given) {
         return Err(wrong(what));
@@ -184,12 +187,7 @@ struct Format {
 }
 
 fn parse<T: serde::de::DeserializeOwned>(path: &Path, text: &str) -> Result<T> {
-    serde_json::from_str(text).map_err(|e| {
-        // serde's "... at line 3 column 7" without the line, which the error has by itself.
-        let full = e.to_string();
-        let what = full.rsplit_once(" at line ").map_or(&*full, |(before, _)| before);
-        Error::text(path, e.line(), what, REMEDY_JSON)
-    })
+    serde_json::from_str(text).map_err(|e| Error::text(path, e.line(), plainly(&e), REMEDY_JSON))
 }
 
 /// The line of the first key that a message names; 0 where it names none.
@@ -206,18 +204,19 @@ fn line_named(text: &str, message: &str) -> usize {
     words.filter(|w| !w.is_empty()).find_map(line_of).map_or(0, |k| k + 1)
 }
 
-/// Which key of a description has a value of the wrong type: serde knows only where the document ends.
-fn named(path: &Path, text: &str) -> Option<Error> {
-    let given: Value = serde_json::from_str(text).ok()?;
-    let good = json!({
-        "format": "", "sensor": "", "width": 1, "height": 1, "fx": 1, "fy": 1, "cx": 1, "cy": 1
-    });
-    given.as_object()?.iter().find_map(|(key, value)| {
+/// As [`parse`]; a value of the wrong type is told by its key, which serde does not say: it is the one
+/// that spoils a `good` document.
+fn parse_named<T: serde::de::DeserializeOwned>(path: &Path, text: &str, good: &Value) -> Result<T> {
+    let spoils = |(key, value): (&String, &Value)| {
         let mut trial = good.clone();
         trial[key] = value.clone();
-        let why = serde_json::from_value::<RecordingFile>(trial).err()?;
-        let line = line_named(text, key);
-        Some(Error::text(path, line, format!("{key}: {why}"), REMEDY_JSON))
+        let why = serde_json::from_value::<T>(trial).err()?;
+        let what = format!("{key}: {}", plainly(&why));
+        Some(Error::text(path, line_named(text, key), what, REMEDY_JSON))
+    };
+    parse(path, text).map_err(|e| {
+        let given: Value = serde_json::from_str(text).unwrap_or_default();
+        given.as_object().and_then(|all| all.iter().find_map(spoils)).unwrap_or(e)
     })
 }
 
@@ -257,7 +256,7 @@ fn open_view(
 fn read_notes(path: &Path, unknown: &mut UnknownKeys) -> Result<ViewNotes> {
     let text = read_json(path)?;
     let wrong = |what: String| Error::text(path, line_named(&text, &what), what, REMEDY_JSON);
-    let file: ViewFile = parse(path, &text)?;
+    let file = parse_named::<ViewFile>(path, &text, &json!({}))?;
     let given = parse(path, &text)?;
     if let Some(what) = absurd(&given) {
         return Err(wrong(what));

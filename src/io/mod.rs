@@ -25,7 +25,7 @@ pub use list::{FrameList, read_list};
 pub(crate) use output::{entries, sync_folder, write_atomic_with};
 pub use output::{hex, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
 pub(crate) use output_folder::is_description;
-pub use output_folder::{Leaves, OutputFolder, refuse_inside};
+pub use output_folder::{Leaves, OutputFolder, refuse_inside, refuse_nested};
 pub use pictures::{ColourImage, InfraredImage};
 pub use unfinished::{Interrupted, discard_stale, discard_unfinished};
 

@@ -6,7 +6,7 @@
 
 use std::ffi::OsString;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::folder::INDEX;
@@ -327,13 +327,31 @@ pub fn refuse_inside(place: &Path, input: &Path) -> Result<()> {
     Ok(())
 }
 
+/// An error when one of two results would lie in the other, or both be one: either would be in the
+/// other's way.
+pub fn refuse_nested(one: &Path, other: &Path) -> Result<()> {
+    let (a, b) = (settled(one)?, settled(other)?);
+    if !a.starts_with(&b) && !b.starts_with(&a) {
+        return Ok(());
+    }
+    let what = format!("{} and this folder would lie one in the other", other.display());
+    Err(Error::recording(one, what, "choose a folder beside it"))
+}
+
 /// Without links. What does not exist yet has no canonical name; the folder it will stand in has.
 fn settled(place: &Path) -> Result<PathBuf> {
     let absolute = std::path::absolute(place).map_err(|e| Error::write(place, e))?;
     for folder in absolute.ancestors() {
         if let Ok(standing) = folder.canonicalize() {
             let rest = absolute.strip_prefix(folder).unwrap_or(Path::new(""));
-            return Ok(if rest.as_os_str().is_empty() { standing } else { standing.join(rest) });
+            return Ok(rest.components().fold(standing, |mut path, part| {
+                // Once made, nothing of the rest is a link.
+                match part {
+                    Component::ParentDir => drop(path.pop()),
+                    part => path.push(part),
+                }
+                path
+            }));
         }
     }
     Ok(absolute)

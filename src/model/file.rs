@@ -15,7 +15,7 @@ use super::uncertainty::Uncertainty;
 use super::{Direction, Domain, SigmaModel};
 use crate::error::{Error, Result};
 use crate::io::{pretty_json, write_atomic};
-use crate::read::{absurd, read_json};
+use crate::read::{absurd, plainly, read_json};
 use crate::view::{RecordingFile, Sensor};
 
 /// The format this version writes and reads.
@@ -165,8 +165,10 @@ impl NoiseModel {
             return Err((what, REMEDY));
         }
         // From the text, for its lines.
-        let file: ModelFile = serde_json::from_str(text)
-            .map_err(|e| (format!("a part of the model is missing or wrong ({e})"), REMEDY))?;
+        let file: ModelFile = serde_json::from_str(text).map_err(|e| {
+            let (line, why) = (e.line(), plainly(&e));
+            (format!("line {line}: a part of the model is missing or wrong ({why})"), REMEDY)
+        })?;
         let sensor = file.sensor.clone().map(RecordingFile::sensor).transpose();
         sensor.map_err(|what| (format!("sensor: {what}"), REMEDY))?;
         let sigma = read_sigma(file.sigma, &file.fit)?;
@@ -219,7 +221,7 @@ fn read_sigma(file: SigmaFile, fit: &FitFile) -> Result<SigmaModel, (String, &'s
             .get(*name)
             .ok_or_else(|| (format!("the parameter {name} is missing"), REMEDY))?;
         let parameter: ParameterFile = serde_json::from_value(value.clone())
-            .map_err(|e| (format!("the parameter {name}: {e}"), REMEDY))?;
+            .map_err(|e| (format!("the parameter {name}: {}", plainly(&e)), REMEDY))?;
         parameters.push(parameter.value);
         std_errors.push(parameter.std_error);
     }

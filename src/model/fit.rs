@@ -14,6 +14,7 @@ use super::surface::Domain;
 use crate::error::{Error, Result};
 use crate::measure::{SigmaRow, SigmaTable};
 use crate::solve::{LeastSquares, trust_region};
+use crate::units::{counted, verb};
 
 /// Distances closer than this count as one.
 pub const DISTANCE_RATIO: f64 = 1.05;
@@ -150,8 +151,9 @@ fn enough(rows: &Rows, spec: &dyn SigmaForm) -> Result<()> {
     if rows.len() < free_at_least {
         return Err(Error::NotEnough {
             what: format!(
-                "{} measured sigmas are too few for the form \"{}\"",
-                rows.len(),
+                "{} {} too few for the form \"{}\"",
+                counted(rows.len(), "measured sigma"),
+                verb(rows.len(), "is", "are"),
                 spec.card().id
             ),
             remedy: format!("give at least {free_at_least}, better {}", 3 * parameters),

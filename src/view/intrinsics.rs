@@ -8,6 +8,7 @@ use crate::units::shortest;
 
 /// Standard uncertainties (k = 1) of the intrinsics, px; what is not stated is left out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(expecting = "an object with any of fx, fy, cx and cy")]
 pub struct IntrinsicsUncertainty {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fx: Option<f64>,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::units::shortest;
+use crate::units::{shortest, to_digits};
 
 /// Where the target is, when the recording says so; pixel coordinates.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +35,7 @@ impl Region {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(expecting = "an object with width_m and height_m")]
 pub struct TargetSize {
     pub width_m: f64,
     pub height_m: f64,
@@ -65,7 +66,7 @@ impl TargetSize {
             "target.flatness_m = {} must be above 0 and at most a tenth of the target's shorter side, {}; is it in \
              millimetres?",
             shortest(flatness),
-            shortest(side)
+            shortest(to_digits(side, 4))
         ))
     }
 }

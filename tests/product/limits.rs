@@ -3,6 +3,7 @@
 
 use std::fs;
 
+use kinoise::io::FrameSource;
 use serde_json::{Value, json};
 
 use crate::desk::{Desk, fifo};
@@ -255,4 +256,114 @@ fn what_the_dead_left_goes_whatever_its_age() {
     assert!(!desk.at(&format!(".kinoise-{dead}-aBcDeF")).exists());
     assert!(desk.at(&format!(".kinoise-{alive}-0")).exists());
     assert!(desk.at(&format!(".kinoise-{dead}-1.kept")).exists());
+}
+
+/// "1 measured sigmas" of nobody knew which recording; models of another size likewise.
+#[test]
+fn what_does_not_fit_together_is_named() {
+    let desk = Desk::furnished();
+    desk.done("simulate one --shrink 4 --frames 4 --distances 1 --tilts 0");
+    desk.refused("calibrate one -o out", &["one: 1 measured sigma is too few"]);
+    let small = json!({"format": "recording/1", "sensor": "Kinect", "width": 64, "height": 48,
+        "fx": 60, "fy": 60, "cx": 31.5, "cy": 23.5, "units_per_metre": 5000});
+    desk.model("small.json", |model| model["sensor"] = small);
+    for (line, name) in [
+        ("diagnose rec -m small.json -o out2", "small.json: "),
+        ("simulate out2 --like rec -m small.json", "small.json: "),
+        ("map film -m small.json -o out2", "small.json: "),
+        ("sigma film -m small.json -o out2", "small.json: "),
+        ("correct rec -m small.json -o out2", "rec: "),
+    ] {
+        desk.refused(line, &[name, "64 x 48 px"]);
+    }
+}
+
+/// They named this program's types, and numbers with what sums leave behind.
+#[test]
+fn messages_are_in_plain_words() {
+    let board = |flatness: f64| json!({"width_m": 1, "height_m": 0.8, "flatness_m": flatness});
+    for (view, says) in [
+        (
+            json!({"target": 5}),
+            "line 2: target: invalid type: integer `5`, expected an object with width_m and height_m",
+        ),
+        (
+            json!({"target": {"width_m": "a"}}),
+            "line 2: target: invalid type: string \"a\", expected a number",
+        ),
+        (json!({"roi": 5}), "line 2: roi: "),
+        (json!({"target": board(0.5)}), "shorter side, 0.08; is it"),
+    ] {
+        let desk = Desk::new();
+        desk.put("rec/0000/view.json", format!("{view:#}"));
+        let told = desk.done("calibrate rec -o out");
+        assert!(told.contains(says), "{says}: {told}");
+    }
+    let desk = Desk::new();
+    for (key, value, says) in [
+        ("raw_disparity", json!(5), "expected an object with offset and slope"),
+        ("intrinsics_uncertainty", json!("x"), "expected an object with any of fx, fy, cx and cy"),
+        ("width", json!(1.5), "expected a whole number"),
+    ] {
+        desk.describe(|sensor| sensor[key] = value);
+        desk.refused("calibrate rec -o out", &[key, says]);
+    }
+    for key in ["sigma", "fit", "provenance", "effects"] {
+        desk.model("model.json", |model| model[key] = json!(5));
+        let says = ["model.json: line ", "integer `5`, expected a"];
+        desk.refused("export model.json --format c -o noise.h", &says);
+        let told = desk.run("export model.json --format c -o noise.h").stderr;
+        assert!(!String::from_utf8_lossy(&told).contains("struct "));
+    }
+    desk.refused("simulate out --seed=inf", &["from 0 to 18446744073709551615"]);
+    desk.refused("simulate out --effect x:y=1", &["radial-disparity-bias, ", "which has "]);
+    desk.refused("simulate out --effect radial:y=1", &["did you mean radial-disparity-bias?"]);
+}
+
+/// 600 m were told of depths that end with the code, at 13.
+#[test]
+fn a_correction_tells_what_it_stored() {
+    let desk = Desk::new();
+    desk.done("simulate far --shrink 8 --frames 2 --distances 8 --tilts 0 --wall-target");
+    desk.model("model.json", |model| {
+        let bowl = json!({"id": "radial-disparity-bias", "parameters": {"k_px": 4}});
+        model["effects"] = json!([bowl]);
+    });
+    let output = desk.run("correct far -m model.json -o out --json");
+    let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let [clamped, rms_mm] = ["clamped", "rms_shift_mm"].map(|key| told[key].as_f64().expect(key));
+    // From 8 m to the end of the code, where most of them stand.
+    let end_mm = 1e3 * (f64::from(u16::MAX) / 5000.0 - 8.0);
+    assert!(clamped > 0.5 * told["pixels"].as_f64().expect("pixels"), "{told}");
+    assert!((0.7 * end_mm..1.1 * end_mm).contains(&rms_mm), "{told}");
+}
+
+/// Both were written, and then one stood in the other's way.
+#[test]
+fn a_correction_and_its_uncertainty_lie_apart() {
+    let desk = Desk::new();
+    desk.model("model.json", |_| ());
+    for (output, sigma) in
+        [("out", "out"), ("out", "./x/../out"), ("out", "out/sigma"), ("s/out", "s")]
+    {
+        let line = format!("correct rec -m model.json -o {output} --sigma {sigma}");
+        desk.refused(&line, &["would lie one in the other"]);
+        assert!(!desk.at("out").exists() && !desk.at("s").exists());
+    }
+    // The way through a folder that is not there leads to where it seems to lead.
+    desk.refused("calibrate rec -o x/../rec/out", &["inside the recording"]);
+    assert!(!desk.at("x").exists() && !desk.at("rec/out").exists());
+}
+
+/// What fuzzing found: the bytes of 4 thousand million columns of as many rows have no number.
+#[test]
+fn no_size_of_an_image_is_too_large_to_be_refused() {
+    let desk = Desk::new();
+    let folder = fs::read_dir(desk.at("rec/0000/depth")).expect("images");
+    for image in folder {
+        let image = image.expect("one").path();
+        for size in [usize::MAX, u32::MAX as usize, 0, 1] {
+            assert!(FrameSource::new(size, size).read(&image).is_err(), "{size}");
+        }
+    }
 }
