@@ -189,6 +189,9 @@ fn summary(diagnosis: &Diagnosis) -> String {
         Verdict::Inconclusive => {
             "inconclusive: nothing was found, and not everything could be tested\n".to_string()
         }
+        Verdict::Mismatch if diagnosis.findings.iter().any(|f| f.contradicted.is_some()) => {
+            format!("mismatch: {held_against} does not fit the recording\n")
+        }
         Verdict::Mismatch => format!("mismatch: {held_against} leaves out\n"),
     };
     for sentence in story(diagnosis) {

@@ -98,7 +98,9 @@ impl After<'_> {
 
     /// Findings that no `--effect` stands for.
     fn without_formula(&self, findings: &[&Finding]) -> Option<String> {
-        let seen = findings.iter().filter(|f| f.status != Status::NotIdentifiable);
+        let seen = findings
+            .iter()
+            .filter(|f| f.status != Status::NotIdentifiable && f.contradicted.is_none());
         let (shaped, bare): (Vec<&Finding>, Vec<&Finding>) =
             seen.partition(|f| !f.terms.is_empty());
         let model = self.folder.join("model.json");

@@ -91,6 +91,9 @@ pub struct Finding {
     /// What it looks like over its axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub curve: Option<Curve>,
+    /// The effect of the model that the views contradict; such a finding has no name of its own.
+    #[serde(skip)]
+    pub contradicted: Option<&'static str>,
     /// What the model is given.
     #[serde(skip)]
     pub terms: Vec<Term>,

@@ -121,6 +121,7 @@ fn finding(
         replicated: outcome.halves.as_ref().and_then(|h| h.replicate(group)),
         physics,
         next_view: None,
+        contradicted: None,
         shape,
         curve: Some(along.curve(scene, &left, &mine)),
         terms: group.iter().map(|&k| terms[k].clone()).collect(),

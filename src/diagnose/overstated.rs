@@ -175,6 +175,7 @@ fn finding(known: &KnownTerms, id: &'static str, statistic: Statistic, axis: Axi
             "Too much: {shape}. It belongs to another sensor or to other settings: take it out of the model, or learn the model again."
         ),
         shape: Some(shape),
+        contradicted: Some(id),
         ..named(id, statistic, axis)
     }
 }

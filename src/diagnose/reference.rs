@@ -116,6 +116,7 @@ pub fn findings(
         replicated: best.replicated,
         physics: physics(status, Some(best.family), Statistic::Bias, best.axis, None),
         next_view: None,
+        contradicted: None,
         shape: None,
         curve: None,
         terms: Vec::new(),
@@ -143,6 +144,7 @@ fn contradicted(law: &Law, p: f64) -> Finding {
             "Not of this sensor: {shape}. Take it out of the model, or learn it again from references."
         ),
         shape: Some(shape),
+        contradicted: Some(law.family),
         ..named(law.family, Statistic::Bias, law.axis)
     }
 }

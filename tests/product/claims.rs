@@ -40,9 +40,9 @@ fn told(folder: &Path, recording: &str, id: &str, parameters: &Value) -> (String
     let text = std::fs::read(folder.join("told/diagnosis.json")).expect("a diagnosis");
     let diagnosis: Value = serde_json::from_slice(&text).expect("JSON");
     let findings = diagnosis["findings"].as_array().expect("a list");
-    let too_much =
+    let contradicted =
         |f: &Value| f["physics"].as_str().is_some_and(|p| p.contains("out of the model"));
-    (diagnosis["verdict"].as_str().expect("a word").into(), findings.iter().any(too_much))
+    (diagnosis["verdict"].as_str().expect("a word").into(), findings.iter().any(contradicted))
 }
 
 /// Each claim on the recording of a sensor without it, and on that of a sensor that has it.

@@ -41,7 +41,7 @@ fn card((i, finding): (usize, &&Finding)) -> Result<Markup> {
     );
     let chart = finding.curve.as_ref().and_then(curve::chart);
     let picture = chart.map(|chart| drawing(&chart, &what)).transpose()?;
-    let (class, badge) = badge(finding.status);
+    let (class, badge) = badge(finding);
     Ok(html! {
         article.card {
             header {

@@ -28,6 +28,8 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> String {
     let effects = missing(&diagnosis.findings);
     let names: Vec<String> = effects.iter().take(MAX_NAMES).map(|f| called(f)).collect();
     let names = join(&names, "and");
+    let contradicted: Vec<String> =
+        diagnosis.findings.iter().filter_map(|f| f.contradicted.map(against)).collect();
     let recalibrate = diagnosis.findings.iter().any(|f| f.status == Status::Recalibrate);
     match (diagnosis.verdict, effects.is_empty()) {
         (Verdict::Match, _) => format!(
@@ -43,6 +45,9 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> String {
         (Verdict::Inconclusive, false) => {
             format!("This recording does not settle whether the model is right. There are hints of {names}.")
         }
+        (Verdict::Mismatch, true) if !contradicted.is_empty() => {
+            format!("The model has {}: it belongs to another sensor or to other settings.", join(&contradicted, "and"))
+        }
         (Verdict::Mismatch, true) if recalibrate => {
             "The model lacks no effect, but its parameters do not fit this sensor: calibrate it again.".into()
         }
@@ -57,7 +62,11 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> String {
             },
             count(effects.len(), "effect"),
             if effects.len() > MAX_NAMES { ", above all" } else { ":" },
-            if recalibrate { "; its own parameters are off as well" } else { "" }
+            match (recalibrate, &contradicted[..]) {
+                (_, [_, ..]) => format!("; and it has {}", join(&contradicted, "and")),
+                (true, []) => "; its own parameters are off as well".into(),
+                (false, []) => String::new(),
+            }
         ),
     }
 }
@@ -66,7 +75,7 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> String {
 /// be seen.
 pub(super) fn missing(findings: &[Finding]) -> Vec<&Finding> {
     let lacking = [Status::Named, Status::OneOf, Status::Unexplained];
-    let lacks = |f: &&Finding| lacking.contains(&f.status) && !f.minor;
+    let lacks = |f: &&Finding| lacking.contains(&f.status) && !f.minor && f.contradicted.is_none();
     findings.iter().filter(lacks).collect()
 }
 
@@ -81,10 +90,14 @@ pub fn called(finding: &Finding) -> String {
                 .filter(|(i, a)| *i < 2 || a.probability.is_some_and(|p| p >= MIN_PROBABILITY));
             join(&likely.map(|(_, a)| title(a.effect).into()).collect::<Vec<_>>(), "or")
         }
-        Status::Unexplained => unnamed(),
+        Status::Unexplained => finding.contradicted.map_or_else(unnamed, against),
         Status::Recalibrate => "parameters that are off".into(),
         _ => finding.effect.map_or_else(unnamed, |id| title(id).into()),
     }
+}
+
+fn against(id: &'static str) -> String {
+    format!("{}, which the recording contradicts", title(id))
 }
 
 /// What something changes over, after its name.
@@ -96,8 +109,9 @@ pub(super) fn along(axis: Axis) -> String {
 }
 
 /// Class and text of a finding's badge.
-pub(super) fn badge(status: Status) -> (&'static str, &'static str) {
-    match status {
+pub(super) fn badge(finding: &Finding) -> (&'static str, &'static str) {
+    match finding.status {
+        _ if finding.contradicted.is_some() => ("bad", "not in the recording"),
         Status::Named => ("good", "effect named"),
         Status::OneOf => ("unsure", "one of several"),
         Status::Unexplained => ("bad", "measured, not in the catalogue"),

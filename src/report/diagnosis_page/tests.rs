@@ -33,6 +33,7 @@ fn finding(status: Status, effect: Option<&'static str>) -> Finding {
         replicated: Some(true),
         physics: String::new(),
         next_view: None,
+        contradicted: None,
         shape: None,
         curve: None,
         terms: Vec::new(),
@@ -119,7 +120,7 @@ fn diagnosis(verdict: Verdict, findings: Vec<Finding>) -> Diagnosis {
 }
 
 /// Diagnoses of every kind, and what the page of each must say.
-fn cases() -> [(Diagnosis, &'static [&'static str]); 8] {
+fn cases() -> [(Diagnosis, &'static [&'static str]); 9] {
     use Verdict::{Inconclusive, Match, Mismatch};
     let named = bowl(Status::Named, [("radial-disparity-bias", 0.97), ("lens-distortion", 0.02)]);
     let noise = Finding {
@@ -196,6 +197,13 @@ fn cases() -> [(Diagnosis, &'static [&'static str]); 8] {
         (
             diagnosis(Mismatch, vec![unexplained()]),
             &["Its curve: a step at row 317, −0.08 px above", "measured, not in the catalogue"],
+        ),
+        (
+            diagnosis(Mismatch, vec![Finding { contradicted: Some("row-noise"), ..unexplained() }]),
+            &[
+                "which the recording contradicts: it belongs to another sensor",
+                "not in the recording",
+            ],
         ),
         (
             diagnosis(Mismatch, vec![finding(Status::Recalibrate, None)]),
