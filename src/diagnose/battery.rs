@@ -160,9 +160,7 @@ impl Case<'_> {
         let textured = scatter.tails.is_some()
             || (!scatter.hangs.is_empty() && f.size.sigma < LEVEL_BESIDE_TEXTURE);
         let tailed = textured && f.status == Status::Recalibrate;
-        // What each half of the views has otherwise, and no physics has a name for, is their scatter.
-        let scattered = f.status == Status::Unexplained && f.replicated == Some(false);
-        !stepped && !tailed && !scattered && f.size.sigma > self.options.ablation.min_size(MIN_SIZE)
+        !stepped && !tailed && f.size.sigma > self.options.ablation.min_size(MIN_SIZE)
     }
 
     /// Is what was measured clearly more than twice of what the model has?

@@ -63,7 +63,13 @@ pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
             None => groups.push(vec![k]),
         }
     }
-    groups.iter().map(|group| finding(scene, outcome, group, &terms, &values, &responses)).collect()
+    // What each half of the views has otherwise, and no physics has a name for, is their scatter.
+    let scattered = |group: &Vec<usize>| {
+        let nameless = group.iter().all(|&k| outcome.chosen[k].candidate.family.is_none());
+        nameless && outcome.halves.as_ref().is_some_and(|h| h.contradict(group))
+    };
+    let told = groups.iter().filter(|group| !scattered(group));
+    told.map(|group| finding(scene, outcome, group, &terms, &values, &responses)).collect()
 }
 
 /// A name found after a curve on its axis stands for both if it had explained this share of it.

@@ -150,6 +150,20 @@ impl Halves {
     /// Do both halves have these terms, taken as one shape? `None` where the terms have no columns
     /// of their own, or a half has too few views.
     pub fn replicate(&self, terms: &[usize]) -> Option<bool> {
+        let (sizes, seen) = self.shown(terms)?;
+        Some(alike(&sizes) && seen > SEEN)
+    }
+
+    /// Does neither half show what the other has, or each the opposite? Sizes that differ are no
+    /// contradiction: of true ones a twentieth lie outside their interval, and sensors warm up.
+    pub fn contradict(&self, terms: &[usize]) -> bool {
+        let opposite = |sizes: [Measured; 2]| sizes[0].value * sizes[1].value <= 0.0;
+        self.shown(terms).is_some_and(|(sizes, seen)| opposite(sizes) || seen <= SEEN)
+    }
+
+    /// What each half has of the common shape, and how clearly the better seen of them shows what the
+    /// other has, in standard errors.
+    fn shown(&self, terms: &[usize]) -> Option<([Measured; 2], f64)> {
         let columns: Vec<usize> =
             terms.iter().filter_map(|&t| self.spans.get(t).cloned()).flatten().collect();
         if columns.is_empty() {
@@ -170,7 +184,7 @@ impl Halves {
         let sizes = [first.measured(&common)?, second.measured(&common)?];
         let seen =
             [first.measured(&along(&second.beta))?.z(), second.measured(&along(&first.beta))?.z()];
-        Some(alike(&sizes) && seen[0].max(seen[1]) > SEEN)
+        Some((sizes, seen[0].max(seen[1])))
     }
 }
 
