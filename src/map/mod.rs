@@ -32,7 +32,8 @@ pub use nearest::Nearest;
 pub use normal_equations::Direction;
 pub use point::Point;
 
-use preprocess::Preprocessor;
+use preprocess::{Prepared, Preprocessor};
+use rayon::prelude::*;
 use tracker::Tracker;
 
 use crate::Progress;
@@ -40,7 +41,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::{ClockOffset, clock_offset};
 use crate::model::NoiseModel;
 use crate::rng::Seed;
-use crate::sequence::Sequence;
+use crate::sequence::{Moment, Sequence};
 use crate::trajectory::Pose;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -73,6 +74,9 @@ impl Mapped {
     }
 }
 
+/// Frames prepared at once: whichever thread is done with one takes the next, and none waits for long.
+const AHEAD: usize = 4;
+
 /// Map a sequence. Whether the model is this sensor's is the caller's to ask:
 /// [`NoiseModel::differences`] and [`outside`].
 /// An error when the model is of another sensor, OpenCV fails, or not even two frames have a pose.
@@ -86,16 +90,22 @@ pub fn map(
     let mut tracker = Tracker::new(&preprocessor);
     let moments = &sequence.moments;
     let mut frames: Vec<FrameReport> = Vec::with_capacity(moments.len());
-    let prepare = |k: usize| moments.get(k).map(|m| preprocessor.prepare(m));
-    let mut next = prepare(0);
-    for (k, moment) in moments.iter().enumerate() {
-        let Some(frame) = next.take() else { break };
-        // The next frame is read while this one is aligned.
-        let (report, prepared) =
-            rayon::join(|| tracker.track(moment.stamp, frame), || prepare(k + 1));
-        frames.push(report?);
-        next = prepared;
-        progress.step(k + 1, moments.len());
+    let prepare = |block: Option<&[Moment]>| -> Vec<Result<Prepared>> {
+        block.into_par_iter().flatten().map(|m| preprocessor.prepare(m)).collect()
+    };
+    let mut blocks = moments.chunks(AHEAD).peekable();
+    let mut ready = prepare(blocks.peek().copied());
+    while let Some(block) = blocks.next() {
+        let prepared = std::mem::take(&mut ready);
+        // The next frames are read while these are aligned, one after the other.
+        let align = || -> Result<Vec<FrameReport>> {
+            let each = |(moment, frame): (&Moment, _)| tracker.track(moment.stamp, frame);
+            block.iter().zip(prepared).map(each).collect()
+        };
+        let (aligned, next) = rayon::join(align, || prepare(blocks.peek().copied()));
+        frames.extend(aligned?);
+        ready = next;
+        progress.step(frames.len(), moments.len());
     }
     let mut remarks: Vec<String> = frames.iter().filter_map(|f| f.remark.clone()).collect();
     remarks.extend(frame_report::remarks(&frames));
