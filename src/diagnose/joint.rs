@@ -75,8 +75,7 @@ impl Joint<'_> {
         let whole = Reduced::of(&self.all, self.columns.terms, s.penalty.as_ref())?;
         let first = whole.fit(&kept, &self.precision)?;
         // What every view says beyond the common fit, of all and of the terms alone.
-        let left: Vec<DVector<f64>> =
-            data.par_iter().filter_map(|view| self.columns.left(view, &first)).collect();
+        let left: Vec<DVector<f64>> = self.left(0..data.len(), &first).collect();
         let of_terms = |left: &DVector<f64>| {
             let terms = self.columns.terms;
             let nodes = left.rows(terms, self.columns.nodes);
@@ -109,7 +108,7 @@ impl Joint<'_> {
                 .clone()
                 .filter(|r| s.penalty.is_none() || !is_smooth_and_nameless(&r.candidate)),
             left_out: Vec::new(),
-            halves: self.halves(data, second, s, &precision, &beta),
+            halves: self.halves(second, s, &precision, &beta),
             covariance: Covariance::default(),
         };
         let planes = (camera, disparities(data));
@@ -161,7 +160,6 @@ impl Joint<'_> {
     /// The same fit to either half of the views, where there are two.
     fn halves(
         &self,
-        data: &[ViewData],
         second: &[bool],
         s: &Settled,
         precision: &DVector<f64>,
@@ -181,14 +179,8 @@ impl Joint<'_> {
             let beta = factor.solve(&own(&evidence.b));
             let mut all = DVector::zeros(self.all.b.len());
             columns.iter().zip(beta.iter()).for_each(|(&c, b)| all[c] = *b);
-            let mine: Vec<&ViewData> = data
-                .iter()
-                .zip(second)
-                .filter(|(_, s)| **s == which)
-                .map(|(view, _)| view)
-                .collect();
-            let beyond =
-                mine.par_iter().filter_map(|v| Some(own(&self.columns.left(v, &all)?))).collect();
+            let mine = (0..second.len()).filter(|v| second[*v] == which);
+            let beyond = self.left(mine, &all).map(|left| own(&left)).collect();
             Some(Half { beta, factor, beyond })
         };
         let mut first = 0;

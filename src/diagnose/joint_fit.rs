@@ -1,7 +1,7 @@
 //! Normal equations of terms and of a smooth map over the picture together, by parts of the views,
 //! and their penalised solution.
 
-use nalgebra::{DMatrix, DVector, DVectorView};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::candidate::Candidate;
@@ -59,33 +59,32 @@ impl Columns {
 
     /// Normal equations of a view, its plane profiled out.
     pub fn evidence(&self, view: &ViewData) -> Option<Evidence> {
-        let Basis::Spline { width, height, across, down, .. } = self.maps[0] else { return None };
+        let Basis::Spline { across, .. } = self.maps[0] else { return None };
+        let half = self.nodes / 2;
         // Between the same nodes the same splines are not zero.
-        let span = |at: f64, length: f64, nodes: usize| {
-            (at / (length - 1.0) * (nodes - 3) as f64) as usize
-        };
-        let block = |i: usize| {
-            let p = &view.places[i];
-            span(p.v, height, down) * across + span(p.u, width, across)
+        let touched = |first: usize| {
+            let squares = (0..4).flat_map(|j| (0..4).map(move |i| j * across + i));
+            let nodes = squares.map(|node| self.terms + first + node);
+            let both = nodes.clone().chain(nodes.map(|node| node + half));
+            (0..self.terms).chain(both).collect()
         };
         let rows = view.rows(&view.response)?;
-        let fill = |i: usize, row: &mut [f64]| self.fill(&view.places[i], row);
-        Some(rows.reduce_by_blocks(self.terms + self.nodes, block, fill))
-    }
-
-    /// What a view says beyond a fit, its plane profiled out: the score that is left.
-    pub fn left(&self, view: &ViewData, beta: &DVector<f64>) -> Option<DVector<f64>> {
-        let count = self.terms + self.nodes;
-        let mut row = vec![0.0; count];
-        let mut of = |(y, place): (&f64, &PixelContext)| {
-            self.fill(place, &mut row);
-            y - DVectorView::from_slice(&row, count).dot(beta)
+        let first =
+            |i: usize| self.maps[0].spline_at(&view.places[i]).map_or(0, |(first, _)| first);
+        let fill = |i: usize, row: &mut [f64]| {
+            let (terms, nodes) = row.split_at_mut(self.terms);
+            let place = &view.places[i];
+            self.fill_terms(place, terms);
+            for (map, nodes) in self.maps.iter().zip(nodes.chunks_exact_mut(16)) {
+                if let Some((_, values)) = map.spline_at(place) {
+                    nodes.copy_from_slice(&values);
+                }
+            }
         };
-        let response: Vec<f64> = view.response.iter().zip(&view.places).map(&mut of).collect();
-        Some(view.rows(&response)?.score(count, |i, row| self.fill(&view.places[i], row)))
+        Some(rows.reduce_by_spans(self.terms + self.nodes, first, touched, fill))
     }
 
-    pub fn fill(&self, place: &PixelContext, row: &mut [f64]) {
+    fn fill_terms(&self, place: &PixelContext, row: &mut [f64]) {
         let mut rest = row;
         for (basis, gauge) in self.bases.iter().zip(&self.gauges) {
             let (mine, others) = rest.split_at_mut(basis.count());
@@ -95,7 +94,12 @@ impl Columns {
             }
             rest = others;
         }
-        let (first, second) = rest.split_at_mut(self.nodes / 2);
+    }
+
+    pub fn fill(&self, place: &PixelContext, row: &mut [f64]) {
+        let (terms, nodes) = row.split_at_mut(self.terms);
+        self.fill_terms(place, terms);
+        let (first, second) = nodes.split_at_mut(self.nodes / 2);
         self.maps[0].fill(place, first);
         self.maps[1].fill(place, second);
     }
@@ -184,25 +188,16 @@ impl Reduced {
     }
 }
 
-/// The equations by parts of the views.
+/// The equations view by view, and by parts of the views.
 pub struct Joint<'a> {
     pub columns: &'a Columns,
     pub views: Vec<Vec<usize>>,
+    by_view: Vec<Option<Evidence>>,
     parts: Vec<Evidence>,
     pub all: Evidence,
     /// Of either half of the views.
     pub halves: [Evidence; 2],
     pub precision: DVector<f64>,
-}
-
-fn none(n: usize) -> Evidence {
-    Evidence { a: DMatrix::zeros(n, n), b: DVector::zeros(n) }
-}
-
-fn add(mut sum: Evidence, part: &Evidence) -> Evidence {
-    sum.a += &part.a;
-    sum.b += &part.b;
-    sum
 }
 
 impl<'a> Joint<'a> {
@@ -215,24 +210,25 @@ impl<'a> Joint<'a> {
         let folds = FOLDS.min(data.len());
         let views: Vec<Vec<usize>> =
             (0..folds).map(|f| order.iter().skip(f).step_by(folds).copied().collect()).collect();
-        let sums: Vec<(Evidence, [Evidence; 2])> = views
-            .par_iter()
-            .map(|part| {
-                let (mut all, mut halves) = (none(n), [none(n), none(n)]);
-                for &v in part {
-                    if let Some(view) = columns.evidence(&data[v]) {
-                        let half = &mut halves[usize::from(second[v])];
-                        *half = add(std::mem::replace(half, none(0)), &view);
-                        all = add(all, &view);
-                    }
-                }
-                (all, halves)
-            })
-            .collect();
-        let all = sums.iter().fold(none(n), |sum, part| add(sum, &part.0));
-        let halves = [0, 1].map(|h| sums.iter().fold(none(n), |sum, part| add(sum, &part.1[h])));
-        let parts = sums.into_iter().map(|part| part.0).collect();
-        Joint { columns, views, parts, all, halves, precision: columns.usual() }
+        let by_view: Vec<Option<Evidence>> =
+            data.par_iter().map(|view| columns.evidence(view)).collect();
+        let sum = |views: &mut dyn Iterator<Item = usize>| {
+            Evidence::sum(n, 0.0, views.filter_map(|v| by_view[v].as_ref()))
+        };
+        let parts: Vec<Evidence> =
+            views.iter().map(|part| sum(&mut part.iter().copied())).collect();
+        let halves = [false, true].map(|h| sum(&mut (0..data.len()).filter(|v| second[*v] == h)));
+        let all = Evidence::sum(n, 0.0, &parts);
+        Joint { columns, views, by_view, parts, all, halves, precision: columns.usual() }
+    }
+
+    /// What each view of these says beyond a fit, its plane profiled out: the score that is left.
+    pub fn left<'b>(
+        &'b self,
+        views: impl Iterator<Item = usize> + 'b,
+        beta: &'b DVector<f64>,
+    ) -> impl Iterator<Item = DVector<f64>> + 'b {
+        views.filter_map(|v| self.by_view[v].as_ref()).map(move |e| &e.b - &e.a * beta)
     }
 
     /// Fits without each part.

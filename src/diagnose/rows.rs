@@ -128,19 +128,54 @@ impl<'a> Rows<'a> {
         block: impl Fn(usize) -> usize,
         mut columns: impl FnMut(usize, &mut [f64]),
     ) -> Evidence {
-        let n = self.width + 1;
-        let mut a = DMatrix::<f64>::zeros(count, count);
-        let mut cross = DMatrix::<f64>::zeros(n, count);
-        let mut order: Vec<(usize, usize)> = self.used().map(|i| (block(i), i)).collect();
-        order.sort_unstable();
         let mut rows = Vec::new();
-        for members in order.chunk_by(|a, b| a.0 == b.0) {
+        self.sum_blocks(count, block, |_, members, few: &mut Vec<f64>| {
             rows.resize(members.len() * count, 0.0);
             for (&(_, i), row) in members.iter().zip(rows.chunks_exact_mut(count.max(1))) {
                 columns(i, row);
             }
             let touched = touched(&rows, count);
-            let weighted = self.weighted(members, &rows, &touched);
+            let packed = rows.chunks_exact(count.max(1));
+            few.extend(packed.flat_map(|row| touched.iter().map(|&j| row[j])));
+            touched
+        })
+    }
+
+    /// The same where a neighbourhood's columns are known beforehand: `columns` fills these alone.
+    pub fn reduce_by_spans(
+        &self,
+        count: usize,
+        block: impl Fn(usize) -> usize,
+        touched: impl Fn(usize) -> Vec<usize>,
+        mut columns: impl FnMut(usize, &mut [f64]),
+    ) -> Evidence {
+        self.sum_blocks(count, block, |block, members, few: &mut Vec<f64>| {
+            let touched = touched(block);
+            few.resize(members.len() * touched.len(), 0.0);
+            for (&(_, i), row) in members.iter().zip(few.chunks_exact_mut(touched.len().max(1))) {
+                columns(i, row);
+            }
+            touched
+        })
+    }
+
+    /// `rows` appends, sample by sample, the columns of a block that it then names.
+    fn sum_blocks(
+        &self,
+        count: usize,
+        block: impl Fn(usize) -> usize,
+        mut rows: impl FnMut(usize, &[(usize, usize)], &mut Vec<f64>) -> Vec<usize>,
+    ) -> Evidence {
+        let n = self.width + 1;
+        let mut a = DMatrix::<f64>::zeros(count, count);
+        let mut cross = DMatrix::<f64>::zeros(n, count);
+        let mut order: Vec<(usize, usize)> = self.used().map(|i| (block(i), i)).collect();
+        order.sort_unstable();
+        let mut few = Vec::new();
+        for members in order.chunk_by(|a, b| a.0 == b.0) {
+            few.clear();
+            let touched = rows(members[0].0, members, &mut few);
+            let weighted = self.weighted(members, &few, touched.len());
             let squares = &weighted * weighted.transpose();
             for (c, &j) in touched.iter().enumerate() {
                 let column = squares.column(c);
@@ -154,39 +189,17 @@ impl<'a> Rows<'a> {
         self.profiled(&a, &cross)
     }
 
-    /// A column a sample: its touched columns, what is beside, and the response, times the root of
-    /// its weight.
-    fn weighted(
-        &self,
-        members: &[(usize, usize)],
-        rows: &[f64],
-        touched: &[usize],
-    ) -> DMatrix<f64> {
-        let count = rows.len() / members.len();
-        let height = touched.len() + self.width + 1;
+    /// A column a sample: its own `count` columns, what is beside, and the response, times the root
+    /// of its weight.
+    fn weighted(&self, members: &[(usize, usize)], rows: &[f64], count: usize) -> DMatrix<f64> {
+        let height = count + self.width + 1;
         let mut all = Vec::with_capacity(members.len() * height);
         for (n, &(_, i)) in members.iter().enumerate() {
             let root = self.weight[i].sqrt();
-            let row = &rows[n * count..][..count];
-            all.extend(touched.iter().map(|&j| root * row[j]));
+            all.extend(rows[n * count..][..count].iter().map(|x| root * x));
             all.extend(self.sample(i).iter().map(|x| root * x));
         }
         DMatrix::from_vec(height, members.len(), all)
-    }
-
-    /// Score of columns alone, the nuisances profiled out: no other term may stand beside.
-    pub fn score(&self, count: usize, mut columns: impl FnMut(usize, &mut [f64])) -> DVector<f64> {
-        let own = &self.inverse * &self.seen;
-        let mut sum = DVector::zeros(count);
-        let mut g = vec![0.0; count];
-        for i in self.used() {
-            columns(i, &mut g);
-            let (row, y) = self.sample(i).split_at(self.width);
-            let fitted: f64 = row.iter().zip(own.iter()).map(|(x, b)| x * b).sum();
-            let left = self.weight[i] * (y[0] - fitted);
-            sum.iter_mut().zip(&g).for_each(|(s, g)| *s += left * g);
-        }
-        sum
     }
 
     /// Information and score of the chosen terms and a candidate together, `cross` being the

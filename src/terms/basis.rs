@@ -138,15 +138,11 @@ impl Basis {
                 let (j, t) = node(p.v, 0.0, height - 1.0, down);
                 bilinear((i, s), (j, t), across, times.value(p), out);
             }
-            Basis::Spline { width, height, across, down, times } => {
+            Basis::Spline { across, .. } => {
                 out.fill(0.0);
-                let scale = times.value(p);
-                let (i, of_columns) = cubic(p.u, width - 1.0, across);
-                let (j, of_rows) = cubic(p.v, height - 1.0, down);
-                for (row, b) in of_rows.iter().enumerate() {
-                    let first = (j + row) * across + i;
-                    for (g, a) in out[first..first + 4].iter_mut().zip(of_columns) {
-                        *g = scale * a * b;
+                if let Some((first, values)) = self.spline_at(p) {
+                    for (row, values) in values.chunks_exact(4).enumerate() {
+                        out[first + row * across..][..4].copy_from_slice(values);
                     }
                 }
             }
@@ -160,6 +156,17 @@ impl Basis {
                 bilinear((i, s), (j, t), nodes[0], 1.0, out);
             }
         }
+    }
+
+    /// Of a map of splines: the first of the 4 x 4 columns that are not zero at a place, and their
+    /// values, row by row.
+    pub fn spline_at(&self, p: &PixelContext) -> Option<(usize, [f64; 16])> {
+        let Basis::Spline { width, height, across, down, times } = *self else { return None };
+        let scale = times.value(p);
+        let (i, of_columns) = cubic(p.u, width - 1.0, across);
+        let (j, of_rows) = cubic(p.v, height - 1.0, down);
+        let value = |k: usize| scale * of_columns[k % 4] * of_rows[k / 4];
+        Some((j * across + i, std::array::from_fn(value)))
     }
 
     /// Value of the term at a place.

@@ -22,13 +22,35 @@ pub(super) fn powers(scale: f64, base: f64, level: bool, out: &mut [f64]) {
 /// Sine and cosine of a phase and of its multiples. A patch sees the mean over what it spans of the
 /// coordinate.
 pub(super) fn waves(over: Coordinate, period: f64, scale: f64, p: &PixelContext, out: &mut [f64]) {
-    let (s, c) = (TAU * (over.value(p) / period)).sin_cos();
-    let (mut sk, mut ck) = (s, c);
-    for (k, pair) in out.chunks_exact_mut(2).enumerate() {
-        let size = scale * seen(over, (k + 1) as f64, period, p);
-        pair[0] = size * sk;
-        pair[1] = size * ck;
-        (sk, ck) = (sk * c + ck * s, ck * c - sk * s);
+    let first = Turn::by(over.value(p) / period);
+    let mut turn = first;
+    let mut seen = seen(over, period, p);
+    for pair in out.chunks_exact_mut(2) {
+        let size = scale * seen();
+        pair[0] = size * turn.sine;
+        pair[1] = size * turn.cosine;
+        turn = turn.and(first);
+    }
+}
+
+/// Sine and cosine of an angle; those of its multiples follow.
+#[derive(Clone, Copy)]
+struct Turn {
+    sine: f64,
+    cosine: f64,
+}
+
+impl Turn {
+    fn by(cycles: f64) -> Self {
+        let (sine, cosine) = (TAU * cycles).sin_cos();
+        Turn { sine, cosine }
+    }
+
+    fn and(self, other: Self) -> Self {
+        Turn {
+            sine: self.sine * other.cosine + self.cosine * other.sine,
+            cosine: self.cosine * other.cosine - self.sine * other.sine,
+        }
     }
 }
 
@@ -37,20 +59,35 @@ pub(super) fn waves(over: Coordinate, period: f64, scale: f64, p: &PixelContext,
 /// it.
 const STRIPE_PX: f64 = 0.2;
 
-fn seen(over: Coordinate, order: f64, period: f64, p: &PixelContext) -> f64 {
-    match over {
-        Coordinate::Column | Coordinate::Row => STRIPE_PX / order * sinc(order * p.side / period),
-        Coordinate::Disparity => {
-            let frequency = order / period;
-            sinc(frequency * p.slope[0] * p.side) * sinc(frequency * p.slope[1] * p.side)
-        }
-        _ => 1.0,
+/// What is left of a wave and, call by call, of its harmonics.
+fn seen(over: Coordinate, period: f64, p: &PixelContext) -> impl FnMut() -> f64 {
+    let spans = match over {
+        Coordinate::Column | Coordinate::Row => [p.side, 0.0],
+        Coordinate::Disparity => p.slope.map(|slope| slope * p.side),
+        _ => [0.0; 2],
+    };
+    let stripes = matches!(over, Coordinate::Column | Coordinate::Row);
+    let mut means = spans.map(|span| sincs(span / period));
+    let mut order = 0.0;
+    move || {
+        order += 1.0;
+        let unit = if stripes { STRIPE_PX / order } else { 1.0 };
+        means.iter_mut().fold(unit, |size, mean| size * mean())
     }
 }
 
-fn sinc(cycles: f64) -> f64 {
+/// sin(k x) / (k x) of x = pi `cycles`, for k = 1, 2 and on.
+fn sincs(cycles: f64) -> impl FnMut() -> f64 {
+    const NOTHING: f64 = 1e-6;
     let x = PI * cycles;
-    if x.abs() < 1e-6 { 1.0 } else { x.sin() / x }
+    let first = if x.abs() < NOTHING { Turn::by(0.0) } else { Turn::by(0.5 * cycles) };
+    let (mut turn, mut order) = (first, 0.0);
+    move || {
+        order += 1.0;
+        let mean = if x.abs() < NOTHING { 1.0 } else { turn.sine / (order * x) };
+        turn = turn.and(first);
+        mean
+    }
 }
 
 /// Take out of the nodes' weights what a straight line over the nodes is: a surface that is moved
@@ -66,5 +103,54 @@ pub(super) fn without_line(weights: &mut [f64]) {
     }
     for (k, w) in weights.iter_mut().enumerate() {
         *w -= sum / n + moment / squares * (k as f64 - middle);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a patch sees of a wave and its harmonics, against the mean over its pixels; what stands
+    /// still in it is seen whole.
+    #[test]
+    fn a_patch_sees_the_mean_over_what_it_spans() {
+        const STEPS: usize = 2000;
+        for (over, side, slope, period) in [
+            (Coordinate::Column, 4.0, [0.0; 2], 37.0),
+            (Coordinate::Row, 8.0, [0.0; 2], 9.0),
+            (Coordinate::Disparity, 4.0, [0.07, -0.02], 1.0),
+            (Coordinate::Disparity, 4.0, [0.0; 2], 1.0),
+        ] {
+            let place = PixelContext {
+                u: 51.0,
+                v: 23.0,
+                disparity: 17.3,
+                slope,
+                side,
+                ..Default::default()
+            };
+            let mut seen = [0.0; 6];
+            waves(over, period, 1.0, &place, &mut seen);
+            let mut means = [0.0; 6];
+            let along = |k: usize| ((k as f64 + 0.5) / STEPS as f64 - 0.5) * side;
+            for (k, l) in (0..STEPS).flat_map(|k| (0..STEPS / 40).map(move |l| (k, 40 * l + 20))) {
+                let (du, dv) = (along(k), along(l));
+                let moved = slope[0] * du + slope[1] * dv;
+                let point = PixelContext {
+                    u: place.u + du,
+                    v: place.v + dv,
+                    disparity: place.disparity + moved,
+                    side: 0.0,
+                    ..place
+                };
+                let mut row = [0.0; 6];
+                waves(over, period, 1.0, &point, &mut row);
+                let share = 1.0 / (STEPS * (STEPS / 40)) as f64;
+                means.iter_mut().zip(row).for_each(|(m, r)| *m += share * r);
+            }
+            for (seen, mean) in seen.iter().zip(means) {
+                assert!((seen - mean).abs() < 2e-4, "{over:?}: {seen} {mean}");
+            }
+        }
     }
 }
