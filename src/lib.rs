@@ -103,6 +103,7 @@
 //! ```
 //! use kinoise::evaluate::{Delta, evaluate};
 //! use kinoise::map::{Options, map};
+//! use kinoise::simulate::Physics;
 //! use kinoise::simulate::room::{Film, Room, around_the_desks};
 //! use kinoise::{NoiseModel, Seed, SigmaModel, io, sequence};
 //!
@@ -112,8 +113,7 @@
 //!     sensor: Film::kinect(4),
 //!     room: Room::office(Seed(1)),
 //!     poses: around_the_desks().into_iter().take(15).collect(),
-//!     sigma: SigmaModel::paper(),
-//!     effects: Vec::new(),
+//!     physics: Physics::Formula { sigma: SigmaModel::paper(), effects: Vec::new() },
 //!     seed: Seed(1),
 //! };
 //! film.write(folder.path(), &|_, _| ())?;

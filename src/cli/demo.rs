@@ -185,8 +185,7 @@ fn mapped(
             sensor: recording.sensor.clone(),
             room: Room::office(seed),
             poses: around_the_desks().into_iter().take(FRAMES).collect(),
-            sigma: SigmaModel::paper(),
-            effects: Vec::new(),
+            physics: Physics::Formula { sigma: SigmaModel::paper(), effects: Vec::new() },
             seed,
         };
         let out = own(&folder)?;

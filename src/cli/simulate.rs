@@ -16,14 +16,15 @@ use serde_json::{Value, json};
 use super::common::{Global, Input, MAX_FRAMES, count, model_again};
 use super::console::{beside, detail, detail_model, next_step, notes, result, say, working};
 use super::output::begin;
-use super::simulate_room::RoomArguments;
-use super::simulate_scene::{PosesArguments, SceneryArguments};
+use super::simulate_room::{RoomArguments, refuse_of_target};
+use super::simulate_scene::{PosesArguments, SceneryArguments, note_idle};
 
 pub const EXAMPLES: &str = "\
 Examples:
   kinoise simulate out/bowl --effect radial-disparity-bias:k_px=0.3 --frames 4 --shrink 2
   kinoise simulate out/twin -m out/kinect/model.json --like recording
-  kinoise simulate out/room --room --frames 90";
+  kinoise simulate out/room --room --frames 90
+  kinoise simulate out/film --room --physics speckle --cause lens_k1=0.05 --frames 40 --shrink 2";
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -97,16 +98,18 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let (sensor, sigma, mut effects) = sensor_and_noise(model, arguments.shrink, given)?;
     effects.extend(given.iter().cloned());
     Active::refuse_twice(&effects)?;
+    let physics = physics(arguments, sigma, effects)?;
     let (made, recipe) = if arguments.room.room {
         // A model brings its own sensor; without one it is what TUM readers assume.
         let tum = || Film::kinect(arguments.shrink.unwrap_or(1));
         let sensor = if arguments.model.is_some() { sensor } else { tum() };
         let room = Room::office(global.seed());
         let poses = arguments.room.path(&room, arguments.frames)?;
-        let film = Film { sensor, room, poses, sigma, effects, seed: global.seed() };
+        refuse_of_target(&physics)?;
+        let film = Film { sensor, room, poses, physics, seed: global.seed() };
         write_film(&film, arguments.folder(global)?)?
     } else {
-        shoot(arguments, sensor, physics(arguments, sigma, effects)?, global)?
+        shoot(arguments, sensor, physics, global)?
     };
     if let Some(path) = &arguments.recipe {
         write_json(path, &recipe, "report this as a bug")?;
@@ -278,24 +281,6 @@ fn note_clamped(views: &[ViewPlan], sigma: &SigmaModel) {
             "note: {count} of {all} views {} outside the model's range (z {near:.2} to {far:.2} m, tilt up to {tilt:.1} degrees); sigma is held at its edge there",
             verb(count, "lies", "lie")
         ));
-    }
-}
-
-/// Effects that have nothing to act on in this scene.
-fn note_idle(effects: &[Active], scenery: &SceneryArguments, like: bool) {
-    for active in effects {
-        let missing = match active.effect.card().id {
-            "occlusion-shadow" | "edge-mixing" if scenery.wall.is_none() => {
-                ("something behind the target", "--wall")
-            }
-            "intensity-dependent-noise" if !scenery.patches => {
-                ("a target of several greys", "--patches")
-            }
-            _ => continue,
-        };
-        let (missing, option) = missing;
-        let how = if like { "views taken --like others have none" } else { option };
-        say(format!("note: {} needs {missing} to show much ({how})", active.effect.card().id));
     }
 }
 

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::bail;
 use clap::Args;
+use kinoise::simulate::Physics;
 use kinoise::simulate::room::{
     CLEARANCE_M, Pose, Resampled, Room, around_the_desks, place, read_trajectory, resample,
 };
@@ -14,7 +16,7 @@ use super::console::say;
 #[derive(Debug, Args)]
 pub struct RoomArguments {
     /// Film an office with two desks: a TUM-layout sequence with colour, depth and ground truth
-    #[arg(long, conflicts_with_all = ["like", "grid", "distances", "tilts", "azimuths", "ordered", "board", "wall_target", "patches", "wall", "clutter", "reference_error", "conditions", "infrared", "physics", "causes"])]
+    #[arg(long, conflicts_with_all = ["like", "grid", "distances", "tilts", "azimuths", "ordered", "board", "wall_target", "patches", "wall", "clutter", "reference_error", "conditions", "infrared"])]
     pub room: bool,
     /// Poses to film along: timestamp tx ty tz qx qy qz qw, z up [default: once around the desks]
     #[arg(long, value_name = "POSES", requires = "room")]
@@ -65,4 +67,16 @@ fn fitted(
         "note: the path was placed by a turn of {turn:.0} degrees and a shift of ({x:.2}, {y:.2}, {z:.2}) m; it keeps {clearance:.2} m away from everything ({CLEARANCE_M} m are needed)"
     ));
     Ok(placed.apply(&poses))
+}
+
+/// A room has no target that could be bent or move.
+pub fn refuse_of_target(physics: &Physics) -> anyhow::Result<()> {
+    let Physics::Speckle { causes } = physics else { return Ok(()) };
+    let of_target = [("bow_m", causes.bow_m), ("motion_mps", causes.motion_mps)];
+    match of_target.into_iter().find(|(_, value)| *value != 0.0) {
+        Some((name, _)) => {
+            bail!("--cause {name}: a room has no target; leave it out, or leave --room out")
+        }
+        None => Ok(()),
+    }
 }

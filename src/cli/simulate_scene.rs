@@ -2,10 +2,12 @@
 
 use anyhow::ensure;
 use clap::Args;
+use kinoise::effects::Active;
 use kinoise::scene::{Board, PATCH_SIDE_M, Print, Target, WHITE};
 use kinoise::simulate::{Grid, GridView, Scenery};
 
 use super::common::{between, count, numbers, one_of};
+use super::console::say;
 
 #[derive(Debug, Args)]
 pub struct PosesArguments {
@@ -95,5 +97,23 @@ impl SceneryArguments {
             reference_error_m: self.reference_error,
             conditions: self.conditions,
         }
+    }
+}
+
+/// Effects that have nothing to act on in this scene.
+pub fn note_idle(effects: &[Active], scenery: &SceneryArguments, like: bool) {
+    for active in effects {
+        let missing = match active.effect.card().id {
+            "occlusion-shadow" | "edge-mixing" if scenery.wall.is_none() => {
+                ("something behind the target", "--wall")
+            }
+            "intensity-dependent-noise" if !scenery.patches => {
+                ("a target of several greys", "--patches")
+            }
+            _ => continue,
+        };
+        let (missing, option) = missing;
+        let how = if like { "views taken --like others have none" } else { option };
+        say(format!("note: {} needs {missing} to show much ({how})", active.effect.card().id));
     }
 }

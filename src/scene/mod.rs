@@ -13,10 +13,18 @@ use rayon::prelude::*;
 use crate::camera::{Camera, Rays};
 use crate::plane::Plane;
 
+/// The nearest surface along a direction from a place that is settled.
+pub type RaysFrom<'a> = Box<dyn Fn(&Vector3<f64>) -> Option<Hit> + 'a>;
+
 /// Surfaces that light can meet.
 pub trait World: Sync {
     /// The nearest surface along `origin + t * direction`, t > 0 (t in units of `direction`).
     fn cast(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Hit>;
+
+    /// The same for many rays from one place.
+    fn from<'a>(&'a self, origin: Vector3<f64>) -> RaysFrom<'a> {
+        Box::new(move |direction| self.cast(&origin, direction))
+    }
 
     /// The surfaces [`Hit::surface`] numbers.
     fn surfaces(&self) -> Vec<Surface>;

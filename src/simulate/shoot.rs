@@ -35,12 +35,17 @@ pub enum Physics {
 
 impl Physics {
     /// For a recipe.
-    pub(super) fn describe_formula(sigma: &SigmaModel, effects: &[Active]) -> serde_json::Value {
-        serde_json::json!({
-            "world": "formula",
-            "sigma": {"form": sigma.form.id(), "parameters": sigma.parameters},
-            "effects": effects.iter().map(Active::described).collect::<Vec<_>>(),
-        })
+    pub(super) fn described(&self) -> serde_json::Value {
+        match self {
+            Physics::Formula { sigma, effects } => serde_json::json!({
+                "world": "formula",
+                "sigma": {"form": sigma.form.id(), "parameters": sigma.parameters},
+                "effects": effects.iter().map(Active::described).collect::<Vec<_>>(),
+            }),
+            Physics::Speckle { causes } => {
+                serde_json::json!({"world": "speckle", "causes": causes.values()})
+            }
+        }
     }
 }
 
@@ -116,12 +121,6 @@ impl Shoot {
 
     /// What was switched on, for a file of its own.
     pub fn recipe(&self) -> serde_json::Value {
-        let physics = match &self.physics {
-            Physics::Formula { sigma, effects } => Physics::describe_formula(sigma, effects),
-            Physics::Speckle { causes } => {
-                serde_json::json!({"world": "speckle", "causes": causes.values()})
-            }
-        };
         let view = |v: &ViewPlan| {
             let q = v.bench.plane.q;
             serde_json::json!({"name": v.name, "plane": [q.x, q.y, q.z]})
@@ -129,7 +128,7 @@ impl Shoot {
         serde_json::json!({
             "format": "kinoise-recipe/1",
             "seed": self.seed.0,
-            "physics": physics,
+            "physics": self.physics.described(),
             "views": self.views.iter().map(view).collect::<Vec<_>>(),
         })
     }

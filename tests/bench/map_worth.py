@@ -4,13 +4,13 @@
 films: real sequences with ground truth. `calibrate` and `diagnose` learn from a recording; every film is
     mapped raw with equal weights, with Eq. 1 and with the calibrated sigma, and without the biases found
     with Eq. 1 and with the calibrated sigma.
-seeds: for each --effect (several of one sensor: joined by +) a simulated sensor a seed. It takes views of
-    a wall, from which `calibrate` fits sigma alone and `diagnose` extends the model with the causes it
+seeds: for each --effect, and in the world of light for each --cause (several of one sensor: joined by +;
+    "none" for a sensor as it is), a simulated sensor a seed. It takes views of a wall, from which `calibrate` fits sigma alone and `diagnose` extends the model with the causes it
     finds. The same sensor films the office, and the film is mapped with both. Tells how often the
     extended model is the worse one.
 
     map_worth.py [--kinoise BIN] --csv FILE films --recording DIR FILM...
-    map_worth.py [--kinoise BIN] --csv FILE seeds [--seeds N] [--effect ID:KEY=VALUE]... [--frames N] [--shrink N]
+    map_worth.py [--kinoise BIN] --csv FILE seeds [--seeds N] [--effect ID:KEY=VALUE]... [--cause NAME=VALUE]... [--frames N] [--shrink N]
 """
 import argparse, csv, json, pathlib, subprocess, sys, tempfile
 
@@ -35,6 +35,7 @@ def arguments():
     seeds = kinds.add_parser("seeds")
     seeds.add_argument("--seeds", type=int, default=10)
     seeds.add_argument("--effect", action="append", default=[])
+    seeds.add_argument("--cause", action="append", default=[])
     seeds.add_argument("--frames", type=int, default=40, help="of the film")
     seeds.add_argument("--shrink", type=int, default=2, help="of 640 x 480 px")
     return p.parse_args()
@@ -96,23 +97,28 @@ def with_eq_1(model):
 
 def seeds(_, a, at):
     yield "effect", "seed", *(f"{kind}_{e}" for kind in ("bare", "extended") for e in ERRORS), "found"
-    for effect in a.effect or ["radial-disparity-bias:k_px=0.3"]:
-        yield from sensors(a, at, effect)
+    for effect in a.effect or ([] if a.cause else ["radial-disparity-bias:k_px=0.3"]):
+        yield from sensors(a, at, effect, [word for part in effect.split("+") for word in ("--effect", part)])
+    for cause in a.cause:
+        parts = [] if cause == "none" else cause.split("+")
+        world = ["--physics", "speckle", *(word for part in parts for word in ("--cause", part))]
+        yield from sensors(a, at, f"light: {cause}", world)
 
 
-def sensors(a, at, effect):
+def sensors(a, at, name, world):
     worse = [0, 0]
-    common = ["--shrink", a.shrink, *(word for part in effect.split("+") for word in ("--effect", part))]
     for seed in range(1, a.seeds + 1):
-        kinoise, here = Kinoise(a.kinoise, seed), at / f"{effect}-{seed}"
+        kinoise, here = Kinoise(a.kinoise, seed), at / f"{name}-{seed}"
         kinoise("simulate", here / "wall", "--wall-target", "--distances", DISTANCES, "--tilts", TILTS,
-                "--azimuths", "0", "--frames", 2, "--reference-error", REFERENCE_ERROR_M, *common)
-        kinoise("simulate", here / "film", "--room", "--frames", a.frames, *common)
-        *models, found = kinoise.learn(here / "wall", here)
-        before, after = (kinoise.errors(here / "film", "-m", model) for model in models)
+                "--azimuths", "0", "--frames", 2, "--reference-error", REFERENCE_ERROR_M, "--shrink", a.shrink, *world)
+        bare, extended, found = kinoise.learn(here / "wall", here)
+        # By light a model brings its sensor alone; by formula it would bring its sigma too.
+        sensor = ["-m", bare] if "--physics" in world else ["--shrink", a.shrink]
+        kinoise("simulate", here / "film", "--room", "--frames", a.frames, *sensor, *world)
+        before, after = (kinoise.errors(here / "film", "-m", model) for model in (bare, extended))
         worse = [n + (float(b) < float(e)) for n, b, e in zip(worse, before, after)]
-        yield effect, seed, *before, *after, found
-    print(f"{effect}: the extended model is worse in {worse[0]} of {a.seeds} seeds by ATE, in {worse[1]} by RPE")
+        yield name, seed, *before, *after, found
+    print(f"{name}: the extended model is worse in {worse[0]} of {a.seeds} seeds by ATE, in {worse[1]} by RPE")
 
 
 def main():

@@ -7,6 +7,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use kinoise::io::Assumed;
 use kinoise::map::{Init, Method, Options, Weights, map};
 use kinoise::sequence::open;
+use kinoise::simulate::Physics;
 use kinoise::simulate::room::{Film, Room, around_the_desks};
 use kinoise::{NoiseModel, Seed, SigmaModel};
 
@@ -17,8 +18,7 @@ fn frames(c: &mut Criterion) {
         sensor: Film::kinect(1),
         room: Room::office(Seed(1)),
         poses: around_the_desks().into_iter().take(FRAMES).collect(),
-        sigma: SigmaModel::paper(),
-        effects: Vec::new(),
+        physics: Physics::Formula { sigma: SigmaModel::paper(), effects: Vec::new() },
         seed: Seed(1),
     };
     let folder = tempfile::tempdir().unwrap();

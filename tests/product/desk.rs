@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 use std::time::Duration;
 
+use kinoise::simulate::Physics;
 use kinoise::simulate::room::{Film, Room, around_the_desks};
 use kinoise::{NoiseModel, Seed, SigmaModel};
 use serde_json::Value;
@@ -99,8 +100,7 @@ impl Desk {
             sensor: Film::kinect(4),
             room: Room::office(Seed(1)),
             poses: around_the_desks().into_iter().take(frames).collect(),
-            sigma: SigmaModel::paper(),
-            effects: Vec::new(),
+            physics: Physics::Formula { sigma: SigmaModel::paper(), effects: Vec::new() },
             seed: Seed(1),
         };
         film.write(&self.at(name), &|_, _| ()).expect("written");

@@ -9,8 +9,8 @@ use kinoise::io::Assumed;
 use kinoise::map::{Options, map};
 use kinoise::model::Effect;
 use kinoise::sequence::{Sequence, open};
-use kinoise::simulate::kinect_v1;
 use kinoise::simulate::room::{Film, Room, around_the_desks};
+use kinoise::simulate::{Physics, kinect_v1};
 use kinoise::{NoiseModel, Seed, SigmaModel};
 
 use crate::common::kinoise;
@@ -50,8 +50,10 @@ fn office(root: &Path, seed: u64) -> Sequence {
         sensor: kinect_v1(2),
         room: Room::office(Seed(seed)),
         poses: around_the_desks().into_iter().take(24).collect(),
-        sigma: SigmaModel::paper(),
-        effects: Active::all_of_model(&[bowl]).unwrap(),
+        physics: Physics::Formula {
+            sigma: SigmaModel::paper(),
+            effects: Active::all_of_model(&[bowl]).unwrap(),
+        },
         seed: Seed(seed),
     };
     let folder = root.join("office");

@@ -8,6 +8,7 @@ use kinoise::evaluate::{Delta, evaluate};
 use kinoise::io::Assumed;
 use kinoise::map::{Init, Mapped, Method, Options, Weights, map};
 use kinoise::sequence::{Sequence, open};
+use kinoise::simulate::Physics;
 use kinoise::simulate::room::{Film, Pose, Room, around_the_desks};
 use kinoise::{NoiseModel, Seed, SigmaModel};
 use nalgebra::Isometry3;
@@ -18,8 +19,7 @@ pub fn film(root: &Path, poses: Vec<Pose>) -> PathBuf {
         sensor: Film::kinect(4),
         room: Room::office(Seed(1)),
         poses,
-        sigma: SigmaModel::paper(),
-        effects: Vec::new(),
+        physics: Physics::Formula { sigma: SigmaModel::paper(), effects: Vec::new() },
         seed: Seed(7),
     };
     let folder = root.join("film");

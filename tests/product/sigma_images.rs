@@ -5,6 +5,7 @@ use std::path::Path;
 use kinoise::correct::{Conditions, Correction, SIGMA_UNITS_PER_METRE};
 use kinoise::io::{Assumed, FrameSource};
 use kinoise::model::{Effect, UNEXPLAINED};
+use kinoise::simulate::Physics;
 use kinoise::simulate::room::{Film, Room, around_the_desks};
 use kinoise::terms::{Basis, Coordinate, Modulation, Term};
 use kinoise::{NoiseModel, Seed, SigmaModel, sequence};
@@ -18,8 +19,7 @@ fn film(folder: &Path) {
         sensor: Film::kinect(4),
         room: Room::office(Seed(1)),
         poses: around_the_desks().into_iter().take(3).collect(),
-        sigma: SigmaModel::paper(),
-        effects: Vec::new(),
+        physics: Physics::Formula { sigma: SigmaModel::paper(), effects: Vec::new() },
         seed: Seed(1),
     };
     film.write(folder, &|_, _| ()).expect("written");

@@ -1,10 +1,10 @@
 //! A room of bodies, and how rays from one point meet them.
 
-use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Translation3, Vector3};
 
 use super::shape::{Intersection, Shape};
 use super::texture::{Material, Texture};
-use crate::scene::{Hit, Surface, World};
+use crate::scene::{Hit, RaysFrom, Surface, World};
 
 /// A shape somewhere in the room, with the material of each of its faces.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,32 +33,77 @@ impl Room {
         all.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0))
     }
 
+    /// A surface for each face: none is the calibration target, and a tilt lasts for one pose only.
+    pub fn surfaces(&self) -> Vec<Surface> {
+        let any = Surface { is_target: false, theta_rad: None };
+        vec![any; self.bodies.len() * Shape::FACES]
+    }
+
     pub fn posed(&self, room_from_camera: &Isometry3<f64>) -> impl Iterator<Item = PosedBody<'_>> {
         let pose = *room_from_camera;
         self.bodies.iter().enumerate().map(move |(i, body)| PosedBody::new(i, body, &pose))
     }
 }
 
-impl World for Room {
+/// A room as a world in the frame of a camera that stands somewhere in it.
+pub struct PosedRoom<'a> {
+    pub room: &'a Room,
+    pub room_from_camera: Isometry3<f64>,
+}
+
+impl PosedRoom<'_> {
+    /// The bodies about a point of the camera's frame, directions in that frame.
+    fn about(&self, origin: &Vector3<f64>) -> Vec<PosedBody<'_>> {
+        self.room.posed(&(self.room_from_camera * Translation3::from(*origin))).collect()
+    }
+}
+
+impl World for PosedRoom<'_> {
     fn cast(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Hit> {
-        let pose = Isometry3::from_parts(Translation3::from(*origin), UnitQuaternion::identity());
-        let hit = |posed: PosedBody<'_>| {
-            let Intersection { t, face } = posed.intersect(direction)?;
-            Some(Hit {
-                t,
-                normal: posed.normal(&posed.point(direction, t), face),
-                surface: posed.surface(face),
-                albedo: f64::from(posed.body.materials[face].albedo),
-            })
-        };
-        self.posed(&pose).filter_map(hit).min_by(|a, b| a.t.total_cmp(&b.t))
+        nearest(&self.about(origin), direction)
     }
 
-    /// None is the calibration target, and a tilt lasts for one pose only.
-    fn surfaces(&self) -> Vec<Surface> {
-        let any = Surface { is_target: false, theta_rad: None };
-        vec![any; self.bodies.len() * Shape::FACES]
+    fn from<'a>(&'a self, origin: Vector3<f64>) -> RaysFrom<'a> {
+        let bodies = self.about(&origin);
+        Box::new(move |direction| nearest(&bodies, direction))
     }
+
+    fn surfaces(&self) -> Vec<Surface> {
+        self.room.surfaces()
+    }
+}
+
+/// The first surface that a ray meets.
+fn nearest(bodies: &[PosedBody<'_>], direction: &Vector3<f64>) -> Option<Hit> {
+    let (posed, Intersection { t, face }) = first_met(bodies, direction)?;
+    Some(Hit {
+        t,
+        normal: posed.normal(&posed.point(direction, t), face),
+        surface: posed.surface(face),
+        albedo: f64::from(posed.body.materials[face].albedo),
+    })
+}
+
+/// The body that a ray meets first, and where; soonest found where the nearest come first.
+#[inline]
+pub fn first_met<'a, 'b: 'a>(
+    bodies: impl IntoIterator<Item = &'a PosedBody<'b>>,
+    direction: &Vector3<f64>,
+) -> Option<(&'a PosedBody<'b>, Intersection)> {
+    let length = direction.norm();
+    let mut best: Option<(&PosedBody<'b>, Intersection)> = None;
+    for body in bodies {
+        let reached = best.map_or(f64::INFINITY, |(_, at)| at.t);
+        if body.nearest > reached * length {
+            continue;
+        }
+        if let Some(at) = body.intersect(direction)
+            && at.t < reached
+        {
+            best = Some((body, at));
+        }
+    }
+    best
 }
 
 /// A body as a camera's rays meet it: all from one point, directions in the camera's frame.

@@ -6,7 +6,8 @@
 //!
 //! ```text
 //! TUM file -trajectory-> samples -resample-> poses -place-> poses in the Room
-//!                                    Room + pose -render-> Picture -FormulaSensor-> depth words
+//!                   Room + pose -render-> colours and true depth -FormulaSensor-> depth words
+//!                               -dots, lens, chip and matcher of a SpeckleSensor-> depth words
 //! ```
 
 mod body;
@@ -15,37 +16,33 @@ mod office;
 mod path;
 mod render;
 mod shape;
+mod shutter;
 mod texture;
 mod textures;
 
 pub use crate::trajectory::{Pose, Trajectory, read_trajectory};
-pub use body::{Body, Room};
+pub use body::{Body, PosedRoom, Room};
 pub use office::{CEILING_M, FLOOR_M};
 pub use path::{
     CLEARANCE_M, Gap, Placement, Resampled, around_the_desks, looking, place, resample,
 };
 pub use render::{Picture, RoomCamera};
 pub use shape::{Intersection, Shape};
+pub use shutter::Shutter;
 pub use texture::{Mapping, Material, Texture};
 
-use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
 use rayon::prelude::*;
 
 use crate::Progress;
-use crate::camera::Rays;
-use crate::effects::{Acting, Active, Instant};
 use crate::error::{Error, Result};
-use crate::frame::{DepthCode, Frame};
+use crate::frame::DepthCode;
 use crate::io::{
     encode_png16_quickly, encode_rgb, refuse_full, write_atomic, write_recording_file,
 };
-use crate::model::{SigmaLookup, SigmaModel};
 use crate::rng::Seed;
-use crate::scene::Seen;
-use crate::simulate::formula::FormulaSensor;
 use crate::simulate::kinect_v1;
 use crate::simulate::shoot::Physics;
 use crate::view::Sensor;
@@ -57,14 +54,9 @@ pub struct Film {
     pub room: Room,
     /// In the room's frame, in time order.
     pub poses: Vec<Pose>,
-    pub sigma: SigmaModel,
-    /// In light-path order.
-    pub effects: Vec<Active>,
+    pub physics: Physics,
     pub seed: Seed,
 }
-
-/// What an effect keeps from frame to frame.
-type Memory = HashMap<&'static str, Vec<f32>>;
 
 /// Frames in hand a thread: the slowest of one round keeps the others waiting half as long.
 const FRAMES_A_THREAD: usize = 2;
@@ -92,16 +84,12 @@ impl Film {
         }
         let sensor = Sensor { code: Self::CODE, ..self.sensor.clone() };
         let rays = sensor.camera.rays();
-        let shutter = Shutter::new(self, &sensor, &rays);
-        let mut memory = Memory::new();
+        let mut shutter = Shutter::new(self, &sensor, &rays);
         let block = FRAMES_A_THREAD * rayon::current_num_threads();
         for (k, poses) in self.poses.chunks(block).enumerate() {
             let first = k * block;
-            let pictures: Vec<Picture> =
-                poses.par_iter().map(|p| shutter.camera.take(&p.world_from_camera)).collect();
-            let depths = shutter.expose(&pictures, first, &mut memory);
-            let files = pictures.par_iter().zip(&depths).zip(poses);
-            files.try_for_each(|((picture, depth), pose)| {
+            let shots = shutter.shoot(first..first + poses.len());
+            shots.par_iter().zip(poses).try_for_each(|((picture, depth), pose)| {
                 let Picture { seen, rgb } = picture;
                 let (name, colour) = (file_name(pose), encode_rgb(seen.width, seen.height, rgb)?);
                 write_atomic(&root.join("rgb").join(&name), &colour)?;
@@ -117,7 +105,7 @@ impl Film {
         serde_json::json!({
             "format": "kinoise-recipe/1",
             "seed": self.seed.0,
-            "physics": Physics::describe_formula(&self.sigma, &self.effects),
+            "physics": self.physics.described(),
             "room": {"scene": "office", "frames": self.poses.len()},
         })
     }
@@ -153,61 +141,4 @@ const TUM_FOCAL_PX: f64 = 525.0;
 fn file_name(pose: &Pose) -> String {
     // As wide as a stamp of this century: names sort as the times do.
     format!("{:017.6}.png", pose.stamp)
-}
-
-/// The film's camera, ready to take any frame.
-pub struct Shutter<'a> {
-    film: &'a Film,
-    camera: RoomCamera<'a>,
-    depth: FormulaSensor<'a>,
-    sigma: SigmaLookup,
-}
-
-impl<'a> Shutter<'a> {
-    /// `sensor` and `rays` are those of one camera; its code is that of the words.
-    pub fn new(film: &'a Film, sensor: &'a Sensor, rays: &'a Rays) -> Self {
-        let Film { sigma, effects, seed, .. } = film;
-        Shutter {
-            film,
-            camera: RoomCamera::new(&film.room, &sensor.camera, rays),
-            depth: FormulaSensor { sensor, rays, sigma, effects, seed: *seed },
-            sigma: SigmaLookup::of(sigma),
-        }
-    }
-
-    /// One frame on its own, on one thread: effects remember nothing before it.
-    pub fn shoot(&self, frame: usize) -> (Picture, Frame) {
-        let picture = self.camera.take(&self.film.poses[frame].world_from_camera);
-        let depth = self.expose_one(&picture, frame, &mut Memory::new());
-        (picture, depth)
-    }
-
-    /// Depth of consecutive frames. Effects of the catalogue may remember: then frames go in order.
-    fn expose(&self, pictures: &[Picture], first: usize, memory: &mut Memory) -> Vec<Frame> {
-        if self.film.effects.iter().all(|a| matches!(a.effect, Acting::Shape(_))) {
-            let each = |(k, p)| self.expose_one(p, first + k, &mut Memory::new());
-            return pictures.par_iter().enumerate().map(each).collect();
-        }
-        let each = |(k, p)| self.expose_one(p, first + k, memory);
-        pictures.iter().enumerate().map(each).collect()
-    }
-
-    fn expose_one(&self, picture: &Picture, frame: usize, memory: &mut Memory) -> Frame {
-        let since = self.film.poses[frame].stamp - self.film.poses[0].stamp;
-        let instant = Instant { view: 0, frame, session_s: since, view_s: since };
-        let sigma = self.sigma_of(&picture.seen);
-        let mut shooting = self.depth.begin_at(&picture.seen, sigma, std::mem::take(memory));
-        let shot = shooting.shoot(instant);
-        *memory = shooting.memory;
-        shot.depth
-    }
-
-    /// Of every pixel, m; zero where there is nothing.
-    fn sigma_of(&self, seen: &Seen) -> Vec<f32> {
-        let of = |(&z, normal): (&f32, &[f32; 3])| {
-            let theta = normal[2].abs().min(1.0).acos();
-            if z.is_nan() { 0.0 } else { self.sigma.at(z, theta) }
-        };
-        seen.depth.iter().zip(&seen.normal).map(of).collect()
-    }
 }

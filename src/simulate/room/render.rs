@@ -6,11 +6,11 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::body::{PosedBody, Room, Window};
+use super::body::{PosedBody, Room, Window, first_met};
 use super::shape::Intersection;
 use super::texture::{Texture, rough_log2};
 use crate::camera::{Camera, Rays};
-use crate::scene::{Seen, World};
+use crate::scene::Seen;
 
 /// A frame of colour and of true depth.
 #[derive(Debug, Clone)]
@@ -138,20 +138,8 @@ impl<'a> View<'a> {
         direction: &Vector3<f64>,
         bodies: &[&'b PosedBody<'b>],
     ) -> Option<SurfacePoint<'b>> {
-        let length = direction.norm();
-        let mut best: Option<(&PosedBody<'b>, Intersection)> = None;
-        for body in bodies {
-            let reached = best.map_or(f64::INFINITY, |(_, at)| at.t);
-            if body.nearest > reached * length {
-                break;
-            }
-            if let Some(at) = body.intersect(direction)
-                && at.t < reached
-            {
-                best = Some((body, at));
-            }
-        }
-        best.map(|(body, at)| SurfacePoint::new(body, at, direction))
+        first_met(bodies.iter().copied(), direction)
+            .map(|(body, at)| SurfacePoint::new(body, at, direction))
     }
 
     fn expose(&self, i: usize, bodies: &[&PosedBody<'_>], picture: &mut Picture) {

@@ -28,8 +28,8 @@ use crate::camera::Camera;
 use crate::effects::{Instant, KINECT_BASELINE_M};
 use crate::frame::{Frame, KINECT_NO_MEASUREMENT};
 use crate::plane::Plane;
-use crate::rng::Seed;
-use crate::scene::{Bench, Seen, Target, WHITE};
+use crate::rng::{Seed, Stream};
+use crate::scene::{Bench, Seen, Target, WHITE, World};
 use crate::stats::range;
 use crate::view::Sensor;
 
@@ -78,13 +78,36 @@ impl SpeckleSensor {
         Filming { sensor: self, bench, seed, lit: None }
     }
 
+    /// One frame of a world that stands otherwise in every frame. `instant` tells how warm the
+    /// sensor is, and the frame's own noise and speckle.
+    pub fn shoot(&self, world: &dyn World, instant: &Instant, seed: Seed) -> SpeckleShot {
+        let moment = Moment { moved_m: 0.0, ..Moment::of(&self.causes, instant) };
+        let frame = instant.frame;
+        let mut speckle = seed.stream(&format!("simulate/speckle/film/{frame}"));
+        let lit = self.light_up(world, moment, &mut speckle);
+        self.expose(&lit, &mut seed.stream(&format!("simulate/chip/film/{frame}")))
+    }
+
+    fn light_up(&self, world: &dyn World, moment: Moment, speckle: &mut Stream) -> Lit {
+        let SpeckleSensor { camera, causes, pattern, baseline_m, .. } = self;
+        let grains = Grain::draw(pattern.dots.len(), causes.speckle, speckle);
+        let spots = Optics::at(&moment, causes, camera, *baseline_m).spots(world, pattern, &grains);
+        let dots = Picture::dark(camera.width, camera.height, 0).with(&spots);
+        Lit { moment, dots, ambient: self.ambient(world) }
+    }
+
+    fn expose(&self, lit: &Lit, chip: &mut Stream) -> SpeckleShot {
+        let infrared = expose(&lit.dots, lit.ambient.as_deref(), &self.causes, chip);
+        SpeckleShot { depth: self.read_out(&infrared), infrared }
+    }
+
     /// Light that is there without the projector, DN; `None` in the dark.
-    fn ambient(&self, bench: &Bench) -> Option<Vec<f32>> {
+    fn ambient(&self, world: &dyn World) -> Option<Vec<f32>> {
         if self.causes.ambient_dn == 0.0 {
             return None;
         }
         let rays = self.camera.rays();
-        let seen = Seen::of(bench, &self.camera, &rays);
+        let seen = Seen::of(world, &self.camera, &rays);
         let white = self.causes.ambient_dn / WHITE;
         let light = |i| {
             let (x, y) = rays.at(i);
@@ -132,23 +155,17 @@ impl Filming<'_> {
             _ => self.light_up(instant.view, moment),
         };
         let name = format!("simulate/chip/{}/{}", instant.view, instant.frame);
-        let mut rng = self.seed.stream(&name);
-        let infrared = expose(&lit.dots, lit.ambient.as_deref(), causes, &mut rng);
+        let shot = self.sensor.expose(&lit, &mut self.seed.stream(&name));
         self.lit = Some(lit);
-        SpeckleShot { depth: self.sensor.read_out(&infrared), infrared }
+        shot
     }
 
     fn light_up(&self, view: usize, moment: Moment) -> Lit {
-        let SpeckleSensor { camera, causes, pattern, baseline_m, .. } = self.sensor;
-        let bench = moment.bench(causes, self.bench);
         // The grains are the same as long as the target stands still.
         let epoch = moment.speckle_epoch();
         let mut rng = self.seed.stream(&format!("simulate/speckle/{view}/{epoch}"));
-        let grains = Grain::draw(pattern.dots.len(), causes.speckle, &mut rng);
-        let spots =
-            Optics::at(&moment, causes, camera, *baseline_m).spots(&bench, pattern, &grains);
-        let dots = Picture::dark(camera.width, camera.height, 0).with(&spots);
-        Lit { moment, dots, ambient: self.sensor.ambient(&bench) }
+        let bench = moment.bench(&self.sensor.causes, self.bench);
+        self.sensor.light_up(&bench, moment, &mut rng)
     }
 }
 

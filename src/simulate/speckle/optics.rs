@@ -9,7 +9,7 @@ use crate::camera::Camera;
 use crate::effects::fill_normal;
 use crate::frame::Frame;
 use crate::rng::Stream;
-use crate::scene::{Hit, WHITE, World};
+use crate::scene::{Hit, RaysFrom, WHITE, World};
 
 /// A dot in the picture: a Gaussian.
 pub struct Spot {
@@ -63,15 +63,18 @@ impl<'a> Optics<'a> {
 
     /// The pattern on the world, with the speckle of each dot.
     pub fn spots(&self, world: &dyn World, pattern: &Pattern, grains: &[Grain]) -> Vec<Spot> {
+        let eyes = [world.from(self.projector), world.from(Vector3::zeros())];
         let lit = pattern.dots.iter().zip(grains);
-        lit.filter_map(|(dot, grain)| self.spot(world, dot, grain)).collect()
+        lit.filter_map(|(dot, grain)| self.spot(&eyes, dot, grain)).collect()
     }
 
-    fn spot(&self, world: &dyn World, dot: &Dot, grain: &Grain) -> Option<Spot> {
+    /// `eyes` are the projector's and the camera's.
+    fn spot(&self, eyes: &[RaysFrom<'_>; 2], dot: &Dot, grain: &Grain) -> Option<Spot> {
+        let [projector, camera] = eyes;
         let beam = self.beam(dot)?;
-        let hit = world.cast(&self.projector, &beam)?;
+        let hit = projector(&beam)?;
         let point = self.projector + beam * hit.t;
-        if !seen_from_camera(world, &point, &hit) {
+        if !seen_from_camera(camera, &point, &hit) {
             return None;
         }
         let (x, y) = (point.x / point.z, point.y / point.z);
@@ -122,9 +125,8 @@ fn full_light() -> f64 {
 }
 
 /// Is the lit side turned to the camera, with nothing in between?
-fn seen_from_camera(world: &dyn World, point: &Vector3<f64>, hit: &Hit) -> bool {
-    hit.normal.dot(point) < 0.0
-        && world.cast(&Vector3::zeros(), point).is_none_or(|first| first.t > 1.0 - HIDING_SHARE)
+fn seen_from_camera(camera: &RaysFrom<'_>, point: &Vector3<f64>, hit: &Hit) -> bool {
+    hit.normal.dot(point) < 0.0 && camera(point).is_none_or(|first| first.t > 1.0 - HIDING_SHARE)
 }
 
 /// Pixels by normalised coordinates at (x, y).

@@ -1,0 +1,134 @@
+//! The film's camera: a colour picture and a depth frame of each pose.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::body::PosedRoom;
+use super::render::{Picture, RoomCamera};
+use super::{Film, Pose};
+use crate::camera::Rays;
+use crate::effects::{Acting, Active, Instant};
+use crate::frame::{DepthCode, Frame};
+use crate::model::{SigmaLookup, SigmaModel};
+use crate::scene::Seen;
+use crate::simulate::formula::FormulaSensor;
+use crate::simulate::shoot::Physics;
+use crate::simulate::speckle::SpeckleSensor;
+use crate::view::Sensor;
+
+/// What an effect keeps from frame to frame.
+type Memory = HashMap<&'static str, Vec<f32>>;
+
+/// The film's camera, ready to take any frame.
+pub struct Shutter<'a> {
+    film: &'a Film,
+    camera: RoomCamera<'a>,
+    depth: DepthCamera<'a>,
+}
+
+/// How depth comes about.
+enum DepthCamera<'a> {
+    Formula {
+        sensor: FormulaSensor<'a>,
+        sigma: SigmaLookup,
+        memory: Memory,
+    },
+    /// Its words in the code of `code`.
+    Speckle {
+        sensor: Box<SpeckleSensor>,
+        code: DepthCode,
+    },
+}
+
+impl<'a> Shutter<'a> {
+    /// `sensor` and `rays` are those of one camera; its code is that of the words.
+    pub fn new(film: &'a Film, sensor: &'a Sensor, rays: &'a Rays) -> Self {
+        let depth = match &film.physics {
+            Physics::Formula { sigma, effects } => {
+                DepthCamera::formula(sensor, rays, sigma, effects, film)
+            }
+            Physics::Speckle { causes } => DepthCamera::Speckle {
+                // The sensor's words are those of its read-out; what is written has another code.
+                sensor: Box::new(SpeckleSensor::new(&film.sensor, causes.clone())),
+                code: sensor.code,
+            },
+        };
+        Shutter { film, camera: RoomCamera::new(&film.room, &sensor.camera, rays), depth }
+    }
+
+    /// Consecutive frames: what an effect remembers goes from one to the next.
+    pub fn shoot(&mut self, frames: Range<usize>) -> Vec<(Picture, Frame)> {
+        let poses = &self.film.poses[frames.clone()];
+        let picture = |pose: &Pose| self.camera.take(&pose.world_from_camera);
+        let pictures: Vec<Picture> = poses.par_iter().map(picture).collect();
+        let since = |frame: usize| self.film.poses[frame].stamp - self.film.poses[0].stamp;
+        let instants = frames.map(|frame| {
+            let since = since(frame);
+            Instant { view: 0, frame, session_s: since, view_s: since }
+        });
+        let seen: Vec<(Instant, &Picture, &Pose)> =
+            instants.zip(&pictures).zip(poses).map(|((i, p), pose)| (i, p, pose)).collect();
+        let depths = self.depth.expose(self.film, &seen);
+        pictures.into_iter().zip(depths).collect()
+    }
+}
+
+impl<'a> DepthCamera<'a> {
+    fn formula(
+        sensor: &'a Sensor,
+        rays: &'a Rays,
+        sigma: &'a SigmaModel,
+        effects: &'a [Active],
+        film: &Film,
+    ) -> Self {
+        DepthCamera::Formula {
+            sensor: FormulaSensor { sensor, rays, sigma, effects, seed: film.seed },
+            sigma: SigmaLookup::of(sigma),
+            memory: Memory::new(),
+        }
+    }
+
+    fn expose(&mut self, film: &Film, seen: &[(Instant, &Picture, &Pose)]) -> Vec<Frame> {
+        match self {
+            DepthCamera::Formula { sensor, sigma, memory } => {
+                let shoot = |(instant, picture, _): &(Instant, &Picture, &Pose),
+                             memory: &mut Memory| {
+                    let sigma = sigma_of(&picture.seen, sigma);
+                    let mut shooting =
+                        sensor.begin_at(&picture.seen, sigma, std::mem::take(memory));
+                    let shot = shooting.shoot(*instant);
+                    *memory = shooting.memory;
+                    shot.depth
+                };
+                // Effects of the catalogue may remember: then frames go in order.
+                if sensor.effects.iter().all(|a| matches!(a.effect, Acting::Shape(_))) {
+                    return seen.par_iter().map(|s| shoot(s, &mut Memory::new())).collect();
+                }
+                seen.iter().map(|s| shoot(s, memory)).collect()
+            }
+            DepthCamera::Speckle { sensor, code } => {
+                let table = sensor.described().code.table();
+                let each = |(instant, _, pose): &(Instant, &Picture, &Pose)| {
+                    let room_from_camera = pose.world_from_camera;
+                    let room = PosedRoom { room: &film.room, room_from_camera };
+                    let Frame { width, height, raw } =
+                        sensor.shoot(&room, instant, film.seed).depth;
+                    let word = |&raw: &u16| code.raw(f64::from(table.metres(raw)));
+                    Frame { width, height, raw: raw.iter().map(word).collect() }
+                };
+                seen.par_iter().map(each).collect()
+            }
+        }
+    }
+}
+
+/// Of every pixel, m; zero where there is nothing.
+fn sigma_of(seen: &Seen, sigma: &SigmaLookup) -> Vec<f32> {
+    let of = |(&z, normal): (&f32, &[f32; 3])| {
+        let theta = normal[2].abs().min(1.0).acos();
+        if z.is_nan() { 0.0 } else { sigma.at(z, theta) }
+    };
+    seen.depth.iter().zip(&seen.normal).map(of).collect()
+}
