@@ -17,7 +17,7 @@ LINES = ["simulate rec --shrink 8 --frames 3 --distances 1,1.5,2,3 --tilts 0,30,
          "simulate film --room --shrink 8 --frames 4", "calibrate rec -o cal", "diagnose rec -o dia", "correct rec -m dia/model.json -o better",
          "map film -m cal/model.json -o map"]
 # Times, and what the machine was doing.
-TIMED = {"ms", "peak_rss_mb", "seconds"}
+TIMED = {"ms", "peak_rss_mb", "seconds", "cpu_seconds"}
 
 
 def debug(binary, rng, times, unoptimised):

@@ -41,6 +41,12 @@ impl After<'_> {
             steps.push(NextStep { why, words: [words, input].concat() });
         };
         let has = |status| self.diagnosis.findings.iter().any(|f| f.status == status);
+        let calibrate = ["calibrate".into(), recording(), "-o".into(), to("calibrated")];
+        let contradicted = self.diagnosis.findings.iter().any(|f| f.contradicted.is_some());
+        if contradicted {
+            let why = "The model has what the recording does not show; fit one without it: ";
+            step(why, &calibrate, self.input);
+        }
         if self.corrects() {
             let why = "Take the errors out of the depth: ";
             let [m, file] = model.clone();
@@ -53,12 +59,10 @@ impl After<'_> {
         };
         let twin = ["simulate".into(), to("twin"), "--like".into(), recording()];
         step(why, &[&twin[..], &model].concat(), self.input);
-        if has(Status::Recalibrate) {
-            let why = "The parameters of the noise are off; fit them again: ";
-            let words = ["calibrate".into(), recording(), "-o".into(), to("calibrated")];
-            step(why, &words, self.input);
+        if has(Status::Recalibrate) && !contradicted {
+            step("The parameters of the noise are off; fit them again: ", &calibrate, self.input);
         }
-        if self.diagnosis.verdict != Verdict::Inconclusive {
+        if self.diagnosis.verdict != Verdict::Inconclusive && !contradicted {
             let map = ["map".into(), "SEQUENCE".into(), "-o".into(), to("map")];
             step("Map a sequence of this sensor with it: ", &[&map[..], &model].concat(), &[]);
         }

@@ -7,6 +7,7 @@
 use serde_json::{Map, Value};
 
 use super::diagnosis::Curve;
+use super::few_losses::few_losses;
 use super::field::Field;
 use super::layers::Survey;
 use super::margins::Margins;
@@ -176,6 +177,12 @@ fn losses(
             Some(end) => outcome.notes.push(end.note()),
             None => outcome.findings.push(finding),
         }
+    }
+    if outcome.findings.is_empty()
+        && let Some((foot, p)) = few_losses(&seen.fine, reach, LEVEL, seed)
+    {
+        let told = Told { fine: &seen.fine, told: &seen.told, base: 0.0, reach, camera };
+        outcome.findings.push(told.finding(&foot, rivals(std::slice::from_ref(&foot)), p));
     }
     outcome
 }

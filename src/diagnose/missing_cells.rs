@@ -21,7 +21,7 @@ pub struct Cell {
 /// Cells across the picture: some hundred a view, each wider than a clump of dead pixels.
 const ACROSS: usize = 16;
 /// Tiles nearer the target's edge are kept apart, px.
-const RIM_PX: f64 = 8.0;
+pub const RIM_PX: f64 = 8.0;
 /// A smaller patch, in tiles, says little.
 const FEWEST_TILES: usize = 2;
 
@@ -95,7 +95,7 @@ pub const USUAL: Scatter = Scatter { level: 1.0, slope: 4.0, cell: 0.5, clump: 4
 /// Never believed to be less.
 const LEAST: Scatter = Scatter { level: 0.1, slope: 0.4, cell: 0.1, clump: 1.0 };
 /// What a few views show is taken so much larger.
-const FEW: f64 = 4.0;
+pub const FEW: f64 = 4.0;
 /// Cells nearer than this are neighbours, in their sides: the corners too.
 const APART: f64 = 1.5;
 

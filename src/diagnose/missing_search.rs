@@ -46,20 +46,21 @@ struct Column {
 }
 
 impl Column {
-    /// Nats and size; every view is predicted from the others and from the whole step.
-    fn gain(&self, b: &[f64]) -> (f64, f64) {
-        let (sum_a, sum_b): (f64, f64) = (self.a.iter().sum(), b.iter().sum());
-        let size = |a: f64, b: f64| ((b + STEP_PRECISION) / (a + STEP_PRECISION)).max(0.0);
-        let total = self.a.iter().zip(b).map(|(a, b)| {
-            let size = size(sum_a - a, sum_b - b);
-            size * (b - 0.5 * size * a)
-        });
-        (total.sum(), size(sum_a, sum_b))
-    }
-
     fn scores(&self, whitened: &[Vec<f64>]) -> Vec<f64> {
         self.by_view.iter().zip(whitened).map(|(g, w)| dot(g, w)).collect()
     }
+}
+
+/// A step's nats and size, by its information and score in every view: each view is predicted from
+/// the others and from the whole step.
+pub fn predicted(a: &[f64], b: &[f64]) -> (f64, f64) {
+    let (sum_a, sum_b): (f64, f64) = (a.iter().sum(), b.iter().sum());
+    let size = |a: f64, b: f64| ((b + STEP_PRECISION) / (a + STEP_PRECISION)).max(0.0);
+    let total = a.iter().zip(b).map(|(a, b)| {
+        let size = size(sum_a - a, sum_b - b);
+        size * (b - 0.5 * size * a)
+    });
+    (total.sum(), size(sum_a, sum_b))
 }
 
 /// Where a tenth of all is lost in most places, the best places show what is lost anyway.
@@ -188,7 +189,7 @@ impl<'a> Losses<'a> {
         let mut judged: Vec<Judged> = columns
             .iter()
             .map(|c| {
-                let (gain, size) = c.gain(&c.scores(&whitened));
+                let (gain, size) = predicted(&c.a, &c.scores(&whitened));
                 Judged { shape: Shape::Step(c.step), gain, coefficients: vec![size] }
             })
             .collect();
@@ -208,7 +209,8 @@ impl<'a> Losses<'a> {
             let mut normal = || StandardNormal.sample(&mut rng);
             let y: Vec<Vec<f64>> = self.whiteners.iter().map(|w| w.draw(&mut normal)).collect();
             let whitened = solve(&y);
-            let steps = columns.iter().map(|c| c.gain(&c.scores(&whitened)).0).fold(0.0, f64::max);
+            let steps =
+                columns.iter().map(|c| predicted(&c.a, &c.scores(&whitened)).0).fold(0.0, f64::max);
             nulls.iter().map(|n| n.draw(&mut rng)).fold(steps, f64::max)
         };
         (judged, Chance::of((0..REPLICATES).into_par_iter().map(draw).collect()))
@@ -248,7 +250,7 @@ pub struct Chance {
 }
 
 impl Chance {
-    fn of(mut gains: Vec<f64>) -> Self {
+    pub fn of(mut gains: Vec<f64>) -> Self {
         gains.sort_by(f64::total_cmp);
         let cut = gains[((gains.len() - 1) as f64 * (1.0 - TAIL)) as usize];
         let tail: Vec<f64> = gains.iter().filter(|g| **g > cut).map(|g| g - cut).collect();

@@ -23,6 +23,7 @@ mod engine;
 mod evidence;
 mod exposure;
 mod far_off;
+mod few_losses;
 mod few_views;
 mod field;
 mod findings;

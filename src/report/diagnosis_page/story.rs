@@ -44,7 +44,10 @@ fn of(f: &Finding) -> String {
     let and_rest = f.effect.is_some() && f.terms.iter().any(|t| smooth(&t.basis));
     let rest = if and_rest { " and a smooth rest of it that no formula follows" } else { "" };
     let size = match f.statistic {
-        Statistic::Dropout => format!("{} % of the pixels lost", fixed(100.0 * f.size.sigma, 1)),
+        Statistic::Dropout => match fixed(100.0 * f.size.sigma, 1) {
+            few if few == "0.0" => "less than 0.1 % of the pixels lost".to_string(),
+            percent => format!("{percent} % of the pixels lost"),
+        },
         _ => format!("{} rms, {} of the noise", mm(f.size.mm), fixed(f.size.sigma, 2)),
     };
     let parameter = |(name, value): (&String, &serde_json::Value)| brief(f.effect, name, value);
