@@ -78,7 +78,7 @@ def odd_outputs(desk):
     os.chmod(at("locked"), 0o555)
     return ["", ".", "..", "/", "/dev/null", "/dev/full", "/dev/stdout", "/proc/self/x", "/sys/x", "-", "--", "out", "out/", "out/deep/er", "./out/../out2", "full", "full/x", "plain", "plain/x", "made",
             "locked", "locked/x", "broken", "to-full", "to-root", "loop", "dangling", "rec", "rec/out", "rec/0000", "film", "model.json", "link", "out räume 😀", "out\nnew", "x" * 255, "x" * 256, "x" * 5000,
-            "a/" * 3000, "out.json", "out%s", "rec/recording.json"]
+            "a/" * 3000, "out.d", "out%s", "rec/recording.json"]
 
 
 def kept(root, names):

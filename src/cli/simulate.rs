@@ -91,6 +91,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         arguments.like.is_some() || arguments.input == Input::default(),
         "--intrinsics and the like tell how to read a recording; give it with --like"
     );
+    arguments.room.refuse_without_room()?;
     if let Some(path) = &arguments.recipe {
         check_recipe(path, &arguments.output)?;
     }
@@ -139,8 +140,13 @@ fn next(arguments: &Arguments) -> Vec<OsString> {
 
 /// Film the office: what programs are told of it, and the recipe.
 fn write_film(film: &Film, folder: OutputFolder) -> anyhow::Result<(Value, Value)> {
-    working("filming", |step| film.write(folder.path(), step))?;
+    let blind = working("filming", |step| film.write(folder.path(), step))?;
     let (output, frames) = (folder.place().to_path_buf(), film.poses.len());
+    ensure!(
+        blind < frames,
+        "{}: no frame shows any depth; change what the sensor or its light is",
+        output.display()
+    );
     folder.finish()?;
     result(format!("wrote {} of a room to {}", counted(frames, "frame"), output.display()));
     Ok((json!({"frames": frames, "output": output}), film.recipe()))

@@ -27,6 +27,15 @@ pub struct RoomArguments {
 }
 
 impl RoomArguments {
+    /// Clap forgets what an option requires where another conflicts with that.
+    pub fn refuse_without_room(&self) -> anyhow::Result<()> {
+        let given = [("--trajectory", self.trajectory.is_some()), ("--stride", self.stride != 1)];
+        match given.into_iter().find(|(_, given)| !self.room && *given) {
+            Some((option, _)) => bail!("{option} is of a film: give --room too, or leave it out"),
+            None => Ok(()),
+        }
+    }
+
     /// The poses to film from, at most so many.
     pub fn path(&self, room: &Room, frames: Option<usize>) -> anyhow::Result<Vec<Pose>> {
         let all = match &self.trajectory {

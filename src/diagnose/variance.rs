@@ -93,6 +93,10 @@ fn log_variances(model: &SigmaModel, z_m: [f64; 2], theta_rad: [f64; 2]) -> Vec<
     (0..TABLE * TABLE).map(log).collect()
 }
 
+/// No sigma is less sure than by a factor of e in variance: a calibration whose errors are larger, or
+/// whose numbers were changed by hand, would match anything.
+const UNSURE: f64 = 1.0;
+
 /// What sigma's own covariance makes of the logarithm of the variance: a term for each of its
 /// directions, by one standard deviation.
 pub fn error_of_sigma(reach: &Extent, sigma: &SigmaModel) -> Vec<Vec<Term>> {
@@ -110,7 +114,8 @@ pub fn error_of_sigma(reach: &Extent, sigma: &SigmaModel) -> Vec<Vec<Term>> {
         // A hundredth of a standard deviation to either side: the slope, though sigma bends.
         const SMALL: f64 = 0.01;
         let (up, down) = (moved(SMALL), moved(-SMALL));
-        let column: Vec<f64> = up.iter().zip(&down).map(|(u, d)| (u - d) / (2.0 * SMALL)).collect();
+        let slope = |(u, d): (&f64, &f64)| ((u - d) / (2.0 * SMALL)).clamp(-UNSURE, UNSURE);
+        let column: Vec<f64> = up.iter().zip(&down).map(slope).collect();
         let told = column.iter().all(|c| c.is_finite()) && column.iter().any(|c| c.abs() > 1e-4);
         told.then(|| {
             let basis = Basis::Table { z_m, theta_rad, columns: vec![column] };

@@ -88,6 +88,12 @@ impl OutputFolder {
             _locks: [of_place, None],
             done: false,
         };
+        // A name that is too long would be found out only when all is done.
+        if let Err(e) = fs::symlink_metadata(place)
+            && e.kind() != std::io::ErrorKind::NotFound
+        {
+            return Err(Error::write(place, e));
+        }
         let mut register = register();
         fs::create_dir(&folder.staging).map_err(|e| Error::write(place, e))?;
         register.open.push(Open {

@@ -87,3 +87,34 @@ fn a_model_that_has_too_much_of_an_effect_is_contradicted_and_a_true_one_is_not(
         }
     }
 }
+
+/// On few small views, where no search finds what they have in common: noise that the model makes far too
+/// small or too large, and errors of many times the noise.
+#[test]
+fn a_model_that_is_far_off_is_no_match() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let at = folder.path();
+    let views = ["--frames", "2", "--distances", "1,1.5,2,3", "--tilts", "0,30"];
+    run(at, &[&["simulate", "clean", "--shrink", "8"], &views[..]].concat());
+    run(at, &["calibrate", "clean", "-o", "calibrated", "-q"]);
+    let text = std::fs::read(at.join("calibrated/model.json")).expect("a model");
+    let model: Value = serde_json::from_slice(&text).expect("JSON");
+    for factor in [0.001, 0.01, 0.02, 0.05, 20.0, 1000.0] {
+        let mut changed = model.clone();
+        for name in ["a", "b"] {
+            let value = &mut changed["sigma"]["parameters"][name]["value"];
+            *value = json!(value.as_f64().expect("a number") * factor);
+        }
+        std::fs::write(at.join("calibrated/model.json"), changed.to_string()).expect("written");
+        let (verdict, _) = told(at, "clean", "vignetting", &json!({"growth": 0.0}));
+        assert_eq!(verdict, "mismatch", "sigma times {factor}");
+    }
+    std::fs::write(at.join("calibrated/model.json"), model.to_string()).expect("written");
+    for (id, parameters) in [
+        ("pixel-locking", json!({"amplitude_px": 0.5})),
+        ("slope-noise", json!({"sigma_lateral_px": 10.0})),
+    ] {
+        assert_eq!(told(at, "clean", id, &parameters).0, "mismatch", "{id} {parameters}");
+    }
+    assert_eq!(told(at, "clean", "vignetting", &json!({"growth": 0.0})).0, "match");
+}

@@ -38,7 +38,7 @@ use rayon::prelude::*;
 
 use crate::Progress;
 use crate::error::{Error, Result};
-use crate::frame::DepthCode;
+use crate::frame::{DepthCode, Frame};
 use crate::io::{
     encode_png16_quickly, encode_rgb, refuse_full, write_atomic, write_recording_file,
 };
@@ -75,8 +75,9 @@ impl Film {
     }
 
     /// Write rgb/, depth/, their lists, groundtruth.txt and recording.json into `root`, which must be
-    /// new or empty. The bytes do not depend on the number of threads.
-    pub fn write(&self, root: &Path, progress: Progress<'_>) -> Result<()> {
+    /// new or empty; returns how many frames show no depth at all. The bytes do not depend on the number
+    /// of threads.
+    pub fn write(&self, root: &Path, progress: Progress<'_>) -> Result<usize> {
         refuse_full(root)?;
         for kind in ["rgb", "depth"] {
             let folder = root.join(kind);
@@ -85,10 +86,12 @@ impl Film {
         let sensor = Sensor { code: Self::CODE, ..self.sensor.clone() };
         let rays = sensor.camera.rays();
         let mut shutter = Shutter::new(self, &sensor, &rays);
+        let mut blind = 0;
         let block = FRAMES_A_THREAD * rayon::current_num_threads();
         for (k, poses) in self.poses.chunks(block).enumerate() {
             let first = k * block;
             let shots = shutter.shoot(first..first + poses.len());
+            blind += shots.iter().filter(|(_, depth)| is_blind(depth)).count();
             shots.par_iter().zip(poses).try_for_each(|((picture, depth), pose)| {
                 let Picture { seen, rgb } = picture;
                 let (name, colour) = (file_name(pose), encode_rgb(seen.width, seen.height, rgb)?);
@@ -97,7 +100,8 @@ impl Film {
             })?;
             progress.step(first + poses.len(), self.poses.len());
         }
-        self.write_lists(root, &sensor)
+        self.write_lists(root, &sensor)?;
+        Ok(blind)
     }
 
     /// What was switched on and where the camera went, for a file of its own.
@@ -133,6 +137,10 @@ impl Film {
         }
         Ok(())
     }
+}
+
+fn is_blind(depth: &Frame) -> bool {
+    depth.raw.iter().all(|&word| Film::CODE.metres(word).is_none())
 }
 
 /// ROS' default for a PrimeSense camera, px.

@@ -102,10 +102,8 @@ causes! {
         "speed of the target away from the sensor during a view";
 }
 
-const ASK: &str = "give --cause NAME=VALUE with one of these";
-
 fn fault(what: String) -> Error {
-    Error::Argument { what, remedy: ASK }
+    Error::Argument { what, remedy: "give --cause NAME=VALUE with one of these" }
 }
 
 impl Causes {
@@ -117,8 +115,10 @@ impl Causes {
         })?;
         let [low, high] = cause.range;
         if !(low..=high).contains(&value) {
-            let unit = cause.unit;
-            return Err(fault(format!("{name} = {value} is outside {low} to {high} {unit}")));
+            // A share or a factor has the unit one.
+            let unit = if cause.unit == "1" { String::new() } else { format!(" {}", cause.unit) };
+            let what = format!("{name} = {value} is outside {low} to {high}{unit}");
+            return Err(Error::Argument { what, remedy: "give a value within" });
         }
         if name == "window_px" && value % 2.0 != 1.0 {
             return Err(fault(format!("window_px = {value} has no middle pixel; it is odd")));
