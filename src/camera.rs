@@ -66,6 +66,11 @@ pub enum CameraFault {
         u: usize,
         v: usize,
     },
+    #[error(
+        "distortion {}: p1 and p2 lie within -{} and {} (lenses have some thousandths); check the order of the \
+         coefficients", listed(.0), TANGENTIAL, TANGENTIAL
+    )]
+    Tangential([f64; 5]),
     /// The image folds back on itself: rays farther out are bent to pixels farther in.
     #[error(
         "distortion {} folds the image inside its corners; check the order of the coefficients and that they \
@@ -119,6 +124,9 @@ impl Camera {
         if k.iter().any(|v| !v.is_finite()) {
             return Some(CameraFault::Coefficients);
         }
+        if k[2].abs().max(k[3].abs()) > TANGENTIAL {
+            return Some(CameraFault::Tangential(k));
+        }
         let mut farthest: f64 = 0.0;
         for v in 0..self.height {
             for (u, (x, y)) in self.row(v).enumerate() {
@@ -153,7 +161,9 @@ impl Camera {
         let [xd, yd] = self.bent(u, v);
         let Some(k) = self.distortion else { return (xd, yd) };
         let cold = || undistorted(&k, [xd, yd], (xd, yd));
-        undistorted(&k, [xd, yd], start).or_else(cold).unwrap_or((f64::NAN, f64::NAN))
+        let outwards = || followed(&k, [xd, yd]);
+        let found = undistorted(&k, [xd, yd], start).or_else(cold).or_else(outwards);
+        found.unwrap_or((f64::NAN, f64::NAN))
     }
 
     /// Where a pixel lies behind the lens, in normalised coordinates.
@@ -204,6 +214,9 @@ impl Camera {
 /// fx over fy, or its inverse: pixels are square to a percent. With cx and cy in their place it is
 /// 1.33 for images of 4:3 whose principal point is in the middle.
 const MAX_ASPECT: f64 = 1.25;
+/// Tangential distortion of a lens that no one would use. Within it each of 5,000 lenses drawn at
+/// random gave the rays of twenty places drawn at random; of lenses up to 0.5 one in a hundred did not.
+const TANGENTIAL: f64 = 0.1;
 /// The widest depth camera has 127 degrees (OAK-D W), and a hundred columns cut out of a Kinect's
 /// image 10. A focal length in mm or as a share of the image's width falls outside, degrees.
 const FIELD_DEG: [f64; 2] = [2.0, 140.0];
@@ -264,6 +277,17 @@ fn undistorted(k: &[f64; 5], [xd, yd]: [f64; 2], start: (f64, f64)) -> Option<(f
         }
     }
     None
+}
+
+/// Steps in which a ray that is not found at once is followed outwards from the axis.
+const STEPS: u32 = 32;
+
+/// The same, each step's ray looked for from the one before: where a lens bends much.
+fn followed(k: &[f64; 5], [xd, yd]: [f64; 2]) -> Option<(f64, f64)> {
+    (1..=STEPS).try_fold((0.0, 0.0), |before, n| {
+        let share = f64::from(n) / f64::from(STEPS);
+        undistorted(k, [share * xd, share * yd], before)
+    })
 }
 
 /// Does the bent radius r (1 + k1 s + k2 s^2 + k3 s^3), s = r^2, fall anywhere up to s = `farthest`?

@@ -24,6 +24,23 @@ fn a_usable_lens_gives_back_every_pixel() {
     }
 }
 
+/// Places between the pixels that Newton's method does not find from the bent place at once (found by
+/// chance, by tests/product/degenerate.rs), and a lens of which it does not find some at all.
+#[test]
+fn a_lens_that_bends_much_gives_back_what_lies_between_the_pixels() {
+    let k = [0.304682, -0.2622173, 0.0999, -0.0999, 0.1737139];
+    let camera = Camera { distortion: Some(k), ..Camera::centred(35, 3, 34.383658) };
+    assert_eq!(camera.fault(), None);
+    for n in 0..=3400 {
+        let (u, v) = (f64::from(n) / 100.0, 2.0 * f64::from(n % 100) / 100.0);
+        let (x, y) = camera.ray(u, v);
+        let (pu, pv) = camera.project(x, y);
+        assert!((pu - u).hypot(pv - v) < 1e-6, "{u} {v}: {pu} {pv}");
+    }
+    let fault = behind([0.3, -0.26, 0.24, -0.22, 0.17]).fault().expect("a fault");
+    assert!(fault.to_string().contains("p1 and p2 lie within -0.1 and 0.1"), "{fault}");
+}
+
 #[test]
 fn swapped_and_misplaced_numbers_are_named() {
     let camera = |[fx, fy, cx, cy]: [f64; 4]| Camera {

@@ -367,3 +367,30 @@ fn no_size_of_an_image_is_too_large_to_be_refused() {
         }
     }
 }
+
+/// A recording of an hour was kept beside, for the disk did not take the name that it was to have.
+#[test]
+fn what_cannot_be_written_is_told_before_the_work() {
+    let desk = Desk::new();
+    let name = "x".repeat(256);
+    desk.refused(&format!("calibrate rec -o {name}"), &["too long"]);
+    desk.refused(&format!("simulate {name} --distances 1 --tilts 0"), &["too long"]);
+    let left = fs::read_dir(desk.at(".")).expect("the desk").flatten();
+    let left: Vec<_> = left.map(|entry| entry.file_name()).collect();
+    assert!(left.iter().all(|name| !name.to_string_lossy().contains("kinoise")), "{left:?}");
+}
+
+/// Options of a film, beside those that a film does not take; and causes that leave nothing to see.
+#[test]
+fn options_of_a_film_are_told_without_one() {
+    let desk = Desk::new();
+    for option in ["--stride 3", "--trajectory poses.txt"] {
+        let line = format!("simulate out --shrink 8 --distances 1 --tilts 0 {option}");
+        desk.refused(&line, &[&option[..8], "give --room too"]);
+    }
+    let dark = "--room --shrink 8 --frames 2 --physics speckle --cause light=0";
+    desk.refused(&format!("simulate out {dark}"), &["no frame shows any depth"]);
+    let light = "--shrink 8 --distances 1 --tilts 0 --physics speckle --cause light=1e9";
+    desk.refused(&format!("simulate out {light}"), &["is outside 0 to 100; give a value within"]);
+    assert!(!desk.at("out").exists());
+}
