@@ -6,7 +6,7 @@
 //! differs from the others' for no reason by as much as theirs do, and never by less than a factor
 //! of e; a count has an error of its own beside that, and what is lost in one clump counts once.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
@@ -71,7 +71,7 @@ fn clump(views: &[Vec<&Cell>]) -> f64 {
             let at = ((c.place.u / side) as i64, (c.place.v / side) as i64);
             (at, c.lost - mine / asked * c.asked)
         };
-        let by_place: HashMap<(i64, i64), f64> = view.iter().map(|c| off(&c)).collect();
+        let by_place: BTreeMap<(i64, i64), f64> = view.iter().map(|c| off(&c)).collect();
         for ((u, v), x) in &by_place {
             squares += x * x;
             cells += 1.0;
