@@ -9,11 +9,11 @@
 use std::collections::BTreeMap;
 
 use rand_distr::{Distribution, StandardNormal};
-use rayon::prelude::*;
 
 use super::missing_cells::{Cell, FEW, RIM_PX, USUAL};
-use super::missing_search::{Chance, Judged, predicted};
+use super::missing_search::{Judged, LEAST_EXCESS, predicted};
 use super::missing_shapes::{Shape, Step};
+use super::null::NoiseGains;
 use crate::rng::Seed;
 use crate::stats::median;
 use crate::terms::{Axis, Extent};
@@ -129,11 +129,10 @@ pub fn few_losses(
         y.iter_mut().for_each(|y| *y -= usual);
         best(&y, scatter).map_or(0.0, |b| b.0.0)
     };
-    let chance = Chance::of((0..REPLICATES).into_par_iter().map(draw).collect());
+    let noise = NoiseGains::simulated(REPLICATES, LEAST_EXCESS, draw);
     let coefficients = vec![size];
-    (found > chance.threshold(level)).then(|| {
-        (Judged { shape: Shape::Step(step), gain: found, coefficients }, chance.of_gain(found))
-    })
+    (found > noise.threshold(level))
+        .then(|| (Judged { shape: Shape::Step(step), gain: found, coefficients }, noise.p(found)))
 }
 
 fn variance(view: &View, scatter: f64) -> f64 {

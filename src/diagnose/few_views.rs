@@ -14,7 +14,7 @@ use super::candidate::{Candidate, RECALIBRATE};
 use super::diagnosis::{Alternative, Finding, Status};
 use super::evidence::{self, Evidence, root};
 use super::naming::physics;
-use super::null::NoiseGains;
+use super::null::{LEAST_EXCESS, NoiseGains};
 use super::other_findings::named;
 use super::outcome::{Outcome, Rules};
 use super::prepared::evidence_of_bases;
@@ -145,15 +145,10 @@ pub fn few_views(
     if most * BESIDE_ALL < shared {
         return None;
     }
-    let mut gains: Vec<f64> = (0..REPLICATES)
-        .into_par_iter()
-        .map(|replicate| {
-            let mut rng = seed.stream(&format!("few-views/null/{replicate}"));
-            tried.iter().map(|t| t.draw(&mut rng)).fold(f64::NEG_INFINITY, f64::max)
-        })
-        .collect();
-    gains.sort_by(f64::total_cmp);
-    let noise = NoiseGains(gains);
+    let noise = NoiseGains::simulated(REPLICATES, LEAST_EXCESS, |replicate| {
+        let mut rng = seed.stream(&format!("few-views/null/{replicate}"));
+        tried.iter().map(|t| t.draw(&mut rng)).fold(f64::NEG_INFINITY, f64::max)
+    });
     if most < noise.threshold(rules.level) {
         return None;
     }

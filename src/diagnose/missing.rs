@@ -151,8 +151,8 @@ fn losses(
         let (first, _) = ledger.judge(&open_steps, &open_curves, None);
         let Some(best) = choose(&first) else { break };
         ledger.scattered_as_left_by(best);
-        let (judged, chance) = ledger.judge(&open_steps, &open_curves, Some(seed));
-        let threshold = chance.threshold(LEVEL);
+        let (judged, noise) = ledger.judge(&open_steps, &open_curves, Some(seed));
+        let threshold = noise.threshold(LEVEL);
         if outcome.findings.is_empty() {
             outcome.detectable = detectable(&ledger, &steps, threshold);
         }
@@ -165,7 +165,7 @@ fn losses(
         taken.push(won.shape.axis());
         let replicated = ledger.replicate(won, &seen.second);
         let told = Told { fine: &seen.fine, told: &seen.told, base: ledger.base, reach, camera };
-        let mut finding = told.finding(won, rivals(&judged), chance.of_gain(won.gain));
+        let mut finding = told.finding(won, rivals(&judged), noise.p(won.gain));
         finding.replicated = replicated;
         match HardEnd::of(&finding, blur) {
             // Nothing is learnt beyond the range: what is lost inside it is looked at alone.

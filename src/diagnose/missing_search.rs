@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::evidence::{Evidence, gain};
 use super::missing_cells::{Cell, Scatter, USUAL, Whitener, odds, share};
 use super::missing_shapes::{Shape, Step};
-use super::null::Null;
+use super::null::{NoiseGains, Null};
 use super::replication::{Halves, Measured, agree};
 use crate::rng::Seed;
 use crate::terms::Basis;
@@ -180,7 +180,7 @@ impl<'a> Losses<'a> {
         steps: &[Step],
         curves: &[Shape],
         null: Option<Seed>,
-    ) -> (Vec<Judged>, Chance) {
+    ) -> (Vec<Judged>, NoiseGains) {
         let columns: Vec<Column> = steps.par_iter().map(|s| self.column(*s)).collect();
         let solve = |y: &[Vec<f64>]| -> Vec<Vec<f64>> {
             self.whiteners.iter().zip(y).map(|(w, y)| w.solve(y)).collect()
@@ -203,7 +203,7 @@ impl<'a> Losses<'a> {
             judged.push(Judged { shape: shape.clone(), gain: won.total, coefficients });
         }
         judged.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        let Some(seed) = null else { return (judged, Chance::default()) };
+        let Some(seed) = null else { return (judged, NoiseGains::default()) };
         let draw = |replicate: u64| {
             let mut rng = seed.stream(&format!("missing/null/{replicate}"));
             let mut normal = || StandardNormal.sample(&mut rng);
@@ -213,7 +213,7 @@ impl<'a> Losses<'a> {
                 columns.iter().map(|c| predicted(&c.a, &c.scores(&whitened)).0).fold(0.0, f64::max);
             nulls.iter().map(|n| n.draw(&mut rng)).fold(steps, f64::max)
         };
-        (judged, Chance::of((0..REPLICATES).into_par_iter().map(draw).collect()))
+        (judged, NoiseGains::simulated(REPLICATES, LEAST_EXCESS, draw))
     }
 
     /// The farthest (for what is lost below: the nearest) whole step that is seen with 80 % power.
@@ -239,31 +239,5 @@ impl<'a> Losses<'a> {
 
 /// Simulations of the null.
 const REPLICATES: u64 = 300;
-/// Beyond this quantile the tail of a log likelihood falls as an exponential.
-const TAIL: f64 = 0.1;
-
-/// The greatest gains of nothing but noise: the quantile where the tail begins, and its mean excess.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Chance {
-    cut: f64,
-    excess: f64,
-}
-
-impl Chance {
-    pub fn of(mut gains: Vec<f64>) -> Self {
-        gains.sort_by(f64::total_cmp);
-        let cut = gains[((gains.len() - 1) as f64 * (1.0 - TAIL)) as usize];
-        let tail: Vec<f64> = gains.iter().filter(|g| **g > cut).map(|g| g - cut).collect();
-        Chance { cut, excess: (tail.iter().sum::<f64>() / tail.len().max(1) as f64).max(1.0) }
-    }
-
-    /// Exceeded with probability `level`.
-    pub fn threshold(&self, level: f64) -> f64 {
-        self.cut + self.excess * (TAIL / level).ln()
-    }
-
-    /// Of noise bringing as much, at most 1; a bound where it is common.
-    pub fn of_gain(&self, gain: f64) -> f64 {
-        if gain > self.cut { TAIL * (-(gain - self.cut) / self.excess).exp() } else { 1.0 }
-    }
-}
+/// Least mean excess of the noise's gains over their 90 % quantile, nats.
+pub const LEAST_EXCESS: f64 = 1.0;

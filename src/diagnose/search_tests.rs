@@ -250,7 +250,7 @@ fn a_lift_that_planes_take_up_is_none() {
 
 #[test]
 fn thresholds_and_chances_are_each_others_inverse() {
-    let gains = NoiseGains((1..=600).map(|k| -(1.0 - f64::from(k) / 601.0).ln()).collect());
+    let gains = NoiseGains::simulated(600, 0.5, |k| -(1.0 - (k + 1) as f64 / 601.0).ln());
     // Exponential: passed with probability exp(-g).
     for level in [0.05, 0.01, 1e-3, 1e-5] {
         let threshold = gains.threshold(level);
