@@ -269,11 +269,6 @@ impl Case<'_> {
             .filter(|m| baseline.is_none_or(|b| !b.loses_alike(m, &self.survey)))
             .map(other_findings::missing)
             .collect();
-        let least = |&(effect, name, least): &(&'static str, &str, f64)| {
-            let mut minimum = Map::new();
-            minimum.insert(name.into(), serde_json::json!(least));
-            Detectable { effect, minimum }
-        };
-        (found, lost.detectable.iter().map(least).collect())
+        (found, lost.detectable)
     }
 }

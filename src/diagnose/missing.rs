@@ -4,9 +4,9 @@
 //! factor of e and more: a finding must hold over the views. Steps on lawful axes have a name
 //! unless a nameless curve does clearly better.
 
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
-use super::diagnosis::Curve;
+use super::diagnosis::{Curve, Detectable};
 use super::few_losses::few_losses;
 use super::field::Field;
 use super::layers::Survey;
@@ -14,13 +14,13 @@ use super::margins::Margins;
 use super::missing_cells::{Cell, cells, fine};
 use super::missing_report::{Told, shadow_finding};
 use super::missing_search::{Judged, Losses};
-use super::missing_shapes::{Shape, Step, curves, steps};
+use super::missing_shapes::{Step, curves, steps};
 use super::replication::{Measured, agree};
 use super::shadow::{Band, Sides, band};
 use super::tiles::Tile;
 use crate::camera::Camera;
 use crate::rng::Seed;
-use crate::terms::{Axis, Extent};
+use crate::terms::{Axis, Basis, Extent};
 
 /// Losses that follow an axis.
 #[derive(Debug, Clone)]
@@ -53,7 +53,7 @@ pub struct DropoutOutcome {
     pub findings: Vec<DropoutFinding>,
     /// Families with the middle of the faintest whole step that 80 % of such recordings would
     /// show, in degrees or m: what begins farther out is not seen.
-    pub detectable: Vec<(&'static str, &'static str, f64)>,
+    pub detectable: Vec<Detectable>,
     /// What is no finding, in words.
     pub notes: Vec<String>,
 }
@@ -146,7 +146,7 @@ fn losses(
         let mut ledger = Losses::new(views, &explained);
         let open_steps: Vec<Step> =
             steps.iter().filter(|s| !taken.contains(&s.axis)).copied().collect();
-        let open_curves: Vec<Shape> =
+        let open_curves: Vec<Basis> =
             curves.iter().filter(|c| !taken.contains(&c.axis())).cloned().collect();
         let (first, _) = ledger.judge(&open_steps, &open_curves, None);
         let Some(best) = choose(&first) else { break };
@@ -274,17 +274,17 @@ fn rivals(judged: &[Judged]) -> Vec<(&'static str, f64)> {
     all
 }
 
-fn detectable(
-    losses: &Losses<'_>,
-    steps: &[Step],
-    threshold: f64,
-) -> Vec<(&'static str, &'static str, f64)> {
-    let name = |s: Step| match (s.axis, s.width > 0.0) {
-        (Axis::Theta, _) => (s.family(), "theta50_deg", s.middle.to_degrees()),
-        (_, true) => (s.family(), "z50_m", s.middle),
-        (_, false) => (s.family(), "z50_m, near side", s.middle),
+fn detectable(losses: &Losses<'_>, steps: &[Step], threshold: f64) -> Vec<Detectable> {
+    let least = |s: Step| {
+        let (name, value) = match (s.axis, s.width > 0.0) {
+            (Axis::Theta, _) => ("theta50_deg", s.middle.to_degrees()),
+            (_, true) => ("z50_m", s.middle),
+            (_, false) => ("z50_m, near side", s.middle),
+        };
+        let minimum = Map::from_iter([(name.to_string(), json!(value))]);
+        Detectable { effect: s.family(), minimum }
     };
-    losses.detectable(steps, threshold).into_iter().map(name).collect()
+    losses.detectable(steps, threshold).into_iter().map(least).collect()
 }
 
 #[cfg(test)]

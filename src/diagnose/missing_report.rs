@@ -9,6 +9,7 @@ use super::missing_cells::Cell;
 use super::missing_fit::{Fitted, Point, bounded, fit, points};
 use super::missing_search::Judged;
 use super::missing_shapes::{Shape, Step};
+use super::parameters::estimate;
 use super::shadow::Band;
 use crate::camera::Camera;
 use crate::terms::{Axis, Basis, Extent};
@@ -52,7 +53,7 @@ impl Told<'_> {
         };
         match &won.shape {
             Shape::Step(step) => self.step(*step, &mut finding),
-            Shape::Curve(axis, basis) => self.curve(*axis, basis, &mut finding),
+            Shape::Curve(basis) => self.curve(basis, &mut finding),
         }
         finding
     }
@@ -69,7 +70,7 @@ impl Told<'_> {
         finding.curve = binned(&all, step.axis, span, loss);
     }
 
-    fn curve(&self, axis: Axis, basis: &Basis, finding: &mut DropoutFinding) {
+    fn curve(&self, basis: &Basis, finding: &mut DropoutFinding) {
         let (span, at): ([f64; 2], At) = match basis {
             Basis::Curve { over, low, high, .. } => {
                 let over = *over;
@@ -79,7 +80,7 @@ impl Told<'_> {
         };
         let all = points(self.fine, &at, span);
         finding.size = mean(&all, |p| (p.share - self.base).max(0.0));
-        finding.curve = binned(&all, axis, span, |_| self.base);
+        finding.curve = binned(&all, basis.axis(), span, |_| self.base);
         finding.curve.model = finding.curve.y.clone();
         finding.interval = crowded(&finding.curve, self.base, (span[1] - span[0]) / BINS as f64);
     }
@@ -98,21 +99,18 @@ fn crowded(curve: &Curve, base: f64, bin: f64) -> [f64; 2] {
     [low - 0.5 * bin, high + 0.5 * bin]
 }
 
-fn estimate(value: f64, std_error: Option<f64>) -> Value {
-    json!({"value": value, "std_error": std_error})
-}
-
 fn parameters(fitted: &Fitted) -> Map<String, Value> {
     let Fitted { step, std_error: [middle, width, share], .. } = fitted;
     let (unit, names) = match step.axis {
         Axis::Theta => (1f64.to_degrees(), ["theta50_deg", "width_deg"]),
         _ => (1.0, ["z50_m", "width_m"]),
     };
+    let error = |of: &Option<f64>| of.map_or(f64::NAN, |e| unit * e);
     let mut all = Map::new();
-    all.insert(names[0].into(), estimate(unit * step.middle, middle.map(|e| unit * e)));
-    all.insert(names[1].into(), estimate(unit * step.width, width.map(|e| unit * e)));
-    if share.is_some() {
-        all.insert("share".into(), estimate(step.share, *share));
+    all.insert(names[0].into(), estimate(unit * step.middle, error(middle)));
+    all.insert(names[1].into(), estimate(unit * step.width, error(width)));
+    if let Some(error) = *share {
+        all.insert("share".into(), estimate(step.share, error));
     }
     all
 }
@@ -165,7 +163,7 @@ fn binned(
 pub fn shadow_finding(band: Band, fields: &[Field]) -> DropoutFinding {
     let mut parameters = Map::new();
     if band.lawful {
-        parameters.insert("share".into(), estimate(band.share[0].min(1.0), Some(band.share[1])));
+        parameters.insert("share".into(), estimate(band.share[0].min(1.0), band.share[1]));
     }
     parameters.insert("side".into(), json!(["left", "right"][band.side]));
     let (mut lost, mut asked) = (0.0, 0.0);

@@ -113,7 +113,7 @@ impl<'a> Losses<'a> {
             Shape::Step(step) => views
                 .map(|v| step.column(v, self.base).iter().map(|h| size[0] * h).collect())
                 .collect(),
-            Shape::Curve(_, basis) => views
+            Shape::Curve(basis) => views
                 .map(|v| v.iter().map(|c| basis.value(size, &c.place, &mut row)).collect())
                 .collect(),
         }
@@ -149,7 +149,7 @@ impl<'a> Losses<'a> {
                 };
                 agree([half(false), half(true)])
             }
-            Shape::Curve(_, basis) => {
+            Shape::Curve(basis) => {
                 let evidence = self.evidence(basis);
                 Halves::of(&evidence, second, CURVE_PRECISION, &[basis.count()])?.replicate(&[0])
             }
@@ -178,7 +178,7 @@ impl<'a> Losses<'a> {
     pub fn judge(
         &self,
         steps: &[Step],
-        curves: &[Shape],
+        curves: &[Basis],
         null: Option<Seed>,
     ) -> (Vec<Judged>, NoiseGains) {
         let columns: Vec<Column> = steps.par_iter().map(|s| self.column(*s)).collect();
@@ -194,13 +194,13 @@ impl<'a> Losses<'a> {
             })
             .collect();
         let mut nulls = Vec::new();
-        for shape in curves {
-            let Shape::Curve(_, basis) = shape else { continue };
+        for basis in curves {
             let evidence = self.evidence(basis);
             let Some(won) = gain(&evidence, CURVE_PRECISION) else { continue };
             nulls.extend(Null::of(&evidence, 0, CURVE_PRECISION));
             let coefficients = won.beta.as_slice().to_vec();
-            judged.push(Judged { shape: shape.clone(), gain: won.total, coefficients });
+            let shape = Shape::Curve(basis.clone());
+            judged.push(Judged { shape, gain: won.total, coefficients });
         }
         judged.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let Some(seed) = null else { return (judged, NoiseGains::default()) };

@@ -37,21 +37,21 @@ impl Step {
 #[derive(Debug, Clone)]
 pub enum Shape {
     Step(Step),
-    Curve(Axis, Basis),
+    Curve(Basis),
 }
 
 impl Shape {
     pub fn axis(&self) -> Axis {
         match self {
             Shape::Step(step) => step.axis,
-            Shape::Curve(axis, _) => *axis,
+            Shape::Curve(basis) => basis.axis(),
         }
     }
 
     pub fn family(&self) -> Option<&'static str> {
         match self {
             Shape::Step(step) => Some(step.family()),
-            Shape::Curve(..) => None,
+            Shape::Curve(_) => None,
         }
     }
 }
@@ -91,27 +91,25 @@ pub fn steps(reach: &Extent) -> Vec<Step> {
 }
 
 /// Curves without a name.
-pub fn curves(camera: &Camera, reach: &Extent) -> Vec<Shape> {
+pub fn curves(camera: &Camera, reach: &Extent) -> Vec<Basis> {
     let (width, height) = (camera.width as f64, camera.height as f64);
     let mut all = Vec::new();
-    let mut curve = |axis, over, [low, high]: [f64; 2], nodes| {
+    let mut curve = |over, [low, high]: [f64; 2], nodes| {
         if high > low {
-            let basis = Basis::Curve { over, low, high, nodes, times: Modulation::One };
-            all.push(Shape::Curve(axis, basis));
+            all.push(Basis::Curve { over, low, high, nodes, times: Modulation::One });
         }
     };
-    curve(Axis::Radius, Coordinate::Radius, [0.0, 1.0], 8);
-    curve(Axis::Column, Coordinate::Column, [0.0, width], 16);
-    curve(Axis::Row, Coordinate::Row, [0.0, height], 12);
-    curve(Axis::EdgeDistance, Coordinate::Edge, [0.0, 24.0], 5);
-    curve(Axis::SessionTime, Coordinate::Session, reach.session, 6);
-    curve(Axis::Z, Coordinate::Z, reach.z, 10);
-    curve(Axis::Theta, Coordinate::Theta, reach.theta, 8);
+    curve(Coordinate::Radius, [0.0, 1.0], 8);
+    curve(Coordinate::Column, [0.0, width], 16);
+    curve(Coordinate::Row, [0.0, height], 12);
+    curve(Coordinate::Edge, [0.0, 24.0], 5);
+    curve(Coordinate::Session, reach.session, 6);
+    curve(Coordinate::Z, reach.z, 10);
+    curve(Coordinate::Theta, reach.theta, 8);
     if reach.is_unevenly_lit() {
-        curve(Axis::Intensity, Coordinate::Light, reach.light, 8);
+        curve(Coordinate::Light, reach.light, 8);
     }
-    let map = Basis::Map { width, height, across: 8, down: 6, times: Modulation::One };
-    all.push(Shape::Curve(Axis::Pixel, map));
+    all.push(Basis::Map { width, height, across: 8, down: 6, times: Modulation::One });
     all
 }
 

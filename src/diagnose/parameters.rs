@@ -6,13 +6,9 @@ use super::candidate::RECALIBRATE;
 use crate::effects::{self, Estimate, Fitted};
 use crate::terms::Basis;
 
-/// A parameter with its standard error.
+/// A parameter with its standard error, which is null where it is not finite.
 pub fn estimate(value: f64, std_error: f64) -> Value {
-    if std_error.is_finite() {
-        json!({ "value": value, "std_error": std_error })
-    } else {
-        json!({ "value": value, "std_error": null })
-    }
+    json!({ "value": value, "std_error": std_error })
 }
 
 /// Of a family's fitted shape; a curve without a name has none.

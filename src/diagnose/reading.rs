@@ -3,15 +3,14 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
-use serde_json::Map;
 use statrs::distribution::{Binomial, Discrete, DiscreteCDF};
 
 use super::diagnosis::Finding;
 use super::engine::FEWEST_VIEWS;
 use super::field::Field;
+use super::hanging::one;
 use super::known::KnownTerms;
 use super::other_findings::named;
-use super::parameters::estimate;
 use crate::Progress;
 use crate::effects::RAY_FOR_DEPTH;
 use crate::error::{Error, Result};
@@ -142,11 +141,9 @@ fn range_term() -> Term {
 
 /// The finding that goes with [`as_ranges`].
 fn ranges(p: f64) -> Finding {
-    let mut parameters = Map::new();
-    parameters.insert("share".into(), estimate(1.0, 0.01));
     Finding {
         share: 1e6,
-        parameters,
+        parameters: one("share", 1.0, 0.01),
         p_adjusted: Some(p),
         terms: vec![range_term()],
         ..named("range-not-depth", Statistic::Bias, Axis::Radius)

@@ -1,13 +1,12 @@
 //! What planes alone cannot tell: offset, scale and drift, where distances were measured by other
 //! means.
 
-use serde_json::Map;
-
 use super::anchor::families;
 use super::case::Case;
 use super::checked::checked;
 use super::diagnosis::{Alternative, CannotTell, Finding, Size, Status};
 use super::field::Field;
+use super::hanging::one;
 use super::heldout;
 use super::known::KnownTerms;
 use super::laws::{Beside, FEWEST, Law, laws};
@@ -90,11 +89,10 @@ pub fn findings(
         .map(|(effect, p)| Alternative { effect, probability: Some(p) })
         .collect();
     let close = odds.get(1).is_some_and(|o| o.1 > (-0.5 * AS_GOOD_NATS).exp());
-    let mut parameters = Map::new();
-    match best.family {
-        "depth-scale" => parameters.insert("scale".into(), estimate(1.0 + beta, error)),
-        "disparity-offset" => parameters.insert("offset_px".into(), estimate(beta, error)),
-        _ => parameters.insert("relative".into(), estimate(beta, error)),
+    let mut parameters = match best.family {
+        "depth-scale" => one("scale", 1.0 + beta, error),
+        "disparity-offset" => one("offset_px", beta, error),
+        _ => one("relative", beta, error),
     };
     for (name, [value, error]) in &best.settled {
         parameters.insert((*name).into(), estimate(*value, *error));
