@@ -5,8 +5,10 @@ use serde_json::Map;
 use super::along::Along;
 use super::diagnosis::{Finding, MapRow};
 use super::naming::{naming, physics};
+use super::other_findings::named;
 use super::outcome::Outcome;
 use super::parameters::{of_any_formula, parameters};
+use super::pixels::terms_of;
 use super::scene::{Scene, size};
 use super::shape;
 use crate::effects::Fitted;
@@ -16,13 +18,7 @@ use crate::terms::{Axis, Basis, Modulation, Term};
 /// All terms of a layer as findings. Terms of one family are one finding, and a nameless curve on
 /// the axis of a name is that name's shape, met better.
 pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
-    let terms: Vec<Term> = (0..outcome.chosen.len())
-        .map(|k| Term {
-            statistic: scene.statistic,
-            basis: outcome.chosen[k].candidate.basis.clone(),
-            coefficients: outcome.coefficients(k),
-        })
-        .collect();
+    let terms = terms_of(outcome, scene.statistic);
     let values: Vec<Vec<Vec<f64>>> = terms.iter().map(|t| scene.values(t)).collect();
     let responses = scene.responses();
     // Groups: who goes with whom.
@@ -111,31 +107,24 @@ fn finding(
     let shape =
         effect.is_none().then(|| shape::words(&terms[main].basis, &terms[main].coefficients));
     let physics = physics(status, effect, scene.statistic, axis, shape.as_deref());
-    let mut finding = Finding {
+    Finding {
         status,
         effect,
         alternatives,
-        statistic: scene.statistic,
-        axis,
         interval: along.interval(scene, &mine),
-        unit: axis.unit(),
-        share: 0.0,
-        minor: false,
+        // Nats for now; the engine turns them into shares.
+        share: group.iter().map(|&k| outcome.chosen[k].gain).sum(),
         parameters,
         size: size(scene, &mine),
         p_adjusted: Some(chosen.p),
         replicated: outcome.halves.as_ref().and_then(|h| h.replicate(group)),
         physics,
-        next_view: None,
-        contradicted: None,
         shape,
         curve: Some(along.curve(scene, &left, &mine)),
         terms: group.iter().map(|&k| terms[k].clone()).collect(),
         covariance: covariance_of(outcome, group),
-    };
-    // Nats for now; the engine turns them into shares.
-    finding.share = group.iter().map(|&k| outcome.chosen[k].gain).sum();
-    finding
+        ..named(effect.unwrap_or_default(), scene.statistic, axis)
+    }
 }
 
 /// Of the terms of a group.

@@ -52,23 +52,15 @@ pub fn hanging(found: Hanging, sigma_mm: f64, replicated: Option<bool>) -> Findi
             .iter()
             .map(|&effect| Alternative { effect, probability: None })
             .collect(),
-        statistic: found.statistic,
-        axis: found.axis,
         interval: found.interval,
-        unit: found.axis.unit(),
         share: found.nats,
-        minor: false,
         parameters: found.parameters,
         size: Size { mm: found.size_sigma * sigma_mm, sigma: found.size_sigma },
         p_adjusted: Some(found.p),
         replicated,
         physics: physics(status, effect, found.statistic, found.axis, found.words.as_deref()),
-        next_view: None,
-        contradicted: None,
         shape: found.words,
-        curve: None,
-        terms: Vec::new(),
-        covariance: Covariance::default(),
+        ..named(effect.unwrap_or_default(), found.statistic, found.axis)
     }
 }
 
@@ -85,23 +77,16 @@ pub fn missing(found: DropoutFinding) -> Finding {
         status,
         effect: found.family,
         alternatives,
-        statistic: Statistic::Dropout,
-        axis: found.axis,
         interval: found.interval,
-        unit: found.axis.unit(),
         share: found.gain,
-        minor: false,
         parameters: found.parameters,
         size: Size { mm: 0.0, sigma: found.size },
         p_adjusted: Some(found.p),
         replicated: found.replicated,
         physics: words,
-        next_view: None,
-        contradicted: None,
         shape,
         curve: Some(found.curve),
-        terms: Vec::new(),
-        covariance: Covariance::default(),
+        ..named(found.family.unwrap_or_default(), Statistic::Dropout, found.axis)
     }
 }
 

@@ -15,7 +15,7 @@ use super::other_findings::named;
 use super::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::replication_textures::beyond;
 use super::shadow::{Sides, largest_share};
-use super::steps::contradicted;
+use super::steps::{contradicted, step_nats};
 use super::structure::Structure;
 use super::tails::{Mixture, SURELY};
 use super::tiles::Tile;
@@ -69,7 +69,7 @@ impl Case<'_> {
         };
         let steps = contradicted(&self.fields, &self.known, self.recording).into_iter();
         let steps = steps.map(|(id, axis, sigma)| Finding {
-            share: 10.0 + 100.0 * sigma * sigma,
+            share: step_nats(sigma),
             size: Size { mm: sigma * sigma_mm, sigma },
             ..finding(&self.known, id, Statistic::Distribution, axis)
         });

@@ -11,13 +11,12 @@ use super::heldout;
 use super::known::KnownTerms;
 use super::laws::{Beside, FEWEST, Law, laws};
 use super::learnt::Learnt;
-use super::naming::{MIN_PROBABILITY, physics};
+use super::naming::MIN_PROBABILITY;
 use super::null::{NoiseGains, Null, student};
 use super::other_findings::named;
 use super::overstated::SHARE;
 use super::parameters::estimate;
 use crate::effects;
-use crate::model::Covariance;
 use crate::rng::Seed;
 use crate::sensors::SensorKind;
 use crate::terms::{Axis, Statistic, Term};
@@ -46,11 +45,6 @@ pub fn findings(
     level: f64,
     seed: Seed,
 ) -> Vec<Finding> {
-    let nulls: Vec<&Null> = laws.iter().map(|l| &l.null).collect();
-    if nulls.is_empty() {
-        return Vec::new();
-    }
-    let noise = NoiseGains::of(&nulls, Seed(seed.0 ^ 0x5eed));
     // An error measured on few references makes a Student's t of a Gaussian.
     let safe = |l: &Law| {
         let gain = (l.gain / l.null.dispersion / excess).max(0.0);
@@ -59,6 +53,8 @@ pub fn findings(
     let Some(best) = laws.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)) else {
         return Vec::new();
     };
+    let nulls: Vec<&Null> = laws.iter().map(|l| &l.null).collect();
+    let noise = NoiseGains::of(&nulls, Seed(seed.0 ^ 0x5eed));
     // So large a law may be missing in the model, too, where it was learnt from references.
     let small = best.rms_m < (CLEARLY * best.error_m * excess.sqrt()).max(LEAST_M);
     if small || safe(best) < noise.threshold(level) {
@@ -100,25 +96,14 @@ pub fn findings(
     let status = if close { Status::OneOf } else { Status::Named };
     vec![Finding {
         status,
-        effect: Some(best.family),
         alternatives,
-        statistic: Statistic::Bias,
-        axis: best.axis,
         interval: best.reach,
-        unit: best.axis.unit(),
         share: best.gain,
-        minor: false,
         parameters,
         size: Size { mm: 1e3 * best.rms_m, sigma: best.rms_sigma },
         p_adjusted: Some(noise.p(safe(best))),
         replicated: best.replicated,
-        physics: physics(status, Some(best.family), Statistic::Bias, best.axis, None),
-        next_view: None,
-        contradicted: None,
-        shape: None,
-        curve: None,
-        terms: Vec::new(),
-        covariance: Covariance::default(),
+        ..named(best.family, Statistic::Bias, best.axis)
     }]
 }
 
@@ -219,6 +204,6 @@ pub fn cannot_tell(fields: &[Field], kind: Option<SensorKind>) -> Vec<CannotTell
         CannotTell { effect: "disparity-offset", why: why("A wrong offset of the disparity") },
         CannotTell { effect: "thermal-drift", why: why("A drift of the scale over the session") },
     ];
-    all.retain(|c| effects::find(c.effect).is_none_or(|e| e.card().applies_to(kind)));
+    all.retain(|c| can_happen(c.effect, kind));
     all
 }

@@ -1,13 +1,11 @@
 //! Steps of the words, and the variance that comes by other names than sigma.
 
-use serde_json::Map;
-
 use super::diagnosis::{Finding, Size};
 use super::field::Field;
+use super::hanging::one;
 use super::known::KnownTerms;
 use super::lattice::{Quantisation, RawHistogram};
 use super::other_findings::named;
-use super::parameters::estimate;
 use super::pixels::{fixed_px2, mean_of, typical_sigma_mm, typical_sigma_px};
 use super::structure::Structure;
 use crate::frame::DepthCode;
@@ -133,6 +131,11 @@ pub(super) fn contradicted(
 /// A step is worth telling when the error it makes is this share of the noise.
 const STEP_SHARE: f64 = 0.1;
 
+/// The weight of a step among the findings, in place of nats: no fit gives any.
+pub(super) fn step_nats(sigma: f64) -> f64 {
+    10.0 + 100.0 * sigma * sigma
+}
+
 pub(super) fn steps(
     lattice: &Quantisation,
     known: &KnownTerms,
@@ -141,79 +144,49 @@ pub(super) fn steps(
     sigma_mm: f64,
     second: &[bool],
 ) -> Vec<Finding> {
-    let mut found = Vec::new();
     let halves = [false, true].map(|half| {
         let mine = fields.iter().zip(second).filter(|(_, s)| **s == half);
         lattice_of(mine.map(|(f, _)| f), recording)
     });
-    let tested = |of: fn(&Quantisation) -> Option<f64>, p: Option<f64>| {
-        let [a, b] = halves.map(|h| of(&h));
-        let alike = a.zip(b).is_some_and(|(a, b)| (a / b - 1.0).abs() < SAME_STEP);
-        (Some(alike), p)
+    let replicated = |step: fn(&Quantisation) -> Option<f64>| {
+        let [a, b] = halves.map(|half| step(&half));
+        Some(a.zip(b).is_some_and(|(a, b)| (a / b - 1.0).abs() < SAME_STEP))
     };
-    let mut add = |effect,
-                   axis,
-                   interval,
-                   name: &str,
-                   step: f64,
-                   error,
-                   size: Size,
-                   (replicated, p_adjusted)| {
-        let mut parameters = Map::new();
-        parameters.insert(name.into(), estimate(step, error));
-        found.push(Finding {
-            interval,
-            share: 10.0 + 100.0 * size.sigma * size.sigma,
-            parameters,
-            size,
-            p_adjusted,
-            replicated,
-            ..named(effect, Statistic::Distribution, axis)
-        });
+    let found = |effect, axis, size: Size| Finding {
+        share: step_nats(size.sigma),
+        size,
+        ..named(effect, Statistic::Distribution, axis)
     };
-    let z = crate::stats::range(fields.iter().map(|f| f.plane.depth(0.0, 0.0)));
     let mut sigma_px: Vec<f32> = fields.iter().filter_map(|f| f.sigma.first().copied()).collect();
     let sigma_px = f64::from(crate::stats::median_in_place(&mut sigma_px));
-    if let Some(step) = lattice.disparity_step_px
-        && recording.sensor.may_have_disparity()
-        && !known.has("disparity-quantisation")
-        && own_step(lattice, recording, fields[0].scale_px_m).is_none()
-    {
+    let of_disparity = lattice.disparity_step_px.filter(|_| {
+        recording.sensor.may_have_disparity()
+            && !known.has("disparity-quantisation")
+            && own_step(lattice, recording, fields[0].scale_px_m).is_none()
+    });
+    let of_disparity = of_disparity.and_then(|step| {
         let sigma = step / 12f64.sqrt() / sigma_px;
-        if sigma > STEP_SHARE {
-            let size = Size { mm: sigma * sigma_mm, sigma };
-            let raw = matches!(recording.sensor.code, DepthCode::Disparity { .. });
-            let error = if raw { 0.0 } else { 0.002 * step };
-            let axis = Axis::DisparityPhase;
-            add(
-                "disparity-quantisation",
-                axis,
-                [0.0, 1.0],
-                "step_px",
-                step,
-                error,
-                size,
-                tested(|l| l.disparity_step_px, lattice.disparity_p),
-            );
-        }
-    }
-    if let Some(step) = lattice.depth_step_m
-        && !known.has("depth-rounding")
-    {
+        let size = Size { mm: sigma * sigma_mm, sigma };
+        let error = if is_raw(recording) { 0.0 } else { 0.002 * step };
+        (sigma > STEP_SHARE).then(|| Finding {
+            interval: [0.0, 1.0],
+            parameters: one("step_px", step, error),
+            p_adjusted: lattice.disparity_p,
+            replicated: replicated(|l| l.disparity_step_px),
+            ..found("disparity-quantisation", Axis::DisparityPhase, size)
+        })
+    });
+    let of_depth = lattice.depth_step_m.filter(|_| !known.has("depth-rounding"));
+    let of_depth = of_depth.and_then(|step| {
         let mm = 1e3 * step / 12f64.sqrt();
         let size = Size { mm, sigma: mm / sigma_mm };
-        if size.sigma > STEP_SHARE {
-            add(
-                "depth-rounding",
-                Axis::Z,
-                z,
-                "step_m",
-                step,
-                0.0,
-                size,
-                tested(|l| l.depth_step_m, lattice.depth_p),
-            );
-        }
-    }
-    found
+        (size.sigma > STEP_SHARE).then(|| Finding {
+            interval: crate::stats::range(fields.iter().map(|f| f.plane.depth(0.0, 0.0))),
+            parameters: one("step_m", step, 0.0),
+            p_adjusted: lattice.depth_p,
+            replicated: replicated(|l| l.depth_step_m),
+            ..found("depth-rounding", Axis::Z, size)
+        })
+    });
+    of_disparity.into_iter().chain(of_depth).collect()
 }
