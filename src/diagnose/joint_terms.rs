@@ -117,30 +117,22 @@ impl Joint<'_> {
         all.into_iter().find(|s| behind(&best, &s.scores) < 1.0)
     }
 
-    /// Terms that the maps make needless, the most needless first.
+    /// Terms that the maps make needless. The terms `alone` bring so much without them, nats.
     fn drop_idle(&self, settled: &mut Settled, chosen: &[Chosen], alone: f64) {
-        loop {
-            let all = total(&settled.scores);
-            let named = alone > ADEQUATE * all;
-            let idle = |&t: &usize| {
-                let c = &chosen[t].candidate;
-                if is_rough(c) || (named && is_radial_name(c)) {
-                    return None;
-                }
-                let others: Vec<usize> =
-                    settled.terms.iter().copied().filter(|o| *o != t).collect();
-                let scores = self.scores(&settled.without, &others, |_| true);
-                let lost = all - total(&scores);
-                let of_target = !is_of_sensor(c);
-                let share = if of_target { MAPS_SHARE } else { TERM_SHARE };
-                let needed = lost > share * all && behind(&settled.scores, &scores) > TERM_CLEARLY;
-                let believed = !of_target || self.size(settled, t) < LARGEST_USUAL;
-                (!(needed && believed)).then_some((lost, others, scores))
-            };
-            let next = settled.terms.iter().filter_map(idle).min_by(|a, b| a.0.total_cmp(&b.0));
-            let Some((_, others, scores)) = next else { return };
-            (settled.terms, settled.scores) = (others, scores);
-        }
+        let concerned = |s: &Settled, t: usize| {
+            let c = &chosen[t].candidate;
+            let named = alone > ADEQUATE * total(&s.scores);
+            !(is_rough(c) || (named && is_radial_name(c)))
+        };
+        let needless = |s: &Settled, t: usize, lost: f64, scores: &[f64]| {
+            let of_target = !is_of_sensor(&chosen[t].candidate);
+            let share = if of_target { MAPS_SHARE } else { TERM_SHARE };
+            let clear = behind(&s.scores, scores) > TERM_CLEARLY;
+            let needed = lost > share * total(&s.scores) && clear;
+            let believed = !of_target || self.size(s, t) < LARGEST_USUAL;
+            !(needed && believed)
+        };
+        self.drop_while(settled, concerned, needless);
     }
 
     /// Nameless curves that bring little beside a shape of the target.
@@ -148,11 +140,11 @@ impl Joint<'_> {
         if settled.terms.iter().all(|&t| is_of_sensor(&chosen[t].candidate)) {
             return;
         }
-        let concerned = |t: usize| {
+        let concerned = |_: &Settled, t: usize| {
             let c = &chosen[t].candidate;
             c.family.is_none() && !c.basis.is_fine() && is_of_sensor(c)
         };
-        self.drop_little(settled, BESIDE_TARGET, &concerned);
+        self.drop_while(settled, concerned, brings_less_than(BESIDE_TARGET));
     }
 
     /// Nameless curves that bring next to nothing beside a name on their own axis: of columns that
@@ -165,30 +157,34 @@ impl Joint<'_> {
             .filter(|c| c.family.is_some())
             .map(|c| c.basis.axis())
             .collect();
-        let concerned = |t: usize| {
+        let concerned = |_: &Settled, t: usize| {
             let c = &chosen[t].candidate;
             c.family.is_none() && named.contains(&c.basis.axis())
         };
-        self.drop_little(settled, TERM_SHARE, &concerned);
+        self.drop_while(settled, concerned, brings_less_than(TERM_SHARE));
     }
 
-    /// Terms among the `concerned` without which the parts left out lose less than this share, the
-    /// one that is missed least first.
-    fn drop_little(&self, settled: &mut Settled, share: f64, concerned: &dyn Fn(usize) -> bool) {
+    /// Leave out terms among the `concerned` that are `needless`, the one that is missed least first: by
+    /// what the parts left out lose without it, nats, and by their scores then.
+    fn drop_while(
+        &self,
+        settled: &mut Settled,
+        concerned: impl Fn(&Settled, usize) -> bool,
+        needless: impl Fn(&Settled, usize, f64, &[f64]) -> bool,
+    ) {
         loop {
             let all = total(&settled.scores);
-            let little = |&t: &usize| {
-                let others: Vec<usize> =
-                    settled.terms.iter().copied().filter(|o| *o != t).collect();
+            let dropped = |&t: &usize| {
+                let others = without(&settled.terms, t);
                 let scores = self.scores(&settled.without, &others, |_| true);
                 let lost = all - total(&scores);
-                (lost < share * all).then_some((lost, others, scores))
+                needless(settled, t, lost, &scores).then_some((lost, others, scores))
             };
             let next = settled
                 .terms
                 .iter()
-                .filter(|&&t| concerned(t))
-                .filter_map(little)
+                .filter(|&&t| concerned(settled, t))
+                .filter_map(dropped)
                 .min_by(|a, b| a.0.total_cmp(&b.0));
             let Some((_, others, scores)) = next else { return };
             (settled.terms, settled.scores) = (others, scores);
@@ -214,17 +210,26 @@ impl Joint<'_> {
             if total(&self.scores(&settled.without, &settled.terms, of_sensor)) >= 0.0 {
                 return;
             }
-            let without = |&t: &usize| {
-                let others: Vec<usize> =
-                    settled.terms.iter().copied().filter(|o| *o != t).collect();
+            let harm = |&t: &usize| {
+                let others = without(&settled.terms, t);
                 (total(&self.scores(&settled.without, &others, of_sensor)), others)
             };
-            let best = settled.terms.iter().map(without).max_by(|a, b| a.0.total_cmp(&b.0));
+            let best = settled.terms.iter().map(harm).max_by(|a, b| a.0.total_cmp(&b.0));
             let Some((_, others)) = best else { return };
             settled.scores = self.scores(&settled.without, &others, |_| true);
             settled.terms = others;
         }
     }
+}
+
+/// The other terms.
+fn without(terms: &[usize], term: usize) -> Vec<usize> {
+    terms.iter().copied().filter(|t| *t != term).collect()
+}
+
+/// Needless is a term without which the parts left out lose less than this share.
+fn brings_less_than(share: f64) -> impl Fn(&Settled, usize, f64, &[f64]) -> bool {
+    move |settled, _, lost, _| lost < share * total(&settled.scores)
 }
 
 /// Of a mean over its standard error this large, over so many parts.
