@@ -7,7 +7,7 @@ use super::checked::{Checked, is_tilted, scatter};
 use super::evidence::{Evidence, gain};
 use super::null::Null;
 use super::replication::{Measured, agree};
-use super::warm_up::{Reading, WarmUp, warm_up};
+use super::warm_up::warm_up;
 use crate::terms::Axis;
 
 /// A law that the distances may be off by.
@@ -49,11 +49,10 @@ pub struct Beside {
 }
 
 /// All laws, with what each gains on references left out; none where there are too few.
-pub fn laws(checked: &[Checked], beside: &Beside) -> Vec<Law> {
-    if checked.len() < FEWEST { Vec::new() } else { of(checked, beside) }
-}
-
-fn of(checked: &[Checked], Beside { bent_m, open }: &Beside) -> Vec<Law> {
+pub fn laws(checked: &[Checked], Beside { bent_m, open }: &Beside) -> Vec<Law> {
+    if checked.len() < FEWEST {
+        return Vec::new();
+    }
     let angles = if is_tilted(checked) { 2 } else { 0 };
     let bent = (*bent_m > 0.0).then_some(*bent_m);
     let others = |c: &Checked| -> Vec<f64> {
@@ -131,27 +130,15 @@ fn of(checked: &[Checked], Beside { bent_m, open }: &Beside) -> Vec<Law> {
     for tau in WARM_UPS {
         add("thermal-drift", Axis::SessionTime, &|c| c.z * (1.0 - (-c.session_s / tau).exp()));
     }
-    if let Some(warm_up) = drift(checked, &others, variance, free) {
+    // The variance was measured with few degrees of freedom: a Student's t in place of a Gaussian.
+    let widened = variance * free / (free - 2.0).max(1.0);
+    if let Some(warm_up) = warm_up(checked, &others, widened) {
         for law in laws.iter_mut().filter(|l| l.family == "thermal-drift") {
             law.estimate = warm_up.relative;
             law.settled = vec![("time_constant_s", warm_up.time_constant_s)];
         }
     }
     laws
-}
-
-/// The drift's numbers, whatever its course, beside the `others`. The variance was measured with `free`
-/// degrees of freedom, which makes a Student's t of a Gaussian.
-fn drift(
-    checked: &[Checked],
-    others: &dyn Fn(&Checked) -> Vec<f64>,
-    variance: f64,
-    free: f64,
-) -> Option<WarmUp> {
-    let reading =
-        |c: &Checked| Reading { z: c.z, session_s: c.session_s, off: c.off, beside: others(c) };
-    let readings: Vec<Reading> = checked.iter().map(reading).collect();
-    warm_up(&readings, variance * free / (free - 2.0).max(1.0))
 }
 
 /// A relative error of a few percent, an offset of a few px.

@@ -35,7 +35,7 @@ fn references(
 
 fn found(checked: &[Checked]) -> Vec<(Option<&'static str>, f64)> {
     let told =
-        findings(&of(checked, &Beside::default()), &KnownTerms::default(), 1.0, 0.003, Seed(1));
+        findings(&laws(checked, &Beside::default()), &KnownTerms::default(), 1.0, 0.003, Seed(1));
     told.iter().map(|f| (f.effect, f.parameters["offset_px"]["value"].as_f64().unwrap())).collect()
 }
 
@@ -70,7 +70,7 @@ fn a_bent_target_is_no_law() {
         checked.iter_mut().for_each(|c| c.off += 0.004);
         let told = |bent_m| {
             findings(
-                &of(&checked, &Beside { bent_m, ..Beside::default() }),
+                &laws(&checked, &Beside { bent_m, ..Beside::default() }),
                 &KnownTerms::default(),
                 1.0,
                 0.003,
@@ -91,7 +91,7 @@ fn an_offset_is_seen_beside_a_bend() {
         let mut checked = references(0.06, [0.0; 2], |k| 7 * k % 24, seed);
         checked.iter_mut().for_each(|c| c.off += 0.004);
         let told = findings(
-            &of(&checked, &Beside { bent_m: 0.004, ..Beside::default() }),
+            &laws(&checked, &Beside { bent_m: 0.004, ..Beside::default() }),
             &KnownTerms::default(),
             1.0,
             0.003,

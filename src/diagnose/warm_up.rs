@@ -6,19 +6,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::checked::Checked;
 use super::posterior::Posterior;
 use crate::stats::even;
-
-/// A reference, as far as a drift goes.
-#[derive(Debug, Clone)]
-pub struct Reading {
-    pub z: f64,
-    pub session_s: f64,
-    /// Measured minus reference, m.
-    pub off: f64,
-    /// What is fitted beside the drift.
-    pub beside: Vec<f64>,
-}
 
 /// The drift's size in the end and its time constant as the card's own formula fits them best, with
 /// root mean square distances of what other courses would have.
@@ -41,9 +31,14 @@ const TYPICAL_TAU_S: f64 = 900.0;
 /// Sensors drift by a per cent or two at most (the card's source: some mm at 1 to 2 m, in 20 min).
 const USUAL: f64 = 0.02;
 
-/// From references that are off by this `variance` each, m^2; `None` without a time.
-pub fn warm_up(readings: &[Reading], variance: f64) -> Option<WarmUp> {
-    let session = readings.iter().map(|r| r.session_s).fold(0.0, f64::max);
+/// From references that are off by this `variance` each, m^2, with what is fitted `beside` the drift;
+/// `None` without a time.
+pub fn warm_up(
+    checked: &[Checked],
+    beside: &dyn Fn(&Checked) -> Vec<f64>,
+    variance: f64,
+) -> Option<WarmUp> {
+    let session = checked.iter().map(|r| r.session_s).fold(0.0, f64::max);
     if session <= 0.0 {
         return None;
     }
@@ -53,7 +48,7 @@ pub fn warm_up(readings: &[Reading], variance: f64) -> Option<WarmUp> {
         .enumerate()
         .flat_map(|(course, of)| even(log, TAUS).map(move |log| (course, of, log.exp())))
         .filter_map(|(course, of, tau_s)| {
-            let (evidence, relative) = size(readings, variance, &|t| of(t / tau_s))?;
+            let (evidence, relative) = size(checked, beside, variance, &|t| of(t / tau_s))?;
             let unlikely = 0.5 * (tau_s / TYPICAL_TAU_S).ln().powi(2);
             Some(Node { course, tau_s, evidence: evidence - unlikely, relative })
         })
@@ -80,30 +75,31 @@ struct Node {
 
 /// The drift's size by least squares, where its course is known, and how well that fits.
 fn size(
-    readings: &[Reading],
+    checked: &[Checked],
+    beside: &dyn Fn(&Checked) -> Vec<f64>,
     variance: f64,
     course: &dyn Fn(f64) -> f64,
 ) -> Option<(f64, [f64; 2])> {
-    let beside = readings.first()?.beside.len();
-    let k = beside + 1;
+    let others = beside(checked.first()?).len();
+    let k = others + 1;
     let (mut a, mut b) = (DMatrix::zeros(k, k), DVector::zeros(k));
-    for r in readings {
-        let mut g = r.beside.clone();
-        g.push(r.z * course(r.session_s));
+    for c in checked {
+        let mut g = beside(c);
+        g.push(c.z * course(c.session_s));
         let g = DVector::from_vec(g);
         a += &g * g.transpose() / variance;
-        b += g * (r.off / variance);
+        b += g * (c.off / variance);
     }
     for j in 0..k {
         // What stands beside is free: a whole unit of it is as likely as none.
-        a[(j, j)] += if j == beside { USUAL.powi(-2) } else { 1.0 };
+        a[(j, j)] += if j == others { USUAL.powi(-2) } else { 1.0 };
     }
     let solved = a.cholesky()?;
     let beta = solved.solve(&b);
     let log_determinant = 2.0 * solved.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
     let covariance = solved.inverse();
     let evidence = 0.5 * (beta.dot(&b) - log_determinant);
-    evidence.is_finite().then(|| (evidence, [beta[beside], covariance[(beside, beside)].sqrt()]))
+    evidence.is_finite().then(|| (evidence, [beta[others], covariance[(others, others)].sqrt()]))
 }
 
 #[cfg(test)]
@@ -115,6 +111,7 @@ mod tests {
     use crate::rng::Seed;
 
     const ERROR_M: f64 = 0.001;
+    const PX_M: f64 = 43.5;
 
     /// Sessions of an hour at most, by each course; what is told of the end of a drift that the
     /// session did not see is to hold it: 90 % of 40 are 36, and 31 or fewer have a chance of 2 %.
@@ -127,15 +124,15 @@ mod tests {
                 let relative = rng.random_range(0.003..0.02);
                 let (tau_s, session_s) =
                     (rng.random_range(400.0..1500.0), rng.random_range(900.0..3600.0));
-                let readings: Vec<Reading> = (0..16)
+                let checked: Vec<Checked> = (0..16)
                     .map(|k| {
                         let (z, at_s) = (rng.random_range(0.6..4.0), session_s * k as f64 / 15.0);
                         let noise: f64 = StandardNormal.sample(&mut rng);
                         let off = relative * z * course(at_s / tau_s) + ERROR_M * noise;
-                        Reading { z, session_s: at_s, off, beside: Vec::new() }
+                        Checked { session_s: at_s, ..Checked::ahead(z, off, PX_M) }
                     })
                     .collect();
-                let told = warm_up(&readings, ERROR_M * ERROR_M).expect("a drift");
+                let told = warm_up(&checked, &|_| Vec::new(), ERROR_M * ERROR_M).expect("a drift");
                 let numbers = [(told.relative, relative), (told.time_constant_s, tau_s)];
                 for (k, ([said, error], truth)) in numbers.into_iter().enumerate() {
                     held[k] += usize::from((said - truth).abs() <= 1.645 * error);
@@ -148,9 +145,8 @@ mod tests {
 
     #[test]
     fn no_time_no_drift() {
-        let still = |z| Reading { z, session_s: 0.0, off: 0.001, beside: Vec::new() };
-        let readings: Vec<Reading> = [0.8, 1.5, 2.5].map(still).into();
-        assert!(warm_up(&readings, ERROR_M * ERROR_M).is_none());
-        assert!(warm_up(&[], ERROR_M * ERROR_M).is_none());
+        let still = [0.8, 1.5, 2.5].map(|z| Checked::ahead(z, 0.001, PX_M));
+        assert!(warm_up(&still, &|_| Vec::new(), ERROR_M * ERROR_M).is_none());
+        assert!(warm_up(&[], &|_| Vec::new(), ERROR_M * ERROR_M).is_none());
     }
 }
