@@ -15,7 +15,7 @@ use super::evidence::Gain;
 use super::joint_fit::{Columns, Joint, Reduced};
 use super::joint_terms::{Settled, System, is_rough, is_smooth_and_nameless, total};
 use super::outcome::{Chosen, Outcome};
-use super::replication::{Half, Halves};
+use super::replication::{Half, Halves, spans};
 use super::samples::{ViewData, coarser};
 use crate::camera::Camera;
 use crate::model::Covariance;
@@ -183,24 +183,21 @@ impl Joint<'_> {
             let beyond = self.left(mine, &all).map(|left| own(&left)).collect();
             Some(Half { beta, factor, beyond })
         };
-        let mut first = 0;
-        let mut next = |count: usize| {
-            first += count;
-            first - count..first
-        };
-        let mut spans = Vec::new();
+        let mut counts = Vec::new();
         for &t in &s.terms {
-            spans.push(next(self.columns.bases[t].count()));
+            counts.push(self.columns.bases[t].count());
             // What planes absorb goes with its term.
-            if self.columns.gauges[t].is_some() {
-                spans.push(next(0));
-            }
+            counts.extend(self.columns.gauges[t].is_some().then_some(0));
         }
         if s.penalty.is_some() {
-            let nodes = self.columns.nodes / 2;
-            spans.extend([next(nodes), next(nodes)]);
+            counts.extend([self.columns.nodes / 2; 2]);
         }
-        Some(Halves::new(part(&self.all.a), own(whole), [half(false)?, half(true)?], spans))
+        Some(Halves {
+            metric: part(&self.all.a),
+            whole: own(whole),
+            halves: [half(false)?, half(true)?],
+            spans: spans(&counts),
+        })
     }
 
     /// The terms with what planes absorb of each, and the maps.

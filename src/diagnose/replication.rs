@@ -78,11 +78,21 @@ pub fn agree(halves: [Option<Measured>; 2]) -> Option<bool> {
 /// All terms of a layer as each half has them, fitted together.
 pub struct Halves {
     /// Information of all views.
-    metric: DMatrix<f64>,
-    whole: DVector<f64>,
-    halves: [Half; 2],
+    pub metric: DMatrix<f64>,
+    pub whole: DVector<f64>,
+    pub halves: [Half; 2],
     /// Columns of each chosen term.
-    spans: Vec<Range<usize>>,
+    pub spans: Vec<Range<usize>>,
+}
+
+/// The columns of terms that have so many each, one after the other.
+pub fn spans(counts: &[usize]) -> Vec<Range<usize>> {
+    let mut first = 0;
+    let span = |&count: &usize| {
+        first += count;
+        first - count..first
+    };
+    counts.iter().map(span).collect()
 }
 
 /// What one half says.
@@ -108,15 +118,6 @@ impl Half {
 }
 
 impl Halves {
-    pub fn new(
-        metric: DMatrix<f64>,
-        whole: DVector<f64>,
-        halves: [Half; 2],
-        spans: Vec<Range<usize>>,
-    ) -> Self {
-        Halves { metric, whole, halves, spans }
-    }
-
     /// From the views' evidence on all terms together; `counts` are the terms' columns.
     pub fn of(views: &[Evidence], second: &[bool], prior: f64, counts: &[usize]) -> Option<Self> {
         let n = views.first()?.b.len();
@@ -138,13 +139,8 @@ impl Halves {
         };
         let Evidence { a: metric, b } = sum(None);
         let whole = (&metric + &held).cholesky()?.solve(&b);
-        let mut first = 0;
-        let span = |&count: &usize| {
-            first += count;
-            first - count..first
-        };
-        let spans = counts.iter().map(span).collect();
-        Some(Halves { metric, whole, halves: [fit(false)?, fit(true)?], spans })
+        let halves = [fit(false)?, fit(true)?];
+        Some(Halves { metric, whole, halves, spans: spans(counts) })
     }
 
     /// Do both halves have these terms, taken as one shape? `None` where the terms have no columns
