@@ -1,7 +1,9 @@
 //! What is said in the end: the verdict, findings in order, the extended model, the views.
 
+use std::collections::BTreeSet;
+
 use super::blocks::BLOCK_TILES;
-use super::diagnosis::{Alternative, CannotTell, Finding, HeldOut, Status, Verdict, ViewLine};
+use super::diagnosis::{CannotTell, Finding, HeldOut, Status, Verdict, ViewLine};
 use super::field::Field;
 use super::heldout;
 use super::layers::Survey;
@@ -25,17 +27,8 @@ pub(super) fn not_identifiable(what: &CannotTell) -> Finding {
 /// A name is told once, by its strongest finding.
 pub(super) fn merge(found: &mut Vec<Finding>) {
     found.sort_by(|a, b| b.share.total_cmp(&a.share));
-    let mut names: Vec<&'static str> = Vec::new();
-    found.retain(|f| match f.effect {
-        Some(id) if f.status != Status::NotIdentifiable => {
-            let new = !names.contains(&id);
-            if new {
-                names.push(id);
-            }
-            new
-        }
-        _ => true,
-    });
+    let mut names = BTreeSet::new();
+    found.retain(|f| f.effect.is_none_or(|id| names.insert(id)));
 }
 
 /// Of ten such names on development seeds (501, 777, 902) none was the cause: by Jeffreys's prior.
@@ -60,11 +53,6 @@ pub(super) fn symptoms(found: &mut [Finding]) {
         }
         // What moves past the pattern is matched anew in every frame.
         let renewed = moves && matches!(f.effect, Some("temporal-correlation" | "frame-jitter"));
-        if renewed {
-            let lessened =
-                |a: &mut Alternative| a.probability = a.probability.map(|p| NO_SYMPTOM * p);
-            f.alternatives.iter_mut().for_each(lessened);
-        }
         if symptom {
             f.physics.push_str(" Held against a simulation it may be a symptom: light, blur and window change it too.");
         }
