@@ -5,8 +5,7 @@ use super::battery::Battery;
 use super::between::between;
 use super::case::Case;
 use super::checked::{checked, scatter};
-use super::detectable::detectable;
-use super::diagnosis::{DIAGNOSIS_FORMAT, Detectable, Diagnosis, HeldOut, MapRow, Reference};
+use super::diagnosis::{DIAGNOSIS_FORMAT, Diagnosis, MapRow, Reference};
 use super::engine::Diagnosed;
 use super::far_off::far_off;
 use super::findings;
@@ -42,7 +41,8 @@ impl Case<'_> {
     }
 
     pub fn conclude(mut self, battery: Battery) -> Diagnosed {
-        let Battery { mean, scatter, mut found, refitted, better_form, detectable } = battery;
+        let Battery { mean, scatter, mut found, refitted, better_form, detectable: of_losses } =
+            battery;
         let outcomes = [&mean.outcome, &scatter.outcome];
         let explained: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
         if found.is_empty() {
@@ -56,7 +56,8 @@ impl Case<'_> {
         let heldout = self.heldout();
         let map = self.map(outcomes);
         self.progress.stage("finding what would have been seen");
-        let detectable = self.detectable(outcomes, detectable);
+        let mut detectable = self.detectable(outcomes);
+        detectable.extend(of_losses);
         let mut remarks = self.remarks();
         remarks.extend(untested(outcomes));
         remarks.extend(better_form);
@@ -69,7 +70,11 @@ impl Case<'_> {
         let views = view_lines(&self.fields, &self.survey, &mean.terms, heldout.as_ref());
         let left_out = heldout::left_out(&self.survey, &mean.outcome, &mean.terms);
         let recording = self.recording.root.display().to_string();
-        let (reference, excluded) = (self.reference(), std::mem::take(&mut self.excluded));
+        let reference = match self.baseline {
+            Some(_) => Reference::SimulatedRecording,
+            None => Reference::Model,
+        };
+        let excluded = std::mem::take(&mut self.excluded);
         self.progress.stage("testing the extended model");
         let again = self.after(&extended, &mean, explained);
         let diagnosis = Diagnosis {
@@ -139,33 +144,9 @@ impl Case<'_> {
         });
     }
 
-    fn reference(&self) -> Reference {
-        match self.baseline {
-            Some(_) => Reference::SimulatedRecording,
-            None => Reference::Model,
-        }
-    }
-
-    fn heldout(&self) -> Option<HeldOut> {
-        let (camera, scale_px_m) = (&self.sensor().camera, self.fields[0].scale_px_m);
-        heldout::score(&self.survey, self.model, camera, scale_px_m, self.options)
-    }
-
     fn map(&self, outcomes: [&Outcome; 2]) -> Vec<MapRow> {
         let level = self.options.level;
         let layers = self.scenes().into_iter().zip(outcomes);
         layers.flat_map(|(scene, outcome)| findings::map(&scene, outcome, level)).collect()
-    }
-
-    /// Of what the searches look for, and of losses.
-    fn detectable(
-        &self,
-        [mean, variance]: [&Outcome; 2],
-        losses: Vec<Detectable>,
-    ) -> Vec<Detectable> {
-        let camera = &self.sensor().camera;
-        let mut all = detectable(&self.survey, mean, variance, camera, self.options);
-        all.extend(losses);
-        all
     }
 }

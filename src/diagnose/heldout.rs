@@ -5,14 +5,11 @@ use rand::seq::SliceRandom;
 
 use super::case::Case;
 use super::diagnosis::{HeldOut, LeftOut};
-use super::engine::DiagnoseOptions;
 use super::layers::Survey;
 use super::outcome::Outcome;
 use super::pixels::terms_of;
 use super::samples::ViewData;
 use super::surveyed_view::SurveyedView;
-use crate::camera::Camera;
-use crate::model::NoiseModel;
 use crate::terms::{Statistic, Term, by_term};
 
 /// A share of the views is kept aside.
@@ -20,61 +17,64 @@ const KEPT_ASIDE: usize = 4;
 /// With fewer views than this none can be spared.
 const FEWEST: usize = 6;
 
-/// Choose again without some views, and score those.
-pub fn score(
-    survey: &Survey,
-    model: &NoiseModel,
-    camera: &Camera,
-    scale_px_m: f64,
-    options: &DiagnoseOptions,
-) -> Option<HeldOut> {
-    let n = survey.views.len();
-    if n < FEWEST {
-        return None;
+impl Case<'_> {
+    /// Choose again without some views, and score those.
+    pub(super) fn heldout(&self) -> Option<HeldOut> {
+        let (survey, model, options) = (&self.survey, self.model, self.options);
+        let (camera, scale_px_m) = (&self.sensor().camera, self.fields[0].scale_px_m);
+        let n = survey.views.len();
+        if n < FEWEST {
+            return None;
+        }
+        let mut rng = options.seed.stream("diagnose/heldout");
+        let mut order: Vec<usize> = (0..n).collect();
+        order.shuffle(&mut rng);
+        let mut aside = order[..(n / KEPT_ASIDE).max(1)].to_vec();
+        aside.sort_unstable();
+        let rest: Vec<usize> = (0..n).filter(|v| !aside.contains(v)).collect();
+        let (chosen_on, judged_on) = (survey.subset(&rest), survey.subset(&aside));
+        let level = options.level;
+        let bias = chosen_on.search_bias(camera, Case::MEAN_LEVEL * level, options.seed);
+        let bias_terms = terms_of(&bias, Statistic::Bias);
+        let variance = chosen_on.search_variance(
+            &model.sigma,
+            camera,
+            Case::VARIANCE_LEVEL * level,
+            options.seed,
+        );
+        let variance_terms = terms_of(&variance, Statistic::Variance);
+        let means: Vec<ViewData> = judged_on.coarse_mean_data();
+        let blocks = judged_on.variance_data();
+        let mut before = Vec::new();
+        let mut gains = Vec::new();
+        for (mean, block) in means.iter().zip(&blocks) {
+            let (b0, b1) = (log_score(mean, &[])?, log_score(mean, &bias_terms)?);
+            let (v0, v1) = (log_score(block, &[])?, log_score(block, &variance_terms)?);
+            before.push(b0 + v0);
+            gains.push(b1 - b0 + v1 - v0);
+        }
+        let views = before.len() as f64;
+        let mean_before = before.iter().sum::<f64>() / views;
+        let gain = gains.iter().sum::<f64>() / views;
+        let rms = |terms: &[Term]| rms(&judged_on.views, terms, scale_px_m);
+        let (old, new) = (rms(&[]), rms(&bias_terms));
+        let of_sensor: Vec<Term> =
+            bias_terms.iter().filter(|t| t.is_sensor_bias()).cloned().collect();
+        let corrected = rms(&of_sensor);
+        Some(HeldOut {
+            views: aside.iter().map(|&v| survey.views[v].name.clone()).collect(),
+            log_score_before: mean_before,
+            log_score_after: mean_before + gain,
+            gain,
+            gain_interval: bootstrap(&gains, &mut rng),
+            rms_mm_before: old.mm,
+            rms_mm_after: new.mm,
+            rms_px_before: old.px,
+            rms_px_after: new.px,
+            correction_rms_before_px: old.px,
+            correction_rms_after_px: corrected.px,
+        })
     }
-    let mut rng = options.seed.stream("diagnose/heldout");
-    let mut order: Vec<usize> = (0..n).collect();
-    order.shuffle(&mut rng);
-    let mut aside = order[..(n / KEPT_ASIDE).max(1)].to_vec();
-    aside.sort_unstable();
-    let rest: Vec<usize> = (0..n).filter(|v| !aside.contains(v)).collect();
-    let (chosen_on, judged_on) = (survey.subset(&rest), survey.subset(&aside));
-    let level = options.level;
-    let bias = chosen_on.search_bias(camera, Case::MEAN_LEVEL * level, options.seed);
-    let bias_terms = terms_of(&bias, Statistic::Bias);
-    let variance =
-        chosen_on.search_variance(&model.sigma, camera, Case::VARIANCE_LEVEL * level, options.seed);
-    let variance_terms = terms_of(&variance, Statistic::Variance);
-    let means: Vec<ViewData> = judged_on.coarse_mean_data();
-    let blocks = judged_on.variance_data();
-    let mut before = Vec::new();
-    let mut gains = Vec::new();
-    for (mean, block) in means.iter().zip(&blocks) {
-        let (b0, b1) = (log_score(mean, &[])?, log_score(mean, &bias_terms)?);
-        let (v0, v1) = (log_score(block, &[])?, log_score(block, &variance_terms)?);
-        before.push(b0 + v0);
-        gains.push(b1 - b0 + v1 - v0);
-    }
-    let views = before.len() as f64;
-    let mean_before = before.iter().sum::<f64>() / views;
-    let gain = gains.iter().sum::<f64>() / views;
-    let rms = |terms: &[Term]| rms(&judged_on.views, terms, scale_px_m);
-    let (old, new) = (rms(&[]), rms(&bias_terms));
-    let of_sensor: Vec<Term> = bias_terms.iter().filter(|t| t.is_sensor_bias()).cloned().collect();
-    let corrected = rms(&of_sensor);
-    Some(HeldOut {
-        views: aside.iter().map(|&v| survey.views[v].name.clone()).collect(),
-        log_score_before: mean_before,
-        log_score_after: mean_before + gain,
-        gain,
-        gain_interval: bootstrap(&gains, &mut rng),
-        rms_mm_before: old.mm,
-        rms_mm_after: new.mm,
-        rms_px_before: old.px,
-        rms_px_after: new.px,
-        correction_rms_before_px: old.px,
-        correction_rms_after_px: corrected.px,
-    })
 }
 
 /// -r'Wr / 2 with the nuisances fitted, nats.
