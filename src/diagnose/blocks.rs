@@ -9,63 +9,35 @@ use super::surveyed_view::SurveyedView;
 use super::tiles::{SIDE, Tile};
 use crate::terms::PixelContext;
 
-/// Patches large enough for a variance.
-pub struct Blocks {
-    places: Vec<PixelContext>,
-    /// Logarithm of the variance over the model's.
-    response: Vec<f64>,
-    weight: Vec<f64>,
-}
-
 /// Side of a block, in tiles: 24 px, seven independent samples under a Kinect's window.
 pub const BLOCK_TILES: usize = 6;
 
-impl Blocks {
-    pub fn of(view: &SurveyedView) -> Self {
-        let side = (BLOCK_TILES * SIDE) as f64;
-        let mut sums: std::collections::BTreeMap<(u32, u32), Sum> = Default::default();
-        for t in view.tiles.iter() {
-            let key = ((t.place.v / side) as u32, (t.place.u / side) as u32);
-            sums.entry(key).or_default().add(t, view.moving);
-        }
-        // What the box's mean took with it.
-        let taken = view.correlation.sum / (SMOOTH_PX * SMOOTH_PX) as f64;
-        let kept = if view.moving.is_some() { 1.0 } else { 1.0 - taken };
-        let mut blocks = Blocks { places: Vec::new(), response: Vec::new(), weight: Vec::new() };
-        for s in sums.values() {
-            // Half a block at least: a few pixels at the rim give no variance.
-            if s.n < 0.5 * side * side || s.ratio <= 0.0 {
-                continue;
-            }
-            let worth = s.n * view.frames / view.correlation.sum_of_squares;
-            blocks.places.push(s.place);
-            // The mean of log chi^2 / n is about -1 / n.
-            blocks.response.push((s.ratio / s.n / kept.max(0.5)).ln() + 1.0 / worth);
-            blocks.weight.push(0.5 * worth / (1.0 + 1.0 / worth) / view.doubt);
-        }
-        blocks
+/// Logarithm of the variance over the model's in patches large enough for a variance, beside a level of
+/// the view's own, which is free.
+pub fn blocks(view: &SurveyedView) -> ViewData {
+    let side = (BLOCK_TILES * SIDE) as f64;
+    let mut sums: std::collections::BTreeMap<(u32, u32), Sum> = Default::default();
+    for t in view.tiles.iter() {
+        let key = ((t.place.v / side) as u32, (t.place.u / side) as u32);
+        sums.entry(key).or_default().add(t, view.moving);
     }
-
-    /// With a level of its own for the view, as uncertain as views scatter.
-    pub fn data(self, level_scatter: f64) -> ViewData {
-        ViewData {
-            nuisance: vec![1.0; self.places.len()],
-            places: self.places,
-            response: self.response,
-            weight: self.weight,
-            precision: vec![1.0 / level_scatter],
-            gathered: Vec::new(),
+    // What the box's mean took with it.
+    let taken = view.correlation.sum / (SMOOTH_PX * SMOOTH_PX) as f64;
+    let kept = if view.moving.is_some() { 1.0 } else { 1.0 - taken };
+    let mut blocks = ViewData { precision: vec![0.0], ..ViewData::default() };
+    for s in sums.values() {
+        // Half a block at least: a few pixels at the rim give no variance.
+        if s.n < 0.5 * side * side || s.ratio <= 0.0 {
+            continue;
         }
+        let worth = s.n * view.frames / view.correlation.sum_of_squares;
+        blocks.places.push(s.place);
+        // The mean of log chi^2 / n is about -1 / n.
+        blocks.response.push((s.ratio / s.n / kept.max(0.5)).ln() + 1.0 / worth);
+        blocks.weight.push(0.5 * worth / (1.0 + 1.0 / worth) / view.doubt);
+        blocks.nuisance.push(1.0);
     }
-
-    fn level(&self) -> Option<(f64, f64)> {
-        let (mut sum, mut n) = (0.0, 0.0);
-        for (y, w) in self.response.iter().zip(&self.weight) {
-            sum += w * y;
-            n += w;
-        }
-        (n > 0.0).then(|| (sum / n, 1.0 / n))
-    }
+    blocks
 }
 
 #[derive(Default)]
@@ -121,11 +93,11 @@ const LEVEL_SCATTER: f64 = 0.01;
 /// Variance of the views' own levels beyond what their samples explain (a moment estimate after
 /// DerSimonian and Laird), about laws of the distance and of the tilt: what a law explains is no
 /// scatter. Enlarged for the laws that so few views have to settle.
-pub fn view_scatter(blocks: &[Blocks], tolerance: f64) -> f64 {
+pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
     let floor = tolerance * tolerance;
     let levels: Vec<(&PixelContext, f64, f64)> = blocks
         .iter()
-        .filter_map(|b| b.level().map(|(level, variance)| (&b.places[0], level, variance)))
+        .filter_map(|b| b.level().map(|(level, weight)| (&b.places[0], level, 1.0 / weight)))
         .collect();
     let n = levels.len();
     let laws = |p: &PixelContext| {

@@ -43,6 +43,8 @@ pub fn far_off(survey: &Survey, sigma_mm: f64) -> Option<Finding> {
         let words = format!("The views' mean errors are {sigma:.0} times the noise of a pixel");
         return Some(found(sigma, words, "radial-disparity-bias", Statistic::Bias));
     }
+    // Of a view's noise over the model's.
+    let factor = |view: &ViewData| Some((0.5 * view.level()?.0).exp());
     let factors: Vec<f64> = survey.variance_data().iter().filter_map(factor).collect();
     let larger = reached(factors.clone()).filter(|f| *f > limit);
     let smaller = reached(factors.iter().map(|f| 1.0 / f).collect()).filter(|f| *f > limit);
@@ -60,13 +62,6 @@ fn reached(mut of_views: Vec<f64>) -> Option<f64> {
     of_views.retain(|x| x.is_finite());
     of_views.sort_by(|a, b| b.total_cmp(a));
     of_views.get(of_views.len().div_ceil(SHARE).max(FEWEST) - 1).copied()
-}
-
-/// A view's noise over the model's.
-fn factor(view: &ViewData) -> Option<f64> {
-    let weight: f64 = view.weight.iter().sum();
-    let sum: f64 = view.response.iter().zip(&view.weight).map(|(y, w)| w * y).sum();
-    (weight > 0.0).then(|| (0.5 * sum / weight).exp())
 }
 
 #[cfg(test)]

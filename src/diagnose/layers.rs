@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::ablation::Ablation;
-use super::blocks::{Blocks, MODEL_TOLERANCE, view_scatter};
+use super::blocks::{MODEL_TOLERANCE, blocks, view_scatter};
 use super::field::Field;
 use super::learnt::Learnt;
 use super::light::{Light, relative_light};
@@ -180,9 +180,11 @@ impl Survey {
 
     /// Log variance over the model's, block by block.
     pub fn variance_data(&self) -> Vec<ViewData> {
-        let blocks: Vec<Blocks> = self.views.par_iter().map(Blocks::of).collect();
-        let scatter = view_scatter(&blocks, self.tolerance);
-        blocks.into_iter().map(|b| b.data(scatter).beside(&self.between[1])).collect()
+        let blocks: Vec<ViewData> = self.views.par_iter().map(blocks).collect();
+        // A view's level is as uncertain as views scatter.
+        let precision = vec![1.0 / view_scatter(&blocks, self.tolerance)];
+        let held = |b| ViewData { precision: precision.clone(), ..b };
+        blocks.into_iter().map(|b| held(b).beside(&self.between[1])).collect()
     }
 
     /// Which half each view is in.

@@ -5,7 +5,7 @@ use super::tiles::SIDE;
 use crate::terms::{PixelContext, Term};
 
 /// One view's samples.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct ViewData {
     pub places: Vec<PixelContext>,
     pub response: Vec<f64>,
@@ -22,6 +22,13 @@ impl ViewData {
     /// The weighted rows of a `response` at these places, the view's nuisances beside it.
     pub fn rows(&self, response: &[f64]) -> Option<Rows<'_>> {
         Rows::new(response, &self.weight, &self.nuisance, self.precision.len(), &self.precision)
+    }
+
+    /// Weighted mean of the response, and the weight of all samples.
+    pub fn level(&self) -> Option<(f64, f64)> {
+        let weight: f64 = self.weight.iter().sum();
+        let sum: f64 = self.response.iter().zip(&self.weight).map(|(y, w)| w * y).sum();
+        (weight > 0.0).then(|| (sum / weight, weight))
     }
 
     /// With these terms beside the view's own nuisances: each is there by a standard normal number.
