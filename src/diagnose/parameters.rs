@@ -32,7 +32,7 @@ pub fn of_any_formula(
     family: Option<&str>,
     mut parameters: Map<String, Value>,
 ) -> Map<String, Value> {
-    let share = family.and_then(effects::find).map_or(0.0, |e| e.formula_error());
+    let share = family.and_then(effects::find).map_or(0.0, |e| e.card().formula_error);
     for parameter in parameters.values_mut() {
         let number = |key: &str| parameter[key].as_f64();
         if let (Some(value), Some(error)) = (number("value"), number("std_error")) {

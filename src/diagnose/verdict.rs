@@ -65,7 +65,7 @@ pub(super) fn symptoms(found: &mut [Finding]) {
 }
 
 fn is_symptom(id: &str) -> bool {
-    effects::find(id).is_some_and(|e| e.is_symptom())
+    effects::find(id).is_some_and(|e| e.card().is_symptom)
 }
 
 /// Where sigma itself is off by more, a law of depth or tilt alone beside it is the rest of the same

@@ -2,7 +2,6 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Stage};
 use crate::camera::Camera;
-use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, PixelContext, ROOM_LUX, Term};
 
 pub struct AmbientLight;
@@ -19,12 +18,12 @@ static CARD: Card = Card {
         typical: 0.05,
         summary: "light of a room of 500 lx over the pattern's, on a surface facing the sensor at 1 m",
     }],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "variance",
     axis: "intensity",
     confused_with: "range-exponent, which does not go with the light of the room; intensity-dependent-noise: ambient light falls on the print as the pattern does, so that their ratio stays",
     reference: "Fankhauser et al. 2015",
+    formula_error: 0.3,
+    ..Card::BASE
 };
 
 impl Effect for AmbientLight {
@@ -71,10 +70,6 @@ impl Effect for AmbientLight {
         // them, agree there and not at a distance of none.
         let far = PixelContext { z, ambient, ..PixelContext::default() };
         vec![fit.estimate("ratio", &|b| fit.value(b, far).exp_m1() / excess)]
-    }
-
-    fn formula_error(&self) -> f64 {
-        0.3
     }
 
     fn term(&self, known: Known, _: &Camera) -> Option<Term> {

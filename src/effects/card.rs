@@ -105,9 +105,32 @@ pub struct Card {
     /// The effects it is taken for most easily, by id, and what distinguishes them.
     pub confused_with: &'static str,
     pub reference: &'static str,
+    /// May it be a symptom of another cause where a recording is held against a simulation? Light,
+    /// blur and window of a matcher change it.
+    pub is_symptom: bool,
+    /// With another formula of the same physics its parameters come out different by this share
+    /// (measured on ray-traced recordings).
+    pub formula_error: f64,
 }
 
 impl Card {
+    /// What most effects have in common; the rest is each card's own.
+    pub const BASE: Card = Card {
+        id: "",
+        title: "",
+        stage: Stage::Surface,
+        summary: "",
+        parameters: &[],
+        kinds: SensorKind::ALL,
+        identity: 0.0,
+        statistic: "",
+        axis: "",
+        confused_with: "",
+        reference: "",
+        is_symptom: false,
+        formula_error: 0.0,
+    };
+
     /// Can it happen to a camera of this kind? To one that is not known all can.
     pub fn applies_to(&self, kind: Option<SensorKind>) -> bool {
         kind.is_none_or(|kind| self.kinds.contains(&kind))

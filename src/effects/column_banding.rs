@@ -29,11 +29,13 @@ static CARD: Card = Card {
         },
     ],
     kinds: SensorKind::MATCHING,
-    identity: 0.0,
     statistic: "bias",
     axis: "column",
     confused_with: "target-bow, which moves and turns with the board; disparity-quantisation on a tilted plane, whose contours move with the distance",
     reference: "OpenNI property GmcMode: a correction in the read-out's steps of 1/8 px; 2 to 8 bands",
+    is_symptom: true,
+    formula_error: 0.3,
+    ..Card::BASE
 };
 
 impl Effect for ColumnBanding {
@@ -82,10 +84,6 @@ impl Effect for ColumnBanding {
         ]
     }
 
-    fn formula_error(&self) -> f64 {
-        0.3
-    }
-
     fn term(&self, known: Known, camera: &Camera) -> Option<Term> {
         let (amplitude, period) = (known("amplitude_px")?, known("period_px")?);
         let nodes = camera.width.max(2);
@@ -103,10 +101,6 @@ impl Effect for ColumnBanding {
     fn smallest(&self, bounds: &Bounds) -> Option<Smallest> {
         let shape = stripes(bounds.camera.width as f64 / 8.0, 1);
         Some(Smallest { parameter: "amplitude_px", shape, unit: vec![1.0, 0.0], of: |a| a })
-    }
-
-    fn is_symptom(&self) -> bool {
-        true
     }
 }
 

@@ -1,7 +1,6 @@
 //! The driver rounds the depth to a constant step.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
-use crate::sensors::SensorKind;
 
 pub struct DepthRounding;
 
@@ -17,12 +16,11 @@ static CARD: Card = Card {
         typical: 0.001,
         summary: "one step of the stored depth",
     }],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "distribution",
     axis: "z",
     confused_with: "disparity-quantisation, whose gaps grow with z^2",
     reference: "OpenNI and the Microsoft SDK: whole millimetres; the TUM layout: 0.2 mm",
+    ..Card::BASE
 };
 
 impl Effect for DepthRounding {

@@ -2,7 +2,6 @@
 
 use super::{Card, Draw, Effect, Exposure, Inverse, Parameter, Settings, Stage};
 use crate::camera::Camera;
-use crate::sensors::SensorKind;
 
 pub struct DepthScale;
 
@@ -18,12 +17,12 @@ static CARD: Card = Card {
         typical: 1.035,
         summary: "stored depth over true depth",
     }],
-    kinds: SensorKind::ALL,
     identity: 1.0,
     statistic: "bias",
     axis: "z",
     confused_with: "disparity-offset, whose error grows with z^2; thermal-drift, which changes during the session",
     reference: "TUM RGB-D benchmark: 1.035 for freiburg1",
+    ..Card::BASE
 };
 
 impl Effect for DepthScale {

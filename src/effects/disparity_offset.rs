@@ -20,11 +20,11 @@ static CARD: Card = Card {
         summary: "added to every disparity: positive brings things nearer",
     }],
     kinds: SensorKind::MATCHING,
-    identity: 0.0,
     statistic: "bias",
     axis: "z",
     confused_with: "depth-scale, whose error grows with z; take at least five distances",
     reference: "Khoshelham and Elberink 2012, calibration parameters; Herrera et al. 2012",
+    ..Card::BASE
 };
 
 impl Effect for DisparityOffset {

@@ -18,11 +18,11 @@ static CARD: Card = Card {
         summary: "one step of the disparity",
     }],
     kinds: SensorKind::MATCHING,
-    identity: 0.0,
     statistic: "distribution",
     axis: "disparity-phase",
     confused_with: "depth-rounding, whose gaps do not grow with z; pixel-locking, which shifts the mean and leaves no comb",
     reference: "Konolige and Mihelich, ROS kinect_calibration/technical: 1/8 px",
+    ..Card::BASE
 };
 
 impl Effect for DisparityQuantisation {

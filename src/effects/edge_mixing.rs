@@ -1,7 +1,6 @@
 //! Depth mixes with what is behind.
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Parameter, Settings, Stage};
-use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate};
 
 pub struct EdgeMixing;
@@ -18,12 +17,13 @@ static CARD: Card = Card {
         typical: 2.0,
         summary: "distance from the edge at which a pixel sees one surface only",
     }],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "bias",
     axis: "edge-distance",
     confused_with: "target-bow, which has no edge; occlusion-shadow, which loses pixels on one side",
     reference: "Gschwandtner et al. 2011 (BlenSor): mixed pixels; half a matching window",
+    // A blur of the picture spreads an edge as well.
+    is_symptom: true,
+    ..Card::BASE
 };
 
 impl Effect for EdgeMixing {
@@ -51,11 +51,6 @@ impl Effect for EdgeMixing {
             fit.estimate("amplitude_px", &|b| b[0]),
             Estimate::given("width_px", width, 0.4 * width),
         ]
-    }
-
-    /// A blur of the picture spreads an edge as well.
-    fn is_symptom(&self) -> bool {
-        true
     }
 }
 

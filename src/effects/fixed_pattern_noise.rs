@@ -1,7 +1,6 @@
 //! Each pixel has its own constant error.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, normals};
-use crate::sensors::SensorKind;
 
 pub struct FixedPatternNoise;
 
@@ -17,12 +16,11 @@ static CARD: Card = Card {
         typical: 0.05,
         summary: "standard deviation over the pixels",
     }],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "bias",
     axis: "pixel",
     confused_with: "frozen-noise, which changes with the view; spatial-correlation, which is afresh in every frame",
     reference: "matching a 9 x 9 window of random dots: 0.05 to 0.1 px",
+    ..Card::BASE
 };
 
 impl Effect for FixedPatternNoise {

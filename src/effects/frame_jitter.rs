@@ -1,7 +1,6 @@
 //! The whole frame is shifted as one.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, normals};
-use crate::sensors::SensorKind;
 
 pub struct FrameJitter;
 
@@ -17,12 +16,11 @@ static CARD: Card = Card {
         typical: 0.03,
         summary: "standard deviation of the shift",
     }],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "correlation",
     axis: "frame",
     confused_with: "target-motion, which has a direction; temporal-correlation, which is each pixel's own",
     reference: "vibration of the mount or of the reference",
+    ..Card::BASE
 };
 
 impl Effect for FrameJitter {

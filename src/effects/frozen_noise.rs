@@ -1,7 +1,6 @@
 //! Laser speckle stands still.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, normals};
-use crate::sensors::SensorKind;
 
 pub struct FrozenNoise;
 
@@ -17,12 +16,11 @@ static CARD: Card = Card {
         typical: 0.8,
         summary: "of the variance that stands still",
     }],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "correlation",
     axis: "frame",
     confused_with: "fixed-pattern-noise, which is the same in every view; temporal-correlation, which dies out over frames",
     reference: "Landau, Choo and Beling 2015: dot energy Gamma(4.54, 0.196)",
+    ..Card::BASE
 };
 
 impl Effect for FrozenNoise {

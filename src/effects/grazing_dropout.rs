@@ -1,7 +1,6 @@
 //! No depth at grazing angles.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, chance, logistic};
-use crate::sensors::SensorKind;
 
 pub struct GrazingDropout;
 
@@ -33,12 +32,11 @@ static CARD: Card = Card {
             summary: "how gradual: from a quarter to three quarters over 2.2 times this",
         },
     ],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "missing",
     axis: "theta",
     confused_with: "range-dropout, which does not go with the tilt; intensity-dependent-noise, since grazing surfaces are darker",
     reference: "Nguyen, Izadi and Lovell 2012: nothing beyond 80 degrees",
+    ..Card::BASE
 };
 
 impl Effect for GrazingDropout {

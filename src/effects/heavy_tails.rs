@@ -1,7 +1,6 @@
 //! Gross mismatches.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, chance, normals};
-use crate::sensors::SensorKind;
 
 pub struct HeavyTails;
 
@@ -26,12 +25,12 @@ static CARD: Card = Card {
             summary: "how many times wider their errors are",
         },
     ],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "distribution",
     axis: "residual",
     confused_with: "vignetting, slope-noise and other uneven noise, which looks heavy-tailed when pooled: divide by the local sigma first",
     reference: "Mallick, Das and Majumdar 2014, review; 0.1 to 5 % of the pixels",
+    is_symptom: true,
+    ..Card::BASE
 };
 
 impl Effect for HeavyTails {
@@ -48,9 +47,5 @@ impl Effect for HeavyTails {
                 *noise = scale * wide;
             }
         }
-    }
-
-    fn is_symptom(&self) -> bool {
-        true
     }
 }

@@ -3,7 +3,6 @@
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Stage};
 use crate::camera::Camera;
 use crate::scene::WHITE;
-use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct IntensityDependentNoise;
@@ -20,12 +19,12 @@ static CARD: Card = Card {
         typical: 0.5,
         summary: "sigma goes with the reflectance to minus this; nothing changes on white paper",
     }],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "variance",
     axis: "intensity",
     confused_with: "vignetting, which stays in the picture and not on the print; ambient-light, which goes with the room",
     reference: "Mallick, Das and Majumdar 2014; shot noise: 0.5",
+    is_symptom: true,
+    ..Card::BASE
 };
 
 impl Effect for IntensityDependentNoise {
@@ -58,10 +57,6 @@ impl Effect for IntensityDependentNoise {
 
     fn term(&self, known: Known, _: &Camera) -> Option<Term> {
         Some(Term::variance(dark(1, false), vec![-2.0 * known("exponent")?]))
-    }
-
-    fn is_symptom(&self) -> bool {
-        true
     }
 }
 

@@ -2,7 +2,6 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
 use crate::camera::Camera;
-use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct LensDistortion;
@@ -19,12 +18,12 @@ static CARD: Card = Card {
         typical: -0.05,
         summary: "radial coefficient of Brown and Conrady that the calibration lacks",
     }],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "bias",
     axis: "radius",
     confused_with: "radial-disparity-bias, which frontal planes show too; target-bow, which stays with the board",
     reference: "Brown 1966; Burrus, Kinect calibration: k1 = -0.26 before correction",
+    formula_error: 0.03,
+    ..Card::BASE
 };
 
 impl Effect for LensDistortion {
@@ -60,10 +59,6 @@ impl Effect for LensDistortion {
         let radial =
             |b: &[f64], r: f64| b.iter().rev().fold(0.0, |sum, c| (sum + c) * r * r);
         vec![fit.estimate("k1", &|b| slope_in_square(|r| radial(b, r), 0.6))]
-    }
-
-    fn formula_error(&self) -> f64 {
-        0.03
     }
 
     fn term(&self, known: Known, camera: &Camera) -> Option<Term> {

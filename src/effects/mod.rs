@@ -83,12 +83,6 @@ pub trait Effect: Send + Sync {
         Vec::new()
     }
 
-    /// With another formula of the same physics its parameters come out different by this share
-    /// (measured on ray-traced recordings).
-    fn formula_error(&self) -> f64 {
-        0.0
-    }
-
     /// What known parameters make of a measurement, where that is a term.
     fn term(&self, _: Known, _: &Camera) -> Option<Term> {
         None
@@ -103,12 +97,6 @@ pub trait Effect: Send + Sync {
     /// How the smallest of it that could have been found is told.
     fn smallest(&self, _: &Bounds) -> Option<Smallest> {
         None
-    }
-
-    /// May it be a symptom of another cause where a recording is held against a simulation? Light,
-    /// blur and window of a matcher change it.
-    fn is_symptom(&self) -> bool {
-        false
     }
 }
 

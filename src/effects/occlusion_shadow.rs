@@ -18,11 +18,11 @@ static CARD: Card = Card {
         summary: "of the baseline between camera and projector",
     }],
     kinds: SensorKind::MATCHING,
-    identity: 0.0,
     statistic: "missing",
     axis: "edge-distance",
     confused_with: "grazing-dropout and range-dropout, which are not beside an edge; edge-mixing, which is on all sides",
     reference: "geometry; render_kinect (Bohg et al. 2014) tests the same ray",
+    ..Card::BASE
 };
 
 impl Effect for OcclusionShadow {

@@ -22,11 +22,13 @@ static CARD: Card = Card {
         summary: "height of the wave",
     }],
     kinds: SensorKind::MATCHING,
-    identity: 0.0,
     statistic: "bias",
     axis: "disparity-phase",
     confused_with: "disparity-quantisation, whose comb is finer (a fraction of a pixel) and keeps the mean; target-bow, which moves with the board",
     reference: "Shimizu and Okutomi 2001, sub-pixel estimation error cancellation: 0.04 to 0.06 px for a 9 x 9 window on random dots",
+    is_symptom: true,
+    formula_error: 0.1,
+    ..Card::BASE
 };
 
 impl Effect for PixelLocking {
@@ -70,10 +72,6 @@ impl Effect for PixelLocking {
         ]
     }
 
-    fn formula_error(&self) -> f64 {
-        0.1
-    }
-
     fn term(&self, known: Known, _: &Camera) -> Option<Term> {
         Some(Term::bias(waves(1.0, 1), vec![-known("amplitude_px")?, 0.0]))
     }
@@ -85,10 +83,6 @@ impl Effect for PixelLocking {
     fn smallest(&self, _: &Bounds) -> Option<Smallest> {
         let (parameter, shape) = ("amplitude_px", waves(1.0, 1));
         Some(Smallest { parameter, shape, unit: vec![1.0, 0.0], of: |a| a })
-    }
-
-    fn is_symptom(&self) -> bool {
-        true
     }
 }
 

@@ -20,11 +20,12 @@ static CARD: Card = Card {
         summary: "disparity too large by this at the corner radius",
     }],
     kinds: SensorKind::MATCHING,
-    identity: 0.0,
     statistic: "bias",
     axis: "radius",
     confused_with: "target-bow, which stays with the board and does not grow with z; lens-distortion, which a frontal plane does not show; range-not-depth, whose bowl grows with z and has no free size",
     reference: "Herrera, Kannala and Heikkila 2012: D(u,v) of the disparity; Teichman et al. 2013 (CLAMS)",
+    formula_error: 0.1,
+    ..Card::BASE
 };
 
 impl Effect for RadialDisparityBias {
@@ -67,10 +68,6 @@ impl Effect for RadialDisparityBias {
             fit.estimate("k_px", &|b| slope_in_square(|r| fit.value(b, at(r)), 1.0)),
             Estimate::given("disparity_power", disparity_power, 0.25),
         ]
-    }
-
-    fn formula_error(&self) -> f64 {
-        0.1
     }
 
     fn term(&self, known: Known, _: &Camera) -> Option<Term> {

@@ -1,7 +1,6 @@
 //! No depth far away, or too near.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, chance, logistic};
-use crate::sensors::SensorKind;
 
 pub struct RangeDropout;
 
@@ -33,12 +32,12 @@ static CARD: Card = Card {
             summary: "how gradual: from a quarter to three quarters over 2.2 times this; negative loses what is nearer",
         },
     ],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "missing",
     axis: "z",
     confused_with: "grazing-dropout, which goes with the tilt; ambient-light, which adds noise before it loses",
     reference: "Microsoft SDK: 0.8 to 4 m, near mode 0.4 to 3 m",
+    is_symptom: true,
+    ..Card::BASE
 };
 
 impl Effect for RangeDropout {
@@ -55,9 +54,5 @@ impl Effect for RangeDropout {
                 exposure.disparity[i] = f32::NAN;
             }
         }
-    }
-
-    fn is_symptom(&self) -> bool {
-        true
     }
 }

@@ -2,7 +2,6 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
 use crate::camera::Camera;
-use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Term};
 
 pub struct RangeExponent;
@@ -19,12 +18,12 @@ static CARD: Card = Card {
         typical: 0.5,
         summary: "added to the exponent of z; nothing changes at 2 m",
     }],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "variance",
     axis: "z",
     confused_with: "ambient-light, which also grows with z but goes with the light of the room; disparity-quantisation, which adds noise as z^2",
     reference: "Khoshelham and Elberink 2012: z^2; time of flight: other powers",
+    is_symptom: true,
+    ..Card::BASE
 };
 
 impl Effect for RangeExponent {
@@ -63,10 +62,6 @@ impl Effect for RangeExponent {
     fn smallest(&self, _: &Bounds) -> Option<Smallest> {
         let (parameter, shape) = ("excess", power_law(1));
         Some(Smallest { parameter, shape, unit: vec![1.0], of: |a| 0.5 * a })
-    }
-
-    fn is_symptom(&self) -> bool {
-        true
     }
 }
 

@@ -2,7 +2,6 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Inverse, Known, Parameter, Settings, Stage};
 use crate::camera::Camera;
-use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct RangeNotDepth;
@@ -19,12 +18,12 @@ static CARD: Card = Card {
         typical: 1.0,
         summary: "how much of the ray length over the depth is in the file",
     }],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "bias",
     axis: "radius",
     confused_with: "radial-disparity-bias, which grows with z^2 and has any size: this one grows with z and is z r^2 / (2 f^2), no more and no less",
     reference: "geometry: 1 / cos of the angle off the axis; 5.8 % at 200 px from the middle of a Kinect",
+    formula_error: 0.07,
+    ..Card::BASE
 };
 
 impl Effect for RangeNotDepth {
@@ -52,10 +51,6 @@ impl Effect for RangeNotDepth {
 
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
         vec![fit.estimate("share", &|b| b[0])]
-    }
-
-    fn formula_error(&self) -> f64 {
-        0.07
     }
 
     fn term(&self, known: Known, _: &Camera) -> Option<Term> {

@@ -1,7 +1,6 @@
 //! A row is shifted as one.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, normals};
-use crate::sensors::SensorKind;
 
 pub struct RowNoise;
 
@@ -17,12 +16,11 @@ static CARD: Card = Card {
         typical: 0.03,
         summary: "standard deviation of the shift",
     }],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "correlation",
     axis: "row",
     confused_with: "spatial-correlation, which reaches as far along the columns as along the rows",
     reference: "row-wise read-out of image sensors (EMVA 1288, row noise)",
+    ..Card::BASE
 };
 
 impl Effect for RowNoise {

@@ -5,7 +5,6 @@ use rayon::prelude::*;
 use super::{Card, Draw, Effect, Exposure, Settings, Stage};
 use crate::plane::Plane;
 use crate::scene::Seen;
-use crate::sensors::SensorKind;
 use crate::stats::median_in_place;
 use crate::terms::{Needs, PixelContext, Pixels, Statistic, Term, edge_distances};
 
@@ -22,12 +21,11 @@ static BIAS: Card = Card {
     stage: Stage::Disparity,
     summary: "errors of the disparity as a fit found them, without a formula",
     parameters: &[],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "bias",
     axis: "pixel",
     confused_with: "",
     reference: "the model",
+    ..Card::BASE
 };
 
 static VARIANCE: Card = Card {

@@ -20,11 +20,13 @@ static CARD: Card = Card {
         summary: "standard deviation of the place a pixel looks at",
     }],
     kinds: SensorKind::MATCHING,
-    identity: 0.0,
     statistic: "variance",
     axis: "theta",
     confused_with: "the tilt term of the form, which is near nothing below 70 degrees and grows with z^2; tilt-axis-anisotropy, which prefers a direction",
     reference: "Nguyen, Izadi and Lovell 2012: 0.8 px and more",
+    is_symptom: true,
+    formula_error: 0.07,
+    ..Card::BASE
 };
 
 impl Effect for SlopeNoise {
@@ -53,10 +55,6 @@ impl Effect for SlopeNoise {
         vec![fit.estimate("sigma_lateral_px", &|b| lateral_px * doubled(b).sqrt())]
     }
 
-    fn formula_error(&self) -> f64 {
-        0.07
-    }
-
     fn term(&self, known: Known, _: &Camera) -> Option<Term> {
         Some(Term::variance(blur(known("sigma_lateral_px")?), vec![1.0]))
     }
@@ -64,10 +62,6 @@ impl Effect for SlopeNoise {
     fn smallest(&self, _: &Bounds) -> Option<Smallest> {
         let (parameter, shape) = ("sigma_lateral_px", blur(0.2));
         Some(Smallest { parameter, shape, unit: vec![1.0], of: |a| 0.2 * a.sqrt() })
-    }
-
-    fn is_symptom(&self) -> bool {
-        true
     }
 }
 

@@ -1,7 +1,6 @@
 //! Neighbours share a matching window.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Scope, Settings, Stage, normals};
-use crate::sensors::SensorKind;
 
 pub struct SpatialCorrelation;
 
@@ -26,12 +25,11 @@ static CARD: Card = Card {
             summary: "of the variance that comes through the window; the rest is each pixel's own",
         },
     ],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "correlation",
     axis: "pixel-lag",
     confused_with: "smooth errors that stand still (radial-disparity-bias, fixed-pattern-noise): those stay in the mean over frames and views",
     reference: "Konolige and Mihelich: 9 x 9 or 9 x 7 window",
+    ..Card::BASE
 };
 
 impl Effect for SpatialCorrelation {

@@ -3,7 +3,6 @@
 use super::{
     Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Parameter, Settings, Smallest, Stage,
 };
-use crate::sensors::SensorKind;
 use crate::stats::{even, range};
 use crate::terms::{Basis, PixelContext};
 
@@ -30,12 +29,12 @@ static CARD: Card = Card {
             summary: "width of the board over which it is counted",
         },
     ],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "bias",
     axis: "target-position",
     confused_with: "radial-disparity-bias and lens-distortion, which stay in the picture when the board moves; turn the board by 180 degrees, or move it aside",
     reference: "geometry of a bent plate: millimetres, whatever the distance",
+    formula_error: 0.3,
+    ..Card::BASE
 };
 
 impl Effect for TargetBow {
@@ -96,10 +95,6 @@ impl Effect for TargetBow {
             // The board's pixels end within a few of its edge.
             Estimate::given("span_m", span[1] - span[0], f64::NAN),
         ]
-    }
-
-    fn formula_error(&self) -> f64 {
-        0.3
     }
 
     fn smallest(&self, bounds: &Bounds) -> Option<Smallest> {

@@ -1,7 +1,6 @@
 //! Something moved during the view.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
-use crate::sensors::SensorKind;
 
 pub struct TargetMotion;
 
@@ -17,12 +16,11 @@ static CARD: Card = Card {
         typical: 0.005,
         summary: "of the target away from the sensor",
     }],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "bias",
     axis: "frame",
     confused_with: "thermal-drift, which goes on from view to view; frame-jitter, which has no direction",
     reference: "kinematics: velocity times time",
+    ..Card::BASE
 };
 
 impl Effect for TargetMotion {

@@ -1,7 +1,6 @@
 //! The firmware filters over time.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
-use crate::sensors::SensorKind;
 
 pub struct TemporalCorrelation;
 
@@ -17,12 +16,11 @@ static CARD: Card = Card {
         typical: 0.5,
         summary: "correlation of a pixel's noise from one frame to the next",
     }],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "correlation",
     axis: "frame",
     confused_with: "frozen-noise, which never decays while the scene stands still",
     reference: "librealsense, temporal filter: alpha 0.4, which is rho 0.6",
+    ..Card::BASE
 };
 
 impl Effect for TemporalCorrelation {

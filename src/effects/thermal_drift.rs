@@ -2,7 +2,6 @@
 
 use super::{Card, Draw, Effect, Exposure, Inverse, Parameter, Settings, Stage};
 use crate::camera::Camera;
-use crate::sensors::SensorKind;
 
 pub struct ThermalDrift;
 
@@ -27,12 +26,11 @@ static CARD: Card = Card {
             summary: "time after which 63 % of it has come",
         },
     ],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "bias",
     axis: "session-time",
     confused_with: "depth-scale, where distances were taken in the order of time; target-motion, which is within a view",
     reference: "Tolgyessy et al. 2021: 20 min and more; Fiedler and Mueller 2012",
+    ..Card::BASE
 };
 
 impl Effect for ThermalDrift {

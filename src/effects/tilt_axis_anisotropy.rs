@@ -2,7 +2,6 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
 use crate::camera::Camera;
-use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Term};
 
 pub struct TiltAxisAnisotropy;
@@ -19,12 +18,12 @@ static CARD: Card = Card {
         typical: 1.5,
         summary: "sigma at 60 degrees of tilt along the baseline over across it",
     }],
-    kinds: SensorKind::ALL,
     identity: 1.0,
     statistic: "variance",
     axis: "azimuth",
     confused_with: "slope-noise, which is the same in all directions",
     reference: "geometry: a disparity gradient of b tan(theta) / z, along the window or across it",
+    ..Card::BASE
 };
 
 impl Effect for TiltAxisAnisotropy {

@@ -2,7 +2,6 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
 use crate::camera::Camera;
-use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct Vignetting;
@@ -19,12 +18,14 @@ static CARD: Card = Card {
         typical: 0.5,
         summary: "by how much sigma is larger at the corner radius, as a share",
     }],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "variance",
     axis: "radius",
     confused_with: "slope-noise: even a frontal target is met at an angle off the axis, but that grows with the tilt",
     reference: "Choo et al. 2014: radial factors beside depth; cos^4 law",
+    is_symptom: true,
+    // Lenses that shade as cos^4 or their rim alone: 0.21 rms of twelve sets, seed 7000.
+    formula_error: 0.2,
+    ..Card::BASE
 };
 
 impl Effect for Vignetting {
@@ -55,11 +56,6 @@ impl Effect for Vignetting {
         vec![fit.estimate("growth", &|b| (0.5 * b.iter().sum::<f64>()).exp() - 1.0)]
     }
 
-    /// Lenses that shade as cos^4 or their rim alone: 0.21 rms of twelve sets, seed 7000.
-    fn formula_error(&self) -> f64 {
-        0.2
-    }
-
     fn term(&self, known: Known, _: &Camera) -> Option<Term> {
         let growth = known("growth")?;
         let nodes = 33;
@@ -73,10 +69,6 @@ impl Effect for Vignetting {
     fn smallest(&self, _: &Bounds) -> Option<Smallest> {
         let (parameter, shape) = ("growth", darker(1));
         Some(Smallest { parameter, shape, unit: vec![1.0], of: |a| (0.5 * a).exp() - 1.0 })
-    }
-
-    fn is_symptom(&self) -> bool {
-        true
     }
 }
 

@@ -5,7 +5,6 @@ use std::f64::consts::TAU;
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter};
 use super::{Settings, Smallest, Stage, greatest};
 use crate::camera::Camera;
-use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, PixelContext, Term};
 
 pub struct RowRipple;
@@ -31,12 +30,11 @@ static CARD: Card = Card {
             summary: "rows from one wave to the next",
         },
     ],
-    kinds: SensorKind::ALL,
-    identity: 0.0,
     statistic: "bias",
     axis: "row",
     confused_with: "row-noise, which is afresh in every frame",
     reference: "mains hum",
+    ..Card::BASE
 };
 
 impl Effect for RowRipple {
