@@ -11,7 +11,7 @@ use super::layers::Survey;
 use super::outcome::{Chosen, Outcome, Rules};
 use super::prepared::evidence_of_bases;
 use super::samples::{ViewData, coarser};
-use super::search::{search, search_beside};
+use super::search::search;
 use super::tiles::SIDE;
 use super::variance;
 use crate::camera::Camera;
@@ -83,7 +83,7 @@ impl Survey {
         let fine = self.mean_data();
         let coarse: Vec<ViewData> = fine.par_iter().map(coarser).collect();
         let candidates = self.ablation.candidates(candidates);
-        let found = search(&fine, &coarse, &candidates, &rules, seed);
+        let found = search(&fine, &coarse, &candidates, None, &rules, seed);
         let inflation: Vec<f64> = self.views.iter().map(|v| v.inflation).collect();
         let second = self.second();
         refit(&fine, &inflation, &second, camera, found.halved(&second, BIAS_PRIOR))
@@ -126,7 +126,7 @@ impl Survey {
         let candidates = self.ablation.candidates(candidates);
         let refits = refit.is_some();
         let rules = self.variance_rules(level);
-        let mut found = search_beside(&data, &data, &candidates, refit, &rules, seed);
+        let mut found = search(&data, &data, &candidates, refit, &rules, seed);
         if refits {
             found = with_best_surface(&data, found, variance::surfaces(&self.reach));
         }

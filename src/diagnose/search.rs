@@ -9,7 +9,7 @@ use super::evidence::{Evidence, Gain, fit, gain};
 use super::judge::{Judge, Judged, looks};
 use super::null::{NoiseGains, Null};
 use super::outcome::{Chosen, Look, Outcome, Rules};
-use super::prepared::{Grouping, Patches, Prepared, prepare, together};
+use super::prepared::{Grouping, Patches, Prepared, evidence_of_bases, prepare};
 use super::samples::ViewData;
 use crate::model::Covariance;
 use crate::rng::Seed;
@@ -20,20 +20,9 @@ use crate::terms::Basis;
 pub const LEAST_SHARE: f64 = 0.005;
 
 /// Search a layer. `coarse` has the same views in larger patches, for shapes that do not change
-/// within them.
+/// within them. A term `beside` is fitted with every other, whatever it brings: what it can take up is
+/// attributed to no other term. It stays in, last of the chosen.
 pub fn search(
-    fine: &[ViewData],
-    coarse: &[ViewData],
-    candidates: &[Candidate],
-    rules: &Rules,
-    seed: Seed,
-) -> Outcome {
-    search_beside(fine, coarse, candidates, None, rules, seed)
-}
-
-/// The same, with a term that is fitted beside every other, whatever it brings: what it can take
-/// up is nobody else's. It stays in, last of the chosen.
-pub fn search_beside(
     fine: &[ViewData],
     coarse: &[ViewData],
     candidates: &[Candidate],
@@ -158,7 +147,7 @@ impl Layer<'_> {
     fn evidence_of(&self, terms: &[&Basis]) -> Vec<Evidence> {
         let fine = terms.iter().any(|b| b.is_fine() || b.of_column_alone());
         let views = if fine { self.fine } else { self.coarse };
-        views.par_iter().filter_map(|v| together(v, terms)).collect()
+        evidence_of_bases(views, terms)
     }
 
     /// Terms with a name are fitted anew beside every candidate; those without have many columns

@@ -79,7 +79,7 @@ fn candidates() -> Vec<Candidate> {
 }
 
 fn found(views: &[ViewData], seed: u64) -> Outcome {
-    search(views, views, &candidates(), &RULES, Seed(seed))
+    search(views, views, &candidates(), None, &RULES, Seed(seed))
 }
 
 fn families(outcome: &Outcome) -> Vec<Option<&'static str>> {
@@ -127,7 +127,7 @@ fn what_is_pinned_takes_up_its_own() {
         let pinned = Some(Candidate::curve(basis.clone()));
         let beyond: Vec<Candidate> =
             candidates().into_iter().filter(|c| c.basis.axis() != Axis::Radius).collect();
-        let outcome = search_beside(&views, &views, &beyond, pinned, &RULES, Seed(9));
+        let outcome = search(&views, &views, &beyond, pinned, &RULES, Seed(9));
         assert_eq!(families(&outcome), names);
         let last = outcome.chosen.len() - 1;
         let beta = outcome.coefficients(last);
@@ -185,7 +185,7 @@ fn what_fades_in_large_patches_is_told_once() {
         })
         .collect();
     let coarse: Vec<ViewData> = fine.iter().map(coarser).collect();
-    let outcome = search(&fine, &coarse, &candidates(), &RULES, Seed(3));
+    let outcome = search(&fine, &coarse, &candidates(), None, &RULES, Seed(3));
     assert_eq!(families(&outcome), [Some("pixel-locking")]);
     assert!(outcome.remaining.is_none());
 }
@@ -234,7 +234,8 @@ fn a_lift_that_planes_take_up_is_none() {
             view.nuisance = view.places.iter().flat_map(affine).collect();
             view.precision = vec![0.0; 3];
         }
-        let outcome = search(&views, &views, &[Candidate::curve(lift.clone())], &RULES, Seed(1));
+        let outcome =
+            search(&views, &views, &[Candidate::curve(lift.clone())], None, &RULES, Seed(1));
         let coefficients = outcome.chosen.first().map_or(vec![0.0; 3], |_| outcome.coefficients(0));
         let at = |right| {
             let place = PixelContext { right, disparity: 1.0, rho: 1.0, ..PixelContext::default() };
