@@ -4,6 +4,9 @@
 //! fx * baseline / z. Nothing is cut by a RANSAC threshold: what strays is clipped, and counted.
 
 use super::edges::Edges;
+use super::known::KnownTerms;
+use super::lattice::RawHistogram;
+use super::smooth::{SMOOTH_PX, high_pass};
 use crate::camera::Rays;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
@@ -13,9 +16,6 @@ use crate::measure::{Workbench, view_target};
 use crate::model::SigmaModel;
 use crate::plane::Plane;
 use crate::view::{Sensor, View};
-
-use super::known::KnownTerms;
-use super::lattice::RawHistogram;
 
 /// One view's residuals.
 #[derive(Debug, Clone)]
@@ -172,6 +172,11 @@ impl Field {
             image[i as usize] = value;
         }
         image
+    }
+
+    /// The same without what is smooth.
+    pub fn high_passed(&self, values: &[f32]) -> Vec<f32> {
+        high_pass(&self.image(values), self.width, self.height, SMOOTH_PX)
     }
 
     fn empty(view: &View, sensor: &Sensor, plane: Plane, pixels: Vec<u32>) -> Self {

@@ -12,7 +12,7 @@ use super::light::{Light, relative_light};
 use super::replication::halves;
 use super::samples::{ViewData, coarser};
 use super::surveyed_view::{SurveyedView, independent_frames, inflation, mean_data};
-use super::tiles::tiles;
+use super::tiles::{roughen, tiles};
 use crate::camera::{Camera, Rays};
 use crate::effects::Flat;
 use crate::sensors::SensorKind;
@@ -164,11 +164,10 @@ impl Survey {
         extra: impl Fn(&PixelContext) -> f64 + Sync,
         stretch: impl Fn(&PixelContext) -> f64 + Sync,
     ) {
-        let width = fields.first().map_or(0, |f| f.width);
         self.views.par_iter_mut().zip(fields).enumerate().for_each(|(n, (view, field))| {
             let tiles = Arc::make_mut(&mut view.tiles);
             if let Some(bias) = bias.get(n) {
-                super::tiles::roughen(tiles, field, bias, width);
+                roughen(tiles, field, bias);
             }
             for t in tiles {
                 let (factor, more) = (stretch(&t.place), extra(&t.place));

@@ -5,6 +5,7 @@
 //! row shares; the products with a box around each pixel are that of one it shares with its
 //! neighbours. Each costs a pass over the image.
 
+use super::smooth::BoxSums;
 use super::texture::calm;
 
 /// As far as neighbours are looked at, px.
@@ -109,34 +110,12 @@ fn along(line: impl Iterator<Item = f32>) -> Sum {
 /// Pairs within the reach of one another, by sums over boxes.
 fn neighbours(image: &[f32], width: usize) -> Sum {
     let height = image.len() / width;
-    let mut table = vec![[0f64; 2]; (width + 1) * (height + 1)];
-    for v in 0..height {
-        let mut row = [0.0; 2];
-        for u in 0..width {
-            let r = image[v * width + u];
-            if r.is_finite() {
-                row[0] += f64::from(r);
-                row[1] += 1.0;
-            }
-            let above = table[v * (width + 1) + u + 1];
-            table[(v + 1) * (width + 1) + u + 1] = [above[0] + row[0], above[1] + row[1]];
-        }
-    }
+    let sums = BoxSums::of(image, width, height);
     let mut sum = Sum::default();
-    for v in 0..height {
-        let (v0, v1) = (v.saturating_sub(REACH_PX), (v + REACH_PX + 1).min(height));
-        for u in 0..width {
-            let r = image[v * width + u];
-            if !r.is_finite() {
-                continue;
-            }
-            let (u0, u1) = (u.saturating_sub(REACH_PX), (u + REACH_PX + 1).min(width));
-            let at = |u: usize, v: usize| table[v * (width + 1) + u];
-            let [a, b, c, d] = [at(u1, v1), at(u0, v1), at(u1, v0), at(u0, v0)];
-            let within = |k: usize| a[k] - b[k] - c[k] + d[k];
-            sum.products += f64::from(r) * (within(0) - f64::from(r));
-            sum.pairs += within(1) - 1.0;
-        }
+    for (i, r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
+        let [products, pairs] = sums.around(i % width, i / width, REACH_PX);
+        sum.products += f64::from(*r) * (products - f64::from(*r));
+        sum.pairs += pairs - 1.0;
     }
     sum
 }

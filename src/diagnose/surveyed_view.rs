@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::field::Field;
 use super::samples::{ViewData, finite};
-use super::smooth::{SMOOTH_PX, high_pass};
+use super::texture::{same_pixel, without_bias};
 use super::tiles::Tile;
 use crate::stats::{Correlation, measure_correlation};
 
@@ -31,12 +31,7 @@ pub struct SurveyedView {
 /// model's, and how many pixels make one independent sample. Measured on what is left after a
 /// smooth error, and what is known of the bias (px, by pixel, or empty), is taken out.
 pub fn inflation(field: &Field, bias: &[f32]) -> (f64, Correlation) {
-    let rough = if bias.is_empty() {
-        rough(&field.mean, field)
-    } else {
-        let left: Vec<f32> = field.mean.iter().zip(bias).map(|(m, b)| m - b).collect();
-        rough(&left, field)
-    };
+    let rough = rough(&without_bias(&field.mean, bias), field);
     let (mut sum, mut n) = (0.0, 0.0);
     for r in rough.iter().filter(|r| r.is_finite()) {
         sum += f64::from(*r).powi(2);
@@ -50,13 +45,13 @@ pub fn inflation(field: &Field, bias: &[f32]) -> (f64, Correlation) {
 /// Whitened residuals as an image, without what is smooth.
 fn rough(residuals: &[f32], field: &Field) -> Vec<f32> {
     let whitened: Vec<f32> = residuals.iter().zip(&field.sigma).map(|(r, s)| r / s).collect();
-    high_pass(&field.image(&whitened), field.width, field.height, SMOOTH_PX)
+    field.high_passed(&whitened)
 }
 
 /// F frames whose noise is the same by a share rho are worth 1 / (rho^2 + (1 - rho^2) / F).
 pub fn independent_frames(field: &Field) -> f64 {
     let [first, second, ..] = field.first.as_slice() else { return 1.0 };
-    let rho = super::texture::same_pixel(&rough(first, field), &rough(second, field));
+    let rho = same_pixel(&rough(first, field), &rough(second, field));
     let rho = if rho.is_finite() { rho.clamp(0.0, 1.0) } else { 0.0 };
     let frames = field.frames.len() as f64;
     1.0 / (rho * rho + (1.0 - rho * rho) / frames)

@@ -1,10 +1,11 @@
 //! Images of the noise: what is smooth, still or shared by a line taken out of them, and how their
 //! pixels hang together.
 
+use std::borrow::Cow;
 use std::f32::consts::FRAC_1_SQRT_2;
 
 use super::field::Field;
-use super::smooth::{SMOOTH_PX, high_pass};
+use super::smooth::high_pass;
 use crate::camera::Camera;
 use crate::stats::{MAD_TO_SIGMA, median_in_place};
 
@@ -42,13 +43,15 @@ fn change(a: &[f32], b: &[f32]) -> Vec<f32> {
 
 /// Residuals as an image, px, without what is smooth and what is known.
 pub fn rough(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
-    let image = if bias.is_empty() {
-        field.image(residuals)
-    } else {
-        let left: Vec<f32> = residuals.iter().zip(bias).map(|(r, b)| r - b).collect();
-        field.image(&left)
-    };
-    high_pass(&image, field.width, field.height, SMOOTH_PX)
+    field.high_passed(&without_bias(residuals, bias))
+}
+
+/// Residuals less what is known of them, which may be nothing.
+pub fn without_bias<'a>(residuals: &'a [f32], bias: &[f32]) -> Cow<'a, [f32]> {
+    if bias.is_empty() {
+        return Cow::Borrowed(residuals);
+    }
+    residuals.iter().zip(bias).map(|(r, b)| r - b).collect()
 }
 
 /// The view's mean, px, without what is known, gross errors, and all that does not change from pixel

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::field::Field;
-use super::smooth::{SMOOTH_PX, high_pass};
+use super::texture::rough;
 use crate::camera::{Camera, Rays};
 use crate::scene::TargetFrame;
 use crate::terms::{PixelContext, corner_radius, edge_distances};
@@ -122,7 +122,6 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
     let rows = camera.height.div_ceil(SIDE);
     let mut sums = vec![Sums::default(); across * rows];
     let frames = field.frames.len() as f64;
-    let rough = high_pass(&field.image(&field.mean), camera.width, camera.height, SMOOTH_PX);
     for (k, &i) in field.pixels.iter().enumerate() {
         let (u, v) = (i as usize % camera.width, i as usize / camera.width);
         let s = &mut sums[v / SIDE * across + u / SIDE];
@@ -136,11 +135,6 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
             s.mean += mean;
             s.square += square;
             s.temporal += square - mean * mean;
-            let rough = f64::from(rough[i as usize]);
-            if rough.is_finite() {
-                s.rough_n += 1.0;
-                s.rough_square += rough * rough;
-            }
             s.light += f64::from(field.light.get(k).copied().unwrap_or(1.0));
         }
     }
@@ -149,6 +143,7 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
     for t in &mut tiles {
         t.temporal -= field.moved_px2(t.place.disparity);
     }
+    roughen(&mut tiles, field, &[]);
     tiles
 }
 
@@ -162,8 +157,6 @@ struct Sums {
     mean: f64,
     square: f64,
     temporal: f64,
-    rough_n: f64,
-    rough_square: f64,
     light: f64,
     variance: f64,
     asked: f64,
@@ -186,7 +179,7 @@ impl Sums {
             place: PixelContext { light: self.light / self.n, variance, ..place },
             mean: self.mean / self.n,
             square: self.square / self.n,
-            rough_square: self.rough_square / self.rough_n,
+            rough_square: f64::NAN,
             temporal: self.temporal / self.n,
             variance,
             pixels: self.n,
@@ -208,14 +201,13 @@ fn board_frame(field: &Field, rays: &Rays) -> TargetFrame {
     TargetFrame::on(&field.plane, sum / few.len() as f64)
 }
 
-/// Measure the rough part of the mean again, with what is known of it taken out.
-pub fn roughen(tiles: &mut [Tile], field: &Field, bias: &[f32], width: usize) {
-    let left: Vec<f32> = field.mean.iter().zip(bias).map(|(m, b)| m - b).collect();
-    let rough = high_pass(&field.image(&left), width, field.height, SMOOTH_PX);
-    let across = width.div_ceil(SIDE);
+/// Measure the rough part of the mean, with what is known of it taken out, px by pixel (or empty).
+pub fn roughen(tiles: &mut [Tile], field: &Field, bias: &[f32]) {
+    let rough = rough(field, &field.mean, bias);
+    let across = field.width.div_ceil(SIDE);
     let mut sums = vec![(0.0, 0.0); across * field.height.div_ceil(SIDE)];
     for &i in &field.pixels {
-        let (u, v) = (i as usize % width, i as usize / width);
+        let (u, v) = (i as usize % field.width, i as usize / field.width);
         let r = f64::from(rough[i as usize]);
         if r.is_finite() {
             let s = &mut sums[v / SIDE * across + u / SIDE];
