@@ -9,6 +9,7 @@ use super::layers::Survey;
 use super::missing::DropoutFinding;
 use super::noise::hanging;
 use super::structure::Structure;
+use crate::stats::mean;
 
 /// Tails of two recordings are no news within this factor: gross errors come in clumps.
 const TAILS_ALIKE: f64 = 3.0;
@@ -24,9 +25,7 @@ impl Baseline {
     ) {
         let ours = structure;
         let level = |of: &dyn Fn(&Structure) -> Option<f64>| {
-            let all: Vec<f64> =
-                self.structure.iter().filter_map(of).filter(|v| v.is_finite()).collect();
-            all.iter().sum::<f64>() / all.len().max(1) as f64
+            mean(self.structure.iter().filter_map(of)).unwrap_or(0.0)
         };
         let windows = level(&|s| s.window_px.map(f64::ln));
         let (fixed, rows) = (level(&|s| s.fixed_px2), level(&|s| s.row_px2));
@@ -81,12 +80,10 @@ impl Baseline {
 
     /// Are the recording's tails no heavier than those of the simulation, by much?
     pub fn tails_alike(&self, real: &[Structure]) -> bool {
-        let mean = |all: &[Structure]| {
-            let looked: Vec<f64> =
-                all.iter().filter(|s| s.tail_pixels > 0.0).map(|s| s.tail).collect();
-            looked.iter().sum::<f64>() / looked.len().max(1) as f64
+        let tail = |all: &[Structure]| {
+            mean(all.iter().filter(|s| s.tail_pixels > 0.0).map(|s| s.tail)).unwrap_or(0.0)
         };
-        mean(real) < TAILS_ALIKE * mean(&self.structure)
+        tail(real) < TAILS_ALIKE * tail(&self.structure)
     }
 
     /// Is as much lost in the simulated views, for the same reason or on the whole?

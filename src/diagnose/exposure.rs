@@ -9,7 +9,7 @@ use crate::frame::{DepthTable, Frame};
 use crate::measure::Workbench;
 use crate::model::SigmaModel;
 use crate::stats::{MAD_TO_SIGMA, median_in_place};
-use crate::terms::{PixelContext, Term};
+use crate::terms::Term;
 
 /// Disparities that spread less than this over a view show no slope, px.
 const LEAST_SPREAD_PX: f64 = 0.5;
@@ -71,13 +71,10 @@ impl Field {
         let mut sigma = self.sigma.clone();
         let places = Places::of(self, &bench.sensor.camera, &bench.rays, start);
         let mut row = Vec::new();
-        let mut sum = |terms: &[Term], place: &PixelContext| -> f64 {
-            terms.iter().map(|t| t.value(place, &mut row)).sum()
-        };
         for k in 0..n {
             let place = places.pixel(k);
-            expected[k] += sum(&known.bias, &place) as f32;
-            sigma[k] *= (0.5 * sum(&known.variance, &place)).exp() as f32;
+            expected[k] += Term::sum(&known.bias, &place, &mut row) as f32;
+            sigma[k] *= (0.5 * Term::sum(&known.variance, &place, &mut row)).exp() as f32;
         }
         self.sigma = sigma;
         expected

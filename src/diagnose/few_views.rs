@@ -17,7 +17,7 @@ use super::naming::physics;
 use super::null::{LEAST_EXCESS, NoiseGains};
 use super::other_findings::named;
 use super::outcome::{Outcome, Rules};
-use super::prepared::evidence_of_bases;
+use super::prepared::{evidence_of_bases, without};
 use super::samples::{ViewData, coarser};
 use super::scene::{Scene, size};
 use crate::rng::{Seed, Stream};
@@ -120,7 +120,11 @@ pub fn few_views(
     rules: &Rules,
     seed: Seed,
 ) -> Option<Finding> {
-    let fine: Vec<ViewData> = fine.iter().map(|v| without(v, outcome)).collect();
+    let chosen = outcome.chosen.iter().enumerate();
+    let shared: Vec<(&Basis, Vec<f64>)> =
+        chosen.map(|(k, c)| (&c.candidate.basis, outcome.coefficients(k))).collect();
+    let without_shared = |v: &ViewData| ViewData { response: without(v, &shared), ..v.clone() };
+    let fine: Vec<ViewData> = fine.iter().map(without_shared).collect();
     let coarse: Vec<ViewData> = match scene.statistic {
         crate::terms::Statistic::Bias => fine.par_iter().map(coarser).collect(),
         _ => fine.clone(),
@@ -155,19 +159,6 @@ pub fn few_views(
     let name = all.iter().find(|(c, b)| c.family.is_some() && b.gain > ADEQUATE * most);
     let (candidate, best) = name.or(all.first())?;
     Some(told(scene, candidate, best, noise.p(most)))
-}
-
-/// A view without what all views share.
-fn without(view: &ViewData, outcome: &Outcome) -> ViewData {
-    let mut view = view.clone();
-    let mut row = Vec::new();
-    for (k, chosen) in outcome.chosen.iter().enumerate() {
-        let beta = outcome.coefficients(k);
-        for (y, place) in view.response.iter_mut().zip(&view.places) {
-            *y -= chosen.candidate.basis.value(&beta, place, &mut row);
-        }
-    }
-    view
 }
 
 fn told(scene: &Scene<'_>, candidate: &Candidate, best: &Best, p: f64) -> Finding {

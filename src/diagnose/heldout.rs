@@ -84,7 +84,7 @@ fn log_score(view: &ViewData, terms: &[Term]) -> Option<f64> {
         .response
         .iter()
         .zip(&view.places)
-        .map(|(y, p)| y - terms.iter().map(|t| t.value(p, &mut row)).sum::<f64>())
+        .map(|(y, p)| y - Term::sum(terms, p, &mut row))
         .collect();
     let own: f64 = response.iter().zip(&view.weight).map(|(y, w)| w * y * y).sum();
     let rows = view.rows(&response)?;
@@ -132,10 +132,7 @@ pub fn levels(survey: &Survey, terms: &[Term]) -> Vec<f64> {
 
 fn values(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
     let mut row = Vec::new();
-    view.tiles
-        .iter()
-        .map(|t| terms.iter().map(|term| term.value(&t.place, &mut row)).sum())
-        .collect()
+    view.tiles.iter().map(|t| Term::sum(terms, &t.place, &mut row)).collect()
 }
 
 /// The terms' values at the tiles, with the plane fitted anew.

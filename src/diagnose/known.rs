@@ -7,6 +7,7 @@ use serde_json::{Map, Value};
 use crate::camera::Camera;
 use crate::effects;
 use crate::model::{Covariance, NoiseModel, UNEXPLAINED};
+use crate::stats::mean;
 use crate::terms::{Basis, Statistic, Term, by_term};
 
 /// The model's effects as terms, and the rest by name.
@@ -149,9 +150,10 @@ impl KnownTerms {
 
     /// Variance of what learnt profiles of single columns and rows may be off by, px^2.
     pub fn error_of_lines_px2(&self) -> f64 {
-        let mean = |mine: &[f64]| mine.iter().sum::<f64>() / mine.len().max(1) as f64;
         let of = |(shape, covariance): &(Vec<Term>, Covariance)| -> f64 {
-            by_term(shape, &covariance.variances).map(|(_, mine)| mean(mine)).sum()
+            by_term(shape, &covariance.variances)
+                .filter_map(|(_, mine)| mean(mine.iter().copied()))
+                .sum()
         };
         self.learnt.iter().filter(|(_, c)| c.factors.is_empty()).map(of).sum()
     }

@@ -27,10 +27,6 @@ struct Errors {
     own: Vec<Term>,
 }
 
-fn value(part: &[Term], place: &PixelContext, row: &mut Vec<f64>) -> f64 {
-    part.iter().map(|t| t.value(place, row)).sum()
-}
-
 impl Errors {
     fn of(known: &KnownTerms, statistic: Statistic) -> Self {
         Errors { parts: known.errors(statistic), own: known.own_errors(statistic) }
@@ -42,7 +38,7 @@ impl Errors {
 
     fn fill(&self, place: &PixelContext, columns: &mut [f64], row: &mut Vec<f64>) {
         let (together, mut rest) = columns.split_at_mut(self.parts.len());
-        together.iter_mut().zip(&self.parts).for_each(|(g, part)| *g = value(part, place, row));
+        together.iter_mut().zip(&self.parts).for_each(|(g, part)| *g = Term::sum(part, place, row));
         for term in &self.own {
             let (mine, others) = rest.split_at_mut(term.coefficients.len());
             term.basis.fill(place, mine);
@@ -113,7 +109,7 @@ impl Survey {
         self.views.par_iter_mut().for_each(|view| {
             let mut row = Vec::new();
             for t in Arc::make_mut(&mut view.tiles) {
-                let off = value(&off, &t.place, &mut row);
+                let off = Term::sum(&off, &t.place, &mut row);
                 t.square += off * (off - 2.0 * t.mean);
                 t.mean -= off;
             }
@@ -131,7 +127,7 @@ impl Survey {
         self.views.par_iter_mut().for_each(|view| {
             let mut row = Vec::new();
             for t in Arc::make_mut(&mut view.tiles) {
-                let factor = value(&off, &t.place, &mut row).exp();
+                let factor = Term::sum(&off, &t.place, &mut row).exp();
                 t.variance *= factor;
                 t.place.variance *= factor;
             }

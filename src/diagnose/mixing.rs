@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::edges::{Edges, INSIDE_PX};
 use super::field::Field;
 use super::hanging::{Hanging, Mean, nats, one};
+use crate::stats::mean;
 use crate::terms::{Axis, Statistic};
 
 /// Widths of the footprint that decide whether depth mixes, px.
@@ -76,8 +77,7 @@ pub fn whole_share(views: &[&Edges], width: f64) -> Option<(Mean, f64)> {
 /// The step to what is behind in sigmas of the noise: the views' mean.
 fn step_sigmas(views: &[&Edges]) -> f64 {
     let seen = views.iter().filter(|e| e.sigma_px > 0.0);
-    let sigmas: Vec<f64> = seen.map(|e| e.step_px / e.sigma_px).collect();
-    sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64
+    mean(seen.map(|e| e.step_px / e.sigma_px)).unwrap_or(0.0)
 }
 
 /// The views' mean share at a width, beyond that of the twins where there are any, and how well it
@@ -116,11 +116,11 @@ pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<H
     if p > level {
         return None;
     }
-    let (width, (mean, _)) = best(&WIDTHS_PX)?;
+    let (width, (share, _)) = best(&WIDTHS_PX)?;
     let full = mixed_px(width);
-    let [mixed, error] = [full * mean.value, full * mean.std_error];
+    let [mixed, error] = [full * share.value, full * share.std_error];
     let slope = (width_px(mixed + error) - width_px((mixed - error).max(0.0))) / 2.0;
-    let edge = mean.value * footprint(0, width);
+    let edge = share.value * footprint(0, width);
     Some(Hanging {
         families: vec!["edge-mixing"],
         statistic: Statistic::Bias,
@@ -129,7 +129,7 @@ pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<H
         parameters: one("width_px", width_px(mixed), slope),
         size_sigma: edge * step_sigmas(&edges),
         p,
-        nats: nats(&mean, 0.0),
+        nats: nats(&share, 0.0),
         words: Some(format!(
             "the target's last pixel is off by {:.2} % of the step to what is behind",
             100.0 * edge

@@ -7,12 +7,12 @@ use super::hanging::Hanging;
 use super::known::KnownTerms;
 use super::layers::Survey;
 use super::outcome::Outcome;
-use super::smooth::{SMOOTH_PX, high_pass};
 use super::structure::Structure;
 use super::tails::{TailCounts, tail};
 use super::texture::moving;
 use super::tiles::Places;
 use crate::measure::Workbench;
+use crate::stats::mean;
 use crate::terms::{Statistic, Term};
 
 /// How much frames of a view resemble one another, by lag, where that was found to be noise.
@@ -36,12 +36,7 @@ pub(super) fn fixed_px2(structure: &[Structure]) -> f64 {
 }
 
 pub(super) fn mean_of(values: impl Iterator<Item = f64>) -> f64 {
-    let (mut sum, mut n) = (0.0, 0.0);
-    for v in values.filter(|v| v.is_finite()) {
-        sum += v;
-        n += 1.0;
-    }
-    f64::max(sum / f64::max(n, 1.0), 0.0)
+    mean(values).unwrap_or(0.0).max(0.0)
 }
 
 pub(super) fn typical_sigma_px(fields: &[Field]) -> f64 {
@@ -71,7 +66,7 @@ pub(super) fn measure_tails(
                     (frame[k] - bias.get(n).map_or(0.0, |b| b[k])) / (field.sigma[k] * factor)
                 })
                 .collect();
-            high_pass(&field.image(&whitened), field.width, field.height, SMOOTH_PX)
+            field.high_passed(&whitened)
         };
         let frames: Vec<Vec<f32>> = field.first.iter().map(whitened).collect();
         // Single frames, unless what stands still in them could be taken for a tail.
@@ -130,7 +125,7 @@ pub(super) fn pixel_terms(
                 .map(|k| {
                     let mut place = places.pixel(k);
                     place.light = survey.light.of(f, k, &place);
-                    terms.iter().map(|t| t.value(&place, &mut row)).sum::<f64>() as f32
+                    Term::sum(terms, &place, &mut row) as f32
                 })
                 .collect()
         })

@@ -27,8 +27,8 @@ pub struct Prepared<'a> {
     groups: Vec<(&'a Grouping, Rows<'a>)>,
 }
 
-/// A view's response, what is settled taken out.
-fn without(view: &ViewData, settled: &[(&Basis, Vec<f64>)]) -> Vec<f64> {
+/// A view's response, terms with these coefficients taken out.
+pub fn without(view: &ViewData, settled: &[(&Basis, Vec<f64>)]) -> Vec<f64> {
     let mut response = view.response.clone();
     let mut scratch = Vec::new();
     for (basis, beta) in settled {

@@ -14,7 +14,7 @@ use super::texture::{
 };
 use super::unequal::loudness;
 use crate::camera::Camera;
-use crate::stats::measure_correlation;
+use crate::stats::{mean, measure_correlation};
 
 /// What one view tells; `None` where it cannot.
 #[derive(Debug, Clone, Default)]
@@ -172,15 +172,6 @@ fn across_views(means: &[Vec<f32>]) -> Vec<Option<f64>> {
         (n > 1000.0).then(|| products / n)
     };
     means.par_iter().map(of).collect()
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (mut sum, mut n) = (0.0, 0.0);
-    for v in values.filter(|v| v.is_finite()) {
-        sum += v;
-        n += 1.0;
-    }
-    (n > 0.0).then(|| sum / n)
 }
 
 /// How the frames' means move.

@@ -36,6 +36,16 @@ pub fn range(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
 }
 
+/// Mean of the finite values, if any.
+pub fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (mut sum, mut n) = (0.0, 0.0);
+    for v in values.filter(|v| v.is_finite()) {
+        sum += v;
+        n += 1.0;
+    }
+    (n > 0.0).then(|| sum / n)
+}
+
 /// Median by selection; NaN when empty. The slice is reordered.
 pub fn median_in_place(values: &mut [f32]) -> f32 {
     let n = values.len();

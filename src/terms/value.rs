@@ -42,6 +42,11 @@ impl Term {
             _ => self.basis.value(b, p, row),
         }
     }
+
+    /// Of all these terms together.
+    pub fn sum(terms: &[Term], p: &PixelContext, row: &mut Vec<f64>) -> f64 {
+        terms.iter().map(|t| t.value(p, row)).sum()
+    }
 }
 
 fn bilinear(b: &[f64], across: usize, (i, s): (usize, f64), (j, t): (usize, f64)) -> f64 {
