@@ -5,8 +5,9 @@ use nalgebra::DVector;
 use super::anchor::Family;
 use super::checked::{Checked, is_tilted, scatter};
 use super::evidence::{Evidence, gain};
+use super::hanging::Mean;
 use super::null::Null;
-use super::replication::{Measured, agree};
+use super::replication::agree;
 use super::warm_up::warm_up;
 use crate::terms::Axis;
 
@@ -98,7 +99,7 @@ pub fn laws(checked: &[Checked], Beside { bent_m, open }: &Beside) -> Vec<Law> {
             };
             let half = |second: bool| {
                 let mine = checked.iter().filter(|c| c.second == second);
-                Measured::of_scores(mine.map(|c| {
+                Mean::of_scores(mine.map(|c| {
                     let g = column(c);
                     (g * g / variance, g * (c.off - moved(c)) / variance)
                 }))

@@ -9,13 +9,14 @@ use serde_json::{Map, Value, json};
 use super::diagnosis::{Curve, Detectable};
 use super::few_losses::few_losses;
 use super::field::Field;
+use super::hanging::Mean;
 use super::layers::Survey;
 use super::margins::Margins;
 use super::missing_cells::{Cell, cells, fine};
 use super::missing_report::{Told, shadow_finding};
 use super::missing_search::{Judged, Losses};
 use super::missing_shapes::{Step, curves, steps};
-use super::replication::{Measured, agree};
+use super::replication::agree;
 use super::shadow::{Band, Sides, band};
 use super::tiles::Tile;
 use crate::camera::Camera;
@@ -249,7 +250,7 @@ fn bands_agree(sides: &[Sides], second: &[bool]) -> Option<bool> {
         let mine = sides.iter().zip(second).filter(|(_, s)| **s == which);
         let mine: Vec<Sides> = mine.map(|(sides, _)| *sides).collect();
         let Band { side, share: [value, std_error], .. } = band(&mine, 1.0)?;
-        Some((side, Measured { value, std_error, views: mine.len() }))
+        Some((side, Mean { value, std_error, views: mine.len() as f64 }))
     };
     let (first, second) = (half(false)?, half(true)?);
     Some(first.0 == second.0 && agree([Some(first.1), Some(second.1)])?)

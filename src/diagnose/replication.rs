@@ -10,6 +10,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::evidence::Evidence;
+use super::hanging::Mean;
 
 /// Standard errors from which on a half sees something by itself.
 const SEEN: f64 = 2.0;
@@ -33,15 +34,7 @@ pub fn halves(poses: &[(f64, f64)]) -> Vec<bool> {
     second
 }
 
-/// A size that so many views gave.
-#[derive(Debug, Clone, Copy)]
-pub struct Measured {
-    pub value: f64,
-    pub std_error: f64,
-    pub views: usize,
-}
-
-impl Measured {
+impl Mean {
     /// Of a single column, by each view's information and score; errors from the views' scatter
     /// where that is the larger.
     pub fn of_scores(views: impl Iterator<Item = (f64, f64)>) -> Option<Self> {
@@ -51,7 +44,7 @@ impl Measured {
         let left: f64 = all.iter().map(|(own, score)| (score - value * own).powi(2)).sum();
         let n = all.len() as f64;
         let variance = (left * n / (n - 1.0) / (a * a)).max(1.0 / a);
-        (all.len() > 1).then_some(Measured { value, std_error: variance.sqrt(), views: all.len() })
+        (n > 1.0).then_some(Mean { value, std_error: variance.sqrt(), views: n })
     }
 
     fn z(&self) -> f64 {
@@ -60,9 +53,9 @@ impl Measured {
 }
 
 /// Same sign, and sizes inside their joint interval.
-fn alike(halves: &[Measured; 2]) -> bool {
+fn alike(halves: &[Mean; 2]) -> bool {
     let [a, b] = halves;
-    let freedom = (a.views + b.views).saturating_sub(2).max(1) as f64;
+    let freedom = (a.views.round() + b.views.round() - 2.0).max(1.0);
     let reach = StudentsT::new(0.0, 1.0, freedom)
         .map_or(f64::INFINITY, |t| t.inverse_cdf(0.5 + 0.5 * INTERVAL));
     let apart = (a.value - b.value).abs();
@@ -70,7 +63,7 @@ fn alike(halves: &[Measured; 2]) -> bool {
 }
 
 /// Two sizes of one statistic. `None` where a half has too few views for an error.
-pub fn agree(halves: [Option<Measured>; 2]) -> Option<bool> {
+pub fn agree(halves: [Option<Mean>; 2]) -> Option<bool> {
     let [Some(a), Some(b)] = halves else { return None };
     Some(alike(&[a, b]) && a.z().abs().max(b.z().abs()) > SEEN)
 }
@@ -106,14 +99,13 @@ pub struct Half {
 
 impl Half {
     /// A weighted sum of the coefficients; errors from the views' scatter where that is the larger.
-    fn measured(&self, weights: &DVector<f64>) -> Option<Measured> {
-        let views = self.beyond.len();
-        let n = views as f64;
+    fn measured(&self, weights: &DVector<f64>) -> Option<Mean> {
+        let n = self.beyond.len() as f64;
         let reach = self.factor.solve(weights);
         let scatter: f64 = self.beyond.iter().map(|s| reach.dot(s).powi(2)).sum();
         let variance = (scatter * n / (n - 1.0)).max(reach.dot(weights));
         let value = weights.dot(&self.beta);
-        (views > 1).then_some(Measured { value, std_error: variance.sqrt(), views })
+        (n > 1.0).then_some(Mean { value, std_error: variance.sqrt(), views: n })
     }
 }
 
@@ -153,13 +145,13 @@ impl Halves {
     /// Does neither half show what the other has, or each the opposite? Sizes that differ are no
     /// contradiction: of true ones a twentieth lie outside their interval, and sensors warm up.
     pub fn contradict(&self, terms: &[usize]) -> bool {
-        let opposite = |sizes: [Measured; 2]| sizes[0].value * sizes[1].value <= 0.0;
+        let opposite = |sizes: [Mean; 2]| sizes[0].value * sizes[1].value <= 0.0;
         self.shown(terms).is_some_and(|(sizes, seen)| opposite(sizes) || seen <= SEEN)
     }
 
     /// What each half has of the common shape, and how clearly the better seen of them shows what the
     /// other has, in standard errors.
-    fn shown(&self, terms: &[usize]) -> Option<([Measured; 2], f64)> {
+    fn shown(&self, terms: &[usize]) -> Option<([Mean; 2], f64)> {
         let columns: Vec<usize> =
             terms.iter().filter_map(|&t| self.spans.get(t).cloned()).flatten().collect();
         if columns.is_empty() {

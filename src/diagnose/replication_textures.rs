@@ -8,7 +8,7 @@ use super::in_time::{later, of_any_two};
 use super::known::KnownTerms;
 use super::mixing::mean_share;
 use super::noise::expected_window;
-use super::replication::{Measured, agree};
+use super::replication::agree;
 use super::structure::Structure;
 use super::tails::GAUSSIAN_TAIL;
 use crate::terms::{Axis, Statistic};
@@ -30,11 +30,11 @@ pub fn replicated(
         match &beyond {
             Some(of) => {
                 let views: Vec<Structure> = mine.map(|v| structure[v].clone()).collect();
-                Mean::of(&views, of).map(|m| measured(&m))
+                Mean::of(&views, of)
             }
             None if found.axis == Axis::EdgeDistance => {
                 let edges: Vec<&Edges> = mine.map(|v| &fields[v].edges).collect();
-                mean_share(&edges, None, found.interval[1]).map(|(m, _)| measured(&m))
+                mean_share(&edges, None, found.interval[1]).map(|(m, _)| m)
             }
             None => None,
         }
@@ -83,8 +83,4 @@ pub fn beyond<'a>(id: &str, known: &'a KnownTerms) -> Option<OfView<'a>> {
         }),
         _ => return None,
     })
-}
-
-fn measured(m: &Mean) -> Measured {
-    Measured { value: m.value, std_error: m.std_error, views: m.views.round() as usize }
 }
