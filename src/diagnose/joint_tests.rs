@@ -4,7 +4,6 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::model::Covariance;
 use crate::rng::{Seed, Stream};
 use crate::simulate::kinect_v1;
 use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Statistic, Term, corner_radius};
@@ -20,14 +19,7 @@ fn session(z_m: [f64; 2], rng: &mut Stream, bias: impl Fn(&PixelContext) -> f64)
         .map(|_| {
             let d = SCALE_PX_M / rng.random_range(z_m[0]..z_m[1]);
             let slope = [rng.random_range(-0.5..0.5) * d, rng.random_range(-0.5..0.5) * d];
-            let mut view = ViewData {
-                places: Vec::new(),
-                response: Vec::new(),
-                weight: Vec::new(),
-                nuisance: Vec::new(),
-                precision: vec![0.0; 3],
-                gathered: Vec::new(),
-            };
+            let mut view = ViewData { precision: vec![0.0; 3], ..ViewData::default() };
             for v in (2..camera.height).step_by(4) {
                 for u in (2..camera.width).step_by(4) {
                     let (u, v) = (u as f64, v as f64);
@@ -71,17 +63,7 @@ fn term(family: Option<&'static str>, basis: Basis) -> Chosen {
 }
 
 fn fitted(data: &[ViewData], chosen: Vec<Chosen>) -> Outcome {
-    let found = Outcome {
-        chosen,
-        looks: Vec::new(),
-        fit: None,
-        evidence: Vec::new(),
-        noise: Default::default(),
-        remaining: None,
-        left_out: Vec::new(),
-        halves: None,
-        covariance: Covariance::default(),
-    };
+    let found = Outcome { chosen, ..Outcome::default() };
     let second: Vec<bool> = (0..data.len()).map(|v| v % 4 == 1 || v % 4 == 2).collect();
     refit(data, &vec![1.0; data.len()], &second, &kinect_v1(4).camera, found)
 }

@@ -6,36 +6,19 @@ use serde_json::json;
 use super::*;
 use crate::diagnose::parameters::parameters as told;
 use crate::effects::Fitted;
-use crate::model::{Effect, FitSummary, Provenance};
+use crate::model::Effect;
 use crate::simulate::kinect_v1;
 use crate::terms::{Basis, Extent, PixelContext};
 
 fn model(id: &str, parameters: Value) -> NoiseModel {
     let Value::Object(parameters) = parameters else { panic!("an object") };
-    NoiseModel {
-        sensor: None,
-        sigma: crate::SigmaModel::paper(),
-        effects: vec![Effect { id: id.into(), parameters, ..Effect::default() }],
-        uncertainty: None,
-        fit: FitSummary::default(),
-        provenance: Provenance::now(None),
-    }
+    let effects = vec![Effect { id: id.into(), parameters, ..Effect::default() }];
+    NoiseModel { effects, ..NoiseModel::paper() }
 }
 
 fn reach() -> Extent {
-    let unit = [0.0, 1.0];
-    Extent {
-        disparity: [10.0, 40.0],
-        z: [0.8, 3.2],
-        theta: unit,
-        right: unit,
-        down: unit,
-        session: unit,
-        temperature: unit,
-        light: unit,
-        ambient: unit,
-        edge: 1.0,
-    }
+    let (disparity, z, unit) = ([10.0, 40.0], [0.8, 3.2], [0.0, 1.0]);
+    Extent { disparity, z, theta: unit, light: unit, ambient: unit, ..Extent::default() }
 }
 
 /// There and back: formula of the entry, then the parameters of the term.

@@ -131,14 +131,7 @@ impl Outlook<'_> {
         let centre = Vector3::new(0.0, 0.0, plane.depth(0.0, 0.0));
         let board = TargetFrame::on(plane, centre);
         let within = |x: f64, [low, high]: [f64; 2]| x >= low && x <= high;
-        let mut data = ViewData {
-            gathered: Vec::new(),
-            places: Vec::new(),
-            response: Vec::new(),
-            weight: Vec::new(),
-            nuisance: Vec::new(),
-            precision: self.precision.clone(),
-        };
+        let mut data = ViewData { precision: self.precision.clone(), ..ViewData::default() };
         for v in (side / 2..self.camera.height).step_by(side) {
             for u in (side / 2..self.camera.width).step_by(side) {
                 let mut place = pixels.place(v * self.camera.width + u);

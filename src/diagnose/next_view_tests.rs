@@ -10,19 +10,8 @@ fn sigma() -> SigmaModel {
 
 /// Of a target of this size, m.
 fn reach([width, height]: [f64; 2]) -> Extent {
-    let none = [0.0, 0.0];
-    Extent {
-        disparity: none,
-        z: none,
-        theta: none,
-        right: [-0.5 * width, 0.5 * width],
-        down: [-0.5 * height, 0.5 * height],
-        session: none,
-        temperature: none,
-        light: none,
-        ambient: none,
-        edge: 100.0,
-    }
+    let [right, down] = [width, height].map(|size| [-0.5 * size, 0.5 * size]);
+    Extent { right, down, edge: 100.0, ..Extent::default() }
 }
 
 fn term(basis: Basis, coefficients: Vec<f64>) -> Term {

@@ -68,6 +68,7 @@ pub struct Look {
 }
 
 /// All terms of a layer with their common fit.
+#[derive(Default)]
 pub struct Outcome {
     pub chosen: Vec<Chosen>,
     /// Every nameless curve on its own, on the data as they came.

@@ -18,10 +18,10 @@ fn reach() -> Extent {
         right: [-0.6, 0.6],
         down: [-0.4, 0.4],
         session: [0.0, 1000.0],
-        temperature: [0.0, 0.0],
         light: [1.0, 1.0],
         ambient: [0.0, 1000.0],
         edge: 100.0,
+        ..Extent::default()
     }
 }
 

@@ -11,7 +11,6 @@ use super::null::{NoiseGains, Null};
 use super::outcome::{Chosen, Look, Outcome, Rules};
 use super::prepared::{Grouping, Patches, Prepared, evidence_of_bases, prepare};
 use super::samples::ViewData;
-use crate::model::Covariance;
 use crate::rng::Seed;
 use crate::terms::Basis;
 
@@ -67,17 +66,7 @@ pub fn search(
     let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
     let noise = layer.noise.unwrap_or_default();
     let looks = layer.looks;
-    Outcome {
-        chosen,
-        looks,
-        fit,
-        evidence,
-        noise,
-        remaining,
-        left_out: Vec::new(),
-        halves: None,
-        covariance: Covariance::default(),
-    }
+    Outcome { chosen, looks, fit, evidence, noise, remaining, ..Outcome::default() }
 }
 
 struct Layer<'a> {

@@ -4,7 +4,7 @@ use super::place::PixelContext;
 use crate::stats::range;
 
 /// Least and greatest of each axis.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Extent {
     pub disparity: [f64; 2],
     pub z: [f64; 2],
