@@ -18,7 +18,6 @@ use super::outcome::{Chosen, Outcome};
 use super::replication::{Half, Halves, spans};
 use super::samples::{ViewData, coarser};
 use crate::camera::Camera;
-use crate::model::Covariance;
 use crate::terms::Gauge;
 
 /// The terms of a finished search fitted together, with the smooth rest. `fine` are the views' means
@@ -73,7 +72,7 @@ impl Joint<'_> {
     ) -> Option<Outcome> {
         let kept = self.kept(&s.terms);
         let whole = Reduced::of(&self.all, self.columns.terms, s.penalty.as_ref())?;
-        let first = whole.fit(&kept, &self.precision)?;
+        let first = whole.fit(&kept, &self.columns.precision)?;
         // What every view says beyond the common fit, of all and of the terms alone.
         let left: Vec<DVector<f64>> = self.left(0..data.len(), &first).collect();
         let of_terms = |left: &DVector<f64>| {
@@ -86,7 +85,8 @@ impl Joint<'_> {
         let information =
             DMatrix::from_fn(kept.len(), kept.len(), |i, j| whole.a[(kept[i], kept[j])]);
         let held = |dispersion: f64| {
-            let own = DVector::from_fn(kept.len(), |i, _| dispersion * self.precision[kept[i]]);
+            let own =
+                DVector::from_fn(kept.len(), |i, _| dispersion * self.columns.precision[kept[i]]);
             (&information + DMatrix::from_diagonal(&own)).try_inverse()
         };
         let inverse = held(1.0)?;
@@ -94,22 +94,19 @@ impl Joint<'_> {
         let scatter: f64 = beyond.iter().map(|e| e.dot(&(&inverse * e))).sum();
         // Views scatter beyond their noise: what they say counts for less against what is usual.
         let dispersion = if kept.is_empty() { 1.0 } else { (scatter / free).max(1.0) };
-        let precision = &self.precision * dispersion;
+        let precision = &self.columns.precision * dispersion;
         let beta = whole.fit(&kept, &precision)?;
         let errors = clustered(&held(dispersion)?, &beyond);
         let mut outcome = Outcome {
             chosen: self.chosen(s, found),
             looks: found.looks.clone(),
-            fit: None,
-            evidence: Vec::new(),
             noise: found.noise.clone(),
             remaining: found
                 .remaining
                 .clone()
                 .filter(|r| s.penalty.is_none() || !is_smooth_and_nameless(&r.candidate)),
-            left_out: Vec::new(),
             halves: self.halves(second, s, &precision, &beta),
-            covariance: Covariance::default(),
+            ..Outcome::default()
         };
         let planes = (camera, disparities(data));
         let is_told = second.contains(&true);

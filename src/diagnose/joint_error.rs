@@ -49,7 +49,7 @@ impl Joint<'_> {
             row.add_square(1.0 / row.variance(&covariance), &mut metric);
         }
         for i in 0..n {
-            let usual = kept.get(i).map_or(1.0, |&k| self.precision[k]);
+            let usual = kept.get(i).map_or(1.0, |&k| self.columns.precision[k]);
             metric[(i, i)] += SLIGHT * seen.len() as f64 * usual;
         }
         let root = Cholesky::<f64, Dyn>::new(metric)?.l();

@@ -4,7 +4,6 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::candidate::Candidate;
 use super::evidence::{Evidence, score};
 use super::outcome::Chosen;
 use super::samples::ViewData;
@@ -25,17 +24,13 @@ const NODE_PX: usize = 32;
 /// What is fitted: terms, then the nodes of the maps.
 pub struct Columns {
     pub bases: Vec<Basis>,
-    /// Of every column of the terms.
-    usual: Vec<f64>,
+    /// Precision of the terms' coefficients before anything was measured.
+    pub precision: DVector<f64>,
     pub gauges: Vec<Option<Gauge>>,
     pub maps: [Basis; 2],
     /// Columns of the terms, and of both maps.
     pub terms: usize,
     pub nodes: usize,
-}
-
-fn usual(candidate: &Candidate) -> impl Iterator<Item = f64> {
-    (0..candidate.basis.count()).map(|k| candidate.usual(k))
 }
 
 impl Columns {
@@ -47,11 +42,15 @@ impl Columns {
             .map(|(length, low, high)| (length / NODE_PX).clamp(low, high));
         let [width, height] = [camera.width, camera.height].map(|n| n as f64);
         let map = |times| Basis::Spline { width, height, across, down, times };
+        let precision = |c: &Chosen| -> Vec<f64> {
+            let coefficients = 0..c.candidate.basis.count();
+            coefficients.map(|k| c.candidate.usual(k).powi(-2)).collect()
+        };
         Columns {
             gauges: bases.iter().map(|b| Gauge::of(b, &pixels)).collect(),
             terms: bases.iter().map(Basis::count).sum(),
             nodes: 2 * across * down,
-            usual: chosen.iter().flat_map(|c| usual(&c.candidate)).collect(),
+            precision: DVector::from_vec(chosen.iter().flat_map(precision).collect()),
             bases,
             maps: [map(Modulation::One), map(Modulation::DisparitySquared)],
         }
@@ -102,11 +101,6 @@ impl Columns {
         let (first, second) = nodes.split_at_mut(self.nodes / 2);
         self.maps[0].fill(place, first);
         self.maps[1].fill(place, second);
-    }
-
-    /// Precision of the terms' columns.
-    fn usual(&self) -> DVector<f64> {
-        DVector::from_iterator(self.terms, self.usual.iter().map(|size| size.powi(-2)))
     }
 
     pub fn span(&self, term: usize) -> std::ops::Range<usize> {
@@ -197,7 +191,6 @@ pub struct Joint<'a> {
     pub all: Evidence,
     /// Of either half of the views.
     pub halves: [Evidence; 2],
-    pub precision: DVector<f64>,
 }
 
 impl<'a> Joint<'a> {
@@ -219,7 +212,7 @@ impl<'a> Joint<'a> {
             views.iter().map(|part| sum(&mut part.iter().copied())).collect();
         let halves = [false, true].map(|h| sum(&mut (0..data.len()).filter(|v| second[*v] == h)));
         let all = Evidence::sum(n, 0.0, &parts);
-        Joint { columns, views, by_view, parts, all, halves, precision: columns.usual() }
+        Joint { columns, views, by_view, parts, all, halves }
     }
 
     /// What each view of these says beyond a fit, its plane profiled out: the score that is left.
@@ -253,7 +246,7 @@ impl<'a> Joint<'a> {
     ) -> Vec<f64> {
         let kept = self.kept(terms);
         let of = |(reduced, part): (&Reduced, &Evidence)| {
-            let mut beta = reduced.fit(&kept, &self.precision)?;
+            let mut beta = reduced.fit(&kept, &self.columns.precision)?;
             for &t in terms.iter().filter(|t| !applied(**t)) {
                 self.columns.span(t).for_each(|k| beta[k] = 0.0);
             }

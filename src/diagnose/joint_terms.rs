@@ -196,9 +196,11 @@ impl Joint<'_> {
         let kept = self.kept(&settled.terms);
         let span = self.columns.span(term);
         let of = |beta: DVector<f64>| -> f64 {
-            span.clone().map(|k| self.precision[k].sqrt() * beta[k].abs()).fold(0.0, f64::max)
+            span.clone()
+                .map(|k| self.columns.precision[k].sqrt() * beta[k].abs())
+                .fold(0.0, f64::max)
         };
-        let fits = settled.without.iter().filter_map(|r| r.fit(&kept, &self.precision));
+        let fits = settled.without.iter().filter_map(|r| r.fit(&kept, &self.columns.precision));
         fits.map(of).sum::<f64>() / settled.without.len().max(1) as f64
     }
 
