@@ -1,5 +1,6 @@
 //! What the found terms are worth on views that had no part in any choice.
 
+use nalgebra::Vector3;
 use rand::Rng;
 use rand::seq::SliceRandom;
 
@@ -9,7 +10,9 @@ use super::layers::Survey;
 use super::outcome::Outcome;
 use super::pixels::terms_of;
 use super::samples::ViewData;
+use super::scatter::plane_through;
 use super::surveyed_view::SurveyedView;
+use super::tiles::Tile;
 use crate::terms::{Statistic, Term, by_term};
 
 /// A share of the views is kept aside.
@@ -111,16 +114,12 @@ struct Rms {
 fn rms(views: &[SurveyedView], terms: &[Term], scale_px_m: f64) -> Rms {
     let (mut px, mut mm, mut n) = (0.0, 0.0, 0.0);
     for view in views {
-        let fitted = fitted(view, terms);
-        for (t, f) in view.tiles.iter().zip(&fitted) {
-            if !t.mean.is_finite() {
-                continue;
-            }
+        each_tile(view, terms, |t, f| {
             let to_mm = 1e3 * t.place.z * t.place.z / scale_px_m;
             px += t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0);
             mm += t.pixels * ((t.mean - f) * to_mm).powi(2);
             n += t.pixels;
-        }
+        });
     }
     Rms { px: (px / n).sqrt(), mm: (mm / n).sqrt() }
 }
@@ -147,18 +146,17 @@ fn fitted(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
     values
 }
 
-fn plane_left(view: &SurveyedView, values: &[f64]) -> Option<nalgebra::Vector3<f64>> {
-    let mut a = nalgebra::Matrix3::zeros();
-    let mut b = nalgebra::Vector3::zeros();
-    for (t, f) in view.tiles.iter().zip(values) {
-        let (y, w) = (t.mean - f, t.pixels);
-        if y.is_finite() {
-            let x = nalgebra::Vector3::new(1.0, t.place.x, t.place.y);
-            a += w * x * x.transpose();
-            b += w * y * x;
-        }
-    }
-    a.lu().solve(&b)
+/// The plane that is left in a view's means without these values.
+fn plane_left(view: &SurveyedView, values: &[f64]) -> Option<Vector3<f64>> {
+    let points = view.tiles.iter().zip(values);
+    plane_through(points.map(|(t, f)| ([t.place.x, t.place.y], t.mean - f, t.pixels)))
+}
+
+/// Every tile that has a mean, with the terms' value there, the plane fitted anew.
+fn each_tile(view: &SurveyedView, terms: &[Term], mut visit: impl FnMut(&Tile, f64)) {
+    let fitted = fitted(view, terms);
+    let tiles = view.tiles.iter().zip(fitted).filter(|(t, _)| t.mean.is_finite());
+    tiles.for_each(|(t, f)| visit(t, f));
 }
 
 /// Root mean square of each view's mean residual with the terms taken out, px.
@@ -168,12 +166,10 @@ pub fn rms_by_view(survey: &Survey, terms: &[Term]) -> Vec<f64> {
         .iter()
         .map(|view| {
             let (mut sum, mut n) = (0.0, 0.0);
-            for (t, f) in view.tiles.iter().zip(&fitted(view, terms)) {
-                if t.mean.is_finite() {
-                    sum += t.pixels * (t.mean - f).powi(2);
-                    n += t.pixels;
-                }
-            }
+            each_tile(view, terms, |t, f| {
+                sum += t.pixels * (t.mean - f).powi(2);
+                n += t.pixels;
+            });
             (sum / f64::max(n, 1.0)).sqrt()
         })
         .collect()
@@ -198,11 +194,9 @@ pub fn left_out(survey: &Survey, outcome: &Outcome, terms: &[Term]) -> Option<Le
         let both = sums.iter_mut().zip(&mut by_view).zip([&[][..], &refitted]);
         for ((sum, by_view), terms) in both {
             let before = *sum;
-            for (t, f) in view.tiles.iter().zip(&fitted(view, terms)) {
-                if t.mean.is_finite() {
-                    *sum += t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0);
-                }
-            }
+            each_tile(view, terms, |t, f| {
+                *sum += t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0);
+            });
             *by_view += ((*sum - before) / pixels.max(1.0)).sqrt();
         }
         n += pixels;

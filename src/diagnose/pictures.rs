@@ -1,12 +1,13 @@
 //! Residuals of a few views as pictures: as recorded, with what was found taken out, and of the
 //! view's twin. Computed here, drawn elsewhere.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::engine::Diagnosed;
 use super::field::Field;
 use super::known::KnownTerms;
+use super::scatter::plane_through;
 use crate::camera::Rays;
 use crate::frame::Frame;
 use crate::measure::{MeasureOptions, Workbench};
@@ -87,21 +88,15 @@ fn worth_seeing(done: &Diagnosed) -> Vec<usize> {
 
 /// Minus the plane that is left in `values`.
 fn about_plane(field: &Field, values: &[f32], rays: &Rays) -> Vec<f32> {
-    let row = |i: u32| {
+    let at = |i: u32| {
         let (x, y) = rays.at(i as usize);
-        Vector3::new(1.0, x, y)
+        [x, y]
     };
-    let (mut a, mut b) = (Matrix3::zeros(), Vector3::zeros());
-    for (&i, &value) in field.pixels.iter().zip(values) {
-        if value.is_finite() {
-            let x = row(i);
-            a += x * x.transpose();
-            b += x * f64::from(value);
-        }
-    }
-    let plane = a.lu().solve(&b).unwrap_or_else(Vector3::zeros);
-    let pairs = field.pixels.iter().zip(values);
-    pairs.map(|(&i, &value)| value - plane.dot(&row(i)) as f32).collect()
+    let pairs = || field.pixels.iter().zip(values);
+    let plane = plane_through(pairs().map(|(&i, &value)| (at(i), f64::from(value), 1.0)));
+    let plane = plane.unwrap_or_else(Vector3::zeros);
+    let of_plane = |[x, y]: [f64; 2]| plane.dot(&Vector3::new(1.0, x, y)) as f32;
+    pairs().map(|(&i, &value)| value - of_plane(at(i))).collect()
 }
 
 /// Errors of the disparity, px, as errors of the depth, mm: a larger disparity is nearer.

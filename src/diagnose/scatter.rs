@@ -1,6 +1,6 @@
 //! What a least-squares fit leaves, where columns may say the same.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 /// Singular values below this share of the greatest are rounding.
 const TINY: f64 = 1e-6;
@@ -22,6 +22,17 @@ pub fn left_by_fit(x: DMatrix<f64>, y: &DVector<f64>) -> Option<Left> {
     let beta = svd.solve(y, tiny).ok()?;
     let free = (y.len() - svd.rank(tiny)) as f64;
     Some(Left { squares: (y - x * beta).norm_squared(), free })
+}
+
+/// The plane 1, x, y through values of some weight, as they come: its three coefficients.
+pub fn plane_through(points: impl Iterator<Item = ([f64; 2], f64, f64)>) -> Option<Vector3<f64>> {
+    let (mut a, mut b) = (Matrix3::zeros(), Vector3::zeros());
+    for ([x, y], value, weight) in points.filter(|p| p.1.is_finite()) {
+        let row = Vector3::new(1.0, x, y);
+        a += weight * row * row.transpose();
+        b += weight * value * row;
+    }
+    a.lu().solve(&b)
 }
 
 #[cfg(test)]
