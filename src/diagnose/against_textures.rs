@@ -81,7 +81,7 @@ impl Baseline {
     /// Are the recording's tails no heavier than those of the simulation, by much?
     pub fn tails_alike(&self, real: &[Structure]) -> bool {
         let tail = |all: &[Structure]| {
-            mean(all.iter().filter(|s| s.tail_pixels > 0.0).map(|s| s.tail)).unwrap_or(0.0)
+            mean(all.iter().filter(|s| s.tails.n > 0.0).map(|s| s.tails.share())).unwrap_or(0.0)
         };
         tail(real) < TAILS_ALIKE * tail(&self.structure)
     }

@@ -96,7 +96,6 @@ impl Case<'_> {
             diagnosis,
             model: extended,
             fields: again.fields,
-            bias: mean.terms,
             bias_px: mean.px,
             excluded,
             against: again.against,

@@ -9,7 +9,6 @@ use crate::error::Result;
 use crate::measure::MeasureOptions;
 use crate::model::NoiseModel;
 use crate::rng::Seed;
-use crate::terms::Term;
 use crate::view::{Excluded, Recording};
 
 /// Settings of a diagnosis.
@@ -43,9 +42,7 @@ pub struct Diagnosed {
     pub model: NoiseModel,
     /// The views, but for their single frames.
     pub fields: Vec<Field>,
-    /// Terms of the bias that were found, for pictures.
-    pub bias: Vec<Term>,
-    /// The same at every pixel of every field, px; empty when there are none.
+    /// The bias that was found, at every pixel of every field, px; empty where there is none.
     pub bias_px: Vec<Vec<f32>>,
     pub excluded: Vec<Excluded>,
     /// The simulated views, where there are any, in the same order.

@@ -1,7 +1,5 @@
 //! A recording that is far from the model, though no search found what its views have in common.
 
-use serde_json::Map;
-
 use super::diagnosis::{Finding, Size, Status};
 use super::field::CLIP_SIGMAS;
 use super::heldout::rms_by_view;
@@ -26,22 +24,21 @@ pub fn far_off(survey: &Survey, sigma_mm: f64) -> Option<Finding> {
     });
     let rms_px = rms_by_view(survey, &[]);
     let sigma = reached(rms_px.iter().zip(sigma_px).map(|(rms, sigma)| rms / sigma).collect());
-    let found = |sigma: f64, words: String, id, statistic| Finding {
+    let found = |sigma: f64, words: String, statistic| Finding {
         status: Status::Unexplained,
         effect: None,
         alternatives: Vec::new(),
-        parameters: Map::new(),
         share: 1.0,
         size: Size { mm: sigma * sigma_mm, sigma },
         physics: format!(
             "{words}, and these views do not say by what: the model may be another sensor's, or views from more \
              distances and tilts may tell."
         ),
-        ..named(id, statistic, Axis::Pixel)
+        ..named("", statistic, Axis::Pixel)
     };
     if let Some(sigma) = sigma.filter(|s| *s > limit) {
         let words = format!("The views' mean errors are {sigma:.0} times the noise of a pixel");
-        return Some(found(sigma, words, "radial-disparity-bias", Statistic::Bias));
+        return Some(found(sigma, words, Statistic::Bias));
     }
     // Of a view's noise over the model's.
     let factor = |view: &ViewData| Some((0.5 * view.level()?.0).exp());
@@ -54,7 +51,7 @@ pub fn far_off(survey: &Survey, sigma_mm: f64) -> Option<Finding> {
         (None, None) => return None,
     };
     let words = format!("In some views the noise is {words} the model's");
-    Some(found(sigma, words, "range-exponent", Statistic::Variance))
+    Some(found(sigma, words, Statistic::Variance))
 }
 
 /// What two of the views and a quarter of them are beyond, at least.

@@ -16,8 +16,6 @@ pub struct Quantisation {
     pub depth_step_m: Option<f64>,
     /// Occurring disparities are multiples of this, px, give or take a constant.
     pub disparity_step_px: Option<f64>,
-    /// Length of the mean phase on that lattice, 0 to 1.
-    pub resultant: f64,
     /// Chance of such steps were all words as likely to occur; `None` where the format has the steps.
     pub depth_p: Option<f64>,
     pub disparity_p: Option<f64>,
@@ -78,11 +76,10 @@ impl RawHistogram {
         let stride = words.iter().fold(0, |g, (w, _)| gcd(g, *w));
         match sensor.code {
             DepthCode::Metric { units_per_metre, .. } => {
-                let (step, resultant, p) = self.scan(&words, scale_px_m * units_per_metre);
+                let (step, p) = self.scan(&words, scale_px_m * units_per_metre);
                 Quantisation {
                     depth_step_m: (stride > 1).then(|| stride as f64 / units_per_metre),
                     disparity_step_px: step.filter(|_| stride == 1),
-                    resultant,
                     depth_p: (stride > 1).then(|| all_multiples(stride, words.len())),
                     disparity_p: step.filter(|_| stride == 1).and(Some(p)),
                 }
@@ -93,7 +90,6 @@ impl RawHistogram {
                 Quantisation {
                     depth_step_m: None,
                     disparity_step_px: Some(offsets.max(1) as f64 * slope.abs() * scale_px_m),
-                    resultant: 1.0,
                     depth_p: None,
                     disparity_p: (offsets > 1).then(|| all_multiples(offsets, words.len() - 1)),
                 }
@@ -101,10 +97,10 @@ impl RawHistogram {
         }
     }
 
-    /// The frequency at which the disparities' phases gather most.
-    fn scan(&self, words: &[(usize, f64)], px_words: f64) -> (Option<f64>, f64, f64) {
+    /// The step of the frequency at which the disparities' phases gather most, and the chance of it.
+    fn scan(&self, words: &[(usize, f64)], px_words: f64) -> (Option<f64>, f64) {
         if self.contrast(words) < CONTRAST {
-            return (None, 0.0, 1.0);
+            return (None, 1.0);
         }
         let disparities: Vec<(f64, f64, f64)> = words
             .iter()
@@ -137,7 +133,7 @@ impl RawHistogram {
         // Rayleigh's test, at each of the scanned frequencies.
         let (frequency, resultant, words) = best;
         let p = (scanned * (-words * resultant * resultant).exp()).clamp(f64::MIN_POSITIVE, 1.0);
-        ((resultant > GATHERED).then(|| 1.0 / frequency), resultant, p)
+        ((resultant > GATHERED).then(|| 1.0 / frequency), p)
     }
 
     /// Do the disparities lie on a lattice of this step, give or take what a scale or its own error

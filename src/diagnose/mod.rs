@@ -101,8 +101,4 @@ pub use diagnosis::*;
 pub use engine::{DiagnoseOptions, Diagnosed, diagnose, diagnose_against};
 pub use field::Field;
 pub use known::KnownTerms;
-pub use lattice::{Quantisation, RawHistogram};
-pub use layers::Survey;
-pub use missing::{DropoutFinding, DropoutOutcome, missing};
-pub use outcome::Outcome;
 pub use pictures::{ViewPictures, pictures};

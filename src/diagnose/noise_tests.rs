@@ -290,7 +290,7 @@ fn tails_are_heavy_when_most_views_have_them() {
             // As exponential as a tail of matches gone astray.
             let between = [0.4, 0.24, 0.2, 0.12, 0.03].map(|part| part * n * tail);
             let tails = TailCounts { n, beyond: n * tail, between };
-            Structure { tail, tail_pixels: n, tails, ..Structure::default() }
+            Structure { tails, ..Structure::default() }
         };
         (0..VIEWS).map(view).collect()
     };

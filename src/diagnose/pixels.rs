@@ -80,7 +80,6 @@ pub(super) fn measure_tails(
         };
         s.tails = TailCounts::default();
         looks.iter().for_each(|l| s.tails.add(l));
-        (s.tail_pixels, s.tail) = (s.tails.n, s.tails.beyond / s.tails.n.max(1.0));
     });
 }
 

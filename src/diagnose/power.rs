@@ -20,7 +20,7 @@ use super::search::LEAST_SHARE;
 use super::variance::beyond_sigma;
 use super::verdict::MIN_SIZE;
 use crate::rng::Seed;
-use crate::terms::{Basis, Statistic, Term};
+use crate::terms::{Basis, Term};
 
 /// Of the recordings, so many show it.
 const POWER: f64 = 0.8;
@@ -131,8 +131,7 @@ impl Gates<'_> {
             .fixed
             .filter(|_| basis.is_of_picture())
             .map_or(0.0, |(fixed, px)| fixed * (CLEARLY * basis.count() as f64 / px).sqrt());
-        let least = if self.scene.statistic == Statistic::Bias { self.rules.least } else { 0.0 };
-        least.max(LEAST_OF_LARGEST * largest).max(still)
+        self.rules.least.max(LEAST_OF_LARGEST * largest).max(still)
     }
 }
 

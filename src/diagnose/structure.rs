@@ -43,17 +43,14 @@ pub struct Structure {
     pub column_px2: Option<f64>,
     /// Of the frames' means about a line in time.
     pub jitter: Option<Jitter>,
-    /// Share of residuals beyond four local standard deviations, and how many were looked at.
-    pub tail: f64,
-    pub tail_pixels: f64,
-    /// The same by how far out they lie.
+    /// Residuals beyond four local standard deviations.
     pub tails: TailCounts,
 }
 
 impl Structure {
     /// Share beyond four local standard deviations, where enough was looked at.
     pub fn tail_share(&self) -> Option<f64> {
-        (self.tail_pixels > FEWEST_READINGS).then_some(self.tail)
+        (self.tails.n > FEWEST_READINGS).then(|| self.tails.share())
     }
 }
 

@@ -39,6 +39,11 @@ impl TailCounts {
         self.between.iter_mut().zip(other.between).for_each(|(a, b)| *a += b);
     }
 
+    /// Share beyond the first edge.
+    pub fn share(&self) -> f64 {
+        self.beyond / self.n.max(1.0)
+    }
+
     pub fn count(&mut self, sigmas: f32) {
         self.n += 1.0;
         self.beyond += f64::from(u8::from(sigmas > TAIL_SIGMAS));
@@ -131,7 +136,7 @@ pub fn tails(views: &[Structure], known: &KnownTerms, level: f64, uneven: bool) 
         parameters,
         size_sigma,
         p: m.p_above(own),
-        nats: m.value * views.iter().map(|s| s.tail_pixels).sum::<f64>() * (m.value / own).ln(),
+        nats: m.value * views.iter().map(|s| s.tails.n).sum::<f64>() * (m.value / own).ln(),
         words: None,
     })
 }
