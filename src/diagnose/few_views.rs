@@ -132,7 +132,7 @@ pub fn few_views(
     let tried: Vec<Tried<'_>> = candidates
         .par_iter()
         .filter(|c| c.family != Some(RECALIBRATE) && c.basis.count() <= MAX_COLUMNS)
-        // Seams and ripples in depth are many, and nearly the same.
+        // Seams are many, and nearly the same.
         .filter(|c| c.family.is_some() || !matches!(c.basis, Basis::Curve { nodes: 2, .. }))
         .filter_map(|c| {
             let as_fine = c.basis.is_fine() || c.basis.of_column_alone();

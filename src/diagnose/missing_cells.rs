@@ -180,7 +180,7 @@ struct Clump {
 }
 
 impl Clump {
-    /// Cells one step apart, to the right and below; a rim's cell beside its patch's other part too.
+    /// Every pair of cells that touch, counted once; a rim's cell and its patch's other part among them.
     fn add(&mut self, cells: &[Cell], off: &[f64]) {
         let step = cells.iter().map(|c| c.place.side).fold(0.0, f64::max).max(1.0) * APART;
         for (i, (a, x)) in cells.iter().zip(off).enumerate() {
