@@ -134,11 +134,16 @@ fn a_full_footprint_is_given_its_width() {
     assert!((width - 4.0).abs() < 0.2, "{width}");
 }
 
+/// Of 40 sets of views, how many have a mixed edge at a level of 5 %.
+fn mixed_of_40(first_seed: u64, answer: Answer<'_>) -> usize {
+    let mixed = |seed: &u64| mixing(&views(*seed, answer), None, 0.05).is_some();
+    (first_seed..first_seed + 40).filter(mixed).count()
+}
+
 /// At a level of 5 % two of 40 sharp edges may be told; eight are one in a thousand.
 #[test]
 fn sharp_edges_are_told_as_often_as_the_level_says() {
-    let told = |seed: u64| mixing(&views(100 + seed, &|_, _| Some(0.0)), None, 0.05).is_some();
-    let count = (0..40).filter(|&seed| told(seed)).count();
+    let count = mixed_of_40(100, &|_, _| Some(0.0));
     assert!(count <= 7, "{count} of 40");
 }
 
@@ -148,8 +153,7 @@ fn gross_errors_beside_the_edge_are_no_mixing() {
     let gross = |_: isize, rng: &mut Stream| {
         Some(if rng.random_bool(0.05) { rng.random_range(-1.0..1.0) } else { 0.0 })
     };
-    let told = |seed: u64| mixing(&views(200 + seed, &gross), None, 0.05).is_some();
-    let count = (0..40).filter(|&seed| told(seed)).count();
+    let count = mixed_of_40(200, &gross);
     assert!(count <= 7, "{count} of 40");
 }
 

@@ -4,6 +4,7 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
+use crate::diagnose::pixels::terms_of;
 use crate::rng::{Seed, Stream};
 use crate::simulate::kinect_v1;
 use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Statistic, Term, corner_radius};
@@ -72,24 +73,16 @@ fn fitted(data: &[ViewData], chosen: Vec<Chosen>) -> Outcome {
 /// say, px.
 fn left(data: &[ViewData], outcome: &Outcome) -> [f64; 2] {
     let (mut squares, mut n) = ([0.0; 2], 0.0);
-    let mut row = Vec::new();
+    let (terms, mut row) = (terms_of(outcome, Statistic::Bias), Vec::new());
     for view in data {
         let x = DMatrix::from_row_slice(view.places.len(), 3, &view.nuisance);
         let solver = x.clone().svd(true, true);
         let mut y = DVector::from_vec(view.response.clone());
         for square in &mut squares {
             *square += (&y - &x * solver.solve(&y, 1e-12).unwrap()).norm_squared();
-            for (k, c) in outcome.chosen.iter().enumerate() {
-                let basis = c.candidate.basis.clone();
-                let term = Term {
-                    statistic: Statistic::Bias,
-                    basis,
-                    coefficients: outcome.coefficients(k),
-                };
-                if term.is_sensor_bias() {
-                    let values = view.places.iter().map(|p| term.value(p, &mut row));
-                    y -= DVector::from_iterator(view.places.len(), values);
-                }
+            for term in terms.iter().filter(|t| t.is_sensor_bias()) {
+                let values = view.places.iter().map(|p| term.value(p, &mut row));
+                y -= DVector::from_iterator(view.places.len(), values);
             }
         }
         n += view.places.len() as f64;
@@ -140,16 +133,9 @@ fn what_planes_absorb_comes_out_as_nothing() {
     let rng = &mut Seed(5).stream("joint/affine");
     let data = session([0.8, 3.0], rng, |p| 0.7 - 0.4 * p.x + 0.3 * p.y);
     let outcome = fitted(&data, vec![bowl(), map()]);
-    let mut row = Vec::new();
-    let mut most = 0.0f64;
-    for p in data.iter().flat_map(|v| &v.places) {
-        let of = |k: usize| (outcome.chosen[k].candidate.basis.clone(), outcome.coefficients(k));
-        let value: f64 = (0..outcome.chosen.len())
-            .map(of)
-            .map(|(basis, beta)| basis.value(&beta, p, &mut row))
-            .sum();
-        most = most.max(value.abs());
-    }
+    let (terms, mut row) = (terms_of(&outcome, Statistic::Bias), Vec::new());
+    let sizes = data.iter().flat_map(|v| &v.places).map(|p| Term::sum(&terms, p, &mut row).abs());
+    let most = sizes.fold(0.0, f64::max);
     assert!(most < 0.05, "{most}");
 }
 
@@ -238,14 +224,8 @@ fn a_nameless_curve_does_not_share_what_a_name_says() {
     let outcome = fitted(&data, chosen);
     let families: Vec<_> = outcome.chosen.iter().map(|c| c.candidate.family).collect();
     assert!(families.iter().all(|f| *f == Some("column-banding")), "{families:?}");
-    let mut row = Vec::new();
-    let value = |u: f64, row: &mut Vec<f64>| -> f64 {
-        let place = PixelContext { u, ..data[0].places[0] };
-        let of = |k: usize| {
-            outcome.chosen[k].candidate.basis.value(&outcome.coefficients(k), &place, row)
-        };
-        (0..outcome.chosen.len()).map(of).sum()
-    };
-    let height = 0.5 * (value(65.0, &mut row) - value(75.0, &mut row));
+    let terms = terms_of(&outcome, Statistic::Bias);
+    let at = |u| Term::sum(&terms, &PixelContext { u, ..data[0].places[0] }, &mut Vec::new());
+    let height = 0.5 * (at(65.0) - at(75.0));
     assert!((height - 0.1).abs() < 0.01, "{height}");
 }

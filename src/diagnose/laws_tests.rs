@@ -3,6 +3,7 @@
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
+use crate::diagnose::diagnosis::Finding;
 use crate::diagnose::known::KnownTerms;
 use crate::diagnose::reference::findings;
 use crate::rng::Seed;
@@ -33,10 +34,12 @@ fn references(
     (0..24).map(of).collect()
 }
 
-fn found(checked: &[Checked]) -> Vec<(Option<&'static str>, f64)> {
-    let told =
-        findings(&laws(checked, &Beside::default()), &KnownTerms::default(), 1.0, 0.003, Seed(1));
-    told.iter().map(|f| (f.effect, f.parameters["offset_px"]["value"].as_f64().unwrap())).collect()
+/// Names with the offset, px, beside a target bent by so much.
+fn found(checked: &[Checked], bent_m: f64) -> Vec<(Option<&'static str>, f64)> {
+    let laws = laws(checked, &Beside { bent_m, ..Beside::default() });
+    let found = findings(&laws, &KnownTerms::default(), 1.0, 0.003, Seed(1));
+    let offset_px = |f: &Finding| f.parameters.get("offset_px")?.get("value")?.as_f64();
+    found.iter().map(|f| (f.effect, offset_px(f).unwrap_or(f64::NAN))).collect()
 }
 
 /// In the order of the session they would be a drift.
@@ -44,7 +47,7 @@ fn found(checked: &[Checked]) -> Vec<(Option<&'static str>, f64)> {
 fn a_target_read_beside_the_axis_is_no_law() {
     for seed in 0..8 {
         let checked = references(0.0, [-0.006, 0.003], |k| k, seed);
-        assert_eq!(found(&checked), [], "seed {seed}");
+        assert_eq!(found(&checked, 0.0), [], "seed {seed}");
     }
 }
 
@@ -53,7 +56,7 @@ fn a_target_read_beside_the_axis_is_no_law() {
 fn an_offset_keeps_its_size_beside_it() {
     for seed in 0..8 {
         for angles in [[0.0, 0.0], [-0.006, 0.003]] {
-            let told = found(&references(0.06, angles, |k| 7 * k % 24, seed));
+            let told = found(&references(0.06, angles, |k| 7 * k % 24, seed), 0.0);
             let &[(effect, offset_px)] = &told[..] else { panic!("seed {seed}: {told:?}") };
             assert_eq!(effect, Some("disparity-offset"));
             assert!((offset_px - 0.06).abs() < 0.01, "seed {seed}: {offset_px}");
@@ -68,18 +71,8 @@ fn a_bent_target_is_no_law() {
     for seed in 0..8 {
         let mut checked = references(0.0, [0.0; 2], |k| 7 * k % 24, seed);
         checked.iter_mut().for_each(|c| c.off += 0.004);
-        let told = |bent_m| {
-            findings(
-                &laws(&checked, &Beside { bent_m, ..Beside::default() }),
-                &KnownTerms::default(),
-                1.0,
-                0.003,
-                Seed(1),
-            )
-            .len()
-        };
-        alone += told(0.0);
-        assert_eq!(told(0.004), 0, "seed {seed}");
+        alone += found(&checked, 0.0).len();
+        assert_eq!(found(&checked, 0.004), [], "seed {seed}");
     }
     assert!(alone > 0, "without knowing of the bend there is no law either");
 }
@@ -90,16 +83,9 @@ fn an_offset_is_seen_beside_a_bend() {
     for seed in 0..8 {
         let mut checked = references(0.06, [0.0; 2], |k| 7 * k % 24, seed);
         checked.iter_mut().for_each(|c| c.off += 0.004);
-        let told = findings(
-            &laws(&checked, &Beside { bent_m: 0.004, ..Beside::default() }),
-            &KnownTerms::default(),
-            1.0,
-            0.003,
-            Seed(1),
-        );
-        let [offset] = &told[..] else { panic!("seed {seed}: {}", told.len()) };
-        assert_eq!(offset.effect, Some("disparity-offset"));
-        let px = offset.parameters["offset_px"]["value"].as_f64().unwrap();
+        let found = found(&checked, 0.004);
+        let &[(effect, px)] = &found[..] else { panic!("seed {seed}: {found:?}") };
+        assert_eq!(effect, Some("disparity-offset"));
         assert!((px - 0.06).abs() < 0.012, "seed {seed}: {px}");
     }
 }

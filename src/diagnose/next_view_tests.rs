@@ -47,9 +47,7 @@ fn confused(best: &Term, rival: &Term, size: [f64; 2]) -> (Prospects, Prospects)
 /// with the ray's angle to the surface, which is the same bowl while the target is faced.
 #[test]
 fn a_bowl_and_the_angle_of_incidence_ask_for_a_tilted_view() {
-    let bowl = term(Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(0.0)), vec![0.2]);
-    let incidence =
-        term(Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(1.0)), vec![0.0; 2]);
+    let (bowl, incidence) = (bowl_of(0.2), incidence());
     let lens = term(
         Basis::powers(Coordinate::RaySquared, 1, Modulation::RadialSlope { fx: 145.0, fy: 145.0 }),
         vec![0.05],
@@ -85,13 +83,15 @@ fn the_advised_view_separates_more_than_most() {
 /// cannot.
 #[test]
 fn a_small_board_is_asked_for_near_by() {
-    let bowl = bowl_of(0.2);
-    let incidence =
-        term(Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(1.0)), vec![0.0; 2]);
+    let (bowl, incidence) = (bowl_of(0.2), incidence());
     let [wall, board] =
         [WALL_M, [0.6, 0.5]].map(|size| confused(&bowl, &incidence, size).0.best().copied());
     let (wall, board) = (wall.unwrap(), board.unwrap());
     assert!(board.separation < wall.separation && board.z_m <= wall.z_m, "{wall:?} {board:?}");
+}
+
+fn incidence() -> Term {
+    term(Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(1.0)), vec![0.0; 2])
 }
 
 fn bowl_of(k: f64) -> Term {

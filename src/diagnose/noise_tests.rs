@@ -8,7 +8,7 @@ use super::super::in_time::still_share;
 use super::super::structure::Jitter;
 use super::super::tails::{GAUSSIAN_TAIL, TailCounts, tails};
 use super::*;
-use crate::model::{Effect, FitSummary, NoiseModel, Provenance};
+use crate::model::{Effect, NoiseModel};
 use crate::rng::{Seed, Stream};
 use crate::simulate::kinect_v1;
 
@@ -25,14 +25,8 @@ fn normal(rng: &mut Stream) -> f64 {
 fn knowing(id: &str, name: &str, value: f64) -> KnownTerms {
     let mut parameters = Map::new();
     parameters.insert(name.into(), json!(value));
-    let model = NoiseModel {
-        sensor: None,
-        sigma: crate::SigmaModel::paper(),
-        effects: vec![Effect { id: id.into(), parameters, ..Effect::default() }],
-        uncertainty: None,
-        fit: FitSummary::default(),
-        provenance: Provenance::now(None),
-    };
+    let effects = vec![Effect { id: id.into(), parameters, ..Effect::default() }];
+    let model = NoiseModel { effects, ..NoiseModel::paper() };
     KnownTerms::of(&model, &kinect_v1(1).camera)
 }
 

@@ -190,23 +190,20 @@ fn what_fades_in_large_patches_is_told_once() {
     assert!(outcome.remaining.is_none());
 }
 
-/// A step over the rows is no family's: it stays a curve on its own axis.
+/// A step over the rows is no family's, and a curve along the columns that the stripes do not explain is
+/// not called stripes: each stays a curve on its own axis.
 #[test]
-fn what_has_no_family_stays_a_curve() {
-    let mut rng = Seed(6).stream("search/step");
-    let outcome = found(&session(&mut rng, |p| f64::from(p.v > 300.0)), 6);
-    let first = &outcome.chosen[0].candidate;
-    assert_eq!(first.family, None);
-    assert_eq!(first.basis.axis(), crate::terms::Axis::Row);
-}
-
-/// A curve along the columns that the stripes do not explain is not called stripes.
-#[test]
-fn a_family_that_explains_a_part_is_not_named() {
-    let mut rng = Seed(7).stream("search/part");
-    let outcome = found(&session(&mut rng, |p| (-((p.u - 200.0) / 60.0).powi(2)).exp() * 2.0), 7);
-    assert_eq!(outcome.chosen[0].candidate.family, None);
-    assert_eq!(outcome.chosen[0].candidate.basis.axis(), crate::terms::Axis::Column);
+fn what_no_family_explains_stays_a_curve() {
+    type Bias = fn(&PixelContext) -> f64;
+    let step: Bias = |p| f64::from(p.v > 300.0);
+    let hill: Bias = |p| (-((p.u - 200.0) / 60.0).powi(2)).exp() * 2.0;
+    for (name, seed, bias, axis) in [("step", 6, step, Axis::Row), ("part", 7, hill, Axis::Column)]
+    {
+        let mut rng = Seed(seed).stream(&format!("search/{name}"));
+        let outcome = found(&session(&mut rng, bias), seed);
+        let first = &outcome.chosen[0].candidate;
+        assert_eq!((first.family, first.basis.axis()), (None, axis), "{name}");
+    }
 }
 
 /// A board that is tilted as a whole is a plane again, but for what averaging over a patch leaves:
