@@ -18,7 +18,7 @@ impl Light {
     /// Of a single pixel.
     pub fn of(&self, field: &Field, k: usize, p: &PixelContext) -> f64 {
         let Some(&light) = field.light.get(k) else { return 1.0 };
-        let own = f64::from(light) / (1.0 + self.ambient_share * p.ambient * far(p));
+        let own = f64::from(light) / (1.0 + self.ambient_share * p.ambient * p.pattern_fall_off());
         if self.median > 0.0 && own.is_finite() { own / self.median } else { 1.0 }
     }
 }
@@ -29,7 +29,7 @@ pub fn relative_light(views: &mut [SurveyedView]) -> Light {
     let mut all: Vec<f32> = Vec::new();
     for tile in views.iter_mut().flat_map(|v| Arc::make_mut(&mut v.tiles)) {
         let p = &mut tile.place;
-        p.light /= 1.0 + share * p.ambient * far(p);
+        p.light /= 1.0 + share * p.ambient * p.pattern_fall_off();
         if p.light.is_finite() {
             all.push(p.light as f32);
         }
@@ -43,13 +43,8 @@ pub fn relative_light(views: &mut [SurveyedView]) -> Light {
     Light { median: if usable { median } else { 0.0 }, ambient_share: share }
 }
 
-/// By this the pattern's light has fallen.
-fn far(p: &PixelContext) -> f64 {
-    p.z * p.z * (1.0 + p.x * p.x + p.y * p.y) / p.theta.cos().max(0.05)
-}
-
-/// Light of the room in the infrared image, a lux over the pattern at 1 m: amplitude times `far`
-/// is a (1 + share lux far), a line through the views' medians.
+/// Light of the room in the infrared image, a lux over the pattern at 1 m: amplitude times the
+/// pattern's fall-off f is a (1 + share lux f), a line through the views' medians.
 fn ambient_share(views: &[SurveyedView]) -> f64 {
     let points: Vec<(f64, f64)> = views
         .iter()
@@ -57,7 +52,7 @@ fn ambient_share(views: &[SurveyedView]) -> f64 {
             let mut light: Vec<f32> = v.tiles.iter().map(|t| t.place.light as f32).collect();
             light.retain(|l| l.is_finite());
             let middle = v.tiles.get(v.tiles.len() / 2)?.place;
-            let x = middle.ambient * far(&middle);
+            let x = middle.ambient * middle.pattern_fall_off();
             let y = f64::from(crate::stats::median_in_place(&mut light));
             (x > 0.0 && y > 0.0).then_some((x, y))
         })

@@ -2,6 +2,7 @@
 
 use super::missing_cells::{Cell, odds};
 use crate::camera::Camera;
+use crate::effects::logistic;
 use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, PixelContext};
 
 /// Beyond `middle` a share is lost; a negative width loses what is below it.
@@ -24,7 +25,7 @@ impl Step {
 
     /// Chance of a loss where the axis is at `x` and `base` is lost anyway.
     pub fn loss(&self, x: f64, base: f64) -> f64 {
-        base + (1.0 - base) * self.share * logistic((x - self.middle) / self.width)
+        base + (1.0 - base) * self.share * logistic(x - self.middle, self.width)
     }
 
     /// Log odds that it adds.
@@ -111,9 +112,4 @@ pub fn curves(camera: &Camera, reach: &Extent) -> Vec<Basis> {
     }
     all.push(Basis::Map { width, height, across: 8, down: 6, times: Modulation::One });
     all
-}
-
-/// 1 / (1 + exp(-t)).
-fn logistic(t: f64) -> f64 {
-    1.0 / (1.0 + (-t).exp())
 }

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::edges::{Edges, INSIDE_PX};
 use super::field::Field;
 use super::hanging::{Hanging, Mean, nats, one};
-use crate::stats::mean;
+use crate::stats::{bisect, mean};
 use crate::terms::{Axis, Statistic};
 
 /// Widths of the footprint that decide whether depth mixes, px.
@@ -52,11 +52,7 @@ fn mixed_px(width: f64) -> f64 {
 
 /// The full footprint that mixes in so much.
 fn width_px(mixed: f64) -> f64 {
-    let (mut low, mut high) = (0.5, WIDEST_PX);
-    for _ in 0..50 {
-        let middle = 0.5 * (low + high);
-        if mixed_px(middle) < mixed { low = middle } else { high = middle }
-    }
+    let [low, high] = bisect([0.5, WIDEST_PX], |width| mixed_px(width) < mixed);
     0.5 * (low + high)
 }
 

@@ -58,13 +58,20 @@ fn law(views: &[Beside], of: impl Fn(&Beside) -> f64) -> Option<Mean> {
     Mean::weighed(&views.iter().map(|v| (v.lost / of(v), of(v))).collect::<Vec<_>>())
 }
 
+/// What either side has in the views that see it, and the share of the geometry's width that is lost.
+fn by_side(views: &[Sides]) -> [(Vec<Beside>, Option<Mean>); 2] {
+    [0, 1].map(|side: usize| {
+        let seen: Vec<Beside> = views.iter().filter_map(|s| s.0[side]).collect();
+        let enough = seen.len() >= FEWEST_VIEWS;
+        let share = enough.then(|| law(&seen, |v| v.shaded)).flatten();
+        (seen, share)
+    })
+}
+
 /// Of the side that loses more.
 pub fn largest_share(views: &[Sides]) -> Option<Mean> {
-    let side = |side: usize| {
-        let seen: Vec<Beside> = views.iter().filter_map(|s| s.0[side]).collect();
-        (seen.len() >= FEWEST_VIEWS).then(|| law(&seen, |v| v.shaded)).flatten()
-    };
-    [side(0)?, side(1)?].into_iter().max_by(|a, b| a.value.total_cmp(&b.value))
+    let [(_, left), (_, right)] = by_side(views);
+    [left?, right?].into_iter().max_by(|a, b| a.value.total_cmp(&b.value))
 }
 
 fn t(share: &Mean) -> f64 {
@@ -82,15 +89,10 @@ fn nats(share: &Mean, views: &[Beside], of: impl Fn(&Beside) -> f64) -> f64 {
 
 /// The band that the views agree on, if there is one at this level.
 pub fn band(views: &[Sides], level: f64) -> Option<Band> {
-    let seen = |side: usize| -> Vec<Beside> { views.iter().filter_map(|s| s.0[side]).collect() };
-    let sides = [seen(0), seen(1)];
-    let laws = [0, 1].map(|side: usize| {
-        let views = &sides[side];
-        (views.len() >= FEWEST_VIEWS).then(|| law(views, |v| v.shaded)).flatten()
-    });
-    let share = |side: usize| laws[side].map_or(0.0, |law| law.value);
+    let sides = by_side(views);
+    let share = |side: usize| sides[side].1.map_or(0.0, |share| share.value);
     let side = usize::from(share(1) > share(0));
-    let (views, lawful) = (&sides[side], laws[side]?);
+    let (views, lawful) = (&sides[side].0, sides[side].1?);
     let even = law(views, |v| v.rows)?;
     let student = StudentsT::new(0.0, 1.0, lawful.views - 1.0).ok()?;
     // Two sides were looked at.

@@ -9,7 +9,7 @@ use super::parameters::estimate;
 use super::strays::{Strays, strays};
 use super::structure::Structure;
 use crate::camera::Camera;
-use crate::stats::{MAD_TO_SIGMA, median_in_place};
+use crate::stats::{MAD_TO_SIGMA, bisect, median_in_place};
 use crate::terms::{Axis, Statistic};
 
 /// A Gaussian's share beyond four standard deviations.
@@ -165,12 +165,8 @@ impl Mixture {
 
     /// Standard deviation by the median, over that of the narrow part.
     pub fn width(&self) -> f64 {
-        let (mut low, mut high) = (0.0, self.scale);
-        for _ in 0..50 {
-            let middle = 0.5 * (low + high);
-            if self.beyond(middle) > 0.5 { low = middle } else { high = middle }
-        }
-        MAD_TO_SIGMA * high
+        let [_, median] = bisect([0.0, self.scale], |t| self.beyond(t) > 0.5);
+        MAD_TO_SIGMA * median
     }
 
     /// Share beyond four standard deviations where there is this share of the strays, and their scale

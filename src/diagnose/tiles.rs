@@ -6,7 +6,7 @@ use super::field::Field;
 use super::texture::rough;
 use crate::camera::{Camera, Rays};
 use crate::scene::TargetFrame;
-use crate::terms::{PixelContext, corner_radius, edge_distances};
+use crate::terms::{PixelContext, Pixels, corner_radius, edge_distances};
 
 /// Mean residual of a patch of pixels.
 #[derive(Debug, Clone, Copy)]
@@ -48,14 +48,8 @@ pub struct Places<'a> {
 impl<'a> Places<'a> {
     /// `session_start` on the recording's clock, s.
     pub fn of(field: &'a Field, camera: &'a Camera, rays: &'a Rays, session_start: f64) -> Self {
-        let plane = &field.plane;
-        let slope = |q: f64, f: f64| field.scale_px_m * q / f;
-        let view = PixelContext {
+        let mut view = PixelContext {
             side: SIDE as f64,
-            slope: [slope(plane.q.x, camera.fx), slope(plane.q.y, camera.fy)],
-            rho: plane.distance(),
-            theta: plane.theta(),
-            azimuth: plane.azimuth(),
             session_s: field.time_s - session_start,
             ambient: field.ambient_lux.unwrap_or(0.0),
             temperature_c: field.temperature_c.unwrap_or(0.0),
@@ -63,6 +57,7 @@ impl<'a> Places<'a> {
             variance: 1.0,
             ..PixelContext::default()
         };
+        view.lean_on(&field.plane, &Pixels::new(camera, rays, field.scale_px_m));
         Places {
             field,
             camera,

@@ -2,7 +2,7 @@
 
 use super::coordinate::Coordinate;
 use super::modulation::Modulation;
-use super::nodes::{bilinear, cubic, node};
+use super::nodes::{bilinear, cubic, interpolated, node, on_ring};
 use super::place::PixelContext;
 use super::series::{powers, waves, without_line};
 
@@ -107,12 +107,10 @@ impl Basis {
             Basis::Decay { over, width } => out[0] = (-over.value(p) / width).exp(),
             Basis::Log1p { over } => out[0] = over.value(p).ln_1p(),
             Basis::Table { z_m, theta_rad, ref columns } => {
-                let (i, s) = node(p.z, z_m[0], z_m[1], TABLE);
-                let (j, t) = node(p.theta, theta_rad[0], theta_rad[1], TABLE);
+                let at_z = node(p.z, z_m[0], z_m[1], TABLE);
+                let at_theta = node(p.theta, theta_rad[0], theta_rad[1], TABLE);
                 for (g, column) in out.iter_mut().zip(columns) {
-                    let at = |i: usize, j: usize| column[j * TABLE + i];
-                    *g = (1.0 - t) * ((1.0 - s) * at(i, j) + s * at(i + 1, j))
-                        + t * ((1.0 - s) * at(i, j + 1) + s * at(i + 1, j + 1));
+                    *g = interpolated(column, TABLE, at_z, at_theta);
                 }
             }
             Basis::Curve { over, low, high, times, .. } => {
@@ -127,11 +125,10 @@ impl Basis {
             }
             Basis::Ring { over, period, nodes, times } => {
                 out.fill(0.0);
-                let place = (over.value(p) / period).rem_euclid(1.0) * nodes as f64;
-                let (k, t) = (place as usize % nodes, place.fract());
+                let ([k, next], t) = on_ring(over.value(p), period, nodes);
                 let scale = times.value(p);
                 out[k] += scale * (1.0 - t);
-                out[(k + 1) % nodes] += scale * t;
+                out[next] += scale * t;
             }
             Basis::Map { width, height, across, down, times } => {
                 let (i, s) = node(p.u, 0.0, width - 1.0, across);

@@ -75,10 +75,7 @@ impl Coordinate {
             Coordinate::Temperature => p.temperature_c,
             Coordinate::Light => p.light,
             Coordinate::LogLight => p.light.max(DARKEST).ln(),
-            Coordinate::Ambient(ratio) => {
-                let far = p.z * p.z * (1.0 + p.x * p.x + p.y * p.y) / p.theta.cos().max(0.05);
-                ratio * p.ambient / ROOM_LUX * far
-            }
+            Coordinate::Ambient(ratio) => ratio * p.ambient / ROOM_LUX * p.pattern_fall_off(),
         }
     }
 

@@ -23,6 +23,25 @@ pub(super) fn bilinear(
     }
 }
 
+/// The value there of a bilinear map with these values at its nodes.
+pub(super) fn interpolated(
+    nodes: &[f64],
+    across: usize,
+    (i, s): (usize, f64),
+    (j, t): (usize, f64),
+) -> f64 {
+    let along = |j: usize| nodes[j * across + i] * (1.0 - s) + nodes[j * across + i + 1] * s;
+    along(j) * (1.0 - t) + along(j + 1) * t
+}
+
+/// Numbers of the nodes before and after a value on a circle of this period, and the way from one to
+/// the other.
+pub(super) fn on_ring(value: f64, period: f64, nodes: usize) -> ([usize; 2], f64) {
+    let place = (value / period).rem_euclid(1.0) * nodes as f64;
+    let k = place as usize % nodes;
+    ([k, (k + 1) % nodes], place.fract())
+}
+
 /// Cubic B-splines on `nodes` even places from 0 to `last`: the number of the first of the four that
 /// are not zero at `at`, and their values, which sum to one (de Boor 1978).
 pub(super) fn cubic(at: f64, last: f64, nodes: usize) -> (usize, [f64; 4]) {

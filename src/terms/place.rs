@@ -142,6 +142,11 @@ pub struct PixelContext {
 pub type Mean<'a> = dyn Fn(&dyn Fn(usize) -> f64) -> f64 + 'a;
 
 impl PixelContext {
+    /// How much weaker the projected pattern's light comes back than from a target faced at 1 m.
+    pub fn pattern_fall_off(&self) -> f64 {
+        self.z * self.z * (1.0 + self.x * self.x + self.y * self.y) / self.theta.cos().max(0.05)
+    }
+
     /// Move to the mean of the members' places; what is one for the view stays.
     pub fn average(&mut self, all: &[PixelContext], mean: &Mean<'_>) {
         self.u = mean(&|i| all[i].u);

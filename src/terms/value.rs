@@ -2,7 +2,7 @@
 
 use super::Term;
 use super::basis::Basis;
-use super::nodes::{cubic, node};
+use super::nodes::{cubic, interpolated, node, on_ring};
 use super::place::PixelContext;
 
 impl Term {
@@ -16,14 +16,13 @@ impl Term {
                 times.value(p) * (b[k] * (1.0 - t) + b[k + 1] * t)
             }
             Basis::Ring { over, period, nodes, times } => {
-                let place = (over.value(p) / period).rem_euclid(1.0) * nodes as f64;
-                let (k, t) = (place as usize % nodes, place.fract());
-                times.value(p) * (b[k] * (1.0 - t) + b[(k + 1) % nodes] * t)
+                let ([k, next], t) = on_ring(over.value(p), period, nodes);
+                times.value(p) * (b[k] * (1.0 - t) + b[next] * t)
             }
             Basis::Map { width, height, across, down, times } => {
                 let column = node(p.u, 0.0, width - 1.0, across);
                 let row = node(p.v, 0.0, height - 1.0, down);
-                times.value(p) * bilinear(b, across, column, row)
+                times.value(p) * interpolated(b, across, column, row)
             }
             Basis::Spline { width, height, across, down, times } => {
                 let (i, of_columns) = cubic(p.u, width - 1.0, across);
@@ -37,7 +36,7 @@ impl Term {
             Basis::Pair { over, low, high, nodes } => {
                 let first = node(over[0].value(p), low[0], high[0], nodes[0]);
                 let second = node(over[1].value(p), low[1], high[1], nodes[1]);
-                bilinear(b, nodes[0], first, second)
+                interpolated(b, nodes[0], first, second)
             }
             _ => self.basis.value(b, p, row),
         }
@@ -47,11 +46,6 @@ impl Term {
     pub fn sum(terms: &[Term], p: &PixelContext, row: &mut Vec<f64>) -> f64 {
         terms.iter().map(|t| t.value(p, row)).sum()
     }
-}
-
-fn bilinear(b: &[f64], across: usize, (i, s): (usize, f64), (j, t): (usize, f64)) -> f64 {
-    let along = |j: usize| b[j * across + i] * (1.0 - s) + b[j * across + i + 1] * s;
-    along(j) * (1.0 - t) + along(j + 1) * t
 }
 
 #[cfg(test)]
