@@ -8,8 +8,8 @@ use super::blocks::BLOCK_TILES;
 use super::layers::Survey;
 use super::pixels::fixed_px2;
 use super::samples::ViewData;
-use super::scatter::{Left, left_by_fit};
 use super::tiles::SIDE;
+use crate::solve::{Left, left_by_fit};
 
 /// Gross errors make the noise of one view in two runs differ, in log variance.
 const ANOTHER_RUN: f64 = 0.12;

@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::checked::Checked;
+use super::laws::Checked;
 use crate::camera::Camera;
 use crate::model::Effect;
 use crate::solve::Cholesky;

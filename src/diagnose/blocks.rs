@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::layers::SurveyedView;
 use super::samples::ViewData;
-use super::scatter::{Left, left_by_fit};
-use super::smooth::SMOOTH_PX;
-use super::surveyed_view::SurveyedView;
+use super::texture::SMOOTH_PX;
 use super::tiles::{SIDE, Tile};
+use crate::solve::{Left, left_by_fit};
 use crate::terms::PixelContext;
 
 /// Side of a block, in tiles: 24 px, seven independent samples under a Kinect's window.

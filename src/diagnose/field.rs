@@ -6,7 +6,7 @@
 use super::edges::Edges;
 use super::known::KnownTerms;
 use super::lattice::RawHistogram;
-use super::smooth::{SMOOTH_PX, high_pass};
+use super::texture::{SMOOTH_PX, high_pass};
 use crate::camera::Rays;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;

@@ -1,10 +1,14 @@
-//! Frames whose means move or jitter as the pixels' noise does not explain.
+//! Frames whose means move or jitter as the pixels' noise does not explain, and frames that are noisier
+//! than the others of their view: an exposure that has not settled.
 
+use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 
-use super::hanging::{Hanging, one, variance_px2};
+use super::exposure::FRAMES_KEPT;
+use super::hanging::{Hanging, Mean, nats, one, variance_px2};
 use super::known::KnownTerms;
 use super::structure::{Jitter, Structure};
+use super::verdict::MIN_SIZE;
 use crate::terms::{Axis, Statistic};
 
 /// Motion that is not uniform, and jitter that is no white noise, differ by this share.
@@ -121,4 +125,89 @@ pub(super) fn frames(
         });
     }
     found
+}
+
+/// Logarithm of each frame's mean square over the others', of rough residuals. What frames have in
+/// common, still or slowly changing, is in all of them alike. Nothing with fewer than three frames,
+/// of which none can be blamed.
+pub fn loudness(frames: &[Vec<f32>]) -> [Option<f64>; FRAMES_KEPT] {
+    let mut all = [None; FRAMES_KEPT];
+    let n = frames.len().min(FRAMES_KEPT);
+    if n < 3 {
+        return all;
+    }
+    let mut squares = [0.0; FRAMES_KEPT];
+    for k in 0..frames[0].len() {
+        let at: [f64; FRAMES_KEPT] =
+            std::array::from_fn(|j| frames.get(j).map_or(0.0, |f| f64::from(f[k]).powi(2)));
+        if at.iter().sum::<f64>().is_finite() {
+            squares.iter_mut().zip(at).for_each(|(square, r)| *square += r);
+        }
+    }
+    let whole: f64 = squares.iter().sum();
+    for (one, own) in all.iter_mut().zip(squares).take(n) {
+        let rest = (whole - own) / (n - 1) as f64;
+        *one = (own > 0.0 && rest > 0.0).then(|| (own / rest).ln());
+    }
+    all
+}
+
+/// The frame that stands out most in all views.
+pub fn unequal(views: &[Structure], level: f64) -> Option<Hanging> {
+    let (frame, m, p) = (0..FRAMES_KEPT)
+        .filter_map(|j| {
+            let m = Mean::of(views, |s| s.loudness[j])?;
+            // Either way, and any of the frames.
+            let p = 2.0 * m.p_above(0.0).min(Mean { value: -m.value, ..m }.p_above(0.0));
+            Some((j, m, (p * FRAMES_KEPT as f64).min(1.0)))
+        })
+        .min_by(|a, b| a.2.total_cmp(&b.2))?;
+    let size_sigma = (0.5 * m.value).exp() - 1.0;
+    if p > level || size_sigma.abs() < MIN_SIZE {
+        return None;
+    }
+    let more = if m.value > 0.0 { "more" } else { "less" };
+    let mut parameters = one("log_variance", m.value, m.std_error);
+    parameters.insert("frame".into(), json!(frame));
+    Some(Hanging {
+        families: vec![],
+        statistic: Statistic::Variance,
+        axis: Axis::Frame,
+        interval: [0.0, 0.0],
+        parameters,
+        size_sigma: size_sigma.abs(),
+        p,
+        nats: nats(&m, 0.0),
+        words: Some(format!("frame {} of every view has {more} noise than the others", frame + 1)),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::rng::Seed;
+
+    /// Views of four frames, 5000 pixels each, the first frame's noise times `first`.
+    fn views(name: &str, first: f64) -> Vec<Structure> {
+        let view = |n: u64| {
+            let mut rng = Seed(n).stream(name);
+            let mut frame = |size: f64| -> Vec<f32> {
+                let mut one = || -> f64 { StandardNormal.sample(&mut rng) };
+                (0..5000).map(|_| (size * one()) as f32).collect()
+            };
+            let frames = [first, 1.0, 1.0, 1.0].map(&mut frame);
+            Structure { loudness: loudness(&frames), ..Structure::default() }
+        };
+        (0..12).map(view).collect()
+    }
+
+    #[test]
+    fn the_frame_that_is_louder_is_found_with_its_size() {
+        let found = unequal(&views("unequal/first", 1.1), 1e-3).unwrap();
+        assert_eq!(found.parameters["frame"], json!(0));
+        assert!((found.size_sigma - 0.1).abs() < 0.01, "{}", found.size_sigma);
+        assert!(unequal(&views("unequal/none", 1.0), 1e-3).is_none());
+    }
 }

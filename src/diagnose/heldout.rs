@@ -6,13 +6,12 @@ use rand::seq::SliceRandom;
 
 use super::case::Case;
 use super::diagnosis::{HeldOut, LeftOut};
-use super::layers::Survey;
+use super::layers::{Survey, SurveyedView};
 use super::outcome::Outcome;
 use super::pixels::terms_of;
 use super::samples::ViewData;
-use super::scatter::plane_through;
-use super::surveyed_view::SurveyedView;
 use super::tiles::Tile;
+use crate::solve::plane_through;
 use crate::terms::{Statistic, Term, by_term};
 
 /// A share of the views is kept aside.

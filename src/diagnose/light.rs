@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::field::Field;
-use super::surveyed_view::SurveyedView;
+use super::layers::SurveyedView;
 use crate::terms::PixelContext;
 
 /// How infrared amplitudes become the light of surfaces.

@@ -1,13 +1,12 @@
 //! What the structure of the noise amounts to: each view is one sample of every statistic.
 
-use super::frames::frames;
+use super::frames::{frames, unequal};
 use super::hanging::{Hanging, LEAST_SHARE, Mean, Shared, nats, one, variance_px2};
 use super::in_time::in_time;
 use super::known::KnownTerms;
 use super::pairs::{REACH_PX, window_of};
 use super::parameters::estimate;
 use super::structure::Structure;
-use super::unequal::unequal;
 use super::window::{Window, part};
 use crate::terms::{Axis, Statistic};
 

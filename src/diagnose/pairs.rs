@@ -5,8 +5,7 @@
 //! row shares; the products with a box around each pixel are that of one it shares with its
 //! neighbours. Each costs a pass over the image.
 
-use super::smooth::BoxSums;
-use super::texture::calm;
+use super::texture::{BoxSums, calm};
 
 /// As far as neighbours are looked at, px.
 pub const REACH_PX: usize = 4;

@@ -7,11 +7,11 @@ use rayon::prelude::*;
 use super::engine::Diagnosed;
 use super::field::Field;
 use super::known::KnownTerms;
-use super::scatter::plane_through;
 use crate::camera::Rays;
 use crate::frame::Frame;
 use crate::measure::{MeasureOptions, Workbench};
 use crate::model::NoiseModel;
+use crate::solve::plane_through;
 use crate::view::Sensor;
 
 /// One view, row by row, mm of depth, measured minus the plane; NaN off the target.

@@ -1,4 +1,5 @@
-//! What size of a shape a layer's search would see in 80 % of such recordings.
+//! How small an effect a recording could have shown: what size of a shape a layer's search would see in
+//! 80 % of such recordings.
 //!
 //! The gates are those of the search itself: the threshold of the null over the dispersion of the
 //! views, the share of what was found first, and the least sizes. Noise is drawn from the views' own
@@ -7,8 +8,11 @@
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
+use serde_json::{Map, Value, json};
 
 use super::candidate::Candidate;
+use super::case::Case;
+use super::diagnosis::Detectable;
 use super::evidence::{Evidence, gain, root};
 use super::judge::{CLEARLY, LEAST_OF_LARGEST};
 use super::null::Null;
@@ -19,8 +23,9 @@ use super::scene::{Scene, size};
 use super::search::LEAST_SHARE;
 use super::variance::beyond_sigma;
 use super::verdict::MIN_SIZE;
+use crate::effects::{self, Smallest};
 use crate::rng::Seed;
-use crate::terms::{Basis, Term};
+use crate::terms::{Basis, Statistic, Term};
 
 /// Of the recordings, so many show it.
 const POWER: f64 = 0.8;
@@ -193,6 +198,52 @@ impl Draw<'_> {
         let beside: Vec<Evidence> = views.iter().map(part).collect();
         Some(gain(&beside, self.prior)?.total)
     }
+}
+
+impl Case<'_> {
+    /// The least parameter of each family that would be found with 80 % power.
+    pub(super) fn detectable(&self, [bias, variance]: [&Outcome; 2]) -> Vec<Detectable> {
+        let (survey, camera) = (&self.survey, &self.sensor().camera);
+        let seed = self.options.seed;
+        let scenes = [Scene::bias(survey, 1.0, 1.0), Scene::variance(survey, 1.0, 1.0)];
+        let mean = Gates {
+            scene: &scenes[0],
+            outcome: bias,
+            rules: survey.bias_rules(camera, self.level(Case::MEAN_LEVEL)),
+            beside: None,
+            seed,
+        };
+        let blocks = Gates {
+            scene: &scenes[1],
+            outcome: variance,
+            rules: survey.variance_rules(self.level(Case::VARIANCE_LEVEL)),
+            beside: survey.refitted().map(|c| c.basis),
+            seed,
+        };
+        let bounds = survey.bounds(camera);
+        let mut all = Vec::new();
+        for (statistic, gates) in [(Statistic::Bias, &mean), (Statistic::Variance, &blocks)] {
+            let can = effects::that_change(statistic).into_iter();
+            for effect in can.filter(|e| e.card().applies_to(bounds.kind)) {
+                let smallest = effect.smallest(&bounds).and_then(|s| least(s, statistic, gates));
+                all.extend(
+                    smallest.map(|minimum| Detectable { effect: effect.card().id, minimum }),
+                );
+            }
+        }
+        all
+    }
+}
+
+fn least(
+    smallest: Smallest,
+    statistic: Statistic,
+    gates: &Gates<'_>,
+) -> Option<Map<String, Value>> {
+    let Smallest { parameter, shape, unit, of } = smallest;
+    let term = Term { statistic, basis: shape, coefficients: unit };
+    let least = gates.least(&term).map(of).filter(|least| least.is_finite())?;
+    Some(Map::from_iter([(parameter.to_string(), json!(least))]))
 }
 
 #[cfg(test)]

@@ -3,13 +3,12 @@
 
 use super::anchor::families;
 use super::case::Case;
-use super::checked::checked;
 use super::diagnosis::{Alternative, CannotTell, Finding, Size, Status};
 use super::field::Field;
 use super::hanging::one;
 use super::heldout;
 use super::known::KnownTerms;
-use super::laws::{Beside, FEWEST, Law, laws};
+use super::laws::{Beside, FEWEST, Law, checked, laws};
 use super::learnt::Learnt;
 use super::naming::MIN_PROBABILITY;
 use super::null::{NoiseGains, Null, student};

@@ -6,13 +6,13 @@ use rayon::prelude::*;
 
 use super::exposure::FRAMES_KEPT;
 use super::field::Field;
+use super::frames::loudness;
 use super::pairs::Pairs;
 use super::tails::{FEWEST_READINGS, TailCounts};
 use super::texture::{
     COURSE, FAR, Filled, LONG_LINE, SHORT_LINE, calm, changes, covariance, fine, moving, rough,
     same_pixel, without_lines,
 };
-use super::unequal::loudness;
 use crate::camera::Camera;
 use crate::stats::{mean, measure_correlation};
 

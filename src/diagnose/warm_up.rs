@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::checked::Checked;
+use super::laws::Checked;
 use super::posterior::Posterior;
 use crate::stats::even;
 

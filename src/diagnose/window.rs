@@ -2,9 +2,8 @@
 
 use super::hanging::Mean;
 use super::posterior::Posterior;
-use super::smooth::SMOOTH_PX;
 use super::structure::Structure;
-use super::texture::{COURSE, FAR};
+use super::texture::{COURSE, FAR, SMOOTH_PX};
 use crate::stats::even;
 
 /// Its side, px, and the share of the variance that comes through it, each with its standard error.

@@ -1,6 +1,7 @@
 //! An effect with its knobs set, from the command line or from a model file.
 
 use std::ops::Deref;
+use std::path::Path;
 use std::sync::Arc;
 
 use serde_json::{Map, Value, json};
@@ -10,6 +11,7 @@ use super::shape::Shape;
 use super::{CATALOGUE, Draw, Effect, Exposure, Settings, find};
 use crate::error::{Error, Result};
 use crate::model;
+use crate::model::NoiseModel;
 use crate::rng::Seed;
 use crate::units::{shortest, to_digits};
 
@@ -231,5 +233,18 @@ impl Active {
 impl std::fmt::Debug for Active {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}:{:?}", self.effect.card().id, self.settings.0)
+    }
+}
+
+impl NoiseModel {
+    /// From a `model.json`, or the folder that holds one.
+    /// An error when the file is missing, not a model, damaged, or of a newer format; and when an effect
+    /// without a fitted shape is not in the catalogue, has a parameter that the catalogue's has not, or one
+    /// outside its range: nothing that reads the model would do what it says.
+    pub fn read(path: &Path) -> Result<Self> {
+        let file = Self::file(path);
+        let model = Self::read_unchecked(&file)?;
+        Active::check_model(&model.effects).map_err(|e| e.of(&file))?;
+        Ok(model)
     }
 }

@@ -11,7 +11,6 @@ mod card;
 mod draw;
 mod exposure;
 mod fitted;
-mod model_file;
 mod shape;
 mod traces;
 

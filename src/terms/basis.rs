@@ -2,9 +2,8 @@
 
 use super::coordinate::Coordinate;
 use super::modulation::Modulation;
-use super::nodes::{bilinear, cubic, interpolated, node, on_ring};
 use super::place::PixelContext;
-use super::series::{powers, waves, without_line};
+use super::series::{bilinear, cubic, interpolated, node, on_ring, powers, waves, without_line};
 
 /// A term with everything but its linear coefficients settled. Terms of the bias are in px of
 /// disparity, those of the variance in its natural logarithm.

@@ -4,12 +4,10 @@
 mod basis;
 mod coordinate;
 mod edges;
-mod extent;
 mod fault;
 mod gauge;
 mod modulation;
 mod needs;
-mod nodes;
 mod pixels;
 mod place;
 mod properties;
@@ -20,12 +18,11 @@ mod written;
 pub use basis::{Basis, TABLE};
 pub use coordinate::{Coordinate, ROOM_LUX};
 pub use edges::edge_distances;
-pub use extent::Extent;
 pub use gauge::Gauge;
 pub use modulation::{DISPARITY_UNIT_PX, Modulation};
 pub use needs::Needs;
 pub use pixels::Pixels;
-pub use place::{Axis, PixelContext, corner_radius};
+pub use place::{Axis, Extent, PixelContext, corner_radius};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -2,8 +2,8 @@
 
 use super::Term;
 use super::basis::Basis;
-use super::nodes::{cubic, interpolated, node, on_ring};
 use super::place::PixelContext;
+use super::series::{cubic, interpolated, node, on_ring};
 
 impl Term {
     /// At a place, px or nepers of variance. `row` is scratch.
