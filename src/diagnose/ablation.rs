@@ -45,7 +45,7 @@ impl Ablation {
         fixed
     }
 
-    /// A size below this, in sigmas, is nobody's concern.
+    /// Smaller terms, in sigmas, are not reported.
     pub(super) fn min_size(self, least: f64) -> f64 {
         if self == Ablation::UncalibratedThresholds { 0.0 } else { least }
     }

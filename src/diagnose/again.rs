@@ -2,7 +2,7 @@
 //! views, with everything that was found taken out of the residuals in memory.
 
 use super::battery::Battery;
-use super::case::{Case, Mean};
+use super::case::{Case, MeanResult};
 use super::diagnosis::{After, Finding, Remaining};
 use super::field::Field;
 use super::known::KnownTerms;
@@ -22,7 +22,7 @@ pub struct Again {
 
 impl Case<'_> {
     /// What stands out against `extended`; the first run `explained` so many nats.
-    pub fn after(mut self, extended: &NoiseModel, mean: &Mean, explained: f64) -> Again {
+    pub fn after(mut self, extended: &NoiseModel, mean: &MeanResult, explained: f64) -> Again {
         let added = self.added(extended);
         let known = KnownTerms::of(extended, &self.sensor().camera);
         let means: Vec<Vec<f32>> = self.fields.iter().map(|f| f.mean.clone()).collect();
@@ -57,7 +57,7 @@ impl Case<'_> {
 
     /// Terms at every pixel, px: as the search left them but for those that were not told, and for
     /// what other layers learnt.
-    fn bias_px(&self, terms: &[Term], mean: &Mean) -> Vec<Vec<f32>> {
+    fn bias_px(&self, terms: &[Term], mean: &MeanResult) -> Vec<Vec<f32>> {
         let beyond = |all: &[Term], others: &[Term], sign: f64| -> Vec<Term> {
             let other = all.iter().filter(|t| !others.contains(t));
             let signed = |t: &Term| {

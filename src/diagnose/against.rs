@@ -8,17 +8,17 @@ use std::f64::consts::TAU;
 
 use super::engine::{DiagnoseOptions, FEWEST_VIEWS, measure_options};
 use super::field::Field;
-use super::hanging::Hanging;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
 use super::layers::Survey;
 use super::missing::{DropoutFinding, missing};
-use super::noise::hanging;
+use super::noise::texture_findings;
 use super::pixels::{common, measure_tails};
 use super::reading::read;
 use super::steps::{Steps, lattice};
 use super::structure::{Structure, structures};
 use super::tails::tails;
+use super::texture_finding::TextureFinding;
 use crate::Progress;
 use crate::error::{Error, Result};
 use crate::measure::Workbench;
@@ -30,7 +30,7 @@ pub struct Baseline {
     pub fields: Vec<Field>,
     pub(super) survey: Survey,
     pub(super) structure: Vec<Structure>,
-    pub(super) hangs: Vec<Hanging>,
+    pub(super) textures: Vec<TextureFinding>,
     pub(super) lattice: Quantisation,
     /// Variance with another name.
     pub steps: Steps,
@@ -105,8 +105,8 @@ impl Baseline {
         let none = KnownTerms::default();
         let mut survey = Survey::of(&fields, camera, &bench.rays);
         let mut structure = structures(&fields, camera, &[]);
-        let hangs = hanging(&structure, &none, 0.03 * options.level);
-        survey.compare_frames(&fields, common(&structure, &hangs, &none));
+        let textures = texture_findings(&structure, &none, 0.03 * options.level);
+        survey.compare_frames(&fields, common(&structure, &textures, &none));
         measure_tails(&mut structure, &fields, &[], &[], &survey, bench);
         let lattice = lattice(&fields, simulated);
         let steps = Steps::of(&lattice, &structure, &fields, simulated);
@@ -116,7 +116,7 @@ impl Baseline {
             fields,
             survey,
             structure,
-            hangs,
+            textures,
             lattice,
             steps,
             lost,

@@ -41,8 +41,8 @@ impl Baseline {
     pub fn variances(&mut self, survey: &mut Survey) -> bool {
         // Of noise that hardly changes from frame to frame all is measured, in both or in neither.
         for (real, twin) in survey.views.iter_mut().zip(&mut self.survey.views) {
-            if real.moving.is_none() || twin.moving.is_none() {
-                (real.moving, twin.moving) = (None, None);
+            if real.between_frame_factor.is_none() || twin.between_frame_factor.is_none() {
+                (real.between_frame_factor, twin.between_frame_factor) = (None, None);
             }
         }
         let theirs = self.survey.variance_data();
@@ -75,7 +75,7 @@ impl Baseline {
 
     /// The simulated variances are as uncertain as the real ones, and both more so than a
     /// Gaussian's where gross errors come in clumps.
-    pub fn doubt(&self, survey: &mut Survey) {
+    pub fn inflate_log_variances(&self, survey: &mut Survey) {
         survey.tolerance = ANOTHER_RUN;
         let (ours, theirs) = (survey.variance_data(), self.survey.variance_data());
         let mean = |v: &ViewData| v.weight.iter().sum::<f64>() / v.weight.len().max(1) as f64;
@@ -83,7 +83,7 @@ impl Baseline {
             let (w, t) = (mean(ours), mean(theirs));
             if w > 0.0 && t > 0.0 {
                 let clumps = scatter(ours).max(scatter(theirs));
-                view.doubt = clumps * (w + t) / t;
+                view.log_variance_inflation = clumps * (w + t) / t;
             }
         }
     }

@@ -1,14 +1,14 @@
 //! Against a simulated recording: the structure of the noise, steps and losses, view by view.
 
 use super::against::Baseline;
-use super::hanging::Hanging;
 use super::in_time::still_level;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
 use super::layers::Survey;
 use super::missing::DropoutFinding;
-use super::noise::hanging;
+use super::noise::texture_findings;
 use super::structure::Structure;
+use super::texture_finding::TextureFinding;
 use crate::stats::mean;
 
 /// Tails of two recordings are no news within this factor: gross errors come in clumps.
@@ -41,7 +41,10 @@ impl Baseline {
             // Nothing is known of columns: what both have must vanish.
             differ(&mut s.column_px2, twin.column_px2, columns.min(0.0));
             differ(&mut s.lines_px2, twin.lines_px2, 0.0);
-            s.loudness.iter_mut().zip(twin.loudness).for_each(|(r, t)| differ(r, t, 0.0));
+            s.frame_log_variance
+                .iter_mut()
+                .zip(twin.frame_log_variance)
+                .for_each(|(r, t)| differ(r, t, 0.0));
             for (k, lag) in lags.iter().enumerate() {
                 if twin.lagged[k].is_some() {
                     differ(&mut s.lagged[k], twin.lagged[k], *lag);
@@ -57,9 +60,9 @@ impl Baseline {
         }
         let once = ["frozen-noise", "temporal-correlation", "frame-jitter", "target-motion"];
         let once = &once[usize::from(still.is_some())..];
-        for hang in &self.hangs {
-            for id in once.iter().filter(|id| hang.families.contains(id)) {
-                for (name, value) in &hang.parameters {
+        for texture in &self.textures {
+            for id in once.iter().filter(|id| texture.families.contains(id)) {
+                for (name, value) in &texture.parameters {
                     known.learn(id, name, value["value"].as_f64().unwrap_or(0.0));
                 }
             }
@@ -95,17 +98,17 @@ impl Baseline {
         });
         // What lies beside the target is no tile's.
         let on_target = lost.family != Some("occlusion-shadow");
-        same || on_target && lost_share(real) < 1.2 * lost_share(&self.survey) + LOST_BY_LOT
+        same || on_target && lost_share(real) < 1.2 * lost_share(&self.survey) + NEGLIGIBLE_DROPOUT
     }
 
     /// What the simulation shows and the recording does not, in words.
     pub fn too_much(&self, real: &[Structure], level: f64) -> Vec<String> {
-        let ours = hanging(real, &KnownTerms::default(), level);
-        let names = |all: &[Hanging]| -> Vec<&'static str> {
+        let ours = texture_findings(real, &KnownTerms::default(), level);
+        let names = |all: &[TextureFinding]| -> Vec<&'static str> {
             all.iter().filter_map(|h| h.families.first().copied()).collect()
         };
         let shown = names(&ours);
-        names(&self.hangs)
+        names(&self.textures)
             .into_iter()
             .filter(|id| !shown.contains(id))
             .map(|id| format!("the simulated recording shows {id}, the real one does not"))
@@ -115,9 +118,9 @@ impl Baseline {
 
 /// Steps that differ by less are the same, as a logarithm.
 const STEPS_ALIKE: f64 = 0.05;
-/// A share of the pixels that nobody misses.
-const LOST_BY_LOT: f64 = 0.0005;
-/// Losses whose sizes differ by less are the same: views lose by lot.
+/// A difference between lost shares that is too small to matter.
+const NEGLIGIBLE_DROPOUT: f64 = 0.0005;
+/// Losses whose sizes differ by less are the same, as a logarithm: dropout differs between views at random.
 const LOSSES_ALIKE: f64 = 0.4;
 
 /// Of all that was asked of the target's pixels.

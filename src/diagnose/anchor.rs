@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::laws::Checked;
+use super::laws::ReferencedView;
 use crate::camera::Camera;
 use crate::model::Effect;
 use crate::solve::Cholesky;
@@ -21,7 +21,7 @@ pub struct Family {
 
 impl Family {
     /// What its constant, of the usual size, makes of a distance, m.
-    pub fn moves_m(&self, c: &Checked) -> f64 {
+    pub fn moves_m(&self, c: &ReferencedView) -> f64 {
         let disparity = c.px_m / c.z;
         // A disparity too large by delta px makes the depth too small by z^2 delta / (f b).
         let by_px = c.z * c.z / c.px_m;
@@ -31,7 +31,7 @@ impl Family {
 
 /// Let the learnt biases of `added` leave the references where they were measured. `checked` is what
 /// the references say with these biases, and all laws, taken out; `variance` that of one, m^2.
-pub fn anchor(added: &mut [Effect], checked: &[Checked], variance: f64, camera: &Camera) {
+pub fn anchor(added: &mut [Effect], checked: &[ReferencedView], variance: f64, camera: &Camera) {
     let families = families(added.iter().flat_map(|e| &e.shape), camera);
     for (Family { power, usual }, [shift, error]) in
         families.iter().zip(constants(&families, checked, variance))
@@ -69,7 +69,7 @@ fn mean_square(term: &Term, pixels: &Pixels<'_>) -> f64 {
 }
 
 /// Each family's constant, in its usual size, with its standard error.
-fn constants(families: &[Family], checked: &[Checked], variance: f64) -> Vec<[f64; 2]> {
+fn constants(families: &[Family], checked: &[ReferencedView], variance: f64) -> Vec<[f64; 2]> {
     let n = families.len();
     let mut information = DMatrix::zeros(n + 2, n + 2);
     let mut score = DVector::zeros(n + 2);

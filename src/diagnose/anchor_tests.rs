@@ -17,13 +17,19 @@ fn bowl(power: f64) -> Effect {
 }
 
 /// References whose distances are too short by a constant of the disparity.
-fn references(count: usize, power: f64, shift_px: f64, error_m: f64, seed: u64) -> Vec<Checked> {
+fn references(
+    count: usize,
+    power: f64,
+    shift_px: f64,
+    error_m: f64,
+    seed: u64,
+) -> Vec<ReferencedView> {
     let mut rng = Seed(seed).stream("references");
     let noise = Normal::new(0.0, error_m).unwrap();
     let of = |k: usize| {
         let z = 0.8 + 2.7 * k as f64 / (count - 1) as f64;
         let px = shift_px * (PX_M / z / DISPARITY_UNIT_PX).powf(power);
-        Checked::ahead(z, -z * z * px / PX_M + noise.sample(&mut rng), PX_M)
+        ReferencedView::ahead(z, -z * z * px / PX_M + noise.sample(&mut rng), PX_M)
     };
     (0..count).map(of).collect()
 }

@@ -4,13 +4,12 @@ use serde_json::{Map, Value};
 
 use super::ablation::Ablation;
 use super::bias;
-use super::case::{Case, Mean, Scatter};
+use super::case::{Case, MeanResult, ScatterResult};
 use super::diagnosis::{Detectable, Finding, Status};
 use super::few_views::few_views;
 use super::field::Field;
 use super::findings;
 use super::form::better_form;
-use super::hanging::Hanging;
 use super::lines::lines;
 use super::missing::{self, missing};
 use super::mixing::mixing;
@@ -24,6 +23,7 @@ use super::reference::{self, can_happen};
 use super::replication_textures;
 use super::scene::Scene;
 use super::steps::{COARSE_SIGMAS, is_raw, own_step, own_step_note, steps};
+use super::texture_finding::TextureFinding;
 use super::variance;
 use super::verdict::{MIN_SIZE, echoes, fold_into_sigma, merge, symptoms};
 use crate::sensors::SensorKind;
@@ -34,8 +34,8 @@ const LEVEL_BESIDE_TEXTURE: f64 = 0.05;
 
 /// What one run of all layers shows.
 pub struct Battery {
-    pub mean: Mean,
-    pub scatter: Scatter,
+    pub mean: MeanResult,
+    pub scatter: ScatterResult,
     /// Largest first; their shares are nats.
     pub found: Vec<Finding>,
     /// The refit of a sigma that was calibrated on these very views.
@@ -87,7 +87,7 @@ impl Case<'_> {
         let lattice = &scatter.lattice;
         let steps = steps(lattice, &self.known, &self.fields, self.recording, sigma_mm, &second);
         let own_step = own_step(lattice, self.recording, self.fields[0].scale_px_m);
-        self.copies.extend(own_step.map(own_step_note));
+        self.remarks.extend(own_step.map(own_step_note));
         let stepped = lattice.is_some();
         let mut curves = self.curves([&mean.outcome, &scatter.outcome], advise);
         let refitted = self.take_refit(&mut curves);
@@ -143,7 +143,7 @@ impl Case<'_> {
     }
 
     /// Steps shift the mean within a step, and gross errors add to the variance: neither is news.
-    fn is_news(&self, f: &Finding, scatter: &Scatter) -> bool {
+    fn is_news(&self, f: &Finding, scatter: &ScatterResult) -> bool {
         let coarsest = scatter.lattice.step_px(self.fields[0].scale_px_m, self.survey.reach.z[0]);
         let sigma_px = typical_sigma_px(&self.fields);
         let of_steps = match f.statistic {
@@ -158,7 +158,7 @@ impl Case<'_> {
             && !is_raw(self.recording)
             && f.size.sigma * sigma_px < 0.3 * coarsest;
         let textured = scatter.tails.is_some()
-            || (!scatter.hangs.is_empty() && f.size.sigma < LEVEL_BESIDE_TEXTURE);
+            || (!scatter.textures.is_empty() && f.size.sigma < LEVEL_BESIDE_TEXTURE);
         let tailed = textured && f.status == Status::Recalibrate;
         !stepped && !tailed && f.size.sigma > self.options.ablation.min_size(MIN_SIZE)
     }
@@ -176,21 +176,26 @@ impl Case<'_> {
     }
 
     /// What neither a mean nor a variance shows: how the noise hangs together, tails, steps.
-    fn texture(&self, mean: &Mean, scatter: &Scatter, steps: Vec<Finding>) -> Vec<Finding> {
+    fn texture(
+        &self,
+        mean: &MeanResult,
+        scatter: &ScatterResult,
+        steps: Vec<Finding>,
+    ) -> Vec<Finding> {
         let sigma_mm = typical_sigma_mm(&self.fields);
         let level = self.level(Self::EACH_LEVEL);
         let mixing = mixing(&self.fields, self.twins(), level)
             .filter(|m| self.is_more(&m.families, &m.parameters) && self.stands(m.p, level));
-        let hangs = scatter.hangs.iter().cloned().chain(scatter.tails.clone()).chain(mixing);
+        let textures = scatter.textures.iter().cloned().chain(scatter.tails.clone()).chain(mixing);
         let second = self.survey.second();
-        let told = |h: Hanging| {
+        let told = |h: TextureFinding| {
             let (views, fields) = (&scatter.structure, &self.fields);
             let replicated =
                 replication_textures::replicated(&h, views, fields, &second, &self.known);
-            other_findings::hanging(h, sigma_mm, replicated)
+            other_findings::texture(h, sigma_mm, replicated)
         };
-        let hangs = hangs.map(told).chain(self.overstated(scatter));
-        let mut found: Vec<Finding> = hangs.chain(steps).collect();
+        let textures = textures.map(told).chain(self.overstated(scatter));
+        let mut found: Vec<Finding> = textures.chain(steps).collect();
         // Lines that stand still have no name, but they can be learnt.
         let stands = |f: &&mut Finding| {
             f.effect.is_none() && f.statistic == Statistic::Bias && f.axis == Axis::Column
@@ -258,7 +263,7 @@ impl Case<'_> {
     fn lost(&mut self) -> (Vec<Finding>, Vec<Detectable>) {
         let camera = &self.sensor().camera;
         let lost = missing(&self.fields, self.twins(), &self.survey, camera, self.options.seed);
-        self.copies.extend(lost.notes);
+        self.remarks.extend(lost.notes);
         let baseline = self.baseline.as_ref();
         let found = lost
             .findings

@@ -19,11 +19,11 @@ pub fn blocks(view: &SurveyedView) -> ViewData {
     let mut sums: std::collections::BTreeMap<(u32, u32), Sum> = Default::default();
     for t in view.tiles.iter() {
         let key = ((t.place.v / side) as u32, (t.place.u / side) as u32);
-        sums.entry(key).or_default().add(t, view.moving);
+        sums.entry(key).or_default().add(t, view.between_frame_factor);
     }
     // What the box's mean took with it.
     let taken = view.correlation.sum / (SMOOTH_PX * SMOOTH_PX) as f64;
-    let kept = if view.moving.is_some() { 1.0 } else { 1.0 - taken };
+    let kept = if view.between_frame_factor.is_some() { 1.0 } else { 1.0 - taken };
     let mut blocks = ViewData { precision: vec![0.0], ..ViewData::default() };
     for s in sums.values() {
         // Half a block at least: a few pixels at the rim give no variance.
@@ -34,7 +34,7 @@ pub fn blocks(view: &SurveyedView) -> ViewData {
         blocks.places.push(s.place);
         // The mean of log chi^2 / n is about -1 / n.
         blocks.response.push((s.ratio / s.n / kept.max(0.5)).ln() + 1.0 / worth);
-        blocks.weight.push(0.5 * worth / (1.0 + 1.0 / worth) / view.doubt);
+        blocks.weight.push(0.5 * worth / (1.0 + 1.0 / worth) / view.log_variance_inflation);
         blocks.nuisance.push(1.0);
     }
     blocks
@@ -48,10 +48,10 @@ struct Sum {
 }
 
 impl Sum {
-    fn add(&mut self, t: &Tile, moving: Option<f64>) {
+    fn add(&mut self, t: &Tile, between_frame_factor: Option<f64>) {
         // With frames to compare, only what changes is noise; its still part is put back by what
         // frames have in common.
-        let square = match moving {
+        let square = match between_frame_factor {
             Some(factor) => t.temporal * factor,
             None => t.temporal + t.rough_square,
         };

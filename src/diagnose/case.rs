@@ -7,18 +7,18 @@ use super::against::Baseline;
 use super::diagnosis::Finding;
 use super::engine::{DiagnoseOptions, measure_options};
 use super::field::Field;
-use super::hanging::Hanging;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
 use super::layers::Survey;
 use super::learnt::Learnt;
-use super::noise::hanging;
+use super::noise::texture_findings;
 use super::outcome::Outcome;
 use super::pixels::{common, mean_of, measure_tails, pixel_terms, terms_of};
-use super::reading::{Taken, refuse_other_size};
+use super::reading::{LoadedViews, refuse_other_size};
 use super::steps::{Steps, forget_windows, is_raw, lattice};
 use super::structure::{Structure, fixed_px2_by_view, structures};
 use super::tails::tails;
+use super::texture_finding::TextureFinding;
 use crate::Progress;
 use crate::effects::{Active, RAY_FOR_DEPTH};
 use crate::error::Result;
@@ -40,7 +40,7 @@ pub struct Case<'a> {
     pub baseline: Option<Baseline>,
     pub excluded: Vec<Excluded>,
     /// What was odd about the views, in words.
-    pub copies: Vec<String>,
+    pub remarks: Vec<String>,
     /// Found while reading: the words are ranges.
     pub ranges: Option<Finding>,
     /// Views that the model's bias, and its sigma, were learnt from, where these are others.
@@ -50,7 +50,7 @@ pub struct Case<'a> {
 }
 
 /// What the residuals' mean shows.
-pub struct Mean {
+pub struct MeanResult {
     pub outcome: Outcome,
     pub terms: Vec<Term>,
     /// The terms at every pixel, px.
@@ -58,12 +58,12 @@ pub struct Mean {
 }
 
 /// What scatters about it.
-pub struct Scatter {
+pub struct ScatterResult {
     /// One number of each kind a view.
     pub structure: Vec<Structure>,
     pub lattice: Quantisation,
-    pub hangs: Vec<Hanging>,
-    pub tails: Option<Hanging>,
+    pub textures: Vec<TextureFinding>,
+    pub tails: Option<TextureFinding>,
     /// Of the variance.
     pub outcome: Outcome,
 }
@@ -84,8 +84,8 @@ impl<'a> Case<'a> {
         }
         let bench = Workbench::new(sensor, measure_options(options));
         let known = KnownTerms::of(model, &sensor.camera);
-        let Taken { mut fields, excluded, ranges, copies } =
-            Taken::of(recording, &bench, model, &known, progress)?;
+        let LoadedViews { mut fields, excluded, ranges, copies } =
+            LoadedViews::of(recording, &bench, model, &known, progress)?;
         let baseline = simulated
             .map(|s| Baseline::of(s, sensor, &mut fields, model, options, progress))
             .transpose()?;
@@ -106,7 +106,7 @@ impl<'a> Case<'a> {
             survey,
             baseline,
             excluded,
-            copies,
+            remarks: copies,
             ranges,
             learnt_from,
             extended: false,
@@ -120,13 +120,13 @@ impl<'a> Case<'a> {
     {
         let learnt = (self.learnt_from, &known);
         let mut survey = survey(&fields, &self.bench, self.baseline.as_ref(), self.options, learnt);
-        survey.ask_no_certainty();
+        survey.skip_covariance();
         Case {
             model,
             known,
             fields,
             survey,
-            copies: Vec::new(),
+            remarks: Vec::new(),
             ranges: None,
             extended: true,
             ..self
@@ -153,7 +153,7 @@ impl<'a> Case<'a> {
         share * self.options.level
     }
 
-    pub fn mean(&mut self) -> Mean {
+    pub fn mean(&mut self) -> MeanResult {
         self.at("searching the mean error", "testing the mean again");
         let first = self.search_mean();
         // What is steep in a bias was taken for noise that hangs together: views count for more
@@ -164,15 +164,15 @@ impl<'a> Case<'a> {
         if weighed { self.search_mean() } else { first }
     }
 
-    fn search_mean(&self) -> Mean {
+    fn search_mean(&self) -> MeanResult {
         let level = self.level(Self::MEAN_LEVEL);
         let outcome = self.survey.search_bias(&self.sensor().camera, level, self.options.seed);
         let terms = terms_of(&outcome, Statistic::Bias);
         let px = pixel_terms(&self.fields, &terms, &self.survey, &self.bench);
-        Mean { outcome, terms, px }
+        MeanResult { outcome, terms, px }
     }
 
-    pub fn scatter(&mut self, mean: &Mean) -> Scatter {
+    pub fn scatter(&mut self, mean: &MeanResult) -> ScatterResult {
         self.at("searching the noise", "testing the noise again");
         let camera = &self.recording.sensor.camera;
         let mut structure = structures(&self.fields, camera, &mean.px);
@@ -191,9 +191,9 @@ impl<'a> Case<'a> {
             baseline.compare(&mut structure, &lattice, &mut self.known);
             found.iter().for_each(|found| self.known.overrule(found));
         }
-        let mut hangs = hanging(&structure, &self.known, each);
-        hangs.retain(|h| self.stands(h.p, each));
-        self.survey.compare_frames(&self.fields, common(&structure, &hangs, &self.known));
+        let mut textures = texture_findings(&structure, &self.known, each);
+        textures.retain(|h| self.stands(h.p, each));
+        self.survey.compare_frames(&self.fields, common(&structure, &textures, &self.known));
         let compared =
             self.baseline.as_mut().is_some_and(|baseline| baseline.variances(&mut self.survey));
         let range_share = self.range_share(&mean.terms);
@@ -204,12 +204,12 @@ impl<'a> Case<'a> {
         };
         self.survey.roughen(&self.fields, &mean.px, extra, stretch);
         if let Some(baseline) = self.baseline.as_ref().filter(|_| compared) {
-            baseline.doubt(&mut self.survey);
+            baseline.inflate_log_variances(&mut self.survey);
         }
         let level = self.level(Self::VARIANCE_LEVEL);
         let sigma = &self.model.sigma;
         if self.survey.learnt_from[1].is_some() {
-            self.survey.forgive_variance(&self.known, sigma);
+            self.survey.absorb_model_variance_error(&self.known, sigma);
         }
         let outcome = self.survey.search_variance(sigma, camera, level, self.options.seed);
         let terms = terms_of(&outcome, Statistic::Variance);
@@ -222,7 +222,7 @@ impl<'a> Case<'a> {
             || !self.known.variance.iter().all(holds);
         let tails = tails(&structure, &self.known, each, uneven)
             .filter(|t| !alike && self.stands(t.p, each));
-        Scatter { structure, lattice, hangs, tails, outcome }
+        ScatterResult { structure, lattice, textures, tails, outcome }
     }
 
     /// Is this chance, of noise alone, small enough where the model's own views left something open
@@ -276,7 +276,7 @@ fn survey(
         survey.between = Arc::new([of(Statistic::Bias), of(Statistic::Variance)]);
     }
     if learnt_from[0].is_some() {
-        survey.forgive_bias(known);
+        survey.absorb_model_bias_error(known);
     }
     survey
 }

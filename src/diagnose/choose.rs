@@ -24,14 +24,15 @@ pub struct Choice<'a> {
 impl Choice<'_> {
     /// The best, if it brings more than noise can and is not among the `chosen` already.
     pub fn best(&self, chosen: &[Chosen]) -> Option<Chosen> {
-        let families = self.ranked(true, |i| self.fair(i));
+        let families = self.ranked(true, |i| self.dispersion_corrected_gain(i));
         let curves = self.ranked(false, |i| self.total(i));
         let threshold = self.noise.threshold(self.rules.level);
         let new = |i: usize| {
             !chosen.iter().any(|c| same_curve(&c.candidate, &self.candidates[i]))
                 && self.is_sensible(i)
         };
-        let curve = || curves.iter().copied().find(|&i| self.safe(i) > threshold && new(i));
+        let curve =
+            || curves.iter().copied().find(|&i| self.calibrated_gain(i) > threshold && new(i));
         let winner = self.name(&families, &curves).or_else(curve)?;
         Some(Chosen {
             candidate: self.candidates[winner].clone(),
@@ -40,7 +41,7 @@ impl Choice<'_> {
             gain: self.total(winner),
             best_curve: self.best_curve(&curves),
             rivals: self.rivals(winner, &families)?,
-            p: self.noise.p(self.safe(winner)),
+            p: self.noise.p(self.calibrated_gain(winner)),
         })
     }
 
@@ -48,12 +49,12 @@ impl Choice<'_> {
         self.judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| j.gain.total)
     }
 
-    fn safe(&self, i: usize) -> f64 {
-        self.judged[i].as_ref().map_or(0.0, |j| j.safe(self.rules))
+    fn calibrated_gain(&self, i: usize) -> f64 {
+        self.judged[i].as_ref().map_or(0.0, |j| j.calibrated_gain(self.rules))
     }
 
     /// A name whose fits to single views disagree is the worse one.
-    fn fair(&self, i: usize) -> f64 {
+    fn dispersion_corrected_gain(&self, i: usize) -> f64 {
         let total = self.total(i);
         self.judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| {
             if total > 0.0 { total / j.null.dispersion.sqrt() } else { total }
@@ -91,7 +92,8 @@ impl Choice<'_> {
     fn name(&self, families: &[usize], curves: &[usize]) -> Option<usize> {
         let threshold = self.noise.threshold(self.rules.level);
         let best_curve = self.best_curve(curves);
-        let best_family = families.first().map_or(f64::NEG_INFINITY, |&i| self.fair(i));
+        let best_family =
+            families.first().map_or(f64::NEG_INFINITY, |&i| self.dispersion_corrected_gain(i));
         let most = families.iter().map(|&i| self.total(i)).fold(0.0, f64::max);
         let slack = AS_GOOD_NATS.max(AS_GOOD_SHARE * best_family);
         let columns = |i: usize| self.candidates[i].basis.count();
@@ -99,10 +101,13 @@ impl Choice<'_> {
             .iter()
             .copied()
             .filter(|&i| {
-                self.fair(i) > best_family - slack || self.is_as_exact_as_a_formula(i, most)
+                self.dispersion_corrected_gain(i) > best_family - slack
+                    || self.is_as_exact_as_a_formula(i, most)
             })
             .min_by_key(|&i| (columns(i), !self.rests_on_a_measurement(i)))
-            .filter(|&i| self.safe(i) > threshold && self.total(i) > self.adequacy(i) * best_curve)
+            .filter(|&i| {
+                self.calibrated_gain(i) > threshold && self.total(i) > self.adequacy(i) * best_curve
+            })
             // What fewer columns without a name do better is not what the name says.
             .filter(|&i| {
                 let simpler = |&k: &usize| columns(k) < columns(i) && self.total(k) > self.total(i);
@@ -111,7 +116,7 @@ impl Choice<'_> {
             .filter(|&i| self.is_sensible(i))
             .filter(|&i| {
                 let clear = self.total(i) > CLEAR * best_curve;
-                clear || self.judged[i].as_ref().is_some_and(steady)
+                clear || self.judged[i].as_ref().is_some_and(consistent_across_views)
             })
     }
 
@@ -127,7 +132,7 @@ impl Choice<'_> {
                 rivals.push(Rival {
                     family,
                     basis: self.candidates[i].basis.clone(),
-                    gain: self.fair(i),
+                    gain: self.dispersion_corrected_gain(i),
                     behind: behind(&won.by_view, &j.gain.by_view),
                 });
             }
@@ -172,7 +177,7 @@ const CLEAR: f64 = 0.85;
 
 /// Views that scatter about a common fit far beyond their noise are explained badly; a name must
 /// then help most of them.
-fn steady(judged: &Judged) -> bool {
+fn consistent_across_views(judged: &Judged) -> bool {
     const WILD: f64 = 3.0;
     const STEADY: f64 = 2.5;
     let none = vec![0.0; judged.gain.by_view.len()];

@@ -8,7 +8,7 @@ use super::diagnosis::{DIAGNOSIS_FORMAT, Diagnosis, MapRow, Reference};
 use super::engine::Diagnosed;
 use super::far_off::far_off;
 use super::known::KnownTerms;
-use super::laws::{checked, scatter};
+use super::laws::{referenced_views, scatter};
 use super::outcome::Outcome;
 use super::pixels::typical_sigma_mm;
 use super::verdict::{extend, not_identifiable, shares, untested, verdict, view_lines};
@@ -23,9 +23,9 @@ impl Case<'_> {
         if self.options.calibrated_here && self.model.sigma.form != Form::Paper {
             remarks.extend(self.model.fit.remarks.first().cloned());
         }
-        remarks.append(&mut self.copies);
+        remarks.append(&mut self.remarks);
         let camera = &self.sensor().camera;
-        remarks.extend(thinned::told(camera.width, camera.height));
+        remarks.extend(thinned::remark(camera.width, camera.height));
         if self.sensor().baseline_m.is_none() {
             remarks.push(format!(
                 "the recording gives no baseline_m: {KINECT_BASELINE_M} m, a Kinect v1's, is assumed; all disparities scale with it"
@@ -105,7 +105,7 @@ impl Case<'_> {
         let added = &mut extended.effects[self.model.effects.len()..];
         let bias = added.iter().flat_map(|e| &e.shape).filter(|t| t.is_correctable());
         let levels = heldout::levels(&self.survey, &bias.cloned().collect::<Vec<_>>());
-        let checked = checked(&self.fields, &levels, &known, &self.survey.second());
+        let checked = referenced_views(&self.fields, &levels, &known, &self.survey.second());
         if checked.len() >= laws::FEWEST {
             anchor(added, &checked, scatter(&checked).0, camera);
         }

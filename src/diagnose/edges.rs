@@ -51,7 +51,7 @@ struct Side {
 /// One view's pixels beside the target in a frame: lost, and in the shadow by geometry, over so many
 /// rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Beside {
+pub struct EdgeLoss {
     pub lost: f64,
     pub shaded: f64,
     pub rows: f64,
@@ -88,16 +88,16 @@ const FEWEST_ROWS: usize = 8;
 impl Edges {
     /// Where the lines cross the edge, by the view's first frame.
     pub fn find(field: &Field, frame: &Frame, rays: &Rays, table: &DepthTable) -> Self {
-        let looked = Looked { field, frame, rays, table, on: field.on_target() };
+        let scan = EdgeScan { field, frame, rays, table, on: field.on_target() };
         let mut edges = Edges::default();
         let (mut sigma, mut step, width) = (0.0, 0.0, field.width as isize);
         for (k, &i) in field.pixels.iter().enumerate() {
             for stride in [-1, 1, -width, width] {
                 let noise = f64::from(field.sigma[k].max(field.spread_px));
-                let Some(crossing) = looked.crossing(i as isize, stride, noise) else { continue };
+                let Some(crossing) = scan.crossing(i as isize, stride, noise) else { continue };
                 step -= crossing.step;
                 // As the residuals are scaled.
-                let own = looked.plane(crossing.last);
+                let own = scan.plane(crossing.last);
                 sigma += noise * (own + crossing.step) / own;
                 if let Some(side) = crossing.side {
                     edges.sides[side].rows += 1;
@@ -155,9 +155,9 @@ impl Edges {
     }
 
     /// What is beside the target on a side; `None` where too few rows were seen.
-    pub fn beside(&self, side: usize) -> Option<Beside> {
+    pub fn beside(&self, side: usize) -> Option<EdgeLoss> {
         let (lost, side) = (self.lost_px(side), &self.sides[side]);
-        let beside = Beside { lost, shaded: side.shaded_px, rows: side.rows as f64 };
+        let beside = EdgeLoss { lost, shaded: side.shaded_px, rows: side.rows as f64 };
         (side.rows >= FEWEST_ROWS).then_some(beside)
     }
 }
@@ -177,7 +177,7 @@ fn fringe_px(width: usize) -> usize {
     (FRINGE * width as f64).ceil() as usize
 }
 
-struct Looked<'a> {
+struct EdgeScan<'a> {
     field: &'a Field,
     frame: &'a Frame,
     rays: &'a Rays,
@@ -186,7 +186,7 @@ struct Looked<'a> {
     on: Vec<bool>,
 }
 
-impl Looked<'_> {
+impl EdgeScan<'_> {
     /// The crossing outwards of region pixel `start`; `None` where the next pixel is in the region
     /// too, nothing is seen behind, or the region is too narrow.
     fn crossing(&self, start: isize, stride: isize, sigma: f64) -> Option<Crossing> {

@@ -198,7 +198,7 @@ fn shadows(width: impl Fn(f64) -> [f64; 2]) -> Vec<Sides> {
         let shaded = 2.0 * f64::from(k);
         let [left, right] = width(shaded).map(f64::round);
         let side =
-            |lost: f64| Some(Beside { lost: 100.0 * lost, shaded: 100.0 * shaded, rows: 100.0 });
+            |lost: f64| Some(EdgeLoss { lost: 100.0 * lost, shaded: 100.0 * shaded, rows: 100.0 });
         Sides([side(left), side(right)])
     };
     (4..14).map(of).collect()

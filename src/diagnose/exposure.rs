@@ -20,7 +20,7 @@ pub const FRAMES_KEPT: usize = 4;
 
 impl Field {
     /// Collect the residuals of all frames (time since the first, s).
-    pub fn expose(
+    pub fn accumulate(
         &mut self,
         frames: impl Iterator<Item = (f64, Frame)>,
         bench: &Workbench<'_>,
@@ -39,7 +39,7 @@ impl Field {
                 }
                 edges = Edges::find(self, &image, &bench.rays, &bench.table);
                 if self.edge.is_empty() {
-                    self.thin(&mut expected);
+                    self.subsample_blocks(&mut expected);
                 }
             }
             edges.add(self, &image, &bench.rays, &bench.table);

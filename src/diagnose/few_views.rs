@@ -31,7 +31,7 @@ const REPLICATES: u64 = 200;
 /// own shape, badly met.
 const BESIDE_ALL: f64 = 10.0;
 /// A name must explain this share of what the best curve does: a few views show little of a shape.
-const ADEQUATE: f64 = 0.9;
+const NAME_ADEQUATE: f64 = 0.9;
 
 /// A candidate in the views that show it best.
 struct Best {
@@ -156,12 +156,12 @@ pub fn few_views(
     if most < noise.threshold(rules.level) {
         return None;
     }
-    let name = all.iter().find(|(c, b)| c.family.is_some() && b.gain > ADEQUATE * most);
+    let name = all.iter().find(|(c, b)| c.family.is_some() && b.gain > NAME_ADEQUATE * most);
     let (candidate, best) = name.or(all.first())?;
-    Some(told(scene, candidate, best, noise.p(most)))
+    Some(report(scene, candidate, best, noise.p(most)))
 }
 
-fn told(scene: &Scene<'_>, candidate: &Candidate, best: &Best, p: f64) -> Finding {
+fn report(scene: &Scene<'_>, candidate: &Candidate, best: &Best, p: f64) -> Finding {
     let (statistic, axis) = (scene.statistic, candidate.basis.axis());
     let coefficients = best.beta.as_slice().to_vec();
     let term = Term { statistic, basis: candidate.basis.clone(), coefficients };

@@ -62,7 +62,7 @@ pub struct Field {
     /// How often each stored word occurs on the target.
     pub words: RawHistogram,
     /// The target's region was given; else it ends where too little is measured.
-    pub told: bool,
+    pub region_given: bool,
     /// Where the target ends before something else.
     pub edges: Edges,
 }
@@ -98,8 +98,8 @@ impl Field {
             };
             Some((frame.timestamp - start, image))
         });
-        field.expose(frames, bench, sigma, known, session_start);
-        field.look(view, &bench.rays);
+        field.accumulate(frames, bench, sigma, known, session_start);
+        field.read_infrared(view, &bench.rays);
         Ok(field)
     }
 
@@ -123,12 +123,12 @@ impl Field {
             words: RawHistogram::none(),
             ..self.clone()
         };
-        field.expose(frames, bench, sigma, known, session_start);
+        field.accumulate(frames, bench, sigma, known, session_start);
         field
     }
 
     /// Read the view's first infrared image; one that cannot be read is as none.
-    fn look(&mut self, view: &View, rays: &Rays) {
+    fn read_infrared(&mut self, view: &View, rays: &Rays) {
         let Some(frame) = view.infrared.first() else { return };
         let size = [self.width, rays.x.len() / self.width];
         let Ok(image) = InfraredImage::read(&frame.path, size) else { return };
@@ -189,7 +189,7 @@ impl Field {
             flatness_m: view.notes.target.and_then(|t| t.flatness_m),
             temperature_c: view.notes.temperature_c,
             ambient_lux: view.notes.ambient_lux,
-            told: view.notes.region.is_some(),
+            region_given: view.notes.region.is_some(),
             ..Field::unseen(plane, scale_px_m, size, pixels)
         }
     }
@@ -227,7 +227,7 @@ impl Field {
             ambient_lux: None,
             light: Vec::new(),
             words: RawHistogram::none(),
-            told: false,
+            region_given: false,
             edges: Edges::default(),
         }
     }

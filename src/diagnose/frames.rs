@@ -5,9 +5,9 @@ use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 
 use super::exposure::FRAMES_KEPT;
-use super::hanging::{Hanging, Mean, nats, one, variance_px2};
 use super::known::KnownTerms;
 use super::structure::{Jitter, Structure};
+use super::texture_finding::{TextureFinding, ViewMean, nats, one, variance_px2};
 use super::verdict::MIN_SIZE;
 use crate::terms::{Axis, Statistic};
 
@@ -58,7 +58,7 @@ pub(super) fn frames(
     known: &KnownTerms,
     level: f64,
     rho: f64,
-) -> Vec<Hanging> {
+) -> Vec<TextureFinding> {
     let all: Vec<Jitter> = views.iter().filter_map(|s| s.jitter).collect();
     let freedom: f64 = all.iter().map(|j| j.freedom).sum();
     if all.len() < 2 || freedom < 2.0 {
@@ -88,7 +88,7 @@ pub(super) fn frames(
             nats: 0.5 * n * f.ln().max(0.0),
         });
         let std_error = std_error.hypot(UNEVEN * velocity_mps);
-        found.push(Hanging {
+        found.push(TextureFinding {
             families: vec!["target-motion"],
             statistic: Statistic::Bias,
             axis: Axis::Frame,
@@ -112,7 +112,7 @@ pub(super) fn frames(
     if p_jitter < level && jitter_px2 > 0.0 && !aside {
         let sigma = jitter_px2.sqrt();
         let variance = variance_px2(views);
-        found.push(Hanging {
+        found.push(TextureFinding {
             families: vec!["frame-jitter"],
             statistic: Statistic::Correlation,
             axis: Axis::Frame,
@@ -130,7 +130,7 @@ pub(super) fn frames(
 /// Logarithm of each frame's mean square over the others', of rough residuals. What frames have in
 /// common, still or slowly changing, is in all of them alike. Nothing with fewer than three frames,
 /// of which none can be blamed.
-pub fn loudness(frames: &[Vec<f32>]) -> [Option<f64>; FRAMES_KEPT] {
+pub fn frame_log_variance(frames: &[Vec<f32>]) -> [Option<f64>; FRAMES_KEPT] {
     let mut all = [None; FRAMES_KEPT];
     let n = frames.len().min(FRAMES_KEPT);
     if n < 3 {
@@ -153,12 +153,12 @@ pub fn loudness(frames: &[Vec<f32>]) -> [Option<f64>; FRAMES_KEPT] {
 }
 
 /// The frame that stands out most in all views.
-pub fn unequal(views: &[Structure], level: f64) -> Option<Hanging> {
+pub fn unequal(views: &[Structure], level: f64) -> Option<TextureFinding> {
     let (frame, m, p) = (0..FRAMES_KEPT)
         .filter_map(|j| {
-            let m = Mean::of(views, |s| s.loudness[j])?;
+            let m = ViewMean::of(views, |s| s.frame_log_variance[j])?;
             // Either way, and any of the frames.
-            let p = 2.0 * m.p_above(0.0).min(Mean { value: -m.value, ..m }.p_above(0.0));
+            let p = 2.0 * m.p_above(0.0).min(ViewMean { value: -m.value, ..m }.p_above(0.0));
             Some((j, m, (p * FRAMES_KEPT as f64).min(1.0)))
         })
         .min_by(|a, b| a.2.total_cmp(&b.2))?;
@@ -169,7 +169,7 @@ pub fn unequal(views: &[Structure], level: f64) -> Option<Hanging> {
     let more = if m.value > 0.0 { "more" } else { "less" };
     let mut parameters = one("log_variance", m.value, m.std_error);
     parameters.insert("frame".into(), json!(frame));
-    Some(Hanging {
+    Some(TextureFinding {
         families: vec![],
         statistic: Statistic::Variance,
         axis: Axis::Frame,
@@ -198,7 +198,7 @@ mod tests {
                 (0..5000).map(|_| (size * one()) as f32).collect()
             };
             let frames = [first, 1.0, 1.0, 1.0].map(&mut frame);
-            Structure { loudness: loudness(&frames), ..Structure::default() }
+            Structure { frame_log_variance: frame_log_variance(&frames), ..Structure::default() }
         };
         (0..12).map(view).collect()
     }

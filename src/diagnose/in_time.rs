@@ -1,8 +1,10 @@
 //! What pixels repeat: in every view, in every frame of a view, and from frame to frame.
 
-use super::hanging::{Hanging, LEAST_SHARE, Mean, Shared, nats, one, variance_px2};
 use super::known::KnownTerms;
 use super::structure::Structure;
+use super::texture_finding::{
+    LEAST_VARIANCE_SHARE, Shared, TextureFinding, ViewMean, nats, one, variance_px2,
+};
 use crate::terms::{Axis, Statistic};
 
 /// Correlations smaller than this are not worth a word.
@@ -19,8 +21,8 @@ fn of_frames(
     (name, share, std_error): (&str, f64, f64),
     size: f64,
     (p, nats): (f64, f64),
-) -> Hanging {
-    Hanging {
+) -> TextureFinding {
+    TextureFinding {
         families,
         statistic: Statistic::Correlation,
         axis: Axis::Frame,
@@ -33,8 +35,8 @@ fn of_frames(
     }
 }
 
-pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {
-    let fixed = Mean::of_pairs(views, |s| s.fixed_px2);
+pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
+    let fixed = ViewMean::of_pairs(views, |s| s.fixed_px2);
     let variance = variance_px2(views);
     let known_px = known.parameter("fixed-pattern-noise", "sigma_px").unwrap_or(0.0);
     let pattern = Shared {
@@ -45,15 +47,15 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hangi
         least: LEAST_FIXED,
         words: None,
     };
-    let mut found: Vec<Hanging> =
+    let mut found: Vec<TextureFinding> =
         fixed.and_then(|m| pattern.found(&m, variance, level)).into_iter().collect();
     let fixed_px2 = fixed.map_or(0.0, |m| m.value.max(0.0));
-    let Some(first) = Mean::of(views, |s| s.lagged[0]) else { return found };
+    let Some(first) = ViewMean::of(views, |s| s.lagged[0]) else { return found };
     let first_error = first.std_error.max(by_chance(views));
     let fixed_share = fixed_px2 / variance.max(1e-12);
     let frozen_known = known.parameter("frozen-noise", "fraction").unwrap_or(0.0);
     let rho_known = known.parameter("temporal-correlation", "rho").unwrap_or(0.0);
-    let falling = Mean::of(views, |s| Some(s.lagged[0]? - later(s)?));
+    let falling = ViewMean::of(views, |s| Some(s.lagged[0]? - later(s)?));
     let Some((falling, still)) = falling.zip(still_level(views)) else {
         // Two frames a view: still or slowly changing, nobody can say.
         let p = first.p_above(fixed_share + frozen_known + rho_known);
@@ -66,10 +68,10 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hangi
         return found;
     };
     let p_falling = falling.p_above(0.0);
-    let slowly = p_falling < level && falling.value > LEAST_SHARE;
+    let slowly = p_falling < level && falling.value > LEAST_VARIANCE_SHARE;
     // What stands still is in the last of them whole, and in all of them where none fades.
     let last = |s: &Structure| if slowly { s.lagged[2].or(s.lagged[1]) } else { of_any_two(s) };
-    let Some(least) = Mean::of(views, last) else { return found };
+    let Some(least) = ViewMean::of(views, last) else { return found };
     let p_still = least.p_above(fixed_share + frozen_known);
     if slowly && rho_known == 0.0 {
         let s = still.max(0.0) + fixed_share;
@@ -114,7 +116,7 @@ fn by_chance(views: &[Structure]) -> f64 {
 /// Share of the noise that stands still within a view, by the views' mean correlations; `None` with
 /// too few frames.
 pub fn still_level(views: &[Structure]) -> Option<f64> {
-    let mean = |of: &dyn Fn(&Structure) -> Option<f64>| Mean::of(views, of).map(|m| m.value);
+    let mean = |of: &dyn Fn(&Structure) -> Option<f64>| ViewMean::of(views, of).map(|m| m.value);
     let (c1, c2, c3) = (mean(&|s| s.lagged[0])?, mean(&|s| s.lagged[1])?, mean(&|s| s.lagged[2]));
     let share = still_share([c1, c2, c3.unwrap_or(c2 * c2 / c1.max(1e-6))], c3.is_some());
     let fixed = mean(&|s| s.fixed_px2).unwrap_or(0.0).max(0.0);

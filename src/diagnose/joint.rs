@@ -113,27 +113,33 @@ impl Joint<'_> {
         if let Some(error) =
             is_told.then(|| self.error(s, &kept, &precision, &left, planes)).flatten()
         {
-            outcome.covariance.factors = error.factors.iter().map(|f| self.told(s, f)).collect();
+            outcome.covariance.factors =
+                error.factors.iter().map(|f| self.reported(s, f)).collect();
             outcome.covariance.variances = self.laid_out(s, &error.variances, |_, _| [0.0; 3]);
         }
         let folds = s.without.iter().zip(&self.views);
         outcome.left_out = folds
             .filter_map(|(r, views)| {
-                Some((views.clone(), self.told(s, &r.fit(&kept, &precision)?)))
+                Some((views.clone(), self.reported(s, &r.fit(&kept, &precision)?)))
             })
             .collect();
-        let told = self.told(s, &beta);
+        let told = self.reported(s, &beta);
         outcome.fit = Some(Gain {
             total: total(&s.scores),
             by_view: s.scores.clone(),
-            covariance: self.covariance_of_told(s, &errors, told.len()),
+            covariance: self.covariance_of_reported(s, &errors, told.len()),
             beta: DVector::from_vec(told),
         });
         Some(outcome)
     }
 
-    /// The terms' covariance where [`Joint::told`] has their coefficients, zero elsewhere.
-    fn covariance_of_told(&self, s: &Settled, errors: &DMatrix<f64>, told: usize) -> DMatrix<f64> {
+    /// The terms' covariance where [`Joint::reported`] has their coefficients, zero elsewhere.
+    fn covariance_of_reported(
+        &self,
+        s: &Settled,
+        errors: &DMatrix<f64>,
+        told: usize,
+    ) -> DMatrix<f64> {
         let mut covariance = DMatrix::zeros(told, told);
         let mut to = 0;
         let places: Vec<usize> = s
@@ -226,7 +232,7 @@ impl Joint<'_> {
     }
 
     /// The coefficients of [`Joint::chosen`].
-    fn told(&self, s: &Settled, beta: &DVector<f64>) -> Vec<f64> {
+    fn reported(&self, s: &Settled, beta: &DVector<f64>) -> Vec<f64> {
         self.laid_out(s, beta, |gauge, mine| gauge.term(mine).1)
     }
 

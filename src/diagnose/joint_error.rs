@@ -73,7 +73,7 @@ impl Joint<'_> {
     }
 
     /// The columns as planes that are faced show them.
-    fn seen(&self, places: &[usize], camera: &Camera, disparities: [f64; 3]) -> Vec<Seen> {
+    fn seen(&self, places: &[usize], camera: &Camera, disparities: [f64; 3]) -> Vec<DesignRow> {
         let rays = camera.rays();
         let pixels = Pixels::new(camera, &rays, 1.0);
         let mut row = vec![0.0; self.all.b.len()];
@@ -85,7 +85,7 @@ impl Joint<'_> {
                     place.disparity = disparity;
                     self.columns.fill(&place, &mut row);
                     let columns = places.iter().map(|&k| row[k]).enumerate();
-                    seen.push(Seen(columns.filter(|(_, g)| *g != 0.0).collect()));
+                    seen.push(DesignRow(columns.filter(|(_, g)| *g != 0.0).collect()));
                 }
             }
         }
@@ -100,9 +100,9 @@ pub struct Error {
 }
 
 /// A place's columns that are not zero.
-struct Seen(Vec<(usize, f64)>);
+struct DesignRow(Vec<(usize, f64)>);
 
-impl Seen {
+impl DesignRow {
     fn variance(&self, covariance: &DMatrix<f64>) -> f64 {
         let row = |&(i, g): &(usize, f64)| -> f64 {
             g * self.0.iter().map(|&(j, h)| h * covariance[(i, j)]).sum::<f64>()
@@ -119,7 +119,7 @@ impl Seen {
 
 /// Variances of the first map's nodes that make what is left of every place's, neighbours being
 /// independent.
-fn rest(seen: &[Seen], left: &DMatrix<f64>, first: usize, nodes: usize) -> Vec<f64> {
+fn rest(seen: &[DesignRow], left: &DMatrix<f64>, first: usize, nodes: usize) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); left.nrows()];
     for place in seen {
         let mine = || place.0.iter().filter(|(i, _)| (first..first + nodes).contains(i));

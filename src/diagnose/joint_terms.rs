@@ -25,7 +25,7 @@ const LARGEST_USUAL: f64 = 2.0;
 /// what the target's formula misses, and no board's misfit is to be taken out of other pictures.
 const BESIDE_TARGET: f64 = 0.05;
 /// A radial name that explains this share of all stands, and the maps are the rest of it.
-const ADEQUATE: f64 = 0.6;
+const RADIAL_NAME_ADEQUATE: f64 = 0.6;
 
 /// What the terms are in the end.
 pub struct Settled {
@@ -121,7 +121,7 @@ impl Joint<'_> {
     fn drop_idle(&self, settled: &mut Settled, chosen: &[Chosen], alone: f64) {
         let concerned = |s: &Settled, t: usize| {
             let c = &chosen[t].candidate;
-            let named = alone > ADEQUATE * total(&s.scores);
+            let named = alone > RADIAL_NAME_ADEQUATE * total(&s.scores);
             !(is_rough(c) || (named && is_radial_name(c)))
         };
         let needless = |s: &Settled, t: usize, lost: f64, scores: &[f64]| {

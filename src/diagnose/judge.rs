@@ -18,8 +18,8 @@ pub struct Judged {
 
 impl Judged {
     /// Nats that count against what noise brings.
-    pub fn safe(&self, rules: &Rules) -> f64 {
-        self.null.safe(self.gain.total, self.gain.by_view.len(), rules)
+    pub fn calibrated_gain(&self, rules: &Rules) -> f64 {
+        self.null.calibrated_gain(self.gain.total, self.gain.by_view.len(), rules)
     }
 }
 
@@ -29,7 +29,7 @@ pub const LEAST_OF_LARGEST: f64 = 0.06;
 /// A pattern that stands still must be, in square, so much more than what a fit to nothing but the
 /// pixels' own errors would make: seven times, for the best of many and for views that cover little
 /// of the picture.
-pub const CLEARLY: f64 = 50.0;
+pub const CLEARLY_FIXED: f64 = 50.0;
 
 /// What sizes are measured on, and held against.
 pub struct Judge<'a> {
@@ -65,7 +65,7 @@ impl Judge<'_> {
         let Some((fixed, pixels)) = self.rules.fixed.filter(|_| basis.is_of_picture()) else {
             return true;
         };
-        rms * rms > CLEARLY * fixed * fixed * k as f64 / pixels
+        rms * rms > CLEARLY_FIXED * fixed * fixed * k as f64 / pixels
     }
 }
 
@@ -100,7 +100,7 @@ pub fn looks(
             Some(Look {
                 basis: c.basis.clone(),
                 coefficients: j.gain.beta.as_slice().to_vec(),
-                p: noise.p(j.safe(rules)),
+                p: noise.p(j.calibrated_gain(rules)),
             })
         })
         .collect()

@@ -101,7 +101,7 @@ fn nearest(evidence: &[Evidence], n: usize) -> Option<DVector<f64>> {
 
 impl Survey {
     /// Take out of the views' means what the model's biases may be off by.
-    pub fn forgive_bias(&mut self, known: &KnownTerms) {
+    pub fn absorb_model_bias_error(&mut self, known: &KnownTerms) {
         let off = Errors::of(known, Statistic::Bias).settled(&self.coarse_mean_data());
         if off.is_empty() {
             return;
@@ -117,7 +117,7 @@ impl Survey {
     }
 
     /// The same for the size of the noise: sigma's own error and that of known terms.
-    pub fn forgive_variance(&mut self, known: &KnownTerms, sigma: &SigmaModel) {
+    pub fn absorb_model_variance_error(&mut self, known: &KnownTerms, sigma: &SigmaModel) {
         let mut errors = Errors::of(known, Statistic::Variance);
         errors.parts.extend(error_of_sigma(&self.reach, sigma));
         let off = errors.settled(&self.variance_data());

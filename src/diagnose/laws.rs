@@ -5,17 +5,17 @@ use nalgebra::{DMatrix, DVector};
 use super::anchor::Family;
 use super::evidence::{Evidence, gain};
 use super::field::Field;
-use super::hanging::Mean;
 use super::known::KnownTerms;
 use super::null::Null;
 use super::replication::agree;
+use super::texture_finding::ViewMean;
 use super::warm_up::warm_up;
 use crate::solve::{Left, left_by_fit};
 use crate::terms::Axis;
 
 /// One view with a reference.
 #[derive(Debug, Clone, Copy)]
-pub struct Checked {
+pub struct ReferencedView {
     pub z: f64,
     /// Slope of the target, along the columns and rows.
     pub slope: [f64; 2],
@@ -25,23 +25,23 @@ pub struct Checked {
     /// Disparity in px times depth.
     pub px_m: f64,
     pub sigma_m: f64,
-    pub second: bool,
+    pub in_second_half: bool,
 }
 
 /// What the model knows of the laws is taken out. `levels` is what each view's disparity on the
 /// optical axis changes by once the found bias is taken out, px.
-pub fn checked(
+pub fn referenced_views(
     fields: &[Field],
     levels: &[f64],
     known: &KnownTerms,
     second: &[bool],
-) -> Vec<Checked> {
+) -> Vec<ReferencedView> {
     let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
     fields
         .iter()
         .zip(levels)
         .zip(second)
-        .filter_map(|((f, level), &second)| {
+        .filter_map(|((f, level), &in_second_half)| {
             // The plane had bent towards what is now known to be a bias.
             let z = f.scale_px_m / (f.scale_px_m * f.plane.q.z + level);
             let session_s = f.time_s - start;
@@ -51,7 +51,15 @@ pub fn checked(
             let steep = f.plane.theta().tan();
             let (sin, cos) = f.plane.azimuth().sin_cos();
             let slope = [steep * cos, steep * sin];
-            Some(Checked { z, slope, off, session_s, px_m: f.scale_px_m, sigma_m, second })
+            Some(ReferencedView {
+                z,
+                slope,
+                off,
+                session_s,
+                px_m: f.scale_px_m,
+                sigma_m,
+                in_second_half,
+            })
         })
         .collect()
 }
@@ -63,14 +71,14 @@ const FEWEST_TILTED: usize = 5;
 
 /// On a tilted target the distance depends on where the optical axis is taken to meet it: by two
 /// angles, which are fitted beside every law where there are views enough.
-pub fn is_tilted(checked: &[Checked]) -> bool {
-    let steep = |c: &&Checked| c.slope[0].hypot(c.slope[1]) > TILTED;
+pub fn is_tilted(checked: &[ReferencedView]) -> bool {
+    let steep = |c: &&ReferencedView| c.slope[0].hypot(c.slope[1]) > TILTED;
     checked.iter().filter(steep).count() >= FEWEST_TILTED && checked.len() >= 2 * FEWEST_TILTED
 }
 
 /// Variance of the references' own errors, m^2, and its degrees of freedom: what the laws together
 /// leave.
-pub fn scatter(checked: &[Checked]) -> (f64, f64) {
+pub fn scatter(checked: &[ReferencedView]) -> (f64, f64) {
     let n = checked.len();
     let span = checked.iter().map(|c| c.session_s).fold(0.0, f64::max).max(1.0);
     let columns = if is_tilted(checked) { 6 } else { 4 };
@@ -87,10 +95,18 @@ pub fn scatter(checked: &[Checked]) -> (f64, f64) {
 }
 
 #[cfg(test)]
-impl Checked {
+impl ReferencedView {
     /// A frontal view.
     pub fn ahead(z: f64, off: f64, px_m: f64) -> Self {
-        Checked { z, slope: [0.0; 2], off, session_s: 0.0, px_m, sigma_m: 0.002, second: false }
+        ReferencedView {
+            z,
+            slope: [0.0; 2],
+            off,
+            session_s: 0.0,
+            px_m,
+            sigma_m: 0.002,
+            in_second_half: false,
+        }
     }
 }
 
@@ -125,7 +141,7 @@ const WARM_UPS: [f64; 6] = [60.0, 180.0, 480.0, 1200.0, 2400.0, 7200.0];
 
 /// What else distances may be off by.
 #[derive(Default)]
-pub struct Beside {
+pub struct Nuisances {
     /// How far a bent target may lie from the place on it that was measured, at any distance, m.
     pub bent_m: f64,
     /// Biases whose constants are open: an offset of the disparity cannot be told from them.
@@ -133,22 +149,22 @@ pub struct Beside {
 }
 
 /// All laws, with what each gains on references left out; none where there are too few.
-pub fn laws(checked: &[Checked], Beside { bent_m, open }: &Beside) -> Vec<Law> {
+pub fn laws(checked: &[ReferencedView], Nuisances { bent_m, open }: &Nuisances) -> Vec<Law> {
     if checked.len() < FEWEST {
         return Vec::new();
     }
     let angles = if is_tilted(checked) { 2 } else { 0 };
     let bent = (*bent_m > 0.0).then_some(*bent_m);
-    let others = |c: &Checked| -> Vec<f64> {
+    let others = |c: &ReferencedView| -> Vec<f64> {
         let angles = c.slope[..angles].iter().map(|s| c.z * s);
         angles.chain(bent).chain(open.iter().map(|f| f.moves_m(c))).collect()
     };
     let beside = angles + usize::from(bent.is_some()) + open.len();
     let (variance, free) = scatter(checked);
     let mut laws = Vec::new();
-    let mut add = |family, axis, column: &dyn Fn(&Checked) -> f64| {
+    let mut add = |family, axis, column: &dyn Fn(&ReferencedView) -> f64| {
         let evidence = |with: bool| -> Vec<Evidence> {
-            let of = |c: &Checked| {
+            let of = |c: &ReferencedView| {
                 let mut g = others(c);
                 g.extend(with.then(|| column(c)));
                 let g = DVector::from_vec(g);
@@ -166,10 +182,10 @@ pub fn laws(checked: &[Checked], Beside { bent_m, open }: &Beside) -> Vec<Law> {
             let beta = gain.beta[beside];
             let beta_error = gain.covariance[(beside, beside)].sqrt();
             let n = checked.len() as f64;
-            let square = |of: &dyn Fn(&Checked) -> f64| {
+            let square = |of: &dyn Fn(&ReferencedView) -> f64| {
                 (checked.iter().map(|c| of(c).powi(2)).sum::<f64>() / n).sqrt()
             };
-            let shift = |c: &Checked| beta * column(c);
+            let shift = |c: &ReferencedView| beta * column(c);
             let reach = crate::stats::range(checked.iter().map(|c| match axis {
                 Axis::SessionTime => c.session_s,
                 _ => c.z,
@@ -177,12 +193,12 @@ pub fn laws(checked: &[Checked], Beside { bent_m, open }: &Beside) -> Vec<Law> {
             let (rms_m, rms_sigma) = (square(&shift), square(&|c| shift(c) / c.sigma_m));
             // The others as all references have them.
             let sizes = &gain.beta.as_slice()[..beside];
-            let moved = |c: &Checked| -> f64 {
+            let moved = |c: &ReferencedView| -> f64 {
                 sizes.iter().zip(others(c)).map(|(size, column)| size * column).sum()
             };
             let half = |second: bool| {
-                let mine = checked.iter().filter(|c| c.second == second);
-                Mean::of_scores(mine.map(|c| {
+                let mine = checked.iter().filter(|c| c.in_second_half == second);
+                ViewMean::of_scores(mine.map(|c| {
                     let g = column(c);
                     (g * g / variance, g * (c.off - moved(c)) / variance)
                 }))

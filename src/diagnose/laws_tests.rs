@@ -20,7 +20,7 @@ fn references(
     angles: [f64; 2],
     order: fn(usize) -> usize,
     seed: u64,
-) -> Vec<Checked> {
+) -> Vec<ReferencedView> {
     let mut rng = Seed(seed).stream("laws");
     let of = |k: usize| {
         let z = 0.8 + 0.3 * (k % 8) as f64;
@@ -28,15 +28,23 @@ fn references(
         let noise: f64 = StandardNormal.sample(&mut rng);
         let turned = z * (angles[0] * slope[0] + angles[1] * slope[1]);
         let off = turned - z * z * offset_px / PX_M + ERROR_M * noise;
-        let (session_s, second) = (60.0 * order(k) as f64, k % 2 == 1);
-        Checked { z, slope, off, session_s, px_m: PX_M, sigma_m: 0.002 * z * z, second }
+        let (session_s, in_second_half) = (60.0 * order(k) as f64, k % 2 == 1);
+        ReferencedView {
+            z,
+            slope,
+            off,
+            session_s,
+            px_m: PX_M,
+            sigma_m: 0.002 * z * z,
+            in_second_half,
+        }
     };
     (0..24).map(of).collect()
 }
 
 /// Names with the offset, px, beside a target bent by so much.
-fn found(checked: &[Checked], bent_m: f64) -> Vec<(Option<&'static str>, f64)> {
-    let laws = laws(checked, &Beside { bent_m, ..Beside::default() });
+fn found(checked: &[ReferencedView], bent_m: f64) -> Vec<(Option<&'static str>, f64)> {
+    let laws = laws(checked, &Nuisances { bent_m, ..Nuisances::default() });
     let found = findings(&laws, &KnownTerms::default(), 1.0, 0.003, Seed(1));
     let offset_px = |f: &Finding| f.parameters.get("offset_px")?.get("value")?.as_f64();
     found.iter().map(|f| (f.effect, offset_px(f).unwrap_or(f64::NAN))).collect()

@@ -25,7 +25,7 @@ const MAX_TERMS: usize = 10;
 /// A bias smaller than this share of the noise is not told.
 const LEAST_SIGMAS: f64 = 0.004;
 /// A name that explains less than this share of what a nameless curve explains is not the cause.
-const ADEQUATE: f64 = 0.6;
+const NAME_ADEQUATE: f64 = 0.6;
 /// Precision of a coefficient of the bias: a few px at most.
 const BIAS_PRIOR: f64 = 0.1;
 /// Of one of log variance: a factor of e is already much.
@@ -68,7 +68,7 @@ impl Survey {
         self.ablation.rules(Rules {
             level,
             prior: BIAS_PRIOR,
-            adequacy: ADEQUATE,
+            adequacy: NAME_ADEQUATE,
             max_terms: MAX_TERMS,
             fixed: (self.fixed_px2 > 0.0).then(|| (self.fixed_px2.sqrt(), self.covered_px(camera))),
             least: LEAST_SIGMAS * self.typical_sigma_px(),
@@ -94,7 +94,7 @@ impl Survey {
         self.ablation.rules(Rules {
             level,
             prior: VARIANCE_PRIOR,
-            adequacy: ADEQUATE,
+            adequacy: NAME_ADEQUATE,
             max_terms: MAX_TERMS,
             fixed: None,
             // What views differ by as wholes is mostly taken up by their own levels: small terms are

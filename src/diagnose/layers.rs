@@ -30,19 +30,19 @@ pub struct SurveyedView {
     /// Independent frames a view's variance is worth.
     pub frames: f64,
     /// How many times more uncertain the logarithm of its variance is than by that.
-    pub doubt: f64,
+    pub log_variance_inflation: f64,
     /// What the variance between frames is to be multiplied by to be all of the noise's; `None`
     /// with a single frame.
-    pub moving: Option<f64>,
+    pub between_frame_factor: Option<f64>,
     /// In the second of the halves that a finding must replicate in.
-    pub second: bool,
+    pub in_second_half: bool,
 }
 
 /// How much less a pixel's mean is worth than the model says: its variance relative to the
 /// model's, and how many pixels make one independent sample. Measured on what is left after a
 /// smooth error, and what is known of the bias (px, by pixel, or empty), is taken out.
 pub fn inflation(field: &Field, bias: &[f32]) -> (f64, Correlation) {
-    let rough = rough(&without_bias(&field.mean, bias), field);
+    let rough = whitened_high_passed(&without_bias(&field.mean, bias), field);
     let (mut sum, mut n) = (0.0, 0.0);
     for r in rough.iter().filter(|r| r.is_finite()) {
         sum += f64::from(*r).powi(2);
@@ -54,7 +54,7 @@ pub fn inflation(field: &Field, bias: &[f32]) -> (f64, Correlation) {
 }
 
 /// Whitened residuals as an image, without what is smooth.
-fn rough(residuals: &[f32], field: &Field) -> Vec<f32> {
+fn whitened_high_passed(residuals: &[f32], field: &Field) -> Vec<f32> {
     let whitened: Vec<f32> = residuals.iter().zip(&field.sigma).map(|(r, s)| r / s).collect();
     field.high_passed(&whitened)
 }
@@ -62,7 +62,7 @@ fn rough(residuals: &[f32], field: &Field) -> Vec<f32> {
 /// F frames whose noise is the same by a share rho are worth 1 / (rho^2 + (1 - rho^2) / F).
 pub fn independent_frames(field: &Field) -> f64 {
     let [first, second, ..] = field.first.as_slice() else { return 1.0 };
-    let rho = same_pixel(&rough(first, field), &rough(second, field));
+    let rho = same_pixel(&whitened_high_passed(first, field), &whitened_high_passed(second, field));
     let rho = if rho.is_finite() { rho.clamp(0.0, 1.0) } else { 0.0 };
     let frames = field.frames.len() as f64;
     1.0 / (rho * rho + (1.0 - rho * rho) / frames)
@@ -112,7 +112,7 @@ impl Survey {
         let mut views: Vec<SurveyedView> = fields
             .par_iter()
             .zip(halves(&poses))
-            .map(|(f, second)| {
+            .map(|(f, in_second_half)| {
                 let (inflation, correlation) = inflation(f, &[]);
                 let tiles = Arc::new(tiles(f, camera, rays, start));
                 SurveyedView {
@@ -121,9 +121,9 @@ impl Survey {
                     inflation,
                     correlation,
                     frames: independent_frames(f),
-                    doubt: 1.0,
-                    moving: None,
-                    second,
+                    log_variance_inflation: 1.0,
+                    between_frame_factor: None,
+                    in_second_half,
                 }
             })
             .collect();
@@ -167,13 +167,13 @@ impl Survey {
         let views: Vec<SurveyedView> = which.iter().map(|&n| self.views[n].clone()).collect();
         let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter().map(|t| &t.place)));
         let mut part = Survey { views, reach, between: self.between.clone(), ..*self };
-        part.ask_no_certainty();
+        part.skip_covariance();
         part
     }
 
     /// Nobody asks how sure a search of these views is: whether halves agree, and the covariance.
-    pub fn ask_no_certainty(&mut self) {
-        self.views.iter_mut().for_each(|v| v.second = false);
+    pub fn skip_covariance(&mut self) {
+        self.views.iter_mut().for_each(|v| v.in_second_half = false);
     }
 
     /// Measure anew what the views' means are worth, with what was found of the bias taken out, px
@@ -211,7 +211,8 @@ impl Survey {
                 pairs += (n - lag) as f64;
             }
             let mean = (sum / pairs).clamp(0.0, 0.9);
-            view.moving = (mean < 0.9).then(|| n as f64 / (n as f64 - 1.0) / (1.0 - mean));
+            view.between_frame_factor =
+                (mean < 0.9).then(|| n as f64 / (n as f64 - 1.0) / (1.0 - mean));
             view.frames = view.frames.min(n as f64 - 1.0);
         }
     }
@@ -250,6 +251,6 @@ impl Survey {
 
     /// Which half each view is in.
     pub fn second(&self) -> Vec<bool> {
-        self.views.iter().map(|v| v.second).collect()
+        self.views.iter().map(|v| v.in_second_half).collect()
     }
 }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::field::Field;
-use super::texture::fine;
+use super::texture::pixel_scale;
 use crate::terms::{Basis, Coordinate, Modulation, Statistic, Term};
 
 /// Columns and rows of fewer readings over all views are left at nothing.
@@ -32,7 +32,7 @@ pub fn lines(fields: &[Field], bias: &[Vec<f32>]) -> Lines {
         .enumerate()
         .map(|(n, field)| {
             let mut sums = [vec![(0.0, 0.0); width], vec![(0.0, 0.0); height]];
-            let image = fine(field, bias.get(n).unwrap_or(&none));
+            let image = pixel_scale(field, bias.get(n).unwrap_or(&none));
             for (i, &r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
                 for (sums, line) in sums.iter_mut().zip([i % width, i / width]) {
                     sums[line].0 += f64::from(r);

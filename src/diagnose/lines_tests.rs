@@ -24,7 +24,7 @@ fn field(rng: &mut Stream, error_px: impl Fn(usize) -> f64) -> Field {
         square: vec![0.01; n],
         count: vec![1; n],
         measured: vec![1; n],
-        told: true,
+        region_given: true,
         ..Field::unseen(Plane::tilted(1.0, 0.0, 0.0), 10.0, SIZE, (0..n as u32).collect())
     }
 }

@@ -9,7 +9,6 @@ use serde_json::{Map, Value, json};
 use super::diagnosis::{Curve, Detectable};
 use super::few_losses::few_losses;
 use super::field::Field;
-use super::hanging::Mean;
 use super::layers::Survey;
 use super::margins::Margins;
 use super::missing_cells::{Cell, cells, fine};
@@ -18,6 +17,7 @@ use super::missing_search::{Judged, Losses};
 use super::missing_shapes::{Step, curves, steps};
 use super::replication::agree;
 use super::shadow::{Band, Sides, band};
+use super::texture_finding::ViewMean;
 use super::tiles::Tile;
 use crate::camera::Camera;
 use crate::rng::Seed;
@@ -81,7 +81,7 @@ pub fn missing(
     camera: &Camera,
     seed: Seed,
 ) -> DropoutOutcome {
-    let told: Vec<bool> = fields.iter().map(|f| f.told).collect();
+    let told: Vec<bool> = fields.iter().map(|f| f.region_given).collect();
     let second = survey.second();
     let margins = Margins::of(fields);
     let (cells, fine) = (cells(survey, camera, &margins), fine(survey, &margins));
@@ -250,7 +250,7 @@ fn bands_agree(sides: &[Sides], second: &[bool]) -> Option<bool> {
         let mine = sides.iter().zip(second).filter(|(_, s)| **s == which);
         let mine: Vec<Sides> = mine.map(|(sides, _)| *sides).collect();
         let Band { side, share: [value, std_error], .. } = band(&mine, 1.0)?;
-        Some((side, Mean { value, std_error, views: mine.len() as f64 }))
+        Some((side, ViewMean { value, std_error, views: mine.len() as f64 }))
     };
     let (first, second) = (half(false)?, half(true)?);
     Some(first.0 == second.0 && agree([Some(first.1), Some(second.1)])?)

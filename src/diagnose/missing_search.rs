@@ -5,11 +5,11 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::evidence::{Evidence, gain};
-use super::hanging::Mean;
 use super::missing_cells::{Cell, Scatter, USUAL, Whitener, odds, share};
 use super::missing_shapes::{Shape, Step};
 use super::null::{NoiseGains, Null};
 use super::replication::{Halves, agree};
+use super::texture_finding::ViewMean;
 use crate::rng::Seed;
 use crate::terms::Basis;
 
@@ -146,7 +146,7 @@ impl<'a> Losses<'a> {
                 let half = |which: bool| {
                     let views = column.a.iter().zip(&scores).zip(second);
                     let mine = views.filter(|(_, s)| **s == which);
-                    Mean::of_scores(mine.map(|((a, b), _)| (*a, *b)))
+                    ViewMean::of_scores(mine.map(|((a, b), _)| (*a, *b)))
                 };
                 agree([half(false), half(true)])
             }

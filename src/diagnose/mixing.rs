@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::edges::{Edges, INSIDE_PX};
 use super::field::Field;
-use super::hanging::{Hanging, Mean, nats, one};
+use super::texture_finding::{TextureFinding, ViewMean, nats, one};
 use crate::stats::{bisect, mean};
 use crate::terms::{Axis, Statistic};
 
@@ -58,7 +58,7 @@ fn width_px(mixed: f64) -> f64 {
 
 /// The views' mean share of a footprint's own curve, of whatever width, and the curve's size at the
 /// edge in sigmas. No bias is fitted beside it: none is a quarter of the step.
-pub fn whole_share(views: &[&Edges], width: f64) -> Option<(Mean, f64)> {
+pub fn whole_share(views: &[&Edges], width: f64) -> Option<(ViewMean, f64)> {
     let of = |edges: &&Edges| {
         let sums = || edges.inside.iter().enumerate().map(|(n, s)| (footprint(n, width), s));
         let own: f64 = sums().map(|(seen, s)| seen * seen * s.square).sum();
@@ -67,7 +67,7 @@ pub fn whole_share(views: &[&Edges], width: f64) -> Option<(Mean, f64)> {
     };
     let seen: Vec<(f64, f64)> = views.iter().filter_map(of).collect();
     (seen.len() as f64 > TOO_FEW_VIEWS).then_some(())?;
-    Some((Mean::weighed(&seen)?, footprint(0, width) * step_sigmas(views)))
+    Some((ViewMean::weighed(&seen)?, footprint(0, width) * step_sigmas(views)))
 }
 
 /// The step to what is behind in sigmas of the noise: the views' mean.
@@ -78,7 +78,11 @@ fn step_sigmas(views: &[&Edges]) -> f64 {
 
 /// The views' mean share at a width, beyond that of the twins where there are any, and how well it
 /// explains them: the root of twice its nats, by the noise alone, with its sign.
-pub fn mean_share(views: &[&Edges], twins: Option<&[&Edges]>, width: f64) -> Option<(Mean, f64)> {
+pub fn mean_share(
+    views: &[&Edges],
+    twins: Option<&[&Edges]>,
+    width: f64,
+) -> Option<(ViewMean, f64)> {
     let of = |v: usize| {
         let (value, sure) = share(views[v], width)?;
         let Some(twins) = twins else { return Some((value, sure)) };
@@ -89,18 +93,18 @@ pub fn mean_share(views: &[&Edges], twins: Option<&[&Edges]>, width: f64) -> Opt
 }
 
 /// Mean of (value, information), with the views' scatter where that is larger than the noise's.
-fn combined(views: &[(f64, f64)]) -> Option<(Mean, f64)> {
+fn combined(views: &[(f64, f64)]) -> Option<(ViewMean, f64)> {
     let n = views.len() as f64;
     let sure: f64 = views.iter().map(|v| v.1).sum();
     let value = views.iter().map(|v| v.0 * v.1).sum::<f64>() / sure;
     let scatter = views.iter().map(|v| v.1 * (v.0 - value).powi(2)).sum::<f64>() / (n - 1.0);
     let std_error = (scatter.max(1.0) / sure).sqrt();
     let explained = value * sure.sqrt();
-    (n > 1.0 && sure > 0.0).then_some((Mean { value, std_error, views: n }, explained))
+    (n > 1.0 && sure > 0.0).then_some((ViewMean { value, std_error, views: n }, explained))
 }
 
 /// Depth mixed at the edge, where the views agree on it at this level.
-pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<Hanging> {
+pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<TextureFinding> {
     let edges: Vec<&Edges> = fields.iter().map(|f| &f.edges).collect();
     let twins: Option<Vec<&Edges>> = twins.map(|t| t.iter().map(|f| &f.edges).collect());
     let at = |w: &f64| Some((*w, mean_share(&edges, twins.as_deref(), *w)?));
@@ -117,7 +121,7 @@ pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<H
     let [mixed, error] = [full * share.value, full * share.std_error];
     let slope = (width_px(mixed + error) - width_px((mixed - error).max(0.0))) / 2.0;
     let edge = share.value * footprint(0, width);
-    Some(Hanging {
+    Some(TextureFinding {
         families: vec!["edge-mixing"],
         statistic: Statistic::Bias,
         axis: Axis::EdgeDistance,

@@ -231,14 +231,14 @@ pub fn advise(found: &mut [Finding], scene: &Scene<'_>, outcome: &Outcome, outlo
             coefficients: vec![0.0; rival.basis.count()],
         };
         let all = prospects(&scene.data, best, &rival, outlook);
-        finding.next_view = all.best().map(|p| told(p, all.now, name, runner_up));
+        finding.next_view = all.best().map(|p| report(p, all.now, name, runner_up));
     }
 }
 
 /// Apart by less than this two causes are not.
 const APART: f64 = 2.0;
 
-fn told(view: &Prospect, now: f64, best: &str, rival: &str) -> NextView {
+fn report(view: &Prospect, now: f64, best: &str, rival: &str) -> NextView {
     let then = view.separation;
     let verdict = if then < APART {
         "no single view tells them apart, this one helps most"

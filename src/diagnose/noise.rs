@@ -1,17 +1,23 @@
 //! What the structure of the noise amounts to: each view is one sample of every statistic.
 
 use super::frames::{frames, unequal};
-use super::hanging::{Hanging, LEAST_SHARE, Mean, Shared, nats, one, variance_px2};
 use super::in_time::in_time;
 use super::known::KnownTerms;
 use super::pairs::{REACH_PX, window_of};
 use super::parameters::estimate;
 use super::structure::Structure;
+use super::texture_finding::{
+    LEAST_VARIANCE_SHARE, Shared, TextureFinding, ViewMean, nats, one, variance_px2,
+};
 use super::window::{Window, part};
 use crate::terms::{Axis, Statistic};
 
 /// All mismatches of structure at this error rate each.
-pub fn hanging(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {
+pub fn texture_findings(
+    views: &[Structure],
+    known: &KnownTerms,
+    level: f64,
+) -> Vec<TextureFinding> {
     let mut found = Vec::new();
     found.extend(window(views, known, level));
     found.extend(in_time(views, known, level));
@@ -29,12 +35,12 @@ pub fn hanging(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hangi
 /// Windows that differ by less than this factor are the same.
 const SAME_WINDOW: f64 = 1.12;
 
-fn window(views: &[Structure], known: &KnownTerms, level: f64) -> Option<Hanging> {
-    let m = Mean::of(views, |s| s.window_px.map(f64::ln))?;
+fn window(views: &[Structure], known: &KnownTerms, level: f64) -> Option<TextureFinding> {
+    let m = ViewMean::of(views, |s| s.window_px.map(f64::ln))?;
     let expected = expected_window(known);
     let length = m.value.exp();
     let p = m.p_above(expected.ln());
-    let found = |interval, parameters, size_sigma, p, nats| Hanging {
+    let found = |interval, parameters, size_sigma, p, nats| TextureFinding {
         families: vec!["spatial-correlation"],
         statistic: Statistic::Correlation,
         axis: Axis::PixelLag,
@@ -59,9 +65,9 @@ fn window(views: &[Structure], known: &KnownTerms, level: f64) -> Option<Hanging
         return Some(found([0.0, length], parameters, size, p, nats));
     }
     // A part of the noise alone: seen where neighbours are taken for independent.
-    let near = Mean::of(views, |s| s.near)?;
+    let near = ViewMean::of(views, |s| s.neighbour_correlation)?;
     let p = near.p_above(0.0);
-    if expected > 1.0 || p >= level || near.value <= LEAST_SHARE {
+    if expected > 1.0 || p >= level || near.value <= LEAST_VARIANCE_SHARE {
         return None;
     }
     let (size, nats) = (near.value.sqrt(), nats(&near, 0.0));
@@ -86,7 +92,7 @@ pub fn expected_window(known: &KnownTerms) -> f64 {
     1.0 + of("share").unwrap_or(1.0).clamp(0.0, 1.0) * (side - 1.0)
 }
 
-fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {
+fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
     let variance = variance_px2(views);
     let known_px = known.parameter("row-noise", "sigma_px").unwrap_or(0.0);
     let line = |families, statistic, axis, expected_px2, words| Shared {
@@ -94,7 +100,7 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {
         statistic,
         axis,
         expected_px2,
-        least: if statistic == Statistic::Bias { LEAST_STILL } else { LEAST_SHARE },
+        least: if statistic == Statistic::Bias { LEAST_STILL } else { LEAST_VARIANCE_SHARE },
         words,
     };
     let still = "whole columns or rows err by a constant each, from one to the next";
@@ -102,15 +108,15 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Hanging> {
     let row = known_px * known_px;
     let all = [
         (
-            Mean::of_pairs(views, |s| s.lines_px2),
+            ViewMean::of_pairs(views, |s| s.lines_px2),
             line(vec![], Statistic::Bias, Axis::Column, known.error_of_lines_px2(), Some(still)),
         ),
         (
-            Mean::of(views, |s| s.row_px2),
+            ViewMean::of(views, |s| s.row_px2),
             line(vec!["row-noise"], Statistic::Correlation, Axis::Row, row, None),
         ),
         (
-            Mean::of(views, |s| s.column_px2),
+            ViewMean::of(views, |s| s.column_px2),
             line(vec![], Statistic::Correlation, Axis::Column, 0.0, Some(afresh)),
         ),
     ];

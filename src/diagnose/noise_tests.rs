@@ -53,12 +53,12 @@ fn with(rng: &mut Stream, add: impl Fn(&mut Structure)) -> Vec<Structure> {
     views
 }
 
-fn names(found: &[Hanging]) -> Vec<&'static str> {
+fn names(found: &[TextureFinding]) -> Vec<&'static str> {
     found.iter().flat_map(|h| h.families.first().copied()).collect()
 }
 
 #[track_caller]
-fn parameter(found: &Hanging, name: &str) -> [f64; 2] {
+fn parameter(found: &TextureFinding, name: &str) -> [f64; 2] {
     ["value", "std_error"].map(|key| found.parameters[name][key].as_f64().expect("a number"))
 }
 
@@ -69,7 +69,7 @@ fn structures_of_nothing_amount_to_nothing() {
     let mut alarms = Vec::new();
     for seed in 0..400 {
         let mut rng = Seed(seed).stream("noise/null");
-        alarms.extend(names(&hanging(&plain(&mut rng), &KnownTerms::default(), LEVEL)));
+        alarms.extend(names(&texture_findings(&plain(&mut rng), &KnownTerms::default(), LEVEL)));
     }
     println!("{} false alarms in 400: {alarms:?}", alarms.len());
     assert!(alarms.len() <= 10, "{alarms:?}");
@@ -93,7 +93,7 @@ fn each_structure_has_its_name_and_size() {
     for (add, name, key, value) in cases {
         let mut rng = Seed(1).stream(name);
         let views = with(&mut rng, add);
-        let found = hanging(&views, &KnownTerms::default(), LEVEL);
+        let found = texture_findings(&views, &KnownTerms::default(), LEVEL);
         assert_eq!(names(&found), [name]);
         let [estimate, error] = parameter(&found[0], key);
         // Six standard errors, with 13 degrees of freedom: 5e-5.
@@ -104,7 +104,7 @@ fn each_structure_has_its_name_and_size() {
         assert!(error < 0.1 * value && found[0].p < 1e-6, "{name}: +- {error}, p {}", found[0].p);
         // What the model knows is no news.
         let known = knowing(name, key, value);
-        let again = hanging(&views, &known, LEVEL);
+        let again = texture_findings(&views, &known, LEVEL);
         assert!(again.is_empty(), "{name} is known: {:?}", names(&again));
     }
 }
@@ -133,11 +133,11 @@ fn a_filter_in_time_is_a_filter_and_is_no_news_when_known() {
     };
     let mut rng = Seed(2).stream("noise/filter");
     let views = with(&mut rng, add);
-    let found = hanging(&views, &KnownTerms::default(), LEVEL);
+    let found = texture_findings(&views, &KnownTerms::default(), LEVEL);
     assert_eq!(names(&found)[0], "temporal-correlation");
     let [value, error] = parameter(&found[0], "rho");
     assert!((value - rho).abs() < 6.0 * error && error < 0.05, "{value} +- {error}");
-    let again = hanging(&views, &knowing("temporal-correlation", "rho", rho), LEVEL);
+    let again = texture_findings(&views, &knowing("temporal-correlation", "rho", rho), LEVEL);
     assert!(again.is_empty(), "a known filter is {:?}", names(&again));
 }
 
@@ -148,7 +148,7 @@ fn two_frames_leave_two_names() {
     let add = |s: &mut Structure| {
         s.lagged = [s.lagged[0].map(|c| c + 0.4), None, None];
     };
-    let found = hanging(&with(&mut rng, add), &KnownTerms::default(), LEVEL);
+    let found = texture_findings(&with(&mut rng, add), &KnownTerms::default(), LEVEL);
     assert_eq!(found.len(), 1);
     let mut both = found[0].families.clone();
     both.sort_unstable();
@@ -165,7 +165,7 @@ fn columns_that_move_as_one_have_no_name() {
     ];
     for (add, statistic) in cases {
         let mut rng = Seed(4).stream("noise/columns");
-        let found = hanging(&with(&mut rng, add), &KnownTerms::default(), LEVEL);
+        let found = texture_findings(&with(&mut rng, add), &KnownTerms::default(), LEVEL);
         assert_eq!(found.len(), 1);
         assert!(found[0].families.is_empty() && found[0].words.is_some());
         assert_eq!((found[0].statistic, found[0].axis), (statistic, Axis::Column));
@@ -202,7 +202,7 @@ fn frames_that_scatter_as_their_pixels_do_not_move() {
         .filter(|&seed| {
             let mut rng = Seed(seed).stream("noise/frames");
             let views = moving(0.0, 0.0, &mut rng);
-            names(&hanging(&views, &KnownTerms::default(), LEVEL))
+            names(&texture_findings(&views, &KnownTerms::default(), LEVEL))
                 .iter()
                 .any(|n| ["frame-jitter", "target-motion"].contains(n))
         })
@@ -213,13 +213,13 @@ fn frames_that_scatter_as_their_pixels_do_not_move() {
 #[test]
 fn jitter_and_motion_are_told_apart() {
     let mut rng = Seed(6).stream("noise/jitter");
-    let found = hanging(&moving(0.02, 0.0, &mut rng), &KnownTerms::default(), LEVEL);
+    let found = texture_findings(&moving(0.02, 0.0, &mut rng), &KnownTerms::default(), LEVEL);
     assert_eq!(names(&found), ["frame-jitter"]);
     let [value, error] = parameter(&found[0], "sigma_px");
     assert!((value - 0.02).abs() < 5.0 * error && error < 0.004, "{value} +- {error}");
     let known = knowing("frame-jitter", "sigma_px", 0.02);
-    assert!(hanging(&moving(0.02, 0.0, &mut rng), &known, LEVEL).is_empty());
-    let found = hanging(&moving(0.0, 0.05, &mut rng), &KnownTerms::default(), LEVEL);
+    assert!(texture_findings(&moving(0.02, 0.0, &mut rng), &known, LEVEL).is_empty());
+    let found = texture_findings(&moving(0.0, 0.05, &mut rng), &KnownTerms::default(), LEVEL);
     assert_eq!(names(&found), ["target-motion"]);
 }
 
@@ -236,7 +236,7 @@ fn motion_is_what_all_views_have_in_common() {
                 jitter.velocity_mps *= -1.0;
             }
         }
-        hanging(&views, &KnownTerms::default(), LEVEL)
+        texture_findings(&views, &KnownTerms::default(), LEVEL)
     };
     assert!(!names(&resembling(0.003, true)).contains(&"target-motion"));
     let found = resembling(0.003, false);
@@ -269,7 +269,7 @@ fn what_views_share_errs_as_pairs_do() {
                     ..Structure::default()
                 })
                 .collect();
-            Mean::of_pairs(&views, |s| s.fixed_px2).expect("a mean").p_above(0.0) < 0.05
+            ViewMean::of_pairs(&views, |s| s.fixed_px2).expect("a mean").p_above(0.0) < 0.05
         })
         .count();
     assert!(alarms <= 36, "{alarms} of 400");
@@ -306,7 +306,7 @@ fn one_view_is_no_sample() {
     let mut rng = Seed(7).stream("noise/one");
     let add = |s: &mut Structure| s.window_px = Some(5.0);
     let one = &with(&mut rng, add)[..1];
-    assert!(hanging(one, &KnownTerms::default(), LEVEL).is_empty());
-    assert!(hanging(&[], &KnownTerms::default(), LEVEL).is_empty());
+    assert!(texture_findings(one, &KnownTerms::default(), LEVEL).is_empty());
+    assert!(texture_findings(&[], &KnownTerms::default(), LEVEL).is_empty());
     assert!(tails(&[], &KnownTerms::default(), 1e-3, false).is_none());
 }

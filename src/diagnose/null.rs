@@ -46,15 +46,19 @@ impl Null {
     /// that scatter more than their noise says count for less. Held against what other views taught,
     /// their scatter is the noise; it was measured on few views, which makes a Student's t of a
     /// Gaussian.
-    pub fn safe(&self, gain: f64, views: usize, rules: &Rules) -> f64 {
+    pub fn calibrated_gain(&self, gain: f64, views: usize, rules: &Rules) -> f64 {
         let nats = gain / self.excess(views, rules);
         let judged_by_t = rules.learnt_from.is_some() && nats > 0.0;
         if judged_by_t { student(nats, freedom(views)) } else { nats }
     }
 
     /// The gain that counts for so many nats: the other way round.
-    pub fn gain_for(&self, safe: f64, views: usize, rules: &Rules) -> f64 {
-        let nats = if rules.learnt_from.is_some() { gaussian(safe, freedom(views)) } else { safe };
+    pub fn gain_for(&self, calibrated_gain: f64, views: usize, rules: &Rules) -> f64 {
+        let nats = if rules.learnt_from.is_some() {
+            gaussian(calibrated_gain, freedom(views))
+        } else {
+            calibrated_gain
+        };
         nats * self.excess(views, rules)
     }
 
@@ -305,7 +309,11 @@ mod tests {
         for (learnt_from, factor) in [(None, 0.99), (other(false), 2.0), (other(true), 4.0)] {
             let rules = rules(learnt_from);
             let gain = null.gain_for(7.0, 12, &rules);
-            approx::assert_relative_eq!(null.safe(gain, 12, &rules), 7.0, max_relative = 1e-12);
+            approx::assert_relative_eq!(
+                null.calibrated_gain(gain, 12, &rules),
+                7.0,
+                max_relative = 1e-12
+            );
             assert!(gain > factor * null.dispersion * 7.0, "{gain}");
         }
     }

@@ -3,9 +3,9 @@
 use serde_json::Map;
 
 use super::diagnosis::{Alternative, Finding, Size, Status};
-use super::hanging::Hanging;
 use super::missing::{ADEQUATE, DropoutFinding};
 use super::naming::{MIN_PROBABILITY, none_of_these, physics};
+use super::texture_finding::TextureFinding;
 use crate::effects;
 use crate::model::Covariance;
 use crate::terms::{Axis, Statistic};
@@ -37,7 +37,7 @@ pub fn named(effect: &'static str, statistic: Statistic, axis: Axis) -> Finding 
 }
 
 /// A mismatch of structure as a finding; `sigma_mm` is the recording's typical sigma.
-pub fn hanging(found: Hanging, sigma_mm: f64, replicated: Option<bool>) -> Finding {
+pub fn texture(found: TextureFinding, sigma_mm: f64, replicated: Option<bool>) -> Finding {
     let effect = found.families.first().copied();
     let status = match found.families.len() {
         0 => Status::Unexplained,

@@ -5,10 +5,9 @@
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::case::{Case, Scatter};
+use super::case::{Case, ScatterResult};
 use super::diagnosis::{Finding, Size, Status};
 use super::edges::Edges;
-use super::hanging::{Mean, nats, variance_px2};
 use super::known::KnownTerms;
 use super::mixing::whole_share;
 use super::other_findings::named;
@@ -17,7 +16,8 @@ use super::replication_textures::beyond;
 use super::shadow::{Sides, largest_share};
 use super::steps::{contradicted, step_nats};
 use super::structure::Structure;
-use super::tails::{Mixture, SURELY};
+use super::tails::{Mixture, SURE_SCALE_ERRORS};
+use super::texture_finding::{ViewMean, nats, variance_px2};
 use super::tiles::Tile;
 use crate::effects::logistic;
 use crate::terms::{Axis, Statistic};
@@ -33,7 +33,7 @@ pub struct Claim {
     pub statistic: Statistic,
     pub axis: Axis,
     /// Mean over the views; the claim is contradicted below `half`.
-    pub seen: Mean,
+    pub seen: ViewMean,
     pub half: f64,
     /// In units of the noise's standard deviation.
     pub size_sigma: f64,
@@ -50,7 +50,7 @@ impl Claim {
 
 impl Case<'_> {
     /// What the model has more than twice of.
-    pub(super) fn overstated(&self, scatter: &Scatter) -> Vec<Finding> {
+    pub(super) fn overstated(&self, scatter: &ScatterResult) -> Vec<Finding> {
         // A simulated recording shows what its model does; the two are compared view by view.
         if self.baseline.is_some() {
             return Vec::new();
@@ -79,13 +79,15 @@ impl Case<'_> {
     fn tails_claimed(&self, views: &[Structure]) -> Option<Claim> {
         let mixture = Mixture::of(&self.known)?;
         let (seen, half) = match mixture.width() {
-            // Strays so frequent are the noise itself, which is as wide as they are.
+            // Outliers so frequent are the noise itself, which is as wide as they are.
             width if width > 2.0 => {
                 let sigma_px = typical_sigma_px(&self.fields);
-                let seen = Mean::of(views, |s| Some(s.variance_px2 / sigma_px.powi(2)))?;
+                let seen = ViewMean::of(views, |s| Some(s.variance_px2 / sigma_px.powi(2)))?;
                 (seen, (1.0 + SHARE * (width - 1.0)).powi(2))
             }
-            _ => (Mean::of(views, |s| s.tail_share())?, mixture.tail(SHARE, -SURELY)),
+            _ => {
+                (ViewMean::of(views, |s| s.tail_share())?, mixture.tail(SHARE, -SURE_SCALE_ERRORS))
+            }
         };
         let (statistic, axis) = (Statistic::Distribution, Axis::Residual);
         let size_sigma = mixture.size_sigma();
@@ -124,7 +126,7 @@ impl Case<'_> {
                 let lost: f64 = v.tiles.iter().map(|t| t.missing * t.asked).sum();
                 (expected > LOST).then_some((lost / expected, expected))
             });
-            let seen = Mean::weighed(&views.collect::<Vec<_>>())?;
+            let seen = ViewMean::weighed(&views.collect::<Vec<_>>())?;
             let statistic = Statistic::Dropout;
             Some(Claim { id, statistic, axis, seen, half: SHARE, size_sigma: 0.0 })
         };
@@ -150,7 +152,7 @@ fn textures(views: &[Structure], known: &KnownTerms) -> Vec<Claim> {
     let sigma_px = variance_px2(views).sqrt().max(1e-9);
     let one = |&(id, name, axis): &(&'static str, &str, Axis)| {
         let size = known.parameter(id, name).filter(|size| *size > 0.0)?;
-        let seen = Mean::of(views, beyond(id, known)?)?;
+        let seen = ViewMean::of(views, beyond(id, known)?)?;
         // A window is told as a logarithm, the others as variances or shares.
         let (half, size_sigma) = match name {
             "sigma_px" => (-SHARE * size * size, size / sigma_px),

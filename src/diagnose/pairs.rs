@@ -5,7 +5,7 @@
 //! row shares; the products with a box around each pixel are that of one it shares with its
 //! neighbours. Each costs a pass over the image.
 
-use super::texture::{BoxSums, calm};
+use super::texture::{BoxSums, without_outliers};
 
 /// As far as neighbours are looked at, px.
 pub const REACH_PX: usize = 4;
@@ -29,7 +29,7 @@ pub struct Pairs {
 impl Pairs {
     /// Of an image of the noise, whatever plane it holds taken out; NaN where there is nothing.
     pub fn of(image: &[f32], width: usize) -> Option<Self> {
-        let level = calm(&without_plane(image, width)?);
+        let level = without_outliers(&without_plane(image, width)?);
         let height = level.len() / width;
         let pixels = level.iter().filter(|r| r.is_finite()).count() as f64;
         let power =

@@ -3,22 +3,26 @@
 use rayon::prelude::*;
 
 use super::field::Field;
-use super::hanging::Hanging;
 use super::known::KnownTerms;
 use super::layers::Survey;
 use super::outcome::Outcome;
 use super::structure::Structure;
 use super::tails::{TailCounts, tail};
 use super::texture::moving;
+use super::texture_finding::TextureFinding;
 use super::tiles::Places;
 use crate::measure::Workbench;
 use crate::stats::mean;
 use crate::terms::{Statistic, Term};
 
 /// How much frames of a view resemble one another, by lag, where that was found to be noise.
-pub(super) fn common(structure: &[Structure], hangs: &[Hanging], known: &KnownTerms) -> [f64; 3] {
+pub(super) fn common(
+    structure: &[Structure],
+    textures: &[TextureFinding],
+    known: &KnownTerms,
+) -> [f64; 3] {
     let in_time = ["frozen-noise", "temporal-correlation"];
-    let told = hangs.iter().flat_map(|h| &h.families).any(|f| in_time.contains(f))
+    let told = textures.iter().flat_map(|h| &h.families).any(|f| in_time.contains(f))
         || in_time.iter().any(|id| known.has(id));
     if !told {
         return [0.0; 3];

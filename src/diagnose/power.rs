@@ -14,13 +14,13 @@ use super::candidate::Candidate;
 use super::case::Case;
 use super::diagnosis::Detectable;
 use super::evidence::{Evidence, gain, root};
-use super::judge::{CLEARLY, LEAST_OF_LARGEST};
+use super::judge::{CLEARLY_FIXED, LEAST_OF_LARGEST};
 use super::null::Null;
 use super::outcome::{Outcome, Rules};
 use super::pixels::terms_of;
 use super::prepared::evidence_of;
 use super::scene::{Scene, size};
-use super::search::LEAST_SHARE;
+use super::search::LEAST_SHARE_OF_GAIN;
 use super::variance::beyond_sigma;
 use super::verdict::MIN_SIZE;
 use crate::effects::{self, Smallest};
@@ -32,7 +32,7 @@ const POWER: f64 = 0.8;
 const REPLICATES: u64 = 200;
 
 /// A layer as it was searched.
-pub struct Gates<'a> {
+pub struct DetectionCriteria<'a> {
     pub scene: &'a Scene<'a>,
     pub outcome: &'a Outcome,
     pub rules: Rules,
@@ -63,7 +63,7 @@ impl Quadratic {
     }
 }
 
-impl Gates<'_> {
+impl DetectionCriteria<'_> {
     /// Multiple of the term, which is of size one, that is seen; `None` where none is.
     pub fn least(&self, unit: &Term) -> Option<f64> {
         // Beside sigma's own refit, what follows depth and tilt alone is not looked for.
@@ -82,7 +82,8 @@ impl Gates<'_> {
         let dispersion = null.scatter(&self.rules);
         let first = self.outcome.chosen.first().map_or(0.0, |c| c.gain);
         let threshold = self.outcome.noise.threshold(self.rules.level);
-        let need = null.gain_for(threshold, views.len(), &self.rules).max(LEAST_SHARE * first);
+        let need =
+            null.gain_for(threshold, views.len(), &self.rules).max(LEAST_SHARE_OF_GAIN * first);
         let sum = Evidence::sum(u.len(), 0.0, &views).a;
         let information = u.dot(&(&sum * &u));
         if !need.is_finite() || information <= 0.0 {
@@ -131,11 +132,10 @@ impl Gates<'_> {
     /// Root mean square that a fit must have, in the response's unit.
     fn min_rms(&self, basis: &Basis) -> f64 {
         let largest = self.outcome.chosen.iter().map(|c| c.rms).fold(0.0, f64::max);
-        let still = self
-            .rules
-            .fixed
-            .filter(|_| basis.is_of_picture())
-            .map_or(0.0, |(fixed, px)| fixed * (CLEARLY * basis.count() as f64 / px).sqrt());
+        let still =
+            self.rules.fixed.filter(|_| basis.is_of_picture()).map_or(0.0, |(fixed, px)| {
+                fixed * (CLEARLY_FIXED * basis.count() as f64 / px).sqrt()
+            });
         self.rules.least.max(LEAST_OF_LARGEST * largest).max(still)
     }
 }
@@ -206,14 +206,14 @@ impl Case<'_> {
         let (survey, camera) = (&self.survey, &self.sensor().camera);
         let seed = self.options.seed;
         let scenes = [Scene::bias(survey, 1.0, 1.0), Scene::variance(survey, 1.0, 1.0)];
-        let mean = Gates {
+        let mean = DetectionCriteria {
             scene: &scenes[0],
             outcome: bias,
             rules: survey.bias_rules(camera, self.level(Case::MEAN_LEVEL)),
             beside: None,
             seed,
         };
-        let blocks = Gates {
+        let blocks = DetectionCriteria {
             scene: &scenes[1],
             outcome: variance,
             rules: survey.variance_rules(self.level(Case::VARIANCE_LEVEL)),
@@ -238,7 +238,7 @@ impl Case<'_> {
 fn least(
     smallest: Smallest,
     statistic: Statistic,
-    gates: &Gates<'_>,
+    gates: &DetectionCriteria<'_>,
 ) -> Option<Map<String, Value>> {
     let Smallest { parameter, shape, unit, of } = smallest;
     let term = Term { statistic, basis: shape, coefficients: unit };

@@ -8,9 +8,9 @@ use statrs::distribution::{Binomial, Discrete, DiscreteCDF};
 use super::diagnosis::Finding;
 use super::engine::FEWEST_VIEWS;
 use super::field::Field;
-use super::hanging::one;
 use super::known::KnownTerms;
 use super::other_findings::named;
+use super::texture_finding::one;
 use crate::Progress;
 use crate::effects::RAY_FOR_DEPTH;
 use crate::error::{Error, Result};
@@ -20,7 +20,7 @@ use crate::terms::{Axis, Statistic, Term};
 use crate::view::{Excluded, Recording};
 
 /// What could be read of a recording.
-pub(super) struct Taken {
+pub(super) struct LoadedViews {
     pub fields: Vec<Field>,
     pub excluded: Vec<Excluded>,
     /// The words turned out to be ranges.
@@ -29,7 +29,7 @@ pub(super) struct Taken {
     pub copies: Vec<String>,
 }
 
-impl Taken {
+impl LoadedViews {
     /// Every view that can be used, one at least of each.
     ///
     /// # Errors
@@ -58,7 +58,7 @@ impl Taken {
                 "a diagnosis needs at least three views of a plane",
             ));
         }
-        Ok(Taken { fields, excluded, ranges: found, copies })
+        Ok(LoadedViews { fields, excluded, ranges: found, copies })
     }
 }
 
@@ -77,7 +77,7 @@ pub(super) fn refuse_other_size(model: &NoiseModel, sensor: &crate::view::Sensor
     })
 }
 
-/// A view whose frames are another's, bit for bit, is no second witness.
+/// A view whose frames are bit-identical to another's is a duplicate and is dropped.
 fn without_copies(fields: &mut Vec<Field>) -> Vec<String> {
     let mut told = Vec::new();
     let mut kept: Vec<Field> = Vec::new();

@@ -5,16 +5,16 @@ use super::anchor::families;
 use super::case::Case;
 use super::diagnosis::{Alternative, CannotTell, Finding, Size, Status};
 use super::field::Field;
-use super::hanging::one;
 use super::heldout;
 use super::known::KnownTerms;
-use super::laws::{Beside, FEWEST, Law, checked, laws};
+use super::laws::{FEWEST, Law, Nuisances, laws, referenced_views};
 use super::learnt::Learnt;
 use super::naming::MIN_PROBABILITY;
 use super::null::{NoiseGains, Null, student};
 use super::other_findings::named;
 use super::overstated::SHARE;
 use super::parameters::estimate;
+use super::texture_finding::one;
 use crate::effects;
 use crate::rng::Seed;
 use crate::sensors::SensorKind;
@@ -22,7 +22,7 @@ use crate::terms::{Axis, Statistic, Term};
 
 /// A law must move the depth by this many errors of a reference, and by this much, m: tapes and
 /// planes are not better.
-const CLEARLY: f64 = 1.2;
+const CLEAR_LAW_ERRORS: f64 = 1.2;
 const LEAST_M: f64 = 0.0015;
 /// Names that predict as well as the best within this many nats cannot be told apart.
 const AS_GOOD_NATS: f64 = 3.0;
@@ -45,7 +45,7 @@ pub fn findings(
     seed: Seed,
 ) -> Vec<Finding> {
     // An error measured on few references makes a Student's t of a Gaussian.
-    let safe = |l: &Law| {
+    let calibrated_gain = |l: &Law| {
         let gain = (l.gain / l.null.dispersion / excess).max(0.0);
         student(gain, l.freedom)
     };
@@ -55,15 +55,15 @@ pub fn findings(
     let nulls: Vec<&Null> = laws.iter().map(|l| &l.null).collect();
     let noise = NoiseGains::of(&nulls, Seed(seed.0 ^ 0x5eed));
     // So large a law may be missing in the model, too, where it was learnt from references.
-    let small = best.rms_m < (CLEARLY * best.error_m * excess.sqrt()).max(LEAST_M);
-    if small || safe(best) < noise.threshold(level) {
+    let small = best.rms_m < (CLEAR_LAW_ERRORS * best.error_m * excess.sqrt()).max(LEAST_M);
+    if small || calibrated_gain(best) < noise.threshold(level) {
         return Vec::new();
     }
     let [beta, error] = best.estimate;
     if let Some(had) = known.law(best.family) {
         // Sessions and references differ by a part of a law; not by half of it.
         let other = beta.abs() - 2.0 * error > SHARE * had.abs();
-        return Vec::from_iter(other.then(|| contradicted(best, noise.p(safe(best)))));
+        return Vec::from_iter(other.then(|| contradicted(best, noise.p(calibrated_gain(best)))));
     }
     let mut odds: Vec<(&'static str, f64)> = Vec::new();
     for family in ["depth-scale", "disparity-offset", "thermal-drift"] {
@@ -100,7 +100,7 @@ pub fn findings(
         share: best.gain,
         parameters,
         size: Size { mm: 1e3 * best.rms_m, sigma: best.rms_sigma },
-        p_adjusted: Some(noise.p(safe(best))),
+        p_adjusted: Some(noise.p(calibrated_gain(best))),
         replicated: best.replicated,
         ..named(best.family, Statistic::Bias, best.axis)
     }]
@@ -152,10 +152,11 @@ impl Case<'_> {
         let ours = self.fields.iter().filter(|f| f.reference_distance_m.is_some()).count();
         let of_laws = theirs.map(|l| l.excess(ours as f64));
         let excess = of_bias.unwrap_or(1.0).max(of_laws.unwrap_or(1.0));
-        let found = |terms: &[Term], beside: &Beside| {
+        let found = |terms: &[Term], beside: &Nuisances| {
             let levels = heldout::levels(&self.survey, terms);
             let second = self.survey.second();
-            let mut laws = laws(&checked(&self.fields, &levels, &self.known, &second), beside);
+            let mut laws =
+                laws(&referenced_views(&self.fields, &levels, &self.known, &second), beside);
             laws.retain(|l| can_happen(l.family, self.sensor().kind));
             let level = self.level(Self::LAWS_LEVEL);
             findings(&laws, &self.known, excess, level, self.options.seed)
@@ -163,7 +164,7 @@ impl Case<'_> {
         // A bowl, too, moves the plane on the axis, by a constant that nobody knows.
         let open = families(bias.iter().chain(&self.known.bias), &self.sensor().camera);
         if !open.is_empty() {
-            let laws = found(bias, &Beside { bent_m, open });
+            let laws = found(bias, &Nuisances { bent_m, open });
             if !laws.is_empty() {
                 return laws;
             }
@@ -176,7 +177,7 @@ impl Case<'_> {
         };
         let model: Vec<Term> =
             self.known.bias.iter().filter(|t| !t.basis.is_nothing_ahead()).map(back).collect();
-        let closed = Beside { bent_m, open: Vec::new() };
+        let closed = Nuisances { bent_m, open: Vec::new() };
         let mut laws = found(&plain, &closed);
         for others in [anchored.clone(), bias.to_vec(), [anchored, model].concat()] {
             if others != plain && !laws.is_empty() {

@@ -10,7 +10,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::evidence::Evidence;
-use super::hanging::Mean;
+use super::texture_finding::ViewMean;
 
 /// Standard errors from which on a half sees something by itself.
 const SEEN: f64 = 2.0;
@@ -34,7 +34,7 @@ pub fn halves(poses: &[(f64, f64)]) -> Vec<bool> {
     second
 }
 
-impl Mean {
+impl ViewMean {
     /// Of a single column, by each view's information and score; errors from the views' scatter
     /// where that is the larger.
     pub fn of_scores(views: impl Iterator<Item = (f64, f64)>) -> Option<Self> {
@@ -44,7 +44,7 @@ impl Mean {
         let left: f64 = all.iter().map(|(own, score)| (score - value * own).powi(2)).sum();
         let n = all.len() as f64;
         let variance = (left * n / (n - 1.0) / (a * a)).max(1.0 / a);
-        (n > 1.0).then_some(Mean { value, std_error: variance.sqrt(), views: n })
+        (n > 1.0).then_some(ViewMean { value, std_error: variance.sqrt(), views: n })
     }
 
     fn z(&self) -> f64 {
@@ -53,7 +53,7 @@ impl Mean {
 }
 
 /// Same sign, and sizes inside their joint interval.
-fn alike(halves: &[Mean; 2]) -> bool {
+fn alike(halves: &[ViewMean; 2]) -> bool {
     let [a, b] = halves;
     let freedom = (a.views.round() + b.views.round() - 2.0).max(1.0);
     let reach = StudentsT::new(0.0, 1.0, freedom)
@@ -63,7 +63,7 @@ fn alike(halves: &[Mean; 2]) -> bool {
 }
 
 /// Two sizes of one statistic. `None` where a half has too few views for an error.
-pub fn agree(halves: [Option<Mean>; 2]) -> Option<bool> {
+pub fn agree(halves: [Option<ViewMean>; 2]) -> Option<bool> {
     let [Some(a), Some(b)] = halves else { return None };
     Some(alike(&[a, b]) && a.z().abs().max(b.z().abs()) > SEEN)
 }
@@ -99,13 +99,13 @@ pub struct Half {
 
 impl Half {
     /// A weighted sum of the coefficients; errors from the views' scatter where that is the larger.
-    fn measured(&self, weights: &DVector<f64>) -> Option<Mean> {
+    fn measured(&self, weights: &DVector<f64>) -> Option<ViewMean> {
         let n = self.beyond.len() as f64;
         let reach = self.factor.solve(weights);
         let scatter: f64 = self.beyond.iter().map(|s| reach.dot(s).powi(2)).sum();
         let variance = (scatter * n / (n - 1.0)).max(reach.dot(weights));
         let value = weights.dot(&self.beta);
-        (n > 1.0).then_some(Mean { value, std_error: variance.sqrt(), views: n })
+        (n > 1.0).then_some(ViewMean { value, std_error: variance.sqrt(), views: n })
     }
 }
 
@@ -145,13 +145,13 @@ impl Halves {
     /// Does neither half show what the other has, or each the opposite? Sizes that differ are no
     /// contradiction: of true ones a twentieth lie outside their interval, and sensors warm up.
     pub fn contradict(&self, terms: &[usize]) -> bool {
-        let opposite = |sizes: [Mean; 2]| sizes[0].value * sizes[1].value <= 0.0;
+        let opposite = |sizes: [ViewMean; 2]| sizes[0].value * sizes[1].value <= 0.0;
         self.shown(terms).is_some_and(|(sizes, seen)| opposite(sizes) || seen <= SEEN)
     }
 
     /// What each half has of the common shape, and how clearly the better seen of them shows what the
     /// other has, in standard errors.
-    fn shown(&self, terms: &[usize]) -> Option<([Mean; 2], f64)> {
+    fn shown(&self, terms: &[usize]) -> Option<([ViewMean; 2], f64)> {
         let columns: Vec<usize> =
             terms.iter().filter_map(|&t| self.spans.get(t).cloned()).flatten().collect();
         if columns.is_empty() {

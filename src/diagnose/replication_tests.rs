@@ -78,7 +78,7 @@ fn halves_of_other_sizes_do_not_contradict_each_other() {
 
 #[test]
 fn sizes_that_differ_do_not_agree() {
-    let size = |value, std_error| Some(Mean { value, std_error, views: 8.0 });
+    let size = |value, std_error| Some(ViewMean { value, std_error, views: 8.0 });
     assert_eq!(agree([size(1.0, 0.1), size(1.2, 0.1)]), Some(true));
     assert_eq!(agree([size(1.0, 0.1), size(1.6, 0.1)]), Some(false));
     assert_eq!(agree([size(0.1, 0.1), size(0.1, 0.1)]), Some(false), "no half sees it");
@@ -90,7 +90,7 @@ fn sizes_that_differ_do_not_agree() {
 /// variance of 2 / 3 * 3 / 2 / 3.
 #[test]
 fn a_size_has_the_scatter_of_its_views() {
-    let m = Mean::of_scores([(1.0, 1.0), (1.0, 2.0), (1.0, 3.0)].into_iter()).unwrap();
+    let m = ViewMean::of_scores([(1.0, 1.0), (1.0, 2.0), (1.0, 3.0)].into_iter()).unwrap();
     approx::assert_relative_eq!(m.value, 2.0);
     approx::assert_relative_eq!(m.std_error, (1f64 / 3.0).sqrt(), max_relative = 1e-12);
 }

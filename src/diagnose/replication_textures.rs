@@ -3,7 +3,6 @@
 
 use super::edges::Edges;
 use super::field::Field;
-use super::hanging::{Hanging, Mean};
 use super::in_time::{later, of_any_two};
 use super::known::KnownTerms;
 use super::mixing::mean_share;
@@ -11,6 +10,7 @@ use super::noise::expected_window;
 use super::replication::agree;
 use super::structure::Structure;
 use super::tails::GAUSSIAN_TAIL;
+use super::texture_finding::{TextureFinding, ViewMean};
 use crate::terms::{Axis, Statistic};
 
 /// A view's value beyond what the model has, in the statistic's own unit.
@@ -18,7 +18,7 @@ type OfView<'a> = Box<dyn Fn(&Structure) -> Option<f64> + 'a>;
 
 /// `None` where the finding is no mean of the views, or a half has too few of them.
 pub fn replicated(
-    found: &Hanging,
+    found: &TextureFinding,
     structure: &[Structure],
     fields: &[Field],
     second: &[bool],
@@ -30,7 +30,7 @@ pub fn replicated(
         match &beyond {
             Some(of) => {
                 let views: Vec<Structure> = mine.map(|v| structure[v].clone()).collect();
-                Mean::of(&views, of)
+                ViewMean::of(&views, of)
             }
             None if found.axis == Axis::EdgeDistance => {
                 let edges: Vec<&Edges> = mine.map(|v| &fields[v].edges).collect();
@@ -43,10 +43,12 @@ pub fn replicated(
 }
 
 /// What a finding is told by, view by view.
-fn beyond_known<'a>(found: &Hanging, known: &'a KnownTerms) -> Option<OfView<'a>> {
+fn beyond_known<'a>(found: &TextureFinding, known: &'a KnownTerms) -> Option<OfView<'a>> {
     Some(match (found.families.first().copied(), found.axis, found.statistic) {
         // A part of the noise alone is seen in near pixels, all of it in the window's side.
-        (Some("spatial-correlation"), ..) if found.size_sigma < 1.0 => Box::new(|s| s.near),
+        (Some("spatial-correlation"), ..) if found.size_sigma < 1.0 => {
+            Box::new(|s| s.neighbour_correlation)
+        }
         // Beside what stands still, which the finding is told without.
         (Some("temporal-correlation"), ..) => Box::new(|s| Some(s.lagged[0]? - later(s)?)),
         (Some("target-motion"), ..) => Box::new(|s| Some(s.jitter?.velocity_mps)),
@@ -55,7 +57,7 @@ fn beyond_known<'a>(found: &Hanging, known: &'a KnownTerms) -> Option<OfView<'a>
         (None, Axis::Column, _) => Box::new(|s| s.column_px2),
         (None, Axis::Frame, _) => {
             let frame = found.parameters.get("frame")?.as_u64()? as usize;
-            Box::new(move |s| *s.loudness.get(frame)?)
+            Box::new(move |s| *s.frame_log_variance.get(frame)?)
         }
         _ => return None,
     })

@@ -16,7 +16,7 @@ use crate::terms::Basis;
 
 /// A later term must bring this share of what the first brought: what is less is the first one's
 /// own shape, badly met.
-pub const LEAST_SHARE: f64 = 0.005;
+pub const LEAST_SHARE_OF_GAIN: f64 = 0.005;
 
 /// Search a layer. `coarse` has the same views in larger patches, for shapes that do not change
 /// within them. A term `beside` is fitted with every other, whatever it brings: what it can take up is
@@ -45,7 +45,8 @@ pub fn search(
     layer.pinned = beside.map(|candidate| layer.pin(candidate));
     let mut remaining = None;
     while let Some(next) = layer.step(&chosen) {
-        let little = chosen.first().is_some_and(|first| next.gain < LEAST_SHARE * first.gain);
+        let little =
+            chosen.first().is_some_and(|first| next.gain < LEAST_SHARE_OF_GAIN * first.gain);
         if little || chosen.len() >= rules.max_terms {
             remaining = Some(next);
             break;

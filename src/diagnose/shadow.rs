@@ -6,9 +6,9 @@
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::diagnosis::Curve;
-use super::edges::{Beside, Edges};
-use super::hanging::Mean;
+use super::edges::{EdgeLoss, Edges};
 use super::null::student;
+use super::texture_finding::ViewMean;
 
 /// Losses beside the target.
 #[derive(Debug, Clone)]
@@ -34,11 +34,11 @@ const WIDEST: f64 = 1.4;
 /// One view's border is known to this, px: its rows err alike.
 const BORDER_PX: f64 = 0.7;
 /// A name must explain this share of what the best curve does.
-const ADEQUATE: f64 = 0.6;
+const SHADOW_ADEQUATE: f64 = 0.6;
 
 /// What a view has left and right of the target; `None` where too little is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sides(pub [Option<Beside>; 2]);
+pub struct Sides(pub [Option<EdgeLoss>; 2]);
 
 impl Sides {
     /// What is lost beyond what a twin loses, where there is one.
@@ -47,21 +47,21 @@ impl Sides {
             let own = edges.beside(side)?;
             let Some(twin) = twin else { return Some(own) };
             let expected = twin.beside(side)?;
-            Some(Beside { lost: own.lost - expected.lost * own.rows / expected.rows, ..own })
+            Some(EdgeLoss { lost: own.lost - expected.lost * own.rows / expected.rows, ..own })
         };
         Sides([side(0), side(1)])
     }
 }
 
 /// What is lost as a share of `of`, view by view.
-fn law(views: &[Beside], of: impl Fn(&Beside) -> f64) -> Option<Mean> {
-    Mean::weighed(&views.iter().map(|v| (v.lost / of(v), of(v))).collect::<Vec<_>>())
+fn law(views: &[EdgeLoss], of: impl Fn(&EdgeLoss) -> f64) -> Option<ViewMean> {
+    ViewMean::weighed(&views.iter().map(|v| (v.lost / of(v), of(v))).collect::<Vec<_>>())
 }
 
 /// What either side has in the views that see it, and the share of the geometry's width that is lost.
-fn by_side(views: &[Sides]) -> [(Vec<Beside>, Option<Mean>); 2] {
+fn by_side(views: &[Sides]) -> [(Vec<EdgeLoss>, Option<ViewMean>); 2] {
     [0, 1].map(|side: usize| {
-        let seen: Vec<Beside> = views.iter().filter_map(|s| s.0[side]).collect();
+        let seen: Vec<EdgeLoss> = views.iter().filter_map(|s| s.0[side]).collect();
         let enough = seen.len() >= FEWEST_VIEWS;
         let share = enough.then(|| law(&seen, |v| v.shaded)).flatten();
         (seen, share)
@@ -69,20 +69,20 @@ fn by_side(views: &[Sides]) -> [(Vec<Beside>, Option<Mean>); 2] {
 }
 
 /// Of the side that loses more.
-pub fn largest_share(views: &[Sides]) -> Option<Mean> {
+pub fn largest_share(views: &[Sides]) -> Option<ViewMean> {
     let [(_, left), (_, right)] = by_side(views);
     [left?, right?].into_iter().max_by(|a, b| a.value.total_cmp(&b.value))
 }
 
-fn t(share: &Mean) -> f64 {
+fn t(share: &ViewMean) -> f64 {
     // Without any loss there is neither a share nor an error.
     if share.value > 0.0 { share.value / share.std_error.max(1e-9 * share.value) } else { 0.0 }
 }
 
 /// What a share of `of` is worth: that the views agree on it, and whole pixels that it explains.
-fn nats(share: &Mean, views: &[Beside], of: impl Fn(&Beside) -> f64) -> f64 {
-    let square = |px: f64, v: &Beside| (px / v.rows / BORDER_PX).powi(2);
-    let explained = |v: &Beside| square(v.lost, v) - square(v.lost - share.value * of(v), v);
+fn nats(share: &ViewMean, views: &[EdgeLoss], of: impl Fn(&EdgeLoss) -> f64) -> f64 {
+    let square = |px: f64, v: &EdgeLoss| (px / v.rows / BORDER_PX).powi(2);
+    let explained = |v: &EdgeLoss| square(v.lost, v) - square(v.lost - share.value * of(v), v);
     student(0.5 * t(share).powi(2), share.views - 1.0)
         + 0.5 * views.iter().map(explained).sum::<f64>()
 }
@@ -104,7 +104,7 @@ pub fn band(views: &[Sides], level: f64) -> Option<Band> {
     let gain = [nats(&lawful, views, |v| v.shaded), nats(&even, views, |v| v.rows)];
     Some(Band {
         side,
-        lawful: one_sided && lawful.value < WIDEST && gain[0] > ADEQUATE * gain[1],
+        lawful: one_sided && lawful.value < WIDEST && gain[0] > SHADOW_ADEQUATE * gain[1],
         share: [lawful.value, lawful.std_error],
         gain,
         p,
@@ -112,7 +112,7 @@ pub fn band(views: &[Sides], level: f64) -> Option<Band> {
     })
 }
 
-fn curve(views: &[Beside], share: f64) -> Curve {
+fn curve(views: &[EdgeLoss], share: f64) -> Curve {
     let mut widths: Vec<[f64; 2]> =
         views.iter().map(|v| [v.shaded, v.lost].map(|px| px / v.rows)).collect();
     widths.sort_by(|a, b| a[0].total_cmp(&b[0]));

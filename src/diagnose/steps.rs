@@ -2,12 +2,12 @@
 
 use super::diagnosis::{Finding, Size};
 use super::field::Field;
-use super::hanging::one;
 use super::known::KnownTerms;
 use super::lattice::{Quantisation, RawHistogram};
 use super::other_findings::named;
 use super::pixels::{fixed_px2, mean_of, typical_sigma_mm, typical_sigma_px};
 use super::structure::Structure;
+use super::texture_finding::one;
 use crate::frame::DepthCode;
 use crate::terms::{Axis, PixelContext, Statistic};
 use crate::view::Recording;
@@ -95,7 +95,7 @@ pub(super) fn forget_windows(
         let sigma = f.sigma.get(f.sigma.len() / 2).map_or(0.0, |s| f64::from(*s));
         let step = lattice.step_px(f.scale_px_m, f.plane.depth(0.0, 0.0));
         if step > COARSE_SIGMAS * sigma {
-            (s.window_px, s.near, s.course) = (None, None, None);
+            (s.window_px, s.neighbour_correlation, s.correlation_profile) = (None, None, None);
         }
     }
 }

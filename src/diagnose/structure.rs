@@ -6,12 +6,12 @@ use rayon::prelude::*;
 
 use super::exposure::FRAMES_KEPT;
 use super::field::Field;
-use super::frames::loudness;
+use super::frames::frame_log_variance;
 use super::pairs::Pairs;
 use super::tails::{FEWEST_READINGS, TailCounts};
 use super::texture::{
-    COURSE, FAR, Filled, LONG_LINE, SHORT_LINE, calm, changes, covariance, fine, moving, rough,
-    same_pixel, without_lines,
+    FAR, Filled, LONG_LINE, PROFILE_LAGS, SHORT_LINE, changes, covariance, high_passed, moving,
+    pixel_scale, same_pixel, without_lines, without_outliers,
 };
 use crate::camera::Camera;
 use crate::stats::{mean, measure_correlation};
@@ -27,13 +27,13 @@ pub struct Structure {
     pub window_px: Option<f64>,
     /// Correlation of pixels 1, 2, 3, ... apart of what changes between frames, beyond that of far
     /// ones.
-    pub course: Option<[f64; COURSE]>,
+    pub correlation_profile: Option<[f64; PROFILE_LAGS]>,
     /// Mean correlation of near pixels of what changes between frames.
-    pub near: Option<f64>,
+    pub neighbour_correlation: Option<f64>,
     /// Correlation of a pixel with itself 1, 2 and 3 frames later.
     pub lagged: [Option<f64>; 3],
     /// Logarithm of each of the first frames' variance over that of the others.
-    pub loudness: [Option<f64>; FRAMES_KEPT],
+    pub frame_log_variance: [Option<f64>; FRAMES_KEPT],
     /// Covariance of the mean residual with the other views' at the same pixels, px^2.
     pub fixed_px2: Option<f64>,
     /// The part of it that whole columns and rows share, px^2.
@@ -97,7 +97,7 @@ struct Still {
 }
 
 fn still(views: &[(&Field, &[f32])], camera: &Camera) -> Vec<Still> {
-    let mut means: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| fine(f, b)).collect();
+    let mut means: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| pixel_scale(f, b)).collect();
     let with_lines = across_views(&means);
     means.par_iter_mut().for_each(|m| *m = without_lines(m, camera.width, SHORT_LINE));
     let pairs = across_views(&means).into_iter().zip(with_lines);
@@ -106,7 +106,8 @@ fn still(views: &[(&Field, &[f32])], camera: &Camera) -> Vec<Still> {
 
 fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     let mut s = Structure::default();
-    let frames: Vec<Vec<f32>> = field.first.iter().map(|r| calm(&rough(field, r, bias))).collect();
+    let frames: Vec<Vec<f32>> =
+        field.first.iter().map(|r| without_outliers(&high_passed(field, r, bias))).collect();
     let Some(first) = frames.first() else { return s };
     s.pixels = first.iter().filter(|r| r.is_finite()).count() as f64;
     s.variance_px2 = mean(first.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
@@ -118,22 +119,23 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     }
     let noise = moving(&frames, s.lagged[0]);
     let lines = without_lines(&noise, camera.width, LONG_LINE);
-    s.loudness = loudness(&frames);
+    s.frame_log_variance = frame_log_variance(&frames);
     let images: Vec<Vec<f32>> = field.first.iter().map(|r| field.image(r)).collect();
     let pairs: Option<Vec<Pairs>> =
         changes(&images).iter().map(|change| Pairs::of(change, camera.width)).collect();
     if let Some(pairs) = pairs.filter(|p| !p.is_empty()) {
         let all = |of: fn(&Pairs) -> Option<f64>| mean(pairs.iter().filter_map(of));
         (s.row_px2, s.column_px2) = (all(|p| p.row), all(|p| p.column));
-        s.near = all(|p| Some(p.near / p.power.max(1e-12)));
-        s.course = course(&changes(&frames), camera, [s.row_px2, s.column_px2]);
+        s.neighbour_correlation = all(|p| Some(p.near / p.power.max(1e-12)));
+        s.correlation_profile =
+            correlation_profile(&changes(&frames), camera, [s.row_px2, s.column_px2]);
     }
     let correlation = measure_correlation(&lines, camera.width);
     // What whole rows share is no window's: it stands in the correlation at every lag.
     let share = |px2: Option<f64>| (px2.unwrap_or(0.0) / s.variance_px2.max(1e-12)).max(0.0);
-    let along = |course: &[f64], share: f64| {
+    let along = |correlation_profile: &[f64], share: f64| {
         let left = |rho: &f64| ((rho - share) / (1.0 - share).max(0.1)).max(0.0);
-        1.0 + 2.0 * course[1..].iter().map(left).filter(|r| *r > 0.05).sum::<f64>()
+        1.0 + 2.0 * correlation_profile[1..].iter().map(left).filter(|r| *r > 0.05).sum::<f64>()
     };
     // A box of L px has a correlation sum of L along each axis.
     let window = along(&correlation.along_u, share(s.row_px2))
@@ -207,11 +209,11 @@ fn jitter(field: &Field, s: &Structure, correlation_sum: f64) -> Option<Jitter> 
 
 /// Correlation of pixels 1, 2, 3, ... apart along rows and columns, without what far ones and whole
 /// `lines` share, px^2.
-fn course(
+fn correlation_profile(
     changes: &[Vec<f32>],
     camera: &Camera,
     [row, column]: [Option<f64>; 2],
-) -> Option<[f64; COURSE]> {
+) -> Option<[f64; PROFILE_LAGS]> {
     let filled: Vec<Filled> = changes.iter().map(|c| Filled::of(c)).collect();
     let over = |lags: &[usize], step: [usize; 2]| {
         let all: Option<Vec<f64>> =
@@ -227,6 +229,6 @@ fn course(
         let both = along([1, 0], row?)? + along([0, 1], column?)?;
         Some(0.5 * both / power.max(1e-12))
     };
-    let course: Option<Vec<f64>> = (1..=COURSE).map(at).collect();
-    course?.try_into().ok()
+    let correlation_profile: Option<Vec<f64>> = (1..=PROFILE_LAGS).map(at).collect();
+    correlation_profile?.try_into().ok()
 }

@@ -3,11 +3,11 @@
 use serde_json::{Map, json};
 use statrs::function::erf::erfc;
 
-use super::hanging::{Hanging, Mean};
 use super::known::KnownTerms;
+use super::outliers::{Outliers, outliers};
 use super::parameters::estimate;
-use super::strays::{Strays, strays};
 use super::structure::Structure;
+use super::texture_finding::{TextureFinding, ViewMean};
 use crate::camera::Camera;
 use crate::stats::{MAD_TO_SIGMA, bisect, median_in_place};
 use crate::terms::{Axis, Statistic};
@@ -91,7 +91,7 @@ pub fn tail(image: &[f32], camera: &Camera) -> TailCounts {
 }
 
 /// Standard errors that a model's scale may be off by.
-pub const SURELY: f64 = 2.0;
+pub const SURE_SCALE_ERRORS: f64 = 2.0;
 /// A tail is heavy from this many times a Gaussian's share on.
 const HEAVY: f64 = 2.5;
 /// So much more where the size of the noise is uneven.
@@ -103,14 +103,19 @@ pub const FEWEST_READINGS: f64 = 5000.0;
 
 /// Are the residuals' tails heavier than a Gaussian's? `uneven` says that the noise is of unequal
 /// size where no law was found for it, which makes a tail too.
-pub fn tails(views: &[Structure], known: &KnownTerms, level: f64, uneven: bool) -> Option<Hanging> {
+pub fn tails(
+    views: &[Structure],
+    known: &KnownTerms,
+    level: f64,
+    uneven: bool,
+) -> Option<TextureFinding> {
     let mixture = Mixture::of(known);
     // A simulation's tails are compared elsewhere.
     if known.has("heavy-tails") && mixture.is_none() {
         return None;
     }
-    let own = mixture.map_or(GAUSSIAN_TAIL, |m| m.tail(1.0, SURELY).max(GAUSSIAN_TAIL));
-    let m = Mean::of(views, Structure::tail_share)?;
+    let own = mixture.map_or(GAUSSIAN_TAIL, |m| m.tail(1.0, SURE_SCALE_ERRORS).max(GAUSSIAN_TAIL));
+    let m = ViewMean::of(views, Structure::tail_share)?;
     // Patches of unequal noise, and steps of the words, make a tail of a Gaussian too.
     let much = if uneven { MUCH_HEAVIER } else { 1.0 };
     let expected = much * UNEQUAL * own;
@@ -123,12 +128,12 @@ pub fn tails(views: &[Structure], known: &KnownTerms, level: f64, uneven: bool) 
     parameters.insert("share_beyond_4_sigma".into(), json!(m.value));
     // Where all that strays is gross it has no scale.
     let mut size_sigma = 4.0 * m.value.sqrt();
-    if let Some(Strays { fraction, scale }) = strays(&counts, m.std_error / m.value) {
+    if let Some(Outliers { fraction, scale }) = outliers(&counts, m.std_error / m.value) {
         parameters.insert("fraction".into(), estimate(fraction[0], fraction[1]));
         parameters.insert("scale".into(), estimate(scale[0], scale[1]));
         size_sigma = fraction[0].sqrt() * scale[0];
     }
-    Some(Hanging {
+    Some(TextureFinding {
         families: vec!["heavy-tails"],
         statistic: Statistic::Distribution,
         axis: Axis::Residual,

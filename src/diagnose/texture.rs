@@ -41,7 +41,7 @@ fn change(a: &[f32], b: &[f32]) -> Vec<f32> {
 }
 
 /// Residuals as an image, px, without what is smooth and what is known.
-pub fn rough(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
+pub fn high_passed(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
     field.high_passed(&without_bias(residuals, bias))
 }
 
@@ -55,13 +55,13 @@ pub fn without_bias<'a>(residuals: &'a [f32], bias: &[f32]) -> Cow<'a, [f32]> {
 
 /// The view's mean, px, without what is known, gross errors, and all that does not change from pixel
 /// to pixel.
-pub fn fine(field: &Field, bias: &[f32]) -> Vec<f32> {
-    let image = calm(&rough(field, &field.mean, bias));
+pub fn pixel_scale(field: &Field, bias: &[f32]) -> Vec<f32> {
+    let image = without_outliers(&high_passed(field, &field.mean, bias));
     high_pass(&image, field.width, field.height, PIXEL_BOX)
 }
 
 /// Without gross errors.
-pub fn calm(image: &[f32]) -> Vec<f32> {
+pub fn without_outliers(image: &[f32]) -> Vec<f32> {
     let mut sizes: Vec<f32> = image.iter().filter(|r| r.is_finite()).map(|r| r.abs()).collect();
     let limit = 6.0 * MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
     let kept = |r: &f32| if limit > 0.0 && r.abs() > limit { f32::NAN } else { *r };
@@ -120,7 +120,7 @@ const PIXEL_BOX: usize = 7;
 /// Lags well beyond a Kinect's window, px.
 pub const FAR: [usize; 12] = [20, 22, 24, 27, 30, 33, 36, 39, 42, 46, 50, 54];
 /// Lags that a window's side is read from, px.
-pub const COURSE: usize = 16;
+pub const PROFILE_LAGS: usize = 16;
 
 /// An image with nothing where there is none: sums run over it without a question.
 pub struct Filled {

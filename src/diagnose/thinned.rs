@@ -17,7 +17,7 @@ pub fn blocks_apart(pixels: usize) -> usize {
 }
 
 /// What is not looked at, in words.
-pub fn told(width: usize, height: usize) -> Option<String> {
+pub fn remark(width: usize, height: usize) -> Option<String> {
     let apart = blocks_apart(width * height);
     (apart > 1).then(|| {
         let blocks = apart * apart;
@@ -30,7 +30,7 @@ pub fn told(width: usize, height: usize) -> Option<String> {
 impl Field {
     /// Keep of the target's pixels, before anything is measured at them, those of the blocks that are looked
     /// at; `expected` has a number a pixel.
-    pub(super) fn thin(&mut self, expected: &mut Vec<f32>) {
+    pub(super) fn subsample_blocks(&mut self, expected: &mut Vec<f32>) {
         let (width, height) = (self.width, self.height);
         let apart = blocks_apart(width * height);
         if apart < 2 {
@@ -71,7 +71,7 @@ mod tests {
             [(640, 480, 1), (1024, 1024, 1), (1280, 1024, 2), (2048, 1536, 2), (4096, 3072, 4)]
         {
             assert_eq!(blocks_apart(width * height), apart, "{width} x {height}");
-            assert_eq!(told(width, height).is_some(), apart > 1);
+            assert_eq!(remark(width, height).is_some(), apart > 1);
             // Blocks at the far side count too.
             let kept = |side: usize| side.div_ceil(BLOCK).div_ceil(apart) * BLOCK;
             assert!(kept(width) * kept(height) <= MAX_PIXELS + MAX_PIXELS / 4);

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::field::Field;
-use super::texture::rough;
+use super::texture::high_passed;
 use crate::camera::{Camera, Rays};
 use crate::scene::TargetFrame;
 use crate::terms::{PixelContext, Pixels, corner_radius, edge_distances};
@@ -198,7 +198,7 @@ fn board_frame(field: &Field, rays: &Rays) -> TargetFrame {
 
 /// Measure the rough part of the mean, with what is known of it taken out, px by pixel (or empty).
 pub fn roughen(tiles: &mut [Tile], field: &Field, bias: &[f32]) {
-    let rough = rough(field, &field.mean, bias);
+    let rough = high_passed(field, &field.mean, bias);
     let across = field.width.div_ceil(SIDE);
     let mut sums = vec![(0.0, 0.0); across * field.height.div_ceil(SIDE)];
     for &i in &field.pixels {

@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::laws::Checked;
+use super::laws::ReferencedView;
 use super::posterior::Posterior;
 use crate::stats::even;
 
@@ -34,8 +34,8 @@ const USUAL: f64 = 0.02;
 /// From references that are off by this `variance` each, m^2, with what is fitted `beside` the drift;
 /// `None` without a time.
 pub fn warm_up(
-    checked: &[Checked],
-    beside: &dyn Fn(&Checked) -> Vec<f64>,
+    checked: &[ReferencedView],
+    beside: &dyn Fn(&ReferencedView) -> Vec<f64>,
     variance: f64,
 ) -> Option<WarmUp> {
     let session = checked.iter().map(|r| r.session_s).fold(0.0, f64::max);
@@ -75,8 +75,8 @@ struct Node {
 
 /// The drift's size by least squares, where its course is known, and how well that fits.
 fn size(
-    checked: &[Checked],
-    beside: &dyn Fn(&Checked) -> Vec<f64>,
+    checked: &[ReferencedView],
+    beside: &dyn Fn(&ReferencedView) -> Vec<f64>,
     variance: f64,
     course: &dyn Fn(f64) -> f64,
 ) -> Option<(f64, [f64; 2])> {
@@ -124,12 +124,12 @@ mod tests {
                 let relative = rng.random_range(0.003..0.02);
                 let (tau_s, session_s) =
                     (rng.random_range(400.0..1500.0), rng.random_range(900.0..3600.0));
-                let checked: Vec<Checked> = (0..16)
+                let checked: Vec<ReferencedView> = (0..16)
                     .map(|k| {
                         let (z, at_s) = (rng.random_range(0.6..4.0), session_s * k as f64 / 15.0);
                         let noise: f64 = StandardNormal.sample(&mut rng);
                         let off = relative * z * course(at_s / tau_s) + ERROR_M * noise;
-                        Checked { session_s: at_s, ..Checked::ahead(z, off, PX_M) }
+                        ReferencedView { session_s: at_s, ..ReferencedView::ahead(z, off, PX_M) }
                     })
                     .collect();
                 let told = warm_up(&checked, &|_| Vec::new(), ERROR_M * ERROR_M).expect("a drift");
@@ -145,7 +145,7 @@ mod tests {
 
     #[test]
     fn no_time_no_drift() {
-        let still = [0.8, 1.5, 2.5].map(|z| Checked::ahead(z, 0.001, PX_M));
+        let still = [0.8, 1.5, 2.5].map(|z| ReferencedView::ahead(z, 0.001, PX_M));
         assert!(warm_up(&still, &|_| Vec::new(), ERROR_M * ERROR_M).is_none());
         assert!(warm_up(&[], &|_| Vec::new(), ERROR_M * ERROR_M).is_none());
     }

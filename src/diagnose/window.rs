@@ -1,9 +1,9 @@
 //! The window that a part of the noise comes through, from how correlation falls with distance.
 
-use super::hanging::Mean;
 use super::posterior::Posterior;
 use super::structure::Structure;
-use super::texture::{COURSE, FAR, SMOOTH_PX};
+use super::texture::{FAR, PROFILE_LAGS, SMOOTH_PX};
+use super::texture_finding::ViewMean;
 use crate::stats::even;
 
 /// Its side, px, and the share of the variance that comes through it, each with its standard error.
@@ -30,10 +30,11 @@ const REACH_PX: [f64; 2] = [1.2, 64.0];
 
 /// By the views' mean course; its lags err alike, since it is the same noise that they are made of.
 pub fn part(views: &[Structure]) -> Option<Window> {
-    let lag = |k: usize| Mean::of(views, |s| Some(s.course?[k]));
-    let course: Vec<Mean> = (0..COURSE).map(lag).collect::<Option<_>>()?;
-    let variance = course.iter().map(|m| m.std_error.powi(2)).sum::<f64>() / COURSE as f64;
-    let values: Vec<f64> = course.iter().map(|m| m.value).collect();
+    let lag = |k: usize| ViewMean::of(views, |s| Some(s.correlation_profile?[k]));
+    let correlation_profile: Vec<ViewMean> = (0..PROFILE_LAGS).map(lag).collect::<Option<_>>()?;
+    let variance =
+        correlation_profile.iter().map(|m| m.std_error.powi(2)).sum::<f64>() / PROFILE_LAGS as f64;
+    let values: Vec<f64> = correlation_profile.iter().map(|m| m.value).collect();
     of(&values, variance)
 }
 
@@ -42,8 +43,8 @@ pub fn part(views: &[Structure]) -> Option<Window> {
 fn seen(of: &dyn Fn(f64) -> f64, lags: usize) -> Vec<f64> {
     let reach = FAR[FAR.len() - 1];
     let half = SMOOTH_PX / 2;
-    let mean = |course: &[f64], until: usize| -> Vec<f64> {
-        let at = |lag: isize| course.get(lag.unsigned_abs()).copied().unwrap_or(0.0);
+    let mean = |correlation_profile: &[f64], until: usize| -> Vec<f64> {
+        let at = |lag: isize| correlation_profile.get(lag.unsigned_abs()).copied().unwrap_or(0.0);
         let over = |k: usize| {
             let (k, half) = (k as isize, half as isize);
             (k - half..=k + half).map(at).sum::<f64>() / SMOOTH_PX as f64
@@ -59,17 +60,18 @@ fn seen(of: &dyn Fn(f64) -> f64, lags: usize) -> Vec<f64> {
     (1..=lags).map(|lag| at(lag, 0) - far).collect()
 }
 
-fn of(course: &[f64], variance: f64) -> Option<Window> {
+fn of(correlation_profile: &[f64], variance: f64) -> Option<Window> {
     let variance = variance.max(f64::MIN_POSITIVE);
     let log = REACH_PX.map(f64::ln);
     let mut nodes: Vec<[f64; 4]> = Vec::new();
-    let own = seen(&|lag| f64::from(u8::from(lag == 0.0)), course.len());
+    let own = seen(&|lag| f64::from(u8::from(lag == 0.0)), correlation_profile.len());
     for form in FORMS {
         for side in even(log, SIDES).map(f64::exp) {
-            let through = seen(&|lag| form(lag / side), course.len());
+            let through = seen(&|lag| form(lag / side), correlation_profile.len());
             let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
             let beyond = |of: &[f64]| of.iter().zip(&own).map(|(x, own)| x - own).collect();
-            let (shape, left): (Vec<f64>, Vec<f64>) = (beyond(&through), beyond(course));
+            let (shape, left): (Vec<f64>, Vec<f64>) =
+                (beyond(&through), beyond(correlation_profile));
             let information = dot(&shape, &shape) / variance;
             let share = dot(&shape, &left) / variance / information;
             // No more than all comes through; a window that no lag lies in shows nothing.
@@ -104,9 +106,9 @@ mod tests {
             for seed in 0..60 {
                 let mut rng = Seed(seed).stream("window");
                 let truth = [rng.random_range(4.0..12.0), rng.random_range(0.005..0.1)];
-                let own = seen(&|lag| f64::from(u8::from(lag == 0.0)), COURSE);
-                let through = seen(&|lag| form(lag / truth[0]), COURSE);
-                let course: Vec<f64> = own
+                let own = seen(&|lag| f64::from(u8::from(lag == 0.0)), PROFILE_LAGS);
+                let through = seen(&|lag| form(lag / truth[0]), PROFILE_LAGS);
+                let correlation_profile: Vec<f64> = own
                     .iter()
                     .zip(through)
                     .map(|(own, through)| {
@@ -114,7 +116,8 @@ mod tests {
                         truth[1] * through + (1.0 - truth[1]) * own + ERROR * noise
                     })
                     .collect();
-                let Window { length, share } = of(&course, ERROR * ERROR).expect("a window");
+                let Window { length, share } =
+                    of(&correlation_profile, ERROR * ERROR).expect("a window");
                 for (k, [said, error]) in [length, share].into_iter().enumerate() {
                     held[k] += usize::from((said - truth[k]).abs() <= 1.645 * error);
                 }

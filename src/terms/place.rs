@@ -140,7 +140,7 @@ pub struct PixelContext {
 }
 
 /// The mean of what a function gives for the members of a group.
-pub type Mean<'a> = dyn Fn(&dyn Fn(usize) -> f64) -> f64 + 'a;
+pub type GroupMean<'a> = dyn Fn(&dyn Fn(usize) -> f64) -> f64 + 'a;
 
 impl PixelContext {
     /// How much weaker the projected pattern's light comes back than from a target faced at 1 m.
@@ -149,7 +149,7 @@ impl PixelContext {
     }
 
     /// Move to the mean of the members' places; what is one for the view stays.
-    pub fn average(&mut self, all: &[PixelContext], mean: &Mean<'_>) {
+    pub fn average(&mut self, all: &[PixelContext], mean: &GroupMean<'_>) {
         self.u = mean(&|i| all[i].u);
         self.v = mean(&|i| all[i].v);
         self.x = mean(&|i| all[i].x);

@@ -14,7 +14,7 @@ use super::tails::{TAIL_EDGES, TailCounts};
 /// Share and scale of the far errors, each with its standard error; the scale is their standard
 /// deviation over that of the noise.
 #[derive(Debug, Clone, Copy)]
-pub struct Strays {
+pub struct Outliers {
     pub fraction: [f64; 2],
     pub scale: [f64; 2],
 }
@@ -35,7 +35,7 @@ const SIGMA: f64 = 0.05;
 
 /// The far errors that make these counts, whose total differs from view to view so that its mean is
 /// known to the share `scatter`; `None` where hardly any are counted.
-pub fn strays(counts: &TailCounts, scatter: f64) -> Option<Strays> {
+pub fn outliers(counts: &TailCounts, scatter: f64) -> Option<Outliers> {
     let own = |t: f64| counts.n * FORMS[0](t);
     let seen: Vec<f64> = counts.between.to_vec();
     let chance: Vec<f64> = TAIL_EDGES.windows(2).map(|w| own(w[0]) - own(w[1])).collect();
@@ -75,9 +75,9 @@ pub fn strays(counts: &TailCounts, scatter: f64) -> Option<Strays> {
         let mean = posterior.mean(|n| n[k]);
         [mean, posterior.rms(|n| n[k] - mean).hypot(scatter.hypot(SIGMA) * mean)]
     };
-    Some(Strays { fraction: of(1, scatter), scale: of(2, 0.0) })
+    Some(Outliers { fraction: of(1, scatter), scale: of(2, 0.0) })
 }
 
 #[cfg(test)]
-#[path = "strays_tests.rs"]
+#[path = "outliers_tests.rs"]
 mod tests;

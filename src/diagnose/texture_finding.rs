@@ -11,7 +11,7 @@ use crate::terms::{Axis, Statistic};
 
 /// A mismatch of the noise's structure.
 #[derive(Debug, Clone)]
-pub struct Hanging {
+pub struct TextureFinding {
     /// Best first; more than one when they cannot be told apart. Empty: no name.
     pub families: Vec<&'static str>,
     pub statistic: Statistic,
@@ -26,21 +26,21 @@ pub struct Hanging {
     pub words: Option<String>,
 }
 
-/// Mean of a statistic over the views, and its standard error.
+/// ViewMean of a statistic over the views, and its standard error.
 #[derive(Debug, Clone, Copy)]
-pub struct Mean {
+pub struct ViewMean {
     pub value: f64,
     pub std_error: f64,
     pub views: f64,
 }
 
-impl Mean {
+impl ViewMean {
     pub fn of(views: &[Structure], value: impl Fn(&Structure) -> Option<f64>) -> Option<Self> {
         let values: Vec<(f64, f64)> = views
             .iter()
             .filter_map(|s| Some((value(s).filter(|v| v.is_finite())?, s.pixels)))
             .collect();
-        Mean::weighed(&values)
+        ViewMean::weighed(&values)
     }
 
     /// Of values, each with how much there is of what it was measured on.
@@ -57,7 +57,7 @@ impl Mean {
         }
         let value = values.iter().map(|v| weight(v.1) * v.0).sum::<f64>() / total;
         let scatter: f64 = values.iter().map(|v| (weight(v.1) * (v.0 - value)).powi(2)).sum();
-        Some(Mean { value, std_error: (scatter * n / (n - 1.0)).sqrt() / total, views: n })
+        Some(ViewMean { value, std_error: (scatter * n / (n - 1.0)).sqrt() / total, views: n })
     }
 
     /// Of what each view shares with all the others: a pair of views counts in two of the values, so
@@ -66,9 +66,9 @@ impl Mean {
         views: &[Structure],
         value: impl Fn(&Structure) -> Option<f64>,
     ) -> Option<Self> {
-        let m = Mean::of(views, value)?;
+        let m = ViewMean::of(views, value)?;
         let std_error = m.std_error * (2.0 * (m.views - 1.0) / (m.views - 2.0)).sqrt();
-        (m.views > 2.0).then_some(Mean { std_error, ..m })
+        (m.views > 2.0).then_some(ViewMean { std_error, ..m })
     }
 
     /// Chance of a mean this far above `expected`, one-sided, by Student's t.
@@ -84,7 +84,7 @@ pub fn one(name: &str, value: f64, std_error: f64) -> Map<String, serde_json::Va
     map
 }
 
-pub fn nats(m: &Mean, expected: f64) -> f64 {
+pub fn nats(m: &ViewMean, expected: f64) -> f64 {
     let t = (m.value - expected) / m.std_error.max(1e-9);
     student(0.5 * t * t, m.views)
 }
@@ -103,11 +103,11 @@ pub struct Shared {
 
 impl Shared {
     /// `m` of the noise's `variance_px2`, both px^2.
-    pub fn found(self, m: &Mean, variance_px2: f64, level: f64) -> Option<Hanging> {
+    pub fn found(self, m: &ViewMean, variance_px2: f64, level: f64) -> Option<TextureFinding> {
         let p = m.p_above(self.expected_px2);
         let share = (m.value - self.expected_px2) / variance_px2.max(1e-12);
         let sigma = m.value.max(0.0).sqrt();
-        (p < level && share > self.least).then(|| Hanging {
+        (p < level && share > self.least).then(|| TextureFinding {
             families: self.families,
             statistic: self.statistic,
             axis: self.axis,
@@ -122,9 +122,9 @@ impl Shared {
 }
 
 /// A share of the variance is not told whose square root is smaller than a bias must be.
-pub const LEAST_SHARE: f64 = MIN_SIZE * MIN_SIZE;
+pub const LEAST_VARIANCE_SHARE: f64 = MIN_SIZE * MIN_SIZE;
 
 /// Of the first frame's rough residual, px^2.
 pub fn variance_px2(views: &[Structure]) -> f64 {
-    Mean::of(views, |s| Some(s.variance_px2)).map_or(0.0, |m| m.value)
+    ViewMean::of(views, |s| Some(s.variance_px2)).map_or(0.0, |m| m.value)
 }

@@ -27,9 +27,9 @@ fn held(name: &str, seeds: u64, stray: fn(&mut Stream, f64) -> f64) -> [usize; 2
         let fraction = 10f64.powf(rng.random_range(-3.3..-1.7));
         let scale = rng.random_range(3.0..8.0);
         let counts = counted(&mut rng, fraction, |rng| stray(rng, scale));
-        let strays = strays(&counts, 0.0).expect("strays");
+        let outliers = outliers(&counts, 0.0).expect("strays");
         for (k, ([said, error], truth)) in
-            [(strays.fraction, fraction), (strays.scale, scale)].into_iter().enumerate()
+            [(outliers.fraction, fraction), (outliers.scale, scale)].into_iter().enumerate()
         {
             held[k] += usize::from((said - truth).abs() <= 1.645 * error);
         }
@@ -67,9 +67,9 @@ fn intervals_hold_whatever_far_errors_are_drawn_from() {
 fn gross_errors_are_no_tail() {
     let mut rng = Seed(1).stream("strays/gross");
     let mut counts = counted(&mut rng, 0.003, |rng| laplace(rng, 5.0));
-    let before = strays(&counts, 0.0).expect("strays");
+    let before = outliers(&counts, 0.0).expect("strays");
     (0..400).for_each(|_| counts.count(300.0));
-    let after = strays(&counts, 0.0).expect("strays");
+    let after = outliers(&counts, 0.0).expect("strays");
     assert!((after.scale[0] / before.scale[0] - 1.0).abs() < 0.01);
-    assert!(strays(&TailCounts::default(), 0.0).is_none());
+    assert!(outliers(&TailCounts::default(), 0.0).is_none());
 }
