@@ -2,7 +2,7 @@
 
 use super::candidate::{Candidate, RECALIBRATE};
 use super::judge::Judged;
-use super::null::NoiseGains;
+use super::noise_gains::NoiseGains;
 use super::outcome::{Chosen, Rival, Rules};
 use crate::terms::Basis;
 

@@ -4,14 +4,15 @@ use super::anchor::anchor;
 use super::battery::Battery;
 use super::between::between;
 use super::case::Case;
-use super::diagnosis::{DIAGNOSIS_FORMAT, Diagnosis, MapRow, Reference};
+use super::diagnosis::{DIAGNOSIS_FORMAT, Diagnosis, HeldOut, MapRow, Reference, ViewLine};
 use super::engine::Diagnosed;
 use super::far_off::far_off;
+use super::field::Field;
 use super::known::KnownTerms;
 use super::laws::{referenced_views, scatter};
 use super::outcome::Outcome;
 use super::pixels::typical_sigma_mm;
-use super::verdict::{extend, not_identifiable, shares, untested, verdict, view_lines};
+use super::verdict::{extend, not_identifiable, shares, untested, verdict};
 use super::{findings, heldout, laws, reference, thinned};
 use crate::effects::KINECT_BASELINE_M;
 use crate::model::{Effect, Form, NoiseModel, Searched};
@@ -63,7 +64,7 @@ impl Case<'_> {
             self.anchor(&mut extended);
             self.sample(&mut extended);
         }
-        let views = view_lines(&self.fields, &self.survey, &mean.terms, heldout.as_ref());
+        let views = self.view_lines(&mean.terms, heldout.as_ref());
         let left_out = heldout::left_out(&self.survey, &mean.outcome, &mean.terms);
         let recording = self.recording.root.display().to_string();
         let reference = match self.baseline {
@@ -143,5 +144,23 @@ impl Case<'_> {
         let level = self.options.level;
         let layers = self.scenes().into_iter().zip(outcomes);
         layers.flat_map(|(scene, outcome)| findings::map(&scene, outcome, level)).collect()
+    }
+
+    /// The views, for people.
+    fn view_lines(&self, bias: &[Term], heldout: Option<&HeldOut>) -> Vec<ViewLine> {
+        let before = heldout::rms_by_view(&self.survey, &[]);
+        let after = heldout::rms_by_view(&self.survey, bias);
+        let line = |(n, f): (usize, &Field)| ViewLine {
+            name: f.name.clone(),
+            z_m: f.plane.depth(0.0, 0.0),
+            theta_rad: f.plane.theta(),
+            azimuth_rad: f.plane.azimuth(),
+            frames: f.frames.len(),
+            pixels: f.pixels.len(),
+            bowl_px_before: before[n],
+            bowl_px_after: after[n],
+            held_out: heldout.is_some_and(|h| h.views.contains(&f.name)),
+        };
+        self.fields.iter().enumerate().map(line).collect()
     }
 }

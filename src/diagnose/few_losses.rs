@@ -13,7 +13,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::missing_cells::{Cell, FEW, RIM_PX, USUAL};
 use super::missing_search::{Judged, LEAST_EXCESS, predicted};
 use super::missing_shapes::{Shape, Step};
-use super::null::NoiseGains;
+use super::noise_gains::NoiseGains;
 use crate::rng::Seed;
 use crate::stats::median;
 use crate::terms::{Axis, Extent};

@@ -14,7 +14,7 @@ use super::candidate::{Candidate, RECALIBRATE};
 use super::diagnosis::{Alternative, Finding, Status};
 use super::evidence::{self, Evidence, root};
 use super::naming::physics;
-use super::null::{LEAST_EXCESS, NoiseGains};
+use super::noise_gains::{LEAST_EXCESS, NoiseGains};
 use super::other_findings::named;
 use super::outcome::{Outcome, Rules};
 use super::prepared::{evidence_of_bases, without};

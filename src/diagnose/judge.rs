@@ -2,7 +2,8 @@
 
 use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain};
-use super::null::{NoiseGains, Null};
+use super::noise_gains::NoiseGains;
+use super::null::Null;
 use super::outcome::{Look, Rules};
 use super::samples::ViewData;
 use crate::terms::{Basis, Coordinate, PixelContext};

@@ -55,6 +55,7 @@ mod mixing;
 mod naming;
 mod next_view;
 mod noise;
+mod noise_gains;
 mod null;
 mod other_findings;
 mod outcome;

@@ -3,7 +3,7 @@
 use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain};
 use super::learnt::Learnt;
-use super::null::NoiseGains;
+use super::noise_gains::NoiseGains;
 use super::replication::Halves;
 use crate::model::Covariance;
 use crate::terms::Basis;

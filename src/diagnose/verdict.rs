@@ -1,18 +1,15 @@
-//! What is said in the end: the verdict, findings in order, the extended model, the views.
+//! What is said in the end: the verdict, findings in order, the extended model.
 
 use std::collections::BTreeSet;
 
 use super::blocks::BLOCK_TILES;
-use super::diagnosis::{CannotTell, Finding, HeldOut, Status, Verdict, ViewLine};
-use super::field::Field;
-use super::heldout;
-use super::layers::Survey;
+use super::diagnosis::{CannotTell, Finding, Status, Verdict};
 use super::other_findings::named;
 use super::outcome::Outcome;
 use super::tiles::SIDE;
 use crate::effects;
 use crate::model::{Covariance, Effect, NoiseModel, UNEXPLAINED};
-use crate::terms::{Axis, Statistic, Term};
+use crate::terms::{Axis, Statistic};
 use crate::view::{RecordingFile, Sensor};
 
 pub(super) fn not_identifiable(what: &CannotTell) -> Finding {
@@ -225,31 +222,6 @@ pub(super) fn extend<'a>(
         }
     }
     extended
-}
-
-pub(super) fn view_lines(
-    fields: &[Field],
-    survey: &Survey,
-    bias: &[Term],
-    heldout: Option<&HeldOut>,
-) -> Vec<ViewLine> {
-    let before = heldout::rms_by_view(survey, &[]);
-    let after = heldout::rms_by_view(survey, bias);
-    fields
-        .iter()
-        .enumerate()
-        .map(|(n, f)| ViewLine {
-            name: f.name.clone(),
-            z_m: f.plane.depth(0.0, 0.0),
-            theta_rad: f.plane.theta(),
-            azimuth_rad: f.plane.azimuth(),
-            frames: f.frames.len(),
-            pixels: f.pixels.len(),
-            bowl_px_before: before[n],
-            bowl_px_after: after[n],
-            held_out: heldout.is_some_and(|h| h.views.contains(&f.name)),
-        })
-        .collect()
 }
 
 /// A bias or a change of variance smaller than this, in sigmas, is not told.
