@@ -23,9 +23,9 @@ const MANY: f64 = 0.1;
 /// Added to a count whose logarithm is taken (Anscombe 1948 has 3/8).
 const HALF: f64 = 0.5;
 /// So many widths before its middle a logistic rise has lost a three-thousandth.
-const FOOT: f64 = 8.0;
+const ONSET_WIDTHS: f64 = 8.0;
 /// Middles tried, over as many widths.
-const FEET: usize = 16;
+const ONSETS: usize = 16;
 /// Simulations of the null.
 const REPLICATES: u64 = 1000;
 
@@ -108,7 +108,7 @@ pub fn few_losses(
     let usual = median(&mut levels.clone());
     let y: Vec<f64> = levels.iter().map(|l| l - usual).collect();
     let columns: Vec<(Step, Vec<f64>)> =
-        feet(reach).into_iter().map(|s| (s, column(&s, &views, usual))).collect();
+        step_onsets(reach).into_iter().map(|s| (s, column(&s, &views, usual))).collect();
     let best = |y: &[f64], scatter: f64| {
         let each = columns.iter().map(|(step, h)| (gain(h, y, &views, scatter), *step, h));
         each.max_by(|a, b| a.0.0.total_cmp(&b.0.0))
@@ -158,19 +158,19 @@ fn column(step: &Step, views: &[View], usual: f64) -> Vec<f64> {
 
 /// Steps of which the views may see the foot: beyond the steepest and the farthest, and before the
 /// nearest.
-fn feet(reach: &Extent) -> Vec<Step> {
-    let along = |k: usize| FOOT * k as f64 / (FEET - 1) as f64;
+fn step_onsets(reach: &Extent) -> Vec<Step> {
+    let along = |k: usize| ONSET_WIDTHS * k as f64 / (ONSETS - 1) as f64;
     let mut all = Vec::new();
     let [_, steepest] = reach.theta;
     for width in [1.0f64, 2.0, 4.0].map(f64::to_radians) {
-        for k in 0..FEET {
+        for k in 0..ONSETS {
             let middle = steepest + along(k) * width;
             all.push(Step { axis: Axis::Theta, middle, width, share: 1.0 });
         }
     }
     let [near, far] = reach.z;
     for width in [0.015, 0.03, 0.06] {
-        for k in 0..FEET {
+        for k in 0..ONSETS {
             let beyond = along(k) * width;
             let step = |middle, width| Step { axis: Axis::Z, middle, width, share: 1.0 };
             all.push(step(far * (1.0 + beyond), far * width));

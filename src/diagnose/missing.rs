@@ -12,7 +12,7 @@ use super::field::Field;
 use super::layers::Survey;
 use super::margins::Margins;
 use super::missing_cells::{Cell, cells, fine};
-use super::missing_report::{Told, shadow_finding};
+use super::missing_report::{DropoutReporter, shadow_finding};
 use super::missing_search::{Judged, Losses};
 use super::missing_shapes::{Step, curves, steps};
 use super::replication::agree;
@@ -65,10 +65,10 @@ const FEWEST_VIEWS: usize = 4;
 pub const LEVEL: f64 = 0.001;
 const SHADOW_LEVEL: f64 = 0.0005;
 /// A name must explain this share of what the best nameless curve does.
-pub const ADEQUATE: f64 = 0.6;
+pub const NAME_ADEQUATE: f64 = 0.6;
 const MOST_FINDINGS: usize = 3;
 /// A later finding must bring this share of what the first brought.
-const LEAST_SHARE: f64 = 0.1;
+const LEAST_OF_FIRST: f64 = 0.1;
 
 /// What the losses of a recording follow.
 ///
@@ -81,11 +81,11 @@ pub fn missing(
     camera: &Camera,
     seed: Seed,
 ) -> DropoutOutcome {
-    let told: Vec<bool> = fields.iter().map(|f| f.region_given).collect();
+    let region_given: Vec<bool> = fields.iter().map(|f| f.region_given).collect();
     let second = survey.second();
     let margins = Margins::of(fields);
     let (cells, fine) = (cells(survey, camera, &margins), fine(survey, &margins));
-    let seen = Seen { cells, fine, told, second };
+    let seen = DropoutCells { cells, fine, region_given, second };
     let blur = |z: f64| blur(survey, z);
     let mut outcome = losses(&seen, &survey.reach, camera, &blur, seed);
     outcome.notes.extend(margins.notes());
@@ -97,7 +97,7 @@ pub fn missing(
         shadow.replicated = bands_agree(&sides, &seen.second);
         // Where the target's own mask reaches into its shadow, the same losses are seen again; a
         // region that was given ends at the target.
-        let grown = seen.told.contains(&false);
+        let grown = seen.region_given.contains(&false);
         outcome.findings.retain(|f| !grown || f.family.is_some() || f.size > shadow.size);
         outcome.findings.push(shadow);
     }
@@ -105,31 +105,31 @@ pub fn missing(
 }
 
 /// The views' losses on the target.
-struct Seen {
+struct DropoutCells {
     /// In patches large enough to judge.
     cells: Vec<Vec<Cell>>,
     /// In the smallest there are.
     fine: Vec<Vec<Cell>>,
     /// Whether a view's region was given.
-    told: Vec<bool>,
+    region_given: Vec<bool>,
     /// Whether it is in the second half.
     second: Vec<bool>,
 }
 
-impl Seen {
+impl DropoutCells {
     /// Without the patches that a hard end of the range touches.
-    fn inside(&self, end: &HardEnd) -> Seen {
+    fn inside(&self, end: &HardEnd) -> DropoutCells {
         let kept = |views: &[Vec<Cell>]| -> Vec<Vec<Cell>> {
             let inside = |v: &Vec<Cell>| v.iter().filter(|c| !end.touches(c)).cloned().collect();
             views.iter().map(inside).collect()
         };
-        let (told, second) = (self.told.clone(), self.second.clone());
-        Seen { cells: kept(&self.cells), fine: kept(&self.fine), told, second }
+        let (region_given, second) = (self.region_given.clone(), self.second.clone());
+        DropoutCells { cells: kept(&self.cells), fine: kept(&self.fine), region_given, second }
     }
 }
 
 fn losses(
-    seen: &Seen,
+    seen: &DropoutCells,
     reach: &Extent,
     camera: &Camera,
     blur: &dyn Fn(f64) -> f64,
@@ -158,15 +158,21 @@ fn losses(
             outcome.detectable = detectable(&ledger, &steps, threshold);
         }
         let Some(won) = choose(&judged).filter(|j| j.gain > threshold) else { break };
-        if outcome.findings.first().is_some_and(|f| won.gain < LEAST_SHARE * f.gain) {
+        if outcome.findings.first().is_some_and(|f| won.gain < LEAST_OF_FIRST * f.gain) {
             break;
         }
         let more = ledger.explained(won);
         explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
         taken.push(won.shape.axis());
         let replicated = ledger.replicate(won, &seen.second);
-        let told = Told { fine: &seen.fine, told: &seen.told, base: ledger.base, reach, camera };
-        let mut finding = told.finding(won, rivals(&judged), noise.p(won.gain));
+        let report = DropoutReporter {
+            fine: &seen.fine,
+            region_given: &seen.region_given,
+            base: ledger.base,
+            reach,
+            camera,
+        };
+        let mut finding = report.finding(won, rivals(&judged), noise.p(won.gain));
         finding.replicated = replicated;
         match HardEnd::of(&finding, blur) {
             // Nothing is learnt beyond the range: what is lost inside it is looked at alone.
@@ -182,20 +188,26 @@ fn losses(
     if outcome.findings.is_empty()
         && let Some((foot, p)) = few_losses(&seen.fine, reach, LEVEL, seed)
     {
-        let told = Told { fine: &seen.fine, told: &seen.told, base: 0.0, reach, camera };
-        outcome.findings.push(told.finding(&foot, rivals(std::slice::from_ref(&foot)), p));
+        let report = DropoutReporter {
+            fine: &seen.fine,
+            region_given: &seen.region_given,
+            base: 0.0,
+            reach,
+            camera,
+        };
+        outcome.findings.push(report.finding(&foot, rivals(std::slice::from_ref(&foot)), p));
     }
     outcome
 }
 
 /// An edge narrower than this share of its distance, or than the noise there, is a limit that a driver
 /// or a format has set (the noise blurs it so); a pattern that grows faint goes gradually.
-const HARD: f64 = 0.01;
+const HARD_END_SHARE: f64 = 0.01;
 /// Widths by which the views reach beyond an edge that is known as a whole.
 const PASSED: f64 = 5.0;
 /// One that is hardly reached must be narrower by so many standard errors, which hold the doubt about
 /// the form of its rise as well.
-const SURELY: f64 = 1.0;
+const SURE_WIDTH_ERRORS: f64 = 1.0;
 /// Widths of an edge within which patches feel it: 2 % are lost there.
 const FELT: f64 = 4.0;
 
@@ -214,9 +226,9 @@ impl HardEnd {
         let value = |name: &str, of: &str| finding.parameters.get(name)?.get(of)?.as_f64();
         let (z_m, width_m) = (value("z50_m", "value")?, value("width_m", "value")?);
         let error = value("width_m", "std_error")?;
-        let limit = f64::max(HARD * z_m, blur(z_m));
+        let limit = f64::max(HARD_END_SHARE * z_m, blur(z_m));
         let end = finding.interval[usize::from(width_m > 0.0)];
-        let doubt = if (end - z_m) / width_m > PASSED { 0.0 } else { SURELY * error };
+        let doubt = if (end - z_m) / width_m > PASSED { 0.0 } else { SURE_WIDTH_ERRORS * error };
         (width_m.abs() + doubt < limit).then_some(HardEnd { z_m, width_m })
     }
 
@@ -260,7 +272,7 @@ fn bands_agree(sides: &[Sides], second: &[bool]) -> Option<bool> {
 fn choose(judged: &[Judged]) -> Option<&Judged> {
     let best = |named: bool| judged.iter().find(|j| j.shape.family().is_some() == named);
     let (step, curve) = (best(true), best(false));
-    let enough = curve.map_or(0.0, |c| ADEQUATE * c.gain);
+    let enough = curve.map_or(0.0, |c| NAME_ADEQUATE * c.gain);
     step.filter(|s| s.gain > enough).or(curve)
 }
 

@@ -24,12 +24,12 @@ pub const BINS: usize = 40;
 /// Where more is lost the search for the target passes over the holes: the share is a bound.
 const HOLES: f64 = 0.4;
 
-/// In views whose region was not `told`, what lies beyond the first bin with holes is a bound.
-pub fn bounded(mut points: Vec<Point>, step: &Step, told: &[bool]) -> Vec<Point> {
+/// In views whose region was not given, what lies beyond the first bin with holes is a bound.
+pub fn bounded(mut points: Vec<Point>, step: &Step, region_given: &[bool]) -> Vec<Point> {
     let beyond = |p: &Point| p.x * step.width.signum();
     let from = points.iter().filter(|p| p.share > HOLES).map(beyond).fold(f64::INFINITY, f64::min);
     for p in &mut points {
-        p.at_least = !told[p.view] && beyond(p) >= from;
+        p.at_least = !region_given[p.view] && beyond(p) >= from;
     }
     points
 }

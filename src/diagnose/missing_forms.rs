@@ -32,21 +32,21 @@ const NEGLIGIBLE: f64 = 8.0;
 /// The least width that is tried, as a share of the greatest.
 const NARROWEST: f64 = 1e-3;
 /// As narrow as an edge need be followed: a driver's limit has no width at all.
-const HARD: f64 = 1e-4;
+const NARROWEST_EDGE: f64 = 1e-4;
 
-/// Root mean square distances of middle and width from those of `told`; the points scatter by the
+/// Root mean square distances of middle and width from those `reported`; the points scatter by the
 /// factor `scatter` more, in variance, than they are expected to.
-pub fn errors(told: &Step, base: f64, points: &[Point], scatter: f64) -> Option<[f64; 2]> {
-    let Allowed { middles, widths, typical } = allowed(told)?;
+pub fn errors(reported: &Step, base: f64, points: &[Point], scatter: f64) -> Option<[f64; 2]> {
+    let Allowed { middles, widths, typical } = allowed(reported)?;
     let rising =
-        |rise: &fn(f64) -> f64| Rising { told, base, points, scatter, typical, rise: *rise };
+        |rise: &fn(f64) -> f64| Rising { reported, base, points, scatter, typical, rise: *rise };
     let nodes: Vec<Node> = RISES
         .par_iter()
         .flat_map_iter(|rise| rising(rise).nodes(middles, widths.map(f64::ln)))
         .collect();
     let posterior = Posterior::of(nodes, |n| (-n.misfit, n.area))?;
-    let of_middle = posterior.rms(|n| n.middle - told.middle);
-    let errors = [of_middle, posterior.rms(|n| n.width - told.width.abs())];
+    let of_middle = posterior.rms(|n| n.middle - reported.middle);
+    let errors = [of_middle, posterior.rms(|n| n.width - reported.width.abs())];
     errors.iter().all(|e| e.is_finite()).then_some(errors)
 }
 
@@ -60,7 +60,8 @@ pub struct Allowed {
 impl Allowed {
     pub fn admits(&self, step: &Step) -> bool {
         let within = |x: f64, [low, high]: [f64; 2]| (low..=high).contains(&x);
-        within(step.middle, self.middles) && within(step.width.abs(), [HARD, self.widths[1]])
+        within(step.middle, self.middles)
+            && within(step.width.abs(), [NARROWEST_EDGE, self.widths[1]])
     }
 }
 
@@ -89,7 +90,7 @@ struct Node {
 
 /// A form of the rise, held against the points.
 struct Rising<'a> {
-    told: &'a Step,
+    reported: &'a Step,
     base: f64,
     points: &'a [Point],
     scatter: f64,
@@ -100,8 +101,8 @@ struct Rising<'a> {
 impl Rising<'_> {
     /// Nats below a perfect fit of a typical width; infinite as soon as it is beyond `limit`.
     fn misfit(&self, middle: f64, width: f64, limit: f64) -> f64 {
-        let lost = self.told.share * (1.0 - self.base);
-        let toward = self.told.width.signum() / width;
+        let lost = self.reported.share * (1.0 - self.base);
+        let toward = self.reported.width.signum() / width;
         let mut sum = 0.5 * (width / self.typical).ln().powi(2);
         for p in self.points {
             let loss = self.base + lost * (self.rise)((p.x - middle) * toward);
@@ -115,7 +116,7 @@ impl Rising<'_> {
 
     /// The last grid's nodes that matter.
     fn nodes(&self, middles: [f64; 2], logs: [f64; 2]) -> Vec<Node> {
-        let mut across = around(self.told.middle, self.told.width.abs(), middles);
+        let mut across = around(self.reported.middle, self.reported.width.abs(), middles);
         let mut along: Vec<f64> = even(logs, NODES).collect();
         let mut nodes = Vec::new();
         for _ in 0..ROUNDS {

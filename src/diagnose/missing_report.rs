@@ -17,12 +17,12 @@ use crate::terms::{Axis, Basis, Extent};
 /// An effect matters from this lost share on.
 const MATTERS: f64 = 0.05;
 
-/// What a finding is told about.
-pub struct Told<'a> {
+/// Writes findings, from what the views lost.
+pub struct DropoutReporter<'a> {
     /// The views' losses in the smallest patches.
     pub fine: &'a [Vec<Cell>],
     /// Whether each view's region was given.
-    pub told: &'a [bool],
+    pub region_given: &'a [bool],
     /// Share lost everywhere.
     pub base: f64,
     pub reach: &'a Extent,
@@ -32,7 +32,7 @@ pub struct Told<'a> {
 /// Where a cell lies on an axis.
 type At = Box<dyn Fn(&Cell) -> f64>;
 
-impl Told<'_> {
+impl DropoutReporter<'_> {
     pub fn finding(
         &self,
         won: &Judged,
@@ -60,7 +60,8 @@ impl Told<'_> {
 
     fn step(&self, step: Step, finding: &mut DropoutFinding) {
         let span = if step.axis == Axis::Theta { self.reach.theta } else { self.reach.z };
-        let all = bounded(points(self.fine, &|c| step.at(&c.place), span), &step, self.told);
+        let all =
+            bounded(points(self.fine, &|c| step.at(&c.place), span), &step, self.region_given);
         let own = Fitted { step, std_error: [None; 3] };
         let fitted = fit(step, self.base, &all).unwrap_or(own);
         let loss = |x: f64| fitted.step.loss(x, self.base);

@@ -70,10 +70,10 @@ fn find(views: &[Vec<Cell>], camera: &Camera, seed: Seed) -> DropoutOutcome {
     reach.theta = of(|p| p.theta);
     reach.session = of(|p| p.session_s);
     reach.light = [1.0, 1.0];
-    let seen = Seen {
+    let seen = DropoutCells {
         cells: views.to_vec(),
         fine: views.to_vec(),
-        told: vec![true; views.len()],
+        region_given: vec![true; views.len()],
         second: (0..views.len()).map(|v| v % 2 == 1).collect(),
     };
     // Eq. 1 without its tilt.

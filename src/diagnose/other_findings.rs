@@ -3,7 +3,7 @@
 use serde_json::Map;
 
 use super::diagnosis::{Alternative, Finding, Size, Status};
-use super::missing::{ADEQUATE, DropoutFinding};
+use super::missing::{DropoutFinding, NAME_ADEQUATE};
 use super::naming::{MIN_PROBABILITY, none_of_these, physics};
 use super::texture_finding::TextureFinding;
 use crate::effects;
@@ -105,7 +105,7 @@ fn weighed(name: &'static str, found: &DropoutFinding) -> Vec<Alternative> {
             .map(|(id, gain)| (id, (0.25 * (gain - best).clamp(-60.0, 0.0)).exp())),
     );
     let total: f64 = odds.iter().map(|o| o.1).sum();
-    let some = 1.0 - none_of_these(found.gain, curve, ADEQUATE);
+    let some = 1.0 - none_of_these(found.gain, curve, NAME_ADEQUATE);
     odds.into_iter()
         .map(|(effect, o)| (effect, some * o / total))
         .filter(|a| a.0 == name || a.1 > MIN_PROBABILITY)
