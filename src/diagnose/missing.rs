@@ -140,6 +140,8 @@ fn losses(
     if views.iter().filter(|v| !v.is_empty()).count() < FEWEST_VIEWS {
         return outcome;
     }
+    let (fine, region_given) = (&seen.fine[..], &seen.region_given[..]);
+    let reporter = |base| DropoutReporter { fine, region_given, base, reach, camera };
     let (steps, curves) = (steps(reach), curves(camera, reach));
     let mut explained: Vec<Vec<f64>> = views.iter().map(|v| vec![0.0; v.len()]).collect();
     let mut taken: Vec<Axis> = Vec::new();
@@ -165,14 +167,7 @@ fn losses(
         explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
         taken.push(won.shape.axis());
         let replicated = ledger.replicate(won, &seen.second);
-        let report = DropoutReporter {
-            fine: &seen.fine,
-            region_given: &seen.region_given,
-            base: ledger.base,
-            reach,
-            camera,
-        };
-        let mut finding = report.finding(won, rivals(&judged), noise.p(won.gain));
+        let mut finding = reporter(ledger.base).finding(won, rivals(&judged), noise.p(won.gain));
         finding.replicated = replicated;
         match HardEnd::of(&finding, blur) {
             // Nothing is learnt beyond the range: what is lost inside it is looked at alone.
@@ -188,14 +183,7 @@ fn losses(
     if outcome.findings.is_empty()
         && let Some((foot, p)) = few_losses(&seen.fine, reach, LEVEL, seed)
     {
-        let report = DropoutReporter {
-            fine: &seen.fine,
-            region_given: &seen.region_given,
-            base: 0.0,
-            reach,
-            camera,
-        };
-        outcome.findings.push(report.finding(&foot, rivals(std::slice::from_ref(&foot)), p));
+        outcome.findings.push(reporter(0.0).finding(&foot, rivals(std::slice::from_ref(&foot)), p));
     }
     outcome
 }
