@@ -19,6 +19,11 @@ pub trait Target: Sync {
     type Cache: Default + Clone + Send;
     /// The neighbour of a place, in the target's frame.
     fn find(&self, p: &Vector3<f32>, cache: &mut Self::Cache) -> Option<&Point>;
+    /// Width of what one point stands for at a depth of 1 m, m, where pairs are to be held closer
+    /// together near the goal ([`Gate`]).
+    fn block_width(&self) -> Option<f32> {
+        None
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,11 +43,11 @@ pub struct Alignment {
     pub covariance: Matrix6<f64>,
     pub iterations: usize,
     pub termination: Termination,
-    /// Share of the moving points that have a neighbour.
+    /// Share of the moving points that have a neighbour, before [`Gate`] holds pairs closer together.
     pub inlier_ratio: f64,
     pub correspondences: usize,
     /// The distances along the normals over what their weights expect, as a robust sigma: 1 where the
-    /// noise model says all.
+    /// noise model says all. Of the same pairs.
     pub misfit: f64,
     /// Root mean square of the distances along the normals, m; `None` without correspondences.
     pub rms_m: Option<f64>,
@@ -68,6 +73,9 @@ pub fn align<T: Target>(
     let mut cache = vec![T::Cache::default(); source.len()];
     let mut few = Few::of(source, options);
     let mut scale = f64::INFINITY;
+    let mut block_width = target.block_width().filter(|_| options.weights == Weights::Both);
+    let mut gate = None;
+    let (mut misfit, mut inlier_ratio) = (f64::INFINITY, 0.0);
     let mut last = None;
     let mut termination = Termination::MaxIterations;
     let mut iterations = 0;
@@ -79,7 +87,7 @@ pub fn align<T: Target>(
         } else {
             (source, &mut *cache)
         };
-        let equations = Round { target, options, pose: &pose, scale }.sum(points, cache);
+        let equations = Round { target, options, pose: &pose, scale, gate }.sum(points, cache);
         iterations += 1;
         let enough = equations.correspondences >= MIN_CORRESPONDENCES;
         let Some(solution) = enough.then(|| equations.solve()).flatten() else {
@@ -87,7 +95,12 @@ pub fn align<T: Target>(
                 few.enough = true;
                 continue;
             }
+            if gate.take().is_some() {
+                block_width = None;
+                continue;
+            }
             termination = Termination::TooFewCorrespondences;
+            inlier_ratio = 0.0;
             last = None;
             break;
         };
@@ -96,18 +109,29 @@ pub fn align<T: Target>(
         if options.kernel != Kernel::Square {
             scale = equations.robust_sigma();
         }
+        if gate.is_none() {
+            misfit = scale;
+            inlier_ratio = equations.correspondences as f64 / points.len() as f64;
+        }
         let step = solution.step;
         pose = renormalised(&(moved(&step) * pose));
         let (shift, turn) = (step.fixed_rows::<3>(0).norm(), step.fixed_rows::<3>(3).norm());
         last = Some((equations, solution));
+        let near = shift < NEAR && turn < NEAR;
+        if let Some(width) = block_width
+            && misfit.is_finite()
+            && (near || 2 * iterations >= options.max_iterations)
+        {
+            gate.get_or_insert(Gate::of(options.max_correspondence_m, misfit, width));
+        }
         if coarse {
-            few.enough = shift < NEAR && turn < NEAR;
+            few.enough = near;
         } else if shift < options.min_shift_m && turn < options.min_turn_rad {
             termination = Termination::Converged;
             break;
         }
     }
-    Alignment { misfit: scale, ..finish(pose, last, termination, iterations, source.len()) }
+    Alignment { misfit, inlier_ratio, ..finish(pose, last, termination, iterations) }
 }
 
 /// The points of the first rounds: far from the goal a few tell the way as well as all. The paper's
@@ -131,6 +155,40 @@ impl Few {
     }
 }
 
+/// How far apart a pair may be once the motion is nearly found.
+///
+/// Where the noise model explains the residuals, all pairs within the greatest distance count. Where it
+/// does not (other surfaces beside the right one, a rolling shutter), only the nearer ones do: those
+/// within that distance times [`SOUND_MISFIT`] / misfit. On fr1_rpy the mean error of a motion falls by
+/// 16 %, in a simulated room nothing changes (reports/maps).
+#[derive(Debug, Clone, Copy)]
+struct Gate {
+    /// m.
+    distance: f32,
+    /// A pair by projection is up to about a block apart: so much at a depth of 1 m.
+    block_width: f32,
+}
+
+/// Misfit of a film whose noise model is right, a Kinect's steps in it: 1.32 to 1.42 in a simulated
+/// room. Real films have 3 to 8 with the paper's Eq. 1.
+pub const SOUND_MISFIT: f64 = 1.45;
+/// No nearer than this share of the greatest distance.
+const MIN_GATE: f64 = 0.2;
+
+impl Gate {
+    fn of(max_m: f32, misfit: f64, block_width: f32) -> Self {
+        let share = (SOUND_MISFIT / misfit).clamp(MIN_GATE, 1.0);
+        Gate { distance: max_m * share as f32, block_width }
+    }
+
+    /// A point at a depth, m, and one so far from it, squared.
+    #[inline]
+    fn passes(&self, depth: f32, squared: f32) -> bool {
+        let max = self.distance.max(self.block_width * depth);
+        squared <= max * max
+    }
+}
+
 /// exp of a small motion: shift and turn about the target's origin.
 fn moved(step: &nalgebra::Vector6<f64>) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_scaled_axis(step.fixed_rows::<3>(3).into_owned());
@@ -148,7 +206,6 @@ fn finish(
     last: Option<(NormalEquations, Solution)>,
     termination: Termination,
     iterations: usize,
-    points: usize,
 ) -> Alignment {
     let (correspondences, rms_m, solution) = match last {
         Some((equations, solution)) => {
@@ -163,7 +220,7 @@ fn finish(
         covariance: solution.as_ref().map_or(unknown, |s| s.covariance),
         iterations,
         termination,
-        inlier_ratio: correspondences as f64 / points.max(1) as f64,
+        inlier_ratio: 0.0,
         correspondences,
         misfit: f64::INFINITY,
         rms_m,
@@ -178,6 +235,7 @@ struct Round<'a, T> {
     pose: &'a Isometry3<f64>,
     /// Of weighted residuals that are no outliers.
     scale: f64,
+    gate: Option<Gate>,
 }
 
 impl<T: Target> Round<'_, T> {
@@ -191,6 +249,9 @@ impl<T: Target> Round<'_, T> {
             for (s, cache) in points.iter().zip(cache) {
                 let at = motion.moved(&s.at);
                 let Some(d) = self.target.find(&at, cache) else { continue };
+                if self.gate.is_some_and(|g| !g.passes(s.at.z, (d.at - at).norm_squared())) {
+                    continue;
+                }
                 if any_normal || motion.turned(&s.normal).dot(&d.normal) >= min_cosine {
                     batch.push(&at, d, self.variance(s, d), &robust);
                 }

@@ -121,6 +121,11 @@ impl<'a> IndexMap<'a> {
         IndexMap { camera, grid, camera_from_map, front }
     }
 
+    /// Width of a block at a depth of 1 m, m.
+    pub fn block_width(&self) -> f32 {
+        1.0 / self.grid.focal[0]
+    }
+
     /// The block that a place of the map's frame falls in.
     #[inline]
     pub fn block(&self, at: &Vector3<f32>) -> Option<usize> {

@@ -5,7 +5,7 @@
 use nalgebra::{Isometry3, Vector3};
 
 use super::blocks::Blocks;
-use super::icp::Target;
+use super::icp::{SOUND_MISFIT, Target};
 use super::index_map::{IndexMap, SIGMAS, joint, within};
 use super::map_points::{MapPoint, colour_of, mean_colour};
 use super::point::{Motion, Point};
@@ -42,9 +42,6 @@ const CONFIRMED: u32 = 3;
 /// ... by the time this many frames have passed was a mistake.
 const PROBATION: u32 = 30;
 
-/// Misfit of a film whose noise model is right, a Kinect's steps in it: 1.32 to 1.42 in a simulated room.
-/// Real films have 3 to 8 with the paper's Eq. 1.
-const SOUND: f64 = 1.45;
 /// Averages of fewer are as rough as the frames themselves.
 const MIN_OBSERVATIONS: f32 = 3.0;
 
@@ -71,7 +68,8 @@ impl Surfels {
     /// How many observations count is the noise model's to say as far as it holds: where residuals are
     /// larger than it expects, poses err, too, and what is old is of less use.
     pub fn remember(&mut self, max_observations: f32, misfit: f64) {
-        let held = if misfit.is_finite() { (SOUND / misfit).powi(2).min(1.0) as f32 } else { 1.0 };
+        let held =
+            if misfit.is_finite() { (SOUND_MISFIT / misfit).powi(2).min(1.0) as f32 } else { 1.0 };
         self.max_observations =
             (held * max_observations).max(MIN_OBSERVATIONS.min(max_observations));
     }
@@ -216,6 +214,10 @@ impl Target for SurfelTarget<'_> {
             candidates.min_by(|a, b| squared(a).total_cmp(&squared(b)))
         })
     }
+
+    fn block_width(&self) -> Option<f32> {
+        Some(self.index_map.block_width())
+    }
 }
 
 #[cfg(test)]
@@ -231,7 +233,7 @@ mod tests {
         };
         assert_eq!(after(30.0, f64::INFINITY), 30.0, "no kernel, no misfit");
         assert_eq!(after(30.0, 1.0), 30.0);
-        assert!((after(30.0, 2.0 * SOUND) - 7.5).abs() < 1e-3);
+        assert!((after(30.0, 2.0 * SOUND_MISFIT) - 7.5).abs() < 1e-3);
         assert_eq!(after(30.0, 10.0), MIN_OBSERVATIONS);
         assert_eq!(after(2.0, 10.0), 2.0, "never more than asked for");
     }

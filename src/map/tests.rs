@@ -4,10 +4,10 @@ use nalgebra::{Isometry3, Vector3};
 use rand_distr::{Distribution, Normal};
 
 use super::blocks::Blocks;
-use super::icp::{Alignment, Termination, align};
+use super::icp::{Alignment, Target, Termination, align};
 use super::index_map::Projective;
 use super::nearest::Nearest;
-use super::point::Noise;
+use super::point::{Noise, Point};
 use super::voxel::{Voxels, points_of};
 use super::{Init, Kernel, Options, Weights};
 use crate::camera::Camera;
@@ -143,6 +143,56 @@ fn weights_beat_none_where_noise_differs() {
         squares = [squares[0] + errors[0].powi(2), squares[1] + errors[1].powi(2)];
     }
     assert!(won >= 17 && squares[1] < 0.5 * squares[0], "{won} of 20; {squares:?}");
+}
+
+/// A target whose pairs are held closer together near the goal.
+struct Gated<'a>(Projective<'a>);
+
+impl Target for Gated<'_> {
+    type Cache = ();
+    fn find(&self, p: &Vector3<f32>, cache: &mut ()) -> Option<&Point> {
+        self.0.find(p, cache)
+    }
+    fn block_width(&self) -> Option<f32> {
+        Some((4.0 / camera().fx) as f32)
+    }
+}
+
+/// Where the noise is four times the model's and a fifth of the target has moved by 7 cm, within the
+/// widest gate of 10 cm, the nearer gate keeps those pairs out. Where all is as the model says, nothing
+/// changes.
+#[test]
+fn pairs_are_held_together_where_the_noise_model_falls_short() {
+    let (still, moved) = (picture(&CORNER, &Isometry3::identity()), picture(&CORNER, &motion()));
+    let (camera, options) = (camera(), Options::best());
+    let errors = |seed: u64, factor: f32, apart_m: f32| {
+        let drawn = |depth: &[f32], stream: &str| -> Vec<f32> {
+            let noisy = noisy(depth, &mut Seed(seed).stream(stream));
+            depth.iter().zip(noisy).map(|(z, noisy)| z + factor * (noisy - z)).collect()
+        };
+        let mut target = drawn(&still, "still");
+        for (i, z) in target.iter_mut().enumerate() {
+            *z -= if i % camera.width % 80 < 16 { apart_m } else { 0.0 };
+        }
+        let (source, target) = (blocks(&drawn(&moved, "moved")), blocks(&target));
+        let points: Vec<_> = source.points.iter().flatten().copied().collect();
+        let wide = || Projective::new(&camera, &target, 0.1);
+        let start = Isometry3::identity();
+        let found = [
+            align(&points, &wide(), start, &options),
+            align(&points, &Gated(wide()), start, &options),
+        ];
+        assert!(found[1].inlier_ratio > 0.8, "{}", found[1].inlier_ratio);
+        found.map(|found| error(&found, &motion()).0)
+    };
+    let mut sums = [0.0; 2];
+    for seed in 0..6 {
+        let [wide, gated] = errors(seed, 1.0, 0.0);
+        assert_eq!(wide, gated, "seed {seed}, the model's own noise");
+        let [wide, gated] = errors(seed, 4.0, 0.07);
+        sums = [sums[0] + wide, sums[1] + gated];
+    }
+    assert!(sums[1] < 0.5 * sums[0], "{sums:?}");
 }
 
 /// The reported covariance is the scatter of the estimates, to a factor: 40 draws give a standard
