@@ -45,14 +45,15 @@ pub struct Batch {
     place_squared: Lanes,
     squares_m2: Lanes,
     correspondences: usize,
-    sizes: Vec<f32>,
+    /// `None` where they are not asked for.
+    sizes: Option<Vec<f32>>,
 }
 
 impl Batch {
-    /// With room for so many sizes, where a kernel asks for them.
-    pub fn new(kernel: Kernel, points: usize) -> Self {
-        let room = if kernel == Kernel::Square { 0 } else { points + LANES };
-        Batch { sizes: Vec::with_capacity(room), ..Batch::default() }
+    /// With room for the sizes of so many points, where they are asked for.
+    pub fn new(sizes: Option<usize>) -> Self {
+        let sizes = sizes.map(|points| Vec::with_capacity(points + LANES));
+        Batch { sizes, ..Batch::default() }
     }
 
     /// A moved point, its neighbour, and the variance of the distance between them along the
@@ -78,8 +79,8 @@ impl Batch {
         let r = each(|i| off[0][i] * n[0][i] + off[1][i] * n[1][i] + off[2][i] * n[2][i]);
         let w2 = each(|i| 1.0 / self.variance[i]);
         let squared = each(|i| r[i] * r[i] * w2[i]);
-        if robust.kernel != Kernel::Square {
-            self.sizes.extend(each(|i| squared[i].sqrt()));
+        if let Some(sizes) = &mut self.sizes {
+            sizes.extend(each(|i| squared[i].sqrt()));
         }
         let w2 = robust.weighted(&w2, &squared);
         let cross = |a: usize, b: usize| each(|i| p[a][i] * n[b][i] - p[b][i] * n[a][i]);
@@ -115,7 +116,9 @@ impl Batch {
         }
         if left > 0 {
             self.add(robust);
-            self.sizes.truncate(self.correspondences);
+            if let Some(sizes) = &mut self.sizes {
+                sizes.truncate(self.correspondences);
+            }
         }
         let total = |lanes: &Lanes| lanes.iter().map(|&v| f64::from(v)).sum::<f64>();
         NormalEquations {
@@ -128,7 +131,7 @@ impl Batch {
             place_squared: total(&self.place_squared),
             correspondences: self.correspondences,
             squares_m2: total(&self.squares_m2),
-            sizes: self.sizes,
+            sizes: self.sizes.unwrap_or_default(),
         }
     }
 }
@@ -178,7 +181,7 @@ mod tests {
     fn side_by_side_is_as_one_by_one() {
         let wave = |i: usize, k: f32| (i as f32 * k).sin();
         let robust = Robust { kernel: Kernel::Huber, scale: 0.5 };
-        let mut batch = Batch::new(robust.kernel, 19);
+        let mut batch = Batch::new(Some(19));
         let (mut h, mut g) = (Matrix6::<f64>::zeros(), Vector6::<f64>::zeros());
         let mut sizes = Vec::new();
         for i in 1..20 {

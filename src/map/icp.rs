@@ -74,6 +74,7 @@ pub fn align<T: Target>(
     let mut few = Few::of(source, options);
     let mut scale = f64::INFINITY;
     let mut block_width = target.block_width().filter(|_| options.weights == Weights::Both);
+    let sizes = options.kernel != Kernel::Square || block_width.is_some();
     let mut gate = None;
     let (mut misfit, mut inlier_ratio) = (f64::INFINITY, 0.0);
     let mut last = None;
@@ -87,7 +88,8 @@ pub fn align<T: Target>(
         } else {
             (source, &mut *cache)
         };
-        let equations = Round { target, options, pose: &pose, scale, gate }.sum(points, cache);
+        let equations =
+            Round { target, options, pose: &pose, scale, gate, sizes }.sum(points, cache);
         iterations += 1;
         let enough = equations.correspondences >= MIN_CORRESPONDENCES;
         let Some(solution) = enough.then(|| equations.solve()).flatten() else {
@@ -106,7 +108,7 @@ pub fn align<T: Target>(
         };
         // The first round's residuals hold the motion itself: only from the second on is what
         // stands out an outlier.
-        if options.kernel != Kernel::Square {
+        if sizes {
             scale = equations.robust_sigma();
         }
         if gate.is_none() {
@@ -119,7 +121,6 @@ pub fn align<T: Target>(
         last = Some((equations, solution));
         let near = shift < NEAR && turn < NEAR;
         if let Some(width) = block_width
-            && misfit.is_finite()
             && (near || 2 * iterations >= options.max_iterations)
         {
             gate.get_or_insert(Gate::of(options.max_correspondence_m, misfit, width));
@@ -236,6 +237,8 @@ struct Round<'a, T> {
     /// Of weighted residuals that are no outliers.
     scale: f64,
     gate: Option<Gate>,
+    /// Whether the residuals' sizes are kept.
+    sizes: bool,
 }
 
 impl<T: Target> Round<'_, T> {
@@ -245,7 +248,7 @@ impl<T: Target> Round<'_, T> {
         let any_normal = min_cosine <= -1.0;
         let robust = Robust { kernel: self.options.kernel, scale: self.scale as f32 };
         let part = |(points, cache): (&[Point], &mut [T::Cache])| {
-            let mut batch = Batch::new(robust.kernel, points.len());
+            let mut batch = Batch::new(self.sizes.then_some(points.len()));
             for (s, cache) in points.iter().zip(cache) {
                 let at = motion.moved(&s.at);
                 let Some(d) = self.target.find(&at, cache) else { continue };
