@@ -17,7 +17,7 @@ use super::pixels::{common, measure_tails};
 use super::reading::read;
 use super::steps::{Steps, lattice};
 use super::structure::{Structure, structures};
-use super::tails::tails;
+use super::tails::{Confusers, tails};
 use super::texture_finding::TextureFinding;
 use crate::Progress;
 use crate::error::{Error, Result};
@@ -111,8 +111,9 @@ impl Baseline {
         let lattice = lattice(&fields, simulated);
         let steps = Steps::of(&lattice, &structure, &fields, simulated);
         let lost = missing(&fields, None, &survey, camera, options.seed).findings;
+        let confusers = Confusers { uneven: false, simulated: true };
         Baseline {
-            heavy: tails(&structure, &none, 0.03 * options.level, false).is_some(),
+            heavy: tails(&structure, &none, 0.03 * options.level, confusers).is_some(),
             fields,
             survey,
             structure,

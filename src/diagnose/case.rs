@@ -17,7 +17,7 @@ use super::pixels::{common, mean_of, measure_tails, pixel_terms, terms_of};
 use super::reading::{LoadedViews, refuse_other_size};
 use super::steps::{Steps, forget_windows, is_raw, lattice};
 use super::structure::{Structure, fixed_px2_by_view, structures};
-use super::tails::tails;
+use super::tails::{Confusers, tails};
 use super::texture_finding::TextureFinding;
 use crate::Progress;
 use crate::effects::{Active, RAY_FOR_DEPTH};
@@ -220,7 +220,8 @@ impl<'a> Case<'a> {
             || self.survey.refits_sigma && !terms.iter().all(holds)
             || self.known.has_uneven_noise()
             || !self.known.variance.iter().all(holds);
-        let tails = tails(&structure, &self.known, each, uneven)
+        let confusers = Confusers { uneven, simulated: self.baseline.is_some() };
+        let tails = tails(&structure, &self.known, each, confusers)
             .filter(|t| !alike && self.stands(t.p, each));
         ScatterResult { structure, lattice, textures, tails, outcome }
     }

@@ -6,7 +6,6 @@ use serde_json::{Map, json};
 
 use super::super::in_time::still_share;
 use super::super::structure::Jitter;
-use super::super::tails::{GAUSSIAN_TAIL, TailCounts, tails};
 use super::*;
 use crate::model::{Effect, NoiseModel};
 use crate::rng::{Seed, Stream};
@@ -275,32 +274,6 @@ fn what_views_share_errs_as_pairs_do() {
     assert!(alarms <= 36, "{alarms} of 400");
 }
 
-/// A Gaussian's own share beyond four deviations is no tail; a tenth of a per cent is one.
-#[test]
-fn tails_are_heavy_when_most_views_have_them() {
-    let tailed = |share: f64, of: usize| -> Vec<Structure> {
-        let view = |k: usize| {
-            let (tail, n) = (if k < of { share } else { GAUSSIAN_TAIL }, 50_000.0);
-            // As exponential as a tail of matches gone astray.
-            let between = [0.4, 0.24, 0.2, 0.12, 0.03].map(|part| part * n * tail);
-            let tails = TailCounts { n, beyond: n * tail, between };
-            Structure { tails, ..Structure::default() }
-        };
-        (0..VIEWS).map(view).collect()
-    };
-    assert!(tails(&tailed(GAUSSIAN_TAIL, VIEWS), &KnownTerms::default(), 1e-3, false).is_none());
-    assert!(
-        tails(&tailed(2e-3, 4), &KnownTerms::default(), 1e-3, false).is_none(),
-        "in a few views only"
-    );
-    let found = tails(&tailed(2e-3, VIEWS), &KnownTerms::default(), 1e-3, false).expect("a tail");
-    assert_eq!(found.families, ["heavy-tails"]);
-    let fraction = parameter(&found, "fraction")[0];
-    assert!(fraction > 2e-3 && fraction < 0.2, "{fraction}");
-    let known = knowing("heavy-tails", "fraction", fraction);
-    assert!(tails(&tailed(2e-3, VIEWS), &known, 1e-3, false).is_none());
-}
-
 #[test]
 fn one_view_is_no_sample() {
     let mut rng = Seed(7).stream("noise/one");
@@ -308,5 +281,4 @@ fn one_view_is_no_sample() {
     let one = &with(&mut rng, add)[..1];
     assert!(texture_findings(one, &KnownTerms::default(), LEVEL).is_empty());
     assert!(texture_findings(&[], &KnownTerms::default(), LEVEL).is_empty());
-    assert!(tails(&[], &KnownTerms::default(), 1e-3, false).is_none());
 }

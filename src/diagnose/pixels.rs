@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::field::Field;
 use super::known::KnownTerms;
+use super::kurtosis::FourthMoment;
 use super::layers::Survey;
 use super::outcome::Outcome;
 use super::structure::Structure;
@@ -61,7 +62,6 @@ pub(super) fn measure_tails(
     bench: &Workbench<'_>,
 ) {
     let factors = pixel_terms(fields, variance, survey, bench);
-    let camera = &bench.sensor.camera;
     structure.par_iter_mut().zip(fields).enumerate().for_each(|(n, (s, field))| {
         let whitened = |frame: &Vec<f32>| -> Vec<f32> {
             let whitened: Vec<f32> = (0..frame.len())
@@ -75,15 +75,13 @@ pub(super) fn measure_tails(
         let frames: Vec<Vec<f32>> = field.first.iter().map(whitened).collect();
         // Single frames, unless what stands still in them could be taken for a tail.
         let apart = s.lagged[0].is_some_and(|c| c < HARDLY_STILL);
-        let looks = if apart {
-            frames.iter().map(|f| tail(f, camera)).collect()
-        } else if frames.is_empty() {
-            Vec::new()
-        } else {
-            vec![tail(&moving(&frames, s.lagged[0]), camera)]
-        };
-        s.tails = TailCounts::default();
-        looks.iter().for_each(|l| s.tails.add(l));
+        let looks =
+            if apart || frames.is_empty() { frames } else { vec![moving(&frames, s.lagged[0])] };
+        (s.tails, s.fourth) = (TailCounts::default(), FourthMoment::default());
+        for look in &looks {
+            s.tails.add(&tail(look, field.width));
+            s.fourth.add(&FourthMoment::of(look, field.width));
+        }
     });
 }
 

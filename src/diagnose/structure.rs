@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::exposure::FRAMES_KEPT;
 use super::field::Field;
 use super::frames::frame_log_variance;
+use super::kurtosis::FourthMoment;
 use super::pairs::Pairs;
 use super::tails::{FEWEST_READINGS, TailCounts};
 use super::texture::{
@@ -45,6 +46,7 @@ pub struct Structure {
     pub jitter: Option<Jitter>,
     /// Residuals beyond four local standard deviations.
     pub tails: TailCounts,
+    pub fourth: FourthMoment,
 }
 
 impl Structure {

@@ -6,10 +6,10 @@ use statrs::function::erf::erfc;
 use super::known::KnownTerms;
 use super::outliers::{Outliers, outliers};
 use super::parameters::estimate;
+use super::patches::patches;
 use super::structure::Structure;
-use super::texture_finding::{TextureFinding, ViewMean};
-use crate::camera::Camera;
-use crate::stats::{MAD_TO_SIGMA, bisect, median_in_place};
+use super::texture_finding::{self, TextureFinding, ViewMean};
+use crate::stats::{MAD_TO_SIGMA, bisect};
 use crate::terms::{Axis, Statistic};
 
 /// A Gaussian's share beyond four standard deviations.
@@ -17,11 +17,6 @@ pub const GAUSSIAN_TAIL: f64 = 6.334e-5;
 const TAIL_SIGMAS: f32 = 4.0;
 /// What lies beyond the last is no tail of the noise: a few such errors would decide its mean.
 pub const TAIL_EDGES: [f64; 6] = [4.0, 5.0, 6.0, 8.0, 11.0, 16.0];
-
-/// Side of the patches whose own scale their residuals are held against: this share of the
-/// picture's width, px.
-const PATCHES_ACROSS: usize = 7;
-const SMALLEST_PATCH: usize = 40;
 
 /// How many residuals were looked at, and how many lie between each two of [`TAIL_EDGES`], in
 /// standard deviations of their patch; beyond the first, whatever their size, in all.
@@ -55,37 +50,10 @@ impl TailCounts {
 }
 
 /// The tail of an image's residuals.
-pub fn tail(image: &[f32], camera: &Camera) -> TailCounts {
+pub fn tail(image: &[f32], width: usize) -> TailCounts {
     let mut counts = TailCounts::default();
-    let side = (camera.width / PATCHES_ACROSS).max(SMALLEST_PATCH);
-    for v0 in (0..camera.height).step_by(side) {
-        for u0 in (0..camera.width).step_by(side) {
-            let rows = v0..(v0 + side).min(camera.height);
-            let patch: Vec<f32> = rows
-                .flat_map(|v| {
-                    let u1 = (u0 + side).min(camera.width);
-                    image[v * camera.width + u0..v * camera.width + u1].iter().copied()
-                })
-                .filter(|r| r.is_finite())
-                .map(f32::abs)
-                .collect();
-            if patch.len() < side * side / 4 {
-                continue;
-            }
-            let mut sizes = patch.clone();
-            let mad = MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
-            // Coarse words make the median jump; the bulk's own spread bounds it below.
-            let end = sizes.len() * 9 / 10;
-            sizes.select_nth_unstable_by(end, f32::total_cmp);
-            let most = &sizes[..end];
-            let square: f64 = most.iter().map(|r| f64::from(*r).powi(2)).sum();
-            // Nine tenths of a Gaussian have 0.72 of its standard deviation... squared 0.6225.
-            let spread = (square / most.len() as f64 / 0.6225).sqrt() as f32;
-            let sigma = mad.max(0.8 * spread);
-            if sigma > 0.0 {
-                patch.iter().for_each(|r| counts.count(*r / sigma));
-            }
-        }
+    for patch in patches(image, width) {
+        patch.pixels.iter().for_each(|i| counts.count(image[*i].abs() / patch.sigma));
     }
     counts
 }
@@ -101,13 +69,24 @@ const UNEQUAL: f64 = 1.5;
 /// Views too small to show a tail, in readings.
 pub const FEWEST_READINGS: f64 = 5000.0;
 
-/// Are the residuals' tails heavier than a Gaussian's? `uneven` says that the noise is of unequal
-/// size where no law was found for it, which makes a tail too.
+/// What makes residuals look heavy-tailed where their noise is not.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Confusers {
+    /// The noise is of unequal size where no law was found for it.
+    pub uneven: bool,
+    /// Tails are a simulation's or are compared with one: the light of a real sensor makes its noise
+    /// uneven from pixel to pixel.
+    pub simulated: bool,
+}
+
+/// Are the residuals' tails heavier than a Gaussian's?
+///
+/// Heavy ones show far out, weak ones in the fourth moment.
 pub fn tails(
     views: &[Structure],
     known: &KnownTerms,
     level: f64,
-    uneven: bool,
+    confusers: Confusers,
 ) -> Option<TextureFinding> {
     let mixture = Mixture::of(known);
     // A simulation's tails are compared elsewhere.
@@ -115,20 +94,26 @@ pub fn tails(
         return None;
     }
     let own = mixture.map_or(GAUSSIAN_TAIL, |m| m.tail(1.0, SURE_SCALE_ERRORS).max(GAUSSIAN_TAIL));
-    let m = ViewMean::of(views, Structure::tail_share)?;
+    let share = ViewMean::of(views, Structure::tail_share)?;
     // Patches of unequal noise, and steps of the words, make a tail of a Gaussian too.
-    let much = if uneven { MUCH_HEAVIER } else { 1.0 };
+    let much = if confusers.uneven { MUCH_HEAVIER } else { 1.0 };
     let expected = much * UNEQUAL * own;
-    if m.value < much * HEAVY * own || m.p_above(expected) > level {
-        return None;
-    }
+    let readings: f64 = views.iter().map(|s| s.tails.n).sum();
+    let (p, nats) = if share.value >= much * HEAVY * own && share.p_above(expected) <= level {
+        (share.p_above(own), share.value * readings * (share.value / own).ln())
+    } else {
+        let looked = mixture.is_none() && !confusers.uneven && !confusers.simulated;
+        let excess = ViewMean::of(views, |s| s.fourth.excess()).filter(|_| looked)?;
+        let p = excess.p_above(0.0);
+        (p <= level).then(|| (p, texture_finding::nats(&excess, 0.0)))?
+    };
     let mut counts = TailCounts::default();
     views.iter().filter(|s| s.tail_share().is_some()).for_each(|s| counts.add(&s.tails));
     let mut parameters = Map::new();
-    parameters.insert("share_beyond_4_sigma".into(), json!(m.value));
+    parameters.insert("share_beyond_4_sigma".into(), json!(share.value));
     // Where all that strays is gross it has no scale.
-    let mut size_sigma = 4.0 * m.value.sqrt();
-    if let Some(Outliers { fraction, scale }) = outliers(&counts, m.std_error / m.value) {
+    let mut size_sigma = 4.0 * share.value.sqrt();
+    if let Some(Outliers { fraction, scale }) = outliers(&counts, share.std_error / share.value) {
         parameters.insert("fraction".into(), estimate(fraction[0], fraction[1]));
         parameters.insert("scale".into(), estimate(scale[0], scale[1]));
         size_sigma = fraction[0].sqrt() * scale[0];
@@ -140,8 +125,8 @@ pub fn tails(
         interval: [4.0, 2.0 * mean_size(&counts) - 4.0],
         parameters,
         size_sigma,
-        p: m.p_above(own),
-        nats: m.value * views.iter().map(|s| s.tails.n).sum::<f64>() * (m.value / own).ln(),
+        p,
+        nats,
         words: None,
     })
 }
@@ -199,13 +184,17 @@ fn mean_size(counts: &TailCounts) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::kurtosis::FourthMoment;
+    use crate::rng::Seed;
+    use rand_distr::{Distribution, StandardNormal, StudentT};
+
+    const VIEWS: usize = 14;
 
     /// Against a Monte-Carlo draw of the catalogue's mixture.
     #[test]
     fn a_mixture_is_as_wide_and_as_heavy_as_what_is_drawn_from_it() {
-        use crate::rng::Seed;
+        use crate::stats::median_in_place;
         use rand::Rng;
-        use rand_distr::{Distribution, StandardNormal};
         let mut rng = Seed(3).stream("mixture");
         for (fraction, scale) in [(0.05, 8.0), (0.3, 3.0), (1.0, 100.0)] {
             let mixture = Mixture { fraction, scale, scale_error: 0.0 };
@@ -223,5 +212,79 @@ mod tests {
             let error = 5.0 * (share / drawn.len() as f64).sqrt();
             assert!((mixture.tail(1.0, 0.0) - share).abs() < error + 0.03 * share, "{share}");
         }
+    }
+
+    /// A Gaussian's own share beyond four deviations is no tail; a tenth of a per cent is one.
+    #[test]
+    fn tails_are_heavy_when_most_views_have_them() {
+        let tailed = |share: f64, of: usize| -> Vec<Structure> {
+            let view = |k: usize| {
+                let (tail, n) = (if k < of { share } else { GAUSSIAN_TAIL }, 50_000.0);
+                // As exponential as a tail of matches gone astray.
+                let between = [0.4, 0.24, 0.2, 0.12, 0.03].map(|part| part * n * tail);
+                let tails = TailCounts { n, beyond: n * tail, between };
+                Structure { tails, ..Structure::default() }
+            };
+            (0..VIEWS).map(view).collect()
+        };
+        assert!(
+            tails(
+                &tailed(GAUSSIAN_TAIL, VIEWS),
+                &KnownTerms::default(),
+                1e-3,
+                Confusers::default()
+            )
+            .is_none()
+        );
+        assert!(
+            tails(&tailed(2e-3, 4), &KnownTerms::default(), 1e-3, Confusers::default()).is_none(),
+            "in a few views only"
+        );
+        let found = tails(&tailed(2e-3, VIEWS), &KnownTerms::default(), 1e-3, Confusers::default())
+            .expect("a tail");
+        assert_eq!(found.families, ["heavy-tails"]);
+        let fraction = found.parameters["fraction"]["value"].as_f64().expect("a number");
+        assert!(fraction > 2e-3 && fraction < 0.2, "{fraction}");
+        let mut known = KnownTerms::default();
+        known.learn("heavy-tails", "fraction", fraction);
+        assert!(tails(&tailed(2e-3, VIEWS), &known, 1e-3, Confusers::default()).is_none());
+    }
+
+    /// Weak tails, with hardly anything far out: a Student's t is seen by its fourth moment unless the
+    /// noise is uneven anyway, or a simulation's; a Gaussian and a Gaussian of uneven size are not.
+    #[test]
+    fn weak_tails_are_seen_by_the_fourth_moment() {
+        const SIZE: [usize; 2] = [200, 150];
+        let student = StudentT::new(80.0).expect("a distribution");
+        let views = |stream: &str, heavy: bool, uneven: f64| -> Vec<Structure> {
+            let mut rng = Seed(11).stream(stream);
+            let view = |_| {
+                let mut pixel = |i: usize| -> f32 {
+                    let x: f64 = if heavy {
+                        student.sample(&mut rng)
+                    } else {
+                        StandardNormal.sample(&mut rng)
+                    };
+                    (x * (1.0 + uneven * ((i % SIZE[0]) as f64 / 25.0).sin())) as f32
+                };
+                let image: Vec<f32> = (0..SIZE[0] * SIZE[1]).map(&mut pixel).collect();
+                Structure {
+                    tails: tail(&image, SIZE[0]),
+                    fourth: FourthMoment::of(&image, SIZE[0]),
+                    ..Structure::default()
+                }
+            };
+            (0..VIEWS).map(view).collect()
+        };
+        let told = |views: &[Structure], uneven: bool, simulated: bool| {
+            let confusers = Confusers { uneven, simulated };
+            tails(views, &KnownTerms::default(), 1e-3, confusers)
+        };
+        let heavy = views("student", true, 0.0);
+        assert_eq!(told(&heavy, false, false).expect("weak tails").families, ["heavy-tails"]);
+        assert!(told(&heavy, true, false).is_none(), "of a noise that is uneven anyway");
+        assert!(told(&heavy, false, true).is_none(), "of a simulation");
+        assert!(told(&views("gaussian", false, 0.0), false, false).is_none());
+        assert!(told(&views("uneven", false, 0.3), false, false).is_none());
     }
 }

@@ -1,0 +1,42 @@
+//! Patches of an image, each with the standard deviation of its own residuals.
+
+use crate::stats::{MAD_TO_SIGMA, median_in_place};
+
+/// Side of a patch: this share of the picture's width, px.
+const PATCHES_ACROSS: usize = 7;
+const SMALLEST_PATCH: usize = 40;
+
+/// The pixels of a patch that have a residual, and their standard deviation; what strays has no say in
+/// it.
+pub struct Patch {
+    pub pixels: Vec<usize>,
+    pub sigma: f32,
+}
+
+/// Those of an image that are a quarter full or more.
+pub fn patches(image: &[f32], width: usize) -> impl Iterator<Item = Patch> + '_ {
+    let side = (width / PATCHES_ACROSS).max(SMALLEST_PATCH);
+    let height = image.len() / width.max(1);
+    let corners = (0..height)
+        .step_by(side)
+        .flat_map(move |v0| (0..width).step_by(side).map(move |u0| [u0, v0]));
+    corners.filter_map(move |[u0, v0]| {
+        let (rows, end) = (v0..(v0 + side).min(height), (u0 + side).min(width));
+        let all = rows.flat_map(|v| v * width + u0..v * width + end);
+        let pixels: Vec<usize> = all.filter(|i| image[*i].is_finite()).collect();
+        if pixels.len() < side * side / 4 {
+            return None;
+        }
+        let mut sizes: Vec<f32> = pixels.iter().map(|i| image[*i].abs()).collect();
+        let mad = MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
+        // Coarse words make the median jump; the bulk's own spread bounds it below.
+        let end = sizes.len() * 9 / 10;
+        sizes.select_nth_unstable_by(end, f32::total_cmp);
+        let most = &sizes[..end];
+        let square: f64 = most.iter().map(|r| f64::from(*r).powi(2)).sum();
+        // Nine tenths of a Gaussian have 0.72 of its standard deviation... squared 0.6225.
+        let spread = (square / most.len() as f64 / 0.6225).sqrt() as f32;
+        let sigma = mad.max(0.8 * spread);
+        (sigma > 0.0).then_some(Patch { pixels, sigma })
+    })
+}
