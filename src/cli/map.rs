@@ -81,8 +81,8 @@ struct Tuning {
     /// Side of an image block in px
     #[arg(long, value_name = "PX", value_parser = count(1, MAX_BLOCK_PX))]
     block: Option<usize>,
-    /// Greatest distance between the points of a pair, m; near the goal less counts where frames fit the
-    /// map worse than the noise model expects
+    /// Greatest distance between the points of a pair, m. With the default method, once the motion is
+    /// nearly found, a smaller one where frames fit the map worse than the noise model expects
     #[arg(long, value_name = "M", value_parser = between(GATE_M[0], GATE_M[1], "m"))]
     gate: Option<f64>,
     /// Maximum number of iterations of an alignment

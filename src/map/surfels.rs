@@ -231,7 +231,7 @@ mod tests {
             surfels.remember(max, misfit);
             surfels.max_observations
         };
-        assert_eq!(after(30.0, f64::INFINITY), 30.0, "no kernel, no misfit");
+        assert_eq!(after(30.0, f64::INFINITY), 30.0, "no misfit is known");
         assert_eq!(after(30.0, 1.0), 30.0);
         assert!((after(30.0, 2.0 * SOUND_MISFIT) - 7.5).abs() < 1e-3);
         assert_eq!(after(30.0, 10.0), MIN_OBSERVATIONS);

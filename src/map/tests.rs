@@ -183,6 +183,9 @@ fn pairs_are_held_together_where_the_noise_model_falls_short() {
             align(&points, &Gated(wide()), start, &options),
         ];
         assert!(found[1].inlier_ratio > 0.8, "{}", found[1].inlier_ratio);
+        let square = Options { kernel: Kernel::Square, ..options };
+        let square = align(&points, &Gated(wide()), start, &square);
+        assert!(square.misfit.is_finite(), "a square kernel has a misfit, too");
         found.map(|found| error(&found, &motion()).0)
     };
     let mut sums = [0.0; 2];
