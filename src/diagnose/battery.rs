@@ -23,6 +23,7 @@ use super::reference::{self, can_happen};
 use super::replication_textures;
 use super::scene::Scene;
 use super::steps::{COARSE_SIGMAS, is_raw, own_step, own_step_note, steps};
+use super::tails::EXCESS;
 use super::texture_finding::TextureFinding;
 use super::variance;
 use super::verdict::{MIN_SIZE, echoes, fold_into_sigma, merge, symptoms};
@@ -157,8 +158,10 @@ impl Case<'_> {
             && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)
             && !is_raw(self.recording)
             && f.size.sigma * sigma_px < 0.3 * coarsest;
-        let textured = scatter.tails.is_some()
-            || (!scatter.textures.is_empty() && f.size.sigma < LEVEL_BESIDE_TEXTURE);
+        let far_errors = |t: &TextureFinding| !t.parameters.contains_key(EXCESS);
+        let textures = !scatter.textures.is_empty() || scatter.tails.is_some();
+        let textured = scatter.tails.as_ref().is_some_and(far_errors)
+            || (textures && f.size.sigma < LEVEL_BESIDE_TEXTURE);
         let tailed = textured && f.status == Status::Recalibrate;
         !stepped && !tailed && f.size.sigma > self.options.ablation.min_size(MIN_SIZE)
     }

@@ -1,15 +1,14 @@
 //! The noise's fourth moment beyond a Gaussian's, with what an uneven size of the noise adds taken off.
 //!
 //! Noise of a size s(u, v) that differs from place to place has a fourth moment of 3 (1 + c), where c is
-//! the variance of s^2 over its mean's square: as though its tails were heavy. The same c is the
-//! covariance of the squares of two pixels so near that they share s. Two Gaussian pixels that are
-//! correlated by rho add 2 rho^2 to it. So
+//! the variance of s^2 over its mean's square: as though its tails were heavy. Two pixels so near that
+//! they share s, and correlated by rho, have E x^2 y^2 = (1 + c) (1 + 2 rho^2) if they are Gaussian. So
 //!
 //! ```text
-//! excess = E x^4 - 3 (1 + cov(x^2, y^2) - 2 rho^2)        x, y of unit variance
+//! excess = E x^4 - 3 E x^2 y^2 / (1 + 2 rho^2)        x, y of unit variance
 //! ```
 //!
-//! is none for Gaussian noise of any smooth size.
+//! is none for Gaussian noise whose size changes little from x to y.
 
 use super::patches::patches;
 use super::tails::FEWEST_READINGS;
@@ -19,124 +18,148 @@ use super::tails::FEWEST_READINGS;
 const CUT: f32 = 4.5;
 /// E x^4 of a Gaussian that is cut there, its variance being 1 afterwards.
 const GAUSSIAN_FOURTH: f64 = 2.997_52;
-/// Pixels so far apart share the size of the noise, and hardly its errors: most matchers' windows are no
-/// wider.
+/// Pixels so far apart, px, share the size of the noise and little of its errors; what they share is
+/// taken off.
 const APART_PX: usize = 8;
+/// Along rows, columns and both: noise is correlated by another rho in each.
+const DIRECTIONS: [[usize; 2]; 3] = [[APART_PX, 0], [0, APART_PX], [APART_PX, APART_PX]];
 
-/// Sums over residuals of unit variance, and over pairs of them [`APART_PX`] apart.
+/// Sums over pairs of residuals of unit variance.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct FourthMoment {
-    n: f64,
-    fourth: f64,
+struct PairSums {
     pairs: f64,
+    fourth: f64,
     products: f64,
     products_of_squares: f64,
 }
 
+/// What the residuals of some images say, direction by direction.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct FourthMoment([PairSums; DIRECTIONS.len()]);
+
 impl FourthMoment {
-    /// Of an image's residuals.
+    /// Of an image's residuals: row by row, `width` px a row, in any unit, NaN where there is none.
     pub fn of(image: &[f32], width: usize) -> Self {
-        let mut unit = vec![f32::NAN; image.len()];
+        let mut unit = vec![f64::NAN; image.len()];
         let mut sums = FourthMoment::default();
-        for patch in patches(image, width) {
+        for patch in patches(image, width).filter(|p| !p.coarse) {
             let near = || patch.pixels.iter().filter(|i| image[**i].abs() < CUT * patch.sigma);
             let (n, square) = near()
                 .fold((0.0, 0.0), |(n, sum), i| (n + 1.0, sum + f64::from(image[*i]).powi(2)));
-            let scale = (n / f64::max(square, f64::MIN_POSITIVE)).sqrt();
-            near().for_each(|i| {
-                let x = scale * f64::from(image[*i]);
-                unit[*i] = x as f32;
-                sums.fourth += x.powi(4);
-            });
-            sums.n += n;
-        }
-        let height = image.len() / width.max(1);
-        for (i, x) in unit.iter().enumerate().filter(|(_, x)| x.is_finite()) {
-            let (u, v) = (i % width, i / width);
-            for (du, dv) in [(APART_PX, 0), (0, APART_PX), (APART_PX, APART_PX)] {
-                if u + du >= width || v + dv >= height {
-                    continue;
-                }
-                let y = unit[i + dv * width + du];
-                if y.is_finite() {
-                    let (x, y) = (f64::from(*x), f64::from(y));
-                    sums.pairs += 1.0;
-                    sums.products += x * y;
-                    sums.products_of_squares += (x * x - 1.0) * (y * y - 1.0);
-                }
+            if square > 0.0 {
+                let scale = f64::sqrt(n / square);
+                near().for_each(|i| unit[*i] = scale * f64::from(image[*i]));
+                // Both of a pair have the scale of this patch.
+                sums.add_pairs(&unit, width, &patch.pixels);
+                near().for_each(|i| unit[*i] = f64::NAN);
             }
         }
         sums
     }
 
+    fn add_pairs(&mut self, unit: &[f64], width: usize, pixels: &[usize]) {
+        for &i in pixels.iter().filter(|i| unit[**i].is_finite()) {
+            for (sums, [du, dv]) in self.0.iter_mut().zip(DIRECTIONS) {
+                let inside = i % width + du < width;
+                let y = unit.get(i + dv * width + du).filter(|y| inside && y.is_finite());
+                if let Some(y) = y {
+                    let (xx, yy) = (unit[i] * unit[i], y * y);
+                    sums.pairs += 1.0;
+                    sums.fourth += 0.5 * (xx * xx + yy * yy);
+                    sums.products += unit[i] * y;
+                    sums.products_of_squares += xx * yy;
+                }
+            }
+        }
+    }
+
     pub fn add(&mut self, other: &FourthMoment) {
-        self.n += other.n;
-        self.fourth += other.fourth;
-        self.pairs += other.pairs;
-        self.products += other.products;
-        self.products_of_squares += other.products_of_squares;
+        for (mine, other) in self.0.iter_mut().zip(&other.0) {
+            mine.pairs += other.pairs;
+            mine.fourth += other.fourth;
+            mine.products += other.products;
+            mine.products_of_squares += other.products_of_squares;
+        }
     }
 
     /// Excess kurtosis, where enough was looked at.
     pub fn excess(&self) -> Option<f64> {
-        if self.n.min(self.pairs) < FEWEST_READINGS {
-            return None;
-        }
-        let rho = self.products / self.pairs;
-        let uneven = self.products_of_squares / self.pairs - 2.0 * rho * rho;
-        Some(self.fourth / self.n - GAUSSIAN_FOURTH - 3.0 * uneven)
+        let of = |s: &PairSums| {
+            let rho = s.products / s.pairs;
+            let uneven = s.products_of_squares / s.pairs / (1.0 + 2.0 * rho * rho);
+            (s.pairs >= FEWEST_READINGS)
+                .then(|| s.fourth / s.pairs - GAUSSIAN_FOURTH - 3.0 * (uneven - 1.0))
+        };
+        let all: Option<Vec<f64>> = self.0.iter().map(of).collect();
+        all.map(|all| all.iter().sum::<f64>() / all.len() as f64)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rng::Seed;
+    use crate::rng::{Seed, Stream};
     use rand_distr::{Distribution, StandardNormal, StudentT};
 
     const SIZE: [usize; 2] = [320, 240];
+    const SEEDS: u64 = 12;
 
-    fn image(mut draw: impl FnMut(f64, f64) -> f64) -> Vec<f32> {
-        (0..SIZE[0] * SIZE[1])
-            .map(|i| draw((i % SIZE[0]) as f64, (i / SIZE[0]) as f64) as f32)
-            .collect()
+    /// Mean and standard error over the seeds.
+    fn excess(draw: impl Fn(&mut Stream) -> Vec<f32>) -> [f64; 2] {
+        let of = |seed| {
+            let image = draw(&mut Seed(seed).stream("kurtosis"));
+            FourthMoment::of(&image, SIZE[0]).excess().expect("an excess")
+        };
+        let all: Vec<f64> = (0..SEEDS).map(of).collect();
+        let n = all.len() as f64;
+        let mean = all.iter().sum::<f64>() / n;
+        let square: f64 = all.iter().map(|x| (x - mean).powi(2)).sum();
+        [mean, (square / (n - 1.0) / n).sqrt()]
     }
 
-    /// Each within five standard errors, (24 / n)^(1/2) and what the pairs add.
+    fn white(rng: &mut Stream) -> Vec<f32> {
+        (0..SIZE[0] * SIZE[1]).map(|_| StandardNormal.sample(rng)).collect()
+    }
+
+    /// Within four standard errors, and what a size that changes from pixel to pixel of a pair leaves.
     #[test]
-    fn only_what_is_no_gaussian_has_an_excess() {
-        let mut rng = Seed(3).stream("kurtosis");
-        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-        let error = 5.0 * 1.3 * (24.0 / (SIZE[0] * SIZE[1]) as f64).sqrt();
-        let excess = |image: &[f32]| FourthMoment::of(image, SIZE[0]).excess().expect("an excess");
-        let even = excess(&image(|_, _| normal()));
-        assert!(even.abs() < error, "{even}");
-        let uneven =
-            excess(&image(|u, v| normal() * (1.0 + 0.4 * (u / 25.0).sin() * (v / 30.0).cos())));
-        assert!(uneven.abs() < error, "uneven: {uneven}");
-        // Means of 3 x 3 pixels: correlated, and Gaussian still.
-        let white = image(|_, _| normal());
-        let mean = |i: usize| {
-            let around = [0, 1, 2].into_iter().flat_map(|r| (0..3).map(move |c| r * SIZE[0] + c));
-            around.map(|k| white.get(i + k).copied().unwrap_or(0.0)).sum::<f32>()
-        };
-        let blurred = excess(&(0..white.len()).map(mean).collect::<Vec<f32>>());
-        assert!(blurred.abs() < 3.0 * error, "blurred: {blurred}");
+    fn gaussian_noise_has_none_even_uneven_or_correlated() {
+        let even = excess(white);
+        assert!(even[0].abs() < 4.0 * even[1], "{even:?}");
+        let uneven = excess(|rng| {
+            let size = |i: usize| 1.0 + 0.3 * ((i % SIZE[0]) as f32 / 40.0).sin();
+            white(rng).iter().enumerate().map(|(i, x)| size(i) * x).collect()
+        });
+        assert!(uneven[0].abs() < 4.0 * uneven[1] + 0.02, "uneven: {uneven:?}");
+        // Means over 12 px of a row: rho is a third along rows and none along columns. Without 2 rho^2
+        // it would be -.22.
+        let rows = excess(|rng| {
+            let white = white(rng);
+            let mean = |i: usize| white[i..(i + 12).min(white.len())].iter().sum::<f32>();
+            (0..white.len()).map(mean).collect()
+        });
+        assert!(rows[0].abs() < 4.0 * rows[1] && rows[1] < 0.04, "rows: {rows:?}");
     }
 
     /// Student's t of 24 degrees of freedom has 6 / 20 more, less what the cut takes.
     #[test]
-    fn weak_tails_have_one() {
-        let mut rng = Seed(4).stream("kurtosis");
+    fn weak_tails_have_some() {
         let student = StudentT::new(24.0).expect("a distribution");
-        let found = FourthMoment::of(&image(|_, _| student.sample(&mut rng)), SIZE[0]).excess();
-        let found = found.expect("an excess");
-        assert!((0.12..0.3).contains(&found), "{found}");
+        let draw = |rng: &mut Stream| -> Vec<f32> {
+            (0..SIZE[0] * SIZE[1]).map(|_| student.sample(rng) as f32).collect()
+        };
+        let found = excess(draw);
+        assert!((0.15..0.3).contains(&found[0]), "{found:?}");
     }
 
+    /// Too small a picture, words so coarse that most residuals are none, no noise at all.
     #[test]
-    fn a_small_picture_tells_nothing() {
+    fn what_shows_no_noise_tells_nothing() {
         assert_eq!(FourthMoment::of(&vec![1.0; 2000], 50).excess(), None);
         assert_eq!(FourthMoment::default().excess(), None);
+        let mut rng = Seed(1).stream("kurtosis/coarse");
+        let coarse: Vec<f32> = white(&mut rng).iter().map(|x| (0.4 * x).round()).collect();
+        assert_eq!(FourthMoment::of(&coarse, SIZE[0]).excess(), None);
+        assert_eq!(FourthMoment::of(&vec![0.0; 320 * 240], SIZE[0]).excess(), None);
     }
 }

@@ -53,6 +53,7 @@ mod missing_report;
 mod missing_search;
 mod missing_shapes;
 mod mixing;
+mod mixture;
 mod naming;
 mod next_view;
 mod noise;

@@ -2,8 +2,9 @@
 
 use crate::stats::{MAD_TO_SIGMA, median_in_place};
 
-/// Side of a patch: this share of the picture's width, px.
+/// So many patches fit across the picture ...
 const PATCHES_ACROSS: usize = 7;
+/// ... unless their sides would be shorter than this, px.
 const SMALLEST_PATCH: usize = 40;
 
 /// The pixels of a patch that have a residual, and their standard deviation; what strays has no say in
@@ -11,9 +12,12 @@ const SMALLEST_PATCH: usize = 40;
 pub struct Patch {
     pub pixels: Vec<usize>,
     pub sigma: f32,
+    /// The words are so coarse that the median says less than the bulk's spread.
+    pub coarse: bool,
 }
 
-/// Those of an image that are a quarter full or more.
+/// Those of an image that are a quarter full or more: row by row, `width` px a row, in any unit, NaN
+/// where there is no residual.
 pub fn patches(image: &[f32], width: usize) -> impl Iterator<Item = Patch> + '_ {
     let side = (width / PATCHES_ACROSS).max(SMALLEST_PATCH);
     let height = image.len() / width.max(1);
@@ -34,9 +38,10 @@ pub fn patches(image: &[f32], width: usize) -> impl Iterator<Item = Patch> + '_ 
         sizes.select_nth_unstable_by(end, f32::total_cmp);
         let most = &sizes[..end];
         let square: f64 = most.iter().map(|r| f64::from(*r).powi(2)).sum();
-        // Nine tenths of a Gaussian have 0.72 of its standard deviation... squared 0.6225.
+        // The inner nine tenths of a Gaussian have .6225 of its variance.
         let spread = (square / most.len() as f64 / 0.6225).sqrt() as f32;
         let sigma = mad.max(0.8 * spread);
-        (sigma > 0.0).then_some(Patch { pixels, sigma })
+        let coarse = mad < sigma;
+        (sigma > 0.0).then_some(Patch { pixels, sigma, coarse })
     })
 }

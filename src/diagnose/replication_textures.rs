@@ -9,7 +9,7 @@ use super::mixing::mean_share;
 use super::noise::expected_window;
 use super::replication::agree;
 use super::structure::Structure;
-use super::tails::GAUSSIAN_TAIL;
+use super::tails::{EXCESS, GAUSSIAN_TAIL};
 use super::texture_finding::{TextureFinding, ViewMean};
 use crate::terms::{Axis, Statistic};
 
@@ -51,6 +51,9 @@ fn beyond_known<'a>(found: &TextureFinding, known: &'a KnownTerms) -> Option<OfV
         }
         // Beside what stands still, which the finding is told without.
         (Some("temporal-correlation"), ..) => Box::new(|s| Some(s.lagged[0]? - later(s)?)),
+        (Some("heavy-tails"), ..) if found.parameters.contains_key(EXCESS) => {
+            Box::new(|s| s.fourth.excess())
+        }
         (Some("target-motion"), ..) => Box::new(|s| Some(s.jitter?.velocity_mps)),
         (Some(id), ..) => return beyond(id, known),
         (None, Axis::Column, Statistic::Bias) => Box::new(|s| s.lines_px2),

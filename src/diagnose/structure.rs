@@ -46,6 +46,7 @@ pub struct Structure {
     pub jitter: Option<Jitter>,
     /// Residuals beyond four local standard deviations.
     pub tails: TailCounts,
+    /// Of the residuals near the middle, for tails too weak to count.
     pub fourth: FourthMoment,
 }
 

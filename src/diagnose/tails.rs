@@ -1,15 +1,14 @@
 //! Residuals beyond four standard deviations: how many, and whether they are too many.
 
 use serde_json::{Map, json};
-use statrs::function::erf::erfc;
 
 use super::known::KnownTerms;
+use super::mixture::Mixture;
 use super::outliers::{Outliers, outliers};
 use super::parameters::estimate;
 use super::patches::patches;
 use super::structure::Structure;
 use super::texture_finding::{self, TextureFinding, ViewMean};
-use crate::stats::{MAD_TO_SIGMA, bisect};
 use crate::terms::{Axis, Statistic};
 
 /// A Gaussian's share beyond four standard deviations.
@@ -49,7 +48,7 @@ impl TailCounts {
     }
 }
 
-/// The tail of an image's residuals.
+/// The tail of an image's residuals: row by row, `width` px a row, NaN where there is none.
 pub fn tail(image: &[f32], width: usize) -> TailCounts {
     let mut counts = TailCounts::default();
     for patch in patches(image, width) {
@@ -74,8 +73,8 @@ pub const FEWEST_READINGS: f64 = 5000.0;
 pub struct Confusers {
     /// The noise is of unequal size where no law was found for it.
     pub uneven: bool,
-    /// Tails are a simulation's or are compared with one: the light of a real sensor makes its noise
-    /// uneven from pixel to pixel.
+    /// The views are a simulation's, or are compared with one: a simulation by formula lacks the
+    /// unevenness from pixel to pixel that light brings, so that the two differ without heavy tails.
     pub simulated: bool,
 }
 
@@ -98,19 +97,14 @@ pub fn tails(
     // Patches of unequal noise, and steps of the words, make a tail of a Gaussian too.
     let much = if confusers.uneven { MUCH_HEAVIER } else { 1.0 };
     let expected = much * UNEQUAL * own;
-    let readings: f64 = views.iter().map(|s| s.tails.n).sum();
-    let (p, nats) = if share.value >= much * HEAVY * own && share.p_above(expected) <= level {
-        (share.p_above(own), share.value * readings * (share.value / own).ln())
-    } else {
-        let looked = mixture.is_none() && !confusers.uneven && !confusers.simulated;
-        let excess = ViewMean::of(views, |s| s.fourth.excess()).filter(|_| looked)?;
-        let p = excess.p_above(0.0);
-        (p <= level).then(|| (p, texture_finding::nats(&excess, 0.0)))?
-    };
-    let mut counts = TailCounts::default();
-    views.iter().filter(|s| s.tail_share().is_some()).for_each(|s| counts.add(&s.tails));
     let mut parameters = Map::new();
     parameters.insert("share_beyond_4_sigma".into(), json!(share.value));
+    if share.value < much * HEAVY * own || share.p_above(expected) > level {
+        let looked = mixture.is_none() && !confusers.uneven && !confusers.simulated;
+        return if looked { weak(views, level, parameters) } else { None };
+    }
+    let mut counts = TailCounts::default();
+    views.iter().filter(|s| s.tail_share().is_some()).for_each(|s| counts.add(&s.tails));
     // Where all that strays is gross it has no scale.
     let mut size_sigma = 4.0 * share.value.sqrt();
     if let Some(Outliers { fraction, scale }) = outliers(&counts, share.std_error / share.value) {
@@ -118,6 +112,7 @@ pub fn tails(
         parameters.insert("scale".into(), estimate(scale[0], scale[1]));
         size_sigma = fraction[0].sqrt() * scale[0];
     }
+    let readings: f64 = views.iter().map(|s| s.tails.n).sum();
     Some(TextureFinding {
         families: vec!["heavy-tails"],
         statistic: Statistic::Distribution,
@@ -125,52 +120,53 @@ pub fn tails(
         interval: [4.0, 2.0 * mean_size(&counts) - 4.0],
         parameters,
         size_sigma,
-        p,
-        nats,
+        p: share.p_above(own),
+        nats: share.value * readings * (share.value / own).ln(),
         words: None,
     })
 }
 
-/// The model's heavy tails: noise of which a share is drawn so many times wider.
-#[derive(Debug, Clone, Copy)]
-pub struct Mixture {
-    fraction: f64,
-    scale: f64,
-    scale_error: f64,
-}
+/// The parameter that tells a finding of [`weak`] from one of far errors.
+pub const EXCESS: &str = "excess_kurtosis";
+/// Share of the readings that weak tails are said to be drawn from: a moment gives one number, and the
+/// catalogue's mixture has two.
+const WEAK_FRACTION: f64 = 0.1;
 
-impl Mixture {
-    pub fn of(known: &KnownTerms) -> Option<Self> {
-        let at = |name| known.parameter("heavy-tails", name);
-        let scale_error = known.std_error("heavy-tails", "scale");
-        let mixture = Mixture { fraction: at("fraction")?, scale: at("scale")?, scale_error };
-        (mixture.fraction > 0.0 && mixture.scale > 1.0).then_some(mixture)
+/// Tails too weak to count, by the fourth moment. It is the second test of tails at this level, so that
+/// its chance is doubled.
+fn weak(
+    views: &[Structure],
+    level: f64,
+    mut parameters: Map<String, serde_json::Value>,
+) -> Option<TextureFinding> {
+    let excess = ViewMean::of(views, |s| s.fourth.excess())?;
+    let p = 2.0 * excess.p_above(0.0);
+    if p > level {
+        return None;
     }
-
-    /// Share of the readings beyond `t` of the narrow part's standard deviations.
-    fn beyond(&self, t: f64) -> f64 {
-        let gaussian = |t: f64| erfc(t * std::f64::consts::FRAC_1_SQRT_2);
-        (1.0 - self.fraction) * gaussian(t) + self.fraction * gaussian(t / self.scale)
-    }
-
-    /// Standard deviation by the median, over that of the narrow part.
-    pub fn width(&self) -> f64 {
-        let [_, median] = bisect([0.0, self.scale], |t| self.beyond(t) > 0.5);
-        MAD_TO_SIGMA * median
-    }
-
-    /// Share beyond four standard deviations where there is this share of the strays, and their scale
-    /// is off by so many of its standard errors: that of weak tails is hardly known.
-    pub fn tail(&self, share: f64, errors: f64) -> f64 {
-        let scale = (self.scale + errors * self.scale_error).max(1.0);
-        let other = Mixture { fraction: share * self.fraction, scale, ..*self };
-        other.beyond(4.0 * other.width())
-    }
-
-    /// Of the strays, over the noise's standard deviation.
-    pub fn size_sigma(&self) -> f64 {
-        self.fraction.sqrt() * self.scale
-    }
+    // A mixture has 3 f (1 - f) x^2 / (1 + f x)^2, where its wide part has 1 + x times the variance.
+    let root = |k: f64| (k.max(0.0) / (3.0 * WEAK_FRACTION * (1.0 - WEAK_FRACTION))).sqrt();
+    let scale = |k: f64| {
+        let r = root(k);
+        (1.0 + r / (1.0 - WEAK_FRACTION * r).max(WEAK_FRACTION)).sqrt()
+    };
+    let (k, error) = (excess.value, excess.std_error);
+    let scale_error = 0.5 * (scale(k + error) - scale(k - error));
+    parameters.insert(EXCESS.into(), estimate(k, error));
+    parameters.insert("fraction".into(), estimate(WEAK_FRACTION, WEAK_FRACTION));
+    parameters.insert("scale".into(), estimate(scale(k), scale_error));
+    Some(TextureFinding {
+        families: vec!["heavy-tails"],
+        statistic: Statistic::Distribution,
+        axis: Axis::Residual,
+        interval: [2.0, TAIL_EDGES[0]],
+        parameters,
+        // Of the wide part's variance beyond the noise's, the share that is drawn from it.
+        size_sigma: (WEAK_FRACTION * (scale(k).powi(2) - 1.0)).sqrt(),
+        p,
+        nats: texture_finding::nats(&excess, 0.0),
+        words: None,
+    })
 }
 
 /// Of what lies between the edges, a bin's middle standing for it; at least five.
@@ -189,30 +185,6 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal, StudentT};
 
     const VIEWS: usize = 14;
-
-    /// Against a Monte-Carlo draw of the catalogue's mixture.
-    #[test]
-    fn a_mixture_is_as_wide_and_as_heavy_as_what_is_drawn_from_it() {
-        use crate::stats::median_in_place;
-        use rand::Rng;
-        let mut rng = Seed(3).stream("mixture");
-        for (fraction, scale) in [(0.05, 8.0), (0.3, 3.0), (1.0, 100.0)] {
-            let mixture = Mixture { fraction, scale, scale_error: 0.0 };
-            let mut drawn: Vec<f32> = (0..400_000)
-                .map(|_| {
-                    let one: f64 = StandardNormal.sample(&mut rng);
-                    let wide = rng.random_bool(fraction);
-                    (if wide { scale * one } else { one }).abs() as f32
-                })
-                .collect();
-            let sigma = MAD_TO_SIGMA * f64::from(median_in_place(&mut drawn));
-            assert!((mixture.width() / sigma - 1.0).abs() < 0.01, "{sigma} {}", mixture.width());
-            let beyond = drawn.iter().filter(|d| f64::from(**d) > 4.0 * sigma).count() as f64;
-            let share = beyond / drawn.len() as f64;
-            let error = 5.0 * (share / drawn.len() as f64).sqrt();
-            assert!((mixture.tail(1.0, 0.0) - share).abs() < error + 0.03 * share, "{share}");
-        }
-    }
 
     /// A Gaussian's own share beyond four deviations is no tail; a tenth of a per cent is one.
     #[test]
@@ -281,9 +253,17 @@ mod tests {
             tails(views, &KnownTerms::default(), 1e-3, confusers)
         };
         let heavy = views("student", true, 0.0);
-        assert_eq!(told(&heavy, false, false).expect("weak tails").families, ["heavy-tails"]);
+        let found = told(&heavy, false, false).expect("weak tails");
+        assert_eq!(found.families, ["heavy-tails"]);
+        let [fraction, scale, excess] = ["fraction", "scale", EXCESS]
+            .map(|name| found.parameters[name]["value"].as_f64().expect("a number"));
+        // The mixture that is told has the excess that was measured.
+        let x = fraction * (scale * scale - 1.0);
+        let had = 3.0 * (1.0 - fraction) / fraction * (x / (1.0 + x)).powi(2);
+        assert!((had / excess - 1.0).abs() < 1e-3, "{had} {excess}");
         assert!(told(&heavy, true, false).is_none(), "of a noise that is uneven anyway");
         assert!(told(&heavy, false, true).is_none(), "of a simulation");
+        assert!(told(&[], false, false).is_none());
         assert!(told(&views("gaussian", false, 0.0), false, false).is_none());
         assert!(told(&views("uneven", false, 0.3), false, false).is_none());
     }
