@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::missing_cells::{Cell, FEW, RIM_PX, USUAL};
-use super::missing_search::{Judged, LEAST_EXCESS_OF_LOSSES, predicted};
+use super::missing_search::{Judged, MIN_EXCESS_OF_LOSSES, predicted};
 use super::missing_shapes::{Shape, Step};
 use super::noise_gains::NoiseGains;
 use crate::rng::Seed;
@@ -129,7 +129,7 @@ pub fn few_losses(
         y.iter_mut().for_each(|y| *y -= usual);
         best(&y, scatter).map_or(0.0, |b| b.0.0)
     };
-    let noise = NoiseGains::simulated(REPLICATES, LEAST_EXCESS_OF_LOSSES, draw);
+    let noise = NoiseGains::simulated(REPLICATES, MIN_EXCESS_OF_LOSSES, draw);
     let coefficients = vec![size];
     (found > noise.threshold(level))
         .then(|| (Judged { shape: Shape::Step(step), gain: found, coefficients }, noise.p(found)))

@@ -14,7 +14,7 @@ use super::candidate::{Candidate, RECALIBRATE};
 use super::diagnosis::{Alternative, Finding, Status};
 use super::evidence::{self, Evidence, root};
 use super::naming::physics;
-use super::noise_gains::{LEAST_EXCESS, NoiseGains};
+use super::noise_gains::{MIN_EXCESS, NoiseGains};
 use super::other_findings::named;
 use super::outcome::{Outcome, Rules};
 use super::prepared::{evidence_of_bases, without};
@@ -149,7 +149,7 @@ pub fn few_views(
     if most * BESIDE_ALL < shared {
         return None;
     }
-    let noise = NoiseGains::simulated(REPLICATES, LEAST_EXCESS, |replicate| {
+    let noise = NoiseGains::simulated(REPLICATES, MIN_EXCESS, |replicate| {
         let mut rng = seed.stream(&format!("few-views/null/{replicate}"));
         tried.iter().map(|t| t.draw(&mut rng)).fold(f64::NEG_INFINITY, f64::max)
     });

@@ -215,7 +215,7 @@ impl<'a> Losses<'a> {
                 columns.iter().map(|c| predicted(&c.a, &c.scores(&whitened)).0).fold(0.0, f64::max);
             nulls.iter().map(|n| n.draw(&mut rng)).fold(steps, f64::max)
         };
-        (judged, NoiseGains::simulated(REPLICATES, LEAST_EXCESS_OF_LOSSES, draw))
+        (judged, NoiseGains::simulated(REPLICATES, MIN_EXCESS_OF_LOSSES, draw))
     }
 
     /// The farthest (for what is lost below: the nearest) whole step that is seen with 80 % power.
@@ -241,5 +241,5 @@ impl<'a> Losses<'a> {
 
 /// Simulations of the null.
 const REPLICATES: u64 = 300;
-/// Least mean excess of the noise's gains over their 90 % quantile, nats.
-pub const LEAST_EXCESS_OF_LOSSES: f64 = 1.0;
+/// Minimum mean excess of the noise's gains over their 90 % quantile, nats.
+pub const MIN_EXCESS_OF_LOSSES: f64 = 1.0;

@@ -9,19 +9,19 @@ use crate::rng::Seed;
 #[derive(Debug, Clone, Default)]
 pub struct NoiseGains {
     ascending: Vec<f64>,
-    /// Least mean excess of the tail: a few gains that happen to be close show too short a one.
-    least_excess: f64,
+    /// Minimum mean excess of the tail: a few gains that happen to be close show too short a one.
+    min_excess: f64,
 }
 
 /// Simulations of the null.
 const REPLICATES: u64 = 600;
-pub const LEAST_EXCESS: f64 = 0.5;
+pub const MIN_EXCESS: f64 = 0.5;
 /// Beyond this quantile the tail of a log likelihood falls as an exponential.
 const TAIL: f64 = 0.1;
 
 impl NoiseGains {
     pub fn of(nulls: &[&Null], seed: Seed) -> Self {
-        NoiseGains::simulated(REPLICATES, LEAST_EXCESS, |replicate| {
+        NoiseGains::simulated(REPLICATES, MIN_EXCESS, |replicate| {
             let mut rng = seed.stream(&format!("diagnose/null/{replicate}"));
             nulls.iter().map(|null| null.draw(&mut rng)).fold(0.0, f64::max)
         })
@@ -30,12 +30,12 @@ impl NoiseGains {
     /// `draw` gives the gain of one simulation by its number.
     pub fn simulated(
         replicates: u64,
-        least_excess: f64,
+        min_excess: f64,
         draw: impl Fn(u64) -> f64 + Send + Sync,
     ) -> Self {
         let mut ascending: Vec<f64> = (0..replicates).into_par_iter().map(draw).collect();
         ascending.sort_by(f64::total_cmp);
-        NoiseGains { ascending, least_excess }
+        NoiseGains { ascending, min_excess }
     }
 
     /// Was there anything to draw from?
@@ -45,7 +45,7 @@ impl NoiseGains {
 
     /// Noise is taken to bring next to nothing.
     pub fn unknown() -> Self {
-        NoiseGains { ascending: vec![0.0], least_excess: LEAST_EXCESS }
+        NoiseGains { ascending: vec![0.0], min_excess: MIN_EXCESS }
     }
 
     /// Where the tail begins, and its mean excess.
@@ -54,7 +54,7 @@ impl NoiseGains {
         let cut = gains[((gains.len() - 1) as f64 * (1.0 - TAIL)) as usize];
         let tail: Vec<f64> = gains.iter().filter(|g| **g > cut).map(|g| g - cut).collect();
         let mean_excess = tail.iter().sum::<f64>() / tail.len().max(1) as f64;
-        (cut, mean_excess.max(self.least_excess))
+        (cut, mean_excess.max(self.min_excess))
     }
 
     /// Exceeded with probability `level`.

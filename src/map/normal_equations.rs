@@ -47,7 +47,7 @@ pub struct NormalEquations {
     pub correspondences: usize,
     /// Unweighted.
     pub squares_m2: f64,
-    /// |residual| times weight, of each; empty where nobody asks for them.
+    /// |residual| times weight, of each; empty unless they are asked for.
     pub sizes: Vec<f32>,
 }
 
