@@ -26,7 +26,7 @@ pub struct TextureFinding {
     pub words: Option<String>,
 }
 
-/// ViewMean of a statistic over the views, and its standard error.
+/// Mean of a statistic over the views, and its standard error.
 #[derive(Debug, Clone, Copy)]
 pub struct ViewMean {
     pub value: f64,
