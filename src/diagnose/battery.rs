@@ -11,7 +11,7 @@ use super::field::Field;
 use super::findings;
 use super::form::better_form;
 use super::lines::lines;
-use super::missing::{self, missing};
+use super::missing::{self, DropoutOutcome, missing};
 use super::mixing::mixing;
 use super::naming::{physics, temper};
 use super::next_view;
@@ -82,7 +82,7 @@ impl Case<'_> {
     pub fn battery(&mut self, advise: bool) -> Battery {
         let mean = self.mean();
         let scatter = self.scatter(&mean);
-        self.at("naming, and comparing the halves of the views", "naming what is left");
+        self.at("naming, and searching the lost pixels", "naming what is left");
         let sigma_mm = typical_sigma_mm(&self.fields);
         let second = self.survey.second();
         let lattice = &scatter.lattice;
@@ -90,7 +90,11 @@ impl Case<'_> {
         let own_step = own_step(lattice, self.recording, self.fields[0].scale_px_m);
         self.remarks.extend(own_step.map(own_step_note));
         let stepped = lattice.is_some();
-        let mut curves = self.curves([&mean.outcome, &scatter.outcome], advise);
+        let outcomes = [&mean.outcome, &scatter.outcome];
+        let ((lost, of_few_views), (mut curves, textures)) = rayon::join(
+            || (self.lost(), self.few_views(outcomes, stepped)),
+            || (self.curves(outcomes, advise), self.texture(&mean, &scatter, steps)),
+        );
         let refitted = self.take_refit(&mut curves);
         curves.retain(|f| self.is_news(f, &scatter));
         if self.baseline.is_none() {
@@ -101,15 +105,15 @@ impl Case<'_> {
         let clearly = refitted.as_ref().is_some_and(|f| f.share > clear);
         let better_form = self.tell_form(&mut curves, clearly);
         let mut found: Vec<Finding> = self.ranges.clone().into_iter().chain(curves).collect();
-        found.extend(self.texture(&mean, &scatter, steps));
-        self.at("searching the lost pixels", "testing the lost pixels again");
-        let (lost, mut detectable) = self.lost();
+        found.extend(textures);
+        let DropoutOutcome { findings, mut detectable, notes } = lost;
+        self.remarks.extend(notes);
         detectable.retain(|d| can_happen(d.effect, self.sensor().kind));
-        found.extend(lost);
+        found.extend(findings.into_iter().map(other_findings::missing));
         let laws = self.laws(&mean.terms, reference::bent_m(&found));
         found.extend(laws);
         forget_impossible(&mut found, self.sensor().kind);
-        found.extend(self.few_views([&mean.outcome, &scatter.outcome], stepped));
+        found.extend(of_few_views);
         tell_lines_once(&mut found);
         if self.baseline.is_some() {
             symptoms(&mut found);
@@ -263,20 +267,16 @@ impl Case<'_> {
         Some(format!("sigma over depth and tilt follows better: {better}"))
     }
 
-    fn lost(&mut self) -> (Vec<Finding>, Vec<Detectable>) {
+    /// Losses that neither the model has nor the simulation.
+    fn lost(&self) -> DropoutOutcome {
         let camera = &self.sensor().camera;
-        let lost = missing(&self.fields, self.twins(), &self.survey, camera, self.options.seed);
-        self.remarks.extend(lost.notes);
+        let mut lost = missing(&self.fields, self.twins(), &self.survey, camera, self.options.seed);
         let baseline = self.baseline.as_ref();
-        let found = lost
-            .findings
-            .into_iter()
-            .filter(|m| {
-                m.family.is_none_or(|id| !self.known.has(id)) && self.stands(m.p, missing::LEVEL)
-            })
-            .filter(|m| baseline.is_none_or(|b| !b.loses_alike(m, &self.survey)))
-            .map(other_findings::missing)
-            .collect();
-        (found, lost.detectable)
+        lost.findings.retain(|m| {
+            m.family.is_none_or(|id| !self.known.has(id))
+                && self.stands(m.p, missing::LEVEL)
+                && baseline.is_none_or(|b| !b.loses_alike(m, &self.survey))
+        });
+        lost
     }
 }

@@ -49,11 +49,9 @@ impl Case<'_> {
         let cannot_tell = reference::cannot_tell(&self.fields, self.sensor().kind);
         found.extend(cannot_tell.iter().map(not_identifiable));
         shares(&mut found);
-        self.progress.stage("scoring views kept aside");
-        let heldout = self.heldout();
-        let map = self.map(outcomes);
-        self.progress.stage("finding what would have been seen");
-        let mut detectable = self.detectable(outcomes);
+        self.progress.stage("scoring views kept aside, and what would have been seen");
+        let (heldout, (map, mut detectable)) =
+            rayon::join(|| self.heldout(), || (self.map(outcomes), self.detectable(outcomes)));
         detectable.extend(of_losses);
         let mut remarks = self.remarks();
         remarks.extend(untested(outcomes));

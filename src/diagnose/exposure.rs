@@ -38,9 +38,7 @@ impl Field {
                     clip_px = self.spread_beside(&image, &expected, &bench.table);
                 }
                 edges = Edges::find(self, &image, &bench.rays, &bench.table);
-                if self.edge.is_empty() {
-                    self.subsample_blocks(&mut expected);
-                }
+                self.subsample_blocks(&mut expected);
             }
             edges.add(self, &image, &bench.rays, &bench.table);
             self.add(&image, time, &expected, &bench.table, clip_px);

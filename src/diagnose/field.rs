@@ -15,6 +15,7 @@ use crate::io::{InfraredImage, read_depth};
 use crate::measure::{Workbench, view_target};
 use crate::model::SigmaModel;
 use crate::plane::Plane;
+use crate::terms::edge_distances;
 use crate::view::{Sensor, View};
 
 /// One view's residuals.
@@ -30,8 +31,7 @@ pub struct Field {
     pub height: usize,
     /// Pixels of the target, ascending.
     pub pixels: Vec<u32>,
-    /// Of each, its distance from the target's edge, px, where not all pixels of the target are here;
-    /// empty otherwise.
+    /// Of each, its distance from the target's edge, px.
     pub edge: Vec<f32>,
     /// Model's standard deviation of the disparity of each pixel, px.
     pub sigma: Vec<f32>,
@@ -203,6 +203,9 @@ impl Field {
         pixels: Vec<u32>,
     ) -> Self {
         let n = pixels.len();
+        let mut on_target = vec![false; width * height];
+        pixels.iter().for_each(|&i| on_target[i as usize] = true);
+        let distances = edge_distances(&on_target, width);
         Field {
             name: String::new(),
             time_s: 0.0,
@@ -210,8 +213,8 @@ impl Field {
             scale_px_m,
             width,
             height,
+            edge: pixels.iter().map(|&i| distances[i as usize]).collect(),
             pixels,
-            edge: Vec::new(),
             sigma: Vec::new(),
             spread_px: 0.0,
             mean: vec![0.0; n],

@@ -1,12 +1,13 @@
 //! From what the searches chose to what is told.
 
+use rayon::prelude::*;
 use serde_json::Map;
 
 use super::along::Along;
 use super::diagnosis::{Finding, MapRow};
 use super::naming::{naming, physics};
 use super::other_findings::named;
-use super::outcome::Outcome;
+use super::outcome::{Look, Outcome};
 use super::parameters::{of_any_formula, parameters};
 use super::pixels::terms_of;
 use super::scene::{Scene, size};
@@ -152,16 +153,14 @@ fn sum<'a>(layers: impl Iterator<Item = &'a Vec<Vec<f64>>>) -> Vec<Vec<f64>> {
 
 /// Every nameless curve that saw something, on the data as they came.
 pub fn map(scene: &Scene<'_>, outcome: &Outcome, level: f64) -> Vec<MapRow> {
-    let mut rows: Vec<MapRow> = Vec::new();
-    for look in outcome.looks.iter().filter(|l| l.p < level) {
+    let of_axis = |basis: &Basis| match basis {
+        // A ripple's period is not the axis's own curve.
+        Basis::Ring { .. } => basis.axis() != Axis::Z,
+        Basis::Curve { times, .. } => *times != Modulation::DisparitySquared,
+        _ => true,
+    };
+    let of_look = |look: &Look| {
         let axis = look.basis.axis();
-        if matches!(look.basis, Basis::Ring { .. }) && axis == Axis::Z {
-            // A ripple's period is not the axis's own curve.
-            continue;
-        }
-        if matches!(look.basis, Basis::Curve { times: Modulation::DisparitySquared, .. }) {
-            continue;
-        }
         let term = Term {
             statistic: scene.statistic,
             basis: look.basis.clone(),
@@ -169,15 +168,19 @@ pub fn map(scene: &Scene<'_>, outcome: &Outcome, level: f64) -> Vec<MapRow> {
         };
         let values = scene.values(&term);
         let along = Along::of(scene, &look.basis);
-        let row = MapRow {
+        MapRow {
             statistic: scene.statistic,
             axis,
             interval: along.interval(scene, &values),
             unit: axis.unit(),
             effect_size: size(scene, &values).sigma,
             p_adjusted: look.p,
-        };
-        match rows.iter_mut().find(|r| r.axis == axis) {
+        }
+    };
+    let looks = outcome.looks.par_iter().filter(|l| l.p < level && of_axis(&l.basis));
+    let mut rows: Vec<MapRow> = Vec::new();
+    for row in looks.map(of_look).collect::<Vec<_>>() {
+        match rows.iter_mut().find(|r| r.axis == row.axis) {
             Some(old) if old.effect_size >= row.effect_size => {}
             Some(old) => *old = row,
             None => rows.push(row),

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use rand::Rng;
 use rand::seq::SliceRandom;
+use rayon::prelude::*;
 
 use super::case::Case;
 use super::diagnosis::{HeldOut, LeftOut};
@@ -125,7 +126,8 @@ fn rms(views: &[SurveyedView], terms: &[Term], scale_px_m: f64) -> Rms {
 
 /// What each view's disparity on the optical axis changes by once the terms are taken out, px.
 pub fn levels(survey: &Survey, terms: &[Term]) -> Vec<f64> {
-    survey.views.iter().map(|v| plane_left(v, &values(v, terms)).map_or(0.0, |p| p[0])).collect()
+    let level = |v: &SurveyedView| plane_left(v, &values(v, terms)).map_or(0.0, |p| p[0]);
+    survey.views.par_iter().map(level).collect()
 }
 
 fn values(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {

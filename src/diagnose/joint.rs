@@ -97,6 +97,12 @@ impl Joint<'_> {
         let precision = &self.columns.precision * dispersion;
         let beta = whole.fit(&kept, &precision)?;
         let errors = clustered(&held(dispersion)?, &beyond);
+        let planes = (camera, disparities(data));
+        let is_told = second.contains(&true);
+        let (halves, error) = rayon::join(
+            || self.halves(second, s, &precision, &beta),
+            || is_told.then(|| self.error(s, &kept, &precision, &left, planes)).flatten(),
+        );
         let mut outcome = Outcome {
             chosen: self.chosen(s, found),
             looks: found.looks.clone(),
@@ -105,14 +111,10 @@ impl Joint<'_> {
                 .remaining
                 .clone()
                 .filter(|r| s.penalty.is_none() || !is_smooth_and_nameless(&r.candidate)),
-            halves: self.halves(second, s, &precision, &beta),
+            halves,
             ..Outcome::default()
         };
-        let planes = (camera, disparities(data));
-        let is_told = second.contains(&true);
-        if let Some(error) =
-            is_told.then(|| self.error(s, &kept, &precision, &left, planes)).flatten()
-        {
+        if let Some(error) = error {
             outcome.covariance.factors =
                 error.factors.iter().map(|f| self.reported(s, f)).collect();
             outcome.covariance.variances = self.laid_out(s, &error.variances, |_, _| [0.0; 3]);

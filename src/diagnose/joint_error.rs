@@ -2,6 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
 
 use super::joint_fit::Joint;
 use super::joint_terms::{Settled, System};
@@ -45,8 +46,8 @@ impl Joint<'_> {
         let seen = self.seen(&places, camera, disparities);
         // With this metric every place counts alike, whatever its variance.
         let mut metric = DMatrix::zeros(n, n);
-        for row in &seen {
-            row.add_square(1.0 / row.variance(&covariance), &mut metric);
+        for (row, variance) in seen.iter().zip(variances(&seen, &covariance)) {
+            row.add_square(1.0 / variance, &mut metric);
         }
         for i in 0..n {
             let usual = kept.get(i).map_or(1.0, |&k| self.columns.precision[k]);
@@ -76,20 +77,23 @@ impl Joint<'_> {
     fn seen(&self, places: &[usize], camera: &Camera, disparities: [f64; 3]) -> Vec<DesignRow> {
         let rays = camera.rays();
         let pixels = Pixels::new(camera, &rays, 1.0);
-        let mut row = vec![0.0; self.all.b.len()];
-        let mut seen = Vec::new();
-        for disparity in disparities {
-            for v in (STRIDE / 2..camera.height).step_by(STRIDE) {
-                for u in (STRIDE / 2..camera.width).step_by(STRIDE) {
-                    let mut place = pixels.place(v * camera.width + u);
-                    place.disparity = disparity;
-                    self.columns.fill(&place, &mut row);
-                    let columns = places.iter().map(|&k| row[k]).enumerate();
-                    seen.push(DesignRow(columns.filter(|(_, g)| *g != 0.0).collect()));
-                }
+        let lines = |disparity| {
+            let rows = (STRIDE / 2..camera.height).into_par_iter().step_by(STRIDE);
+            rows.map(move |v| (disparity, v))
+        };
+        let of_line = |(disparity, v): (f64, usize)| {
+            let mut row = vec![0.0; self.all.b.len()];
+            let mut seen = Vec::new();
+            for u in (STRIDE / 2..camera.width).step_by(STRIDE) {
+                let mut place = pixels.place(v * camera.width + u);
+                place.disparity = disparity;
+                self.columns.fill(&place, &mut row);
+                let columns = places.iter().map(|&k| row[k]).enumerate();
+                seen.push(DesignRow(columns.filter(|(_, g)| *g != 0.0).collect()));
             }
-        }
-        seen
+            seen
+        };
+        disparities.into_par_iter().flat_map(lines).flat_map_iter(of_line).collect()
     }
 }
 
@@ -117,14 +121,19 @@ impl DesignRow {
     }
 }
 
+/// Of each row's value.
+fn variances(rows: &[DesignRow], covariance: &DMatrix<f64>) -> Vec<f64> {
+    rows.par_iter().map(|row| row.variance(covariance)).collect()
+}
+
 /// Variances of the first map's nodes that make what is left of every place's, neighbours being
 /// independent.
 fn rest(seen: &[DesignRow], left: &DMatrix<f64>, first: usize, nodes: usize) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); left.nrows()];
-    for place in seen {
+    for (place, variance) in seen.iter().zip(variances(seen, left)) {
         let mine = || place.0.iter().filter(|(i, _)| (first..first + nodes).contains(i));
         let squares: f64 = mine().map(|(_, g)| g * g).sum();
-        let variance = place.variance(left) / squares.max(f64::MIN_POSITIVE);
+        let variance = variance / squares.max(f64::MIN_POSITIVE);
         for &(i, g) in mine() {
             sums[i] = (sums[i].0 + g * g * variance, sums[i].1 + g * g);
         }

@@ -205,12 +205,12 @@ impl<'a> Joint<'a> {
             (0..folds).map(|f| order.iter().skip(f).step_by(folds).copied().collect()).collect();
         let by_view: Vec<Option<Evidence>> =
             data.par_iter().map(|view| columns.evidence(view)).collect();
-        let sum = |views: &mut dyn Iterator<Item = usize>| {
-            Evidence::sum(n, 0.0, views.filter_map(|v| by_view[v].as_ref()))
+        let sum = |views: &Vec<usize>| {
+            Evidence::sum(n, 0.0, views.iter().filter_map(|&v| by_view[v].as_ref()))
         };
-        let parts: Vec<Evidence> =
-            views.iter().map(|part| sum(&mut part.iter().copied())).collect();
-        let halves = [false, true].map(|h| sum(&mut (0..data.len()).filter(|v| second[*v] == h)));
+        let half = |h: bool| sum(&(0..data.len()).filter(|v| second[*v] == h).collect());
+        let parts: Vec<Evidence> = views.par_iter().map(sum).collect();
+        let halves = rayon::join(|| half(false), || half(true)).into();
         let all = Evidence::sum(n, 0.0, &parts);
         Joint { columns, views, by_view, parts, all, halves }
     }

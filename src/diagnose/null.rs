@@ -12,15 +12,20 @@ use crate::rng::Stream;
 /// Worked in the eigenvectors of the summed A, in which the views' own A are taken as diagonal:
 /// exact when the views' A are multiples of one another, and a thousand times quicker.
 pub struct Null {
-    /// Information of each view on each eigenvector.
-    by_view: Vec<Vec<f64>>,
-    total: Vec<f64>,
+    /// Of each eigenvector: what each view says of it, and its total.
+    vectors: Vec<(Vec<Information>, f64)>,
     prior: f64,
     /// How much more the views' own fits scatter than their noise explains, at least 1: about the
     /// common fit, or about nothing at all where a few views have what the others have not.
     pub dispersion: f64,
     /// The same about the common fit alone.
     pub about_fit: f64,
+}
+
+/// Information of a view on an eigenvector, and its root.
+struct Information {
+    value: f64,
+    root: f64,
 }
 
 impl Null {
@@ -38,7 +43,12 @@ impl Null {
         let total: Vec<f64> = (0..k).map(|j| by_view.iter().map(|a| a[j]).sum()).collect();
         let about_fit = dispersion(&alone, &by_view, &total, &u, &left, prior);
         let dispersion = about_fit.min(usual_square(&by_view, &total, &u, &left));
-        Some(Null { by_view, total, prior, dispersion, about_fit })
+        let of_vector = |(j, &total): (usize, &f64)| {
+            let values = by_view.iter().map(|a| a[j]);
+            (values.map(|value| Information { value, root: value.sqrt() }).collect(), total)
+        };
+        let vectors = total.iter().enumerate().map(of_vector).collect();
+        Some(Null { vectors, prior, dispersion, about_fit })
     }
 
     /// Nats that count against what noise brings, by `rules`, of a gain over so many views: views
@@ -74,17 +84,17 @@ impl Null {
     /// The gain of one recording of nothing but noise, nats.
     pub fn draw(&self, rng: &mut Stream) -> f64 {
         let mut gain = 0.0;
-        let mut b = vec![0.0; self.by_view.len()];
-        for (j, &total) in self.total.iter().enumerate() {
-            let mut sum = 0.0;
-            for (b, a) in b.iter_mut().zip(&self.by_view) {
+        let mut b = Vec::new();
+        for (views, total) in &self.vectors {
+            b.clear();
+            b.extend(views.iter().map(|a| {
                 let draw: f64 = StandardNormal.sample(rng);
-                *b = a[j].sqrt() * draw;
-                sum += *b;
-            }
-            for (b, a) in b.iter().zip(&self.by_view) {
-                let beta = (sum - b) / (total - a[j] + self.prior);
-                gain += beta * (b - 0.5 * beta * a[j]);
+                a.root * draw
+            }));
+            let sum: f64 = b.iter().sum();
+            for (b, a) in b.iter().zip(views) {
+                let beta = (sum - b) / (total - a.value + self.prior);
+                gain += beta * (b - 0.5 * beta * a.value);
             }
         }
         gain
@@ -216,8 +226,7 @@ mod tests {
     /// without.
     #[test]
     fn the_gain_for_so_many_nats_counts_for_as_many() {
-        let (by_view, total) = (Vec::new(), Vec::new());
-        let null = Null { by_view, total, prior: 1.0, dispersion: 1.5, about_fit: 3.0 };
+        let null = Null { vectors: Vec::new(), prior: 1.0, dispersion: 1.5, about_fit: 3.0 };
         let rules = |learnt_from| Rules {
             level: 0.01,
             prior: 1.0,

@@ -176,13 +176,19 @@ impl<'a> Rows<'a> {
             few.clear();
             let touched = rows(members[0].0, members, &mut few);
             let weighted = self.weighted(members, &few, touched.len());
-            let squares = &weighted * weighted.transpose();
-            for (c, &j) in touched.iter().enumerate() {
-                let column = squares.column(c);
-                let (own, beside) = column.as_slice().split_at(touched.len());
-                // The lower triangle alone.
-                touched[c..].iter().zip(&own[c..]).for_each(|(&i, s)| a[(i, j)] += s);
-                cross.column_mut(j).iter_mut().zip(beside).for_each(|(sum, s)| *sum += s);
+            let across = weighted.transpose();
+            // The lower triangle alone, in strips.
+            let strips = (touched.len() / STRIP).max(1);
+            for first in (0..strips).map(|k| k * STRIP) {
+                let last = if first / STRIP + 1 == strips { touched.len() } else { first + STRIP };
+                let products = weighted.rows_range(first..) * across.columns_range(first..last);
+                for (c, column) in products.column_iter().enumerate() {
+                    let j = touched[first + c];
+                    let (own, beside) = column.as_slice().split_at(touched.len() - first);
+                    let below = touched[first..].iter().zip(own).skip(c);
+                    below.for_each(|(&i, s)| a[(i, j)] += s);
+                    cross.column_mut(j).iter_mut().zip(beside).for_each(|(sum, s)| *sum += s);
+                }
             }
         }
         a.fill_upper_triangle_with_lower_triangle();
@@ -227,6 +233,9 @@ impl<'a> Rows<'a> {
     }
 }
 
+/// Columns of a block that are multiplied at once with all that follow: enough for the kernel of the
+/// matrix product, few beside the hundred of a usual block.
+const STRIP: usize = 16;
 /// Samples multiplied at once.
 const AT_ONCE: usize = 512;
 

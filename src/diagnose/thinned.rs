@@ -3,7 +3,6 @@
 //! Whole blocks are kept, for neighbours hang together: each is as it was, with the target's true edge.
 
 use super::field::Field;
-use crate::terms::edge_distances;
 
 /// Pixels of an image that are all looked at; a Kinect has 0.3 megapixels, the largest time-of-flight
 /// sensors one.
@@ -44,11 +43,10 @@ impl Field {
         if !kept.iter().any(|k| *k) {
             return;
         }
-        let edge = edge_distances(&self.on_target(), width);
         keep(&mut self.pixels, &kept);
         keep(&mut self.sigma, &kept);
         keep(expected, &kept);
-        self.edge = self.pixels.iter().map(|&i| edge[i as usize]).collect();
+        keep(&mut self.edge, &kept);
         let n = self.pixels.len();
         (self.mean, self.square) = (vec![0.0; n], vec![0.0; n]);
         (self.count, self.measured) = (vec![0; n], vec![0; n]);

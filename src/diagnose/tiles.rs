@@ -6,7 +6,7 @@ use super::field::Field;
 use super::texture::high_passed;
 use crate::camera::{Camera, Rays};
 use crate::scene::TargetFrame;
-use crate::terms::{PixelContext, Pixels, corner_radius, edge_distances};
+use crate::terms::{PixelContext, Pixels, corner_radius};
 
 /// Mean residual of a patch of pixels.
 #[derive(Debug, Clone, Copy)]
@@ -38,7 +38,6 @@ pub struct Places<'a> {
     field: &'a Field,
     camera: &'a Camera,
     rays: &'a Rays,
-    edge: Vec<f32>,
     board: TargetFrame,
     corner: f64,
     /// What is one for the view.
@@ -62,7 +61,6 @@ impl<'a> Places<'a> {
             field,
             camera,
             rays,
-            edge: edges(field, camera),
             board: board_frame(field, rays),
             corner: corner_radius(camera),
             view,
@@ -73,7 +71,7 @@ impl<'a> Places<'a> {
     pub fn pixel(&self, k: usize) -> PixelContext {
         let i = self.field.pixels[k] as usize;
         let (u, v) = ((i % self.camera.width) as f64, (i / self.camera.width) as f64);
-        let edge = f64::from(self.edge[i]);
+        let edge = f64::from(self.field.edge[k]);
         let (x, y) = self.rays.at(i);
         let place = self.at(u, v, (x, y), edge);
         let variance = self.field.sigma.get(k).map_or(1.0, |s| f64::from(*s).powi(2));
@@ -100,16 +98,6 @@ impl<'a> Places<'a> {
     }
 }
 
-/// Distance of each pixel from the target's edge, px.
-fn edges(field: &Field, camera: &Camera) -> Vec<f32> {
-    if field.edge.is_empty() {
-        return edge_distances(&field.on_target(), camera.width);
-    }
-    let mut edge = vec![0.0; camera.pixels()];
-    field.pixels.iter().zip(&field.edge).for_each(|(&i, &e)| edge[i as usize] = e);
-    edge
-}
-
 /// The tiles of a view.
 pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) -> Vec<Tile> {
     let places = Places::of(field, camera, rays, session_start);
@@ -120,7 +108,7 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
     for (k, &i) in field.pixels.iter().enumerate() {
         let (u, v) = (i as usize % camera.width, i as usize / camera.width);
         let s = &mut sums[v / SIDE * across + u / SIDE];
-        s.add(u, v, f64::from(places.edge[i as usize]));
+        s.add(u, v, f64::from(field.edge[k]));
         s.asked += frames;
         s.missing += frames - f64::from(field.measured[k]);
         s.variance += f64::from(field.sigma[k]).powi(2);
