@@ -135,8 +135,9 @@ impl<'a> Rows<'a> {
                 columns(i, row);
             }
             let touched = touched(&rows, count);
-            let packed = rows.chunks_exact(count.max(1));
-            few.extend(packed.flat_map(|row| touched.iter().map(|&j| row[j])));
+            for row in rows.chunks_exact(count.max(1)) {
+                few.extend(touched.iter().map(|&j| row[j]));
+            }
             touched
         })
     }
@@ -254,11 +255,11 @@ fn squares(samples: &[f64], weight: &[f64], n: usize) -> DMatrix<f64> {
 
 /// The columns of a block of rows that are not zero everywhere.
 fn touched(rows: &[f64], count: usize) -> Vec<usize> {
-    let mut any = vec![false; count];
+    let mut sizes = vec![0.0; count];
     for row in rows.chunks_exact(count.max(1)) {
-        any.iter_mut().zip(row).for_each(|(any, g)| *any |= *g != 0.0);
+        sizes.iter_mut().zip(row).for_each(|(size, g)| *size += g.abs());
     }
-    (0..count).filter(|&j| any[j]).collect()
+    (0..count).filter(|&j| sizes[j] != 0.0).collect()
 }
 
 #[cfg(test)]

@@ -89,7 +89,7 @@ impl<'a> Places<'a> {
             y,
             disparity: field.scale_px_m / z,
             z,
-            radius: f64::hypot(u - camera.cx, v - camera.cy) / self.corner,
+            radius: ((u - camera.cx).powi(2) + (v - camera.cy).powi(2)).sqrt() / self.corner,
             right,
             down,
             edge,

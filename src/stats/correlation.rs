@@ -28,14 +28,12 @@ const PAIRS: usize = 10_000;
 
 /// Measure on the residual `field` (row-major, `width` wide, NaN where there is none).
 pub fn measure_correlation(field: &[f32], width: usize) -> Correlation {
-    let height = field.len() / width.max(1);
     let valid = field.iter().filter(|e| e.is_finite()).count();
     let stride = (valid / PAIRS).max(1);
     let along_u =
-        course(field, width, valid, stride, |i, lag| (i % width + lag < width).then_some(i + lag));
-    let along_v = course(field, width, valid, stride, |i, lag| {
-        (i / width + lag < height).then_some(i + lag * width)
-    });
+        course(field, width, valid, stride, |i, u, lag| (u + lag < width).then(|| field[i + lag]));
+    let along_v =
+        course(field, width, valid, stride, |i, _, lag| field.get(i + lag * width).copied());
     let two_sided =
         |c: &[f64], power: i32| 1.0 + 2.0 * c[1..].iter().map(|r| r.powi(power)).sum::<f64>();
     let persists = |c: &[f64]| c.len() > LONGEST_LAG;
@@ -48,13 +46,14 @@ pub fn measure_correlation(field: &[f32], width: usize) -> Correlation {
     }
 }
 
-/// Correlation at lag 0, 1, 2 ... until it is dead.
+/// Correlation at lag 0, 1, 2 ... until it is dead; `partner(i, u, lag)` is the value that far from
+/// sample `i` of column `u`.
 fn course(
     field: &[f32],
     width: usize,
     valid: usize,
     stride: usize,
-    partner: impl Fn(usize, usize) -> Option<usize>,
+    partner: impl Fn(usize, usize, usize) -> Option<f32>,
 ) -> Vec<f64> {
     let mut course = vec![1.0];
     if valid < 100 || width == 0 {
@@ -62,15 +61,13 @@ fn course(
     }
     // A stride that shares no factor with the width visits all columns.
     let stride = if stride > 1 { stride | 1 } else { 1 };
+    let there = |i: usize| field[i].is_finite().then(|| (i, i % width));
+    let samples: Vec<(usize, usize)> = (0..field.len()).step_by(stride).filter_map(there).collect();
     for lag in 1..=LONGEST_LAG {
         let (mut ab, mut aa, mut bb, mut n) = (0.0f64, 0.0f64, 0.0f64, 0usize);
-        for i in (0..field.len()).step_by(stride) {
-            let a = field[i];
-            if !a.is_finite() {
-                continue;
-            }
-            if let Some(b) = partner(i, lag).map(|j| field[j]).filter(|b| b.is_finite()) {
-                let (a, b) = (f64::from(a), f64::from(b));
+        for &(i, u) in &samples {
+            if let Some(b) = partner(i, u, lag).filter(|b| b.is_finite()) {
+                let (a, b) = (f64::from(field[i]), f64::from(b));
                 ab += a * b;
                 aa += a * a;
                 bb += b * b;

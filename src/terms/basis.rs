@@ -41,7 +41,7 @@ pub enum Basis {
 /// Nodes of a table over z and over theta.
 pub const TABLE: usize = 17;
 /// Powers of two coordinates, without the plane itself.
-const BENT: [(i32, i32); 12] = [
+const BENT: [(usize, usize); 12] = [
     (2, 0),
     (0, 2),
     (1, 1),
@@ -55,6 +55,12 @@ const BENT: [(i32, i32); 12] = [
     (1, 3),
     (0, 4),
 ];
+
+/// Its powers from 0 to 4.
+fn to_fourth(x: f64) -> [f64; 5] {
+    let square = x * x;
+    [1.0, x, square, x * square, square * square]
+}
 
 impl Basis {
     /// A power series without a constant.
@@ -77,7 +83,7 @@ impl Basis {
         match self {
             Basis::Powers { orders, level, .. } => orders + usize::from(*level),
             Basis::Polynomial { degree, .. } => {
-                BENT.iter().filter(|(i, j)| i + j <= *degree as i32).count()
+                BENT.iter().filter(|(i, j)| i + j <= *degree).count()
             }
             Basis::Waves { harmonics, .. } => 2 * harmonics,
             Basis::Table { columns, .. } => columns.len(),
@@ -97,9 +103,9 @@ impl Basis {
                 powers(times.value(p), over.value(p), level, out);
             }
             Basis::Polynomial { over: [a, b], times, .. } => {
-                let (scale, a, b) = (times.value(p), a.value(p), b.value(p));
+                let (scale, a, b) = (times.value(p), to_fourth(a.value(p)), to_fourth(b.value(p)));
                 for (g, (i, j)) in out.iter_mut().zip(BENT) {
-                    *g = scale * a.powi(i) * b.powi(j);
+                    *g = scale * a[i] * b[j];
                 }
             }
             Basis::Waves { over, period, times, .. } => waves(over, period, times.value(p), p, out),

@@ -35,6 +35,14 @@ pub enum Modulation {
     },
 }
 
+/// `x.powf(power)`, sooner for the halves of whole numbers that bowls are looked for at.
+fn power_of(x: f64, power: f64) -> f64 {
+    const LARGEST: f64 = 8.0;
+    let twice = 2.0 * power;
+    let is_whole = twice.fract() == 0.0 && twice.abs() <= LARGEST;
+    if is_whole { x.sqrt().powi(twice as i32) } else { x.powf(power) }
+}
+
 impl Modulation {
     /// The largest square of a slope, at 80 degrees: Nguyen, Izadi and Lovell 2012 see nothing beyond.
     pub const STEEPEST: f64 = 32.2;
@@ -62,7 +70,7 @@ impl Modulation {
             Modulation::One => 1.0,
             Modulation::Disparity => p.disparity,
             Modulation::DisparitySquared => (p.disparity / DISPARITY_UNIT_PX).powi(2),
-            Modulation::DisparityPower(power) => (p.disparity / DISPARITY_UNIT_PX).powf(power),
+            Modulation::DisparityPower(power) => power_of(p.disparity / DISPARITY_UNIT_PX, power),
             Modulation::Lift => p.disparity / p.rho,
             Modulation::Tilt => p.theta.sin(),
             Modulation::TiltPower(power) => p.theta.sin().powi(power),
