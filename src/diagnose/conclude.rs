@@ -50,8 +50,11 @@ impl Case<'_> {
         found.extend(cannot_tell.iter().map(not_identifiable));
         shares(&mut found);
         self.progress.stage("scoring views kept aside, and what would have been seen");
-        let (heldout, (map, mut detectable)) =
-            rayon::join(|| self.heldout(), || (self.map(outcomes), self.detectable(outcomes)));
+        let left_out = || heldout::left_out(&self.survey, &mean.outcome, &mean.terms);
+        let (heldout, (map, mut detectable, left_out)) = rayon::join(
+            || self.heldout(),
+            || (self.map(outcomes), self.detectable(outcomes), left_out()),
+        );
         detectable.extend(of_losses);
         let mut remarks = self.remarks();
         remarks.extend(untested(outcomes));
@@ -63,7 +66,6 @@ impl Case<'_> {
             self.sample(&mut extended);
         }
         let views = self.view_lines(&mean.terms, heldout.as_ref());
-        let left_out = heldout::left_out(&self.survey, &mean.outcome, &mean.terms);
         let recording = self.recording.root.display().to_string();
         let reference = match self.baseline {
             Some(_) => Reference::SimulatedRecording,

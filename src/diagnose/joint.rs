@@ -264,7 +264,7 @@ impl Joint<'_> {
 fn disparities(data: &[ViewData]) -> [f64; 3] {
     let mut all: Vec<f64> =
         data.iter().flat_map(|v| v.places.iter().map(|p| p.disparity)).collect();
-    all.sort_by(f64::total_cmp);
+    all.par_sort_unstable_by(f64::total_cmp);
     [0.1, 0.5, 0.9]
         .map(|share| all.get((share * all.len() as f64) as usize).copied().unwrap_or(1.0))
 }
