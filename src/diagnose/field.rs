@@ -203,18 +203,15 @@ impl Field {
         pixels: Vec<u32>,
     ) -> Self {
         let n = pixels.len();
-        let mut on_target = vec![false; width * height];
-        pixels.iter().for_each(|&i| on_target[i as usize] = true);
-        let distances = edge_distances(&on_target, width);
-        Field {
+        let mut field = Field {
             name: String::new(),
             time_s: 0.0,
             plane,
             scale_px_m,
             width,
             height,
-            edge: pixels.iter().map(|&i| distances[i as usize]).collect(),
             pixels,
+            edge: Vec::new(),
             sigma: Vec::new(),
             spread_px: 0.0,
             mean: vec![0.0; n],
@@ -232,7 +229,10 @@ impl Field {
             words: RawHistogram::none(),
             region_given: false,
             edges: Edges::default(),
-        }
+        };
+        let distances = edge_distances(&field.on_target(), width);
+        field.edge = field.pixels.iter().map(|&i| distances[i as usize]).collect();
+        field
     }
 
     /// Disparity of the plane at pixel number `k` of the target, px.
