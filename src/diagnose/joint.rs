@@ -12,12 +12,14 @@ use rayon::prelude::*;
 
 use super::candidate::Candidate;
 use super::evidence::Gain;
+use super::joint_error::Error;
 use super::joint_fit::{Columns, Joint, Reduced};
 use super::joint_terms::{Settled, System, is_rough, is_smooth_and_nameless, total};
 use super::outcome::{Chosen, Outcome};
 use super::replication::{Half, Halves, spans};
 use super::samples::{ViewData, coarser};
 use crate::camera::Camera;
+use crate::model::Covariance;
 use crate::terms::Gauge;
 
 /// The terms of a finished search fitted together, with the smooth rest. `fine` are the views' means
@@ -103,7 +105,18 @@ impl Joint<'_> {
             || self.halves(second, s, &precision, &beta),
             || is_told.then(|| self.error(s, &kept, &precision, &left, planes)).flatten(),
         );
-        let mut outcome = Outcome {
+        let folds = s.without.iter().zip(&self.views);
+        let left_out = folds.filter_map(|(r, views)| {
+            Some((views.clone(), self.reported(s, &r.fit(&kept, &precision)?)))
+        });
+        let told = self.reported(s, &beta);
+        let fit = Gain {
+            total: total(&s.scores),
+            by_view: s.scores.clone(),
+            covariance: self.covariance_of_reported(s, &errors, told.len()),
+            beta: DVector::from_vec(told),
+        };
+        Some(Outcome {
             chosen: self.chosen(s, found),
             looks: found.looks.clone(),
             noise: found.noise.clone(),
@@ -112,27 +125,20 @@ impl Joint<'_> {
                 .clone()
                 .filter(|r| s.penalty.is_none() || !is_smooth_and_nameless(&r.candidate)),
             halves,
+            covariance: error.map(|e| self.reported_error(s, &e)).unwrap_or_default(),
+            left_out: left_out.collect(),
+            fit: Some(fit),
             ..Outcome::default()
-        };
-        if let Some(error) = error {
-            outcome.covariance.factors =
-                error.factors.iter().map(|f| self.reported(s, f)).collect();
-            outcome.covariance.variances = self.laid_out(s, &error.variances, |_, _| [0.0; 3]);
+        })
+    }
+
+    /// An error where [`Joint::reported`] has the coefficients.
+    fn reported_error(&self, s: &Settled, error: &Error) -> Covariance {
+        Covariance {
+            factors: error.factors.iter().map(|f| self.reported(s, f)).collect(),
+            variances: self.laid_out(s, &error.variances, |_, _| [0.0; 3]),
+            ..Covariance::default()
         }
-        let folds = s.without.iter().zip(&self.views);
-        outcome.left_out = folds
-            .filter_map(|(r, views)| {
-                Some((views.clone(), self.reported(s, &r.fit(&kept, &precision)?)))
-            })
-            .collect();
-        let told = self.reported(s, &beta);
-        outcome.fit = Some(Gain {
-            total: total(&s.scores),
-            by_view: s.scores.clone(),
-            covariance: self.covariance_of_reported(s, &errors, told.len()),
-            beta: DVector::from_vec(told),
-        });
-        Some(outcome)
     }
 
     /// The terms' covariance where [`Joint::reported`] has their coefficients, zero elsewhere.

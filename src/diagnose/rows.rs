@@ -180,8 +180,9 @@ impl<'a> Rows<'a> {
             let across = weighted.transpose();
             // The lower triangle alone, in strips.
             let strips = (touched.len() / STRIP).max(1);
-            for first in (0..strips).map(|k| k * STRIP) {
-                let last = if first / STRIP + 1 == strips { touched.len() } else { first + STRIP };
+            for strip in 0..strips {
+                let first = strip * STRIP;
+                let last = if strip + 1 == strips { touched.len() } else { first + STRIP };
                 let products = weighted.rows_range(first..) * across.columns_range(first..last);
                 for (c, column) in products.column_iter().enumerate() {
                     let j = touched[first + c];
@@ -234,8 +235,9 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Columns of a block that are multiplied at once with all that follow: enough for the kernel of the
-/// matrix product, few beside the hundred of a usual block.
+/// Columns of a block that are multiplied at once with all that follow; the last strip has what is over,
+/// too. Twice the kernel's width of the matrix product, and few beside a block of two maps, which has 32
+/// and the terms'.
 const STRIP: usize = 16;
 /// Samples multiplied at once.
 const AT_ONCE: usize = 512;
