@@ -16,9 +16,14 @@ pub const BLOCK_TILES: usize = 6;
 /// the view's own, which is free.
 pub fn blocks(view: &SurveyedView) -> ViewData {
     let side = (BLOCK_TILES * SIDE) as f64;
-    let mut sums: std::collections::BTreeMap<(u32, u32), Sum> = Default::default();
+    // What is light and what is dark lies apart: their mean is the noise of neither.
+    let first = view.tiles.first().map_or(1.0, |t| t.place.light);
+    let lit = view.tiles.iter().any(|t| t.place.light != first);
+    let least = if lit { LEAST_LIT } else { LEAST } * side * side;
+    let mut sums: std::collections::BTreeMap<(u32, u32, i32), Sum> = Default::default();
     for t in view.tiles.iter() {
-        let key = ((t.place.v / side) as u32, (t.place.u / side) as u32);
+        let octave = t.place.light.max(DARKEST).log2().floor() as i32;
+        let key = ((t.place.v / side) as u32, (t.place.u / side) as u32, octave);
         sums.entry(key).or_default().add(t, view.between_frame_factor);
     }
     // What the box's mean took with it.
@@ -26,8 +31,7 @@ pub fn blocks(view: &SurveyedView) -> ViewData {
     let kept = if view.between_frame_factor.is_some() { 1.0 } else { 1.0 - taken };
     let mut blocks = ViewData { precision: vec![0.0], ..ViewData::default() };
     for s in sums.values() {
-        // Half a block at least: a few pixels at the rim give no variance.
-        if s.n < 0.5 * side * side || s.ratio <= 0.0 {
+        if s.n < least || s.ratio <= 0.0 {
             continue;
         }
         let worth = s.n * view.frames / view.correlation.sum_of_squares;
@@ -39,6 +43,13 @@ pub fn blocks(view: &SurveyedView) -> ViewData {
     }
     blocks
 }
+
+/// Share of a block that is needed: a few pixels at the rim give no variance.
+const LEAST: f64 = 0.5;
+/// The same where a block falls into parts by their light.
+const LEAST_LIT: f64 = 0.125;
+/// Light that is told from none, of the recording's median.
+const DARKEST: f64 = 0.01;
 
 #[derive(Default)]
 struct Sum {
@@ -78,7 +89,8 @@ impl Sum {
         mix(&mut p.down, t.place.down);
         mix(&mut p.variance, t.place.variance);
         mix(&mut p.edge, t.place.edge);
-        mix(&mut p.light, t.place.light);
+        // Variances add up, and where light is what they come from they are as its inverse (shot noise).
+        p.light = 1.0 / (1.0 / p.light + share * (1.0 / t.place.light - 1.0 / p.light));
     }
 }
 

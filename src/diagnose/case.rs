@@ -24,7 +24,7 @@ use crate::effects::{Active, RAY_FOR_DEPTH};
 use crate::error::Result;
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
-use crate::terms::{Basis, PixelContext, Statistic, Term};
+use crate::terms::{Axis, Basis, PixelContext, Statistic, Term};
 use crate::view::{Excluded, Recording, Sensor};
 
 /// A diagnosis under way.
@@ -216,7 +216,10 @@ impl<'a> Case<'a> {
         measure_tails(&mut structure, &self.fields, &mean.px, &terms, &self.survey, &self.bench);
         let alike = self.baseline.as_ref().is_some_and(|b| b.tails_alike(&structure));
         let holds = |t: &Term| self.holds_tails(t);
+        // The light of single pixels is known to little better than an octave.
+        let by_light = |t: &Term| t.basis.axis() == Axis::Intensity;
         let uneven = outcome.chosen.iter().any(|c| c.candidate.family.is_none())
+            || terms.iter().chain(&self.known.variance).any(by_light)
             || self.survey.refits_sigma && !terms.iter().all(holds)
             || self.known.has_uneven_noise()
             || !self.known.variance.iter().all(holds);

@@ -6,12 +6,13 @@
 use super::edges::Edges;
 use super::known::KnownTerms;
 use super::lattice::RawHistogram;
+use super::light::amplitudes;
 use super::texture::{SMOOTH_PX, high_pass};
 use crate::camera::Rays;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
 use crate::frame::Frame;
-use crate::io::{InfraredImage, read_depth};
+use crate::io::read_depth;
 use crate::measure::{Workbench, view_target};
 use crate::model::SigmaModel;
 use crate::plane::Plane;
@@ -127,18 +128,15 @@ impl Field {
         field
     }
 
-    /// Read the view's first infrared image; one that cannot be read is as none.
+    /// Read how light the surfaces are; without an infrared image that can be read it stays unknown.
     fn read_infrared(&mut self, view: &View, rays: &Rays) {
-        let Some(frame) = view.infrared.first() else { return };
-        let size = [self.width, rays.x.len() / self.width];
-        let Ok(image) = InfraredImage::read(&frame.path, size) else { return };
+        let Some(amplitudes) = amplitudes(view, &self.on_target(), self.width) else { return };
         let n = self.plane.q.normalize();
-        let light = self.pixels.iter().map(|&i| {
+        let light = self.pixels.iter().zip(amplitudes).map(|(&i, amplitude)| {
             let (x, y) = rays.at(i as usize);
             let ray = nalgebra::Vector3::new(x, y, 1.0);
             let facing = (n.dot(&ray) / ray.norm()).abs().max(0.02);
             let far = self.plane.depth(x, y).powi(2) * ray.norm_squared();
-            let amplitude = image.amplitude.get(i as usize).copied().unwrap_or(0);
             (f64::from(amplitude) * far / facing) as f32
         });
         self.light = light.collect();

@@ -2,9 +2,54 @@
 
 use std::sync::Arc;
 
+use super::exposure::FRAMES_KEPT;
 use super::field::Field;
 use super::layers::SurveyedView;
+use crate::io::InfraredImage;
+use crate::stats::{MAD_TO_SIGMA, median_in_place};
 use crate::terms::PixelContext;
+use crate::view::View;
+
+/// Half the side of the window that a pixel's light is read from, px: five across, which are 100
+/// readings of four frames. A Kinect's read noise of 10.4 (Landau et al. 2015), as large as paper at
+/// 4 m is light, is then 1.3; its matcher sees a window of nine.
+const LIGHT_REACH: usize = 2;
+/// What is darker than so many standard errors of that median is as dark as anything.
+const SURE_LIGHT_ERRORS: f64 = 2.0;
+/// Standard error of a Gaussian's median, of that of its mean: the root of pi / 2.
+const MEDIAN_ERROR: f64 = 1.2533;
+
+/// Infrared amplitude at each pixel of a target, in the image's own units: the median of its
+/// neighbours on the target in the view's first frames, for what is dark is cut off at nought and has
+/// too large a mean. `None` without an image that can be read.
+pub fn amplitudes(view: &View, on_target: &[bool], width: usize) -> Option<Vec<f32>> {
+    let height = on_target.len() / width.max(1);
+    let read = |f| InfraredImage::read(f, [width, height]).ok();
+    let images: Vec<InfraredImage> =
+        view.infrared.iter().filter_map(|f| read(&f.path)).take(FRAMES_KEPT).collect();
+    let first = images.first()?;
+    let mut near: Vec<u16> = Vec::new();
+    let median = |i: usize| {
+        let (u, v) = (i % width, i / width);
+        let columns = u.saturating_sub(LIGHT_REACH)..(u + LIGHT_REACH + 1).min(width);
+        near.clear();
+        for row in v.saturating_sub(LIGHT_REACH)..(v + LIGHT_REACH + 1).min(height) {
+            let places = row * width + columns.start..row * width + columns.end;
+            for (k, _) in places.clone().zip(&on_target[places]).filter(|(_, on)| **on) {
+                near.extend(images.iter().map(|image| image.amplitude[k]));
+            }
+        }
+        let middle = near.len() / 2;
+        *near.select_nth_unstable(middle).1
+    };
+    let pixels = || (0..on_target.len()).filter(|i| on_target[*i]);
+    let medians: Vec<f32> = pixels().map(median).map(f32::from).collect();
+    let apart = pixels().zip(&medians).map(|(i, m)| (f32::from(first.amplitude[i]) - m).abs());
+    let noise = MAD_TO_SIGMA * f64::from(median_in_place(&mut apart.collect::<Vec<f32>>()));
+    let readings = ((2 * LIGHT_REACH + 1).pow(2) * images.len()) as f64;
+    let least = (SURE_LIGHT_ERRORS * MEDIAN_ERROR * noise / readings.sqrt()) as f32;
+    Some(medians.into_iter().map(|m| m.max(least)).collect())
+}
 
 /// How infrared amplitudes become the light of surfaces.
 #[derive(Debug, Clone, Copy)]
@@ -34,7 +79,7 @@ pub fn relative_light(views: &mut [SurveyedView]) -> Light {
             all.push(p.light as f32);
         }
     }
-    let median = f64::from(crate::stats::median_in_place(&mut all));
+    let median = f64::from(median_in_place(&mut all));
     let usable = median > 0.0;
     for tile in views.iter_mut().flat_map(|v| Arc::make_mut(&mut v.tiles)) {
         let light = tile.place.light / median;
@@ -53,7 +98,7 @@ fn ambient_share(views: &[SurveyedView]) -> f64 {
             light.retain(|l| l.is_finite());
             let middle = v.tiles.get(v.tiles.len() / 2)?.place;
             let x = middle.ambient * middle.pattern_fall_off();
-            let y = f64::from(crate::stats::median_in_place(&mut light));
+            let y = f64::from(median_in_place(&mut light));
             (x > 0.0 && y > 0.0).then_some((x, y))
         })
         .collect();

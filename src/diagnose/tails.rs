@@ -63,6 +63,9 @@ pub const SURE_SCALE_ERRORS: f64 = 2.0;
 const HEAVY: f64 = 2.5;
 /// So much more where the size of the noise is uneven.
 const MUCH_HEAVIER: f64 = 6.0;
+/// A wide part that is not wider than this, in two standard errors, is noise of uneven size: light that
+/// is known to an octave at the edges of a print leaves a factor of 1.4 of shot noise.
+const UNEVEN_SCALE: f64 = 1.5;
 /// So heavy it may look without a cause.
 const UNEQUAL: f64 = 1.5;
 /// Views too small to show a tail, in readings.
@@ -108,6 +111,9 @@ pub fn tails(
     // Where all that strays is gross it has no scale.
     let mut size_sigma = 4.0 * share.value.sqrt();
     if let Some(Outliers { fraction, scale }) = outliers(&counts, share.std_error / share.value) {
+        if confusers.uneven && scale[0] - 2.0 * scale[1] < UNEVEN_SCALE {
+            return None;
+        }
         parameters.insert("fraction".into(), estimate(fraction[0], fraction[1]));
         parameters.insert("scale".into(), estimate(scale[0], scale[1]));
         size_sigma = fraction[0].sqrt() * scale[0];

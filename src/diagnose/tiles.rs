@@ -118,7 +118,7 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
             s.mean += mean;
             s.square += square;
             s.temporal += square - mean * mean;
-            s.light += f64::from(field.light.get(k).copied().unwrap_or(1.0));
+            s.darkness += f64::from(field.light.get(k).copied().unwrap_or(1.0)).recip();
         }
     }
     let mut tiles: Vec<Tile> =
@@ -140,7 +140,8 @@ struct Sums {
     mean: f64,
     square: f64,
     temporal: f64,
-    light: f64,
+    /// One over the light: noise goes with it.
+    darkness: f64,
     variance: f64,
     asked: f64,
     missing: f64,
@@ -159,7 +160,7 @@ impl Sums {
         let place = places.at(u, v, places.camera.ray(u, v), self.edge / self.pixels);
         let variance = self.variance / self.pixels;
         Tile {
-            place: PixelContext { light: self.light / self.n, variance, ..place },
+            place: PixelContext { light: self.n / self.darkness, variance, ..place },
             mean: self.mean / self.n,
             square: self.square / self.n,
             rough_square: f64::NAN,
