@@ -35,14 +35,16 @@ fn another_power_of_z() {
     }
 }
 
-/// Variances add: the model's, and (0.8 px z tan(theta) / 290 px)^2.
+/// Variances add: the model's, and (0.8 px dz/du)^2: with 290 px, dz/du is z tan(theta) / 290 px on the
+/// optical axis, and goes with z^2 over the plane.
 #[test]
 fn a_slope_turns_lateral_noise_into_depth_noise() {
     for theta in [30.0f64, 60.0] {
-        let lab = noisy(1.2, theta, 90.0, "slope-noise:sigma_lateral_px=0.8");
+        let axis = 1.2;
+        let lab = noisy(axis, theta, 90.0, "slope-noise:sigma_lateral_px=0.8");
         let truth = lab.truth();
-        let slope = 0.8 / 290.0 * theta.to_radians().tan();
-        let got = left_over(&lab, |i| 1f64.hypot(slope * truth[i] / SIGMA_M));
+        let slope = 0.8 / 290.0 * theta.to_radians().tan() / axis;
+        let got = left_over(&lab, |i| 1f64.hypot(slope * truth[i].powi(2) / SIGMA_M));
         // The far half is out of range at 60 degrees: fewer pixels.
         close(got, 1.0, 0.02, "sigma");
     }
