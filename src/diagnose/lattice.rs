@@ -34,6 +34,11 @@ const COARSE: f64 = 0.35;
 const GATHERED_AT_ALL: f64 = 0.4;
 /// What a scale of the depth, or the error of a step, may change it by, as a share.
 const STEP_ERROR: f64 = 0.02;
+/// Finest and coarsest steps of the depth looked for, in units of the words: two are gathered by
+/// sin(pi / 2) / (pi / 2), just above [`GATHERED`].
+const STEPS_UNITS: [f64; 2] = [2.0, 500.0];
+/// The range of words in which they are looked for first.
+const DENSE_UNITS: f64 = 1024.0;
 /// Coarsest and finest steps looked for, px.
 const STEPS_PX: [f64; 2] = [1.0 / 3.0, 1.0 / 64.0];
 
@@ -76,12 +81,29 @@ impl RawHistogram {
         let stride = words.iter().fold(0, |g, (w, _)| gcd(g, *w));
         match sensor.code {
             DepthCode::Metric { units_per_metre, .. } => {
-                let (step, p) = self.scan(&words, scale_px_m * units_per_metre);
+                if stride > 1 {
+                    return Quantisation {
+                        depth_step_m: Some(stride as f64 / units_per_metre),
+                        depth_p: Some(all_multiples(stride, words.len())),
+                        ..Quantisation::default()
+                    };
+                }
+                if self.contrast(&words) < CONTRAST {
+                    return Quantisation::default();
+                }
+                let disparity = scan(&words, scale_px_m * units_per_metre);
+                let depth = scan_depths(&words);
+                if depth.resultant > disparity.resultant {
+                    return Quantisation {
+                        depth_step_m: depth.step().map(|units| units / units_per_metre),
+                        depth_p: depth.step().and(Some(depth.p)),
+                        ..Quantisation::default()
+                    };
+                }
                 Quantisation {
-                    depth_step_m: (stride > 1).then(|| stride as f64 / units_per_metre),
-                    disparity_step_px: step.filter(|_| stride == 1),
-                    depth_p: (stride > 1).then(|| all_multiples(stride, words.len())),
-                    disparity_p: step.filter(|_| stride == 1).and(Some(p)),
+                    disparity_step_px: disparity.step(),
+                    disparity_p: disparity.step().and(Some(disparity.p)),
+                    ..Quantisation::default()
                 }
             }
             DepthCode::Disparity { slope, .. } => {
@@ -95,45 +117,6 @@ impl RawHistogram {
                 }
             }
         }
-    }
-
-    /// The step of the frequency at which the disparities' phases gather most, and the chance of it.
-    fn scan(&self, words: &[(usize, f64)], px_words: f64) -> (Option<f64>, f64) {
-        if self.contrast(words) < CONTRAST {
-            return (None, 1.0);
-        }
-        let disparities: Vec<(f64, f64, f64)> = words
-            .iter()
-            // A count counts less and less: a lattice shows in which words occur.
-            .map(|&(w, n)| (px_words / w as f64, n.sqrt(), px_words / (w * w) as f64))
-            .collect();
-        let range = disparities[0].0 - disparities[disparities.len() - 1].0;
-        let mut best = (0.0, 0.0, 0.0);
-        let mut scanned = 0.0;
-        let mut frequency = 1.0 / STEPS_PX[0];
-        while frequency < 1.0 / STEPS_PX[1] {
-            let (mut c, mut s, mut n, mut squares) = (0.0, 0.0, 0.0, 0.0);
-            for &(d, weight, width) in &disparities {
-                // Words coarser than the lattice cannot show it.
-                if width * frequency < COARSE {
-                    let (sin, cos) = (TAU * frequency * d).sin_cos();
-                    c += weight * cos;
-                    s += weight * sin;
-                    n += weight;
-                    squares += weight * weight;
-                }
-            }
-            let resultant = f64::hypot(c, s) / f64::max(n, 1e-9);
-            if n > 0.0 && resultant > best.1 {
-                best = (frequency, resultant, n * n / squares);
-            }
-            scanned += 1.0;
-            frequency += 0.15 / range.max(1.0);
-        }
-        // Rayleigh's test, at each of the scanned frequencies.
-        let (frequency, resultant, words) = best;
-        let p = (scanned * (-words * resultant * resultant).exp()).clamp(f64::MIN_POSITIVE, 1.0);
-        ((resultant > GATHERED).then(|| 1.0 / frequency), p)
     }
 
     /// Do the disparities lie on a lattice of this step, give or take what a scale or its own error
@@ -193,6 +176,95 @@ impl RawHistogram {
     }
 }
 
+/// The frequency at which phases gather most, how much they do (0 to 1), and the chance of it.
+#[derive(Default)]
+struct Comb {
+    frequency: f64,
+    resultant: f64,
+    p: f64,
+}
+
+impl Comb {
+    fn step(&self) -> Option<f64> {
+        (self.resultant > GATHERED).then(|| 1.0 / self.frequency)
+    }
+
+    /// Of the places, with their weights, that `at` gives for each frequency of an even scan.
+    fn scan<'a>(from: f64, to: f64, by: f64, at: &dyn Fn(f64) -> &'a [(f64, f64)]) -> Self {
+        let mut best = Comb::default();
+        let (mut worth, mut scanned) = (0.0, 0.0);
+        let mut frequency = from;
+        while frequency < to {
+            let (mut c, mut s, mut n, mut squares) = (0.0, 0.0, 0.0, 0.0);
+            for &(x, weight) in at(frequency) {
+                let (sin, cos) = (TAU * frequency * x).sin_cos();
+                c += weight * cos;
+                s += weight * sin;
+                n += weight;
+                squares += weight * weight;
+            }
+            let resultant = f64::hypot(c, s) / f64::max(n, 1e-9);
+            if n > 0.0 && resultant > best.resultant {
+                (best.frequency, best.resultant) = (frequency, resultant);
+                worth = n * n / squares;
+            }
+            scanned += 1.0;
+            frequency += by;
+        }
+        // Rayleigh's test, at each of the scanned frequencies.
+        let chance: f64 = scanned * (-worth * best.resultant * best.resultant).exp();
+        Comb { p: chance.clamp(f64::MIN_POSITIVE, 1.0), ..best }
+    }
+}
+
+/// A scan goes on by this share of a cycle over the range of what it looks at.
+const PHASE_STEP: f64 = 0.15;
+
+/// Steps of the disparity, px: words are `px_words` over their disparity.
+fn scan(words: &[(usize, f64)], px_words: f64) -> Comb {
+    let disparities: Vec<(f64, f64)> = words
+        .iter()
+        // A count counts less and less: a lattice shows in which words occur.
+        .map(|&(w, n)| (px_words / w as f64, n.sqrt()))
+        .collect();
+    let range = disparities[0].0 - disparities[disparities.len() - 1].0;
+    // Words coarser than the lattice, the nearest ones, cannot show it.
+    let fine = |frequency: f64| {
+        let coarse = |&(w, _): &(usize, f64)| px_words / (w * w) as f64 * frequency >= COARSE;
+        &disparities[words.partition_point(coarse)..]
+    };
+    Comb::scan(1.0 / STEPS_PX[0], 1.0 / STEPS_PX[1], PHASE_STEP / range.max(1.0), &fine)
+}
+
+/// Steps of the depth that are no whole number of units: where words lie densest first, then finer and
+/// finer over more of them.
+fn scan_depths(words: &[(usize, f64)]) -> Comb {
+    let places: Vec<(f64, f64)> = words.iter().map(|&(w, n)| (w as f64, n.sqrt())).collect();
+    let within = |middle: f64, range: f64| {
+        let from = places.partition_point(|p| p.0 < middle - 0.5 * range);
+        &places[from..places.partition_point(|p| p.0 < middle + 0.5 * range)]
+    };
+    let all = places[places.len() - 1].0 - places[0].0;
+    let mut range = DENSE_UNITS.min(all);
+    let crowded = |w: &(f64, f64)| within(w.0, range).iter().map(|p| p.1).sum::<f64>();
+    let every = (places.len() / 64).max(1);
+    let densest = places.iter().step_by(every).max_by(|a, b| crowded(a).total_cmp(&crowded(b)));
+    let middle = densest.map_or(0.0, |p| p.0);
+    let near = within(middle, range);
+    let mut comb =
+        Comb::scan(1.0 / STEPS_UNITS[1], 1.0 / STEPS_UNITS[0], PHASE_STEP / range, &|_| near);
+    let mut p = comb.p;
+    while range < 2.0 * all {
+        let off = 2.0 * PHASE_STEP / range;
+        range *= 2.0;
+        let more = within(middle, range);
+        let (from, to) = (comb.frequency - off, comb.frequency + off);
+        comb = Comb::scan(from, to, PHASE_STEP / range, &|_| more);
+        p = p.min(comb.p * STEPS_UNITS[1] * range / PHASE_STEP);
+    }
+    Comb { p: p.clamp(f64::MIN_POSITIVE, 1.0), ..comb }
+}
+
 /// Chance that so many words are all multiples of `step`, or of any coarser one.
 fn all_multiples(step: usize, words: usize) -> f64 {
     let (step, n) = (step as f64, words as f64);
@@ -236,6 +308,12 @@ mod tests {
         assert!((found.disparity_step_px.unwrap() / 0.125 - 1.0).abs() < 2e-3, "{found:?}");
         let found = words(0.0, 0.001).lattice(&sensor, 43.5);
         assert_eq!((found.depth_step_m, found.disparity_step_px), (Some(0.001), None));
+        for rounding in [0.00045, 0.000907, 0.00121, 0.0123] {
+            let found = words(0.0, rounding).lattice(&sensor, 43.5);
+            let step = found.depth_step_m.expect("a step that is no whole number of units");
+            assert!((step / rounding - 1.0).abs() < 1e-4, "{rounding}: {found:?}");
+            assert!(found.disparity_step_px.is_none() && found.depth_p.is_some_and(|p| p < 1e-9));
+        }
         let found = words(0.0, 0.0).lattice(&sensor, 43.5);
         assert_eq!((found.depth_step_m, found.disparity_step_px), (None, None), "{found:?}");
     }

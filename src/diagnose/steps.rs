@@ -128,8 +128,17 @@ pub(super) fn contradicted(
     disparity.into_iter().chain(depth).collect()
 }
 
-/// A step is worth telling when the error it makes is this share of the noise.
+/// A step is worth telling when the error it makes is this share of the noise in some view.
 const STEP_SHARE: f64 = 0.1;
+
+/// The largest error of a step among the views, in sigmas; `px` is the step at a depth, in px.
+fn strongest(fields: &[Field], px: impl Fn(f64) -> f64) -> f64 {
+    let of = |f: &Field| {
+        let sigma = f.sigma.get(f.sigma.len() / 2).map_or(f64::INFINITY, |s| f64::from(*s));
+        px(f.plane.depth(0.0, 0.0)) / 12f64.sqrt() / sigma
+    };
+    fields.iter().map(of).fold(0.0, f64::max)
+}
 
 /// The weight of a step among the findings, in place of nats: no fit gives any.
 pub(super) fn step_nats(sigma: f64) -> f64 {
@@ -168,7 +177,7 @@ pub(super) fn steps(
         let sigma = step / 12f64.sqrt() / sigma_px;
         let size = Size { mm: sigma * sigma_mm, sigma };
         let error = if is_raw(recording) { 0.0 } else { 0.002 * step };
-        (sigma > STEP_SHARE).then(|| Finding {
+        (strongest(fields, |_| step) > STEP_SHARE).then(|| Finding {
             interval: [0.0, 1.0],
             parameters: one("step_px", step, error),
             p_adjusted: lattice.disparity_p,
@@ -180,7 +189,8 @@ pub(super) fn steps(
     let of_depth = of_depth.and_then(|step| {
         let mm = 1e3 * step / 12f64.sqrt();
         let size = Size { mm, sigma: mm / sigma_mm };
-        (size.sigma > STEP_SHARE).then(|| Finding {
+        let px = |z: f64| step * fields[0].scale_px_m / (z * z);
+        (strongest(fields, px) > STEP_SHARE).then(|| Finding {
             interval: crate::stats::range(fields.iter().map(|f| f.plane.depth(0.0, 0.0))),
             parameters: one("step_m", step, 0.0),
             p_adjusted: lattice.depth_p,
