@@ -10,6 +10,7 @@ use super::few_views::few_views;
 use super::field::Field;
 use super::findings;
 use super::form::better_form;
+use super::layers::SurveyedView;
 use super::lines::lines;
 use super::missing::{self, DropoutOutcome, missing};
 use super::mixing::mixing;
@@ -23,6 +24,7 @@ use super::reference::{self, can_happen};
 use super::replication_textures;
 use super::scene::Scene;
 use super::steps::{COARSE_SIGMAS, is_raw, own_step, own_step_note, steps};
+use super::structure::Structure;
 use super::tails::EXCESS;
 use super::texture_finding::TextureFinding;
 use super::variance;
@@ -92,7 +94,7 @@ impl Case<'_> {
         let stepped = lattice.is_some();
         let outcomes = [&mean.outcome, &scatter.outcome];
         let ((lost, of_few_views), (mut curves, textures)) = rayon::join(
-            || (self.lost(), self.few_views(outcomes, stepped)),
+            || (self.lost(), self.few_views(outcomes, &scatter, stepped)),
             || (self.curves(outcomes, advise), self.texture(&mean, &scatter, steps)),
         );
         let refitted = self.take_refit(&mut curves);
@@ -219,7 +221,12 @@ impl Case<'_> {
 
     /// What a few views have alone. Two runs of a world of light, and views beside those that a model
     /// was learnt from, differ one by one for no reason that could be told.
-    fn few_views(&self, outcomes: [&Outcome; 2], stepped: bool) -> Vec<Finding> {
+    fn few_views(
+        &self,
+        outcomes: [&Outcome; 2],
+        measured: &ScatterResult,
+        stepped: bool,
+    ) -> Vec<Finding> {
         if self.baseline.is_some() || self.options.ablation != Ablation::None {
             return Vec::new();
         }
@@ -230,12 +237,18 @@ impl Case<'_> {
         let bias = || {
             let candidates = bias::candidates(&bounds);
             let rules = survey.bias_rules(camera, level);
-            few_views(&mean, &survey.mean_data(), &candidates, outcomes[0], &rules, seed)
+            let views = measured.structure.iter().zip(&survey.views);
+            let of_rows = |(s, v): (&Structure, &SurveyedView)| s.excess_of_rows(&v.correlation)[0];
+            let excess: Vec<f64> = match self.rows_err_alike(&measured.textures) {
+                true => views.map(of_rows).collect(),
+                false => Vec::new(),
+            };
+            few_views(&mean, &survey.mean_data(), &candidates, outcomes[0], &rules, &excess, seed)
         };
         let variance = || {
             let candidates = variance::candidates(&bounds, &self.model.sigma);
             let rules = survey.variance_rules(level);
-            few_views(&scatter, &scatter.data, &candidates, outcomes[1], &rules, seed)
+            few_views(&scatter, &scatter.data, &candidates, outcomes[1], &rules, &[], seed)
         };
         let tested = |layer: usize| survey.learnt_from[layer].is_none();
         // Where the words step, so does the mean of every view, at places of its own.

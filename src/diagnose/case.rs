@@ -11,7 +11,7 @@ use super::known::KnownTerms;
 use super::lattice::Quantisation;
 use super::layers::Survey;
 use super::learnt::Learnt;
-use super::noise::texture_findings;
+use super::noise::{ROW_NOISE, texture_findings};
 use super::outcome::Outcome;
 use super::pixels::{common, mean_of, measure_tails, pixel_terms, terms_of};
 use super::reading::{LoadedViews, refuse_other_size};
@@ -193,6 +193,11 @@ impl<'a> Case<'a> {
         }
         let mut textures = texture_findings(&structure, &self.known, each);
         textures.retain(|h| self.stands(h.p, each));
+        if self.rows_err_alike(&textures) {
+            for (view, s) in self.survey.views.iter_mut().zip(&structure) {
+                view.log_variance_inflation *= s.excess_of_rows(&view.correlation)[1];
+            }
+        }
         self.survey.compare_frames(&self.fields, common(&structure, &textures, &self.known));
         let compared =
             self.baseline.as_mut().is_some_and(|baseline| baseline.variances(&mut self.survey));
@@ -227,6 +232,11 @@ impl<'a> Case<'a> {
         let tails = tails(&structure, &self.known, each, confusers)
             .filter(|t| !alike && self.stands(t.p, each));
         ScatterResult { structure, lattice, textures, tails, outcome }
+    }
+
+    /// Do the pixels of a row share an error, as was found or is known?
+    pub fn rows_err_alike(&self, textures: &[TextureFinding]) -> bool {
+        textures.iter().any(|t| t.families.contains(&ROW_NOISE)) || self.known.has(ROW_NOISE)
     }
 
     /// Is this chance, of noise alone, small enough where the model's own views left something open

@@ -20,8 +20,9 @@ use super::outcome::{Outcome, Rules};
 use super::prepared::{evidence_of_bases, without};
 use super::samples::{ViewData, coarser};
 use super::scene::{Scene, size};
+use super::tiles::SIDE;
 use crate::rng::{Seed, Stream};
-use crate::terms::{Basis, Term};
+use crate::terms::{Basis, PixelContext, Term};
 
 /// Candidates with more columns fit single views too freely.
 const MAX_COLUMNS: usize = 16;
@@ -30,6 +31,11 @@ const REPLICATES: u64 = 200;
 /// What all views share explains at most so many times as much: what it misses in some views is its
 /// own shape, badly met.
 const BESIDE_ALL: f64 = 10.0;
+/// What lies behind a target may be taken for its rim so far from the edge, px, and no other view
+/// outvotes it.
+const RIM_PX: f64 = SIDE as f64;
+/// A share of the weight that keeps a sample, and lets it say nothing.
+const NEXT_TO_NONE: f64 = 1e-9;
 /// A name must explain this share of what the best curve does: a few views show little of a shape.
 const NAME_ADEQUATE: f64 = 0.9;
 
@@ -111,20 +117,27 @@ impl<'a> Tried<'a> {
     }
 }
 
-/// The strongest such cause beside what all views share, if noise does not bring as much.
+/// The strongest such cause beside what all views share, if noise does not bring as much; `excess` is how
+/// many times less sure each view is than its samples say, where whole lines err alike.
 pub fn few_views(
     scene: &Scene<'_>,
     fine: &[ViewData],
     candidates: &[Candidate],
     outcome: &Outcome,
     rules: &Rules,
+    excess: &[f64],
     seed: Seed,
 ) -> Option<Finding> {
     let chosen = outcome.chosen.iter().enumerate();
     let shared: Vec<(&Basis, Vec<f64>)> =
         chosen.map(|(k, c)| (&c.candidate.basis, outcome.coefficients(k))).collect();
-    let without_shared = |v: &ViewData| ViewData { response: without(v, &shared), ..v.clone() };
-    let fine: Vec<ViewData> = fine.iter().map(without_shared).collect();
+    let alone = |(n, v): (usize, &ViewData)| {
+        let share = |p: &PixelContext| if p.edge < RIM_PX { NEXT_TO_NONE } else { 1.0 };
+        let shares = v.places.iter().map(share).zip(&v.weight);
+        let weight = shares.map(|(share, w)| share * w / excess.get(n).unwrap_or(&1.0)).collect();
+        ViewData { response: without(v, &shared), weight, ..v.clone() }
+    };
+    let fine: Vec<ViewData> = fine.iter().enumerate().map(alone).collect();
     let coarse: Vec<ViewData> = match scene.statistic {
         crate::terms::Statistic::Bias => fine.par_iter().map(coarser).collect(),
         _ => fine.clone(),

@@ -92,9 +92,12 @@ pub fn expected_window(known: &KnownTerms) -> f64 {
     1.0 + of("share").unwrap_or(1.0).clamp(0.0, 1.0) * (side - 1.0)
 }
 
+/// Rows of a frame that err as one each.
+pub const ROW_NOISE: &str = "row-noise";
+
 fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
     let variance = variance_px2(views);
-    let known_px = known.parameter("row-noise", "sigma_px").unwrap_or(0.0);
+    let known_px = known.parameter(ROW_NOISE, "sigma_px").unwrap_or(0.0);
     let line = |families, statistic, axis, expected_px2, words| Shared {
         families,
         statistic,
@@ -113,7 +116,7 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
         ),
         (
             ViewMean::of(views, |s| s.row_px2),
-            line(vec!["row-noise"], Statistic::Correlation, Axis::Row, row, None),
+            line(vec![ROW_NOISE], Statistic::Correlation, Axis::Row, row, None),
         ),
         (
             ViewMean::of(views, |s| s.column_px2),

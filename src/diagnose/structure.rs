@@ -15,7 +15,7 @@ use super::texture::{
     pixel_scale, same_pixel, without_lines, without_outliers,
 };
 use crate::camera::Camera;
-use crate::stats::{mean, measure_correlation};
+use crate::stats::{Correlation, mean, measure_correlation};
 
 /// What one view tells; `None` where it cannot.
 #[derive(Debug, Clone, Default)]
@@ -54,6 +54,18 @@ impl Structure {
     /// Share beyond four local standard deviations, where enough was looked at.
     pub fn tail_share(&self) -> Option<f64> {
         (self.tails.n > FEWEST_READINGS).then(|| self.tails.share())
+    }
+
+    /// How many times the variance of a mean, and of a log variance, exceeds what pixels that hang
+    /// together so say, for a shape that the row decides where rows have an error of their own: along one
+    /// all pixels share it, on a target about as wide as it is high.
+    pub fn excess_of_rows(&self, correlation: &Correlation) -> [f64; 2] {
+        let shared = self.row_px2.unwrap_or(0.0).max(0.0) / self.variance_px2.max(1e-12);
+        let along = self.pixels.sqrt();
+        [
+            1.0 + along * shared / correlation.sum.max(1.0),
+            1.0 + along * shared * shared / correlation.sum_of_squares.max(1.0),
+        ]
     }
 }
 
