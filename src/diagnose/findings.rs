@@ -105,6 +105,7 @@ fn finding(
         let fit = Fitted { shape: basis, coefficients, covariance, reach };
         of_any_formula(chosen.candidate.family, parameters(chosen.candidate.family, &fit))
     });
+    let formula_error = chosen.candidate.effect().map_or(0.0, |e| e.card().formula_error);
     let shape =
         effect.is_none().then(|| shape::words(&terms[main].basis, &terms[main].coefficients));
     let physics = physics(status, effect, scene.statistic, axis, shape.as_deref());
@@ -118,7 +119,7 @@ fn finding(
         parameters,
         size: size(scene, &mine),
         p_adjusted: Some(chosen.p),
-        replicated: outcome.halves.as_ref().and_then(|h| h.replicate(group)),
+        replicated: outcome.halves.as_ref().and_then(|h| h.replicate(group, formula_error)),
         physics,
         shape,
         curve: Some(along.curve(scene, &left, &mine)),

@@ -153,7 +153,8 @@ impl<'a> Losses<'a> {
             }
             Shape::Curve(basis) => {
                 let evidence = self.evidence(basis);
-                Halves::of(&evidence, second, CURVE_PRECISION, &[basis.count()])?.replicate(&[0])
+                Halves::of(&evidence, second, CURVE_PRECISION, &[basis.count()])?
+                    .replicate(&[0], 0.0)
             }
         }
     }

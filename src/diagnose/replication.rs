@@ -136,9 +136,13 @@ impl Halves {
     }
 
     /// Do both halves have these terms, taken as one shape? `None` where the terms have no columns
-    /// of their own, or a half has too few views.
-    pub fn replicate(&self, terms: &[usize]) -> Option<bool> {
-        let (sizes, seen) = self.shown(terms)?;
+    /// of their own, or a half has too few views. No formula is exact: each half may be off by this share
+    /// of the size beside its own error.
+    pub fn replicate(&self, terms: &[usize], formula_error: f64) -> Option<bool> {
+        let (mut sizes, seen) = self.shown(terms)?;
+        for size in &mut sizes {
+            size.std_error = size.std_error.hypot(formula_error * size.value);
+        }
         Some(alike(&sizes) && seen > SEEN)
     }
 

@@ -41,7 +41,7 @@ fn share(k: usize, truth: impl Fn(usize) -> f64) -> f64 {
     let mut rng = Seed(7).stream("replication");
     let replicates = || {
         let (views, second) = views(k, &truth, &mut rng);
-        Halves::of(&views, &second, 1e-6, &[k]).unwrap().replicate(&[0]).unwrap()
+        Halves::of(&views, &second, 1e-6, &[k]).unwrap().replicate(&[0], 0.0).unwrap()
     };
     std::iter::repeat_with(replicates).take(400).filter(|r| *r).count() as f64 / 400.0
 }
