@@ -29,11 +29,15 @@ struct Motion {
 impl Motion {
     /// Mean of the views' velocities by their errors, which are enlarged by how they disagree.
     fn of(all: &[Jitter]) -> Option<Self> {
+        // Two frames beyond a line may lie on it by chance: no view is surer than all together are.
+        let freedom: f64 = all.iter().map(|j| j.freedom).sum();
+        let usual_px2 = all.iter().map(|j| j.scatter_px2).sum::<f64>() / freedom.max(1.0);
         let known: Vec<(f64, f64)> = all
             .iter()
             .filter(|j| j.trend_px2 > 0.0 && j.freedom > 0.0)
             .map(|j| {
-                let noise_px2 = j.expected_px2.max(j.scatter_px2 / j.freedom);
+                let own_px2 = j.expected_px2.max(j.scatter_px2 / j.freedom);
+                let noise_px2 = own_px2.max(usual_px2);
                 (j.velocity_mps, j.velocity_mps.powi(2) / j.trend_px2 * noise_px2)
             })
             .filter(|(_, variance)| *variance > 0.0)
