@@ -48,8 +48,16 @@ fn of(f: &Finding) -> String {
             few if few == "0.0" => "less than 0.1 % of the pixels lost".to_string(),
             percent => format!("{percent} % of the pixels lost"),
         },
-        _ => format!("{} rms, {} of the noise", mm(f.size.mm), fixed(f.size.sigma, 2)),
+        // A motion has a speed, and no size of its own.
+        _ if f.size.mm == 0.0 && f.size.sigma == 0.0 => String::new(),
+        _ => match fixed(f.size.sigma, 2) {
+            little if little == "0.00" => {
+                format!("{} rms, less than 0.01 of the noise", mm(f.size.mm))
+            }
+            sigmas => format!("{} rms, {sigmas} of the noise", mm(f.size.mm)),
+        },
     };
+    let size = if size.is_empty() { size } else { size + ", " };
     let parameter = |(name, value): (&String, &serde_json::Value)| brief(f.effect, name, value);
     let parameters: Vec<String> = f.parameters.iter().filter_map(parameter).collect();
     let parameters = match parameters[..] {
@@ -66,7 +74,7 @@ fn of(f: &Finding) -> String {
         true => "by the reference distances".to_string(),
         false => format!("{} % of the mismatch", fixed(100.0 * f.share, 0)),
     };
-    format!("{name}{rest}: {size}, {share}{parameters}{halves}{next}.")
+    format!("{name}{rest}: {size}{share}{parameters}{halves}{next}.")
 }
 
 fn settled_by(view: &NextView) -> String {
