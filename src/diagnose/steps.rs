@@ -85,7 +85,8 @@ pub(super) fn own_step_note(step: f64) -> String {
 /// Quantization Noise, 2008. What coarser ones leave follows the surface.
 pub(super) const COARSE_SIGMAS: f64 = 2.0;
 
-/// Neighbours in one coarse step err alike: such views show no window.
+/// Neighbours in one coarse step err alike: such views show no window. Nor do they show what lines share,
+/// for whether a pixel jumps from frame to frame depends on where in a step its line lies.
 pub(super) fn forget_windows(
     structure: &mut [Structure],
     fields: &[Field],
@@ -96,6 +97,7 @@ pub(super) fn forget_windows(
         let step = lattice.step_px(f.scale_px_m, f.plane.depth(0.0, 0.0));
         if step > COARSE_SIGMAS * sigma {
             (s.window_px, s.neighbour_correlation, s.correlation_profile) = (None, None, None);
+            (s.row_px2, s.column_px2) = (None, None);
         }
     }
 }
