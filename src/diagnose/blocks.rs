@@ -14,15 +14,16 @@ pub const BLOCK_TILES: usize = 6;
 
 /// Logarithm of the variance over the model's in patches large enough for a variance, beside a level of
 /// the view's own, which is free.
-pub fn blocks(view: &SurveyedView) -> ViewData {
+/// Where `by_light`, a block falls into parts by their light: what is light and what is dark lies apart,
+/// for their mean is the noise of neither.
+pub fn blocks(view: &SurveyedView, by_light: bool) -> ViewData {
     let side = (BLOCK_TILES * SIDE) as f64;
-    // What is light and what is dark lies apart: their mean is the noise of neither.
     let first = view.tiles.first().map_or(1.0, |t| t.place.light);
-    let lit = view.tiles.iter().any(|t| t.place.light != first);
+    let lit = by_light && view.tiles.iter().any(|t| t.place.light != first);
     let least = if lit { LEAST_LIT } else { LEAST } * side * side;
     let mut sums: std::collections::BTreeMap<(u32, u32, i32), Sum> = Default::default();
     for t in view.tiles.iter() {
-        let octave = t.place.light.max(DARKEST).log2().floor() as i32;
+        let octave = if lit { t.place.light.max(DARKEST).log2().floor() as i32 } else { 0 };
         let key = ((t.place.v / side) as u32, (t.place.u / side) as u32, octave);
         sums.entry(key).or_default().add(t, view.between_frame_factor);
     }
@@ -134,4 +135,62 @@ pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
     let enlarged = if free > 3.0 { free / (free - 2.0) } else { 3.0 };
     let floor = if tolerance > MODEL_TOLERANCE { floor } else { LEVEL_SCATTER * LEVEL_SCATTER };
     ((left - sampling) * enlarged).max(floor)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::stats::Correlation;
+
+    /// A print of two greys, half a block a square: shot noise is told of either grey, and not of what
+    /// lies between them.
+    #[test]
+    fn what_is_light_and_what_is_dark_lie_apart() {
+        const ACROSS: usize = 10 * BLOCK_TILES;
+        let tile = |k: usize| {
+            let (row, column) = (k / ACROSS, k % ACROSS);
+            let square = (2 * row / BLOCK_TILES + 2 * column / BLOCK_TILES) % 2;
+            let light = [0.25, 2.0][square];
+            let [u, v] = [column, row].map(|place| ((place * SIDE) as f64) + 1.5);
+            Tile {
+                place: PixelContext { u, v, light, ..PixelContext::default() },
+                mean: 0.0,
+                square: 1.0 / light,
+                rough_square: 0.0,
+                temporal: 1.0 / light,
+                variance: 1.0,
+                pixels: (SIDE * SIDE) as f64,
+                missing: 0.0,
+                asked: 1.0,
+            }
+        };
+        let white = Correlation {
+            along_u: vec![1.0],
+            along_v: vec![1.0],
+            sum: 1.0,
+            sum_of_squares: 1.0,
+            persists: false,
+        };
+        let view = SurveyedView {
+            name: "0".into(),
+            tiles: Arc::new((0..ACROSS * ACROSS).map(tile).collect()),
+            inflation: 1.0,
+            correlation: white,
+            frames: 3.0,
+            log_variance_inflation: 1.0,
+            between_frame_factor: Some(1.0),
+            in_second_half: false,
+        };
+        let data = blocks(&view, true);
+        assert_eq!(data.places.len(), 200, "two parts of a hundred blocks");
+        for (place, log_variance) in data.places.iter().zip(&data.response) {
+            assert!([0.25, 2.0].iter().any(|grey| (place.light / grey - 1.0).abs() < 1e-9));
+            // The mean of a log chi^2 is put right by one over what the block is worth.
+            assert!((log_variance + place.light.ln()).abs() < 2.0 / 400.0, "{log_variance}");
+        }
+        let whole = blocks(&view, false);
+        assert_eq!(whole.places.len(), 100, "a simulation is compared block by block");
+    }
 }

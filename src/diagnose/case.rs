@@ -10,7 +10,7 @@ use super::field::Field;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
 use super::layers::Survey;
-use super::learnt::Learnt;
+use super::learnt::{Learnt, learnt_from};
 use super::noise::{ROW_NOISE, texture_findings};
 use super::outcome::Outcome;
 use super::pixels::{common, mean_of, measure_tails, pixel_terms, terms_of};
@@ -278,6 +278,7 @@ fn survey(
     let camera = &bench.sensor.camera;
     let mut survey = Survey::of(fields, camera, &bench.rays);
     survey.kind = bench.sensor.kind;
+    survey.by_light = baseline.is_none();
     survey.ablate(options.ablation, fields);
     survey.refits_sigma = options.calibrated_here && baseline.is_none();
     survey.fixed_px2 = mean_of(fixed_px2_by_view(fields, camera).into_iter().flatten());
@@ -293,16 +294,4 @@ fn survey(
         survey.absorb_model_bias_error(known);
     }
     survey
-}
-
-/// Views that the model's bias, and its sigma, were learnt from, where these are others.
-fn learnt_from(
-    model: &NoiseModel,
-    known: &KnownTerms,
-    options: &DiagnoseOptions,
-    against: bool,
-) -> [Option<Learnt>; 2] {
-    let others = !against && !options.calibrated_here;
-    let learnt = Learnt::of(model).filter(|_| others);
-    [learnt.filter(|l| l.searched || known.bias_is_learnt()), learnt]
 }

@@ -92,6 +92,8 @@ pub struct Survey {
     /// Variance of what each pixel errs by in every view alike, px^2.
     pub fixed_px2: f64,
     pub light: Light,
+    /// Blocks fall into parts by their light; those of two recordings that are compared do not.
+    pub by_light: bool,
     /// How well the size of the noise is known from view to view beforehand, in log variance.
     pub tolerance: f64,
     /// Sigma was calibrated on these very views: it is refitted beside every hypothesis.
@@ -143,6 +145,7 @@ impl Survey {
             kind: None,
             fixed_px2: 0.0,
             light,
+            by_light: true,
             tolerance,
             refits_sigma: false,
             learnt_from: [None; 2],
@@ -242,7 +245,8 @@ impl Survey {
 
     /// Log variance over the model's, block by block.
     pub fn variance_data(&self) -> Vec<ViewData> {
-        let blocks: Vec<ViewData> = self.views.par_iter().map(blocks).collect();
+        let of = |v: &SurveyedView| blocks(v, self.by_light);
+        let blocks: Vec<ViewData> = self.views.par_iter().map(of).collect();
         // A view's level is as uncertain as views scatter.
         let precision = vec![1.0 / view_scatter(&blocks, self.tolerance)];
         let held = |b| ViewData { precision: precision.clone(), ..b };

@@ -2,6 +2,8 @@
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
+use super::engine::DiagnoseOptions;
+use super::known::KnownTerms;
 use crate::model::NoiseModel;
 
 /// Views that taught a model, where they are not the ones that are looked at.
@@ -44,6 +46,18 @@ impl Learnt {
         let deviations = -normal.inverse_cdf(p);
         if self.searched { normal.sf(deviations / self.excess(views).sqrt()) } else { p }
     }
+}
+
+/// Views that the model's bias, and its sigma, were learnt from, where these are others.
+pub fn learnt_from(
+    model: &NoiseModel,
+    known: &KnownTerms,
+    options: &DiagnoseOptions,
+    against: bool,
+) -> [Option<Learnt>; 2] {
+    let others = !against && !options.calibrated_here;
+    let learnt = Learnt::of(model).filter(|_| others);
+    [learnt.filter(|l| l.searched || known.bias_is_learnt()), learnt]
 }
 
 #[cfg(test)]

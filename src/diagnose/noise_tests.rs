@@ -282,3 +282,40 @@ fn one_view_is_no_sample() {
     assert!(texture_findings(one, &KnownTerms::default(), LEVEL).is_empty());
     assert!(texture_findings(&[], &KnownTerms::default(), LEVEL).is_empty());
 }
+
+/// Frames that jitter, about a line through four of them: two degrees of freedom a view leave some view
+/// that lies on its line by chance, and it must not decide for all. A true motion is told.
+#[test]
+fn frames_that_jitter_do_not_move() {
+    const MANY: usize = 40;
+    const Z_M: f64 = 2.0;
+    const SCALE_PX_M: f64 = 43.5;
+    let told = |seed: u64, velocity_mps: f64| {
+        let mut rng = Seed(seed).stream("noise/jitter");
+        let view = |_| {
+            let t = [-0.05, -0.05 / 3.0, 0.05 / 3.0, 0.05f64];
+            let px_per_s = -velocity_mps * SCALE_PX_M / (Z_M * Z_M);
+            let m = t.map(|t| px_per_s * t + 0.015 * normal(&mut rng));
+            let mean = m.iter().sum::<f64>() / 4.0;
+            let tt: f64 = t.iter().map(|t| t * t).sum();
+            let tm: f64 = t.iter().zip(m).map(|(t, m)| t * m).sum();
+            let mm: f64 = m.iter().map(|m| (m - mean).powi(2)).sum();
+            Structure {
+                jitter: Some(Jitter {
+                    scatter_px2: mm - tm * tm / tt,
+                    freedom: 2.0,
+                    expected_px2: 1e-7,
+                    trend_px2: tm * tm / tt,
+                    velocity_mps: -tm / tt * Z_M * Z_M / SCALE_PX_M,
+                }),
+                ..Structure::default()
+            }
+        };
+        let views: Vec<Structure> = (0..MANY).map(view).collect();
+        names(&frames(&views, &KnownTerms::default(), LEVEL, 0.0))
+    };
+    // At 1e-3, 0.3 of 300 are expected: more than 3 have a chance of 3e-4.
+    let moving = (0..300).filter(|seed| told(*seed, 0.0).contains(&"target-motion")).count();
+    assert!(moving <= 3, "{moving} of 300 move");
+    assert!((0..20).all(|seed| told(seed, 0.05).contains(&"target-motion")));
+}

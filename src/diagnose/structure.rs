@@ -247,3 +247,55 @@ fn correlation_profile(
     let correlation_profile: Option<Vec<f64>> = (1..=PROFILE_LAGS).map(at).collect();
     correlation_profile?.try_into().ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::rng::Seed;
+
+    /// A square of white pixels whose rows err by half as much each: the variance of a row's mean, and
+    /// of its mean square, over that of as many pixels that have nothing in common.
+    #[test]
+    fn rows_that_err_alike_are_worth_less() {
+        const SIDE: usize = 60;
+        const ROWS: usize = 40_000;
+        const ROW_PX: f64 = 0.5;
+        let mut rng = Seed(3).stream("structure/rows");
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let (mut means, mut squares) = (Vec::new(), Vec::new());
+        for _ in 0..ROWS {
+            let row = ROW_PX * normal();
+            let pixels: Vec<f64> = (0..SIDE).map(|_| row + normal()).collect();
+            means.push(pixels.iter().sum::<f64>() / SIDE as f64);
+            squares.push(pixels.iter().map(|p| p * p).sum::<f64>() / SIDE as f64);
+        }
+        let spread = |all: &[f64]| {
+            let level = all.iter().sum::<f64>() / ROWS as f64;
+            all.iter().map(|x| (x - level).powi(2)).sum::<f64>() / ROWS as f64
+        };
+        let power = 1.0 + ROW_PX * ROW_PX;
+        let apart = [power / SIDE as f64, 2.0 * power * power / SIDE as f64];
+        let truth = [spread(&means) / apart[0], spread(&squares) / apart[1]];
+        let s = Structure {
+            pixels: (SIDE * SIDE) as f64,
+            variance_px2: power,
+            row_px2: Some(ROW_PX * ROW_PX),
+            ..Structure::default()
+        };
+        let white = Correlation {
+            along_u: vec![1.0],
+            along_v: vec![1.0],
+            sum: 1.0,
+            sum_of_squares: 1.0,
+            persists: false,
+        };
+        for (got, truth) in s.excess_of_rows(&white).iter().zip(truth) {
+            // A pixel has itself in common with its row: one of sixty.
+            assert!((got / truth - 1.0).abs() < 0.06, "{got}, by simulation {truth}");
+        }
+        let none = Structure { row_px2: Some(-1e-4), ..s };
+        assert_eq!(none.excess_of_rows(&white), [1.0; 2]);
+    }
+}

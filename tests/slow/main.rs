@@ -15,6 +15,7 @@ mod rays;
 #[path = "../common/raytraced/mod.rs"]
 mod raytraced;
 
+mod demos;
 mod detectable;
 mod diagnose;
 mod diagnose_ablation;
