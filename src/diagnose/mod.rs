@@ -14,6 +14,7 @@ mod blocks;
 mod candidate;
 mod case;
 mod choose;
+mod comb;
 mod conclude;
 mod diagnosis;
 mod edges;
