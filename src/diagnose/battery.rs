@@ -10,7 +10,6 @@ use super::few_views::few_views;
 use super::field::Field;
 use super::findings;
 use super::form::better_form;
-use super::layers::SurveyedView;
 use super::lines::lines;
 use super::missing::{self, DropoutOutcome, missing};
 use super::mixing::mixing;
@@ -24,7 +23,6 @@ use super::reference::{self, can_happen};
 use super::replication_textures;
 use super::scene::Scene;
 use super::steps::{COARSE_SIGMAS, is_raw, own_step, own_step_note, steps};
-use super::structure::Structure;
 use super::tails::EXCESS;
 use super::texture_finding::TextureFinding;
 use super::variance;
@@ -237,12 +235,8 @@ impl Case<'_> {
         let bias = || {
             let candidates = bias::candidates(&bounds);
             let rules = survey.bias_rules(camera, level);
-            let views = measured.structure.iter().zip(&survey.views);
-            let of_rows = |(s, v): (&Structure, &SurveyedView)| s.excess_of_rows(&v.correlation)[0];
-            let excess: Vec<f64> = match self.rows_err_alike(&measured.textures) {
-                true => views.map(of_rows).collect(),
-                false => Vec::new(),
-            };
+            let excess = self.excess_of_rows(&measured.structure, &measured.textures);
+            let excess: Vec<f64> = excess.into_iter().map(|[of_mean, _]| of_mean).collect();
             few_views(&mean, &survey.mean_data(), &candidates, outcomes[0], &rules, &excess, seed)
         };
         let variance = || {

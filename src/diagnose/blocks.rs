@@ -7,7 +7,7 @@ use super::samples::ViewData;
 use super::texture::SMOOTH_PX;
 use super::tiles::{SIDE, Tile};
 use crate::solve::{Left, left_by_fit};
-use crate::terms::PixelContext;
+use crate::terms::{DARKEST, PixelContext};
 
 /// Side of a block, in tiles: 24 px, seven independent samples under a Kinect's window.
 pub const BLOCK_TILES: usize = 6;
@@ -49,8 +49,6 @@ pub fn blocks(view: &SurveyedView, by_light: bool) -> ViewData {
 const LEAST: f64 = 0.5;
 /// The same where a block falls into parts by their light.
 const LEAST_LIT: f64 = 0.125;
-/// Light that is told from none, of the recording's median.
-const DARKEST: f64 = 0.01;
 
 #[derive(Default)]
 struct Sum {
@@ -166,18 +164,11 @@ mod tests {
                 asked: 1.0,
             }
         };
-        let white = Correlation {
-            along_u: vec![1.0],
-            along_v: vec![1.0],
-            sum: 1.0,
-            sum_of_squares: 1.0,
-            persists: false,
-        };
         let view = SurveyedView {
             name: "0".into(),
             tiles: Arc::new((0..ACROSS * ACROSS).map(tile).collect()),
             inflation: 1.0,
-            correlation: white,
+            correlation: Correlation::white(),
             frames: 3.0,
             log_variance_inflation: 1.0,
             between_frame_factor: Some(1.0),

@@ -50,6 +50,11 @@ impl Candidate {
         effects::find(self.family?)
     }
 
+    /// The share that the cause's formula is off by; a curve without a name is what was measured.
+    pub fn formula_error(&self) -> f64 {
+        self.effect().map_or(0.0, |e| e.card().formula_error)
+    }
+
     /// See [`Effect::usual`].
     pub fn usual(&self, k: usize) -> f64 {
         self.effect().map_or(USUAL_PX, |e| e.usual(k, self.flat.as_ref()))

@@ -193,10 +193,9 @@ impl<'a> Case<'a> {
         }
         let mut textures = texture_findings(&structure, &self.known, each);
         textures.retain(|h| self.stands(h.p, each));
-        if self.rows_err_alike(&textures) {
-            for (view, s) in self.survey.views.iter_mut().zip(&structure) {
-                view.log_variance_inflation *= s.excess_of_rows(&view.correlation)[1];
-            }
+        let excess = self.excess_of_rows(&structure, &textures);
+        for (view, [_, of_log_variance]) in self.survey.views.iter_mut().zip(excess) {
+            view.log_variance_inflation *= of_log_variance;
         }
         self.survey.compare_frames(&self.fields, common(&structure, &textures, &self.known));
         let compared =
@@ -234,9 +233,19 @@ impl<'a> Case<'a> {
         ScatterResult { structure, lattice, textures, tails, outcome }
     }
 
-    /// Do the pixels of a row share an error, as was found or is known?
-    pub fn rows_err_alike(&self, textures: &[TextureFinding]) -> bool {
-        textures.iter().any(|t| t.families.contains(&ROW_NOISE)) || self.known.has(ROW_NOISE)
+    /// [`Structure::excess_of_rows`] of the views where rows have an error of their own, as was found or is
+    /// known; one where they have none.
+    pub fn excess_of_rows(
+        &self,
+        structure: &[Structure],
+        textures: &[TextureFinding],
+    ) -> Vec<[f64; 2]> {
+        let found = textures.iter().any(|t| t.families.contains(&ROW_NOISE));
+        let alike = found || self.known.has(ROW_NOISE);
+        let views = structure.iter().zip(&self.survey.views);
+        views
+            .map(|(s, v)| if alike { s.excess_of_rows(&v.correlation) } else { [1.0; 2] })
+            .collect()
     }
 
     /// Is this chance, of noise alone, small enough where the model's own views left something open

@@ -66,7 +66,7 @@ impl Choice<'_> {
     fn is_as_exact_as_a_formula(&self, i: usize, most: f64) -> bool {
         let (total, candidate) = (self.total(i), &self.candidates[i]);
         let Some(judged) = &self.judged[i] else { return false };
-        let error = candidate.effect().map_or(0.0, |e| e.card().formula_error).min(FORMULA_ERROR);
+        let error = candidate.formula_error().min(FORMULA_ERROR);
         let numbers = (judged.gain.by_view.len() * candidate.basis.count()) as f64;
         total > (1.0 - AS_GOOD_SHARE) * most && 2.0 * total * error.powi(2) > numbers
     }

@@ -15,6 +15,28 @@ const DENSE_UNITS: f64 = 1024.0;
 /// Coarsest and finest steps looked for, px.
 const STEPS_PX: [f64; 2] = [1.0 / 3.0, 1.0 / 64.0];
 
+/// How much the phases of places gather, 0 to 1, and how many equal places their weights are worth.
+pub struct Gathered {
+    pub resultant: f64,
+    places: f64,
+}
+
+impl Gathered {
+    /// Of places with their weights; nothing of none.
+    pub fn of(places: &[(f64, f64)], frequency: f64) -> Self {
+        let (mut c, mut s, mut n, mut squares) = (0.0, 0.0, 0.0, 0.0);
+        for &(x, weight) in places {
+            let (sin, cos) = (TAU * frequency * x).sin_cos();
+            c += weight * cos;
+            s += weight * sin;
+            n += weight;
+            squares += weight * weight;
+        }
+        let resultant = f64::hypot(c, s) / f64::max(n, 1e-9);
+        Gathered { resultant, places: n * n / squares }
+    }
+}
+
 /// The frequency at which phases gather most, how much they do (0 to 1), and the chance of it.
 #[derive(Default)]
 pub struct Comb {
@@ -35,18 +57,10 @@ impl Comb {
         let (mut worth, mut scanned) = (0.0, 0.0);
         let mut frequency = from;
         while frequency < to {
-            let (mut c, mut s, mut n, mut squares) = (0.0, 0.0, 0.0, 0.0);
-            for &(x, weight) in at(frequency) {
-                let (sin, cos) = (TAU * frequency * x).sin_cos();
-                c += weight * cos;
-                s += weight * sin;
-                n += weight;
-                squares += weight * weight;
-            }
-            let resultant = f64::hypot(c, s) / f64::max(n, 1e-9);
-            if n > 0.0 && resultant > best.resultant {
+            let Gathered { resultant, places } = Gathered::of(at(frequency), frequency);
+            if resultant > best.resultant {
                 (best.frequency, best.resultant) = (frequency, resultant);
-                worth = n * n / squares;
+                worth = places;
             }
             scanned += 1.0;
             frequency += by;

@@ -244,6 +244,11 @@ impl Field {
         self.scale_px_m * self.plane.inverse_depth(x, y)
     }
 
+    /// The model's sigma in the middle of the target, px.
+    pub fn middle_sigma_px(&self) -> Option<f32> {
+        self.sigma.get(self.sigma.len() / 2).copied()
+    }
+
     /// Whether each pixel of the picture is one of the target's.
     pub fn on_target(&self) -> Vec<bool> {
         let mut on = vec![false; self.width * self.height];

@@ -99,13 +99,13 @@ fn finding(
         let span = outcome.span(main);
         f.covariance.view((span.start, span.start), (span.len(), span.len())).into_owned()
     });
+    let formula_error = chosen.candidate.formula_error();
     let parameters = covariance.map_or_else(Map::new, |c| {
         let Term { basis, coefficients, .. } = &terms[main];
         let (covariance, reach) = (&c, &scene.survey.reach);
         let fit = Fitted { shape: basis, coefficients, covariance, reach };
-        of_any_formula(chosen.candidate.family, parameters(chosen.candidate.family, &fit))
+        of_any_formula(formula_error, parameters(chosen.candidate.family, &fit))
     });
-    let formula_error = chosen.candidate.effect().map_or(0.0, |e| e.card().formula_error);
     let shape =
         effect.is_none().then(|| shape::words(&terms[main].basis, &terms[main].coefficients));
     let physics = physics(status, effect, scene.statistic, axis, shape.as_deref());

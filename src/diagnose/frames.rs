@@ -28,10 +28,9 @@ struct Motion {
 
 impl Motion {
     /// Mean of the views' velocities by their errors, which are enlarged by how they disagree.
-    fn of(all: &[Jitter]) -> Option<Self> {
-        // Two frames beyond a line may lie on it by chance: no view is surer than all together are.
-        let freedom: f64 = all.iter().map(|j| j.freedom).sum();
-        let usual_px2 = all.iter().map(|j| j.scatter_px2).sum::<f64>() / freedom.max(1.0);
+    /// Frames may lie on a line by chance: none is surer than by the scatter of all views' together,
+    /// `usual_px2`.
+    fn of(all: &[Jitter], usual_px2: f64) -> Option<Self> {
         let known: Vec<(f64, f64)> = all
             .iter()
             .filter(|j| j.trend_px2 > 0.0 && j.freedom > 0.0)
@@ -79,7 +78,7 @@ pub(super) fn frames(
     let wander = (1.0 + rho) / (1.0 - rho).max(0.05);
     let f = per_trend / (per_scatter * wander * wander).max(1e-300);
     let p_line = FisherSnedecor::new(n, freedom).map_or(1.0, |d| 1.0 - d.cdf(f));
-    let steady = Motion::of(&all).filter(|m| m.p < 0.5 * level);
+    let steady = Motion::of(&all, scatter / freedom).filter(|m| m.p < 0.5 * level);
     let moving =
         (p_line < 0.5 * level && f > 3.0 || steady.is_some()) && !known.has("target-motion");
     if moving {

@@ -1,8 +1,6 @@
 //! Which depths occur at all: the steps of the matcher, and those of the driver.
 
-use std::f64::consts::TAU;
-
-use super::comb::{COARSE, PHASE_STEP, steps_of_depths, steps_of_disparities};
+use super::comb::{COARSE, Gathered, PHASE_STEP, steps_of_depths, steps_of_disparities};
 use crate::frame::DepthCode;
 use crate::view::Sensor;
 
@@ -122,17 +120,11 @@ impl RawHistogram {
         if words.len() < FEWEST_WORDS || range[1] - range[0] < step {
             return None;
         }
-        let total: f64 = words.iter().map(|w| w.1).sum();
-        let gathered = |step: f64| {
-            let sum = |part: fn(f64) -> f64| -> f64 {
-                words.iter().map(|(d, weight)| weight * part(TAU * d / step)).sum()
-            };
-            sum(f64::cos).hypot(sum(f64::sin)) / total
-        };
         let cycles = (range[1] - range[0]) / step;
         let tries = (2.0 * STEP_ERROR * cycles / PHASE_STEP).ceil().clamp(1.0, 1e4);
         let tried = |k: f64| step * (1.0 - STEP_ERROR + 2.0 * STEP_ERROR * k / tries);
-        let tries = (0..=tries as usize).map(|k| gathered(tried(k as f64)));
+        let tries =
+            (0..=tries as usize).map(|k| Gathered::of(&words, 1.0 / tried(k as f64)).resultant);
         Some(tries.fold(0.0, f64::max) > GATHERED_AT_ALL)
     }
 

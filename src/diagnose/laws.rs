@@ -46,7 +46,7 @@ pub fn referenced_views(
             let z = f.scale_px_m / (f.scale_px_m * f.plane.q.z + level);
             let session_s = f.time_s - start;
             let off = z - f.reference_distance_m? - known.law_m(z, session_s, f.scale_px_m);
-            let sigma_px = f64::from(f.sigma.get(f.sigma.len() / 2).copied()?);
+            let sigma_px = f64::from(f.middle_sigma_px()?);
             let sigma_m = sigma_px * z * z / f.scale_px_m;
             let steep = f.plane.theta().tan();
             let (sin, cos) = f.plane.azimuth().sin_cos();

@@ -27,12 +27,8 @@ fn sigma_factor(fit: &Fitted) -> Vec<Estimate> {
     if *fit.shape == Basis::Level { vec![fit.estimate("sigma_factor", &level)] } else { Vec::new() }
 }
 
-/// With the errors enlarged by what the family's formula is off: no sensor has that very one.
-pub fn of_any_formula(
-    family: Option<&str>,
-    mut parameters: Map<String, Value>,
-) -> Map<String, Value> {
-    let share = family.and_then(effects::find).map_or(0.0, |e| e.card().formula_error);
+/// With the errors enlarged by the share that the family's formula is off: no sensor has that very one.
+pub fn of_any_formula(share: f64, mut parameters: Map<String, Value>) -> Map<String, Value> {
     for parameter in parameters.values_mut() {
         let number = |key: &str| parameter[key].as_f64();
         if let (Some(value), Some(error)) = (number("value"), number("std_error")) {

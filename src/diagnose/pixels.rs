@@ -45,8 +45,7 @@ pub(super) fn mean_of(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 pub(super) fn typical_sigma_px(fields: &[Field]) -> f64 {
-    let mut all: Vec<f32> =
-        fields.iter().filter_map(|f| f.sigma.get(f.sigma.len() / 2).copied()).collect();
+    let mut all: Vec<f32> = fields.iter().filter_map(|f| f.middle_sigma_px()).collect();
     f64::from(crate::stats::median_in_place(&mut all))
 }
 
@@ -99,7 +98,7 @@ pub fn terms_of(outcome: &Outcome, statistic: Statistic) -> Vec<Term> {
 pub(super) fn typical_sigma_mm(fields: &[Field]) -> f64 {
     let of = |f: &Field| {
         let z = f.plane.depth(0.0, 0.0);
-        let px = f64::from(*f.sigma.get(f.sigma.len() / 2).unwrap_or(&0.0));
+        let px = f.middle_sigma_px().map_or(0.0, f64::from);
         1e3 * px * z * z / f.scale_px_m
     };
     let mut all: Vec<f32> = fields.iter().map(|f| of(f) as f32).collect();

@@ -93,7 +93,7 @@ pub(super) fn forget_windows(
     lattice: &Quantisation,
 ) {
     for (s, f) in structure.iter_mut().zip(fields) {
-        let sigma = f.sigma.get(f.sigma.len() / 2).map_or(0.0, |s| f64::from(*s));
+        let sigma = f.middle_sigma_px().map_or(0.0, f64::from);
         let step = lattice.step_px(f.scale_px_m, f.plane.depth(0.0, 0.0));
         if step > COARSE_SIGMAS * sigma {
             (s.window_px, s.neighbour_correlation, s.correlation_profile) = (None, None, None);
@@ -130,13 +130,14 @@ pub(super) fn contradicted(
     disparity.into_iter().chain(depth).collect()
 }
 
-/// A step is worth telling when the error it makes is this share of the noise in some view.
+/// A step is worth telling when the error it makes is this share of the noise in some view; that a model
+/// has one which the words contradict, when it is this share of the usual noise.
 const STEP_SHARE: f64 = 0.1;
 
 /// The largest error of a step among the views, in sigmas; `px` is the step at a depth, in px.
 fn strongest(fields: &[Field], px: impl Fn(f64) -> f64) -> f64 {
     let of = |f: &Field| {
-        let sigma = f.sigma.get(f.sigma.len() / 2).map_or(f64::INFINITY, |s| f64::from(*s));
+        let sigma = f.middle_sigma_px().map_or(f64::INFINITY, f64::from);
         px(f.plane.depth(0.0, 0.0)) / 12f64.sqrt() / sigma
     };
     fields.iter().map(of).fold(0.0, f64::max)

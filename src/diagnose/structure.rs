@@ -284,18 +284,11 @@ mod tests {
             row_px2: Some(ROW_PX * ROW_PX),
             ..Structure::default()
         };
-        let white = Correlation {
-            along_u: vec![1.0],
-            along_v: vec![1.0],
-            sum: 1.0,
-            sum_of_squares: 1.0,
-            persists: false,
-        };
-        for (got, truth) in s.excess_of_rows(&white).iter().zip(truth) {
+        for (got, truth) in s.excess_of_rows(&Correlation::white()).iter().zip(truth) {
             // A pixel has itself in common with its row: one of sixty.
             assert!((got / truth - 1.0).abs() < 0.06, "{got}, by simulation {truth}");
         }
         let none = Structure { row_px2: Some(-1e-4), ..s };
-        assert_eq!(none.excess_of_rows(&white), [1.0; 2]);
+        assert_eq!(none.excess_of_rows(&Correlation::white()), [1.0; 2]);
     }
 }

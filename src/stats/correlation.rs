@@ -26,6 +26,21 @@ const DEAD: f64 = 0.05;
 /// Pairs looked at per lag; the standard error of a correlation is then 0.01.
 const PAIRS: usize = 10_000;
 
+#[cfg(test)]
+impl Correlation {
+    /// Of pixels that have nothing in common.
+    pub fn white() -> Self {
+        let alone = || vec![1.0];
+        Correlation {
+            along_u: alone(),
+            along_v: alone(),
+            sum: 1.0,
+            sum_of_squares: 1.0,
+            persists: false,
+        }
+    }
+}
+
 /// Measure on the residual `field` (row-major, `width` wide, NaN where there is none).
 pub fn measure_correlation(field: &[f32], width: usize) -> Correlation {
     let valid = field.iter().filter(|e| e.is_finite()).count();

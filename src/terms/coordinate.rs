@@ -45,7 +45,7 @@ pub enum Coordinate {
 /// Light on the desk of an office (EN 12464-1), lx: what a room's share of the light is counted at.
 pub const ROOM_LUX: f64 = 500.0;
 /// No surface is darker, of the recording's median.
-const DARKEST: f64 = 1e-2;
+pub const DARKEST: f64 = 1e-2;
 
 impl Coordinate {
     pub fn value(self, p: &PixelContext) -> f64 {

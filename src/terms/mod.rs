@@ -16,6 +16,7 @@ mod value;
 mod written;
 
 pub use basis::{Basis, TABLE};
+pub(crate) use coordinate::DARKEST;
 pub use coordinate::{Coordinate, ROOM_LUX};
 pub use edges::edge_distances;
 pub use gauge::Gauge;

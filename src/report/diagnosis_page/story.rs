@@ -45,19 +45,19 @@ fn of(f: &Finding) -> String {
     let rest = if and_rest { " and a smooth rest of it that no formula follows" } else { "" };
     let size = match f.statistic {
         Statistic::Dropout => match fixed(100.0 * f.size.sigma, 1) {
-            few if few == "0.0" => "less than 0.1 % of the pixels lost".to_string(),
-            percent => format!("{percent} % of the pixels lost"),
+            few if few == "0.0" => Some("less than 0.1 % of the pixels lost".to_string()),
+            percent => Some(format!("{percent} % of the pixels lost")),
         },
         // A motion has a speed, and no size of its own.
-        _ if f.size.mm == 0.0 && f.size.sigma == 0.0 => String::new(),
-        _ => match fixed(f.size.sigma, 2) {
-            little if little == "0.00" => {
-                format!("{} rms, less than 0.01 of the noise", mm(f.size.mm))
-            }
-            sigmas => format!("{} rms, {sigmas} of the noise", mm(f.size.mm)),
-        },
+        _ if f.size.mm == 0.0 && f.size.sigma == 0.0 => None,
+        _ => {
+            let sigmas = match fixed(f.size.sigma, 2) {
+                little if little == "0.00" => "less than 0.01".to_string(),
+                sigmas => sigmas,
+            };
+            Some(format!("{} rms, {sigmas} of the noise", mm(f.size.mm)))
+        }
     };
-    let size = if size.is_empty() { size } else { size + ", " };
     let parameter = |(name, value): (&String, &serde_json::Value)| brief(f.effect, name, value);
     let parameters: Vec<String> = f.parameters.iter().filter_map(parameter).collect();
     let parameters = match parameters[..] {
@@ -74,7 +74,8 @@ fn of(f: &Finding) -> String {
         true => "by the reference distances".to_string(),
         false => format!("{} % of the mismatch", fixed(100.0 * f.share, 0)),
     };
-    format!("{name}{rest}: {size}{share}{parameters}{halves}{next}.")
+    let sizes: Vec<String> = size.into_iter().chain([share]).collect();
+    format!("{name}{rest}: {}{parameters}{halves}{next}.", sizes.join(", "))
 }
 
 fn settled_by(view: &NextView) -> String {
