@@ -13,7 +13,7 @@ use super::form::better_form;
 use super::lines::lines;
 use super::missing::{self, DropoutOutcome, missing};
 use super::mixing::mixing;
-use super::naming::{physics, temper};
+use super::naming::{doubt_beside_the_unexplained, physics, temper};
 use super::next_view;
 use super::other_findings;
 use super::outcome::Outcome;
@@ -120,6 +120,7 @@ impl Case<'_> {
         }
         echoes(&mut found);
         merge(&mut found);
+        doubt_beside_the_unexplained(&mut found);
         found.iter_mut().for_each(|f| temper(&mut f.alternatives));
         Battery { mean, scatter, found, refitted, better_form, detectable }
     }

@@ -1,12 +1,9 @@
 //! The size of the noise in patches large enough for a variance.
 
-use nalgebra::{DMatrix, DVector};
-
 use super::layers::SurveyedView;
 use super::samples::ViewData;
 use super::texture::SMOOTH_PX;
 use super::tiles::{SIDE, Tile};
-use crate::solve::{Left, left_by_fit};
 use crate::terms::{DARKEST, PixelContext};
 
 /// Side of a block, in tiles: 24 px, seven independent samples under a Kinect's window.
@@ -91,48 +88,6 @@ impl Sum {
         // Variances add up, and where light is what they come from they are as its inverse (shot noise).
         p.light = 1.0 / (1.0 / p.light + share * (1.0 / t.place.light - 1.0 / p.light));
     }
-}
-
-/// A model's sigma is not known better than this from view to view, in log variance, where the views
-/// are too few to show how they scatter.
-pub const MODEL_TOLERANCE: f64 = 0.04;
-/// And where they show it: the blocks of a view tell its level to about this. On 60 clean ray-traced
-/// sets and 24 pairs of speckle runs one was called a mismatch with this floor (the
-/// same with the larger one), and of causes worth 50 nats a third more were seen.
-const LEVEL_SCATTER: f64 = 0.01;
-
-/// Variance of the views' own levels beyond what their samples explain (a moment estimate after
-/// DerSimonian and Laird), about laws of the distance and of the tilt: what a law explains is no
-/// scatter. Enlarged for the laws that so few views have to settle.
-pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
-    let floor = tolerance * tolerance;
-    let levels: Vec<(&PixelContext, f64, f64)> = blocks
-        .iter()
-        .filter_map(|b| b.level().map(|(level, weight)| (&b.places[0], level, 1.0 / weight)))
-        .collect();
-    let n = levels.len();
-    let laws = |p: &PixelContext| {
-        let steep = p.theta.sin().powi(2);
-        [1.0, p.z.ln(), steep, steep * (2.0 * p.azimuth).cos()]
-    };
-    let orders = match n {
-        // By how much two runs differ by chance may follow any law of the distance.
-        _ if tolerance > MODEL_TOLERANCE => 1,
-        9.. => 4,
-        _ => 2,
-    };
-    if n < orders + 2 {
-        return floor;
-    }
-    let x = DMatrix::from_fn(n, orders, |i, k| laws(levels[i].0)[k]);
-    let y = DVector::from_fn(n, |i, _| levels[i].1);
-    // Views of one distance or one tilt leave laws without a meaning.
-    let Some(Left { squares, free }) = left_by_fit(x, &y) else { return floor };
-    let left = squares / free;
-    let sampling = levels.iter().map(|l| l.2).sum::<f64>() / n as f64;
-    let enlarged = if free > 3.0 { free / (free - 2.0) } else { 3.0 };
-    let floor = if tolerance > MODEL_TOLERANCE { floor } else { LEVEL_SCATTER * LEVEL_SCATTER };
-    ((left - sampling) * enlarged).max(floor)
 }
 
 #[cfg(test)]

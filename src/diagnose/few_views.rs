@@ -21,8 +21,10 @@ use super::prepared::{evidence_of_bases, without};
 use super::samples::{ViewData, coarser};
 use super::scene::{Scene, size};
 use super::tiles::SIDE;
+use super::view_levels::scatter_of_most;
+use super::view_worth::{doubted, left_over};
 use crate::rng::{Seed, Stream};
-use crate::terms::{Basis, PixelContext, Term};
+use crate::terms::{Basis, PixelContext, Statistic, Term};
 
 /// Candidates with more columns fit single views too freely.
 const MAX_COLUMNS: usize = 16;
@@ -131,17 +133,21 @@ pub fn few_views(
     let chosen = outcome.chosen.iter().enumerate();
     let shared: Vec<(&Basis, Vec<f64>)> =
         chosen.map(|(k, c)| (&c.candidate.basis, outcome.coefficients(k))).collect();
+    let of_mean = scene.statistic == Statistic::Bias;
+    let doubted = if of_mean { doubted(scene.survey) } else { vec![1.0; fine.len()] };
     let alone = |(n, v): (usize, &ViewData)| {
         let share = |p: &PixelContext| if p.edge < RIM_PX { NEXT_TO_NONE } else { 1.0 };
-        let shares = v.places.iter().map(share).zip(&v.weight);
-        let weight = shares.map(|(share, w)| share * w / excess.get(n).unwrap_or(&1.0)).collect();
+        let sure = doubted[n] / excess.get(n).unwrap_or(&1.0);
+        let weight = v.places.iter().map(share).zip(&v.weight).map(|(s, w)| s * w * sure).collect();
         ViewData { response: without(v, &shared), weight, ..v.clone() }
     };
-    let fine: Vec<ViewData> = fine.iter().enumerate().map(alone).collect();
-    let coarse: Vec<ViewData> = match scene.statistic {
-        crate::terms::Statistic::Bias => fine.par_iter().map(coarser).collect(),
-        _ => fine.clone(),
-    };
+    let mut fine: Vec<ViewData> = fine.iter().enumerate().map(alone).collect();
+    if !of_mean && let Some(whole) = fine.first().and_then(|v| v.precision.first()) {
+        let precision = 1.0 / scatter_of_most(&fine, 1.0 / whole);
+        fine.iter_mut().for_each(|v| v.precision[0] = precision);
+    }
+    let coarse: Vec<ViewData> =
+        if of_mean { fine.par_iter().map(coarser).collect() } else { fine.clone() };
     let tried: Vec<Tried<'_>> = candidates
         .par_iter()
         .filter(|c| c.family != Some(RECALIBRATE) && c.basis.count() <= MAX_COLUMNS)
@@ -149,7 +155,17 @@ pub fn few_views(
         .filter(|c| c.family.is_some() || !matches!(c.basis, Basis::Curve { nodes: 2, .. }))
         .filter_map(|c| {
             let as_fine = c.basis.is_fine() || c.basis.of_column_alone();
-            let evidence = evidence_of_bases(if as_fine { &fine } else { &coarse }, &[&c.basis]);
+            let data = if as_fine { &fine } else { &coarse };
+            let mut evidence = evidence_of_bases(data, &[&c.basis]);
+            if evidence.len() < data.len() {
+                return None;
+            }
+            for (n, e) in evidence.iter_mut().enumerate().filter(|(n, _)| doubted[*n] > 1.0) {
+                let beta = evidence::fit(std::slice::from_ref(e), rules.prior)?;
+                let left = left_over(&data[n], &c.basis, beta.as_slice()).clamp(1.0, doubted[n]);
+                e.a /= left;
+                e.b /= left;
+            }
             Tried::of(c, evidence, rules.prior)
         })
         .collect();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::ablation::Ablation;
-use super::blocks::{MODEL_TOLERANCE, blocks, view_scatter};
+use super::blocks::blocks;
 use super::field::Field;
 use super::learnt::Learnt;
 use super::light::{Light, relative_light};
@@ -13,6 +13,7 @@ use super::replication::halves;
 use super::samples::{ViewData, coarser, finite};
 use super::texture::{same_pixel, without_bias};
 use super::tiles::{Tile, roughen, tiles};
+use super::view_levels::{MODEL_TOLERANCE, view_scatter};
 use crate::camera::{Camera, Rays};
 use crate::effects::Flat;
 use crate::sensors::SensorKind;

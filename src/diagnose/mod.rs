@@ -91,6 +91,8 @@ mod thinned;
 mod tiles;
 mod variance;
 mod verdict;
+mod view_levels;
+mod view_worth;
 mod warm_up;
 mod window;
 

@@ -1,7 +1,7 @@
 //! Which names a chosen term may have, and what is said of the physics behind one.
 
 use super::candidate::RECALIBRATE;
-use super::diagnosis::{Alternative, Status};
+use super::diagnosis::{Alternative, Finding, Status};
 use super::outcome::Chosen;
 use crate::effects;
 use crate::terms::{Axis, Statistic};
@@ -25,6 +25,22 @@ pub fn temper(alternatives: &mut [Alternative]) {
     let total = cool(none) + stated().map(cool).sum::<f64>();
     for a in alternatives.iter_mut().filter(|_| total > 0.0) {
         a.probability = a.probability.map(|p| cool(p) / total);
+    }
+}
+
+/// What is left of an error over the picture without a name may be the rest of the named part's own
+/// shape, which is then not what its name says: its names are the less probable the more is left, in
+/// shares of both.
+pub fn doubt_beside_the_unexplained(found: &mut [Finding]) {
+    let of_picture = |f: &Finding| {
+        let places = [Axis::Column, Axis::Row, Axis::Radius, Axis::Pixel];
+        f.statistic == Statistic::Bias && places.contains(&f.axis)
+    };
+    let nameless = |f: &&Finding| of_picture(f) && f.status == Status::Unexplained;
+    let left: f64 = found.iter().filter(nameless).map(|f| f.share).sum();
+    for f in found.iter_mut().filter(|f| of_picture(f) && f.share > 0.0) {
+        let sure = f.share / (f.share + left);
+        f.alternatives.iter_mut().for_each(|a| a.probability = a.probability.map(|p| p * sure));
     }
 }
 
@@ -108,6 +124,34 @@ pub fn physics(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::other_findings::named;
+
+    /// Half of what is there without a name: half as probable. What is left on another axis, or of
+    /// another statistic, takes nothing.
+    #[test]
+    fn a_name_is_doubted_by_what_is_left_over_the_picture_beside_it() {
+        let with = |share: f64, statistic: Statistic, axis: Axis| Finding {
+            status: Status::Unexplained,
+            share,
+            ..named("", statistic, axis)
+        };
+        let bowl = || Finding {
+            share: 30.0,
+            alternatives: vec![Alternative {
+                effect: "radial-disparity-bias",
+                probability: Some(0.96),
+            }],
+            ..named("radial-disparity-bias", Statistic::Bias, Axis::Radius)
+        };
+        let sure = |rest: Finding| {
+            let mut found = [bowl(), rest];
+            doubt_beside_the_unexplained(&mut found);
+            found[0].alternatives[0].probability.unwrap()
+        };
+        assert!((sure(with(30.0, Statistic::Bias, Axis::Column)) - 0.48).abs() < 1e-12);
+        assert_eq!(sure(with(30.0, Statistic::Variance, Axis::Column)), 0.96);
+        assert_eq!(sure(with(30.0, Statistic::Bias, Axis::Z)), 0.96);
+    }
 
     #[test]
     fn tempered_odds_keep_their_order_and_their_sum() {
