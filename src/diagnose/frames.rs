@@ -28,17 +28,11 @@ struct Motion {
 
 impl Motion {
     /// Mean of the views' velocities by their errors, which are enlarged by how they disagree.
-    /// Frames may lie on a line by chance: none is surer than by the scatter of all views' together,
-    /// `usual_px2`.
-    fn of(all: &[Jitter], usual_px2: f64) -> Option<Self> {
+    fn of(all: &[Jitter], noise: &FrameNoise) -> Option<Self> {
         let known: Vec<(f64, f64)> = all
             .iter()
             .filter(|j| j.trend_px2 > 0.0 && j.freedom > 0.0)
-            .map(|j| {
-                let own_px2 = j.expected_px2.max(j.scatter_px2 / j.freedom);
-                let noise_px2 = own_px2.max(usual_px2);
-                (j.velocity_mps, j.velocity_mps.powi(2) / j.trend_px2 * noise_px2)
-            })
+            .map(|j| (j.velocity_mps, j.velocity_mps.powi(2) / j.trend_px2 * noise.own_px2(j)))
             .filter(|(_, variance)| *variance > 0.0)
             .collect();
         let n = known.len() as f64;
@@ -55,6 +49,29 @@ impl Motion {
     }
 }
 
+/// Noise of a frame's mean about the line of its view: what its pixels explain, and what all frames
+/// scatter by beside that, px^2.
+struct FrameNoise {
+    extra_px2: f64,
+}
+
+impl FrameNoise {
+    fn of(all: &[Jitter]) -> Self {
+        let freedom: f64 = all.iter().map(|j| j.freedom).sum();
+        let beside: f64 = all.iter().map(|j| j.scatter_px2 - j.freedom * j.expected_px2).sum();
+        FrameNoise { extra_px2: (beside / freedom).max(0.0) }
+    }
+
+    fn px2(&self, view: &Jitter) -> f64 {
+        (view.expected_px2 + self.extra_px2).max(f64::MIN_POSITIVE)
+    }
+
+    /// No surer than the view's own frames scatter; they may lie on a line by chance.
+    fn own_px2(&self, view: &Jitter) -> f64 {
+        self.px2(view).max(view.scatter_px2 / view.freedom)
+    }
+}
+
 /// `rho` is the correlation of successive frames that was found.
 pub(super) fn frames(
     views: &[Structure],
@@ -68,17 +85,18 @@ pub(super) fn frames(
         return Vec::new();
     }
     let mut found = Vec::new();
-    let scatter: f64 = all.iter().map(|j| j.scatter_px2).sum();
-    let trend: f64 = all.iter().map(|j| j.trend_px2).sum();
     let n = all.len() as f64;
     // Motion: the line explains more than the scatter about it does, or all views move alike.
-    let per_trend = trend / n;
-    let per_scatter = (scatter / freedom).max(all.iter().map(|j| j.expected_px2).sum::<f64>() / n);
+    let noise = FrameNoise::of(&all);
+    let by_noise =
+        |of: &dyn Fn(&Jitter) -> f64| all.iter().map(|j| of(j) / noise.px2(j)).sum::<f64>();
+    let line = by_noise(&|j| j.trend_px2) / n;
+    let about_it = (by_noise(&|j| j.scatter_px2) / freedom).max(1.0);
     // Frames that resemble their neighbours wander.
     let wander = (1.0 + rho) / (1.0 - rho).max(0.05);
-    let f = per_trend / (per_scatter * wander * wander).max(1e-300);
+    let f = line / (about_it * wander * wander);
     let p_line = FisherSnedecor::new(n, freedom).map_or(1.0, |d| 1.0 - d.cdf(f));
-    let steady = Motion::of(&all, scatter / freedom).filter(|m| m.p < 0.5 * level);
+    let steady = Motion::of(&all, &noise).filter(|m| m.p < 0.5 * level);
     let moving =
         (p_line < 0.5 * level && f > 3.0 || steady.is_some()) && !known.has("target-motion");
     if moving {
@@ -111,7 +129,8 @@ pub(super) fn frames(
     let p_jitter = ChiSquared::new(freedom).map_or(1.0, |d| 1.0 - d.cdf(ratio / JITTER));
     let jitter_px2 =
         all.iter().map(|j| j.scatter_px2 - j.freedom * j.expected_px2).sum::<f64>() / freedom;
-    let aside = moving && jitter_px2 < 0.15 * per_trend;
+    let trend_px2 = all.iter().map(|j| j.trend_px2).sum::<f64>() / n;
+    let aside = moving && jitter_px2 < 0.15 * trend_px2;
     if p_jitter < level && jitter_px2 > 0.0 && !aside {
         let sigma = jitter_px2.sqrt();
         let variance = variance_px2(views);
@@ -204,6 +223,31 @@ mod tests {
             Structure { frame_log_variance: frame_log_variance(&frames), ..Structure::default() }
         };
         (0..12).map(view).collect()
+    }
+
+    /// Far, steep views have noisy means: a motion that the near ones see is no less sure for them.
+    #[test]
+    fn views_count_by_their_own_noise() {
+        let mut rng = Seed(9).stream("motion/uneven");
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let view = |n: u32| {
+            let expected_px2 = 1e-6 * f64::from(1 << n);
+            let spread = expected_px2.sqrt();
+            let trend = 0.006 + spread * normal();
+            let jitter = Jitter {
+                scatter_px2: (spread * normal()).powi(2),
+                freedom: 1.0,
+                expected_px2,
+                trend_px2: trend * trend,
+                velocity_mps: trend,
+            };
+            Structure { jitter: Some(jitter), ..Structure::default() }
+        };
+        let views: Vec<Structure> = (0..12).map(view).collect();
+        let found = frames(&views, &KnownTerms::default(), 1e-3, 0.0);
+        let motion = found.iter().find(|h| h.families == ["target-motion"]).expect("a motion");
+        let velocity = motion.parameters["velocity_mps"]["value"].as_f64().unwrap();
+        assert!((velocity - 0.006).abs() < 0.002, "{velocity}");
     }
 
     #[test]
