@@ -24,10 +24,9 @@ const MIN_FREE: f64 = 8.0;
 /// How many times surer each view's mean is if its noise hangs together as it usually does than
 /// by its own measure, which takes a cause that the others do not have for noise; 1 where they agree.
 pub fn doubted(survey: &Survey) -> Vec<f64> {
-    let own = survey.views.iter().map(|v| v.inflation);
-    let mut known: Vec<f64> = own.clone().filter(|i| i.is_finite()).collect();
-    let usual = if known.is_empty() { f64::INFINITY } else { median(&mut known) };
-    own.map(|i| if i.is_finite() { (i / (OTHERWISE * usual)).max(1.0) } else { 1.0 }).collect()
+    let own = || survey.views.iter().map(|v| v.correlation.sum);
+    let usual = median(&mut own().collect::<Vec<f64>>());
+    own().map(|sum| (sum / (OTHERWISE * usual)).max(1.0)).collect()
 }
 
 /// What a candidate leaves of a view over what the weights allow: the worst of patches of one, two,
