@@ -119,6 +119,26 @@ impl<'a> Tried<'a> {
     }
 }
 
+/// View by view; where a view's worth is `doubted`, it is worth the less the more these columns leave.
+fn evidence_of(
+    basis: &Basis,
+    data: &[ViewData],
+    doubted: &[f64],
+    prior: f64,
+) -> Option<Vec<Evidence>> {
+    let mut all = evidence_of_bases(data, &[basis]);
+    if all.len() < data.len() {
+        return None;
+    }
+    for ((e, view), doubt) in all.iter_mut().zip(data).zip(doubted).filter(|(_, d)| **d > 1.0) {
+        let beta = evidence::fit(std::slice::from_ref(e), prior)?;
+        let left = left_over(view, basis, beta.as_slice()).clamp(1.0, *doubt);
+        e.a /= left;
+        e.b /= left;
+    }
+    Some(all)
+}
+
 /// The strongest such cause beside what all views share, if noise does not bring as much; `excess` is how
 /// many times less sure each view is than its samples say, where whole lines err alike.
 pub fn few_views(
@@ -156,17 +176,7 @@ pub fn few_views(
         .filter_map(|c| {
             let as_fine = c.basis.is_fine() || c.basis.of_column_alone();
             let data = if as_fine { &fine } else { &coarse };
-            let mut evidence = evidence_of_bases(data, &[&c.basis]);
-            if evidence.len() < data.len() {
-                return None;
-            }
-            for (n, e) in evidence.iter_mut().enumerate().filter(|(n, _)| doubted[*n] > 1.0) {
-                let beta = evidence::fit(std::slice::from_ref(e), rules.prior)?;
-                let left = left_over(&data[n], &c.basis, beta.as_slice()).clamp(1.0, doubted[n]);
-                e.a /= left;
-                e.b /= left;
-            }
-            Tried::of(c, evidence, rules.prior)
+            Tried::of(c, evidence_of(&c.basis, data, &doubted, rules.prior)?, rules.prior)
         })
         .collect();
     let mut all: Vec<(&Candidate, Best)> =

@@ -15,8 +15,8 @@ use crate::solve::plane_through;
 use crate::stats::median;
 use crate::terms::Basis;
 
-/// A view's noise that hangs together so many times more than it usually does may be a cause. On
-/// clean ray-traced views the measure scatters by a third.
+/// Noise of a view that hangs together so many times more than the others' may be a cause. Of 19
+/// ray-traced views those without one were within a third of their middle, where they were large.
 const OTHERWISE: f64 = 2.0;
 /// Fewer patches say nothing of what is left.
 const MIN_FREE: f64 = 8.0;
