@@ -101,7 +101,7 @@ fn scatter(view: &ViewData) -> f64 {
         root[i] * [1.0, view.places[i].x, view.places[i].y][k]
     });
     let y = nalgebra::DVector::from_fn(n, |i, _| root[i] * view.response[i]);
-    let Some(Left { squares: chi2, free }) = left_by_fit(x, &y) else { return 1.0 };
+    let Some(Left { squares: chi2, free }) = left_by_fit(&x, &y) else { return 1.0 };
     // Four standard deviations beyond what chance makes.
     if chi2 > free + 4.0 * (2.0 * free).sqrt() { chi2 / free } else { 1.0 }
 }

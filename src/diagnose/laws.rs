@@ -89,7 +89,7 @@ pub fn scatter(checked: &[ReferencedView]) -> (f64, f64) {
     });
     let off = DVector::from_iterator(n, checked.iter().map(|c| c.off));
     let all = Left { squares: off.norm_squared(), free: n as f64 };
-    let left = left_by_fit(columns, &off).unwrap_or(all);
+    let left = left_by_fit(&columns, &off).unwrap_or(all);
     // A tape is read to half a millimetre at best.
     ((left.squares / left.free.max(1.0)).max(0.0005 * 0.0005), left.free)
 }

@@ -27,6 +27,7 @@ mod few_views;
 mod field;
 mod findings;
 mod form;
+mod frame_means;
 mod frames;
 mod heldout;
 mod in_time;

@@ -1,6 +1,7 @@
 //! What the structure of the noise amounts to: each view is one sample of every statistic.
 
-use super::frames::{frames, unequal};
+use super::frame_means::frame_means;
+use super::frames::unequal;
 use super::in_time::in_time;
 use super::known::KnownTerms;
 use super::pairs::{REACH_PX, window_of};
@@ -27,7 +28,7 @@ pub fn texture_findings(
         .find(|h| h.families.first() == Some(&"temporal-correlation"))
         .and_then(|h| h.parameters["rho"]["value"].as_f64())
         .unwrap_or(0.0);
-    found.extend(frames(views, known, level, rho));
+    found.extend(frame_means(views, known, level, rho));
     found.extend(unequal(views, level));
     found
 }

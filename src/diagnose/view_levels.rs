@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 use super::samples::ViewData;
-use crate::solve::{Left, left_by_fit};
+use crate::solve::{Left, fit_by_svd, left_by_fit};
 use crate::stats::median;
 use crate::terms::PixelContext;
 
@@ -32,7 +32,8 @@ pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
         return floor;
     }
     // Views of one distance or one tilt leave laws without a meaning.
-    let Some(Left { squares, free }) = left_by_fit(laws(&levels, orders), &heights(&levels)) else {
+    let Some(Left { squares, free }) = left_by_fit(&laws(&levels, orders), &heights(&levels))
+    else {
         return floor;
     };
     let enlarged = if free > 3.0 { free / (free - 2.0) } else { 3.0 };
@@ -101,7 +102,7 @@ fn sampling(levels: &[Level<'_>]) -> f64 {
 
 /// What a fit to some of the rows leaves of all.
 fn left_by(x: &DMatrix<f64>, y: &DVector<f64>, rows: &[usize]) -> Option<DVector<f64>> {
-    let beta = x.select_rows(rows).svd(true, true).solve(&y.select_rows(rows), 1e-12).ok()?;
+    let (beta, _) = fit_by_svd(&x.select_rows(rows), &y.select_rows(rows))?;
     Some(y - x * beta)
 }
 

@@ -162,14 +162,19 @@ pub struct Left {
     pub free: f64,
 }
 
-/// What the columns of `x` do not explain of `y`; by SVD, so that columns which say the same count
-/// once. `None` where there is no decomposition.
-pub fn left_by_fit(x: DMatrix<f64>, y: &DVector<f64>) -> Option<Left> {
+/// Least squares by SVD, so that columns which say the same count once: the coefficients, and how many
+/// columns say something of their own. `None` where there is no decomposition.
+pub fn fit_by_svd(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<(DVector<f64>, usize)> {
     let svd = x.clone().svd(true, true);
     let tiny = TINY * svd.singular_values.max();
     let beta = svd.solve(y, tiny).ok()?;
-    let free = (y.len() - svd.rank(tiny)) as f64;
-    Some(Left { squares: (y - x * beta).norm_squared(), free })
+    Some((beta, svd.rank(tiny)))
+}
+
+/// What the columns of `x` do not explain of `y`; see [`fit_by_svd`].
+pub fn left_by_fit(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<Left> {
+    let (beta, rank) = fit_by_svd(x, y)?;
+    Some(Left { squares: (y - x * beta).norm_squared(), free: (y.len() - rank) as f64 })
 }
 
 /// The plane 1, x, y through values of some weight, as they come: its three coefficients.
@@ -222,7 +227,7 @@ mod tests {
         let line = DMatrix::from_fn(4, 2, |i, k| [1.0, i as f64][k]);
         let twice = DMatrix::from_fn(4, 3, |i, k| [1.0, i as f64, 2.0 * i as f64 - 1.0][k]);
         for x in [line, twice] {
-            let left = left_by_fit(x, &y).unwrap();
+            let left = left_by_fit(&x, &y).unwrap();
             assert_eq!(left.free, 2.0);
             approx::assert_relative_eq!(left.squares, expected(&y), max_relative = 1e-12);
         }
