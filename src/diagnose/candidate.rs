@@ -57,7 +57,7 @@ impl Candidate {
 
     /// See [`Effect::usual`].
     pub fn usual(&self, k: usize) -> f64 {
-        self.effect().map_or(USUAL_PX, |e| e.usual(k, self.flat.as_ref()))
+        self.effect().map_or(USUAL_PX, |e| e.usual(&self.basis, k, self.flat.as_ref()))
     }
 
     /// Does a fit of it agree with what is stated of the target?

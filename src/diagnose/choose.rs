@@ -53,11 +53,14 @@ impl Choice<'_> {
         self.judged[i].as_ref().map_or(0.0, |j| j.calibrated_gain(self.rules))
     }
 
-    /// A name whose fits to single views disagree is the worse one.
+    /// A name whose fits to single views disagree is the worse one, where they do by more than twice
+    /// what chance scatters a mean square by: once is off the dispersion already.
     fn dispersion_corrected_gain(&self, i: usize) -> f64 {
         let total = self.total(i);
         self.judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| {
-            if total > 0.0 { total / j.null.dispersion.sqrt() } else { total }
+            let numbers = (j.gain.by_view.len() * self.candidates[i].basis.count()) as f64;
+            let clear = (j.null.dispersion - f64::sqrt(2.0 / numbers)).max(1.0);
+            if total > 0.0 { total / clear.sqrt() } else { total }
         })
     }
 

@@ -6,8 +6,12 @@ use super::outcome::Chosen;
 use crate::effects;
 use crate::terms::{Axis, Statistic};
 
-/// Odds of a family that needs more columns to say the same: it can bend to what it is not.
-const RICHER: f64 = 0.35;
+/// Odds of a family that needs so many columns more to say the same: it could have bent in each of
+/// these to what it is not, as far as all that is there (a unit-information prior; Kass and Wasserman
+/// 1995), and `gain` nats were seen to say that it did not.
+fn occam(more_columns: usize, gain: f64) -> f64 {
+    (1.0 + 2.0 * gain.max(0.0)).powf(-0.5 * more_columns as f64)
+}
 
 /// Less probable names are not told.
 pub const MIN_PROBABILITY: f64 = 0.005;
@@ -64,8 +68,8 @@ pub fn naming(chosen: &Chosen) -> (Status, Option<&'static str>, Vec<Alternative
     for rival in chosen.rivals.iter().filter(|r| r.family != family) {
         let nats = (best - rival.gain).clamp(0.0, 40.0);
         let behind = rival.behind.clamp(-1.0, 6.0);
-        let richer = rival.basis.count() > chosen.candidate.basis.count();
-        let bent = if richer { RICHER } else { 1.0 };
+        let more = rival.basis.count().saturating_sub(chosen.candidate.basis.count());
+        let bent = occam(more, chosen.gain);
         odds.push((rival.family, bent * (-(1.2 * behind + 0.25 * nats)).exp().min(1.0)));
     }
     let total: f64 = odds.iter().map(|o| o.1).sum();

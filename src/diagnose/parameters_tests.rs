@@ -82,6 +82,15 @@ fn exact() -> Vec<Case> {
         // z = -sagitta (x / half)^2: the middle of the board stands out by it.
         ("target-bow", Basis::relief(2), vec![-0.02 / 0.36, 0.0, 0.0], "sagitta_m", 0.02, 1e-12),
         ("target-bow", Basis::relief(2), vec![0.0, 0.02 / 0.16, 0.0], "sagitta_m", -0.02, 1e-12),
+        // Half by the square of the radius and half by its fourth power.
+        (
+            "target-bow",
+            Basis::dome(2),
+            vec![-0.01 / 0.36, -0.01 / 0.36f64.powi(2)],
+            "sagitta_m",
+            0.02,
+            1e-12,
+        ),
         (
             "pixel-locking",
             Basis::waves(Coordinate::Disparity, 1.0, 2),

@@ -50,7 +50,7 @@ impl Effect for LensDistortion {
 
     /// What is left of k1 in a depth picture that was calibrated (Khoshelham and Elberink 2012,
     /// table 1: 0.003; Smisek, Jancosek and Pajdla 2011: 0.01 to 0.05).
-    fn usual(&self, _: usize, _: Option<&Flat>) -> f64 {
+    fn usual(&self, _: &Basis, _: usize, _: Option<&Flat>) -> f64 {
         0.02
     }
 

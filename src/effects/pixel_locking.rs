@@ -59,7 +59,7 @@ impl Effect for PixelLocking {
     }
 
     /// Shimizu and Okutomi 2001: 0.06 px; without a remedy twice that.
-    fn usual(&self, _: usize, _: Option<&Flat>) -> f64 {
+    fn usual(&self, _: &Basis, _: usize, _: Option<&Flat>) -> f64 {
         0.1
     }
 

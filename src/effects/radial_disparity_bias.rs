@@ -39,9 +39,11 @@ impl Effect for RadialDisparityBias {
         exposure.shift_disparity(|i| k * radius(i).powi(2));
     }
 
-    /// Two orders for what is nearly a parabola, four for a wavy one.
+    /// Two orders for what is nearly a parabola, four for a wavy one. One that grows faster than the
+    /// disparity grows with z less than in proportion: at the square it has the same depth at every
+    /// distance, which is the target's shape and not the sensor's.
     fn shapes(&self, _: &Bounds) -> Vec<Basis> {
-        const POWERS: [f64; 9] = [-1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
+        const POWERS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
         let of = |orders: usize| POWERS.map(|power| bowl(power, orders));
         [of(2), of(4)].concat()
     }
@@ -52,7 +54,7 @@ impl Effect for RadialDisparityBias {
 
     /// Herrera, Kannala and Heikkila 2012, fig. 6: up to 4 of a Kinect's steps of 1/8 px towards
     /// the corners.
-    fn usual(&self, _: usize, _: Option<&Flat>) -> f64 {
+    fn usual(&self, _: &Basis, _: usize, _: Option<&Flat>) -> f64 {
         0.5
     }
 

@@ -45,7 +45,7 @@ impl Effect for RangeNotDepth {
     }
 
     /// All of it or nothing.
-    fn usual(&self, _: usize, _: Option<&Flat>) -> f64 {
+    fn usual(&self, _: &Basis, _: usize, _: Option<&Flat>) -> f64 {
         1.0
     }
 

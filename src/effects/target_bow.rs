@@ -55,8 +55,10 @@ impl Effect for TargetBow {
         }
     }
 
+    /// Bent along its sides; pressed or swollen in its middle, which a clamped plate's r^4 and a bump's
+    /// r^6 describe (Timoshenko and Woinowsky-Krieger 1959, chapter 3); or otherwise.
     fn shapes(&self, _: &Bounds) -> Vec<Basis> {
-        [2, 4].map(Basis::relief).into()
+        vec![Basis::relief(2), Basis::dome(3), Basis::relief(4)]
     }
 
     fn plain(&self, _: Basis) -> Basis {
@@ -66,13 +68,12 @@ impl Effect for TargetBow {
     /// A board bends by about 1 mm at 1 m, and by 1.5 mm half a metre from its middle where it is a
     /// bad one. One whose flatness is stated bends by anything up to that, either way, over what was
     /// seen of it: a rectangular distribution.
-    fn usual(&self, k: usize, flat: Option<&Flat>) -> f64 {
-        let degree = if k < 3 {
-            2
-        } else if k < 7 {
-            3
-        } else {
-            4
+    fn usual(&self, shape: &Basis, k: usize, flat: Option<&Flat>) -> f64 {
+        let degree = match (shape, k) {
+            (Basis::Powers { .. }, k) => 2 * (k as i32 + 1),
+            (_, 0..3) => 2,
+            (_, 3..7) => 3,
+            _ => 4,
         };
         let (bow_m, half_m) = flat.map_or((BOW_M, 0.5), |f| {
             let half = |[low, high]: [f64; 2]| 0.5 * (high - low);
@@ -85,13 +86,23 @@ impl Effect for TargetBow {
         relief_m(flat, shape, coefficients) <= BEYOND_STATED * flat.flatness_m
     }
 
-    /// Over the reach of the board that was seen, along the side that is bent more.
+    /// Over the reach of the board that was seen, along the side that is bent more; of a dome along the
+    /// longer.
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
         let (right, down) = (half_square(fit.reach.right), half_square(fit.reach.down));
-        let along_right = |b: &[f64]| (b[0] * right).abs() > (b[1] * down).abs();
+        let is_dome = matches!(fit.shape, Basis::Powers { .. });
+        let along_right =
+            |b: &[f64]| if is_dome { right > down } else { (b[0] * right).abs() > (b[1] * down).abs() };
         let span = if along_right(fit.coefficients) { fit.reach.right } else { fit.reach.down };
+        let sagitta = |b: &[f64]| {
+            let half_square = if along_right(b) { right } else { down };
+            match is_dome {
+                true => -(0..b.len()).map(|k| b[k] * half_square.powi(k as i32 + 1)).sum::<f64>(),
+                false => -half_square * if along_right(b) { b[0] } else { b[1] },
+            }
+        };
         vec![
-            fit.estimate("sagitta_m", &|b| if along_right(b) { -b[0] * right } else { -b[1] * down }),
+            fit.estimate("sagitta_m", &sagitta),
             // The board's pixels end within a few of its edge.
             Estimate::given("span_m", span[1] - span[0], f64::NAN),
         ]
@@ -161,8 +172,9 @@ mod tests {
 
     #[test]
     fn what_is_stated_takes_the_place_of_what_is_usual() {
-        assert_eq!(TargetBow.usual(0, None), BOW_M / 0.25);
-        let stated = TargetBow.usual(0, Some(&FLAT));
+        let bend = Basis::relief(2);
+        assert_eq!(TargetBow.usual(&bend, 0, None), BOW_M / 0.25);
+        let stated = TargetBow.usual(&bend, 0, Some(&FLAT));
         assert!((stated - 2e-4 / 3f64.sqrt() / 0.25).abs() < 1e-15, "{stated}");
     }
 }

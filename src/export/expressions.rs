@@ -176,7 +176,8 @@ fn coordinate(over: Coordinate) -> String {
         Coordinate::LogRatio(pivot_m) => format!("log(p.z / {})", number(pivot_m)),
         Coordinate::Disparity => "p.disparity".into(),
         // Of a calibration board; no term of a sensor has them.
-        Coordinate::Right | Coordinate::Down | Coordinate::Edge => "0.0".into(),
+        Coordinate::Right | Coordinate::Down => "0.0".into(),
+        Coordinate::TargetRadiusSquared | Coordinate::Edge => "0.0".into(),
         Coordinate::Theta => "p.theta".into(),
         Coordinate::Azimuth => "p.azimuth".into(),
         Coordinate::Along => "p.x * cos(p.azimuth) + p.y * sin(p.azimuth)".into(),

@@ -83,6 +83,7 @@ mod tests {
             ),
             Basis::powers(Coordinate::Foreshortening, 1, Modulation::Disparity),
             Basis::relief(4),
+            Basis::dome(3),
             Basis::waves(Coordinate::Disparity, 1.0, 4),
             Basis::waves(Coordinate::Column, 80.7, 1),
             Basis::Decay { over: Coordinate::Edge, width: 2.3 },

@@ -78,6 +78,11 @@ impl Basis {
         Basis::Polynomial { over, degree, times: Modulation::Lift }
     }
 
+    /// The target's surface where it is round about its middle, m along its normal.
+    pub const fn dome(orders: usize) -> Self {
+        Basis::powers(Coordinate::TargetRadiusSquared, orders, Modulation::Lift)
+    }
+
     /// How many linear coefficients it has.
     pub fn count(&self) -> usize {
         match self {
