@@ -157,6 +157,14 @@ mod tests {
         assert_eq!(sure(with(30.0, Statistic::Bias, Axis::Z)), 0.96);
     }
 
+    /// Twelve nats are 25 = 5^2 times as much information as the unit that is believed at first.
+    #[test]
+    fn each_column_more_costs_the_root_of_what_was_seen() {
+        assert_eq!([occam(0, 12.0), occam(1, 0.0), occam(1, -3.0)], [1.0; 3]);
+        assert!((occam(1, 12.0) - 0.2).abs() < 1e-12);
+        assert!((occam(2, 12.0) - 0.04).abs() < 1e-12);
+    }
+
     #[test]
     fn tempered_odds_keep_their_order_and_their_sum() {
         let of = |p: &[f64]| -> Vec<f64> {
