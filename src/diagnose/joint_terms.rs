@@ -22,7 +22,7 @@ const TERM_CLEARLY: f64 = 2.0;
 /// them do): what is collinear with the sensor's own error and fits no board is not the board's.
 const LARGEST_USUAL: f64 = 2.0;
 /// A smooth error of the sensor, the maps among them, must bring this share beside a shape of the
-/// target: less is what the target's formula misses (up to 2.2 % of domes, 0.7 % of arcs), and no
+/// target: less is what the target's formula misses (up to 2.1 % of domes, 0.7 % of arcs), and no
 /// board's misfit is to be taken out of other pictures.
 const BESIDE_TARGET: f64 = 0.05;
 /// A radial name that explains this share of all stands, and the maps are the rest of it.

@@ -54,7 +54,7 @@ pub trait Effect: Send + Sync {
         shape
     }
 
-    /// A size that coefficient number `k` of its shapes may well have, in its unit: the standard
+    /// A size that coefficient number `k` of one of its shapes may well have, in its unit: the standard
     /// deviation of what is believed before anything was measured. `flat` is what is stated of the
     /// target.
     fn usual(&self, _shape: &Basis, _k: usize, _flat: Option<&Flat>) -> f64 {
