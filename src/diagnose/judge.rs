@@ -5,8 +5,7 @@ use super::evidence::{Evidence, Gain};
 use super::noise_gains::NoiseGains;
 use super::null::Null;
 use super::outcome::{Look, Rules};
-use super::samples::ViewData;
-use crate::terms::{Basis, Coordinate, PixelContext};
+use crate::terms::Basis;
 
 pub struct Judged {
     pub gain: Gain,
@@ -32,9 +31,8 @@ pub const LEAST_OF_LARGEST: f64 = 0.06;
 /// of the picture.
 pub const CLEARLY_FIXED: f64 = 50.0;
 
-/// What sizes are measured on, and held against.
+/// What sizes are held against.
 pub struct Judge<'a> {
-    pub fine: &'a [ViewData],
     /// Of all samples.
     pub weight: f64,
     pub rules: &'a Rules,
@@ -52,12 +50,7 @@ impl Judge<'_> {
         (square / self.weight).max(0.0).sqrt()
     }
 
-    pub fn sensible(&self, basis: &Basis, m: usize, gain: &Gain, rms: f64) -> bool {
-        let beta = gain.beta.rows(m, basis.count()).into_owned();
-        if let Basis::Powers { over: Coordinate::LogRatio(_), orders: 2.., .. } = basis {
-            let ends = self.fine.iter().flat_map(|v| v.places.iter().map(|p| p.z));
-            return one_way(basis, beta.as_slice(), crate::stats::range(ends));
-        }
+    pub fn sensible(&self, basis: &Basis, rms: f64) -> bool {
         let k = basis.count();
         let least = self.rules.least.max(LEAST_OF_LARGEST * self.largest);
         if rms < least {
@@ -68,24 +61,6 @@ impl Judge<'_> {
         };
         rms * rms > CLEARLY_FIXED * fixed * fixed * k as f64 / pixels
     }
-}
-
-/// Up all along, or down: what turns round is no power of z.
-fn one_way(basis: &Basis, beta: &[f64], [near, far]: [f64; 2]) -> bool {
-    const NODES: usize = 24;
-    const BACK: f64 = 0.12;
-    let mut row = Vec::new();
-    let mut at = |k: usize| {
-        let z = near * (far / near).powf(k as f64 / (NODES - 1) as f64);
-        basis.value(beta, &PixelContext { z, ..PixelContext::default() }, &mut row)
-    };
-    let values: Vec<f64> = (0..NODES).map(&mut at).collect();
-    let (mut up, mut down) = (0.0, 0.0);
-    for w in values.windows(2) {
-        let step = w[1] - w[0];
-        if step > 0.0 { up += step } else { down -= step }
-    }
-    f64::min(up, down) < BACK * (up + down)
 }
 
 pub fn looks(

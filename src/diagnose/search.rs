@@ -120,7 +120,7 @@ impl Trial<'_> {
         gain.total -= base.total;
         gain.by_view.iter_mut().zip(&base.by_view).for_each(|(g, b)| *g -= b);
         let rms = self.judge.rms(&c.basis, m, &gain, &evidence);
-        let sensible = self.judge.sensible(&c.basis, m, &gain, rms);
+        let sensible = self.judge.sensible(&c.basis, rms);
         Some(Judged { gain, null, sensible, rms })
     }
 }
@@ -190,9 +190,9 @@ impl Layer<'_> {
             if settled > 0 { gain(&evidence, self.rules.prior) } else { Some(nothing) }
         };
         let base = [base(Patches::Fine)?, base(Patches::Coarse)?];
-        let Layer { fine, coarse, rules, largest, .. } = *self;
+        let Layer { coarse, rules, largest, .. } = *self;
         let weight = coarse.iter().flat_map(|v| &v.weight).sum();
-        let judge = Judge { fine, weight, rules, largest };
+        let judge = Judge { weight, rules, largest };
         Some(Trial { beside, views, settled, base, judge })
     }
 

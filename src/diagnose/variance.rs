@@ -160,6 +160,11 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
         let bent = Basis::Table { z_m, theta_rad, columns: bent };
         all.push(Candidate::named(RECALIBRATE, bent));
     }
+    // One number that is off is no less simple than a formula of one.
+    for column in &columns {
+        let columns = vec![column.clone()];
+        all.push(Candidate::named(RECALIBRATE, Basis::Table { z_m, theta_rad, columns }));
+    }
     for n in if few < columns.len() { vec![few, columns.len()] } else { vec![few] } {
         if n > 0 {
             let columns = columns[..n].to_vec();

@@ -39,11 +39,7 @@ impl Effect for RangeExponent {
     }
 
     fn shapes(&self, _: &Bounds) -> Vec<Basis> {
-        [1, 2, 4].map(power_law).into()
-    }
-
-    fn plain(&self, _: Basis) -> Basis {
-        power_law(1)
+        power_laws()
     }
 
     /// Between the ends of what was seen.
@@ -56,11 +52,11 @@ impl Effect for RangeExponent {
     }
 
     fn term(&self, known: Known, _: &Camera) -> Option<Term> {
-        Some(Term::variance(power_law(1), vec![2.0 * known("excess")?]))
+        Some(Term::variance(power_law(), vec![2.0 * known("excess")?]))
     }
 
     fn smallest(&self, _: &Bounds) -> Option<Smallest> {
-        let (parameter, shape) = ("excess", power_law(1));
+        let (parameter, shape) = ("excess", power_law());
         Some(Smallest { parameter, shape, unit: vec![1.0], of: |a| 0.5 * a })
     }
 }
@@ -68,7 +64,61 @@ impl Effect for RangeExponent {
 /// Where the noise is the form's: the middle (in ratio) of a Kinect's 1 to 4 m.
 const PIVOT_M: f64 = 2.0;
 
-/// Of ln z.
-fn power_law(orders: usize) -> Basis {
-    Basis::powers(Coordinate::LogRatio(PIVOT_M), orders, Modulation::One)
+/// One column each.
+fn power_laws() -> Vec<Basis> {
+    let powers = [3.0, 4.0, 6.0];
+    let growths = powers.into_iter().flat_map(|power| [2.0, 4.0, 8.0].map(|unit| growth(unit, power)));
+    std::iter::once(power_law()).chain(growths).collect()
+}
+
+/// Another power throughout.
+fn power_law() -> Basis {
+    Basis::powers(Coordinate::LogRatio(PIVOT_M), 1, Modulation::One)
+}
+
+/// Noise of another power beside that of the form, as variances add: near it is nothing.
+///
+/// With these units and powers one column follows, from .8 to 4 m, z^4 in quadrature, a kink rounded over
+/// half a metre and straight or square growth from 1 to 1.5 m on to .3 % of its square.
+fn growth(unit_m: f64, power: f64) -> Basis {
+    Basis::Log1p { over: Coordinate::DepthPower { unit_m, power } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of the square of a change of log variance from .8 to 4 m, what the best of `shapes` leaves.
+    fn left(shapes: &[Basis], change: impl Fn(f64) -> f64) -> f64 {
+        let depths = || (0..=64).map(|n| 0.8 + 0.05 * f64::from(n));
+        let mut row = Vec::new();
+        let mut of = |shape: &Basis| {
+            let (mut fitted, mut square, mut own) = (0.0, 0.0, 0.0);
+            for z in depths() {
+                let at = PixelContext { z, ..PixelContext::default() };
+                let (x, y) = (shape.value(&[1.0], &at, &mut row), change(z));
+                (fitted, square, own) = (fitted + x * y, square + y * y, own + x * x);
+            }
+            1.0 - fitted * fitted / (own * square)
+        };
+        shapes.iter().map(&mut of).fold(1.0, f64::min)
+    }
+
+    /// Noise of other formulas than ours, small and large, keeps the name; noise that grows and falls
+    /// again does not.
+    #[test]
+    fn one_column_follows_other_growths() {
+        let shapes = power_laws();
+        for size in [0.03, 0.1, 0.3] {
+            let quartic = |z: f64| (size * (z / 2.5).powi(4)).ln_1p();
+            let kink = |z: f64| 2.0 * (size * ((z - 1.8) / 0.5).exp().ln_1p()).ln_1p();
+            let line = |z: f64| 2.0 * (size * (z - 1.0).max(0.0)).ln_1p();
+            let power = |z: f64| 2.0 * size * (z / 2.0).ln();
+            let worst = [left(&shapes, quartic), left(&shapes, kink), left(&shapes, line)];
+            assert!(worst.iter().all(|&w| w < 0.01), "{size}: {worst:?}");
+            assert!(left(&shapes, power) < 1e-12);
+            let hill = |z: f64| size * (-(z - 2.0).powi(2)).exp();
+            assert!(left(&shapes, hill) > 0.2);
+        }
+    }
 }

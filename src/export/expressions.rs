@@ -174,6 +174,9 @@ fn coordinate(over: Coordinate) -> String {
         Coordinate::Z => "p.z".into(),
         Coordinate::LogZ => "log(p.z)".into(),
         Coordinate::LogRatio(pivot_m) => format!("log(p.z / {})", number(pivot_m)),
+        Coordinate::DepthPower { unit_m, power } => {
+            format!("pow(p.z / {}, {})", number(unit_m), number(power))
+        }
         Coordinate::Disparity => "p.disparity".into(),
         // Of a calibration board; no term of a sensor has them.
         Coordinate::Right | Coordinate::Down => "0.0".into(),

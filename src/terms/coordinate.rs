@@ -22,6 +22,11 @@ pub enum Coordinate {
     LogZ,
     /// Logarithm of the depth over this one, m.
     LogRatio(f64),
+    /// Depth in units of `unit_m`, to a power.
+    DepthPower {
+        unit_m: f64,
+        power: f64,
+    },
     Disparity,
     Right,
     Down,
@@ -61,6 +66,7 @@ impl Coordinate {
             Coordinate::Z => p.z,
             Coordinate::LogZ => p.z.ln(),
             Coordinate::LogRatio(pivot_m) => (p.z / pivot_m).ln(),
+            Coordinate::DepthPower { unit_m, power } => (p.z / unit_m).powf(power),
             Coordinate::Disparity => p.disparity,
             Coordinate::Right => p.right,
             Coordinate::Down => p.down,
@@ -89,7 +95,7 @@ impl Coordinate {
             Coordinate::Radius | Coordinate::RadiusSquared => Axis::Radius,
             Coordinate::RaySquared | Coordinate::Foreshortening => Axis::Radius,
             Coordinate::Z | Coordinate::LogZ | Coordinate::LogRatio(_) => Axis::Z,
-            Coordinate::Disparity => Axis::Z,
+            Coordinate::Disparity | Coordinate::DepthPower { .. } => Axis::Z,
             Coordinate::Right | Coordinate::Down => Axis::TargetPosition,
             Coordinate::TargetRadiusSquared => Axis::TargetPosition,
             Coordinate::Edge => Axis::EdgeDistance,
@@ -107,7 +113,7 @@ impl Coordinate {
             Coordinate::Radius | Coordinate::RadiusSquared => Needs::PIXEL,
             Coordinate::RaySquared | Coordinate::Foreshortening => Needs::PIXEL,
             Coordinate::Z | Coordinate::LogZ | Coordinate::LogRatio(_) => Needs::DEPTH,
-            Coordinate::Disparity => Needs::DEPTH,
+            Coordinate::Disparity | Coordinate::DepthPower { .. } => Needs::DEPTH,
             Coordinate::Theta | Coordinate::Azimuth | Coordinate::Along => Needs::SURFACE,
             Coordinate::Alignment | Coordinate::Blur(_) => Needs::SURFACE,
             Coordinate::Ambient(_) => Needs::SURFACE,
@@ -132,7 +138,7 @@ impl Coordinate {
     pub(super) fn is_of_sigma(self) -> bool {
         matches!(self, Coordinate::Theta)
             || matches!(self.alone(), Some(Coordinate::Disparity))
-            || matches!(self, Coordinate::LogRatio(_))
+            || matches!(self, Coordinate::LogRatio(_) | Coordinate::DepthPower { .. })
     }
 
     /// The coordinate that groups of samples of one value are made by.

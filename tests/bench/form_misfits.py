@@ -5,9 +5,10 @@ Views of a plane are made by numpy alone, with noise that has no cause but its s
 along the axis, Eq. 1 across the plane, Nguyen's formula, and k z^2. `kinoise diagnose` then calibrates on
 the recording and looks for causes. "Calibrate again" is a right answer, a physical name is a wrong one.
 With --curved, depth is the range along the ray, as of a camera whose driver mixes the two: a wall comes
-out curved, which must be told as a mismatch and not refused.
+out curved, which must be told as a mismatch and not refused. With --foreign, sigma is not fitted to the
+recording but to a sensor that obeys the next of these formulas.
 
-    form_misfits.py [--kinoise BIN] [--sets N] [--seed S] [--jobs J] [--curved]
+    form_misfits.py [--kinoise BIN] [--sets N] [--seed S] [--jobs J] [--curved] [--foreign]
 """
 import argparse, collections, concurrent.futures, json, pathlib, subprocess, sys, tempfile
 
@@ -40,6 +41,7 @@ def arguments():
     p.add_argument("--seed", type=int, default=0)
     p.add_argument("--jobs", type=int, default=1)
     p.add_argument("--curved", action="store_true", help="depth is the range along the ray")
+    p.add_argument("--foreign", action="store_true", help="diagnose with a model of another formula")
     return p.parse_args()
 
 
@@ -71,12 +73,23 @@ def recording(folder, sigma, curved, rng):
         (view / "depth.txt").write_text("".join(lines))
 
 
+def foreign_model(args, place, form, rng):
+    """The calibration of a sensor of the next formula."""
+    forms = list(FORMS)
+    other = forms[(forms.index(form) + 1) % len(forms)]
+    recording(place / "other", FORMS[other], False, rng)
+    subprocess.run([args.kinoise, "calibrate", place / "other", "-o", place / "calibrated"],
+                   capture_output=True, check=True)
+    return ["-m", place / "calibrated/model.json"]
+
+
 def judge(args, form, n):
     rng = np.random.default_rng([args.seed, list(FORMS).index(form), n])
     with tempfile.TemporaryDirectory() as place:
         place = pathlib.Path(place)
         recording(place / "rec", FORMS[form], args.curved, rng)
-        run = subprocess.run([args.kinoise, "--threads", "1", "diagnose", place / "rec", "-o", place / "out"],
+        model = foreign_model(args, place, form, rng) if args.foreign else []
+        run = subprocess.run([args.kinoise, "--threads", "1", "diagnose", place / "rec", *model, "-o", place / "out"],
                              capture_output=True, text=True)
         if run.returncode == 2:
             return form, n, "refused", [run.stderr.strip()[-300:]]
