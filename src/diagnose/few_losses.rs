@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use rand_distr::{Distribution, StandardNormal};
 
-use super::missing_cells::{Cell, FEW, RIM_PX, USUAL};
+use super::missing_cells::{Cell, FEW, USUAL};
 use super::missing_search::{Judged, MIN_EXCESS_OF_LOSSES, predicted};
 use super::missing_shapes::{Shape, Step};
 use super::noise_gains::NoiseGains;
@@ -88,16 +88,17 @@ fn clump(views: &[Vec<&Cell>]) -> f64 {
     (squares / f64::max(lost, f64::MIN_POSITIVE)).max(1.0) * (1.0 + 8.0 * alike.clamp(0.0, 1.0))
 }
 
-/// The step whose foot the views' losses follow, where noise alone brings as much with a chance of no
-/// more than `level`.
+/// The step whose foot the views' losses follow, at `rim` px or more from the target's edge, where noise
+/// alone brings as much with a chance of no more than `level`.
 pub fn few_losses(
     fine: &[Vec<Cell>],
+    rim: f64,
     reach: &Extent,
     level: f64,
     seed: Seed,
 ) -> Option<(Judged, f64)> {
     let cells: Vec<Vec<&Cell>> =
-        fine.iter().map(|v| v.iter().filter(|c| c.place.edge >= RIM_PX).collect()).collect();
+        fine.iter().map(|v| v.iter().filter(|c| c.place.edge >= rim).collect()).collect();
     let clump = clump(&cells);
     let views: Vec<View> = cells.iter().filter_map(|v| View::of(v, clump)).collect();
     let many = |v: &View| v.lost > MANY * v.asked;
@@ -114,9 +115,8 @@ pub fn few_losses(
         each.max_by(|a, b| a.0.0.total_cmp(&b.0.0))
     };
     let (_, _, column) = best(&y, USUAL.level)?;
-    let left: f64 = y.iter().zip(column).map(|(y, h)| (y - h).powi(2)).sum();
-    let n = views.len() as f64;
-    let scatter = ((1.0 + FEW / n) * left / n).max(USUAL.level);
+    let left: Vec<f64> = y.iter().zip(column).map(|(y, h)| (y - h).powi(2)).collect();
+    let scatter = ((1.0 + FEW / views.len() as f64) * scatter(&left, &views)).max(USUAL.level);
     let ((found, size), step, _) = best(&y, scatter)?;
     let draw = |replicate: u64| {
         let mut rng = seed.stream(&format!("missing/few/{replicate}"));
@@ -133,6 +133,25 @@ pub fn few_losses(
     let coefficients = vec![size];
     (found > noise.threshold(level))
         .then(|| (Judged { shape: Shape::Step(step), gain: found, coefficients }, noise.p(found)))
+}
+
+/// By how much the views' logarithms differ for no reason, in square, beside what their counts err by:
+/// where the squares that are `left`, over what is expected of them, come to one a view (Paule and
+/// Mandel 1982).
+fn scatter(left: &[f64], views: &[View]) -> f64 {
+    let excess = |scatter: f64| {
+        let each = left.iter().zip(views).map(|(square, v)| square / variance(v, scatter));
+        each.sum::<f64>() - views.len() as f64
+    };
+    let [mut low, mut high] = [0.0, left.iter().sum()];
+    if excess(low) <= 0.0 {
+        return low;
+    }
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if excess(middle) > 0.0 { low = middle } else { high = middle }
+    }
+    high
 }
 
 fn variance(view: &View, scatter: f64) -> f64 {
@@ -217,7 +236,7 @@ mod tests {
     }
 
     fn found((cells, reach): &(Vec<Vec<Cell>>, Extent)) -> Option<Axis> {
-        few_losses(cells, reach, 0.001, Seed(1)).map(|(judged, _)| judged.shape.axis())
+        few_losses(cells, 8.0, reach, 0.001, Seed(1)).map(|(judged, _)| judged.shape.axis())
     }
 
     #[test]

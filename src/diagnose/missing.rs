@@ -11,7 +11,7 @@ use super::few_losses::few_losses;
 use super::field::Field;
 use super::layers::Survey;
 use super::margins::Margins;
-use super::missing_cells::{Cell, cells, fine};
+use super::missing_cells::{Cell, cells, fine, rim_px};
 use super::missing_report::{DropoutReporter, shadow_finding};
 use super::missing_search::{Judged, Losses};
 use super::missing_shapes::{Step, curves, steps};
@@ -181,7 +181,7 @@ fn losses(
         }
     }
     if outcome.findings.is_empty()
-        && let Some((foot, p)) = few_losses(&seen.fine, reach, LEVEL, seed)
+        && let Some((foot, p)) = few_losses(&seen.fine, rim_px(camera), reach, LEVEL, seed)
     {
         outcome.findings.push(reporter(0.0).finding(&foot, rivals(std::slice::from_ref(&foot)), p));
     }

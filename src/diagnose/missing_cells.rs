@@ -20,14 +20,19 @@ pub struct Cell {
 
 /// Cells across the picture: some hundred a view, each wider than a clump of dead pixels.
 const ACROSS: usize = 16;
-/// Tiles nearer the target's edge are kept apart, px.
-pub const RIM_PX: f64 = 8.0;
+/// Tiles nearer the target's edge are kept apart: what a matcher's window of 9 px in 640 reaches, and no
+/// less than a tile, px.
+pub fn rim_px(camera: &Camera) -> f64 {
+    (camera.width as f64 / 80.0).max(SIDE as f64)
+}
+
 /// A smaller patch, in tiles, says little.
 const FEWEST_TILES: usize = 2;
 
 /// The cells of all views.
 pub fn cells(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<Cell>> {
     let side = (camera.width.div_ceil(ACROSS * SIDE) * SIDE) as f64;
+    let rim = rim_px(camera);
     survey
         .views
         .iter()
@@ -35,7 +40,7 @@ pub fn cells(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<Cel
             let mut groups: BTreeMap<(u32, u32, bool), Vec<usize>> = BTreeMap::new();
             for (i, t) in view.tiles.iter().enumerate().filter(|(_, t)| margins.hold(t)) {
                 let p = &t.place;
-                let key = ((p.v / side) as u32, (p.u / side) as u32, p.edge < RIM_PX);
+                let key = ((p.v / side) as u32, (p.u / side) as u32, p.edge < rim);
                 groups.entry(key).or_default().push(i);
             }
             let places: Vec<PixelContext> = view.tiles.iter().map(|t| t.place).collect();
