@@ -11,7 +11,6 @@ use super::field::Field;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
 use super::layers::Survey;
-use super::missing::{DropoutFinding, missing};
 use super::noise::texture_findings;
 use super::pixels::{common, measure_tails};
 use super::reading::read;
@@ -34,7 +33,6 @@ pub struct Baseline {
     pub(super) lattice: Quantisation,
     /// Variance with another name.
     pub steps: Steps,
-    pub(super) lost: Vec<DropoutFinding>,
     pub(super) heavy: bool,
     /// What was odd, in words.
     pub remarks: Vec<String>,
@@ -111,7 +109,6 @@ impl Baseline {
         measure_tails(&mut structure, &fields, &[], &[], &survey, bench);
         let lattice = lattice(&fields, simulated);
         let steps = Steps::of(&lattice, &structure, &fields, simulated);
-        let lost = missing(&fields, None, &survey, camera, options.seed).findings;
         let confusers = Confusers { uneven: false, simulated: true };
         Baseline {
             heavy: tails(&structure, &none, 0.03 * options.level, confusers).is_some(),
@@ -121,7 +118,6 @@ impl Baseline {
             textures,
             lattice,
             steps,
-            lost,
             remarks: Vec::new(),
         }
     }

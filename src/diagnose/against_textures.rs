@@ -1,15 +1,14 @@
-//! Against a simulated recording: the structure of the noise, steps and losses, view by view.
+//! Against a simulated recording: the structure of the noise and steps, view by view.
 
 use super::against::Baseline;
 use super::in_time::still_level;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
 use super::layers::Survey;
-use super::missing::DropoutFinding;
 use super::noise::texture_findings;
 use super::structure::Structure;
 use super::texture_finding::TextureFinding;
-use crate::stats::mean;
+use crate::stats::{mean, range};
 
 /// Tails of two recordings are no news within this factor: gross errors come in clumps.
 const TAILS_ALIKE: f64 = 3.0;
@@ -89,16 +88,11 @@ impl Baseline {
         tail(real) < TAILS_ALIKE * tail(&self.structure)
     }
 
-    /// Is as much lost in the simulated views, for the same reason or on the whole?
-    pub fn loses_alike(&self, lost: &DropoutFinding, real: &Survey) -> bool {
-        let same = self.lost.iter().any(|own| {
-            own.family == lost.family
-                && own.axis == lost.axis
-                && (own.size.max(1e-6) / lost.size.max(1e-6)).ln().abs() < LOSSES_ALIKE
-        });
-        // What lies beside the target is no tile's.
-        let on_target = lost.family != Some("occlusion-shadow");
-        same || on_target && lost_share(real) < 1.2 * lost_share(&self.survey) + NEGLIGIBLE_DROPOUT
+    /// Is as much lost of the targets on the whole as in the simulated views?
+    pub fn loses_alike(&self, real: &Survey) -> bool {
+        let shares = [real, &self.survey].map(lost_share);
+        let [less, more] = range(shares);
+        more < LOSSES_ALIKE * less + NEGLIGIBLE_DROPOUT
     }
 
     /// What the simulation shows and the recording does not, in words.
@@ -118,10 +112,10 @@ impl Baseline {
 
 /// Steps that differ by less are the same, as a logarithm.
 const STEPS_ALIKE: f64 = 0.05;
-/// A difference between lost shares that is too small to matter.
+/// Lost shares that differ by less than this factor, and this much, are the same: what lies at the range's
+/// end is lost or not by chance.
+const LOSSES_ALIKE: f64 = 1.2;
 const NEGLIGIBLE_DROPOUT: f64 = 0.0005;
-/// Losses whose sizes differ by less are the same, as a logarithm: dropout differs between views at random.
-const LOSSES_ALIKE: f64 = 0.4;
 
 /// Of all that was asked of the target's pixels.
 fn lost_share(survey: &Survey) -> f64 {

@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 
 use super::ablation::Ablation;
 use super::bias;
-use super::case::{Case, MeanResult, ScatterResult};
+use super::case::{Case, MeanResult};
 use super::diagnosis::{Detectable, Finding, Status};
 use super::few_views::few_views;
 use super::field::Field;
@@ -13,7 +13,7 @@ use super::form::better_form;
 use super::lines::lines;
 use super::missing::{self, DropoutOutcome, missing};
 use super::mixing::mixing;
-use super::naming::{doubt_beside_the_unexplained, physics, temper};
+use super::naming::{doubt_beside_the_unexplained, physics, resembles_only, temper};
 use super::next_view;
 use super::other_findings;
 use super::outcome::Outcome;
@@ -21,8 +21,9 @@ use super::overstated::SHARE;
 use super::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::reference::{self, can_happen};
 use super::replication_textures;
+use super::scatter::ScatterResult;
 use super::scene::Scene;
-use super::steps::{COARSE_SIGMAS, is_raw, own_step, own_step_note, steps};
+use super::steps::{COARSE_SIGMAS, own_step, own_step_note, steps};
 use super::tails::EXCESS;
 use super::texture_finding::TextureFinding;
 use super::variance;
@@ -105,7 +106,10 @@ impl Case<'_> {
         let clearly = refitted.as_ref().is_some_and(|f| f.share > clear);
         let better_form = self.tell_form(&mut curves, clearly);
         let mut found: Vec<Finding> = self.ranges.clone().into_iter().chain(curves).collect();
-        found.extend(textures);
+        let of_size = |f: &Finding| f.statistic == Statistic::Variance;
+        let told = found.iter().any(of_size);
+        // What the search of the size tells is not told of its parts once more.
+        found.extend(textures.into_iter().filter(|f| !(told && of_size(f) && f.effect.is_none())));
         let DropoutOutcome { findings, mut detectable, notes } = lost;
         self.remarks.extend(notes);
         detectable.retain(|d| can_happen(d.effect, self.sensor().kind));
@@ -121,7 +125,10 @@ impl Case<'_> {
         echoes(&mut found);
         merge(&mut found);
         doubt_beside_the_unexplained(&mut found);
-        found.iter_mut().for_each(|f| temper(&mut f.alternatives));
+        for f in &mut found {
+            temper(&mut f.alternatives);
+            resembles_only(f);
+        }
         Battery { mean, scatter, found, refitted, better_form, detectable }
     }
 
@@ -161,7 +168,7 @@ impl Case<'_> {
         let stepped = of_steps
             && f.effect.is_none()
             && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)
-            && !is_raw(self.recording)
+            && own_step(&scatter.lattice, self.recording, self.fields[0].scale_px_m).is_none()
             && f.size.sigma * sigma_px < 0.3 * coarsest;
         let far_errors = |t: &TextureFinding| !t.parameters.contains_key(EXCESS);
         let textures = !scatter.textures.is_empty() || scatter.tails.is_some();
@@ -278,12 +285,15 @@ impl Case<'_> {
     /// Losses that neither the model has nor the simulation.
     fn lost(&self) -> DropoutOutcome {
         let camera = &self.sensor().camera;
-        let mut lost = missing(&self.fields, self.twins(), &self.survey, camera, self.options.seed);
-        let baseline = self.baseline.as_ref();
+        let twins = self.baseline.as_ref().map(|b| (&b.fields[..], &b.survey));
+        let mut lost = missing(&self.fields, twins, &self.survey, camera, self.options.seed);
+        let alike = self.baseline.as_ref().is_some_and(|b| b.loses_alike(&self.survey));
         lost.findings.retain(|m| {
+            // What lies beside the target is no tile's.
+            let on_target = m.family != Some("occlusion-shadow");
             m.family.is_none_or(|id| !self.known.has(id))
                 && self.stands(m.p, missing::LEVEL)
-                && baseline.is_none_or(|b| !b.loses_alike(m, &self.survey))
+                && !(alike && on_target)
         });
         lost
     }

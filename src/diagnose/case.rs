@@ -8,23 +8,18 @@ use super::diagnosis::Finding;
 use super::engine::{DiagnoseOptions, measure_options};
 use super::field::Field;
 use super::known::KnownTerms;
-use super::lattice::Quantisation;
 use super::layers::Survey;
 use super::learnt::{Learnt, learnt_from};
-use super::noise::{ROW_NOISE, texture_findings};
 use super::outcome::Outcome;
-use super::pixels::{common, mean_of, measure_tails, pixel_terms, terms_of};
+use super::pixels::{mean_of, pixel_terms, terms_of};
 use super::reading::{LoadedViews, refuse_other_size};
-use super::steps::{Steps, forget_windows, is_raw, lattice};
-use super::structure::{Structure, fixed_px2_by_view, structures};
-use super::tails::{Confusers, tails};
-use super::texture_finding::TextureFinding;
+use super::structure::fixed_px2_by_view;
 use crate::Progress;
 use crate::effects::{Active, RAY_FOR_DEPTH};
 use crate::error::Result;
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
-use crate::terms::{Axis, Basis, PixelContext, Statistic, Term};
+use crate::terms::{Statistic, Term};
 use crate::view::{Excluded, Recording, Sensor};
 
 /// A diagnosis under way.
@@ -55,17 +50,6 @@ pub struct MeanResult {
     pub terms: Vec<Term>,
     /// The terms at every pixel, px.
     pub px: Vec<Vec<f32>>,
-}
-
-/// What scatters about it.
-pub struct ScatterResult {
-    /// One number of each kind a view.
-    pub structure: Vec<Structure>,
-    pub lattice: Quantisation,
-    pub textures: Vec<TextureFinding>,
-    pub tails: Option<TextureFinding>,
-    /// Of the variance.
-    pub outcome: Outcome,
 }
 
 impl<'a> Case<'a> {
@@ -172,97 +156,11 @@ impl<'a> Case<'a> {
         MeanResult { outcome, terms, px }
     }
 
-    pub fn scatter(&mut self, mean: &MeanResult) -> ScatterResult {
-        self.at("searching the noise", "testing the noise again");
-        let camera = &self.recording.sensor.camera;
-        let mut structure = structures(&self.fields, camera, &mean.px);
-        let lattice = lattice(&self.fields, self.recording);
-        let own = Steps::of(&lattice, &structure, &self.fields, self.recording);
-        if !is_raw(self.recording) {
-            forget_windows(&mut structure, &self.fields, &lattice);
-        }
-        let theirs = self.baseline.as_ref().map(|b| b.steps);
-        let extra = |p: &PixelContext| (own.at(p) - theirs.map_or(0.0, |s| s.at(p))).max(0.0);
-        let each = self.level(Self::EACH_LEVEL);
-        if let Some(baseline) = &mut self.baseline {
-            let more = baseline.too_much(&structure, each);
-            baseline.remarks.extend(more);
-            let found = self.extended.then(|| self.known.clone());
-            baseline.compare(&mut structure, &lattice, &mut self.known);
-            found.iter().for_each(|found| self.known.overrule(found));
-        }
-        let mut textures = texture_findings(&structure, &self.known, each);
-        textures.retain(|h| self.stands(h.p, each));
-        let excess = self.excess_of_rows(&structure, &textures);
-        for (view, [_, of_log_variance]) in self.survey.views.iter_mut().zip(excess) {
-            view.log_variance_inflation *= of_log_variance;
-        }
-        self.survey.compare_frames(&self.fields, common(&structure, &textures, &self.known));
-        let compared =
-            self.baseline.as_mut().is_some_and(|baseline| baseline.variances(&mut self.survey));
-        let range_share = self.range_share(&mean.terms);
-        // A range in place of a depth makes a disparity, and its noise, smaller.
-        let stretch = |p: &PixelContext| {
-            let ray = 1.0 / (1.0 + p.x * p.x + p.y * p.y).sqrt();
-            (1.0 + range_share.clamp(0.0, 1.0) * (ray - 1.0)).powi(2)
-        };
-        self.survey.roughen(&self.fields, &mean.px, extra, stretch);
-        if let Some(baseline) = self.baseline.as_ref().filter(|_| compared) {
-            baseline.inflate_log_variances(&mut self.survey);
-        }
-        let level = self.level(Self::VARIANCE_LEVEL);
-        let sigma = &self.model.sigma;
-        if self.survey.learnt_from[1].is_some() {
-            self.survey.absorb_model_variance_error(&self.known, sigma);
-        }
-        let outcome = self.survey.search_variance(sigma, camera, level, self.options.seed);
-        let terms = terms_of(&outcome, Statistic::Variance);
-        measure_tails(&mut structure, &self.fields, &mean.px, &terms, &self.survey, &self.bench);
-        let alike = self.baseline.as_ref().is_some_and(|b| b.tails_alike(&structure));
-        let holds = |t: &Term| self.holds_tails(t);
-        // The light of single pixels is known to little better than an octave.
-        let by_light = |t: &Term| t.basis.axis() == Axis::Intensity;
-        let uneven = outcome.chosen.iter().any(|c| c.candidate.family.is_none())
-            || terms.iter().chain(&self.known.variance).any(by_light)
-            || self.survey.refits_sigma && !terms.iter().all(holds)
-            || self.known.has_uneven_noise()
-            || !self.known.variance.iter().all(holds);
-        let confusers = Confusers { uneven, simulated: self.baseline.is_some() };
-        let tails = tails(&structure, &self.known, each, confusers)
-            .filter(|t| !alike && self.stands(t.p, each));
-        ScatterResult { structure, lattice, textures, tails, outcome }
-    }
-
-    /// [`Structure::excess_of_rows`] of the views where rows have an error of their own, as was found or is
-    /// known; one where they have none.
-    pub fn excess_of_rows(
-        &self,
-        structure: &[Structure],
-        textures: &[TextureFinding],
-    ) -> Vec<[f64; 2]> {
-        let found = textures.iter().any(|t| t.families.contains(&ROW_NOISE));
-        let alike = found || self.known.has(ROW_NOISE);
-        let views = structure.iter().zip(&self.survey.views);
-        views
-            .map(|(s, v)| if alike { s.excess_of_rows(&v.correlation) } else { [1.0; 2] })
-            .collect()
-    }
-
     /// Is this chance, of noise alone, small enough where the model's own views left something open
     /// as well?
     pub fn stands(&self, p: f64, level: f64) -> bool {
         let views = self.fields.len() as f64;
         self.learnt_from[1].map_or(p, |model| model.p(p, views)) <= level
-    }
-
-    /// A refit that makes sigma much smaller somewhere rests on noise that steps have swallowed, or
-    /// on a cause that was taken for noise: against it everything has tails.
-    fn holds_tails(&self, term: &Term) -> bool {
-        const MUCH: f64 = -1.4;
-        let mut row = Vec::new();
-        let mut tiles = self.survey.views.iter().flat_map(|v| v.tiles.iter());
-        !matches!(term.basis, Basis::Table { .. })
-            || tiles.all(|t| term.value(&t.place, &mut row) > MUCH)
     }
 
     pub fn range_share(&self, terms: &[Term]) -> f64 {

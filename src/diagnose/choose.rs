@@ -111,6 +111,14 @@ impl Choice<'_> {
             .filter(|&i| {
                 self.calibrated_gain(i) > threshold && self.total(i) > self.adequacy(i) * best_curve
             })
+            .filter(|&i| {
+                let axis = |k: usize| self.candidates[k].basis.axis();
+                let own = curves.iter().copied().find(|&k| axis(k) == axis(i));
+                let least = own.map_or(0.0, |k| self.rules.own_axis_adequacy * self.total(k));
+                // Some ride on an error of their axis that is another's.
+                let alone = self.adequacy(i) >= self.rules.adequacy;
+                !alone || self.total(i) > least
+            })
             // What fewer columns without a name do better is not what the name says.
             .filter(|&i| {
                 let simpler = |&k: &usize| columns(k) < columns(i) && self.total(k) > self.total(i);

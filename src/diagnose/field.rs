@@ -16,6 +16,7 @@ use crate::io::read_depth;
 use crate::measure::{Workbench, view_target};
 use crate::model::SigmaModel;
 use crate::plane::Plane;
+use crate::stats::median_in_place;
 use crate::terms::edge_distances;
 use crate::view::{Sensor, View};
 
@@ -60,6 +61,8 @@ pub struct Field {
     /// Infrared amplitude times the square of the distance over the cosine of the incidence: how
     /// light the surface is, in the image's own units. Empty without an infrared image.
     pub light: Vec<f32>,
+    /// Median infrared amplitude over the target, in the image's own units.
+    pub infrared: Option<f64>,
     /// How often each stored word occurs on the target.
     pub words: RawHistogram,
     /// The target's region was given; else it ends where too little is measured.
@@ -131,6 +134,7 @@ impl Field {
     /// Read how light the surfaces are; without an infrared image that can be read it stays unknown.
     fn read_infrared(&mut self, view: &View, rays: &Rays) {
         let Some(amplitudes) = amplitudes(view, &self.on_target(), self.width) else { return };
+        self.infrared = Some(f64::from(median_in_place(&mut amplitudes.clone())));
         let n = self.plane.q.normalize();
         let light = self.pixels.iter().zip(amplitudes).map(|(&i, amplitude)| {
             let (x, y) = rays.at(i as usize);
@@ -140,6 +144,12 @@ impl Field {
             (f64::from(amplitude) * far / facing) as f32
         });
         self.light = light.collect();
+    }
+
+    /// Infrared amplitude of a target that faces the sensor at 1 m, in the image's own units.
+    pub fn pattern_at_1m(&self) -> Option<f64> {
+        let light = median_in_place(&mut self.light.clone());
+        (light > 0.0).then_some(f64::from(light))
     }
 
     /// Variance over the frames of their lines at this disparity, px^2: what moves as a whole is
@@ -224,6 +234,7 @@ impl Field {
             temperature_c: None,
             ambient_lux: None,
             light: Vec::new(),
+            infrared: None,
             words: RawHistogram::none(),
             region_given: false,
             edges: Edges::default(),

@@ -5,9 +5,10 @@ use serde_json::Map;
 
 use super::along::Along;
 use super::diagnosis::{Finding, MapRow};
+use super::joint_terms::is_smooth_and_nameless;
 use super::naming::{naming, physics};
 use super::other_findings::named;
-use super::outcome::{Look, Outcome};
+use super::outcome::{Chosen, Look, Outcome};
 use super::parameters::{of_any_formula, parameters};
 use super::pixels::terms_of;
 use super::scene::{Scene, size};
@@ -51,7 +52,11 @@ pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
                             .any(|r| r.family == family && r.gain > NEARLY * first.gain);
                     first.candidate.family == c.candidate.family || nearly
                 }
-                None => first.candidate.basis.axis() == axis,
+                // Smooth curves over the picture share what they show.
+                None => {
+                    let smooth = |c: &Chosen| is_smooth_and_nameless(&c.candidate);
+                    first.candidate.basis.axis() == axis || smooth(c) && smooth(first)
+                }
             }
         });
         match home {

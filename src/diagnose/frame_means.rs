@@ -45,6 +45,13 @@ impl Motion {
     }
 }
 
+/// The velocity of a target that seems to move, its error, m/s, and the chance of it for one at rest.
+pub(super) fn velocity(views: &[Structure]) -> Option<(f64, f64, f64)> {
+    let all: Vec<Jitter> = views.iter().filter_map(|s| s.jitter).collect();
+    let Motion { velocity_mps, std_error, p, .. } = Motion::of(&all, &FrameNoise::of(&all))?;
+    Some((velocity_mps, std_error.hypot(UNEVEN * velocity_mps), p))
+}
+
 /// Noise of a frame's mean about the line of its view: what its pixels explain, and what all frames
 /// scatter by beside that, px^2; negative where they scatter less.
 struct FrameNoise {

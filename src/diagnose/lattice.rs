@@ -1,6 +1,8 @@
 //! Which depths occur at all: the steps of the matcher, and those of the driver.
 
-use super::comb::{COARSE, Gathered, PHASE_STEP, steps_of_depths, steps_of_disparities};
+use super::comb::{
+    COARSE, Gathered, PHASE_STEP, steps_of_depths, steps_of_disparities, steps_of_words,
+};
 use crate::frame::DepthCode;
 use crate::view::Sensor;
 
@@ -94,13 +96,13 @@ impl RawHistogram {
                 }
             }
             DepthCode::Disparity { slope, .. } => {
-                // Words are the lattice; what is left to see is whether only every n-th occurs.
-                let offsets = words.iter().fold(0, |g, (w, _)| gcd(g, w - words[0].0));
+                // Words are the lattice; what is left to see is whether a coarser one leaves some empty.
+                let word_px = slope.abs() * scale_px_m;
+                let coarser = steps_of_words(&words);
                 Quantisation {
-                    depth_step_m: None,
-                    disparity_step_px: Some(offsets.max(1) as f64 * slope.abs() * scale_px_m),
-                    depth_p: None,
-                    disparity_p: (offsets > 1).then(|| all_multiples(offsets, words.len() - 1)),
+                    disparity_step_px: Some(coarser.map_or(1.0, |c| c.0) * word_px),
+                    disparity_p: coarser.map(|c| c.1),
+                    ..Quantisation::default()
                 }
             }
         }
@@ -191,6 +193,37 @@ mod tests {
             words.0[usize::from(sensor.code.raw(z))] += 1;
         }
         words
+    }
+
+    /// A matcher's steps of 1.28 to 2.67 words, each in the word nearest to it, and its own words.
+    #[test]
+    fn raw_words_show_steps_that_are_no_whole_number_of_them() {
+        let word_px = 0.125;
+        let (offset, slope) = (1100.0 * word_px / 43.5, -word_px / 43.5);
+        let code = DepthCode::Disparity { offset, slope, invalid: 2047 };
+        let sensor = Sensor { code, ..kinect_v1(1) };
+        let mut rng = Seed(4).stream("lattice/raw");
+        let mut found = |step_px: f64| {
+            let mut words = RawHistogram::none();
+            for _ in 0..100_000 {
+                let noise: f64 = StandardNormal.sample(&mut rng);
+                let mut d = rng.random_range(14.0..44.0) + 0.08 * noise;
+                if step_px > 0.0 {
+                    d = (d / step_px).round() * step_px;
+                }
+                words.0[((d / 43.5 - offset) / slope).round() as usize] += 1;
+            }
+            words.lattice(&sensor, 43.5)
+        };
+        for step_px in [0.16, 0.2, 0.25, 1.0 / 3.0, 0.5] {
+            let found = found(step_px);
+            let step = found.disparity_step_px.expect("a step");
+            assert!((step / step_px - 1.0).abs() < 5e-3, "{step_px}: {found:?}");
+            assert!(found.disparity_p.is_some_and(|p| p < 1e-4), "{found:?}");
+        }
+        let own = found(0.0);
+        assert!((own.disparity_step_px.unwrap() / word_px - 1.0).abs() < 1e-9, "{own:?}");
+        assert_eq!(own.disparity_p, None);
     }
 
     #[test]

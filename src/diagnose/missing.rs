@@ -11,7 +11,7 @@ use super::few_losses::few_losses;
 use super::field::Field;
 use super::layers::Survey;
 use super::margins::Margins;
-use super::missing_cells::{Cell, cells, fine, rim_px};
+use super::missing_cells::{Cell, cells, expected, fine, rim_px};
 use super::missing_report::{DropoutReporter, shadow_finding};
 use super::missing_search::{Judged, Losses};
 use super::missing_shapes::{Step, curves, steps};
@@ -72,11 +72,10 @@ const LEAST_OF_FIRST: f64 = 0.1;
 
 /// What the losses of a recording follow.
 ///
-/// `twins` are the same views without what is looked for: what is lost beside their targets is
-/// expected.
+/// `twins` are the same views without what is looked for: what they lose is expected.
 pub fn missing(
     fields: &[Field],
-    twins: Option<&[Field]>,
+    twins: Option<(&[Field], &Survey)>,
     survey: &Survey,
     camera: &Camera,
     seed: Seed,
@@ -84,13 +83,15 @@ pub fn missing(
     let region_given: Vec<bool> = fields.iter().map(|f| f.region_given).collect();
     let second = survey.second();
     let margins = Margins::of(fields);
-    let (cells, fine) = (cells(survey, camera, &margins), fine(survey, &margins));
-    let seen = DropoutCells { cells, fine, region_given, second };
+    let (mut mine, fine) = (cells(survey, camera, &margins), fine(survey, &margins));
+    let expected = twins
+        .map(|(_, survey)| expected(&mut mine, &cells(survey, camera, &margins), rim_px(camera)));
+    let seen = DropoutCells { cells: mine, fine, region_given, second, expected };
     let blur = |z: f64| blur(survey, z);
     let mut outcome = losses(&seen, &survey.reach, camera, &blur, seed);
     outcome.notes.extend(margins.notes());
     let sides: Vec<Sides> = (0..fields.len())
-        .map(|v| Sides::of(&fields[v].edges, twins.map(|t| &t[v].edges)))
+        .map(|v| Sides::of(&fields[v].edges, twins.map(|(t, _)| &t[v].edges)))
         .collect();
     if let Some(band) = band(&sides, SHADOW_LEVEL) {
         let mut shadow = shadow_finding(band, fields);
@@ -114,17 +115,28 @@ struct DropoutCells {
     region_given: Vec<bool>,
     /// Whether it is in the second half.
     second: Vec<bool>,
+    /// Log odds that the views' twins lose in each patch, over nothing lost.
+    expected: Option<Vec<Vec<f64>>>,
 }
 
 impl DropoutCells {
     /// Without the patches that a hard end of the range touches.
     fn inside(&self, end: &HardEnd) -> DropoutCells {
-        let kept = |views: &[Vec<Cell>]| -> Vec<Vec<Cell>> {
-            let inside = |v: &Vec<Cell>| v.iter().filter(|c| !end.touches(c)).cloned().collect();
-            views.iter().map(inside).collect()
-        };
-        let (region_given, second) = (self.region_given.clone(), self.second.clone());
-        DropoutCells { cells: kept(&self.cells), fine: kept(&self.fine), region_given, second }
+        fn kept<T: Clone>(of: &[Vec<T>], cells: &[Vec<Cell>], end: &HardEnd) -> Vec<Vec<T>> {
+            let inside = |(of, cells): (&Vec<T>, &Vec<Cell>)| {
+                let both = of.iter().zip(cells).filter(|(_, c)| !end.touches(c));
+                both.map(|(of, _)| of.clone()).collect()
+            };
+            of.iter().zip(cells).map(inside).collect()
+        }
+        let (cells, fine) = (&self.cells, &self.fine);
+        DropoutCells {
+            cells: kept(cells, cells, end),
+            fine: kept(fine, fine, end),
+            region_given: self.region_given.clone(),
+            second: self.second.clone(),
+            expected: self.expected.as_ref().map(|e| kept(e, cells, end)),
+        }
     }
 }
 
@@ -143,7 +155,8 @@ fn losses(
     let (fine, region_given) = (&seen.fine[..], &seen.region_given[..]);
     let reporter = |base| DropoutReporter { fine, region_given, base, reach, camera };
     let (steps, curves) = (steps(reach), curves(camera, reach));
-    let mut explained: Vec<Vec<f64>> = views.iter().map(|v| vec![0.0; v.len()]).collect();
+    let nothing = || views.iter().map(|v| vec![0.0; v.len()]).collect();
+    let mut explained: Vec<Vec<f64>> = seen.expected.clone().unwrap_or_else(nothing);
     let mut taken: Vec<Axis> = Vec::new();
     while outcome.findings.len() < MOST_FINDINGS {
         let mut ledger = Losses::new(views, &explained);
@@ -181,6 +194,7 @@ fn losses(
         }
     }
     if outcome.findings.is_empty()
+        && seen.expected.is_none()
         && let Some((foot, p)) = few_losses(&seen.fine, rim_px(camera), reach, LEVEL, seed)
     {
         outcome.findings.push(reporter(0.0).finding(&foot, rivals(std::slice::from_ref(&foot)), p));

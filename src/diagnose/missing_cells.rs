@@ -61,6 +61,24 @@ pub fn cells(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<Cel
         .collect()
 }
 
+/// Which cell of its picture it is.
+fn key(cell: &Cell, rim: f64) -> (u32, u32, bool) {
+    let at = |x: f64| (x / cell.place.side) as u32;
+    (at(cell.place.v), at(cell.place.u), cell.place.edge < rim)
+}
+
+/// What is lost at the same places of the views' twins, in log odds over nothing lost. Cells without a twin
+/// show nothing and go.
+pub fn expected(cells: &mut [Vec<Cell>], twins: &[Vec<Cell>], rim: f64) -> Vec<Vec<f64>> {
+    let of_view = |(mine, theirs): (&mut Vec<Cell>, &Vec<Cell>)| {
+        let lost: BTreeMap<_, f64> =
+            theirs.iter().map(|c| (key(c, rim), odds(c.lost / c.asked) - odds(0.0))).collect();
+        mine.retain(|c| lost.contains_key(&key(c, rim)));
+        mine.iter().map(|c| lost[&key(c, rim)]).collect()
+    };
+    cells.iter_mut().zip(twins).map(of_view).collect()
+}
+
 /// Every tile a cell of its own: for where and how much, not for whether.
 pub fn fine(survey: &Survey, margins: &Margins) -> Vec<Vec<Cell>> {
     let cell = |t: &Tile| Cell { place: t.place, lost: t.asked * t.missing, asked: t.asked };

@@ -75,6 +75,7 @@ fn find(views: &[Vec<Cell>], camera: &Camera, seed: Seed) -> DropoutOutcome {
         fine: views.to_vec(),
         region_given: vec![true; views.len()],
         second: (0..views.len()).map(|v| v % 2 == 1).collect(),
+        expected: None,
     };
     // Eq. 1 without its tilt.
     losses(&seen, &reach, camera, &|z| 0.0015 + 0.00215 * (z - 0.483).powi(2), seed)

@@ -48,6 +48,23 @@ pub fn doubt_beside_the_unexplained(found: &mut [Finding]) {
     }
 }
 
+/// A name that is less probable than that the cause has none is no name: what was found is told as what it
+/// resembles.
+pub fn resembles_only(f: &mut Finding) {
+    let stated: Option<Vec<f64>> = f.alternatives.iter().map(|a| a.probability).collect();
+    let Some((first, all)) = stated.and_then(|p| Some((*p.first()?, p.iter().sum::<f64>()))) else {
+        return;
+    };
+    let named = matches!(f.status, Status::Named | Status::OneOf);
+    if let Some(id) = f.effect.filter(|_| named && first < 1.0 - all) {
+        (f.status, f.effect) = (Status::Unexplained, None);
+        f.parameters.clear();
+        f.physics = physics(f.status, None, f.statistic, f.axis, f.shape.as_deref());
+        let title = effects::find(id).map_or(id, |e| e.card().title);
+        f.physics.push_str(&format!(" It resembles {title}, which is less probable than not."));
+    }
+}
+
 /// Chance that the cause has none of the names, where a name gains `named` nats, the best nameless
 /// curve `curve`, and this share of it is `adequate`.
 pub fn none_of_these(named: f64, curve: f64, adequate: f64) -> f64 {
@@ -155,6 +172,25 @@ mod tests {
         assert!((sure(with(30.0, Statistic::Bias, Axis::Column)) - 0.48).abs() < 1e-12);
         assert_eq!(sure(with(30.0, Statistic::Variance, Axis::Column)), 0.96);
         assert_eq!(sure(with(30.0, Statistic::Bias, Axis::Z)), 0.96);
+    }
+
+    #[test]
+    fn a_name_that_is_less_probable_than_none_is_what_it_resembles() {
+        let of = |p: &[f64]| {
+            let tell = |p: &f64| Alternative { effect: "vignetting", probability: Some(*p) };
+            let mut f = Finding {
+                alternatives: p.iter().map(tell).collect(),
+                ..named("vignetting", Statistic::Variance, Axis::Radius)
+            };
+            resembles_only(&mut f);
+            (f.status, f.effect)
+        };
+        assert_eq!(of(&[0.3, 0.2]), (Status::Unexplained, None));
+        assert_eq!(of(&[0.3, 0.5]), (Status::Named, Some("vignetting")), "some name it has");
+        assert_eq!(of(&[0.6]), (Status::Named, Some("vignetting")));
+        let mut untested = named("vignetting", Statistic::Variance, Axis::Radius);
+        resembles_only(&mut untested);
+        assert_eq!(untested.effect, Some("vignetting"), "no test has weighed it");
     }
 
     /// Twelve nats are 25 = 5^2 times as much information as the unit that is believed at first.

@@ -36,7 +36,11 @@ pub fn texture_findings(
 /// Windows that differ by less than this factor are the same.
 const SAME_WINDOW: f64 = 1.12;
 
-fn window(views: &[Structure], known: &KnownTerms, level: f64) -> Option<TextureFinding> {
+pub(super) fn window(
+    views: &[Structure],
+    known: &KnownTerms,
+    level: f64,
+) -> Option<TextureFinding> {
     let m = ViewMean::of(views, |s| s.window_px.map(f64::ln))?;
     let expected = expected_window(known);
     let length = m.value.exp();

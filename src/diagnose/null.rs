@@ -231,6 +231,7 @@ mod tests {
             level: 0.01,
             prior: 1.0,
             adequacy: 0.6,
+            own_axis_adequacy: 0.0,
             max_terms: 1,
             fixed: None,
             least: 0.0,

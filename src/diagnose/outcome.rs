@@ -17,6 +17,9 @@ pub struct Rules {
     pub prior: f64,
     /// A name must explain this share of what the best curve does.
     pub adequacy: f64,
+    /// And this share of what the best curve on its own axis does: what that one sees beyond is no rest
+    /// of another cause.
+    pub own_axis_adequacy: f64,
     pub max_terms: usize,
     /// Constant error of every pixel, px, and pixels of the picture: a pattern that stands still
     /// in the picture must be larger than what these errors make by chance.

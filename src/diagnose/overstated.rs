@@ -5,7 +5,7 @@
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::case::{Case, ScatterResult};
+use super::case::Case;
 use super::diagnosis::{Finding, Size, Status};
 use super::edges::Edges;
 use super::known::KnownTerms;
@@ -14,6 +14,7 @@ use super::mixture::Mixture;
 use super::other_findings::named;
 use super::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::replication_textures::beyond;
+use super::scatter::ScatterResult;
 use super::shadow::{Sides, largest_share};
 use super::steps::{contradicted, step_nats};
 use super::structure::Structure;

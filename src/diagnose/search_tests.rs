@@ -14,6 +14,7 @@ const RULES: Rules = Rules {
     level: 0.01,
     prior: 1e-6,
     adequacy: 0.7,
+    own_axis_adequacy: 0.0,
     max_terms: 4,
     fixed: None,
     least: 0.0,

@@ -28,13 +28,14 @@ impl Steps {
         recording: &Recording,
     ) -> Self {
         let step_px = lattice.disparity_step_px.unwrap_or(0.0);
+        let own_px = word_px(recording, fields[0].scale_px_m).unwrap_or(0.0);
         // With frames to compare, what stands still is not in the variance.
         let single = fields.iter().all(|f| f.frames.len() < 2);
         let still = if single { fixed_px2(structure) } else { 0.0 };
         Steps {
             depth_px_m2: lattice.depth_step_m.unwrap_or(0.0) * fields[0].scale_px_m,
             // Words of a raw sensor are in the model's variance already.
-            disparity_px: if is_raw(recording) { 0.0 } else { step_px },
+            disparity_px: (step_px.powi(2) - own_px.powi(2)).max(0.0).sqrt(),
             noise_px2: mean_of(structure.iter().filter_map(|s| s.row_px2)) + still,
         }
     }
@@ -44,10 +45,6 @@ impl Steps {
         let depth_px = self.depth_px_m2 / (p.z * p.z);
         (depth_px * depth_px + self.disparity_px.powi(2)) / 12.0 + self.noise_px2
     }
-}
-
-pub(super) fn is_raw(recording: &Recording) -> bool {
-    matches!(recording.sensor.code, DepthCode::Disparity { .. })
 }
 
 pub(super) fn lattice(fields: &[Field], recording: &Recording) -> Quantisation {
@@ -64,14 +61,19 @@ fn lattice_of<'a>(fields: impl Iterator<Item = &'a Field>, recording: &Recording
     words.lattice(&recording.sensor, scale_px_m)
 }
 
+/// A raw word of the disparity, px.
+fn word_px(recording: &Recording, px_m: f64) -> Option<f64> {
+    let DepthCode::Disparity { slope, .. } = recording.sensor.code else { return None };
+    Some((slope * px_m).abs())
+}
+
 /// Steps of two halves that differ by less, as a share, are one: the scan's own error twice.
 const SAME_STEP: f64 = 0.005;
 
 /// The step of a raw recording's own words, px, where that is what is seen: a simulation in the same
 /// words has it too, and sigma holds the error that it makes.
 pub(super) fn own_step(lattice: &Quantisation, recording: &Recording, px_m: f64) -> Option<f64> {
-    let DepthCode::Disparity { slope, .. } = recording.sensor.code else { return None };
-    let word = (slope * px_m).abs();
+    let word = word_px(recording, px_m)?;
     lattice.disparity_step_px.filter(|step| (step / word - 1.0).abs() < SAME_STEP)
 }
 
@@ -179,7 +181,7 @@ pub(super) fn steps(
     let of_disparity = of_disparity.and_then(|step| {
         let sigma = step / 12f64.sqrt() / sigma_px;
         let size = Size { mm: sigma * sigma_mm, sigma };
-        let error = if is_raw(recording) { 0.0 } else { 0.002 * step };
+        let error = 0.002 * step;
         (strongest(fields, |_| step) > STEP_SHARE).then(|| Finding {
             interval: [0.0, 1.0],
             parameters: one("step_px", step, error),

@@ -76,6 +76,11 @@ impl ViewMean {
         let t = (self.value - expected) / self.std_error.max(1e-12 * self.value.abs()).max(1e-300);
         StudentsT::new(0.0, 1.0, self.views - 1.0).map_or(1.0, |d| 1.0 - d.cdf(t)).max(1e-300)
     }
+
+    /// The same below it.
+    pub fn p_below(&self, expected: f64) -> f64 {
+        ViewMean { value: -self.value, ..*self }.p_above(-expected)
+    }
 }
 
 pub fn one(name: &str, value: f64, std_error: f64) -> Map<String, serde_json::Value> {

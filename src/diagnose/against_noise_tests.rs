@@ -1,0 +1,112 @@
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+use crate::plane::Plane;
+use crate::rng::{Seed, Stream};
+
+const VIEWS: usize = 12;
+/// Of a frame's variance, what stands still in a speckle simulator's recordings.
+const STILL: f64 = 0.9;
+const LEVEL: f64 = 1e-3;
+
+/// A view's noise with so much of either part, each measured to a few per cent; with the time between two
+/// frames their likeness falls.
+fn view([still, changing]: [f64; 2], falls: f64, rng: &mut Stream) -> Structure {
+    let mut about = |x: f64, error: f64| -> f64 {
+        let normal: f64 = StandardNormal.sample(rng);
+        x * (error * normal).exp()
+    };
+    let (still, changing) = (about(STILL * still, 0.15), about((1.0 - STILL) * changing, 0.05));
+    let likeness = still / (still + changing);
+    Structure {
+        pixels: 6000.0,
+        variance_px2: 0.01 * (still + changing),
+        lagged: [Some(likeness + about(falls, 0.1)), Some(likeness - about(falls, 0.1)), None],
+        ..Structure::default()
+    }
+}
+
+fn parts(of: [f64; 2], falls: f64, rng: &mut Stream) -> Option<NoiseParts> {
+    let real: Vec<Structure> = (0..VIEWS).map(|_| view(of, falls, rng)).collect();
+    let twins: Vec<Structure> = (0..VIEWS).map(|_| view([1.0; 2], 0.0, rng)).collect();
+    NoiseParts::of(&real, &twins, LEVEL)
+}
+
+/// What the speckle simulator does to either part, read off its recordings: 36 of each cause.
+#[test]
+fn each_cause_changes_the_parts_in_its_own_way() {
+    let table: [(&str, [f64; 2], f64, Option<&[&str]>); 5] = [
+        ("stronger speckle", [1.5, 1.05], 0.0, Some(&["frozen-noise"])),
+        ("a target that moves", [0.5, 5.5], 0.02, Some(&["target-motion"])),
+        ("less light", [1.0, 1.6], 0.0, Some(&[])),
+        ("read noise", [0.95, 2.2], 0.0, Some(&[])),
+        ("more blur", [1.3, 2.0], 0.0, Some(&[])),
+    ];
+    for (what, of, falls, names) in table {
+        let right = (0..40).filter(|seed| {
+            let mut rng = Seed(*seed).stream(what);
+            let found = parts(of, falls, &mut rng).and_then(|p| p.finding(None));
+            found.map(|f| f.families) == names.map(<[&str]>::to_vec)
+        });
+        let right = right.count();
+        assert!(right >= 37, "{what}: {right} of 40");
+    }
+}
+
+#[test]
+fn a_larger_window_shrinks_both_parts_alike_and_the_same_sensor_neither() {
+    let (mut shrunk, mut said) = (0, 0);
+    for seed in 0..200 {
+        let mut rng = Seed(seed).stream("against/window");
+        shrunk += usize::from(parts([0.65; 2], 0.0, &mut rng).is_some_and(|p| p.shrink_alike()));
+        let same = parts([1.0; 2], 0.0, &mut rng);
+        said += usize::from(same.is_some_and(|p| p.shrink_alike() || p.finding(None).is_some()));
+    }
+    assert!(shrunk >= 190, "{shrunk} of 200");
+    // Four tails at 1e-3 each: 0.8 of 200 are expected, more than 4 have a chance of 0.2 %.
+    assert!(said <= 4, "{said} of 200 clean ones");
+}
+
+/// Views of one pixel, of which the first ones' infrared images are lighter by `more`.
+fn lit(more: f64, rng: &mut Stream) -> [Vec<Field>; 2] {
+    let field = |z: f64, infrared: f64| Field {
+        infrared: Some(infrared),
+        light: vec![(infrared * z * z) as f32],
+        ..Field::unseen(Plane::tilted(z, 0.0, 0.0), 43.5, [1, 1], vec![0])
+    };
+    let mut pair = |k: usize| {
+        let z = 0.9 + 0.15 * k as f64;
+        let mut about = |x: f64| -> f64 {
+            let normal: f64 = StandardNormal.sample(rng);
+            x * (1.0 + 0.01 * normal)
+        };
+        // The image has an offset of its own.
+        let pattern = 50.0 + 150.0 / (z * z);
+        [field(z, about(pattern + more)), field(z, about(pattern))]
+    };
+    let pairs: Vec<[Field; 2]> = (0..VIEWS).map(&mut pair).collect();
+    let side = |k: usize| pairs.iter().map(|p| p[k].clone()).collect();
+    [side(0), side(1)]
+}
+
+#[test]
+fn light_of_the_room_is_a_constant_and_a_brighter_pattern_is_a_factor() {
+    for seed in 0..40 {
+        let mut rng = Seed(seed).stream("against/light");
+        let [real, twins] = lit(60.0, &mut rng);
+        let found = ambient_light(&real, &twins, LEVEL).expect("60 more everywhere");
+        assert_eq!(found.families, ["ambient-light"]);
+        let ratio = found.parameters["ratio"]["value"].as_f64().unwrap();
+        // 200 at 1 m, the offset among them.
+        assert!((ratio - 0.25).abs() < 0.1, "{ratio}");
+        let [real, twins] = lit(0.0, &mut rng);
+        assert!(ambient_light(&real, &twins, LEVEL).is_none());
+        let dimmer: Vec<Field> = twins
+            .iter()
+            .map(|f| Field { infrared: f.infrared.map(|i| 50.0 + 0.4 * (i - 50.0)), ..f.clone() })
+            .collect();
+        assert!(ambient_light(&dimmer, &twins, LEVEL).is_none(), "a dimmer pattern");
+        assert!(ambient_light(&twins, &dimmer, LEVEL).is_none(), "a brighter one");
+        assert!(ambient_light(&real[..3], &twins[..3], LEVEL).is_none(), "three views");
+    }
+}
