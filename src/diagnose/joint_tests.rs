@@ -56,7 +56,6 @@ fn term(family: Option<&'static str>, basis: Basis) -> Chosen {
         candidate: Candidate { family, basis, flat: None },
         rms: 0.1,
         adequacy: 0.6,
-        own_axis_adequacy: 0.0,
         gain: 1.0,
         best_curve: 1.0,
         rivals: Vec::new(),
