@@ -15,7 +15,7 @@ use super::in_time::{later, of_any_two};
 use super::structure::Structure;
 use super::texture_finding::{TextureFinding, ViewMean, nats, one};
 use crate::solve::fit_by_svd;
-use crate::stats::range;
+use crate::stats::{mean as mean_of_all, range};
 use crate::terms::{Axis, ROOM_LUX, Statistic};
 
 /// That the noise differs is known by then: a sign of why need be no surer than this.
@@ -30,7 +30,7 @@ struct View {
     changing: f64,
     /// Variance over the simulated one's, less one.
     total: f64,
-    /// How much the correlation of two frames falls with the time between them.
+    /// How much more the correlation of two frames falls with the time between them.
     falls: f64,
     /// Of this view's variance, what stands still.
     share: f64,
@@ -40,16 +40,20 @@ struct View {
 impl View {
     fn of(real: &Structure, twin: &Structure) -> Option<Self> {
         let parts = |s: &Structure| {
-            let still = of_any_two(s).filter(|c| (MIN_PART..1.0 - MIN_PART).contains(c))?;
-            Some([still * s.variance_px2, (1.0 - still) * s.variance_px2])
+            // What stands still in every view is a pattern of the sensor's.
+            let fixed = s.fixed_px2.unwrap_or(0.0).max(0.0) / s.variance_px2.max(1e-12);
+            let all = of_any_two(s).filter(|c| (MIN_PART..1.0 - MIN_PART).contains(c))?;
+            let still = Some(all - fixed).filter(|still| *still > MIN_PART)?;
+            Some([still * s.variance_px2, (1.0 - all) * s.variance_px2])
         };
+        let fall = |s: &Structure| Some(s.lagged[0]? - later(s)?);
         let (ours, theirs) = (parts(real)?, parts(twin)?);
         Some(View {
             still: (ours[0] / theirs[0]).ln(),
             changing: (ours[1] / theirs[1]).ln(),
             total: real.variance_px2 / twin.variance_px2 - 1.0,
-            falls: real.lagged[0]? - later(real).unwrap_or(f64::NAN),
-            share: of_any_two(real)?,
+            falls: fall(real).zip(fall(twin)).map_or(f64::NAN, |(r, t)| r - t),
+            share: ours[0] / real.variance_px2,
             pixels: real.pixels,
         })
     }
@@ -111,7 +115,7 @@ impl NoiseParts {
             });
         }
         // Blur and steps make more of both, and more so of what changes.
-        if self.up(&self.still) && self.apart.value > 0.0 {
+        if self.up(&self.still) && self.apart.p_above(0.0) < NAMED_LEVEL {
             return Some(TextureFinding {
                 families: vec!["frozen-noise"],
                 statistic: Statistic::Correlation,
@@ -137,7 +141,7 @@ impl NoiseParts {
                 .fold(1.0, f64::min),
             nats: nats(&self.changing, 0.0).max(nats(&self.still, 0.0)),
             words: Some(words),
-            ..self.texture(Axis::Z)
+            ..self.texture(Axis::Frame)
         })
     }
 
@@ -176,72 +180,82 @@ impl Baseline {
         level: f64,
     ) -> Vec<TextureFinding> {
         let light = ambient_light(fields, &self.fields, level);
-        let reach = range(fields.iter().map(|f| f.plane.depth(0.0, 0.0)));
         // Light of the room is more noise of the image itself.
         let of_light = |f: &TextureFinding| light.is_some() && f.families.is_empty();
         let noise = parts.and_then(|p| p.finding(velocity(real))).filter(|f| !of_light(f));
-        let told = noise.map(|found| {
-            let interval = if found.axis == Axis::Z { reach } else { found.interval };
-            TextureFinding { interval, ..found }
-        });
-        told.into_iter().chain(light).collect()
+        noise.into_iter().chain(light).collect()
     }
 }
 
 /// A line through fewer has next to no error to be judged by.
 const MIN_LIT_VIEWS: usize = 4;
 
+/// One recording's light over the other's, view by view: a line.
+struct LightLine {
+    /// Its height less the other's at the darkest view, and where the other has no light.
+    lift: ViewMean,
+    at_no_light: ViewMean,
+    slope: f64,
+}
+
+impl LightLine {
+    /// Of pairs [other, one].
+    fn of(pairs: &[[f64; 2]]) -> Option<Self> {
+        let n = pairs.len();
+        if n < MIN_LIT_VIEWS {
+            return None;
+        }
+        let [darkest, _] = range(pairs.iter().map(|p| p[0]));
+        // Errors are shares of the light.
+        let x = DMatrix::from_fn(n, 2, |i, k| [1.0, pairs[i][0] - darkest][k] / pairs[i][0]);
+        let y = DVector::from_fn(n, |i, _| pairs[i][1] / pairs[i][0]);
+        let (line, rank) = fit_by_svd(&x, &y)?;
+        if rank < 2 {
+            return None;
+        }
+        let left = (&y - &x * &line).norm_squared() / (n - 2) as f64;
+        let covariance = (x.transpose() * &x).try_inverse()? * left;
+        let mean = |at: f64, height: f64| {
+            let variance =
+                covariance[(0, 0)] + at * (at * covariance[(1, 1)] - 2.0 * covariance[(0, 1)]);
+            ViewMean { value: height, std_error: variance.sqrt(), views: n as f64 - 1.0 }
+        };
+        Some(LightLine {
+            lift: mean(0.0, line[0] - darkest),
+            at_no_light: mean(darkest, line[0] - darkest * line[1]),
+            slope: line[1],
+        })
+    }
+}
+
 /// Light of the room: the infrared images are lighter than the simulated ones by a constant, in the darkest
-/// view as in the lightest. More or less light of the pattern would be a factor.
+/// view as in the lightest. More or less light of the pattern would be a factor. Poses that differ a little
+/// make either line flatter than it is, so that both must say so.
 fn ambient_light(real: &[Field], twins: &[Field], level: f64) -> Option<TextureFinding> {
-    let pairs: Vec<[f64; 2]> = real
-        .iter()
-        .zip(twins)
-        .filter_map(|(r, t)| Some([r.infrared?, t.infrared?]))
-        .filter(|[r, t]| *r > 0.0 && *t > 0.0)
-        .collect();
-    let n = pairs.len();
-    if n < MIN_LIT_VIEWS {
+    let lit = real.iter().zip(twins).filter_map(|(r, t)| Some([t.infrared?, r.infrared?]));
+    let pairs: Vec<[f64; 2]> = lit.filter(|p| p[0] > 0.0 && p[1] > 0.0).collect();
+    let swapped: Vec<[f64; 2]> = pairs.iter().map(|p| [p[1], p[0]]).collect();
+    let LightLine { lift, at_no_light, slope } = LightLine::of(&pairs)?;
+    let other_way = LightLine::of(&swapped)?.at_no_light.p_below(0.0);
+    let p = lift.p_above(0.0).max(at_no_light.p_above(0.0)).max(other_way);
+    if p >= level || slope <= 0.0 {
         return None;
     }
-    let darkest = pairs.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
-    // Errors are shares of the light. The line's height is that at the darkest view.
-    let x = DMatrix::from_fn(n, 2, |i, k| [1.0, pairs[i][1] - darkest][k] / pairs[i][1]);
-    let y = DVector::from_fn(n, |i, _| pairs[i][0] / pairs[i][1]);
-    let (line, rank) = fit_by_svd(&x, &y)?;
-    if rank < 2 {
-        return None;
-    }
-    let left = (&y - &x * &line).norm_squared() / (n - 2) as f64;
-    let covariance = (x.transpose() * &x).try_inverse()? * left;
-    let views = n as f64 - 1.0;
-    let mean = |value: f64, variance: f64| ViewMean { value, std_error: variance.sqrt(), views };
-    let lift = mean(line[0] - darkest, covariance[(0, 0)]);
-    let at_no_light = mean(
-        line[0] - darkest * line[1],
-        covariance[(0, 0)] + darkest.powi(2) * covariance[(1, 1)]
-            - 2.0 * darkest * covariance[(0, 1)],
-    );
-    let p = lift.p_above(0.0).max(at_no_light.p_above(0.0));
-    if p >= level {
-        return None;
-    }
-    // Over the pattern's on a surface that faces the sensor at 1 m.
-    let at_1m = |f: &Field| f.pattern_at_1m().zip(Some(f.ambient_lux.unwrap_or(ROOM_LUX)));
-    let ratios = twins
-        .iter()
-        .filter_map(|f| at_1m(f))
-        .map(|(light, lux)| at_no_light.value / light * ROOM_LUX / lux.max(1.0));
-    let ratio = crate::stats::mean(ratios)?;
+    // Over the pattern's on a surface that faces the sensor at 1 m, by the lux of the real room.
+    let ratios = real.iter().zip(twins).filter_map(|(r, t)| {
+        let lux = r.ambient_lux.unwrap_or(ROOM_LUX).max(1.0);
+        Some(at_no_light.value / (slope * t.pattern_at_1m()?) * ROOM_LUX / lux)
+    });
+    let ratio = mean_of_all(ratios)?;
     Some(TextureFinding {
         families: vec!["ambient-light"],
         statistic: Statistic::Variance,
         axis: Axis::Intensity,
-        interval: range(pairs.iter().map(|p| p[0])),
-        parameters: one("ratio", ratio, ratio * lift.std_error / lift.value),
+        interval: range(pairs.iter().map(|p| p[1])),
+        parameters: one("ratio", ratio, ratio * at_no_light.std_error / at_no_light.value),
         size_sigma: 0.0,
         p,
-        nats: nats(&lift, 0.0),
+        nats: nats(&lift, 0.0).min(nats(&at_no_light, 0.0)),
         words: None,
     })
 }

@@ -35,12 +35,13 @@ fn parts(of: [f64; 2], falls: f64, rng: &mut Stream) -> Option<NoiseParts> {
 /// What the speckle simulator does to either part, read off its recordings: 36 of each cause.
 #[test]
 fn each_cause_changes_the_parts_in_its_own_way() {
-    let table: [(&str, [f64; 2], f64, Option<&[&str]>); 5] = [
+    let table: [(&str, [f64; 2], f64, Option<&[&str]>); 6] = [
         ("stronger speckle", [1.5, 1.05], 0.0, Some(&["frozen-noise"])),
         ("a target that moves", [0.5, 5.5], 0.02, Some(&["target-motion"])),
         ("less light", [1.0, 1.6], 0.0, Some(&[])),
         ("read noise", [0.95, 2.2], 0.0, Some(&[])),
         ("more blur", [1.3, 2.0], 0.0, Some(&[])),
+        ("a smaller window", [1.5, 1.5], 0.0, Some(&[])),
     ];
     for (what, of, falls, names) in table {
         let right = (0..40).filter(|seed| {
@@ -67,18 +68,19 @@ fn a_larger_window_shrinks_both_parts_alike_and_the_same_sensor_neither() {
     assert!(said <= 4, "{said} of 200 clean ones");
 }
 
-/// Views of one pixel, of which the first ones' infrared images are lighter by `more`.
-fn lit(more: f64, rng: &mut Stream) -> [Vec<Field>; 2] {
+/// Views of one pixel from 0.9 m on, in steps of `apart`; the real ones' infrared images are lighter by `more`,
+/// and each is off by the share `error`.
+fn lit(more: f64, apart: f64, error: f64, rng: &mut Stream) -> [Vec<Field>; 2] {
     let field = |z: f64, infrared: f64| Field {
         infrared: Some(infrared),
         light: vec![(infrared * z * z) as f32],
         ..Field::unseen(Plane::tilted(z, 0.0, 0.0), 43.5, [1, 1], vec![0])
     };
     let mut pair = |k: usize| {
-        let z = 0.9 + 0.15 * k as f64;
+        let z = 0.9 + apart * k as f64;
         let mut about = |x: f64| -> f64 {
             let normal: f64 = StandardNormal.sample(rng);
-            x * (1.0 + 0.01 * normal)
+            x * (1.0 + error * normal)
         };
         // The image has an offset of its own.
         let pattern = 50.0 + 150.0 / (z * z);
@@ -93,13 +95,13 @@ fn lit(more: f64, rng: &mut Stream) -> [Vec<Field>; 2] {
 fn light_of_the_room_is_a_constant_and_a_brighter_pattern_is_a_factor() {
     for seed in 0..40 {
         let mut rng = Seed(seed).stream("against/light");
-        let [real, twins] = lit(60.0, &mut rng);
+        let [real, twins] = lit(60.0, 0.15, 0.01, &mut rng);
         let found = ambient_light(&real, &twins, LEVEL).expect("60 more everywhere");
         assert_eq!(found.families, ["ambient-light"]);
         let ratio = found.parameters["ratio"]["value"].as_f64().unwrap();
         // 200 at 1 m, the offset among them.
         assert!((ratio - 0.25).abs() < 0.1, "{ratio}");
-        let [real, twins] = lit(0.0, &mut rng);
+        let [real, twins] = lit(0.0, 0.15, 0.01, &mut rng);
         assert!(ambient_light(&real, &twins, LEVEL).is_none());
         let dimmer: Vec<Field> = twins
             .iter()
@@ -109,4 +111,16 @@ fn light_of_the_room_is_a_constant_and_a_brighter_pattern_is_a_factor() {
         assert!(ambient_light(&twins, &dimmer, LEVEL).is_none(), "a brighter one");
         assert!(ambient_light(&real[..3], &twins[..3], LEVEL).is_none(), "three views");
     }
+}
+
+/// Views about equally light whose poses differ by a tenth: the line is flat, and no light of the room.
+#[test]
+fn views_that_are_alike_show_no_light_of_the_room() {
+    let said = (0..200).filter(|seed| {
+        let mut rng = Seed(*seed).stream("against/alike");
+        let [real, twins] = lit(0.0, 0.015, 0.1, &mut rng);
+        ambient_light(&real, &twins, LEVEL).is_some()
+    });
+    let said = said.count();
+    assert!(said <= 2, "{said} of 200");
 }

@@ -114,8 +114,9 @@ impl Choice<'_> {
             .filter(|&i| {
                 let axis = |k: usize| self.candidates[k].basis.axis();
                 let own = curves.iter().copied().find(|&k| axis(k) == axis(i));
-                let least = own.map_or(0.0, |k| self.rules.own_axis_adequacy * self.total(k));
-                // Some ride on an error of their axis that is another's.
+                let least =
+                    own.map_or(0.0, |k| self.rules.own_axis_adequacy * self.total(k).max(0.0));
+                // A name with a lower share of its own may ride on another cause's error.
                 let alone = self.adequacy(i) >= self.rules.adequacy;
                 !alone || self.total(i) > least
             })

@@ -122,12 +122,13 @@ pub fn steps_of_depths(words: &[(usize, f64)]) -> Comb {
 /// Finest and coarsest steps looked for in raw words, in words: of a finer one only every eighth word or
 /// fewer would be empty.
 const STEPS_WORDS: [f64; 2] = [1.15, 16.0];
-/// So many words in the middle of those that occur are enough, and are scanned by this share of a cycle.
+/// So many words in the middle of those that occur are enough; a scan goes on by this share of a step over
+/// their range.
 const WORDS_SCANNED: usize = 256;
-const WORD_PHASE_STEP: f64 = 0.02;
+const WORD_PHASE_STEP: f64 = 0.04;
 /// Share of the readings, by the roots of their counts, that may lie in words that ought to be empty.
 const STRAY: f64 = 0.05;
-/// A chance beyond this is none.
+/// Steps whose chance is larger are not told.
 const CHANCE: f64 = 1e-4;
 
 /// Steps of a matcher whose answers are stored in the nearest words, which leaves words between them
@@ -136,10 +137,10 @@ pub fn steps_of_words(words: &[(usize, f64)]) -> Option<(f64, f64)> {
     let middle = words[words.len() / 2].0;
     let near = words.iter().filter(|w| w.0.abs_diff(middle) <= WORDS_SCANNED / 2);
     let near: Vec<(f64, f64)> = near.map(|&(w, n)| (w as f64, n.sqrt())).collect();
-    let by = WORD_PHASE_STEP / (near[near.len() - 1].0 - near[0].0).max(1.0);
-    let scan = |k: usize| 1.0 / STEPS_WORDS[1] + k as f64 * by;
-    let tries = ((1.0 / STEPS_WORDS[0] - scan(0)) / by) as usize;
-    let holds = |k: &usize| most_within(&near, scan(*k)) >= 1.0 - STRAY;
+    let ratio = 1.0 + WORD_PHASE_STEP / (near[near.len() - 1].0 - near[0].0).max(1.0);
+    let scan = |k: usize| ratio.powi(k as i32) / STEPS_WORDS[1];
+    let tries = ((STEPS_WORDS[1] / STEPS_WORDS[0]).ln() / ratio.ln()) as usize;
+    let holds = |k: &usize| max_within(&near, scan(*k)) >= 1.0 - STRAY;
     let first = (0..tries).find(holds)?;
     let last = (first..tries).take_while(holds).last()?;
     let frequency = 0.5 * (scan(first) + scan(last));
@@ -151,8 +152,8 @@ pub fn steps_of_words(words: &[(usize, f64)]) -> Option<(f64, f64)> {
 
 /// The greatest share of the places' weights whose phases an arc holds that is not quite as long as a word:
 /// of evenly spread phases a whole one holds one too many.
-fn most_within(places: &[(f64, f64)], frequency: f64) -> f64 {
-    let arc = frequency - 0.5 * WORD_PHASE_STEP;
+fn max_within(places: &[(f64, f64)], frequency: f64) -> f64 {
+    let arc = frequency * (1.0 - 0.5 * WORD_PHASE_STEP);
     let mut phases: Vec<(f64, f64)> =
         places.iter().map(|&(x, weight)| ((x * frequency).fract(), weight)).collect();
     phases.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -98,7 +98,12 @@ impl RawHistogram {
             DepthCode::Disparity { slope, .. } => {
                 // Words are the lattice; what is left to see is whether a coarser one leaves some empty.
                 let word_px = slope.abs() * scale_px_m;
-                let coarser = steps_of_words(&words);
+                let stride = words.iter().fold(0, |g, (w, _)| gcd(g, w - words[0].0));
+                let coarser = if stride > 1 {
+                    Some((stride as f64, all_multiples(stride, words.len() - 1)))
+                } else {
+                    steps_of_words(&words)
+                };
                 Quantisation {
                     disparity_step_px: Some(coarser.map_or(1.0, |c| c.0) * word_px),
                     disparity_p: coarser.map(|c| c.1),
@@ -195,7 +200,7 @@ mod tests {
         words
     }
 
-    /// A matcher's steps of 1.28 to 2.67 words, each in the word nearest to it, and its own words.
+    /// A matcher's steps of 1.28 to 13.4 words, each in the word nearest to it, and its own words.
     #[test]
     fn raw_words_show_steps_that_are_no_whole_number_of_them() {
         let word_px = 0.125;
@@ -215,7 +220,7 @@ mod tests {
             }
             words.lattice(&sensor, 43.5)
         };
-        for step_px in [0.16, 0.2, 0.25, 1.0 / 3.0, 0.5] {
+        for step_px in [0.16, 0.2, 0.25, 1.0 / 3.0, 0.5, 0.9125, 1.2125, 1.675] {
             let found = found(step_px);
             let step = found.disparity_step_px.expect("a step");
             assert!((step / step_px - 1.0).abs() < 5e-3, "{step_px}: {found:?}");

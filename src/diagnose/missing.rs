@@ -9,6 +9,7 @@ use serde_json::{Map, Value, json};
 use super::diagnosis::{Curve, Detectable};
 use super::few_losses::few_losses;
 use super::field::Field;
+use super::hard_end::{HardEnd, blur};
 use super::layers::Survey;
 use super::margins::Margins;
 use super::missing_cells::{Cell, cells, expected, fine, rim_px};
@@ -18,7 +19,6 @@ use super::missing_shapes::{Step, curves, steps};
 use super::replication::agree;
 use super::shadow::{Band, Sides, band};
 use super::texture_finding::ViewMean;
-use super::tiles::Tile;
 use crate::camera::Camera;
 use crate::rng::Seed;
 use crate::terms::{Axis, Basis, Extent};
@@ -194,68 +194,13 @@ fn losses(
         }
     }
     if outcome.findings.is_empty()
+        // Counts are not compared with a twin's.
         && seen.expected.is_none()
         && let Some((foot, p)) = few_losses(&seen.fine, rim_px(camera), reach, LEVEL, seed)
     {
         outcome.findings.push(reporter(0.0).finding(&foot, rivals(std::slice::from_ref(&foot)), p));
     }
     outcome
-}
-
-/// An edge narrower than this share of its distance, or than the noise there, is a limit that a driver
-/// or a format has set (the noise blurs it so); a pattern that grows faint goes gradually.
-const HARD_END_SHARE: f64 = 0.01;
-/// Widths by which the views reach beyond an edge that is known as a whole.
-const PASSED: f64 = 5.0;
-/// One that is hardly reached must be narrower by so many standard errors, which hold the doubt about
-/// the form of its rise as well.
-const SURE_WIDTH_ERRORS: f64 = 1.0;
-/// Widths of an edge within which patches feel it: 2 % are lost there.
-const FELT: f64 = 4.0;
-
-/// Beyond it (or before it) all is missing.
-struct HardEnd {
-    z_m: f64,
-    /// Negative where what is nearer is lost.
-    width_m: f64,
-}
-
-impl HardEnd {
-    fn of(finding: &DropoutFinding, blur: &dyn Fn(f64) -> f64) -> Option<Self> {
-        if finding.family != Some("range-dropout") || finding.parameters.contains_key("share") {
-            return None;
-        }
-        let value = |name: &str, of: &str| finding.parameters.get(name)?.get(of)?.as_f64();
-        let (z_m, width_m) = (value("z50_m", "value")?, value("width_m", "value")?);
-        let error = value("width_m", "std_error")?;
-        let limit = f64::max(HARD_END_SHARE * z_m, blur(z_m));
-        let end = finding.interval[usize::from(width_m > 0.0)];
-        let doubt = if (end - z_m) / width_m > PASSED { 0.0 } else { SURE_WIDTH_ERRORS * error };
-        (width_m.abs() + doubt < limit).then_some(HardEnd { z_m, width_m })
-    }
-
-    fn touches(&self, cell: &Cell) -> bool {
-        let far = cell.place.slope[0].abs() + cell.place.slope[1].abs();
-        let half = 0.5 * cell.place.side * far / cell.place.disparity * cell.place.z;
-        let past = (cell.place.z - self.z_m) * self.width_m.signum();
-        past + half > -FELT * self.width_m.abs()
-    }
-
-    fn note(&self) -> String {
-        let side = if self.width_m > 0.0 { "beyond" } else { "nearer than" };
-        format!(
-            "readings {side} {:.2} m are missing: the range has a hard end there, set by the sensor's driver or format",
-            self.z_m
-        )
-    }
-}
-
-/// Standard deviation of the depth, by the model, where the views come nearest to `z`, m.
-fn blur(survey: &Survey, z: f64) -> f64 {
-    let tiles = survey.views.iter().flat_map(|v| v.tiles.iter());
-    let away = |t: &&Tile| (t.place.z - z).abs();
-    let nearest = tiles.min_by(|a, b| away(a).total_cmp(&away(b)));
-    nearest.map_or(0.0, |t| t.variance.sqrt() / t.place.disparity * z)
 }
 
 /// Do the shadows of both halves have the same share of the expected width?

@@ -30,6 +30,7 @@ mod findings;
 mod form;
 mod frame_means;
 mod frames;
+mod hard_end;
 mod heldout;
 mod in_time;
 mod joint;

@@ -48,15 +48,15 @@ pub fn doubt_beside_the_unexplained(found: &mut [Finding]) {
     }
 }
 
-/// A name that is less probable than that the cause has none is no name: what was found is told as what it
-/// resembles.
+/// A name that is less probable than that the cause has none of those told is no name: what was found is
+/// told as what it resembles.
 pub fn resembles_only(f: &mut Finding) {
     let stated: Option<Vec<f64>> = f.alternatives.iter().map(|a| a.probability).collect();
-    let Some((first, all)) = stated.and_then(|p| Some((*p.first()?, p.iter().sum::<f64>()))) else {
-        return;
-    };
+    let own =
+        f.alternatives.iter().find(|a| Some(a.effect) == f.effect).and_then(|a| a.probability);
+    let Some((own, all)) = own.zip(stated.map(|p| p.iter().sum::<f64>())) else { return };
     let named = matches!(f.status, Status::Named | Status::OneOf);
-    if let Some(id) = f.effect.filter(|_| named && first < 1.0 - all) {
+    if let Some(id) = f.effect.filter(|_| named && own < 1.0 - all) {
         (f.status, f.effect) = (Status::Unexplained, None);
         f.parameters.clear();
         f.physics = physics(f.status, None, f.statistic, f.axis, f.shape.as_deref());

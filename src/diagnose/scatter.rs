@@ -12,7 +12,7 @@ use super::tails::{Confusers, tails};
 use super::texture_finding::TextureFinding;
 use crate::terms::{Axis, Basis, PixelContext, Statistic, Term};
 
-/// What scatters about it.
+/// What scatters about the mean.
 pub struct ScatterResult {
     /// One number of each kind a view.
     pub structure: Vec<Structure>,
@@ -77,7 +77,7 @@ impl Case<'_> {
         ScatterResult { structure, lattice, textures, tails, outcome }
     }
 
-    /// How the noise hangs together, where a simulation takes the model's place beyond that one's.
+    /// How the noise hangs together; against a simulation, what goes beyond the simulation's.
     fn textures(
         &mut self,
         structure: &mut [Structure],
@@ -94,7 +94,12 @@ impl Case<'_> {
             of_parts = baseline.noise_findings(parts.as_ref(), structure, &self.fields, each);
             baseline.compare(structure, lattice, &mut self.known);
             if let Some(found) = found {
-                of_parts.retain(|h| !h.families.iter().any(|id| found.has(id)));
+                // The extended model has it, under its name or in its size.
+                let held = |h: &TextureFinding| {
+                    let nameless = h.families.is_empty() && !found.variance.is_empty();
+                    nameless || h.families.iter().any(|id| found.has(id))
+                };
+                of_parts.retain(|h| !held(h));
                 self.known.overrule(&found);
             }
         }

@@ -29,13 +29,20 @@ impl Steps {
     ) -> Self {
         let step_px = lattice.disparity_step_px.unwrap_or(0.0);
         let own_px = word_px(recording, fields[0].scale_px_m).unwrap_or(0.0);
+        let words = step_px / own_px;
+        let whole = own_px > 0.0 && (words.round() / words - 1.0).abs() < SAME_STEP;
         // With frames to compare, what stands still is not in the variance.
         let single = fields.iter().all(|f| f.frames.len() < 2);
         let still = if single { fixed_px2(structure) } else { 0.0 };
         Steps {
             depth_px_m2: lattice.depth_step_m.unwrap_or(0.0) * fields[0].scale_px_m,
-            // Words of a raw sensor are in the model's variance already.
-            disparity_px: (step_px.powi(2) - own_px.powi(2)).max(0.0).sqrt(),
+            // Words of a raw sensor are in the model's variance already. A step that is no whole number
+            // of them is rounded twice.
+            disparity_px: if whole {
+                (step_px.powi(2) - own_px.powi(2)).max(0.0).sqrt()
+            } else {
+                step_px
+            },
             noise_px2: mean_of(structure.iter().filter_map(|s| s.row_px2)) + still,
         }
     }
