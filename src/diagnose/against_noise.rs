@@ -111,7 +111,7 @@ impl NoiseParts {
                 parameters: velocity.map_or_else(Map::new, |v| one("velocity_mps", v.0, v.1)),
                 p: self.still.p_below(0.0).max(self.changing.p_above(0.0)),
                 nats: nats(&self.still, 0.0) + nats(&self.changing, 0.0),
-                ..self.texture(Axis::Frame)
+                ..self.texture()
             });
         }
         // Blur and steps make more of both, and more so of what changes.
@@ -123,7 +123,7 @@ impl NoiseParts {
                     .map_or_else(Map::new, |m| one("fraction", m.value, m.std_error)),
                 p: self.still.p_above(0.0),
                 nats: nats(&self.still, 0.0),
-                ..self.texture(Axis::Frame)
+                ..self.texture()
             });
         }
         let differs = [&self.still, &self.changing].map(|m| self.up(m) || self.down(m));
@@ -141,15 +141,15 @@ impl NoiseParts {
                 .fold(1.0, f64::min),
             nats: nats(&self.changing, 0.0).max(nats(&self.still, 0.0)),
             words: Some(words),
-            ..self.texture(Axis::Frame)
+            ..self.texture()
         })
     }
 
-    fn texture(&self, axis: Axis) -> TextureFinding {
+    fn texture(&self) -> TextureFinding {
         TextureFinding {
             families: Vec::new(),
             statistic: Statistic::Variance,
-            axis,
+            axis: Axis::Frame,
             interval: [0.0, 0.0],
             parameters: Map::new(),
             size_sigma: self.size_sigma(),

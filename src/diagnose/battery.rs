@@ -13,7 +13,7 @@ use super::form::better_form;
 use super::lines::lines;
 use super::missing::{self, DropoutOutcome, missing};
 use super::mixing::mixing;
-use super::naming::{doubt_beside_the_unexplained, physics, resembles_only, temper};
+use super::naming::{doubt_beside_the_unexplained, resembles_only, temper, unname};
 use super::next_view;
 use super::other_findings;
 use super::outcome::Outcome;
@@ -62,9 +62,7 @@ fn forget_impossible(found: &mut [Finding], kind: Option<SensorKind>) {
     for f in found {
         f.alternatives.retain(|a| can_happen(a.effect, kind));
         if f.effect.is_some_and(|id| !can_happen(id, kind)) {
-            (f.effect, f.status) = (None, Status::Unexplained);
-            f.parameters.clear();
-            f.physics = physics(f.status, None, f.statistic, f.axis, None);
+            unname(f);
         }
     }
 }

@@ -48,6 +48,13 @@ pub fn doubt_beside_the_unexplained(found: &mut [Finding]) {
     }
 }
 
+/// What was found, without the name it had.
+pub fn unname(f: &mut Finding) {
+    (f.status, f.effect) = (Status::Unexplained, None);
+    f.parameters.clear();
+    f.physics = physics(f.status, None, f.statistic, f.axis, None);
+}
+
 /// A name that is less probable than that the cause has none of those told is no name: what was found is
 /// told as what it resembles.
 pub fn resembles_only(f: &mut Finding) {
@@ -57,9 +64,7 @@ pub fn resembles_only(f: &mut Finding) {
     let Some((own, all)) = own.zip(stated.map(|p| p.iter().sum::<f64>())) else { return };
     let named = matches!(f.status, Status::Named | Status::OneOf);
     if let Some(id) = f.effect.filter(|_| named && own < 1.0 - all) {
-        (f.status, f.effect) = (Status::Unexplained, None);
-        f.parameters.clear();
-        f.physics = physics(f.status, None, f.statistic, f.axis, f.shape.as_deref());
+        unname(f);
         let title = effects::find(id).map_or(id, |e| e.card().title);
         f.physics.push_str(&format!(" It resembles {title}, which is less probable than not."));
     }
