@@ -20,6 +20,11 @@ pub struct Family {
 }
 
 impl Family {
+    /// The usual size of what has the same disparity at all distances, px.
+    pub fn still_px(&self) -> f64 {
+        if self.power == 0.0 { self.usual } else { 0.0 }
+    }
+
     /// What its constant, of the usual size, makes of a distance, m.
     pub fn moves_m(&self, c: &ReferencedView) -> f64 {
         let disparity = c.px_m / c.z;

@@ -27,7 +27,7 @@ use super::steps::{COARSE_SIGMAS, own_step, own_step_note, steps};
 use super::tails::EXCESS;
 use super::texture_finding::TextureFinding;
 use super::variance;
-use super::verdict::{MIN_SIZE, echoes, fold_into_sigma, merge, symptoms};
+use super::verdict::{MIN_SIZE, echoes, fold_into_sigma, forget_noise_of_frames, merge, symptoms};
 use crate::sensors::SensorKind;
 use crate::terms::{Axis, Statistic, corner_radius};
 
@@ -98,6 +98,7 @@ impl Case<'_> {
         curves.retain(|f| self.is_news(f, &scatter));
         if self.baseline.is_none() {
             fold_into_sigma(&mut curves);
+            forget_noise_of_frames(&mut curves, &textures);
         }
         // Nats, as long as they are not shares.
         let clear = scatter.outcome.noise.threshold(self.options.level);

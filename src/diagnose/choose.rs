@@ -31,8 +31,14 @@ impl Choice<'_> {
             !chosen.iter().any(|c| same_curve(&c.candidate, &self.candidates[i]))
                 && self.is_sensible(i)
         };
-        let curve =
-            || curves.iter().copied().find(|&i| self.calibrated_gain(i) > threshold && new(i));
+        let by = |i: usize| match self.rules.agreed {
+            true => self.dispersion_corrected_gain(i),
+            false => self.total(i),
+        };
+        let curve = || {
+            let told = |&i: &usize| self.calibrated_gain(i) > threshold && new(i);
+            self.ranked(false, by).into_iter().find(told)
+        };
         let winner = self.name(&families, &curves).or_else(curve)?;
         Some(Chosen {
             candidate: self.candidates[winner].clone(),

@@ -1,7 +1,7 @@
 //! What shows in a few of the views and not in the others.
 //!
 //! A fit to all views says nothing of a cause that some of them have: the others outvote it. So each
-//! candidate is also fitted to the views that show it best, one, two, up to a third of them, and pays
+//! candidate is also fitted to the views that show it best, one, two, up to nearly half of them, and pays
 //! for the choice: the logarithm of how many such sets there are.
 
 use nalgebra::{DMatrix, DVector};
@@ -17,7 +17,7 @@ use super::naming::physics;
 use super::noise_gains::{MIN_EXCESS, NoiseGains};
 use super::other_findings::named;
 use super::outcome::{Outcome, Rules};
-use super::prepared::{evidence_of_bases, without};
+use super::prepared::{together, without};
 use super::samples::{ViewData, coarser};
 use super::scene::{Scene, size};
 use super::tiles::SIDE;
@@ -72,7 +72,7 @@ fn best(views: &[Evidence], prior: f64) -> Option<Best> {
     order.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut sum = Evidence { a: DMatrix::zeros(k, k), b: DVector::zeros(k) };
     let mut best: Option<Best> = None;
-    for count in 1..=n / 3 {
+    for count in 1..=(n - 1) / 2 {
         let next = &views[order[count - 1].1];
         sum.a += &next.a;
         sum.b += &next.b;
@@ -91,7 +91,7 @@ impl<'a> Tried<'a> {
         let k = candidate.basis.count();
         let factors = evidence.iter().map(|e| root(&e.a)).collect();
         let mut squares = Vec::new();
-        for e in &evidence {
+        for e in evidence.iter().filter(|e| e.a.trace() > 0.0) {
             squares.push(evidence::fit(std::slice::from_ref(e), prior)?.dot(&e.b) as f32);
         }
         // Most views are as noise is, whatever a few have.
@@ -119,17 +119,17 @@ impl<'a> Tried<'a> {
     }
 }
 
-/// View by view; where a view's worth is `doubted`, it is worth the less the more these columns leave.
+/// View by view, nothing where a view says nothing; where a view's worth is `doubted`, it is worth the less
+/// the more these columns leave.
 fn evidence_of(
     basis: &Basis,
     data: &[ViewData],
     doubted: &[f64],
     prior: f64,
 ) -> Option<Vec<Evidence>> {
-    let mut all = evidence_of_bases(data, &[basis]);
-    if all.len() < data.len() {
-        return None;
-    }
+    let nothing = || Evidence::sum(basis.count(), 0.0, []);
+    let of = |view: &ViewData| together(view, &[basis]).unwrap_or_else(nothing);
+    let mut all: Vec<Evidence> = data.par_iter().map(of).collect();
     for ((e, view), doubt) in all.iter_mut().zip(data).zip(doubted).filter(|(_, d)| **d > 1.0) {
         let beta = evidence::fit(std::slice::from_ref(e), prior)?;
         let left = left_over(view, basis, beta.as_slice()).clamp(1.0, *doubt);
@@ -236,6 +236,7 @@ fn report(scene: &Scene<'_>, candidate: &Candidate, best: &Best, p: f64) -> Find
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::terms::{Coordinate, Modulation};
 
     fn views(name: &str, size: f64, of: usize) -> Vec<Evidence> {
         let mut rng = Seed(7).stream(name);
@@ -255,6 +256,30 @@ mod tests {
         found.views.sort_unstable();
         assert_eq!(found.views, [0, 1, 2]);
         assert!((found.beta[0] - 1.0).abs() < 0.25 && found.gain > 90.0, "{}", found.gain);
+    }
+
+    /// Eight views of eighteen, from one on, are few as well.
+    #[test]
+    fn nearly_half_of_the_views_are_few() {
+        let found = best(&views("few-views/half", 1.0, 8), 0.1).unwrap();
+        assert_eq!((found.views.len(), found.gain > 300.0), (8, true), "{}", found.gain);
+    }
+
+    /// A view without a reading takes no part, and keeps no other from it.
+    #[test]
+    fn a_view_that_says_nothing_leaves_the_others_alone() {
+        let place = |k: usize| PixelContext { u: k as f64, side: 4.0, ..Default::default() };
+        let view = |weight: f64| ViewData {
+            places: (0..9).map(place).collect(),
+            response: (0..9).map(f64::from).collect(),
+            weight: vec![weight; 9],
+            nuisance: vec![1.0; 9],
+            precision: vec![0.0],
+            ..ViewData::default()
+        };
+        let slope = Basis::powers(Coordinate::Column, 1, Modulation::One);
+        let all = evidence_of(&slope, &[view(1.0), view(0.0)], &[1.0; 2], 1.0).unwrap();
+        assert!(all[0].a.trace() > 1.0 && all[1].a.trace() == 0.0, "{all:?}");
     }
 
     #[test]

@@ -11,6 +11,8 @@ use crate::terms::{Axis, Statistic};
 const LEAST_CORRELATION: f64 = 0.002;
 /// Share of the variance that pixels repeat in every view, worth a word.
 const LEAST_FIXED: f64 = 0.0003;
+/// Chance from where on a correlation that falls is not taken for one that stands still.
+const DOUBTFUL: f64 = 0.05;
 /// A share that stands still beside one that changes slowly is known to this.
 const BESIDE_ANOTHER: f64 = 0.05;
 
@@ -82,10 +84,17 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
     }
     let floor = if slowly { BESIDE_ANOTHER } else { LEAST_CORRELATION };
     if p_still < level && still - frozen_known > floor {
-        let name = vec!["frozen-noise"];
+        // What falls, but not clearly, may as well change slowly.
+        let mut names = vec!["frozen-noise"];
+        if !slowly && p_falling < DOUBTFUL {
+            names.insert(usize::from(2.0 * falling.value < first.value), "temporal-correlation");
+        }
         let evidence = (p_still, nats(&least, fixed_share + frozen_known));
-        let fraction = ("fraction", still, least.std_error);
-        found.push(of_frames(name, [1.0, 3.0], fraction, still, evidence));
+        let parameter = match names[0] {
+            "frozen-noise" => ("fraction", still, least.std_error),
+            _ => ("rho", first.value, first_error),
+        };
+        found.push(of_frames(names, [1.0, 3.0], parameter, still, evidence));
     }
     found
 }

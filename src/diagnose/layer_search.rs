@@ -74,6 +74,7 @@ impl Survey {
             prior: BIAS_PRIOR,
             adequacy: NAME_ADEQUATE,
             own_axis_adequacy: OWN_AXIS_ADEQUATE,
+            agreed: false,
             max_terms: MAX_TERMS,
             fixed: (self.fixed_px2 > 0.0).then(|| (self.fixed_px2.sqrt(), self.covered_px(camera))),
             least: LEAST_SIGMAS * self.typical_sigma_px(),
@@ -101,6 +102,7 @@ impl Survey {
             prior: VARIANCE_PRIOR,
             adequacy: NAME_ADEQUATE,
             own_axis_adequacy: 0.0,
+            agreed: true,
             max_terms: MAX_TERMS,
             fixed: None,
             // What views differ by as wholes is mostly taken up by their own levels: small terms are

@@ -232,6 +232,7 @@ mod tests {
             prior: 1.0,
             adequacy: 0.6,
             own_axis_adequacy: 0.0,
+            agreed: false,
             max_terms: 1,
             fixed: None,
             least: 0.0,

@@ -20,6 +20,9 @@ pub struct Rules {
     /// And this share of what the best curve on its own axis does: what that one sees beyond is no rest
     /// of another cause.
     pub own_axis_adequacy: f64,
+    /// Of curves without a name, take the one on which the views agree: what stands still on the target is
+    /// no map of the picture. Where curves are fitted anew together, the largest is a better beginning.
+    pub agreed: bool,
     pub max_terms: usize,
     /// Constant error of every pixel, px, and pixels of the picture: a pattern that stands still
     /// in the picture must be larger than what these errors make by chance.

@@ -1,7 +1,7 @@
 //! What planes alone cannot tell: offset, scale and drift, where distances were measured by other
 //! means.
 
-use super::anchor::families;
+use super::anchor::{Family, families};
 use super::case::Case;
 use super::diagnosis::{Alternative, CannotTell, Finding, Size, Status};
 use super::field::Field;
@@ -132,6 +132,14 @@ fn contradicted(law: &Law, p: f64) -> Finding {
     }
 }
 
+/// An offset of the disparity may be no more than the constant of a shape that stands still in the picture,
+/// of `usual` px, which nobody knows: within two standard deviations of it.
+fn is_constant_of(law: &Finding, usual: f64) -> bool {
+    const DEVIATIONS: f64 = 2.0;
+    let offset = law.parameters.get("offset_px").and_then(|p| p.get("value")?.as_f64());
+    offset.is_some_and(|px| px.abs() < DEVIATIONS * usual)
+}
+
 /// Does the effect happen to cameras of this kind?
 pub fn can_happen(id: &str, kind: Option<SensorKind>) -> bool {
     effects::find(id).is_none_or(|e| e.card().applies_to(kind))
@@ -186,6 +194,9 @@ impl Case<'_> {
                 laws.retain(|l| with.iter().any(|w| w.effect == l.effect));
             }
         }
+        let nameless = bias.iter().filter(|t| !of_catalogue(t));
+        let own = families(nameless, &self.sensor().camera).iter().map(Family::still_px).sum();
+        laws.retain(|l| !is_constant_of(l, own));
         laws
     }
 }
@@ -207,4 +218,21 @@ pub fn cannot_tell(fields: &[Field], kind: Option<SensorKind>) -> Vec<CannotTell
     ];
     all.retain(|c| can_happen(c.effect, kind));
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_offset_as_large_as_a_still_shape_is_its_constant() {
+        let law = |id, name, value| Finding {
+            parameters: one(name, value, 0.001),
+            ..named(id, Statistic::Bias, Axis::Z)
+        };
+        let offset = |px| law("disparity-offset", "offset_px", px);
+        assert!(is_constant_of(&offset(-0.016), 0.01));
+        assert!(!is_constant_of(&offset(0.021), 0.01) && !is_constant_of(&offset(0.016), 0.0));
+        assert!(!is_constant_of(&law("depth-scale", "scale", 0.016), 0.01));
+    }
 }

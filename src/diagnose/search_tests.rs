@@ -15,6 +15,7 @@ const RULES: Rules = Rules {
     prior: 1e-6,
     adequacy: 0.7,
     own_axis_adequacy: 0.0,
+    agreed: false,
     max_terms: 4,
     fixed: None,
     least: 0.0,

@@ -81,6 +81,14 @@ pub(super) fn fold_into_sigma(found: &mut Vec<Finding>) {
     found.insert(at.min(found.len()), sigma);
 }
 
+/// A frame that is noisier than the others is in the size of all: of a sigma that is off by less, that frame
+/// is what is told.
+pub(super) fn forget_noise_of_frames(found: &mut Vec<Finding>, textures: &[Finding]) {
+    let of_frame = |f: &&Finding| f.statistic == Statistic::Variance && f.axis == Axis::Frame;
+    let size = textures.iter().find(of_frame).map_or(0.0, |f| f.size.sigma);
+    found.retain(|f| f.status != Status::Recalibrate || f.size.sigma > size);
+}
+
 fn of_sigma_alone(f: &Finding) -> bool {
     let axis = matches!(f.axis, Axis::Z | Axis::Theta);
     f.statistic == Statistic::Variance && axis && f.effect.is_none_or(|id| id == "range-exponent")
@@ -277,5 +285,17 @@ mod tests {
         echoes(&mut found);
         shares(&mut found);
         assert_eq!(found[0].status, Status::Recalibrate);
+    }
+
+    #[test]
+    fn a_noisier_frame_is_no_sigma_that_is_off() {
+        let of = |sigma, f| Finding { effect: None, size: Size { mm: 0.0, sigma }, ..f };
+        for (size, axis, left) in
+            [(0.05, Axis::Frame, 0), (0.4, Axis::Frame, 1), (0.05, Axis::Row, 1)]
+        {
+            let mut found = vec![of(size, recalibrate(1.1))];
+            forget_noise_of_frames(&mut found, &[of(0.2, named("", Statistic::Variance, axis))]);
+            assert_eq!(found.len(), left);
+        }
     }
 }

@@ -12,21 +12,30 @@ use super::layers::Survey;
 use super::prepared::without;
 use super::samples::ViewData;
 use crate::solve::plane_through;
-use crate::stats::median;
+use crate::stats::quantile;
 use crate::terms::Basis;
 
-/// Noise of a view that hangs together so many times more than the others' may be a cause. Of 19
-/// ray-traced views those without one were within a third of their middle, where they were large.
+/// A view worth so many times less than the others may have a cause of its own. Of 19 ray-traced views
+/// those without one were within a third of their middle, where they were large.
 const OTHERWISE: f64 = 2.0;
+/// So many of the views have none, whatever the others have: nearly half of them may begin late in a
+/// session, or far away.
+const USUAL: f64 = 0.25;
 /// Fewer patches say nothing of what is left.
 const MIN_FREE: f64 = 8.0;
 
-/// How many times surer each view's mean is if its noise hangs together as it usually does than
-/// by its own measure, which takes a cause that the others do not have for noise; 1 where they agree.
+/// How many times surer each view's mean is if its noise is as it usually is than by its own measure,
+/// which takes a cause that the others do not have for noise; 1 where they agree.
 pub fn doubted(survey: &Survey) -> Vec<f64> {
-    let own = || survey.views.iter().map(|v| v.correlation.sum);
-    let usual = median(&mut own().collect::<Vec<f64>>());
-    own().map(|sum| (sum / (OTHERWISE * usual)).max(1.0)).collect()
+    doubts(&survey.views.iter().map(|v| v.inflation).collect::<Vec<f64>>())
+}
+
+fn doubts(inflations: &[f64]) -> Vec<f64> {
+    // A view that shows nothing says nothing of the others.
+    let mut shown: Vec<f64> = inflations.iter().copied().filter(|i| i.is_finite()).collect();
+    let usual = quantile(&mut shown, USUAL).unwrap_or(f64::INFINITY);
+    let doubt = |i: &f64| if i.is_finite() { (i / (OTHERWISE * usual)).max(1.0) } else { 1.0 };
+    inflations.iter().map(doubt).collect()
 }
 
 /// What a candidate leaves of a view over what the weights allow: the worst of patches of one, two,
@@ -84,6 +93,16 @@ mod tests {
             data.weight.push(1.0);
         }
         data
+    }
+
+    /// Views of the second half of a session, of which one shows nothing.
+    #[test]
+    fn what_begins_late_is_doubted_where_it_began() {
+        let views = [12.0, 14.0, 10.0, 13.0, f64::INFINITY, 110.0, 90.0, 200.0];
+        let doubted = doubts(&views);
+        assert_eq!(doubted[..5], [1.0; 5]);
+        assert!(doubted[5..].iter().all(|d| *d > 3.0), "{doubted:?}");
+        assert_eq!(doubts(&[f64::INFINITY; 2]), [1.0; 2]);
     }
 
     /// What a candidate explains leaves noise; what it does not counts as far as it hangs together.
