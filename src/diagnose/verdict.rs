@@ -290,9 +290,8 @@ mod tests {
     #[test]
     fn a_noisier_frame_is_no_sigma_that_is_off() {
         let of = |sigma, f| Finding { effect: None, size: Size { mm: 0.0, sigma }, ..f };
-        for (size, axis, left) in
-            [(0.05, Axis::Frame, 0), (0.4, Axis::Frame, 1), (0.05, Axis::Row, 1)]
-        {
+        let (frame, row) = (Axis::Frame, Axis::Row);
+        for (size, axis, left) in [(0.05, frame, 0), (0.4, frame, 1), (0.05, row, 1)] {
             let mut found = vec![of(size, recalibrate(1.1))];
             forget_noise_of_frames(&mut found, &[of(0.2, named("", Statistic::Variance, axis))]);
             assert_eq!(found.len(), left);
