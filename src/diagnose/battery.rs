@@ -6,6 +6,7 @@ use super::ablation::Ablation;
 use super::bias;
 use super::case::{Case, MeanResult};
 use super::diagnosis::{Detectable, Finding, Status};
+use super::echoes::{echoes, fold_into_sigma, forget_noise_of_frames};
 use super::few_views::few_views;
 use super::field::Field;
 use super::findings;
@@ -26,8 +27,7 @@ use super::scene::Scene;
 use super::steps::{COARSE_SIGMAS, own_step, own_step_note, steps};
 use super::tails::EXCESS;
 use super::texture_finding::TextureFinding;
-use super::variance;
-use super::verdict::{MIN_SIZE, echoes, fold_into_sigma, forget_noise_of_frames, merge, symptoms};
+use super::verdict::{MIN_SIZE, merge, symptoms};
 use crate::sensors::SensorKind;
 use crate::terms::{Axis, Statistic, corner_radius};
 
@@ -97,8 +97,9 @@ impl Case<'_> {
         let refitted = self.take_refit(&mut curves);
         curves.retain(|f| self.is_news(f, &scatter));
         if self.baseline.is_none() {
+            let frames = self.fields.iter().map(|f| f.frames.len()).max();
+            forget_noise_of_frames(&mut curves, &textures, frames.unwrap_or(1));
             fold_into_sigma(&mut curves);
-            forget_noise_of_frames(&mut curves, &textures);
         }
         // Nats, as long as they are not shares.
         let clear = scatter.outcome.noise.threshold(self.options.level);
@@ -106,8 +107,8 @@ impl Case<'_> {
         let better_form = self.tell_form(&mut curves, clearly);
         let mut found: Vec<Finding> = self.ranges.clone().into_iter().chain(curves).collect();
         let of_size = |f: &Finding| f.statistic == Statistic::Variance;
-        let told = found.iter().any(of_size);
-        // What the search of the size tells is not told of its parts once more.
+        let told = self.baseline.is_some() && found.iter().any(of_size);
+        // Of two recordings what the search of the size tells is not told of its parts again.
         found.extend(textures.into_iter().filter(|f| !(told && of_size(f) && f.effect.is_none())));
         let DropoutOutcome { findings, mut detectable, notes } = lost;
         self.remarks.extend(notes);
@@ -247,7 +248,7 @@ impl Case<'_> {
             few_views(&mean, &survey.mean_data(), &candidates, outcomes[0], &rules, &excess, seed)
         };
         let variance = || {
-            let candidates = variance::candidates(&bounds, &self.model.sigma);
+            let candidates = super::variance::candidates(&bounds, &self.model.sigma);
             let rules = survey.variance_rules(level);
             few_views(&scatter, &scatter.data, &candidates, outcomes[1], &rules, &[], seed)
         };

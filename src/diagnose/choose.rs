@@ -59,7 +59,7 @@ impl Choice<'_> {
         self.judged[i].as_ref().map_or(0.0, |j| j.calibrated_gain(self.rules))
     }
 
-    /// A name whose fits to single views disagree is the worse one, where they do by more than twice
+    /// A name, or a curve that views are to agree on, whose fits to single views disagree is the worse one, where they do by more than twice
     /// what chance scatters a mean square by: once is off the dispersion already.
     fn dispersion_corrected_gain(&self, i: usize) -> f64 {
         let total = self.total(i);

@@ -11,7 +11,7 @@ use crate::terms::{Axis, Statistic};
 const LEAST_CORRELATION: f64 = 0.002;
 /// Share of the variance that pixels repeat in every view, worth a word.
 const LEAST_FIXED: f64 = 0.0003;
-/// Chance from where on a correlation that falls is not taken for one that stands still.
+/// Below this chance a fall of the correlation is not put down to noise alone.
 const DOUBTFUL: f64 = 0.05;
 /// A share that stands still beside one that changes slowly is known to this.
 const BESIDE_ANOTHER: f64 = 0.05;
@@ -86,13 +86,13 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
     if p_still < level && still - frozen_known > floor {
         // What falls, but not clearly, may as well change slowly.
         let mut names = vec!["frozen-noise"];
-        if !slowly && p_falling < DOUBTFUL {
+        if !slowly && p_falling < DOUBTFUL && rho_known == 0.0 {
             names.insert(usize::from(2.0 * falling.value < first.value), "temporal-correlation");
         }
         let evidence = (p_still, nats(&least, fixed_share + frozen_known));
         let parameter = match names[0] {
             "frozen-noise" => ("fraction", still, least.std_error),
-            _ => ("rho", first.value, first_error),
+            _ => ("rho", (first.value - fixed_share - frozen_known).max(0.0), first_error),
         };
         found.push(of_frames(names, [1.0, 3.0], parameter, still, evidence));
     }

@@ -18,6 +18,7 @@ mod choose;
 mod comb;
 mod conclude;
 mod diagnosis;
+mod echoes;
 mod edges;
 mod engine;
 mod evidence;

@@ -196,7 +196,7 @@ impl Case<'_> {
         }
         let nameless = bias.iter().filter(|t| !of_catalogue(t));
         let own = families(nameless, &self.sensor().camera).iter().map(Family::still_px).sum();
-        laws.retain(|l| !is_constant_of(l, own));
+        laws.retain(|l| l.status != Status::Named || !is_constant_of(l, own));
         laws
     }
 }

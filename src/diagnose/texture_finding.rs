@@ -46,14 +46,18 @@ impl ViewMean {
 
     /// Of values, each with how much there is of what it was measured on.
     pub fn weighed(values: &[(f64, f64)]) -> Option<Self> {
+        let sized = values.iter().any(|v| v.1 > 0.0);
+        // Of nothing there is nothing to tell.
+        let used = values.iter().copied().filter(|v| v.1 > 0.0 || !sized);
+        let values = &used.collect::<Vec<(f64, f64)>>()[..];
         let n = values.len() as f64;
+        if n < 2.0 {
+            return None;
+        }
         let middle = values.iter().map(|v| v.1).sum::<f64>() / n;
         // A small one says little; views differ for reasons of their own, so that a large one
         // does not say all.
-        let weight = |size: f64| if middle > 0.0 { size / (size + OWN * middle) } else { 1.0 };
-        if values.len() < 2 || values.iter().filter(|v| weight(v.1) > 0.0).count() < 2 {
-            return None;
-        }
+        let weight = |size: f64| if sized { size / (size + ERROR_OVER_OWN * middle) } else { 1.0 };
         let value = without_strays(values, weight);
         let distance = |v: &(f64, f64)| weight(v.1).sqrt() * (v.0 - value).abs();
         let stray = stray_beyond(values.iter().map(distance));
@@ -91,22 +95,24 @@ impl ViewMean {
     }
 }
 
-/// What views differ by for reasons of their own, in square, over what one of middling size errs by. Of
-/// clean sessions 5 to 12 in 10,000 are then beyond a level of 9 in 10,000, by how much views differ up to
+/// What a view of middling size errs by over what views differ by for reasons of their own, in squares. Of
+/// clean sessions 5 to 12 in 10,000 are then beyond a level of 9 in 10,000, whatever views differ by up to
 /// a middling one's error (simulated, 11 to 20 views of 1,000 to 19,000 pixels).
-const OWN: f64 = 2.0;
+const ERROR_OVER_OWN: f64 = 2.0;
 /// Fewer views do not tell which of them strays.
-const MIN_FOR_STRAYS: usize = 6;
-/// Standard deviations from where on a view strays: of Gaussian ones one in 80 does, which costs 2 % of the
-/// information (Huber, Robust Statistics, 1981).
+const MIN_FOR_STRAYS: usize = 8;
+/// Standard deviations from where on a view strays: of Gaussian ones one in 80 does, which costs 0.2 % of
+/// the information (Huber, Robust Statistics, 1981).
 const STRAY: f64 = 2.5;
 /// Standard deviations of a Gaussian in its median absolute deviation.
 const SD_OF_MAD: f64 = 1.4826;
 
-/// Where distances from the middle, each over what its view errs by, are a stray's.
+/// Where distances from the middle, each over what its view errs by, are a stray's; nowhere if most of them
+/// are none at all, as counts of what is rare are.
 fn stray_beyond(distances: impl Iterator<Item = f64>) -> f64 {
     let mut all: Vec<f64> = distances.collect();
-    if all.len() < MIN_FOR_STRAYS { f64::INFINITY } else { STRAY * SD_OF_MAD * median(&mut all) }
+    let stray = STRAY * SD_OF_MAD * median(&mut all);
+    if all.len() < MIN_FOR_STRAYS || stray == 0.0 { f64::INFINITY } else { stray }
 }
 
 /// What is left of a view's weight at this distance: a stray moves no mean farther than one that lies where
@@ -216,8 +222,20 @@ mod tests {
         }
     }
 
-    /// One view that has a still error of its own hides what the others share from no one, and is no
-    /// finding alone.
+    /// Views without a pixel, more than there are others, take no part.
+    #[test]
+    fn views_of_no_size_say_nothing() {
+        let mut rng = Seed(6).stream("view-mean/none");
+        let some = views(0.01, 4, &mut rng);
+        let all: Vec<(f64, f64)> = some.iter().copied().chain([(0.0, 0.0); 12]).collect();
+        let [a, b] = [&some, &all].map(|v| ViewMean::weighed(v).unwrap());
+        assert_eq!((a.value, a.std_error, a.views), (b.value, b.std_error, b.views));
+        let mostly_none = [[(0.0, 1e3); 9].as_slice(), &[(0.2, 1e3); 3]].concat();
+        assert!(ViewMean::weighed(&mostly_none).unwrap().p_above(0.0) > 0.01);
+        assert!(ViewMean::weighed(&[(1.0, 5.0), (2.0, 0.0)]).is_none());
+    }
+
+    /// One view with a still error of its own does not hide what the others share, and is no finding alone.
     #[test]
     fn a_view_that_strays_moves_the_mean_by_little() {
         let mut rng = Seed(5).stream("view-mean/stray");

@@ -1,4 +1,4 @@
-//! How much a view's mean is worth where its noise seems to hang together more than the others' does.
+//! How much a view's mean is worth where it seems to err more, or more alike, than the others' do.
 //!
 //! A cause that only some views have makes their errors alike from patch to patch, as noise that hangs
 //! together would: by its own measure such a view is worth little. It is given the worth of the others,
@@ -15,14 +15,16 @@ use crate::solve::plane_through;
 use crate::stats::quantile;
 use crate::terms::Basis;
 
-/// A view worth so many times less than the others may have a cause of its own. Of 19 ray-traced views
-/// those without one were within a third of their middle, where they were large.
+/// A view worth so many times less than the others may have a cause of its own: on development sets those
+/// without one were worth within a half of one another.
 const OTHERWISE: f64 = 2.0;
-/// So many of the views have none, whatever the others have: nearly half of them may begin late in a
-/// session, or far away.
+/// The quantile of the views that shows what is usual: the middle of those without a cause where nearly half
+/// have one.
 const USUAL: f64 = 0.25;
 /// Fewer patches say nothing of what is left.
 const MIN_FREE: f64 = 8.0;
+/// A patch of less than this share of the largest weight is left out.
+const SLIGHT: f64 = 1e-6;
 
 /// How many times surer each view's mean is if its noise is as it usually is than by its own measure,
 /// which takes a cause that the others do not have for noise; 1 where they agree.
@@ -38,7 +40,7 @@ fn doubts(inflations: &[f64]) -> Vec<f64> {
     inflations.iter().map(doubt).collect()
 }
 
-/// What a candidate leaves of a view over what the weights allow: the worst of patches of one, two,
+/// What a candidate leaves of a view over what the weights allow, infinite where too little is seen: the worst of patches of one, two,
 /// four and eight samples across, so that errors which hang together count as they do.
 pub fn left_over(view: &ViewData, basis: &Basis, beta: &[f64]) -> f64 {
     let left = without(view, &[(basis, beta.to_vec())]);
@@ -54,11 +56,15 @@ pub fn left_over(view: &ViewData, basis: &Basis, beta: &[f64]) -> f64 {
             sums[0] += w * (y - plane.dot(&Vector3::new(1.0, p.x, p.y)));
             sums[1] += w;
         }
+        // What weighs next to nothing leaves nothing, and is no evidence of a good fit.
+        let most = patches.values().map(|p| p[1]).fold(0.0, f64::max);
+        patches.retain(|_, p| p[1] > SLIGHT * most);
         let free = patches.len() as f64 - 3.0 - beta.len() as f64;
         let squares: f64 = patches.values().map(|[y, w]| y * y / w.max(f64::MIN_POSITIVE)).sum();
-        if free < MIN_FREE { 0.0 } else { squares / free }
+        (free >= MIN_FREE).then(|| squares / free)
     };
-    [1.0, 2.0, 4.0, 8.0].map(at_scale).into_iter().fold(0.0, f64::max)
+    let left = [1.0, 2.0, 4.0, 8.0].into_iter().filter_map(at_scale).reduce(f64::max);
+    left.unwrap_or(f64::INFINITY)
 }
 
 #[cfg(test)]

@@ -1,0 +1,156 @@
+//! A sigma that is off, beside what else was found: its own laws belong to it, and what it only repeats does
+//! not come before the cause.
+
+use super::diagnosis::{Finding, Status};
+use crate::terms::{Axis, Statistic};
+
+/// Where sigma itself is off by more, a law of depth or tilt alone beside it is the rest of the same
+/// misfit: its terms, and nats, go to that finding.
+pub(super) fn fold_into_sigma(found: &mut Vec<Finding>) {
+    let Some(at) = found.iter().position(|f| f.status == Status::Recalibrate) else { return };
+    let mut sigma = found.remove(at);
+    let (rest, others): (Vec<Finding>, Vec<Finding>) =
+        found.drain(..).partition(|f| of_sigma_alone(f) && f.share < sigma.share);
+    *found = others;
+    for f in rest {
+        sigma.share += f.share;
+        sigma.terms.extend(f.terms);
+        sigma.covariance.extend(f.covariance);
+    }
+    found.insert(at.min(found.len()), sigma);
+}
+
+/// A frame that is noisier than the others is in the size of all `frames`: where that accounts for at least
+/// half of what sigma is off by, only the frame is reported.
+pub(super) fn forget_noise_of_frames(
+    found: &mut Vec<Finding>,
+    textures: &[Finding],
+    frames: usize,
+) {
+    let of_frame = |f: &&Finding| f.statistic == Statistic::Variance && f.axis == Axis::Frame;
+    let frame = textures.iter().find(of_frame);
+    let log = frame.and_then(|f| f.parameters.get("log_variance")?.get("value")?.as_f64());
+    let share = log.map_or(0.0, |log| log.exp_m1() / frames.max(1) as f64);
+    let echo = |f: &Finding| -excess(f) * share > 0.0 && share.abs() > HALF * excess(f).abs();
+    found.retain(|f| f.status != Status::Recalibrate || !echo(f));
+}
+
+fn of_sigma_alone(f: &Finding) -> bool {
+    let axis = matches!(f.axis, Axis::Z | Axis::Theta);
+    f.statistic == Statistic::Variance && axis && f.effect.is_none_or(|id| id == "range-exponent")
+}
+
+/// What adds to the spread of one frame, and so to a sigma that was calibrated with it in place.
+const SPREADS: [&str; 6] = [
+    "fixed-pattern-noise",
+    "frozen-noise",
+    "disparity-quantisation",
+    "depth-rounding",
+    "column-banding",
+    "row-noise",
+];
+
+fn spreads(f: &Finding) -> bool {
+    let named = matches!(f.status, Status::Named | Status::OneOf);
+    named && (f.statistic == Statistic::Bias || f.effect.is_some_and(|id| SPREADS.contains(&id)))
+}
+
+/// A sigma that is too large was calibrated with the named causes in it: of such a finding only
+/// what they do not account for counts, in variance.
+pub(super) fn echoes(found: &mut [Finding]) {
+    let explained: f64 = found.iter().filter(|f| spreads(f)).map(|f| f.size.sigma.powi(2)).sum();
+    let largest = found.iter().filter(|f| spreads(f)).map(|f| f.share).fold(0.0, f64::max);
+    for f in found.iter_mut().filter(|f| f.status == Status::Recalibrate) {
+        let too_much = excess(f);
+        if too_much > 0.0 && explained > 0.0 {
+            f.share *= (1.0 - explained / too_much).max(0.0);
+            if explained > HALF * too_much {
+                f.share = f.share.min(0.99 * largest);
+            }
+        }
+    }
+}
+
+/// From this share on a cause accounts for what sigma is off by.
+const HALF: f64 = 0.5;
+
+/// By how much the model's variance exceeds what was measured, in units of the model's; negative
+/// where sigma is too small.
+fn excess(f: &Finding) -> f64 {
+    let Some(curve) = f.curve.as_ref().filter(|c| !c.model.is_empty()) else { return 0.0 };
+    let mean = curve.model.iter().map(|ratio| ratio * ratio).sum::<f64>();
+    1.0 - mean / curve.model.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::other_findings::named;
+    use super::super::texture_finding::one;
+    use super::super::verdict::shares;
+    use super::*;
+    use crate::diagnose::{Curve, Size};
+
+    fn recalibrate(ratio: f64) -> Finding {
+        let curve = Curve { model: vec![ratio; 8], ..Curve::default() };
+        Finding {
+            status: Status::Recalibrate,
+            effect: None,
+            share: 900.0,
+            curve: Some(curve),
+            ..named("range-exponent", Statistic::Variance, Axis::Z)
+        }
+    }
+
+    fn bowl(sigma: f64) -> Finding {
+        Finding {
+            share: 100.0,
+            size: Size { mm: 1.0, sigma },
+            ..named("radial-disparity-bias", Statistic::Bias, Axis::Radius)
+        }
+    }
+
+    /// The smaller of the two is the rest of the larger one's misfit; not the other way round.
+    #[test]
+    fn a_law_of_the_depth_beside_a_larger_misfit_of_sigma_is_part_of_it() {
+        for (nats, left) in [(100.0, 1), (2000.0, 2)] {
+            let exponent =
+                Finding { share: nats, ..named("range-exponent", Statistic::Variance, Axis::Z) };
+            let mut found = vec![exponent, recalibrate(1.2)];
+            fold_into_sigma(&mut found);
+            assert_eq!(found.len(), left);
+            assert_eq!(found.iter().map(|f| f.share).sum::<f64>(), 900.0 + nats);
+        }
+    }
+
+    /// Sigma calibrated with a bias of half its size in it; then too small a sigma, which no bias
+    /// explains.
+    #[test]
+    fn the_echo_of_a_cause_never_comes_before_it() {
+        let mut found = vec![recalibrate(0.75f64.sqrt()), bowl(0.5)];
+        echoes(&mut found);
+        shares(&mut found);
+        assert_eq!(found[0].effect, Some("radial-disparity-bias"));
+        assert!(found[1].share < 1e-9, "{}", found[1].share);
+        let mut found = vec![recalibrate(1.3), bowl(0.5)];
+        echoes(&mut found);
+        shares(&mut found);
+        assert_eq!(found[0].status, Status::Recalibrate);
+    }
+
+    /// One frame of four with 1.46 times the variance of the others makes all 1.12 times as large.
+    #[test]
+    fn a_noisier_frame_is_no_sigma_that_is_off() {
+        let frame = |axis| {
+            let parameters = one("log_variance", 0.38, 0.01);
+            Finding { effect: None, parameters, ..named("", Statistic::Variance, axis) }
+        };
+        let (own, row) = (frame(Axis::Frame), frame(Axis::Row));
+        for (ratio, texture, left) in
+            [(1.05, &own, 0), (1.2, &own, 1), (0.95, &own, 1), (1.05, &row, 1)]
+        {
+            let mut found = vec![recalibrate(ratio)];
+            forget_noise_of_frames(&mut found, std::slice::from_ref(texture), 4);
+            assert_eq!(found.len(), left, "{ratio}");
+        }
+    }
+}
