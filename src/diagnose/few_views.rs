@@ -262,13 +262,14 @@ mod tests {
         assert!((found.beta[0] - 1.0).abs() < 0.25 && found.gain > 90.0, "{}", found.gain);
     }
 
-    /// Eight views of eighteen, from one on, are few as well.
+    /// Eight views of eighteen are few as well. Of the 390 nats no more than three quarters are lost: the
+    /// quartile of all is the median of the ten that are noise, four times what it is taken for.
     #[test]
     fn nearly_half_of_the_views_are_few() {
         let slope = Candidate::curve(Basis::powers(Coordinate::Column, 1, Modulation::One));
         let tried = Tried::of(&slope, views("few-views/half", 1.0, 8), 0.1).unwrap();
         let found = tried.best().unwrap();
-        assert_eq!((found.views.len(), found.gain > 200.0), (8, true), "{}", found.gain);
+        assert_eq!((found.views.len(), found.gain > 90.0), (8, true), "{}", found.gain);
     }
 
     /// A view without a reading takes no part, and keeps no other from it.
