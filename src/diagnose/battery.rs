@@ -27,6 +27,7 @@ use super::scene::Scene;
 use super::steps::{COARSE_SIGMAS, own_step, own_step_note, steps};
 use super::tails::EXCESS;
 use super::texture_finding::TextureFinding;
+use super::variance;
 use super::verdict::{MIN_SIZE, merge, symptoms};
 use crate::sensors::SensorKind;
 use crate::terms::{Axis, Statistic, corner_radius};
@@ -97,8 +98,7 @@ impl Case<'_> {
         let refitted = self.take_refit(&mut curves);
         curves.retain(|f| self.is_news(f, &scatter));
         if self.baseline.is_none() {
-            let frames = self.fields.iter().map(|f| f.frames.len()).max();
-            forget_noise_of_frames(&mut curves, &textures, frames.unwrap_or(1));
+            forget_noise_of_frames(&mut curves, &textures, &self.fields);
             fold_into_sigma(&mut curves);
         }
         // Nats, as long as they are not shares.
@@ -248,7 +248,7 @@ impl Case<'_> {
             few_views(&mean, &survey.mean_data(), &candidates, outcomes[0], &rules, &excess, seed)
         };
         let variance = || {
-            let candidates = super::variance::candidates(&bounds, &self.model.sigma);
+            let candidates = variance::candidates(&bounds, &self.model.sigma);
             let rules = survey.variance_rules(level);
             few_views(&scatter, &scatter.data, &candidates, outcomes[1], &rules, &[], seed)
         };

@@ -31,13 +31,11 @@ impl Choice<'_> {
             !chosen.iter().any(|c| same_curve(&c.candidate, &self.candidates[i]))
                 && self.is_sensible(i)
         };
-        let by = |i: usize| match self.rules.agreed {
-            true => self.dispersion_corrected_gain(i),
-            false => self.total(i),
-        };
+        let agreed =
+            self.rules.agreed.then(|| self.ranked(false, |i| self.dispersion_corrected_gain(i)));
         let curve = || {
-            let told = |&i: &usize| self.calibrated_gain(i) > threshold && new(i);
-            self.ranked(false, by).into_iter().find(told)
+            let ranked = agreed.as_ref().unwrap_or(&curves);
+            ranked.iter().copied().find(|&i| self.calibrated_gain(i) > threshold && new(i))
         };
         let winner = self.name(&families, &curves).or_else(curve)?;
         Some(Chosen {
@@ -59,7 +57,7 @@ impl Choice<'_> {
         self.judged[i].as_ref().map_or(0.0, |j| j.calibrated_gain(self.rules))
     }
 
-    /// A name, or a curve that views are to agree on, whose fits to single views disagree is the worse one, where they do by more than twice
+    /// A candidate whose fits to single views disagree is the worse one, where they do by more than twice
     /// what chance scatters a mean square by: once is off the dispersion already.
     fn dispersion_corrected_gain(&self, i: usize) -> f64 {
         let total = self.total(i);

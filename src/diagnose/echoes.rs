@@ -2,6 +2,7 @@
 //! not come before the cause.
 
 use super::diagnosis::{Finding, Status};
+use super::field::Field;
 use crate::terms::{Axis, Statistic};
 
 /// Where sigma itself is off by more, a law of depth or tilt alone beside it is the rest of the same
@@ -20,19 +21,20 @@ pub(super) fn fold_into_sigma(found: &mut Vec<Finding>) {
     found.insert(at.min(found.len()), sigma);
 }
 
-/// A frame that is noisier than the others is in the size of all `frames`: where that accounts for at least
-/// half of what sigma is off by, only the frame is reported.
+/// A frame that is noisier than the others is in the size of all: where that accounts for at least half of
+/// what sigma is off by, only the frame is reported.
 pub(super) fn forget_noise_of_frames(
     found: &mut Vec<Finding>,
     textures: &[Finding],
-    frames: usize,
+    fields: &[Field],
 ) {
     let of_frame = |f: &&Finding| f.statistic == Statistic::Variance && f.axis == Axis::Frame;
     let frame = textures.iter().find(of_frame);
     let log = frame.and_then(|f| f.parameters.get("log_variance")?.get("value")?.as_f64());
-    let share = log.map_or(0.0, |log| log.exp_m1() / frames.max(1) as f64);
-    let echo = |f: &Finding| -excess(f) * share > 0.0 && share.abs() > HALF * excess(f).abs();
-    found.retain(|f| f.status != Status::Recalibrate || !echo(f));
+    let frames = fields.iter().map(|f| f.frames.len()).max().unwrap_or(1);
+    let own = log.map_or(0.0, |log| log.exp_m1() / frames as f64);
+    let echo = |off: f64| off * own > 0.0 && own.abs() > HALF * off.abs();
+    found.retain(|f| f.status != Status::Recalibrate || !echo(-excess(f)));
 }
 
 fn of_sigma_alone(f: &Finding) -> bool {
@@ -84,11 +86,14 @@ fn excess(f: &Finding) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::slice::from_ref;
+
     use super::super::other_findings::named;
     use super::super::texture_finding::one;
     use super::super::verdict::shares;
     use super::*;
     use crate::diagnose::{Curve, Size};
+    use crate::plane::Plane;
 
     fn recalibrate(ratio: f64) -> Finding {
         let curve = Curve { model: vec![ratio; 8], ..Curve::default() };
@@ -145,11 +150,15 @@ mod tests {
             Finding { effect: None, parameters, ..named("", Statistic::Variance, axis) }
         };
         let (own, row) = (frame(Axis::Frame), frame(Axis::Row));
+        let field = Field {
+            frames: vec![(0.0, 0.0); 4],
+            ..Field::unseen(Plane::tilted(1.0, 0.0, 0.0), 43.5, [1, 1], vec![0])
+        };
         for (ratio, texture, left) in
             [(1.05, &own, 0), (1.2, &own, 1), (0.95, &own, 1), (1.05, &row, 1)]
         {
             let mut found = vec![recalibrate(ratio)];
-            forget_noise_of_frames(&mut found, std::slice::from_ref(texture), 4);
+            forget_noise_of_frames(&mut found, from_ref(texture), from_ref(&field));
             assert_eq!(found.len(), left, "{ratio}");
         }
     }

@@ -85,10 +85,14 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
     let floor = if slowly { BESIDE_ANOTHER } else { LEAST_CORRELATION };
     if p_still < level && still - frozen_known > floor {
         // What falls, but not clearly, may as well change slowly.
-        let mut names = vec!["frozen-noise"];
-        if !slowly && p_falling < DOUBTFUL && rho_known == 0.0 {
-            names.insert(usize::from(2.0 * falling.value < first.value), "temporal-correlation");
-        }
+        let doubtful = !slowly && p_falling < DOUBTFUL && rho_known == 0.0;
+        let names = match doubtful {
+            false => vec!["frozen-noise"],
+            true if 2.0 * falling.value < first.value => {
+                vec!["frozen-noise", "temporal-correlation"]
+            }
+            true => vec!["temporal-correlation", "frozen-noise"],
+        };
         let evidence = (p_still, nats(&least, fixed_share + frozen_known));
         let parameter = match names[0] {
             "frozen-noise" => ("fraction", still, least.std_error),

@@ -58,17 +58,8 @@ impl ViewMean {
         // A small one says little; views differ for reasons of their own, so that a large one
         // does not say all.
         let weight = |size: f64| if sized { size / (size + ERROR_OVER_OWN * middle) } else { 1.0 };
-        let value = without_strays(values, weight);
-        let distance = |v: &(f64, f64)| weight(v.1).sqrt() * (v.0 - value).abs();
-        let stray = stray_beyond(values.iter().map(distance));
-        let (mut squares, mut total, mut trusted) = (0.0, 0.0, 0.0);
-        for v in values {
-            let (w, distance) = (weight(v.1), distance(v));
-            squares += (held(distance, stray) * distance).powi(2);
-            total += w;
-            trusted += if distance > stray { 0.0 } else { w };
-        }
-        let std_error = (squares / (n - 1.0) * total).sqrt() / trusted;
+        let weighted: Vec<(f64, f64)> = values.iter().map(|v| (v.0, weight(v.1))).collect();
+        let (value, std_error) = huber(&weighted);
         Some(ViewMean { value, std_error, views: n })
     }
 
@@ -121,21 +112,31 @@ fn held(distance: f64, stray: f64) -> f64 {
     if distance > stray { stray / distance } else { 1.0 }
 }
 
-/// Huber's mean of values, each with how much there is of what it was measured on; begun at the median.
-fn without_strays(values: &[(f64, f64)], weight: impl Fn(f64) -> f64) -> f64 {
+/// Huber's mean of values with their weights, begun at the median, and its standard error by least squares
+/// with the influence of every value on it.
+fn huber(values: &[(f64, f64)]) -> (f64, f64) {
     const ROUNDS: usize = 20;
-    let mut value = median(&mut values.iter().map(|v| v.0).collect::<Vec<f64>>());
+    let off = |mean: f64| values.iter().map(move |(x, w)| w.sqrt() * (x - mean).abs());
+    let mut mean = median(&mut values.iter().map(|v| v.0).collect::<Vec<f64>>());
     for _ in 0..ROUNDS {
-        let size = |v: &(f64, f64)| weight(v.1).sqrt() * (v.0 - value).abs();
-        let stray = stray_beyond(values.iter().map(size));
-        let weights = values.iter().map(|v| weight(v.1) * held(size(v), stray));
-        let (sum, total) = values
-            .iter()
-            .zip(weights)
-            .fold((0.0, 0.0), |(sum, total), (v, w)| (sum + w * v.0, total + w));
-        value = sum / total;
+        let stray = stray_beyond(off(mean));
+        let (mut sum, mut total) = (0.0, 0.0);
+        for ((x, w), distance) in values.iter().zip(off(mean)) {
+            let w = w * held(distance, stray);
+            sum += w * x;
+            total += w;
+        }
+        mean = sum / total;
     }
-    value
+    let stray = stray_beyond(off(mean));
+    let (mut squares, mut total, mut trusted) = (0.0, 0.0, 0.0);
+    for ((_, w), distance) in values.iter().zip(off(mean)) {
+        squares += (held(distance, stray) * distance).powi(2);
+        total += w;
+        trusted += if distance > stray { 0.0 } else { *w };
+    }
+    let free = values.len() as f64 - 1.0;
+    (mean, (squares / free * total).sqrt() / trusted)
 }
 
 pub fn one(name: &str, value: f64, std_error: f64) -> Map<String, serde_json::Value> {
