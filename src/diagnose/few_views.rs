@@ -24,7 +24,7 @@ use super::tiles::SIDE;
 use super::view_levels::scatter_of_most;
 use super::view_worth::{doubted, left_over};
 use crate::rng::{Seed, Stream};
-use crate::stats::quantile;
+use crate::stats::{MAD_TO_SIGMA, quantile};
 use crate::terms::{Basis, PixelContext, Statistic, Term};
 
 /// Candidates with more columns fit single views too freely.
@@ -39,8 +39,6 @@ const BESIDE_ALL: f64 = 10.0;
 const RIM_PX: f64 = SIDE as f64;
 /// A share of the weight that keeps a sample, and lets it say nothing.
 const NEXT_TO_NONE: f64 = 1e-9;
-/// Standard deviations from the middle of a Gaussian to its quartile.
-const QUARTILE: f64 = 0.6745;
 /// A name must explain this share of what the best curve does: a few views show little of a shape.
 const NAME_ADEQUATE: f64 = 0.9;
 
@@ -100,7 +98,7 @@ impl<'a> Tried<'a> {
         // A quarter of the views is as noise is, whatever nearly half of them have (the quartile of chi
         // squared by Wilson and Hilferty 1931).
         let (k, spread) = (k as f64, 2.0 / (9.0 * k as f64));
-        let expected = k * (1.0 - spread - QUARTILE * spread.sqrt()).powi(3);
+        let expected = k * (1.0 - spread - spread.sqrt() / MAD_TO_SIGMA).powi(3);
         let usual = quantile(&mut squares, 0.25).unwrap_or(0.0);
         let scatter = (usual / expected).max(1.0);
         Some(Tried { candidate, evidence, factors, scatter, prior })

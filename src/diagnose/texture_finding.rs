@@ -7,7 +7,7 @@ use super::null::student;
 use super::parameters::estimate;
 use super::structure::Structure;
 use super::verdict::MIN_SIZE;
-use crate::stats::median;
+use crate::stats::{MAD_TO_SIGMA, median};
 use crate::terms::{Axis, Statistic};
 
 /// A mismatch of the noise's structure.
@@ -95,14 +95,12 @@ const MIN_FOR_STRAYS: usize = 8;
 /// Standard deviations from where on a view strays: of Gaussian ones one in 80 does, which costs 0.2 % of
 /// the information (Huber, Robust Statistics, 1981).
 const STRAY: f64 = 2.5;
-/// Standard deviations of a Gaussian in its median absolute deviation.
-const SD_OF_MAD: f64 = 1.4826;
 
 /// Where distances from the middle, each over what its view errs by, are a stray's; nowhere if most of them
 /// are none at all, as counts of what is rare are.
 fn stray_beyond(distances: impl Iterator<Item = f64>) -> f64 {
     let mut all: Vec<f64> = distances.collect();
-    let stray = STRAY * SD_OF_MAD * median(&mut all);
+    let stray = STRAY * MAD_TO_SIGMA * median(&mut all);
     if all.len() < MIN_FOR_STRAYS || stray == 0.0 { f64::INFINITY } else { stray }
 }
 
