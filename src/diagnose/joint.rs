@@ -51,7 +51,7 @@ pub fn refit(
         .collect();
     let columns = Columns::of(&found.chosen, camera);
     let joint = Joint::of(&columns, &data, second);
-    match joint.settle(&found.chosen, camera) {
+    match joint.settle(&found.chosen) {
         Some(settled) => joint.posterior(&data, second, &settled, &found, camera).unwrap_or(found),
         None => found,
     }
@@ -202,6 +202,7 @@ impl Joint<'_> {
         }
         if s.penalty.is_some() {
             counts.extend([self.columns.nodes / 2; 2]);
+            counts.extend(self.columns.far_gauge.is_some().then_some(0));
         }
         Some(Halves {
             metric: part(&self.all.a),
@@ -224,9 +225,9 @@ impl Joint<'_> {
             }
         }
         if s.penalty.is_some() {
-            for (basis, gain) in self.columns.maps.iter().zip([s.maps, 0.0]) {
+            for (basis, gain) in self.columns.rest().zip([s.maps, 0.0, 0.0]) {
                 chosen.push(Chosen {
-                    candidate: Candidate::curve(basis.clone()),
+                    candidate: Candidate::curve(basis),
                     rms: 0.0,
                     adequacy: 0.0,
                     gain,
@@ -260,7 +261,11 @@ impl Joint<'_> {
             }
         }
         if s.penalty.is_some() {
-            told.extend(of_columns.rows(self.columns.terms, self.columns.nodes).iter());
+            let nodes = &of_columns.as_slice()[self.columns.terms..];
+            told.extend(nodes);
+            if let Some(gauge) = &self.columns.far_gauge {
+                told.extend(affine(gauge, &nodes[self.columns.nodes / 2..]));
+            }
         }
         told
     }

@@ -28,6 +28,8 @@ pub struct Columns {
     pub precision: DVector<f64>,
     pub gauges: Vec<Option<Gauge>>,
     pub maps: [Basis; 2],
+    /// What planes absorb of the second map.
+    pub far_gauge: Option<Gauge>,
     /// Columns of the terms, and of both maps.
     pub terms: usize,
     pub nodes: usize,
@@ -42,6 +44,7 @@ impl Columns {
             .map(|(length, low, high)| (length / NODE_PX).clamp(low, high));
         let [width, height] = [camera.width, camera.height].map(|n| n as f64);
         let map = |times| Basis::Spline { width, height, across, down, times };
+        let maps = [map(Modulation::One), map(Modulation::DisparitySquared)];
         let precision = |c: &Chosen| -> Vec<f64> {
             let coefficients = 0..c.candidate.basis.count();
             coefficients.map(|k| c.candidate.usual(k).powi(-2)).collect()
@@ -52,7 +55,8 @@ impl Columns {
             nodes: 2 * across * down,
             precision: DVector::from_vec(chosen.iter().flat_map(precision).collect()),
             bases,
-            maps: [map(Modulation::One), map(Modulation::DisparitySquared)],
+            far_gauge: Gauge::of(&maps[1], &pixels),
+            maps,
         }
     }
 
@@ -108,9 +112,15 @@ impl Columns {
         first..first + self.bases[term].count()
     }
 
+    /// The maps, and what planes absorb of the second.
+    pub fn rest(&self) -> impl Iterator<Item = Basis> + '_ {
+        let absorbed = self.far_gauge.iter().map(|gauge| gauge.term(&[]).0);
+        self.maps.iter().cloned().chain(absorbed)
+    }
+
     /// What holds the nodes, for a mean information of one on each: smooth, small, and without
     /// what planes absorb.
-    pub fn penalty(&self, camera: &Camera, smoothness: f64) -> DMatrix<f64> {
+    pub fn penalty(&self, smoothness: f64) -> DMatrix<f64> {
         let Basis::Spline { across, down, .. } = self.maps[0] else {
             return DMatrix::zeros(0, 0);
         };
@@ -125,17 +135,21 @@ impl Columns {
         let (id, unit) = (DMatrix::identity(across, across), DMatrix::identity(down, down));
         let rough: DMatrix<f64> = unit.kronecker(&bend(across)) + bend(down).kronecker(&id);
         let n = across * down;
-        let mut one = (rough + DMatrix::identity(n, n) * RIDGE) * smoothness;
-        let rays = camera.rays();
-        if let Some(gauge) = Gauge::of(&self.maps[0], &Pixels::new(camera, &rays, 1.0)) {
-            for k in 0..3 {
-                let c = DVector::from_iterator(n, gauge.affine.iter().map(|a| a[k])).normalize();
-                one.ger(HELD, &c, &c, 1.0);
-            }
-        }
         let mut both = DMatrix::zeros(2 * n, 2 * n);
+        let one = (rough + DMatrix::identity(n, n) * RIDGE) * smoothness;
         both.view_mut((0, 0), (n, n)).copy_from(&one);
         both.view_mut((n, n), (n, n)).copy_from(&one);
+        if let Some(gauge) = &self.far_gauge {
+            // A slope that grows with the disparity's square bends tilted planes, and what is held
+            // to be nothing is taken for another shape: it is fitted, and left out of what is told.
+            for (map, absorbed) in [(0, 0..3), (n, 0..1)] {
+                for k in absorbed {
+                    let affine = DVector::from_iterator(n, gauge.affine.iter().map(|a| a[k]));
+                    let c = affine.normalize();
+                    both.view_mut((map, map), (n, n)).ger(HELD, &c, &c, 1.0);
+                }
+            }
+        }
         both
     }
 }

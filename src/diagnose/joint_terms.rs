@@ -7,7 +7,6 @@ use super::candidate::Candidate;
 use super::choose::behind;
 use super::joint_fit::{Joint, Reduced, SMOOTHNESS};
 use super::outcome::Chosen;
-use crate::camera::Camera;
 use crate::terms::{Axis, Basis, Coordinate, Statistic, Term};
 
 /// Maps take the place of terms where they predict views left out better by this share, and by so
@@ -60,7 +59,7 @@ impl Joint<'_> {
         System { columns, held }
     }
 
-    pub fn settle(&self, chosen: &[Chosen], camera: &Camera) -> Option<Settled> {
+    pub fn settle(&self, chosen: &[Chosen]) -> Option<Settled> {
         let everything: Vec<usize> = (0..chosen.len()).collect();
         let plain = self.without(None)?;
         let scores = self.scores(&plain, &everything, |_| true);
@@ -74,7 +73,7 @@ impl Joint<'_> {
         };
         let is_kept = |t: &usize| !is_smooth_and_nameless(&chosen[*t].candidate);
         let kept: Vec<usize> = settled.terms.iter().copied().filter(is_kept).collect();
-        if let Some(mapped) = self.best_maps(&kept, camera) {
+        if let Some(mapped) = self.best_maps(&kept) {
             let better = total(&mapped.scores) - total(&settled.scores);
             let slack = MAPS_SHARE * total(&mapped.scores);
             let clear = behind(&mapped.scores, &settled.scores) > MAPS_CLEARLY;
@@ -101,13 +100,13 @@ impl Joint<'_> {
 
     /// The smoothest maps that predict the parts left out within a standard error of the best
     /// (Breiman et al. 1984).
-    fn best_maps(&self, terms: &[usize], camera: &Camera) -> Option<Settled> {
+    fn best_maps(&self, terms: &[usize]) -> Option<Settled> {
         let first = self.columns.terms;
         let diagonal = self.all.a.diagonal();
         let unit = diagonal.rows(first, self.columns.nodes / 2).mean();
         let mut all: Vec<Settled> = Vec::new();
         for smoothness in SMOOTHNESS {
-            let penalty = self.columns.penalty(camera, smoothness) * unit;
+            let penalty = self.columns.penalty(smoothness) * unit;
             let Some(without) = self.without(Some(&penalty)) else { continue };
             let scores = self.scores(&without, terms, |_| true);
             let worse = all.last().is_some_and(|b| total(&b.scores) > total(&scores));

@@ -139,6 +139,34 @@ fn what_planes_absorb_comes_out_as_nothing() {
     assert!(most < 0.05, "{most}");
 }
 
+/// A slope that grows with the disparity's square bends tilted planes. It is no part of what is told,
+/// and nothing else is told in its place.
+#[test]
+fn a_slope_of_the_disparity_squared_is_left_out_and_bends_no_map() {
+    let far = |p: &PixelContext| (p.disparity / 40.0).powi(2);
+    let wide = |p: &PixelContext| 0.15 * (p.u / 40.0).sin() * (p.v / 35.0).cos();
+    let slope = |p: &PixelContext| (0.4 * p.x - 0.3 * p.y) * far(p);
+    let rng = &mut Seed(7).stream("joint/slope");
+    let data = session([0.8, 3.0], rng, |p| wide(p) * far(p) + slope(p));
+    let outcome = fitted(&data, vec![bowl(), map()]);
+    let (terms, mut row) = (terms_of(&outcome, Statistic::Bias), Vec::new());
+    // A frontal plane at 0.9 m.
+    let disparity = SCALE_PX_M / 0.9;
+    let places: Vec<PixelContext> =
+        data[0].places.iter().map(|p| PixelContext { disparity, z: 0.9, rho: 0.9, ..*p }).collect();
+    let x = DMatrix::from_fn(places.len(), 3, |i, k| [1.0, places[i].x, places[i].y][k]);
+    let solver = x.clone().svd(true, true);
+    let told = places.iter().map(|p| Term::sum(&terms, p, &mut row));
+    let told = DVector::from_iterator(places.len(), told);
+    let affine = solver.solve(&told, 1e-12).unwrap();
+    assert!(affine.amax() < 0.02, "{affine}");
+    let truth = DVector::from_iterator(places.len(), places.iter().map(|p| wide(p) * far(p)));
+    let around = |y: &DVector<f64>| y - &x * solver.solve(y, 1e-12).unwrap();
+    let [missed, size] = [&around(&(told - &truth)), &around(&truth)]
+        .map(|y| (y.norm_squared() / places.len() as f64).sqrt());
+    assert!(missed < 0.1 * size, "{missed} of {size}");
+}
+
 /// Near views teach nothing of what grows far away; what they teach must not do harm there.
 #[test]
 fn a_correction_from_one_distance_does_no_harm_at_another() {
