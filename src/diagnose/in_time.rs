@@ -70,7 +70,9 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
         return found;
     };
     let p_falling = falling.p_above(0.0);
-    let slowly = p_falling < level && falling.value > LEAST_VARIANCE_SHARE;
+    // What changes slowly makes next frames alike; a fall to frames that differ is chance.
+    let alike = first.p_above(fixed_share + frozen_known) < level;
+    let slowly = alike && p_falling < level && falling.value > LEAST_VARIANCE_SHARE;
     // What stands still is in the last of them whole, and in all of them where none fades.
     let last = |s: &Structure| if slowly { s.lagged[2].or(s.lagged[1]) } else { of_any_two(s) };
     let Some(least) = ViewMean::of(views, last) else { return found };

@@ -140,6 +140,22 @@ fn a_filter_in_time_is_a_filter_and_is_no_news_when_known() {
     assert!(again.is_empty(), "a known filter is {:?}", names(&again));
 }
 
+/// What changes slowly makes next frames alike: that those farther apart differ more than by chance,
+/// below nothing, is no filter.
+#[test]
+fn a_fall_to_frames_that_differ_is_no_filter() {
+    let mut rng = Seed(9).stream("noise/fall");
+    let add = |s: &mut Structure| {
+        for lag in &mut s.lagged[1..] {
+            *lag = lag.map(|c| c - 0.05);
+        }
+    };
+    let views = with(&mut rng, add);
+    let fall = ViewMean::of(&views, |s| Some(s.lagged[0]? - s.lagged[1]?)).expect("a mean");
+    assert!(fall.p_above(0.0) < LEVEL, "{fall:?}");
+    assert!(texture_findings(&views, &KnownTerms::default(), LEVEL).is_empty());
+}
+
 /// With two frames a view nobody can say whether noise stands still or fades.
 #[test]
 fn two_frames_leave_two_names() {
