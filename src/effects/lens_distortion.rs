@@ -2,6 +2,7 @@
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
 use crate::camera::Camera;
+use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct LensDistortion;
@@ -10,7 +11,7 @@ static CARD: Card = Card {
     id: "lens-distortion",
     title: "uncorrected lens distortion",
     stage: Stage::Optics,
-    summary: "the lens bends rays, so that a pixel looks elsewhere than the pinhole says: only planes that are tilted show it",
+    summary: "the lens bends rays, so that a pixel looks elsewhere than the pinhole says, which tilted planes show; a matcher that looks through it also finds its shifts against the reference stretched",
     parameters: &[Parameter {
         name: "k1",
         unit: "",
@@ -20,7 +21,7 @@ static CARD: Card = Card {
     }],
     statistic: "bias",
     axis: "radius",
-    confused_with: "radial-disparity-bias, which frontal planes show too; target-bow, which stays with the board",
+    confused_with: "radial-disparity-bias, which is as large along rows as along columns; target-bow, which stays with the board",
     reference: "Brown 1966; Burrus, Kinect calibration: k1 = -0.26 before correction",
     formula_error: 0.03,
     ..Card::BASE
@@ -40,12 +41,26 @@ impl Effect for LensDistortion {
     }
 
     fn shapes(&self, bounds: &Bounds) -> Vec<Basis> {
-        [1, 2, 4].map(|orders| bent(bounds.camera, orders)).into()
+        let mut all: Vec<Basis> =
+            [1, 2, 4].map(|orders| bent(bounds.camera, orders)).into();
+        if bounds.kind.is_none_or(|k| k == SensorKind::StructuredLight) {
+            // The reference was recorded where the sensor works.
+            let [low, high] = bounds.reach.disparity;
+            for reference_px in [low, (low * high).sqrt(), high] {
+                all.extend([1, 2].map(|orders| matched(bounds.camera, reference_px, orders)));
+            }
+        }
+        all
     }
 
     fn plain(&self, shape: Basis) -> Basis {
-        let Basis::Powers { over, times, .. } = shape else { return shape };
-        Basis::powers(over, 1, times)
+        match shape {
+            Basis::Powers { over, times, .. } => Basis::powers(over, 1, times),
+            Basis::Lens { fx, fy, reference_px, .. } => {
+                Basis::Lens { fx, fy, reference_px, orders: 1 }
+            }
+            other => other,
+        }
     }
 
     /// What is left of k1 in a depth picture that was calibrated (Khoshelham and Elberink 2012,
@@ -84,6 +99,12 @@ fn undistorted((xd, yd): (f64, f64), k1: f64) -> (f64, f64) {
 /// At a Kinect's corner (0.69) with |k1| = 0.2 each round shrinks the error to a half or less: what
 /// is left is below 1e-4 px.
 const ITERATIONS: usize = 20;
+
+/// The same where a matcher looks through the lens: it finds the shift between two spots that are both
+/// displaced, and the larger the shift the more it is stretched.
+fn matched(camera: &Camera, reference_px: f64, orders: usize) -> Basis {
+    Basis::Lens { fx: camera.fx, fy: camera.fy, reference_px, orders }
+}
 
 /// Rays shifted along the radius, seen through the slope of the target.
 fn bent(camera: &Camera, orders: usize) -> Basis {

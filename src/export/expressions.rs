@@ -72,6 +72,18 @@ impl Expressions {
                 let tail = [flag(stripes), coordinate(*over), number(*period), times(by)];
                 self.call("waves", b, tail.into())
             }
+            Basis::Lens { fx, fy, reference_px, .. } => {
+                let elsewhere = times(&Modulation::RadialSlope { fx: *fx, fy: *fy });
+                let shift = format!("(p.disparity - {})", number(*reference_px));
+                let order = |(n, b): (usize, &f64)| {
+                    let stretch =
+                        format!("{OFF_AXIS} + {} * p.x * p.x", number(2.0 * (n + 1) as f64));
+                    let whole = format!("({OFF_AXIS}) * ({elsewhere}) + ({stretch}) * {shift}");
+                    format!("{} * pow({OFF_AXIS}, {}) * ({whole})", number(*b), number(n as f64))
+                };
+                let orders: Vec<String> = b.iter().enumerate().map(order).collect();
+                format!("({})", orders.join(" + "))
+            }
             Basis::Decay { over, width } => {
                 format!("{} * exp(-({}) / {})", number(b[0]), coordinate(*over), number(*width))
             }
@@ -162,8 +174,10 @@ fn flag(on: bool) -> String {
     u8::from(on).to_string()
 }
 
+/// Square of the ray's distance from the axis.
+const OFF_AXIS: &str = "p.x * p.x + p.y * p.y";
+
 fn coordinate(over: Coordinate) -> String {
-    const OFF_AXIS: &str = "p.x * p.x + p.y * p.y";
     match over {
         Coordinate::Column => "p.u".into(),
         Coordinate::Row => "p.v".into(),

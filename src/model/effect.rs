@@ -81,6 +81,7 @@ mod tests {
                 3,
                 Modulation::RadialSlope { fx: 580.1, fy: 1745.3 / 3.0 },
             ),
+            Basis::Lens { fx: 580.1, fy: 1745.3 / 3.0, reference_px: 21.7, orders: 2 },
             Basis::powers(Coordinate::Foreshortening, 1, Modulation::Disparity),
             Basis::relief(4),
             Basis::dome(3),

@@ -3,7 +3,9 @@
 use super::coordinate::Coordinate;
 use super::modulation::Modulation;
 use super::place::PixelContext;
-use super::series::{bilinear, cubic, interpolated, node, on_ring, powers, waves, without_line};
+use super::series::{
+    bilinear, cubic, interpolated, lens, node, on_ring, powers, waves, without_line,
+};
 
 /// A term with everything but its linear coefficients settled. Terms of the bias are in px of
 /// disparity, those of the variance in its natural logarithm.
@@ -17,6 +19,9 @@ pub enum Basis {
     Polynomial { over: [Coordinate; 2], degree: usize, times: Modulation },
     /// Sine and cosine of a period, and their harmonics.
     Waves { over: Coordinate, period: f64, harmonics: usize, times: Modulation },
+    /// Radial distortion, order by order of r^2, of the lens through which a matcher sees both the scene and
+    /// its reference, which was recorded where the disparity is `reference_px`.
+    Lens { fx: f64, fy: f64, reference_px: f64, orders: usize },
     /// Falls off exponentially from where the coordinate is zero.
     Decay { over: Coordinate, width: f64 },
     /// Logarithm of one plus the coordinate: what adds to a variance.
@@ -94,6 +99,7 @@ impl Basis {
             Basis::Table { columns, .. } => columns.len(),
             Basis::Curve { nodes, .. } | Basis::Ring { nodes, .. } => *nodes,
             Basis::Map { across, down, .. } | Basis::Spline { across, down, .. } => across * down,
+            Basis::Lens { orders, .. } => *orders,
             Basis::Affine { .. } => 3,
             Basis::Pair { nodes, .. } => nodes[0] * nodes[1],
             Basis::Level | Basis::Decay { .. } | Basis::Log1p { .. } => 1,
@@ -114,6 +120,7 @@ impl Basis {
                 }
             }
             Basis::Waves { over, period, times, .. } => waves(over, period, times.value(p), p, out),
+            Basis::Lens { fx, fy, reference_px, .. } => lens([fx, fy], reference_px, p, out),
             Basis::Decay { over, width } => out[0] = (-over.value(p) / width).exp(),
             Basis::Log1p { over } => out[0] = over.value(p).ln_1p(),
             Basis::Table { z_m, theta_rad, ref columns } => {

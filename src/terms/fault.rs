@@ -90,6 +90,10 @@ impl Basis {
         match self {
             Basis::Level | Basis::Log1p { .. } | Basis::Affine { .. } => None,
             Basis::Powers { orders, .. } => some_orders(*orders),
+            Basis::Lens { reference_px, orders, .. } => {
+                within("reference_px", &[*reference_px], [0.0, MAX_BIAS_PX])
+                    .or_else(|| some_orders(*orders))
+            }
             Basis::Polynomial { degree, .. } => {
                 (!DEGREES.contains(degree)).then(|| format!("degree = {degree} is not from 2 to 4"))
             }

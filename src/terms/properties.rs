@@ -18,6 +18,7 @@ impl Basis {
             | Basis::Log1p { over }
             | Basis::Curve { over, .. }
             | Basis::Ring { over, .. } => [Some(*over), None],
+            Basis::Lens { .. } => [Some(Coordinate::RaySquared), None],
             Basis::Polynomial { over, .. } | Basis::Pair { over, .. } => over.map(Some),
             Basis::Table { .. } => [Some(Coordinate::Z), Some(Coordinate::Theta)],
             Basis::Map { .. } | Basis::Spline { .. } | Basis::Affine { .. } => {
@@ -36,6 +37,7 @@ impl Basis {
             | Basis::Map { times, .. }
             | Basis::Spline { times, .. }
             | Basis::Affine { times } => *times,
+            Basis::Lens { fx, fy, .. } => Modulation::RadialSlope { fx: *fx, fy: *fy },
             _ => Modulation::One,
         }
     }
@@ -88,7 +90,8 @@ impl Basis {
         self.times().power_of_disparity().filter(|_| still)
     }
 
-    /// Is it nothing on the optical axis, by its physics?
+    /// Is it nothing on the optical axis, by its physics? (A matcher's lens is, too, but for where its
+    /// reference was recorded, which no fit tells well.)
     pub fn is_nothing_ahead(&self) -> bool {
         matches!(
             self,
@@ -124,7 +127,9 @@ impl Basis {
 impl Term {
     pub fn needs(&self) -> Needs {
         let over = self.basis.over().into_iter().flatten();
-        over.fold(self.basis.times().needs(), |needs, over| needs.and(over.needs()))
+        let needs = over.fold(self.basis.times().needs(), |needs, over| needs.and(over.needs()));
+        // A matcher's lens stretches the disparity itself.
+        Needs { depth: needs.depth || matches!(self.basis, Basis::Lens { .. }), ..needs }
     }
 
     /// Is it the sensor's, so that it can be taken out of any picture? A board's shape is not.

@@ -4,6 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::coordinate::Coordinate;
+use super::modulation::Modulation;
 use super::place::PixelContext;
 
 /// `base` times `scale`, its square, and so on; `scale` itself after the first where there is a
@@ -17,6 +18,20 @@ pub(super) fn powers(scale: f64, base: f64, level: bool, out: &mut [f64]) {
         }
         term *= base;
         *g = term;
+    }
+}
+
+/// A spot at (x, y) is seen at (x, y) (1 + k r^2n). Its pixel then shows the disparity of another ray, and its
+/// shift against the reference is larger in the ratio in which x (1 + k r^2n) grows with x.
+pub(super) fn lens([fx, fy]: [f64; 2], reference_px: f64, p: &PixelContext, out: &mut [f64]) {
+    let square = p.x * p.x + p.y * p.y;
+    let elsewhere = Modulation::RadialSlope { fx, fy }.value(p);
+    let shift = p.disparity - reference_px;
+    let mut power = 1.0;
+    for (n, g) in out.iter_mut().enumerate() {
+        let stretch = square + 2.0 * (n + 1) as f64 * p.x * p.x;
+        *g = power * (square * elsewhere + stretch * shift);
+        power *= square;
     }
 }
 
@@ -206,6 +221,48 @@ mod tests {
             for (seen, mean) in seen.iter().zip(means) {
                 assert!((seen - mean).abs() < 2e-4, "{over:?}: {seen} {mean}");
             }
+        }
+    }
+
+    /// Against the rays themselves: spots of a tilted plane and of the reference, both seen through the lens.
+    #[test]
+    fn a_matcher_behind_a_lens_finds_what_the_columns_say() {
+        let (f, scale) = (580.0, 43.5);
+        let (at_reference, normal) = (scale / 1.5, [0.3, -0.2, 0.9]);
+        let disparity = |x: f64, y: f64| scale * (normal[0] * x + normal[1] * y + normal[2]) / 1.2;
+        for (n, k) in [(1, 1e-4), (2, -2e-4)] {
+            let mut sums = [0.0; 2];
+            let seen = |x: f64, y: f64| 1.0 + k * (x * x + y * y).powi(n);
+            for (x, y) in [(0.4, 0.3), (-0.5, 0.1), (0.0, -0.35), (0.2, 0.0)] {
+                // The same dot falls on the reference beside it, in the projector's direction.
+                let found = |x: f64, y: f64| {
+                    let shift = (disparity(x, y) - at_reference) / f;
+                    let reference = x - shift;
+                    // The matcher looks along the row; a spot's row is displaced a little, too.
+                    f * (x * seen(x, y) - reference * seen(reference, y)) + at_reference
+                };
+                let (u, v) = (x * seen(x, y), y * seen(x, y));
+                let error = found(x, y) - disparity(u, v);
+                let place = PixelContext {
+                    x: u,
+                    y: v,
+                    disparity: disparity(u, v),
+                    slope: [normal[0], normal[1]].map(|s| scale * s / 1.2 / f),
+                    ..PixelContext::default()
+                };
+                let mut row = [0.0; 2];
+                lens([f, f], at_reference, &place, &mut row);
+                let said = k * row[n as usize - 1];
+                // Taylor's remainder, of the second order in the shift and in k.
+                let order = f64::from(n);
+                let shift = (disparity(x, y) - at_reference).abs() / f;
+                let r = x.hypot(y) + shift;
+                let curved = order * (2.0 * order + 1.0) * r.powi(2 * n - 1) * shift * shift;
+                let bound = f * k.abs() * (curved + 10.0 * k.abs());
+                assert!((error - said).abs() < bound, "{n} {x} {y}: {error} {said} {bound}");
+                sums = [sums[0] + (error - said).abs(), sums[1] + said.abs()];
+            }
+            assert!(sums[0] < 0.1 * sums[1], "{n}: {sums:?}");
         }
     }
 

@@ -40,6 +40,7 @@ enum Kind {
     Spline { width: f64, height: f64, across: usize, down: usize, times: Modulation },
     Affine { disparity_power: f64 },
     Pair { over: [Coordinate; 2], low: [f64; 2], high: [f64; 2], nodes: [usize; 2] },
+    MatchedLens { fx: f64, fy: f64, reference_px: f64, orders: usize },
     // Whatever the kinds above do not hold.
     Powers { over: Coordinate, orders: usize, level: bool, times: Modulation },
     Polynomial { over: [Coordinate; 2], degree: usize, times: Modulation },
@@ -95,6 +96,9 @@ impl Kind {
                 (C::Column, M::One) => Kind::Banding { period_px: period, harmonics },
                 _ => Kind::Waves { over, period, harmonics, times },
             },
+            Basis::Lens { fx, fy, reference_px, orders } => {
+                Kind::MatchedLens { fx, fy, reference_px, orders }
+            }
             Basis::Decay { over: C::Edge, width } => Kind::EdgeMixing { width_px: width },
             Basis::Decay { over, width } => Kind::Decay { over, width },
             Basis::Log1p { over: C::Blur(lateral_px) } => Kind::SlopeNoise { lateral_px },
@@ -171,6 +175,9 @@ impl From<Kind> for Basis {
             }
             Kind::Affine { disparity_power } => Basis::Affine { times: M::still(disparity_power) },
             Kind::Pair { over, low, high, nodes } => Basis::Pair { over, low, high, nodes },
+            Kind::MatchedLens { fx, fy, reference_px, orders } => {
+                Basis::Lens { fx, fy, reference_px, orders }
+            }
             Kind::Powers { over, orders, level, times } => {
                 Basis::Powers { over, orders, level, times }
             }
@@ -242,6 +249,7 @@ mod tests {
             Basis::waves(Coordinate::Row, 30.0, 2),
             Basis::powers(Coordinate::RadiusSquared, 2, Modulation::DisparitySquared),
             Basis::Decay { over: Coordinate::Radius, width: 0.1 },
+            Basis::Lens { fx: 580.0, fy: 581.0, reference_px: 21.5, orders: 2 },
             Basis::Log1p { over: Coordinate::Light },
         ] {
             let term = Term::bias(basis, vec![0.5]);

@@ -85,6 +85,7 @@ fn bases() -> Vec<Basis> {
         Basis::Level,
         Basis::powers(C::RadiusSquared, 3, M::power(-0.7)),
         Basis::powers(C::RaySquared, 2, M::RadialSlope { fx: 72.5, fy: 72.5 }),
+        Basis::Lens { fx: 72.5, fy: 72.5, reference_px: 4.5, orders: 2 },
         Basis::powers(C::Foreshortening, 1, M::Disparity),
         Basis::Powers { over: C::LogRatio(2.0), orders: 2, level: true, times: M::One },
         Basis::Polynomial { over: [C::Theta, C::Along], degree: 4, times: M::Lift },
