@@ -4,7 +4,7 @@
 Reads the `use` lines and the `crate::`, `super::` and child-module paths of every file (tests left
 out), follows re-exports to the file that defines a name, and checks
   1. that the files' imports hold no circle; what a folder's own mod.rs declares is open to every
-     file of the folder (src/diagnose is left out: its files import one another),
+     file of the folder,
   2. that a module imports only from modules listed above it in src/lib.rs.
 Prints what breaks a rule and exits with 1.   python3 tests/structure.py [FOLDER]   (default: src)
 """
@@ -12,8 +12,6 @@ Prints what breaks a rule and exits with 1.   python3 tests/structure.py [FOLDER
 import re
 import sys
 from pathlib import Path
-
-EXEMPT = ("diagnose",)
 
 
 def strip(text):
@@ -152,7 +150,7 @@ def main():
     place = {name: k for k, name in enumerate(order)}
     name = lambda module: "::".join(module) or "lib"
     faults = []
-    inner = [(a, b) for a, b in edges if not {a[0], b[0]} & set(EXEMPT) and a[: len(b)] != b]
+    inner = [(a, b) for a, b in edges if a[: len(b)] != b]
     for group in circles(inner):
         members = set(group)
         arrows = sorted(f"{name(a)} -> {name(b)}" for a, b in inner if a in members and b in members)

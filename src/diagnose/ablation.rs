@@ -3,22 +3,9 @@
 use super::candidate::Candidate;
 use super::field::Field;
 use super::layers::Survey;
-use super::outcome::Rules;
+use super::options::Ablation;
+use super::rules::Rules;
 use crate::stats::Correlation;
-
-/// Which part is left out.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Ablation {
-    #[default]
-    None,
-    /// Every pixel of every frame counts as a sample of its own, whatever it shares with others.
-    NoCorrelation,
-    /// What gains a nat on views left out is there, as Akaike has it for one parameter: no
-    /// simulation of noise alone through the whole search, and no least size.
-    UncalibratedThresholds,
-    /// Every name has the one formula of its catalogue card; what only scales it stays free.
-    FixedFormulas,
-}
 
 impl Ablation {
     pub(super) fn rules(self, rules: Rules) -> Rules {

@@ -6,12 +6,12 @@
 
 use std::f64::consts::TAU;
 
-use super::engine::{DiagnoseOptions, FEWEST_VIEWS, measure_options};
 use super::field::Field;
 use super::known::KnownTerms;
 use super::lattice::Quantisation;
 use super::layers::Survey;
 use super::noise::texture_findings;
+use super::options::{DiagnoseOptions, FEWEST_VIEWS, measure_options};
 use super::pixels::{common, measure_tails};
 use super::reading::read;
 use super::steps::{Steps, lattice};

@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::laws::ReferencedView;
+use super::referenced_view::ReferencedView;
 use crate::camera::Camera;
 use crate::model::Effect;
 use crate::solve::Cholesky;

@@ -2,33 +2,28 @@
 
 use serde_json::{Map, Value};
 
-use super::ablation::Ablation;
-use super::bias;
 use super::case::{Case, MeanResult};
 use super::diagnosis::{Detectable, Finding, Status};
 use super::echoes::{echoes, fold_into_sigma, forget_noise_of_frames};
 use super::few_views::few_views;
 use super::field::Field;
-use super::findings;
 use super::form::better_form;
 use super::lines::lines;
 use super::missing::{self, DropoutOutcome, missing};
 use super::mixing::mixing;
 use super::naming::{doubt_beside_the_unexplained, resembles_only, temper, unname};
-use super::next_view;
-use super::other_findings;
+use super::options::{Ablation, MIN_SIZE};
 use super::outcome::Outcome;
 use super::overstated::SHARE;
 use super::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::reference::{self, can_happen};
-use super::replication_textures;
 use super::scatter::ScatterResult;
 use super::scene::Scene;
 use super::steps::{COARSE_SIGMAS, own_step, own_step_note, steps};
 use super::tails::EXCESS;
 use super::texture_finding::TextureFinding;
-use super::variance;
-use super::verdict::{MIN_SIZE, merge, symptoms};
+use super::verdict::{merge, symptoms};
+use super::{bias, findings, next_view, other_findings, replication_textures, variance};
 use crate::sensors::SensorKind;
 use crate::terms::{Axis, Statistic, corner_radius};
 

@@ -1,8 +1,8 @@
 //! The size of the noise in patches large enough for a variance.
 
-use super::layers::SurveyedView;
+use super::box_sums::SMOOTH_PX;
 use super::samples::ViewData;
-use super::texture::SMOOTH_PX;
+use super::surveyed_view::SurveyedView;
 use super::tiles::{SIDE, Tile};
 use crate::terms::{DARKEST, PixelContext};
 

@@ -2,14 +2,13 @@
 
 use std::sync::Arc;
 
-use super::ablation::Ablation;
 use super::against::Baseline;
 use super::diagnosis::Finding;
-use super::engine::{DiagnoseOptions, measure_options};
 use super::field::Field;
 use super::known::KnownTerms;
 use super::layers::Survey;
 use super::learnt::{Learnt, learnt_from};
+use super::options::{Ablation, DiagnoseOptions, measure_options};
 use super::outcome::Outcome;
 use super::pixels::{mean_of, pixel_terms, terms_of};
 use super::reading::{LoadedViews, refuse_other_size};

@@ -3,7 +3,8 @@
 use super::candidate::{Candidate, RECALIBRATE};
 use super::judge::Judged;
 use super::noise_gains::NoiseGains;
-use super::outcome::{Chosen, Rival, Rules};
+use super::outcome::{Chosen, Rival};
+use super::rules::Rules;
 use crate::terms::Basis;
 
 /// Of families that predict as well as the best, the one with the fewest columns is meant.

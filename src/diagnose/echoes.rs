@@ -89,7 +89,7 @@ mod tests {
     use std::slice::from_ref;
 
     use super::super::other_findings::named;
-    use super::super::texture_finding::one;
+    use super::super::parameters::one;
     use super::super::verdict::shares;
     use super::*;
     use crate::diagnose::{Curve, Size};

@@ -1,39 +1,13 @@
 //! The diagnosis from end to end: locate, name, model, show.
 
-use super::ablation::Ablation;
 use super::case::Case;
 use super::diagnosis::Diagnosis;
 use super::field::Field;
+use super::options::DiagnoseOptions;
 use crate::Progress;
 use crate::error::Result;
-use crate::measure::MeasureOptions;
 use crate::model::NoiseModel;
-use crate::rng::Seed;
 use crate::view::{Excluded, Recording};
-
-/// Settings of a diagnosis.
-#[derive(Debug, Clone, Copy)]
-pub struct DiagnoseOptions {
-    pub seed: Seed,
-    /// Chance that a clean recording is said to have anything wrong.
-    pub level: f64,
-    /// The model was calibrated on this very recording, causes and all: sigma is refitted beside
-    /// whatever is found, and that is no finding.
-    pub calibrated_here: bool,
-    /// Nothing, but in tests of what each part is for.
-    pub ablation: Ablation,
-}
-
-impl Default for DiagnoseOptions {
-    fn default() -> Self {
-        DiagnoseOptions {
-            seed: Seed(1),
-            level: 0.03,
-            calibrated_here: false,
-            ablation: Ablation::None,
-        }
-    }
-}
 
 /// A finished diagnosis.
 pub struct Diagnosed {
@@ -59,9 +33,6 @@ impl Diagnosed {
         self.fields[view].pixels.iter().zip(mean).map(|(&i, m)| m - at(i)).collect()
     }
 }
-
-/// Fewest views that anything is said about.
-pub const FEWEST_VIEWS: usize = 3;
 
 /// Find out what `model` leaves out of `recording`.
 ///
@@ -89,10 +60,6 @@ pub fn diagnose_against(
     progress: Progress<'_>,
 ) -> Result<Diagnosed> {
     run(recording, Some(simulated), model, options, progress)
-}
-
-pub(super) fn measure_options(options: &DiagnoseOptions) -> MeasureOptions {
-    MeasureOptions { seed: options.seed, ..MeasureOptions::default() }
 }
 
 fn run(

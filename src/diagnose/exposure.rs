@@ -3,6 +3,7 @@
 use super::edges::Edges;
 use super::field::{CLIP_SIGMAS, Field};
 use super::known::KnownTerms;
+use super::options::FRAMES_KEPT;
 use super::tiles::Places;
 use crate::camera::Rays;
 use crate::frame::{DepthTable, Frame};
@@ -15,8 +16,6 @@ use crate::terms::Term;
 const LEAST_SPREAD_PX: f64 = 0.5;
 /// A model that is right spreads residuals as the view itself does, to a few per cent.
 const FAR_OFF: f32 = 2.0;
-/// Single frames kept whole: enough for correlations in time.
-pub const FRAMES_KEPT: usize = 4;
 
 impl Field {
     /// Collect the residuals of all frames (time since the first, s).

@@ -3,11 +3,11 @@
 //! In disparity a plane is exactly affine in the image, so the residual is taken there, in px of
 //! fx * baseline / z. Nothing is cut by a RANSAC threshold: what strays is clipped, and counted.
 
+use super::box_sums::{SMOOTH_PX, high_pass};
 use super::edges::Edges;
+use super::infrared::amplitudes;
 use super::known::KnownTerms;
 use super::lattice::RawHistogram;
-use super::light::amplitudes;
-use super::texture::{SMOOTH_PX, high_pass};
 use crate::camera::Rays;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;

@@ -3,8 +3,10 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 
 use super::known::KnownTerms;
+use super::parameters::one;
 use super::structure::{Jitter, Structure};
-use super::texture_finding::{TextureFinding, one, variance_px2};
+use super::texture_finding::TextureFinding;
+use super::view_mean::variance_px2;
 use crate::terms::{Axis, Statistic};
 
 /// Motion that is not uniform, and jitter that is no white noise, differ by this share.

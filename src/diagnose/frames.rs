@@ -2,36 +2,12 @@
 
 use serde_json::json;
 
-use super::exposure::FRAMES_KEPT;
+use super::options::{FRAMES_KEPT, MIN_SIZE};
+use super::parameters::one;
 use super::structure::Structure;
-use super::texture_finding::{TextureFinding, ViewMean, nats, one};
-use super::verdict::MIN_SIZE;
+use super::texture_finding::TextureFinding;
+use super::view_mean::{ViewMean, nats};
 use crate::terms::{Axis, Statistic};
-
-/// Logarithm of each frame's mean square over the others', of rough residuals. What frames have in
-/// common, still or slowly changing, is in all of them alike. Nothing with fewer than three frames,
-/// of which none can be blamed.
-pub fn frame_log_variance(frames: &[Vec<f32>]) -> [Option<f64>; FRAMES_KEPT] {
-    let mut all = [None; FRAMES_KEPT];
-    let n = frames.len().min(FRAMES_KEPT);
-    if n < 3 {
-        return all;
-    }
-    let mut squares = [0.0; FRAMES_KEPT];
-    for k in 0..frames[0].len() {
-        let at: [f64; FRAMES_KEPT] =
-            std::array::from_fn(|j| frames.get(j).map_or(0.0, |f| f64::from(f[k]).powi(2)));
-        if at.iter().sum::<f64>().is_finite() {
-            squares.iter_mut().zip(at).for_each(|(square, r)| *square += r);
-        }
-    }
-    let whole: f64 = squares.iter().sum();
-    for (one, own) in all.iter_mut().zip(squares).take(n) {
-        let rest = (whole - own) / (n - 1) as f64;
-        *one = (own > 0.0 && rest > 0.0).then(|| (own / rest).ln());
-    }
-    all
-}
 
 /// The frame that stands out most in all views.
 pub fn unequal(views: &[Structure], level: f64) -> Option<TextureFinding> {
@@ -68,6 +44,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
+    use crate::diagnose::texture::frame_log_variance;
     use crate::rng::Seed;
 
     /// Views of four frames, 5000 pixels each, the first frame's noise times `first`.

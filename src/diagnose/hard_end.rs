@@ -1,7 +1,7 @@
 //! A hard end of the range: beyond it all is missing, by the sensor's driver or format.
 
+use super::dropout_finding::DropoutFinding;
 use super::layers::Survey;
-use super::missing::DropoutFinding;
 use super::missing_cells::Cell;
 use super::tiles::Tile;
 

@@ -7,10 +7,11 @@ use rayon::prelude::*;
 
 use super::case::Case;
 use super::diagnosis::{HeldOut, LeftOut};
-use super::layers::{Survey, SurveyedView};
+use super::layers::Survey;
 use super::outcome::Outcome;
 use super::pixels::terms_of;
 use super::samples::ViewData;
+use super::surveyed_view::SurveyedView;
 use super::tiles::Tile;
 use crate::solve::plane_through;
 use crate::terms::{Statistic, Term, by_term};

@@ -1,10 +1,10 @@
 //! What pixels repeat: in every view, in every frame of a view, and from frame to frame.
 
 use super::known::KnownTerms;
+use super::parameters::one;
 use super::structure::Structure;
-use super::texture_finding::{
-    LEAST_VARIANCE_SHARE, Shared, TextureFinding, ViewMean, nats, one, variance_px2,
-};
+use super::texture_finding::{LEAST_VARIANCE_SHARE, Shared, TextureFinding};
+use super::view_mean::{ViewMean, nats, variance_px2};
 use crate::terms::{Axis, Statistic};
 
 /// Correlations smaller than this are not worth a word.

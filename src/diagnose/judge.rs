@@ -4,7 +4,8 @@ use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain};
 use super::noise_gains::NoiseGains;
 use super::null::Null;
-use super::outcome::{Look, Rules};
+use super::outcome::Look;
+use super::rules::Rules;
 use crate::terms::Basis;
 
 pub struct Judged {

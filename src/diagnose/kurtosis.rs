@@ -11,7 +11,7 @@
 //! is none for Gaussian noise whose size changes little from x to y.
 
 use super::patches::patches;
-use super::tails::FEWEST_READINGS;
+use super::tail_counts::FEWEST_READINGS;
 
 /// Residuals farther out, in standard deviations, are [`super::tails`]' to count: one gross error of 30
 /// would outweigh a million others here.

@@ -3,17 +3,17 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::bias;
 use super::candidate::{Candidate, RECALIBRATE};
 use super::evidence::{Gain, gain};
 use super::joint::{clustered, refit};
 use super::layers::Survey;
-use super::outcome::{Chosen, Outcome, Rules};
+use super::outcome::{Chosen, Outcome};
 use super::prepared::evidence_of_bases;
+use super::rules::Rules;
 use super::samples::{ViewData, coarser};
 use super::search::search;
 use super::tiles::SIDE;
-use super::variance;
+use super::{bias, variance};
 use crate::camera::Camera;
 use crate::effects::Bounds;
 use crate::model::SigmaModel;

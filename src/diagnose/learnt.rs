@@ -2,8 +2,8 @@
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::engine::DiagnoseOptions;
 use super::known::KnownTerms;
+use super::options::DiagnoseOptions;
 use crate::model::NoiseModel;
 
 /// Views that taught a model, where they are not the ones that are looked at.

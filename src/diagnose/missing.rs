@@ -4,9 +4,10 @@
 //! factor of e and more: a finding must hold over the views. Steps on lawful axes have a name
 //! unless a nameless curve does clearly better.
 
-use serde_json::{Map, Value, json};
+use serde_json::{Map, json};
 
-use super::diagnosis::{Curve, Detectable};
+use super::diagnosis::Detectable;
+use super::dropout_finding::{DropoutFinding, NAME_ADEQUATE};
 use super::few_losses::few_losses;
 use super::field::Field;
 use super::hard_end::{HardEnd, blur};
@@ -18,34 +19,10 @@ use super::missing_search::{Judged, Losses};
 use super::missing_shapes::{Step, curves, steps};
 use super::replication::agree;
 use super::shadow::{Band, Sides, band};
-use super::texture_finding::ViewMean;
+use super::view_mean::ViewMean;
 use crate::camera::Camera;
 use crate::rng::Seed;
 use crate::terms::{Axis, Basis, Extent};
-
-/// Losses that follow an axis.
-#[derive(Debug, Clone)]
-pub struct DropoutFinding {
-    /// Id in the catalogue; `None` where no family explains it.
-    pub family: Option<&'static str>,
-    pub axis: Axis,
-    /// Where it matters, in the axis's unit.
-    pub interval: [f64; 2],
-    /// As the catalogue names them, each with value and standard error.
-    pub parameters: Map<String, Value>,
-    /// Chance that losses without a cause look as much like it anywhere in this layer.
-    pub p: f64,
-    /// Families and nameless axes beside it, nats, best first.
-    pub rivals: Vec<(&'static str, f64)>,
-    /// Nats on held-out views.
-    pub gain: f64,
-    /// Share of all pixel-frames that it took.
-    pub size: f64,
-    /// Each half of the views alone has it.
-    pub replicated: Option<bool>,
-    /// Lost share over the axis.
-    pub curve: Curve,
-}
 
 /// All that was found missing.
 #[derive(Debug, Clone, Default)]
@@ -64,8 +41,6 @@ const FEWEST_VIEWS: usize = 4;
 /// Chance of a finding on a clean recording: the steps and curves, and the shadow.
 pub const LEVEL: f64 = 0.001;
 const SHADOW_LEVEL: f64 = 0.0005;
-/// A name must explain this share of what the best nameless curve does.
-pub const NAME_ADEQUATE: f64 = 0.6;
 const MOST_FINDINGS: usize = 3;
 /// A later finding must bring this share of what the first brought.
 const LEAST_OF_FIRST: f64 = 0.1;

@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 use statrs::function::erf::erfc;
 
-use super::missing_fit::{Point, misfit};
+use super::missing_points::{Point, misfit};
 use super::missing_shapes::Step;
 use super::posterior::Posterior;
 use crate::effects;

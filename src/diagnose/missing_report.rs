@@ -3,10 +3,11 @@
 use serde_json::{Map, Value, json};
 
 use super::diagnosis::Curve;
+use super::dropout_finding::DropoutFinding;
 use super::field::Field;
-use super::missing::DropoutFinding;
 use super::missing_cells::Cell;
-use super::missing_fit::{Fitted, Point, bounded, fit, points};
+use super::missing_fit::{Fitted, fit};
+use super::missing_points::{Point, bounded, points};
 use super::missing_search::Judged;
 use super::missing_shapes::{Shape, Step};
 use super::parameters::estimate;

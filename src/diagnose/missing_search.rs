@@ -10,7 +10,7 @@ use super::missing_shapes::{Shape, Step};
 use super::noise_gains::NoiseGains;
 use super::null::Null;
 use super::replication::{Halves, agree};
-use super::texture_finding::ViewMean;
+use super::view_mean::ViewMean;
 use crate::rng::Seed;
 use crate::terms::Basis;
 

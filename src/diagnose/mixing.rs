@@ -4,7 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::edges::{Edges, INSIDE_PX};
 use super::field::Field;
-use super::texture_finding::{TextureFinding, ViewMean, nats, one};
+use super::parameters::one;
+use super::texture_finding::TextureFinding;
+use super::view_mean::{ViewMean, nats};
 use crate::stats::{bisect, mean};
 use crate::terms::{Axis, Statistic};
 

@@ -5,11 +5,10 @@ use super::frames::unequal;
 use super::in_time::in_time;
 use super::known::KnownTerms;
 use super::pairs::{REACH_PX, window_of};
-use super::parameters::estimate;
+use super::parameters::{estimate, one};
 use super::structure::Structure;
-use super::texture_finding::{
-    LEAST_VARIANCE_SHARE, Shared, TextureFinding, ViewMean, nats, one, variance_px2,
-};
+use super::texture_finding::{LEAST_VARIANCE_SHARE, Shared, TextureFinding};
+use super::view_mean::{ViewMean, nats, variance_px2};
 use super::window::{Window, part};
 use crate::terms::{Axis, Statistic};
 

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::evidence::Evidence;
-use super::outcome::Rules;
+use super::rules::Rules;
 use crate::rng::Stream;
 
 /// What noise alone may bring for a candidate: b ~ N(0, A) in every view.

@@ -3,7 +3,7 @@
 use serde_json::Map;
 
 use super::diagnosis::{Alternative, Finding, Size, Status};
-use super::missing::{DropoutFinding, NAME_ADEQUATE};
+use super::dropout_finding::{DropoutFinding, NAME_ADEQUATE};
 use super::naming::{MIN_PROBABILITY, none_of_these, physics};
 use super::texture_finding::TextureFinding;
 use crate::effects;

@@ -9,7 +9,7 @@
 use statrs::function::erf::erfc;
 
 use super::posterior::Posterior;
-use super::tails::{TAIL_EDGES, TailCounts};
+use super::tail_counts::{TAIL_EDGES, TailCounts};
 
 /// Share and scale of the far errors, each with its standard error; the scale is their standard
 /// deviation over that of the noise.

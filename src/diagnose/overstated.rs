@@ -19,8 +19,8 @@ use super::shadow::{Sides, largest_share};
 use super::steps::{contradicted, step_nats};
 use super::structure::Structure;
 use super::tails::SURE_SCALE_ERRORS;
-use super::texture_finding::{ViewMean, nats, variance_px2};
 use super::tiles::Tile;
+use super::view_mean::{ViewMean, nats, variance_px2};
 use crate::effects::logistic;
 use crate::terms::{Axis, Statistic};
 

@@ -5,7 +5,8 @@
 //! row shares; the products with a box around each pixel are that of one it shares with its
 //! neighbours. Each costs a pass over the image.
 
-use super::texture::{BoxSums, without_outliers};
+use super::box_sums::BoxSums;
+use super::texture::without_outliers;
 
 /// As far as neighbours are looked at, px.
 pub const REACH_PX: usize = 4;

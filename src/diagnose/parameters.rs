@@ -11,6 +11,13 @@ pub fn estimate(value: f64, std_error: f64) -> Value {
     json!({ "value": value, "std_error": std_error })
 }
 
+/// A single one, by its name.
+pub fn one(name: &str, value: f64, std_error: f64) -> Map<String, serde_json::Value> {
+    let mut map = Map::new();
+    map.insert(name.into(), estimate(value, std_error));
+    map
+}
+
 /// Of a family's fitted shape; a curve without a name has none.
 pub fn parameters(family: Option<&str>, fit: &Fitted) -> Map<String, Value> {
     let all = match family {

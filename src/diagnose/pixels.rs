@@ -8,7 +8,7 @@ use super::kurtosis::FourthMoment;
 use super::layers::Survey;
 use super::outcome::Outcome;
 use super::structure::Structure;
-use super::tails::{TailCounts, tail};
+use super::tail_counts::{TailCounts, tail};
 use super::texture::moving;
 use super::texture_finding::TextureFinding;
 use super::tiles::Places;

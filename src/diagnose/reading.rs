@@ -6,11 +6,11 @@ use rayon::prelude::*;
 use statrs::distribution::{Binomial, Discrete, DiscreteCDF};
 
 use super::diagnosis::Finding;
-use super::engine::FEWEST_VIEWS;
 use super::field::Field;
 use super::known::KnownTerms;
+use super::options::FEWEST_VIEWS;
 use super::other_findings::named;
-use super::texture_finding::one;
+use super::parameters::one;
 use crate::Progress;
 use crate::effects::RAY_FOR_DEPTH;
 use crate::error::{Error, Result};

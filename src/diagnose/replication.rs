@@ -10,7 +10,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::evidence::Evidence;
-use super::texture_finding::ViewMean;
+use super::view_mean::ViewMean;
 
 /// Standard errors from which on a half sees something by itself.
 const SEEN: f64 = 2.0;

@@ -9,8 +9,10 @@ use super::mixing::mean_share;
 use super::noise::expected_window;
 use super::replication::agree;
 use super::structure::Structure;
-use super::tails::{EXCESS, GAUSSIAN_TAIL};
-use super::texture_finding::{TextureFinding, ViewMean};
+use super::tail_counts::GAUSSIAN_TAIL;
+use super::tails::EXCESS;
+use super::texture_finding::TextureFinding;
+use super::view_mean::ViewMean;
 use crate::terms::{Axis, Statistic};
 
 /// A view's value beyond what the model has, in the statistic's own unit.

@@ -8,7 +8,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::diagnosis::Curve;
 use super::edges::{EdgeLoss, Edges};
 use super::null::student;
-use super::texture_finding::ViewMean;
+use super::view_mean::ViewMean;
 
 /// Losses beside the target.
 #[derive(Debug, Clone)]

@@ -4,15 +4,14 @@
 
 use rayon::prelude::*;
 
-use super::exposure::FRAMES_KEPT;
 use super::field::Field;
-use super::frames::frame_log_variance;
 use super::kurtosis::FourthMoment;
+use super::options::FRAMES_KEPT;
 use super::pairs::Pairs;
-use super::tails::{FEWEST_READINGS, TailCounts};
+use super::tail_counts::{FEWEST_READINGS, TailCounts};
 use super::texture::{
-    FAR, Filled, LONG_LINE, PROFILE_LAGS, SHORT_LINE, changes, covariance, high_passed, moving,
-    pixel_scale, same_pixel, without_lines, without_outliers,
+    FAR, Filled, LONG_LINE, PROFILE_LAGS, SHORT_LINE, changes, covariance, frame_log_variance,
+    high_passed, moving, pixel_scale, same_pixel, without_lines, without_outliers,
 };
 use crate::camera::Camera;
 use crate::stats::{Correlation, mean, measure_correlation};

@@ -4,7 +4,9 @@
 use std::borrow::Cow;
 use std::f32::consts::FRAC_1_SQRT_2;
 
+use super::box_sums::high_pass;
 use super::field::Field;
+use super::options::FRAMES_KEPT;
 use crate::camera::Camera;
 use crate::stats::{MAD_TO_SIGMA, median_in_place};
 
@@ -175,51 +177,27 @@ fn products(a: &[f32], b: &[f32]) -> f64 {
     lanes.iter().sum::<f64>() + rest
 }
 
-/// Side of the box whose mean is taken out, px: several windows, and less than a lens's bowl.
-pub const SMOOTH_PX: usize = 49;
-
-/// Sums over boxes of an image, by a summed-area table (Crow 1984).
-pub struct BoxSums {
-    /// Sum and number of the finite pixels above and left of each corner.
-    table: Vec<[f64; 2]>,
-    width: usize,
-    height: usize,
-}
-
-impl BoxSums {
-    pub fn of(image: &[f32], width: usize, height: usize) -> Self {
-        let mut table = vec![[0.0; 2]; (width + 1) * (height + 1)];
-        for v in 0..height {
-            let mut row = [0.0; 2];
-            for u in 0..width {
-                let r = image[v * width + u];
-                if r.is_finite() {
-                    row[0] += f64::from(r);
-                    row[1] += 1.0;
-                }
-                let above = table[v * (width + 1) + u + 1];
-                table[(v + 1) * (width + 1) + u + 1] = [above[0] + row[0], above[1] + row[1]];
-            }
+/// Logarithm of each frame's mean square over the others', of rough residuals. What frames have in
+/// common, still or slowly changing, is in all of them alike. Nothing with fewer than three frames,
+/// of which none can be blamed.
+pub fn frame_log_variance(frames: &[Vec<f32>]) -> [Option<f64>; FRAMES_KEPT] {
+    let mut all = [None; FRAMES_KEPT];
+    let n = frames.len().min(FRAMES_KEPT);
+    if n < 3 {
+        return all;
+    }
+    let mut squares = [0.0; FRAMES_KEPT];
+    for k in 0..frames[0].len() {
+        let at: [f64; FRAMES_KEPT] =
+            std::array::from_fn(|j| frames.get(j).map_or(0.0, |f| f64::from(f[k]).powi(2)));
+        if at.iter().sum::<f64>().is_finite() {
+            squares.iter_mut().zip(at).for_each(|(square, r)| *square += r);
         }
-        BoxSums { table, width, height }
     }
-
-    /// Sum and number of the finite pixels no farther than `reach` px from (u, v) along either axis.
-    pub fn around(&self, u: usize, v: usize, reach: usize) -> [f64; 2] {
-        let (u0, u1) = (u.saturating_sub(reach), (u + reach + 1).min(self.width));
-        let (v0, v1) = (v.saturating_sub(reach), (v + reach + 1).min(self.height));
-        let at = |u: usize, v: usize| self.table[v * (self.width + 1) + u];
-        let [a, b, c, d] = [at(u1, v1), at(u0, v1), at(u1, v0), at(u0, v0)];
-        [a[0] - b[0] - c[0] + d[0], a[1] - b[1] - c[1] + d[1]]
+    let whole: f64 = squares.iter().sum();
+    for (one, own) in all.iter_mut().zip(squares).take(n) {
+        let rest = (whole - own) / (n - 1) as f64;
+        *one = (own > 0.0 && rest > 0.0).then(|| (own / rest).ln());
     }
-}
-
-/// Minus its mean over a box of `side` px, where at least a quarter of the box is there; NaN elsewhere.
-pub fn high_pass(image: &[f32], width: usize, height: usize, side: usize) -> Vec<f32> {
-    let sums = BoxSums::of(image, width, height);
-    let minus_mean = |i: usize| {
-        let [sum, n] = sums.around(i % width, i / width, side / 2);
-        if 4.0 * n < (side * side) as f64 { f32::NAN } else { image[i] - (sum / n) as f32 }
-    };
-    (0..width * height).map(minus_mean).collect()
+    all
 }

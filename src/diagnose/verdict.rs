@@ -160,6 +160,3 @@ pub(super) fn extend<'a>(
     }
     extended
 }
-
-/// A bias or a change of variance smaller than this, in sigmas, is not told.
-pub(super) const MIN_SIZE: f64 = 0.005;

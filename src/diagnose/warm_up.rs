@@ -6,8 +6,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::laws::ReferencedView;
 use super::posterior::Posterior;
+use super::referenced_view::ReferencedView;
 use crate::stats::even;
 
 /// The drift's size in the end and its time constant as the card's own formula fits them best, with

@@ -1,9 +1,10 @@
 //! The window that a part of the noise comes through, from how correlation falls with distance.
 
+use super::box_sums::SMOOTH_PX;
 use super::posterior::Posterior;
 use super::structure::Structure;
-use super::texture::{FAR, PROFILE_LAGS, SMOOTH_PX};
-use super::texture_finding::ViewMean;
+use super::texture::{FAR, PROFILE_LAGS};
+use super::view_mean::ViewMean;
 use crate::stats::even;
 
 /// Its side, px, and the share of the variance that comes through it, each with its standard error.

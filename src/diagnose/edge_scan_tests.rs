@@ -3,6 +3,7 @@
 use rand::Rng;
 use rand_distr::{Distribution, Normal};
 
+use super::super::edges::EdgeLoss;
 use super::super::mixing::mixing;
 use super::super::shadow::{Sides, band};
 use super::*;
