@@ -1,19 +1,23 @@
 //! From findings to the diagnosis.
 
-use super::anchor::anchor;
 use super::battery::Battery;
-use super::between::between;
 use super::case::Case;
+use super::checks::far_off::far_off;
+use super::checks::heldout;
 use super::diagnosis::{DIAGNOSIS_FORMAT, Diagnosis, HeldOut, MapRow, Reference, ViewLine};
+use super::distance::laws;
+use super::distance::reference;
+use super::distance::referenced_view::{referenced_views, scatter};
 use super::engine::Diagnosed;
-use super::far_off::far_off;
-use super::field::Field;
-use super::known::KnownTerms;
-use super::outcome::Outcome;
-use super::pixels::typical_sigma_mm;
-use super::referenced_view::{referenced_views, scatter};
+use super::finding::findings;
+use super::finding::pixels::typical_sigma_mm;
+use super::joint::anchor::anchor;
+use super::search::outcome::Outcome;
 use super::verdict::{extend, not_identifiable, shares, untested, verdict};
-use super::{findings, heldout, laws, reference, thinned};
+use super::views::between::between;
+use super::views::field::Field;
+use super::views::known::KnownTerms;
+use super::views::thinned;
 use crate::effects::KINECT_BASELINE_M;
 use crate::model::{Effect, Form, NoiseModel, Searched};
 use crate::terms::{Statistic, Term};

@@ -2,7 +2,7 @@
 //! not come before the cause.
 
 use super::diagnosis::{Finding, Status};
-use super::field::Field;
+use super::views::field::Field;
 use crate::terms::{Axis, Statistic};
 
 /// Where sigma itself is off by more, a law of depth or tilt alone beside it is the rest of the same
@@ -88,10 +88,10 @@ fn excess(f: &Finding) -> f64 {
 mod tests {
     use std::slice::from_ref;
 
-    use super::super::other_findings::named;
-    use super::super::parameters::one;
-    use super::super::verdict::shares;
     use super::*;
+    use crate::diagnose::finding::other_findings::named;
+    use crate::diagnose::finding::parameters::one;
+    use crate::diagnose::verdict::shares;
     use crate::diagnose::{Curve, Size};
     use crate::plane::Plane;
 

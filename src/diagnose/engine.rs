@@ -2,8 +2,8 @@
 
 use super::case::Case;
 use super::diagnosis::Diagnosis;
-use super::field::Field;
 use super::options::DiagnoseOptions;
+use super::views::field::Field;
 use crate::Progress;
 use crate::error::Result;
 use crate::model::NoiseModel;

@@ -5,8 +5,8 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::engine::Diagnosed;
-use super::field::Field;
-use super::known::KnownTerms;
+use super::views::field::Field;
+use super::views::known::KnownTerms;
 use crate::camera::Rays;
 use crate::frame::Frame;
 use crate::measure::{MeasureOptions, Workbench};

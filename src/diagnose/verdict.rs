@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use super::blocks::BLOCK_TILES;
 use super::diagnosis::{CannotTell, Finding, Status, Verdict};
-use super::other_findings::named;
-use super::outcome::Outcome;
-use super::tiles::SIDE;
+use super::finding::other_findings::named;
+use super::search::outcome::Outcome;
+use super::views::blocks::BLOCK_TILES;
+use super::views::tiles::SIDE;
 use crate::effects;
 use crate::model::{Covariance, Effect, NoiseModel, UNEXPLAINED};
 use crate::terms::{Axis, Statistic};

@@ -1,0 +1,254 @@
+//! A simulated recording in the model's place: view by view, what the real one shows beyond it.
+//!
+//! Means are compared tile by tile, each about its own plane, and variances block by block
+//! (`against_layers`); the structure of the noise view by view (`against_textures`). Both sides'
+//! errors count.
+pub mod layers;
+pub mod noise;
+pub mod textures;
+
+use std::f64::consts::TAU;
+
+use crate::Progress;
+use crate::diagnose::finding::pixels::{common, measure_tails};
+use crate::diagnose::noise::structure::{Structure, structures};
+use crate::diagnose::noise::tails::{Confusers, tails};
+use crate::diagnose::noise::texture_finding::TextureFinding;
+use crate::diagnose::noise::texture_findings;
+use crate::diagnose::options::{DiagnoseOptions, FEWEST_VIEWS, measure_options};
+use crate::diagnose::steps::lattice::Quantisation;
+use crate::diagnose::steps::{Steps, lattice};
+use crate::diagnose::views::field::Field;
+use crate::diagnose::views::known::KnownTerms;
+use crate::diagnose::views::layers::Survey;
+use crate::diagnose::views::reading::read;
+use crate::error::{Error, Result};
+use crate::measure::Workbench;
+use crate::model::NoiseModel;
+use crate::view::{Recording, Sensor};
+
+/// The simulated views, in the order of the real ones they belong to.
+pub struct Baseline {
+    pub fields: Vec<Field>,
+    pub(in crate::diagnose) survey: Survey,
+    pub(in crate::diagnose) structure: Vec<Structure>,
+    pub(in crate::diagnose) textures: Vec<TextureFinding>,
+    pub(in crate::diagnose) lattice: Quantisation,
+    /// Variance with another name.
+    pub steps: Steps,
+    pub(in crate::diagnose) heavy: bool,
+    /// What was odd, in words.
+    pub remarks: Vec<String>,
+}
+
+/// Numbers of two cameras that differ by less are the same, as a share.
+const SAME: f64 = 0.01;
+
+impl Baseline {
+    /// Read `simulated` and keep of `fields` those views that have a partner there.
+    pub fn of(
+        simulated: &Recording,
+        real: &Sensor,
+        fields: &mut Vec<Field>,
+        model: &NoiseModel,
+        options: &DiagnoseOptions,
+        progress: Progress<'_>,
+    ) -> Result<Self> {
+        // Disparities of both in the same px.
+        let sensor = Sensor { baseline_m: real.baseline_m, ..simulated.sensor.clone() };
+        same_sensor(real, &simulated.sensor)?;
+        let bench = Workbench::new(&sensor, measure_options(options));
+        let known = KnownTerms::of(model, &sensor.camera);
+        let (theirs, excluded) = read(simulated, &bench, model, &known, progress);
+        let mut remarks: Vec<String> =
+            excluded.iter().map(|e| format!("of the simulated recording, {e}")).collect();
+        let poses = |fields: &[Field]| fields.iter().map(Pose::of).collect::<Vec<_>>();
+        let partner = partners(&poses(fields), &poses(&theirs));
+        let all = fields.len();
+        let mut left: Vec<Option<Field>> = theirs.into_iter().map(Some).collect();
+        let mut kept = Vec::new();
+        let mut theirs = Vec::new();
+        for (field, partner) in fields.drain(..).zip(partner) {
+            match partner.and_then(|p| left[p].take()) {
+                Some(twin) => {
+                    kept.push(field);
+                    theirs.push(twin);
+                }
+                None => remarks.push(format!(
+                    "view {} was left out: the simulated recording has no view of this pose",
+                    field.name
+                )),
+            }
+        }
+        *fields = kept;
+        if theirs.len() < FEWEST_VIEWS {
+            return Err(Error::NotEnough {
+                what: format!("{} of {all} views have a partner in {}", theirs.len(), simulated.root.display()),
+                remedy: "simulate the very views of the recording (kinoise simulate OUT --like REC), three at least".into(),
+            });
+        }
+        let unused = left.iter().flatten().count();
+        if unused > 0 {
+            remarks.push(format!("{unused} simulated views have no partner in the recording"));
+        }
+        let mut baseline = Baseline::measured(simulated, theirs, &bench, options);
+        baseline.remarks = remarks;
+        Ok(baseline)
+    }
+
+    fn measured(
+        simulated: &Recording,
+        fields: Vec<Field>,
+        bench: &Workbench<'_>,
+        options: &DiagnoseOptions,
+    ) -> Self {
+        let camera = &bench.sensor.camera;
+        let none = KnownTerms::default();
+        let mut survey = Survey::of(&fields, camera, &bench.rays);
+        survey.by_light = false;
+        let mut structure = structures(&fields, camera, &[]);
+        let textures = texture_findings(&structure, &none, 0.03 * options.level);
+        survey.compare_frames(&fields, common(&structure, &textures, &none));
+        measure_tails(&mut structure, &fields, &[], &[], &survey, bench);
+        let lattice = lattice(&fields, simulated);
+        let steps = Steps::of(&lattice, &structure, &fields, simulated);
+        let confusers = Confusers { uneven: false, simulated: true };
+        Baseline {
+            heavy: tails(&structure, &none, 0.03 * options.level, confusers).is_some(),
+            fields,
+            survey,
+            structure,
+            textures,
+            lattice,
+            steps,
+            remarks: Vec::new(),
+        }
+    }
+
+    /// Distances by other means, off by what the simulated view's own are off.
+    pub fn references(&self, fields: &mut [Field]) {
+        for (real, twin) in fields.iter_mut().zip(&self.fields) {
+            if let (Some(reference), Some(own)) =
+                (&mut real.reference_distance_m, twin.reference_distance_m)
+            {
+                *reference += twin.plane.depth(0.0, 0.0) - own;
+            }
+        }
+    }
+}
+
+/// Pictures can be laid over one another only when one camera took both.
+fn same_sensor(real: &Sensor, simulated: &Sensor) -> Result<()> {
+    let (a, b) = (&real.camera, &simulated.camera);
+    let remedy = "simulate the sensor of the recording: the same recording.json";
+    let differ = |what: String| Err(Error::Argument { what, remedy });
+    if (a.width, a.height) != (b.width, b.height) {
+        return differ(format!(
+            "--against: its images are {} x {} px, the recording's {} x {}",
+            b.width, b.height, a.width, a.height
+        ));
+    }
+    let baselines = [real.baseline_m, simulated.baseline_m].map(|b| b.unwrap_or(f64::NAN));
+    let numbers = [
+        ("fx", a.fx, b.fx, a.fx),
+        ("fy", a.fy, b.fy, a.fy),
+        ("cx", a.cx, b.cx, a.fx),
+        ("cy", a.cy, b.cy, a.fy),
+        ("baseline_m", baselines[0], baselines[1], baselines[0]),
+    ];
+    match numbers.iter().find(|(_, a, b, scale)| (a - b).abs() > SAME * scale) {
+        None => Ok(()),
+        Some((name, a, b, _)) => {
+            differ(format!("--against: another sensor: its {name} is {b}, the recording's {a}"))
+        }
+    }
+}
+
+/// Where a view's plane is.
+#[derive(Debug, Clone)]
+pub struct Pose {
+    name: String,
+    z_m: f64,
+    theta_rad: f64,
+    azimuth_rad: f64,
+}
+
+/// Poses farther apart are different ones: a share of the distance, tilt, direction of the tilt.
+const Z_SHARE: f64 = 0.1;
+const THETA_RAD: f64 = 8.0 * TAU / 360.0;
+const AZIMUTH_RAD: f64 = 30.0 * TAU / 360.0;
+/// Below this tilt a plane has no direction.
+const TILTED_RAD: f64 = 10.0 * TAU / 360.0;
+
+impl Pose {
+    pub fn of(field: &Field) -> Self {
+        Pose {
+            name: field.name.clone(),
+            z_m: field.plane.depth(0.0, 0.0),
+            theta_rad: field.plane.theta(),
+            azimuth_rad: field.plane.azimuth(),
+        }
+    }
+
+    /// In tolerances; `None` where one is exceeded.
+    fn off(&self, other: &Pose) -> Option<f64> {
+        let z = (other.z_m - self.z_m).abs() / (Z_SHARE * self.z_m);
+        let theta = (other.theta_rad - self.theta_rad).abs() / THETA_RAD;
+        let turned = (other.azimuth_rad - self.azimuth_rad).rem_euclid(TAU);
+        let tilted = self.theta_rad.max(other.theta_rad) > TILTED_RAD;
+        let azimuth = if tilted { turned.min(TAU - turned) / AZIMUTH_RAD } else { 0.0 };
+        (z.max(theta).max(azimuth) <= 1.0).then_some(z + theta + azimuth)
+    }
+}
+
+/// For each real view the number of its simulated one; none serves twice. A name alone is not
+/// enough: numbered views of two recordings have the same names.
+pub fn partners(real: &[Pose], simulated: &[Pose]) -> Vec<Option<usize>> {
+    let mut pairs: Vec<(bool, f64, usize, usize)> = Vec::new();
+    for (i, r) in real.iter().enumerate() {
+        for (j, s) in simulated.iter().enumerate() {
+            if let Some(off) = r.off(s) {
+                pairs.push((r.name != s.name, off, i, j));
+            }
+        }
+    }
+    pairs.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then((a.2, a.3).cmp(&(b.2, b.3))));
+    let mut found = vec![None; real.len()];
+    let mut taken = vec![false; simulated.len()];
+    for (_, _, i, j) in pairs {
+        if found[i].is_none() && !taken[j] {
+            (found[i], taken[j]) = (Some(j), true);
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pose(name: &str, z_m: f64, theta_deg: f64, azimuth_deg: f64) -> Pose {
+        let (theta_rad, azimuth_rad) = (theta_deg.to_radians(), azimuth_deg.to_radians());
+        Pose { name: name.into(), z_m, theta_rad, azimuth_rad }
+    }
+
+    #[test]
+    fn names_come_first_then_poses_and_none_serves_twice() {
+        let real = [
+            pose("a", 1.0, 30.0, 179.0),
+            pose("b", 1.0, 2.0, 90.0),
+            pose("c", 2.0, 0.0, 0.0),
+            pose("d", 2.0, 40.0, 0.0),
+        ];
+        let simulated = [
+            pose("c", 2.1, 0.0, 0.0),
+            // The name of a, the pose of another.
+            pose("a", 3.0, 30.0, 179.0),
+            pose("x", 1.02, 33.0, -175.0),
+            pose("y", 0.97, 1.0, 0.0),
+            pose("z", 0.98, 1.0, 0.0),
+        ];
+        let found = partners(&real, &simulated);
+        assert_eq!(found, [Some(2), Some(4), Some(0), None]);
+    }
+}

@@ -1,0 +1,267 @@
+//! Against a simulated recording: the size of the noise that stands still within a view, of the noise that
+//! changes from frame to frame, and of the light that both come with.
+//!
+//! The total hides causes from one another. Laser speckle stands still as long as the scene does, read and
+//! shot noise change, a larger window averages both alike, and a target that moves turns what stood
+//! still into what changes. The views are the sample of each.
+
+use nalgebra::{DMatrix, DVector};
+use serde_json::Map;
+
+use super::Baseline;
+use crate::diagnose::finding::parameters::one;
+use crate::diagnose::noise::frame_means::velocity;
+use crate::diagnose::noise::in_time::{later, of_any_two};
+use crate::diagnose::noise::structure::Structure;
+use crate::diagnose::noise::texture_finding::TextureFinding;
+use crate::diagnose::noise::view_mean::{ViewMean, nats};
+use crate::diagnose::views::field::Field;
+use crate::solve::fit_by_svd;
+use crate::stats::{mean as mean_of_all, range};
+use crate::terms::{Axis, ROOM_LUX, Statistic};
+
+/// That the noise differs is known by then: a sign of why need be no surer than this.
+pub const NAMED_LEVEL: f64 = 0.05;
+/// A part of the noise below this share is lost in the other.
+const MIN_PART: f64 = 0.005;
+
+/// What a view's noise is beside the simulated one's.
+struct View {
+    /// Variance over the simulated one's, natural logarithms.
+    still: f64,
+    changing: f64,
+    /// Variance over the simulated one's, less one.
+    total: f64,
+    /// How much more the correlation of two frames falls with the time between them.
+    falls: f64,
+    /// Of this view's variance, what stands still.
+    share: f64,
+    pixels: f64,
+}
+
+impl View {
+    fn of(real: &Structure, twin: &Structure) -> Option<Self> {
+        let parts = |s: &Structure| {
+            // What stands still in every view is a pattern of the sensor's.
+            let fixed = s.fixed_px2.unwrap_or(0.0).max(0.0) / s.variance_px2.max(1e-12);
+            let all = of_any_two(s).filter(|c| (MIN_PART..1.0 - MIN_PART).contains(c))?;
+            let still = Some(all - fixed).filter(|still| *still > MIN_PART)?;
+            Some([still * s.variance_px2, (1.0 - all) * s.variance_px2])
+        };
+        let fall = |s: &Structure| Some(s.lagged[0]? - later(s)?);
+        let (ours, theirs) = (parts(real)?, parts(twin)?);
+        Some(View {
+            still: (ours[0] / theirs[0]).ln(),
+            changing: (ours[1] / theirs[1]).ln(),
+            total: real.variance_px2 / twin.variance_px2 - 1.0,
+            falls: fall(real).zip(fall(twin)).map_or(f64::NAN, |(r, t)| r - t),
+            share: ours[0] / real.variance_px2,
+            pixels: real.pixels,
+        })
+    }
+}
+
+/// Which way each part of the noise differs from the simulated one's, if it does.
+pub struct NoiseParts {
+    views: Vec<View>,
+    still: ViewMean,
+    changing: ViewMean,
+    /// What stands still less what changes.
+    apart: ViewMean,
+    level: f64,
+}
+
+impl NoiseParts {
+    fn of(real: &[Structure], twins: &[Structure], level: f64) -> Option<Self> {
+        let views: Vec<View> = real.iter().zip(twins).filter_map(|(r, t)| View::of(r, t)).collect();
+        let mean = |of: fn(&View) -> f64| mean(&views, of);
+        let (still, changing) = (mean(|v| v.still)?, mean(|v| v.changing)?);
+        let apart = mean(|v| v.still - v.changing)?;
+        Some(NoiseParts { still, changing, apart, views, level })
+    }
+
+    fn up(&self, m: &ViewMean) -> bool {
+        m.p_above(0.0) < self.level
+    }
+
+    fn down(&self, m: &ViewMean) -> bool {
+        m.p_below(0.0) < self.level
+    }
+
+    /// Less of both by about the same factor: averaged over more pixels.
+    pub fn shrink_alike(&self) -> bool {
+        let alike = !self.up(&self.apart) && !self.down(&self.apart);
+        self.down(&self.still) && self.down(&self.changing) && alike
+    }
+
+    /// Root of the share by which the variance differs.
+    fn size_sigma(&self) -> f64 {
+        mean(&self.views, |v| v.total).map_or(0.0, |m| m.value.abs().sqrt())
+    }
+
+    /// Does the still part become the changing one, as where the target moves under the pattern?
+    fn renews(&self, velocity_p: f64) -> bool {
+        let falls = mean(&self.views, |v| v.falls).map_or(1.0, |m| m.p_above(0.0));
+        self.down(&self.still) && self.up(&self.changing) && falls.min(velocity_p) < NAMED_LEVEL
+    }
+
+    fn finding(&self, velocity: Option<(f64, f64, f64)>) -> Option<TextureFinding> {
+        if self.renews(velocity.map_or(1.0, |v| v.2)) {
+            return Some(TextureFinding {
+                families: vec!["target-motion"],
+                statistic: Statistic::Bias,
+                parameters: velocity.map_or_else(Map::new, |v| one("velocity_mps", v.0, v.1)),
+                p: self.still.p_below(0.0).max(self.changing.p_above(0.0)),
+                nats: nats(&self.still, 0.0) + nats(&self.changing, 0.0),
+                ..self.texture()
+            });
+        }
+        // Blur and steps make more of both, and more so of what changes.
+        if self.up(&self.still) && self.apart.p_above(0.0) < NAMED_LEVEL {
+            return Some(TextureFinding {
+                families: vec!["frozen-noise"],
+                statistic: Statistic::Correlation,
+                parameters: mean(&self.views, |v| v.share)
+                    .map_or_else(Map::new, |m| one("fraction", m.value, m.std_error)),
+                p: self.still.p_above(0.0),
+                nats: nats(&self.still, 0.0),
+                ..self.texture()
+            });
+        }
+        let differs = [&self.still, &self.changing].map(|m| self.up(m) || self.down(m));
+        let factor = |m: &ViewMean| (0.5 * m.value).exp();
+        let words = format!(
+            "the noise that changes from frame to frame is {:.2} times the simulation's, and what stands still {:.2} times",
+            factor(&self.changing),
+            factor(&self.still)
+        );
+        differs.contains(&true).then(|| TextureFinding {
+            statistic: Statistic::Variance,
+            p: [&self.still, &self.changing]
+                .map(|m| m.p_above(0.0).min(m.p_below(0.0)))
+                .into_iter()
+                .fold(1.0, f64::min),
+            nats: nats(&self.changing, 0.0).max(nats(&self.still, 0.0)),
+            words: Some(words),
+            ..self.texture()
+        })
+    }
+
+    fn texture(&self) -> TextureFinding {
+        TextureFinding {
+            families: Vec::new(),
+            statistic: Statistic::Variance,
+            axis: Axis::Frame,
+            interval: [0.0, 0.0],
+            parameters: Map::new(),
+            size_sigma: self.size_sigma(),
+            p: 1.0,
+            nats: 0.0,
+            words: None,
+        }
+    }
+}
+
+fn mean(views: &[View], of: impl Fn(&View) -> f64) -> Option<ViewMean> {
+    let values = views.iter().map(|v| (of(v), v.pixels)).filter(|v| v.0.is_finite());
+    ViewMean::weighed(&values.collect::<Vec<_>>())
+}
+
+impl Baseline {
+    /// How the parts of the noise compare; `None` where one of them can hardly be seen.
+    pub fn noise_parts(&self, real: &[Structure], level: f64) -> Option<NoiseParts> {
+        NoiseParts::of(real, &self.structure, level)
+    }
+
+    /// What the parts of the noise, and the infrared images, say.
+    pub fn noise_findings(
+        &self,
+        parts: Option<&NoiseParts>,
+        real: &[Structure],
+        fields: &[Field],
+        level: f64,
+    ) -> Vec<TextureFinding> {
+        let light = ambient_light(fields, &self.fields, level);
+        // Light of the room is more noise of the image itself.
+        let of_light = |f: &TextureFinding| light.is_some() && f.families.is_empty();
+        let noise = parts.and_then(|p| p.finding(velocity(real))).filter(|f| !of_light(f));
+        noise.into_iter().chain(light).collect()
+    }
+}
+
+/// A line through fewer has next to no error to be judged by.
+const MIN_LIT_VIEWS: usize = 4;
+
+/// One recording's light over the other's, view by view: a line.
+struct LightLine {
+    /// Its height less the other's at the darkest view, and where the other has no light.
+    lift: ViewMean,
+    at_no_light: ViewMean,
+    slope: f64,
+}
+
+impl LightLine {
+    /// Of pairs [other, one].
+    fn of(pairs: &[[f64; 2]]) -> Option<Self> {
+        let n = pairs.len();
+        if n < MIN_LIT_VIEWS {
+            return None;
+        }
+        let [darkest, _] = range(pairs.iter().map(|p| p[0]));
+        // Errors are shares of the light.
+        let x = DMatrix::from_fn(n, 2, |i, k| [1.0, pairs[i][0] - darkest][k] / pairs[i][0]);
+        let y = DVector::from_fn(n, |i, _| pairs[i][1] / pairs[i][0]);
+        let (line, rank) = fit_by_svd(&x, &y)?;
+        if rank < 2 {
+            return None;
+        }
+        let left = (&y - &x * &line).norm_squared() / (n - 2) as f64;
+        let covariance = (x.transpose() * &x).try_inverse()? * left;
+        let mean = |at: f64, height: f64| {
+            let variance =
+                covariance[(0, 0)] + at * (at * covariance[(1, 1)] - 2.0 * covariance[(0, 1)]);
+            ViewMean { value: height, std_error: variance.sqrt(), views: n as f64 - 1.0 }
+        };
+        Some(LightLine {
+            lift: mean(0.0, line[0] - darkest),
+            at_no_light: mean(darkest, line[0] - darkest * line[1]),
+            slope: line[1],
+        })
+    }
+}
+
+/// Light of the room: the infrared images are lighter than the simulated ones by a constant, in the darkest
+/// view as in the lightest. More or less light of the pattern would be a factor. Poses that differ a little
+/// make either line flatter than it is, so that both must say so.
+fn ambient_light(real: &[Field], twins: &[Field], level: f64) -> Option<TextureFinding> {
+    let lit = real.iter().zip(twins).filter_map(|(r, t)| Some([t.infrared?, r.infrared?]));
+    let pairs: Vec<[f64; 2]> = lit.filter(|p| p[0] > 0.0 && p[1] > 0.0).collect();
+    let swapped: Vec<[f64; 2]> = pairs.iter().map(|p| [p[1], p[0]]).collect();
+    let LightLine { lift, at_no_light, slope } = LightLine::of(&pairs)?;
+    let other_way = LightLine::of(&swapped)?.at_no_light.p_below(0.0);
+    let p = lift.p_above(0.0).max(at_no_light.p_above(0.0)).max(other_way);
+    if p >= level || slope <= 0.0 {
+        return None;
+    }
+    // Over the pattern's on a surface that faces the sensor at 1 m, by the lux of the real room.
+    let ratios = real.iter().zip(twins).filter_map(|(r, t)| {
+        let lux = r.ambient_lux.unwrap_or(ROOM_LUX).max(1.0);
+        Some(at_no_light.value / (slope * t.pattern_at_1m()?) * ROOM_LUX / lux)
+    });
+    let ratio = mean_of_all(ratios)?;
+    Some(TextureFinding {
+        families: vec!["ambient-light"],
+        statistic: Statistic::Variance,
+        axis: Axis::Intensity,
+        interval: range(pairs.iter().map(|p| p[1])),
+        parameters: one("ratio", ratio, ratio * at_no_light.std_error / at_no_light.value),
+        size_sigma: 0.0,
+        p,
+        nats: nats(&lift, 0.0).min(nats(&at_no_light, 0.0)),
+        words: None,
+    })
+}
+
+#[cfg(test)]
+#[path = "noise_tests.rs"]
+mod tests;

@@ -1,0 +1,125 @@
+//! Against a simulated recording: the structure of the noise and steps, view by view.
+
+use super::Baseline;
+use crate::diagnose::noise::in_time::still_level;
+use crate::diagnose::noise::structure::Structure;
+use crate::diagnose::noise::texture_finding::TextureFinding;
+use crate::diagnose::noise::texture_findings;
+use crate::diagnose::steps::lattice::Quantisation;
+use crate::diagnose::views::known::KnownTerms;
+use crate::diagnose::views::layers::Survey;
+use crate::stats::{mean, range};
+
+/// Tails of two recordings are no news within this factor: gross errors come in clumps.
+const TAILS_ALIKE: f64 = 3.0;
+
+impl Baseline {
+    /// Replace each statistic of the real views by its difference to the twin's, on the level of
+    /// the simulated recording; what that level is goes to `known`.
+    pub fn compare(
+        &self,
+        structure: &mut [Structure],
+        real: &Quantisation,
+        known: &mut KnownTerms,
+    ) {
+        let ours = structure;
+        let level = |of: &dyn Fn(&Structure) -> Option<f64>| {
+            mean(self.structure.iter().filter_map(of)).unwrap_or(0.0)
+        };
+        let windows = level(&|s| s.window_px.map(f64::ln));
+        let (fixed, rows) = (level(&|s| s.fixed_px2), level(&|s| s.row_px2));
+        let columns = level(&|s| s.column_px2);
+        let lags: [f64; 3] = std::array::from_fn(|k| level(&|s| s.lagged[k]));
+        for (s, twin) in ours.iter_mut().zip(&self.structure) {
+            let differ = |real: &mut Option<f64>, twin: Option<f64>, level: f64| {
+                *real = real.zip(twin).map(|(r, t)| r - t + level);
+            };
+            s.window_px = s.window_px.zip(twin.window_px).map(|(r, t)| r / t * windows.exp());
+            differ(&mut s.fixed_px2, twin.fixed_px2, fixed.max(0.0));
+            differ(&mut s.row_px2, twin.row_px2, rows.max(0.0));
+            // Nothing is known of columns: what both have must vanish.
+            differ(&mut s.column_px2, twin.column_px2, columns.min(0.0));
+            differ(&mut s.lines_px2, twin.lines_px2, 0.0);
+            s.frame_log_variance
+                .iter_mut()
+                .zip(twin.frame_log_variance)
+                .for_each(|(r, t)| differ(r, t, 0.0));
+            for (k, lag) in lags.iter().enumerate() {
+                if twin.lagged[k].is_some() {
+                    differ(&mut s.lagged[k], twin.lagged[k], *lag);
+                }
+            }
+        }
+        known.learn("spatial-correlation", "length_px", windows.exp());
+        known.learn("fixed-pattern-noise", "sigma_px", fixed.max(0.0).sqrt());
+        known.learn("row-noise", "sigma_px", rows.max(0.0).sqrt());
+        let still = still_level(&self.structure).filter(|share| *share > 0.0);
+        if let Some(share) = still {
+            known.learn("frozen-noise", "fraction", share);
+        }
+        let once = ["frozen-noise", "temporal-correlation", "frame-jitter", "target-motion"];
+        let once = &once[usize::from(still.is_some())..];
+        for texture in &self.textures {
+            for id in once.iter().filter(|id| texture.families.contains(id)) {
+                for (name, value) in &texture.parameters {
+                    known.learn(id, name, value["value"].as_f64().unwrap_or(0.0));
+                }
+            }
+        }
+        if self.heavy {
+            known.learn("heavy-tails", "fraction", 0.0);
+        }
+        let alike = |a: Option<f64>, b: Option<f64>| {
+            a.zip(b).is_some_and(|(a, b)| (a / b).ln().abs() < STEPS_ALIKE)
+        };
+        if alike(self.lattice.disparity_step_px, real.disparity_step_px) {
+            known.learn("disparity-quantisation", "step_px", 0.0);
+        }
+        if alike(self.lattice.depth_step_m, real.depth_step_m) {
+            known.learn("depth-rounding", "step_m", 0.0);
+        }
+    }
+
+    /// Are the recording's tails no heavier than those of the simulation, by much?
+    pub fn tails_alike(&self, real: &[Structure]) -> bool {
+        let tail = |all: &[Structure]| {
+            mean(all.iter().filter(|s| s.tails.n > 0.0).map(|s| s.tails.share())).unwrap_or(0.0)
+        };
+        tail(real) < TAILS_ALIKE * tail(&self.structure)
+    }
+
+    /// Is as much lost of the targets on the whole as in the simulated views?
+    pub fn loses_alike(&self, real: &Survey) -> bool {
+        let shares = [real, &self.survey].map(lost_share);
+        let [less, more] = range(shares);
+        more < LOSSES_ALIKE * less + NEGLIGIBLE_DROPOUT
+    }
+
+    /// What the simulation shows and the recording does not, in words.
+    pub fn too_much(&self, real: &[Structure], level: f64) -> Vec<String> {
+        let ours = texture_findings(real, &KnownTerms::default(), level);
+        let names = |all: &[TextureFinding]| -> Vec<&'static str> {
+            all.iter().filter_map(|h| h.families.first().copied()).collect()
+        };
+        let shown = names(&ours);
+        names(&self.textures)
+            .into_iter()
+            .filter(|id| !shown.contains(id))
+            .map(|id| format!("the simulated recording shows {id}, the real one does not"))
+            .collect()
+    }
+}
+
+/// Steps that differ by less are the same, as a logarithm.
+const STEPS_ALIKE: f64 = 0.05;
+/// Lost shares that differ by less than this factor, and this much, are the same: what lies at the range's
+/// end is lost or not by chance.
+const LOSSES_ALIKE: f64 = 1.2;
+const NEGLIGIBLE_DROPOUT: f64 = 0.0005;
+
+/// Of all that was asked of the target's pixels.
+fn lost_share(survey: &Survey) -> f64 {
+    let tiles = || survey.views.iter().flat_map(|v| v.tiles.iter());
+    let asked: f64 = tiles().map(|t| t.asked).sum();
+    tiles().map(|t| t.asked * t.missing).sum::<f64>() / asked.max(1.0)
+}

@@ -1,0 +1,54 @@
+//! The engine with one of its parts taken out, to show what that part is for. Only tests ask for it.
+
+use crate::diagnose::options::Ablation;
+use crate::diagnose::search::candidate::Candidate;
+use crate::diagnose::search::rules::Rules;
+use crate::diagnose::views::field::Field;
+use crate::diagnose::views::layers::Survey;
+use crate::stats::Correlation;
+
+impl Ablation {
+    pub(in crate::diagnose) fn rules(self, rules: Rules) -> Rules {
+        match self {
+            Ablation::UncalibratedThresholds => Rules { calibrated: false, least: 0.0, ..rules },
+            _ => rules,
+        }
+    }
+
+    pub(in crate::diagnose) fn candidates(self, all: Vec<Candidate>) -> Vec<Candidate> {
+        if self != Ablation::FixedFormulas {
+            return all;
+        }
+        let mut fixed: Vec<Candidate> = Vec::new();
+        for mut candidate in all {
+            if let Some(effect) = candidate.effect() {
+                candidate.basis = effect.plain(candidate.basis);
+            }
+            let same = |c: &Candidate| (c.family, &c.basis) == (candidate.family, &candidate.basis);
+            if !fixed.iter().any(same) {
+                fixed.push(candidate);
+            }
+        }
+        fixed
+    }
+
+    /// Smaller terms, in sigmas, are not reported.
+    pub(in crate::diagnose) fn min_size(self, least: f64) -> f64 {
+        if self == Ablation::UncalibratedThresholds { 0.0 } else { least }
+    }
+}
+
+impl Survey {
+    pub(in crate::diagnose) fn ablate(&mut self, ablation: Ablation, fields: &[Field]) {
+        self.ablation = ablation;
+        if ablation != Ablation::NoCorrelation {
+            return;
+        }
+        for (view, field) in self.views.iter_mut().zip(fields) {
+            view.inflation /= view.correlation.sum;
+            view.correlation =
+                Correlation { sum: 1.0, sum_of_squares: 1.0, ..view.correlation.clone() };
+            view.frames = field.frames.len() as f64;
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! The battery once more, against the extended model: the same layers and thresholds on the same
+//! views, with everything that was found taken out of the residuals in memory.
+
+use crate::diagnose::battery::Battery;
+use crate::diagnose::case::{Case, MeanResult};
+use crate::diagnose::diagnosis::{After, Finding, Remaining};
+use crate::diagnose::finding::pixels::pixel_terms;
+use crate::diagnose::verdict::verdict;
+use crate::diagnose::views::field::Field;
+use crate::diagnose::views::known::KnownTerms;
+use crate::model::{Effect, NoiseModel};
+use crate::terms::Term;
+
+/// What the second run leaves behind.
+pub struct Again {
+    pub after: After,
+    /// The views, their means as they were; single frames are spent.
+    pub fields: Vec<Field>,
+    /// The simulated views, where there are any.
+    pub against: Vec<Field>,
+}
+
+impl Case<'_> {
+    /// What stands out against `extended`; the first run `explained` so many nats.
+    pub fn after(mut self, extended: &NoiseModel, mean: &MeanResult, explained: f64) -> Again {
+        let added = self.added(extended);
+        let known = KnownTerms::of(extended, &self.sensor().camera);
+        let means: Vec<Vec<f32>> = self.fields.iter().map(|f| f.mean.clone()).collect();
+        let bias = self.bias_px(&added.bias, mean);
+        let spread = pixel_terms(&self.fields, &added.variance, &self.survey, &self.bench);
+        let mut fields = std::mem::take(&mut self.fields);
+        for (n, field) in fields.iter_mut().enumerate() {
+            bias.get(n).into_iter().for_each(|b| take_out(field, b));
+            for (sigma, log) in field.sigma.iter_mut().zip(spread.get(n).into_iter().flatten()) {
+                *sigma *= (0.5 * log).exp();
+            }
+        }
+        let mut case = self.again(fields, known, extended);
+        let battery = case.battery(false);
+        for (field, mean) in case.fields.iter_mut().zip(means) {
+            field.mean = mean;
+            field.first.clear();
+        }
+        let against = case.baseline.map_or_else(Vec::new, |b| b.fields);
+        Again { after: after(&battery, explained), fields: case.fields, against }
+    }
+
+    /// What the extended model has beyond the one that was given, as terms.
+    fn added(&self, extended: &NoiseModel) -> KnownTerms {
+        // Words that are ranges were read as such.
+        let read = |e: &Effect| self.ranges.is_some() && e.id == "range-not-depth";
+        let mut beyond = extended.clone();
+        beyond.effects.drain(..self.model.effects.len());
+        beyond.effects.retain(|e| !read(e));
+        KnownTerms::of(&beyond, &self.sensor().camera)
+    }
+
+    /// Terms at every pixel, px: as the search left them but for those that were not told, and for
+    /// what other layers learnt.
+    fn bias_px(&self, terms: &[Term], mean: &MeanResult) -> Vec<Vec<f32>> {
+        let beyond = |all: &[Term], others: &[Term], sign: f64| -> Vec<Term> {
+            let other = all.iter().filter(|t| !others.contains(t));
+            let signed = |t: &Term| {
+                let coefficients = t.coefficients.iter().map(|c| sign * c).collect();
+                Term { coefficients, ..t.clone() }
+            };
+            other.map(signed).collect()
+        };
+        let mut differ = beyond(terms, &mean.terms, 1.0);
+        differ.extend(beyond(&mean.terms, terms, -1.0));
+        let mut all = mean.px.clone();
+        let more = pixel_terms(&self.fields, &differ, &self.survey, &self.bench);
+        if all.is_empty() {
+            return more;
+        }
+        for (sum, more) in all.iter_mut().zip(more) {
+            sum.iter_mut().zip(more).for_each(|(s, m)| *s += m);
+        }
+        all
+    }
+}
+
+/// Residuals without `bias`, px by pixel. Means of whole frames are compared with one another alone,
+/// and keep what all frames share.
+fn take_out(field: &mut Field, bias: &[f32]) {
+    let both = field.mean.iter_mut().zip(&mut field.square);
+    for ((mean, square), b) in both.zip(bias) {
+        *square += b * (b - 2.0 * *mean);
+        *mean -= b;
+    }
+    for frame in &mut field.first {
+        frame.iter_mut().zip(bias).for_each(|(e, b)| *e -= b);
+    }
+}
+
+fn after(battery: &Battery, explained: f64) -> After {
+    let remaining = |f: &Finding| {
+        let name = f.effect.unwrap_or("a curve without a name");
+        Remaining {
+            statistic: f.statistic,
+            axis: f.axis,
+            share: f.share / (explained + f.share),
+            p_adjusted: f.p_adjusted,
+            words: format!("{name} would still bring {:.0} nats", f.share),
+        }
+    };
+    let Battery { mean, scatter, found, .. } = battery;
+    let verdict = verdict(found, [&mean.outcome, &scatter.outcome]);
+    After { verdict, remaining: found.iter().map(remaining).collect() }
+}

@@ -1,0 +1,214 @@
+//! What the found terms are worth on views that had no part in any choice.
+
+use nalgebra::Vector3;
+use rand::Rng;
+use rand::seq::SliceRandom;
+use rayon::prelude::*;
+
+use crate::diagnose::case::Case;
+use crate::diagnose::diagnosis::{HeldOut, LeftOut};
+use crate::diagnose::finding::pixels::terms_of;
+use crate::diagnose::search::outcome::Outcome;
+use crate::diagnose::views::layers::Survey;
+use crate::diagnose::views::samples::ViewData;
+use crate::diagnose::views::surveyed_view::SurveyedView;
+use crate::diagnose::views::tiles::Tile;
+use crate::solve::plane_through;
+use crate::terms::{Statistic, Term, by_term};
+
+/// A share of the views is kept aside.
+const KEPT_ASIDE: usize = 4;
+/// With fewer views than this none can be spared.
+const FEWEST: usize = 6;
+
+impl Case<'_> {
+    /// Choose again without some views, and score those.
+    pub(in crate::diagnose) fn heldout(&self) -> Option<HeldOut> {
+        let (survey, model, options) = (&self.survey, self.model, self.options);
+        let (camera, scale_px_m) = (&self.sensor().camera, self.fields[0].scale_px_m);
+        let n = survey.views.len();
+        if n < FEWEST {
+            return None;
+        }
+        let mut rng = options.seed.stream("diagnose/heldout");
+        let mut order: Vec<usize> = (0..n).collect();
+        order.shuffle(&mut rng);
+        let mut aside = order[..(n / KEPT_ASIDE).max(1)].to_vec();
+        aside.sort_unstable();
+        let rest: Vec<usize> = (0..n).filter(|v| !aside.contains(v)).collect();
+        let (chosen_on, judged_on) = (survey.subset(&rest), survey.subset(&aside));
+        let level = options.level;
+        let bias = chosen_on.search_bias(camera, Case::MEAN_LEVEL * level, options.seed);
+        let bias_terms = terms_of(&bias, Statistic::Bias);
+        let variance = chosen_on.search_variance(
+            &model.sigma,
+            camera,
+            Case::VARIANCE_LEVEL * level,
+            options.seed,
+        );
+        let variance_terms = terms_of(&variance, Statistic::Variance);
+        let means: Vec<ViewData> = judged_on.coarse_mean_data();
+        let blocks = judged_on.variance_data();
+        let mut before = Vec::new();
+        let mut gains = Vec::new();
+        for (mean, block) in means.iter().zip(&blocks) {
+            let (b0, b1) = (log_score(mean, &[])?, log_score(mean, &bias_terms)?);
+            let (v0, v1) = (log_score(block, &[])?, log_score(block, &variance_terms)?);
+            before.push(b0 + v0);
+            gains.push(b1 - b0 + v1 - v0);
+        }
+        let views = before.len() as f64;
+        let mean_before = before.iter().sum::<f64>() / views;
+        let gain = gains.iter().sum::<f64>() / views;
+        let rms = |terms: &[Term]| rms(&judged_on.views, terms, scale_px_m);
+        let (old, new) = (rms(&[]), rms(&bias_terms));
+        let of_sensor: Vec<Term> =
+            bias_terms.iter().filter(|t| t.is_sensor_bias()).cloned().collect();
+        let corrected = rms(&of_sensor);
+        Some(HeldOut {
+            views: aside.iter().map(|&v| survey.views[v].name.clone()).collect(),
+            log_score_before: mean_before,
+            log_score_after: mean_before + gain,
+            gain,
+            gain_interval: bootstrap(&gains, &mut rng),
+            rms_mm_before: old.mm,
+            rms_mm_after: new.mm,
+            rms_px_before: old.px,
+            rms_px_after: new.px,
+            correction_rms_before_px: old.px,
+            correction_rms_after_px: corrected.px,
+        })
+    }
+}
+
+/// -r'Wr / 2 with the nuisances fitted, nats.
+fn log_score(view: &ViewData, terms: &[Term]) -> Option<f64> {
+    let mut row = Vec::new();
+    let response: Vec<f64> = view
+        .response
+        .iter()
+        .zip(&view.places)
+        .map(|(y, p)| y - Term::sum(terms, p, &mut row))
+        .collect();
+    let own: f64 = response.iter().zip(&view.weight).map(|(y, w)| w * y * y).sum();
+    let rows = view.rows(&response)?;
+    Some(-0.5 * (own - rows.explained()))
+}
+
+/// 95 % of the mean, by resampling.
+fn bootstrap(values: &[f64], rng: &mut crate::rng::Stream) -> [f64; 2] {
+    const RESAMPLES: usize = 2000;
+    let n = values.len();
+    let mut means: Vec<f64> = (0..RESAMPLES)
+        .map(|_| (0..n).map(|_| values[rng.random_range(0..n)]).sum::<f64>() / n as f64)
+        .collect();
+    means.sort_by(f64::total_cmp);
+    [means[RESAMPLES / 40], means[RESAMPLES - 1 - RESAMPLES / 40]]
+}
+
+struct Rms {
+    px: f64,
+    mm: f64,
+}
+
+/// Root mean square of the smooth residual in mm, and of every pixel of every frame in px.
+fn rms(views: &[SurveyedView], terms: &[Term], scale_px_m: f64) -> Rms {
+    let (mut px, mut mm, mut n) = (0.0, 0.0, 0.0);
+    for view in views {
+        each_tile(view, terms, |t, f| {
+            let to_mm = 1e3 * t.place.z * t.place.z / scale_px_m;
+            px += t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0);
+            mm += t.pixels * ((t.mean - f) * to_mm).powi(2);
+            n += t.pixels;
+        });
+    }
+    Rms { px: (px / n).sqrt(), mm: (mm / n).sqrt() }
+}
+
+/// What each view's disparity on the optical axis changes by once the terms are taken out, px.
+pub fn levels(survey: &Survey, terms: &[Term]) -> Vec<f64> {
+    let level = |v: &SurveyedView| plane_left(v, &values(v, terms)).map_or(0.0, |p| p[0]);
+    survey.views.par_iter().map(level).collect()
+}
+
+fn values(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
+    let mut row = Vec::new();
+    view.tiles.iter().map(|t| Term::sum(terms, &t.place, &mut row)).collect()
+}
+
+/// The terms' values at the tiles, with the plane fitted anew.
+fn fitted(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
+    let mut values = values(view, terms);
+    // What is left after the terms has a plane of its own: it goes with them.
+    if let Some(plane) = plane_left(view, &values) {
+        for (t, f) in view.tiles.iter().zip(&mut values) {
+            *f += plane[0] + plane[1] * t.place.x + plane[2] * t.place.y;
+        }
+    }
+    values
+}
+
+/// The plane that is left in a view's means without these values.
+fn plane_left(view: &SurveyedView, values: &[f64]) -> Option<Vector3<f64>> {
+    let points = view.tiles.iter().zip(values);
+    plane_through(points.map(|(t, f)| ([t.place.x, t.place.y], t.mean - f, t.pixels)))
+}
+
+/// Every tile that has a mean, with the terms' value there, the plane fitted anew.
+fn each_tile(view: &SurveyedView, terms: &[Term], mut visit: impl FnMut(&Tile, f64)) {
+    let fitted = fitted(view, terms);
+    let tiles = view.tiles.iter().zip(fitted).filter(|(t, _)| t.mean.is_finite());
+    tiles.for_each(|(t, f)| visit(t, f));
+}
+
+/// Root mean square of each view's mean residual with the terms taken out, px.
+pub fn rms_by_view(survey: &Survey, terms: &[Term]) -> Vec<f64> {
+    survey
+        .views
+        .iter()
+        .map(|view| {
+            let (mut sum, mut n) = (0.0, 0.0);
+            each_tile(view, terms, |t, f| {
+                sum += t.pixels * (t.mean - f).powi(2);
+                n += t.pixels;
+            });
+            (sum / f64::max(n, 1.0)).sqrt()
+        })
+        .collect()
+}
+
+/// Every view with coefficients fitted without it, the shapes as chosen on all: root mean square of
+/// every pixel of every frame to a plane, px, before and after.
+pub fn left_out(survey: &Survey, outcome: &Outcome, terms: &[Term]) -> Option<LeftOut> {
+    let (mut sums, mut n) = ([0.0; 2], 0.0);
+    let mut by_view = [0.0; 2];
+    for (v, view) in survey.views.iter().enumerate() {
+        let fitted_without: &[f64] =
+            match outcome.left_out.iter().find(|(views, _)| views.contains(&v)) {
+                Some((_, beta)) => beta,
+                None if terms.is_empty() => &[],
+                None => return None,
+            };
+        let refitted: Vec<Term> = by_term(terms, fitted_without)
+            .map(|(t, mine)| Term { coefficients: mine.to_vec(), ..t.clone() })
+            .collect();
+        let pixels: f64 = view.tiles.iter().filter(|t| t.mean.is_finite()).map(|t| t.pixels).sum();
+        let both = sums.iter_mut().zip(&mut by_view).zip([&[][..], &refitted]);
+        for ((sum, by_view), terms) in both {
+            let before = *sum;
+            each_tile(view, terms, |t, f| {
+                *sum += t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0);
+            });
+            *by_view += ((*sum - before) / pixels.max(1.0)).sqrt();
+        }
+        n += pixels;
+    }
+    let [before, after] = sums.map(|s| (s / n).sqrt());
+    let [mean_before, mean_after] = by_view.map(|s| s / survey.views.len() as f64);
+    Some(LeftOut {
+        rms_px_before: before,
+        rms_px_after: after,
+        mean_of_views_px_before: mean_before,
+        mean_of_views_px_after: mean_after,
+    })
+}

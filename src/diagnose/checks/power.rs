@@ -1,0 +1,264 @@
+//! How small an effect a recording could have shown: what size of a shape a layer's search would see in
+//! 80 % of such recordings.
+//!
+//! The gates are those of the search itself: the threshold of the null over the dispersion of the
+//! views, the share of what was found first, and the least sizes. Noise is drawn from the views' own
+//! information, and with the shape added its gain and its size are quadratic in the shape's size.
+
+use nalgebra::{DMatrix, DVector};
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+use serde_json::{Map, Value, json};
+
+use crate::diagnose::case::Case;
+use crate::diagnose::diagnosis::Detectable;
+use crate::diagnose::finding::pixels::terms_of;
+use crate::diagnose::finding::scene::{Scene, size};
+use crate::diagnose::options::MIN_SIZE;
+use crate::diagnose::search::LEAST_SHARE_OF_GAIN;
+use crate::diagnose::search::candidate::Candidate;
+use crate::diagnose::search::evidence::{Evidence, gain, root};
+use crate::diagnose::search::judge::{CLEARLY_FIXED, LEAST_OF_LARGEST};
+use crate::diagnose::search::null::Null;
+use crate::diagnose::search::outcome::Outcome;
+use crate::diagnose::search::prepared::evidence_of;
+use crate::diagnose::search::rules::Rules;
+use crate::diagnose::search::variance::beyond_sigma;
+use crate::effects::{self, Smallest};
+use crate::rng::Seed;
+use crate::terms::{Basis, Statistic, Term};
+
+/// Of the recordings, so many show it.
+const POWER: f64 = 0.8;
+const REPLICATES: u64 = 200;
+
+/// A layer as it was searched.
+pub struct DetectionCriteria<'a> {
+    pub scene: &'a Scene<'a>,
+    pub outcome: &'a Outcome,
+    pub rules: Rules,
+    /// Fitted beside everything.
+    pub beside: Option<Basis>,
+    pub seed: Seed,
+}
+
+/// c0 + c1 x + c2 x^2.
+struct Quadratic([f64; 3]);
+
+impl Quadratic {
+    /// Through the values at 0, x and 2 x.
+    fn through([zero, one, two]: [f64; 3], x: f64) -> Self {
+        let bend = 0.5 * (two - 2.0 * one + zero);
+        Quadratic([zero, (one - zero - bend) / x, bend / (x * x)])
+    }
+
+    /// From where on it stays above `level`.
+    fn above(&self, level: f64) -> f64 {
+        let Quadratic([c, b, a]) = self;
+        let root = b * b - 4.0 * a * (c - level);
+        match (*a > 0.0, root > 0.0) {
+            (false, _) => f64::INFINITY,
+            (true, false) => 0.0,
+            (true, true) => ((root.sqrt() - b) / (2.0 * a)).max(0.0),
+        }
+    }
+}
+
+impl DetectionCriteria<'_> {
+    /// Multiple of the term, which is of size one, that is seen; `None` where none is.
+    pub fn least(&self, unit: &Term) -> Option<f64> {
+        // Beside sigma's own refit, what follows depth and tilt alone is not looked for.
+        if self.beside.is_some() && !beyond_sigma(&Candidate::curve(unit.basis.clone())) {
+            return None;
+        }
+        let beside = self.beside.clone().map(|basis| {
+            let coefficients = vec![0.0; basis.count()];
+            Term { statistic: unit.statistic, basis, coefficients }
+        });
+        let m = beside.as_ref().map_or(0, |t| t.basis.count());
+        let terms: Vec<Term> = beside.into_iter().chain([unit.clone()]).collect();
+        let views = evidence_of(&self.left(), &terms);
+        let u = DVector::from_vec([vec![0.0; m], unit.coefficients.clone()].concat());
+        let null = Null::of(&views, m, self.rules.prior)?;
+        let dispersion = null.scatter(&self.rules);
+        let first = self.outcome.chosen.first().map_or(0.0, |c| c.gain);
+        let threshold = self.outcome.noise.threshold(self.rules.level);
+        let need =
+            null.gain_for(threshold, views.len(), &self.rules).max(LEAST_SHARE_OF_GAIN * first);
+        let sum = Evidence::sum(u.len(), 0.0, &views).a;
+        let information = u.dot(&(&sum * &u));
+        if !need.is_finite() || information <= 0.0 {
+            return None;
+        }
+        let draw = Draw {
+            roots: views.iter().map(|v| root(&v.a) * dispersion.sqrt()).collect(),
+            views: &views,
+            u: &u,
+            m,
+            step: (2.0 * need / information).sqrt(),
+            prior: self.rules.prior,
+            sum: &sum,
+        };
+        let floor = self.min_rms(&unit.basis);
+        let weight: f64 = self.scene.data.iter().flat_map(|v| &v.weight).sum();
+        let own = size(self.scene, &self.scene.values(unit)).sigma;
+        let sizes: Option<Vec<f64>> = (0..REPLICATES)
+            .into_par_iter()
+            .map(|replicate| {
+                let mut rng = self.seed.stream(&format!("diagnose/power/{replicate}"));
+                let (gain, square, off) = draw.once(&mut rng)?;
+                let told = MIN_SIZE / own.max(f64::MIN_POSITIVE) - off;
+                Some(gain.above(need).max(square.above(floor * floor * weight)).max(told))
+            })
+            .collect();
+        let mut sizes = sizes?;
+        sizes.sort_by(f64::total_cmp);
+        let least = sizes[(POWER * (sizes.len() - 1) as f64).ceil() as usize];
+        (least > 0.0 && least.is_finite()).then_some(least)
+    }
+
+    /// The views without what was found: it would not be taken for an effect more.
+    fn left(&self) -> Vec<crate::diagnose::views::samples::ViewData> {
+        let found = terms_of(self.outcome, self.scene.statistic);
+        let mut row = Vec::new();
+        let mut views = self.scene.data.clone();
+        for view in &mut views {
+            for (y, place) in view.response.iter_mut().zip(&view.places) {
+                *y -= found.iter().map(|t| t.value(place, &mut row)).sum::<f64>();
+            }
+        }
+        views
+    }
+
+    /// Root mean square that a fit must have, in the response's unit.
+    fn min_rms(&self, basis: &Basis) -> f64 {
+        let largest = self.outcome.chosen.iter().map(|c| c.rms).fold(0.0, f64::max);
+        let still =
+            self.rules.fixed.filter(|_| basis.is_of_picture()).map_or(0.0, |(fixed, px)| {
+                fixed * (CLEARLY_FIXED * basis.count() as f64 / px).sqrt()
+            });
+        self.rules.least.max(LEAST_OF_LARGEST * largest).max(still)
+    }
+}
+
+/// Recordings of the shape and of noise.
+struct Draw<'a> {
+    views: &'a [Evidence],
+    roots: Vec<DMatrix<f64>>,
+    u: &'a DVector<f64>,
+    /// Columns beside the shape's.
+    m: usize,
+    step: f64,
+    prior: f64,
+    sum: &'a DMatrix<f64>,
+}
+
+impl Draw<'_> {
+    /// Gain, weighted square of the fit, and the error of its size, over the shape's size.
+    fn once(&self, rng: &mut crate::rng::Stream) -> Option<(Quadratic, Quadratic, f64)> {
+        let noise: Vec<DVector<f64>> = self
+            .roots
+            .iter()
+            .map(|r| r * DVector::from_fn(r.ncols(), |_, _| StandardNormal.sample(rng)))
+            .collect();
+        let (m, k) = (self.m, self.u.len() - self.m);
+        let own = self.sum.view((m, m), (k, k));
+        let mut gains = [0.0; 3];
+        let mut squares = [0.0; 3];
+        let mut off = 0.0;
+        for (n, (g, s)) in gains.iter_mut().zip(&mut squares).enumerate() {
+            let size = n as f64 * self.step;
+            let with = |(v, b): (&Evidence, &DVector<f64>)| Evidence {
+                a: v.a.clone(),
+                b: b + &v.a * self.u * size,
+            };
+            let views: Vec<Evidence> = self.views.iter().zip(&noise).map(with).collect();
+            let whole = gain(&views, self.prior)?;
+            *g = whole.total - self.base(&views)?;
+            let beta = whole.beta.rows(m, k);
+            *s = beta.dot(&(own * beta));
+            if n == 0 {
+                let unit = self.u.rows(m, k);
+                off = unit.dot(&(own * beta)) / unit.dot(&(own * unit));
+            }
+        }
+        let through = |values| Quadratic::through(values, self.step);
+        Some((through(gains), through(squares), off))
+    }
+
+    /// What the columns beside bring alone.
+    fn base(&self, views: &[Evidence]) -> Option<f64> {
+        let m = self.m;
+        if m == 0 {
+            return Some(0.0);
+        }
+        let part = |v: &Evidence| Evidence {
+            a: v.a.view((0, 0), (m, m)).into_owned(),
+            b: v.b.rows(0, m).into_owned(),
+        };
+        let beside: Vec<Evidence> = views.iter().map(part).collect();
+        Some(gain(&beside, self.prior)?.total)
+    }
+}
+
+impl Case<'_> {
+    /// The least parameter of each family that would be found with 80 % power.
+    pub(in crate::diagnose) fn detectable(
+        &self,
+        [bias, variance]: [&Outcome; 2],
+    ) -> Vec<Detectable> {
+        let (survey, camera) = (&self.survey, &self.sensor().camera);
+        let seed = self.options.seed;
+        let scenes = [Scene::bias(survey, 1.0, 1.0), Scene::variance(survey, 1.0, 1.0)];
+        let mean = DetectionCriteria {
+            scene: &scenes[0],
+            outcome: bias,
+            rules: survey.bias_rules(camera, self.level(Case::MEAN_LEVEL)),
+            beside: None,
+            seed,
+        };
+        let blocks = DetectionCriteria {
+            scene: &scenes[1],
+            outcome: variance,
+            rules: survey.variance_rules(self.level(Case::VARIANCE_LEVEL)),
+            beside: survey.refitted().map(|c| c.basis),
+            seed,
+        };
+        let bounds = survey.bounds(camera);
+        let mut all = Vec::new();
+        for (statistic, gates) in [(Statistic::Bias, &mean), (Statistic::Variance, &blocks)] {
+            let can = effects::that_change(statistic).into_iter();
+            for effect in can.filter(|e| e.card().applies_to(bounds.kind)) {
+                let smallest = effect.smallest(&bounds).and_then(|s| least(s, statistic, gates));
+                all.extend(
+                    smallest.map(|minimum| Detectable { effect: effect.card().id, minimum }),
+                );
+            }
+        }
+        all
+    }
+}
+
+fn least(
+    smallest: Smallest,
+    statistic: Statistic,
+    gates: &DetectionCriteria<'_>,
+) -> Option<Map<String, Value>> {
+    let Smallest { parameter, shape, unit, of } = smallest;
+    let term = Term { statistic, basis: shape, coefficients: unit };
+    let least = gates.least(&term).map(of).filter(|least| least.is_finite())?;
+    Some(Map::from_iter([(parameter.to_string(), json!(least))]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quadratic_is_above_a_level_from_its_larger_root_on() {
+        let square = Quadratic::through([1.0, 4.0, 9.0], 1.0);
+        approx::assert_relative_eq!(square.above(16.0), 3.0, max_relative = 1e-12);
+        assert_eq!(square.above(-1.0), 0.0);
+        assert_eq!(Quadratic::through([0.0, 1.0, 0.0], 1.0).above(2.0), f64::INFINITY);
+    }
+}

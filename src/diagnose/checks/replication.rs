@@ -1,0 +1,185 @@
+//! Do two halves of the views, each alone, say the same? The plainest certificate there is.
+//!
+//! The views are split once, alike in distance and tilt. A finding replicates where the shape that
+//! all views gave it has the same sign in both halves, sizes that agree inside their joint 95 %
+//! interval, and is seen by one half alone along the shape that the other half gave it.
+
+use std::ops::Range;
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use crate::diagnose::noise::view_mean::ViewMean;
+use crate::diagnose::search::evidence::Evidence;
+
+/// Standard errors from which on a half sees something by itself.
+const SEEN: f64 = 2.0;
+/// Two-sided.
+const INTERVAL: f64 = 0.95;
+/// Views that are neighbours in distance; these are dealt out by tilt.
+const NEIGHBOURS: usize = 4;
+
+/// Which half each view belongs to, from its distance and tilt.
+pub fn halves(poses: &[(f64, f64)]) -> Vec<bool> {
+    let mut order: Vec<usize> = (0..poses.len()).collect();
+    order.sort_by(|&a, &b| poses[a].0.total_cmp(&poses[b].0));
+    let mut second = vec![false; poses.len()];
+    for (k, near) in order.chunks_mut(NEIGHBOURS).enumerate() {
+        near.sort_by(|&a, &b| poses[a].1.total_cmp(&poses[b].1));
+        for (place, &view) in near.iter().enumerate() {
+            // The outer two of four, then the inner two: tilts balance within the group.
+            second[view] = matches!(place, 1 | 2) != (k % 2 == 1);
+        }
+    }
+    second
+}
+
+impl ViewMean {
+    /// Of a single column, by each view's information and score; errors from the views' scatter
+    /// where that is the larger.
+    pub fn of_scores(views: impl Iterator<Item = (f64, f64)>) -> Option<Self> {
+        let all: Vec<(f64, f64)> = views.filter(|(a, _)| *a > 0.0).collect();
+        let (a, b) = all.iter().fold((0.0, 0.0), |sum, v| (sum.0 + v.0, sum.1 + v.1));
+        let value = b / a;
+        let left: f64 = all.iter().map(|(own, score)| (score - value * own).powi(2)).sum();
+        let n = all.len() as f64;
+        let variance = (left * n / (n - 1.0) / (a * a)).max(1.0 / a);
+        (n > 1.0).then_some(ViewMean { value, std_error: variance.sqrt(), views: n })
+    }
+
+    fn z(&self) -> f64 {
+        self.value / self.std_error
+    }
+}
+
+/// Same sign, and sizes inside their joint interval.
+fn alike(halves: &[ViewMean; 2]) -> bool {
+    let [a, b] = halves;
+    let freedom = (a.views.round() + b.views.round() - 2.0).max(1.0);
+    let reach = StudentsT::new(0.0, 1.0, freedom)
+        .map_or(f64::INFINITY, |t| t.inverse_cdf(0.5 + 0.5 * INTERVAL));
+    let apart = (a.value - b.value).abs();
+    a.value * b.value > 0.0 && apart <= reach * a.std_error.hypot(b.std_error)
+}
+
+/// Two sizes of one statistic. `None` where a half has too few views for an error.
+pub fn agree(halves: [Option<ViewMean>; 2]) -> Option<bool> {
+    let [Some(a), Some(b)] = halves else { return None };
+    Some(alike(&[a, b]) && a.z().abs().max(b.z().abs()) > SEEN)
+}
+
+/// All terms of a layer as each half has them, fitted together.
+pub struct Halves {
+    /// Information of all views.
+    pub metric: DMatrix<f64>,
+    pub whole: DVector<f64>,
+    pub halves: [Half; 2],
+    /// Columns of each chosen term.
+    pub spans: Vec<Range<usize>>,
+}
+
+/// The columns of terms that have so many each, one after the other.
+pub fn spans(counts: &[usize]) -> Vec<Range<usize>> {
+    let mut first = 0;
+    let span = |&count: &usize| {
+        first += count;
+        first - count..first
+    };
+    counts.iter().map(span).collect()
+}
+
+/// What one half says.
+pub struct Half {
+    pub beta: DVector<f64>,
+    /// Of the information and the priors.
+    pub factor: Cholesky<f64, Dyn>,
+    /// Every view's score beyond that fit.
+    pub beyond: Vec<DVector<f64>>,
+}
+
+impl Half {
+    /// A weighted sum of the coefficients; errors from the views' scatter where that is the larger.
+    fn measured(&self, weights: &DVector<f64>) -> Option<ViewMean> {
+        let n = self.beyond.len() as f64;
+        let reach = self.factor.solve(weights);
+        let scatter: f64 = self.beyond.iter().map(|s| reach.dot(s).powi(2)).sum();
+        let variance = (scatter * n / (n - 1.0)).max(reach.dot(weights));
+        let value = weights.dot(&self.beta);
+        (n > 1.0).then_some(ViewMean { value, std_error: variance.sqrt(), views: n })
+    }
+}
+
+impl Halves {
+    /// From the views' evidence on all terms together; `counts` are the terms' columns.
+    pub fn of(views: &[Evidence], second: &[bool], prior: f64, counts: &[usize]) -> Option<Self> {
+        let n = views.first()?.b.len();
+        if views.len() != second.len() || !second.contains(&true) {
+            return None;
+        }
+        let held = DMatrix::identity(n, n) * prior;
+        let sum = |which: Option<bool>| {
+            let mine = views.iter().zip(second).filter(|(_, s)| which.is_none_or(|w| w == **s));
+            Evidence::sum(n, 0.0, mine.map(|(view, _)| view))
+        };
+        let fit = |which| {
+            let Evidence { a, b } = sum(Some(which));
+            let factor = (a + &held).cholesky()?;
+            let beta = factor.solve(&b);
+            let mine = views.iter().zip(second).filter(|(_, s)| **s == which);
+            let beyond = mine.map(|(view, _)| &view.b - &view.a * &beta).collect();
+            Some(Half { beta, factor, beyond })
+        };
+        let Evidence { a: metric, b } = sum(None);
+        let whole = (&metric + &held).cholesky()?.solve(&b);
+        let halves = [fit(false)?, fit(true)?];
+        Some(Halves { metric, whole, halves, spans: spans(counts) })
+    }
+
+    /// Do both halves have these terms, taken as one shape? `None` where the terms have no columns
+    /// of their own, or a half has too few views. No formula is exact: each half may be off by this share
+    /// of the size beside its own error.
+    pub fn replicate(&self, terms: &[usize], formula_error: f64) -> Option<bool> {
+        let (mut sizes, seen) = self.shown(terms)?;
+        for size in &mut sizes {
+            size.std_error = size.std_error.hypot(formula_error * size.value);
+        }
+        Some(alike(&sizes) && seen > SEEN)
+    }
+
+    /// Does neither half show what the other has, or each the opposite? Sizes that differ are no
+    /// contradiction: of true ones a twentieth lie outside their interval, and sensors warm up.
+    pub fn contradict(&self, terms: &[usize]) -> bool {
+        let opposite = |sizes: [ViewMean; 2]| sizes[0].value * sizes[1].value <= 0.0;
+        self.shown(terms).is_some_and(|(sizes, seen)| opposite(sizes) || seen <= SEEN)
+    }
+
+    /// What each half has of the common shape, and how clearly the better seen of them shows what the
+    /// other has, in standard errors.
+    fn shown(&self, terms: &[usize]) -> Option<([ViewMean; 2], f64)> {
+        let columns: Vec<usize> =
+            terms.iter().filter_map(|&t| self.spans.get(t).cloned()).flatten().collect();
+        if columns.is_empty() {
+            return None;
+        }
+        // How far a fit reaches along a shape, the shape itself being one.
+        let along = |shape: &DVector<f64>| {
+            let mut own = DVector::zeros(shape.len());
+            columns.iter().for_each(|&c| own[c] = shape[c]);
+            let weights = &self.metric * &own;
+            let mut mine = DVector::zeros(shape.len());
+            columns.iter().for_each(|&c| mine[c] = weights[c]);
+            let square = mine.dot(&own);
+            mine / square
+        };
+        let [first, second] = &self.halves;
+        let common = along(&self.whole);
+        let sizes = [first.measured(&common)?, second.measured(&common)?];
+        let seen =
+            [first.measured(&along(&second.beta))?.z(), second.measured(&along(&first.beta))?.z()];
+        Some((sizes, seen[0].max(seen[1])))
+    }
+}
+
+#[cfg(test)]
+#[path = "replication_tests.rs"]
+mod tests;

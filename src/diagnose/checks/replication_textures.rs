@@ -1,0 +1,93 @@
+//! Does either half of the views show the same texture? Each view is one sample of the statistic
+//! that a finding rests on.
+
+use super::replication::agree;
+use crate::diagnose::edges::Edges;
+use crate::diagnose::edges::mixing::mean_share;
+use crate::diagnose::noise::expected_window;
+use crate::diagnose::noise::in_time::{later, of_any_two};
+use crate::diagnose::noise::structure::Structure;
+use crate::diagnose::noise::tail_counts::GAUSSIAN_TAIL;
+use crate::diagnose::noise::tails::EXCESS;
+use crate::diagnose::noise::texture_finding::TextureFinding;
+use crate::diagnose::noise::view_mean::ViewMean;
+use crate::diagnose::views::field::Field;
+use crate::diagnose::views::known::KnownTerms;
+use crate::terms::{Axis, Statistic};
+
+/// A view's value beyond what the model has, in the statistic's own unit.
+type OfView<'a> = Box<dyn Fn(&Structure) -> Option<f64> + 'a>;
+
+/// `None` where the finding is no mean of the views, or a half has too few of them.
+pub fn replicated(
+    found: &TextureFinding,
+    structure: &[Structure],
+    fields: &[Field],
+    second: &[bool],
+    known: &KnownTerms,
+) -> Option<bool> {
+    let beyond = beyond_known(found, known);
+    let half = |which: bool| {
+        let mine = second.iter().enumerate().filter(|(_, s)| **s == which).map(|(v, _)| v);
+        match &beyond {
+            Some(of) => {
+                let views: Vec<Structure> = mine.map(|v| structure[v].clone()).collect();
+                ViewMean::of(&views, of)
+            }
+            None if found.axis == Axis::EdgeDistance => {
+                let edges: Vec<&Edges> = mine.map(|v| &fields[v].edges).collect();
+                mean_share(&edges, None, found.interval[1]).map(|(m, _)| m)
+            }
+            None => None,
+        }
+    };
+    agree([half(false), half(true)])
+}
+
+/// What a finding is told by, view by view.
+fn beyond_known<'a>(found: &TextureFinding, known: &'a KnownTerms) -> Option<OfView<'a>> {
+    Some(match (found.families.first().copied(), found.axis, found.statistic) {
+        // A part of the noise alone is seen in near pixels, all of it in the window's side.
+        (Some("spatial-correlation"), ..) if found.size_sigma < 1.0 => {
+            Box::new(|s| s.neighbour_correlation)
+        }
+        // Beside what stands still, which the finding is told without.
+        (Some("temporal-correlation"), ..) => Box::new(|s| Some(s.lagged[0]? - later(s)?)),
+        (Some("heavy-tails"), ..) if found.parameters.contains_key(EXCESS) => {
+            Box::new(|s| s.fourth.excess())
+        }
+        (Some("target-motion"), ..) => Box::new(|s| Some(s.jitter?.velocity_mps)),
+        (Some(id), ..) => return beyond(id, known),
+        (None, Axis::Column, Statistic::Bias) => Box::new(|s| s.lines_px2),
+        (None, Axis::Column, _) => Box::new(|s| s.column_px2),
+        (None, Axis::Frame, _) => {
+            let frame = found.parameters.get("frame")?.as_u64()? as usize;
+            Box::new(move |s| *s.frame_log_variance.get(frame)?)
+        }
+        _ => return None,
+    })
+}
+
+/// A view's texture of this name beyond what the model has of it.
+pub fn beyond<'a>(id: &str, known: &'a KnownTerms) -> Option<OfView<'a>> {
+    let parameter = |name: &str| known.parameter(id, name).unwrap_or(0.0);
+    let (px2, fraction, rho) =
+        (parameter("sigma_px").powi(2), parameter("fraction"), parameter("rho"));
+    let still = |s: &Structure| s.fixed_px2.unwrap_or(0.0).max(0.0) / s.variance_px2.max(1e-12);
+    Some(match id {
+        "spatial-correlation" => {
+            let side = expected_window(known);
+            Box::new(move |s| Some(s.window_px?.ln() - side.ln()))
+        }
+        "fixed-pattern-noise" => Box::new(move |s| Some(s.fixed_px2? - px2)),
+        "temporal-correlation" => Box::new(move |s| Some(s.lagged[0]? - rho)),
+        "frozen-noise" => Box::new(move |s| Some(of_any_two(s)? - still(s) - fraction)),
+        "row-noise" => Box::new(move |s| Some(s.row_px2? - px2)),
+        "heavy-tails" => Box::new(|s| Some(s.tail_share()? - GAUSSIAN_TAIL)),
+        "frame-jitter" => Box::new(move |s| {
+            let j = s.jitter?;
+            Some(j.scatter_px2 / j.freedom - j.expected_px2 - px2)
+        }),
+        _ => return None,
+    })
+}

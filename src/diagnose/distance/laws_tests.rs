@@ -1,0 +1,99 @@
+//! References of a target that was tilted, and read where the axis was thought to meet it.
+
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+use crate::diagnose::diagnosis::Finding;
+use crate::diagnose::distance::reference::findings;
+use crate::diagnose::views::known::KnownTerms;
+use crate::rng::Seed;
+
+const PX_M: f64 = 43.5;
+/// Of a reference, m.
+const ERROR_M: f64 = 0.0008;
+
+/// Three rows of distances: faced, turned about one axis, then about the other. By two angles the axis
+/// meets the target elsewhere than was thought, and the disparity is off by `offset_px`. `order` is the
+/// place of each in the session.
+fn references(
+    offset_px: f64,
+    angles: [f64; 2],
+    order: fn(usize) -> usize,
+    seed: u64,
+) -> Vec<ReferencedView> {
+    let mut rng = Seed(seed).stream("laws");
+    let of = |k: usize| {
+        let z = 0.8 + 0.3 * (k % 8) as f64;
+        let slope = [[0.0, 0.0], [1.2, 0.05], [0.02, -1.2]][k / 8];
+        let noise: f64 = StandardNormal.sample(&mut rng);
+        let turned = z * (angles[0] * slope[0] + angles[1] * slope[1]);
+        let off = turned - z * z * offset_px / PX_M + ERROR_M * noise;
+        let (session_s, in_second_half) = (60.0 * order(k) as f64, k % 2 == 1);
+        ReferencedView {
+            z,
+            slope,
+            off,
+            session_s,
+            px_m: PX_M,
+            sigma_m: 0.002 * z * z,
+            in_second_half,
+        }
+    };
+    (0..24).map(of).collect()
+}
+
+/// Names with the offset, px, beside a target bent by so much.
+fn found(checked: &[ReferencedView], bent_m: f64) -> Vec<(Option<&'static str>, f64)> {
+    let laws = laws(checked, &Nuisances { bent_m, ..Nuisances::default() });
+    let found = findings(&laws, &KnownTerms::default(), 1.0, 0.003, Seed(1));
+    let offset_px = |f: &Finding| f.parameters.get("offset_px")?.get("value")?.as_f64();
+    found.iter().map(|f| (f.effect, offset_px(f).unwrap_or(f64::NAN))).collect()
+}
+
+/// In the order of the session they would be a drift.
+#[test]
+fn a_target_read_beside_the_axis_is_no_law() {
+    for seed in 0..8 {
+        let checked = references(0.0, [-0.006, 0.003], |k| k, seed);
+        assert_eq!(found(&checked, 0.0), [], "seed {seed}");
+    }
+}
+
+/// Taken in no order of distance, so that no drift can look like it.
+#[test]
+fn an_offset_keeps_its_size_beside_it() {
+    for seed in 0..8 {
+        for angles in [[0.0, 0.0], [-0.006, 0.003]] {
+            let told = found(&references(0.06, angles, |k| 7 * k % 24, seed), 0.0);
+            let &[(effect, offset_px)] = &told[..] else { panic!("seed {seed}: {told:?}") };
+            assert_eq!(effect, Some("disparity-offset"));
+            assert!((offset_px - 0.06).abs() < 0.01, "seed {seed}: {offset_px}");
+        }
+    }
+}
+
+/// The plane of a bent board is elsewhere than the place that was measured, at any distance.
+#[test]
+fn a_bent_target_is_no_law() {
+    let mut alone = 0;
+    for seed in 0..8 {
+        let mut checked = references(0.0, [0.0; 2], |k| 7 * k % 24, seed);
+        checked.iter_mut().for_each(|c| c.off += 0.004);
+        alone += found(&checked, 0.0).len();
+        assert_eq!(found(&checked, 0.004), [], "seed {seed}");
+    }
+    assert!(alone > 0, "without knowing of the bend there is no law either");
+}
+
+/// Nor does a bend hide one.
+#[test]
+fn an_offset_is_seen_beside_a_bend() {
+    for seed in 0..8 {
+        let mut checked = references(0.06, [0.0; 2], |k| 7 * k % 24, seed);
+        checked.iter_mut().for_each(|c| c.off += 0.004);
+        let found = found(&checked, 0.004);
+        let &[(effect, px)] = &found[..] else { panic!("seed {seed}: {found:?}") };
+        assert_eq!(effect, Some("disparity-offset"));
+        assert!((px - 0.06).abs() < 0.012, "seed {seed}: {px}");
+    }
+}

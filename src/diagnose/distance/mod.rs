@@ -1,0 +1,6 @@
+//! Laws of the distance, where it was measured by other means.
+
+pub mod laws;
+pub mod reference;
+pub mod referenced_view;
+pub mod warm_up;

@@ -1,0 +1,238 @@
+//! What planes alone cannot tell: offset, scale and drift, where distances were measured by other
+//! means.
+
+use super::laws::{FEWEST, Law, Nuisances, laws};
+use super::referenced_view::referenced_views;
+use crate::diagnose::case::Case;
+use crate::diagnose::checks::heldout;
+use crate::diagnose::checks::overstated::SHARE;
+use crate::diagnose::diagnosis::{Alternative, CannotTell, Finding, Size, Status};
+use crate::diagnose::finding::naming::MIN_PROBABILITY;
+use crate::diagnose::finding::other_findings::named;
+use crate::diagnose::finding::parameters::{estimate, one};
+use crate::diagnose::joint::anchor::{Family, families};
+use crate::diagnose::search::noise_gains::NoiseGains;
+use crate::diagnose::search::null::{Null, student};
+use crate::diagnose::views::field::Field;
+use crate::diagnose::views::known::KnownTerms;
+use crate::diagnose::views::learnt::Learnt;
+use crate::effects;
+use crate::rng::Seed;
+use crate::sensors::SensorKind;
+use crate::terms::{Axis, Statistic, Term};
+
+/// A law must move the depth by this many errors of a reference, and by this much, m: tapes and
+/// planes are not better.
+const CLEAR_LAW_ERRORS: f64 = 1.2;
+const LEAST_M: f64 = 0.0015;
+/// Names that predict as well as the best within this many nats cannot be told apart.
+const AS_GOOD_NATS: f64 = 3.0;
+
+/// How far a bent target's plane may lie from the place on it that was measured, m: of a parabola the
+/// mean is 1.1 root mean squares from its vertex, and 2.2 from its rim.
+pub fn bent_m(found: &[Finding]) -> f64 {
+    const FROM_PLACE: f64 = 2.0;
+    let bent = |f: &&Finding| f.statistic == Statistic::Bias && f.axis == Axis::TargetPosition;
+    1e-3 * FROM_PLACE * found.iter().filter(bent).map(|f| f.size.mm).fold(0.0, f64::hypot)
+}
+
+/// What the references tell, if anything.
+/// `excess` is how much further than by their own error the levels may be off, in variance.
+pub fn findings(
+    laws: &[Law],
+    known: &KnownTerms,
+    excess: f64,
+    level: f64,
+    seed: Seed,
+) -> Vec<Finding> {
+    // An error measured on few references makes a Student's t of a Gaussian.
+    let calibrated_gain = |l: &Law| {
+        let gain = (l.gain / l.null.dispersion / excess).max(0.0);
+        student(gain, l.freedom)
+    };
+    let Some(best) = laws.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)) else {
+        return Vec::new();
+    };
+    let nulls: Vec<&Null> = laws.iter().map(|l| &l.null).collect();
+    let noise = NoiseGains::of(&nulls, Seed(seed.0 ^ 0x5eed));
+    // So large a law may be missing in the model, too, where it was learnt from references.
+    let small = best.rms_m < (CLEAR_LAW_ERRORS * best.error_m * excess.sqrt()).max(LEAST_M);
+    if small || calibrated_gain(best) < noise.threshold(level) {
+        return Vec::new();
+    }
+    let [beta, error] = best.estimate;
+    if let Some(had) = known.law(best.family) {
+        // Sessions and references differ by a part of a law; not by half of it.
+        let other = beta.abs() - 2.0 * error > SHARE * had.abs();
+        return Vec::from_iter(other.then(|| contradicted(best, noise.p(calibrated_gain(best)))));
+    }
+    let mut odds: Vec<(&'static str, f64)> = Vec::new();
+    for family in ["depth-scale", "disparity-offset", "thermal-drift"] {
+        let most = laws
+            .iter()
+            .filter(|l| l.family == family)
+            .map(|l| l.gain)
+            .fold(f64::NEG_INFINITY, f64::max);
+        odds.push((family, (0.5 * (most - best.gain)).exp()));
+    }
+    odds.sort_by(|a, b| b.1.total_cmp(&a.1));
+    // No law at all explains what chance does.
+    let total: f64 = odds.iter().map(|o| o.1).sum::<f64>() + (-0.5 * best.gain).exp();
+    let alternatives: Vec<Alternative> = odds
+        .iter()
+        .map(|&(effect, o)| (effect, o / total))
+        .filter(|a| a.1 > MIN_PROBABILITY)
+        .map(|(effect, p)| Alternative { effect, probability: Some(p) })
+        .collect();
+    let close = odds.get(1).is_some_and(|o| o.1 > (-0.5 * AS_GOOD_NATS).exp());
+    let mut parameters = match best.family {
+        "depth-scale" => one("scale", 1.0 + beta, error),
+        "disparity-offset" => one("offset_px", beta, error),
+        _ => one("relative", beta, error),
+    };
+    for (name, [value, error]) in &best.settled {
+        parameters.insert((*name).into(), estimate(*value, *error));
+    }
+    let status = if close { Status::OneOf } else { Status::Named };
+    vec![Finding {
+        status,
+        alternatives,
+        interval: best.reach,
+        share: best.gain,
+        parameters,
+        size: Size { mm: 1e3 * best.rms_m, sigma: best.rms_sigma },
+        p_adjusted: Some(noise.p(calibrated_gain(best))),
+        replicated: best.replicated,
+        ..named(best.family, Statistic::Bias, best.axis)
+    }]
+}
+
+/// References that contradict what the model has of this law.
+fn contradicted(law: &Law, p: f64) -> Finding {
+    let shape = format!(
+        "the model's {} is off by {:.1} mm at the references' distances, more than half of it",
+        law.family,
+        1e3 * law.rms_m
+    );
+    Finding {
+        status: Status::Unexplained,
+        effect: None,
+        alternatives: Vec::new(),
+        interval: law.reach,
+        share: law.gain,
+        size: Size { mm: 1e3 * law.rms_m, sigma: law.rms_sigma },
+        p_adjusted: Some(p),
+        replicated: law.replicated,
+        physics: format!(
+            "Not of this sensor: {shape}. Take it out of the model, or learn it again from references."
+        ),
+        shape: Some(shape),
+        contradicted: Some(law.family),
+        ..named(law.family, Statistic::Bias, law.axis)
+    }
+}
+
+/// An offset of the disparity may be no more than the constant of a shape that stands still in the picture,
+/// of `usual` px, which nobody knows: within two standard deviations of it.
+fn is_constant_of(law: &Finding, usual: f64) -> bool {
+    const DEVIATIONS: f64 = 2.0;
+    let offset = law.parameters.get("offset_px").and_then(|p| p.get("value")?.as_f64());
+    offset.is_some_and(|px| px.abs() < DEVIATIONS * usual)
+}
+
+/// Does the effect happen to cameras of this kind?
+pub fn can_happen(id: &str, kind: Option<SensorKind>) -> bool {
+    effects::find(id).is_none_or(|e| e.card().applies_to(kind))
+}
+
+impl Case<'_> {
+    /// Laws of the distance, by reference distances.
+    pub(in crate::diagnose) fn laws(&self, bias: &[Term], bent_m: f64) -> Vec<Finding> {
+        // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
+        let anchored: Vec<Term> =
+            bias.iter().filter(|t| t.basis.is_nothing_ahead()).cloned().collect();
+        // The catalogue's bowl is nothing there either: by that its offset is told.
+        let of_catalogue = |t: &&Term| t.basis.is_nothing_ahead() || t.basis.is_bowl();
+        let plain: Vec<Term> = bias.iter().filter(of_catalogue).cloned().collect();
+        let views = self.fields.len() as f64;
+        // The levels are off with the model's bias; and its own references, if any, left a law open.
+        let of_bias = self.learnt_from[0].map(|l| Learnt { searched: false, ..l }.excess(views));
+        let theirs = Learnt::references(self.model).filter(|_| self.learnt_from[1].is_some());
+        let ours = self.fields.iter().filter(|f| f.reference_distance_m.is_some()).count();
+        let of_laws = theirs.map(|l| l.excess(ours as f64));
+        let excess = of_bias.unwrap_or(1.0).max(of_laws.unwrap_or(1.0));
+        let found = |terms: &[Term], beside: &Nuisances| {
+            let levels = heldout::levels(&self.survey, terms);
+            let second = self.survey.second();
+            let mut laws =
+                laws(&referenced_views(&self.fields, &levels, &self.known, &second), beside);
+            laws.retain(|l| can_happen(l.family, self.sensor().kind));
+            let level = self.level(Self::LAWS_LEVEL);
+            findings(&laws, &self.known, excess, level, self.options.seed)
+        };
+        // A bowl, too, moves the plane on the axis, by a constant that nobody knows.
+        let open = families(bias.iter().chain(&self.known.bias), &self.sensor().camera);
+        if !open.is_empty() {
+            let laws = found(bias, &Nuisances { bent_m, open });
+            if !laws.is_empty() {
+                return laws;
+            }
+        }
+        // It may be all of an offset of the disparity: a law must hold with and without the bowl, be it
+        // new or the model's.
+        let back = |t: &Term| Term {
+            coefficients: t.coefficients.iter().map(|c| -c).collect(),
+            ..t.clone()
+        };
+        let model: Vec<Term> =
+            self.known.bias.iter().filter(|t| !t.basis.is_nothing_ahead()).map(back).collect();
+        let closed = Nuisances { bent_m, open: Vec::new() };
+        let mut laws = found(&plain, &closed);
+        for others in [anchored.clone(), bias.to_vec(), [anchored, model].concat()] {
+            if others != plain && !laws.is_empty() {
+                let with = found(&others, &closed);
+                laws.retain(|l| with.iter().any(|w| w.effect == l.effect));
+            }
+        }
+        let nameless = bias.iter().filter(|t| !of_catalogue(t));
+        let own = families(nameless, &self.sensor().camera).iter().map(Family::still_px).sum();
+        laws.retain(|l| l.status != Status::Named || !is_constant_of(l, own));
+        laws
+    }
+}
+
+/// What planes alone never tell.
+pub fn cannot_tell(fields: &[Field], kind: Option<SensorKind>) -> Vec<CannotTell> {
+    if fields.iter().filter(|f| f.reference_distance_m.is_some()).count() >= FEWEST {
+        return Vec::new();
+    }
+    let why = |what: &str| {
+        format!(
+            "{what} is not identifiable from planes without a reference distance: every plane takes it up whole. Measure the distance of the target in at least {FEWEST} views with a tape or a rail and give it as reference_distance_m."
+        )
+    };
+    let mut all = vec![
+        CannotTell { effect: "depth-scale", why: why("A wrong scale of the depth") },
+        CannotTell { effect: "disparity-offset", why: why("A wrong offset of the disparity") },
+        CannotTell { effect: "thermal-drift", why: why("A drift of the scale over the session") },
+    ];
+    all.retain(|c| can_happen(c.effect, kind));
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_offset_as_large_as_a_still_shape_is_its_constant() {
+        let law = |id, name, value| Finding {
+            parameters: one(name, value, 0.001),
+            ..named(id, Statistic::Bias, Axis::Z)
+        };
+        let offset = |px| law("disparity-offset", "offset_px", px);
+        assert!(is_constant_of(&offset(-0.016), 0.01));
+        assert!(!is_constant_of(&offset(0.021), 0.01) && !is_constant_of(&offset(0.016), 0.0));
+        assert!(!is_constant_of(&law("depth-scale", "scale", 0.016), 0.01));
+    }
+}

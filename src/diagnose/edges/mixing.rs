@@ -1,0 +1,140 @@
+//! Does depth mix at the target's edge? One share a view; the views are the sample.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Edges, INSIDE_PX};
+use crate::diagnose::finding::parameters::one;
+use crate::diagnose::noise::texture_finding::TextureFinding;
+use crate::diagnose::noise::view_mean::{ViewMean, nats};
+use crate::diagnose::views::field::Field;
+use crate::stats::{bisect, mean};
+use crate::terms::{Axis, Statistic};
+
+/// Widths of the footprint that decide whether depth mixes, px.
+const TRIED_PX: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
+/// And that tell how far, px.
+const WIDTHS_PX: [f64; 7] = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
+/// So few views show no rule.
+const TOO_FEW_VIEWS: f64 = 2.0;
+/// Wider footprints are told as this, px: the catalogue's limit.
+const WIDEST_PX: f64 = 32.0;
+
+/// What a view's target mixes in, as a share of a full footprint's, with the information on it.
+fn share(edges: &Edges, width: f64) -> Option<(f64, f64)> {
+    let (mut normal, mut cross, mut score) = (Matrix3::zeros(), Vector3::zeros(), Vector3::zeros());
+    let (mut own, mut own_score) = (0.0, 0.0);
+    for (n, s) in edges.inside.iter().enumerate() {
+        // A bias that is smooth over the pixels at the edge is none of the edge's.
+        let x = n as f64 / INSIDE_PX as f64 - 0.5;
+        let smooth = Vector3::new(1.0, x, x * x);
+        let seen = footprint(n, width);
+        normal += s.n * smooth * smooth.transpose();
+        cross += seen * s.step * smooth;
+        score += s.residual * smooth;
+        own += seen * seen * s.square;
+        own_score += seen * s.product;
+    }
+    let solved = normal.cholesky()?.solve(&cross);
+    let information = own - cross.dot(&solved);
+    let value = (own_score - solved.dot(&score)) / information;
+    let sure = information / edges.sigma_px.powi(2);
+    (value.is_finite() && sure > 0.0).then_some((value, sure))
+}
+
+/// Share of the other surface in pixel `n` of the target from the edge, for a square footprint that
+/// reaches `width` px to either side.
+fn footprint(n: usize, width: f64) -> f64 {
+    0.5 * (1.0 - (n as f64 + 0.5) / width).max(0.0)
+}
+
+/// All that a full footprint of this width mixes in, px of the step.
+fn mixed_px(width: f64) -> f64 {
+    (0..WIDEST_PX as usize).map(|n| footprint(n, width)).sum()
+}
+
+/// The full footprint that mixes in so much.
+fn width_px(mixed: f64) -> f64 {
+    let [low, high] = bisect([0.5, WIDEST_PX], |width| mixed_px(width) < mixed);
+    0.5 * (low + high)
+}
+
+/// The views' mean share of a footprint's own curve, of whatever width, and the curve's size at the
+/// edge in sigmas. No bias is fitted beside it: none is a quarter of the step.
+pub fn whole_share(views: &[&Edges], width: f64) -> Option<(ViewMean, f64)> {
+    let of = |edges: &&Edges| {
+        let sums = || edges.inside.iter().enumerate().map(|(n, s)| (footprint(n, width), s));
+        let own: f64 = sums().map(|(seen, s)| seen * seen * s.square).sum();
+        let score: f64 = sums().map(|(seen, s)| seen * s.product).sum();
+        (own > 0.0).then_some((score / own, own))
+    };
+    let seen: Vec<(f64, f64)> = views.iter().filter_map(of).collect();
+    (seen.len() as f64 > TOO_FEW_VIEWS).then_some(())?;
+    Some((ViewMean::weighed(&seen)?, footprint(0, width) * step_sigmas(views)))
+}
+
+/// The step to what is behind in sigmas of the noise: the views' mean.
+fn step_sigmas(views: &[&Edges]) -> f64 {
+    let seen = views.iter().filter(|e| e.sigma_px > 0.0);
+    mean(seen.map(|e| e.step_px / e.sigma_px)).unwrap_or(0.0)
+}
+
+/// The views' mean share at a width, beyond that of the twins where there are any, and how well it
+/// explains them: the root of twice its nats, by the noise alone, with its sign.
+pub fn mean_share(
+    views: &[&Edges],
+    twins: Option<&[&Edges]>,
+    width: f64,
+) -> Option<(ViewMean, f64)> {
+    let of = |v: usize| {
+        let (value, sure) = share(views[v], width)?;
+        let Some(twins) = twins else { return Some((value, sure)) };
+        let (expected, as_sure) = share(twins[v], width)?;
+        Some((value - expected, 1.0 / (1.0 / sure + 1.0 / as_sure)))
+    };
+    combined(&(0..views.len()).filter_map(of).collect::<Vec<_>>())
+}
+
+/// Mean of (value, information), with the views' scatter where that is larger than the noise's.
+fn combined(views: &[(f64, f64)]) -> Option<(ViewMean, f64)> {
+    let n = views.len() as f64;
+    let sure: f64 = views.iter().map(|v| v.1).sum();
+    let value = views.iter().map(|v| v.0 * v.1).sum::<f64>() / sure;
+    let scatter = views.iter().map(|v| v.1 * (v.0 - value).powi(2)).sum::<f64>() / (n - 1.0);
+    let std_error = (scatter.max(1.0) / sure).sqrt();
+    let explained = value * sure.sqrt();
+    (n > 1.0 && sure > 0.0).then_some((ViewMean { value, std_error, views: n }, explained))
+}
+
+/// Depth mixed at the edge, where the views agree on it at this level.
+pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<TextureFinding> {
+    let edges: Vec<&Edges> = fields.iter().map(|f| &f.edges).collect();
+    let twins: Option<Vec<&Edges>> = twins.map(|t| t.iter().map(|f| &f.edges).collect());
+    let at = |w: &f64| Some((*w, mean_share(&edges, twins.as_deref(), *w)?));
+    let best = |widths: &[f64]| {
+        let seen = widths.iter().filter_map(at).filter(|(_, (m, _))| m.views > TOO_FEW_VIEWS);
+        seen.max_by(|a, b| a.1.1.total_cmp(&b.1.1))
+    };
+    let p = (TRIED_PX.len() as f64 * best(&TRIED_PX)?.1.0.p_above(0.0)).min(1.0);
+    if p > level {
+        return None;
+    }
+    let (width, (share, _)) = best(&WIDTHS_PX)?;
+    let full = mixed_px(width);
+    let [mixed, error] = [full * share.value, full * share.std_error];
+    let slope = (width_px(mixed + error) - width_px((mixed - error).max(0.0))) / 2.0;
+    let edge = share.value * footprint(0, width);
+    Some(TextureFinding {
+        families: vec!["edge-mixing"],
+        statistic: Statistic::Bias,
+        axis: Axis::EdgeDistance,
+        interval: [0.0, width],
+        parameters: one("width_px", width_px(mixed), slope),
+        size_sigma: edge * step_sigmas(&edges),
+        p,
+        nats: nats(&share, 0.0),
+        words: Some(format!(
+            "the target's last pixel is off by {:.2} % of the step to what is behind",
+            100.0 * edge
+        )),
+    })
+}

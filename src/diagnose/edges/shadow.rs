@@ -1,0 +1,130 @@
+//! Is there a shadow beside the target, in all views on one side, and as wide as it must be?
+//!
+//! The band that the projector cannot light is as many pixels wide as the disparity falls from the
+//! target's edge to what is behind: fx b (1/z - 1/z_behind), on the side away from the projector.
+
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::{EdgeLoss, Edges};
+use crate::diagnose::diagnosis::Curve;
+use crate::diagnose::noise::view_mean::ViewMean;
+use crate::diagnose::search::null::student;
+
+/// Losses beside the target.
+#[derive(Debug, Clone)]
+pub struct Band {
+    /// 0 left of the target, 1 right of it.
+    pub side: usize,
+    /// As wide as the geometry has it, and on one side.
+    pub lawful: bool,
+    /// Of what the geometry has, and its standard error.
+    pub share: [f64; 2],
+    /// Nats of a share of the geometry's width, and of one width everywhere.
+    pub gain: [f64; 2],
+    pub p: f64,
+    pub curve: Curve,
+}
+
+const FEWEST_VIEWS: usize = 3;
+/// The other side has less than this share of it.
+const OTHER_SIDE: f64 = 0.4;
+/// A shadow is no wider than this share of what geometry has: pixels that see both surfaces are
+/// lost beside it.
+const WIDEST: f64 = 1.4;
+/// One view's border is known to this, px: its rows err alike.
+const BORDER_PX: f64 = 0.7;
+/// A name must explain this share of what the best curve does.
+const SHADOW_ADEQUATE: f64 = 0.6;
+
+/// What a view has left and right of the target; `None` where too little is seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sides(pub [Option<EdgeLoss>; 2]);
+
+impl Sides {
+    /// What is lost beyond what a twin loses, where there is one.
+    pub fn of(edges: &Edges, twin: Option<&Edges>) -> Self {
+        let side = |side: usize| {
+            let own = edges.beside(side)?;
+            let Some(twin) = twin else { return Some(own) };
+            let expected = twin.beside(side)?;
+            Some(EdgeLoss { lost: own.lost - expected.lost * own.rows / expected.rows, ..own })
+        };
+        Sides([side(0), side(1)])
+    }
+}
+
+/// What is lost as a share of `of`, view by view.
+fn law(views: &[EdgeLoss], of: impl Fn(&EdgeLoss) -> f64) -> Option<ViewMean> {
+    ViewMean::weighed(&views.iter().map(|v| (v.lost / of(v), of(v))).collect::<Vec<_>>())
+}
+
+/// What either side has in the views that see it, and the share of the geometry's width that is lost.
+fn by_side(views: &[Sides]) -> [(Vec<EdgeLoss>, Option<ViewMean>); 2] {
+    [0, 1].map(|side: usize| {
+        let seen: Vec<EdgeLoss> = views.iter().filter_map(|s| s.0[side]).collect();
+        let enough = seen.len() >= FEWEST_VIEWS;
+        let share = enough.then(|| law(&seen, |v| v.shaded)).flatten();
+        (seen, share)
+    })
+}
+
+/// Of the side that loses more.
+pub fn largest_share(views: &[Sides]) -> Option<ViewMean> {
+    let [(_, left), (_, right)] = by_side(views);
+    [left?, right?].into_iter().max_by(|a, b| a.value.total_cmp(&b.value))
+}
+
+fn t(share: &ViewMean) -> f64 {
+    // Without any loss there is neither a share nor an error.
+    if share.value > 0.0 { share.value / share.std_error.max(1e-9 * share.value) } else { 0.0 }
+}
+
+/// What a share of `of` is worth: that the views agree on it, and whole pixels that it explains.
+fn nats(share: &ViewMean, views: &[EdgeLoss], of: impl Fn(&EdgeLoss) -> f64) -> f64 {
+    let square = |px: f64, v: &EdgeLoss| (px / v.rows / BORDER_PX).powi(2);
+    let explained = |v: &EdgeLoss| square(v.lost, v) - square(v.lost - share.value * of(v), v);
+    student(0.5 * t(share).powi(2), share.views - 1.0)
+        + 0.5 * views.iter().map(explained).sum::<f64>()
+}
+
+/// The band that the views agree on, if there is one at this level.
+pub fn band(views: &[Sides], level: f64) -> Option<Band> {
+    let sides = by_side(views);
+    let share = |side: usize| sides[side].1.map_or(0.0, |share| share.value);
+    let side = usize::from(share(1) > share(0));
+    let (views, lawful) = (&sides[side].0, sides[side].1?);
+    let even = law(views, |v| v.rows)?;
+    let student = StudentsT::new(0.0, 1.0, lawful.views - 1.0).ok()?;
+    // Two sides were looked at.
+    let p = (2.0 * student.sf(t(&lawful))).min(1.0);
+    if p > level {
+        return None;
+    }
+    let one_sided = share(1 - side) < OTHER_SIDE * lawful.value;
+    let gain = [nats(&lawful, views, |v| v.shaded), nats(&even, views, |v| v.rows)];
+    Some(Band {
+        side,
+        lawful: one_sided && lawful.value < WIDEST && gain[0] > SHADOW_ADEQUATE * gain[1],
+        share: [lawful.value, lawful.std_error],
+        gain,
+        p,
+        curve: curve(views, lawful.value),
+    })
+}
+
+fn curve(views: &[EdgeLoss], share: f64) -> Curve {
+    let mut widths: Vec<[f64; 2]> =
+        views.iter().map(|v| [v.shaded, v.lost].map(|px| px / v.rows)).collect();
+    widths.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let model: Vec<f64> = widths.iter().map(|w| share * w[0]).collect();
+    let off: f64 = widths.iter().zip(&model).map(|(w, m)| (w[1] - m).powi(2)).sum();
+    let scatter = (off / (widths.len() as f64 - 1.0)).sqrt();
+    Curve {
+        x_label: "disparity from the target's border to what is behind, px".into(),
+        y_label: "width without a measurement beside the border, px".into(),
+        x: widths.iter().map(|w| w[0]).collect(),
+        y: widths.iter().map(|w| w[1]).collect(),
+        y_std_error: vec![scatter; widths.len()],
+        model,
+    }
+}

@@ -1,0 +1,197 @@
+//! From what the searches chose to what is told.
+
+use rayon::prelude::*;
+use serde_json::Map;
+
+use super::along::Along;
+use super::naming::{naming, physics};
+use super::other_findings::named;
+use super::parameters::{of_any_formula, parameters};
+use super::pixels::terms_of;
+use super::scene::{Scene, size};
+use super::shape;
+use crate::diagnose::diagnosis::{Finding, MapRow};
+use crate::diagnose::joint::terms::is_smooth_and_nameless;
+use crate::diagnose::search::outcome::{Chosen, Look, Outcome};
+use crate::effects::Fitted;
+use crate::model::Covariance;
+use crate::terms::{Axis, Basis, Modulation, Term};
+
+/// All terms of a layer as findings. Terms of one family are one finding, and a nameless curve on
+/// the axis of a name is that name's shape, met better.
+pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
+    let terms = terms_of(outcome, scene.statistic);
+    let values: Vec<Vec<Vec<f64>>> = terms.iter().map(|t| scene.values(t)).collect();
+    let responses = scene.responses();
+    // Groups: who goes with whom.
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for (k, c) in outcome.chosen.iter().enumerate() {
+        let axis = c.candidate.basis.axis();
+        // What planes absorb of a term goes with it.
+        if let (Basis::Affine { .. }, Some(home)) =
+            (&c.candidate.basis, groups.iter_mut().find(|g| g.contains(&k.wrapping_sub(1))))
+        {
+            home.push(k);
+            continue;
+        }
+        let is_map = matches!(c.candidate.basis, Basis::Spline { .. });
+        let home = groups.iter().position(|g| {
+            let first = &outcome.chosen[g[0]];
+            match c.candidate.family {
+                // The smooth rest of a radial cause.
+                None if is_map && first.candidate.family.is_some() => {
+                    first.candidate.basis.axis() == Axis::Radius
+                }
+                Some(family) => {
+                    // A curve came first, but this name had explained half of it.
+                    let nearly = first.candidate.family.is_none()
+                        && first.candidate.basis.axis() == axis
+                        && first
+                            .rivals
+                            .iter()
+                            .any(|r| r.family == family && r.gain > NEARLY * first.gain);
+                    first.candidate.family == c.candidate.family || nearly
+                }
+                // Smooth curves over the picture share what they show.
+                None => {
+                    let smooth = |c: &Chosen| is_smooth_and_nameless(&c.candidate);
+                    first.candidate.basis.axis() == axis || smooth(c) && smooth(first)
+                }
+            }
+        });
+        match home {
+            Some(g) if c.candidate.family.is_some() => groups[g].insert(0, k),
+            Some(g) => groups[g].push(k),
+            None => groups.push(vec![k]),
+        }
+    }
+    // What each half of the views has otherwise, and no physics has a name for, is their scatter.
+    let scattered = |group: &Vec<usize>| {
+        let nameless = group.iter().all(|&k| outcome.chosen[k].candidate.family.is_none());
+        nameless && outcome.halves.as_ref().is_some_and(|h| h.contradict(group))
+    };
+    let told = groups.iter().filter(|group| !scattered(group));
+    told.map(|group| finding(scene, outcome, group, &terms, &values, &responses)).collect()
+}
+
+/// A name found after a curve on its axis stands for both if it had explained this share of it.
+const NEARLY: f64 = 0.4;
+
+fn finding(
+    scene: &Scene<'_>,
+    outcome: &Outcome,
+    group: &[usize],
+    terms: &[Term],
+    values: &[Vec<Vec<f64>>],
+    responses: &[Vec<f64>],
+) -> Finding {
+    let main = group[0];
+    let chosen = &outcome.chosen[main];
+    let axis = chosen.candidate.basis.axis();
+    let mine: Vec<Vec<f64>> = sum(group.iter().map(|&k| &values[k]));
+    let others: Vec<usize> = (0..terms.len()).filter(|k| !group.contains(k)).collect();
+    let rest: Vec<Vec<f64>> = sum(others.iter().map(|&k| &values[k]));
+    let left: Vec<Vec<f64>> = responses
+        .iter()
+        .enumerate()
+        .map(|(v, y)| {
+            y.iter().enumerate().map(|(i, y)| y - rest.get(v).map_or(0.0, |r| r[i])).collect()
+        })
+        .collect();
+    let along = Along::of(scene, &chosen.candidate.basis);
+    let (status, effect, alternatives) = naming(chosen);
+    let covariance = outcome.fit.as_ref().map(|f| {
+        let span = outcome.span(main);
+        f.covariance.view((span.start, span.start), (span.len(), span.len())).into_owned()
+    });
+    let formula_error = chosen.candidate.formula_error();
+    let parameters = covariance.map_or_else(Map::new, |c| {
+        let Term { basis, coefficients, .. } = &terms[main];
+        let (covariance, reach) = (&c, &scene.survey.reach);
+        let fit = Fitted { shape: basis, coefficients, covariance, reach };
+        of_any_formula(formula_error, parameters(chosen.candidate.family, &fit))
+    });
+    let shape =
+        effect.is_none().then(|| shape::words(&terms[main].basis, &terms[main].coefficients));
+    let physics = physics(status, effect, scene.statistic, axis, shape.as_deref());
+    Finding {
+        status,
+        effect,
+        alternatives,
+        interval: along.interval(scene, &mine),
+        // Nats for now; the engine turns them into shares.
+        share: group.iter().map(|&k| outcome.chosen[k].gain).sum(),
+        parameters,
+        size: size(scene, &mine),
+        p_adjusted: Some(chosen.p),
+        replicated: outcome.halves.as_ref().and_then(|h| h.replicate(group, formula_error)),
+        physics,
+        shape,
+        curve: Some(along.curve(scene, &left, &mine)),
+        terms: group.iter().map(|&k| terms[k].clone()).collect(),
+        covariance: covariance_of(outcome, group),
+        ..named(effect.unwrap_or_default(), scene.statistic, axis)
+    }
+}
+
+/// Of the terms of a group.
+fn covariance_of(outcome: &Outcome, group: &[usize]) -> Covariance {
+    let Covariance { fit, factors, variances } = &outcome.covariance;
+    let of = |f: &Vec<f64>| -> Vec<f64> {
+        group.iter().filter_map(|&k| f.get(outcome.span(k))).flatten().copied().collect()
+    };
+    Covariance { fit: *fit, factors: factors.iter().map(of).collect(), variances: of(variances) }
+}
+
+fn sum<'a>(layers: impl Iterator<Item = &'a Vec<Vec<f64>>>) -> Vec<Vec<f64>> {
+    let mut total: Vec<Vec<f64>> = Vec::new();
+    for layer in layers {
+        if total.is_empty() {
+            total = layer.clone();
+        } else {
+            for (t, l) in total.iter_mut().zip(layer) {
+                t.iter_mut().zip(l).for_each(|(t, l)| *t += l);
+            }
+        }
+    }
+    total
+}
+
+/// Every nameless curve that saw something, on the data as they came.
+pub fn map(scene: &Scene<'_>, outcome: &Outcome, level: f64) -> Vec<MapRow> {
+    let of_axis = |basis: &Basis| match basis {
+        // A ripple's period is not the axis's own curve.
+        Basis::Ring { .. } => basis.axis() != Axis::Z,
+        Basis::Curve { times, .. } => *times != Modulation::DisparitySquared,
+        _ => true,
+    };
+    let of_look = |look: &Look| {
+        let axis = look.basis.axis();
+        let term = Term {
+            statistic: scene.statistic,
+            basis: look.basis.clone(),
+            coefficients: look.coefficients.clone(),
+        };
+        let values = scene.values(&term);
+        let along = Along::of(scene, &look.basis);
+        MapRow {
+            statistic: scene.statistic,
+            axis,
+            interval: along.interval(scene, &values),
+            unit: axis.unit(),
+            effect_size: size(scene, &values).sigma,
+            p_adjusted: look.p,
+        }
+    };
+    let looks = outcome.looks.par_iter().filter(|l| l.p < level && of_axis(&l.basis));
+    let mut rows: Vec<MapRow> = Vec::new();
+    for row in looks.map(of_look).collect::<Vec<_>>() {
+        match rows.iter_mut().find(|r| r.axis == row.axis) {
+            Some(old) if old.effect_size >= row.effect_size => {}
+            Some(old) => *old = row,
+            None => rows.push(row),
+        }
+    }
+    rows.sort_by(|a, b| b.effect_size.total_cmp(&a.effect_size));
+    rows
+}

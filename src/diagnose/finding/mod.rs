@@ -1,0 +1,12 @@
+//! From terms and statistics to findings: names, numbers, curves and words.
+
+pub mod along;
+pub mod findings;
+pub mod form;
+pub mod naming;
+pub mod next_view;
+pub mod other_findings;
+pub mod parameters;
+pub mod pixels;
+pub mod scene;
+pub mod shape;

@@ -1,0 +1,133 @@
+//! Found terms, pixel by pixel, and what is typical of the pixels.
+
+use rayon::prelude::*;
+
+use crate::diagnose::noise::kurtosis::FourthMoment;
+use crate::diagnose::noise::structure::Structure;
+use crate::diagnose::noise::tail_counts::{TailCounts, tail};
+use crate::diagnose::noise::texture::moving;
+use crate::diagnose::noise::texture_finding::TextureFinding;
+use crate::diagnose::search::outcome::Outcome;
+use crate::diagnose::views::field::Field;
+use crate::diagnose::views::known::KnownTerms;
+use crate::diagnose::views::layers::Survey;
+use crate::diagnose::views::tiles::Places;
+use crate::measure::Workbench;
+use crate::stats::mean;
+use crate::terms::{Statistic, Term};
+
+/// How much frames of a view resemble one another, by lag, where that was found to be noise.
+pub(in crate::diagnose) fn common(
+    structure: &[Structure],
+    textures: &[TextureFinding],
+    known: &KnownTerms,
+) -> [f64; 3] {
+    let in_time = ["frozen-noise", "temporal-correlation"];
+    let told = textures.iter().flat_map(|h| &h.families).any(|f| in_time.contains(f))
+        || in_time.iter().any(|id| known.has(id));
+    if !told {
+        return [0.0; 3];
+    }
+    let at = |lag: usize| mean_of(structure.iter().filter_map(|s| s.lagged[lag]));
+    let near = at(0);
+    [near, if structure.iter().any(|s| s.lagged[1].is_some()) { at(1) } else { near }, {
+        if structure.iter().any(|s| s.lagged[2].is_some()) { at(2) } else { at(1) }
+    }]
+}
+
+/// Variance of the pixels' constant errors, px^2.
+pub(in crate::diagnose) fn fixed_px2(structure: &[Structure]) -> f64 {
+    mean_of(structure.iter().filter_map(|s| s.fixed_px2))
+}
+
+pub(in crate::diagnose) fn mean_of(values: impl Iterator<Item = f64>) -> f64 {
+    mean(values).unwrap_or(0.0).max(0.0)
+}
+
+pub(in crate::diagnose) fn typical_sigma_px(fields: &[Field]) -> f64 {
+    let mut all: Vec<f32> = fields.iter().filter_map(|f| f.middle_sigma_px()).collect();
+    f64::from(crate::stats::median_in_place(&mut all))
+}
+
+/// Correlation of successive frames below which they are taken to have nothing in common.
+const HARDLY_STILL: f64 = 0.1;
+
+pub(in crate::diagnose) fn measure_tails(
+    structure: &mut [Structure],
+    fields: &[Field],
+    bias: &[Vec<f32>],
+    variance: &[Term],
+    survey: &Survey,
+    bench: &Workbench<'_>,
+) {
+    let factors = pixel_terms(fields, variance, survey, bench);
+    structure.par_iter_mut().zip(fields).enumerate().for_each(|(n, (s, field))| {
+        let whitened = |frame: &Vec<f32>| -> Vec<f32> {
+            let whitened: Vec<f32> = (0..frame.len())
+                .map(|k| {
+                    let factor = factors.get(n).map_or(1.0, |f| (0.5 * f[k]).exp());
+                    (frame[k] - bias.get(n).map_or(0.0, |b| b[k])) / (field.sigma[k] * factor)
+                })
+                .collect();
+            field.high_passed(&whitened)
+        };
+        let frames: Vec<Vec<f32>> = field.first.iter().map(whitened).collect();
+        // Single frames, unless what stands still in them could be taken for a tail.
+        let apart = s.lagged[0].is_some_and(|c| c < HARDLY_STILL);
+        let looks =
+            if apart || frames.is_empty() { frames } else { vec![moving(&frames, s.lagged[0])] };
+        (s.tails, s.fourth) = (TailCounts::default(), FourthMoment::default());
+        for look in &looks {
+            s.tails.add(&tail(look, field.width));
+            s.fourth.add(&FourthMoment::of(look, field.width));
+        }
+    });
+}
+
+/// The chosen terms with their common coefficients.
+pub fn terms_of(outcome: &Outcome, statistic: Statistic) -> Vec<Term> {
+    (0..outcome.chosen.len())
+        .map(|k| Term {
+            statistic,
+            basis: outcome.chosen[k].candidate.basis.clone(),
+            coefficients: outcome.coefficients(k),
+        })
+        .collect()
+}
+
+pub(in crate::diagnose) fn typical_sigma_mm(fields: &[Field]) -> f64 {
+    let of = |f: &Field| {
+        let z = f.plane.depth(0.0, 0.0);
+        let px = f.middle_sigma_px().map_or(0.0, f64::from);
+        1e3 * px * z * z / f.scale_px_m
+    };
+    let mut all: Vec<f32> = fields.iter().map(|f| of(f) as f32).collect();
+    f64::from(crate::stats::median_in_place(&mut all))
+}
+
+/// The terms at every pixel; empty when there are none.
+pub(in crate::diagnose) fn pixel_terms(
+    fields: &[Field],
+    terms: &[Term],
+    survey: &Survey,
+    bench: &Workbench<'_>,
+) -> Vec<Vec<f32>> {
+    if terms.is_empty() {
+        return Vec::new();
+    }
+    let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
+    fields
+        .par_iter()
+        .map(|f| {
+            let places = Places::of(f, &bench.sensor.camera, &bench.rays, start);
+            let mut row = Vec::new();
+            (0..f.pixels.len())
+                .map(|k| {
+                    let mut place = places.pixel(k);
+                    place.light = survey.light.of(f, k, &place);
+                    Term::sum(terms, &place, &mut row) as f32
+                })
+                .collect()
+        })
+        .collect()
+}

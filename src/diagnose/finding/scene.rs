@@ -1,0 +1,99 @@
+//! The data that a layer's findings are measured on.
+
+use crate::diagnose::diagnosis::Size;
+use crate::diagnose::views::layers::Survey;
+use crate::diagnose::views::samples::ViewData;
+use crate::terms::{Statistic, Term};
+
+/// The data a layer's findings are measured on.
+pub struct Scene<'a> {
+    pub statistic: Statistic,
+    pub survey: &'a Survey,
+    pub data: Vec<ViewData>,
+    /// Depth error in mm of one px of disparity, at a place.
+    pub scale_px_m: f64,
+    pub corner_px: f64,
+}
+
+impl<'a> Scene<'a> {
+    pub fn bias(survey: &'a Survey, scale_px_m: f64, corner_px: f64) -> Self {
+        let data = survey.coarse_mean_data();
+        Scene { statistic: Statistic::Bias, survey, data, scale_px_m, corner_px }
+    }
+
+    pub fn variance(survey: &'a Survey, scale_px_m: f64, corner_px: f64) -> Self {
+        let data = survey.variance_data();
+        Scene { statistic: Statistic::Variance, survey, data, scale_px_m, corner_px }
+    }
+
+    /// A term's values, what the views' own nuisances take taken out.
+    pub fn values(&self, term: &Term) -> Vec<Vec<f64>> {
+        let mut row = Vec::new();
+        self.data
+            .iter()
+            .map(|view| {
+                let mut values: Vec<f64> =
+                    view.places.iter().map(|p| term.value(p, &mut row)).collect();
+                if self.statistic == Statistic::Bias {
+                    level(view, &mut values);
+                }
+                values
+            })
+            .collect()
+    }
+
+    pub fn responses(&self) -> Vec<Vec<f64>> {
+        let of = |view: &ViewData| {
+            let mut values = view.response.clone();
+            if self.statistic == Statistic::Bias {
+                level(view, &mut values);
+            }
+            values
+        };
+        self.data.iter().map(of).collect()
+    }
+}
+
+/// Take the weighted fit of the view's nuisances out of `values`.
+fn level(view: &ViewData, values: &mut [f64]) {
+    let p = view.precision.len();
+    let mut a = nalgebra::DMatrix::<f64>::zeros(p, p);
+    let mut b = nalgebra::DVector::<f64>::zeros(p);
+    for ((row, w), y) in view.nuisance.chunks_exact(p).zip(&view.weight).zip(values.iter()) {
+        for q in 0..p {
+            b[q] += w * row[q] * y;
+            for r in 0..p {
+                a[(q, r)] += w * row[q] * row[r];
+            }
+        }
+    }
+    view.precision.iter().enumerate().for_each(|(q, held)| a[(q, q)] += held);
+    let Some(fit) = a.lu().solve(&b) else { return };
+    for (row, y) in view.nuisance.chunks_exact(p).zip(values) {
+        *y -= row.iter().zip(fit.iter()).map(|(x, c)| x * c).sum::<f64>();
+    }
+}
+
+/// Root mean square of a term's values over the recording.
+pub fn size(scene: &Scene<'_>, values: &[Vec<f64>]) -> Size {
+    let (mut mm, mut sigma, mut n) = (0.0, 0.0, 0.0);
+    for (view, values) in scene.data.iter().zip(values) {
+        for ((p, &f), &w) in view.places.iter().zip(values).zip(&view.weight) {
+            if w <= 0.0 || !f.is_finite() {
+                continue;
+            }
+            let px_mm = 1e3 * p.z * p.z / scene.scale_px_m;
+            let (in_mm, in_sigma) = if scene.statistic == Statistic::Bias {
+                (f * px_mm, f / p.variance.sqrt())
+            } else {
+                let factor = (0.5 * f).exp() - 1.0;
+                (factor * p.variance.sqrt() * px_mm, factor)
+            };
+            mm += in_mm * in_mm;
+            sigma += in_sigma * in_sigma;
+            n += 1.0;
+        }
+    }
+    let n = f64::max(n, 1.0);
+    Size { mm: (mm / n).sqrt(), sigma: (sigma / n).sqrt() }
+}

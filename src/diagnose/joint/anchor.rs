@@ -1,0 +1,122 @@
+//! The constant of a bias that planes take up whole, from reference distances.
+//!
+//! A bias that stands still in the picture may hold any constant: every plane takes it up, and the
+//! joint fit leaves it at none on average over the picture. Taken out so it moves all distances by
+//! what nobody has measured. Reference distances measure it.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::camera::Camera;
+use crate::diagnose::distance::referenced_view::ReferencedView;
+use crate::model::Effect;
+use crate::solve::Cholesky;
+use crate::terms::{Basis, DISPARITY_UNIT_PX, Modulation, Pixels, Statistic, Term};
+
+/// Biases of one power of the disparity, whose constant planes do not tell.
+pub struct Family {
+    power: f64,
+    /// Root mean square over the picture, px: the constant is of no other size than the shapes are.
+    usual: f64,
+}
+
+impl Family {
+    /// The usual size of what has the same disparity at all distances, px.
+    pub fn still_px(&self) -> f64 {
+        if self.power == 0.0 { self.usual } else { 0.0 }
+    }
+
+    /// What its constant, of the usual size, makes of a distance, m.
+    pub fn moves_m(&self, c: &ReferencedView) -> f64 {
+        let disparity = c.px_m / c.z;
+        // A disparity too large by delta px makes the depth too small by z^2 delta / (f b).
+        let by_px = c.z * c.z / c.px_m;
+        by_px * self.usual * (disparity / DISPARITY_UNIT_PX).powf(self.power)
+    }
+}
+
+/// Let the learnt biases of `added` leave the references where they were measured. `checked` is what
+/// the references say with these biases, and all laws, taken out; `variance` that of one, m^2.
+pub fn anchor(added: &mut [Effect], checked: &[ReferencedView], variance: f64, camera: &Camera) {
+    let families = families(added.iter().flat_map(|e| &e.shape), camera);
+    for (Family { power, usual }, [shift, error]) in
+        families.iter().zip(constants(&families, checked, variance))
+    {
+        let times = Modulation::still(*power);
+        let of_power = |t: &Term| t.is_correctable() && t.basis.still_power() == Some(*power);
+        if let Some(effect) = added.iter_mut().find(|e| e.shape.iter().any(of_power)) {
+            lift(effect, times, shift * usual, (error * usual).powi(2));
+        }
+    }
+}
+
+pub fn families<'a>(terms: impl Iterator<Item = &'a Term>, camera: &Camera) -> Vec<Family> {
+    let rays = camera.rays();
+    let pixels = Pixels::new(camera, &rays, 1.0);
+    let mut families: Vec<Family> = Vec::new();
+    for term in terms.filter(|t| t.is_correctable() && !matches!(t.basis, Basis::Affine { .. })) {
+        let Some(power) = term.basis.still_power() else { continue };
+        let square = mean_square(term, &pixels);
+        match families.iter_mut().find(|f| f.power == power) {
+            Some(family) => family.usual = family.usual.hypot(square.sqrt()),
+            None => families.push(Family { power, usual: square.sqrt() }),
+        }
+    }
+    families
+}
+
+fn mean_square(term: &Term, pixels: &Pixels<'_>) -> f64 {
+    let (mut sum, mut count, mut row) = (0.0, 0.0, Vec::new());
+    for place in pixels.sampled() {
+        sum += term.value(&place, &mut row).powi(2);
+        count += 1.0;
+    }
+    sum / f64::max(count, 1.0)
+}
+
+/// Each family's constant, in its usual size, with its standard error.
+fn constants(families: &[Family], checked: &[ReferencedView], variance: f64) -> Vec<[f64; 2]> {
+    let n = families.len();
+    let mut information = DMatrix::zeros(n + 2, n + 2);
+    let mut score = DVector::zeros(n + 2);
+    for c in checked {
+        // On a tilted target the axis meets it elsewhere by two small angles.
+        let angles = c.slope.map(|slope| c.z * slope);
+        let row =
+            DVector::from_iterator(n + 2, families.iter().map(|f| f.moves_m(c)).chain(angles));
+        score.axpy(-c.off / variance, &row, 1.0);
+        information.ger(1.0 / variance, &row, &row, 1.0);
+    }
+    information += DMatrix::identity(n + 2, n + 2);
+    let Some(factor) = Cholesky::of(information) else { return vec![[0.0; 2]; n] };
+    let (constants, covariance) = (factor.solve(&score), factor.inverse());
+    (0..n).map(|k| [constants[k], covariance[(k, k)].sqrt()]).collect()
+}
+
+/// Add a constant of the disparity, px, to an effect's shape.
+fn lift(effect: &mut Effect, times: Modulation, shift: f64, variance: f64) {
+    let of_times = |t: &Term| matches!(&t.basis, Basis::Affine { times: own } if *own == times);
+    let at = effect.shape.iter().position(of_times).unwrap_or_else(|| {
+        let term = Term {
+            statistic: Statistic::Bias,
+            basis: Basis::Affine { times },
+            coefficients: vec![0.0; 3],
+        };
+        effect.shape.push(term);
+        if let Some(covariance) = &mut effect.covariance {
+            covariance.factors.iter_mut().for_each(|f| f.extend([0.0; 3]));
+            if !covariance.variances.is_empty() {
+                covariance.variances.extend([0.0; 3]);
+            }
+        }
+        effect.shape.len() - 1
+    });
+    effect.shape[at].coefficients[0] += shift;
+    let first: usize = effect.shape[..at].iter().map(|t| t.coefficients.len()).sum();
+    if let Some(own) = effect.covariance.as_mut().and_then(|c| c.variances.get_mut(first)) {
+        *own += variance;
+    }
+}
+
+#[cfg(test)]
+#[path = "anchor_tests.rs"]
+mod tests;

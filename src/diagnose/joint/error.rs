@@ -1,0 +1,197 @@
+//! How sure the joint posterior is: its covariance in a few factors.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use super::fit::Joint;
+use super::terms::{Settled, System};
+use crate::camera::Camera;
+use crate::rng::Seed;
+use crate::terms::Pixels;
+
+/// Factors are taken until they hold this share of the variance, place by place. The rest is each
+/// node's own.
+const HELD: f64 = 0.98;
+const MAX_FACTORS: usize = 40;
+/// The picture is looked at in pixels so far apart, at three distances.
+const STRIDE: usize = 8;
+/// What no place shows is held against what is usual, by this much.
+const SLIGHT: f64 = 1e-6;
+/// Rounds of the subspace iteration; its start has so many directions to spare (Halko, Martinsson
+/// and Tropp 2011).
+const ROUNDS: usize = 4;
+const SPARE: usize = 8;
+
+impl Joint<'_> {
+    /// The covariance of all columns' coefficients. `left` is what each view says beyond the fit:
+    /// views scatter beyond their noise, and the posterior is as much wider. It is to hold on planes
+    /// at these disparities, px.
+    pub fn error(
+        &self,
+        s: &Settled,
+        kept: &[usize],
+        precision: &DVector<f64>,
+        left: &[DVector<f64>],
+        (camera, disparities): (&Camera, [f64; 3]),
+    ) -> Option<Error> {
+        let System { columns: places, held } = self.system(s, kept, precision);
+        let n = places.len();
+        let information = DMatrix::from_fn(n, n, |i, j| self.all.a[(places[i], places[j])]);
+        let inverse = Cholesky::<f64, Dyn>::new(&information + held)?.inverse();
+        let mine = |e: &DVector<f64>| DVector::from_fn(n, |i, _| e[places[i]]);
+        let scatter: f64 = left.iter().map(|e| mine(e).dot(&(&inverse * mine(e)))).sum();
+        let free = inverse.component_mul(&information).sum();
+        let covariance = inverse * (scatter / free.max(1.0)).max(1.0);
+        let seen = self.seen(&places, camera, disparities);
+        // With this metric every place counts alike, whatever its variance.
+        let mut metric = DMatrix::zeros(n, n);
+        for (row, variance) in seen.iter().zip(variances(&seen, &covariance)) {
+            row.add_square(1.0 / variance, &mut metric);
+        }
+        for i in 0..n {
+            let usual = kept.get(i).map_or(1.0, |&k| self.columns.precision[k]);
+            metric[(i, i)] += SLIGHT * seen.len() as f64 * usual;
+        }
+        let root = Cholesky::<f64, Dyn>::new(metric)?.l();
+        let back = root.transpose();
+        let sizes = &back * &covariance * &root;
+        let factors: Vec<DVector<f64>> = leading(&sizes)
+            .into_iter()
+            .map(|f| back.solve_upper_triangular(&f))
+            .collect::<Option<_>>()?;
+        let told = together(&factors, n);
+        let own = rest(&seen, &(covariance - told), kept.len(), (n - kept.len()) / 2);
+        let all = |of: &dyn Fn(usize) -> f64| {
+            let mut all = DVector::zeros(self.all.b.len());
+            places.iter().enumerate().for_each(|(i, &k)| all[k] = of(i));
+            all
+        };
+        Some(Error {
+            variances: all(&|i| own[i]),
+            factors: factors.iter().map(|f| all(&|i| f[i])).collect(),
+        })
+    }
+
+    /// The columns as planes that are faced show them.
+    fn seen(&self, places: &[usize], camera: &Camera, disparities: [f64; 3]) -> Vec<DesignRow> {
+        let rays = camera.rays();
+        let pixels = Pixels::new(camera, &rays, 1.0);
+        let lines = |disparity| {
+            let rows = (STRIDE / 2..camera.height).into_par_iter().step_by(STRIDE);
+            rows.map(move |v| (disparity, v))
+        };
+        let of_line = |(disparity, v): (f64, usize)| {
+            let mut row = vec![0.0; self.all.b.len()];
+            let mut seen = Vec::new();
+            for u in (STRIDE / 2..camera.width).step_by(STRIDE) {
+                let mut place = pixels.place(v * camera.width + u);
+                place.disparity = disparity;
+                self.columns.fill(&place, &mut row);
+                let columns = places.iter().map(|&k| row[k]).enumerate();
+                seen.push(DesignRow(columns.filter(|(_, g)| *g != 0.0).collect()));
+            }
+            seen
+        };
+        disparities.into_par_iter().flat_map(lines).flat_map_iter(of_line).collect()
+    }
+}
+
+/// A covariance: the sum of the factors' outer products, and variances of each coefficient's own.
+pub struct Error {
+    pub factors: Vec<DVector<f64>>,
+    pub variances: DVector<f64>,
+}
+
+/// A place's columns that are not zero.
+struct DesignRow(Vec<(usize, f64)>);
+
+impl DesignRow {
+    fn variance(&self, covariance: &DMatrix<f64>) -> f64 {
+        let row = |&(i, g): &(usize, f64)| -> f64 {
+            g * self.0.iter().map(|&(j, h)| h * covariance[(i, j)]).sum::<f64>()
+        };
+        self.0.iter().map(row).sum::<f64>().max(f64::MIN_POSITIVE)
+    }
+
+    fn add_square(&self, weight: f64, sum: &mut DMatrix<f64>) {
+        for &(i, g) in &self.0 {
+            self.0.iter().for_each(|&(j, h)| sum[(i, j)] += weight * g * h);
+        }
+    }
+}
+
+/// Of each row's value.
+fn variances(rows: &[DesignRow], covariance: &DMatrix<f64>) -> Vec<f64> {
+    rows.par_iter().map(|row| row.variance(covariance)).collect()
+}
+
+/// Variances of the first map's nodes that make what is left of every place's, neighbours being
+/// independent.
+fn rest(seen: &[DesignRow], left: &DMatrix<f64>, first: usize, nodes: usize) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0); left.nrows()];
+    for (place, variance) in seen.iter().zip(variances(seen, left)) {
+        let mine = || place.0.iter().filter(|(i, _)| (first..first + nodes).contains(i));
+        let squares: f64 = mine().map(|(_, g)| g * g).sum();
+        let variance = variance / squares.max(f64::MIN_POSITIVE);
+        for &(i, g) in mine() {
+            sums[i] = (sums[i].0 + g * g * variance, sums[i].1 + g * g);
+        }
+    }
+    sums.iter().map(|(sum, n)| if *n > 0.0 { sum / n } else { 0.0 }).collect()
+}
+
+/// The largest eigenvectors of a covariance, each times the root of its eigenvalue.
+fn leading(covariance: &DMatrix<f64>) -> Vec<DVector<f64>> {
+    let n = covariance.nrows();
+    if n == 0 {
+        return Vec::new();
+    }
+    let mut rng = Seed(1).stream("diagnose/joint/error");
+    let start =
+        DMatrix::from_fn(n, n.min(MAX_FACTORS + SPARE), |_, _| StandardNormal.sample(&mut rng));
+    let mut basis = start.qr().q();
+    for _ in 0..ROUNDS {
+        basis = (covariance * basis).qr().q();
+    }
+    let small = (basis.transpose() * (covariance * &basis)).symmetric_eigen();
+    let mut order: Vec<usize> = (0..small.eigenvalues.len()).collect();
+    order.sort_by(|&a, &b| small.eigenvalues[b].total_cmp(&small.eigenvalues[a]));
+    let mut rest = covariance.trace();
+    let enough = (1.0 - HELD) * rest;
+    let mut factors = Vec::new();
+    for k in order.into_iter().take(MAX_FACTORS) {
+        let value = small.eigenvalues[k];
+        if rest <= enough || value <= 0.0 {
+            break;
+        }
+        rest -= value;
+        factors.push(&basis * small.eigenvectors.column(k) * value.sqrt());
+    }
+    factors
+}
+
+/// What factors of `n` coefficients make of the covariance.
+fn together(factors: &[DVector<f64>], n: usize) -> DMatrix<f64> {
+    factors.iter().fold(DMatrix::zeros(n, n), |sum, f| sum + f * f.transpose())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A covariance of few directions comes back whole; of many, its largest part.
+    #[test]
+    fn factors_make_the_covariance_again() {
+        let n = 90;
+        let columns = DMatrix::from_fn(n, 5, |i, k| ((k + 1) as f64 * i as f64 * 0.21).sin());
+        let few = &columns * columns.transpose();
+        let made = together(&leading(&few), n);
+        assert!((&made - &few).norm() < 0.15 * few.norm(), "{}", (&made - &few).norm());
+        assert!((made.trace() / few.trace() - 1.0).abs() < 1.0 - HELD + 1e-9);
+        let none = leading(&DMatrix::identity(3, 3));
+        assert_eq!(none.len(), 3);
+        // No term is left to be sure of.
+        assert_eq!(together(&leading(&DMatrix::zeros(0, 0)), 0).shape(), (0, 0));
+    }
+}

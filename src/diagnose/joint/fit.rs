@@ -1,0 +1,272 @@
+//! Normal equations of terms and of a smooth map over the picture together, by parts of the views,
+//! and their penalised solution.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::camera::Camera;
+use crate::diagnose::search::evidence::{Evidence, score};
+use crate::diagnose::search::outcome::Chosen;
+use crate::diagnose::views::samples::ViewData;
+use crate::solve::Cholesky;
+use crate::terms::{Basis, Gauge, Modulation, PixelContext, Pixels};
+
+/// Parts of the views that are left out in turn.
+const FOLDS: usize = 6;
+/// Precision of second differences of a map's nodes, over the mean information on a node.
+pub const SMOOTHNESS: [f64; 5] = [1.0, 0.2, 0.04, 0.008, 0.0016];
+/// Precision of the nodes themselves beside that.
+const RIDGE: f64 = 0.1;
+/// So much the affine part of a map is held to zero, over the mean information on a node.
+const HELD: f64 = 1e4;
+/// Pixels to a node of a map.
+const NODE_PX: usize = 32;
+/// What is fitted: terms, then the nodes of the maps.
+pub struct Columns {
+    pub bases: Vec<Basis>,
+    /// Precision of the terms' coefficients before anything was measured.
+    pub precision: DVector<f64>,
+    pub gauges: Vec<Option<Gauge>>,
+    pub maps: [Basis; 2],
+    /// What planes absorb of the second map.
+    pub far_gauge: Option<Gauge>,
+    /// Columns of the terms, and of both maps.
+    pub terms: usize,
+    pub nodes: usize,
+}
+
+impl Columns {
+    pub fn of(chosen: &[Chosen], camera: &Camera) -> Self {
+        let rays = camera.rays();
+        let pixels = Pixels::new(camera, &rays, 1.0);
+        let bases: Vec<Basis> = chosen.iter().map(|c| c.candidate.basis.clone()).collect();
+        let [across, down] = [(camera.width, 6, 20), (camera.height, 5, 15)]
+            .map(|(length, low, high)| (length / NODE_PX).clamp(low, high));
+        let [width, height] = [camera.width, camera.height].map(|n| n as f64);
+        let map = |times| Basis::Spline { width, height, across, down, times };
+        let maps = [map(Modulation::One), map(Modulation::DisparitySquared)];
+        let precision = |c: &Chosen| -> Vec<f64> {
+            let coefficients = 0..c.candidate.basis.count();
+            coefficients.map(|k| c.candidate.usual(k).powi(-2)).collect()
+        };
+        Columns {
+            gauges: bases.iter().map(|b| Gauge::of(b, &pixels)).collect(),
+            terms: bases.iter().map(Basis::count).sum(),
+            nodes: 2 * across * down,
+            precision: DVector::from_vec(chosen.iter().flat_map(precision).collect()),
+            bases,
+            far_gauge: Gauge::of(&maps[1], &pixels),
+            maps,
+        }
+    }
+
+    /// Normal equations of a view, its plane profiled out.
+    pub fn evidence(&self, view: &ViewData) -> Option<Evidence> {
+        let Basis::Spline { across, .. } = self.maps[0] else { return None };
+        let half = self.nodes / 2;
+        // Between the same nodes the same splines are not zero.
+        let touched = |first: usize| {
+            let squares = (0..4).flat_map(|j| (0..4).map(move |i| j * across + i));
+            let nodes = squares.map(|node| self.terms + first + node);
+            let both = nodes.clone().chain(nodes.map(|node| node + half));
+            (0..self.terms).chain(both).collect()
+        };
+        let rows = view.rows(&view.response)?;
+        let first =
+            |i: usize| self.maps[0].spline_at(&view.places[i]).map_or(0, |(first, _)| first);
+        let fill = |i: usize, row: &mut [f64]| {
+            let (terms, nodes) = row.split_at_mut(self.terms);
+            let place = &view.places[i];
+            self.fill_terms(place, terms);
+            for (map, nodes) in self.maps.iter().zip(nodes.chunks_exact_mut(16)) {
+                if let Some((_, values)) = map.spline_at(place) {
+                    nodes.copy_from_slice(&values);
+                }
+            }
+        };
+        Some(rows.reduce_by_spans(self.terms + self.nodes, first, touched, fill))
+    }
+
+    fn fill_terms(&self, place: &PixelContext, row: &mut [f64]) {
+        let mut rest = row;
+        for (basis, gauge) in self.bases.iter().zip(&self.gauges) {
+            let (mine, others) = rest.split_at_mut(basis.count());
+            basis.fill(place, mine);
+            if let Some(gauge) = gauge {
+                gauge.take_out(place, mine);
+            }
+            rest = others;
+        }
+    }
+
+    pub fn fill(&self, place: &PixelContext, row: &mut [f64]) {
+        let (terms, nodes) = row.split_at_mut(self.terms);
+        self.fill_terms(place, terms);
+        let (first, second) = nodes.split_at_mut(self.nodes / 2);
+        self.maps[0].fill(place, first);
+        self.maps[1].fill(place, second);
+    }
+
+    pub fn span(&self, term: usize) -> std::ops::Range<usize> {
+        let first: usize = self.bases[..term].iter().map(Basis::count).sum();
+        first..first + self.bases[term].count()
+    }
+
+    /// The maps, and what planes absorb of the second.
+    pub fn rest(&self) -> impl Iterator<Item = Basis> + '_ {
+        let absorbed = self.far_gauge.iter().map(|gauge| gauge.term(&[]).0);
+        self.maps.iter().cloned().chain(absorbed)
+    }
+
+    /// What holds the nodes, for a mean information of one on each: smooth, small, and without
+    /// what planes absorb.
+    pub fn penalty(&self, smoothness: f64) -> DMatrix<f64> {
+        let Basis::Spline { across, down, .. } = self.maps[0] else {
+            return DMatrix::zeros(0, 0);
+        };
+        let bend = |n: usize| {
+            let d = DMatrix::from_fn(n - 2, n, |i, j| match j.wrapping_sub(i) {
+                0 | 2 => 1.0,
+                1 => -2.0,
+                _ => 0.0,
+            });
+            d.transpose() * d
+        };
+        let (id, unit) = (DMatrix::identity(across, across), DMatrix::identity(down, down));
+        let rough: DMatrix<f64> = unit.kronecker(&bend(across)) + bend(down).kronecker(&id);
+        let n = across * down;
+        let mut both = DMatrix::zeros(2 * n, 2 * n);
+        let one = (rough + DMatrix::identity(n, n) * RIDGE) * smoothness;
+        both.view_mut((0, 0), (n, n)).copy_from(&one);
+        both.view_mut((n, n), (n, n)).copy_from(&one);
+        if let Some(gauge) = &self.far_gauge {
+            // A slope that grows with the disparity's square bends tilted planes, and what is held
+            // to be nothing is taken for another shape: it is fitted, and left out of what is told.
+            for (map, absorbed) in [(0, 0..3), (n, 0..1)] {
+                for k in absorbed {
+                    let affine = DVector::from_iterator(n, gauge.affine.iter().map(|a| a[k]));
+                    let c = affine.normalize();
+                    both.view_mut((map, map), (n, n)).ger(HELD, &c, &c, 1.0);
+                }
+            }
+        }
+        both
+    }
+}
+
+/// Some views' equations with the nodes of the maps eliminated, if there are maps.
+pub struct Reduced {
+    pub a: DMatrix<f64>,
+    b: DVector<f64>,
+    /// The nodes where all terms are nothing, and what a term's coefficient changes of them.
+    alone: DVector<f64>,
+    pub with: DMatrix<f64>,
+}
+
+impl Reduced {
+    pub fn of(all: &Evidence, terms: usize, penalty: Option<&DMatrix<f64>>) -> Option<Self> {
+        let (a, b) = (all.a.view((0, 0), (terms, terms)).into_owned(), all.b.rows(0, terms));
+        let nodes = all.b.len() - terms;
+        let Some(penalty) = penalty else {
+            let (alone, with) = (DVector::zeros(nodes), DMatrix::zeros(nodes, terms));
+            return Some(Reduced { a, b: b.into_owned(), alone, with });
+        };
+        let factor = Cholesky::of(all.a.view((terms, terms), (nodes, nodes)) + penalty)?;
+        let cross = all.a.view((terms, 0), (nodes, terms));
+        let alone = factor.solve(&all.b.rows(terms, nodes).into_owned());
+        let with = factor.solve_all(cross.into_owned());
+        let less = cross.transpose();
+        Some(Reduced { a: a - &less * &with, b: b - less * &alone, alone, with })
+    }
+
+    /// Coefficients of the terms' columns in `kept`, and of the nodes.
+    pub fn fit(&self, kept: &[usize], precision: &DVector<f64>) -> Option<DVector<f64>> {
+        let n = kept.len();
+        let a = DMatrix::from_fn(n, n, |i, j| {
+            let own = if i == j { precision[kept[i]] } else { 0.0 };
+            self.a[(kept[i], kept[j])] + own
+        });
+        let mine = a.cholesky()?.solve(&DVector::from_fn(n, |i, _| self.b[kept[i]]));
+        let terms = self.b.len();
+        let mut all = DVector::zeros(terms + self.alone.len());
+        kept.iter().zip(mine.iter()).for_each(|(&k, m)| all[k] = *m);
+        let nodes = &self.alone - &self.with * all.rows(0, terms);
+        all.rows_mut(terms, self.alone.len()).copy_from(&nodes);
+        Some(all)
+    }
+}
+
+/// The equations view by view, and by parts of the views.
+pub struct Joint<'a> {
+    pub columns: &'a Columns,
+    pub views: Vec<Vec<usize>>,
+    by_view: Vec<Option<Evidence>>,
+    parts: Vec<Evidence>,
+    pub all: Evidence,
+    /// Of either half of the views.
+    pub halves: [Evidence; 2],
+}
+
+impl<'a> Joint<'a> {
+    pub fn of(columns: &'a Columns, data: &[ViewData], second: &[bool]) -> Self {
+        let n = columns.terms + columns.nodes;
+        // Near and far in every part.
+        let z = |v: &usize| data[*v].places.first().map_or(0.0, |p| p.rho);
+        let mut order: Vec<usize> = (0..data.len()).collect();
+        order.sort_by(|a, b| z(a).total_cmp(&z(b)));
+        let folds = FOLDS.min(data.len());
+        let views: Vec<Vec<usize>> =
+            (0..folds).map(|f| order.iter().skip(f).step_by(folds).copied().collect()).collect();
+        let by_view: Vec<Option<Evidence>> =
+            data.par_iter().map(|view| columns.evidence(view)).collect();
+        let sum = |views: &Vec<usize>| {
+            Evidence::sum(n, 0.0, views.iter().filter_map(|&v| by_view[v].as_ref()))
+        };
+        let half = |h: bool| sum(&(0..data.len()).filter(|v| second[*v] == h).collect());
+        let parts: Vec<Evidence> = views.par_iter().map(sum).collect();
+        let halves = rayon::join(|| half(false), || half(true)).into();
+        let all = Evidence::sum(n, 0.0, &parts);
+        Joint { columns, views, by_view, parts, all, halves }
+    }
+
+    /// What each view of these says beyond a fit, its plane profiled out: the score that is left.
+    pub fn left<'b>(
+        &'b self,
+        views: impl Iterator<Item = usize> + 'b,
+        beta: &'b DVector<f64>,
+    ) -> impl Iterator<Item = DVector<f64>> + 'b {
+        views.filter_map(|v| self.by_view[v].as_ref()).map(move |e| &e.b - &e.a * beta)
+    }
+
+    /// Fits without each part.
+    pub fn without(&self, penalty: Option<&DMatrix<f64>>) -> Option<Vec<Reduced>> {
+        let of = |part: &Evidence| {
+            let others = Evidence { a: &self.all.a - &part.a, b: &self.all.b - &part.b };
+            Reduced::of(&others, self.columns.terms, penalty)
+        };
+        self.parts.par_iter().map(of).collect()
+    }
+
+    pub fn kept(&self, terms: &[usize]) -> Vec<usize> {
+        terms.iter().flat_map(|&t| self.columns.span(t)).collect()
+    }
+
+    /// Nats over no term at all on each part left out; only what `applied` says of a term is taken.
+    pub fn scores(
+        &self,
+        without: &[Reduced],
+        terms: &[usize],
+        applied: impl Fn(usize) -> bool + Sync,
+    ) -> Vec<f64> {
+        let kept = self.kept(terms);
+        let of = |(reduced, part): (&Reduced, &Evidence)| {
+            let mut beta = reduced.fit(&kept, &self.columns.precision)?;
+            for &t in terms.iter().filter(|t| !applied(**t)) {
+                self.columns.span(t).for_each(|k| beta[k] = 0.0);
+            }
+            Some(score(part, &beta))
+        };
+        let pairs: Vec<_> = without.iter().zip(&self.parts).collect();
+        pairs.into_par_iter().map(|pair| of(pair).unwrap_or(f64::NEG_INFINITY)).collect()
+    }
+}

@@ -1,0 +1,303 @@
+//! The joint posterior of all that shifts the mean.
+//!
+//! The search takes the best term first, and what it takes next makes up for what that one got
+//! wrong. Here the terms it settled on are fitted together once more, each held by what is usual of
+//! its kind, and with them a smooth rest: two maps over the picture, one of them times the square
+//! of the disparity. Every view's plane is free, and what planes absorb of a shape is taken out of
+//! it beforehand. How smooth the maps are, and whether they and the terms are needed, is decided on
+//! views left out.
+pub mod anchor;
+pub mod error;
+pub mod fit;
+pub mod terms;
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::camera::Camera;
+use crate::diagnose::checks::replication::{Half, Halves, spans};
+use crate::diagnose::search::candidate::Candidate;
+use crate::diagnose::search::evidence::Gain;
+use crate::diagnose::search::outcome::{Chosen, Outcome};
+use crate::diagnose::views::samples::{ViewData, coarser};
+use crate::model::Covariance;
+use crate::terms::Gauge;
+use error::Error;
+use fit::{Columns, Joint, Reduced};
+use terms::{Settled, System, is_rough, is_smooth_and_nameless, total};
+
+/// The terms of a finished search fitted together, with the smooth rest. `fine` are the views' means
+/// in small patches, `inflation` what each view's weights were divided by: a bias is as sure in a
+/// view as in another, for views scatter beyond their noise. `second` says which half a view is in;
+/// where all are in one, nobody asks how sure it is, and there are neither halves nor a covariance.
+pub fn refit(
+    fine: &[ViewData],
+    inflation: &[f64],
+    second: &[bool],
+    camera: &Camera,
+    found: Outcome,
+) -> Outcome {
+    if found.chosen.is_empty() {
+        return found;
+    }
+    let rough = found.chosen.iter().any(|c| is_rough(&c.candidate));
+    let common = median(inflation);
+    let data: Vec<ViewData> = fine
+        .par_iter()
+        .zip(inflation)
+        .map(|(view, own)| {
+            let mut view = if rough { view.clone() } else { coarser(view) };
+            // A target too small to measure its noise on weighs nothing already.
+            let share = if own.is_finite() { own / common } else { 0.0 };
+            view.weight.iter_mut().for_each(|w| *w *= share);
+            view
+        })
+        .collect();
+    let columns = Columns::of(&found.chosen, camera);
+    let joint = Joint::of(&columns, &data, second);
+    match joint.settle(&found.chosen) {
+        Some(settled) => joint.posterior(&data, second, &settled, &found, camera).unwrap_or(found),
+        None => found,
+    }
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(1.0)
+}
+
+impl Joint<'_> {
+    fn posterior(
+        &self,
+        data: &[ViewData],
+        second: &[bool],
+        s: &Settled,
+        found: &Outcome,
+        camera: &Camera,
+    ) -> Option<Outcome> {
+        let kept = self.kept(&s.terms);
+        let whole = Reduced::of(&self.all, self.columns.terms, s.penalty.as_ref())?;
+        let first = whole.fit(&kept, &self.columns.precision)?;
+        // What every view says beyond the common fit, of all and of the terms alone.
+        let left: Vec<DVector<f64>> = self.left(0..data.len(), &first).collect();
+        let of_terms = |left: &DVector<f64>| {
+            let terms = self.columns.terms;
+            let nodes = left.rows(terms, self.columns.nodes);
+            let mine = left.rows(0, terms) - whole.with.transpose() * nodes;
+            DVector::from_fn(kept.len(), |i, _| mine[kept[i]])
+        };
+        let beyond: Vec<DVector<f64>> = left.iter().map(of_terms).collect();
+        let information =
+            DMatrix::from_fn(kept.len(), kept.len(), |i, j| whole.a[(kept[i], kept[j])]);
+        let held = |dispersion: f64| {
+            let own =
+                DVector::from_fn(kept.len(), |i, _| dispersion * self.columns.precision[kept[i]]);
+            (&information + DMatrix::from_diagonal(&own)).try_inverse()
+        };
+        let inverse = held(1.0)?;
+        let free = (&information * &inverse).trace();
+        let scatter: f64 = beyond.iter().map(|e| e.dot(&(&inverse * e))).sum();
+        // Views scatter beyond their noise: what they say counts for less against what is usual.
+        let dispersion = if kept.is_empty() { 1.0 } else { (scatter / free).max(1.0) };
+        let precision = &self.columns.precision * dispersion;
+        let beta = whole.fit(&kept, &precision)?;
+        let errors = clustered(&held(dispersion)?, &beyond);
+        let planes = (camera, disparities(data));
+        let is_told = second.contains(&true);
+        let (halves, error) = rayon::join(
+            || self.halves(second, s, &precision, &beta),
+            || is_told.then(|| self.error(s, &kept, &precision, &left, planes)).flatten(),
+        );
+        let folds = s.without.iter().zip(&self.views);
+        let left_out = folds.filter_map(|(r, views)| {
+            Some((views.clone(), self.reported(s, &r.fit(&kept, &precision)?)))
+        });
+        let told = self.reported(s, &beta);
+        let fit = Gain {
+            total: total(&s.scores),
+            by_view: s.scores.clone(),
+            covariance: self.covariance_of_reported(s, &errors, told.len()),
+            beta: DVector::from_vec(told),
+        };
+        Some(Outcome {
+            chosen: self.chosen(s, found),
+            looks: found.looks.clone(),
+            noise: found.noise.clone(),
+            remaining: found
+                .remaining
+                .clone()
+                .filter(|r| s.penalty.is_none() || !is_smooth_and_nameless(&r.candidate)),
+            halves,
+            covariance: error.map(|e| self.reported_error(s, &e)).unwrap_or_default(),
+            left_out: left_out.collect(),
+            fit: Some(fit),
+            ..Outcome::default()
+        })
+    }
+
+    /// An error where [`Joint::reported`] has the coefficients.
+    fn reported_error(&self, s: &Settled, error: &Error) -> Covariance {
+        Covariance {
+            factors: error.factors.iter().map(|f| self.reported(s, f)).collect(),
+            variances: self.laid_out(s, &error.variances, |_, _| [0.0; 3]),
+            ..Covariance::default()
+        }
+    }
+
+    /// The terms' covariance where [`Joint::reported`] has their coefficients, zero elsewhere.
+    fn covariance_of_reported(
+        &self,
+        s: &Settled,
+        errors: &DMatrix<f64>,
+        told: usize,
+    ) -> DMatrix<f64> {
+        let mut covariance = DMatrix::zeros(told, told);
+        let mut to = 0;
+        let places: Vec<usize> = s
+            .terms
+            .iter()
+            .flat_map(|&t| {
+                let (count, gauge) = (self.columns.bases[t].count(), &self.columns.gauges[t]);
+                let first = to;
+                to += count + if gauge.is_some() { 3 } else { 0 };
+                first..first + count
+            })
+            .collect();
+        for (i, &p) in places.iter().enumerate() {
+            for (j, &q) in places.iter().enumerate() {
+                covariance[(p, q)] = errors[(i, j)];
+            }
+        }
+        covariance
+    }
+
+    /// The same fit to either half of the views, where there are two.
+    fn halves(
+        &self,
+        second: &[bool],
+        s: &Settled,
+        precision: &DVector<f64>,
+        whole: &DVector<f64>,
+    ) -> Option<Halves> {
+        if !second.contains(&true) {
+            return None;
+        }
+        let kept = self.kept(&s.terms);
+        let System { columns, held } = self.system(s, &kept, precision);
+        let n = columns.len();
+        let part = |a: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| a[(columns[i], columns[j])]);
+        let own = |all: &DVector<f64>| DVector::from_fn(n, |i, _| all[columns[i]]);
+        let half = |which: bool| {
+            let evidence = &self.halves[usize::from(which)];
+            let factor = (part(&evidence.a) + &held).cholesky()?;
+            let beta = factor.solve(&own(&evidence.b));
+            let mut all = DVector::zeros(self.all.b.len());
+            columns.iter().zip(beta.iter()).for_each(|(&c, b)| all[c] = *b);
+            let mine = (0..second.len()).filter(|v| second[*v] == which);
+            let beyond = self.left(mine, &all).map(|left| own(&left)).collect();
+            Some(Half { beta, factor, beyond })
+        };
+        let mut counts = Vec::new();
+        for &t in &s.terms {
+            counts.push(self.columns.bases[t].count());
+            // What planes absorb goes with its term.
+            counts.extend(self.columns.gauges[t].is_some().then_some(0));
+        }
+        if s.penalty.is_some() {
+            counts.extend([self.columns.nodes / 2; 2]);
+            counts.extend(self.columns.far_gauge.is_some().then_some(0));
+        }
+        Some(Halves {
+            metric: part(&self.all.a),
+            whole: own(whole),
+            halves: [half(false)?, half(true)?],
+            spans: spans(&counts),
+        })
+    }
+
+    /// The terms with what planes absorb of each, and the maps.
+    fn chosen(&self, s: &Settled, found: &Outcome) -> Vec<Chosen> {
+        let mut chosen = Vec::new();
+        for &t in &s.terms {
+            let term = &found.chosen[t];
+            chosen.push(term.clone());
+            if let Some(gauge) = &self.columns.gauges[t] {
+                let (basis, _) = gauge.term(&[]);
+                let candidate = Candidate { basis, ..term.candidate.clone() };
+                chosen.push(Chosen { candidate, gain: 0.0, rivals: Vec::new(), ..term.clone() });
+            }
+        }
+        if s.penalty.is_some() {
+            for (basis, gain) in self.columns.rest().zip([s.maps, 0.0, 0.0]) {
+                chosen.push(Chosen {
+                    candidate: Candidate::curve(basis),
+                    rms: 0.0,
+                    adequacy: 0.0,
+                    gain,
+                    best_curve: gain,
+                    rivals: Vec::new(),
+                    p: s.maps_p,
+                });
+            }
+        }
+        chosen
+    }
+
+    /// The coefficients of [`Joint::chosen`].
+    fn reported(&self, s: &Settled, beta: &DVector<f64>) -> Vec<f64> {
+        self.laid_out(s, beta, |gauge, mine| gauge.term(mine).1)
+    }
+
+    /// A number for each coefficient of [`Joint::chosen`]; `affine` has those of what planes absorb.
+    fn laid_out(
+        &self,
+        s: &Settled,
+        of_columns: &DVector<f64>,
+        affine: impl Fn(&Gauge, &[f64]) -> [f64; 3],
+    ) -> Vec<f64> {
+        let mut told = Vec::new();
+        for &t in &s.terms {
+            let mine = &of_columns.as_slice()[self.columns.span(t)];
+            told.extend(mine);
+            if let Some(gauge) = &self.columns.gauges[t] {
+                told.extend(affine(gauge, mine));
+            }
+        }
+        if s.penalty.is_some() {
+            let nodes = &of_columns.as_slice()[self.columns.terms..];
+            told.extend(nodes);
+            if let Some(gauge) = &self.columns.far_gauge {
+                told.extend(affine(gauge, &nodes[self.columns.nodes / 2..]));
+            }
+        }
+        told
+    }
+}
+
+/// Near, in the middle, and far, px: a tenth, half and nine tenths of the views' samples.
+fn disparities(data: &[ViewData]) -> [f64; 3] {
+    let mut all: Vec<f64> =
+        data.iter().flat_map(|v| v.places.iter().map(|p| p.disparity)).collect();
+    all.par_sort_unstable_by(f64::total_cmp);
+    [0.1, 0.5, 0.9]
+        .map(|share| all.get((share * all.len() as f64) as usize).copied().unwrap_or(1.0))
+}
+
+/// Covariance with the views as the sample (White 1980; Liang and Zeger 1986), where it is the larger.
+pub fn clustered(inverse: &DMatrix<f64>, beyond: &[DVector<f64>]) -> DMatrix<f64> {
+    let n = beyond.len() as f64;
+    let mut square = DMatrix::zeros(inverse.nrows(), inverse.nrows());
+    for e in beyond {
+        let moved = inverse * e;
+        square.ger(n / (n - 1.0).max(1.0), &moved, &moved, 1.0);
+    }
+    let larger: Vec<f64> =
+        (0..inverse.nrows()).map(|i| (square[(i, i)] / inverse[(i, i)]).max(1.0).sqrt()).collect();
+    DMatrix::from_fn(inverse.nrows(), inverse.nrows(), |i, j| {
+        inverse[(i, j)] * larger[i] * larger[j]
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,276 @@
+//! Which terms the joint fit keeps, and whether it has a smooth rest: by what views left out say.
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::fit::{Joint, Reduced, SMOOTHNESS};
+use crate::diagnose::search::candidate::Candidate;
+use crate::diagnose::search::choose::behind;
+use crate::diagnose::search::outcome::Chosen;
+use crate::terms::{Axis, Basis, Coordinate, Statistic, Term};
+
+/// Maps take the place of terms where they predict views left out better by this share, and by so
+/// many standard errors over the parts.
+const MAPS_SHARE: f64 = 0.02;
+const MAPS_CLEARLY: f64 = 3.0;
+/// Beside the maps a term must bring this share of all, and be so clear.
+const TERM_SHARE: f64 = 0.005;
+const TERM_CLEARLY: f64 = 2.0;
+/// A shape of the target, which a correction leaves in, must bring as much beside the maps as they
+/// must bring themselves, and lie within so many of the standard deviations of what is usual (95 % of
+/// them do): what is collinear with the sensor's own error and fits no board is not the board's.
+const LARGEST_USUAL: f64 = 2.0;
+/// A smooth error of the sensor, the maps among them, must bring this share beside a shape of the
+/// target: less is what the target's formula misses (up to 2.1 % of domes, 0.7 % of arcs), and no
+/// board's misfit is to be taken out of other pictures.
+const BESIDE_TARGET: f64 = 0.05;
+/// A radial name that explains this share of all stands, and the maps are the rest of it.
+const RADIAL_NAME_ADEQUATE: f64 = 0.6;
+
+/// What the terms are in the end.
+pub struct Settled {
+    pub terms: Vec<usize>,
+    pub penalty: Option<DMatrix<f64>>,
+    pub without: Vec<Reduced>,
+    pub scores: Vec<f64>,
+    /// What the maps bring beside the terms, nats, and the chance that nothing brings as much: over
+    /// the parts left out, by Student's t.
+    pub maps: f64,
+    pub maps_p: f64,
+}
+
+/// What is solved: the columns that are in it, by number, and what holds them.
+pub struct System {
+    pub columns: Vec<usize>,
+    pub held: DMatrix<f64>,
+}
+
+impl Joint<'_> {
+    /// The terms' columns in `kept`, and the maps' where there are maps.
+    pub fn system(&self, s: &Settled, kept: &[usize], precision: &DVector<f64>) -> System {
+        let terms = self.columns.terms;
+        let nodes = if s.penalty.is_some() { self.columns.nodes } else { 0 };
+        let columns: Vec<usize> = kept.iter().copied().chain(terms..terms + nodes).collect();
+        let mut held = DMatrix::zeros(columns.len(), columns.len());
+        kept.iter().enumerate().for_each(|(i, &k)| held[(i, i)] = precision[k]);
+        if let Some(penalty) = &s.penalty {
+            held.view_mut((kept.len(), kept.len()), (nodes, nodes)).copy_from(penalty);
+        }
+        System { columns, held }
+    }
+
+    pub fn settle(&self, chosen: &[Chosen]) -> Option<Settled> {
+        let everything: Vec<usize> = (0..chosen.len()).collect();
+        let plain = self.without(None)?;
+        let scores = self.scores(&plain, &everything, |_| true);
+        let mut settled = Settled {
+            scores,
+            terms: everything,
+            penalty: None,
+            without: plain,
+            maps: 0.0,
+            maps_p: 1.0,
+        };
+        let is_kept = |t: &usize| !is_smooth_and_nameless(&chosen[*t].candidate);
+        let kept: Vec<usize> = settled.terms.iter().copied().filter(is_kept).collect();
+        if let Some(mapped) = self.best_maps(&kept) {
+            let better = total(&mapped.scores) - total(&settled.scores);
+            let slack = MAPS_SHARE * total(&mapped.scores);
+            let clear = behind(&mapped.scores, &settled.scores) > MAPS_CLEARLY;
+            // A rest that the search saw is told by the maps, unless they are the worse for it.
+            let seen = kept.len() < settled.terms.len();
+            let alone = self.scores(&settled.without, &kept, |_| true);
+            let brought = total(&mapped.scores) - total(&alone);
+            let is_misfit = kept.iter().any(|&t| !is_of_sensor(&chosen[t].candidate))
+                && brought < BESIDE_TARGET * total(&mapped.scores);
+            if !is_misfit && ((clear && better > slack) || (seen && better > -slack)) {
+                settled = mapped;
+                self.drop_idle(&mut settled, chosen, total(&alone));
+                settled.maps = total(&settled.scores) - total(&alone);
+                settled.maps_p = chance(behind(&settled.scores, &alone), alone.len());
+            }
+        }
+        if settled.penalty.is_none() {
+            self.drop_misfit_of_target(&mut settled, chosen);
+        }
+        self.drop_companions(&mut settled, chosen);
+        self.drop_harmful(&mut settled, chosen);
+        Some(settled)
+    }
+
+    /// The smoothest maps that predict the parts left out within a standard error of the best
+    /// (Breiman et al. 1984).
+    fn best_maps(&self, terms: &[usize]) -> Option<Settled> {
+        let first = self.columns.terms;
+        let diagonal = self.all.a.diagonal();
+        let unit = diagonal.rows(first, self.columns.nodes / 2).mean();
+        let mut all: Vec<Settled> = Vec::new();
+        for smoothness in SMOOTHNESS {
+            let penalty = self.columns.penalty(smoothness) * unit;
+            let Some(without) = self.without(Some(&penalty)) else { continue };
+            let scores = self.scores(&without, terms, |_| true);
+            let worse = all.last().is_some_and(|b| total(&b.scores) > total(&scores));
+            if worse {
+                break;
+            }
+            let (terms, penalty) = (terms.to_vec(), Some(penalty));
+            all.push(Settled { terms, penalty, without, scores, maps: 0.0, maps_p: 1.0 });
+        }
+        let best = all.last()?.scores.clone();
+        all.into_iter().find(|s| behind(&best, &s.scores) < 1.0)
+    }
+
+    /// Terms that the maps make needless. The terms `alone` bring so much without them, nats.
+    fn drop_idle(&self, settled: &mut Settled, chosen: &[Chosen], alone: f64) {
+        let concerned = |s: &Settled, t: usize| {
+            let c = &chosen[t].candidate;
+            let named = alone > RADIAL_NAME_ADEQUATE * total(&s.scores);
+            !(is_rough(c) || (named && is_radial_name(c)))
+        };
+        let needless = |s: &Settled, t: usize, lost: f64, scores: &[f64]| {
+            let of_target = !is_of_sensor(&chosen[t].candidate);
+            let share = if of_target { MAPS_SHARE } else { TERM_SHARE };
+            let clear = behind(&s.scores, scores) > TERM_CLEARLY;
+            let needed = lost > share * total(&s.scores) && clear;
+            let believed = !of_target || self.size(s, t) < LARGEST_USUAL;
+            !(needed && believed)
+        };
+        self.drop_while(settled, concerned, needless);
+    }
+
+    /// What is smooth over the picture and brings little beside a shape of the target.
+    fn drop_misfit_of_target(&self, settled: &mut Settled, chosen: &[Chosen]) {
+        if settled.terms.iter().all(|&t| is_of_sensor(&chosen[t].candidate)) {
+            return;
+        }
+        let concerned = |_: &Settled, t: usize| {
+            let c = &chosen[t].candidate;
+            let smooth = is_radial_name(c) || c.family.is_none() && !c.basis.is_fine();
+            smooth && is_of_sensor(c)
+        };
+        self.drop_while(settled, concerned, brings_less_than(BESIDE_TARGET));
+    }
+
+    /// Nameless curves that bring next to nothing beside a name on their own axis: of columns that
+    /// nearly say the same a fit makes two halves.
+    fn drop_companions(&self, settled: &mut Settled, chosen: &[Chosen]) {
+        let named: Vec<Axis> = settled
+            .terms
+            .iter()
+            .map(|&t| &chosen[t].candidate)
+            .filter(|c| c.family.is_some())
+            .map(|c| c.basis.axis())
+            .collect();
+        let concerned = |_: &Settled, t: usize| {
+            let c = &chosen[t].candidate;
+            c.family.is_none() && named.contains(&c.basis.axis())
+        };
+        self.drop_while(settled, concerned, brings_less_than(TERM_SHARE));
+    }
+
+    /// Leave out terms among the `concerned` that are `needless`, the one that is missed least first: by
+    /// what the parts left out lose without it, nats, and by their scores then.
+    fn drop_while(
+        &self,
+        settled: &mut Settled,
+        concerned: impl Fn(&Settled, usize) -> bool,
+        needless: impl Fn(&Settled, usize, f64, &[f64]) -> bool,
+    ) {
+        loop {
+            let all = total(&settled.scores);
+            let dropped = |&t: &usize| {
+                let others = without(&settled.terms, t);
+                let scores = self.scores(&settled.without, &others, |_| true);
+                let lost = all - total(&scores);
+                needless(settled, t, lost, &scores).then_some((lost, others, scores))
+            };
+            let next = settled
+                .terms
+                .iter()
+                .filter(|&&t| concerned(settled, t))
+                .filter_map(dropped)
+                .min_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((_, others, scores)) = next else { return };
+            (settled.terms, settled.scores) = (others, scores);
+        }
+    }
+
+    /// The largest of a term's coefficients over its usual size, mean over the fits.
+    fn size(&self, settled: &Settled, term: usize) -> f64 {
+        let kept = self.kept(&settled.terms);
+        let span = self.columns.span(term);
+        let of = |beta: DVector<f64>| -> f64 {
+            span.clone()
+                .map(|k| self.columns.precision[k].sqrt() * beta[k].abs())
+                .fold(0.0, f64::max)
+        };
+        let fits = settled.without.iter().filter_map(|r| r.fit(&kept, &self.columns.precision));
+        fits.map(of).sum::<f64>() / settled.without.len().max(1) as f64
+    }
+
+    /// What a correction takes out must help the parts left out; terms that are needed for the sum
+    /// alone, against one that is not the sensor's, do not.
+    fn drop_harmful(&self, settled: &mut Settled, chosen: &[Chosen]) {
+        let of_sensor = |t: usize| is_of_sensor(&chosen[t].candidate);
+        while !settled.terms.is_empty() {
+            if total(&self.scores(&settled.without, &settled.terms, of_sensor)) >= 0.0 {
+                return;
+            }
+            let harm = |&t: &usize| {
+                let others = without(&settled.terms, t);
+                (total(&self.scores(&settled.without, &others, of_sensor)), others)
+            };
+            let best = settled.terms.iter().map(harm).max_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((_, others)) = best else { return };
+            settled.scores = self.scores(&settled.without, &others, |_| true);
+            settled.terms = others;
+        }
+    }
+}
+
+/// The other terms.
+fn without(terms: &[usize], term: usize) -> Vec<usize> {
+    terms.iter().copied().filter(|t| *t != term).collect()
+}
+
+/// Needless is a term without which the parts left out lose less than this share.
+fn brings_less_than(share: f64) -> impl Fn(&Settled, usize, f64, &[f64]) -> bool {
+    move |settled, _, lost, _| lost < share * total(&settled.scores)
+}
+
+/// Of a mean over its standard error this large, over so many parts.
+fn chance(t: f64, parts: usize) -> f64 {
+    let law = StudentsT::new(0.0, 1.0, parts.saturating_sub(1).max(1) as f64);
+    law.map_or(1.0, |law| law.sf(t))
+}
+
+pub fn total(scores: &[f64]) -> f64 {
+    scores.iter().sum()
+}
+
+/// Do the maps say the same, and more?
+pub fn is_smooth_and_nameless(c: &Candidate) -> bool {
+    let still = matches!(
+        c.basis,
+        Basis::Map { .. } | Basis::Curve { over: Coordinate::Radius, nodes: 3.., .. }
+    );
+    c.family.is_none() && still
+}
+
+fn is_radial_name(c: &Candidate) -> bool {
+    c.family.is_some() && c.basis.axis() == Axis::Radius
+}
+
+/// Can a smooth map stand in for it at all?
+pub fn is_rough(c: &Candidate) -> bool {
+    let fine_lines = matches!(
+        c.basis,
+        Basis::Curve { over: Coordinate::Column | Coordinate::Row, nodes: 2 | 30.., .. }
+    );
+    c.basis.is_fine() || fine_lines || c.basis.period().is_some()
+}
+
+fn is_of_sensor(c: &Candidate) -> bool {
+    let basis = c.basis.clone();
+    Term { statistic: Statistic::Bias, basis, coefficients: Vec::new() }.is_sensor_bias()
+}

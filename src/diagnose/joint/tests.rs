@@ -1,0 +1,259 @@
+//! Simulated views of planes: what goes in comes out, and nothing else.
+
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+use crate::diagnose::finding::pixels::terms_of;
+use crate::rng::{Seed, Stream};
+use crate::simulate::kinect_v1;
+use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Statistic, Term, corner_radius};
+
+const SCALE_PX_M: f64 = 43.5;
+const NOISE_PX: f64 = 0.05;
+
+/// Views of planes at these distances, m, with a bias, px.
+fn session(z_m: [f64; 2], rng: &mut Stream, bias: impl Fn(&PixelContext) -> f64) -> Vec<ViewData> {
+    let camera = kinect_v1(4).camera;
+    let corner = corner_radius(&camera);
+    (0..12)
+        .map(|_| {
+            let d = SCALE_PX_M / rng.random_range(z_m[0]..z_m[1]);
+            let slope = [rng.random_range(-0.5..0.5) * d, rng.random_range(-0.5..0.5) * d];
+            let mut view = ViewData { precision: vec![0.0; 3], ..ViewData::default() };
+            for v in (2..camera.height).step_by(4) {
+                for u in (2..camera.width).step_by(4) {
+                    let (u, v) = (u as f64, v as f64);
+                    let (x, y) = camera.ray(u, v);
+                    let disparity = d + slope[0] * x + slope[1] * y;
+                    let radius = f64::hypot(u - camera.cx, v - camera.cy) / corner;
+                    let z = SCALE_PX_M / disparity;
+                    let place = PixelContext {
+                        u,
+                        v,
+                        x,
+                        y,
+                        disparity,
+                        z,
+                        radius,
+                        rho: z,
+                        ..Default::default()
+                    };
+                    let noise: f64 = StandardNormal.sample(rng);
+                    view.response.push(bias(&place) + NOISE_PX * noise);
+                    view.weight.push(NOISE_PX.powi(-2));
+                    view.nuisance.extend([1.0, x, y]);
+                    view.places.push(place);
+                }
+            }
+            view
+        })
+        .collect()
+}
+
+fn term(family: Option<&'static str>, basis: Basis) -> Chosen {
+    Chosen {
+        candidate: Candidate { family, basis, flat: None },
+        rms: 0.1,
+        adequacy: 0.6,
+        gain: 1.0,
+        best_curve: 1.0,
+        rivals: Vec::new(),
+        p: 0.0,
+    }
+}
+
+fn fitted(data: &[ViewData], chosen: Vec<Chosen>) -> Outcome {
+    let found = Outcome { chosen, ..Outcome::default() };
+    let second: Vec<bool> = (0..data.len()).map(|v| v % 4 == 1 || v % 4 == 2).collect();
+    refit(data, &vec![1.0; data.len()], &second, &kinect_v1(4).camera, found)
+}
+
+/// Root mean square of the bias around each view's plane, before and after what the sensor's terms
+/// say, px.
+fn left(data: &[ViewData], outcome: &Outcome) -> [f64; 2] {
+    let (mut squares, mut n) = ([0.0; 2], 0.0);
+    let (terms, mut row) = (terms_of(outcome, Statistic::Bias), Vec::new());
+    for view in data {
+        let x = DMatrix::from_row_slice(view.places.len(), 3, &view.nuisance);
+        let solver = x.clone().svd(true, true);
+        let mut y = DVector::from_vec(view.response.clone());
+        for square in &mut squares {
+            *square += (&y - &x * solver.solve(&y, 1e-12).unwrap()).norm_squared();
+            for term in terms.iter().filter(|t| t.is_sensor_bias()) {
+                let values = view.places.iter().map(|p| term.value(p, &mut row));
+                y -= DVector::from_iterator(view.places.len(), values);
+            }
+        }
+        n += view.places.len() as f64;
+    }
+    squares.map(|s| (s / n).sqrt())
+}
+
+fn bowl() -> Chosen {
+    let basis = Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(0.0));
+    term(Some("radial-disparity-bias"), basis)
+}
+
+fn map() -> Chosen {
+    let (width, height) = (160.0, 120.0);
+    let basis = Basis::Map { width, height, across: 4, down: 3, times: Modulation::One };
+    term(None, basis)
+}
+
+fn smooth(p: &PixelContext) -> f64 {
+    0.15 * (p.u / 25.0).sin() * (p.v / 20.0).cos()
+}
+
+#[test]
+fn a_bowl_and_its_smooth_rest_are_recovered() {
+    let rng = &mut Seed(3).stream("joint/rest");
+    let data = session([0.8, 3.0], rng, |p| 0.3 * p.radius.powi(2) + smooth(p));
+    let outcome = fitted(&data, vec![bowl(), map()]);
+    let maps = |c: &&Chosen| matches!(c.candidate.basis, Basis::Spline { .. });
+    assert_eq!(outcome.chosen.iter().filter(maps).count(), 2);
+    let others = session([0.8, 3.0], rng, |p| 0.3 * p.radius.powi(2) + smooth(p));
+    let [before, after] = left(&others, &outcome);
+    assert!(before > 2.0 * NOISE_PX && after < 1.1 * NOISE_PX, "{before} {after}");
+}
+
+#[test]
+fn a_bowl_alone_needs_no_maps_and_keeps_its_size() {
+    let rng = &mut Seed(4).stream("joint/bowl");
+    let data = session([0.8, 3.0], rng, |p| 0.3 * p.radius.powi(2));
+    let outcome = fitted(&data, vec![bowl()]);
+    assert_eq!(outcome.chosen.len(), 2, "the bowl, and what planes absorb of it");
+    let k = outcome.coefficients(0)[0];
+    assert!((k - 0.3).abs() < 0.01, "{k}");
+}
+
+/// No fit to planes tells it, so it is nothing.
+#[test]
+fn what_planes_absorb_comes_out_as_nothing() {
+    let rng = &mut Seed(5).stream("joint/affine");
+    let data = session([0.8, 3.0], rng, |p| 0.7 - 0.4 * p.x + 0.3 * p.y);
+    let outcome = fitted(&data, vec![bowl(), map()]);
+    let (terms, mut row) = (terms_of(&outcome, Statistic::Bias), Vec::new());
+    let sizes = data.iter().flat_map(|v| &v.places).map(|p| Term::sum(&terms, p, &mut row).abs());
+    let most = sizes.fold(0.0, f64::max);
+    assert!(most < 0.05, "{most}");
+}
+
+/// A slope that grows with the disparity's square bends tilted planes. It is no part of what is told,
+/// and nothing else is told in its place.
+#[test]
+fn a_slope_of_the_disparity_squared_is_left_out_and_bends_no_map() {
+    let far = |p: &PixelContext| (p.disparity / 40.0).powi(2);
+    let wide = |p: &PixelContext| 0.15 * (p.u / 40.0).sin() * (p.v / 35.0).cos();
+    let slope = |p: &PixelContext| (0.4 * p.x - 0.3 * p.y) * far(p);
+    let rng = &mut Seed(7).stream("joint/slope");
+    let data = session([0.8, 3.0], rng, |p| wide(p) * far(p) + slope(p));
+    let outcome = fitted(&data, vec![bowl(), map()]);
+    let (terms, mut row) = (terms_of(&outcome, Statistic::Bias), Vec::new());
+    // A frontal plane at 0.9 m.
+    let disparity = SCALE_PX_M / 0.9;
+    let places: Vec<PixelContext> =
+        data[0].places.iter().map(|p| PixelContext { disparity, z: 0.9, rho: 0.9, ..*p }).collect();
+    let x = DMatrix::from_fn(places.len(), 3, |i, k| [1.0, places[i].x, places[i].y][k]);
+    let solver = x.clone().svd(true, true);
+    let told = places.iter().map(|p| Term::sum(&terms, p, &mut row));
+    let told = DVector::from_iterator(places.len(), told);
+    let affine = solver.solve(&told, 1e-12).unwrap();
+    assert!(affine.amax() < 0.02, "{affine}");
+    let truth = DVector::from_iterator(places.len(), places.iter().map(|p| wide(p) * far(p)));
+    let around = |y: &DVector<f64>| y - &x * solver.solve(y, 1e-12).unwrap();
+    let [missed, size] = [&around(&(told - &truth)), &around(&truth)]
+        .map(|y| (y.norm_squared() / places.len() as f64).sqrt());
+    assert!(missed < 0.1 * size, "{missed} of {size}");
+}
+
+/// Near views teach nothing of what grows far away; what they teach must not do harm there.
+#[test]
+fn a_correction_from_one_distance_does_no_harm_at_another() {
+    for seed in 0..3 {
+        let rng = &mut Seed(seed).stream("joint/distance");
+        let bias = |p: &PixelContext| 0.2 * p.radius.powi(2) * (p.disparity / 40.0) + smooth(p);
+        let near = session([0.7, 0.9], rng, bias);
+        let far = session([2.0, 3.5], rng, bias);
+        for (taught, judged) in [(&near, &far), (&far, &near)] {
+            let [before, after] = left(judged, &fitted(taught, vec![bowl(), map()]));
+            assert!(after < before, "seed {seed}: {before} {after}");
+        }
+    }
+}
+
+/// The stated error of the sum against the true one, over seeds and places: its square is one on
+/// average, give or take the few directions that a fit has, and nine tenths lie within 1.645.
+#[test]
+fn the_stated_error_is_the_true_one() {
+    // What the maps can bend to: what is finer is no part of a stated error.
+    let wide = |p: &PixelContext| 0.15 * (p.u / 70.0).sin() * (p.v / 60.0).cos();
+    let bias = |p: &PixelContext| 0.3 * p.radius.powi(2) + wide(p);
+    let (mut squares, mut inside, mut n) = (0.0, 0.0, 0.0);
+    let mut row = Vec::new();
+    for seed in 0..6 {
+        let rng = &mut Seed(seed).stream("joint/error");
+        let data = session([0.8, 3.0], rng, bias);
+        let outcome = fitted(&data, vec![bowl(), map()]);
+        let mut sum = |numbers: &dyn Fn(usize) -> f64, p: &PixelContext, power: i32| -> f64 {
+            let mut total = 0.0;
+            for (k, c) in outcome.chosen.iter().enumerate() {
+                let basis = &c.candidate.basis;
+                row.clear();
+                row.resize(basis.count(), 0.0);
+                basis.fill(p, &mut row);
+                let span = outcome.span(k);
+                total += row.iter().zip(span).map(|(g, j)| g.powi(power) * numbers(j)).sum::<f64>();
+            }
+            total
+        };
+        let beta = outcome.fit.as_ref().expect("a fit").beta.clone();
+        // A frontal plane at 1.2 m, what planes absorb taken out of the error.
+        let view = &data[0];
+        let places: Vec<PixelContext> = view
+            .places
+            .iter()
+            .map(|p| PixelContext { disparity: SCALE_PX_M / 1.2, z: 1.2, ..*p })
+            .collect();
+        let x = DMatrix::from_fn(places.len(), 3, |i, k| [1.0, places[i].x, places[i].y][k]);
+        let solver = x.clone().svd(true, true);
+        let plane_out = |y: DVector<f64>| &y - &x * solver.solve(&y, 1e-12).unwrap();
+        let off = |p: &PixelContext| sum(&|j| beta[j], p, 1) - bias(p);
+        let error = plane_out(DVector::from_iterator(places.len(), places.iter().map(off)));
+        let mut variance = DVector::zeros(places.len());
+        for factor in &outcome.covariance.factors {
+            let of = |p: &PixelContext| sum(&|j| factor[j], p, 1);
+            let part = plane_out(DVector::from_iterator(places.len(), places.iter().map(of)));
+            variance += part.component_mul(&part);
+        }
+        for (i, p) in places.iter().enumerate() {
+            variance[i] += sum(&|j| outcome.covariance.variances[j], p, 2);
+            let square = error[i].powi(2) / variance[i];
+            squares += square;
+            inside += f64::from(square < 1.645f64.powi(2));
+            n += 1.0;
+        }
+    }
+    assert!((0.4..2.0).contains(&(squares / n)), "{}", squares / n);
+    assert!((0.75..=0.99).contains(&(inside / n)), "{}", inside / n);
+}
+
+/// A wave and a curve over the same columns: the wave says it all, and keeps its size.
+#[test]
+fn a_nameless_curve_does_not_share_what_a_name_says() {
+    let period_px = 20.0;
+    let bias = |p: &PixelContext| 0.1 * (std::f64::consts::TAU * p.u / period_px).sin();
+    let rng = &mut Seed(6).stream("joint/companion");
+    let data = session([0.8, 3.0], rng, bias);
+    let wave = Basis::waves(Coordinate::Column, period_px, 2);
+    let (over, low, high) = (Coordinate::Column, 0.0, 160.0);
+    let curve = Basis::Curve { over, low, high, nodes: 72, times: Modulation::One };
+    let chosen = vec![term(Some("column-banding"), wave), term(None, curve)];
+    let outcome = fitted(&data, chosen);
+    let families: Vec<_> = outcome.chosen.iter().map(|c| c.candidate.family).collect();
+    assert!(families.iter().all(|f| *f == Some("column-banding")), "{families:?}");
+    let terms = terms_of(&outcome, Statistic::Bias);
+    let at = |u| Term::sum(&terms, &PixelContext { u, ..data[0].places[0] }, &mut Vec::new());
+    let height = 0.5 * (at(65.0) - at(75.0));
+    assert!((height - 0.1).abs() < 0.01, "{height}");
+}

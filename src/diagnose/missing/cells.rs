@@ -1,0 +1,226 @@
+//! What share of a patch was lost, and how much such shares scatter without any cause.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::camera::Camera;
+use crate::diagnose::views::layers::Survey;
+use crate::diagnose::views::margins::Margins;
+use crate::diagnose::views::tiles::{SIDE, Tile};
+use crate::terms::PixelContext;
+
+/// Pixel-frames of a patch, and how many of them have no measurement.
+#[derive(Debug, Clone, Copy)]
+pub struct Cell {
+    pub place: PixelContext,
+    pub lost: f64,
+    pub asked: f64,
+}
+
+/// Cells across the picture: some hundred a view, each wider than a clump of dead pixels.
+const ACROSS: usize = 16;
+/// Tiles nearer the target's edge are kept apart: what a matcher's window of 9 px in 640 reaches, and no
+/// less than a tile, px.
+pub fn rim_px(camera: &Camera) -> f64 {
+    (camera.width as f64 / 80.0).max(SIDE as f64)
+}
+
+/// A smaller patch, in tiles, says little.
+const FEWEST_TILES: usize = 2;
+
+/// The cells of all views.
+pub fn cells(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<Cell>> {
+    let side = (camera.width.div_ceil(ACROSS * SIDE) * SIDE) as f64;
+    let rim = rim_px(camera);
+    survey
+        .views
+        .iter()
+        .map(|view| {
+            let mut groups: BTreeMap<(u32, u32, bool), Vec<usize>> = BTreeMap::new();
+            for (i, t) in view.tiles.iter().enumerate().filter(|(_, t)| margins.hold(t)) {
+                let p = &t.place;
+                let key = ((p.v / side) as u32, (p.u / side) as u32, p.edge < rim);
+                groups.entry(key).or_default().push(i);
+            }
+            let places: Vec<PixelContext> = view.tiles.iter().map(|t| t.place).collect();
+            groups
+                .values()
+                .filter(|g| g.len() >= FEWEST_TILES)
+                .map(|group| {
+                    let sum = |of: &dyn Fn(usize) -> f64| group.iter().map(|&i| of(i)).sum::<f64>();
+                    let asked = sum(&|i| view.tiles[i].asked);
+                    let lost = sum(&|i| view.tiles[i].asked * view.tiles[i].missing);
+                    let mut place = places[group[0]];
+                    place.average(&places, &|of| sum(&|i| view.tiles[i].asked * of(i)) / asked);
+                    place.side = side;
+                    Cell { place, lost, asked }
+                })
+                .collect()
+        })
+        .collect()
+}
+
+/// Which cell of its picture it is.
+fn key(cell: &Cell, rim: f64) -> (u32, u32, bool) {
+    let at = |x: f64| (x / cell.place.side) as u32;
+    (at(cell.place.v), at(cell.place.u), cell.place.edge < rim)
+}
+
+/// What is lost at the same places of the views' twins, in log odds over nothing lost. Cells without a twin
+/// show nothing and go.
+pub fn expected(cells: &mut [Vec<Cell>], twins: &[Vec<Cell>], rim: f64) -> Vec<Vec<f64>> {
+    let of_view = |(mine, theirs): (&mut Vec<Cell>, &Vec<Cell>)| {
+        let lost: BTreeMap<_, f64> =
+            theirs.iter().map(|c| (key(c, rim), odds(c.lost / c.asked) - odds(0.0))).collect();
+        mine.retain(|c| lost.contains_key(&key(c, rim)));
+        mine.iter().map(|c| lost[&key(c, rim)]).collect()
+    };
+    cells.iter_mut().zip(twins).map(of_view).collect()
+}
+
+/// Every tile a cell of its own: for where and how much, not for whether.
+pub fn fine(survey: &Survey, margins: &Margins) -> Vec<Vec<Cell>> {
+    let cell = |t: &Tile| Cell { place: t.place, lost: t.asked * t.missing, asked: t.asked };
+    let held = |v: &[Tile]| v.iter().filter(|t| margins.hold(t)).map(cell).collect();
+    survey.views.iter().map(|v| held(&v.tiles)).collect()
+}
+
+/// Losses below this share are all the same.
+const HARDLY: f64 = 0.002;
+
+/// Log odds of a share, flattened where hardly anything or nearly all is lost.
+pub fn odds(share: f64) -> f64 {
+    ((share + HARDLY) / (1.0 - share + HARDLY)).ln()
+}
+
+/// Its inverse.
+pub fn share(odds: f64) -> f64 {
+    let e = odds.exp();
+    (((1.0 + HARDLY) * e - HARDLY) / (1.0 + e)).clamp(0.0, 1.0)
+}
+
+/// Variances of the log odds without a cause.
+#[derive(Debug, Clone, Copy)]
+pub struct Scatter {
+    /// Of a view as a whole.
+    pub level: f64,
+    /// Of a view's slope across the picture, for a normalised coordinate of 1.
+    pub slope: f64,
+    /// Of a cell.
+    pub cell: f64,
+    /// Neighbouring cells share their clumps: so many make one.
+    pub clump: f64,
+}
+
+/// Before anything is measured: views differ by a factor of e, the sides of one picture as well.
+pub const USUAL: Scatter = Scatter { level: 1.0, slope: 4.0, cell: 0.5, clump: 4.0 };
+/// Never believed to be less.
+const LEAST: Scatter = Scatter { level: 0.1, slope: 0.4, cell: 0.1, clump: 1.0 };
+/// What a few views show is taken so much larger.
+pub const FEW: f64 = 4.0;
+/// Cells nearer than this are neighbours, in their sides: the corners too.
+const APART: f64 = 1.5;
+
+/// Applies the inverse covariance of a view's cells.
+pub struct Whitener {
+    weight: f64,
+    slopes: Vec<Vector3<f64>>,
+    inverse: Matrix3<f64>,
+    scatter: Scatter,
+}
+
+impl Whitener {
+    pub fn of(cells: &[Cell], scatter: Scatter) -> Self {
+        let weight = 1.0 / (scatter.clump * scatter.cell);
+        let slopes: Vec<_> =
+            cells.iter().map(|c| Vector3::new(1.0, c.place.x, c.place.y)).collect();
+        let tight = Vector3::new(1.0 / scatter.level, 1.0 / scatter.slope, 1.0 / scatter.slope);
+        let inner = slopes
+            .iter()
+            .fold(Matrix3::from_diagonal(&tight), |m, n| m + n * n.transpose() * weight);
+        // Positive definite by its diagonal.
+        let inverse = inner.try_inverse().unwrap_or_else(Matrix3::zeros);
+        Whitener { weight, slopes, inverse, scatter }
+    }
+
+    /// C^-1 y by Woodbury's identity.
+    pub fn solve(&self, y: &[f64]) -> Vec<f64> {
+        let seen = self.slopes.iter().zip(y).fold(Vector3::zeros(), |s, (n, y)| s + n * *y);
+        let own = self.inverse * seen * self.weight;
+        self.slopes.iter().zip(y).map(|(n, y)| self.weight * (y - n.dot(&own))).collect()
+    }
+
+    /// Log odds of a view in which nothing is wrong.
+    pub fn draw(&self, mut normal: impl FnMut() -> f64) -> Vec<f64> {
+        let s = &self.scatter;
+        let own = Vector3::new(
+            s.level.sqrt() * normal(),
+            s.slope.sqrt() * normal(),
+            s.slope.sqrt() * normal(),
+        );
+        let sd = self.weight.recip().sqrt();
+        self.slopes.iter().map(|n| n.dot(&own) + sd * normal()).collect()
+    }
+}
+
+impl Scatter {
+    /// What is left of the views' log odds: their levels and slopes by least squares, then the
+    /// cells about them.
+    pub fn of(views: &[Vec<Cell>], left: &[Vec<f64>]) -> Self {
+        let (mut sums, mut n) = ([0.0; 3], [0.0; 3]);
+        let mut clump = Clump::default();
+        for (cells, left) in views.iter().zip(left) {
+            let loose = Scatter { level: 1e6, slope: 4.0, cell: 1.0, clump: 4.0 };
+            let w = Whitener::of(cells, loose);
+            let seen = w.slopes.iter().zip(left).fold(Vector3::zeros(), |s, (n, y)| s + n * *y);
+            let own = w.inverse * seen * w.weight;
+            sums[0] += (left.iter().sum::<f64>() / left.len().max(1) as f64).powi(2);
+            sums[1] += own.y.powi(2) + own.z.powi(2);
+            let off: Vec<f64> = w.slopes.iter().zip(left).map(|(n, y)| y - n.dot(&own)).collect();
+            sums[2] += off.iter().map(|y| y * y).sum::<f64>();
+            clump.add(cells, &off);
+            n = [n[0] + 1.0, n[1] + 2.0, n[2] + left.len() as f64];
+        }
+        let mean = |k: usize| sums[k] / f64::max(n[k], 1.0);
+        let few = 1.0 + FEW / f64::max(n[0], 1.0);
+        Scatter {
+            level: (few * mean(0)).max(LEAST.level),
+            slope: (few * mean(1)).max(LEAST.slope),
+            cell: mean(2).max(LEAST.cell),
+            clump: clump.size().max(LEAST.clump),
+        }
+    }
+}
+
+/// How much neighbouring cells have in common.
+#[derive(Default)]
+struct Clump {
+    product: f64,
+    square: f64,
+    pairs: f64,
+    cells: f64,
+}
+
+impl Clump {
+    /// Every pair of cells that touch, counted once; a rim's cell and its patch's other part among them.
+    fn add(&mut self, cells: &[Cell], off: &[f64]) {
+        let step = cells.iter().map(|c| c.place.side).fold(0.0, f64::max).max(1.0) * APART;
+        for (i, (a, x)) in cells.iter().zip(off).enumerate() {
+            self.square += x * x;
+            self.cells += 1.0;
+            for (b, y) in cells[i + 1..].iter().zip(&off[i + 1..]) {
+                if (a.place.u - b.place.u).hypot(a.place.v - b.place.v) < step {
+                    self.product += x * y;
+                    self.pairs += 1.0;
+                }
+            }
+        }
+    }
+
+    /// Cells that make one: with four neighbours and four at the corners.
+    fn size(&self) -> f64 {
+        let rho = self.product / self.pairs.max(1.0) * self.cells / self.square.max(1e-12);
+        1.0 + 8.0 * rho.clamp(0.0, 1.0)
+    }
+}

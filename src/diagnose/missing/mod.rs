@@ -1,0 +1,236 @@
+//! The layer of what is not there: which pixels give no answer, and what it follows.
+//!
+//! Losses are judged in log odds, view by view, against views that differ for no reason by a
+//! factor of e and more: a finding must hold over the views. Steps on lawful axes have a name
+//! unless a nameless curve does clearly better.
+pub mod cells;
+pub mod few;
+pub mod finding;
+pub mod fit;
+pub mod forms;
+pub mod hard_end;
+pub mod points;
+pub mod report;
+pub mod search;
+pub mod shapes;
+
+use serde_json::{Map, json};
+
+use crate::camera::Camera;
+use crate::diagnose::checks::replication::agree;
+use crate::diagnose::diagnosis::Detectable;
+use crate::diagnose::edges::shadow::{Band, Sides, band};
+use crate::diagnose::noise::view_mean::ViewMean;
+use crate::diagnose::views::field::Field;
+use crate::diagnose::views::layers::Survey;
+use crate::diagnose::views::margins::Margins;
+use crate::rng::Seed;
+use crate::terms::{Axis, Basis, Extent};
+use cells::{Cell, cells, expected, fine, rim_px};
+use few::few_losses;
+use finding::{DropoutFinding, NAME_ADEQUATE};
+use hard_end::{HardEnd, blur};
+use report::{DropoutReporter, shadow_finding};
+use search::{Judged, Losses};
+use shapes::{Step, curves, steps};
+
+/// All that was found missing.
+#[derive(Debug, Clone, Default)]
+pub struct DropoutOutcome {
+    /// Largest gain first.
+    pub findings: Vec<DropoutFinding>,
+    /// Families with the middle of the faintest whole step that 80 % of such recordings would
+    /// show, in degrees or m: what begins farther out is not seen.
+    pub detectable: Vec<Detectable>,
+    /// What is no finding, in words.
+    pub notes: Vec<String>,
+}
+
+/// Fewer views show no rule.
+const FEWEST_VIEWS: usize = 4;
+/// Chance of a finding on a clean recording: the steps and curves, and the shadow.
+pub const LEVEL: f64 = 0.001;
+const SHADOW_LEVEL: f64 = 0.0005;
+const MOST_FINDINGS: usize = 3;
+/// A later finding must bring this share of what the first brought.
+const LEAST_OF_FIRST: f64 = 0.1;
+
+/// What the losses of a recording follow.
+///
+/// `twins` are the same views without what is looked for: what they lose is expected.
+pub fn missing(
+    fields: &[Field],
+    twins: Option<(&[Field], &Survey)>,
+    survey: &Survey,
+    camera: &Camera,
+    seed: Seed,
+) -> DropoutOutcome {
+    let region_given: Vec<bool> = fields.iter().map(|f| f.region_given).collect();
+    let second = survey.second();
+    let margins = Margins::of(fields);
+    let (mut mine, fine) = (cells(survey, camera, &margins), fine(survey, &margins));
+    let expected = twins
+        .map(|(_, survey)| expected(&mut mine, &cells(survey, camera, &margins), rim_px(camera)));
+    let seen = DropoutCells { cells: mine, fine, region_given, second, expected };
+    let blur = |z: f64| blur(survey, z);
+    let mut outcome = losses(&seen, &survey.reach, camera, &blur, seed);
+    outcome.notes.extend(margins.notes());
+    let sides: Vec<Sides> = (0..fields.len())
+        .map(|v| Sides::of(&fields[v].edges, twins.map(|(t, _)| &t[v].edges)))
+        .collect();
+    if let Some(band) = band(&sides, SHADOW_LEVEL) {
+        let mut shadow = shadow_finding(band, fields);
+        shadow.replicated = bands_agree(&sides, &seen.second);
+        // Where the target's own mask reaches into its shadow, the same losses are seen again; a
+        // region that was given ends at the target.
+        let grown = seen.region_given.contains(&false);
+        outcome.findings.retain(|f| !grown || f.family.is_some() || f.size > shadow.size);
+        outcome.findings.push(shadow);
+    }
+    outcome
+}
+
+/// The views' losses on the target.
+struct DropoutCells {
+    /// In patches large enough to judge.
+    cells: Vec<Vec<Cell>>,
+    /// In the smallest there are.
+    fine: Vec<Vec<Cell>>,
+    /// Whether a view's region was given.
+    region_given: Vec<bool>,
+    /// Whether it is in the second half.
+    second: Vec<bool>,
+    /// Log odds that the views' twins lose in each patch, over nothing lost.
+    expected: Option<Vec<Vec<f64>>>,
+}
+
+impl DropoutCells {
+    /// Without the patches that a hard end of the range touches.
+    fn inside(&self, end: &HardEnd) -> DropoutCells {
+        fn kept<T: Clone>(of: &[Vec<T>], cells: &[Vec<Cell>], end: &HardEnd) -> Vec<Vec<T>> {
+            let inside = |(of, cells): (&Vec<T>, &Vec<Cell>)| {
+                let both = of.iter().zip(cells).filter(|(_, c)| !end.touches(c));
+                both.map(|(of, _)| of.clone()).collect()
+            };
+            of.iter().zip(cells).map(inside).collect()
+        }
+        let (cells, fine) = (&self.cells, &self.fine);
+        DropoutCells {
+            cells: kept(cells, cells, end),
+            fine: kept(fine, fine, end),
+            region_given: self.region_given.clone(),
+            second: self.second.clone(),
+            expected: self.expected.as_ref().map(|e| kept(e, cells, end)),
+        }
+    }
+}
+
+fn losses(
+    seen: &DropoutCells,
+    reach: &Extent,
+    camera: &Camera,
+    blur: &dyn Fn(f64) -> f64,
+    seed: Seed,
+) -> DropoutOutcome {
+    let views = &seen.cells;
+    let mut outcome = DropoutOutcome::default();
+    if views.iter().filter(|v| !v.is_empty()).count() < FEWEST_VIEWS {
+        return outcome;
+    }
+    let (fine, region_given) = (&seen.fine[..], &seen.region_given[..]);
+    let reporter = |base| DropoutReporter { fine, region_given, base, reach, camera };
+    let (steps, curves) = (steps(reach), curves(camera, reach));
+    let nothing = || views.iter().map(|v| vec![0.0; v.len()]).collect();
+    let mut explained: Vec<Vec<f64>> = seen.expected.clone().unwrap_or_else(nothing);
+    let mut taken: Vec<Axis> = Vec::new();
+    while outcome.findings.len() < MOST_FINDINGS {
+        let mut ledger = Losses::new(views, &explained);
+        let open_steps: Vec<Step> =
+            steps.iter().filter(|s| !taken.contains(&s.axis)).copied().collect();
+        let open_curves: Vec<Basis> =
+            curves.iter().filter(|c| !taken.contains(&c.axis())).cloned().collect();
+        let (first, _) = ledger.judge(&open_steps, &open_curves, None);
+        let Some(best) = choose(&first) else { break };
+        ledger.scattered_as_left_by(best);
+        let (judged, noise) = ledger.judge(&open_steps, &open_curves, Some(seed));
+        let threshold = noise.threshold(LEVEL);
+        if outcome.findings.is_empty() {
+            outcome.detectable = detectable(&ledger, &steps, threshold);
+        }
+        let Some(won) = choose(&judged).filter(|j| j.gain > threshold) else { break };
+        if outcome.findings.first().is_some_and(|f| won.gain < LEAST_OF_FIRST * f.gain) {
+            break;
+        }
+        let more = ledger.explained(won);
+        explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
+        taken.push(won.shape.axis());
+        let replicated = ledger.replicate(won, &seen.second);
+        let mut finding = reporter(ledger.base).finding(won, rivals(&judged), noise.p(won.gain));
+        finding.replicated = replicated;
+        match HardEnd::of(&finding, blur) {
+            // Nothing is learnt beyond the range: what is lost inside it is looked at alone.
+            Some(end) if views.iter().flatten().any(|c| end.touches(c)) => {
+                let mut rest = losses(&seen.inside(&end), reach, camera, blur, seed);
+                rest.notes.insert(0, end.note());
+                return rest;
+            }
+            Some(end) => outcome.notes.push(end.note()),
+            None => outcome.findings.push(finding),
+        }
+    }
+    if outcome.findings.is_empty()
+        // Counts are not compared with a twin's.
+        && seen.expected.is_none()
+        && let Some((foot, p)) = few_losses(&seen.fine, rim_px(camera), reach, LEVEL, seed)
+    {
+        outcome.findings.push(reporter(0.0).finding(&foot, rivals(std::slice::from_ref(&foot)), p));
+    }
+    outcome
+}
+
+/// Do the shadows of both halves have the same share of the expected width?
+fn bands_agree(sides: &[Sides], second: &[bool]) -> Option<bool> {
+    let half = |which: bool| {
+        let mine = sides.iter().zip(second).filter(|(_, s)| **s == which);
+        let mine: Vec<Sides> = mine.map(|(sides, _)| *sides).collect();
+        let Band { side, share: [value, std_error], .. } = band(&mine, 1.0)?;
+        Some((side, ViewMean { value, std_error, views: mine.len() as f64 }))
+    };
+    let (first, second) = (half(false)?, half(true)?);
+    Some(first.0 == second.0 && agree([Some(first.1), Some(second.1)])?)
+}
+
+/// The best step, unless the best curve leaves it behind.
+fn choose(judged: &[Judged]) -> Option<&Judged> {
+    let best = |named: bool| judged.iter().find(|j| j.shape.family().is_some() == named);
+    let (step, curve) = (best(true), best(false));
+    let enough = curve.map_or(0.0, |c| NAME_ADEQUATE * c.gain);
+    step.filter(|s| s.gain > enough).or(curve)
+}
+
+fn rivals(judged: &[Judged]) -> Vec<(&'static str, f64)> {
+    let mut all: Vec<(&'static str, f64)> = Vec::new();
+    for j in judged {
+        let name = j.shape.family().unwrap_or(j.shape.axis().id());
+        if all.iter().all(|r| r.0 != name) {
+            all.push((name, j.gain));
+        }
+    }
+    all
+}
+
+fn detectable(losses: &Losses<'_>, steps: &[Step], threshold: f64) -> Vec<Detectable> {
+    let least = |s: Step| {
+        let (name, value) = match (s.axis, s.width > 0.0) {
+            (Axis::Theta, _) => ("theta50_deg", s.middle.to_degrees()),
+            (_, true) => ("z50_m", s.middle),
+            (_, false) => ("z50_m, near side", s.middle),
+        };
+        let minimum = Map::from_iter([(name.to_string(), json!(value))]);
+        Detectable { effect: s.family(), minimum }
+    };
+    losses.detectable(steps, threshold).into_iter().map(least).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,69 @@
+//! Shares lost along an axis, view by view.
+
+use super::cells::Cell;
+use super::shapes::Step;
+
+/// Share lost where the axis is at `x`, in one view.
+#[derive(Debug, Clone, Copy)]
+pub struct Point {
+    pub view: usize,
+    pub x: f64,
+    pub share: f64,
+    pub asked: f64,
+    /// The true share may be larger.
+    pub at_least: bool,
+}
+
+/// Bins over an axis's reach: a tilted view spans some.
+pub const BINS: usize = 40;
+
+/// Where more is lost the search for the target passes over the holes: the share is a bound.
+const HOLES: f64 = 0.4;
+
+/// In views whose region was not given, what lies beyond the first bin with holes is a bound.
+pub fn bounded(mut points: Vec<Point>, step: &Step, region_given: &[bool]) -> Vec<Point> {
+    let beyond = |p: &Point| p.x * step.width.signum();
+    let from = points.iter().filter(|p| p.share > HOLES).map(beyond).fold(f64::INFINITY, f64::min);
+    for p in &mut points {
+        p.at_least = !region_given[p.view] && beyond(p) >= from;
+    }
+    points
+}
+
+/// The views' shares, bin by bin of an axis.
+pub fn points(views: &[Vec<Cell>], at: &dyn Fn(&Cell) -> f64, [low, high]: [f64; 2]) -> Vec<Point> {
+    let mut all = Vec::new();
+    let width = ((high - low) / BINS as f64).max(f64::MIN_POSITIVE);
+    for (view, cells) in views.iter().enumerate() {
+        let mut sums = [[0.0; 3]; BINS];
+        for c in cells {
+            let x = at(c);
+            let bin = (((x - low) / width).max(0.0) as usize).min(BINS - 1);
+            let sum = &mut sums[bin];
+            *sum = [sum[0] + c.asked, sum[1] + c.lost, sum[2] + c.asked * x];
+        }
+        all.extend(sums.iter().filter(|s| s[0] > 0.0).map(|&[asked, lost, x]| Point {
+            view,
+            x: x / asked,
+            share: lost / asked,
+            asked,
+            at_least: false,
+        }));
+    }
+    all
+}
+
+/// Views are off the step by this, in log odds, and neighbours lose their pixels together.
+const OFF: f64 = 0.3;
+const TOGETHER: f64 = 16.0;
+/// Shares are known no better.
+const LEAST: f64 = 0.002;
+/// How far a point lies from an expected loss, in its standard errors.
+pub fn misfit(p: &Point, loss: f64) -> f64 {
+    // Between what was expected and what was seen: neither alone may claim certainty.
+    let half = 0.5 * (loss + p.share);
+    let spread = half * (1.0 - half);
+    let variance = spread * TOGETHER / p.asked + (OFF * spread).powi(2) + LEAST * LEAST;
+    let off = if p.at_least { (p.share - loss).max(0.0) } else { p.share - loss };
+    off / variance.sqrt()
+}

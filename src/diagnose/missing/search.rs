@@ -1,0 +1,246 @@
+//! Which shape the losses follow, judged on views it was not fitted to.
+
+use nalgebra::{DMatrix, DVector};
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use super::cells::{Cell, Scatter, USUAL, Whitener, odds, share};
+use super::shapes::{Shape, Step};
+use crate::diagnose::checks::replication::{Halves, agree};
+use crate::diagnose::noise::view_mean::ViewMean;
+use crate::diagnose::search::evidence::{Evidence, gain};
+use crate::diagnose::search::noise_gains::NoiseGains;
+use crate::diagnose::search::null::Null;
+use crate::rng::Seed;
+use crate::terms::Basis;
+
+/// Precision of a step's size about the whole one: half of it is as likely as one and a half.
+const STEP_PRECISION: f64 = 4.0;
+/// Precision of a curve's log odds about none: they reach 12 from nothing lost to all.
+const CURVE_PRECISION: f64 = 0.05;
+
+/// Information below this decides nothing, nats.
+const NO_SAY: f64 = 1e-6;
+
+/// Losses as they are judged: log odds over what is lost everywhere.
+pub struct Losses<'a> {
+    pub views: &'a [Vec<Cell>],
+    /// What earlier findings explain is taken out.
+    pub left: Vec<Vec<f64>>,
+    pub base: f64,
+    whiteners: Vec<Whitener>,
+}
+
+/// How well a shape predicts the views it was not fitted to.
+#[derive(Debug, Clone)]
+pub struct Judged {
+    pub shape: Shape,
+    /// Nats, all views.
+    pub gain: f64,
+    pub coefficients: Vec<f64>,
+}
+
+/// A step's column in all views, with its information and score there.
+struct Column {
+    step: Step,
+    by_view: Vec<Vec<f32>>,
+    a: Vec<f64>,
+}
+
+impl Column {
+    fn scores(&self, whitened: &[Vec<f64>]) -> Vec<f64> {
+        self.by_view.iter().zip(whitened).map(|(g, w)| dot(g, w)).collect()
+    }
+}
+
+/// A step's nats and size, by its information and score in every view: each view is predicted from
+/// the others and from the whole step.
+pub fn predicted(a: &[f64], b: &[f64]) -> (f64, f64) {
+    let (sum_a, sum_b): (f64, f64) = (a.iter().sum(), b.iter().sum());
+    let size = |a: f64, b: f64| ((b + STEP_PRECISION) / (a + STEP_PRECISION)).max(0.0);
+    let total = a.iter().zip(b).map(|(a, b)| {
+        let size = size(sum_a - a, sum_b - b);
+        size * (b - 0.5 * size * a)
+    });
+    (total.sum(), size(sum_a, sum_b))
+}
+
+/// Where a tenth of all is lost in most places, the best places show what is lost anyway.
+const MUCH: f64 = 0.1;
+
+/// Log odds of what is lost everywhere.
+fn usual(odds: &[Vec<f64>]) -> f64 {
+    let mut all: Vec<f64> = odds.iter().flatten().copied().collect();
+    all.sort_by(f64::total_cmp);
+    let at = |q: f64| all.get((q * all.len() as f64) as usize).copied().unwrap_or(0.0);
+    if share(at(0.5)) < MUCH { at(0.5) } else { at(0.1) }
+}
+
+fn dot(g: &[f32], w: &[f64]) -> f64 {
+    g.iter().zip(w).map(|(g, w)| f64::from(*g) * w).sum()
+}
+
+impl<'a> Losses<'a> {
+    /// `explained` in log odds over the base.
+    pub fn new(views: &'a [Vec<Cell>], explained: &[Vec<f64>]) -> Self {
+        let left: Vec<Vec<f64>> = views
+            .iter()
+            .zip(explained)
+            .map(|(cells, e)| {
+                cells.iter().zip(e).map(|(c, e)| odds(c.lost / c.asked) - e).collect()
+            })
+            .collect();
+        let whiteners = views.iter().map(|v| Whitener::of(v, USUAL)).collect();
+        let level = usual(&left).max(odds(0.0));
+        let mut losses = Losses { views, left, base: share(level), whiteners };
+        losses.left.iter_mut().flatten().for_each(|y| *y -= level);
+        losses
+    }
+
+    /// Once more with the scatter that `best` leaves.
+    pub fn scattered_as_left_by(&mut self, best: &Judged) {
+        let explained = self.explained(best);
+        let mut left = self.left.clone();
+        left.iter_mut().flatten().zip(explained.iter().flatten()).for_each(|(y, e)| *y -= e);
+        let scatter = Scatter::of(self.views, &left);
+        self.whiteners = self.views.iter().map(|v| Whitener::of(v, scatter)).collect();
+    }
+
+    /// Log odds that a shape adds.
+    pub fn explained(&self, judged: &Judged) -> Vec<Vec<f64>> {
+        let size = &judged.coefficients;
+        let mut row = Vec::new();
+        let views = self.views.iter();
+        match &judged.shape {
+            Shape::Step(step) => views
+                .map(|v| step.column(v, self.base).iter().map(|h| size[0] * h).collect())
+                .collect(),
+            Shape::Curve(basis) => views
+                .map(|v| v.iter().map(|c| basis.value(size, &c.place, &mut row)).collect())
+                .collect(),
+        }
+    }
+
+    fn column(&self, step: Step) -> Column {
+        let columns: Vec<Vec<f64>> = self.views.iter().map(|v| step.column(v, self.base)).collect();
+        let information = |(g, w): (&Vec<f64>, &Whitener)| {
+            g.iter().zip(w.solve(g)).map(|(g, w)| g * w).sum::<f64>()
+        };
+        let a: Vec<f64> = columns.iter().zip(&self.whiteners).map(information).collect();
+        // Views that the step leaves alone have no say.
+        let narrow = |(g, a): (&Vec<f64>, &f64)| {
+            g.iter().take(if *a > NO_SAY { g.len() } else { 0 }).map(|h| *h as f32).collect()
+        };
+        let by_view = columns.iter().zip(&a).map(narrow).collect();
+        Column { step, by_view, a }
+    }
+
+    /// Do both halves of the views lose by this shape?
+    pub fn replicate(&self, judged: &Judged, second: &[bool]) -> Option<bool> {
+        match &judged.shape {
+            Shape::Step(step) => {
+                let column = self.column(*step);
+                let solve = |(w, y): (&Whitener, &Vec<f64>)| w.solve(y);
+                let whitened: Vec<Vec<f64>> =
+                    self.whiteners.iter().zip(&self.left).map(solve).collect();
+                let scores = column.scores(&whitened);
+                let half = |which: bool| {
+                    let views = column.a.iter().zip(&scores).zip(second);
+                    let mine = views.filter(|(_, s)| **s == which);
+                    ViewMean::of_scores(mine.map(|((a, b), _)| (*a, *b)))
+                };
+                agree([half(false), half(true)])
+            }
+            Shape::Curve(basis) => {
+                let evidence = self.evidence(basis);
+                Halves::of(&evidence, second, CURVE_PRECISION, &[basis.count()])?
+                    .replicate(&[0], 0.0)
+            }
+        }
+    }
+
+    fn evidence(&self, basis: &Basis) -> Vec<Evidence> {
+        let k = basis.count();
+        let of = |v: usize| {
+            let cells = &self.views[v];
+            let mut rows = vec![0.0; cells.len() * k];
+            rows.chunks_exact_mut(k).zip(cells).for_each(|(row, c)| basis.fill(&c.place, row));
+            let g = DMatrix::from_row_slice(cells.len(), k, &rows);
+            let mut a = DMatrix::zeros(k, k);
+            for j in 0..k {
+                let w = DVector::from_vec(self.whiteners[v].solve(g.column(j).as_slice()));
+                a.set_column(j, &(g.transpose() * w));
+            }
+            let w = DVector::from_vec(self.whiteners[v].solve(&self.left[v]));
+            Evidence { a, b: g.transpose() * w }
+        };
+        (0..self.views.len()).map(of).collect()
+    }
+
+    /// All shapes on these losses, and what noise alone would have brought the best of them.
+    pub fn judge(
+        &self,
+        steps: &[Step],
+        curves: &[Basis],
+        null: Option<Seed>,
+    ) -> (Vec<Judged>, NoiseGains) {
+        let columns: Vec<Column> = steps.par_iter().map(|s| self.column(*s)).collect();
+        let solve = |y: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            self.whiteners.iter().zip(y).map(|(w, y)| w.solve(y)).collect()
+        };
+        let whitened = solve(&self.left);
+        let mut judged: Vec<Judged> = columns
+            .iter()
+            .map(|c| {
+                let (gain, size) = predicted(&c.a, &c.scores(&whitened));
+                Judged { shape: Shape::Step(c.step), gain, coefficients: vec![size] }
+            })
+            .collect();
+        let mut nulls = Vec::new();
+        for basis in curves {
+            let evidence = self.evidence(basis);
+            let Some(won) = gain(&evidence, CURVE_PRECISION) else { continue };
+            nulls.extend(Null::of(&evidence, 0, CURVE_PRECISION));
+            let coefficients = won.beta.as_slice().to_vec();
+            let shape = Shape::Curve(basis.clone());
+            judged.push(Judged { shape, gain: won.total, coefficients });
+        }
+        judged.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let Some(seed) = null else { return (judged, NoiseGains::default()) };
+        let draw = |replicate: u64| {
+            let mut rng = seed.stream(&format!("missing/null/{replicate}"));
+            let mut normal = || StandardNormal.sample(&mut rng);
+            let y: Vec<Vec<f64>> = self.whiteners.iter().map(|w| w.draw(&mut normal)).collect();
+            let whitened = solve(&y);
+            let steps =
+                columns.iter().map(|c| predicted(&c.a, &c.scores(&whitened)).0).fold(0.0, f64::max);
+            nulls.iter().map(|n| n.draw(&mut rng)).fold(steps, f64::max)
+        };
+        (judged, NoiseGains::simulated(REPLICATES, MIN_EXCESS_OF_LOSSES, draw))
+    }
+
+    /// The farthest (for what is lost below: the nearest) whole step that is seen with 80 % power.
+    pub fn detectable(&self, steps: &[Step], threshold: f64) -> Vec<Step> {
+        // A gain of half the information, give or take its root.
+        const POWER_80: f64 = 0.84;
+        let seen = |s: &&Step| {
+            let a: f64 = self.column(**s).a.iter().sum();
+            s.share == 1.0 && 0.5 * a - POWER_80 * a.sqrt() > threshold
+        };
+        let mut all: Vec<Step> = steps.iter().filter(seen).copied().collect();
+        // The least demanding first: largest middle, or the smallest where what is below is lost.
+        all.sort_by(|a, b| (b.middle * b.width.signum()).total_cmp(&(a.middle * a.width.signum())));
+        let mut best: Vec<Step> = Vec::new();
+        for s in all {
+            if best.iter().all(|b| b.axis != s.axis || b.width.signum() != s.width.signum()) {
+                best.push(s);
+            }
+        }
+        best
+    }
+}
+
+/// Simulations of the null.
+const REPLICATES: u64 = 300;
+/// Minimum mean excess of the noise's gains over their 90 % quantile, nats.
+pub const MIN_EXCESS_OF_LOSSES: f64 = 1.0;

@@ -1,0 +1,115 @@
+//! What losses may follow: steps on lawful axes, which have a name, and curves, which have none.
+
+use super::cells::{Cell, odds};
+use crate::camera::Camera;
+use crate::effects::logistic;
+use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, PixelContext};
+
+/// Beyond `middle` a share is lost; a negative width loses what is below it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    pub axis: Axis,
+    pub middle: f64,
+    pub width: f64,
+    pub share: f64,
+}
+
+impl Step {
+    pub fn family(&self) -> &'static str {
+        if self.axis == Axis::Theta { "grazing-dropout" } else { "range-dropout" }
+    }
+
+    pub fn at(&self, p: &PixelContext) -> f64 {
+        if self.axis == Axis::Theta { p.theta } else { p.z }
+    }
+
+    /// Chance of a loss where the axis is at `x` and `base` is lost anyway.
+    pub fn loss(&self, x: f64, base: f64) -> f64 {
+        base + (1.0 - base) * self.share * logistic(x - self.middle, self.width)
+    }
+
+    /// Log odds that it adds.
+    pub fn column(&self, cells: &[Cell], base: f64) -> Vec<f64> {
+        cells.iter().map(|c| odds(self.loss(self.at(&c.place), base)) - odds(base)).collect()
+    }
+}
+
+/// What may explain losses.
+#[derive(Debug, Clone)]
+pub enum Shape {
+    Step(Step),
+    Curve(Basis),
+}
+
+impl Shape {
+    pub fn axis(&self) -> Axis {
+        match self {
+            Shape::Step(step) => step.axis,
+            Shape::Curve(basis) => basis.axis(),
+        }
+    }
+
+    pub fn family(&self) -> Option<&'static str> {
+        match self {
+            Shape::Step(step) => Some(step.family()),
+            Shape::Curve(_) => None,
+        }
+    }
+}
+
+/// Places tried for the middle of a step, over the axis's reach.
+const MIDDLES: usize = 24;
+/// Smaller reaches tell nothing of an axis: rad, and share of z.
+const LEAST_TILT: f64 = 0.1;
+const LEAST_RANGE: f64 = 1.1;
+
+/// All steps on lawful axes.
+pub fn steps(reach: &Extent) -> Vec<Step> {
+    let mut all = Vec::new();
+    let mut add = |axis, middle, width| {
+        all.extend([1.0, 0.3].map(|share| Step { axis, middle, width, share }));
+    };
+    let along = |k: usize| k as f64 / (MIDDLES - 1) as f64;
+    let [low, high] = reach.theta;
+    if high - low > LEAST_TILT {
+        for k in 0..MIDDLES {
+            let beyond = 4f64.to_radians();
+            let middle = low + along(k) * (high + beyond - low);
+            [1.0f64, 2.0, 4.0].iter().for_each(|deg| add(Axis::Theta, middle, deg.to_radians()));
+        }
+    }
+    let [low, high] = reach.z;
+    if high > LEAST_RANGE * low {
+        for k in 0..MIDDLES {
+            let middle = low * (high / low).powf(along(k));
+            for width in [0.015, 0.03, 0.06] {
+                add(Axis::Z, middle, width * middle);
+                add(Axis::Z, middle, -width * middle);
+            }
+        }
+    }
+    all
+}
+
+/// Curves without a name.
+pub fn curves(camera: &Camera, reach: &Extent) -> Vec<Basis> {
+    let (width, height) = (camera.width as f64, camera.height as f64);
+    let mut all = Vec::new();
+    let mut curve = |over, [low, high]: [f64; 2], nodes| {
+        if high > low {
+            all.push(Basis::Curve { over, low, high, nodes, times: Modulation::One });
+        }
+    };
+    curve(Coordinate::Radius, [0.0, 1.0], 8);
+    curve(Coordinate::Column, [0.0, width], 16);
+    curve(Coordinate::Row, [0.0, height], 12);
+    curve(Coordinate::Edge, [0.0, 24.0], 5);
+    curve(Coordinate::Session, reach.session, 6);
+    curve(Coordinate::Z, reach.z, 10);
+    curve(Coordinate::Theta, reach.theta, 8);
+    if reach.is_unevenly_lit() {
+        curve(Coordinate::Light, reach.light, 8);
+    }
+    all.push(Basis::Map { width, height, across: 8, down: 6, times: Modulation::One });
+    all
+}

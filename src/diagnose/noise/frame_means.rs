@@ -1,0 +1,247 @@
+//! Frames whose means move or jitter as the pixels' noise does not explain.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
+
+use super::structure::{Jitter, Structure};
+use super::texture_finding::TextureFinding;
+use super::view_mean::variance_px2;
+use crate::diagnose::finding::parameters::one;
+use crate::diagnose::views::known::KnownTerms;
+use crate::terms::{Axis, Statistic};
+
+/// Motion that is not uniform, and jitter that is no white noise, differ by this share.
+const UNEVEN: f64 = 0.2;
+
+/// The frames' means scatter by this factor more before it is called jitter.
+const JITTER: f64 = 2.0;
+
+/// A target that moves by the same velocity in all views.
+struct Motion {
+    /// Along the optical axis, m/s.
+    velocity_mps: f64,
+    std_error: f64,
+    p: f64,
+    nats: f64,
+}
+
+impl Motion {
+    /// Mean of the views' velocities by their errors, which are enlarged by how they disagree.
+    fn of(all: &[Jitter], noise: &FrameNoise) -> Option<Self> {
+        let known: Vec<(f64, f64)> = all
+            .iter()
+            .filter(|j| j.trend_px2 > 0.0 && j.freedom > 0.0)
+            .map(|j| (j.velocity_mps, j.velocity_mps.powi(2) / j.trend_px2 * noise.own_px2(j)))
+            .filter(|(_, variance)| *variance > 0.0)
+            .collect();
+        let n = known.len() as f64;
+        let precision: f64 = known.iter().map(|v| 1.0 / v.1).sum();
+        if known.len() < 3 || !precision.is_finite() {
+            return None;
+        }
+        let velocity_mps = known.iter().map(|v| v.0 / v.1).sum::<f64>() / precision;
+        let left: f64 = known.iter().map(|v| (v.0 - velocity_mps).powi(2) / v.1).sum();
+        let std_error = ((left / (n - 1.0)).max(1.0) / precision).sqrt();
+        let t = velocity_mps / std_error;
+        let p = StudentsT::new(0.0, 1.0, n - 1.0).map_or(1.0, |d| 2.0 * (1.0 - d.cdf(t.abs())));
+        Some(Motion { velocity_mps, std_error, p, nats: 0.5 * n * (t * t / n).ln_1p() })
+    }
+}
+
+/// The velocity of a target that seems to move, its error, m/s, and the chance of it for one at rest.
+pub(in crate::diagnose) fn velocity(views: &[Structure]) -> Option<(f64, f64, f64)> {
+    let all: Vec<Jitter> = views.iter().filter_map(|s| s.jitter).collect();
+    let Motion { velocity_mps, std_error, p, .. } = Motion::of(&all, &FrameNoise::of(&all))?;
+    Some((velocity_mps, std_error.hypot(UNEVEN * velocity_mps), p))
+}
+
+/// Noise of a frame's mean about the line of its view: what its pixels explain, and what all frames
+/// scatter by beside that, px^2; negative where they scatter less.
+struct FrameNoise {
+    extra_px2: f64,
+}
+
+impl FrameNoise {
+    fn of(all: &[Jitter]) -> Self {
+        let freedom: f64 = all.iter().map(|j| j.freedom).sum();
+        let beside: f64 = all.iter().map(|j| j.scatter_px2 - j.freedom * j.expected_px2).sum();
+        FrameNoise { extra_px2: beside / freedom }
+    }
+
+    fn px2(&self, view: &Jitter) -> f64 {
+        (view.expected_px2 + self.extra_px2.max(0.0)).max(f64::MIN_POSITIVE)
+    }
+
+    /// No surer than the view's own frames scatter; they may lie on a line by chance.
+    fn own_px2(&self, view: &Jitter) -> f64 {
+        self.px2(view).max(view.scatter_px2 / view.freedom)
+    }
+}
+
+/// What the frames' means tell; `rho` is the correlation of successive frames that was found.
+pub(in crate::diagnose) fn frame_means(
+    views: &[Structure],
+    known: &KnownTerms,
+    level: f64,
+    rho: f64,
+) -> Vec<TextureFinding> {
+    let all: Vec<Jitter> = views.iter().filter_map(|s| s.jitter).collect();
+    let freedom: f64 = all.iter().map(|j| j.freedom).sum();
+    if all.len() < 2 || freedom < 2.0 {
+        return Vec::new();
+    }
+    let noise = FrameNoise::of(&all);
+    let mut found = Vec::new();
+    found.extend((!known.has("target-motion")).then(|| motion(&all, &noise, level, rho)).flatten());
+    // A motion that is not uniform scatters about its line.
+    let trend_px2 = all.iter().map(|j| j.trend_px2).sum::<f64>() / all.len() as f64;
+    if found.is_empty() || noise.extra_px2 >= 0.15 * trend_px2 {
+        let known_px = known.parameter("frame-jitter", "sigma_px").unwrap_or(0.0);
+        found.extend(jitter(&all, &noise, known_px, variance_px2(views), level));
+    }
+    found
+}
+
+/// Motion: the line explains more than the scatter about it does, or all views move alike.
+fn motion(all: &[Jitter], noise: &FrameNoise, level: f64, rho: f64) -> Option<TextureFinding> {
+    let n = all.len() as f64;
+    let freedom: f64 = all.iter().map(|j| j.freedom).sum();
+    let by_noise =
+        |of: &dyn Fn(&Jitter) -> f64| all.iter().map(|j| of(j) / noise.px2(j)).sum::<f64>();
+    let line = by_noise(&|j| j.trend_px2) / n;
+    let about_it = (by_noise(&|j| j.scatter_px2) / freedom).max(1.0);
+    // Frames that resemble their neighbours wander.
+    let wander = (1.0 + rho) / (1.0 - rho).max(0.05);
+    let f = line / (about_it * wander * wander);
+    let p_line = FisherSnedecor::new(n, freedom).map_or(1.0, |d| 1.0 - d.cdf(f));
+    let steady = Motion::of(all, noise).filter(|m| m.p < 0.5 * level);
+    if steady.is_none() && !(p_line < 0.5 * level && f > 3.0) {
+        return None;
+    }
+    let speed = (all.iter().map(|j| j.velocity_mps.powi(2)).sum::<f64>() / n).sqrt();
+    let signed = all.iter().map(|j| j.velocity_mps).sum::<f64>() / n;
+    let Motion { velocity_mps, std_error, p, nats } = steady.unwrap_or(Motion {
+        velocity_mps: speed.copysign(signed),
+        std_error: speed / (2.0 * n).sqrt(),
+        p: p_line,
+        nats: 0.5 * n * f.ln().max(0.0),
+    });
+    let std_error = std_error.hypot(UNEVEN * velocity_mps);
+    Some(TextureFinding {
+        families: vec!["target-motion"],
+        statistic: Statistic::Bias,
+        axis: Axis::Frame,
+        interval: [0.0, 0.0],
+        parameters: one("velocity_mps", velocity_mps, std_error),
+        size_sigma: 0.0,
+        p: p.max(1e-300),
+        nats,
+        words: None,
+    })
+}
+
+/// Jitter: the means scatter as neither their pixels' noise, `variance_px2` a pixel, nor the jitter that is
+/// known explains.
+fn jitter(
+    all: &[Jitter],
+    noise: &FrameNoise,
+    known_px: f64,
+    variance_px2: f64,
+    level: f64,
+) -> Option<TextureFinding> {
+    let freedom: f64 = all.iter().map(|j| j.freedom).sum();
+    let ratio: f64 = all
+        .iter()
+        .map(|j| j.scatter_px2 / (j.expected_px2 + known_px * known_px).max(1e-300))
+        .sum();
+    let p = ChiSquared::new(freedom).map_or(1.0, |d| 1.0 - d.cdf(ratio / JITTER));
+    let jitter_px2 = noise.extra_px2;
+    if !(p < level && jitter_px2 > 0.0) {
+        return None;
+    }
+    let sigma = jitter_px2.sqrt();
+    Some(TextureFinding {
+        families: vec!["frame-jitter"],
+        statistic: Statistic::Correlation,
+        axis: Axis::Frame,
+        interval: [0.0, 0.0],
+        parameters: one("sigma_px", sigma, sigma * UNEVEN.hypot(1.0 / (2.0 * freedom).sqrt())),
+        size_sigma: (jitter_px2 / variance_px2.max(1e-12)).sqrt(),
+        p: p.max(1e-300),
+        nats: 0.5 * freedom * (ratio / freedom).ln().max(0.0),
+        words: None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::rng::{Seed, Stream};
+
+    fn normal(rng: &mut Stream) -> f64 {
+        StandardNormal.sample(rng)
+    }
+
+    /// m/s.
+    fn velocity(views: &[Structure]) -> Option<f64> {
+        let found = frame_means(views, &KnownTerms::default(), 1e-3, 0.0);
+        let motion = found.iter().find(|h| h.families == ["target-motion"])?;
+        motion.parameters["velocity_mps"]["value"].as_f64()
+    }
+
+    /// Frames that jitter, about a line through four of them: two degrees of freedom a view leave some view
+    /// that lies on its line by chance, and it must not decide for all. A true motion is told.
+    #[test]
+    fn frames_that_jitter_do_not_move() {
+        // At 2 m.
+        const M_PER_PX: f64 = 4.0 / 43.5;
+        let told = |seed: u64, velocity_mps: f64| {
+            let mut rng = Seed(seed).stream("noise/jitter");
+            let view = |_| {
+                let t = [-0.05, -0.05 / 3.0, 0.05 / 3.0, 0.05f64];
+                let m = t.map(|t| 0.015 * normal(&mut rng) - velocity_mps / M_PER_PX * t);
+                let mean = m.iter().sum::<f64>() / 4.0;
+                let tt: f64 = t.iter().map(|t| t * t).sum();
+                let tm: f64 = t.iter().zip(m).map(|(t, m)| t * m).sum();
+                let mm: f64 = m.iter().map(|m| (m - mean).powi(2)).sum();
+                Structure {
+                    jitter: Some(Jitter {
+                        scatter_px2: mm - tm * tm / tt,
+                        freedom: 2.0,
+                        expected_px2: 1e-7,
+                        trend_px2: tm * tm / tt,
+                        velocity_mps: -tm / tt * M_PER_PX,
+                    }),
+                    ..Structure::default()
+                }
+            };
+            velocity(&(0..40).map(view).collect::<Vec<_>>()).is_some()
+        };
+        // At 1e-3, 0.3 of 300 are expected: more than 3 have a chance of 3e-4.
+        let moving = (0..300).filter(|seed| told(*seed, 0.0)).count();
+        assert!(moving <= 3, "{moving} of 300 move");
+        assert!((0..20).all(|seed| told(seed, 0.05)));
+    }
+
+    /// Far, steep views have noisy means: a motion that the near ones see is no less sure for them.
+    #[test]
+    fn views_count_by_their_own_noise() {
+        let mut rng = Seed(9).stream("motion/uneven");
+        let view = |n: u32| {
+            let expected_px2 = 1e-6 * f64::from(1 << n);
+            let spread = expected_px2.sqrt();
+            let trend = 0.006 + spread * normal(&mut rng);
+            let jitter = Jitter {
+                scatter_px2: (spread * normal(&mut rng)).powi(2),
+                freedom: 1.0,
+                expected_px2,
+                trend_px2: trend * trend,
+                velocity_mps: trend,
+            };
+            Structure { jitter: Some(jitter), ..Structure::default() }
+        };
+        let velocity = velocity(&(0..12).map(view).collect::<Vec<_>>()).expect("a motion");
+        assert!((velocity - 0.006).abs() < 0.002, "{velocity}");
+    }
+}

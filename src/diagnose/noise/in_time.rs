@@ -1,0 +1,156 @@
+//! What pixels repeat: in every view, in every frame of a view, and from frame to frame.
+
+use super::structure::Structure;
+use super::texture_finding::{LEAST_VARIANCE_SHARE, Shared, TextureFinding};
+use super::view_mean::{ViewMean, nats, variance_px2};
+use crate::diagnose::finding::parameters::one;
+use crate::diagnose::views::known::KnownTerms;
+use crate::terms::{Axis, Statistic};
+
+/// Correlations smaller than this are not worth a word.
+const LEAST_CORRELATION: f64 = 0.002;
+/// Share of the variance that pixels repeat in every view, worth a word.
+const LEAST_FIXED: f64 = 0.0003;
+/// Below this chance a fall of the correlation is not put down to noise alone.
+const DOUBTFUL: f64 = 0.05;
+/// A share that stands still beside one that changes slowly is known to this.
+const BESIDE_ANOTHER: f64 = 0.05;
+
+/// A correlation of frames: a share of the variance.
+fn of_frames(
+    families: Vec<&'static str>,
+    interval: [f64; 2],
+    (name, share, std_error): (&str, f64, f64),
+    size: f64,
+    (p, nats): (f64, f64),
+) -> TextureFinding {
+    TextureFinding {
+        families,
+        statistic: Statistic::Correlation,
+        axis: Axis::Frame,
+        interval,
+        parameters: one(name, share, std_error),
+        size_sigma: size.max(0.0).sqrt(),
+        p,
+        nats,
+        words: None,
+    }
+}
+
+pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
+    let fixed = ViewMean::of_pairs(views, |s| s.fixed_px2);
+    let variance = variance_px2(views);
+    let known_px = known.parameter("fixed-pattern-noise", "sigma_px").unwrap_or(0.0);
+    let pattern = Shared {
+        families: vec!["fixed-pattern-noise"],
+        statistic: Statistic::Bias,
+        axis: Axis::Pixel,
+        expected_px2: known_px * known_px,
+        least: LEAST_FIXED,
+        words: None,
+    };
+    let mut found: Vec<TextureFinding> =
+        fixed.and_then(|m| pattern.found(&m, variance, level)).into_iter().collect();
+    let fixed_px2 = fixed.map_or(0.0, |m| m.value.max(0.0));
+    let Some(first) = ViewMean::of(views, |s| s.lagged[0]) else { return found };
+    let first_error = first.std_error.max(by_chance(views));
+    let fixed_share = fixed_px2 / variance.max(1e-12);
+    let frozen_known = known.parameter("frozen-noise", "fraction").unwrap_or(0.0);
+    let rho_known = known.parameter("temporal-correlation", "rho").unwrap_or(0.0);
+    let falling = ViewMean::of(views, |s| Some(s.lagged[0]? - later(s)?));
+    let Some((falling, still)) = falling.zip(still_level(views)) else {
+        // Two frames a view: still or slowly changing, nobody can say.
+        let p = first.p_above(fixed_share + frozen_known + rho_known);
+        let more = first.value - fixed_share - frozen_known - rho_known;
+        if p < level && more > LEAST_CORRELATION {
+            let names = vec!["frozen-noise", "temporal-correlation"];
+            let fraction = ("fraction", first.value, first_error);
+            found.push(of_frames(names, [0.0, 1.0], fraction, more, (p, nats(&first, 0.0))));
+        }
+        return found;
+    };
+    let p_falling = falling.p_above(0.0);
+    // What changes slowly makes next frames alike; a fall to frames that differ is chance.
+    let alike = first.p_above(fixed_share + frozen_known) < level;
+    let slowly = alike && p_falling < level && falling.value > LEAST_VARIANCE_SHARE;
+    // What stands still is in the last of them whole, and in all of them where none fades.
+    let last = |s: &Structure| if slowly { s.lagged[2].or(s.lagged[1]) } else { of_any_two(s) };
+    let Some(least) = ViewMean::of(views, last) else { return found };
+    let p_still = least.p_above(fixed_share + frozen_known);
+    if slowly && rho_known == 0.0 {
+        let s = still.max(0.0) + fixed_share;
+        let rho = ((first.value - s) / (1.0 - s).max(1e-6)).clamp(0.0, 1.0);
+        let name = vec!["temporal-correlation"];
+        let evidence = (p_falling, nats(&falling, 0.0));
+        found.push(of_frames(name, [1.0, 3.0], ("rho", rho, first_error), rho, evidence));
+    }
+    let floor = if slowly { BESIDE_ANOTHER } else { LEAST_CORRELATION };
+    if p_still < level && still - frozen_known > floor {
+        // What falls, but not clearly, may as well change slowly.
+        let doubtful = !slowly && p_falling < DOUBTFUL && rho_known == 0.0;
+        let names = match doubtful {
+            false => vec!["frozen-noise"],
+            true if 2.0 * falling.value < first.value => {
+                vec!["frozen-noise", "temporal-correlation"]
+            }
+            true => vec!["temporal-correlation", "frozen-noise"],
+        };
+        let evidence = (p_still, nats(&least, fixed_share + frozen_known));
+        let parameter = match names[0] {
+            "frozen-noise" => ("fraction", still, least.std_error),
+            _ => ("rho", (first.value - fixed_share - frozen_known).max(0.0), first_error),
+        };
+        found.push(of_frames(names, [1.0, 3.0], parameter, still, evidence));
+    }
+    found
+}
+
+/// Correlation of frames two or three apart: of four frames two pairs, and one.
+pub fn later(s: &Structure) -> Option<f64> {
+    let (two, three) = (s.lagged[1]?, s.lagged[2]);
+    Some(three.map_or(two, |three| (2.0 * two + three) / 3.0))
+}
+
+/// Correlation of any two frames, each pair of them counted once: of four frames three are next to
+/// one another.
+pub fn of_any_two(s: &Structure) -> Option<f64> {
+    let next = s.lagged[0]?;
+    let Some(rest) = later(s) else { return Some(next) };
+    let share = if s.lagged[2].is_some() { 1.0 / 2.0 } else { 1.0 / 3.0 };
+    Some(next + share * (rest - next))
+}
+
+/// Pixels of white noise correlate by chance to one over the root of their number; a few views may
+/// happen to agree better than that.
+fn by_chance(views: &[Structure]) -> f64 {
+    let pairs = |s: &Structure| s.pixels * s.lagged.iter().flatten().count() as f64;
+    let pairs: f64 = views.iter().map(pairs).sum();
+    if pairs > 0.0 { pairs.sqrt().recip() } else { 0.0 }
+}
+
+/// Share of the noise that stands still within a view, by the views' mean correlations; `None` with
+/// too few frames.
+pub fn still_level(views: &[Structure]) -> Option<f64> {
+    let mean = |of: &dyn Fn(&Structure) -> Option<f64>| ViewMean::of(views, of).map(|m| m.value);
+    let (c1, c2, c3) = (mean(&|s| s.lagged[0])?, mean(&|s| s.lagged[1])?, mean(&|s| s.lagged[2]));
+    let share = still_share([c1, c2, c3.unwrap_or(c2 * c2 / c1.max(1e-6))], c3.is_some());
+    let fixed = mean(&|s| s.fixed_px2).unwrap_or(0.0).max(0.0);
+    let variance = mean(&|s| Some(s.variance_px2)).unwrap_or(0.0);
+    Some(share - fixed / variance.max(1e-12))
+}
+
+/// The s of c_k = s + (1 - s) rho^k, from the correlations at lags one to three.
+pub(in crate::diagnose) fn still_share([c1, c2, c3]: [f64; 3], three: bool) -> f64 {
+    let (near, far) = (c1 - c2, c2 - c3);
+    if !three {
+        // rho^2 = rho * rho alone cannot be told from a share: what falls is taken as a filter's.
+        return if near > 0.05 * c1 { 0.0 } else { c2 };
+    }
+    if near <= 0.01 {
+        return (c1 + c2 + c3) / 3.0;
+    }
+    let rho = (far / near).clamp(0.0, 0.95);
+    // c1 - c2 = (1 - s) rho (1 - rho); a moving average dies at once and leaves the last.
+    let s = if rho < 0.05 { c3 } else { 1.0 - near / (rho * (1.0 - rho)) };
+    s.clamp(0.0, c3.max(0.0))
+}

@@ -1,0 +1,165 @@
+//! The noise's fourth moment beyond a Gaussian's, with what an uneven size of the noise adds taken off.
+//!
+//! Noise of a size s(u, v) that differs from place to place has a fourth moment of 3 (1 + c), where c is
+//! the variance of s^2 over its mean's square: as though its tails were heavy. Two pixels so near that
+//! they share s, and correlated by rho, have E x^2 y^2 = (1 + c) (1 + 2 rho^2) if they are Gaussian. So
+//!
+//! ```text
+//! excess = E x^4 - 3 E x^2 y^2 / (1 + 2 rho^2)        x, y of unit variance
+//! ```
+//!
+//! is none for Gaussian noise whose size changes little from x to y.
+
+use super::tail_counts::FEWEST_READINGS;
+use crate::diagnose::views::patches::patches;
+
+/// Residuals farther out, in standard deviations, are [`super::tails`]' to count: one gross error of 30
+/// would outweigh a million others here.
+const CUT: f32 = 4.5;
+/// E x^4 of a Gaussian that is cut there, its variance being 1 afterwards.
+const GAUSSIAN_FOURTH: f64 = 2.997_52;
+/// Pixels so far apart, px, share the size of the noise and little of its errors; what they share is
+/// taken off.
+const APART_PX: usize = 8;
+/// Along rows, columns and both: noise is correlated by another rho in each.
+const DIRECTIONS: [[usize; 2]; 3] = [[APART_PX, 0], [0, APART_PX], [APART_PX, APART_PX]];
+
+/// Sums over pairs of residuals of unit variance.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct PairSums {
+    pairs: f64,
+    fourth: f64,
+    products: f64,
+    products_of_squares: f64,
+}
+
+/// What the residuals of some images say, direction by direction.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct FourthMoment([PairSums; DIRECTIONS.len()]);
+
+impl FourthMoment {
+    /// Of an image's residuals: row by row, `width` px a row, in any unit, NaN where there is none.
+    pub fn of(image: &[f32], width: usize) -> Self {
+        let mut unit = vec![f64::NAN; image.len()];
+        let mut sums = FourthMoment::default();
+        for patch in patches(image, width).filter(|p| !p.coarse) {
+            let near = || patch.pixels.iter().filter(|i| image[**i].abs() < CUT * patch.sigma);
+            let (n, square) = near()
+                .fold((0.0, 0.0), |(n, sum), i| (n + 1.0, sum + f64::from(image[*i]).powi(2)));
+            if square > 0.0 {
+                let scale = f64::sqrt(n / square);
+                near().for_each(|i| unit[*i] = scale * f64::from(image[*i]));
+                // Both of a pair have the scale of this patch.
+                sums.add_pairs(&unit, width, &patch.pixels);
+                near().for_each(|i| unit[*i] = f64::NAN);
+            }
+        }
+        sums
+    }
+
+    fn add_pairs(&mut self, unit: &[f64], width: usize, pixels: &[usize]) {
+        for &i in pixels.iter().filter(|i| unit[**i].is_finite()) {
+            for (sums, [du, dv]) in self.0.iter_mut().zip(DIRECTIONS) {
+                let inside = i % width + du < width;
+                let y = unit.get(i + dv * width + du).filter(|y| inside && y.is_finite());
+                if let Some(y) = y {
+                    let (xx, yy) = (unit[i] * unit[i], y * y);
+                    sums.pairs += 1.0;
+                    sums.fourth += 0.5 * (xx * xx + yy * yy);
+                    sums.products += unit[i] * y;
+                    sums.products_of_squares += xx * yy;
+                }
+            }
+        }
+    }
+
+    pub fn add(&mut self, other: &FourthMoment) {
+        for (mine, other) in self.0.iter_mut().zip(&other.0) {
+            mine.pairs += other.pairs;
+            mine.fourth += other.fourth;
+            mine.products += other.products;
+            mine.products_of_squares += other.products_of_squares;
+        }
+    }
+
+    /// Excess kurtosis, where enough was looked at.
+    pub fn excess(&self) -> Option<f64> {
+        let of = |s: &PairSums| {
+            let rho = s.products / s.pairs;
+            let uneven = s.products_of_squares / s.pairs / (1.0 + 2.0 * rho * rho);
+            (s.pairs >= FEWEST_READINGS)
+                .then(|| s.fourth / s.pairs - GAUSSIAN_FOURTH - 3.0 * (uneven - 1.0))
+        };
+        let all: Option<Vec<f64>> = self.0.iter().map(of).collect();
+        all.map(|all| all.iter().sum::<f64>() / all.len() as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::{Seed, Stream};
+    use rand_distr::{Distribution, StandardNormal, StudentT};
+
+    const SIZE: [usize; 2] = [320, 240];
+    const SEEDS: u64 = 12;
+
+    /// Mean and standard error over the seeds.
+    fn excess(draw: impl Fn(&mut Stream) -> Vec<f32>) -> [f64; 2] {
+        let of = |seed| {
+            let image = draw(&mut Seed(seed).stream("kurtosis"));
+            FourthMoment::of(&image, SIZE[0]).excess().expect("an excess")
+        };
+        let all: Vec<f64> = (0..SEEDS).map(of).collect();
+        let n = all.len() as f64;
+        let mean = all.iter().sum::<f64>() / n;
+        let square: f64 = all.iter().map(|x| (x - mean).powi(2)).sum();
+        [mean, (square / (n - 1.0) / n).sqrt()]
+    }
+
+    fn white(rng: &mut Stream) -> Vec<f32> {
+        (0..SIZE[0] * SIZE[1]).map(|_| StandardNormal.sample(rng)).collect()
+    }
+
+    /// Within four standard errors, and what a size that changes from pixel to pixel of a pair leaves.
+    #[test]
+    fn gaussian_noise_has_none_even_uneven_or_correlated() {
+        let even = excess(white);
+        assert!(even[0].abs() < 4.0 * even[1], "{even:?}");
+        let uneven = excess(|rng| {
+            let size = |i: usize| 1.0 + 0.3 * ((i % SIZE[0]) as f32 / 40.0).sin();
+            white(rng).iter().enumerate().map(|(i, x)| size(i) * x).collect()
+        });
+        assert!(uneven[0].abs() < 4.0 * uneven[1] + 0.02, "uneven: {uneven:?}");
+        // Means over 12 px of a row: rho is a third along rows and none along columns. Without 2 rho^2
+        // it would be -.22.
+        let rows = excess(|rng| {
+            let white = white(rng);
+            let mean = |i: usize| white[i..(i + 12).min(white.len())].iter().sum::<f32>();
+            (0..white.len()).map(mean).collect()
+        });
+        assert!(rows[0].abs() < 4.0 * rows[1] && rows[1] < 0.04, "rows: {rows:?}");
+    }
+
+    /// Student's t of 24 degrees of freedom has 6 / 20 more, less what the cut takes.
+    #[test]
+    fn weak_tails_have_some() {
+        let student = StudentT::new(24.0).expect("a distribution");
+        let draw = |rng: &mut Stream| -> Vec<f32> {
+            (0..SIZE[0] * SIZE[1]).map(|_| student.sample(rng) as f32).collect()
+        };
+        let found = excess(draw);
+        assert!((0.15..0.3).contains(&found[0]), "{found:?}");
+    }
+
+    /// Too small a picture, words so coarse that most residuals are none, no noise at all.
+    #[test]
+    fn what_shows_no_noise_tells_nothing() {
+        assert_eq!(FourthMoment::of(&vec![1.0; 2000], 50).excess(), None);
+        assert_eq!(FourthMoment::default().excess(), None);
+        let mut rng = Seed(1).stream("kurtosis/coarse");
+        let coarse: Vec<f32> = white(&mut rng).iter().map(|x| (0.4 * x).round()).collect();
+        assert_eq!(FourthMoment::of(&coarse, SIZE[0]).excess(), None);
+        assert_eq!(FourthMoment::of(&vec![0.0; 320 * 240], SIZE[0]).excess(), None);
+    }
+}

@@ -1,0 +1,79 @@
+//! Whole columns and rows that err by a constant each: their profile, as terms of the model.
+
+use rayon::prelude::*;
+
+use super::texture::pixel_scale;
+use crate::diagnose::views::field::Field;
+use crate::terms::{Basis, Coordinate, Modulation, Statistic, Term};
+
+/// Columns and rows of fewer readings over all views are left at nothing.
+const FEWEST_READINGS: f64 = 200.0;
+
+/// Means of every column and row, and how sure they are.
+pub struct Lines {
+    pub terms: Vec<Term>,
+    /// Of the terms' coefficients, each for itself, px^2.
+    pub variances: Vec<f64>,
+}
+
+/// What a line's readings sum to in one view, and how many they are.
+type Sums = Vec<(f64, f64)>;
+
+/// The mean of every column and row over the views, px, without what is smooth; `bias` has what is
+/// known to be no noise, by view and pixel, px.
+pub fn lines(fields: &[Field], bias: &[Vec<f32>]) -> Lines {
+    let Some(first) = fields.first() else {
+        return Lines { terms: Vec::new(), variances: Vec::new() };
+    };
+    let (width, height) = (first.width, first.height);
+    let none = Vec::new();
+    let by_view: Vec<[Sums; 2]> = fields
+        .par_iter()
+        .enumerate()
+        .map(|(n, field)| {
+            let mut sums = [vec![(0.0, 0.0); width], vec![(0.0, 0.0); height]];
+            let image = pixel_scale(field, bias.get(n).unwrap_or(&none));
+            for (i, &r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
+                for (sums, line) in sums.iter_mut().zip([i % width, i / width]) {
+                    sums[line].0 += f64::from(r);
+                    sums[line].1 += 1.0;
+                }
+            }
+            sums
+        })
+        .collect();
+    let mut told = Lines { terms: Vec::new(), variances: Vec::new() };
+    for (k, over) in [Coordinate::Column, Coordinate::Row].into_iter().enumerate() {
+        let nodes = [width, height][k];
+        let lines = (0..nodes).map(|line| mean(by_view.iter().map(|sums| sums[k][line])));
+        let (coefficients, variances): (Vec<f64>, Vec<f64>) = lines.unzip();
+        told.variances.extend(variances);
+        let high = nodes.saturating_sub(1) as f64;
+        told.terms.push(Term {
+            statistic: Statistic::Bias,
+            basis: Basis::Curve { over, low: 0.0, high, nodes, times: Modulation::One },
+            coefficients,
+        });
+    }
+    told
+}
+
+/// Mean of a line, and its variance with the views as the sample.
+fn mean(views: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
+    let (mut sum, mut n) = (0.0, 0.0);
+    views.clone().for_each(|(s, k)| (sum, n) = (sum + s, n + k));
+    if n < FEWEST_READINGS {
+        return (0.0, 0.0);
+    }
+    let mean = sum / n;
+    let (mut square, mut seen) = (0.0, 0.0);
+    for (s, k) in views.filter(|v| v.1 > 0.0) {
+        square += (s - k * mean).powi(2);
+        seen += 1.0;
+    }
+    (mean, square / (n * n) * seen / f64::max(seen - 1.0, 1.0))
+}
+
+#[cfg(test)]
+#[path = "lines_tests.rs"]
+mod tests;

@@ -1,0 +1,154 @@
+//! What the structure of the noise amounts to: each view is one sample of every statistic.
+pub mod frame_means;
+pub mod frames;
+pub mod in_time;
+pub mod kurtosis;
+pub mod lines;
+pub mod mixture;
+pub mod outliers;
+pub mod pairs;
+pub mod scatter;
+pub mod structure;
+pub mod tail_counts;
+pub mod tails;
+pub mod texture;
+pub mod texture_finding;
+pub mod view_mean;
+pub mod window;
+
+use crate::diagnose::finding::parameters::{estimate, one};
+use crate::diagnose::views::known::KnownTerms;
+use crate::terms::{Axis, Statistic};
+use frame_means::frame_means;
+use frames::unequal;
+use in_time::in_time;
+use pairs::{REACH_PX, window_of};
+use structure::Structure;
+use texture_finding::{LEAST_VARIANCE_SHARE, Shared, TextureFinding};
+use view_mean::{ViewMean, nats, variance_px2};
+use window::{Window, part};
+
+/// All mismatches of structure at this error rate each.
+pub fn texture_findings(
+    views: &[Structure],
+    known: &KnownTerms,
+    level: f64,
+) -> Vec<TextureFinding> {
+    let mut found = Vec::new();
+    found.extend(window(views, known, level));
+    found.extend(in_time(views, known, level));
+    found.extend(lines(views, known, level));
+    let rho = found
+        .iter()
+        .find(|h| h.families.first() == Some(&"temporal-correlation"))
+        .and_then(|h| h.parameters["rho"]["value"].as_f64())
+        .unwrap_or(0.0);
+    found.extend(frame_means(views, known, level, rho));
+    found.extend(unequal(views, level));
+    found
+}
+
+/// Windows that differ by less than this factor are the same.
+const SAME_WINDOW: f64 = 1.12;
+
+pub(in crate::diagnose) fn window(
+    views: &[Structure],
+    known: &KnownTerms,
+    level: f64,
+) -> Option<TextureFinding> {
+    let m = ViewMean::of(views, |s| s.window_px.map(f64::ln))?;
+    let expected = expected_window(known);
+    let length = m.value.exp();
+    let p = m.p_above(expected.ln());
+    let found = |interval, parameters, size_sigma, p, nats| TextureFinding {
+        families: vec!["spatial-correlation"],
+        statistic: Statistic::Correlation,
+        axis: Axis::PixelLag,
+        interval,
+        parameters,
+        size_sigma,
+        p,
+        nats,
+        words: None,
+    };
+    let part = part(views).filter(|w| expected == 1.0 && w.share[0] + 2.0 * w.share[1] < WHOLE);
+    let of_part = |Window { length, share }: Window| {
+        let mut parameters = one("length_px", length[0], length[1]);
+        parameters.insert("share".into(), estimate(share[0], share[1]));
+        parameters
+    };
+    if p < level && length > SAME_WINDOW * expected {
+        let nats = nats(&m, expected.ln());
+        let whole = || one("length_px", length, length * m.std_error);
+        let size = part.map_or(1.0, |w| w.share[0].sqrt());
+        let parameters = part.map_or_else(whole, of_part);
+        return Some(found([0.0, length], parameters, size, p, nats));
+    }
+    // A part of the noise alone: seen where neighbours are taken for independent.
+    let near = ViewMean::of(views, |s| s.neighbour_correlation)?;
+    let p = near.p_above(0.0);
+    if expected > 1.0 || p >= level || near.value <= LEAST_VARIANCE_SHARE {
+        return None;
+    }
+    let (size, nats) = (near.value.sqrt(), nats(&near, 0.0));
+    // Where side and share cannot be told apart: the window through which all would come.
+    let all = || {
+        let side = window_of(near.value);
+        let std_error = window_of(near.value + near.std_error) - side + 0.2 * (side - 1.0);
+        one("length_px", side.max(length), std_error)
+    };
+    let reach = part.map_or(REACH_PX as f64, |w| w.length[0]);
+    Some(found([0.0, reach], part.map_or_else(all, of_part), size, p, nats))
+}
+
+/// Where less of the noise than this comes through a window, it is told how much.
+const WHOLE: f64 = 0.9;
+
+/// Side of the window that the model has, px, where a part of the noise alone comes through it with
+/// so much less correlation.
+pub fn expected_window(known: &KnownTerms) -> f64 {
+    let of = |name| known.parameter("spatial-correlation", name);
+    let side = of("length_px").unwrap_or(1.0).max(1.0);
+    1.0 + of("share").unwrap_or(1.0).clamp(0.0, 1.0) * (side - 1.0)
+}
+
+/// Rows of a frame that err as one each.
+pub const ROW_NOISE: &str = "row-noise";
+
+fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
+    let variance = variance_px2(views);
+    let known_px = known.parameter(ROW_NOISE, "sigma_px").unwrap_or(0.0);
+    let line = |families, statistic, axis, expected_px2, words| Shared {
+        families,
+        statistic,
+        axis,
+        expected_px2,
+        least: if statistic == Statistic::Bias { LEAST_STILL } else { LEAST_VARIANCE_SHARE },
+        words,
+    };
+    let still = "whole columns or rows err by a constant each, from one to the next";
+    let afresh = "each column is shifted as one, afresh in every frame";
+    let row = known_px * known_px;
+    let all = [
+        (
+            ViewMean::of_pairs(views, |s| s.lines_px2),
+            line(vec![], Statistic::Bias, Axis::Column, known.error_of_lines_px2(), Some(still)),
+        ),
+        (
+            ViewMean::of(views, |s| s.row_px2),
+            line(vec![ROW_NOISE], Statistic::Correlation, Axis::Row, row, None),
+        ),
+        (
+            ViewMean::of(views, |s| s.column_px2),
+            line(vec![], Statistic::Correlation, Axis::Column, 0.0, Some(afresh)),
+        ),
+    ];
+    all.into_iter().filter_map(|(m, line)| line.found(&m?, variance, level)).collect()
+}
+
+/// Share of the variance that still lines have in common, worth a word: less is what the shapes found
+/// in the mean leave.
+const LEAST_STILL: f64 = 0.0004;
+
+#[cfg(test)]
+mod tests;

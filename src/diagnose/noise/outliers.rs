@@ -1,0 +1,83 @@
+//! What the noise's far errors are drawn from: how many there are and how wide they lie, from counts
+//! between a few distances.
+//!
+//! Near the middle they hide in the noise, so that the part of them which is not seen depends on the
+//! form of their distribution. A matcher that locks to a wrong place errs by a Gaussian; where near
+//! places win more often than far ones, by a Laplace distribution; where all in its window are alike,
+//! by a uniform one. The posterior is summed over the three.
+
+use statrs::function::erf::erfc;
+
+use super::tail_counts::{TAIL_EDGES, TailCounts};
+use crate::diagnose::search::posterior::Posterior;
+
+/// Share and scale of the far errors, each with its standard error; the scale is their standard
+/// deviation over that of the noise.
+#[derive(Debug, Clone, Copy)]
+pub struct Outliers {
+    pub fraction: [f64; 2],
+    pub scale: [f64; 2],
+}
+
+/// Share of unit errors farther out than `t` standard deviations.
+const FORMS: [fn(f64) -> f64; 3] = [
+    |t| erfc(t * std::f64::consts::FRAC_1_SQRT_2),
+    |t| (-std::f64::consts::SQRT_2 * t).exp(),
+    |t| (1.0 - t / 3f64.sqrt()).max(0.0),
+];
+
+/// Scales that are tried; evenly in the logarithm.
+const SCALES: usize = 240;
+const REACH: [f64; 2] = [1.2, 30.0];
+/// The sigma that distances are measured in: a patch of 40 px a side has its own to 2 %, and is
+/// uneven by about as much again. So much are both parameters off, and a bin's expected count.
+const SIGMA: f64 = 0.05;
+
+/// The far errors that make these counts, whose total differs from view to view so that its mean is
+/// known to the share `scatter`; `None` where hardly any are counted.
+pub fn outliers(counts: &TailCounts, scatter: f64) -> Option<Outliers> {
+    let own = |t: f64| counts.n * FORMS[0](t);
+    let seen: Vec<f64> = counts.between.to_vec();
+    let chance: Vec<f64> = TAIL_EDGES.windows(2).map(|w| own(w[0]) - own(w[1])).collect();
+    let more: f64 = seen.iter().sum::<f64>() - chance.iter().sum::<f64>();
+    if more <= 0.0 || counts.n <= 0.0 {
+        return None;
+    }
+    let log = |k: usize| {
+        let share = k as f64 / (SCALES - 1) as f64;
+        REACH[0].ln() + (REACH[1] / REACH[0]).ln() * share
+    };
+    let mut nodes: Vec<[f64; 3]> = Vec::new();
+    for form in FORMS {
+        for scale in (0..SCALES).map(|k| log(k).exp()) {
+            let beyond = |edge: f64| form(edge / scale);
+            let inside = beyond(TAIL_EDGES[0]) - beyond(TAIL_EDGES[TAIL_EDGES.len() - 1]);
+            if inside <= 0.0 {
+                continue;
+            }
+            let fraction = more / inside / counts.n;
+            // More than all cannot stray.
+            if fraction >= 1.0 {
+                continue;
+            }
+            let bins = TAIL_EDGES.windows(2).zip(seen.iter().zip(&chance));
+            let misfit = bins.map(|(w, (seen, chance))| {
+                let expected = chance + more * (beyond(w[0]) - beyond(w[1])) / inside;
+                let variance = expected + (SIGMA * expected).powi(2);
+                // Likelihood of a Gaussian count, its own variance part of it.
+                0.5 * ((seen - expected).powi(2) / variance + variance.max(1.0).ln())
+            });
+            nodes.push([misfit.sum(), fraction, scale]);
+        }
+    }
+    let posterior = Posterior::of(nodes, |n| (-n[0], 1.0))?;
+    let of = |k: usize, scatter: f64| {
+        let mean = posterior.mean(|n| n[k]);
+        [mean, posterior.rms(|n| n[k] - mean).hypot(scatter.hypot(SIGMA) * mean)]
+    };
+    Some(Outliers { fraction: of(1, scatter), scale: of(2, 0.0) })
+}
+
+#[cfg(test)]
+#[path = "outliers_tests.rs"]
+mod tests;

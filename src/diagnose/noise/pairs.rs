@@ -1,0 +1,194 @@
+//! What pixels of one image have in common with their neighbours and with their row and column:
+//! mean products over all the pairs there are.
+//!
+//! With S the sum over a row, S^2 less what is on the diagonal is the score of a variance that the
+//! row shares; the products with a box around each pixel are that of one it shares with its
+//! neighbours. Each costs a pass over the image.
+
+use super::texture::without_outliers;
+use crate::diagnose::views::box_sums::BoxSums;
+
+/// As far as neighbours are looked at, px.
+pub const REACH_PX: usize = 4;
+/// Pixels closer than this along a line may share a window, px.
+const APART_PX: usize = 16;
+/// Fewer pairs say nothing.
+const FEWEST_PAIRS: f64 = 1000.0;
+
+/// Mean products, px^2.
+#[derive(Debug, Clone, Copy)]
+pub struct Pairs {
+    /// Of pixels with themselves.
+    pub power: f64,
+    /// Of pixels of one row that lie apart, and of one column.
+    pub row: Option<f64>,
+    pub column: Option<f64>,
+    /// Of neighbours, without what rows and columns share.
+    pub near: f64,
+}
+
+impl Pairs {
+    /// Of an image of the noise, whatever plane it holds taken out; NaN where there is nothing.
+    pub fn of(image: &[f32], width: usize) -> Option<Self> {
+        let level = without_outliers(&without_plane(image, width)?);
+        let height = level.len() / width;
+        let pixels = level.iter().filter(|r| r.is_finite()).count() as f64;
+        let power =
+            level.iter().filter(|r| r.is_finite()).map(|r| square(*r)).sum::<f64>() / pixels;
+        let beside = neighbours(&level, width);
+        if beside.pairs < FEWEST_PAIRS {
+            return None;
+        }
+        // The plane took a little of every pair with it: of its three degrees of freedom the level
+        // and one slope are a line's.
+        let taken = (power + beside.products / pixels) / pixels;
+        let lines = |count: usize, length: usize, at: &dyn Fn(usize, usize) -> usize| {
+            let sum = (0..count).fold(Sum::default(), |sum, line| {
+                sum.and(along((0..length).map(|k| level[at(line, k)])))
+            });
+            (sum.pairs >= FEWEST_PAIRS).then(|| sum.products / sum.pairs + 2.0 * taken)
+        };
+        let row = lines(height, width, &|line, k| line * width + k);
+        let column = lines(width, height, &|line, k| k * width + line);
+        let shared = (row.unwrap_or(0.0) + column.unwrap_or(0.0)) * ON_THE_LINE;
+        let near = beside.products / beside.pairs + 3.0 * taken - shared;
+        Some(Pairs { power, row, column, near })
+    }
+}
+
+/// Neighbours of a pixel, and the share of them in its own row.
+const NEIGHBOURS: usize = (2 * REACH_PX + 1) * (2 * REACH_PX + 1) - 1;
+const ON_THE_LINE: f64 = (2 * REACH_PX) as f64 / NEIGHBOURS as f64;
+
+/// Side of the square window in which as many pixels make one as where neighbours are correlated by
+/// `rho` on average.
+pub fn window_of(rho: f64) -> f64 {
+    (1.0 + NEIGHBOURS as f64 * rho).max(1.0).sqrt()
+}
+
+fn square(r: f32) -> f64 {
+    f64::from(r).powi(2)
+}
+
+/// Products of pairs, each pair met twice, and their number.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sum {
+    products: f64,
+    pairs: f64,
+}
+
+impl Sum {
+    fn and(self, other: Sum) -> Sum {
+        Sum { products: self.products + other.products, pairs: self.pairs + other.pairs }
+    }
+}
+
+/// Pairs of a line's pixels in blocks that do not touch.
+fn along(line: impl Iterator<Item = f32>) -> Sum {
+    let (mut whole, mut before, mut block) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+    let mut close = [0.0; 2];
+    let mut end = |block: [f64; 2], before: [f64; 2]| {
+        for k in 0..2 {
+            whole[k] += block[k];
+            close[k] += block[k] * (block[k] + 2.0 * before[k]);
+        }
+    };
+    for (k, r) in line.enumerate() {
+        if k > 0 && k % APART_PX == 0 {
+            end(block, before);
+            (before, block) = (block, [0.0; 2]);
+        }
+        if r.is_finite() {
+            block[0] += f64::from(r);
+            block[1] += 1.0;
+        }
+    }
+    end(block, before);
+    Sum { products: whole[0].powi(2) - close[0], pairs: whole[1].powi(2) - close[1] }
+}
+
+/// Pairs within the reach of one another, by sums over boxes.
+fn neighbours(image: &[f32], width: usize) -> Sum {
+    let height = image.len() / width;
+    let sums = BoxSums::of(image, width, height);
+    let mut sum = Sum::default();
+    for (i, r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
+        let [products, pairs] = sums.around(i % width, i / width, REACH_PX);
+        sum.products += f64::from(*r) * (products - f64::from(*r));
+        sum.pairs += pairs - 1.0;
+    }
+    sum
+}
+
+/// Less its plane by least squares; `None` with too few pixels for one.
+fn without_plane(image: &[f32], width: usize) -> Option<Vec<f32>> {
+    let (u0, v0) = (0.5 * width as f64, 0.5 * (image.len() / width) as f64);
+    let column = |i: usize| {
+        let (u, v) = ((i % width) as f64, (i / width) as f64);
+        nalgebra::Vector3::new(1.0, (u - u0) / u0, (v - v0) / v0)
+    };
+    let mut square = nalgebra::Matrix3::zeros();
+    let mut right = nalgebra::Vector3::zeros();
+    for (i, r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
+        let x = column(i);
+        square += x * x.transpose();
+        right += x * f64::from(*r);
+    }
+    let plane = square.cholesky()?.solve(&right);
+    Some(image.iter().enumerate().map(|(i, r)| r - plane.dot(&column(i)) as f32).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::rng::Seed;
+
+    const WIDTH: usize = 120;
+    const HEIGHT: usize = 90;
+
+    /// Unit noise on a plane, with holes, plus `more` of (u, v); a hundred images' statistics.
+    fn pairs(name: &str, rows: f64, more: impl Fn(usize, usize) -> f64) -> Vec<Pairs> {
+        let one = |n: u64| {
+            let mut rng = Seed(n).stream(name);
+            let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+            let shift: Vec<f64> = (0..HEIGHT).map(|_| rows * normal()).collect();
+            let image: Vec<f32> = (0..WIDTH * HEIGHT)
+                .map(|i| {
+                    let (u, v) = (i % WIDTH, i / WIDTH);
+                    let r = normal() + 0.02 * u as f64 + shift[v] + more(u, v);
+                    if u < 20 || (u + v) % 31 == 0 { f32::NAN } else { r as f32 }
+                })
+                .collect();
+            Pairs::of(&image, WIDTH).unwrap()
+        };
+        (0..100).map(one).collect()
+    }
+
+    #[track_caller]
+    fn near(all: &[Pairs], of: impl Fn(&Pairs) -> f64, truth: f64) {
+        let values: Vec<f64> = all.iter().map(of).collect();
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        let error = (square / n).sqrt();
+        assert!((mean - truth).abs() < 4.0 * error, "{mean} +- {error}, not {truth}");
+    }
+
+    #[test]
+    fn white_noise_on_a_plane_shares_nothing() {
+        let all = pairs("pairs/white", 0.0, |_, _| 0.0);
+        near(&all, |p| p.row.unwrap(), 0.0);
+        near(&all, |p| p.column.unwrap(), 0.0);
+        near(&all, |p| p.near, 0.0);
+    }
+
+    #[test]
+    fn what_rows_share_is_theirs_alone() {
+        let all = pairs("pairs/rows", 0.2, |_, _| 0.0);
+        near(&all, |p| p.row.unwrap(), 0.04 * (1.0 - 2.0 / HEIGHT as f64));
+        near(&all, |p| p.column.unwrap(), 0.0);
+        near(&all, |p| p.near, 0.0);
+    }
+}

@@ -1,0 +1,139 @@
+//! What scatters about the mean: how the noise hangs together, how large it is, and its tails.
+
+use super::structure::{Structure, structures};
+use super::tails::{Confusers, tails};
+use super::texture_finding::TextureFinding;
+use super::{ROW_NOISE, texture_findings, window};
+use crate::diagnose::against::noise::{NAMED_LEVEL, NoiseParts};
+use crate::diagnose::case::{Case, MeanResult};
+use crate::diagnose::finding::pixels::{common, measure_tails, terms_of};
+use crate::diagnose::search::outcome::Outcome;
+use crate::diagnose::steps::lattice::Quantisation;
+use crate::diagnose::steps::{Steps, forget_windows, lattice, own_step};
+use crate::terms::{Axis, Basis, PixelContext, Statistic, Term};
+
+/// What scatters about the mean.
+pub struct ScatterResult {
+    /// One number of each kind a view.
+    pub structure: Vec<Structure>,
+    pub lattice: Quantisation,
+    pub textures: Vec<TextureFinding>,
+    pub tails: Option<TextureFinding>,
+    /// Of the variance.
+    pub outcome: Outcome,
+}
+
+impl Case<'_> {
+    pub fn scatter(&mut self, mean: &MeanResult) -> ScatterResult {
+        self.at("searching the noise", "testing the noise again");
+        let camera = &self.recording.sensor.camera;
+        let mut structure = structures(&self.fields, camera, &mean.px);
+        let lattice = lattice(&self.fields, self.recording);
+        let own = Steps::of(&lattice, &structure, &self.fields, self.recording);
+        if own_step(&lattice, self.recording, self.fields[0].scale_px_m).is_none() {
+            forget_windows(&mut structure, &self.fields, &lattice);
+        }
+        let theirs = self.baseline.as_ref().map(|b| b.steps);
+        let extra = |p: &PixelContext| (own.at(p) - theirs.map_or(0.0, |s| s.at(p))).max(0.0);
+        let each = self.level(Self::EACH_LEVEL);
+        let textures = self.textures(&mut structure, &lattice, each);
+        let excess = self.excess_of_rows(&structure, &textures);
+        for (view, [_, of_log_variance]) in self.survey.views.iter_mut().zip(excess) {
+            view.log_variance_inflation *= of_log_variance;
+        }
+        self.survey.compare_frames(&self.fields, common(&structure, &textures, &self.known));
+        let compared =
+            self.baseline.as_mut().is_some_and(|baseline| baseline.variances(&mut self.survey));
+        let range_share = self.range_share(&mean.terms);
+        // A range in place of a depth makes a disparity, and its noise, smaller.
+        let stretch = |p: &PixelContext| {
+            let ray = 1.0 / (1.0 + p.x * p.x + p.y * p.y).sqrt();
+            (1.0 + range_share.clamp(0.0, 1.0) * (ray - 1.0)).powi(2)
+        };
+        self.survey.roughen(&self.fields, &mean.px, extra, stretch);
+        if let Some(baseline) = self.baseline.as_ref().filter(|_| compared) {
+            baseline.inflate_log_variances(&mut self.survey);
+        }
+        let level = self.level(Self::VARIANCE_LEVEL);
+        let sigma = &self.model.sigma;
+        if self.survey.learnt_from[1].is_some() {
+            self.survey.absorb_model_variance_error(&self.known, sigma);
+        }
+        let outcome = self.survey.search_variance(sigma, camera, level, self.options.seed);
+        let terms = terms_of(&outcome, Statistic::Variance);
+        measure_tails(&mut structure, &self.fields, &mean.px, &terms, &self.survey, &self.bench);
+        let alike = self.baseline.as_ref().is_some_and(|b| b.tails_alike(&structure));
+        let holds = |t: &Term| self.holds_tails(t);
+        // The light of single pixels is known to little better than an octave.
+        let by_light = |t: &Term| t.basis.axis() == Axis::Intensity;
+        let uneven = outcome.chosen.iter().any(|c| c.candidate.family.is_none())
+            || terms.iter().chain(&self.known.variance).any(by_light)
+            || self.survey.refits_sigma && !terms.iter().all(holds)
+            || self.known.has_uneven_noise()
+            || !self.known.variance.iter().all(holds);
+        let confusers = Confusers { uneven, simulated: self.baseline.is_some() };
+        let tails = tails(&structure, &self.known, each, confusers)
+            .filter(|t| !alike && self.stands(t.p, each));
+        ScatterResult { structure, lattice, textures, tails, outcome }
+    }
+
+    /// How the noise hangs together; against a simulation, what goes beyond the simulation's.
+    fn textures(
+        &mut self,
+        structure: &mut [Structure],
+        lattice: &Quantisation,
+        each: f64,
+    ) -> Vec<TextureFinding> {
+        let (mut of_parts, mut shrunk) = (Vec::new(), false);
+        if let Some(baseline) = &mut self.baseline {
+            let more = baseline.too_much(structure, each);
+            baseline.remarks.extend(more);
+            let found = self.extended.then(|| self.known.clone());
+            let parts = baseline.noise_parts(structure, each);
+            shrunk = parts.as_ref().is_some_and(NoiseParts::shrink_alike);
+            of_parts = baseline.noise_findings(parts.as_ref(), structure, &self.fields, each);
+            baseline.compare(structure, lattice, &mut self.known);
+            if let Some(found) = found {
+                // The extended model has it, under its name or in its size.
+                let held = |h: &TextureFinding| {
+                    let nameless = h.families.is_empty() && !found.variance.is_empty();
+                    nameless || h.families.iter().any(|id| found.has(id))
+                };
+                of_parts.retain(|h| !held(h));
+                self.known.overrule(&found);
+            }
+        }
+        let mut textures = texture_findings(structure, &self.known, each);
+        textures.retain(|h| self.stands(h.p, each));
+        if shrunk && !textures.iter().any(|h| h.families.contains(&"spatial-correlation")) {
+            textures.extend(window(structure, &self.known, NAMED_LEVEL));
+        }
+        textures.extend(of_parts);
+        textures
+    }
+
+    /// [`Structure::excess_of_rows`] of the views where rows have an error of their own, as was found or is
+    /// known; one where they have none.
+    pub fn excess_of_rows(
+        &self,
+        structure: &[Structure],
+        textures: &[TextureFinding],
+    ) -> Vec<[f64; 2]> {
+        let found = textures.iter().any(|t| t.families.contains(&ROW_NOISE));
+        let alike = found || self.known.has(ROW_NOISE);
+        let views = structure.iter().zip(&self.survey.views);
+        views
+            .map(|(s, v)| if alike { s.excess_of_rows(&v.correlation) } else { [1.0; 2] })
+            .collect()
+    }
+
+    /// A refit that makes sigma much smaller somewhere rests on noise that steps have swallowed, or
+    /// on a cause that was taken for noise: against it everything has tails.
+    fn holds_tails(&self, term: &Term) -> bool {
+        const MUCH: f64 = -1.4;
+        let mut row = Vec::new();
+        let mut tiles = self.survey.views.iter().flat_map(|v| v.tiles.iter());
+        !matches!(term.basis, Basis::Table { .. })
+            || tiles.all(|t| term.value(&t.place, &mut row) > MUCH)
+    }
+}

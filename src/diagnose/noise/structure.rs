@@ -1,0 +1,293 @@
+//! How the noise hangs together: between neighbours, frames, rows, and views.
+//!
+//! Every statistic is one number a view, so that views are the sample.
+
+use rayon::prelude::*;
+
+use super::kurtosis::FourthMoment;
+use super::pairs::Pairs;
+use super::tail_counts::{FEWEST_READINGS, TailCounts};
+use super::texture::{
+    FAR, Filled, LONG_LINE, PROFILE_LAGS, SHORT_LINE, changes, covariance, frame_log_variance,
+    high_passed, moving, pixel_scale, same_pixel, without_lines, without_outliers,
+};
+use crate::camera::Camera;
+use crate::diagnose::options::FRAMES_KEPT;
+use crate::diagnose::views::field::Field;
+use crate::stats::{Correlation, mean, measure_correlation};
+
+/// What one view tells; `None` where it cannot.
+#[derive(Debug, Clone, Default)]
+pub struct Structure {
+    /// Pixels that were looked at.
+    pub pixels: f64,
+    /// Variance of the first frame's rough residual, px^2.
+    pub variance_px2: f64,
+    /// Side of the window that would make the correlation, px.
+    pub window_px: Option<f64>,
+    /// Correlation of pixels 1, 2, 3, ... apart of what changes between frames, beyond that of far
+    /// ones.
+    pub correlation_profile: Option<[f64; PROFILE_LAGS]>,
+    /// Mean correlation of near pixels of what changes between frames.
+    pub neighbour_correlation: Option<f64>,
+    /// Correlation of a pixel with itself 1, 2 and 3 frames later.
+    pub lagged: [Option<f64>; 3],
+    /// Logarithm of each of the first frames' variance over that of the others.
+    pub frame_log_variance: [Option<f64>; FRAMES_KEPT],
+    /// Covariance of the mean residual with the other views' at the same pixels, px^2.
+    pub fixed_px2: Option<f64>,
+    /// The part of it that whole columns and rows share, px^2.
+    pub lines_px2: Option<f64>,
+    /// Variance that a row (a column) of one frame shares, px^2.
+    pub row_px2: Option<f64>,
+    pub column_px2: Option<f64>,
+    /// Of the frames' means about a line in time.
+    pub jitter: Option<Jitter>,
+    /// Residuals beyond four local standard deviations.
+    pub tails: TailCounts,
+    /// Of the residuals near the middle, for tails too weak to count.
+    pub fourth: FourthMoment,
+}
+
+impl Structure {
+    /// Share beyond four local standard deviations, where enough was looked at.
+    pub fn tail_share(&self) -> Option<f64> {
+        (self.tails.n > FEWEST_READINGS).then(|| self.tails.share())
+    }
+
+    /// How many times the variance of a mean, and of a log variance, exceeds what pixels that hang
+    /// together so say, for a shape that the row decides where rows have an error of their own: along one
+    /// all pixels share it, on a target about as wide as it is high.
+    pub fn excess_of_rows(&self, correlation: &Correlation) -> [f64; 2] {
+        let shared = self.row_px2.unwrap_or(0.0).max(0.0) / self.variance_px2.max(1e-12);
+        let along = self.pixels.sqrt();
+        [
+            1.0 + along * shared / correlation.sum.max(1.0),
+            1.0 + along * shared * shared / correlation.sum_of_squares.max(1.0),
+        ]
+    }
+}
+
+/// Frame by frame, the mean residual of the target.
+#[derive(Debug, Clone, Copy)]
+pub struct Jitter {
+    /// Sum of squares about the line, px^2, and its degrees of freedom.
+    pub scatter_px2: f64,
+    pub freedom: f64,
+    /// What the pixels' own noise lets one expect for scatter / freedom, px^2.
+    pub expected_px2: f64,
+    /// Sum of squares that the line explains, px^2.
+    pub trend_px2: f64,
+    /// Velocity along the optical axis, m/s.
+    pub velocity_mps: f64,
+}
+
+/// Measure all views. `bias` has, view by view, what is known to be no noise, px (or is empty).
+pub fn structures(fields: &[Field], camera: &Camera, bias: &[Vec<f32>]) -> Vec<Structure> {
+    let views = beside_bias(fields, bias);
+    let mut all: Vec<Structure> = views.par_iter().map(|(f, b)| structure(f, camera, b)).collect();
+    for (s, Still { fixed_px2, with_lines_px2 }) in all.iter_mut().zip(still(&views, camera)) {
+        s.fixed_px2 = fixed_px2;
+        s.lines_px2 = with_lines_px2.zip(fixed_px2).map(|(all, fixed)| all - fixed);
+    }
+    all
+}
+
+/// [`Structure::fixed_px2`] of all views alone.
+pub fn fixed_px2_by_view(fields: &[Field], camera: &Camera) -> Vec<Option<f64>> {
+    still(&beside_bias(fields, &[]), camera).into_iter().map(|s| s.fixed_px2).collect()
+}
+
+fn beside_bias<'a>(fields: &'a [Field], bias: &'a [Vec<f32>]) -> Vec<(&'a Field, &'a [f32])> {
+    let of = |n: usize| bias.get(n).map_or(&[][..], Vec::as_slice);
+    fields.iter().enumerate().map(|(n, f)| (f, of(n))).collect()
+}
+
+/// Covariance of a view's mean residual with the other views' at the same pixels, px^2: without and
+/// with what whole lines share.
+struct Still {
+    fixed_px2: Option<f64>,
+    with_lines_px2: Option<f64>,
+}
+
+fn still(views: &[(&Field, &[f32])], camera: &Camera) -> Vec<Still> {
+    let mut means: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| pixel_scale(f, b)).collect();
+    let with_lines = across_views(&means);
+    means.par_iter_mut().for_each(|m| *m = without_lines(m, camera.width, SHORT_LINE));
+    let pairs = across_views(&means).into_iter().zip(with_lines);
+    pairs.map(|(fixed_px2, with_lines_px2)| Still { fixed_px2, with_lines_px2 }).collect()
+}
+
+fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
+    let mut s = Structure::default();
+    let frames: Vec<Vec<f32>> =
+        field.first.iter().map(|r| without_outliers(&high_passed(field, r, bias))).collect();
+    let Some(first) = frames.first() else { return s };
+    s.pixels = first.iter().filter(|r| r.is_finite()).count() as f64;
+    s.variance_px2 = mean(first.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
+    let level: Vec<Vec<f32>> =
+        frames.iter().map(|f| without_lines(f, camera.width, SHORT_LINE)).collect();
+    for lag in 1..frames.len().min(4) {
+        let pairs = (0..frames.len() - lag).map(|k| same_pixel(&level[k], &level[k + lag]));
+        s.lagged[lag - 1] = mean(pairs);
+    }
+    let noise = moving(&frames, s.lagged[0]);
+    let lines = without_lines(&noise, camera.width, LONG_LINE);
+    s.frame_log_variance = frame_log_variance(&frames);
+    let images: Vec<Vec<f32>> = field.first.iter().map(|r| field.image(r)).collect();
+    let pairs: Option<Vec<Pairs>> =
+        changes(&images).iter().map(|change| Pairs::of(change, camera.width)).collect();
+    if let Some(pairs) = pairs.filter(|p| !p.is_empty()) {
+        let all = |of: fn(&Pairs) -> Option<f64>| mean(pairs.iter().filter_map(of));
+        (s.row_px2, s.column_px2) = (all(|p| p.row), all(|p| p.column));
+        s.neighbour_correlation = all(|p| Some(p.near / p.power.max(1e-12)));
+        s.correlation_profile =
+            correlation_profile(&changes(&frames), camera, [s.row_px2, s.column_px2]);
+    }
+    let correlation = measure_correlation(&lines, camera.width);
+    // What whole rows share is no window's: it stands in the correlation at every lag.
+    let share = |px2: Option<f64>| (px2.unwrap_or(0.0) / s.variance_px2.max(1e-12)).max(0.0);
+    let along = |correlation_profile: &[f64], share: f64| {
+        let left = |rho: &f64| ((rho - share) / (1.0 - share).max(0.1)).max(0.0);
+        1.0 + 2.0 * correlation_profile[1..].iter().map(left).filter(|r| *r > 0.05).sum::<f64>()
+    };
+    // A box of L px has a correlation sum of L along each axis.
+    let window = along(&correlation.along_u, share(s.row_px2))
+        * along(&correlation.along_v, share(s.column_px2));
+    s.window_px = Some(window.sqrt());
+    s.jitter = jitter(field, &s, window);
+    s
+}
+
+/// Mean product of each view's mean residual with the mean of the others', px^2.
+fn across_views(means: &[Vec<f32>]) -> Vec<Option<f64>> {
+    let n = means.iter().map(Vec::len).max().unwrap_or(0);
+    let mut sum = vec![0f32; n];
+    let mut count = vec![0u16; n];
+    for image in means {
+        for ((s, c), &r) in sum.iter_mut().zip(&mut count).zip(image) {
+            if r.is_finite() {
+                *s += r;
+                *c += 1;
+            }
+        }
+    }
+    let of = |image: &Vec<f32>| {
+        let (mut products, mut n) = (0.0, 0.0);
+        for ((&s, &c), &r) in sum.iter().zip(&count).zip(image) {
+            if r.is_finite() && c > 1 {
+                // Pixels that many views saw say more.
+                let others = f64::from(c - 1);
+                products += f64::from(r) * f64::from(s - r);
+                n += others;
+            }
+        }
+        (n > 1000.0).then(|| products / n)
+    };
+    means.par_iter().map(of).collect()
+}
+
+/// How the frames' means move.
+fn jitter(field: &Field, s: &Structure, correlation_sum: f64) -> Option<Jitter> {
+    let frames: Vec<(f64, f64)> =
+        field.frames.iter().copied().filter(|f| f.1.is_finite()).collect();
+    let n = frames.len() as f64;
+    let (t0, m0) = frames.iter().fold((0.0, 0.0), |(t, m), f| (t + f.0 / n, m + f.1 / n));
+    let (mut tt, mut tm, mut mm) = (0.0, 0.0, 0.0);
+    for (t, m) in frames {
+        tt += (t - t0).powi(2);
+        tm += (t - t0) * (m - m0);
+        mm += (m - m0).powi(2);
+    }
+    let disparity = field.scale_px_m * field.plane.q.z;
+    if n < 3.0 || tt <= 0.0 || disparity <= 0.0 || s.variance_px2 <= 0.0 {
+        return None;
+    }
+    let still = s.lagged[0].unwrap_or(0.0).clamp(0.0, 1.0);
+    let rows = field
+        .pixels
+        .last()
+        .zip(field.pixels.first())
+        .map_or(1.0, |(last, first)| f64::from(last - first) / field.width as f64 + 1.0);
+    let own = s.variance_px2 * (1.0 - still) * correlation_sum / field.measured_pixels().max(1.0);
+    let trend_px2 = tm * tm / tt;
+    let z = field.scale_px_m / disparity;
+    Some(Jitter {
+        scatter_px2: (mm - trend_px2).max(0.0),
+        freedom: n - 2.0,
+        expected_px2: own + s.row_px2.unwrap_or(0.0).max(0.0) / rows,
+        trend_px2,
+        velocity_mps: -tm / tt / disparity * z,
+    })
+}
+
+/// Correlation of pixels 1, 2, 3, ... apart along rows and columns, without what far ones and whole
+/// `lines` share, px^2.
+fn correlation_profile(
+    changes: &[Vec<f32>],
+    camera: &Camera,
+    [row, column]: [Option<f64>; 2],
+) -> Option<[f64; PROFILE_LAGS]> {
+    let filled: Vec<Filled> = changes.iter().map(|c| Filled::of(c)).collect();
+    let over = |lags: &[usize], step: [usize; 2]| {
+        let all: Option<Vec<f64>> =
+            filled.iter().map(|c| covariance(c, camera, lags, step)).collect();
+        mean(all?.into_iter())
+    };
+    // Taking out what is smooth leaves a little of everything everywhere: what a diagonal shows is
+    // no window's.
+    let apart = over(&FAR, [1, 1])?;
+    let power = mean(changes.iter().flatten().map(|&r| f64::from(r).powi(2)))?;
+    let at = |lag: usize| {
+        let along = |step, line: f64| Some(over(&[lag], step)? - apart - line.max(0.0));
+        let both = along([1, 0], row?)? + along([0, 1], column?)?;
+        Some(0.5 * both / power.max(1e-12))
+    };
+    let correlation_profile: Option<Vec<f64>> = (1..=PROFILE_LAGS).map(at).collect();
+    correlation_profile?.try_into().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::rng::Seed;
+
+    /// A square of white pixels whose rows err by half as much each: the variance of a row's mean, and
+    /// of its mean square, over that of as many pixels that have nothing in common.
+    #[test]
+    fn rows_that_err_alike_are_worth_less() {
+        const SIDE: usize = 60;
+        const ROWS: usize = 40_000;
+        const ROW_PX: f64 = 0.5;
+        let mut rng = Seed(3).stream("structure/rows");
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let (mut means, mut squares) = (Vec::new(), Vec::new());
+        for _ in 0..ROWS {
+            let row = ROW_PX * normal();
+            let pixels: Vec<f64> = (0..SIDE).map(|_| row + normal()).collect();
+            means.push(pixels.iter().sum::<f64>() / SIDE as f64);
+            squares.push(pixels.iter().map(|p| p * p).sum::<f64>() / SIDE as f64);
+        }
+        let spread = |all: &[f64]| {
+            let level = all.iter().sum::<f64>() / ROWS as f64;
+            all.iter().map(|x| (x - level).powi(2)).sum::<f64>() / ROWS as f64
+        };
+        let power = 1.0 + ROW_PX * ROW_PX;
+        let apart = [power / SIDE as f64, 2.0 * power * power / SIDE as f64];
+        let truth = [spread(&means) / apart[0], spread(&squares) / apart[1]];
+        let s = Structure {
+            pixels: (SIDE * SIDE) as f64,
+            variance_px2: power,
+            row_px2: Some(ROW_PX * ROW_PX),
+            ..Structure::default()
+        };
+        for (got, truth) in s.excess_of_rows(&Correlation::white()).iter().zip(truth) {
+            // A pixel has itself in common with its row: one of sixty.
+            assert!((got / truth - 1.0).abs() < 0.06, "{got}, by simulation {truth}");
+        }
+        let none = Structure { row_px2: Some(-1e-4), ..s };
+        assert_eq!(none.excess_of_rows(&Correlation::white()), [1.0; 2]);
+    }
+}

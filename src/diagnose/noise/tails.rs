@@ -1,0 +1,230 @@
+//! Residuals beyond four standard deviations: how many, and whether they are too many.
+
+use serde_json::{Map, json};
+
+use super::mixture::Mixture;
+use super::outliers::{Outliers, outliers};
+use super::structure::Structure;
+use super::tail_counts::{GAUSSIAN_TAIL, TAIL_EDGES, TailCounts};
+use super::texture_finding::TextureFinding;
+use super::view_mean::{ViewMean, nats};
+use crate::diagnose::finding::parameters::estimate;
+use crate::diagnose::views::known::KnownTerms;
+use crate::terms::{Axis, Statistic};
+
+/// Standard errors that a model's scale may be off by.
+pub const SURE_SCALE_ERRORS: f64 = 2.0;
+/// A tail is heavy from this many times a Gaussian's share on.
+const HEAVY: f64 = 2.5;
+/// So much more where the size of the noise is uneven.
+const MUCH_HEAVIER: f64 = 6.0;
+/// A wide part that is not wider than this, in two standard errors, is noise of uneven size: light that
+/// is known to an octave at the edges of a print leaves a factor of 1.4 of shot noise.
+const UNEVEN_SCALE: f64 = 1.5;
+/// So heavy it may look without a cause.
+const UNEQUAL: f64 = 1.5;
+
+/// What makes residuals look heavy-tailed where their noise is not.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Confusers {
+    /// The noise is of unequal size where no law was found for it.
+    pub uneven: bool,
+    /// The views are a simulation's, or are compared with one: a simulation by formula lacks the
+    /// unevenness from pixel to pixel that light brings, so that the two differ without heavy tails.
+    pub simulated: bool,
+}
+
+/// Are the residuals' tails heavier than a Gaussian's?
+///
+/// Heavy ones show far out, weak ones in the fourth moment.
+pub fn tails(
+    views: &[Structure],
+    known: &KnownTerms,
+    level: f64,
+    confusers: Confusers,
+) -> Option<TextureFinding> {
+    let mixture = Mixture::of(known);
+    // A simulation's tails are compared elsewhere.
+    if known.has("heavy-tails") && mixture.is_none() {
+        return None;
+    }
+    let own = mixture.map_or(GAUSSIAN_TAIL, |m| m.tail(1.0, SURE_SCALE_ERRORS).max(GAUSSIAN_TAIL));
+    let share = ViewMean::of(views, Structure::tail_share)?;
+    // Patches of unequal noise, and steps of the words, make a tail of a Gaussian too.
+    let much = if confusers.uneven { MUCH_HEAVIER } else { 1.0 };
+    let expected = much * UNEQUAL * own;
+    let mut parameters = Map::new();
+    parameters.insert("share_beyond_4_sigma".into(), json!(share.value));
+    if share.value < much * HEAVY * own || share.p_above(expected) > level {
+        let looked = mixture.is_none() && !confusers.uneven && !confusers.simulated;
+        return if looked { weak(views, level, parameters) } else { None };
+    }
+    let mut counts = TailCounts::default();
+    views.iter().filter(|s| s.tail_share().is_some()).for_each(|s| counts.add(&s.tails));
+    // Where all that strays is gross it has no scale.
+    let mut size_sigma = 4.0 * share.value.sqrt();
+    if let Some(Outliers { fraction, scale }) = outliers(&counts, share.std_error / share.value) {
+        if confusers.uneven && scale[0] - 2.0 * scale[1] < UNEVEN_SCALE {
+            return None;
+        }
+        parameters.insert("fraction".into(), estimate(fraction[0], fraction[1]));
+        parameters.insert("scale".into(), estimate(scale[0], scale[1]));
+        size_sigma = fraction[0].sqrt() * scale[0];
+    }
+    let readings: f64 = views.iter().map(|s| s.tails.n).sum();
+    Some(TextureFinding {
+        families: vec!["heavy-tails"],
+        statistic: Statistic::Distribution,
+        axis: Axis::Residual,
+        interval: [4.0, 2.0 * mean_size(&counts) - 4.0],
+        parameters,
+        size_sigma,
+        p: share.p_above(own),
+        nats: share.value * readings * (share.value / own).ln(),
+        words: None,
+    })
+}
+
+/// The parameter that tells a finding of [`weak`] from one of far errors.
+pub const EXCESS: &str = "excess_kurtosis";
+/// Share of the readings that weak tails are said to be drawn from: a moment gives one number, and the
+/// catalogue's mixture has two.
+const WEAK_FRACTION: f64 = 0.1;
+
+/// Tails too weak to count, by the fourth moment. It is the second test of tails at this level, so that
+/// its chance is doubled.
+fn weak(
+    views: &[Structure],
+    level: f64,
+    mut parameters: Map<String, serde_json::Value>,
+) -> Option<TextureFinding> {
+    let excess = ViewMean::of(views, |s| s.fourth.excess())?;
+    let p = 2.0 * excess.p_above(0.0);
+    if p > level {
+        return None;
+    }
+    // A mixture has 3 f (1 - f) x^2 / (1 + f x)^2, where its wide part has 1 + x times the variance.
+    let root = |k: f64| (k.max(0.0) / (3.0 * WEAK_FRACTION * (1.0 - WEAK_FRACTION))).sqrt();
+    let scale = |k: f64| {
+        let r = root(k);
+        (1.0 + r / (1.0 - WEAK_FRACTION * r).max(WEAK_FRACTION)).sqrt()
+    };
+    let (k, error) = (excess.value, excess.std_error);
+    let scale_error = 0.5 * (scale(k + error) - scale(k - error));
+    parameters.insert(EXCESS.into(), estimate(k, error));
+    parameters.insert("fraction".into(), estimate(WEAK_FRACTION, WEAK_FRACTION));
+    parameters.insert("scale".into(), estimate(scale(k), scale_error));
+    Some(TextureFinding {
+        families: vec!["heavy-tails"],
+        statistic: Statistic::Distribution,
+        axis: Axis::Residual,
+        interval: [2.0, TAIL_EDGES[0]],
+        parameters,
+        // Of the wide part's variance beyond the noise's, the share that is drawn from it.
+        size_sigma: (WEAK_FRACTION * (scale(k).powi(2) - 1.0)).sqrt(),
+        p,
+        nats: nats(&excess, 0.0),
+        words: None,
+    })
+}
+
+/// Of what lies between the edges, a bin's middle standing for it; at least five.
+fn mean_size(counts: &TailCounts) -> f64 {
+    let all: f64 = counts.between.iter().sum();
+    let middles = TAIL_EDGES.windows(2).map(|w| 0.5 * (w[0] + w[1]));
+    let sum: f64 = counts.between.iter().zip(middles).map(|(n, x)| n * x).sum();
+    if all > 0.0 { sum / all } else { 5.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::noise::kurtosis::FourthMoment;
+    use crate::diagnose::noise::tail_counts::tail;
+    use crate::rng::Seed;
+    use rand_distr::{Distribution, StandardNormal, StudentT};
+
+    const VIEWS: usize = 14;
+
+    /// A Gaussian's own share beyond four deviations is no tail; a tenth of a per cent is one.
+    #[test]
+    fn tails_are_heavy_when_most_views_have_them() {
+        let tailed = |share: f64, of: usize| -> Vec<Structure> {
+            let view = |k: usize| {
+                let (tail, n) = (if k < of { share } else { GAUSSIAN_TAIL }, 50_000.0);
+                // As exponential as a tail of matches gone astray.
+                let between = [0.4, 0.24, 0.2, 0.12, 0.03].map(|part| part * n * tail);
+                let tails = TailCounts { n, beyond: n * tail, between };
+                Structure { tails, ..Structure::default() }
+            };
+            (0..VIEWS).map(view).collect()
+        };
+        assert!(
+            tails(
+                &tailed(GAUSSIAN_TAIL, VIEWS),
+                &KnownTerms::default(),
+                1e-3,
+                Confusers::default()
+            )
+            .is_none()
+        );
+        assert!(
+            tails(&tailed(2e-3, 4), &KnownTerms::default(), 1e-3, Confusers::default()).is_none(),
+            "in a few views only"
+        );
+        let found = tails(&tailed(2e-3, VIEWS), &KnownTerms::default(), 1e-3, Confusers::default())
+            .expect("a tail");
+        assert_eq!(found.families, ["heavy-tails"]);
+        let fraction = found.parameters["fraction"]["value"].as_f64().expect("a number");
+        assert!(fraction > 2e-3 && fraction < 0.2, "{fraction}");
+        let mut known = KnownTerms::default();
+        known.learn("heavy-tails", "fraction", fraction);
+        assert!(tails(&tailed(2e-3, VIEWS), &known, 1e-3, Confusers::default()).is_none());
+    }
+
+    /// Weak tails, with hardly anything far out: a Student's t is seen by its fourth moment unless the
+    /// noise is uneven anyway, or a simulation's; a Gaussian and a Gaussian of uneven size are not.
+    #[test]
+    fn weak_tails_are_seen_by_the_fourth_moment() {
+        const SIZE: [usize; 2] = [200, 150];
+        let student = StudentT::new(80.0).expect("a distribution");
+        let views = |stream: &str, heavy: bool, uneven: f64| -> Vec<Structure> {
+            let mut rng = Seed(11).stream(stream);
+            let view = |_| {
+                let mut pixel = |i: usize| -> f32 {
+                    let x: f64 = if heavy {
+                        student.sample(&mut rng)
+                    } else {
+                        StandardNormal.sample(&mut rng)
+                    };
+                    (x * (1.0 + uneven * ((i % SIZE[0]) as f64 / 25.0).sin())) as f32
+                };
+                let image: Vec<f32> = (0..SIZE[0] * SIZE[1]).map(&mut pixel).collect();
+                Structure {
+                    tails: tail(&image, SIZE[0]),
+                    fourth: FourthMoment::of(&image, SIZE[0]),
+                    ..Structure::default()
+                }
+            };
+            (0..VIEWS).map(view).collect()
+        };
+        let told = |views: &[Structure], uneven: bool, simulated: bool| {
+            let confusers = Confusers { uneven, simulated };
+            tails(views, &KnownTerms::default(), 1e-3, confusers)
+        };
+        let heavy = views("student", true, 0.0);
+        let found = told(&heavy, false, false).expect("weak tails");
+        assert_eq!(found.families, ["heavy-tails"]);
+        let [fraction, scale, excess] = ["fraction", "scale", EXCESS]
+            .map(|name| found.parameters[name]["value"].as_f64().expect("a number"));
+        // The mixture that is told has the excess that was measured.
+        let x = fraction * (scale * scale - 1.0);
+        let had = 3.0 * (1.0 - fraction) / fraction * (x / (1.0 + x)).powi(2);
+        assert!((had / excess - 1.0).abs() < 1e-3, "{had} {excess}");
+        assert!(told(&heavy, true, false).is_none(), "of a noise that is uneven anyway");
+        assert!(told(&heavy, false, true).is_none(), "of a simulation");
+        assert!(told(&[], false, false).is_none());
+        assert!(told(&views("gaussian", false, 0.0), false, false).is_none());
+        assert!(told(&views("uneven", false, 0.3), false, false).is_none());
+    }
+}

@@ -1,0 +1,203 @@
+//! Images of the noise: what is smooth, still or shared by a line taken out of them, and how their
+//! pixels hang together.
+
+use std::borrow::Cow;
+use std::f32::consts::FRAC_1_SQRT_2;
+
+use crate::camera::Camera;
+use crate::diagnose::options::FRAMES_KEPT;
+use crate::diagnose::views::box_sums::high_pass;
+use crate::diagnose::views::field::Field;
+use crate::stats::{MAD_TO_SIGMA, median_in_place};
+
+/// Frames that resemble one another more than this have little noise of their own.
+const STILL: f64 = 0.6;
+
+/// An image of the noise as it changes from frame to frame, so that nothing that stands still is
+/// taken for it; the first frame where there is but one, or where nearly all stands still.
+/// `next` is the correlation of a frame with the next.
+pub fn moving(frames: &[Vec<f32>], next: Option<f64>) -> Vec<f32> {
+    match frames {
+        [a, b, ..] if next.is_none_or(|c| c < STILL) => change(a, b),
+        _ => frames[0].clone(),
+    }
+}
+
+/// What changes between a view's frames, as orthogonal images that have one frame's variance each.
+pub fn changes(frames: &[Vec<f32>]) -> Vec<Vec<f32>> {
+    match frames {
+        [a, b, c, d, ..] => {
+            let sum = |a: &[f32], b: &[f32]| -> Vec<f32> {
+                a.iter().zip(b).map(|(a, b)| (a + b) * FRAC_1_SQRT_2).collect()
+            };
+            vec![change(a, b), change(c, d), change(&sum(a, b), &sum(c, d))]
+        }
+        [a, b, ..] => vec![change(a, b)],
+        _ => Vec::new(),
+    }
+}
+
+/// From one frame to another, with the variance of one.
+fn change(a: &[f32], b: &[f32]) -> Vec<f32> {
+    a.iter().zip(b).map(|(a, b)| (b - a) * FRAC_1_SQRT_2).collect()
+}
+
+/// Residuals as an image, px, without what is smooth and what is known.
+pub fn high_passed(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
+    field.high_passed(&without_bias(residuals, bias))
+}
+
+/// Residuals less what is known of them, which may be nothing.
+pub fn without_bias<'a>(residuals: &'a [f32], bias: &[f32]) -> Cow<'a, [f32]> {
+    if bias.is_empty() {
+        return Cow::Borrowed(residuals);
+    }
+    residuals.iter().zip(bias).map(|(r, b)| r - b).collect()
+}
+
+/// The view's mean, px, without what is known, gross errors, and all that does not change from pixel
+/// to pixel.
+pub fn pixel_scale(field: &Field, bias: &[f32]) -> Vec<f32> {
+    let image = without_outliers(&high_passed(field, &field.mean, bias));
+    high_pass(&image, field.width, field.height, PIXEL_BOX)
+}
+
+/// Without gross errors.
+pub fn without_outliers(image: &[f32]) -> Vec<f32> {
+    let mut sizes: Vec<f32> = image.iter().filter(|r| r.is_finite()).map(|r| r.abs()).collect();
+    let limit = 6.0 * MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
+    let kept = |r: &f32| if limit > 0.0 && r.abs() > limit { f32::NAN } else { *r };
+    image.iter().map(kept).collect()
+}
+
+/// Rows and columns shorter than this are left as they are, px: their mean is mostly noise.
+pub const LONG_LINE: usize = 150;
+/// The same where a pixel is held against itself, and a line's mean only stands in the way.
+pub const SHORT_LINE: usize = 30;
+
+/// Minus the mean of each long row and column: noise that a row shares is no window's.
+pub fn without_lines(image: &[f32], width: usize, least: usize) -> Vec<f32> {
+    let mut out = image.to_vec();
+    let level = |sum: f64, n: usize| if n >= least { (sum / n as f64) as f32 } else { 0.0 };
+    let mut columns = vec![(0.0, 0); width];
+    for row in out.chunks_exact_mut(width.max(1)) {
+        let (mut sum, mut n) = (0.0, 0);
+        for r in row.iter().filter(|r| r.is_finite()) {
+            sum += f64::from(*r);
+            n += 1;
+        }
+        let mean = level(sum, n);
+        for (r, (sum, n)) in row.iter_mut().zip(&mut columns) {
+            *r -= mean;
+            if r.is_finite() {
+                *sum += f64::from(*r);
+                *n += 1;
+            }
+        }
+    }
+    let means: Vec<f32> = columns.into_iter().map(|(sum, n)| level(sum, n)).collect();
+    for row in out.chunks_exact_mut(width.max(1)) {
+        row.iter_mut().zip(&means).for_each(|(r, mean)| *r -= mean);
+    }
+    out
+}
+
+/// Correlation of two images, pixel by pixel.
+pub fn same_pixel(a: &[f32], b: &[f32]) -> f64 {
+    let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
+    for (&a, &b) in a.iter().zip(b) {
+        let (a, b) = (f64::from(a), f64::from(b));
+        if (a * b).is_finite() {
+            ab += a * b;
+            aa += a * a;
+            bb += b * b;
+        }
+    }
+    if aa * bb > 0.0 { ab / (aa * bb).sqrt() } else { f64::NAN }
+}
+
+/// A pixel's own error changes from pixel to pixel: the box whose mean is taken out, px.
+const PIXEL_BOX: usize = 7;
+
+/// Lags well beyond a Kinect's window, px.
+pub const FAR: [usize; 12] = [20, 22, 24, 27, 30, 33, 36, 39, 42, 46, 50, 54];
+/// Lags that a window's side is read from, px.
+pub const PROFILE_LAGS: usize = 16;
+
+/// An image with nothing where there is none: sums run over it without a question.
+pub struct Filled {
+    value: Vec<f32>,
+    there: Vec<u8>,
+}
+
+impl Filled {
+    pub fn of(image: &[f32]) -> Self {
+        Filled {
+            value: image.iter().map(|r| if r.is_finite() { *r } else { 0.0 }).collect(),
+            there: image.iter().map(|r| u8::from(r.is_finite())).collect(),
+        }
+    }
+}
+
+/// Mean product of pixels that are so far apart along `step`, px^2.
+pub fn covariance(
+    image: &Filled,
+    camera: &Camera,
+    lags: &[usize],
+    step: [usize; 2],
+) -> Option<f64> {
+    let (w, h) = (camera.width, camera.height);
+    let (mut sum, mut n) = (0.0, 0u64);
+    for lag in lags {
+        let (du, dv) = (lag * step[0], lag * step[1]);
+        let across = w.saturating_sub(du);
+        for v in 0..h.saturating_sub(dv) {
+            let near = v * w..v * w + across;
+            let far = (v + dv) * w + du..(v + dv) * w + du + across;
+            sum += products(&image.value[near.clone()], &image.value[far.clone()]);
+            let pairs = image.there[near].iter().zip(&image.there[far]);
+            n += u64::from(pairs.map(|(a, b)| u32::from(a & b)).sum::<u32>());
+        }
+    }
+    (n > 1000).then(|| sum / n as f64)
+}
+
+/// Sum of products, in lanes that a processor adds at once.
+fn products(a: &[f32], b: &[f32]) -> f64 {
+    const LANES: usize = 8;
+    let mut lanes = [0.0f64; LANES];
+    let (a, b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest = a.remainder().iter().zip(b.remainder());
+    let rest: f64 = rest.map(|(a, b)| f64::from(a * b)).sum();
+    for (a, b) in a.zip(b) {
+        for ((lane, a), b) in lanes.iter_mut().zip(a).zip(b) {
+            *lane += f64::from(a * b);
+        }
+    }
+    lanes.iter().sum::<f64>() + rest
+}
+
+/// Logarithm of each frame's mean square over the others', of rough residuals. What frames have in
+/// common, still or slowly changing, is in all of them alike. Nothing with fewer than three frames,
+/// of which none can be blamed.
+pub fn frame_log_variance(frames: &[Vec<f32>]) -> [Option<f64>; FRAMES_KEPT] {
+    let mut all = [None; FRAMES_KEPT];
+    let n = frames.len().min(FRAMES_KEPT);
+    if n < 3 {
+        return all;
+    }
+    let mut squares = [0.0; FRAMES_KEPT];
+    for k in 0..frames[0].len() {
+        let at: [f64; FRAMES_KEPT] =
+            std::array::from_fn(|j| frames.get(j).map_or(0.0, |f| f64::from(f[k]).powi(2)));
+        if at.iter().sum::<f64>().is_finite() {
+            squares.iter_mut().zip(at).for_each(|(square, r)| *square += r);
+        }
+    }
+    let whole: f64 = squares.iter().sum();
+    for (one, own) in all.iter_mut().zip(squares).take(n) {
+        let rest = (whole - own) / (n - 1) as f64;
+        *one = (own > 0.0 && rest > 0.0).then(|| (own / rest).ln());
+    }
+    all
+}

@@ -1,0 +1,60 @@
+//! A mismatch of the noise's structure.
+
+use serde_json::Map;
+
+use super::view_mean::{ViewMean, nats};
+use crate::diagnose::finding::parameters::one;
+use crate::diagnose::options::MIN_SIZE;
+use crate::terms::{Axis, Statistic};
+
+/// A mismatch of the noise's structure.
+#[derive(Debug, Clone)]
+pub struct TextureFinding {
+    /// Best first; more than one when they cannot be told apart. Empty: no name.
+    pub families: Vec<&'static str>,
+    pub statistic: Statistic,
+    pub axis: Axis,
+    pub interval: [f64; 2],
+    pub parameters: Map<String, serde_json::Value>,
+    /// In units of the noise's standard deviation.
+    pub size_sigma: f64,
+    pub p: f64,
+    /// Roughly, nats a recording.
+    pub nats: f64,
+    pub words: Option<String>,
+}
+
+/// Variance that pixels or lines share, as it is looked for.
+pub struct Shared {
+    pub families: Vec<&'static str>,
+    pub statistic: Statistic,
+    pub axis: Axis,
+    /// What the model has of it, px^2.
+    pub expected_px2: f64,
+    /// Of all variance: a smaller share is not worth a word.
+    pub least: f64,
+    pub words: Option<&'static str>,
+}
+
+impl Shared {
+    /// `m` of the noise's `variance_px2`, both px^2.
+    pub fn found(self, m: &ViewMean, variance_px2: f64, level: f64) -> Option<TextureFinding> {
+        let p = m.p_above(self.expected_px2);
+        let share = (m.value - self.expected_px2) / variance_px2.max(1e-12);
+        let sigma = m.value.max(0.0).sqrt();
+        (p < level && share > self.least).then(|| TextureFinding {
+            families: self.families,
+            statistic: self.statistic,
+            axis: self.axis,
+            interval: [0.0, 0.0],
+            parameters: one("sigma_px", sigma, 0.5 * m.std_error / sigma.max(1e-9)),
+            size_sigma: share.sqrt(),
+            p,
+            nats: nats(m, self.expected_px2),
+            words: self.words.map(String::from),
+        })
+    }
+}
+
+/// A share of the variance is not told whose square root is smaller than a bias must be.
+pub const LEAST_VARIANCE_SHARE: f64 = MIN_SIZE * MIN_SIZE;

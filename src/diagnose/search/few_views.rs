@@ -1,0 +1,297 @@
+//! What shows in a few of the views and not in the others.
+//!
+//! A fit to all views says nothing of a cause that some of them have: the others outvote it. So each
+//! candidate is also fitted to the views that show it best, one, two, up to nearly half of them, and pays
+//! for the choice: the logarithm of how many such sets there are.
+
+use nalgebra::{DMatrix, DVector};
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+use statrs::function::factorial::ln_binomial;
+
+use super::candidate::{Candidate, RECALIBRATE};
+use super::evidence::{self, Evidence, root};
+use super::noise_gains::{MIN_EXCESS, NoiseGains};
+use super::outcome::Outcome;
+use super::prepared::{together, without};
+use super::rules::Rules;
+use super::view_levels::scatter_of_most;
+use super::view_worth::{doubted, left_over};
+use crate::diagnose::diagnosis::{Alternative, Finding, Status};
+use crate::diagnose::finding::along::Along;
+use crate::diagnose::finding::naming::physics;
+use crate::diagnose::finding::other_findings::named;
+use crate::diagnose::finding::scene::{Scene, size};
+use crate::diagnose::views::samples::{ViewData, coarser};
+use crate::diagnose::views::tiles::SIDE;
+use crate::rng::{Seed, Stream};
+use crate::stats::{MAD_TO_SIGMA, quantile};
+use crate::terms::{Basis, PixelContext, Statistic, Term};
+
+/// Candidates with more columns fit single views too freely.
+const MAX_COLUMNS: usize = 16;
+/// Simulations of the null; its tail is an exponential's.
+const REPLICATES: u64 = 200;
+/// What all views share explains at most so many times as much: what it misses in some views is its
+/// own shape, badly met.
+const BESIDE_ALL: f64 = 10.0;
+/// What lies behind a target may be taken for its rim so far from the edge, px, and no other view
+/// outvotes it.
+const RIM_PX: f64 = SIDE as f64;
+/// A share of the weight that keeps a sample, and lets it say nothing.
+const NEXT_TO_NONE: f64 = 1e-9;
+/// A name must explain this share of what the best curve does: a few views show little of a shape.
+const NAME_ADEQUATE: f64 = 0.9;
+
+/// A candidate in the views that show it best.
+struct Best {
+    /// Nats of a common fit to them, what the choice of them costs taken off.
+    gain: f64,
+    views: Vec<usize>,
+    beta: DVector<f64>,
+}
+
+/// One candidate's information, view by view, and how much more than noise its views scatter.
+struct Tried<'a> {
+    candidate: &'a Candidate,
+    evidence: Vec<Evidence>,
+    factors: Vec<DMatrix<f64>>,
+    scatter: f64,
+    prior: f64,
+}
+
+/// Best common fit of these columns to a few views.
+fn best(views: &[Evidence], prior: f64) -> Option<Best> {
+    let (n, k) = (views.len(), views.first()?.b.len());
+    let fit = |e: &Evidence| {
+        let beta = evidence::fit(std::slice::from_ref(e), prior)?;
+        Some((0.5 * beta.dot(&e.b), beta))
+    };
+    let mut order = Vec::with_capacity(n);
+    for (v, e) in views.iter().enumerate() {
+        order.push((fit(e)?.0, v));
+    }
+    order.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut sum = Evidence { a: DMatrix::zeros(k, k), b: DVector::zeros(k) };
+    let mut best: Option<Best> = None;
+    for count in 1..=(n - 1) / 2 {
+        let next = &views[order[count - 1].1];
+        sum.a += &next.a;
+        sum.b += &next.b;
+        let (nats, beta) = fit(&sum)?;
+        let gain = nats - ln_binomial(n as u64, count as u64) - 0.5 * k as f64;
+        if best.as_ref().is_none_or(|b| gain > b.gain) {
+            let views = order[..count].iter().map(|o| o.1).collect();
+            best = Some(Best { gain, views, beta });
+        }
+    }
+    best
+}
+
+impl<'a> Tried<'a> {
+    fn of(candidate: &'a Candidate, evidence: Vec<Evidence>, prior: f64) -> Option<Self> {
+        let k = candidate.basis.count();
+        let factors = evidence.iter().map(|e| root(&e.a)).collect();
+        let mut squares = Vec::new();
+        for e in evidence.iter().filter(|e| e.a.trace() > 0.0) {
+            squares.push(evidence::fit(std::slice::from_ref(e), prior)?.dot(&e.b));
+        }
+        // A quarter of the views is as noise is, whatever nearly half of them have (the quartile of chi
+        // squared by Wilson and Hilferty 1931).
+        let (k, spread) = (k as f64, 2.0 / (9.0 * k as f64));
+        let expected = k * (1.0 - spread - spread.sqrt() / MAD_TO_SIGMA).powi(3);
+        let usual = quantile(&mut squares, 0.25).unwrap_or(0.0);
+        let scatter = (usual / expected).max(1.0);
+        Some(Tried { candidate, evidence, factors, scatter, prior })
+    }
+
+    fn best(&self) -> Option<Best> {
+        let mut best = best(&self.evidence, self.prior)?;
+        best.gain /= self.scatter;
+        Some(best)
+    }
+
+    /// Gain of nothing but noise.
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        let noise = |(e, root): (&Evidence, &DMatrix<f64>)| {
+            let white = DVector::from_fn(root.ncols(), |_, _| StandardNormal.sample(rng));
+            Evidence { a: e.a.clone(), b: root * white }
+        };
+        let evidence: Vec<Evidence> = self.evidence.iter().zip(&self.factors).map(noise).collect();
+        best(&evidence, self.prior).map_or(0.0, |b| b.gain)
+    }
+}
+
+/// View by view, nothing where a view says nothing; where a view's worth is `doubted`, it is worth the less
+/// the more these columns leave.
+fn evidence_of(
+    basis: &Basis,
+    data: &[ViewData],
+    doubted: &[f64],
+    prior: f64,
+) -> Option<Vec<Evidence>> {
+    let nothing = || Evidence::sum(basis.count(), 0.0, []);
+    let of = |view: &ViewData| together(view, &[basis]).unwrap_or_else(nothing);
+    let mut all: Vec<Evidence> = data.par_iter().map(of).collect();
+    for ((e, view), doubt) in all.iter_mut().zip(data).zip(doubted).filter(|(_, d)| **d > 1.0) {
+        let beta = evidence::fit(std::slice::from_ref(e), prior)?;
+        let left = left_over(view, basis, beta.as_slice()).clamp(1.0, *doubt);
+        e.a /= left;
+        e.b /= left;
+    }
+    Some(all)
+}
+
+/// The strongest such cause beside what all views share, if noise does not bring as much; `excess` is how
+/// many times less sure each view is than its samples say, where whole lines err alike.
+pub fn few_views(
+    scene: &Scene<'_>,
+    fine: &[ViewData],
+    candidates: &[Candidate],
+    outcome: &Outcome,
+    rules: &Rules,
+    excess: &[f64],
+    seed: Seed,
+) -> Option<Finding> {
+    let chosen = outcome.chosen.iter().enumerate();
+    let shared: Vec<(&Basis, Vec<f64>)> =
+        chosen.map(|(k, c)| (&c.candidate.basis, outcome.coefficients(k))).collect();
+    let of_mean = scene.statistic == Statistic::Bias;
+    let doubted = if of_mean { doubted(scene.survey) } else { vec![1.0; fine.len()] };
+    let alone = |(n, v): (usize, &ViewData)| {
+        let share = |p: &PixelContext| if p.edge < RIM_PX { NEXT_TO_NONE } else { 1.0 };
+        let sure = doubted[n] / excess.get(n).unwrap_or(&1.0);
+        let weight = v.places.iter().map(share).zip(&v.weight).map(|(s, w)| s * w * sure).collect();
+        ViewData { response: without(v, &shared), weight, ..v.clone() }
+    };
+    let mut fine: Vec<ViewData> = fine.iter().enumerate().map(alone).collect();
+    if !of_mean && let Some(whole) = fine.first().and_then(|v| v.precision.first()) {
+        let precision = 1.0 / scatter_of_most(&fine, 1.0 / whole);
+        fine.iter_mut().for_each(|v| v.precision[0] = precision);
+    }
+    let coarse: Vec<ViewData> =
+        if of_mean { fine.par_iter().map(coarser).collect() } else { fine.clone() };
+    let tried: Vec<Tried<'_>> = candidates
+        .par_iter()
+        .filter(|c| c.family != Some(RECALIBRATE) && c.basis.count() <= MAX_COLUMNS)
+        // Seams are many, and nearly the same.
+        .filter(|c| c.family.is_some() || !matches!(c.basis, Basis::Curve { nodes: 2, .. }))
+        .filter_map(|c| {
+            let as_fine = c.basis.is_fine() || c.basis.of_column_alone();
+            let data = if as_fine { &fine } else { &coarse };
+            Tried::of(c, evidence_of(&c.basis, data, &doubted, rules.prior)?, rules.prior)
+        })
+        .collect();
+    let mut all: Vec<(&Candidate, Best)> =
+        tried.par_iter().filter_map(|t| Some((t.candidate, t.best()?))).collect();
+    all.retain(|(candidate, best)| candidate.agrees(best.beta.as_slice()));
+    all.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
+    let most = all.first()?.1.gain;
+    let shared: f64 = outcome.chosen.iter().map(|c| c.gain.max(0.0)).sum();
+    if most * BESIDE_ALL < shared {
+        return None;
+    }
+    let noise = NoiseGains::simulated(REPLICATES, MIN_EXCESS, |replicate| {
+        let mut rng = seed.stream(&format!("few-views/null/{replicate}"));
+        tried.iter().map(|t| t.draw(&mut rng)).fold(f64::NEG_INFINITY, f64::max)
+    });
+    if most < noise.threshold(rules.level) {
+        return None;
+    }
+    let name = all.iter().find(|(c, b)| c.family.is_some() && b.gain > NAME_ADEQUATE * most);
+    let (candidate, best) = name.or(all.first())?;
+    Some(report(scene, candidate, best, noise.p(most)))
+}
+
+fn report(scene: &Scene<'_>, candidate: &Candidate, best: &Best, p: f64) -> Finding {
+    let (statistic, axis) = (scene.statistic, candidate.basis.axis());
+    let coefficients = best.beta.as_slice().to_vec();
+    let term = Term { statistic, basis: candidate.basis.clone(), coefficients };
+    let mut values = scene.values(&term);
+    let others = (0..values.len()).filter(|v| !best.views.contains(v)).collect::<Vec<_>>();
+    others.into_iter().for_each(|v| values[v].iter_mut().for_each(|x| *x = 0.0));
+    let status = if candidate.family.is_some() { Status::Named } else { Status::Unexplained };
+    let mut names: Vec<&str> =
+        best.views.iter().map(|&v| scene.survey.views[v].name.as_str()).collect();
+    names.sort_unstable();
+    let only = format!("only in the views {}", names.join(", "));
+    let effect = candidate.family;
+    let along = Along::of(scene, &candidate.basis);
+    let finding = named(effect.unwrap_or_default(), statistic, axis);
+    Finding {
+        status,
+        effect,
+        alternatives: effect
+            .map(|effect| Alternative { effect, probability: None })
+            .into_iter()
+            .collect(),
+        interval: along.interval(scene, &values),
+        share: best.gain,
+        size: size(scene, &values),
+        p_adjusted: Some(p),
+        physics: physics(status, effect, statistic, axis, Some(&only))
+            + &if effect.is_some() { format!(" It shows {only}.") } else { String::new() },
+        shape: Some(only),
+        ..finding
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::terms::{Coordinate, Modulation};
+
+    fn views(name: &str, size: f64, of: usize) -> Vec<Evidence> {
+        let mut rng = Seed(7).stream(name);
+        let one = |v: usize| {
+            let (a, noise): (f64, f64) = (100.0, StandardNormal.sample(&mut rng));
+            let beta = if v < of { size } else { 0.0 };
+            let b = DVector::from_element(1, a * beta + a.sqrt() * noise);
+            Evidence { a: DMatrix::from_element(1, 1, a), b }
+        };
+        (0..18).map(one).collect()
+    }
+
+    /// Three views of eighteen show what is worth 150 nats in them: 0.5 a beta^2 each.
+    #[test]
+    fn the_views_that_show_it_are_found() {
+        let mut found = best(&views("few-views/three", 1.0, 3), 0.1).unwrap();
+        found.views.sort_unstable();
+        assert_eq!(found.views, [0, 1, 2]);
+        assert!((found.beta[0] - 1.0).abs() < 0.25 && found.gain > 90.0, "{}", found.gain);
+    }
+
+    /// Eight views of eighteen are few as well. Of the 390 nats no more than three quarters are lost: the
+    /// quartile of all is the median of the ten that are noise, four times what it is taken for.
+    #[test]
+    fn nearly_half_of_the_views_are_few() {
+        let slope = Candidate::curve(Basis::powers(Coordinate::Column, 1, Modulation::One));
+        let tried = Tried::of(&slope, views("few-views/half", 1.0, 8), 0.1).unwrap();
+        let found = tried.best().unwrap();
+        assert_eq!((found.views.len(), found.gain > 90.0), (8, true), "{}", found.gain);
+    }
+
+    /// A view without a reading takes no part, and keeps no other from it.
+    #[test]
+    fn a_view_that_says_nothing_leaves_the_others_alone() {
+        let place = |k: usize| PixelContext { u: k as f64, side: 4.0, ..Default::default() };
+        let view = |weight: f64| ViewData {
+            places: (0..9).map(place).collect(),
+            response: (0..9).map(f64::from).collect(),
+            weight: vec![weight; 9],
+            nuisance: vec![1.0; 9],
+            precision: vec![0.0],
+            ..ViewData::default()
+        };
+        let slope = Basis::powers(Coordinate::Column, 1, Modulation::One);
+        let all = evidence_of(&slope, &[view(1.0), view(0.0)], &[1.0; 2], 1.0).unwrap();
+        assert!(all[0].a.trace() > 1.0 && all[1].a.trace() == 0.0, "{all:?}");
+    }
+
+    #[test]
+    fn noise_brings_less_than_the_choice_costs() {
+        let gain = |n: u64| best(&views(&format!("few-views/{n}"), 0.0, 0), 0.1).unwrap().gain;
+        let above = (0..200).filter(|&n| gain(n) > 5.0).count();
+        assert!(above <= 6, "{above} of 200 above 5 nats");
+    }
+}

@@ -1,0 +1,290 @@
+//! The search for missing terms: best first, each step judged on held-out views against what
+//! noise alone would have brought.
+pub mod bias;
+pub mod candidate;
+pub mod choose;
+pub mod evidence;
+pub mod few_views;
+pub mod judge;
+pub mod layer_search;
+pub mod noise_gains;
+pub mod null;
+pub mod outcome;
+pub mod posterior;
+pub mod prepared;
+pub mod rows;
+pub mod rules;
+pub mod variance;
+pub mod view_levels;
+pub mod view_worth;
+
+use rayon::prelude::*;
+
+use crate::diagnose::views::samples::ViewData;
+use crate::rng::Seed;
+use crate::terms::Basis;
+use candidate::Candidate;
+use choose::Choice;
+use evidence::{Evidence, Gain, fit, gain};
+use judge::{Judge, Judged, looks};
+use noise_gains::NoiseGains;
+use null::Null;
+use outcome::{Chosen, Look, Outcome};
+use prepared::{Grouping, Patches, Prepared, evidence_of_bases, prepare};
+use rules::Rules;
+
+/// A later term must bring this share of what the first brought: what is less is the first one's
+/// own shape, badly met.
+pub const LEAST_SHARE_OF_GAIN: f64 = 0.005;
+
+/// Search a layer. `coarse` has the same views in larger patches, for shapes that do not change
+/// within them. A term `beside` is fitted with every other, whatever it brings: what it can take up is
+/// attributed to no other term. It stays in, last of the chosen.
+pub fn search(
+    fine: &[ViewData],
+    coarse: &[ViewData],
+    candidates: &[Candidate],
+    beside: Option<Candidate>,
+    rules: &Rules,
+    seed: Seed,
+) -> Outcome {
+    let mut layer = Layer {
+        fine,
+        coarse,
+        groups: fine.par_iter().map(Grouping::all).collect(),
+        candidates,
+        rules,
+        noise: None,
+        looks: Vec::new(),
+        largest: 0.0,
+        pinned: None,
+        seed,
+    };
+    let mut chosen: Vec<Chosen> = Vec::new();
+    layer.pinned = beside.map(|candidate| layer.pin(candidate));
+    let mut remaining = None;
+    while let Some(next) = layer.step(&chosen) {
+        let little =
+            chosen.first().is_some_and(|first| next.gain < LEAST_SHARE_OF_GAIN * first.gain);
+        if little || chosen.len() >= rules.max_terms {
+            remaining = Some(next);
+            break;
+        }
+        layer.largest = layer.largest.max(next.rms);
+        let nameless = next.candidate.family.is_none();
+        if nameless && chosen.iter().all(|c| c.candidate.family.is_some()) {
+            layer.look_back(&mut chosen);
+        }
+        chosen.push(next);
+    }
+    if chosen.iter().all(|c| c.candidate.family.is_some()) {
+        layer.look_back(&mut chosen);
+    }
+    layer.refine_maps(&mut chosen);
+    chosen.extend(layer.pinned.clone());
+    let evidence = layer.evidence_of(&bases(&chosen));
+    let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
+    let noise = layer.noise.unwrap_or_default();
+    let looks = layer.looks;
+    Outcome { chosen, looks, fit, evidence, noise, remaining, ..Outcome::default() }
+}
+
+struct Layer<'a> {
+    fine: &'a [ViewData],
+    coarse: &'a [ViewData],
+    /// Of every view's fine samples.
+    groups: Vec<Vec<Grouping>>,
+    candidates: &'a [Candidate],
+    rules: &'a Rules,
+    noise: Option<NoiseGains>,
+    looks: Vec<Look>,
+    /// Root mean square of the largest term so far.
+    largest: f64,
+    /// Fitted beside everything.
+    pinned: Option<Chosen>,
+    seed: Seed,
+}
+
+/// Candidates are tried on this.
+struct Trial<'a> {
+    beside: Vec<Chosen>,
+    views: Vec<Prepared<'a>>,
+    /// Columns of what is fitted beside, and what those bring without the candidate on fine and on
+    /// coarse patches.
+    settled: usize,
+    base: [Gain; 2],
+    judge: Judge<'a>,
+}
+
+impl Trial<'_> {
+    /// `None` for a name that is in already: what its shape misses is left to the curves.
+    fn judged(&self, c: &Candidate) -> Option<Judged> {
+        let taken = |old: &Chosen| c.family.is_some() && old.candidate.family == c.family;
+        if self.beside.iter().any(taken) {
+            return None;
+        }
+        let (m, prior) = (self.settled, self.judge.rules.prior);
+        let evidence: Vec<Evidence> = self.views.iter().map(|v| v.evidence(&c.basis)).collect();
+        let null = Null::of(&evidence, m, prior)?;
+        let mut gain = gain(&evidence, prior)?;
+        if !c.agrees(gain.beta.rows(m, c.basis.count()).into_owned().as_slice()) {
+            return None;
+        }
+        let [fine, coarse] = &self.base;
+        let base = match self.views.first()?.patches(&c.basis) {
+            Patches::Fine => fine,
+            Patches::Coarse => coarse,
+        };
+        gain.total -= base.total;
+        gain.by_view.iter_mut().zip(&base.by_view).for_each(|(g, b)| *g -= b);
+        let rms = self.judge.rms(&c.basis, m, &gain, &evidence);
+        let sensible = self.judge.sensible(&c.basis, rms);
+        Some(Judged { gain, null, sensible, rms })
+    }
+}
+
+fn bases(chosen: &[Chosen]) -> Vec<&Basis> {
+    bases_where(chosen, |_| true)
+}
+
+fn bases_where(chosen: &[Chosen], which: impl Fn(&Candidate) -> bool) -> Vec<&Basis> {
+    chosen.iter().map(|c| &c.candidate).filter(|c| which(c)).map(|c| &c.basis).collect()
+}
+
+impl Layer<'_> {
+    /// Evidence of the views on these terms together.
+    fn evidence_of(&self, terms: &[&Basis]) -> Vec<Evidence> {
+        let fine = terms.iter().any(|b| b.is_fine() || b.of_column_alone());
+        let views = if fine { self.fine } else { self.coarse };
+        evidence_of_bases(views, terms)
+    }
+
+    /// Terms with a name are fitted anew beside every candidate; those without have many columns
+    /// and are taken out as they were fitted.
+    fn prepare(&self, chosen: &[Chosen]) -> Vec<Prepared<'_>> {
+        let named: Vec<&Basis> = bases_where(chosen, |c| c.family.is_some());
+        let nameless: Vec<&Basis> = bases_where(chosen, |c| c.family.is_none());
+        let mut settled: Vec<(&Basis, Vec<f64>)> = Vec::new();
+        if !nameless.is_empty() {
+            let all: Vec<&Basis> = nameless.iter().chain(&named).copied().collect();
+            let beta = fit(&self.evidence_of(&all), self.rules.prior);
+            let beta = beta.map_or_else(Vec::new, |beta| beta.as_slice().to_vec());
+            let mut rest = beta.as_slice();
+            for basis in nameless {
+                if rest.len() >= basis.count() {
+                    let (mine, others) = rest.split_at(basis.count());
+                    settled.push((basis, mine.to_vec()));
+                    rest = others;
+                }
+            }
+        }
+        let views = self.fine.par_iter().zip(self.coarse).zip(&self.groups);
+        let is_fine = |c: &Candidate| c.basis.is_fine() && c.basis.alone().is_none();
+        let keep_fine = self.candidates.iter().any(is_fine);
+        views.filter_map(|((f, c), g)| prepare(f, c, g, keep_fine, &named, &settled)).collect()
+    }
+
+    /// A term that stays, with what it brings alone.
+    fn pin(&self, candidate: Candidate) -> Chosen {
+        let alone = gain(&self.evidence_of(&[&candidate.basis]), self.rules.prior);
+        let gain = alone.map_or(0.0, |g| g.total);
+        let (adequacy, rivals) = (self.rules.adequacy, Vec::new());
+        Chosen { candidate, rms: 0.0, adequacy, gain, best_curve: 0.0, rivals, p: 1.0 }
+    }
+
+    /// What `chosen` and what is pinned leave for a candidate to explain.
+    fn trial(&self, chosen: &[Chosen]) -> Option<Trial<'_>> {
+        let beside: Vec<Chosen> = self.pinned.iter().chain(chosen).cloned().collect();
+        let views = self.prepare(&beside);
+        let settled = views.first()?.beside(Patches::Coarse).b.len();
+        let base = |patches| {
+            let evidence: Vec<Evidence> = views.iter().map(|v| v.beside(patches)).collect();
+            let nothing = Gain {
+                total: 0.0,
+                by_view: vec![0.0; views.len()],
+                beta: nalgebra::DVector::zeros(0),
+                covariance: nalgebra::DMatrix::zeros(0, 0),
+            };
+            if settled > 0 { gain(&evidence, self.rules.prior) } else { Some(nothing) }
+        };
+        let base = [base(Patches::Fine)?, base(Patches::Coarse)?];
+        let Layer { coarse, rules, largest, .. } = *self;
+        let weight = coarse.iter().flat_map(|v| &v.weight).sum();
+        let judge = Judge { weight, rules, largest };
+        Some(Trial { beside, views, settled, base, judge })
+    }
+
+    /// The best candidate beside `chosen` and what is pinned, if it brings more than noise can.
+    fn step(&mut self, chosen: &[Chosen]) -> Option<Chosen> {
+        let trial = self.trial(chosen)?;
+        let judged: Vec<Option<Judged>> =
+            self.candidates.par_iter().map(|c| trial.judged(c)).collect();
+        let beside = trial.beside;
+        if self.noise.is_none() {
+            let nulls: Vec<&Null> = judged.iter().flatten().map(|j| &j.null).collect();
+            let noise = if self.rules.calibrated {
+                NoiseGains::of(&nulls, self.seed)
+            } else {
+                NoiseGains::unknown()
+            };
+            self.looks = looks(self.candidates, &judged, self.rules, &noise);
+            self.noise = Some(noise);
+        }
+        let noise = self.noise.as_ref()?;
+        let (candidates, rules) = (self.candidates, self.rules);
+        Choice { candidates, judged: &judged, rules, noise }.best(&beside)
+    }
+
+    /// Maps with twice as many nodes, where those predict left-out views better.
+    fn refine_maps(&self, chosen: &mut [Chosen]) {
+        let total = |terms: &[&Basis]| {
+            gain(&self.evidence_of(terms), self.rules.prior).map_or(0.0, |g| g.total)
+        };
+        let mut so_far = None;
+        for k in 0..chosen.len() {
+            let Basis::Map { width, height, across, down, times } = chosen[k].candidate.basis
+            else {
+                continue;
+            };
+            let finer = Basis::Map { width, height, across: 2 * across, down: 2 * down, times };
+            let mut old = bases(chosen);
+            old.extend(self.pinned.iter().map(|c| &c.candidate.basis));
+            let mut new = old.clone();
+            new[k] = &finer;
+            let before = *so_far.get_or_insert_with(|| total(&old));
+            let after = total(&new);
+            let better = after - before;
+            if self.noise.as_ref().is_some_and(|n| better > n.threshold(self.rules.level)) {
+                chosen[k].gain += better;
+                chosen[k].candidate.basis = finer;
+                so_far = Some(after);
+            }
+        }
+    }
+
+    /// With all names in, is each still what fits best, and needed at all?
+    fn look_back(&mut self, chosen: &mut Vec<Chosen>) {
+        let mut k = 0;
+        while chosen.len() > 1 && k < chosen.len() {
+            let mut others = chosen.clone();
+            let old = others.remove(k);
+            match self.step(&others) {
+                None => {
+                    chosen.remove(k);
+                    continue;
+                }
+                Some(new) if new.candidate.family == old.candidate.family => {
+                    chosen[k] = Chosen { p: old.p.min(new.p), ..new };
+                }
+                // Another name is taken; a curve without one is not.
+                Some(new) if new.candidate.family.is_some() => chosen[k] = new,
+                Some(_) => {}
+            }
+            k += 1;
+        }
+        chosen.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,254 @@
+//! What noise alone brings for a candidate.
+
+use nalgebra::{DMatrix, DVector};
+use rand_distr::{Distribution, StandardNormal};
+
+use super::evidence::Evidence;
+use super::rules::Rules;
+use crate::rng::Stream;
+
+/// What noise alone may bring for a candidate: b ~ N(0, A) in every view.
+///
+/// Worked in the eigenvectors of the summed A, in which the views' own A are taken as diagonal:
+/// exact when the views' A are multiples of one another, and a thousand times quicker.
+pub struct Null {
+    /// Of each eigenvector: what each view says of it, and its total.
+    vectors: Vec<(Vec<Information>, f64)>,
+    prior: f64,
+    /// How much more the views' own fits scatter than their noise explains, at least 1: about the
+    /// common fit, or about nothing at all where a few views have what the others have not.
+    pub dispersion: f64,
+    /// The same about the common fit alone.
+    pub about_fit: f64,
+}
+
+/// Information of a view on an eigenvector, and its root.
+struct Information {
+    value: f64,
+    root: f64,
+}
+
+impl Null {
+    /// For the columns from number `chosen` on, given the columns before them.
+    pub fn of(views: &[Evidence], chosen: usize, prior: f64) -> Option<Self> {
+        let k = views.first()?.b.len() - chosen;
+        let (alone, left) = beside_chosen(views, chosen, prior)?;
+        let sum = alone.iter().fold(DMatrix::zeros(k, k), |sum, a| sum + a);
+        let u = sum.symmetric_eigen().eigenvectors;
+        let information = |a: &DMatrix<f64>| -> Vec<f64> {
+            let au = a * &u;
+            (0..k).map(|j| u.column(j).dot(&au.column(j)).max(0.0)).collect()
+        };
+        let by_view: Vec<Vec<f64>> = alone.iter().map(information).collect();
+        let total: Vec<f64> = (0..k).map(|j| by_view.iter().map(|a| a[j]).sum()).collect();
+        let about_fit = dispersion(&alone, &by_view, &total, &u, &left, prior);
+        let dispersion = about_fit.min(usual_square(&by_view, &total, &u, &left));
+        let of_vector = |(j, &total): (usize, &f64)| {
+            let values = by_view.iter().map(|a| a[j]);
+            (values.map(|value| Information { value, root: value.sqrt() }).collect(), total)
+        };
+        let vectors = total.iter().enumerate().map(of_vector).collect();
+        Some(Null { vectors, prior, dispersion, about_fit })
+    }
+
+    /// Nats that count against what noise brings, by `rules`, of a gain over so many views: views
+    /// that scatter more than their noise says count for less. Held against what other views taught,
+    /// their scatter is the noise; it was measured on few views, which makes a Student's t of a
+    /// Gaussian.
+    pub fn calibrated_gain(&self, gain: f64, views: usize, rules: &Rules) -> f64 {
+        let nats = gain / self.excess(views, rules);
+        let judged_by_t = rules.learnt_from.is_some() && nats > 0.0;
+        if judged_by_t { student(nats, freedom(views)) } else { nats }
+    }
+
+    /// The gain that counts for so many nats: the other way round.
+    pub fn gain_for(&self, calibrated_gain: f64, views: usize, rules: &Rules) -> f64 {
+        let nats = if rules.learnt_from.is_some() {
+            gaussian(calibrated_gain, freedom(views))
+        } else {
+            calibrated_gain
+        };
+        nats * self.excess(views, rules)
+    }
+
+    /// How much further than by their noise so many views may be off, in variance.
+    fn excess(&self, views: usize, rules: &Rules) -> f64 {
+        self.scatter(rules) * rules.learnt_from.map_or(1.0, |model| model.excess(views as f64))
+    }
+
+    /// The views' own scatter that counts, over their noise.
+    pub fn scatter(&self, rules: &Rules) -> f64 {
+        if rules.learnt_from.is_some() { self.about_fit } else { self.dispersion }
+    }
+
+    /// The gain of one recording of nothing but noise, nats.
+    pub fn draw(&self, rng: &mut Stream) -> f64 {
+        let mut gain = 0.0;
+        let mut b = Vec::new();
+        for (views, total) in &self.vectors {
+            b.clear();
+            b.extend(views.iter().map(|a| {
+                let draw: f64 = StandardNormal.sample(rng);
+                a.root * draw
+            }));
+            let sum: f64 = b.iter().sum();
+            for (b, a) in b.iter().zip(views) {
+                let beta = (sum - b) / (total - a.value + self.prior);
+                gain += beta * (b - 0.5 * beta * a.value);
+            }
+        }
+        gain
+    }
+}
+
+/// Degrees of freedom of a scatter about a mean.
+fn freedom(views: usize) -> f64 {
+    (views as f64 - 1.0).max(1.0)
+}
+
+/// Nats of a Gaussian whose error was measured with so many degrees of freedom: of a Student's t.
+pub fn student(nats: f64, freedom: f64) -> f64 {
+    0.5 * freedom * (2.0 * nats / freedom).ln_1p()
+}
+
+/// The other way round.
+fn gaussian(nats: f64, freedom: f64) -> f64 {
+    0.5 * freedom * (2.0 * nats / freedom).exp_m1()
+}
+
+/// Information and score of each view.
+type PerView = (Vec<DMatrix<f64>>, Vec<DVector<f64>>);
+
+/// The candidate's evidence once the chosen terms are fitted with it: its information in each
+/// view, and its score there.
+fn beside_chosen(views: &[Evidence], chosen: usize, prior: f64) -> Option<PerView> {
+    let n = views.first()?.b.len();
+    let k = n - chosen;
+    if chosen == 0 {
+        let split = views.iter().map(|v| (v.a.clone(), v.b.clone()));
+        return Some(split.unzip());
+    }
+    let mut mm = DMatrix::identity(chosen, chosen) * prior;
+    let mut mk = DMatrix::zeros(chosen, k);
+    let mut bm = DVector::zeros(chosen);
+    for v in views {
+        mm += v.a.view((0, 0), (chosen, chosen));
+        mk += v.a.view((0, chosen), (chosen, k));
+        bm += v.b.rows(0, chosen);
+    }
+    let factor = mm.cholesky()?;
+    let (t, beta) = (factor.solve(&mk), factor.solve(&bm));
+    let split = views.iter().map(|v| {
+        let vmm = v.a.view((0, 0), (chosen, chosen));
+        let vmk = v.a.view((0, chosen), (chosen, k));
+        let vkk = v.a.view((chosen, chosen), (k, k));
+        let tm = t.transpose() * vmk;
+        let a = vkk - &tm - tm.transpose() + t.transpose() * vmm * &t;
+        let left_m = v.b.rows(0, chosen) - vmm * &beta;
+        let left_k = v.b.rows(chosen, k) - vmk.transpose() * &beta;
+        (a, left_k - t.transpose() * left_m)
+    });
+    Some(split.unzip())
+}
+
+/// Scatter of the views' scores about the common fit, over what noise gives them.
+fn dispersion(
+    alone: &[DMatrix<f64>],
+    by_view: &[Vec<f64>],
+    total: &[f64],
+    u: &DMatrix<f64>,
+    scores: &[DVector<f64>],
+    prior: f64,
+) -> f64 {
+    let most = total.iter().copied().fold(0.0, f64::max);
+    let k = u.nrows();
+    let whole = alone.iter().fold(DMatrix::identity(k, k) * prior, |sum, a| sum + a);
+    let seen = scores.iter().fold(DVector::zeros(k), |sum, b| sum + b);
+    let Some(factor) = whole.cholesky() else { return 1.0 };
+    let beta = factor.solve(&seen);
+    // What each view says beyond the common fit.
+    let left: Vec<DVector<f64>> = scores.iter().zip(alone).map(|(b, a)| b - a * &beta).collect();
+    let (mut sum, mut n) = (0.0, 0.0);
+    for (j, &total) in total.iter().enumerate() {
+        if total < 1e-6 * most {
+            continue;
+        }
+        for (left, a) in left.iter().zip(by_view) {
+            // A view that says next to nothing would divide by next to nothing.
+            if a[j] > 1e-3 * total {
+                sum += u.column(j).dot(left).powi(2) / a[j];
+                n += 1.0 - a[j] / total;
+            }
+        }
+    }
+    if n < 1.0 {
+        return 1.0;
+    }
+    // Chance alone scatters the estimate by the root of 2 / n.
+    (sum / n - f64::sqrt(2.0 / n)).max(1.0)
+}
+
+/// Median of the views' squared scores, over what noise gives them: near 1 where most views have
+/// nothing of the candidate, whatever the others have.
+fn usual_square(
+    by_view: &[Vec<f64>],
+    total: &[f64],
+    u: &DMatrix<f64>,
+    scores: &[DVector<f64>],
+) -> f64 {
+    let most = total.iter().copied().fold(0.0, f64::max);
+    let mut squares = Vec::new();
+    for (j, &total) in total.iter().enumerate().filter(|(_, t)| **t >= 1e-6 * most) {
+        let seen = scores.iter().zip(by_view).filter(|(_, a)| a[j] > 1e-3 * total);
+        squares.extend(seen.map(|(b, a)| u.column(j).dot(b).powi(2) / a[j]));
+    }
+    if squares.is_empty() {
+        return 1.0;
+    }
+    let (half, n) = (squares.len() / 2, squares.len() as f64);
+    let middle = *squares.select_nth_unstable_by(half, f64::total_cmp).1;
+    // By one standard error of the median more, for safety.
+    (middle / CHI2_MEDIAN * (1.0 + MEDIAN_ERROR / n.sqrt())).max(1.0)
+}
+
+/// Median of the square of a standard normal number.
+const CHI2_MEDIAN: f64 = 0.4549;
+/// Relative standard error of the median of n such squares, times the root of n: 1 / (2 f m) with
+/// their density f at the median m.
+const MEDIAN_ERROR: f64 = 2.33;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::views::learnt::Learnt;
+
+    /// What `detectable` asks for is what the search lets pass, with a model of other views and
+    /// without.
+    #[test]
+    fn the_gain_for_so_many_nats_counts_for_as_many() {
+        let null = Null { vectors: Vec::new(), prior: 1.0, dispersion: 1.5, about_fit: 3.0 };
+        let rules = |learnt_from| Rules {
+            level: 0.01,
+            prior: 1.0,
+            adequacy: 0.6,
+            own_axis_adequacy: 0.0,
+            agreed: false,
+            max_terms: 1,
+            fixed: None,
+            least: 0.0,
+            calibrated: true,
+            learnt_from,
+        };
+        let other = |searched| Some(Learnt { views: 20.0, searched });
+        for (learnt_from, factor) in [(None, 0.99), (other(false), 2.0), (other(true), 4.0)] {
+            let rules = rules(learnt_from);
+            let gain = null.gain_for(7.0, 12, &rules);
+            approx::assert_relative_eq!(
+                null.calibrated_gain(gain, 12, &rules),
+                7.0,
+                max_relative = 1e-12
+            );
+            assert!(gain > factor * null.dispersion * 7.0, "{gain}");
+        }
+    }
+}

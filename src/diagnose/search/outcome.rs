@@ -1,0 +1,85 @@
+//! What a search comes to.
+
+use super::candidate::Candidate;
+use super::evidence::{Evidence, Gain};
+use super::noise_gains::NoiseGains;
+use crate::diagnose::checks::replication::Halves;
+use crate::model::Covariance;
+use crate::terms::Basis;
+
+/// A family beside the one that was chosen.
+#[derive(Debug, Clone)]
+pub struct Rival {
+    pub family: &'static str,
+    pub basis: Basis,
+    /// Nats over the terms before, over the root of how much more than noise the views disagree.
+    pub gain: f64,
+    /// How far behind the chosen one, in standard errors over the views.
+    pub behind: f64,
+}
+
+/// A term that was accepted.
+#[derive(Debug, Clone)]
+pub struct Chosen {
+    pub candidate: Candidate,
+    /// Root mean square, in the response's unit.
+    pub rms: f64,
+    /// The share of the best curve that its name had to explain.
+    pub adequacy: f64,
+    /// Nats over the terms before it.
+    pub gain: f64,
+    /// The best nameless curve's at the same step, nats.
+    pub best_curve: f64,
+    /// All families at this step, best first, the chosen one too where it has a name.
+    pub rivals: Vec<Rival>,
+    /// Chance that noise brings as much anywhere in this layer.
+    pub p: f64,
+}
+
+/// What a single nameless curve saw, before anything was explained.
+#[derive(Debug, Clone)]
+pub struct Look {
+    pub basis: Basis,
+    pub coefficients: Vec<f64>,
+    pub p: f64,
+}
+
+/// All terms of a layer with their common fit.
+#[derive(Default)]
+pub struct Outcome {
+    pub chosen: Vec<Chosen>,
+    /// Every nameless curve on its own, on the data as they came.
+    pub looks: Vec<Look>,
+    /// Fit of all terms at once.
+    pub fit: Option<Gain>,
+    pub evidence: Vec<Evidence>,
+    pub noise: NoiseGains,
+    /// What still stood out when the search ended.
+    pub remaining: Option<Chosen>,
+    /// Coefficients as fitted without some views, for these views.
+    pub left_out: Vec<(Vec<usize>, Vec<f64>)>,
+    /// All terms as either half of the views has them.
+    pub halves: Option<Halves>,
+    /// Of all coefficients.
+    pub covariance: Covariance,
+}
+
+impl Outcome {
+    /// Coefficients of term number `k` in the common fit: the first and the one after the last.
+    pub fn span(&self, k: usize) -> std::ops::Range<usize> {
+        let first = self.chosen[..k].iter().map(|c| c.candidate.basis.count()).sum();
+        first..first + self.chosen[k].candidate.basis.count()
+    }
+
+    /// With the halves' fits, for views in these halves.
+    pub fn halved(mut self, second: &[bool], prior: f64) -> Self {
+        let counts: Vec<usize> = self.chosen.iter().map(|c| c.candidate.basis.count()).collect();
+        self.halves = Halves::of(&self.evidence, second, prior, &counts);
+        self
+    }
+
+    pub fn coefficients(&self, k: usize) -> Vec<f64> {
+        let span = self.span(k);
+        self.fit.as_ref().map_or_else(Vec::new, |f| f.beta.as_slice()[span].to_vec())
+    }
+}

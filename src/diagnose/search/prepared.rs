@@ -1,0 +1,194 @@
+//! A view made ready for candidates: what is fitted beside them, and samples that they cannot tell
+//! apart made one.
+
+use rayon::prelude::*;
+
+use super::evidence::Evidence;
+use super::rows::Rows;
+use crate::diagnose::views::samples::ViewData;
+use crate::diagnose::views::tiles::SIDE;
+use crate::terms::{Basis, Coordinate, PixelContext, Term};
+
+/// Evidence of views on given terms together.
+pub fn evidence_of(data: &[ViewData], terms: &[Term]) -> Vec<Evidence> {
+    evidence_of_bases(data, &terms.iter().map(|t| &t.basis).collect::<Vec<_>>())
+}
+
+pub fn evidence_of_bases(data: &[ViewData], bases: &[&Basis]) -> Vec<Evidence> {
+    data.par_iter().filter_map(|v| together(v, bases)).collect()
+}
+
+/// A view made ready for the candidates.
+pub struct Prepared<'a> {
+    /// Where a candidate is fine and does not depend on one coordinate alone.
+    fine: Option<(&'a [PixelContext], Rows<'a>)>,
+    pub coarse: (&'a [PixelContext], Rows<'a>),
+    /// The fine samples gathered by one coordinate.
+    groups: Vec<(&'a Grouping, Rows<'a>)>,
+}
+
+/// A view's response, terms with these coefficients taken out.
+pub fn without(view: &ViewData, settled: &[(&Basis, Vec<f64>)]) -> Vec<f64> {
+    let mut response = view.response.clone();
+    let mut scratch = Vec::new();
+    for (basis, beta) in settled {
+        for (y, place) in response.iter_mut().zip(&view.places) {
+            *y -= basis.value(beta, place, &mut scratch);
+        }
+    }
+    response
+}
+
+/// Side of a neighbourhood in patches: few nodes of a curve or a map are within it.
+const NEIGHBOURS: f64 = 8.0;
+
+/// A view's normal equations on these terms together.
+pub fn together(view: &ViewData, terms: &[&Basis]) -> Option<Evidence> {
+    let rows = rows(view, &view.response, &[])?;
+    let count = terms.iter().map(|b| b.count()).sum();
+    let block = |i: usize| {
+        const ACROSS: usize = 1 << 16;
+        let place = &view.places[i];
+        let side = NEIGHBOURS * place.side.max(1.0);
+        (place.v / side) as usize * ACROSS + (place.u / side) as usize
+    };
+    Some(rows.reduce_by_blocks(count, block, |i, row| fill_all(terms, &view.places[i], row)))
+}
+
+/// The columns of several terms, one after the other.
+fn fill_all(terms: &[&Basis], place: &PixelContext, row: &mut [f64]) {
+    let mut rest = row;
+    for basis in terms {
+        let (mine, others) = rest.split_at_mut(basis.count());
+        basis.fill(place, mine);
+        rest = others;
+    }
+}
+
+/// A view's rows with its nuisances and the terms beside.
+fn rows<'a>(view: &'a ViewData, response: &[f64], beside: &[&Basis]) -> Option<Rows<'a>> {
+    let p = view.precision.len();
+    if beside.is_empty() {
+        return view.rows(response);
+    }
+    let width = p + beside.iter().map(|b| b.count()).sum::<usize>();
+    let mut columns = vec![0.0; view.places.len() * width];
+    for (i, row) in columns.chunks_exact_mut(width).enumerate() {
+        row[..p].copy_from_slice(&view.nuisance[i * p..][..p]);
+        fill_all(beside, &view.places[i], &mut row[p..]);
+    }
+    Rows::new(response, &view.weight, &columns, width, &view.precision)
+}
+
+pub fn prepare<'a>(
+    fine: &'a ViewData,
+    coarse: &'a ViewData,
+    groups: &'a [Grouping],
+    keep_fine: bool,
+    beside: &[&Basis],
+    settled: &[(&Basis, Vec<f64>)],
+) -> Option<Prepared<'a>> {
+    let left = without(fine, settled);
+    let left_coarse = if coarse.gathered.is_empty() {
+        left.clone()
+    } else {
+        // What changes within a patch is taken out before the patch is made.
+        let mut sums = vec![0.0; coarse.places.len()];
+        for ((y, w), &k) in left.iter().zip(&fine.weight).zip(&coarse.gathered) {
+            sums[k as usize] += w * y;
+        }
+        sums.iter().zip(&coarse.weight).map(|(s, w)| if *w > 0.0 { s / w } else { 0.0 }).collect()
+    };
+    let rows_fine = rows(fine, &left, beside)?;
+    let grouped = |g: &'a Grouping| (g, rows_fine.grouped(g.places.len(), |i| g.of[i] as usize));
+    let groups = groups.iter().map(grouped).collect();
+    Some(Prepared {
+        groups,
+        fine: keep_fine.then_some((&fine.places[..], rows_fine)),
+        coarse: (&coarse.places, rows(coarse, &left_coarse, beside)?),
+    })
+}
+
+/// Disparities this near are one, px: a thirtieth of a locking's period.
+const DISPARITY_GROUP_PX: f64 = 1.0 / 30.0;
+const EDGE_GROUP_PX: f64 = 0.5;
+
+/// A view's samples in steps of one coordinate.
+pub struct Grouping {
+    over: Coordinate,
+    /// Each group lies where its samples do on average.
+    places: Vec<PixelContext>,
+    /// The group of each sample.
+    of: Vec<u32>,
+}
+
+impl Grouping {
+    /// By every coordinate that a shape may depend on alone.
+    pub fn all(view: &ViewData) -> Vec<Self> {
+        let side = SIDE as f64;
+        let steps = [
+            (Coordinate::Column, side),
+            (Coordinate::Row, side),
+            (Coordinate::Disparity, DISPARITY_GROUP_PX),
+            (Coordinate::Edge, EDGE_GROUP_PX),
+        ];
+        steps.map(|(over, step)| Grouping::by(&view.places, over, step)).into()
+    }
+
+    fn by(places: &[PixelContext], over: Coordinate, step: f64) -> Self {
+        let low = places.iter().map(|p| over.value(p)).fold(f64::INFINITY, f64::min);
+        let of: Vec<u32> = places.iter().map(|p| ((over.value(p) - low) / step) as u32).collect();
+        let count = of.iter().map(|&k| k as usize + 1).max().unwrap_or(0);
+        let mut sums = vec![(PixelContext::default(), [0.0; 6], 0.0); count];
+        for (p, &k) in places.iter().zip(&of) {
+            let (first, sum, n) = &mut sums[k as usize];
+            *first = *p;
+            *n += 1.0;
+            let values = [p.u, p.v, p.disparity, p.z, p.edge, p.radius];
+            sum.iter_mut().zip(values).for_each(|(s, v)| *s += v);
+        }
+        let mean = |(place, sum, n): &(PixelContext, [f64; 6], f64)| {
+            let [u, v, disparity, z, edge, radius] = sum.map(|s| s / f64::max(*n, 1.0));
+            PixelContext { u, v, disparity, z, edge, radius, ..*place }
+        };
+        Grouping { over, places: sums.iter().map(mean).collect(), of }
+    }
+}
+
+/// Which samples a basis is tried on. What stands beside it brings more on the fine ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Patches {
+    Fine,
+    Coarse,
+}
+
+impl Prepared<'_> {
+    /// The samples that a basis is tried on, and which they are.
+    fn samples(&self, basis: &Basis) -> (&[PixelContext], &Rows<'_>, Patches) {
+        let alone = basis.alone().and_then(|over| self.groups.iter().find(|g| g.0.over == over));
+        if let Some((group, rows)) = alone {
+            (&group.places, rows, Patches::Fine)
+        } else if let Some((places, rows)) = self.fine.as_ref().filter(|_| basis.is_fine()) {
+            (places, rows, Patches::Fine)
+        } else {
+            (self.coarse.0, &self.coarse.1, Patches::Coarse)
+        }
+    }
+
+    pub fn patches(&self, basis: &Basis) -> Patches {
+        self.samples(basis).2
+    }
+
+    /// Evidence on what stands beside every candidate. However fine samples are gathered, it is the
+    /// same.
+    pub fn beside(&self, patches: Patches) -> Evidence {
+        let fine = self.groups.first().filter(|_| patches == Patches::Fine);
+        fine.map_or(&self.coarse.1, |(_, rows)| rows).reduce(0, |_, _| ())
+    }
+
+    /// On the basis and what stands beside it.
+    pub fn evidence(&self, basis: &Basis) -> Evidence {
+        let (places, rows, _) = self.samples(basis);
+        rows.reduce(basis.count(), |i, g| basis.fill(&places[i], g))
+    }
+}

@@ -1,0 +1,279 @@
+//! Searches over made-up views: what is put in is found, and noise is let be.
+
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+use crate::diagnose::views::samples::coarser;
+use crate::rng::{Seed, Stream};
+use crate::terms::{Axis, Coordinate, Modulation, PixelContext};
+
+const VIEWS: usize = 12;
+const SAMPLES: usize = 120;
+const RULES: Rules = Rules {
+    level: 0.01,
+    prior: 1e-6,
+    adequacy: 0.7,
+    own_axis_adequacy: 0.0,
+    agreed: false,
+    max_terms: 4,
+    fixed: None,
+    least: 0.0,
+    calibrated: true,
+    learnt_from: None,
+};
+
+/// Places all over the picture with a free level a view; noise of unit variance, and a bias.
+fn session(rng: &mut Stream, bias: impl Fn(&PixelContext) -> f64) -> Vec<ViewData> {
+    (0..VIEWS)
+        .map(|_| {
+            let level: f64 = StandardNormal.sample(rng);
+            let disparity = rng.random_range(10.0..45.0);
+            let places: Vec<PixelContext> = (0..SAMPLES)
+                .map(|_| {
+                    let (u, v) = (rng.random_range(0.0..640.0), rng.random_range(0.0..480.0));
+                    let radius = f64::hypot(u - 319.5, v - 239.5) / 399.5;
+                    PixelContext {
+                        u,
+                        v,
+                        radius,
+                        disparity,
+                        side: 8.0,
+                        z: 43.5 / disparity,
+                        ..PixelContext::default()
+                    }
+                })
+                .collect();
+            let response = places
+                .iter()
+                .map(|p| {
+                    let noise: f64 = StandardNormal.sample(rng);
+                    3.0 * level + bias(p) + noise
+                })
+                .collect();
+            ViewData {
+                gathered: Vec::new(),
+                places,
+                response,
+                weight: vec![1.0; SAMPLES],
+                nuisance: vec![1.0; SAMPLES],
+                precision: vec![0.0],
+            }
+        })
+        .collect()
+}
+
+fn candidates() -> Vec<Candidate> {
+    let curve = |over, high| {
+        Candidate::curve(Basis::Curve { over, low: 0.0, high, nodes: 9, times: Modulation::One })
+    };
+    vec![
+        Candidate::named(
+            "radial-disparity-bias",
+            Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(0.0)),
+        ),
+        Candidate::named("column-banding", Basis::waves(Coordinate::Column, 160.0, 2)),
+        Candidate::named("pixel-locking", Basis::waves(Coordinate::Disparity, 1.0, 2)),
+        curve(Coordinate::Column, 639.0),
+        curve(Coordinate::Row, 479.0),
+        curve(Coordinate::Radius, 1.0),
+    ]
+}
+
+fn found(views: &[ViewData], seed: u64) -> Outcome {
+    search(views, views, &candidates(), None, &RULES, Seed(seed))
+}
+
+fn families(outcome: &Outcome) -> Vec<Option<&'static str>> {
+    outcome.chosen.iter().map(|c| c.candidate.family).collect()
+}
+
+/// 200 searches at 1 %: two are expected to find something; more than 9 have a chance of 4e-5.
+#[test]
+fn noise_is_let_be() {
+    let alarms = (0..200)
+        .filter(|&seed| {
+            let mut rng = Seed(seed).stream("search/null");
+            !found(&session(&mut rng, |_| 0.0), seed).chosen.is_empty()
+        })
+        .count();
+    println!("{alarms} of 200 false alarms at 1 %");
+    assert!(alarms <= 9, "{alarms} of 200");
+}
+
+#[test]
+fn what_was_put_in_is_found_with_its_size() {
+    for seed in 0..8 {
+        let mut rng = Seed(seed).stream("search/bowl");
+        let outcome = found(&session(&mut rng, |p| 1.5 * p.radius * p.radius), seed);
+        assert_eq!(families(&outcome), [Some("radial-disparity-bias")], "seed {seed}");
+        let fit = outcome.fit.as_ref().unwrap();
+        let (k, error) = (outcome.coefficients(0)[0], fit.covariance[(0, 0)].sqrt());
+        // Five standard errors in 8 searches: 5e-6.
+        assert!((k - 1.5).abs() < 5.0 * error && error < 0.15, "{k} +- {error}");
+        assert!(outcome.chosen[0].p < 1e-4 && outcome.chosen[0].rivals[0].behind == 0.0);
+    }
+}
+
+/// What a pinned term can take up is nobody else's; it stays, last, and others are found beside it.
+#[test]
+fn what_is_pinned_takes_up_its_own() {
+    let over = Coordinate::Radius;
+    let basis = Basis::Curve { over, low: 0.0, high: 1.0, nodes: 5, times: Modulation::One };
+    for (stripes, names) in [(0.0, vec![None]), (1.0, vec![Some("column-banding"), None])] {
+        let mut rng = Seed(9).stream("search/pinned");
+        let views = session(&mut rng, |p| {
+            let wave = (std::f64::consts::TAU * p.u / 160.0).sin();
+            1.5 * p.radius * p.radius + stripes * wave
+        });
+        let pinned = Some(Candidate::curve(basis.clone()));
+        let beyond: Vec<Candidate> =
+            candidates().into_iter().filter(|c| c.basis.axis() != Axis::Radius).collect();
+        let outcome = search(&views, &views, &beyond, pinned, &RULES, Seed(9));
+        assert_eq!(families(&outcome), names);
+        let last = outcome.chosen.len() - 1;
+        let beta = outcome.coefficients(last);
+        // Of 1.5 r^2 from r = 1/4 to r = 3/4.
+        assert!((beta[3] - beta[1] - 0.75).abs() < 0.3, "{beta:?}");
+    }
+}
+
+#[test]
+fn two_causes_are_two_terms_whichever_is_larger() {
+    for (bowl, stripes) in [(3.0, 0.6), (1.2, 1.5)] {
+        let mut rng = Seed(5).stream("search/two");
+        let bias = |p: &PixelContext| {
+            bowl * p.radius * p.radius + stripes * (std::f64::consts::TAU * p.u / 160.0).sin()
+        };
+        let outcome = found(&session(&mut rng, bias), 5);
+        let mut names = families(&outcome);
+        names.sort_unstable();
+        assert_eq!(names, [Some("column-banding"), Some("radial-disparity-bias")]);
+        let gains: Vec<f64> = outcome.chosen.iter().map(|c| c.gain).collect();
+        assert!(gains[0] >= gains[1], "best first: {gains:?}");
+        assert_eq!(outcome.span(1).start, outcome.span(0).end);
+    }
+}
+
+/// Sloping boards in small patches, and in patches over which locking fades. What it brings more in
+/// the small ones is not any other candidate's that is tried on them.
+#[test]
+fn what_fades_in_large_patches_is_told_once() {
+    let mut rng = Seed(3).stream("search/fading");
+    let bias = |d: f64| 0.3 * (std::f64::consts::TAU * d).sin();
+    let fine: Vec<ViewData> = (0..VIEWS)
+        .map(|_| {
+            let (near, slope) = (rng.random_range(10.0..40.0), rng.random_range(0.015..0.03));
+            let grid = (0..30).flat_map(|v| (0..40).map(move |u| (f64::from(u), f64::from(v))));
+            let place = |(u, v): (f64, f64)| PixelContext {
+                u: 4.0 * u + 1.5,
+                v: 4.0 * v + 1.5,
+                disparity: near + slope * (4.0 * u + 1.5),
+                slope: [slope, 0.0],
+                side: 4.0,
+                ..PixelContext::default()
+            };
+            let places: Vec<PixelContext> = grid.map(place).collect();
+            let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
+            let nuisance = places.iter().flat_map(|p| [1.0, p.u / 160.0, p.v / 120.0]).collect();
+            ViewData {
+                response: places.iter().map(|p| bias(p.disparity) + noise()).collect(),
+                weight: vec![1.0; places.len()],
+                nuisance,
+                precision: vec![0.0; 3],
+                gathered: Vec::new(),
+                places,
+            }
+        })
+        .collect();
+    let coarse: Vec<ViewData> = fine.iter().map(coarser).collect();
+    let outcome = search(&fine, &coarse, &candidates(), None, &RULES, Seed(3));
+    assert_eq!(families(&outcome), [Some("pixel-locking")]);
+    assert!(outcome.remaining.is_none());
+}
+
+/// A step over the rows is no family's, and a curve along the columns that the stripes do not explain is
+/// not called stripes: each stays a curve on its own axis.
+#[test]
+fn what_no_family_explains_stays_a_curve() {
+    type Bias = fn(&PixelContext) -> f64;
+    let step: Bias = |p| f64::from(p.v > 300.0);
+    let hill: Bias = |p| (-((p.u - 200.0) / 60.0).powi(2)).exp() * 2.0;
+    for (name, seed, bias, axis) in [("step", 6, step, Axis::Row), ("part", 7, hill, Axis::Column)]
+    {
+        let mut rng = Seed(seed).stream(&format!("search/{name}"));
+        let outcome = found(&session(&mut rng, bias), seed);
+        let first = &outcome.chosen[0].candidate;
+        assert_eq!((first.family, first.basis.axis()), (None, axis), "{name}");
+    }
+}
+
+/// A board that is tilted as a whole is a plane again, but for what averaging over a patch leaves:
+/// that must not be taken for a lift of metres.
+#[test]
+fn a_lift_that_planes_take_up_is_none() {
+    let lift = Basis::Curve {
+        over: Coordinate::Right,
+        low: -1.0,
+        high: 1.0,
+        nodes: 3,
+        times: Modulation::Lift,
+    };
+    let searched = |tilt: f64, bend: f64| {
+        let mut rng = Seed(9).stream("search/lift");
+        let mut views = session(&mut rng, |_| 0.0);
+        for view in &mut views {
+            for (p, y) in view.places.iter_mut().zip(&mut view.response) {
+                let (right, averaged) = ((p.u - 320.0) / 320.0, 1e-3 * (p.u / 40.0).sin());
+                p.rho = 1.0 / p.disparity;
+                *y += p.disparity.powi(2) * (tilt * averaged + bend * right * right);
+                p.right = right + averaged;
+            }
+            let affine = |p: &PixelContext| [1.0, p.u / 640.0, p.v / 480.0];
+            view.nuisance = view.places.iter().flat_map(affine).collect();
+            view.precision = vec![0.0; 3];
+        }
+        let outcome =
+            search(&views, &views, &[Candidate::curve(lift.clone())], None, &RULES, Seed(1));
+        let coefficients = outcome.chosen.first().map_or(vec![0.0; 3], |_| outcome.coefficients(0));
+        let at = |right| {
+            let place = PixelContext { right, disparity: 1.0, rho: 1.0, ..PixelContext::default() };
+            lift.value(&coefficients, &place, &mut Vec::new()).abs()
+        };
+        [-1.0, 0.0, 1.0].map(at).into_iter().fold(0.0, f64::max)
+    };
+    assert!(searched(3.0, 0.0) < 0.03, "of 3 m at the rim nothing: {}", searched(3.0, 0.0));
+    // 0.01 of the square of -1 to 1, its best line taken out.
+    let bend = searched(0.0, 0.01);
+    assert!((bend / (0.01 * 2.0 / 3.0) - 1.0).abs() < 0.25, "a bent board: {bend}");
+}
+
+#[test]
+fn thresholds_and_chances_are_each_others_inverse() {
+    let gains = NoiseGains::simulated(600, 0.5, |k| -(1.0 - (k + 1) as f64 / 601.0).ln());
+    // Exponential: passed with probability exp(-g).
+    for level in [0.05, 0.01, 1e-3, 1e-5] {
+        let threshold = gains.threshold(level);
+        assert!((gains.p(threshold) / level - 1.0).abs() < 1e-9, "{level}");
+        assert!((threshold / -level.ln() - 1.0).abs() < 0.08, "{level}: {threshold}");
+    }
+    assert!(gains.p(0.0) > 0.9 && gains.p(0.0) <= 1.0);
+    assert!(NoiseGains::default().threshold(0.05) == f64::INFINITY);
+    assert!(NoiseGains::default().p(1e9) == 1.0);
+}
+
+/// Same seed, same search, on one thread and two.
+#[test]
+fn a_search_repeats() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut rng = Seed(8).stream("search/repeat");
+            let outcome = found(&session(&mut rng, |p| p.radius * p.radius), 8);
+            (families(&outcome), outcome.coefficients(0), outcome.chosen[0].p)
+        })
+    };
+    let one = run(1);
+    assert_eq!(one, run(2));
+    assert_eq!(one, run(2));
+}

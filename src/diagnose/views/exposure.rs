@@ -1,0 +1,151 @@
+//! Frames laid on a view's plane: what every pixel measures beside what is expected of it.
+
+use super::field::{CLIP_SIGMAS, Field};
+use super::known::KnownTerms;
+use super::tiles::Places;
+use crate::camera::Rays;
+use crate::diagnose::edges::Edges;
+use crate::diagnose::options::FRAMES_KEPT;
+use crate::frame::{DepthTable, Frame};
+use crate::measure::Workbench;
+use crate::model::SigmaModel;
+use crate::stats::{MAD_TO_SIGMA, median_in_place};
+use crate::terms::Term;
+
+/// Disparities that spread less than this over a view show no slope, px.
+const LEAST_SPREAD_PX: f64 = 0.5;
+/// A model that is right spreads residuals as the view itself does, to a few per cent.
+const FAR_OFF: f32 = 2.0;
+
+impl Field {
+    /// Collect the residuals of all frames (time since the first, s).
+    pub fn accumulate(
+        &mut self,
+        frames: impl Iterator<Item = (f64, Frame)>,
+        bench: &Workbench<'_>,
+        sigma: &SigmaModel,
+        known: &KnownTerms,
+        session_start: f64,
+    ) {
+        self.sigma = self.expected_sigma(&bench.rays, sigma);
+        let mut expected = self.known_bias(known, bench, session_start);
+        let mut clip_px = self.spread_px;
+        let mut edges = Edges::default();
+        for (time, image) in frames {
+            if self.frames.is_empty() {
+                if !known.bias.is_empty() {
+                    clip_px = self.spread_beside(&image, &expected, &bench.table);
+                }
+                edges = Edges::find(self, &image, &bench.rays, &bench.table);
+                self.subsample_blocks(&mut expected);
+            }
+            edges.add(self, &image, &bench.rays, &bench.table);
+            self.add(&image, time, &expected, &bench.table, clip_px);
+        }
+        self.edges = edges;
+        self.close();
+    }
+
+    /// Sigma of the disparity at each pixel, px.
+    fn expected_sigma(&self, rays: &Rays, sigma: &SigmaModel) -> Vec<f32> {
+        let theta = self.plane.theta();
+        let of = |&i: &u32| {
+            let (x, y) = rays.at(i as usize);
+            let z = self.plane.depth(x, y);
+            (sigma.axial_sigma(z, theta) * self.scale_px_m / (z * z)) as f32
+        };
+        self.pixels.iter().map(of).collect()
+    }
+
+    /// Disparity that the model expects at each pixel, px; its terms of the variance go to sigma.
+    fn known_bias(&mut self, known: &KnownTerms, bench: &Workbench<'_>, start: f64) -> Vec<f32> {
+        let n = self.pixels.len();
+        let mut expected: Vec<f32> =
+            (0..n).map(|k| self.disparity(k, &bench.rays) as f32).collect();
+        if known.bias.is_empty() && known.variance.is_empty() {
+            return expected;
+        }
+        let mut sigma = self.sigma.clone();
+        let places = Places::of(self, &bench.sensor.camera, &bench.rays, start);
+        let mut row = Vec::new();
+        for k in 0..n {
+            let place = places.pixel(k);
+            expected[k] += Term::sum(&known.bias, &place, &mut row) as f32;
+            sigma[k] *= (0.5 * Term::sum(&known.variance, &place, &mut row)).exp() as f32;
+        }
+        self.sigma = sigma;
+        expected
+    }
+
+    /// The spread to clip by, px: the view's own, or that about what the model expects where the model is
+    /// wrong by far more. Clipped by the view's own, a model of a bowl that is not there would leave no
+    /// pixel to tell it by.
+    fn spread_beside(&self, frame: &Frame, expected: &[f32], table: &DepthTable) -> f32 {
+        let off = |(&i, &d): (&u32, &f32)| {
+            let z = table.metres(frame.raw[i as usize]);
+            z.is_finite().then(|| ((self.scale_px_m / f64::from(z)) as f32 - d).abs())
+        };
+        let mut all: Vec<f32> = self.pixels.iter().zip(expected).filter_map(off).collect();
+        let spread = MAD_TO_SIGMA as f32 * median_in_place(&mut all);
+        if spread > FAR_OFF * self.spread_px { spread } else { self.spread_px }
+    }
+
+    fn add(
+        &mut self,
+        frame: &Frame,
+        time: f64,
+        expected: &[f32],
+        table: &DepthTable,
+        clip_px: f32,
+    ) {
+        let keep = self.first.len() < FRAMES_KEPT;
+        let mut residuals = if keep { vec![f32::NAN; self.pixels.len()] } else { Vec::new() };
+        let (mut sum, mut n) = (0.0f64, 0.0f64);
+        let middle = self.scale_px_m * self.plane.q.z;
+        let (mut sx, mut sxx, mut sxy) = (0.0f64, 0.0f64, 0.0f64);
+        for k in 0..self.pixels.len() {
+            let word = frame.raw[self.pixels[k] as usize];
+            let z = table.metres(word);
+            if !z.is_finite() {
+                continue;
+            }
+            self.measured[k] += 1;
+            self.words.0[usize::from(word)] += 1;
+            let e = (self.scale_px_m / f64::from(z)) as f32 - expected[k];
+            if keep {
+                residuals[k] = e;
+            }
+            if e.abs() <= CLIP_SIGMAS * self.sigma[k].max(clip_px) {
+                self.count[k] += 1;
+                self.mean[k] += e;
+                self.square[k] += e * e;
+                sum += f64::from(e);
+                n += 1.0;
+                let x = f64::from(expected[k]) - middle;
+                sx += x;
+                sxx += x * x;
+                sxy += x * f64::from(e);
+            }
+        }
+        if keep {
+            self.first.push(residuals);
+        }
+        // A frontal view has one disparity, and no slope.
+        let spread = sxx - sx * sx / f64::max(n, 1.0);
+        let slope = if spread > n * LEAST_SPREAD_PX * LEAST_SPREAD_PX {
+            (sxy - sx * sum / n) / spread
+        } else {
+            0.0
+        };
+        self.lines.push([(sum - slope * sx) / f64::max(n, 1.0), slope]);
+        self.frames.push((time, if n > 0.0 { sum / n } else { f64::NAN }));
+    }
+
+    fn close(&mut self) {
+        for k in 0..self.pixels.len() {
+            let n = f32::from(self.count[k]);
+            self.mean[k] /= n;
+            self.square[k] /= n;
+        }
+    }
+}

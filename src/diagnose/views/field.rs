@@ -1,0 +1,269 @@
+//! Residuals that can be trusted: every pixel of the target, all frames, about one plane a view.
+//!
+//! In disparity a plane is exactly affine in the image, so the residual is taken there, in px of
+//! fx * baseline / z. Nothing is cut by a RANSAC threshold: what strays is clipped, and counted.
+
+use super::box_sums::{SMOOTH_PX, high_pass};
+use super::infrared::amplitudes;
+use super::known::KnownTerms;
+use crate::camera::Rays;
+use crate::diagnose::edges::Edges;
+use crate::diagnose::steps::lattice::RawHistogram;
+use crate::effects::KINECT_BASELINE_M;
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::io::read_depth;
+use crate::measure::{Workbench, view_target};
+use crate::model::SigmaModel;
+use crate::plane::Plane;
+use crate::stats::median_in_place;
+use crate::terms::edge_distances;
+use crate::view::{Sensor, View};
+
+/// One view's residuals.
+#[derive(Debug, Clone)]
+pub struct Field {
+    pub name: String,
+    /// On the recording's clock, s.
+    pub time_s: f64,
+    pub plane: Plane,
+    /// fx * baseline, px m.
+    pub scale_px_m: f64,
+    pub width: usize,
+    pub height: usize,
+    /// Pixels of the target, ascending.
+    pub pixels: Vec<u32>,
+    /// Of each, its distance from the target's edge, px.
+    pub edge: Vec<f32>,
+    /// Model's standard deviation of the disparity of each pixel, px.
+    pub sigma: Vec<f32>,
+    /// Robust standard deviation of the view's residuals, px.
+    pub spread_px: f32,
+    /// Mean over the frames, px; NaN where never measured.
+    pub mean: Vec<f32>,
+    /// Mean square over the frames, px^2.
+    pub square: Vec<f32>,
+    /// Frames with a measurement inside the clip.
+    pub count: Vec<u16>,
+    /// Frames with a measurement.
+    pub measured: Vec<u16>,
+    /// Residuals of the first frames, px, in order.
+    pub first: Vec<Vec<f32>>,
+    /// Time and mean residual of each frame, s since the first and px.
+    pub frames: Vec<(f64, f64)>,
+    /// Each frame's residual as a line in the disparity: at the view's middle, px, and its slope.
+    pub lines: Vec<[f64; 2]>,
+    pub reference_distance_m: Option<f64>,
+    /// Of the target, as the view states it.
+    pub flatness_m: Option<f64>,
+    pub temperature_c: Option<f64>,
+    pub ambient_lux: Option<f64>,
+    /// Infrared amplitude times the square of the distance over the cosine of the incidence: how
+    /// light the surface is, in the image's own units. Empty without an infrared image.
+    pub light: Vec<f32>,
+    /// Median infrared amplitude over the target, in the image's own units.
+    pub infrared: Option<f64>,
+    /// How often each stored word occurs on the target.
+    pub words: RawHistogram,
+    /// The target's region was given; else it ends where too little is measured.
+    pub region_given: bool,
+    /// Where the target ends before something else.
+    pub edges: Edges,
+}
+
+/// Beyond this many sigmas of the model, or of the view's own residuals where errors the model
+/// lacks are larger, a residual is no noise: it is kept out of the means and left to the tests of
+/// the tails.
+pub const CLIP_SIGMAS: f32 = 6.0;
+
+impl Field {
+    /// Read the view and collect its residuals.
+    ///
+    /// # Errors
+    /// When no frame can be read or none shows a plane.
+    pub fn read(
+        view: &View,
+        bench: &Workbench<'_>,
+        sigma: &SigmaModel,
+        known: &KnownTerms,
+        session_start: f64,
+    ) -> Result<Self> {
+        let (target, held) = view_target(view, bench)?;
+        let camera = &bench.sensor.camera;
+        let mut field = Field::empty(view, bench.sensor, target.plane, target.pixels);
+        field.spread_px = (target.scale * field.scale_px_m) as f32;
+        let start = view.depth.first().map_or(0.0, |f| f.timestamp);
+        let mut held = held.into_iter().peekable();
+        // Frames that showed the target are not read twice.
+        let frames = view.depth.iter().enumerate().filter_map(|(number, frame)| {
+            let image = match held.next_if(|h| h.0 == number) {
+                Some((_, image)) => image,
+                None => read_depth(frame, camera.width, camera.height).ok()?,
+            };
+            Some((frame.timestamp - start, image))
+        });
+        field.accumulate(frames, bench, sigma, known, session_start);
+        field.read_infrared(view, &bench.rays);
+        Ok(field)
+    }
+
+    /// The same pixels about the same plane, seen in other frames (time since the first, s).
+    pub fn with_frames(
+        &self,
+        frames: impl Iterator<Item = (f64, Frame)>,
+        bench: &Workbench<'_>,
+        sigma: &SigmaModel,
+        known: &KnownTerms,
+        session_start: f64,
+    ) -> Self {
+        let n = self.pixels.len();
+        let mut field = Field {
+            mean: vec![0.0; n],
+            square: vec![0.0; n],
+            count: vec![0; n],
+            measured: vec![0; n],
+            first: Vec::new(),
+            frames: Vec::new(),
+            words: RawHistogram::none(),
+            ..self.clone()
+        };
+        field.accumulate(frames, bench, sigma, known, session_start);
+        field
+    }
+
+    /// Read how light the surfaces are; without an infrared image that can be read it stays unknown.
+    fn read_infrared(&mut self, view: &View, rays: &Rays) {
+        let Some(amplitudes) = amplitudes(view, &self.on_target(), self.width) else { return };
+        self.infrared = Some(f64::from(median_in_place(&mut amplitudes.clone())));
+        let n = self.plane.q.normalize();
+        let light = self.pixels.iter().zip(amplitudes).map(|(&i, amplitude)| {
+            let (x, y) = rays.at(i as usize);
+            let ray = nalgebra::Vector3::new(x, y, 1.0);
+            let facing = (n.dot(&ray) / ray.norm()).abs().max(0.02);
+            let far = self.plane.depth(x, y).powi(2) * ray.norm_squared();
+            (f64::from(amplitude) * far / facing) as f32
+        });
+        self.light = light.collect();
+    }
+
+    /// Infrared amplitude of a target that faces the sensor at 1 m, in the image's own units.
+    pub fn pattern_at_1m(&self) -> Option<f64> {
+        let light = median_in_place(&mut self.light.clone());
+        (light > 0.0).then_some(f64::from(light))
+    }
+
+    /// Variance over the frames of their lines at this disparity, px^2: what moves as a whole is
+    /// not the pixels' noise.
+    pub fn moved_px2(&self, disparity: f64) -> f64 {
+        let x = disparity - self.scale_px_m * self.plane.q.z;
+        let n = self.lines.len() as f64;
+        if n < 2.0 {
+            return 0.0;
+        }
+        let at = |line: &[f64; 2]| line[0] + line[1] * x;
+        let mean = self.lines.iter().map(at).sum::<f64>() / n;
+        self.lines.iter().map(|l| (at(l) - mean).powi(2)).sum::<f64>() / n
+    }
+
+    /// Pixels measured in a frame, on average.
+    pub fn measured_pixels(&self) -> f64 {
+        let measured: f64 = self.measured.iter().map(|&n| f64::from(n)).sum();
+        measured / self.frames.len().max(1) as f64
+    }
+
+    /// Values of the target's pixels as an image, NaN elsewhere.
+    pub fn image(&self, values: &[f32]) -> Vec<f32> {
+        let last = self.pixels.last().map_or(0, |&i| i as usize);
+        let rows = self.height.max(last / self.width + 1);
+        let mut image = vec![f32::NAN; self.width * rows];
+        for (&i, &value) in self.pixels.iter().zip(values) {
+            image[i as usize] = value;
+        }
+        image
+    }
+
+    /// The same without what is smooth.
+    pub fn high_passed(&self, values: &[f32]) -> Vec<f32> {
+        high_pass(&self.image(values), self.width, self.height, SMOOTH_PX)
+    }
+
+    fn empty(view: &View, sensor: &Sensor, plane: Plane, pixels: Vec<u32>) -> Self {
+        let scale_px_m = sensor.disparity_px_m().unwrap_or(sensor.camera.fx * KINECT_BASELINE_M);
+        let size = [sensor.camera.width, sensor.camera.height];
+        Field {
+            name: view.name.clone(),
+            time_s: view.depth.first().map_or(0.0, |f| f.timestamp),
+            reference_distance_m: view.notes.reference_distance_m,
+            flatness_m: view.notes.target.and_then(|t| t.flatness_m),
+            temperature_c: view.notes.temperature_c,
+            ambient_lux: view.notes.ambient_lux,
+            region_given: view.notes.region.is_some(),
+            ..Field::unseen(plane, scale_px_m, size, pixels)
+        }
+    }
+
+    /// These pixels of a picture about a plane, before anything is measured at them and with nothing
+    /// known of the view.
+    pub(in crate::diagnose) fn unseen(
+        plane: Plane,
+        scale_px_m: f64,
+        [width, height]: [usize; 2],
+        pixels: Vec<u32>,
+    ) -> Self {
+        let n = pixels.len();
+        let mut field = Field {
+            name: String::new(),
+            time_s: 0.0,
+            plane,
+            scale_px_m,
+            width,
+            height,
+            pixels,
+            edge: Vec::new(),
+            sigma: Vec::new(),
+            spread_px: 0.0,
+            mean: vec![0.0; n],
+            square: vec![0.0; n],
+            count: vec![0; n],
+            measured: vec![0; n],
+            first: Vec::new(),
+            frames: Vec::new(),
+            lines: Vec::new(),
+            reference_distance_m: None,
+            flatness_m: None,
+            temperature_c: None,
+            ambient_lux: None,
+            light: Vec::new(),
+            infrared: None,
+            words: RawHistogram::none(),
+            region_given: false,
+            edges: Edges::default(),
+        };
+        let distances = edge_distances(&field.on_target(), width);
+        field.edge = field.pixels.iter().map(|&i| distances[i as usize]).collect();
+        field
+    }
+
+    /// Disparity of the plane at pixel number `k` of the target, px.
+    pub fn disparity(&self, k: usize, rays: &Rays) -> f64 {
+        self.plane_at(self.pixels[k] as usize, rays)
+    }
+
+    /// Disparity of the plane at pixel `i` of the picture, px.
+    pub fn plane_at(&self, i: usize, rays: &Rays) -> f64 {
+        let (x, y) = rays.at(i);
+        self.scale_px_m * self.plane.inverse_depth(x, y)
+    }
+
+    /// The model's sigma in the middle of the target, px.
+    pub fn middle_sigma_px(&self) -> Option<f32> {
+        self.sigma.get(self.sigma.len() / 2).copied()
+    }
+
+    /// Whether each pixel of the picture is one of the target's.
+    pub fn on_target(&self) -> Vec<bool> {
+        let mut on = vec![false; self.width * self.height];
+        self.pixels.iter().for_each(|&i| on[i as usize] = true);
+        on
+    }
+}

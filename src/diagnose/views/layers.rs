@@ -1,0 +1,199 @@
+//! The layers a mismatch may sit in: the mean, and the size of the noise.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::blocks::blocks;
+use super::field::Field;
+use super::learnt::Learnt;
+use super::light::{Light, relative_light};
+use super::samples::{ViewData, coarser};
+use super::surveyed_view::{SurveyedView, independent_frames, inflation, mean_data};
+use super::tiles::{roughen, tiles};
+use crate::camera::{Camera, Rays};
+use crate::diagnose::checks::replication::halves;
+use crate::diagnose::options::Ablation;
+use crate::diagnose::search::view_levels::{MODEL_TOLERANCE, view_scatter};
+use crate::effects::Flat;
+use crate::sensors::SensorKind;
+use crate::stats::Correlation;
+use crate::terms::{Extent, PixelContext, Term};
+
+/// The tiles of all views, with how much each view is worth.
+pub struct Survey {
+    pub views: Vec<SurveyedView>,
+    pub reach: Extent,
+    /// Where every view states how flat its target is: the least flat of them.
+    pub flat: Option<Flat>,
+    /// Of the camera.
+    pub kind: Option<SensorKind>,
+    /// Variance of what each pixel errs by in every view alike, px^2.
+    pub fixed_px2: f64,
+    pub light: Light,
+    /// Blocks fall into parts by their light; those of two recordings that are compared do not.
+    pub by_light: bool,
+    /// How well the size of the noise is known from view to view beforehand, in log variance.
+    pub tolerance: f64,
+    /// Sigma was calibrated on these very views: it is refitted beside every hypothesis.
+    pub refits_sigma: bool,
+    /// Views that the model's bias, and its sigma, were learnt from, where these are others.
+    pub learnt_from: [Option<Learnt>; 2],
+    /// What single views differ from the model by, one standard deviation a term: of the mean, and of
+    /// the variance.
+    pub between: Arc<[Vec<Term>; 2]>,
+    pub ablation: Ablation,
+}
+
+impl Survey {
+    pub fn of(fields: &[Field], camera: &Camera, rays: &Rays) -> Self {
+        let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
+        let poses: Vec<(f64, f64)> =
+            fields.iter().map(|f| (f.plane.distance(), f.plane.theta())).collect();
+        let mut views: Vec<SurveyedView> = fields
+            .par_iter()
+            .zip(halves(&poses))
+            .map(|(f, in_second_half)| {
+                let (inflation, correlation) = inflation(f, &[]);
+                let tiles = Arc::new(tiles(f, camera, rays, start));
+                SurveyedView {
+                    name: f.name.clone(),
+                    tiles,
+                    inflation,
+                    correlation,
+                    frames: independent_frames(f),
+                    log_variance_inflation: 1.0,
+                    between_frame_factor: None,
+                    in_second_half,
+                }
+            })
+            .collect();
+        let light = relative_light(&mut views);
+        let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter().map(|t| &t.place)));
+        let stated: Option<Vec<f64>> = fields.iter().map(|f| f.flatness_m).collect();
+        let flat = stated.filter(|all| !all.is_empty()).map(|all| Flat {
+            flatness_m: all.into_iter().fold(0.0, f64::max),
+            right: reach.right,
+            down: reach.down,
+        });
+        let (tolerance, ablation) = (MODEL_TOLERANCE, Ablation::None);
+        Survey {
+            views,
+            reach,
+            flat,
+            kind: None,
+            fixed_px2: 0.0,
+            light,
+            by_light: true,
+            tolerance,
+            refits_sigma: false,
+            learnt_from: [None; 2],
+            between: Arc::default(),
+            ablation,
+        }
+    }
+
+    /// The views' mean residuals, about a plane of their own each.
+    pub fn mean_data(&self) -> Vec<ViewData> {
+        self.views.par_iter().map(|v| mean_data(v).beside(&self.between[0])).collect()
+    }
+
+    /// The same in larger patches.
+    pub fn coarse_mean_data(&self) -> Vec<ViewData> {
+        let coarse = |v| coarser(&mean_data(v)).beside(&self.between[0]);
+        self.views.par_iter().map(coarse).collect()
+    }
+
+    /// The views at these places.
+    pub fn subset(&self, which: &[usize]) -> Survey {
+        let views: Vec<SurveyedView> = which.iter().map(|&n| self.views[n].clone()).collect();
+        let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter().map(|t| &t.place)));
+        let mut part = Survey { views, reach, between: self.between.clone(), ..*self };
+        part.skip_covariance();
+        part
+    }
+
+    /// Nobody asks how sure a search of these views is: whether halves agree, and the covariance.
+    pub fn skip_covariance(&mut self) {
+        self.views.iter_mut().for_each(|v| v.in_second_half = false);
+    }
+
+    /// Measure anew what the views' means are worth, with what was found of the bias taken out, px
+    /// by view and pixel. `false`, and nothing is changed, where that changes little.
+    pub fn reweigh(&mut self, fields: &[Field], bias: &[Vec<f32>]) -> bool {
+        const LITTLE: f64 = 1.3;
+        let views = fields.par_iter().zip(bias);
+        let anew: Vec<(f64, Correlation)> = views.map(|(f, b)| inflation(f, b)).collect();
+        let more = |(view, new): (&SurveyedView, &(f64, Correlation))| {
+            new.0 > 0.0 && view.inflation > LITTLE * new.0
+        };
+        if !self.views.iter().zip(&anew).any(more) {
+            return false;
+        }
+        for (view, (inflation, correlation)) in self.views.iter_mut().zip(anew) {
+            if inflation < view.inflation {
+                (view.inflation, view.correlation) = (inflation, correlation);
+            }
+        }
+        true
+    }
+
+    /// Noise is what changes from frame to frame; `common` is the correlation of two frames of a
+    /// view that comes from noise, by lag.
+    pub fn compare_frames(&mut self, fields: &[Field], common: [f64; 3]) {
+        for (view, field) in self.views.iter_mut().zip(fields) {
+            let n = field.frames.len();
+            if n < 2 {
+                continue;
+            }
+            // Mean correlation of two different frames.
+            let (mut sum, mut pairs) = (0.0, 0.0);
+            for lag in 1..n {
+                sum += (n - lag) as f64 * common[lag.min(3) - 1];
+                pairs += (n - lag) as f64;
+            }
+            let mean = (sum / pairs).clamp(0.0, 0.9);
+            view.between_frame_factor =
+                (mean < 0.9).then(|| n as f64 / (n as f64 - 1.0) / (1.0 - mean));
+            view.frames = view.frames.min(n as f64 - 1.0);
+        }
+    }
+
+    /// With what is known of the mean taken out of what the noise is measured on, view by view
+    /// and pixel by pixel, px; and with variance that has another name already, px^2, or is
+    /// stretched by a factor with the measurement itself.
+    pub fn roughen(
+        &mut self,
+        fields: &[Field],
+        bias: &[Vec<f32>],
+        extra: impl Fn(&PixelContext) -> f64 + Sync,
+        stretch: impl Fn(&PixelContext) -> f64 + Sync,
+    ) {
+        self.views.par_iter_mut().zip(fields).enumerate().for_each(|(n, (view, field))| {
+            let tiles = Arc::make_mut(&mut view.tiles);
+            if let Some(bias) = bias.get(n) {
+                roughen(tiles, field, bias);
+            }
+            for t in tiles {
+                let (factor, more) = (stretch(&t.place), extra(&t.place));
+                t.variance = t.variance * factor + more;
+                t.place.variance = t.place.variance * factor + more;
+            }
+        });
+    }
+
+    /// Log variance over the model's, block by block.
+    pub fn variance_data(&self) -> Vec<ViewData> {
+        let of = |v: &SurveyedView| blocks(v, self.by_light);
+        let blocks: Vec<ViewData> = self.views.par_iter().map(of).collect();
+        // A view's level is as uncertain as views scatter.
+        let precision = vec![1.0 / view_scatter(&blocks, self.tolerance)];
+        let held = |b| ViewData { precision: precision.clone(), ..b };
+        blocks.into_iter().map(|b| held(b).beside(&self.between[1])).collect()
+    }
+
+    /// Which half each view is in.
+    pub fn second(&self) -> Vec<bool> {
+        self.views.iter().map(|v| v.in_second_half).collect()
+    }
+}

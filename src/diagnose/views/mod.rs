@@ -1,0 +1,20 @@
+//! The views as they are looked at: residuals about planes, tiles, blocks, and what is known of them.
+
+pub mod between;
+pub mod blocks;
+pub mod box_sums;
+pub mod exposure;
+pub mod field;
+pub mod infrared;
+pub mod known;
+pub mod known_error;
+pub mod layers;
+pub mod learnt;
+pub mod light;
+pub mod margins;
+pub mod patches;
+pub mod reading;
+pub mod samples;
+pub mod surveyed_view;
+pub mod thinned;
+pub mod tiles;

@@ -1,0 +1,185 @@
+//! The views as fields of residuals: read, checked, and none of them twice.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use statrs::distribution::{Binomial, Discrete, DiscreteCDF};
+
+use super::field::Field;
+use super::known::KnownTerms;
+use crate::Progress;
+use crate::diagnose::diagnosis::Finding;
+use crate::diagnose::finding::other_findings::named;
+use crate::diagnose::finding::parameters::one;
+use crate::diagnose::options::FEWEST_VIEWS;
+use crate::effects::RAY_FOR_DEPTH;
+use crate::error::{Error, Result};
+use crate::measure::Workbench;
+use crate::model::NoiseModel;
+use crate::terms::{Axis, Statistic, Term};
+use crate::view::{Excluded, Recording};
+
+/// What could be read of a recording.
+pub(in crate::diagnose) struct LoadedViews {
+    pub fields: Vec<Field>,
+    pub excluded: Vec<Excluded>,
+    /// The words turned out to be ranges.
+    pub ranges: Option<Finding>,
+    /// Views that were another's copy, in words.
+    pub copies: Vec<String>,
+}
+
+impl LoadedViews {
+    /// Every view that can be used, one at least of each.
+    ///
+    /// # Errors
+    /// When fewer than three views are left.
+    pub fn of(
+        recording: &Recording,
+        bench: &Workbench<'_>,
+        model: &NoiseModel,
+        known: &KnownTerms,
+        progress: Progress<'_>,
+    ) -> Result<Self> {
+        let (mut fields, mut excluded) = read(recording, bench, model, known, progress);
+        let mut found = None;
+        if let Some((flat, p)) = as_ranges(recording, bench, model, known, &fields) {
+            (fields, excluded) = flat;
+            found = Some(ranges(p));
+        }
+        let copies = without_copies(&mut fields);
+        if fields.len() < FEWEST_VIEWS {
+            let first = excluded
+                .first()
+                .map_or_else(String::new, |e| format!("; view {}: {}", e.view, e.reason));
+            return Err(Error::recording(
+                &recording.root,
+                format!("{} of {} views can be used{first}", fields.len(), recording.views.len()),
+                "a diagnosis needs at least three views of a plane",
+            ));
+        }
+        Ok(LoadedViews { fields, excluded, ranges: found, copies })
+    }
+}
+
+pub(in crate::diagnose) fn refuse_other_size(
+    model: &NoiseModel,
+    sensor: &crate::view::Sensor,
+) -> Result<()> {
+    let Some(other) = &model.sensor else { return Ok(()) };
+    let (theirs, ours) = (&other.camera, &sensor.camera);
+    if (theirs.width, theirs.height) == (ours.width, ours.height) {
+        return Ok(());
+    }
+    Err(Error::Argument {
+        what: format!(
+            "the model's sensor has {} x {} px, the recording's {} x {}: its errors lie elsewhere",
+            theirs.width, theirs.height, ours.width, ours.height
+        ),
+        remedy: "give the model that was made of this very sensor",
+    })
+}
+
+/// A view whose frames are bit-identical to another's is a duplicate and is dropped.
+fn without_copies(fields: &mut Vec<Field>) -> Vec<String> {
+    let mut told = Vec::new();
+    let mut kept: Vec<Field> = Vec::new();
+    for field in fields.drain(..) {
+        let same = |other: &&Field| {
+            other.words.0 == field.words.0
+                && other.frames.len() == field.frames.len()
+                && other.pixels == field.pixels
+                && other.first.first().map(|f| bits(f)) == field.first.first().map(|f| bits(f))
+        };
+        match kept.iter().find(same) {
+            Some(other) => told.push(format!(
+                "view {} has the same frames as view {}: it was left out",
+                field.name, other.name
+            )),
+            None => kept.push(field),
+        }
+    }
+    *fields = kept;
+    told
+}
+
+fn bits(residuals: &[f32]) -> Vec<u32> {
+    residuals.iter().map(|r| r.to_bits()).collect()
+}
+
+/// Views that can be used, and those that cannot.
+type Read = (Vec<Field>, Vec<Excluded>);
+
+/// Do the views become flat once their words are taken for lengths of rays? Then with them, and with
+/// the chance of it were either reading as good as the other (the exact test of McNemar).
+fn as_ranges(
+    recording: &Recording,
+    bench: &Workbench<'_>,
+    model: &NoiseModel,
+    known: &KnownTerms,
+    as_depths: &[Field],
+) -> Option<(Read, f64)> {
+    let flat = as_depths.len();
+    if 2 * flat >= recording.views.len() || known.has("range-not-depth") {
+        return None;
+    }
+    let bench = Workbench { ranges: true, ..Workbench::new(bench.sensor, bench.options) };
+    let mut told = known.clone();
+    told.bias.push(range_term());
+    let (fields, excluded) = read(recording, &bench, model, &told, &|_, _| ());
+    if fields.len() < FEWEST_VIEWS || fields.len() <= 2 * flat {
+        return None;
+    }
+    let only = |these: &[Field], those: &[Field]| {
+        these.iter().filter(|f| those.iter().all(|g| g.name != f.name)).count() as u64
+    };
+    let (won, lost) = (only(&fields, as_depths), only(as_depths, &fields));
+    let p = Binomial::new(0.5, won + lost).map_or(1.0, |b| b.pmf(won) + b.sf(won));
+    Some(((fields, excluded), p))
+}
+
+fn range_term() -> Term {
+    Term::bias(RAY_FOR_DEPTH, vec![1.0])
+}
+
+/// The finding that goes with [`as_ranges`].
+fn ranges(p: f64) -> Finding {
+    Finding {
+        share: 1e6,
+        parameters: one("share", 1.0, 0.01),
+        p_adjusted: Some(p),
+        terms: vec![range_term()],
+        ..named("range-not-depth", Statistic::Bias, Axis::Radius)
+    }
+}
+
+pub(in crate::diagnose) fn read(
+    recording: &Recording,
+    bench: &Workbench<'_>,
+    model: &NoiseModel,
+    known: &KnownTerms,
+    progress: Progress<'_>,
+) -> Read {
+    let times = recording.views.iter().filter_map(|v| v.depth.first()).map(|f| f.timestamp);
+    let start = times.fold(f64::INFINITY, f64::min);
+    let done = AtomicUsize::new(0);
+    let total = recording.views.len();
+    let results: Vec<Result<Field>> = recording
+        .views
+        .par_iter()
+        .map(|v| {
+            let field = Field::read(v, bench, &model.sigma, known, start);
+            progress.step(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+            field
+        })
+        .collect();
+    let mut excluded = recording.excluded.clone();
+    let mut fields = Vec::new();
+    for (view, result) in recording.views.iter().zip(results) {
+        match result {
+            Ok(field) => fields.push(field),
+            Err(e) => excluded.push(Excluded::of(&view.name, &e)),
+        }
+    }
+    (fields, excluded)
+}

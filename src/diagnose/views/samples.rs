@@ -1,0 +1,91 @@
+//! The samples that a search works on.
+
+use super::tiles::SIDE;
+use crate::diagnose::search::rows::Rows;
+use crate::terms::{PixelContext, Term};
+
+/// One view's samples.
+#[derive(Clone, Default)]
+pub struct ViewData {
+    pub places: Vec<PixelContext>,
+    pub response: Vec<f64>,
+    pub weight: Vec<f64>,
+    /// Row-major, as many columns as `precision` has entries.
+    pub nuisance: Vec<f64>,
+    /// Holds each nuisance to zero; 0 leaves it free.
+    pub precision: Vec<f64>,
+    /// For larger patches: which of them each sample of the finer data went to.
+    pub gathered: Vec<u32>,
+}
+
+impl ViewData {
+    /// The weighted rows of a `response` at these places, the view's nuisances beside it.
+    pub fn rows(&self, response: &[f64]) -> Option<Rows<'_>> {
+        Rows::new(response, &self.weight, &self.nuisance, self.precision.len(), &self.precision)
+    }
+
+    /// Weighted mean of the response, and the weight of all samples.
+    pub fn level(&self) -> Option<(f64, f64)> {
+        let weight: f64 = self.weight.iter().sum();
+        let sum: f64 = self.response.iter().zip(&self.weight).map(|(y, w)| w * y).sum();
+        (weight > 0.0).then(|| (sum / weight, weight))
+    }
+
+    /// With these terms beside the view's own nuisances: each is there by a standard normal number.
+    pub fn beside(mut self, terms: &[Term]) -> Self {
+        if terms.is_empty() {
+            return self;
+        }
+        let mut row = Vec::new();
+        let own = self.nuisance.chunks_exact(self.precision.len()).zip(&self.places);
+        let with = |(own, place): (&[f64], &PixelContext)| {
+            let more = terms.iter().map(|t| finite(t.value(place, &mut row)));
+            own.iter().copied().chain(more).collect::<Vec<f64>>()
+        };
+        self.nuisance = own.flat_map(with).collect();
+        self.precision.extend(terms.iter().map(|_| 1.0));
+        self
+    }
+}
+
+pub fn finite(v: f64) -> f64 {
+    if v.is_finite() { v } else { 0.0 }
+}
+
+/// Two tiles by two made one.
+pub fn coarser(fine: &ViewData) -> ViewData {
+    let side = (2 * SIDE) as f64;
+    let p = fine.precision.len();
+    let mut groups: std::collections::BTreeMap<(u32, u32), Vec<usize>> = Default::default();
+    for (i, place) in fine.places.iter().enumerate() {
+        let key = ((place.v / side) as u32, (place.u / side) as u32);
+        groups.entry(key).or_default().push(i);
+    }
+    let mut coarse = ViewData {
+        places: Vec::with_capacity(groups.len()),
+        response: Vec::with_capacity(groups.len()),
+        weight: Vec::with_capacity(groups.len()),
+        nuisance: Vec::with_capacity(groups.len() * p),
+        precision: fine.precision.clone(),
+        gathered: vec![0; fine.places.len()],
+    };
+    for (k, members) in groups.values().enumerate() {
+        members.iter().for_each(|&i| coarse.gathered[i] = k as u32);
+        let weight: f64 = members.iter().map(|&i| fine.weight[i]).sum();
+        let mean = |of: &dyn Fn(usize) -> f64| {
+            if weight > 0.0 {
+                members.iter().map(|&i| fine.weight[i] * of(i)).sum::<f64>() / weight
+            } else {
+                of(members[0])
+            }
+        };
+        let mut place = fine.places[members[0]];
+        place.average(&fine.places, &mean);
+        place.side = side;
+        coarse.places.push(place);
+        coarse.response.push(mean(&|i| fine.response[i]));
+        coarse.weight.push(weight);
+        coarse.nuisance.extend((0..p).map(|q| mean(&|i| fine.nuisance[i * p + q])));
+    }
+    coarse
+}

@@ -1,0 +1,72 @@
+//! One view as the searches see it: its tiles, and how much they are worth.
+
+use std::sync::Arc;
+
+use super::field::Field;
+use super::samples::{ViewData, finite};
+use super::tiles::Tile;
+use crate::diagnose::noise::texture::{same_pixel, without_bias};
+use crate::stats::{Correlation, measure_correlation};
+
+/// A view, thinned.
+#[derive(Clone)]
+pub struct SurveyedView {
+    pub name: String,
+    /// Shared by the surveys of a part of the views.
+    pub tiles: Arc<Vec<Tile>>,
+    /// Variance of a pixel's mean in units of the model's, times pixels per independent sample.
+    pub inflation: f64,
+    pub correlation: Correlation,
+    /// Independent frames a view's variance is worth.
+    pub frames: f64,
+    /// How many times more uncertain the logarithm of its variance is than by that.
+    pub log_variance_inflation: f64,
+    /// What the variance between frames is to be multiplied by to be all of the noise's; `None`
+    /// with a single frame.
+    pub between_frame_factor: Option<f64>,
+    /// In the second of the halves that a finding must replicate in.
+    pub in_second_half: bool,
+}
+
+/// How much less a pixel's mean is worth than the model says: its variance relative to the
+/// model's, and how many pixels make one independent sample. Measured on what is left after a
+/// smooth error, and what is known of the bias (px, by pixel, or empty), is taken out.
+pub fn inflation(field: &Field, bias: &[f32]) -> (f64, Correlation) {
+    let rough = whitened_high_passed(&without_bias(&field.mean, bias), field);
+    let (mut sum, mut n) = (0.0, 0.0);
+    for r in rough.iter().filter(|r| r.is_finite()) {
+        sum += f64::from(*r).powi(2);
+        n += 1.0;
+    }
+    let correlation = measure_correlation(&rough, field.width);
+    let inflation = if n > 0.0 { (sum / n * correlation.sum).max(1e-6) } else { f64::INFINITY };
+    (inflation, correlation)
+}
+
+/// Whitened residuals as an image, without what is smooth.
+fn whitened_high_passed(residuals: &[f32], field: &Field) -> Vec<f32> {
+    let whitened: Vec<f32> = residuals.iter().zip(&field.sigma).map(|(r, s)| r / s).collect();
+    field.high_passed(&whitened)
+}
+
+/// F frames whose noise is the same by a share rho are worth 1 / (rho^2 + (1 - rho^2) / F).
+pub fn independent_frames(field: &Field) -> f64 {
+    let [first, second, ..] = field.first.as_slice() else { return 1.0 };
+    let rho = same_pixel(&whitened_high_passed(first, field), &whitened_high_passed(second, field));
+    let rho = if rho.is_finite() { rho.clamp(0.0, 1.0) } else { 0.0 };
+    let frames = field.frames.len() as f64;
+    1.0 / (rho * rho + (1.0 - rho * rho) / frames)
+}
+
+/// The means, about a plane of the view's own.
+pub fn mean_data(view: &SurveyedView) -> ViewData {
+    let tiles = &view.tiles;
+    ViewData {
+        places: tiles.iter().map(|t| t.place).collect(),
+        response: tiles.iter().map(|t| finite(t.mean)).collect(),
+        weight: tiles.iter().map(|t| finite(t.pixels / t.variance / view.inflation)).collect(),
+        nuisance: tiles.iter().flat_map(|t| [1.0, t.place.x, t.place.y]).collect(),
+        precision: vec![0.0; 3],
+        gathered: Vec::new(),
+    }
+}

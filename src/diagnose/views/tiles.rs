@@ -1,0 +1,206 @@
+//! Residuals thinned to tiles: what all searches work on.
+
+use nalgebra::Vector3;
+
+use super::field::Field;
+use crate::camera::{Camera, Rays};
+use crate::diagnose::noise::texture::high_passed;
+use crate::scene::TargetFrame;
+use crate::terms::{PixelContext, Pixels, corner_radius};
+
+/// Mean residual of a patch of pixels.
+#[derive(Debug, Clone, Copy)]
+pub struct Tile {
+    pub place: PixelContext,
+    /// Mean residual, px.
+    pub mean: f64,
+    /// Mean square of single frames' residuals, px^2.
+    pub square: f64,
+    /// Mean square of the mean residual without what is smooth, px^2.
+    pub rough_square: f64,
+    /// Mean variance of a pixel over the frames, px^2.
+    pub temporal: f64,
+    /// Model's variance of a pixel, px^2.
+    pub variance: f64,
+    /// Pixels with a mean.
+    pub pixels: f64,
+    /// Share of pixel-frames without a measurement, and their number.
+    pub missing: f64,
+    pub asked: f64,
+}
+
+/// Side of a tile, px: small against a Kinect's window of 9 px, so that ripples of a few px are
+/// still seen.
+pub const SIDE: usize = 4;
+
+/// Places of a view's pixels and patches.
+pub struct Places<'a> {
+    field: &'a Field,
+    camera: &'a Camera,
+    rays: &'a Rays,
+    board: TargetFrame,
+    corner: f64,
+    /// What is one for the view.
+    view: PixelContext,
+}
+
+impl<'a> Places<'a> {
+    /// `session_start` on the recording's clock, s.
+    pub fn of(field: &'a Field, camera: &'a Camera, rays: &'a Rays, session_start: f64) -> Self {
+        let mut view = PixelContext {
+            side: SIDE as f64,
+            session_s: field.time_s - session_start,
+            ambient: field.ambient_lux.unwrap_or(0.0),
+            temperature_c: field.temperature_c.unwrap_or(0.0),
+            light: 1.0,
+            variance: 1.0,
+            ..PixelContext::default()
+        };
+        view.lean_on(&field.plane, &Pixels::new(camera, rays, field.scale_px_m));
+        Places {
+            field,
+            camera,
+            rays,
+            board: board_frame(field, rays),
+            corner: corner_radius(camera),
+            view,
+        }
+    }
+
+    /// Of the pixel number `k` of the target; its variance is the field's.
+    pub fn pixel(&self, k: usize) -> PixelContext {
+        let i = self.field.pixels[k] as usize;
+        let (u, v) = ((i % self.camera.width) as f64, (i / self.camera.width) as f64);
+        let edge = f64::from(self.field.edge[k]);
+        let (x, y) = self.rays.at(i);
+        let place = self.at(u, v, (x, y), edge);
+        let variance = self.field.sigma.get(k).map_or(1.0, |s| f64::from(*s).powi(2));
+        PixelContext { side: 1.0, variance, ..place }
+    }
+
+    fn at(&self, u: f64, v: f64, (x, y): (f64, f64), edge: f64) -> PixelContext {
+        let (field, camera) = (self.field, self.camera);
+        let z = field.plane.depth(x, y);
+        let (right, down) = self.board.place(&(Vector3::new(x, y, 1.0) * z));
+        PixelContext {
+            u,
+            v,
+            x,
+            y,
+            disparity: field.scale_px_m / z,
+            z,
+            radius: ((u - camera.cx).powi(2) + (v - camera.cy).powi(2)).sqrt() / self.corner,
+            right,
+            down,
+            edge,
+            ..self.view
+        }
+    }
+}
+
+/// The tiles of a view.
+pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) -> Vec<Tile> {
+    let places = Places::of(field, camera, rays, session_start);
+    let across = camera.width.div_ceil(SIDE);
+    let rows = camera.height.div_ceil(SIDE);
+    let mut sums = vec![Sums::default(); across * rows];
+    let frames = field.frames.len() as f64;
+    for (k, &i) in field.pixels.iter().enumerate() {
+        let (u, v) = (i as usize % camera.width, i as usize / camera.width);
+        let s = &mut sums[v / SIDE * across + u / SIDE];
+        s.add(u, v, f64::from(field.edge[k]));
+        s.asked += frames;
+        s.missing += frames - f64::from(field.measured[k]);
+        s.variance += f64::from(field.sigma[k]).powi(2);
+        let (mean, square) = (f64::from(field.mean[k]), f64::from(field.square[k]));
+        if mean.is_finite() {
+            s.n += 1.0;
+            s.mean += mean;
+            s.square += square;
+            s.temporal += square - mean * mean;
+            s.darkness += f64::from(field.light.get(k).copied().unwrap_or(1.0)).recip();
+        }
+    }
+    let mut tiles: Vec<Tile> =
+        sums.iter().filter(|s| s.pixels > 0.0).map(|s| s.tile(&places)).collect();
+    for t in &mut tiles {
+        t.temporal -= field.moved_px2(t.place.disparity);
+    }
+    roughen(&mut tiles, field, &[]);
+    tiles
+}
+
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    pixels: f64,
+    u: f64,
+    v: f64,
+    edge: f64,
+    n: f64,
+    mean: f64,
+    square: f64,
+    temporal: f64,
+    /// One over the light: noise goes with it.
+    darkness: f64,
+    variance: f64,
+    asked: f64,
+    missing: f64,
+}
+
+impl Sums {
+    fn add(&mut self, u: usize, v: usize, edge: f64) {
+        self.pixels += 1.0;
+        self.u += u as f64;
+        self.v += v as f64;
+        self.edge += edge;
+    }
+
+    fn tile(&self, places: &Places<'_>) -> Tile {
+        let (u, v) = (self.u / self.pixels, self.v / self.pixels);
+        let place = places.at(u, v, places.camera.ray(u, v), self.edge / self.pixels);
+        let variance = self.variance / self.pixels;
+        Tile {
+            place: PixelContext { light: self.n / self.darkness, variance, ..place },
+            mean: self.mean / self.n,
+            square: self.square / self.n,
+            rough_square: f64::NAN,
+            temporal: self.temporal / self.n,
+            variance,
+            pixels: self.n,
+            missing: self.missing / self.asked,
+            asked: self.asked,
+        }
+    }
+}
+
+/// The target's own coordinates, begun at the centroid of its pixels.
+fn board_frame(field: &Field, rays: &Rays) -> TargetFrame {
+    const ENOUGH: usize = 5000;
+    let stride = (field.pixels.len() / ENOUGH).max(1);
+    let few: Vec<u32> = field.pixels.iter().copied().step_by(stride).collect();
+    let sum = few.iter().fold(Vector3::zeros(), |sum, &i| {
+        let (x, y) = rays.at(i as usize);
+        sum + Vector3::new(x, y, 1.0) * field.plane.depth(x, y)
+    });
+    TargetFrame::on(&field.plane, sum / few.len() as f64)
+}
+
+/// Measure the rough part of the mean, with what is known of it taken out, px by pixel (or empty).
+pub fn roughen(tiles: &mut [Tile], field: &Field, bias: &[f32]) {
+    let rough = high_passed(field, &field.mean, bias);
+    let across = field.width.div_ceil(SIDE);
+    let mut sums = vec![(0.0, 0.0); across * field.height.div_ceil(SIDE)];
+    for &i in &field.pixels {
+        let (u, v) = (i as usize % field.width, i as usize / field.width);
+        let r = f64::from(rough[i as usize]);
+        if r.is_finite() {
+            let s = &mut sums[v / SIDE * across + u / SIDE];
+            s.0 += r * r;
+            s.1 += 1.0;
+        }
+    }
+    for t in tiles {
+        let s = sums[t.place.v as usize / SIDE * across + t.place.u as usize / SIDE];
+        t.rough_square = s.0 / s.1;
+    }
+}
