@@ -3,7 +3,7 @@
 //! Layout: five lines that are skipped, then 80 x 80 rows (8 x 6 px each, row by row) of 23 numbers:
 //! three of the bins, then counts, two sums and the factors of five bins of 2 m. The reader divides a
 //! true depth by the factor, linear between the bins' middles at 1, 3, 5, 7 and 9 m
-//! (cpp/open3d/t/io/ImageIO.cpp; http://redwood-data.org/indoor/data/simdepth.py).
+//! (cpp/open3d/t/io/ImageIO.cpp; <http://redwood-data.org/indoor/data/simdepth.py>).
 
 use std::fmt::Write as _;
 

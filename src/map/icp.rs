@@ -19,7 +19,7 @@ pub trait Target: Sync {
     type Cache: Default + Clone + Send;
     /// The neighbour of a place, in the target's frame.
     fn find(&self, p: &Vector3<f32>, cache: &mut Self::Cache) -> Option<&Point>;
-    /// Width of what one point stands for at a depth of 1 m, m; `Some` switches the [`Gate`] on.
+    /// Width of what one point stands for at a depth of 1 m, m; `Some` switches the `Gate` on.
     fn block_width(&self) -> Option<f32> {
         None
     }
@@ -42,12 +42,12 @@ pub struct Alignment {
     pub covariance: Matrix6<f64>,
     pub iterations: usize,
     pub termination: Termination,
-    /// Share of the moving points that have a neighbour, before the [`Gate`].
+    /// Share of the moving points that have a neighbour, before the `Gate`.
     pub inlier_ratio: f64,
     /// Pairs of the last round; `covariance` and `rms_m` are theirs.
     pub correspondences: usize,
     /// The distances along the normals over what their weights expect, as a robust sigma: 1 where the
-    /// noise model says all. Of the pairs before the [`Gate`].
+    /// noise model says all. Of the pairs before the `Gate`.
     pub misfit: f64,
     /// Root mean square of the distances along the normals, m; `None` without correspondences.
     pub rms_m: Option<f64>,

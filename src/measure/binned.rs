@@ -9,7 +9,7 @@ use crate::units::counted;
 pub const MAX_ROWS: usize = 10_000;
 
 impl SigmaTable {
-    /// The table itself, or where it has more than [`MAX_ROWS`] rows one of at most so many, and a
+    /// The table itself, or where it has more than `MAX_ROWS` rows one of at most so many, and a
     /// sentence on it: rows of one view, alike in distance and tilt, are pooled into one of their mean
     /// variance. Where there are more views than that, views are pooled too.
     pub fn binned(&self) -> (SigmaTable, Option<String>) {
