@@ -11,7 +11,7 @@ use super::distance::referenced_view::{referenced_views, scatter};
 use super::engine::Diagnosed;
 use super::finding::findings;
 use super::finding::pixels::typical_sigma_mm;
-use super::joint::anchor::anchor;
+use super::joint::anchor::{anchor, let_planes_be};
 use super::search::outcome::Outcome;
 use super::verdict::{extend, not_identifiable, shares, untested, verdict};
 use super::views::between::between;
@@ -113,6 +113,8 @@ impl Case<'_> {
         let checked = referenced_views(&self.fields, &levels, &known, &self.survey.second());
         if checked.len() >= laws::FEWEST {
             anchor(added, &checked, scatter(&checked).0, camera);
+        } else {
+            let_planes_be(added, camera);
         }
     }
 

@@ -47,7 +47,7 @@ impl Effect for LensDistortion {
             // The reference was recorded where the sensor works.
             let [low, high] = bounds.reach.disparity;
             for reference_px in [low, (low * high).sqrt(), high] {
-                all.extend([1, 2].map(|orders| matched(bounds.camera, reference_px, orders)));
+                all.extend([1, 2, 4].map(|orders| matched(bounds.camera, reference_px, orders)));
             }
         }
         all

@@ -22,19 +22,7 @@ impl Gauge {
     /// the optical axis by their physics.
     pub fn of(basis: &Basis, pixels: &Pixels<'_>) -> Option<Self> {
         let times = Modulation::still(basis.still_power()?);
-        let count = basis.count();
-        let mut square = Matrix3::zeros();
-        let mut cross = vec![Vector3::zeros(); count];
-        let mut row = vec![0.0; count];
-        for place in pixels.sampled() {
-            let ray = Vector3::new(1.0, place.x, place.y);
-            square += ray * ray.transpose();
-            basis.fill(&place, &mut row);
-            cross.iter_mut().zip(&row).for_each(|(c, g)| *c += ray * *g);
-        }
-        let solver = square.lu();
-        let affine = cross.iter().map(|c| Some(solver.solve(c)?.into())).collect::<Option<_>>()?;
-        Some(Gauge { times, affine })
+        Some(Gauge { times, affine: affine_parts(basis, pixels, |place| place)? })
     }
 
     /// Take the affine part out of the shape's columns.
@@ -53,6 +41,27 @@ impl Gauge {
         }
         (Basis::Affine { times: self.times }, sum)
     }
+}
+
+/// Of 1, x and y of the ray, a column each: what they make of the shape over the whole picture, by least
+/// squares. `at` says where it is looked at.
+pub fn affine_parts(
+    basis: &Basis,
+    pixels: &Pixels<'_>,
+    at: impl Fn(PixelContext) -> PixelContext,
+) -> Option<Vec<[f64; 3]>> {
+    let count = basis.count();
+    let mut square = Matrix3::zeros();
+    let mut cross = vec![Vector3::zeros(); count];
+    let mut row = vec![0.0; count];
+    for place in pixels.sampled() {
+        let ray = Vector3::new(1.0, place.x, place.y);
+        square += ray * ray.transpose();
+        basis.fill(&at(place), &mut row);
+        cross.iter_mut().zip(&row).for_each(|(c, g)| *c += ray * *g);
+    }
+    let solver = square.lu();
+    cross.iter().map(|c| Some(solver.solve(c)?.into())).collect()
 }
 
 #[cfg(test)]

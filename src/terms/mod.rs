@@ -19,7 +19,7 @@ pub use basis::{Basis, TABLE};
 pub(crate) use coordinate::DARKEST;
 pub use coordinate::{Coordinate, ROOM_LUX};
 pub use edges::edge_distances;
-pub use gauge::Gauge;
+pub use gauge::{Gauge, affine_parts};
 pub use modulation::{DISPARITY_UNIT_PX, Modulation};
 pub use needs::Needs;
 pub use pixels::Pixels;

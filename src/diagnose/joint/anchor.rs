@@ -10,7 +10,9 @@ use crate::camera::Camera;
 use crate::diagnose::distance::referenced_view::ReferencedView;
 use crate::model::Effect;
 use crate::solve::Cholesky;
-use crate::terms::{Basis, DISPARITY_UNIT_PX, Modulation, Pixels, Statistic, Term};
+use crate::terms::{
+    Basis, DISPARITY_UNIT_PX, Modulation, PixelContext, Pixels, Statistic, Term, affine_parts,
+};
 
 /// Biases of one power of the disparity, whose constant planes do not tell.
 pub struct Family {
@@ -44,7 +46,7 @@ pub fn anchor(added: &mut [Effect], checked: &[ReferencedView], variance: f64, c
         let times = Modulation::still(*power);
         let of_power = |t: &Term| t.is_correctable() && t.basis.still_power() == Some(*power);
         if let Some(effect) = added.iter_mut().find(|e| e.shape.iter().any(of_power)) {
-            lift(effect, times, shift * usual, (error * usual).powi(2));
+            lift(effect, times, [shift * usual, 0.0, 0.0], (error * usual).powi(2));
         }
     }
 }
@@ -92,8 +94,36 @@ fn constants(families: &[Family], checked: &[ReferencedView], variance: f64) -> 
     (0..n).map(|k| [constants[k], covariance[(k, k)].sqrt()]).collect()
 }
 
-/// Add a constant of the disparity, px, to an effect's shape.
-fn lift(effect: &mut Effect, times: Modulation, shift: f64, variance: f64) {
+/// Take out of the lenses of `added` what planes take up: where no distance was measured none may move.
+/// Across the optical axis a lens is its stretch times the disparity beyond the reference's.
+pub fn let_planes_be(added: &mut [Effect], camera: &Camera) {
+    let rays = camera.rays();
+    let pixels = Pixels::new(camera, &rays, 1.0);
+    for effect in added {
+        let lens = |t: &Term| match t.basis {
+            Basis::Lens { reference_px, .. } => {
+                Some((reference_px, stretch(t, reference_px, &pixels)?))
+            }
+            _ => None,
+        };
+        let lenses: Vec<(f64, [f64; 3])> = effect.shape.iter().filter_map(lens).collect();
+        for (reference_px, stretch) in lenses {
+            lift(effect, Modulation::Disparity, stretch.map(|s| -s), 0.0);
+            lift(effect, Modulation::One, stretch.map(|s| reference_px * s), 0.0);
+        }
+    }
+}
+
+/// The affine part of a lens's stretch: of its shape a pixel of disparity beyond the reference's.
+fn stretch(lens: &Term, reference_px: f64, pixels: &Pixels<'_>) -> Option<[f64; 3]> {
+    let beyond = |place| PixelContext { disparity: reference_px + 1.0, slope: [0.0; 2], ..place };
+    let parts = affine_parts(&lens.basis, pixels, beyond)?;
+    let sum = |k: usize| parts.iter().zip(&lens.coefficients).map(|(part, c)| part[k] * c).sum();
+    Some(std::array::from_fn(sum))
+}
+
+/// Add an affine part of the disparity, px, to an effect's shape; `variance` is that of its constant.
+fn lift(effect: &mut Effect, times: Modulation, affine: [f64; 3], variance: f64) {
     let of_times = |t: &Term| matches!(&t.basis, Basis::Affine { times: own } if *own == times);
     let at = effect.shape.iter().position(of_times).unwrap_or_else(|| {
         let term = Term {
@@ -110,7 +140,7 @@ fn lift(effect: &mut Effect, times: Modulation, shift: f64, variance: f64) {
         }
         effect.shape.len() - 1
     });
-    effect.shape[at].coefficients[0] += shift;
+    effect.shape[at].coefficients.iter_mut().zip(affine).for_each(|(c, a)| *c += a);
     let first: usize = effect.shape[..at].iter().map(|t| t.coefficients.len()).sum();
     if let Some(own) = effect.covariance.as_mut().and_then(|c| c.variances.get_mut(first)) {
         *own += variance;

@@ -78,3 +78,29 @@ fn poor_references_move_little() {
     assert!(shift.abs() < 0.01, "{shift}");
     assert!(error > 0.1, "{error}");
 }
+
+/// What is told of a lens moves no frontal plane, at any distance, and bends it as before.
+#[test]
+fn a_lens_without_references_moves_no_plane() {
+    let camera = kinect_v1(4).camera;
+    let basis = Basis::Lens { fx: camera.fx, fy: camera.fy, reference_px: 26.0, orders: 2 };
+    let lens = Term { statistic: Statistic::Bias, basis, coefficients: vec![0.02, -0.03] };
+    let mut added = [Effect { shape: vec![lens], ..Effect::default() }];
+    let_planes_be(&mut added, &camera);
+    let rays = camera.rays();
+    let pixels = Pixels::new(&camera, &rays, PX_M);
+    let shape = &added[0].shape;
+    assert_eq!(shape.len(), 3);
+    for disparity in [10.0, 26.0, 60.0] {
+        let at = |place| PixelContext { disparity, slope: [0.0; 2], ..place };
+        let mut sums = [0.0; 4];
+        for place in pixels.sampled().map(at) {
+            let px = Term::sum(shape, &place, &mut Vec::new());
+            let alone = Term::sum(&shape[..1], &place, &mut Vec::new());
+            let all = [px, px * place.x, px * place.y, (alone - px).powi(2)];
+            sums.iter_mut().zip(all).for_each(|(s, a)| *s += a);
+        }
+        assert!(sums[..3].iter().all(|s| s.abs() < 1e-8), "{disparity}: {sums:?}");
+        assert_eq!(sums[3] > 0.0, disparity != 26.0, "{disparity}: {sums:?}");
+    }
+}
