@@ -68,6 +68,9 @@ impl Case<'_> {
         if self.baseline.is_none() {
             self.anchor(&mut extended);
             self.sample(&mut extended);
+        } else {
+            let added = &mut extended.effects[self.model.effects.len()..];
+            let_planes_be(added, &self.sensor().camera);
         }
         let views = self.view_lines(&mean.terms, heldout.as_ref());
         let recording = self.recording.root.display().to_string();

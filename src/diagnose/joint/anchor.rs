@@ -46,7 +46,7 @@ pub fn anchor(added: &mut [Effect], checked: &[ReferencedView], variance: f64, c
         let times = Modulation::still(*power);
         let of_power = |t: &Term| t.is_correctable() && t.basis.still_power() == Some(*power);
         if let Some(effect) = added.iter_mut().find(|e| e.shape.iter().any(of_power)) {
-            lift(effect, times, [shift * usual, 0.0, 0.0], (error * usual).powi(2));
+            lift(effect, times, shift * usual, (error * usual).powi(2));
         }
     }
 }
@@ -94,36 +94,59 @@ fn constants(families: &[Family], checked: &[ReferencedView], variance: f64) -> 
     (0..n).map(|k| [constants[k], covariance[(k, k)].sqrt()]).collect()
 }
 
-/// Take out of the lenses of `added` what planes take up: where no distance was measured none may move.
-/// Across the optical axis a lens is its stretch times the disparity beyond the reference's.
+/// Take out of the lenses of `added` what every plane takes up: where no distance was measured none may
+/// move. Across the optical axis a lens is its stretch times the disparity beyond the reference's, and the
+/// stretch has a mean over the picture. Its slope bends tilted planes, and stays.
 pub fn let_planes_be(added: &mut [Effect], camera: &Camera) {
     let rays = camera.rays();
     let pixels = Pixels::new(camera, &rays, 1.0);
     for effect in added {
-        let lens = |t: &Term| match t.basis {
-            Basis::Lens { reference_px, .. } => {
-                Some((reference_px, stretch(t, reference_px, &pixels)?))
+        let mut first = 0;
+        let mut lenses = Vec::new();
+        for term in &effect.shape {
+            let span = first..first + term.coefficients.len();
+            first = span.end;
+            if let Basis::Lens { reference_px, .. } = term.basis {
+                let mean = mean_stretch(&term.basis, reference_px, &pixels);
+                lenses.extend(mean.map(|mean| (reference_px, mean, span)));
             }
-            _ => None,
-        };
-        let lenses: Vec<(f64, [f64; 3])> = effect.shape.iter().filter_map(lens).collect();
-        for (reference_px, stretch) in lenses {
-            lift(effect, Modulation::Disparity, stretch.map(|s| -s), 0.0);
-            lift(effect, Modulation::One, stretch.map(|s| reference_px * s), 0.0);
+        }
+        for (reference_px, mean, span) in lenses {
+            for (times, share) in [(Modulation::Disparity, -1.0), (Modulation::One, reference_px)] {
+                let (at, first) = constant_of(effect, times);
+                let constant = |all: &[f64]| -> f64 {
+                    all[span.clone()].iter().zip(&mean).map(|(c, m)| share * c * m).sum()
+                };
+                let all: Vec<f64> =
+                    effect.shape.iter().flat_map(|t| t.coefficients.iter().copied()).collect();
+                effect.shape[at].coefficients[0] += constant(&all);
+                for factor in effect.covariance.iter_mut().flat_map(|c| &mut c.factors) {
+                    factor[first] += constant(factor);
+                }
+            }
         }
     }
 }
 
-/// The affine part of a lens's stretch: of its shape a pixel of disparity beyond the reference's.
-fn stretch(lens: &Term, reference_px: f64, pixels: &Pixels<'_>) -> Option<[f64; 3]> {
+/// Of a lens's columns, a pixel of disparity beyond the reference's.
+fn mean_stretch(lens: &Basis, reference_px: f64, pixels: &Pixels<'_>) -> Option<Vec<f64>> {
     let beyond = |place| PixelContext { disparity: reference_px + 1.0, slope: [0.0; 2], ..place };
-    let parts = affine_parts(&lens.basis, pixels, beyond)?;
-    let sum = |k: usize| parts.iter().zip(&lens.coefficients).map(|(part, c)| part[k] * c).sum();
-    Some(std::array::from_fn(sum))
+    let parts = affine_parts(lens, pixels, beyond)?;
+    Some(parts.iter().map(|part| part[0]).collect())
 }
 
-/// Add an affine part of the disparity, px, to an effect's shape; `variance` is that of its constant.
-fn lift(effect: &mut Effect, times: Modulation, affine: [f64; 3], variance: f64) {
+/// Add a constant of the disparity, px, to an effect's shape.
+fn lift(effect: &mut Effect, times: Modulation, shift: f64, variance: f64) {
+    let (at, first) = constant_of(effect, times);
+    effect.shape[at].coefficients[0] += shift;
+    if let Some(own) = effect.covariance.as_mut().and_then(|c| c.variances.get_mut(first)) {
+        *own += variance;
+    }
+}
+
+/// The effect's affine term of this modulation, new where it has none: its number, and that of its first
+/// coefficient among all of the effect's.
+fn constant_of(effect: &mut Effect, times: Modulation) -> (usize, usize) {
     let of_times = |t: &Term| matches!(&t.basis, Basis::Affine { times: own } if *own == times);
     let at = effect.shape.iter().position(of_times).unwrap_or_else(|| {
         let term = Term {
@@ -140,11 +163,7 @@ fn lift(effect: &mut Effect, times: Modulation, affine: [f64; 3], variance: f64)
         }
         effect.shape.len() - 1
     });
-    effect.shape[at].coefficients.iter_mut().zip(affine).for_each(|(c, a)| *c += a);
-    let first: usize = effect.shape[..at].iter().map(|t| t.coefficients.len()).sum();
-    if let Some(own) = effect.covariance.as_mut().and_then(|c| c.variances.get_mut(first)) {
-        *own += variance;
-    }
+    (at, effect.shape[..at].iter().map(|t| t.coefficients.len()).sum())
 }
 
 #[cfg(test)]

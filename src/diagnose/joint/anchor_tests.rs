@@ -79,28 +79,42 @@ fn poor_references_move_little() {
     assert!(error > 0.1, "{error}");
 }
 
-/// What is told of a lens moves no frontal plane, at any distance, and bends it as before.
+/// What is told of a lens moves no plane as a whole, and bends every one as before.
 #[test]
 fn a_lens_without_references_moves_no_plane() {
     let camera = kinect_v1(4).camera;
     let basis = Basis::Lens { fx: camera.fx, fy: camera.fy, reference_px: 26.0, orders: 2 };
     let lens = Term { statistic: Statistic::Bias, basis, coefficients: vec![0.02, -0.03] };
-    let mut added = [Effect { shape: vec![lens], ..Effect::default() }];
+    let factor = vec![0.004, -0.005];
+    let covariance = Covariance { factors: vec![factor], ..Covariance::default() };
+    let mut added =
+        [Effect { shape: vec![lens], covariance: Some(covariance), ..Effect::default() }];
     let_planes_be(&mut added, &camera);
     let rays = camera.rays();
     let pixels = Pixels::new(&camera, &rays, PX_M);
     let shape = &added[0].shape;
     assert_eq!(shape.len(), 3);
-    for disparity in [10.0, 26.0, 60.0] {
-        let at = |place| PixelContext { disparity, slope: [0.0; 2], ..place };
-        let mut sums = [0.0; 4];
-        for place in pixels.sampled().map(at) {
-            let px = Term::sum(shape, &place, &mut Vec::new());
-            let alone = Term::sum(&shape[..1], &place, &mut Vec::new());
-            let all = [px, px * place.x, px * place.y, (alone - px).powi(2)];
-            sums.iter_mut().zip(all).for_each(|(s, a)| *s += a);
-        }
-        assert!(sums[..3].iter().all(|s| s.abs() < 1e-8), "{disparity}: {sums:?}");
-        assert_eq!(sums[3] > 0.0, disparity != 26.0, "{disparity}: {sums:?}");
+    // What is taken out errs with the lens: as the coefficients, so the factor.
+    let factor = &added[0].covariance.as_ref().unwrap().factors[0];
+    let coefficients: Vec<f64> = shape.iter().flat_map(|t| t.coefficients.clone()).collect();
+    assert_eq!([factor.len(), coefficients.len()], [8, 8]);
+    for of in [factor, &coefficients] {
+        assert!(of[2] != 0.0 && (of[2] + of[5] / 26.0).abs() < 1e-12, "{of:?}");
     }
+    let (mut told, mut alone) = (0.0, 0.0);
+    for (k, place) in pixels.sampled().enumerate() {
+        // A tilted plane, and a frontal one far from the reference.
+        let tilted = 34.0 + 40.0 * place.x - 20.0 * place.y;
+        for disparity in [tilted, 60.0] {
+            let at = PixelContext { disparity, slope: [0.0; 2], ..place };
+            let [px, lens] = [&shape[..], &shape[..1]].map(|s| Term::sum(s, &at, &mut Vec::new()));
+            // Whatever the plane, it is a multiple of its own disparity and a constant.
+            let taken = (disparity - 26.0) * -coefficients[2];
+            assert!((lens - px - taken).abs() < 1e-12, "{k}: {lens} {px} {taken}");
+        }
+        let at = PixelContext { disparity: 60.0, slope: [0.0; 2], ..place };
+        told += Term::sum(shape, &at, &mut Vec::new());
+        alone += Term::sum(&shape[..1], &at, &mut Vec::new());
+    }
+    assert!(told.abs() < 0.01 * alone.abs(), "{told} of {alone}");
 }
