@@ -1,11 +1,12 @@
 //! How a measured surface leans at each pixel: planes in disparity over small windows.
 //!
-//! Sums over any window come from a summed-area table (Crow 1984). A window that lies across an
-//! edge fits badly; then the best of four that have the pixel in a corner is taken (Kuwahara 1976).
+//! A window that lies across an edge fits badly; then the best of four that have the pixel in a
+//! corner is taken (Kuwahara 1976).
 
 use rayon::prelude::*;
 
 use crate::model::SigmaModel;
+use crate::stats::SummedArea;
 
 /// Half a window's side, px: 13 x 13 px bring the slope's noise to a fiftieth of a pixel's a px.
 const HALF: usize = 6;
@@ -70,13 +71,13 @@ impl Slopes {
         disparity: impl Fn(usize) -> f64 + Sync,
         noise: &Noise,
     ) -> Self {
-        let table = Table::of(width, height, &disparity);
+        let windows = Windows::of(width, height, &disparity);
         let mut slopes = vec![[0f32; 2]; width * height];
         slopes.par_chunks_mut(width).enumerate().for_each(|(v, line)| {
             for (u, slope) in line.iter_mut().enumerate() {
                 let d = disparity(v * width + u);
                 if d > 0.0 {
-                    *slope = table.slope(u, v, d, noise).map(|s| s as f32);
+                    *slope = windows.slope(u, v, d, noise).map(|s| s as f32);
                 }
             }
         });
@@ -89,46 +90,20 @@ impl Slopes {
     }
 }
 
-/// Summed-area table with a row and a column of zeros before the first.
-struct Table {
+/// Sums over any window of the image.
+struct Windows {
     width: usize,
     height: usize,
-    sums: Vec<Sums>,
+    sums: SummedArea<10>,
 }
 
-impl Table {
+impl Windows {
     fn of(width: usize, height: usize, disparity: &(impl Fn(usize) -> f64 + Sync)) -> Self {
-        let across = width + 1;
-        let mut sums = vec![[0f64; 10]; across * (height + 1)];
-        // Along the rows, each on its own ...
-        sums[across..].par_chunks_mut(across).enumerate().for_each(|(v, line)| {
-            let mut running = [0f64; 10];
-            for u in 0..width {
-                let d = disparity(v * width + u);
-                if d > 0.0 {
-                    let (x, y) = (u as f64, v as f64);
-                    let new = [1.0, x, y, x * x, x * y, y * y, d, x * d, y * d, d * d];
-                    running.iter_mut().zip(new).for_each(|(r, n)| *r += n);
-                }
-                line[u + 1] = running;
-            }
-        });
-        // ... then down the columns.
-        for v in 2..=height {
-            let (above, below) = sums.split_at_mut(v * across);
-            let above = &above[(v - 1) * across..];
-            for (b, a) in below[..across].iter_mut().zip(above) {
-                b.iter_mut().zip(a).for_each(|(b, a)| *b += a);
-            }
-        }
-        Table { width, height, sums }
-    }
-
-    /// Over columns `u0..u1` and rows `v0..v1`.
-    fn window(&self, [u0, u1]: [usize; 2], [v0, v1]: [usize; 2]) -> Sums {
-        let at = |u: usize, v: usize| &self.sums[v * (self.width + 1) + u];
-        let (a, b, c, d) = (at(u0, v0), at(u1, v0), at(u0, v1), at(u1, v1));
-        std::array::from_fn(|k| d[k] - b[k] - c[k] + a[k])
+        let pixel = |i: usize| {
+            let (d, x, y) = (disparity(i), (i % width) as f64, (i / width) as f64);
+            (d > 0.0).then_some([1.0, x, y, x * x, x * y, y * y, d, x * d, y * d, d * d])
+        };
+        Windows { width, height, sums: SummedArea::of(width, height, pixel) }
     }
 
     fn slope(&self, u: usize, v: usize, d: f64, noise: &Noise) -> [f64; 2] {
@@ -138,7 +113,9 @@ impl Table {
             [first, (first + SIDE).min(end)]
         };
         let fit = |left: usize, above: usize| {
-            LocalPlane::of(&self.window(span(u, left, self.width), span(v, above, self.height)))
+            LocalPlane::of(
+                &self.sums.window(span(u, left, self.width), span(v, above, self.height)),
+            )
         };
         let middle = fit(HALF, HALF);
         if let Some(plane) = middle.filter(|p| noise.passes(d, p.variance)) {

@@ -65,12 +65,9 @@ impl Case<'_> {
         remarks.extend(better_form);
         let told = found.iter().chain(&refitted);
         let mut extended = extend(self.model, told, self.sensor(), self.survey.reach.disparity);
+        self.anchor(&mut extended);
         if self.baseline.is_none() {
-            self.anchor(&mut extended);
             self.sample(&mut extended);
-        } else {
-            let added = &mut extended.effects[self.model.effects.len()..];
-            let_planes_be(added, &self.sensor().camera);
         }
         let views = self.view_lines(&mean.terms, heldout.as_ref());
         let recording = self.recording.root.display().to_string();
@@ -106,7 +103,7 @@ impl Case<'_> {
         }
     }
 
-    /// The biases learnt here leave distances as the references have them.
+    /// The biases learnt here leave distances as the references have them, or as they were.
     fn anchor(&self, extended: &mut NoiseModel) {
         let camera = &self.sensor().camera;
         let known = KnownTerms::of(extended, camera);
@@ -114,7 +111,7 @@ impl Case<'_> {
         let bias = added.iter().flat_map(|e| &e.shape).filter(|t| t.is_correctable());
         let levels = heldout::levels(&self.survey, &bias.cloned().collect::<Vec<_>>());
         let checked = referenced_views(&self.fields, &levels, &known, &self.survey.second());
-        if checked.len() >= laws::FEWEST {
+        if self.baseline.is_none() && checked.len() >= laws::FEWEST {
             anchor(added, &checked, scatter(&checked).0, camera);
         } else {
             let_planes_be(added, camera);

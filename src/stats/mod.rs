@@ -4,6 +4,7 @@ mod budget;
 mod correlation;
 mod paule_mandel;
 mod random_effects;
+mod summed_area;
 
 pub use budget::{
     Budget, COVERAGE_FACTOR, Component, Distribution, Evaluation, rounding_uncertainty,
@@ -11,6 +12,7 @@ pub use budget::{
 pub use correlation::{Correlation, measure_correlation};
 pub use paule_mandel::{between, paule_mandel};
 pub use random_effects::RandomEffects;
+pub use summed_area::SummedArea;
 
 use std::f64::consts::PI;
 

@@ -1,8 +1,9 @@
 //! A simulated recording in the model's place: view by view, what the real one shows beyond it.
 //!
 //! Means are compared tile by tile, each about its own plane, and variances block by block
-//! (`against_layers`); the structure of the noise view by view (`against_textures`). Both sides'
+//! (`layers`); the structure of the noise view by view (`textures`). Both sides'
 //! errors count.
+
 pub mod layers;
 pub mod noise;
 pub mod textures;

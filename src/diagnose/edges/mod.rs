@@ -4,12 +4,14 @@
 //! A footprint that sees both surfaces shifts the target's last pixels by a share of the step; what
 //! the projector cannot light is lost on one side, as wide as the disparity falls. Both are sums
 //! over hundreds of crossings and all frames, so that a thousandth of the step can be seen.
+
 pub mod mixing;
 pub mod scan;
 pub mod shadow;
 
 /// Pixels of the target that are looked at, from its edge inwards.
 pub const INSIDE_PX: usize = 12;
+
 /// Sums over the crossings at one distance from the edge.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Sums {

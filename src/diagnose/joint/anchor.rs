@@ -100,28 +100,21 @@ fn constants(families: &[Family], checked: &[ReferencedView], variance: f64) -> 
 pub fn let_planes_be(added: &mut [Effect], camera: &Camera) {
     let rays = camera.rays();
     let pixels = Pixels::new(camera, &rays, 1.0);
+    let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
     for effect in added {
         let mut first = 0;
-        let mut lenses = Vec::new();
-        for term in &effect.shape {
-            let span = first..first + term.coefficients.len();
+        for k in 0..effect.shape.len() {
+            let lens = &effect.shape[k];
+            let span = first..first + lens.coefficients.len();
             first = span.end;
-            if let Basis::Lens { reference_px, .. } = term.basis {
-                let mean = mean_stretch(&term.basis, reference_px, &pixels);
-                lenses.extend(mean.map(|mean| (reference_px, mean, span)));
-            }
-        }
-        for (reference_px, mean, span) in lenses {
+            let Basis::Lens { reference_px, .. } = lens.basis else { continue };
+            let Some(mean) = mean_stretch(&lens.basis, reference_px, &pixels) else { continue };
+            let stretch = dot(&lens.coefficients, &mean);
             for (times, share) in [(Modulation::Disparity, -1.0), (Modulation::One, reference_px)] {
-                let (at, first) = constant_of(effect, times);
-                let constant = |all: &[f64]| -> f64 {
-                    all[span.clone()].iter().zip(&mean).map(|(c, m)| share * c * m).sum()
-                };
-                let all: Vec<f64> =
-                    effect.shape.iter().flat_map(|t| t.coefficients.iter().copied()).collect();
-                effect.shape[at].coefficients[0] += constant(&all);
+                let constant = lift(effect, times, share * stretch, 0.0);
+                // It errs as the lens does.
                 for factor in effect.covariance.iter_mut().flat_map(|c| &mut c.factors) {
-                    factor[first] += constant(factor);
+                    factor[constant] += share * dot(&factor[span.clone()], &mean);
                 }
             }
         }
@@ -135,18 +128,8 @@ fn mean_stretch(lens: &Basis, reference_px: f64, pixels: &Pixels<'_>) -> Option<
     Some(parts.iter().map(|part| part[0]).collect())
 }
 
-/// Add a constant of the disparity, px, to an effect's shape.
-fn lift(effect: &mut Effect, times: Modulation, shift: f64, variance: f64) {
-    let (at, first) = constant_of(effect, times);
-    effect.shape[at].coefficients[0] += shift;
-    if let Some(own) = effect.covariance.as_mut().and_then(|c| c.variances.get_mut(first)) {
-        *own += variance;
-    }
-}
-
-/// The effect's affine term of this modulation, new where it has none: its number, and that of its first
-/// coefficient among all of the effect's.
-fn constant_of(effect: &mut Effect, times: Modulation) -> (usize, usize) {
+/// Add a constant of the disparity, px, to an effect's shape; its number among all coefficients.
+fn lift(effect: &mut Effect, times: Modulation, shift: f64, variance: f64) -> usize {
     let of_times = |t: &Term| matches!(&t.basis, Basis::Affine { times: own } if *own == times);
     let at = effect.shape.iter().position(of_times).unwrap_or_else(|| {
         let term = Term {
@@ -163,7 +146,12 @@ fn constant_of(effect: &mut Effect, times: Modulation) -> (usize, usize) {
         }
         effect.shape.len() - 1
     });
-    (at, effect.shape[..at].iter().map(|t| t.coefficients.len()).sum())
+    effect.shape[at].coefficients[0] += shift;
+    let first: usize = effect.shape[..at].iter().map(|t| t.coefficients.len()).sum();
+    if let Some(own) = effect.covariance.as_mut().and_then(|c| c.variances.get_mut(first)) {
+        *own += variance;
+    }
+    first
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 //! of the disparity. Every view's plane is free, and what planes absorb of a shape is taken out of
 //! it beforehand. How smooth the maps are, and whether they and the terms are needed, is decided on
 //! views left out.
+
 pub mod anchor;
 pub mod error;
 pub mod fit;

@@ -3,6 +3,7 @@
 //! Losses are judged in log odds, view by view, against views that differ for no reason by a
 //! factor of e and more: a finding must hold over the views. Steps on lawful axes have a name
 //! unless a nameless curve does clearly better.
+
 pub mod cells;
 pub mod few;
 pub mod finding;

@@ -1,4 +1,5 @@
 //! What the structure of the noise amounts to: each view is one sample of every statistic.
+
 pub mod frame_means;
 pub mod frames;
 pub mod in_time;

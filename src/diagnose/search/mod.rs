@@ -1,5 +1,6 @@
 //! The search for missing terms: best first, each step judged on held-out views against what
 //! noise alone would have brought.
+
 pub mod bias;
 pub mod candidate;
 pub mod choose;

@@ -1,4 +1,5 @@
 //! Steps of the words, and the variance that comes by other names than sigma.
+
 pub mod comb;
 pub mod lattice;
 
