@@ -12,7 +12,6 @@ use super::edges::mixing::mixing;
 use super::finding::findings;
 use super::finding::form::better_form;
 use super::finding::naming::{doubt_beside_the_unexplained, resembles_only, temper, unname};
-use super::finding::next_view;
 use super::finding::other_findings;
 use super::finding::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::finding::scene::Scene;
@@ -78,8 +77,8 @@ impl Case<'_> {
         ]
     }
 
-    /// All layers, one after the other; `advise` also looks for the views that would settle a name.
-    pub fn battery(&mut self, advise: bool) -> Battery {
+    /// All layers, one after the other.
+    pub fn battery(&mut self) -> Battery {
         let mean = self.mean();
         let scatter = self.scatter(&mean);
         self.at("naming, and searching the lost pixels", "naming what is left");
@@ -93,7 +92,7 @@ impl Case<'_> {
         let outcomes = [&mean.outcome, &scatter.outcome];
         let ((lost, of_few_views), (mut curves, textures)) = rayon::join(
             || (self.lost(), self.few_views(outcomes, &scatter, stepped)),
-            || (self.curves(outcomes, advise), self.texture(&mean, &scatter, steps)),
+            || (self.curves(outcomes), self.texture(&mean, &scatter, steps)),
         );
         let refitted = self.take_refit(&mut curves);
         curves.retain(|f| self.is_news(f, &scatter));
@@ -137,22 +136,10 @@ impl Case<'_> {
         self.baseline.as_ref().map(|b| &b.fields[..])
     }
 
-    /// Curves of the mean and of the variance, named or not, with the advised view.
-    fn curves(&self, outcomes: [&Outcome; 2], advise: bool) -> Vec<Finding> {
-        let scenes = self.scenes();
-        let mut found: Vec<Finding> = scenes
-            .iter()
-            .zip(outcomes)
-            .flat_map(|(scene, outcome)| findings::findings(scene, outcome))
-            .collect();
-        let camera = &self.sensor().camera;
-        for (scene, outcome) in scenes.iter().zip(outcomes).filter(|_| advise) {
-            let sigma = &self.model.sigma;
-            if let Some(outlook) = next_view::outlook(scene, sigma, camera, &self.bench.rays) {
-                next_view::advise(&mut found, scene, outcome, &outlook);
-            }
-        }
-        found
+    /// Curves of the mean and of the variance, named or not.
+    fn curves(&self, outcomes: [&Outcome; 2]) -> Vec<Finding> {
+        let layers = self.scenes().into_iter().zip(outcomes);
+        layers.flat_map(|(scene, outcome)| findings::findings(&scene, outcome)).collect()
     }
 
     /// Steps shift the mean within a step, and gross errors add to the variance: neither is news.

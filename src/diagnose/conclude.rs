@@ -4,12 +4,16 @@ use super::battery::Battery;
 use super::case::Case;
 use super::checks::far_off::far_off;
 use super::checks::heldout;
-use super::diagnosis::{DIAGNOSIS_FORMAT, Diagnosis, HeldOut, MapRow, Reference, ViewLine};
+use super::diagnosis::{
+    DIAGNOSIS_FORMAT, Diagnosis, Finding, HeldOut, MapRow, Reference, ViewLine,
+};
 use super::distance::laws;
 use super::distance::reference;
 use super::distance::referenced_view::{referenced_views, scatter};
 use super::engine::Diagnosed;
 use super::finding::findings;
+use super::finding::next_view;
+use super::finding::outlook::outlook;
 use super::finding::pixels::typical_sigma_mm;
 use super::joint::anchor::{anchor, let_planes_be};
 use super::search::outcome::Outcome;
@@ -45,6 +49,7 @@ impl Case<'_> {
         let Battery { mean, scatter, mut found, refitted, better_form, detectable: of_losses } =
             battery;
         let outcomes = [&mean.outcome, &scatter.outcome];
+        self.advise(&mut found, outcomes);
         let explained: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
         if found.is_empty() {
             found.extend(far_off(&self.survey, typical_sigma_mm(&self.fields)));
@@ -100,6 +105,16 @@ impl Case<'_> {
             bias_px: mean.px,
             excluded,
             against: again.against,
+        }
+    }
+
+    /// The views that would settle names that are in doubt.
+    fn advise(&self, found: &mut [Finding], outcomes: [&Outcome; 2]) {
+        let (sigma, camera, rays) = (&self.model.sigma, &self.sensor().camera, &self.bench.rays);
+        for (scene, outcome) in self.scenes().iter().zip(outcomes) {
+            if let Some(outlook) = outlook(scene, sigma, camera, rays) {
+                next_view::advise(found, scene, outcome, &outlook, self.options.seed);
+            }
         }
     }
 

@@ -168,6 +168,8 @@ pub struct NextView {
     /// Standard errors between the two best names, on the views there are and with this one added.
     pub separation_now: f64,
     pub separation_then: f64,
+    /// That with this view the true name is sure.
+    pub chance: f64,
     pub why: String,
 }
 

@@ -70,6 +70,6 @@ fn run(
     progress: Progress<'_>,
 ) -> Result<Diagnosed> {
     let mut case = Case::open(recording, simulated, model, options, progress)?;
-    let battery = case.battery(true);
+    let battery = case.battery();
     Ok(case.conclude(battery))
 }

@@ -36,7 +36,7 @@ impl Case<'_> {
             }
         }
         let mut case = self.again(fields, known, extended);
-        let battery = case.battery(false);
+        let battery = case.battery();
         for (field, mean) in case.fields.iter_mut().zip(means) {
             field.mean = mean;
             field.first.clear();

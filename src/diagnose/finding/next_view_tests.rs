@@ -1,99 +1,161 @@
+use rand_distr::{Distribution, StandardNormal};
+
 use super::*;
-use crate::model::{Domain, Form, PAPER_EQ1};
+use crate::diagnose::diagnosis::Alternative;
+use crate::diagnose::search::candidate::Candidate;
+use crate::diagnose::search::noise_gains::NoiseGains;
+use crate::diagnose::search::outcome::Rival;
+use crate::diagnose::views::samples::ViewData;
+use crate::model::{Domain, Form, PAPER_EQ1, SigmaModel};
+use crate::rng::Stream;
 use crate::simulate::kinect_v1;
-use crate::terms::{Basis, Coordinate, Modulation, PixelContext};
-
-fn sigma() -> SigmaModel {
-    let domain = Domain { z_m: [0.3, 9.0], theta_rad: [0.0, 1.3] };
-    SigmaModel::published(Form::Paper, &PAPER_EQ1, domain)
-}
-
-/// Of a target of this size, m.
-fn reach([width, height]: [f64; 2]) -> Extent {
-    let [right, down] = [width, height].map(|size| [-0.5 * size, 0.5 * size]);
-    Extent { right, down, edge: 100.0, ..Extent::default() }
-}
-
-fn term(basis: Basis, coefficients: Vec<f64>) -> Term {
-    Term { statistic: Statistic::Bias, basis, coefficients }
-}
+use crate::terms::{Basis, Coordinate, Extent, Modulation, Statistic, Term};
+use crate::view::Sensor;
 
 const WALL_M: [f64; 2] = [20.0, 20.0];
 const BOARD_M: [f64; 2] = [1.0, 0.8];
+const NAMES: [&str; 2] = ["radial-disparity-bias", "range-not-depth"];
 
-/// Frontal views, and what is asked of another.
-fn confused(best: &Term, rival: &Term, size: [f64; 2]) -> (Prospects, Prospects) {
-    let sensor = kinect_v1(4);
-    let (camera, rays, sigma, reach) = (&sensor.camera, sensor.camera.rays(), sigma(), reach(size));
-    let outlook = Outlook {
-        statistic: Statistic::Bias,
-        camera,
-        rays: &rays,
-        scale_px_m: sensor.disparity_px_m().unwrap(),
-        sigma: &sigma,
-        reach: &reach,
-        worth: 0.02,
-        precision: vec![0.0; 3],
-    };
-    let frontal: Vec<ViewData> =
-        [0.9, 1.3].iter().filter_map(|&z| outlook.view(&Plane::tilted(z, 0.0, 0.0))).collect();
-    assert!(frontal[0].places.iter().all(|p: &PixelContext| p.z > 0.0));
-    let there = prospects(&frontal, best, rival, &outlook);
-    let alone = prospects(&[], best, rival, &outlook);
-    (there, alone)
+/// A sensor in front of a target of this size, m.
+struct Stand {
+    sensor: Sensor,
+    sigma: SigmaModel,
+    reach: Extent,
 }
 
-/// What frontal views cannot tell: a bowl that stands still in the picture, and one that goes
-/// with the ray's angle to the surface, which is the same bowl while the target is faced.
-#[test]
-fn a_bowl_and_the_angle_of_incidence_ask_for_a_tilted_view() {
-    let (bowl, incidence) = (bowl_of(0.2), incidence());
-    let lens = term(
-        Basis::powers(Coordinate::RaySquared, 1, Modulation::RadialSlope { fx: 145.0, fy: 145.0 }),
-        vec![0.05],
-    );
-    let (there, _) = confused(&bowl, &incidence, WALL_M);
-    let best = there.best().unwrap();
-    assert!(best.separation > 2.0 * there.now, "{} {best:?}", there.now);
-    // A lens shows on tilted planes alone.
-    let (there, _) = confused(&lens, &bowl, WALL_M);
-    let best = there.best().unwrap();
-    assert!(there.now < 1e-6 && best.separation > 2.0, "{} {best:?}", there.now);
-    assert!(best.theta_rad > 0.4, "{best:?}");
-}
+impl Stand {
+    fn of([width, height]: [f64; 2]) -> Self {
+        let domain = Domain { z_m: [0.3, 9.0], theta_rad: [0.0, 1.3] };
+        let [right, down] = [width, height].map(|size| [-0.5 * size, 0.5 * size]);
+        Stand {
+            sensor: kinect_v1(4),
+            sigma: SigmaModel::published(Form::Paper, &PAPER_EQ1, domain),
+            reach: Extent { right, down, edge: 100.0, ..Extent::default() },
+        }
+    }
 
-#[test]
-fn the_advised_view_separates_more_than_most() {
-    let bow = term(Basis::relief(2), vec![0.02, 0.02, 0.0]);
-    let bowl =
-        term(Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(0.0)), vec![0.0; 2]);
-    for (best, rival) in [(&bow, &bowl), (&bowl_of(0.2), &bow)] {
-        let (there, alone) = confused(best, rival, BOARD_M);
-        let mut all: Vec<f32> = there.views.iter().map(|p| p.separation as f32).collect();
-        let median = f64::from(crate::stats::median_in_place(&mut all));
-        let most = there.best().unwrap();
-        assert!(most.separation > 1.2 * median, "{} {median} {most:?}", there.now);
-        assert!(there.views.iter().all(|p| p.separation >= there.now - 1e-6));
-        // Views taken hold the rival down: the same view alone tells less.
-        assert!(alone.best().unwrap().separation <= most.separation + 1e-6);
+    fn with<T>(&self, of: impl FnOnce(&Outlook<'_>) -> T) -> T {
+        let rays = self.sensor.camera.rays();
+        of(&Outlook {
+            statistic: Statistic::Bias,
+            camera: &self.sensor.camera,
+            rays: &rays,
+            scale_px_m: self.sensor.disparity_px_m().unwrap(),
+            sigma: &self.sigma,
+            reach: &self.reach,
+            worth: 0.02,
+            precision: vec![0.0; 3],
+        })
     }
 }
 
-/// Of a small board far away little is left in the picture: what a wall would tell there, it
-/// cannot.
+/// What frontal views cannot tell: a bowl that stands still in the picture, and one that goes with
+/// the distance, the same while the target is at one.
+fn bases() -> [Basis; 2] {
+    [0.0, 1.0].map(|p| Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(p)))
+}
+
+/// A search that ended with the first of two names, the other close behind.
+fn in_doubt() -> Outcome {
+    let rival = |(family, basis)| Rival { family, basis, gain: 20.0, behind: 0.0 };
+    let rivals: Vec<Rival> = NAMES.into_iter().zip(bases()).map(rival).collect();
+    let chosen = Chosen {
+        candidate: Candidate::named(NAMES[0], rivals[0].basis.clone()),
+        rms: 0.01,
+        adequacy: 0.6,
+        gain: 20.0,
+        best_curve: 20.0,
+        rivals,
+        p: 0.001,
+    };
+    Outcome { chosen: vec![chosen], noise: NoiseGains::unknown(), ..Outcome::default() }
+}
+
+fn stated(p: [f64; 2]) -> Vec<Alternative> {
+    let of = |(effect, p)| Alternative { effect, probability: Some(p) };
+    NAMES.into_iter().zip(p).map(of).collect()
+}
+
+/// A bowl of `k` px in the corner's radius, by the first or the second name.
+fn bowl(which: usize, k: f64) -> Term {
+    Term { statistic: Statistic::Bias, basis: bases()[which].clone(), coefficients: vec![k] }
+}
+
+/// With the term's bias, and noise of `sigmas` of what the weights say.
+fn recorded(mut view: ViewData, term: &Term, sigmas: f64, rng: &mut Stream) -> ViewData {
+    let mut row = Vec::new();
+    for ((y, place), w) in view.response.iter_mut().zip(&view.places).zip(&view.weight) {
+        let white: f64 = StandardNormal.sample(rng);
+        *y = term.value(place, &mut row) + sigmas * white / w.sqrt();
+    }
+    view
+}
+
+fn frontal(outlook: &Outlook<'_>, term: &Term, sigmas: f64, rng: &mut Stream) -> Vec<ViewData> {
+    let views = [0.95, 1.0, 1.0, 1.1, 1.05].map(|z| outlook.view(&Plane::tilted(z, 0.0, 0.0)));
+    views.into_iter().flatten().map(|view| recorded(view, term, sigmas, rng)).collect()
+}
+
+/// Poses by what they promise, for a bowl of `k` seen without noise, and how far apart the names are.
+fn advised(size: [f64; 2], k: f64) -> (Vec<Prospect>, f64) {
+    let (outcome, seed) = (in_doubt(), Seed(3));
+    Stand::of(size).with(|outlook| {
+        let views = frontal(outlook, &bowl(0, k), 0.0, &mut seed.stream("test"));
+        let of = (Statistic::Bias, &views[..]);
+        let contest = Contest::of(of, &outcome, &outcome.chosen[0], &stated([0.6, 0.39])).unwrap();
+        (prospects(&contest, outlook, seed), contest.separation(&contest.information()))
+    })
+}
+
 #[test]
-fn a_small_board_is_asked_for_near_by() {
-    let (bowl, incidence) = (bowl_of(0.2), incidence());
-    let [wall, board] =
-        [WALL_M, [0.6, 0.5]].map(|size| confused(&bowl, &incidence, size).0.best().copied());
-    let (wall, board) = (wall.unwrap(), board.unwrap());
-    assert!(board.separation < wall.separation && board.z_m <= wall.z_m, "{wall:?} {board:?}");
+fn what_frontal_views_confuse_asks_for_another_distance_or_tilt() {
+    let (all, now) = advised(WALL_M, 0.05);
+    let best = &all[0];
+    assert!(now < 3.0 && best.separation > 2.0 * now, "{now} {best:?}");
+    // As often as one of the two names is right.
+    assert!(best.chance > 0.9, "{best:?}");
+    // A cause that is hardly there is settled by no view.
+    let (all, _) = advised(WALL_M, 0.0005);
+    assert!(all.iter().all(|p| p.chance < 0.1), "{:?}", all[0]);
 }
 
-fn incidence() -> Term {
-    term(Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(1.0)), vec![0.0; 2])
+/// Of a small board far away little is left in the picture.
+#[test]
+fn a_small_board_promises_less_and_is_asked_for_near_by() {
+    let [wall, board] = [WALL_M, BOARD_M].map(|size| advised(size, 0.03).0[0]);
+    assert!(board.z_m < wall.z_m && board.separation < wall.separation, "{wall:?} {board:?}");
 }
 
-fn bowl_of(k: f64) -> Term {
-    term(Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(0.0)), vec![k])
+/// Truths of either name, recorded with noise; where the name is in doubt, a view more settles it as
+/// often as was promised: within three standard errors.
+#[test]
+fn a_view_settles_the_name_as_often_as_promised() {
+    let (outcome, stand) = (in_doubt(), Stand::of(WALL_M));
+    let (mut promised, mut kept, mut variance) = (0.0, 0.0, 0.0);
+    stand.with(|outlook| {
+        for seed in 0..80 {
+            let mut rng = Seed(seed).stream("test");
+            let truth = (seed % 2) as usize;
+            let term = bowl(truth, 0.02);
+            let views = frontal(outlook, &term, 1.0, &mut rng);
+            let of = (Statistic::Bias, &views[..]);
+            let contest = Contest::of(of, &outcome, &outcome.chosen[0], &stated([0.5, 0.5]));
+            let now = contest.unwrap().now;
+            if now[0].max(now[1]) >= SURE {
+                continue;
+            }
+            let now = stated([now[0], now[1]]);
+            let contest = Contest::of(of, &outcome, &outcome.chosen[0], &now).unwrap();
+            let another = outlook.view(&Plane::tilted(1.8, 0.0, 0.0)).unwrap();
+            let another = recorded(another, &term, 1.0, &mut rng);
+            let more = evidence_of_bases(&[another], &contest.bases).pop().unwrap();
+            let p = contest.chance(&more.a, rng);
+            let settled = contest.sure_with(&more) == Some(truth);
+            promised += p;
+            variance += p * (1.0 - p);
+            kept += f64::from(u8::from(settled));
+        }
+    });
+    assert!(variance > 4.0, "too few doubts: {promised} {kept} {variance}");
+    assert!((kept - promised).abs() < 3.0 * variance.sqrt(), "{promised} {kept} {variance}");
 }

@@ -8,11 +8,23 @@ use super::rules::Rules;
 use crate::terms::Basis;
 
 /// Of families that predict as well as the best, the one with the fewest columns is meant.
-const AS_GOOD_NATS: f64 = 2.0;
+pub const AS_GOOD_NATS: f64 = 2.0;
 /// So they do within this share of a large gain: no family's shape is exact.
 const AS_GOOD_SHARE: f64 = 0.01;
 /// A formula of the catalogue that is off by more is another formula.
 const FORMULA_ERROR: f64 = 0.1;
+
+/// How far behind the best a family predicts as well as it, nats.
+pub fn as_good(best: f64) -> f64 {
+    AS_GOOD_NATS.max(AS_GOOD_SHARE * best)
+}
+
+/// A candidate whose fits to single views disagree is the worse one, where they do by more than twice
+/// what chance scatters a mean square of so many numbers by: once is off the dispersion already.
+pub fn corrected(gain: f64, dispersion: f64, numbers: usize) -> f64 {
+    let clear = (dispersion - f64::sqrt(2.0 / numbers as f64)).max(1.0);
+    if gain > 0.0 { gain / clear.sqrt() } else { gain }
+}
 
 /// The candidates of a step, and what each comes to.
 pub struct Choice<'a> {
@@ -58,14 +70,11 @@ impl Choice<'_> {
         self.judged[i].as_ref().map_or(0.0, |j| j.calibrated_gain(self.rules))
     }
 
-    /// A candidate whose fits to single views disagree is the worse one, where they do by more than twice
-    /// what chance scatters a mean square by: once is off the dispersion already.
+    /// See [`corrected`].
     fn dispersion_corrected_gain(&self, i: usize) -> f64 {
-        let total = self.total(i);
         self.judged[i].as_ref().map_or(f64::NEG_INFINITY, |j| {
-            let numbers = (j.gain.by_view.len() * self.candidates[i].basis.count()) as f64;
-            let clear = (j.null.dispersion - f64::sqrt(2.0 / numbers)).max(1.0);
-            if total > 0.0 { total / clear.sqrt() } else { total }
+            let numbers = j.gain.by_view.len() * self.candidates[i].basis.count();
+            corrected(j.gain.total, j.null.dispersion, numbers)
         })
     }
 
@@ -103,7 +112,7 @@ impl Choice<'_> {
         let best_family =
             families.first().map_or(f64::NEG_INFINITY, |&i| self.dispersion_corrected_gain(i));
         let most = families.iter().map(|&i| self.total(i)).fold(0.0, f64::max);
-        let slack = AS_GOOD_NATS.max(AS_GOOD_SHARE * best_family);
+        let slack = as_good(best_family);
         let columns = |i: usize| self.candidates[i].basis.count();
         families
             .iter()

@@ -32,7 +32,7 @@ const NAME_ADEQUATE: f64 = 0.6;
 /// noise's size are not as exact.
 const OWN_AXIS_ADEQUATE: f64 = 0.92;
 /// Precision of a coefficient of the bias: a few px at most.
-const BIAS_PRIOR: f64 = 0.1;
+pub const BIAS_PRIOR: f64 = 0.1;
 /// Of one of log variance: a factor of e is already much.
 pub const VARIANCE_PRIOR: f64 = 1.0;
 

@@ -10,8 +10,6 @@ use crate::terms::{Basis, Statistic};
 /// So many findings have a sentence each; with the verdict, the rest, what is gained and what is left
 /// that makes seven.
 const MAX_SENTENCES: usize = 3;
-/// A second view of a pair of names is worth a word where it sets them this many standard errors apart.
-const SETTLES: f64 = 2.0;
 /// The largest findings a sentence each, all others in one, what views kept aside gain, and what the
 /// same tests find against the extended model: six at most, after the verdict's.
 pub fn story(diagnosis: &Diagnosis) -> Vec<String> {
@@ -83,8 +81,11 @@ fn settled_by(view: &NextView) -> String {
         tilt if tilt == "0" => "facing the sensor".to_string(),
         tilt => format!("tilted by {tilt}°, {} side away", far_side(view.azimuth_rad)),
     };
-    let helps = if view.separation_then > SETTLES { "would settle it" } else { "would help most" };
-    format!("; a view at {} m {pose} {helps}", fixed(view.z_m, 2))
+    let percent = fixed(100.0 * view.chance, 0);
+    format!(
+        "; a view at {} m {pose} would settle it with a chance of {percent} %",
+        fixed(view.z_m, 2)
+    )
 }
 
 /// Findings without a sentence of their own.

@@ -146,6 +146,7 @@ fn cases() -> [(Diagnosis, &'static [&'static str]); 9] {
         azimuth_rad: 0.05,
         separation_now: 0.4,
         separation_then: 6.0,
+        chance: 0.8,
         why: "a bent board moves with the board".into(),
     });
     let tape = Finding {

@@ -1,0 +1,257 @@
+//! Names in doubt, and what a view more would make of them.
+//!
+//! The view is drawn as the search will see it, by its normal equations A: one of the causes in
+//! doubt, with coefficients as probable as the views taken make them, gives it the scores A beta and
+//! noise as wide as these views scatter. Then all names are weighed anew. The share of draws after
+//! which the true name is sure is the chance that the view settles it (a preposterior analysis:
+//! Raiffa and Schlaifer 1961). A cause that should be farther ahead of a rival on the views taken
+//! than it is, is not alone there or not of its formula: it settles nothing.
+
+use nalgebra::{DMatrix, DVector};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use super::naming::{MIN_PROBABILITY, naming, temper};
+use crate::diagnose::diagnosis::Alternative;
+use crate::diagnose::search::candidate::{Candidate, RECALIBRATE};
+use crate::diagnose::search::choose::{AS_GOOD_NATS, as_good, behind, corrected};
+use crate::diagnose::search::evidence::{Evidence, Gain, gain, root};
+use crate::diagnose::search::layer_search::{BIAS_PRIOR, VARIANCE_PRIOR};
+use crate::diagnose::search::null::Null;
+use crate::diagnose::search::outcome::{Chosen, Outcome, Rival};
+use crate::diagnose::search::prepared::{evidence_of_bases, without};
+use crate::diagnose::views::samples::ViewData;
+use crate::rng::Stream;
+use crate::terms::{Basis, Statistic};
+
+/// A name this probable needs no further view.
+pub const SURE: f64 = 0.9;
+/// Draws of a view: a chance of one half to .04.
+const DRAWS: usize = 160;
+/// Standard errors that a cause may be less ahead of a rival than it should be.
+const SHORT: f64 = 2.0;
+
+/// The names in doubt, on the views taken.
+pub struct Contest<'a> {
+    chosen: &'a Chosen,
+    /// The most probable first.
+    pub names: Vec<Name<'a>>,
+    /// What is fitted beside every name, and the names'.
+    pub bases: Vec<&'a Basis>,
+    /// On the columns of all these; those beside the names come first.
+    taken: Vec<Evidence>,
+    beside: Vec<usize>,
+    prior: f64,
+    /// How probable each name is on the views taken, and that it is none of them, when weighed here:
+    /// on coarser samples than the search's and beside what it found.
+    pub now: Vec<f64>,
+}
+
+pub struct Name<'a> {
+    pub family: &'static str,
+    basis: &'a Basis,
+    probability: f64,
+    /// Those beside it first.
+    columns: Vec<usize>,
+    fit: Gain,
+    /// Of its coefficients' covariance.
+    root: DMatrix<f64>,
+    /// Variance of the views about it, over their noise's.
+    scatter: f64,
+    /// It is as far ahead of every rival as it should be.
+    borne_out: bool,
+}
+
+/// On these columns alone.
+fn part(e: &Evidence, columns: &[usize]) -> Evidence {
+    let a = e.a.select_rows(columns).select_columns(columns);
+    Evidence { a, b: e.b.select_rows(columns) }
+}
+
+impl<'a> Contest<'a> {
+    /// Between the names `stated` of a finding that began with `chosen`; all other terms are taken
+    /// out of `data` as they were fitted.
+    pub fn of(
+        (statistic, data): (Statistic, &[ViewData]),
+        outcome: &'a Outcome,
+        chosen: &'a Chosen,
+        stated: &[Alternative],
+    ) -> Option<Self> {
+        let is_law = |c: &&Chosen| c.candidate.family == Some(RECALIBRATE);
+        let mut bases: Vec<&Basis> =
+            outcome.chosen.iter().filter(is_law).map(|c| &c.candidate.basis).collect();
+        let others = (0..outcome.chosen.len()).filter(|&k| {
+            let c = &outcome.chosen[k];
+            !std::ptr::eq(c, chosen) && !is_law(&c)
+        });
+        let settled: Vec<(&Basis, Vec<f64>)> =
+            others.map(|k| (&outcome.chosen[k].candidate.basis, outcome.coefficients(k))).collect();
+        let left = |view: &ViewData| ViewData { response: without(view, &settled), ..view.clone() };
+        let data: Vec<ViewData> = data.par_iter().map(left).collect();
+        let beside: Vec<usize> = (0..bases.iter().map(|b| b.count()).sum()).collect();
+        let in_doubt = stated.iter().filter_map(|a| {
+            let rival = chosen.rivals.iter().find(|r| r.family == a.effect)?;
+            Some((rival, a.probability?))
+        });
+        let in_doubt: Vec<(&Rival, f64)> = in_doubt.collect();
+        bases.extend(in_doubt.iter().map(|(rival, _)| &rival.basis));
+        let taken = evidence_of_bases(&data, &bases);
+        let prior = if statistic == Statistic::Bias { BIAS_PRIOR } else { VARIANCE_PRIOR };
+        let mut first = beside.len();
+        let name = |(rival, probability): (&'a Rival, f64)| {
+            let next = first + rival.basis.count();
+            let columns: Vec<usize> = beside.iter().copied().chain(first..next).collect();
+            first = next;
+            let views: Vec<Evidence> = taken.iter().map(|e| part(e, &columns)).collect();
+            let fit = gain(&views, prior)?;
+            let root = root(&fit.covariance);
+            let scatter = Null::of(&views, beside.len(), prior)?.about_fit;
+            let Rival { family, ref basis, .. } = *rival;
+            Some(Name { family, basis, probability, columns, fit, root, scatter, borne_out: true })
+        };
+        let names: Vec<Name<'_>> = in_doubt.into_iter().filter_map(name).collect();
+        let now = Vec::new();
+        let mut contest = Contest { chosen, names, bases, taken, beside, prior, now };
+        let gains = contest.gains(None)?;
+        contest.now = contest.weigh(&gains)?;
+        let borne_out: Vec<bool> =
+            (0..contest.names.len()).map(|k| contest.is_borne_out(k, &gains)).collect();
+        contest.names.iter_mut().zip(borne_out).for_each(|(name, b)| name.borne_out = b);
+        (contest.names.len() > 1).then_some(contest)
+    }
+
+    /// Is it ahead of the rivals as it should be if it were true?
+    fn is_borne_out(&self, k: usize, gains: &[(Gain, f64)]) -> bool {
+        let information = self.information();
+        (0..self.names.len()).filter(|&r| r != k).all(|r| {
+            // Twice the expected gain is the variance of it.
+            let apart = self.apart(&information, &self.names[k], &self.names[r]);
+            gains[k].1 - gains[r].1 > 0.5 * apart - SHORT * apart.sqrt() - AS_GOOD_NATS
+        })
+    }
+
+    /// Standard errors between a cause as it was fitted and the best that a rival can do, in square.
+    fn apart(&self, a: &DMatrix<f64>, truth: &Name<'_>, rival: &Name<'_>) -> f64 {
+        let own = &truth.columns[self.beside.len()..];
+        let beta = truth.fit.beta.rows(self.beside.len(), own.len()).into_owned();
+        let of = |rows: &[usize], columns: &[usize]| a.select_rows(rows).select_columns(columns);
+        let cross = of(&rival.columns, own) * &beta;
+        let mut free = of(&rival.columns, &rival.columns);
+        // Columns that say nothing must not divide by nothing.
+        let floor = 1e-9 * free.diagonal().max().max(f64::MIN_POSITIVE);
+        free.set_diagonal(&free.diagonal().add_scalar(floor));
+        let absorbed = free.cholesky().map_or(0.0, |c| cross.dot(&c.solve(&cross)));
+        (beta.dot(&(of(own, own) * &beta)) - absorbed).max(0.0)
+    }
+
+    /// The same, weighted by the chance that the one is true and the other in its place.
+    pub fn all_apart(&self, a: &DMatrix<f64>) -> f64 {
+        let pairs = self.names.iter().flat_map(|n| self.names.iter().map(move |m| (n, m)));
+        pairs
+            .filter(|(truth, rival)| truth.family != rival.family)
+            .map(|(truth, rival)| {
+                truth.probability * rival.probability * self.apart(a, truth, rival)
+            })
+            .sum()
+    }
+
+    /// What each name brings on the views taken and one more; and the same less where views scatter.
+    fn gains(&self, more: Option<&Evidence>) -> Option<Vec<(Gain, f64)>> {
+        let gain_of = |columns: &[usize]| {
+            let views = self.taken.iter().chain(more).map(|e| part(e, columns));
+            gain(&views.collect::<Vec<_>>(), self.prior)
+        };
+        let base = if self.beside.is_empty() { None } else { Some(gain_of(&self.beside)?) };
+        let over_base = |name: &Name<'_>| {
+            let mut gain = gain_of(&name.columns)?;
+            if let Some(base) = &base {
+                gain.total -= base.total;
+                gain.by_view.iter_mut().zip(&base.by_view).for_each(|(g, b)| *g -= b);
+            }
+            let numbers = gain.by_view.len() * name.basis.count();
+            let counts = corrected(gain.total, name.scatter, numbers);
+            Some((gain, counts))
+        };
+        self.names.iter().map(over_base).collect()
+    }
+
+    /// How probable such gains make each name, and that it is none of them.
+    fn weigh(&self, gains: &[(Gain, f64)]) -> Option<Vec<f64>> {
+        let best = gains.iter().map(|g| g.1).fold(f64::NEG_INFINITY, f64::max);
+        let leads = (0..self.names.len())
+            .filter(|&k| gains[k].1 > best - as_good(best))
+            .min_by_key(|&k| self.names[k].basis.count())?;
+        let rival = |(name, (gain, counts)): (&Name<'_>, &(Gain, f64))| Rival {
+            family: name.family,
+            basis: name.basis.clone(),
+            gain: *counts,
+            behind: behind(&gains[leads].0.by_view, &gain.by_view),
+        };
+        let (leader, gain) = (&self.names[leads], gains[leads].0.total);
+        let (_, _, mut stated) = naming(&Chosen {
+            candidate: Candidate::named(leader.family, leader.basis.clone()),
+            gain,
+            // What no name explains grows with what one does.
+            best_curve: self.chosen.best_curve / self.chosen.gain * gain,
+            rivals: self.names.iter().zip(gains).map(rival).collect(),
+            ..self.chosen.clone()
+        });
+        temper(&mut stated);
+        let of_name = |name: &Name<'_>| {
+            let stated = stated.iter().find(|a| a.effect == name.family);
+            stated.and_then(|a| a.probability).unwrap_or(0.0).max(MIN_PROBABILITY)
+        };
+        let mut all: Vec<f64> = self.names.iter().map(of_name).collect();
+        all.push((1.0 - all.iter().sum::<f64>()).max(MIN_PROBABILITY));
+        Some(all)
+    }
+
+    /// The number of the name that is sure with a view more: what it changes is added to what was
+    /// stated.
+    pub fn sure_with(&self, more: &Evidence) -> Option<usize> {
+        let none = 1.0 - self.names.iter().map(|n| n.probability).sum::<f64>();
+        let stated = self.names.iter().map(|n| n.probability).chain([none]);
+        let changed = self.weigh(&self.gains(Some(more))?)?;
+        let changed = changed.iter().zip(&self.now).map(|(then, now)| then / now);
+        let then: Vec<f64> = stated.zip(changed).map(|(p, factor)| p * factor).collect();
+        let total: f64 = then.iter().sum();
+        (0..self.names.len()).find(|&k| then[k] >= SURE * total)
+    }
+
+    /// The chance that a view with these normal equations makes the true name sure.
+    pub fn chance(&self, a: &DMatrix<f64>, mut rng: Stream) -> f64 {
+        let noise = root(a);
+        let settled = (0..DRAWS).filter(|_| self.settles(a, &noise, &mut rng)).count();
+        settled as f64 / DRAWS as f64
+    }
+
+    fn settles(&self, a: &DMatrix<f64>, noise: &DMatrix<f64>, rng: &mut Stream) -> bool {
+        let mut left: f64 = rng.random();
+        let drawn = self.names.iter().position(|name| {
+            left -= name.probability;
+            left < 0.0
+        });
+        // None of them: no view makes it one.
+        let Some(drawn) = drawn else { return false };
+        let truth = &self.names[drawn];
+        if !truth.borne_out {
+            return false;
+        }
+        let mut white = |n: usize| DVector::from_fn(n, |_, _| StandardNormal.sample(rng));
+        let beta = &truth.fit.beta + &truth.root * white(truth.columns.len());
+        let scores = a.select_columns(&truth.columns) * beta;
+        let b = scores + noise * white(a.nrows()) * truth.scatter.sqrt();
+        self.sure_with(&Evidence { a: a.clone(), b }) == Some(drawn)
+    }
+
+    pub fn information(&self) -> DMatrix<f64> {
+        let n = self.bases.iter().map(|b| b.count()).sum();
+        Evidence::sum(n, 0.0, &self.taken).a
+    }
+
+    /// Standard errors between the two best names, by views of this information.
+    pub fn separation(&self, information: &DMatrix<f64>) -> f64 {
+        self.apart(information, &self.names[0], &self.names[1]).sqrt()
+    }
+}
