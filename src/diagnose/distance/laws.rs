@@ -49,91 +49,109 @@ pub struct Nuisances {
     pub open: Vec<Family>,
 }
 
+/// Views with a reference, and what is fitted beside every law.
+struct References<'a> {
+    checked: &'a [ReferencedView],
+    /// How far each of the others moves each view by one of its unit, m.
+    others: Vec<Vec<f64>>,
+    /// Variance of a reference, m^2, and its degrees of freedom.
+    variance: f64,
+    freedom: f64,
+}
+
+impl<'a> References<'a> {
+    fn of(checked: &'a [ReferencedView], Nuisances { bent_m, open }: &Nuisances) -> Self {
+        let angles = if is_tilted(checked) { 2 } else { 0 };
+        let bent = (*bent_m > 0.0).then_some(*bent_m);
+        let others = |c: &ReferencedView| -> Vec<f64> {
+            let angles = c.slope[..angles].iter().map(|s| c.z * s);
+            angles.chain(bent).chain(open.iter().map(|f| f.moves_m(c))).collect()
+        };
+        let (variance, freedom) = scatter(checked);
+        References { checked, others: checked.iter().map(others).collect(), variance, freedom }
+    }
+
+    /// On the others, and on a law that moves the views so far.
+    fn evidence(&self, law: Option<&[f64]>) -> Vec<Evidence> {
+        let of = |(n, c): (usize, &ReferencedView)| {
+            let law = law.map(|moves| moves[n]);
+            let g = DVector::from_iterator(
+                self.others[n].len() + usize::from(law.is_some()),
+                self.others[n].iter().copied().chain(law),
+            );
+            Evidence { a: &g * g.transpose() / self.variance, b: g * (c.off / self.variance) }
+        };
+        self.checked.iter().enumerate().map(of).collect()
+    }
+
+    /// The law that moves the depth by `moves` times its coefficient, m.
+    fn law(
+        &self,
+        family: &'static str,
+        axis: Axis,
+        moves: impl Fn(&ReferencedView) -> f64,
+    ) -> Option<Law> {
+        let checked = self.checked;
+        let moves: Vec<f64> = checked.iter().map(moves).collect();
+        let beside = self.others.first().map_or(0, Vec::len);
+        let views = self.evidence(Some(&moves));
+        let mut gain = gain(&views, PRIOR)?;
+        if beside > 0 {
+            gain.total -= self::gain(&self.evidence(None), PRIOR).map_or(0.0, |alone| alone.total);
+        }
+        let beta = gain.beta[beside];
+        let rms = |of: &dyn Fn(usize) -> f64| {
+            let squares: f64 = (0..checked.len()).map(|n| of(n).powi(2)).sum();
+            (squares / checked.len() as f64).sqrt()
+        };
+        // The others as all references have them.
+        let half = |second: bool| {
+            let mine = (0..checked.len()).filter(|&n| checked[n].in_second_half == second);
+            ViewMean::of_scores(mine.map(|n| {
+                let others = gain.beta.iter().zip(&self.others[n]).map(|(size, o)| size * o);
+                let left = checked[n].off - others.sum::<f64>();
+                (moves[n] * moves[n] / self.variance, moves[n] * left / self.variance)
+            }))
+        };
+        Some(Law {
+            family,
+            axis,
+            reach: crate::stats::range(checked.iter().map(|c| match axis {
+                Axis::SessionTime => c.session_s,
+                _ => c.z,
+            })),
+            rms_m: rms(&|n| beta * moves[n]),
+            rms_sigma: rms(&|n| beta * moves[n] / checked[n].sigma_m),
+            error_m: self.variance.sqrt(),
+            settled: Vec::new(),
+            gain: gain.total,
+            estimate: [beta, gain.covariance[(beside, beside)].sqrt()],
+            null: Null::of(&views, beside, PRIOR)?,
+            freedom: self.freedom.max(1.0),
+            replicated: agree([half(false), half(true)]),
+        })
+    }
+}
+
 /// All laws, with what each gains on references left out; none where there are too few.
-pub fn laws(checked: &[ReferencedView], Nuisances { bent_m, open }: &Nuisances) -> Vec<Law> {
+pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances) -> Vec<Law> {
     if checked.len() < FEWEST {
         return Vec::new();
     }
-    let angles = if is_tilted(checked) { 2 } else { 0 };
-    let bent = (*bent_m > 0.0).then_some(*bent_m);
-    let others = |c: &ReferencedView| -> Vec<f64> {
-        let angles = c.slope[..angles].iter().map(|s| c.z * s);
-        angles.chain(bent).chain(open.iter().map(|f| f.moves_m(c))).collect()
-    };
-    let beside = angles + usize::from(bent.is_some()) + open.len();
-    let (variance, free) = scatter(checked);
-    let mut laws = Vec::new();
-    let mut add = |family, axis, column: &dyn Fn(&ReferencedView) -> f64| {
-        let evidence = |with: bool| -> Vec<Evidence> {
-            let of = |c: &ReferencedView| {
-                let mut g = others(c);
-                g.extend(with.then(|| column(c)));
-                let g = DVector::from_vec(g);
-                Evidence { a: &g * g.transpose() / variance, b: g * (c.off / variance) }
-            };
-            checked.iter().map(of).collect()
-        };
-        let views = evidence(true);
-        let alone = if beside > 0 { gain(&evidence(false), PRIOR) } else { None };
-        if let (Some(mut gain), Some(null)) = (gain(&views, PRIOR), Null::of(&views, beside, PRIOR))
-        {
-            if let Some(alone) = alone {
-                gain.total -= alone.total;
-            }
-            let beta = gain.beta[beside];
-            let beta_error = gain.covariance[(beside, beside)].sqrt();
-            let n = checked.len() as f64;
-            let square = |of: &dyn Fn(&ReferencedView) -> f64| {
-                (checked.iter().map(|c| of(c).powi(2)).sum::<f64>() / n).sqrt()
-            };
-            let shift = |c: &ReferencedView| beta * column(c);
-            let reach = crate::stats::range(checked.iter().map(|c| match axis {
-                Axis::SessionTime => c.session_s,
-                _ => c.z,
-            }));
-            let (rms_m, rms_sigma) = (square(&shift), square(&|c| shift(c) / c.sigma_m));
-            // The others as all references have them.
-            let sizes = &gain.beta.as_slice()[..beside];
-            let moved = |c: &ReferencedView| -> f64 {
-                sizes.iter().zip(others(c)).map(|(size, column)| size * column).sum()
-            };
-            let half = |second: bool| {
-                let mine = checked.iter().filter(|c| c.in_second_half == second);
-                ViewMean::of_scores(mine.map(|c| {
-                    let g = column(c);
-                    (g * g / variance, g * (c.off - moved(c)) / variance)
-                }))
-            };
-            let replicated = agree([half(false), half(true)]);
-            let error_m = variance.sqrt();
-            let freedom = free.max(1.0);
-            laws.push(Law {
-                family,
-                axis,
-                reach,
-                rms_m,
-                rms_sigma,
-                error_m,
-                settled: Vec::new(),
-                gain: gain.total,
-                estimate: [beta, beta_error],
-                null,
-                freedom,
-                replicated,
-            });
-        }
-    };
-    add("depth-scale", Axis::Z, &|c| c.z);
+    let references = References::of(checked, nuisances);
+    let mut laws = Vec::from_iter(references.law("depth-scale", Axis::Z, |c| c.z));
     // An offset of the disparity by delta px moves the depth by -z^2 delta / (f b).
-    if open.is_empty() {
-        add("disparity-offset", Axis::Z, &|c| -c.z * c.z / c.px_m);
+    if nuisances.open.is_empty() {
+        laws.extend(references.law("disparity-offset", Axis::Z, |c| -c.z * c.z / c.px_m));
     }
-    for tau in WARM_UPS {
-        add("thermal-drift", Axis::SessionTime, &|c| c.z * (1.0 - (-c.session_s / tau).exp()));
-    }
+    laws.extend(WARM_UPS.iter().filter_map(|tau| {
+        let warm = |c: &ReferencedView| c.z * (1.0 - (-c.session_s / tau).exp());
+        references.law("thermal-drift", Axis::SessionTime, warm)
+    }));
     // The variance was measured with few degrees of freedom: a Student's t in place of a Gaussian.
-    let widened = variance * free / (free - 2.0).max(1.0);
-    if let Some(warm_up) = warm_up(checked, &others, widened) {
+    let References { others, variance, freedom, .. } = &references;
+    let widened = variance * freedom / (freedom - 2.0).max(1.0);
+    if let Some(warm_up) = warm_up(checked, others, widened) {
         for law in laws.iter_mut().filter(|l| l.family == "thermal-drift") {
             law.estimate = warm_up.relative;
             law.settled = vec![("time_constant_s", warm_up.time_constant_s)];
