@@ -45,14 +45,21 @@ pub struct Structure {
     pub jitter: Option<Jitter>,
     /// Residuals beyond four local standard deviations.
     pub tails: TailCounts,
-    /// Of the residuals near the middle, for tails too weak to count.
-    pub fourth: FourthMoment,
+    /// Of the residuals near the middle, for tails too weak to count: of the disparity and, where the
+    /// noise is large enough for it to differ, of the depth.
+    pub fourth: Vec<FourthMoment>,
 }
 
 impl Structure {
     /// Share beyond four local standard deviations, where enough was looked at.
     pub fn tail_share(&self) -> Option<f64> {
         (self.tails.n > FEWEST_READINGS).then(|| self.tails.share())
+    }
+
+    /// Excess kurtosis: none for what is Gaussian in the disparity or in the depth.
+    pub fn excess(&self) -> Option<f64> {
+        let each: Option<Vec<f64>> = self.fourth.iter().map(FourthMoment::excess).collect();
+        each?.into_iter().min_by(f64::total_cmp)
     }
 
     /// How many times the variance of a mean, and of a log variance, exceeds what pixels that hang

@@ -98,7 +98,7 @@ fn weak(
     level: f64,
     mut parameters: Map<String, serde_json::Value>,
 ) -> Option<TextureFinding> {
-    let excess = ViewMean::of(views, |s| s.fourth.excess())?;
+    let excess = ViewMean::of(views, Structure::excess)?;
     let p = 2.0 * excess.p_above(0.0);
     if p > level {
         return None;
@@ -202,7 +202,7 @@ mod tests {
                 let image: Vec<f32> = (0..SIZE[0] * SIZE[1]).map(&mut pixel).collect();
                 Structure {
                     tails: tail(&image, SIZE[0]),
-                    fourth: FourthMoment::of(&image, SIZE[0]),
+                    fourth: vec![FourthMoment::of(&image, SIZE[0])],
                     ..Structure::default()
                 }
             };
