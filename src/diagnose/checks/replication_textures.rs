@@ -54,7 +54,7 @@ fn beyond_known<'a>(found: &TextureFinding, known: &'a KnownTerms) -> Option<OfV
         // Beside what stands still, which the finding is told without.
         (Some("temporal-correlation"), ..) => Box::new(|s| Some(s.lagged[0]? - later(s)?)),
         (Some("heavy-tails"), ..) if found.parameters.contains_key(EXCESS) => {
-            Box::new(Structure::excess)
+            Box::new(|s| s.excess()?.into_iter().min_by(f64::total_cmp))
         }
         (Some("target-motion"), ..) => Box::new(|s| Some(s.jitter?.velocity_mps)),
         (Some(id), ..) => return beyond(id, known),

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use super::naming::{MIN_PROBABILITY, naming, temper};
 use crate::diagnose::diagnosis::Alternative;
 use crate::diagnose::search::candidate::{Candidate, RECALIBRATE};
-use crate::diagnose::search::choose::{AS_GOOD_NATS, as_good, behind, corrected};
+use crate::diagnose::search::choose::{as_good, behind, corrected};
 use crate::diagnose::search::evidence::{Evidence, Gain, gain, root};
 use crate::diagnose::search::layer_search::{BIAS_PRIOR, VARIANCE_PRIOR};
 use crate::diagnose::search::null::Null;
@@ -27,8 +27,8 @@ use crate::terms::{Basis, Statistic};
 
 /// A name this probable needs no further view.
 pub const SURE: f64 = 0.9;
-/// Draws of a view: a chance of one half to .04.
-const DRAWS: usize = 160;
+/// Draws of a view: a chance of one half has a standard error of .03.
+const DRAWS: usize = 250;
 /// Standard errors that a cause may be less ahead of a rival than it should be.
 const SHORT: f64 = 2.0;
 
@@ -55,7 +55,7 @@ pub struct Name<'a> {
     /// Those beside it first.
     columns: Vec<usize>,
     fit: Gain,
-    /// Of its coefficients' covariance.
+    /// Of its coefficients' covariance, as the views scatter.
     root: DMatrix<f64>,
     /// Variance of the views about it, over their noise's.
     scatter: f64,
@@ -94,7 +94,8 @@ impl<'a> Contest<'a> {
             let rival = chosen.rivals.iter().find(|r| r.family == a.effect)?;
             Some((rival, a.probability?))
         });
-        let in_doubt: Vec<(&Rival, f64)> = in_doubt.collect();
+        let mut in_doubt: Vec<(&Rival, f64)> = in_doubt.collect();
+        in_doubt.sort_by(|a, b| b.1.total_cmp(&a.1));
         bases.extend(in_doubt.iter().map(|(rival, _)| &rival.basis));
         let taken = evidence_of_bases(&data, &bases);
         let prior = if statistic == Statistic::Bias { BIAS_PRIOR } else { VARIANCE_PRIOR };
@@ -105,8 +106,8 @@ impl<'a> Contest<'a> {
             first = next;
             let views: Vec<Evidence> = taken.iter().map(|e| part(e, &columns)).collect();
             let fit = gain(&views, prior)?;
-            let root = root(&fit.covariance);
             let scatter = Null::of(&views, beside.len(), prior)?.about_fit;
+            let root = root(&(&fit.covariance * scatter));
             let Rival { family, ref basis, .. } = *rival;
             Some(Name { family, basis, probability, columns, fit, root, scatter, borne_out: true })
         };
@@ -125,9 +126,11 @@ impl<'a> Contest<'a> {
     fn is_borne_out(&self, k: usize, gains: &[(Gain, f64)]) -> bool {
         let information = self.information();
         (0..self.names.len()).filter(|&r| r != k).all(|r| {
-            // Twice the expected gain is the variance of it.
+            // The variance of the gain is twice what is expected, times the views' scatter.
             let apart = self.apart(&information, &self.names[k], &self.names[r]);
-            gains[k].1 - gains[r].1 > 0.5 * apart - SHORT * apart.sqrt() - AS_GOOD_NATS
+            let error = (apart * self.names[k].scatter).sqrt();
+            let slack = as_good(gains[k].0.total);
+            gains[k].0.total - gains[r].0.total > 0.5 * apart - SHORT * error - slack
         })
     }
 
@@ -145,7 +148,7 @@ impl<'a> Contest<'a> {
         (beta.dot(&(of(own, own) * &beta)) - absorbed).max(0.0)
     }
 
-    /// The same, weighted by the chance that the one is true and the other in its place.
+    /// Sum of that over all pairs, each by the chance that the one is true and that it is the other.
     pub fn all_apart(&self, a: &DMatrix<f64>) -> f64 {
         let pairs = self.names.iter().flat_map(|n| self.names.iter().map(move |m| (n, m)));
         pairs
@@ -156,7 +159,7 @@ impl<'a> Contest<'a> {
             .sum()
     }
 
-    /// What each name brings on the views taken and one more; and the same less where views scatter.
+    /// What each name brings on the views taken and one more: as it is, and corrected for their scatter.
     fn gains(&self, more: Option<&Evidence>) -> Option<Vec<(Gain, f64)>> {
         let gain_of = |columns: &[usize]| {
             let views = self.taken.iter().chain(more).map(|e| part(e, columns));
@@ -179,6 +182,11 @@ impl<'a> Contest<'a> {
     /// How probable such gains make each name, and that it is none of them.
     fn weigh(&self, gains: &[(Gain, f64)]) -> Option<Vec<f64>> {
         let best = gains.iter().map(|g| g.1).fold(f64::NEG_INFINITY, f64::max);
+        if best <= 0.0 {
+            let mut none = vec![MIN_PROBABILITY; self.names.len()];
+            none.push(1.0 - none.iter().sum::<f64>());
+            return Some(none);
+        }
         let leads = (0..self.names.len())
             .filter(|&k| gains[k].1 > best - as_good(best))
             .min_by_key(|&k| self.names[k].basis.count())?;
@@ -193,7 +201,7 @@ impl<'a> Contest<'a> {
             candidate: Candidate::named(leader.family, leader.basis.clone()),
             gain,
             // What no name explains grows with what one does.
-            best_curve: self.chosen.best_curve / self.chosen.gain * gain,
+            best_curve: self.chosen.best_curve / self.chosen.gain * gain.max(0.0),
             rivals: self.names.iter().zip(gains).map(rival).collect(),
             ..self.chosen.clone()
         });
@@ -207,8 +215,7 @@ impl<'a> Contest<'a> {
         Some(all)
     }
 
-    /// The number of the name that is sure with a view more: what it changes is added to what was
-    /// stated.
+    /// The number of the name that is sure with a view more: the odds stated times what it changes.
     pub fn sure_with(&self, more: &Evidence) -> Option<usize> {
         let none = 1.0 - self.names.iter().map(|n| n.probability).sum::<f64>();
         let stated = self.names.iter().map(|n| n.probability).chain([none]);
@@ -239,7 +246,11 @@ impl<'a> Contest<'a> {
             return false;
         }
         let mut white = |n: usize| DVector::from_fn(n, |_, _| StandardNormal.sample(rng));
-        let beta = &truth.fit.beta + &truth.root * white(truth.columns.len());
+        let mut beta = &truth.fit.beta + &truth.root * white(truth.columns.len());
+        // By what its formula is off, it is larger or smaller in another view.
+        let candidate = Candidate::named(truth.family, truth.basis.clone());
+        let off = 1.0 + candidate.formula_error() * white(1)[0];
+        beta.rows_mut(self.beside.len(), truth.basis.count()).scale_mut(off);
         let scores = a.select_columns(&truth.columns) * beta;
         let b = scores + noise * white(a.nrows()) * truth.scatter.sqrt();
         self.sure_with(&Evidence { a: a.clone(), b }) == Some(drawn)

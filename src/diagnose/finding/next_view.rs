@@ -13,8 +13,6 @@ use crate::diagnose::search::prepared::evidence_of_bases;
 use crate::plane::Plane;
 use crate::rng::Seed;
 
-/// A view that is more likely to settle the name than not is worth a person's minute.
-const WORTH_TAKING: f64 = 0.5;
 /// Poses that are looked at closely.
 const CLOSELY: usize = 12;
 
@@ -45,13 +43,17 @@ fn prospects(contest: &Contest<'_>, outlook: &Outlook<'_>, seed: Seed) -> Vec<Pr
     let mut all: Vec<_> = poses().into_par_iter().filter_map(pose).collect();
     all.sort_by(|x, y| y.0.apart.total_cmp(&x.0.apart));
     all.truncate(CLOSELY);
-    let closely = |(prospect, a): (Prospect, DMatrix<f64>)| Prospect {
-        chance: contest.chance(&a, seed.stream("diagnose/next-view")),
-        ..prospect
+    let closely = |(mut prospect, a): (Prospect, DMatrix<f64>)| {
+        prospect.chance = contest.chance(&a, seed.stream("diagnose/next-view"));
+        (prospect, a)
     };
-    let mut all: Vec<Prospect> = all.into_par_iter().map(closely).collect();
-    all.sort_by(|x, y| y.chance.total_cmp(&x.chance));
-    all
+    let mut all: Vec<_> = all.into_par_iter().map(closely).collect();
+    all.sort_by(|x, y| y.0.chance.total_cmp(&x.0.chance));
+    // The best of many draws was lucky: its chance is that of others.
+    if let Some((best, a)) = all.first_mut() {
+        best.chance = contest.chance(a, seed.stream("diagnose/next-view/chosen"));
+    }
+    all.into_iter().map(|(prospect, _)| prospect).collect()
 }
 
 /// Give advice to every finding of the layer that is not sure of its name, where a view is likely to
@@ -72,21 +74,15 @@ pub fn advise(
         let contest = Contest::of(views, outcome, chosen, &finding.alternatives);
         let Some(contest) = contest else { continue };
         let best = prospects(&contest, outlook, seed).into_iter().next();
-        let told = |p: &Prospect| p.chance >= WORTH_TAKING || finding.status == Status::OneOf;
-        finding.next_view = best.filter(told).map(|p| report(&p, &contest));
+        let told = |v: &NextView| v.is_likely_to_settle() || finding.status == Status::OneOf;
+        finding.next_view = best.map(|p| report(&p, &contest)).filter(told);
     }
 }
 
 fn report(view: &Prospect, contest: &Contest<'_>) -> NextView {
-    let [now, then] = [contest.separation(&contest.information()), view.separation];
-    let percent = 100.0 * view.chance;
-    let settles = if view.chance >= WORTH_TAKING {
-        format!("it settles the name with a chance of {percent:.0} %")
-    } else {
-        format!("this one helps most, with a chance of {percent:.0} % to settle the name")
-    };
+    let (now, then) = (contest.separation(&contest.information()), view.separation);
     let [best, rival] = [contest.names[0].family, contest.names[1].family];
-    NextView {
+    let mut next = NextView {
         z_m: view.z_m,
         theta_rad: view.theta_rad,
         azimuth_rad: view.azimuth_rad,
@@ -94,9 +90,16 @@ fn report(view: &Prospect, contest: &Contest<'_>) -> NextView {
         separation_then: then,
         chance: view.chance,
         why: format!(
-            "{best} and {rival} are {now:.1} standard errors apart as it is, {then:.1} expected with this view; {settles}"
+            "{best} and {rival} are {now:.1} standard errors apart as it is, {then:.1} expected with this view; "
         ),
-    }
+    };
+    let percent = 100.0 * view.chance;
+    next.why += &if next.is_likely_to_settle() {
+        format!("it settles the name with a chance of {percent:.0} %")
+    } else {
+        format!("no single view is likely to settle the name (chance {percent:.0} %)")
+    };
+    next
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use crate::terms::{Extent, Pixels, Statistic};
 /// Where a board is held: distances, m, and tilts, degrees.
 const Z_M: [f64; 12] = [0.6, 0.8, 1.0, 1.2, 1.5, 1.8, 2.1, 2.5, 2.9, 3.3, 3.7, 4.0];
 const TILTS_DEG: [f64; 7] = [0.0, 15.0, 25.0, 35.0, 45.0, 55.0, 65.0];
-/// Directions, quarters of a right angle times two: along, across and oblique.
+/// Directions, 45 degrees apart.
 const AZIMUTHS: u32 = 8;
 /// The picture is looked at in so many patches across.
 const ACROSS: usize = 32;

@@ -89,8 +89,7 @@ pub(in crate::diagnose) fn measure_tails(
         s.tails = TailCounts::default();
         in_disparity.iter().for_each(|look| s.tails.add(&tail(look, field.width)));
         let disparity = |k| field.disparity(k, &bench.rays) as f32;
-        let middle = field.pixels.len() / 2;
-        let bends = field.sigma.get(middle).is_some_and(|s| *s > BENDS * disparity(middle));
+        let bends = (0..field.pixels.len()).any(|k| field.sigma[k] > BENDS * disparity(k));
         // An error of the depth is that of the disparity, e, over 1 + e / d.
         let in_depth = |k: usize, error: f32| error / (1.0 + error / disparity(k));
         s.fourth = vec![fourth(&in_disparity)];

@@ -56,10 +56,10 @@ impl Structure {
         (self.tails.n > FEWEST_READINGS).then(|| self.tails.share())
     }
 
-    /// Excess kurtosis: none for what is Gaussian in the disparity or in the depth.
-    pub fn excess(&self) -> Option<f64> {
-        let each: Option<Vec<f64>> = self.fourth.iter().map(FourthMoment::excess).collect();
-        each?.into_iter().min_by(f64::total_cmp)
+    /// Excess kurtosis of the disparity, and of the depth where that differs.
+    pub fn excess(&self) -> Option<[f64; 2]> {
+        let disparity = self.fourth.first()?.excess()?;
+        Some([disparity, self.fourth.get(1).map_or(Some(disparity), FourthMoment::excess)?])
     }
 
     /// How many times the variance of a mean, and of a log variance, exceeds what pixels that hang

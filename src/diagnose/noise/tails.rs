@@ -98,7 +98,9 @@ fn weak(
     level: f64,
     mut parameters: Map<String, serde_json::Value>,
 ) -> Option<TextureFinding> {
-    let excess = ViewMean::of(views, Structure::excess)?;
+    // What is Gaussian in the disparity or in the depth has no tails.
+    let each = [0, 1].map(|k| ViewMean::of(views, |s| Some(s.excess()?[k])));
+    let excess = each.into_iter().flatten().min_by(|a, b| a.value.total_cmp(&b.value))?;
     let p = 2.0 * excess.p_above(0.0);
     if p > level {
         return None;
@@ -221,6 +223,16 @@ mod tests {
         let x = fraction * (scale * scale - 1.0);
         let had = 3.0 * (1.0 - fraction) / fraction * (x / (1.0 + x)).powi(2);
         assert!((had / excess - 1.0).abs() < 1e-3, "{had} {excess}");
+        let in_depth = |other: &[Structure]| -> Vec<Structure> {
+            let both = |(h, o): (&Structure, &Structure)| Structure {
+                fourth: [h.fourth.clone(), o.fourth.clone()].concat(),
+                ..h.clone()
+            };
+            heavy.iter().zip(other).map(both).collect()
+        };
+        assert!(told(&in_depth(&heavy), false, false).is_some());
+        let gaussian = views("gaussian", false, 0.0);
+        assert!(told(&in_depth(&gaussian), false, false).is_none(), "Gaussian in the depth");
         assert!(told(&heavy, true, false).is_none(), "of a noise that is uneven anyway");
         assert!(told(&heavy, false, true).is_none(), "of a simulation");
         assert!(told(&[], false, false).is_none());

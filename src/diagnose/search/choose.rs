@@ -8,7 +8,7 @@ use super::rules::Rules;
 use crate::terms::Basis;
 
 /// Of families that predict as well as the best, the one with the fewest columns is meant.
-pub const AS_GOOD_NATS: f64 = 2.0;
+const AS_GOOD_NATS: f64 = 2.0;
 /// So they do within this share of a large gain: no family's shape is exact.
 const AS_GOOD_SHARE: f64 = 0.01;
 /// A formula of the catalogue that is off by more is another formula.

@@ -138,9 +138,13 @@ fn alternatives(finding: &Finding) -> Markup {
 fn advice(finding: &Finding) -> Option<Markup> {
     let view = finding.next_view.as_ref();
     let more = match finding.status {
-        Status::Named => "",
-        Status::OneOf if view.is_some() => {
+        Status::Named | Status::OneOf if view.is_some() => {
             "Then diagnose again with this view added to the recording."
+        }
+        Status::Named => "",
+        Status::OneOf if finding.is_law() => {
+            "These references do not separate the alternatives. Measure more, near and far in turn from a cold start on, \
+             and diagnose again."
         }
         Status::OneOf => {
             "These views do not separate the alternatives. Add views at other distances and tilts, and diagnose again."

@@ -81,11 +81,12 @@ fn settled_by(view: &NextView) -> String {
         tilt if tilt == "0" => "facing the sensor".to_string(),
         tilt => format!("tilted by {tilt}°, {} side away", far_side(view.azimuth_rad)),
     };
-    let percent = fixed(100.0 * view.chance, 0);
-    format!(
-        "; a view at {} m {pose} would settle it with a chance of {percent} %",
-        fixed(view.z_m, 2)
-    )
+    let helps = if view.is_likely_to_settle() {
+        format!("would settle it with a chance of {} %", fixed(100.0 * view.chance, 0))
+    } else {
+        "would help most, but is not likely to settle it".to_string()
+    };
+    format!("; a view at {} m {pose} {helps}", fixed(view.z_m, 2))
 }
 
 /// Findings without a sentence of their own.

@@ -77,6 +77,7 @@ fn short_advice(f: &Finding) -> String {
             "`kinoise correct` takes it out".into()
         }
         (Status::Named, _) => "nothing: the extended model has it".into(),
+        (Status::OneOf, None) if f.is_law() => "references near and far, from a cold start".into(),
         (Status::OneOf, None) => "views at other distances and tilts".into(),
         (Status::Unexplained, None) => "vary one condition at a time to find its cause".into(),
         (Status::Recalibrate, _) => "`kinoise calibrate` again".into(),
