@@ -123,10 +123,13 @@ impl Case<'_> {
         let camera = &self.sensor().camera;
         let known = KnownTerms::of(extended, camera);
         let added = &mut extended.effects[self.model.effects.len()..];
+        if self.baseline.is_some() {
+            return let_planes_be(added, camera);
+        }
         let bias = added.iter().flat_map(|e| &e.shape).filter(|t| t.is_correctable());
         let levels = heldout::levels(&self.survey, &bias.cloned().collect::<Vec<_>>());
         let checked = referenced_views(&self.fields, &levels, &known, &self.survey.second());
-        if self.baseline.is_none() && checked.len() >= laws::FEWEST {
+        if checked.len() >= laws::FEWEST {
             anchor(added, &checked, scatter(&checked).0, camera);
         } else {
             let_planes_be(added, camera);

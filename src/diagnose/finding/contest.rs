@@ -39,13 +39,17 @@ pub struct Contest<'a> {
     pub names: Vec<Name<'a>>,
     /// What is fitted beside every name, and the names'.
     pub bases: Vec<&'a Basis>,
-    /// On the columns of all these; those beside the names come first.
-    taken: Vec<Evidence>,
+    /// Of the views taken, on the columns of all these; those beside the names come first.
+    pub information: DMatrix<f64>,
     beside: Vec<usize>,
+    /// The views taken, on what is beside alone.
+    base: Vec<Evidence>,
     prior: f64,
     /// How probable each name is on the views taken, and that it is none of them, when weighed here:
     /// on coarser samples than the search's and beside what it found.
     pub now: Vec<f64>,
+    /// Is each name as far ahead of every rival as it should be?
+    borne_out: Vec<bool>,
 }
 
 pub struct Name<'a> {
@@ -54,13 +58,15 @@ pub struct Name<'a> {
     probability: f64,
     /// Those beside it first.
     columns: Vec<usize>,
+    /// The views taken, on these.
+    views: Vec<Evidence>,
     fit: Gain,
     /// Of its coefficients' covariance, as the views scatter.
     root: DMatrix<f64>,
     /// Variance of the views about it, over their noise's.
     scatter: f64,
-    /// It is as far ahead of every rival as it should be.
-    borne_out: bool,
+    /// Share that its formula is off by.
+    formula_error: f64,
 }
 
 /// On these columns alone.
@@ -109,25 +115,44 @@ impl<'a> Contest<'a> {
             let scatter = Null::of(&views, beside.len(), prior)?.about_fit;
             let root = root(&(&fit.covariance * scatter));
             let Rival { family, ref basis, .. } = *rival;
-            Some(Name { family, basis, probability, columns, fit, root, scatter, borne_out: true })
+            let formula_error = Candidate::named(family, basis.clone()).formula_error();
+            Some(Name {
+                family,
+                basis,
+                probability,
+                columns,
+                views,
+                fit,
+                root,
+                scatter,
+                formula_error,
+            })
         };
         let names: Vec<Name<'_>> = in_doubt.into_iter().filter_map(name).collect();
-        let now = Vec::new();
-        let mut contest = Contest { chosen, names, bases, taken, beside, prior, now };
+        let columns = bases.iter().map(|b| b.count()).sum();
+        let mut contest = Contest {
+            chosen,
+            names,
+            information: Evidence::sum(columns, 0.0, &taken).a,
+            base: taken.iter().map(|e| part(e, &beside)).collect(),
+            bases,
+            beside,
+            prior,
+            now: Vec::new(),
+            borne_out: Vec::new(),
+        };
         let gains = contest.gains(None)?;
         contest.now = contest.weigh(&gains)?;
-        let borne_out: Vec<bool> =
+        contest.borne_out =
             (0..contest.names.len()).map(|k| contest.is_borne_out(k, &gains)).collect();
-        contest.names.iter_mut().zip(borne_out).for_each(|(name, b)| name.borne_out = b);
         (contest.names.len() > 1).then_some(contest)
     }
 
     /// Is it ahead of the rivals as it should be if it were true?
     fn is_borne_out(&self, k: usize, gains: &[(Gain, f64)]) -> bool {
-        let information = self.information();
         (0..self.names.len()).filter(|&r| r != k).all(|r| {
             // The variance of the gain is twice what is expected, times the views' scatter.
-            let apart = self.apart(&information, &self.names[k], &self.names[r]);
+            let apart = self.apart(&self.information, &self.names[k], &self.names[r]);
             let error = (apart * self.names[k].scatter).sqrt();
             let slack = as_good(gains[k].0.total);
             gains[k].0.total - gains[r].0.total > 0.5 * apart - SHORT * error - slack
@@ -161,17 +186,15 @@ impl<'a> Contest<'a> {
 
     /// What each name brings on the views taken and one more: as it is, and corrected for their scatter.
     fn gains(&self, more: Option<&Evidence>) -> Option<Vec<(Gain, f64)>> {
-        let gain_of = |columns: &[usize]| {
-            let views = self.taken.iter().chain(more).map(|e| part(e, columns));
-            gain(&views.collect::<Vec<_>>(), self.prior)
+        let gain_of = |taken: &[Evidence], columns: &[usize]| {
+            let more = more.map(|e| part(e, columns));
+            gain(&taken.iter().cloned().chain(more).collect::<Vec<_>>(), self.prior)
         };
-        let base = if self.beside.is_empty() { None } else { Some(gain_of(&self.beside)?) };
+        let nothing = self.beside.is_empty();
+        let base = if nothing { None } else { Some(gain_of(&self.base, &self.beside)?) };
         let over_base = |name: &Name<'_>| {
-            let mut gain = gain_of(&name.columns)?;
-            if let Some(base) = &base {
-                gain.total -= base.total;
-                gain.by_view.iter_mut().zip(&base.by_view).for_each(|(g, b)| *g -= b);
-            }
+            let whole = gain_of(&name.views, &name.columns)?;
+            let gain = if let Some(base) = &base { whole.over(base) } else { whole };
             let numbers = gain.by_view.len() * name.basis.count();
             let counts = corrected(gain.total, name.scatter, numbers);
             Some((gain, counts))
@@ -241,24 +264,18 @@ impl<'a> Contest<'a> {
         });
         // None of them: no view makes it one.
         let Some(drawn) = drawn else { return false };
-        let truth = &self.names[drawn];
-        if !truth.borne_out {
+        if !self.borne_out[drawn] {
             return false;
         }
+        let truth = &self.names[drawn];
         let mut white = |n: usize| DVector::from_fn(n, |_, _| StandardNormal.sample(rng));
         let mut beta = &truth.fit.beta + &truth.root * white(truth.columns.len());
         // By what its formula is off, it is larger or smaller in another view.
-        let candidate = Candidate::named(truth.family, truth.basis.clone());
-        let off = 1.0 + candidate.formula_error() * white(1)[0];
+        let off = 1.0 + truth.formula_error * white(1)[0];
         beta.rows_mut(self.beside.len(), truth.basis.count()).scale_mut(off);
         let scores = a.select_columns(&truth.columns) * beta;
         let b = scores + noise * white(a.nrows()) * truth.scatter.sqrt();
         self.sure_with(&Evidence { a: a.clone(), b }) == Some(drawn)
-    }
-
-    pub fn information(&self) -> DMatrix<f64> {
-        let n = self.bases.iter().map(|b| b.count()).sum();
-        Evidence::sum(n, 0.0, &self.taken).a
     }
 
     /// Standard errors between the two best names, by views of this information.

@@ -31,11 +31,10 @@ struct Prospect {
 
 /// What a view would do where the causes are farthest apart, the best first.
 fn prospects(contest: &Contest<'_>, outlook: &Outlook<'_>, seed: Seed) -> Vec<Prospect> {
-    let sum = contest.information();
     let pose = |(z_m, theta_rad, azimuth_rad)| {
         let view = outlook.view(&Plane::tilted(z_m, theta_rad, azimuth_rad))?;
         let a = evidence_of_bases(&[view], &contest.bases).pop()?.a;
-        let with = &sum + &a;
+        let with = &contest.information + &a;
         let separation = contest.separation(&with);
         let apart = contest.all_apart(&with);
         Some((Prospect { z_m, theta_rad, azimuth_rad, apart, separation, chance: 0.0 }, a))
@@ -80,7 +79,7 @@ pub fn advise(
 }
 
 fn report(view: &Prospect, contest: &Contest<'_>) -> NextView {
-    let (now, then) = (contest.separation(&contest.information()), view.separation);
+    let (now, then) = (contest.separation(&contest.information), view.separation);
     let [best, rival] = [contest.names[0].family, contest.names[1].family];
     let mut next = NextView {
         z_m: view.z_m,

@@ -103,7 +103,7 @@ fn advised(size: [f64; 2], k: f64) -> (Vec<Prospect>, f64) {
         let views = frontal(outlook, &bowl(0, k), 0.0, &mut seed.stream("test"));
         let of = (Statistic::Bias, &views[..]);
         let contest = Contest::of(of, &outcome, &outcome.chosen[0], &stated([0.6, 0.39])).unwrap();
-        (prospects(&contest, outlook, seed), contest.separation(&contest.information()))
+        (prospects(&contest, outlook, seed), contest.separation(&contest.information))
     })
 }
 

@@ -42,6 +42,15 @@ pub struct Gain {
     pub covariance: DMatrix<f64>,
 }
 
+impl Gain {
+    /// Over what `base`, a part of the terms, brings on the same views.
+    pub fn over(mut self, base: &Gain) -> Self {
+        self.total -= base.total;
+        self.by_view.iter_mut().zip(&base.by_view).for_each(|(g, b)| *g -= b);
+        self
+    }
+}
+
 /// Coefficients of a fit to all views.
 pub fn fit(views: &[Evidence], prior: f64) -> Option<DVector<f64>> {
     let Evidence { a, b } = Evidence::sum(views.first()?.b.len(), prior, views);

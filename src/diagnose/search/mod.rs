@@ -127,7 +127,7 @@ impl Trial<'_> {
         let (m, prior) = (self.settled, self.judge.rules.prior);
         let evidence: Vec<Evidence> = self.views.iter().map(|v| v.evidence(&c.basis)).collect();
         let null = Null::of(&evidence, m, prior)?;
-        let mut gain = gain(&evidence, prior)?;
+        let gain = gain(&evidence, prior)?;
         if !c.agrees(gain.beta.rows(m, c.basis.count()).into_owned().as_slice()) {
             return None;
         }
@@ -136,8 +136,7 @@ impl Trial<'_> {
             Patches::Fine => fine,
             Patches::Coarse => coarse,
         };
-        gain.total -= base.total;
-        gain.by_view.iter_mut().zip(&base.by_view).for_each(|(g, b)| *g -= b);
+        let gain = gain.over(base);
         let rms = self.judge.rms(&c.basis, m, &gain, &evidence);
         let sensible = self.judge.sensible(&c.basis, rms);
         Some(Judged { gain, null, sensible, rms })

@@ -10,6 +10,7 @@ use crate::terms::{Basis, Statistic};
 /// So many findings have a sentence each; with the verdict, the rest, what is gained and what is left
 /// that makes seven.
 const MAX_SENTENCES: usize = 3;
+
 /// The largest findings a sentence each, all others in one, what views kept aside gain, and what the
 /// same tests find against the extended model: six at most, after the verdict's.
 pub fn story(diagnosis: &Diagnosis) -> Vec<String> {
