@@ -41,7 +41,7 @@ fn in_region(
     let valid: Vec<u32> = inside.iter().copied().filter(|&i| image.valid(i as usize)).collect();
     if valid.len() < MIN_PIXELS {
         return Err(format!(
-            "only {} of {} pixels of its region carry a depth",
+            "{} of {} pixels of its region carry a depth, and {MIN_PIXELS} are needed",
             valid.len(),
             inside.len()
         ));
@@ -57,7 +57,9 @@ fn in_region(
     let flat = |i: u32| !relief.mask[relief.lattice.node_of(i as usize, width)];
     let on = valid.iter().filter(|&&i| flat(i) && on_plane(image, &fit, i as usize)).count();
     if on < MIN_PIXELS {
-        return Err(format!("only {on} pixels of its region lie on one plane"));
+        return Err(format!(
+            "{on} pixels of its region lie on one plane, and {MIN_PIXELS} are needed"
+        ));
     }
     let exclusions = Exclusions {
         considered: inside.len(),
@@ -123,7 +125,10 @@ pub(super) fn at_principal_point(
     let lattice = Lattice::over(image.w, image.rays, camera.width, camera.height);
     let measured = image.w.iter().filter(|w| w.is_finite()).count();
     if measured < MIN_PIXELS {
-        return Err(format!("only {measured} of {} pixels carry a depth", image.w.len()));
+        return Err(format!(
+            "{measured} of {} pixels carry a depth, and {MIN_PIXELS} are needed",
+            image.w.len()
+        ));
     }
     let mut best: Option<Candidate> = None;
     for share in WINDOWS {
