@@ -11,10 +11,6 @@ use crate::terms::PixelContext;
 /// A model's sigma is not known better than this from view to view, in log variance, where the views
 /// are too few to show how they scatter.
 pub const MODEL_TOLERANCE: f64 = 0.04;
-/// And where they show it: the blocks of a view tell its level to about this. On 60 clean ray-traced
-/// sets and 24 pairs of speckle runs one was called a mismatch with this floor (the
-/// same with the larger one), and of causes worth 50 nats a third more were seen.
-const LEVEL_SCATTER: f64 = 0.01;
 
 /// Variance of the views' own levels beyond what their samples explain (a moment estimate after
 /// DerSimonian and Laird), about laws of the distance and of the tilt: what a law explains is no
@@ -37,7 +33,7 @@ pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
         return floor;
     };
     let enlarged = if free > 3.0 { free / (free - 2.0) } else { 3.0 };
-    let floor = if tolerance > MODEL_TOLERANCE { floor } else { LEVEL_SCATTER * LEVEL_SCATTER };
+    let floor = if tolerance > MODEL_TOLERANCE { floor } else { unseen(&levels, free) };
     ((squares / free - sampling(&levels)) * enlarged).max(floor)
 }
 
@@ -64,7 +60,7 @@ pub fn scatter_of_most(blocks: &[ViewData], whole: f64) -> f64 {
     // So that one in a hundred is too small by no more than view_scatter is (simulated, 10 to 40 views).
     let enlarged = 1.0 + 12.0 / free;
     let scatter = (squares / held / free - sampling(&levels)) * enlarged;
-    scatter.max(LEVEL_SCATTER * LEVEL_SCATTER).min(whole)
+    scatter.max(unseen(&levels, free)).min(whole)
 }
 
 /// A view's level, and its variance by sampling alone.
@@ -98,6 +94,11 @@ fn heights(levels: &[Level<'_>]) -> DVector<f64> {
 
 fn sampling(levels: &[Level<'_>]) -> f64 {
     levels.iter().map(|l| l.variance).sum::<f64>() / levels.len() as f64
+}
+
+/// The scatter that levels which do not scatter can hide: one standard error of its estimate.
+fn unseen(levels: &[Level<'_>], free: f64) -> f64 {
+    sampling(levels) * (2.0 / free).sqrt()
 }
 
 /// What a fit to some of the rows leaves of all.
