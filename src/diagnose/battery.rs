@@ -20,7 +20,7 @@ use super::noise::lines::lines;
 use super::noise::scatter::ScatterResult;
 use super::noise::tails::EXCESS;
 use super::noise::texture_finding::TextureFinding;
-use super::options::{Ablation, MIN_SIZE};
+use super::options::Ablation;
 use super::search::bias;
 use super::search::few_views::few_views;
 use super::search::outcome::Outcome;
@@ -162,7 +162,7 @@ impl Case<'_> {
         let textured = scatter.tails.as_ref().is_some_and(far_errors)
             || (textures && f.size.sigma < LEVEL_BESIDE_TEXTURE);
         let tailed = textured && f.status == Status::Recalibrate;
-        !stepped && !tailed && f.size.sigma > self.options.ablation.min_size(MIN_SIZE)
+        !stepped && !tailed
     }
 
     /// Is what was measured clearly more than twice of what the model has?

@@ -35,7 +35,7 @@ pub enum Ablation {
     /// Every pixel of every frame counts as a sample of its own, whatever it shares with others.
     NoCorrelation,
     /// What gains a nat on views left out is there, as Akaike has it for one parameter: no
-    /// simulation of noise alone through the whole search, and no least size.
+    /// simulation of noise alone through the whole search.
     UncalibratedThresholds,
     /// Every name has the one formula of its catalogue card; what only scales it stays free.
     FixedFormulas,
@@ -45,8 +45,6 @@ pub enum Ablation {
 pub const FEWEST_VIEWS: usize = 3;
 /// Single frames kept whole: enough for correlations in time.
 pub const FRAMES_KEPT: usize = 4;
-/// A bias or a change of variance smaller than this, in sigmas, is not told.
-pub const MIN_SIZE: f64 = 0.005;
 
 pub fn measure_options(options: &DiagnoseOptions) -> MeasureOptions {
     MeasureOptions { seed: options.seed, ..MeasureOptions::default() }

@@ -10,7 +10,7 @@ use crate::stats::Correlation;
 impl Ablation {
     pub(in crate::diagnose) fn rules(self, rules: Rules) -> Rules {
         match self {
-            Ablation::UncalibratedThresholds => Rules { calibrated: false, least: 0.0, ..rules },
+            Ablation::UncalibratedThresholds => Rules { calibrated: false, ..rules },
             _ => rules,
         }
     }
@@ -30,11 +30,6 @@ impl Ablation {
             }
         }
         fixed
-    }
-
-    /// Smaller terms, in sigmas, are not reported.
-    pub(in crate::diagnose) fn min_size(self, least: f64) -> f64 {
-        if self == Ablation::UncalibratedThresholds { 0.0 } else { least }
     }
 }
 

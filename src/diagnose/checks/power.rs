@@ -2,7 +2,7 @@
 //! 80 % of such recordings.
 //!
 //! The gates are those of the search itself: the threshold of the null over the dispersion of the
-//! views, the share of what was found first, and the least sizes. Noise is drawn from the views' own
+//! views, the share of what was found first, and the size beside the largest. Noise is drawn from the views' own
 //! information, and with the shape added its gain and its size are quadratic in the shape's size.
 
 use nalgebra::{DMatrix, DVector};
@@ -13,8 +13,7 @@ use serde_json::{Map, Value, json};
 use crate::diagnose::case::Case;
 use crate::diagnose::diagnosis::Detectable;
 use crate::diagnose::finding::pixels::terms_of;
-use crate::diagnose::finding::scene::{Scene, size};
-use crate::diagnose::options::MIN_SIZE;
+use crate::diagnose::finding::scene::Scene;
 use crate::diagnose::search::LEAST_SHARE_OF_GAIN;
 use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::evidence::{Evidence, gain, root};
@@ -101,14 +100,12 @@ impl DetectionCriteria<'_> {
         };
         let floor = self.min_rms(&unit.basis);
         let weight: f64 = self.scene.data.iter().flat_map(|v| &v.weight).sum();
-        let own = size(self.scene, &self.scene.values(unit)).sigma;
         let sizes: Option<Vec<f64>> = (0..REPLICATES)
             .into_par_iter()
             .map(|replicate| {
                 let mut rng = self.seed.stream(&format!("diagnose/power/{replicate}"));
-                let (gain, square, off) = draw.once(&mut rng)?;
-                let told = MIN_SIZE / own.max(f64::MIN_POSITIVE) - off;
-                Some(gain.above(need).max(square.above(floor * floor * weight)).max(told))
+                let (gain, square) = draw.once(&mut rng)?;
+                Some(gain.above(need).max(square.above(floor * floor * weight)))
             })
             .collect();
         let mut sizes = sizes?;
@@ -137,7 +134,7 @@ impl DetectionCriteria<'_> {
             self.rules.fixed.filter(|_| basis.is_of_picture()).map_or(0.0, |(fixed, px)| {
                 fixed * (CLEARLY_FIXED * basis.count() as f64 / px).sqrt()
             });
-        self.rules.least.max(LEAST_OF_LARGEST * largest).max(still)
+        (LEAST_OF_LARGEST * largest).max(still)
     }
 }
 
@@ -154,8 +151,8 @@ struct Draw<'a> {
 }
 
 impl Draw<'_> {
-    /// Gain, weighted square of the fit, and the error of its size, over the shape's size.
-    fn once(&self, rng: &mut crate::rng::Stream) -> Option<(Quadratic, Quadratic, f64)> {
+    /// Gain and weighted square of the fit, over the shape's size.
+    fn once(&self, rng: &mut crate::rng::Stream) -> Option<(Quadratic, Quadratic)> {
         let noise: Vec<DVector<f64>> = self
             .roots
             .iter()
@@ -165,7 +162,6 @@ impl Draw<'_> {
         let own = self.sum.view((m, m), (k, k));
         let mut gains = [0.0; 3];
         let mut squares = [0.0; 3];
-        let mut off = 0.0;
         for (n, (g, s)) in gains.iter_mut().zip(&mut squares).enumerate() {
             let size = n as f64 * self.step;
             let with = |(v, b): (&Evidence, &DVector<f64>)| Evidence {
@@ -177,13 +173,9 @@ impl Draw<'_> {
             *g = whole.total - self.base(&views)?;
             let beta = whole.beta.rows(m, k);
             *s = beta.dot(&(own * beta));
-            if n == 0 {
-                let unit = self.u.rows(m, k);
-                off = unit.dot(&(own * beta)) / unit.dot(&(own * unit));
-            }
         }
         let through = |values| Quadratic::through(values, self.step);
-        Some((through(gains), through(squares), off))
+        Some((through(gains), through(squares)))
     }
 
     /// What the columns beside bring alone.

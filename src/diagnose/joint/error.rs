@@ -176,6 +176,21 @@ fn together(factors: &[DVector<f64>], n: usize) -> DMatrix<f64> {
     factors.iter().fold(DMatrix::zeros(n, n), |sum, f| sum + f * f.transpose())
 }
 
+/// Covariance with the views as the sample (White 1980; Liang and Zeger 1986), where it is the larger.
+pub fn clustered(inverse: &DMatrix<f64>, beyond: &[DVector<f64>]) -> DMatrix<f64> {
+    let n = beyond.len() as f64;
+    let mut square = DMatrix::zeros(inverse.nrows(), inverse.nrows());
+    for e in beyond {
+        let moved = inverse * e;
+        square.ger(n / (n - 1.0).max(1.0), &moved, &moved, 1.0);
+    }
+    let larger: Vec<f64> =
+        (0..inverse.nrows()).map(|i| (square[(i, i)] / inverse[(i, i)]).max(1.0).sqrt()).collect();
+    DMatrix::from_fn(inverse.nrows(), inverse.nrows(), |i, j| {
+        inverse[(i, j)] * larger[i] * larger[j]
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -23,7 +23,7 @@ use crate::diagnose::search::outcome::{Chosen, Outcome};
 use crate::diagnose::views::samples::{ViewData, coarser};
 use crate::model::Covariance;
 use crate::terms::Gauge;
-use error::Error;
+use error::{Error, clustered};
 use fit::{Columns, Joint, Reduced};
 use terms::{Settled, System, is_rough, is_smooth_and_nameless, total};
 
@@ -283,21 +283,6 @@ fn disparities(data: &[ViewData]) -> [f64; 3] {
     all.par_sort_unstable_by(f64::total_cmp);
     [0.1, 0.5, 0.9]
         .map(|share| all.get((share * all.len() as f64) as usize).copied().unwrap_or(1.0))
-}
-
-/// Covariance with the views as the sample (White 1980; Liang and Zeger 1986), where it is the larger.
-pub fn clustered(inverse: &DMatrix<f64>, beyond: &[DVector<f64>]) -> DMatrix<f64> {
-    let n = beyond.len() as f64;
-    let mut square = DMatrix::zeros(inverse.nrows(), inverse.nrows());
-    for e in beyond {
-        let moved = inverse * e;
-        square.ger(n / (n - 1.0).max(1.0), &moved, &moved, 1.0);
-    }
-    let larger: Vec<f64> =
-        (0..inverse.nrows()).map(|i| (square[(i, i)] / inverse[(i, i)]).max(1.0).sqrt()).collect();
-    DMatrix::from_fn(inverse.nrows(), inverse.nrows(), |i, j| {
-        inverse[(i, j)] * larger[i] * larger[j]
-    })
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::structure::Structure;
 use super::texture_finding::TextureFinding;
 use super::view_mean::{ViewMean, nats};
 use crate::diagnose::finding::parameters::one;
-use crate::diagnose::options::{FRAMES_KEPT, MIN_SIZE};
+use crate::diagnose::options::FRAMES_KEPT;
 use crate::terms::{Axis, Statistic};
 
 /// The frame that stands out most in all views.
@@ -19,8 +19,7 @@ pub fn unequal(views: &[Structure], level: f64) -> Option<TextureFinding> {
             Some((j, m, (p * FRAMES_KEPT as f64).min(1.0)))
         })
         .min_by(|a, b| a.2.total_cmp(&b.2))?;
-    let size_sigma = (0.5 * m.value).exp() - 1.0;
-    if p > level || size_sigma.abs() < MIN_SIZE {
+    if p > level {
         return None;
     }
     let more = if m.value > 0.0 { "more" } else { "less" };
@@ -32,7 +31,7 @@ pub fn unequal(views: &[Structure], level: f64) -> Option<TextureFinding> {
         axis: Axis::Frame,
         interval: [0.0, 0.0],
         parameters,
-        size_sigma: size_sigma.abs(),
+        size_sigma: ((0.5 * m.value).exp() - 1.0).abs(),
         p,
         nats: nats(&m, 0.0),
         words: Some(format!("frame {} of every view has {more} noise than the others", frame + 1)),

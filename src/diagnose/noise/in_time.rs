@@ -1,14 +1,12 @@
 //! What pixels repeat: in every view, in every frame of a view, and from frame to frame.
 
 use super::structure::Structure;
-use super::texture_finding::{LEAST_VARIANCE_SHARE, Shared, TextureFinding};
+use super::texture_finding::{Shared, TextureFinding};
 use super::view_mean::{ViewMean, nats, variance_px2};
 use crate::diagnose::finding::parameters::one;
 use crate::diagnose::views::known::KnownTerms;
 use crate::terms::{Axis, Statistic};
 
-/// Correlations smaller than this are not worth a word.
-const LEAST_CORRELATION: f64 = 0.002;
 /// Share of the variance that pixels repeat in every view, worth a word.
 const LEAST_FIXED: f64 = 0.0003;
 /// Below this chance a fall of the correlation is not put down to noise alone.
@@ -62,7 +60,7 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
         // Two frames a view: still or slowly changing, nobody can say.
         let p = first.p_above(fixed_share + frozen_known + rho_known);
         let more = first.value - fixed_share - frozen_known - rho_known;
-        if p < level && more > LEAST_CORRELATION {
+        if p < level {
             let names = vec!["frozen-noise", "temporal-correlation"];
             let fraction = ("fraction", first.value, first_error);
             found.push(of_frames(names, [0.0, 1.0], fraction, more, (p, nats(&first, 0.0))));
@@ -72,7 +70,7 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
     let p_falling = falling.p_above(0.0);
     // What changes slowly makes next frames alike; a fall to frames that differ is chance.
     let alike = first.p_above(fixed_share + frozen_known) < level;
-    let slowly = alike && p_falling < level && falling.value > LEAST_VARIANCE_SHARE;
+    let slowly = alike && p_falling < level;
     // What stands still is in the last of them whole, and in all of them where none fades.
     let last = |s: &Structure| if slowly { s.lagged[2].or(s.lagged[1]) } else { of_any_two(s) };
     let Some(least) = ViewMean::of(views, last) else { return found };
@@ -84,7 +82,7 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
         let evidence = (p_falling, nats(&falling, 0.0));
         found.push(of_frames(name, [1.0, 3.0], ("rho", rho, first_error), rho, evidence));
     }
-    let floor = if slowly { BESIDE_ANOTHER } else { LEAST_CORRELATION };
+    let floor = if slowly { BESIDE_ANOTHER } else { 0.0 };
     if p_still < level && still - frozen_known > floor {
         // What falls, but not clearly, may as well change slowly.
         let doubtful = !slowly && p_falling < DOUBTFUL && rho_known == 0.0;

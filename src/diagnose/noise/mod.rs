@@ -25,7 +25,7 @@ use frames::unequal;
 use in_time::in_time;
 use pairs::{REACH_PX, window_of};
 use structure::Structure;
-use texture_finding::{LEAST_VARIANCE_SHARE, Shared, TextureFinding};
+use texture_finding::{Shared, TextureFinding};
 use view_mean::{ViewMean, nats, variance_px2};
 use window::{Window, part};
 
@@ -88,7 +88,7 @@ pub(in crate::diagnose) fn window(
     // A part of the noise alone: seen where neighbours are taken for independent.
     let near = ViewMean::of(views, |s| s.neighbour_correlation)?;
     let p = near.p_above(0.0);
-    if expected > 1.0 || p >= level || near.value <= LEAST_VARIANCE_SHARE {
+    if expected > 1.0 || p >= level {
         return None;
     }
     let (size, nats) = (near.value.sqrt(), nats(&near, 0.0));
@@ -124,7 +124,7 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
         statistic,
         axis,
         expected_px2,
-        least: if statistic == Statistic::Bias { LEAST_STILL } else { LEAST_VARIANCE_SHARE },
+        least: if statistic == Statistic::Bias { LEAST_STILL } else { 0.0 },
         words,
     };
     let still = "whole columns or rows err by a constant each, from one to the next";

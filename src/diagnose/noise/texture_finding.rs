@@ -4,7 +4,6 @@ use serde_json::Map;
 
 use super::view_mean::{ViewMean, nats};
 use crate::diagnose::finding::parameters::one;
-use crate::diagnose::options::MIN_SIZE;
 use crate::terms::{Axis, Statistic};
 
 /// A mismatch of the noise's structure.
@@ -55,6 +54,3 @@ impl Shared {
         })
     }
 }
-
-/// A share of the variance is not told whose square root is smaller than a bias must be.
-pub const LEAST_VARIANCE_SHARE: f64 = MIN_SIZE * MIN_SIZE;

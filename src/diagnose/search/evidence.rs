@@ -91,4 +91,4 @@ pub fn score(view: &Evidence, beta: &DVector<f64>) -> f64 {
 
 #[cfg(test)]
 #[path = "evidence_tests.rs"]
-mod tests;
+pub mod tests;

@@ -5,11 +5,10 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::diagnose::search::null::Null;
 use crate::diagnose::search::rows::Rows;
 use crate::rng::{Seed, Stream};
 
-fn normal(rng: &mut Stream) -> f64 {
+pub fn normal(rng: &mut Stream) -> f64 {
     StandardNormal.sample(rng)
 }
 
@@ -19,21 +18,21 @@ fn matrix(rows: usize, columns: usize, rng: &mut Stream) -> DMatrix<f64> {
 
 /// One view's samples as plain matrices.
 #[derive(Clone)]
-struct View {
-    y: DVector<f64>,
-    w: DVector<f64>,
+pub struct View {
+    pub y: DVector<f64>,
+    pub w: DVector<f64>,
     /// Nuisances, and what holds each to zero.
-    x: DMatrix<f64>,
-    precision: Vec<f64>,
+    pub x: DMatrix<f64>,
+    pub precision: Vec<f64>,
     /// Terms already chosen, and the candidate.
-    chosen: DMatrix<f64>,
-    candidate: DMatrix<f64>,
+    pub chosen: DMatrix<f64>,
+    pub candidate: DMatrix<f64>,
 }
 
 const NUISANCES: usize = 3;
 
 impl View {
-    fn draw(n: usize, chosen: usize, candidate: usize, rng: &mut Stream) -> Self {
+    pub fn draw(n: usize, chosen: usize, candidate: usize, rng: &mut Stream) -> Self {
         View {
             y: DVector::from_fn(n, |_, _| normal(rng)),
             // One in ten says nothing.
@@ -47,7 +46,7 @@ impl View {
         }
     }
 
-    fn rows(&self) -> Rows<'_> {
+    pub fn rows(&self) -> Rows<'_> {
         let beside = join(&self.x, &self.chosen);
         let width = beside.ncols();
         let row_major: Vec<f64> = beside.transpose().as_slice().to_vec();
@@ -55,7 +54,7 @@ impl View {
             .expect("nuisances that can be told apart")
     }
 
-    fn evidence(&self) -> Evidence {
+    pub fn evidence(&self) -> Evidence {
         let g = &self.candidate;
         self.rows().reduce(g.ncols(), |i, row| {
             row.iter_mut().enumerate().for_each(|(j, x)| *x = g[(i, j)]);
@@ -196,132 +195,4 @@ fn nuisances_that_are_one_and_the_same_are_refused() {
     let ones = [1.0; 10];
     assert!(Rows::new(&ones, &ones, &beside, 2, &[0.0, 0.0]).is_none());
     assert!(Rows::new(&ones, &ones, &beside, 2, &[1.0, 1.0]).is_some());
-}
-
-const DRAWS: usize = 4000;
-
-/// Gains of the candidate over the chosen terms in recordings of nothing but noise, by way of
-/// every sample; the chosen terms have true coefficients that are not zero.
-fn simulated(views: &[View], prior: f64, rng: &mut Stream) -> Vec<f64> {
-    let chosen = views[0].chosen.ncols();
-    let mut noisy: Vec<View> = views.to_vec();
-    let truth = DVector::from_element(chosen, 0.8);
-    let mut gains: Vec<f64> = (0..DRAWS)
-        .map(|_| {
-            for (view, n) in views.iter().zip(&mut noisy) {
-                let noise = view.w.map(|w| if w > 0.0 { normal(rng) / w.sqrt() } else { 0.0 });
-                n.y = &view.chosen * &truth + noise;
-            }
-            let with: Vec<Evidence> = noisy.iter().map(View::evidence).collect();
-            let before: Vec<Evidence> =
-                noisy.iter().map(|v| v.rows().reduce(0, |_, _| ())).collect();
-            let base = if chosen > 0 { gain(&before, prior).unwrap().total } else { 0.0 };
-            gain(&with, prior).unwrap().total - base
-        })
-        .collect();
-    gains.sort_by(f64::total_cmp);
-    gains
-}
-
-fn drawn(views: &[View], prior: f64, rng: &mut Stream) -> Vec<f64> {
-    let evidence: Vec<Evidence> = views.iter().map(View::evidence).collect();
-    let null = Null::of(&evidence, views[0].chosen.ncols(), prior).unwrap();
-    let mut gains: Vec<f64> = (0..DRAWS).map(|_| null.draw(rng)).collect();
-    gains.sort_by(f64::total_cmp);
-    gains
-}
-
-/// Greatest distance of two samples' distribution functions.
-fn kolmogorov_smirnov(a: &[f64], b: &[f64]) -> f64 {
-    a.iter()
-        .map(|x| {
-            let share = |s: &[f64]| s.partition_point(|y| y < x) as f64 / s.len() as f64;
-            (share(a) - share(b)).abs()
-        })
-        .fold(0.0, f64::max)
-}
-
-/// The same columns in every view, in others' weight.
-fn multiples(chosen: usize, candidate: usize, rng: &mut Stream) -> Vec<View> {
-    let one = View { precision: vec![0.0; 3], ..View::draw(25, chosen, candidate, rng) };
-    (0..7).map(|v| View { w: &one.w * (0.5 + f64::from(v)), ..one.clone() }).collect()
-}
-
-/// Where the views' information differs by a factor alone the drawn gains are those of noise.
-/// False alarm of each Kolmogorov-Smirnov test: 1e-4.
-#[test]
-fn noise_is_drawn_as_noise_brings_it_where_views_are_alike() {
-    let bound = (-(0.5e-4f64).ln() / 2.0).sqrt() * (2.0 / DRAWS as f64).sqrt();
-    for candidate in [1, 4] {
-        let mut rng = Seed(candidate as u64).stream("evidence/null");
-        let views = multiples(0, candidate, &mut rng);
-        let (brute, quick) = (simulated(&views, 1e-6, &mut rng), drawn(&views, 1e-6, &mut rng));
-        let distance = kolmogorov_smirnov(&brute, &quick);
-        assert!(distance < bound, "{candidate} columns: {distance} > {bound}");
-    }
-}
-
-/// In views that differ, with terms chosen before: the quick null's 95 % and 99 % quantiles are
-/// passed by noise as often as they say, to a third. Monte Carlo alone moves these shares by 7 %
-/// and 16 % (one standard deviation of 4,000 brute against 4,000 quick draws is root two of it).
-#[test]
-fn noise_is_drawn_nearly_so_where_views_differ() {
-    for (seed, chosen, candidate) in [(1, 0, 3), (2, 2, 3), (3, 1, 8)] {
-        let mut rng = Seed(seed).stream("evidence/differ");
-        let views: Vec<View> = (0..9)
-            .map(|v| {
-                let mut view = View::draw(25, chosen, candidate, &mut rng);
-                view.precision = vec![0.0; 3];
-                view.w *= 0.3 + 0.2 * f64::from(v);
-                view
-            })
-            .collect();
-        let (brute, quick) = (simulated(&views, 1e-6, &mut rng), drawn(&views, 1e-6, &mut rng));
-        for (share, most) in [(0.05, 0.05 * 4.0 / 3.0), (0.01, 0.01 * 5.0 / 3.0)] {
-            let cut = quick[((1.0 - share) * DRAWS as f64) as usize];
-            let above = DRAWS - brute.partition_point(|g| *g < cut);
-            let above = above as f64 / DRAWS as f64;
-            println!("{chosen} chosen, {candidate} columns: {above:.4} above the {share} quantile");
-            assert!(above < most, "noise passes the {share} quantile in {above}");
-            assert!(above > share / 3.0, "the {share} quantile is far too high: {above}");
-        }
-    }
-}
-
-/// Scatter of twelve views about a common coefficient, each with its own beside it.
-fn scatter(common: f64, apart: f64, rng: &mut Stream) -> f64 {
-    let evidence: Vec<Evidence> = (0..12)
-        .map(|_| {
-            let mut view = View::draw(60, 1, 3, rng);
-            let noise = view.w.map(|w| if w > 0.0 { normal(rng) / w.sqrt() } else { 0.0 });
-            let own = DVector::from_fn(3, |_, _| common + apart * normal(rng));
-            view.y = &view.candidate * own + &view.chosen * DVector::from_element(1, -3.0) + noise;
-            view.evidence()
-        })
-        .collect();
-    Null::of(&evidence, 1, 1e-6).unwrap().dispersion
-}
-
-/// 33 degrees of freedom: the sum of squares over them has a standard deviation of 0.25, which is
-/// taken off once already; 1.75 is four of them off, in 20 draws a chance of 2e-3 for the skewed
-/// tail. The second bound is the information of about 100 units a view: 1 + 100 * 0.5^2 = 26.
-#[test]
-fn views_that_disagree_are_seen_to() {
-    let mut rng = Seed(5).stream("evidence/dispersion");
-    for _ in 0..20 {
-        let calm = scatter(0.0, 0.0, &mut rng);
-        assert!((1.0..1.75).contains(&calm), "{calm}");
-    }
-    let wild = scatter(0.0, 0.5, &mut rng);
-    assert!(wild > 5.0, "{wild}");
-}
-
-/// Views that agree do not scatter, however strong what they agree on.
-#[test]
-fn views_that_agree_on_something_strong_do_not_scatter() {
-    let mut rng = Seed(6).stream("evidence/agree");
-    for common in [0.1, 0.5, 2.0] {
-        let calm = scatter(common, 0.0, &mut rng);
-        assert!((1.0..1.75).contains(&calm), "coefficients of {common} in all views: {calm}");
-    }
 }

@@ -53,8 +53,7 @@ impl Judge<'_> {
 
     pub fn sensible(&self, basis: &Basis, rms: f64) -> bool {
         let k = basis.count();
-        let least = self.rules.least.max(LEAST_OF_LARGEST * self.largest);
-        if rms < least {
+        if rms < LEAST_OF_LARGEST * self.largest {
             return false;
         }
         let Some((fixed, pixels)) = self.rules.fixed.filter(|_| basis.is_of_picture()) else {

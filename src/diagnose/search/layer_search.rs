@@ -12,7 +12,7 @@ use super::rules::Rules;
 use super::search;
 use super::variance;
 use crate::camera::Camera;
-use crate::diagnose::joint::{clustered, refit};
+use crate::diagnose::joint::{error::clustered, refit};
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::samples::{ViewData, coarser};
 use crate::diagnose::views::tiles::SIDE;
@@ -23,8 +23,6 @@ use crate::terms::Basis;
 
 /// No more terms than this are looked for in a layer.
 const MAX_TERMS: usize = 10;
-/// A bias smaller than this share of the noise is not told.
-const LEAST_SIGMAS: f64 = 0.004;
 /// A name that explains less than this share of what a nameless curve explains is not the cause.
 const NAME_ADEQUATE: f64 = 0.6;
 /// Biases by other formulas brought 97 % and more of the best curve's gain on their own axis (92
@@ -37,16 +35,6 @@ pub const BIAS_PRIOR: f64 = 0.1;
 pub const VARIANCE_PRIOR: f64 = 1.0;
 
 impl Survey {
-    /// Root of the weighted harmonic mean of the model's variance, px.
-    fn typical_sigma_px(&self) -> f64 {
-        let (mut sum, mut n) = (0.0, 0.0);
-        for t in self.views.iter().flat_map(|v| v.tiles.iter()).filter(|t| t.variance > 0.0) {
-            sum += t.pixels / t.variance;
-            n += t.pixels;
-        }
-        (n / sum).sqrt()
-    }
-
     /// Pixels of the picture that any view's target covered.
     fn covered_px(&self, camera: &Camera) -> f64 {
         let across = camera.width.div_ceil(SIDE);
@@ -78,7 +66,6 @@ impl Survey {
             agreed: false,
             max_terms: MAX_TERMS,
             fixed: (self.fixed_px2 > 0.0).then(|| (self.fixed_px2.sqrt(), self.covered_px(camera))),
-            least: LEAST_SIGMAS * self.typical_sigma_px(),
             calibrated: true,
             learnt_from: self.learnt_from[0],
         })
@@ -106,9 +93,6 @@ impl Survey {
             agreed: true,
             max_terms: MAX_TERMS,
             fixed: None,
-            // What views differ by as wholes is mostly taken up by their own levels: small terms are
-            // dropped when they are told, by their size on the axis.
-            least: 0.0,
             calibrated: true,
             learnt_from: self.learnt_from[1],
         })

@@ -218,37 +218,5 @@ const CHI2_MEDIAN: f64 = 0.4549;
 const MEDIAN_ERROR: f64 = 2.33;
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::diagnose::views::learnt::Learnt;
-
-    /// What `detectable` asks for is what the search lets pass, with a model of other views and
-    /// without.
-    #[test]
-    fn the_gain_for_so_many_nats_counts_for_as_many() {
-        let null = Null { vectors: Vec::new(), prior: 1.0, dispersion: 1.5, about_fit: 3.0 };
-        let rules = |learnt_from| Rules {
-            level: 0.01,
-            prior: 1.0,
-            adequacy: 0.6,
-            own_axis_adequacy: 0.0,
-            agreed: false,
-            max_terms: 1,
-            fixed: None,
-            least: 0.0,
-            calibrated: true,
-            learnt_from,
-        };
-        let other = |searched| Some(Learnt { views: 20.0, searched });
-        for (learnt_from, factor) in [(None, 0.99), (other(false), 2.0), (other(true), 4.0)] {
-            let rules = rules(learnt_from);
-            let gain = null.gain_for(7.0, 12, &rules);
-            approx::assert_relative_eq!(
-                null.calibrated_gain(gain, 12, &rules),
-                7.0,
-                max_relative = 1e-12
-            );
-            assert!(gain > factor * null.dispersion * 7.0, "{gain}");
-        }
-    }
-}
+#[path = "null_tests.rs"]
+mod tests;

@@ -21,8 +21,6 @@ pub struct Rules {
     /// Constant error of every pixel, px, and pixels of the picture: a pattern that stands still
     /// in the picture must be larger than what these errors make by chance.
     pub fixed: Option<(f64, f64)>,
-    /// Root mean square of the least term that is worth a word, in the response's unit.
-    pub least: f64,
     /// Judge gains by what noise alone would have brought.
     pub calibrated: bool,
     /// Views that the model was learnt from, where these views are not among them: its own error is

@@ -18,7 +18,6 @@ const RULES: Rules = Rules {
     agreed: false,
     max_terms: 4,
     fixed: None,
-    least: 0.0,
     calibrated: true,
     learnt_from: None,
 };
