@@ -51,6 +51,7 @@ impl Case<'_> {
         let outcomes = [&mean.outcome, &scatter.outcome];
         self.advise(&mut found, outcomes);
         let explained: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
+        let tested = (found.is_empty() && refitted.is_none()).then(|| verdict(&found, outcomes));
         if found.is_empty() {
             found.extend(far_off(&self.survey, typical_sigma_mm(&self.fields)));
         }
@@ -81,8 +82,12 @@ impl Case<'_> {
             None => Reference::Model,
         };
         let excluded = std::mem::take(&mut self.excluded);
-        self.progress.stage("testing the extended model");
-        let again = self.after(&extended, &mean, explained);
+        let again = if let Some(tested) = tested {
+            self.as_before(tested)
+        } else {
+            self.progress.stage("testing the extended model");
+            self.after(&extended, &mean, explained)
+        };
         let diagnosis = Diagnosis {
             format: DIAGNOSIS_FORMAT,
             recording,

@@ -3,7 +3,7 @@
 
 use crate::diagnose::battery::Battery;
 use crate::diagnose::case::{Case, MeanResult};
-use crate::diagnose::diagnosis::{After, Finding, Remaining};
+use crate::diagnose::diagnosis::{After, Finding, Remaining, Verdict};
 use crate::diagnose::finding::pixels::pixel_terms;
 use crate::diagnose::verdict::verdict;
 use crate::diagnose::views::field::Field;
@@ -21,6 +21,14 @@ pub struct Again {
 }
 
 impl Case<'_> {
+    /// What stands out where nothing was found: the model is the extended one, and was tested.
+    pub fn as_before(self, verdict: Verdict) -> Again {
+        let mut fields = self.fields;
+        fields.iter_mut().for_each(|f| f.first.clear());
+        let against = self.baseline.map_or_else(Vec::new, |b| b.fields);
+        Again { after: After { verdict, remaining: Vec::new() }, fields, against }
+    }
+
     /// What stands out against `extended`; the first run `explained` so many nats.
     pub fn after(mut self, extended: &NoiseModel, mean: &MeanResult, explained: f64) -> Again {
         let added = self.added(extended);
@@ -35,6 +43,7 @@ impl Case<'_> {
                 *sigma *= (0.5 * log).exp();
             }
         }
+        drop((bias, spread));
         let mut case = self.again(fields, known, extended);
         let battery = case.battery();
         for (field, mean) in case.fields.iter_mut().zip(means) {

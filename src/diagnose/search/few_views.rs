@@ -13,7 +13,7 @@ use super::candidate::{Candidate, RECALIBRATE};
 use super::evidence::{self, Evidence, root};
 use super::noise_gains::{MIN_EXCESS, NoiseGains};
 use super::outcome::Outcome;
-use super::prepared::{together, without};
+use super::prepared::{Grouping, Prepared, prepare, without};
 use super::rules::Rules;
 use super::view_levels::scatter_of_most;
 use super::view_worth::{doubted, left_over};
@@ -122,24 +122,45 @@ impl<'a> Tried<'a> {
     }
 }
 
-/// View by view, nothing where a view says nothing; where a view's worth is `doubted`, it is worth the less
-/// the more these columns leave.
-fn evidence_of(
-    basis: &Basis,
-    data: &[ViewData],
-    doubted: &[f64],
+/// The views as a candidate is tried on them.
+struct Views<'a> {
+    fine: &'a [ViewData],
+    coarse: &'a [ViewData],
+    /// `None` where a view says nothing.
+    prepared: Vec<Option<Prepared<'a>>>,
+    doubted: &'a [f64],
     prior: f64,
-) -> Option<Vec<Evidence>> {
-    let nothing = || Evidence::sum(basis.count(), 0.0, []);
-    let of = |view: &ViewData| together(view, &[basis]).unwrap_or_else(nothing);
-    let mut all: Vec<Evidence> = data.par_iter().map(of).collect();
-    for ((e, view), doubt) in all.iter_mut().zip(data).zip(doubted).filter(|(_, d)| **d > 1.0) {
-        let beta = evidence::fit(std::slice::from_ref(e), prior)?;
-        let left = left_over(view, basis, beta.as_slice()).clamp(1.0, *doubt);
-        e.a /= left;
-        e.b /= left;
+}
+
+impl<'a> Views<'a> {
+    fn of(
+        fine: &'a [ViewData],
+        coarse: &'a [ViewData],
+        groups: &'a [Vec<Grouping>],
+        doubted: &'a [f64],
+        prior: f64,
+    ) -> Self {
+        let prepared = |v: usize| prepare(&fine[v], &coarse[v], &groups[v], true, &[], &[]);
+        let prepared = (0..fine.len()).into_par_iter().map(prepared).collect();
+        Views { fine, coarse, prepared, doubted, prior }
     }
-    Some(all)
+
+    /// View by view; where a view's worth is doubted, it is worth the less the more these columns leave.
+    fn evidence(&self, basis: &Basis) -> Option<Vec<Evidence>> {
+        let nothing = || Evidence::sum(basis.count(), 0.0, []);
+        let of = |p: &Option<Prepared<'_>>| p.as_ref().map_or_else(nothing, |p| p.evidence(basis));
+        let mut all: Vec<Evidence> = self.prepared.iter().map(of).collect();
+        let as_fine = basis.is_fine() || basis.of_column_alone();
+        let data = if as_fine { self.fine } else { self.coarse };
+        let views = all.iter_mut().zip(data).zip(self.doubted);
+        for ((e, view), doubt) in views.filter(|(_, d)| **d > 1.0) {
+            let beta = evidence::fit(std::slice::from_ref(e), self.prior)?;
+            let left = left_over(view, basis, beta.as_slice()).clamp(1.0, *doubt);
+            e.a /= left;
+            e.b /= left;
+        }
+        Some(all)
+    }
 }
 
 /// The strongest such cause beside what all views share, if noise does not bring as much; `excess` is how
@@ -171,16 +192,14 @@ pub fn few_views(
     }
     let coarse: Vec<ViewData> =
         if of_mean { fine.par_iter().map(coarser).collect() } else { fine.clone() };
+    let groups: Vec<Vec<Grouping>> = fine.par_iter().map(Grouping::all).collect();
+    let views = Views::of(&fine, &coarse, &groups, &doubted, rules.prior);
     let tried: Vec<Tried<'_>> = candidates
         .par_iter()
         .filter(|c| c.family != Some(RECALIBRATE) && c.basis.count() <= MAX_COLUMNS)
         // Seams are many, and nearly the same.
         .filter(|c| c.family.is_some() || !matches!(c.basis, Basis::Curve { nodes: 2, .. }))
-        .filter_map(|c| {
-            let as_fine = c.basis.is_fine() || c.basis.of_column_alone();
-            let data = if as_fine { &fine } else { &coarse };
-            Tried::of(c, evidence_of(&c.basis, data, &doubted, rules.prior)?, rules.prior)
-        })
+        .filter_map(|c| Tried::of(c, views.evidence(&c.basis)?, rules.prior))
         .collect();
     let mut all: Vec<(&Candidate, Best)> =
         tried.par_iter().filter_map(|t| Some((t.candidate, t.best()?))).collect();
@@ -284,7 +303,10 @@ mod tests {
             ..ViewData::default()
         };
         let slope = Basis::powers(Coordinate::Column, 1, Modulation::One);
-        let all = evidence_of(&slope, &[view(1.0), view(0.0)], &[1.0; 2], 1.0).unwrap();
+        let data = [view(1.0), view(0.0)];
+        let groups = data.each_ref().map(Grouping::all);
+        let views = Views::of(&data, &data, &groups, &[1.0; 2], 1.0);
+        let all = views.evidence(&slope).unwrap();
         assert!(all[0].a.trace() > 1.0 && all[1].a.trace() == 0.0, "{all:?}");
     }
 
