@@ -87,7 +87,7 @@ fn log_score(view: &ViewData, terms: &[Term]) -> Option<f64> {
     let response: Vec<f64> = view
         .response
         .iter()
-        .zip(&view.places)
+        .zip(view.places.iter())
         .map(|(y, p)| y - Term::sum(terms, p, &mut row))
         .collect();
     let own: f64 = response.iter().zip(&view.weight).map(|(y, w)| w * y * y).sum();

@@ -120,7 +120,7 @@ impl DetectionCriteria<'_> {
         let mut row = Vec::new();
         let mut views = self.scene.data.clone();
         for view in &mut views {
-            for (y, place) in view.response.iter_mut().zip(&view.places) {
+            for (y, place) in view.response.iter_mut().zip(view.places.iter()) {
                 *y -= found.iter().map(|t| t.value(place, &mut row)).sum::<f64>();
             }
         }

@@ -1,5 +1,7 @@
 //! The views that a sensor could take, as the search would see them.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use super::scene::Scene;
@@ -87,7 +89,7 @@ impl Outlook<'_> {
                     data.nuisance.push(1.0);
                 }
                 data.response.push(0.0);
-                data.places.push(place);
+                Arc::make_mut(&mut data.places).push(place);
             }
         }
         (data.places.len() > FEWEST_PATCHES).then_some(data)
@@ -112,7 +114,7 @@ pub fn outlook<'a>(
         let weight: f64 = view
             .weight
             .iter()
-            .zip(&view.places)
+            .zip(view.places.iter())
             .map(|(w, p)| if bias { w * p.variance } else { *w })
             .sum();
         let each = (weight / pixels.max(1.0)) as f32;

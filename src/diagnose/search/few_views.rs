@@ -257,6 +257,8 @@ fn report(scene: &Scene<'_>, candidate: &Candidate, best: &Best, p: f64) -> Find
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
     use crate::terms::{Coordinate, Modulation};
 
@@ -295,7 +297,7 @@ mod tests {
     fn a_view_that_says_nothing_leaves_the_others_alone() {
         let place = |k: usize| PixelContext { u: k as f64, side: 4.0, ..Default::default() };
         let view = |weight: f64| ViewData {
-            places: (0..9).map(place).collect(),
+            places: Arc::new((0..9).map(place).collect()),
             response: (0..9).map(f64::from).collect(),
             weight: vec![weight; 9],
             nuisance: vec![1.0; 9],

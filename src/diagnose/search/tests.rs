@@ -1,5 +1,7 @@
 //! Searches over made-up views: what is put in is found, and noise is let be.
 
+use std::sync::Arc;
+
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -52,7 +54,7 @@ fn session(rng: &mut Stream, bias: impl Fn(&PixelContext) -> f64) -> Vec<ViewDat
                 .collect();
             ViewData {
                 gathered: Vec::new(),
-                places,
+                places: Arc::new(places),
                 response,
                 weight: vec![1.0; SAMPLES],
                 nuisance: vec![1.0; SAMPLES],
@@ -181,7 +183,7 @@ fn what_fades_in_large_patches_is_told_once() {
                 nuisance,
                 precision: vec![0.0; 3],
                 gathered: Vec::new(),
-                places,
+                places: Arc::new(places),
             }
         })
         .collect();
@@ -222,7 +224,7 @@ fn a_lift_that_planes_take_up_is_none() {
         let mut rng = Seed(9).stream("search/lift");
         let mut views = session(&mut rng, |_| 0.0);
         for view in &mut views {
-            for (p, y) in view.places.iter_mut().zip(&mut view.response) {
+            for (p, y) in Arc::make_mut(&mut view.places).iter_mut().zip(&mut view.response) {
                 let (right, averaged) = ((p.u - 320.0) / 320.0, 1e-3 * (p.u / 40.0).sin());
                 p.rho = 1.0 / p.disparity;
                 *y += p.disparity.powi(2) * (tilt * averaged + bend * right * right);

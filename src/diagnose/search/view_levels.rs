@@ -128,6 +128,8 @@ fn trimmed(x: &DMatrix<f64>, y: &DVector<f64>, start: DVector<f64>, kept: usize)
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use rand::Rng;
     use rand_distr::{Distribution, StandardNormal};
 
@@ -143,7 +145,7 @@ mod tests {
             let normal: f64 = StandardNormal.sample(rng);
             let level = 0.2 * z.ln() + sd * normal + if n < odd { more } else { 0.0 };
             ViewData {
-                places: vec![place],
+                places: Arc::new(vec![place]),
                 response: vec![level],
                 weight: vec![1e8],
                 ..Default::default()

@@ -70,6 +70,8 @@ pub fn left_over(view: &ViewData, basis: &Basis, beta: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
@@ -86,7 +88,7 @@ mod tests {
         for i in 0..ACROSS * ACROSS {
             let [u, v] = [i % ACROSS, i / ACROSS].map(|k| SIDE * k as f64 + 2.0);
             let [x, y] = [u, v].map(|at| at / (0.5 * SIDE * ACROSS as f64) - 1.0);
-            data.places.push(PixelContext {
+            Arc::make_mut(&mut data.places).push(PixelContext {
                 u,
                 v,
                 x,

@@ -1,5 +1,7 @@
 //! The size of the noise in patches large enough for a variance.
 
+use std::sync::Arc;
+
 use super::box_sums::SMOOTH_PX;
 use super::samples::ViewData;
 use super::surveyed_view::SurveyedView;
@@ -33,7 +35,7 @@ pub fn blocks(view: &SurveyedView, by_light: bool) -> ViewData {
             continue;
         }
         let worth = s.n * view.frames / view.correlation.sum_of_squares;
-        blocks.places.push(s.place);
+        Arc::make_mut(&mut blocks.places).push(s.place);
         // The mean of log chi^2 / n is about -1 / n.
         blocks.response.push((s.ratio / s.n / kept.max(0.5)).ln() + 1.0 / worth);
         blocks.weight.push(0.5 * worth / (1.0 + 1.0 / worth) / view.log_variance_inflation);

@@ -1,5 +1,7 @@
 //! The samples that a search works on.
 
+use std::sync::Arc;
+
 use super::tiles::SIDE;
 use crate::diagnose::search::rows::Rows;
 use crate::terms::{PixelContext, Term};
@@ -7,7 +9,8 @@ use crate::terms::{PixelContext, Term};
 /// One view's samples.
 #[derive(Clone, Default)]
 pub struct ViewData {
-    pub places: Vec<PixelContext>,
+    /// Shared by what is looked for at the same places.
+    pub places: Arc<Vec<PixelContext>>,
     pub response: Vec<f64>,
     pub weight: Vec<f64>,
     /// Row-major, as many columns as `precision` has entries.
@@ -37,7 +40,7 @@ impl ViewData {
             return self;
         }
         let mut row = Vec::new();
-        let own = self.nuisance.chunks_exact(self.precision.len()).zip(&self.places);
+        let own = self.nuisance.chunks_exact(self.precision.len()).zip(self.places.iter());
         let with = |(own, place): (&[f64], &PixelContext)| {
             let more = terms.iter().map(|t| finite(t.value(place, &mut row)));
             own.iter().copied().chain(more).collect::<Vec<f64>>()
@@ -62,13 +65,14 @@ pub fn coarser(fine: &ViewData) -> ViewData {
         groups.entry(key).or_default().push(i);
     }
     let mut coarse = ViewData {
-        places: Vec::with_capacity(groups.len()),
+        places: Arc::default(),
         response: Vec::with_capacity(groups.len()),
         weight: Vec::with_capacity(groups.len()),
         nuisance: Vec::with_capacity(groups.len() * p),
         precision: fine.precision.clone(),
         gathered: vec![0; fine.places.len()],
     };
+    let mut places = Vec::with_capacity(groups.len());
     for (k, members) in groups.values().enumerate() {
         members.iter().for_each(|&i| coarse.gathered[i] = k as u32);
         let weight: f64 = members.iter().map(|&i| fine.weight[i]).sum();
@@ -82,10 +86,11 @@ pub fn coarser(fine: &ViewData) -> ViewData {
         let mut place = fine.places[members[0]];
         place.average(&fine.places, &mean);
         place.side = side;
-        coarse.places.push(place);
+        places.push(place);
         coarse.response.push(mean(&|i| fine.response[i]));
         coarse.weight.push(weight);
         coarse.nuisance.extend((0..p).map(|q| mean(&|i| fine.nuisance[i * p + q])));
     }
+    coarse.places = Arc::new(places);
     coarse
 }

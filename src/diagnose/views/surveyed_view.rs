@@ -75,7 +75,7 @@ pub fn mean_data(view: &SurveyedView) -> ViewData {
     let tiles = &view.tiles;
     let nuisance = |t: &Tile| [1.0, t.place.x, t.place.y, finite(mean_off(&t.place))];
     ViewData {
-        places: tiles.iter().map(|t| t.place).collect(),
+        places: Arc::new(tiles.iter().map(|t| t.place).collect()),
         response: tiles.iter().map(|t| finite(t.mean)).collect(),
         weight: tiles.iter().map(|t| finite(t.pixels / t.variance / view.inflation)).collect(),
         nuisance: tiles.iter().flat_map(nuisance).collect(),
