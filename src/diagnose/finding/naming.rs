@@ -6,11 +6,16 @@ use crate::diagnose::search::outcome::Chosen;
 use crate::effects;
 use crate::terms::{Axis, Statistic};
 
-/// Odds of a family that needs so many columns more to say the same: it could have bent in each of
-/// these to what it is not, as far as all that is there (a unit-information prior; Kass and Wasserman
-/// 1995), and `gain` nats were seen to say that it did not.
-fn occam(more_columns: usize, gain: f64) -> f64 {
-    (1.0 + 2.0 * gain.max(0.0)).powf(-0.5 * more_columns as f64)
+/// Logarithm of the odds of a family that needs so many columns more to say the same: it could have bent
+/// in each of these to what it is not, as far as all that is there (a unit-information prior; Kass and
+/// Wasserman 1995), and `gain` nats were seen to say that it did not.
+pub fn ln_occam(more_columns: f64, gain: f64) -> f64 {
+    -0.5 * more_columns * (1.0 + 2.0 * gain.max(0.0)).ln()
+}
+
+/// The same for so many nats more on views left out, whose differences count for themselves.
+pub fn ln_odds(nats: f64) -> f64 {
+    0.25 * nats
 }
 
 /// Less probable names are not told.
@@ -91,8 +96,8 @@ pub fn naming(chosen: &Chosen) -> (Status, Option<&'static str>, Vec<Alternative
         let nats = (best - rival.gain).clamp(0.0, 40.0);
         let behind = rival.behind.clamp(-1.0, 6.0);
         let more = rival.basis.count().saturating_sub(chosen.candidate.basis.count());
-        let bent = occam(more, chosen.gain);
-        odds.push((rival.family, bent * (-(1.2 * behind + 0.25 * nats)).exp().min(1.0)));
+        let bent = ln_occam(more as f64, chosen.gain).exp();
+        odds.push((rival.family, bent * (ln_odds(-nats) - 1.2 * behind).exp().min(1.0)));
     }
     let total: f64 = odds.iter().map(|o| o.1).sum();
     odds.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -201,9 +206,12 @@ mod tests {
     /// Twelve nats are 25 = 5^2 times as much information as the unit that is believed at first.
     #[test]
     fn each_column_more_costs_the_root_of_what_was_seen() {
-        assert_eq!([occam(0, 12.0), occam(1, 0.0), occam(1, -3.0)], [1.0; 3]);
-        assert!((occam(1, 12.0) - 0.2).abs() < 1e-12);
-        assert!((occam(2, 12.0) - 0.04).abs() < 1e-12);
+        assert_eq!(
+            [ln_occam(0.0, 12.0), ln_occam(1.0, 0.0), ln_occam(1.0, -3.0)].map(f64::abs),
+            [0.0; 3]
+        );
+        assert!((ln_occam(1.0, 12.0).exp() - 0.2).abs() < 1e-12);
+        assert!((ln_occam(2.0, 12.0).exp() - 0.04).abs() < 1e-12);
     }
 
     #[test]

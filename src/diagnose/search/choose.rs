@@ -5,6 +5,7 @@ use super::judge::Judged;
 use super::noise_gains::NoiseGains;
 use super::outcome::{Chosen, Rival};
 use super::rules::Rules;
+use crate::diagnose::finding::naming::{ln_occam, ln_odds};
 use crate::terms::Basis;
 
 /// Of families that predict as well as the best, the one with the fewest columns is meant.
@@ -146,23 +147,34 @@ impl Choice<'_> {
             })
     }
 
-    /// The best of every family.
+    /// The best of every family: of the winner's the shape that brings most, of another's the one
+    /// that is most probable with its columns.
     fn rivals(&self, winner: usize, families: &[usize]) -> Option<Vec<Rival>> {
         let won = &self.judged[winner].as_ref()?.gain;
-        let mut rivals: Vec<Rival> = Vec::new();
-        for &i in families {
-            let (Some(family), Some(j)) = (self.candidates[i].family, &self.judged[i]) else {
-                continue;
-            };
-            if rivals.iter().all(|r| r.family != family) {
-                rivals.push(Rival {
-                    family,
-                    basis: self.candidates[i].basis.clone(),
-                    gain: self.dispersion_corrected_gain(i),
-                    behind: behind(&won.by_view, &j.gain.by_view),
-                });
+        let own = self.candidates[winner].family;
+        let odds = |i: usize| {
+            let nats = self.dispersion_corrected_gain(i) - won.total;
+            ln_odds(nats) + ln_occam(self.candidates[i].basis.count() as f64, won.total)
+        };
+        let mut best: Vec<(&'static str, usize)> = Vec::new();
+        for &i in families.iter().filter(|&&i| self.judged[i].is_some()) {
+            let Some(family) = self.candidates[i].family else { continue };
+            match best.iter_mut().find(|b| b.0 == family) {
+                None => best.push((family, i)),
+                Some(b) if Some(family) != own && odds(i) > odds(b.1) => b.1 = i,
+                Some(_) => {}
             }
         }
+        let rival = |(family, i): (&'static str, usize)| {
+            Some(Rival {
+                family,
+                basis: self.candidates[i].basis.clone(),
+                gain: self.dispersion_corrected_gain(i),
+                behind: behind(&won.by_view, &self.judged[i].as_ref()?.gain.by_view),
+            })
+        };
+        let mut rivals: Vec<Rival> = best.into_iter().filter_map(rival).collect();
+        rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         Some(rivals)
     }
 

@@ -161,8 +161,8 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
         all.push(Candidate::named(RECALIBRATE, bent));
     }
     // One number that is off is no less simple than a formula of one.
-    for column in &columns {
-        let columns = vec![column.clone()];
+    for column in columns.iter().cloned().chain(moved_depths(sigma, z_m, theta_rad)) {
+        let columns = vec![column];
         all.push(Candidate::named(RECALIBRATE, Basis::Table { z_m, theta_rad, columns }));
     }
     for n in if few < columns.len() { vec![few, columns.len()] } else { vec![few] } {
@@ -172,6 +172,23 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
         }
     }
     all
+}
+
+/// What a scale of the depth, z' = (1 + s) z, and an offset of the disparity, z' = z + c z^2, make of the
+/// logarithm of the variance over the model's at z', per s and per c: planes do not show these, and the
+/// noise that moves with them is no new physics. Of s^2 and c^2 nothing is said.
+fn moved_depths(sigma: &SigmaModel, z_m: [f64; 2], theta_rad: [f64; 2]) -> [Vec<f64>; 2] {
+    const SMALL: f64 = 0.01;
+    let column = |of: &dyn Fn(f64, f64) -> f64| {
+        let at = |n| {
+            let (z, theta) = table_place(z_m, theta_rad, n);
+            let log = |z| 2.0 * sigma.sigma(z, theta).ln();
+            let value = of(z, (log(z * (1.0 + SMALL)) - log(z)) / SMALL.ln_1p());
+            if value.is_finite() { value } else { 0.0 }
+        };
+        (0..TABLE * TABLE).map(at).collect()
+    };
+    [column(&|_, slope| 2.0 - slope), column(&|z, slope| z * (4.0 - slope))]
 }
 
 /// Curves without a name, one axis each.

@@ -180,6 +180,26 @@ mod tests {
         }
     }
 
+    /// Levels that differ by sampling alone may hide one standard error of that, whatever the picture's size.
+    #[test]
+    fn the_scatter_that_is_not_seen_goes_with_what_a_view_is_worth() {
+        let mut rng = Seed(6).stream("levels");
+        for sd in [0.02, 0.005] {
+            let median = |rng: &mut Stream| {
+                let mut all: Vec<f64> = (0..40)
+                    .map(|_| {
+                        let mut views = session(20, sd, 0, 0.0, rng);
+                        views.iter_mut().for_each(|v| v.weight[0] = 1.0 / (sd * sd));
+                        view_scatter(&views, MODEL_TOLERANCE)
+                    })
+                    .collect();
+                crate::stats::median(&mut all)
+            };
+            let hidden = median(&mut rng) / (sd * sd);
+            assert!((0.3..0.45).contains(&hidden), "{hidden} of the sampling's variance");
+        }
+    }
+
     #[test]
     fn of_too_few_views_all_count() {
         let mut rng = Seed(5).stream("levels");

@@ -83,3 +83,87 @@ pub fn mean_data(view: &SurveyedView) -> ViewData {
         gathered: Vec::new(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plane::Plane;
+    use crate::simulate::kinect_v1;
+    use crate::terms::{Basis, Coordinate, Modulation};
+
+    /// A tilted wall seen by a sensor of Eq. 1 whose noise is Gaussian in the depth, means without noise.
+    fn view() -> SurveyedView {
+        const SIDE: usize = 4;
+        let sensor = kinect_v1(1);
+        let (camera, scale) = (&sensor.camera, 43.5);
+        let plane = Plane::tilted(3.5, 1.0, 0.7);
+        let mut tiles = Vec::new();
+        for v in (SIDE / 2..camera.height).step_by(SIDE) {
+            for u in (SIDE / 2..camera.width).step_by(SIDE) {
+                let (u, v) = (u as f64, v as f64);
+                let (x, y) = camera.ray(u, v);
+                let z = plane.depth(x, y);
+                if !(0.5..8.0).contains(&z) {
+                    continue;
+                }
+                let (disparity, sigma_m) = (scale / z, 0.0015 + 0.00215 * (z - 0.483).powi(2));
+                let variance = (sigma_m * disparity / z).powi(2);
+                let (side, radius) = (SIDE as f64, x.hypot(y));
+                let own = PixelContext {
+                    u,
+                    v,
+                    x,
+                    y,
+                    z,
+                    disparity,
+                    variance,
+                    side,
+                    radius,
+                    ..Default::default()
+                };
+                tiles.push(Tile {
+                    place: own,
+                    mean: disparity * (sigma_m / z).powi(2),
+                    square: variance,
+                    rough_square: variance,
+                    temporal: variance,
+                    variance,
+                    // Thirty frames.
+                    pixels: 30.0 * side * side,
+                    missing: 0.0,
+                    asked: 1.0,
+                });
+            }
+        }
+        SurveyedView {
+            name: "0".into(),
+            tiles: Arc::new(tiles),
+            inflation: 1.0,
+            correlation: Correlation::white(),
+            frames: 30.0,
+            log_variance_inflation: 1.0,
+            between_frame_factor: Some(1.0),
+            in_second_half: false,
+        }
+    }
+
+    /// Planes alone leave of it what a bowl would be: dozens of nats a view, for no error of the sensor.
+    #[test]
+    fn noise_that_is_gaussian_in_the_depth_is_no_bowl() {
+        let data = mean_data(&view());
+        let bowl = Basis::powers(Coordinate::RadiusSquared, 2, Modulation::One);
+        let nats = |data: &ViewData| {
+            let rows = data.rows(&data.response).expect("nuisances that can be told apart");
+            let seen = rows.reduce(2, |i, g| bowl.fill(&data.places[i], g));
+            0.5 * seen.b.dot(&(seen.a.try_inverse().expect("two columns") * &seen.b))
+        };
+        let planes = ViewData {
+            nuisance: data.nuisance.chunks_exact(4).flat_map(|n| n[..3].to_vec()).collect(),
+            precision: vec![0.0; 3],
+            ..data.clone()
+        };
+        let (with, without) = (nats(&data), nats(&planes));
+        println!("{with:.3} nats, by planes alone {without:.1}");
+        assert!(without > 10.0 && with < 1.0, "{with} {without}");
+    }
+}

@@ -1,0 +1,63 @@
+//! Causes of a few views, among views made by numbers.
+
+use std::sync::Arc;
+
+use super::*;
+use crate::terms::{Coordinate, Modulation};
+
+fn views(name: &str, size: f64, of: usize) -> Vec<Evidence> {
+    let mut rng = Seed(7).stream(name);
+    let one = |v: usize| {
+        let (a, noise): (f64, f64) = (100.0, StandardNormal.sample(&mut rng));
+        let beta = if v < of { size } else { 0.0 };
+        let b = DVector::from_element(1, a * beta + a.sqrt() * noise);
+        Evidence { a: DMatrix::from_element(1, 1, a), b }
+    };
+    (0..18).map(one).collect()
+}
+
+/// Three views of eighteen show what is worth 150 nats in them: 0.5 a beta^2 each.
+#[test]
+fn the_views_that_show_it_are_found() {
+    let mut found = best(&views("few-views/three", 1.0, 3), 0.1).unwrap();
+    found.views.sort_unstable();
+    assert_eq!(found.views, [0, 1, 2]);
+    assert!((found.beta[0] - 1.0).abs() < 0.25 && found.gain > 90.0, "{}", found.gain);
+}
+
+/// Eight views of eighteen are few as well. Of the 390 nats no more than three quarters are lost: the
+/// quartile of all is the median of the ten that are noise, four times what it is taken for.
+#[test]
+fn nearly_half_of_the_views_are_few() {
+    let slope = Candidate::curve(Basis::powers(Coordinate::Column, 1, Modulation::One));
+    let tried = Tried::of(&slope, views("few-views/half", 1.0, 8), 0.1).unwrap();
+    let found = tried.best().unwrap();
+    assert_eq!((found.views.len(), found.gain > 90.0), (8, true), "{}", found.gain);
+}
+
+/// A view without a reading takes no part, and keeps no other from it.
+#[test]
+fn a_view_that_says_nothing_leaves_the_others_alone() {
+    let place = |k: usize| PixelContext { u: k as f64, side: 4.0, ..Default::default() };
+    let view = |weight: f64| ViewData {
+        places: Arc::new((0..9).map(place).collect()),
+        response: (0..9).map(f64::from).collect(),
+        weight: vec![weight; 9],
+        nuisance: vec![1.0; 9],
+        precision: vec![0.0],
+        ..ViewData::default()
+    };
+    let slope = Basis::powers(Coordinate::Column, 1, Modulation::One);
+    let data = [view(1.0), view(0.0)];
+    let groups = data.each_ref().map(Grouping::all);
+    let views = Views::of(&data, &data, &groups, &[1.0; 2], 1.0);
+    let all = views.evidence(&slope).unwrap();
+    assert!(all[0].a.trace() > 1.0 && all[1].a.trace() == 0.0, "{all:?}");
+}
+
+#[test]
+fn noise_brings_less_than_the_choice_costs() {
+    let gain = |n: u64| best(&views(&format!("few-views/{n}"), 0.0, 0), 0.1).unwrap().gain;
+    let above = (0..200).filter(|&n| gain(n) > 5.0).count();
+    assert!(above <= 6, "{above} of 200 above 5 nats");
+}
