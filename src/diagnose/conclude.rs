@@ -83,7 +83,7 @@ impl Case<'_> {
         };
         let excluded = std::mem::take(&mut self.excluded);
         let again = if let Some(tested) = tested {
-            self.as_before(tested)
+            self.unchanged(tested)
         } else {
             self.progress.stage("testing the extended model");
             self.after(&extended, &mean, explained)

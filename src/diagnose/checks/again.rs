@@ -22,7 +22,7 @@ pub struct Again {
 
 impl Case<'_> {
     /// What stands out where nothing was found: the model is the extended one, and was tested.
-    pub fn as_before(self, verdict: Verdict) -> Again {
+    pub fn unchanged(self, verdict: Verdict) -> Again {
         let mut fields = self.fields;
         fields.iter_mut().for_each(|f| f.first.clear());
         let against = self.baseline.map_or_else(Vec::new, |b| b.fields);
