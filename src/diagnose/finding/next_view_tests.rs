@@ -44,7 +44,7 @@ impl Stand {
             sigma: &self.sigma,
             reach: &self.reach,
             worth: 0.02,
-            precision: vec![0.0; 3],
+            precision: vec![0.0, 0.0, 0.0, 0.1],
         })
     }
 }

@@ -176,19 +176,24 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
 
 /// What a scale of the depth, z' = (1 + s) z, and an offset of the disparity, z' = z + c z^2, make of the
 /// logarithm of the variance over the model's at z', per s and per c: planes do not show these, and the
-/// noise that moves with them is no new physics. Of s^2 and c^2 nothing is said.
-fn moved_depths(sigma: &SigmaModel, z_m: [f64; 2], theta_rad: [f64; 2]) -> [Vec<f64>; 2] {
+/// noise that moves with them is no new physics. To first order, and as if the tilts stayed.
+fn moved_depths(sigma: &SigmaModel, z_m: [f64; 2], theta_rad: [f64; 2]) -> Vec<Vec<f64>> {
     const SMALL: f64 = 0.01;
     let column = |of: &dyn Fn(f64, f64) -> f64| {
         let at = |n| {
             let (z, theta) = table_place(z_m, theta_rad, n);
             let log = |z| 2.0 * sigma.sigma(z, theta).ln();
-            let value = of(z, (log(z * (1.0 + SMALL)) - log(z)) / SMALL.ln_1p());
+            // Towards the middle: beyond its ends a sigma goes on as it ended.
+            let share = if z * z > z_m[0] * z_m[1] { 1.0 - SMALL } else { 1.0 + SMALL };
+            let value = of(z, (log(z * share) - log(z)) / share.ln());
             if value.is_finite() { value } else { 0.0 }
         };
         (0..TABLE * TABLE).map(at).collect()
     };
-    [column(&|_, slope| 2.0 - slope), column(&|z, slope| z * (4.0 - slope))]
+    let columns: [Vec<f64>; 2] =
+        [column(&|_, slope| 2.0 - slope), column(&|z, slope| z * (4.0 - slope))];
+    // Sigma in proportion to z does not move with a scale, nor to z^2 with an offset.
+    columns.into_iter().filter(|c| c.iter().any(|x| x.abs() > 0.05)).collect()
 }
 
 /// Curves without a name, one axis each.
