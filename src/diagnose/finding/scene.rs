@@ -26,7 +26,7 @@ impl<'a> Scene<'a> {
         Scene { statistic: Statistic::Variance, survey, data, scale_px_m, corner_px }
     }
 
-    /// A term's values, what the views' own nuisances take taken out.
+    /// A term's values, what the views' planes take taken out.
     pub fn values(&self, term: &Term) -> Vec<Vec<f64>> {
         let mut row = Vec::new();
         self.data
@@ -54,23 +54,24 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// Take the weighted fit of the view's nuisances out of `values`.
+/// Take the weighted fit of the view's free nuisances, its plane, out of `values`. What is held would
+/// take a part of a large effect, too.
 fn level(view: &ViewData, values: &mut [f64]) {
     let p = view.precision.len();
-    let mut a = nalgebra::DMatrix::<f64>::zeros(p, p);
-    let mut b = nalgebra::DVector::<f64>::zeros(p);
+    let free: Vec<usize> = (0..p).filter(|&q| view.precision[q] == 0.0).collect();
+    let mut a = nalgebra::DMatrix::<f64>::zeros(free.len(), free.len());
+    let mut b = nalgebra::DVector::<f64>::zeros(free.len());
     for ((row, w), y) in view.nuisance.chunks_exact(p).zip(&view.weight).zip(values.iter()) {
-        for q in 0..p {
-            b[q] += w * row[q] * y;
-            for r in 0..p {
-                a[(q, r)] += w * row[q] * row[r];
+        for (i, &q) in free.iter().enumerate() {
+            b[i] += w * row[q] * y;
+            for (j, &r) in free.iter().enumerate() {
+                a[(i, j)] += w * row[q] * row[r];
             }
         }
     }
-    view.precision.iter().enumerate().for_each(|(q, held)| a[(q, q)] += held);
     let Some(fit) = a.lu().solve(&b) else { return };
     for (row, y) in view.nuisance.chunks_exact(p).zip(values) {
-        *y -= row.iter().zip(fit.iter()).map(|(x, c)| x * c).sum::<f64>();
+        *y -= free.iter().zip(fit.iter()).map(|(&q, c)| row[q] * c).sum::<f64>();
     }
 }
 
