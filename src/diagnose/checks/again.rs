@@ -20,13 +20,18 @@ pub struct Again {
     pub against: Vec<Field>,
 }
 
+impl Again {
+    fn of(after: After, case: Case<'_>) -> Self {
+        let mut fields = case.fields;
+        fields.iter_mut().for_each(|f| f.first.clear());
+        Again { after, fields, against: case.baseline.map_or_else(Vec::new, |b| b.fields) }
+    }
+}
+
 impl Case<'_> {
     /// What stands out where nothing was found: the model is the extended one, and was tested.
     pub fn unchanged(self, verdict: Verdict) -> Again {
-        let mut fields = self.fields;
-        fields.iter_mut().for_each(|f| f.first.clear());
-        let against = self.baseline.map_or_else(Vec::new, |b| b.fields);
-        Again { after: After { verdict, remaining: Vec::new() }, fields, against }
+        Again::of(After { verdict, remaining: Vec::new() }, self)
     }
 
     /// What stands out against `extended`; the first run `explained` so many nats.
@@ -46,12 +51,8 @@ impl Case<'_> {
         drop((bias, spread));
         let mut case = self.again(fields, known, extended);
         let battery = case.battery();
-        for (field, mean) in case.fields.iter_mut().zip(means) {
-            field.mean = mean;
-            field.first.clear();
-        }
-        let against = case.baseline.map_or_else(Vec::new, |b| b.fields);
-        Again { after: after(&battery, explained), fields: case.fields, against }
+        case.fields.iter_mut().zip(means).for_each(|(field, mean)| field.mean = mean);
+        Again::of(after(&battery, explained), case)
     }
 
     /// What the extended model has beyond the one that was given, as terms.

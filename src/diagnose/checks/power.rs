@@ -2,8 +2,9 @@
 //! 80 % of such recordings.
 //!
 //! The gates are those of the search itself: the threshold of the null over the dispersion of the
-//! views, the share of what was found first, and the size beside the largest. Noise is drawn from the views' own
-//! information, and with the shape added its gain and its size are quadratic in the shape's size.
+//! views, the share of what was found first, and the size beside the largest. Noise is drawn from the
+//! views' own information, and with the shape added its gain and its size are quadratic in the shape's
+//! size.
 
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};

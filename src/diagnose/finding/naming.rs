@@ -13,7 +13,7 @@ pub fn ln_occam(more_columns: f64, gain: f64) -> f64 {
     -0.5 * more_columns * (1.0 + 2.0 * gain.max(0.0)).ln()
 }
 
-/// The same for so many nats more on views left out, whose differences count for themselves.
+/// Logarithm of the odds for so many nats more. How far single views are ahead counts beside it.
 pub fn ln_odds(nats: f64) -> f64 {
     0.25 * nats
 }

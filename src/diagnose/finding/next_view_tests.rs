@@ -6,6 +6,7 @@ use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::diagnose::search::outcome::Rival;
 use crate::diagnose::views::samples::ViewData;
+use crate::diagnose::views::surveyed_view::MEAN_PRECISION;
 use crate::model::{Domain, Form, PAPER_EQ1, SigmaModel};
 use crate::rng::Stream;
 use crate::simulate::kinect_v1;
@@ -44,7 +45,7 @@ impl Stand {
             sigma: &self.sigma,
             reach: &self.reach,
             worth: 0.02,
-            precision: vec![0.0, 0.0, 0.0, 0.1],
+            precision: MEAN_PRECISION.to_vec(),
         })
     }
 }

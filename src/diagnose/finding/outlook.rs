@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::scene::Scene;
 use crate::camera::{Camera, Rays};
 use crate::diagnose::views::samples::ViewData;
-use crate::diagnose::views::surveyed_view::mean_off;
+use crate::diagnose::views::surveyed_view::{MEAN_PRECISION, mean_nuisance};
 use crate::model::SigmaModel;
 use crate::plane::Plane;
 use crate::scene::TargetFrame;
@@ -84,7 +84,7 @@ impl Outlook<'_> {
                 let weight = self.worth * (side * side) as f64;
                 if self.statistic == Statistic::Bias {
                     data.weight.push(weight / place.variance);
-                    data.nuisance.extend([1.0, place.x, place.y, mean_off(&place)]);
+                    data.nuisance.extend(mean_nuisance(&place));
                 } else {
                     data.weight.push(weight);
                     data.nuisance.push(1.0);
@@ -126,7 +126,7 @@ pub fn outlook<'a>(
         return None;
     }
     // Of the view's own nuisances; how known terms scatter is nothing to plan by.
-    let own = if scene.statistic == Statistic::Bias { 4 } else { 1 };
+    let own = if bias { MEAN_PRECISION.len() } else { 1 };
     Some(Outlook {
         statistic: scene.statistic,
         camera,

@@ -1,5 +1,7 @@
 //! The data that a layer's findings are measured on.
 
+use nalgebra::Vector3;
+
 use crate::diagnose::diagnosis::Size;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::samples::ViewData;
@@ -54,24 +56,11 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// Take the weighted fit of the view's free nuisances, its plane, out of `values`. What is held would
-/// take a part of a large effect, too.
+/// Take the view's plane out of `values`. What is held beside it would take a part of a large effect, too.
 fn level(view: &ViewData, values: &mut [f64]) {
-    let p = view.precision.len();
-    let free: Vec<usize> = (0..p).filter(|&q| view.precision[q] == 0.0).collect();
-    let mut a = nalgebra::DMatrix::<f64>::zeros(free.len(), free.len());
-    let mut b = nalgebra::DVector::<f64>::zeros(free.len());
-    for ((row, w), y) in view.nuisance.chunks_exact(p).zip(&view.weight).zip(values.iter()) {
-        for (i, &q) in free.iter().enumerate() {
-            b[i] += w * row[q] * y;
-            for (j, &r) in free.iter().enumerate() {
-                a[(i, j)] += w * row[q] * row[r];
-            }
-        }
-    }
-    let Some(fit) = a.lu().solve(&b) else { return };
-    for (row, y) in view.nuisance.chunks_exact(p).zip(values) {
-        *y -= free.iter().zip(fit.iter()).map(|(&q, c)| row[q] * c).sum::<f64>();
+    let Some(plane) = view.plane_of(values) else { return };
+    for (p, y) in view.places.iter().zip(values) {
+        *y -= plane.dot(&Vector3::new(1.0, p.x, p.y));
     }
 }
 

@@ -141,7 +141,8 @@ mod tests {
         assert!(rows[0].abs() < 4.0 * rows[1] && rows[1] < 0.04, "rows: {rows:?}");
     }
 
-    /// Noise of 3 % that is Gaussian in the depth has an excess of 72 s^2 = .065 in the disparity.
+    /// Noise of 3 % that is Gaussian in the depth has an excess of 72 s^2 = .065 in the disparity, and
+    /// none once it is made a depth again.
     #[test]
     fn what_is_gaussian_in_the_depth_looks_heavy_in_the_disparity() {
         const S: f32 = 0.03;
@@ -150,6 +151,8 @@ mod tests {
         };
         let found = excess(disparity);
         assert!((found[0] - 0.065).abs() < 4.0 * found[1], "{found:?}");
+        let depth = excess(|rng| disparity(rng).iter().map(|e| e / (1.0 + S * e)).collect());
+        assert!(depth[0].abs() < 4.0 * depth[1], "{depth:?}");
     }
 
     /// Student's t of 24 degrees of freedom has 6 / 20 more, less what the cut takes.

@@ -152,10 +152,9 @@ impl Choice<'_> {
     fn rivals(&self, winner: usize, families: &[usize]) -> Option<Vec<Rival>> {
         let won = &self.judged[winner].as_ref()?.gain;
         let own = self.candidates[winner].family;
-        let odds = |i: usize| {
-            let nats = self.dispersion_corrected_gain(i) - won.total;
-            ln_odds(nats) + ln_occam(self.candidates[i].basis.count() as f64, won.total)
-        };
+        let columns = |i: usize| self.candidates[i].basis.count() as f64;
+        let odds =
+            |i: usize| ln_odds(self.dispersion_corrected_gain(i)) + ln_occam(columns(i), won.total);
         let mut best: Vec<(&'static str, usize)> = Vec::new();
         for &i in families.iter().filter(|&&i| self.judged[i].is_some()) {
             let Some(family) = self.candidates[i].family else { continue };

@@ -125,8 +125,13 @@ pub fn error_of_sigma(reach: &Extent, sigma: &SigmaModel) -> Vec<Vec<Term>> {
     (0..eigen.eigenvalues.len()).filter_map(direction).collect()
 }
 
-/// The derivatives of log variance after the sigma model's parameters: all of them, and those that
-/// a frontal target decides.
+/// Does the logarithm of the variance move with it?
+fn tells(column: &[f64]) -> bool {
+    column.iter().all(|c| c.is_finite()) && column.iter().any(|c| c.abs() > 0.05)
+}
+
+/// The derivatives of log variance after the sigma model's parameters: all of them, those that a frontal
+/// target decides, and each alone; and what [`moved_depths`] make of it.
 fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
     let (z_m, theta_rad) = table_reach(reach);
     let table = |model: &SigmaModel| log_variances(model, z_m, theta_rad);
@@ -139,9 +144,7 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
             moved.parameters[j] += step;
             let column: Vec<f64> =
                 table(&moved).iter().zip(&base).map(|(m, b)| (m - b) / 0.01).collect();
-            let told =
-                column.iter().all(|c| c.is_finite()) && column.iter().any(|c| c.abs() > 0.05);
-            told.then_some(column)
+            tells(&column).then_some(column)
         })
         .collect();
     let few = columns.len().min(3);
@@ -185,15 +188,14 @@ fn moved_depths(sigma: &SigmaModel, z_m: [f64; 2], theta_rad: [f64; 2]) -> Vec<V
             let log = |z| 2.0 * sigma.sigma(z, theta).ln();
             // Towards the middle: beyond its ends a sigma goes on as it ended.
             let share = if z * z > z_m[0] * z_m[1] { 1.0 - SMALL } else { 1.0 + SMALL };
-            let value = of(z, (log(z * share) - log(z)) / share.ln());
-            if value.is_finite() { value } else { 0.0 }
+            of(z, (log(z * share) - log(z)) / share.ln())
         };
-        (0..TABLE * TABLE).map(at).collect()
+        (0..TABLE * TABLE).map(at).collect::<Vec<f64>>()
     };
-    let columns: [Vec<f64>; 2] =
-        [column(&|_, slope| 2.0 - slope), column(&|z, slope| z * (4.0 - slope))];
+    let mut columns = vec![column(&|_, slope| 2.0 - slope), column(&|z, slope| z * (4.0 - slope))];
     // Sigma in proportion to z does not move with a scale, nor to z^2 with an offset.
-    columns.into_iter().filter(|c| c.iter().any(|x| x.abs() > 0.05)).collect()
+    columns.retain(|c| tells(c));
+    columns
 }
 
 /// Curves without a name, one axis each.

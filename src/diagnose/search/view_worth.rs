@@ -11,7 +11,6 @@ use nalgebra::Vector3;
 use super::prepared::without;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::samples::ViewData;
-use crate::solve::plane_through;
 use crate::stats::quantile;
 use crate::terms::Basis;
 
@@ -45,13 +44,10 @@ fn doubts(inflations: &[f64]) -> Vec<f64> {
 /// patches of any size are seen.
 pub fn left_over(view: &ViewData, basis: &Basis, beta: &[f64]) -> f64 {
     let left = without(view, &[(basis, beta.to_vec())]);
-    let points = || view.places.iter().zip(&left).zip(&view.weight);
-    let Some(plane) = plane_through(points().map(|((p, y), w)| ([p.x, p.y], *y, *w))) else {
-        return f64::INFINITY;
-    };
+    let Some(plane) = view.plane_of(&left) else { return f64::INFINITY };
     let at_scale = |across: f64| {
         let mut patches: BTreeMap<[u32; 2], [f64; 2]> = BTreeMap::new();
-        for ((p, y), w) in points() {
+        for ((p, y), w) in view.places.iter().zip(&left).zip(&view.weight) {
             let side = across * p.side.max(1.0);
             let sums = patches.entry([p.u, p.v].map(|at| (at / side) as u32)).or_default();
             sums[0] += w * (y - plane.dot(&Vector3::new(1.0, p.x, p.y)));

@@ -94,10 +94,7 @@ impl Sum {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
-    use crate::stats::Correlation;
 
     /// A print of two greys, half a block a square: shot noise is told of either grey, and not of what
     /// lies between them.
@@ -121,16 +118,7 @@ mod tests {
                 asked: 1.0,
             }
         };
-        let view = SurveyedView {
-            name: "0".into(),
-            tiles: Arc::new((0..ACROSS * ACROSS).map(tile).collect()),
-            inflation: 1.0,
-            correlation: Correlation::white(),
-            frames: 3.0,
-            log_variance_inflation: 1.0,
-            between_frame_factor: Some(1.0),
-            in_second_half: false,
-        };
+        let view = SurveyedView::white((0..ACROSS * ACROSS).map(tile).collect(), 3.0);
         let data = blocks(&view, true);
         assert_eq!(data.places.len(), 200, "two parts of a hundred blocks");
         for (place, log_variance) in data.places.iter().zip(&data.response) {

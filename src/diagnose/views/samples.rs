@@ -2,8 +2,11 @@
 
 use std::sync::Arc;
 
+use nalgebra::Vector3;
+
 use super::tiles::SIDE;
 use crate::diagnose::search::rows::Rows;
+use crate::solve::plane_through;
 use crate::terms::{PixelContext, Term};
 
 /// One view's samples.
@@ -25,6 +28,12 @@ impl ViewData {
     /// The weighted rows of a `response` at these places, the view's nuisances beside it.
     pub fn rows(&self, response: &[f64]) -> Option<Rows<'_>> {
         Rows::new(response, &self.weight, &self.nuisance, self.precision.len(), &self.precision)
+    }
+
+    /// The plane 1, x, y through `values` at these places.
+    pub fn plane_of(&self, values: &[f64]) -> Option<Vector3<f64>> {
+        let points = self.places.iter().zip(values).zip(&self.weight);
+        plane_through(points.map(|((p, y), w)| ([p.x, p.y], *y, *w)))
     }
 
     /// Weighted mean of the response, and the weight of all samples.

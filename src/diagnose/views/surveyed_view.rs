@@ -59,41 +59,65 @@ pub fn independent_frames(field: &Field) -> f64 {
     1.0 / (rho * rho + (1.0 - rho * rho) / frames)
 }
 
-/// Precision of a [`mean_off`], in its own size: where the noise is Gaussian is not known. It is so wide
-/// that twenty views which err alike by one cost a nat together.
-const MEAN_OFF_PRECISION: f64 = 0.1;
-
 /// By how much the mean disparity is off where the noise is Gaussian in the depth, px: the mean of an
 /// inverse, at second order. As large as the noise is beside the distance: in four metres a hundredth
 /// of the noise, and bent as a tilted target lies.
-pub fn mean_off(p: &PixelContext) -> f64 {
+fn mean_off(p: &PixelContext) -> f64 {
     p.variance / p.disparity
 }
+
+/// What a view's mean may be off by for itself: a plane, and a [`mean_off`].
+pub fn mean_nuisance(p: &PixelContext) -> [f64; 4] {
+    [1.0, p.x, p.y, finite(mean_off(p))]
+}
+
+/// What holds each of these. Where the noise is Gaussian is not known; the last is so wide that twenty
+/// views which err alike by one cost a nat together.
+pub const MEAN_PRECISION: [f64; 4] = [0.0, 0.0, 0.0, 0.1];
 
 /// The means, about a plane of the view's own.
 pub fn mean_data(view: &SurveyedView) -> ViewData {
     let tiles = &view.tiles;
-    let nuisance = |t: &Tile| [1.0, t.place.x, t.place.y, finite(mean_off(&t.place))];
     ViewData {
         places: Arc::new(tiles.iter().map(|t| t.place).collect()),
         response: tiles.iter().map(|t| finite(t.mean)).collect(),
         weight: tiles.iter().map(|t| finite(t.pixels / t.variance / view.inflation)).collect(),
-        nuisance: tiles.iter().flat_map(nuisance).collect(),
-        precision: vec![0.0, 0.0, 0.0, MEAN_OFF_PRECISION],
+        nuisance: tiles.iter().flat_map(|t| mean_nuisance(&t.place)).collect(),
+        precision: MEAN_PRECISION.to_vec(),
         gathered: Vec::new(),
     }
 }
 
 #[cfg(test)]
+impl SurveyedView {
+    /// Of white noise, and nothing known beside.
+    pub fn white(tiles: Vec<Tile>, frames: f64) -> Self {
+        SurveyedView {
+            name: "0".into(),
+            tiles: Arc::new(tiles),
+            inflation: 1.0,
+            correlation: Correlation::white(),
+            frames,
+            log_variance_inflation: 1.0,
+            between_frame_factor: Some(1.0),
+            in_second_half: false,
+        }
+    }
+}
+
+#[cfg(test)]
 mod tests {
+    use rand_distr::{Distribution, StandardNormal};
+
     use super::*;
+    use crate::diagnose::views::tiles::SIDE;
     use crate::plane::Plane;
+    use crate::rng::Seed;
     use crate::simulate::kinect_v1;
     use crate::terms::{Basis, Coordinate, Modulation};
 
     /// A tilted wall seen by a sensor of Eq. 1 whose noise is Gaussian in the depth, means without noise.
     fn view() -> SurveyedView {
-        const SIDE: usize = 4;
         let sensor = kinect_v1(1);
         let (camera, scale) = (&sensor.camera, 43.5);
         let plane = Plane::tilted(3.5, 1.0, 0.7);
@@ -135,16 +159,7 @@ mod tests {
                 });
             }
         }
-        SurveyedView {
-            name: "0".into(),
-            tiles: Arc::new(tiles),
-            inflation: 1.0,
-            correlation: Correlation::white(),
-            frames: 30.0,
-            log_variance_inflation: 1.0,
-            between_frame_factor: Some(1.0),
-            in_second_half: false,
-        }
+        SurveyedView::white(tiles, 30.0)
     }
 
     /// Planes alone leave of it what a bowl would be: a nat in each view, and views add up.
@@ -163,11 +178,10 @@ mod tests {
             ..data.clone()
         };
         // A Gaussian depth's disparity, drawn: its mean is off by as much, and upwards.
-        let mut rng = crate::rng::Seed(1).stream("mean-off");
+        let mut rng = Seed(1).stream("mean-off");
         let (z, sigma_m, mut sum) = (4.0, 0.2, 0.0);
         for _ in 0..200_000 {
-            let normal: f64 =
-                rand_distr::Distribution::sample(&rand_distr::StandardNormal, &mut rng);
+            let normal: f64 = StandardNormal.sample(&mut rng);
             let both = [normal, -normal].map(|n| 43.5 / (z + sigma_m * n));
             sum += (both[0] + both[1]) / 400_000.0;
         }
