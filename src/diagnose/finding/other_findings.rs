@@ -72,7 +72,10 @@ pub fn missing(found: DropoutFinding) -> Finding {
         .family
         .is_none()
         .then(|| format!("more is lost from {:.4} to {:.4}", found.interval[0], found.interval[1]));
-    let words = physics(status, found.family, Statistic::Dropout, found.axis, shape.as_deref());
+    let mut words = physics(status, found.family, Statistic::Dropout, found.axis, shape.as_deref());
+    if let Some(since) = found.since_s {
+        words += &format!(" It began {since:.0} s after the first view.");
+    }
     Finding {
         status,
         effect: found.family,

@@ -25,6 +25,8 @@ pub struct DropoutFinding {
     pub size: f64,
     /// Each half of the views alone has it.
     pub replicated: Option<bool>,
+    /// When it began, where it did so in the midst of the session, s.
+    pub since_s: Option<f64>,
     /// Lost share over the axis.
     pub curve: Curve,
 }

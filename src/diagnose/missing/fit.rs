@@ -31,12 +31,7 @@ struct Problem<'a> {
 impl Problem<'_> {
     fn step(&self, x: &DVector<f64>) -> Step {
         let share = if self.free_share { 1.0 / (1.0 + (-x[2]).exp()) } else { 1.0 };
-        Step {
-            middle: x[0],
-            width: self.start.width.signum() * x[1].exp(),
-            share,
-            axis: self.start.axis,
-        }
+        Step { middle: x[0], width: self.start.width.signum() * x[1].exp(), share, ..self.start }
     }
 
     fn residuals(&self, x: &DVector<f64>) -> DVector<f64> {

@@ -25,7 +25,11 @@ pub struct HardEnd {
 
 impl HardEnd {
     pub fn of(finding: &DropoutFinding, blur: &dyn Fn(f64) -> f64) -> Option<Self> {
-        if finding.family != Some("range-dropout") || finding.parameters.contains_key("share") {
+        // No driver's limit begins in the midst of a session.
+        if finding.family != Some("range-dropout")
+            || finding.parameters.contains_key("share")
+            || finding.since_s.is_some()
+        {
             return None;
         }
         let value = |name: &str, of: &str| finding.parameters.get(name)?.get(of)?.as_f64();

@@ -5,6 +5,7 @@
 //! unless a nameless curve does clearly better.
 
 pub mod cells;
+mod clumps;
 pub mod few;
 pub mod finding;
 pub mod fit;
@@ -33,7 +34,7 @@ use finding::{DropoutFinding, NAME_ADEQUATE};
 use hard_end::{HardEnd, blur};
 use report::{DropoutReporter, shadow_finding};
 use search::{Judged, Losses};
-use shapes::{Step, curves, steps};
+use shapes::{Step, curves, steps, with_starts};
 
 /// All that was found missing.
 #[derive(Debug, Clone, Default)]
@@ -140,7 +141,7 @@ fn losses(
     }
     let (fine, region_given) = (&seen.fine[..], &seen.region_given[..]);
     let reporter = |base| DropoutReporter { fine, region_given, base, reach, camera };
-    let (steps, curves) = (steps(reach), curves(camera, reach));
+    let (steps, curves) = (with_starts(steps(reach), views), curves(camera, reach));
     let nothing = || views.iter().map(|v| vec![0.0; v.len()]).collect();
     let mut explained: Vec<Vec<f64>> = seen.expected.clone().unwrap_or_else(nothing);
     let mut taken: Vec<Axis> = Vec::new();

@@ -50,6 +50,7 @@ impl DropoutReporter<'_> {
             gain: won.gain,
             size: 0.0,
             replicated: None,
+            since_s: None,
             curve: Curve::default(),
         };
         match &won.shape {
@@ -61,12 +62,16 @@ impl DropoutReporter<'_> {
 
     fn step(&self, step: Step, finding: &mut DropoutFinding) {
         let span = if step.axis == Axis::Theta { self.reach.theta } else { self.reach.z };
-        let all =
-            bounded(points(self.fine, &|c| step.at(&c.place), span), &step, self.region_given);
+        let there = |v: &Vec<Cell>| {
+            v.iter().filter(|c| !step.before(c.place.session_s)).copied().collect::<Vec<Cell>>()
+        };
+        let there: Vec<Vec<Cell>> = self.fine.iter().map(there).collect();
+        let all = bounded(points(&there, &|c| step.at(&c.place), span), &step, self.region_given);
         let own = Fitted { step, std_error: [None; 3] };
         let fitted = fit(step, self.base, &all).unwrap_or(own);
         let loss = |x: f64| fitted.step.loss(x, self.base);
         finding.parameters = parameters(&fitted);
+        finding.since_s = step.start();
         finding.interval = interval(&fitted, span);
         finding.size = mean(&all, |p| loss(p.x) - self.base);
         finding.curve = binned(&all, step.axis, span, loss);
@@ -119,7 +124,7 @@ fn parameters(fitted: &Fitted) -> Map<String, Value> {
 
 /// From where the loss matters to the end of the axis.
 fn interval(fitted: &Fitted, [low, high]: [f64; 2]) -> [f64; 2] {
-    let Step { middle, width, share, axis } = fitted.step;
+    let Step { middle, width, share, axis, .. } = fitted.step;
     let from = middle + width * (MATTERS / (share - MATTERS).max(MATTERS)).ln();
     match (width > 0.0, axis) {
         (true, Axis::Theta) => [from, std::f64::consts::FRAC_PI_2],
@@ -183,6 +188,7 @@ pub fn shadow_finding(band: Band, fields: &[Field]) -> DropoutFinding {
         gain: band.gain[usize::from(!band.lawful)],
         size: lost / (asked + lost).max(1.0),
         replicated: None,
+        since_s: None,
         curve: band.curve,
     }
 }

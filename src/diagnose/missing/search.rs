@@ -193,6 +193,7 @@ impl<'a> Losses<'a> {
             .iter()
             .map(|c| {
                 let (gain, size) = predicted(&c.a, &c.scores(&whitened));
+                let gain = gain - c.step.cost();
                 Judged { shape: Shape::Step(c.step), gain, coefficients: vec![size] }
             })
             .collect();
@@ -212,8 +213,8 @@ impl<'a> Losses<'a> {
             let mut normal = || StandardNormal.sample(&mut rng);
             let y: Vec<Vec<f64>> = self.whiteners.iter().map(|w| w.draw(&mut normal)).collect();
             let whitened = solve(&y);
-            let steps =
-                columns.iter().map(|c| predicted(&c.a, &c.scores(&whitened)).0).fold(0.0, f64::max);
+            let gain = |c: &Column| predicted(&c.a, &c.scores(&whitened)).0 - c.step.cost();
+            let steps = columns.iter().map(gain).fold(0.0, f64::max);
             nulls.iter().map(|n| n.draw(&mut rng)).fold(steps, f64::max)
         };
         (judged, NoiseGains::simulated(REPLICATES, MIN_EXCESS_OF_LOSSES, draw))
@@ -225,7 +226,7 @@ impl<'a> Losses<'a> {
         const POWER_80: f64 = 0.84;
         let seen = |s: &&Step| {
             let a: f64 = self.column(**s).a.iter().sum();
-            s.share == 1.0 && 0.5 * a - POWER_80 * a.sqrt() > threshold
+            s.share == 1.0 && s.start().is_none() && 0.5 * a - POWER_80 * a.sqrt() > threshold
         };
         let mut all: Vec<Step> = steps.iter().filter(seen).copied().collect();
         // The least demanding first: largest middle, or the smallest where what is below is lost.

@@ -12,11 +12,33 @@ pub struct Step {
     pub middle: f64,
     pub width: f64,
     pub share: f64,
+    /// It is there from this time of the session on, s; from before it began where nothing is said.
+    pub since_s: f64,
 }
 
 impl Step {
     pub fn family(&self) -> &'static str {
         if self.axis == Axis::Theta { "grazing-dropout" } else { "range-dropout" }
+    }
+
+    /// A share of one, at all times.
+    pub fn whole(axis: Axis, middle: f64, width: f64) -> Self {
+        Step { axis, middle, width, share: 1.0, since_s: f64::NEG_INFINITY }
+    }
+
+    /// It is not there yet.
+    pub fn before(&self, session_s: f64) -> bool {
+        session_s < self.since_s
+    }
+
+    /// What its choice among the beginnings costs, nats.
+    pub fn cost(&self) -> f64 {
+        self.start().map_or(0.0, |_| (STARTS as f64).ln())
+    }
+
+    /// When it began, if it did in the session.
+    pub fn start(&self) -> Option<f64> {
+        self.since_s.is_finite().then_some(self.since_s)
     }
 
     pub fn at(&self, p: &PixelContext) -> f64 {
@@ -30,7 +52,8 @@ impl Step {
 
     /// Log odds that it adds.
     pub fn column(&self, cells: &[Cell], base: f64) -> Vec<f64> {
-        cells.iter().map(|c| odds(self.loss(self.at(&c.place), base)) - odds(base)).collect()
+        let of = |c: &Cell| odds(self.loss(self.at(&c.place), base)) - odds(base);
+        cells.iter().map(|c| if self.before(c.place.session_s) { 0.0 } else { of(c) }).collect()
     }
 }
 
@@ -67,7 +90,7 @@ const LEAST_RANGE: f64 = 1.1;
 pub fn steps(reach: &Extent) -> Vec<Step> {
     let mut all = Vec::new();
     let mut add = |axis, middle, width| {
-        all.extend([1.0, 0.3].map(|share| Step { axis, middle, width, share }));
+        all.extend([1.0, 0.3].map(|share| Step { share, ..Step::whole(axis, middle, width) }));
     };
     let along = |k: usize| k as f64 / (MIDDLES - 1) as f64;
     let [low, high] = reach.theta;
@@ -89,6 +112,28 @@ pub fn steps(reach: &Extent) -> Vec<Step> {
         }
     }
     all
+}
+
+/// Views on either side of a beginning: fewer show no rule.
+const SIDE_VIEWS: usize = 3;
+/// Beginnings tried.
+const STARTS: usize = 8;
+
+/// These steps, and each of them begun in the midst of the session.
+pub fn with_starts(steps: Vec<Step>, views: &[Vec<Cell>]) -> Vec<Step> {
+    let mut times: Vec<f64> =
+        views.iter().filter_map(|v| v.first()).map(|c| c.place.session_s).collect();
+    times.sort_by(f64::total_cmp);
+    let between = |k: usize| 0.5 * (times[k - 1] + times[k]);
+    let last = (times.len() + 1).saturating_sub(SIDE_VIEWS);
+    let all: Vec<usize> = (SIDE_VIEWS..last).filter(|&k| times[k] > times[k - 1]).collect();
+    let starts = all.iter().step_by(all.len().div_ceil(STARTS).max(1)).map(|&k| between(k));
+    let begun: Vec<Step> = starts
+        .flat_map(|since_s| {
+            steps.iter().filter(|s| s.share == 1.0).map(move |s| Step { since_s, ..*s })
+        })
+        .collect();
+    steps.into_iter().chain(begun).collect()
 }
 
 /// Curves without a name.

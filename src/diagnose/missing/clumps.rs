@@ -1,0 +1,125 @@
+//! How many readings are lost together.
+
+use std::collections::BTreeMap;
+
+use super::cells::Cell;
+use crate::stats::range;
+
+/// Parts of a view's reach along an axis.
+pub const PARTS: usize = 64;
+
+/// The part of a view's reach that each cell lies in.
+pub fn parts(cells: &[&Cell], at: &dyn Fn(&Cell) -> f64) -> Vec<usize> {
+    let [low, high] = range(cells.iter().map(|c| at(c)));
+    let width = ((high - low) / PARTS as f64).max(f64::MIN_POSITIVE);
+    cells.iter().map(|c| (((at(c) - low) / width) as usize).min(PARTS - 1)).collect()
+}
+
+/// Pixel-frames that are lost together: how much more patches scatter than single losses would about a share
+/// that grows with `along` within each view, times how many of them are alike.
+pub fn clump(views: &[Vec<&Cell>], along: &dyn Fn(&Cell) -> f64) -> f64 {
+    let (mut squares, mut expected) = (0.0, 0.0);
+    let (mut products, mut pairs, mut cells) = (0.0, 0.0, 0.0);
+    for view in views.iter().filter(|v| v.iter().any(|c| c.lost > 0.0)) {
+        let mut off = BTreeMap::new();
+        for (c, share) in view.iter().zip(growing_share(view, along)) {
+            let side = c.place.side.max(1.0);
+            let at = ((c.place.u / side) as i64, (c.place.v / side) as i64);
+            off.insert(at, c.lost - share * c.asked);
+            expected += share * (1.0 - share) * c.asked;
+        }
+        for ((u, v), x) in &off {
+            squares += x * x;
+            cells += 1.0;
+            for at in [(u + 1, *v), (*u, v + 1), (u + 1, v + 1), (u - 1, v + 1)] {
+                if let Some(y) = off.get(&at) {
+                    products += x * y;
+                    pairs += 1.0;
+                }
+            }
+        }
+    }
+    let together = (squares / f64::max(expected, f64::MIN_POSITIVE)).max(1.0);
+    let alike = products / f64::max(pairs, 1.0) * cells / f64::max(squares, f64::MIN_POSITIVE);
+    // Where losses are single, patches are alike for what the share leaves out.
+    together * (1.0 + 8.0 * alike.clamp(0.0, 1.0) * (1.0 - 1.0 / together))
+}
+
+/// Of each cell the share that is lost, by least squares among those that only grow (pooling of adjacent
+/// violators: Ayer et al. 1955).
+fn growing_share(view: &[&Cell], along: &dyn Fn(&Cell) -> f64) -> Vec<f64> {
+    let parts = parts(view, along);
+    let mut sums = [[0.0; 2]; PARTS];
+    for (c, part) in view.iter().zip(&parts) {
+        sums[*part] = [sums[*part][0] + c.lost, sums[*part][1] + c.asked];
+    }
+    let share = |[lost, asked]: [f64; 2]| if asked > 0.0 { lost / asked } else { 0.0 };
+    let mut pools: Vec<([f64; 2], usize)> = Vec::new();
+    for sum in sums {
+        pools.push((sum, 1));
+        while let [.., (before, _), (last, _)] = pools[..]
+            && (before[1] == 0.0 || last[1] == 0.0 || share(before) > share(last))
+            && let Some((sum, count)) = pools.pop()
+            && let Some(pool) = pools.last_mut()
+        {
+            *pool = ([pool.0[0] + sum[0], pool.0[1] + sum[1]], pool.1 + count);
+        }
+    }
+    let grown: Vec<f64> =
+        pools.into_iter().flat_map(|(sum, n)| std::iter::repeat_n(share(sum), n)).collect();
+    parts.into_iter().map(|part| grown[part]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::Rng;
+
+    use super::*;
+    use crate::rng::Seed;
+    use crate::terms::PixelContext;
+
+    const SIDE: usize = 4;
+    const ACROSS: usize = 40;
+    const FRAMES: usize = 4;
+
+    /// Patches of a picture in which each reading is lost by a chance, and of some pixels all.
+    fn view(chance: impl Fn(f64) -> f64, dead: impl Fn(usize, usize) -> bool) -> Vec<Cell> {
+        let mut rng = Seed(3).stream("clumps");
+        let mut cells = Vec::new();
+        for (row, column) in (0..ACROSS).flat_map(|r| (0..ACROSS).map(move |c| (r, c))) {
+            let mut lost = 0;
+            for (v, u) in (0..SIDE).flat_map(|v| (0..SIDE).map(move |u| (v, u))) {
+                let (u, v) = (column * SIDE + u, row * SIDE + v);
+                let chance = if dead(u, v) { 1.0 } else { chance(u as f64) };
+                lost += (0..FRAMES).filter(|_| rng.random_bool(chance)).count();
+            }
+            let middle = |k: usize| (k * SIDE) as f64 + 2.0;
+            let (u, v, side) = (middle(column), middle(row), SIDE as f64);
+            let place = PixelContext { u, v, side, ..Default::default() };
+            cells.push(Cell { place, lost: lost as f64, asked: (SIDE * SIDE * FRAMES) as f64 });
+        }
+        cells
+    }
+
+    /// What follows the axis is single, a dead pixel is lost in all frames, and a hole is one event.
+    #[test]
+    fn single_losses_are_single_however_they_rise_along_the_axis() {
+        let along =
+            |sign: f64, v: &[Cell]| clump(&[v.iter().collect()], &|c: &Cell| sign * c.place.u);
+        let even = along(1.0, &view(|_| 0.01, |_, _| false));
+        let rising = view(|u| 0.3 * (-u / 10.0).exp(), |_, _| false);
+        let pixels = along(1.0, &view(|_| 0.0, |u, v| (7 * u + 11 * v).is_multiple_of(97)));
+        let hole = |from: usize| {
+            let inside = move |u: usize| (from..from + 20).contains(&u);
+            along(1.0, &view(|_| 0.0, move |u, v| inside(u) && inside(v)))
+        };
+        let [with, against] = [-1.0, 1.0].map(|sign| along(sign, &rising));
+        let all = (400 * FRAMES) as f64;
+        let holes = [hole(60), hole(140)].map(|size| all / size);
+        println!("{even:.2} {with:.2} {against:.1} {pixels:.2} {holes:.1?}");
+        assert!((1.0..1.3).contains(&even) && (1.0..1.3).contains(&with), "{even} {with}");
+        assert!(against > 5.0, "{against}");
+        assert!((3.0..6.0).contains(&pixels), "{pixels}");
+        assert!(holes.iter().all(|events| *events < 6.0), "{holes:?}");
+    }
+}
