@@ -116,7 +116,7 @@ pub struct Scatter {
 /// Before anything is measured: views differ by a factor of e, the sides of one picture as well.
 pub const USUAL: Scatter = Scatter { level: 1.0, slope: 4.0, cell: 0.5, clump: 4.0 };
 /// Never believed to be less.
-const LEAST: Scatter = Scatter { level: 0.1, slope: 0.4, cell: 0.1, clump: 1.0 };
+pub const LEAST: Scatter = Scatter { level: 0.1, slope: 0.4, cell: 0.1, clump: 1.0 };
 /// What a few views show is taken so much larger.
 pub const FEW: f64 = 4.0;
 /// Cells nearer than this are neighbours, in their sides: the corners too.
@@ -165,9 +165,9 @@ impl Whitener {
 }
 
 impl Scatter {
-    /// What is left of the views' log odds: their levels and slopes by least squares, then the
-    /// cells about them.
-    pub fn of(views: &[Vec<Cell>], left: &[Vec<f64>]) -> Self {
+    /// What is left of the views' log odds, and no less than `least`: their levels and slopes by least
+    /// squares, then the cells about them.
+    pub fn of(views: &[Vec<Cell>], left: &[Vec<f64>], least: Scatter) -> Self {
         let (mut sums, mut n) = ([0.0; 3], [0.0; 3]);
         let mut clump = Clump::default();
         for (cells, left) in views.iter().zip(left) {
@@ -185,10 +185,10 @@ impl Scatter {
         let mean = |k: usize| sums[k] / f64::max(n[k], 1.0);
         let few = 1.0 + FEW / f64::max(n[0], 1.0);
         Scatter {
-            level: (few * mean(0)).max(LEAST.level),
-            slope: (few * mean(1)).max(LEAST.slope),
-            cell: mean(2).max(LEAST.cell),
-            clump: clump.size().max(LEAST.clump),
+            level: (few * mean(0)).max(least.level),
+            slope: (few * mean(1)).max(least.slope),
+            cell: mean(2).max(least.cell),
+            clump: clump.size().max(least.clump),
         }
     }
 }

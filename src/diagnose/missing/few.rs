@@ -13,7 +13,7 @@ use rand_distr::{Distribution, Poisson, StandardNormal};
 use super::cells::{Cell, FEW, USUAL};
 use super::clumps::{PARTS, clump, parts};
 use super::search::{Judged, MIN_EXCESS_OF_LOSSES, predicted};
-use super::shapes::{Shape, Step, with_starts};
+use super::shapes::{Shape, Step, begun};
 use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::rng::{Seed, Stream};
 use crate::terms::{Axis, Extent};
@@ -144,12 +144,7 @@ struct Foot {
 }
 
 impl Foot {
-    fn of(
-        cells: &[Vec<&Cell>],
-        begun: &dyn Fn(Vec<Step>) -> Vec<Step>,
-        reach: &Extent,
-        toward: Toward,
-    ) -> Self {
+    fn of(cells: &[Vec<&Cell>], fine: &[Vec<Cell>], reach: &Extent, toward: Toward) -> Self {
         let clump = clump(cells, &|c| toward.along(c));
         let (views, lost): (Vec<View>, Vec<Lost>) =
             cells.iter().map(|v| View::of(v, clump, toward)).unzip();
@@ -158,7 +153,9 @@ impl Foot {
             let (levels, runs) = views.iter().map(|v| v.added(&step, rate)).unzip();
             Column { step, levels, runs }
         };
-        let columns = begun(toward.onsets(reach)).into_iter().map(column).collect();
+        let mut steps = toward.onsets(reach);
+        steps.extend(begun(&steps, fine));
+        let columns = steps.into_iter().map(column).collect();
         Foot { views, lost, rate, columns }
     }
 
@@ -226,9 +223,7 @@ pub fn few_losses(
     if cells.iter().any(many) || cells.iter().all(none) {
         return None;
     }
-    let begun = |steps| with_starts(steps, fine);
-    let feet =
-        [Toward::Steep, Toward::Far, Toward::Near].map(|t| Foot::of(&cells, &begun, reach, t));
+    let feet = [Toward::Steep, Toward::Far, Toward::Near].map(|t| Foot::of(&cells, fine, reach, t));
     let found = |scatter| {
         let each = feet.iter().filter_map(|f| f.best(&f.lost, scatter));
         each.max_by(|a, b| a.gain.total_cmp(&b.gain))

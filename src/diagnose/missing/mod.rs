@@ -23,18 +23,19 @@ use crate::diagnose::checks::replication::agree;
 use crate::diagnose::diagnosis::Detectable;
 use crate::diagnose::edges::shadow::{Band, Sides, band};
 use crate::diagnose::noise::view_mean::ViewMean;
+use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::margins::Margins;
 use crate::rng::Seed;
 use crate::terms::{Axis, Basis, Extent};
-use cells::{Cell, cells, expected, fine, rim_px};
+use cells::{Cell, LEAST, Scatter, USUAL, cells, expected, fine, rim_px};
 use few::few_losses;
 use finding::{DropoutFinding, NAME_ADEQUATE};
 use hard_end::{HardEnd, blur};
 use report::{DropoutReporter, shadow_finding};
 use search::{Judged, Losses};
-use shapes::{Step, curves, steps, with_starts};
+use shapes::{Step, begun, curves, steps};
 
 /// All that was found missing.
 #[derive(Debug, Clone, Default)]
@@ -141,43 +142,51 @@ fn losses(
     }
     let (fine, region_given) = (&seen.fine[..], &seen.region_given[..]);
     let reporter = |base| DropoutReporter { fine, region_given, base, reach, camera };
-    let (steps, curves) = (with_starts(steps(reach), views), curves(camera, reach));
+    let (steps, curves) = (steps(reach), curves(camera, reach));
+    let whole: Vec<Step> = steps.iter().filter(|s| s.share == 1.0).copied().collect();
+    let begun = begun(&whole, views);
     let nothing = || views.iter().map(|v| vec![0.0; v.len()]).collect();
     let mut explained: Vec<Vec<f64>> = seen.expected.clone().unwrap_or_else(nothing);
     let mut taken: Vec<Axis> = Vec::new();
     while outcome.findings.len() < MOST_FINDINGS {
-        let mut ledger = Losses::new(views, &explained);
         let open_steps: Vec<Step> =
             steps.iter().filter(|s| !taken.contains(&s.axis)).copied().collect();
         let open_curves: Vec<Basis> =
             curves.iter().filter(|c| !taken.contains(&c.axis())).cloned().collect();
-        let (first, _) = ledger.judge(&open_steps, &open_curves, None);
-        let Some(best) = choose(&first) else { break };
-        ledger.scattered_as_left_by(best);
-        let (judged, noise) = ledger.judge(&open_steps, &open_curves, Some(seed));
-        let threshold = noise.threshold(LEVEL);
+        let round = Round::of(views, &explained, (&open_steps, &open_curves), LEAST, seed);
+        let Some(always) = round else { break };
         if outcome.findings.is_empty() {
-            outcome.detectable = detectable(&ledger, &steps, threshold);
+            outcome.detectable = detectable(&always.ledger, &steps, always.threshold());
         }
-        let Some(won) = choose(&judged).filter(|j| j.gain > threshold) else { break };
+        // What begins in the midst of the session is looked for where nothing is there at all times; few
+        // views show how they scatter from then on.
+        let first = outcome.findings.is_empty() && always.won().is_none();
+        let later = || Round::of(views, &explained, (&begun, &[]), USUAL, seed);
+        let Some(round) = (if first { later() } else { Some(always) }) else { break };
+        let Round { ledger, judged, noise } = &round;
+        let Some(won) = round.won() else { break };
         if outcome.findings.first().is_some_and(|f| won.gain < LEAST_OF_FIRST * f.gain) {
             break;
         }
-        let more = ledger.explained(won);
+        let told = |won: &Judged| {
+            let finding = reporter(ledger.base).finding(won, rivals(judged), noise.p(won.gain));
+            DropoutFinding { replicated: ledger.replicate(won, &seen.second), ..finding }
+        };
+        let finding = told(won);
+        let end = HardEnd::of(&finding, blur);
+        // Nothing is learnt beyond the range: what is lost inside it is looked at alone.
+        if let Some(end) = end.as_ref().filter(|e| views.iter().flatten().any(|c| e.touches(c))) {
+            let mut rest = losses(&seen.inside(end), reach, camera, blur, seed);
+            rest.notes.insert(0, end.note());
+            return rest;
+        }
+        let later = if end.is_none() { ledger.later(won) } else { None };
+        let more = ledger.explained(later.as_ref().unwrap_or(won));
         explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
         taken.push(won.shape.axis());
-        let replicated = ledger.replicate(won, &seen.second);
-        let mut finding = reporter(ledger.base).finding(won, rivals(&judged), noise.p(won.gain));
-        finding.replicated = replicated;
-        match HardEnd::of(&finding, blur) {
-            // Nothing is learnt beyond the range: what is lost inside it is looked at alone.
-            Some(end) if views.iter().flatten().any(|c| end.touches(c)) => {
-                let mut rest = losses(&seen.inside(&end), reach, camera, blur, seed);
-                rest.notes.insert(0, end.note());
-                return rest;
-            }
+        match end {
             Some(end) => outcome.notes.push(end.note()),
-            None => outcome.findings.push(finding),
+            None => outcome.findings.push(later.as_ref().map_or(finding, told)),
         }
     }
     if outcome.findings.is_empty()
@@ -188,6 +197,37 @@ fn losses(
         outcome.findings.push(reporter(0.0).finding(&foot, rivals(std::slice::from_ref(&foot)), p));
     }
     outcome
+}
+
+/// Shapes judged with the scatter that the best of them leaves, and what noise alone brings.
+struct Round<'a> {
+    ledger: Losses<'a>,
+    judged: Vec<Judged>,
+    noise: NoiseGains,
+}
+
+impl<'a> Round<'a> {
+    fn of(
+        views: &'a [Vec<Cell>],
+        explained: &[Vec<f64>],
+        (steps, curves): (&[Step], &[Basis]),
+        least: Scatter,
+        seed: Seed,
+    ) -> Option<Self> {
+        let mut ledger = Losses::new(views, explained);
+        let (first, _) = ledger.judge(steps, curves, None);
+        ledger.scattered_as_left_by(choose(&first)?, least);
+        let (judged, noise) = ledger.judge(steps, curves, Some(seed));
+        Some(Round { ledger, judged, noise })
+    }
+
+    fn threshold(&self) -> f64 {
+        self.noise.threshold(LEVEL)
+    }
+
+    fn won(&self) -> Option<&Judged> {
+        choose(&self.judged).filter(|j| j.gain > self.threshold())
+    }
 }
 
 /// Do the shadows of both halves have the same share of the expected width?

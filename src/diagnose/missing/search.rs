@@ -5,7 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::cells::{Cell, Scatter, USUAL, Whitener, odds, share};
-use super::shapes::{Shape, Step};
+use super::shapes::{Shape, Step, begun};
 use crate::diagnose::checks::replication::{Halves, agree};
 use crate::diagnose::noise::view_mean::ViewMean;
 use crate::diagnose::search::evidence::{Evidence, gain};
@@ -18,6 +18,9 @@ use crate::terms::Basis;
 const STEP_PRECISION: f64 = 4.0;
 /// Precision of a curve's log odds about none: they reach 12 from nothing lost to all.
 const CURVE_PRECISION: f64 = 0.05;
+
+/// Nats by which a beginning must do better than none: twenty to one.
+const CLEARLY: f64 = 3.0;
 
 /// Information below this decides nothing, nats.
 const NO_SAY: f64 = 1e-6;
@@ -97,12 +100,12 @@ impl<'a> Losses<'a> {
         losses
     }
 
-    /// Once more with the scatter that `best` leaves.
-    pub fn scattered_as_left_by(&mut self, best: &Judged) {
+    /// Once more with the scatter that `best` leaves, and no less than `least`.
+    pub fn scattered_as_left_by(&mut self, best: &Judged, least: Scatter) {
         let explained = self.explained(best);
         let mut left = self.left.clone();
         left.iter_mut().flatten().zip(explained.iter().flatten()).for_each(|(y, e)| *y -= e);
-        let scatter = Scatter::of(self.views, &left);
+        let scatter = Scatter::of(self.views, &left, least);
         self.whiteners = self.views.iter().map(|v| Whitener::of(v, scatter)).collect();
     }
 
@@ -157,6 +160,13 @@ impl<'a> Losses<'a> {
                     .replicate(&[0], 0.0)
             }
         }
+    }
+
+    /// The same step begun in the midst of the session, where that does clearly better.
+    pub fn later(&self, step: &Judged) -> Option<Judged> {
+        let Shape::Step(always) = step.shape else { return None };
+        let best = self.judge(&begun(&[always], self.views), &[], None).0.into_iter().next()?;
+        (always.start().is_none() && best.gain > step.gain + CLEARLY).then_some(best)
     }
 
     fn evidence(&self, basis: &Basis) -> Vec<Evidence> {
@@ -226,7 +236,7 @@ impl<'a> Losses<'a> {
         const POWER_80: f64 = 0.84;
         let seen = |s: &&Step| {
             let a: f64 = self.column(**s).a.iter().sum();
-            s.share == 1.0 && s.start().is_none() && 0.5 * a - POWER_80 * a.sqrt() > threshold
+            s.share == 1.0 && 0.5 * a - POWER_80 * a.sqrt() > threshold
         };
         let mut all: Vec<Step> = steps.iter().filter(seen).copied().collect();
         // The least demanding first: largest middle, or the smallest where what is below is lost.

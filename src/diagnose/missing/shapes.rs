@@ -119,8 +119,8 @@ const SIDE_VIEWS: usize = 3;
 /// Beginnings tried.
 const STARTS: usize = 8;
 
-/// These steps, and each of them begun in the midst of the session.
-pub fn with_starts(steps: Vec<Step>, views: &[Vec<Cell>]) -> Vec<Step> {
+/// These steps, each begun in the midst of the session.
+pub fn begun(steps: &[Step], views: &[Vec<Cell>]) -> Vec<Step> {
     let mut times: Vec<f64> =
         views.iter().filter_map(|v| v.first()).map(|c| c.place.session_s).collect();
     times.sort_by(f64::total_cmp);
@@ -128,12 +128,7 @@ pub fn with_starts(steps: Vec<Step>, views: &[Vec<Cell>]) -> Vec<Step> {
     let last = (times.len() + 1).saturating_sub(SIDE_VIEWS);
     let all: Vec<usize> = (SIDE_VIEWS..last).filter(|&k| times[k] > times[k - 1]).collect();
     let starts = all.iter().step_by(all.len().div_ceil(STARTS).max(1)).map(|&k| between(k));
-    let begun: Vec<Step> = starts
-        .flat_map(|since_s| {
-            steps.iter().filter(|s| s.share == 1.0).map(move |s| Step { since_s, ..*s })
-        })
-        .collect();
-    steps.into_iter().chain(begun).collect()
+    starts.flat_map(|since_s| steps.iter().map(move |s| Step { since_s, ..*s })).collect()
 }
 
 /// Curves without a name.

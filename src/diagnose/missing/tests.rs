@@ -156,6 +156,23 @@ fn a_hard_end_of_the_range_is_a_note() {
     assert!(outcome.notes.len() == 1 && outcome.notes[0].contains("2.2"), "{:?}", outcome.notes);
 }
 
+/// The same distances lose nothing before.
+#[test]
+fn what_begins_in_the_midst_of_the_session_is_told_with_its_time() {
+    for seed in 0..3 {
+        let mut rng = Seed(seed).stream("late");
+        let (views, camera) = session(0.0, &mut rng, |p| {
+            let there = f64::from(u8::from(p.session_s > 6.5));
+            there / (1.0 + (-(p.z - 1.8) / 0.08).exp())
+        });
+        let outcome = find(&views, &camera, Seed(seed));
+        let first = outcome.findings.first().expect("found");
+        assert_eq!((first.family, first.since_s), (Some("range-dropout"), Some(6.5)), "{seed}");
+        let [middle, error] = parameter(first, "z50_m");
+        assert!((middle - 1.8).abs() < 3.0 * error.max(0.01), "{middle} +- {error}");
+    }
+}
+
 /// A band of rows has no name, but a place.
 #[test]
 fn rows_that_fail_are_told_by_their_axis() {
