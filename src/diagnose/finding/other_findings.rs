@@ -74,7 +74,7 @@ pub fn missing(found: DropoutFinding) -> Finding {
         .then(|| format!("more is lost from {:.4} to {:.4}", found.interval[0], found.interval[1]));
     let mut words = physics(status, found.family, Statistic::Dropout, found.axis, shape.as_deref());
     if let Some(since) = found.since_s {
-        words += &format!(" It began {since:.0} s after the first view.");
+        words += &format!(" It began about {since:.1} s after the first view.");
     }
     Finding {
         status,

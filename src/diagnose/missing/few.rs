@@ -7,127 +7,21 @@
 //! of e; a count has an error of its own beside that, and what is lost in one clump counts once. Where in a
 //! view it is lost tells the rise in distance from that in tilt.
 
-use rand::Rng;
-use rand_distr::{Distribution, Poisson, StandardNormal};
+use rand_distr::{Distribution, StandardNormal};
 
 use super::cells::{Cell, FEW, USUAL};
-use super::clumps::{PARTS, clump, parts};
+use super::clumps::clump;
+use super::runs::{Lost, MANY, SLOPE, Toward, View};
 use super::search::{Judged, MIN_EXCESS_OF_LOSSES, predicted};
 use super::shapes::{Shape, Step, begun};
 use crate::diagnose::search::noise_gains::NoiseGains;
-use crate::rng::{Seed, Stream};
-use crate::terms::{Axis, Extent};
+use crate::rng::Seed;
+use crate::terms::Extent;
 
-/// A view that has lost more has shares to judge by.
-const MANY: f64 = 0.1;
 /// Added to a count whose logarithm is taken (Anscombe 1948 has 3/8).
 const HALF: f64 = 0.5;
-/// So many widths before its middle a logistic rise has lost a three-thousandth.
-const ONSET_WIDTHS: f64 = 8.0;
-/// Middles tried, over as many widths.
-const ONSETS: usize = 16;
 /// Simulations of the null.
 const REPLICATES: u64 = 1000;
-/// In these so many losses of a view have a place; more say the same.
-const PLACED: usize = 100;
-
-/// Where a rise goes: what is steeper is lost, what is farther, or what is nearer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Toward {
-    Steep,
-    Far,
-    Near,
-}
-
-impl Toward {
-    fn along(self, cell: &Cell) -> f64 {
-        match self {
-            Toward::Steep => cell.place.theta,
-            Toward::Far => cell.place.z,
-            Toward::Near => -cell.place.z,
-        }
-    }
-
-    /// Steps of which the views may see the foot: beyond the steepest and the farthest, and before the
-    /// nearest.
-    fn onsets(self, reach: &Extent) -> Vec<Step> {
-        let ([_, steepest], [near, far]) = (reach.theta, reach.z);
-        let step = |width: f64, beyond: f64| match self {
-            Toward::Steep => {
-                let width = width.to_radians();
-                Step::whole(Axis::Theta, steepest + beyond * width, width)
-            }
-            Toward::Far => Step::whole(Axis::Z, far * (1.0 + beyond * width), far * width),
-            Toward::Near => Step::whole(Axis::Z, near * (1.0 - beyond * width), -near * width),
-        };
-        let widths = if self == Toward::Steep { [1.0, 2.0, 4.0] } else { [0.015, 0.03, 0.06] };
-        let beyond = (0..ONSETS).map(|k| ONSET_WIDTHS * k as f64 / (ONSETS - 1) as f64);
-        beyond.flat_map(|beyond| widths.map(|width| step(width, beyond))).collect()
-    }
-}
-
-/// What a view has lost, in clumps, of how many that there could be.
-struct View {
-    asked: f64,
-    session_s: f64,
-    /// What it runs through on the step's axis: where, and its share of the view.
-    runs: Vec<[f64; 2]>,
-}
-
-/// Lost by a view: in all, and in each of its runs.
-struct Lost {
-    all: f64,
-    runs: Vec<f64>,
-}
-
-impl View {
-    fn of(cells: &[&Cell], clump: f64, toward: Toward) -> (Self, Lost) {
-        let mut sums = vec![[0.0; 3]; PARTS];
-        for (c, part) in cells.iter().zip(parts(cells, &|c| toward.along(c))) {
-            let [x, asked, lost] = sums[part];
-            sums[part] = [x + c.asked * toward.along(c).abs(), asked + c.asked, lost + c.lost];
-        }
-        sums.retain(|s| s[1] > 0.0);
-        let [asked, lost] = [1, 2].map(|k| sums.iter().map(|s| s[k]).sum::<f64>());
-        let view = View {
-            asked: asked / clump,
-            session_s: cells[0].place.session_s,
-            runs: sums.iter().map(|[x, mine, _]| [x / mine, mine / asked]).collect(),
-        };
-        let runs = sums.iter().map(|s| s[2] / clump).collect();
-        (view, Lost { all: lost / clump, runs })
-    }
-
-    /// Of nothing but noise, where so many are `expected`.
-    fn draw(&self, expected: f64, rng: &mut Stream) -> Lost {
-        let all = Poisson::new(expected).map_or(0.0, |p| p.sample(rng));
-        let mut runs = vec![0.0; self.runs.len()];
-        let placed = (all as usize).min(PLACED);
-        for _ in 0..placed {
-            let mut left: f64 = rng.random();
-            let here = |[_, share]: &[f64; 2]| {
-                left -= share;
-                left < 0.0
-            };
-            let run = self.runs.iter().position(here).unwrap_or(runs.len() - 1);
-            runs[run] += all / placed as f64;
-        }
-        Lost { all, runs }
-    }
-
-    /// What a step adds to the logarithm of the view's rate where `rate` is there anyway, and to that of
-    /// each run beyond it.
-    fn added(&self, step: &Step, rate: f64) -> (f64, Vec<f64>) {
-        if step.before(self.session_s) {
-            return (0.0, Vec::new());
-        }
-        let loss = |x: f64| step.loss(x, 0.0).min(MANY);
-        let level = 1.0 + self.runs.iter().map(|[x, share]| share * loss(*x)).sum::<f64>() / rate;
-        let run = |[x, _]: &[f64; 2]| ((1.0 + loss(*x) / rate) / level).ln();
-        (level.ln(), self.runs.iter().map(run).collect())
-    }
-}
-
 /// A step, and what it adds in each of the views: to its level, and along it.
 struct Column {
     step: Step,
@@ -144,7 +38,7 @@ struct Foot {
 }
 
 impl Foot {
-    fn of(cells: &[Vec<&Cell>], fine: &[Vec<Cell>], reach: &Extent, toward: Toward) -> Self {
+    fn of(cells: &[Vec<&Cell>], reach: &Extent, toward: Toward) -> Self {
         let clump = clump(cells, &|c| toward.along(c));
         let (views, lost): (Vec<View>, Vec<Lost>) =
             cells.iter().map(|v| View::of(v, clump, toward)).unzip();
@@ -154,13 +48,12 @@ impl Foot {
             Column { step, levels, runs }
         };
         let mut steps = toward.onsets(reach);
-        steps.extend(begun(&steps, fine));
+        steps.extend(begun(&steps, views.iter().map(|v| v.session_s)));
         let columns = steps.into_iter().map(column).collect();
         Foot { views, lost, rate, columns }
     }
 
-    /// Logarithms of the views' rates over the usual one. Where nothing is lost of too few to expect any, a
-    /// view says nothing.
+    /// Logarithms of the views' rates over the usual one. A view without a loss never counts as above it.
     fn levels(&self, lost: &[Lost]) -> Vec<f64> {
         let rate = usual_rate(&self.views, lost);
         let level = |(lost, v): (&Lost, &View)| {
@@ -180,7 +73,10 @@ impl Foot {
             let a: Vec<f64> = h.iter().zip(weight()).map(|(h, w)| w * h * h).collect();
             let b: Vec<f64> = h.iter().zip(&y).zip(weight()).map(|((h, y), w)| w * h * y).collect();
             let (gain, size) = predicted(&a, &b);
-            let along = || lost.iter().zip(&c.runs).map(|(l, added)| dot(&l.runs, added));
+            // A slope of the view's own is as good as any: what single losses say is bounded by it.
+            let bound = |l: &Lost| 1.0 + l.all * SLOPE * SLOPE / 3.0;
+            let along =
+                || lost.iter().zip(&c.runs).map(|(l, added)| dot(&l.runs, added) / bound(l));
             let along = if gain > 0.0 { along().sum() } else { 0.0 };
             (gain + along - c.step.cost(), size)
         };
@@ -223,7 +119,7 @@ pub fn few_losses(
     if cells.iter().any(many) || cells.iter().all(none) {
         return None;
     }
-    let feet = [Toward::Steep, Toward::Far, Toward::Near].map(|t| Foot::of(&cells, fine, reach, t));
+    let feet = [Toward::Steep, Toward::Far, Toward::Near].map(|t| Foot::of(&cells, reach, t));
     let found = |scatter| {
         let each = feet.iter().filter_map(|f| f.best(&f.lost, scatter));
         each.max_by(|a, b| a.gain.total_cmp(&b.gain))

@@ -13,6 +13,7 @@ pub mod forms;
 pub mod hard_end;
 pub mod points;
 pub mod report;
+mod runs;
 pub mod search;
 pub mod shapes;
 
@@ -34,7 +35,7 @@ use few::few_losses;
 use finding::{DropoutFinding, NAME_ADEQUATE};
 use hard_end::{HardEnd, blur};
 use report::{DropoutReporter, shadow_finding};
-use search::{Judged, Losses};
+use search::{Judged, Losses, times};
 use shapes::{Step, begun, curves, steps};
 
 /// All that was found missing.
@@ -52,7 +53,9 @@ pub struct DropoutOutcome {
 /// Fewer views show no rule.
 const FEWEST_VIEWS: usize = 4;
 /// Chance of a finding on a clean recording: the steps and curves, and the shadow.
-pub const LEVEL: f64 = 0.001;
+pub const LEVEL: f64 = 0.003;
+/// By which it may come: of what is always there, of what begins in the midst, and of a rise's foot.
+const TESTS: f64 = 3.0;
 const SHADOW_LEVEL: f64 = 0.0005;
 const MOST_FINDINGS: usize = 3;
 /// A later finding must bring this share of what the first brought.
@@ -144,7 +147,7 @@ fn losses(
     let reporter = |base| DropoutReporter { fine, region_given, base, reach, camera };
     let (steps, curves) = (steps(reach), curves(camera, reach));
     let whole: Vec<Step> = steps.iter().filter(|s| s.share == 1.0).copied().collect();
-    let begun = begun(&whole, views);
+    let begun = begun(&whole, times(views));
     let nothing = || views.iter().map(|v| vec![0.0; v.len()]).collect();
     let mut explained: Vec<Vec<f64>> = seen.expected.clone().unwrap_or_else(nothing);
     let mut taken: Vec<Axis> = Vec::new();
@@ -158,18 +161,21 @@ fn losses(
         if outcome.findings.is_empty() {
             outcome.detectable = detectable(&always.ledger, &steps, always.threshold());
         }
-        // What begins in the midst of the session is looked for where nothing is there at all times; few
-        // views show how they scatter from then on.
+        // Steps that begin in the midst of the session are tried where none is found that is always there.
+        // Few views show how they scatter from then on: that is not trusted below what is usual.
         let first = outcome.findings.is_empty() && always.won().is_none();
-        let later = || Round::of(views, &explained, (&begun, &[]), USUAL, seed);
+        let begun: Vec<Step> = begun.iter().filter(|s| !taken.contains(&s.axis)).copied().collect();
+        let later = || Round::of(views, &explained, (&begun, &open_curves), USUAL, seed);
         let Some(round) = (if first { later() } else { Some(always) }) else { break };
         let Round { ledger, judged, noise } = &round;
         let Some(won) = round.won() else { break };
         if outcome.findings.first().is_some_and(|f| won.gain < LEAST_OF_FIRST * f.gain) {
             break;
         }
+        let p = noise.p(won.gain);
         let told = |won: &Judged| {
-            let finding = reporter(ledger.base).finding(won, rivals(judged), noise.p(won.gain));
+            let rivals = rivals(std::iter::once(won).chain(judged));
+            let finding = reporter(ledger.base).finding(won, rivals, TESTS * p);
             DropoutFinding { replicated: ledger.replicate(won, &seen.second), ..finding }
         };
         let finding = told(won);
@@ -180,7 +186,9 @@ fn losses(
             rest.notes.insert(0, end.note());
             return rest;
         }
-        let later = if end.is_none() { ledger.later(won) } else { None };
+        let mut careful = Losses::new(views, &explained);
+        careful.scattered_as_left_by(won, USUAL);
+        let later = if end.is_none() { careful.later(won) } else { None };
         let more = ledger.explained(later.as_ref().unwrap_or(won));
         explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
         taken.push(won.shape.axis());
@@ -192,9 +200,9 @@ fn losses(
     if outcome.findings.is_empty()
         // Counts are not compared with a twin's.
         && seen.expected.is_none()
-        && let Some((foot, p)) = few_losses(&seen.fine, rim_px(camera), reach, LEVEL, seed)
+        && let Some((foot, p)) = few_losses(&seen.fine, rim_px(camera), reach, LEVEL / TESTS, seed)
     {
-        outcome.findings.push(reporter(0.0).finding(&foot, rivals(std::slice::from_ref(&foot)), p));
+        outcome.findings.push(reporter(0.0).finding(&foot, rivals([&foot]), TESTS * p));
     }
     outcome
 }
@@ -222,11 +230,12 @@ impl<'a> Round<'a> {
     }
 
     fn threshold(&self) -> f64 {
-        self.noise.threshold(LEVEL)
+        self.noise.threshold(LEVEL / TESTS)
     }
 
     fn won(&self) -> Option<&Judged> {
-        choose(&self.judged).filter(|j| j.gain > self.threshold())
+        let seen = self.judged.partition_point(|j| j.gain > self.threshold());
+        choose(&self.judged[..seen])
     }
 }
 
@@ -250,7 +259,7 @@ fn choose(judged: &[Judged]) -> Option<&Judged> {
     step.filter(|s| s.gain > enough).or(curve)
 }
 
-fn rivals(judged: &[Judged]) -> Vec<(&'static str, f64)> {
+fn rivals<'a>(judged: impl IntoIterator<Item = &'a Judged>) -> Vec<(&'static str, f64)> {
     let mut all: Vec<(&'static str, f64)> = Vec::new();
     for j in judged {
         let name = j.shape.family().unwrap_or(j.shape.axis().id());

@@ -73,7 +73,10 @@ impl DropoutReporter<'_> {
         finding.parameters = parameters(&fitted);
         finding.since_s = step.start();
         finding.interval = interval(&fitted, span);
-        finding.size = mean(&all, |p| loss(p.x) - self.base);
+        // Of all pixel-frames, those before it began among them.
+        let asked = |views: &[Vec<Cell>]| views.iter().flatten().map(|c| c.asked).sum::<f64>();
+        let part = asked(&there) / asked(self.fine).max(1.0);
+        finding.size = part * mean(&all, |p| loss(p.x) - self.base);
         finding.curve = binned(&all, step.axis, span, loss);
     }
 

@@ -19,7 +19,7 @@ const STEP_PRECISION: f64 = 4.0;
 /// Precision of a curve's log odds about none: they reach 12 from nothing lost to all.
 const CURVE_PRECISION: f64 = 0.05;
 
-/// Nats by which a beginning must do better than none: twenty to one.
+/// Nats by which a beginning must do better than the same step without one: twenty to one.
 const CLEARLY: f64 = 3.0;
 
 /// Information below this decides nothing, nats.
@@ -32,6 +32,11 @@ pub struct Losses<'a> {
     pub left: Vec<Vec<f64>>,
     pub base: f64,
     whiteners: Vec<Whitener>,
+}
+
+/// When the views were taken, s of the session.
+pub fn times(views: &[Vec<Cell>]) -> impl Iterator<Item = f64> {
+    views.iter().filter_map(|v| v.first()).map(|c| c.place.session_s)
 }
 
 /// How well a shape predicts the views it was not fitted to.
@@ -165,8 +170,12 @@ impl<'a> Losses<'a> {
     /// The same step begun in the midst of the session, where that does clearly better.
     pub fn later(&self, step: &Judged) -> Option<Judged> {
         let Shape::Step(always) = step.shape else { return None };
-        let best = self.judge(&begun(&[always], self.views), &[], None).0.into_iter().next()?;
-        (always.start().is_none() && best.gain > step.gain + CLEARLY).then_some(best)
+        if always.start().is_some() {
+            return None;
+        }
+        let gain = |steps: &[Step]| self.judge(steps, &[], None).0.into_iter().next();
+        let (always, later) = (gain(&[always])?, gain(&begun(&[always], times(self.views)))?);
+        (later.gain > always.gain + CLEARLY).then_some(later)
     }
 
     fn evidence(&self, basis: &Basis) -> Vec<Evidence> {

@@ -12,7 +12,7 @@ pub struct Step {
     pub middle: f64,
     pub width: f64,
     pub share: f64,
-    /// It is there from this time of the session on, s; from before it began where nothing is said.
+    /// It is there from this time of the session on, s; minus infinity: throughout.
     pub since_s: f64,
 }
 
@@ -93,16 +93,16 @@ pub fn steps(reach: &Extent) -> Vec<Step> {
         all.extend([1.0, 0.3].map(|share| Step { share, ..Step::whole(axis, middle, width) }));
     };
     let along = |k: usize| k as f64 / (MIDDLES - 1) as f64;
-    let [low, high] = reach.theta;
-    if high - low > LEAST_TILT {
+    if is_told_apart(Axis::Theta, reach) {
+        let [low, high] = reach.theta;
         for k in 0..MIDDLES {
             let beyond = 4f64.to_radians();
             let middle = low + along(k) * (high + beyond - low);
             [1.0f64, 2.0, 4.0].iter().for_each(|deg| add(Axis::Theta, middle, deg.to_radians()));
         }
     }
-    let [low, high] = reach.z;
-    if high > LEAST_RANGE * low {
+    if is_told_apart(Axis::Z, reach) {
+        let [low, high] = reach.z;
         for k in 0..MIDDLES {
             let middle = low * (high / low).powf(along(k));
             for width in [0.015, 0.03, 0.06] {
@@ -119,16 +119,21 @@ const SIDE_VIEWS: usize = 3;
 /// Beginnings tried.
 const STARTS: usize = 8;
 
-/// These steps, each begun in the midst of the session.
-pub fn begun(steps: &[Step], views: &[Vec<Cell>]) -> Vec<Step> {
-    let mut times: Vec<f64> =
-        views.iter().filter_map(|v| v.first()).map(|c| c.place.session_s).collect();
+/// These steps, each begun in the midst of a session with views at these `times`.
+pub fn begun(steps: &[Step], times: impl Iterator<Item = f64>) -> Vec<Step> {
+    let mut times: Vec<f64> = times.collect();
     times.sort_by(f64::total_cmp);
     let between = |k: usize| 0.5 * (times[k - 1] + times[k]);
     let last = (times.len() + 1).saturating_sub(SIDE_VIEWS);
     let all: Vec<usize> = (SIDE_VIEWS..last).filter(|&k| times[k] > times[k - 1]).collect();
     let starts = all.iter().step_by(all.len().div_ceil(STARTS).max(1)).map(|&k| between(k));
     starts.flat_map(|since_s| steps.iter().map(move |s| Step { since_s, ..*s })).collect()
+}
+
+/// Do views that reach so far tell anything of this axis?
+pub fn is_told_apart(axis: Axis, reach: &Extent) -> bool {
+    let ([least, steepest], [near, far]) = (reach.theta, reach.z);
+    if axis == Axis::Theta { steepest - least > LEAST_TILT } else { far > LEAST_RANGE * near }
 }
 
 /// Curves without a name.

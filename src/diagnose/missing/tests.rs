@@ -97,7 +97,7 @@ fn the_grazing_angle_comes_back() {
         let outcome = find(&views, &camera, Seed(seed));
         let first = outcome.findings.first().expect("found");
         assert_eq!(first.family, Some("grazing-dropout"), "{seed}: {:?}", first.rivals);
-        assert!(first.p < 1e-3);
+        assert!(first.p < 1e-3 && first.since_s.is_none(), "{:?}", first.since_s);
         let [middle, error] = parameter(first, "theta50_deg");
         assert!((middle - 62.0).abs() < 3.0, "{middle} +- {error}");
         within += usize::from((middle - 62.0).abs() < 2.0 * error);
