@@ -22,6 +22,7 @@ use crate::terms::Extent;
 const HALF: f64 = 0.5;
 /// Simulations of the null.
 const REPLICATES: u64 = 1000;
+
 /// A step, and what it adds in each of the views: to its level, and along it.
 struct Column {
     step: Step,
@@ -67,22 +68,21 @@ impl Foot {
     /// `scatter` for no reason, and by where in each view it is lost.
     fn best(&self, lost: &[Lost], scatter: f64) -> Option<Best<'_>> {
         let y = self.levels(lost);
-        let weight = || lost.iter().map(|l| 1.0 / variance(l.all, scatter));
-        let gain = |c: &Column| {
-            let h = &c.levels;
-            let a: Vec<f64> = h.iter().zip(weight()).map(|(h, w)| w * h * h).collect();
-            let b: Vec<f64> = h.iter().zip(&y).zip(weight()).map(|((h, y), w)| w * h * y).collect();
-            let (gain, size) = predicted(&a, &b);
-            // A slope of the view's own is as good as any: what single losses say is bounded by it.
-            let bound = |l: &Lost| 1.0 + l.all * SLOPE * SLOPE / 3.0;
-            let along =
-                || lost.iter().zip(&c.runs).map(|(l, added)| dot(&l.runs, added) / bound(l));
-            let along = if gain > 0.0 { along().sum() } else { 0.0 };
-            (gain + along - c.step.cost(), size)
-        };
+        let weights: Vec<f64> = lost.iter().map(|l| 1.0 / variance(l.all, scatter)).collect();
+        // A slope of the view's own is as good as any: what single losses say is bounded by it.
+        let bound = |l: &Lost| 1.0 + l.all * SLOPE * SLOPE / 3.0;
+        let (mut a, mut b) = (vec![0.0; y.len()], vec![0.0; y.len()]);
         let each = self.columns.iter().map(|column| {
-            let (gain, size) = gain(column);
-            Best { gain, size, foot: self, column }
+            for (v, (h, w)) in column.levels.iter().zip(&weights).enumerate() {
+                (a[v], b[v]) = (w * h * h, w * h * y[v]);
+            }
+            let (gain, size) = predicted(&a, &b);
+            let along = || {
+                let views = lost.iter().zip(&column.runs).filter(|(l, _)| l.all > 0.0);
+                views.map(|(l, added)| dot(&l.runs, added) / bound(l)).sum()
+            };
+            let along = if gain > 0.0 { along() } else { 0.0 };
+            Best { gain: gain + along - column.step.cost(), size, foot: self, column }
         });
         each.max_by(|a, b| a.gain.total_cmp(&b.gain))
     }

@@ -146,8 +146,8 @@ fn losses(
     let (fine, region_given) = (&seen.fine[..], &seen.region_given[..]);
     let reporter = |base| DropoutReporter { fine, region_given, base, reach, camera };
     let (steps, curves) = (steps(reach), curves(camera, reach));
-    let whole: Vec<Step> = steps.iter().filter(|s| s.share == 1.0).copied().collect();
-    let begun = begun(&whole, times(views));
+    let usual: Vec<Step> = steps.iter().filter(|s| s.is_usual()).copied().collect();
+    let begun = begun(&usual, times(views));
     let nothing = || views.iter().map(|v| vec![0.0; v.len()]).collect();
     let mut explained: Vec<Vec<f64>> = seen.expected.clone().unwrap_or_else(nothing);
     let mut taken: Vec<Axis> = Vec::new();

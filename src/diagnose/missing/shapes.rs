@@ -36,6 +36,15 @@ impl Step {
         self.start().map_or(0.0, |_| (STARTS as f64).ln())
     }
 
+    /// All is lost beyond it, and it is as wide as the middle one of the widths tried.
+    pub fn is_usual(&self) -> bool {
+        let usual = match self.axis {
+            Axis::Theta => WIDTHS_DEG[1].to_radians(),
+            _ => WIDTHS[1] * self.middle,
+        };
+        self.share == 1.0 && (self.width.abs() / usual - 1.0).abs() < 1e-6
+    }
+
     /// When it began, if it did in the session.
     pub fn start(&self) -> Option<f64> {
         self.since_s.is_finite().then_some(self.since_s)
@@ -82,6 +91,9 @@ impl Shape {
 
 /// Places tried for the middle of a step, over the axis's reach.
 const MIDDLES: usize = 24;
+/// Widths tried: degrees, and shares of the middle.
+const WIDTHS_DEG: [f64; 3] = [1.0, 2.0, 4.0];
+const WIDTHS: [f64; 3] = [0.015, 0.03, 0.06];
 /// Smaller reaches tell nothing of an axis: rad, and share of z.
 const LEAST_TILT: f64 = 0.1;
 const LEAST_RANGE: f64 = 1.1;
@@ -98,14 +110,14 @@ pub fn steps(reach: &Extent) -> Vec<Step> {
         for k in 0..MIDDLES {
             let beyond = 4f64.to_radians();
             let middle = low + along(k) * (high + beyond - low);
-            [1.0f64, 2.0, 4.0].iter().for_each(|deg| add(Axis::Theta, middle, deg.to_radians()));
+            WIDTHS_DEG.iter().for_each(|deg| add(Axis::Theta, middle, deg.to_radians()));
         }
     }
     if is_told_apart(Axis::Z, reach) {
         let [low, high] = reach.z;
         for k in 0..MIDDLES {
             let middle = low * (high / low).powf(along(k));
-            for width in [0.015, 0.03, 0.06] {
+            for width in WIDTHS {
                 add(Axis::Z, middle, width * middle);
                 add(Axis::Z, middle, -width * middle);
             }
