@@ -169,7 +169,7 @@ impl Scatter {
     /// squares, then the cells about them.
     pub fn of(views: &[Vec<Cell>], left: &[Vec<f64>], least: Scatter) -> Self {
         let (mut sums, mut n) = ([0.0; 3], [0.0; 3]);
-        let mut clump = Clump::default();
+        let mut neighbours = Neighbours::default();
         for (cells, left) in views.iter().zip(left) {
             let loose = Scatter { level: 1e6, slope: 4.0, cell: 1.0, clump: 4.0 };
             let w = Whitener::of(cells, loose);
@@ -179,7 +179,7 @@ impl Scatter {
             sums[1] += own.y.powi(2) + own.z.powi(2);
             let off: Vec<f64> = w.slopes.iter().zip(left).map(|(n, y)| y - n.dot(&own)).collect();
             sums[2] += off.iter().map(|y| y * y).sum::<f64>();
-            clump.add(cells, &off);
+            neighbours.add(cells, &off);
             n = [n[0] + 1.0, n[1] + 2.0, n[2] + left.len() as f64];
         }
         let mean = |k: usize| sums[k] / f64::max(n[k], 1.0);
@@ -188,21 +188,21 @@ impl Scatter {
             level: (few * mean(0)).max(least.level),
             slope: (few * mean(1)).max(least.slope),
             cell: mean(2).max(least.cell),
-            clump: clump.size().max(least.clump),
+            clump: neighbours.size().max(least.clump),
         }
     }
 }
 
 /// How much neighbouring cells have in common.
 #[derive(Default)]
-struct Clump {
+pub struct Neighbours {
     product: f64,
-    square: f64,
+    pub square: f64,
     pairs: f64,
     cells: f64,
 }
 
-impl Clump {
+impl Neighbours {
     /// Every pair of cells that touch, counted once; a rim's cell and its patch's other part among them.
     fn add(&mut self, cells: &[Cell], off: &[f64]) {
         let step = cells.iter().map(|c| c.place.side).fold(0.0, f64::max).max(1.0) * APART;
@@ -218,9 +218,28 @@ impl Clump {
         }
     }
 
-    /// Cells that make one: with four neighbours and four at the corners.
-    fn size(&self) -> f64 {
+    /// The same for many cells, by their columns and rows.
+    pub fn add_grid(&mut self, off: &BTreeMap<(i64, i64), f64>) {
+        for ((u, v), x) in off {
+            self.square += x * x;
+            self.cells += 1.0;
+            for at in [(u + 1, *v), (*u, v + 1), (u + 1, v + 1), (u - 1, v + 1)] {
+                if let Some(y) = off.get(&at) {
+                    self.product += x * y;
+                    self.pairs += 1.0;
+                }
+            }
+        }
+    }
+
+    /// Further cells that a cell is one with: of four neighbours and four at the corners.
+    pub fn more(&self) -> f64 {
         let rho = self.product / self.pairs.max(1.0) * self.cells / self.square.max(1e-12);
-        1.0 + 8.0 * rho.clamp(0.0, 1.0)
+        8.0 * rho.clamp(0.0, 1.0)
+    }
+
+    /// Cells that make one.
+    fn size(&self) -> f64 {
+        1.0 + self.more()
     }
 }

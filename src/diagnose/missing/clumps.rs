@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::cells::Cell;
+use super::cells::{Cell, Neighbours};
+use super::points::part;
 use crate::stats::range;
 
 /// Parts of a view's reach along an axis.
@@ -10,16 +11,14 @@ pub const PARTS: usize = 64;
 
 /// The part of a view's reach that each cell lies in.
 pub fn parts(cells: &[&Cell], at: &dyn Fn(&Cell) -> f64) -> Vec<usize> {
-    let [low, high] = range(cells.iter().map(|c| at(c)));
-    let width = ((high - low) / PARTS as f64).max(f64::MIN_POSITIVE);
-    cells.iter().map(|c| (((at(c) - low) / width) as usize).min(PARTS - 1)).collect()
+    let span = range(cells.iter().map(|c| at(c)));
+    cells.iter().map(|c| part(at(c), span, PARTS)).collect()
 }
 
 /// Pixel-frames that are lost together: how much more patches scatter than single losses would about a share
 /// that grows with `along` within each view, times how many of them are alike.
 pub fn clump(views: &[Vec<&Cell>], along: &dyn Fn(&Cell) -> f64) -> f64 {
-    let (mut squares, mut expected) = (0.0, 0.0);
-    let (mut products, mut pairs, mut cells) = (0.0, 0.0, 0.0);
+    let (mut neighbours, mut expected) = (Neighbours::default(), 0.0);
     for view in views.iter().filter(|v| v.iter().any(|c| c.lost > 0.0)) {
         let mut off = BTreeMap::new();
         for (c, share) in view.iter().zip(growing_share(view, along)) {
@@ -28,21 +27,11 @@ pub fn clump(views: &[Vec<&Cell>], along: &dyn Fn(&Cell) -> f64) -> f64 {
             off.insert(at, c.lost - share * c.asked);
             expected += share * (1.0 - share) * c.asked;
         }
-        for ((u, v), x) in &off {
-            squares += x * x;
-            cells += 1.0;
-            for at in [(u + 1, *v), (*u, v + 1), (u + 1, v + 1), (u - 1, v + 1)] {
-                if let Some(y) = off.get(&at) {
-                    products += x * y;
-                    pairs += 1.0;
-                }
-            }
-        }
+        neighbours.add_grid(&off);
     }
-    let together = (squares / f64::max(expected, f64::MIN_POSITIVE)).max(1.0);
-    let alike = products / f64::max(pairs, 1.0) * cells / f64::max(squares, f64::MIN_POSITIVE);
+    let together = (neighbours.square / f64::max(expected, f64::MIN_POSITIVE)).max(1.0);
     // Where losses are single, patches are alike for what the share leaves out.
-    together * (1.0 + 8.0 * alike.clamp(0.0, 1.0) * (1.0 - 1.0 / together))
+    together * (1.0 + neighbours.more() * (1.0 - 1.0 / together))
 }
 
 /// Of each cell the share that is lost, by least squares among those that only grow (pooling of adjacent

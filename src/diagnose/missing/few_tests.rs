@@ -73,7 +73,7 @@ fn a_foot_that_begins_in_the_midst_of_the_session_is_seen() {
     let step = |cells: &[Vec<Cell>]| {
         let (judged, _) = few_losses(cells, 8.0, &reach, 0.001, Seed(1))?;
         let Shape::Step(step) = judged.shape else { return None };
-        Some((step.axis, step.start()))
+        Some((step.axis, step.since_s))
     };
     let twin: Vec<f64> = cells[9].iter().map(|c| c.place.z).collect();
     cells[2].iter_mut().zip(twin).for_each(|(c, z)| c.place.z = z);

@@ -36,7 +36,7 @@ use finding::{DropoutFinding, NAME_ADEQUATE};
 use hard_end::{HardEnd, blur};
 use report::{DropoutReporter, shadow_finding};
 use search::{Judged, Losses, times};
-use shapes::{Step, begun, curves, steps};
+use shapes::{Shapes, Step};
 
 /// All that was found missing.
 #[derive(Debug, Clone, Default)]
@@ -145,30 +145,25 @@ fn losses(
     }
     let (fine, region_given) = (&seen.fine[..], &seen.region_given[..]);
     let reporter = |base| DropoutReporter { fine, region_given, base, reach, camera };
-    let (steps, curves) = (steps(reach), curves(camera, reach));
-    let usual: Vec<Step> = steps.iter().filter(|s| s.is_usual()).copied().collect();
-    let begun = begun(&usual, times(views));
+    let shapes = Shapes::of(reach, camera, times(views));
     let nothing = || views.iter().map(|v| vec![0.0; v.len()]).collect();
     let mut explained: Vec<Vec<f64>> = seen.expected.clone().unwrap_or_else(nothing);
     let mut taken: Vec<Axis> = Vec::new();
     while outcome.findings.len() < MOST_FINDINGS {
-        let open_steps: Vec<Step> =
-            steps.iter().filter(|s| !taken.contains(&s.axis)).copied().collect();
-        let open_curves: Vec<Basis> =
-            curves.iter().filter(|c| !taken.contains(&c.axis())).cloned().collect();
-        let round = Round::of(views, &explained, (&open_steps, &open_curves), LEAST, seed);
-        let Some(always) = round else { break };
+        let open = shapes.beside(&taken);
+        let of = |steps: &[Step], least| {
+            Round::of(views, &explained, (steps, &open.curves), least, seed)
+        };
+        let Some(always) = of(&open.steps, LEAST) else { break };
         if outcome.findings.is_empty() {
-            outcome.detectable = detectable(&always.ledger, &steps, always.threshold());
+            outcome.detectable = detectable(&always.ledger, &shapes.steps, always.threshold());
         }
         // Steps that begin in the midst of the session are tried where none is found that is always there.
         // Few views show how they scatter from then on: that is not trusted below what is usual.
-        let first = outcome.findings.is_empty() && always.won().is_none();
-        let begun: Vec<Step> = begun.iter().filter(|s| !taken.contains(&s.axis)).copied().collect();
-        let later = || Round::of(views, &explained, (&begun, &open_curves), USUAL, seed);
-        let Some(round) = (if first { later() } else { Some(always) }) else { break };
-        let Round { ledger, judged, noise } = &round;
-        let Some(won) = round.won() else { break };
+        let begins = outcome.findings.is_empty() && always.won().is_none();
+        let round = if begins { of(&open.begun, USUAL) } else { Some(always) };
+        let Some(Round { ledger, judged, noise }) = &round else { break };
+        let Some(won) = round.as_ref().and_then(Round::won) else { break };
         if outcome.findings.first().is_some_and(|f| won.gain < LEAST_OF_FIRST * f.gain) {
             break;
         }
@@ -186,9 +181,7 @@ fn losses(
             rest.notes.insert(0, end.note());
             return rest;
         }
-        let mut careful = Losses::new(views, &explained);
-        careful.scattered_as_left_by(won, USUAL);
-        let later = if end.is_none() { careful.later(won) } else { None };
+        let later = if end.is_none() { ledger.later(won) } else { None };
         let more = ledger.explained(later.as_ref().unwrap_or(won));
         explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
         taken.push(won.shape.axis());
@@ -222,9 +215,9 @@ impl<'a> Round<'a> {
         least: Scatter,
         seed: Seed,
     ) -> Option<Self> {
-        let mut ledger = Losses::new(views, explained);
+        let ledger = Losses::new(views, explained);
         let (first, _) = ledger.judge(steps, curves, None);
-        ledger.scattered_as_left_by(choose(&first)?, least);
+        let ledger = ledger.scattered_as_left_by(choose(&first)?, least);
         let (judged, noise) = ledger.judge(steps, curves, Some(seed));
         Some(Round { ledger, judged, noise })
     }

@@ -30,16 +30,23 @@ pub fn bounded(mut points: Vec<Point>, step: &Step, region_given: &[bool]) -> Ve
     points
 }
 
-/// The views' shares, bin by bin of an axis.
-pub fn points(views: &[Vec<Cell>], at: &dyn Fn(&Cell) -> f64, [low, high]: [f64; 2]) -> Vec<Point> {
+/// Which of so many equal parts of a span `x` lies in, the outermost if beyond.
+pub fn part(x: f64, [low, high]: [f64; 2], parts: usize) -> usize {
+    let width = ((high - low) / parts as f64).max(f64::MIN_POSITIVE);
+    (((x - low) / width).max(0.0) as usize).min(parts - 1)
+}
+
+/// The views' shares, bin by bin of an axis; `at` tells where on it a cell lies, if it counts.
+pub fn points(
+    views: &[Vec<Cell>],
+    at: &dyn Fn(&Cell) -> Option<f64>,
+    span: [f64; 2],
+) -> Vec<Point> {
     let mut all = Vec::new();
-    let width = ((high - low) / BINS as f64).max(f64::MIN_POSITIVE);
     for (view, cells) in views.iter().enumerate() {
         let mut sums = [[0.0; 3]; BINS];
-        for c in cells {
-            let x = at(c);
-            let bin = (((x - low) / width).max(0.0) as usize).min(BINS - 1);
-            let sum = &mut sums[bin];
+        for (c, x) in cells.iter().filter_map(|c| Some((c, at(c)?))) {
+            let sum = &mut sums[part(x, span, BINS)];
             *sum = [sum[0] + c.asked, sum[1] + c.lost, sum[2] + c.asked * x];
         }
         all.extend(sums.iter().filter(|s| s[0] > 0.0).map(|&[asked, lost, x]| Point {

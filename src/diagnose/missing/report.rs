@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use super::cells::Cell;
 use super::finding::DropoutFinding;
 use super::fit::{Fitted, fit};
-use super::points::{Point, bounded, points};
+use super::points::{Point, bounded, part, points};
 use super::search::Judged;
 use super::shapes::{Shape, Step};
 use crate::camera::Camera;
@@ -31,7 +31,7 @@ pub struct DropoutReporter<'a> {
 }
 
 /// Where a cell lies on an axis.
-type At = Box<dyn Fn(&Cell) -> f64>;
+type At = Box<dyn Fn(&Cell) -> Option<f64>>;
 
 impl DropoutReporter<'_> {
     pub fn finding(
@@ -62,21 +62,18 @@ impl DropoutReporter<'_> {
 
     fn step(&self, step: Step, finding: &mut DropoutFinding) {
         let span = if step.axis == Axis::Theta { self.reach.theta } else { self.reach.z };
-        let there = |v: &Vec<Cell>| {
-            v.iter().filter(|c| !step.before(c.place.session_s)).copied().collect::<Vec<Cell>>()
-        };
-        let there: Vec<Vec<Cell>> = self.fine.iter().map(there).collect();
-        let all = bounded(points(&there, &|c| step.at(&c.place), span), &step, self.region_given);
+        let at = |c: &Cell| (!step.before(c.place.session_s)).then(|| step.at(&c.place));
+        let all = bounded(points(self.fine, &at, span), &step, self.region_given);
         let own = Fitted { step, std_error: [None; 3] };
         let fitted = fit(step, self.base, &all).unwrap_or(own);
         let loss = |x: f64| fitted.step.loss(x, self.base);
         finding.parameters = parameters(&fitted);
-        finding.since_s = step.start();
+        finding.since_s = step.since_s;
         finding.interval = interval(&fitted, span);
         // Of all pixel-frames, those before it began among them.
-        let asked = |views: &[Vec<Cell>]| views.iter().flatten().map(|c| c.asked).sum::<f64>();
-        let part = asked(&there) / asked(self.fine).max(1.0);
-        finding.size = part * mean(&all, |p| loss(p.x) - self.base);
+        let there: f64 = all.iter().map(|p| p.asked).sum();
+        let asked: f64 = self.fine.iter().flatten().map(|c| c.asked).sum();
+        finding.size = there / asked.max(1.0) * mean(&all, |p| loss(p.x) - self.base);
         finding.curve = binned(&all, step.axis, span, loss);
     }
 
@@ -84,9 +81,9 @@ impl DropoutReporter<'_> {
         let (span, at): ([f64; 2], At) = match basis {
             Basis::Curve { over, low, high, .. } => {
                 let over = *over;
-                ([*low, *high], Box::new(move |c| over.value(&c.place)))
+                ([*low, *high], Box::new(move |c| Some(over.value(&c.place))))
             }
-            _ => ([0.0, self.camera.width as f64], Box::new(|c| c.place.u)),
+            _ => ([0.0, self.camera.width as f64], Box::new(|c| Some(c.place.u))),
         };
         let all = points(self.fine, &at, span);
         finding.size = mean(&all, |p| (p.share - self.base).max(0.0));
@@ -140,20 +137,14 @@ fn interval(fitted: &Fitted, [low, high]: [f64; 2]) -> [f64; 2] {
 const BINS: usize = 40;
 
 /// Lost shares bin by bin; the views are the sample.
-fn binned(
-    points: &[Point],
-    axis: Axis,
-    [low, high]: [f64; 2],
-    model: impl Fn(f64) -> f64,
-) -> Curve {
-    let width = ((high - low) / BINS as f64).max(f64::MIN_POSITIVE);
+fn binned(points: &[Point], axis: Axis, span: [f64; 2], model: impl Fn(f64) -> f64) -> Curve {
     let mut curve = Curve {
         x_label: format!("{axis}, {}", axis.unit()),
         y_label: "share of the pixel-frames without a measurement".into(),
         ..Curve::default()
     };
     for bin in 0..BINS {
-        let inside = |p: &&Point| (((p.x - low) / width).max(0.0) as usize).min(BINS - 1) == bin;
+        let inside = |p: &&Point| part(p.x, span, BINS) == bin;
         let members: Vec<Point> = points.iter().filter(inside).copied().collect();
         let asked: f64 = members.iter().map(|p| p.asked).sum();
         if asked <= 0.0 {

@@ -106,12 +106,13 @@ impl<'a> Losses<'a> {
     }
 
     /// Once more with the scatter that `best` leaves, and no less than `least`.
-    pub fn scattered_as_left_by(&mut self, best: &Judged, least: Scatter) {
+    pub fn scattered_as_left_by(self, best: &Judged, least: Scatter) -> Self {
         let explained = self.explained(best);
         let mut left = self.left.clone();
         left.iter_mut().flatten().zip(explained.iter().flatten()).for_each(|(y, e)| *y -= e);
         let scatter = Scatter::of(self.views, &left, least);
-        self.whiteners = self.views.iter().map(|v| Whitener::of(v, scatter)).collect();
+        let whiteners = self.views.iter().map(|v| Whitener::of(v, scatter)).collect();
+        Losses { whiteners, ..self }
     }
 
     /// Log odds that a shape adds.
@@ -167,14 +168,14 @@ impl<'a> Losses<'a> {
         }
     }
 
-    /// The same step begun in the midst of the session, where that does clearly better.
-    pub fn later(&self, step: &Judged) -> Option<Judged> {
-        let Shape::Step(always) = step.shape else { return None };
-        if always.start().is_some() {
-            return None;
-        }
-        let gain = |steps: &[Step]| self.judge(steps, &[], None).0.into_iter().next();
-        let (always, later) = (gain(&[always])?, gain(&begun(&[always], times(self.views)))?);
+    /// The step `won`, where it is always there, begun in the midst of the session: if that does clearly
+    /// better, with views whose scatter is not trusted below what is usual.
+    pub fn later(&self, won: &Judged) -> Option<Judged> {
+        let Shape::Step(always @ Step { since_s: None, .. }) = won.shape else { return None };
+        let (left, whiteners) = (self.left.clone(), Vec::new());
+        let careful = Losses { left, whiteners, ..*self }.scattered_as_left_by(won, USUAL);
+        let best = |steps: &[Step]| careful.judge(steps, &[], None).0.into_iter().next();
+        let (always, later) = (best(&[always])?, best(&begun(&[always], times(self.views)))?);
         (later.gain > always.gain + CLEARLY).then_some(later)
     }
 

@@ -12,8 +12,8 @@ pub struct Step {
     pub middle: f64,
     pub width: f64,
     pub share: f64,
-    /// It is there from this time of the session on, s; minus infinity: throughout.
-    pub since_s: f64,
+    /// It is there from this time of the session on, s; `None`: throughout.
+    pub since_s: Option<f64>,
 }
 
 impl Step {
@@ -23,31 +23,17 @@ impl Step {
 
     /// A share of one, at all times.
     pub fn whole(axis: Axis, middle: f64, width: f64) -> Self {
-        Step { axis, middle, width, share: 1.0, since_s: f64::NEG_INFINITY }
+        Step { axis, middle, width, share: 1.0, since_s: None }
     }
 
     /// It is not there yet.
     pub fn before(&self, session_s: f64) -> bool {
-        session_s < self.since_s
+        self.since_s.is_some_and(|since| session_s < since)
     }
 
     /// What its choice among the beginnings costs, nats.
     pub fn cost(&self) -> f64 {
-        self.start().map_or(0.0, |_| (STARTS as f64).ln())
-    }
-
-    /// All is lost beyond it, and it is as wide as the middle one of the widths tried.
-    pub fn is_usual(&self) -> bool {
-        let usual = match self.axis {
-            Axis::Theta => WIDTHS_DEG[1].to_radians(),
-            _ => WIDTHS[1] * self.middle,
-        };
-        self.share == 1.0 && (self.width.abs() / usual - 1.0).abs() < 1e-6
-    }
-
-    /// When it began, if it did in the session.
-    pub fn start(&self) -> Option<f64> {
-        self.since_s.is_finite().then_some(self.since_s)
+        self.since_s.map_or(0.0, |_| (STARTS as f64).ln())
     }
 
     pub fn at(&self, p: &PixelContext) -> f64 {
@@ -99,10 +85,19 @@ const LEAST_TILT: f64 = 0.1;
 const LEAST_RANGE: f64 = 1.1;
 
 /// All steps on lawful axes.
-pub fn steps(reach: &Extent) -> Vec<Step> {
+fn steps(reach: &Extent) -> Vec<Step> {
+    grid(reach, &WIDTHS_DEG, &WIDTHS, &[1.0, 0.3])
+}
+
+/// Whole steps of the middle width.
+fn usual_steps(reach: &Extent) -> Vec<Step> {
+    grid(reach, &WIDTHS_DEG[1..2], &WIDTHS[1..2], &[1.0])
+}
+
+fn grid(reach: &Extent, widths_deg: &[f64], widths: &[f64], shares: &[f64]) -> Vec<Step> {
     let mut all = Vec::new();
     let mut add = |axis, middle, width| {
-        all.extend([1.0, 0.3].map(|share| Step { share, ..Step::whole(axis, middle, width) }));
+        all.extend(shares.iter().map(|&share| Step { share, ..Step::whole(axis, middle, width) }));
     };
     let along = |k: usize| k as f64 / (MIDDLES - 1) as f64;
     if is_told_apart(Axis::Theta, reach) {
@@ -110,14 +105,14 @@ pub fn steps(reach: &Extent) -> Vec<Step> {
         for k in 0..MIDDLES {
             let beyond = 4f64.to_radians();
             let middle = low + along(k) * (high + beyond - low);
-            WIDTHS_DEG.iter().for_each(|deg| add(Axis::Theta, middle, deg.to_radians()));
+            widths_deg.iter().for_each(|deg| add(Axis::Theta, middle, deg.to_radians()));
         }
     }
     if is_told_apart(Axis::Z, reach) {
         let [low, high] = reach.z;
         for k in 0..MIDDLES {
             let middle = low * (high / low).powf(along(k));
-            for width in WIDTHS {
+            for width in widths {
                 add(Axis::Z, middle, width * middle);
                 add(Axis::Z, middle, -width * middle);
             }
@@ -139,7 +134,8 @@ pub fn begun(steps: &[Step], times: impl Iterator<Item = f64>) -> Vec<Step> {
     let last = (times.len() + 1).saturating_sub(SIDE_VIEWS);
     let all: Vec<usize> = (SIDE_VIEWS..last).filter(|&k| times[k] > times[k - 1]).collect();
     let starts = all.iter().step_by(all.len().div_ceil(STARTS).max(1)).map(|&k| between(k));
-    starts.flat_map(|since_s| steps.iter().map(move |s| Step { since_s, ..*s })).collect()
+    let begun = |start| steps.iter().map(move |s| Step { since_s: Some(start), ..*s });
+    starts.flat_map(begun).collect()
 }
 
 /// Do views that reach so far tell anything of this axis?
@@ -149,7 +145,7 @@ pub fn is_told_apart(axis: Axis, reach: &Extent) -> bool {
 }
 
 /// Curves without a name.
-pub fn curves(camera: &Camera, reach: &Extent) -> Vec<Basis> {
+fn curves(camera: &Camera, reach: &Extent) -> Vec<Basis> {
     let (width, height) = (camera.width as f64, camera.height as f64);
     let mut all = Vec::new();
     let mut curve = |over, [low, high]: [f64; 2], nodes| {
@@ -169,4 +165,30 @@ pub fn curves(camera: &Camera, reach: &Extent) -> Vec<Basis> {
     }
     all.push(Basis::Map { width, height, across: 8, down: 6, times: Modulation::One });
     all
+}
+
+/// All that is tried.
+#[derive(Clone)]
+pub struct Shapes {
+    pub steps: Vec<Step>,
+    /// Steps that begin in the midst of the session.
+    pub begun: Vec<Step>,
+    pub curves: Vec<Basis>,
+}
+
+impl Shapes {
+    /// Of views at these `times`, s of the session.
+    pub fn of(reach: &Extent, camera: &Camera, times: impl Iterator<Item = f64>) -> Self {
+        let begun = begun(&usual_steps(reach), times);
+        Shapes { steps: steps(reach), begun, curves: curves(camera, reach) }
+    }
+
+    /// Those on other axes than these.
+    pub fn beside(&self, taken: &[Axis]) -> Self {
+        let mut open = self.clone();
+        open.steps.retain(|s| !taken.contains(&s.axis));
+        open.begun.retain(|s| !taken.contains(&s.axis));
+        open.curves.retain(|c| !taken.contains(&c.axis()));
+        open
+    }
 }
