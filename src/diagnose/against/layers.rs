@@ -20,9 +20,9 @@ impl Baseline {
         survey.fixed_px2 += fixed_px2(&self.structure);
         for (real, twin) in survey.views.iter_mut().zip(&self.survey.views) {
             let theirs: HashMap<(u32, u32), f64> =
-                twin.tiles.iter().map(|t| (patch(t.place.u, t.place.v, SIDE), t.mean)).collect();
-            for t in Arc::make_mut(&mut real.tiles) {
-                let mean = theirs.get(&patch(t.place.u, t.place.v, SIDE)).copied();
+                twin.patches().map(|(p, t)| (patch(p.u, p.v, SIDE), t.mean)).collect();
+            for (t, place) in Arc::make_mut(&mut real.tiles).iter_mut().zip(real.places.iter()) {
+                let mean = theirs.get(&patch(place.u, place.v, SIDE)).copied();
                 match mean.filter(|m| m.is_finite()) {
                     Some(m) => {
                         t.square += m * m - 2.0 * m * t.mean;
@@ -62,9 +62,9 @@ impl Baseline {
             // Terms that depend on the variance itself must not have the blocks' errors in them: these
             // are in what they are fitted to.
             let smooth = logs.values().sum::<f64>() / logs.len().max(1) as f64;
-            for t in Arc::make_mut(&mut real.tiles) {
-                t.place.variance = t.variance * smooth.exp();
-                match logs.get(&patch(t.place.u, t.place.v, side)) {
+            for (place, t) in real.patches_mut() {
+                place.variance = t.variance * smooth.exp();
+                match logs.get(&patch(place.u, place.v, side)) {
                     Some(log) => t.variance *= log.exp(),
                     None => (t.temporal, t.rough_square) = (f64::NAN, f64::NAN),
                 }

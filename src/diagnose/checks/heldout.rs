@@ -14,7 +14,7 @@ use crate::diagnose::views::samples::ViewData;
 use crate::diagnose::views::surveyed_view::SurveyedView;
 use crate::diagnose::views::tiles::Tile;
 use crate::solve::plane_through;
-use crate::terms::{Statistic, Term, by_term};
+use crate::terms::{PixelContext, Statistic, Term, by_term};
 
 /// A share of the views is kept aside.
 const KEPT_ASIDE: usize = 4;
@@ -115,8 +115,8 @@ struct Rms {
 fn rms(views: &[SurveyedView], terms: &[Term], scale_px_m: f64) -> Rms {
     let (mut px, mut mm, mut n) = (0.0, 0.0, 0.0);
     for view in views {
-        each_tile(view, terms, |t, f| {
-            let to_mm = 1e3 * t.place.z * t.place.z / scale_px_m;
+        each_patch(view, terms, |(place, t), f| {
+            let to_mm = 1e3 * place.z * place.z / scale_px_m;
             px += t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0);
             mm += t.pixels * ((t.mean - f) * to_mm).powi(2);
             n += t.pixels;
@@ -133,16 +133,16 @@ pub fn levels(survey: &Survey, terms: &[Term]) -> Vec<f64> {
 
 fn values(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
     let mut row = Vec::new();
-    view.tiles.iter().map(|t| Term::sum(terms, &t.place, &mut row)).collect()
+    view.places.iter().map(|place| Term::sum(terms, place, &mut row)).collect()
 }
 
-/// The terms' values at the tiles, with the plane fitted anew.
+/// The terms' values at the patches, with the plane fitted anew.
 fn fitted(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
     let mut values = values(view, terms);
     // What is left after the terms has a plane of its own: it goes with them.
     if let Some(plane) = plane_left(view, &values) {
-        for (t, f) in view.tiles.iter().zip(&mut values) {
-            *f += plane[0] + plane[1] * t.place.x + plane[2] * t.place.y;
+        for (place, f) in view.places.iter().zip(&mut values) {
+            *f += plane[0] + plane[1] * place.x + plane[2] * place.y;
         }
     }
     values
@@ -150,15 +150,19 @@ fn fitted(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
 
 /// The plane that is left in a view's means without these values.
 fn plane_left(view: &SurveyedView, values: &[f64]) -> Option<Vector3<f64>> {
-    let points = view.tiles.iter().zip(values);
-    plane_through(points.map(|(t, f)| ([t.place.x, t.place.y], t.mean - f, t.pixels)))
+    let points = view.patches().zip(values);
+    plane_through(points.map(|((p, t), f)| ([p.x, p.y], t.mean - f, t.pixels)))
 }
 
-/// Every tile that has a mean, with the terms' value there, the plane fitted anew.
-fn each_tile(view: &SurveyedView, terms: &[Term], mut visit: impl FnMut(&Tile, f64)) {
+/// Every patch that has a mean, with the terms' value there, the plane fitted anew.
+fn each_patch(
+    view: &SurveyedView,
+    terms: &[Term],
+    mut visit: impl FnMut((&PixelContext, &Tile), f64),
+) {
     let fitted = fitted(view, terms);
-    let tiles = view.tiles.iter().zip(fitted).filter(|(t, _)| t.mean.is_finite());
-    tiles.for_each(|(t, f)| visit(t, f));
+    let patches = view.patches().zip(fitted).filter(|((_, t), _)| t.mean.is_finite());
+    patches.for_each(|(patch, f)| visit(patch, f));
 }
 
 /// Root mean square of each view's mean residual with the terms taken out, px.
@@ -168,7 +172,7 @@ pub fn rms_by_view(survey: &Survey, terms: &[Term]) -> Vec<f64> {
         .iter()
         .map(|view| {
             let (mut sum, mut n) = (0.0, 0.0);
-            each_tile(view, terms, |t, f| {
+            each_patch(view, terms, |(_, t), f| {
                 sum += t.pixels * (t.mean - f).powi(2);
                 n += t.pixels;
             });
@@ -196,7 +200,7 @@ pub fn left_out(survey: &Survey, outcome: &Outcome, terms: &[Term]) -> Option<Le
         let both = sums.iter_mut().zip(&mut by_view).zip([&[][..], &refitted]);
         for ((sum, by_view), terms) in both {
             let before = *sum;
-            each_tile(view, terms, |t, f| {
+            each_patch(view, terms, |(_, t), f| {
                 *sum += t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0);
             });
             *by_view += ((*sum - before) / pixels.max(1.0)).sqrt();

@@ -22,7 +22,7 @@ use crate::diagnose::steps::{contradicted, step_nats};
 use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::tiles::Tile;
 use crate::effects::logistic;
-use crate::terms::{Axis, Statistic};
+use crate::terms::{Axis, PixelContext, Statistic};
 
 /// The recording shows less than this share of it. Sensors warm up, and views differ.
 pub const SHARE: f64 = 0.5;
@@ -119,12 +119,12 @@ impl Case<'_> {
         let of = |id: &'static str, middle: &str, width: &str, axis: Axis| {
             let at = |name: &str| self.known.parameter(id, name);
             let (share, middle, width) = (at("share").unwrap_or(1.0), at(middle)?, at(width)?);
-            let expected = |t: &Tile| {
-                let x = if axis == Axis::Z { t.place.z } else { t.place.theta.to_degrees() };
+            let expected = |(place, t): (&PixelContext, &Tile)| {
+                let x = if axis == Axis::Z { place.z } else { place.theta.to_degrees() };
                 share * logistic(x - middle, width) * t.asked
             };
             let views = self.survey.views.iter().filter_map(|v| {
-                let expected: f64 = v.tiles.iter().map(expected).sum();
+                let expected: f64 = v.patches().map(expected).sum();
                 let lost: f64 = v.tiles.iter().map(|t| t.missing * t.asked).sum();
                 (expected > LOST).then_some((lost / expected, expected))
             });

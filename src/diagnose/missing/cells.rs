@@ -7,7 +7,8 @@ use nalgebra::{Matrix3, Vector3};
 use crate::camera::Camera;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::margins::Margins;
-use crate::diagnose::views::tiles::{SIDE, Tile};
+use crate::diagnose::views::surveyed_view::SurveyedView;
+use crate::diagnose::views::tiles::SIDE;
 use crate::terms::PixelContext;
 
 /// Pixel-frames of a patch, and how many of them have no measurement.
@@ -38,12 +39,10 @@ pub fn cells(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<Cel
         .iter()
         .map(|view| {
             let mut groups: BTreeMap<(u32, u32, bool), Vec<usize>> = BTreeMap::new();
-            for (i, t) in view.tiles.iter().enumerate().filter(|(_, t)| margins.hold(t)) {
-                let p = &t.place;
+            for (i, p) in view.places.iter().enumerate().filter(|(_, p)| margins.hold(p)) {
                 let key = ((p.v / side) as u32, (p.u / side) as u32, p.edge < rim);
                 groups.entry(key).or_default().push(i);
             }
-            let places: Vec<PixelContext> = view.tiles.iter().map(|t| t.place).collect();
             groups
                 .values()
                 .filter(|g| g.len() >= FEWEST_TILES)
@@ -51,8 +50,9 @@ pub fn cells(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<Cel
                     let sum = |of: &dyn Fn(usize) -> f64| group.iter().map(|&i| of(i)).sum::<f64>();
                     let asked = sum(&|i| view.tiles[i].asked);
                     let lost = sum(&|i| view.tiles[i].asked * view.tiles[i].missing);
-                    let mut place = places[group[0]];
-                    place.average(&places, &|of| sum(&|i| view.tiles[i].asked * of(i)) / asked);
+                    let mut place = view.places[group[0]];
+                    place
+                        .average(&view.places, &|of| sum(&|i| view.tiles[i].asked * of(i)) / asked);
                     place.side = side;
                     Cell { place, lost, asked }
                 })
@@ -81,9 +81,12 @@ pub fn expected(cells: &mut [Vec<Cell>], twins: &[Vec<Cell>], rim: f64) -> Vec<V
 
 /// Every tile a cell of its own: for where and how much, not for whether.
 pub fn fine(survey: &Survey, margins: &Margins) -> Vec<Vec<Cell>> {
-    let cell = |t: &Tile| Cell { place: t.place, lost: t.asked * t.missing, asked: t.asked };
-    let held = |v: &[Tile]| v.iter().filter(|t| margins.hold(t)).map(cell).collect();
-    survey.views.iter().map(|v| held(&v.tiles)).collect()
+    let of_view = |v: &SurveyedView| {
+        let held = v.patches().filter(|(place, _)| margins.hold(place));
+        held.map(|(place, t)| Cell { place: *place, lost: t.asked * t.missing, asked: t.asked })
+            .collect()
+    };
+    survey.views.iter().map(of_view).collect()
 }
 
 /// Losses below this share are all the same.

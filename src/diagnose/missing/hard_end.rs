@@ -3,7 +3,7 @@
 use super::cells::Cell;
 use super::finding::DropoutFinding;
 use crate::diagnose::views::layers::Survey;
-use crate::diagnose::views::tiles::Tile;
+use crate::diagnose::views::surveyed_view::SurveyedView;
 
 /// An edge narrower than this share of its distance, or than the noise there, is a limit that a driver
 /// or a format has set (the noise blurs it so); a pattern that grows faint goes gradually.
@@ -59,8 +59,7 @@ impl HardEnd {
 
 /// Standard deviation of the depth, by the model, where the views come nearest to `z`, m.
 pub fn blur(survey: &Survey, z: f64) -> f64 {
-    let tiles = survey.views.iter().flat_map(|v| v.tiles.iter());
-    let away = |t: &&Tile| (t.place.z - z).abs();
-    let nearest = tiles.min_by(|a, b| away(a).total_cmp(&away(b)));
-    nearest.map_or(0.0, |t| t.variance.sqrt() / t.place.disparity * z)
+    let patches = survey.views.iter().flat_map(SurveyedView::patches);
+    let nearest = patches.min_by(|(a, _), (b, _)| (a.z - z).abs().total_cmp(&(b.z - z).abs()));
+    nearest.map_or(0.0, |(place, t)| t.variance.sqrt() / place.disparity * z)
 }

@@ -132,8 +132,8 @@ impl Case<'_> {
     fn holds_tails(&self, term: &Term) -> bool {
         const MUCH: f64 = -1.4;
         let mut row = Vec::new();
-        let mut tiles = self.survey.views.iter().flat_map(|v| v.tiles.iter());
+        let mut places = self.survey.views.iter().flat_map(|v| v.places.iter());
         !matches!(term.basis, Basis::Table { .. })
-            || tiles.all(|t| term.value(&t.place, &mut row) > MUCH)
+            || places.all(|place| term.value(place, &mut row) > MUCH)
     }
 }

@@ -39,8 +39,8 @@ impl Survey {
     fn covered_px(&self, camera: &Camera) -> f64 {
         let across = camera.width.div_ceil(SIDE);
         let mut seen = vec![false; across * camera.height.div_ceil(SIDE)];
-        for t in self.views.iter().flat_map(|v| v.tiles.iter()) {
-            seen[t.place.v as usize / SIDE * across + t.place.u as usize / SIDE] = true;
+        for place in self.views.iter().flat_map(|v| v.places.iter()) {
+            seen[place.v as usize / SIDE * across + place.u as usize / SIDE] = true;
         }
         (seen.iter().filter(|s| **s).count() * SIDE * SIDE) as f64
     }

@@ -17,14 +17,14 @@ pub const BLOCK_TILES: usize = 6;
 /// for their mean is the noise of neither.
 pub fn blocks(view: &SurveyedView, by_light: bool) -> ViewData {
     let side = (BLOCK_TILES * SIDE) as f64;
-    let first = view.tiles.first().map_or(1.0, |t| t.place.light);
-    let lit = by_light && view.tiles.iter().any(|t| t.place.light != first);
+    let first = view.places.first().map_or(1.0, |p| p.light);
+    let lit = by_light && view.places.iter().any(|p| p.light != first);
     let least = if lit { LEAST_LIT } else { LEAST } * side * side;
     let mut sums: std::collections::BTreeMap<(u32, u32, i32), Sum> = Default::default();
-    for t in view.tiles.iter() {
-        let octave = if lit { t.place.light.max(DARKEST).log2().floor() as i32 } else { 0 };
-        let key = ((t.place.v / side) as u32, (t.place.u / side) as u32, octave);
-        sums.entry(key).or_default().add(t, view.between_frame_factor);
+    for (place, t) in view.patches() {
+        let octave = if lit { place.light.max(DARKEST).log2().floor() as i32 } else { 0 };
+        let key = ((place.v / side) as u32, (place.u / side) as u32, octave);
+        sums.entry(key).or_default().add(place, t, view.between_frame_factor);
     }
     // What the box's mean took with it.
     let taken = view.correlation.sum / (SMOOTH_PX * SMOOTH_PX) as f64;
@@ -57,7 +57,7 @@ struct Sum {
 }
 
 impl Sum {
-    fn add(&mut self, t: &Tile, between_frame_factor: Option<f64>) {
+    fn add(&mut self, at: &PixelContext, t: &Tile, between_frame_factor: Option<f64>) {
         // With frames to compare, only what changes is noise; its still part is put back by what
         // frames have in common.
         let square = match between_frame_factor {
@@ -68,7 +68,7 @@ impl Sum {
             return;
         }
         if self.n == 0.0 {
-            self.place = t.place;
+            self.place = *at;
         }
         self.n += t.pixels;
         self.ratio += t.pixels * square / t.variance;
@@ -76,19 +76,19 @@ impl Sum {
         let share = t.pixels / self.n;
         let mix = |a: &mut f64, b: f64| *a += share * (b - *a);
         let p = &mut self.place;
-        mix(&mut p.u, t.place.u);
-        mix(&mut p.v, t.place.v);
-        mix(&mut p.x, t.place.x);
-        mix(&mut p.y, t.place.y);
-        mix(&mut p.z, t.place.z);
-        mix(&mut p.disparity, t.place.disparity);
-        mix(&mut p.radius, t.place.radius);
-        mix(&mut p.right, t.place.right);
-        mix(&mut p.down, t.place.down);
-        mix(&mut p.variance, t.place.variance);
-        mix(&mut p.edge, t.place.edge);
+        mix(&mut p.u, at.u);
+        mix(&mut p.v, at.v);
+        mix(&mut p.x, at.x);
+        mix(&mut p.y, at.y);
+        mix(&mut p.z, at.z);
+        mix(&mut p.disparity, at.disparity);
+        mix(&mut p.radius, at.radius);
+        mix(&mut p.right, at.right);
+        mix(&mut p.down, at.down);
+        mix(&mut p.variance, at.variance);
+        mix(&mut p.edge, at.edge);
         // Variances add up, and where light is what they come from they are as its inverse (shot noise).
-        p.light = 1.0 / (1.0 / p.light + share * (1.0 / t.place.light - 1.0 / p.light));
+        p.light = 1.0 / (1.0 / p.light + share * (1.0 / at.light - 1.0 / p.light));
     }
 }
 
@@ -101,13 +101,12 @@ mod tests {
     #[test]
     fn what_is_light_and_what_is_dark_lie_apart() {
         const ACROSS: usize = 10 * BLOCK_TILES;
-        let tile = |k: usize| {
+        let patch = |k: usize| {
             let (row, column) = (k / ACROSS, k % ACROSS);
             let square = (2 * row / BLOCK_TILES + 2 * column / BLOCK_TILES) % 2;
             let light = [0.25, 2.0][square];
             let [u, v] = [column, row].map(|place| ((place * SIDE) as f64) + 1.5);
-            Tile {
-                place: PixelContext { u, v, light, ..PixelContext::default() },
+            let tile = Tile {
                 mean: 0.0,
                 square: 1.0 / light,
                 rough_square: 0.0,
@@ -116,9 +115,10 @@ mod tests {
                 pixels: (SIDE * SIDE) as f64,
                 missing: 0.0,
                 asked: 1.0,
-            }
+            };
+            (PixelContext { u, v, light, ..PixelContext::default() }, tile)
         };
-        let view = SurveyedView::white((0..ACROSS * ACROSS).map(tile).collect(), 3.0);
+        let view = SurveyedView::white((0..ACROSS * ACROSS).map(patch), 3.0);
         let data = blocks(&view, true);
         assert_eq!(data.places.len(), 200, "two parts of a hundred blocks");
         for (place, log_variance) in data.places.iter().zip(&data.response) {

@@ -108,8 +108,8 @@ impl Survey {
         }
         self.views.par_iter_mut().for_each(|view| {
             let mut row = Vec::new();
-            for t in Arc::make_mut(&mut view.tiles) {
-                let off = Term::sum(&off, &t.place, &mut row);
+            for (t, place) in Arc::make_mut(&mut view.tiles).iter_mut().zip(view.places.iter()) {
+                let off = Term::sum(&off, place, &mut row);
                 t.square += off * (off - 2.0 * t.mean);
                 t.mean -= off;
             }
@@ -126,10 +126,10 @@ impl Survey {
         }
         self.views.par_iter_mut().for_each(|view| {
             let mut row = Vec::new();
-            for t in Arc::make_mut(&mut view.tiles) {
-                let factor = Term::sum(&off, &t.place, &mut row).exp();
+            for (place, t) in view.patches_mut() {
+                let factor = Term::sum(&off, place, &mut row).exp();
                 t.variance *= factor;
-                t.place.variance *= factor;
+                place.variance *= factor;
             }
         });
     }

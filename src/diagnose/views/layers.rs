@@ -10,7 +10,7 @@ use super::learnt::Learnt;
 use super::light::{Light, relative_light};
 use super::samples::{ViewData, coarser};
 use super::surveyed_view::{SurveyedView, independent_frames, inflation, mean_data};
-use super::tiles::{roughen, tiles};
+use super::tiles::{Tile, roughen, tiles};
 use crate::camera::{Camera, Rays};
 use crate::diagnose::checks::replication::halves;
 use crate::diagnose::options::Ablation;
@@ -55,10 +55,11 @@ impl Survey {
             .zip(halves(&poses))
             .map(|(f, in_second_half)| {
                 let (inflation, correlation) = inflation(f, &[]);
-                let tiles = Arc::new(tiles(f, camera, rays, start));
+                let (places, tiles) = tiles(f, camera, rays, start);
                 SurveyedView {
                     name: f.name.clone(),
-                    tiles,
+                    places: Arc::new(places),
+                    tiles: Arc::new(tiles),
                     inflation,
                     correlation,
                     frames: independent_frames(f),
@@ -69,7 +70,7 @@ impl Survey {
             })
             .collect();
         let light = relative_light(&mut views);
-        let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter().map(|t| &t.place)));
+        let reach = Extent::of(views.iter().flat_map(|v| v.places.iter()));
         let stated: Option<Vec<f64>> = fields.iter().map(|f| f.flatness_m).collect();
         let flat = stated.filter(|all| !all.is_empty()).map(|all| Flat {
             flatness_m: all.into_iter().fold(0.0, f64::max),
@@ -107,7 +108,7 @@ impl Survey {
     /// The views at these places.
     pub fn subset(&self, which: &[usize]) -> Survey {
         let views: Vec<SurveyedView> = which.iter().map(|&n| self.views[n].clone()).collect();
-        let reach = Extent::of(views.iter().flat_map(|v| v.tiles.iter().map(|t| &t.place)));
+        let reach = Extent::of(views.iter().flat_map(|v| v.places.iter()));
         let mut part = Survey { views, reach, between: self.between.clone(), ..*self };
         part.skip_covariance();
         part
@@ -170,14 +171,14 @@ impl Survey {
         stretch: impl Fn(&PixelContext) -> f64 + Sync,
     ) {
         self.views.par_iter_mut().zip(fields).enumerate().for_each(|(n, (view, field))| {
-            let tiles = Arc::make_mut(&mut view.tiles);
             if let Some(bias) = bias.get(n) {
-                roughen(tiles, field, bias);
+                let tiles: &mut Vec<Tile> = Arc::make_mut(&mut view.tiles);
+                roughen(tiles, &view.places, field, bias);
             }
-            for t in tiles {
-                let (factor, more) = (stretch(&t.place), extra(&t.place));
+            for (place, t) in view.patches_mut() {
+                let (factor, more) = (stretch(place), extra(place));
                 t.variance = t.variance * factor + more;
-                t.place.variance = t.place.variance * factor + more;
+                place.variance = place.variance * factor + more;
             }
         });
     }

@@ -28,8 +28,7 @@ impl Light {
 pub fn relative_light(views: &mut [SurveyedView]) -> Light {
     let share = ambient_share(views);
     let mut all: Vec<f32> = Vec::new();
-    for tile in views.iter_mut().flat_map(|v| Arc::make_mut(&mut v.tiles)) {
-        let p = &mut tile.place;
+    for p in views.iter_mut().flat_map(|v| Arc::make_mut(&mut v.places)) {
         p.light /= 1.0 + share * p.ambient * p.pattern_fall_off();
         if p.light.is_finite() {
             all.push(p.light as f32);
@@ -37,9 +36,9 @@ pub fn relative_light(views: &mut [SurveyedView]) -> Light {
     }
     let median = f64::from(median_in_place(&mut all));
     let usable = median > 0.0;
-    for tile in views.iter_mut().flat_map(|v| Arc::make_mut(&mut v.tiles)) {
-        let light = tile.place.light / median;
-        tile.place.light = if usable && light.is_finite() { light } else { 1.0 };
+    for p in views.iter_mut().flat_map(|v| Arc::make_mut(&mut v.places)) {
+        let light = p.light / median;
+        p.light = if usable && light.is_finite() { light } else { 1.0 };
     }
     Light { median: if usable { median } else { 0.0 }, ambient_share: share }
 }
@@ -50,9 +49,9 @@ fn ambient_share(views: &[SurveyedView]) -> f64 {
     let points: Vec<(f64, f64)> = views
         .iter()
         .filter_map(|v| {
-            let mut light: Vec<f32> = v.tiles.iter().map(|t| t.place.light as f32).collect();
+            let mut light: Vec<f32> = v.places.iter().map(|p| p.light as f32).collect();
             light.retain(|l| l.is_finite());
-            let middle = v.tiles.get(v.tiles.len() / 2)?.place;
+            let middle = v.places.get(v.places.len() / 2)?;
             let x = middle.ambient * middle.pattern_fall_off();
             let y = f64::from(median_in_place(&mut light));
             (x > 0.0 && y > 0.0).then_some((x, y))

@@ -2,7 +2,8 @@
 //! image has room for. A Kinect v1 leaves eight columns on the right empty, which no window reaches.
 
 use super::field::Field;
-use super::tiles::{SIDE, Tile};
+use super::tiles::SIDE;
+use crate::terms::PixelContext;
 
 /// First and last column, and first and last row, that answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,13 +36,13 @@ impl Margins {
         Margins { columns, rows, size }
     }
 
-    /// Is the whole tile where the sensor answers?
-    pub fn hold(&self, tile: &Tile) -> bool {
+    /// Is the whole tile at this place where the sensor answers?
+    pub fn hold(&self, place: &PixelContext) -> bool {
         let half = 0.5 * SIDE as f64;
         let inside = |at: f64, [first, last]: [usize; 2]| {
             at - half >= first as f64 - 1.0 && at + half <= last as f64 + 1.0
         };
-        inside(tile.place.u, self.columns) && inside(tile.place.v, self.rows)
+        inside(place.u, self.columns) && inside(place.v, self.rows)
     }
 
     pub fn notes(&self) -> Vec<String> {

@@ -13,7 +13,9 @@ use crate::terms::PixelContext;
 #[derive(Clone)]
 pub struct SurveyedView {
     pub name: String,
-    /// Shared by the surveys of a part of the views.
+    /// Shared, as the tiles are, by the surveys of a part of the views, and by all samples.
+    pub places: Arc<Vec<PixelContext>>,
+    /// One at each place.
     pub tiles: Arc<Vec<Tile>>,
     /// Variance of a pixel's mean in units of the model's, times pixels per independent sample.
     pub inflation: f64,
@@ -79,21 +81,35 @@ pub const MEAN_PRECISION: [f64; 4] = [0.0, 0.0, 0.0, 0.1];
 pub fn mean_data(view: &SurveyedView) -> ViewData {
     let tiles = &view.tiles;
     ViewData {
-        places: Arc::new(tiles.iter().map(|t| t.place).collect()),
+        places: Arc::clone(&view.places),
         response: tiles.iter().map(|t| finite(t.mean)).collect(),
         weight: tiles.iter().map(|t| finite(t.pixels / t.variance / view.inflation)).collect(),
-        nuisance: tiles.iter().flat_map(|t| mean_nuisance(&t.place)).collect(),
+        nuisance: view.places.iter().flat_map(mean_nuisance).collect(),
         precision: MEAN_PRECISION.to_vec(),
         gathered: Vec::new(),
+    }
+}
+
+impl SurveyedView {
+    /// Each tile with its place.
+    pub fn patches(&self) -> impl Iterator<Item = (&PixelContext, &Tile)> {
+        self.places.iter().zip(self.tiles.iter())
+    }
+
+    /// The same, to be changed.
+    pub fn patches_mut(&mut self) -> impl Iterator<Item = (&mut PixelContext, &mut Tile)> {
+        Arc::make_mut(&mut self.places).iter_mut().zip(Arc::make_mut(&mut self.tiles))
     }
 }
 
 #[cfg(test)]
 impl SurveyedView {
     /// Of white noise, and nothing known beside.
-    pub fn white(tiles: Vec<Tile>, frames: f64) -> Self {
+    pub fn white(patches: impl IntoIterator<Item = (PixelContext, Tile)>, frames: f64) -> Self {
+        let (places, tiles): (Vec<_>, Vec<_>) = patches.into_iter().unzip();
         SurveyedView {
             name: "0".into(),
+            places: Arc::new(places),
             tiles: Arc::new(tiles),
             inflation: 1.0,
             correlation: Correlation::white(),
@@ -121,7 +137,7 @@ mod tests {
         let sensor = kinect_v1(1);
         let (camera, scale) = (&sensor.camera, 43.5);
         let plane = Plane::tilted(3.5, 1.0, 0.7);
-        let mut tiles = Vec::new();
+        let mut patches = Vec::new();
         for v in (SIDE / 2..camera.height).step_by(SIDE) {
             for u in (SIDE / 2..camera.width).step_by(SIDE) {
                 let (u, v) = (u as f64, v as f64);
@@ -145,8 +161,7 @@ mod tests {
                     radius,
                     ..Default::default()
                 };
-                tiles.push(Tile {
-                    place: own,
+                let tile = Tile {
                     mean: disparity * (sigma_m / z).powi(2),
                     square: variance,
                     rough_square: variance,
@@ -156,10 +171,11 @@ mod tests {
                     pixels: 30.0 * side * side,
                     missing: 0.0,
                     asked: 1.0,
-                });
+                };
+                patches.push((own, tile));
             }
         }
-        SurveyedView::white(tiles, 30.0)
+        SurveyedView::white(patches, 30.0)
     }
 
     /// Planes alone leave of it what a bowl would be: a nat in each view, and views add up.

@@ -8,10 +8,10 @@ use crate::diagnose::noise::texture::high_passed;
 use crate::scene::TargetFrame;
 use crate::terms::{PixelContext, Pixels, corner_radius};
 
-/// Mean residual of a patch of pixels.
+/// What is measured in a patch of pixels; where it lies stands beside it, for all that look there to
+/// share.
 #[derive(Debug, Clone, Copy)]
 pub struct Tile {
-    pub place: PixelContext,
     /// Mean residual, px.
     pub mean: f64,
     /// Mean square of single frames' residuals, px^2.
@@ -98,8 +98,13 @@ impl<'a> Places<'a> {
     }
 }
 
-/// The tiles of a view.
-pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) -> Vec<Tile> {
+/// The tiles of a view, and where each lies.
+pub fn tiles(
+    field: &Field,
+    camera: &Camera,
+    rays: &Rays,
+    session_start: f64,
+) -> (Vec<PixelContext>, Vec<Tile>) {
     let places = Places::of(field, camera, rays, session_start);
     let across = camera.width.div_ceil(SIDE);
     let rows = camera.height.div_ceil(SIDE);
@@ -121,13 +126,13 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays, session_start: f64) ->
             s.darkness += f64::from(field.light.get(k).copied().unwrap_or(1.0)).recip();
         }
     }
-    let mut tiles: Vec<Tile> =
-        sums.iter().filter(|s| s.pixels > 0.0).map(|s| s.tile(&places)).collect();
-    for t in &mut tiles {
-        t.temporal -= field.moved_px2(t.place.disparity);
+    let (places, mut tiles): (Vec<PixelContext>, Vec<Tile>) =
+        sums.iter().filter(|s| s.pixels > 0.0).map(|s| s.tile(&places)).unzip();
+    for (t, place) in tiles.iter_mut().zip(&places) {
+        t.temporal -= field.moved_px2(place.disparity);
     }
-    roughen(&mut tiles, field, &[]);
-    tiles
+    roughen(&mut tiles, &places, field, &[]);
+    (places, tiles)
 }
 
 #[derive(Clone, Copy, Default)]
@@ -155,12 +160,11 @@ impl Sums {
         self.edge += edge;
     }
 
-    fn tile(&self, places: &Places<'_>) -> Tile {
+    fn tile(&self, places: &Places<'_>) -> (PixelContext, Tile) {
         let (u, v) = (self.u / self.pixels, self.v / self.pixels);
         let place = places.at(u, v, places.camera.ray(u, v), self.edge / self.pixels);
         let variance = self.variance / self.pixels;
-        Tile {
-            place: PixelContext { light: self.n / self.darkness, variance, ..place },
+        let tile = Tile {
             mean: self.mean / self.n,
             square: self.square / self.n,
             rough_square: f64::NAN,
@@ -169,7 +173,8 @@ impl Sums {
             pixels: self.n,
             missing: self.missing / self.asked,
             asked: self.asked,
-        }
+        };
+        (PixelContext { light: self.n / self.darkness, variance, ..place }, tile)
     }
 }
 
@@ -186,7 +191,7 @@ fn board_frame(field: &Field, rays: &Rays) -> TargetFrame {
 }
 
 /// Measure the rough part of the mean, with what is known of it taken out, px by pixel (or empty).
-pub fn roughen(tiles: &mut [Tile], field: &Field, bias: &[f32]) {
+pub fn roughen(tiles: &mut [Tile], places: &[PixelContext], field: &Field, bias: &[f32]) {
     let rough = high_passed(field, &field.mean, bias);
     let across = field.width.div_ceil(SIDE);
     let mut sums = vec![(0.0, 0.0); across * field.height.div_ceil(SIDE)];
@@ -199,8 +204,8 @@ pub fn roughen(tiles: &mut [Tile], field: &Field, bias: &[f32]) {
             s.1 += 1.0;
         }
     }
-    for t in tiles {
-        let s = sums[t.place.v as usize / SIDE * across + t.place.u as usize / SIDE];
+    for (t, place) in tiles.iter_mut().zip(places) {
+        let s = sums[place.v as usize / SIDE * across + place.u as usize / SIDE];
         t.rough_square = s.0 / s.1;
     }
 }
