@@ -3,10 +3,8 @@
 mod uncertainty;
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::SystemTime;
 
-use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
@@ -73,24 +71,8 @@ pub fn measure(
     progress: Progress<'_>,
 ) -> Result<Measurements> {
     let bench = Workbench::new(&recording.sensor, *options);
-    let done = AtomicUsize::new(0);
-    let total = recording.views.len();
-    let results: Vec<_> = recording
-        .views
-        .par_iter()
-        .map(|view| {
-            let result = measure_view(view, &bench);
-            progress.step(done.fetch_add(1, Ordering::Relaxed) + 1, total);
-            result
-        })
-        .collect();
-    let mut measurements = Measurements { views: Vec::new(), excluded: recording.excluded.clone() };
-    for (view, result) in recording.views.iter().zip(results) {
-        match result {
-            Ok(m) => measurements.views.push(m),
-            Err(e) => measurements.excluded.push(Excluded::of(&view.name, &e)),
-        }
-    }
+    let (views, excluded) = recording.each_view(progress, |view| measure_view(view, &bench));
+    let (measurements, total) = (Measurements { views, excluded }, recording.views.len());
     if measurements.views.is_empty() {
         let first = measurements.excluded.first();
         let first = first.map(|e| format!("view {}: {}", e.view, e.reason));

@@ -10,7 +10,11 @@ pub use notes::{Region, TargetSize, ViewNotes};
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
+use rayon::prelude::*;
+
+use crate::Progress;
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::frame::{DepthCode, Frame};
@@ -169,6 +173,32 @@ pub struct Recording {
     pub remarks: Vec<String>,
     /// Files that describe the recording (not the frames), for provenance.
     pub described_by: Vec<PathBuf>,
+}
+
+impl Recording {
+    /// What `of` makes of the views, all at once and in their order; with why of the others nothing came,
+    /// after what was excluded before. `progress` counts views.
+    pub fn each_view<'a, T: Send>(
+        &'a self,
+        progress: Progress<'_>,
+        of: impl Fn(&'a View) -> Result<T> + Sync,
+    ) -> (Vec<T>, Vec<Excluded>) {
+        let (done, total) = (AtomicUsize::new(0), self.views.len());
+        let counted = |view| {
+            let result = of(view);
+            progress.step(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+            result
+        };
+        let results: Vec<Result<T>> = self.views.par_iter().map(counted).collect();
+        let (mut made, mut excluded) = (Vec::new(), self.excluded.clone());
+        for (view, result) in self.views.iter().zip(results) {
+            match result {
+                Ok(one) => made.push(one),
+                Err(e) => excluded.push(Excluded::of(&view.name, &e)),
+            }
+        }
+        (made, excluded)
+    }
 }
 
 /// A view that was not used, and why.

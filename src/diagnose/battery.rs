@@ -57,6 +57,12 @@ fn tell_lines_once(found: &mut Vec<Finding>) {
     }
 }
 
+/// Curves of the mean and of the variance, named or not.
+fn curves(scenes: &[Scene<'_>; 2], outcomes: [&Outcome; 2]) -> Vec<Finding> {
+    let layers = scenes.iter().zip(outcomes);
+    layers.flat_map(|(scene, outcome)| findings::findings(scene, outcome)).collect()
+}
+
 /// What cannot happen to a camera of this kind is no name for a finding, and no alternative.
 fn forget_impossible(found: &mut [Finding], kind: Option<SensorKind>) {
     for f in found {
@@ -69,11 +75,12 @@ fn forget_impossible(found: &mut [Finding], kind: Option<SensorKind>) {
 
 impl Case<'_> {
     pub fn scenes(&self) -> [Scene<'_>; 2] {
-        let scale_px_m = self.fields[0].scale_px_m;
-        let corner = corner_radius(&self.sensor().camera);
+        let (survey, scale_px_m) = (&self.survey, self.fields[0].scale_px_m);
+        let corner_px = corner_radius(&self.sensor().camera);
+        let of = |statistic, data| Scene { statistic, survey, data, scale_px_m, corner_px };
         [
-            Scene::bias(&self.survey, scale_px_m, corner),
-            Scene::variance(&self.survey, scale_px_m, corner),
+            of(Statistic::Bias, survey.coarse_mean_data()),
+            of(Statistic::Variance, survey.variance_data()),
         ]
     }
 
@@ -90,10 +97,12 @@ impl Case<'_> {
         self.remarks.extend(own_step.map(own_step_note));
         let stepped = lattice.is_some();
         let outcomes = [&mean.outcome, &scatter.outcome];
+        let scenes = self.scenes();
         let ((lost, of_few_views), (mut curves, textures)) = rayon::join(
-            || (self.lost(), self.few_views(outcomes, &scatter, stepped)),
-            || (self.curves(outcomes), self.texture(&mean, &scatter, steps)),
+            || (self.lost(), self.few_views(&scenes, outcomes, &scatter, stepped)),
+            || (curves(&scenes, outcomes), self.texture(&mean, &scatter, steps)),
         );
+        drop(scenes);
         let refitted = self.take_refit(&mut curves);
         curves.retain(|f| self.is_news(f, &scatter));
         if self.baseline.is_none() {
@@ -134,12 +143,6 @@ impl Case<'_> {
     /// The simulated views beside these, one each.
     fn twins(&self) -> Option<&[Field]> {
         self.baseline.as_ref().map(|b| &b.fields[..])
-    }
-
-    /// Curves of the mean and of the variance, named or not.
-    fn curves(&self, outcomes: [&Outcome; 2]) -> Vec<Finding> {
-        let layers = self.scenes().into_iter().zip(outcomes);
-        layers.flat_map(|(scene, outcome)| findings::findings(&scene, outcome)).collect()
     }
 
     /// Steps shift the mean within a step, and gross errors add to the variance: neither is news.
@@ -202,9 +205,7 @@ impl Case<'_> {
         };
         if self.baseline.is_none() {
             for f in found.iter_mut().filter(stands) {
-                let lines = lines(&self.fields, &mean.px);
-                f.terms = lines.terms;
-                f.covariance.variances = lines.variances;
+                (f.terms, f.covariance.variances) = lines(&self.fields, &mean.px);
             }
         }
         found
@@ -214,6 +215,7 @@ impl Case<'_> {
     /// was learnt from, differ one by one for no reason that could be told.
     fn few_views(
         &self,
+        [mean, scatter]: &[Scene<'_>; 2],
         outcomes: [&Outcome; 2],
         measured: &ScatterResult,
         stepped: bool,
@@ -223,19 +225,18 @@ impl Case<'_> {
         }
         let (survey, camera, seed) = (&self.survey, &self.sensor().camera, self.options.seed);
         let level = self.level(Self::EACH_LEVEL);
-        let [mean, scatter] = self.scenes();
         let bounds = survey.bounds(camera);
         let bias = || {
             let candidates = bias::candidates(&bounds);
             let rules = survey.bias_rules(camera, level);
             let excess = self.excess_of_rows(&measured.structure, &measured.textures);
             let excess: Vec<f64> = excess.into_iter().map(|[of_mean, _]| of_mean).collect();
-            few_views(&mean, &survey.mean_data(), &candidates, outcomes[0], &rules, &excess, seed)
+            few_views(mean, &survey.mean_data(), &candidates, outcomes[0], &rules, &excess, seed)
         };
         let variance = || {
             let candidates = variance::candidates(&bounds, &self.model.sigma);
             let rules = survey.variance_rules(level);
-            few_views(&scatter, &scatter.data, &candidates, outcomes[1], &rules, &[], seed)
+            few_views(scatter, &scatter.data, &candidates, outcomes[1], &rules, &[], seed)
         };
         let tested = |layer: usize| survey.learnt_from[layer].is_none();
         // Where the words step, so does the mean of every view, at places of its own.

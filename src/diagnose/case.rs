@@ -12,7 +12,7 @@ use super::views::field::Field;
 use super::views::known::KnownTerms;
 use super::views::layers::Survey;
 use super::views::learnt::{Learnt, learnt_from};
-use super::views::reading::{LoadedViews, refuse_other_size};
+use super::views::reading::LoadedViews;
 use crate::Progress;
 use crate::effects::{Active, RAY_FOR_DEPTH};
 use crate::error::Result;
@@ -63,7 +63,7 @@ impl<'a> Case<'a> {
         progress.stage("measuring the views");
         let sensor = &recording.sensor;
         if simulated.is_none() {
-            refuse_other_size(model, sensor)?;
+            model.refuse_other_size(sensor)?;
         }
         let bench = Workbench::new(sensor, measure_options(options));
         let known = KnownTerms::of(model, &sensor.camera);

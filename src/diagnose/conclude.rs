@@ -15,6 +15,7 @@ use super::finding::findings;
 use super::finding::next_view;
 use super::finding::outlook::outlook;
 use super::finding::pixels::typical_sigma_mm;
+use super::finding::scene::Scene;
 use super::joint::anchor::{anchor, let_planes_be};
 use super::search::outcome::Outcome;
 use super::verdict::{extend, not_identifiable, shares, untested, verdict};
@@ -49,7 +50,8 @@ impl Case<'_> {
         let Battery { mean, scatter, mut found, refitted, better_form, detectable: of_losses } =
             battery;
         let outcomes = [&mean.outcome, &scatter.outcome];
-        self.advise(&mut found, outcomes);
+        let scenes = self.scenes();
+        self.advise(&mut found, &scenes, outcomes);
         let explained: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
         let tested = (found.is_empty() && refitted.is_none()).then(|| verdict(&found, outcomes));
         if found.is_empty() {
@@ -63,8 +65,9 @@ impl Case<'_> {
         let left_out = || heldout::left_out(&self.survey, &mean.outcome, &mean.terms);
         let (heldout, (map, mut detectable, left_out)) = rayon::join(
             || self.heldout(),
-            || (self.map(outcomes), self.detectable(outcomes), left_out()),
+            || (self.map(&scenes, outcomes), self.detectable(&scenes, outcomes), left_out()),
         );
+        drop(scenes);
         detectable.extend(of_losses);
         let mut remarks = self.remarks();
         remarks.extend(untested(outcomes));
@@ -114,9 +117,9 @@ impl Case<'_> {
     }
 
     /// The views that would settle names that are in doubt.
-    fn advise(&self, found: &mut [Finding], outcomes: [&Outcome; 2]) {
+    fn advise(&self, found: &mut [Finding], scenes: &[Scene<'_>; 2], outcomes: [&Outcome; 2]) {
         let (sigma, camera, rays) = (&self.model.sigma, &self.sensor().camera, &self.bench.rays);
-        for (scene, outcome) in self.scenes().iter().zip(outcomes) {
+        for (scene, outcome) in scenes.iter().zip(outcomes) {
             if let Some(outlook) = outlook(scene, sigma, camera, rays) {
                 next_view::advise(found, scene, outcome, &outlook, self.options.seed);
             }
@@ -169,10 +172,10 @@ impl Case<'_> {
         });
     }
 
-    fn map(&self, outcomes: [&Outcome; 2]) -> Vec<MapRow> {
+    fn map(&self, scenes: &[Scene<'_>; 2], outcomes: [&Outcome; 2]) -> Vec<MapRow> {
         let level = self.options.level;
-        let layers = self.scenes().into_iter().zip(outcomes);
-        layers.flat_map(|(scene, outcome)| findings::map(&scene, outcome, level)).collect()
+        let layers = scenes.iter().zip(outcomes);
+        layers.flat_map(|(scene, outcome)| findings::map(scene, outcome, level)).collect()
     }
 
     /// The views, for people.

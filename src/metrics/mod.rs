@@ -13,7 +13,6 @@ mod temporal;
 pub use frame::FrameMetrics;
 
 use nalgebra::Vector3;
-use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::Progress;
@@ -74,25 +73,8 @@ const STEP_M: f64 = 0.5;
 pub fn metrics(recording: &Recording, seed: Seed, progress: Progress<'_>) -> Result<Metrics> {
     let options = MeasureOptions { seed, ..MeasureOptions::default() };
     let bench = Workbench::new(&recording.sensor, options);
-    let done = std::sync::atomic::AtomicUsize::new(0);
-    let results: Vec<Result<ViewMetrics>> = recording
-        .views
-        .par_iter()
-        .map(|view| {
-            let found = of_view(view, &bench);
-            let count = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-            progress.step(count, recording.views.len());
-            found
-        })
-        .collect();
-    let mut excluded: Vec<[String; 2]> = recording.excluded.iter().map(named).collect();
-    let mut views = Vec::new();
-    for (view, result) in recording.views.iter().zip(results) {
-        match result {
-            Ok(found) => views.push(found),
-            Err(e) => excluded.push(named(&Excluded::of(&view.name, &e))),
-        }
-    }
+    let (views, excluded) = recording.each_view(progress, |view| of_view(view, &bench));
+    let excluded: Vec<[String; 2]> = excluded.iter().map(named).collect();
     if views.is_empty() {
         let first = excluded
             .first()

@@ -5,17 +5,15 @@ use nalgebra::Vector3;
 use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_distr::{Distribution, StandardNormal};
-use rayon::prelude::*;
 
 use super::{GridView, RATE_HZ};
 use crate::camera::{Camera, Rays};
 use crate::effects::{Instant, ROOM_LUX};
-use crate::error::Result;
 use crate::measure::{MeasureOptions, Workbench, view_target};
 use crate::plane::{Plane, Target as Found};
 use crate::rng::Seed;
 use crate::scene::{Bench, Patch, Print, Seen, Target, TargetFrame, WHITE};
-use crate::view::{Excluded, Recording, TargetSize, ViewNotes};
+use crate::view::{Excluded, Recording, TargetSize, View, ViewNotes};
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewPlan {
@@ -176,27 +174,20 @@ pub fn plan_like(
 ) -> (Vec<ViewPlan>, Vec<Excluded>) {
     let options = MeasureOptions { seed, ..MeasureOptions::default() };
     let bench = Workbench::new(&recording.sensor, options);
-    let found: Vec<Result<Found>> =
-        recording.views.par_iter().map(|view| Ok(view_target(view, &bench)?.0)).collect();
-    let mut plans = Vec::new();
-    let mut excluded = recording.excluded.clone();
-    for (view, target) in recording.views.iter().zip(found) {
-        let Found { plane, pixels, .. } = match target {
-            Ok(target) => target,
-            Err(e) => {
-                excluded.push(Excluded::of(&view.name, &e));
-                continue;
-            }
-        };
+    let (found, excluded) = recording.each_view(&|_, _| (), |view| {
+        let (target, _) = view_target(view, &bench)?;
+        Ok((view, target))
+    });
+    let plan = |(view, Found { plane, pixels, .. }): (&View, Found)| {
         let mut notes = view.notes.clone();
         if notes.reference_distance_m.is_some() {
             let z_m = plane.depth(0.0, 0.0);
             notes.reference_distance_m = reference(z_m, reference_error_m, seed, &view.name);
         }
         let stamps = view.depth.iter().map(|f| f.timestamp).collect();
-        plans.push(plan_on(&view.name, &plane, &pixels, &bench.rays, stamps, notes));
-    }
-    (plans, excluded)
+        plan_on(&view.name, &plane, &pixels, &bench.rays, stamps, notes)
+    };
+    (found.into_iter().map(plan).collect(), excluded)
 }
 
 /// A view of these pixels of a plane.

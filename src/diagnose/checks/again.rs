@@ -69,12 +69,7 @@ impl Case<'_> {
     /// what other layers learnt.
     fn bias_px(&self, terms: &[Term], mean: &MeanResult) -> Vec<Vec<f32>> {
         let beyond = |all: &[Term], others: &[Term], sign: f64| -> Vec<Term> {
-            let other = all.iter().filter(|t| !others.contains(t));
-            let signed = |t: &Term| {
-                let coefficients = t.coefficients.iter().map(|c| sign * c).collect();
-                Term { coefficients, ..t.clone() }
-            };
-            other.map(signed).collect()
+            all.iter().filter(|t| !others.contains(t)).map(|t| t.times(sign)).collect()
         };
         let mut differ = beyond(terms, &mean.terms, 1.0);
         differ.extend(beyond(&mean.terms, terms, -1.0));

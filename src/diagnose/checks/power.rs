@@ -21,7 +21,7 @@ use crate::diagnose::search::evidence::{Evidence, gain, root};
 use crate::diagnose::search::judge::{CLEARLY_FIXED, LEAST_OF_LARGEST};
 use crate::diagnose::search::null::Null;
 use crate::diagnose::search::outcome::Outcome;
-use crate::diagnose::search::prepared::evidence_of;
+use crate::diagnose::search::prepared::evidence_of_bases;
 use crate::diagnose::search::rules::Rules;
 use crate::diagnose::search::variance::beyond_sigma;
 use crate::effects::{self, Smallest};
@@ -71,13 +71,9 @@ impl DetectionCriteria<'_> {
         if self.beside.is_some() && !beyond_sigma(&Candidate::curve(unit.basis.clone())) {
             return None;
         }
-        let beside = self.beside.clone().map(|basis| {
-            let coefficients = vec![0.0; basis.count()];
-            Term { statistic: unit.statistic, basis, coefficients }
-        });
-        let m = beside.as_ref().map_or(0, |t| t.basis.count());
-        let terms: Vec<Term> = beside.into_iter().chain([unit.clone()]).collect();
-        let views = evidence_of(&self.left(), &terms);
+        let bases: Vec<&Basis> = self.beside.iter().chain([&unit.basis]).collect();
+        let m = self.beside.as_ref().map_or(0, Basis::count);
+        let views = evidence_of_bases(&self.left(), &bases);
         let u = DVector::from_vec([vec![0.0; m], unit.coefficients.clone()].concat());
         let null = Null::of(&views, m, self.rules.prior)?;
         let dispersion = null.scatter(&self.rules);
@@ -182,9 +178,6 @@ impl Draw<'_> {
     /// What the columns beside bring alone.
     fn base(&self, views: &[Evidence]) -> Option<f64> {
         let m = self.m;
-        if m == 0 {
-            return Some(0.0);
-        }
         let part = |v: &Evidence| Evidence {
             a: v.a.view((0, 0), (m, m)).into_owned(),
             b: v.b.rows(0, m).into_owned(),
@@ -198,20 +191,20 @@ impl Case<'_> {
     /// The least parameter of each family that would be found with 80 % power.
     pub(in crate::diagnose) fn detectable(
         &self,
+        [mean, size]: &[Scene<'_>; 2],
         [bias, variance]: [&Outcome; 2],
     ) -> Vec<Detectable> {
         let (survey, camera) = (&self.survey, &self.sensor().camera);
         let seed = self.options.seed;
-        let scenes = [Scene::bias(survey, 1.0, 1.0), Scene::variance(survey, 1.0, 1.0)];
-        let mean = DetectionCriteria {
-            scene: &scenes[0],
+        let of_mean = DetectionCriteria {
+            scene: mean,
             outcome: bias,
             rules: survey.bias_rules(camera, self.level(Case::MEAN_LEVEL)),
             beside: None,
             seed,
         };
-        let blocks = DetectionCriteria {
-            scene: &scenes[1],
+        let of_size = DetectionCriteria {
+            scene: size,
             outcome: variance,
             rules: survey.variance_rules(self.level(Case::VARIANCE_LEVEL)),
             beside: survey.refitted().map(|c| c.basis),
@@ -219,7 +212,7 @@ impl Case<'_> {
         };
         let bounds = survey.bounds(camera);
         let mut all = Vec::new();
-        for (statistic, gates) in [(Statistic::Bias, &mean), (Statistic::Variance, &blocks)] {
+        for (statistic, gates) in [(Statistic::Bias, &of_mean), (Statistic::Variance, &of_size)] {
             let can = effects::that_change(statistic).into_iter();
             for effect in can.filter(|e| e.card().applies_to(bounds.kind)) {
                 let smallest = effect.smallest(&bounds).and_then(|s| least(s, statistic, gates));

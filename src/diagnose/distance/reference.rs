@@ -180,12 +180,8 @@ impl Case<'_> {
         }
         // It may be all of an offset of the disparity: a law must hold with and without the bowl, be it
         // new or the model's.
-        let back = |t: &Term| Term {
-            coefficients: t.coefficients.iter().map(|c| -c).collect(),
-            ..t.clone()
-        };
-        let model: Vec<Term> =
-            self.known.bias.iter().filter(|t| !t.basis.is_nothing_ahead()).map(back).collect();
+        let model = self.known.bias.iter().filter(|t| !t.basis.is_nothing_ahead());
+        let model: Vec<Term> = model.map(|t| t.times(-1.0)).collect();
         let closed = Nuisances { bent_m, open: Vec::new() };
         let mut laws = found(&plain, &closed);
         for others in [anchored.clone(), bias.to_vec(), [anchored, model].concat()] {

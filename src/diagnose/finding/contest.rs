@@ -190,11 +190,9 @@ impl<'a> Contest<'a> {
             let more = more.map(|e| part(e, columns));
             gain(&taken.iter().cloned().chain(more).collect::<Vec<_>>(), self.prior)
         };
-        let nothing = self.beside.is_empty();
-        let base = if nothing { None } else { Some(gain_of(&self.base, &self.beside)?) };
+        let base = gain_of(&self.base, &self.beside)?;
         let over_base = |name: &Name<'_>| {
-            let whole = gain_of(&name.views, &name.columns)?;
-            let gain = if let Some(base) = &base { whole.over(base) } else { whole };
+            let gain = gain_of(&name.views, &name.columns)?.over(&base);
             let numbers = gain.by_view.len() * name.basis.count();
             let counts = corrected(gain.total, name.scatter, numbers);
             Some((gain, counts))

@@ -16,35 +16,26 @@ use crate::rng::Seed;
 /// Poses that are looked at closely.
 const CLOSELY: usize = 12;
 
-/// A pose, and what a view there would do.
-#[derive(Debug, Clone, Copy)]
-struct Prospect {
-    z_m: f64,
-    theta_rad: f64,
-    azimuth_rad: f64,
-    /// Square of the standard errors between a cause and another, over all pairs.
-    apart: f64,
-    /// Standard errors between the two best names.
-    separation: f64,
-    chance: f64,
-}
-
 /// What a view would do where the causes are farthest apart, the best first.
-fn prospects(contest: &Contest<'_>, outlook: &Outlook<'_>, seed: Seed) -> Vec<Prospect> {
+fn prospects(contest: &Contest<'_>, outlook: &Outlook<'_>, seed: Seed) -> Vec<NextView> {
+    let separation_now = contest.separation(&contest.information);
     let pose = |(z_m, theta_rad, azimuth_rad)| {
         let view = outlook.view(&Plane::tilted(z_m, theta_rad, azimuth_rad))?;
         let a = evidence_of_bases(&[view], &contest.bases).pop()?.a;
         let with = &contest.information + &a;
-        let separation = contest.separation(&with);
-        let apart = contest.all_apart(&with);
-        Some((Prospect { z_m, theta_rad, azimuth_rad, apart, separation, chance: 0.0 }, a))
+        let separation_then = contest.separation(&with);
+        let (chance, why) = (0.0, String::new());
+        let view =
+            NextView { z_m, theta_rad, azimuth_rad, separation_now, separation_then, chance, why };
+        // Square of the standard errors between a cause and another, over all pairs.
+        Some((contest.all_apart(&with), view, a))
     };
     let mut all: Vec<_> = poses().into_par_iter().filter_map(pose).collect();
-    all.sort_by(|x, y| y.0.apart.total_cmp(&x.0.apart));
+    all.sort_by(|x, y| y.0.total_cmp(&x.0));
     all.truncate(CLOSELY);
-    let closely = |(mut prospect, a): (Prospect, DMatrix<f64>)| {
-        prospect.chance = contest.chance(&a, seed.stream("diagnose/next-view"));
-        (prospect, a)
+    let closely = |(_, mut view, a): (f64, NextView, DMatrix<f64>)| {
+        view.chance = contest.chance(&a, seed.stream("diagnose/next-view"));
+        (view, a)
     };
     let mut all: Vec<_> = all.into_par_iter().map(closely).collect();
     all.sort_by(|x, y| y.0.chance.total_cmp(&x.0.chance));
@@ -52,7 +43,7 @@ fn prospects(contest: &Contest<'_>, outlook: &Outlook<'_>, seed: Seed) -> Vec<Pr
     if let Some((best, a)) = all.first_mut() {
         best.chance = contest.chance(a, seed.stream("diagnose/next-view/chosen"));
     }
-    all.into_iter().map(|(prospect, _)| prospect).collect()
+    all.into_iter().map(|(view, _)| view).collect()
 }
 
 /// Give advice to every finding of the layer that is not sure of its name, where a view is likely to
@@ -74,31 +65,23 @@ pub fn advise(
         let Some(contest) = contest else { continue };
         let best = prospects(&contest, outlook, seed).into_iter().next();
         let told = |v: &NextView| v.is_likely_to_settle() || finding.status == Status::OneOf;
-        finding.next_view = best.map(|p| report(&p, &contest)).filter(told);
+        finding.next_view = best.map(|view| report(view, &contest)).filter(told);
     }
 }
 
-fn report(view: &Prospect, contest: &Contest<'_>) -> NextView {
-    let (now, then) = (contest.separation(&contest.information), view.separation);
+fn report(mut view: NextView, contest: &Contest<'_>) -> NextView {
     let [best, rival] = [contest.names[0].family, contest.names[1].family];
-    let mut next = NextView {
-        z_m: view.z_m,
-        theta_rad: view.theta_rad,
-        azimuth_rad: view.azimuth_rad,
-        separation_now: now,
-        separation_then: then,
-        chance: view.chance,
-        why: format!(
-            "{best} and {rival} are {now:.1} standard errors apart as it is, {then:.1} expected with this view; "
-        ),
-    };
     let percent = 100.0 * view.chance;
-    next.why += &if next.is_likely_to_settle() {
+    let settles = if view.is_likely_to_settle() {
         format!("it settles the name with a chance of {percent:.0} %")
     } else {
         format!("no single view is likely to settle the name (chance {percent:.0} %)")
     };
-    next
+    view.why = format!(
+        "{best} and {rival} are {:.1} standard errors apart as it is, {:.1} expected with this view; {settles}",
+        view.separation_now, view.separation_then
+    );
+    view
 }
 
 #[cfg(test)]

@@ -98,7 +98,7 @@ fn frontal(outlook: &Outlook<'_>, term: &Term, sigmas: f64, rng: &mut Stream) ->
 }
 
 /// Poses by what they promise, for a bowl of `k` seen without noise, and how far apart the names are.
-fn advised(size: [f64; 2], k: f64) -> (Vec<Prospect>, f64) {
+fn advised(size: [f64; 2], k: f64) -> (Vec<NextView>, f64) {
     let (outcome, seed) = (in_doubt(), Seed(3));
     Stand::of(size).with(|outlook| {
         let views = frontal(outlook, &bowl(0, k), 0.0, &mut seed.stream("test"));
@@ -112,7 +112,7 @@ fn advised(size: [f64; 2], k: f64) -> (Vec<Prospect>, f64) {
 fn what_frontal_views_confuse_asks_for_another_distance_or_tilt() {
     let (all, now) = advised(WALL_M, 0.05);
     let best = &all[0];
-    assert!(now < 3.0 && best.separation > 2.0 * now, "{now} {best:?}");
+    assert!(now < 3.0 && best.separation_then > 2.0 * now, "{now} {best:?}");
     // As often as one of the two names is right.
     assert!(best.chance > 0.9, "{best:?}");
     // A cause that is hardly there is settled by no view.
@@ -123,8 +123,11 @@ fn what_frontal_views_confuse_asks_for_another_distance_or_tilt() {
 /// Of a small board far away little is left in the picture.
 #[test]
 fn a_small_board_promises_less_and_is_asked_for_near_by() {
-    let [wall, board] = [WALL_M, BOARD_M].map(|size| advised(size, 0.03).0[0]);
-    assert!(board.z_m < wall.z_m && board.separation < wall.separation, "{wall:?} {board:?}");
+    let [wall, board] = [WALL_M, BOARD_M].map(|size| advised(size, 0.03).0.swap_remove(0));
+    assert!(
+        board.z_m < wall.z_m && board.separation_then < wall.separation_then,
+        "{wall:?} {board:?}"
+    );
 }
 
 /// Truths of either name, recorded with noise; where the name is in doubt, a view more settles it as

@@ -17,17 +17,7 @@ pub struct Scene<'a> {
     pub corner_px: f64,
 }
 
-impl<'a> Scene<'a> {
-    pub fn bias(survey: &'a Survey, scale_px_m: f64, corner_px: f64) -> Self {
-        let data = survey.coarse_mean_data();
-        Scene { statistic: Statistic::Bias, survey, data, scale_px_m, corner_px }
-    }
-
-    pub fn variance(survey: &'a Survey, scale_px_m: f64, corner_px: f64) -> Self {
-        let data = survey.variance_data();
-        Scene { statistic: Statistic::Variance, survey, data, scale_px_m, corner_px }
-    }
-
+impl Scene<'_> {
     /// A term's values, what the views' planes take taken out.
     pub fn values(&self, term: &Term) -> Vec<Vec<f64>> {
         let mut row = Vec::new();

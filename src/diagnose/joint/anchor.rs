@@ -11,7 +11,7 @@ use crate::diagnose::distance::referenced_view::ReferencedView;
 use crate::model::Effect;
 use crate::solve::Cholesky;
 use crate::terms::{
-    Basis, DISPARITY_UNIT_PX, Modulation, PixelContext, Pixels, Statistic, Term, affine_parts,
+    Basis, DISPARITY_UNIT_PX, Modulation, PixelContext, Pixels, Term, affine_parts,
 };
 
 /// Biases of one power of the disparity, whose constant planes do not tell.
@@ -132,12 +132,7 @@ fn mean_stretch(lens: &Basis, reference_px: f64, pixels: &Pixels<'_>) -> Option<
 fn lift(effect: &mut Effect, times: Modulation, shift: f64, variance: f64) -> usize {
     let of_times = |t: &Term| matches!(&t.basis, Basis::Affine { times: own } if *own == times);
     let at = effect.shape.iter().position(of_times).unwrap_or_else(|| {
-        let term = Term {
-            statistic: Statistic::Bias,
-            basis: Basis::Affine { times },
-            coefficients: vec![0.0; 3],
-        };
-        effect.shape.push(term);
+        effect.shape.push(Term::bias(Basis::Affine { times }, vec![0.0; 3]));
         if let Some(covariance) = &mut effect.covariance {
             covariance.factors.iter_mut().for_each(|f| f.extend([0.0; 3]));
             if !covariance.variances.is_empty() {

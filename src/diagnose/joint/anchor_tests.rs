@@ -11,7 +11,7 @@ const PX_M: f64 = 43.5;
 /// A bowl with a constant that nobody knows, and its share of the disparity's power.
 fn bowl(power: f64) -> Effect {
     let basis = Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(power));
-    let term = Term { statistic: Statistic::Bias, basis, coefficients: vec![0.8] };
+    let term = Term::bias(basis, vec![0.8]);
     let covariance = Covariance { variances: vec![1e-6], ..Covariance::default() };
     Effect { shape: vec![term], covariance: Some(covariance), ..Effect::default() }
 }
@@ -84,7 +84,7 @@ fn poor_references_move_little() {
 fn a_lens_without_references_moves_no_plane() {
     let camera = kinect_v1(4).camera;
     let basis = Basis::Lens { fx: camera.fx, fy: camera.fy, reference_px: 26.0, orders: 2 };
-    let lens = Term { statistic: Statistic::Bias, basis, coefficients: vec![0.02, -0.03] };
+    let lens = Term::bias(basis, vec![0.02, -0.03]);
     let factor = vec![0.004, -0.005];
     let covariance = Covariance { factors: vec![factor], ..Covariance::default() };
     let mut added =

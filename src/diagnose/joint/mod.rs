@@ -25,7 +25,7 @@ use crate::model::Covariance;
 use crate::terms::Gauge;
 use error::{Error, clustered};
 use fit::{Columns, Joint, Reduced};
-use terms::{Settled, System, is_rough, is_smooth_and_nameless, total};
+use terms::{Settled, System, is_rough, total};
 
 /// The terms of a finished search fitted together, with the smooth rest. `fine` are the views' means
 /// in small patches, `inflation` what each view's weights were divided by: a bias is as sure in a
@@ -125,10 +125,6 @@ impl Joint<'_> {
             chosen: self.chosen(s, found),
             looks: found.looks.clone(),
             noise: found.noise.clone(),
-            remaining: found
-                .remaining
-                .clone()
-                .filter(|r| s.penalty.is_none() || !is_smooth_and_nameless(&r.candidate)),
             halves,
             covariance: error.map(|e| self.reported_error(s, &e)).unwrap_or_default(),
             left_out: left_out.collect(),

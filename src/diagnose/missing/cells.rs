@@ -13,10 +13,29 @@ use crate::terms::PixelContext;
 
 /// Pixel-frames of a patch, and how many of them have no measurement.
 #[derive(Debug, Clone, Copy)]
-pub struct Cell {
+pub struct Cell<'a> {
+    pub place: &'a PixelContext,
+    pub lost: f64,
+    pub asked: f64,
+}
+
+/// A patch of many tiles, with a place of its own.
+#[derive(Debug, Clone, Copy)]
+pub struct Patch {
     pub place: PixelContext,
     pub lost: f64,
     pub asked: f64,
+}
+
+impl Patch {
+    fn cell(&self) -> Cell<'_> {
+        Cell { place: &self.place, lost: self.lost, asked: self.asked }
+    }
+}
+
+/// The patches as cells.
+pub fn cells(patches: &[Vec<Patch>]) -> Vec<Vec<Cell<'_>>> {
+    patches.iter().map(|view| view.iter().map(Patch::cell).collect()).collect()
 }
 
 /// Cells across the picture: some hundred a view, each wider than a clump of dead pixels.
@@ -30,8 +49,8 @@ pub fn rim_px(camera: &Camera) -> f64 {
 /// A smaller patch, in tiles, says little.
 const FEWEST_TILES: usize = 2;
 
-/// The cells of all views.
-pub fn cells(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<Cell>> {
+/// All views in patches large enough to judge.
+pub fn patches(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<Patch>> {
     let side = (camera.width.div_ceil(ACROSS * SIDE) * SIDE) as f64;
     let rim = rim_px(camera);
     survey
@@ -54,7 +73,7 @@ pub fn cells(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<Cel
                     place
                         .average(&view.places, &|of| sum(&|i| view.tiles[i].asked * of(i)) / asked);
                     place.side = side;
-                    Cell { place, lost, asked }
+                    Patch { place, lost, asked }
                 })
                 .collect()
         })
@@ -62,15 +81,15 @@ pub fn cells(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<Cel
 }
 
 /// Which cell of its picture it is.
-fn key(cell: &Cell, rim: f64) -> (u32, u32, bool) {
+fn key(cell: &Cell<'_>, rim: f64) -> (u32, u32, bool) {
     let at = |x: f64| (x / cell.place.side) as u32;
     (at(cell.place.v), at(cell.place.u), cell.place.edge < rim)
 }
 
 /// What is lost at the same places of the views' twins, in log odds over nothing lost. Cells without a twin
 /// show nothing and go.
-pub fn expected(cells: &mut [Vec<Cell>], twins: &[Vec<Cell>], rim: f64) -> Vec<Vec<f64>> {
-    let of_view = |(mine, theirs): (&mut Vec<Cell>, &Vec<Cell>)| {
+pub fn expected(cells: &mut [Vec<Cell<'_>>], twins: &[Vec<Cell<'_>>], rim: f64) -> Vec<Vec<f64>> {
+    let of_view = |(mine, theirs): (&mut Vec<Cell<'_>>, &Vec<Cell<'_>>)| {
         let lost: BTreeMap<_, f64> =
             theirs.iter().map(|c| (key(c, rim), odds(c.lost / c.asked) - odds(0.0))).collect();
         mine.retain(|c| lost.contains_key(&key(c, rim)));
@@ -80,11 +99,10 @@ pub fn expected(cells: &mut [Vec<Cell>], twins: &[Vec<Cell>], rim: f64) -> Vec<V
 }
 
 /// Every tile a cell of its own: for where and how much, not for whether.
-pub fn fine(survey: &Survey, margins: &Margins) -> Vec<Vec<Cell>> {
-    let of_view = |v: &SurveyedView| {
+pub fn fine<'a>(survey: &'a Survey, margins: &Margins) -> Vec<Vec<Cell<'a>>> {
+    let of_view = |v: &'a SurveyedView| {
         let held = v.patches().filter(|(place, _)| margins.hold(place));
-        held.map(|(place, t)| Cell { place: *place, lost: t.asked * t.missing, asked: t.asked })
-            .collect()
+        held.map(|(place, t)| Cell { place, lost: t.asked * t.missing, asked: t.asked }).collect()
     };
     survey.views.iter().map(of_view).collect()
 }

@@ -10,14 +10,14 @@ use crate::stats::range;
 pub const PARTS: usize = 64;
 
 /// The part of a view's reach that each cell lies in.
-pub fn parts(cells: &[&Cell], at: &dyn Fn(&Cell) -> f64) -> Vec<usize> {
+pub fn parts(cells: &[Cell<'_>], at: &dyn Fn(&Cell<'_>) -> f64) -> Vec<usize> {
     let span = range(cells.iter().map(|c| at(c)));
     cells.iter().map(|c| part(at(c), span, PARTS)).collect()
 }
 
 /// Pixel-frames that are lost together: how much more patches scatter than single losses would about a share
 /// that grows with `along` within each view, times how many of them are alike.
-pub fn clump(views: &[Vec<&Cell>], along: &dyn Fn(&Cell) -> f64) -> f64 {
+pub fn clump(views: &[Vec<Cell<'_>>], along: &dyn Fn(&Cell<'_>) -> f64) -> f64 {
     let (mut neighbours, mut expected) = (Neighbours::default(), 0.0);
     for view in views.iter().filter(|v| v.iter().any(|c| c.lost > 0.0)) {
         let mut off = BTreeMap::new();
@@ -36,7 +36,7 @@ pub fn clump(views: &[Vec<&Cell>], along: &dyn Fn(&Cell) -> f64) -> f64 {
 
 /// Of each cell the share that is lost, by least squares among those that only grow (pooling of adjacent
 /// violators: Ayer et al. 1955).
-fn growing_share(view: &[&Cell], along: &dyn Fn(&Cell) -> f64) -> Vec<f64> {
+fn growing_share(view: &[Cell<'_>], along: &dyn Fn(&Cell<'_>) -> f64) -> Vec<f64> {
     let parts = parts(view, along);
     let mut sums = [[0.0; 2]; PARTS];
     for (c, part) in view.iter().zip(&parts) {
@@ -64,6 +64,7 @@ mod tests {
     use rand::Rng;
 
     use super::*;
+    use crate::diagnose::missing::cells::{Patch, cells};
     use crate::rng::Seed;
     use crate::terms::PixelContext;
 
@@ -72,9 +73,9 @@ mod tests {
     const FRAMES: usize = 4;
 
     /// Patches of a picture in which each reading is lost by a chance, and of some pixels all.
-    fn view(chance: impl Fn(f64) -> f64, dead: impl Fn(usize, usize) -> bool) -> Vec<Cell> {
+    fn view(chance: impl Fn(f64) -> f64, dead: impl Fn(usize, usize) -> bool) -> Vec<Patch> {
         let mut rng = Seed(3).stream("clumps");
-        let mut cells = Vec::new();
+        let mut patches = Vec::new();
         for (row, column) in (0..ACROSS).flat_map(|r| (0..ACROSS).map(move |c| (r, c))) {
             let mut lost = 0;
             for (v, u) in (0..SIDE).flat_map(|v| (0..SIDE).map(move |u| (v, u))) {
@@ -85,16 +86,17 @@ mod tests {
             let middle = |k: usize| (k * SIDE) as f64 + 2.0;
             let (u, v, side) = (middle(column), middle(row), SIDE as f64);
             let place = PixelContext { u, v, side, ..Default::default() };
-            cells.push(Cell { place, lost: lost as f64, asked: (SIDE * SIDE * FRAMES) as f64 });
+            patches.push(Patch { place, lost: lost as f64, asked: (SIDE * SIDE * FRAMES) as f64 });
         }
-        cells
+        patches
     }
 
     /// What follows the axis is single, a dead pixel is lost in all frames, and a hole is one event.
     #[test]
     fn single_losses_are_single_however_they_rise_along_the_axis() {
-        let along =
-            |sign: f64, v: &[Cell]| clump(&[v.iter().collect()], &|c: &Cell| sign * c.place.u);
+        let along = |sign: f64, view: &[Patch]| {
+            clump(&cells(&[view.to_vec()]), &|c: &Cell<'_>| sign * c.place.u)
+        };
         let even = along(1.0, &view(|_| 0.01, |_, _| false));
         let rising = view(|u| 0.3 * (-u / 10.0).exp(), |_, _| false);
         let pixels = along(1.0, &view(|_| 0.0, |u, v| (7 * u + 11 * v).is_multiple_of(97)));

@@ -39,7 +39,7 @@ struct Foot {
 }
 
 impl Foot {
-    fn of(cells: &[Vec<&Cell>], reach: &Extent, toward: Toward) -> Self {
+    fn of(cells: &[Vec<Cell<'_>>], reach: &Extent, toward: Toward) -> Self {
         let clump = clump(cells, &|c| toward.along(c));
         let (views, lost): (Vec<View>, Vec<Lost>) =
             cells.iter().map(|v| View::of(v, clump, toward)).unzip();
@@ -103,19 +103,19 @@ struct Best<'a> {
 /// The step whose foot the views' losses follow, at `rim` px or more from the target's edge, where noise
 /// alone brings as much with a chance of no more than `level`.
 pub fn few_losses(
-    fine: &[Vec<Cell>],
+    fine: &[Vec<Cell<'_>>],
     rim: f64,
     reach: &Extent,
     level: f64,
     seed: Seed,
 ) -> Option<(Judged, f64)> {
-    let inner = |c: &&Cell| c.place.edge >= rim && c.asked > 0.0;
-    let mut cells: Vec<Vec<&Cell>> =
-        fine.iter().map(|v| v.iter().filter(inner).collect()).collect();
+    let inner = |c: &Cell<'_>| c.place.edge >= rim && c.asked > 0.0;
+    let mut cells: Vec<Vec<Cell<'_>>> =
+        fine.iter().map(|v| v.iter().copied().filter(inner).collect()).collect();
     cells.retain(|v| !v.is_empty());
-    let sum = |v: &[&Cell], of: fn(&Cell) -> f64| v.iter().map(|c| of(c)).sum::<f64>();
-    let many = |v: &Vec<&Cell>| sum(v, |c| c.lost) > MANY * sum(v, |c| c.asked);
-    let none = |v: &Vec<&Cell>| sum(v, |c| c.lost) == 0.0;
+    let sum = |v: &[Cell<'_>], of: fn(&Cell<'_>) -> f64| v.iter().map(|c| of(c)).sum::<f64>();
+    let many = |v: &Vec<Cell<'_>>| sum(v, |c| c.lost) > MANY * sum(v, |c| c.asked);
+    let none = |v: &Vec<Cell<'_>>| sum(v, |c| c.lost) == 0.0;
     if cells.iter().any(many) || cells.iter().all(none) {
         return None;
     }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::diagnose::missing::cells::{Patch, cells};
 use crate::terms::{Axis, PixelContext};
 use rand::Rng;
 
@@ -8,7 +9,7 @@ const ACROSS: usize = 30;
 
 /// Views ever steeper and, in another order, ever farther, each by a tenth farther on its right than on
 /// its left; `lost` says what a patch loses.
-fn session(mut lost: impl FnMut(usize, usize) -> f64) -> (Vec<Vec<Cell>>, Extent) {
+fn session(mut lost: impl FnMut(usize, usize) -> f64) -> (Vec<Vec<Patch>>, Extent) {
     let view = |view: usize| -> Vec<(usize, PixelContext)> {
         let theta = (4.5 * view as f64).to_radians();
         let z = 0.8 + 0.15 * (7 * view % VIEWS) as f64;
@@ -24,14 +25,14 @@ fn session(mut lost: impl FnMut(usize, usize) -> f64) -> (Vec<Vec<Cell>>, Extent
         };
         (0..ACROSS * ACROSS).map(|i| (i, place(i))).collect()
     };
-    let cells: Vec<Vec<Cell>> = (0..VIEWS)
+    let patches: Vec<Vec<Patch>> = (0..VIEWS)
         .map(|v| {
-            let cell = |(i, place)| Cell { place, lost: lost(v, i), asked: 64.0 };
-            view(v).into_iter().map(cell).collect()
+            let patch = |(i, place)| Patch { place, lost: lost(v, i), asked: 64.0 };
+            view(v).into_iter().map(patch).collect()
         })
         .collect();
-    let reach = Extent::of(cells.iter().flatten().map(|c| &c.place));
-    (cells, reach)
+    let reach = Extent::of(patches.iter().flatten().map(|p| &p.place));
+    (patches, reach)
 }
 
 /// How far right in its view a patch lies, from 0 to 1.
@@ -44,8 +45,8 @@ fn fall(over: f64) -> f64 {
     0.6 * (-over / 0.06).exp()
 }
 
-fn found((cells, reach): &(Vec<Vec<Cell>>, Extent)) -> Option<Axis> {
-    few_losses(cells, 8.0, reach, 0.001, Seed(1)).map(|(judged, _)| judged.shape.axis())
+fn found((patches, reach): &(Vec<Vec<Patch>>, Extent)) -> Option<Axis> {
+    few_losses(&cells(patches), 8.0, reach, 0.001, Seed(1)).map(|(judged, _)| judged.shape.axis())
 }
 
 #[test]
@@ -68,16 +69,16 @@ fn the_foot_of_a_rise_is_seen_in_the_steepest_view_the_farthest_and_the_nearest(
 #[test]
 fn a_foot_that_begins_in_the_midst_of_the_session_is_seen() {
     let mut rng = Seed(8).stream("few");
-    let (mut cells, reach) =
+    let (mut patches, reach) =
         session(|v, i| f64::from(u8::from(v == 9 && rng.random_bool(fall(1.0 - right(i))))));
-    let step = |cells: &[Vec<Cell>]| {
-        let (judged, _) = few_losses(cells, 8.0, &reach, 0.001, Seed(1))?;
+    let step = |patches: &[Vec<Patch>]| {
+        let (judged, _) = few_losses(&cells(patches), 8.0, &reach, 0.001, Seed(1))?;
         let Shape::Step(step) = judged.shape else { return None };
         Some((step.axis, step.since_s))
     };
-    let twin: Vec<f64> = cells[9].iter().map(|c| c.place.z).collect();
-    cells[2].iter_mut().zip(twin).for_each(|(c, z)| c.place.z = z);
-    let (axis, start) = step(&cells).expect("found");
+    let twin: Vec<f64> = patches[9].iter().map(|c| c.place.z).collect();
+    patches[2].iter_mut().zip(twin).for_each(|(c, z)| c.place.z = z);
+    let (axis, start) = step(&patches).expect("found");
     assert!(axis == Axis::Z && start.is_some_and(|s| (120.0..540.0).contains(&s)), "{start:?}");
 }
 

@@ -41,7 +41,7 @@ impl HardEnd {
         (width_m.abs() + doubt < limit).then_some(HardEnd { z_m, width_m })
     }
 
-    pub fn touches(&self, cell: &Cell) -> bool {
+    pub fn touches(&self, cell: &Cell<'_>) -> bool {
         let far = cell.place.slope[0].abs() + cell.place.slope[1].abs();
         let half = 0.5 * cell.place.side * far / cell.place.disparity * cell.place.z;
         let past = (cell.place.z - self.z_m) * self.width_m.signum();

@@ -30,7 +30,7 @@ use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::margins::Margins;
 use crate::rng::Seed;
 use crate::terms::{Axis, Basis, Extent};
-use cells::{Cell, LEAST, Scatter, USUAL, cells, expected, fine, rim_px};
+use cells::{Cell, LEAST, Scatter, USUAL, cells, expected, fine, patches, rim_px};
 use few::few_losses;
 use finding::{DropoutFinding, NAME_ADEQUATE};
 use hard_end::{HardEnd, blur};
@@ -74,9 +74,11 @@ pub fn missing(
     let region_given: Vec<bool> = fields.iter().map(|f| f.region_given).collect();
     let second = survey.second();
     let margins = Margins::of(fields);
-    let (mut mine, fine) = (cells(survey, camera, &margins), fine(survey, &margins));
-    let expected = twins
-        .map(|(_, survey)| expected(&mut mine, &cells(survey, camera, &margins), rim_px(camera)));
+    let (large, fine) = (patches(survey, camera, &margins), fine(survey, &margins));
+    let mut mine = cells(&large);
+    let expected = twins.map(|(_, survey)| {
+        expected(&mut mine, &cells(&patches(survey, camera, &margins)), rim_px(camera))
+    });
     let seen = DropoutCells { cells: mine, fine, region_given, second, expected };
     let blur = |z: f64| blur(survey, z);
     let mut outcome = losses(&seen, &survey.reach, camera, &blur, seed);
@@ -97,11 +99,11 @@ pub fn missing(
 }
 
 /// The views' losses on the target.
-struct DropoutCells {
+struct DropoutCells<'a> {
     /// In patches large enough to judge.
-    cells: Vec<Vec<Cell>>,
+    cells: Vec<Vec<Cell<'a>>>,
     /// In the smallest there are.
-    fine: Vec<Vec<Cell>>,
+    fine: Vec<Vec<Cell<'a>>>,
     /// Whether a view's region was given.
     region_given: Vec<bool>,
     /// Whether it is in the second half.
@@ -110,11 +112,11 @@ struct DropoutCells {
     expected: Option<Vec<Vec<f64>>>,
 }
 
-impl DropoutCells {
+impl<'a> DropoutCells<'a> {
     /// Without the patches that a hard end of the range touches.
-    fn inside(&self, end: &HardEnd) -> DropoutCells {
-        fn kept<T: Clone>(of: &[Vec<T>], cells: &[Vec<Cell>], end: &HardEnd) -> Vec<Vec<T>> {
-            let inside = |(of, cells): (&Vec<T>, &Vec<Cell>)| {
+    fn inside(&self, end: &HardEnd) -> DropoutCells<'a> {
+        fn kept<T: Clone>(of: &[Vec<T>], cells: &[Vec<Cell<'_>>], end: &HardEnd) -> Vec<Vec<T>> {
+            let inside = |(of, cells): (&Vec<T>, &Vec<Cell<'_>>)| {
                 let both = of.iter().zip(cells).filter(|(_, c)| !end.touches(c));
                 both.map(|(of, _)| of.clone()).collect()
             };
@@ -132,7 +134,7 @@ impl DropoutCells {
 }
 
 fn losses(
-    seen: &DropoutCells,
+    seen: &DropoutCells<'_>,
     reach: &Extent,
     camera: &Camera,
     blur: &dyn Fn(f64) -> f64,
@@ -209,7 +211,7 @@ struct Round<'a> {
 
 impl<'a> Round<'a> {
     fn of(
-        views: &'a [Vec<Cell>],
+        views: &'a [Vec<Cell<'a>>],
         explained: &[Vec<f64>],
         (steps, curves): (&[Step], &[Basis]),
         least: Scatter,

@@ -38,8 +38,8 @@ pub fn part(x: f64, [low, high]: [f64; 2], parts: usize) -> usize {
 
 /// The views' shares, bin by bin of an axis; `at` tells where on it a cell lies, if it counts.
 pub fn points(
-    views: &[Vec<Cell>],
-    at: &dyn Fn(&Cell) -> Option<f64>,
+    views: &[Vec<Cell<'_>>],
+    at: &dyn Fn(&Cell<'_>) -> Option<f64>,
     span: [f64; 2],
 ) -> Vec<Point> {
     let mut all = Vec::new();

@@ -21,7 +21,7 @@ const MATTERS: f64 = 0.05;
 /// Writes findings, from what the views lost.
 pub struct DropoutReporter<'a> {
     /// The views' losses in the smallest patches.
-    pub fine: &'a [Vec<Cell>],
+    pub fine: &'a [Vec<Cell<'a>>],
     /// Whether each view's region was given.
     pub region_given: &'a [bool],
     /// Share lost everywhere.
@@ -31,7 +31,7 @@ pub struct DropoutReporter<'a> {
 }
 
 /// Where a cell lies on an axis.
-type At = Box<dyn Fn(&Cell) -> Option<f64>>;
+type At = Box<dyn Fn(&Cell<'_>) -> Option<f64>>;
 
 impl DropoutReporter<'_> {
     pub fn finding(
@@ -62,7 +62,7 @@ impl DropoutReporter<'_> {
 
     fn step(&self, step: Step, finding: &mut DropoutFinding) {
         let span = if step.axis == Axis::Theta { self.reach.theta } else { self.reach.z };
-        let at = |c: &Cell| (!step.before(c.place.session_s)).then(|| step.at(&c.place));
+        let at = |c: &Cell<'_>| (!step.before(c.place.session_s)).then(|| step.at(c.place));
         let all = bounded(points(self.fine, &at, span), &step, self.region_given);
         let own = Fitted { step, std_error: [None; 3] };
         let fitted = fit(step, self.base, &all).unwrap_or(own);

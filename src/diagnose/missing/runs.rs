@@ -30,7 +30,7 @@ pub enum Toward {
 }
 
 impl Toward {
-    pub fn along(self, cell: &Cell) -> f64 {
+    pub fn along(self, cell: &Cell<'_>) -> f64 {
         match self {
             Toward::Steep => cell.place.theta,
             Toward::Far => cell.place.z,
@@ -75,7 +75,7 @@ pub struct Lost {
 }
 
 impl View {
-    pub fn of(cells: &[&Cell], clump: f64, toward: Toward) -> (Self, Lost) {
+    pub fn of(cells: &[Cell<'_>], clump: f64, toward: Toward) -> (Self, Lost) {
         let mut sums = vec![[0.0; 3]; PARTS];
         for (c, part) in cells.iter().zip(parts(cells, &|c| toward.along(c))) {
             let [x, asked, lost] = sums[part];

@@ -27,7 +27,7 @@ const NO_SAY: f64 = 1e-6;
 
 /// Losses as they are judged: log odds over what is lost everywhere.
 pub struct Losses<'a> {
-    pub views: &'a [Vec<Cell>],
+    pub views: &'a [Vec<Cell<'a>>],
     /// What earlier findings explain is taken out.
     pub left: Vec<Vec<f64>>,
     pub base: f64,
@@ -35,7 +35,7 @@ pub struct Losses<'a> {
 }
 
 /// When the views were taken, s of the session.
-pub fn times(views: &[Vec<Cell>]) -> impl Iterator<Item = f64> {
+pub fn times(views: &[Vec<Cell<'_>>]) -> impl Iterator<Item = f64> {
     views.iter().filter_map(|v| v.first()).map(|c| c.place.session_s)
 }
 
@@ -90,7 +90,7 @@ fn dot(g: &[f32], w: &[f64]) -> f64 {
 
 impl<'a> Losses<'a> {
     /// `explained` in log odds over the base.
-    pub fn new(views: &'a [Vec<Cell>], explained: &[Vec<f64>]) -> Self {
+    pub fn new(views: &'a [Vec<Cell<'a>>], explained: &[Vec<f64>]) -> Self {
         let left: Vec<Vec<f64>> = views
             .iter()
             .zip(explained)
@@ -184,7 +184,7 @@ impl<'a> Losses<'a> {
         let of = |v: usize| {
             let cells = &self.views[v];
             let mut rows = vec![0.0; cells.len() * k];
-            rows.chunks_exact_mut(k).zip(cells).for_each(|(row, c)| basis.fill(&c.place, row));
+            rows.chunks_exact_mut(k).zip(cells).for_each(|(row, c)| basis.fill(c.place, row));
             let g = DMatrix::from_row_slice(cells.len(), k, &rows);
             let mut a = DMatrix::zeros(k, k);
             for j in 0..k {

@@ -46,8 +46,8 @@ impl Step {
     }
 
     /// Log odds that it adds.
-    pub fn column(&self, cells: &[Cell], base: f64) -> Vec<f64> {
-        let of = |c: &Cell| odds(self.loss(self.at(&c.place), base)) - odds(base);
+    pub fn column(&self, cells: &[Cell<'_>], base: f64) -> Vec<f64> {
+        let of = |c: &Cell<'_>| odds(self.loss(self.at(c.place), base)) - odds(base);
         cells.iter().map(|c| if self.before(c.place.session_s) { 0.0 } else { of(c) }).collect()
     }
 }

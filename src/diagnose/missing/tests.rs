@@ -1,4 +1,5 @@
 use super::*;
+use crate::diagnose::missing::cells::Patch;
 use crate::plane::Plane;
 use crate::rng::Stream;
 use crate::simulate::kinect_v1;
@@ -14,7 +15,7 @@ fn session(
     share: f64,
     rng: &mut Stream,
     loss: impl Fn(&PixelContext) -> f64,
-) -> (Vec<Vec<Cell>>, Camera) {
+) -> (Vec<Vec<Patch>>, Camera) {
     let camera = kinect_v1(1).camera;
     let mut normal = {
         let mut own = crate::rng::Seed(rng.random()).stream("normal");
@@ -54,14 +55,14 @@ fn session(
             let p = 1.0 - (1.0 - by_chance.min(1.0)) * (1.0 - loss(&place));
             let asked: f64 = 6400.0;
             let drawn = asked * p + (asked * p * (1.0 - p)).sqrt() * normal();
-            cells.push(Cell { place, lost: drawn.round().clamp(0.0, asked), asked });
+            cells.push(Patch { place, lost: drawn.round().clamp(0.0, asked), asked });
         }
         cells
     });
     (views.collect(), camera)
 }
 
-fn find(views: &[Vec<Cell>], camera: &Camera, seed: Seed) -> DropoutOutcome {
+fn find(views: &[Vec<Patch>], camera: &Camera, seed: Seed) -> DropoutOutcome {
     let of = |value: fn(&PixelContext) -> f64| {
         crate::stats::range(views.iter().flatten().map(|c| value(&c.place)))
     };
@@ -71,8 +72,8 @@ fn find(views: &[Vec<Cell>], camera: &Camera, seed: Seed) -> DropoutOutcome {
     reach.session = of(|p| p.session_s);
     reach.light = [1.0, 1.0];
     let seen = DropoutCells {
-        cells: views.to_vec(),
-        fine: views.to_vec(),
+        cells: cells(views),
+        fine: cells(views),
         region_given: vec![true; views.len()],
         second: (0..views.len()).map(|v| v % 2 == 1).collect(),
         expected: None,

@@ -4,27 +4,18 @@ use rayon::prelude::*;
 
 use super::texture::pixel_scale;
 use crate::diagnose::views::field::Field;
-use crate::terms::{Basis, Coordinate, Modulation, Statistic, Term};
+use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 /// Columns and rows of fewer readings over all views are left at nothing.
 const FEWEST_READINGS: f64 = 200.0;
-
-/// Means of every column and row, and how sure they are.
-pub struct Lines {
-    pub terms: Vec<Term>,
-    /// Of the terms' coefficients, each for itself, px^2.
-    pub variances: Vec<f64>,
-}
 
 /// What a line's readings sum to in one view, and how many they are.
 type Sums = Vec<(f64, f64)>;
 
 /// The mean of every column and row over the views, px, without what is smooth; `bias` has what is
-/// known to be no noise, by view and pixel, px.
-pub fn lines(fields: &[Field], bias: &[Vec<f32>]) -> Lines {
-    let Some(first) = fields.first() else {
-        return Lines { terms: Vec::new(), variances: Vec::new() };
-    };
+/// known to be no noise, by view and pixel, px. As terms, with the variance of each coefficient, px^2.
+pub fn lines(fields: &[Field], bias: &[Vec<f32>]) -> (Vec<Term>, Vec<f64>) {
+    let Some(first) = fields.first() else { return Default::default() };
     let (width, height) = (first.width, first.height);
     let none = Vec::new();
     let by_view: Vec<[Sums; 2]> = fields
@@ -42,20 +33,17 @@ pub fn lines(fields: &[Field], bias: &[Vec<f32>]) -> Lines {
             sums
         })
         .collect();
-    let mut told = Lines { terms: Vec::new(), variances: Vec::new() };
+    let (mut terms, mut all_variances) = (Vec::new(), Vec::new());
     for (k, over) in [Coordinate::Column, Coordinate::Row].into_iter().enumerate() {
         let nodes = [width, height][k];
         let lines = (0..nodes).map(|line| mean(by_view.iter().map(|sums| sums[k][line])));
         let (coefficients, variances): (Vec<f64>, Vec<f64>) = lines.unzip();
-        told.variances.extend(variances);
+        all_variances.extend(variances);
         let high = nodes.saturating_sub(1) as f64;
-        told.terms.push(Term {
-            statistic: Statistic::Bias,
-            basis: Basis::Curve { over, low: 0.0, high, nodes, times: Modulation::One },
-            coefficients,
-        });
+        let profile = Basis::Curve { over, low: 0.0, high, nodes, times: Modulation::One };
+        terms.push(Term::bias(profile, coefficients));
     }
-    told
+    (terms, all_variances)
 }
 
 /// Mean of a line, and its variance with the views as the sample.

@@ -63,12 +63,10 @@ pub fn search(
     };
     let mut chosen: Vec<Chosen> = Vec::new();
     layer.pinned = beside.map(|candidate| layer.pin(candidate));
-    let mut remaining = None;
     while let Some(next) = layer.step(&chosen) {
         let little =
             chosen.first().is_some_and(|first| next.gain < LEAST_SHARE_OF_GAIN * first.gain);
         if little || chosen.len() >= rules.max_terms {
-            remaining = Some(next);
             break;
         }
         layer.largest = layer.largest.max(next.rms);
@@ -87,7 +85,7 @@ pub fn search(
     let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
     let noise = layer.noise.unwrap_or_default();
     let looks = layer.looks;
-    Outcome { chosen, looks, fit, evidence, noise, remaining, ..Outcome::default() }
+    Outcome { chosen, looks, fit, evidence, noise, ..Outcome::default() }
 }
 
 struct Layer<'a> {
@@ -199,13 +197,7 @@ impl Layer<'_> {
         let settled = views.first()?.beside(Patches::Coarse).b.len();
         let base = |patches| {
             let evidence: Vec<Evidence> = views.iter().map(|v| v.beside(patches)).collect();
-            let nothing = Gain {
-                total: 0.0,
-                by_view: vec![0.0; views.len()],
-                beta: nalgebra::DVector::zeros(0),
-                covariance: nalgebra::DMatrix::zeros(0, 0),
-            };
-            if settled > 0 { gain(&evidence, self.rules.prior) } else { Some(nothing) }
+            gain(&evidence, self.rules.prior)
         };
         let base = [base(Patches::Fine)?, base(Patches::Coarse)?];
         let Layer { coarse, rules, largest, .. } = *self;

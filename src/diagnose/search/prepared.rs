@@ -7,13 +7,9 @@ use super::evidence::Evidence;
 use super::rows::Rows;
 use crate::diagnose::views::samples::ViewData;
 use crate::diagnose::views::tiles::SIDE;
-use crate::terms::{Basis, Coordinate, PixelContext, Term};
+use crate::terms::{Basis, Coordinate, PixelContext};
 
 /// Evidence of views on given terms together.
-pub fn evidence_of(data: &[ViewData], terms: &[Term]) -> Vec<Evidence> {
-    evidence_of_bases(data, &terms.iter().map(|t| &t.basis).collect::<Vec<_>>())
-}
-
 pub fn evidence_of_bases(data: &[ViewData], bases: &[&Basis]) -> Vec<Evidence> {
     data.par_iter().filter_map(|v| together(v, bases)).collect()
 }

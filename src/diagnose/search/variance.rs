@@ -148,7 +148,6 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
         })
         .collect();
     let few = columns.len().min(3);
-    let mut all = Vec::new();
     // A change that is not small bends: the level parameters by a third up and down.
     let bent: Vec<Vec<f64>> = (0..few)
         .flat_map(|j| [0.7, 1.4].map(|factor| (j, factor)))
@@ -159,22 +158,18 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
             column.iter().all(|c| c.is_finite()).then_some(column)
         })
         .collect();
-    if !bent.is_empty() {
-        let bent = Basis::Table { z_m, theta_rad, columns: bent };
-        all.push(Candidate::named(RECALIBRATE, bent));
-    }
     // One number that is off is no less simple than a formula of one.
-    for column in columns.iter().cloned().chain(moved_depths(sigma, z_m, theta_rad)) {
-        let columns = vec![column];
-        all.push(Candidate::named(RECALIBRATE, Basis::Table { z_m, theta_rad, columns }));
-    }
-    for n in if few < columns.len() { vec![few, columns.len()] } else { vec![few] } {
-        if n > 0 {
-            let columns = columns[..n].to_vec();
-            all.push(Candidate::named(RECALIBRATE, Basis::Table { z_m, theta_rad, columns }));
-        }
-    }
-    all
+    let moved = moved_depths(sigma, z_m, theta_rad);
+    let alone = columns.iter().cloned().chain(moved).map(|column| vec![column]);
+    let level = (few < columns.len()).then(|| columns[..few].to_vec());
+    std::iter::once(bent)
+        .chain(alone)
+        .chain(level)
+        .chain([columns.clone()])
+        .filter(|columns| !columns.is_empty())
+        .map(|columns| Basis::Table { z_m, theta_rad, columns })
+        .map(|table| Candidate::named(RECALIBRATE, table))
+        .collect()
 }
 
 /// What a scale of the depth, z' = (1 + s) z, and an offset of the disparity, z' = z + c z^2, make of the

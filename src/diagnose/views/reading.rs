@@ -1,8 +1,5 @@
 //! The views as fields of residuals: read, checked, and none of them twice.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-use rayon::prelude::*;
 use statrs::distribution::{Binomial, Discrete, DiscreteCDF};
 
 use super::field::Field;
@@ -60,24 +57,6 @@ impl LoadedViews {
         }
         Ok(LoadedViews { fields, excluded, ranges: found, copies })
     }
-}
-
-pub(in crate::diagnose) fn refuse_other_size(
-    model: &NoiseModel,
-    sensor: &crate::view::Sensor,
-) -> Result<()> {
-    let Some(other) = &model.sensor else { return Ok(()) };
-    let (theirs, ours) = (&other.camera, &sensor.camera);
-    if (theirs.width, theirs.height) == (ours.width, ours.height) {
-        return Ok(());
-    }
-    Err(Error::Argument {
-        what: format!(
-            "the model's sensor has {} x {} px, the recording's {} x {}: its errors lie elsewhere",
-            theirs.width, theirs.height, ours.width, ours.height
-        ),
-        remedy: "give the model that was made of this very sensor",
-    })
 }
 
 /// A view whose frames are bit-identical to another's is a duplicate and is dropped.
@@ -162,24 +141,5 @@ pub(in crate::diagnose) fn read(
 ) -> Read {
     let times = recording.views.iter().filter_map(|v| v.depth.first()).map(|f| f.timestamp);
     let start = times.fold(f64::INFINITY, f64::min);
-    let done = AtomicUsize::new(0);
-    let total = recording.views.len();
-    let results: Vec<Result<Field>> = recording
-        .views
-        .par_iter()
-        .map(|v| {
-            let field = Field::read(v, bench, &model.sigma, known, start);
-            progress.step(done.fetch_add(1, Ordering::Relaxed) + 1, total);
-            field
-        })
-        .collect();
-    let mut excluded = recording.excluded.clone();
-    let mut fields = Vec::new();
-    for (view, result) in recording.views.iter().zip(results) {
-        match result {
-            Ok(field) => fields.push(field),
-            Err(e) => excluded.push(Excluded::of(&view.name, &e)),
-        }
-    }
-    (fields, excluded)
+    recording.each_view(progress, |v| Field::read(v, bench, &model.sigma, known, start))
 }

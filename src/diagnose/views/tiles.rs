@@ -126,8 +126,13 @@ pub fn tiles(
             s.darkness += f64::from(field.light.get(k).copied().unwrap_or(1.0)).recip();
         }
     }
-    let (places, mut tiles): (Vec<PixelContext>, Vec<Tile>) =
-        sums.iter().filter(|s| s.pixels > 0.0).map(|s| s.tile(&places)).unzip();
+    let held = || sums.iter().filter(|s| s.pixels > 0.0);
+    // No larger than they must be: with the places they are the most of a survey.
+    let n = held().count();
+    let mut patches: (Vec<PixelContext>, Vec<Tile>) =
+        (Vec::with_capacity(n), Vec::with_capacity(n));
+    patches.extend(held().map(|s| s.tile(&places)));
+    let (places, mut tiles) = patches;
     for (t, place) in tiles.iter_mut().zip(&places) {
         t.temporal -= field.moved_px2(place.disparity);
     }
