@@ -121,7 +121,7 @@ impl Case<'_> {
         let DropoutOutcome { findings, mut detectable, notes } = lost;
         self.remarks.extend(notes);
         detectable.retain(|d| can_happen(d.effect, self.sensor().kind));
-        found.extend(findings.into_iter().map(other_findings::missing));
+        found.extend(findings);
         let laws = self.laws(&mean.terms, reference::bent_m(&found));
         found.extend(laws);
         forget_impossible(&mut found, self.sensor().kind);
@@ -276,9 +276,9 @@ impl Case<'_> {
         let alike = self.baseline.as_ref().is_some_and(|b| b.loses_alike(&self.survey));
         lost.findings.retain(|m| {
             // What lies beside the target is no tile's.
-            let on_target = m.family != Some("occlusion-shadow");
-            m.family.is_none_or(|id| !self.known.has(id))
-                && self.stands(m.p, missing::LEVEL)
+            let on_target = m.effect != Some("occlusion-shadow");
+            m.effect.is_none_or(|id| !self.known.has(id))
+                && m.p_adjusted.is_some_and(|p| self.stands(p, missing::LEVEL))
                 && !(alike && on_target)
         });
         lost

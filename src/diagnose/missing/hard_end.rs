@@ -1,7 +1,7 @@
 //! A hard end of the range: beyond it all is missing, by the sensor's driver or format.
 
 use super::cells::Cell;
-use super::finding::DropoutFinding;
+use crate::diagnose::diagnosis::Finding;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::surveyed_view::SurveyedView;
 
@@ -24,12 +24,8 @@ pub struct HardEnd {
 }
 
 impl HardEnd {
-    pub fn of(finding: &DropoutFinding, blur: &dyn Fn(f64) -> f64) -> Option<Self> {
-        // No driver's limit begins in the midst of a session.
-        if finding.family != Some("range-dropout")
-            || finding.parameters.contains_key("share")
-            || finding.since_s.is_some()
-        {
+    pub fn of(finding: &Finding, blur: &dyn Fn(f64) -> f64) -> Option<Self> {
+        if finding.effect != Some("range-dropout") || finding.parameters.contains_key("share") {
             return None;
         }
         let value = |name: &str, of: &str| finding.parameters.get(name)?.get(of)?.as_f64();

@@ -7,7 +7,6 @@
 pub mod cells;
 mod clumps;
 pub mod few;
-pub mod finding;
 pub mod fit;
 pub mod forms;
 pub mod hard_end;
@@ -21,7 +20,7 @@ use serde_json::{Map, json};
 
 use crate::camera::Camera;
 use crate::diagnose::checks::replication::agree;
-use crate::diagnose::diagnosis::Detectable;
+use crate::diagnose::diagnosis::{Detectable, Finding};
 use crate::diagnose::edges::shadow::{Band, Sides, band};
 use crate::diagnose::noise::view_mean::ViewMean;
 use crate::diagnose::search::noise_gains::NoiseGains;
@@ -32,9 +31,8 @@ use crate::rng::Seed;
 use crate::terms::{Axis, Basis, Extent};
 use cells::{Cell, LEAST, Scatter, USUAL, cells, expected, fine, patches, rim_px};
 use few::few_losses;
-use finding::{DropoutFinding, NAME_ADEQUATE};
 use hard_end::{HardEnd, blur};
-use report::{DropoutReporter, shadow_finding};
+use report::{DropoutReporter, NAME_ADEQUATE, shadow_finding};
 use search::{Judged, Losses, times};
 use shapes::{Shapes, Step};
 
@@ -42,7 +40,7 @@ use shapes::{Shapes, Step};
 #[derive(Debug, Clone, Default)]
 pub struct DropoutOutcome {
     /// Largest gain first.
-    pub findings: Vec<DropoutFinding>,
+    pub findings: Vec<Finding>,
     /// Families with the middle of the faintest whole step that 80 % of such recordings would
     /// show, in degrees or m: what begins farther out is not seen.
     pub detectable: Vec<Detectable>,
@@ -92,7 +90,8 @@ pub fn missing(
         // Where the target's own mask reaches into its shadow, the same losses are seen again; a
         // region that was given ends at the target.
         let grown = seen.region_given.contains(&false);
-        outcome.findings.retain(|f| !grown || f.family.is_some() || f.size > shadow.size);
+        let larger = |f: &Finding| f.size.sigma > shadow.size.sigma;
+        outcome.findings.retain(|f| !grown || f.effect.is_some() || larger(f));
         outcome.findings.push(shadow);
     }
     outcome
@@ -166,17 +165,19 @@ fn losses(
         let round = if begins { of(&open.begun, USUAL) } else { Some(always) };
         let Some(Round { ledger, judged, noise }) = &round else { break };
         let Some(won) = round.as_ref().and_then(Round::won) else { break };
-        if outcome.findings.first().is_some_and(|f| won.gain < LEAST_OF_FIRST * f.gain) {
+        if outcome.findings.first().is_some_and(|f| won.gain < LEAST_OF_FIRST * f.share) {
             break;
         }
         let p = noise.p(won.gain);
         let told = |won: &Judged| {
             let rivals = rivals(std::iter::once(won).chain(judged));
-            let finding = reporter(ledger.base).finding(won, rivals, TESTS * p);
-            DropoutFinding { replicated: ledger.replicate(won, &seen.second), ..finding }
+            let finding = reporter(ledger.base).finding(won, &rivals, TESTS * p);
+            Finding { replicated: ledger.replicate(won, &seen.second), ..finding }
         };
         let finding = told(won);
-        let end = HardEnd::of(&finding, blur);
+        // No driver's limit begins in the midst of a session.
+        let always = won.shape.since_s().is_none();
+        let end = if always { HardEnd::of(&finding, blur) } else { None };
         // Nothing is learnt beyond the range: what is lost inside it is looked at alone.
         if let Some(end) = end.as_ref().filter(|e| views.iter().flatten().any(|c| e.touches(c))) {
             let mut rest = losses(&seen.inside(end), reach, camera, blur, seed);
@@ -197,7 +198,7 @@ fn losses(
         && seen.expected.is_none()
         && let Some((foot, p)) = few_losses(&seen.fine, rim_px(camera), reach, LEVEL / TESTS, seed)
     {
-        outcome.findings.push(reporter(0.0).finding(&foot, rivals([&foot]), TESTS * p));
+        outcome.findings.push(reporter(0.0).finding(&foot, &rivals([&foot]), TESTS * p));
     }
     outcome
 }

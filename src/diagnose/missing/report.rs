@@ -3,20 +3,27 @@
 use serde_json::{Map, Value, json};
 
 use super::cells::Cell;
-use super::finding::DropoutFinding;
 use super::fit::{Fitted, fit};
 use super::points::{Point, bounded, part, points};
 use super::search::Judged;
 use super::shapes::{Shape, Step};
 use crate::camera::Camera;
-use crate::diagnose::diagnosis::Curve;
+use crate::diagnose::diagnosis::{Alternative, Curve, Finding, Size, Status};
 use crate::diagnose::edges::shadow::Band;
+use crate::diagnose::finding::naming::{MIN_PROBABILITY, none_of_these, physics};
+use crate::diagnose::finding::other_findings::named;
 use crate::diagnose::finding::parameters::estimate;
 use crate::diagnose::views::field::Field;
-use crate::terms::{Axis, Basis, Extent};
+use crate::effects;
+use crate::terms::{Axis, Basis, Extent, Statistic};
 
 /// An effect matters from this lost share on.
 const MATTERS: f64 = 0.05;
+/// A name must explain this share of what the best nameless curve does.
+pub const NAME_ADEQUATE: f64 = 0.6;
+
+/// Families and nameless axes that were looked for, nats, best first.
+pub type Rivals = [(&'static str, f64)];
 
 /// Writes findings, from what the views lost.
 pub struct DropoutReporter<'a> {
@@ -34,33 +41,22 @@ pub struct DropoutReporter<'a> {
 type At = Box<dyn Fn(&Cell<'_>) -> Option<f64>>;
 
 impl DropoutReporter<'_> {
-    pub fn finding(
-        &self,
-        won: &Judged,
-        rivals: Vec<(&'static str, f64)>,
-        p: f64,
-    ) -> DropoutFinding {
-        let mut finding = DropoutFinding {
-            family: won.shape.family(),
-            axis: won.shape.axis(),
-            interval: [0.0; 2],
-            parameters: Map::new(),
-            p,
-            rivals,
-            gain: won.gain,
-            size: 0.0,
-            replicated: None,
-            since_s: None,
-            curve: Curve::default(),
+    /// What losses of this shape are told as; noise alone brings as much with the chance `p`.
+    pub fn finding(&self, won: &Judged, rivals: &Rivals, p: f64) -> Finding {
+        let (family, axis) = (won.shape.family(), won.shape.axis());
+        let mut finding = Finding {
+            share: won.gain,
+            p_adjusted: Some(p),
+            ..named(family.unwrap_or_default(), Statistic::Dropout, axis)
         };
         match &won.shape {
             Shape::Step(step) => self.step(*step, &mut finding),
             Shape::Curve(basis) => self.curve(basis, &mut finding),
         }
-        finding
+        described(finding, family, rivals, won.shape.since_s())
     }
 
-    fn step(&self, step: Step, finding: &mut DropoutFinding) {
+    fn step(&self, step: Step, finding: &mut Finding) {
         let span = if step.axis == Axis::Theta { self.reach.theta } else { self.reach.z };
         let at = |c: &Cell<'_>| (!step.before(c.place.session_s)).then(|| step.at(c.place));
         let all = bounded(points(self.fine, &at, span), &step, self.region_given);
@@ -68,28 +64,28 @@ impl DropoutReporter<'_> {
         let fitted = fit(step, self.base, &all).unwrap_or(own);
         let loss = |x: f64| fitted.step.loss(x, self.base);
         finding.parameters = parameters(&fitted);
-        finding.since_s = step.since_s;
         finding.interval = interval(&fitted, span);
         // Of all pixel-frames, those before it began among them.
         let there: f64 = all.iter().map(|p| p.asked).sum();
         let asked: f64 = self.fine.iter().flatten().map(|c| c.asked).sum();
-        finding.size = there / asked.max(1.0) * mean(&all, |p| loss(p.x) - self.base);
-        finding.curve = binned(&all, step.axis, span, loss);
+        finding.size.sigma = there / asked.max(1.0) * mean(&all, |p| loss(p.x) - self.base);
+        finding.curve = Some(binned(&all, step.axis, span, loss));
     }
 
-    fn curve(&self, basis: &Basis, finding: &mut DropoutFinding) {
+    fn curve(&self, basis: &Basis, finding: &mut Finding) {
         let (span, at): ([f64; 2], At) = match basis {
             Basis::Curve { over, low, high, .. } => {
                 let over = *over;
-                ([*low, *high], Box::new(move |c| Some(over.value(&c.place))))
+                ([*low, *high], Box::new(move |c| Some(over.value(c.place))))
             }
             _ => ([0.0, self.camera.width as f64], Box::new(|c| Some(c.place.u))),
         };
         let all = points(self.fine, &at, span);
-        finding.size = mean(&all, |p| (p.share - self.base).max(0.0));
-        finding.curve = binned(&all, basis.axis(), span, |_| self.base);
-        finding.curve.model = finding.curve.y.clone();
-        finding.interval = crowded(&finding.curve, self.base, (span[1] - span[0]) / BINS as f64);
+        finding.size.sigma = mean(&all, |p| (p.share - self.base).max(0.0));
+        let mut curve = binned(&all, basis.axis(), span, |_| self.base);
+        curve.model = curve.y.clone();
+        finding.interval = crowded(&curve, self.base, (span[1] - span[0]) / BINS as f64);
+        finding.curve = Some(curve);
     }
 }
 
@@ -161,7 +157,7 @@ fn binned(points: &[Point], axis: Axis, span: [f64; 2], model: impl Fn(f64) -> f
 }
 
 /// A band beside the target.
-pub fn shadow_finding(band: Band, fields: &[Field]) -> DropoutFinding {
+pub fn shadow_finding(band: Band, fields: &[Field]) -> Finding {
     let mut parameters = Map::new();
     if band.lawful {
         parameters.insert("share".into(), estimate(band.share[0].min(1.0), band.share[1]));
@@ -172,17 +168,58 @@ pub fn shadow_finding(band: Band, fields: &[Field]) -> DropoutFinding {
         lost += f.edges.lost_px(band.side);
         asked += f.pixels.len() as f64;
     }
-    DropoutFinding {
-        family: band.lawful.then_some("occlusion-shadow"),
-        axis: Axis::EdgeDistance,
+    let family = band.lawful.then_some("occlusion-shadow");
+    let finding = Finding {
         interval: [0.0, band.curve.y.iter().copied().fold(0.0, f64::max)],
+        share: band.gain[usize::from(!band.lawful)],
         parameters,
-        p: band.p,
-        rivals: vec![("occlusion-shadow", band.gain[0]), ("edge-distance", band.gain[1])],
-        gain: band.gain[usize::from(!band.lawful)],
-        size: lost / (asked + lost).max(1.0),
-        replicated: None,
-        since_s: None,
-        curve: band.curve,
+        size: Size { mm: 0.0, sigma: lost / (asked + lost).max(1.0) },
+        p_adjusted: Some(band.p),
+        curve: Some(band.curve),
+        ..named(family.unwrap_or_default(), Statistic::Dropout, Axis::EdgeDistance)
+    };
+    let rivals = [("occlusion-shadow", band.gain[0]), ("edge-distance", band.gain[1])];
+    described(finding, family, &rivals, None)
+}
+
+/// With its name, if it has one, its rivals, and what is said of both; it began so many seconds after the
+/// first view.
+fn described(
+    found: Finding,
+    family: Option<&'static str>,
+    rivals: &Rivals,
+    since_s: Option<f64>,
+) -> Finding {
+    let status = if family.is_some() { Status::Named } else { Status::Unexplained };
+    let [from, to] = found.interval;
+    let shape = family.is_none().then(|| format!("more is lost from {from:.4} to {to:.4}"));
+    let mut words = physics(status, family, Statistic::Dropout, found.axis, shape.as_deref());
+    if let Some(since) = since_s {
+        words += &format!(" It began about {since:.1} s after the first view.");
     }
+    let alternatives = family.map_or_else(Vec::new, |name| weighed(name, found.share, rivals));
+    Finding { status, effect: family, alternatives, physics: words, shape, ..found }
+}
+
+/// The names that losses may have, by how well each predicts views left out; what a nameless curve
+/// does better is the chance of none.
+fn weighed(name: &'static str, gain: f64, rivals: &Rivals) -> Vec<Alternative> {
+    let best = rivals.first().map_or(gain, |r| r.1);
+    let card = |id: &'static str| effects::find(id).map(|e| e.card().id);
+    let curves = rivals.iter().filter(|r| card(r.0).is_none());
+    let curve = curves.map(|r| r.1).fold(0.0, f64::max);
+    let mut odds = vec![(name, 1.0)];
+    let rivals = rivals.iter().filter_map(|&(id, gain)| Some((card(id)?, gain)));
+    odds.extend(
+        rivals
+            .filter(|r| r.0 != name)
+            .map(|(id, gain)| (id, (0.25 * (gain - best).clamp(-60.0, 0.0)).exp())),
+    );
+    let total: f64 = odds.iter().map(|o| o.1).sum();
+    let some = 1.0 - none_of_these(gain, curve, NAME_ADEQUATE);
+    odds.into_iter()
+        .map(|(effect, o)| (effect, some * o / total))
+        .filter(|a| a.0 == name || a.1 > MIN_PROBABILITY)
+        .map(|(effect, p)| Alternative { effect, probability: Some(p) })
+        .collect()
 }

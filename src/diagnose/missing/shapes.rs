@@ -73,6 +73,14 @@ impl Shape {
             Shape::Curve(_) => None,
         }
     }
+
+    /// When it begins, where that is in the midst of the session, s after the first view.
+    pub fn since_s(&self) -> Option<f64> {
+        match self {
+            Shape::Step(step) => step.since_s,
+            Shape::Curve(_) => None,
+        }
+    }
 }
 
 /// Places tried for the middle of a step, over the axis's reach.

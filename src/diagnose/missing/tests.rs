@@ -82,7 +82,7 @@ fn find(views: &[Vec<Patch>], camera: &Camera, seed: Seed) -> DropoutOutcome {
     losses(&seen, &reach, camera, &|z| 0.0015 + 0.00215 * (z - 0.483).powi(2), seed)
 }
 
-fn parameter(finding: &DropoutFinding, name: &str) -> [f64; 2] {
+fn parameter(finding: &Finding, name: &str) -> [f64; 2] {
     ["value", "std_error"].map(|of| finding.parameters[name][of].as_f64().unwrap())
 }
 
@@ -97,8 +97,12 @@ fn the_grazing_angle_comes_back() {
         });
         let outcome = find(&views, &camera, Seed(seed));
         let first = outcome.findings.first().expect("found");
-        assert_eq!(first.family, Some("grazing-dropout"), "{seed}: {:?}", first.rivals);
-        assert!(first.p < 1e-3 && first.since_s.is_none(), "{:?}", first.since_s);
+        assert_eq!(first.effect, Some("grazing-dropout"), "{seed}: {:?}", first.alternatives);
+        assert!(
+            first.p_adjusted < Some(1e-3) && !first.physics.contains("began"),
+            "{}",
+            first.physics
+        );
         let [middle, error] = parameter(first, "theta50_deg");
         assert!((middle - 62.0).abs() < 3.0, "{middle} +- {error}");
         within += usize::from((middle - 62.0).abs() < 2.0 * error);
@@ -122,7 +126,7 @@ fn the_interval_holds_whatever_the_rise() {
             let (views, camera) = session(0.002, &mut rng, |p| rise((p.z - middle) / width));
             let outcome = find(&views, &camera, Seed(seed));
             let first = outcome.findings.first().expect("found");
-            assert_eq!(first.family, Some("range-dropout"), "{seed}: {:?}", first.rivals);
+            assert_eq!(first.effect, Some("range-dropout"), "{seed}: {:?}", first.alternatives);
             for (k, (of, truth)) in [("z50_m", middle), ("width_m", width)].into_iter().enumerate()
             {
                 let [said, error] = parameter(first, of);
@@ -140,7 +144,7 @@ fn what_is_too_near_is_lost_on_the_near_side() {
     let (views, camera) = session(0.002, &mut rng, |p| 1.0 / (1.0 + ((p.z - 1.0) / 0.04).exp()));
     let outcome = find(&views, &camera, Seed(3));
     let first = &outcome.findings[0];
-    assert_eq!((first.family, first.axis), (Some("range-dropout"), Axis::Z));
+    assert_eq!((first.effect, first.axis), (Some("range-dropout"), Axis::Z));
     let ([middle, error], [width, _]) = (parameter(first, "z50_m"), parameter(first, "width_m"));
     assert!((middle - 1.0).abs() < 3.0 * error.max(0.003), "{middle} +- {error}");
     assert!((width + 0.04).abs() < 0.02, "{width}");
@@ -168,7 +172,8 @@ fn what_begins_in_the_midst_of_the_session_is_told_with_its_time() {
         });
         let outcome = find(&views, &camera, Seed(seed));
         let first = outcome.findings.first().expect("found");
-        assert_eq!((first.family, first.since_s), (Some("range-dropout"), Some(6.5)), "{seed}");
+        assert_eq!(first.effect, Some("range-dropout"), "{seed}");
+        assert!(first.physics.contains("It began about 6.5 s"), "{seed}: {}", first.physics);
         let [middle, error] = parameter(first, "z50_m");
         assert!((middle - 1.8).abs() < 3.0 * error.max(0.01), "{middle} +- {error}");
     }
@@ -181,7 +186,7 @@ fn rows_that_fail_are_told_by_their_axis() {
     let (views, camera) =
         session(0.001, &mut rng, |p| if (200.0..280.0).contains(&p.v) { 0.1 } else { 0.0 });
     let first = &find(&views, &camera, Seed(4)).findings[0];
-    assert_eq!((first.family, first.axis), (None, Axis::Row));
+    assert_eq!((first.effect, first.axis), (None, Axis::Row));
     assert!(first.interval[0] > 150.0 && first.interval[1] < 330.0, "{:?}", first.interval);
 }
 
