@@ -14,12 +14,6 @@ pub fn axial(z: f64, plane: &Plane, x: f64, y: f64) -> f64 {
     z - plane.depth(x, y)
 }
 
-/// Signed distance of the measured point from the plane, m.
-#[inline]
-pub fn perpendicular(z: f64, plane: &Plane, x: f64, y: f64) -> f64 {
-    axial(z, plane, x, y) * perpendicular_per_axial(plane, x, y)
-}
-
 /// By what an axial residual on the ray (x, y, 1) is multiplied to become perpendicular.
 #[inline]
 pub fn perpendicular_per_axial(plane: &Plane, x: f64, y: f64) -> f64 {
@@ -43,8 +37,10 @@ mod tests {
             prop_assume!(depth > 0.1 && depth < 50.0);
             let z = depth + e;
             let distance = plane.normal().dot(&(Vector3::new(x, y, 1.0) * z)) - plane.distance();
-            prop_assert!((perpendicular(z, &plane, x, y) - distance).abs() < 1e-9);
-            prop_assert!((axial(z, &plane, x, y) - e).abs() < 1e-9);
+            let axial = axial(z, &plane, x, y);
+            let perpendicular = axial * perpendicular_per_axial(&plane, x, y);
+            prop_assert!((perpendicular - distance).abs() < 1e-9);
+            prop_assert!((axial - e).abs() < 1e-9);
         }
     }
 }

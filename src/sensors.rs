@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
+
 /// How a camera comes to its depth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -34,6 +36,18 @@ impl SensorKind {
         }
     }
 }
+
+/// Projector to camera in every Kinect v1, m (LDDIS of the OpenNI device properties; libfreenect:
+/// dcmos_emitter_distance = 7.5 cm); where a sensor without a given baseline is to have a disparity.
+pub const KINECT_BASELINE_M: f64 = 0.075;
+
+/// z = 1/(3.33095 - 0.0030711 raw) of a Kinect v1: the fit OpenKinect users have shared since 2010, also in
+/// libfreenect's own viewer (examples/glpclview.c).
+pub(crate) const OPENKINECT: DepthCode = DepthCode::Disparity {
+    offset: 3.330_949_516_1,
+    slope: -0.003_071_101_6,
+    invalid: KINECT_NO_MEASUREMENT,
+};
 
 /// The finest difference that the default mode makes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,8 +83,7 @@ pub static PRESETS: [Preset; 6] = [
         size: (640, 480),
         // OpenNI and ROS (openni_launch).
         focal_px: 580.0,
-        // LDDIS of the OpenNI device properties; libfreenect: dcmos_emitter_distance = 7.5 cm.
-        baseline_m: Some(0.075),
+        baseline_m: Some(KINECT_BASELINE_M),
         // Konolige and Mihelich, ROS kinect_calibration/technical: an eighth of a pixel.
         step: Step::DisparityPx(0.125),
     },
@@ -82,7 +95,7 @@ pub static PRESETS: [Preset; 6] = [
         // openni2_camera: the depth camera's default focal length, 570.34 px.
         focal_px: 570.34,
         // The PS1080 reference design, which all of these follow: as in a Kinect v1.
-        baseline_m: Some(0.075),
+        baseline_m: Some(KINECT_BASELINE_M),
         // The same chip as in a Kinect v1.
         step: Step::DisparityPx(0.125),
     },

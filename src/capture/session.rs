@@ -1,12 +1,12 @@
 //! A recording on the disk that grows view by view: each is whole or not there.
 
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
 use super::source::LiveFrame;
 use crate::error::{Error, Result};
 use crate::io::{
-    DEPTH_LIST, DESCRIPTION, encode_png16_quickly, entries, read_description, refuse_full,
+    DEPTH_LIST, DESCRIPTION, encode_png16_quickly, entries, lock, read_description, refuse_full,
     sync_folder, write_recording_file, write_view_notes,
 };
 use crate::view::{Sensor, ViewNotes};
@@ -17,6 +17,11 @@ const PARTIAL: &str = ".partial";
 const OLD: &str = "old-";
 /// Prefix of a rejected view that is being removed.
 const REJECTED: &str = "bad-";
+/// One capture at a time.
+const TAKEN: [&str; 2] = [
+    "another capture is writing into it",
+    "end that one first (q, or Ctrl-C), or choose a new folder",
+];
 
 /// An open recording.
 pub struct Session {
@@ -46,7 +51,7 @@ impl Session {
             return Err(Error::recording(root, "this is a file", remedy));
         }
         fs::create_dir_all(root).map_err(|e| failed(root, e))?;
-        let _lock = lock(root)?;
+        let _lock = lock(root, TAKEN)?;
         let mut session = Session { root: root.into(), partial: None, remarks: vec![], _lock };
         let description = root.join(DESCRIPTION);
         if description.is_file() {
@@ -201,20 +206,6 @@ impl PartialView {
             sync(&path)?;
         }
         sync(&self.folder)
-    }
-}
-
-/// One capture at a time: the folder, locked until it is dropped, however the process ends.
-/// `None` where folders cannot be opened or locked (some systems, some network disks).
-fn lock(root: &Path) -> Result<Option<File>> {
-    let Ok(folder) = File::open(root) else { return Ok(None) };
-    match folder.try_lock() {
-        Ok(()) => Ok(Some(folder)),
-        Err(TryLockError::WouldBlock) => {
-            let remedy = "end that one first (q, or Ctrl-C), or choose a new folder";
-            Err(Error::recording(root, "another capture is writing into it", remedy))
-        }
-        Err(TryLockError::Error(_)) => Ok(None),
     }
 }
 

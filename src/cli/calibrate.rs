@@ -17,17 +17,10 @@ use super::console::{
 use super::origin::origin;
 use super::output::{CALIBRATION, begin};
 
-pub const EXAMPLES: &str = "\
-Examples:
-  kinoise calibrate recording -o out/kinect
-  kinoise calibrate pngs -o out/kinect --intrinsics 525,525,319.5,239.5 --units-per-metre 1000";
-
-pub const FIT_EXAMPLES: &str = "\
-Examples:
-  kinoise fit table.csv -o out/table
-  kinoise fit table.csv -o out/table --form auto";
-
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  kinoise calibrate recording -o out/kinect
+  kinoise calibrate pngs -o out/kinect --intrinsics 525,525,319.5,239.5 --units-per-metre 1000")]
 pub struct Arguments {
     /// A recording, a TUM folder, a fakenect dump, a folder of 16-bit PNGs, a ROS bag (.bag, .mcap, .db3),
     /// a NumPy stack (.npy, .npz), or a table z_m,theta_rad,sigma_m[,n] (.csv)
@@ -66,6 +59,9 @@ struct Measuring {
 
 /// `kinoise fit`: what `kinoise calibrate` does with a table.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  kinoise fit table.csv -o out/table
+  kinoise fit table.csv -o out/table --form auto")]
 pub struct FitArguments {
     /// CSV with the columns z_m,theta_rad,sigma_m and optionally n (SI units)
     table: PathBuf,
@@ -164,7 +160,7 @@ fn table(file: &Path, output: &Path, fitting: &Fitting, global: &Global) -> anyh
         measurements: None,
         calibration: &calibration,
         overlays: &fitting.overlay,
-        origin: &origin(file, output, global.seed().0),
+        origin: &origin(file, global.seed().0),
     };
     write_outputs(begin(output, CALIBRATION, &[file], global)?, &page)?;
     global.print_json(&as_json(&calibration, None))?;
@@ -205,7 +201,7 @@ pub fn calibrate(
         measurements: Some(&measurements),
         calibration: &calibration,
         overlays,
-        origin: &origin(&recording.root, out.place(), options.measure.seed.0),
+        origin: &origin(&recording.root, options.measure.seed.0),
     };
     write_outputs(out, &page)?;
     Ok((measurements, calibration))

@@ -16,12 +16,10 @@ use super::capture_interface::{Log, Screen, is_interactive, stop_signal};
 use super::common::{Global, Input, MAX_FRAMES, between, count, one_of};
 use super::console::{beside, next_step, notes, result, say};
 
-pub const EXAMPLES: &str = "\
-Examples:
-  kinoise capture my-kinect --source freenect --views quick
-  kinoise capture my-kinect --source freenect --advise out/diagnosis/diagnosis.json";
-
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  kinoise capture my-kinect --source freenect --views quick
+  kinoise capture my-kinect --source freenect --advise out/diagnosis/diagnosis.json")]
 pub struct Arguments {
     /// The recording: a new folder, or one to continue
     recording: PathBuf,

@@ -10,15 +10,13 @@ use super::console::{beside, next_step, notes, result_lines, say};
 use super::origin::origin;
 use super::output::{COMPARISON, begin};
 
-pub const EXAMPLES: &str = "\
-Examples:
-  kinoise compare rgbd_dataset_freiburg1_desk -o out/desk -m out/kinect/model.json
-  kinoise compare rgbd_dataset_freiburg1_desk -o out/steps --ablation --repeats 3";
-
 /// Runs of each variant: their scatter is known well before.
 const MAX_REPEATS: usize = 100;
 
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  kinoise compare rgbd_dataset_freiburg1_desk -o out/desk -m out/kinect/model.json
+  kinoise compare rgbd_dataset_freiburg1_desk -o out/steps --ablation --repeats 3")]
 pub struct Arguments {
     /// A sequence with ground truth, in the layout of the TUM RGB-D benchmark or of 7-Scenes
     sequence: PathBuf,
@@ -61,7 +59,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     for (name, svg) in comparison_figures(&comparison)? {
         output.write(name, svg.as_bytes())?;
     }
-    let origin = origin(&arguments.sequence, &arguments.output, global.seed().0);
+    let origin = origin(&arguments.sequence, global.seed().0);
     output.write("report.html", comparison_page(&comparison, &origin)?.as_bytes())?;
     output.finish()?;
     result_lines(text);

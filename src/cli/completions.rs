@@ -5,15 +5,13 @@ use clap_complete::Shell;
 use super::command;
 use super::console::answer;
 
-pub const EXAMPLES: &str = "\
-Examples:
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
   kinoise completions bash
   kinoise completions zsh
 
 bash reads them in ~/.local/share/bash-completion/completions/kinoise, zsh in _kinoise of a folder in
-its fpath, fish in ~/.config/fish/completions/kinoise.fish.";
-
-#[derive(Debug, Args)]
+its fpath, fish in ~/.config/fish/completions/kinoise.fish.")]
 pub struct Arguments {
     /// Whose completions to print on stdout
     #[arg(value_enum)]

@@ -12,12 +12,10 @@ use super::common::{Global, Input};
 use super::console::{beside, detail_model, next_step, notes, result, say, working};
 use super::output::begin;
 
-pub const EXAMPLES: &str = "\
-Examples:
-  kinoise correct recording -m out/diagnosis/model.json -o corrected
-  kinoise correct recording -m out/diagnosis/model.json -o corrected --sigma uncertainty";
-
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  kinoise correct recording -m out/diagnosis/model.json -o corrected
+  kinoise correct recording -m out/diagnosis/model.json -o corrected --sigma uncertainty")]
 pub struct Arguments {
     /// A recording, a TUM folder, a fakenect dump, a folder of 16-bit PNGs, a ROS bag (.bag, .mcap, .db3),
     /// or a NumPy stack (.npy, .npz)

@@ -26,12 +26,10 @@ use super::diagnose::{HeldAgainst, examine};
 use super::map::{Title, follow};
 use super::output::{DEMO, DIAGNOSIS, MAP, begin};
 
-pub const EXAMPLES: &str = "\
-Examples:
-  kinoise demo
-  kinoise demo -o out/again --seed 7";
-
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  kinoise demo
+  kinoise demo -o out/again --seed 7")]
 pub struct Arguments {
     /// Folder for the results
     #[arg(short, long, default_value = "out/demo", value_name = "DIR")]

@@ -22,12 +22,10 @@ use super::diagnose_next::{After, NextStep};
 use super::origin::origin;
 use super::output::{DIAGNOSIS, begin};
 
-pub const EXAMPLES: &str = "\
-Examples:
-  kinoise diagnose recording -o out/diagnosis
-  kinoise diagnose recording -o out/difference --against simulated";
-
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  kinoise diagnose recording -o out/diagnosis
+  kinoise diagnose recording -o out/difference --against simulated")]
 pub struct Arguments {
     /// A recording, a TUM folder, a fakenect dump, a folder of 16-bit PNGs, a ROS bag (.bag, .mcap, .db3),
     /// or a NumPy stack (.npy, .npz)
@@ -135,7 +133,7 @@ pub fn examine(
     let title = format!("What the {held_against} of {} leaves out", recording.sensor.name);
     working("drawing the page", |_| -> anyhow::Result<()> {
         let pictures = with_twins(&done, &recording.sensor, model, options.seed);
-        let origin = &origin(&recording.root, out.place(), options.seed.0);
+        let origin = &origin(&recording.root, options.seed.0);
         // The page names its folder, not where that stands.
         let folder = PathBuf::from(out.place().file_name().unwrap_or_default());
         let after = After { diagnosis, recording: &recording.root, folder: &folder, input };

@@ -6,12 +6,10 @@ use serde_json::json;
 use super::common::Global;
 use super::console::{answer, next_step};
 
-pub const EXAMPLES: &str = "\
-Examples:
-  kinoise effects target-bow vignetting
-  kinoise effects --list";
-
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  kinoise effects target-bow vignetting
+  kinoise effects --list")]
 pub struct Arguments {
     /// Only these [default: all]
     #[arg(value_name = "ID")]

@@ -14,13 +14,11 @@ use super::console::{notes, result, say};
 use super::origin::origin;
 use super::output::{EVALUATION, begin};
 
-pub const EXAMPLES: &str = "\
-Examples:
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
   kinoise evaluate --truth groundtruth.txt --estimate out/desk/trajectory.txt
   kinoise evaluate --truth groundtruth.txt --estimate out/desk/trajectory.txt --delta 30 --delta-unit f
-  kinoise evaluate --truth groundtruth.txt --estimate out/desk/trajectory.txt --offset auto";
-
-#[derive(Debug, Args)]
+  kinoise evaluate --truth groundtruth.txt --estimate out/desk/trajectory.txt --offset auto")]
 pub struct Arguments {
     /// Folder for evaluation.json, the plots and report.html
     #[arg(short, long, value_name = "DIR")]
@@ -120,11 +118,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         say(format!("the estimate's clock is set by {:+.1} ms", 1e3 * shift));
     }
     let evaluation = evaluate(&truth, &estimate, delta)?;
-    report(&evaluation, arguments);
+    report(&evaluation, delta);
     if let Some(output) = output {
         let against =
             Against { truth: &truth, estimate: &estimate, evaluation: &evaluation, delta };
-        let origin = origin(&arguments.estimate, output.place(), global.seed().0);
+        let origin = origin(&arguments.estimate, global.seed().0);
         write(&against, output, &origin)?;
     }
     global.print_json(&as_json(&evaluation))
@@ -148,7 +146,7 @@ fn write(against: &Against<'_>, output: OutputFolder, origin: &Origin) -> anyhow
     Ok(())
 }
 
-fn report(evaluation: &Evaluation, arguments: &Arguments) {
+fn report(evaluation: &Evaluation, delta: Delta) {
     let line = |name: &str, s: &Spread, unit: &str| {
         result(format!(
             "{name} {unit}: rmse {:.6}  mean {:.6}  median {:.6}  std {:.6}  min {:.6}  max {:.6}  of {}",
@@ -161,10 +159,7 @@ fn report(evaluation: &Evaluation, arguments: &Arguments) {
             counted(s.pairs, "pair")
         ));
     };
-    let interval = match arguments.delta_unit {
-        Unit::S => format!("RPE over {} s,", arguments.delta),
-        Unit::F => format!("RPE over {},", counted(arguments.delta as usize, "frame")),
-    };
+    let interval = format!("RPE over {delta},");
     line("ATE after alignment,", &evaluation.ate.error, "m");
     line(&interval, &evaluation.rpe.translation, "m");
     line(&interval, &evaluation.rpe.rotation.scaled(1f64.to_degrees()), "degrees");

@@ -9,12 +9,10 @@ use kinoise::io::{discard_stale, write_atomic};
 use super::common::{Global, one_of};
 use super::console::{detail_model, notes, result};
 
-pub const EXAMPLES: &str = "\
-Examples:
-  kinoise export out/kinect/model.json --format python -o kinect_noise.py
-  kinoise export out/kinect/model.json --format elevation-mapping -o sensor.yaml";
-
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  kinoise export out/kinect/model.json --format python -o kinect_noise.py
+  kinoise export out/kinect/model.json --format elevation-mapping -o sensor.yaml")]
 pub struct Arguments {
     /// model.json, or the folder it is in
     model: PathBuf,

@@ -9,16 +9,14 @@ use super::common::Global;
 use super::console::result;
 use super::output::begin;
 
-pub const EXAMPLES: &str = "\
-Examples:
-  kinoise man ~/.local/share/man/man1/kinoise
-  kinoise man out/man --force";
-
 /// A page for the program and one a command.
 const PAGES: Leaves =
     Leaves::Results { names: &[&["kinoise.1", "kinoise-"]], marks: &["kinoise.1"] };
 
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  kinoise man ~/.local/share/man/man1/kinoise
+  kinoise man out/man --force")]
 pub struct Arguments {
     /// Folder for the pages: kinoise.1, and kinoise-COMMAND.1 of each command
     #[arg(value_name = "DIR")]

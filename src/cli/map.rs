@@ -19,12 +19,10 @@ use super::console::{beside, detail, next_step, notes, result, say, working};
 use super::origin::origin;
 use super::output::{MAP, begin};
 
-pub const EXAMPLES: &str = "\
-Examples:
-  kinoise map rgbd_dataset_freiburg1_desk -m out/kinect/model.json -o out/desk
-  kinoise map rgbd_dataset_freiburg1_desk -o out/quick --stride 2 --frames 200";
-
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  kinoise map rgbd_dataset_freiburg1_desk -m out/kinect/model.json -o out/desk
+  kinoise map rgbd_dataset_freiburg1_desk -o out/quick --stride 2 --frames 200")]
 pub struct Arguments {
     /// A sequence in the layout of the TUM RGB-D benchmark or of 7-Scenes, a ROS bag (.bag, .mcap, .db3), or
     /// a NumPy stack (.npy, .npz)
@@ -187,7 +185,7 @@ pub fn follow(
             delta: DELTA,
         }),
         model: &named,
-        origin: &origin(&sequence.root, output.place(), options.seed.0),
+        origin: &origin(&sequence.root, options.seed.0),
     };
     output.write("map.html", map_page(&page)?.as_bytes())?;
     output.write("frames.csv", frames_csv(&mapped.frames).as_bytes())?;

@@ -11,12 +11,10 @@ use super::console::{detail_recording, notes, result, say, working};
 use super::origin::origin;
 use super::output::{METRICS, begin};
 
-pub const EXAMPLES: &str = "\
-Examples:
-  kinoise metrics recording
-  kinoise metrics recording -o out/metrics --json";
-
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  kinoise metrics recording
+  kinoise metrics recording -o out/metrics --json")]
 pub struct Arguments {
     /// A recording, a TUM folder, a fakenect dump, or a folder of 16-bit PNGs
     recording: PathBuf,
@@ -42,7 +40,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         let place = output.place().to_path_buf();
         output.write("metrics.json", kinoise::io::pretty_json(&value)?.as_bytes())?;
         let title = format!("Depth quality of {}", recording.sensor.name);
-        let page = metrics_page(&title, &found, &origin(path, &place, global.seed().0))?;
+        let page = metrics_page(&title, &found, &origin(path, global.seed().0))?;
         output.write("report.html", page.as_bytes())?;
         output.finish()?;
         say(format!("wrote {}", place.join("report.html").display()));

@@ -51,57 +51,40 @@ Examples:
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Take views from a running Kinect; the screen guides you to those that matter
-    #[command(after_help = capture::EXAMPLES)]
     Capture(capture::Arguments),
     /// Fit sigma(z, theta) to recorded views of a plane, or to a table: model.json, plots, report
-    #[command(after_help = calibrate::EXAMPLES)]
     Calibrate(calibrate::Arguments),
     /// Fit sigma(z, theta) to a table z_m,theta_rad,sigma_m[,n]
-    #[command(after_help = calibrate::FIT_EXAMPLES)]
     Fit(calibrate::FitArguments),
     /// Give the vendors' figures of a recording: Z-accuracy, spatial and sub-pixel RMS, fill rate
-    #[command(after_help = metrics::EXAMPLES)]
     Metrics(metrics::Arguments),
     /// Find what a model or a simulation leaves out of a recording, name it and model it
-    #[command(after_help = diagnose::EXAMPLES)]
     Diagnose(diagnose::Arguments),
     /// Make a recording of a board, or a film of a room
-    #[command(after_help = simulate::EXAMPLES)]
     Simulate(simulate::Arguments),
     /// Write a recording again, with the model's biases taken out of the depth
-    #[command(after_help = correct::EXAMPLES)]
     Correct(correct::Arguments),
     /// Write a sigma image beside every depth image of a sequence
-    #[command(after_help = sigma::EXAMPLES)]
     Sigma(sigma::Arguments),
     /// Build a map from a sequence: trajectory, coloured points, statistics
-    #[command(after_help = map::EXAMPLES)]
     Map(map::Arguments),
     /// Compare the paper's four variants of the mapper: tables, figures, report
-    #[command(after_help = compare::EXAMPLES)]
     Compare(compare::Arguments),
     /// Compute ATE and RPE of a trajectory, as the TUM scripts do
-    #[command(after_help = evaluate::EXAMPLES)]
     Evaluate(evaluate::Arguments),
     /// Compare units of a kind: what is common, what is one unit's own, what has changed since
     Units(units::Arguments),
     /// Write a model as other software reads it: a program, tables, parameters of a mapper
-    #[command(after_help = export::EXAMPLES)]
     Export(export::Arguments),
     /// Show the catalogue of physical effects: what each does, how it shows, what it resembles
-    #[command(after_help = effects::EXAMPLES)]
     Effects(effects::Arguments),
     /// Calibrate bundled data, then diagnose a cause drawn by lot and sealed, then map
-    #[command(after_help = demo::EXAMPLES)]
     Demo(demo::Arguments),
     /// Print the JSON Schema of a file that kinoise writes
-    #[command(after_help = schema::EXAMPLES)]
     Schema(schema::Arguments),
     /// Print the completions of a shell
-    #[command(after_help = completions::EXAMPLES)]
     Completions(completions::Arguments),
     /// Write the manual's pages
-    #[command(after_help = man::EXAMPLES)]
     Man(man::Arguments),
 }
 

@@ -12,13 +12,12 @@ const FLAGS: [&str; 5] = ["--json", "--force", "--exit-zero", "-q", "-v"];
 const WITH_VALUE: &str = "--threads";
 const OUTPUT: [&str; 2] = ["-o", "--output"];
 
-/// Of a page in `folder`, made from `recording`, now (or at SOURCE_DATE_EPOCH).
-pub fn origin(recording: &Path, folder: &Path, seed: u64) -> Origin {
+/// Of a page made from `recording` now (or at SOURCE_DATE_EPOCH).
+pub fn origin(recording: &Path, seed: u64) -> Origin {
     let typed: Vec<String> =
         std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned()).collect();
     let recording = recording.to_string_lossy();
-    let origin = Origin::at(&quoted(&recording), &command(&typed), Some(seed), source_date());
-    Origin { folder: quoted(&name_of(folder)), ..origin }
+    Origin::at(&quoted(&recording), &command(&typed), Some(seed), source_date())
 }
 
 /// Without what results do not depend on; of the folder of results, its name.

@@ -6,12 +6,10 @@ use kinoise::schema::{SchemaOf, schema};
 use super::common::one_of;
 use super::console::answer;
 
-pub const EXAMPLES: &str = "\
-Examples:
-  kinoise schema model
-  kinoise schema diagnosis";
-
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  kinoise schema model
+  kinoise schema diagnosis")]
 pub struct Arguments {
     /// Whose schema to print on stdout
     #[arg(value_name = "FILE", value_parser = one_of([

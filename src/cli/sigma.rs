@@ -10,12 +10,10 @@ use super::common::{Global, Input, Thinning};
 use super::console::{detail_model, notes, result, say, working};
 use super::output::{SIGMA, begin};
 
-pub const EXAMPLES: &str = "\
-Examples:
-  kinoise sigma rgbd_dataset_freiburg1_desk -m out/kinect/model.json -o out/desk-sigma
-  kinoise sigma rgbd_dataset_freiburg1_desk -m out/kinect/model.json -o out/few --stride 10";
-
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  kinoise sigma rgbd_dataset_freiburg1_desk -m out/kinect/model.json -o out/desk-sigma
+  kinoise sigma rgbd_dataset_freiburg1_desk -m out/kinect/model.json -o out/few --stride 10")]
 pub struct Arguments {
     /// A sequence in the layout of the TUM RGB-D benchmark or of 7-Scenes
     sequence: PathBuf,

@@ -19,14 +19,12 @@ use super::output::begin;
 use super::simulate_room::{RoomArguments, refuse_of_target};
 use super::simulate_scene::{PosesArguments, SceneryArguments, note_idle};
 
-pub const EXAMPLES: &str = "\
-Examples:
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
   kinoise simulate out/bowl --effect radial-disparity-bias:k_px=0.3 --frames 4 --shrink 2
   kinoise simulate out/twin -m out/kinect/model.json --like recording
   kinoise simulate out/room --room --frames 90
-  kinoise simulate out/film --room --physics speckle --cause lens_k1=0.05 --frames 40 --shrink 2";
-
-#[derive(Debug, Args)]
+  kinoise simulate out/film --room --physics speckle --cause lens_k1=0.05 --frames 40 --shrink 2")]
 pub struct Arguments {
     /// New folder for the recording
     output: PathBuf,

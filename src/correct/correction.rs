@@ -4,9 +4,10 @@ use super::locking::Locking;
 use super::slopes::Noise;
 use super::uncertainty::Uncertainty;
 use crate::camera::{Camera, Rays};
-use crate::effects::{Active, Inverse, KINECT_BASELINE_M};
+use crate::effects::{Active, Inverse};
 use crate::error::Result;
 use crate::model::{self, NoiseModel, SigmaModel};
+use crate::sensors::KINECT_BASELINE_M;
 use crate::terms::{Needs, Pixels, Statistic, Term};
 use crate::view::Sensor;
 
@@ -28,32 +29,35 @@ impl Conditions {
     }
 }
 
+/// A term of the model with the disparities at which it was learnt, px.
+pub(crate) type LearntTerm = (Term, [f64; 2]);
+
 /// The biases of a sensor, ready to be taken out of its depth images.
 #[derive(Debug, Clone)]
 pub struct Correction {
-    pub(super) camera: Camera,
+    pub(crate) camera: Camera,
     pub(super) rays: Rays,
     /// Disparity in px times depth in m, as the model counts it.
-    pub(super) scale_px_m: f64,
+    pub(crate) scale_px_m: f64,
     /// Stored depth over true depth, the same everywhere.
-    pub(super) scale: f64,
-    pub(super) drifts: Vec<Drift>,
+    pub(crate) scale: f64,
+    pub(crate) drifts: Vec<Drift>,
     /// Share of the ray's excess over the depth that is stored.
-    pub(super) ray_share: f64,
+    pub(crate) ray_share: f64,
     /// Stored depth over true depth of each pixel; empty where it is one.
     along_ray: Vec<f32>,
     /// What depends on the pixel alone.
-    pub(super) still_terms: Vec<Term>,
+    pub(crate) still_terms: Vec<Term>,
     /// Their sum at each pixel, px; empty where there are none.
     still: Vec<f32>,
-    pub(super) locking: Option<Locking>,
-    /// What depends on more than the pixel, with the disparities that each was learnt at, px.
-    pub(super) terms: Vec<(Term, [f64; 2])>,
-    pub(super) needs: Needs,
-    /// What changes the logarithm of the noise's variance, with the disparities as above.
-    pub(super) variance: Vec<(Term, [f64; 2])>,
+    pub(crate) locking: Option<Locking>,
+    /// What depends on more than the pixel.
+    pub(crate) terms: Vec<LearntTerm>,
+    pub(crate) needs: Needs,
+    /// What changes the logarithm of the noise's variance.
+    pub(crate) variance: Vec<LearntTerm>,
     pub(super) sigma: SigmaModel,
-    pub(super) noise: Noise,
+    pub(crate) noise: Noise,
     pub(super) uncertainty: Uncertainty,
     ignored: Vec<String>,
     unpredicted: Vec<String>,
@@ -65,7 +69,7 @@ const ANYWHERE: [f64; 2] = [0.0, f64::INFINITY];
 
 /// Warm-up: depth drifts by `relative` with a time constant.
 #[derive(Debug, Clone, Copy)]
-pub struct Drift {
+pub(crate) struct Drift {
     pub relative: f64,
     pub time_constant_s: f64,
 }
@@ -135,7 +139,7 @@ impl Correction {
 
     /// Disparities at which all that grows with the disparity was learnt, px.
     pub(super) fn learnt_px(&self) -> Option<[f64; 2]> {
-        let grows = |(t, _): &&(Term, [f64; 2])| t.basis.still_power().is_some();
+        let grows = |(t, _): &&LearntTerm| t.basis.still_power().is_some();
         let ranges = self.terms.iter().filter(grows).map(|(_, learnt)| *learnt);
         let both = ranges.reduce(|a, b| [a[0].max(b[0]), a[1].min(b[1])])?;
         (both != ANYWHERE).then_some(both)
@@ -182,7 +186,7 @@ impl Correction {
 
     /// An entry that the catalogue's formula stands for.
     fn add_formula(&mut self, entry: &model::Effect) -> Result<()> {
-        let active = Active::from_model(&entry.id, &entry.parameters)?;
+        let active = Active::from_model(entry)?;
         if active.is_identity() {
             return Ok(());
         }

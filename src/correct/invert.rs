@@ -3,12 +3,12 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::correction::{Conditions, Correction};
+use super::correction::{Conditions, Correction, LearntTerm};
 use super::slopes::Slopes;
 use super::uncertainty::{Scratch, where_held};
 use crate::error::{Error, Result};
 use crate::plane::Plane;
-use crate::terms::{PixelContext, Pixels, Term};
+use crate::terms::{PixelContext, Pixels};
 
 /// The error of a term is taken at the corrected disparity: substituted until it changes by less, px.
 /// What is left is less again by the term's steepness, a hundredth for terms of a few tenths of a px
@@ -180,7 +180,7 @@ impl Correction {
 
 /// A term's value; what stands still in the picture and grows with the disparity is held where its
 /// learning ended.
-fn held((term, [low, high]): &(Term, [f64; 2]), place: &PixelContext, row: &mut Vec<f64>) -> f64 {
+fn held((term, [low, high]): &LearntTerm, place: &PixelContext, row: &mut Vec<f64>) -> f64 {
     term.value(&where_held(&term.basis, [*low, *high], place), row)
 }
 
@@ -192,7 +192,7 @@ struct Known<'a> {
     slopes: Option<Slopes>,
     pixels: Pixels<'a>,
     /// Those that can be evaluated.
-    terms: Vec<&'a (Term, [f64; 2])>,
+    terms: Vec<&'a LearntTerm>,
     /// Does any of them ask for the tilt?
     tilt: bool,
 }

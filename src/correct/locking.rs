@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 /// What to add to a locked disparity, by its phase.
 #[derive(Debug, Clone)]
-pub(super) struct Locking {
+pub(crate) struct Locking {
     amplitude_px: f64,
     shifts: Vec<f64>,
 }

@@ -11,7 +11,6 @@ mod describe;
 mod files;
 mod invert;
 mod locking;
-mod parts;
 mod raw;
 mod recording;
 mod rewrite;
@@ -19,7 +18,7 @@ mod sigma_images;
 mod slopes;
 mod uncertainty;
 
-pub use correction::{Conditions, Correction, Drift};
-pub use parts::{LearntTerm, Parts};
+pub use correction::{Conditions, Correction};
+pub(crate) use correction::{Drift, LearntTerm};
 pub use recording::{CorrectOptions, Corrected, SIGMA_UNITS_PER_METRE, correct_recording};
 pub use sigma_images::{SigmaImages, sigma_images};

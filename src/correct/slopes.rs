@@ -24,7 +24,7 @@ const MIN_WIDTH: f64 = 1.0;
 /// The model's noise of a frontal surface, by disparity: a middle window no noisier than this
 /// needs no comparison.
 #[derive(Debug, Clone)]
-pub(super) struct Noise {
+pub(crate) struct Noise {
     /// Variance in px^2, a node a px of disparity.
     variance: Vec<f64>,
 }

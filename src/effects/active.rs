@@ -123,13 +123,13 @@ impl Active {
     ///
     /// # Errors
     /// As [`Active::with`]; and when a parameter is no number.
-    pub fn from_model(id: &str, parameters: &Map<String, Value>) -> Result<Self> {
+    pub fn from_model(entry: &model::Effect) -> Result<Self> {
+        let id = &entry.id;
         let mut active = Active::typical(id)?;
-        for (key, value) in parameters {
-            let number =
-                value.get("value").unwrap_or(value).as_f64().ok_or_else(|| {
-                    fault(format!("effect {id}: {key} = {value} is not a number"))
-                })?;
+        for (key, value) in &entry.parameters {
+            let number = entry
+                .number(key)
+                .ok_or_else(|| fault(format!("effect {id}: {key} = {value} is not a number")))?;
             active = active.with(key, number)?;
         }
         Ok(active)
@@ -142,7 +142,7 @@ impl Active {
     /// When one is not.
     pub fn check_model(effects: &[model::Effect]) -> Result<()> {
         effects.iter().try_for_each(|entry| match &entry.shape[..] {
-            [] => Active::from_model(&entry.id, &entry.parameters).map(drop),
+            [] => Active::from_model(entry).map(drop),
             _ if entry.id == model::UNEXPLAINED => Ok(()),
             _ => Active::typical(&entry.id).map(drop),
         })
@@ -154,8 +154,7 @@ impl Active {
     /// As [`Active::from_model`], for effects without a shape.
     pub fn all_of_model(effects: &[model::Effect]) -> Result<Vec<Self>> {
         let formulas = effects.iter().filter(|e| e.shape.is_empty());
-        let mut all: Vec<Active> =
-            formulas.map(|e| Active::from_model(&e.id, &e.parameters)).collect::<Result<_>>()?;
+        let mut all: Vec<Active> = formulas.map(Active::from_model).collect::<Result<_>>()?;
         let shapes = Shape::of(effects.iter().flat_map(|e| e.shape.iter().cloned()));
         all.extend(shapes.map(|shape| Active {
             effect: Acting::Shape(Arc::new(shape)),

@@ -6,7 +6,7 @@ use crate::terms::{Basis, Coordinate, PixelContext, ROOM_LUX, Term};
 
 pub struct AmbientLight;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "ambient-light",
     title: "noise from ambient light",
     stage: Stage::Variance,
@@ -27,10 +27,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for AmbientLight {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let ratio = settings.at(0) * exposure.ambient_lux / ROOM_LUX;
         for i in 0..exposure.pixels() {

@@ -7,7 +7,7 @@ use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Term};
 
 pub struct ColumnBanding;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "column-banding",
     title: "column banding",
     stage: Stage::Disparity,
@@ -39,10 +39,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for ColumnBanding {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let (amplitude, period) = (settings.at(0), settings.at(1));
         let (width, centre) = (exposure.seen.width, exposure.sensor.camera.cx);

@@ -4,7 +4,7 @@ use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
 
 pub struct DepthRounding;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "depth-rounding",
     title: "depth rounding",
     stage: Stage::Word,
@@ -24,10 +24,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for DepthRounding {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let step = settings.at(0) as f32;
         exposure.depth.iter_mut().for_each(|z| *z = (*z / step).round() * step);

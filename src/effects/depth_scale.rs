@@ -5,7 +5,7 @@ use crate::camera::Camera;
 
 pub struct DepthScale;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "depth-scale",
     title: "a wrong depth scale",
     stage: Stage::Driver,
@@ -26,10 +26,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for DepthScale {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let scale = settings.at(0) as f32;
         exposure.depth.iter_mut().for_each(|z| *z *= scale);

@@ -7,7 +7,7 @@ use crate::terms::{Basis, Term};
 
 pub struct DisparityOffset;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "disparity-offset",
     title: "a constant disparity offset",
     stage: Stage::Quantiser,
@@ -28,10 +28,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for DisparityOffset {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let offset = settings.at(0);
         exposure.shift_disparity(|_| offset);

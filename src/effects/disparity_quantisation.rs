@@ -5,7 +5,7 @@ use crate::sensors::SensorKind;
 
 pub struct DisparityQuantisation;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "disparity-quantisation",
     title: "disparity quantisation",
     stage: Stage::Quantiser,
@@ -26,10 +26,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for DisparityQuantisation {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let step = settings.at(0) as f32;
         exposure.disparity.iter_mut().for_each(|d| *d = (*d / step).round() * step);

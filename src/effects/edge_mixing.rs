@@ -5,7 +5,7 @@ use crate::terms::{Basis, Coordinate};
 
 pub struct EdgeMixing;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "edge-mixing",
     title: "mixed depth at edges",
     stage: Stage::Optics,
@@ -27,10 +27,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for EdgeMixing {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let width = settings.at(0);
         let mixing = |e: &Exposure| offsets(e, width);

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use crate::camera::Rays;
 use crate::scene::Seen;
+use crate::sensors::KINECT_BASELINE_M;
 use crate::terms::corner_radius;
 use crate::view::Sensor;
 
@@ -107,6 +108,3 @@ impl Exposure<'_> {
         self.memory.insert(id, kept);
     }
 }
-
-/// Of a Kinect v1; where a sensor without a given baseline is to have a disparity.
-pub const KINECT_BASELINE_M: f64 = 0.075;

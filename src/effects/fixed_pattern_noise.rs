@@ -4,7 +4,7 @@ use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, nor
 
 pub struct FixedPatternNoise;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "fixed-pattern-noise",
     title: "fixed-pattern noise",
     stage: Stage::Disparity,
@@ -24,10 +24,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for FixedPatternNoise {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw) {
         let sigma = settings.at(0);
         let pattern = |e: &Exposure| normals(e.pixels(), draw.stream(Scope::Sensor, "pixels"));

@@ -4,7 +4,7 @@ use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, nor
 
 pub struct FrameJitter;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "frame-jitter",
     title: "frame jitter",
     stage: Stage::Disparity,
@@ -24,10 +24,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for FrameJitter {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw) {
         let shift = normals(1, draw.stream(Scope::Frame, "frame"))[0];
         let shift = settings.at(0) * f64::from(shift);

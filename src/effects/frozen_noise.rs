@@ -4,7 +4,7 @@ use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, nor
 
 pub struct FrozenNoise;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "frozen-noise",
     title: "frozen noise",
     stage: Stage::NoiseAtRest,
@@ -24,10 +24,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for FrozenNoise {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw) {
         let fraction = settings.at(0);
         let (at_rest, alive) = (fraction.sqrt() as f32, (1.0 - fraction).sqrt() as f32);

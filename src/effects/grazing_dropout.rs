@@ -4,7 +4,7 @@ use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, cha
 
 pub struct GrazingDropout;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "grazing-dropout",
     title: "dropout at grazing tilts",
     stage: Stage::Dropout,
@@ -40,10 +40,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for GrazingDropout {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw) {
         let (share, half, width) = (settings.at(0), settings.at(1), settings.at(2));
         let mut rng = draw.stream(Scope::Frame, "lost");

@@ -4,7 +4,7 @@ use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, cha
 
 pub struct HeavyTails;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "heavy-tails",
     title: "heavy-tailed noise",
     stage: Stage::NoiseTails,
@@ -34,10 +34,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for HeavyTails {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw) {
         let (fraction, scale) = (settings.at(0), settings.at(1) as f32);
         let mut which = draw.stream(Scope::Frame, "which");

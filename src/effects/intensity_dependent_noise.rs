@@ -7,7 +7,7 @@ use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct IntensityDependentNoise;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "intensity-dependent-noise",
     title: "noise that depends on intensity",
     stage: Stage::Variance,
@@ -28,10 +28,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for IntensityDependentNoise {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let exponent = settings.at(0);
         for (sigma, albedo) in exposure.sigma.iter_mut().zip(&exposure.seen.albedo) {

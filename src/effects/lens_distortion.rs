@@ -7,7 +7,7 @@ use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct LensDistortion;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "lens-distortion",
     title: "uncorrected lens distortion",
     stage: Stage::Optics,
@@ -28,10 +28,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for LensDistortion {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let k1 = settings.at(0);
         for i in 0..exposure.pixels() {

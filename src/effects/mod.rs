@@ -17,23 +17,27 @@ mod traces;
 pub use active::{Acting, Active};
 pub use card::{Card, Parameter, Settings, Stage};
 pub use draw::{Draw, Scope, fill_normal, logistic};
-pub use exposure::{Exposure, Instant, KINECT_BASELINE_M};
+pub use exposure::{Exposure, Instant};
 pub use fitted::{Estimate, Fitted};
 pub use range_not_depth::RAY_FOR_DEPTH;
 pub use traces::{Bounds, Flat, Inverse, Known, Smallest};
 
 use crate::camera::Camera;
+pub use crate::sensors::KINECT_BASELINE_M;
 pub use crate::terms::ROOM_LUX;
 use crate::terms::{Basis, Statistic, Term};
 use draw::{chance, normals};
 use fitted::{greatest, slope_in_square};
 
+/// What has a card; `catalogue!` gives each effect the `CARD` of its file.
+pub trait Carded {
+    fn card(&self) -> &'static Card;
+}
+
 /// A physical effect with both its faces: what nature does to an exposure, and what a recording
 /// shows of it. Effects without [`Effect::shapes`] show in textures, losses, edges or reference
 /// distances, and are recognised by measurements of their own.
-pub trait Effect: Send + Sync {
-    fn card(&self) -> &'static Card;
-
+pub trait Effect: Carded + Send + Sync {
     /// Change `exposure` as the effect does with these settings. Called once a frame, at the
     /// card's stage, and only when the strength is not the card's identity.
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw);
@@ -106,6 +110,12 @@ pub const USUAL_PX: f64 = 1.0;
 macro_rules! catalogue {
     ($($module:ident :: $name:ident),* $(,)?) => {
         $(mod $module;)*
+
+        $(impl Carded for $module::$name {
+            fn card(&self) -> &'static Card {
+                &$module::CARD
+            }
+        })*
 
         /// Every effect, in the order of the light's path and of `crate::docs::catalogue`.
         pub static CATALOGUE: &[&dyn Effect] = &[$(&$module::$name),*];

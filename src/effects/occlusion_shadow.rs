@@ -5,7 +5,7 @@ use crate::sensors::SensorKind;
 
 pub struct OcclusionShadow;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "occlusion-shadow",
     title: "an occlusion shadow",
     stage: Stage::Dropout,
@@ -26,10 +26,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for OcclusionShadow {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let share = settings.at(0) as f32;
         exposure.with_kept(CARD.id, |e| shadow(e, share), |e, shadow| {

@@ -9,7 +9,7 @@ use crate::terms::{Basis, Coordinate, PixelContext, Term};
 
 pub struct PixelLocking;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "pixel-locking",
     title: "pixel locking",
     stage: Stage::Disparity,
@@ -32,10 +32,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for PixelLocking {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let amplitude = settings.at(0) as f32;
         for d in &mut exposure.disparity {

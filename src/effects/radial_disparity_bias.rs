@@ -7,7 +7,7 @@ use crate::terms::{Basis, Coordinate, DISPARITY_UNIT_PX, Modulation, PixelContex
 
 pub struct RadialDisparityBias;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "radial-disparity-bias",
     title: "radial disparity bias",
     stage: Stage::Disparity,
@@ -29,10 +29,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for RadialDisparityBias {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let k = settings.at(0);
         let radius = exposure.radius();

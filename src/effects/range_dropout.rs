@@ -4,7 +4,7 @@ use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, cha
 
 pub struct RangeDropout;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "range-dropout",
     title: "dropout out of range",
     stage: Stage::Dropout,
@@ -41,10 +41,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for RangeDropout {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw) {
         let (share, half, width) = (settings.at(0), settings.at(1), settings.at(2));
         let mut rng = draw.stream(Scope::Frame, "lost");

@@ -6,7 +6,7 @@ use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Term};
 
 pub struct RangeExponent;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "range-exponent",
     title: "noise with another power of distance",
     stage: Stage::Variance,
@@ -27,10 +27,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for RangeExponent {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let excess = settings.at(0);
         for (sigma, z) in exposure.sigma.iter_mut().zip(&exposure.seen.depth) {

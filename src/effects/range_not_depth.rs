@@ -6,7 +6,7 @@ use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct RangeNotDepth;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "range-not-depth",
     title: "range stored as depth",
     stage: Stage::Driver,
@@ -27,10 +27,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for RangeNotDepth {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let share = settings.at(0);
         for i in 0..exposure.pixels() {

@@ -4,7 +4,7 @@ use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, nor
 
 pub struct RowNoise;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "row-noise",
     title: "row noise",
     stage: Stage::Disparity,
@@ -24,10 +24,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for RowNoise {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw) {
         let (sigma, width) = (settings.at(0), exposure.seen.width);
         let rows = normals(exposure.seen.height, draw.stream(Scope::Frame, "rows"));

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Card, Draw, Effect, Exposure, Settings, Stage};
+use super::{Card, Carded, Draw, Effect, Exposure, Settings, Stage};
 use crate::plane::Plane;
 use crate::scene::Seen;
 use crate::stats::median_in_place;
@@ -56,11 +56,13 @@ impl Shape {
     }
 }
 
-impl Effect for Shape {
+impl Carded for Shape {
     fn card(&self) -> &'static Card {
         self.card
     }
+}
 
+impl Effect for Shape {
     fn terms(&self) -> &[Term] {
         &self.terms
     }

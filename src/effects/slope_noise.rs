@@ -7,7 +7,7 @@ use crate::terms::{Basis, Coordinate, Term};
 
 pub struct SlopeNoise;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "slope-noise",
     title: "extra noise on slopes",
     stage: Stage::Variance,
@@ -30,10 +30,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for SlopeNoise {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let lateral = settings.at(0) / exposure.sensor.camera.fx;
         let seen = exposure.seen;

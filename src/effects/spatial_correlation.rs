@@ -4,7 +4,7 @@ use super::{Card, Draw, Effect, Exposure, Parameter, Scope, Settings, Stage, nor
 
 pub struct SpatialCorrelation;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "spatial-correlation",
     title: "noise correlated between neighbours",
     stage: Stage::NoiseInSpace,
@@ -33,10 +33,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for SpatialCorrelation {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw) {
         let (side, share, width) = (settings.at(0), settings.at(1), exposure.seen.width);
         if side <= 1.0 {

@@ -8,7 +8,7 @@ use crate::terms::{Basis, PixelContext};
 
 pub struct TargetBow;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "target-bow",
     title: "a bent target",
     stage: Stage::Surface,
@@ -38,10 +38,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for TargetBow {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let Some(target) = exposure.seen.target else { return };
         let (sagitta, half_span) = (settings.at(0), 0.5 * settings.at(1));

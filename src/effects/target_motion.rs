@@ -4,7 +4,7 @@ use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
 
 pub struct TargetMotion;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "target-motion",
     title: "motion during a view",
     stage: Stage::Surface,
@@ -24,10 +24,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for TargetMotion {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let gone = settings.at(0) * exposure.instant.view_s;
         for i in 0..exposure.pixels() {

@@ -4,7 +4,7 @@ use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
 
 pub struct TemporalCorrelation;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "temporal-correlation",
     title: "noise correlated between frames",
     stage: Stage::NoiseInTime,
@@ -24,10 +24,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for TemporalCorrelation {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let rho = settings.at(0) as f32;
         let fresh = (1.0 - rho * rho).sqrt();

@@ -5,7 +5,7 @@ use crate::camera::Camera;
 
 pub struct ThermalDrift;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "thermal-drift",
     title: "thermal drift",
     stage: Stage::Driver,
@@ -34,10 +34,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for ThermalDrift {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let (relative, constant) = (settings.at(0), settings.at(1));
         // First-order heating: 1 - exp(-t / tau), from cold at the session's begin.

@@ -6,7 +6,7 @@ use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Term};
 
 pub struct TiltAxisAnisotropy;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "tilt-axis-anisotropy",
     title: "noise that depends on the tilt axis",
     stage: Stage::Variance,
@@ -27,10 +27,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for TiltAxisAnisotropy {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let ratio = settings.at(0);
         for i in 0..exposure.pixels() {

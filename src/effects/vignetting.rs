@@ -6,7 +6,7 @@ use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 pub struct Vignetting;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "vignetting",
     title: "vignetting",
     stage: Stage::Variance,
@@ -29,10 +29,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for Vignetting {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let growth = settings.at(0);
         let radius = exposure.radius();

@@ -11,15 +11,13 @@ mod rpe;
 pub use offset::{ClockOffset, clock_offset};
 pub use rpe::{Delta, Rpe, relative};
 
-use std::path::Path;
-
 use nalgebra::{
     Isometry3, Matrix3, Matrix4, Quaternion, SymmetricEigen, Translation3, UnitQuaternion, Vector3,
 };
 
 use crate::error::{Error, Result};
 use crate::stats::median;
-use crate::trajectory::{Pose, associate, read_benchmark};
+use crate::trajectory::{Pose, associate};
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
@@ -81,11 +79,6 @@ fn swapped(truth: &[Pose], estimate: &[Pose]) -> Option<String> {
 const AT_IDENTITY: f64 = 1e-6;
 /// Motion capture has 100 poses a second, images come 30 times: three times as often.
 const DENSER: f64 = 2.0;
-
-/// Of two files.
-pub fn evaluate_files(truth: &Path, estimate: &Path, delta: Delta) -> Result<Evaluation> {
-    evaluate(&read_benchmark(truth)?.poses, &read_benchmark(estimate)?.poses, delta)
-}
 
 /// A list of errors in figures, in their unit.
 #[derive(Debug, Clone, Copy, PartialEq)]

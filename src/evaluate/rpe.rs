@@ -1,5 +1,7 @@
 //! Relative pose error over a fixed interval: evaluate_rpe.py with `--fixed_delta`.
 
+use std::fmt::{Display, Formatter};
+
 use nalgebra::Isometry3;
 
 use super::{Spread, too_few};
@@ -12,6 +14,15 @@ use crate::units::counted;
 pub enum Delta {
     Seconds(f64),
     Frames(usize),
+}
+
+impl Display for Delta {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Delta::Seconds(s) => write!(f, "{s} s"),
+            Delta::Frames(n) => f.write_str(&counted(*n, "frame")),
+        }
+    }
 }
 
 /// Motions of the estimate against the true ones.
@@ -65,14 +76,8 @@ pub fn relative(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Rpe> 
 }
 
 fn too_short(delta: Delta) -> Error {
-    let interval = match delta {
-        Delta::Seconds(s) => format!("{s} s"),
-        Delta::Frames(n) => counted(n, "frame"),
-    };
     Error::NotEnough {
-        what: format!(
-            "the estimate has no two motions of {interval} with true poses at their ends"
-        ),
+        what: format!("the estimate has no two motions of {delta} with true poses at their ends"),
         remedy: "compare over a shorter interval (--delta), or give more of the sequence".into(),
     }
 }

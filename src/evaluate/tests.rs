@@ -3,6 +3,7 @@ use std::path::PathBuf;
 use nalgebra::{Isometry3, Vector3};
 
 use super::*;
+use crate::trajectory::read_benchmark;
 
 /// The folder of real trajectories, where there is one.
 fn real() -> Option<PathBuf> {
@@ -20,10 +21,12 @@ fn the_scripts_figures_to_the_last_digit() {
     let mut compared = 0;
     for line in expected.lines().filter(|l| !l.starts_with('#')) {
         let words: Vec<&str> = line.split([' ', '|']).filter(|w| !w.is_empty()).collect();
-        let file = |kind: &str| folder.join(format!("{}_{kind}.txt", words[0]));
-        let evaluated = |delta| {
-            evaluate_files(&file("groundtruth"), &file(words[1]), delta).expect("they overlap")
+        let poses = |kind: &str| {
+            let file = folder.join(format!("{}_{kind}.txt", words[0]));
+            read_benchmark(&file).expect("a trajectory").poses
         };
+        let [truth, estimate] = ["groundtruth", words[1]].map(poses);
+        let evaluated = |delta| evaluate(&truth, &estimate, delta).expect("they overlap");
         let second = evaluated(Delta::Seconds(1.0));
         let frame = evaluated(Delta::Frames(1));
         let figures = |rpe: &Rpe| {

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::Exported;
 use super::expressions::number;
 use super::program::{Line, Program, correction_of, left_out, listed};
-use crate::correct::Parts;
+use crate::correct::Correction;
 use crate::error::Result;
 use crate::frame::DepthCode;
 use crate::model::NoiseModel;
@@ -18,14 +18,14 @@ const IMAGE: &str = include_str!("runtime/image.h");
 
 pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
     let known = correction_of(model)?;
-    let parts = known.as_ref().map(|(_, correction)| correction.parts());
-    let program = Program::of(model, parts.as_ref(), PREFIX);
+    let correction = known.as_ref().map(|(_, correction)| correction);
+    let program = Program::of(model, correction, PREFIX);
     let mut text = head(model);
     text.push_str(HELPERS);
     text.push_str(&sigma(model, &program));
-    if let (Some((sensor, _)), Some(parts)) = (&known, &parts) {
+    if let Some((sensor, correction)) = &known {
         text.push_str(PLACE);
-        text.push_str(&constants(sensor, parts, &program));
+        text.push_str(&constants(sensor, correction, &program));
         for (k, table) in program.expressions.tables.iter().enumerate() {
             text.push_str(&array(&program.expressions.name(k), table));
         }
@@ -36,7 +36,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
         text.push_str(IMAGE);
     }
     text.push_str("\n#endif\n");
-    let notes = left_out(model, known.as_ref().map(|(_, correction)| correction));
+    let notes = left_out(model, correction);
     Ok(Exported { bytes: text.into_bytes(), notes })
 }
 
@@ -71,9 +71,11 @@ fn array(name: &str, numbers: &[f64]) -> String {
     format!("static const double {name}[{}] = {{\n    {}\n}};\n", numbers.len(), listed(numbers))
 }
 
-fn constants(sensor: &Sensor, parts: &Parts<'_>, program: &Program) -> String {
-    let camera = parts.camera;
-    let (locking_px, unlocking) = parts.locking.unwrap_or((0.0, &[]));
+fn constants(sensor: &Sensor, correction: &Correction, program: &Program) -> String {
+    let camera = &correction.camera;
+    let locking = correction.locking.as_ref();
+    let (locking_px, unlocking) =
+        locking.map_or((0.0, &[][..]), |l| (l.amplitude_px(), l.shifts()));
     let (units, offset, slope, invalid, raw) = match sensor.code {
         DepthCode::Metric { units_per_metre, invalid } => (units_per_metre, 0.0, 1.0, invalid, 0),
         DepthCode::Disparity { offset, slope, invalid } => (1.0, offset, slope, invalid, 1),
@@ -81,12 +83,12 @@ fn constants(sensor: &Sensor, parts: &Parts<'_>, program: &Program) -> String {
     let counts = [
         ("WIDTH", camera.width),
         ("HEIGHT", camera.height),
-        ("DRIFTS", parts.drifts.len()),
+        ("DRIFTS", correction.drifts.len()),
         ("UNLOCKING", unlocking.len()),
         ("BIAS_TERMS", program.bias.len()),
         ("VARIANCE_TERMS", program.variance.len()),
-        ("NEEDS_DEPTH", usize::from(parts.needs.depth)),
-        ("NEEDS_SLOPE", usize::from(parts.needs.slope)),
+        ("NEEDS_DEPTH", usize::from(correction.needs.depth)),
+        ("NEEDS_SLOPE", usize::from(correction.needs.slope)),
         ("RAW_DISPARITY", raw),
     ];
     let scalars = [
@@ -95,9 +97,9 @@ fn constants(sensor: &Sensor, parts: &Parts<'_>, program: &Program) -> String {
         ("cx", camera.cx),
         ("cy", camera.cy),
         ("has_distortion", f64::from(u8::from(camera.distortion.is_some()))),
-        ("scale_px_m", parts.scale_px_m),
-        ("scale", parts.scale),
-        ("ray_share", parts.ray_share),
+        ("scale_px_m", correction.scale_px_m),
+        ("scale", correction.scale),
+        ("ray_share", correction.ray_share),
         ("locking_px", locking_px),
         ("units_per_metre", units),
         ("raw_offset", offset),
@@ -112,12 +114,12 @@ fn constants(sensor: &Sensor, parts: &Parts<'_>, program: &Program) -> String {
         let _ = writeln!(text, "static const double {PREFIX}{name} = {};", number(value));
     }
     let drifts: Vec<f64> =
-        parts.drifts.iter().flat_map(|d| [d.relative, d.time_constant_s]).collect();
+        correction.drifts.iter().flat_map(|d| [d.relative, d.time_constant_s]).collect();
     for (name, numbers) in [
         ("distortion", &camera.distortion.unwrap_or_default()[..]),
         ("drifts", &drifts),
         ("unlocking", unlocking),
-        ("window_limits", parts.window_limits),
+        ("window_limits", correction.noise.limits()),
     ] {
         text.push_str(&array(&format!("{PREFIX}{name}"), numbers));
     }

@@ -77,8 +77,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
 
 /// A parameter of one of the model's effects.
 fn parameter(model: &NoiseModel, id: &str, name: &str) -> Option<f64> {
-    let value = model.effects.iter().find(|e| e.id == id)?.parameters.get(name)?;
-    value.get("value").unwrap_or(value).as_f64()
+    model.effects.iter().find(|e| e.id == id)?.number(name)
 }
 
 /// The step of the disparity: the matcher's where it was found, else the stored number's.

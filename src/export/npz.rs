@@ -25,7 +25,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
     match correction_of(model)? {
         None => notes.push("the model has no sensor: sigma's table alone is in the file".into()),
         Some((_, correction)) => {
-            let camera = correction.parts().camera;
+            let camera = &correction.camera;
             put("intrinsics", &[4], &[camera.fx, camera.fy, camera.cx, camera.cy]);
             put("distortion", &[5], &camera.distortion.unwrap_or_default());
             let [near, far] = model.sigma.domain.z_m;
@@ -41,7 +41,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
             let shape = [DEPTHS, camera.height, camera.width];
             archive.add("correction_m", &array("<f4", &shape, all));
             notes = notes_of_bias(&correction);
-            if !correction.parts().variance.is_empty() {
+            if !correction.variance.is_empty() {
                 notes.push(
                     "what changes the noise beside depth and tilt is not in the table".into(),
                 );

@@ -48,7 +48,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
             BLOCK[0], BLOCK[1]
         ));
     }
-    if !correction.parts().variance.is_empty() {
+    if !correction.variance.is_empty() {
         notes.push("what changes the noise beside depth and tilt is not in the table".into());
     }
     Ok(Exported { bytes: text.into_bytes(), notes })

@@ -1,7 +1,7 @@
 //! What a program outside needs of a model: one list of terms, written once for each language.
 
 use super::expressions::{Expressions, number, sigma};
-use crate::correct::{Correction, LearntTerm, Parts};
+use crate::correct::{Correction, LearntTerm};
 use crate::error::Result;
 use crate::model::NoiseModel;
 use crate::terms::Term;
@@ -25,8 +25,8 @@ pub(super) struct Program {
 }
 
 impl Program {
-    /// Of a model whose sensor is known where `parts` are given; names begin with `prefix`.
-    pub fn of(model: &NoiseModel, parts: Option<&Parts<'_>>, prefix: &'static str) -> Self {
+    /// Of a model whose sensor is known where `correction` is given; names begin with `prefix`.
+    pub fn of(model: &NoiseModel, correction: Option<&Correction>, prefix: &'static str) -> Self {
         let mut expressions = Expressions::new(prefix);
         let mut line = |term: &Term, [low, high]: [f64; 2]| {
             let bounded = high.is_finite() && term.basis.still_power().is_some();
@@ -38,9 +38,9 @@ impl Program {
         };
         let mut lines =
             |terms: &[LearntTerm]| terms.iter().map(|(t, learnt)| line(t, *learnt)).collect();
-        let bias = parts.map_or_else(Vec::new, |p| lines(p.terms));
-        let variance = parts.map_or_else(Vec::new, |p| lines(p.variance));
-        let still = parts.map_or(&[][..], |p| p.still);
+        let bias = correction.map_or_else(Vec::new, |c| lines(&c.terms));
+        let variance = correction.map_or_else(Vec::new, |c| lines(&c.variance));
+        let still = correction.map_or(&[][..], |c| &c.still_terms[..]);
         let still = still.iter().map(|t| line(t, [0.0, f64::INFINITY])).collect();
         Program { sigma: sigma(&model.sigma, prefix), still, bias, variance, expressions }
     }

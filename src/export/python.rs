@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::Exported;
 use super::expressions::number;
 use super::program::{Line, Program, correction_of, left_out, listed};
-use crate::correct::Parts;
+use crate::correct::{Correction, Drift};
 use crate::error::Result;
 use crate::frame::DepthCode;
 use crate::model::NoiseModel;
@@ -17,13 +17,13 @@ const IMAGE: &str = include_str!("runtime/image.py");
 
 pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
     let known = correction_of(model)?;
-    let parts = known.as_ref().map(|(_, correction)| correction.parts());
-    let program = Program::of(model, parts.as_ref(), PREFIX);
+    let correction = known.as_ref().map(|(_, correction)| correction);
+    let program = Program::of(model, correction, PREFIX);
     let mut text = head(model);
     text.push_str(HELPERS);
     text.push_str(&sigma(model, &program));
-    if let (Some((sensor, _)), Some(parts)) = (&known, &parts) {
-        text.push_str(&constants(sensor, parts));
+    if let Some((sensor, correction)) = &known {
+        text.push_str(&constants(sensor, correction));
         for (k, table) in program.expressions.tables.iter().enumerate() {
             let name = program.expressions.name(k);
             let _ = writeln!(text, "{name} = np.array([\n    {}\n])", listed(table));
@@ -36,7 +36,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
         text.push_str("\n\n");
         text.push_str(IMAGE);
     }
-    let notes = left_out(model, known.as_ref().map(|(_, correction)| correction));
+    let notes = left_out(model, correction);
     Ok(Exported { bytes: text.into_bytes(), notes })
 }
 
@@ -68,8 +68,8 @@ fn sigma(model: &NoiseModel, program: &Program) -> String {
     )
 }
 
-fn constants(sensor: &Sensor, parts: &Parts<'_>) -> String {
-    let camera = parts.camera;
+fn constants(sensor: &Sensor, correction: &Correction) -> String {
+    let camera = &correction.camera;
     let mut text = format!("\n\nWIDTH, HEIGHT = {}, {}\n", camera.width, camera.height);
     let distortion = camera.distortion.map(|k| format!("({})", k.map(number).join(", ")));
     let (units, raw, invalid) = match sensor.code {
@@ -80,11 +80,11 @@ fn constants(sensor: &Sensor, parts: &Parts<'_>) -> String {
             ("None".into(), format!("({}, {})", number(offset), number(slope)), invalid)
         }
     };
-    let drift = |d: &crate::correct::Drift| {
-        format!("({}, {})", number(d.relative), number(d.time_constant_s))
-    };
-    let drifts: Vec<String> = parts.drifts.iter().map(drift).collect();
-    let (locking_px, unlocking) = parts.locking.unwrap_or((0.0, &[]));
+    let drift = |d: &Drift| format!("({}, {})", number(d.relative), number(d.time_constant_s));
+    let drifts: Vec<String> = correction.drifts.iter().map(drift).collect();
+    let locking = correction.locking.as_ref();
+    let (locking_px, unlocking) =
+        locking.map_or((0.0, &[][..]), |l| (l.amplitude_px(), l.shifts()));
     let python = |on: bool| if on { "True" } else { "False" }.to_string();
     let lines = [
         ("fx", number(camera.fx)),
@@ -92,18 +92,18 @@ fn constants(sensor: &Sensor, parts: &Parts<'_>) -> String {
         ("cx", number(camera.cx)),
         ("cy", number(camera.cy)),
         ("distortion", distortion.unwrap_or("None".into())),
-        ("scale_px_m", number(parts.scale_px_m)),
+        ("scale_px_m", number(correction.scale_px_m)),
         ("units_per_metre", units),
         ("raw_disparity", raw),
         ("invalid", invalid.to_string()),
-        ("scale", number(parts.scale)),
+        ("scale", number(correction.scale)),
         ("drifts", format!("[{}]", drifts.join(", "))),
-        ("ray_share", number(parts.ray_share)),
+        ("ray_share", number(correction.ray_share)),
         ("locking_px", number(locking_px)),
         ("unlocking", format!("np.array([\n    {}\n])", listed(unlocking))),
-        ("window_limits", format!("np.array([\n    {}\n])", listed(parts.window_limits))),
-        ("needs_depth", python(parts.needs.depth)),
-        ("needs_slope", python(parts.needs.slope)),
+        ("window_limits", format!("np.array([\n    {}\n])", listed(correction.noise.limits()))),
+        ("needs_depth", python(correction.needs.depth)),
+        ("needs_slope", python(correction.needs.slope)),
     ];
     for (name, value) in lines {
         let _ = writeln!(text, "{PREFIX}{name} = {value}");

@@ -44,23 +44,23 @@ pub(super) fn known(model: &NoiseModel, format: &str) -> Result<(Sensor, Correct
 
 /// The corrected depth of every pixel of a picture that shows `depth_m` throughout, m.
 pub(super) fn frontal(correction: &Correction, depth_m: f64) -> Result<Vec<f64>> {
-    let picture = vec![depth_m as f32; correction.parts().camera.pixels()];
+    let picture = vec![depth_m as f32; correction.camera.pixels()];
     correction.corrected(&picture, &Conditions::default())
 }
 
 /// What tables of [`frontal`] leave out, told where it matters.
 pub(super) fn notes_of_bias(correction: &Correction) -> Vec<String> {
-    let parts = correction.parts();
+    let Correction { needs, drifts, .. } = correction;
     let mut notes = Vec::new();
     if correction.is_identity() {
         notes.push("the model holds no bias: the table corrects nothing".to_string());
     }
-    if parts.needs.slope {
+    if needs.slope {
         notes.push(
             "a bias that follows the surface's slope is in the table as of frontal surfaces".into(),
         );
     }
-    if parts.needs.session || parts.needs.temperature || !parts.drifts.is_empty() {
+    if needs.session || needs.temperature || !drifts.is_empty() {
         notes.push("a bias that changes in the course of a session is in the table as at its begin, without a thermometer".into());
     }
     notes

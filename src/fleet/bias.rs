@@ -12,9 +12,9 @@ use super::curve::Curve;
 use super::own::{Member, Standing, sort_out, standings};
 use super::unit::UnitModel;
 use crate::camera::Camera;
-use crate::effects::KINECT_BASELINE_M;
 use crate::model::{Effect, NoiseModel};
 use crate::plane::Plane;
+use crate::sensors::KINECT_BASELINE_M;
 use crate::terms::{PixelContext, Pixels, Term};
 
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -62,8 +62,7 @@ fn by_id(id: &str, units: &[(String, &[Effect])]) -> SharedEffect {
         };
         found_in.push(unit.clone());
         for (name, value) in &effect.parameters {
-            let number = value.get("value").unwrap_or(value).as_f64();
-            let Some(number) = number.filter(|v| v.is_finite()) else { continue };
+            let Some(number) = effect.number(name).filter(|v| v.is_finite()) else { continue };
             let std_error = value.get("std_error").and_then(serde_json::Value::as_f64);
             let std_error = std_error.filter(|s| s.is_finite());
             let of_unit = ParameterOfUnit { unit: unit.clone(), value: number, std_error };

@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use super::images::size_of;
-use super::raw_values::{OPENKINECT, RawValues};
+use super::raw_values::RawValues;
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
 use crate::read::read_text;
-use crate::sensors::{PRESET_UNITS_PER_METRE, Preset};
+use crate::sensors::{KINECT_BASELINE_M, OPENKINECT, PRESET_UNITS_PER_METRE, Preset};
 use crate::units::shortest;
 use crate::view::{FrameRef, Sensor};
 
@@ -28,8 +28,6 @@ pub struct Assumed {
 
 /// Focal length of a Kinect v1 infrared camera to a percent, and the image centre.
 const KINECT_INTRINSICS: [f64; 4] = [585.0, 585.0, 319.5, 239.5];
-/// Projector to camera in every Kinect v1 (LDDIS of the OpenNI device properties: 7.5 cm).
-const KINECT_BASELINE_M: f64 = 0.075;
 /// What ROS publishes for an uncalibrated PrimeSense camera; the TUM tools assume it too.
 const ROS_INTRINSICS: [f64; 4] = [525.0, 525.0, 319.5, 239.5];
 /// Of the images that these intrinsics belong to, px.

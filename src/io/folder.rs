@@ -4,13 +4,12 @@
 use std::path::{Path, PathBuf};
 
 use super::assumed::Assumed;
-use super::images::{encode_pgm16, size_of};
+use super::images::size_of;
 use super::layout::{DEPTH_LIST, DESCRIPTION, UnknownKeys, is_view, read_sensor};
 use super::list::{read_list, shorten};
-use super::output::{entries, listed, refuse_full, write_atomic};
+use super::output::{entries, listed};
 use super::stills::{Film, Footage};
 use crate::error::{Error, Result};
-use crate::frame::Frame;
 use crate::read::{is_there, read_text};
 use crate::view::{FrameRef, Sensor};
 
@@ -205,30 +204,6 @@ pub(super) fn dump(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> 
     };
     Ok((footage, sensor))
 }
-
-/// Write depth frames as fakenect-record would have: stamps in s, frames of 640 x 480 raw values.
-/// fakenect plays nothing else.
-pub fn write_dump<'a>(
-    root: &Path,
-    frames: impl IntoIterator<Item = (f64, &'a Frame)>,
-) -> Result<()> {
-    refuse_full(root)?;
-    std::fs::create_dir_all(root).map_err(|e| Error::write(root, e))?;
-    let mut index = String::new();
-    for (stamp, frame) in frames {
-        // The sensor's own clock: 60 MHz in 32 bits.
-        let ticks = (stamp * CLOCK_HZ) as u64 as u32;
-        let name = format!("d-{stamp:.6}-{ticks}.pgm");
-        let file = root.join(&name);
-        std::fs::write(&file, encode_pgm16(frame)).map_err(|e| Error::write(&file, e))?;
-        index += &name;
-        index.push('\n');
-    }
-    write_atomic(&root.join(INDEX), index.as_bytes())
-}
-
-/// Of a Kinect v1's timestamps.
-const CLOCK_HZ: f64 = 60e6;
 
 /// Host time in seconds: the first number of `d-<time>-<stamp>.pgm`.
 fn stamp(name: &str) -> Option<f64> {

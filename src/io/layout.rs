@@ -158,22 +158,17 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
 
 pub(super) fn read_sensor(path: &Path, unknown: &mut UnknownKeys) -> Result<Sensor> {
     let text = read_json(path)?;
-    let wrong = |what: String| Error::text(path, line_named(&text, &what), what, REMEDY_JSON);
     // Another format has other keys: its name says more than the first key that is missing.
     let Format { format } = parse(path, &text)?;
     if format != RECORDING_FORMAT {
-        return Err(wrong(format!("format is \"{format}\", expected \"{RECORDING_FORMAT}\"")));
+        let what = format!("format is \"{format}\", expected \"{RECORDING_FORMAT}\"");
+        return Err(wrong(path, &text, what));
     }
     let good = json!({
         "format": "", "sensor": "", "width": 1, "height": 1, "fx": 1, "fy": 1, "cx": 1, "cy": 1
     });
-    let file = parse_named::<RecordingFile>(path, &text, &good)?;
-    let given = parse(path, &text)?;
-    if let Some(what) = absurd(&given) {
-        return Err(wrong(what));
-    }
-    unknown.note(path, &given, &json!(file));
-    file.sensor().map_err(wrong)
+    let file: RecordingFile = parse_whole(path, &text, &good, unknown)?;
+    file.sensor().map_err(|what| wrong(path, &text, what))
 }
 
 /// The sensor of a `recording.json`.
@@ -220,6 +215,27 @@ fn parse_named<T: serde::de::DeserializeOwned>(path: &Path, text: &str, good: &V
     })
 }
 
+/// As [`parse_named`]; absurd values are refused, and keys that nobody reads noted.
+fn parse_whole<T: Serialize + serde::de::DeserializeOwned>(
+    path: &Path,
+    text: &str,
+    good: &Value,
+    unknown: &mut UnknownKeys,
+) -> Result<T> {
+    let file = parse_named::<T>(path, text, good)?;
+    let given = parse(path, text)?;
+    if let Some(what) = absurd(&given) {
+        return Err(wrong(path, text, what));
+    }
+    unknown.note(path, &given, &json!(file));
+    Ok(file)
+}
+
+/// An error at the line of the key that it names.
+fn wrong(path: &Path, text: &str, what: String) -> Error {
+    Error::text(path, line_named(text, &what), what, REMEDY_JSON)
+}
+
 fn open_view(
     folder: &Path,
     name: &str,
@@ -255,14 +271,8 @@ fn open_view(
 
 fn read_notes(path: &Path, unknown: &mut UnknownKeys) -> Result<ViewNotes> {
     let text = read_json(path)?;
-    let wrong = |what: String| Error::text(path, line_named(&text, &what), what, REMEDY_JSON);
-    let file = parse_named::<ViewFile>(path, &text, &json!({}))?;
-    let given = parse(path, &text)?;
-    if let Some(what) = absurd(&given) {
-        return Err(wrong(what));
-    }
-    unknown.note(path, &given, &json!(file));
-    file.notes().map_err(wrong)
+    let file: ViewFile = parse_whole(path, &text, &json!({}), unknown)?;
+    file.notes().map_err(|what| wrong(path, &text, what))
 }
 
 /// Write `view.json` into the view's folder; nothing where nothing is known.

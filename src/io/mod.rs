@@ -14,7 +14,6 @@ mod stills;
 mod unfinished;
 
 pub use assumed::Assumed;
-pub use folder::write_dump;
 pub(crate) use folder::{INDEX, results_in};
 pub use images::{FrameSource, encode_pgm16, encode_png16, encode_png16_quickly, encode_rgb};
 pub(crate) use images::{encode_corrected, is_corrected, read_depth, size_of};
@@ -27,6 +26,7 @@ pub use output::{hex, pretty_json, refuse_full, sha256_hex, write_atomic, write_
 pub(crate) use output_folder::is_description;
 pub use output_folder::{Leaves, OutputFolder, refuse_inside, refuse_nested};
 pub use pictures::{ColourImage, InfraredImage};
+pub(crate) use unfinished::lock;
 pub use unfinished::{Interrupted, discard_stale, discard_unfinished};
 
 use std::path::Path;

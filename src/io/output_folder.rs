@@ -15,6 +15,12 @@ use super::output::{entries, listed, sync_folder, write_atomic};
 use super::unfinished::{Open, UNFINISHED, discard, discard_stale, lock, register, unfinished};
 use crate::error::{Error, Result};
 
+/// Of a folder that another run has.
+const TAKEN: [&str; 2] = [
+    "another run is writing into this folder",
+    "wait until it has ended, or choose another folder",
+];
+
 /// What a command fills its folder with.
 #[derive(Debug, Clone, Copy)]
 pub enum Leaves {
@@ -67,7 +73,7 @@ impl OutputFolder {
             refuse_replacing(place, leaves, input)?;
         }
         // Where nothing stands yet, the first to finish has the place, and the other says so.
-        let of_place = if stands == Stands::Nothing { None } else { lock(place)? };
+        let of_place = if stands == Stands::Nothing { None } else { lock(place, TAKEN)? };
         let unique = format!("{}{}", unfinished(), next_number());
         let (parents, staging) = if stands == Stands::Nothing {
             let absolute = std::path::absolute(place).map_err(|e| Error::write(place, e))?;
@@ -103,7 +109,7 @@ impl OutputFolder {
             stood: stands != Stands::Nothing,
         });
         drop(register);
-        folder._locks[1] = lock(&folder.staging)?;
+        folder._locks[1] = lock(&folder.staging, TAKEN)?;
         Ok(folder)
     }
 

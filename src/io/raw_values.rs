@@ -3,16 +3,10 @@
 
 use super::images::read_any;
 use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
+use crate::sensors::OPENKINECT;
 use crate::stats::{median, quantile};
 use crate::units::{decimals, shortest};
 use crate::view::FrameRef;
-
-/// z = 1/(3.33095 - 0.0030711 raw): the fit OpenKinect users have shared since 2010.
-pub(super) const OPENKINECT: DepthCode = DepthCode::Disparity {
-    offset: 3.330_949_516_1,
-    slope: -0.003_071_101_6,
-    invalid: KINECT_NO_MEASUREMENT,
-};
 
 /// Frames that are looked at, spread over all.
 const MAX_FRAMES: usize = 12;

@@ -55,17 +55,13 @@ pub(super) fn discard(staging: &Path, parents: &[PathBuf]) {
     parents.iter().for_each(|parent| drop(fs::remove_dir(parent)));
 }
 
-/// Have a folder for this run alone: two would mix their files.
-/// An error when another run has it.
-pub(super) fn lock(folder: &Path) -> Result<Option<fs::File>> {
+/// Have a folder for this run alone until what is returned is dropped, however the process ends: two
+/// would mix their files. An error of these words when another run has it.
+pub(crate) fn lock(folder: &Path, [what, remedy]: [&'static str; 2]) -> Result<Option<fs::File>> {
     // Some systems open no folder, and some network disks know no locks.
     let Ok(file) = fs::File::open(folder) else { return Ok(None) };
     match file.try_lock() {
-        Err(fs::TryLockError::WouldBlock) => Err(Error::recording(
-            folder,
-            "another run is writing into this folder",
-            "wait until it has ended, or choose another folder",
-        )),
+        Err(fs::TryLockError::WouldBlock) => Err(Error::recording(folder, what, remedy)),
         _ => Ok(Some(file)),
     }
 }

@@ -76,11 +76,7 @@ const CORRELATION: [&str; 3] = ["spatial-correlation", "length_px", "share"];
 impl Noise {
     pub fn of(model: &NoiseModel) -> Self {
         let entry = model.effects.iter().find(|e| e.id == CORRELATION[0]);
-        let number = |name: &str| {
-            let value = entry?.parameters.get(name)?;
-            let number = value.as_f64().or_else(|| value.get("value")?.as_f64());
-            number.filter(|n| n.is_finite())
-        };
+        let number = |name: &str| entry?.number(name).filter(|n| n.is_finite());
         let length = number(CORRELATION[1]).unwrap_or(1.0).max(1.0);
         let share = number(CORRELATION[2]).unwrap_or(1.0).clamp(0.0, 1.0);
         let table = SigmaLookup::of(&model.sigma);

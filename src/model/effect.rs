@@ -39,6 +39,12 @@ const MAX_PX: f64 = 65_536.0;
 const MAX_SCATTER: f64 = 1e3;
 
 impl Effect {
+    /// The number of a parameter, which is a number or {"value": number, ..}.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        let parameter = self.parameters.get(name)?;
+        parameter.get("value").unwrap_or(parameter).as_f64()
+    }
+
     /// What is wrong with it, if anything.
     pub fn fault(&self) -> Option<String> {
         if self.id == UNEXPLAINED && self.shape.is_empty() {

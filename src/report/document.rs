@@ -26,8 +26,6 @@ pub struct Origin {
     pub recording: String,
     /// What was typed, without what results do not depend on.
     pub command: String,
-    /// Name of the folder of results.
-    pub folder: String,
     pub seed: Option<u64>,
     /// RFC 3339, UTC.
     pub created: String,
@@ -38,7 +36,7 @@ impl Origin {
     pub fn at(recording: &str, command: &str, seed: Option<u64>, time: Option<SystemTime>) -> Self {
         let made = Provenance::at(seed, time.unwrap_or_else(SystemTime::now));
         let [recording, command] = [recording, command].map(String::from);
-        Origin { recording, command, folder: String::new(), seed, created: made.created }
+        Origin { recording, command, seed, created: made.created }
     }
 }
 

@@ -61,7 +61,7 @@ impl Against<'_> {
     /// Both paths, and both errors over time, by file name.
     pub fn charts(&self) -> [(&'static str, Chart); 3] {
         let e = self.evaluation;
-        let rpe = format!("Relative pose error over {}", self.interval());
+        let rpe = format!("Relative pose error over {}", self.delta);
         let over_time = |title: &str, each: &[(f64, f64)], colour| {
             let begin = self.estimate.first().map_or(0.0, |p| p.stamp);
             let errors = each.iter().map(|(t, error)| [t - begin, MM * error]).collect();
@@ -101,13 +101,6 @@ impl Against<'_> {
         chart("Paths", [names[i], names[j]], lines, true)
     }
 
-    fn interval(&self) -> String {
-        match self.delta {
-            Delta::Seconds(s) => format!("{s} s"),
-            Delta::Frames(n) => counted(n, "frame"),
-        }
-    }
-
     /// The figures as tiles and as a table, and the errors over time.
     ///
     /// # Errors
@@ -119,7 +112,7 @@ impl Against<'_> {
             let figures = figures.map(|v| html! { (fixed(v, 3)) });
             [html! { (name) }].into_iter().chain(figures).chain([html! { (s.pairs) }]).collect()
         };
-        let over = self.interval();
+        let over = self.delta;
         let degrees = e.rpe.rotation.scaled(1f64.to_degrees());
         let rows = [
             row("ATE after alignment, mm".into(), e.ate.error.scaled(MM)),

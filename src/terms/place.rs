@@ -33,63 +33,41 @@ pub enum Axis {
 }
 
 impl Axis {
+    /// In words, id, unit.
+    const fn names(self) -> [&'static str; 3] {
+        match self {
+            Axis::Z => ["distance from the sensor", "z", "m"],
+            Axis::DisparityPhase => ["phase of the disparity", "disparity-phase", "periods"],
+            Axis::Column => ["column of the picture", "column", "px"],
+            Axis::Row => ["row of the picture", "row", "px"],
+            Axis::Radius => ["distance from the picture's centre", "radius", "px"],
+            Axis::Pixel => ["pixel", "pixel", "px"],
+            Axis::Theta => ["tilt of the target", "theta", "rad"],
+            Axis::Azimuth => ["azimuth of the tilt", "azimuth", "rad"],
+            Axis::TargetPosition => ["place on the target", "target-position", "m"],
+            Axis::EdgeDistance => ["distance from the target's edge", "edge-distance", "px"],
+            Axis::Intensity => ["infrared intensity", "intensity", "of the median"],
+            Axis::Frame => ["time within a view", "frame", "s"],
+            Axis::SessionTime => ["time since the session began", "session-time", "s"],
+            Axis::Temperature => ["temperature", "temperature", "degrees Celsius"],
+            Axis::PixelLag => ["distance between two pixels", "pixel-lag", "px"],
+            Axis::Residual => ["size of the residual", "residual", "sigma"],
+        }
+    }
+
     /// As a sentence calls it, after "the".
     pub fn in_words(self) -> &'static str {
-        match self {
-            Axis::Z => "distance from the sensor",
-            Axis::DisparityPhase => "phase of the disparity",
-            Axis::Column => "column of the picture",
-            Axis::Row => "row of the picture",
-            Axis::Radius => "distance from the picture's centre",
-            Axis::Pixel => "pixel",
-            Axis::Theta => "tilt of the target",
-            Axis::Azimuth => "azimuth of the tilt",
-            Axis::TargetPosition => "place on the target",
-            Axis::EdgeDistance => "distance from the target's edge",
-            Axis::Intensity => "infrared intensity",
-            Axis::Frame => "time within a view",
-            Axis::SessionTime => "time since the session began",
-            Axis::Temperature => "temperature",
-            Axis::PixelLag => "distance between two pixels",
-            Axis::Residual => "size of the residual",
-        }
+        self.names()[0]
     }
 
     /// As `diagnosis.json` writes it.
     pub fn id(self) -> &'static str {
-        match self {
-            Axis::Z => "z",
-            Axis::DisparityPhase => "disparity-phase",
-            Axis::Column => "column",
-            Axis::Row => "row",
-            Axis::Radius => "radius",
-            Axis::Pixel => "pixel",
-            Axis::Theta => "theta",
-            Axis::Azimuth => "azimuth",
-            Axis::TargetPosition => "target-position",
-            Axis::EdgeDistance => "edge-distance",
-            Axis::Intensity => "intensity",
-            Axis::Frame => "frame",
-            Axis::SessionTime => "session-time",
-            Axis::Temperature => "temperature",
-            Axis::PixelLag => "pixel-lag",
-            Axis::Residual => "residual",
-        }
+        self.names()[1]
     }
 
     /// Unit of its values.
     pub fn unit(self) -> &'static str {
-        match self {
-            Axis::Z | Axis::TargetPosition => "m",
-            Axis::Column | Axis::Row | Axis::Radius | Axis::Pixel | Axis::EdgeDistance => "px",
-            Axis::PixelLag => "px",
-            Axis::Theta | Axis::Azimuth => "rad",
-            Axis::SessionTime | Axis::Frame => "s",
-            Axis::Temperature => "degrees Celsius",
-            Axis::DisparityPhase => "periods",
-            Axis::Intensity => "of the median",
-            Axis::Residual => "sigma",
-        }
+        self.names()[2]
     }
 }
 

@@ -86,6 +86,22 @@ pub fn write_depth(path: &Path, frame: &Frame) {
     std::fs::write(path, kinoise::io::encode_png16(frame).expect("encoded")).expect("written");
 }
 
+/// Write depth frames into a new folder as fakenect-record would have: stamps in s, frames of
+/// 640 x 480 raw values. fakenect plays nothing else.
+pub fn write_dump<'a>(root: &Path, frames: impl IntoIterator<Item = (f64, &'a Frame)>) {
+    std::fs::create_dir_all(root).expect("made");
+    let mut index = String::new();
+    for (stamp, frame) in frames {
+        // The sensor's own clock: 60 MHz in 32 bits.
+        let ticks = (stamp * 60e6) as u64 as u32;
+        let name = format!("d-{stamp:.6}-{ticks}.pgm");
+        std::fs::write(root.join(&name), kinoise::io::encode_pgm16(frame)).expect("written");
+        index += &name;
+        index.push('\n');
+    }
+    std::fs::write(root.join("INDEX.txt"), index).expect("written");
+}
+
 pub fn kinoise() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_kinoise"));
     command.env("SOURCE_DATE_EPOCH", "1700000000");

@@ -9,7 +9,7 @@ use crate::terms::{Basis, Coordinate, PixelContext, Term};
 
 pub struct RowRipple;
 
-static CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     id: "row-ripple",
     title: "a ripple over the rows",
     stage: Stage::Disparity,
@@ -38,10 +38,6 @@ static CARD: Card = Card {
 };
 
 impl Effect for RowRipple {
-    fn card(&self) -> &'static Card {
-        &CARD
-    }
-
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let (amplitude, period, width) = (settings.at(0), settings.at(1), exposure.seen.width);
         exposure.shift_disparity(|i| amplitude * (TAU * (i / width) as f64 / period).sin());

@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 use std::process::Command as Process;
 use std::sync::OnceLock;
 
-use kinoise::io::{Assumed, open, write_dump};
+use kinoise::io::{Assumed, open};
 use kinoise::simulate::speckle::Causes;
 use kinoise::simulate::{Physics, Scenery, Shoot, kinect_v1, plan_grid};
 use kinoise::{DepthCode, Recording, Seed};
 
 use crate::common;
 use crate::common::capture::{FRAMES, HELD_STILL, HOLD, folder, frames_of, json, told};
-use crate::common::{BOARD, grid, kinoise};
+use crate::common::{BOARD, grid, kinoise, write_dump};
 
 /// A file of the package libfreenect0.5, or `None` with a line that says what to do.
 fn installed(name: &str) -> Option<PathBuf> {
@@ -65,7 +65,7 @@ fn by_light() -> &'static ByLight {
             let dump = folder.path().join("dump");
             let frames = frames_of(&recording);
             let stamped = frames.iter().enumerate().map(|(k, f)| (1e9 + k as f64 / 30.0, f));
-            write_dump(&dump, stamped).expect("a dump");
+            write_dump(&dump, stamped);
             (folder, ByLight { recording, dump })
         })
         .1

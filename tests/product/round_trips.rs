@@ -4,7 +4,7 @@ use std::path::Path;
 
 use kinoise::io::{
     Assumed, FrameSource, encode_pgm16, encode_png16, encode_png16_quickly, open, open_uncut,
-    read_list, write_dump, write_recording_file, write_view_notes,
+    read_list, write_recording_file, write_view_notes,
 };
 use kinoise::measure::read_table;
 use kinoise::sensors::SensorKind;
@@ -14,6 +14,8 @@ use kinoise::{Camera, DepthCode, Frame, Sensor};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use proptest::option::of;
 use proptest::prelude::*;
+
+use crate::common::write_dump;
 
 fn folder() -> tempfile::TempDir {
     tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder")
@@ -189,7 +191,7 @@ proptest! {
             .collect();
         let folder = folder();
         let root = folder.path().join("dump");
-        write_dump(&root, frames.iter().enumerate().map(|(k, f)| (k as f64 / 30.0, f))).unwrap();
+        write_dump(&root, frames.iter().enumerate().map(|(k, f)| (k as f64 / 30.0, f)));
         let read = open_uncut(&root, &Assumed::default()).unwrap();
         let mut source = FrameSource::new(640, 480);
         let again: Vec<Frame> = read.views[0].depth.iter().map(|f| source.frame(f).unwrap()).collect();

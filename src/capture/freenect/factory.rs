@@ -2,20 +2,14 @@
 
 use super::ffi::{HEIGHT, WIDTH, ZeroPlane};
 use crate::camera::Camera;
-use crate::effects::KINECT_BASELINE_M;
 use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
 use crate::io::Assumed;
+use crate::sensors::{KINECT_BASELINE_M, OPENKINECT};
 use crate::view::Sensor;
 
 /// fx, fy, cx, cy of the depth camera, px, as libfreenect's own point-cloud viewer has them
 /// (examples/glpclview.c, after Nicolas Burrus's calibration of one unit).
 const INTRINSICS: [f64; 4] = [594.21, 591.04, 339.5, 242.7];
-/// z = 1/(3.33095 - 0.0030711 raw), from the same file.
-const OPENKINECT: DepthCode = DepthCode::Disparity {
-    offset: 3.330_949_516_1,
-    slope: -0.003_071_101_6,
-    invalid: KINECT_NO_MEASUREMENT,
-};
 /// libfreenect places the optical axis in the middle of 640 x 480 px (freenect_camera_to_world).
 const FACTORY_CENTRE: [f64; 2] = [320.0, 240.0];
 /// The infrared camera has 1280 columns, the depth every second of them.

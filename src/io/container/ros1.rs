@@ -48,18 +48,77 @@ impl Ros1Bag {
             let what = "this is no ROS bag of version 2.0";
             return Err(source.damaged(what, "give a .bag file; older ones: rosbag migrate"));
         }
-        let mut reader =
-            Reader { chunks: Chunks::new(source), topics: Vec::new(), of: HashMap::new() };
-        let infos = reader.index()?;
-        let mut bag = Ros1Bag {
-            places: vec![Vec::new(); reader.topics.len()],
-            topics: reader.topics,
-            chunks: reader.chunks,
-        };
-        for at in infos {
-            bag.add_chunk(at, &reader.of)?;
+        let mut bag =
+            Ros1Bag { chunks: Chunks::new(source), topics: Vec::new(), places: Vec::new() };
+        let (begins, topic_of) = bag.index()?;
+        for at in begins {
+            bag.add_chunk(at, &topic_of)?;
         }
         Ok(bag)
+    }
+
+    /// Take the topics from the end of the file. Where each chunk begins, in the order of the file; and
+    /// the topic of each connection: several may write to one.
+    fn index(&mut self) -> Result<(Vec<u64>, HashMap<u32, usize>)> {
+        let source = &self.chunks.source;
+        let head = Record::at(source, VERSION.len() as u64)?;
+        if head.fields.op()? != BAG {
+            return Err(source.damaged("the bag's own header is missing", REMEDY));
+        }
+        let index = head.fields.u64("index_pos")?;
+        if index == 0 {
+            return Err(source.damaged("the bag has no index", REMEDY_INDEX));
+        }
+        if index > source.length {
+            let what = format!(
+                "the index should stand at byte {index}, but the file ends at {}",
+                source.length
+            );
+            return Err(source.damaged(what, REMEDY_INDEX));
+        }
+        let (connections, chunks) =
+            (head.fields.u32("conn_count")?, head.fields.u32("chunk_count")?);
+        let (mut begins, mut topic_of) = (Vec::new(), HashMap::new());
+        let (mut listed, mut next) = (0, index);
+        while next < source.length {
+            let record = Record::at(source, next)?;
+            match record.fields.op()? {
+                CONNECTION => {
+                    listed += 1;
+                    let inner = source.bytes(record.data_at, record.data, "a connection")?;
+                    let inner = Fields { source, at: record.data_at, bytes: inner };
+                    let name = record.fields.text("topic")?;
+                    let kind = kind_of(&inner.text("type")?);
+                    let same = |t: &Topic| t.name == name && t.kind == kind;
+                    let topic = self.topics.iter().position(same).unwrap_or(self.topics.len());
+                    if topic == self.topics.len() {
+                        let logged_ns = Vec::new();
+                        self.topics.push(Topic { name, kind, dialect: Dialect::Ros1, logged_ns });
+                        self.places.push(Vec::new());
+                    }
+                    topic_of.insert(record.fields.u32("conn")?, topic);
+                }
+                CHUNK_INFO => begins.push(record.fields.u64("chunk_pos")?),
+                op => {
+                    let what = format!("at byte {next}: a record of kind {op} in the index");
+                    return Err(source.damaged(what, REMEDY_INDEX));
+                }
+            }
+            next = record.end();
+        }
+        if (listed, begins.len()) != (connections, chunks as usize) {
+            let what = format!(
+                "the index lists {listed} of {connections} connections and {} of {chunks} chunks",
+                begins.len()
+            );
+            return Err(source.damaged(what, REMEDY_INDEX));
+        }
+        begins.sort_unstable();
+        // Each would be gone through again, with all that its index lists.
+        if begins.windows(2).any(|w| w[0] == w[1]) {
+            return Err(source.damaged("the index lists a chunk twice", REMEDY_INDEX));
+        }
+        Ok((begins, topic_of))
     }
 
     fn add_chunk(&mut self, at: u64, topic_of: &HashMap<u32, usize>) -> Result<()> {
@@ -149,77 +208,6 @@ impl Bag for Ros1Bag {
         // The whole of it has to be there, whatever is asked for.
         self.chunks.bytes(chunk, begin + length, 0, "the end of a message")?;
         Ok(Message { bytes: bytes(begin, length.min(limit))?, length })
-    }
-}
-
-/// What the end of the file lists.
-struct Reader {
-    chunks: Chunks,
-    topics: Vec<Topic>,
-    /// The topic of a connection: several may write to one.
-    of: HashMap<u32, usize>,
-}
-
-impl Reader {
-    /// Where each chunk begins, in the order of the file.
-    fn index(&mut self) -> Result<Vec<u64>> {
-        let source = &self.chunks.source;
-        let head = Record::at(source, VERSION.len() as u64)?;
-        if head.fields.op()? != BAG {
-            return Err(source.damaged("the bag's own header is missing", REMEDY));
-        }
-        let index = head.fields.u64("index_pos")?;
-        if index == 0 {
-            return Err(source.damaged("the bag has no index", REMEDY_INDEX));
-        }
-        if index > source.length {
-            let what = format!(
-                "the index should stand at byte {index}, but the file ends at {}",
-                source.length
-            );
-            return Err(source.damaged(what, REMEDY_INDEX));
-        }
-        let (connections, chunks) =
-            (head.fields.u32("conn_count")?, head.fields.u32("chunk_count")?);
-        let (mut listed, mut begins, mut next) = (0, Vec::new(), index);
-        while next < source.length {
-            let record = Record::at(source, next)?;
-            match record.fields.op()? {
-                CONNECTION => {
-                    listed += 1;
-                    let inner = source.bytes(record.data_at, record.data, "a connection")?;
-                    let inner = Fields { source, at: record.data_at, bytes: inner };
-                    let name = record.fields.text("topic")?;
-                    let kind = kind_of(&inner.text("type")?);
-                    let same = |t: &Topic| t.name == name && t.kind == kind;
-                    let topic = self.topics.iter().position(same).unwrap_or(self.topics.len());
-                    if topic == self.topics.len() {
-                        let logged_ns = Vec::new();
-                        self.topics.push(Topic { name, kind, dialect: Dialect::Ros1, logged_ns });
-                    }
-                    self.of.insert(record.fields.u32("conn")?, topic);
-                }
-                CHUNK_INFO => begins.push(record.fields.u64("chunk_pos")?),
-                op => {
-                    let what = format!("at byte {next}: a record of kind {op} in the index");
-                    return Err(source.damaged(what, REMEDY_INDEX));
-                }
-            }
-            next = record.end();
-        }
-        if (listed, begins.len()) != (connections, chunks as usize) {
-            let what = format!(
-                "the index lists {listed} of {connections} connections and {} of {chunks} chunks",
-                begins.len()
-            );
-            return Err(source.damaged(what, REMEDY_INDEX));
-        }
-        begins.sort_unstable();
-        // Each would be gone through again, with all that its index lists.
-        if begins.windows(2).any(|w| w[0] == w[1]) {
-            return Err(source.damaged("the index lists a chunk twice", REMEDY_INDEX));
-        }
-        Ok(begins)
     }
 }
 

@@ -3,6 +3,7 @@
 use maud::{Markup, html};
 
 use crate::report::document::{self, fold, list, prose};
+use crate::units::counted;
 use crate::view::Excluded;
 
 /// Longer lists fold away.
@@ -36,10 +37,6 @@ pub(super) fn section(warnings: &[String], excluded: &[Excluded]) -> Markup {
             }
         },
     )
-}
-
-fn counted(n: usize, noun: &str) -> String {
-    if n == 1 { format!("1 {noun}") } else { format!("{n} {noun}s") }
 }
 
 /// Remarks that differ in the view and in numbers only, together; in order of appearance.

@@ -238,7 +238,7 @@ fn picture() -> ViewPictures {
 }
 
 fn rendered(diagnosis: &Diagnosis, picture: ViewPictures) -> Result<String> {
-    let origin = &Origin { recording: "rec".into(), folder: "out".into(), ..Origin::default() };
+    let origin = &Origin { recording: "rec".into(), ..Origin::default() };
     let steps =
         &[Step { why: "Take the errors out: ".into(), command: "kinoise correct 'a b'".into() }];
     let (title, shown) = ("Kinect & co", &[picture]);

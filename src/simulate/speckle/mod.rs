@@ -25,11 +25,12 @@ use pattern::{Field, Grain, Pattern};
 use reference::{Candidates, REFERENCE_M, ReadOut, Reference};
 
 use crate::camera::Camera;
-use crate::effects::{Instant, KINECT_BASELINE_M};
+use crate::effects::Instant;
 use crate::frame::{Frame, KINECT_NO_MEASUREMENT};
 use crate::plane::Plane;
 use crate::rng::{Seed, Stream};
 use crate::scene::{Bench, Seen, Target, WHITE, World};
+use crate::sensors::KINECT_BASELINE_M;
 use crate::stats::range;
 use crate::view::Sensor;
 

@@ -3,6 +3,7 @@
 
 use super::optics::Picture;
 use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
+use crate::stats::SummedArea;
 
 /// Distance of the factory's plane, m. The real one is not published; at 2 m the picture moves by
 /// +22 px at 1 m and by -11 px at 4 m.
@@ -109,7 +110,7 @@ impl ReadOut {
     }
 }
 
-/// A picture with the sums over the window about each pixel, row-major.
+/// A picture with the sums over the window about each pixel, row-major; zero where it does not fit.
 pub struct WindowedImage {
     pub width: usize,
     pub height: usize,
@@ -121,49 +122,28 @@ pub struct WindowedImage {
 
 impl WindowedImage {
     pub fn new(grey: &[u32], width: usize, half: usize) -> Self {
-        let squares: Vec<u32> = grey.iter().map(|g| g * g).collect();
+        let height = grey.len() / width;
+        // Whole numbers: the sums are exact.
+        let sums = SummedArea::of(width, height, |i| {
+            let g = f64::from(grey[i]);
+            Some([g, g * g])
+        });
         let area = ((2 * half + 1) as f32).powi(2);
-        let sum: Vec<f32> = window_sums(grey, width, half).iter().map(|&s| s as f32).collect();
-        let contrast =
-            |(&squares, &sum): (&u32, &f32)| (squares as f32 - sum * sum / area).max(0.0).sqrt();
-        WindowedImage {
-            width,
-            height: grey.len() / width,
-            grey: grey.iter().map(|&g| g as f32).collect(),
-            contrast: window_sums(&squares, width, half).iter().zip(&sum).map(contrast).collect(),
-            sum,
+        let (mut sum, mut contrast) = (vec![0f32; grey.len()], vec![0f32; grey.len()]);
+        for v in half..height.saturating_sub(half) {
+            for u in half..width.saturating_sub(half) {
+                let [total, squares] = sums.around(u, v, half).map(|s| s as f32);
+                sum[v * width + u] = total;
+                contrast[v * width + u] = (squares - total * total / area).max(0.0).sqrt();
+            }
         }
+        let grey = grey.iter().map(|&g| g as f32).collect();
+        WindowedImage { width, height, grey, sum, contrast }
     }
 
     pub fn row<'a>(&self, values: &'a [f32], v: usize) -> &'a [f32] {
         &values[v * self.width..][..self.width]
     }
-}
-
-/// Sum of each pixel's `(2 half + 1)^2` neighbourhood; zero where it does not fit. Exact.
-fn window_sums(values: &[u32], width: usize, half: usize) -> Vec<u32> {
-    let height = values.len() / width;
-    let side = 2 * half + 1;
-    let mut sums = vec![0; values.len()];
-    let mut columns = vec![0u32; width];
-    for bottom in 0..height {
-        let row = &values[bottom * width..][..width];
-        columns.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
-        if bottom >= side {
-            let old = &values[(bottom - side) * width..][..width];
-            columns.iter_mut().zip(old).for_each(|(sum, value)| *sum -= value);
-        }
-        if bottom + 1 >= side && width >= side {
-            let out = &mut sums[(bottom - half) * width..][..width];
-            let mut sum: u32 = columns[..side - 1].iter().sum();
-            for right in side - 1..width {
-                sum += columns[right];
-                out[right - half] = sum;
-                sum -= columns[right + 1 - side];
-            }
-        }
-    }
-    sums
 }
 
 /// Candidates are worked on in groups of this size: a multiple of any vector register.
@@ -271,12 +251,16 @@ mod tests {
     #[test]
     fn window_sums_are_the_sums_over_windows() {
         let values: Vec<u32> = (0..70u32).map(|i| i * i % 101).collect();
-        let sums = window_sums(&values, 10, 1);
-        let expected: u32 =
-            (2..5).flat_map(|v| (4..7).map(move |u| v * 10 + u)).map(|i| values[i]).sum();
-        assert_eq!(sums[3 * 10 + 5], expected);
-        assert_eq!(sums[0], 0);
-        assert_eq!(sums[6 * 10 + 5], 0, "the last row has no whole window");
+        let image = WindowedImage::new(&values, 10, 1);
+        let window = (2..5).flat_map(|v| (4..7).map(move |u| v * 10 + u)).map(|i| values[i]);
+        let window: Vec<u32> = window.collect();
+        let sum: u32 = window.iter().sum();
+        let squares: u32 = window.iter().map(|g| g * g).sum();
+        assert_eq!(image.sum[3 * 10 + 5], sum as f32);
+        let contrast = (squares as f32 - (sum * sum) as f32 / 9.0).sqrt();
+        assert_eq!(image.contrast[3 * 10 + 5], contrast);
+        assert_eq!(image.sum[0], 0.0);
+        assert_eq!(image.sum[6 * 10 + 5], 0.0, "the last row has no whole window");
     }
 
     #[test]
