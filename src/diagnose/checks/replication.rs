@@ -14,6 +14,8 @@ use crate::diagnose::search::evidence::Evidence;
 
 /// Standard errors from which on a half sees something by itself.
 const SEEN: f64 = 2.0;
+/// What a half knows by less than this share of what all views know, it tells nothing of.
+const LEAST_KNOWN: f64 = 0.1;
 /// Two-sided.
 const INTERVAL: f64 = 0.95;
 /// Views that are neighbours in distance; these are dealt out by tilt.
@@ -135,29 +137,67 @@ impl Halves {
         Some(Halves { metric, whole, halves, spans: spans(counts) })
     }
 
-    /// Do both halves have these terms, taken as one shape? `None` where the terms have no columns
-    /// of their own, or a half has too few views. No formula is exact: each half may be off by this share
-    /// of the size beside its own error.
+    /// Do both halves have these terms, taken as one shape? No formula is exact: each half may be off by
+    /// this share of the size beside its own error. `None` where the terms have no columns of their own, or
+    /// a half has too few views.
     pub fn replicate(&self, terms: &[usize], formula_error: f64) -> Option<bool> {
-        let (mut sizes, seen) = self.shown(terms)?;
-        for size in &mut sizes {
-            size.std_error = size.std_error.hypot(formula_error * size.value);
-        }
-        Some(alike(&sizes) && seen > SEEN)
+        Some(self.shown(terms)?.replicates(formula_error))
     }
 
-    /// Does neither half show what the other has, or each the opposite? Sizes that differ are no
-    /// contradiction: of true ones a twentieth lie outside their interval, and sensors warm up.
+    /// The same of curves without a name, which are what the other terms leave: these are as all views have
+    /// them.
+    pub fn replicate_beside(&self, terms: &[usize]) -> Option<bool> {
+        Some(self.shown_beside(terms)?.replicates(0.0))
+    }
+
+    /// Does neither half show what the other has, or each the opposite, beside the other terms? Sizes that
+    /// differ are no contradiction: of true ones a twentieth lie outside their interval, and sensors warm up.
     pub fn contradict(&self, terms: &[usize]) -> bool {
-        let opposite = |sizes: [ViewMean; 2]| sizes[0].value * sizes[1].value <= 0.0;
-        self.shown(terms).is_some_and(|(sizes, seen)| opposite(sizes) || seen <= SEEN)
+        let opposite = |sizes: &[ViewMean; 2]| sizes[0].value * sizes[1].value <= 0.0;
+        self.shown_beside(terms).is_some_and(|s| opposite(&s.sizes) || s.seen() <= SEEN)
     }
 
-    /// What each half has of the common shape, and how clearly the better seen of them shows what the
-    /// other has, in standard errors.
-    fn shown(&self, terms: &[usize]) -> Option<([ViewMean; 2], f64)> {
-        let columns: Vec<usize> =
-            terms.iter().filter_map(|&t| self.spans.get(t).cloned()).flatten().collect();
+    /// What each half has along the very shape, all other terms being as all views have them: of terms that
+    /// nearly say the same, and of nodes that a half hardly sees, each half makes another part. Of its own
+    /// shape it tells what it knows.
+    fn shown_beside(&self, terms: &[usize]) -> Option<Shown> {
+        let columns = self.columns(terms);
+        let of = |v: &DVector<f64>| DVector::from_fn(columns.len(), |i, _| v[columns[i]]);
+        let block = |m: &DMatrix<f64>| {
+            DMatrix::from_fn(columns.len(), columns.len(), |i, k| m[(columns[i], columns[k])])
+        };
+        let hardly_known = LEAST_KNOWN * block(&self.metric);
+        let alone = |half: &Half| {
+            let precision = half.factor.l() * half.factor.l().transpose();
+            let mut left = &half.beta - &self.whole;
+            columns.iter().for_each(|&c| left[c] = half.beta[c]);
+            let (score, precision) = (of(&(&precision * left)), block(&precision));
+            let shape = (&precision + &hardly_known).cholesky()?.solve(&score);
+            let beyond: Vec<DVector<f64>> = half.beyond.iter().map(of).collect();
+            Some((score, precision, beyond, shape))
+        };
+        let halves = [alone(&self.halves[0])?, alone(&self.halves[1])?];
+        let measured = |k: usize, shape: &DVector<f64>| {
+            let (score, precision, beyond, _) = &halves[k];
+            let (n, square) = (beyond.len() as f64, shape.dot(&(precision * shape)));
+            let scatter: f64 = beyond.iter().map(|s| s.dot(shape).powi(2)).sum();
+            let std_error = (scatter * n / (n - 1.0)).max(square).sqrt() / square;
+            let value = score.dot(shape) / square;
+            (n > 1.0 && square > 0.0).then_some(ViewMean { value, std_error, views: n })
+        };
+        let common = of(&self.whole);
+        Some(Shown {
+            sizes: [measured(0, &common)?, measured(1, &common)?],
+            others: [measured(0, &halves[1].3)?, measured(1, &halves[0].3)?],
+        })
+    }
+
+    fn columns(&self, terms: &[usize]) -> Vec<usize> {
+        terms.iter().filter_map(|&t| self.spans.get(t).cloned()).flatten().collect()
+    }
+
+    fn shown(&self, terms: &[usize]) -> Option<Shown> {
+        let columns = self.columns(terms);
         if columns.is_empty() {
             return None;
         }
@@ -173,10 +213,32 @@ impl Halves {
         };
         let [first, second] = &self.halves;
         let common = along(&self.whole);
-        let sizes = [first.measured(&common)?, second.measured(&common)?];
-        let seen =
-            [first.measured(&along(&second.beta))?.z(), second.measured(&along(&first.beta))?.z()];
-        Some((sizes, seen[0].max(seen[1])))
+        Some(Shown {
+            sizes: [first.measured(&common)?, second.measured(&common)?],
+            others: [first.measured(&along(&second.beta))?, second.measured(&along(&first.beta))?],
+        })
+    }
+}
+
+/// What halves have of a shape.
+struct Shown {
+    /// Of the common one, each.
+    sizes: [ViewMean; 2],
+    /// Of the other half's, each.
+    others: [ViewMean; 2],
+}
+
+impl Shown {
+    /// How clearly the better seen of them shows what the other has, in standard errors.
+    fn seen(&self) -> f64 {
+        self.others[0].z().max(self.others[1].z())
+    }
+
+    fn replicates(mut self, formula_error: f64) -> bool {
+        for size in &mut self.sizes {
+            size.std_error = size.std_error.hypot(formula_error * size.value);
+        }
+        alike(&self.sizes) && self.seen() > SEEN
     }
 }
 

@@ -124,7 +124,10 @@ fn finding(
         parameters,
         size: size(scene, &mine),
         p_adjusted: Some(chosen.p),
-        replicated: outcome.halves.as_ref().and_then(|h| h.replicate(group, formula_error)),
+        replicated: outcome.halves.as_ref().and_then(|h| match chosen.candidate.family {
+            Some(_) => h.replicate(group, formula_error),
+            None => h.replicate_beside(group),
+        }),
         physics,
         shape,
         curve: Some(along.curve(scene, &left, &mine)),

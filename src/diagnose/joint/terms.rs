@@ -7,6 +7,7 @@ use super::fit::{Joint, Reduced, SMOOTHNESS};
 use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::choose::behind;
 use crate::diagnose::search::outcome::Chosen;
+use crate::diagnose::views::tiles::SIDE;
 use crate::terms::{Axis, Basis, Coordinate, Statistic, Term};
 
 /// Maps take the place of terms where they predict views left out better by this share, and by so
@@ -261,13 +262,24 @@ fn is_radial_name(c: &Candidate) -> bool {
     c.family.is_some() && c.basis.axis() == Axis::Radius
 }
 
+/// From so many nodes on no smooth map stands in for lines.
+const FINE_LINES: usize = 30;
+/// Side of a larger patch, px, and how many of them a node needs to be known from its neighbours.
+const COARSE_PX: f64 = (2 * SIDE) as f64;
+const PATCHES_A_NODE: f64 = 2.0;
+
 /// Can a smooth map stand in for it at all?
 pub fn is_rough(c: &Candidate) -> bool {
-    let fine_lines = matches!(
-        c.basis,
-        Basis::Curve { over: Coordinate::Column | Coordinate::Row, nodes: 2 | 30.., .. }
-    );
-    c.basis.is_fine() || fine_lines || c.basis.period().is_some()
+    let changes_within_a_patch = match c.basis {
+        Basis::Curve { over: Coordinate::Column | Coordinate::Row, low, high, nodes, .. } => {
+            nodes == 2
+                || nodes >= FINE_LINES
+                || high - low < PATCHES_A_NODE * COARSE_PX * nodes as f64
+        }
+        Basis::Curve { .. } => c.basis.alone().is_some(),
+        _ => false,
+    };
+    c.basis.is_fine() || changes_within_a_patch || c.basis.period().is_some()
 }
 
 fn is_of_sensor(c: &Candidate) -> bool {

@@ -150,7 +150,7 @@ impl<'a> Views<'a> {
         let nothing = || Evidence::sum(basis.count(), 0.0, []);
         let of = |p: &Option<Prepared<'_>>| p.as_ref().map_or_else(nothing, |p| p.evidence(basis));
         let mut all: Vec<Evidence> = self.prepared.iter().map(of).collect();
-        let as_fine = basis.is_fine() || basis.of_column_alone();
+        let as_fine = basis.is_fine() || basis.alone().is_some();
         let data = if as_fine { self.fine } else { self.coarse };
         let views = all.iter_mut().zip(data).zip(self.doubted);
         for ((e, view), doubt) in views.filter(|(_, d)| **d > 1.0) {
@@ -217,8 +217,14 @@ pub fn few_views(
     if most < noise.threshold(rules.level) {
         return None;
     }
-    let name = all.iter().find(|(c, b)| c.family.is_some() && b.gain > NAME_ADEQUATE * most);
-    let (candidate, best) = name.or(all.first())?;
+    let named = |c: &Candidate| c.family.is_some();
+    let curve = all.iter().find(|(c, _)| !named(c));
+    // In a single view a curve without a name shows as much as a name that is hardly better.
+    let clear = |b: &Best| curve.is_none_or(|(_, curve)| NAME_ADEQUATE * b.gain > curve.gain);
+    let name = all.iter().find(|(c, b)| {
+        named(c) && b.gain > NAME_ADEQUATE * most && (b.views.len() > 1 || clear(b))
+    });
+    let (candidate, best) = name.or(curve)?;
     Some(report(scene, candidate, best, noise.p(most)))
 }
 
