@@ -217,14 +217,15 @@ pub fn few_views(
     if most < noise.threshold(rules.level) {
         return None;
     }
-    let named = |c: &Candidate| c.family.is_some();
-    let curve = all.iter().find(|(c, _)| !named(c));
-    // In a single view a curve without a name shows as much as a name that is hardly better.
-    let clear = |b: &Best| curve.is_none_or(|(_, curve)| NAME_ADEQUATE * b.gain > curve.gain);
-    let name = all.iter().find(|(c, b)| {
-        named(c) && b.gain > NAME_ADEQUATE * most && (b.views.len() > 1 || clear(b))
-    });
-    let (candidate, best) = name.or(curve)?;
+    let curves = || all.iter().filter(|(c, _)| c.family.is_none());
+    // In a few views much looks alike: a name must be better than what has none on another axis.
+    let clear = |(c, b): &(&Candidate, Best)| {
+        let mut others = curves().filter(|o| o.0.basis.axis() != c.basis.axis());
+        others.all(|o| o.1.gain < NAME_ADEQUATE * b.gain)
+    };
+    let names = all.iter().filter(|(c, b)| c.family.is_some() && b.gain > NAME_ADEQUATE * most);
+    let name = names.clone().find(|n| clear(n));
+    let (candidate, best) = name.or(curves().next()).or(names.clone().next())?;
     Some(report(scene, candidate, best, noise.p(most)))
 }
 
