@@ -217,16 +217,21 @@ pub fn few_views(
     if most < noise.threshold(rules.level) {
         return None;
     }
+    let (candidate, best) = told(&all)?;
+    Some(report(scene, candidate, best, noise.p(most)))
+}
+
+/// Of the candidates, best first, the name or else the curve to report. In a few views much looks alike: a
+/// name must be better than what has none on another axis.
+fn told<'a>(all: &'a [(&'a Candidate, Best)]) -> Option<&'a (&'a Candidate, Best)> {
+    let most = all.first()?.1.gain;
     let curves = || all.iter().filter(|(c, _)| c.family.is_none());
-    // In a few views much looks alike: a name must be better than what has none on another axis.
-    let clear = |(c, b): &(&Candidate, Best)| {
+    let clear = |(c, b): &&(&Candidate, Best)| {
         let mut others = curves().filter(|o| o.0.basis.axis() != c.basis.axis());
         others.all(|o| o.1.gain < NAME_ADEQUATE * b.gain)
     };
-    let names = all.iter().filter(|(c, b)| c.family.is_some() && b.gain > NAME_ADEQUATE * most);
-    let name = names.clone().find(|n| clear(n));
-    let (candidate, best) = name.or(curves().next()).or(names.clone().next())?;
-    Some(report(scene, candidate, best, noise.p(most)))
+    let names = || all.iter().filter(|(c, b)| c.family.is_some() && b.gain > NAME_ADEQUATE * most);
+    names().find(clear).or(curves().next()).or(names().next())
 }
 
 fn report(scene: &Scene<'_>, candidate: &Candidate, best: &Best, p: f64) -> Finding {

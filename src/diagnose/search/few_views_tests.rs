@@ -61,3 +61,26 @@ fn noise_brings_less_than_the_choice_costs() {
     let above = (0..200).filter(|&n| gain(n) > 5.0).count();
     assert!(above <= 6, "{above} of 200 above 5 nats");
 }
+
+/// Bands that a curve along the distance explains as well have no name; where only one along their own
+/// axis does they have.
+#[test]
+fn a_name_is_better_than_curves_on_other_axes() {
+    let basis = |over| Basis::Ring { over, period: 1.0, nodes: 6, times: Modulation::One };
+    let [columns, distance] = [Coordinate::Column, Coordinate::Z].map(basis);
+    let bands = Candidate::named("column-banding", columns.clone());
+    let [own, other] = [columns, distance].map(Candidate::curve);
+    let found =
+        |candidate, gain| (candidate, Best { gain, views: vec![3], beta: DVector::zeros(6) });
+    let cases = [
+        (&other, 95.0, None),
+        (&other, 60.0, Some("column-banding")),
+        (&own, 99.0, Some("column-banding")),
+    ];
+    for (curve, gain, name) in cases {
+        let all = [found(&bands, 100.0), found(curve, gain)];
+        assert_eq!(told(&all).unwrap().0.family, name, "{gain}");
+    }
+    let all = [found(&other, 100.0), found(&bands, 80.0)];
+    assert_eq!(told(&all).unwrap().0.family, None, "a name that explains too little");
+}
