@@ -31,6 +31,9 @@ pub(super) fn degrees(radians: f64) -> String {
 
 /// With a decimal where one is needed to tell it from 0 or 100 %.
 pub(super) fn percent(share: f64) -> String {
+    if share > 0.0 && share < 0.0005 {
+        return "less than 0.1 %".into();
+    }
     let near_an_end = |share: f64| share > 0.0 && share < 0.01;
     let decimals = usize::from(near_an_end(share) || near_an_end(1.0 - share));
     // What is not all does not read as all.
@@ -179,6 +182,7 @@ mod tests {
         assert_eq!(millimetres(-0.0231), "−23.1");
         assert_eq!(degrees(std::f64::consts::PI), "180.0");
         assert_eq!([0.995, 0.99996, 1.0].map(percent), ["99.5 %", "99.9 %", "100 %"]);
+        assert_eq!([0.0, 0.0004, 0.004].map(percent), ["0 %", "less than 0.1 %", "0.4 %"]);
         assert_eq!(count(2, "cause"), "two causes");
     }
 

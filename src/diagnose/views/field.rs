@@ -124,6 +124,7 @@ impl Field {
             measured: vec![0; n],
             first: Vec::new(),
             frames: Vec::new(),
+            lines: Vec::new(),
             words: RawHistogram::none(),
             ..self.clone()
         };
@@ -208,9 +209,11 @@ impl Field {
         plane: Plane,
         scale_px_m: f64,
         [width, height]: [usize; 2],
-        pixels: Vec<u32>,
+        mut pixels: Vec<u32>,
     ) -> Self {
         let n = pixels.len();
+        // All views stay in memory together.
+        pixels.shrink_to_fit();
         let mut field = Field {
             name: String::new(),
             time_s: 0.0,
