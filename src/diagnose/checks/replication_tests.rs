@@ -76,6 +76,9 @@ fn halves_of_other_sizes_do_not_contradict_each_other() {
     assert!(contradicted(&|_| 0.0) > 320, "{}", contradicted(&|_| 0.0));
 }
 
+/// Draws views from normal numbers; and the columns of each term.
+type Draw<'a> = &'a dyn Fn(&mut dyn FnMut() -> f64) -> (Vec<Evidence>, Vec<usize>);
+
 /// Views of two terms that differ by a thousandth: what a half gives the one it takes from the other.
 /// And views of twelve columns of which those of either half see eight, four of them alone.
 #[test]
@@ -83,15 +86,14 @@ fn halves_that_share_out_or_see_parts_do_not_contradict_each_other() {
     let mut rng = Seed(11).stream("replication/parts");
     let mut noise = move || -> f64 { StandardNormal.sample(&mut rng) };
     let second: Vec<bool> = (0..20).map(|v| v % 2 == 1).collect();
-    let mut contradicted =
-        |halves: &dyn Fn(&mut dyn FnMut() -> f64) -> (Vec<Evidence>, Vec<usize>)| {
-            let one = || {
-                let (views, counts) = halves(&mut noise);
-                let halves = Halves::of(&views, &second, 1e-6, &counts).unwrap();
-                (0..counts.len()).any(|term| halves.contradict(&[term]))
-            };
-            std::iter::repeat_with(one).take(200).filter(|c| *c).count()
+    let mut contradicted = |halves: Draw<'_>| {
+        let one = || {
+            let (views, counts) = halves(&mut noise);
+            let halves = Halves::of(&views, &second, 1e-6, &counts).unwrap();
+            (0..counts.len()).any(|term| halves.contradict(&[term]))
         };
+        std::iter::repeat_with(one).take(200).filter(|c| *c).count()
+    };
     let alike = |noise: &mut dyn FnMut() -> f64| {
         let rows = DMatrix::from_row_slice(2, 2, &[1.0, 1.0, 0.0, 1e-3]);
         let view = |_| {
@@ -103,7 +105,7 @@ fn halves_that_share_out_or_see_parts_do_not_contradict_each_other() {
     assert_eq!(contradicted(&alike), 0);
     let parts = |noise: &mut dyn FnMut() -> f64| {
         let view = |v: usize| {
-            let sees = |k: usize| if v % 2 == 0 { k < 8 } else { k >= 4 };
+            let sees = |k: usize| if v.is_multiple_of(2) { k < 8 } else { k >= 4 };
             let known = DVector::from_fn(12, |k, _| if sees(k) { 1.0 } else { 1e-3 });
             let b = known.map(|w: f64| w * 2.0 + w.sqrt() * noise());
             Evidence { a: DMatrix::from_diagonal(&known), b }

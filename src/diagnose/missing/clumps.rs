@@ -11,7 +11,7 @@ pub const PARTS: usize = 64;
 
 /// The part of a view's reach that each cell lies in.
 pub fn parts(cells: &[Cell<'_>], at: &dyn Fn(&Cell<'_>) -> f64) -> Vec<usize> {
-    let span = range(cells.iter().map(|c| at(c)));
+    let span = range(cells.iter().map(at));
     cells.iter().map(|c| part(at(c), span, PARTS)).collect()
 }
 

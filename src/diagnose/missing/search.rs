@@ -125,7 +125,7 @@ impl<'a> Losses<'a> {
                 .map(|v| step.column(v, self.base).iter().map(|h| size[0] * h).collect())
                 .collect(),
             Shape::Curve(basis) => views
-                .map(|v| v.iter().map(|c| basis.value(size, &c.place, &mut row)).collect())
+                .map(|v| v.iter().map(|c| basis.value(size, c.place, &mut row)).collect())
                 .collect(),
         }
     }
