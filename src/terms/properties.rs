@@ -73,11 +73,6 @@ impl Basis {
         }
     }
 
-    /// Does it depend on the column of the picture alone?
-    pub fn of_column_alone(&self) -> bool {
-        self.alone() == Some(Coordinate::Column)
-    }
-
     /// Does it stand still in the picture, but for its size?
     pub fn is_of_picture(&self) -> bool {
         *self != Basis::Level && self.is_all(Coordinate::is_of_picture)
@@ -121,6 +116,11 @@ impl Basis {
         let over = self.over()[0];
         over == Some(Coordinate::Edge)
             || self.period().is_some() && !over.is_some_and(Coordinate::is_of_picture)
+    }
+
+    /// Is it to be fitted on the smallest patches there are?
+    pub fn needs_tiles(&self) -> bool {
+        self.is_fine() || self.alone().is_some()
     }
 }
 

@@ -1,7 +1,6 @@
 //! Against a simulated recording: the mean and the size of the noise, patch by patch.
 
 use std::collections::{BTreeMap, HashMap};
-use std::sync::Arc;
 
 use super::Baseline;
 use crate::diagnose::finding::pixels::fixed_px2;
@@ -21,7 +20,7 @@ impl Baseline {
         for (real, twin) in survey.views.iter_mut().zip(&self.survey.views) {
             let theirs: HashMap<(u32, u32), f64> =
                 twin.patches().map(|(p, t)| (patch(p.u, p.v, SIDE), t.mean)).collect();
-            for (t, place) in Arc::make_mut(&mut real.tiles).iter_mut().zip(real.places.iter()) {
+            for (place, t) in real.tiles_mut() {
                 let mean = theirs.get(&patch(place.u, place.v, SIDE)).copied();
                 match mean.filter(|m| m.is_finite()) {
                     Some(m) => {

@@ -7,7 +7,7 @@ use super::fit::{Joint, Reduced, SMOOTHNESS};
 use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::choose::behind;
 use crate::diagnose::search::outcome::Chosen;
-use crate::diagnose::views::tiles::SIDE;
+use crate::diagnose::views::samples::COARSE_PX;
 use crate::terms::{Axis, Basis, Coordinate, Statistic, Term};
 
 /// Maps take the place of terms where they predict views left out better by this share, and by so
@@ -264,11 +264,10 @@ fn is_radial_name(c: &Candidate) -> bool {
 
 /// From so many nodes on no smooth map stands in for lines.
 const FINE_LINES: usize = 30;
-/// Side of a larger patch, px, and how many of them a node needs to be known from its neighbours.
-const COARSE_PX: f64 = (2 * SIDE) as f64;
+/// Nodes that are nearer than so many larger patches are not told apart by these.
 const PATCHES_A_NODE: f64 = 2.0;
 
-/// Can a smooth map stand in for it at all?
+/// Too rough for a smooth map to stand in for it, or for larger patches to show it?
 pub fn is_rough(c: &Candidate) -> bool {
     let changes_within_a_patch = match c.basis {
         Basis::Curve { over: Coordinate::Column | Coordinate::Row, low, high, nodes, .. } => {

@@ -150,8 +150,7 @@ impl<'a> Views<'a> {
         let nothing = || Evidence::sum(basis.count(), 0.0, []);
         let of = |p: &Option<Prepared<'_>>| p.as_ref().map_or_else(nothing, |p| p.evidence(basis));
         let mut all: Vec<Evidence> = self.prepared.iter().map(of).collect();
-        let as_fine = basis.is_fine() || basis.alone().is_some();
-        let data = if as_fine { self.fine } else { self.coarse };
+        let data = if basis.needs_tiles() { self.fine } else { self.coarse };
         let views = all.iter_mut().zip(data).zip(self.doubted);
         for ((e, view), doubt) in views.filter(|(_, d)| **d > 1.0) {
             let beta = evidence::fit(std::slice::from_ref(e), self.prior)?;

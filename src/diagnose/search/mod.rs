@@ -152,7 +152,7 @@ fn bases_where(chosen: &[Chosen], which: impl Fn(&Candidate) -> bool) -> Vec<&Ba
 impl Layer<'_> {
     /// Evidence of the views on these terms together.
     fn evidence_of(&self, terms: &[&Basis]) -> Vec<Evidence> {
-        let fine = terms.iter().any(|b| b.is_fine() || b.alone().is_some());
+        let fine = terms.iter().any(|b| b.needs_tiles());
         let views = if fine { self.fine } else { self.coarse };
         evidence_of_bases(views, terms)
     }

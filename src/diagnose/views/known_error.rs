@@ -1,8 +1,6 @@
 //! What the model knows is not known exactly: where new views differ from it by no more than its own
 //! error, nothing is missing.
 
-use std::sync::Arc;
-
 use nalgebra::DVector;
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -108,7 +106,7 @@ impl Survey {
         }
         self.views.par_iter_mut().for_each(|view| {
             let mut row = Vec::new();
-            for (t, place) in Arc::make_mut(&mut view.tiles).iter_mut().zip(view.places.iter()) {
+            for (place, t) in view.tiles_mut() {
                 let off = Term::sum(&off, place, &mut row);
                 t.square += off * (off - 2.0 * t.mean);
                 t.mean -= off;

@@ -64,9 +64,12 @@ pub fn finite(v: f64) -> f64 {
     if v.is_finite() { v } else { 0.0 }
 }
 
+/// Side of a larger patch, px: two tiles.
+pub const COARSE_PX: f64 = (2 * SIDE) as f64;
+
 /// Two tiles by two made one.
 pub fn coarser(fine: &ViewData) -> ViewData {
-    let side = (2 * SIDE) as f64;
+    let side = COARSE_PX;
     let p = fine.precision.len();
     let mut groups: std::collections::BTreeMap<(u32, u32), Vec<usize>> = Default::default();
     for (i, place) in fine.places.iter().enumerate() {

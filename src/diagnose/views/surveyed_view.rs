@@ -96,7 +96,12 @@ impl SurveyedView {
         self.places.iter().zip(self.tiles.iter())
     }
 
-    /// The same, to be changed.
+    /// The same with the tiles to be changed: the places stay shared.
+    pub fn tiles_mut(&mut self) -> impl Iterator<Item = (&PixelContext, &mut Tile)> {
+        self.places.iter().zip(Arc::make_mut(&mut self.tiles))
+    }
+
+    /// Both to be changed.
     pub fn patches_mut(&mut self) -> impl Iterator<Item = (&mut PixelContext, &mut Tile)> {
         Arc::make_mut(&mut self.places).iter_mut().zip(Arc::make_mut(&mut self.tiles))
     }
