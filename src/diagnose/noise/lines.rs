@@ -23,7 +23,7 @@ pub fn lines(fields: &[Field], bias: &[Vec<f32>]) -> (Vec<Term>, Vec<f64>) {
         .enumerate()
         .map(|(n, field)| {
             let mut sums = [vec![(0.0, 0.0); width], vec![(0.0, 0.0); height]];
-            let image = pixel_scale(field, bias.get(n).unwrap_or(&none));
+            let image = pixel_scale(field, &field.mean, bias.get(n).unwrap_or(&none));
             for (i, &r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
                 for (sums, line) in sums.iter_mut().zip([i % width, i / width]) {
                     sums[line].0 += f64::from(r);

@@ -9,6 +9,7 @@ pub mod mixture;
 pub mod outliers;
 pub mod pairs;
 pub mod scatter;
+pub mod still;
 pub mod structure;
 pub mod tail_counts;
 pub mod tails;

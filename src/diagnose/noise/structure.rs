@@ -6,10 +6,11 @@ use rayon::prelude::*;
 
 use super::kurtosis::FourthMoment;
 use super::pairs::Pairs;
+use super::still::{Still, still};
 use super::tail_counts::{FEWEST_READINGS, TailCounts};
 use super::texture::{
     FAR, Filled, LONG_LINE, PROFILE_LAGS, SHORT_LINE, changes, covariance, frame_log_variance,
-    high_passed, moving, pixel_scale, same_pixel, without_lines, without_outliers,
+    high_passed, moving, same_pixel, without_lines, without_outliers,
 };
 use crate::camera::Camera;
 use crate::diagnose::options::FRAMES_KEPT;
@@ -110,21 +111,6 @@ fn beside_bias<'a>(fields: &'a [Field], bias: &'a [Vec<f32>]) -> Vec<(&'a Field,
     fields.iter().enumerate().map(|(n, f)| (f, of(n))).collect()
 }
 
-/// Covariance of a view's mean residual with the other views' at the same pixels, px^2: without and
-/// with what whole lines share.
-struct Still {
-    fixed_px2: Option<f64>,
-    with_lines_px2: Option<f64>,
-}
-
-fn still(views: &[(&Field, &[f32])], camera: &Camera) -> Vec<Still> {
-    let mut means: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| pixel_scale(f, b)).collect();
-    let with_lines = across_views(&means);
-    means.par_iter_mut().for_each(|m| *m = without_lines(m, camera.width, SHORT_LINE));
-    let pairs = across_views(&means).into_iter().zip(with_lines);
-    pairs.map(|(fixed_px2, with_lines_px2)| Still { fixed_px2, with_lines_px2 }).collect()
-}
-
 fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     let mut s = Structure::default();
     let frames: Vec<Vec<f32>> =
@@ -164,34 +150,6 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     s.window_px = Some(window.sqrt());
     s.jitter = jitter(field, &s, window);
     s
-}
-
-/// Mean product of each view's mean residual with the mean of the others', px^2.
-fn across_views(means: &[Vec<f32>]) -> Vec<Option<f64>> {
-    let n = means.iter().map(Vec::len).max().unwrap_or(0);
-    let mut sum = vec![0f32; n];
-    let mut count = vec![0u16; n];
-    for image in means {
-        for ((s, c), &r) in sum.iter_mut().zip(&mut count).zip(image) {
-            if r.is_finite() {
-                *s += r;
-                *c += 1;
-            }
-        }
-    }
-    let of = |image: &Vec<f32>| {
-        let (mut products, mut n) = (0.0, 0.0);
-        for ((&s, &c), &r) in sum.iter().zip(&count).zip(image) {
-            if r.is_finite() && c > 1 {
-                // Pixels that many views saw say more.
-                let others = f64::from(c - 1);
-                products += f64::from(r) * f64::from(s - r);
-                n += others;
-            }
-        }
-        (n > 1000.0).then(|| products / n)
-    };
-    means.par_iter().map(of).collect()
 }
 
 /// How the frames' means move.

@@ -55,10 +55,10 @@ pub fn without_bias<'a>(residuals: &'a [f32], bias: &[f32]) -> Cow<'a, [f32]> {
     residuals.iter().zip(bias).map(|(r, b)| r - b).collect()
 }
 
-/// The view's mean, px, without what is known, gross errors, and all that does not change from pixel
-/// to pixel.
-pub fn pixel_scale(field: &Field, bias: &[f32]) -> Vec<f32> {
-    let image = without_outliers(&high_passed(field, &field.mean, bias));
+/// Residuals as an image, px, without what is known, gross errors, and all that does not change from
+/// pixel to pixel.
+pub fn pixel_scale(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
+    let image = without_outliers(&high_passed(field, residuals, bias));
     high_pass(&image, field.width, field.height, PIXEL_BOX)
 }
 
