@@ -1,4 +1,5 @@
-//! The step itself: where half is lost and how gradually, by weighted least squares on shares.
+//! The step itself: where half is lost and how gradually, by weighted least squares on shares. The foot
+//! of a rise alone does not say how wide it is: the width is held by what is typical of its kind.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -34,10 +35,13 @@ impl Problem<'_> {
         Step { middle: x[0], width: self.start.width.signum() * x[1].exp(), share, ..self.start }
     }
 
+    /// Of the points, and of the width from what is typical.
     fn residuals(&self, x: &DVector<f64>) -> DVector<f64> {
         let step = self.step(x);
         let of = |p: &Point| misfit(p, step.loss(p.x, self.base));
-        DVector::from_iterator(self.points.len(), self.points.iter().map(of))
+        let held = self.allowed.map(|a| a.untypical(&step));
+        let all: Vec<f64> = self.points.iter().map(of).chain(held).collect();
+        DVector::from_vec(all)
     }
 
     fn start(&self) -> DVector<f64> {

@@ -63,6 +63,11 @@ impl Allowed {
         within(step.middle, self.middles)
             && within(step.width.abs(), [NARROWEST_EDGE, self.widths[1]])
     }
+
+    /// How far a width is from the typical one, in standard deviations: a factor of e is one.
+    pub fn untypical(&self, step: &Step) -> f64 {
+        (step.width.abs() / self.typical).ln()
+    }
 }
 
 /// What the catalogue allows of such a step.
