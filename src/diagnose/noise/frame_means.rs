@@ -42,7 +42,7 @@ impl Motion {
         let left: f64 = known.iter().map(|v| (v.0 - velocity_mps).powi(2) / v.1).sum();
         let std_error = ((left / (n - 1.0)).max(1.0) / precision).sqrt();
         let t = velocity_mps / std_error;
-        let p = StudentsT::new(0.0, 1.0, n - 1.0).map_or(1.0, |d| 2.0 * (1.0 - d.cdf(t.abs())));
+        let p = StudentsT::new(0.0, 1.0, n - 1.0).map_or(1.0, |d| 2.0 * d.sf(t.abs()));
         Some(Motion { velocity_mps, std_error, p, nats: 0.5 * n * (t * t / n).ln_1p() })
     }
 }
@@ -112,7 +112,7 @@ fn motion(all: &[Jitter], noise: &FrameNoise, level: f64, rho: f64) -> Option<Te
     // Frames that resemble their neighbours wander.
     let wander = (1.0 + rho) / (1.0 - rho).max(0.05);
     let f = line / (about_it * wander * wander);
-    let p_line = FisherSnedecor::new(n, freedom).map_or(1.0, |d| 1.0 - d.cdf(f));
+    let p_line = FisherSnedecor::new(n, freedom).map_or(1.0, |d| d.sf(f));
     let steady = Motion::of(all, noise).filter(|m| m.p < 0.5 * level);
     if steady.is_none() && !(p_line < 0.5 * level && f > 3.0) {
         return None;
@@ -153,7 +153,7 @@ fn jitter(
         .iter()
         .map(|j| j.scatter_px2 / (j.expected_px2 + known_px * known_px).max(1e-300))
         .sum();
-    let p = ChiSquared::new(freedom).map_or(1.0, |d| 1.0 - d.cdf(ratio / JITTER));
+    let p = ChiSquared::new(freedom).map_or(1.0, |d| d.sf(ratio / JITTER));
     let jitter_px2 = noise.extra_px2;
     if !(p < level && jitter_px2 > 0.0) {
         return None;

@@ -57,7 +57,7 @@ impl ViewMean {
     /// Chance of a mean this far above `expected`, one-sided, by Student's t.
     pub fn p_above(&self, expected: f64) -> f64 {
         let t = (self.value - expected) / self.std_error.max(1e-12 * self.value.abs()).max(1e-300);
-        StudentsT::new(0.0, 1.0, self.views - 1.0).map_or(1.0, |d| 1.0 - d.cdf(t)).max(1e-300)
+        StudentsT::new(0.0, 1.0, self.views - 1.0).map_or(1.0, |d| d.sf(t)).max(1e-300)
     }
 
     /// The same below it.
