@@ -186,11 +186,11 @@ fn survey(
     let camera = &bench.sensor.camera;
     let mut survey = Survey::of(fields, camera, &bench.rays);
     survey.kind = bench.sensor.kind;
-    survey.by_light = baseline.is_none();
     survey.ablate(options.ablation, fields);
     survey.refits_sigma = options.calibrated_here && baseline.is_none();
     survey.fixed_px2 = mean_of(fixed_px2_by_view(fields, camera).into_iter().flatten());
     if let Some(baseline) = baseline {
+        survey.compared();
         baseline.means(&mut survey);
     }
     survey.learnt_from = learnt_from;

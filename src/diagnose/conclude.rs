@@ -70,7 +70,7 @@ impl Case<'_> {
         drop(scenes);
         detectable.extend(of_losses);
         let mut remarks = self.remarks();
-        remarks.extend(untested(outcomes));
+        remarks.extend(untested(outcomes, self.survey.block_tiles));
         remarks.extend(better_form);
         let told = found.iter().chain(&refitted);
         let mut extended = extend(self.model, told, self.sensor(), self.survey.reach.disparity);

@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use super::diagnosis::{CannotTell, Finding, Status, Verdict};
 use super::finding::other_findings::named;
 use super::search::outcome::Outcome;
-use super::views::blocks::BLOCK_TILES;
 use super::views::tiles::SIDE;
 use crate::effects;
 use crate::model::{Covariance, Effect, NoiseModel, UNEXPLAINED};
@@ -91,11 +90,11 @@ pub(super) fn verdict(found: &[Finding], outcomes: [&Outcome; 2]) -> Verdict {
     }
 }
 
-/// What could not be tested, in words.
-pub(super) fn untested([mean, variance]: [&Outcome; 2]) -> Vec<String> {
+/// What could not be tested, in words; the size of the noise in blocks of so many tiles.
+pub(super) fn untested([mean, variance]: [&Outcome; 2], block_tiles: usize) -> Vec<String> {
     let mean = (!mean.noise.is_tested())
         .then(|| "the mean error could not be tested: no view has enough of a target".to_string());
-    let side = BLOCK_TILES * SIDE;
+    let side = block_tiles * SIDE;
     let variance = (!variance.noise.is_tested()).then(|| {
         format!("the size of the noise could not be tested: no target fills a patch of {side} x {side} px")
     });

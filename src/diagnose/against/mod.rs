@@ -106,7 +106,7 @@ impl Baseline {
         let camera = &bench.sensor.camera;
         let none = KnownTerms::default();
         let mut survey = Survey::of(&fields, camera, &bench.rays);
-        survey.by_light = false;
+        survey.compared();
         let mut structure = structures(&fields, camera, &[]);
         let textures = texture_findings(&structure, &none, 0.03 * options.level);
         survey.compare_frames(&fields, common(&structure, &textures, &none));

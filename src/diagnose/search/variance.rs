@@ -199,11 +199,21 @@ fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
     let curve = |over, [low, high]: [f64; 2], nodes| {
         Candidate::curve(Basis::Curve { over, low, high, nodes, times: Modulation::One })
     };
+    let on_target = |nodes| {
+        Candidate::curve(Basis::Pair {
+            over: [Coordinate::Right, Coordinate::Down],
+            low: [reach.right[0], reach.down[0]],
+            high: [reach.right[1], reach.down[1]],
+            nodes,
+        })
+    };
     let ring = |over, period, nodes| {
         Candidate::curve(Basis::Ring { over, period, nodes, times: Modulation::One })
     };
     let mut all = vec![
         curve(Coordinate::LogZ, reach.z.map(f64::ln), 8),
+        // Twenty centimetres of the far end.
+        curve(Coordinate::LogZ, reach.z.map(f64::ln), 24),
         curve(Coordinate::Theta, reach.theta, 6),
         ring(Coordinate::Azimuth, std::f64::consts::TAU, 8),
         curve(Coordinate::Radius, [0.0, 1.0], 8),
@@ -214,12 +224,9 @@ fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
         curve(Coordinate::Right, reach.right, 8),
         curve(Coordinate::Down, reach.down, 8),
         Candidate::curve(Basis::Map { width, height, across: 6, down: 4, times: Modulation::One }),
-        Candidate::curve(Basis::Pair {
-            over: [Coordinate::Right, Coordinate::Down],
-            low: [reach.right[0], reach.down[0]],
-            high: [reach.right[1], reach.down[1]],
-            nodes: [6, 5],
-        }),
+        on_target([6, 5]),
+        // A spot on a board that is seen from near and far.
+        on_target([12, 10]),
     ];
     for (over, range) in [
         (Coordinate::Session, reach.session),

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
-use crate::diagnose::views::samples::ViewData;
+use crate::diagnose::views::samples::{ViewData, finite};
 use crate::solve::{Left, fit_by_svd, left_by_fit};
 use crate::stats::median;
 use crate::terms::PixelContext;
@@ -13,13 +13,14 @@ use crate::terms::PixelContext;
 pub const MODEL_TOLERANCE: f64 = 0.04;
 
 /// Variance of the views' own levels beyond what their samples explain (a moment estimate after
-/// DerSimonian and Laird), about laws of the distance and of the tilt: what a law explains is no
-/// scatter. Enlarged for the laws that so few views have to settle.
+/// DerSimonian and Laird), about laws of the distance, the tilt, the time and the temperature: what a
+/// law explains is no scatter. Enlarged for the laws that so few views have to settle.
 pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
     let levels = Level::of(blocks);
     let orders = match levels.len() {
         // By how much two runs differ by chance may follow any law of the distance.
         _ if tolerance > MODEL_TOLERANCE => 1,
+        12.. => 6,
         9.. => 4,
         _ => 2,
     };
@@ -83,7 +84,15 @@ impl<'a> Level<'a> {
 fn laws(levels: &[Level<'_>], orders: usize) -> DMatrix<f64> {
     let of = |p: &PixelContext| {
         let steep = p.theta.sin().powi(2);
-        [1.0, p.z.ln(), steep, steep * (2.0 * p.azimuth).cos()]
+        let later = finite(p.session_s) / 3600.0;
+        [
+            1.0,
+            p.z.ln(),
+            steep,
+            steep * (2.0 * p.azimuth).cos(),
+            later,
+            finite(p.temperature_c) / 10.0,
+        ]
     };
     DMatrix::from_fn(levels.len(), orders, |i, k| of(levels[i].place)[k])
 }
@@ -197,6 +206,35 @@ mod tests {
             };
             let hidden = median(&mut rng) / (sd * sd);
             assert!((0.35..0.55).contains(&hidden), "{hidden} of the sampling's variance");
+        }
+    }
+
+    /// With a trend of `rise` over a session whose views were taken at random distances.
+    fn with_trend(mut views: Vec<ViewData>, rise: f64, rng: &mut Stream) -> Vec<ViewData> {
+        for view in &mut views {
+            let session_s = rng.random_range(0.0..1800.0);
+            Arc::make_mut(&mut view.places)[0].session_s = session_s;
+            view.response[0] += rise * session_s / 1800.0;
+        }
+        views
+    }
+
+    #[test]
+    fn a_trend_over_the_session_is_no_scatter() {
+        let mut rng = Seed(7).stream("levels");
+        for views in [12, 17, 24] {
+            let mut ratio = |rise: f64| {
+                let mut all: Vec<f64> = (0..60)
+                    .map(|_| {
+                        let views = session(views, 0.1, 0, 0.0, &mut rng);
+                        let views = with_trend(views, rise, &mut rng);
+                        view_scatter(&views, MODEL_TOLERANCE) / 0.1f64.powi(2)
+                    })
+                    .collect();
+                crate::stats::median(&mut all)
+            };
+            let (steady, rising) = (ratio(0.0), ratio(2.0));
+            assert!((rising / steady - 1.0).abs() < 0.35, "{views} views: {steady} {rising}");
         }
     }
 

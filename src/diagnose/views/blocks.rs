@@ -6,17 +6,37 @@ use super::box_sums::SMOOTH_PX;
 use super::samples::ViewData;
 use super::surveyed_view::SurveyedView;
 use super::tiles::{SIDE, Tile};
+use crate::stats::median;
 use crate::terms::{DARKEST, PixelContext};
 
 /// Side of a block, in tiles: 24 px, seven independent samples under a Kinect's window.
 pub const BLOCK_TILES: usize = 6;
+/// The least: narrower ones have hardly a pixel without the rim of a tile.
+const LEAST_TILES: usize = 2;
+/// Half a block is worth this many samples: log chi squared is normal to a hundredth of its standard
+/// deviation in the mean then.
+const WORTH: f64 = 24.0;
+/// Of a picture, px: what is as large a part of a smaller one is resolved as well.
+const WIDTH_PX: usize = 640;
+
+/// Side of the blocks of these views of a picture `width` px wide, in tiles.
+pub fn block_tiles(views: &[SurveyedView], width: usize) -> usize {
+    let mut per_px: Vec<f64> =
+        views.iter().map(|v| v.frames / v.correlation.sum_of_squares.max(1.0)).collect();
+    let per_px = median(&mut per_px);
+    let large = |tiles: &usize| {
+        let pixels = ((tiles * SIDE) as f64).powi(2);
+        tiles * WIDTH_PX >= BLOCK_TILES * width && LEAST * pixels * per_px >= WORTH
+    };
+    (LEAST_TILES..BLOCK_TILES).find(large).unwrap_or(BLOCK_TILES)
+}
 
 /// Logarithm of the variance over the model's in patches large enough for a variance, beside a level of
 /// the view's own, which is free.
 /// Where `by_light`, a block falls into parts by their light: what is light and what is dark lies apart,
 /// for their mean is the noise of neither.
-pub fn blocks(view: &SurveyedView, by_light: bool) -> ViewData {
-    let side = (BLOCK_TILES * SIDE) as f64;
+pub fn blocks(view: &SurveyedView, tiles: usize, by_light: bool) -> ViewData {
+    let side = (tiles * SIDE) as f64;
     let first = view.places.first().map_or(1.0, |p| p.light);
     let lit = by_light && view.places.iter().any(|p| p.light != first);
     let least = if lit { LEAST_LIT } else { LEAST } * side * side;
@@ -96,6 +116,20 @@ impl Sum {
 mod tests {
     use super::*;
 
+    /// As large a part of the picture, but no fewer independent samples than a variance needs.
+    #[test]
+    fn blocks_are_as_small_as_the_picture_and_the_noise_allow() {
+        let tiles = |width, frames, sum_of_squares| {
+            let mut view = SurveyedView::white([], frames);
+            view.correlation.sum_of_squares = sum_of_squares;
+            block_tiles(&[view], width)
+        };
+        assert_eq!([1280, 640, 320, 160].map(|width| tiles(width, 4.0, 1.0)), [6, 6, 3, 2]);
+        // Under a window of six pixels half a block of 8 x 8 px and 4 frames is worth 3.6 samples.
+        assert_eq!([1.0, 4.0, 16.0].map(|frames| tiles(160, frames, 36.0)), [6, 6, 3]);
+        assert_eq!(block_tiles(&[], 160), BLOCK_TILES);
+    }
+
     /// A print of two greys, half a block a square: shot noise is told of either grey, and not of what
     /// lies between them.
     #[test]
@@ -119,14 +153,14 @@ mod tests {
             (PixelContext { u, v, light, ..PixelContext::default() }, tile)
         };
         let view = SurveyedView::white((0..ACROSS * ACROSS).map(patch), 3.0);
-        let data = blocks(&view, true);
+        let data = blocks(&view, BLOCK_TILES, true);
         assert_eq!(data.places.len(), 200, "two parts of a hundred blocks");
         for (place, log_variance) in data.places.iter().zip(&data.response) {
             assert!([0.25, 2.0].iter().any(|grey| (place.light / grey - 1.0).abs() < 1e-9));
             // The mean of a log chi^2 is put right by one over what the block is worth.
             assert!((log_variance + place.light.ln()).abs() < 2.0 / 400.0, "{log_variance}");
         }
-        let whole = blocks(&view, false);
+        let whole = blocks(&view, BLOCK_TILES, false);
         assert_eq!(whole.places.len(), 100, "a simulation is compared block by block");
     }
 }

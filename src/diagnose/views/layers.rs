@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::blocks::blocks;
+use super::blocks::{BLOCK_TILES, block_tiles, blocks};
 use super::field::Field;
 use super::learnt::Learnt;
 use super::light::{Light, relative_light};
@@ -31,6 +31,8 @@ pub struct Survey {
     /// Variance of what each pixel errs by in every view alike, px^2.
     pub fixed_px2: f64,
     pub light: Light,
+    /// Side of the blocks that the size of the noise is measured on, in tiles.
+    pub block_tiles: usize,
     /// Blocks fall into parts by their light; those of two recordings that are compared do not.
     pub by_light: bool,
     /// How well the size of the noise is known from view to view beforehand, in log variance.
@@ -78,8 +80,10 @@ impl Survey {
             down: reach.down,
         });
         let (tolerance, ablation) = (MODEL_TOLERANCE, Ablation::None);
+        let block_tiles = block_tiles(&views, camera.width);
         Survey {
             views,
+            block_tiles,
             reach,
             flat,
             kind: None,
@@ -92,6 +96,11 @@ impl Survey {
             between: Arc::default(),
             ablation,
         }
+    }
+
+    /// Two recordings are compared block by block, wherever light falls.
+    pub fn compared(&mut self) {
+        (self.block_tiles, self.by_light) = (BLOCK_TILES, false);
     }
 
     /// The views' mean residuals, about a plane of their own each.
@@ -185,7 +194,7 @@ impl Survey {
 
     /// Log variance over the model's, block by block.
     pub fn variance_data(&self) -> Vec<ViewData> {
-        let of = |v: &SurveyedView| blocks(v, self.by_light);
+        let of = |v: &SurveyedView| blocks(v, self.block_tiles, self.by_light);
         let blocks: Vec<ViewData> = self.views.par_iter().map(of).collect();
         // A view's level is as uncertain as views scatter.
         let precision = vec![1.0 / view_scatter(&blocks, self.tolerance)];
