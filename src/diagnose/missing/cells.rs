@@ -17,6 +17,8 @@ pub struct Cell<'a> {
     pub place: &'a PixelContext,
     pub lost: f64,
     pub asked: f64,
+    /// It is held against a twin, and it, a neighbour or one of their twins loses something.
+    pub differs: bool,
 }
 
 /// A patch of many tiles, with a place of its own.
@@ -27,15 +29,12 @@ pub struct Patch {
     pub asked: f64,
 }
 
-impl Patch {
-    fn cell(&self) -> Cell<'_> {
-        Cell { place: &self.place, lost: self.lost, asked: self.asked }
-    }
-}
-
 /// The patches as cells.
 pub fn cells(patches: &[Vec<Patch>]) -> Vec<Vec<Cell<'_>>> {
-    patches.iter().map(|view| view.iter().map(Patch::cell).collect()).collect()
+    fn cell(p: &Patch) -> Cell<'_> {
+        Cell { place: &p.place, lost: p.lost, asked: p.asked, differs: false }
+    }
+    patches.iter().map(|view| view.iter().map(cell).collect()).collect()
 }
 
 /// Cells across the picture: some hundred a view, each wider than a clump of dead pixels.
@@ -93,7 +92,15 @@ pub fn expected(cells: &mut [Vec<Cell<'_>>], twins: &[Vec<Cell<'_>>], rim: f64) 
         let lost: BTreeMap<_, f64> =
             theirs.iter().map(|c| (key(c, rim), odds(c.lost / c.asked) - odds(0.0))).collect();
         mine.retain(|c| lost.contains_key(&key(c, rim)));
-        mine.iter().map(|c| lost[&key(c, rim)]).collect()
+        let theirs: Vec<f64> = mine.iter().map(|c| lost[&key(c, rim)]).collect();
+        let loses: Vec<bool> =
+            mine.iter().zip(&theirs).map(|(c, t)| c.lost > 0.0 || *t > 0.0).collect();
+        // Where a clump lies in one run, the other could have had it next to it.
+        let differs: Vec<bool> = (0..mine.len())
+            .map(|i| (0..mine.len()).any(|j| loses[j] && touch(&mine[i], &mine[j])))
+            .collect();
+        mine.iter_mut().zip(differs).for_each(|(c, differs)| c.differs = differs);
+        theirs
     };
     cells.iter_mut().zip(twins).map(of_view).collect()
 }
@@ -102,7 +109,11 @@ pub fn expected(cells: &mut [Vec<Cell<'_>>], twins: &[Vec<Cell<'_>>], rim: f64) 
 pub fn fine<'a>(survey: &'a Survey, margins: &Margins) -> Vec<Vec<Cell<'a>>> {
     let of_view = |v: &'a SurveyedView| {
         let held = v.patches().filter(|(place, _)| margins.hold(place));
-        held.map(|(place, t)| Cell { place, lost: t.asked * t.missing, asked: t.asked }).collect()
+        held.map(|(place, t)| {
+            let (lost, asked) = (t.asked * t.missing, t.asked);
+            Cell { place, lost, asked, differs: false }
+        })
+        .collect()
     };
     survey.views.iter().map(of_view).collect()
 }
@@ -130,14 +141,19 @@ pub struct Scatter {
     pub slope: f64,
     /// Of a cell.
     pub cell: f64,
+    /// Of one that is held against a twin where either loses something: clumps of lost pixels lie
+    /// elsewhere in every run, and where neither loses anything nothing scatters.
+    pub differing: f64,
     /// Neighbouring cells share their clumps: so many make one.
     pub clump: f64,
 }
 
 /// Before anything is measured: views differ by a factor of e, the sides of one picture as well.
-pub const USUAL: Scatter = Scatter { level: 1.0, slope: 4.0, cell: 0.5, clump: 4.0 };
+pub const USUAL: Scatter =
+    Scatter { level: 1.0, slope: 4.0, cell: 0.5, differing: 0.5, clump: 4.0 };
 /// Never believed to be less.
-pub const LEAST: Scatter = Scatter { level: 0.1, slope: 0.4, cell: 0.1, clump: 1.0 };
+pub const LEAST: Scatter =
+    Scatter { level: 0.1, slope: 0.4, cell: 0.1, differing: 0.1, clump: 1.0 };
 /// What a few views show is taken so much larger.
 pub const FEW: f64 = 4.0;
 /// Cells nearer than this are neighbours, in their sides: the corners too.
@@ -145,7 +161,7 @@ const APART: f64 = 1.5;
 
 /// Applies the inverse covariance of a view's cells.
 pub struct Whitener {
-    weight: f64,
+    weights: Vec<f64>,
     slopes: Vec<Vector3<f64>>,
     inverse: Matrix3<f64>,
     scatter: Scatter,
@@ -153,23 +169,31 @@ pub struct Whitener {
 
 impl Whitener {
     pub fn of(cells: &[Cell], scatter: Scatter) -> Self {
-        let weight = 1.0 / (scatter.clump * scatter.cell);
+        let of = |c: &Cell| if c.differs { scatter.differing } else { scatter.cell };
+        let weights: Vec<f64> = cells.iter().map(|c| 1.0 / (scatter.clump * of(c))).collect();
         let slopes: Vec<_> =
             cells.iter().map(|c| Vector3::new(1.0, c.place.x, c.place.y)).collect();
         let tight = Vector3::new(1.0 / scatter.level, 1.0 / scatter.slope, 1.0 / scatter.slope);
         let inner = slopes
             .iter()
-            .fold(Matrix3::from_diagonal(&tight), |m, n| m + n * n.transpose() * weight);
+            .zip(&weights)
+            .fold(Matrix3::from_diagonal(&tight), |m, (n, w)| m + n * n.transpose() * *w);
         // Positive definite by its diagonal.
         let inverse = inner.try_inverse().unwrap_or_else(Matrix3::zeros);
-        Whitener { weight, slopes, inverse, scatter }
+        Whitener { weights, slopes, inverse, scatter }
     }
 
     /// C^-1 y by Woodbury's identity.
     pub fn solve(&self, y: &[f64]) -> Vec<f64> {
-        let seen = self.slopes.iter().zip(y).fold(Vector3::zeros(), |s, (n, y)| s + n * *y);
-        let own = self.inverse * seen * self.weight;
-        self.slopes.iter().zip(y).map(|(n, y)| self.weight * (y - n.dot(&own))).collect()
+        let own = self.own(y);
+        let left = self.slopes.iter().zip(y).map(|(n, y)| y - n.dot(&own));
+        left.zip(&self.weights).map(|(left, w)| w * left).collect()
+    }
+
+    /// The view's level and slopes.
+    fn own(&self, y: &[f64]) -> Vector3<f64> {
+        let cells = self.slopes.iter().zip(&self.weights).zip(y);
+        self.inverse * cells.fold(Vector3::zeros(), |s, ((n, w), y)| s + n * (*w * *y))
     }
 
     /// Log odds of a view in which nothing is wrong.
@@ -180,8 +204,8 @@ impl Whitener {
             s.slope.sqrt() * normal(),
             s.slope.sqrt() * normal(),
         );
-        let sd = self.weight.recip().sqrt();
-        self.slopes.iter().map(|n| n.dot(&own) + sd * normal()).collect()
+        let cells = self.slopes.iter().zip(&self.weights);
+        cells.map(|(n, w)| n.dot(&own) + w.recip().sqrt() * normal()).collect()
     }
 }
 
@@ -189,19 +213,22 @@ impl Scatter {
     /// What is left of the views' log odds, and no less than `least`: their levels and slopes by least
     /// squares, then the cells about them.
     pub fn of(views: &[Vec<Cell>], left: &[Vec<f64>], least: Scatter) -> Self {
-        let (mut sums, mut n) = ([0.0; 3], [0.0; 3]);
+        let (mut sums, mut n) = ([0.0; 4], [0.0; 4]);
         let mut neighbours = Neighbours::default();
         for (cells, left) in views.iter().zip(left) {
-            let loose = Scatter { level: 1e6, slope: 4.0, cell: 1.0, clump: 4.0 };
+            let loose = Scatter { level: 1e6, slope: 4.0, cell: 1.0, differing: 1.0, clump: 4.0 };
             let w = Whitener::of(cells, loose);
-            let seen = w.slopes.iter().zip(left).fold(Vector3::zeros(), |s, (n, y)| s + n * *y);
-            let own = w.inverse * seen * w.weight;
+            let own = w.own(left);
             sums[0] += (left.iter().sum::<f64>() / left.len().max(1) as f64).powi(2);
             sums[1] += own.y.powi(2) + own.z.powi(2);
             let off: Vec<f64> = w.slopes.iter().zip(left).map(|(n, y)| y - n.dot(&own)).collect();
-            sums[2] += off.iter().map(|y| y * y).sum::<f64>();
+            for (cell, y) in cells.iter().zip(&off) {
+                let kind = 2 + usize::from(cell.differs);
+                sums[kind] += y * y;
+                n[kind] += 1.0;
+            }
             neighbours.add(cells, &off);
-            n = [n[0] + 1.0, n[1] + 2.0, n[2] + left.len() as f64];
+            (n[0], n[1]) = (n[0] + 1.0, n[1] + 2.0);
         }
         let mean = |k: usize| sums[k] / f64::max(n[k], 1.0);
         let few = 1.0 + FEW / f64::max(n[0], 1.0);
@@ -209,9 +236,16 @@ impl Scatter {
             level: (few * mean(0)).max(least.level),
             slope: (few * mean(1)).max(least.slope),
             cell: mean(2).max(least.cell),
+            differing: mean(3).max(least.differing),
             clump: neighbours.size().max(least.clump),
         }
     }
+}
+
+/// Are they neighbours, or one patch's rim and its other part?
+fn touch(a: &Cell, b: &Cell) -> bool {
+    let side = a.place.side.max(b.place.side).max(1.0);
+    (a.place.u - b.place.u).hypot(a.place.v - b.place.v) < APART * side
 }
 
 /// How much neighbouring cells have in common.
@@ -226,12 +260,11 @@ pub struct Neighbours {
 impl Neighbours {
     /// Every pair of cells that touch, counted once; a rim's cell and its patch's other part among them.
     fn add(&mut self, cells: &[Cell], off: &[f64]) {
-        let step = cells.iter().map(|c| c.place.side).fold(0.0, f64::max).max(1.0) * APART;
         for (i, (a, x)) in cells.iter().zip(off).enumerate() {
             self.square += x * x;
             self.cells += 1.0;
             for (b, y) in cells[i + 1..].iter().zip(&off[i + 1..]) {
-                if (a.place.u - b.place.u).hypot(a.place.v - b.place.v) < step {
+                if touch(a, b) {
                     self.product += x * y;
                     self.pairs += 1.0;
                 }
