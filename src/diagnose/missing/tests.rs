@@ -93,32 +93,34 @@ fn find_beside(
     losses(&seen, &reach, camera, &|z| 0.0015 + 0.00215 * (z - 0.483).powi(2), seed)
 }
 
-/// Where a matcher fails, whole patches go, and other ones in every run.
+/// Where a matcher fails, whole patches go, and other ones in every run: of the far patches this
+/// `share` loses some.
+fn run(none: &[Vec<Patch>], far_m: f64, share: f64, rng: &mut Stream) -> Vec<Vec<Patch>> {
+    let mut views = none.to_vec();
+    for far in views.iter_mut().flatten().filter(|c| c.place.z > far_m) {
+        let clump = rng.random_bool(share);
+        far.lost = if clump { far.asked * rng.random_range(0.02..0.3) } else { 0.0 };
+    }
+    views
+}
+
 #[test]
 fn clumps_that_lie_elsewhere_in_another_run_are_no_difference() {
     let [mut alarms, mut seen] = [0; 2];
     for seed in 0..20 {
         let mut rng = Seed(seed).stream("twins");
         let (none, camera) = session(0.0, &mut rng, |_| 0.0);
-        let mut run = || {
-            let mut views = none.clone();
-            for far in views.iter_mut().flatten().filter(|c| c.place.z > 2.0) {
-                let clump = rng.random_bool(0.3);
-                far.lost = if clump { far.asked * rng.random_range(0.02..0.3) } else { 0.0 };
-            }
-            views
-        };
-        let (views, twins) = (run(), run());
-        let found = |twins: &[Vec<Patch>]| {
-            let outcome = find_beside(&views, Some(twins), &camera, Seed(seed));
+        let differ = |views: &[Vec<Patch>], twins: &[Vec<Patch>]| {
+            let outcome = find_beside(views, Some(twins), &camera, Seed(seed));
             usize::from(!outcome.findings.is_empty())
         };
-        alarms += found(&twins);
-        seen += found(&none);
+        let few = [(); 2].map(|()| run(&none, 3.4, 0.3, &mut rng));
+        alarms += differ(&few[0], &few[1]);
+        seen += differ(&run(&none, 2.8, 0.6, &mut rng), &none);
     }
-    println!("{alarms} alarms of 20 where both lose alike, {seen} where one alone loses");
-    // By a chance of .003 each, two of twenty are one in six hundred.
-    assert!(alarms <= 1 && 2 * seen > 20, "{alarms} {seen}");
+    println!("{alarms} alarms of 20 where both lose alike, {seen} of 20 where one alone loses");
+    // One scatter for all patches makes five alarms. By a chance of .003 each, two are one in 600.
+    assert!(alarms <= 1 && seen >= 18, "{alarms} {seen}");
 }
 
 fn parameter(finding: &Finding, name: &str) -> [f64; 2] {
