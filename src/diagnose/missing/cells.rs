@@ -141,7 +141,7 @@ pub struct Scatter {
     pub slope: f64,
     /// Of a cell.
     pub cell: f64,
-    /// Of one that is held against a twin where either loses something: clumps of lost pixels lie
+    /// Of one that is held against a twin where either, or a neighbour, loses something: clumps lie
     /// elsewhere in every run, and where neither loses anything nothing scatters.
     pub differing: f64,
     /// Neighbouring cells share their clumps: so many make one.

@@ -212,7 +212,7 @@ fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
     };
     let mut all = vec![
         curve(Coordinate::LogZ, reach.z.map(f64::ln), 8),
-        // Twenty centimetres of the far end.
+        // Noise at one distance: a tenth of it.
         curve(Coordinate::LogZ, reach.z.map(f64::ln), 24),
         curve(Coordinate::Theta, reach.theta, 6),
         ring(Coordinate::Azimuth, std::f64::consts::TAU, 8),

@@ -13,8 +13,8 @@ use crate::terms::PixelContext;
 pub const MODEL_TOLERANCE: f64 = 0.04;
 
 /// Variance of the views' own levels beyond what their samples explain (a moment estimate after
-/// DerSimonian and Laird), about laws of the distance, the tilt, the time and the temperature: what a
-/// law explains is no scatter. Enlarged for the laws that so few views have to settle.
+/// DerSimonian and Laird), about laws of the distance, from nine views on of the tilt, and from twelve on
+/// of the time and the temperature: what a law explains is no scatter. Enlarged for the laws that so few views have to settle.
 pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
     let levels = Level::of(blocks);
     let orders = match levels.len() {
@@ -39,7 +39,7 @@ pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
 }
 
 /// The same where a third of the views may have a level of their own: least trimmed squares
-/// (Rousseeuw 1984) about laws of the distance and of the steepness, and never more than `whole`,
+/// (Rousseeuw 1984) about a law of the distance, and never more than `whole`,
 /// the scatter of all views.
 pub fn scatter_of_most(blocks: &[ViewData], whole: f64) -> f64 {
     const ORDERS: usize = 2;

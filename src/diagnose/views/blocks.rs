@@ -9,12 +9,12 @@ use super::tiles::{SIDE, Tile};
 use crate::stats::median;
 use crate::terms::{DARKEST, PixelContext};
 
-/// Side of a block, in tiles: 24 px, seven independent samples under a Kinect's window.
+/// Widest side of a block, in tiles: 24 px, seven independent samples under a Kinect's window.
 pub const BLOCK_TILES: usize = 6;
 /// The least: narrower ones have hardly a pixel without the rim of a tile.
 const LEAST_TILES: usize = 2;
-/// Half a block is worth this many samples: log chi squared is normal to a hundredth of its standard
-/// deviation in the mean then.
+/// In most views half a block is worth this many samples: beyond -1/n the mean of log chi squared is
+/// off by a five hundredth of its standard deviation then.
 const WORTH: f64 = 24.0;
 /// Of a picture, px: what is as large a part of a smaller one is resolved as well.
 const WIDTH_PX: usize = 640;

@@ -98,7 +98,7 @@ impl Survey {
         }
     }
 
-    /// Two recordings are compared block by block, wherever light falls.
+    /// Two recordings are compared block by block, in the widest blocks and wherever light falls.
     pub fn compared(&mut self) {
         (self.block_tiles, self.by_light) = (BLOCK_TILES, false);
     }
