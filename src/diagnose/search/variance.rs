@@ -212,8 +212,6 @@ fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
     };
     let mut all = vec![
         curve(Coordinate::LogZ, reach.z.map(f64::ln), 8),
-        // Noise at one distance: a tenth of it.
-        curve(Coordinate::LogZ, reach.z.map(f64::ln), 24),
         curve(Coordinate::Theta, reach.theta, 6),
         ring(Coordinate::Azimuth, std::f64::consts::TAU, 8),
         curve(Coordinate::Radius, [0.0, 1.0], 8),
