@@ -123,14 +123,15 @@ pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<T
     let [mixed, error] = [full * share.value, full * share.std_error];
     let slope = (width_px(mixed + error) - width_px((mixed - error).max(0.0))) / 2.0;
     // A part of a wider footprint mixes as much as the whole of a narrower one.
-    let of_form = width - width_px(mixed);
+    let whole = width_px(mixed);
+    let std_error = slope.hypot(width - whole);
     let edge = share.value * footprint(0, width);
     Some(TextureFinding {
         families: vec!["edge-mixing"],
         statistic: Statistic::Bias,
         axis: Axis::EdgeDistance,
         interval: [0.0, width],
-        parameters: one("width_px", width_px(mixed), slope.hypot(of_form)),
+        parameters: one("width_px", whole, std_error),
         size_sigma: edge * step_sigmas(&edges),
         p,
         nats: nats(&share, 0.0),

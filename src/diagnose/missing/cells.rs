@@ -92,15 +92,15 @@ pub fn expected(cells: &mut [Vec<Cell<'_>>], twins: &[Vec<Cell<'_>>], rim: f64) 
         let lost: BTreeMap<_, f64> =
             theirs.iter().map(|c| (key(c, rim), odds(c.lost / c.asked) - odds(0.0))).collect();
         mine.retain(|c| lost.contains_key(&key(c, rim)));
-        let theirs: Vec<f64> = mine.iter().map(|c| lost[&key(c, rim)]).collect();
+        let expected: Vec<f64> = mine.iter().map(|c| lost[&key(c, rim)]).collect();
         let loses: Vec<bool> =
-            mine.iter().zip(&theirs).map(|(c, t)| c.lost > 0.0 || *t > 0.0).collect();
+            mine.iter().zip(&expected).map(|(c, e)| c.lost > 0.0 || *e > 0.0).collect();
         // Where a clump lies in one run, the other could have had it next to it.
         let differs: Vec<bool> = (0..mine.len())
             .map(|i| (0..mine.len()).any(|j| loses[j] && touch(&mine[i], &mine[j])))
             .collect();
         mine.iter_mut().zip(differs).for_each(|(c, differs)| c.differs = differs);
-        theirs
+        expected
     };
     cells.iter_mut().zip(twins).map(of_view).collect()
 }

@@ -64,10 +64,15 @@ impl Allowed {
             && within(step.width.abs(), [NARROWEST_EDGE, self.widths[1]])
     }
 
-    /// How far a width is from the typical one, in standard deviations: a factor of e is one.
+    /// See [`untypical`].
     pub fn untypical(&self, step: &Step) -> f64 {
-        (step.width.abs() / self.typical).ln()
+        untypical(step.width.abs(), self.typical)
     }
+}
+
+/// How far a width is from the typical one, in standard deviations: a factor of e is one.
+fn untypical(width: f64, typical: f64) -> f64 {
+    (width / typical).ln()
 }
 
 /// What the catalogue allows of such a step.
@@ -108,7 +113,7 @@ impl Rising<'_> {
     fn misfit(&self, middle: f64, width: f64, limit: f64) -> f64 {
         let lost = self.reported.share * (1.0 - self.base);
         let toward = self.reported.width.signum() / width;
-        let mut sum = 0.5 * (width / self.typical).ln().powi(2);
+        let mut sum = 0.5 * untypical(width, self.typical).powi(2);
         for p in self.points {
             let loss = self.base + lost * (self.rise)((p.x - middle) * toward);
             sum += 0.5 * misfit(p, loss).powi(2) / self.scatter;

@@ -13,8 +13,9 @@ use crate::terms::PixelContext;
 pub const MODEL_TOLERANCE: f64 = 0.04;
 
 /// Variance of the views' own levels beyond what their samples explain (a moment estimate after
-/// DerSimonian and Laird), about laws of the distance, from nine views on of the tilt, and from twelve on
-/// of the time and the temperature: what a law explains is no scatter. Enlarged for the laws that so few views have to settle.
+/// DerSimonian and Laird), about laws of the distance, from nine views on of the tilt, and from twelve
+/// on of the time and the temperature: what a law explains is no scatter. Enlarged for the laws that
+/// so few views have to settle.
 pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
     let levels = Level::of(blocks);
     let orders = match levels.len() {
@@ -39,8 +40,7 @@ pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
 }
 
 /// The same where a third of the views may have a level of their own: least trimmed squares
-/// (Rousseeuw 1984) about a law of the distance, and never more than `whole`,
-/// the scatter of all views.
+/// (Rousseeuw 1984) about a law of the distance, and never more than `whole`, the scatter of all views.
 pub fn scatter_of_most(blocks: &[ViewData], whole: f64) -> f64 {
     const ORDERS: usize = 2;
     let levels = Level::of(blocks);
@@ -84,15 +84,9 @@ impl<'a> Level<'a> {
 fn laws(levels: &[Level<'_>], orders: usize) -> DMatrix<f64> {
     let of = |p: &PixelContext| {
         let steep = p.theta.sin().powi(2);
-        let later = finite(p.session_s) / 3600.0;
-        [
-            1.0,
-            p.z.ln(),
-            steep,
-            steep * (2.0 * p.azimuth).cos(),
-            later,
-            finite(p.temperature_c) / 10.0,
-        ]
+        let turned = steep * (2.0 * p.azimuth).cos();
+        let [hours, tens_of_c] = [p.session_s / 3600.0, p.temperature_c / 10.0].map(finite);
+        [1.0, p.z.ln(), steep, turned, hours, tens_of_c]
     };
     DMatrix::from_fn(levels.len(), orders, |i, k| of(levels[i].place)[k])
 }
