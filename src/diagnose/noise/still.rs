@@ -1,10 +1,12 @@
 //! What pixels err by in every view alike: the views' covariance, pixel by pixel.
 
+use rand::Rng;
 use rayon::prelude::*;
 
 use super::texture::{SHORT_LINE, pixel_scale, without_lines};
 use crate::camera::Camera;
 use crate::diagnose::views::field::Field;
+use crate::rng::Seed;
 
 /// Covariance of a view's mean residual with the other views' at the same pixels, px^2: without and
 /// with what whole lines share.
@@ -13,41 +15,47 @@ pub struct Still {
     pub with_lines_px2: Option<f64>,
 }
 
-pub fn still(views: &[(&Field, &[f32])], camera: &Camera) -> Vec<Still> {
-    let seen = covariances(views, camera, |f, b| pixel_scale(f, &f.mean, b));
-    // Every pixel is part of the means that are taken out: what is left of a pattern of variance 1.
-    let kept = covariances(views, camera, |f, _| pixel_scale(f, &coins(f), &[]));
-    let over = |seen: Option<f64>, kept: Option<f64>| Some(seen? / kept.filter(|k| *k > 0.0)?);
-    let pairs = seen.into_iter().zip(kept);
-    let of = |(seen, kept): ([Option<f64>; 2], [Option<f64>; 2])| Still {
-        fixed_px2: over(seen[0], kept[0]),
-        with_lines_px2: over(seen[1], kept[1]),
-    };
-    pairs.map(of).collect()
+impl Still {
+    /// As a share of what a pattern of variance 1 has left.
+    fn over(&self, kept: &Still) -> Still {
+        let share = |seen: Option<f64>, kept: Option<f64>| Some(seen? / kept.filter(|k| *k > 0.0)?);
+        Still {
+            fixed_px2: share(self.fixed_px2, kept.fixed_px2),
+            with_lines_px2: share(self.with_lines_px2, kept.with_lines_px2),
+        }
+    }
 }
 
-/// View by view, without and with what whole lines share.
+pub fn still(views: &[(&Field, &[f32])], camera: &Camera) -> Vec<Still> {
+    let seen = covariances(views, camera, |f, b| pixel_scale(f, &f.mean, b));
+    // Every pixel is part of the means that are taken out.
+    let coins = coins(camera.width * camera.height);
+    let kept = covariances(views, camera, |f, _| pixel_scale(f, &tossed(f, &coins), &[]));
+    seen.iter().zip(&kept).map(|(seen, kept)| seen.over(kept)).collect()
+}
+
 fn covariances(
     views: &[(&Field, &[f32])],
     camera: &Camera,
     image: impl Fn(&Field, &[f32]) -> Vec<f32> + Sync,
-) -> Vec<[Option<f64>; 2]> {
+) -> Vec<Still> {
     let mut images: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| image(f, b)).collect();
     let with_lines = across_views(&images);
     images.par_iter_mut().for_each(|m| *m = without_lines(m, camera.width, SHORT_LINE));
-    across_views(&images).into_iter().zip(with_lines).map(|(a, b)| [a, b]).collect()
+    let both = across_views(&images).into_iter().zip(with_lines);
+    both.map(|(fixed_px2, with_lines_px2)| Still { fixed_px2, with_lines_px2 }).collect()
 }
 
-/// Heads or tails for each pixel of the picture, the same in every view that sees it.
-fn coins(field: &Field) -> Vec<f32> {
-    let toss = |(&pixel, mean): (&u32, &f32)| {
-        // The finaliser of MurmurHash3: every bit of the number reaches every bit of the result.
-        let mut h = pixel;
-        h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
-        h = (h ^ (h >> 13)).wrapping_mul(0xc2b2_ae35);
-        if mean.is_finite() { 1.0 - (h >> 15 & 2) as f32 } else { f32::NAN }
-    };
-    field.pixels.iter().zip(&field.mean).map(toss).collect()
+/// Heads or tails for each pixel of the picture: a pattern whose variance is 1 wherever it is seen.
+fn coins(pixels: usize) -> Vec<f32> {
+    let mut rng = Seed(0).stream("diagnose/still");
+    (0..pixels).map(|_| if rng.random() { 1.0 } else { -1.0 }).collect()
+}
+
+/// The coins where the view has a mean.
+fn tossed(field: &Field, coins: &[f32]) -> Vec<f32> {
+    let pixels = field.pixels.iter().zip(&field.mean);
+    pixels.map(|(&i, mean)| if mean.is_finite() { coins[i as usize] } else { f32::NAN }).collect()
 }
 
 /// Mean product of each view's mean residual with the mean of the others', px^2.
@@ -81,11 +89,9 @@ fn across_views(means: &[Vec<f32>]) -> Vec<Option<f64>> {
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
-    use rand::Rng;
 
     use super::*;
     use crate::plane::Plane;
-    use crate::rng::Seed;
     use crate::simulate::kinect_v1;
 
     /// A pattern of 0.01 px up or down and no noise, on targets of very different sizes: of its variance
