@@ -54,26 +54,45 @@ pub(in crate::diagnose) fn velocity(views: &[Structure]) -> Option<(f64, f64, f6
     Some((velocity_mps, std_error.hypot(UNEVEN * velocity_mps), p))
 }
 
-/// Noise of a frame's mean about the line of its view: what its pixels explain, and what all frames
-/// scatter by beside that, px^2; negative where they scatter less.
+/// Noise of a frame's mean about the line of its view.
 struct FrameNoise {
+    /// What all frames scatter by beside what their pixels explain, px^2; negative where they scatter less.
     extra_px2: f64,
+    /// By how much views' own variances differ from that beyond chance, as a share, in square.
+    uneven: f64,
 }
 
 impl FrameNoise {
     fn of(all: &[Jitter]) -> Self {
         let freedom: f64 = all.iter().map(|j| j.freedom).sum();
         let beside: f64 = all.iter().map(|j| j.scatter_px2 - j.freedom * j.expected_px2).sum();
-        FrameNoise { extra_px2: beside / freedom }
+        let mut noise = FrameNoise { extra_px2: beside / freedom, uneven: 0.0 };
+        // A variance of f degrees of freedom is off by 2 / f, in square.
+        let off = |j: &Jitter| {
+            let by_chance = 2.0 / j.freedom;
+            ((noise.ratio(j) - 1.0).powi(2) - by_chance) / (1.0 + by_chance)
+        };
+        let measured = all.iter().filter(|j| j.freedom > 0.0);
+        let (sum, n) = measured.fold((0.0, 0.0), |(sum, n), j| (sum + off(j), n + 1.0));
+        noise.uneven = (sum / f64::max(n, 1.0)).max(0.0);
+        noise
+    }
+
+    /// What a view's own frames scatter by, over what is expected.
+    fn ratio(&self, view: &Jitter) -> f64 {
+        view.scatter_px2 / (view.freedom * self.px2(view))
     }
 
     fn px2(&self, view: &Jitter) -> f64 {
         (view.expected_px2 + self.extra_px2.max(0.0)).max(f64::MIN_POSITIVE)
     }
 
-    /// No surer than the view's own frames scatter; they may lie on a line by chance.
+    /// As its own frames scatter, so far as views differ (a moderated variance: Smyth 2004); no less than
+    /// all do, for few frames may lie on a line by chance.
     fn own_px2(&self, view: &Jitter) -> f64 {
-        self.px2(view).max(view.scatter_px2 / view.freedom)
+        // Degrees of freedom that the other views are worth are 2 / uneven.
+        let own = self.uneven * view.freedom;
+        self.px2(view) * ((2.0 + own * self.ratio(view)) / (2.0 + own)).max(1.0)
     }
 }
 
