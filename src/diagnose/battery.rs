@@ -15,6 +15,7 @@ use super::finding::naming::{doubt_beside_the_unexplained, resembles_only, tempe
 use super::finding::other_findings;
 use super::finding::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::finding::scene::Scene;
+use super::missing::shapes::Step;
 use super::missing::{self, DropoutOutcome, missing};
 use super::noise::lines::lines;
 use super::noise::scatter::ScatterResult;
@@ -44,6 +45,8 @@ pub struct Battery {
     pub refitted: Option<Finding>,
     /// The form that sigma would follow better, in words.
     pub better_form: Option<String>,
+    /// Hard ends of the range.
+    pub ends: Vec<Step>,
     /// How small a loss would have been seen.
     pub detectable: Vec<Detectable>,
 }
@@ -118,7 +121,7 @@ impl Case<'_> {
         let told = self.baseline.is_some() && found.iter().any(of_size);
         // Of two recordings what the search of the size tells is not told of its parts again.
         found.extend(textures.into_iter().filter(|f| !(told && of_size(f) && f.effect.is_none())));
-        let DropoutOutcome { findings, mut detectable, notes } = lost;
+        let DropoutOutcome { findings, mut detectable, ends, notes } = lost;
         self.remarks.extend(notes);
         detectable.retain(|d| can_happen(d.effect, self.sensor().kind));
         found.extend(findings);
@@ -137,7 +140,7 @@ impl Case<'_> {
             temper(&mut f.alternatives);
             resembles_only(f);
         }
-        Battery { mean, scatter, found, refitted, better_form, detectable }
+        Battery { mean, scatter, found, refitted, better_form, ends, detectable }
     }
 
     /// The simulated views beside these, one each.

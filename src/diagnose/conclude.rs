@@ -17,6 +17,7 @@ use super::finding::outlook::outlook;
 use super::finding::pixels::typical_sigma_mm;
 use super::finding::scene::Scene;
 use super::joint::anchor::{anchor, let_planes_be};
+use super::missing::shapes::Step;
 use super::search::outcome::Outcome;
 use super::verdict::{extend, not_identifiable, shares, untested, verdict};
 use super::views::between::between;
@@ -47,11 +48,18 @@ impl Case<'_> {
     }
 
     pub fn conclude(mut self, battery: Battery) -> Diagnosed {
-        let Battery { mean, scatter, mut found, refitted, better_form, detectable: of_losses } =
-            battery;
+        let Battery {
+            mean,
+            scatter,
+            mut found,
+            refitted,
+            better_form,
+            ends,
+            detectable: of_losses,
+        } = battery;
         let outcomes = [&mean.outcome, &scatter.outcome];
         let scenes = self.scenes();
-        self.advise(&mut found, &scenes, outcomes);
+        self.advise(&mut found, &scenes, outcomes, ends);
         let explained: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
         let tested = (found.is_empty() && refitted.is_none()).then(|| verdict(&found, outcomes));
         if found.is_empty() {
@@ -116,11 +124,19 @@ impl Case<'_> {
         }
     }
 
-    /// The views that would settle names that are in doubt.
-    fn advise(&self, found: &mut [Finding], scenes: &[Scene<'_>; 2], outcomes: [&Outcome; 2]) {
+    /// The views that would settle names that are in doubt, where depth comes back: not beyond these `ends`,
+    /// and not where it was found to be lost.
+    fn advise(
+        &self,
+        found: &mut [Finding],
+        scenes: &[Scene<'_>; 2],
+        outcomes: [&Outcome; 2],
+        ends: Vec<Step>,
+    ) {
+        let lost: Vec<Step> = found.iter().filter_map(Step::of).chain(ends).collect();
         let (sigma, camera, rays) = (&self.model.sigma, &self.sensor().camera, &self.bench.rays);
         for (scene, outcome) in scenes.iter().zip(outcomes) {
-            if let Some(outlook) = outlook(scene, sigma, camera, rays) {
+            if let Some(outlook) = outlook(scene, sigma, camera, rays, &lost) {
                 next_view::advise(found, scene, outcome, &outlook, self.options.seed);
             }
         }

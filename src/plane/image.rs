@@ -44,7 +44,7 @@ pub struct InverseDepthImage<'a> {
 }
 
 /// A target has at least so many pixels.
-pub(super) const MIN_PIXELS: usize = 300;
+pub(crate) const MIN_PIXELS: usize = 300;
 /// Pixels within this many robust standard deviations belong to the plane.
 const REACH_SIGMAS: f64 = 5.0;
 /// ... and pixels within this distance always do: lens errors of a Kinect bend a near wall by

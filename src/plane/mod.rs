@@ -19,6 +19,7 @@ mod target;
 
 pub(crate) use affine::MAD_TO_SIGMA;
 pub use affine::{AffineFit, Effort, fit_affine_robust};
+pub(crate) use image::MIN_PIXELS;
 pub use image::{Exclusions, InverseDepthImage, Target};
 pub use paper::{Points, RansacPlane, ransac_plane};
 pub use ransac::RansacOptions;

@@ -2,6 +2,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::diagnose::diagnosis::Alternative;
+use crate::diagnose::missing::shapes::Step;
 use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::diagnose::search::outcome::Rival;
@@ -10,7 +11,7 @@ use crate::diagnose::views::surveyed_view::MEAN_PRECISION;
 use crate::model::{Domain, Form, PAPER_EQ1, SigmaModel};
 use crate::rng::Stream;
 use crate::simulate::kinect_v1;
-use crate::terms::{Basis, Coordinate, Extent, Modulation, Statistic, Term};
+use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, PixelContext, Statistic, Term};
 use crate::view::Sensor;
 
 const WALL_M: [f64; 2] = [20.0, 20.0];
@@ -22,6 +23,8 @@ struct Stand {
     sensor: Sensor,
     sigma: SigmaModel,
     reach: Extent,
+    lost: Vec<Step>,
+    last: PixelContext,
 }
 
 impl Stand {
@@ -32,6 +35,8 @@ impl Stand {
             sensor: kinect_v1(4),
             sigma: SigmaModel::published(Form::Paper, &PAPER_EQ1, domain),
             reach: Extent { right, down, edge: 100.0, ..Extent::default() },
+            lost: Vec::new(),
+            last: PixelContext::default(),
         }
     }
 
@@ -44,6 +49,9 @@ impl Stand {
             scale_px_m: self.sensor.disparity_px_m().unwrap(),
             sigma: &self.sigma,
             reach: &self.reach,
+            rim_px: 0.0,
+            last: self.last,
+            lost: &self.lost,
             worth: 0.02,
             precision: MEAN_PRECISION.to_vec(),
         })
@@ -128,6 +136,39 @@ fn a_small_board_promises_less_and_is_asked_for_near_by() {
         board.z_m < wall.z_m && board.separation_then < wall.separation_then,
         "{wall:?} {board:?}"
     );
+}
+
+/// Of a board that is faced, by the camera's focal length alone.
+#[test]
+fn the_edge_is_as_far_as_it_is_in_the_picture() {
+    let stand = Stand::of(BOARD_M);
+    let f = stand.sensor.camera.fx;
+    stand.with(|outlook| {
+        let view = outlook.view(&Plane::tilted(2.0, 0.0, 0.0)).unwrap();
+        for p in view.places.iter() {
+            let expected = f / 2.0 * (0.5 - p.right.abs()).min(0.4 - p.down.abs());
+            approx::assert_relative_eq!(p.edge, expected.min(100.0), max_relative = 1e-9);
+        }
+    });
+}
+
+/// Where the views lost nearly all, another is not asked for; and the room's light stays on.
+#[test]
+fn a_view_is_asked_for_where_depth_comes_back_and_in_the_light_there_is() {
+    let [open, cut] = [None, Some(Step::whole(Axis::Z, 3.0, 0.05))].map(|lost| Stand {
+        lost: lost.into_iter().collect(),
+        last: PixelContext { ambient: 300.0, temperature_c: 25.0, ..PixelContext::default() },
+        ..Stand::of(BOARD_M)
+    });
+    let weight = |stand: &Stand, z: f64| {
+        let view = stand.with(|outlook| outlook.view(&Plane::tilted(z, 0.0, 0.0)))?;
+        assert!(view.places.iter().all(|p| p.ambient == 300.0 && p.temperature_c == 25.0));
+        Some(view.weight.iter().sum::<f64>())
+    };
+    let near = weight(&cut, 2.0).unwrap() / weight(&open, 2.0).unwrap();
+    let midst = weight(&cut, 3.0).unwrap() / weight(&open, 3.0).unwrap();
+    assert!((near - 1.0).abs() < 1e-6 && (midst - 0.5).abs() < 1e-6, "{near} {midst}");
+    assert!(weight(&open, 4.0).is_some() && weight(&cut, 4.0).is_none());
 }
 
 /// Truths of either name, recorded with noise; where the name is in doubt, a view more settles it as

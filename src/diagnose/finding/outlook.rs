@@ -6,12 +6,14 @@ use nalgebra::Vector3;
 
 use super::scene::Scene;
 use crate::camera::{Camera, Rays};
+use crate::diagnose::missing::shapes::Step;
 use crate::diagnose::views::samples::ViewData;
-use crate::diagnose::views::surveyed_view::{MEAN_PRECISION, mean_nuisance};
+use crate::diagnose::views::surveyed_view::{MEAN_PRECISION, SurveyedView, mean_nuisance};
 use crate::model::SigmaModel;
-use crate::plane::Plane;
+use crate::plane::{MIN_PIXELS, Plane};
 use crate::scene::TargetFrame;
-use crate::terms::{Extent, Pixels, Statistic};
+use crate::stats::median_in_place;
+use crate::terms::{Extent, PixelContext, Pixels, Statistic};
 
 /// Where a board is held: distances, m, and tilts, degrees.
 const Z_M: [f64; 12] = [0.6, 0.8, 1.0, 1.2, 1.5, 1.8, 2.1, 2.5, 2.9, 3.3, 3.7, 4.0];
@@ -32,6 +34,12 @@ pub struct Outlook<'a> {
     pub sigma: &'a SigmaModel,
     /// Extent of the target in use: the next view has no larger one.
     pub reach: &'a Extent,
+    /// Places of the views are so far from the target's edge at least, px.
+    pub rim_px: f64,
+    /// The room and the sensor as they were last: time, temperature and ambient light.
+    pub last: PixelContext,
+    /// Where no depth comes back.
+    pub lost: &'a [Step],
     /// Weight of a pixel: over its variance for the mean, as it is for the variance.
     pub worth: f64,
     /// Of a view's own level or plane, as the recording's views have it.
@@ -60,28 +68,15 @@ impl Outlook<'_> {
         let pixels = Pixels::new(self.camera, self.rays, self.scale_px_m);
         let centre = Vector3::new(0.0, 0.0, plane.depth(0.0, 0.0));
         let board = TargetFrame::on(plane, centre);
-        let within = |x: f64, [low, high]: [f64; 2]| x >= low && x <= high;
         let mut data = ViewData { precision: self.precision.clone(), ..ViewData::default() };
+        let mut measured = 0.0;
         for v in (side / 2..self.camera.height).step_by(side) {
             for u in (side / 2..self.camera.width).step_by(side) {
-                let mut place = pixels.place(v * self.camera.width + u);
-                let z = plane.depth(place.x, place.y);
-                if !(z > 0.0 && z < FARTHEST_M) {
-                    continue;
-                }
-                place.at_disparity(self.scale_px_m / z, self.scale_px_m);
-                place.lean_on(plane, &pixels);
-                let point = Vector3::new(place.x, place.y, 1.0) * z;
-                (place.right, place.down) = board.place(&point);
-                let on =
-                    within(place.right, self.reach.right) && within(place.down, self.reach.down);
-                if !on {
-                    continue;
-                }
-                place.edge = self.reach.edge;
-                let sigma_px = self.sigma.axial_sigma(z, place.theta) * self.scale_px_m / (z * z);
-                place.variance = sigma_px * sigma_px;
-                let weight = self.worth * (side * side) as f64;
+                let Some(place) = self.place(plane, &board, &pixels, [u, v]) else { continue };
+                let kept: f64 = self.lost.iter().map(|s| 1.0 - s.loss(s.at(&place), 0.0)).product();
+                let seen = kept * (side * side) as f64;
+                measured += seen;
+                let weight = self.worth * seen;
                 if self.statistic == Statistic::Bias {
                     data.weight.push(weight / place.variance);
                     data.nuisance.extend(mean_nuisance(&place));
@@ -93,7 +88,45 @@ impl Outlook<'_> {
                 Arc::make_mut(&mut data.places).push(place);
             }
         }
-        (data.places.len() > FEWEST_PATCHES).then_some(data)
+        let enough = data.places.len() > FEWEST_PATCHES && measured > MIN_PIXELS as f64;
+        enough.then_some(data)
+    }
+
+    /// Where a pixel lies on the target, if it does.
+    fn place(
+        &self,
+        plane: &Plane,
+        board: &TargetFrame,
+        pixels: &Pixels<'_>,
+        [u, v]: [usize; 2],
+    ) -> Option<PixelContext> {
+        let mut place = pixels.place(v * self.camera.width + u);
+        let z = plane.depth(place.x, place.y);
+        if !(z > 0.0 && z < FARTHEST_M) {
+            return None;
+        }
+        place.at_disparity(self.scale_px_m / z, self.scale_px_m);
+        place.lean_on(plane, pixels);
+        let point = Vector3::new(place.x, place.y, 1.0) * z;
+        (place.right, place.down) = board.place(&point);
+        // What a metre along the target is in the picture, px.
+        let px_per_m = |along: &Vector3<f64>| {
+            let du = self.camera.fx * (along.x - place.x * along.z) / z;
+            du.hypot(self.camera.fy * (along.y - place.y * along.z) / z)
+        };
+        let inside = |x: f64, [low, high]: [f64; 2], along: &Vector3<f64>| {
+            (x - low).min(high - x) * px_per_m(along)
+        };
+        let right = inside(place.right, self.reach.right, &board.right);
+        let edge = right.min(inside(place.down, self.reach.down, &board.down));
+        if edge < 0.0 {
+            return None;
+        }
+        place.edge = (self.rim_px + edge).min(self.reach.edge);
+        let sigma_px = self.sigma.axial_sigma(z, place.theta) * self.scale_px_m / (z * z);
+        place.variance = sigma_px * sigma_px;
+        let PixelContext { session_s, temperature_c, ambient, .. } = self.last;
+        Some(PixelContext { session_s, temperature_c, ambient, ..place })
     }
 }
 
@@ -106,35 +139,40 @@ pub fn outlook<'a>(
     sigma: &'a SigmaModel,
     camera: &'a Camera,
     rays: &'a Rays,
+    lost: &'a [Step],
 ) -> Option<Outlook<'a>> {
-    let bias = scene.statistic == Statistic::Bias;
-    // A pixel's weight in the views there are: theirs over their patches' areas.
-    let worth = |(n, view): (usize, &ViewData)| {
-        let surveyed = scene.survey.views.get(n)?;
-        let pixels: f64 = surveyed.tiles.iter().map(|t| t.pixels).sum();
-        let weight: f64 = view
-            .weight
-            .iter()
-            .zip(view.places.iter())
-            .map(|(w, p)| if bias { w * p.variance } else { *w })
-            .sum();
-        let each = (weight / pixels.max(1.0)) as f32;
-        (each > 0.0).then_some(each)
-    };
-    let mut worths: Vec<f32> = scene.data.iter().enumerate().filter_map(worth).collect();
-    if worths.is_empty() {
-        return None;
-    }
+    let views = &scene.survey.views;
+    let first = |v: &'a SurveyedView| v.places.first();
+    let later = |a: &&PixelContext, b: &&PixelContext| a.session_s.total_cmp(&b.session_s);
+    let places = views.iter().flat_map(|v| v.places.iter());
     // Of the view's own nuisances; how known terms scatter is nothing to plan by.
-    let own = if bias { MEAN_PRECISION.len() } else { 1 };
-    Some(Outlook {
+    let own = if scene.statistic == Statistic::Bias { MEAN_PRECISION.len() } else { 1 };
+    let mut outlook = Outlook {
         statistic: scene.statistic,
         camera,
         rays,
         scale_px_m: scene.scale_px_m,
         sigma,
         reach: &scene.survey.reach,
-        worth: f64::from(crate::stats::median_in_place(&mut worths)),
+        rim_px: places.map(|p| p.edge).fold(f64::INFINITY, f64::min),
+        last: *views.iter().filter_map(first).max_by(later)?,
+        lost,
+        worth: 1.0,
         precision: scene.data.first()?.precision[..own].to_vec(),
-    })
+    };
+    // A pixel's weight in the views there are: theirs over what they would weigh by their poses. The
+    // target is not always in the middle, and not all of it is used.
+    let worth = |view: &ViewData| {
+        let at = view.places.first()?;
+        let pose = Plane::tilted(at.rho / at.theta.cos(), at.theta, at.azimuth);
+        let expected: f64 = outlook.view(&pose)?.weight.iter().sum();
+        let worth = (view.weight.iter().sum::<f64>() / expected) as f32;
+        (worth > 0.0).then_some(worth)
+    };
+    let mut worths: Vec<f32> = scene.data.iter().filter_map(worth).collect();
+    if worths.is_empty() {
+        return None;
+    }
+    outlook.worth = f64::from(median_in_place(&mut worths));
+    Some(outlook)
 }

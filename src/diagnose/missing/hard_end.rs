@@ -1,9 +1,11 @@
 //! A hard end of the range: beyond it all is missing, by the sensor's driver or format.
 
 use super::cells::Cell;
+use super::shapes::Step;
 use crate::diagnose::diagnosis::Finding;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::surveyed_view::SurveyedView;
+use crate::terms::Axis;
 
 /// An edge narrower than this share of its distance, or than the noise there, is a limit that a driver
 /// or a format has set (the noise blurs it so); a pattern that grows faint goes gradually.
@@ -42,6 +44,11 @@ impl HardEnd {
         let half = 0.5 * cell.place.side * far / cell.place.disparity * cell.place.z;
         let past = (cell.place.z - self.z_m) * self.width_m.signum();
         past + half > -FELT * self.width_m.abs()
+    }
+
+    /// What it loses.
+    pub fn step(&self) -> Step {
+        Step::whole(Axis::Z, self.z_m, self.width_m)
     }
 
     pub fn note(&self) -> String {

@@ -44,6 +44,8 @@ pub struct DropoutOutcome {
     /// Families with the middle of the faintest whole step that 80 % of such recordings would
     /// show, in degrees or m: what begins farther out is not seen.
     pub detectable: Vec<Detectable>,
+    /// Hard ends of the range, which are no findings.
+    pub ends: Vec<Step>,
     /// What is no finding, in words.
     pub notes: Vec<String>,
 }
@@ -182,6 +184,7 @@ fn losses(
         if let Some(end) = end.as_ref().filter(|e| views.iter().flatten().any(|c| e.touches(c))) {
             let mut rest = losses(&seen.inside(end), reach, camera, blur, seed);
             rest.notes.insert(0, end.note());
+            rest.ends.push(end.step());
             return rest;
         }
         let later = if end.is_none() { ledger.later(won) } else { None };
@@ -189,7 +192,10 @@ fn losses(
         explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
         taken.push(won.shape.axis());
         match end {
-            Some(end) => outcome.notes.push(end.note()),
+            Some(end) => {
+                outcome.notes.push(end.note());
+                outcome.ends.push(end.step());
+            }
             None => outcome.findings.push(later.as_ref().map_or(finding, told)),
         }
     }

@@ -2,6 +2,7 @@
 
 use super::cells::{Cell, odds};
 use crate::camera::Camera;
+use crate::diagnose::diagnosis::Finding;
 use crate::effects::logistic;
 use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, PixelContext};
 
@@ -24,6 +25,21 @@ impl Step {
     /// A share of one, at all times.
     pub fn whole(axis: Axis, middle: f64, width: f64) -> Self {
         Step { axis, middle, width, share: 1.0, since_s: None }
+    }
+
+    /// What a finding's parameters say.
+    pub fn of(finding: &Finding) -> Option<Self> {
+        let value = |name: &str| finding.parameters.get(name)?.get("value")?.as_f64();
+        let step = match finding.effect? {
+            "grazing-dropout" => Step::whole(
+                Axis::Theta,
+                value("theta50_deg")?.to_radians(),
+                value("width_deg")?.to_radians(),
+            ),
+            "range-dropout" => Step::whole(Axis::Z, value("z50_m")?, value("width_m")?),
+            _ => return None,
+        };
+        Some(Step { share: value("share").unwrap_or(1.0), ..step })
     }
 
     /// It is not there yet.
