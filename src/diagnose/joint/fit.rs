@@ -21,6 +21,8 @@ const RIDGE: f64 = 0.1;
 const HELD: f64 = 1e4;
 /// Pixels to a node of a map.
 const NODE_PX: usize = 32;
+/// Splines of a map that are not zero at a place.
+const SPLINES: usize = 16;
 /// What is fitted: terms, then the nodes of the maps.
 pub struct Columns {
     pub bases: Vec<Basis>,
@@ -62,29 +64,73 @@ impl Columns {
 
     /// Normal equations of a view, its plane profiled out.
     pub fn evidence(&self, view: &ViewData) -> Option<Evidence> {
-        let Basis::Spline { across, .. } = self.maps[0] else { return None };
-        let half = self.nodes / 2;
-        // Between the same nodes the same splines are not zero.
-        let touched = |first: usize| {
-            let squares = (0..4).flat_map(|j| (0..4).map(move |i| j * across + i));
-            let nodes = squares.map(|node| self.terms + first + node);
-            let both = nodes.clone().chain(nodes.map(|node| node + half));
-            (0..self.terms).chain(both).collect()
-        };
         let rows = view.rows(&view.response)?;
         let first =
             |i: usize| self.maps[0].spline_at(&view.places[i]).map_or(0, |(first, _)| first);
+        let touched = |first| self.touched(first).collect();
         let fill = |i: usize, row: &mut [f64]| {
-            let (terms, nodes) = row.split_at_mut(self.terms);
-            let place = &view.places[i];
-            self.fill_terms(place, terms);
-            for (map, nodes) in self.maps.iter().zip(nodes.chunks_exact_mut(16)) {
-                if let Some((_, values)) = map.spline_at(place) {
-                    nodes.copy_from_slice(&values);
-                }
-            }
+            self.fill_touched(&view.places[i], row);
         };
         Some(rows.reduce_by_spans(self.terms + self.nodes, first, touched, fill))
+    }
+
+    /// What a view says beyond a fit, its plane profiled out: the score that is left. It is b - A beta of its
+    /// normal equations, which need not be held.
+    fn left(&self, view: &ViewData, beta: &DVector<f64>) -> Option<DVector<f64>> {
+        let (n, p) = (beta.len(), view.precision.len());
+        let mut own = DMatrix::from_diagonal(&DVector::from_column_slice(&view.precision));
+        // Of each column the products with the nuisances and with what is left of the response.
+        let mut products = vec![0.0; n * (p + 1)];
+        let mut seen = DVector::zeros(p);
+        let mut row = vec![0.0; self.terms + 2 * SPLINES];
+        let mut touched: (usize, Vec<usize>) = (usize::MAX, Vec::new());
+        let samples = view.places.iter().zip(&view.response).zip(&view.weight);
+        let samples = samples.zip(view.nuisance.chunks_exact(p)).filter(|((_, w), _)| **w > 0.0);
+        for (((place, y), w), nuisances) in samples {
+            let first = self.fill_touched(place, &mut row);
+            if first != touched.0 {
+                touched = (first, self.touched(first).collect());
+            }
+            let columns = || touched.1.iter().zip(&row);
+            let beyond = w * (y - columns().map(|(&k, g)| g * beta[k]).sum::<f64>());
+            let weighted: Vec<f64> = nuisances.iter().map(|x| w * x).chain([beyond]).collect();
+            for (&k, g) in columns() {
+                let into = &mut products[k * (p + 1)..][..p + 1];
+                into.iter_mut().zip(&weighted).for_each(|(sum, x)| *sum += g * x);
+            }
+            let x = DVector::from_column_slice(nuisances);
+            own.ger(*w, &x, &x, 1.0);
+            seen.axpy(beyond, &x, 1.0);
+        }
+        let plane: DVector<f64> = own.try_inverse()? * seen;
+        let left = |products: &[f64]| {
+            let explained = products.iter().zip(&plane).map(|(s, f)| s * f).sum::<f64>();
+            products[p] - explained
+        };
+        Some(DVector::from_iterator(n, products.chunks_exact(p + 1).map(left)))
+    }
+
+    /// The columns that are not zero where the maps' splines begin at node `first`.
+    fn touched(&self, first: usize) -> impl Iterator<Item = usize> {
+        let across = if let Basis::Spline { across, .. } = self.maps[0] { across } else { 0 };
+        let half = self.nodes / 2;
+        let squares = (0..SPLINES).map(move |k| k / 4 * across + k % 4);
+        let nodes = squares.map(move |node| self.terms + first + node);
+        (0..self.terms).chain(nodes.clone()).chain(nodes.map(move |node| node + half))
+    }
+
+    /// The values of these columns at a place, and the first node.
+    fn fill_touched(&self, place: &PixelContext, row: &mut [f64]) -> usize {
+        let (terms, nodes) = row.split_at_mut(self.terms);
+        self.fill_terms(place, terms);
+        let mut begins = 0;
+        for (map, nodes) in self.maps.iter().zip(nodes.chunks_exact_mut(SPLINES)) {
+            if let Some((first, values)) = map.spline_at(place) {
+                nodes.copy_from_slice(&values);
+                begins = first;
+            }
+        }
+        begins
     }
 
     fn fill_terms(&self, place: &PixelContext, row: &mut [f64]) {
@@ -196,11 +242,11 @@ impl Reduced {
     }
 }
 
-/// The equations view by view, and by parts of the views.
+/// The equations by parts of the views.
 pub struct Joint<'a> {
     pub columns: &'a Columns,
+    data: &'a [ViewData],
     pub views: Vec<Vec<usize>>,
-    by_view: Vec<Option<Evidence>>,
     parts: Vec<Evidence>,
     pub all: Evidence,
     /// Of either half of the views.
@@ -208,7 +254,7 @@ pub struct Joint<'a> {
 }
 
 impl<'a> Joint<'a> {
-    pub fn of(columns: &'a Columns, data: &[ViewData], second: &[bool]) -> Self {
+    pub fn of(columns: &'a Columns, data: &'a [ViewData], second: &[bool]) -> Self {
         let n = columns.terms + columns.nodes;
         // Near and far in every part.
         let z = |v: &usize| data[*v].places.first().map_or(0.0, |p| p.rho);
@@ -217,25 +263,24 @@ impl<'a> Joint<'a> {
         let folds = FOLDS.min(data.len());
         let views: Vec<Vec<usize>> =
             (0..folds).map(|f| order.iter().skip(f).step_by(folds).copied().collect()).collect();
-        let by_view: Vec<Option<Evidence>> =
-            data.par_iter().map(|view| columns.evidence(view)).collect();
-        let sum = |views: &Vec<usize>| {
-            Evidence::sum(n, 0.0, views.iter().filter_map(|&v| by_view[v].as_ref()))
+        // What each part has of either half. A view's equations are a matrix of megabytes: they are added as
+        // they come, in the order of the views.
+        let of_half = |(part, half): (usize, bool)| {
+            let mine = views[part].iter().filter(|v| second[**v] == half);
+            Evidence::sum(n, 0.0, mine.filter_map(|&v| columns.evidence(&data[v])))
         };
-        let half = |h: bool| sum(&(0..data.len()).filter(|v| second[*v] == h).collect());
-        let parts: Vec<Evidence> = views.par_iter().map(sum).collect();
-        let halves = rayon::join(|| half(false), || half(true)).into();
-        let all = Evidence::sum(n, 0.0, &parts);
-        Joint { columns, views, by_view, parts, all, halves }
+        let each: Vec<(usize, bool)> =
+            (0..folds).flat_map(|part| [(part, false), (part, true)]).collect();
+        let each: Vec<Evidence> = each.into_par_iter().map(of_half).collect();
+        let halves = [0, 1].map(|half| Evidence::sum(n, 0.0, each.iter().skip(half).step_by(2)));
+        let parts: Vec<Evidence> = each.chunks(2).map(|both| Evidence::sum(n, 0.0, both)).collect();
+        let all = Evidence::sum(n, 0.0, &halves);
+        Joint { columns, data, views, parts, all, halves }
     }
 
     /// What each view of these says beyond a fit, its plane profiled out: the score that is left.
-    pub fn left<'b>(
-        &'b self,
-        views: impl Iterator<Item = usize> + 'b,
-        beta: &'b DVector<f64>,
-    ) -> impl Iterator<Item = DVector<f64>> + 'b {
-        views.filter_map(|v| self.by_view[v].as_ref()).map(move |e| &e.b - &e.a * beta)
+    pub fn left(&self, views: &[usize], beta: &DVector<f64>) -> Vec<DVector<f64>> {
+        views.par_iter().filter_map(|&v| self.columns.left(&self.data[v], beta)).collect()
     }
 
     /// Fits without each part.

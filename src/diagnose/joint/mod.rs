@@ -81,7 +81,8 @@ impl Joint<'_> {
         let whole = Reduced::of(&self.all, self.columns.terms, s.penalty.as_ref())?;
         let first = whole.fit(&kept, &self.columns.precision)?;
         // What every view says beyond the common fit, of all and of the terms alone.
-        let left: Vec<DVector<f64>> = self.left(0..data.len(), &first).collect();
+        let every: Vec<usize> = (0..data.len()).collect();
+        let left = self.left(&every, &first);
         let of_terms = |left: &DVector<f64>| {
             let terms = self.columns.terms;
             let nodes = left.rows(terms, self.columns.nodes);
@@ -191,8 +192,8 @@ impl Joint<'_> {
             let beta = factor.solve(&own(&evidence.b));
             let mut all = DVector::zeros(self.all.b.len());
             columns.iter().zip(beta.iter()).for_each(|(&c, b)| all[c] = *b);
-            let mine = (0..second.len()).filter(|v| second[*v] == which);
-            let beyond = self.left(mine, &all).map(|left| own(&left)).collect();
+            let mine: Vec<usize> = (0..second.len()).filter(|v| second[*v] == which).collect();
+            let beyond = self.left(&mine, &all).iter().map(own).collect();
             Some(Half { beta, factor, beyond })
         };
         let mut counts = Vec::new();

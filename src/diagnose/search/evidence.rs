@@ -4,6 +4,8 @@
 //! view's own level) profiled out, log p(view | beta) = beta' b - beta' A beta / 2 + const. The
 //! search then needs only A and b of every view, and so does the simulation of its null.
 
+use std::borrow::Borrow;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -19,11 +21,11 @@ pub struct Evidence {
 
 impl Evidence {
     /// Of these views together, on `n` columns that are held by the precision `prior`.
-    pub fn sum<'a>(n: usize, prior: f64, views: impl IntoIterator<Item = &'a Self>) -> Self {
+    pub fn sum<E: Borrow<Self>>(n: usize, prior: f64, views: impl IntoIterator<Item = E>) -> Self {
         let held = Evidence { a: DMatrix::identity(n, n) * prior, b: DVector::zeros(n) };
         views.into_iter().fold(held, |mut sum, view| {
-            sum.a += &view.a;
-            sum.b += &view.b;
+            sum.a += &view.borrow().a;
+            sum.b += &view.borrow().b;
             sum
         })
     }

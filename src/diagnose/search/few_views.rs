@@ -147,7 +147,7 @@ impl<'a> Views<'a> {
 
     /// View by view; where a view's worth is doubted, it is worth the less the more these columns leave.
     fn evidence(&self, basis: &Basis) -> Option<Vec<Evidence>> {
-        let nothing = || Evidence::sum(basis.count(), 0.0, []);
+        let nothing = || Evidence::sum::<Evidence>(basis.count(), 0.0, []);
         let of = |p: &Option<Prepared<'_>>| p.as_ref().map_or_else(nothing, |p| p.evidence(basis));
         let mut all: Vec<Evidence> = self.prepared.iter().map(of).collect();
         let data = if basis.needs_tiles() { self.fine } else { self.coarse };
