@@ -8,6 +8,7 @@
 //! views left out.
 
 pub mod anchor;
+mod columns;
 pub mod error;
 pub mod fit;
 pub mod terms;
@@ -23,8 +24,9 @@ use crate::diagnose::search::outcome::{Chosen, Outcome};
 use crate::diagnose::views::samples::{ViewData, coarser};
 use crate::model::Covariance;
 use crate::terms::Gauge;
+use columns::Columns;
 use error::{Error, clustered};
-use fit::{Columns, Joint, Reduced};
+use fit::{Joint, Reduced};
 use terms::{Settled, System, is_rough, total};
 
 /// The terms of a finished search fitted together, with the smooth rest. `fine` are the views' means

@@ -1,0 +1,196 @@
+//! The columns of the joint fit, terms and then two smooth maps over the picture, and what a view says of
+//! them with its plane profiled out.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::camera::Camera;
+use crate::diagnose::search::evidence::Evidence;
+use crate::diagnose::search::outcome::Chosen;
+use crate::diagnose::views::samples::ViewData;
+use crate::terms::{Basis, Gauge, Modulation, PixelContext, Pixels};
+
+/// Precision of the nodes themselves beside that.
+const RIDGE: f64 = 0.1;
+/// So much the affine part of a map is held to zero, over the mean information on a node.
+const HELD: f64 = 1e4;
+/// Pixels to a node of a map.
+const NODE_PX: usize = 32;
+/// Splines of a map that are not zero at a place.
+const SPLINES: usize = 16;
+
+/// What is fitted: terms, then the nodes of the maps.
+pub struct Columns {
+    pub bases: Vec<Basis>,
+    /// Precision of the terms' coefficients before anything was measured.
+    pub precision: DVector<f64>,
+    pub gauges: Vec<Option<Gauge>>,
+    pub maps: [Basis; 2],
+    /// What planes absorb of the second map.
+    pub far_gauge: Option<Gauge>,
+    /// Columns of the terms, and of both maps.
+    pub terms: usize,
+    pub nodes: usize,
+}
+
+impl Columns {
+    pub fn of(chosen: &[Chosen], camera: &Camera) -> Self {
+        let rays = camera.rays();
+        let pixels = Pixels::new(camera, &rays, 1.0);
+        let bases: Vec<Basis> = chosen.iter().map(|c| c.candidate.basis.clone()).collect();
+        let [across, down] = [(camera.width, 6, 20), (camera.height, 5, 15)]
+            .map(|(length, low, high)| (length / NODE_PX).clamp(low, high));
+        let [width, height] = [camera.width, camera.height].map(|n| n as f64);
+        let map = |times| Basis::Spline { width, height, across, down, times };
+        let maps = [map(Modulation::One), map(Modulation::DisparitySquared)];
+        let precision = |c: &Chosen| -> Vec<f64> {
+            let coefficients = 0..c.candidate.basis.count();
+            coefficients.map(|k| c.candidate.usual(k).powi(-2)).collect()
+        };
+        Columns {
+            gauges: bases.iter().map(|b| Gauge::of(b, &pixels)).collect(),
+            terms: bases.iter().map(Basis::count).sum(),
+            nodes: 2 * across * down,
+            precision: DVector::from_vec(chosen.iter().flat_map(precision).collect()),
+            bases,
+            far_gauge: Gauge::of(&maps[1], &pixels),
+            maps,
+        }
+    }
+
+    /// Normal equations of a view, its plane profiled out.
+    pub fn evidence(&self, view: &ViewData) -> Option<Evidence> {
+        let rows = view.rows(&view.response)?;
+        let first =
+            |i: usize| self.maps[0].spline_at(&view.places[i]).map_or(0, |(first, _)| first);
+        let touched = |first| self.touched(first).collect();
+        let fill = |i: usize, row: &mut [f64]| {
+            self.fill_touched(&view.places[i], row);
+        };
+        Some(rows.reduce_by_spans(self.terms + self.nodes, first, touched, fill))
+    }
+
+    /// What a view says beyond a fit, its plane profiled out: the score that is left. It is b - A beta of its
+    /// normal equations, which need not be held.
+    pub fn left(&self, view: &ViewData, beta: &DVector<f64>) -> Option<DVector<f64>> {
+        let (n, p) = (beta.len(), view.precision.len());
+        let mut own = DMatrix::from_diagonal(&DVector::from_column_slice(&view.precision));
+        // Of each column the products with the nuisances and with what is left of the response.
+        let mut products = vec![0.0; n * (p + 1)];
+        let mut seen = DVector::zeros(p);
+        let mut row = vec![0.0; self.terms + 2 * SPLINES];
+        let mut touched: (usize, Vec<usize>) = (usize::MAX, Vec::new());
+        let samples = view.places.iter().zip(&view.response).zip(&view.weight);
+        let samples = samples.zip(view.nuisance.chunks_exact(p)).filter(|((_, w), _)| **w > 0.0);
+        for (((place, y), w), nuisances) in samples {
+            let first = self.fill_touched(place, &mut row);
+            if first != touched.0 {
+                touched = (first, self.touched(first).collect());
+            }
+            let columns = || touched.1.iter().zip(&row);
+            let beyond = w * (y - columns().map(|(&k, g)| g * beta[k]).sum::<f64>());
+            let weighted: Vec<f64> = nuisances.iter().map(|x| w * x).chain([beyond]).collect();
+            for (&k, g) in columns() {
+                let into = &mut products[k * (p + 1)..][..p + 1];
+                into.iter_mut().zip(&weighted).for_each(|(sum, x)| *sum += g * x);
+            }
+            let x = DVector::from_column_slice(nuisances);
+            own.ger(*w, &x, &x, 1.0);
+            seen.axpy(beyond, &x, 1.0);
+        }
+        let plane: DVector<f64> = own.try_inverse()? * seen;
+        let left = |products: &[f64]| {
+            let explained = products.iter().zip(&plane).map(|(s, f)| s * f).sum::<f64>();
+            products[p] - explained
+        };
+        Some(DVector::from_iterator(n, products.chunks_exact(p + 1).map(left)))
+    }
+
+    /// The columns that are not zero where the maps' splines begin at node `first`.
+    fn touched(&self, first: usize) -> impl Iterator<Item = usize> {
+        let across = if let Basis::Spline { across, .. } = self.maps[0] { across } else { 0 };
+        let half = self.nodes / 2;
+        let squares = (0..SPLINES).map(move |k| k / 4 * across + k % 4);
+        let nodes = squares.map(move |node| self.terms + first + node);
+        (0..self.terms).chain(nodes.clone()).chain(nodes.map(move |node| node + half))
+    }
+
+    /// The values of these columns at a place, and the first node.
+    fn fill_touched(&self, place: &PixelContext, row: &mut [f64]) -> usize {
+        let (terms, nodes) = row.split_at_mut(self.terms);
+        self.fill_terms(place, terms);
+        let mut begins = 0;
+        for (map, nodes) in self.maps.iter().zip(nodes.chunks_exact_mut(SPLINES)) {
+            if let Some((first, values)) = map.spline_at(place) {
+                nodes.copy_from_slice(&values);
+                begins = first;
+            }
+        }
+        begins
+    }
+
+    fn fill_terms(&self, place: &PixelContext, row: &mut [f64]) {
+        let mut rest = row;
+        for (basis, gauge) in self.bases.iter().zip(&self.gauges) {
+            let (mine, others) = rest.split_at_mut(basis.count());
+            basis.fill(place, mine);
+            if let Some(gauge) = gauge {
+                gauge.take_out(place, mine);
+            }
+            rest = others;
+        }
+    }
+
+    pub fn fill(&self, place: &PixelContext, row: &mut [f64]) {
+        let (terms, nodes) = row.split_at_mut(self.terms);
+        self.fill_terms(place, terms);
+        let (first, second) = nodes.split_at_mut(self.nodes / 2);
+        self.maps[0].fill(place, first);
+        self.maps[1].fill(place, second);
+    }
+
+    pub fn span(&self, term: usize) -> std::ops::Range<usize> {
+        let first: usize = self.bases[..term].iter().map(Basis::count).sum();
+        first..first + self.bases[term].count()
+    }
+
+    /// The maps, and what planes absorb of the second.
+    pub fn rest(&self) -> impl Iterator<Item = Basis> + '_ {
+        let absorbed = self.far_gauge.iter().map(|gauge| gauge.term(&[]).0);
+        self.maps.iter().cloned().chain(absorbed)
+    }
+
+    /// What holds the nodes, for a mean information of one on each: smooth, small, and without
+    /// what planes absorb.
+    pub fn penalty(&self, smoothness: f64) -> DMatrix<f64> {
+        let Basis::Spline { across, down, .. } = self.maps[0] else {
+            return DMatrix::zeros(0, 0);
+        };
+        let bend = |n: usize| {
+            let d = DMatrix::from_fn(n - 2, n, |i, j| match j.wrapping_sub(i) {
+                0 | 2 => 1.0,
+                1 => -2.0,
+                _ => 0.0,
+            });
+            d.transpose() * d
+        };
+        let (id, unit) = (DMatrix::identity(across, across), DMatrix::identity(down, down));
+        let rough: DMatrix<f64> = unit.kronecker(&bend(across)) + bend(down).kronecker(&id);
+        let n = across * down;
+        let mut both = DMatrix::zeros(2 * n, 2 * n);
+        let one = (rough + DMatrix::identity(n, n) * RIDGE) * smoothness;
+        both.view_mut((0, 0), (n, n)).copy_from(&one);
+        both.view_mut((n, n), (n, n)).copy_from(&one);
+        if let Some(gauge) = &self.far_gauge {
+            // A slope that grows with the disparity's square bends tilted planes, and what is held
+            // to be nothing is taken for another shape: it is fitted, and left out of what is told.
+            for (map, absorbed) in [(0, 0..3), (n, 0..1)] {
+                for k in absorbed {
+                    let affine = DVector::from_iterator(n, gauge.affine.iter().map(|a| a[k]));
+                    let c = affine.normalize();
+                    both.view_mut((map, map), (n, n)).ger(HELD, &c, &c, 1.0);
+                }
+            }
+        }
+        both
+    }
+}
