@@ -125,7 +125,7 @@ impl Case<'_> {
     }
 
     /// The views that would settle names that are in doubt, where depth comes back: not beyond these `ends`,
-    /// and not where it was found to be lost.
+    /// and not where a dropout over distance or tilt, found or known, takes it.
     fn advise(
         &self,
         found: &mut [Finding],
@@ -133,7 +133,10 @@ impl Case<'_> {
         outcomes: [&Outcome; 2],
         ends: Vec<Step>,
     ) {
-        let lost: Vec<Step> = found.iter().filter_map(Step::of).chain(ends).collect();
+        let found_lost = found.iter().filter_map(|f| {
+            Step::of(f.effect?, |name| f.parameters.get(name)?.get("value")?.as_f64())
+        });
+        let lost: Vec<Step> = found_lost.chain(Step::known(&self.known)).chain(ends).collect();
         let (sigma, camera, rays) = (&self.model.sigma, &self.sensor().camera, &self.bench.rays);
         for (scene, outcome) in scenes.iter().zip(outcomes) {
             if let Some(outlook) = outlook(scene, sigma, camera, rays, &lost) {

@@ -13,6 +13,7 @@ use crate::diagnose::edges::mixing::whole_share;
 use crate::diagnose::edges::shadow::{Sides, largest_share};
 use crate::diagnose::finding::other_findings::named;
 use crate::diagnose::finding::pixels::{typical_sigma_mm, typical_sigma_px};
+use crate::diagnose::missing::shapes::Step;
 use crate::diagnose::noise::mixture::Mixture;
 use crate::diagnose::noise::scatter::ScatterResult;
 use crate::diagnose::noise::structure::Structure;
@@ -21,7 +22,6 @@ use crate::diagnose::noise::view_mean::{ViewMean, nats, variance_px2};
 use crate::diagnose::steps::{contradicted, step_nats};
 use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::tiles::Tile;
-use crate::effects::logistic;
 use crate::terms::{Axis, PixelContext, Statistic};
 
 /// The recording shows less than this share of it. Sensors warm up, and views differ.
@@ -116,27 +116,19 @@ impl Case<'_> {
 
     /// What is lost of that which the model loses.
     fn losses_claimed(&self) -> Vec<Claim> {
-        let of = |id: &'static str, middle: &str, width: &str, axis: Axis| {
-            let at = |name: &str| self.known.parameter(id, name);
-            let (share, middle, width) = (at("share").unwrap_or(1.0), at(middle)?, at(width)?);
-            let expected = |(place, t): (&PixelContext, &Tile)| {
-                let x = if axis == Axis::Z { place.z } else { place.theta.to_degrees() };
-                share * logistic(x - middle, width) * t.asked
-            };
+        let of = |step: Step| {
+            let expected =
+                |(place, t): (&PixelContext, &Tile)| step.loss(step.at(place), 0.0) * t.asked;
             let views = self.survey.views.iter().filter_map(|v| {
                 let expected: f64 = v.patches().map(expected).sum();
                 let lost: f64 = v.tiles.iter().map(|t| t.missing * t.asked).sum();
                 (expected > LOST).then_some((lost / expected, expected))
             });
             let seen = ViewMean::weighed(&views.collect::<Vec<_>>())?;
-            let statistic = Statistic::Dropout;
+            let (id, axis, statistic) = (step.family(), step.axis, Statistic::Dropout);
             Some(Claim { id, statistic, axis, seen, half: SHARE, size_sigma: 0.0 })
         };
-        let range = of("range-dropout", "z50_m", "width_m", Axis::Z);
-        range
-            .into_iter()
-            .chain(of("grazing-dropout", "theta50_deg", "width_deg", Axis::Theta))
-            .collect()
+        Step::known(&self.known).into_iter().filter_map(of).collect()
     }
 }
 

@@ -12,7 +12,7 @@ use crate::diagnose::views::surveyed_view::{MEAN_PRECISION, SurveyedView, mean_n
 use crate::model::SigmaModel;
 use crate::plane::{MIN_PIXELS, Plane};
 use crate::scene::TargetFrame;
-use crate::stats::median_in_place;
+use crate::stats::median;
 use crate::terms::{Extent, PixelContext, Pixels, Statistic};
 
 /// Where a board is held: distances, m, and tilts, degrees.
@@ -25,6 +25,31 @@ const ACROSS: usize = 32;
 /// Beyond this no depth comes back, m.
 const FARTHEST_M: f64 = 8.0;
 
+/// The room and the sensor, as they were last.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Conditions {
+    pub session_s: f64,
+    /// As [`PixelContext`] has them: 0 where no view knows.
+    pub temperature_c: f64,
+    pub ambient: f64,
+}
+
+impl Conditions {
+    /// Of these views; what the last does not know is as it was before.
+    fn last(views: &[SurveyedView]) -> Self {
+        let mut all: Vec<&PixelContext> = views.iter().filter_map(|v| v.places.first()).collect();
+        all.sort_by(|a, b| a.session_s.total_cmp(&b.session_s));
+        let last = |of: fn(&PixelContext) -> f64| {
+            all.iter().rev().map(|p| of(p)).find(|x| *x != 0.0).unwrap_or(0.0)
+        };
+        Conditions {
+            session_s: last(|p| p.session_s),
+            temperature_c: last(|p| p.temperature_c),
+            ambient: last(|p| p.ambient),
+        }
+    }
+}
+
 /// A sensor that could take a view, and what a view of its is worth.
 pub struct Outlook<'a> {
     pub statistic: Statistic,
@@ -36,11 +61,11 @@ pub struct Outlook<'a> {
     pub reach: &'a Extent,
     /// Places of the views are so far from the target's edge at least, px.
     pub rim_px: f64,
-    /// The room and the sensor as they were last: time, temperature and ambient light.
-    pub last: PixelContext,
-    /// Where no depth comes back.
+    pub last: Conditions,
+    /// What share of the depth does not come back, and where.
     pub lost: &'a [Step],
-    /// Weight of a pixel: over its variance for the mean, as it is for the variance.
+    /// Weight of a pixel of a target in the middle: over its variance for the mean, as it is for the
+    /// variance.
     pub worth: f64,
     /// Of a view's own level or plane, as the recording's views have it.
     pub precision: Vec<f64>,
@@ -64,6 +89,13 @@ pub fn poses() -> Vec<(f64, f64, f64)> {
 impl Outlook<'_> {
     /// A view of the target, its middle on the optical axis; `None` when too little is seen.
     pub fn view(&self, plane: &Plane) -> Option<ViewData> {
+        let (data, measured) = self.look(plane);
+        let enough = data.places.len() > FEWEST_PATCHES && measured > MIN_PIXELS as f64;
+        enough.then_some(data)
+    }
+
+    /// The same however little is seen, and the pixels that are measured.
+    fn look(&self, plane: &Plane) -> (ViewData, f64) {
         let side = self.camera.width.div_ceil(ACROSS).max(1);
         let pixels = Pixels::new(self.camera, self.rays, self.scale_px_m);
         let centre = Vector3::new(0.0, 0.0, plane.depth(0.0, 0.0));
@@ -88,8 +120,7 @@ impl Outlook<'_> {
                 Arc::make_mut(&mut data.places).push(place);
             }
         }
-        let enough = data.places.len() > FEWEST_PATCHES && measured > MIN_PIXELS as f64;
-        enough.then_some(data)
+        (data, measured)
     }
 
     /// Where a pixel lies on the target, if it does.
@@ -109,24 +140,32 @@ impl Outlook<'_> {
         place.lean_on(plane, pixels);
         let point = Vector3::new(place.x, place.y, 1.0) * z;
         (place.right, place.down) = board.place(&point);
-        // What a metre along the target is in the picture, px.
-        let px_per_m = |along: &Vector3<f64>| {
-            let du = self.camera.fx * (along.x - place.x * along.z) / z;
-            du.hypot(self.camera.fy * (along.y - place.y * along.z) / z)
-        };
-        let inside = |x: f64, [low, high]: [f64; 2], along: &Vector3<f64>| {
-            (x - low).min(high - x) * px_per_m(along)
-        };
-        let right = inside(place.right, self.reach.right, &board.right);
-        let edge = right.min(inside(place.down, self.reach.down, &board.down));
-        if edge < 0.0 {
+        let within = |x: f64, [low, high]: [f64; 2]| x >= low && x <= high;
+        if !within(place.right, self.reach.right) || !within(place.down, self.reach.down) {
             return None;
         }
-        place.edge = (self.rim_px + edge).min(self.reach.edge);
+        place.edge = (self.rim_px + self.edge_px(&place, &point, board)).min(self.reach.edge);
         let sigma_px = self.sigma.axial_sigma(z, place.theta) * self.scale_px_m / (z * z);
         place.variance = sigma_px * sigma_px;
-        let PixelContext { session_s, temperature_c, ambient, .. } = self.last;
+        let Conditions { session_s, temperature_c, ambient } = self.last;
         Some(PixelContext { session_s, temperature_c, ambient, ..place })
+    }
+
+    /// From a point of the target along its sides to the nearest of its edges that is in the picture, px;
+    /// the picture's own border is none.
+    fn edge_px(&self, place: &PixelContext, point: &Vector3<f64>, board: &TargetFrame) -> f64 {
+        let (camera, [left, right]) = (self.camera, self.reach.right);
+        let [top, bottom] = self.reach.down;
+        let to_edge = |way: f64, along: &Vector3<f64>| {
+            let p = point + along * way;
+            let (u, v) = camera.project(p.x / p.z, p.y / p.z);
+            let (width, height) = (camera.width as f64, camera.height as f64);
+            let seen = p.z > 0.0 && (0.0..width).contains(&u) && (0.0..height).contains(&v);
+            if seen { (u - place.u).hypot(v - place.v) } else { f64::INFINITY }
+        };
+        let sides = [left, right].map(|x| to_edge(x - place.right, &board.right));
+        let ends = [top, bottom].map(|y| to_edge(y - place.down, &board.down));
+        sides.into_iter().chain(ends).fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -142,8 +181,6 @@ pub fn outlook<'a>(
     lost: &'a [Step],
 ) -> Option<Outlook<'a>> {
     let views = &scene.survey.views;
-    let first = |v: &'a SurveyedView| v.places.first();
-    let later = |a: &&PixelContext, b: &&PixelContext| a.session_s.total_cmp(&b.session_s);
     let places = views.iter().flat_map(|v| v.places.iter());
     // Of the view's own nuisances; how known terms scatter is nothing to plan by.
     let own = if scene.statistic == Statistic::Bias { MEAN_PRECISION.len() } else { 1 };
@@ -155,24 +192,26 @@ pub fn outlook<'a>(
         sigma,
         reach: &scene.survey.reach,
         rim_px: places.map(|p| p.edge).fold(f64::INFINITY, f64::min),
-        last: *views.iter().filter_map(first).max_by(later)?,
-        lost,
+        last: Conditions::last(views),
+        lost: &[],
         worth: 1.0,
         precision: scene.data.first()?.precision[..own].to_vec(),
     };
     // A pixel's weight in the views there are: theirs over what they would weigh by their poses. The
-    // target is not always in the middle, and not all of it is used.
+    // target is not always in the middle, and not all of it is used. What was lost in some of them is left
+    // to the median.
     let worth = |view: &ViewData| {
         let at = view.places.first()?;
-        let pose = Plane::tilted(at.rho / at.theta.cos(), at.theta, at.azimuth);
-        let expected: f64 = outlook.view(&pose)?.weight.iter().sum();
-        let worth = (view.weight.iter().sum::<f64>() / expected) as f32;
-        (worth > 0.0).then_some(worth)
+        let z = view.places.iter().map(|p| p.z).sum::<f64>() / view.places.len() as f64;
+        let (seen, _) = outlook.look(&Plane::tilted(z, at.theta, at.azimuth));
+        let [taken, expected] = [view, &seen].map(|v| v.weight.iter().sum::<f64>());
+        (taken > 0.0 && expected > 0.0).then_some(taken / expected)
     };
-    let mut worths: Vec<f32> = scene.data.iter().filter_map(worth).collect();
+    let mut worths: Vec<f64> = scene.data.iter().filter_map(worth).collect();
     if worths.is_empty() {
         return None;
     }
-    outlook.worth = f64::from(median_in_place(&mut worths));
+    outlook.worth = median(&mut worths);
+    outlook.lost = lost;
     Some(outlook)
 }

@@ -9,7 +9,7 @@ use crate::diagnose::search::outcome::Chosen;
 use crate::diagnose::views::samples::ViewData;
 use crate::terms::{Basis, Gauge, Modulation, PixelContext, Pixels};
 
-/// Precision of the nodes themselves beside that.
+/// Precision of the nodes themselves beside that of their differences (`SMOOTHNESS`).
 const RIDGE: f64 = 0.1;
 /// So much the affine part of a map is held to zero, over the mean information on a node.
 const HELD: f64 = 1e4;

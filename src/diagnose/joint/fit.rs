@@ -59,7 +59,7 @@ impl Reduced {
 /// The equations by parts of the views.
 pub struct Joint<'a> {
     pub columns: &'a Columns,
-    data: &'a [ViewData],
+    pub data: &'a [ViewData],
     pub views: Vec<Vec<usize>>,
     parts: Vec<Evidence>,
     pub all: Evidence,
@@ -78,7 +78,7 @@ impl<'a> Joint<'a> {
         let views: Vec<Vec<usize>> =
             (0..folds).map(|f| order.iter().skip(f).step_by(folds).copied().collect()).collect();
         // What each part has of either half. A view's equations are a matrix of megabytes: they are added as
-        // they come, in the order of the views.
+        // they come, the nearest first.
         let of_half = |(part, half): (usize, bool)| {
             let mine = views[part].iter().filter(|v| second[**v] == half);
             Evidence::sum(n, 0.0, mine.filter_map(|&v| columns.evidence(&data[v])))

@@ -59,7 +59,7 @@ pub fn refit(
     let columns = Columns::of(&found.chosen, camera);
     let joint = Joint::of(&columns, &data, second);
     match joint.settle(&found.chosen) {
-        Some(settled) => joint.posterior(&data, second, &settled, &found, camera).unwrap_or(found),
+        Some(settled) => joint.posterior(second, &settled, &found, camera).unwrap_or(found),
         None => found,
     }
 }
@@ -73,7 +73,6 @@ fn median(values: &[f64]) -> f64 {
 impl Joint<'_> {
     fn posterior(
         &self,
-        data: &[ViewData],
         second: &[bool],
         s: &Settled,
         found: &Outcome,
@@ -83,7 +82,7 @@ impl Joint<'_> {
         let whole = Reduced::of(&self.all, self.columns.terms, s.penalty.as_ref())?;
         let first = whole.fit(&kept, &self.columns.precision)?;
         // What every view says beyond the common fit, of all and of the terms alone.
-        let every: Vec<usize> = (0..data.len()).collect();
+        let every: Vec<usize> = (0..self.data.len()).collect();
         let left = self.left(&every, &first);
         let of_terms = |left: &DVector<f64>| {
             let terms = self.columns.terms;
@@ -107,7 +106,7 @@ impl Joint<'_> {
         let precision = &self.columns.precision * dispersion;
         let beta = whole.fit(&kept, &precision)?;
         let errors = clustered(&held(dispersion)?, &beyond);
-        let planes = (camera, disparities(data));
+        let planes = (camera, disparities(self.data));
         let is_told = second.contains(&true);
         let (halves, error) = rayon::join(
             || self.halves(second, s, &precision, &beta),

@@ -2,7 +2,7 @@
 
 use super::cells::{Cell, odds};
 use crate::camera::Camera;
-use crate::diagnose::diagnosis::Finding;
+use crate::diagnose::views::known::KnownTerms;
 use crate::effects::logistic;
 use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, PixelContext};
 
@@ -27,10 +27,9 @@ impl Step {
         Step { axis, middle, width, share: 1.0, since_s: None }
     }
 
-    /// What a finding's parameters say.
-    pub fn of(finding: &Finding) -> Option<Self> {
-        let value = |name: &str| finding.parameters.get(name)?.get("value")?.as_f64();
-        let step = match finding.effect? {
+    /// By the effect's parameters; the share is one where none is given.
+    pub fn of(effect: &str, value: impl Fn(&str) -> Option<f64>) -> Option<Self> {
+        let step = match effect {
             "grazing-dropout" => Step::whole(
                 Axis::Theta,
                 value("theta50_deg")?.to_radians(),
@@ -40,6 +39,12 @@ impl Step {
             _ => return None,
         };
         Some(Step { share: value("share").unwrap_or(1.0), ..step })
+    }
+
+    /// What is known to be lost over distance or tilt.
+    pub fn known(known: &KnownTerms) -> Vec<Self> {
+        let of = |id| Step::of(id, |name| known.parameter(id, name));
+        ["range-dropout", "grazing-dropout"].into_iter().filter_map(of).collect()
     }
 
     /// It is not there yet.

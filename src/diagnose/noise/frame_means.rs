@@ -58,23 +58,23 @@ pub(in crate::diagnose) fn velocity(views: &[Structure]) -> Option<(f64, f64, f6
 struct FrameNoise {
     /// What all frames scatter by beside what their pixels explain, px^2; negative where they scatter less.
     extra_px2: f64,
-    /// By how much views' own variances differ from that beyond chance, as a share, in square.
-    uneven: f64,
+    /// Squared coefficient of variation of the views' own variances about that, beyond chance.
+    cv2: f64,
 }
 
 impl FrameNoise {
     fn of(all: &[Jitter]) -> Self {
         let freedom: f64 = all.iter().map(|j| j.freedom).sum();
         let beside: f64 = all.iter().map(|j| j.scatter_px2 - j.freedom * j.expected_px2).sum();
-        let mut noise = FrameNoise { extra_px2: beside / freedom, uneven: 0.0 };
-        // A variance of f degrees of freedom is off by 2 / f, in square.
+        let mut noise = FrameNoise { extra_px2: beside / freedom, cv2: 0.0 };
+        // Of r, a ratio with f degrees of freedom, (r - 1)^2 is cv2 (1 + 2 / f) + 2 / f on average.
         let off = |j: &Jitter| {
             let by_chance = 2.0 / j.freedom;
             ((noise.ratio(j) - 1.0).powi(2) - by_chance) / (1.0 + by_chance)
         };
-        let measured = all.iter().filter(|j| j.freedom > 0.0);
+        let measured = all.iter().filter(|j| j.freedom > 0.0 && noise.px2(j) > f64::MIN_POSITIVE);
         let (sum, n) = measured.fold((0.0, 0.0), |(sum, n), j| (sum + off(j), n + 1.0));
-        noise.uneven = (sum / f64::max(n, 1.0)).max(0.0);
+        noise.cv2 = (sum / f64::max(n, 1.0)).max(0.0);
         noise
     }
 
@@ -87,12 +87,14 @@ impl FrameNoise {
         (view.expected_px2 + self.extra_px2.max(0.0)).max(f64::MIN_POSITIVE)
     }
 
-    /// As its own frames scatter, so far as views differ (a moderated variance: Smyth 2004); no less than
-    /// all do, for few frames may lie on a line by chance.
+    /// As its own frames scatter, so far as views differ (a moderated variance: Smyth 2004, his prior by
+    /// its moments); no less than all do, for few frames may lie on a line by chance.
     fn own_px2(&self, view: &Jitter) -> f64 {
-        // Degrees of freedom that the other views are worth are 2 / uneven.
-        let own = self.uneven * view.freedom;
-        self.px2(view) * ((2.0 + own * self.ratio(view)) / (2.0 + own)).max(1.0)
+        // Inverse gamma variances of d degrees of freedom have cv2 = 2 / (d - 4), and their mean counts
+        // d - 2 times.
+        let others = 2.0 * (1.0 + self.cv2);
+        let own = self.cv2 * view.freedom;
+        self.px2(view) * ((others + own * self.ratio(view)) / (others + own)).max(1.0)
     }
 }
 
@@ -241,6 +243,29 @@ mod tests {
         let moving = (0..300).filter(|seed| told(*seed, 0.0)).count();
         assert!(moving <= 3, "{moving} of 300 move");
         assert!((0..20).all(|seed| told(seed, 0.05)));
+    }
+
+    /// Views that scatter alike are believed to: by each one's own two degrees of freedom, if that is more,
+    /// they would scatter by 1 + 1/e. A view that is truly restless is taken for it.
+    #[test]
+    fn a_view_counts_by_its_own_frames_as_far_as_views_differ() {
+        let mut rng = Seed(11).stream("frame-means/moderated");
+        let mut view = |true_px2: f64, freedom: u32| {
+            let scatter_px2 = (0..freedom).map(|_| true_px2 * normal(&mut rng).powi(2)).sum();
+            let freedom = f64::from(freedom);
+            Jitter { scatter_px2, freedom, expected_px2: 1.0, trend_px2: 1.0, velocity_mps: 1.0 }
+        };
+        let mut over = 0.0;
+        for _ in 0..200 {
+            let all: Vec<Jitter> = (0..13).map(|_| view(1.0, 2)).collect();
+            let noise = FrameNoise::of(&all);
+            over += all.iter().map(|j| noise.own_px2(j) / noise.px2(j)).sum::<f64>() / 2600.0;
+        }
+        assert!((1.0..1.2).contains(&over), "{over}");
+        let all: Vec<Jitter> = (0..40).map(|v| view(if v == 7 { 30.0 } else { 1.0 }, 10)).collect();
+        let noise = FrameNoise::of(&all);
+        let own = noise.own_px2(&all[7]);
+        assert!((15.0..60.0).contains(&own), "{own}");
     }
 
     /// Far, steep views have noisy means: a motion that the near ones see is no less sure for them.
