@@ -48,7 +48,7 @@ pub struct Battery {
     /// Hard ends of the range.
     pub ends: Vec<Step>,
     /// How small a loss would have been seen.
-    pub detectable: Vec<Detectable>,
+    pub detectable_losses: Vec<Detectable>,
 }
 
 /// Lines that were learnt are told by their profile alone.
@@ -121,9 +121,9 @@ impl Case<'_> {
         let told = self.baseline.is_some() && found.iter().any(of_size);
         // Of two recordings what the search of the size tells is not told of its parts again.
         found.extend(textures.into_iter().filter(|f| !(told && of_size(f) && f.effect.is_none())));
-        let DropoutOutcome { findings, mut detectable, ends, notes } = lost;
+        let DropoutOutcome { findings, detectable: mut detectable_losses, ends, notes } = lost;
         self.remarks.extend(notes);
-        detectable.retain(|d| can_happen(d.effect, self.sensor().kind));
+        detectable_losses.retain(|d| can_happen(d.effect, self.sensor().kind));
         found.extend(findings);
         let laws = self.laws(&mean.terms, reference::bent_m(&found));
         found.extend(laws);
@@ -140,7 +140,7 @@ impl Case<'_> {
             temper(&mut f.alternatives);
             resembles_only(f);
         }
-        Battery { mean, scatter, found, refitted, better_form, ends, detectable }
+        Battery { mean, scatter, found, refitted, better_form, ends, detectable_losses }
     }
 
     /// The simulated views beside these, one each.

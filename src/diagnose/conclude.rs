@@ -48,15 +48,8 @@ impl Case<'_> {
     }
 
     pub fn conclude(mut self, battery: Battery) -> Diagnosed {
-        let Battery {
-            mean,
-            scatter,
-            mut found,
-            refitted,
-            better_form,
-            ends,
-            detectable: of_losses,
-        } = battery;
+        let Battery { mean, scatter, mut found, refitted, better_form, ends, detectable_losses } =
+            battery;
         let outcomes = [&mean.outcome, &scatter.outcome];
         let scenes = self.scenes();
         self.advise(&mut found, &scenes, outcomes, ends);
@@ -76,7 +69,7 @@ impl Case<'_> {
             || (self.map(&scenes, outcomes), self.detectable(&scenes, outcomes), left_out()),
         );
         drop(scenes);
-        detectable.extend(of_losses);
+        detectable.extend(detectable_losses);
         let mut remarks = self.remarks();
         remarks.extend(untested(outcomes, self.survey.block_tiles));
         remarks.extend(better_form);
@@ -133,9 +126,8 @@ impl Case<'_> {
         outcomes: [&Outcome; 2],
         ends: Vec<Step>,
     ) {
-        let found_lost = found.iter().filter_map(|f| {
-            Step::of(f.effect?, |name| f.parameters.get(name)?.get("value")?.as_f64())
-        });
+        let of_finding = |f: &Finding| Step::of(f.effect?, |name| f.value(name));
+        let found_lost = found.iter().filter_map(of_finding);
         let lost: Vec<Step> = found_lost.chain(Step::known(&self.known)).chain(ends).collect();
         let (sigma, camera, rays) = (&self.model.sigma, &self.sensor().camera, &self.bench.rays);
         for (scene, outcome) in scenes.iter().zip(outcomes) {

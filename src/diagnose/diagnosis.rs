@@ -109,6 +109,11 @@ impl Finding {
         matches!(self.effect, Some("depth-scale" | "disparity-offset" | "thermal-drift"))
     }
 
+    /// What was found of a parameter, without its error.
+    pub fn value(&self, parameter: &str) -> Option<f64> {
+        self.parameters.get(parameter)?.get("value")?.as_f64()
+    }
+
     /// The effect of the catalogue that shows as this finding does, for the simulator: what was not
     /// measured is typical. `None` for what has no name, and where the strength is not known or
     /// beyond what the formula takes.
@@ -118,8 +123,7 @@ impl Finding {
         let card = active.effect.card();
         for (n, knob) in card.parameters.iter().enumerate() {
             let [low, high] = knob.range;
-            let value = self.parameters.get(knob.name).and_then(|v| v.get("value")?.as_f64());
-            match value {
+            match self.value(knob.name) {
                 Some(v) if n > 0 => active = active.with(knob.name, v.clamp(low, high)).ok()?,
                 Some(v) => active = active.with(knob.name, v).ok()?,
                 // A share that is not said is the whole.

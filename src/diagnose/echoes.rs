@@ -30,7 +30,7 @@ pub(super) fn forget_noise_of_frames(
 ) {
     let of_frame = |f: &&Finding| f.statistic == Statistic::Variance && f.axis == Axis::Frame;
     let frame = textures.iter().find(of_frame);
-    let log = frame.and_then(|f| f.parameters.get("log_variance")?.get("value")?.as_f64());
+    let log = frame.and_then(|f| f.value("log_variance"));
     let frames = fields.iter().map(|f| f.frames.len()).max().unwrap_or(1);
     let own = log.map_or(0.0, |log| log.exp_m1() / frames as f64);
     let echo = |off: f64| off * own > 0.0 && own.abs() > HALF * off.abs();

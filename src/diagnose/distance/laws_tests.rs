@@ -3,7 +3,6 @@
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::diagnose::diagnosis::Finding;
 use crate::diagnose::distance::reference::findings;
 use crate::diagnose::views::known::KnownTerms;
 use crate::rng::Seed;
@@ -46,8 +45,7 @@ fn references(
 fn found(checked: &[ReferencedView], bent_m: f64) -> Vec<(Option<&'static str>, f64)> {
     let laws = laws(checked, &Nuisances { bent_m, ..Nuisances::default() });
     let found = findings(&laws, &KnownTerms::default(), 1.0, 0.003, Seed(1));
-    let offset_px = |f: &Finding| f.parameters.get("offset_px")?.get("value")?.as_f64();
-    found.iter().map(|f| (f.effect, offset_px(f).unwrap_or(f64::NAN))).collect()
+    found.iter().map(|f| (f.effect, f.value("offset_px").unwrap_or(f64::NAN))).collect()
 }
 
 /// In the order of the session they would be a drift.

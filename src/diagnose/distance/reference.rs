@@ -136,8 +136,7 @@ fn contradicted(law: &Law, p: f64) -> Finding {
 /// of `usual` px, which nobody knows: within two standard deviations of it.
 fn is_constant_of(law: &Finding, usual: f64) -> bool {
     const DEVIATIONS: f64 = 2.0;
-    let offset = law.parameters.get("offset_px").and_then(|p| p.get("value")?.as_f64());
-    offset.is_some_and(|px| px.abs() < DEVIATIONS * usual)
+    law.value("offset_px").is_some_and(|px| px.abs() < DEVIATIONS * usual)
 }
 
 /// Does the effect happen to cameras of this kind?

@@ -1,8 +1,8 @@
 use rand_distr::{Distribution, StandardNormal};
 
-use super::super::outlook::Conditions;
 use super::*;
 use crate::diagnose::diagnosis::Alternative;
+use crate::diagnose::finding::outlook::Conditions;
 use crate::diagnose::missing::shapes::Step;
 use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::noise_gains::NoiseGains;

@@ -25,6 +25,8 @@ pub struct Columns {
     pub precision: DVector<f64>,
     pub gauges: Vec<Option<Gauge>>,
     pub maps: [Basis; 2],
+    /// Nodes of a map from one row to the next.
+    across: usize,
     /// What planes absorb of the second map.
     pub far_gauge: Option<Gauge>,
     /// Columns of the terms, and of both maps.
@@ -52,6 +54,7 @@ impl Columns {
             nodes: 2 * across * down,
             precision: DVector::from_vec(chosen.iter().flat_map(precision).collect()),
             bases,
+            across,
             far_gauge: Gauge::of(&maps[1], &pixels),
             maps,
         }
@@ -107,9 +110,8 @@ impl Columns {
 
     /// The columns that are not zero where the maps' splines begin at node `first`.
     fn touched(&self, first: usize) -> impl Iterator<Item = usize> {
-        let across = if let Basis::Spline { across, .. } = self.maps[0] { across } else { 0 };
         let half = self.nodes / 2;
-        let squares = (0..SPLINES).map(move |k| k / 4 * across + k % 4);
+        let squares = (0..SPLINES).map(|k| k / 4 * self.across + k % 4);
         let nodes = squares.map(move |node| self.terms + first + node);
         (0..self.terms).chain(nodes.clone()).chain(nodes.map(move |node| node + half))
     }

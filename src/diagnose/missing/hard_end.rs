@@ -30,9 +30,8 @@ impl HardEnd {
         if finding.effect != Some("range-dropout") || finding.parameters.contains_key("share") {
             return None;
         }
-        let value = |name: &str, of: &str| finding.parameters.get(name)?.get(of)?.as_f64();
-        let (z_m, width_m) = (value("z50_m", "value")?, value("width_m", "value")?);
-        let error = value("width_m", "std_error")?;
+        let (z_m, width_m) = (finding.value("z50_m")?, finding.value("width_m")?);
+        let error = finding.parameters.get("width_m")?.get("std_error")?.as_f64()?;
         let limit = f64::max(HARD_END_SHARE * z_m, blur(z_m));
         let end = finding.interval[usize::from(width_m > 0.0)];
         let doubt = if (end - z_m) / width_m > PASSED { 0.0 } else { SURE_WIDTH_ERRORS * error };
