@@ -30,6 +30,7 @@ use super::steps::{COARSE_SIGMAS, own_step, own_step_note, steps};
 use super::verdict::{merge, symptoms};
 use super::views::field::Field;
 use crate::sensors::SensorKind;
+use crate::stats::mean;
 use crate::terms::{Axis, Statistic, corner_radius};
 
 /// How noise hangs together changes what a few frames show of its size by so much.
@@ -107,7 +108,7 @@ impl Case<'_> {
         );
         drop(scenes);
         let refitted = self.take_refit(&mut curves);
-        curves.retain(|f| self.is_news(f, &scatter));
+        curves.retain(|f| self.is_news(f, &mean, &scatter));
         if self.baseline.is_none() {
             forget_noise_of_frames(&mut curves, &textures, &self.fields);
             fold_into_sigma(&mut curves);
@@ -148,8 +149,9 @@ impl Case<'_> {
         self.baseline.as_ref().map(|b| &b.fields[..])
     }
 
-    /// Steps shift the mean within a step, and gross errors add to the variance: neither is news.
-    fn is_news(&self, f: &Finding, scatter: &ScatterResult) -> bool {
+    /// Steps shift the mean within a step, rows that err as one shift theirs, and gross errors add to the variance:
+    /// none of it is news.
+    fn is_news(&self, f: &Finding, bias: &MeanResult, scatter: &ScatterResult) -> bool {
         let coarsest = scatter.lattice.step_px(self.fields[0].scale_px_m, self.survey.reach.z[0]);
         let sigma_px = typical_sigma_px(&self.fields);
         // The error of a fine step is as good as noise, of a twelfth of its square; the mean it shifts by
@@ -161,12 +163,19 @@ impl Case<'_> {
             && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)
             && own_step(&scatter.lattice, self.recording, self.fields[0].scale_px_m).is_none()
             && f.size.sigma * sigma_px < 0.3 * coarsest;
+        // Where rows err as one, so does their mean in every view: for no curve over the rows.
+        let over_rows = f.statistic == Statistic::Bias && f.axis == Axis::Row && f.effect.is_none();
+        let of_rows = over_rows && {
+            let excess = self.excess_of_rows(&scatter.structure, &scatter.textures);
+            let excess = mean(excess.iter().map(|[of_mean, _]| *of_mean)).unwrap_or(1.0);
+            f.share / excess < bias.outcome.noise.threshold(self.level(Self::MEAN_LEVEL))
+        };
         let far_errors = |t: &TextureFinding| !t.parameters.contains_key(EXCESS);
         let textures = !scatter.textures.is_empty() || scatter.tails.is_some();
         let textured = scatter.tails.as_ref().is_some_and(far_errors)
             || (textures && f.size.sigma < LEVEL_BESIDE_TEXTURE);
         let tailed = textured && f.status == Status::Recalibrate;
-        !stepped && !tailed
+        !stepped && !tailed && !of_rows
     }
 
     /// Is what was measured clearly more than twice of what the model has?

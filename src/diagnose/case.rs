@@ -77,7 +77,8 @@ impl<'a> Case<'a> {
         }
         progress.stage("comparing with the model");
         let learnt_from = learnt_from(model, &known, options, simulated.is_some());
-        let survey = survey(&fields, &bench, baseline.as_ref(), options, (learnt_from, &known));
+        let learnt = (learnt_from, &known);
+        let survey = survey(&fields, &bench, baseline.as_ref(), options, learnt, model);
         Ok(Case {
             recording,
             model,
@@ -104,7 +105,8 @@ impl<'a> Case<'a> {
         let learnt = (self.learnt_from, &known);
         // Two surveys at once are a quarter of the memory of all.
         drop(self.survey);
-        let mut survey = survey(&fields, &self.bench, self.baseline.as_ref(), self.options, learnt);
+        let (bench, baseline) = (&self.bench, self.baseline.as_ref());
+        let mut survey = survey(&fields, bench, baseline, self.options, learnt, model);
         survey.skip_covariance();
         Case {
             model,
@@ -182,6 +184,7 @@ fn survey(
     baseline: Option<&Baseline>,
     options: &DiagnoseOptions,
     (learnt_from, known): ([Option<Learnt>; 2], &KnownTerms),
+    model: &NoiseModel,
 ) -> Survey {
     let camera = &bench.sensor.camera;
     let mut survey = Survey::of(fields, camera, &bench.rays);
@@ -192,6 +195,8 @@ fn survey(
     if let Some(baseline) = baseline {
         survey.compared();
         baseline.means(&mut survey);
+    } else {
+        survey.forget_noise_beyond(&model.sigma);
     }
     survey.learnt_from = learnt_from;
     if learnt_from[1].is_some() {

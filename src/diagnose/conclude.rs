@@ -37,6 +37,9 @@ impl Case<'_> {
         remarks.append(&mut self.remarks);
         let camera = &self.sensor().camera;
         remarks.extend(thinned::remark(camera.width, camera.height));
+        if self.baseline.is_none() && !self.survey.refits_sigma {
+            remarks.extend(self.survey.noise_untested(&self.model.sigma));
+        }
         if self.sensor().baseline_m.is_none() {
             remarks.push(format!(
                 "the recording gives no baseline_m: {KINECT_BASELINE_M} m, a Kinect v1's, is assumed; all disparities scale with it"

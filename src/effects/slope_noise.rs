@@ -45,12 +45,15 @@ impl Effect for SlopeNoise {
     }
 
     fn shapes(&self, _: &Bounds) -> Vec<Basis> {
-        // Steps of the root of two: between two of them a width is off by a fifth, and its curve by little.
-        [0.1, 0.14, 0.2, 0.28, 0.4, 0.57, 0.8, 1.13, 1.6].map(blur).into()
+        let tilted = WIDTHS_PX.map(|px| Basis::Log1p { over: Coordinate::TiltBlur(px) });
+        WIDTHS_PX.map(blur).into_iter().chain(tilted).collect()
     }
 
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
-        let Basis::Log1p { over: Coordinate::Blur(lateral_px) } = *fit.shape else {
+        let Basis::Log1p {
+            over: Coordinate::Blur(lateral_px) | Coordinate::TiltBlur(lateral_px),
+        } = *fit.shape
+        else {
             return Vec::new();
         };
         // A shape of another width, more or less of it, says the same where it doubles the variance.
@@ -68,7 +71,46 @@ impl Effect for SlopeNoise {
     }
 }
 
+/// Steps of the root of two: between two of them a width is off by a fifth, and its curve by little.
+const WIDTHS_PX: [f64; 9] = [0.1, 0.14, 0.2, 0.28, 0.4, 0.57, 0.8, 1.13, 1.6];
+
 /// Noise of the place in the picture, through the slope of the target.
 fn blur(lateral_px: f64) -> Basis {
     Basis::Log1p { over: Coordinate::Blur(lateral_px) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plane::Plane;
+    use crate::simulate::kinect_v1;
+    use crate::terms::Pixels;
+
+    /// In depth: z^2 over fx b times the disparity's is the width times the depth's change from pixel to pixel,
+    /// by the plane itself; or times z tan(theta) / fx, which is the same on the optical axis alone.
+    #[test]
+    fn a_width_is_noise_of_the_depth_by_the_slope() {
+        const WIDTH_PX: f64 = 0.7;
+        let camera = kinect_v1(1).camera;
+        let rays = camera.rays();
+        let px_m = 0.075 * camera.fx;
+        let plane = Plane::tilted(1.5, 0.8, 0.0);
+        let pixels = Pixels::new(&camera, &rays, px_m);
+        for u in [40.0, camera.cx, 560.0] {
+            let (x, _) = camera.ray(u, camera.cy);
+            let depth = |x: f64| plane.depth(x, 0.0);
+            let z = depth(x);
+            let mut place = pixels.place(camera.cy.round() as usize * camera.width);
+            (place.x, place.y, place.variance) = (x, 0.0, 1.0);
+            place.at_disparity(px_m / z, px_m);
+            place.lean_on(&plane, &pixels);
+            let in_depth = |over: Coordinate| over.value(&place).sqrt() * z * z / px_m;
+            let change = (depth(x + 0.5 / camera.fx) - depth(x - 0.5 / camera.fx)).abs();
+            let by_plane = in_depth(Coordinate::Blur(WIDTH_PX));
+            assert!((by_plane / (WIDTH_PX * change) - 1.0).abs() < 1e-3, "{u}: {by_plane}");
+            let by_tilt = in_depth(Coordinate::TiltBlur(WIDTH_PX));
+            let law = WIDTH_PX * z * plane.theta().tan() / camera.fx;
+            assert!((by_tilt / law - 1.0).abs() < 1e-9, "{u}: {by_tilt} {law}");
+        }
+    }
 }

@@ -38,7 +38,9 @@ impl Effect for TiltAxisAnisotropy {
     }
 
     fn shapes(&self, _: &Bounds) -> Vec<Basis> {
-        LAWS.map(along_baseline).into()
+        // Up along the baseline and down across it, or up along it alone.
+        let both = [Coordinate::Alignment, Coordinate::AlongBaseline];
+        both.iter().flat_map(|over| LAWS.map(|law| Basis::powers(*over, 1, law))).collect()
     }
 
     fn plain(&self, _: Basis) -> Basis {
@@ -46,8 +48,13 @@ impl Effect for TiltAxisAnisotropy {
     }
 
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
-        let steep = PixelContext { theta: REFERENCE_TILT_RAD, azimuth: 0.0, ..Default::default() };
-        let ratio = |b: &[f64]| fit.value(b, steep).exp();
+        let steep = |azimuth| PixelContext {
+            theta: REFERENCE_TILT_RAD,
+            azimuth,
+            ..Default::default()
+        };
+        let [along, across] = [0.0, std::f64::consts::FRAC_PI_2].map(steep);
+        let ratio = |b: &[f64]| (0.5 * (fit.value(b, along) - fit.value(b, across))).exp();
         let mut told = fit.estimate("ratio", &ratio);
         let by_law = told.value * told.value.ln() * between_laws(fit.reach.theta[1]);
         told.std_error = told.std_error.hypot(by_law);
@@ -102,6 +109,22 @@ mod tests {
         let coefficients = &[coefficient];
         let fit = Fitted { shape: &shape, coefficients, covariance: &covariance, reach: &reach };
         TiltAxisAnisotropy.estimates(&fit)[0]
+    }
+
+    /// Up along the baseline and down across it by as much, or up along it alone by twice that: the same ratio.
+    #[test]
+    fn the_ratio_is_between_the_two_directions() {
+        let of = |over, coefficient: f64| {
+            let mut reach = Extent::of(std::iter::empty());
+            reach.theta = [0.0, 1.0];
+            let (shape, covariance) = (Basis::powers(over, 1, FORWARD), DMatrix::zeros(1, 1));
+            let coefficients = &[coefficient];
+            let fit = Fitted { shape: &shape, coefficients, covariance: &covariance, reach: &reach };
+            TiltAxisAnisotropy.estimates(&fit)[0].value
+        };
+        let both = 1.5f64.ln() / 0.75;
+        let ratios = [of(Coordinate::Alignment, both), of(Coordinate::AlongBaseline, 2.0 * both)];
+        assert!(ratios.iter().all(|ratio| (ratio - 1.5).abs() < 1e-9), "{ratios:?}");
     }
 
     /// Every law says the same of the tilt that the ratio is counted at; a recording whose tilts end

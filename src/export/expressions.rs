@@ -199,9 +199,14 @@ fn coordinate(over: Coordinate) -> String {
         Coordinate::Azimuth => "p.azimuth".into(),
         Coordinate::Along => "p.x * cos(p.azimuth) + p.y * sin(p.azimuth)".into(),
         Coordinate::Alignment => "cos(2.0 * p.azimuth)".into(),
+        Coordinate::AlongBaseline => "cos(p.azimuth) * cos(p.azimuth)".into(),
         Coordinate::Blur(lateral_px) => {
             let slope = "(p.slope_u * p.slope_u + p.slope_v * p.slope_v)";
             format!("{} * {slope} / p.variance", number(lateral_px * lateral_px))
+        }
+        Coordinate::TiltBlur(lateral_px) => {
+            let middle = "(p.rho / (fmax(cos(p.theta), 0.05) * p.z))";
+            format!("{} * {middle} * {middle}", coordinate(Coordinate::Blur(lateral_px)))
         }
         Coordinate::Session => "p.session_s".into(),
         Coordinate::Temperature => "p.temperature_c".into(),

@@ -119,6 +119,18 @@ impl SigmaModel {
         }
     }
 
+    /// Logarithm of what the form goes on to outside the domain over [`SigmaModel::axial_sigma`]: 0 inside, NaN
+    /// where it goes on to nothing positive.
+    pub fn ln_beyond_domain(&self, z: f64, theta: f64) -> f64 {
+        let (_, held) = self.domain.clamp(z, theta);
+        let continued = self.form.spec().sigma(&self.parameters, z, theta.abs());
+        let leans = match self.direction {
+            Direction::Axial => 1.0,
+            Direction::Perpendicular => held.cos() / theta.cos(),
+        };
+        (continued / self.sigma(z, theta) * leans).ln()
+    }
+
     /// Lower and upper end of the interval that covers sigma with probability `level`: Student's
     /// t on the logarithm, so that neither end is negative.
     pub fn interval(&self, z: f64, theta: f64, level: f64) -> [f64; 2] {
@@ -233,6 +245,25 @@ fn cell(share: f32, nodes: usize) -> (usize, f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Held at the edges of its domain, 1 to 4 m: by what Eq. 1 is at half a metre, and across a plane by the
+    /// cosine too; beyond its pole it has no value.
+    #[test]
+    fn what_the_form_goes_on_to_is_told_beside_what_is_held() {
+        let mut model = SigmaModel::paper();
+        for (z, theta) in [(1.0, 0.0), (2.7, 1.0), (4.0, PAPER_EQ1[5] - POLE_MARGIN)] {
+            assert_eq!(model.ln_beyond_domain(z, theta), 0.0);
+        }
+        let eq1 = |z: f64| 0.00151 + 0.00215 * (z - 0.483f64).powi(2);
+        let near = (eq1(0.5) / eq1(1.0)).ln();
+        approx::assert_relative_eq!(model.ln_beyond_domain(0.5, 0.0), near, max_relative = 1e-9);
+        model.domain.theta_rad[1] = 0.5;
+        let [axial, across] = [Direction::Axial, Direction::Perpendicular]
+            .map(|direction| SigmaModel { direction, ..model.clone() }.ln_beyond_domain(2.0, 1.0));
+        let cosines = (0.5f64.cos() / 1f64.cos()).ln();
+        approx::assert_relative_eq!(across - axial, cosines, max_relative = 1e-9);
+        assert!(!(model.ln_beyond_domain(2.0, PAPER_EQ1[5]).abs() < 1.0));
+    }
 
     #[test]
     fn the_table_is_the_model_inside_its_range_and_at_its_edge() {

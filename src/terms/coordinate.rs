@@ -39,8 +39,13 @@ pub enum Coordinate {
     Along,
     /// From one where the tilt is along the baseline to minus one across it.
     Alignment,
+    /// From one where the tilt is along the baseline to zero across it.
+    AlongBaseline,
     /// Variance that a blur of the place by so many px brings through the slope, over the model's.
     Blur(f64),
+    /// The same by the depth and the tilt alone: z tan(theta) of every ray, where the slope of a plane is that of
+    /// its middle on all of them (Nguyen, Izadi and Lovell 2012).
+    TiltBlur(f64),
     Session,
     Temperature,
     Light,
@@ -51,6 +56,8 @@ pub enum Coordinate {
 
 /// Light on the desk of an office (EN 12464-1), lx: what a room's share of the light is counted at.
 pub const ROOM_LUX: f64 = 500.0;
+/// Cosine of the tilt of a plane that is not seen any more.
+const FLATTEST: f64 = 0.05;
 /// No surface is darker, of the recording's median.
 pub const DARKEST: f64 = 1e-2;
 
@@ -76,9 +83,14 @@ impl Coordinate {
             Coordinate::Azimuth => p.azimuth,
             Coordinate::Along => p.x * p.azimuth.cos() + p.y * p.azimuth.sin(),
             Coordinate::Alignment => (2.0 * p.azimuth).cos(),
+            Coordinate::AlongBaseline => p.azimuth.cos().powi(2),
             Coordinate::Blur(lateral_px) => {
                 let slope2 = p.slope[0].powi(2) + p.slope[1].powi(2);
                 lateral_px * lateral_px * slope2 / p.variance
+            }
+            Coordinate::TiltBlur(lateral_px) => {
+                let middle = p.rho / p.theta.cos().max(FLATTEST);
+                Coordinate::Blur(lateral_px).value(p) * (middle / p.z).powi(2)
             }
             Coordinate::Session => p.session_s,
             Coordinate::Temperature => p.temperature_c,
@@ -99,8 +111,9 @@ impl Coordinate {
             Coordinate::Right | Coordinate::Down => Axis::TargetPosition,
             Coordinate::TargetRadiusSquared => Axis::TargetPosition,
             Coordinate::Edge => Axis::EdgeDistance,
-            Coordinate::Theta | Coordinate::Blur(_) => Axis::Theta,
-            Coordinate::Azimuth | Coordinate::Along | Coordinate::Alignment => Axis::Azimuth,
+            Coordinate::Theta | Coordinate::Blur(_) | Coordinate::TiltBlur(_) => Axis::Theta,
+            Coordinate::Azimuth | Coordinate::Along => Axis::Azimuth,
+            Coordinate::Alignment | Coordinate::AlongBaseline => Axis::Azimuth,
             Coordinate::Session => Axis::SessionTime,
             Coordinate::Temperature => Axis::Temperature,
             Coordinate::Light | Coordinate::LogLight | Coordinate::Ambient(_) => Axis::Intensity,
@@ -115,7 +128,8 @@ impl Coordinate {
             Coordinate::Z | Coordinate::LogZ | Coordinate::LogRatio(_) => Needs::DEPTH,
             Coordinate::Disparity | Coordinate::DepthPower { .. } => Needs::DEPTH,
             Coordinate::Theta | Coordinate::Azimuth | Coordinate::Along => Needs::SURFACE,
-            Coordinate::Alignment | Coordinate::Blur(_) => Needs::SURFACE,
+            Coordinate::Alignment | Coordinate::AlongBaseline => Needs::SURFACE,
+            Coordinate::Blur(_) | Coordinate::TiltBlur(_) => Needs::SURFACE,
             Coordinate::Ambient(_) => Needs::SURFACE,
             Coordinate::Right | Coordinate::Down | Coordinate::Edge => Needs::BOARD,
             Coordinate::TargetRadiusSquared => Needs::BOARD,
@@ -136,7 +150,7 @@ impl Coordinate {
 
     /// Is it depth or tilt, as sigma is a function of?
     pub(super) fn is_of_sigma(self) -> bool {
-        matches!(self, Coordinate::Theta)
+        matches!(self, Coordinate::Theta | Coordinate::TiltBlur(_))
             || matches!(self.alone(), Some(Coordinate::Disparity))
             || matches!(self, Coordinate::LogRatio(_) | Coordinate::DepthPower { .. })
     }

@@ -137,7 +137,9 @@ impl Coordinate {
                 within("its unit of depth", &[unit_m], PIVOT_M)
                     .or_else(|| within("its power of the depth", &[power], [-MAX_POWER, MAX_POWER]))
             }
-            Coordinate::Blur(lateral_px) => within("its blur", &[lateral_px], BLUR_PX),
+            Coordinate::Blur(lateral_px) | Coordinate::TiltBlur(lateral_px) => {
+                within("its blur", &[lateral_px], BLUR_PX)
+            }
             Coordinate::Ambient(ratio) => {
                 within("its share of the room's light", &[ratio], [0.0, MAX_AMBIENT])
             }

@@ -1,10 +1,13 @@
 //! What a candidate comes to on its own: what it brings, how large it is, and whether it can be meant.
 
+use nalgebra::DVector;
+
 use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain};
 use super::noise_gains::NoiseGains;
 use super::null::Null;
 use super::outcome::Look;
+use super::own;
 use super::rules::Rules;
 use crate::terms::Basis;
 
@@ -45,7 +48,7 @@ impl Judge<'_> {
     /// Root mean square of a candidate's fit over the samples, the nuisances taken out.
     pub fn rms(&self, basis: &Basis, m: usize, gain: &Gain, evidence: &[Evidence]) -> f64 {
         let k = basis.count();
-        let beta = gain.beta.rows(m, k).into_owned();
+        let beta = DVector::from_column_slice(own(gain, basis));
         let square: f64 =
             evidence.iter().map(|e| beta.dot(&(e.a.view((m, m), (k, k)) * &beta))).sum();
         (square / self.weight).max(0.0).sqrt()
@@ -75,7 +78,7 @@ pub fn looks(
             let j = j.as_ref()?;
             Some(Look {
                 basis: c.basis.clone(),
-                coefficients: j.gain.beta.as_slice().to_vec(),
+                coefficients: own(&j.gain, &c.basis).to_vec(),
                 p: noise.p(j.calibrated_gain(rules)),
             })
         })

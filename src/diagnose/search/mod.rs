@@ -29,7 +29,7 @@ use choose::Choice;
 use evidence::{Evidence, Gain, fit, gain};
 use judge::{Judge, Judged, looks};
 use noise_gains::NoiseGains;
-use null::Null;
+use null::{Null, beside_chosen};
 use outcome::{Chosen, Look, Outcome};
 use prepared::{Grouping, Patches, Prepared, evidence_of_bases, prepare};
 use rules::Rules;
@@ -80,6 +80,9 @@ pub fn search(
         layer.look_back(&mut chosen);
     }
     layer.refine_maps(&mut chosen);
+    if rules.agreed {
+        layer.drop_needless(&mut chosen);
+    }
     chosen.extend(layer.pinned.clone());
     let evidence = layer.evidence_of(&bases(&chosen));
     let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
@@ -109,13 +112,19 @@ struct Trial<'a> {
     beside: Vec<Chosen>,
     views: Vec<Prepared<'a>>,
     /// Columns of what is fitted beside, and what those bring without the candidate on fine and on
-    /// coarse patches.
+    /// coarse patches. `None` where a term is pinned: it is fitted to all views, those that are left out
+    /// too. Taught by the others a free surface goes anywhere where one view reaches farther than they
+    /// do, and what bends it back would seem to be found.
     settled: usize,
-    base: [Gain; 2],
+    base: Option<[Gain; 2]>,
     judge: Judge<'a>,
 }
 
 impl Trial<'_> {
+    fn patches(&self, c: &Candidate) -> Option<Patches> {
+        Some(self.views.first()?.patches(&c.basis))
+    }
+
     /// `None` for a name that is in already: what its shape misses is left to the curves.
     fn judged(&self, c: &Candidate) -> Option<Judged> {
         let taken = |old: &Chosen| c.family.is_some() && old.candidate.family == c.family;
@@ -125,20 +134,26 @@ impl Trial<'_> {
         let (m, prior) = (self.settled, self.judge.rules.prior);
         let evidence: Vec<Evidence> = self.views.iter().map(|v| v.evidence(&c.basis)).collect();
         let null = Null::of(&evidence, m, prior)?;
-        let gain = gain(&evidence, prior)?;
-        if !c.agrees(gain.beta.rows(m, c.basis.count()).into_owned().as_slice()) {
+        let gain = match &self.base {
+            None => gain(&beside_chosen(&evidence, m, prior)?, prior)?,
+            Some([fine, coarse]) => gain(&evidence, prior)?.over(match self.patches(c)? {
+                Patches::Fine => fine,
+                Patches::Coarse => coarse,
+            }),
+        };
+        if !c.agrees(own(&gain, &c.basis)) {
             return None;
         }
-        let [fine, coarse] = &self.base;
-        let base = match self.views.first()?.patches(&c.basis) {
-            Patches::Fine => fine,
-            Patches::Coarse => coarse,
-        };
-        let gain = gain.over(base);
         let rms = self.judge.rms(&c.basis, m, &gain, &evidence);
         let sensible = self.judge.sensible(&c.basis, rms);
         Some(Judged { gain, null, sensible, rms })
     }
+}
+
+/// A candidate's coefficients, which come last.
+pub fn own<'a>(gain: &'a Gain, basis: &Basis) -> &'a [f64] {
+    let beta = gain.beta.as_slice();
+    &beta[beta.len() - basis.count()..]
 }
 
 fn bases(chosen: &[Chosen]) -> Vec<&Basis> {
@@ -199,7 +214,10 @@ impl Layer<'_> {
             let evidence: Vec<Evidence> = views.iter().map(|v| v.beside(patches)).collect();
             gain(&evidence, self.rules.prior)
         };
-        let base = [base(Patches::Fine)?, base(Patches::Coarse)?];
+        let base = match self.pinned {
+            None => Some([base(Patches::Fine)?, base(Patches::Coarse)?]),
+            Some(_) => None,
+        };
         let Layer { coarse, rules, largest, .. } = *self;
         let weight = coarse.iter().flat_map(|v| &v.weight).sum();
         let judge = Judge { weight, rules, largest };
@@ -227,11 +245,35 @@ impl Layer<'_> {
         Choice { candidates, judged: &judged, rules, noise }.best(&beside)
     }
 
+    /// What terms bring together, beside what is pinned.
+    fn total(&self, terms: &[&Basis]) -> f64 {
+        let pinned: Vec<&Basis> = self.pinned.iter().map(|c| &c.candidate.basis).collect();
+        let columns = pinned.iter().map(|b| b.count()).sum();
+        let evidence = self.evidence_of(&[&pinned[..], terms].concat());
+        let alone = beside_chosen(&evidence, columns, self.rules.prior);
+        alone.and_then(|alone| gain(&alone, self.rules.prior)).map_or(0.0, |g| g.total)
+    }
+
+    /// What was taken before what really is there brings no more than noise beside it.
+    fn drop_needless(&self, chosen: &mut Vec<Chosen>) {
+        let Some(noise) = &self.noise else { return };
+        while chosen.len() > 1 {
+            let whole = self.total(&bases(chosen));
+            let lost = |k: usize| {
+                let mut others = bases(chosen);
+                others.remove(k);
+                (k, whole - self.total(&others))
+            };
+            let idlest = (0..chosen.len()).map(lost).min_by(|a, b| a.1.total_cmp(&b.1));
+            match idlest {
+                Some((k, lost)) if lost < noise.threshold(self.rules.level) => chosen.remove(k),
+                _ => return,
+            };
+        }
+    }
+
     /// Maps with twice as many nodes, where those predict left-out views better.
     fn refine_maps(&self, chosen: &mut [Chosen]) {
-        let total = |terms: &[&Basis]| {
-            gain(&self.evidence_of(terms), self.rules.prior).map_or(0.0, |g| g.total)
-        };
         let mut so_far = None;
         for k in 0..chosen.len() {
             let Basis::Map { width, height, across, down, times } = chosen[k].candidate.basis
@@ -239,12 +281,11 @@ impl Layer<'_> {
                 continue;
             };
             let finer = Basis::Map { width, height, across: 2 * across, down: 2 * down, times };
-            let mut old = bases(chosen);
-            old.extend(self.pinned.iter().map(|c| &c.candidate.basis));
+            let old = bases(chosen);
             let mut new = old.clone();
             new[k] = &finer;
-            let before = *so_far.get_or_insert_with(|| total(&old));
-            let after = total(&new);
+            let before = *so_far.get_or_insert_with(|| self.total(&old));
+            let after = self.total(&new);
             let better = after - before;
             if self.noise.as_ref().is_some_and(|n| better > n.threshold(self.rules.level)) {
                 chosen[k].gain += better;

@@ -32,17 +32,16 @@ impl Null {
     /// For the columns from number `chosen` on, given the columns before them.
     pub fn of(views: &[Evidence], chosen: usize, prior: f64) -> Option<Self> {
         let k = views.first()?.b.len() - chosen;
-        let (alone, left) = beside_chosen(views, chosen, prior)?;
-        let sum = alone.iter().fold(DMatrix::zeros(k, k), |sum, a| sum + a);
-        let u = sum.symmetric_eigen().eigenvectors;
+        let alone = beside_chosen(views, chosen, prior)?;
+        let u = Evidence::sum(k, 0.0, &alone).a.symmetric_eigen().eigenvectors;
         let information = |a: &DMatrix<f64>| -> Vec<f64> {
             let au = a * &u;
             (0..k).map(|j| u.column(j).dot(&au.column(j)).max(0.0)).collect()
         };
-        let by_view: Vec<Vec<f64>> = alone.iter().map(information).collect();
+        let by_view: Vec<Vec<f64>> = alone.iter().map(|e| information(&e.a)).collect();
         let total: Vec<f64> = (0..k).map(|j| by_view.iter().map(|a| a[j]).sum()).collect();
-        let about_fit = dispersion(&alone, &by_view, &total, &u, &left, prior);
-        let dispersion = about_fit.min(usual_square(&by_view, &total, &u, &left));
+        let about_fit = dispersion(&alone, &by_view, &total, &u, prior);
+        let dispersion = about_fit.min(usual_square(&by_view, &total, &u, &alone));
         let of_vector = |(j, &total): (usize, &f64)| {
             let values = by_view.iter().map(|a| a[j]);
             (values.map(|value| Information { value, root: value.sqrt() }).collect(), total)
@@ -116,17 +115,13 @@ fn gaussian(nats: f64, freedom: f64) -> f64 {
     0.5 * freedom * (2.0 * nats / freedom).exp_m1()
 }
 
-/// Information and score of each view.
-type PerView = (Vec<DMatrix<f64>>, Vec<DVector<f64>>);
-
-/// The candidate's evidence once the chosen terms are fitted with it: its information in each
-/// view, and its score there.
-fn beside_chosen(views: &[Evidence], chosen: usize, prior: f64) -> Option<PerView> {
+/// What each view says of a candidate once the chosen terms, the columns before its own, are fitted with it to
+/// all views.
+pub fn beside_chosen(views: &[Evidence], chosen: usize, prior: f64) -> Option<Vec<Evidence>> {
     let n = views.first()?.b.len();
     let k = n - chosen;
     if chosen == 0 {
-        let split = views.iter().map(|v| (v.a.clone(), v.b.clone()));
-        return Some(split.unzip());
+        return Some(views.to_vec());
     }
     let mut mm = DMatrix::identity(chosen, chosen) * prior;
     let mut mk = DMatrix::zeros(chosen, k);
@@ -138,7 +133,7 @@ fn beside_chosen(views: &[Evidence], chosen: usize, prior: f64) -> Option<PerVie
     }
     let factor = mm.cholesky()?;
     let (t, beta) = (factor.solve(&mk), factor.solve(&bm));
-    let split = views.iter().map(|v| {
+    let alone = views.iter().map(|v| {
         let vmm = v.a.view((0, 0), (chosen, chosen));
         let vmk = v.a.view((0, chosen), (chosen, k));
         let vkk = v.a.view((chosen, chosen), (k, k));
@@ -146,28 +141,25 @@ fn beside_chosen(views: &[Evidence], chosen: usize, prior: f64) -> Option<PerVie
         let a = vkk - &tm - tm.transpose() + t.transpose() * vmm * &t;
         let left_m = v.b.rows(0, chosen) - vmm * &beta;
         let left_k = v.b.rows(chosen, k) - vmk.transpose() * &beta;
-        (a, left_k - t.transpose() * left_m)
+        Evidence { a, b: left_k - t.transpose() * left_m }
     });
-    Some(split.unzip())
+    Some(alone.collect())
 }
 
 /// Scatter of the views' scores about the common fit, over what noise gives them.
 fn dispersion(
-    alone: &[DMatrix<f64>],
+    alone: &[Evidence],
     by_view: &[Vec<f64>],
     total: &[f64],
     u: &DMatrix<f64>,
-    scores: &[DVector<f64>],
     prior: f64,
 ) -> f64 {
     let most = total.iter().copied().fold(0.0, f64::max);
-    let k = u.nrows();
-    let whole = alone.iter().fold(DMatrix::identity(k, k) * prior, |sum, a| sum + a);
-    let seen = scores.iter().fold(DVector::zeros(k), |sum, b| sum + b);
-    let Some(factor) = whole.cholesky() else { return 1.0 };
-    let beta = factor.solve(&seen);
+    let whole = Evidence::sum(u.nrows(), prior, alone);
+    let Some(factor) = whole.a.cholesky() else { return 1.0 };
+    let beta = factor.solve(&whole.b);
     // What each view says beyond the common fit.
-    let left: Vec<DVector<f64>> = scores.iter().zip(alone).map(|(b, a)| b - a * &beta).collect();
+    let left: Vec<DVector<f64>> = alone.iter().map(|e| &e.b - &e.a * &beta).collect();
     let (mut sum, mut n) = (0.0, 0.0);
     for (j, &total) in total.iter().enumerate() {
         if total < 1e-6 * most {
@@ -190,17 +182,12 @@ fn dispersion(
 
 /// Median of the views' squared scores, over what noise gives them: near 1 where most views have
 /// nothing of the candidate, whatever the others have.
-fn usual_square(
-    by_view: &[Vec<f64>],
-    total: &[f64],
-    u: &DMatrix<f64>,
-    scores: &[DVector<f64>],
-) -> f64 {
+fn usual_square(by_view: &[Vec<f64>], total: &[f64], u: &DMatrix<f64>, alone: &[Evidence]) -> f64 {
     let most = total.iter().copied().fold(0.0, f64::max);
     let mut squares = Vec::new();
     for (j, &total) in total.iter().enumerate().filter(|(_, t)| **t >= 1e-6 * most) {
-        let seen = scores.iter().zip(by_view).filter(|(_, a)| a[j] > 1e-3 * total);
-        squares.extend(seen.map(|(b, a)| u.column(j).dot(b).powi(2) / a[j]));
+        let seen = alone.iter().zip(by_view).filter(|(_, a)| a[j] > 1e-3 * total);
+        squares.extend(seen.map(|(e, a)| u.column(j).dot(&e.b).powi(2) / a[j]));
     }
     if squares.is_empty() {
         return 1.0;

@@ -116,6 +116,37 @@ fn what_was_put_in_is_found_with_its_size() {
     }
 }
 
+/// A curve that was taken before what really is there goes once that is; one that is there as well stays.
+#[test]
+fn a_curve_that_brings_nothing_beside_the_others_is_left_out() {
+    let curve = |over, high| {
+        Candidate::curve(Basis::Curve { over, low: 0.0, high, nodes: 9, times: Modulation::One })
+    };
+    let both = [curve(Coordinate::Row, 479.0), curve(Coordinate::Radius, 1.0)];
+    for (of_rows, axes) in [(0.0, vec![Axis::Radius]), (1.0, vec![Axis::Row, Axis::Radius])] {
+        let mut rng = Seed(11).stream("search/needless");
+        let bias = |p: &PixelContext| 1.5 * p.radius * p.radius + of_rows * (p.v / 60.0).sin();
+        let views = session(&mut rng, bias);
+        let layer = Layer {
+            fine: &views,
+            coarse: &views,
+            groups: Vec::new(),
+            candidates: &both,
+            rules: &RULES,
+            // Exponential, as of noise.
+            noise: Some(NoiseGains::simulated(600, 0.5, |k| -(1.0 - (k + 1) as f64 / 601.0).ln())),
+            looks: Vec::new(),
+            largest: 0.0,
+            pinned: None,
+            seed: Seed(11),
+        };
+        let mut chosen: Vec<Chosen> = both.iter().map(|c| layer.pin(c.clone())).collect();
+        layer.drop_needless(&mut chosen);
+        let left: Vec<Axis> = chosen.iter().map(|c| c.candidate.basis.axis()).collect();
+        assert_eq!(left, axes);
+    }
+}
+
 /// What a pinned term can take up is nobody else's; it stays, last, and others are found beside it.
 #[test]
 fn what_is_pinned_takes_up_its_own() {

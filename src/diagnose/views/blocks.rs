@@ -54,10 +54,10 @@ pub fn blocks(view: &SurveyedView, tiles: usize, by_light: bool) -> ViewData {
         if s.n < least || s.ratio <= 0.0 {
             continue;
         }
-        let worth = s.n * view.frames / view.correlation.sum_of_squares;
+        let worth = s.repeated * view.frames / view.correlation.sum_of_squares;
         Arc::make_mut(&mut blocks.places).push(s.place);
         // The mean of log chi^2 / n is about -1 / n.
-        blocks.response.push((s.ratio / s.n / kept.max(0.5)).ln() + 1.0 / worth);
+        blocks.response.push((s.ratio / s.repeated / kept.max(0.5)).ln() + 1.0 / worth);
         blocks.weight.push(0.5 * worth / (1.0 + 1.0 / worth) / view.log_variance_inflation);
         blocks.nuisance.push(1.0);
     }
@@ -73,6 +73,8 @@ const LEAST_LIT: f64 = 0.125;
 struct Sum {
     place: PixelContext,
     n: f64,
+    /// Those whose frames could be compared, where frames are.
+    repeated: f64,
     ratio: f64,
 }
 
@@ -80,9 +82,9 @@ impl Sum {
     fn add(&mut self, at: &PixelContext, t: &Tile, between_frame_factor: Option<f64>) {
         // With frames to compare, only what changes is noise; its still part is put back by what
         // frames have in common.
-        let square = match between_frame_factor {
-            Some(factor) => t.temporal * factor,
-            None => t.temporal + t.rough_square,
+        let (square, repeated) = match between_frame_factor {
+            Some(factor) => (t.temporal * factor, t.repeated),
+            None => (t.temporal + t.rough_square, 1.0),
         };
         if !square.is_finite() {
             return;
@@ -91,7 +93,8 @@ impl Sum {
             self.place = *at;
         }
         self.n += t.pixels;
-        self.ratio += t.pixels * square / t.variance;
+        self.repeated += t.pixels * repeated;
+        self.ratio += t.pixels * repeated * square / t.variance;
         // The block lies where its tiles do on average; what is one for the view stays.
         let share = t.pixels / self.n;
         let mix = |a: &mut f64, b: f64| *a += share * (b - *a);
@@ -145,6 +148,7 @@ mod tests {
                 square: 1.0 / light,
                 rough_square: 0.0,
                 temporal: 1.0 / light,
+                repeated: 1.0,
                 variance: 1.0,
                 pixels: (SIDE * SIDE) as f64,
                 missing: 0.0,

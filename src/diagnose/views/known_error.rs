@@ -8,14 +8,19 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::known::KnownTerms;
 use super::layers::Survey;
 use super::samples::ViewData;
+use super::surveyed_view::SurveyedView;
 use crate::diagnose::search::evidence::Evidence;
 use crate::diagnose::search::null::Null;
 use crate::diagnose::search::variance::error_of_sigma;
-use crate::model::SigmaModel;
+use crate::diagnose::search::view_levels::MODEL_TOLERANCE;
+use crate::model::{Domain, SigmaModel};
 use crate::terms::{PixelContext, Statistic, Term};
 
 /// Chance that a model which is right differs by more than its own error.
 const LEVEL: f64 = 1e-3;
+
+/// Less than this of the views is not worth a remark.
+const TELLABLE_PERCENT: f64 = 0.5;
 
 /// What the model may be off by: parts that err together, by a standard normal number times their
 /// terms, and terms of which every coefficient errs for itself.
@@ -97,7 +102,38 @@ fn nearest(evidence: &[Evidence], n: usize) -> Option<DVector<f64>> {
     Some(eigen.eigenvectors * shrunk)
 }
 
+/// Is a place so far outside the model's domain that sigma, which is held at the domain's edge, is off from what
+/// its form goes on to by more than a model's sigma is known to? There the model says nothing of the noise.
+pub fn is_beyond(sigma: &SigmaModel, place: &PixelContext) -> bool {
+    let log_variance = 2.0 * sigma.ln_beyond_domain(place.z, place.theta);
+    // What the form cannot go on to is beyond it, too.
+    !(log_variance.abs() <= MODEL_TOLERANCE)
+}
+
 impl Survey {
+    /// Do not measure the noise where the model says nothing of it.
+    pub fn forget_noise_beyond(&mut self, sigma: &SigmaModel) {
+        for (place, t) in self.views.iter_mut().flat_map(SurveyedView::tiles_mut) {
+            if is_beyond(sigma, place) {
+                t.temporal = f64::NAN;
+            }
+        }
+    }
+
+    /// What was left out by [`Survey::forget_noise_beyond`], in words.
+    pub fn noise_untested(&self, sigma: &SigmaModel) -> Option<String> {
+        let places = || self.views.iter().flat_map(|v| v.places.iter());
+        let beyond = places().filter(|p| is_beyond(sigma, p)).count();
+        let percent = 100.0 * beyond as f64 / places().count().max(1) as f64;
+        let Domain { z_m: [near, far], theta_rad: [_, steepest] } = sigma.domain;
+        (percent > TELLABLE_PERCENT).then(|| {
+            format!(
+                "the model's sigma was measured from {near:.2} to {far:.2} m and up to {:.0} degrees of tilt: the size of the noise was not tested in the {percent:.0} % of these views that lie beyond",
+                steepest.to_degrees()
+            )
+        })
+    }
+
     /// Take out of the views' means what the model's biases may be off by.
     pub fn absorb_model_bias_error(&mut self, known: &KnownTerms) {
         let off = Errors::of(known, Statistic::Bias).settled(&self.coarse_mean_data());
@@ -130,5 +166,21 @@ impl Survey {
                 place.variance *= factor;
             }
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Eq. 1 is held below 1 m: at 0.99 m by 1 % of the variance too large, at 0.95 m by a tenth; beyond the
+    /// form's pole there is nothing to say.
+    #[test]
+    fn a_model_says_nothing_where_its_edge_is_not_its_form() {
+        let beyond = |z, theta| {
+            is_beyond(&SigmaModel::paper(), &PixelContext { z, theta, ..Default::default() })
+        };
+        assert_eq!([4.0, 1.0, 0.995, 0.95].map(|z| beyond(z, 0.3)), [false, false, false, true]);
+        assert!(!beyond(2.0, 1.3) && beyond(2.0, 1.4));
     }
 }

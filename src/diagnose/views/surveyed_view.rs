@@ -171,6 +171,7 @@ mod tests {
                     square: variance,
                     rough_square: variance,
                     temporal: variance,
+                    repeated: 1.0,
                     variance,
                     // Thirty frames.
                     pixels: 30.0 * side * side,

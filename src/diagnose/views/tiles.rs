@@ -18,8 +18,10 @@ pub struct Tile {
     pub square: f64,
     /// Mean square of the mean residual without what is smooth, px^2.
     pub rough_square: f64,
-    /// Mean variance of a pixel over the frames, px^2.
+    /// Mean variance of a pixel over the frames, px^2, as if it was measured in all of them.
     pub temporal: f64,
+    /// Share of the frames' differences that were measured: less than one where readings are lost.
+    pub repeated: f64,
     /// Model's variance of a pixel, px^2.
     pub variance: f64,
     /// Pixels with a mean.
@@ -122,7 +124,9 @@ pub fn tiles(
             s.n += 1.0;
             s.mean += mean;
             s.square += square;
-            s.temporal += square - mean * mean;
+            let n = f64::from(field.count[k]);
+            s.temporal += n * (square - mean * mean);
+            s.repeats += n - 1.0;
             s.darkness += f64::from(field.light.get(k).copied().unwrap_or(1.0)).recip();
         }
     }
@@ -131,7 +135,7 @@ pub fn tiles(
     let n = held().count();
     let mut patches: (Vec<PixelContext>, Vec<Tile>) =
         (Vec::with_capacity(n), Vec::with_capacity(n));
-    patches.extend(held().map(|s| s.tile(&places)));
+    patches.extend(held().map(|s| s.tile(&places, frames)));
     let (places, mut tiles) = patches;
     for (t, place) in tiles.iter_mut().zip(&places) {
         t.temporal -= field.moved_px2(place.disparity);
@@ -149,7 +153,9 @@ struct Sums {
     n: f64,
     mean: f64,
     square: f64,
+    /// Sum of squares over the frames, and its degrees of freedom.
     temporal: f64,
+    repeats: f64,
     /// One over the light: noise goes with it.
     darkness: f64,
     variance: f64,
@@ -165,15 +171,23 @@ impl Sums {
         self.edge += edge;
     }
 
-    fn tile(&self, places: &Places<'_>) -> (PixelContext, Tile) {
+    fn tile(&self, places: &Places<'_>, frames: f64) -> (PixelContext, Tile) {
         let (u, v) = (self.u / self.pixels, self.v / self.pixels);
         let place = places.at(u, v, places.camera.ray(u, v), self.edge / self.pixels);
         let variance = self.variance / self.pixels;
+        // A single frame differs from no other.
+        let (temporal, repeated) = if frames > 1.0 {
+            let asked = frames - 1.0;
+            (self.temporal / self.repeats * asked / frames, self.repeats / (self.n * asked))
+        } else {
+            (0.0, 1.0)
+        };
         let tile = Tile {
             mean: self.mean / self.n,
             square: self.square / self.n,
             rough_square: f64::NAN,
-            temporal: self.temporal / self.n,
+            temporal,
+            repeated,
             variance,
             pixels: self.n,
             missing: self.missing / self.asked,
@@ -212,5 +226,71 @@ pub fn roughen(tiles: &mut [Tile], places: &[PixelContext], field: &Field, bias:
     for (t, place) in tiles.iter_mut().zip(places) {
         let s = sums[place.v as usize / SIDE * across + place.u as usize / SIDE];
         t.rough_square = s.0 / s.1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::plane::Plane;
+    use crate::rng::Seed;
+    use crate::simulate::kinect_v1;
+
+    const FRAMES: usize = 4;
+    const SIGMA: f32 = 0.1;
+
+    /// Of every pixel a share of the readings, the others lost at random.
+    fn field(camera: &Camera, kept: f64) -> Field {
+        let inside = |i: &u32| {
+            let (u, v) = (*i as usize % camera.width, *i as usize / camera.width);
+            (200..400).contains(&u) && (100..300).contains(&v)
+        };
+        let pixels = (0..(camera.width * camera.height) as u32).filter(inside).collect();
+        let size = [camera.width, camera.height];
+        let mut field = Field::unseen(Plane::tilted(1.5, 0.0, 0.0), 43.5, size, pixels);
+        field.sigma = vec![SIGMA; field.pixels.len()];
+        field.frames = vec![(0.0, 0.0); FRAMES];
+        let mut rng = Seed(3).stream("tiles/lost");
+        for k in 0..field.pixels.len() {
+            let mut readings: Vec<f32> = Vec::new();
+            for _ in 0..FRAMES {
+                let normal: f32 = StandardNormal.sample(&mut rng);
+                if rng.random::<f64>() < kept {
+                    readings.push(SIGMA * normal);
+                }
+            }
+            let n = readings.len() as f32;
+            field.count[k] = readings.len() as u16;
+            field.measured[k] = readings.len() as u16;
+            field.mean[k] = readings.iter().sum::<f32>() / n;
+            field.square[k] = readings.iter().map(|e| e * e).sum::<f32>() / n;
+        }
+        field
+    }
+
+    /// The noise is as large as where nothing is lost, and counts for the pairs of readings there are.
+    #[test]
+    fn lost_readings_make_the_noise_no_smaller() {
+        let camera = kinect_v1(1).camera;
+        for kept in [1.0, 0.5, 0.2] {
+            let (_, tiles) = tiles(&field(&camera, kept), &camera, &camera.rays(), 0.0);
+            let seen = tiles.iter().filter(|t| t.temporal.is_finite());
+            let sums = seen.fold([0.0; 2], |[square, n], t| {
+                let counts = t.pixels * t.repeated;
+                [square + counts * t.temporal, n + counts]
+            });
+            let unbiased = sums[0] / sums[1] * FRAMES as f64 / (FRAMES as f64 - 1.0);
+            // 40,000 pixels, a tenth of the pairs where a fifth of the readings is left.
+            let ratio = unbiased / f64::from(SIGMA).powi(2);
+            assert!((ratio - 1.0).abs() < 0.05, "{kept}: {ratio}");
+            // A pixel that is read n times has n - 1 differences.
+            let lost = 1.0 - kept;
+            let pairs = FRAMES as f64 * kept - 1.0 + lost.powi(FRAMES as i32);
+            let expected = 40_000.0 * pairs / (FRAMES as f64 - 1.0);
+            assert!((sums[1] / expected - 1.0).abs() < 0.05, "{kept}: {} {expected}", sums[1]);
+        }
     }
 }
