@@ -262,7 +262,9 @@ mod tests {
             .map(|direction| SigmaModel { direction, ..model.clone() }.ln_beyond_domain(2.0, 1.0));
         let cosines = (0.5f64.cos() / 1f64.cos()).ln();
         approx::assert_relative_eq!(across - axial, cosines, max_relative = 1e-9);
-        assert!(!(model.ln_beyond_domain(2.0, PAPER_EQ1[5]).abs() < 1.0));
+        // At the pole itself: without bounds, or no number.
+        let pole = model.ln_beyond_domain(2.0, PAPER_EQ1[5]);
+        assert!(!pole.is_finite() || pole > 10.0, "{pole}");
     }
 
     #[test]

@@ -107,7 +107,7 @@ fn nearest(evidence: &[Evidence], n: usize) -> Option<DVector<f64>> {
 pub fn is_beyond(sigma: &SigmaModel, place: &PixelContext) -> bool {
     let log_variance = 2.0 * sigma.ln_beyond_domain(place.z, place.theta);
     // What the form cannot go on to is beyond it, too.
-    !(log_variance.abs() <= MODEL_TOLERANCE)
+    log_variance.is_nan() || log_variance.abs() > MODEL_TOLERANCE
 }
 
 impl Survey {
