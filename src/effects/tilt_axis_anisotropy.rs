@@ -102,10 +102,10 @@ mod tests {
     use super::*;
     use crate::terms::Extent;
 
-    fn told(law: Modulation, coefficient: f64, steepest: f64) -> Estimate {
+    fn told(shape: Basis, coefficient: f64, steepest: f64) -> Estimate {
         let mut reach = Extent::of(std::iter::empty());
         reach.theta = [0.0, steepest];
-        let (shape, covariance) = (along_baseline(law), DMatrix::zeros(1, 1));
+        let covariance = DMatrix::zeros(1, 1);
         let coefficients = &[coefficient];
         let fit = Fitted { shape: &shape, coefficients, covariance: &covariance, reach: &reach };
         TiltAxisAnisotropy.estimates(&fit)[0]
@@ -114,14 +114,7 @@ mod tests {
     /// Up along the baseline and down across it by as much, or up along it alone by twice that: the same ratio.
     #[test]
     fn the_ratio_is_between_the_two_directions() {
-        let of = |over, coefficient: f64| {
-            let mut reach = Extent::of(std::iter::empty());
-            reach.theta = [0.0, 1.0];
-            let (shape, covariance) = (Basis::powers(over, 1, FORWARD), DMatrix::zeros(1, 1));
-            let coefficients = &[coefficient];
-            let fit = Fitted { shape: &shape, coefficients, covariance: &covariance, reach: &reach };
-            TiltAxisAnisotropy.estimates(&fit)[0].value
-        };
+        let of = |over, coefficient| told(Basis::powers(over, 1, FORWARD), coefficient, 1.0).value;
         let both = 1.5f64.ln() / 0.75;
         let ratios = [of(Coordinate::Alignment, both), of(Coordinate::AlongBaseline, 2.0 * both)];
         assert!(ratios.iter().all(|ratio| (ratio - 1.5).abs() < 1e-9), "{ratios:?}");
@@ -133,7 +126,7 @@ mod tests {
     fn the_ratio_is_counted_at_sixty_degrees() {
         for (law, at_reference) in LAWS.into_iter().zip([0.75f64.sqrt(), 0.75, 3.0]) {
             let [near, past] =
-                [0.8, 1.2].map(|steepest| told(law, 1.5f64.ln() / at_reference, steepest));
+                [0.8, 1.2].map(|steepest| told(along_baseline(law), 1.5f64.ln() / at_reference, steepest));
             assert!((near.value - 1.5).abs() < 1e-9, "{law:?}: {near:?}");
             assert!(near.std_error > 4.0 * past.std_error, "{law:?}: {near:?}, {past:?}");
         }

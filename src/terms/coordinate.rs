@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::needs::Needs;
-use super::place::{Axis, PixelContext};
+use super::place::{Axis, FLATTEST, PixelContext};
 
 /// A number of a place.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -56,8 +56,6 @@ pub enum Coordinate {
 
 /// Light on the desk of an office (EN 12464-1), lx: what a room's share of the light is counted at.
 pub const ROOM_LUX: f64 = 500.0;
-/// Cosine of the tilt of a plane that is not seen any more.
-const FLATTEST: f64 = 0.05;
 /// No surface is darker, of the recording's median.
 pub const DARKEST: f64 = 1e-2;
 

@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 use crate::camera::Camera;
 use crate::stats::range;
 
+/// Cosine of the tilt of a plane that is not seen any more.
+pub(super) const FLATTEST: f64 = 0.05;
+
 /// The axes along which a mismatch is located (`crate::docs::catalogue`).
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
@@ -123,7 +126,7 @@ pub type GroupMean<'a> = dyn Fn(&dyn Fn(usize) -> f64) -> f64 + 'a;
 impl PixelContext {
     /// How much weaker the projected pattern's light comes back than from a target faced at 1 m.
     pub fn pattern_fall_off(&self) -> f64 {
-        self.z * self.z * (1.0 + self.x * self.x + self.y * self.y) / self.theta.cos().max(0.05)
+        self.z * self.z * (1.0 + self.x * self.x + self.y * self.y) / self.theta.cos().max(FLATTEST)
     }
 
     /// Move to the mean of the members' places; what is one for the view stays.

@@ -133,9 +133,10 @@ impl Trial<'_> {
         }
         let (m, prior) = (self.settled, self.judge.rules.prior);
         let evidence: Vec<Evidence> = self.views.iter().map(|v| v.evidence(&c.basis)).collect();
-        let null = Null::of(&evidence, m, prior)?;
+        let alone = beside_chosen(&evidence, m, prior)?;
+        let null = Null::of_candidate(&alone, prior)?;
         let gain = match &self.base {
-            None => gain(&beside_chosen(&evidence, m, prior)?, prior)?,
+            None => gain(&alone, prior)?,
             Some([fine, coarse]) => gain(&evidence, prior)?.over(match self.patches(c)? {
                 Patches::Fine => fine,
                 Patches::Coarse => coarse,

@@ -31,17 +31,21 @@ struct Information {
 impl Null {
     /// For the columns from number `chosen` on, given the columns before them.
     pub fn of(views: &[Evidence], chosen: usize, prior: f64) -> Option<Self> {
-        let k = views.first()?.b.len() - chosen;
-        let alone = beside_chosen(views, chosen, prior)?;
-        let u = Evidence::sum(k, 0.0, &alone).a.symmetric_eigen().eigenvectors;
+        Null::of_candidate(&beside_chosen(views, chosen, prior)?, prior)
+    }
+
+    /// The same for what [`beside_chosen`] makes of the views.
+    pub fn of_candidate(alone: &[Evidence], prior: f64) -> Option<Self> {
+        let k = alone.first()?.b.len();
+        let u = Evidence::sum(k, 0.0, alone).a.symmetric_eigen().eigenvectors;
         let information = |a: &DMatrix<f64>| -> Vec<f64> {
             let au = a * &u;
             (0..k).map(|j| u.column(j).dot(&au.column(j)).max(0.0)).collect()
         };
         let by_view: Vec<Vec<f64>> = alone.iter().map(|e| information(&e.a)).collect();
         let total: Vec<f64> = (0..k).map(|j| by_view.iter().map(|a| a[j]).sum()).collect();
-        let about_fit = dispersion(&alone, &by_view, &total, &u, prior);
-        let dispersion = about_fit.min(usual_square(&by_view, &total, &u, &alone));
+        let about_fit = dispersion(alone, &by_view, &total, &u, prior);
+        let dispersion = about_fit.min(usual_square(&by_view, &total, &u, alone));
         let of_vector = |(j, &total): (usize, &f64)| {
             let values = by_view.iter().map(|a| a[j]);
             (values.map(|value| Information { value, root: value.sqrt() }).collect(), total)
