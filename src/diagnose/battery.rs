@@ -168,7 +168,8 @@ impl Case<'_> {
         let of_rows = over_rows && {
             let excess = self.excess_of_rows(&scatter.structure, &scatter.textures);
             let excess = mean(excess.iter().map(|[of_mean, _]| *of_mean)).unwrap_or(1.0);
-            f.share / excess < bias.outcome.noise.threshold(self.level(Self::MEAN_LEVEL))
+            excess > 1.0
+                && f.share / excess < bias.outcome.noise.threshold(self.level(Self::MEAN_LEVEL))
         };
         let far_errors = |t: &TextureFinding| !t.parameters.contains_key(EXCESS);
         let textures = !scatter.textures.is_empty() || scatter.tails.is_some();

@@ -97,6 +97,7 @@ mod tests {
             Basis::powers(Coordinate::LogRatio(2.0), 2, Modulation::One),
             Basis::powers(Coordinate::RadiusSquared, 3, Modulation::One),
             Basis::Log1p { over: Coordinate::Blur(0.8) },
+            Basis::Log1p { over: Coordinate::TiltBlur(0.8) },
             Basis::Log1p { over: Coordinate::DepthPower { unit_m: 2.0 / 3.0, power: 3.1 } },
             Basis::powers(Coordinate::Alignment, 1, Modulation::TiltPower(2)),
             Basis::Powers {
@@ -195,6 +196,7 @@ mod tests {
             Basis::waves(Coordinate::Column, 1e-9, 1),
             Basis::Decay { over: Coordinate::Edge, width: 1e300 },
             Basis::Log1p { over: Coordinate::Blur(1e200) },
+            Basis::Log1p { over: Coordinate::TiltBlur(-1.0) },
             Basis::Log1p { over: Coordinate::DepthPower { unit_m: 0.0, power: 3.0 } },
             Basis::Log1p { over: Coordinate::DepthPower { unit_m: 2.0, power: 1e3 } },
             Basis::Map { width: 1e12, height: 480.0, across: 3, down: 2, times },

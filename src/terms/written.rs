@@ -251,6 +251,8 @@ mod tests {
             Basis::Decay { over: Coordinate::Radius, width: 0.1 },
             Basis::Lens { fx: 580.0, fy: 581.0, reference_px: 21.5, orders: 2 },
             Basis::Log1p { over: Coordinate::Light },
+            Basis::Log1p { over: Coordinate::TiltBlur(0.4) },
+            Basis::powers(Coordinate::AlongBaseline, 1, Modulation::SlopeSquared),
         ] {
             let term = Term::bias(basis, vec![0.5]);
             let value = serde_json::to_value(&term).expect("JSON");

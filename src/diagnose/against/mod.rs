@@ -11,7 +11,7 @@ pub mod textures;
 use std::f64::consts::TAU;
 
 use crate::Progress;
-use crate::diagnose::finding::pixels::{common, measure_tails};
+use crate::diagnose::finding::pixels::{Whitener, common, measure_tails};
 use crate::diagnose::noise::structure::{Structure, structures};
 use crate::diagnose::noise::tails::{Confusers, tails};
 use crate::diagnose::noise::texture_finding::TextureFinding;
@@ -110,7 +110,8 @@ impl Baseline {
         let mut structure = structures(&fields, camera, &[]);
         let textures = texture_findings(&structure, &none, 0.03 * options.level);
         survey.compare_frames(&fields, common(&structure, &textures, &none));
-        measure_tails(&mut structure, &fields, &[], &[], &survey, bench);
+        let whitener = Whitener { sigma: None, terms: &[], survey: &survey, bench };
+        measure_tails(&mut structure, &fields, &[], &whitener);
         let lattice = lattice(&fields, simulated);
         let steps = Steps::of(&lattice, &structure, &fields, simulated);
         let confusers = Confusers { uneven: false, simulated: true };

@@ -10,9 +10,11 @@ use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::search::outcome::Outcome;
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
+use crate::diagnose::views::known_error::is_beyond;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::tiles::Places;
 use crate::measure::Workbench;
+use crate::model::SigmaModel;
 use crate::stats::mean;
 use crate::terms::{Statistic, Term};
 
@@ -56,16 +58,30 @@ const HARDLY_STILL: f64 = 0.1;
 /// disparity, and the other way round: from here on 3e-4, a sixth of what a recording tells apart.
 const BENDS: f32 = 0.002;
 
+/// What the pixels' errors are held against: the model's sigma, as far as it says something (`None`: two recordings
+/// are compared, wherever they are), and what was found of the variance.
+pub(in crate::diagnose) struct Whitener<'a> {
+    pub sigma: Option<&'a SigmaModel>,
+    pub terms: &'a [Term],
+    pub survey: &'a Survey,
+    pub bench: &'a Workbench<'a>,
+}
+
 pub(in crate::diagnose) fn measure_tails(
     structure: &mut [Structure],
     fields: &[Field],
     bias: &[Vec<f32>],
-    variance: &[Term],
-    survey: &Survey,
-    bench: &Workbench<'_>,
+    Whitener { sigma, terms, survey, bench }: &Whitener<'_>,
 ) {
-    let factors = pixel_terms(fields, variance, survey, bench);
+    let factors = pixel_terms(fields, terms, survey, bench);
     structure.par_iter_mut().zip(fields).enumerate().for_each(|(n, (s, field))| {
+        // Where the model says nothing of the noise, errors are no tails.
+        let theta = field.plane.theta();
+        let is_told = |k: usize| {
+            let z = field.scale_px_m / field.disparity(k, &bench.rays);
+            sigma.is_none_or(|sigma| !is_beyond(sigma, z, theta))
+        };
+        let told: Vec<bool> = (0..field.pixels.len()).map(is_told).collect();
         // Single frames, unless what stands still in them could be taken for a tail.
         let apart = s.lagged[0].is_some_and(|c| c < HARDLY_STILL);
         let looks = |of: &(dyn Fn(usize, f32) -> f32 + Sync)| {
@@ -73,7 +89,7 @@ pub(in crate::diagnose) fn measure_tails(
                 let white = |k: usize| {
                     let factor = factors.get(n).map_or(1.0, |f| (0.5 * f[k]).exp());
                     let error = frame[k] - bias.get(n).map_or(0.0, |b| b[k]);
-                    of(k, error) / (field.sigma[k] * factor)
+                    if told[k] { of(k, error) / (field.sigma[k] * factor) } else { f32::NAN }
                 };
                 field.high_passed(&(0..frame.len()).map(white).collect::<Vec<f32>>())
             };

@@ -6,7 +6,7 @@ use super::texture_finding::TextureFinding;
 use super::{ROW_NOISE, texture_findings, window};
 use crate::diagnose::against::noise::{NAMED_LEVEL, NoiseParts};
 use crate::diagnose::case::{Case, MeanResult};
-use crate::diagnose::finding::pixels::{common, measure_tails, terms_of};
+use crate::diagnose::finding::pixels::{Whitener, common, measure_tails, terms_of};
 use crate::diagnose::search::outcome::Outcome;
 use crate::diagnose::steps::lattice::Quantisation;
 use crate::diagnose::steps::{Steps, forget_windows, lattice, own_step};
@@ -54,6 +54,9 @@ impl Case<'_> {
         if let Some(baseline) = self.baseline.as_ref().filter(|_| compared) {
             baseline.inflate_log_variances(&mut self.survey);
         }
+        if self.baseline.is_some() && !compared {
+            self.survey.forget_noise_beyond(&self.model.sigma);
+        }
         let level = self.level(Self::VARIANCE_LEVEL);
         let sigma = &self.model.sigma;
         if self.survey.learnt_from[1].is_some() {
@@ -61,7 +64,9 @@ impl Case<'_> {
         }
         let outcome = self.survey.search_variance(sigma, camera, level, self.options.seed);
         let terms = terms_of(&outcome, Statistic::Variance);
-        measure_tails(&mut structure, &self.fields, &mean.px, &terms, &self.survey, &self.bench);
+        let sigma = Some(sigma).filter(|_| self.baseline.is_none());
+        let whitener = Whitener { sigma, terms: &terms, survey: &self.survey, bench: &self.bench };
+        measure_tails(&mut structure, &self.fields, &mean.px, &whitener);
         let alike = self.baseline.as_ref().is_some_and(|b| b.tails_alike(&structure));
         let holds = |t: &Term| self.holds_tails(t);
         // The light of single pixels is known to little better than an octave.

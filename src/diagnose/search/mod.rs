@@ -112,8 +112,8 @@ struct Trial<'a> {
     beside: Vec<Chosen>,
     views: Vec<Prepared<'a>>,
     /// Columns of what is fitted beside, and what those bring without the candidate on fine and on
-    /// coarse patches. `None` where a term is pinned: it is fitted to all views, those that are left out
-    /// too. Taught by the others a free surface goes anywhere where one view reaches farther than they
+    /// coarse patches. `None` where a term is pinned: it, and the names beside it, are fitted to all views,
+    /// those that are left out too. Taught by the others a free surface goes anywhere where one view reaches farther than they
     /// do, and what bends it back would seem to be found.
     settled: usize,
     base: Option<[Gain; 2]>,
@@ -265,7 +265,15 @@ impl Layer<'_> {
                 others.remove(k);
                 (k, whole - self.total(&others))
             };
-            let idlest = (0..chosen.len()).map(lost).min_by(|a, b| a.1.total_cmp(&b.1));
+            // A name whose own axis has a curve beside it is what that curve completes.
+            let completed = |k: usize| {
+                let axis = chosen[k].candidate.basis.axis();
+                let nameless = |c: &Chosen| c.candidate.family.is_none();
+                !nameless(&chosen[k])
+                    && chosen.iter().any(|c| nameless(c) && c.candidate.basis.axis() == axis)
+            };
+            let concerned = (0..chosen.len()).filter(|&k| !completed(k));
+            let idlest = concerned.map(lost).min_by(|a, b| a.1.total_cmp(&b.1));
             match idlest {
                 Some((k, lost)) if lost < noise.threshold(self.rules.level) => chosen.remove(k),
                 _ => return,

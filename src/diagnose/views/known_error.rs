@@ -104,8 +104,8 @@ fn nearest(evidence: &[Evidence], n: usize) -> Option<DVector<f64>> {
 
 /// Is a place so far outside the model's domain that sigma, which is held at the domain's edge, is off from what
 /// its form goes on to by more than a model's sigma is known to? There the model says nothing of the noise.
-pub fn is_beyond(sigma: &SigmaModel, place: &PixelContext) -> bool {
-    let log_variance = 2.0 * sigma.ln_beyond_domain(place.z, place.theta);
+pub fn is_beyond(sigma: &SigmaModel, z: f64, theta: f64) -> bool {
+    let log_variance = 2.0 * sigma.ln_beyond_domain(z, theta);
     // What the form cannot go on to is beyond it, too.
     log_variance.is_nan() || log_variance.abs() > MODEL_TOLERANCE
 }
@@ -114,7 +114,7 @@ impl Survey {
     /// Do not measure the noise where the model says nothing of it.
     pub fn forget_noise_beyond(&mut self, sigma: &SigmaModel) {
         for (place, t) in self.views.iter_mut().flat_map(SurveyedView::tiles_mut) {
-            if is_beyond(sigma, place) {
+            if is_beyond(sigma, place.z, place.theta) {
                 t.temporal = f64::NAN;
             }
         }
@@ -123,7 +123,7 @@ impl Survey {
     /// What was left out by [`Survey::forget_noise_beyond`], in words.
     pub fn noise_untested(&self, sigma: &SigmaModel) -> Option<String> {
         let places = || self.views.iter().flat_map(|v| v.places.iter());
-        let beyond = places().filter(|p| is_beyond(sigma, p)).count();
+        let beyond = places().filter(|p| is_beyond(sigma, p.z, p.theta)).count();
         let percent = 100.0 * beyond as f64 / places().count().max(1) as f64;
         let Domain { z_m: [near, far], theta_rad: [_, steepest] } = sigma.domain;
         (percent > TELLABLE_PERCENT).then(|| {
@@ -177,9 +177,7 @@ mod tests {
     /// form's pole there is nothing to say.
     #[test]
     fn a_model_says_nothing_where_its_edge_is_not_its_form() {
-        let beyond = |z, theta| {
-            is_beyond(&SigmaModel::paper(), &PixelContext { z, theta, ..Default::default() })
-        };
+        let beyond = |z, theta| is_beyond(&SigmaModel::paper(), z, theta);
         assert_eq!([4.0, 1.0, 0.995, 0.95].map(|z| beyond(z, 0.3)), [false, false, false, true]);
         assert!(!beyond(2.0, 1.3) && beyond(2.0, 1.4));
     }

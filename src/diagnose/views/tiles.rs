@@ -175,12 +175,12 @@ impl Sums {
         let (u, v) = (self.u / self.pixels, self.v / self.pixels);
         let place = places.at(u, v, places.camera.ray(u, v), self.edge / self.pixels);
         let variance = self.variance / self.pixels;
-        // A single frame differs from no other.
-        let (temporal, repeated) = if frames > 1.0 {
-            let asked = frames - 1.0;
+        // A single reading differs from no other.
+        let asked = frames - 1.0;
+        let (temporal, repeated) = if self.repeats > 0.0 {
             (self.temporal / self.repeats * asked / frames, self.repeats / (self.n * asked))
         } else {
-            (0.0, 1.0)
+            (0.0, if asked > 0.0 { 0.0 } else { 1.0 })
         };
         let tile = Tile {
             mean: self.mean / self.n,
