@@ -1,8 +1,8 @@
 //! A hard end of the range: beyond it all is missing, by the sensor's driver or format.
 
 use super::cells::Cell;
+use super::points::Point;
 use super::shapes::Step;
-use crate::diagnose::diagnosis::Finding;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::surveyed_view::SurveyedView;
 use crate::terms::Axis;
@@ -10,13 +10,21 @@ use crate::terms::Axis;
 /// An edge narrower than this share of its distance, or than the noise there, is a limit that a driver
 /// or a format has set (the noise blurs it so); a pattern that grows faint goes gradually.
 const HARD_END_SHARE: f64 = 0.01;
-/// Widths by which the views reach beyond an edge that is known as a whole.
-const PASSED: f64 = 5.0;
-/// One that is hardly reached must be narrower by so many standard errors, which hold the doubt about
-/// the form of its rise as well.
-const SURE_WIDTH_ERRORS: f64 = 1.0;
+/// So many times that on either side, what is lost is looked at more closely: an edge as wide as the limit
+/// has lost 2 % there.
+const CLOSE: f64 = 4.0;
 /// Widths of an edge within which patches feel it: 2 % are lost there.
 const FELT: f64 = 4.0;
+
+/// How the losses about a depth are looked at more closely.
+pub struct Closely<'a> {
+    /// Standard deviation of the depth there, m.
+    pub blur: &'a dyn Fn(f64) -> f64,
+    /// The views' shares within a span of depths, m.
+    pub points: &'a dyn Fn([f64; 2]) -> Vec<Point>,
+    /// Depths that the views reach, m.
+    pub reach: [f64; 2],
+}
 
 /// Beyond it (or before it) all is missing.
 pub struct HardEnd {
@@ -26,16 +34,28 @@ pub struct HardEnd {
 }
 
 impl HardEnd {
-    pub fn of(finding: &Finding, blur: &dyn Fn(f64) -> f64) -> Option<Self> {
-        if finding.effect != Some("range-dropout") || finding.parameters.contains_key("share") {
+    /// Of a step in depth by which a share of `base` is lost anyway: if what is lost lies beyond some depth and
+    /// what is measured before it, but for fewer pixels than an edge as wide as the limit would mix.
+    pub fn of(step: &Step, base: f64, closely: &Closely<'_>) -> Option<Self> {
+        // No driver's limit lets a share pass.
+        if step.axis != Axis::Z || step.share < 1.0 {
             return None;
         }
-        let (z_m, width_m) = (finding.value("z50_m")?, finding.value("width_m")?);
-        let error = finding.parameters.get("width_m")?.get("std_error")?.as_f64()?;
-        let limit = f64::max(HARD_END_SHARE * z_m, blur(z_m));
-        let end = finding.interval[usize::from(width_m > 0.0)];
-        let doubt = if (end - z_m) / width_m > PASSED { 0.0 } else { SURE_WIDTH_ERRORS * error };
-        (width_m.abs() + doubt < limit).then_some(HardEnd { z_m, width_m })
+        // The middle of a rise of which the foot alone is seen lies beyond; that of a hard end does not.
+        let [near, far] = closely.reach;
+        let (middle, toward) = (step.middle.max(near).min(far), step.width.signum());
+        let limit = f64::max(HARD_END_SHARE * middle, (closely.blur)(middle));
+        let mut points = (closely.points)([middle - CLOSE * limit, middle + CLOSE * limit]);
+        points.sort_by(|a, b| (a.x * toward).total_cmp(&(b.x * toward)));
+        let lost = |p: &Point| (p.share - base).max(0.0) * p.asked;
+        let Cut { z_m, before, measured } = cut(&points, lost)?;
+        let edge = Step::whole(Axis::Z, z_m, toward * limit);
+        let of_edge = |p: &Point| p.asked * edge.loss(z_m - toward * (p.x - z_m).abs(), 0.0);
+        let (mixed, widest) = (before + measured, points.iter().map(of_edge).sum::<f64>());
+        // Of the foot of a rise most is lost before any cut.
+        let beyond = points.iter().map(lost).sum::<f64>() - before;
+        let width_m = toward * limit * mixed.max(1.0) / widest;
+        (before < beyond && mixed < widest).then_some(HardEnd { z_m, width_m })
     }
 
     pub fn touches(&self, cell: &Cell<'_>) -> bool {
@@ -59,9 +79,69 @@ impl HardEnd {
     }
 }
 
+/// A depth, and the pixel-frames on the wrong side of it: lost before it, and measured beyond.
+struct Cut {
+    z_m: f64,
+    before: f64,
+    measured: f64,
+}
+
+/// The cut with fewest of them, between two of these points as they come.
+fn cut(points: &[Point], lost: impl Fn(&Point) -> f64) -> Option<Cut> {
+    let measured = points.iter().map(|p| p.asked - lost(p)).sum();
+    let mut best = Cut { z_m: points.first()?.x, before: 0.0, measured };
+    let (mut before, mut measured) = (0.0, measured);
+    for pair in points.windows(2) {
+        before += lost(&pair[0]);
+        measured -= pair[0].asked - lost(&pair[0]);
+        if before + measured < best.before + best.measured {
+            best = Cut { z_m: 0.5 * (pair[0].x + pair[1].x), before, measured };
+        }
+    }
+    Some(best)
+}
+
 /// Standard deviation of the depth, by the model, where the views come nearest to `z`, m.
 pub fn blur(survey: &Survey, z: f64) -> f64 {
     let patches = survey.views.iter().flat_map(SurveyedView::patches);
     let nearest = patches.min_by(|(a, _), (b, _)| (a.z - z).abs().total_cmp(&(b.z - z).abs()));
     nearest.map_or(0.0, |(place, t)| t.variance.sqrt() / place.disparity * z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Six views that run steadily through 5.5 to 6.1 m, some hundred pixels of eight frames in a bin, of which
+    /// `loss` loses a share; a corner of one alone reaches the end.
+    fn end(loss: impl Fn(f64) -> f64) -> Option<HardEnd> {
+        let view = |view: usize| {
+            let far = if view == 0 { 6.1 } else { 5.9 };
+            let bins = (0..24).map(|k| 5.5 + 0.025 * f64::from(k)).filter(move |x| *x < far);
+            let corner = |x: f64| if x < 5.95 { 800.0 } else { 160.0 };
+            bins.map(move |x| (view, x, corner(x)))
+        };
+        let point = |(view, x, asked)| Point { view, x, share: loss(x), asked, at_least: false };
+        let all: Vec<Point> = (0..6).flat_map(view).map(point).collect();
+        let closely = Closely {
+            blur: &|_| 0.03,
+            points: &|[near, far]| {
+                all.iter().copied().filter(|p| p.x >= near && p.x <= far).collect()
+            },
+            reach: [5.5, 6.075],
+        };
+        HardEnd::of(&Step::whole(Axis::Z, 7.0, 0.1), 0.0, &closely)
+    }
+
+    #[test]
+    fn a_corner_that_is_cut_off_shows_a_hard_end_and_the_foot_of_a_rise_none() {
+        let cut = |at: f64| move |x: f64| f64::from(u8::from(x > at));
+        let rise =
+            |middle: f64, width: f64| move |x: f64| 1.0 / (1.0 + ((middle - x) / width).exp());
+        assert!(end(cut(6.0)).is_some_and(|e| (e.z_m - 6.0).abs() < 0.03));
+        assert!(end(rise(6.0, 0.02)).is_some(), "blurred by the noise");
+        assert!(end(rise(6.0, 0.2)).is_none(), "gradual");
+        assert!(end(rise(6.3, 0.1)).is_none(), "a foot");
+        assert!(end(|_| 0.0).is_none(), "nothing");
+    }
 }

@@ -31,7 +31,8 @@ use crate::rng::Seed;
 use crate::terms::{Axis, Basis, Extent};
 use cells::{Cell, LEAST, Scatter, USUAL, cells, expected, fine, patches, rim_px};
 use few::few_losses;
-use hard_end::{HardEnd, blur};
+use hard_end::{Closely, HardEnd, blur};
+use points::points_of_pixels;
 use report::{DropoutReporter, NAME_ADEQUATE, shadow_finding};
 use search::{Judged, Losses, times};
 use shapes::{Shapes, Step};
@@ -48,6 +49,13 @@ pub struct DropoutOutcome {
     pub ends: Vec<Step>,
     /// What is no finding, in words.
     pub notes: Vec<String>,
+}
+
+impl DropoutOutcome {
+    fn take_end(&mut self, end: &HardEnd) {
+        self.notes.insert(0, end.note());
+        self.ends.push(end.step());
+    }
 }
 
 /// Fewer views show no rule.
@@ -80,8 +88,13 @@ pub fn missing(
         expected(&mut mine, &cells(&patches(survey, camera, &margins)), rim_px(camera))
     });
     let seen = DropoutCells { cells: mine, fine, region_given, second, expected };
-    let blur = |z: f64| blur(survey, z);
-    let mut outcome = losses(&seen, &survey.reach, camera, &blur, seed);
+    let rays = camera.rays();
+    let closely = Closely {
+        blur: &|z| blur(survey, z),
+        points: &|span| points_of_pixels(fields, &rays, &margins, span),
+        reach: survey.reach.z,
+    };
+    let mut outcome = losses(&seen, &survey.reach, camera, &closely, seed);
     outcome.notes.extend(margins.notes());
     let sides: Vec<Sides> = (0..fields.len())
         .map(|v| Sides::of(&fields[v].edges, twins.map(|(t, _)| &t[v].edges)))
@@ -138,7 +151,7 @@ fn losses(
     seen: &DropoutCells<'_>,
     reach: &Extent,
     camera: &Camera,
-    blur: &dyn Fn(f64) -> f64,
+    closely: &Closely<'_>,
     seed: Seed,
 ) -> DropoutOutcome {
     let views = &seen.cells;
@@ -147,6 +160,11 @@ fn losses(
         return outcome;
     }
     let (fine, region_given) = (&seen.fine[..], &seen.region_given[..]);
+    let within = |end: &HardEnd| {
+        let mut rest = losses(&seen.inside(end), reach, camera, closely, seed);
+        rest.take_end(end);
+        rest
+    };
     let reporter = |base| DropoutReporter { fine, region_given, base, reach, camera };
     let shapes = Shapes::of(reach, camera, times(views));
     let nothing = || views.iter().map(|v| vec![0.0; v.len()]).collect();
@@ -177,25 +195,17 @@ fn losses(
             Finding { replicated: ledger.replicate(won, &seen.second), ..finding }
         };
         let finding = told(won);
-        // No driver's limit begins in the midst of a session.
-        let always = won.shape.since_s().is_none();
-        let end = if always { HardEnd::of(&finding, blur) } else { None };
+        let end = end(&finding, ledger.base, closely);
         // Nothing is learnt beyond the range: what is lost inside it is looked at alone.
         if let Some(end) = end.as_ref().filter(|e| views.iter().flatten().any(|c| e.touches(c))) {
-            let mut rest = losses(&seen.inside(end), reach, camera, blur, seed);
-            rest.notes.insert(0, end.note());
-            rest.ends.push(end.step());
-            return rest;
+            return within(end);
         }
         let later = if end.is_none() { ledger.later(won) } else { None };
         let more = ledger.explained(later.as_ref().unwrap_or(won));
         explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
         taken.push(won.shape.axis());
         match end {
-            Some(end) => {
-                outcome.notes.push(end.note());
-                outcome.ends.push(end.step());
-            }
+            Some(end) => outcome.take_end(&end),
             None => outcome.findings.push(later.as_ref().map_or(finding, told)),
         }
     }
@@ -204,9 +214,20 @@ fn losses(
         && seen.expected.is_none()
         && let Some((foot, p)) = few_losses(&seen.fine, rim_px(camera), reach, LEVEL / TESTS, seed)
     {
-        outcome.findings.push(reporter(0.0).finding(&foot, &rivals([&foot]), TESTS * p));
+        let finding = reporter(0.0).finding(&foot, &rivals([&foot]), TESTS * p);
+        // A corner of a view that is cut off looks like the foot of a rise.
+        match end(&finding, 0.0, closely) {
+            Some(end) if seen.fine.iter().flatten().any(|c| end.touches(c)) => return within(&end),
+            Some(end) => outcome.take_end(&end),
+            None => outcome.findings.push(finding),
+        }
     }
     outcome
+}
+
+/// Is what was found a hard end of the range?
+fn end(found: &Finding, base: f64, closely: &Closely<'_>) -> Option<HardEnd> {
+    HardEnd::of(&Step::of(found.effect?, |name| found.value(name))?, base, closely)
 }
 
 /// Shapes judged with the scatter that the best of them leaves, and what noise alone brings.

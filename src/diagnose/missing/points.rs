@@ -2,6 +2,9 @@
 
 use super::cells::Cell;
 use super::shapes::Step;
+use crate::camera::Rays;
+use crate::diagnose::views::field::Field;
+use crate::diagnose::views::margins::Margins;
 
 /// Share lost where the axis is at `x`, in one view.
 #[derive(Debug, Clone, Copy)]
@@ -42,22 +45,49 @@ pub fn points(
     at: &dyn Fn(&Cell<'_>) -> Option<f64>,
     span: [f64; 2],
 ) -> Vec<Point> {
-    let mut all = Vec::new();
-    for (view, cells) in views.iter().enumerate() {
-        let mut sums = [[0.0; 3]; BINS];
-        for (c, x) in cells.iter().filter_map(|c| Some((c, at(c)?))) {
-            let sum = &mut sums[part(x, span, BINS)];
-            *sum = [sum[0] + c.asked, sum[1] + c.lost, sum[2] + c.asked * x];
-        }
-        all.extend(sums.iter().filter(|s| s[0] > 0.0).map(|&[asked, lost, x]| Point {
-            view,
-            x: x / asked,
-            share: lost / asked,
-            asked,
-            at_least: false,
-        }));
+    let along = |c: &Cell<'_>| Some([at(c)?, c.lost, c.asked]);
+    let of_view =
+        |(view, cells): (usize, &Vec<Cell<'_>>)| binned(view, cells.iter().filter_map(along), span);
+    views.iter().enumerate().flat_map(of_view).collect()
+}
+
+/// The same over depth and pixel by pixel, of what lies within the span: a tile of a steep target is
+/// deeper than an edge is wide.
+pub fn points_of_pixels(
+    fields: &[Field],
+    rays: &Rays,
+    margins: &Margins,
+    span @ [near, far]: [f64; 2],
+) -> Vec<Point> {
+    let of_view = |(view, field): (usize, &Field)| {
+        let asked = field.frames.len() as f64;
+        let at = |(&i, &measured): (&u32, &u16)| {
+            let i = i as usize;
+            let z = field.scale_px_m / field.plane_at(i, rays);
+            let counts =
+                z >= near && z <= far && margins.hold_pixel(i % field.width, i / field.width);
+            counts.then(|| [z, asked - f64::from(measured), asked])
+        };
+        binned(view, field.pixels.iter().zip(&field.measured).filter_map(at), span)
+    };
+    fields.iter().enumerate().flat_map(of_view).collect()
+}
+
+/// One view's shares, of places on the axis with what each has lost and was asked.
+fn binned(view: usize, all: impl Iterator<Item = [f64; 3]>, span: [f64; 2]) -> Vec<Point> {
+    let mut sums = [[0.0; 3]; BINS];
+    for [x, lost, asked] in all {
+        let sum = &mut sums[part(x, span, BINS)];
+        *sum = [sum[0] + asked, sum[1] + lost, sum[2] + asked * x];
     }
-    all
+    let point = |&[asked, lost, x]: &[f64; 3]| Point {
+        view,
+        x: x / asked,
+        share: lost / asked,
+        asked,
+        at_least: false,
+    };
+    sums.iter().filter(|s| s[0] > 0.0).map(point).collect()
 }
 
 /// Views are off the step by this, in log odds, and neighbours lose their pixels together.

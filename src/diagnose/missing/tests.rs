@@ -1,5 +1,6 @@
 use super::*;
 use crate::diagnose::missing::cells::Patch;
+use crate::diagnose::missing::points::points;
 use crate::plane::Plane;
 use crate::rng::Stream;
 use crate::simulate::kinect_v1;
@@ -89,8 +90,14 @@ fn find_beside(
         second: (0..views.len()).map(|v| v % 2 == 1).collect(),
         expected,
     };
-    // Eq. 1 without its tilt.
-    losses(&seen, &reach, camera, &|z| 0.0015 + 0.00215 * (z - 0.483).powi(2), seed)
+    let depth = |c: &Cell<'_>| Some(c.place.z);
+    let closely = Closely {
+        // Eq. 1 without its tilt.
+        blur: &|z| 0.0015 + 0.00215 * (z - 0.483).powi(2),
+        points: &|span| points(&seen.fine, &depth, span),
+        reach: reach.z,
+    };
+    losses(&seen, &reach, camera, &closely, seed)
 }
 
 /// Where a matcher fails, whole patches go, and other ones in every run: of the far patches this

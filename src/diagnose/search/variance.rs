@@ -235,5 +235,18 @@ fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
             all.push(curve(over, range, 6));
         }
     }
+    all.extend(onsets(reach.session));
     all
+}
+
+/// Noisier, or less so, from a time of the session on: a curve through few nodes follows no step.
+fn onsets([start, end]: [f64; 2]) -> impl Iterator<Item = Candidate> {
+    const PLACES: usize = 8;
+    let wide = (end - start) / PLACES as f64;
+    (1..PLACES).filter(move |_| wide > 0.0).map(move |k| {
+        let at = start + wide * k as f64;
+        let (low, high) = (at - 0.25 * wide, at + 0.25 * wide);
+        let (over, times) = (Coordinate::Session, Modulation::One);
+        Candidate::curve(Basis::Curve { over, low, high, nodes: 2, times })
+    })
 }

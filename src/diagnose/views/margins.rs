@@ -45,6 +45,12 @@ impl Margins {
         inside(place.u, self.columns) && inside(place.v, self.rows)
     }
 
+    /// Does the sensor answer there?
+    pub fn hold_pixel(&self, column: usize, row: usize) -> bool {
+        let inside = |at: usize, [first, last]: [usize; 2]| (first..=last).contains(&at);
+        inside(column, self.columns) && inside(row, self.rows)
+    }
+
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         for (what, [first, last], n) in
