@@ -283,9 +283,9 @@ impl Case<'_> {
 
     /// Losses that neither the model has nor the simulation.
     fn lost(&self) -> DropoutOutcome {
-        let camera = &self.sensor().camera;
+        let seen_by = (&self.sensor().camera, &self.bench.rays);
         let twins = self.baseline.as_ref().map(|b| (&b.fields[..], &b.survey));
-        let mut lost = missing(&self.fields, twins, &self.survey, camera, self.options.seed);
+        let mut lost = missing(&self.fields, twins, &self.survey, seen_by, self.options.seed);
         let alike = self.baseline.as_ref().is_some_and(|b| b.loses_alike(&self.survey));
         lost.findings.retain(|m| {
             // What lies beside the target is no tile's.

@@ -6,6 +6,7 @@
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::{EdgeLoss, Edges};
+use crate::diagnose::checks::replication::agree;
 use crate::diagnose::diagnosis::Curve;
 use crate::diagnose::noise::view_mean::ViewMean;
 use crate::diagnose::search::null::student;
@@ -127,4 +128,16 @@ fn curve(views: &[EdgeLoss], share: f64) -> Curve {
         y_std_error: vec![scatter; widths.len()],
         model,
     }
+}
+
+/// Do the shadows of both halves have the same share of the expected width?
+pub fn bands_agree(sides: &[Sides], second: &[bool]) -> Option<bool> {
+    let half = |which: bool| {
+        let mine = sides.iter().zip(second).filter(|(_, s)| **s == which);
+        let mine: Vec<Sides> = mine.map(|(sides, _)| *sides).collect();
+        let Band { side, share: [value, std_error], .. } = band(&mine, 1.0)?;
+        Some((side, ViewMean { value, std_error, views: mine.len() as f64 }))
+    };
+    let (first, second) = (half(false)?, half(true)?);
+    Some(first.0 == second.0 && agree([Some(first.1), Some(second.1)])?)
 }

@@ -10,14 +10,14 @@ use crate::terms::Axis;
 /// An edge narrower than this share of its distance, or than the noise there, is a limit that a driver
 /// or a format has set (the noise blurs it so); a pattern that grows faint goes gradually.
 const HARD_END_SHARE: f64 = 0.01;
-/// So many times that on either side, what is lost is looked at more closely: an edge as wide as the limit
-/// has lost 2 % there.
+/// So many limits on either side of the middle are looked at pixel by pixel: an edge as wide as the limit has
+/// lost 2 % there.
 const CLOSE: f64 = 4.0;
 /// Widths of an edge within which patches feel it: 2 % are lost there.
 const FELT: f64 = 4.0;
 
-/// How the losses about a depth are looked at more closely.
-pub struct Closely<'a> {
+/// What the pixels say of the losses about a depth.
+pub struct CloseLook<'a> {
     /// Standard deviation of the depth there, m.
     pub blur: &'a dyn Fn(f64) -> f64,
     /// The views' shares within a span of depths, m.
@@ -34,21 +34,21 @@ pub struct HardEnd {
 }
 
 impl HardEnd {
-    /// Of a step in depth by which a share of `base` is lost anyway: if what is lost lies beyond some depth and
-    /// what is measured before it, but for fewer pixels than an edge as wide as the limit would mix.
-    pub fn of(step: &Step, base: f64, closely: &Closely<'_>) -> Option<Self> {
+    /// A step in depth is one where the pixels show a cut: what is lost lies beyond some depth and what is
+    /// measured before it, but for fewer than an edge as wide as the limit would mix. `base` is lost anyway.
+    pub fn of(step: &Step, base: f64, look: &CloseLook<'_>) -> Option<Self> {
         // No driver's limit lets a share pass.
         if step.axis != Axis::Z || step.share < 1.0 {
             return None;
         }
         // The middle of a rise of which the foot alone is seen lies beyond; that of a hard end does not.
-        let [near, far] = closely.reach;
+        let [near, far] = look.reach;
         let (middle, toward) = (step.middle.max(near).min(far), step.width.signum());
-        let limit = f64::max(HARD_END_SHARE * middle, (closely.blur)(middle));
-        let mut points = (closely.points)([middle - CLOSE * limit, middle + CLOSE * limit]);
+        let limit = f64::max(HARD_END_SHARE * middle, (look.blur)(middle));
+        let mut points = (look.points)([middle - CLOSE * limit, middle + CLOSE * limit]);
         points.sort_by(|a, b| (a.x * toward).total_cmp(&(b.x * toward)));
         let lost = |p: &Point| (p.share - base).max(0.0) * p.asked;
-        let Cut { z_m, before, measured } = cut(&points, lost)?;
+        let Cut { z_m, before, measured } = best_cut(&points, lost)?;
         let edge = Step::whole(Axis::Z, z_m, toward * limit);
         let of_edge = |p: &Point| p.asked * edge.loss(z_m - toward * (p.x - z_m).abs(), 0.0);
         let (mixed, widest) = (before + measured, points.iter().map(of_edge).sum::<f64>());
@@ -87,7 +87,7 @@ struct Cut {
 }
 
 /// The cut with fewest of them, between two of these points as they come.
-fn cut(points: &[Point], lost: impl Fn(&Point) -> f64) -> Option<Cut> {
+fn best_cut(points: &[Point], lost: impl Fn(&Point) -> f64) -> Option<Cut> {
     let measured = points.iter().map(|p| p.asked - lost(p)).sum();
     let mut best = Cut { z_m: points.first()?.x, before: 0.0, measured };
     let (mut before, mut measured) = (0.0, measured);
@@ -123,14 +123,14 @@ mod tests {
         };
         let point = |(view, x, asked)| Point { view, x, share: loss(x), asked, at_least: false };
         let all: Vec<Point> = (0..6).flat_map(view).map(point).collect();
-        let closely = Closely {
+        let look = CloseLook {
             blur: &|_| 0.03,
             points: &|[near, far]| {
                 all.iter().copied().filter(|p| p.x >= near && p.x <= far).collect()
             },
             reach: [5.5, 6.075],
         };
-        HardEnd::of(&Step::whole(Axis::Z, 7.0, 0.1), 0.0, &closely)
+        HardEnd::of(&Step::whole(Axis::Z, 7.0, 0.1), 0.0, &look)
     }
 
     #[test]

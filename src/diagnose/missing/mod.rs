@@ -16,13 +16,9 @@ mod runs;
 pub mod search;
 pub mod shapes;
 
-use serde_json::{Map, json};
-
-use crate::camera::Camera;
-use crate::diagnose::checks::replication::agree;
+use crate::camera::{Camera, Rays};
 use crate::diagnose::diagnosis::{Detectable, Finding};
-use crate::diagnose::edges::shadow::{Band, Sides, band};
-use crate::diagnose::noise::view_mean::ViewMean;
+use crate::diagnose::edges::shadow::{Sides, band, bands_agree};
 use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::layers::Survey;
@@ -31,9 +27,9 @@ use crate::rng::Seed;
 use crate::terms::{Axis, Basis, Extent};
 use cells::{Cell, LEAST, Scatter, USUAL, cells, expected, fine, patches, rim_px};
 use few::few_losses;
-use hard_end::{Closely, HardEnd, blur};
+use hard_end::{CloseLook, HardEnd, blur};
 use points::points_of_pixels;
-use report::{DropoutReporter, NAME_ADEQUATE, shadow_finding};
+use report::{DropoutReporter, NAME_ADEQUATE, detectable, rivals, shadow_finding};
 use search::{Judged, Losses, times};
 use shapes::{Shapes, Step};
 
@@ -76,7 +72,7 @@ pub fn missing(
     fields: &[Field],
     twins: Option<(&[Field], &Survey)>,
     survey: &Survey,
-    camera: &Camera,
+    (camera, rays): (&Camera, &Rays),
     seed: Seed,
 ) -> DropoutOutcome {
     let region_given: Vec<bool> = fields.iter().map(|f| f.region_given).collect();
@@ -88,13 +84,12 @@ pub fn missing(
         expected(&mut mine, &cells(&patches(survey, camera, &margins)), rim_px(camera))
     });
     let seen = DropoutCells { cells: mine, fine, region_given, second, expected };
-    let rays = camera.rays();
-    let closely = Closely {
+    let look = CloseLook {
         blur: &|z| blur(survey, z),
-        points: &|span| points_of_pixels(fields, &rays, &margins, span),
+        points: &|span| points_of_pixels(fields, rays, &margins, span),
         reach: survey.reach.z,
     };
-    let mut outcome = losses(&seen, &survey.reach, camera, &closely, seed);
+    let mut outcome = DropoutSearch { reach: &survey.reach, camera, look, seed }.losses(&seen);
     outcome.notes.extend(margins.notes());
     let sides: Vec<Sides> = (0..fields.len())
         .map(|v| Sides::of(&fields[v].edges, twins.map(|(t, _)| &t[v].edges)))
@@ -147,87 +142,111 @@ impl<'a> DropoutCells<'a> {
     }
 }
 
-fn losses(
-    seen: &DropoutCells<'_>,
-    reach: &Extent,
-    camera: &Camera,
-    closely: &Closely<'_>,
+/// What losses are searched with.
+struct DropoutSearch<'a> {
+    reach: &'a Extent,
+    camera: &'a Camera,
+    look: CloseLook<'a>,
     seed: Seed,
-) -> DropoutOutcome {
-    let views = &seen.cells;
-    let mut outcome = DropoutOutcome::default();
-    if views.iter().filter(|v| !v.is_empty()).count() < FEWEST_VIEWS {
-        return outcome;
-    }
-    let (fine, region_given) = (&seen.fine[..], &seen.region_given[..]);
-    let within = |end: &HardEnd| {
-        let mut rest = losses(&seen.inside(end), reach, camera, closely, seed);
-        rest.take_end(end);
-        rest
-    };
-    let reporter = |base| DropoutReporter { fine, region_given, base, reach, camera };
-    let shapes = Shapes::of(reach, camera, times(views));
-    let nothing = || views.iter().map(|v| vec![0.0; v.len()]).collect();
-    let mut explained: Vec<Vec<f64>> = seen.expected.clone().unwrap_or_else(nothing);
-    let mut taken: Vec<Axis> = Vec::new();
-    while outcome.findings.len() < MOST_FINDINGS {
-        let open = shapes.beside(&taken);
-        let of = |steps: &[Step], least| {
-            Round::of(views, &explained, (steps, &open.curves), least, seed)
-        };
-        let Some(always) = of(&open.steps, LEAST) else { break };
-        if outcome.findings.is_empty() {
-            outcome.detectable = detectable(&always.ledger, &shapes.steps, always.threshold());
+}
+
+impl DropoutSearch<'_> {
+    fn losses(&self, seen: &DropoutCells<'_>) -> DropoutOutcome {
+        let views = &seen.cells;
+        let mut outcome = DropoutOutcome::default();
+        if views.iter().filter(|v| !v.is_empty()).count() < FEWEST_VIEWS {
+            return outcome;
         }
-        // Steps that begin in the midst of the session are tried where none is found that is always there.
-        // Few views show how they scatter from then on: that is not trusted below what is usual.
-        let begins = outcome.findings.is_empty() && always.won().is_none();
-        let round = if begins { of(&open.begun, USUAL) } else { Some(always) };
-        let Some(Round { ledger, judged, noise }) = &round else { break };
-        let Some(won) = round.as_ref().and_then(Round::won) else { break };
-        if outcome.findings.first().is_some_and(|f| won.gain < LEAST_OF_FIRST * f.share) {
-            break;
+        let shapes = Shapes::of(self.reach, self.camera, times(views));
+        let nothing = || views.iter().map(|v| vec![0.0; v.len()]).collect();
+        let mut explained: Vec<Vec<f64>> = seen.expected.clone().unwrap_or_else(nothing);
+        let mut taken: Vec<Axis> = Vec::new();
+        while outcome.findings.len() < MOST_FINDINGS {
+            let open = shapes.beside(&taken);
+            let of = |steps: &[Step], least| {
+                Round::of(views, &explained, (steps, &open.curves), least, self.seed)
+            };
+            let Some(always) = of(&open.steps, LEAST) else { break };
+            if outcome.findings.is_empty() {
+                outcome.detectable = detectable(&always.ledger, &shapes.steps, always.threshold());
+            }
+            // Steps that begin in the midst of the session are tried where none is found that is always there.
+            // Few views show how they scatter from then on: that is not trusted below what is usual.
+            let begins = outcome.findings.is_empty() && always.won().is_none();
+            let round = if begins { of(&open.begun, USUAL) } else { Some(always) };
+            let Some(Round { ledger, judged, noise }) = &round else { break };
+            let Some(won) = round.as_ref().and_then(Round::won) else { break };
+            if outcome.findings.first().is_some_and(|f| won.gain < LEAST_OF_FIRST * f.share) {
+                break;
+            }
+            let p = noise.p(won.gain);
+            let told = |won: &Judged| {
+                let rivals = rivals(std::iter::once(won).chain(judged));
+                let finding = self.reporter(seen, ledger.base).finding(won, &rivals, TESTS * p);
+                Finding { replicated: ledger.replicate(won, &seen.second), ..finding }
+            };
+            let finding = told(won);
+            let end = self.end(&finding, ledger.base);
+            if let Some(end) = end.as_ref().filter(|e| touches(views, e)) {
+                return self.within(end, seen);
+            }
+            let later = if end.is_none() { ledger.later(won) } else { None };
+            let more = ledger.explained(later.as_ref().unwrap_or(won));
+            explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
+            taken.push(won.shape.axis());
+            match end {
+                Some(end) => outcome.take_end(&end),
+                None => outcome.findings.push(later.as_ref().map_or(finding, told)),
+            }
         }
-        let p = noise.p(won.gain);
-        let told = |won: &Judged| {
-            let rivals = rivals(std::iter::once(won).chain(judged));
-            let finding = reporter(ledger.base).finding(won, &rivals, TESTS * p);
-            Finding { replicated: ledger.replicate(won, &seen.second), ..finding }
-        };
-        let finding = told(won);
-        let end = end(&finding, ledger.base, closely);
-        // Nothing is learnt beyond the range: what is lost inside it is looked at alone.
-        if let Some(end) = end.as_ref().filter(|e| views.iter().flatten().any(|c| e.touches(c))) {
-            return within(end);
-        }
-        let later = if end.is_none() { ledger.later(won) } else { None };
-        let more = ledger.explained(later.as_ref().unwrap_or(won));
-        explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
-        taken.push(won.shape.axis());
-        match end {
-            Some(end) => outcome.take_end(&end),
-            None => outcome.findings.push(later.as_ref().map_or(finding, told)),
-        }
-    }
-    if outcome.findings.is_empty()
         // Counts are not compared with a twin's.
-        && seen.expected.is_none()
-        && let Some((foot, p)) = few_losses(&seen.fine, rim_px(camera), reach, LEVEL / TESTS, seed)
-    {
-        let finding = reporter(0.0).finding(&foot, &rivals([&foot]), TESTS * p);
+        if outcome.findings.is_empty() && seen.expected.is_none() {
+            return self.few(seen, outcome);
+        }
+        outcome
+    }
+
+    /// Where nothing else is found: losses too few to be a share of a patch.
+    fn few(&self, seen: &DropoutCells<'_>, mut outcome: DropoutOutcome) -> DropoutOutcome {
+        let (rim, level) = (rim_px(self.camera), LEVEL / TESTS);
+        let Some((foot, p)) = few_losses(&seen.fine, rim, self.reach, level, self.seed) else {
+            return outcome;
+        };
+        let finding = self.reporter(seen, 0.0).finding(&foot, &rivals([&foot]), TESTS * p);
         // A corner of a view that is cut off looks like the foot of a rise.
-        match end(&finding, 0.0, closely) {
-            Some(end) if seen.fine.iter().flatten().any(|c| end.touches(c)) => return within(&end),
+        match self.end(&finding, 0.0) {
+            Some(end) if touches(&seen.fine, &end) => return self.within(&end, seen),
             Some(end) => outcome.take_end(&end),
             None => outcome.findings.push(finding),
         }
+        outcome
     }
-    outcome
+
+    /// Nothing is learnt beyond a hard end: what is lost inside it is looked at alone.
+    fn within(&self, end: &HardEnd, seen: &DropoutCells<'_>) -> DropoutOutcome {
+        let mut rest = self.losses(&seen.inside(end));
+        rest.take_end(end);
+        rest
+    }
+
+    /// Is what was found a hard end of the range?
+    fn end(&self, found: &Finding, base: f64) -> Option<HardEnd> {
+        HardEnd::of(&Step::of(found.effect?, |name| found.value(name))?, base, &self.look)
+    }
+
+    fn reporter<'b>(&'b self, seen: &'b DropoutCells<'b>, base: f64) -> DropoutReporter<'b> {
+        DropoutReporter {
+            fine: &seen.fine,
+            region_given: &seen.region_given,
+            base,
+            reach: self.reach,
+            camera: self.camera,
+        }
+    }
 }
 
-/// Is what was found a hard end of the range?
-fn end(found: &Finding, base: f64, closely: &Closely<'_>) -> Option<HardEnd> {
-    HardEnd::of(&Step::of(found.effect?, |name| found.value(name))?, base, closely)
+fn touches(views: &[Vec<Cell<'_>>], end: &HardEnd) -> bool {
+    views.iter().flatten().any(|c| end.touches(c))
 }
 
 /// Shapes judged with the scatter that the best of them leaves, and what noise alone brings.
@@ -262,48 +281,12 @@ impl<'a> Round<'a> {
     }
 }
 
-/// Do the shadows of both halves have the same share of the expected width?
-fn bands_agree(sides: &[Sides], second: &[bool]) -> Option<bool> {
-    let half = |which: bool| {
-        let mine = sides.iter().zip(second).filter(|(_, s)| **s == which);
-        let mine: Vec<Sides> = mine.map(|(sides, _)| *sides).collect();
-        let Band { side, share: [value, std_error], .. } = band(&mine, 1.0)?;
-        Some((side, ViewMean { value, std_error, views: mine.len() as f64 }))
-    };
-    let (first, second) = (half(false)?, half(true)?);
-    Some(first.0 == second.0 && agree([Some(first.1), Some(second.1)])?)
-}
-
 /// The best step, unless the best curve leaves it behind.
 fn choose(judged: &[Judged]) -> Option<&Judged> {
     let best = |named: bool| judged.iter().find(|j| j.shape.family().is_some() == named);
     let (step, curve) = (best(true), best(false));
     let enough = curve.map_or(0.0, |c| NAME_ADEQUATE * c.gain);
     step.filter(|s| s.gain > enough).or(curve)
-}
-
-fn rivals<'a>(judged: impl IntoIterator<Item = &'a Judged>) -> Vec<(&'static str, f64)> {
-    let mut all: Vec<(&'static str, f64)> = Vec::new();
-    for j in judged {
-        let name = j.shape.family().unwrap_or(j.shape.axis().id());
-        if all.iter().all(|r| r.0 != name) {
-            all.push((name, j.gain));
-        }
-    }
-    all
-}
-
-fn detectable(losses: &Losses<'_>, steps: &[Step], threshold: f64) -> Vec<Detectable> {
-    let least = |s: Step| {
-        let (name, value) = match (s.axis, s.width > 0.0) {
-            (Axis::Theta, _) => ("theta50_deg", s.middle.to_degrees()),
-            (_, true) => ("z50_m", s.middle),
-            (_, false) => ("z50_m, near side", s.middle),
-        };
-        let minimum = Map::from_iter([(name.to_string(), json!(value))]);
-        Detectable { effect: s.family(), minimum }
-    };
-    losses.detectable(steps, threshold).into_iter().map(least).collect()
 }
 
 #[cfg(test)]

@@ -63,7 +63,7 @@ pub fn points_of_pixels(
         let asked = field.frames.len() as f64;
         let at = |(&i, &measured): (&u32, &u16)| {
             let i = i as usize;
-            let z = field.scale_px_m / field.plane_at(i, rays);
+            let z = field.plane.depth_at(rays, i);
             let counts =
                 z >= near && z <= far && margins.hold_pixel(i % field.width, i / field.width);
             counts.then(|| [z, asked - f64::from(measured), asked])

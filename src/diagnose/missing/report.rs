@@ -5,10 +5,10 @@ use serde_json::{Map, Value, json};
 use super::cells::Cell;
 use super::fit::{Fitted, fit};
 use super::points::{Point, bounded, part, points};
-use super::search::Judged;
+use super::search::{Judged, Losses};
 use super::shapes::{Shape, Step};
 use crate::camera::Camera;
-use crate::diagnose::diagnosis::{Alternative, Curve, Finding, Size, Status};
+use crate::diagnose::diagnosis::{Alternative, Curve, Detectable, Finding, Size, Status};
 use crate::diagnose::edges::shadow::Band;
 use crate::diagnose::finding::naming::{MIN_PROBABILITY, none_of_these, physics};
 use crate::diagnose::finding::other_findings::named;
@@ -24,6 +24,18 @@ pub const NAME_ADEQUATE: f64 = 0.6;
 
 /// Families and nameless axes that were looked for, nats, best first.
 pub type Rivals = [(&'static str, f64)];
+
+/// Names and axes without one, each by the best of its shapes.
+pub fn rivals<'a>(judged: impl IntoIterator<Item = &'a Judged>) -> Vec<(&'static str, f64)> {
+    let mut all: Vec<(&'static str, f64)> = Vec::new();
+    for j in judged {
+        let name = j.shape.family().unwrap_or(j.shape.axis().id());
+        if all.iter().all(|r| r.0 != name) {
+            all.push((name, j.gain));
+        }
+    }
+    all
+}
 
 /// Writes findings, from what the views lost.
 pub struct DropoutReporter<'a> {
@@ -154,6 +166,20 @@ fn binned(points: &[Point], axis: Axis, span: [f64; 2], model: impl Fn(f64) -> f
         curve.model.push(model(x));
     }
     curve
+}
+
+/// What would be seen of these steps, by where the faintest that is has its middle.
+pub fn detectable(losses: &Losses<'_>, steps: &[Step], threshold: f64) -> Vec<Detectable> {
+    let least = |s: Step| {
+        let (name, value) = match (s.axis, s.width > 0.0) {
+            (Axis::Theta, _) => ("theta50_deg", s.middle.to_degrees()),
+            (_, true) => ("z50_m", s.middle),
+            (_, false) => ("z50_m, near side", s.middle),
+        };
+        let minimum = Map::from_iter([(name.to_string(), json!(value))]);
+        Detectable { effect: s.family(), minimum }
+    };
+    losses.detectable(steps, threshold).into_iter().map(least).collect()
 }
 
 /// A band beside the target.

@@ -91,13 +91,13 @@ fn find_beside(
         expected,
     };
     let depth = |c: &Cell<'_>| Some(c.place.z);
-    let closely = Closely {
+    let look = CloseLook {
         // Eq. 1 without its tilt.
         blur: &|z| 0.0015 + 0.00215 * (z - 0.483).powi(2),
         points: &|span| points(&seen.fine, &depth, span),
         reach: reach.z,
     };
-    losses(&seen, &reach, camera, &closely, seed)
+    DropoutSearch { reach: &reach, camera, look, seed }.losses(&seen)
 }
 
 /// Where a matcher fails, whole patches go, and other ones in every run: of the far patches this

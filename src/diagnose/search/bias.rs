@@ -57,11 +57,7 @@ fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
 /// Two halves of the picture that disagree, at any of these places.
 fn seams(length: f64, over: Coordinate) -> impl Iterator<Item = Candidate> {
     const PLACES: usize = 32;
-    (2..PLACES - 1).map(move |k| {
-        let at = length * k as f64 / PLACES as f64;
-        let (low, high) = (at - 1.0, at + 1.0);
-        Candidate::curve(Basis::Curve { over, low, high, nodes: 2, times: Modulation::One })
-    })
+    (2..PLACES - 1).map(move |k| Candidate::step(over, length * k as f64 / PLACES as f64, 2.0))
 }
 
 /// What turns with the direction of the tilt and is not there without one.

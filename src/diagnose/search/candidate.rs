@@ -1,7 +1,7 @@
 //! What could be missing: a shape with, or without, the name of its cause.
 
 use crate::effects::{self, Bounds, Effect, Flat, USUAL_PX};
-use crate::terms::{Axis, Basis, Coordinate, Statistic};
+use crate::terms::{Axis, Basis, Coordinate, Modulation, Statistic};
 
 /// A term that is tried.
 #[derive(Debug, Clone)]
@@ -23,6 +23,12 @@ impl Candidate {
 
     pub fn curve(basis: Basis) -> Self {
         Candidate { family: None, basis, flat: None }
+    }
+
+    /// One level up to `at` and another from there on, the rise between them `wide`.
+    pub fn step(over: Coordinate, at: f64, wide: f64) -> Self {
+        let (low, high) = (at - 0.5 * wide, at + 0.5 * wide);
+        Candidate::curve(Basis::Curve { over, low, high, nodes: 2, times: Modulation::One })
     }
 
     /// All that the catalogue's effects may look like.

@@ -243,10 +243,6 @@ fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
 fn onsets([start, end]: [f64; 2]) -> impl Iterator<Item = Candidate> {
     const PLACES: usize = 8;
     let wide = (end - start) / PLACES as f64;
-    (1..PLACES).filter(move |_| wide > 0.0).map(move |k| {
-        let at = start + wide * k as f64;
-        let (low, high) = (at - 0.25 * wide, at + 0.25 * wide);
-        let (over, times) = (Coordinate::Session, Modulation::One);
-        Candidate::curve(Basis::Curve { over, low, high, nodes: 2, times })
-    })
+    let onset = move |k| Candidate::step(Coordinate::Session, start + wide * k as f64, 0.5 * wide);
+    (1..PLACES).filter(move |_| wide > 0.0).map(onset)
 }
