@@ -13,8 +13,8 @@ const HARD_END_SHARE: f64 = 0.01;
 /// So many limits on either side of the middle are looked at pixel by pixel: an edge as wide as the limit has
 /// lost 2 % there.
 const CLOSE: f64 = 4.0;
-/// Widths of an edge within which patches feel it: 2 % are lost there.
-const FELT: f64 = 4.0;
+/// What a driver's limit lets pass, farther beyond it than that: none but strays.
+const STRAYS: f64 = 0.1;
 
 /// What the pixels say of the losses about a depth.
 pub struct CloseLook<'a> {
@@ -31,38 +31,68 @@ pub struct HardEnd {
     z_m: f64,
     /// Negative where what is nearer is lost.
     width_m: f64,
+    /// So far before it nothing is lost by it any more, m.
+    felt_m: f64,
 }
 
 impl HardEnd {
-    /// A step in depth is one where the pixels show a cut: what is lost lies beyond some depth and what is
-    /// measured before it, but for fewer than an edge as wide as the limit would mix. `base` is lost anyway.
-    pub fn of(step: &Step, base: f64, look: &CloseLook<'_>) -> Option<Self> {
-        // No driver's limit lets a share pass.
-        if step.axis != Axis::Z || step.share < 1.0 {
+    /// A step in depth is one where it was fitted as narrow, or else where the pixels show a cut: what is lost
+    /// lies beyond it and what is measured before it, but for fewer than an edge as wide as the limit would
+    /// mix. `base` is lost anyway.
+    pub fn of(step: &Step, width_error: f64, base: f64, look: &CloseLook<'_>) -> Option<Self> {
+        if step.axis != Axis::Z || step.share < 1.0 - STRAYS {
             return None;
         }
         // The middle of a rise of which the foot alone is seen lies beyond; that of a hard end does not.
         let [near, far] = look.reach;
         let (middle, toward) = (step.middle.max(near).min(far), step.width.signum());
         let limit = f64::max(HARD_END_SHARE * middle, (look.blur)(middle));
-        let mut points = (look.points)([middle - CLOSE * limit, middle + CLOSE * limit]);
-        points.sort_by(|a, b| (a.x * toward).total_cmp(&(b.x * toward)));
-        let lost = |p: &Point| (p.share - base).max(0.0) * p.asked;
+        let fitted = HardEnd { z_m: step.middle, width_m: step.width, felt_m: CLOSE * limit };
+        let narrow = step.width.abs() + width_error < limit;
+        let end = if narrow { fitted } else { HardEnd::cut(middle, toward * limit, base, look)? };
+        // What begins in the midst of a session is none either: other views pass it.
+        let past = end.z_m + toward * CLOSE * limit;
+        let beyond = if toward > 0.0 { [past, far] } else { [near, past] };
+        let all = if beyond[0] < beyond[1] { (look.points)(beyond) } else { Vec::new() };
+        let sum = |of: fn(&Point) -> f64| all.iter().map(of).sum::<f64>();
+        (sum(|p| p.asked * (1.0 - p.share)) <= STRAYS * sum(|p| p.asked)).then_some(end)
+    }
+
+    /// The cut about `middle`, narrower than `limit`, which is negative where what is nearer is lost.
+    fn cut(middle: f64, limit: f64, base: f64, look: &CloseLook<'_>) -> Option<Self> {
+        let close = CLOSE * limit.abs();
+        let mut points = (look.points)([middle - close, middle + close]);
+        points.sort_by(|a, b| (a.x * limit).total_cmp(&(b.x * limit)));
+        let lost = |p: &Point| ((p.share - base) / (1.0 - base)).max(0.0) * p.asked;
         let Cut { z_m, before, measured } = best_cut(&points, lost)?;
-        let edge = Step::whole(Axis::Z, z_m, toward * limit);
-        let of_edge = |p: &Point| p.asked * edge.loss(z_m - toward * (p.x - z_m).abs(), 0.0);
+        let edge = Step::whole(Axis::Z, z_m, limit);
+        let of_edge =
+            |p: &Point| p.asked * edge.loss(z_m - limit.signum() * (p.x - z_m).abs(), 0.0);
         let (mixed, widest) = (before + measured, points.iter().map(of_edge).sum::<f64>());
-        // Of the foot of a rise most is lost before any cut.
-        let beyond = points.iter().map(lost).sum::<f64>() - before;
-        let width_m = toward * limit * mixed.max(1.0) / widest;
-        (before < beyond && mixed < widest).then_some(HardEnd { z_m, width_m })
+        // Of the foot of a rise most is lost before any cut; and one distance alone shows none.
+        let all_lost: f64 = points.iter().map(lost).sum();
+        let all_measured: f64 = points.iter().map(|p| p.asked - lost(p)).sum();
+        let is_cut =
+            before < all_lost - before && mixed < all_measured - measured && mixed < widest;
+        let width_m = limit * mixed.max(1.0) / widest;
+        is_cut.then_some(HardEnd { z_m, width_m, felt_m: close })
     }
 
     pub fn touches(&self, cell: &Cell<'_>) -> bool {
         let far = cell.place.slope[0].abs() + cell.place.slope[1].abs();
         let half = 0.5 * cell.place.side * far / cell.place.disparity * cell.place.z;
-        let past = (cell.place.z - self.z_m) * self.width_m.signum();
-        past + half > -FELT * self.width_m.abs()
+        !self.spares(cell.place.z + half * self.width_m.signum())
+    }
+
+    /// Is nothing lost by it at this depth?
+    pub fn spares(&self, z: f64) -> bool {
+        (z - self.z_m) * self.width_m.signum() <= -self.felt_m
+    }
+
+    /// Of depths that are reached, those that it spares.
+    pub fn spared(&self, [near, far]: [f64; 2]) -> [f64; 2] {
+        let last = self.z_m - self.felt_m * self.width_m.signum();
+        if self.width_m > 0.0 { [near, far.min(last)] } else { [near.max(last), far] }
     }
 
     /// What it loses.
@@ -123,14 +153,17 @@ mod tests {
         };
         let point = |(view, x, asked)| Point { view, x, share: loss(x), asked, at_least: false };
         let all: Vec<Point> = (0..6).flat_map(view).map(point).collect();
+        judged(&all, 7.0)
+    }
+
+    fn judged(all: &[Point], middle: f64) -> Option<HardEnd> {
+        let inside = |[near, far]: [f64; 2]| move |p: &Point| p.x >= near && p.x <= far;
         let look = CloseLook {
             blur: &|_| 0.03,
-            points: &|[near, far]| {
-                all.iter().copied().filter(|p| p.x >= near && p.x <= far).collect()
-            },
-            reach: [5.5, 6.075],
+            points: &|span| all.iter().copied().filter(inside(span)).collect(),
+            reach: crate::stats::range(all.iter().map(|p| p.x)),
         };
-        HardEnd::of(&Step::whole(Axis::Z, 7.0, 0.1), 0.0, &look)
+        HardEnd::of(&Step::whole(Axis::Z, middle, 0.1), f64::INFINITY, 0.0, &look)
     }
 
     #[test]
@@ -143,5 +176,25 @@ mod tests {
         assert!(end(rise(6.0, 0.2)).is_none(), "gradual");
         assert!(end(rise(6.3, 0.1)).is_none(), "a foot");
         assert!(end(|_| 0.0).is_none(), "nothing");
+    }
+
+    /// Frontal walls half a metre apart: none shows both sides of an edge.
+    #[test]
+    fn a_wall_that_loses_much_is_no_cut() {
+        let wall = |(view, x, share)| Point { view, x, share, asked: 4e5, at_least: false };
+        let walls = [(0, 5.0, 0.0), (1, 5.5, 0.08), (2, 6.0, 0.62)].map(wall);
+        assert!(judged(&walls, 5.95).is_none());
+    }
+
+    /// The same distances are measured in another view: no driver's limit.
+    #[test]
+    fn an_end_that_other_views_pass_is_none() {
+        let at =
+            |view: usize, x: f64, share| Point { view, x, share, asked: 800.0, at_least: false };
+        let early = (0..8).map(|k| at(0, 6.5 + 0.05 * f64::from(k), 0.0));
+        let late = (0..20).map(|k| at(1, 5.5 + 0.05 * f64::from(k), f64::from(u8::from(k > 10))));
+        let late: Vec<Point> = late.collect();
+        assert!(judged(&late, 6.0).is_some());
+        assert!(judged(&late.into_iter().chain(early).collect::<Vec<_>>(), 6.0).is_none());
     }
 }

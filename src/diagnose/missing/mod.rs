@@ -224,14 +224,20 @@ impl DropoutSearch<'_> {
 
     /// Nothing is learnt beyond a hard end: what is lost inside it is looked at alone.
     fn within(&self, end: &HardEnd, seen: &DropoutCells<'_>) -> DropoutOutcome {
-        let mut rest = self.losses(&seen.inside(end));
+        let spared =
+            |span| (self.look.points)(span).into_iter().filter(|p| end.spares(p.x)).collect();
+        let reach = end.spared(self.look.reach);
+        let look = CloseLook { points: &spared, reach, ..self.look };
+        let mut rest = DropoutSearch { look, ..*self }.losses(&seen.inside(end));
         rest.take_end(end);
         rest
     }
 
     /// Is what was found a hard end of the range?
     fn end(&self, found: &Finding, base: f64) -> Option<HardEnd> {
-        HardEnd::of(&Step::of(found.effect?, |name| found.value(name))?, base, &self.look)
+        let step = Step::of(found.effect?, |name| found.value(name))?;
+        let error = found.parameters.get("width_m").and_then(|w| w.get("std_error")?.as_f64());
+        HardEnd::of(&step, error.unwrap_or(f64::INFINITY), base, &self.look)
     }
 
     fn reporter<'b>(&'b self, seen: &'b DropoutCells<'b>, base: f64) -> DropoutReporter<'b> {

@@ -90,11 +90,13 @@ fn find_beside(
         second: (0..views.len()).map(|v| v % 2 == 1).collect(),
         expected,
     };
-    let depth = |c: &Cell<'_>| Some(c.place.z);
+    let within = |[near, far]: [f64; 2]| {
+        move |c: &Cell<'_>| Some(c.place.z).filter(|z| *z >= near && *z <= far)
+    };
     let look = CloseLook {
         // Eq. 1 without its tilt.
         blur: &|z| 0.0015 + 0.00215 * (z - 0.483).powi(2),
-        points: &|span| points(&seen.fine, &depth, span),
+        points: &|span| points(&seen.fine, &within(span), span),
         reach: reach.z,
     };
     DropoutSearch { reach: &reach, camera, look, seed }.losses(&seen)
