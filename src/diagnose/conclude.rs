@@ -9,7 +9,7 @@ use super::diagnosis::{
 };
 use super::distance::laws;
 use super::distance::reference;
-use super::distance::referenced_view::{referenced_views, scatter};
+use super::distance::referenced_view::{Scatter, referenced_views};
 use super::engine::Diagnosed;
 use super::finding::findings;
 use super::finding::next_view;
@@ -149,10 +149,10 @@ impl Case<'_> {
             return let_planes_be(added, camera);
         }
         let bias = added.iter().flat_map(|e| &e.shape).filter(|t| t.is_correctable());
-        let levels = heldout::levels(&self.survey, &bias.cloned().collect::<Vec<_>>());
-        let checked = referenced_views(&self.fields, &levels, &known, &self.survey.second());
+        let bias: Vec<Term> = bias.cloned().collect();
+        let checked = referenced_views(&self.fields, &self.survey, &bias, &known);
         if checked.len() >= laws::FEWEST {
-            anchor(added, &checked, scatter(&checked).0, camera);
+            anchor(added, &checked, &Scatter::of(&checked).variances, camera);
         } else {
             let_planes_be(added, camera);
         }

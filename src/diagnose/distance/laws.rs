@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::referenced_view::{ReferencedView, is_tilted, scatter};
+use super::referenced_view::{ReferencedView, Scatter, is_tilted};
 use super::warm_up::warm_up;
 use crate::diagnose::checks::replication::agree;
 use crate::diagnose::joint::anchor::Family;
@@ -20,8 +20,8 @@ pub struct Law {
     /// What it makes of the depth, m and in sigmas.
     pub rms_m: f64,
     pub rms_sigma: f64,
-    /// Of one reference, m.
-    pub error_m: f64,
+    /// The same in errors of a reference.
+    pub rms_errors: f64,
     /// What settles its shape, each with its standard error.
     pub settled: Vec<(&'static str, [f64; 2])>,
     /// Nats.
@@ -54,9 +54,7 @@ struct References<'a> {
     checked: &'a [ReferencedView],
     /// How far each of the others moves each view by one of its unit, m.
     others: Vec<Vec<f64>>,
-    /// Variance of a reference, m^2, and its degrees of freedom.
-    variance: f64,
-    freedom: f64,
+    scatter: Scatter,
 }
 
 impl<'a> References<'a> {
@@ -67,8 +65,8 @@ impl<'a> References<'a> {
             let angles = c.slope[..angles].iter().map(|s| c.z * s);
             angles.chain(bent).chain(open.iter().map(|f| f.moves_m(c))).collect()
         };
-        let (variance, freedom) = scatter(checked);
-        References { checked, others: checked.iter().map(others).collect(), variance, freedom }
+        let scatter = Scatter::of(checked);
+        References { checked, others: checked.iter().map(others).collect(), scatter }
     }
 
     /// On the others, and on a law that moves the views so far.
@@ -79,7 +77,8 @@ impl<'a> References<'a> {
                 self.others[n].len() + usize::from(law.is_some()),
                 self.others[n].iter().copied().chain(law),
             );
-            Evidence { a: &g * g.transpose() / self.variance, b: g * (c.off / self.variance) }
+            let variance = self.scatter.variances[n];
+            Evidence { a: &g * g.transpose() / variance, b: g * (c.off / variance) }
         };
         self.checked.iter().enumerate().map(of).collect()
     }
@@ -110,7 +109,8 @@ impl<'a> References<'a> {
             ViewMean::of_scores(mine.map(|n| {
                 let others = gain.beta.iter().zip(&self.others[n]).map(|(size, o)| size * o);
                 let left = checked[n].off - others.sum::<f64>();
-                (moves[n] * moves[n] / self.variance, moves[n] * left / self.variance)
+                let variance = self.scatter.variances[n];
+                (moves[n] * moves[n] / variance, moves[n] * left / variance)
             }))
         };
         Some(Law {
@@ -122,12 +122,12 @@ impl<'a> References<'a> {
             })),
             rms_m: rms(&|n| beta * moves[n]),
             rms_sigma: rms(&|n| beta * moves[n] / checked[n].sigma_m),
-            error_m: self.variance.sqrt(),
+            rms_errors: rms(&|n| beta * moves[n] / self.scatter.variances[n].sqrt()),
             settled: Vec::new(),
             gain: gain.total,
             estimate: [beta, gain.covariance[(beside, beside)].sqrt()],
             null: Null::of(&views, beside, PRIOR)?,
-            freedom: self.freedom.max(1.0),
+            freedom: self.scatter.freedom.max(1.0),
             replicated: agree([half(false), half(true)]),
         })
     }
@@ -149,9 +149,10 @@ pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances) -> Vec<Law> {
         references.law("thermal-drift", Axis::SessionTime, warm)
     }));
     // The variance was measured with few degrees of freedom: a Student's t in place of a Gaussian.
-    let References { others, variance, freedom, .. } = &references;
-    let widened = variance * freedom / (freedom - 2.0).max(1.0);
-    if let Some(warm_up) = warm_up(checked, others, widened) {
+    let References { others, scatter: Scatter { variances, freedom }, .. } = &references;
+    let wider = freedom / (freedom - 2.0).max(1.0);
+    let widened: Vec<f64> = variances.iter().map(|v| v * wider).collect();
+    if let Some(warm_up) = warm_up(checked, others, &widened) {
         for law in laws.iter_mut().filter(|l| l.family == "thermal-drift") {
             law.estimate = warm_up.relative;
             law.settled = vec![("time_constant_s", warm_up.time_constant_s)];

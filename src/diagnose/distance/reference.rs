@@ -4,7 +4,6 @@
 use super::laws::{FEWEST, Law, Nuisances, laws};
 use super::referenced_view::referenced_views;
 use crate::diagnose::case::Case;
-use crate::diagnose::checks::heldout;
 use crate::diagnose::checks::overstated::SHARE;
 use crate::diagnose::diagnosis::{Alternative, CannotTell, Finding, Size, Status};
 use crate::diagnose::finding::naming::MIN_PROBABILITY;
@@ -56,8 +55,8 @@ pub fn findings(
     let nulls: Vec<&Null> = laws.iter().map(|l| &l.null).collect();
     let noise = NoiseGains::of(&nulls, Seed(seed.0 ^ 0x5eed));
     // So large a law may be missing in the model, too, where it was learnt from references.
-    let small = best.rms_m < (CLEAR_LAW_ERRORS * best.error_m * excess.sqrt()).max(LEAST_M);
-    if small || calibrated_gain(best) < noise.threshold(level) {
+    let clear = best.rms_errors > CLEAR_LAW_ERRORS * excess.sqrt() && best.rms_m > LEAST_M;
+    if !clear || calibrated_gain(best) < noise.threshold(level) {
         return Vec::new();
     }
     let [beta, error] = best.estimate;
@@ -161,10 +160,8 @@ impl Case<'_> {
         let of_laws = theirs.map(|l| l.excess(ours as f64));
         let excess = of_bias.unwrap_or(1.0).max(of_laws.unwrap_or(1.0));
         let found = |terms: &[Term], beside: &Nuisances| {
-            let levels = heldout::levels(&self.survey, terms);
-            let second = self.survey.second();
-            let mut laws =
-                laws(&referenced_views(&self.fields, &levels, &self.known, &second), beside);
+            let checked = referenced_views(&self.fields, &self.survey, terms, &self.known);
+            let mut laws = laws(&checked, beside);
             laws.retain(|l| can_happen(l.family, self.sensor().kind));
             let level = self.level(Self::LAWS_LEVEL);
             findings(&laws, &self.known, excess, level, self.options.seed)

@@ -1,10 +1,15 @@
 //! Views whose distance was measured by other means.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
+use crate::diagnose::checks::heldout;
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
+use crate::diagnose::views::layers::Survey;
+use crate::diagnose::views::surveyed_view::{SurveyedView, mean_data};
 use crate::solve::{Left, left_by_fit};
+use crate::terms::Term;
 
 /// One view with a reference.
 #[derive(Debug, Clone, Copy)]
@@ -14,6 +19,8 @@ pub struct ReferencedView {
     pub slope: [f64; 2],
     /// Measured minus reference, m.
     pub off: f64,
+    /// Standard error of what was measured, m: by the view's own noise, and growing with z^2.
+    pub own_m: f64,
     pub session_s: f64,
     /// Disparity in px times depth.
     pub px_m: f64,
@@ -21,40 +28,44 @@ pub struct ReferencedView {
     pub in_second_half: bool,
 }
 
-/// What the model knows of the laws is taken out. `levels` is what each view's disparity on the
-/// optical axis changes by once the found bias is taken out, px.
+/// Distances with what the model knows of the laws, and the terms of the `bias` that was found, taken
+/// out.
 pub fn referenced_views(
     fields: &[Field],
-    levels: &[f64],
+    survey: &Survey,
+    bias: &[Term],
     known: &KnownTerms,
-    second: &[bool],
 ) -> Vec<ReferencedView> {
     let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
-    fields
-        .iter()
-        .zip(levels)
-        .zip(second)
-        .filter_map(|((f, level), &in_second_half)| {
+    let levels = heldout::levels(survey, bias);
+    let views = fields.par_iter().zip(&survey.views).zip(levels);
+    views
+        .filter_map(|((f, view), level)| {
+            let reference_m = f.reference_distance_m?;
             // The plane had bent towards what is now known to be a bias.
             let z = f.scale_px_m / (f.scale_px_m * f.plane.q.z + level);
             let session_s = f.time_s - start;
-            let off = z - f.reference_distance_m? - known.law_m(z, session_s, f.scale_px_m);
-            let sigma_px = f64::from(f.middle_sigma_px()?);
-            let sigma_m = sigma_px * z * z / f.scale_px_m;
+            let m_a_px = z * z / f.scale_px_m;
             let steep = f.plane.theta().tan();
             let (sin, cos) = f.plane.azimuth().sin_cos();
-            let slope = [steep * cos, steep * sin];
             Some(ReferencedView {
                 z,
-                slope,
-                off,
+                slope: [steep * cos, steep * sin],
+                off: z - reference_m - known.law_m(z, session_s, f.scale_px_m),
+                own_m: level_error_px(view) * m_a_px,
                 session_s,
                 px_m: f.scale_px_m,
-                sigma_m,
-                in_second_half,
+                sigma_m: f64::from(f.middle_sigma_px()?) * m_a_px,
+                in_second_half: view.in_second_half,
             })
         })
         .collect()
+}
+
+/// Standard error of a view's disparity on the optical axis, beside its slopes.
+fn level_error_px(view: &SurveyedView) -> f64 {
+    let data = mean_data(view);
+    data.rows(&data.response).map_or(f64::INFINITY, |rows| rows.error_of_nuisance(0))
 }
 
 /// Targets tilted by less, as a slope, and fewer of them than this, do not tell where they were
@@ -69,23 +80,54 @@ pub fn is_tilted(checked: &[ReferencedView]) -> bool {
     checked.iter().filter(steep).count() >= FEWEST_TILTED && checked.len() >= 2 * FEWEST_TILTED
 }
 
-/// Variance of the references' own errors, m^2, and its degrees of freedom: what the laws together
-/// leave.
-pub fn scatter(checked: &[ReferencedView]) -> (f64, f64) {
-    let n = checked.len();
-    let span = checked.iter().map(|c| c.session_s).fold(0.0, f64::max).max(1.0);
-    let columns = if is_tilted(checked) { 6 } else { 4 };
-    let columns = DMatrix::from_fn(n, columns, |i, j| {
-        let c = &checked[i];
-        let [right, down] = c.slope;
-        [1.0, c.z, c.z * c.z, c.z * c.session_s / span, c.z * right, c.z * down][j]
-    });
-    let off = DVector::from_iterator(n, checked.iter().map(|c| c.off));
-    let all = Left { squares: off.norm_squared(), free: n as f64 };
-    let left = left_by_fit(&columns, &off).unwrap_or(all);
-    // A tape is read to half a millimetre at best.
-    ((left.squares / left.free.max(1.0)).max(0.0005 * 0.0005), left.free)
+/// A tape is read to half a millimetre at best.
+const TAPE_M: f64 = 0.0005;
+
+/// How far references may be off.
+pub struct Scatter {
+    /// Variance of each, m^2.
+    pub variances: Vec<f64>,
+    /// Degrees of freedom that it was measured with.
+    pub freedom: f64,
 }
+
+impl Scatter {
+    /// Of one reference by itself, m^2, beside the views' own errors: as large as it takes to explain
+    /// what the laws together leave (Paule and Mandel 1982).
+    pub fn of(checked: &[ReferencedView]) -> Self {
+        let n = checked.len();
+        let span = checked.iter().map(|c| c.session_s).fold(0.0, f64::max).max(1.0);
+        let columns = if is_tilted(checked) { 6 } else { 4 };
+        let columns = DMatrix::from_fn(n, columns, |i, j| {
+            let c = &checked[i];
+            let [right, down] = c.slope;
+            [1.0, c.z, c.z * c.z, c.z * c.session_s / span, c.z * right, c.z * down][j]
+        });
+        let off = DVector::from_iterator(n, checked.iter().map(|c| c.off));
+        let with = |tape: f64| checked.iter().map(|c| tape + c.own_m * c.own_m).collect::<Vec<_>>();
+        let left = |tape: f64| {
+            let roots = DVector::from_iterator(n, with(tape).iter().map(|v| v.sqrt().recip()));
+            let (mut columns, off) = (columns.clone(), off.component_mul(&roots));
+            columns.column_iter_mut().for_each(|mut c| c.component_mul_assign(&roots));
+            let all = Left { squares: off.norm_squared(), free: n as f64 };
+            let left = left_by_fit(&columns, &off).unwrap_or(all);
+            (left.squares / left.free.max(1.0), left.free)
+        };
+        // More of the tape's own explains more, and all of it no more than is left.
+        let mut low = TAPE_M * TAPE_M;
+        let mut high = low.max(2.0 * off.norm_squared());
+        if left(low).0 > 1.0 {
+            for _ in 0..HALVINGS {
+                let middle = (low * high).sqrt();
+                if left(middle).0 > 1.0 { low = middle } else { high = middle }
+            }
+        }
+        Scatter { variances: with(low), freedom: left(low).1 }
+    }
+}
+
+/// Of the logarithm: to a hundredth of a percent, whatever lies between.
+const HALVINGS: usize = 24;
 
 #[cfg(test)]
 impl ReferencedView {
@@ -95,6 +137,7 @@ impl ReferencedView {
             z,
             slope: [0.0; 2],
             off,
+            own_m: 0.0,
             session_s: 0.0,
             px_m,
             sigma_m: 0.002,

@@ -31,9 +31,13 @@ const TYPICAL_TAU_S: f64 = 900.0;
 /// Sensors drift by a per cent or two at most (the card's source: some mm at 1 to 2 m, in 20 min).
 const USUAL: f64 = 0.02;
 
-/// From references that are off by this `variance` each, m^2, with what of each is fitted `beside` the drift;
+/// From references that are off by these `variances`, m^2, with what of each is fitted `beside` the drift;
 /// `None` without a time.
-pub fn warm_up(checked: &[ReferencedView], beside: &[Vec<f64>], variance: f64) -> Option<WarmUp> {
+pub fn warm_up(
+    checked: &[ReferencedView],
+    beside: &[Vec<f64>],
+    variances: &[f64],
+) -> Option<WarmUp> {
     let session = checked.iter().map(|r| r.session_s).fold(0.0, f64::max);
     if session <= 0.0 {
         return None;
@@ -44,7 +48,7 @@ pub fn warm_up(checked: &[ReferencedView], beside: &[Vec<f64>], variance: f64) -
         .enumerate()
         .flat_map(|(course, of)| even(log, TAUS).map(move |log| (course, of, log.exp())))
         .filter_map(|(course, of, tau_s)| {
-            let (evidence, relative) = size(checked, beside, variance, &|t| of(t / tau_s))?;
+            let (evidence, relative) = size(checked, beside, variances, &|t| of(t / tau_s))?;
             let unlikely = 0.5 * (tau_s / TYPICAL_TAU_S).ln().powi(2);
             Some(Node { course, tau_s, evidence: evidence - unlikely, relative })
         })
@@ -73,17 +77,17 @@ struct Node {
 fn size(
     checked: &[ReferencedView],
     beside: &[Vec<f64>],
-    variance: f64,
+    variances: &[f64],
     course: &dyn Fn(f64) -> f64,
 ) -> Option<(f64, [f64; 2])> {
     let others = beside.first()?.len();
     let k = others + 1;
     let (mut a, mut b) = (DMatrix::zeros(k, k), DVector::zeros(k));
-    for (c, beside) in checked.iter().zip(beside) {
+    for ((c, beside), variance) in checked.iter().zip(beside).zip(variances) {
         let mut g = beside.clone();
         g.push(c.z * course(c.session_s));
         let g = DVector::from_vec(g);
-        a += &g * g.transpose() / variance;
+        a += &g * g.transpose() / *variance;
         b += g * (c.off / variance);
     }
     for j in 0..k {
@@ -128,8 +132,8 @@ mod tests {
                         ReferencedView { session_s: at_s, ..ReferencedView::ahead(z, off, PX_M) }
                     })
                     .collect();
-                let told =
-                    warm_up(&checked, &vec![Vec::new(); 16], ERROR_M * ERROR_M).expect("a drift");
+                let told = warm_up(&checked, &vec![Vec::new(); 16], &[ERROR_M * ERROR_M; 16])
+                    .expect("a drift");
                 let numbers = [(told.relative, relative), (told.time_constant_s, tau_s)];
                 for (k, ([said, error], truth)) in numbers.into_iter().enumerate() {
                     held[k] += usize::from((said - truth).abs() <= 1.645 * error);
@@ -143,7 +147,7 @@ mod tests {
     #[test]
     fn no_time_no_drift() {
         let still = [0.8, 1.5, 2.5].map(|z| ReferencedView::ahead(z, 0.001, PX_M));
-        assert!(warm_up(&still, &vec![Vec::new(); 3], ERROR_M * ERROR_M).is_none());
-        assert!(warm_up(&[], &[], ERROR_M * ERROR_M).is_none());
+        assert!(warm_up(&still, &vec![Vec::new(); 3], &[ERROR_M * ERROR_M; 3]).is_none());
+        assert!(warm_up(&[], &[], &[]).is_none());
     }
 }

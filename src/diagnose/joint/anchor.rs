@@ -37,11 +37,16 @@ impl Family {
 }
 
 /// Let the learnt biases of `added` leave the references where they were measured. `checked` is what
-/// the references say with these biases, and all laws, taken out; `variance` that of one, m^2.
-pub fn anchor(added: &mut [Effect], checked: &[ReferencedView], variance: f64, camera: &Camera) {
+/// the references say with these biases, and all laws, taken out; `variances` theirs, m^2.
+pub fn anchor(
+    added: &mut [Effect],
+    checked: &[ReferencedView],
+    variances: &[f64],
+    camera: &Camera,
+) {
     let families = families(added.iter().flat_map(|e| &e.shape), camera);
     for (Family { power, usual }, [shift, error]) in
-        families.iter().zip(constants(&families, checked, variance))
+        families.iter().zip(constants(&families, checked, variances))
     {
         let times = Modulation::still(*power);
         let of_power = |t: &Term| t.is_correctable() && t.basis.still_power() == Some(*power);
@@ -76,11 +81,11 @@ fn mean_square(term: &Term, pixels: &Pixels<'_>) -> f64 {
 }
 
 /// Each family's constant, in its usual size, with its standard error.
-fn constants(families: &[Family], checked: &[ReferencedView], variance: f64) -> Vec<[f64; 2]> {
+fn constants(families: &[Family], checked: &[ReferencedView], variances: &[f64]) -> Vec<[f64; 2]> {
     let n = families.len();
     let mut information = DMatrix::zeros(n + 2, n + 2);
     let mut score = DVector::zeros(n + 2);
-    for c in checked {
+    for (c, variance) in checked.iter().zip(variances) {
         // On a tilted target the axis meets it elsewhere by two small angles.
         let angles = c.slope.map(|slope| c.z * slope);
         let row =

@@ -50,7 +50,7 @@ fn references_tell_the_constant() {
         for seed in 0..40 {
             let mut added = [bowl(power)];
             let checked = references(12, power, 0.2, 0.002, seed);
-            anchor(&mut added, &checked, 0.002f64.powi(2), &camera);
+            anchor(&mut added, &checked, &vec![0.002f64.powi(2); checked.len()], &camera);
             let [shift, error] = shift_of(&added[0]);
             assert!((shift - 0.2).abs() < 0.08, "{power}: {shift}");
             inside += usize::from((shift - 0.2).abs() < 1.645 * error);
@@ -64,7 +64,7 @@ fn references_tell_the_constant() {
 fn a_constant_alone_is_nothing() {
     let camera = kinect_v1(4).camera;
     let mut added = [Effect::default()];
-    anchor(&mut added, &references(12, 0.0, 0.2, 0.002, 1), 4e-6, &camera);
+    anchor(&mut added, &references(12, 0.0, 0.2, 0.002, 1), &[4e-6; 12], &camera);
     assert!(added[0].shape.is_empty());
 }
 
@@ -73,7 +73,7 @@ fn a_constant_alone_is_nothing() {
 fn poor_references_move_little() {
     let camera = kinect_v1(4).camera;
     let mut added = [bowl(0.0)];
-    anchor(&mut added, &references(6, 0.0, 0.2, 0.0, 1), 1.0, &camera);
+    anchor(&mut added, &references(6, 0.0, 0.2, 0.0, 1), &[1.0; 6], &camera);
     let [shift, error] = shift_of(&added[0]);
     assert!(shift.abs() < 0.01, "{shift}");
     assert!(error > 0.1, "{error}");
