@@ -108,7 +108,7 @@ impl Case<'_> {
         );
         drop(scenes);
         let refitted = self.take_refit(&mut curves);
-        curves.retain(|f| self.is_news(f, &mean, &scatter));
+        curves.retain(|f| self.is_news(f, &mean, &scatter) && self.halves_allow(f));
         if self.baseline.is_none() {
             forget_noise_of_frames(&mut curves, &textures, &self.fields);
             fold_into_sigma(&mut curves);
@@ -127,7 +127,7 @@ impl Case<'_> {
         detectable_losses.retain(|d| can_happen(d.effect, self.sensor().kind));
         found.extend(findings);
         let laws = self.laws(&mean.terms, reference::bent_m(&found));
-        found.extend(laws);
+        found.extend(laws.into_iter().filter(|f| self.halves_allow(f)));
         forget_impossible(&mut found, self.sensor().kind);
         found.extend(of_few_views);
         tell_lines_once(&mut found);
