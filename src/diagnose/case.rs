@@ -106,8 +106,7 @@ impl<'a> Case<'a> {
         // Two surveys at once are a quarter of the memory of all.
         drop(self.survey);
         let (bench, baseline) = (&self.bench, self.baseline.as_ref());
-        let mut survey = survey(&fields, bench, baseline, self.options, learnt, model);
-        survey.skip_covariance();
+        let survey = survey(&fields, bench, baseline, self.options, learnt, model);
         Case {
             model,
             known,

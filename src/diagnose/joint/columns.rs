@@ -69,7 +69,7 @@ impl Columns {
         let fill = |i: usize, row: &mut [f64]| {
             self.fill_touched(&view.places[i], row);
         };
-        Some(rows.reduce_by_spans(self.terms + self.nodes, first, touched, fill))
+        Some(rows.reduce_by_blocks(self.terms + self.nodes, first, touched, fill))
     }
 
     /// What a view says beyond a fit, its plane profiled out: the score that is left. It is b - A beta of its
@@ -89,7 +89,7 @@ impl Columns {
             if first != touched.0 {
                 touched = (first, self.touched(first).collect());
             }
-            let columns = || touched.1.iter().zip(&row);
+            let columns = || touched.1.iter().zip(&row).filter(|(_, g)| **g != 0.0);
             let beyond = w * (y - columns().map(|(&k, g)| g * beta[k]).sum::<f64>());
             let weighted: Vec<f64> = nuisances.iter().map(|x| w * x).chain([beyond]).collect();
             for (&k, g) in columns() {

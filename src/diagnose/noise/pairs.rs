@@ -6,7 +6,7 @@
 //! neighbours. Each costs a pass over the image.
 
 use super::texture::without_outliers;
-use crate::diagnose::views::box_sums::box_sums;
+use crate::diagnose::views::box_sums::over_boxes;
 
 /// As far as neighbours are looked at, px.
 pub const REACH_PX: usize = 4;
@@ -109,14 +109,12 @@ fn along(line: impl Iterator<Item = f32>) -> Sum {
 
 /// Pairs within the reach of one another, by sums over boxes.
 fn neighbours(image: &[f32], width: usize) -> Sum {
-    let height = image.len() / width;
-    let sums = box_sums(image, width, height);
     let mut sum = Sum::default();
-    for (i, r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
-        let [products, pairs] = sums.around(i % width, i / width, REACH_PX);
-        sum.products += f64::from(*r) * (products - f64::from(*r));
+    over_boxes(image, width, REACH_PX, |i, products, pairs| {
+        let r = f64::from(image[i]);
+        sum.products += r * (products - r);
         sum.pairs += pairs - 1.0;
-    }
+    });
     sum
 }
 

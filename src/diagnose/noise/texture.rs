@@ -59,7 +59,7 @@ pub fn without_bias<'a>(residuals: &'a [f32], bias: &[f32]) -> Cow<'a, [f32]> {
 /// pixel to pixel.
 pub fn pixel_scale(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
     let image = without_outliers(&high_passed(field, residuals, bias));
-    high_pass(&image, field.width, field.height, PIXEL_BOX)
+    high_pass(&image, field.width, PIXEL_BOX)
 }
 
 /// Without gross errors.

@@ -48,7 +48,8 @@ pub fn together(view: &ViewData, terms: &[&Basis]) -> Option<Evidence> {
         let side = NEIGHBOURS * place.side.max(1.0);
         (place.v / side) as usize * ACROSS + (place.u / side) as usize
     };
-    Some(rows.reduce_by_blocks(count, block, |i, row| fill_all(terms, &view.places[i], row)))
+    let fill = |i: usize, row: &mut [f64]| fill_all(terms, &view.places[i], row);
+    Some(rows.reduce_by_blocks(count, block, |_| (0..count).collect(), fill))
 }
 
 /// The columns of several terms, one after the other.

@@ -126,42 +126,28 @@ impl<'a> Rows<'a> {
     }
 
     /// The same for many columns, of which samples near each other touch the same few: `block` is
-    /// the number of a sample's neighbourhood, and `columns` fills a whole row.
+    /// the number of a sample's neighbourhood, `touched` the columns that may not be zero in one, and
+    /// `columns` fills these alone.
     pub fn reduce_by_blocks(
-        &self,
-        count: usize,
-        block: impl Fn(usize) -> usize,
-        mut columns: impl FnMut(usize, &mut [f64]),
-    ) -> Evidence {
-        let mut rows = Vec::new();
-        self.sum_blocks(count, block, |_, members, few: &mut Vec<f64>| {
-            rows.resize(members.len() * count, 0.0);
-            for (&(_, i), row) in members.iter().zip(rows.chunks_exact_mut(count.max(1))) {
-                columns(i, row);
-            }
-            let touched = touched(&rows, count);
-            for row in rows.chunks_exact(count.max(1)) {
-                few.extend(touched.iter().map(|&j| row[j]));
-            }
-            touched
-        })
-    }
-
-    /// The same where a neighbourhood's columns are known beforehand: `columns` fills these alone.
-    pub fn reduce_by_spans(
         &self,
         count: usize,
         block: impl Fn(usize) -> usize,
         touched: impl Fn(usize) -> Vec<usize>,
         mut columns: impl FnMut(usize, &mut [f64]),
     ) -> Evidence {
+        let mut rows = Vec::new();
         self.sum_blocks(count, block, |block, members, few: &mut Vec<f64>| {
             let touched = touched(block);
-            few.resize(members.len() * touched.len(), 0.0);
-            for (&(_, i), row) in members.iter().zip(few.chunks_exact_mut(touched.len().max(1))) {
+            let width = touched.len().max(1);
+            rows.resize(members.len() * width, 0.0);
+            for (&(_, i), row) in members.iter().zip(rows.chunks_exact_mut(width)) {
                 columns(i, row);
             }
-            touched
+            let used = not_zero(&rows, touched.len());
+            for row in rows.chunks_exact(width) {
+                few.extend(used.iter().map(|&j| row[j]));
+            }
+            used.into_iter().map(|j| touched[j]).collect()
         })
     }
 
@@ -261,7 +247,7 @@ fn squares(samples: &[f64], weight: &[f64], n: usize) -> DMatrix<f64> {
 }
 
 /// The columns of a block of rows that are not zero everywhere.
-fn touched(rows: &[f64], count: usize) -> Vec<usize> {
+fn not_zero(rows: &[f64], count: usize) -> Vec<usize> {
     let mut sizes = vec![0.0; count];
     for row in rows.chunks_exact(count.max(1)) {
         sizes.iter_mut().zip(row).for_each(|(size, g)| *size += g.abs());

@@ -28,7 +28,8 @@ fn neighbourhoods_sum_to_what_single_samples_do() {
     let rows = Rows::new(&response, &weight, &beside, 2, &[0.5]).expect("a level");
     let plain = rows.reduce(NODES + 1, fill);
     for side in [1, 7, SAMPLES] {
-        let blocks = rows.reduce_by_blocks(NODES + 1, |i| i / side, fill);
+        let blocks =
+            rows.reduce_by_blocks(NODES + 1, |i| i / side, |_| (0..=NODES).collect(), fill);
         approx::assert_relative_eq!(blocks.a, plain.a, epsilon = 1e-9);
         approx::assert_relative_eq!(blocks.b, plain.b, epsilon = 1e-9);
     }

@@ -1,22 +1,89 @@
 //! Sums over boxes of an image, and what is left of it without their mean.
 
-use crate::stats::SummedArea;
-
 /// Side of the box whose mean is taken out, px: several windows, and less than a lens's bowl.
 pub const SMOOTH_PX: usize = 49;
 
-/// Sum and number of the finite pixels in any box.
-pub fn box_sums(image: &[f32], width: usize, height: usize) -> SummedArea<2> {
-    let pixel = |i: usize| Some(image[i]).filter(|r| r.is_finite()).map(|r| [f64::from(r), 1.0]);
-    SummedArea::of(width, height, pixel)
+/// Tells of every finite pixel the sum and the number of the finite pixels no farther than `reach` from it
+/// along either axis: running sums down the columns, and of these along the row.
+pub fn over_boxes(
+    image: &[f32],
+    width: usize,
+    reach: usize,
+    mut tell: impl FnMut(usize, f64, f64),
+) {
+    let rows: Vec<&[f32]> = image.chunks_exact(width.max(1)).collect();
+    let mut columns = vec![[0.0; 2]; width];
+    let change = |columns: &mut [[f64; 2]], row: &[f32], sign: f64| {
+        for ([sum, n], r) in columns.iter_mut().zip(row) {
+            let (value, there) = if r.is_finite() { (f64::from(*r), 1.0) } else { (0.0, 0.0) };
+            *sum += sign * value;
+            *n += sign * there;
+        }
+    };
+    for (v, row) in rows.iter().enumerate() {
+        let entering = if v == 0 { 0..reach + 1 } else { v + reach..v + reach + 1 };
+        entering.filter_map(|e| rows.get(e)).for_each(|e| change(&mut columns, e, 1.0));
+        if v > reach {
+            change(&mut columns, rows[v - reach - 1], -1.0);
+        }
+        let Some(first) = row.iter().position(|r| r.is_finite()) else { continue };
+        let mut whole = [0.0; 2];
+        let mut add = |[sum, n]: [f64; 2], sign: f64| {
+            whole = [whole[0] + sign * sum, whole[1] + sign * n];
+            whole
+        };
+        let start = first.saturating_sub(reach)..(first + reach).min(width);
+        columns[start].iter().for_each(|c| _ = add(*c, 1.0));
+        for (u, r) in row.iter().enumerate().skip(first) {
+            let mut whole = add(columns.get(u + reach).copied().unwrap_or_default(), 1.0);
+            if u > first && u > reach {
+                whole = add(columns[u - reach - 1], -1.0);
+            }
+            if r.is_finite() {
+                tell(v * width + u, whole[0], whole[1]);
+            }
+        }
+    }
 }
 
 /// Minus its mean over a box of `side` px, where at least a quarter of the box is there; NaN elsewhere.
-pub fn high_pass(image: &[f32], width: usize, height: usize, side: usize) -> Vec<f32> {
-    let sums = box_sums(image, width, height);
-    let minus_mean = |i: usize| {
-        let [sum, n] = sums.around(i % width, i / width, side / 2);
-        if 4.0 * n < (side * side) as f64 { f32::NAN } else { image[i] - (sum / n) as f32 }
-    };
-    (0..width * height).map(minus_mean).collect()
+pub fn high_pass(image: &[f32], width: usize, side: usize) -> Vec<f32> {
+    let mut left = vec![f32::NAN; image.len()];
+    over_boxes(image, width, side / 2, |i, sum, n| {
+        if 4.0 * n >= (side * side) as f64 {
+            left[i] = image[i] - (sum / n) as f32;
+        }
+    });
+    left
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stats::SummedArea;
+
+    /// Against a summed-area table, on an image with holes, empty rows and a wide empty rim.
+    #[test]
+    fn boxes_sum_what_lies_in_them() {
+        let (width, height) = (37, 29);
+        let image: Vec<f32> = (0..width * height)
+            .map(|i| {
+                let (u, v) = (i % width, i / width);
+                let hole = u < 4 || v < 3 || v % 11 == 7 || (3 * u + 5 * v) % 17 == 0;
+                if hole { f32::NAN } else { (1.7 * i as f32).sin() }
+            })
+            .collect();
+        let pixel =
+            |i: usize| Some(image[i]).filter(|r| r.is_finite()).map(|r| [f64::from(r), 1.0]);
+        let table = SummedArea::of(width, height, pixel);
+        for reach in [0, 1, 4, 12, 40] {
+            let mut told = 0;
+            over_boxes(&image, width, reach, |i, sum, n| {
+                let truth = table.around(i % width, i / width, reach);
+                assert!((sum - truth[0]).abs() < 1e-12 && n == truth[1], "{i} {reach}");
+                told += 1;
+            });
+            assert_eq!(told, image.iter().filter(|r| r.is_finite()).count());
+        }
+    }
 }

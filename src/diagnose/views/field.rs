@@ -185,7 +185,7 @@ impl Field {
 
     /// The same without what is smooth.
     pub fn high_passed(&self, values: &[f32]) -> Vec<f32> {
-        high_pass(&self.image(values), self.width, self.height, SMOOTH_PX)
+        high_pass(&self.image(values), self.width, SMOOTH_PX)
     }
 
     fn empty(view: &View, sensor: &Sensor, plane: Plane, pixels: Vec<u32>) -> Self {

@@ -114,18 +114,12 @@ impl Survey {
         self.views.par_iter().map(coarse).collect()
     }
 
-    /// The views at these places.
+    /// The views at these places. Nobody asks how sure a search of them is, nor whether halves agree.
     pub fn subset(&self, which: &[usize]) -> Survey {
-        let views: Vec<SurveyedView> = which.iter().map(|&n| self.views[n].clone()).collect();
+        let of = |n: &usize| SurveyedView { in_second_half: false, ..self.views[*n].clone() };
+        let views: Vec<SurveyedView> = which.iter().map(of).collect();
         let reach = Extent::of(views.iter().flat_map(|v| v.places.iter()));
-        let mut part = Survey { views, reach, between: self.between.clone(), ..*self };
-        part.skip_covariance();
-        part
-    }
-
-    /// Nobody asks how sure a search of these views is: whether halves agree, and the covariance.
-    pub fn skip_covariance(&mut self) {
-        self.views.iter_mut().for_each(|v| v.in_second_half = false);
+        Survey { views, reach, between: self.between.clone(), ..*self }
     }
 
     /// Measure anew what the views' means are worth, with what was found of the bias taken out, px
