@@ -25,6 +25,11 @@ impl Gauge {
         Some(Gauge { times, affine: affine_parts(basis, pixels, |place| place)? })
     }
 
+    /// Is the affine part a plane's own, at any distance?
+    pub fn is_plane(&self) -> bool {
+        self.times == Modulation::One
+    }
+
     /// Take the affine part out of the shape's columns.
     pub fn take_out(&self, p: &PixelContext, columns: &mut [f64]) {
         let far = self.times.value(p);

@@ -8,7 +8,8 @@ use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::surveyed_view::{SurveyedView, mean_data};
-use crate::solve::{Left, left_by_fit};
+use crate::solve::fit_by_svd;
+use crate::stats::paule_mandel;
 use crate::terms::Term;
 
 /// One view with a reference.
@@ -104,30 +105,30 @@ impl Scatter {
             [1.0, c.z, c.z * c.z, c.z * c.session_s / span, c.z * right, c.z * down][j]
         });
         let off = DVector::from_iterator(n, checked.iter().map(|c| c.off));
-        let with = |tape: f64| checked.iter().map(|c| tape + c.own_m * c.own_m).collect::<Vec<_>>();
-        let left = |tape: f64| {
-            let roots = DVector::from_iterator(n, with(tape).iter().map(|v| v.sqrt().recip()));
+        let with = |more: f64| {
+            let own = checked.iter().map(|c| TAPE_M * TAPE_M + c.own_m * c.own_m);
+            own.map(|v| v + more).collect::<Vec<f64>>()
+        };
+        // What is left in square over these variances, how that falls with them, and the numbers left.
+        let left = |more: f64| {
+            let weights = DVector::from_iterator(n, with(more).iter().map(|v| v.recip()));
+            let roots = weights.map(f64::sqrt);
             let (mut columns, off) = (columns.clone(), off.component_mul(&roots));
             columns.column_iter_mut().for_each(|mut c| c.component_mul_assign(&roots));
-            let all = Left { squares: off.norm_squared(), free: n as f64 };
-            let left = left_by_fit(&columns, &off).unwrap_or(all);
-            (left.squares / left.free.max(1.0), left.free)
+            let (left, rank) = match fit_by_svd(&columns, &off) {
+                Some((fit, rank)) => (off - columns * fit, rank),
+                None => (off, 0),
+            };
+            (left.norm_squared(), -weights.dot(&left.component_mul(&left)), (n - rank) as f64)
         };
-        // More of the tape's own explains more, and all of it no more than is left.
-        let mut low = TAPE_M * TAPE_M;
-        let mut high = low.max(2.0 * off.norm_squared());
-        if left(low).0 > 1.0 {
-            for _ in 0..HALVINGS {
-                let middle = (low * high).sqrt();
-                if left(middle).0 > 1.0 { low = middle } else { high = middle }
-            }
-        }
-        Scatter { variances: with(low), freedom: left(low).1 }
+        let freedom = left(0.0).2;
+        let more = paule_mandel(freedom.max(1.0), |more| {
+            let (squares, slope, _) = left(more);
+            (squares, slope)
+        });
+        Scatter { variances: with(more), freedom }
     }
 }
-
-/// Of the logarithm: to a hundredth of a percent, whatever lies between.
-const HALVINGS: usize = 24;
 
 #[cfg(test)]
 impl ReferencedView {

@@ -116,10 +116,11 @@ impl Columns {
         (0..self.terms).chain(nodes.clone()).chain(nodes.map(move |node| node + half))
     }
 
-    /// The values of these columns at a place, and the first node.
+    /// The values of these columns at a place, and the first node. With a plane of the view's own beside them it
+    /// is the same whether a part that is a plane is taken out, and without they are zero in most places.
     fn fill_touched(&self, place: &PixelContext, row: &mut [f64]) -> usize {
         let (terms, nodes) = row.split_at_mut(self.terms);
-        self.fill_terms(place, terms);
+        self.fill_terms(place, terms, |gauge| !gauge.is_plane());
         let mut begins = 0;
         for (map, nodes) in self.maps.iter().zip(nodes.chunks_exact_mut(SPLINES)) {
             if let Some((first, values)) = map.spline_at(place) {
@@ -130,12 +131,18 @@ impl Columns {
         begins
     }
 
-    fn fill_terms(&self, place: &PixelContext, row: &mut [f64]) {
+    /// `taken_out` says of which the affine part is.
+    fn fill_terms(
+        &self,
+        place: &PixelContext,
+        row: &mut [f64],
+        taken_out: impl Fn(&Gauge) -> bool,
+    ) {
         let mut rest = row;
         for (basis, gauge) in self.bases.iter().zip(&self.gauges) {
             let (mine, others) = rest.split_at_mut(basis.count());
             basis.fill(place, mine);
-            if let Some(gauge) = gauge {
+            if let Some(gauge) = gauge.as_ref().filter(|gauge| taken_out(gauge)) {
                 gauge.take_out(place, mine);
             }
             rest = others;
@@ -144,7 +151,7 @@ impl Columns {
 
     pub fn fill(&self, place: &PixelContext, row: &mut [f64]) {
         let (terms, nodes) = row.split_at_mut(self.terms);
-        self.fill_terms(place, terms);
+        self.fill_terms(place, terms, |_| true);
         let (first, second) = nodes.split_at_mut(self.nodes / 2);
         self.maps[0].fill(place, first);
         self.maps[1].fill(place, second);

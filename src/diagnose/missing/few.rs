@@ -16,6 +16,7 @@ use super::search::{Judged, MIN_EXCESS_OF_LOSSES, predicted};
 use super::shapes::{Shape, Step, begun};
 use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::rng::Seed;
+use crate::stats::{between, paule_mandel};
 use crate::terms::Extent;
 
 /// Added to a count whose logarithm is taken (Anscombe 1948 has 3/8).
@@ -160,19 +161,9 @@ fn usual_rate(views: &[View], lost: &[Lost]) -> f64 {
 /// where the squares that are `left`, over what is expected of them, come to one a view (Paule and
 /// Mandel 1982).
 fn scatter(left: &[f64], lost: &[f64]) -> f64 {
-    let excess = |scatter: f64| {
-        let each = left.iter().zip(lost).map(|(square, lost)| square / variance(*lost, scatter));
-        each.sum::<f64>() - lost.len() as f64
-    };
-    let [mut low, mut high] = [0.0, left.iter().sum()];
-    if excess(low) <= 0.0 {
-        return low;
-    }
-    for _ in 0..40 {
-        let middle = 0.5 * (low + high);
-        if excess(middle) > 0.0 { low = middle } else { high = middle }
-    }
-    high
+    let each = left.iter().zip(lost).map(|(square, lost)| (*square, variance(*lost, 0.0)));
+    let each: Vec<(f64, f64)> = each.collect();
+    paule_mandel(each.len() as f64, |scatter| between(&each, scatter))
 }
 
 fn variance(lost: f64, scatter: f64) -> f64 {
