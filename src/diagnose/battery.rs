@@ -27,7 +27,7 @@ use super::search::few_views::few_views;
 use super::search::outcome::Outcome;
 use super::search::variance;
 use super::steps::{COARSE_SIGMAS, own_step, own_step_note, steps};
-use super::verdict::{is_negligible, merge, symptoms};
+use super::verdict::{merge, symptoms};
 use super::views::field::Field;
 use crate::sensors::SensorKind;
 use crate::stats::mean;
@@ -99,16 +99,16 @@ impl Case<'_> {
         let steps = steps(lattice, &self.known, &self.fields, self.recording, sigma_mm, &second);
         let own_step = own_step(lattice, self.recording, self.fields[0].scale_px_m);
         self.remarks.extend(own_step.map(own_step_note));
+        let stepped = lattice.is_some();
         let outcomes = [&mean.outcome, &scatter.outcome];
         let scenes = self.scenes();
         let ((lost, of_few_views), (mut curves, textures)) = rayon::join(
-            || (self.lost(), self.few_views(&scenes, outcomes, &scatter, lattice.is_some())),
+            || (self.lost(), self.few_views(&scenes, outcomes, &scatter, stepped)),
             || (curves(&scenes, outcomes), self.texture(&mean, &scatter, steps)),
         );
         drop(scenes);
         let refitted = self.take_refit(&mut curves);
         curves.retain(|f| self.is_news(f, &mean, &scatter) && self.halves_allow(f));
-        curves.retain(|f| !is_negligible(f));
         if self.baseline.is_none() {
             forget_noise_of_frames(&mut curves, &textures, &self.fields);
             fold_into_sigma(&mut curves);
@@ -121,8 +121,7 @@ impl Case<'_> {
         let of_size = |f: &Finding| f.statistic == Statistic::Variance;
         let told = self.baseline.is_some() && found.iter().any(of_size);
         // Of two recordings what the search of the size tells is not told of its parts again.
-        let told_again = |f: &Finding| told && of_size(f) && f.effect.is_none();
-        found.extend(textures.into_iter().filter(|f| !told_again(f) && !is_negligible(f)));
+        found.extend(textures.into_iter().filter(|f| !(told && of_size(f) && f.effect.is_none())));
         let DropoutOutcome { findings, detectable: mut detectable_losses, ends, notes } = lost;
         self.remarks.extend(notes);
         detectable_losses.retain(|d| can_happen(d.effect, self.sensor().kind));

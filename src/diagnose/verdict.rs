@@ -20,17 +20,6 @@ pub(super) fn not_identifiable(what: &CannotTell) -> Finding {
     }
 }
 
-/// Too small to be of use, however sure it is: a bias of less than a thousandth of the noise, which the
-/// mean of a million frames would not show at a pixel; and a window that joins less than a twentieth of
-/// the next pixel.
-pub(super) fn is_negligible(f: &Finding) -> bool {
-    const BIAS_SIGMA: f64 = 1e-3;
-    const WINDOW_PX: f64 = 1.05;
-    // What moves its target as a whole has no size over the picture.
-    let of_bias = f.statistic == Statistic::Bias && f.size.sigma > 0.0;
-    of_bias && f.size.sigma < BIAS_SIGMA || f.value("length_px").is_some_and(|px| px < WINDOW_PX)
-}
-
 /// A name is told once, by its strongest finding.
 pub(super) fn merge(found: &mut Vec<Finding>) {
     found.sort_by(|a, b| b.share.total_cmp(&a.share));
@@ -169,26 +158,4 @@ pub(super) fn extend<'a>(
         }
     }
     extended
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::diagnose::diagnosis::Size;
-    use crate::diagnose::finding::parameters::one;
-
-    #[test]
-    fn what_nothing_could_show_is_negligible() {
-        let bias = |sigma| Finding {
-            size: Size { mm: 0.1, sigma },
-            ..named("column-banding", Statistic::Bias, Axis::Column)
-        };
-        let window = |px| Finding {
-            parameters: one("length_px", px, 0.001),
-            ..named("spatial-correlation", Statistic::Correlation, Axis::PixelLag)
-        };
-        assert!(is_negligible(&bias(0.0009)) && is_negligible(&window(1.008)));
-        assert!(!is_negligible(&bias(0.002)) && !is_negligible(&window(1.3)));
-        assert!(!is_negligible(&bias(0.0)), "a target that moves has no size");
-    }
 }
