@@ -11,7 +11,7 @@ use super::echoes::{echoes, fold_into_sigma, forget_noise_of_frames};
 use super::edges::mixing::mixing;
 use super::finding::findings;
 use super::finding::form::better_form;
-use super::finding::naming::{doubt_beside_the_unexplained, resembles_only, temper, unname};
+use super::finding::naming::{doubt_beside_the_unexplained, resembles_only, temper};
 use super::finding::other_findings;
 use super::finding::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::finding::scene::Scene;
@@ -27,9 +27,8 @@ use super::search::few_views::few_views;
 use super::search::outcome::Outcome;
 use super::search::variance;
 use super::steps::{COARSE_SIGMAS, own_step, own_step_note, steps};
-use super::verdict::{merge, symptoms};
+use super::verdict::{forget_impossible, merge, symptoms};
 use super::views::field::Field;
-use crate::sensors::SensorKind;
 use crate::stats::mean;
 use crate::terms::{Axis, Statistic, corner_radius};
 
@@ -67,16 +66,6 @@ fn curves(scenes: &[Scene<'_>; 2], outcomes: [&Outcome; 2]) -> Vec<Finding> {
     layers.flat_map(|(scene, outcome)| findings::findings(scene, outcome)).collect()
 }
 
-/// What cannot happen to a camera of this kind is no name for a finding, and no alternative.
-fn forget_impossible(found: &mut [Finding], kind: Option<SensorKind>) {
-    for f in found {
-        f.alternatives.retain(|a| can_happen(a.effect, kind));
-        if f.effect.is_some_and(|id| !can_happen(id, kind)) {
-            unname(f);
-        }
-    }
-}
-
 impl Case<'_> {
     pub fn scenes(&self) -> [Scene<'_>; 2] {
         let (survey, scale_px_m) = (&self.survey, self.fields[0].scale_px_m);
@@ -108,7 +97,15 @@ impl Case<'_> {
         );
         drop(scenes);
         let refitted = self.take_refit(&mut curves);
-        curves.retain(|f| self.is_news(f, &mean, &scatter) && self.halves_allow(f));
+        curves.retain(|f| self.is_news(f, &mean, &scatter));
+        let mut bias = mean.terms.clone();
+        curves.retain(|f| {
+            let of_mean = f.statistic == Statistic::Bias;
+            let share = if of_mean { Self::MEAN_LEVEL } else { Self::VARIANCE_LEVEL };
+            let told = self.halves_allow(f, share);
+            bias.retain(|t| told || !f.terms.contains(t));
+            told
+        });
         if self.baseline.is_none() {
             forget_noise_of_frames(&mut curves, &textures, &self.fields);
             fold_into_sigma(&mut curves);
@@ -126,8 +123,8 @@ impl Case<'_> {
         self.remarks.extend(notes);
         detectable_losses.retain(|d| can_happen(d.effect, self.sensor().kind));
         found.extend(findings);
-        let laws = self.laws(&mean.terms, reference::bent_m(&found));
-        found.extend(laws.into_iter().filter(|f| self.halves_allow(f)));
+        let laws = self.laws(&bias, reference::bent_m(&found)).into_iter();
+        found.extend(laws.filter(|f| self.halves_allow(f, Self::LAWS_LEVEL)));
         forget_impossible(&mut found, self.sensor().kind);
         found.extend(of_few_views);
         tell_lines_once(&mut found);

@@ -3,11 +3,14 @@
 use std::collections::BTreeSet;
 
 use super::diagnosis::{CannotTell, Finding, Status, Verdict};
+use super::distance::reference::can_happen;
+use super::finding::naming::unname;
 use super::finding::other_findings::named;
 use super::search::outcome::Outcome;
 use super::views::tiles::SIDE;
 use crate::effects;
 use crate::model::{Covariance, Effect, NoiseModel, UNEXPLAINED};
+use crate::sensors::SensorKind;
 use crate::terms::{Axis, Statistic};
 use crate::view::{RecordingFile, Sensor};
 
@@ -17,6 +20,16 @@ pub(super) fn not_identifiable(what: &CannotTell) -> Finding {
         alternatives: Vec::new(),
         physics: what.why.clone(),
         ..named(what.effect, Statistic::Bias, Axis::Z)
+    }
+}
+
+/// What cannot happen to a camera of this kind is no name for a finding, and no alternative.
+pub(super) fn forget_impossible(found: &mut [Finding], kind: Option<SensorKind>) {
+    for f in found {
+        f.alternatives.retain(|a| can_happen(a.effect, kind));
+        if f.effect.is_some_and(|id| !can_happen(id, kind)) {
+            unname(f);
+        }
     }
 }
 

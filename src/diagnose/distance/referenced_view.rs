@@ -1,6 +1,6 @@
 //! Views whose distance was measured by other means.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use crate::diagnose::checks::heldout;
@@ -20,7 +20,7 @@ pub struct ReferencedView {
     pub slope: [f64; 2],
     /// Measured minus reference, m.
     pub off: f64,
-    /// Standard error of what was measured, m: by the view's own noise, and growing with z^2.
+    /// Standard error of what was measured, m, by the view's own noise: grows with z^2.
     pub own_m: f64,
     pub session_s: f64,
     /// Disparity in px times depth.
@@ -49,24 +49,30 @@ pub fn referenced_views(
             let m_a_px = z * z / f.scale_px_m;
             let steep = f.plane.theta().tan();
             let (sin, cos) = f.plane.azimuth().sin_cos();
+            let sigma_px = f64::from(f.middle_sigma_px()?);
+            let white_px = sigma_px / (f.pixels.len().max(1) as f64).sqrt();
             Some(ReferencedView {
                 z,
                 slope: [steep * cos, steep * sin],
                 off: z - reference_m - known.law_m(z, session_s, f.scale_px_m),
-                own_m: level_error_px(view) * m_a_px,
+                own_m: level_error_px(view).unwrap_or(white_px) * m_a_px,
                 session_s,
                 px_m: f.scale_px_m,
-                sigma_m: f64::from(f.middle_sigma_px()?) * m_a_px,
+                sigma_m: sigma_px * m_a_px,
                 in_second_half: view.in_second_half,
             })
         })
         .collect()
 }
 
-/// Standard error of a view's disparity on the optical axis, beside its slopes.
-fn level_error_px(view: &SurveyedView) -> f64 {
+/// Standard error of the disparity of a view's plane on the optical axis; `None` where the target is too
+/// small to measure its noise on.
+fn level_error_px(view: &SurveyedView) -> Option<f64> {
     let data = mean_data(view);
-    data.rows(&data.response).map_or(f64::INFINITY, |rows| rows.error_of_nuisance(0))
+    let rays = data.places.iter().map(|p| Vector3::new(1.0, p.x, p.y));
+    let information: Matrix3<f64> =
+        rays.zip(&data.weight).map(|(ray, w)| *w * ray * ray.transpose()).sum();
+    Some(information.try_inverse()?[(0, 0)].sqrt()).filter(|error| error.is_finite())
 }
 
 /// Targets tilted by less, as a slope, and fewer of them than this, do not tell where they were
@@ -144,5 +150,42 @@ impl ReferencedView {
             sigma_m: 0.002,
             in_second_half: false,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::views::tiles::Tile;
+    use crate::terms::PixelContext;
+
+    /// White noise of .1 px on tiles that lie evenly about the axis: of the mean of all readings.
+    #[test]
+    fn the_level_of_a_view_is_as_sure_as_the_mean_of_its_readings() {
+        const ACROSS: i32 = 20;
+        let at = |k: i32| f64::from(2 * (k % ACROSS) + 1 - ACROSS);
+        let tile = Tile {
+            mean: 0.0,
+            square: 0.01,
+            rough_square: 0.01,
+            temporal: 0.01,
+            repeated: 1.0,
+            variance: 0.01,
+            pixels: 16.0,
+            missing: 0.0,
+            asked: 16.0,
+        };
+        let patches = (0..ACROSS * ACROSS).map(|k| {
+            let (x, y) = (0.01 * at(k), 0.01 * at(k / ACROSS));
+            (
+                PixelContext { x, y, disparity: 20.0, variance: 0.01, ..Default::default() },
+                tile.clone(),
+            )
+        });
+        let view = SurveyedView::white(patches, 1.0);
+        let error = level_error_px(&view).expect("readings");
+        approx::assert_relative_eq!(error, 0.1 / f64::sqrt(400.0 * 16.0), max_relative = 1e-9);
+        let unmeasured = SurveyedView { inflation: f64::INFINITY, ..view };
+        assert_eq!(level_error_px(&unmeasured), None);
     }
 }

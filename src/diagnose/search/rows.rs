@@ -77,11 +77,6 @@ impl<'a> Rows<'a> {
         (&self.inverse * seen).dot(&seen)
     }
 
-    /// Standard error of a nuisance's coefficient, all others of the nuisances open.
-    pub fn error_of_nuisance(&self, k: usize) -> f64 {
-        self.inverse[(k, k)].sqrt()
-    }
-
     /// Sample number `i`: what is beside, and the response.
     fn sample(&self, i: usize) -> &[f64] {
         let n = self.width + 1;

@@ -126,7 +126,8 @@ fn small_percent(share: f64) -> String {
 }
 
 pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
-    let h = diagnosis.heldout.as_ref()?;
+    // Without a finding there is nothing to gain by.
+    let h = diagnosis.heldout.as_ref().filter(|_| diagnosis.verdict != Verdict::Match)?;
     let gain = |v: f64| fixed(v, usize::from(h.gain.abs() < 10.0));
     let mut gained = vec![format!(
         "{} nats a view are gained [{}, {}]",
