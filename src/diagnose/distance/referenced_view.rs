@@ -177,10 +177,7 @@ mod tests {
         };
         let patches = (0..ACROSS * ACROSS).map(|k| {
             let (x, y) = (0.01 * at(k), 0.01 * at(k / ACROSS));
-            (
-                PixelContext { x, y, disparity: 20.0, variance: 0.01, ..Default::default() },
-                tile.clone(),
-            )
+            (PixelContext { x, y, disparity: 20.0, variance: 0.01, ..Default::default() }, tile)
         });
         let view = SurveyedView::white(patches, 1.0);
         let error = level_error_px(&view).expect("readings");
