@@ -98,6 +98,7 @@ impl Case<'_> {
         drop(scenes);
         let refitted = self.take_refit(&mut curves);
         curves.retain(|f| self.is_news(f, &mean, &scatter));
+        // Laws are fitted beside what is told.
         let mut bias = mean.terms.clone();
         curves.retain(|f| {
             let of_mean = f.statistic == Statistic::Bias;

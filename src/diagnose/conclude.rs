@@ -178,7 +178,7 @@ impl Case<'_> {
                 effect.between_views = shares.by_ref().take(effect.shape.len()).collect();
             }
         }
-        let references = self.fields.iter().filter(|f| f.reference_distance_m.is_some()).count();
+        let references = reference::references(&self.fields);
         let before = self.model.fit.searched.unwrap_or_default();
         extended.fit.searched = Some(Searched {
             views: before.views.max(self.fields.len()),

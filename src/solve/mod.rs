@@ -177,14 +177,22 @@ pub fn left_by_fit(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<Left> {
     Some(Left { squares: (y - x * beta).norm_squared(), free: (y.len() - rank) as f64 })
 }
 
-/// The plane 1, x, y through values of some weight, as they come: its three coefficients.
-pub fn plane_through(points: impl Iterator<Item = ([f64; 2], f64, f64)>) -> Option<Vector3<f64>> {
+/// Normal equations of the plane 1, x, y through values of some weight, as they come.
+pub fn plane_equations(
+    points: impl Iterator<Item = ([f64; 2], f64, f64)>,
+) -> (Matrix3<f64>, Vector3<f64>) {
     let (mut a, mut b) = (Matrix3::zeros(), Vector3::zeros());
     for ([x, y], value, weight) in points.filter(|p| p.1.is_finite()) {
         let row = Vector3::new(1.0, x, y);
         a += weight * row * row.transpose();
         b += weight * value * row;
     }
+    (a, b)
+}
+
+/// Its three coefficients.
+pub fn plane_through(points: impl Iterator<Item = ([f64; 2], f64, f64)>) -> Option<Vector3<f64>> {
+    let (a, b) = plane_equations(points);
     a.lu().solve(&b)
 }
 

@@ -146,6 +146,10 @@ pub fn can_happen(id: &str, kind: Option<SensorKind>) -> bool {
 impl Case<'_> {
     /// Laws of the distance, by reference distances.
     pub(in crate::diagnose) fn laws(&self, bias: &[Term], bent_m: f64) -> Vec<Finding> {
+        let ours = references(&self.fields);
+        if ours < FEWEST {
+            return Vec::new();
+        }
         // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
         let anchored: Vec<Term> =
             bias.iter().filter(|t| t.basis.is_nothing_ahead()).cloned().collect();
@@ -156,7 +160,6 @@ impl Case<'_> {
         // The levels are off with the model's bias; and its own references, if any, left a law open.
         let of_bias = self.learnt_from[0].map(|l| Learnt { searched: false, ..l }.excess(views));
         let theirs = Learnt::references(self.model).filter(|_| self.learnt_from[1].is_some());
-        let ours = self.fields.iter().filter(|f| f.reference_distance_m.is_some()).count();
         let of_laws = theirs.map(|l| l.excess(ours as f64));
         let excess = of_bias.unwrap_or(1.0).max(of_laws.unwrap_or(1.0));
         let found = |terms: &[Term], beside: &Nuisances| {
@@ -193,9 +196,14 @@ impl Case<'_> {
     }
 }
 
+/// How many views have one.
+pub fn references(fields: &[Field]) -> usize {
+    fields.iter().filter(|f| f.reference_distance_m.is_some()).count()
+}
+
 /// What planes alone never tell.
 pub fn cannot_tell(fields: &[Field], kind: Option<SensorKind>) -> Vec<CannotTell> {
-    if fields.iter().filter(|f| f.reference_distance_m.is_some()).count() >= FEWEST {
+    if references(fields) >= FEWEST {
         return Vec::new();
     }
     let why = |what: &str| {

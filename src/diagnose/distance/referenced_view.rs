@@ -1,14 +1,14 @@
 //! Views whose distance was measured by other means.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::diagnose::checks::heldout;
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::layers::Survey;
-use crate::diagnose::views::surveyed_view::{SurveyedView, mean_data};
-use crate::solve::fit_by_svd;
+use crate::diagnose::views::surveyed_view::SurveyedView;
+use crate::solve::{fit_by_svd, plane_equations};
 use crate::stats::paule_mandel;
 use crate::terms::Term;
 
@@ -68,10 +68,8 @@ pub fn referenced_views(
 /// Standard error of the disparity of a view's plane on the optical axis; `None` where the target is too
 /// small to measure its noise on.
 fn level_error_px(view: &SurveyedView) -> Option<f64> {
-    let data = mean_data(view);
-    let rays = data.places.iter().map(|p| Vector3::new(1.0, p.x, p.y));
-    let information: Matrix3<f64> =
-        rays.zip(&data.weight).map(|(ray, w)| *w * ray * ray.transpose()).sum();
+    let points = view.patches().map(|(p, t)| ([p.x, p.y], t.mean, view.weight(t)));
+    let (information, _) = plane_equations(points);
     Some(information.try_inverse()?[(0, 0)].sqrt()).filter(|error| error.is_finite())
 }
 
@@ -113,7 +111,7 @@ impl Scatter {
         let off = DVector::from_iterator(n, checked.iter().map(|c| c.off));
         let with = |more: f64| {
             let own = checked.iter().map(|c| TAPE_M * TAPE_M + c.own_m * c.own_m);
-            own.map(|v| v + more).collect::<Vec<f64>>()
+            own.map(|own| own + more).collect::<Vec<f64>>()
         };
         // What is left in square over these variances, how that falls with them, and the numbers left.
         let left = |more: f64| {

@@ -50,7 +50,7 @@ fn references_tell_the_constant() {
         for seed in 0..40 {
             let mut added = [bowl(power)];
             let checked = references(12, power, 0.2, 0.002, seed);
-            anchor(&mut added, &checked, &vec![0.002f64.powi(2); checked.len()], &camera);
+            anchor(&mut added, &checked, &[4e-6; 12], &camera);
             let [shift, error] = shift_of(&added[0]);
             assert!((shift - 0.2).abs() < 0.08, "{power}: {shift}");
             inside += usize::from((shift - 0.2).abs() < 1.645 * error);

@@ -116,8 +116,8 @@ impl Columns {
         (0..self.terms).chain(nodes.clone()).chain(nodes.map(move |node| node + half))
     }
 
-    /// The values of these columns at a place, and the first node. With a plane of the view's own beside them it
-    /// is the same whether a part that is a plane is taken out, and without they are zero in most places.
+    /// The values of these columns at a place, and the first node. A column's part that is a plane stays in: the
+    /// view's own takes it up, and without it most columns of a map are zero.
     fn fill_touched(&self, place: &PixelContext, row: &mut [f64]) -> usize {
         let (terms, nodes) = row.split_at_mut(self.terms);
         self.fill_terms(place, terms, |gauge| !gauge.is_plane());

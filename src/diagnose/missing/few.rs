@@ -161,8 +161,9 @@ fn usual_rate(views: &[View], lost: &[Lost]) -> f64 {
 /// where the squares that are `left`, over what is expected of them, come to one a view (Paule and
 /// Mandel 1982).
 fn scatter(left: &[f64], lost: &[f64]) -> f64 {
-    let each = left.iter().zip(lost).map(|(square, lost)| (*square, variance(*lost, 0.0)));
-    let each: Vec<(f64, f64)> = each.collect();
+    let views = left.iter().zip(lost);
+    let each: Vec<(f64, f64)> =
+        views.map(|(square, lost)| (*square, variance(*lost, 0.0))).collect();
     paule_mandel(each.len() as f64, |scatter| between(&each, scatter))
 }
 

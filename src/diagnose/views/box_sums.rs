@@ -11,15 +11,18 @@ pub fn over_boxes(
     reach: usize,
     mut tell: impl FnMut(usize, f64, f64),
 ) {
-    let rows: Vec<&[f32]> = image.chunks_exact(width.max(1)).collect();
-    let mut columns = vec![[0.0; 2]; width];
+    let add = |to: &mut [f64; 2], [sum, n]: [f64; 2], sign: f64| {
+        to[0] += sign * sum;
+        to[1] += sign * n;
+    };
     let change = |columns: &mut [[f64; 2]], row: &[f32], sign: f64| {
-        for ([sum, n], r) in columns.iter_mut().zip(row) {
-            let (value, there) = if r.is_finite() { (f64::from(*r), 1.0) } else { (0.0, 0.0) };
-            *sum += sign * value;
-            *n += sign * there;
+        for (column, r) in columns.iter_mut().zip(row) {
+            let pixel = if r.is_finite() { [f64::from(*r), 1.0] } else { [0.0; 2] };
+            add(column, pixel, sign);
         }
     };
+    let rows: Vec<&[f32]> = image.chunks_exact(width.max(1)).collect();
+    let mut columns = vec![[0.0; 2]; width];
     for (v, row) in rows.iter().enumerate() {
         let entering = if v == 0 { 0..reach + 1 } else { v + reach..v + reach + 1 };
         entering.filter_map(|e| rows.get(e)).for_each(|e| change(&mut columns, e, 1.0));
@@ -28,16 +31,15 @@ pub fn over_boxes(
         }
         let Some(first) = row.iter().position(|r| r.is_finite()) else { continue };
         let mut whole = [0.0; 2];
-        let mut add = |[sum, n]: [f64; 2], sign: f64| {
-            whole = [whole[0] + sign * sum, whole[1] + sign * n];
-            whole
-        };
-        let start = first.saturating_sub(reach)..(first + reach).min(width);
-        columns[start].iter().for_each(|c| _ = add(*c, 1.0));
+        for column in &columns[first.saturating_sub(reach)..(first + reach).min(width)] {
+            add(&mut whole, *column, 1.0);
+        }
         for (u, r) in row.iter().enumerate().skip(first) {
-            let mut whole = add(columns.get(u + reach).copied().unwrap_or_default(), 1.0);
+            if let Some(column) = columns.get(u + reach) {
+                add(&mut whole, *column, 1.0);
+            }
             if u > first && u > reach {
-                whole = add(columns[u - reach - 1], -1.0);
+                add(&mut whole, columns[u - reach - 1], -1.0);
             }
             if r.is_finite() {
                 tell(v * width + u, whole[0], whole[1]);

@@ -83,7 +83,7 @@ pub fn mean_data(view: &SurveyedView) -> ViewData {
     ViewData {
         places: Arc::clone(&view.places),
         response: tiles.iter().map(|t| finite(t.mean)).collect(),
-        weight: tiles.iter().map(|t| finite(t.pixels / t.variance / view.inflation)).collect(),
+        weight: tiles.iter().map(|t| view.weight(t)).collect(),
         nuisance: view.places.iter().flat_map(mean_nuisance).collect(),
         precision: MEAN_PRECISION.to_vec(),
         gathered: Vec::new(),
@@ -91,6 +91,11 @@ pub fn mean_data(view: &SurveyedView) -> ViewData {
 }
 
 impl SurveyedView {
+    /// Inverse variance of a tile's mean, 1/px^2.
+    pub fn weight(&self, tile: &Tile) -> f64 {
+        finite(tile.pixels / tile.variance / self.inflation)
+    }
+
     /// Each tile with its place.
     pub fn patches(&self) -> impl Iterator<Item = (&PixelContext, &Tile)> {
         self.places.iter().zip(self.tiles.iter())
