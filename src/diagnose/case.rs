@@ -141,21 +141,28 @@ impl<'a> Case<'a> {
 
     pub fn mean(&mut self) -> MeanResult {
         self.at("searching the mean error", "testing the mean again");
-        let first = self.search_mean();
+        let (camera, level) = (&self.sensor().camera, self.level(Self::MEAN_LEVEL));
+        let seed = self.options.seed;
+        let mut found = self.survey.search_bias(camera, level, seed);
         // What is steep in a bias was taken for noise that hangs together: views count for more
         // once it is known.
-        let weighed = self.baseline.is_none()
-            && self.options.ablation == Ablation::None
-            && self.survey.reweigh(&self.fields, &first.px);
-        if weighed { self.search_mean() } else { first }
+        let weighed = self.baseline.is_none() && self.options.ablation == Ablation::None && {
+            let (_, px) = self.everywhere(&found);
+            self.survey.reweigh(&self.fields, &px)
+        };
+        if weighed {
+            found = self.survey.search_bias(camera, level, seed);
+        }
+        let outcome = self.survey.refit_bias(camera, found);
+        let (terms, px) = self.everywhere(&outcome);
+        MeanResult { outcome, terms, px }
     }
 
-    fn search_mean(&self) -> MeanResult {
-        let level = self.level(Self::MEAN_LEVEL);
-        let outcome = self.survey.search_bias(&self.sensor().camera, level, self.options.seed);
-        let terms = terms_of(&outcome, Statistic::Bias);
+    /// The terms of the mean, and what they are at every pixel, px.
+    fn everywhere(&self, outcome: &Outcome) -> (Vec<Term>, Vec<Vec<f32>>) {
+        let terms = terms_of(outcome, Statistic::Bias);
         let px = pixel_terms(&self.fields, &terms, &self.survey, &self.bench);
-        MeanResult { outcome, terms, px }
+        (terms, px)
     }
 
     /// Is this chance, of noise alone, small enough where the model's own views left something open

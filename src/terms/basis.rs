@@ -106,6 +106,20 @@ impl Basis {
         }
     }
 
+    /// The endless series that its columns begin: that of another with as many or more orders begins with
+    /// them.
+    pub fn series(&self) -> Self {
+        let mut series = self.clone();
+        match &mut series {
+            Basis::Powers { orders: number, .. }
+            | Basis::Lens { orders: number, .. }
+            | Basis::Waves { harmonics: number, .. }
+            | Basis::Polynomial { degree: number, .. } => *number = 0,
+            _ => {}
+        }
+        series
+    }
+
     /// The columns at a place; `out` has [`Basis::count`] entries.
     pub fn fill(&self, p: &PixelContext, out: &mut [f64]) {
         match *self {

@@ -39,6 +39,7 @@ impl Case<'_> {
         let (chosen_on, judged_on) = (survey.subset(&rest), survey.subset(&aside));
         let level = options.level;
         let bias = chosen_on.search_bias(camera, Case::MEAN_LEVEL * level, options.seed);
+        let bias = chosen_on.refit_bias(camera, bias);
         let bias_terms = terms_of(&bias, Statistic::Bias);
         let variance = chosen_on.search_variance(
             &model.sigma,

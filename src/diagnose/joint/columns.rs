@@ -29,6 +29,10 @@ pub struct Columns {
     across: usize,
     /// What planes absorb of the second map.
     pub far_gauge: Option<Gauge>,
+    /// What shapes whose affine part is taken out grow with, but for those where it is a plane.
+    far: Vec<Modulation>,
+    /// Of 1, x and y times each of these, a column each: what is taken out of it.
+    absorbed: DMatrix<f64>,
     /// Columns of the terms, and of both maps.
     pub terms: usize,
     pub nodes: usize,
@@ -48,10 +52,15 @@ impl Columns {
             let coefficients = 0..c.candidate.basis.count();
             coefficients.map(|k| c.candidate.usual(k).powi(-2)).collect()
         };
+        let gauges: Vec<Option<Gauge>> = bases.iter().map(|b| Gauge::of(b, &pixels)).collect();
+        let (terms, nodes) = (bases.iter().map(Basis::count).sum(), 2 * across * down);
+        let (far, absorbed) = absorbed(&bases, &gauges, terms + nodes);
         Columns {
-            gauges: bases.iter().map(|b| Gauge::of(b, &pixels)).collect(),
-            terms: bases.iter().map(Basis::count).sum(),
-            nodes: 2 * across * down,
+            gauges,
+            far,
+            absorbed,
+            terms,
+            nodes,
             precision: DVector::from_vec(chosen.iter().flat_map(precision).collect()),
             bases,
             across,
@@ -60,8 +69,22 @@ impl Columns {
         }
     }
 
-    /// Normal equations of a view, its plane profiled out.
-    pub fn evidence(&self, view: &ViewData) -> Option<Evidence> {
+    /// Normal equations of these views together, their planes profiled out.
+    pub fn evidence<'a>(&self, views: impl Iterator<Item = &'a ViewData>) -> Evidence {
+        let of_views = views.filter_map(|view| self.as_they_are(view));
+        let Evidence { a, b } = Evidence::sum(self.width(), 0.0, of_views);
+        // With c the `absorbed`, columns G and affine ones F: of G - F c.
+        let (c, n, m) = (&self.absorbed, self.absorbed.ncols(), self.absorbed.nrows());
+        let crossed = a.view((0, n), (n, m)) * c;
+        let twice = c.transpose() * (a.view((n, n), (m, m)) * c);
+        Evidence {
+            a: a.view((0, 0), (n, n)) - &crossed - crossed.transpose() + twice,
+            b: b.rows(0, n) - c.transpose() * b.rows(n, m),
+        }
+    }
+
+    /// Of the columns with their affine parts in, and of the affine ones: most of them are zero.
+    fn as_they_are(&self, view: &ViewData) -> Option<Evidence> {
         let rows = view.rows(&view.response)?;
         let first =
             |i: usize| self.maps[0].spline_at(&view.places[i]).map_or(0, |(first, _)| first);
@@ -69,18 +92,20 @@ impl Columns {
         let fill = |i: usize, row: &mut [f64]| {
             self.fill_touched(&view.places[i], row);
         };
-        Some(rows.reduce_by_blocks(self.terms + self.nodes, first, touched, fill))
+        Some(rows.reduce_by_blocks(self.width(), first, touched, fill))
     }
 
     /// What a view says beyond a fit, its plane profiled out: the score that is left. It is b - A beta of its
     /// normal equations, which need not be held.
     pub fn left(&self, view: &ViewData, beta: &DVector<f64>) -> Option<DVector<f64>> {
+        let affine = -(&self.absorbed * beta);
+        let beta: Vec<f64> = beta.iter().chain(&affine).copied().collect();
         let (n, p) = (beta.len(), view.precision.len());
         let mut own = DMatrix::from_diagonal(&DVector::from_column_slice(&view.precision));
         // Of each column the products with the nuisances and with what is left of the response.
         let mut products = vec![0.0; n * (p + 1)];
         let mut seen = DVector::zeros(p);
-        let mut row = vec![0.0; self.terms + 2 * SPLINES];
+        let mut row = vec![0.0; self.terms + 2 * SPLINES + self.absorbed.nrows()];
         let mut touched: (usize, Vec<usize>) = (usize::MAX, Vec::new());
         let samples = view.places.iter().zip(&view.response).zip(&view.weight);
         let samples = samples.zip(view.nuisance.chunks_exact(p)).filter(|((_, w), _)| **w > 0.0);
@@ -105,7 +130,14 @@ impl Columns {
             let explained = products.iter().zip(&plane).map(|(s, f)| s * f).sum::<f64>();
             products[p] - explained
         };
-        Some(DVector::from_iterator(n, products.chunks_exact(p + 1).map(left)))
+        let left = DVector::from_iterator(n, products.chunks_exact(p + 1).map(left));
+        let (n, m) = (self.absorbed.ncols(), self.absorbed.nrows());
+        Some(left.rows(0, n) - self.absorbed.transpose() * left.rows(n, m))
+    }
+
+    /// All columns, and the affine ones that are taken out of them.
+    fn width(&self) -> usize {
+        self.absorbed.ncols() + self.absorbed.nrows()
     }
 
     /// The columns that are not zero where the maps' splines begin at node `first`.
@@ -113,14 +145,16 @@ impl Columns {
         let half = self.nodes / 2;
         let squares = (0..SPLINES).map(|k| k / 4 * self.across + k % 4);
         let nodes = squares.map(move |node| self.terms + first + node);
-        (0..self.terms).chain(nodes.clone()).chain(nodes.map(move |node| node + half))
+        let affine = self.absorbed.ncols()..self.width();
+        let maps = nodes.clone().chain(nodes.map(move |node| node + half));
+        (0..self.terms).chain(maps).chain(affine)
     }
 
-    /// The values of these columns at a place, and the first node. A column's part that is a plane stays in: the
-    /// view's own takes it up, and without it most columns of a map are zero.
+    /// The values of these columns at a place with their affine parts in, and the first node.
     fn fill_touched(&self, place: &PixelContext, row: &mut [f64]) -> usize {
-        let (terms, nodes) = row.split_at_mut(self.terms);
-        self.fill_terms(place, terms, |gauge| !gauge.is_plane());
+        let (terms, others) = row.split_at_mut(self.terms);
+        let (nodes, affine) = others.split_at_mut(2 * SPLINES);
+        self.fill_terms(place, terms);
         let mut begins = 0;
         for (map, nodes) in self.maps.iter().zip(nodes.chunks_exact_mut(SPLINES)) {
             if let Some((first, values)) = map.spline_at(place) {
@@ -128,30 +162,29 @@ impl Columns {
                 begins = first;
             }
         }
+        for (&times, affine) in self.far.iter().zip(affine.chunks_exact_mut(3)) {
+            Basis::Affine { times }.fill(place, affine);
+        }
         begins
     }
 
-    /// `taken_out` says of which the affine part is.
-    fn fill_terms(
-        &self,
-        place: &PixelContext,
-        row: &mut [f64],
-        taken_out: impl Fn(&Gauge) -> bool,
-    ) {
+    fn fill_terms(&self, place: &PixelContext, row: &mut [f64]) {
         let mut rest = row;
-        for (basis, gauge) in self.bases.iter().zip(&self.gauges) {
+        for basis in &self.bases {
             let (mine, others) = rest.split_at_mut(basis.count());
             basis.fill(place, mine);
-            if let Some(gauge) = gauge.as_ref().filter(|gauge| taken_out(gauge)) {
-                gauge.take_out(place, mine);
-            }
             rest = others;
         }
     }
 
+    /// All columns at a place, without what planes absorb of them.
     pub fn fill(&self, place: &PixelContext, row: &mut [f64]) {
         let (terms, nodes) = row.split_at_mut(self.terms);
-        self.fill_terms(place, terms, |_| true);
+        self.fill_terms(place, terms);
+        for (term, gauge) in self.gauges.iter().enumerate() {
+            let mine = &mut terms[self.span(term)];
+            gauge.iter().for_each(|gauge| gauge.take_out(place, mine));
+        }
         let (first, second) = nodes.split_at_mut(self.nodes / 2);
         self.maps[0].fill(place, first);
         self.maps[1].fill(place, second);
@@ -202,4 +235,32 @@ impl Columns {
         }
         both
     }
+}
+
+/// What the columns' affine parts grow with, and what is taken out of each column of 1, x and y times each
+/// of it. What is a plane stays in: every view's own takes it up.
+fn absorbed(
+    bases: &[Basis],
+    gauges: &[Option<Gauge>],
+    columns: usize,
+) -> (Vec<Modulation>, DMatrix<f64>) {
+    let is_far = |gauge: &Gauge| !gauge.is_plane();
+    let mut far: Vec<Modulation> = Vec::new();
+    for gauge in gauges.iter().flatten().filter(|gauge| is_far(gauge)) {
+        if !far.contains(&gauge.times) {
+            far.push(gauge.times);
+        }
+    }
+    let mut absorbed = DMatrix::zeros(3 * far.len(), columns);
+    let mut first = 0;
+    for (basis, gauge) in bases.iter().zip(gauges) {
+        for gauge in gauge.iter().filter(|gauge| is_far(gauge)) {
+            let row = far.iter().position(|times| *times == gauge.times).map_or(0, |k| 3 * k);
+            for (k, affine) in gauge.affine.iter().enumerate() {
+                absorbed.view_mut((row, first + k), (3, 1)).copy_from_slice(affine);
+            }
+        }
+        first += basis.count();
+    }
+    (far, absorbed)
 }

@@ -69,7 +69,6 @@ pub struct Joint<'a> {
 
 impl<'a> Joint<'a> {
     pub fn of(columns: &'a Columns, data: &'a [ViewData], second: &[bool]) -> Self {
-        let n = columns.terms + columns.nodes;
         // Near and far in every part.
         let z = |v: &usize| data[*v].places.first().map_or(0.0, |p| p.rho);
         let mut order: Vec<usize> = (0..data.len()).collect();
@@ -81,11 +80,12 @@ impl<'a> Joint<'a> {
         // they come, the nearest first.
         let of_half = |(part, half): (usize, bool)| {
             let mine = views[part].iter().filter(|v| second[**v] == half);
-            Evidence::sum(n, 0.0, mine.filter_map(|&v| columns.evidence(&data[v])))
+            columns.evidence(mine.map(|&v| &data[v]))
         };
         let each: Vec<(usize, bool)> =
             (0..folds).flat_map(|part| [(part, false), (part, true)]).collect();
         let each: Vec<Evidence> = each.into_par_iter().map(of_half).collect();
+        let n = columns.terms + columns.nodes;
         let halves = [0, 1].map(|half| Evidence::sum(n, 0.0, each.iter().skip(half).step_by(2)));
         let parts: Vec<Evidence> = each.chunks(2).map(|both| Evidence::sum(n, 0.0, both)).collect();
         let all = Evidence::sum(n, 0.0, &halves);

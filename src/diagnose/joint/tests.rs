@@ -267,13 +267,16 @@ fn what_is_left_of_a_view_is_its_score_less_what_the_fit_takes() {
     let mut rng = Seed(5).stream("joint/left");
     let mut data = session([0.8, 3.0], &mut rng, |p| 0.02 * p.radius * p.radius);
     let bowl = Basis::powers(Coordinate::RadiusSquared, 2, Modulation::One);
-    let columns = Columns::of(&[term(Some("lens-distortion"), bowl)], &kinect_v1(4).camera);
-    // What a plane of the view's own absorbs may be taken out of the columns or not.
+    let (width, height, times) = (160.0, 120.0, Modulation::DisparitySquared);
+    let far = Basis::Map { width, height, across: 4, down: 3, times };
+    let chosen = [term(Some("lens-distortion"), bowl), term(None, far)];
+    let columns = Columns::of(&chosen, &kinect_v1(4).camera);
+    // What planes absorb is taken out of the sums, or of every row.
     let rows = data[5].rows(&data[5].response).unwrap();
     let gauged = rows.reduce(columns.terms + columns.nodes, |i, row| {
         columns.fill(&data[5].places[i], row);
     });
-    let plain = columns.evidence(&data[5]).unwrap();
+    let plain = columns.evidence([&data[5]].into_iter());
     assert!((&plain.a - &gauged.a).norm() < 1e-9 * gauged.a.norm());
     assert!((&plain.b - &gauged.b).norm() < 1e-9 * gauged.b.norm());
     for view in &mut data {
@@ -286,7 +289,7 @@ fn what_is_left_of_a_view_is_its_score_less_what_the_fit_takes() {
     let all = joint.left(&[0, 5, 7], &beta);
     assert_eq!(all.len(), 3);
     for (left, v) in all.iter().zip([0, 5, 7]) {
-        let whole = columns.evidence(&data[v]).unwrap();
+        let whole = columns.evidence([&data[v]].into_iter());
         let expected = &whole.b - &whole.a * &beta;
         assert!((left - &expected).norm() < 1e-9 * expected.norm(), "view {v}");
     }

@@ -20,6 +20,14 @@ pub struct Evidence {
 }
 
 impl Evidence {
+    /// On the first `n` columns alone.
+    pub fn keep(&mut self, n: usize) {
+        if n < self.b.len() {
+            self.a = self.a.view((0, 0), (n, n)).into_owned();
+            self.b = self.b.rows(0, n).into_owned();
+        }
+    }
+
     /// Of these views together, on `n` columns that are held by the precision `prior`.
     pub fn sum<E: Borrow<Self>>(n: usize, prior: f64, views: impl IntoIterator<Item = E>) -> Self {
         let held = Evidence { a: DMatrix::identity(n, n) * prior, b: DVector::zeros(n) };

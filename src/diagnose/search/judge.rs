@@ -7,8 +7,8 @@ use super::evidence::{Evidence, Gain};
 use super::noise_gains::NoiseGains;
 use super::null::Null;
 use super::outcome::Look;
-use super::own;
 use super::rules::Rules;
+use super::trial::own;
 use crate::terms::Basis;
 
 pub struct Judged {

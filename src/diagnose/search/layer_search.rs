@@ -71,16 +71,21 @@ impl Survey {
         })
     }
 
+    /// The mean's terms, best first, each as it was taken.
     pub fn search_bias(&self, camera: &Camera, level: f64, seed: Seed) -> Outcome {
         let rules = self.bias_rules(camera, level);
         let candidates = bias::candidates(&self.bounds(camera));
         let fine = self.mean_data();
         let coarse: Vec<ViewData> = fine.par_iter().map(coarser).collect();
         let candidates = self.ablation.candidates(candidates);
-        let found = search(&fine, &coarse, &candidates, None, &rules, seed);
+        search(&fine, &coarse, &candidates, None, &rules, seed)
+    }
+
+    /// What was found of the mean, fitted together.
+    pub fn refit_bias(&self, camera: &Camera, found: Outcome) -> Outcome {
         let inflation: Vec<f64> = self.views.iter().map(|v| v.inflation).collect();
         let second = self.second();
-        refit(&fine, &inflation, &second, camera, found.halved(&second, BIAS_PRIOR))
+        refit(&self.mean_data(), &inflation, &second, camera, found.halved(&second, BIAS_PRIOR))
     }
 
     /// How the search of the variance decides.

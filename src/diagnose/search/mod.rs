@@ -15,6 +15,7 @@ pub mod posterior;
 pub mod prepared;
 pub mod rows;
 pub mod rules;
+mod trial;
 pub mod variance;
 pub mod view_levels;
 pub mod view_worth;
@@ -26,13 +27,14 @@ use crate::rng::Seed;
 use crate::terms::Basis;
 use candidate::Candidate;
 use choose::Choice;
-use evidence::{Evidence, Gain, fit, gain};
+use evidence::{Evidence, fit, gain};
 use judge::{Judge, Judged, looks};
 use noise_gains::NoiseGains;
 use null::{Null, beside_chosen};
 use outcome::{Chosen, Look, Outcome};
 use prepared::{Grouping, Patches, Prepared, evidence_of_bases, prepare};
 use rules::Rules;
+use trial::{Trial, nests};
 
 /// A later term must bring this share of what the first brought: what is less is the first one's
 /// own shape, badly met.
@@ -54,6 +56,7 @@ pub fn search(
         coarse,
         groups: fine.par_iter().map(Grouping::all).collect(),
         candidates,
+        nests: nests(candidates),
         rules,
         noise: None,
         looks: Vec::new(),
@@ -97,6 +100,7 @@ struct Layer<'a> {
     /// Of every view's fine samples.
     groups: Vec<Vec<Grouping>>,
     candidates: &'a [Candidate],
+    nests: Vec<Vec<usize>>,
     rules: &'a Rules,
     noise: Option<NoiseGains>,
     looks: Vec<Look>,
@@ -105,56 +109,6 @@ struct Layer<'a> {
     /// Fitted beside everything.
     pinned: Option<Chosen>,
     seed: Seed,
-}
-
-/// Candidates are tried on this.
-struct Trial<'a> {
-    beside: Vec<Chosen>,
-    views: Vec<Prepared<'a>>,
-    /// Columns of what is fitted beside, and what those bring without the candidate on fine and on
-    /// coarse patches. `None` where a term is pinned: it, and the names beside it, are fitted to all views,
-    /// those that are left out too. Taught by the others a free surface goes anywhere where one view reaches farther than they
-    /// do, and what bends it back would seem to be found.
-    settled: usize,
-    base: Option<[Gain; 2]>,
-    judge: Judge<'a>,
-}
-
-impl Trial<'_> {
-    fn patches(&self, c: &Candidate) -> Option<Patches> {
-        Some(self.views.first()?.patches(&c.basis))
-    }
-
-    /// `None` for a name that is in already: what its shape misses is left to the curves.
-    fn judged(&self, c: &Candidate) -> Option<Judged> {
-        let taken = |old: &Chosen| c.family.is_some() && old.candidate.family == c.family;
-        if self.beside.iter().any(taken) {
-            return None;
-        }
-        let (m, prior) = (self.settled, self.judge.rules.prior);
-        let evidence: Vec<Evidence> = self.views.iter().map(|v| v.evidence(&c.basis)).collect();
-        let alone = beside_chosen(&evidence, m, prior)?;
-        let null = Null::of_candidate(&alone, prior)?;
-        let gain = match &self.base {
-            None => gain(&alone, prior)?,
-            Some([fine, coarse]) => gain(&evidence, prior)?.over(match self.patches(c)? {
-                Patches::Fine => fine,
-                Patches::Coarse => coarse,
-            }),
-        };
-        if !c.agrees(own(&gain, &c.basis)) {
-            return None;
-        }
-        let rms = self.judge.rms(&c.basis, m, &gain, &evidence);
-        let sensible = self.judge.sensible(&c.basis, rms);
-        Some(Judged { gain, null, sensible, rms })
-    }
-}
-
-/// A candidate's coefficients, which come last.
-pub fn own<'a>(gain: &'a Gain, basis: &Basis) -> &'a [f64] {
-    let beta = gain.beta.as_slice();
-    &beta[beta.len() - basis.count()..]
 }
 
 fn bases(chosen: &[Chosen]) -> Vec<&Basis> {
@@ -228,8 +182,10 @@ impl Layer<'_> {
     /// The best candidate beside `chosen` and what is pinned, if it brings more than noise can.
     fn step(&mut self, chosen: &[Chosen]) -> Option<Chosen> {
         let trial = self.trial(chosen)?;
-        let judged: Vec<Option<Judged>> =
-            self.candidates.par_iter().map(|c| trial.judged(c)).collect();
+        let of_nest = |nest: &Vec<usize>| trial.judged(self.candidates, nest);
+        let of_nests: Vec<Vec<(usize, Judged)>> = self.nests.par_iter().map(of_nest).collect();
+        let mut judged: Vec<Option<Judged>> = self.candidates.iter().map(|_| None).collect();
+        of_nests.into_iter().flatten().for_each(|(k, j)| judged[k] = Some(j));
         let beside = trial.beside;
         if self.noise.is_none() {
             let nulls: Vec<&Null> = judged.iter().flatten().map(|j| &j.null).collect();

@@ -1,0 +1,150 @@
+//! Candidates tried beside what was chosen.
+
+use super::candidate::Candidate;
+use super::evidence::{Evidence, Gain, gain};
+use super::judge::{Judge, Judged};
+use super::null::{Null, beside_chosen};
+use super::outcome::Chosen;
+use super::prepared::{Patches, Prepared};
+use crate::terms::Basis;
+
+/// Candidates are tried on this.
+pub struct Trial<'a> {
+    pub beside: Vec<Chosen>,
+    pub views: Vec<Prepared<'a>>,
+    /// Columns of what is fitted beside, and what those bring without the candidate on fine and on
+    /// coarse patches. `None` where a term is pinned: it, and the names beside it, are fitted to all views,
+    /// those that are left out too. Taught by the others a free surface goes anywhere where one view reaches farther than they
+    /// do, and what bends it back would seem to be found.
+    pub settled: usize,
+    pub base: Option<[Gain; 2]>,
+    pub judge: Judge<'a>,
+}
+
+impl Trial<'_> {
+    fn patches(&self, c: &Candidate) -> Option<Patches> {
+        Some(self.views.first()?.patches(&c.basis))
+    }
+
+    /// A nest of candidates, by their numbers. A name that is in already is left out: what its shape misses
+    /// is left to the curves.
+    pub fn judged(&self, candidates: &[Candidate], nest: &[usize]) -> Vec<(usize, Judged)> {
+        let taken = |c: &Candidate| {
+            let same = |old: &Chosen| c.family.is_some() && old.candidate.family == c.family;
+            self.beside.iter().any(same)
+        };
+        let open = || nest.iter().copied().filter(|&k| !taken(&candidates[k]));
+        let Some(widest) = open().next() else { return Vec::new() };
+        let of_widest = |v: &Prepared<'_>| v.evidence(&candidates[widest].basis);
+        let mut evidence: Vec<Evidence> = self.views.iter().map(of_widest).collect();
+        let judged = |k: usize| {
+            let c = &candidates[k];
+            evidence.iter_mut().for_each(|e| e.keep(self.settled + c.basis.count()));
+            Some((k, self.judged_by(c, &evidence)?))
+        };
+        open().filter_map(judged).collect()
+    }
+
+    fn judged_by(&self, c: &Candidate, evidence: &[Evidence]) -> Option<Judged> {
+        let (m, prior) = (self.settled, self.judge.rules.prior);
+        let alone = beside_chosen(evidence, m, prior)?;
+        let null = Null::of_candidate(&alone, prior)?;
+        let gain = match &self.base {
+            None => gain(&alone, prior)?,
+            Some([fine, coarse]) => gain(evidence, prior)?.over(match self.patches(c)? {
+                Patches::Fine => fine,
+                Patches::Coarse => coarse,
+            }),
+        };
+        if !c.agrees(own(&gain, &c.basis)) {
+            return None;
+        }
+        let rms = self.judge.rms(&c.basis, m, &gain, evidence);
+        let sensible = self.judge.sensible(&c.basis, rms);
+        Some(Judged { gain, null, sensible, rms })
+    }
+}
+
+/// Candidates of which the later have the first columns of the earlier, by their numbers: evidence on the
+/// widest holds that on all.
+pub fn nests(candidates: &[Candidate]) -> Vec<Vec<usize>> {
+    let mut nests: Vec<(Basis, Vec<usize>)> = Vec::new();
+    for (k, c) in candidates.iter().enumerate() {
+        let series = c.basis.series();
+        match nests.iter_mut().find(|(of, _)| *of == series) {
+            Some((_, nest)) => nest.push(k),
+            None => nests.push((series, vec![k])),
+        }
+    }
+    let widest_first = |(_, mut nest): (Basis, Vec<usize>)| {
+        nest.sort_by_key(|&k| std::cmp::Reverse(candidates[k].basis.count()));
+        nest
+    };
+    nests.into_iter().map(widest_first).collect()
+}
+
+/// A candidate's coefficients, which come last.
+pub fn own<'a>(gain: &'a Gain, basis: &Basis) -> &'a [f64] {
+    let beta = gain.beta.as_slice();
+    &beta[beta.len() - basis.count()..]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::terms::{Coordinate, Modulation, PixelContext};
+
+    /// Fewer orders first and between others; of another period, or times another modulation, is another nest.
+    #[test]
+    fn a_nest_has_the_first_columns_of_its_widest() {
+        let (over, reference_px) = (Coordinate::RadiusSquared, 12.0);
+        let lens = |orders| Basis::Lens { fx: 580.0, fy: 582.0, reference_px, orders };
+        let leveled = |orders| {
+            let times = Modulation::Tilt;
+            Basis::Powers { over: Coordinate::Z, orders, level: true, times }
+        };
+        let bases = [
+            Basis::powers(over, 2, Modulation::One),
+            Basis::waves(Coordinate::Column, 40.0, 3),
+            Basis::powers(over, 4, Modulation::One),
+            Basis::waves(Coordinate::Column, 50.0, 8),
+            Basis::waves(Coordinate::Column, 40.0, 8),
+            Basis::powers(over, 1, Modulation::DisparitySquared),
+            lens(1),
+            lens(4),
+            Basis::relief(2),
+            Basis::relief(4),
+            leveled(1),
+            leveled(3),
+        ];
+        let candidates: Vec<Candidate> = bases.into_iter().map(Candidate::curve).collect();
+        let nests = nests(&candidates);
+        let expected: [&[usize]; 7] = [&[2, 0], &[4, 1], &[3], &[5], &[7, 6], &[9, 8], &[11, 10]];
+        assert_eq!(nests, expected);
+        let place = PixelContext {
+            u: 310.0,
+            x: 0.1,
+            y: -0.2,
+            z: 1.7,
+            disparity: 25.6,
+            theta: 0.4,
+            radius: 0.6,
+            right: 0.3,
+            down: -0.2,
+            rho: 1.7,
+            side: 8.0,
+            ..PixelContext::default()
+        };
+        let row = |k: usize| {
+            let basis = &candidates[k].basis;
+            let mut row = vec![0.0; basis.count()];
+            basis.fill(&place, &mut row);
+            row
+        };
+        for nest in nests {
+            for &k in &nest {
+                assert!(row(nest[0]).starts_with(&row(k)), "{:?}", candidates[k].basis);
+            }
+        }
+    }
+}
