@@ -47,6 +47,11 @@ fn power_of(x: f64, power: f64) -> f64 {
     }
 }
 
+/// What a shape that grows with this power of the disparity is multiplied by at one, px.
+pub fn growth(power: f64, disparity: f64) -> f64 {
+    power_of(disparity / DISPARITY_UNIT_PX, power)
+}
+
 impl Modulation {
     /// The largest square of a slope, at 80 degrees: Nguyen, Izadi and Lovell 2012 see nothing beyond.
     pub const STEEPEST: f64 = 32.2;
@@ -74,7 +79,7 @@ impl Modulation {
             Modulation::One => 1.0,
             Modulation::Disparity => p.disparity,
             Modulation::DisparitySquared => (p.disparity / DISPARITY_UNIT_PX).powi(2),
-            Modulation::DisparityPower(power) => power_of(p.disparity / DISPARITY_UNIT_PX, power),
+            Modulation::DisparityPower(power) => growth(power, p.disparity),
             Modulation::Lift => p.disparity / p.rho,
             Modulation::Tilt => p.theta.sin(),
             Modulation::TiltPower(power) => p.theta.sin().powi(power),

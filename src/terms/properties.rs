@@ -81,8 +81,12 @@ impl Basis {
     /// The power of the disparity with which a shape grows that is otherwise the same in every
     /// picture, whatever it shows. What comes again and again has next to no affine part.
     pub fn still_power(&self) -> Option<f64> {
-        let still = self.is_of_picture() && self.period().is_none();
-        self.times().power_of_disparity().filter(|_| still)
+        self.power_in_picture().filter(|_| self.period().is_none())
+    }
+
+    /// The same, of what comes again and again, too.
+    pub fn power_in_picture(&self) -> Option<f64> {
+        self.times().power_of_disparity().filter(|_| self.is_of_picture())
     }
 
     /// Is it nothing on the optical axis, by its physics? (A matcher's lens is, too, but for where its

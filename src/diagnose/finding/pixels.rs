@@ -16,7 +16,7 @@ use crate::diagnose::views::tiles::Places;
 use crate::measure::Workbench;
 use crate::model::SigmaModel;
 use crate::stats::mean;
-use crate::terms::{Statistic, Term};
+use crate::terms::{DISPARITY_UNIT_PX, PixelContext, Pixels, Statistic, Term, growth};
 
 /// How much frames of a view resemble one another, by lag, where that was found to be noise.
 pub(in crate::diagnose) fn common(
@@ -134,6 +134,42 @@ pub(in crate::diagnose) fn typical_sigma_mm(fields: &[Field]) -> f64 {
     f64::from(crate::stats::median_in_place(&mut all))
 }
 
+/// Terms that are the same in every picture, but for a power of the disparity that they grow with: at every
+/// pixel of the picture, at the disparity at which they are in px.
+struct Still {
+    power: f64,
+    values: Vec<f64>,
+}
+
+impl Still {
+    /// Of all terms that are such, a power each; and the others.
+    fn of(terms: &[Term], bench: &Workbench<'_>) -> (Vec<Self>, Vec<Term>) {
+        let mut by_power: Vec<(f64, Vec<Term>)> = Vec::new();
+        let mut others = Vec::new();
+        for term in terms {
+            let Some(power) = term.basis.power_in_picture() else {
+                others.push(term.clone());
+                continue;
+            };
+            match by_power.iter_mut().find(|(of, _)| *of == power) {
+                Some((_, same)) => same.push(term.clone()),
+                None => by_power.push((power, vec![term.clone()])),
+            }
+        }
+        let camera = &bench.sensor.camera;
+        let pixels = Pixels::new(camera, &bench.rays, 1.0);
+        let still = |(power, terms): (f64, Vec<Term>)| {
+            let value = |row: &mut Vec<f64>, i: usize| {
+                let (side, disparity) = (1.0, DISPARITY_UNIT_PX);
+                Term::sum(&terms, &PixelContext { side, disparity, ..pixels.place(i) }, row)
+            };
+            let all = (0..camera.width * camera.height).into_par_iter();
+            Still { power, values: all.map_init(Vec::new, value).collect() }
+        };
+        (by_power.into_iter().map(still).collect(), others)
+    }
+}
+
 /// The terms at every pixel; empty when there are none.
 pub(in crate::diagnose) fn pixel_terms(
     fields: &[Field],
@@ -144,6 +180,7 @@ pub(in crate::diagnose) fn pixel_terms(
     if terms.is_empty() {
         return Vec::new();
     }
+    let (still, others) = Still::of(terms, bench);
     let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
     fields
         .par_iter()
@@ -152,11 +189,61 @@ pub(in crate::diagnose) fn pixel_terms(
             let mut row = Vec::new();
             (0..f.pixels.len())
                 .map(|k| {
-                    let mut place = places.pixel(k);
-                    place.light = survey.light.of(f, k, &place);
-                    Term::sum(terms, &place, &mut row) as f32
+                    let disparity = f.disparity(k, &bench.rays);
+                    let at =
+                        |s: &Still| growth(s.power, disparity) * s.values[f.pixels[k] as usize];
+                    let mut sum: f64 = still.iter().map(at).sum();
+                    if !others.is_empty() {
+                        let mut place = places.pixel(k);
+                        place.light = survey.light.of(f, k, &place);
+                        sum += Term::sum(&others, &place, &mut row);
+                    }
+                    sum as f32
                 })
                 .collect()
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::kinect_v1;
+    use crate::terms::{Basis, Coordinate, Modulation};
+
+    /// Of every kind of shape that stands still, and none of those that do not.
+    #[test]
+    fn what_stands_still_is_its_picture_times_a_power_of_the_disparity() {
+        let sensor = kinect_v1(4);
+        let bench = Workbench::new(&sensor, crate::measure::MeasureOptions::default());
+        let (camera, times) = (&sensor.camera, Modulation::DisparitySquared);
+        let [width, height] = [camera.width, camera.height].map(|n| n as f64);
+        let bases = [
+            Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(-0.5)),
+            Basis::waves(Coordinate::Column, 20.0, 2),
+            Basis::Spline { width, height, across: 5, down: 4, times },
+            Basis::Affine { times },
+            Basis::waves(Coordinate::Disparity, 1.0, 2),
+            Basis::powers(Coordinate::RaySquared, 1, Modulation::Tilt),
+            Basis::relief(2),
+        ];
+        let term = |basis: Basis| {
+            let coefficients = (0..basis.count()).map(|k| (1.7 * k as f64).sin() + 0.1).collect();
+            Term { statistic: Statistic::Bias, basis, coefficients }
+        };
+        let terms: Vec<Term> = bases.into_iter().map(term).collect();
+        let (still, others) = Still::of(&terms, &bench);
+        assert_eq!(others, terms[4..]);
+        let pixels = Pixels::new(camera, &bench.rays, 43.5);
+        for i in (0..camera.width * camera.height).step_by(37) {
+            for disparity in [7.0, 25.0, 80.0] {
+                let mut place = pixels.place(i);
+                place.at_disparity(disparity, 43.5);
+                place.side = 1.0;
+                let truth = Term::sum(&terms[..4], &place, &mut Vec::new());
+                let sum: f64 = still.iter().map(|s| growth(s.power, disparity) * s.values[i]).sum();
+                assert!((sum - truth).abs() < 1e-12 * truth.abs().max(1.0), "{i} {disparity}");
+            }
+        }
+    }
 }

@@ -260,22 +260,31 @@ impl Layer<'_> {
         }
     }
 
-    /// With all names in, is each still what fits best, and needed at all?
+    /// With all names in, is each still what fits best, and needed at all? The last was chosen beside the
+    /// others: it is, unless these have changed.
     fn look_back(&mut self, chosen: &mut Vec<Chosen>) {
-        let mut k = 0;
+        let (mut k, mut changed) = (0, false);
         while chosen.len() > 1 && k < chosen.len() {
+            if k + 1 == chosen.len() && !changed {
+                break;
+            }
             let mut others = chosen.clone();
             let old = others.remove(k);
             match self.step(&others) {
                 None => {
                     chosen.remove(k);
+                    changed = true;
                     continue;
                 }
                 Some(new) if new.candidate.family == old.candidate.family => {
+                    changed |= new.candidate.basis != old.candidate.basis;
                     chosen[k] = Chosen { p: old.p.min(new.p), ..new };
                 }
                 // Another name is taken; a curve without one is not.
-                Some(new) if new.candidate.family.is_some() => chosen[k] = new,
+                Some(new) if new.candidate.family.is_some() => {
+                    changed = true;
+                    chosen[k] = new;
+                }
                 Some(_) => {}
             }
             k += 1;
