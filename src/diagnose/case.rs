@@ -145,8 +145,9 @@ impl<'a> Case<'a> {
         let seed = self.options.seed;
         let mut found = self.survey.search_bias(camera, level, seed);
         // What is steep in a bias was taken for noise that hangs together: views count for more
-        // once it is known.
-        let weighed = self.baseline.is_none() && self.options.ablation == Ablation::None && {
+        // once it is known. The second run has what the first knew taken out.
+        let biased = self.baseline.is_none() && !self.extended;
+        let weighed = biased && self.options.ablation == Ablation::None && {
             let (_, px) = self.everywhere(&found);
             self.survey.reweigh(&self.fields, &px)
         };

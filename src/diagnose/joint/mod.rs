@@ -21,7 +21,7 @@ use crate::diagnose::checks::replication::{Half, Halves, spans};
 use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::evidence::Gain;
 use crate::diagnose::search::outcome::{Chosen, Outcome};
-use crate::diagnose::views::samples::{ViewData, coarser};
+use crate::diagnose::views::samples::{COARSE_PX, ViewData, coarser};
 use crate::model::Covariance;
 use crate::terms::Gauge;
 use columns::Columns;
@@ -49,7 +49,7 @@ pub fn refit(
         .par_iter()
         .zip(inflation)
         .map(|(view, own)| {
-            let mut view = if rough { view.clone() } else { coarser(view) };
+            let mut view = if rough { view.clone() } else { coarser(view, COARSE_PX) };
             // A target too small to measure its noise on weighs nothing already.
             let share = if own.is_finite() { own / common } else { 0.0 };
             view.weight.iter_mut().for_each(|w| *w *= share);

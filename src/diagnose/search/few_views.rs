@@ -22,7 +22,7 @@ use crate::diagnose::finding::along::Along;
 use crate::diagnose::finding::naming::physics;
 use crate::diagnose::finding::other_findings::named;
 use crate::diagnose::finding::scene::{Scene, size};
-use crate::diagnose::views::samples::{ViewData, coarser};
+use crate::diagnose::views::samples::{COARSE_PX, ViewData, coarser};
 use crate::diagnose::views::tiles::SIDE;
 use crate::rng::{Seed, Stream};
 use crate::stats::{MAD_TO_SIGMA, quantile};
@@ -189,8 +189,11 @@ pub fn few_views(
         let precision = 1.0 / scatter_of_most(&fine, 1.0 / whole);
         fine.iter_mut().for_each(|v| v.precision[0] = precision);
     }
-    let coarse: Vec<ViewData> =
-        if of_mean { fine.par_iter().map(coarser).collect() } else { fine.clone() };
+    let coarse: Vec<ViewData> = if of_mean {
+        fine.par_iter().map(|v| coarser(v, COARSE_PX)).collect()
+    } else {
+        fine.clone()
+    };
     let groups: Vec<Vec<Grouping>> = fine.par_iter().map(Grouping::all).collect();
     let views = Views::of(&fine, &coarse, &groups, &doubted, rules.prior);
     let tried: Vec<Tried<'_>> = candidates

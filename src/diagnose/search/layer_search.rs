@@ -14,7 +14,7 @@ use super::variance;
 use crate::camera::Camera;
 use crate::diagnose::joint::{error::clustered, refit};
 use crate::diagnose::views::layers::Survey;
-use crate::diagnose::views::samples::{ViewData, coarser};
+use crate::diagnose::views::samples::{ViewData, coarser, smooth_px};
 use crate::diagnose::views::tiles::SIDE;
 use crate::effects::Bounds;
 use crate::model::SigmaModel;
@@ -76,7 +76,8 @@ impl Survey {
         let rules = self.bias_rules(camera, level);
         let candidates = bias::candidates(&self.bounds(camera));
         let fine = self.mean_data();
-        let coarse: Vec<ViewData> = fine.par_iter().map(coarser).collect();
+        let side = smooth_px(camera.width);
+        let coarse: Vec<ViewData> = fine.par_iter().map(|v| coarser(v, side)).collect();
         let candidates = self.ablation.candidates(candidates);
         search(&fine, &coarse, &candidates, None, &rules, seed)
     }

@@ -6,7 +6,7 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::diagnose::views::samples::coarser;
+use crate::diagnose::views::samples::{COARSE_PX, coarser};
 use crate::rng::{Seed, Stream};
 use crate::terms::{Axis, Coordinate, Modulation, PixelContext};
 
@@ -218,7 +218,7 @@ fn what_fades_in_large_patches_is_told_once() {
             }
         })
         .collect();
-    let coarse: Vec<ViewData> = fine.iter().map(coarser).collect();
+    let coarse: Vec<ViewData> = fine.iter().map(|v| coarser(v, COARSE_PX)).collect();
     let outcome = search(&fine, &coarse, &candidates(), None, &RULES, Seed(3));
     assert_eq!(families(&outcome), [Some("pixel-locking")]);
 }

@@ -8,7 +8,7 @@ use super::blocks::{BLOCK_TILES, block_tiles, blocks};
 use super::field::Field;
 use super::learnt::Learnt;
 use super::light::{Light, relative_light};
-use super::samples::{ViewData, coarser};
+use super::samples::{COARSE_PX, ViewData, coarser};
 use super::surveyed_view::{SurveyedView, independent_frames, inflation, mean_data};
 use super::tiles::{Tile, roughen, tiles};
 use crate::camera::{Camera, Rays};
@@ -110,7 +110,7 @@ impl Survey {
 
     /// The same in larger patches.
     pub fn coarse_mean_data(&self) -> Vec<ViewData> {
-        let coarse = |v| coarser(&mean_data(v)).beside(&self.between[0]);
+        let coarse = |v| coarser(&mean_data(v), COARSE_PX).beside(&self.between[0]);
         self.views.par_iter().map(coarse).collect()
     }
 

@@ -67,9 +67,14 @@ pub fn finite(v: f64) -> f64 {
 /// Side of a larger patch, px: two tiles.
 pub const COARSE_PX: f64 = (2 * SIDE) as f64;
 
-/// Two tiles by two made one.
-pub fn coarser(fine: &ViewData) -> ViewData {
-    let side = COARSE_PX;
+/// Of one that smooth shapes are looked for on, px: a fortieth of the picture's width, which is two tiles of
+/// the 320 px that the proof's pictures have.
+pub fn smooth_px(width: usize) -> f64 {
+    ((width / 40 / SIDE * SIDE) as f64).max(COARSE_PX)
+}
+
+/// Tiles made one in patches of this side, px.
+pub fn coarser(fine: &ViewData, side: f64) -> ViewData {
     let p = fine.precision.len();
     let mut groups: std::collections::BTreeMap<(u32, u32), Vec<usize>> = Default::default();
     for (i, place) in fine.places.iter().enumerate() {
