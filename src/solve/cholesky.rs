@@ -37,6 +37,11 @@ impl Cholesky {
         Some(Cholesky { lower: a })
     }
 
+    /// L.
+    pub fn l(&self) -> DMatrix<f64> {
+        self.lower.lower_triangle()
+    }
+
     /// The solution of A x = b.
     pub fn solve(&self, b: &DVector<f64>) -> DVector<f64> {
         let n = b.len();
@@ -100,6 +105,7 @@ mod tests {
             approx::assert_relative_eq!(factor.solve(&(&a * &truth)), truth, epsilon = 1e-8);
             let unit = DMatrix::identity(n, n);
             approx::assert_relative_eq!(&a * factor.inverse(), unit, epsilon = 1e-8);
+            approx::assert_relative_eq!(factor.l() * factor.l().transpose(), a, epsilon = 1e-8);
         }
     }
 

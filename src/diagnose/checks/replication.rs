@@ -6,11 +6,12 @@
 
 use std::ops::Range;
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::diagnose::noise::view_mean::ViewMean;
 use crate::diagnose::search::evidence::Evidence;
+use crate::solve::Cholesky;
 
 /// Standard errors from which on a half sees something by itself.
 const SEEN: f64 = 2.0;
@@ -94,7 +95,7 @@ pub fn spans(counts: &[usize]) -> Vec<Range<usize>> {
 pub struct Half {
     pub beta: DVector<f64>,
     /// Of the information and the priors.
-    pub factor: Cholesky<f64, Dyn>,
+    pub factor: Cholesky,
     /// Every view's score beyond that fit.
     pub beyond: Vec<DVector<f64>>,
 }
@@ -125,14 +126,14 @@ impl Halves {
         };
         let fit = |which| {
             let Evidence { a, b } = sum(Some(which));
-            let factor = (a + &held).cholesky()?;
+            let factor = Cholesky::of(a + &held)?;
             let beta = factor.solve(&b);
             let mine = views.iter().zip(second).filter(|(_, s)| **s == which);
             let beyond = mine.map(|(view, _)| &view.b - &view.a * &beta).collect();
             Some(Half { beta, factor, beyond })
         };
         let Evidence { a: metric, b } = sum(None);
-        let whole = (&metric + &held).cholesky()?.solve(&b);
+        let whole = Cholesky::of(&metric + &held)?.solve(&b);
         let halves = [fit(false)?, fit(true)?];
         Some(Halves { metric, whole, halves, spans: spans(counts) })
     }

@@ -71,8 +71,11 @@ impl Columns {
 
     /// Normal equations of these views together, their planes profiled out.
     pub fn evidence<'a>(&self, views: impl Iterator<Item = &'a ViewData>) -> Evidence {
-        let of_views = views.filter_map(|view| self.as_they_are(view));
-        let Evidence { a, b } = Evidence::sum(self.width(), 0.0, of_views);
+        let n = self.width();
+        let mut sum = Evidence { a: DMatrix::zeros(n, n), b: DVector::zeros(n) };
+        views.for_each(|view| self.add(view, &mut sum));
+        let Evidence { mut a, b } = sum;
+        a.fill_upper_triangle_with_lower_triangle();
         // With c the `absorbed`, columns G and affine ones F: of G - F c.
         let (c, n, m) = (&self.absorbed, self.absorbed.ncols(), self.absorbed.nrows());
         let crossed = a.view((0, n), (n, m)) * c;
@@ -83,16 +86,17 @@ impl Columns {
         }
     }
 
-    /// Of the columns with their affine parts in, and of the affine ones: most of them are zero.
-    fn as_they_are(&self, view: &ViewData) -> Option<Evidence> {
-        let rows = view.rows(&view.response)?;
+    /// Add a view's equations, of the columns with their affine parts in, and of the affine ones: most of
+    /// them are zero.
+    fn add(&self, view: &ViewData, sum: &mut Evidence) {
+        let Some(rows) = view.rows(&view.response) else { return };
         let first =
             |i: usize| self.maps[0].spline_at(&view.places[i]).map_or(0, |(first, _)| first);
         let touched = |first| self.touched(first).collect();
         let fill = |i: usize, row: &mut [f64]| {
             self.fill_touched(&view.places[i], row);
         };
-        Some(rows.reduce_by_blocks(self.width(), first, touched, fill))
+        rows.add_by_blocks(sum, first, touched, fill);
     }
 
     /// What a view says beyond a fit, its plane profiled out: the score that is left. It is b - A beta of its

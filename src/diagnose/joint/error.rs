@@ -1,6 +1,6 @@
 //! How sure the joint posterior is: its covariance in a few factors.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
@@ -8,6 +8,7 @@ use super::fit::Joint;
 use super::terms::{Settled, System};
 use crate::camera::Camera;
 use crate::rng::Seed;
+use crate::solve::Cholesky;
 use crate::terms::Pixels;
 
 /// Factors are taken until they hold this share of the variance, place by place. The rest is each
@@ -38,7 +39,7 @@ impl Joint<'_> {
         let System { columns: places, held } = self.system(s, kept, precision);
         let n = places.len();
         let information = DMatrix::from_fn(n, n, |i, j| self.all.a[(places[i], places[j])]);
-        let inverse = Cholesky::<f64, Dyn>::new(&information + held)?.inverse();
+        let inverse = Cholesky::of(&information + held)?.inverse();
         let mine = |e: &DVector<f64>| DVector::from_fn(n, |i, _| e[places[i]]);
         let scatter: f64 = left.iter().map(|e| mine(e).dot(&(&inverse * mine(e)))).sum();
         let free = inverse.component_mul(&information).sum();
@@ -53,7 +54,7 @@ impl Joint<'_> {
             let usual = kept.get(i).map_or(1.0, |&k| self.columns.precision[k]);
             metric[(i, i)] += SLIGHT * seen.len() as f64 * usual;
         }
-        let root = Cholesky::<f64, Dyn>::new(metric)?.l();
+        let root = Cholesky::of(metric)?.l();
         let back = root.transpose();
         let sizes = &back * &covariance * &root;
         let factors: Vec<DVector<f64>> = leading(&sizes)

@@ -14,7 +14,7 @@ const FOLDS: usize = 6;
 /// Precision of second differences of a map's nodes, over the mean information on a node.
 pub const SMOOTHNESS: [f64; 5] = [1.0, 0.2, 0.04, 0.008, 0.0016];
 
-/// Some views' equations with the nodes of the maps eliminated, if there are maps.
+/// Some views' equations of a part of the terms, with the nodes of the maps eliminated, if there are maps.
 pub struct Reduced {
     pub a: DMatrix<f64>,
     b: DVector<f64>,
@@ -24,19 +24,30 @@ pub struct Reduced {
 }
 
 impl Reduced {
-    pub fn of(all: &Evidence, terms: usize, penalty: Option<&DMatrix<f64>>) -> Option<Self> {
-        let (a, b) = (all.a.view((0, 0), (terms, terms)).into_owned(), all.b.rows(0, terms));
+    /// Of the terms' columns in `kept`; there are `terms` of all.
+    pub fn of(
+        all: &Evidence,
+        terms: usize,
+        kept: &[usize],
+        penalty: Option<&DMatrix<f64>>,
+    ) -> Option<Self> {
+        let mut a = all.a.view((0, 0), (terms, terms)).into_owned();
+        let mut b = all.b.rows(0, terms).into_owned();
         let nodes = all.b.len() - terms;
-        let Some(penalty) = penalty else {
-            let (alone, with) = (DVector::zeros(nodes), DMatrix::zeros(nodes, terms));
-            return Some(Reduced { a, b: b.into_owned(), alone, with });
-        };
-        let factor = Cholesky::of(all.a.view((terms, terms), (nodes, nodes)) + penalty)?;
-        let cross = all.a.view((terms, 0), (nodes, terms));
-        let alone = factor.solve(&all.b.rows(terms, nodes).into_owned());
-        let with = factor.solve_all(cross.into_owned());
-        let less = cross.transpose();
-        Some(Reduced { a: a - &less * &with, b: b - less * &alone, alone, with })
+        let (mut alone, mut with) = (DVector::zeros(nodes), DMatrix::zeros(nodes, terms));
+        if let Some(penalty) = penalty {
+            let factor = Cholesky::of(all.a.view((terms, terms), (nodes, nodes)) + penalty)?;
+            let cross = all.a.view((terms, 0), (nodes, terms)).select_columns(kept);
+            alone = factor.solve(&all.b.rows(terms, nodes).into_owned());
+            let solved = factor.solve_all(cross.clone());
+            let (less, less_seen) = (cross.tr_mul(&solved), cross.tr_mul(&alone));
+            for (j, &to) in kept.iter().enumerate() {
+                with.set_column(to, &solved.column(j));
+                b[to] -= less_seen[j];
+                kept.iter().enumerate().for_each(|(i, &from)| a[(from, to)] -= less[(i, j)]);
+            }
+        }
+        Some(Reduced { a, b, alone, with })
     }
 
     /// Coefficients of the terms' columns in `kept`, and of the nodes.
@@ -97,11 +108,12 @@ impl<'a> Joint<'a> {
         views.par_iter().filter_map(|&v| self.columns.left(&self.data[v], beta)).collect()
     }
 
-    /// Fits without each part.
-    pub fn without(&self, penalty: Option<&DMatrix<f64>>) -> Option<Vec<Reduced>> {
+    /// Fits of these terms without each part.
+    pub fn without(&self, terms: &[usize], penalty: Option<&DMatrix<f64>>) -> Option<Vec<Reduced>> {
+        let kept = self.kept(terms);
         let of = |part: &Evidence| {
             let others = Evidence { a: &self.all.a - &part.a, b: &self.all.b - &part.b };
-            Reduced::of(&others, self.columns.terms, penalty)
+            Reduced::of(&others, self.columns.terms, &kept, penalty)
         };
         self.parts.par_iter().map(of).collect()
     }

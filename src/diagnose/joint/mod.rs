@@ -23,6 +23,7 @@ use crate::diagnose::search::evidence::Gain;
 use crate::diagnose::search::outcome::{Chosen, Outcome};
 use crate::diagnose::views::samples::{COARSE_PX, ViewData, coarser};
 use crate::model::Covariance;
+use crate::solve::Cholesky;
 use crate::terms::Gauge;
 use columns::Columns;
 use error::{Error, clustered};
@@ -79,7 +80,7 @@ impl Joint<'_> {
         camera: &Camera,
     ) -> Option<Outcome> {
         let kept = self.kept(&s.terms);
-        let whole = Reduced::of(&self.all, self.columns.terms, s.penalty.as_ref())?;
+        let whole = Reduced::of(&self.all, self.columns.terms, &kept, s.penalty.as_ref())?;
         let first = whole.fit(&kept, &self.columns.precision)?;
         // What every view says beyond the common fit, of all and of the terms alone.
         let every: Vec<usize> = (0..self.data.len()).collect();
@@ -189,7 +190,7 @@ impl Joint<'_> {
         let own = |all: &DVector<f64>| DVector::from_fn(n, |i, _| all[columns[i]]);
         let half = |which: bool| {
             let evidence = &self.halves[usize::from(which)];
-            let factor = (part(&evidence.a) + &held).cholesky()?;
+            let factor = Cholesky::of(part(&evidence.a) + &held)?;
             let beta = factor.solve(&own(&evidence.b));
             let mut all = DVector::zeros(self.all.b.len());
             columns.iter().zip(beta.iter()).for_each(|(&c, b)| all[c] = *b);

@@ -62,7 +62,7 @@ impl Joint<'_> {
 
     pub fn settle(&self, chosen: &[Chosen]) -> Option<Settled> {
         let everything: Vec<usize> = (0..chosen.len()).collect();
-        let plain = self.without(None)?;
+        let plain = self.without(&everything, None)?;
         let scores = self.scores(&plain, &everything, |_| true);
         let mut settled = Settled {
             scores,
@@ -108,7 +108,7 @@ impl Joint<'_> {
         let mut all: Vec<Settled> = Vec::new();
         for smoothness in SMOOTHNESS {
             let penalty = self.columns.penalty(smoothness) * unit;
-            let Some(without) = self.without(Some(&penalty)) else { continue };
+            let Some(without) = self.without(terms, Some(&penalty)) else { continue };
             let scores = self.scores(&without, terms, |_| true);
             let worse = all.last().is_some_and(|b| total(&b.scores) > total(&scores));
             if worse {

@@ -115,9 +115,20 @@ impl<'a> Rows<'a> {
                 into.iter_mut().zip(sample).for_each(|(sum, x)| *sum += wg * x);
             }
         }
-        let mut a = DMatrix::from_row_slice(count, count, &a);
-        a.fill_upper_triangle_with_lower_triangle();
-        self.profiled(&a, &DMatrix::from_vec(n, count, cross))
+        let mut sum = self.nothing(count);
+        let m = self.width - self.nuisances;
+        sum.a
+            .view_mut((m, m), (count, count))
+            .copy_from(&DMatrix::from_row_slice(count, count, &a));
+        self.profile(&mut sum, &DMatrix::from_vec(n, count, cross));
+        sum.a.fill_upper_triangle_with_lower_triangle();
+        sum
+    }
+
+    /// Before any sample has said something of `count` columns.
+    fn nothing(&self, count: usize) -> Evidence {
+        let n = self.width - self.nuisances + count;
+        Evidence { a: DMatrix::zeros(n, n), b: DVector::zeros(n) }
     }
 
     /// The same for many columns, of which samples near each other touch the same few: `block` is
@@ -128,10 +139,24 @@ impl<'a> Rows<'a> {
         count: usize,
         block: impl Fn(usize) -> usize,
         touched: impl Fn(usize) -> Vec<usize>,
-        mut columns: impl FnMut(usize, &mut [f64]),
+        columns: impl FnMut(usize, &mut [f64]),
     ) -> Evidence {
+        let mut sum = self.nothing(count);
+        self.add_by_blocks(&mut sum, block, touched, columns);
+        sum.a.fill_upper_triangle_with_lower_triangle();
+        sum
+    }
+
+    /// Added to what other views say, of whose information the lower triangle alone is told.
+    pub fn add_by_blocks(
+        &self,
+        sum: &mut Evidence,
+        block: impl Fn(usize) -> usize,
+        touched: impl Fn(usize) -> Vec<usize>,
+        mut columns: impl FnMut(usize, &mut [f64]),
+    ) {
         let mut rows = Vec::new();
-        self.sum_blocks(count, block, |block, members, few: &mut Vec<f64>| {
+        let cross = self.sum_blocks(sum, block, |block, members, few: &mut Vec<f64>| {
             let touched = touched(block);
             let width = touched.len().max(1);
             rows.resize(members.len() * width, 0.0);
@@ -143,19 +168,20 @@ impl<'a> Rows<'a> {
                 few.extend(used.iter().map(|&j| row[j]));
             }
             used.into_iter().map(|j| touched[j]).collect()
-        })
+        });
+        self.profile(sum, &cross);
     }
 
-    /// `rows` appends, sample by sample, the columns of a block that it then names.
+    /// `rows` appends, sample by sample, the columns of a block that it then names. Told is what they have
+    /// to do with all that is beside them, and with the response.
     fn sum_blocks(
         &self,
-        count: usize,
+        sum: &mut Evidence,
         block: impl Fn(usize) -> usize,
         mut rows: impl FnMut(usize, &[(usize, usize)], &mut Vec<f64>) -> Vec<usize>,
-    ) -> Evidence {
-        let n = self.width + 1;
-        let mut a = DMatrix::<f64>::zeros(count, count);
-        let mut cross = DMatrix::<f64>::zeros(n, count);
+    ) -> DMatrix<f64> {
+        let m = self.width - self.nuisances;
+        let mut cross = DMatrix::<f64>::zeros(self.width + 1, sum.b.len() - m);
         let mut order: Vec<(usize, usize)> = self.used().map(|i| (block(i), i)).collect();
         order.sort_unstable();
         let mut few = Vec::new();
@@ -174,13 +200,12 @@ impl<'a> Rows<'a> {
                     let j = touched[first + c];
                     let (own, beside) = column.as_slice().split_at(touched.len() - first);
                     let below = touched[first..].iter().zip(own).skip(c);
-                    below.for_each(|(&i, s)| a[(i, j)] += s);
+                    below.for_each(|(&i, s)| sum.a[(m + i, m + j)] += s);
                     cross.column_mut(j).iter_mut().zip(beside).for_each(|(sum, s)| *sum += s);
                 }
             }
         }
-        a.fill_upper_triangle_with_lower_triangle();
-        self.profiled(&a, &cross)
+        cross
     }
 
     /// A column a sample: its own `count` columns, what is beside, and the response, times the root
@@ -196,28 +221,31 @@ impl<'a> Rows<'a> {
         DMatrix::from_vec(height, members.len(), all)
     }
 
-    /// Information and score of the chosen terms and a candidate together, `cross` being the
-    /// candidate's against all that is beside it and the response, with the nuisances profiled out.
-    fn profiled(&self, a: &DMatrix<f64>, cross: &DMatrix<f64>) -> Evidence {
-        let (p, count) = (self.nuisances, a.ncols());
+    /// What is left to add where a candidate's own information is in the sum: `cross` is what it has to do
+    /// with all that is beside it and with the response. The nuisances are profiled out.
+    fn profile(&self, sum: &mut Evidence, cross: &DMatrix<f64>) {
+        let (p, count) = (self.nuisances, cross.ncols());
         let m = self.width - p;
         let n = m + count;
-        let mut all = DMatrix::<f64>::zeros(n, n);
-        let mut right = DVector::<f64>::zeros(n);
-        all.view_mut((0, 0), (m, m)).copy_from(&self.own.view((p, p), (m, m)));
-        all.view_mut((m, m), (count, count)).copy_from(a);
-        all.view_mut((0, m), (m, count)).copy_from(&cross.view((p, 0), (m, count)));
-        all.view_mut((m, 0), (count, m)).copy_from(&cross.view((p, 0), (m, count)).transpose());
-        right.rows_mut(0, m).copy_from(&self.seen.rows(p, m));
-        right.rows_mut(m, count).copy_from(&cross.row(self.width).transpose());
+        let chosen = self.own.view((p, p), (m, m));
+        sum.a.view_mut((0, 0), (m, m)).zip_apply(&chosen, |sum, a| *sum += a);
+        let beside = cross.view((p, 0), (m, count)).transpose();
+        sum.a.view_mut((m, 0), (count, m)).zip_apply(&beside, |sum, a| *sum += a);
         // The nuisances against all of it.
         let mut shared = DMatrix::<f64>::zeros(p, n);
         shared.view_mut((0, 0), (p, m)).copy_from(&self.own.view((0, p), (p, m)));
         shared.view_mut((0, m), (p, count)).copy_from(&cross.view((0, 0), (p, count)));
-        let project = shared.transpose() * &self.inverse;
-        all -= &project * &shared;
-        right -= &project * self.seen.rows(0, p);
-        Evidence { a: all, b: right }
+        let project = &self.inverse * &shared;
+        for (j, mine) in project.column_iter().enumerate() {
+            for (i, theirs) in shared.column_iter().enumerate().skip(j) {
+                sum.a[(i, j)] -= mine.dot(&theirs);
+            }
+        }
+        let response = self.seen.rows(p, m).into_owned();
+        let of_response = cross.row(self.width).transpose();
+        let explained = project.transpose() * self.seen.rows(0, p);
+        let right = response.iter().chain(of_response.iter()).zip(&explained);
+        sum.b.iter_mut().zip(right).for_each(|(sum, (seen, explained))| *sum += seen - explained);
     }
 }
 
