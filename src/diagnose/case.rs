@@ -103,10 +103,14 @@ impl<'a> Case<'a> {
         'a: 'b,
     {
         let learnt = (self.learnt_from, &known);
+        let weights = self.survey.weights();
         // Two surveys at once are a quarter of the memory of all.
         drop(self.survey);
         let (bench, baseline) = (&self.bench, self.baseline.as_ref());
-        let survey = survey(&fields, bench, baseline, self.options, learnt, model);
+        let mut survey = survey(&fields, bench, baseline, self.options, learnt, model);
+        if baseline.is_none() {
+            survey.weigh_more(weights);
+        }
         Case {
             model,
             known,
@@ -144,15 +148,15 @@ impl<'a> Case<'a> {
         let (camera, level) = (&self.sensor().camera, self.level(Self::MEAN_LEVEL));
         let seed = self.options.seed;
         let mut found = self.survey.search_bias(camera, level, seed);
-        // What is steep in a bias was taken for noise that hangs together: views count for more
-        // once it is known. The second run has what the first knew taken out.
-        let biased = self.baseline.is_none() && !self.extended;
-        let weighed = biased && self.options.ablation == Ablation::None && {
+        // The second run has the weights that the first ended with.
+        let first = self.baseline.is_none() && !self.extended;
+        if first && self.options.ablation == Ablation::None {
+            // What is steep in a bias was taken for noise that hangs together: views count for more
+            // once it is known, as the search alone has it.
             let (_, px) = self.everywhere(&found);
-            self.survey.reweigh(&self.fields, &px)
-        };
-        if weighed {
-            found = self.survey.search_bias(camera, level, seed);
+            if self.survey.reweigh(&self.fields, &px) {
+                found = self.survey.search_bias(camera, level, seed);
+            }
         }
         let outcome = self.survey.refit_bias(camera, found);
         let (terms, px) = self.everywhere(&outcome);

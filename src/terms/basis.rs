@@ -45,7 +45,7 @@ pub enum Basis {
 
 /// Nodes of a table over z and over theta.
 pub const TABLE: usize = 17;
-/// Powers of two coordinates, without the plane itself.
+/// Powers of two coordinates, without the plane itself, by their degree.
 const BENT: [(usize, usize); 12] = [
     (2, 0),
     (0, 2),
@@ -106,8 +106,8 @@ impl Basis {
         }
     }
 
-    /// The endless series that its columns begin: that of another with as many or more orders begins with
-    /// them.
+    /// The same with no number of orders: of two of one series, the columns of the one with fewer are the
+    /// first ones of the other.
     pub fn series(&self) -> Self {
         let mut series = self.clone();
         match &mut series {

@@ -20,7 +20,7 @@ pub(crate) use coordinate::DARKEST;
 pub use coordinate::{Coordinate, ROOM_LUX};
 pub use edges::edge_distances;
 pub use gauge::{Gauge, affine_parts};
-pub use modulation::{DISPARITY_UNIT_PX, Modulation, growth};
+pub use modulation::{DISPARITY_UNIT_PX, Modulation, disparity_power};
 pub use needs::Needs;
 pub use pixels::Pixels;
 pub use place::{Axis, Extent, PixelContext, corner_radius};

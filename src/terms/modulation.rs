@@ -47,8 +47,8 @@ fn power_of(x: f64, power: f64) -> f64 {
     }
 }
 
-/// What a shape that grows with this power of the disparity is multiplied by at one, px.
-pub fn growth(power: f64, disparity: f64) -> f64 {
+/// What a shape that grows with this power of the disparity is multiplied by at a disparity, px.
+pub fn disparity_power(power: f64, disparity: f64) -> f64 {
     power_of(disparity / DISPARITY_UNIT_PX, power)
 }
 
@@ -78,8 +78,8 @@ impl Modulation {
         match self {
             Modulation::One => 1.0,
             Modulation::Disparity => p.disparity,
-            Modulation::DisparitySquared => (p.disparity / DISPARITY_UNIT_PX).powi(2),
-            Modulation::DisparityPower(power) => growth(power, p.disparity),
+            Modulation::DisparitySquared => disparity_power(2.0, p.disparity),
+            Modulation::DisparityPower(power) => disparity_power(power, p.disparity),
             Modulation::Lift => p.disparity / p.rho,
             Modulation::Tilt => p.theta.sin(),
             Modulation::TiltPower(power) => p.theta.sin().powi(power),

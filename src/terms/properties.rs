@@ -84,7 +84,7 @@ impl Basis {
         self.power_in_picture().filter(|_| self.period().is_none())
     }
 
-    /// The same, of what comes again and again, too.
+    /// The same power, of shapes that come again and again, too.
     pub fn power_in_picture(&self) -> Option<f64> {
         self.times().power_of_disparity().filter(|_| self.is_of_picture())
     }
@@ -122,9 +122,10 @@ impl Basis {
             || self.period().is_some() && !over.is_some_and(Coordinate::is_of_picture)
     }
 
-    /// Is it to be fitted on the smallest patches there are?
+    /// Is it to be fitted on the smallest patches there are? What is printed on a target may be as small.
     pub fn needs_tiles(&self) -> bool {
-        self.is_fine() || self.alone().is_some()
+        let printed = self.over()[0] == Some(Coordinate::Light);
+        self.is_fine() || self.alone().is_some() || printed
     }
 }
 

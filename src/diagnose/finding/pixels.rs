@@ -16,7 +16,7 @@ use crate::diagnose::views::tiles::Places;
 use crate::measure::Workbench;
 use crate::model::SigmaModel;
 use crate::stats::mean;
-use crate::terms::{DISPARITY_UNIT_PX, PixelContext, Pixels, Statistic, Term, growth};
+use crate::terms::{DISPARITY_UNIT_PX, PixelContext, Pixels, Statistic, Term, disparity_power};
 
 /// How much frames of a view resemble one another, by lag, where that was found to be noise.
 pub(in crate::diagnose) fn common(
@@ -168,6 +168,11 @@ impl Still {
         };
         (by_power.into_iter().map(still).collect(), others)
     }
+
+    /// At pixel `i` of the picture on a surface of this disparity, px.
+    fn at(&self, i: u32, disparity: f64) -> f64 {
+        disparity_power(self.power, disparity) * self.values[i as usize]
+    }
 }
 
 /// The terms at every pixel; empty when there are none.
@@ -190,8 +195,7 @@ pub(in crate::diagnose) fn pixel_terms(
             (0..f.pixels.len())
                 .map(|k| {
                     let disparity = f.disparity(k, &bench.rays);
-                    let at =
-                        |s: &Still| growth(s.power, disparity) * s.values[f.pixels[k] as usize];
+                    let at = |s: &Still| s.at(f.pixels[k], disparity);
                     let mut sum: f64 = still.iter().map(at).sum();
                     if !others.is_empty() {
                         let mut place = places.pixel(k);
@@ -208,42 +212,49 @@ pub(in crate::diagnose) fn pixel_terms(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plane::Plane;
     use crate::simulate::kinect_v1;
     use crate::terms::{Basis, Coordinate, Modulation};
 
-    /// Of every kind of shape that stands still, and none of those that do not.
+    /// Looked at once in the picture, and in every pixel of a tilted view as it is.
     #[test]
     fn what_stands_still_is_its_picture_times_a_power_of_the_disparity() {
         let sensor = kinect_v1(4);
         let bench = Workbench::new(&sensor, crate::measure::MeasureOptions::default());
         let (camera, times) = (&sensor.camera, Modulation::DisparitySquared);
         let [width, height] = [camera.width, camera.height].map(|n| n as f64);
+        let (low, high) = (0.0, width);
         let bases = [
             Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(-0.5)),
             Basis::waves(Coordinate::Column, 20.0, 2),
+            Basis::Curve { over: Coordinate::Column, low, high, nodes: 9, times: Modulation::One },
+            Basis::Curve { over: Coordinate::Radius, low, high: 1.0, nodes: 6, times },
+            Basis::Map { width, height, across: 5, down: 4, times: Modulation::One },
             Basis::Spline { width, height, across: 5, down: 4, times },
             Basis::Affine { times },
             Basis::waves(Coordinate::Disparity, 1.0, 2),
             Basis::powers(Coordinate::RaySquared, 1, Modulation::Tilt),
             Basis::relief(2),
         ];
+        const STILL: usize = 7;
         let term = |basis: Basis| {
             let coefficients = (0..basis.count()).map(|k| (1.7 * k as f64).sin() + 0.1).collect();
             Term { statistic: Statistic::Bias, basis, coefficients }
         };
         let terms: Vec<Term> = bases.into_iter().map(term).collect();
         let (still, others) = Still::of(&terms, &bench);
-        assert_eq!(others, terms[4..]);
-        let pixels = Pixels::new(camera, &bench.rays, 43.5);
-        for i in (0..camera.width * camera.height).step_by(37) {
-            for disparity in [7.0, 25.0, 80.0] {
-                let mut place = pixels.place(i);
-                place.at_disparity(disparity, 43.5);
-                place.side = 1.0;
-                let truth = Term::sum(&terms[..4], &place, &mut Vec::new());
-                let sum: f64 = still.iter().map(|s| growth(s.power, disparity) * s.values[i]).sum();
-                assert!((sum - truth).abs() < 1e-12 * truth.abs().max(1.0), "{i} {disparity}");
-            }
+        assert_eq!(others, terms[STILL..]);
+        let size = [camera.width, camera.height];
+        let pixels: Vec<u32> = (0..(camera.width * camera.height) as u32).step_by(37).collect();
+        let mut field = Field::unseen(Plane::tilted(1.5, 0.9, 0.4), 43.5, size, pixels);
+        field.edge = vec![9.0; field.pixels.len()];
+        let places = Places::of(&field, camera, &bench.rays, 0.0);
+        for k in 0..field.pixels.len() {
+            let truth = Term::sum(&terms[..STILL], &places.pixel(k), &mut Vec::new());
+            let disparity = field.disparity(k, &bench.rays);
+            let at = |s: &Still| s.at(field.pixels[k], disparity);
+            let sum: f64 = still.iter().map(at).sum();
+            assert!((sum - truth).abs() < 1e-10 * truth.abs().max(1.0), "{k}: {sum} {truth}");
         }
     }
 }

@@ -29,9 +29,9 @@ pub struct Columns {
     across: usize,
     /// What planes absorb of the second map.
     pub far_gauge: Option<Gauge>,
-    /// What shapes whose affine part is taken out grow with, but for those where it is a plane.
-    far: Vec<Modulation>,
-    /// Of 1, x and y times each of these, a column each: what is taken out of it.
+    /// What affine parts that are taken out grow with, each once.
+    absorbed_times: Vec<Modulation>,
+    /// How much of 1, x and y times each of these is taken out of each column, a column each.
     absorbed: DMatrix<f64>,
     /// Columns of the terms, and of both maps.
     pub terms: usize,
@@ -54,10 +54,10 @@ impl Columns {
         };
         let gauges: Vec<Option<Gauge>> = bases.iter().map(|b| Gauge::of(b, &pixels)).collect();
         let (terms, nodes) = (bases.iter().map(Basis::count).sum(), 2 * across * down);
-        let (far, absorbed) = absorbed(&bases, &gauges, terms + nodes);
+        let (absorbed_times, absorbed) = absorbed(&bases, &gauges, terms + nodes);
         Columns {
             gauges,
-            far,
+            absorbed_times,
             absorbed,
             terms,
             nodes,
@@ -166,7 +166,7 @@ impl Columns {
                 begins = first;
             }
         }
-        for (&times, affine) in self.far.iter().zip(affine.chunks_exact_mut(3)) {
+        for (&times, affine) in self.absorbed_times.iter().zip(affine.chunks_exact_mut(3)) {
             Basis::Affine { times }.fill(place, affine);
         }
         begins
@@ -248,23 +248,24 @@ fn absorbed(
     gauges: &[Option<Gauge>],
     columns: usize,
 ) -> (Vec<Modulation>, DMatrix<f64>) {
-    let is_far = |gauge: &Gauge| !gauge.is_plane();
-    let mut far: Vec<Modulation> = Vec::new();
-    for gauge in gauges.iter().flatten().filter(|gauge| is_far(gauge)) {
-        if !far.contains(&gauge.times) {
-            far.push(gauge.times);
-        }
-    }
-    let mut absorbed = DMatrix::zeros(3 * far.len(), columns);
+    let mut all: Vec<Modulation> = Vec::new();
+    let mut taken: Vec<(usize, usize, [f64; 3])> = Vec::new();
     let mut first = 0;
     for (basis, gauge) in bases.iter().zip(gauges) {
-        for gauge in gauge.iter().filter(|gauge| is_far(gauge)) {
-            let row = far.iter().position(|times| *times == gauge.times).map_or(0, |k| 3 * k);
-            for (k, affine) in gauge.affine.iter().enumerate() {
-                absorbed.view_mut((row, first + k), (3, 1)).copy_from_slice(affine);
-            }
+        for gauge in gauge.iter().filter(|gauge| !gauge.is_plane()) {
+            let known = all.iter().position(|times| *times == gauge.times);
+            let row = known.unwrap_or_else(|| {
+                all.push(gauge.times);
+                all.len() - 1
+            });
+            let columns = gauge.affine.iter().enumerate();
+            taken.extend(columns.map(|(k, affine)| (3 * row, first + k, *affine)));
         }
         first += basis.count();
     }
-    (far, absorbed)
+    let mut absorbed = DMatrix::zeros(3 * all.len(), columns);
+    for (row, column, affine) in taken {
+        absorbed.view_mut((row, column), (3, 1)).copy_from_slice(&affine);
+    }
+    (all, absorbed)
 }

@@ -41,10 +41,10 @@ impl Reduced {
             alone = factor.solve(&all.b.rows(terms, nodes).into_owned());
             let solved = factor.solve_all(cross.clone());
             let (less, less_seen) = (cross.tr_mul(&solved), cross.tr_mul(&alone));
-            for (j, &to) in kept.iter().enumerate() {
-                with.set_column(to, &solved.column(j));
-                b[to] -= less_seen[j];
-                kept.iter().enumerate().for_each(|(i, &from)| a[(from, to)] -= less[(i, j)]);
+            for (j, &column) in kept.iter().enumerate() {
+                with.set_column(column, &solved.column(j));
+                b[column] -= less_seen[j];
+                kept.iter().enumerate().for_each(|(i, &row)| a[(row, column)] -= less[(i, j)]);
             }
         }
         Some(Reduced { a, b, alone, with })
@@ -139,5 +139,39 @@ impl<'a> Joint<'a> {
         };
         let pairs: Vec<_> = without.iter().zip(&self.parts).collect();
         pairs.into_par_iter().map(|pair| of(pair).unwrap_or(f64::NEG_INFINITY)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::rng::Seed;
+
+    /// Two of four terms beside five nodes, against all seven solved at once.
+    #[test]
+    fn terms_beside_the_maps_are_those_of_the_whole_system() {
+        let (terms, nodes, kept) = (4, 5, [0, 2]);
+        let n = terms + nodes;
+        let mut rng = Seed(8).stream("joint/reduced");
+        let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
+        let x = DMatrix::from_fn(3 * n, n, |_, _| draw());
+        let all = Evidence { a: x.transpose() * &x, b: DVector::from_fn(n, |_, _| draw()) };
+        let penalty = DMatrix::identity(nodes, nodes) * 0.7;
+        let precision = DVector::from_vec(vec![0.3, 0.5, 0.2, 0.9]);
+        let reduced = Reduced::of(&all, terms, &kept, Some(&penalty)).expect("positive definite");
+        let beta = reduced.fit(&kept, &precision).expect("positive definite");
+        let columns: Vec<usize> = kept.into_iter().chain(terms..n).collect();
+        let held = |k: usize| if k < terms { precision[k] } else { 0.7 };
+        let a = DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
+            all.a[(columns[i], columns[j])] + if i == j { held(columns[i]) } else { 0.0 }
+        });
+        let b = DVector::from_fn(columns.len(), |i, _| all.b[columns[i]]);
+        let truth = a.lu().solve(&b).expect("a regular matrix");
+        for (t, &k) in truth.iter().zip(&columns) {
+            approx::assert_relative_eq!(beta[k], *t, epsilon = 1e-10);
+        }
+        assert_eq!([beta[1], beta[3]], [0.0, 0.0]);
     }
 }

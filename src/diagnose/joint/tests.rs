@@ -267,18 +267,22 @@ fn what_is_left_of_a_view_is_its_score_less_what_the_fit_takes() {
     let mut rng = Seed(5).stream("joint/left");
     let mut data = session([0.8, 3.0], &mut rng, |p| 0.02 * p.radius * p.radius);
     let bowl = Basis::powers(Coordinate::RadiusSquared, 2, Modulation::One);
-    let (width, height, times) = (160.0, 120.0, Modulation::DisparitySquared);
-    let far = Basis::Map { width, height, across: 4, down: 3, times };
-    let chosen = [term(Some("lens-distortion"), bowl), term(None, far)];
+    let curve = |times| {
+        let (over, low, high) = (Coordinate::Radius, 0.0, 1.0);
+        Basis::Curve { over, low, high, nodes: 5, times }
+    };
+    let [inverse, square] = [-1.0, 2.0].map(|power| curve(Modulation::still(power)));
+    let chosen = [bowl, square.clone(), inverse, square].map(|basis| term(None, basis));
     let columns = Columns::of(&chosen, &kinect_v1(4).camera);
     // What planes absorb is taken out of the sums, or of every row.
+    let fill = |i: usize, row: &mut [f64]| columns.fill(&data[5].places[i], row);
     let rows = data[5].rows(&data[5].response).unwrap();
-    let gauged = rows.reduce(columns.terms + columns.nodes, |i, row| {
-        columns.fill(&data[5].places[i], row);
-    });
-    let plain = columns.evidence([&data[5]].into_iter());
+    let gauged = rows.reduce(columns.terms + columns.nodes, fill);
+    let [plain, other, both] =
+        [&[5][..], &[7], &[5, 7]].map(|of| columns.evidence(of.iter().map(|&v| &data[v])));
     assert!((&plain.a - &gauged.a).norm() < 1e-9 * gauged.a.norm());
     assert!((&plain.b - &gauged.b).norm() < 1e-9 * gauged.b.norm());
+    assert!((&both.a - (plain.a + other.a)).norm() < 1e-9 * both.a.norm());
     for view in &mut data {
         view.precision = vec![0.0, 0.0, 3.0];
         view.weight.iter_mut().step_by(3).for_each(|w| *w = 0.0);

@@ -84,7 +84,7 @@ fn usual(odds: &[Vec<f64>]) -> f64 {
     if share(at(0.5)) < MUCH { at(0.5) } else { at(0.1) }
 }
 
-/// In sums that do not wait for one another.
+/// In eight sums: in one each addition would wait for the one before.
 fn dot(g: &[f32], w: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     for (g, w) in g.chunks(sums.len()).zip(w.chunks(sums.len())) {

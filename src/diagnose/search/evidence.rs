@@ -21,7 +21,7 @@ pub struct Evidence {
 
 impl Evidence {
     /// On the first `n` columns alone.
-    pub fn keep(&mut self, n: usize) {
+    pub fn truncate(&mut self, n: usize) {
         if n < self.b.len() {
             self.a = self.a.view((0, 0), (n, n)).into_owned();
             self.b = self.b.rows(0, n).into_owned();

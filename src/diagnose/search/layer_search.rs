@@ -71,7 +71,7 @@ impl Survey {
         })
     }
 
-    /// The mean's terms, best first, each as it was taken.
+    /// The mean's terms, best first, fitted together without maps or what is usual of each.
     pub fn search_bias(&self, camera: &Camera, level: f64, seed: Seed) -> Outcome {
         let rules = self.bias_rules(camera, level);
         let candidates = bias::candidates(&self.bounds(camera));

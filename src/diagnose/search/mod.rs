@@ -31,7 +31,7 @@ use evidence::{Evidence, fit, gain};
 use judge::{Judge, Judged, looks};
 use noise_gains::NoiseGains;
 use null::{Null, beside_chosen};
-use outcome::{Chosen, Look, Outcome};
+use outcome::{Chosen, Look, Outcome, bases, bases_where};
 use prepared::{Grouping, Patches, Prepared, evidence_of_bases, prepare};
 use rules::Rules;
 use trial::{Trial, nests};
@@ -51,19 +51,7 @@ pub fn search(
     rules: &Rules,
     seed: Seed,
 ) -> Outcome {
-    let mut layer = Layer {
-        fine,
-        coarse,
-        groups: fine.par_iter().map(Grouping::all).collect(),
-        candidates,
-        nests: nests(candidates),
-        rules,
-        noise: None,
-        looks: Vec::new(),
-        largest: 0.0,
-        pinned: None,
-        seed,
-    };
+    let mut layer = Layer::of(fine, coarse, candidates, rules, seed);
     let mut chosen: Vec<Chosen> = Vec::new();
     layer.pinned = beside.map(|candidate| layer.pin(candidate));
     while let Some(next) = layer.step(&chosen) {
@@ -111,15 +99,29 @@ struct Layer<'a> {
     seed: Seed,
 }
 
-fn bases(chosen: &[Chosen]) -> Vec<&Basis> {
-    bases_where(chosen, |_| true)
-}
+impl<'a> Layer<'a> {
+    fn of(
+        fine: &'a [ViewData],
+        coarse: &'a [ViewData],
+        candidates: &'a [Candidate],
+        rules: &'a Rules,
+        seed: Seed,
+    ) -> Self {
+        Layer {
+            fine,
+            coarse,
+            groups: fine.par_iter().map(Grouping::all).collect(),
+            candidates,
+            nests: nests(candidates),
+            rules,
+            noise: None,
+            looks: Vec::new(),
+            largest: 0.0,
+            pinned: None,
+            seed,
+        }
+    }
 
-fn bases_where(chosen: &[Chosen], which: impl Fn(&Candidate) -> bool) -> Vec<&Basis> {
-    chosen.iter().map(|c| &c.candidate).filter(|c| which(c)).map(|c| &c.basis).collect()
-}
-
-impl Layer<'_> {
     /// Evidence of the views on these terms together.
     fn evidence_of(&self, terms: &[&Basis]) -> Vec<Evidence> {
         let fine = terms.iter().any(|b| b.needs_tiles());
@@ -147,7 +149,7 @@ impl Layer<'_> {
             }
         }
         let views = self.fine.par_iter().zip(self.coarse).zip(&self.groups);
-        let is_fine = |c: &Candidate| c.basis.is_fine() && c.basis.alone().is_none();
+        let is_fine = |c: &Candidate| c.basis.needs_tiles() && c.basis.alone().is_none();
         let keep_fine = self.candidates.iter().any(is_fine);
         views.filter_map(|((f, c), g)| prepare(f, c, g, keep_fine, &named, &settled)).collect()
     }

@@ -81,3 +81,12 @@ impl Outcome {
         self.fit.as_ref().map_or_else(Vec::new, |f| f.beta.as_slice()[span].to_vec())
     }
 }
+
+/// Of all chosen terms, one after the other.
+pub fn bases(chosen: &[Chosen]) -> Vec<&Basis> {
+    bases_where(chosen, |_| true)
+}
+
+pub fn bases_where(chosen: &[Chosen], which: impl Fn(&Candidate) -> bool) -> Vec<&Basis> {
+    chosen.iter().map(|c| &c.candidate).filter(|c| which(c)).map(|c| &c.basis).collect()
+}

@@ -165,7 +165,7 @@ impl Prepared<'_> {
         let alone = basis.alone().and_then(|over| self.groups.iter().find(|g| g.0.over == over));
         if let Some((group, rows)) = alone {
             (&group.places, rows, Patches::Fine)
-        } else if let Some((places, rows)) = self.fine.as_ref().filter(|_| basis.is_fine()) {
+        } else if let Some((places, rows)) = self.fine.as_ref().filter(|_| basis.needs_tiles()) {
             (places, rows, Patches::Fine)
         } else {
             (self.coarse.0, &self.coarse.1, Patches::Coarse)

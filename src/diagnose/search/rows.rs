@@ -147,7 +147,8 @@ impl<'a> Rows<'a> {
         sum
     }
 
-    /// Added to what other views say, of whose information the lower triangle alone is told.
+    /// The same added to `sum`, of which only the lower triangle is kept: it is to be filled when all views
+    /// are in.
     pub fn add_by_blocks(
         &self,
         sum: &mut Evidence,
@@ -172,8 +173,8 @@ impl<'a> Rows<'a> {
         self.profile(sum, &cross);
     }
 
-    /// `rows` appends, sample by sample, the columns of a block that it then names. Told is what they have
-    /// to do with all that is beside them, and with the response.
+    /// Adds the columns' own products to `sum`, and gives those with all that is beside them and with the
+    /// response. `rows` appends, sample by sample, the columns of a block that it then names.
     fn sum_blocks(
         &self,
         sum: &mut Evidence,
@@ -221,8 +222,8 @@ impl<'a> Rows<'a> {
         DMatrix::from_vec(height, members.len(), all)
     }
 
-    /// What is left to add where a candidate's own information is in the sum: `cross` is what it has to do
-    /// with all that is beside it and with the response. The nuisances are profiled out.
+    /// Adds the chosen terms' own equations and their products with the candidate's columns, `cross`, and
+    /// takes out what the nuisances explain. The lower triangle alone is kept.
     fn profile(&self, sum: &mut Evidence, cross: &DMatrix<f64>) {
         let (p, count) = (self.nuisances, cross.ncols());
         let m = self.width - p;

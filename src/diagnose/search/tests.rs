@@ -12,7 +12,7 @@ use crate::terms::{Axis, Coordinate, Modulation, PixelContext};
 
 const VIEWS: usize = 12;
 const SAMPLES: usize = 120;
-const RULES: Rules = Rules {
+pub const RULES: Rules = Rules {
     level: 0.01,
     prior: 1e-6,
     adequacy: 0.7,
@@ -25,7 +25,7 @@ const RULES: Rules = Rules {
 };
 
 /// Places all over the picture with a free level a view; noise of unit variance, and a bias.
-fn session(rng: &mut Stream, bias: impl Fn(&PixelContext) -> f64) -> Vec<ViewData> {
+pub fn session(rng: &mut Stream, bias: impl Fn(&PixelContext) -> f64) -> Vec<ViewData> {
     (0..VIEWS)
         .map(|_| {
             let level: f64 = StandardNormal.sample(rng);
@@ -53,21 +53,22 @@ fn session(rng: &mut Stream, bias: impl Fn(&PixelContext) -> f64) -> Vec<ViewDat
                 })
                 .collect();
             ViewData {
-                gathered: Vec::new(),
                 places: Arc::new(places),
                 response,
                 weight: vec![1.0; SAMPLES],
                 nuisance: vec![1.0; SAMPLES],
                 precision: vec![0.0],
+                ..Default::default()
             }
         })
         .collect()
 }
 
+fn curve(over: Coordinate, high: f64) -> Candidate {
+    Candidate::curve(Basis::Curve { over, low: 0.0, high, nodes: 9, times: Modulation::One })
+}
+
 fn candidates() -> Vec<Candidate> {
-    let curve = |over, high| {
-        Candidate::curve(Basis::Curve { over, low: 0.0, high, nodes: 9, times: Modulation::One })
-    };
     vec![
         Candidate::named(
             "radial-disparity-bias",
@@ -119,27 +120,15 @@ fn what_was_put_in_is_found_with_its_size() {
 /// A curve that was taken before what really is there goes once that is; one that is there as well stays.
 #[test]
 fn a_curve_that_brings_nothing_beside_the_others_is_left_out() {
-    let curve = |over, high| {
-        Candidate::curve(Basis::Curve { over, low: 0.0, high, nodes: 9, times: Modulation::One })
-    };
     let both = [curve(Coordinate::Row, 479.0), curve(Coordinate::Radius, 1.0)];
     for (of_rows, axes) in [(0.0, vec![Axis::Radius]), (1.0, vec![Axis::Row, Axis::Radius])] {
         let mut rng = Seed(11).stream("search/needless");
         let bias = |p: &PixelContext| 1.5 * p.radius * p.radius + of_rows * (p.v / 60.0).sin();
         let views = session(&mut rng, bias);
-        let layer = Layer {
-            fine: &views,
-            coarse: &views,
-            groups: Vec::new(),
-            candidates: &both,
-            rules: &RULES,
-            // Exponential, as of noise.
-            noise: Some(NoiseGains::simulated(600, 0.5, |k| -(1.0 - (k + 1) as f64 / 601.0).ln())),
-            looks: Vec::new(),
-            largest: 0.0,
-            pinned: None,
-            seed: Seed(11),
-        };
+        let mut layer = Layer::of(&views, &views, &both, &RULES, Seed(11));
+        // Exponential, as of noise.
+        let gain = |k: u64| -(1.0 - (k + 1) as f64 / 601.0).ln();
+        layer.noise = Some(NoiseGains::simulated(600, 0.5, gain));
         let mut chosen: Vec<Chosen> = both.iter().map(|c| layer.pin(c.clone())).collect();
         layer.drop_needless(&mut chosen);
         let left: Vec<Axis> = chosen.iter().map(|c| c.candidate.basis.axis()).collect();
@@ -213,8 +202,8 @@ fn what_fades_in_large_patches_is_told_once() {
                 weight: vec![1.0; places.len()],
                 nuisance,
                 precision: vec![0.0; 3],
-                gathered: Vec::new(),
                 places: Arc::new(places),
+                ..Default::default()
             }
         })
         .collect();

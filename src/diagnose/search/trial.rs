@@ -12,11 +12,12 @@ use crate::terms::Basis;
 pub struct Trial<'a> {
     pub beside: Vec<Chosen>,
     pub views: Vec<Prepared<'a>>,
-    /// Columns of what is fitted beside, and what those bring without the candidate on fine and on
-    /// coarse patches. `None` where a term is pinned: it, and the names beside it, are fitted to all views,
-    /// those that are left out too. Taught by the others a free surface goes anywhere where one view reaches farther than they
-    /// do, and what bends it back would seem to be found.
+    /// Columns of what is fitted beside.
     pub settled: usize,
+    /// What those bring without the candidate, on fine and on coarse patches. `None` where a term is
+    /// pinned: it, and the names beside it, are fitted to all views, those that are left out too. Taught by
+    /// the others a free surface goes anywhere where one view reaches farther than they do, and what bends
+    /// it back would seem to be found.
     pub base: Option<[Gain; 2]>,
     pub judge: Judge<'a>,
 }
@@ -26,8 +27,8 @@ impl Trial<'_> {
         Some(self.views.first()?.patches(&c.basis))
     }
 
-    /// A nest of candidates, by their numbers. A name that is in already is left out: what its shape misses
-    /// is left to the curves.
+    /// Of the candidates with these numbers, a nest. A name that is in already is left out: what its shape
+    /// misses is left to the curves.
     pub fn judged(&self, candidates: &[Candidate], nest: &[usize]) -> Vec<(usize, Judged)> {
         let taken = |c: &Candidate| {
             let same = |old: &Chosen| c.family.is_some() && old.candidate.family == c.family;
@@ -39,7 +40,7 @@ impl Trial<'_> {
         let mut evidence: Vec<Evidence> = self.views.iter().map(of_widest).collect();
         let judged = |k: usize| {
             let c = &candidates[k];
-            evidence.iter_mut().for_each(|e| e.keep(self.settled + c.basis.count()));
+            evidence.iter_mut().for_each(|e| e.truncate(self.settled + c.basis.count()));
             Some((k, self.judged_by(c, &evidence)?))
         };
         open().filter_map(judged).collect()
@@ -92,6 +93,9 @@ pub fn own<'a>(gain: &'a Gain, basis: &Basis) -> &'a [f64] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::search::Layer;
+    use crate::diagnose::search::tests::{RULES, session};
+    use crate::rng::Seed;
     use crate::terms::{Coordinate, Modulation, PixelContext};
 
     /// Fewer orders first and between others; of another period, or times another modulation, is another nest.
@@ -144,6 +148,34 @@ mod tests {
         for nest in nests {
             for &k in &nest {
                 assert!(row(nest[0]).starts_with(&row(k)), "{:?}", candidates[k].basis);
+            }
+        }
+    }
+
+    /// Beside a name that is in already.
+    #[test]
+    fn in_a_nest_each_is_judged_as_it_is_alone() {
+        let mut rng = Seed(4).stream("search/nest");
+        let views = session(&mut rng, |p| 0.5 * p.radius.powi(4) + 0.3 * (p.u / 20.0).sin());
+        let (over, times) = (Coordinate::RadiusSquared, Modulation::power(0.0));
+        let named = |basis| Candidate::named("radial-disparity-bias", basis);
+        let mut candidates: Vec<Candidate> =
+            [1, 4, 2].map(|orders| named(Basis::powers(over, orders, times))).into();
+        let waves = |harmonics| Basis::waves(Coordinate::Column, 125.0, harmonics);
+        candidates.extend([2, 4].map(|k| Candidate::named("column-banding", waves(k))));
+        let locking =
+            Candidate::named("pixel-locking", Basis::waves(Coordinate::Disparity, 1.0, 2));
+        let layer = Layer::of(&views, &views, &candidates, &RULES, Seed(1));
+        let trial = layer.trial(&[layer.pin(locking)]).expect("views");
+        assert!(trial.settled == 4 && layer.nests == [vec![1, 2, 0], vec![4, 3]]);
+        for nest in &layer.nests {
+            let together = trial.judged(&candidates, nest);
+            assert_eq!(together.len(), nest.len());
+            for (k, judged) in together {
+                let (_, alone) = trial.judged(&candidates, &[k]).remove(0);
+                approx::assert_relative_eq!(judged.gain.total, alone.gain.total, epsilon = 1e-9);
+                approx::assert_relative_eq!(judged.gain.beta, alone.gain.beta, epsilon = 1e-9);
+                approx::assert_relative_eq!(judged.rms, alone.rms, epsilon = 1e-9);
             }
         }
     }

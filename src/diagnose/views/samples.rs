@@ -67,10 +67,13 @@ pub fn finite(v: f64) -> f64 {
 /// Side of a larger patch, px: two tiles.
 pub const COARSE_PX: f64 = (2 * SIDE) as f64;
 
-/// Of one that smooth shapes are looked for on, px: a fortieth of the picture's width, which is two tiles of
-/// the 320 px that the proof's pictures have.
+/// So many of the patches that smooth shapes are looked for on lie across the picture: in the 320 px that
+/// the proof's pictures have they are two tiles wide.
+const PATCHES_ACROSS: usize = 40;
+
+/// Side of these patches in a picture this wide, px: whole tiles.
 pub fn smooth_px(width: usize) -> f64 {
-    ((width / 40 / SIDE * SIDE) as f64).max(COARSE_PX)
+    ((width / PATCHES_ACROSS / SIDE * SIDE) as f64).max(COARSE_PX)
 }
 
 /// Tiles made one in patches of this side, px.
@@ -110,4 +113,15 @@ pub fn coarser(fine: &ViewData, side: f64) -> ViewData {
     }
     coarse.places = Arc::new(places);
     coarse
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patches_of_smooth_shapes_grow_with_the_picture_in_whole_tiles() {
+        let widths = [160, 320, 512, 640, 1280];
+        assert_eq!(widths.map(smooth_px), [8.0, 8.0, 12.0, 16.0, 32.0]);
+    }
 }
