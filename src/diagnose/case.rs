@@ -108,6 +108,7 @@ impl<'a> Case<'a> {
         drop(self.survey);
         let (bench, baseline) = (&self.bench, self.baseline.as_ref());
         let mut survey = survey(&fields, bench, baseline, self.options, learnt, model);
+        // What remains is counted at the weights that what was explained was counted at.
         if baseline.is_none() {
             survey.weigh_more(weights);
         }

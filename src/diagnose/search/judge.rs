@@ -8,7 +8,6 @@ use super::noise_gains::NoiseGains;
 use super::null::Null;
 use super::outcome::Look;
 use super::rules::Rules;
-use super::trial::own;
 use crate::terms::Basis;
 
 pub struct Judged {
@@ -83,4 +82,10 @@ pub fn looks(
             })
         })
         .collect()
+}
+
+/// A candidate's coefficients, which come last.
+pub fn own<'a>(gain: &'a Gain, basis: &Basis) -> &'a [f64] {
+    let beta = gain.beta.as_slice();
+    &beta[beta.len() - basis.count()..]
 }

@@ -2,7 +2,7 @@
 
 use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain, gain};
-use super::judge::{Judge, Judged};
+use super::judge::{Judge, Judged, own};
 use super::null::{Null, beside_chosen};
 use super::outcome::Chosen;
 use super::prepared::{Patches, Prepared};
@@ -82,12 +82,6 @@ pub fn nests(candidates: &[Candidate]) -> Vec<Vec<usize>> {
         nest
     };
     nests.into_iter().map(widest_first).collect()
-}
-
-/// A candidate's coefficients, which come last.
-pub fn own<'a>(gain: &'a Gain, basis: &Basis) -> &'a [f64] {
-    let beta = gain.beta.as_slice();
-    &beta[beta.len() - basis.count()..]
 }
 
 #[cfg(test)]
