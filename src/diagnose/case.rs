@@ -148,7 +148,8 @@ impl<'a> Case<'a> {
         self.at("searching the mean error", "testing the mean again");
         let (camera, level) = (&self.sensor().camera, self.level(Self::MEAN_LEVEL));
         let seed = self.options.seed;
-        let mut found = self.survey.search_bias(camera, level, seed);
+        let mut fine = self.survey.mean_data();
+        let mut found = self.survey.search_bias(&fine, camera, level, seed);
         // The second run has the weights that the first ended with.
         let first = self.baseline.is_none() && !self.extended;
         if first && self.options.ablation == Ablation::None {
@@ -156,10 +157,12 @@ impl<'a> Case<'a> {
             // once it is known, as the search alone has it.
             let (_, px) = self.everywhere(&found);
             if self.survey.reweigh(&self.fields, &px) {
-                found = self.survey.search_bias(camera, level, seed);
+                fine = self.survey.mean_data();
+                found = self.survey.search_bias(&fine, camera, level, seed);
             }
         }
-        let outcome = self.survey.refit_bias(camera, found);
+        let outcome = self.survey.refit_bias(&fine, camera, found);
+        drop(fine);
         let (terms, px) = self.everywhere(&outcome);
         MeanResult { outcome, terms, px }
     }

@@ -12,7 +12,7 @@ use super::place::PixelContext;
 #[derive(Debug, Clone)]
 pub struct Gauge {
     /// What the shape grows with.
-    pub times: Modulation,
+    pub(crate) times: Modulation,
     /// Of 1, x and y of the ray, a column of the shape each.
     pub affine: Vec<[f64; 3]>,
 }

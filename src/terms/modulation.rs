@@ -48,7 +48,7 @@ fn power_of(x: f64, power: f64) -> f64 {
 }
 
 /// What a shape that grows with this power of the disparity is multiplied by at a disparity, px.
-pub fn disparity_power(power: f64, disparity: f64) -> f64 {
+pub(crate) fn disparity_power(power: f64, disparity: f64) -> f64 {
     power_of(disparity / DISPARITY_UNIT_PX, power)
 }
 

@@ -38,8 +38,10 @@ impl Case<'_> {
         let rest: Vec<usize> = (0..n).filter(|v| !aside.contains(v)).collect();
         let (chosen_on, judged_on) = (survey.subset(&rest), survey.subset(&aside));
         let level = options.level;
-        let bias = chosen_on.search_bias(camera, Case::MEAN_LEVEL * level, options.seed);
-        let bias = chosen_on.refit_bias(camera, bias);
+        let fine = chosen_on.mean_data();
+        let found = chosen_on.search_bias(&fine, camera, Case::MEAN_LEVEL * level, options.seed);
+        let bias = chosen_on.refit_bias(&fine, camera, found);
+        drop(fine);
         let bias_terms = terms_of(&bias, Statistic::Bias);
         let variance = chosen_on.search_variance(
             &model.sigma,

@@ -1,11 +1,10 @@
 //! How small an effect a recording could have shown: what size of a shape a layer's search would see in
 //! 80 % of such recordings.
 //!
-//! The gates are those of the search itself, but for whether halves of the views agree, and on patches of two
-//! tiles: the threshold of
-//! the null over the dispersion of the views, the share of what was found first, and the size beside the
-//! largest. Noise is drawn from the views' own information, and with the shape added its gain and its size
-//! are quadratic in the shape's size.
+//! The gates are those of the search itself, but for whether halves of the views agree, and on patches of
+//! two tiles: the threshold of the null over the dispersion of the views, the share of what was found
+//! first, and the size beside the largest. Noise is drawn from the views' own information, and with the
+//! shape added its gain and its size are quadratic in the shape's size.
 
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};

@@ -169,7 +169,8 @@ impl Halves {
         };
         let hardly_known = LEAST_KNOWN * block(&self.metric);
         let alone = |half: &Half| {
-            let precision = half.factor.l() * half.factor.l().transpose();
+            let l = half.factor.l();
+            let precision = &l * l.transpose();
             let mut left = &half.beta - &self.whole;
             columns.iter().for_each(|&c| left[c] = half.beta[c]);
             let (score, precision) = (of(&(&precision * left)), block(&precision));

@@ -190,14 +190,15 @@ pub(in crate::diagnose) fn pixel_terms(
     fields
         .par_iter()
         .map(|f| {
-            let places = Places::of(f, &bench.sensor.camera, &bench.rays, start);
+            let of_view = || Places::of(f, &bench.sensor.camera, &bench.rays, start);
+            let places = (!others.is_empty()).then(of_view);
             let mut row = Vec::new();
             (0..f.pixels.len())
                 .map(|k| {
                     let disparity = f.disparity(k, &bench.rays);
                     let at = |s: &Still| s.at(f.pixels[k], disparity);
                     let mut sum: f64 = still.iter().map(at).sum();
-                    if !others.is_empty() {
+                    if let Some(places) = &places {
                         let mut place = places.pixel(k);
                         place.light = survey.light.of(f, k, &place);
                         sum += Term::sum(&others, &place, &mut row);

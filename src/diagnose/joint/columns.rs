@@ -71,8 +71,7 @@ impl Columns {
 
     /// Normal equations of these views together, their planes profiled out.
     pub fn evidence<'a>(&self, views: impl Iterator<Item = &'a ViewData>) -> Evidence {
-        let n = self.width();
-        let mut sum = Evidence { a: DMatrix::zeros(n, n), b: DVector::zeros(n) };
+        let mut sum = Evidence::zeros(self.width());
         views.for_each(|view| self.add(view, &mut sum));
         let Evidence { mut a, b } = sum;
         a.fill_upper_triangle_with_lower_triangle();

@@ -20,6 +20,11 @@ pub struct Evidence {
 }
 
 impl Evidence {
+    /// On `n` columns, before any view has said something.
+    pub fn zeros(n: usize) -> Self {
+        Evidence { a: DMatrix::zeros(n, n), b: DVector::zeros(n) }
+    }
+
     /// On the first `n` columns alone.
     pub fn truncate(&mut self, n: usize) {
         if n < self.b.len() {

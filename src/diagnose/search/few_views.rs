@@ -72,7 +72,7 @@ fn best(views: &[Evidence], prior: f64) -> Option<Best> {
         order.push((fit(e)?.0, v));
     }
     order.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut sum = Evidence { a: DMatrix::zeros(k, k), b: DVector::zeros(k) };
+    let mut sum = Evidence::zeros(k);
     let mut best: Option<Best> = None;
     for count in 1..=(n - 1) / 2 {
         let next = &views[order[count - 1].1];

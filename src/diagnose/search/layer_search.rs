@@ -72,21 +72,27 @@ impl Survey {
     }
 
     /// The mean's terms, best first, fitted together without maps or what is usual of each.
-    pub fn search_bias(&self, camera: &Camera, level: f64, seed: Seed) -> Outcome {
+    /// `fine` are the views' means ([`Survey::mean_data`]).
+    pub fn search_bias(
+        &self,
+        fine: &[ViewData],
+        camera: &Camera,
+        level: f64,
+        seed: Seed,
+    ) -> Outcome {
         let rules = self.bias_rules(camera, level);
         let candidates = bias::candidates(&self.bounds(camera));
-        let fine = self.mean_data();
         let side = smooth_px(camera.width);
         let coarse: Vec<ViewData> = fine.par_iter().map(|v| coarser(v, side)).collect();
         let candidates = self.ablation.candidates(candidates);
-        search(&fine, &coarse, &candidates, None, &rules, seed)
+        search(fine, &coarse, &candidates, None, &rules, seed)
     }
 
-    /// What was found of the mean, fitted together.
-    pub fn refit_bias(&self, camera: &Camera, found: Outcome) -> Outcome {
+    /// What was found of these means, fitted together.
+    pub fn refit_bias(&self, fine: &[ViewData], camera: &Camera, found: Outcome) -> Outcome {
         let inflation: Vec<f64> = self.views.iter().map(|v| v.inflation).collect();
         let second = self.second();
-        refit(&self.mean_data(), &inflation, &second, camera, found.halved(&second, BIAS_PRIOR))
+        refit(fine, &inflation, &second, camera, found.halved(&second, BIAS_PRIOR))
     }
 
     /// How the search of the variance decides.

@@ -127,8 +127,7 @@ impl<'a> Rows<'a> {
 
     /// Before any sample has said something of `count` columns.
     fn nothing(&self, count: usize) -> Evidence {
-        let n = self.width - self.nuisances + count;
-        Evidence { a: DMatrix::zeros(n, n), b: DVector::zeros(n) }
+        Evidence::zeros(self.width - self.nuisances + count)
     }
 
     /// The same for many columns, of which samples near each other touch the same few: `block` is
