@@ -84,7 +84,7 @@ impl Case<'_> {
         self.at("naming, and searching the lost pixels", "naming what is left");
         let sigma_mm = typical_sigma_mm(&self.fields);
         let second = self.survey.second();
-        let lattice = &scatter.lattice;
+        let lattice = &self.lattice;
         let steps = steps(lattice, &self.known, &self.fields, self.recording, sigma_mm, &second);
         let own_step = own_step(lattice, self.recording, self.fields[0].scale_px_m);
         self.remarks.extend(own_step.map(own_step_note));
@@ -150,7 +150,7 @@ impl Case<'_> {
     /// Steps shift the mean within a step, rows that err as one shift theirs, and gross errors add to the variance:
     /// none of it is news.
     fn is_news(&self, f: &Finding, bias: &MeanResult, scatter: &ScatterResult) -> bool {
-        let coarsest = scatter.lattice.step_px(self.fields[0].scale_px_m, self.survey.reach.z[0]);
+        let coarsest = self.lattice.step_px(self.fields[0].scale_px_m, self.survey.reach.z[0]);
         let sigma_px = typical_sigma_px(&self.fields);
         // The error of a fine step is as good as noise, of a twelfth of its square; the mean it shifts by
         // less than a four hundredth.
@@ -159,7 +159,7 @@ impl Case<'_> {
         let stepped = of_steps
             && f.effect.is_none()
             && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)
-            && own_step(&scatter.lattice, self.recording, self.fields[0].scale_px_m).is_none()
+            && own_step(&self.lattice, self.recording, self.fields[0].scale_px_m).is_none()
             && f.size.sigma * sigma_px < 0.3 * coarsest;
         // Where rows err as one, so does their mean in every view: for no curve over the rows.
         let over_rows = f.statistic == Statistic::Bias && f.axis == Axis::Row && f.effect.is_none();
@@ -283,7 +283,9 @@ impl Case<'_> {
     fn lost(&self) -> DropoutOutcome {
         let seen_by = (&self.sensor().camera, &self.bench.rays);
         let twins = self.baseline.as_ref().map(|b| (&b.fields[..], &b.survey));
-        let mut lost = missing(&self.fields, twins, &self.survey, seen_by, self.options.seed);
+        let seed = self.options.seed;
+        let all = || missing(&self.fields, twins, &self.survey, seen_by, seed);
+        let mut lost = self.losses.get_or_init(all).clone();
         let alike = self.baseline.as_ref().is_some_and(|b| b.loses_alike(&self.survey));
         lost.findings.retain(|m| {
             // What lies beside the target is no tile's.

@@ -1,13 +1,16 @@
 //! A diagnosis under way: the views as they were read, and the searches of their mean and scatter.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::against::Baseline;
 use super::diagnosis::Finding;
 use super::finding::pixels::{mean_of, pixel_terms, terms_of};
-use super::noise::structure::fixed_px2_by_view;
+use super::missing::DropoutOutcome;
+use super::noise::still::{KeptPattern, still};
 use super::options::{Ablation, DiagnoseOptions, measure_options};
 use super::search::outcome::Outcome;
+use super::steps::lattice;
+use super::steps::lattice::Quantisation;
 use super::views::field::Field;
 use super::views::known::KnownTerms;
 use super::views::layers::Survey;
@@ -32,6 +35,12 @@ pub struct Case<'a> {
     pub fields: Vec<Field>,
     pub survey: Survey,
     pub baseline: Option<Baseline>,
+    /// What the means that are taken out leave of a still pattern.
+    pub kept: KeptPattern,
+    /// What the words step by.
+    pub lattice: Quantisation,
+    /// Losses, which no model changes: the second run's are the first's.
+    pub losses: OnceLock<DropoutOutcome>,
     pub excluded: Vec<Excluded>,
     /// What was odd about the views, in words.
     pub remarks: Vec<String>,
@@ -76,9 +85,11 @@ impl<'a> Case<'a> {
             baseline.references(&mut fields);
         }
         progress.stage("comparing with the model");
+        let lattice = lattice(&fields, recording);
+        let kept = KeptPattern::of(&fields, &sensor.camera);
         let learnt_from = learnt_from(model, &known, options, simulated.is_some());
         let learnt = (learnt_from, &known);
-        let survey = survey(&fields, &bench, baseline.as_ref(), options, learnt, model);
+        let survey = survey((&fields, &kept), &bench, baseline.as_ref(), options, learnt, model);
         Ok(Case {
             recording,
             model,
@@ -89,6 +100,9 @@ impl<'a> Case<'a> {
             fields,
             survey,
             baseline,
+            kept,
+            lattice,
+            losses: OnceLock::new(),
             excluded,
             remarks: copies,
             ranges,
@@ -107,7 +121,8 @@ impl<'a> Case<'a> {
         // Two surveys at once are a quarter of the memory of all.
         drop(self.survey);
         let (bench, baseline) = (&self.bench, self.baseline.as_ref());
-        let mut survey = survey(&fields, bench, baseline, self.options, learnt, model);
+        let views = (&fields[..], &self.kept);
+        let mut survey = survey(views, bench, baseline, self.options, learnt, model);
         // What remains is counted at the weights that what was explained was counted at.
         if baseline.is_none() {
             survey.weigh_more(weights);
@@ -205,7 +220,7 @@ impl<'a> Case<'a> {
 }
 
 fn survey(
-    fields: &[Field],
+    (fields, kept): (&[Field], &KeptPattern),
     bench: &Workbench<'_>,
     baseline: Option<&Baseline>,
     options: &DiagnoseOptions,
@@ -217,7 +232,8 @@ fn survey(
     survey.kind = bench.sensor.kind;
     survey.ablate(options.ablation, fields);
     survey.refits_sigma = options.calibrated_here && baseline.is_none();
-    survey.fixed_px2 = mean_of(fixed_px2_by_view(fields, camera).into_iter().flatten());
+    let still = still(fields, camera, &[], kept);
+    survey.fixed_px2 = mean_of(still.into_iter().filter_map(|s| s.fixed_px2));
     if let Some(baseline) = baseline {
         survey.compared();
         baseline.means(&mut survey);

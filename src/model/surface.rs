@@ -126,6 +126,9 @@ impl SigmaModel {
         if pole.is_some_and(|pole| theta.abs() >= pole) {
             return f64::NAN;
         }
+        if self.domain.contains(z, theta) {
+            return 0.0;
+        }
         let (_, held) = self.domain.clamp(z, theta);
         let continued = self.form.spec().sigma(&self.parameters, z, theta.abs());
         let leans = match self.direction {

@@ -12,6 +12,7 @@ use std::f64::consts::TAU;
 
 use crate::Progress;
 use crate::diagnose::finding::pixels::{Whitener, common, measure_tails};
+use crate::diagnose::noise::still::KeptPattern;
 use crate::diagnose::noise::structure::{Structure, structures};
 use crate::diagnose::noise::tails::{Confusers, tails};
 use crate::diagnose::noise::texture_finding::TextureFinding;
@@ -107,7 +108,8 @@ impl Baseline {
         let none = KnownTerms::default();
         let mut survey = Survey::of(&fields, camera, &bench.rays);
         survey.compared();
-        let mut structure = structures(&fields, camera, &[]);
+        let kept = KeptPattern::of(&fields, camera);
+        let mut structure = structures(&fields, camera, &[], &kept);
         let textures = texture_findings(&structure, &none, 0.03 * options.level);
         survey.compare_frames(&fields, common(&structure, &textures, &none));
         let whitener = Whitener { sigma: None, terms: &[], survey: &survey, bench };

@@ -94,7 +94,9 @@ pub fn spans(counts: &[usize]) -> Vec<Range<usize>> {
 /// What one half says.
 pub struct Half {
     pub beta: DVector<f64>,
-    /// Of the information and the priors.
+    /// Information and priors.
+    pub precision: DMatrix<f64>,
+    /// Of the precision.
     pub factor: Cholesky,
     /// Every view's score beyond that fit.
     pub beyond: Vec<DVector<f64>>,
@@ -126,11 +128,12 @@ impl Halves {
         };
         let fit = |which| {
             let Evidence { a, b } = sum(Some(which));
-            let factor = Cholesky::of(a + &held)?;
+            let precision = a + &held;
+            let factor = Cholesky::of(precision.clone())?;
             let beta = factor.solve(&b);
             let mine = views.iter().zip(second).filter(|(_, s)| **s == which);
             let beyond = mine.map(|(view, _)| &view.b - &view.a * &beta).collect();
-            Some(Half { beta, factor, beyond })
+            Some(Half { beta, precision, factor, beyond })
         };
         let Evidence { a: metric, b } = sum(None);
         let whole = Cholesky::of(&metric + &held)?.solve(&b);
@@ -169,11 +172,9 @@ impl Halves {
         };
         let hardly_known = LEAST_KNOWN * block(&self.metric);
         let alone = |half: &Half| {
-            let l = half.factor.l();
-            let precision = &l * l.transpose();
             let mut left = &half.beta - &self.whole;
             columns.iter().for_each(|&c| left[c] = half.beta[c]);
-            let (score, precision) = (of(&(&precision * left)), block(&precision));
+            let (score, precision) = (of(&(&half.precision * left)), block(&half.precision));
             let shape = (&precision + &hardly_known).cholesky()?.solve(&score);
             let beyond: Vec<DVector<f64>> = half.beyond.iter().map(of).collect();
             Some((score, precision, beyond, shape))

@@ -190,13 +190,14 @@ impl Joint<'_> {
         let own = |all: &DVector<f64>| DVector::from_fn(n, |i, _| all[columns[i]]);
         let half = |which: bool| {
             let evidence = &self.halves[usize::from(which)];
-            let factor = Cholesky::of(part(&evidence.a) + &held)?;
+            let precision = part(&evidence.a) + &held;
+            let factor = Cholesky::of(precision.clone())?;
             let beta = factor.solve(&own(&evidence.b));
             let mut all = DVector::zeros(self.all.b.len());
             columns.iter().zip(beta.iter()).for_each(|(&c, b)| all[c] = *b);
             let mine: Vec<usize> = (0..second.len()).filter(|v| second[*v] == which).collect();
             let beyond = self.left(&mine, &all).iter().map(own).collect();
-            Some(Half { beta, factor, beyond })
+            Some(Half { beta, precision, factor, beyond })
         };
         let mut counts = Vec::new();
         for &t in &s.terms {

@@ -9,14 +9,13 @@ use crate::diagnose::case::{Case, MeanResult};
 use crate::diagnose::finding::pixels::{Whitener, common, measure_tails, terms_of};
 use crate::diagnose::search::outcome::Outcome;
 use crate::diagnose::steps::lattice::Quantisation;
-use crate::diagnose::steps::{Steps, forget_windows, lattice, own_step};
+use crate::diagnose::steps::{Steps, forget_windows, own_step};
 use crate::terms::{Axis, Basis, PixelContext, Statistic, Term};
 
 /// What scatters about the mean.
 pub struct ScatterResult {
     /// One number of each kind a view.
     pub structure: Vec<Structure>,
-    pub lattice: Quantisation,
     pub textures: Vec<TextureFinding>,
     pub tails: Option<TextureFinding>,
     /// Of the variance.
@@ -27,8 +26,8 @@ impl Case<'_> {
     pub fn scatter(&mut self, mean: &MeanResult) -> ScatterResult {
         self.at("searching the noise", "testing the noise again");
         let camera = &self.recording.sensor.camera;
-        let mut structure = structures(&self.fields, camera, &mean.px);
-        let lattice = lattice(&self.fields, self.recording);
+        let mut structure = structures(&self.fields, camera, &mean.px, &self.kept);
+        let lattice = self.lattice;
         let own = Steps::of(&lattice, &structure, &self.fields, self.recording);
         if own_step(&lattice, self.recording, self.fields[0].scale_px_m).is_none() {
             forget_windows(&mut structure, &self.fields, &lattice);
@@ -79,7 +78,7 @@ impl Case<'_> {
         let confusers = Confusers { uneven, simulated: self.baseline.is_some() };
         let tails = tails(&structure, &self.known, each, confusers)
             .filter(|t| !alike && self.stands(t.p, each));
-        ScatterResult { structure, lattice, textures, tails, outcome }
+        ScatterResult { structure, textures, tails, outcome }
     }
 
     /// How the noise hangs together; against a simulation, what goes beyond the simulation's.

@@ -16,7 +16,7 @@ pub struct Still {
 }
 
 impl Still {
-    /// As a share of what a pattern of variance 1 has left.
+    /// As a share of what a pattern of variance 1 keeps.
     fn over(&self, kept: &Still) -> Still {
         let share = |seen: Option<f64>, kept: Option<f64>| Some(seen? / kept.filter(|k| *k > 0.0)?);
         Still {
@@ -26,20 +26,40 @@ impl Still {
     }
 }
 
-pub fn still(views: &[(&Field, &[f32])], camera: &Camera) -> Vec<Still> {
-    let seen = covariances(views, camera, |f, b| pixel_scale(f, &f.mean, b));
-    // Every pixel is part of the means that are taken out.
-    let coins = coins(camera.width * camera.height);
-    let kept = covariances(views, camera, |f, _| pixel_scale(f, &tossed(f, &coins), &[]));
-    seen.iter().zip(&kept).map(|(seen, kept)| seen.over(kept)).collect()
+/// What a pattern of variance 1 keeps in each view where it is measured: every pixel is part of the means that
+/// are taken out.
+pub struct KeptPattern(Vec<Still>);
+
+impl KeptPattern {
+    pub fn of(fields: &[Field], camera: &Camera) -> Self {
+        let coins = coins(camera.width * camera.height);
+        KeptPattern(covariances(fields, camera, |n| {
+            pixel_scale(&fields[n], &tossed(&fields[n], &coins), &[])
+        }))
+    }
 }
 
-fn covariances(
-    views: &[(&Field, &[f32])],
+/// Of the fields that `kept` was made of. `bias` has, view by view, what is known to be no noise, px (or is
+/// empty).
+pub fn still(
+    fields: &[Field],
     camera: &Camera,
-    image: impl Fn(&Field, &[f32]) -> Vec<f32> + Sync,
+    bias: &[Vec<f32>],
+    kept: &KeptPattern,
 ) -> Vec<Still> {
-    let mut images: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| image(f, b)).collect();
+    let seen = covariances(fields, camera, |n| {
+        pixel_scale(&fields[n], &fields[n].mean, bias.get(n).map_or(&[], Vec::as_slice))
+    });
+    seen.iter().zip(&kept.0).map(|(seen, kept)| seen.over(kept)).collect()
+}
+
+/// Of the fields' images, by their numbers.
+fn covariances(
+    fields: &[Field],
+    camera: &Camera,
+    image: impl Fn(usize) -> Vec<f32> + Sync + Send,
+) -> Vec<Still> {
+    let mut images: Vec<Vec<f32>> = (0..fields.len()).into_par_iter().map(image).collect();
     let with_lines = across_views(&images);
     images.par_iter_mut().for_each(|m| *m = without_lines(m, camera.width, SHORT_LINE));
     let both = across_views(&images).into_iter().zip(with_lines);
@@ -118,8 +138,8 @@ mod tests {
                 field
             })
             .into();
-        let views: Vec<(&Field, &[f32])> = fields.iter().map(|f| (f, &[][..])).collect();
-        let seen: Vec<[f64; 2]> = still(&views, &camera)
+        let kept = KeptPattern::of(&fields, &camera);
+        let seen: Vec<[f64; 2]> = still(&fields, &camera, &[], &kept)
             .iter()
             .map(|s| [s.fixed_px2, s.with_lines_px2])
             .map(|both| both.map(|px2| px2.expect("large enough") / PATTERN_PX.powi(2)))

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::kurtosis::FourthMoment;
 use super::pairs::Pairs;
-use super::still::{Still, still};
+use super::still::{KeptPattern, Still, still};
 use super::tail_counts::{FEWEST_READINGS, TailCounts};
 use super::texture::{
     FAR, Filled, LONG_LINE, PROFILE_LAGS, SHORT_LINE, changes, covariance, frame_log_variance,
@@ -91,24 +91,20 @@ pub struct Jitter {
 }
 
 /// Measure all views. `bias` has, view by view, what is known to be no noise, px (or is empty).
-pub fn structures(fields: &[Field], camera: &Camera, bias: &[Vec<f32>]) -> Vec<Structure> {
-    let views = beside_bias(fields, bias);
-    let mut all: Vec<Structure> = views.par_iter().map(|(f, b)| structure(f, camera, b)).collect();
-    for (s, Still { fixed_px2, with_lines_px2 }) in all.iter_mut().zip(still(&views, camera)) {
+pub fn structures(
+    fields: &[Field],
+    camera: &Camera,
+    bias: &[Vec<f32>],
+    kept: &KeptPattern,
+) -> Vec<Structure> {
+    let of = |(n, f): (usize, &Field)| structure(f, camera, bias.get(n).map_or(&[], Vec::as_slice));
+    let mut all: Vec<Structure> = fields.par_iter().enumerate().map(of).collect();
+    for (s, still) in all.iter_mut().zip(still(fields, camera, bias, kept)) {
+        let Still { fixed_px2, with_lines_px2 } = still;
         s.fixed_px2 = fixed_px2;
         s.lines_px2 = with_lines_px2.zip(fixed_px2).map(|(all, fixed)| all - fixed);
     }
     all
-}
-
-/// [`Structure::fixed_px2`] of all views alone.
-pub fn fixed_px2_by_view(fields: &[Field], camera: &Camera) -> Vec<Option<f64>> {
-    still(&beside_bias(fields, &[]), camera).into_iter().map(|s| s.fixed_px2).collect()
-}
-
-fn beside_bias<'a>(fields: &'a [Field], bias: &'a [Vec<f32>]) -> Vec<(&'a Field, &'a [f32])> {
-    let of = |n: usize| bias.get(n).map_or(&[][..], Vec::as_slice);
-    fields.iter().enumerate().map(|(n, f)| (f, of(n))).collect()
 }
 
 fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {

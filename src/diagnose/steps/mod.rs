@@ -172,12 +172,11 @@ pub(in crate::diagnose) fn steps(
     sigma_mm: f64,
     second: &[bool],
 ) -> Vec<Finding> {
-    let halves = [false, true].map(|half| {
-        let mine = fields.iter().zip(second).filter(|(_, s)| **s == half);
-        lattice_of(mine.map(|(f, _)| f), recording)
-    });
     let replicated = |step: fn(&Quantisation) -> Option<f64>| {
-        let [a, b] = halves.map(|half| step(&half));
+        let [a, b] = [false, true].map(|half| {
+            let mine = fields.iter().zip(second).filter(|(_, s)| **s == half);
+            step(&lattice_of(mine.map(|(f, _)| f), recording))
+        });
         Some(a.zip(b).is_some_and(|(a, b)| (a / b - 1.0).abs() < SAME_STEP))
     };
     let found = |effect, axis, size: Size| Finding {
