@@ -134,22 +134,22 @@ impl Survey {
         if !self.views.iter().zip(&anew).any(more) {
             return false;
         }
-        self.weigh_more(anew);
-        true
-    }
-
-    /// What each view's mean is worth: see [`inflation`].
-    pub fn weights(&self) -> Vec<(f64, Correlation)> {
-        self.views.iter().map(|v| (v.inflation, v.correlation.clone())).collect()
-    }
-
-    /// Views are worth as much as this where that is more.
-    pub fn weigh_more(&mut self, weights: Vec<(f64, Correlation)>) {
-        for (view, (inflation, correlation)) in self.views.iter_mut().zip(weights) {
+        for (view, (inflation, correlation)) in self.views.iter_mut().zip(anew) {
             if inflation < view.inflation {
                 (view.inflation, view.correlation) = (inflation, correlation);
             }
         }
+        true
+    }
+
+    /// What each view's mean is worth.
+    pub fn weights(&self) -> Vec<(f64, Correlation)> {
+        self.views.iter().map(|v| (v.whole_weight(), v.correlation.clone())).collect()
+    }
+
+    /// Views are worth as much as this where that is more.
+    pub fn weigh_more(&mut self, weights: Vec<(f64, Correlation)>) {
+        self.views.iter_mut().zip(weights).for_each(|(view, weight)| view.weigh_more(weight));
     }
 
     /// Noise is what changes from frame to frame; `common` is the correlation of two frames of a

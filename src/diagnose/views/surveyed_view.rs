@@ -96,6 +96,21 @@ impl SurveyedView {
         finite(tile.pixels / tile.variance / self.inflation)
     }
 
+    /// Of all tiles together.
+    pub fn whole_weight(&self) -> f64 {
+        self.tiles.iter().map(|t| self.weight(t)).sum()
+    }
+
+    /// All together they are worth as much as this where that is more, and hang together so. Two runs'
+    /// inflations do not compare: each is relative to its own sigma.
+    pub fn weigh_more(&mut self, (weight, correlation): (f64, Correlation)) {
+        let own = self.whole_weight();
+        if weight > own && own > 0.0 {
+            self.inflation *= own / weight;
+            self.correlation = correlation;
+        }
+    }
+
     /// Each tile with its place.
     pub fn patches(&self) -> impl Iterator<Item = (&PixelContext, &Tile)> {
         self.places.iter().zip(self.tiles.iter())
@@ -187,6 +202,26 @@ mod tests {
             }
         }
         SurveyedView::white(patches, 30.0)
+    }
+
+    /// Of a sigma that was refitted to half of what it was, a view is worth as much as before; where what it
+    /// had not been told made it seem worth a third, it is worth what it was.
+    #[test]
+    fn a_view_keeps_its_weight_whatever_sigma_is() {
+        let first = view();
+        let weights = (first.whole_weight(), first.correlation.clone());
+        let mut refitted = view();
+        refitted.tiles_mut().for_each(|(_, tile)| tile.variance /= 4.0);
+        refitted.inflation *= 4.0;
+        refitted.weigh_more(weights.clone());
+        assert_eq!(refitted.inflation, 4.0 * first.inflation);
+        refitted.inflation *= 3.0;
+        refitted.weigh_more(weights);
+        approx::assert_relative_eq!(
+            refitted.whole_weight(),
+            first.whole_weight(),
+            max_relative = 1e-12
+        );
     }
 
     /// Planes alone leave of it what a bowl would be: a nat in each view, and views add up.
