@@ -20,6 +20,8 @@ pub mod variance;
 pub mod view_levels;
 pub mod view_worth;
 
+use std::rc::Rc;
+
 use rayon::prelude::*;
 
 use crate::diagnose::views::samples::ViewData;
@@ -32,7 +34,7 @@ use judge::{Judge, Judged, looks};
 use noise_gains::NoiseGains;
 use null::{Null, beside_chosen};
 use outcome::{Chosen, Look, Outcome, bases, bases_where};
-use prepared::{Grouping, Patches, Prepared, evidence_of_bases, prepare};
+use prepared::{Grouping, Patches, Prepared, Together, prepare};
 use rules::Rules;
 use trial::{Trial, nests};
 
@@ -75,16 +77,16 @@ pub fn search(
         layer.drop_needless(&mut chosen);
     }
     chosen.extend(layer.pinned.clone());
-    let evidence = layer.evidence_of(&bases(&chosen));
+    let evidence = layer.together.evidence(&bases(&chosen));
     let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
-    let noise = layer.noise.unwrap_or_default();
-    let looks = layer.looks;
+    let Layer { noise, looks, together, .. } = layer;
+    drop(together);
+    let (noise, evidence) = (noise.unwrap_or_default(), Rc::unwrap_or_clone(evidence));
     Outcome { chosen, looks, fit, evidence, noise, ..Outcome::default() }
 }
 
 struct Layer<'a> {
-    fine: &'a [ViewData],
-    coarse: &'a [ViewData],
+    together: Together<'a>,
     /// Of every view's fine samples.
     groups: Vec<Vec<Grouping>>,
     candidates: &'a [Candidate],
@@ -108,8 +110,7 @@ impl<'a> Layer<'a> {
         seed: Seed,
     ) -> Self {
         Layer {
-            fine,
-            coarse,
+            together: Together::of(fine, coarse),
             groups: fine.par_iter().map(Grouping::all).collect(),
             candidates,
             nests: nests(candidates),
@@ -122,33 +123,24 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// Evidence of the views on these terms together.
-    fn evidence_of(&self, terms: &[&Basis]) -> Vec<Evidence> {
-        let fine = terms.iter().any(|b| b.needs_tiles());
-        let views = if fine { self.fine } else { self.coarse };
-        evidence_of_bases(views, terms)
-    }
-
     /// Terms with a name are fitted anew beside every candidate; those without have many columns
     /// and are taken out as they were fitted.
     fn prepare(&self, chosen: &[Chosen]) -> Vec<Prepared<'_>> {
-        let named: Vec<&Basis> = bases_where(chosen, |c| c.family.is_some());
-        let nameless: Vec<&Basis> = bases_where(chosen, |c| c.family.is_none());
+        let named = bases_where(chosen, |c| c.family.is_some());
         let mut settled: Vec<(&Basis, Vec<f64>)> = Vec::new();
-        if !nameless.is_empty() {
-            let all: Vec<&Basis> = nameless.iter().chain(&named).copied().collect();
-            let beta = fit(&self.evidence_of(&all), self.rules.prior);
-            let beta = beta.map_or_else(Vec::new, |beta| beta.as_slice().to_vec());
+        if named.len() < chosen.len()
+            && let Some(beta) = fit(&self.together.evidence(&bases(chosen)), self.rules.prior)
+        {
             let mut rest = beta.as_slice();
-            for basis in nameless {
-                if rest.len() >= basis.count() {
-                    let (mine, others) = rest.split_at(basis.count());
+            for Candidate { basis, family, .. } in chosen.iter().map(|c| &c.candidate) {
+                let (mine, others) = rest.split_at(basis.count());
+                rest = others;
+                if family.is_none() {
                     settled.push((basis, mine.to_vec()));
-                    rest = others;
                 }
             }
         }
-        let views = self.fine.par_iter().zip(self.coarse).zip(&self.groups);
+        let views = self.together.fine.par_iter().zip(self.together.coarse).zip(&self.groups);
         let is_fine = |c: &Candidate| c.basis.needs_tiles() && c.basis.alone().is_none();
         let keep_fine = self.candidates.iter().any(is_fine);
         views.filter_map(|((f, c), g)| prepare(f, c, g, keep_fine, &named, &settled)).collect()
@@ -156,7 +148,7 @@ impl<'a> Layer<'a> {
 
     /// A term that stays, with what it brings alone.
     fn pin(&self, candidate: Candidate) -> Chosen {
-        let alone = gain(&self.evidence_of(&[&candidate.basis]), self.rules.prior);
+        let alone = gain(&self.together.evidence(&[&candidate.basis]), self.rules.prior);
         let gain = alone.map_or(0.0, |g| g.total);
         let (adequacy, rivals) = (self.rules.adequacy, Vec::new());
         Chosen { candidate, rms: 0.0, adequacy, gain, best_curve: 0.0, rivals, p: 1.0 }
@@ -175,8 +167,8 @@ impl<'a> Layer<'a> {
             None => Some([base(Patches::Fine)?, base(Patches::Coarse)?]),
             Some(_) => None,
         };
-        let Layer { coarse, rules, largest, .. } = *self;
-        let weight = coarse.iter().flat_map(|v| &v.weight).sum();
+        let Layer { rules, largest, .. } = *self;
+        let weight = self.together.coarse.iter().flat_map(|v| &v.weight).sum();
         let judge = Judge { weight, rules, largest };
         Some(Trial { beside, views, settled, base, judge })
     }
@@ -208,7 +200,7 @@ impl<'a> Layer<'a> {
     fn total(&self, terms: &[&Basis]) -> f64 {
         let pinned: Vec<&Basis> = self.pinned.iter().map(|c| &c.candidate.basis).collect();
         let columns = pinned.iter().map(|b| b.count()).sum();
-        let evidence = self.evidence_of(&[&pinned[..], terms].concat());
+        let evidence = self.together.evidence(&[&pinned[..], terms].concat());
         let alone = beside_chosen(&evidence, columns, self.rules.prior);
         alone.and_then(|alone| gain(&alone, self.rules.prior)).map_or(0.0, |g| g.total)
     }

@@ -1,6 +1,9 @@
 //! A view made ready for candidates: what is fitted beside them, and samples that they cannot tell
 //! apart made one.
 
+use std::cell::RefCell;
+use std::rc::Rc;
+
 use rayon::prelude::*;
 
 use super::evidence::Evidence;
@@ -12,6 +15,37 @@ use crate::terms::{Basis, Coordinate, PixelContext};
 /// Evidence of views on given terms together.
 pub fn evidence_of_bases(data: &[ViewData], bases: &[&Basis]) -> Vec<Evidence> {
     data.par_iter().filter_map(|v| together(v, bases)).collect()
+}
+
+/// A layer's views, on which several terms are fitted together.
+pub struct Together<'a> {
+    pub fine: &'a [ViewData],
+    /// The same views in larger patches.
+    pub coarse: &'a [ViewData],
+    /// The terms that were asked for last: they are often asked for again.
+    last: RefCell<Option<(Vec<Basis>, Rc<Vec<Evidence>>)>>,
+}
+
+impl<'a> Together<'a> {
+    pub fn of(fine: &'a [ViewData], coarse: &'a [ViewData]) -> Self {
+        Together { fine, coarse, last: RefCell::new(None) }
+    }
+
+    /// Evidence of the views on these terms, on fine patches where one of them needs them.
+    pub fn evidence(&self, terms: &[&Basis]) -> Rc<Vec<Evidence>> {
+        let mut last = self.last.borrow_mut();
+        if let Some((of, evidence)) = &*last
+            && of.iter().eq(terms.iter().copied())
+        {
+            return Rc::clone(evidence);
+        }
+        let fine = terms.iter().any(|b| b.needs_tiles());
+        let evidence = evidence_of_bases(if fine { self.fine } else { self.coarse }, terms);
+        let evidence = Rc::new(evidence);
+        let of = terms.iter().map(|b| (*b).clone()).collect();
+        *last = Some((of, Rc::clone(&evidence)));
+        evidence
+    }
 }
 
 /// A view made ready for the candidates.

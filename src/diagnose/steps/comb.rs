@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use rayon::prelude::*;
+
 /// Phases gathered more than this belong to a lattice: chance over the scanned frequencies and a
 /// hundred words reaches 0.4.
 const GATHERED: f64 = 0.6;
@@ -141,7 +143,7 @@ pub fn steps_of_words(words: &[(usize, f64)]) -> Option<(f64, f64)> {
     let scan = |k: usize| ratio.powi(k as i32) / STEPS_WORDS[1];
     let tries = ((STEPS_WORDS[1] / STEPS_WORDS[0]).ln() / ratio.ln()) as usize;
     let holds = |k: &usize| max_within(&near, scan(*k)) >= 1.0 - STRAY;
-    let first = (0..tries).find(holds)?;
+    let first = (0..tries).into_par_iter().find_first(holds)?;
     let last = (first..tries).take_while(holds).last()?;
     let frequency = 0.5 * (scan(first) + scan(last));
     // Each word has this chance to lie within the arc that one of them begins.
