@@ -217,7 +217,7 @@ fn survey(
     survey.kind = bench.sensor.kind;
     survey.ablate(options.ablation, fields);
     survey.refits_sigma = options.calibrated_here && baseline.is_none();
-    survey.fixed_px2 = mean_of(fixed_px2_by_view(fields, camera).into_iter().flatten());
+    survey.fixed_px2 = mean_of(fixed_px2_by_view(fields).into_iter().flatten());
     if let Some(baseline) = baseline {
         survey.compared();
         baseline.means(&mut survey);

@@ -107,7 +107,7 @@ impl Baseline {
         let none = KnownTerms::default();
         let mut survey = Survey::of(&fields, camera, &bench.rays);
         survey.compared();
-        let mut structure = structures(&fields, camera, &[]);
+        let mut structure = structures(&fields, &[]);
         let textures = texture_findings(&structure, &none, 0.03 * options.level);
         survey.compare_frames(&fields, common(&structure, &textures, &none));
         let whitener = Whitener { sigma: None, terms: &[], survey: &survey, bench };

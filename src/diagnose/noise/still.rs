@@ -4,7 +4,6 @@ use rand::Rng;
 use rayon::prelude::*;
 
 use super::texture::{SHORT_LINE, pixel_scale, without_lines};
-use crate::camera::Camera;
 use crate::diagnose::views::field::Field;
 use crate::rng::Seed;
 
@@ -26,22 +25,22 @@ impl Still {
     }
 }
 
-pub fn still(views: &[(&Field, &[f32])], camera: &Camera) -> Vec<Still> {
-    let seen = covariances(views, camera, |f, b| pixel_scale(f, &f.mean, b));
+pub fn still(views: &[(&Field, &[f32])]) -> Vec<Still> {
+    let seen = covariances(views, |f, b| pixel_scale(f, &f.mean, b));
     // Every pixel is part of the means that are taken out.
-    let coins = coins(camera.width * camera.height);
-    let kept = covariances(views, camera, |f, _| pixel_scale(f, &tossed(f, &coins), &[]));
+    let coins = coins(views.first().map_or(0, |(f, _)| f.width * f.height));
+    let kept = covariances(views, |f, _| pixel_scale(f, &tossed(f, &coins), &[]));
     seen.iter().zip(&kept).map(|(seen, kept)| seen.over(kept)).collect()
 }
 
 fn covariances(
     views: &[(&Field, &[f32])],
-    camera: &Camera,
     image: impl Fn(&Field, &[f32]) -> Vec<f32> + Sync,
 ) -> Vec<Still> {
     let mut images: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| image(f, b)).collect();
     let with_lines = across_views(&images);
-    images.par_iter_mut().for_each(|m| *m = without_lines(m, camera.width, SHORT_LINE));
+    let of_views = images.par_iter_mut().zip(views);
+    of_views.for_each(|(m, (f, _))| *m = without_lines(m, f.width, SHORT_LINE));
     let both = across_views(&images).into_iter().zip(with_lines);
     both.map(|(fixed_px2, with_lines_px2)| Still { fixed_px2, with_lines_px2 }).collect()
 }
@@ -119,7 +118,7 @@ mod tests {
             })
             .into();
         let views: Vec<(&Field, &[f32])> = fields.iter().map(|f| (f, &[][..])).collect();
-        let seen: Vec<[f64; 2]> = still(&views, &camera)
+        let seen: Vec<[f64; 2]> = still(&views)
             .iter()
             .map(|s| [s.fixed_px2, s.with_lines_px2])
             .map(|both| both.map(|px2| px2.expect("large enough") / PATTERN_PX.powi(2)))
