@@ -82,10 +82,9 @@ impl Case<'_> {
         let mean = self.mean();
         let scatter = self.scatter(&mean);
         self.at("naming, and searching the lost pixels", "naming what is left");
-        let sigma_mm = typical_sigma_mm(&self.fields);
         let second = self.survey.second();
         let lattice = &self.lattice;
-        let steps = steps(lattice, &self.known, &self.fields, self.recording, sigma_mm, &second);
+        let steps = steps(lattice, &self.known, &self.fields, self.recording, &second);
         let own_step = own_step(lattice, self.recording, self.fields[0].scale_px_m);
         self.remarks.extend(own_step.map(own_step_note));
         let stepped = lattice.is_some();

@@ -6,7 +6,7 @@ use super::against::Baseline;
 use super::diagnosis::Finding;
 use super::finding::pixels::{mean_of, pixel_terms, terms_of};
 use super::missing::DropoutOutcome;
-use super::noise::still::{KeptPattern, still};
+use super::noise::still::{KeptPattern, beside_bias, still};
 use super::options::{Ablation, DiagnoseOptions, measure_options};
 use super::search::outcome::Outcome;
 use super::steps::lattice;
@@ -86,7 +86,7 @@ impl<'a> Case<'a> {
         }
         progress.stage("comparing with the model");
         let lattice = lattice(&fields, recording);
-        let kept = KeptPattern::of(&fields, &sensor.camera);
+        let kept = KeptPattern::of(&fields);
         let learnt_from = learnt_from(model, &known, options, simulated.is_some());
         let learnt = (learnt_from, &known);
         let survey = survey((&fields, &kept), &bench, baseline.as_ref(), options, learnt, model);
@@ -232,7 +232,7 @@ fn survey(
     survey.kind = bench.sensor.kind;
     survey.ablate(options.ablation, fields);
     survey.refits_sigma = options.calibrated_here && baseline.is_none();
-    let still = still(fields, camera, &[], kept);
+    let still = still(&beside_bias(fields, &[]), kept);
     survey.fixed_px2 = mean_of(still.into_iter().filter_map(|s| s.fixed_px2));
     if let Some(baseline) = baseline {
         survey.compared();

@@ -108,8 +108,8 @@ impl Baseline {
         let none = KnownTerms::default();
         let mut survey = Survey::of(&fields, camera, &bench.rays);
         survey.compared();
-        let kept = KeptPattern::of(&fields, camera);
-        let mut structure = structures(&fields, camera, &[], &kept);
+        let kept = KeptPattern::of(&fields);
+        let mut structure = structures(&fields, &[], &kept);
         let textures = texture_findings(&structure, &none, 0.03 * options.level);
         survey.compare_frames(&fields, common(&structure, &textures, &none));
         let whitener = Whitener { sigma: None, terms: &[], survey: &survey, bench };

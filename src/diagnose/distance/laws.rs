@@ -70,9 +70,9 @@ impl<'a> References<'a> {
     }
 
     /// On the others, and on a law that moves the views so far.
-    fn evidence(&self, law: Option<&[f64]>) -> Vec<Evidence> {
+    fn evidence(&self, law: Option<&dyn Fn(&ReferencedView) -> f64>) -> Vec<Evidence> {
         let of = |(n, c): (usize, &ReferencedView)| {
-            let law = law.map(|moves| moves[n]);
+            let law = law.map(|moves| moves(c));
             let g = DVector::from_iterator(
                 self.others[n].len() + usize::from(law.is_some()),
                 self.others[n].iter().copied().chain(law),
@@ -91,9 +91,9 @@ impl<'a> References<'a> {
         moves: impl Fn(&ReferencedView) -> f64,
     ) -> Option<Law> {
         let checked = self.checked;
-        let moves: Vec<f64> = checked.iter().map(moves).collect();
         let beside = self.others.first().map_or(0, Vec::len);
         let views = self.evidence(Some(&moves));
+        let moves: Vec<f64> = checked.iter().map(moves).collect();
         let mut gain = gain(&views, PRIOR)?;
         if beside > 0 {
             gain.total -= self::gain(&self.evidence(None), PRIOR).map_or(0.0, |alone| alone.total);
@@ -138,7 +138,7 @@ pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances) -> Vec<Law> {
     if checked.len() < FEWEST {
         return Vec::new();
     }
-    let references = References::of(checked, nuisances);
+    let mut references = References::of(checked, nuisances);
     let mut laws = Vec::from_iter(references.law("depth-scale", Axis::Z, |c| c.z));
     // An offset of the disparity by delta px moves the depth by -z^2 delta / (f b).
     if nuisances.open.is_empty() {
@@ -149,10 +149,11 @@ pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances) -> Vec<Law> {
         references.law("thermal-drift", Axis::SessionTime, warm)
     }));
     // The variance was measured with few degrees of freedom: a Student's t in place of a Gaussian.
-    let References { others, scatter: Scatter { variances, freedom }, .. } = &references;
-    let wider = freedom / (freedom - 2.0).max(1.0);
-    let widened: Vec<f64> = variances.iter().map(|v| v * wider).collect();
-    if let Some(warm_up) = warm_up(checked, others, &widened) {
+    let Scatter { variances, freedom } = &mut references.scatter;
+    let wider = *freedom / (*freedom - 2.0).max(1.0);
+    variances.iter_mut().for_each(|v| *v *= wider);
+    let session_s = checked.iter().map(|r| r.session_s).fold(0.0, f64::max);
+    if let Some(warm_up) = warm_up(session_s, |moves| references.evidence(Some(moves))) {
         for law in laws.iter_mut().filter(|l| l.family == "thermal-drift") {
             law.estimate = warm_up.relative;
             law.settled = vec![("time_constant_s", warm_up.time_constant_s)];

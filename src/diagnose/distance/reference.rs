@@ -65,15 +65,10 @@ pub fn findings(
         let other = beta.abs() - 2.0 * error > SHARE * had.abs();
         return Vec::from_iter(other.then(|| contradicted(best, noise.p(calibrated_gain(best)))));
     }
-    let mut odds: Vec<(&'static str, f64)> = Vec::new();
-    for family in ["depth-scale", "disparity-offset", "thermal-drift"] {
-        let most = laws
-            .iter()
-            .filter(|l| l.family == family)
-            .map(|l| l.gain)
-            .fold(f64::NEG_INFINITY, f64::max);
-        odds.push((family, (0.5 * (most - best.gain)).exp()));
-    }
+    let mut odds = ["depth-scale", "disparity-offset", "thermal-drift"].map(|family| {
+        let gains = laws.iter().filter(|l| l.family == family).map(|l| l.gain);
+        (family, (0.5 * (gains.fold(f64::NEG_INFINITY, f64::max) - best.gain)).exp())
+    });
     odds.sort_by(|a, b| b.1.total_cmp(&a.1));
     // No law at all explains what chance does.
     let total: f64 = odds.iter().map(|o| o.1).sum::<f64>() + (-0.5 * best.gain).exp();
@@ -83,7 +78,7 @@ pub fn findings(
         .filter(|a| a.1 > MIN_PROBABILITY)
         .map(|(effect, p)| Alternative { effect, probability: Some(p) })
         .collect();
-    let close = odds.get(1).is_some_and(|o| o.1 > (-0.5 * AS_GOOD_NATS).exp());
+    let close = odds[1].1 > (-0.5 * AS_GOOD_NATS).exp();
     let mut parameters = match best.family {
         "depth-scale" => one("scale", 1.0 + beta, error),
         "disparity-offset" => one("offset_px", beta, error),

@@ -4,9 +4,8 @@
 //! then depends on the form of the approach. So the posterior is summed over several, and over all time
 //! constants that a sensor may have.
 
-use nalgebra::{DMatrix, DVector};
-
 use super::referenced_view::ReferencedView;
+use crate::diagnose::search::evidence::Evidence;
 use crate::diagnose::search::posterior::Posterior;
 use crate::stats::even;
 
@@ -31,26 +30,24 @@ const TYPICAL_TAU_S: f64 = 900.0;
 /// Sensors drift by a per cent or two at most (the card's source: some mm at 1 to 2 m, in 20 min).
 const USUAL: f64 = 0.02;
 
-/// From references that are off by these `variances`, m^2, with what of each is fitted `beside` the drift;
-/// `None` without a time.
+/// Of a session that lasted so long, s, by the `evidence` of its references on a drift that moves each of
+/// them by so much of its size, m, behind what is fitted beside it; `None` without a time.
 pub fn warm_up(
-    checked: &[ReferencedView],
-    beside: &[Vec<f64>],
-    variances: &[f64],
+    session_s: f64,
+    evidence: impl Fn(&dyn Fn(&ReferencedView) -> f64) -> Vec<Evidence>,
 ) -> Option<WarmUp> {
-    let session = checked.iter().map(|r| r.session_s).fold(0.0, f64::max);
-    if session <= 0.0 {
+    if session_s <= 0.0 {
         return None;
     }
-    let log = TAU_SESSIONS.map(|n| (n * session).ln());
+    let log = TAU_SESSIONS.map(|n| (n * session_s).ln());
     let nodes: Vec<Node> = COURSES
         .iter()
         .enumerate()
         .flat_map(|(course, of)| even(log, TAUS).map(move |log| (course, of, log.exp())))
         .filter_map(|(course, of, tau_s)| {
-            let (evidence, relative) = size(checked, beside, variances, &|t| of(t / tau_s))?;
+            let (likely, relative) = size(&evidence(&|c| c.z * of(c.session_s / tau_s)))?;
             let unlikely = 0.5 * (tau_s / TYPICAL_TAU_S).ln().powi(2);
-            Some(Node { course, tau_s, evidence: evidence - unlikely, relative })
+            Some(Node { course, tau_s, evidence: likely - unlikely, relative })
         })
         .collect();
     let told = nodes.iter().filter(|n| n.course == 0);
@@ -74,23 +71,10 @@ struct Node {
 }
 
 /// The drift's size by least squares, where its course is known, and how well that fits.
-fn size(
-    checked: &[ReferencedView],
-    beside: &[Vec<f64>],
-    variances: &[f64],
-    course: &dyn Fn(f64) -> f64,
-) -> Option<(f64, [f64; 2])> {
-    let others = beside.first()?.len();
-    let k = others + 1;
-    let (mut a, mut b) = (DMatrix::zeros(k, k), DVector::zeros(k));
-    for ((c, beside), variance) in checked.iter().zip(beside).zip(variances) {
-        let mut g = beside.clone();
-        g.push(c.z * course(c.session_s));
-        let g = DVector::from_vec(g);
-        a += &g * g.transpose() / *variance;
-        b += g * (c.off / variance);
-    }
-    for j in 0..k {
+fn size(views: &[Evidence]) -> Option<(f64, [f64; 2])> {
+    let others = views.first()?.b.len() - 1;
+    let Evidence { mut a, b } = Evidence::sum(others + 1, 0.0, views);
+    for j in 0..=others {
         // What stands beside is free: a whole unit of it is as likely as none.
         a[(j, j)] += if j == others { USUAL.powi(-2) } else { 1.0 };
     }
@@ -104,6 +88,7 @@ fn size(
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{DMatrix, DVector};
     use rand::Rng;
     use rand_distr::{Distribution, StandardNormal};
 
@@ -112,6 +97,18 @@ mod tests {
 
     const ERROR_M: f64 = 0.001;
     const PX_M: f64 = 43.5;
+
+    /// With nothing beside the drift.
+    fn found(checked: &[ReferencedView]) -> Option<WarmUp> {
+        let session_s = checked.iter().map(|r| r.session_s).fold(0.0, f64::max);
+        warm_up(session_s, |moves| {
+            let of = |c: &ReferencedView| Evidence {
+                a: DMatrix::from_element(1, 1, (moves(c) / ERROR_M).powi(2)),
+                b: DVector::from_element(1, moves(c) * c.off / ERROR_M.powi(2)),
+            };
+            checked.iter().map(of).collect()
+        })
+    }
 
     /// Sessions of an hour at most, by each course; what is told of the end of a drift that the
     /// session did not see is to hold it: 90 % of 40 are 36, and 31 or fewer have a chance of 2 %.
@@ -132,8 +129,7 @@ mod tests {
                         ReferencedView { session_s: at_s, ..ReferencedView::ahead(z, off, PX_M) }
                     })
                     .collect();
-                let told = warm_up(&checked, &vec![Vec::new(); 16], &[ERROR_M * ERROR_M; 16])
-                    .expect("a drift");
+                let told = found(&checked).expect("a drift");
                 let numbers = [(told.relative, relative), (told.time_constant_s, tau_s)];
                 for (k, ([said, error], truth)) in numbers.into_iter().enumerate() {
                     held[k] += usize::from((said - truth).abs() <= 1.645 * error);
@@ -147,7 +143,7 @@ mod tests {
     #[test]
     fn no_time_no_drift() {
         let still = [0.8, 1.5, 2.5].map(|z| ReferencedView::ahead(z, 0.001, PX_M));
-        assert!(warm_up(&still, &vec![Vec::new(); 3], &[ERROR_M * ERROR_M; 3]).is_none());
-        assert!(warm_up(&[], &[], &[]).is_none());
+        assert!(found(&still).is_none());
+        assert!(found(&[]).is_none());
     }
 }

@@ -127,9 +127,6 @@ pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<T
     let std_error = slope.hypot(width - whole);
     let edge = share.value * footprint(0, width);
     Some(TextureFinding {
-        families: vec!["edge-mixing"],
-        statistic: Statistic::Bias,
-        axis: Axis::EdgeDistance,
         interval: [0.0, width],
         parameters: one("width_px", whole, std_error),
         size_sigma: edge * step_sigmas(&edges),
@@ -139,5 +136,6 @@ pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<T
             "the target's last pixel is off by {:.2} % of the step to what is behind",
             100.0 * edge
         )),
+        ..TextureFinding::named(vec!["edge-mixing"], Statistic::Bias, Axis::EdgeDistance)
     })
 }

@@ -24,21 +24,12 @@ pub struct Sums {
     pub square: f64,
 }
 
-/// What is lost on one side of the target.
+/// One view's pixels beside the target, over so many rows.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Side {
-    rows: usize,
-    /// Sum over rows and frames of the width lost, less what is lost anyway, px.
-    lost_px: f64,
-    /// Sum over the rows of the width that geometry has, px.
-    shaded_px: f64,
-}
-
-/// One view's pixels beside the target in a frame: lost, and in the shadow by geometry, over so many
-/// rows.
-#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeLoss {
+    /// Sum over the rows of the width lost, less what is lost anyway.
     pub lost: f64,
+    /// Sum over the rows of the width that geometry has.
     pub shaded: f64,
     pub rows: f64,
 }
@@ -62,25 +53,25 @@ pub struct Edges {
     crossings: Vec<Crossing>,
     frames: usize,
     pub inside: [Sums; INSIDE_PX],
-    sides: [Side; 2],
+    /// Left and right; what is lost, in all frames.
+    sides: [EdgeLoss; 2],
     pub sigma_px: f64,
     /// From the target down to what is behind, px.
     pub step_px: f64,
 }
 
 /// Rows of fewer pixels than this show nothing of a side.
-const FEWEST_ROWS: usize = 8;
+const FEWEST_ROWS: f64 = 8.0;
 
 impl Edges {
     /// Pixels lost in a frame on a side (0 left, 1 right).
     pub fn lost_px(&self, side: usize) -> f64 {
-        self.sides[side].lost_px / self.frames.max(1) as f64
+        self.sides[side].lost / self.frames.max(1) as f64
     }
 
-    /// What is beside the target on a side; `None` where too few rows were seen.
+    /// What is beside the target on a side in a frame; `None` where too few rows were seen.
     pub fn beside(&self, side: usize) -> Option<EdgeLoss> {
-        let (lost, side) = (self.lost_px(side), &self.sides[side]);
-        let beside = EdgeLoss { lost, shaded: side.shaded_px, rows: side.rows as f64 };
-        (side.rows >= FEWEST_ROWS).then_some(beside)
+        let beside = EdgeLoss { lost: self.lost_px(side), ..self.sides[side] };
+        (beside.rows >= FEWEST_ROWS).then_some(beside)
     }
 }

@@ -35,8 +35,8 @@ impl Edges {
                 let own = scan.plane(crossing.last);
                 sigma += noise * (own + crossing.step) / own;
                 if let Some(side) = crossing.side {
-                    edges.sides[side].rows += 1;
-                    edges.sides[side].shaded_px -= crossing.step;
+                    edges.sides[side].rows += 1.0;
+                    edges.sides[side].shaded -= crossing.step;
                 }
                 edges.crossings.push(crossing);
             }
@@ -79,7 +79,7 @@ impl Edges {
                 };
                 let beyond = shadow + fringe_px(field.width);
                 let anyway = lost(beyond..beyond + BEYOND_PX) / BEYOND_PX as f64;
-                self.sides[side].lost_px += lost(0..shadow) - anyway * shadow as f64;
+                self.sides[side].lost += lost(0..shadow) - anyway * shadow as f64;
             }
         }
     }

@@ -56,6 +56,8 @@ pub(in crate::diagnose) fn velocity(views: &[Structure]) -> Option<(f64, f64, f6
 
 /// Noise of a frame's mean about the line of its view.
 struct FrameNoise {
+    /// Degrees of freedom of all frames.
+    freedom: f64,
     /// What all frames scatter by beside what their pixels explain, px^2; negative where they scatter less.
     extra_px2: f64,
     /// Squared coefficient of variation of the views' own variances about that, beyond chance.
@@ -66,7 +68,7 @@ impl FrameNoise {
     fn of(all: &[Jitter]) -> Self {
         let freedom: f64 = all.iter().map(|j| j.freedom).sum();
         let beside: f64 = all.iter().map(|j| j.scatter_px2 - j.freedom * j.expected_px2).sum();
-        let mut noise = FrameNoise { extra_px2: beside / freedom, cv2: 0.0 };
+        let mut noise = FrameNoise { freedom, extra_px2: beside / freedom, cv2: 0.0 };
         // Of r, a ratio with f degrees of freedom, (r - 1)^2 is cv2 (1 + 2 / f) + 2 / f on average.
         let off = |j: &Jitter| {
             let by_chance = 2.0 / j.freedom;
@@ -106,11 +108,10 @@ pub(in crate::diagnose) fn frame_means(
     rho: f64,
 ) -> Vec<TextureFinding> {
     let all: Vec<Jitter> = views.iter().filter_map(|s| s.jitter).collect();
-    let freedom: f64 = all.iter().map(|j| j.freedom).sum();
-    if all.len() < 2 || freedom < 2.0 {
+    let noise = FrameNoise::of(&all);
+    if all.len() < 2 || noise.freedom < 2.0 {
         return Vec::new();
     }
-    let noise = FrameNoise::of(&all);
     let mut found = Vec::new();
     found.extend((!known.has("target-motion")).then(|| motion(&all, &noise, level, rho)).flatten());
     // A motion that is not uniform scatters about its line.
@@ -125,15 +126,14 @@ pub(in crate::diagnose) fn frame_means(
 /// Motion: the line explains more than the scatter about it does, or all views move alike.
 fn motion(all: &[Jitter], noise: &FrameNoise, level: f64, rho: f64) -> Option<TextureFinding> {
     let n = all.len() as f64;
-    let freedom: f64 = all.iter().map(|j| j.freedom).sum();
     let by_noise =
         |of: &dyn Fn(&Jitter) -> f64| all.iter().map(|j| of(j) / noise.px2(j)).sum::<f64>();
     let line = by_noise(&|j| j.trend_px2) / n;
-    let about_it = (by_noise(&|j| j.scatter_px2) / freedom).max(1.0);
+    let about_it = (by_noise(&|j| j.scatter_px2) / noise.freedom).max(1.0);
     // Frames that resemble their neighbours wander.
     let wander = (1.0 + rho) / (1.0 - rho).max(0.05);
     let f = line / (about_it * wander * wander);
-    let p_line = FisherSnedecor::new(n, freedom).map_or(1.0, |d| d.sf(f));
+    let p_line = FisherSnedecor::new(n, noise.freedom).map_or(1.0, |d| d.sf(f));
     let steady = Motion::of(all, noise).filter(|m| m.p < 0.5 * level);
     if steady.is_none() && !(p_line < 0.5 * level && f > 3.0) {
         return None;
@@ -148,15 +148,10 @@ fn motion(all: &[Jitter], noise: &FrameNoise, level: f64, rho: f64) -> Option<Te
     });
     let std_error = std_error.hypot(UNEVEN * velocity_mps);
     Some(TextureFinding {
-        families: vec!["target-motion"],
-        statistic: Statistic::Bias,
-        axis: Axis::Frame,
-        interval: [0.0, 0.0],
         parameters: one("velocity_mps", velocity_mps, std_error),
-        size_sigma: 0.0,
         p: p.max(1e-300),
         nats,
-        words: None,
+        ..TextureFinding::named(vec!["target-motion"], Statistic::Bias, Axis::Frame)
     })
 }
 
@@ -169,27 +164,26 @@ fn jitter(
     variance_px2: f64,
     level: f64,
 ) -> Option<TextureFinding> {
-    let freedom: f64 = all.iter().map(|j| j.freedom).sum();
     let ratio: f64 = all
         .iter()
         .map(|j| j.scatter_px2 / (j.expected_px2 + known_px * known_px).max(1e-300))
         .sum();
-    let p = ChiSquared::new(freedom).map_or(1.0, |d| d.sf(ratio / JITTER));
+    let p = ChiSquared::new(noise.freedom).map_or(1.0, |d| d.sf(ratio / JITTER));
     let jitter_px2 = noise.extra_px2;
     if !(p < level && jitter_px2 > 0.0) {
         return None;
     }
     let sigma = jitter_px2.sqrt();
     Some(TextureFinding {
-        families: vec!["frame-jitter"],
-        statistic: Statistic::Correlation,
-        axis: Axis::Frame,
-        interval: [0.0, 0.0],
-        parameters: one("sigma_px", sigma, sigma * UNEVEN.hypot(1.0 / (2.0 * freedom).sqrt())),
+        parameters: one(
+            "sigma_px",
+            sigma,
+            sigma * UNEVEN.hypot(1.0 / (2.0 * noise.freedom).sqrt()),
+        ),
         size_sigma: (jitter_px2 / variance_px2.max(1e-12)).sqrt(),
         p: p.max(1e-300),
-        nats: 0.5 * freedom * (ratio / freedom).ln().max(0.0),
-        words: None,
+        nats: 0.5 * noise.freedom * (ratio / noise.freedom).ln().max(0.0),
+        ..TextureFinding::named(vec!["frame-jitter"], Statistic::Correlation, Axis::Frame)
     })
 }
 

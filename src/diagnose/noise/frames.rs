@@ -15,7 +15,7 @@ pub fn unequal(views: &[Structure], level: f64) -> Option<TextureFinding> {
         .filter_map(|j| {
             let m = ViewMean::of(views, |s| s.frame_log_variance[j])?;
             // Either way, and any of the frames.
-            let p = 2.0 * m.p_above(0.0).min(ViewMean { value: -m.value, ..m }.p_above(0.0));
+            let p = 2.0 * m.p_above(0.0).min(m.p_below(0.0));
             Some((j, m, (p * FRAMES_KEPT as f64).min(1.0)))
         })
         .min_by(|a, b| a.2.total_cmp(&b.2))?;
@@ -26,15 +26,12 @@ pub fn unequal(views: &[Structure], level: f64) -> Option<TextureFinding> {
     let mut parameters = one("log_variance", m.value, m.std_error);
     parameters.insert("frame".into(), json!(frame));
     Some(TextureFinding {
-        families: vec![],
-        statistic: Statistic::Variance,
-        axis: Axis::Frame,
-        interval: [0.0, 0.0],
         parameters,
         size_sigma: ((0.5 * m.value).exp() - 1.0).abs(),
         p,
         nats: nats(&m, 0.0),
         words: Some(format!("frame {} of every view has {more} noise than the others", frame + 1)),
+        ..TextureFinding::named(vec![], Statistic::Variance, Axis::Frame)
     })
 }
 

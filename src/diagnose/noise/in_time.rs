@@ -23,15 +23,12 @@ fn of_frames(
     (p, nats): (f64, f64),
 ) -> TextureFinding {
     TextureFinding {
-        families,
-        statistic: Statistic::Correlation,
-        axis: Axis::Frame,
         interval,
         parameters: one(name, share, std_error),
         size_sigma: size.max(0.0).sqrt(),
         p,
         nats,
-        words: None,
+        ..TextureFinding::named(families, Statistic::Correlation, Axis::Frame)
     }
 }
 
@@ -131,23 +128,24 @@ fn by_chance(views: &[Structure]) -> f64 {
 pub fn still_level(views: &[Structure]) -> Option<f64> {
     let mean = |of: &dyn Fn(&Structure) -> Option<f64>| ViewMean::of(views, of).map(|m| m.value);
     let (c1, c2, c3) = (mean(&|s| s.lagged[0])?, mean(&|s| s.lagged[1])?, mean(&|s| s.lagged[2]));
-    let share = still_share([c1, c2, c3.unwrap_or(c2 * c2 / c1.max(1e-6))], c3.is_some());
+    let share = still_share(c1, c2, c3);
     let fixed = mean(&|s| s.fixed_px2).unwrap_or(0.0).max(0.0);
     let variance = mean(&|s| Some(s.variance_px2)).unwrap_or(0.0);
     Some(share - fixed / variance.max(1e-12))
 }
 
-/// The s of c_k = s + (1 - s) rho^k, from the correlations at lags one to three.
-pub(in crate::diagnose) fn still_share([c1, c2, c3]: [f64; 3], three: bool) -> f64 {
-    let (near, far) = (c1 - c2, c2 - c3);
-    if !three {
+/// The s of c_k = s + (1 - s) rho^k, from the correlations at lags one, two and, where there are frames
+/// enough, three.
+pub(in crate::diagnose) fn still_share(c1: f64, c2: f64, c3: Option<f64>) -> f64 {
+    let near = c1 - c2;
+    let Some(c3) = c3 else {
         // rho^2 = rho * rho alone cannot be told from a share: what falls is taken as a filter's.
         return if near > 0.05 * c1 { 0.0 } else { c2 };
-    }
+    };
     if near <= 0.01 {
         return (c1 + c2 + c3) / 3.0;
     }
-    let rho = (far / near).clamp(0.0, 0.95);
+    let rho = ((c2 - c3) / near).clamp(0.0, 0.95);
     // c1 - c2 = (1 - s) rho (1 - rho); a moving average dies at once and leaves the last.
     let s = if rho < 0.05 { c3 } else { 1.0 - near / (rho * (1.0 - rho)) };
     s.clamp(0.0, c3.max(0.0))

@@ -10,8 +10,7 @@
 //!
 //! is none for Gaussian noise whose size changes little from x to y.
 
-use super::tail_counts::FEWEST_READINGS;
-use crate::diagnose::views::patches::patches;
+use super::tail_counts::{FEWEST_READINGS, patches};
 
 /// Residuals farther out, in standard deviations, are [`super::tails`]' to count: one gross error of 30
 /// would outweigh a million others here.

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::still::beside_bias;
 use super::texture::pixel_scale;
 use crate::diagnose::views::field::Field;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
@@ -17,13 +18,11 @@ type Sums = Vec<(f64, f64)>;
 pub fn lines(fields: &[Field], bias: &[Vec<f32>]) -> (Vec<Term>, Vec<f64>) {
     let Some(first) = fields.first() else { return Default::default() };
     let (width, height) = (first.width, first.height);
-    let none = Vec::new();
-    let by_view: Vec<[Sums; 2]> = fields
+    let by_view: Vec<[Sums; 2]> = beside_bias(fields, bias)
         .par_iter()
-        .enumerate()
-        .map(|(n, field)| {
+        .map(|(field, bias)| {
             let mut sums = [vec![(0.0, 0.0); width], vec![(0.0, 0.0); height]];
-            let image = pixel_scale(field, &field.mean, bias.get(n).unwrap_or(&none));
+            let image = pixel_scale(field, &field.mean, bias);
             for (i, &r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
                 for (sums, line) in sums.iter_mut().zip([i % width, i / width]) {
                     sums[line].0 += f64::from(r);

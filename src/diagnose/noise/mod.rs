@@ -63,15 +63,12 @@ pub(in crate::diagnose) fn window(
     let length = m.value.exp();
     let p = m.p_above(expected.ln());
     let found = |interval, parameters, size_sigma, p, nats| TextureFinding {
-        families: vec!["spatial-correlation"],
-        statistic: Statistic::Correlation,
-        axis: Axis::PixelLag,
         interval,
         parameters,
         size_sigma,
         p,
         nats,
-        words: None,
+        ..TextureFinding::named(vec!["spatial-correlation"], Statistic::Correlation, Axis::PixelLag)
     };
     let part = part(views).filter(|w| expected == 1.0 && w.share[0] + 2.0 * w.share[1] < WHOLE);
     let of_part = |Window { length, share }: Window| {

@@ -37,9 +37,8 @@ const SIGMA: f64 = 0.05;
 /// known to the share `scatter`; `None` where hardly any are counted.
 pub fn outliers(counts: &TailCounts, scatter: f64) -> Option<Outliers> {
     let own = |t: f64| counts.n * FORMS[0](t);
-    let seen: Vec<f64> = counts.between.to_vec();
     let chance: Vec<f64> = TAIL_EDGES.windows(2).map(|w| own(w[0]) - own(w[1])).collect();
-    let more: f64 = seen.iter().sum::<f64>() - chance.iter().sum::<f64>();
+    let more: f64 = counts.between.iter().sum::<f64>() - chance.iter().sum::<f64>();
     if more <= 0.0 || counts.n <= 0.0 {
         return None;
     }
@@ -60,7 +59,7 @@ pub fn outliers(counts: &TailCounts, scatter: f64) -> Option<Outliers> {
             if fraction >= 1.0 {
                 continue;
             }
-            let bins = TAIL_EDGES.windows(2).zip(seen.iter().zip(&chance));
+            let bins = TAIL_EDGES.windows(2).zip(counts.between.iter().zip(&chance));
             let misfit = bins.map(|(w, (seen, chance))| {
                 let expected = chance + more * (beyond(w[0]) - beyond(w[1])) / inside;
                 let variance = expected + (SIGMA * expected).powi(2);

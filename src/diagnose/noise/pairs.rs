@@ -5,8 +5,12 @@
 //! row shares; the products with a box around each pixel are that of one it shares with its
 //! neighbours. Each costs a pass over the image.
 
+use nalgebra::Vector3;
+
 use super::texture::without_outliers;
 use crate::diagnose::views::box_sums::over_boxes;
+use crate::solve::plane_equations;
+use crate::stats::mean;
 
 /// As far as neighbours are looked at, px.
 pub const REACH_PX: usize = 4;
@@ -33,8 +37,7 @@ impl Pairs {
         let level = without_outliers(&without_plane(image, width)?);
         let height = level.len() / width;
         let pixels = level.iter().filter(|r| r.is_finite()).count() as f64;
-        let power =
-            level.iter().filter(|r| r.is_finite()).map(|r| square(*r)).sum::<f64>() / pixels;
+        let power = mean(level.iter().map(|r| f64::from(*r).powi(2)))?;
         let beside = neighbours(&level, width);
         if beside.pairs < FEWEST_PAIRS {
             return None;
@@ -64,10 +67,6 @@ const ON_THE_LINE: f64 = (2 * REACH_PX) as f64 / NEIGHBOURS as f64;
 /// `rho` on average.
 pub fn window_of(rho: f64) -> f64 {
     (1.0 + NEIGHBOURS as f64 * rho).max(1.0).sqrt()
-}
-
-fn square(r: f32) -> f64 {
-    f64::from(r).powi(2)
 }
 
 /// Products of pairs, each pair met twice, and their number.
@@ -121,19 +120,15 @@ fn neighbours(image: &[f32], width: usize) -> Sum {
 /// Less its plane by least squares; `None` with too few pixels for one.
 fn without_plane(image: &[f32], width: usize) -> Option<Vec<f32>> {
     let (u0, v0) = (0.5 * width as f64, 0.5 * (image.len() / width) as f64);
-    let column = |i: usize| {
-        let (u, v) = ((i % width) as f64, (i / width) as f64);
-        nalgebra::Vector3::new(1.0, (u - u0) / u0, (v - v0) / v0)
+    let place = |i: usize| [((i % width) as f64 - u0) / u0, ((i / width) as f64 - v0) / v0];
+    let points = image.iter().enumerate().map(|(i, r)| (place(i), f64::from(*r), 1.0));
+    let (a, b) = plane_equations(points);
+    let plane = a.cholesky()?.solve(&b);
+    let less = |(i, r): (usize, &f32)| {
+        let [x, y] = place(i);
+        r - plane.dot(&Vector3::new(1.0, x, y)) as f32
     };
-    let mut square = nalgebra::Matrix3::zeros();
-    let mut right = nalgebra::Vector3::zeros();
-    for (i, r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
-        let x = column(i);
-        square += x * x.transpose();
-        right += x * f64::from(*r);
-    }
-    let plane = square.cholesky()?.solve(&right);
-    Some(image.iter().enumerate().map(|(i, r)| r - plane.dot(&column(i)) as f32).collect())
+    Some(image.iter().enumerate().map(less).collect())
 }
 
 #[cfg(test)]

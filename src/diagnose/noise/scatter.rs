@@ -26,7 +26,7 @@ impl Case<'_> {
     pub fn scatter(&mut self, mean: &MeanResult) -> ScatterResult {
         self.at("searching the noise", "testing the noise again");
         let camera = &self.recording.sensor.camera;
-        let mut structure = structures(&self.fields, camera, &mean.px, &self.kept);
+        let mut structure = structures(&self.fields, &mean.px, &self.kept);
         let lattice = self.lattice;
         let own = Steps::of(&lattice, &structure, &self.fields, self.recording);
         if own_step(&lattice, self.recording, self.fields[0].scale_px_m).is_none() {

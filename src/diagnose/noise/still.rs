@@ -4,7 +4,6 @@ use rand::Rng;
 use rayon::prelude::*;
 
 use super::texture::{SHORT_LINE, pixel_scale, without_lines};
-use crate::camera::Camera;
 use crate::diagnose::views::field::Field;
 use crate::rng::Seed;
 
@@ -31,37 +30,33 @@ impl Still {
 pub struct KeptPattern(Vec<Still>);
 
 impl KeptPattern {
-    pub fn of(fields: &[Field], camera: &Camera) -> Self {
-        let coins = coins(camera.width * camera.height);
-        KeptPattern(covariances(fields, camera, |n| {
-            pixel_scale(&fields[n], &tossed(&fields[n], &coins), &[])
-        }))
+    pub fn of(fields: &[Field]) -> Self {
+        let coins = coins(fields.first().map_or(0, |f| f.width * f.height));
+        let views = beside_bias(fields, &[]);
+        KeptPattern(covariances(&views, |f, _| pixel_scale(f, &tossed(f, &coins), &[])))
     }
 }
 
-/// Of the fields that `kept` was made of. `bias` has, view by view, what is known to be no noise, px (or is
-/// empty).
-pub fn still(
-    fields: &[Field],
-    camera: &Camera,
-    bias: &[Vec<f32>],
-    kept: &KeptPattern,
-) -> Vec<Still> {
-    let seen = covariances(fields, camera, |n| {
-        pixel_scale(&fields[n], &fields[n].mean, bias.get(n).map_or(&[], Vec::as_slice))
-    });
+/// Each view with what is known of it to be no noise, px, by pixel (or nothing).
+pub fn beside_bias<'a>(fields: &'a [Field], bias: &'a [Vec<f32>]) -> Vec<(&'a Field, &'a [f32])> {
+    let of = |n: usize| bias.get(n).map_or(&[][..], Vec::as_slice);
+    fields.iter().enumerate().map(|(n, f)| (f, of(n))).collect()
+}
+
+/// Of the views that `kept` was made of, each with what is known of it to be no noise.
+pub fn still(views: &[(&Field, &[f32])], kept: &KeptPattern) -> Vec<Still> {
+    let seen = covariances(views, |f, b| pixel_scale(f, &f.mean, b));
     seen.iter().zip(&kept.0).map(|(seen, kept)| seen.over(kept)).collect()
 }
 
-/// Of the fields' images, by their numbers.
 fn covariances(
-    fields: &[Field],
-    camera: &Camera,
-    image: impl Fn(usize) -> Vec<f32> + Sync + Send,
+    views: &[(&Field, &[f32])],
+    image: impl Fn(&Field, &[f32]) -> Vec<f32> + Sync,
 ) -> Vec<Still> {
-    let mut images: Vec<Vec<f32>> = (0..fields.len()).into_par_iter().map(image).collect();
+    let mut images: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| image(f, b)).collect();
     let with_lines = across_views(&images);
-    images.par_iter_mut().for_each(|m| *m = without_lines(m, camera.width, SHORT_LINE));
+    let of_views = images.par_iter_mut().zip(views);
+    of_views.for_each(|(m, (f, _))| *m = without_lines(m, f.width, SHORT_LINE));
     let both = across_views(&images).into_iter().zip(with_lines);
     both.map(|(fixed_px2, with_lines_px2)| Still { fixed_px2, with_lines_px2 }).collect()
 }
@@ -138,8 +133,8 @@ mod tests {
                 field
             })
             .into();
-        let kept = KeptPattern::of(&fields, &camera);
-        let seen: Vec<[f64; 2]> = still(&fields, &camera, &[], &kept)
+        let kept = KeptPattern::of(&fields);
+        let seen: Vec<[f64; 2]> = still(&beside_bias(&fields, &[]), &kept)
             .iter()
             .map(|s| [s.fixed_px2, s.with_lines_px2])
             .map(|both| both.map(|px2| px2.expect("large enough") / PATTERN_PX.powi(2)))

@@ -6,13 +6,12 @@ use rayon::prelude::*;
 
 use super::kurtosis::FourthMoment;
 use super::pairs::Pairs;
-use super::still::{KeptPattern, Still, still};
+use super::still::{KeptPattern, Still, beside_bias, still};
 use super::tail_counts::{FEWEST_READINGS, TailCounts};
 use super::texture::{
     FAR, Filled, LONG_LINE, PROFILE_LAGS, SHORT_LINE, changes, covariance, frame_log_variance,
     high_passed, moving, same_pixel, without_lines, without_outliers,
 };
-use crate::camera::Camera;
 use crate::diagnose::options::FRAMES_KEPT;
 use crate::diagnose::views::field::Field;
 use crate::stats::{Correlation, mean, measure_correlation};
@@ -91,15 +90,10 @@ pub struct Jitter {
 }
 
 /// Measure all views. `bias` has, view by view, what is known to be no noise, px (or is empty).
-pub fn structures(
-    fields: &[Field],
-    camera: &Camera,
-    bias: &[Vec<f32>],
-    kept: &KeptPattern,
-) -> Vec<Structure> {
-    let of = |(n, f): (usize, &Field)| structure(f, camera, bias.get(n).map_or(&[], Vec::as_slice));
-    let mut all: Vec<Structure> = fields.par_iter().enumerate().map(of).collect();
-    for (s, still) in all.iter_mut().zip(still(fields, camera, bias, kept)) {
+pub fn structures(fields: &[Field], bias: &[Vec<f32>], kept: &KeptPattern) -> Vec<Structure> {
+    let views = beside_bias(fields, bias);
+    let mut all: Vec<Structure> = views.par_iter().map(|(f, b)| structure(f, b)).collect();
+    for (s, still) in all.iter_mut().zip(still(&views, kept)) {
         let Still { fixed_px2, with_lines_px2 } = still;
         s.fixed_px2 = fixed_px2;
         s.lines_px2 = with_lines_px2.zip(fixed_px2).map(|(all, fixed)| all - fixed);
@@ -107,7 +101,7 @@ pub fn structures(
     all
 }
 
-fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
+fn structure(field: &Field, bias: &[f32]) -> Structure {
     let mut s = Structure::default();
     let frames: Vec<Vec<f32>> =
         field.first.iter().map(|r| without_outliers(&high_passed(field, r, bias))).collect();
@@ -115,25 +109,25 @@ fn structure(field: &Field, camera: &Camera, bias: &[f32]) -> Structure {
     s.pixels = first.iter().filter(|r| r.is_finite()).count() as f64;
     s.variance_px2 = mean(first.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
     let level: Vec<Vec<f32>> =
-        frames.iter().map(|f| without_lines(f, camera.width, SHORT_LINE)).collect();
+        frames.iter().map(|f| without_lines(f, field.width, SHORT_LINE)).collect();
     for lag in 1..frames.len().min(4) {
         let pairs = (0..frames.len() - lag).map(|k| same_pixel(&level[k], &level[k + lag]));
         s.lagged[lag - 1] = mean(pairs);
     }
     let noise = moving(&frames, s.lagged[0]);
-    let lines = without_lines(&noise, camera.width, LONG_LINE);
+    let lines = without_lines(&noise, field.width, LONG_LINE);
     s.frame_log_variance = frame_log_variance(&frames);
     let images: Vec<Vec<f32>> = field.first.iter().map(|r| field.image(r)).collect();
     let pairs: Option<Vec<Pairs>> =
-        changes(&images).iter().map(|change| Pairs::of(change, camera.width)).collect();
+        changes(&images).iter().map(|change| Pairs::of(change, field.width)).collect();
     if let Some(pairs) = pairs.filter(|p| !p.is_empty()) {
         let all = |of: fn(&Pairs) -> Option<f64>| mean(pairs.iter().filter_map(of));
         (s.row_px2, s.column_px2) = (all(|p| p.row), all(|p| p.column));
         s.neighbour_correlation = all(|p| Some(p.near / p.power.max(1e-12)));
         s.correlation_profile =
-            correlation_profile(&changes(&frames), camera, [s.row_px2, s.column_px2]);
+            correlation_profile(&changes(&frames), field.width, [s.row_px2, s.column_px2]);
     }
-    let correlation = measure_correlation(&lines, camera.width);
+    let correlation = measure_correlation(&lines, field.width);
     // What whole rows share is no window's: it stands in the correlation at every lag.
     let share = |px2: Option<f64>| (px2.unwrap_or(0.0) / s.variance_px2.max(1e-12)).max(0.0);
     let along = |correlation_profile: &[f64], share: f64| {
@@ -186,13 +180,13 @@ fn jitter(field: &Field, s: &Structure, correlation_sum: f64) -> Option<Jitter> 
 /// `lines` share, px^2.
 fn correlation_profile(
     changes: &[Vec<f32>],
-    camera: &Camera,
+    width: usize,
     [row, column]: [Option<f64>; 2],
 ) -> Option<[f64; PROFILE_LAGS]> {
     let filled: Vec<Filled> = changes.iter().map(|c| Filled::of(c)).collect();
     let over = |lags: &[usize], step: [usize; 2]| {
         let all: Option<Vec<f64>> =
-            filled.iter().map(|c| covariance(c, camera, lags, step)).collect();
+            filled.iter().map(|c| covariance(c, width, lags, step)).collect();
         mean(all?.into_iter())
     };
     // Taking out what is smooth leaves a little of everything everywhere: what a diagonal shows is

@@ -1,10 +1,12 @@
 //! How many residuals lie how far out, in standard deviations of their patch.
 
-use crate::diagnose::views::patches::patches;
+use crate::stats::{MAD_TO_SIGMA, median_in_place};
 
 /// A Gaussian's share beyond four standard deviations.
 pub const GAUSSIAN_TAIL: f64 = 6.334e-5;
 const TAIL_SIGMAS: f32 = 4.0;
+/// Views too small to show a tail, in readings.
+pub const FEWEST_READINGS: f64 = 5000.0;
 /// What lies beyond the last is no tail of the noise: a few such errors would decide its mean.
 pub const TAIL_EDGES: [f64; 6] = [4.0, 5.0, 6.0, 8.0, 11.0, 16.0];
 
@@ -48,5 +50,46 @@ pub fn tail(image: &[f32], width: usize) -> TailCounts {
     counts
 }
 
-/// Views too small to show a tail, in readings.
-pub const FEWEST_READINGS: f64 = 5000.0;
+/// So many patches fit across the picture ...
+const PATCHES_ACROSS: usize = 7;
+/// ... unless their sides would be shorter than this, px.
+const SMALLEST_PATCH: usize = 40;
+
+/// The pixels of a patch that have a residual, and their standard deviation; what strays has no say in
+/// it.
+pub struct Patch {
+    pub pixels: Vec<usize>,
+    pub sigma: f32,
+    /// The words are so coarse that the median says less than the bulk's spread.
+    pub coarse: bool,
+}
+
+/// Those of an image that are a quarter full or more: row by row, `width` px a row, in any unit, NaN
+/// where there is no residual.
+pub fn patches(image: &[f32], width: usize) -> impl Iterator<Item = Patch> + '_ {
+    let side = (width / PATCHES_ACROSS).max(SMALLEST_PATCH);
+    let height = image.len() / width.max(1);
+    let corners = (0..height)
+        .step_by(side)
+        .flat_map(move |v0| (0..width).step_by(side).map(move |u0| [u0, v0]));
+    corners.filter_map(move |[u0, v0]| {
+        let (rows, end) = (v0..(v0 + side).min(height), (u0 + side).min(width));
+        let all = rows.flat_map(|v| v * width + u0..v * width + end);
+        let pixels: Vec<usize> = all.filter(|i| image[*i].is_finite()).collect();
+        if pixels.len() < side * side / 4 {
+            return None;
+        }
+        let mut sizes: Vec<f32> = pixels.iter().map(|i| image[*i].abs()).collect();
+        let mad = MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
+        // Coarse words make the median jump; the bulk's own spread bounds it below.
+        let end = sizes.len() * 9 / 10;
+        sizes.select_nth_unstable_by(end, f32::total_cmp);
+        let most = &sizes[..end];
+        let square: f64 = most.iter().map(|r| f64::from(*r).powi(2)).sum();
+        // The inner nine tenths of a Gaussian have .6225 of its variance.
+        let spread = (square / most.len() as f64 / 0.6225).sqrt() as f32;
+        let sigma = mad.max(0.8 * spread);
+        let coarse = mad < sigma;
+        (sigma > 0.0).then_some(Patch { pixels, sigma, coarse })
+    })
+}

@@ -73,15 +73,12 @@ pub fn tails(
     }
     let readings: f64 = views.iter().map(|s| s.tails.n).sum();
     Some(TextureFinding {
-        families: vec!["heavy-tails"],
-        statistic: Statistic::Distribution,
-        axis: Axis::Residual,
         interval: [4.0, 2.0 * mean_size(&counts) - 4.0],
         parameters,
         size_sigma,
         p: share.p_above(own),
         nats: share.value * readings * (share.value / own).ln(),
-        words: None,
+        ..TextureFinding::named(vec!["heavy-tails"], Statistic::Distribution, Axis::Residual)
     })
 }
 
@@ -117,16 +114,13 @@ fn weak(
     parameters.insert("fraction".into(), estimate(WEAK_FRACTION, WEAK_FRACTION));
     parameters.insert("scale".into(), estimate(scale(k), scale_error));
     Some(TextureFinding {
-        families: vec!["heavy-tails"],
-        statistic: Statistic::Distribution,
-        axis: Axis::Residual,
         interval: [2.0, TAIL_EDGES[0]],
         parameters,
         // Of the wide part's variance beyond the noise's, the share that is drawn from it.
         size_sigma: (WEAK_FRACTION * (scale(k).powi(2) - 1.0)).sqrt(),
         p,
         nats: nats(&excess, 0.0),
-        words: None,
+        ..TextureFinding::named(vec!["heavy-tails"], Statistic::Distribution, Axis::Residual)
     })
 }
 

@@ -114,10 +114,10 @@ fn what_stands_still_is_told_from_what_fades() {
     for s in [0.0, 0.2, 0.5] {
         for rho in [0.3, 0.5, 0.7f64] {
             let c = [1, 2, 3].map(|k| s + (1.0 - s) * rho.powi(k));
-            let found = still_share(c, true);
+            let found = still_share(c[0], c[1], Some(c[2]));
             assert!((found - s).abs() < 1e-9, "s {s}, rho {rho}: {found}");
         }
-        let found = still_share([s; 3], true);
+        let found = still_share(s, s, Some(s));
         assert!((found - s).abs() < 1e-9, "s {s} alone: {found}");
     }
 }

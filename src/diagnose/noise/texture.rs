@@ -4,7 +4,6 @@
 use std::borrow::Cow;
 use std::f32::consts::FRAC_1_SQRT_2;
 
-use crate::camera::Camera;
 use crate::diagnose::options::FRAMES_KEPT;
 use crate::diagnose::views::box_sums::high_pass;
 use crate::diagnose::views::field::Field;
@@ -140,13 +139,8 @@ impl Filled {
 }
 
 /// Mean product of pixels that are so far apart along `step`, px^2.
-pub fn covariance(
-    image: &Filled,
-    camera: &Camera,
-    lags: &[usize],
-    step: [usize; 2],
-) -> Option<f64> {
-    let (w, h) = (camera.width, camera.height);
+pub fn covariance(image: &Filled, width: usize, lags: &[usize], step: [usize; 2]) -> Option<f64> {
+    let (w, h) = (width, image.value.len() / width.max(1));
     let (mut sum, mut n) = (0.0, 0u64);
     for lag in lags {
         let (du, dv) = (lag * step[0], lag * step[1]);

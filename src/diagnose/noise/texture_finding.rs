@@ -23,6 +23,23 @@ pub struct TextureFinding {
     pub words: Option<String>,
 }
 
+impl TextureFinding {
+    /// With these names, and nothing else said yet.
+    pub fn named(families: Vec<&'static str>, statistic: Statistic, axis: Axis) -> Self {
+        TextureFinding {
+            families,
+            statistic,
+            axis,
+            interval: [0.0, 0.0],
+            parameters: Map::new(),
+            size_sigma: 0.0,
+            p: 1.0,
+            nats: 0.0,
+            words: None,
+        }
+    }
+}
+
 /// Variance that pixels or lines share, as it is looked for.
 pub struct Shared {
     pub families: Vec<&'static str>,
@@ -42,15 +59,12 @@ impl Shared {
         let share = (m.value - self.expected_px2) / variance_px2.max(1e-12);
         let sigma = m.value.max(0.0).sqrt();
         (p < level && share > self.least).then(|| TextureFinding {
-            families: self.families,
-            statistic: self.statistic,
-            axis: self.axis,
-            interval: [0.0, 0.0],
             parameters: one("sigma_px", sigma, 0.5 * m.std_error / sigma.max(1e-9)),
             size_sigma: share.sqrt(),
             p,
             nats: nats(m, self.expected_px2),
             words: self.words.map(String::from),
+            ..TextureFinding::named(self.families, self.statistic, self.axis)
         })
     }
 }

@@ -1,7 +1,7 @@
 //! Which depths occur at all: the steps of the matcher, and those of the driver.
 
 use super::comb::{
-    COARSE, Gathered, PHASE_STEP, steps_of_depths, steps_of_disparities, steps_of_words,
+    COARSE, Comb, Gathered, PHASE_STEP, steps_of_depths, steps_of_disparities, steps_of_words,
 };
 use crate::frame::DepthCode;
 use crate::view::Sensor;
@@ -32,6 +32,16 @@ const GATHERED_AT_ALL: f64 = 0.4;
 const STEP_ERROR: f64 = 0.02;
 
 impl Quantisation {
+    /// Steps of the depth alone.
+    fn of_depth(depth_step_m: Option<f64>, p: Option<f64>) -> Self {
+        Quantisation { depth_step_m, depth_p: p, ..Quantisation::default() }
+    }
+
+    /// Steps of the disparity alone.
+    fn of_disparity(disparity_step_px: Option<f64>, p: Option<f64>) -> Self {
+        Quantisation { disparity_step_px, disparity_p: p, ..Quantisation::default() }
+    }
+
     pub fn is_some(&self) -> bool {
         self.depth_step_m.is_some() || self.disparity_step_px.is_some()
     }
@@ -71,29 +81,20 @@ impl RawHistogram {
         match sensor.code {
             DepthCode::Metric { units_per_metre, .. } => {
                 if stride > 1 {
-                    return Quantisation {
-                        depth_step_m: Some(stride as f64 / units_per_metre),
-                        depth_p: Some(all_multiples(stride, words.len())),
-                        ..Quantisation::default()
-                    };
+                    let p = all_multiples(stride, words.len());
+                    return Quantisation::of_depth(Some(stride as f64 / units_per_metre), Some(p));
                 }
                 if self.contrast(&words) < CONTRAST {
                     return Quantisation::default();
                 }
                 let disparity = steps_of_disparities(&words, scale_px_m * units_per_metre);
                 let depth = steps_of_depths(&words);
+                let told = |comb: &Comb| comb.step().and(Some(comb.p));
                 if depth.resultant > disparity.resultant {
-                    return Quantisation {
-                        depth_step_m: depth.step().map(|units| units / units_per_metre),
-                        depth_p: depth.step().and(Some(depth.p)),
-                        ..Quantisation::default()
-                    };
+                    let step_m = depth.step().map(|units| units / units_per_metre);
+                    return Quantisation::of_depth(step_m, told(&depth));
                 }
-                Quantisation {
-                    disparity_step_px: disparity.step(),
-                    disparity_p: disparity.step().and(Some(disparity.p)),
-                    ..Quantisation::default()
-                }
+                Quantisation::of_disparity(disparity.step(), told(&disparity))
             }
             DepthCode::Disparity { slope, .. } => {
                 // Words are the lattice; what is left to see is whether a coarser one leaves some empty.
@@ -104,11 +105,8 @@ impl RawHistogram {
                 } else {
                     steps_of_words(&words)
                 };
-                Quantisation {
-                    disparity_step_px: Some(coarser.map_or(1.0, |c| c.0) * word_px),
-                    disparity_p: coarser.map(|c| c.1),
-                    ..Quantisation::default()
-                }
+                let step_px = coarser.map_or(1.0, |c| c.0) * word_px;
+                Quantisation::of_disparity(Some(step_px), coarser.map(|c| c.1))
             }
         }
     }

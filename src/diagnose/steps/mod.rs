@@ -57,17 +57,16 @@ impl Steps {
     }
 }
 
-pub(in crate::diagnose) fn lattice(fields: &[Field], recording: &Recording) -> Quantisation {
-    lattice_of(fields.iter(), recording)
-}
-
-fn lattice_of<'a>(fields: impl Iterator<Item = &'a Field>, recording: &Recording) -> Quantisation {
+pub(in crate::diagnose) fn lattice<'a>(
+    fields: impl IntoIterator<Item = &'a Field>,
+    recording: &Recording,
+) -> Quantisation {
     let mut words = RawHistogram::none();
     let mut scale_px_m = 0.0;
-    fields.for_each(|f| {
+    for f in fields {
         words.merge(&f.words);
         scale_px_m = f.scale_px_m;
-    });
+    }
     words.lattice(&recording.sensor, scale_px_m)
 }
 
@@ -132,18 +131,14 @@ pub(in crate::diagnose) fn contradicted(
     let disparity = known.parameter("disparity-quantisation", "step_px").and_then(|step| {
         let lies = words.on_disparities(step, sensor, fields[0].scale_px_m)?;
         let sigma = step / 12f64.sqrt() / sigma_px;
-        (!lies && sigma > STEP_SHARE).then_some((
-            "disparity-quantisation",
-            Axis::DisparityPhase,
-            sigma,
-        ))
+        (!lies).then_some(("disparity-quantisation", Axis::DisparityPhase, sigma))
     });
     let depth = known.parameter("depth-rounding", "step_m").and_then(|step| {
-        let sigma = 1e3 * step / 12f64.sqrt() / sigma_mm;
         let lies = words.on_depths(step, sensor)?;
-        (!lies && sigma > STEP_SHARE).then_some(("depth-rounding", Axis::Z, sigma))
+        let sigma = 1e3 * step / 12f64.sqrt() / sigma_mm;
+        (!lies).then_some(("depth-rounding", Axis::Z, sigma))
     });
-    disparity.into_iter().chain(depth).collect()
+    disparity.into_iter().chain(depth).filter(|(_, _, sigma)| *sigma > STEP_SHARE).collect()
 }
 
 /// A step is worth telling when the error it makes is this share of the noise in some view; that a model
@@ -169,13 +164,12 @@ pub(in crate::diagnose) fn steps(
     known: &KnownTerms,
     fields: &[Field],
     recording: &Recording,
-    sigma_mm: f64,
     second: &[bool],
 ) -> Vec<Finding> {
     let replicated = |step: fn(&Quantisation) -> Option<f64>| {
         let [a, b] = [false, true].map(|half| {
             let mine = fields.iter().zip(second).filter(|(_, s)| **s == half);
-            step(&lattice_of(mine.map(|(f, _)| f), recording))
+            step(&self::lattice(mine.map(|(f, _)| f), recording))
         });
         Some(a.zip(b).is_some_and(|(a, b)| (a / b - 1.0).abs() < SAME_STEP))
     };
@@ -186,6 +180,7 @@ pub(in crate::diagnose) fn steps(
     };
     let mut sigma_px: Vec<f32> = fields.iter().filter_map(|f| f.sigma.first().copied()).collect();
     let sigma_px = f64::from(crate::stats::median_in_place(&mut sigma_px));
+    let sigma_mm = typical_sigma_mm(fields);
     let of_disparity = lattice.disparity_step_px.filter(|_| {
         recording.sensor.may_have_disparity()
             && !known.has("disparity-quantisation")

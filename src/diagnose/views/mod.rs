@@ -12,7 +12,6 @@ pub mod layers;
 pub mod learnt;
 pub mod light;
 pub mod margins;
-pub mod patches;
 pub mod reading;
 pub mod samples;
 pub mod surveyed_view;
