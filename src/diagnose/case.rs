@@ -98,10 +98,11 @@ impl<'a> Case<'a> {
     }
 
     /// The same views once more, with other residuals and against another model.
-    pub fn again<'b>(self, fields: Vec<Field>, known: KnownTerms, model: &'b NoiseModel) -> Case<'b>
+    pub fn again<'b>(self, fields: Vec<Field>, model: &'b NoiseModel) -> Case<'b>
     where
         'a: 'b,
     {
+        let known = KnownTerms::of(model, &self.sensor().camera);
         let learnt = (self.learnt_from, &known);
         let weights = self.survey.weights();
         // Two surveys at once are a quarter of the memory of all.
