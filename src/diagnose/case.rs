@@ -213,12 +213,11 @@ fn survey(
     (learnt_from, known): ([Option<Learnt>; 2], &KnownTerms),
     model: &NoiseModel,
 ) -> Survey {
-    let camera = &bench.sensor.camera;
-    let mut survey = Survey::of(fields, camera, &bench.rays);
-    survey.kind = bench.sensor.kind;
+    let mut survey = Survey::of(fields, bench);
     survey.ablate(options.ablation, fields);
     survey.refits_sigma = options.calibrated_here && baseline.is_none();
-    survey.fixed_px2 = mean_of(fixed_px2_by_view(fields, camera).into_iter().flatten());
+    survey.fixed_px2 =
+        mean_of(fixed_px2_by_view(fields, &bench.sensor.camera).into_iter().flatten());
     if let Some(baseline) = baseline {
         survey.compared();
         baseline.means(&mut survey);
