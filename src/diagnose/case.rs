@@ -112,10 +112,11 @@ impl<'a> Case<'a> {
     }
 
     /// The same views once more, with other residuals and against another model.
-    pub fn again<'b>(self, fields: Vec<Field>, known: KnownTerms, model: &'b NoiseModel) -> Case<'b>
+    pub fn again<'b>(self, fields: Vec<Field>, model: &'b NoiseModel) -> Case<'b>
     where
         'a: 'b,
     {
+        let known = KnownTerms::of(model, &self.sensor().camera);
         let learnt = (self.learnt_from, &known);
         let weights = self.survey.weights();
         // Two surveys at once are a quarter of the memory of all.
@@ -227,9 +228,7 @@ fn survey(
     (learnt_from, known): ([Option<Learnt>; 2], &KnownTerms),
     model: &NoiseModel,
 ) -> Survey {
-    let camera = &bench.sensor.camera;
-    let mut survey = Survey::of(fields, camera, &bench.rays);
-    survey.kind = bench.sensor.kind;
+    let mut survey = Survey::of(fields, bench);
     survey.ablate(options.ablation, fields);
     survey.refits_sigma = options.calibrated_here && baseline.is_none();
     let still = still(&beside_bias(fields, &[]), kept);

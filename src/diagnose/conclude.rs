@@ -5,7 +5,7 @@ use super::case::Case;
 use super::checks::far_off::far_off;
 use super::checks::heldout;
 use super::diagnosis::{
-    DIAGNOSIS_FORMAT, Diagnosis, Finding, HeldOut, MapRow, Reference, ViewLine,
+    After, DIAGNOSIS_FORMAT, Diagnosis, Finding, HeldOut, MapRow, Reference, ViewLine,
 };
 use super::distance::laws;
 use super::distance::reference;
@@ -50,9 +50,10 @@ impl Case<'_> {
         remarks
     }
 
-    pub fn conclude(mut self, battery: Battery) -> Diagnosed {
+    /// Runs all layers and puts together what they come to.
+    pub fn conclude(mut self) -> Diagnosed {
         let Battery { mean, scatter, mut found, refitted, better_form, ends, detectable_losses } =
-            battery;
+            self.battery();
         let outcomes = [&mean.outcome, &scatter.outcome];
         let scenes = self.scenes();
         self.advise(&mut found, &scenes, outcomes, ends);
@@ -88,13 +89,12 @@ impl Case<'_> {
             Some(_) => Reference::SimulatedRecording,
             None => Reference::Model,
         };
-        let excluded = std::mem::take(&mut self.excluded);
-        let again = if let Some(tested) = tested {
-            self.unchanged(tested)
-        } else {
-            self.progress.stage("testing the extended model");
-            self.after(&extended, &mean, explained)
+        let (after, mut done) = match tested {
+            // Where nothing was found the model is the extended one, and was tested.
+            Some(verdict) => (After { verdict, remaining: Vec::new() }, self),
+            None => self.after(&extended, &mean, explained),
         };
+        done.fields.iter_mut().for_each(|f| f.first.clear());
         let diagnosis = Diagnosis {
             format: DIAGNOSIS_FORMAT,
             recording,
@@ -104,7 +104,7 @@ impl Case<'_> {
             map,
             heldout,
             left_out,
-            after: again.after,
+            after,
             detectable,
             cannot_tell,
             views,
@@ -112,11 +112,11 @@ impl Case<'_> {
         };
         Diagnosed {
             diagnosis,
+            fields: done.fields,
+            excluded: done.excluded,
+            against: done.baseline.map_or_else(Vec::new, |b| b.fields),
             model: extended,
-            fields: again.fields,
             bias_px: mean.px,
-            excluded,
-            against: again.against,
         }
     }
 

@@ -89,7 +89,7 @@ mod tests {
     use std::slice::from_ref;
 
     use super::*;
-    use crate::diagnose::finding::other_findings::named;
+    use crate::diagnose::finding::other_findings::{named, nameless};
     use crate::diagnose::finding::parameters::one;
     use crate::diagnose::verdict::shares;
     use crate::diagnose::{Curve, Size};
@@ -147,7 +147,7 @@ mod tests {
     fn a_noisier_frame_is_no_sigma_that_is_off() {
         let frame = |axis| {
             let parameters = one("log_variance", 0.38, 0.01);
-            Finding { effect: None, parameters, ..named("", Statistic::Variance, axis) }
+            Finding { parameters, ..nameless(Statistic::Variance, axis) }
         };
         let (own, row) = (frame(Axis::Frame), frame(Axis::Row));
         let field = Field {

@@ -44,7 +44,7 @@ pub fn diagnose(
     options: &DiagnoseOptions,
     progress: Progress<'_>,
 ) -> Result<Diagnosed> {
-    run(recording, None, model, options, progress)
+    Ok(Case::open(recording, None, model, options, progress)?.conclude())
 }
 
 /// Find out what a simulation leaves out: `simulated` is its recording of the same views, `model`
@@ -59,17 +59,5 @@ pub fn diagnose_against(
     options: &DiagnoseOptions,
     progress: Progress<'_>,
 ) -> Result<Diagnosed> {
-    run(recording, Some(simulated), model, options, progress)
-}
-
-fn run(
-    recording: &Recording,
-    simulated: Option<&Recording>,
-    model: &NoiseModel,
-    options: &DiagnoseOptions,
-    progress: Progress<'_>,
-) -> Result<Diagnosed> {
-    let mut case = Case::open(recording, simulated, model, options, progress)?;
-    let battery = case.battery();
-    Ok(case.conclude(battery))
+    Ok(Case::open(recording, Some(simulated), model, options, progress)?.conclude())
 }

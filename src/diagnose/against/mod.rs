@@ -27,6 +27,7 @@ use crate::diagnose::views::reading::read;
 use crate::error::{Error, Result};
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
+use crate::plane::Plane;
 use crate::view::{Recording, Sensor};
 
 /// The simulated views, in the order of the real ones they belong to.
@@ -64,8 +65,7 @@ impl Baseline {
         let (theirs, excluded) = read(simulated, &bench, model, &known, progress);
         let mut remarks: Vec<String> =
             excluded.iter().map(|e| format!("of the simulated recording, {e}")).collect();
-        let poses = |fields: &[Field]| fields.iter().map(Pose::of).collect::<Vec<_>>();
-        let partner = partners(&poses(fields), &poses(&theirs));
+        let partner = partners(fields, &theirs);
         let all = fields.len();
         let mut left: Vec<Option<Field>> = theirs.into_iter().map(Some).collect();
         let mut kept = Vec::new();
@@ -104,9 +104,8 @@ impl Baseline {
         bench: &Workbench<'_>,
         options: &DiagnoseOptions,
     ) -> Self {
-        let camera = &bench.sensor.camera;
         let none = KnownTerms::default();
-        let mut survey = Survey::of(&fields, camera, &bench.rays);
+        let mut survey = Survey::of(&fields, bench);
         survey.compared();
         let kept = KeptPattern::of(&fields);
         let mut structure = structures(&fields, &[], &kept);
@@ -168,15 +167,6 @@ fn same_sensor(real: &Sensor, simulated: &Sensor) -> Result<()> {
     }
 }
 
-/// Where a view's plane is.
-#[derive(Debug, Clone)]
-pub struct Pose {
-    name: String,
-    z_m: f64,
-    theta_rad: f64,
-    azimuth_rad: f64,
-}
-
 /// Poses farther apart are different ones: a share of the distance, tilt, direction of the tilt.
 const Z_SHARE: f64 = 0.1;
 const THETA_RAD: f64 = 8.0 * TAU / 360.0;
@@ -184,34 +174,25 @@ const AZIMUTH_RAD: f64 = 30.0 * TAU / 360.0;
 /// Below this tilt a plane has no direction.
 const TILTED_RAD: f64 = 10.0 * TAU / 360.0;
 
-impl Pose {
-    pub fn of(field: &Field) -> Self {
-        Pose {
-            name: field.name.clone(),
-            z_m: field.plane.depth(0.0, 0.0),
-            theta_rad: field.plane.theta(),
-            azimuth_rad: field.plane.azimuth(),
-        }
-    }
-
-    /// In tolerances; `None` where one is exceeded.
-    fn off(&self, other: &Pose) -> Option<f64> {
-        let z = (other.z_m - self.z_m).abs() / (Z_SHARE * self.z_m);
-        let theta = (other.theta_rad - self.theta_rad).abs() / THETA_RAD;
-        let turned = (other.azimuth_rad - self.azimuth_rad).rem_euclid(TAU);
-        let tilted = self.theta_rad.max(other.theta_rad) > TILTED_RAD;
-        let azimuth = if tilted { turned.min(TAU - turned) / AZIMUTH_RAD } else { 0.0 };
-        (z.max(theta).max(azimuth) <= 1.0).then_some(z + theta + azimuth)
-    }
+/// How far two planes are from one another, in tolerances; `None` where one is exceeded.
+fn off(real: &Plane, simulated: &Plane) -> Option<f64> {
+    let [z, z_simulated] = [real, simulated].map(|p| p.depth(0.0, 0.0));
+    let [theta, theta_simulated] = [real, simulated].map(Plane::theta);
+    let turned = (simulated.azimuth() - real.azimuth()).rem_euclid(TAU);
+    let tilted = theta.max(theta_simulated) > TILTED_RAD;
+    let z = (z_simulated - z).abs() / (Z_SHARE * z);
+    let theta = (theta_simulated - theta).abs() / THETA_RAD;
+    let azimuth = if tilted { turned.min(TAU - turned) / AZIMUTH_RAD } else { 0.0 };
+    (z.max(theta).max(azimuth) <= 1.0).then_some(z + theta + azimuth)
 }
 
 /// For each real view the number of its simulated one; none serves twice. A name alone is not
 /// enough: numbered views of two recordings have the same names.
-pub fn partners(real: &[Pose], simulated: &[Pose]) -> Vec<Option<usize>> {
+fn partners(real: &[Field], simulated: &[Field]) -> Vec<Option<usize>> {
     let mut pairs: Vec<(bool, f64, usize, usize)> = Vec::new();
     for (i, r) in real.iter().enumerate() {
         for (j, s) in simulated.iter().enumerate() {
-            if let Some(off) = r.off(s) {
+            if let Some(off) = off(&r.plane, &s.plane) {
                 pairs.push((r.name != s.name, off, i, j));
             }
         }
@@ -231,9 +212,9 @@ pub fn partners(real: &[Pose], simulated: &[Pose]) -> Vec<Option<usize>> {
 mod tests {
     use super::*;
 
-    fn pose(name: &str, z_m: f64, theta_deg: f64, azimuth_deg: f64) -> Pose {
-        let (theta_rad, azimuth_rad) = (theta_deg.to_radians(), azimuth_deg.to_radians());
-        Pose { name: name.into(), z_m, theta_rad, azimuth_rad }
+    fn pose(name: &str, z_m: f64, theta_deg: f64, azimuth_deg: f64) -> Field {
+        let plane = Plane::tilted(z_m, theta_deg.to_radians(), azimuth_deg.to_radians());
+        Field { name: name.into(), ..Field::unseen(plane, 43.5, [1, 1], vec![0]) }
     }
 
     #[test]

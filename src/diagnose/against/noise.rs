@@ -149,15 +149,8 @@ impl NoiseParts {
 
     fn texture(&self) -> TextureFinding {
         TextureFinding {
-            families: Vec::new(),
-            statistic: Statistic::Variance,
-            axis: Axis::Frame,
-            interval: [0.0, 0.0],
-            parameters: Map::new(),
             size_sigma: self.size_sigma(),
-            p: 1.0,
-            nats: 0.0,
-            words: None,
+            ..TextureFinding::named(Vec::new(), Statistic::Variance, Axis::Frame)
         }
     }
 }
@@ -250,15 +243,11 @@ fn ambient_light(real: &[Field], twins: &[Field], level: f64) -> Option<TextureF
     });
     let ratio = mean_of_all(ratios)?;
     Some(TextureFinding {
-        families: vec!["ambient-light"],
-        statistic: Statistic::Variance,
-        axis: Axis::Intensity,
         interval: range(pairs.iter().map(|p| p[1])),
         parameters: one("ratio", ratio, ratio * at_no_light.std_error / at_no_light.value),
-        size_sigma: 0.0,
         p,
         nats: nats(&lift, 0.0).min(nats(&at_no_light, 0.0)),
-        words: None,
+        ..TextureFinding::named(vec!["ambient-light"], Statistic::Variance, Axis::Intensity)
     })
 }
 

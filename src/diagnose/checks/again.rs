@@ -3,7 +3,7 @@
 
 use crate::diagnose::battery::Battery;
 use crate::diagnose::case::{Case, MeanResult};
-use crate::diagnose::diagnosis::{After, Finding, Remaining, Verdict};
+use crate::diagnose::diagnosis::{After, Finding, Remaining};
 use crate::diagnose::finding::pixels::pixel_terms;
 use crate::diagnose::verdict::verdict;
 use crate::diagnose::views::field::Field;
@@ -11,33 +11,20 @@ use crate::diagnose::views::known::KnownTerms;
 use crate::model::{Effect, NoiseModel};
 use crate::terms::Term;
 
-/// What the second run leaves behind.
-pub struct Again {
-    pub after: After,
-    /// The views, their means as they were; single frames are spent.
-    pub fields: Vec<Field>,
-    /// The simulated views, where there are any.
-    pub against: Vec<Field>,
-}
-
-impl Again {
-    fn of(after: After, case: Case<'_>) -> Self {
-        let mut fields = case.fields;
-        fields.iter_mut().for_each(|f| f.first.clear());
-        Again { after, fields, against: case.baseline.map_or_else(Vec::new, |b| b.fields) }
-    }
-}
-
-impl Case<'_> {
-    /// What stands out where nothing was found: the model is the extended one, and was tested.
-    pub fn unchanged(self, verdict: Verdict) -> Again {
-        Again::of(After { verdict, remaining: Vec::new() }, self)
-    }
-
-    /// What stands out against `extended`; the first run `explained` so many nats.
-    pub fn after(mut self, extended: &NoiseModel, mean: &MeanResult, explained: f64) -> Again {
+impl<'a> Case<'a> {
+    /// What stands out against `extended`, and the views with their means as they were; the first run
+    /// `explained` so many nats.
+    pub fn after<'b>(
+        mut self,
+        extended: &'b NoiseModel,
+        mean: &MeanResult,
+        explained: f64,
+    ) -> (After, Case<'b>)
+    where
+        'a: 'b,
+    {
+        self.progress.stage("testing the extended model");
         let added = self.added(extended);
-        let known = KnownTerms::of(extended, &self.sensor().camera);
         let means: Vec<Vec<f32>> = self.fields.iter().map(|f| f.mean.clone()).collect();
         let bias = self.bias_px(&added.bias, mean);
         let spread = pixel_terms(&self.fields, &added.variance, &self.survey, &self.bench);
@@ -49,10 +36,10 @@ impl Case<'_> {
             }
         }
         drop((bias, spread));
-        let mut case = self.again(fields, known, extended);
+        let mut case = self.again(fields, extended);
         let battery = case.battery();
         case.fields.iter_mut().zip(means).for_each(|(field, mean)| field.mean = mean);
-        Again::of(after(&battery, explained), case)
+        (after(&battery, explained), case)
     }
 
     /// What the extended model has beyond the one that was given, as terms.

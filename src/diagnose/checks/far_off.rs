@@ -1,8 +1,8 @@
 //! A recording that is far from the model, though no search found what its views have in common.
 
 use super::heldout::rms_by_view;
-use crate::diagnose::diagnosis::{Finding, Size, Status};
-use crate::diagnose::finding::other_findings::named;
+use crate::diagnose::diagnosis::{Finding, Size};
+use crate::diagnose::finding::other_findings::nameless;
 use crate::diagnose::views::field::CLIP_SIGMAS;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::samples::ViewData;
@@ -25,16 +25,13 @@ pub fn far_off(survey: &Survey, sigma_mm: f64) -> Option<Finding> {
     let rms_px = rms_by_view(survey, &[]);
     let sigma = reached(rms_px.iter().zip(sigma_px).map(|(rms, sigma)| rms / sigma).collect());
     let found = |sigma: f64, words: String, statistic| Finding {
-        status: Status::Unexplained,
-        effect: None,
-        alternatives: Vec::new(),
         share: 1.0,
         size: Size { mm: sigma * sigma_mm, sigma },
         physics: format!(
             "{words}, and these views do not say by what: the model may be another sensor's, or views from more \
              distances and tilts may tell."
         ),
-        ..named("", statistic, Axis::Pixel)
+        ..nameless(statistic, Axis::Pixel)
     };
     if let Some(sigma) = sigma.filter(|s| *s > limit) {
         let words = format!("The views' mean errors are {sigma:.0} times the noise of a pixel");

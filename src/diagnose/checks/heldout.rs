@@ -24,31 +24,26 @@ const FEWEST: usize = 6;
 impl Case<'_> {
     /// Choose again without some views, and score those.
     pub(in crate::diagnose) fn heldout(&self) -> Option<HeldOut> {
-        let (survey, model, options) = (&self.survey, self.model, self.options);
+        let (survey, seed) = (&self.survey, self.options.seed);
         let (camera, scale_px_m) = (&self.sensor().camera, self.fields[0].scale_px_m);
         let n = survey.views.len();
         if n < FEWEST {
             return None;
         }
-        let mut rng = options.seed.stream("diagnose/heldout");
+        let mut rng = seed.stream("diagnose/heldout");
         let mut order: Vec<usize> = (0..n).collect();
         order.shuffle(&mut rng);
         let mut aside = order[..(n / KEPT_ASIDE).max(1)].to_vec();
         aside.sort_unstable();
         let rest: Vec<usize> = (0..n).filter(|v| !aside.contains(v)).collect();
         let (chosen_on, judged_on) = (survey.subset(&rest), survey.subset(&aside));
-        let level = options.level;
         let fine = chosen_on.mean_data();
-        let found = chosen_on.search_bias(&fine, camera, Case::MEAN_LEVEL * level, options.seed);
+        let found = chosen_on.search_bias(&fine, camera, self.level(Case::MEAN_LEVEL), seed);
         let bias = chosen_on.refit_bias(&fine, camera, found);
         drop(fine);
         let bias_terms = terms_of(&bias, Statistic::Bias);
-        let variance = chosen_on.search_variance(
-            &model.sigma,
-            camera,
-            Case::VARIANCE_LEVEL * level,
-            options.seed,
-        );
+        let (sigma, level) = (&self.model.sigma, self.level(Case::VARIANCE_LEVEL));
+        let variance = chosen_on.search_variance(sigma, camera, level, seed);
         let variance_terms = terms_of(&variance, Statistic::Variance);
         let means: Vec<ViewData> = judged_on.coarse_mean_data();
         let blocks = judged_on.variance_data();
@@ -64,35 +59,29 @@ impl Case<'_> {
         let mean_before = before.iter().sum::<f64>() / views;
         let gain = gains.iter().sum::<f64>() / views;
         let rms = |terms: &[Term]| rms(&judged_on.views, terms, scale_px_m);
-        let (old, new) = (rms(&[]), rms(&bias_terms));
+        let ([px_before, mm_before], [px_after, mm_after]) = (rms(&[]), rms(&bias_terms));
         let of_sensor: Vec<Term> =
             bias_terms.iter().filter(|t| t.is_sensor_bias()).cloned().collect();
-        let corrected = rms(&of_sensor);
+        let [px_corrected, _] = rms(&of_sensor);
         Some(HeldOut {
             views: aside.iter().map(|&v| survey.views[v].name.clone()).collect(),
             log_score_before: mean_before,
             log_score_after: mean_before + gain,
             gain,
             gain_interval: bootstrap(&gains, &mut rng),
-            rms_mm_before: old.mm,
-            rms_mm_after: new.mm,
-            rms_px_before: old.px,
-            rms_px_after: new.px,
-            correction_rms_before_px: old.px,
-            correction_rms_after_px: corrected.px,
+            rms_mm_before: mm_before,
+            rms_mm_after: mm_after,
+            rms_px_before: px_before,
+            rms_px_after: px_after,
+            correction_rms_before_px: px_before,
+            correction_rms_after_px: px_corrected,
         })
     }
 }
 
 /// -r'Wr / 2 with the nuisances fitted, nats.
 fn log_score(view: &ViewData, terms: &[Term]) -> Option<f64> {
-    let mut row = Vec::new();
-    let response: Vec<f64> = view
-        .response
-        .iter()
-        .zip(view.places.iter())
-        .map(|(y, p)| y - Term::sum(terms, p, &mut row))
-        .collect();
+    let response = view.without(terms);
     let own: f64 = response.iter().zip(&view.weight).map(|(y, w)| w * y * y).sum();
     let rows = view.rows(&response)?;
     Some(-0.5 * (own - rows.explained()))
@@ -109,23 +98,23 @@ fn bootstrap(values: &[f64], rng: &mut crate::rng::Stream) -> [f64; 2] {
     [means[RESAMPLES / 40], means[RESAMPLES - 1 - RESAMPLES / 40]]
 }
 
-struct Rms {
-    px: f64,
-    mm: f64,
-}
-
-/// Root mean square of the smooth residual in mm, and of every pixel of every frame in px.
-fn rms(views: &[SurveyedView], terms: &[Term], scale_px_m: f64) -> Rms {
+/// Root mean square of every pixel of every frame, px, and of the smooth residual, mm.
+fn rms(views: &[SurveyedView], terms: &[Term], scale_px_m: f64) -> [f64; 2] {
     let (mut px, mut mm, mut n) = (0.0, 0.0, 0.0);
     for view in views {
         each_patch(view, terms, |(place, t), f| {
             let to_mm = 1e3 * place.z * place.z / scale_px_m;
-            px += t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0);
+            px += squares_about(t, f);
             mm += t.pixels * ((t.mean - f) * to_mm).powi(2);
             n += t.pixels;
         });
     }
-    Rms { px: (px / n).sqrt(), mm: (mm / n).sqrt() }
+    [(px / n).sqrt(), (mm / n).sqrt()]
+}
+
+/// Of a patch's readings about `f`, px^2.
+fn squares_about(t: &Tile, f: f64) -> f64 {
+    t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0)
 }
 
 /// What each view's disparity on the optical axis changes by once the terms are taken out, px.
@@ -204,7 +193,7 @@ pub fn left_out(survey: &Survey, outcome: &Outcome, terms: &[Term]) -> Option<Le
         for ((sum, by_view), terms) in both {
             let before = *sum;
             each_patch(view, terms, |(_, t), f| {
-                *sum += t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0);
+                *sum += squares_about(t, f);
             });
             *by_view += ((*sum - before) / pixels.max(1.0)).sqrt();
         }

@@ -7,11 +7,11 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::replication_textures::beyond;
 use crate::diagnose::case::Case;
-use crate::diagnose::diagnosis::{Finding, Size, Status};
+use crate::diagnose::diagnosis::{Finding, Size};
 use crate::diagnose::edges::Edges;
 use crate::diagnose::edges::mixing::whole_share;
 use crate::diagnose::edges::shadow::{Sides, largest_share};
-use crate::diagnose::finding::other_findings::named;
+use crate::diagnose::finding::other_findings::nameless;
 use crate::diagnose::finding::pixels::{typical_sigma_mm, typical_sigma_px};
 use crate::diagnose::missing::shapes::Step;
 use crate::diagnose::noise::mixture::Mixture;
@@ -164,14 +164,11 @@ fn finding(known: &KnownTerms, id: &'static str, statistic: Statistic, axis: Axi
         known.in_words(id)
     );
     Finding {
-        status: Status::Unexplained,
-        effect: None,
-        alternatives: Vec::new(),
         physics: format!(
             "Too much: {shape}. It belongs to another sensor or to other settings: take it out of the model, or learn the model again."
         ),
         shape: Some(shape),
         contradicted: Some(id),
-        ..named(id, statistic, axis)
+        ..nameless(statistic, axis)
     }
 }

@@ -24,6 +24,7 @@ use crate::diagnose::search::outcome::Outcome;
 use crate::diagnose::search::prepared::evidence_of_bases;
 use crate::diagnose::search::rules::Rules;
 use crate::diagnose::search::variance::beyond_sigma;
+use crate::diagnose::views::samples::ViewData;
 use crate::effects::{self, Smallest};
 use crate::rng::Seed;
 use crate::terms::{Basis, Statistic, Term};
@@ -112,16 +113,10 @@ impl DetectionCriteria<'_> {
     }
 
     /// The views without what was found: it would not be taken for an effect more.
-    fn left(&self) -> Vec<crate::diagnose::views::samples::ViewData> {
+    fn left(&self) -> Vec<ViewData> {
         let found = terms_of(self.outcome, self.scene.statistic);
-        let mut row = Vec::new();
-        let mut views = self.scene.data.clone();
-        for view in &mut views {
-            for (y, place) in view.response.iter_mut().zip(view.places.iter()) {
-                *y -= found.iter().map(|t| t.value(place, &mut row)).sum::<f64>();
-            }
-        }
-        views
+        let left = |view: &ViewData| ViewData { response: view.without(&found), ..view.clone() };
+        self.scene.data.iter().map(left).collect()
     }
 
     /// Root mean square that a fit must have, in the response's unit.

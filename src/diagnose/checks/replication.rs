@@ -7,11 +7,11 @@
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::diagnose::noise::view_mean::ViewMean;
 use crate::diagnose::search::evidence::Evidence;
 use crate::solve::Cholesky;
+use crate::stats::student_quantile;
 
 /// Standard errors from which on a half sees something by itself.
 const SEEN: f64 = 2.0;
@@ -59,8 +59,7 @@ impl ViewMean {
 fn alike(halves: &[ViewMean; 2]) -> bool {
     let [a, b] = halves;
     let freedom = (a.views.round() + b.views.round() - 2.0).max(1.0);
-    let reach = StudentsT::new(0.0, 1.0, freedom)
-        .map_or(f64::INFINITY, |t| t.inverse_cdf(0.5 + 0.5 * INTERVAL));
+    let reach = student_quantile(INTERVAL, freedom);
     let apart = (a.value - b.value).abs();
     a.value * b.value > 0.0 && apart <= reach * a.std_error.hypot(b.std_error)
 }

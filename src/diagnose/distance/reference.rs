@@ -7,7 +7,7 @@ use crate::diagnose::case::Case;
 use crate::diagnose::checks::overstated::SHARE;
 use crate::diagnose::diagnosis::{Alternative, CannotTell, Finding, Size, Status};
 use crate::diagnose::finding::naming::MIN_PROBABILITY;
-use crate::diagnose::finding::other_findings::named;
+use crate::diagnose::finding::other_findings::{named, nameless};
 use crate::diagnose::finding::parameters::{estimate, one};
 use crate::diagnose::joint::anchor::{Family, families};
 use crate::diagnose::search::noise_gains::NoiseGains;
@@ -109,9 +109,6 @@ fn contradicted(law: &Law, p: f64) -> Finding {
         1e3 * law.rms_m
     );
     Finding {
-        status: Status::Unexplained,
-        effect: None,
-        alternatives: Vec::new(),
         interval: law.reach,
         share: law.gain,
         size: Size { mm: 1e3 * law.rms_m, sigma: law.rms_sigma },
@@ -122,7 +119,7 @@ fn contradicted(law: &Law, p: f64) -> Finding {
         ),
         shape: Some(shape),
         contradicted: Some(law.family),
-        ..named(law.family, Statistic::Bias, law.axis)
+        ..nameless(Statistic::Bias, law.axis)
     }
 }
 

@@ -3,13 +3,13 @@
 use super::scene::Scene;
 use crate::diagnose::diagnosis::Curve;
 use crate::stats::range;
-use crate::terms::{Axis, Basis, PixelContext, Statistic};
+use crate::terms::{Axis, Basis, Coordinate, PixelContext, Statistic};
 
 type OfPlace = Box<dyn Fn(&PixelContext) -> f64>;
 
 /// The axis along which a term is shown.
 pub struct Along {
-    label: String,
+    label: &'static str,
     value: OfPlace,
 }
 
@@ -17,7 +17,7 @@ impl Along {
     pub fn of(scene: &Scene<'_>, basis: &Basis) -> Self {
         let axis = basis.axis();
         let corner = scene.corner_px;
-        let (label, value): (&str, OfPlace) = match axis {
+        let (label, value): (&'static str, OfPlace) = match axis {
             Axis::Z => ("depth, m", Box::new(|p| p.z)),
             Axis::DisparityPhase => {
                 let period = basis.period().unwrap_or(1.0);
@@ -32,17 +32,15 @@ impl Along {
                 ("distance from the image centre, px", Box::new(move |p| p.radius * corner))
             }
             Axis::Theta => ("tilt, rad", Box::new(|p| p.theta)),
-            Axis::Azimuth
-                if matches!(basis, Basis::Curve { over: crate::terms::Coordinate::Along, .. }) =>
-            {
-                (
-                    "from the optical axis along the tilt, ray",
-                    Box::new(|p| crate::terms::Coordinate::Along.value(p)),
-                )
-            }
-            Axis::Azimuth => ("direction of the tilt, rad", Box::new(|p| p.azimuth)),
+            Axis::Azimuth => match basis {
+                Basis::Curve { over: Coordinate::Along, .. } => {
+                    let along = Box::new(|p: &PixelContext| Coordinate::Along.value(p));
+                    ("from the optical axis along the tilt, ray", along)
+                }
+                _ => ("direction of the tilt, rad", Box::new(|p| p.azimuth)),
+            },
             Axis::TargetPosition => match basis {
-                Basis::Curve { over: crate::terms::Coordinate::Down, .. } => {
+                Basis::Curve { over: Coordinate::Down, .. } => {
                     ("down on the board, m", Box::new(|p| p.down))
                 }
                 _ => ("right on the board, m", Box::new(|p| p.right)),
@@ -55,7 +53,7 @@ impl Along {
             Axis::Temperature => ("temperature, degrees Celsius", Box::new(|p| p.temperature_c)),
             _ => ("", Box::new(|p| p.z)),
         };
-        Along { label: label.into(), value }
+        Along { label, value }
     }
 
     /// Where nine tenths of the term's energy lie.
@@ -105,7 +103,7 @@ impl Along {
             }
         }
         let mut curve = Curve {
-            x_label: self.label.clone(),
+            x_label: self.label.into(),
             y_label: if scene.statistic == Statistic::Bias {
                 "disparity error, px".into()
             } else {

@@ -155,16 +155,15 @@ pub fn physics(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::finding::other_findings::named;
+    use crate::diagnose::finding::other_findings::{named, nameless};
 
     /// Half of what is there without a name: half as probable. What is left on another axis, or of
     /// another statistic, takes nothing.
     #[test]
     fn a_name_is_doubted_by_what_is_left_over_the_picture_beside_it() {
         let with = |share: f64, statistic: Statistic, axis: Axis| Finding {
-            status: Status::Unexplained,
             share,
-            ..named("", statistic, axis)
+            ..nameless(statistic, axis)
         };
         let bowl = || Finding {
             share: 30.0,

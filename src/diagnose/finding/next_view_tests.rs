@@ -2,7 +2,6 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::diagnose::diagnosis::Alternative;
-use crate::diagnose::finding::outlook::Conditions;
 use crate::diagnose::missing::shapes::Step;
 use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::noise_gains::NoiseGains;
@@ -12,7 +11,7 @@ use crate::diagnose::views::surveyed_view::MEAN_PRECISION;
 use crate::model::{Domain, Form, PAPER_EQ1, SigmaModel};
 use crate::rng::Stream;
 use crate::simulate::kinect_v1;
-use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, Statistic, Term};
+use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, PixelContext, Statistic, Term};
 use crate::view::Sensor;
 
 const WALL_M: [f64; 2] = [20.0, 20.0];
@@ -25,7 +24,7 @@ struct Stand {
     sigma: SigmaModel,
     reach: Extent,
     lost: Vec<Step>,
-    last: Conditions,
+    last: PixelContext,
 }
 
 impl Stand {
@@ -37,7 +36,7 @@ impl Stand {
             sigma: SigmaModel::published(Form::Paper, &PAPER_EQ1, domain),
             reach: Extent { right, down, edge: 100.0, ..Extent::default() },
             lost: Vec::new(),
-            last: Conditions::default(),
+            last: PixelContext::default(),
         }
     }
 
@@ -159,7 +158,7 @@ fn the_edge_is_as_far_as_it_is_in_the_picture() {
 fn a_view_is_asked_for_where_depth_comes_back_and_in_the_light_there_is() {
     let [open, cut] = [None, Some(Step::whole(Axis::Z, 3.0, 0.05))].map(|lost| Stand {
         lost: lost.into_iter().collect(),
-        last: Conditions { ambient: 300.0, temperature_c: 25.0, ..Conditions::default() },
+        last: PixelContext { ambient: 300.0, temperature_c: 25.0, ..PixelContext::default() },
         ..Stand::of(BOARD_M)
     });
     let weight = |stand: &Stand, z: f64| {

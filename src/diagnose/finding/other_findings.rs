@@ -34,6 +34,16 @@ pub fn named(effect: &'static str, statistic: Statistic, axis: Axis) -> Finding 
     }
 }
 
+/// A finding that has no name, and nothing else said yet.
+pub fn nameless(statistic: Statistic, axis: Axis) -> Finding {
+    Finding {
+        status: Status::Unexplained,
+        effect: None,
+        alternatives: Vec::new(),
+        ..named("", statistic, axis)
+    }
+}
+
 /// A mismatch of structure as a finding; `sigma_mm` is the recording's typical sigma.
 pub fn texture(found: TextureFinding, sigma_mm: f64, replicated: Option<bool>) -> Finding {
     let effect = found.families.first().copied();

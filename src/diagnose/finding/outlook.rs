@@ -25,28 +25,19 @@ const ACROSS: usize = 32;
 /// Beyond this no depth comes back, m.
 const FARTHEST_M: f64 = 8.0;
 
-/// The room and the sensor, as they were last.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Conditions {
-    pub session_s: f64,
-    /// As [`PixelContext`] has them: 0 where no view knows.
-    pub temperature_c: f64,
-    pub ambient: f64,
-}
-
-impl Conditions {
-    /// Of these views; what the last does not know is as it was before.
-    fn last(views: &[SurveyedView]) -> Self {
-        let mut all: Vec<&PixelContext> = views.iter().filter_map(|v| v.places.first()).collect();
-        all.sort_by(|a, b| a.session_s.total_cmp(&b.session_s));
-        let last = |of: fn(&PixelContext) -> f64| {
-            all.iter().rev().map(|p| of(p)).find(|x| *x != 0.0).unwrap_or(0.0)
-        };
-        Conditions {
-            session_s: last(|p| p.session_s),
-            temperature_c: last(|p| p.temperature_c),
-            ambient: last(|p| p.ambient),
-        }
+/// The room and the sensor as they were last in these views: time, temperature and ambient light alone.
+/// What the last does not know is as it was before.
+fn last_conditions(views: &[SurveyedView]) -> PixelContext {
+    let mut all: Vec<&PixelContext> = views.iter().filter_map(|v| v.places.first()).collect();
+    all.sort_by(|a, b| a.session_s.total_cmp(&b.session_s));
+    let last = |of: fn(&PixelContext) -> f64| {
+        all.iter().rev().map(|p| of(p)).find(|x| *x != 0.0).unwrap_or(0.0)
+    };
+    PixelContext {
+        session_s: last(|p| p.session_s),
+        temperature_c: last(|p| p.temperature_c),
+        ambient: last(|p| p.ambient),
+        ..PixelContext::default()
     }
 }
 
@@ -61,7 +52,8 @@ pub struct Outlook<'a> {
     pub reach: &'a Extent,
     /// Places of the views are so far from the target's edge at least, px.
     pub rim_px: f64,
-    pub last: Conditions,
+    /// The room and the sensor, as they were last.
+    pub last: PixelContext,
     /// What share of the depth does not come back, and where.
     pub lost: &'a [Step],
     /// Weight of a pixel of a target in the middle: over its variance for the mean, as it is for the
@@ -147,7 +139,7 @@ impl Outlook<'_> {
         place.edge = (self.rim_px + self.edge_px(&place, &point, board)).min(self.reach.edge);
         let sigma_px = self.sigma.axial_sigma(z, place.theta) * self.scale_px_m / (z * z);
         place.variance = sigma_px * sigma_px;
-        let Conditions { session_s, temperature_c, ambient } = self.last;
+        let PixelContext { session_s, temperature_c, ambient, .. } = self.last;
         Some(PixelContext { session_s, temperature_c, ambient, ..place })
     }
 
@@ -192,7 +184,7 @@ pub fn outlook<'a>(
         sigma,
         reach: &scene.survey.reach,
         rim_px: places.map(|p| p.edge).fold(f64::INFINITY, f64::min),
-        last: Conditions::last(views),
+        last: last_conditions(views),
         lost: &[],
         worth: 1.0,
         precision: scene.data.first()?.precision[..own].to_vec(),

@@ -12,10 +12,8 @@ pub fn estimate(value: f64, std_error: f64) -> Value {
 }
 
 /// A single one, by its name.
-pub fn one(name: &str, value: f64, std_error: f64) -> Map<String, serde_json::Value> {
-    let mut map = Map::new();
-    map.insert(name.into(), estimate(value, std_error));
-    map
+pub fn one(name: &str, value: f64, std_error: f64) -> Map<String, Value> {
+    Map::from_iter([(name.into(), estimate(value, std_error))])
 }
 
 /// Of a family's fitted shape; a curve without a name has none.

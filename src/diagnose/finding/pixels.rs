@@ -31,10 +31,9 @@ pub(in crate::diagnose) fn common(
         return [0.0; 3];
     }
     let at = |lag: usize| mean_of(structure.iter().filter_map(|s| s.lagged[lag]));
-    let near = at(0);
-    [near, if structure.iter().any(|s| s.lagged[1].is_some()) { at(1) } else { near }, {
-        if structure.iter().any(|s| s.lagged[2].is_some()) { at(2) } else { at(1) }
-    }]
+    let is_measured = |lag: usize| structure.iter().any(|s| s.lagged[lag].is_some());
+    let second = if is_measured(1) { at(1) } else { at(0) };
+    [at(0), second, if is_measured(2) { at(2) } else { at(1) }]
 }
 
 /// Variance of the pixels' constant errors, px^2.

@@ -21,28 +21,22 @@ impl Scene<'_> {
     /// A term's values, what the views' planes take taken out.
     pub fn values(&self, term: &Term) -> Vec<Vec<f64>> {
         let mut row = Vec::new();
-        self.data
-            .iter()
-            .map(|view| {
-                let mut values: Vec<f64> =
-                    view.places.iter().map(|p| term.value(p, &mut row)).collect();
-                if self.statistic == Statistic::Bias {
-                    level(view, &mut values);
-                }
-                values
-            })
-            .collect()
+        self.levelled(|view| view.places.iter().map(|p| term.value(p, &mut row)).collect())
     }
 
     pub fn responses(&self) -> Vec<Vec<f64>> {
-        let of = |view: &ViewData| {
-            let mut values = view.response.clone();
+        self.levelled(|view| view.response.clone())
+    }
+
+    fn levelled(&self, mut of: impl FnMut(&ViewData) -> Vec<f64>) -> Vec<Vec<f64>> {
+        let levelled = |view: &ViewData| {
+            let mut values = of(view);
             if self.statistic == Statistic::Bias {
                 level(view, &mut values);
             }
             values
         };
-        self.data.iter().map(of).collect()
+        self.data.iter().map(levelled).collect()
     }
 }
 

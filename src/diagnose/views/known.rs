@@ -56,15 +56,12 @@ impl KnownTerms {
 
     /// Take a parameter of an effect for known; nothing is taken out for it.
     pub fn learn(&mut self, id: &str, name: &str, value: f64) {
-        let entry = match self.entries.iter().position(|e| e.0 == id) {
-            Some(k) => &mut self.entries[k],
-            None => {
-                self.entries.push((id.into(), Map::new()));
-                let last = self.entries.len() - 1;
-                &mut self.entries[last]
-            }
-        };
-        entry.1.insert(name.into(), value.into());
+        let at = self.entries.iter().position(|(known, _)| known == id);
+        let at = at.unwrap_or_else(|| {
+            self.entries.push((id.into(), Map::new()));
+            self.entries.len() - 1
+        });
+        self.entries[at].1.insert(name.into(), value.into());
     }
 
     /// Take what `found` has for known, whatever was learnt since.
@@ -159,26 +156,29 @@ impl KnownTerms {
     }
 
     pub fn has(&self, id: &str) -> bool {
-        self.entries.iter().any(|(known, _)| known == id)
+        self.entry(id).is_some()
+    }
+
+    fn entry(&self, id: &str) -> Option<&Map<String, Value>> {
+        self.entries.iter().find(|(known, _)| known == id).map(|(_, parameters)| parameters)
     }
 
     /// The parameters of an entry, as they are told.
     pub fn in_words(&self, id: &str) -> String {
-        let entry = self.entries.iter().find(|(known, _)| known == id);
-        let numbers =
-            entry.iter().flat_map(|(_, p)| p.keys().filter_map(|n| Some((n, number(p, n)?))));
+        let entry = self.entry(id).into_iter();
+        let numbers = entry.flat_map(|p| p.keys().filter_map(|n| Some((n, number(p, n)?))));
         numbers.map(|(name, value)| format!("{name} {value:.4}")).collect::<Vec<_>>().join(", ")
     }
 
     /// Standard error of a parameter; 0 where the model states none.
     pub fn std_error(&self, id: &str, name: &str) -> f64 {
-        let of = |(_, p): &(String, Map<String, Value>)| p.get(name)?.get("std_error")?.as_f64();
-        self.entries.iter().find(|(known, _)| known == id).and_then(of).unwrap_or(0.0)
+        let of = |p: &Map<String, Value>| p.get(name)?.get("std_error")?.as_f64();
+        self.entry(id).and_then(of).unwrap_or(0.0)
     }
 
     /// A parameter of an entry.
     pub fn parameter(&self, id: &str, name: &str) -> Option<f64> {
-        self.entries.iter().find(|(known, _)| known == id).and_then(|(_, p)| number(p, name))
+        number(self.entry(id)?, name)
     }
 }
 

@@ -11,11 +11,11 @@ use super::light::{Light, relative_light};
 use super::samples::{COARSE_PX, ViewData, coarser};
 use super::surveyed_view::{SurveyedView, independent_frames, inflation, mean_data};
 use super::tiles::{Tile, roughen, tiles};
-use crate::camera::{Camera, Rays};
 use crate::diagnose::checks::replication::halves;
 use crate::diagnose::options::Ablation;
 use crate::diagnose::search::view_levels::{MODEL_TOLERANCE, view_scatter};
 use crate::effects::Flat;
+use crate::measure::Workbench;
 use crate::sensors::SensorKind;
 use crate::stats::Correlation;
 use crate::terms::{Extent, PixelContext, Term};
@@ -48,7 +48,8 @@ pub struct Survey {
 }
 
 impl Survey {
-    pub fn of(fields: &[Field], camera: &Camera, rays: &Rays) -> Self {
+    pub fn of(fields: &[Field], bench: &Workbench<'_>) -> Self {
+        let camera = &bench.sensor.camera;
         let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
         let poses: Vec<(f64, f64)> =
             fields.iter().map(|f| (f.plane.distance(), f.plane.theta())).collect();
@@ -57,7 +58,7 @@ impl Survey {
             .zip(halves(&poses))
             .map(|(f, in_second_half)| {
                 let (inflation, correlation) = inflation(f, &[]);
-                let (places, tiles) = tiles(f, camera, rays, start);
+                let (places, tiles) = tiles(f, camera, &bench.rays, start);
                 SurveyedView {
                     name: f.name.clone(),
                     places: Arc::new(places),
@@ -79,22 +80,20 @@ impl Survey {
             right: reach.right,
             down: reach.down,
         });
-        let (tolerance, ablation) = (MODEL_TOLERANCE, Ablation::None);
-        let block_tiles = block_tiles(&views, camera.width);
         Survey {
+            block_tiles: block_tiles(&views, camera.width),
             views,
-            block_tiles,
             reach,
             flat,
-            kind: None,
+            kind: bench.sensor.kind,
             fixed_px2: 0.0,
             light,
             by_light: true,
-            tolerance,
+            tolerance: MODEL_TOLERANCE,
             refits_sigma: false,
             learnt_from: [None; 2],
             between: Arc::default(),
-            ablation,
+            ablation: Ablation::None,
         }
     }
 

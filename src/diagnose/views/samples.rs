@@ -43,6 +43,13 @@ impl ViewData {
         (weight > 0.0).then(|| (sum / weight, weight))
     }
 
+    /// The response, these terms taken out.
+    pub fn without(&self, terms: &[Term]) -> Vec<f64> {
+        let mut row = Vec::new();
+        let samples = self.response.iter().zip(self.places.iter());
+        samples.map(|(y, place)| y - Term::sum(terms, place, &mut row)).collect()
+    }
+
     /// With these terms beside the view's own nuisances: each is there by a standard normal number.
     pub fn beside(mut self, terms: &[Term]) -> Self {
         if terms.is_empty() {
