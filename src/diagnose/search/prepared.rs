@@ -22,9 +22,12 @@ pub struct Together<'a> {
     pub fine: &'a [ViewData],
     /// The same views in larger patches.
     pub coarse: &'a [ViewData],
-    /// The terms that were asked for last: they are often asked for again.
-    last: RefCell<Option<(Vec<Basis>, Rc<Vec<Evidence>>)>>,
+    /// What was asked for last: it is often asked for again.
+    last: RefCell<Option<Answer>>,
 }
+
+/// Terms, and the views' evidence on them.
+type Answer = (Vec<Basis>, Rc<Vec<Evidence>>);
 
 impl<'a> Together<'a> {
     pub fn of(fine: &'a [ViewData], coarse: &'a [ViewData]) -> Self {

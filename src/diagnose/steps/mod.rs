@@ -178,9 +178,7 @@ pub(in crate::diagnose) fn steps(
         size,
         ..named(effect, Statistic::Distribution, axis)
     };
-    let mut sigma_px: Vec<f32> = fields.iter().filter_map(|f| f.sigma.first().copied()).collect();
-    let sigma_px = f64::from(crate::stats::median_in_place(&mut sigma_px));
-    let sigma_mm = typical_sigma_mm(fields);
+    let (sigma_px, sigma_mm) = (typical_sigma_px(fields), typical_sigma_mm(fields));
     let of_disparity = lattice.disparity_step_px.filter(|_| {
         recording.sensor.may_have_disparity()
             && !known.has("disparity-quantisation")
