@@ -283,8 +283,8 @@ impl Case<'_> {
         let seen_by = (&self.sensor().camera, &self.bench.rays);
         let twins = self.baseline.as_ref().map(|b| (&b.fields[..], &b.survey));
         let seed = self.options.seed;
-        let all = || missing(&self.fields, twins, &self.survey, seen_by, seed);
-        let mut lost = self.losses.get_or_init(all).clone();
+        let search = || missing(&self.fields, twins, &self.survey, seen_by, seed);
+        let mut lost = self.losses.get_or_init(search).clone();
         let alike = self.baseline.as_ref().is_some_and(|b| b.loses_alike(&self.survey));
         lost.findings.retain(|m| {
             // What lies beside the target is no tile's.

@@ -21,6 +21,7 @@ use crate::effects::{Active, RAY_FOR_DEPTH};
 use crate::error::Result;
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
+use crate::stats::Correlation;
 use crate::terms::{Basis, Statistic, Term};
 use crate::view::{Excluded, Recording, Sensor};
 
@@ -39,7 +40,7 @@ pub struct Case<'a> {
     pub kept: KeptPattern,
     /// What the words step by.
     pub lattice: Quantisation,
-    /// Losses, which no model changes: the second run's are the first's.
+    /// Losses: the second run's are the first's, whose sigma says how hard an end of the range is.
     pub losses: OnceLock<DropoutOutcome>,
     pub excluded: Vec<Excluded>,
     /// What was odd about the views, in words.
@@ -58,6 +59,8 @@ pub struct MeanResult {
     pub terms: Vec<Term>,
     /// The terms at every pixel, px.
     pub px: Vec<Vec<f32>>,
+    /// What the views were worth in the fit: see [`Survey::weights`].
+    pub weights: Vec<(f64, Correlation)>,
 }
 
 impl<'a> Case<'a> {
@@ -111,20 +114,25 @@ impl<'a> Case<'a> {
         })
     }
 
-    /// The same views once more, with other residuals and against another model.
-    pub fn again<'b>(self, fields: Vec<Field>, model: &'b NoiseModel) -> Case<'b>
+    /// The same views once more, with other residuals and against another model. They are worth no less than
+    /// by these `weights`.
+    pub fn again<'b>(
+        self,
+        fields: Vec<Field>,
+        model: &'b NoiseModel,
+        weights: Vec<(f64, Correlation)>,
+    ) -> Case<'b>
     where
         'a: 'b,
     {
         let known = KnownTerms::of(model, &self.sensor().camera);
         let learnt = (self.learnt_from, &known);
-        let weights = self.survey.weights();
         // Two surveys at once are a quarter of the memory of all.
         drop(self.survey);
         let (bench, baseline) = (&self.bench, self.baseline.as_ref());
         let views = (&fields[..], &self.kept);
         let mut survey = survey(views, bench, baseline, self.options, learnt, model);
-        // What remains is counted at the weights that what was explained was counted at.
+        // What remains is counted by no less than what was explained was counted by.
         if baseline.is_none() {
             survey.weigh_more(weights);
         }
@@ -166,7 +174,7 @@ impl<'a> Case<'a> {
         let seed = self.options.seed;
         let mut fine = self.survey.mean_data();
         let mut found = self.survey.search_bias(&fine, camera, level, seed);
-        // The second run has the weights that the first ended with.
+        // The second run begins with what views were worth in the first.
         let first = self.baseline.is_none() && !self.extended;
         if first && self.options.ablation == Ablation::None {
             // What is steep in a bias was taken for noise that hangs together: views count for more
@@ -180,7 +188,7 @@ impl<'a> Case<'a> {
         let outcome = self.survey.refit_bias(&fine, camera, found);
         drop(fine);
         let (terms, px) = self.everywhere(&outcome);
-        MeanResult { outcome, terms, px }
+        MeanResult { outcome, terms, px, weights: self.survey.weights() }
     }
 
     /// The terms of the mean, and what they are at every pixel, px.

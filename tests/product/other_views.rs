@@ -75,3 +75,25 @@ fn a_sensor_is_itself_and_a_changed_one_is_not() {
         assert!(names.contains(&change), "{change}: {names:?}");
     }
 }
+
+/// Against a model whose sigma is too large nothing but sigma is off: what views weigh is relative to it,
+/// and once it is refitted white noise is white noise. Weights that were taken over as they stood made them four
+/// times as heavy as they are.
+#[test]
+fn a_sigma_that_was_too_large_leaves_nothing_once_it_is_refitted() {
+    let paper = NoiseModel::paper();
+    let parameters = paper.sigma.parameters.iter().enumerate();
+    let twice =
+        parameters.map(|(k, p)| if matches!(k, 0 | 1 | 3) { 2.0 * p } else { *p }).collect();
+    let model =
+        NoiseModel { sigma: SigmaModel { parameters: twice, ..paper.sigma.clone() }, ..paper };
+    for seed in 2..5 {
+        let (_folder, recording) = views(&[], seed);
+        let options = DiagnoseOptions::default();
+        let told = diagnose(&recording, &model, &options, &|_, _| ()).expect("diagnosed").diagnosis;
+        let names: Vec<_> = told.findings.iter().map(|f| (f.status, f.axis)).collect();
+        assert_eq!(told.verdict, Verdict::Mismatch, "seed {seed}: {names:?}");
+        let remains: Vec<_> = told.after.remaining.iter().map(|r| &r.words).collect();
+        assert_eq!(told.after.verdict, Verdict::Match, "seed {seed}: {remains:?}");
+    }
+}

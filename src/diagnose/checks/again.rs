@@ -1,5 +1,6 @@
 //! The battery once more, against the extended model: the same layers and thresholds on the same
-//! views, with everything that was found taken out of the residuals in memory.
+//! views, with everything that was found taken out of the residuals in memory. What no model changes,
+//! losses and the words' steps, is the first run's.
 
 use crate::diagnose::battery::Battery;
 use crate::diagnose::case::{Case, MeanResult};
@@ -36,7 +37,7 @@ impl<'a> Case<'a> {
             }
         }
         drop((bias, spread));
-        let mut case = self.again(fields, extended);
+        let mut case = self.again(fields, extended, mean.weights.clone());
         let battery = case.battery();
         case.fields.iter_mut().zip(means).for_each(|(field, mean)| field.mean = mean);
         (after(&battery, explained), case)

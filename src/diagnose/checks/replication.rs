@@ -93,9 +93,9 @@ pub fn spans(counts: &[usize]) -> Vec<Range<usize>> {
 /// What one half says.
 pub struct Half {
     pub beta: DVector<f64>,
-    /// Information and priors.
+    /// Information plus what the priors hold.
     pub precision: DMatrix<f64>,
-    /// Of the precision.
+    /// The precision's.
     pub factor: Cholesky,
     /// Every view's score beyond that fit.
     pub beyond: Vec<DVector<f64>>,

@@ -148,7 +148,8 @@ pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances) -> Vec<Law> {
         let warm = |c: &ReferencedView| c.z * (1.0 - (-c.session_s / tau).exp());
         references.law("thermal-drift", Axis::SessionTime, warm)
     }));
-    // The variance was measured with few degrees of freedom: a Student's t in place of a Gaussian.
+    // Wider from here on: the variance was measured with few degrees of freedom, which makes a Student's t of
+    // a Gaussian.
     let Scatter { variances, freedom } = &mut references.scatter;
     let wider = *freedom / (*freedom - 2.0).max(1.0);
     variances.iter_mut().for_each(|v| *v *= wider);

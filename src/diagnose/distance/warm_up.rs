@@ -30,8 +30,8 @@ const TYPICAL_TAU_S: f64 = 900.0;
 /// Sensors drift by a per cent or two at most (the card's source: some mm at 1 to 2 m, in 20 min).
 const USUAL: f64 = 0.02;
 
-/// Of a session that lasted so long, s, by the `evidence` of its references on a drift that moves each of
-/// them by so much of its size, m, behind what is fitted beside it; `None` without a time.
+/// The warm-up in a session of so many seconds; `None` without a time. `evidence` is what the references
+/// say of a drift, the last of its columns, that moves each of them by so many metres for a size of one.
 pub fn warm_up(
     session_s: f64,
     evidence: impl Fn(&dyn Fn(&ReferencedView) -> f64) -> Vec<Evidence>,

@@ -27,7 +27,7 @@ pub struct Sums {
 /// One view's pixels beside the target, over so many rows.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct EdgeLoss {
-    /// Sum over the rows of the width lost, less what is lost anyway.
+    /// Sum over the rows of the width lost, less what is lost anyway: in one frame, where not said otherwise.
     pub lost: f64,
     /// Sum over the rows of the width that geometry has.
     pub shaded: f64,

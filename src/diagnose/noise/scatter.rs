@@ -8,7 +8,6 @@ use crate::diagnose::against::noise::{NAMED_LEVEL, NoiseParts};
 use crate::diagnose::case::{Case, MeanResult};
 use crate::diagnose::finding::pixels::{Whitener, common, measure_tails, terms_of};
 use crate::diagnose::search::outcome::Outcome;
-use crate::diagnose::steps::lattice::Quantisation;
 use crate::diagnose::steps::{Steps, forget_windows, own_step};
 use crate::terms::{Axis, Basis, PixelContext, Statistic, Term};
 
@@ -35,7 +34,7 @@ impl Case<'_> {
         let theirs = self.baseline.as_ref().map(|b| b.steps);
         let extra = |p: &PixelContext| (own.at(p) - theirs.map_or(0.0, |s| s.at(p))).max(0.0);
         let each = self.level(Self::EACH_LEVEL);
-        let textures = self.textures(&mut structure, &lattice, each);
+        let textures = self.textures(&mut structure, each);
         let excess = self.excess_of_rows(&structure, &textures);
         for (view, [_, of_log_variance]) in self.survey.views.iter_mut().zip(excess) {
             view.log_variance_inflation *= of_log_variance;
@@ -82,12 +81,7 @@ impl Case<'_> {
     }
 
     /// How the noise hangs together; against a simulation, what goes beyond the simulation's.
-    fn textures(
-        &mut self,
-        structure: &mut [Structure],
-        lattice: &Quantisation,
-        each: f64,
-    ) -> Vec<TextureFinding> {
+    fn textures(&mut self, structure: &mut [Structure], each: f64) -> Vec<TextureFinding> {
         let (mut of_parts, mut shrunk) = (Vec::new(), false);
         if let Some(baseline) = &mut self.baseline {
             let more = baseline.too_much(structure, each);
@@ -96,7 +90,7 @@ impl Case<'_> {
             let parts = baseline.noise_parts(structure, each);
             shrunk = parts.as_ref().is_some_and(NoiseParts::shrink_alike);
             of_parts = baseline.noise_findings(parts.as_ref(), structure, &self.fields, each);
-            baseline.compare(structure, lattice, &mut self.known);
+            baseline.compare(structure, &self.lattice, &mut self.known);
             if let Some(found) = found {
                 // The extended model has it, under its name or in its size.
                 let held = |h: &TextureFinding| {

@@ -45,6 +45,7 @@ pub fn beside_bias<'a>(fields: &'a [Field], bias: &'a [Vec<f32>]) -> Vec<(&'a Fi
 
 /// Of the views that `kept` was made of, each with what is known of it to be no noise.
 pub fn still(views: &[(&Field, &[f32])], kept: &KeptPattern) -> Vec<Still> {
+    debug_assert_eq!(views.len(), kept.0.len());
     let seen = covariances(views, |f, b| pixel_scale(f, &f.mean, b));
     seen.iter().zip(&kept.0).map(|(seen, kept)| seen.over(kept)).collect()
 }

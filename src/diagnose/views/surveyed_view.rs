@@ -101,7 +101,7 @@ impl SurveyedView {
         self.tiles.iter().map(|t| self.weight(t)).sum()
     }
 
-    /// All together they are worth as much as this where that is more, and hang together so. Two runs'
+    /// Raise the weight of all tiles together to at least this, and take its correlation over. Two runs'
     /// inflations do not compare: each is relative to its own sigma.
     pub fn weigh_more(&mut self, (weight, correlation): (f64, Correlation)) {
         let own = self.whole_weight();
@@ -209,14 +209,17 @@ mod tests {
     #[test]
     fn a_view_keeps_its_weight_whatever_sigma_is() {
         let first = view();
-        let weights = (first.whole_weight(), first.correlation.clone());
+        let near = Correlation { sum: 3.0, ..Correlation::white() };
+        let weights = (first.whole_weight(), near.clone());
         let mut refitted = view();
         refitted.tiles_mut().for_each(|(_, tile)| tile.variance /= 4.0);
         refitted.inflation *= 4.0;
         refitted.weigh_more(weights.clone());
         assert_eq!(refitted.inflation, 4.0 * first.inflation);
+        assert_eq!(refitted.correlation, Correlation::white());
         refitted.inflation *= 3.0;
         refitted.weigh_more(weights);
+        assert_eq!(refitted.correlation, near);
         approx::assert_relative_eq!(
             refitted.whole_weight(),
             first.whole_weight(),
