@@ -102,6 +102,17 @@ pub struct Half {
 }
 
 impl Half {
+    /// The fit by this precision to a `score`; `beyond` are the views' scores beyond it.
+    pub fn of(
+        precision: DMatrix<f64>,
+        score: &DVector<f64>,
+        beyond: impl FnOnce(&DVector<f64>) -> Vec<DVector<f64>>,
+    ) -> Option<Self> {
+        let factor = Cholesky::of(precision.clone())?;
+        let beta = factor.solve(score);
+        Some(Half { beyond: beyond(&beta), beta, precision, factor })
+    }
+
     /// A weighted sum of the coefficients; errors from the views' scatter where that is the larger.
     fn measured(&self, weights: &DVector<f64>) -> Option<ViewMean> {
         let n = self.beyond.len() as f64;
@@ -127,12 +138,8 @@ impl Halves {
         };
         let fit = |which| {
             let Evidence { a, b } = sum(Some(which));
-            let precision = a + &held;
-            let factor = Cholesky::of(precision.clone())?;
-            let beta = factor.solve(&b);
             let mine = views.iter().zip(second).filter(|(_, s)| **s == which);
-            let beyond = mine.map(|(view, _)| &view.b - &view.a * &beta).collect();
-            Some(Half { beta, precision, factor, beyond })
+            Half::of(a + &held, &b, |beta| mine.map(|(view, _)| &view.b - &view.a * beta).collect())
         };
         let Evidence { a: metric, b } = sum(None);
         let whole = Cholesky::of(&metric + &held)?.solve(&b);

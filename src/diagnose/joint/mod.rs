@@ -23,7 +23,6 @@ use crate::diagnose::search::evidence::Gain;
 use crate::diagnose::search::outcome::{Chosen, Outcome};
 use crate::diagnose::views::samples::{COARSE_PX, ViewData, coarser};
 use crate::model::Covariance;
-use crate::solve::Cholesky;
 use crate::terms::Gauge;
 use columns::Columns;
 use error::{Error, clustered};
@@ -190,14 +189,12 @@ impl Joint<'_> {
         let own = |all: &DVector<f64>| DVector::from_fn(n, |i, _| all[columns[i]]);
         let half = |which: bool| {
             let evidence = &self.halves[usize::from(which)];
-            let precision = part(&evidence.a) + &held;
-            let factor = Cholesky::of(precision.clone())?;
-            let beta = factor.solve(&own(&evidence.b));
-            let mut all = DVector::zeros(self.all.b.len());
-            columns.iter().zip(beta.iter()).for_each(|(&c, b)| all[c] = *b);
-            let mine: Vec<usize> = (0..second.len()).filter(|v| second[*v] == which).collect();
-            let beyond = self.left(&mine, &all).iter().map(own).collect();
-            Some(Half { beta, precision, factor, beyond })
+            Half::of(part(&evidence.a) + &held, &own(&evidence.b), |beta| {
+                let mut all = DVector::zeros(self.all.b.len());
+                columns.iter().zip(beta.iter()).for_each(|(&c, b)| all[c] = *b);
+                let mine: Vec<usize> = (0..second.len()).filter(|v| second[*v] == which).collect();
+                self.left(&mine, &all).iter().map(own).collect()
+            })
         };
         let mut counts = Vec::new();
         for &t in &s.terms {

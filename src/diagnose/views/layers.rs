@@ -141,7 +141,7 @@ impl Survey {
         true
     }
 
-    /// What each view's mean is worth.
+    /// What each view's mean is worth as a whole, 1/px^2, and how its pixels hang together.
     pub fn weights(&self) -> Vec<(f64, Correlation)> {
         self.views.iter().map(|v| (v.whole_weight(), v.correlation.clone())).collect()
     }
