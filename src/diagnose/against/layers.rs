@@ -62,9 +62,9 @@ impl Baseline {
             // are in what they are fitted to.
             let smooth = logs.values().sum::<f64>() / logs.len().max(1) as f64;
             for (place, t) in real.patches_mut() {
-                place.variance = t.variance * smooth.exp();
+                place.variance = t.noise_variance * smooth.exp();
                 match logs.get(&patch(place.u, place.v, side)) {
-                    Some(log) => t.variance *= log.exp(),
+                    Some(log) => t.noise_variance *= log.exp(),
                     None => (t.temporal, t.rough_square) = (f64::NAN, f64::NAN),
                 }
             }

@@ -169,6 +169,7 @@ mod tests {
             temporal: 0.01,
             repeated: 1.0,
             variance: 0.01,
+            noise_variance: 0.01,
             pixels: 16.0,
             missing: 0.0,
             asked: 16.0,

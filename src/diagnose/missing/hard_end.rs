@@ -135,7 +135,7 @@ fn best_cut(points: &[Point], lost: impl Fn(&Point) -> f64) -> Option<Cut> {
 pub fn blur(survey: &Survey, z: f64) -> f64 {
     let patches = survey.views.iter().flat_map(SurveyedView::patches);
     let nearest = patches.min_by(|(a, _), (b, _)| (a.z - z).abs().total_cmp(&(b.z - z).abs()));
-    nearest.map_or(0.0, |(place, t)| t.variance.sqrt() / place.disparity * z)
+    nearest.map_or(0.0, |(place, t)| t.noise_variance.sqrt() / place.disparity * z)
 }
 
 #[cfg(test)]

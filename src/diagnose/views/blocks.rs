@@ -94,7 +94,7 @@ impl Sum {
         }
         self.n += t.pixels;
         self.repeated += t.pixels * repeated;
-        self.ratio += t.pixels * repeated * square / t.variance;
+        self.ratio += t.pixels * repeated * square / t.noise_variance;
         // The block lies where its tiles do on average; what is one for the view stays.
         let share = t.pixels / self.n;
         let mix = |a: &mut f64, b: f64| *a += share * (b - *a);
@@ -150,6 +150,7 @@ mod tests {
                 temporal: 1.0 / light,
                 repeated: 1.0,
                 variance: 1.0,
+                noise_variance: 1.0,
                 pixels: (SIDE * SIDE) as f64,
                 missing: 0.0,
                 asked: 1.0,

@@ -162,7 +162,7 @@ impl Survey {
             let mut row = Vec::new();
             for (place, t) in view.patches_mut() {
                 let factor = Term::sum(&off, place, &mut row).exp();
-                t.variance *= factor;
+                t.noise_variance *= factor;
                 place.variance *= factor;
             }
         });

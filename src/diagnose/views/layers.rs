@@ -189,7 +189,7 @@ impl Survey {
             }
             for (place, t) in view.patches_mut() {
                 let (factor, more) = (stretch(place), extra(place));
-                t.variance = t.variance * factor + more;
+                t.noise_variance = t.noise_variance * factor + more;
                 place.variance = place.variance * factor + more;
             }
         });

@@ -193,6 +193,7 @@ mod tests {
                     temporal: variance,
                     repeated: 1.0,
                     variance,
+                    noise_variance: variance,
                     // Thirty frames.
                     pixels: 30.0 * side * side,
                     missing: 0.0,

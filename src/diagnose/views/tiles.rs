@@ -24,6 +24,8 @@ pub struct Tile {
     pub repeated: f64,
     /// Model's variance of a pixel, px^2.
     pub variance: f64,
+    /// What its noise is held against, px^2: the same, until the noise's search puts in what has another name.
+    pub noise_variance: f64,
     /// Pixels with a mean.
     pub pixels: f64,
     /// Share of pixel-frames without a measurement, and their number.
@@ -189,6 +191,7 @@ impl Sums {
             temporal,
             repeated,
             variance,
+            noise_variance: variance,
             pixels: self.n,
             missing: self.missing / self.asked,
             asked: self.asked,
