@@ -21,7 +21,6 @@ use crate::effects::{Active, RAY_FOR_DEPTH};
 use crate::error::Result;
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
-use crate::stats::Correlation;
 use crate::terms::{Basis, Statistic, Term};
 use crate::view::{Excluded, Recording, Sensor};
 
@@ -59,8 +58,6 @@ pub struct MeanResult {
     pub terms: Vec<Term>,
     /// The terms at every pixel, px.
     pub px: Vec<Vec<f32>>,
-    /// What the views were worth in the fit: see [`Survey::weights`].
-    pub weights: Vec<(f64, Correlation)>,
 }
 
 impl<'a> Case<'a> {
@@ -115,18 +112,14 @@ impl<'a> Case<'a> {
     }
 
     /// The same views once more, with other residuals and against another model. They are worth no less than
-    /// by these `weights`.
-    pub fn again<'b>(
-        self,
-        fields: Vec<Field>,
-        model: &'b NoiseModel,
-        weights: Vec<(f64, Correlation)>,
-    ) -> Case<'b>
+    /// they were.
+    pub fn again<'b>(self, fields: Vec<Field>, model: &'b NoiseModel) -> Case<'b>
     where
         'a: 'b,
     {
         let known = KnownTerms::of(model, &self.sensor().camera);
         let learnt = (self.learnt_from, &known);
+        let weights = self.survey.weights();
         // Two surveys at once are a quarter of the memory of all.
         drop(self.survey);
         let (bench, baseline) = (&self.bench, self.baseline.as_ref());
@@ -188,7 +181,7 @@ impl<'a> Case<'a> {
         let outcome = self.survey.refit_bias(&fine, camera, found);
         drop(fine);
         let (terms, px) = self.everywhere(&outcome);
-        MeanResult { outcome, terms, px, weights: self.survey.weights() }
+        MeanResult { outcome, terms, px }
     }
 
     /// The terms of the mean, and what they are at every pixel, px.

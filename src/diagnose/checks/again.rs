@@ -37,7 +37,7 @@ impl<'a> Case<'a> {
             }
         }
         drop((bias, spread));
-        let mut case = self.again(fields, extended, mean.weights.clone());
+        let mut case = self.again(fields, extended);
         let battery = case.battery();
         case.fields.iter_mut().zip(means).for_each(|(field, mean)| field.mean = mean);
         (after(&battery, explained), case)

@@ -151,6 +151,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
+    use crate::diagnose::views::blocks::{BLOCK_TILES, blocks};
     use crate::diagnose::views::tiles::SIDE;
     use crate::plane::Plane;
     use crate::rng::Seed;
@@ -226,6 +227,20 @@ mod tests {
             first.whole_weight(),
             max_relative = 1e-12
         );
+    }
+
+    /// Noise that has another name is told from what is left; a mean is worth what it was in its own fit.
+    #[test]
+    fn what_the_noise_is_held_against_does_not_weigh_the_means() {
+        let first = view();
+        let mut held = view();
+        held.tiles_mut().for_each(|(_, tile)| tile.noise_variance *= 2.0);
+        assert_eq!(mean_data(&held).weight, mean_data(&first).weight);
+        let [before, after] = [&first, &held].map(|v| blocks(v, BLOCK_TILES, false).response);
+        assert!(!before.is_empty());
+        for (before, after) in before.iter().zip(&after) {
+            approx::assert_relative_eq!(before - after, 2f64.ln(), epsilon = 1e-12);
+        }
     }
 
     /// Planes alone leave of it what a bowl would be: a nat in each view, and views add up.
