@@ -39,6 +39,12 @@ impl Learnt {
         if self.searched { (share.sqrt() + measured.sqrt()).powi(2) } else { measured }
     }
 
+    /// The same once the model's own error was taken out of the views, by its covariance: a model that nobody
+    /// searched leaves nothing open beside it.
+    pub fn unseen_excess(&self, views: f64) -> f64 {
+        if self.searched { self.excess(views) } else { 1.0 }
+    }
+
     /// A chance of `views` that counted noise alone, as one of noise and of what a search of the
     /// others may have left; a model that nobody searched for it says nothing of it.
     pub fn p(&self, p: f64, views: f64) -> f64 {
@@ -73,6 +79,8 @@ mod tests {
         assert_eq!(of(20.0, false), 2.0);
         approx::assert_relative_eq!(of(20.0, true), 3.0 + 8f64.sqrt(), max_relative = 1e-12);
         assert!(of(5.0, true) > of(20.0, true));
+        let unseen = |searched| Learnt { views: 20.0, searched }.unseen_excess(20.0);
+        assert_eq!([unseen(false), unseen(true)], [1.0, of(20.0, true)]);
         let many = Learnt { views: 1e9, searched: true };
         for p in [1e-12, 1e-3, 0.2] {
             approx::assert_relative_eq!(many.p(p, 20.0), p, max_relative = 1e-2);
