@@ -72,15 +72,18 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
     let last = |s: &Structure| if slowly { s.lagged[2].or(s.lagged[1]) } else { of_any_two(s) };
     let Some(least) = ViewMean::of(views, last) else { return found };
     let p_still = least.p_above(fixed_share + frozen_known);
+    let floor = if slowly { BESIDE_ANOTHER } else { 0.0 };
+    let stands = p_still < level && still - frozen_known > floor;
     if slowly && rho_known == 0.0 {
-        let s = still.max(0.0) + fixed_share;
+        // A share that is not told has no part in it: of small ones chance is the most, and the next frames
+        // are in them.
+        let s = fixed_share + if stands { still } else { frozen_known };
         let rho = ((first.value - s) / (1.0 - s).max(1e-6)).clamp(0.0, 1.0);
         let name = vec!["temporal-correlation"];
         let evidence = (p_falling, nats(&falling, 0.0));
         found.push(of_frames(name, [1.0, 3.0], ("rho", rho, first_error), rho, evidence));
     }
-    let floor = if slowly { BESIDE_ANOTHER } else { 0.0 };
-    if p_still < level && still - frozen_known > floor {
+    if stands {
         // What falls, but not clearly, may as well change slowly.
         let doubtful = !slowly && p_falling < DOUBTFUL && rho_known == 0.0;
         let names = match doubtful {
@@ -149,4 +152,32 @@ pub(in crate::diagnose) fn still_share(c1: f64, c2: f64, c3: Option<f64>) -> f64
     // c1 - c2 = (1 - s) rho (1 - rho); a moving average dies at once and leaves the last.
     let s = if rho < 0.05 { c3 } else { 1.0 - near / (rho * (1.0 - rho)) };
     s.clamp(0.0, c3.max(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{parameter, with};
+    use super::*;
+    use crate::rng::Seed;
+
+    /// What chance leaves of the later frames is no share that stands still: it would make rho smaller, and
+    /// never larger.
+    #[test]
+    fn a_share_that_is_not_told_has_no_part_in_the_correlation_of_frames() {
+        const RHO: f64 = 0.08;
+        let mut rng = Seed(8).stream("noise/in-time");
+        let mut off: Vec<f64> = Vec::new();
+        for _ in 0..400 {
+            let views = with(&mut rng, |s| {
+                for (k, lag) in (1..).zip(&mut s.lagged) {
+                    *lag = lag.map(|c| c + RHO.powi(k));
+                }
+            });
+            let found = in_time(&views, &KnownTerms::default(), 1e-3);
+            let slow = found.iter().find(|f| f.families == ["temporal-correlation"]);
+            off.extend(slow.map(|f| parameter(f, "rho")[0] - RHO));
+        }
+        let mean = off.iter().sum::<f64>() / off.len() as f64;
+        assert!(off.len() > 390 && mean.abs() < 1e-3, "{mean} of {}", off.len());
+    }
 }

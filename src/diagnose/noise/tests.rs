@@ -46,7 +46,7 @@ fn plain(rng: &mut Stream) -> Vec<Structure> {
 }
 
 /// `plain`, with something added to every view.
-fn with(rng: &mut Stream, add: impl Fn(&mut Structure)) -> Vec<Structure> {
+pub(super) fn with(rng: &mut Stream, add: impl Fn(&mut Structure)) -> Vec<Structure> {
     let mut views = plain(rng);
     views.iter_mut().for_each(add);
     views
@@ -57,7 +57,7 @@ fn names(found: &[TextureFinding]) -> Vec<&'static str> {
 }
 
 #[track_caller]
-fn parameter(found: &TextureFinding, name: &str) -> [f64; 2] {
+pub(super) fn parameter(found: &TextureFinding, name: &str) -> [f64; 2] {
     ["value", "std_error"].map(|key| found.parameters[name][key].as_f64().expect("a number"))
 }
 
