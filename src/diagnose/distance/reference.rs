@@ -150,7 +150,7 @@ impl Case<'_> {
         let plain: Vec<Term> = bias.iter().filter(of_catalogue).cloned().collect();
         let views = self.fields.len() as f64;
         // The levels are off with the model's bias; and its own references, if any, left a law open.
-        let of_bias = self.learnt_from[0].map(|l| Learnt { searched: false, ..l }.excess(views));
+        let of_bias = self.learnt_from[0].map(|l| l.of_difference(views));
         let theirs = Learnt::references(self.model).filter(|_| self.learnt_from[1].is_some());
         let of_laws = theirs.map(|l| l.excess(ours as f64));
         let excess = of_bias.unwrap_or(1.0).max(of_laws.unwrap_or(1.0));

@@ -75,8 +75,7 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
     let floor = if slowly { BESIDE_ANOTHER } else { 0.0 };
     let stands = p_still < level && still - frozen_known > floor;
     if slowly && rho_known == 0.0 {
-        // A share that is not told has no part in it: of small ones chance is the most, and the next frames
-        // are in them.
+        // A share too small to be told is mostly chance, and this very correlation is in its estimate.
         let s = fixed_share + if stands { still } else { frozen_known };
         let rho = ((first.value - s) / (1.0 - s).max(1e-6)).clamp(0.0, 1.0);
         let name = vec!["temporal-correlation"];

@@ -76,8 +76,7 @@ impl Null {
 
     /// How much further than by their noise so many views may be off, in variance.
     fn excess(&self, views: usize, rules: &Rules) -> f64 {
-        self.scatter(rules)
-            * rules.learnt_from.map_or(1.0, |model| model.unseen_excess(views as f64))
+        self.scatter(rules) * rules.learnt_from.map_or(1.0, |model| model.excess(views as f64))
     }
 
     /// The views' own scatter that counts, over their noise.

@@ -29,20 +29,21 @@ impl Learnt {
         (references > 0).then_some(Learnt { views: references as f64, searched: true })
     }
 
-    /// How much further than by their own error so many `views` may be off from the model, in
-    /// variance. What the model has is off by its own error, one over its views. What it has not was
-    /// looked for, and may be just too small to be seen there: in amplitudes, with the threshold of
-    /// both at one, sqrt(views / its views); beyond it stands a difference of two measurements.
-    pub fn excess(&self, views: f64) -> f64 {
-        let share = views / self.views;
-        let measured = 1.0 + share;
-        if self.searched { (share.sqrt() + measured.sqrt()).powi(2) } else { measured }
+    /// Variance of the difference of `views` and the model, over the variance of the views alone: the model's
+    /// own is one over its views.
+    pub fn of_difference(&self, views: f64) -> f64 {
+        1.0 + views / self.views
     }
 
-    /// The same once the model's own error was taken out of the views, by its covariance: a model that nobody
-    /// searched leaves nothing open beside it.
-    pub fn unseen_excess(&self, views: f64) -> f64 {
-        if self.searched { self.excess(views) } else { 1.0 }
+    /// How much further than by their own error so many `views` may be off, in variance, once the model's
+    /// error was taken out of them by its covariance. What the model has not was looked for, and may be just too
+    /// small to be seen there: in amplitudes, with the threshold of both at one, sqrt(views / its views);
+    /// beyond it stands a difference of two measurements. A model that nobody searched leaves nothing open.
+    pub fn excess(&self, views: f64) -> f64 {
+        if !self.searched {
+            return 1.0;
+        }
+        ((views / self.views).sqrt() + self.of_difference(views).sqrt()).powi(2)
     }
 
     /// A chance of `views` that counted noise alone, as one of noise and of what a search of the
@@ -74,13 +75,14 @@ mod tests {
     /// as are looked at, what was just not seen there counts too.
     #[test]
     fn few_views_leave_more_open() {
-        let of = |views: f64, searched| Learnt { views, searched }.excess(20.0);
-        assert!((of(1e9, true) - 1.0).abs() < 1e-3 && (of(1e9, false) - 1.0).abs() < 1e-3);
-        assert_eq!(of(20.0, false), 2.0);
-        approx::assert_relative_eq!(of(20.0, true), 3.0 + 8f64.sqrt(), max_relative = 1e-12);
-        assert!(of(5.0, true) > of(20.0, true));
-        let unseen = |searched| Learnt { views: 20.0, searched }.unseen_excess(20.0);
-        assert_eq!([unseen(false), unseen(true)], [1.0, of(20.0, true)]);
+        let learnt = |views: f64, searched| Learnt { views, searched };
+        let of = |views: f64| learnt(views, true).excess(20.0);
+        let difference = |views: f64| learnt(views, false).of_difference(20.0);
+        assert!((of(1e9) - 1.0).abs() < 1e-3 && (difference(1e9) - 1.0).abs() < 1e-3);
+        assert_eq!(difference(20.0), 2.0);
+        approx::assert_relative_eq!(of(20.0), 3.0 + 8f64.sqrt(), max_relative = 1e-12);
+        assert!(of(5.0) > of(20.0));
+        assert_eq!(learnt(20.0, false).excess(20.0), 1.0);
         let many = Learnt { views: 1e9, searched: true };
         for p in [1e-12, 1e-3, 0.2] {
             approx::assert_relative_eq!(many.p(p, 20.0), p, max_relative = 1e-2);
