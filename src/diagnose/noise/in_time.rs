@@ -13,6 +13,8 @@ const LEAST_FIXED: f64 = 0.0003;
 const DOUBTFUL: f64 = 0.05;
 /// A share that stands still beside one that changes slowly is known to this.
 const BESIDE_ANOTHER: f64 = 0.05;
+/// Of a view that is hardly anything else, px^2 by px^2, nothing is known beside the pattern.
+const LARGEST_PATTERN: f64 = 0.95;
 
 /// A correlation of frames: a share of the variance.
 fn of_frames(
@@ -46,17 +48,20 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
     };
     let mut found: Vec<TextureFinding> =
         fixed.and_then(|m| pattern.found(&m, variance, level)).into_iter().collect();
-    let fixed_px2 = fixed.map_or(0.0, |m| m.value.max(0.0));
+    let views = &beside_pattern(views, fixed)[..];
     let Some(first) = ViewMean::of(views, |s| s.lagged[0]) else { return found };
+    // What the pattern errs by is in every view's correlation alike.
+    let of_pattern = fixed.map_or(0.0, |m| m.std_error * mean_precision(views));
+    let sure_of = |m: ViewMean| ViewMean { std_error: m.std_error.hypot(of_pattern), ..m };
+    let first = sure_of(first);
     let first_error = first.std_error.max(by_chance(views));
-    let fixed_share = fixed_px2 / variance.max(1e-12);
     let frozen_known = known.parameter("frozen-noise", "fraction").unwrap_or(0.0);
     let rho_known = known.parameter("temporal-correlation", "rho").unwrap_or(0.0);
     let falling = ViewMean::of(views, |s| Some(s.lagged[0]? - later(s)?));
-    let Some((falling, still)) = falling.zip(still_level(views)) else {
+    let Some((falling, still)) = falling.zip(still_beside(views)) else {
         // Two frames a view: still or slowly changing, nobody can say.
-        let p = first.p_above(fixed_share + frozen_known + rho_known);
-        let more = first.value - fixed_share - frozen_known - rho_known;
+        let p = first.p_above(frozen_known + rho_known);
+        let more = first.value - frozen_known - rho_known;
         if p < level {
             let names = vec!["frozen-noise", "temporal-correlation"];
             let fraction = ("fraction", first.value, first_error);
@@ -66,17 +71,17 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
     };
     let p_falling = falling.p_above(0.0);
     // What changes slowly makes next frames alike; a fall to frames that differ is chance.
-    let alike = first.p_above(fixed_share + frozen_known) < level;
+    let alike = first.p_above(frozen_known) < level;
     let slowly = alike && p_falling < level;
     // What stands still is in the last of them whole, and in all of them where none fades.
     let last = |s: &Structure| if slowly { s.lagged[2].or(s.lagged[1]) } else { of_any_two(s) };
-    let Some(least) = ViewMean::of(views, last) else { return found };
-    let p_still = least.p_above(fixed_share + frozen_known);
+    let Some(least) = ViewMean::of(views, last).map(sure_of) else { return found };
+    let p_still = least.p_above(frozen_known);
     let floor = if slowly { BESIDE_ANOTHER } else { 0.0 };
     let stands = p_still < level && still - frozen_known > floor;
     if slowly && rho_known == 0.0 {
         // A share too small to be told is mostly chance, and this very correlation is in its estimate.
-        let s = fixed_share + if stands { still } else { frozen_known };
+        let s = if stands { still } else { frozen_known };
         let rho = ((first.value - s) / (1.0 - s).max(1e-6)).clamp(0.0, 1.0);
         let name = vec!["temporal-correlation"];
         let evidence = (p_falling, nats(&falling, 0.0));
@@ -92,10 +97,10 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
             }
             true => vec!["temporal-correlation", "frozen-noise"],
         };
-        let evidence = (p_still, nats(&least, fixed_share + frozen_known));
+        let evidence = (p_still, nats(&least, frozen_known));
         let parameter = match names[0] {
             "frozen-noise" => ("fraction", still, least.std_error),
-            _ => ("rho", (first.value - fixed_share - frozen_known).max(0.0), first_error),
+            _ => ("rho", (first.value - frozen_known).max(0.0), first_error),
         };
         found.push(of_frames(names, [1.0, 3.0], parameter, still, evidence));
     }
@@ -125,15 +130,33 @@ fn by_chance(views: &[Structure]) -> f64 {
     if pairs > 0.0 { pairs.sqrt().recip() } else { 0.0 }
 }
 
-/// Share of the noise that stands still within a view, by the views' mean correlations; `None` with
-/// too few frames.
+/// Views with their frames' correlations beside a pattern that is the same in all of them: each view's noise
+/// has its own share of that.
+fn beside_pattern(views: &[Structure], fixed: Option<ViewMean>) -> Vec<Structure> {
+    let fixed_px2 = fixed.map_or(0.0, |m| m.value.max(0.0));
+    let beside = |s: &Structure| {
+        let share = (fixed_px2 / s.variance_px2.max(1e-12)).min(LARGEST_PATTERN);
+        let lagged = s.lagged.map(|c| Some((c? - share) / (1.0 - share)));
+        Structure { lagged, ..s.clone() }
+    };
+    views.iter().map(beside).collect()
+}
+
+/// Mean of one over the variance, px^-2.
+fn mean_precision(views: &[Structure]) -> f64 {
+    let precision = |s: &Structure| (s.variance_px2 > 0.0).then(|| 1.0 / s.variance_px2);
+    ViewMean::of(views, precision).map_or(0.0, |m| m.value)
+}
+
+/// Share of the noise that stands still within a view and is not in all of them, by the views' mean
+/// correlations; `None` with too few frames.
 pub fn still_level(views: &[Structure]) -> Option<f64> {
-    let mean = |of: &dyn Fn(&Structure) -> Option<f64>| ViewMean::of(views, of).map(|m| m.value);
-    let (c1, c2, c3) = (mean(&|s| s.lagged[0])?, mean(&|s| s.lagged[1])?, mean(&|s| s.lagged[2]));
-    let share = still_share(c1, c2, c3);
-    let fixed = mean(&|s| s.fixed_px2).unwrap_or(0.0).max(0.0);
-    let variance = mean(&|s| Some(s.variance_px2)).unwrap_or(0.0);
-    Some(share - fixed / variance.max(1e-12))
+    still_beside(&beside_pattern(views, ViewMean::of_pairs(views, |s| s.fixed_px2)))
+}
+
+fn still_beside(views: &[Structure]) -> Option<f64> {
+    let mean = |lag: usize| ViewMean::of(views, |s| s.lagged[lag]).map(|m| m.value);
+    Some(still_share(mean(0)?, mean(1)?, mean(2)))
 }
 
 /// The s of c_k = s + (1 - s) rho^k, from the correlations at lags one, two and, where there are frames
@@ -178,5 +201,30 @@ mod tests {
         }
         let mean = off.iter().sum::<f64>() / off.len() as f64;
         assert!(off.len() > 390 && mean.abs() < 1e-3, "{mean} of {}", off.len());
+    }
+
+    /// Far views have more noise of their own beside the same pattern: the share that stands still within
+    /// each is 0.1 of that in all of them.
+    #[test]
+    fn what_stands_still_in_all_views_is_none_of_what_stands_still_in_each() {
+        const FRACTION: f64 = 0.1;
+        const PATTERN_PX2: f64 = 0.01;
+        let mut rng = Seed(9).stream("noise/pattern");
+        let mut off: Vec<f64> = Vec::new();
+        for _ in 0..40 {
+            let mut noise_px2 = 0.01;
+            let views = with(&mut rng, |s| {
+                noise_px2 *= 1.3;
+                s.variance_px2 = noise_px2 + PATTERN_PX2;
+                s.fixed_px2 = s.fixed_px2.map(|f| f + PATTERN_PX2);
+                let still = (FRACTION * noise_px2 + PATTERN_PX2) / s.variance_px2;
+                s.lagged = s.lagged.map(|c| c.map(|c| c + still));
+            });
+            let found = in_time(&views, &KnownTerms::default(), 1e-3);
+            let frozen = found.iter().find(|f| f.families == ["frozen-noise"]);
+            off.extend(frozen.map(|f| parameter(f, "fraction")[0] - FRACTION));
+        }
+        let mean = off.iter().sum::<f64>() / off.len() as f64;
+        assert!(off.len() > 30 && mean.abs() < 0.005, "{mean} of {}", off.len());
     }
 }

@@ -46,7 +46,7 @@ fn plain(rng: &mut Stream) -> Vec<Structure> {
 }
 
 /// `plain`, with something added to every view.
-pub(super) fn with(rng: &mut Stream, add: impl Fn(&mut Structure)) -> Vec<Structure> {
+pub(super) fn with(rng: &mut Stream, add: impl FnMut(&mut Structure)) -> Vec<Structure> {
     let mut views = plain(rng);
     views.iter_mut().for_each(add);
     views
