@@ -1,5 +1,7 @@
 //! Vertical stripes.
 
+use std::f64::consts::{FRAC_PI_2, TAU};
+
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage, greatest};
 use crate::camera::Camera;
 use crate::sensors::SensorKind;
@@ -71,13 +73,17 @@ impl Effect for ColumnBanding {
         Some(0.45)
     }
 
+    /// From the first harmonic, which is 2 / pi of a saw-tooth.
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
         let Basis::Waves { period: period_px, .. } = *fit.shape else { return Vec::new() };
+        let first = Fitted { shape: &stripes(period_px, 1), ..*fit };
         let at = |t: f64| PixelContext { u: t * period_px, ..PixelContext::default() };
-        vec![
-            fit.estimate("amplitude_px", &|b| greatest(|t| fit.value(b, at(t)))),
-            Estimate::given("period_px", period_px, 0.02 * period_px),
-        ]
+        let amplitude = fit.estimate("amplitude_px", &|b| {
+            FRAC_PI_2 * greatest(|t| first.value(&b[..2], at(t)))
+        });
+        let share = amplitude.std_error / amplitude.value;
+        let std_error = error_of_period(period_px, share, fit.reach.column);
+        vec![amplitude, Estimate::given("period_px", period_px, std_error)]
     }
 
     fn term(&self, known: Known, camera: &Camera) -> Option<Term> {
@@ -104,6 +110,13 @@ impl Effect for ColumnBanding {
 fn tooth(column: usize, centre: f64, amplitude: f64, period: f64) -> f64 {
     let bands = (column as f64 - centre) / period;
     2.0 * amplitude * (bands.round() - bands)
+}
+
+/// Cramer-Rao bound of the period of a sine whose amplitude is known to this share, seen evenly over the
+/// `columns`, px: what a change of the period turns it by is as sure as its phase (Rife and Boorstyn, 1974).
+fn error_of_period(period_px: f64, share: f64, columns: [f64; 2]) -> f64 {
+    let length = (columns[1] - columns[0]).max(period_px);
+    period_px.powi(2) * share / TAU * 12f64.sqrt() / length
 }
 
 fn stripes(period_px: f64, harmonics: usize) -> Basis {

@@ -10,12 +10,20 @@ pub struct Estimate {
     pub parameter: &'static str,
     pub value: f64,
     pub std_error: f64,
+    /// Was the shape settled by it? It is then no coefficient of a formula that may be off.
+    pub settles: bool,
 }
 
 impl Estimate {
     /// What settles the shape, and was tried in steps.
     pub fn given(parameter: &'static str, value: f64, std_error: f64) -> Self {
-        Estimate { parameter, value, std_error }
+        Estimate { parameter, value, std_error, settles: true }
+    }
+
+    /// With its error enlarged by the share that the cause's formula is off: no sensor has that very one.
+    pub fn of_any_formula(self, share: f64) -> Self {
+        let off = if self.settles { 0.0 } else { share * self.value };
+        Estimate { std_error: self.std_error.hypot(off), ..self }
     }
 }
 
@@ -32,7 +40,12 @@ pub struct Fitted<'a> {
 impl Fitted<'_> {
     /// A parameter as a function of the coefficients; its error by the delta method.
     pub fn estimate(&self, parameter: &'static str, of: &dyn Fn(&[f64]) -> f64) -> Estimate {
-        Estimate { parameter, value: of(self.coefficients), std_error: self.delta(of) }
+        Estimate {
+            parameter,
+            value: of(self.coefficients),
+            std_error: self.delta(of),
+            settles: false,
+        }
     }
 
     /// Of the shape at a place, with these coefficients.

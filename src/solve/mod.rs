@@ -1,4 +1,4 @@
-//! Symmetric systems, what a least-squares fit leaves, and the two argmin solvers that the fits use, each
+//! Symmetric systems, what a least-squares fit leaves, and the argmin solvers that the fits use, each
 //! with a limit on its steps.
 
 mod cholesky;
@@ -8,6 +8,7 @@ pub use cholesky::Cholesky;
 use std::cell::RefCell;
 
 use argmin::core::{CostFunction, Error as ArgminError, Executor, Gradient, Hessian, State};
+use argmin::solver::brent::BrentOpt;
 use argmin::solver::neldermead::NelderMead;
 use argmin::solver::trustregion::{Steihaug, TrustRegion};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -125,6 +126,32 @@ impl<F: Fn(&[f64]) -> f64> CostFunction for Plain<F> {
     fn cost(&self, x: &Self::Param) -> Result<f64, ArgminError> {
         Ok(finite_or_huge((self.0)(x)))
     }
+}
+
+struct OfOne<F>(F);
+
+impl<F: Fn(f64) -> f64> CostFunction for OfOne<F> {
+    type Param = f64;
+    type Output = f64;
+    fn cost(&self, x: &f64) -> Result<f64, ArgminError> {
+        Ok(finite_or_huge((self.0)(*x)))
+    }
+}
+
+/// Where a function of one number has its minimum within an interval, to so much, by Brent's method;
+/// `None` where the interval is none.
+pub fn brent(
+    cost: impl Fn(f64) -> f64,
+    [low, high]: [f64; 2],
+    tolerance: f64,
+    max_steps: u64,
+) -> Option<f64> {
+    let solver = BrentOpt::new(low, high).set_tolerance(f64::EPSILON.sqrt(), tolerance);
+    let run = Executor::new(OfOne(cost), solver)
+        .configure(|state| state.max_iters(max_steps))
+        .timer(false)
+        .run();
+    run.ok()?.state().get_best_param().copied()
 }
 
 /// Nelder-Mead from a simplex of the given edge lengths around `start`.

@@ -158,6 +158,7 @@ pub fn corner_radius(camera: &Camera) -> f64 {
 /// Least and greatest of each axis.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Extent {
+    pub column: [f64; 2],
     pub disparity: [f64; 2],
     pub z: [f64; 2],
     pub theta: [f64; 2],
@@ -175,6 +176,7 @@ impl Extent {
     pub fn of<'a>(places: impl Iterator<Item = &'a PixelContext> + Clone) -> Self {
         let of = |value: fn(&PixelContext) -> f64| range(places.clone().map(value));
         Extent {
+            column: of(|p| p.u),
             disparity: of(|p| p.disparity),
             z: of(|p| p.z),
             theta: of(|p| p.theta),

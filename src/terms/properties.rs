@@ -64,6 +64,15 @@ impl Basis {
         }
     }
 
+    /// The same with another period, where it has one.
+    pub fn with_period(&self, new: f64) -> Self {
+        let mut basis = self.clone();
+        if let Basis::Waves { period, .. } | Basis::Ring { period, .. } = &mut basis {
+            *period = new;
+        }
+        basis
+    }
+
     /// Does it depend on one coordinate of a view alone, and change too fast along it for patches?
     pub fn alone(&self) -> Option<Coordinate> {
         let smooth = matches!(self, Basis::Powers { .. } | Basis::Log1p { .. });

@@ -6,7 +6,7 @@ use serde_json::Map;
 use super::along::Along;
 use super::naming::{naming, physics};
 use super::other_findings::named;
-use super::parameters::{of_any_formula, parameters};
+use super::parameters::parameters;
 use super::pixels::terms_of;
 use super::scene::{Scene, size};
 use super::shape;
@@ -109,7 +109,7 @@ fn finding(
         let Term { basis, coefficients, .. } = &terms[main];
         let (covariance, reach) = (&c, &scene.survey.reach);
         let fit = Fitted { shape: basis, coefficients, covariance, reach };
-        of_any_formula(formula_error, parameters(chosen.candidate.family, &fit))
+        parameters(chosen.candidate.family, formula_error, &fit)
     });
     let shape =
         effect.is_none().then(|| shape::words(&terms[main].basis, &terms[main].coefficients));

@@ -16,31 +16,21 @@ pub fn one(name: &str, value: f64, std_error: f64) -> Map<String, Value> {
     Map::from_iter([(name.into(), estimate(value, std_error))])
 }
 
-/// Of a family's fitted shape; a curve without a name has none.
-pub fn parameters(family: Option<&str>, fit: &Fitted) -> Map<String, Value> {
+/// Of a family's fitted shape, whose formula is off by this share; a curve without a name has none.
+pub fn parameters(family: Option<&str>, formula_error: f64, fit: &Fitted) -> Map<String, Value> {
     let all = match family {
         Some(RECALIBRATE) => sigma_factor(fit),
         Some(id) => effects::find(id).map_or_else(Vec::new, |e| e.estimates(fit)),
         None => Vec::new(),
     };
-    all.iter().map(|e| (e.parameter.to_string(), estimate(e.value, e.std_error))).collect()
+    let all = all.into_iter().map(|e| e.of_any_formula(formula_error));
+    all.map(|e| (e.parameter.to_string(), estimate(e.value, e.std_error))).collect()
 }
 
 /// Of a level alone.
 fn sigma_factor(fit: &Fitted) -> Vec<Estimate> {
     let level = |b: &[f64]| (0.5 * b[0]).exp();
     if *fit.shape == Basis::Level { vec![fit.estimate("sigma_factor", &level)] } else { Vec::new() }
-}
-
-/// With the errors enlarged by the share that the family's formula is off: no sensor has that very one.
-pub fn of_any_formula(share: f64, mut parameters: Map<String, Value>) -> Map<String, Value> {
-    for parameter in parameters.values_mut() {
-        let number = |key: &str| parameter[key].as_f64();
-        if let (Some(value), Some(error)) = (number("value"), number("std_error")) {
-            *parameter = estimate(value, error.hypot(share * value));
-        }
-    }
-    parameters
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ pub mod layer_search;
 pub mod noise_gains;
 pub mod null;
 pub mod outcome;
+mod period;
 pub mod posterior;
 pub mod prepared;
 pub mod rows;
@@ -193,7 +194,9 @@ impl<'a> Layer<'a> {
         }
         let noise = self.noise.as_ref()?;
         let (candidates, rules) = (self.candidates, self.rules);
-        Choice { candidates, judged: &judged, rules, noise }.best(&beside)
+        let mut next = Choice { candidates, judged: &judged, rules, noise }.best(&beside)?;
+        period::tune(candidates, chosen, &mut next, |terms| self.total(terms));
+        Some(next)
     }
 
     /// What terms bring together, beside what is pinned.

@@ -48,7 +48,7 @@ fn what_is_known_is_told_with_the_same_numbers() {
             let none = DMatrix::zeros(count, count);
             let (shape, coefficients) = (&terms[0].basis, &terms[0].coefficients[..]);
             let (covariance, reach) = (&none, &reach());
-            let again = told(Some(id), &Fitted { shape, coefficients, covariance, reach });
+            let again = told(Some(id), 0.0, &Fitted { shape, coefficients, covariance, reach });
             let found = again[name]["value"].as_f64().unwrap();
             assert!((found / value - 1.0).abs() < 1.3e-3, "{id}: {value} written, {found} told");
         }
