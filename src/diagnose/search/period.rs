@@ -7,10 +7,10 @@ use crate::stats::range;
 use crate::terms::Basis;
 
 /// Of the way from one period to the next that is tried: at 5,000 nats a sine's period is known to a
-/// hundredth of what turns it by half a cycle over the picture (its Cramer-Rao bound).
-const TO_SHARE: f64 = 0.01;
+/// hundredth of what turns it by half a cycle over the picture (its Cramer-Rao bound), and this is a fifth.
+const TO_SHARE: f64 = 0.002;
 /// Brent's method needs about ten.
-const MAX_STEPS: u64 = 20;
+const MAX_STEPS: u64 = 30;
 
 /// Take the period with which `next` brings the largest gain beside `chosen`, from the one that was tried
 /// before it to the one after it. `total` is what terms bring together, nats.
@@ -99,7 +99,8 @@ mod tests {
             let phase: f64 = rng.random_range(0.0..std::f64::consts::TAU);
             let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
             let means = DVector::from_fn(COLUMNS, |u, _| {
-                0.01 * (std::f64::consts::TAU * u as f64 / truth + phase).sin() + NOISE_PX * noise()
+                0.005 * (std::f64::consts::TAU * u as f64 / truth + phase).sin()
+                    + NOISE_PX * noise()
             });
             let total = |terms: &[&Basis]| {
                 let (beta, covariance) = fit(terms[0], &means);
