@@ -1,6 +1,6 @@
 //! Vertical stripes.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_2_PI, TAU};
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage, greatest};
 use crate::camera::Camera;
@@ -73,15 +73,20 @@ impl Effect for ColumnBanding {
         Some(0.45)
     }
 
-    /// From the first harmonic, which is 2 / pi of a saw-tooth.
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
-        let Basis::Waves { period: period_px, .. } = *fit.shape else { return Vec::new() };
-        let first = Fitted { shape: &stripes(period_px, 1), ..*fit };
+        let Basis::Waves { period: period_px, harmonics, .. } = *fit.shape else {
+            return Vec::new();
+        };
         let at = |t: f64| PixelContext { u: t * period_px, ..PixelContext::default() };
-        let amplitude = fit.estimate("amplitude_px", &|b| {
-            FRAC_PI_2 * greatest(|t| first.value(&b[..2], at(t)))
-        });
-        let share = amplitude.std_error / amplitude.value;
+        let height = |b: &[f64]| greatest(|t| fit.value(b, at(t)));
+        let amplitude =
+            fit.estimate("amplitude_px", &|b| height(b) / greatest(|t| blunt_tooth(t, harmonics)));
+        // What turns the first by an angle turns the k-th by k times that.
+        let sure = |k: usize| {
+            let size = fit.estimate("", &|b| b[2 * k].hypot(b[2 * k + 1]));
+            ((k + 1) as f64 * size.value / size.std_error).powi(2)
+        };
+        let share = (0..harmonics).map(sure).sum::<f64>().sqrt().recip();
         let std_error = error_of_period(period_px, share, fit.reach.column);
         vec![amplitude, Estimate::given("period_px", period_px, std_error)]
     }
@@ -110,6 +115,12 @@ impl Effect for ColumnBanding {
 fn tooth(column: usize, centre: f64, amplitude: f64, period: f64) -> f64 {
     let bands = (column as f64 - centre) / period;
     2.0 * amplitude * (bands.round() - bands)
+}
+
+/// The first orders of a tooth of amplitude 1, so many periods on.
+fn blunt_tooth(periods: f64, orders: usize) -> f64 {
+    let order = |k: f64| (TAU * k * periods).sin() / k;
+    FRAC_2_PI * (1..=orders).map(|k| order(k as f64)).sum::<f64>()
 }
 
 /// Teeth whose higher orders are finer than a patch turn the first by 0.02 to 0.03 cycles over the picture

@@ -105,7 +105,7 @@ fn exact() -> Vec<Case> {
             "column-banding",
             Basis::waves(Coordinate::Column, 37.0, 2),
             // A saw-tooth of 0.1 px, in fifths of a px over the order.
-            vec![-FRAC_1_PI, 0.0, FRAC_1_PI, 0.0],
+            vec![FRAC_1_PI, 0.0, FRAC_1_PI, 0.0],
             "amplitude_px",
             0.1,
             sampled,
