@@ -14,7 +14,8 @@ use crate::terms::{Axis, Basis, Coordinate, Statistic, Term};
 /// many standard errors over the parts.
 const MAPS_SHARE: f64 = 0.02;
 const MAPS_CLEARLY: f64 = 3.0;
-/// Beside the maps a term must bring this share of all, and be so clear.
+/// Beside the maps a term must bring this share of all, and be so clear; waves, which no map is but which
+/// maps come near to, be clear.
 const TERM_SHARE: f64 = 0.005;
 const TERM_CLEARLY: f64 = 2.0;
 /// A shape of the target, which a correction leaves in, must bring as much beside the maps as they
@@ -126,11 +127,16 @@ impl Joint<'_> {
         let concerned = |s: &Settled, t: usize| {
             let c = &chosen[t].candidate;
             let named = alone > RADIAL_NAME_ADEQUATE * total(&s.scores);
-            !(is_rough(c) || (named && is_radial_name(c)))
+            let waves = c.basis.period().is_some();
+            waves || !(is_rough(c) || (named && is_radial_name(c)))
         };
         let needless = |s: &Settled, t: usize, lost: f64, scores: &[f64]| {
             let of_target = !is_of_sensor(&chosen[t].candidate);
-            let share = if of_target { MAPS_SHARE } else { TERM_SHARE };
+            let share = match of_target {
+                true => MAPS_SHARE,
+                false if is_rough(&chosen[t].candidate) => 0.0,
+                false => TERM_SHARE,
+            };
             let clear = behind(&s.scores, scores) > TERM_CLEARLY;
             let needed = lost > share * total(&s.scores) && clear;
             let believed = !of_target || self.size(s, t) < LARGEST_USUAL;
@@ -285,3 +291,7 @@ fn is_of_sensor(c: &Candidate) -> bool {
     let basis = c.basis.clone();
     Term { statistic: Statistic::Bias, basis, coefficients: Vec::new() }.is_sensor_bias()
 }
+
+#[cfg(test)]
+#[path = "terms_tests.rs"]
+mod tests;

@@ -12,10 +12,14 @@ use crate::simulate::kinect_v1;
 use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Statistic, Term, corner_radius};
 
 const SCALE_PX_M: f64 = 43.5;
-const NOISE_PX: f64 = 0.05;
+pub(super) const NOISE_PX: f64 = 0.05;
 
 /// Views of planes at these distances, m, with a bias, px.
-fn session(z_m: [f64; 2], rng: &mut Stream, bias: impl Fn(&PixelContext) -> f64) -> Vec<ViewData> {
+pub(super) fn session(
+    z_m: [f64; 2],
+    rng: &mut Stream,
+    bias: impl Fn(&PixelContext) -> f64,
+) -> Vec<ViewData> {
     let camera = kinect_v1(4).camera;
     let corner = corner_radius(&camera);
     (0..12)
@@ -30,6 +34,7 @@ fn session(z_m: [f64; 2], rng: &mut Stream, bias: impl Fn(&PixelContext) -> f64)
                     let disparity = d + slope[0] * x + slope[1] * y;
                     let radius = f64::hypot(u - camera.cx, v - camera.cy) / corner;
                     let z = SCALE_PX_M / disparity;
+                    let rho = z;
                     let place = PixelContext {
                         u,
                         v,
@@ -38,7 +43,7 @@ fn session(z_m: [f64; 2], rng: &mut Stream, bias: impl Fn(&PixelContext) -> f64)
                         disparity,
                         z,
                         radius,
-                        rho: z,
+                        rho,
                         ..Default::default()
                     };
                     let noise: f64 = StandardNormal.sample(rng);
@@ -53,7 +58,7 @@ fn session(z_m: [f64; 2], rng: &mut Stream, bias: impl Fn(&PixelContext) -> f64)
         .collect()
 }
 
-fn term(family: Option<&'static str>, basis: Basis) -> Chosen {
+pub(super) fn term(family: Option<&'static str>, basis: Basis) -> Chosen {
     Chosen {
         candidate: Candidate { family, basis, flat: None },
         rms: 0.1,
@@ -65,7 +70,7 @@ fn term(family: Option<&'static str>, basis: Basis) -> Chosen {
     }
 }
 
-fn fitted(data: &[ViewData], chosen: Vec<Chosen>) -> Outcome {
+pub(super) fn fitted(data: &[ViewData], chosen: Vec<Chosen>) -> Outcome {
     let found = Outcome { chosen, ..Outcome::default() };
     let second: Vec<bool> = (0..data.len()).map(|v| v % 4 == 1 || v % 4 == 2).collect();
     refit(data, &vec![1.0; data.len()], &second, &kinect_v1(4).camera, found)
@@ -73,7 +78,7 @@ fn fitted(data: &[ViewData], chosen: Vec<Chosen>) -> Outcome {
 
 /// Root mean square of the bias around each view's plane, before and after what the sensor's terms
 /// say, px.
-fn left(data: &[ViewData], outcome: &Outcome) -> [f64; 2] {
+pub(super) fn left(data: &[ViewData], outcome: &Outcome) -> [f64; 2] {
     let (mut squares, mut n) = ([0.0; 2], 0.0);
     let (terms, mut row) = (terms_of(outcome, Statistic::Bias), Vec::new());
     for view in data {
@@ -92,41 +97,19 @@ fn left(data: &[ViewData], outcome: &Outcome) -> [f64; 2] {
     squares.map(|s| (s / n).sqrt())
 }
 
-fn bowl() -> Chosen {
+pub(super) fn bowl() -> Chosen {
     let basis = Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(0.0));
     term(Some("radial-disparity-bias"), basis)
 }
 
-fn map() -> Chosen {
+pub(super) fn map() -> Chosen {
     let (width, height) = (160.0, 120.0);
     let basis = Basis::Map { width, height, across: 4, down: 3, times: Modulation::One };
     term(None, basis)
 }
 
-fn smooth(p: &PixelContext) -> f64 {
+pub(super) fn smooth(p: &PixelContext) -> f64 {
     0.15 * (p.u / 25.0).sin() * (p.v / 20.0).cos()
-}
-
-#[test]
-fn a_bowl_and_its_smooth_rest_are_recovered() {
-    let rng = &mut Seed(3).stream("joint/rest");
-    let data = session([0.8, 3.0], rng, |p| 0.3 * p.radius.powi(2) + smooth(p));
-    let outcome = fitted(&data, vec![bowl(), map()]);
-    let maps = |c: &&Chosen| matches!(c.candidate.basis, Basis::Spline { .. });
-    assert_eq!(outcome.chosen.iter().filter(maps).count(), 2);
-    let others = session([0.8, 3.0], rng, |p| 0.3 * p.radius.powi(2) + smooth(p));
-    let [before, after] = left(&others, &outcome);
-    assert!(before > 2.0 * NOISE_PX && after < 1.1 * NOISE_PX, "{before} {after}");
-}
-
-#[test]
-fn a_bowl_alone_needs_no_maps_and_keeps_its_size() {
-    let rng = &mut Seed(4).stream("joint/bowl");
-    let data = session([0.8, 3.0], rng, |p| 0.3 * p.radius.powi(2));
-    let outcome = fitted(&data, vec![bowl()]);
-    assert_eq!(outcome.chosen.len(), 2, "the bowl, and what planes absorb of it");
-    let k = outcome.coefficients(0)[0];
-    assert!((k - 0.3).abs() < 0.01, "{k}");
 }
 
 /// No fit to planes tells it, so it is nothing.
@@ -239,26 +222,6 @@ fn the_stated_error_is_the_true_one() {
     }
     assert!((0.4..2.0).contains(&(squares / n)), "{}", squares / n);
     assert!((0.75..=0.99).contains(&(inside / n)), "{}", inside / n);
-}
-
-/// A wave and a curve over the same columns: the wave says it all, and keeps its size.
-#[test]
-fn a_nameless_curve_does_not_share_what_a_name_says() {
-    let period_px = 20.0;
-    let bias = |p: &PixelContext| 0.1 * (std::f64::consts::TAU * p.u / period_px).sin();
-    let rng = &mut Seed(6).stream("joint/companion");
-    let data = session([0.8, 3.0], rng, bias);
-    let wave = Basis::waves(Coordinate::Column, period_px, 2);
-    let (over, low, high) = (Coordinate::Column, 0.0, 160.0);
-    let curve = Basis::Curve { over, low, high, nodes: 72, times: Modulation::One };
-    let chosen = vec![term(Some("column-banding"), wave), term(None, curve)];
-    let outcome = fitted(&data, chosen);
-    let families: Vec<_> = outcome.chosen.iter().map(|c| c.candidate.family).collect();
-    assert!(families.iter().all(|f| *f == Some("column-banding")), "{families:?}");
-    let terms = terms_of(&outcome, Statistic::Bias);
-    let at = |u| Term::sum(&terms, &PixelContext { u, ..data[0].places[0] }, &mut Vec::new());
-    let height = 0.5 * (at(65.0) - at(75.0));
-    assert!((height - 0.1).abs() < 0.01, "{height}");
 }
 
 /// What is left of a view by one pass over its samples is what its normal equations leave.
