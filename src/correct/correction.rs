@@ -51,6 +51,8 @@ pub struct Correction {
     /// Their sum at each pixel, px; empty where there are none.
     still: Vec<f32>,
     pub(crate) locking: Option<Locking>,
+    /// Do whole columns step, otherwise in every image?
+    pub(crate) column_steps: bool,
     /// What depends on more than the pixel.
     pub(crate) terms: Vec<LearntTerm>,
     pub(crate) needs: Needs,
@@ -99,6 +101,7 @@ impl Correction {
             still_terms: Vec::new(),
             still: Vec::new(),
             locking: None,
+            column_steps: false,
             terms: Vec::new(),
             needs: Needs::default(),
             uncertainty: Uncertainty::default(),
@@ -124,6 +127,7 @@ impl Correction {
             && self.along_ray.is_empty()
             && self.still.is_empty()
             && self.locking.is_none()
+            && !self.column_steps
             && self.terms.is_empty()
     }
 
@@ -201,6 +205,7 @@ impl Correction {
                 self.ray_share = share;
                 self.along_ray = self.ray_over_depth(share);
             }
+            Some(Inverse::ColumnSteps) => self.column_steps = true,
             Some(Inverse::Locking { amplitude_px }) => {
                 self.locking = Some(Locking::new(amplitude_px));
             }

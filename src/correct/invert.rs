@@ -7,6 +7,7 @@ use super::correction::{Conditions, Correction, LearntTerm};
 use super::slopes::Slopes;
 use super::uncertainty::{Scratch, where_held};
 use crate::error::{Error, Result};
+use crate::measure::ColumnSteps;
 use crate::plane::Plane;
 use crate::terms::{PixelContext, Pixels};
 
@@ -73,12 +74,14 @@ impl Correction {
         let slopes = self.needs.slope.then(|| self.slopes(depth_m, factor));
         let terms = self.terms.iter().filter(|(t, _)| conditions.determine(t)).collect();
         let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
-        Known { conditions, factor, slopes, pixels, terms, tilt: self.needs.tilt }
+        let columns = self.columns(depth_m, factor);
+        Known { conditions, factor, slopes, pixels, terms, columns, tilt: self.needs.tilt }
     }
 
     /// The corrected depth of a pixel whose stored depth is `z`, m.
     fn depth(&self, i: usize, z: f32, known: &Known<'_>, scratch: &mut Vec<f64>) -> f64 {
-        let measured = self.disparity(i, z, known.factor);
+        let steps = known.columns.get(i % self.camera.width).copied().unwrap_or(0.0);
+        let measured = self.disparity(i, z, known.factor) - steps;
         let d = self.solve(i, measured, known, scratch);
         if d > 0.0 { self.scale_px_m / d } else { f64::INFINITY }
     }
@@ -117,7 +120,8 @@ impl Correction {
         let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
         let slopes = self.uncertainty.needs.slope.then(|| self.slopes(depth_m, 1.0));
         let tilt = self.uncertainty.needs.tilt;
-        let known = Known { conditions, factor: 1.0, slopes, pixels, terms: Vec::new(), tilt };
+        let (terms, columns) = (Vec::new(), Vec::new());
+        let known = Known { conditions, factor: 1.0, slopes, pixels, terms, columns, tilt };
         let width = self.camera.width;
         let mut sigma = vec![f32::NAN; depth_m.len()];
         sigma.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
@@ -169,6 +173,21 @@ impl Correction {
         Ok(sigma)
     }
 
+    /// What whole columns err by in this image, px, where the model says that they do and the image shows how.
+    fn columns(&self, depth_m: &[f32], factor: f64) -> Vec<f64> {
+        if !self.column_steps {
+            return Vec::new();
+        }
+        let disparity = |(i, &z): (usize, &f32)| match z > 0.0 {
+            true => self.disparity(i, z, factor) as f32,
+            false => f32::NAN,
+        };
+        let image: Vec<f32> = depth_m.iter().enumerate().map(disparity).collect();
+        let width = self.camera.width;
+        ColumnSteps::find(&image, width)
+            .map_or_else(Vec::new, |steps| (0..width).map(|u| steps.error_px(u)).collect())
+    }
+
     fn slopes(&self, depth_m: &[f32], factor: f64) -> Slopes {
         let disparity = |i: usize| match depth_m[i] {
             z if z > 0.0 => self.disparity(i, z, factor),
@@ -193,6 +212,8 @@ struct Known<'a> {
     pixels: Pixels<'a>,
     /// Those that can be evaluated.
     terms: Vec<&'a LearntTerm>,
+    /// What whole columns err by in this image, px; empty where they do not.
+    columns: Vec<f64>,
     /// Does any of them ask for the tilt?
     tilt: bool,
 }

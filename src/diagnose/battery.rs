@@ -55,8 +55,8 @@ pub struct Battery {
 fn tell_lines_once(found: &mut Vec<Finding>) {
     let of_columns = |f: &Finding| f.axis == Axis::Column;
     if found.iter().any(|f| of_columns(f) && !f.terms.is_empty()) {
-        let bare = |f: &Finding| f.statistic == Statistic::Bias && f.terms.is_empty();
-        found.retain(|f| !(of_columns(f) && bare(f)));
+        let bare = |f: &Finding| f.effect.is_none() && f.terms.is_empty();
+        found.retain(|f| !(of_columns(f) && f.statistic == Statistic::Bias && bare(f)));
     }
 }
 
@@ -114,7 +114,8 @@ impl Case<'_> {
         let clear = scatter.outcome.noise.threshold(self.options.level);
         let clearly = refitted.as_ref().is_some_and(|f| f.share > clear);
         let better_form = self.tell_form(&mut curves, clearly);
-        let mut found: Vec<Finding> = self.ranges.clone().into_iter().chain(curves).collect();
+        let read = self.ranges.iter().chain(&self.column_steps).cloned();
+        let mut found: Vec<Finding> = read.chain(curves).collect();
         let of_size = |f: &Finding| f.statistic == Statistic::Variance;
         let told = self.baseline.is_some() && found.iter().any(of_size);
         // Of two recordings what the search of the size tells is not told of its parts again.

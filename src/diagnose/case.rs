@@ -11,6 +11,7 @@ use super::options::{Ablation, DiagnoseOptions, measure_options};
 use super::search::outcome::Outcome;
 use super::steps::lattice;
 use super::steps::lattice::Quantisation;
+use super::views::column_steps::column_steps;
 use super::views::field::Field;
 use super::views::known::KnownTerms;
 use super::views::layers::Survey;
@@ -46,6 +47,8 @@ pub struct Case<'a> {
     pub remarks: Vec<String>,
     /// Found while reading: the words are ranges.
     pub ranges: Option<Finding>,
+    /// Found in every image alone, and taken out while reading.
+    pub column_steps: Option<Finding>,
     /// Views that the model's bias, and its sigma, were learnt from, where these are others.
     pub learnt_from: [Option<Learnt>; 2],
     /// The model has what a first run found.
@@ -84,6 +87,9 @@ impl<'a> Case<'a> {
         if let Some(baseline) = &baseline {
             baseline.references(&mut fields);
         }
+        let steps = |f: &Field| f.column_steps.is_some();
+        let in_both = baseline.as_ref().is_some_and(|b| b.fields.iter().any(steps));
+        let column_steps = column_steps(&fields, &known).filter(|_| !in_both);
         progress.stage("comparing with the model");
         let lattice = lattice(&fields, recording);
         let kept = KeptPattern::of(&fields);
@@ -106,6 +112,7 @@ impl<'a> Case<'a> {
             excluded,
             remarks: copies,
             ranges,
+            column_steps,
             learnt_from,
             extended: false,
         })
@@ -136,6 +143,7 @@ impl<'a> Case<'a> {
             survey,
             remarks: Vec::new(),
             ranges: None,
+            column_steps: None,
             extended: true,
             ..self
         }

@@ -26,11 +26,12 @@ pub struct Diagnosed {
 impl Diagnosed {
     /// Mean residual of every pixel of a view, beyond the simulated one's where there is one, px.
     pub fn recorded(&self, view: usize) -> Vec<f32> {
-        let mean = &self.fields[view].mean;
-        let Some(twin) = self.against.get(view) else { return mean.clone() };
-        let theirs = twin.image(&twin.mean);
+        let field = &self.fields[view];
+        let mean = field.with_column_steps();
+        let Some(twin) = self.against.get(view) else { return mean };
+        let theirs = twin.image(&twin.with_column_steps());
         let at = |i: u32| theirs.get(i as usize).copied().unwrap_or(f32::NAN);
-        self.fields[view].pixels.iter().zip(mean).map(|(&i, m)| m - at(i)).collect()
+        field.pixels.iter().zip(mean).map(|(&i, m)| m - at(i)).collect()
     }
 }
 

@@ -5,6 +5,7 @@
 mod binned;
 mod budget;
 mod cells;
+mod column_steps;
 mod doubtful;
 mod finish;
 mod grouping;
@@ -14,6 +15,7 @@ mod view;
 
 pub use budget::flatness_uncertainty_m;
 pub use cells::{Cell, Spread};
+pub use column_steps::ColumnSteps;
 pub use table::{SigmaKind, SigmaRow, SigmaTable, read_table, write_measurements};
 pub use view::{measure_view, view_target};
 

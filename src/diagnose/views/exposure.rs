@@ -7,7 +7,7 @@ use crate::camera::Rays;
 use crate::diagnose::edges::Edges;
 use crate::diagnose::options::FRAMES_KEPT;
 use crate::frame::{DepthTable, Frame};
-use crate::measure::Workbench;
+use crate::measure::{ColumnSteps, Workbench};
 use crate::model::SigmaModel;
 use crate::stats::{MAD_TO_SIGMA, median_in_place};
 use crate::terms::Term;
@@ -38,12 +38,25 @@ impl Field {
                 }
                 edges = Edges::find(self, &image, &bench.rays, &bench.table);
                 self.subsample_blocks(&mut expected);
+                self.find_column_steps(&image, &bench.table);
+                if let Some(steps) = self.column_steps {
+                    let of_pixels = self.pixels.iter().zip(&mut expected);
+                    of_pixels
+                        .for_each(|(&i, d)| *d += steps.error_px(i as usize % self.width) as f32);
+                }
             }
             edges.add(self, &image, &bench.rays, &bench.table);
             self.add(&image, time, &expected, &bench.table, clip_px);
         }
         self.edges = edges;
         self.close();
+    }
+
+    /// Where a matcher's columns step: an image tells it without a plane.
+    fn find_column_steps(&mut self, image: &Frame, table: &DepthTable) {
+        let disparity = |&word: &u16| (self.scale_px_m / f64::from(table.metres(word))) as f32;
+        let disparities: Vec<f32> = image.raw.iter().map(disparity).collect();
+        self.column_steps = ColumnSteps::find(&disparities, self.width);
     }
 
     /// Sigma of the disparity at each pixel, px.

@@ -13,7 +13,7 @@ use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::io::read_depth;
-use crate::measure::{Workbench, view_target};
+use crate::measure::{ColumnSteps, Workbench, view_target};
 use crate::model::SigmaModel;
 use crate::plane::Plane;
 use crate::stats::median_in_place;
@@ -47,6 +47,8 @@ pub struct Field {
     pub count: Vec<u16>,
     /// Frames with a measurement.
     pub measured: Vec<u16>,
+    /// What whole columns err by, where the first frame shows it; the residuals are beside it.
+    pub column_steps: Option<ColumnSteps>,
     /// Residuals of the first frames, px, in order.
     pub first: Vec<Vec<f32>>,
     /// Time and mean residual of each frame, s since the first and px.
@@ -125,6 +127,7 @@ impl Field {
             first: Vec::new(),
             frames: Vec::new(),
             lines: Vec::new(),
+            column_steps: None,
             words: RawHistogram::none(),
             ..self.clone()
         };
@@ -232,6 +235,7 @@ impl Field {
             first: Vec::new(),
             frames: Vec::new(),
             lines: Vec::new(),
+            column_steps: None,
             reference_distance_m: None,
             flatness_m: None,
             temperature_c: None,
@@ -256,6 +260,13 @@ impl Field {
     pub fn plane_at(&self, i: usize, rays: &Rays) -> f64 {
         let (x, y) = rays.at(i);
         self.scale_px_m * self.plane.inverse_depth(x, y)
+    }
+
+    /// The mean as it was recorded, before whole columns' steps were taken out, px.
+    pub fn with_column_steps(&self) -> Vec<f32> {
+        let Some(steps) = self.column_steps else { return self.mean.clone() };
+        let error = |i: u32| steps.error_px(i as usize % self.width) as f32;
+        self.pixels.iter().zip(&self.mean).map(|(&i, m)| m + error(i)).collect()
     }
 
     /// The model's sigma in the middle of the target, px.

@@ -3,6 +3,7 @@
 pub mod between;
 pub mod blocks;
 pub mod box_sums;
+pub mod column_steps;
 pub mod exposure;
 pub mod field;
 pub mod infrared;

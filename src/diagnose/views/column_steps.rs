@@ -1,0 +1,62 @@
+//! Columns that step, at other distances in every view: each view's own image tells them.
+
+use serde_json::Map;
+
+use super::field::Field;
+use super::known::KnownTerms;
+use crate::diagnose::diagnosis::{Finding, Size};
+use crate::diagnose::finding::other_findings::named;
+use crate::diagnose::finding::parameters::estimate;
+use crate::measure::ColumnSteps;
+use crate::stats::{median, range};
+use crate::terms::{Axis, Statistic};
+
+const BANDING: &str = "column-banding";
+/// Root mean square of a saw-tooth, over its step.
+const RMS_OF_STEP: f64 = 0.288_675_134_594_812_9;
+/// A step is one of the read-out's: that is known to the scale of the disparity (0.6 % off on a Kinect).
+const STEP_ERROR: f64 = 0.01;
+
+/// The finding, where most views show steps and the model does not say so.
+pub(in crate::diagnose) fn column_steps(fields: &[Field], known: &KnownTerms) -> Option<Finding> {
+    let seen: Vec<(&Field, ColumnSteps)> =
+        fields.iter().filter_map(|f| Some((f, f.column_steps?))).collect();
+    let known_of_views = known.parameter(BANDING, "period_px") == Some(0.0);
+    if known_of_views || 2 * seen.len() <= fields.len() {
+        return None;
+    }
+    // Any of the views may be the clearest.
+    let clearest = seen.iter().map(|(_, s)| s.p()).fold(1.0, f64::min);
+    let step_px = median(&mut seen.iter().map(|(_, s)| s.step_px.abs()).collect::<Vec<f64>>());
+    let [shortest, longest] = range(seen.iter().map(|(_, s)| s.period_px));
+    let rms_px = RMS_OF_STEP * step_px;
+    let middle = |of: &dyn Fn(&Field) -> f64| {
+        median(&mut seen.iter().map(|(f, _)| of(f)).collect::<Vec<f64>>())
+    };
+    let mm = middle(&|f| 1e3 * rms_px / f.plane.q.z.powi(2) / f.scale_px_m);
+    let sigma = middle(&|f| f.middle_sigma_px().map_or(0.0, |s| rms_px / f64::from(s)));
+    let of_half = |half: usize| {
+        let mine = fields.iter().skip(half).step_by(2);
+        2 * mine.clone().filter(|f| f.column_steps.is_some()).count() > mine.count()
+    };
+    let mut parameters = Map::new();
+    let amplitude_px = 0.5 * step_px;
+    parameters.insert("amplitude_px".into(), estimate(amplitude_px, STEP_ERROR * amplitude_px));
+    parameters.insert("period_px".into(), estimate(0.0, 0.0));
+    let plain = named(BANDING, Statistic::Bias, Axis::Column);
+    Some(Finding {
+        interval: [0.0, fields[0].width as f64],
+        share: seen.iter().map(|(_, s)| 0.5 * s.t * s.t).sum(),
+        physics: format!(
+            "{} The steps lie {shortest:.0} to {longest:.0} px apart, otherwise in every view, with one in the middle of the picture; {} of {} views show them.",
+            plain.physics,
+            seen.len(),
+            fields.len()
+        ),
+        parameters,
+        size: Size { mm, sigma },
+        p_adjusted: Some((clearest * fields.len() as f64).min(1.0)),
+        replicated: Some(of_half(0) && of_half(1)),
+        ..plain
+    })
+}
