@@ -54,12 +54,12 @@ pub fn pictures(
             let recorded = done.recorded(view);
             let twin = retake(view, field).map(|frames| {
                 let frames = frames.into_iter();
-                field.with_frames(frames, &bench, &model.sigma, &known, start).mean
+                field.with_frames(frames, &bench, &model.sigma, &known, start).with_column_steps()
             });
-            let left: Vec<f32> = match done.bias_px.get(view) {
-                Some(bias) => recorded.iter().zip(bias).map(|(r, b)| r - b).collect(),
-                None => recorded.clone(),
-            };
+            let mut left = recorded.clone();
+            left.iter_mut().zip(&field.pixels).for_each(|(r, &i)| *r -= field.column_error(i));
+            let found = done.bias_px.get(view).into_iter().flatten();
+            left.iter_mut().zip(found).for_each(|(r, bias)| *r -= bias);
             let show = |values: &[f32]| {
                 let depths = in_depth(field, &about_plane(field, values, &bench.rays), &bench.rays);
                 shrunk(&field.image(&depths), field)

@@ -14,7 +14,7 @@ pub(super) static CARD: Card = Card {
     id: "column-banding",
     title: "column banding",
     stage: Stage::Disparity,
-    summary: "the firmware applies a correction that is linear in the column in whole steps: what is left is a saw-tooth over the columns, the same in every row",
+    summary: "the firmware applies a correction that is linear in the column in whole steps: what is left is a saw-tooth over the columns, the same in every row; a Kinect begins anew with every view",
     parameters: &[
         Parameter {
             name: "amplitude_px",
@@ -26,9 +26,16 @@ pub(super) static CARD: Card = Card {
         Parameter {
             name: "period_px",
             unit: "px",
-            range: [0.0, 640.0],
+            range: [2.0, 640.0],
             typical: 80.0,
-            summary: "columns from one step to the next; 0: other ones in every view, with a step in the middle",
+            summary: "columns from one step to the next",
+        },
+        Parameter {
+            name: "spread",
+            unit: "",
+            range: [1.0, 20.0],
+            typical: 1.0,
+            summary: "the largest period of a view over the smallest; above 1 every view has its own, with a step in the middle",
         },
     ],
     kinds: SensorKind::MATCHING,
@@ -45,9 +52,9 @@ impl Effect for ColumnBanding {
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw) {
         let (amplitude, period) = (settings.at(0), settings.at(1));
         let (width, centre) = (exposure.seen.width, exposure.sensor.camera.cx);
-        if period == 0.0 {
+        if settings.at(2) > 1.0 {
             let share: f64 = draw.stream(Scope::View, "period").random();
-            let period = width as f64 * OF_VIEWS[0] * (OF_VIEWS[1] / OF_VIEWS[0]).powf(share);
+            let period = period * settings.at(2).powf(share - 0.5);
             // With a step in the middle the bands begin half a period on. As seen, the disparity falls.
             let middle = 0.5 * (width as f64 + period);
             exposure.shift_disparity(|i| tooth(i % width, middle, -amplitude, period));
@@ -102,7 +109,7 @@ impl Effect for ColumnBanding {
 
     fn term(&self, known: Known, camera: &Camera) -> Option<Term> {
         let (amplitude, period) = (known("amplitude_px")?, known("period_px")?);
-        if period == 0.0 {
+        if known("spread").is_some_and(|spread| spread > 1.0) {
             return None;
         }
         let nodes = camera.width.max(2);
@@ -118,7 +125,7 @@ impl Effect for ColumnBanding {
     }
 
     fn inverse(&self, settings: &Settings, camera: &Camera) -> Option<Inverse> {
-        if settings.at(1) == 0.0 {
+        if settings.at(2) > 1.0 {
             return Some(Inverse::ColumnSteps);
         }
         self.term(&|name| settings.named(&CARD, name), camera).map(Inverse::Term)
@@ -129,9 +136,6 @@ impl Effect for ColumnBanding {
         Some(Smallest { parameter: "amplitude_px", shape, unit: vec![1.0, 0.0], of: |a| a })
     }
 }
-
-/// Periods of views, as parts of the width, evenly in the logarithm: two Kinects' lie at 41 to 110 of 640 px.
-const OF_VIEWS: [f64; 2] = [41.0 / 640.0, 110.0 / 640.0];
 
 /// What rounding to the nearest whole step leaves in a column, from -1 to 1 times the amplitude.
 fn tooth(column: usize, centre: f64, amplitude: f64, period: f64) -> f64 {

@@ -81,6 +81,9 @@ pub(super) fn left_out(model: &NoiseModel, correction: Option<&Correction>) -> V
         )),
         Some(_) => {}
     }
+    if correction.is_some_and(|c| c.column_steps) {
+        told.push("the file leaves in the steps of whole columns, which every image shows anew: `kinoise correct` takes them out".into());
+    }
     if model.effects.iter().any(|e| e.covariance.is_some()) {
         told.push("the file holds best values; how sure they are stays in model.json".into());
     }

@@ -32,6 +32,8 @@ const CLIP: f64 = 1.5;
 /// Of all rows, so many must show a column.
 const MIN_ROWS: f64 = 1.0 / 16.0;
 const MIN_EDGES: usize = 3;
+/// An image without noise scatters by no less, in read-out steps: what is left of a mean of rounded numbers.
+const ROUNDING: f64 = 1e-3;
 /// Periods that are tried, as parts of the width: two Kinects' lie at 41 to 110 of 640 px (55 images).
 const PERIODS: [f64; 2] = [1.0 / 26.0, 1.0 / 3.2];
 /// All 55 images of two Kinects lie at 9.6 to 63; 157 simulated ones without, most of them with other effects,
@@ -53,7 +55,7 @@ impl ColumnSteps {
         }
         let middle = median(&mut seen);
         let mut off: Vec<f64> = seen.iter().map(|s| (s - middle).abs()).collect();
-        let spread = MAD_TO_SIGMA * median(&mut off);
+        let spread = (MAD_TO_SIGMA * median(&mut off)).max(ROUNDING * unit);
         // The outermost edges move by half a px from one period to the next.
         let [first, last] = PERIODS.map(|p| (p * width as f64).ln());
         let finer = 1.0 / width as f64;

@@ -268,6 +268,32 @@ fn what_a_formula_does_its_correction_undoes() {
     check(&entries, 0.004, 1.15 * noise);
 }
 
+/// Each view has its own, and tells it: half a read-out's step of 320 columns, beside as much noise.
+#[test]
+fn columns_that_step_otherwise_in_every_view_are_taken_out_of_each() {
+    let parameters = json!({"amplitude_px": 0.03125, "period_px": 34.0, "spread": 2.5});
+    let (plane, effects) = (Plane::tilted(0.8, 0.2, 0.3), [named("column-banding", parameters)]);
+    let correction = Correction::of(&model(&sensor(), effects.to_vec()), &sensor()).expect("one");
+    let noise = rms(&residuals(&depths(&shots(plane, &[], 0.001, &[0.0])[0]), &plane));
+    for frame in shots(plane, &effects, 0.001, &[0.0, 1.0, 2.0]) {
+        let mut depth = depths(&frame);
+        let before = rms(&residuals(&depth, &plane));
+        correction.apply(&mut depth, &Conditions::default()).expect("applied");
+        let after = rms(&residuals(&depth, &plane));
+        assert!(
+            before > noise.hypot(0.015) && after < 1.03 * noise,
+            "{noise}: {before} -> {after}"
+        );
+    }
+    let [sharp, clean] = [&effects[..], &[]].map(|e| depths(&shots(plane, e, 0.001, &[0.0])[0]));
+    let mut other = clean.clone();
+    correction.apply(&mut other, &Conditions::default()).expect("applied");
+    let moved =
+        |a: &[f32], b: &[f32]| a.iter().zip(b).filter(|(a, b)| (*a - *b).abs() > 1e-6).count();
+    assert_eq!(moved(&clean, &other), 0, "an image without steps stays");
+    assert!(moved(&clean, &sharp) > 1000);
+}
+
 /// Each kind of sensor bias by hand; the surface it needs is found in the noisy picture.
 #[test]
 fn what_a_shape_does_its_correction_undoes() {

@@ -1,6 +1,7 @@
 //! Columns that step, at other distances in every view: each view's own image tells them.
 
 use serde_json::Map;
+use statrs::statistics::Statistics;
 
 use super::field::Field;
 use super::known::KnownTerms;
@@ -11,6 +12,8 @@ use crate::measure::ColumnSteps;
 use crate::stats::{median, range};
 use crate::terms::{Axis, Statistic};
 
+/// Even where all views agree the firmware was free to do otherwise.
+const LEAST_SPREAD: f64 = 1.01;
 const BANDING: &str = "column-banding";
 /// Root mean square of a saw-tooth, over its step.
 const RMS_OF_STEP: f64 = 0.288_675_134_594_812_9;
@@ -21,7 +24,7 @@ const STEP_ERROR: f64 = 0.01;
 pub(in crate::diagnose) fn column_steps(fields: &[Field], known: &KnownTerms) -> Option<Finding> {
     let seen: Vec<(&Field, ColumnSteps)> =
         fields.iter().filter_map(|f| Some((f, f.column_steps?))).collect();
-    let known_of_views = known.parameter(BANDING, "period_px") == Some(0.0);
+    let known_of_views = known.parameter(BANDING, "spread").is_some_and(|s| s > 1.0);
     if known_of_views || 2 * seen.len() <= fields.len() {
         return None;
     }
@@ -42,7 +45,12 @@ pub(in crate::diagnose) fn column_steps(fields: &[Field], known: &KnownTerms) ->
     let mut parameters = Map::new();
     let amplitude_px = 0.5 * step_px;
     parameters.insert("amplitude_px".into(), estimate(amplitude_px, STEP_ERROR * amplitude_px));
-    parameters.insert("period_px".into(), estimate(0.0, 0.0));
+    let logs = seen.iter().map(|(_, s)| s.period_px.ln());
+    let period_px = logs.clone().mean().exp();
+    let std_error = period_px * logs.std_dev() / (seen.len() as f64).sqrt();
+    parameters.insert("period_px".into(), estimate(period_px, std_error));
+    // The largest over the smallest: how many views there are decides it.
+    parameters.insert("spread".into(), estimate((longest / shortest).max(LEAST_SPREAD), f64::NAN));
     let plain = named(BANDING, Statistic::Bias, Axis::Column);
     Some(Finding {
         interval: [0.0, fields[0].width as f64],

@@ -39,11 +39,8 @@ impl Field {
                 edges = Edges::find(self, &image, &bench.rays, &bench.table);
                 self.subsample_blocks(&mut expected);
                 self.find_column_steps(&image, &bench.table);
-                if let Some(steps) = self.column_steps {
-                    let of_pixels = self.pixels.iter().zip(&mut expected);
-                    of_pixels
-                        .for_each(|(&i, d)| *d += steps.error_px(i as usize % self.width) as f32);
-                }
+                let of_pixels = self.pixels.iter().zip(&mut expected);
+                of_pixels.for_each(|(&i, d)| *d += self.column_error(i));
             }
             edges.add(self, &image, &bench.rays, &bench.table);
             self.add(&image, time, &expected, &bench.table, clip_px);
