@@ -31,6 +31,9 @@ pub(super) static CARD: Card = Card {
     ..Card::BASE
 };
 
+/// Disparities are px of the matcher as far as baseline and focal length are known.
+const SCALE_ERROR: f64 = 0.01;
+
 impl Effect for PixelLocking {
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let amplitude = settings.at(0) as f32;
@@ -64,7 +67,7 @@ impl Effect for PixelLocking {
         let at = |t: f64| PixelContext { disparity: t * period_px, ..PixelContext::default() };
         vec![
             fit.estimate("amplitude_px", &|b| greatest(|t| fit.value(b, at(t)))),
-            Estimate::given("period_px", period_px, 0.003),
+            Estimate::given("period_px", period_px, SCALE_ERROR * period_px),
         ]
     }
 

@@ -12,15 +12,16 @@ const TO_SHARE: f64 = 0.002;
 /// Brent's method needs about ten.
 const MAX_STEPS: u64 = 30;
 
-/// Take the period with which `next` brings the largest gain beside `chosen`, from the one that was tried
-/// before it to the one after it. `total` is what terms bring together, nats.
+/// Take the period with which a named `next` brings the largest gain beside `chosen`, from the one that was
+/// tried before it to the one after it; a curve without a name has no formula to follow. `total` is what terms bring together, nats.
 pub fn tune(
     candidates: &[Candidate],
     chosen: &[Chosen],
     next: &mut Chosen,
     total: impl Fn(&[&Basis]) -> f64,
 ) {
-    let Some([low, high]) = neighbours(candidates, &next.candidate) else { return };
+    let of_name = Some(&next.candidate).filter(|c| c.family.is_some());
+    let Some([low, high]) = of_name.and_then(|c| neighbours(candidates, c)) else { return };
     let beside = bases(chosen);
     let gain =
         |period: f64| total(&[&beside[..], &[&next.candidate.basis.with_period(period)]].concat());
