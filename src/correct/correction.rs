@@ -51,7 +51,7 @@ pub struct Correction {
     /// Their sum at each pixel, px; empty where there are none.
     still: Vec<f32>,
     pub(crate) locking: Option<Locking>,
-    /// Do whole columns step, otherwise in every image?
+    /// Do whole columns step, differently in every image?
     pub(crate) column_steps: bool,
     /// What depends on more than the pixel.
     pub(crate) terms: Vec<LearntTerm>,

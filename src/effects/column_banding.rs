@@ -1,7 +1,8 @@
 //! Vertical stripes.
 
-use rand::Rng;
 use std::f64::consts::{FRAC_2_PI, TAU};
+
+use rand::Rng;
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Inverse, Known, Parameter, Scope, Settings, Smallest, Stage, greatest};
 use crate::camera::Camera;
@@ -125,10 +126,8 @@ impl Effect for ColumnBanding {
     }
 
     fn inverse(&self, settings: &Settings, camera: &Camera) -> Option<Inverse> {
-        if settings.at(2) > 1.0 {
-            return Some(Inverse::ColumnSteps);
-        }
-        self.term(&|name| settings.named(&CARD, name), camera).map(Inverse::Term)
+        let term = self.term(&|name| settings.named(&CARD, name), camera);
+        Some(term.map_or(Inverse::ColumnSteps, Inverse::Term))
     }
 
     fn smallest(&self, bounds: &Bounds) -> Option<Smallest> {

@@ -40,7 +40,7 @@ pub enum Inverse {
     Drift { relative: f64, time_constant_s: f64 },
     /// Depth holds this share of what the ray is longer than the depth.
     AlongRay { share: f64 },
-    /// Whole columns step, otherwise in every image: each shows how (`measure::ColumnSteps`).
+    /// Whole columns step, differently in every image, which shows how (`measure::ColumnSteps`).
     ColumnSteps,
     /// Disparity is drawn to whole pixels by a sine of this height.
     Locking { amplitude_px: f64 },

@@ -270,7 +270,7 @@ fn what_a_formula_does_its_correction_undoes() {
 
 /// Each view has its own, and tells it: half a read-out's step of 320 columns, beside as much noise.
 #[test]
-fn columns_that_step_otherwise_in_every_view_are_taken_out_of_each() {
+fn columns_that_step_differently_in_every_view_are_taken_out_of_each() {
     let parameters = json!({"amplitude_px": 0.03125, "period_px": 34.0, "spread": 2.5});
     let (plane, effects) = (Plane::tilted(0.8, 0.2, 0.3), [named("column-banding", parameters)]);
     let correction = Correction::of(&model(&sensor(), effects.to_vec()), &sensor()).expect("one");

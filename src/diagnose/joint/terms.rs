@@ -14,8 +14,8 @@ use crate::terms::{Axis, Basis, Coordinate, Statistic, Term};
 /// many standard errors over the parts.
 const MAPS_SHARE: f64 = 0.02;
 const MAPS_CLEARLY: f64 = 3.0;
-/// Beside the maps a term must bring this share of all, and be so clear; waves, which no map is but which
-/// maps come near to, be clear.
+/// Beside the maps a term must bring this share of all, and be so clear. Of waves, to which maps only come
+/// near, being clear is enough.
 const TERM_SHARE: f64 = 0.005;
 const TERM_CLEARLY: f64 = 2.0;
 /// A shape of the target, which a correction leaves in, must bring as much beside the maps as they

@@ -48,10 +48,21 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
     };
     let mut found: Vec<TextureFinding> =
         fixed.and_then(|m| pattern.found(&m, variance, level)).into_iter().collect();
-    let views = &beside_pattern(views, fixed)[..];
-    let Some(first) = ViewMean::of(views, |s| s.lagged[0]) else { return found };
     // What the pattern errs by is in every view's correlation alike.
     let of_pattern = fixed.map_or(0.0, |m| m.std_error * mean_precision(views));
+    found.extend(beside(&beside_pattern(views, fixed), of_pattern, known, level));
+    found
+}
+
+/// What frames of a view share beside the pattern, whose error adds so much to theirs.
+fn beside(
+    views: &[Structure],
+    of_pattern: f64,
+    known: &KnownTerms,
+    level: f64,
+) -> Vec<TextureFinding> {
+    let mut found = Vec::new();
+    let Some(first) = ViewMean::of(views, |s| s.lagged[0]) else { return found };
     let sure_of = |m: ViewMean| ViewMean { std_error: m.std_error.hypot(of_pattern), ..m };
     let first = sure_of(first);
     let first_error = first.std_error.max(by_chance(views));

@@ -1,4 +1,4 @@
-//! Columns that step, at other distances in every view: each view's own image tells them.
+//! Columns that step, at different distances in every view: each view's own image tells them.
 
 use serde_json::Map;
 use statrs::statistics::Statistics;
@@ -15,8 +15,6 @@ use crate::terms::{Axis, Statistic};
 /// Even where all views agree the firmware was free to do otherwise.
 const LEAST_SPREAD: f64 = 1.01;
 const BANDING: &str = "column-banding";
-/// Root mean square of a saw-tooth, over its step.
-const RMS_OF_STEP: f64 = 0.288_675_134_594_812_9;
 /// A step is one of the read-out's: that is known to the scale of the disparity (0.6 % off on a Kinect).
 const STEP_ERROR: f64 = 0.01;
 
@@ -30,9 +28,11 @@ pub(in crate::diagnose) fn column_steps(fields: &[Field], known: &KnownTerms) ->
     }
     // Any of the views may be the clearest.
     let clearest = seen.iter().map(|(_, s)| s.p()).fold(1.0, f64::min);
-    let step_px = median(&mut seen.iter().map(|(_, s)| s.step_px.abs()).collect::<Vec<f64>>());
+    // One of the read-out's, whichever way it goes.
+    let step_px = seen.first()?.1.step_px.abs();
     let [shortest, longest] = range(seen.iter().map(|(_, s)| s.period_px));
-    let rms_px = RMS_OF_STEP * step_px;
+    // Of a saw-tooth.
+    let rms_px = step_px / 12f64.sqrt();
     let middle = |of: &dyn Fn(&Field) -> f64| {
         median(&mut seen.iter().map(|(f, _)| of(f)).collect::<Vec<f64>>())
     };
@@ -56,7 +56,7 @@ pub(in crate::diagnose) fn column_steps(fields: &[Field], known: &KnownTerms) ->
         interval: [0.0, fields[0].width as f64],
         share: seen.iter().map(|(_, s)| 0.5 * s.t * s.t).sum(),
         physics: format!(
-            "{} The steps lie {shortest:.0} to {longest:.0} px apart, otherwise in every view, with one in the middle of the picture; {} of {} views show them.",
+            "{} The steps lie {shortest:.0} to {longest:.0} px apart, differently in every view, with one in the middle of the picture; {} of {} views show them.",
             plain.physics,
             seen.len(),
             fields.len()
