@@ -2,8 +2,8 @@
 //!
 //! Its firmware corrects the disparity linearly over the columns (GmcMode in OpenNI), in whole steps of the
 //! read-out and anew for every image: whole columns differ by a step from the next, at even distances
-//! from a step in the middle. No surface steps by as much at one column in all rows, so that no plane
-//! is needed to see them.
+//! from a step at the middle column or next to it. No surface steps by as much at one column in all rows, so
+//! that no plane is needed to see them.
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -17,13 +17,15 @@ pub struct ColumnSteps {
     pub step_px: f64,
     /// Mean of the steps over its standard error.
     pub t: f64,
-    width: usize,
+    /// Where the step of the middle would lie between two columns, px: the next column is the first beyond it.
+    middle_px: f64,
 }
 
 /// A Kinect v1 reads the disparity out in eighths of a px, on 640 columns.
 const READ_OUT_PX: f64 = 1.0 / 8.0 / 640.0;
-/// Columns either side that a step is measured on.
+/// Columns either side that a step is seen on, and located on: to see one, the noise of more is less.
 const REACH: usize = 4;
+const NEXT: usize = 1;
 /// Read-out steps over which one side is no longer smooth, and both together no step of the firmware.
 const ROUGH: f64 = 2.0;
 const TORN: f64 = 3.0;
@@ -32,6 +34,8 @@ const CLIP: f64 = 1.5;
 /// Of all rows, so many must show a column.
 const MIN_ROWS: f64 = 1.0 / 16.0;
 const MIN_EDGES: usize = 3;
+/// The middle and the outermost steps are tried at such parts of a column.
+const FINE: f64 = 1.0 / 16.0;
 /// An image without noise scatters by no less, in read-out steps: what is left of a mean of rounded numbers.
 const ROUNDING: f64 = 1e-3;
 /// Periods that are tried, as parts of the width: two Kinects' lie at 41 to 110 of 640 px (55 images).
@@ -48,7 +52,7 @@ impl ColumnSteps {
     /// Of an image of disparities, px, NaN where there is none; `None` where no steps are clear.
     pub fn find(disparity: &[f32], width: usize) -> Option<Self> {
         let unit = READ_OUT_PX * width as f64;
-        let steps = steps(disparity, width, unit);
+        let steps = rises(disparity, width, unit, REACH);
         let mut seen: Vec<f64> = steps.iter().copied().filter(|s| s.is_finite()).collect();
         if seen.len() < width / 4 {
             return None;
@@ -72,12 +76,15 @@ impl ColumnSteps {
         };
         let best = tried.filter_map(score).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         let (period_px, t) = best.filter(|(_, t)| t.abs() > CLEAR)?;
-        Some(ColumnSteps { period_px, step_px: unit.copysign(t), t: t.abs(), width })
+        let step_px = unit.copysign(t);
+        let next = rises(disparity, width, unit, NEXT);
+        let [middle_px, period_px] = located(&next, step_px, period_px);
+        Some(ColumnSteps { period_px, step_px, t: t.abs(), middle_px })
     }
 
     /// What the disparity of a column errs by, px: the steps less the line that they stand for.
     pub fn error_px(&self, column: usize) -> f64 {
-        let steps = (column as f64 - self.width as f64 / 2.0) / self.period_px;
+        let steps = (column as f64 - self.middle_px) / self.period_px;
         self.step_px * (steps.floor() - steps + 0.5)
     }
 
@@ -87,21 +94,45 @@ impl ColumnSteps {
     }
 }
 
-/// What each column and the next ones on its right lie above those on its left, mean over the rows, px; NaN where
-/// few rows are smooth.
-fn steps(disparity: &[f32], width: usize, unit: f64) -> Vec<f64> {
+/// The middle and the period with steps where the columns rise most, from one column to the next. Of all that put
+/// them at the same columns, the mean.
+fn located(rises: &[f64], step_px: f64, period_px: f64) -> [f64; 2] {
+    let half = rises.len() as f64 / 2.0;
+    let reach = (half / period_px).floor();
+    let mut seen: Vec<f64> = rises.iter().copied().filter(|r| r.is_finite()).collect();
+    let slope = median(&mut seen);
+    let score = |[middle, period]: [f64; 2]| {
+        let at = |k: i64| (middle + k as f64 * period).ceil() as usize;
+        let edges = (-reach as i64..=reach as i64).filter_map(|k| rises.get(at(k)));
+        edges.filter(|r| r.is_finite()).map(|r| (r - slope) * step_px).sum::<f64>()
+    };
+    // The step of the middle, and the outermost, up to so many columns off.
+    let off = |columns: f64| {
+        let n = (columns / FINE) as i32;
+        (-n..=n).map(|k| f64::from(k) * FINE)
+    };
+    let tried = off(1.0).flat_map(|m| off(1.5).map(move |p| [half + m, period_px + p / reach]));
+    let scored: Vec<([f64; 2], f64)> = tried.map(|at| (at, score(at))).collect();
+    let best = scored.iter().map(|s| s.1).fold(f64::NEG_INFINITY, f64::max);
+    let alike: Vec<[f64; 2]> = scored.iter().filter(|s| s.1 >= best).map(|s| s.0).collect();
+    [0, 1].map(|k| alike.iter().map(|a| a[k]).sum::<f64>() / alike.len() as f64)
+}
+
+/// What each column and the next ones on its right lie above those on its left, `reach` of them, mean over the
+/// rows, px; NaN where few rows are smooth.
+fn rises(disparity: &[f32], width: usize, unit: f64, reach: usize) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); width];
     for row in disparity.chunks_exact(width) {
-        for (u, pixels) in row.windows(2 * REACH).enumerate() {
-            let (left, right) = pixels.split_at(REACH);
-            let rises = [left, right].map(|side| f64::from(side[REACH - 1] - side[0]));
+        for (u, pixels) in row.windows(2 * reach).enumerate() {
+            let (left, right) = pixels.split_at(reach);
+            let rises = [left, right].map(|side| f64::from(side[reach - 1] - side[0]));
             let sum = |side: &[f32]| side.iter().map(|d| f64::from(*d)).sum::<f64>();
-            let apart = (sum(right) - sum(left)) / REACH as f64;
+            let apart = (sum(right) - sum(left)) / reach as f64;
             let smooth = rises.iter().all(|r| r.abs() <= ROUGH * unit) && apart.abs() < TORN * unit;
             if smooth && apart.is_finite() {
-                let slope = 0.5 * (rises[0] + rises[1]) / (REACH - 1) as f64;
-                let step = apart - slope * REACH as f64;
-                let (sum, n) = &mut sums[u + REACH];
+                let slope = 0.5 * (rises[0] + rises[1]) / (reach.max(2) - 1) as f64;
+                let step = apart - slope * reach as f64;
+                let (sum, n) = &mut sums[u + reach];
                 *sum += step.clamp(-CLIP * unit, CLIP * unit);
                 *n += 1.0;
             }
@@ -141,16 +172,17 @@ mod tests {
     fn steps_are_found_whichever_way_they_go_and_taken_out() {
         let mut rng = Seed(2).stream("column-steps");
         for sign in [1.0, -1.0] {
-            for period in [43.5, 71.3, 110.0] {
-                let stretch = |u: f64| sign * STEP_PX * ((u - WIDTH as f64 / 2.0) / period).floor();
+            for (period, middle) in [(43.5, 320.0), (71.3, 319.6), (72.15, 319.8), (110.0, 320.7)] {
+                let stretch = |u: f64| sign * STEP_PX * ((u - middle) / period).floor();
                 let stepped = image(&mut rng, stretch);
                 let found = ColumnSteps::find(&stepped, WIDTH).expect("steps");
                 assert!((found.period_px / period - 1.0).abs() < 0.003, "{found:?}");
                 assert_eq!(found.step_px, sign * STEP_PX);
-                let line = |u: usize| sign * STEP_PX * ((u as f64 - 320.0) / period - 0.5);
+                let line = |u: usize| sign * STEP_PX * ((u as f64 - middle) / period - 0.5);
                 let off = |u: usize| stretch(u as f64) - line(u) - found.error_px(u);
-                let mean = (0..WIDTH).map(|u| off(u).abs()).sum::<f64>() / WIDTH as f64;
-                assert!(mean < 0.05 * STEP_PX, "{mean}");
+                // Not even one column is taken for its neighbour.
+                let largest = (0..WIDTH).map(|u| off(u).abs()).fold(0.0, f64::max);
+                assert!(largest < 0.05 * STEP_PX, "{largest}");
             }
         }
     }

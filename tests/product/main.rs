@@ -15,6 +15,7 @@ mod capture;
 mod capture_kinect;
 mod claims;
 mod clocks;
+mod column_steps;
 mod command_line;
 mod containers;
 mod correct;

@@ -1,0 +1,74 @@
+//! The steps of two real Kinects' columns, held against the raw values to their left and right.
+
+use std::path::Path;
+
+use kinoise::measure::ColumnSteps;
+
+use crate::common;
+
+const WIDTH: usize = 640;
+const NONE: u16 = 2047;
+
+/// Raw images below a folder.
+fn images(root: &Path) -> Vec<Vec<u16>> {
+    let png = |path: &Path| path.extension().is_some_and(|e| e == "png");
+    let files = common::tree(root).into_iter().filter(|(path, _)| png(path));
+    let raw = |bytes: &[u8]| image::load_from_memory(bytes).expect("an image").into_luma16();
+    files.map(|(_, bytes)| raw(&bytes).into_raw()).collect()
+}
+
+/// Raw values that a column lies above the one before it, where that is less than three: the mean over the rows,
+/// over many of which both have one.
+fn rise(raw: &[u16], column: usize) -> Option<f64> {
+    let pairs = raw.chunks_exact(WIDTH).map(|row| [row[column - 1], row[column]]);
+    let seen = pairs.filter(|pair| !pair.contains(&NONE));
+    let rises: Vec<f64> = seen
+        .map(|[before, after]| f64::from(after) - f64::from(before))
+        .filter(|r| r.abs() < 3.0)
+        .collect();
+    (rises.len() > 100).then(|| rises.iter().sum::<f64>() / rises.len() as f64)
+}
+
+/// Images that show steps, and how many of the steps (and of the columns next to one) rise by more than half a raw
+/// value.
+fn seen(images: &[Vec<u16>]) -> (usize, [usize; 2], [usize; 2]) {
+    let (mut shown, mut steps, mut beside) = (0, [0; 2], [0; 2]);
+    for raw in images {
+        let px = |&r: &u16| if r == NONE { f32::NAN } else { -f32::from(r) / 8.0 };
+        let disparity: Vec<f32> = raw.iter().map(px).collect();
+        let Some(found) = ColumnSteps::find(&disparity, WIDTH) else { continue };
+        shown += 1;
+        let jumps = |u: usize| found.error_px(u) - found.error_px(u - 1);
+        for u in (2..WIDTH - 1).filter(|&u| jumps(u).abs() > 0.5 / 8.0) {
+            let rises = |count: &mut [usize; 2], column: usize| {
+                if let Some(rise) = rise(raw, column) {
+                    let up = -jumps(u).signum() * rise > 0.5;
+                    *count = [count[0] + usize::from(up), count[1] + 1];
+                }
+            };
+            rises(&mut steps, u);
+            rises(&mut beside, u - 1);
+            rises(&mut beside, u + 1);
+        }
+    }
+    (shown, steps, beside)
+}
+
+#[test]
+fn each_image_of_a_real_kinect_shows_its_own() {
+    // The second unit's disparities were turned into mm and back: not every step is a whole one.
+    let units = [("herrera-kinect-v1/recording", 39, 0.97), ("kinect-v1-second-unit", 33, 0.9)];
+    for (folder, of, share) in units {
+        let Some(folder) = common::data(folder) else { continue };
+        let images = images(&folder);
+        assert_eq!(images.len(), of);
+        let (shown, [right, steps], [wrong, beside]) = seen(&images);
+        println!(
+            "{shown} of {of} images: {right} of {steps} steps right, {wrong} of {beside} beside one"
+        );
+        assert_eq!(shown, of);
+        assert!(right as f64 > share * steps as f64, "{right} of {steps}");
+        // Of a steep board every column rises.
+        assert!(20 * wrong < beside, "{wrong} of {beside}");
+    }
+}
