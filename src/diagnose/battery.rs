@@ -152,12 +152,13 @@ impl Case<'_> {
     fn is_news(&self, f: &Finding, bias: &MeanResult, scatter: &ScatterResult) -> bool {
         let coarsest = self.lattice.step_px(self.fields[0].scale_px_m, self.survey.reach.z[0]);
         let sigma_px = typical_sigma_px(&self.fields);
-        // The error of a fine step is as good as noise, of a twelfth of its square; the mean it shifts by
-        // less than a four hundredth.
+        // A fine step errs as noise does, and shifts the mean by less than a four hundredth.
         let of_steps = matches!(f.statistic, Statistic::Bias | Statistic::Variance)
             && coarsest > COARSE_SIGMAS * sigma_px;
+        // Steps of depth come at no period of the disparity, and pass for one over a few of them.
+        let aliased = self.lattice.depth_step_m.is_some() && f.axis == Axis::DisparityPhase;
         let stepped = of_steps
-            && f.effect.is_none()
+            && (f.effect.is_none() || aliased)
             && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)
             && own_step(&self.lattice, self.recording, self.fields[0].scale_px_m).is_none()
             && f.size.sigma * sigma_px < 0.3 * coarsest;
