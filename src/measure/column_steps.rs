@@ -38,14 +38,14 @@ const MIN_EDGES: usize = 3;
 const FINE: f64 = 1.0 / 16.0;
 /// An image without noise scatters by no less, in read-out steps: what is left of a mean of rounded numbers.
 const ROUNDING: f64 = 1e-3;
-/// Periods that are tried, as parts of the width: two Kinects' lie at 41 to 110 of 640 px (55 images).
+/// Periods that are tried, as parts of the width: two Kinects' lie at 41 to 110 of 640 px (72 images).
 const PERIODS: [f64; 2] = [1.0 / 26.0, 1.0 / 3.2];
-/// All 55 images of two Kinects lie at 9.6 to 63; 157 simulated ones without, most of them with other effects,
+/// All 72 images of two Kinects lie at 9.6 to 63; 157 simulated ones without, most of them with other effects,
 /// at 5.0 or less.
 const CLEAR: f64 = 8.0;
 /// Half of the steps rise by more, in read-out steps: 38 images of a Kinect by .87 or more and one by .51; steep
 /// boards, whose near columns are noisier than the far ones and pass for steps in their mean, by .05 or less.
-const WHOLE: f64 = 0.5;
+const WHOLE: f64 = 0.4;
 /// The largest of those 157 are as those of so many independent Gaussian ones whose deviation is so large
 /// (half of them beyond 2.8, a hundredth beyond 4.4).
 const LOOKS: f64 = 270.0;
