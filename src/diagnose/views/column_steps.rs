@@ -18,12 +18,12 @@ const BANDING: &str = "column-banding";
 /// A step is one of the read-out's: that is known to the scale of the disparity (0.6 % off on a Kinect).
 const STEP_ERROR: f64 = 0.01;
 
-/// The finding, where most views show steps and the model does not say so.
+/// The finding, where views show steps and the model does not say so.
 pub(in crate::diagnose) fn column_steps(fields: &[Field], known: &KnownTerms) -> Option<Finding> {
     let seen: Vec<(&Field, ColumnSteps)> =
         fields.iter().filter_map(|f| Some((f, f.column_steps?))).collect();
     let known_of_views = known.parameter(BANDING, "spread").is_some_and(|s| s > 1.0);
-    if known_of_views || 2 * seen.len() <= fields.len() {
+    if known_of_views {
         return None;
     }
     // Any of the views may be the clearest.
@@ -38,10 +38,8 @@ pub(in crate::diagnose) fn column_steps(fields: &[Field], known: &KnownTerms) ->
     };
     let mm = middle(&|f| 1e3 * rms_px / f.plane.q.z.powi(2) / f.scale_px_m);
     let sigma = middle(&|f| f.middle_sigma_px().map_or(0.0, |s| rms_px / f64::from(s)));
-    let of_half = |half: usize| {
-        let mine = fields.iter().skip(half).step_by(2);
-        2 * mine.clone().filter(|f| f.column_steps.is_some()).count() > mine.count()
-    };
+    let of_half =
+        |half: usize| fields.iter().skip(half).step_by(2).any(|f| f.column_steps.is_some());
     let mut parameters = Map::new();
     let amplitude_px = 0.5 * step_px;
     parameters.insert("amplitude_px".into(), estimate(amplitude_px, STEP_ERROR * amplitude_px));
