@@ -219,6 +219,11 @@ pub fn few_views(
     if most < noise.threshold(rules.level) {
         return None;
     }
+    // Where more has no name in all views, what it misses in some has none.
+    let nameless = outcome.chosen.iter().filter(|c| c.candidate.family.is_none());
+    if nameless.map(|c| c.gain).fold(0.0, f64::max) > most {
+        all.retain(|(candidate, _)| candidate.family.is_none());
+    }
     let (candidate, best) = told(&all)?;
     Some(report(scene, candidate, best, noise.p(most)))
 }
