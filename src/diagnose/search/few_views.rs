@@ -219,25 +219,23 @@ pub fn few_views(
     if most < noise.threshold(rules.level) {
         return None;
     }
-    // Where more has no name in all views, what it misses in some has none.
     let nameless = outcome.chosen.iter().filter(|c| c.candidate.family.is_none());
-    if nameless.map(|c| c.gain).fold(0.0, f64::max) > most {
-        all.retain(|(candidate, _)| candidate.family.is_none());
-    }
-    let (candidate, best) = told(&all)?;
+    let (candidate, best) = told(&all, nameless.map(|c| c.gain).fold(0.0, f64::max))?;
     Some(report(scene, candidate, best, noise.p(most)))
 }
 
 /// Of the candidates, best first, the name or else the curve to report. In a few views much looks alike: a
-/// name must be better than what has none on another axis.
-fn told<'a>(all: &'a [(&'a Candidate, Best)]) -> Option<&'a (&'a Candidate, Best)> {
+/// name must be better than what has none on another axis, and than what has none in all views, `nameless`: this
+/// one's misfit in some of them looks like anything.
+fn told<'a>(all: &'a [(&'a Candidate, Best)], nameless: f64) -> Option<&'a (&'a Candidate, Best)> {
     let most = all.first()?.1.gain;
     let curves = || all.iter().filter(|(c, _)| c.family.is_none());
     let clear = |(c, b): &&(&Candidate, Best)| {
         let mut others = curves().filter(|o| o.0.basis.axis() != c.basis.axis());
         others.all(|o| o.1.gain < NAME_ADEQUATE * b.gain)
     };
-    let names = || all.iter().filter(|(c, b)| c.family.is_some() && b.gain > NAME_ADEQUATE * most);
+    let adequate = f64::max(NAME_ADEQUATE * most, nameless);
+    let names = || all.iter().filter(|(c, b)| c.family.is_some() && b.gain > adequate);
     names().find(clear).or(curves().next()).or(names().next())
 }
 

@@ -79,8 +79,9 @@ fn a_name_is_better_than_curves_on_other_axes() {
     ];
     for (curve, gain, name) in cases {
         let all = [found(&bands, 100.0), found(curve, gain)];
-        assert_eq!(told(&all).unwrap().0.family, name, "{gain}");
+        assert_eq!(told(&all, 0.0).unwrap().0.family, name, "{gain}");
+        assert_eq!(told(&all, 120.0).unwrap().0.family, None, "{gain}, less than what has no name");
     }
     let all = [found(&other, 100.0), found(&bands, 80.0)];
-    assert_eq!(told(&all).unwrap().0.family, None, "a name that explains too little");
+    assert_eq!(told(&all, 0.0).unwrap().0.family, None, "a name that explains too little");
 }
