@@ -56,7 +56,7 @@ impl ColumnSteps {
     pub fn find(disparity: &[f32], width: usize) -> Option<Self> {
         let unit = READ_OUT_PX * width as f64;
         let steps = rises(disparity, width, unit, REACH);
-        let mut seen: Vec<f64> = steps.iter().copied().filter(|s| s.is_finite()).collect();
+        let mut seen = finite(&steps);
         if seen.len() < width / 4 {
             return None;
         }
@@ -80,8 +80,7 @@ impl ColumnSteps {
         let (period_px, t) = best.filter(|(_, t)| t.abs() > CLEAR)?;
         let step_px = unit.copysign(t);
         let next = rises(disparity, width, unit, NEXT);
-        let mut seen: Vec<f64> = next.iter().copied().filter(|r| r.is_finite()).collect();
-        let slope = median(&mut seen);
+        let slope = median(&mut finite(&next));
         let next: Vec<f64> = next.iter().map(|rise| (rise - slope) / step_px).collect();
         let [middle_px, period_px] = located(&next, period_px);
         let whole = median(&mut edges(&next, [middle_px, period_px]).collect::<Vec<_>>());
@@ -99,6 +98,10 @@ impl ColumnSteps {
     pub fn p(&self) -> f64 {
         (LOOKS * Normal::standard().sf(self.t / WIDER)).clamp(1e-300, 1.0)
     }
+}
+
+fn finite(rises: &[f64]) -> Vec<f64> {
+    rises.iter().copied().filter(|rise| rise.is_finite()).collect()
 }
 
 /// Of all columns' rises, those at the steps.
@@ -137,6 +140,7 @@ fn rises(disparity: &[f32], width: usize, unit: f64, reach: usize) -> Vec<f64> {
             let apart = (sum(right) - sum(left)) / reach as f64;
             let smooth = rises.iter().all(|r| r.abs() <= ROUGH * unit) && apart.abs() < TORN * unit;
             if smooth && apart.is_finite() {
+                // A single column has none.
                 let slope = 0.5 * (rises[0] + rises[1]) / (reach.max(2) - 1) as f64;
                 let step = apart - slope * reach as f64;
                 let (sum, n) = &mut sums[u + reach];

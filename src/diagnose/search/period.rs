@@ -13,7 +13,8 @@ const TO_SHARE: f64 = 0.002;
 const MAX_STEPS: u64 = 30;
 
 /// Take the period with which a named `next` brings the largest gain beside `chosen`, from the one that was
-/// tried before it to the one after it; a curve without a name has no formula to follow. `total` is what terms bring together, nats.
+/// tried before it to the one after it; a curve without a name has no formula to follow. `total` is what terms
+/// bring together, nats.
 pub fn tune(
     candidates: &[Candidate],
     chosen: &[Chosen],
