@@ -48,6 +48,16 @@ impl Fitted<'_> {
         }
     }
 
+    /// Coefficients and covariance of the same fit with coefficient `k` held at zero, which is what a shape
+    /// without its column would have had: the Gaussian posterior's condition.
+    pub fn without(&self, k: usize) -> Option<(Vec<f64>, DMatrix<f64>)> {
+        let variance = self.covariance.get((k, k)).copied().filter(|v| *v > 0.0)?;
+        let column = self.covariance.column(k);
+        let moved = column * (self.coefficients[k] / variance);
+        let coefficients = self.coefficients.iter().zip(&moved).map(|(b, m)| b - m).collect();
+        Some((coefficients, self.covariance - column * column.transpose() / variance))
+    }
+
     /// Of the shape at a place, with these coefficients.
     pub fn value(&self, coefficients: &[f64], place: PixelContext) -> f64 {
         self.shape.value(coefficients, &place, &mut Vec::new())
@@ -89,4 +99,35 @@ pub fn slope_in_square(curve: impl Fn(f64) -> f64, far: f64) -> f64 {
 pub fn greatest(curve: impl Fn(f64) -> f64) -> f64 {
     let [low, high] = crate::stats::range((0..64).map(|k| curve(f64::from(k) / 64.0)));
     0.5 * (high - low)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Least squares on three columns, held to two, is least squares on those two.
+    #[test]
+    fn a_fit_without_a_column_is_that_of_the_others() {
+        let columns = DMatrix::from_fn(40, 3, |i, j| (0.1 * i as f64 - 1.0).powi(j as i32));
+        let y = DVector::from_fn(40, |i, _| (0.7 * i as f64).sin() + 0.02 * i as f64);
+        let solved = |of: &DMatrix<f64>| {
+            let covariance = (of.transpose() * of).try_inverse().unwrap();
+            (&covariance * of.transpose() * &y, covariance)
+        };
+        let (coefficients, covariance) = solved(&columns);
+        let shape = &Basis::Level;
+        let reach = &Extent::default();
+        let fit =
+            Fitted { shape, coefficients: coefficients.as_slice(), covariance: &covariance, reach };
+        for gone in 0..3 {
+            let others = solved(&columns.clone().remove_column(gone));
+            let (held, of_held) = fit.without(gone).unwrap();
+            let held = DVector::from_vec(held).remove_row(gone);
+            let of_held = of_held.remove_row(gone).remove_column(gone);
+            assert!((held - others.0).norm() < 1e-10);
+            assert!((of_held - others.1).norm() < 1e-10);
+        }
+        let unknown = DMatrix::zeros(0, 0);
+        assert!(Fitted { covariance: &unknown, ..fit }.without(0).is_none());
+    }
 }

@@ -47,7 +47,15 @@ impl Effect for IntensityDependentNoise {
         dark(1, false)
     }
 
+    /// The law's exponent is that of the law without a bend.
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
+        let bent = matches!(fit.shape, Basis::Powers { orders: 2, .. });
+        let plain = if bent { fit.without(BEND) } else { None };
+        let fit = plain.as_ref().map_or(*fit, |(coefficients, covariance)| Fitted {
+            coefficients,
+            covariance,
+            ..*fit
+        });
         vec![fit.estimate("exponent", &|b| -0.5 * b[0])]
     }
 
@@ -56,6 +64,8 @@ impl Effect for IntensityDependentNoise {
     }
 }
 
+/// Number of the coefficient that bends the law, after its slope and the level.
+const BEND: usize = 2;
 /// Black velvet still gives back this much.
 const DARKEST: f64 = 0.01;
 
