@@ -123,8 +123,9 @@ impl Joint<'_> {
             covariance: self.covariance_of_reported(s, &errors, told.len()),
             beta: DVector::from_vec(told),
         };
+        let disagreed = if is_told { self.disagreed(s, &beta, &errors) } else { Vec::new() };
         Some(Outcome {
-            chosen: self.chosen(s, found),
+            chosen: self.chosen(s, found, &disagreed),
             looks: found.looks.clone(),
             noise: found.noise.clone(),
             halves,
@@ -214,11 +215,14 @@ impl Joint<'_> {
         })
     }
 
-    /// The terms with what planes absorb of each, and the maps.
-    fn chosen(&self, s: &Settled, found: &Outcome) -> Vec<Chosen> {
+    /// The terms with what planes absorb of each, and the maps. What the views do not agree on at all has no name.
+    fn chosen(&self, s: &Settled, found: &Outcome, disagreed: &[usize]) -> Vec<Chosen> {
         let mut chosen = Vec::new();
         for &t in &s.terms {
-            let term = &found.chosen[t];
+            let mut term = found.chosen[t].clone();
+            if disagreed.contains(&t) {
+                term.candidate = Candidate::curve(term.candidate.basis);
+            }
             chosen.push(term.clone());
             if let Some(gauge) = &self.columns.gauges[t] {
                 let (basis, _) = gauge.term(&[]);

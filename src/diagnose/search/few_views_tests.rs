@@ -80,7 +80,12 @@ fn a_name_is_better_than_curves_on_other_axes() {
     for (curve, gain, name) in cases {
         let all = [found(&bands, 100.0), found(curve, gain)];
         assert_eq!(told(&all, 0.0).unwrap().0.family, name, "{gain}");
-        assert_eq!(told(&all, 120.0).unwrap().0.family, None, "{gain}, less than what has no name");
+        assert_eq!(
+            told(&all, 20.0).unwrap().0.family,
+            name,
+            "{gain}, much more than what has none"
+        );
+        assert_eq!(told(&all, 90.0).unwrap().0.family, None, "{gain}, about what has no name");
     }
     let all = [found(&other, 100.0), found(&bands, 80.0)];
     assert_eq!(told(&all, 0.0).unwrap().0.family, None, "a name that explains too little");
