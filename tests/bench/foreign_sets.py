@@ -5,10 +5,11 @@ A board is seen before a wall at 640 x 480, 18 poses of 4 frames, with white noi
 model is calibrated on a clean recording of the same sensor, or, in a third of the sets, on the concealed one
 itself; there the noise may obey Eq. 1 across the plane. Every set is a line: the cause and its size, what was
 found with its share, and whether the cause's name came first, came at all, or was missed; "out-..." has no name
-in the catalogue. It shares nothing with the trial but the layout of a recording. A law of depth and tilt alone
+in the catalogue. A pair has two causes at once: both, one or none of their names are found, or a wrong one beside them.
+It shares nothing with the trial but the layout of a recording. A law of depth and tilt alone
 (range-exponent, slope-noise) is sigma's own form where the model was calibrated on the same recording.
 
-    foreign_sets.py [--kinoise BIN] [--repeat N] [--seed S] [--jobs J] [--keep DIR] [CAUSE ...]
+    foreign_sets.py [--kinoise BIN] [--repeat N] [--seed S] [--jobs J] [--keep DIR] [--pairs N | CAUSE ...]
 """
 import argparse, collections, concurrent.futures, contextlib, json, pathlib, subprocess, sys, tempfile
 
@@ -247,8 +248,30 @@ def temporal_correlation(s, rng):
     return rho
 
 
+def pairs(seed, count):
+    """Causes that can be at once: no two set the same property of the sensor."""
+    rng, drawn = np.random.default_rng([seed, len(CAUSES)]), []
+    named = [c for c in CAUSES if c != "clean" and not c.startswith("out-")]
+    shared = {"reference_m", "print", "lit"}
+
+    def sets(name):
+        sensor = Sensor(np.random.default_rng(0), False)
+        before = dict(vars(sensor))
+        CAUSES[name](sensor, sensor.rng)
+        return {slot for slot, value in vars(sensor).items() if value is not before[slot]} - shared
+
+    while len(drawn) < count:
+        a, b = (str(c) for c in rng.choice(named, 2, replace=False))
+        if not sets(a) & sets(b):
+            drawn.append(f"{a}+{b}")
+    return drawn
+
+
 def verdict(name, told):
     found = [f["effect"] for f in told["findings"] if f["status"] != "not-identifiable"]
+    if "+" in name:
+        right = [c for c in name.split("+") if c in found]
+        return "wrong" if set(found) - {None, *right} else ("missed", "one", "both")[len(right)]
     if name == "clean":
         return "alarm" if found else "match"
     if name.startswith("out-"):
@@ -257,7 +280,8 @@ def verdict(name, told):
 
 
 def judge(args, name, n):
-    rng = np.random.default_rng([args.seed, list(CAUSES).index(name), n])
+    known = [list(CAUSES).index(c) for c in name.split("+")]
+    rng = np.random.default_rng([args.seed, *known, n])
     here = bool(rng.random() < 0.3)
     across = here and bool(rng.integers(2))
     with contextlib.ExitStack() as stack:
@@ -265,7 +289,7 @@ def judge(args, name, n):
         place = pathlib.Path(kept or stack.enter_context(tempfile.TemporaryDirectory()))
         run = lambda *words: subprocess.run([args.kinoise, "--threads", "1", *words], capture_output=True, text=True)
         sensor = Sensor(rng, across)
-        number = CAUSES[name](sensor, rng)
+        numbers = "+".join(f"{CAUSES[c](sensor, rng):.3g}" for c in name.split("+"))
         sensor.record(place / "rec")
         model = []
         if not here:
@@ -274,11 +298,11 @@ def judge(args, name, n):
             model = ["-m", place / "calibrated/model.json"]
         done = run("diagnose", place / "rec", *model, "-o", place / "out")
         if done.returncode not in (0, 1):
-            return name, number, here, across, "refused", done.stderr.strip()[-300:]
+            return name, numbers, here, across, "refused", done.stderr.strip()[-300:]
         told = json.loads((place / "out/diagnosis.json").read_text())
     words = [f"{f['effect'] or f['status'] + ' ' + f['statistic'] + ' over ' + f['axis']} {f['share']:.3f}"
              for f in told["findings"] if f["status"] != "not-identifiable"]
-    return name, number, here, across, verdict(name, told), "; ".join(words)
+    return name, numbers, here, across, verdict(name, told), "; ".join(words)
 
 
 def main():
@@ -286,22 +310,24 @@ def main():
     p.add_argument("causes", nargs="*", metavar="CAUSE", help="all without any")
     p.add_argument("--kinoise", default="target/release/kinoise")
     p.add_argument("--repeat", type=int, default=1, help="sets of each cause")
+    p.add_argument("--pairs", type=int, help="so many sets of two causes, instead")
     p.add_argument("--seed", type=int, default=0)
     p.add_argument("--jobs", type=int, default=1)
     p.add_argument("--keep", metavar="DIR", help="keep every set in this folder")
     args = p.parse_args()
-    unknown = [c for c in args.causes if c not in CAUSES]
+    unknown = [c for name in args.causes for c in name.split("+") if c not in CAUSES]
     if unknown:
         sys.exit(f"no such cause: {', '.join(unknown)}; there are {', '.join(CAUSES)}")
+    causes = pairs(args.seed, args.pairs) if args.pairs else args.causes or list(CAUSES)
     count = collections.Counter()
     with concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
-        jobs = [pool.submit(judge, args, c, n) for n in range(args.repeat) for c in args.causes or CAUSES]
+        jobs = [pool.submit(judge, args, c, n) for n in range(args.repeat) for c in causes]
         for job in jobs:
-            name, number, here, across, how, words = job.result()
-            kind = "clean" if name == "clean" else "outside" if name.startswith("out-") else "single"
+            name, numbers, here, across, how, words = job.result()
+            kind = "clean" if name == "clean" else "outside" if name.startswith("out-") else "pair" if "+" in name else "single"
             count[f"{kind} {how}"] += 1
             model = ("calibrated here" if here else "model") + (", across the plane" if across else "")
-            print(f"{how:11} {name} {number:.3g} ({model}): {words}", flush=True)
+            print(f"{how:11} {name} {numbers} ({model}): {words}", flush=True)
     print(", ".join(f"{n} {what}" for what, n in sorted(count.items())))
 
 
