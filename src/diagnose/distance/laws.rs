@@ -139,13 +139,12 @@ pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances) -> Vec<Law> {
         return Vec::new();
     }
     let mut references = References::of(checked, nuisances);
-    let mut laws = Vec::from_iter(references.law("depth-scale", Axis::Z, |c| c.z));
-    // An offset of the disparity by delta px moves the depth by -z^2 delta / (f b).
+    let mut laws = Vec::from_iter(references.law("depth-scale", Axis::Z, |c| c.without_law()));
     if nuisances.open.is_empty() {
-        laws.extend(references.law("disparity-offset", Axis::Z, |c| -c.z * c.z / c.px_m));
+        laws.extend(references.law("disparity-offset", Axis::Z, ReferencedView::m_a_px));
     }
     laws.extend(WARM_UPS.iter().filter_map(|tau| {
-        let warm = |c: &ReferencedView| c.z * (1.0 - (-c.session_s / tau).exp());
+        let warm = |c: &ReferencedView| c.without_law() * (1.0 - (-c.session_s / tau).exp());
         references.law("thermal-drift", Axis::SessionTime, warm)
     }));
     // Wider from here on: the variance was measured with few degrees of freedom, which makes a Student's t of

@@ -1,11 +1,12 @@
 //! References of a target that was tilted, and read where the axis was thought to meet it.
 
+use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::diagnose::distance::reference::findings;
 use crate::diagnose::views::known::KnownTerms;
-use crate::rng::Seed;
+use crate::rng::{Seed, Stream};
 
 const PX_M: f64 = 43.5;
 /// Of a reference, m.
@@ -68,6 +69,33 @@ fn an_offset_keeps_its_size_beside_it() {
             assert_eq!(effect, Some("disparity-offset"));
             assert!((offset_px - 0.06).abs() < 0.01, "seed {seed}: {offset_px}");
         }
+    }
+}
+
+/// Where a law moves a distance by some per cent, its square is seen too.
+#[test]
+fn a_large_law_has_its_own_size() {
+    let noise = |rng: &mut Stream| 0.1 * ERROR_M * rng.sample::<f64, _>(StandardNormal);
+    type Seen = fn(f64) -> f64;
+    let cases: [(&str, f64, Seen); 2] = [
+        ("disparity-offset", 0.5, |z| PX_M / (PX_M / z + 0.5)),
+        ("depth-scale", 0.03, |z| 1.03 * z),
+    ];
+    for (family, truth, seen) in cases {
+        let mut rng = Seed(2).stream(family);
+        let of = |k: usize| {
+            let z = 0.8 + 0.1 * (7 * k % 24) as f64;
+            let seen = seen(z) + noise(&mut rng);
+            ReferencedView {
+                session_s: 60.0 * k as f64,
+                ..ReferencedView::ahead(seen, seen - z, PX_M)
+            }
+        };
+        let checked: Vec<ReferencedView> = (0..24).map(of).collect();
+        let told = laws(&checked, &Nuisances::default());
+        let [size, error] = told.iter().find(|l| l.family == family).unwrap().estimate;
+        assert!((size - truth).abs() < 3.0 * error, "{family}: {size} +- {error}");
+        assert!(error < 0.01 * truth, "{family}: {error}");
     }
 }
 

@@ -29,6 +29,18 @@ pub struct ReferencedView {
     pub in_second_half: bool,
 }
 
+impl ReferencedView {
+    /// What it would have measured without any further law: the reference, with the known laws.
+    pub fn without_law(&self) -> f64 {
+        self.z - self.off
+    }
+
+    /// What a disparity that is too large by one px makes of the distance, m.
+    pub fn m_a_px(&self) -> f64 {
+        -self.z * self.without_law() / self.px_m
+    }
+}
+
 /// Distances with what the model knows of the laws, and the terms of the `bias` that was found, taken
 /// out.
 pub fn referenced_views(
@@ -136,7 +148,7 @@ impl Scatter {
 
 #[cfg(test)]
 impl ReferencedView {
-    /// A frontal view.
+    /// A frontal view that measured `z`, too far by `off`.
     pub fn ahead(z: f64, off: f64, px_m: f64) -> Self {
         ReferencedView {
             z,

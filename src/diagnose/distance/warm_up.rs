@@ -45,7 +45,8 @@ pub fn warm_up(
         .enumerate()
         .flat_map(|(course, of)| even(log, TAUS).map(move |log| (course, of, log.exp())))
         .filter_map(|(course, of, tau_s)| {
-            let (likely, relative) = size(&evidence(&|c| c.z * of(c.session_s / tau_s)))?;
+            let (likely, relative) =
+                size(&evidence(&|c| c.without_law() * of(c.session_s / tau_s)))?;
             let unlikely = 0.5 * (tau_s / TYPICAL_TAU_S).ln().powi(2);
             Some(Node { course, tau_s, evidence: likely - unlikely, relative })
         })
@@ -126,7 +127,8 @@ mod tests {
                         let (z, at_s) = (rng.random_range(0.6..4.0), session_s * k as f64 / 15.0);
                         let noise: f64 = StandardNormal.sample(&mut rng);
                         let off = relative * z * course(at_s / tau_s) + ERROR_M * noise;
-                        ReferencedView { session_s: at_s, ..ReferencedView::ahead(z, off, PX_M) }
+                        let ahead = ReferencedView::ahead(z + off, off, PX_M);
+                        ReferencedView { session_s: at_s, ..ahead }
                     })
                     .collect();
                 let told = found(&checked).expect("a drift");

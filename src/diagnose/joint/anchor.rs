@@ -30,9 +30,7 @@ impl Family {
     /// What its constant, of the usual size, makes of a distance, m.
     pub fn moves_m(&self, c: &ReferencedView) -> f64 {
         let disparity = c.px_m / c.z;
-        // A disparity too large by delta px makes the depth too small by z^2 delta / (f b).
-        let by_px = c.z * c.z / c.px_m;
-        by_px * self.usual * (disparity / DISPARITY_UNIT_PX).powf(self.power)
+        -c.m_a_px() * self.usual * (disparity / DISPARITY_UNIT_PX).powf(self.power)
     }
 }
 

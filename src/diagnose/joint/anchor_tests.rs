@@ -29,7 +29,8 @@ fn references(
     let of = |k: usize| {
         let z = 0.8 + 2.7 * k as f64 / (count - 1) as f64;
         let px = shift_px * (PX_M / z / DISPARITY_UNIT_PX).powf(power);
-        ReferencedView::ahead(z, -z * z * px / PX_M + noise.sample(&mut rng), PX_M)
+        let seen = PX_M / (PX_M / z + px) + noise.sample(&mut rng);
+        ReferencedView::ahead(seen, seen - z, PX_M)
     };
     (0..count).map(of).collect()
 }

@@ -110,14 +110,18 @@ impl KnownTerms {
         parts.into_values().filter(|part| !part.is_empty()).collect()
     }
 
-    /// What the known laws of the distance make of a depth, m.
+    /// By how much a measured depth is off by the known laws of the distance, m, as `correct` undoes them.
     pub fn law_m(&self, z: f64, session_s: f64, px_m: f64) -> f64 {
         let of = |id, name| self.parameter(id, name);
-        let scale = of("depth-scale", "scale").map_or(0.0, |scale| (scale - 1.0) * z);
-        let offset = of("disparity-offset", "offset_px").map_or(0.0, |px| -px * z * z / px_m);
+        let scale = of("depth-scale", "scale");
+        let offset_px = of("disparity-offset", "offset_px");
         let warmth = of("thermal-drift", "time_constant_s").map(|tau| -(-session_s / tau).exp_m1());
-        let drift = of("thermal-drift", "relative").zip(warmth).map_or(0.0, |(r, w)| r * w * z);
-        scale + offset + drift
+        let drift = of("thermal-drift", "relative").zip(warmth).map(|(r, w)| 1.0 + r * w);
+        if scale.or(offset_px).or(drift).is_none() {
+            return 0.0;
+        }
+        let factor = scale.unwrap_or(1.0) * drift.unwrap_or(1.0);
+        z - px_m / (px_m * factor / z - offset_px.unwrap_or(0.0))
     }
 
     /// The coefficient of a known law of the distance, as it is fitted to references.
