@@ -15,10 +15,11 @@ use crate::terms::Term;
 /// One view with a reference.
 #[derive(Debug, Clone, Copy)]
 pub struct ReferencedView {
+    /// Measured, the known laws taken out, m.
     pub z: f64,
     /// Slope of the target, along the columns and rows.
     pub slope: [f64; 2],
-    /// Measured minus reference, m.
+    /// That minus the reference, m.
     pub off: f64,
     /// Standard error of what was measured, m, by the view's own noise: grows with z^2.
     pub own_m: f64,
@@ -30,7 +31,7 @@ pub struct ReferencedView {
 }
 
 impl ReferencedView {
-    /// What it would have measured without any further law: the reference, with the known laws.
+    /// What it would have measured without any law.
     pub fn without_law(&self) -> f64 {
         self.z - self.off
     }
@@ -56,8 +57,9 @@ pub fn referenced_views(
         .filter_map(|((f, view), level)| {
             let reference_m = f.reference_distance_m?;
             // The plane had bent towards what is now known to be a bias.
-            let z = f.scale_px_m / (f.scale_px_m * f.plane.q.z + level);
+            let measured = f.scale_px_m / (f.scale_px_m * f.plane.q.z + level);
             let session_s = f.time_s - start;
+            let z = measured - known.law_m(measured, session_s, f.scale_px_m);
             let m_a_px = z * z / f.scale_px_m;
             let steep = f.plane.theta().tan();
             let (sin, cos) = f.plane.azimuth().sin_cos();
@@ -66,7 +68,7 @@ pub fn referenced_views(
             Some(ReferencedView {
                 z,
                 slope: [steep * cos, steep * sin],
-                off: z - reference_m - known.law_m(z, session_s, f.scale_px_m),
+                off: z - reference_m,
                 own_m: level_error_px(view).unwrap_or(white_px) * m_a_px,
                 session_s,
                 px_m: f.scale_px_m,

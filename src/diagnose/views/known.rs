@@ -124,10 +124,10 @@ impl KnownTerms {
         z - px_m / (px_m * factor / z - offset_px.unwrap_or(0.0))
     }
 
-    /// The coefficient of a known law of the distance, as it is fitted to references.
+    /// The coefficient of a known law of the distance; one fitted to references undoes it by minus this.
     pub fn law(&self, family: &str) -> Option<f64> {
         match family {
-            "depth-scale" => self.parameter(family, "scale").map(|scale| scale - 1.0),
+            "depth-scale" => self.parameter(family, "scale").map(|scale| 1.0 - scale.recip()),
             "disparity-offset" => self.parameter(family, "offset_px"),
             _ => self.parameter(family, "relative"),
         }
