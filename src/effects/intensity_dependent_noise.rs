@@ -47,10 +47,9 @@ impl Effect for IntensityDependentNoise {
         dark(1, false)
     }
 
-    /// The law's exponent is that of the law without a bend.
+    /// The law's exponent is that of the law without a bend, where the shape has one.
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
-        let bent = matches!(fit.shape, Basis::Powers { orders: 2, .. });
-        let plain = if bent { fit.without(BEND) } else { None };
+        let plain = fit.without(BEND);
         let fit = plain.as_ref().map_or(*fit, |(coefficients, covariance)| Fitted {
             coefficients,
             covariance,

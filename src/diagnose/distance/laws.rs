@@ -141,7 +141,7 @@ pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances) -> Vec<Law> {
     let mut references = References::of(checked, nuisances);
     let mut laws = Vec::from_iter(references.law("depth-scale", Axis::Z, |c| c.without_law()));
     if nuisances.open.is_empty() {
-        laws.extend(references.law("disparity-offset", Axis::Z, ReferencedView::m_a_px));
+        laws.extend(references.law("disparity-offset", Axis::Z, ReferencedView::moved_by_a_px));
     }
     laws.extend(WARM_UPS.iter().filter_map(|tau| {
         let warm = |c: &ReferencedView| c.without_law() * (1.0 - (-c.session_s / tau).exp());

@@ -36,8 +36,8 @@ impl ReferencedView {
         self.z - self.off
     }
 
-    /// What a disparity that is too large by one px makes of the distance, m.
-    pub fn m_a_px(&self) -> f64 {
+    /// What a disparity that is too large by one px adds to the distance, m: negative.
+    pub fn moved_by_a_px(&self) -> f64 {
         -self.z * self.without_law() / self.px_m
     }
 }

@@ -30,7 +30,7 @@ impl Family {
     /// What its constant, of the usual size, makes of a distance, m.
     pub fn moves_m(&self, c: &ReferencedView) -> f64 {
         let disparity = c.px_m / c.z;
-        -c.m_a_px() * self.usual * (disparity / DISPARITY_UNIT_PX).powf(self.power)
+        -c.moved_by_a_px() * self.usual * (disparity / DISPARITY_UNIT_PX).powf(self.power)
     }
 }
 

@@ -1,5 +1,7 @@
 //! How sure the joint posterior is: its covariance in a few factors.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
@@ -8,6 +10,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::fit::Joint;
 use super::terms::{Settled, System};
 use crate::camera::Camera;
+use crate::diagnose::checks::replication::spans;
 use crate::rng::Seed;
 use crate::solve::Cholesky;
 use crate::terms::Pixels;
@@ -81,14 +84,14 @@ impl Joint<'_> {
 
     /// Terms of which the views do not agree that there is anything.
     pub fn disagreed(&self, s: &Settled, beta: &DVector<f64>, errors: &DMatrix<f64>) -> Vec<usize> {
-        let mut from = 0;
-        let is_nothing = |&t: &usize| {
-            let (first, n, kept) = (from, self.columns.bases[t].count(), self.columns.span(t));
-            from += n;
-            let errors = errors.view((first, first), (n, n)).into_owned();
-            chance_of(&beta.rows(kept.start, n).into_owned(), errors).is_some_and(|p| p > DISAGREED)
+        let counts: Vec<usize> = s.terms.iter().map(|&t| self.columns.bases[t].count()).collect();
+        let is_nothing = |(t, own): (usize, Range<usize>)| {
+            let n = own.len();
+            let errors = errors.view((own.start, own.start), (n, n)).into_owned();
+            let mine = beta.rows(self.columns.span(t).start, n).into_owned();
+            chance_of(&mine, errors).is_some_and(|p| p > DISAGREED).then_some(t)
         };
-        s.terms.iter().copied().filter(is_nothing).collect()
+        s.terms.iter().copied().zip(spans(&counts)).filter_map(is_nothing).collect()
     }
 
     /// The columns as planes that are faced show them.
