@@ -85,7 +85,9 @@ class Sensor:
         (folder / "depth").mkdir(parents=True)
         for k in range(FRAMES):
             moved = np.where(on, z * (1 - self.velocity * k / 30 / z0), z)
-            d = PX_M / moved + bias + sigma * self.noise(v, k)
+            # A target that moves has the noise of where it is.
+            nearer = eq1(moved, v["theta"]) / eq1(z, v["theta"]) * (z / moved) ** 2
+            d = PX_M / moved + bias + sigma * nearer * self.noise(v, k)
             d = self.mixing(v, d) if self.mixing else d
             for frame in self.frame:
                 d = frame(v, d)

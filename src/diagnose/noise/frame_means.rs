@@ -21,7 +21,6 @@ struct Motion {
     velocity_mps: f64,
     std_error: f64,
     p: f64,
-    nats: f64,
 }
 
 impl Motion {
@@ -43,14 +42,14 @@ impl Motion {
         let std_error = ((left / (n - 1.0)).max(1.0) / precision).sqrt();
         let t = velocity_mps / std_error;
         let p = StudentsT::new(0.0, 1.0, n - 1.0).map_or(1.0, |d| 2.0 * d.sf(t.abs()));
-        Some(Motion { velocity_mps, std_error, p, nats: 0.5 * n * (t * t / n).ln_1p() })
+        Some(Motion { velocity_mps, std_error, p })
     }
 }
 
 /// The velocity of a target that seems to move, its error, m/s, and the chance of it for one at rest.
 pub(in crate::diagnose) fn velocity(views: &[Structure]) -> Option<(f64, f64, f64)> {
     let all: Vec<Jitter> = views.iter().filter_map(|s| s.jitter).collect();
-    let Motion { velocity_mps, std_error, p, .. } = Motion::of(&all, &FrameNoise::of(&all))?;
+    let Motion { velocity_mps, std_error, p } = Motion::of(&all, &FrameNoise::of(&all))?;
     Some((velocity_mps, std_error.hypot(UNEVEN * velocity_mps), p))
 }
 
@@ -140,17 +139,17 @@ fn motion(all: &[Jitter], noise: &FrameNoise, level: f64, rho: f64) -> Option<Te
     }
     let speed = (all.iter().map(|j| j.velocity_mps.powi(2)).sum::<f64>() / n).sqrt();
     let signed = all.iter().map(|j| j.velocity_mps).sum::<f64>() / n;
-    let Motion { velocity_mps, std_error, p, nats } = steady.unwrap_or(Motion {
+    let Motion { velocity_mps, std_error, p } = steady.unwrap_or(Motion {
         velocity_mps: speed.copysign(signed),
         std_error: speed / (2.0 * n).sqrt(),
         p: p_line,
-        nats: 0.5 * n * f.ln().max(0.0),
     });
     let std_error = std_error.hypot(UNEVEN * velocity_mps);
     Some(TextureFinding {
         parameters: one("velocity_mps", velocity_mps, std_error),
         p: p.max(1e-300),
-        nats,
+        // As a term's: what the lines explain of the squares.
+        nats: 0.5 * n * line,
         ..TextureFinding::named(vec!["target-motion"], Statistic::Bias, Axis::Frame)
     })
 }
@@ -174,6 +173,7 @@ fn jitter(
         return None;
     }
     let sigma = jitter_px2.sqrt();
+    let larger = ratio / noise.freedom;
     Some(TextureFinding {
         parameters: one(
             "sigma_px",
@@ -182,7 +182,7 @@ fn jitter(
         ),
         size_sigma: (jitter_px2 / variance_px2.max(1e-12)).sqrt(),
         p: p.max(1e-300),
-        nats: 0.5 * noise.freedom * (ratio / noise.freedom).ln().max(0.0),
+        nats: 0.5 * noise.freedom * (larger - 1.0 - larger.ln()),
         ..TextureFinding::named(vec!["frame-jitter"], Statistic::Correlation, Axis::Frame)
     })
 }

@@ -71,15 +71,23 @@ pub fn tails(
         parameters.insert("scale".into(), estimate(scale[0], scale[1]));
         size_sigma = fraction[0].sqrt() * scale[0];
     }
-    let readings: f64 = views.iter().map(|s| s.tails.n).sum();
+    let readings: f64 = views.iter().map(independent_readings).sum();
     Some(TextureFinding {
         interval: [4.0, 2.0 * mean_size(&counts) - 4.0],
         parameters,
         size_sigma,
         p: share.p_above(own),
-        nats: share.value * readings * (share.value / own).ln(),
+        nats: readings * (share.value * (share.value / own).ln() - (share.value - own)),
         ..TextureFinding::named(vec!["heavy-tails"], Statistic::Distribution, Axis::Residual)
     })
+}
+
+/// Readings that were looked at, by how much of the noise is a pixel's own: what a box of neighbours shares
+/// is far out in all of them. Its squared correlation sums to this along either axis.
+fn independent_readings(view: &Structure) -> f64 {
+    let side = view.window_px.unwrap_or(1.0).max(1.0);
+    let repeats = (2.0 * side * side + 1.0) / (3.0 * side);
+    view.tails.n / repeats.powi(2)
 }
 
 /// The parameter that tells a finding of [`weak`] from one of far errors.

@@ -81,8 +81,13 @@ pub(super) fn missing(findings: &[Finding]) -> Vec<&Finding> {
 
 /// What a finding is called in the middle of a sentence.
 pub fn called(finding: &Finding) -> String {
-    let what = if finding.statistic == Statistic::Dropout { "loss" } else { "error" };
-    let unnamed = || format!("an unexplained {what} {}", along(finding.axis));
+    let what = match finding.statistic {
+        Statistic::Bias => "an unexplained bias",
+        Statistic::Variance => "unexplained noise",
+        Statistic::Dropout => "an unexplained loss",
+        _ => "an unexplained error",
+    };
+    let unnamed = || format!("{what} {}", along(finding.axis));
     match finding.status {
         Status::OneOf if finding.alternatives.len() > 1 => {
             let likely = finding.alternatives.iter().enumerate();

@@ -179,7 +179,7 @@ fn cases() -> [(Diagnosis, &'static [&'static str]); 9] {
         (
             several,
             &[
-                "leaves three effects out: radial disparity bias, noise with another power of distance and an unexplained error over the row of the picture.",
+                "leaves three effects out: radial disparity bias, noise with another power of distance and an unexplained bias over the row of the picture.",
                 "1.6 to 3.4 m",
                 "less than once in a million recordings (p &lt; 10 −6 )",
                 "a few more large errors than simulated (p = 0.012)",
