@@ -19,7 +19,7 @@ use crate::diagnose::noise::scatter::ScatterResult;
 use crate::diagnose::noise::structure::Structure;
 use crate::diagnose::noise::tails::SURE_SCALE_ERRORS;
 use crate::diagnose::noise::view_mean::{ViewMean, nats, variance_px2};
-use crate::diagnose::steps::{contradicted, step_nats};
+use crate::diagnose::steps::contradicted;
 use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::tiles::Tile;
 use crate::terms::{Axis, PixelContext, Statistic};
@@ -70,8 +70,8 @@ impl Case<'_> {
             (p < level).then_some(Finding { share, size, p_adjusted: Some(p), ..finding })
         };
         let steps = contradicted(&self.fields, &self.known, self.recording).into_iter();
-        let steps = steps.map(|(id, axis, sigma)| Finding {
-            share: step_nats(sigma),
+        let steps = steps.map(|(id, axis, sigma, nats)| Finding {
+            share: nats,
             size: Size { mm: sigma * sigma_mm, sigma },
             ..finding(&self.known, id, Statistic::Distribution, axis)
         });

@@ -118,12 +118,12 @@ pub(in crate::diagnose) fn forget_windows(
 }
 
 /// Steps that the model has and the words do not lie on: each with its axis, and the error that it
-/// would make in sigmas.
+/// would make in sigmas and is worth in nats.
 pub(in crate::diagnose) fn contradicted(
     fields: &[Field],
     known: &KnownTerms,
     recording: &Recording,
-) -> Vec<(&'static str, Axis, f64)> {
+) -> Vec<(&'static str, Axis, f64, f64)> {
     let mut words = RawHistogram::none();
     fields.iter().for_each(|f| words.merge(&f.words));
     let (sigma_px, sigma_mm) = (typical_sigma_px(fields), typical_sigma_mm(fields));
@@ -131,32 +131,44 @@ pub(in crate::diagnose) fn contradicted(
     let disparity = known.parameter("disparity-quantisation", "step_px").and_then(|step| {
         let lies = words.on_disparities(step, sensor, fields[0].scale_px_m)?;
         let sigma = step / 12f64.sqrt() / sigma_px;
-        (!lies).then_some(("disparity-quantisation", Axis::DisparityPhase, sigma))
+        let nats = step_nats(fields, |_| step);
+        (!lies).then_some(("disparity-quantisation", Axis::DisparityPhase, sigma, nats))
     });
     let depth = known.parameter("depth-rounding", "step_m").and_then(|step| {
         let lies = words.on_depths(step, sensor)?;
         let sigma = 1e3 * step / 12f64.sqrt() / sigma_mm;
-        (!lies).then_some(("depth-rounding", Axis::Z, sigma))
+        let nats = step_nats(fields, |z| step * fields[0].scale_px_m / (z * z));
+        (!lies).then_some(("depth-rounding", Axis::Z, sigma, nats))
     });
-    disparity.into_iter().chain(depth).filter(|(_, _, sigma)| *sigma > STEP_SHARE).collect()
+    disparity.into_iter().chain(depth).filter(|(_, _, sigma, _)| *sigma > STEP_SHARE).collect()
 }
 
 /// A step is worth telling when the error it makes is this share of the noise in some view; that a model
 /// has one which the words contradict, when it is this share of the usual noise.
 const STEP_SHARE: f64 = 0.1;
 
-/// The largest error of a step among the views, in sigmas; `px` is the step at a depth, in px.
-fn strongest(fields: &[Field], px: impl Fn(f64) -> f64) -> f64 {
-    let of = |f: &Field| {
+/// The variance that a step adds in each view, as a share of its noise's; `px` is the step at a depth, px.
+fn added(fields: &[Field], px: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
+    fields.iter().map(move |f| {
         let sigma = f.middle_sigma_px().map_or(f64::INFINITY, f64::from);
-        px(f.plane.depth(0.0, 0.0)) / 12f64.sqrt() / sigma
-    };
-    fields.iter().map(of).fold(0.0, f64::max)
+        (px(f.plane.depth(0.0, 0.0)) / sigma).powi(2) / 12.0
+    })
 }
 
-/// The weight of a step among the findings, in place of nats: no fit gives any.
-pub(in crate::diagnose) fn step_nats(sigma: f64) -> f64 {
-    10.0 + 100.0 * sigma * sigma
+/// The largest error of a step among the views, in sigmas.
+fn strongest(fields: &[Field], px: impl Fn(f64) -> f64) -> f64 {
+    added(fields, px).fold(0.0, f64::max).sqrt()
+}
+
+/// What a step is worth that a model lacks, or has too much: the Kullback-Leibler divergence of the
+/// Gaussians with and without its variance, over all readings, nats. That words come in steps tells far
+/// more, but of the format.
+fn step_nats(fields: &[Field], px: impl Fn(f64) -> f64) -> f64 {
+    let of = |(f, more): (&Field, f64)| {
+        let readings: f64 = f.count.iter().map(|n| f64::from(*n)).sum();
+        0.5 * readings * (more - more.ln_1p())
+    };
+    fields.iter().zip(added(fields, px)).map(of).sum()
 }
 
 pub(in crate::diagnose) fn steps(
@@ -173,8 +185,8 @@ pub(in crate::diagnose) fn steps(
         });
         Some(a.zip(b).is_some_and(|(a, b)| (a / b - 1.0).abs() < SAME_STEP))
     };
-    let found = |effect, axis, size: Size| Finding {
-        share: step_nats(size.sigma),
+    let found = |effect, axis, size: Size, nats| Finding {
+        share: nats,
         size,
         ..named(effect, Statistic::Distribution, axis)
     };
@@ -193,7 +205,7 @@ pub(in crate::diagnose) fn steps(
             parameters: one("step_px", step, error),
             p_adjusted: lattice.disparity_p,
             replicated: replicated(|l| l.disparity_step_px),
-            ..found("disparity-quantisation", Axis::DisparityPhase, size)
+            ..found("disparity-quantisation", Axis::DisparityPhase, size, step_nats(fields, |_| step))
         })
     });
     let of_depth = lattice.depth_step_m.filter(|_| !known.has("depth-rounding"));
@@ -206,7 +218,7 @@ pub(in crate::diagnose) fn steps(
             parameters: one("step_m", step, 0.0),
             p_adjusted: lattice.depth_p,
             replicated: replicated(|l| l.depth_step_m),
-            ..found("depth-rounding", Axis::Z, size)
+            ..found("depth-rounding", Axis::Z, size, step_nats(fields, px))
         })
     });
     of_disparity.into_iter().chain(of_depth).collect()
