@@ -37,8 +37,6 @@ pub enum Ablation {
     /// What gains a nat on views left out is there, as Akaike has it for one parameter: no
     /// simulation of noise alone through the whole search.
     UncalibratedThresholds,
-    /// Every name has the one formula of its catalogue card; what only scales it stays free.
-    FixedFormulas,
 }
 
 /// Fewest views that anything is said about.

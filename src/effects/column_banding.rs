@@ -81,10 +81,6 @@ impl Effect for ColumnBanding {
         all
     }
 
-    fn plain(&self, shape: Basis) -> Basis {
-        shape.period().map_or(shape, |period_px| stripes(period_px, 1))
-    }
-
     /// Bands on a real sensor ride on a smooth error of the column that is no band's.
     fn must_explain(&self) -> Option<f64> {
         Some(0.45)

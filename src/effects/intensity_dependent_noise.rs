@@ -43,10 +43,6 @@ impl Effect for IntensityDependentNoise {
         seen.map(|(orders, level)| dark(orders, level)).collect()
     }
 
-    fn plain(&self, _: Basis) -> Basis {
-        dark(1, false)
-    }
-
     /// The law's exponent is that of the law without a bend, where the shape has one.
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
         let plain = fit.without(BEND);

@@ -49,16 +49,6 @@ impl Effect for LensDistortion {
         all
     }
 
-    fn plain(&self, shape: Basis) -> Basis {
-        match shape {
-            Basis::Powers { over, times, .. } => Basis::powers(over, 1, times),
-            Basis::Lens { fx, fy, reference_px, .. } => {
-                Basis::Lens { fx, fy, reference_px, orders: 1 }
-            }
-            other => other,
-        }
-    }
-
     /// What is left of k1 in a depth picture that was calibrated (Khoshelham and Elberink 2012,
     /// table 1: 0.003; Smisek, Jancosek and Pajdla 2011: 0.01 to 0.05).
     fn usual(&self, _: &Basis, _: usize, _: Option<&Flat>) -> f64 {

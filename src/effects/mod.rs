@@ -53,11 +53,6 @@ pub trait Effect: Carded + Send + Sync {
         Vec::new()
     }
 
-    /// One of its shapes as the card's formula has it; what only scales that stays free.
-    fn plain(&self, shape: Basis) -> Basis {
-        shape
-    }
-
     /// A size that coefficient number `k` of one of its shapes may well have, in its unit: the standard
     /// deviation of what is believed before anything was measured. `flat` is what is stated of the
     /// target.

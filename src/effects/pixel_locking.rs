@@ -53,10 +53,6 @@ impl Effect for PixelLocking {
         (-half..=half).map(|k| waves(period(k), 3)).collect()
     }
 
-    fn plain(&self, _: Basis) -> Basis {
-        waves(1.0, 1)
-    }
-
     /// Shimizu and Okutomi 2001: 0.06 px; without a remedy twice that.
     fn usual(&self, _: &Basis, _: usize, _: Option<&Flat>) -> f64 {
         0.1

@@ -44,10 +44,6 @@ impl Effect for RadialDisparityBias {
         [of(2), of(4)].concat()
     }
 
-    fn plain(&self, _: Basis) -> Basis {
-        bowl(0.0, 1)
-    }
-
     /// Herrera, Kannala and Heikkila 2012, fig. 6: up to 4 of a Kinect's steps of 1/8 px towards
     /// the corners.
     fn usual(&self, _: &Basis, _: usize, _: Option<&Flat>) -> f64 {

@@ -57,10 +57,6 @@ impl Effect for TargetBow {
         vec![Basis::relief(2), Basis::dome(3), Basis::relief(4)]
     }
 
-    fn plain(&self, _: Basis) -> Basis {
-        Basis::relief(2)
-    }
-
     /// A board bends by about 1 mm at 1 m, and by 1.5 mm half a metre from its middle where it is a
     /// bad one. One whose flatness is stated bends by anything up to that, either way, over what was
     /// seen of it: a rectangular distribution.

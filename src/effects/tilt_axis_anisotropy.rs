@@ -43,10 +43,6 @@ impl Effect for TiltAxisAnisotropy {
         both.iter().flat_map(|over| LAWS.map(|law| Basis::powers(*over, 1, law))).collect()
     }
 
-    fn plain(&self, _: Basis) -> Basis {
-        along_baseline(LAWS[0])
-    }
-
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
         let steep = |azimuth| PixelContext {
             theta: REFERENCE_TILT_RAD,

@@ -44,10 +44,6 @@ impl Effect for Vignetting {
         [1, 2].map(darker).into()
     }
 
-    fn plain(&self, _: Basis) -> Basis {
-        darker(1)
-    }
-
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
         vec![fit.estimate("growth", &|b| (0.5 * b.iter().sum::<f64>()).exp() - 1.0)]
     }

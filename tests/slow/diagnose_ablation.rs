@@ -72,38 +72,6 @@ fn without_correlation_or_calibrated_thresholds_clean_sets_cry_wolf() {
     }
 }
 
-/// Causes in another formula than the catalogue's: what a name with only its own one leaves over
-/// is found again, as something that is not there.
-#[test]
-fn with_fixed_formulas_more_is_said_that_is_not_there() {
-    let lens = (1..=6).map(|seed| ("lens-distortion", 5000.0, seed));
-    let ripple = (1..=4).map(|seed| ("pixel-locking", 50_000.0, seed));
-    let sets: Vec<(&str, Taken)> = lens
-        .chain(ripple)
-        .map(|(name, nats, seed)| (name, Taken::of(&asked(Cell::Single, name, Some(nats), seed))))
-        .collect();
-    let total = |ablation| {
-        let of = |(name, set): &(&str, Taken)| {
-            let said = said(set.folder.path(), ablation);
-            let form = &set.set.truth().hidden[0].form;
-            println!("{ablation:?}: {name} as {form}: {}", summary(&said));
-            strays(&said, name)
-        };
-        sets.iter().map(of).sum::<usize>()
-    };
-    let (proper, fixed) = (total(Ablation::None), total(Ablation::FixedFormulas));
-    println!("{proper} strays, with fixed formulas {fixed}");
-    assert!(fixed >= proper + 3, "{fixed} against {proper}");
-}
-
-/// Findings that are not the hidden one; that not being the first counts as one more.
-fn strays(diagnosis: &Value, name: &str) -> usize {
-    let all = diagnosis["findings"].as_array().expect("findings").iter();
-    let said: Vec<&Value> = all.filter(|f| f["status"] != "not-identifiable").collect();
-    let first = said.first().is_some_and(|f| f["effect"] == name);
-    said.iter().filter(|f| f["effect"] != name).count() + usize::from(!first)
-}
-
 /// Every pixel four times, by a camera of twice the resolution: the same measurements. That they
 /// hang together now is so, and may be said.
 #[test]

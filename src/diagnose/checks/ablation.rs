@@ -1,7 +1,6 @@
 //! The engine with one of its parts taken out, to show what that part is for. Only tests ask for it.
 
 use crate::diagnose::options::Ablation;
-use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::rules::Rules;
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::layers::Survey;
@@ -13,23 +12,6 @@ impl Ablation {
             Ablation::UncalibratedThresholds => Rules { calibrated: false, ..rules },
             _ => rules,
         }
-    }
-
-    pub(in crate::diagnose) fn candidates(self, all: Vec<Candidate>) -> Vec<Candidate> {
-        if self != Ablation::FixedFormulas {
-            return all;
-        }
-        let mut fixed: Vec<Candidate> = Vec::new();
-        for mut candidate in all {
-            if let Some(effect) = candidate.effect() {
-                candidate.basis = effect.plain(candidate.basis);
-            }
-            let same = |c: &Candidate| (c.family, &c.basis) == (candidate.family, &candidate.basis);
-            if !fixed.iter().any(same) {
-                fixed.push(candidate);
-            }
-        }
-        fixed
     }
 }
 

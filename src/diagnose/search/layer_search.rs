@@ -84,7 +84,6 @@ impl Survey {
         let candidates = bias::candidates(&self.bounds(camera));
         let side = smooth_px(camera.width);
         let coarse: Vec<ViewData> = fine.par_iter().map(|v| coarser(v, side)).collect();
-        let candidates = self.ablation.candidates(candidates);
         search(fine, &coarse, &candidates, None, &rules, seed)
     }
 
@@ -128,7 +127,6 @@ impl Survey {
             candidates.retain(variance::beyond_sigma);
         }
         let data = self.variance_data();
-        let candidates = self.ablation.candidates(candidates);
         let refits = refit.is_some();
         let rules = self.variance_rules(level);
         let mut found = search(&data, &data, &candidates, refit, &rules, seed);
