@@ -241,8 +241,7 @@ impl Case<'_> {
         let bias = || {
             let candidates = bias::candidates(&bounds);
             let rules = survey.bias_rules(camera, level);
-            let excess = self.excess_of_rows(&measured.structure, &measured.textures);
-            let excess: Vec<f64> = excess.into_iter().map(|[of_mean, _]| of_mean).collect();
+            let excess = self.excess_of_mean(measured);
             few_views(mean, &survey.mean_data(), &candidates, outcomes[0], &rules, &excess, seed)
         };
         let variance = || {

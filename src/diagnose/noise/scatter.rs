@@ -6,7 +6,7 @@ use super::texture_finding::TextureFinding;
 use super::{ROW_NOISE, texture_findings, window};
 use crate::diagnose::against::noise::{NAMED_LEVEL, NoiseParts};
 use crate::diagnose::case::{Case, MeanResult};
-use crate::diagnose::finding::pixels::{Whitener, common, measure_tails, terms_of};
+use crate::diagnose::finding::pixels::{Whitener, common, fixed_px2, measure_tails, terms_of};
 use crate::diagnose::search::outcome::Outcome;
 use crate::diagnose::steps::{Steps, forget_windows, own_step};
 use crate::terms::{Axis, Basis, PixelContext, Statistic, Term};
@@ -123,6 +123,16 @@ impl Case<'_> {
         views
             .map(|(s, v)| if alike { s.excess_of_rows(&v.correlation) } else { [1.0; 2] })
             .collect()
+    }
+
+    /// How many times less sure the mean of each view is than its samples say: of rows that err as one, and of
+    /// a pattern that all views show.
+    pub fn excess_of_mean(&self, measured: &ScatterResult) -> Vec<f64> {
+        let of_rows = self.excess_of_rows(&measured.structure, &measured.textures).into_iter();
+        let (px2, n) = (fixed_px2(&measured.structure), measured.structure.len() as f64);
+        let views = measured.structure.iter().zip(&self.survey.views);
+        let of_pattern = views.map(|(s, v)| s.excess_of_pattern(px2, v.frames, n, &v.correlation));
+        of_rows.zip(of_pattern).map(|([of_rows, _], of_pattern)| of_rows * of_pattern).collect()
     }
 
     /// A refit that makes sigma much smaller somewhere rests on noise that steps have swallowed, or

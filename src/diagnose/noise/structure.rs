@@ -73,6 +73,19 @@ impl Structure {
             1.0 + along * shared * shared / correlation.sum_of_squares.max(1.0),
         ]
     }
+
+    /// How many times the variance of a mean of this and other `views` exceeds what each alone says, where their
+    /// pixels have this error in common; `frames` are worth one noise each.
+    pub fn excess_of_pattern(
+        &self,
+        px2: f64,
+        frames: f64,
+        views: f64,
+        correlation: &Correlation,
+    ) -> f64 {
+        let own = correlation.sum.max(1.0) * (self.variance_px2 - px2).max(0.0) / frames;
+        1.0 + (views - 1.0) * px2 / (own + px2).max(1e-12)
+    }
 }
 
 /// Frame by frame, the mean residual of the target.
@@ -244,5 +257,32 @@ mod tests {
         }
         let none = Structure { row_px2: Some(-1e-4), ..s };
         assert_eq!(none.excess_of_rows(&Correlation::white()), [1.0; 2]);
+    }
+
+    /// Means over six views whose pixels have an error in common, by simulation: 5,000 of them scatter as
+    /// said to 4 %, twice what such a scatter errs by.
+    #[test]
+    fn views_with_a_pattern_in_common_are_worth_fewer() {
+        const VIEWS: usize = 6;
+        const FRAMES: usize = 4;
+        const PATTERN_PX: f64 = 0.4;
+        let mut rng = Seed(5).stream("structure/pattern");
+        let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
+        let (mut together, mut each) = (0.0, 0.0);
+        for _ in 0..5000 {
+            let pattern = PATTERN_PX * draw();
+            let views: Vec<f64> =
+                (0..VIEWS).map(|_| pattern + draw() / (FRAMES as f64).sqrt()).collect();
+            together += views.iter().sum::<f64>().powi(2) / VIEWS as f64;
+            each += views.iter().map(|x| x * x).sum::<f64>() / VIEWS as f64;
+        }
+        let s = Structure { variance_px2: 1.0 + PATTERN_PX.powi(2), ..Structure::default() };
+        let said = s.excess_of_pattern(
+            PATTERN_PX.powi(2),
+            FRAMES as f64,
+            VIEWS as f64,
+            &Correlation::white(),
+        );
+        assert!((said / (together / each) - 1.0).abs() < 0.04, "{said}, {}", together / each);
     }
 }

@@ -166,7 +166,7 @@ impl<'a> Views<'a> {
 }
 
 /// The strongest such cause beside what all views share, if noise does not bring as much; `excess` is how
-/// many times less sure each view is than its samples say, where whole lines err alike.
+/// many times less sure each view is than its samples say, where lines or views err alike.
 pub fn few_views(
     scene: &Scene<'_>,
     fine: &[ViewData],

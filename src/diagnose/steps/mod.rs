@@ -205,7 +205,12 @@ pub(in crate::diagnose) fn steps(
             parameters: one("step_px", step, error),
             p_adjusted: lattice.disparity_p,
             replicated: replicated(|l| l.disparity_step_px),
-            ..found("disparity-quantisation", Axis::DisparityPhase, size, step_nats(fields, |_| step))
+            ..found(
+                "disparity-quantisation",
+                Axis::DisparityPhase,
+                size,
+                step_nats(fields, |_| step),
+            )
         })
     });
     let of_depth = lattice.depth_step_m.filter(|_| !known.has("depth-rounding"));
