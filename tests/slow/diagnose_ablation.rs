@@ -9,10 +9,11 @@ use kinoise::io::{Assumed, open};
 use kinoise::measure::MeasureOptions;
 use kinoise::{NoiseModel, Seed};
 use serde_json::{Value, json};
+use tempfile::{TempDir, tempdir_in};
 
 use crate::rays::{edit, repaint};
 use crate::raytraced::conceal;
-use crate::raytraced::question::{Asked, Cell, ConcealedSet, World};
+use crate::raytraced::question::{Asked, Cell, World};
 
 fn asked(cell: Cell, name: &str, nats: Option<f64>, seed: u64) -> Asked {
     let names = if name.is_empty() { Vec::new() } else { vec![name.to_string()] };
@@ -28,36 +29,28 @@ fn said(folder: &Path, ablation: Ablation) -> Value {
     serde_json::to_value(&done.diagnosis).expect("JSON")
 }
 
-/// A set, and what is concealed in it.
-struct Taken {
-    folder: tempfile::TempDir,
-    set: Box<dyn ConcealedSet>,
+/// The folder of a set.
+fn taken(asked: &Asked) -> TempDir {
+    let folder = tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder");
+    conceal(asked).expect("a set").write(folder.path()).expect("written");
+    folder
 }
 
-impl Taken {
-    fn of(asked: &Asked) -> Self {
-        let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder");
-        let set = conceal(asked).expect("a set");
-        set.write(folder.path()).expect("written");
-        Taken { folder, set }
-    }
-}
-
-fn alarms(sets: &[Taken], ablation: Ablation) -> usize {
-    let of = |set: &&Taken| said(set.folder.path(), ablation)["verdict"] == "mismatch";
+fn alarms(sets: &[TempDir], ablation: Ablation) -> usize {
+    let of = |set: &&TempDir| said(set.path(), ablation)["verdict"] == "mismatch";
     let count = sets.iter().filter(of).count();
     println!("{ablation:?}: {count} of {} clean sets are called a mismatch", sets.len());
     count
 }
 
 /// Clean sets whose noise hangs together over seven pixels or more, as the model knows.
-fn correlated() -> Vec<Taken> {
+fn correlated() -> Vec<TempDir> {
     let wide = |asked: &Asked| {
         let base = conceal(asked).expect("a set").truth().base;
         base["known"][0]["parameters"]["length_px"].as_f64().is_some_and(|px| px > 6.5)
     };
     let sets = (1..).map(|seed| asked(Cell::Null, "", None, seed)).filter(wide);
-    sets.take(6).map(|a| Taken::of(&a)).collect()
+    sets.take(6).map(|a| taken(&a)).collect()
 }
 
 /// At 5 % a set the engine proper is wrong on two or more of six in 3 % of trials.
@@ -79,10 +72,10 @@ fn doubled_pixels_do_not_raise_confidence() {
     let name = "radial-disparity-bias";
     let clean = (4..=8).map(|seed| asked(Cell::Null, "", None, seed));
     for asked in clean.chain([asked(Cell::Single, name, Some(60.0), 4)]) {
-        let set = Taken::of(&asked);
-        let before = said(set.folder.path(), Ablation::None);
-        double(set.folder.path());
-        let after = said(set.folder.path(), Ablation::None);
+        let set = taken(&asked);
+        let before = said(set.path(), Ablation::None);
+        double(set.path());
+        let after = said(set.path(), Ablation::None);
         println!("{:?} {}: {} then {}", asked.names, asked.seed, summary(&before), summary(&after));
         let (old, new) = (others(&before), others(&after));
         assert!(new.len() <= old.len(), "{old:?} but {new:?} with pixels that were copied");

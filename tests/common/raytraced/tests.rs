@@ -62,7 +62,7 @@ fn a_board_is_a_plane_and_noise_as_large_as_the_unit_says() {
         squares += ((f64::from(noisy[i]) - z) / sigma.sigma(z, plan.stage.theta)).powi(2);
     }
     // Ten thousand pixels at least: four standard errors.
-    assert!((squares / n - 1.0f64).abs() < 4.0 * (2.0 / n as f64).sqrt(), "{squares} of {n}");
+    assert!((squares / n - 1.0f64).abs() < 4.0 * (2.0 / n).sqrt(), "{squares} of {n}");
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn every_cause_changes_what_it_should_and_nothing_else() {
         let with = held(&set);
         let cause = set.causes.remove(0);
         let without = held(&set);
-        assert_eq!(cause.label.names.first().is_some(), CATALOGUE.contains(name));
+        assert_eq!(!cause.label.names.is_empty(), CATALOGUE.contains(name));
         let pixels = |of: fn(&Pixel) -> u32| {
             let pairs = with.iter().zip(&without).flat_map(|(a, b)| a.0.iter().zip(&b.0));
             pairs.into_iter().any(|(a, b)| of(a) != of(b))
