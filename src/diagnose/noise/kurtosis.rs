@@ -20,9 +20,10 @@ const GAUSSIAN_FOURTH: f64 = 2.997_52;
 /// Pixels so far apart, px, share the size of the noise and little of its errors; what they share is
 /// taken off.
 const APART_PX: usize = 8;
-/// Pairs that share more tell nothing: the patch then holds too few errors to have a size of its own, and of 7
-/// clean recordings with windows of 14 px three had an excess of .04; of 23 with narrower ones none.
-const MAX_SHARED: f64 = 0.35;
+/// Pairs that share more than this, all directions together, tell nothing: a patch then holds too few errors to
+/// have a size of its own. Of 7 clean recordings with windows of 14 px (.29) three had an excess of .04; of 23 with
+/// narrower ones (12 px: .20) none.
+const MAX_SHARED: f64 = 0.25;
 /// Along rows, columns and both: noise is correlated by another rho in each.
 const DIRECTIONS: [[usize; 2]; 3] = [[APART_PX, 0], [0, APART_PX], [APART_PX, APART_PX]];
 
@@ -86,10 +87,11 @@ impl FourthMoment {
 
     /// Excess kurtosis, where enough was looked at and neighbours share little.
     pub fn excess(&self) -> Option<f64> {
+        let rho = |s: &PairSums| s.products / s.pairs;
+        let shared = self.0.iter().map(rho).sum::<f64>() / self.0.len() as f64;
         let of = |s: &PairSums| {
-            let rho = s.products / s.pairs;
-            let uneven = s.products_of_squares / s.pairs / (1.0 + 2.0 * rho * rho);
-            (s.pairs >= FEWEST_READINGS && rho < MAX_SHARED)
+            let uneven = s.products_of_squares / s.pairs / (1.0 + 2.0 * rho(s).powi(2));
+            (s.pairs >= FEWEST_READINGS && shared < MAX_SHARED)
                 .then(|| s.fourth / s.pairs - GAUSSIAN_FOURTH - 3.0 * (uneven - 1.0))
         };
         let all: Option<Vec<f64>> = self.0.iter().map(of).collect();
