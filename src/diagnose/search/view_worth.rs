@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 use super::prepared::without;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::samples::ViewData;
+use crate::diagnose::views::surveyed_view::SurveyedView;
 use crate::stats::quantile;
 use crate::terms::Basis;
 
@@ -26,9 +27,11 @@ const MIN_FREE: f64 = 8.0;
 const SLIGHT: f64 = 1e-6;
 
 /// How many times surer each view's mean is if its noise is as it usually is than by its own measure,
-/// which takes a cause that the others do not have for noise; 1 where they agree.
+/// which takes a cause that the others do not have for noise; 1 where they agree. Noise that the view's
+/// frames show is no such cause.
 pub fn doubted(survey: &Survey) -> Vec<f64> {
-    doubts(&survey.views.iter().map(|v| v.inflation).collect::<Vec<f64>>())
+    let beside_noise = |v: &SurveyedView| v.inflation / v.noise_by_frames().max(1.0);
+    doubts(&survey.views.iter().map(beside_noise).collect::<Vec<f64>>())
 }
 
 fn doubts(inflations: &[f64]) -> Vec<f64> {

@@ -101,6 +101,13 @@ impl SurveyedView {
         self.tiles.iter().map(|t| self.weight(t)).sum()
     }
 
+    /// Variance of a pixel between frames over the model's; 1 where there are no frames to compare.
+    pub fn noise_by_frames(&self) -> f64 {
+        let sum = |of: fn(&Tile) -> f64| self.tiles.iter().map(|t| t.pixels * of(t)).sum::<f64>();
+        let ratio = sum(|t| t.temporal) / sum(|t| t.variance);
+        if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 }
+    }
+
     /// Raise the weight of all tiles together to at least this, and take its correlation over. Two runs'
     /// inflations do not compare: each is relative to its own sigma.
     pub fn weigh_more(&mut self, (weight, correlation): (f64, Correlation)) {
