@@ -70,10 +70,10 @@ impl Case<'_> {
             (p < level).then_some(Finding { share, size, p_adjusted: Some(p), ..finding })
         };
         let steps = contradicted(&self.fields, &self.known, self.recording).into_iter();
-        let steps = steps.map(|(id, axis, sigma, nats)| Finding {
-            share: nats,
-            size: Size { mm: sigma * sigma_mm, sigma },
-            ..finding(&self.known, id, Statistic::Distribution, axis)
+        let steps = steps.map(|c| Finding {
+            share: c.nats,
+            size: c.size,
+            ..finding(&self.known, c.id, Statistic::Distribution, c.axis)
         });
         claims.filter_map(told).chain(steps).collect()
     }

@@ -117,30 +117,44 @@ pub(in crate::diagnose) fn forget_windows(
     }
 }
 
-/// Steps that the model has and the words do not lie on: each with its axis, and the error that it
-/// would make in sigmas and is worth in nats.
+/// A step of the model that the words do not lie on.
+pub(in crate::diagnose) struct Contradicted {
+    pub id: &'static str,
+    pub axis: Axis,
+    /// Of the error that it would make, and what that is worth.
+    pub size: Size,
+    pub nats: f64,
+}
+
 pub(in crate::diagnose) fn contradicted(
     fields: &[Field],
     known: &KnownTerms,
     recording: &Recording,
-) -> Vec<(&'static str, Axis, f64, f64)> {
+) -> Vec<Contradicted> {
     let mut words = RawHistogram::none();
     fields.iter().for_each(|f| words.merge(&f.words));
     let (sigma_px, sigma_mm) = (typical_sigma_px(fields), typical_sigma_mm(fields));
     let sensor = &recording.sensor;
+    let size = |sigma: f64| Size { mm: sigma * sigma_mm, sigma };
     let disparity = known.parameter("disparity-quantisation", "step_px").and_then(|step| {
         let lies = words.on_disparities(step, sensor, fields[0].scale_px_m)?;
-        let sigma = step / 12f64.sqrt() / sigma_px;
-        let nats = step_nats(fields, |_| step);
-        (!lies).then_some(("disparity-quantisation", Axis::DisparityPhase, sigma, nats))
+        (!lies).then(|| Contradicted {
+            id: "disparity-quantisation",
+            axis: Axis::DisparityPhase,
+            size: size(step / 12f64.sqrt() / sigma_px),
+            nats: step_nats(fields, |_| step),
+        })
     });
     let depth = known.parameter("depth-rounding", "step_m").and_then(|step| {
         let lies = words.on_depths(step, sensor)?;
-        let sigma = 1e3 * step / 12f64.sqrt() / sigma_mm;
-        let nats = step_nats(fields, |z| step * fields[0].scale_px_m / (z * z));
-        (!lies).then_some(("depth-rounding", Axis::Z, sigma, nats))
+        (!lies).then(|| Contradicted {
+            id: "depth-rounding",
+            axis: Axis::Z,
+            size: size(1e3 * step / 12f64.sqrt() / sigma_mm),
+            nats: step_nats(fields, |z| step * fields[0].scale_px_m / (z * z)),
+        })
     });
-    disparity.into_iter().chain(depth).filter(|(_, _, sigma, _)| *sigma > STEP_SHARE).collect()
+    disparity.into_iter().chain(depth).filter(|c| c.size.sigma > STEP_SHARE).collect()
 }
 
 /// A step is worth telling when the error it makes is this share of the noise in some view; that a model
