@@ -65,8 +65,7 @@ fn without_correlation_or_calibrated_thresholds_clean_sets_cry_wolf() {
     }
 }
 
-/// Every pixel four times, by a camera of twice the resolution: the same measurements. That they
-/// hang together now is so, and may be said.
+/// That they hang together is so, and may be said.
 #[test]
 fn doubled_pixels_do_not_raise_confidence() {
     let name = "radial-disparity-bias";
@@ -97,7 +96,7 @@ fn others(diagnosis: &Value) -> Vec<(String, f64)> {
 
 /// Every pixel four times, by a camera of twice the resolution: the same measurements, each moved
 /// along the target to where its copy looks (a copy left where it was lies off the slope, as a
-/// sensor with lateral noise measures). That they hang together now is so, and may be said.
+/// sensor with lateral noise measures).
 fn double(folder: &Path) {
     let recording = folder.join("recording");
     let opened = open(&recording, &Assumed::default()).expect("a recording");

@@ -47,9 +47,10 @@ fn what_is_printed_of_every_named_finding_simulates() {
         let id = effect.card().id;
         for finding in findings(Active::typical(id).expect("known")) {
             let named = matches!(finding.status, Status::Named | Status::OneOf);
-            // A cause of a few views is told without a strength.
-            let told = named && !finding.parameters.is_empty();
-            let Some(name) = finding.effect.filter(|_| told) else { continue };
+            // What a few views have is told without a strength.
+            let of_few =
+                finding.shape.as_deref().is_some_and(|s| s.starts_with("only in the views"));
+            let Some(name) = finding.effect.filter(|_| named && !of_few) else { continue };
             let printed = finding.as_effect().map(|a| a.argument());
             println!("{id}: {name}: {printed:?}");
             let Some(Ok(read)) = printed.as_deref().map(Active::parse) else {

@@ -30,7 +30,8 @@ const SLIGHT: f64 = 1e-6;
 /// which takes a cause that the others do not have for noise; 1 where they agree. Noise that the view's
 /// frames show is no such cause.
 pub fn doubted(survey: &Survey) -> Vec<f64> {
-    let beside_noise = |v: &SurveyedView| v.inflation / v.noise_by_frames().max(1.0);
+    let beside_noise =
+        |v: &SurveyedView| v.inflation / v.noise_by_frames().map_or(1.0, |r| r.max(1.0));
     doubts(&survey.views.iter().map(beside_noise).collect::<Vec<f64>>())
 }
 

@@ -151,7 +151,7 @@ pub(in crate::diagnose) fn contradicted(
             id: "depth-rounding",
             axis: Axis::Z,
             size: size(1e3 * step / 12f64.sqrt() / sigma_mm),
-            nats: step_nats(fields, |z| step * fields[0].scale_px_m / (z * z)),
+            nats: step_nats(fields, in_px(step, fields)),
         })
     });
     disparity.into_iter().chain(depth).filter(|c| c.size.sigma > STEP_SHARE).collect()
@@ -160,6 +160,12 @@ pub(in crate::diagnose) fn contradicted(
 /// A step is worth telling when the error it makes is this share of the noise in some view; that a model
 /// has one which the words contradict, when it is this share of the usual noise.
 const STEP_SHARE: f64 = 0.1;
+
+/// A step of the depth, m, as one of the disparity at a depth, px.
+fn in_px(step_m: f64, fields: &[Field]) -> impl Fn(f64) -> f64 + use<> {
+    let scale_px_m = fields[0].scale_px_m;
+    move |z| step_m * scale_px_m / (z * z)
+}
 
 /// The variance that a step adds in each view, as a share of its noise's; `px` is the step at a depth, px.
 fn added(fields: &[Field], px: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
@@ -231,8 +237,8 @@ pub(in crate::diagnose) fn steps(
     let of_depth = of_depth.and_then(|step| {
         let mm = 1e3 * step / 12f64.sqrt();
         let size = Size { mm, sigma: mm / sigma_mm };
-        let px = |z: f64| step * fields[0].scale_px_m / (z * z);
-        (strongest(fields, px) > STEP_SHARE).then(|| Finding {
+        let px = in_px(step, fields);
+        (strongest(fields, &px) > STEP_SHARE).then(|| Finding {
             interval: crate::stats::range(fields.iter().map(|f| f.plane.depth(0.0, 0.0))),
             parameters: one("step_m", step, 0.0),
             p_adjusted: lattice.depth_p,

@@ -101,11 +101,13 @@ impl SurveyedView {
         self.tiles.iter().map(|t| self.weight(t)).sum()
     }
 
-    /// Variance of a pixel between frames over the model's; 1 where there are no frames to compare.
-    pub fn noise_by_frames(&self) -> f64 {
-        let sum = |of: fn(&Tile) -> f64| self.tiles.iter().map(|t| t.pixels * of(t)).sum::<f64>();
-        let ratio = sum(|t| t.temporal) / sum(|t| t.variance);
-        if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 }
+    /// Variance of a pixel's noise, as its frames differ, over the model's; `None` where no frames tell. Tiles of
+    /// which the model says nothing have no say.
+    pub fn noise_by_frames(&self) -> Option<f64> {
+        let told = || self.tiles.iter().filter(|t| t.temporal.is_finite());
+        let sum = |of: fn(&Tile) -> f64| told().map(|t| t.pixels * of(t)).sum::<f64>();
+        let ratio = self.between_frame_factor? * sum(|t| t.temporal) / sum(|t| t.variance);
+        (ratio > 0.0).then_some(ratio)
     }
 
     /// Raise the weight of all tiles together to at least this, and take its correlation over. Two runs'
@@ -248,6 +250,17 @@ mod tests {
         for (before, after) in before.iter().zip(&after) {
             approx::assert_relative_eq!(before - after, 2f64.ln(), epsilon = 1e-12);
         }
+    }
+
+    /// Twice the model's variance, as four frames show it, and a tile beyond the model.
+    #[test]
+    fn frames_tell_the_noise_where_the_model_says_something() {
+        let mut view = SurveyedView { between_frame_factor: Some(4.0 / 3.0), ..view() };
+        view.tiles_mut().for_each(|(_, t)| t.temporal = 0.75 * 2.0 * t.variance);
+        view.tiles_mut().take(1).for_each(|(_, t)| t.temporal = f64::NAN);
+        approx::assert_relative_eq!(view.noise_by_frames().expect("noise"), 2.0, epsilon = 1e-9);
+        view.between_frame_factor = None;
+        assert_eq!(view.noise_by_frames(), None);
     }
 
     /// Planes alone leave of it what a bowl would be: a nat in each view, and views add up.
