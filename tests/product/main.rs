@@ -44,6 +44,7 @@ mod model_file;
 mod other_views;
 mod outliers;
 mod pages;
+mod ranges;
 mod room;
 mod round_trips;
 mod schema;

@@ -89,8 +89,12 @@ fn bits(residuals: &[f32]) -> Vec<u32> {
 /// Views that can be used, and those that cannot.
 type Read = (Vec<Field>, Vec<Excluded>);
 
+/// By the exact test of McNemar, below this ranges are the better reading: five views that are flat
+/// so, and none that are flat as depths alone. Nothing else we know of makes a plane of what is none.
+const RANGES_LEVEL: f64 = 0.05;
+
 /// Do the views become flat once their words are taken for lengths of rays? Then with them, and with
-/// the chance of it were either reading as good as the other (the exact test of McNemar).
+/// the chance of it were either reading as good as the other.
 fn as_ranges(
     recording: &Recording,
     bench: &Workbench<'_>,
@@ -98,23 +102,25 @@ fn as_ranges(
     known: &KnownTerms,
     as_depths: &[Field],
 ) -> Option<(Read, f64)> {
-    let flat = as_depths.len();
-    if 2 * flat >= recording.views.len() || known.has("range-not-depth") {
+    let chance = |won: u64, lost: u64| {
+        Binomial::new(0.5, won + lost).map_or(1.0, |b| b.pmf(won) + b.sf(won))
+    };
+    let refused = (recording.views.len() - as_depths.len()) as u64;
+    if chance(refused, 0) > RANGES_LEVEL || known.has("range-not-depth") {
         return None;
     }
     let bench = Workbench { ranges: true, ..Workbench::new(bench.sensor, bench.options) };
     let mut told = known.clone();
     told.bias.push(range_term());
     let (fields, excluded) = read(recording, &bench, model, &told, &|_, _| ());
-    if fields.len() < FEWEST_VIEWS || fields.len() <= 2 * flat {
+    if fields.len() < FEWEST_VIEWS {
         return None;
     }
     let only = |these: &[Field], those: &[Field]| {
         these.iter().filter(|f| those.iter().all(|g| g.name != f.name)).count() as u64
     };
-    let (won, lost) = (only(&fields, as_depths), only(as_depths, &fields));
-    let p = Binomial::new(0.5, won + lost).map_or(1.0, |b| b.pmf(won) + b.sf(won));
-    Some(((fields, excluded), p))
+    let p = chance(only(&fields, as_depths), only(as_depths, &fields));
+    (p <= RANGES_LEVEL).then_some(((fields, excluded), p))
 }
 
 fn range_term() -> Term {
