@@ -39,7 +39,8 @@ pub struct Columns {
 }
 
 impl Columns {
-    pub fn of(chosen: &[Chosen], camera: &Camera) -> Self {
+    /// Of terms that were chosen where all samples together weighed `weight`, 1/px^2.
+    pub fn of(chosen: &[Chosen], camera: &Camera, weight: f64) -> Self {
         let rays = camera.rays();
         let pixels = Pixels::new(camera, &rays, 1.0);
         let bases: Vec<Basis> = chosen.iter().map(|c| c.candidate.basis.clone()).collect();
@@ -49,8 +50,12 @@ impl Columns {
         let map = |times| Basis::Spline { width, height, across, down, times };
         let maps = [map(Modulation::One), map(Modulation::DisparitySquared)];
         let precision = |c: &Chosen| -> Vec<f64> {
-            let coefficients = 0..c.candidate.basis.count();
-            coefficients.map(|k| c.candidate.usual(k).powi(-2)).collect()
+            let n = c.candidate.basis.count();
+            // No node of a curve without a name says more than the whole of it did, beyond the terms before it:
+            // so it is the rest of a named shape over the same axis.
+            let informed = weight / (2.0 * c.gain * n as f64);
+            let nameless = Some(informed).filter(|_| c.candidate.family.is_none() && c.gain > 0.0);
+            (0..n).map(|k| nameless.unwrap_or_else(|| c.candidate.usual(k).powi(-2))).collect()
         };
         let gauges: Vec<Option<Gauge>> = bases.iter().map(|b| Gauge::of(b, &pixels)).collect();
         let (terms, nodes) = (bases.iter().map(Basis::count).sum(), 2 * across * down);

@@ -56,7 +56,8 @@ pub fn refit(
             view
         })
         .collect();
-    let columns = Columns::of(&found.chosen, camera);
+    let weight = data.iter().flat_map(|view| &view.weight).sum();
+    let columns = Columns::of(&found.chosen, camera, weight);
     let joint = Joint::of(&columns, &data, second);
     match joint.settle(&found.chosen) {
         Some(settled) => joint.posterior(second, &settled, &found, camera).unwrap_or(found),

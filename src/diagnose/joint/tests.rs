@@ -236,7 +236,7 @@ fn what_is_left_of_a_view_is_its_score_less_what_the_fit_takes() {
     };
     let [inverse, square] = [-1.0, 2.0].map(|power| curve(Modulation::still(power)));
     let chosen = [bowl, square.clone(), inverse, square].map(|basis| term(None, basis));
-    let columns = Columns::of(&chosen, &kinect_v1(4).camera);
+    let columns = Columns::of(&chosen, &kinect_v1(4).camera, 1.0);
     // What planes absorb is taken out of the sums, or of every row.
     let fill = |i: usize, row: &mut [f64]| columns.fill(&data[5].places[i], row);
     let rows = data[5].rows(&data[5].response).unwrap();
@@ -260,4 +260,26 @@ fn what_is_left_of_a_view_is_its_score_less_what_the_fit_takes() {
         let expected = &whole.b - &whole.a * &beta;
         assert!((left - &expected).norm() < 1e-9 * expected.norm(), "view {v}");
     }
+}
+
+/// A curve with a node to every other column can say all that bands can: it is their rest, and takes
+/// neither their size nor their name.
+#[test]
+fn a_curve_beside_bands_is_their_rest() {
+    const PERIOD_PX: f64 = 23.0;
+    let bands = |p: &PixelContext| {
+        let share = p.u / PERIOD_PX;
+        0.08 * (share.round() - share)
+    };
+    let data = session([0.8, 3.0], &mut Seed(9).stream("joint/bands"), bands);
+    let over = Coordinate::Column;
+    let curve = Basis::Curve { over, low: 0.0, high: 160.0, nodes: 72, times: Modulation::One };
+    let waves = Basis::waves(over, PERIOD_PX, 2);
+    let named = Chosen { gain: 1500.0, ..term(Some("column-banding"), waves) };
+    let outcome = fitted(&data, vec![named, Chosen { gain: 100.0, ..term(None, curve) }]);
+    assert_eq!(outcome.chosen[0].candidate.family, Some("column-banding"));
+    let (told, mut row) = (terms_of(&outcome, Statistic::Bias), Vec::new());
+    let mut at = |u: f64| told[0].value(&PixelContext { u, ..Default::default() }, &mut row);
+    let height = (0..160).map(|u| at(f64::from(u)).abs()).fold(0.0, f64::max);
+    assert!((0.03..0.05).contains(&height), "{height}");
 }
