@@ -5,7 +5,7 @@ use crate::terms::{Axis, Basis};
 /// What a nameless curve looks like.
 pub fn words(basis: &Basis, beta: &[f64]) -> String {
     match basis {
-        Basis::Ring { period, over, .. } => {
+        Basis::Ring { period, over, .. } | Basis::Waves { period, over, .. } => {
             let axis = over.axis();
             if matches!(basis.axis(), Axis::DisparityPhase) {
                 format!("periodic in the disparity, period {period:.3} px")
@@ -22,16 +22,24 @@ pub fn words(basis: &Basis, beta: &[f64]) -> String {
         }
         Basis::Curve { low, high, nodes, .. } => {
             if *nodes == 2 {
-                return format!("a step at {:.4}", 0.5 * (low + high));
+                return format!("a step at {}", place(0.5 * (low + high), basis.axis()));
             }
-            let at = |k: usize| low + (high - low) * k as f64 / (nodes - 1) as f64;
+            let at = |k: f64| place(low + (high - low) * k / (nodes - 1) as f64, basis.axis());
             curve(beta, &at)
         }
-        _ => "of its family's shape, but not where the family puts it".into(),
+        // A named cause's formula that lost its name.
+        _ => "of a shape that the catalogue has, on which the views do not agree".into(),
     }
 }
 
-fn curve(beta: &[f64], at: &dyn Fn(usize) -> f64) -> String {
+/// A place on an axis to three digits, with its unit.
+pub fn place(value: f64, axis: Axis) -> String {
+    let decimals = (2.0 - value.abs().max(1e-2).log10().floor()).clamp(0.0, 4.0) as usize;
+    format!("{} {}", crate::units::decimals(value, decimals), axis.unit()).trim_end().to_string()
+}
+
+/// `at` says where the k-th node is.
+fn curve(beta: &[f64], at: &dyn Fn(f64) -> String) -> String {
     let n = beta.len();
     let [low, high] = crate::stats::range(beta.iter().copied());
     let height = high - low;
@@ -63,7 +71,7 @@ fn curve(beta: &[f64], at: &dyn Fn(usize) -> f64) -> String {
     };
     if net > 0.7 * height && walked < 1.6 * height {
         if size > 0.6 * height {
-            return format!("a step at {:.4}", 0.5 * (at(jump) + at(jump + 1)));
+            return format!("a step at {}", at(jump as f64 + 0.5));
         }
         let rising = beta[n - 1] > beta[0];
         return format!("monotone, {}", if rising { "rising" } else { "falling" });
@@ -76,7 +84,7 @@ fn curve(beta: &[f64], at: &dyn Fn(usize) -> f64) -> String {
         if far(k) > far(best) { k } else { best }
     });
     let kind = if beta[top] > 0.5 * (beta[0] + beta[n - 1]) { "bump" } else { "dip" };
-    format!("a {kind} at {:.4}", at(top))
+    format!("a {kind} at {}", at(top as f64))
 }
 
 #[cfg(test)]
@@ -93,10 +101,10 @@ mod tests {
 
     #[test]
     fn curves_are_told_by_their_shape() {
-        assert!(of(|x| f64::from(x > 0.5)).starts_with("a step at 0.5"));
+        assert_eq!(of(|x| f64::from(x > 0.5)), "a step at 0.500 px");
         assert_eq!(of(|x| x * x), "monotone, rising");
         assert_eq!(of(|x| -x), "monotone, falling");
-        assert!(of(|x| (-(x - 0.4f64).powi(2) / 0.01).exp()).starts_with("a bump at 0.4"));
+        assert!(of(|x| (-(x - 0.4f64).powi(2) / 0.01).exp()).starts_with("a bump at 0.400 px"));
         assert!(of(|x| (20.0 * x).sin()).starts_with("wavy"));
     }
 }

@@ -41,7 +41,11 @@ fn unsettled(diagnosis: &Diagnosis) -> bool {
 fn of(f: &Finding) -> String {
     let smooth = |b: &Basis| matches!(b, Basis::Spline { .. } | Basis::Map { .. });
     let and_rest = f.effect.is_some() && f.terms.iter().any(|t| smooth(&t.basis));
-    let rest = if and_rest { " and a smooth rest of it that no formula follows" } else { "" };
+    let rest = match &f.shape {
+        _ if and_rest => " and a smooth rest of it that no formula follows".to_string(),
+        Some(shape) if f.effect.is_none() && f.contradicted.is_none() => format!(" ({shape})"),
+        _ => String::new(),
+    };
     let size = match f.statistic {
         Statistic::Dropout => match fixed(100.0 * f.size.sigma, 1) {
             few if few == "0.0" => Some("less than 0.1 % of the pixels lost".to_string()),
