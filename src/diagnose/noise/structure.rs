@@ -9,12 +9,13 @@ use super::pairs::Pairs;
 use super::still::{KeptPattern, Still, beside_bias, still};
 use super::tail_counts::{FEWEST_READINGS, TailCounts};
 use super::texture::{
-    FAR, Filled, LONG_LINE, PROFILE_LAGS, SHORT_LINE, changes, covariance, frame_log_variance,
-    high_passed, moving, same_pixel, without_lines, without_outliers,
+    FAR, Filled, PROFILE_LAGS, SHORT_LINE, changes, covariance, frame_log_variance, high_passed,
+    moving, same_pixel, without_lines, without_outliers,
 };
+use super::window::area;
 use crate::diagnose::options::FRAMES_KEPT;
 use crate::diagnose::views::field::Field;
-use crate::stats::{Correlation, mean, measure_correlation};
+use crate::stats::{Correlation, mean};
 
 /// What one view tells; `None` where it cannot.
 #[derive(Debug, Clone, Default)]
@@ -114,10 +115,6 @@ pub fn structures(fields: &[Field], bias: &[Vec<f32>], kept: &KeptPattern) -> Ve
     all
 }
 
-/// Of the noise, what rows or columns share is taken out whole from here on: the mean of 30 pixels of a
-/// Kinect's window, 9 px, errs by three tenths of the rest, which is less.
-const LARGE_SHARE: f64 = 0.25;
-
 fn structure(field: &Field, bias: &[f32]) -> Structure {
     let mut s = Structure::default();
     let frames: Vec<Vec<f32>> =
@@ -138,24 +135,13 @@ fn structure(field: &Field, bias: &[f32]) -> Structure {
     if let Some(pairs) = pairs.filter(|p| !p.is_empty()) {
         let all = |of: fn(&Pairs) -> Option<f64>| mean(pairs.iter().filter_map(of));
         (s.row_px2, s.column_px2) = (all(|p| p.row), all(|p| p.column));
-        s.neighbour_correlation = all(|p| Some(p.near / p.power.max(1e-12)));
+        s.neighbour_correlation = all(|p| Some(p.near / beside_lines(p.power, [p.row, p.column])));
         s.correlation_profile =
             correlation_profile(&changes(&frames), field.width, [s.row_px2, s.column_px2]);
     }
-    // What whole rows share is no window's: it stands in the correlation at every lag.
     let share = |px2: Option<f64>| (px2.unwrap_or(0.0) / s.variance_px2.max(1e-12)).max(0.0);
     let shares = [share(s.row_px2), share(s.column_px2)];
-    let is_large = shares.iter().any(|share| *share > LARGE_SHARE);
-    let least = if is_large { SHORT_LINE } else { LONG_LINE };
-    let lines = without_lines(&moving(&frames, s.lagged[0]), field.width, least);
-    let correlation = measure_correlation(&lines, field.width);
-    let along = |correlation_profile: &[f64], share: f64| {
-        let share = if is_large { 0.0 } else { share };
-        let left = |rho: &f64| ((rho - share) / (1.0 - share).max(0.1)).max(0.0);
-        1.0 + 2.0 * correlation_profile[1..].iter().map(left).filter(|r| *r > 0.05).sum::<f64>()
-    };
-    // A box of L px has a correlation sum of L along each axis.
-    let window = along(&correlation.along_u, shares[0]) * along(&correlation.along_v, shares[1]);
+    let window = area(&moving(&frames, s.lagged[0]), field.width, shares);
     s.window_px = Some(window.sqrt());
     s.jitter = jitter(field, &s, window);
     s
@@ -195,6 +181,12 @@ fn jitter(field: &Field, s: &Structure, correlation_sum: f64) -> Option<Jitter> 
     })
 }
 
+/// What is left of the `power` without what rows and columns share, px^2.
+fn beside_lines(power: f64, lines: [Option<f64>; 2]) -> f64 {
+    let shared: f64 = lines.iter().flatten().map(|px2| px2.max(0.0)).sum();
+    (power - shared).max(1e-12)
+}
+
 /// Correlation of pixels 1, 2, 3, ... apart along rows and columns, without what far ones and whole
 /// `lines` share, px^2.
 fn correlation_profile(
@@ -212,10 +204,11 @@ fn correlation_profile(
     // no window's.
     let apart = over(&FAR, [1, 1])?;
     let power = mean(changes.iter().flatten().map(|&r| f64::from(r).powi(2)))?;
+    let power = beside_lines(power, [row, column]);
     let at = |lag: usize| {
         let along = |step, line: f64| Some(over(&[lag], step)? - apart - line.max(0.0));
         let both = along([1, 0], row?)? + along([0, 1], column?)?;
-        Some(0.5 * both / power.max(1e-12))
+        Some(0.5 * both / power)
     };
     let correlation_profile: Option<Vec<f64>> = (1..=PROFILE_LAGS).map(at).collect();
     correlation_profile?.try_into().ok()
