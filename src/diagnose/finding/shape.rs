@@ -27,6 +27,7 @@ pub fn words(basis: &Basis, beta: &[f64]) -> String {
             let at = |k: f64| place(low + (high - low) * k / (nodes - 1) as f64, basis.axis());
             curve(beta, &at)
         }
+        Basis::Table { .. } => "as other parameters of sigma have it".into(),
         // A named cause's formula that lost its name.
         _ => "of a shape that the catalogue has, on which the views do not agree".into(),
     }
