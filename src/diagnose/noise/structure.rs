@@ -9,10 +9,9 @@ use super::pairs::Pairs;
 use super::still::{KeptPattern, Still, beside_bias, still};
 use super::tail_counts::{FEWEST_READINGS, TailCounts};
 use super::texture::{
-    FAR, Filled, PROFILE_LAGS, SHORT_LINE, changes, covariance, frame_log_variance, high_passed,
-    moving, same_pixel, without_lines, without_outliers,
+    FAR, Filled, PROFILE_LAGS, SHORT_LINE, area, changes, covariance, frame_log_variance,
+    high_passed, moving, same_pixel, without_lines, without_outliers,
 };
-use super::window::area;
 use crate::diagnose::options::FRAMES_KEPT;
 use crate::diagnose::views::field::Field;
 use crate::stats::{Correlation, mean};

@@ -1,35 +1,17 @@
 //! The window that a part of the noise comes through, from how correlation falls with distance.
 
 use super::structure::Structure;
-use super::texture::{FAR, LONG_LINE, PROFILE_LAGS, SHORT_LINE, without_lines};
+use super::texture::{FAR, PROFILE_LAGS};
 use super::view_mean::ViewMean;
 use crate::diagnose::search::posterior::Posterior;
 use crate::diagnose::views::box_sums::SMOOTH_PX;
-use crate::stats::{even, measure_correlation};
+use crate::stats::even;
 
 /// Its side, px, and the share of the variance that comes through it, each with its standard error.
 #[derive(Debug, Clone, Copy)]
 pub struct Window {
     pub length: [f64; 2],
     pub share: [f64; 2],
-}
-
-/// Of the noise, what rows or columns share is taken out whole from here on: the mean of 30 pixels of a
-/// Kinect's window, 9 px, errs by three tenths of the rest, which is less.
-const LARGE_SHARE: f64 = 0.25;
-
-/// Area of the window that the pixels of an image hang together by, px^2, where rows and columns have
-/// these `shares` of the variance: theirs stand in the correlation at every lag, and are no window's.
-pub fn area(noise: &[f32], width: usize, shares: [f64; 2]) -> f64 {
-    let is_large = shares.iter().any(|share| *share > LARGE_SHARE);
-    let (least, shares) = if is_large { (SHORT_LINE, [0.0; 2]) } else { (LONG_LINE, shares) };
-    let correlation = measure_correlation(&without_lines(noise, width, least), width);
-    // A box of L px has a correlation sum of L along each axis.
-    let along = |by_lag: &[f64], share: f64| {
-        let left = |rho: &f64| ((rho - share) / (1.0 - share).max(0.1)).max(0.0);
-        1.0 + 2.0 * by_lag[1..].iter().map(left).filter(|r| *r > 0.05).sum::<f64>()
-    };
-    along(&correlation.along_u, shares[0]) * along(&correlation.along_v, shares[1])
 }
 
 /// Correlation of pixels `lag` apart under a window of unit side: all alike, a tent or a bell of the
@@ -114,37 +96,6 @@ mod tests {
 
     use super::*;
     use crate::rng::Seed;
-
-    /// An image of noise by boxes of this side beside rows that err by about so much of the variance, and
-    /// their share as it turned out.
-    fn image(side: usize, share: f64) -> (Vec<f32>, f64) {
-        let mut rng = Seed(7).stream("window/area");
-        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-        let wide = WIDTH + side;
-        let white: Vec<f64> = (0..wide * (HEIGHT + side)).map(|_| normal()).collect();
-        let at = |i: usize| {
-            let (u, v) = (i % WIDTH, i / WIDTH);
-            let rows = (v..v + side).map(|v| white[v * wide + u..][..side].iter().sum::<f64>());
-            rows.sum::<f64>() / side as f64
-        };
-        let scale = (share / (1.0 - share)).sqrt();
-        let rows: Vec<f64> = (0..HEIGHT).map(|_| scale * normal()).collect();
-        let square = rows.iter().map(|r| r * r).sum::<f64>() / HEIGHT as f64;
-        let image = (0..WIDTH * HEIGHT).map(|i| (at(i) + rows[i / WIDTH]) as f32).collect();
-        (image, square / (1.0 + square))
-    }
-
-    const WIDTH: usize = 140;
-    const HEIGHT: usize = 100;
-
-    #[test]
-    fn rows_that_err_alike_are_no_window() {
-        for (side, share) in [(1, 0.0), (1, 0.8), (3, 0.0), (3, 0.2), (3, 0.6), (5, 0.8)] {
-            let (image, share) = image(side, share);
-            let found = area(&image, WIDTH, [share, 0.0]).sqrt();
-            assert!((found / side as f64 - 1.0).abs() < 0.12, "{found} px of {side}, rows {share}");
-        }
-    }
 
     /// Courses of each form with lags that err alike: 90 % of 60 are 54; 48 or fewer have a chance
     /// of 2 %.
