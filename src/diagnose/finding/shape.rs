@@ -1,17 +1,16 @@
 //! A curve in words.
 
-use crate::terms::{Axis, Basis};
+use crate::terms::{Axis, Basis, Coordinate};
 
 /// What a nameless curve looks like.
 pub fn words(basis: &Basis, beta: &[f64]) -> String {
     match basis {
         Basis::Ring { period, over, .. } | Basis::Waves { period, over, .. } => {
-            let axis = over.axis();
-            if matches!(basis.axis(), Axis::DisparityPhase) {
-                format!("periodic in the disparity, period {period:.3} px")
-            } else {
-                format!("periodic in the {}, period {period:.3} {}", axis.in_words(), axis.unit())
-            }
+            let of = match basis.axis() {
+                Axis::DisparityPhase => "disparity",
+                _ => over.axis().in_words(),
+            };
+            format!("periodic in the {of}, period {}", place(*period, *over))
         }
         Basis::Map { .. } | Basis::Spline { .. } => {
             "a smooth pattern that stands still in the picture".into()
@@ -20,11 +19,11 @@ pub fn words(basis: &Basis, beta: &[f64]) -> String {
             let [a, b] = over.map(|o| o.axis().in_words());
             format!("depends on the {a} and the {b} together")
         }
-        Basis::Curve { low, high, nodes, .. } => {
+        Basis::Curve { over, low, high, nodes, .. } => {
             if *nodes == 2 {
-                return format!("a step at {}", place(0.5 * (low + high), basis.axis()));
+                return format!("a step at {}", place(0.5 * (low + high), *over));
             }
-            let at = |k: f64| place(low + (high - low) * k / (nodes - 1) as f64, basis.axis());
+            let at = |k: f64| place(low + (high - low) * k / (nodes - 1) as f64, *over);
             curve(beta, &at)
         }
         Basis::Table { .. } => "as other parameters of sigma have it".into(),
@@ -33,10 +32,23 @@ pub fn words(basis: &Basis, beta: &[f64]) -> String {
     }
 }
 
-/// A place on an axis to three digits, with its unit.
-pub fn place(value: f64, axis: Axis) -> String {
+/// A value of the coordinate to three digits, with its unit.
+fn place(value: f64, over: Coordinate) -> String {
+    let unit = match over {
+        Coordinate::Column | Coordinate::Row | Coordinate::Edge | Coordinate::Disparity => " px",
+        Coordinate::Z | Coordinate::Right | Coordinate::Down => " m",
+        Coordinate::Theta | Coordinate::Azimuth => " rad",
+        Coordinate::Session => " s",
+        Coordinate::Radius => " of the corner's",
+        _ => "",
+    };
+    digits(value) + unit
+}
+
+/// To three digits.
+pub fn digits(value: f64) -> String {
     let decimals = (2.0 - value.abs().max(1e-2).log10().floor()).clamp(0.0, 4.0) as usize;
-    format!("{} {}", crate::units::decimals(value, decimals), axis.unit()).trim_end().to_string()
+    crate::units::decimals(value, decimals)
 }
 
 /// `at` says where the k-th node is.
@@ -91,7 +103,7 @@ fn curve(beta: &[f64], at: &dyn Fn(f64) -> String) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::terms::{Coordinate, Modulation};
+    use crate::terms::Modulation;
 
     fn of(values: impl Fn(f64) -> f64) -> String {
         let nodes = 16;

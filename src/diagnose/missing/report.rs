@@ -13,7 +13,7 @@ use crate::diagnose::edges::shadow::Band;
 use crate::diagnose::finding::naming::{MIN_PROBABILITY, none_of_these, physics};
 use crate::diagnose::finding::other_findings::named;
 use crate::diagnose::finding::parameters::estimate;
-use crate::diagnose::finding::shape::place;
+use crate::diagnose::finding::shape::digits;
 use crate::diagnose::views::field::Field;
 use crate::effects;
 use crate::terms::{Axis, Basis, Extent, Statistic};
@@ -218,8 +218,8 @@ fn described(
     since_s: Option<f64>,
 ) -> Finding {
     let status = if family.is_some() { Status::Named } else { Status::Unexplained };
-    let [from, to] = found.interval.map(|end| place(end, found.axis));
-    let shape = family.is_none().then(|| format!("more is lost from {from} to {to}"));
+    let ([from, to], unit) = (found.interval.map(digits), found.unit);
+    let shape = family.is_none().then(|| format!("more is lost from {from} to {to} {unit}"));
     let mut words = physics(status, family, Statistic::Dropout, found.axis, shape.as_deref());
     if let Some(since) = since_s {
         words += &format!(" It began about {since:.1} s after the first view.");

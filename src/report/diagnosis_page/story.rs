@@ -43,7 +43,9 @@ fn of(f: &Finding) -> String {
     let and_rest = f.effect.is_some() && f.terms.iter().any(|t| smooth(&t.basis));
     let rest = match &f.shape {
         _ if and_rest => " and a smooth rest of it that no formula follows".to_string(),
-        Some(shape) if f.effect.is_none() && f.contradicted.is_none() => format!(" ({shape})"),
+        Some(shape) if f.status == Status::Unexplained && f.contradicted.is_none() => {
+            format!(" ({shape})")
+        }
         _ => String::new(),
     };
     let size = match f.statistic {
