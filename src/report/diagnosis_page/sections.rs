@@ -70,8 +70,11 @@ fn tiles(diagnosis: &Diagnosis) -> Markup {
         ("recording", capital(&count(diagnosis.views.len(), "view")), held),
         ("effects left out", capital(&number), largest),
     ];
-    if let Some(held) = &diagnosis.heldout {
-        let change = format!("{} → {}", mm(held.rms_mm_before), mm(held.rms_mm_after));
+    // Where noise alone was found, what is smooth stays as it is.
+    let held = diagnosis.heldout.as_ref();
+    let change = held.map(|h| [h.rms_mm_before, h.rms_mm_after].map(mm));
+    if let Some([before, after]) = change.filter(|[before, after]| before != after) {
+        let change = format!("{before} → {after}");
         tiles.push(("smooth residual, views kept out", change, "rms, before and after".into()));
     }
     if !diagnosis.findings.is_empty() {

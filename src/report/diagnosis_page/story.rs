@@ -3,7 +3,7 @@
 use super::parameters::brief;
 use super::sentences::{called, capital, join, mm};
 use crate::capture::far_side;
-use crate::diagnose::{Diagnosis, Finding, HeldOut, NextView, Status, Verdict};
+use crate::diagnose::{Diagnosis, Finding, NextView, Status, Verdict};
 use crate::report::numbers::{count, fixed};
 use crate::terms::{Basis, Statistic};
 
@@ -132,9 +132,16 @@ fn small_percent(share: f64) -> String {
 }
 
 pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
-    // Without a finding there is nothing to gain by, and with textures and losses alone nothing is scored.
-    let scored = |h: &&HeldOut| diagnosis.verdict != Verdict::Match && h.gain_interval != [0.0; 2];
-    let h = diagnosis.heldout.as_ref().filter(scored)?;
+    // Without a finding there is nothing to gain by.
+    let h = diagnosis.heldout.as_ref().filter(|_| diagnosis.verdict != Verdict::Match)?;
+    let aside = count(h.views.len(), "view");
+    if h.gain_interval == [0.0; 2] {
+        // Of textures, losses and what was seen in reading nothing is scored.
+        let searched = |f: &Finding| f.curve.is_some() && !f.terms.is_empty();
+        return diagnosis.findings.iter().any(searched).then(|| {
+            format!("On {aside} kept aside nothing is gained: without them the same search finds nothing.")
+        });
+    }
     let gain = |v: f64| fixed(v, usize::from(h.gain.abs() < 10.0));
     let mut gained = vec![format!(
         "{} nats a view are gained [{}, {}]",
@@ -155,7 +162,6 @@ pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
             format!("; `kinoise correct` alone takes every pixel from {before} to {after} px rms")
         }
     };
-    let aside = count(h.views.len(), "view");
     Some(format!("On {aside} kept aside {}{alone}.", gained.join(" and ")))
 }
 

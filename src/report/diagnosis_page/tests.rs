@@ -2,7 +2,7 @@ use serde_json::{Map, Value, json};
 
 use super::*;
 use crate::diagnose::*;
-use crate::terms::{Axis, Statistic};
+use crate::terms::{Axis, Basis, Statistic, Term};
 
 fn map(value: Value) -> Map<String, Value> {
     value.as_object().cloned().unwrap()
@@ -313,4 +313,17 @@ fn a_story_has_seven_sentences_at_most() {
         let story = super::story(&diagnosis);
         assert!(story.len() <= 6 && story.iter().all(|s| !s.contains("NaN")), "{story:#?}");
     }
+}
+
+/// Of a search alone can it be said that it finds nothing without the views kept aside.
+#[test]
+fn that_views_kept_aside_gain_nothing_is_told_of_what_was_searched() {
+    let said = |terms: Vec<Term>| {
+        let mut nothing = diagnosis(Verdict::Mismatch, vec![Finding { terms, ..unexplained() }]);
+        nothing.heldout.as_mut().expect("views kept aside").gain_interval = [0.0; 2];
+        story::gained(&nothing)
+    };
+    assert_eq!(said(Vec::new()), None);
+    let searched = said(vec![Term::bias(Basis::Level, vec![1.0])]);
+    assert!(searched.is_some_and(|s| s.starts_with("On three views kept aside nothing is gained")));
 }
