@@ -1,7 +1,5 @@
 //! A sensor that stores the range for the depth, before a board that fills most of a near picture.
 
-use std::path::Path;
-
 use kinoise::diagnose::{DiagnoseOptions, Diagnosis, Finding, Status, Verdict, diagnose};
 use kinoise::effects::Active;
 use kinoise::io::{Assumed, open};
@@ -9,35 +7,19 @@ use kinoise::scene::{Board, Target};
 use kinoise::simulate::{Grid, Physics, Shoot, kinect_v1};
 use kinoise::{NoiseModel, Seed, SigmaModel};
 
-use crate::common::capture::frames_of;
-use crate::common::write_depth;
-
-/// Views of a target, with so much of the range in place of the depth.
-fn shoot(target: Target, share: f64, distances_m: &[f64], tilts_rad: &[f64], folder: &Path) {
-    let poses = Grid { distances_m: distances_m.to_vec(), tilts_rad: tilts_rad.to_vec() }.views();
-    let sigma = SigmaModel::paper();
-    let mut shoot = Shoot::plain(kinect_v1(2), target, &poses, 3, sigma.clone(), Seed(5));
-    let ranges = Active::parse(&format!("range-not-depth:share={share}")).expect("an effect");
-    shoot.physics = Physics::Formula { sigma, effects: vec![ranges] };
-    shoot.write(folder, &|_, _| ()).expect("written");
-}
-
-/// A board before a wall, from near and far: fifteen views.
+/// Of a board before a wall, from near and far, with so much of the range in place of the depth: fifteen views.
 fn diagnosis(share: f64) -> Diagnosis {
     let folder = tempfile::tempdir().expect("a folder");
-    let [front, back] = ["board", "wall"].map(|name| folder.path().join(name));
+    let poses =
+        Grid { distances_m: vec![0.9, 1.0, 1.2, 2.4, 3.0], tilts_rad: vec![0.0, 0.4, 0.7] }.views();
+    let sigma = SigmaModel::paper();
     let board = Target::Board(Board { width_m: 1.2, height_m: 0.9 });
-    shoot(board, share, &[0.9, 1.0, 1.2, 2.4, 3.0], &[0.0, 0.4, 0.7], &front);
-    shoot(Target::Wall, share, &[4.5], &[0.0], &back);
-    let wall = frames_of(&open(&back, &Assumed::default()).expect("a wall")).remove(0);
-    let recording = open(&front, &Assumed::default()).expect("a recording");
-    let images = recording.views.iter().flat_map(|v| &v.depth);
-    for (image, mut frame) in images.zip(frames_of(&recording)) {
-        for (raw, behind) in frame.raw.iter_mut().zip(&wall.raw) {
-            *raw = if *raw == 0 { *behind } else { *raw };
-        }
-        write_depth(&image.path, &frame);
-    }
+    let mut shoot = Shoot::plain(kinect_v1(2), board, &poses, 3, sigma.clone(), Seed(5));
+    shoot.views.iter_mut().for_each(|view| view.bench.wall_m = Some(4.5));
+    let ranges = Active::parse(&format!("range-not-depth:share={share}")).expect("an effect");
+    shoot.physics = Physics::Formula { sigma, effects: vec![ranges] };
+    shoot.write(folder.path(), &|_, _| ()).expect("written");
+    let recording = open(folder.path(), &Assumed::default()).expect("a recording");
     let options = DiagnoseOptions::default();
     let found = diagnose(&recording, &NoiseModel::paper(), &options, &|_, _| ());
     found.expect("diagnosed").diagnosis

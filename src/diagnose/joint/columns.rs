@@ -49,6 +49,7 @@ impl Columns {
         let [width, height] = [camera.width, camera.height].map(|n| n as f64);
         let map = |times| Basis::Spline { width, height, across, down, times };
         let maps = [map(Modulation::One), map(Modulation::DisparitySquared)];
+        // The rest of a named shape over the same axis.
         let is_rest = |c: &Chosen| {
             let axis = c.candidate.basis.axis();
             let mut named = chosen.iter().filter(|other| other.candidate.family.is_some());
@@ -56,11 +57,11 @@ impl Columns {
         };
         let precision = |c: &Chosen| -> Vec<f64> {
             let n = c.candidate.basis.count();
-            // The rest of a named shape over the same axis: no node of it says more than the whole of it did,
-            // beyond the terms before it.
-            let informed = weight / (2.0 * c.gain * n as f64);
-            let rest = Some(informed).filter(|_| is_rest(c) && c.gain > 0.0);
-            (0..n).map(|k| rest.unwrap_or_else(|| c.candidate.usual(k).powi(-2))).collect()
+            if is_rest(c) && c.gain > 0.0 {
+                // No node of it says more than the whole of it did, beyond the terms before it.
+                return vec![weight / (2.0 * c.gain * n as f64); n];
+            }
+            (0..n).map(|k| c.candidate.usual(k).powi(-2)).collect()
         };
         let gauges: Vec<Option<Gauge>> = bases.iter().map(|b| Gauge::of(b, &pixels)).collect();
         let (terms, nodes) = (bases.iter().map(Basis::count).sum(), 2 * across * down);

@@ -70,7 +70,7 @@ pub fn without_outliers(image: &[f32]) -> Vec<f32> {
 }
 
 /// Rows and columns shorter than this are left as they are, px: their mean is mostly noise.
-pub const LONG_LINE: usize = 150;
+const LONG_LINE: usize = 150;
 /// The same where a pixel is held against itself, and a line's mean only stands in the way.
 pub const SHORT_LINE: usize = 30;
 

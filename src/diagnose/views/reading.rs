@@ -121,8 +121,8 @@ fn as_ranges(
         these.iter().filter(|f| those.iter().all(|g| g.name != f.name)).count() as u64
     };
     let p = chance(only(&fields, as_depths), only(as_depths, &fields));
-    let wrong = share_left(&fields, &bench)?.abs();
-    (p <= RANGES_LEVEL && wrong < PART_OF_RANGES).then_some(((fields, excluded), p))
+    let none_left = || share_left(&fields, &bench).is_some_and(|s| s.abs() < PART_OF_RANGES);
+    (p <= RANGES_LEVEL && none_left()).then_some(((fields, excluded), p))
 }
 
 /// Raw values hold ranges or depths: where fields that were read as ranges are off by more than this share

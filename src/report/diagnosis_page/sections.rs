@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::sentences::{
     along, axis, called, capital, interval, join, missing, mm, sentence, statistic, title,
 };
-use super::story::gained;
+use super::story::{gained, smooth_residual};
 use super::{parameters, sentences};
 use crate::diagnose::{CannotTell, Diagnosis, HeldOut, MapRow, Reference, Verdict, ViewLine};
 use crate::report::document::{
@@ -70,10 +70,7 @@ fn tiles(diagnosis: &Diagnosis) -> Markup {
         ("recording", capital(&count(diagnosis.views.len(), "view")), held),
         ("effects left out", capital(&number), largest),
     ];
-    // Where noise alone was found, what is smooth stays as it is.
-    let held = diagnosis.heldout.as_ref();
-    let change = held.map(|h| [h.rms_mm_before, h.rms_mm_after].map(mm));
-    if let Some([before, after]) = change.filter(|[before, after]| before != after) {
+    if let Some([before, after]) = diagnosis.heldout.as_ref().and_then(smooth_residual) {
         let change = format!("{before} → {after}");
         tiles.push(("smooth residual, views kept out", change, "rms, before and after".into()));
     }

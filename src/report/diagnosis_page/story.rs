@@ -3,7 +3,7 @@
 use super::parameters::brief;
 use super::sentences::{called, capital, join, mm};
 use crate::capture::far_side;
-use crate::diagnose::{Diagnosis, Finding, NextView, Status, Verdict};
+use crate::diagnose::{Diagnosis, Finding, HeldOut, NextView, Status, Verdict};
 use crate::report::numbers::{count, fixed};
 use crate::terms::{Basis, Statistic};
 
@@ -131,6 +131,12 @@ fn small_percent(share: f64) -> String {
     }
 }
 
+/// Of views kept aside, before and after; `None` where noise alone was found, and what is smooth stays as it is.
+pub(super) fn smooth_residual(h: &HeldOut) -> Option<[String; 2]> {
+    let [before, after] = [h.rms_mm_before, h.rms_mm_after].map(mm);
+    (before != after).then_some([before, after])
+}
+
 pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
     // Without a finding there is nothing to gain by.
     let h = diagnosis.heldout.as_ref().filter(|_| diagnosis.verdict != Verdict::Match)?;
@@ -149,9 +155,7 @@ pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
         gain(h.gain_interval[0]),
         gain(h.gain_interval[1])
     )];
-    // Where noise alone was found, what is smooth stays as it is.
-    let [before, after] = [h.rms_mm_before, h.rms_mm_after].map(mm);
-    if before != after {
+    if let Some([before, after]) = smooth_residual(h) {
         gained.insert(0, format!("the smooth residual goes from {before} to {after}"));
     }
     let correction = [h.correction_rms_before_px, h.correction_rms_after_px].map(|v| fixed(v, 3));
