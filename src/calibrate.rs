@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::io::{hex, sha256_hex};
 use crate::measure::{
     MeasureOptions, Planes, ReferenceDistance, SigmaKind, SigmaTable, ViewMeasurement, Workbench,
-    measure_view,
+    measure_view, ranges_remark,
 };
 use crate::model::{
     Direction, FitSummary, Form, HeldOut, NoiseModel, Provenance, SigmaFit, SigmaModel,
@@ -77,9 +77,11 @@ pub fn measure(
         let first = measurements.excluded.first();
         let first = first.map(|e| format!("view {}: {}", e.view, e.reason));
         let first = first.unwrap_or_else(|| "there is no view".to_string());
+        let ranges = ranges_remark(recording, &measurements.excluded, &bench);
+        let ranges = ranges.map_or_else(String::new, |remark| format!("; {remark}"));
         return Err(Error::recording(
             &recording.root,
-            format!("no view of {total} can be used; the first: {first}"),
+            format!("no view of {total} can be used; the first: {first}{ranges}"),
             "put this right, then run again",
         ));
     }
@@ -235,7 +237,10 @@ fn hashes(recording: &Recording, measurements: &Measurements) -> Result<Map<Stri
 
 /// What a person should know before trusting the model, the most important first.
 fn warnings_of(recording: &Recording, measurements: &Measurements, fit: &SigmaFit) -> Vec<String> {
-    let mut warnings: Vec<String> = measurements.excluded.iter().map(ToString::to_string).collect();
+    let bench = Workbench::new(&recording.sensor, MeasureOptions::default());
+    let ranges = ranges_remark(recording, &measurements.excluded, &bench);
+    let mut warnings: Vec<String> = ranges.into_iter().collect();
+    warnings.extend(measurements.excluded.iter().map(ToString::to_string));
     // Views left out while opening stand here too.
     warnings.extend(recording.remarks.iter().cloned());
     let total = measurements.views.len();

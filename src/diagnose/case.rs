@@ -18,7 +18,7 @@ use super::views::layers::Survey;
 use super::views::learnt::{Learnt, learnt_from};
 use super::views::reading::LoadedViews;
 use crate::Progress;
-use crate::effects::{Active, RAY_FOR_DEPTH};
+use crate::effects::Active;
 use crate::error::Result;
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
@@ -78,9 +78,8 @@ impl<'a> Case<'a> {
             model.refuse_other_size(sensor)?;
         }
         let bench = Workbench::new(sensor, measure_options(options));
-        let known = KnownTerms::of(model, &sensor.camera);
-        let LoadedViews { mut fields, excluded, ranges, copies } =
-            LoadedViews::of(recording, &bench, model, &known, progress)?;
+        let LoadedViews { mut fields, excluded, ranges, bench, known, copies } =
+            LoadedViews::of(recording, bench, model, progress)?;
         let baseline = simulated
             .map(|s| Baseline::of(s, sensor, &mut fields, model, options, progress))
             .transpose()?;
@@ -217,15 +216,9 @@ impl<'a> Case<'a> {
         maps || f.replicated != Some(false) || f.p_adjusted.is_none_or(clear)
     }
 
-    pub fn range_share(&self, terms: &[Term]) -> f64 {
-        self.known
-            .bias
-            .iter()
-            .chain(terms)
-            .chain(self.ranges.iter().flat_map(|f| &f.terms))
-            .filter(|t| t.basis == RAY_FOR_DEPTH)
-            .map(|t| t.coefficients[0])
-            .sum()
+    /// What reading as ranges took out, the other way round: with it the means are as stored.
+    pub fn as_stored(&self) -> Vec<Term> {
+        self.ranges.iter().flat_map(|f| &f.terms).map(|t| t.times(-1.0)).collect()
     }
 }
 

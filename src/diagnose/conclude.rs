@@ -67,7 +67,8 @@ impl Case<'_> {
         found.extend(cannot_tell.iter().map(not_identifiable));
         shares(&mut found);
         self.progress.stage("scoring views kept aside, and what would have been seen");
-        let left_out = || heldout::left_out(&self.survey, &mean.outcome, &mean.terms);
+        let left_out =
+            || heldout::left_out(&self.survey, &mean.outcome, &mean.terms, &self.as_stored());
         let (heldout, (map, mut detectable, left_out)) = rayon::join(
             || self.heldout(),
             || (self.map(&scenes, outcomes), self.detectable(&scenes, outcomes), left_out()),
@@ -84,6 +85,7 @@ impl Case<'_> {
             self.sample(&mut extended);
         }
         let views = self.view_lines(&mean.terms, heldout.as_ref());
+        let taken_out = self.ranges.iter().flat_map(|f| f.terms.clone()).collect();
         let recording = self.recording.root.display().to_string();
         let reference = match self.baseline {
             Some(_) => Reference::SimulatedRecording,
@@ -116,6 +118,7 @@ impl Case<'_> {
             excluded: done.excluded,
             against: done.baseline.map_or_else(Vec::new, |b| b.fields),
             model: extended,
+            taken_out,
             bias_px: mean.px,
         }
     }
@@ -194,7 +197,7 @@ impl Case<'_> {
 
     /// The views, for people.
     fn view_lines(&self, bias: &[Term], heldout: Option<&HeldOut>) -> Vec<ViewLine> {
-        let before = heldout::rms_by_view(&self.survey, &[]);
+        let before = heldout::rms_by_view(&self.survey, &self.as_stored());
         let after = heldout::rms_by_view(&self.survey, bias);
         let line = |(n, f): (usize, &Field)| ViewLine {
             name: f.name.clone(),

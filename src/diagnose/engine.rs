@@ -6,7 +6,9 @@ use super::options::DiagnoseOptions;
 use super::views::field::Field;
 use crate::Progress;
 use crate::error::Result;
+use crate::measure::Workbench;
 use crate::model::NoiseModel;
+use crate::terms::Term;
 use crate::view::{Excluded, Recording};
 
 /// A finished diagnosis.
@@ -19,19 +21,23 @@ pub struct Diagnosed {
     /// The bias that was found, at every pixel of every field, px; empty where there is none.
     pub bias_px: Vec<Vec<f32>>,
     pub excluded: Vec<Excluded>,
+    /// What was taken out while reading: of ranges that raw values turned out to hold.
+    pub taken_out: Vec<Term>,
     /// The simulated views, where there are any, in the same order.
     pub against: Vec<Field>,
 }
 
 impl Diagnosed {
-    /// Mean residual of every pixel of a view, beyond the simulated one's where there is one, px.
-    pub fn recorded(&self, view: usize) -> Vec<f32> {
+    /// Mean residual of every pixel of a view, beyond the simulated one's where there is one, px: as it was
+    /// read.
+    pub fn read(&self, view: usize, bench: &Workbench<'_>) -> Vec<f32> {
         let field = &self.fields[view];
-        let mean = field.with_column_steps();
-        let Some(twin) = self.against.get(view) else { return mean };
-        let theirs = twin.image(&twin.with_column_steps());
+        let Some(twin) = self.against.get(view) else { return field.mean.clone() };
+        let taken_out = twin.taken_out(&[], bench);
+        let theirs: Vec<f32> = twin.mean.iter().zip(taken_out).map(|(m, t)| m + t).collect();
+        let theirs = twin.image(&theirs);
         let at = |i: u32| theirs.get(i as usize).copied().unwrap_or(f32::NAN);
-        field.pixels.iter().zip(mean).map(|(&i, m)| m - at(i)).collect()
+        field.pixels.iter().zip(&field.mean).map(|(&i, m)| m - at(i)).collect()
     }
 }
 

@@ -45,19 +45,25 @@ pub fn pictures(
     retake: Retake<'_>,
 ) -> Vec<ViewPictures> {
     let bench = Workbench::new(sensor, MeasureOptions::default());
-    let known = KnownTerms::of(model, &sensor.camera);
+    let mut known = KnownTerms::of(model, &sensor.camera);
+    known.bias.extend(done.taken_out.iter().cloned());
     let start = done.fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
     worth_seeing(done)
         .into_par_iter()
         .map(|view| {
             let field = &done.fields[view];
-            let recorded = done.recorded(view);
+            let stored = |field: &Field, mut read: Vec<f32>| {
+                let taken_out = field.taken_out(&done.taken_out, &bench);
+                read.iter_mut().zip(taken_out).for_each(|(r, taken)| *r += taken);
+                read
+            };
             let twin = retake(view, field).map(|frames| {
                 let frames = frames.into_iter();
-                field.with_frames(frames, &bench, &model.sigma, &known, start).with_column_steps()
+                let twin = field.with_frames(frames, &bench, &model.sigma, &known, start);
+                stored(&twin, twin.mean.clone())
             });
-            let mut left = recorded.clone();
-            left.iter_mut().zip(&field.pixels).for_each(|(r, &i)| *r -= field.column_error(i));
+            let mut left = done.read(view, &bench);
+            let recorded = stored(field, left.clone());
             let found = done.bias_px.get(view).into_iter().flatten();
             left.iter_mut().zip(found).for_each(|(r, bias)| *r -= bias);
             let show = |values: &[f32]| {

@@ -17,7 +17,7 @@ pub use budget::flatness_uncertainty_m;
 pub use cells::{Cell, Spread};
 pub use column_steps::ColumnSteps;
 pub use table::{SigmaKind, SigmaRow, SigmaTable, read_table, write_measurements};
-pub use view::{measure_view, view_target};
+pub use view::{measure_view, ranges_remark, view_target};
 
 use crate::camera::Rays;
 use crate::frame::DepthTable;
@@ -65,8 +65,8 @@ pub struct Workbench<'a> {
     /// From raw value to m.
     pub table: DepthTable,
     pub options: MeasureOptions,
-    /// The raw values hold the length of the ray, not the depth.
-    pub ranges: bool,
+    /// Share of the ray's excess over the depth that raw values hold: 1 where they are ranges.
+    pub ray_share: f64,
 }
 
 impl<'a> Workbench<'a> {
@@ -76,7 +76,7 @@ impl<'a> Workbench<'a> {
             rays: sensor.camera.rays(),
             table: sensor.code.table(),
             options,
-            ranges: false,
+            ray_share: 0.0,
         }
     }
 

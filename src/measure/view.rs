@@ -1,5 +1,7 @@
 //! One view: its frames are read once, in order, and only a handful are held.
 
+use rayon::prelude::*;
+
 use super::budget::distance_budget;
 use super::scan::{HELD_FRAMES, Scan};
 use super::{ViewMeasurement, Workbench};
@@ -9,7 +11,7 @@ use crate::io::{FrameSource, InfraredImage};
 use crate::plane::{
     InverseDepthImage, Points, RansacOptions, RansacPlane, Target, find_target, ransac_plane,
 };
-use crate::view::{FrameRef, View};
+use crate::view::{Excluded, FrameRef, Recording, View};
 
 /// An error when no frame can be read or none shows a plane; others that cannot are notes.
 pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasurement> {
@@ -57,6 +59,27 @@ pub fn view_target(view: &View, bench: &Workbench<'_>) -> Result<(Target, Vec<(u
     let (numbers, held): (Vec<usize>, Vec<Frame>) = reader.hold(view)?.into_iter().unzip();
     let target = target_of(view, bench, &held)?;
     Ok((target, numbers.into_iter().zip(held).collect()))
+}
+
+/// So many views are no chance: one in 32 where a plane comes and goes by either reading alike.
+const FEWEST_RANGES: usize = 5;
+
+/// What to say where excluded views hold a plane once their raw values are taken for ranges.
+pub fn ranges_remark(
+    recording: &Recording,
+    excluded: &[Excluded],
+    bench: &Workbench<'_>,
+) -> Option<String> {
+    let bench = Workbench { ray_share: 1.0, ..Workbench::new(bench.sensor, bench.options) };
+    let left_out = |v: &&View| excluded.iter().any(|e| e.view == v.name);
+    let views: Vec<&View> = recording.views.iter().filter(left_out).collect();
+    let flat = views.par_iter().filter(|v| view_target(v, &bench).is_ok()).count();
+    (flat >= FEWEST_RANGES).then(|| {
+        format!(
+            "{flat} of the views that were left out hold a plane once raw values are taken for ranges (the length of \
+             the ray) instead of depths: `kinoise diagnose` tells, `kinoise correct` puts depths in their place"
+        )
+    })
 }
 
 /// Hands out the frames that can be read; the others are named in the notes.
@@ -112,10 +135,11 @@ impl<'r> FrameReader<'r> {
 
 fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Target> {
     let mut w = mean_inverse_depth(held, &bench.table);
-    if bench.ranges {
+    if bench.ray_share != 0.0 {
         for (i, w) in w.iter_mut().enumerate() {
             let (x, y) = bench.rays.at(i);
-            *w *= (1.0 + x * x + y * y).sqrt() as f32;
+            let foreshortening = (1.0 + x * x + y * y).sqrt().recip();
+            *w /= (1.0 - bench.ray_share * (1.0 - foreshortening)) as f32;
         }
     }
     let image = InverseDepthImage {

@@ -1,15 +1,18 @@
 //! A sensor that stores the range for the depth, before a board that fills most of a near picture.
 
-use kinoise::diagnose::{DiagnoseOptions, Diagnosis, Finding, Status, Verdict, diagnose};
+use std::path::Path;
+
+use kinoise::calibrate::{CalibrateOptions, measure, model_of};
+use kinoise::diagnose::{DiagnoseOptions, Diagnosed, Finding, Status, Verdict, diagnose};
 use kinoise::effects::Active;
 use kinoise::io::{Assumed, open};
 use kinoise::scene::{Board, Target};
 use kinoise::simulate::{Grid, Physics, Shoot, kinect_v1};
+use kinoise::view::Recording;
 use kinoise::{NoiseModel, Seed, SigmaModel};
 
 /// Of a board before a wall, from near and far, with so much of the range in place of the depth: fifteen views.
-fn diagnosis(share: f64) -> Diagnosis {
-    let folder = tempfile::tempdir().expect("a folder");
+fn recording(folder: &Path, share: f64) -> Recording {
     let poses =
         Grid { distances_m: vec![0.9, 1.0, 1.2, 2.4, 3.0], tilts_rad: vec![0.0, 0.4, 0.7] }.views();
     let sigma = SigmaModel::paper();
@@ -18,30 +21,54 @@ fn diagnosis(share: f64) -> Diagnosis {
     shoot.views.iter_mut().for_each(|view| view.bench.wall_m = Some(4.5));
     let ranges = Active::parse(&format!("range-not-depth:share={share}")).expect("an effect");
     shoot.physics = Physics::Formula { sigma, effects: vec![ranges] };
-    shoot.write(folder.path(), &|_, _| ()).expect("written");
-    let recording = open(folder.path(), &Assumed::default()).expect("a recording");
-    let options = DiagnoseOptions::default();
-    let found = diagnose(&recording, &NoiseModel::paper(), &options, &|_, _| ());
-    found.expect("diagnosed").diagnosis
+    shoot.write(folder, &|_, _| ()).expect("written");
+    open(folder, &Assumed::default()).expect("a recording")
+}
+
+fn diagnosis(recording: &Recording, model: &NoiseModel) -> Diagnosed {
+    diagnose(recording, model, &DiagnoseOptions::default(), &|_, _| ()).expect("diagnosed")
 }
 
 /// Read as depths, most of the nine near views hold no plane at all: the range bends the board by 15 % of
 /// its distance towards its corners. As ranges all fifteen do, and nothing else is wrong with them.
 #[test]
 fn views_that_are_flat_as_ranges_alone_tell_ranges() {
-    let said = diagnosis(1.0);
+    let folder = tempfile::tempdir().expect("a folder");
+    let recording = recording(folder.path(), 1.0);
+    let done = diagnosis(&recording, &NoiseModel::paper());
+    let said = &done.diagnosis;
     // The simulated noise is that of the depth which is stored: a little more than the model's.
     let large = |f: &&Finding| f.status != Status::NotIdentifiable && !f.minor;
     let told = said.findings.iter().filter(large);
     assert_eq!(told.map(|f| f.effect).collect::<Vec<_>>(), [Some("range-not-depth")]);
     assert_eq!(said.after.verdict, Verdict::Match, "{:?}", said.after.remaining);
     assert_eq!(said.views.len(), 15);
+    // What reading as ranges is worth is told beside the rest: the means are bent as they are stored.
+    let aside = said.heldout.as_ref().expect("views kept aside");
+    assert!(aside.gain_interval[0] > 0.0, "{:?}", aside.gain_interval);
+    let nearest = &said.views[0];
+    assert!(nearest.bowl_px_after < 0.1 * nearest.bowl_px_before, "{nearest:?}");
+    // A model that has the ranges finds the near boards, and nothing more to say of them.
+    let again = diagnosis(&recording, &done.model).diagnosis;
+    assert_eq!((again.verdict, again.views.len()), (Verdict::Match, 15), "{:?}", again.findings);
+}
+
+/// `calibrate` reads depths: it says that the views it left out would be flat as ranges.
+#[test]
+fn a_calibration_says_what_its_views_are_flat_as() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let recording = recording(folder.path(), 1.0);
+    let options = CalibrateOptions::default();
+    let measured = measure(&recording, &options.measure, &|_, _| ()).expect("measured");
+    let warnings = model_of(&recording, &measured, &options).expect("a model").warnings;
+    assert!(warnings[0].contains("taken for ranges"), "{warnings:?}");
 }
 
 /// What is neither range nor depth is told with its share, by the views that are flat enough.
 #[test]
 fn a_part_of_the_range_is_no_range() {
-    let said = diagnosis(0.8);
+    let folder = tempfile::tempdir().expect("a folder");
+    let said = diagnosis(&recording(folder.path(), 0.8), &NoiseModel::paper()).diagnosis;
     assert_eq!(said.findings[0].effect, Some("range-not-depth"));
     let share = said.findings[0].value("share").expect("a share");
     assert!((share - 0.8).abs() < 0.1, "{share}");

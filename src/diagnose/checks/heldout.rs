@@ -45,12 +45,13 @@ impl Case<'_> {
         let (sigma, level) = (&self.model.sigma, self.level(Case::VARIANCE_LEVEL));
         let variance = chosen_on.search_variance(sigma, camera, level, seed);
         let variance_terms = terms_of(&variance, Statistic::Variance);
+        let stored = self.as_stored();
         let means: Vec<ViewData> = judged_on.coarse_mean_data();
         let blocks = judged_on.variance_data();
         let mut before = Vec::new();
         let mut gains = Vec::new();
         for (mean, block) in means.iter().zip(&blocks) {
-            let (b0, b1) = (log_score(mean, &[])?, log_score(mean, &bias_terms)?);
+            let (b0, b1) = (log_score(mean, &stored)?, log_score(mean, &bias_terms)?);
             let (v0, v1) = (log_score(block, &[])?, log_score(block, &variance_terms)?);
             before.push(b0 + v0);
             gains.push(b1 - b0 + v1 - v0);
@@ -59,7 +60,7 @@ impl Case<'_> {
         let mean_before = before.iter().sum::<f64>() / views;
         let gain = gains.iter().sum::<f64>() / views;
         let rms = |terms: &[Term]| rms(&judged_on.views, terms, scale_px_m);
-        let ([px_before, mm_before], [px_after, mm_after]) = (rms(&[]), rms(&bias_terms));
+        let ([px_before, mm_before], [px_after, mm_after]) = (rms(&stored), rms(&bias_terms));
         let of_sensor: Vec<Term> =
             bias_terms.iter().filter(|t| t.is_sensor_bias()).cloned().collect();
         let [px_corrected, _] = rms(&of_sensor);
@@ -174,8 +175,13 @@ pub fn rms_by_view(survey: &Survey, terms: &[Term]) -> Vec<f64> {
 }
 
 /// Every view with coefficients fitted without it, the shapes as chosen on all: root mean square of
-/// every pixel of every frame to a plane, px, before and after.
-pub fn left_out(survey: &Survey, outcome: &Outcome, terms: &[Term]) -> Option<LeftOut> {
+/// every pixel of every frame to a plane, px, before, as `stored`, and after.
+pub fn left_out(
+    survey: &Survey,
+    outcome: &Outcome,
+    terms: &[Term],
+    stored: &[Term],
+) -> Option<LeftOut> {
     let (mut sums, mut n) = ([0.0; 2], 0.0);
     let mut by_view = [0.0; 2];
     for (v, view) in survey.views.iter().enumerate() {
@@ -189,7 +195,7 @@ pub fn left_out(survey: &Survey, outcome: &Outcome, terms: &[Term]) -> Option<Le
             .map(|(t, mine)| Term { coefficients: mine.to_vec(), ..t.clone() })
             .collect();
         let pixels: f64 = view.tiles.iter().filter(|t| t.mean.is_finite()).map(|t| t.pixels).sum();
-        let both = sums.iter_mut().zip(&mut by_view).zip([&[][..], &refitted]);
+        let both = sums.iter_mut().zip(&mut by_view).zip([stored, &refitted]);
         for ((sum, by_view), terms) in both {
             let before = *sum;
             each_patch(view, terms, |(_, t), f| {

@@ -9,6 +9,7 @@ use crate::diagnose::case::{Case, MeanResult};
 use crate::diagnose::finding::pixels::{Whitener, common, fixed_px2, measure_tails, terms_of};
 use crate::diagnose::search::outcome::Outcome;
 use crate::diagnose::steps::{Steps, forget_windows, own_step};
+use crate::diagnose::views::known::ray_share;
 use crate::terms::{Axis, Basis, PixelContext, Statistic, Term};
 
 /// What scatters about the mean.
@@ -42,7 +43,7 @@ impl Case<'_> {
         self.survey.compare_frames(&self.fields, common(&structure, &textures, &self.known));
         let compared =
             self.baseline.as_mut().is_some_and(|baseline| baseline.variances(&mut self.survey));
-        let range_share = self.range_share(&mean.terms);
+        let range_share = self.known.ray_share() + ray_share(&mean.terms);
         // A range in place of a depth makes a disparity, and its noise, smaller.
         let stretch = |p: &PixelContext| {
             let ray = 1.0 / (1.0 + p.x * p.x + p.y * p.y).sqrt();

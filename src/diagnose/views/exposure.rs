@@ -89,6 +89,15 @@ impl Field {
         expected
     }
 
+    /// What was taken out of each pixel while reading, px: whole columns' steps, and these terms.
+    pub fn taken_out(&self, terms: &[Term], bench: &Workbench<'_>) -> Vec<f32> {
+        let places = Places::of(self, &bench.sensor.camera, &bench.rays, self.time_s);
+        let mut row = Vec::new();
+        let mut of_terms = |k| Term::sum(terms, &places.pixel(k), &mut row) as f32;
+        let of_pixel = |(k, &i): (usize, &u32)| self.column_error(i) + of_terms(k);
+        self.pixels.iter().enumerate().map(of_pixel).collect()
+    }
+
     /// The spread to clip by, px: the view's own, or that about what the model expects where the model is
     /// wrong by far more. Clipped by the view's own, a model of a bowl that is not there would leave no
     /// pixel to tell it by.

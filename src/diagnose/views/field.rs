@@ -262,11 +262,6 @@ impl Field {
         self.scale_px_m * self.plane.inverse_depth(x, y)
     }
 
-    /// The mean as it was recorded, before whole columns' steps were taken out, px.
-    pub fn with_column_steps(&self) -> Vec<f32> {
-        self.pixels.iter().zip(&self.mean).map(|(&i, m)| m + self.column_error(i)).collect()
-    }
-
     /// What the whole column of pixel `i` of the picture errs by, px.
     pub fn column_error(&self, i: u32) -> f32 {
         self.column_steps.map_or(0.0, |steps| steps.error_px(i as usize % self.width) as f32)

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Map, Value};
 
 use crate::camera::Camera;
-use crate::effects;
+use crate::effects::{self, RAY_FOR_DEPTH};
 use crate::model::{Covariance, NoiseModel, UNEXPLAINED};
 use crate::stats::mean;
 use crate::terms::{Basis, Statistic, Term, by_term};
@@ -78,6 +78,11 @@ impl KnownTerms {
     /// Is a part of the bias a shape that was fitted?
     pub fn bias_is_learnt(&self) -> bool {
         self.learnt.iter().flat_map(|(shape, _)| shape).any(|t| t.statistic == Statistic::Bias)
+    }
+
+    /// Share of the ray's excess over the depth that raw values hold.
+    pub fn ray_share(&self) -> f64 {
+        ray_share(&self.bias)
     }
 
     /// Does the noise change its size in a way that has no name?
@@ -184,6 +189,11 @@ impl KnownTerms {
     pub fn parameter(&self, id: &str, name: &str) -> Option<f64> {
         number(self.entry(id)?, name)
     }
+}
+
+/// Share of the ray's excess over the depth that these terms hold.
+pub fn ray_share(terms: &[Term]) -> f64 {
+    terms.iter().filter(|t| t.basis == RAY_FOR_DEPTH).map(|t| t.coefficients[0]).sum()
 }
 
 fn number(parameters: &Map<String, Value>, name: &str) -> Option<f64> {

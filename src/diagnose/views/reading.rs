@@ -18,31 +18,38 @@ use crate::terms::{Axis, PixelContext, Pixels, Statistic, Term};
 use crate::view::{Excluded, Recording};
 
 /// What could be read of a recording.
-pub(in crate::diagnose) struct LoadedViews {
+pub(in crate::diagnose) struct LoadedViews<'a> {
     pub fields: Vec<Field>,
     pub excluded: Vec<Excluded>,
     /// The words turned out to be ranges.
     pub ranges: Option<Finding>,
+    /// What the fields were read with.
+    pub bench: Workbench<'a>,
+    /// What was taken out of them.
+    pub known: KnownTerms,
     /// Views that were another's copy, in words.
     pub copies: Vec<String>,
 }
 
-impl LoadedViews {
+impl<'a> LoadedViews<'a> {
     /// Every view that can be used, one at least of each.
     ///
     /// # Errors
     /// When fewer than three views are left.
     pub fn of(
         recording: &Recording,
-        bench: &Workbench<'_>,
+        mut bench: Workbench<'a>,
         model: &NoiseModel,
-        known: &KnownTerms,
         progress: Progress<'_>,
     ) -> Result<Self> {
-        let (mut fields, mut excluded) = read(recording, bench, model, known, progress);
+        let mut known = KnownTerms::of(model, &bench.sensor.camera);
+        bench.ray_share = known.ray_share();
+        let (mut fields, mut excluded) = read(recording, &bench, model, &known, progress);
         let mut found = None;
-        if let Some((flat, p)) = as_ranges(recording, bench, model, known, &fields) {
+        if let Some((flat, p)) = as_ranges(recording, &bench, model, &known, &fields) {
             (fields, excluded) = flat;
+            bench.ray_share = 1.0;
+            known.bias.push(range_term());
             found = Some(ranges(p));
         }
         let copies = without_copies(&mut fields);
@@ -56,7 +63,7 @@ impl LoadedViews {
                 "a diagnosis needs at least three views of a plane",
             ));
         }
-        Ok(LoadedViews { fields, excluded, ranges: found, copies })
+        Ok(LoadedViews { fields, excluded, ranges: found, bench, known, copies })
     }
 }
 
@@ -110,7 +117,7 @@ fn as_ranges(
     if chance(refused, 0) > RANGES_LEVEL || known.has("range-not-depth") {
         return None;
     }
-    let bench = Workbench { ranges: true, ..Workbench::new(bench.sensor, bench.options) };
+    let bench = Workbench { ray_share: 1.0, ..Workbench::new(bench.sensor, bench.options) };
     let mut told = known.clone();
     told.bias.push(range_term());
     let (fields, excluded) = read(recording, &bench, model, &told, &|_, _| ());
