@@ -94,6 +94,7 @@ impl Case<'_> {
             || (self.lost(), self.few_views(&scenes, outcomes, &scatter, stepped)),
             || (curves(&scenes, outcomes), self.texture(&mean, &scatter, steps)),
         );
+        let ranges = self.ranges.clone().map(|f| findings::placed(f, &scenes[0]));
         drop(scenes);
         let refitted = self.take_refit(&mut curves);
         curves.retain(|f| self.is_news(f, &mean, &scatter));
@@ -114,7 +115,7 @@ impl Case<'_> {
         let clear = scatter.outcome.noise.threshold(self.options.level);
         let clearly = refitted.as_ref().is_some_and(|f| f.share > clear);
         let better_form = self.tell_form(&mut curves, clearly);
-        let read = self.ranges.iter().chain(&self.column_steps).cloned();
+        let read = ranges.into_iter().chain(self.column_steps.clone());
         let mut found: Vec<Finding> = read.chain(curves).collect();
         let of_size = |f: &Finding| f.statistic == Statistic::Variance;
         let told = self.baseline.is_some() && found.iter().any(of_size);

@@ -160,6 +160,14 @@ fn sum<'a>(layers: impl Iterator<Item = &'a Vec<Vec<f64>>>) -> Vec<Vec<f64>> {
     total
 }
 
+/// With how large it is and where, in these views; of a finding that is one term.
+pub fn placed(finding: Finding, scene: &Scene<'_>) -> Finding {
+    let Some(term) = finding.terms.first() else { return finding };
+    let values = scene.values(term);
+    let interval = Along::of(scene, &term.basis).interval(scene, &values);
+    Finding { interval, size: size(scene, &values), ..finding }
+}
+
 /// Every nameless curve that saw something, on the data as they came.
 pub fn map(scene: &Scene<'_>, outcome: &Outcome, level: f64) -> Vec<MapRow> {
     let of_axis = |basis: &Basis| match basis {
