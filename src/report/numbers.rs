@@ -47,6 +47,15 @@ pub(super) fn range([low, high]: [f64; 2], decimals: usize) -> String {
     if low == high { low } else { format!("{low} – {high}") }
 }
 
+/// What views are worth, and the ends of its interval; beyond a million in millions.
+pub(super) fn nats(values: [f64; 3]) -> [String; 3] {
+    let [value, ..] = values.map(f64::abs);
+    values.map(|v| match value {
+        1e6.. => format!("{} million", fixed(1e-6 * v, 1)),
+        _ => fixed(v, usize::from(value < 10.0)),
+    })
+}
+
 /// Decimals that keep two digits of `value`, four at most.
 pub(super) fn decimals_for(value: f64) -> usize {
     if !(value.is_finite() && value > 0.0) {
@@ -171,6 +180,13 @@ mod tests {
         ] {
             assert_eq!(significant(value, 3).into_string(), text);
         }
+    }
+
+    #[test]
+    fn what_views_are_worth() {
+        assert_eq!(nats([4.25, -1.0, 9.0]), ["4.2", "−1.0", "9.0"]);
+        assert_eq!(nats([48763.4, 3115.2, 132_750.1]), ["48763", "3115", "132750"]);
+        assert_eq!(nats([5.79e7, 2.3e6, 1.3e8])[0], "57.9 million");
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::diagnose::{CannotTell, Diagnosis, HeldOut, MapRow, Reference, Verdict
 use crate::report::document::{
     self, Column, answer, fold, list, prose, row, section, table, table_of,
 };
-use crate::report::numbers::{count, degrees, fixed, p_value, significant};
+use crate::report::numbers::{count, degrees, fixed, nats, p_value, significant};
 use crate::terms::Statistic;
 
 /// Rows of the map that are open; the rest folds away.
@@ -87,8 +87,7 @@ fn tiles(diagnosis: &Diagnosis) -> Markup {
 /// The final test.
 pub(super) fn held_out(held: Option<&HeldOut>) -> Markup {
     let Some(held) = held else { return html! {} };
-    let [low, high] = held.gain_interval;
-    let gain = |v: f64| fixed(v, usize::from(held.gain.abs() < 10.0));
+    let [gain, low, high] = nats([held.gain, held.gain_interval[0], held.gain_interval[1]]);
     let px = |v| format!("{} px", fixed(v, PX_DECIMALS));
     let every = "every pixel of every frame, noise included, rms";
     let score = [held.log_score_before, held.log_score_after].map(|v| fixed(v, 1));
@@ -111,10 +110,10 @@ pub(super) fn held_out(held: Option<&HeldOut>) -> Markup {
             }
             (table(&["", ">before", ">after"], rows))
             p {
-                @if low > 0.0 { "The extended model predicts such a view better by " }
+                @if held.gain_interval[0] > 0.0 { "The extended model predicts such a view better by " }
                 @else { "No gain beyond chance: the extended model differs by " }
-                b { (gain(held.gain)) " nats a view" }
-                " (95 % interval " (gain(low)) " to " (gain(high)) ", by resampling views). "
+                b { (gain) " nats a view" }
+                " (95 % interval " (low) " to " (high) ", by resampling views). "
                 span.units { "A nat more makes what was recorded e ≈ 2.7 times as probable." }
             }
         },

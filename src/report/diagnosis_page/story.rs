@@ -4,7 +4,7 @@ use super::parameters::brief;
 use super::sentences::{called, capital, join, mm};
 use crate::capture::far_side;
 use crate::diagnose::{Diagnosis, Finding, HeldOut, NextView, Status, Verdict};
-use crate::report::numbers::{count, fixed};
+use crate::report::numbers::{count, fixed, nats};
 use crate::terms::{Basis, Statistic};
 
 /// So many findings have a sentence each; with the verdict, the rest, what is gained and what is left
@@ -148,13 +148,8 @@ pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
             format!("On {aside} kept aside nothing is gained: without them the same search finds nothing.")
         });
     }
-    let gain = |v: f64| fixed(v, usize::from(h.gain.abs() < 10.0));
-    let mut gained = vec![format!(
-        "{} nats a view are gained [{}, {}]",
-        gain(h.gain),
-        gain(h.gain_interval[0]),
-        gain(h.gain_interval[1])
-    )];
+    let [gain, low, high] = nats([h.gain, h.gain_interval[0], h.gain_interval[1]]);
+    let mut gained = vec![format!("{gain} nats a view are gained [{low}, {high}]")];
     if let Some([before, after]) = smooth_residual(h) {
         gained.insert(0, format!("the smooth residual goes from {before} to {after}"));
     }
