@@ -122,7 +122,7 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
         statistic,
         axis,
         expected_px2,
-        least: if statistic == Statistic::Bias { LEAST_STILL } else { 0.0 },
+        least: 0.0,
         words,
     };
     let still = "whole columns or rows err by a constant each, from one to the next";
@@ -144,10 +144,6 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
     ];
     all.into_iter().filter_map(|(m, line)| line.found(&m?, variance, level)).collect()
 }
-
-/// Share of the variance that still lines have in common, worth a word: less is what the shapes found
-/// in the mean leave.
-const LEAST_STILL: f64 = 0.0004;
 
 #[cfg(test)]
 mod tests;

@@ -7,21 +7,20 @@ use super::texture::{SHORT_LINE, pixel_scale, without_lines};
 use crate::diagnose::views::field::Field;
 use crate::rng::Seed;
 
-/// Covariance of a view's mean residual with the other views' at the same pixels, px^2: without and
-/// with what whole lines share.
+/// Covariances of a view's mean residual with the other views', px^2: of pixels, without what whole lines share,
+/// and of whole lines, as far as it changes from one to the next.
 pub struct Still {
     pub fixed_px2: Option<f64>,
-    pub with_lines_px2: Option<f64>,
+    pub lines_px2: Option<f64>,
 }
 
 impl Still {
-    /// As a share of what a pattern of variance 1 keeps.
+    /// As a share of what a pattern of variance 1 keeps; lines beyond the mean of such a pattern's pixels.
     fn over(&self, kept: &Still) -> Still {
-        let share = |seen: Option<f64>, kept: Option<f64>| Some(seen? / kept.filter(|k| *k > 0.0)?);
-        Still {
-            fixed_px2: share(self.fixed_px2, kept.fixed_px2),
-            with_lines_px2: share(self.with_lines_px2, kept.with_lines_px2),
-        }
+        let fixed_px2 =
+            self.fixed_px2.zip(kept.fixed_px2.filter(|k| *k > 0.0)).map(|(seen, kept)| seen / kept);
+        let of_pattern = fixed_px2.zip(kept.lines_px2).map_or(0.0, |(px2, kept)| px2 * kept);
+        Still { fixed_px2, lines_px2: self.lines_px2.map(|seen| seen - of_pattern) }
     }
 }
 
@@ -55,11 +54,35 @@ fn covariances(
     image: impl Fn(&Field, &[f32]) -> Vec<f32> + Sync,
 ) -> Vec<Still> {
     let mut images: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| image(f, b)).collect();
-    let with_lines = across_views(&images);
+    let profiles: Vec<Vec<f32>> =
+        images.par_iter().zip(views).map(|(m, (f, _))| sharp_lines(m, f.width)).collect();
+    let lines = across_views(&profiles, FEWEST_PAIRS[1]);
     let of_views = images.par_iter_mut().zip(views);
     of_views.for_each(|(m, (f, _))| *m = without_lines(m, f.width, SHORT_LINE));
-    let both = across_views(&images).into_iter().zip(with_lines);
-    both.map(|(fixed_px2, with_lines_px2)| Still { fixed_px2, with_lines_px2 }).collect()
+    let both = across_views(&images, FEWEST_PAIRS[0]).into_iter().zip(lines);
+    both.map(|(fixed_px2, lines_px2)| Still { fixed_px2, lines_px2 }).collect()
+}
+
+/// Of fewer pixels, and of fewer lines, that another view saw as well nothing is told.
+const FEWEST_PAIRS: [f64; 2] = [1000.0, 100.0];
+
+/// What the mean of each column, then of each row, has beyond the mean of its neighbours'; NaN where one of
+/// them is short. What is smooth, as leftovers of shapes are, is not in it; lines that err independently
+/// keep their variance.
+fn sharp_lines(image: &[f32], width: usize) -> Vec<f32> {
+    let height = image.len() / width.max(1);
+    let mut sums = vec![(0.0, 0usize); width + height];
+    for (i, r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
+        for line in [i % width, width + i / width] {
+            sums[line].0 += f64::from(*r);
+            sums[line].1 += 1;
+        }
+    }
+    let mean = |(sum, n): &(f64, usize)| if *n >= SHORT_LINE { sum / *n as f64 } else { f64::NAN };
+    let means: Vec<f64> = sums.iter().map(mean).collect();
+    let (columns, rows) = means.split_at(width);
+    let sharp = |w: &[f64]| ((w[1] - 0.5 * (w[0] + w[2])) * (2.0f64 / 3.0).sqrt()) as f32;
+    [columns, rows].iter().flat_map(|lines| lines.windows(3).map(sharp)).collect()
 }
 
 /// Heads or tails for each pixel of the picture: a pattern whose variance is 1 wherever it is seen.
@@ -74,8 +97,8 @@ fn tossed(field: &Field, coins: &[f32]) -> Vec<f32> {
     pixels.map(|(&i, mean)| if mean.is_finite() { coins[i as usize] } else { f32::NAN }).collect()
 }
 
-/// Mean product of each view's mean residual with the mean of the others', px^2.
-fn across_views(means: &[Vec<f32>]) -> Vec<Option<f64>> {
+/// Mean product of each view's values with the mean of the others', px^2.
+fn across_views(means: &[Vec<f32>], fewest: f64) -> Vec<Option<f64>> {
     let n = means.iter().map(Vec::len).max().unwrap_or(0);
     let mut sum = vec![0f32; n];
     let mut count = vec![0u16; n];
@@ -97,7 +120,7 @@ fn across_views(means: &[Vec<f32>]) -> Vec<Option<f64>> {
                 n += others;
             }
         }
-        (n > 1000.0).then(|| products / n)
+        (n > fewest).then(|| products / n)
     };
     means.par_iter().map(of).collect()
 }
@@ -110,16 +133,13 @@ mod tests {
     use crate::plane::Plane;
     use crate::simulate::kinect_v1;
 
-    /// A pattern of 0.01 px up or down and no noise, on targets of very different sizes: of its variance
-    /// the means that are taken out take 4 to 9 % (numpy), and it has nothing that lines share.
-    #[test]
-    fn a_pattern_keeps_its_size_on_small_targets() {
-        const PATTERN_PX: f64 = 0.01;
+    const PATTERN_PX: f64 = 0.01;
+
+    /// Without noise, on targets of very different sizes, with this error at each pixel: what pixels and what
+    /// lines have in common, over the error's variance.
+    fn seen(pattern: impl Fn(usize) -> f64) -> Vec<[f64; 2]> {
         let camera = kinect_v1(1).camera;
         let (width, height) = (camera.width, camera.height);
-        let mut rng = Seed(5).stream("still");
-        let mut toss = || if rng.random_bool(0.5) { PATTERN_PX } else { -PATTERN_PX };
-        let pattern: Vec<f64> = (0..width * height).map(|_| toss()).collect();
         let fields: Vec<Field> = [36, 48, 60, 100, 160, 220]
             .map(|side| {
                 let at = |i: &usize| {
@@ -130,22 +150,52 @@ mod tests {
                 let pixels: Vec<u32> = (0..width * height).filter(at).map(|i| i as u32).collect();
                 let plane = Plane { q: Vector3::new(0.0, 0.0, 1.0) };
                 let mut field = Field::unseen(plane, 40.0, [width, height], pixels);
-                field.mean = field.pixels.iter().map(|&i| pattern[i as usize] as f32).collect();
+                field.mean = field.pixels.iter().map(|&i| pattern(i as usize) as f32).collect();
                 field
             })
             .into();
         let kept = KeptPattern::of(&fields);
-        let seen: Vec<[f64; 2]> = still(&beside_bias(&fields, &[]), &kept)
-            .iter()
-            .map(|s| [s.fixed_px2, s.with_lines_px2])
-            .map(|both| both.map(|px2| px2.expect("large enough") / PATTERN_PX.powi(2)))
-            .collect();
-        println!("{seen:.4?}");
+        let of_view = |s: &Still| [s.fixed_px2, s.lines_px2].map(|px2| px2.expect("large enough"));
+        let seen = still(&beside_bias(&fields, &[]), &kept);
+        seen.iter().map(|s| of_view(s).map(|px2| px2 / PATTERN_PX.powi(2))).collect()
+    }
+
+    /// Of the variance of pixels up or down the means that are taken out take 4 to 9 % (numpy), and lines
+    /// share nothing.
+    #[test]
+    fn a_pattern_keeps_its_size_on_small_targets() {
+        let mut rng = Seed(5).stream("still");
+        let size = kinect_v1(1).camera;
+        let mut toss = || if rng.random_bool(0.5) { PATTERN_PX } else { -PATTERN_PX };
+        let pattern: Vec<f64> = (0..size.width * size.height).map(|_| toss()).collect();
+        let seen = seen(|i| pattern[i]);
         // The coins' own products, of pixels that are not the same, make three hundredths on the smallest.
-        for [fixed, with_lines] in &seen {
-            assert!((fixed - 1.0).abs() < 0.05 && (with_lines - fixed).abs() < 0.05, "{seen:?}");
+        for [fixed, lines] in &seen {
+            assert!((fixed - 1.0).abs() < 0.05 && lines.abs() < 0.05, "{seen:?}");
         }
         let mean = seen.iter().map(|s| s[0]).sum::<f64>() / seen.len() as f64;
         assert!((mean - 1.0).abs() < 0.02, "{mean}");
+    }
+
+    /// Every second column is two heights off its neighbours: 2/3 of four times the columns' variance, and rows,
+    /// which are as many, have none. Means over 49 and 7 px are 1/49 and -1/7 of the column's own error.
+    #[test]
+    fn columns_of_two_readouts_are_lines_and_no_pattern() {
+        let width = kinect_v1(1).camera.width;
+        let seen = seen(|i| if (i % width).is_multiple_of(2) { PATTERN_PX } else { -PATTERN_PX });
+        let passed: f64 = (1.0 - 1.0 / 49.0) * (1.0 + 1.0 / 7.0);
+        for [fixed, lines] in &seen {
+            assert!(fixed.abs() < 0.01, "{seen:?}");
+            assert!((lines - 4.0 / 3.0 * passed * passed).abs() < 0.02, "{seen:?}");
+        }
+    }
+
+    /// Bands of many columns are shapes of the mean's: what one is off by makes few lines.
+    #[test]
+    fn wide_bands_are_no_single_lines() {
+        let width = kinect_v1(1).camera.width as f64;
+        let wave = |i: usize| (i as f64 % width / 48.0 * std::f64::consts::TAU).sin();
+        let seen = seen(|i| PATTERN_PX * wave(i));
+        assert!(seen.iter().all(|[_, lines]| lines.abs() < 0.001), "{seen:?}");
     }
 }

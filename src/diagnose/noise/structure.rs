@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::kurtosis::FourthMoment;
 use super::pairs::Pairs;
-use super::still::{KeptPattern, Still, beside_bias, still};
+use super::still::{KeptPattern, beside_bias, still};
 use super::tail_counts::{FEWEST_READINGS, TailCounts};
 use super::texture::{
     FAR, Filled, PROFILE_LAGS, SHORT_LINE, area, changes, covariance, frame_log_variance,
@@ -36,7 +36,7 @@ pub struct Structure {
     pub frame_log_variance: [Option<f64>; FRAMES_KEPT],
     /// Covariance of the mean residual with the other views' at the same pixels, px^2.
     pub fixed_px2: Option<f64>,
-    /// The part of it that whole columns and rows share, px^2.
+    /// The same of whole columns and rows, as far as it changes from one to the next, px^2.
     pub lines_px2: Option<f64>,
     /// Variance that a row (a column) of one frame shares, px^2.
     pub row_px2: Option<f64>,
@@ -107,9 +107,7 @@ pub fn structures(fields: &[Field], bias: &[Vec<f32>], kept: &KeptPattern) -> Ve
     let views = beside_bias(fields, bias);
     let mut all: Vec<Structure> = views.par_iter().map(|(f, b)| structure(f, b)).collect();
     for (s, still) in all.iter_mut().zip(still(&views, kept)) {
-        let Still { fixed_px2, with_lines_px2 } = still;
-        s.fixed_px2 = fixed_px2;
-        s.lines_px2 = with_lines_px2.zip(fixed_px2).map(|(all, fixed)| all - fixed);
+        (s.fixed_px2, s.lines_px2) = (still.fixed_px2, still.lines_px2);
     }
     all
 }
