@@ -49,7 +49,14 @@ impl Choice<'_> {
             self.rules.agreed.then(|| self.ranked(false, |i| self.dispersion_corrected_gain(i)));
         let curve = || {
             let ranked = agreed.as_ref().unwrap_or(&curves);
-            ranked.iter().copied().find(|&i| self.calibrated_gain(i) > threshold && new(i))
+            let mut clear =
+                ranked.iter().copied().filter(|&i| self.calibrated_gain(i) > threshold && new(i));
+            let best = clear.next()?;
+            // What is left of a map beside a curve over one coordinate is looked for next.
+            let is_map = |i: usize| matches!(self.candidates[i].basis, Basis::Map { .. });
+            let as_much = |i: usize| self.total(i) > CLEAR * self.total(best);
+            let simpler = is_map(best).then(|| clear.find(|&i| !is_map(i) && as_much(i)));
+            Some(simpler.flatten().unwrap_or(best))
         };
         let winner = self.name(&families, &curves).or_else(curve)?;
         Some(Chosen {
