@@ -53,11 +53,14 @@ pub struct Battery {
 
 /// Lines that were learnt are told by their profile alone.
 fn tell_lines_once(found: &mut Vec<Finding>) {
-    let of_columns = |f: &Finding| f.axis == Axis::Column;
-    if found.iter().any(|f| of_columns(f) && !f.terms.is_empty()) {
-        let bare = |f: &Finding| f.effect.is_none() && f.terms.is_empty();
-        found.retain(|f| !(of_columns(f) && f.statistic == Statistic::Bias && bare(f)));
-    }
+    let learnt: Vec<Axis> = found.iter().filter(|f| !f.terms.is_empty()).map(|f| f.axis).collect();
+    found.retain(|f| !(are_lines(f) && f.terms.is_empty() && learnt.contains(&f.axis)));
+}
+
+/// Of columns or rows that stand still, without a name.
+fn are_lines(f: &Finding) -> bool {
+    let of_lines = matches!(f.axis, Axis::Column | Axis::Row);
+    f.effect.is_none() && f.statistic == Statistic::Bias && of_lines
 }
 
 /// Curves of the mean and of the variance, named or not.
@@ -213,12 +216,9 @@ impl Case<'_> {
         let textures = textures.map(told).chain(self.overstated(scatter));
         let mut found: Vec<Finding> = textures.chain(steps).collect();
         // Lines that stand still have no name, but they can be learnt.
-        let stands = |f: &&mut Finding| {
-            f.effect.is_none() && f.statistic == Statistic::Bias && f.axis == Axis::Column
-        };
         if self.baseline.is_none() {
-            for f in found.iter_mut().filter(stands) {
-                (f.terms, f.covariance.variances) = lines(&self.fields, &mean.px);
+            for f in found.iter_mut().filter(|f| are_lines(f)) {
+                (f.terms, f.covariance.variances) = lines(&self.fields, &mean.px, f.axis);
             }
         }
         found

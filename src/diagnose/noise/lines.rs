@@ -1,11 +1,11 @@
-//! Whole columns and rows that err by a constant each: their profile, as terms of the model.
+//! Whole columns, or rows, that err by a constant each: their profile, as a term of the model.
 
 use rayon::prelude::*;
 
 use super::still::beside_bias;
 use super::texture::pixel_scale;
 use crate::diagnose::views::field::Field;
-use crate::terms::{Basis, Coordinate, Modulation, Term};
+use crate::terms::{Axis, Basis, Coordinate, Modulation, Term};
 
 /// Columns and rows of fewer readings over all views are left at nothing.
 const FEWEST_READINGS: f64 = 200.0;
@@ -13,36 +13,33 @@ const FEWEST_READINGS: f64 = 200.0;
 /// What a line's readings sum to in one view, and how many they are.
 type Sums = Vec<(f64, f64)>;
 
-/// The mean of every column and row over the views, px, without what is smooth; `bias` has what is
-/// known to be no noise, by view and pixel, px. As terms, with the variance of each coefficient, px^2.
-pub fn lines(fields: &[Field], bias: &[Vec<f32>]) -> (Vec<Term>, Vec<f64>) {
+/// The mean of every column, or of every row, over the views, px, without what is smooth; `bias` has what is
+/// known to be no noise, by view and pixel, px. As a term, with the variance of each coefficient, px^2.
+pub fn lines(fields: &[Field], bias: &[Vec<f32>], axis: Axis) -> (Vec<Term>, Vec<f64>) {
     let Some(first) = fields.first() else { return Default::default() };
     let (width, height) = (first.width, first.height);
-    let by_view: Vec<[Sums; 2]> = beside_bias(fields, bias)
+    let (over, nodes) = match axis {
+        Axis::Row => (Coordinate::Row, height),
+        _ => (Coordinate::Column, width),
+    };
+    let by_view: Vec<Sums> = beside_bias(fields, bias)
         .par_iter()
         .map(|(field, bias)| {
-            let mut sums = [vec![(0.0, 0.0); width], vec![(0.0, 0.0); height]];
+            let mut sums = vec![(0.0, 0.0); nodes];
             let image = pixel_scale(field, &field.mean, bias);
             for (i, &r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
-                for (sums, line) in sums.iter_mut().zip([i % width, i / width]) {
-                    sums[line].0 += f64::from(r);
-                    sums[line].1 += 1.0;
-                }
+                let line = if axis == Axis::Row { i / width } else { i % width };
+                sums[line].0 += f64::from(r);
+                sums[line].1 += 1.0;
             }
             sums
         })
         .collect();
-    let (mut terms, mut all_variances) = (Vec::new(), Vec::new());
-    for (k, over) in [Coordinate::Column, Coordinate::Row].into_iter().enumerate() {
-        let nodes = [width, height][k];
-        let lines = (0..nodes).map(|line| mean(by_view.iter().map(|sums| sums[k][line])));
-        let (coefficients, variances): (Vec<f64>, Vec<f64>) = lines.unzip();
-        all_variances.extend(variances);
-        let high = nodes.saturating_sub(1) as f64;
-        let profile = Basis::Curve { over, low: 0.0, high, nodes, times: Modulation::One };
-        terms.push(Term::bias(profile, coefficients));
-    }
-    (terms, all_variances)
+    let lines = (0..nodes).map(|line| mean(by_view.iter().map(|sums| sums[line])));
+    let (coefficients, variances): (Vec<f64>, Vec<f64>) = lines.unzip();
+    let high = nodes.saturating_sub(1) as f64;
+    let profile = Basis::Curve { over, low: 0.0, high, nodes, times: Modulation::One };
+    (vec![Term::bias(profile, coefficients)], variances)
 }
 
 /// Mean of a line, and its variance with the views as the sample.

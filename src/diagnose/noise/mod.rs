@@ -125,24 +125,29 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
         least: 0.0,
         words,
     };
-    let still = "whole columns or rows err by a constant each, from one to the next";
     let afresh = "each column is shifted as one, afresh in every frame";
     let row = known_px * known_px;
+    let still = |k: usize, axis, words| {
+        let known_px2 = known.error_of_lines_px2(axis);
+        let line = line(vec![], Statistic::Bias, axis, known_px2, Some(words));
+        // Columns and rows have one error rate.
+        (ViewMean::of_pairs(views, move |s| s.lines_px2[k]), line, 0.5 * level)
+    };
     let all = [
-        (
-            ViewMean::of_pairs(views, |s| s.lines_px2),
-            line(vec![], Statistic::Bias, Axis::Column, known.error_of_lines_px2(), Some(still)),
-        ),
+        still(0, Axis::Column, "whole columns err by a constant each, from one to the next"),
+        still(1, Axis::Row, "whole rows err by a constant each, from one to the next"),
         (
             ViewMean::of(views, |s| s.row_px2),
             line(vec![ROW_NOISE], Statistic::Correlation, Axis::Row, row, None),
+            level,
         ),
         (
             ViewMean::of(views, |s| s.column_px2),
             line(vec![], Statistic::Correlation, Axis::Column, 0.0, Some(afresh)),
+            level,
         ),
     ];
-    all.into_iter().filter_map(|(m, line)| line.found(&m?, variance, level)).collect()
+    all.into_iter().filter_map(|(m, line, level)| line.found(&m?, variance, level)).collect()
 }
 
 #[cfg(test)]

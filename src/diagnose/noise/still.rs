@@ -8,10 +8,10 @@ use crate::diagnose::views::field::Field;
 use crate::rng::Seed;
 
 /// Covariances of a view's mean residual with the other views', px^2: of pixels, without what whole lines share,
-/// and of whole lines, as far as it changes from one to the next.
+/// of whole columns and of whole rows, as far as they change from one to the next.
 pub struct Still {
     pub fixed_px2: Option<f64>,
-    pub lines_px2: Option<f64>,
+    pub lines_px2: [Option<f64>; 2],
 }
 
 impl Still {
@@ -19,8 +19,11 @@ impl Still {
     fn over(&self, kept: &Still) -> Still {
         let fixed_px2 =
             self.fixed_px2.zip(kept.fixed_px2.filter(|k| *k > 0.0)).map(|(seen, kept)| seen / kept);
-        let of_pattern = fixed_px2.zip(kept.lines_px2).map_or(0.0, |(px2, kept)| px2 * kept);
-        Still { fixed_px2, lines_px2: self.lines_px2.map(|seen| seen - of_pattern) }
+        let beyond = |k: usize| {
+            let of_pattern = fixed_px2.zip(kept.lines_px2[k]).map_or(0.0, |(px2, kept)| px2 * kept);
+            self.lines_px2[k].map(|seen| seen - of_pattern)
+        };
+        Still { fixed_px2, lines_px2: [beyond(0), beyond(1)] }
     }
 }
 
@@ -54,22 +57,22 @@ fn covariances(
     image: impl Fn(&Field, &[f32]) -> Vec<f32> + Sync,
 ) -> Vec<Still> {
     let mut images: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| image(f, b)).collect();
-    let profiles: Vec<Vec<f32>> =
-        images.par_iter().zip(views).map(|(m, (f, _))| sharp_lines(m, f.width)).collect();
-    let lines = across_views(&profiles, FEWEST_PAIRS[1]);
+    let profiles = images.par_iter().zip(views).map(|(m, (f, _))| sharp_lines(m, f.width));
+    let (columns, rows): (Vec<_>, Vec<_>) = profiles.unzip();
+    let [columns, rows] = [columns, rows].map(|lines| across_views(&lines, FEWEST_PAIRS[1]));
     let of_views = images.par_iter_mut().zip(views);
     of_views.for_each(|(m, (f, _))| *m = without_lines(m, f.width, SHORT_LINE));
-    let both = across_views(&images, FEWEST_PAIRS[0]).into_iter().zip(lines);
-    both.map(|(fixed_px2, lines_px2)| Still { fixed_px2, lines_px2 }).collect()
+    let all = across_views(&images, FEWEST_PAIRS[0]).into_iter().zip(columns.into_iter().zip(rows));
+    all.map(|(fixed_px2, (u, v))| Still { fixed_px2, lines_px2: [u, v] }).collect()
 }
 
 /// Of fewer pixels, and of fewer lines, that another view saw as well nothing is told.
 const FEWEST_PAIRS: [f64; 2] = [1000.0, 100.0];
 
-/// What the mean of each column, then of each row, has beyond the mean of its neighbours'; NaN where one of
+/// What the mean of each column, and of each row, has beyond the mean of its neighbours'; NaN where one of
 /// them is short. What is smooth, as leftovers of shapes are, is not in it; lines that err independently
 /// keep their variance.
-fn sharp_lines(image: &[f32], width: usize) -> Vec<f32> {
+fn sharp_lines(image: &[f32], width: usize) -> (Vec<f32>, Vec<f32>) {
     let height = image.len() / width.max(1);
     let mut sums = vec![(0.0, 0usize); width + height];
     for (i, r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
@@ -82,7 +85,7 @@ fn sharp_lines(image: &[f32], width: usize) -> Vec<f32> {
     let means: Vec<f64> = sums.iter().map(mean).collect();
     let (columns, rows) = means.split_at(width);
     let sharp = |w: &[f64]| ((w[1] - 0.5 * (w[0] + w[2])) * (2.0f64 / 3.0).sqrt()) as f32;
-    [columns, rows].iter().flat_map(|lines| lines.windows(3).map(sharp)).collect()
+    (columns.windows(3).map(sharp).collect(), rows.windows(3).map(sharp).collect())
 }
 
 /// Heads or tails for each pixel of the picture: a pattern whose variance is 1 wherever it is seen.
@@ -135,9 +138,9 @@ mod tests {
 
     const PATTERN_PX: f64 = 0.01;
 
-    /// Without noise, on targets of very different sizes, with this error at each pixel: what pixels and what
-    /// lines have in common, over the error's variance.
-    fn seen(pattern: impl Fn(usize) -> f64) -> Vec<[f64; 2]> {
+    /// Without noise, on targets of very different sizes, with this error at each pixel: what pixels, columns
+    /// and rows have in common, over the error's variance.
+    fn seen(pattern: impl Fn(usize) -> f64) -> Vec<[f64; 3]> {
         let camera = kinect_v1(1).camera;
         let (width, height) = (camera.width, camera.height);
         let fields: Vec<Field> = [36, 48, 60, 100, 160, 220]
@@ -155,7 +158,8 @@ mod tests {
             })
             .into();
         let kept = KeptPattern::of(&fields);
-        let of_view = |s: &Still| [s.fixed_px2, s.lines_px2].map(|px2| px2.expect("large enough"));
+        let all = |s: &Still| [s.fixed_px2, s.lines_px2[0], s.lines_px2[1]];
+        let of_view = |s: &Still| all(s).map(|px2| px2.expect("large enough"));
         let seen = still(&beside_bias(&fields, &[]), &kept);
         seen.iter().map(|s| of_view(s).map(|px2| px2 / PATTERN_PX.powi(2))).collect()
     }
@@ -170,23 +174,24 @@ mod tests {
         let pattern: Vec<f64> = (0..size.width * size.height).map(|_| toss()).collect();
         let seen = seen(|i| pattern[i]);
         // The coins' own products, of pixels that are not the same, make three hundredths on the smallest.
-        for [fixed, lines] in &seen {
-            assert!((fixed - 1.0).abs() < 0.05 && lines.abs() < 0.05, "{seen:?}");
+        for [fixed, columns, rows] in &seen {
+            let of_lines = columns.abs().max(rows.abs());
+            assert!((fixed - 1.0).abs() < 0.05 && of_lines < 0.05, "{seen:?}");
         }
         let mean = seen.iter().map(|s| s[0]).sum::<f64>() / seen.len() as f64;
         assert!((mean - 1.0).abs() < 0.02, "{mean}");
     }
 
-    /// Every second column is two heights off its neighbours: 2/3 of four times the columns' variance, and rows,
-    /// which are as many, have none. Means over 49 and 7 px are 1/49 and -1/7 of the column's own error.
+    /// Every second column is two heights off its neighbours: 2/3 of four times the columns' variance. Means
+    /// over 49 and 7 px are 1/49 and -1/7 of the column's own error.
     #[test]
     fn columns_of_two_readouts_are_lines_and_no_pattern() {
         let width = kinect_v1(1).camera.width;
         let seen = seen(|i| if (i % width).is_multiple_of(2) { PATTERN_PX } else { -PATTERN_PX });
         let passed: f64 = (1.0 - 1.0 / 49.0) * (1.0 + 1.0 / 7.0);
-        for [fixed, lines] in &seen {
-            assert!(fixed.abs() < 0.01, "{seen:?}");
-            assert!((lines - 4.0 / 3.0 * passed * passed).abs() < 0.02, "{seen:?}");
+        for [fixed, columns, rows] in &seen {
+            assert!(fixed.abs().max(rows.abs()) < 0.01, "{seen:?}");
+            assert!((columns - 8.0 / 3.0 * passed * passed).abs() < 0.04, "{seen:?}");
         }
     }
 
@@ -196,6 +201,6 @@ mod tests {
         let width = kinect_v1(1).camera.width as f64;
         let wave = |i: usize| (i as f64 % width / 48.0 * std::f64::consts::TAU).sin();
         let seen = seen(|i| PATTERN_PX * wave(i));
-        assert!(seen.iter().all(|[_, lines]| lines.abs() < 0.001), "{seen:?}");
+        assert!(seen.iter().all(|[_, columns, _]| columns.abs() < 0.002), "{seen:?}");
     }
 }

@@ -37,7 +37,7 @@ pub struct Structure {
     /// Covariance of the mean residual with the other views' at the same pixels, px^2.
     pub fixed_px2: Option<f64>,
     /// The same of whole columns and rows, as far as it changes from one to the next, px^2.
-    pub lines_px2: Option<f64>,
+    pub lines_px2: [Option<f64>; 2],
     /// Variance that a row (a column) of one frame shares, px^2.
     pub row_px2: Option<f64>,
     pub column_px2: Option<f64>,

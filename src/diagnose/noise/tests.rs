@@ -37,7 +37,7 @@ fn plain(rng: &mut Stream) -> Vec<Structure> {
             window_px: Some(1.0 + SCATTER * normal(rng)),
             lagged: std::array::from_fn(|_| Some(SCATTER * normal(rng))),
             fixed_px2: Some(1e-4 * normal(rng)),
-            lines_px2: Some(1e-4 * normal(rng)),
+            lines_px2: std::array::from_fn(|_| Some(1e-4 * normal(rng))),
             row_px2: Some(1e-4 * normal(rng)),
             column_px2: Some(1e-4 * normal(rng)),
             ..Structure::default()
@@ -176,7 +176,7 @@ fn columns_that_move_as_one_have_no_name() {
     type Add = fn(&mut Structure);
     let cases: [(Add, Statistic); 2] = [
         (|s| s.column_px2 = s.column_px2.map(|c| c + 0.01), Statistic::Correlation),
-        (|s| s.lines_px2 = s.lines_px2.map(|c| c + 0.01), Statistic::Bias),
+        (|s| s.lines_px2[0] = s.lines_px2[0].map(|c| c + 0.01), Statistic::Bias),
     ];
     for (add, statistic) in cases {
         let mut rng = Seed(4).stream("noise/columns");

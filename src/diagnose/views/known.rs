@@ -8,7 +8,7 @@ use crate::camera::Camera;
 use crate::effects::{self, RAY_FOR_DEPTH};
 use crate::model::{Covariance, NoiseModel, UNEXPLAINED};
 use crate::stats::mean;
-use crate::terms::{Basis, Statistic, Term, by_term};
+use crate::terms::{Axis, Basis, Statistic, Term, by_term};
 
 /// The model's effects as terms, and the rest by name.
 #[derive(Debug, Clone, Default)]
@@ -154,10 +154,11 @@ impl KnownTerms {
         fitted.flat_map(of).collect()
     }
 
-    /// Variance of what learnt profiles of single columns and rows may be off by, px^2.
-    pub fn error_of_lines_px2(&self) -> f64 {
+    /// Variance of what learnt profiles of single columns, or of single rows, may be off by, px^2.
+    pub fn error_of_lines_px2(&self, axis: Axis) -> f64 {
         let of = |(shape, covariance): &(Vec<Term>, Covariance)| -> f64 {
             by_term(shape, &covariance.variances)
+                .filter(|(term, _)| term.basis.axis() == axis)
                 .filter_map(|(_, mine)| mean(mine.iter().copied()))
                 .sum()
         };
