@@ -37,6 +37,7 @@ mod invariances;
 mod layouts;
 #[cfg(unix)] // pipes
 mod limits;
+mod lines;
 mod map;
 mod measure;
 mod metrics;

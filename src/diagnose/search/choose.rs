@@ -236,3 +236,30 @@ pub fn behind(winner: &[f64], rival: &[f64]) -> f64 {
     let variance = differences().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
     if variance > 0.0 { mean / (variance / n).sqrt() } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::diagnose::search::candidate::Candidate;
+    use crate::diagnose::search::search;
+    use crate::diagnose::search::tests::{RULES, session};
+    use crate::rng::Seed;
+    use crate::terms::{Axis, Basis, Coordinate, Modulation, PixelContext};
+
+    /// A ramp down the rows with a little over the columns is a ramp, and the little comes next; what
+    /// depends on both as much is a map.
+    #[test]
+    fn a_map_is_for_what_depends_on_both() {
+        type Bias = fn(&PixelContext) -> f64;
+        let ramp: Bias = |p| 1.5 * p.v / 480.0 + 0.15 * p.u / 640.0;
+        let hill: Bias = |p| (-((p.u - 300.0).powi(2) + (p.v - 200.0).powi(2)) / 2e4).exp();
+        let (over, times) = (Coordinate::Row, Modulation::One);
+        let rows = Basis::Curve { over, low: 0.0, high: 479.0, nodes: 9, times };
+        let map = Basis::Map { width: 640.0, height: 480.0, across: 6, down: 4, times };
+        let candidates = [rows, map].map(Candidate::curve);
+        for (seed, bias, axis) in [(1, ramp, Axis::Row), (2, hill, Axis::Pixel)] {
+            let views = session(&mut Seed(seed).stream("choose"), bias);
+            let outcome = search(&views, &views, &candidates, None, &RULES, Seed(seed));
+            assert_eq!(outcome.chosen[0].candidate.basis.axis(), axis);
+        }
+    }
+}

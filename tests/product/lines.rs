@@ -1,0 +1,56 @@
+//! Single columns, or rows, that err by a constant each: told as such, and learnt.
+
+use kinoise::diagnose::{DiagnoseOptions, Diagnosed, Status, Verdict, diagnose};
+use kinoise::effects::Active;
+use kinoise::io::{Assumed, open};
+use kinoise::model::{Effect, UNEXPLAINED};
+use kinoise::scene::Target;
+use kinoise::simulate::{Grid, Physics, Shoot, kinect_v1};
+use kinoise::terms::{Axis, Basis, Coordinate, Modulation, Statistic, Term};
+use kinoise::{NoiseModel, Seed, SigmaModel};
+
+/// A quarter of a Kinect's picture each way.
+const BINNING: usize = 4;
+const SIZE: [usize; 2] = [160, 120];
+
+/// A wall in twelve views of six frames, with this error at each column (row), px, held against the plain model.
+fn diagnosis(over: Coordinate, error_px: impl Fn(usize) -> f64) -> Diagnosed {
+    let nodes = if over == Coordinate::Row { SIZE[1] } else { SIZE[0] };
+    let high = nodes as f64 - 1.0;
+    let basis = Basis::Curve { over, low: 0.0, high, nodes, times: Modulation::One };
+    let shape = vec![Term::bias(basis, (0..nodes).map(error_px).collect())];
+    let effect = Effect { id: UNEXPLAINED.into(), shape, ..Effect::default() };
+    let folder = tempfile::tempdir().expect("a folder");
+    let tilts_rad = vec![0.0, 0.3, 0.6];
+    let poses = Grid { distances_m: vec![1.0, 1.5, 2.0, 2.5], tilts_rad }.views();
+    let sigma = SigmaModel::paper();
+    let (sensor, target) = (kinect_v1(BINNING), Target::Wall);
+    let mut shoot = Shoot::plain(sensor, target, &poses, 6, sigma.clone(), Seed(11));
+    let effects = Active::all_of_model(&[effect]).expect("effects");
+    shoot.physics = Physics::Formula { sigma, effects };
+    shoot.write(folder.path(), &|_, _| ()).expect("written");
+    let recording = open(folder.path(), &Assumed::default()).expect("a recording");
+    let options = DiagnoseOptions::default();
+    diagnose(&recording, &NoiseModel::paper(), &options, &|_, _| ()).expect("diagnosed")
+}
+
+/// Two read-outs, one for even lines and one for odd: smooth curves see nothing of it, and it is a few
+/// ten-thousandths of the noise's variance.
+#[test]
+fn lines_of_two_readouts_are_seen_and_learnt() {
+    let error_px = |line: usize| if line.is_multiple_of(2) { 3e-4 } else { -3e-4 };
+    for (over, axis) in [(Coordinate::Column, Axis::Column), (Coordinate::Row, Axis::Row)] {
+        let said = diagnosis(over, error_px).diagnosis;
+        let found: Vec<_> =
+            said.findings.iter().filter(|f| f.status != Status::NotIdentifiable).collect();
+        let told: Vec<_> = found.iter().map(|f| (f.effect, f.statistic, f.axis)).collect();
+        assert_eq!(told, [(None, Statistic::Bias, axis)]);
+        assert_eq!(said.after.verdict, Verdict::Match, "{:?}", said.after.remaining);
+        let [profile] = &found[0].terms[..] else { panic!("one profile") };
+        // The mean over seven lines that is taken out has a seventh of the middle one's, of the other sign.
+        let known = || profile.coefficients.iter().enumerate().filter(|(_, c)| **c != 0.0);
+        let (n, along) = (known().count(), known().map(|(k, c)| c / error_px(k)).sum::<f64>());
+        let height = along / n as f64;
+        assert!(n > SIZE[1] / 2 && (height - 8.0 / 7.0).abs() < 0.25, "{height} of {n} {axis:?}");
+    }
+}
