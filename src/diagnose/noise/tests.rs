@@ -37,7 +37,7 @@ fn plain(rng: &mut Stream) -> Vec<Structure> {
             window_px: Some(1.0 + SCATTER * normal(rng)),
             lagged: std::array::from_fn(|_| Some(SCATTER * normal(rng))),
             fixed_px2: Some(1e-4 * normal(rng)),
-            lines_px2: std::array::from_fn(|_| Some(1e-4 * normal(rng))),
+            lines_px2: [Some(1e-4 * normal(rng)); 2],
             row_px2: Some(1e-4 * normal(rng)),
             column_px2: Some(1e-4 * normal(rng)),
             ..Structure::default()
