@@ -49,6 +49,8 @@ pub struct Measurements {
     pub views: Vec<ViewMeasurement>,
     /// Views that could not be opened or measured, and why.
     pub excluded: Vec<Excluded>,
+    /// Where many of these are flat as ranges: that they are, in words.
+    pub ranges: Option<String>,
 }
 
 #[derive(Debug, Clone)]
@@ -72,13 +74,13 @@ pub fn measure(
 ) -> Result<Measurements> {
     let bench = Workbench::new(&recording.sensor, *options);
     let (views, excluded) = recording.each_view(progress, |view| measure_view(view, &bench));
-    let (measurements, total) = (Measurements { views, excluded }, recording.views.len());
+    let ranges = ranges_remark(recording, &excluded, &bench);
+    let (measurements, total) = (Measurements { views, excluded, ranges }, recording.views.len());
     if measurements.views.is_empty() {
         let first = measurements.excluded.first();
         let first = first.map(|e| format!("view {}: {}", e.view, e.reason));
         let first = first.unwrap_or_else(|| "there is no view".to_string());
-        let ranges = ranges_remark(recording, &measurements.excluded, &bench);
-        let ranges = ranges.map_or_else(String::new, |remark| format!("; {remark}"));
+        let ranges = measurements.ranges.map_or_else(String::new, |remark| format!("; {remark}"));
         return Err(Error::recording(
             &recording.root,
             format!("no view of {total} can be used; the first: {first}{ranges}"),
@@ -237,9 +239,7 @@ fn hashes(recording: &Recording, measurements: &Measurements) -> Result<Map<Stri
 
 /// What a person should know before trusting the model, the most important first.
 fn warnings_of(recording: &Recording, measurements: &Measurements, fit: &SigmaFit) -> Vec<String> {
-    let bench = Workbench::new(&recording.sensor, MeasureOptions::default());
-    let ranges = ranges_remark(recording, &measurements.excluded, &bench);
-    let mut warnings: Vec<String> = ranges.into_iter().collect();
+    let mut warnings: Vec<String> = measurements.ranges.iter().cloned().collect();
     warnings.extend(measurements.excluded.iter().map(ToString::to_string));
     // Views left out while opening stand here too.
     warnings.extend(recording.remarks.iter().cloned());

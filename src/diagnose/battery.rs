@@ -17,7 +17,7 @@ use super::finding::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::finding::scene::Scene;
 use super::missing::shapes::Step;
 use super::missing::{self, DropoutOutcome, missing};
-use super::noise::lines::lines;
+use super::noise::lines::learn;
 use super::noise::scatter::ScatterResult;
 use super::noise::tails::EXCESS;
 use super::noise::texture_finding::TextureFinding;
@@ -53,7 +53,8 @@ pub struct Battery {
 
 /// Lines that were learnt are told by their profile alone.
 fn tell_lines_once(found: &mut Vec<Finding>) {
-    let learnt: Vec<Axis> = found.iter().filter(|f| !f.terms.is_empty()).map(|f| f.axis).collect();
+    let learnt = |f: &&Finding| f.statistic == Statistic::Bias && !f.terms.is_empty();
+    let learnt: Vec<Axis> = found.iter().filter(learnt).map(|f| f.axis).collect();
     found.retain(|f| !(are_lines(f) && f.terms.is_empty() && learnt.contains(&f.axis)));
 }
 
@@ -216,10 +217,9 @@ impl Case<'_> {
         let textures = textures.map(told).chain(self.overstated(scatter));
         let mut found: Vec<Finding> = textures.chain(steps).collect();
         // Lines that stand still have no name, but they can be learnt.
-        if self.baseline.is_none() {
-            for f in found.iter_mut().filter(|f| are_lines(f)) {
-                (f.terms, f.covariance.variances) = lines(&self.fields, &mean.px, f.axis);
-            }
+        let alone = self.baseline.is_none();
+        for f in found.iter_mut().filter(|f| alone && are_lines(f)) {
+            learn(f, &self.fields, &mean.px);
         }
         found
     }

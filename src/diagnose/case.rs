@@ -216,9 +216,14 @@ impl<'a> Case<'a> {
         maps || f.replicated != Some(false) || f.p_adjusted.is_none_or(clear)
     }
 
-    /// What reading as ranges took out, the other way round: with it the means are as stored.
+    /// What reading as ranges took out of the means.
+    pub fn taken_out(&self) -> Vec<Term> {
+        self.ranges.iter().flat_map(|f| f.terms.clone()).collect()
+    }
+
+    /// Takes that out the other way round: the means are as stored again.
     pub fn as_stored(&self) -> Vec<Term> {
-        self.ranges.iter().flat_map(|f| &f.terms).map(|t| t.times(-1.0)).collect()
+        self.taken_out().iter().map(|t| t.times(-1.0)).collect()
     }
 }
 

@@ -85,7 +85,7 @@ impl Case<'_> {
             self.sample(&mut extended);
         }
         let views = self.view_lines(&mean.terms, heldout.as_ref());
-        let taken_out = self.ranges.iter().flat_map(|f| f.terms.clone()).collect();
+        let taken_out = self.taken_out();
         let recording = self.recording.root.display().to_string();
         let reference = match self.baseline {
             Some(_) => Reference::SimulatedRecording,

@@ -6,7 +6,6 @@ use super::options::DiagnoseOptions;
 use super::views::field::Field;
 use crate::Progress;
 use crate::error::Result;
-use crate::measure::Workbench;
 use crate::model::NoiseModel;
 use crate::terms::Term;
 use crate::view::{Excluded, Recording};
@@ -30,11 +29,11 @@ pub struct Diagnosed {
 impl Diagnosed {
     /// Mean residual of every pixel of a view, beyond the simulated one's where there is one, px: as it was
     /// read.
-    pub fn read(&self, view: usize, bench: &Workbench<'_>) -> Vec<f32> {
+    pub fn read(&self, view: usize) -> Vec<f32> {
         let field = &self.fields[view];
         let Some(twin) = self.against.get(view) else { return field.mean.clone() };
-        let taken_out = twin.taken_out(&[], bench);
-        let theirs: Vec<f32> = twin.mean.iter().zip(taken_out).map(|(m, t)| m + t).collect();
+        let stored = |(&i, m): (&u32, &f32)| m + twin.column_error(i);
+        let theirs: Vec<f32> = twin.pixels.iter().zip(&twin.mean).map(stored).collect();
         let theirs = twin.image(&theirs);
         let at = |i: u32| theirs.get(i as usize).copied().unwrap_or(f32::NAN);
         field.pixels.iter().zip(&field.mean).map(|(&i, m)| m - at(i)).collect()

@@ -62,7 +62,7 @@ pub fn pictures(
                 let twin = field.with_frames(frames, &bench, &model.sigma, &known, start);
                 stored(&twin, twin.mean.clone())
             });
-            let mut left = done.read(view, &bench);
+            let mut left = done.read(view);
             let recorded = stored(field, left.clone());
             let found = done.bias_px.get(view).into_iter().flatten();
             left.iter_mut().zip(found).for_each(|(r, bias)| *r -= bias);

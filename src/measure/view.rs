@@ -61,23 +61,28 @@ pub fn view_target(view: &View, bench: &Workbench<'_>) -> Result<(Target, Vec<(u
     Ok((target, numbers.into_iter().zip(held).collect()))
 }
 
-/// So many views are no chance: one in 32 where a plane comes and goes by either reading alike.
+/// So many views are no chance: one in 32 where either reading alike finds a plane that the other does not.
 const FEWEST_RANGES: usize = 5;
 
-/// What to say where excluded views hold a plane once their raw values are taken for ranges.
+/// What to say where excluded views hold a plane once their raw values are taken for ranges, and none as depths.
 pub fn ranges_remark(
     recording: &Recording,
     excluded: &[Excluded],
     bench: &Workbench<'_>,
 ) -> Option<String> {
-    let bench = Workbench { ray_share: 1.0, ..Workbench::new(bench.sensor, bench.options) };
+    if excluded.len() < FEWEST_RANGES {
+        return None;
+    }
+    let ranges = Workbench { ray_share: 1.0, ..Workbench::new(bench.sensor, bench.options) };
     let left_out = |v: &&View| excluded.iter().any(|e| e.view == v.name);
+    let alone = |v: &&&View| view_target(v, &ranges).is_ok() && view_target(v, bench).is_err();
     let views: Vec<&View> = recording.views.iter().filter(left_out).collect();
-    let flat = views.par_iter().filter(|v| view_target(v, &bench).is_ok()).count();
+    let flat = views.par_iter().filter(alone).count();
     (flat >= FEWEST_RANGES).then(|| {
         format!(
             "{flat} of the views that were left out hold a plane once raw values are taken for ranges (the length of \
-             the ray) instead of depths: `kinoise diagnose` tells, `kinoise correct` puts depths in their place"
+             the ray) instead of depths: `kinoise diagnose -m MODEL` tests this, and `kinoise correct` with the model \
+             that it writes makes them depths"
         )
     })
 }

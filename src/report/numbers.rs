@@ -47,12 +47,11 @@ pub(super) fn range([low, high]: [f64; 2], decimals: usize) -> String {
     if low == high { low } else { format!("{low} – {high}") }
 }
 
-/// What views are worth, and the ends of its interval; beyond a million in millions.
+/// What views are worth, and the ends of its interval; from a million on in millions.
 pub(super) fn nats(values: [f64; 3]) -> [String; 3] {
-    let [value, ..] = values.map(f64::abs);
-    values.map(|v| match value {
-        1e6.. => format!("{} million", fixed(1e-6 * v, 1)),
-        _ => fixed(v, usize::from(value < 10.0)),
+    let decimals = usize::from(values[0].abs() < 10.0);
+    values.map(|v| {
+        if v.abs() >= 1e6 { format!("{} million", fixed(1e-6 * v, 1)) } else { fixed(v, decimals) }
     })
 }
 
@@ -186,7 +185,7 @@ mod tests {
     fn what_views_are_worth() {
         assert_eq!(nats([4.25, -1.0, 9.0]), ["4.2", "−1.0", "9.0"]);
         assert_eq!(nats([48763.4, 3115.2, 132_750.1]), ["48763", "3115", "132750"]);
-        assert_eq!(nats([5.79e7, 2.3e6, 1.3e8])[0], "57.9 million");
+        assert_eq!(nats([5.79e7, 3115.0, 1.3e8]), ["57.9 million", "3115", "130.0 million"]);
     }
 
     #[test]

@@ -131,23 +131,31 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
         let known_px2 = known.error_of_lines_px2(axis);
         let line = line(vec![], Statistic::Bias, axis, known_px2, Some(words));
         // Columns and rows have one error rate.
-        (ViewMean::of_pairs(views, move |s| s.lines_px2[k]), line, 0.5 * level)
+        (ViewMean::of_pairs(views, move |s| s.lines_px2[k]), line, 2.0)
     };
     let all = [
-        still(0, Axis::Column, "whole columns err by a constant each, from one to the next"),
-        still(1, Axis::Row, "whole rows err by a constant each, from one to the next"),
+        still(
+            0,
+            Axis::Column,
+            "each column has a constant error of its own, unlike its neighbours'",
+        ),
+        still(1, Axis::Row, "each row has a constant error of its own, unlike its neighbours'"),
         (
             ViewMean::of(views, |s| s.row_px2),
             line(vec![ROW_NOISE], Statistic::Correlation, Axis::Row, row, None),
-            level,
+            1.0,
         ),
         (
             ViewMean::of(views, |s| s.column_px2),
             line(vec![], Statistic::Correlation, Axis::Column, 0.0, Some(afresh)),
-            level,
+            1.0,
         ),
     ];
-    all.into_iter().filter_map(|(m, line, level)| line.found(&m?, variance, level)).collect()
+    let found = |(m, line, tests): (Option<ViewMean>, Shared, f64)| {
+        let found = line.found(&m?, variance, level / tests)?;
+        Some(TextureFinding { p: tests * found.p, ..found })
+    };
+    all.into_iter().filter_map(found).collect()
 }
 
 #[cfg(test)]

@@ -134,7 +134,7 @@ pub fn same_pixel(a: &[f32], b: &[f32]) -> f64 {
 }
 
 /// A pixel's own error changes from pixel to pixel: the box whose mean is taken out, px.
-const PIXEL_BOX: usize = 7;
+pub const PIXEL_BOX: usize = 7;
 
 /// Lags well beyond a Kinect's window, px.
 pub const FAR: [usize; 12] = [20, 22, 24, 27, 30, 33, 36, 39, 42, 46, 50, 54];

@@ -55,7 +55,10 @@ impl Choice<'_> {
             // What is left of a map beside a curve over one coordinate is looked for next.
             let is_map = |i: usize| matches!(self.candidates[i].basis, Basis::Map { .. });
             let as_much = |i: usize| self.total(i) > CLEAR * self.total(best);
-            let simpler = is_map(best).then(|| clear.find(|&i| !is_map(i) && as_much(i)));
+            let is_curve = |i: usize| {
+                matches!(self.candidates[i].basis, Basis::Curve { .. } | Basis::Ring { .. })
+            };
+            let simpler = is_map(best).then(|| clear.find(|&i| is_curve(i) && as_much(i)));
             Some(simpler.flatten().unwrap_or(best))
         };
         let winner = self.name(&families, &curves).or_else(curve)?;
@@ -216,7 +219,8 @@ fn same_curve(a: &Candidate, b: &Candidate) -> bool {
 
 /// See [`Choice::adequacy`].
 const LAW_ADEQUATE: f64 = 0.85;
-/// A name that explains this share of what the best nameless curve does is met by its own shape.
+/// A name that explains this share of what the best nameless curve does is met by its own shape; and a curve of
+/// a map.
 const CLEAR: f64 = 0.85;
 
 /// Views that scatter about a common fit far beyond their noise are explained badly; a name must

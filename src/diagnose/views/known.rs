@@ -159,7 +159,8 @@ impl KnownTerms {
         let of = |(shape, covariance): &(Vec<Term>, Covariance)| -> f64 {
             by_term(shape, &covariance.variances)
                 .filter(|(term, _)| term.basis.axis() == axis)
-                .filter_map(|(_, mine)| mean(mine.iter().copied()))
+                // What was never learnt has no error.
+                .filter_map(|(_, mine)| mean(mine.iter().copied().filter(|v| *v > 0.0)))
                 .sum()
         };
         self.learnt.iter().filter(|(_, c)| c.factors.is_empty()).map(of).sum()

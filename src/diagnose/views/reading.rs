@@ -43,8 +43,16 @@ impl<'a> LoadedViews<'a> {
         progress: Progress<'_>,
     ) -> Result<Self> {
         let mut known = KnownTerms::of(model, &bench.sensor.camera);
-        bench.ray_share = known.ray_share();
+        bench.ray_share = known.ray_share().clamp(0.0, 1.0);
         let (mut fields, mut excluded) = read(recording, &bench, model, &known, progress);
+        // A model may be wrong about its ranges.
+        if bench.ray_share > 0.0 && fields.len() < recording.views.len() {
+            let plain = Workbench::new(bench.sensor, bench.options);
+            let as_depths = read(recording, &plain, model, &known, &|_, _| ());
+            if as_depths.0.len() > fields.len() {
+                (bench, (fields, excluded)) = (plain, as_depths);
+            }
+        }
         let mut found = None;
         if let Some((flat, p)) = as_ranges(recording, &bench, model, &known, &fields) {
             (fields, excluded) = flat;

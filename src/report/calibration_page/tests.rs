@@ -41,7 +41,7 @@ fn the_page_tells_numbers_and_escapes_names() {
     let mut calibration = calibration();
     calibration.warnings = vec!["view <b>: odd".into(), "view gone was left out: no plane".into()];
     let excluded = vec![Excluded { view: "gone".into(), reason: "no plane".into() }];
-    let measurements = Measurements { views: vec![view()], excluded };
+    let measurements = Measurements { views: vec![view()], excluded, ranges: None };
     let mut page = CalibrationPage {
         title: "Kinect & co",
         sensor: None,
