@@ -6,10 +6,12 @@ use kinoise::calibrate::{CalibrateOptions, measure, model_of};
 use kinoise::diagnose::{DiagnoseOptions, Diagnosed, Finding, Status, Verdict, diagnose};
 use kinoise::effects::Active;
 use kinoise::io::{Assumed, open};
+use kinoise::model::Effect;
 use kinoise::scene::{Board, Target};
 use kinoise::simulate::{Grid, Physics, Shoot, kinect_v1};
 use kinoise::view::Recording;
 use kinoise::{NoiseModel, Seed, SigmaModel};
+use serde_json::json;
 
 /// Of a board before a wall, from near and far, with so much of the range in place of the depth: fifteen views.
 fn recording(folder: &Path, share: f64) -> Recording {
@@ -51,6 +53,20 @@ fn views_that_are_flat_as_ranges_alone_tell_ranges() {
     // A model that has the ranges finds the near boards, and nothing more to say of them.
     let again = diagnosis(&recording, &done.model).diagnosis;
     assert_eq!((again.verdict, again.views.len()), (Verdict::Match, 15), "{:?}", again.findings);
+}
+
+/// A model that takes depths for ranges is wrong about every view, and loses none.
+#[test]
+fn a_model_that_is_wrong_about_ranges_finds_all_targets() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let recording = recording(folder.path(), 0.0);
+    let share = json!({"share": 1.0}).as_object().cloned().expect("an object");
+    let ranges = Effect { id: "range-not-depth".into(), parameters: share, ..Effect::default() };
+    let model = NoiseModel { effects: vec![ranges], ..NoiseModel::paper() };
+    let said = diagnosis(&recording, &model).diagnosis;
+    assert_eq!((said.views.len(), said.findings[0].effect), (15, Some("range-not-depth")));
+    let share = said.findings[0].value("share").expect("a share");
+    assert!((share + 1.0).abs() < 0.1, "{share}");
 }
 
 /// `calibrate` reads depths: it says that the views it left out would be flat as ranges.
