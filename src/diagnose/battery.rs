@@ -17,7 +17,6 @@ use super::finding::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::finding::scene::Scene;
 use super::missing::shapes::Step;
 use super::missing::{self, DropoutOutcome, missing};
-use super::noise::lines::learn;
 use super::noise::scatter::ScatterResult;
 use super::noise::tails::EXCESS;
 use super::noise::texture_finding::TextureFinding;
@@ -83,8 +82,8 @@ impl Case<'_> {
 
     /// All layers, one after the other.
     pub fn battery(&mut self) -> Battery {
-        let mean = self.mean();
-        let scatter = self.scatter(&mean);
+        let mut mean = self.mean();
+        let scatter = self.scatter(&mut mean);
         self.at("naming, and searching the lost pixels", "naming what is left");
         let second = self.survey.second();
         let lattice = &self.lattice;
@@ -216,10 +215,10 @@ impl Case<'_> {
         };
         let textures = textures.map(told).chain(self.overstated(scatter));
         let mut found: Vec<Finding> = textures.chain(steps).collect();
-        // Lines that stand still have no name, but they can be learnt.
-        let alone = self.baseline.is_none();
-        for f in found.iter_mut().filter(|f| alone && are_lines(f)) {
-            learn(f, &self.fields, &mean.px);
+        // Lines that stand still have no name, but they are learnt.
+        for f in found.iter_mut().filter(|f| are_lines(f)) {
+            let axis = f.axis;
+            mean.lines.iter().filter(|l| l.axis == axis).for_each(|l| l.tell(f));
         }
         found
     }

@@ -6,6 +6,7 @@ use super::against::Baseline;
 use super::diagnosis::Finding;
 use super::finding::pixels::{mean_of, pixel_terms, terms_of};
 use super::missing::DropoutOutcome;
+use super::noise::lines::LearntLines;
 use super::noise::still::{KeptPattern, beside_bias, still};
 use super::options::{Ablation, DiagnoseOptions, measure_options};
 use super::search::outcome::Outcome;
@@ -59,8 +60,18 @@ pub struct Case<'a> {
 pub struct MeanResult {
     pub outcome: Outcome,
     pub terms: Vec<Term>,
-    /// The terms at every pixel, px.
+    /// Of single columns and rows, which the search does not see.
+    pub lines: Vec<LearntLines>,
+    /// The terms and the lines at every pixel, px.
     pub px: Vec<Vec<f32>>,
+}
+
+impl MeanResult {
+    /// Searched or not.
+    pub fn all_terms(&self) -> Vec<Term> {
+        let lines = self.lines.iter().map(|l| &l.profile);
+        self.terms.iter().chain(lines).cloned().collect()
+    }
 }
 
 impl<'a> Case<'a> {
@@ -188,7 +199,7 @@ impl<'a> Case<'a> {
         let outcome = self.survey.refit_bias(&fine, camera, found);
         drop(fine);
         let (terms, px) = self.everywhere(&outcome);
-        MeanResult { outcome, terms, px }
+        MeanResult { outcome, terms, lines: Vec::new(), px }
     }
 
     /// The terms of the mean, and what they are at every pixel, px.

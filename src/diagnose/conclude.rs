@@ -70,7 +70,7 @@ impl Case<'_> {
         let left_out =
             || heldout::left_out(&self.survey, &mean.outcome, &mean.terms, &self.as_stored());
         let (heldout, (map, mut detectable, left_out)) = rayon::join(
-            || self.heldout(),
+            || self.heldout(&mean.lines),
             || (self.map(&scenes, outcomes), self.detectable(&scenes, outcomes), left_out()),
         );
         drop(scenes);

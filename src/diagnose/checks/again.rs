@@ -59,8 +59,9 @@ impl<'a> Case<'a> {
         let beyond = |all: &[Term], others: &[Term], sign: f64| -> Vec<Term> {
             all.iter().filter(|t| !others.contains(t)).map(|t| t.times(sign)).collect()
         };
-        let mut differ = beyond(terms, &mean.terms, 1.0);
-        differ.extend(beyond(&mean.terms, terms, -1.0));
+        let known = mean.all_terms();
+        let mut differ = beyond(terms, &known, 1.0);
+        differ.extend(beyond(&known, terms, -1.0));
         let mut all = mean.px.clone();
         let more = pixel_terms(&self.fields, &differ, &self.survey, &self.bench);
         if all.is_empty() {

@@ -7,11 +7,14 @@ use rayon::prelude::*;
 
 use crate::diagnose::case::Case;
 use crate::diagnose::diagnosis::{HeldOut, LeftOut};
-use crate::diagnose::finding::pixels::terms_of;
+use crate::diagnose::finding::pixels::{pixel_terms, terms_of};
+use crate::diagnose::noise::lines::LearntLines;
+use crate::diagnose::noise::still::beside_bias;
 use crate::diagnose::search::outcome::Outcome;
+use crate::diagnose::views::field::Field;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::samples::ViewData;
-use crate::diagnose::views::surveyed_view::SurveyedView;
+use crate::diagnose::views::surveyed_view::{SurveyedView, inflation};
 use crate::diagnose::views::tiles::Tile;
 use crate::solve::plane_through;
 use crate::terms::{PixelContext, Statistic, Term, by_term};
@@ -22,8 +25,9 @@ const KEPT_ASIDE: usize = 4;
 const FEWEST: usize = 6;
 
 impl Case<'_> {
-    /// Choose again without some views, and score those.
-    pub(in crate::diagnose) fn heldout(&self) -> Option<HeldOut> {
+    /// Choose again without some views, and score those. The errors of single `lines` are learnt again without them
+    /// where all views together show such.
+    pub(in crate::diagnose) fn heldout(&self, lines: &[LearntLines]) -> Option<HeldOut> {
         let (survey, seed) = (&self.survey, self.options.seed);
         let (camera, scale_px_m) = (&self.sensor().camera, self.fields[0].scale_px_m);
         let n = survey.views.len();
@@ -50,20 +54,23 @@ impl Case<'_> {
         let blocks = judged_on.variance_data();
         let mut before = Vec::new();
         let mut gains = Vec::new();
-        for (mean, block) in means.iter().zip(&blocks) {
+        let of_lines = self.gained_by_lines(lines, &bias_terms, &rest, &aside);
+        for ((mean, block), lines) in means.iter().zip(&blocks).zip(&of_lines) {
             let (b0, b1) = (log_score(mean, &stored)?, log_score(mean, &bias_terms)?);
             let (v0, v1) = (log_score(block, &[])?, log_score(block, &variance_terms)?);
             before.push(b0 + v0);
-            gains.push(b1 - b0 + v1 - v0);
+            gains.push(b1 - b0 + v1 - v0 + lines.nats);
         }
         let views = before.len() as f64;
         let mean_before = before.iter().sum::<f64>() / views;
         let gain = gains.iter().sum::<f64>() / views;
-        let rms = |terms: &[Term]| rms(&judged_on.views, terms, scale_px_m);
-        let ([px_before, mm_before], [px_after, mm_after]) = (rms(&stored), rms(&bias_terms));
+        let by_lines: f64 = of_lines.iter().map(|l| l.px2).sum();
+        let rms = |terms: &[Term], less_px2| rms(&judged_on.views, terms, scale_px_m, less_px2);
+        let [px_before, mm_before] = rms(&stored, 0.0);
+        let [px_after, mm_after] = rms(&bias_terms, by_lines);
         let of_sensor: Vec<Term> =
             bias_terms.iter().filter(|t| t.is_sensor_bias()).cloned().collect();
-        let [px_corrected, _] = rms(&of_sensor);
+        let [px_corrected, _] = rms(&of_sensor, by_lines);
         Some(HeldOut {
             views: aside.iter().map(|&v| survey.views[v].name.clone()).collect(),
             log_score_before: mean_before,
@@ -78,6 +85,48 @@ impl Case<'_> {
             correction_rms_after_px: px_corrected,
         })
     }
+
+    /// What lines of these axes, learnt on the `rest` beside its `bias`, bring to each of the views kept `aside`.
+    fn gained_by_lines(
+        &self,
+        lines: &[LearntLines],
+        bias: &[Term],
+        rest: &[usize],
+        aside: &[usize],
+    ) -> Vec<LinesGain> {
+        if lines.is_empty() {
+            return vec![LinesGain::default(); aside.len()];
+        }
+        let at_pixels = |terms| pixel_terms(&self.fields, terms, &self.survey, &self.bench);
+        let bias = at_pixels(bias);
+        let all = beside_bias(&self.fields, &bias);
+        let learnt_on: Vec<(&Field, &[f32])> = rest.iter().map(|&v| all[v]).collect();
+        let learnt = |l: &LearntLines| Some(LearntLines::of(&learnt_on, l.axis)?.profile);
+        let px = at_pixels(&lines.iter().filter_map(learnt).collect::<Vec<Term>>());
+        let of_view = |&v: &usize| {
+            let ((field, bias), lines) = (all[v], &px[v]);
+            let of_bias = |k: usize| bias.get(k).copied().unwrap_or(0.0);
+            let both: Vec<f32> = (0..lines.len()).map(|k| of_bias(k) + lines[k]).collect();
+            // Beside the lines: they make the noise look as though it hung together.
+            let (inflation, _) = inflation(field, &both);
+            let mut gain = LinesGain::default();
+            for k in (0..lines.len()).filter(|&k| field.mean[k].is_finite()) {
+                let less = f64::from(lines[k] * (2.0 * (field.mean[k] - of_bias(k)) - lines[k]));
+                gain.px2 += less;
+                gain.nats += 0.5 * less / (f64::from(field.sigma[k]).powi(2) * inflation);
+            }
+            gain
+        };
+        aside.iter().map(of_view).collect()
+    }
+}
+
+/// What taking out the errors of single lines brings to a view.
+#[derive(Clone, Copy, Default)]
+struct LinesGain {
+    nats: f64,
+    /// Off the sum of squares of its pixels.
+    px2: f64,
 }
 
 /// -r'Wr / 2 with the nuisances fitted, nats.
@@ -99,8 +148,9 @@ fn bootstrap(values: &[f64], rng: &mut crate::rng::Stream) -> [f64; 2] {
     [means[RESAMPLES / 40], means[RESAMPLES - 1 - RESAMPLES / 40]]
 }
 
-/// Root mean square of every pixel of every frame, px, and of the smooth residual, mm.
-fn rms(views: &[SurveyedView], terms: &[Term], scale_px_m: f64) -> [f64; 2] {
+/// Root mean square of every pixel of every frame, px, the sum of squares being so much less by lines, and of the
+/// smooth residual, mm.
+fn rms(views: &[SurveyedView], terms: &[Term], scale_px_m: f64, less_px2: f64) -> [f64; 2] {
     let (mut px, mut mm, mut n) = (0.0, 0.0, 0.0);
     for view in views {
         each_patch(view, terms, |(place, t), f| {
@@ -110,7 +160,7 @@ fn rms(views: &[SurveyedView], terms: &[Term], scale_px_m: f64) -> [f64; 2] {
             n += t.pixels;
         });
     }
-    [(px / n).sqrt(), (mm / n).sqrt()]
+    [((px - less_px2).max(0.0) / n).sqrt(), (mm / n).sqrt()]
 }
 
 /// Of a patch's readings about `f`, px^2.

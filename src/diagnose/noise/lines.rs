@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::still::beside_bias;
 use super::texture::{PIXEL_BOX, pixel_scale};
 use crate::diagnose::diagnosis::{Finding, Size};
 use crate::diagnose::finding::parameters::one;
+use crate::diagnose::views::box_sums::SMOOTH_PX;
 use crate::diagnose::views::field::Field;
 use crate::stats::mean;
 use crate::terms::{Axis, Basis, Coordinate, Modulation, Term};
@@ -16,66 +16,80 @@ const FEWEST_READINGS: f64 = 200.0;
 /// What a line's readings sum to in one view, and how many they are.
 type Sums = Vec<(f64, f64)>;
 
-/// Still lines that were found, with their profile, and as large as that is: the test looks at what changes from one
-/// line to the next, of which two read-outs have more than columns that err independently.
-pub fn learn(found: &mut Finding, fields: &[Field], bias: &[Vec<f32>]) {
-    let (terms, variances) = lines(fields, bias, found.axis);
-    let known =
-        || terms.iter().flat_map(|t| &t.coefficients).zip(&variances).filter(|l| *l.1 > 0.0);
-    let (n, variance) = (known().count() as f64, mean(known().map(|(_, v)| *v)).unwrap_or(0.0));
-    let px2 = mean(known().map(|(c, v)| c * c - v)).unwrap_or(0.0);
-    if let Some(told) = found.value("sigma_px").filter(|told| px2 > 0.0 && *told > 0.0) {
-        let (sigma_px, error) = (px2.sqrt(), (variance / n * (1.0 + 0.5 * variance / px2)).sqrt());
-        let times = sigma_px / told;
-        found.parameters = one("sigma_px", sigma_px, error);
-        found.size = Size { mm: times * found.size.mm, sigma: times * found.size.sigma };
+/// What each column, or each row, errs by.
+#[derive(Debug, Clone)]
+pub struct LearntLines {
+    pub axis: Axis,
+    pub profile: Term,
+    /// Of each coefficient, px^2; nothing of a line that was not seen.
+    variances: Vec<f64>,
+}
+
+impl LearntLines {
+    /// The mean of every column, or of every row, over the views, px, without what is smooth. Each view comes with
+    /// what is known of it to be no noise, px by pixel.
+    pub fn of(views: &[(&Field, &[f32])], axis: Axis) -> Option<Self> {
+        let (width, height) = views.first().map(|(f, _)| (f.width, f.height))?;
+        let (over, nodes) = match axis {
+            Axis::Row => (Coordinate::Row, height),
+            _ => (Coordinate::Column, width),
+        };
+        let by_view: Vec<Sums> = views
+            .par_iter()
+            .map(|(field, bias)| {
+                let mut sums = vec![(0.0, 0.0); nodes];
+                let image = pixel_scale(field, &field.mean, bias);
+                for (i, &r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
+                    let line = if axis == Axis::Row { i / width } else { i % width };
+                    sums[line].0 += f64::from(r);
+                    sums[line].1 += 1.0;
+                }
+                sums
+            })
+            .collect();
+        let lines = (0..nodes).map(|line| of_line(by_view.iter().map(|sums| sums[line])));
+        let (means, variances): (Vec<Option<f64>>, Vec<f64>) = lines.unzip();
+        let high = nodes.saturating_sub(1) as f64;
+        let basis = Basis::Curve { over, low: 0.0, high, nodes, times: Modulation::One };
+        Some(LearntLines { axis, profile: Term::bias(basis, with_own_share(&means)), variances })
     }
-    (found.terms, found.covariance.variances) = (terms, variances);
+
+    /// The finding gets the profile, and is as large as that is: the test looks at what changes from one line to
+    /// the next, of which two read-outs have more than columns that err independently.
+    pub fn tell(&self, found: &mut Finding) {
+        let LearntLines { profile, variances, .. } = self;
+        let known = || profile.coefficients.iter().zip(variances).filter(|l| *l.1 > 0.0);
+        let (n, variance) = (known().count() as f64, mean(known().map(|(_, v)| *v)).unwrap_or(0.0));
+        let px2 = mean(known().map(|(c, v)| c * c - v)).unwrap_or(0.0);
+        if let Some(told) = found.value("sigma_px").filter(|told| px2 > 0.0 && *told > 0.0) {
+            let sigma_px = px2.sqrt();
+            let error = (variance / n * (1.0 + 0.5 * variance / px2)).sqrt();
+            let times = sigma_px / told;
+            found.parameters = one("sigma_px", sigma_px, error);
+            found.size = Size { mm: times * found.size.mm, sigma: times * found.size.sigma };
+        }
+        found.interval = [0.0, variances.len().saturating_sub(1) as f64];
+        (found.terms, found.covariance.variances) = (vec![profile.clone()], variances.clone());
+    }
 }
 
-/// The mean of every column, or of every row, over the views, px, without what is smooth; `bias` has what is
-/// known to be no noise, by view and pixel, px. As a term, with the variance of each coefficient, px^2.
-fn lines(fields: &[Field], bias: &[Vec<f32>], axis: Axis) -> (Vec<Term>, Vec<f64>) {
-    let Some(first) = fields.first() else { return Default::default() };
-    let (width, height) = (first.width, first.height);
-    let (over, nodes) = match axis {
-        Axis::Row => (Coordinate::Row, height),
-        _ => (Coordinate::Column, width),
-    };
-    let by_view: Vec<Sums> = beside_bias(fields, bias)
-        .par_iter()
-        .map(|(field, bias)| {
-            let mut sums = vec![(0.0, 0.0); nodes];
-            let image = pixel_scale(field, &field.mean, bias);
-            for (i, &r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
-                let line = if axis == Axis::Row { i / width } else { i % width };
-                sums[line].0 += f64::from(r);
-                sums[line].1 += 1.0;
-            }
-            sums
-        })
-        .collect();
-    let lines = (0..nodes).map(|line| of_line(by_view.iter().map(|sums| sums[line])));
-    let (means, variances): (Vec<Option<f64>>, Vec<f64>) = lines.unzip();
-    let coefficients = with_own_share(&means);
-    let high = nodes.saturating_sub(1) as f64;
-    let profile = Basis::Curve { over, low: 0.0, high, nodes, times: Modulation::One };
-    (vec![Term::bias(profile, coefficients)], variances)
-}
-
-/// Of lines from which the mean over [`PIXEL_BOX`] neighbours was taken: what each had before, but for what is
-/// smooth. Every second line of two read-outs has gained a seventh; two rounds leave 0.3 % of that.
+/// Of lines from which the mean over boxes of neighbours was taken, as [`pixel_scale`] does: what each had before,
+/// but for what is smooth. A line is part of the mean that it lost: of every second line an eighth more is left than
+/// there was, and a thousandth after these rounds; at the rims, where boxes are short, a twentieth (simulated).
 fn with_own_share(means: &[Option<f64>]) -> Vec<f64> {
-    const ROUNDS: usize = 2;
-    let of_known = |values: &[f64], k: usize| {
-        let near = k.saturating_sub(PIXEL_BOX / 2)..means.len().min(k + PIXEL_BOX / 2 + 1);
-        let known = near.filter(|&j| means[j].is_some()).map(|j| values[j]);
-        mean(known).unwrap_or(0.0)
+    const ROUNDS: usize = 3;
+    let beside_box = |values: &[f64], side: usize| -> Vec<f64> {
+        let of_box = |k: usize| {
+            let near = k.saturating_sub(side / 2)..means.len().min(k + side / 2 + 1);
+            mean(near.filter(|&j| means[j].is_some()).map(|j| values[j])).unwrap_or(0.0)
+        };
+        (0..values.len()).map(|k| values[k] - of_box(k)).collect()
     };
     let mut values: Vec<f64> = means.iter().map(|m| m.unwrap_or(0.0)).collect();
     for _ in 0..ROUNDS {
-        let left = |k: usize| means[k].map_or(0.0, |m| m + of_known(&values, k));
-        values = (0..means.len()).map(left).collect();
+        let passed = beside_box(&beside_box(&values, SMOOTH_PX), PIXEL_BOX);
+        let lines = values.iter_mut().zip(passed).zip(means);
+        lines.for_each(|((value, passed), m)| *value += m.map_or(0.0, |m| m - passed));
     }
     values
 }

@@ -3,6 +3,7 @@
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
+use crate::diagnose::noise::still::beside_bias;
 use crate::plane::Plane;
 use crate::rng::{Seed, Stream};
 
@@ -36,8 +37,10 @@ fn each_column_is_met_and_rows_are_let_be() {
     let error_px = |u: usize| if u.is_multiple_of(2) { 0.05 } else { -0.05 };
     let mut rng = Seed(1).stream("lines");
     let fields: Vec<Field> = (0..20).map(|_| field(&mut rng, error_px)).collect();
-    let [columns, rows] =
-        [Axis::Column, Axis::Row].map(|axis| lines(&fields, &[], axis).0.remove(0));
+    let learnt = |bias: &[Vec<f32>], axis| {
+        LearntLines::of(&beside_bias(&fields, bias), axis).expect("views").profile
+    };
+    let [columns, rows] = [Axis::Column, Axis::Row].map(|axis| learnt(&[], axis));
     assert_eq!((columns.coefficients.len(), rows.coefficients.len()), (SIZE[0], SIZE[1]));
     let limit = 5.0 * NOISE_PX / f64::sqrt((20 * SIZE[1]) as f64);
     for (u, c) in columns.coefficients.iter().enumerate() {
@@ -51,6 +54,6 @@ fn each_column_is_met_and_rows_are_let_be() {
         .iter()
         .map(|f| f.pixels.iter().map(|i| error_px(*i as usize % SIZE[0]) as f32).collect())
         .collect();
-    assert!(lines(&fields, &known, Axis::Column).0[0].coefficients.iter().all(|c| c.abs() < limit));
-    assert!(lines(&[], &[], Axis::Row).0.is_empty());
+    assert!(learnt(&known, Axis::Column).coefficients.iter().all(|c| c.abs() < limit));
+    assert!(LearntLines::of(&[], Axis::Row).is_none());
 }

@@ -1,12 +1,16 @@
 //! What scatters about the mean: how the noise hangs together, how large it is, and its tails.
 
+use super::lines::LearntLines;
+use super::still::beside_bias;
 use super::structure::{Structure, structures};
 use super::tails::{Confusers, tails};
 use super::texture_finding::TextureFinding;
 use super::{ROW_NOISE, texture_findings, window};
 use crate::diagnose::against::noise::{NAMED_LEVEL, NoiseParts};
 use crate::diagnose::case::{Case, MeanResult};
-use crate::diagnose::finding::pixels::{Whitener, common, fixed_px2, measure_tails, terms_of};
+use crate::diagnose::finding::pixels::{
+    Whitener, common, fixed_px2, measure_tails, pixel_terms, terms_of,
+};
 use crate::diagnose::search::outcome::Outcome;
 use crate::diagnose::steps::{Steps, forget_windows, own_step};
 use crate::diagnose::views::known::ray_share;
@@ -23,7 +27,7 @@ pub struct ScatterResult {
 }
 
 impl Case<'_> {
-    pub fn scatter(&mut self, mean: &MeanResult) -> ScatterResult {
+    pub fn scatter(&mut self, mean: &mut MeanResult) -> ScatterResult {
         self.at("searching the noise", "testing the noise again");
         let camera = &self.recording.sensor.camera;
         let mut structure = structures(&self.fields, &mean.px, &self.kept);
@@ -36,6 +40,7 @@ impl Case<'_> {
         let extra = |p: &PixelContext| (own.at(p) - theirs.map_or(0.0, |s| s.at(p))).max(0.0);
         let each = self.level(Self::EACH_LEVEL);
         let textures = self.textures(&mut structure, each);
+        self.learn_lines(mean, &textures);
         let excess = self.excess_of_rows(&structure, &textures);
         for (view, [_, of_log_variance]) in self.survey.views.iter_mut().zip(excess) {
             view.log_variance_inflation *= of_log_variance;
@@ -79,6 +84,19 @@ impl Case<'_> {
         let tails = tails(&structure, &self.known, each, confusers)
             .filter(|t| !alike && self.stands(t.p, each));
         ScatterResult { structure, textures, tails, outcome }
+    }
+
+    /// Lines that stand still are part of the mean: beside them the noise has its own size and tails.
+    fn learn_lines(&self, mean: &mut MeanResult, textures: &[TextureFinding]) {
+        let still =
+            textures.iter().filter(|t| t.families.is_empty() && t.statistic == Statistic::Bias);
+        let axes: Vec<Axis> = still.map(|t| t.axis).collect();
+        if axes.is_empty() || self.baseline.is_some() {
+            return;
+        }
+        let views = beside_bias(&self.fields, &mean.px);
+        mean.lines = axes.into_iter().filter_map(|axis| LearntLines::of(&views, axis)).collect();
+        mean.px = pixel_terms(&self.fields, &mean.all_terms(), &self.survey, &self.bench);
     }
 
     /// How the noise hangs together; against a simulation, what goes beyond the simulation's.
