@@ -55,12 +55,12 @@ pub(super) fn nats(values: [f64; 3]) -> [String; 3] {
     })
 }
 
-/// Decimals that keep two digits of `value`, four at most.
+/// Decimals that keep two digits of `value`, six at most.
 pub(super) fn decimals_for(value: f64) -> usize {
     if !(value.is_finite() && value > 0.0) {
         return 2;
     }
-    (1 - value.log10().floor() as i32).clamp(0, 4) as usize
+    (1 - value.log10().floor() as i32).clamp(0, 6) as usize
 }
 
 /// To `digits` significant digits, with a power of ten where that helps.
