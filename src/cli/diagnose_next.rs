@@ -72,7 +72,7 @@ impl After<'_> {
     /// Is there a bias to take out, which views kept aside do not speak against?
     fn corrects(&self) -> bool {
         let biased = |f: &Finding| f.terms.iter().any(|t| t.is_sensor_bias());
-        let gains = self.diagnosis.heldout.as_ref().is_none_or(|h| h.gain_interval[0] > 0.0);
+        let gains = self.diagnosis.heldout.as_ref().is_none_or(|h| h.bias_gain_interval[0] > 0.0);
         gains && self.diagnosis.findings.iter().any(biased)
     }
 

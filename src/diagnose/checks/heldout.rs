@@ -53,12 +53,13 @@ impl Case<'_> {
         let means: Vec<ViewData> = judged_on.coarse_mean_data();
         let blocks = judged_on.variance_data();
         let mut before = Vec::new();
-        let mut gains = Vec::new();
+        let (mut of_bias, mut gains) = (Vec::new(), Vec::new());
         let of_lines = self.gained_by_lines(lines, &bias_terms, &rest, &aside);
         for ((mean, block), lines) in means.iter().zip(&blocks).zip(&of_lines) {
             let (b0, b1) = (log_score(mean, &stored)?, log_score(mean, &bias_terms)?);
-            let (v0, v1) = (log_score(block, &[])?, log_score(block, &variance_terms)?);
+            let (v0, v1) = (noise_score(block, &[]), noise_score(block, &variance_terms));
             before.push(b0 + v0);
+            of_bias.push(b1 - b0 + lines.nats);
             gains.push(b1 - b0 + v1 - v0 + lines.nats);
         }
         let views = before.len() as f64;
@@ -77,6 +78,7 @@ impl Case<'_> {
             log_score_after: mean_before + gain,
             gain,
             gain_interval: bootstrap(&gains, &mut rng),
+            bias_gain_interval: bootstrap(&of_bias, &mut rng),
             rms_mm_before: mm_before,
             rms_mm_after: mm_after,
             rms_px_before: px_before,
@@ -129,12 +131,19 @@ struct LinesGain {
     px2: f64,
 }
 
-/// -r'Wr / 2 with the nuisances fitted, nats.
+/// Of the means, about a plane of the view's own: -r'Wr / 2, nats.
 fn log_score(view: &ViewData, terms: &[Term]) -> Option<f64> {
     let response = view.without(terms);
     let own: f64 = response.iter().zip(&view.weight).map(|(y, w)| w * y * y).sum();
     let rows = view.rows(&response)?;
     Some(-0.5 * (own - rows.explained()))
+}
+
+/// Of the size of the noise, block by block: minus half the deviance of sums of squares (a gamma distribution), nats.
+/// A view's level counts as well: who uses the model has no other sigma.
+fn noise_score(blocks: &ViewData, terms: &[Term]) -> f64 {
+    let left = blocks.without(terms);
+    -left.iter().zip(&blocks.weight).map(|(log, w)| w * (log.exp_m1() - log)).sum::<f64>()
 }
 
 /// 95 % of the mean, by resampling.

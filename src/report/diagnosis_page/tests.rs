@@ -90,6 +90,7 @@ fn diagnosis(verdict: Verdict, findings: Vec<Finding>) -> Diagnosis {
         log_score_after: -4170.9,
         gain: 42.31,
         gain_interval: [31.2, 55.0],
+        bias_gain_interval: [31.2, 55.0],
         rms_mm_before: 3.12,
         rms_mm_after: 1.17,
         rms_px_before: 0.214,
