@@ -12,7 +12,8 @@ pub struct Correlation {
     pub along_v: Vec<f64>,
     /// Sum of rho over all lags: pixels per independent sample of a *mean*.
     pub sum: f64,
-    /// Sum of rho^2 over all lags: pixels per independent sample of a *variance*.
+    /// Sum of the squares' correlation over all lags: pixels per independent sample of a *variance*. It is rho^2 of
+    /// Gaussian noise, and more of pixels that are copies of their neighbours.
     pub sum_of_squares: f64,
     /// The correlation had not died out at the longest lag: what is left is not noise but a
     /// smooth error (a bowl, bands), and the sums are lower bounds.
@@ -23,6 +24,9 @@ pub struct Correlation {
 const LONGEST_LAG: usize = 40;
 /// Correlations below this count as dead.
 const DEAD: f64 = 0.05;
+/// The squares' correlation is told from rho^2 from so many times two standard errors on: noise that is Gaussian
+/// keeps the exact relation, which errs less.
+const CLEARLY: f64 = 5.0;
 /// Pairs looked at per lag; the standard error of a correlation is then 0.01.
 const PAIRS: usize = 10_000;
 
@@ -49,30 +53,30 @@ pub fn measure_correlation(field: &[f32], width: usize) -> Correlation {
         course(field, width, valid, stride, |i, u, lag| (u + lag < width).then(|| field[i + lag]));
     let along_v =
         course(field, width, valid, stride, |i, _, lag| field.get(i + lag * width).copied());
-    let two_sided =
-        |c: &[f64], power: i32| 1.0 + 2.0 * c[1..].iter().map(|r| r.powi(power)).sum::<f64>();
+    let two_sided = |c: &[f64]| 1.0 + 2.0 * c[1..].iter().sum::<f64>();
     let persists = |c: &[f64]| c.len() > LONGEST_LAG;
+    let [(along_u, squares_u), (along_v, squares_v)] = [along_u, along_v];
     Correlation {
-        sum: (two_sided(&along_u, 1) * two_sided(&along_v, 1)).max(1.0),
-        sum_of_squares: two_sided(&along_u, 2) * two_sided(&along_v, 2),
+        sum: (two_sided(&along_u) * two_sided(&along_v)).max(1.0),
+        sum_of_squares: two_sided(&squares_u) * two_sided(&squares_v),
         persists: persists(&along_u) || persists(&along_v),
         along_u,
         along_v,
     }
 }
 
-/// Correlation at lag 0, 1, 2 ... until it is dead; `partner(i, u, lag)` is the value that far from
-/// sample `i` of column `u`.
+/// Correlation at lag 0, 1, 2 ... until it is dead, and that of the squares; `partner(i, u, lag)` is the value that
+/// far from sample `i` of column `u`.
 fn course(
     field: &[f32],
     width: usize,
     valid: usize,
     stride: usize,
     partner: impl Fn(usize, usize, usize) -> Option<f32>,
-) -> Vec<f64> {
-    let mut course = vec![1.0];
+) -> (Vec<f64>, Vec<f64>) {
+    let (mut course, mut squares, mut apart) = (vec![1.0], vec![[1.0; 2]], f64::INFINITY);
     if valid < 100 || width == 0 {
-        return course;
+        return (course.clone(), course);
     }
     // A stride that shares no factor with the width visits all columns.
     let stride = if stride > 1 { stride | 1 } else { 1 };
@@ -80,23 +84,37 @@ fn course(
     let samples: Vec<(usize, usize)> = (0..field.len()).step_by(stride).filter_map(there).collect();
     for lag in 1..=LONGEST_LAG {
         let (mut ab, mut aa, mut bb, mut n) = (0.0f64, 0.0f64, 0.0f64, 0usize);
+        let (mut aabb, mut fourth) = (0.0, 0.0);
         for &(i, u) in &samples {
             if let Some(b) = partner(i, u, lag).filter(|b| b.is_finite()) {
                 let (a, b) = (f64::from(field[i]), f64::from(b));
                 ab += a * b;
                 aa += a * a;
                 bb += b * b;
+                aabb += (a * b).powi(2);
+                fourth += 0.5 * (a.powi(4) + b.powi(4));
                 n += 1;
             }
         }
         let rho = if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 };
         let noise = 2.0 / (n.max(1) as f64).sqrt();
+        let by_chance = aa * bb / n.max(1) as f64;
+        let of_squares = [aabb / by_chance, fourth / by_chance];
         if n < 50 || rho < DEAD.max(noise) {
+            // Where they have nothing in common but the size of the noise, which is uneven.
+            apart = of_squares[0].max(1.0);
             break;
         }
         course.push(rho);
+        squares.push(of_squares);
     }
-    course
+    let clearly = CLEARLY * 2.0 / (samples.len().max(1) as f64).sqrt();
+    let square = |(rho, [product, fourth]): (&f64, [f64; 2])| {
+        let (of_gaussian, own) = (rho * rho, (product - apart) / (fourth - apart));
+        if own > of_gaussian + clearly { own } else { of_gaussian }
+    };
+    let squares = course.iter().zip(squares).map(square).collect();
+    (course, squares)
 }
 
 #[cfg(test)]
@@ -143,6 +161,31 @@ mod tests {
         assert!((c.sum / 81.0 - 1.0).abs() < 0.15, "sum {}", c.sum);
         assert!((c.sum_of_squares / squares - 1.0).abs() < 0.12, "squares {}", c.sum_of_squares);
         assert!(!c.persists);
+    }
+
+    /// Every pixel four times: four make one sample, of a mean and of a variance, where rho^2 alone has nine
+    /// quarters. Size that changes over the picture makes no pixel a copy.
+    #[test]
+    fn copies_are_no_samples() {
+        let (width, half) = (400, white(200, 150));
+        let size = |i: usize| 1.0 + 0.4 * ((i % width) as f32 / 60.0).sin();
+        let copy = |i: usize| half[i / width / 2 * 200 + i % width / 2];
+        for copied in [&copy, &(|i: usize| size(i) * copy(i)) as &dyn Fn(usize) -> f32] {
+            let c = measure_correlation(&(0..width * 300).map(copied).collect::<Vec<_>>(), width);
+            assert!((c.sum / 4.0 - 1.0).abs() < 0.1, "{c:?}");
+            assert!((c.sum_of_squares / 4.0 - 1.0).abs() < 0.1, "{c:?}");
+        }
+        let uneven: Vec<f32> = blurred(&white(width, 300), width, 9)
+            .into_iter()
+            .enumerate()
+            .map(|(i, x)| size(i) * x)
+            .collect();
+        let c = measure_correlation(&uneven, width);
+        let rho_squared: f64 = [&c.along_u, &c.along_v]
+            .map(|c| 1.0 + 2.0 * c[1..].iter().map(|rho| rho * rho).sum::<f64>())
+            .iter()
+            .product();
+        assert_eq!(c.sum_of_squares, rho_squared);
     }
 
     #[test]
