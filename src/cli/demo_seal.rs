@@ -232,7 +232,8 @@ fn gained(heldout: Option<&HeldOut>) -> String {
     );
     let (before, after) = (h.correction_rms_before_px, h.correction_rms_after_px);
     if (before - after).abs() < 5e-4 {
-        return format!("{gain}; there is no bias to correct.");
+        let none = h.bias_gain_interval == [0.0; 2];
+        return gain + if none { "; there is no bias to correct." } else { "." };
     }
     format!(
         "{gain}; correction takes the error of a pixel from {before:.3} to {after:.3} px (rms)."

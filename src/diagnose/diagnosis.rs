@@ -208,8 +208,7 @@ pub struct HeldOut {
     pub gain: f64,
     /// 95 %, by resampling views.
     pub gain_interval: [f64; 2],
-    /// The same of the mean error alone.
-    #[serde(skip)]
+    /// The same of the mean error alone: `correct` is worth while where it lies above zero.
     pub bias_gain_interval: [f64; 2],
     /// Root mean square of the smooth residual, mm.
     pub rms_mm_before: f64,

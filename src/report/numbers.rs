@@ -55,12 +55,12 @@ pub(super) fn nats(values: [f64; 3]) -> [String; 3] {
     })
 }
 
-/// Decimals that keep two digits of `value`, six at most.
+/// Decimals that keep two digits of `value`, seven at most.
 pub(super) fn decimals_for(value: f64) -> usize {
     if !(value.is_finite() && value > 0.0) {
         return 2;
     }
-    (1 - value.log10().floor() as i32).clamp(0, 6) as usize
+    (1 - value.log10().floor() as i32).clamp(0, 7) as usize
 }
 
 /// To `digits` significant digits, with a power of ten where that helps.
@@ -204,6 +204,7 @@ mod tests {
     #[test]
     fn errors_and_p_values() {
         assert_eq!(with_error(0.125, 0.001).into_string(), "0.1250 ± 0.0010");
+        assert_eq!(with_error(0.0098371, 1.6e-5).into_string(), "0.009837 ± 0.000016");
         let tiny = "−2.00·10<sup>−5</sup> ± 3.0·10<sup>−6</sup>";
         assert_eq!(with_error(-2e-5, 3e-6).into_string(), tiny);
         assert_eq!(p_value(0.0004).into_string(), "p = 4·10<sup>−4</sup>");

@@ -1,5 +1,7 @@
 //! How many independent samples a patch of correlated pixels is worth.
 
+use super::{MAD_TO_SIGMA, median_in_place};
+
 /// Spatial correlation of a residual image, summed along columns and rows.
 ///
 /// The sums treat the correlation as the product of its course along u and along v, which is
@@ -24,9 +26,12 @@ pub struct Correlation {
 const LONGEST_LAG: usize = 40;
 /// Correlations below this count as dead.
 const DEAD: f64 = 0.05;
-/// The squares' correlation is told from rho^2 from so many times two standard errors on: noise that is Gaussian
-/// keeps the exact relation, which errs less.
+/// The squares' correlation is told from rho^2 from so many times two standard errors on, .1 for [`PAIRS`]: copied
+/// pixels differ by .25, and noise that is Gaussian keeps the exact relation, which errs less.
 const CLEARLY: f64 = 5.0;
+/// What lies farther out, in standard deviations, has no part in the correlation of squares: a few hundred pixels of
+/// an error that stands still would outweigh all noise.
+const CUT: f64 = 3.5;
 /// Pairs looked at per lag; the standard error of a correlation is then 0.01.
 const PAIRS: usize = 10_000;
 
@@ -49,13 +54,12 @@ impl Correlation {
 pub fn measure_correlation(field: &[f32], width: usize) -> Correlation {
     let valid = field.iter().filter(|e| e.is_finite()).count();
     let stride = (valid / PAIRS).max(1);
-    let along_u =
+    let (along_u, squares_u) =
         course(field, width, valid, stride, |i, u, lag| (u + lag < width).then(|| field[i + lag]));
-    let along_v =
+    let (along_v, squares_v) =
         course(field, width, valid, stride, |i, _, lag| field.get(i + lag * width).copied());
     let two_sided = |c: &[f64]| 1.0 + 2.0 * c[1..].iter().sum::<f64>();
     let persists = |c: &[f64]| c.len() > LONGEST_LAG;
-    let [(along_u, squares_u), (along_v, squares_v)] = [along_u, along_v];
     Correlation {
         sum: (two_sided(&along_u) * two_sided(&along_v)).max(1.0),
         sum_of_squares: two_sided(&squares_u) * two_sided(&squares_v),
@@ -74,47 +78,81 @@ fn course(
     stride: usize,
     partner: impl Fn(usize, usize, usize) -> Option<f32>,
 ) -> (Vec<f64>, Vec<f64>) {
-    let (mut course, mut squares, mut apart) = (vec![1.0], vec![[1.0; 2]], f64::INFINITY);
+    let (mut course, mut squares, mut apart) = (vec![1.0], vec![1.0], None);
     if valid < 100 || width == 0 {
-        return (course.clone(), course);
+        return (course, squares);
     }
     // A stride that shares no factor with the width visits all columns.
     let stride = if stride > 1 { stride | 1 } else { 1 };
     let there = |i: usize| field[i].is_finite().then(|| (i, i % width));
     let samples: Vec<(usize, usize)> = (0..field.len()).step_by(stride).filter_map(there).collect();
+    let mut sizes: Vec<f32> = samples.iter().map(|&(i, _)| field[i].abs()).collect();
+    let cut = CUT * MAD_TO_SIGMA * f64::from(median_in_place(&mut sizes));
+    let mut products = Vec::new();
     for lag in 1..=LONGEST_LAG {
         let (mut ab, mut aa, mut bb, mut n) = (0.0f64, 0.0f64, 0.0f64, 0usize);
-        let (mut aabb, mut fourth) = (0.0, 0.0);
+        let mut near = Products::default();
         for &(i, u) in &samples {
             if let Some(b) = partner(i, u, lag).filter(|b| b.is_finite()) {
                 let (a, b) = (f64::from(field[i]), f64::from(b));
                 ab += a * b;
                 aa += a * a;
                 bb += b * b;
-                aabb += (a * b).powi(2);
-                fourth += 0.5 * (a.powi(4) + b.powi(4));
                 n += 1;
+                if a.abs().max(b.abs()) < cut {
+                    near.add(a * a, b * b);
+                }
             }
         }
         let rho = if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 };
         let noise = 2.0 / (n.max(1) as f64).sqrt();
-        let by_chance = aa * bb / n.max(1) as f64;
-        let of_squares = [aabb / by_chance, fourth / by_chance];
         if n < 50 || rho < DEAD.max(noise) {
-            // Where they have nothing in common but the size of the noise, which is uneven.
-            apart = of_squares[0].max(1.0);
+            // Here they have nothing in common but the size of the noise, which may be uneven.
+            apart = (n >= 50).then(|| near.product());
             break;
         }
         course.push(rho);
-        squares.push(of_squares);
+        products.push((rho, near, CLEARLY * noise));
     }
-    let clearly = CLEARLY * 2.0 / (samples.len().max(1) as f64).sqrt();
-    let square = |(rho, [product, fourth]): (&f64, [f64; 2])| {
-        let (of_gaussian, own) = (rho * rho, (product - apart) / (fourth - apart));
+    // Where the correlation does not die out nothing says what the size alone makes.
+    squares.extend(products.into_iter().map(|(rho, near, clearly)| {
+        let of_gaussian = rho * rho;
+        let own = apart.and_then(|apart| near.correlation(apart)).unwrap_or(0.0);
         if own > of_gaussian + clearly { own } else { of_gaussian }
-    };
-    let squares = course.iter().zip(squares).map(square).collect();
+    }));
     (course, squares)
+}
+
+/// Sums over pairs of squares.
+#[derive(Default)]
+struct Products {
+    pairs: f64,
+    first: f64,
+    second: f64,
+    products: f64,
+    squares: f64,
+}
+
+impl Products {
+    fn add(&mut self, first: f64, second: f64) {
+        self.pairs += 1.0;
+        self.first += first;
+        self.second += second;
+        self.products += first * second;
+        self.squares += 0.5 * (first * first + second * second);
+    }
+
+    /// Mean product of the squares over the product of their means, at least 1.
+    fn product(&self) -> f64 {
+        (self.products * self.pairs / (self.first * self.second)).max(1.0)
+    }
+
+    /// Correlation of the squares, where [`Products::product`] is this of pixels far apart.
+    fn correlation(&self, apart: f64) -> Option<f64> {
+        let by_chance = apart * self.first * self.second / self.pairs;
+        let own = (self.products - by_chance) / (self.squares - by_chance);
+        (self.squares > by_chance).then(|| own.min(1.0))
+    }
 }
 
 #[cfg(test)]
@@ -186,6 +224,21 @@ mod tests {
             .iter()
             .product();
         assert_eq!(c.sum_of_squares, rho_squared);
+    }
+
+    /// An error of 24 x 24 px that stands still, ten times the mean's noise, is not the noise's.
+    #[test]
+    fn a_bump_makes_no_copies() {
+        let width = 400;
+        let mut field = blurred(&white(width, 300), width, 3);
+        let of_noise = measure_correlation(&field, width).sum_of_squares;
+        for v in 140..164 {
+            field[v * width + 200..v * width + 224].iter_mut().for_each(|x| *x += 30.0);
+        }
+        let beside = measure_correlation(&field, width);
+        let rho_squared = |c: &[f64]| 1.0 + 2.0 * c[1..].iter().map(|r| r * r).sum::<f64>();
+        let said = rho_squared(&beside.along_u) * rho_squared(&beside.along_v);
+        assert!((beside.sum_of_squares - said).abs() < 1e-12, "{of_noise} {said} {beside:?}");
     }
 
     #[test]

@@ -14,7 +14,7 @@ use crate::diagnose::search::outcome::Outcome;
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::samples::ViewData;
-use crate::diagnose::views::surveyed_view::{SurveyedView, inflation};
+use crate::diagnose::views::surveyed_view::SurveyedView;
 use crate::diagnose::views::tiles::Tile;
 use crate::solve::plane_through;
 use crate::terms::{PixelContext, Statistic, Term, by_term};
@@ -108,9 +108,7 @@ impl Case<'_> {
         let of_view = |&v: &usize| {
             let ((field, bias), lines) = (all[v], &px[v]);
             let of_bias = |k: usize| bias.get(k).copied().unwrap_or(0.0);
-            let both: Vec<f32> = (0..lines.len()).map(|k| of_bias(k) + lines[k]).collect();
-            // Beside the lines: they make the noise look as though it hung together.
-            let (inflation, _) = inflation(field, &both);
+            let inflation = self.survey.views[v].inflation;
             let mut gain = LinesGain::default();
             for k in (0..lines.len()).filter(|&k| field.mean[k].is_finite()) {
                 let less = f64::from(lines[k] * (2.0 * (field.mean[k] - of_bias(k)) - lines[k]));
@@ -140,7 +138,8 @@ fn log_score(view: &ViewData, terms: &[Term]) -> Option<f64> {
 }
 
 /// Of the size of the noise, block by block: minus half the deviance of sums of squares (a gamma distribution), nats.
-/// A view's level counts as well: who uses the model has no other sigma.
+/// A view's level counts as well: who uses the model has no other sigma. Beside a simulation, whose blocks err as much,
+/// their weight is of the ratio.
 fn noise_score(blocks: &ViewData, terms: &[Term]) -> f64 {
     let left = blocks.without(terms);
     -left.iter().zip(&blocks.weight).map(|(log, w)| w * (log.exp_m1() - log)).sum::<f64>()

@@ -37,21 +37,25 @@ impl LearntLines {
         let by_view: Vec<Sums> = views
             .par_iter()
             .map(|(field, bias)| {
-                let mut sums = vec![(0.0, 0.0); nodes];
+                let mut sums: Sums = vec![(0.0, 0.0); nodes];
                 let image = pixel_scale(field, &field.mean, bias);
                 for (i, &r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
                     let line = if axis == Axis::Row { i / width } else { i % width };
                     sums[line].0 += f64::from(r);
                     sums[line].1 += 1.0;
                 }
+                // View by view, so that the scatter of the views is that of what is told.
+                let means = sums.iter().map(|(sum, n)| (*n > 0.0).then(|| sum / n));
+                let own = with_own_share(&means.collect::<Vec<_>>());
+                sums.iter_mut().zip(own).for_each(|((sum, n), own)| *sum = own * *n);
                 sums
             })
             .collect();
         let lines = (0..nodes).map(|line| of_line(by_view.iter().map(|sums| sums[line])));
-        let (means, variances): (Vec<Option<f64>>, Vec<f64>) = lines.unzip();
+        let (means, variances): (Vec<f64>, Vec<f64>) = lines.unzip();
         let high = nodes.saturating_sub(1) as f64;
         let basis = Basis::Curve { over, low: 0.0, high, nodes, times: Modulation::One };
-        Some(LearntLines { axis, profile: Term::bias(basis, with_own_share(&means)), variances })
+        Some(LearntLines { axis, profile: Term::bias(basis, means), variances })
     }
 
     /// The finding gets the profile, and is as large as that is: the test looks at what changes from one line to
@@ -94,12 +98,12 @@ fn with_own_share(means: &[Option<f64>]) -> Vec<f64> {
     values
 }
 
-/// Mean of a line, and its variance with the views as the sample; none of too few readings.
-fn of_line(views: impl Iterator<Item = (f64, f64)> + Clone) -> (Option<f64>, f64) {
+/// Mean of a line, and its variance with the views as the sample; nothing of too few readings.
+fn of_line(views: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
     let (mut sum, mut n) = (0.0, 0.0);
     views.clone().for_each(|(s, k)| (sum, n) = (sum + s, n + k));
     if n < FEWEST_READINGS {
-        return (None, 0.0);
+        return (0.0, 0.0);
     }
     let mean = sum / n;
     let (mut square, mut seen) = (0.0, 0.0);
@@ -107,7 +111,7 @@ fn of_line(views: impl Iterator<Item = (f64, f64)> + Clone) -> (Option<f64>, f64
         square += (s - k * mean).powi(2);
         seen += 1.0;
     }
-    (Some(mean), square / (n * n) * seen / f64::max(seen - 1.0, 1.0))
+    (mean, square / (n * n) * seen / f64::max(seen - 1.0, 1.0))
 }
 
 #[cfg(test)]

@@ -87,15 +87,24 @@ impl Case<'_> {
     }
 
     /// Lines that stand still are part of the mean: beside them the noise has its own size and tails.
-    fn learn_lines(&self, mean: &mut MeanResult, textures: &[TextureFinding]) {
+    fn learn_lines(&mut self, mean: &mut MeanResult, textures: &[TextureFinding]) {
         let still =
             textures.iter().filter(|t| t.families.is_empty() && t.statistic == Statistic::Bias);
         let axes: Vec<Axis> = still.map(|t| t.axis).collect();
         if axes.is_empty() || self.baseline.is_some() {
             return;
         }
+        self.take_out_lines(mean, &axes);
+        // Whole lines were taken for noise that hangs together: views count for more beside them.
+        if self.survey.reweigh(&self.fields, &mean.px) {
+            *mean = self.mean();
+            self.take_out_lines(mean, &axes);
+        }
+    }
+
+    fn take_out_lines(&self, mean: &mut MeanResult, axes: &[Axis]) {
         let views = beside_bias(&self.fields, &mean.px);
-        mean.lines = axes.into_iter().filter_map(|axis| LearntLines::of(&views, axis)).collect();
+        mean.lines = axes.iter().filter_map(|axis| LearntLines::of(&views, *axis)).collect();
         mean.px = pixel_terms(&self.fields, &mean.all_terms(), &self.survey, &self.bench);
     }
 

@@ -142,7 +142,7 @@ pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
     let h = diagnosis.heldout.as_ref().filter(|_| diagnosis.verdict != Verdict::Match)?;
     let aside = count(h.views.len(), "view");
     if h.gain_interval == [0.0; 2] {
-        // Of textures, losses and column steps nothing is scored.
+        // Of textures but single lines, losses and column steps nothing is scored.
         let searched = |f: &Finding| f.curve.is_some() && !f.terms.is_empty();
         return diagnosis.findings.iter().any(searched).then(|| {
             format!("On {aside} kept aside nothing is gained: without them the same search finds nothing.")
