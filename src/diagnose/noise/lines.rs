@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::texture::{PIXEL_BOX, pixel_scale};
 use crate::diagnose::diagnosis::{Finding, Size};
 use crate::diagnose::finding::parameters::one;
-use crate::diagnose::views::box_sums::SMOOTH_PX;
+use crate::diagnose::views::box_sums::{SMOOTH_PX, over_boxes};
 use crate::diagnose::views::field::Field;
 use crate::stats::mean;
 use crate::terms::{Axis, Basis, Coordinate, Modulation, Term};
@@ -45,10 +45,9 @@ impl LearntLines {
                     sums[line].1 += 1.0;
                 }
                 // View by view, so that the scatter of the views is that of what is told.
-                let means = sums.iter().map(|(sum, n)| (*n > 0.0).then(|| sum / n));
-                let own = with_own_share(&means.collect::<Vec<_>>());
-                sums.iter_mut().zip(own).for_each(|((sum, n), own)| *sum = own * *n);
-                sums
+                let means: Vec<f32> = sums.iter().map(|(sum, n)| (sum / n) as f32).collect();
+                let own = with_own_share(&means).into_iter().map(f64::from).zip(sums);
+                own.map(|(own, (_, n))| if n > 0.0 { (own * n, n) } else { (0.0, 0.0) }).collect()
             })
             .collect();
         let lines = (0..nodes).map(|line| of_line(by_view.iter().map(|sums| sums[line])));
@@ -78,22 +77,22 @@ impl LearntLines {
 }
 
 /// Of lines from which the mean over boxes of neighbours was taken, as [`pixel_scale`] does: what each had before,
-/// but for what is smooth. A line is part of the mean that it lost: of every second line an eighth more is left than
+/// but for what is smooth; NaN of a line that was not seen. A line is part of the mean that it lost: of every second line an eighth more is left than
 /// there was, and a thousandth after these rounds; at the rims, where boxes are short, a twentieth (simulated).
-fn with_own_share(means: &[Option<f64>]) -> Vec<f64> {
+fn with_own_share(means: &[f32]) -> Vec<f32> {
     const ROUNDS: usize = 3;
-    let beside_box = |values: &[f64], side: usize| -> Vec<f64> {
-        let of_box = |k: usize| {
-            let near = k.saturating_sub(side / 2)..means.len().min(k + side / 2 + 1);
-            mean(near.filter(|&j| means[j].is_some()).map(|j| values[j])).unwrap_or(0.0)
-        };
-        (0..values.len()).map(|k| values[k] - of_box(k)).collect()
+    let beside_box = |values: &[f32], side: usize| {
+        let mut left = vec![f32::NAN; values.len()];
+        over_boxes(values, values.len(), side / 2, |k, sum, n| {
+            left[k] = values[k] - (sum / n) as f32;
+        });
+        left
     };
-    let mut values: Vec<f64> = means.iter().map(|m| m.unwrap_or(0.0)).collect();
+    let mut values = means.to_vec();
     for _ in 0..ROUNDS {
         let passed = beside_box(&beside_box(&values, SMOOTH_PX), PIXEL_BOX);
         let lines = values.iter_mut().zip(passed).zip(means);
-        lines.for_each(|((value, passed), m)| *value += m.map_or(0.0, |m| m - passed));
+        lines.for_each(|((value, passed), m)| *value += m - passed);
     }
     values
 }

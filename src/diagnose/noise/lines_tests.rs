@@ -63,16 +63,15 @@ fn each_column_is_met_and_rows_are_let_be() {
 fn what_the_boxes_took_is_put_back() {
     const LINES: usize = 640;
     let truth = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
-    let beside_box = |values: &[f64], side: usize| -> Vec<f64> {
+    let beside_box = |values: &[f32], side: usize| -> Vec<f32> {
         let mean_of = |k: usize| {
             let near = &values[k.saturating_sub(side / 2)..LINES.min(k + side / 2 + 1)];
-            near.iter().sum::<f64>() / near.len() as f64
+            near.iter().sum::<f32>() / near.len() as f32
         };
         (0..LINES).map(|k| values[k] - mean_of(k)).collect()
     };
-    let lines: Vec<f64> = (0..LINES).map(truth).collect();
-    let seen = beside_box(&beside_box(&lines, SMOOTH_PX), PIXEL_BOX);
-    let back = with_own_share(&seen.into_iter().map(Some).collect::<Vec<_>>());
+    let lines: Vec<f32> = (0..LINES).map(truth).collect();
+    let back = with_own_share(&beside_box(&beside_box(&lines, SMOOTH_PX), PIXEL_BOX));
     for (k, line) in back.iter().enumerate() {
         let limit = if (60..LINES - 60).contains(&k) { 2e-3 } else { 0.06 };
         assert!((line - truth(k)).abs() < limit, "{k}: {line}");
