@@ -3,7 +3,7 @@
 use super::battery::Battery;
 use super::case::Case;
 use super::checks::far_off::far_off;
-use super::checks::heldout;
+use super::checks::rms;
 use super::diagnosis::{
     After, DIAGNOSIS_FORMAT, Diagnosis, Finding, HeldOut, MapRow, Reference, ViewLine,
 };
@@ -68,7 +68,7 @@ impl Case<'_> {
         shares(&mut found);
         self.progress.stage("scoring views kept aside, and what would have been seen");
         let left_out =
-            || heldout::left_out(&self.survey, &mean.outcome, &mean.terms, &self.as_stored());
+            || rms::left_out(&self.survey, &mean.outcome, &mean.terms, &self.as_stored());
         let (heldout, (map, mut detectable, left_out)) = rayon::join(
             || self.heldout(&mean.lines),
             || (self.map(&scenes, outcomes), self.detectable(&scenes, outcomes), left_out()),
@@ -197,8 +197,8 @@ impl Case<'_> {
 
     /// The views, for people.
     fn view_lines(&self, bias: &[Term], heldout: Option<&HeldOut>) -> Vec<ViewLine> {
-        let before = heldout::rms_by_view(&self.survey, &self.as_stored());
-        let after = heldout::rms_by_view(&self.survey, bias);
+        let before = rms::rms_by_view(&self.survey, &self.as_stored());
+        let after = rms::rms_by_view(&self.survey, bias);
         let line = |(n, f): (usize, &Field)| ViewLine {
             name: f.name.clone(),
             z_m: f.plane.depth(0.0, 0.0),

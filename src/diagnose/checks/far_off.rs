@@ -1,6 +1,6 @@
 //! A recording that is far from the model, though no search found what its views have in common.
 
-use super::heldout::rms_by_view;
+use super::rms::rms_by_view;
 use crate::diagnose::diagnosis::{Finding, Size};
 use crate::diagnose::finding::other_findings::nameless;
 use crate::diagnose::views::field::CLIP_SIGMAS;

@@ -1,23 +1,17 @@
 //! What the found terms are worth on views that had no part in any choice.
 
-use nalgebra::Vector3;
 use rand::Rng;
 use rand::seq::SliceRandom;
-use rayon::prelude::*;
 
+use super::rms::rms;
 use crate::diagnose::case::Case;
-use crate::diagnose::diagnosis::{HeldOut, LeftOut};
+use crate::diagnose::diagnosis::HeldOut;
 use crate::diagnose::finding::pixels::{pixel_terms, terms_of};
 use crate::diagnose::noise::lines::LearntLines;
 use crate::diagnose::noise::still::beside_bias;
-use crate::diagnose::search::outcome::Outcome;
 use crate::diagnose::views::field::Field;
-use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::samples::ViewData;
-use crate::diagnose::views::surveyed_view::SurveyedView;
-use crate::diagnose::views::tiles::Tile;
-use crate::solve::plane_through;
-use crate::terms::{PixelContext, Statistic, Term, by_term};
+use crate::terms::{Statistic, Term};
 
 /// A share of the views is kept aside.
 const KEPT_ASIDE: usize = 4;
@@ -154,121 +148,4 @@ fn bootstrap(values: &[f64], rng: &mut crate::rng::Stream) -> [f64; 2] {
         .collect();
     means.sort_by(f64::total_cmp);
     [means[RESAMPLES / 40], means[RESAMPLES - 1 - RESAMPLES / 40]]
-}
-
-/// Root mean square of every pixel of every frame, px, the sum of squares being so much less by lines, and of the
-/// smooth residual, mm.
-fn rms(views: &[SurveyedView], terms: &[Term], scale_px_m: f64, less_px2: f64) -> [f64; 2] {
-    let (mut px, mut mm, mut n) = (0.0, 0.0, 0.0);
-    for view in views {
-        each_patch(view, terms, |(place, t), f| {
-            let to_mm = 1e3 * place.z * place.z / scale_px_m;
-            px += squares_about(t, f);
-            mm += t.pixels * ((t.mean - f) * to_mm).powi(2);
-            n += t.pixels;
-        });
-    }
-    [((px - less_px2).max(0.0) / n).sqrt(), (mm / n).sqrt()]
-}
-
-/// Of a patch's readings about `f`, px^2.
-fn squares_about(t: &Tile, f: f64) -> f64 {
-    t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0)
-}
-
-/// What each view's disparity on the optical axis changes by once the terms are taken out, px.
-pub fn levels(survey: &Survey, terms: &[Term]) -> Vec<f64> {
-    let level = |v: &SurveyedView| plane_left(v, &values(v, terms)).map_or(0.0, |p| p[0]);
-    survey.views.par_iter().map(level).collect()
-}
-
-fn values(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
-    let mut row = Vec::new();
-    view.places.iter().map(|place| Term::sum(terms, place, &mut row)).collect()
-}
-
-/// The terms' values at the patches, with the plane fitted anew.
-fn fitted(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
-    let mut values = values(view, terms);
-    // What is left after the terms has a plane of its own: it goes with them.
-    if let Some(plane) = plane_left(view, &values) {
-        for (place, f) in view.places.iter().zip(&mut values) {
-            *f += plane[0] + plane[1] * place.x + plane[2] * place.y;
-        }
-    }
-    values
-}
-
-/// The plane that is left in a view's means without these values.
-fn plane_left(view: &SurveyedView, values: &[f64]) -> Option<Vector3<f64>> {
-    let points = view.patches().zip(values);
-    plane_through(points.map(|((p, t), f)| ([p.x, p.y], t.mean - f, t.pixels)))
-}
-
-/// Every patch that has a mean, with the terms' value there, the plane fitted anew.
-fn each_patch(
-    view: &SurveyedView,
-    terms: &[Term],
-    mut visit: impl FnMut((&PixelContext, &Tile), f64),
-) {
-    let fitted = fitted(view, terms);
-    let patches = view.patches().zip(fitted).filter(|((_, t), _)| t.mean.is_finite());
-    patches.for_each(|(patch, f)| visit(patch, f));
-}
-
-/// Root mean square of each view's mean residual with the terms taken out, px.
-pub fn rms_by_view(survey: &Survey, terms: &[Term]) -> Vec<f64> {
-    survey
-        .views
-        .iter()
-        .map(|view| {
-            let (mut sum, mut n) = (0.0, 0.0);
-            each_patch(view, terms, |(_, t), f| {
-                sum += t.pixels * (t.mean - f).powi(2);
-                n += t.pixels;
-            });
-            (sum / f64::max(n, 1.0)).sqrt()
-        })
-        .collect()
-}
-
-/// Every view with coefficients fitted without it, the shapes as chosen on all: root mean square of
-/// every pixel of every frame to a plane, px, before, as `stored`, and after.
-pub fn left_out(
-    survey: &Survey,
-    outcome: &Outcome,
-    terms: &[Term],
-    stored: &[Term],
-) -> Option<LeftOut> {
-    let (mut sums, mut n) = ([0.0; 2], 0.0);
-    let mut by_view = [0.0; 2];
-    for (v, view) in survey.views.iter().enumerate() {
-        let fitted_without: &[f64] =
-            match outcome.left_out.iter().find(|(views, _)| views.contains(&v)) {
-                Some((_, beta)) => beta,
-                None if terms.is_empty() => &[],
-                None => return None,
-            };
-        let refitted: Vec<Term> = by_term(terms, fitted_without)
-            .map(|(t, mine)| Term { coefficients: mine.to_vec(), ..t.clone() })
-            .collect();
-        let pixels: f64 = view.tiles.iter().filter(|t| t.mean.is_finite()).map(|t| t.pixels).sum();
-        let both = sums.iter_mut().zip(&mut by_view).zip([stored, &refitted]);
-        for ((sum, by_view), terms) in both {
-            let before = *sum;
-            each_patch(view, terms, |(_, t), f| {
-                *sum += squares_about(t, f);
-            });
-            *by_view += ((*sum - before) / pixels.max(1.0)).sqrt();
-        }
-        n += pixels;
-    }
-    let [before, after] = sums.map(|s| (s / n).sqrt());
-    let [mean_before, mean_after] = by_view.map(|s| s / survey.views.len() as f64);
-    Some(LeftOut {
-        rms_px_before: before,
-        rms_px_after: after,
-        mean_of_views_px_before: mean_before,
-        mean_of_views_px_after: mean_after,
-    })
 }

@@ -8,3 +8,4 @@ pub mod overstated;
 pub mod power;
 pub mod replication;
 pub mod replication_textures;
+pub mod rms;

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::diagnose::checks::heldout;
+use crate::diagnose::checks::rms;
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::layers::Survey;
@@ -51,7 +51,7 @@ pub fn referenced_views(
     known: &KnownTerms,
 ) -> Vec<ReferencedView> {
     let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
-    let levels = heldout::levels(survey, bias);
+    let levels = rms::levels(survey, bias);
     let views = fields.par_iter().zip(&survey.views).zip(levels);
     views
         .filter_map(|((f, view), level)| {

@@ -6,6 +6,7 @@
 
 pub mod cells;
 mod clumps;
+mod dropout_cells;
 pub mod few;
 pub mod fit;
 pub mod forms;
@@ -26,6 +27,7 @@ use crate::diagnose::views::margins::Margins;
 use crate::rng::Seed;
 use crate::terms::{Axis, Basis, Extent};
 use cells::{Cell, LEAST, Scatter, USUAL, cells, expected, fine, patches, rim_px};
+use dropout_cells::DropoutCells;
 use few::few_losses;
 use hard_end::{CloseLook, HardEnd, blur};
 use points::points_of_pixels;
@@ -105,41 +107,6 @@ pub fn missing(
         outcome.findings.push(shadow);
     }
     outcome
-}
-
-/// The views' losses on the target.
-struct DropoutCells<'a> {
-    /// In patches large enough to judge.
-    cells: Vec<Vec<Cell<'a>>>,
-    /// In the smallest there are.
-    fine: Vec<Vec<Cell<'a>>>,
-    /// Whether a view's region was given.
-    region_given: Vec<bool>,
-    /// Whether it is in the second half.
-    second: Vec<bool>,
-    /// Log odds that the views' twins lose in each patch, over nothing lost.
-    expected: Option<Vec<Vec<f64>>>,
-}
-
-impl<'a> DropoutCells<'a> {
-    /// Without the patches that a hard end of the range touches.
-    fn inside(&self, end: &HardEnd) -> DropoutCells<'a> {
-        fn kept<T: Clone>(of: &[Vec<T>], cells: &[Vec<Cell<'_>>], end: &HardEnd) -> Vec<Vec<T>> {
-            let inside = |(of, cells): (&Vec<T>, &Vec<Cell<'_>>)| {
-                let both = of.iter().zip(cells).filter(|(_, c)| !end.touches(c));
-                both.map(|(of, _)| of.clone()).collect()
-            };
-            of.iter().zip(cells).map(inside).collect()
-        }
-        let (cells, fine) = (&self.cells, &self.fine);
-        DropoutCells {
-            cells: kept(cells, cells, end),
-            fine: kept(fine, fine, end),
-            region_given: self.region_given.clone(),
-            second: self.second.clone(),
-            expected: self.expected.as_ref().map(|e| kept(e, cells, end)),
-        }
-    }
 }
 
 /// What losses are searched with.

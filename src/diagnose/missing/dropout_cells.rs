@@ -1,0 +1,39 @@
+//! What the views lose, patch by patch.
+
+use super::cells::Cell;
+use super::hard_end::HardEnd;
+
+/// The views' losses on the target.
+pub struct DropoutCells<'a> {
+    /// In patches large enough to judge.
+    pub cells: Vec<Vec<Cell<'a>>>,
+    /// In the smallest there are.
+    pub fine: Vec<Vec<Cell<'a>>>,
+    /// Whether a view's region was given.
+    pub region_given: Vec<bool>,
+    /// Whether it is in the second half.
+    pub second: Vec<bool>,
+    /// Log odds that the views' twins lose in each patch, over nothing lost.
+    pub expected: Option<Vec<Vec<f64>>>,
+}
+
+impl<'a> DropoutCells<'a> {
+    /// Without the patches that a hard end of the range touches.
+    pub fn inside(&self, end: &HardEnd) -> DropoutCells<'a> {
+        fn kept<T: Clone>(of: &[Vec<T>], cells: &[Vec<Cell<'_>>], end: &HardEnd) -> Vec<Vec<T>> {
+            let inside = |(of, cells): (&Vec<T>, &Vec<Cell<'_>>)| {
+                let both = of.iter().zip(cells).filter(|(_, c)| !end.touches(c));
+                both.map(|(of, _)| of.clone()).collect()
+            };
+            of.iter().zip(cells).map(inside).collect()
+        }
+        let (cells, fine) = (&self.cells, &self.fine);
+        DropoutCells {
+            cells: kept(cells, cells, end),
+            fine: kept(fine, fine, end),
+            region_given: self.region_given.clone(),
+            second: self.second.clone(),
+            expected: self.expected.as_ref().map(|e| kept(e, cells, end)),
+        }
+    }
+}
