@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use kinoise::Seed;
-use kinoise::diagnose::{Diagnosis, Finding, HeldOut, Status, Verdict};
+use kinoise::diagnose::{Diagnosis, Finding, Status, Verdict};
 use kinoise::effects::{Active, CATALOGUE, Card, Parameter};
 use kinoise::io::{hex, sha256_hex, write_atomic};
 use kinoise::units::{counted, shortest, to_digits};
@@ -76,7 +76,7 @@ impl Sealed {
         lines.push(answer.sentence(card, diagnosis));
         lines.extend(parameters.iter().map(|c| format!("  {}", c.sentence())));
         lines.extend(answer.wrong_names());
-        lines.push(gained(diagnosis.heldout.as_ref()));
+        lines.push(gained(diagnosis));
         let json = json!({
             "sha256": self.hash(),
             "text": self.text,
@@ -216,13 +216,15 @@ fn digits(v: f64) -> String {
     shortest(to_digits(v, 3))
 }
 
-fn gained(heldout: Option<&HeldOut>) -> String {
-    let Some(h) = heldout else { return "No view could be kept out to show a gain.".into() };
-    if h.gain.abs() < 0.05 {
-        return format!(
-            "On {} kept out of the fit nothing is gained.",
-            counted(h.views.len(), "view")
-        );
+fn gained(diagnosis: &Diagnosis) -> String {
+    let Some(h) = &diagnosis.heldout else {
+        return "No view could be kept out to show a gain.".into();
+    };
+    if h.is_nothing() {
+        let scored =
+            diagnosis.findings.is_empty() || diagnosis.findings.iter().any(Finding::is_scored);
+        let what = if scored { "nothing is gained" } else { "what was found has no score" };
+        return format!("On {} kept out of the fit {what}.", counted(h.views.len(), "view"));
     }
     let [low, high] = h.gain_interval;
     let gain = format!(

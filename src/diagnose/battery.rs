@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 
 use super::case::{Case, MeanResult};
 use super::checks::overstated::SHARE;
-use super::checks::replication_textures;
+use super::checks::textures::replicated;
 use super::diagnosis::{Detectable, Finding, Status};
 use super::distance::reference::{self, can_happen};
 use super::echoes::{echoes, fold_into_sigma, forget_noise_of_frames};
@@ -15,7 +15,7 @@ use super::finding::naming::{doubt_beside_the_unexplained, resembles_only, tempe
 use super::finding::other_findings;
 use super::finding::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::finding::scene::Scene;
-use super::missing::shapes::Step;
+use super::missing::hard_end::HardEnd;
 use super::missing::{self, DropoutOutcome, missing};
 use super::noise::scatter::ScatterResult;
 use super::noise::tails::EXCESS;
@@ -45,7 +45,7 @@ pub struct Battery {
     /// The form that sigma would follow better, in words.
     pub better_form: Option<String>,
     /// Hard ends of the range.
-    pub ends: Vec<Step>,
+    pub ends: Vec<HardEnd>,
     /// How small a loss would have been seen.
     pub detectable_losses: Vec<Detectable>,
 }
@@ -209,8 +209,7 @@ impl Case<'_> {
         let second = self.survey.second();
         let told = |h: TextureFinding| {
             let (views, fields) = (&scatter.structure, &self.fields);
-            let replicated =
-                replication_textures::replicated(&h, views, fields, &second, &self.known);
+            let replicated = replicated(&h, views, fields, &second, &self.known);
             other_findings::texture(h, sigma_mm, replicated)
         };
         let textures = textures.map(told).chain(self.overstated(scatter));
@@ -280,7 +279,7 @@ impl Case<'_> {
     }
 
     /// Losses that neither the model has nor the simulation.
-    fn lost(&self) -> DropoutOutcome {
+    pub(super) fn lost(&self) -> DropoutOutcome {
         let seen_by = (&self.sensor().camera, &self.bench.rays);
         let twins = self.baseline.as_ref().map(|b| (&b.fields[..], &b.survey));
         let seed = self.options.seed;

@@ -102,11 +102,31 @@ pub struct Finding {
     pub covariance: Covariance,
 }
 
+impl HeldOut {
+    /// Neither gained nor lost, as far as it is written: without the views kept aside the searches find nothing,
+    /// these do not show it, or nothing that is scored was found.
+    pub fn is_nothing(&self) -> bool {
+        const AS_WRITTEN: f64 = 0.05;
+        self.gain_interval.iter().all(|nats| nats.abs() < AS_WRITTEN)
+    }
+}
+
 impl Finding {
     /// A law of the distance rests on a number a view, where the others rest on every pixel: that its nats
     /// are few says nothing of its size.
     pub fn is_law(&self) -> bool {
         matches!(self.effect, Some("depth-scale" | "disparity-offset" | "thermal-drift"))
+    }
+
+    /// Has it a part in the score of views kept aside? A step, an edge, a shadow, a law of the distance, and what has
+    /// no terms and no name have none.
+    pub fn is_scored(&self) -> bool {
+        match self.statistic {
+            Statistic::Bias | Statistic::Variance => self.curve.is_some() && !self.terms.is_empty(),
+            Statistic::Dropout => self.effect != Some("occlusion-shadow"),
+            Statistic::Distribution => self.axis == Axis::Residual,
+            Statistic::Correlation => self.effect.is_some(),
+        }
     }
 
     /// What was found of a parameter, without its error.

@@ -57,7 +57,7 @@ pub fn diagnosis_page(page: &DiagnosisPage<'_>) -> Result<String> {
         (pictures(page)?)
         (table::findings(&main, &minor))
         (cards::findings(&main)?)
-        (sections::held_out(diagnosis.heldout.as_ref()))
+        (sections::held_out(diagnosis))
         (sections::remaining(diagnosis))
         (sections::detectable(diagnosis))
         (sections::cannot_tell(&diagnosis.cannot_tell))

@@ -34,6 +34,7 @@ mod flatness;
 mod fuzz_corpus;
 mod hostile;
 mod invariances;
+mod kept_aside;
 mod layouts;
 #[cfg(unix)] // pipes
 mod limits;

@@ -4,11 +4,15 @@ use rand::Rng;
 use rand::seq::SliceRandom;
 
 use super::rms::rms;
+use super::textures;
 use crate::diagnose::case::Case;
 use crate::diagnose::diagnosis::HeldOut;
 use crate::diagnose::finding::pixels::{pixel_terms, terms_of};
+use crate::diagnose::missing;
 use crate::diagnose::noise::lines::LearntLines;
+use crate::diagnose::noise::scatter::ScatterResult;
 use crate::diagnose::noise::still::beside_bias;
+use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::samples::ViewData;
 use crate::terms::{Statistic, Term};
@@ -19,9 +23,13 @@ const KEPT_ASIDE: usize = 4;
 const FEWEST: usize = 6;
 
 impl Case<'_> {
-    /// Choose again without some views, and score those. The errors of single `lines` are learnt again without them
-    /// where all views together show such.
-    pub(in crate::diagnose) fn heldout(&self, lines: &[LearntLines]) -> Option<HeldOut> {
+    /// Choose again without some views, and score those. The errors of single `lines`, losses and textures are learnt
+    /// again without them where all views together show such.
+    pub(in crate::diagnose) fn heldout(
+        &self,
+        lines: &[LearntLines],
+        scatter: &ScatterResult,
+    ) -> Option<HeldOut> {
         let (survey, seed) = (&self.survey, self.options.seed);
         let (camera, scale_px_m) = (&self.sensor().camera, self.fields[0].scale_px_m);
         let n = survey.views.len();
@@ -49,12 +57,14 @@ impl Case<'_> {
         let mut before = Vec::new();
         let (mut of_bias, mut gains) = (Vec::new(), Vec::new());
         let of_lines = self.gained_by_lines(lines, &bias_terms, &rest, &aside);
-        for ((mean, block), lines) in means.iter().zip(&blocks).zip(&of_lines) {
+        let of_rest = self.gained_by_losses_and_textures(scatter, [&rest, &aside]);
+        let others = of_lines.iter().zip(of_rest);
+        for ((mean, block), (lines, of_rest)) in means.iter().zip(&blocks).zip(others) {
             let (b0, b1) = (log_score(mean, &stored)?, log_score(mean, &bias_terms)?);
             let (v0, v1) = (noise_score(block, &[]), noise_score(block, &variance_terms));
             before.push(b0 + v0);
             of_bias.push(b1 - b0 + lines.nats);
-            gains.push(b1 - b0 + v1 - v0 + lines.nats);
+            gains.push(b1 - b0 + v1 - v0 + lines.nats + of_rest);
         }
         let views = before.len() as f64;
         let mean_before = before.iter().sum::<f64>() / views;
@@ -80,6 +90,24 @@ impl Case<'_> {
             correction_rms_before_px: px_before,
             correction_rms_after_px: px_corrected,
         })
+    }
+
+    /// What losses and textures, learnt on the `rest`, bring to each of the views kept `aside`, nats.
+    fn gained_by_losses_and_textures(
+        &self,
+        scatter: &ScatterResult,
+        [rest, aside]: [&[usize]; 2],
+    ) -> Vec<f64> {
+        let twins = self.baseline.as_ref().map(|b| &b.survey);
+        let views = (&self.fields[..], twins, &self.survey);
+        let (camera, known, seed) = (&self.sensor().camera, &self.known, self.options.seed);
+        let split = [rest, aside];
+        let of_losses =
+            missing::kept_aside::gained(&self.lost(), views, camera, known, split, seed);
+        let found: Vec<TextureFinding> =
+            scatter.textures.iter().chain(&scatter.tails).cloned().collect();
+        let of_textures = textures::gained(&found, &scatter.structure, known, split);
+        of_losses.iter().zip(of_textures).map(|(a, b)| a + b).collect()
     }
 
     /// What lines of these axes, learnt on the `rest` beside its `bias`, bring to each of the views kept `aside`.

@@ -7,5 +7,5 @@ pub mod heldout;
 pub mod overstated;
 pub mod power;
 pub mod replication;
-pub mod replication_textures;
 pub mod rms;
+pub mod textures;

@@ -5,7 +5,7 @@
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::replication_textures::beyond;
+use super::textures::beyond;
 use crate::diagnose::case::Case;
 use crate::diagnose::diagnosis::{Finding, Size};
 use crate::diagnose::edges::Edges;

@@ -1,3 +1,4 @@
+use super::cells::{cells, expected};
 use super::*;
 use crate::diagnose::missing::cells::Patch;
 use crate::diagnose::missing::points::points;

@@ -4,7 +4,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::structure::Structure;
 use crate::diagnose::search::null::student;
-use crate::stats::{MAD_TO_SIGMA, median};
+use crate::stats::{MAD_TO_SIGMA, mean, median};
 
 /// Mean of a statistic over the views, and its standard error.
 #[derive(Debug, Clone, Copy)]
@@ -37,21 +37,27 @@ impl ViewMean {
 
     /// Of values, each with how much there is of what it was measured on.
     pub fn weighed(values: &[(f64, f64)]) -> Option<Self> {
-        let sized = values.iter().any(|v| v.1 > 0.0);
-        // Of nothing there is nothing to tell.
-        let used = values.iter().copied().filter(|v| v.1 > 0.0 || !sized);
-        let values = &used.collect::<Vec<(f64, f64)>>()[..];
-        let n = values.len() as f64;
-        if n < 2.0 {
+        let weighted = Weight::of(values).each(values);
+        if weighted.len() < 2 {
             return None;
         }
-        let middle = values.iter().map(|v| v.1).sum::<f64>() / n;
-        // A small one says little; views differ for reasons of their own, so that a large one
-        // does not say all.
-        let weight = |size: f64| if sized { size / (size + ERROR_OVER_OWN * middle) } else { 1.0 };
-        let weighted: Vec<(f64, f64)> = values.iter().map(|v| (v.0, weight(v.1))).collect();
         let (value, std_error) = huber(&weighted);
-        Some(ViewMean { value, std_error, views: n })
+        Some(ViewMean { value, std_error, views: weighted.len() as f64 })
+    }
+
+    /// Nats by which the `value` of one more view, of this size, is likelier about the mean of these values than
+    /// about none: by Student's t of their scatter.
+    pub fn predicts(values: &[(f64, f64)], (value, size): (f64, f64)) -> Option<f64> {
+        let m = ViewMean::weighed(values)?;
+        let weight = Weight::of(values);
+        let total: f64 = weight.each(values).iter().map(|v| v.1).sum();
+        let of_mean = m.std_error.powi(2);
+        let own = of_mean * total / weight.at(size);
+        let log = |off: f64, variance: f64| {
+            -student(0.5 * off * off / variance, m.views - 1.0) - 0.5 * variance.ln()
+        };
+        let nats = log(value - m.value, own + of_mean) - log(value, own);
+        nats.is_finite().then_some(nats)
     }
 
     /// Chance of a mean this far above `expected`, one-sided, by Student's t.
@@ -63,6 +69,31 @@ impl ViewMean {
     /// The same below it.
     pub fn p_below(&self, expected: f64) -> f64 {
         ViewMean { value: -self.value, ..*self }.p_above(-expected)
+    }
+}
+
+/// What values count by the sizes of what they were measured on.
+struct Weight {
+    sized: bool,
+    middle: f64,
+}
+
+impl Weight {
+    fn of(values: &[(f64, f64)]) -> Self {
+        let sizes = values.iter().map(|v| v.1).filter(|size| *size > 0.0);
+        let middle = mean(sizes);
+        Weight { sized: middle.is_some(), middle: middle.unwrap_or(0.0) }
+    }
+
+    /// A small one says little; views differ for reasons of their own, so that a large one does not say all.
+    fn at(&self, size: f64) -> f64 {
+        if self.sized { size / (size + ERROR_OVER_OWN * self.middle) } else { 1.0 }
+    }
+
+    /// The values with their weights. Of nothing there is nothing to tell.
+    fn each(&self, values: &[(f64, f64)]) -> Vec<(f64, f64)> {
+        let used = values.iter().filter(|v| v.1 > 0.0 || !self.sized);
+        used.map(|v| (v.0, self.at(v.1))).collect()
     }
 }
 
@@ -159,6 +190,24 @@ mod tests {
             let above = above(n);
             assert!((10..=59).contains(&above), "{above} of 4000 with {n} views");
         }
+    }
+
+    /// Of a hundred further views: by as much as Gaussian ones with these errors bring, and by nothing where there
+    /// is nothing to learn.
+    #[test]
+    fn further_views_are_predicted_by_what_was_learnt() {
+        let mut rng = Seed(7).stream("view-mean/predicts");
+        let mut brought = |mean| {
+            let learnt_on = views(mean, 60, &mut rng);
+            let further = views(mean, 100, &mut rng).into_iter();
+            let nats: Vec<f64> =
+                further.map(|v| ViewMean::predicts(&learnt_on, v).unwrap()).collect();
+            nats.iter().sum::<f64>() / 100.0
+        };
+        // 0.5 (mean / error)^2 on average over sizes of 1e3 to 2e4: 0.5 * 0.005^2 / 0.2^2 * 1.05e4 = 0.082 each,
+        // give or take a twentieth of its root; that large ones count by less than their size costs a part.
+        assert!((0.03..0.15).contains(&brought(0.005)), "{}", brought(0.005));
+        assert!(brought(0.0).abs() < 0.02, "{}", brought(0.0));
     }
 
     /// Views without a pixel, more than there are others, take no part.

@@ -141,11 +141,9 @@ pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
     // Without a finding there is nothing to gain by.
     let h = diagnosis.heldout.as_ref().filter(|_| diagnosis.verdict != Verdict::Match)?;
     let aside = count(h.views.len(), "view");
-    if h.gain_interval == [0.0; 2] {
-        // Of textures but single lines, losses and column steps nothing is scored.
-        let searched = |f: &Finding| f.curve.is_some() && !f.terms.is_empty();
-        return diagnosis.findings.iter().any(searched).then(|| {
-            format!("On {aside} kept aside nothing is gained: without them the same search finds nothing.")
+    if h.is_nothing() {
+        return diagnosis.findings.iter().any(Finding::is_scored).then(|| {
+            format!("On {aside} kept aside nothing is gained: without them the same search finds nothing, or they do not show it.")
         });
     }
     let [gain, low, high] = nats([h.gain, h.gain_interval[0], h.gain_interval[1]]);

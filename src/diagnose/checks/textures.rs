@@ -1,5 +1,5 @@
-//! Does either half of the views show the same texture? Each view is one sample of the statistic
-//! that a finding rests on.
+//! Does either half of the views show the same texture, and do views kept aside? Each view is one sample of the
+//! statistic that a finding rests on.
 
 use super::replication::agree;
 use crate::diagnose::edges::Edges;
@@ -42,6 +42,30 @@ pub fn replicated(
         }
     };
     agree([half(false), half(true)])
+}
+
+/// What textures of these names, learnt on the `rest` of the views, bring to each of those kept `aside`: nats.
+pub fn gained(
+    found: &[TextureFinding],
+    structure: &[Structure],
+    known: &KnownTerms,
+    [rest, aside]: [&[usize]; 2],
+) -> Vec<f64> {
+    let mut gains = vec![0.0; aside.len()];
+    // What has no name is in no model.
+    for texture in found.iter().filter(|t| !t.families.is_empty()) {
+        let Some(beyond) = beyond_known(texture, known) else { continue };
+        let of = |&v: &usize| {
+            let s = &structure[v];
+            Some((beyond(s).filter(|x| x.is_finite())?, s.pixels))
+        };
+        let learnt_on: Vec<(f64, f64)> = rest.iter().filter_map(of).collect();
+        for (gain, view) in gains.iter_mut().zip(aside) {
+            let nats = of(view).and_then(|own| ViewMean::predicts(&learnt_on, own));
+            *gain += nats.unwrap_or(0.0);
+        }
+    }
+    gains
 }
 
 /// What a finding is told by, view by view.
