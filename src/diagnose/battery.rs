@@ -15,7 +15,7 @@ use super::finding::naming::{doubt_beside_the_unexplained, resembles_only, tempe
 use super::finding::other_findings;
 use super::finding::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::finding::scene::Scene;
-use super::missing::hard_end::HardEnd;
+use super::missing::shapes::Step;
 use super::missing::{self, DropoutOutcome, missing};
 use super::noise::scatter::ScatterResult;
 use super::noise::tails::EXCESS;
@@ -45,7 +45,7 @@ pub struct Battery {
     /// The form that sigma would follow better, in words.
     pub better_form: Option<String>,
     /// Hard ends of the range.
-    pub ends: Vec<HardEnd>,
+    pub ends: Vec<Step>,
     /// How small a loss would have been seen.
     pub detectable_losses: Vec<Detectable>,
 }
@@ -279,7 +279,7 @@ impl Case<'_> {
     }
 
     /// Losses that neither the model has nor the simulation.
-    pub(super) fn lost(&self) -> DropoutOutcome {
+    fn lost(&self) -> DropoutOutcome {
         let seen_by = (&self.sensor().camera, &self.bench.rays);
         let twins = self.baseline.as_ref().map(|b| (&b.fields[..], &b.survey));
         let seed = self.options.seed;

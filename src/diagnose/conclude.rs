@@ -17,7 +17,6 @@ use super::finding::outlook::outlook;
 use super::finding::pixels::typical_sigma_mm;
 use super::finding::scene::Scene;
 use super::joint::anchor::{anchor, let_planes_be};
-use super::missing::hard_end::HardEnd;
 use super::missing::shapes::Step;
 use super::search::outcome::Outcome;
 use super::verdict::{extend, not_identifiable, shares, untested, verdict};
@@ -131,11 +130,10 @@ impl Case<'_> {
         found: &mut [Finding],
         scenes: &[Scene<'_>; 2],
         outcomes: [&Outcome; 2],
-        ends: Vec<HardEnd>,
+        ends: Vec<Step>,
     ) {
         let of_finding = |f: &Finding| Step::of(f.effect?, |name| f.value(name));
         let found_lost = found.iter().filter_map(of_finding);
-        let ends = ends.iter().map(HardEnd::step);
         let lost: Vec<Step> = found_lost.chain(Step::known(&self.known)).chain(ends).collect();
         let (sigma, camera, rays) = (&self.model.sigma, &self.sensor().camera, &self.bench.rays);
         for (scene, outcome) in scenes.iter().zip(outcomes) {

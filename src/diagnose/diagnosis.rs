@@ -103,11 +103,9 @@ pub struct Finding {
 }
 
 impl HeldOut {
-    /// Neither gained nor lost, as far as it is written: without the views kept aside the searches find nothing,
-    /// these do not show it, or nothing that is scored was found.
+    /// Without the views kept aside the searches find nothing, or nothing that is scored was found.
     pub fn is_nothing(&self) -> bool {
-        const AS_WRITTEN: f64 = 0.05;
-        self.gain_interval.iter().all(|nats| nats.abs() < AS_WRITTEN)
+        self.gain_interval == [0.0; 2]
     }
 }
 
@@ -118,12 +116,12 @@ impl Finding {
         matches!(self.effect, Some("depth-scale" | "disparity-offset" | "thermal-drift"))
     }
 
-    /// Has it a part in the score of views kept aside? A step, an edge, a shadow, a law of the distance, and what has
-    /// no terms and no name have none.
+    /// Has it a part in the score of views kept aside? Losses, a step, an edge, a law of the distance, and what has no
+    /// terms and no name have none.
     pub fn is_scored(&self) -> bool {
         match self.statistic {
             Statistic::Bias | Statistic::Variance => self.curve.is_some() && !self.terms.is_empty(),
-            Statistic::Dropout => self.effect != Some("occlusion-shadow"),
+            Statistic::Dropout => false,
             Statistic::Distribution => self.axis == Axis::Residual,
             Statistic::Correlation => self.effect.is_some(),
         }

@@ -8,7 +8,6 @@ use super::textures;
 use crate::diagnose::case::Case;
 use crate::diagnose::diagnosis::HeldOut;
 use crate::diagnose::finding::pixels::{pixel_terms, terms_of};
-use crate::diagnose::missing;
 use crate::diagnose::noise::lines::LearntLines;
 use crate::diagnose::noise::scatter::ScatterResult;
 use crate::diagnose::noise::still::beside_bias;
@@ -23,7 +22,7 @@ const KEPT_ASIDE: usize = 4;
 const FEWEST: usize = 6;
 
 impl Case<'_> {
-    /// Choose again without some views, and score those. The errors of single `lines`, losses and textures are learnt
+    /// Choose again without some views, and score those. The errors of single `lines` and textures are learnt
     /// again without them where all views together show such.
     pub(in crate::diagnose) fn heldout(
         &self,
@@ -57,14 +56,17 @@ impl Case<'_> {
         let mut before = Vec::new();
         let (mut of_bias, mut gains) = (Vec::new(), Vec::new());
         let of_lines = self.gained_by_lines(lines, &bias_terms, &rest, &aside);
-        let of_rest = self.gained_by_losses_and_textures(scatter, [&rest, &aside]);
-        let others = of_lines.iter().zip(of_rest);
-        for ((mean, block), (lines, of_rest)) in means.iter().zip(&blocks).zip(others) {
+        let found: Vec<TextureFinding> =
+            scatter.textures.iter().chain(&scatter.tails).cloned().collect();
+        let of_textures =
+            textures::gained(&found, &scatter.structure, &self.known, [&rest, &aside]);
+        let others = of_lines.iter().zip(of_textures);
+        for ((mean, block), (lines, of_textures)) in means.iter().zip(&blocks).zip(others) {
             let (b0, b1) = (log_score(mean, &stored)?, log_score(mean, &bias_terms)?);
             let (v0, v1) = (noise_score(block, &[]), noise_score(block, &variance_terms));
             before.push(b0 + v0);
             of_bias.push(b1 - b0 + lines.nats);
-            gains.push(b1 - b0 + v1 - v0 + lines.nats + of_rest);
+            gains.push(b1 - b0 + v1 - v0 + lines.nats + of_textures);
         }
         let views = before.len() as f64;
         let mean_before = before.iter().sum::<f64>() / views;
@@ -90,24 +92,6 @@ impl Case<'_> {
             correction_rms_before_px: px_before,
             correction_rms_after_px: px_corrected,
         })
-    }
-
-    /// What losses and textures, learnt on the `rest`, bring to each of the views kept `aside`, nats.
-    fn gained_by_losses_and_textures(
-        &self,
-        scatter: &ScatterResult,
-        [rest, aside]: [&[usize]; 2],
-    ) -> Vec<f64> {
-        let twins = self.baseline.as_ref().map(|b| &b.survey);
-        let views = (&self.fields[..], twins, &self.survey);
-        let (camera, known, seed) = (&self.sensor().camera, &self.known, self.options.seed);
-        let split = [rest, aside];
-        let of_losses =
-            missing::kept_aside::gained(&self.lost(), views, camera, known, split, seed);
-        let found: Vec<TextureFinding> =
-            scatter.textures.iter().chain(&scatter.tails).cloned().collect();
-        let of_textures = textures::gained(&found, &scatter.structure, known, split);
-        of_losses.iter().zip(of_textures).map(|(a, b)| a + b).collect()
     }
 
     /// What lines of these axes, learnt on the `rest` beside its `bias`, bring to each of the views kept `aside`.

@@ -27,7 +27,6 @@ pub struct CloseLook<'a> {
 }
 
 /// Beyond it (or before it) all is missing.
-#[derive(Debug, Clone)]
 pub struct HardEnd {
     z_m: f64,
     /// Negative where what is nearer is lost.

@@ -11,7 +11,6 @@ pub mod few;
 pub mod fit;
 pub mod forms;
 pub mod hard_end;
-pub mod kept_aside;
 pub mod points;
 pub mod report;
 mod runs;
@@ -27,7 +26,7 @@ use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::margins::Margins;
 use crate::rng::Seed;
 use crate::terms::{Axis, Basis, Extent};
-use cells::{Cell, LEAST, Scatter, USUAL, patches, rim_px};
+use cells::{Cell, LEAST, Scatter, USUAL, cells, expected, fine, patches, rim_px};
 use dropout_cells::DropoutCells;
 use few::few_losses;
 use hard_end::{CloseLook, HardEnd, blur};
@@ -45,15 +44,15 @@ pub struct DropoutOutcome {
     /// show, in degrees or m: what begins farther out is not seen.
     pub detectable: Vec<Detectable>,
     /// Hard ends of the range, which are no findings.
-    pub ends: Vec<HardEnd>,
+    pub ends: Vec<Step>,
     /// What is no finding, in words.
     pub notes: Vec<String>,
 }
 
 impl DropoutOutcome {
-    fn take_end(&mut self, end: HardEnd) {
+    fn take_end(&mut self, end: &HardEnd) {
         self.notes.insert(0, end.note());
-        self.ends.push(end);
+        self.ends.push(end.step());
     }
 }
 
@@ -78,9 +77,15 @@ pub fn missing(
     (camera, rays): (&Camera, &Rays),
     seed: Seed,
 ) -> DropoutOutcome {
+    let region_given: Vec<bool> = fields.iter().map(|f| f.region_given).collect();
+    let second = survey.second();
     let margins = Margins::of(fields);
-    let large = patches(survey, camera, &margins);
-    let seen = DropoutCells::of(&large, fields, twins.map(|(_, t)| t), (survey, camera, &margins));
+    let (large, fine) = (patches(survey, camera, &margins), fine(survey, &margins));
+    let mut mine = cells(&large);
+    let expected = twins.map(|(_, survey)| {
+        expected(&mut mine, &cells(&patches(survey, camera, &margins)), rim_px(camera))
+    });
+    let seen = DropoutCells { cells: mine, fine, region_given, second, expected };
     let look = CloseLook {
         blur: &|z| blur(survey, z),
         points: &|span| points_of_pixels(fields, rays, &margins, span),
@@ -120,7 +125,8 @@ impl DropoutSearch<'_> {
             return outcome;
         }
         let shapes = Shapes::of(self.reach, self.camera, times(views));
-        let mut explained = seen.explained();
+        let nothing = || views.iter().map(|v| vec![0.0; v.len()]).collect();
+        let mut explained: Vec<Vec<f64>> = seen.expected.clone().unwrap_or_else(nothing);
         let mut taken: Vec<Axis> = Vec::new();
         while outcome.findings.len() < MOST_FINDINGS {
             let open = shapes.beside(&taken);
@@ -131,8 +137,10 @@ impl DropoutSearch<'_> {
             if outcome.findings.is_empty() {
                 outcome.detectable = detectable(&always.ledger, &shapes.steps, always.threshold());
             }
-            let first = outcome.findings.is_empty();
-            let round = always.or_begun(first, || of(&open.begun, USUAL));
+            // Steps that begin in the midst of the session are tried where none is found that is always there.
+            // Few views show how they scatter from then on: that is not trusted below what is usual.
+            let begins = outcome.findings.is_empty() && always.won().is_none();
+            let round = if begins { of(&open.begun, USUAL) } else { Some(always) };
             let Some(Round { ledger, judged, noise }) = &round else { break };
             let Some(won) = round.as_ref().and_then(Round::won) else { break };
             if outcome.findings.first().is_some_and(|f| won.gain < LEAST_OF_FIRST * f.share) {
@@ -154,7 +162,7 @@ impl DropoutSearch<'_> {
             explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
             taken.push(won.shape.axis());
             match end {
-                Some(end) => outcome.take_end(end),
+                Some(end) => outcome.take_end(&end),
                 None => outcome.findings.push(later.as_ref().map_or(finding, told)),
             }
         }
@@ -175,7 +183,7 @@ impl DropoutSearch<'_> {
         // A corner of a view that is cut off looks like the foot of a rise.
         match self.end(&finding, 0.0) {
             Some(end) if touches(&seen.fine, &end) => return self.within(&end, seen),
-            Some(end) => outcome.take_end(end),
+            Some(end) => outcome.take_end(&end),
             None => outcome.findings.push(finding),
         }
         outcome
@@ -188,7 +196,7 @@ impl DropoutSearch<'_> {
         let reach = end.spared(self.look.reach);
         let look = CloseLook { points: &spared, reach, ..self.look };
         let mut rest = DropoutSearch { look, ..*self }.losses(&seen.inside(end));
-        rest.take_end(end.clone());
+        rest.take_end(end);
         rest
     }
 
@@ -238,12 +246,6 @@ impl<'a> Round<'a> {
 
     fn threshold(&self) -> f64 {
         self.noise.threshold(LEVEL / TESTS)
-    }
-
-    /// Steps that begin in the midst of the session are tried where none is found that is always there.
-    /// Few views show how they scatter from then on: that is not trusted below what is usual.
-    fn or_begun(self, first: bool, begun: impl FnOnce() -> Option<Self>) -> Option<Self> {
-        if first && self.won().is_none() { begun() } else { Some(self) }
     }
 
     fn won(&self) -> Option<&Judged> {

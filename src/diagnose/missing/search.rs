@@ -31,7 +31,6 @@ pub struct Losses<'a> {
     /// What earlier findings explain is taken out.
     pub left: Vec<Vec<f64>>,
     pub base: f64,
-    scatter: Scatter,
     whiteners: Vec<Whitener>,
 }
 
@@ -104,14 +103,11 @@ impl<'a> Losses<'a> {
                 cells.iter().zip(e).map(|(c, e)| odds(c.lost / c.asked) - e).collect()
             })
             .collect();
+        let whiteners = views.iter().map(|v| Whitener::of(v, USUAL)).collect();
         let level = usual(&left).max(odds(0.0));
-        let left = left.into_iter().map(|v| v.into_iter().map(|y| y - level).collect()).collect();
-        Losses { views, left, base: share(level), scatter: USUAL, whiteners: Vec::new() }.whitened()
-    }
-
-    fn whitened(self) -> Self {
-        let whiteners = self.views.iter().map(|v| Whitener::of(v, self.scatter)).collect();
-        Losses { whiteners, ..self }
+        let mut losses = Losses { views, left, base: share(level), whiteners };
+        losses.left.iter_mut().flatten().for_each(|y| *y -= level);
+        losses
     }
 
     /// Once more with the scatter that `best` leaves, and no less than `least`.
@@ -120,32 +116,15 @@ impl<'a> Losses<'a> {
         let mut left = self.left.clone();
         left.iter_mut().flatten().zip(explained.iter().flatten()).for_each(|(y, e)| *y -= e);
         let scatter = Scatter::of(self.views, &left, least);
-        Losses { scatter, ..self }.whitened()
-    }
-
-    /// What `won` brings to each of some other views, of which this much is `explained`: nats.
-    pub fn brings(&self, won: &Judged, others: &[Vec<Cell>], explained: &[Vec<f64>]) -> Vec<f64> {
-        let level = odds(self.base);
-        let of_view = |((cells, known), g): ((&Vec<Cell>, &Vec<f64>), Vec<f64>)| {
-            let y = cells.iter().zip(known).map(|(c, e)| odds(c.lost / c.asked) - e - level);
-            let off: Vec<f64> = y.zip(&g).map(|(y, g)| y - 0.5 * g).collect();
-            let w = Whitener::of(cells, self.scatter).solve(&g);
-            w.iter().zip(off).map(|(w, off)| w * off).sum()
-        };
-        let explains = self.explained_of(won, others);
-        others.iter().zip(explained).zip(explains).map(of_view).collect()
+        let whiteners = self.views.iter().map(|v| Whitener::of(v, scatter)).collect();
+        Losses { whiteners, ..self }
     }
 
     /// Log odds that a shape adds.
     pub fn explained(&self, judged: &Judged) -> Vec<Vec<f64>> {
-        self.explained_of(judged, self.views)
-    }
-
-    /// The same of other `views`.
-    pub fn explained_of(&self, judged: &Judged, views: &[Vec<Cell>]) -> Vec<Vec<f64>> {
         let size = &judged.coefficients;
         let mut row = Vec::new();
-        let views = views.iter();
+        let views = self.views.iter();
         match &judged.shape {
             Shape::Step(step) => views
                 .map(|v| step.column(v, self.base).iter().map(|h| size[0] * h).collect())

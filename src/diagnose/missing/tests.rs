@@ -1,4 +1,3 @@
-use super::cells::{cells, expected};
 use super::*;
 use crate::diagnose::missing::cells::Patch;
 use crate::diagnose::missing::points::points;

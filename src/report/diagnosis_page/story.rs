@@ -143,7 +143,7 @@ pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
     let aside = count(h.views.len(), "view");
     if h.is_nothing() {
         return diagnosis.findings.iter().any(Finding::is_scored).then(|| {
-            format!("On {aside} kept aside nothing is gained: without them the same search finds nothing, or they do not show it.")
+            format!("On {aside} kept aside nothing is gained: without them the same search finds nothing.")
         });
     }
     let [gain, low, high] = nats([h.gain, h.gain_interval[0], h.gain_interval[1]]);
