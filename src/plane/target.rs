@@ -2,6 +2,7 @@
 //! looks at.
 
 use super::affine::AffineFit;
+use super::border::beside;
 use super::candidate::{Candidate, around_principal_point, candidate, centre_disc};
 use super::curved::curved_target;
 use super::grow::Lattice;
@@ -259,10 +260,11 @@ fn finish(
             best.away_px
         ));
     }
+    let beside = beside(image, lattice, &filled);
     let (mut pixels, mut on, mut edge) = (Vec::new(), 0, 0);
     for i in 0..image.w.len() {
         let node = lattice.node_of(i, width);
-        if !filled[node] || !in_front(image, &best.fit.plane, i) {
+        if !filled[node] || beside[i] || !in_front(image, &best.fit.plane, i) {
             continue;
         }
         let fits = image.valid(i) && on_plane(image, &best.fit, i);

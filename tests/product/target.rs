@@ -262,6 +262,32 @@ fn a_person_behind_and_an_edge_of_a_table() {
     expect_first("person behind", &things, 0.7);
 }
 
+/// A board whose edges leave the picture at a slant, with nothing behind: at the border pixels beside it, which the
+/// sensor could not measure, are not counted as lost.
+#[test]
+fn what_is_beside_a_board_that_the_picture_cuts_is_not_lost() {
+    for (n, turn) in [0.02, 0.05, 0.1, 0.3, 0.7].into_iter().enumerate() {
+        let (sin, cos) = f64::sin_cos(turn);
+        let board = Thing::Rectangle {
+            centre: Vector3::new(0.0, 0.0, 0.8),
+            right: Vector3::new(cos, sin, 0.0),
+            down: Vector3::new(-sin, cos, 0.0),
+            half: [0.436, 0.345],
+        };
+        let scene = draw(&[board], n as u64);
+        let target = find(&scene).expect("a board");
+        let taken = || target.pixels.iter().map(|&i| i as usize);
+        let at_border = |i: usize| {
+            let (u, v) = (i % scene.camera.width, i / scene.camera.width);
+            u == 0 || v == 0 || u + 1 == scene.camera.width || v + 1 == scene.camera.height
+        };
+        assert!(taken().filter(|&i| at_border(i)).count() > 100, "the picture cuts the board");
+        assert_eq!(taken().filter(|&i| scene.seen[i].is_none()).count(), 0, "turned by {turn}");
+        // Holes in the board are lost, at the border as well.
+        assert!(taken().any(|i| at_border(i) && scene.w[i].is_nan()), "turned by {turn}");
+    }
+}
+
 #[test]
 fn a_wall_that_fills_the_picture_is_the_target() {
     expect_first("wall", &[Thing::wall(2.0)], 0.0);

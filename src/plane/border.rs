@@ -1,0 +1,40 @@
+//! Where the target's edge leaves the picture at a slant.
+
+use super::grow::Lattice;
+use super::image::InverseDepthImage;
+
+/// Pixels without a measurement, in nodes at the picture's border, that lie beside the target and not on it: those
+/// reached over such pixels from nodes that are not its own. An edge that leaves the picture within a node cuts off
+/// pixels which no erosion of nodes finds, for beyond the border there are none.
+pub(super) fn beside(
+    image: &InverseDepthImage<'_>,
+    lattice: &Lattice,
+    target: &[bool],
+) -> Vec<bool> {
+    let (width, n) = (image.camera.width, image.w.len());
+    let last = [(width - 1) / lattice.pitch, (n / width - 1) / lattice.pitch];
+    let at_border = |i: usize| {
+        let [c, r] = [i % width / lattice.pitch, i / width / lattice.pitch];
+        c == 0 || r == 0 || c == last[0] || r == last[1]
+    };
+    let open = |i: usize| !image.valid(i) && at_border(i);
+    let own = |i: usize| target[lattice.node_of(i, width)];
+    let mut reached: Vec<bool> = (0..n).map(|i| open(i) && !own(i)).collect();
+    let mut queue: Vec<usize> = (0..n).filter(|&i| reached[i]).collect();
+    while let Some(i) = queue.pop() {
+        let (u, v) = (i % width, i / width);
+        let beside = [
+            (u > 0).then(|| i - 1),
+            (u + 1 < width).then(|| i + 1),
+            (v > 0).then(|| i - width),
+            (i + width < n).then(|| i + width),
+        ];
+        for next in beside.into_iter().flatten() {
+            if !reached[next] && open(next) {
+                reached[next] = true;
+                queue.push(next);
+            }
+        }
+    }
+    reached
+}
