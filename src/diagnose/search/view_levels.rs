@@ -6,7 +6,7 @@ use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 use crate::diagnose::views::samples::{ViewData, finite};
 use crate::solve::{Left, fit_by_svd, left_by_fit};
 use crate::stats::median;
-use crate::terms::PixelContext;
+use crate::terms::{PixelContext, ROOM_LUX};
 
 /// A model's sigma is not known better than this from view to view, in log variance, where the views
 /// are too few to show how they scatter.
@@ -14,7 +14,7 @@ pub const MODEL_TOLERANCE: f64 = 0.04;
 
 /// Variance of the views' own levels beyond what their samples explain (a moment estimate after
 /// DerSimonian and Laird), about laws of the distance, from nine views on of the tilt, from ten on
-/// of the time and the temperature instead, from twelve on of all: what a law explains is no scatter.
+/// of the time and the temperature instead, from twelve on of all, the room's light too: what a law explains is no scatter.
 /// Enlarged for the laws that so few views have to settle.
 pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
     let levels = Level::of(blocks);
@@ -98,9 +98,12 @@ enum Law {
     Turn,
     Time,
     Warmth,
+    /// The light of the room over the pattern's, which falls with the square of the distance.
+    Ambient,
 }
 
-const LAWS: [Law; 6] = [Law::Level, Law::Distance, Law::Tilt, Law::Turn, Law::Time, Law::Warmth];
+const LAWS: [Law; 7] =
+    [Law::Level, Law::Distance, Law::Tilt, Law::Turn, Law::Time, Law::Warmth, Law::Ambient];
 
 impl Law {
     fn at(self, place: &PixelContext) -> f64 {
@@ -112,6 +115,7 @@ impl Law {
             Law::Turn => steep * (2.0 * place.azimuth).cos(),
             Law::Time => finite(place.session_s / 3600.0),
             Law::Warmth => finite(place.temperature_c / 10.0),
+            Law::Ambient => finite(place.ambient * place.z * place.z / ROOM_LUX),
         }
     }
 }
