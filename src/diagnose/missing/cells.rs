@@ -8,7 +8,7 @@ use crate::camera::Camera;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::margins::Margins;
 use crate::diagnose::views::surveyed_view::SurveyedView;
-use crate::diagnose::views::tiles::SIDE;
+use crate::diagnose::views::tiles::{SIDE, rim_px};
 use crate::terms::PixelContext;
 
 /// Pixel-frames of a patch, and how many of them have no measurement.
@@ -39,12 +39,6 @@ pub fn cells(patches: &[Vec<Patch>]) -> Vec<Vec<Cell<'_>>> {
 
 /// Cells across the picture: some hundred a view, each wider than a clump of dead pixels.
 const ACROSS: usize = 16;
-/// Tiles nearer the target's edge are kept apart: what a matcher's window of 9 px in 640 reaches, and no
-/// less than a tile, px.
-pub fn rim_px(camera: &Camera) -> f64 {
-    (camera.width as f64 / 80.0).max(SIDE as f64)
-}
-
 /// A smaller patch, in tiles, says little.
 const FEWEST_TILES: usize = 2;
 

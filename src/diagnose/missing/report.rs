@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 use super::cells::Cell;
 use super::fit::{Fitted, fit};
-use super::points::{Point, bounded, part, points};
+use super::points::{Point, bounded, misfit, part, points};
 use super::search::{Judged, Losses};
 use super::shapes::{Shape, Step};
 use crate::camera::Camera;
@@ -56,21 +56,31 @@ type At = Box<dyn Fn(&Cell<'_>) -> Option<f64>>;
 impl DropoutReporter<'_> {
     /// What losses of this shape are told as; noise alone brings as much with the chance `p`.
     pub fn finding(&self, won: &Judged, rivals: &Rivals, p: f64) -> Finding {
-        let (family, axis) = (won.shape.family(), won.shape.axis());
+        let (mut family, axis) = (won.shape.family(), won.shape.axis());
         let mut finding = Finding {
             share: won.gain,
             p_adjusted: Some(p),
             ..named(family.unwrap_or_default(), Statistic::Dropout, axis)
         };
         match &won.shape {
-            Shape::Step(step) => self.step(*step, &mut finding),
+            Shape::Step(step) => {
+                let follows = self.step(*step, &mut finding);
+                family = family.filter(|_| follows);
+            }
             Shape::Curve(basis) => self.curve(basis, &mut finding),
         }
-        described(finding, family, rivals, won.shape.since_s())
+        described(finding, family, rivals, Some(&won.shape))
     }
 
-    fn step(&self, step: Step, finding: &mut Finding) {
-        let span = if step.axis == Axis::Theta { self.reach.theta } else { self.reach.z };
+    /// Do the losses follow the step, or are they farther from it than from none?
+    fn step(&self, step: Step, finding: &mut Finding) -> bool {
+        let span = match step.axis {
+            Axis::Theta if step.incidence => {
+                crate::stats::range(self.fine.iter().flatten().map(|c| step.at(c.place)))
+            }
+            Axis::Theta => self.reach.theta,
+            _ => self.reach.z,
+        };
         let at = |c: &Cell<'_>| (!step.before(c.place.session_s)).then(|| step.at(c.place));
         let all = bounded(points(self.fine, &at, span), &step, self.region_given);
         let own = Fitted { step, std_error: [None; 3] };
@@ -83,6 +93,10 @@ impl DropoutReporter<'_> {
         let asked: f64 = self.fine.iter().flatten().map(|c| c.asked).sum();
         finding.size.sigma = there / asked.max(1.0) * mean(&all, |p| loss(p.x) - self.base);
         finding.curve = Some(binned(&all, step.axis, span, loss));
+        let off = |loss: &dyn Fn(f64) -> f64| -> f64 {
+            all.iter().map(|p| misfit(p, loss(p.x)).powi(2)).sum()
+        };
+        off(&loss) < off(&|_| self.base)
     }
 
     fn curve(&self, basis: &Basis, finding: &mut Finding) {
@@ -209,18 +223,22 @@ pub fn shadow_finding(band: Band, fields: &[Field]) -> Finding {
     described(finding, family, &rivals, None)
 }
 
-/// With its name, if it has one, its rivals, and what is said of both; it began so many seconds after the
-/// first view.
+/// With its name, if it has one, its rivals, and what is said of both.
 fn described(
     found: Finding,
     family: Option<&'static str>,
     rivals: &Rivals,
-    since_s: Option<f64>,
+    shape: Option<&Shape>,
 ) -> Finding {
     let status = if family.is_some() { Status::Named } else { Status::Unexplained };
     let ([from, to], unit) = (found.interval.map(digits), found.unit);
+    let (since_s, by_incidence) =
+        (shape.and_then(Shape::since_s), shape.is_some_and(Shape::by_incidence));
     let shape = family.is_none().then(|| format!("more is lost from {from} to {to} {unit}"));
     let mut words = physics(status, family, Statistic::Dropout, found.axis, shape.as_deref());
+    if by_incidence && family.is_some() {
+        words += " The angle is that at which each pixel sees the target.";
+    }
     if let Some(since) = since_s {
         words += &format!(" It began about {since:.1} s after the first view.");
     }

@@ -251,7 +251,7 @@ impl<'a> Losses<'a> {
         const POWER_80: f64 = 0.84;
         let seen = |s: &&Step| {
             let a: f64 = self.column(**s).a.iter().sum();
-            s.share == 1.0 && 0.5 * a - POWER_80 * a.sqrt() > threshold
+            s.share == 1.0 && !s.incidence && 0.5 * a - POWER_80 * a.sqrt() > threshold
         };
         let mut all: Vec<Step> = steps.iter().filter(seen).copied().collect();
         // The least demanding first: largest middle, or the smallest where what is below is lost.

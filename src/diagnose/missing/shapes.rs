@@ -1,10 +1,12 @@
 //! What losses may follow: steps on lawful axes, which have a name, and curves, which have none.
 
+use std::f64::consts::FRAC_PI_2;
+
 use super::cells::{Cell, odds};
 use crate::camera::Camera;
 use crate::diagnose::views::known::KnownTerms;
 use crate::effects::logistic;
-use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, PixelContext};
+use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, PixelContext, corner_radius};
 
 /// Beyond `middle` a share is lost; a negative width loses what is below it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,6 +17,8 @@ pub struct Step {
     pub share: f64,
     /// It is there from this time of the session on, s; `None`: throughout.
     pub since_s: Option<f64>,
+    /// A step over the tilt goes with the angle at which each pixel sees the target, not with that of the plane.
+    pub incidence: bool,
 }
 
 impl Step {
@@ -24,7 +28,7 @@ impl Step {
 
     /// A share of one, at all times.
     pub fn whole(axis: Axis, middle: f64, width: f64) -> Self {
-        Step { axis, middle, width, share: 1.0, since_s: None }
+        Step { axis, middle, width, share: 1.0, since_s: None, incidence: false }
     }
 
     /// By the effect's parameters; the share is one where none is given.
@@ -52,13 +56,18 @@ impl Step {
         self.since_s.is_some_and(|since| session_s < since)
     }
 
-    /// What its choice among the beginnings costs, nats.
+    /// What its choice among the beginnings costs, and of the other angle, nats.
     pub fn cost(&self) -> f64 {
-        self.since_s.map_or(0.0, |_| (STARTS as f64).ln())
+        let of_angle = if self.incidence { 2f64.ln() } else { 0.0 };
+        of_angle + self.since_s.map_or(0.0, |_| (STARTS as f64).ln())
     }
 
     pub fn at(&self, p: &PixelContext) -> f64 {
-        if self.axis == Axis::Theta { p.theta } else { p.z }
+        match self.axis {
+            Axis::Theta if self.incidence => incidence(p),
+            Axis::Theta => p.theta,
+            _ => p.z,
+        }
     }
 
     /// Chance of a loss where the axis is at `x` and `base` is lost anyway.
@@ -71,6 +80,13 @@ impl Step {
         let of = |c: &Cell<'_>| odds(self.loss(self.at(c.place), base)) - odds(base);
         cells.iter().map(|c| if self.before(c.place.session_s) { 0.0 } else { of(c) }).collect()
     }
+}
+
+/// Between the line of sight and the target's normal, rad.
+fn incidence(p: &PixelContext) -> f64 {
+    let ((sin, cos), (down, along)) = (p.theta.sin_cos(), p.azimuth.sin_cos());
+    let facing = cos - sin * (along * p.x + down * p.y);
+    (facing / (1.0 + p.x * p.x + p.y * p.y).sqrt()).clamp(0.0, 1.0).acos()
 }
 
 /// What may explain losses.
@@ -95,6 +111,11 @@ impl Shape {
         }
     }
 
+    /// Does it go with the angle at which each pixel sees the target?
+    pub fn by_incidence(&self) -> bool {
+        matches!(self, Shape::Step(Step { incidence: true, .. }))
+    }
+
     /// When it begins, where that is in the midst of the session, s after the first view.
     pub fn since_s(&self) -> Option<f64> {
         match self {
@@ -114,27 +135,39 @@ const LEAST_TILT: f64 = 0.1;
 const LEAST_RANGE: f64 = 1.1;
 
 /// All steps on lawful axes.
-fn steps(reach: &Extent) -> Vec<Step> {
-    grid(reach, &WIDTHS_DEG, &WIDTHS, &[1.0, 0.3])
+fn steps(reach: &Extent, camera: &Camera) -> Vec<Step> {
+    grid(reach, camera, &WIDTHS_DEG, &WIDTHS, &[1.0, 0.3])
 }
 
 /// Whole steps of the middle width.
-fn usual_steps(reach: &Extent) -> Vec<Step> {
-    grid(reach, &WIDTHS_DEG[1..2], &WIDTHS[1..2], &[1.0])
+fn usual_steps(reach: &Extent, camera: &Camera) -> Vec<Step> {
+    grid(reach, camera, &WIDTHS_DEG[1..2], &WIDTHS[1..2], &[1.0])
 }
 
-fn grid(reach: &Extent, widths_deg: &[f64], widths: &[f64], shares: &[f64]) -> Vec<Step> {
+fn grid(
+    reach: &Extent,
+    camera: &Camera,
+    widths_deg: &[f64],
+    widths: &[f64],
+    shares: &[f64],
+) -> Vec<Step> {
     let mut all = Vec::new();
-    let mut add = |axis, middle, width| {
-        all.extend(shares.iter().map(|&share| Step { share, ..Step::whole(axis, middle, width) }));
-    };
+    let mut add = |step: Step| all.extend(shares.iter().map(|&share| Step { share, ..step }));
     let along = |k: usize| k as f64 / (MIDDLES - 1) as f64;
     if is_told_apart(Axis::Theta, reach) {
         let [low, high] = reach.theta;
         for k in 0..MIDDLES {
             let beyond = 4f64.to_radians();
             let middle = low + along(k) * (high + beyond - low);
-            widths_deg.iter().for_each(|deg| add(Axis::Theta, middle, deg.to_radians()));
+            let step = |deg: &f64| Step::whole(Axis::Theta, middle, deg.to_radians());
+            widths_deg.iter().for_each(|deg| add(step(deg)));
+        }
+        // The corner of the picture sees a plane that is turned away from it so much more steeply.
+        let steepest = (high + corner_radius(camera).atan()).min(FRAC_PI_2);
+        for k in 0..MIDDLES {
+            let middle = low + along(k) * (steepest - low);
+            let step = |deg: &f64| Step::whole(Axis::Theta, middle, deg.to_radians());
+            widths_deg.iter().for_each(|deg| add(Step { incidence: true, ..step(deg) }));
         }
     }
     if is_told_apart(Axis::Z, reach) {
@@ -142,8 +175,8 @@ fn grid(reach: &Extent, widths_deg: &[f64], widths: &[f64], shares: &[f64]) -> V
         for k in 0..MIDDLES {
             let middle = low * (high / low).powf(along(k));
             for width in widths {
-                add(Axis::Z, middle, width * middle);
-                add(Axis::Z, middle, -width * middle);
+                add(Step::whole(Axis::Z, middle, width * middle));
+                add(Step::whole(Axis::Z, middle, -width * middle));
             }
         }
     }
@@ -208,8 +241,8 @@ pub struct Shapes {
 impl Shapes {
     /// Of views at these `times`, s of the session.
     pub fn of(reach: &Extent, camera: &Camera, times: impl Iterator<Item = f64>) -> Self {
-        let begun = begun(&usual_steps(reach), times);
-        Shapes { steps: steps(reach), begun, curves: curves(camera, reach) }
+        let begun = begun(&usual_steps(reach, camera), times);
+        Shapes { steps: steps(reach, camera), begun, curves: curves(camera, reach) }
     }
 
     /// Those on other axes than these.

@@ -37,6 +37,12 @@ pub struct Tile {
 /// still seen.
 pub const SIDE: usize = 4;
 
+/// What lies nearer the target's edge is kept apart: what a matcher's window of 9 px in 640 reaches, and no less
+/// than a tile, px.
+pub fn rim_px(camera: &Camera) -> f64 {
+    (camera.width as f64 / 80.0).max(SIDE as f64)
+}
+
 /// Places of a view's pixels and patches.
 pub struct Places<'a> {
     field: &'a Field,
