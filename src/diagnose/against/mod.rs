@@ -115,7 +115,7 @@ impl Baseline {
         measure_tails(&mut structure, &fields, &[], &whitener);
         let lattice = lattice(&fields, simulated);
         let steps = Steps::of(&lattice, &structure, &fields, simulated);
-        let confusers = Confusers { uneven: false, simulated: true };
+        let confusers = Confusers { simulated: true, ..Confusers::default() };
         Baseline {
             heavy: tails(&structure, &none, 0.03 * options.level, confusers).is_some(),
             fields,

@@ -12,7 +12,7 @@ use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::known_error::is_beyond;
 use crate::diagnose::views::layers::Survey;
-use crate::diagnose::views::tiles::Places;
+use crate::diagnose::views::tiles::{Places, rim_px};
 use crate::measure::Workbench;
 use crate::model::SigmaModel;
 use crate::stats::mean;
@@ -74,11 +74,14 @@ pub(in crate::diagnose) fn measure_tails(
 ) {
     let factors = pixel_terms(fields, terms, survey, bench);
     structure.par_iter_mut().zip(fields).enumerate().for_each(|(n, (s, field))| {
-        // Where the model says nothing of the noise, errors are no tails.
+        // Where the model says nothing of the noise, errors are no tails, and none where a pixel may see what is
+        // behind the target as well.
         let theta = field.plane.theta();
+        let rim = rim_px(&bench.sensor.camera) as f32;
         let is_told = |k: usize| {
             let z = field.scale_px_m / field.disparity(k, &bench.rays);
-            sigma.is_none_or(|sigma| !is_beyond(sigma, z, theta))
+            let told = sigma.is_none_or(|sigma| !is_beyond(sigma, z, theta));
+            told && field.edge.get(k).is_none_or(|edge| *edge >= rim)
         };
         let told: Vec<bool> = (0..field.pixels.len()).map(is_told).collect();
         // Single frames, unless what stands still in them could be taken for a tail.

@@ -13,6 +13,7 @@ pub mod still;
 pub mod structure;
 pub mod tail_counts;
 pub mod tails;
+mod tails_of_some;
 pub mod texture;
 pub mod texture_finding;
 pub mod view_mean;

@@ -80,7 +80,8 @@ impl Case<'_> {
             || self.survey.refits_sigma && !terms.iter().all(holds)
             || self.known.has_uneven_noise()
             || !self.known.variance.iter().all(holds);
-        let confusers = Confusers { uneven, simulated: self.baseline.is_some() };
+        let stepped = self.lattice.is_some();
+        let confusers = Confusers { uneven, simulated: self.baseline.is_some(), stepped };
         let tails = tails(&structure, &self.known, each, confusers)
             .filter(|t| !alike && self.stands(t.p, each));
         ScatterResult { structure, textures, tails, outcome }

@@ -6,6 +6,7 @@ use super::mixture::Mixture;
 use super::outliers::{Outliers, outliers};
 use super::structure::Structure;
 use super::tail_counts::{GAUSSIAN_TAIL, TAIL_EDGES, TailCounts};
+use super::tails_of_some::{TailedViews, tailed_views};
 use super::texture_finding::TextureFinding;
 use super::view_mean::{ViewMean, nats};
 use crate::diagnose::finding::parameters::estimate;
@@ -32,6 +33,9 @@ pub struct Confusers {
     /// The views are a simulation's, or are compared with one: a simulation by formula lacks the
     /// unevenness from pixel to pixel that light brings, so that the two differ without heavy tails.
     pub simulated: bool,
+    /// The words step by about as much as the noise: how far out a view's residuals lie goes with where its words
+    /// fall.
+    pub stepped: bool,
 }
 
 /// Are the residuals' tails heavier than a Gaussian's?
@@ -55,10 +59,32 @@ pub fn tails(
     let expected = much * UNEQUAL * own;
     let mut parameters = Map::new();
     parameters.insert("share_beyond_4_sigma".into(), json!(share.value));
-    if share.value < much * HEAVY * own || share.p_above(expected) > level {
-        let looked = mixture.is_none() && !confusers.uneven && !confusers.simulated;
-        return if looked { weak(views, level, parameters) } else { None };
+    let heavy = much * HEAVY * own;
+    if share.value >= heavy && share.p_above(expected) <= level {
+        return far_out(views, parameters, own, share.p_above(own), confusers);
     }
+    let of_some = || tailed_views(views, independent_readings, expected, heavy);
+    let alike = !confusers.stepped && !confusers.simulated;
+    let of_some = alike.then(of_some).flatten();
+    if let Some(TailedViews { views: some, p }) = of_some.filter(|t| t.p <= level) {
+        let words = format!("in {} of {} views", some.len(), views.len());
+        let found = far_out(&some, parameters, own, p, confusers)?;
+        return Some(TextureFinding { words: Some(words), ..found });
+    }
+    let looked = mixture.is_none() && !confusers.uneven && !confusers.simulated;
+    if looked { weak(views, level, parameters) } else { None }
+}
+
+/// What is counted far out in these views; `own` is the model's share.
+fn far_out(
+    views: &[Structure],
+    mut parameters: Map<String, serde_json::Value>,
+    own: f64,
+    p: f64,
+    confusers: Confusers,
+) -> Option<TextureFinding> {
+    let share = ViewMean::of(views, Structure::tail_share)?;
+    parameters.insert("share_beyond_4_sigma".into(), json!(share.value));
     let mut counts = TailCounts::default();
     views.iter().filter(|s| s.tail_share().is_some()).for_each(|s| counts.add(&s.tails));
     // Where all that strays is gross it has no scale.
@@ -76,7 +102,7 @@ pub fn tails(
         interval: [4.0, 2.0 * mean_size(&counts) - 4.0],
         parameters,
         size_sigma,
-        p: share.p_above(own),
+        p,
         nats: readings * (share.value * (share.value / own).ln() - (share.value - own)),
         ..TextureFinding::named(vec!["heavy-tails"], Statistic::Distribution, Axis::Residual)
     })
@@ -172,10 +198,19 @@ mod tests {
             )
             .is_none()
         );
-        assert!(
-            tails(&tailed(2e-3, 4), &KnownTerms::default(), 1e-3, Confusers::default()).is_none(),
-            "in a few views only"
-        );
+        let of = |views: usize, confusers: Confusers| {
+            tails(&tailed(2e-3, views), &KnownTerms::default(), 1e-3, confusers)
+        };
+        assert!(of(2, Confusers::default()).is_none(), "in two odd views only");
+        let some = of(4, Confusers::default()).expect("in some views");
+        assert_eq!(some.words, Some(format!("in 4 of {VIEWS} views")));
+        // Of steps, and beside a simulation, views differ by themselves.
+        for confusers in [
+            Confusers { stepped: true, ..Confusers::default() },
+            Confusers { simulated: true, ..Confusers::default() },
+        ] {
+            assert!(of(4, confusers).is_none(), "{confusers:?}");
+        }
         let found = tails(&tailed(2e-3, VIEWS), &KnownTerms::default(), 1e-3, Confusers::default())
             .expect("a tail");
         assert_eq!(found.families, ["heavy-tails"]);
@@ -213,7 +248,7 @@ mod tests {
             (0..VIEWS).map(view).collect()
         };
         let told = |views: &[Structure], uneven: bool, simulated: bool| {
-            let confusers = Confusers { uneven, simulated };
+            let confusers = Confusers { uneven, simulated, stepped: false };
             tails(views, &KnownTerms::default(), 1e-3, confusers)
         };
         let heavy = views("student", true, 0.0);
