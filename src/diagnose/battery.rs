@@ -222,8 +222,8 @@ impl Case<'_> {
         found
     }
 
-    /// What a few views have alone. Two runs of a world of light, and views beside those that a model
-    /// was learnt from, differ one by one for no reason that could be told.
+    /// What a few views have alone. Two runs of a world of light differ view by view for no reason
+    /// that could be told.
     fn few_views(
         &self,
         [mean, scatter]: &[Scene<'_>; 2],
@@ -248,10 +248,12 @@ impl Case<'_> {
             let rules = survey.variance_rules(level);
             few_views(scatter, &scatter.data, &candidates, outcomes[1], &rules, &[], seed)
         };
-        let tested = |layer: usize| survey.learnt_from[layer].is_none();
         // Where the words step, so does the mean of every view, at places of its own.
-        let bias = (tested(0) && !stepped).then(bias).flatten();
-        bias.into_iter().chain(tested(1).then(variance).flatten()).collect()
+        let bias = (!stepped).then(bias).flatten();
+        // And its noise, from view to view, about a sigma that other views taught.
+        let taught = survey.learnt_from[1].is_some();
+        let variance = (!(stepped && taught)).then(variance).flatten();
+        bias.into_iter().chain(variance).collect()
     }
 
     /// The refit of a sigma that was calibrated here is no finding; the extended model has it, for all

@@ -92,7 +92,13 @@ fn best(views: &[Evidence], prior: f64) -> Option<Best> {
 }
 
 impl<'a> Tried<'a> {
-    fn of(candidate: &'a Candidate, evidence: Vec<Evidence>, prior: f64) -> Option<Self> {
+    /// Held against a model that other views taught, all views may be off by `excess` in variance.
+    fn of(
+        candidate: &'a Candidate,
+        evidence: Vec<Evidence>,
+        prior: f64,
+        excess: f64,
+    ) -> Option<Self> {
         let k = candidate.basis.count();
         let factors = evidence.iter().map(|e| root(&e.a)).collect();
         let mut squares = Vec::new();
@@ -104,7 +110,7 @@ impl<'a> Tried<'a> {
         let (k, spread) = (k as f64, 2.0 / (9.0 * k as f64));
         let expected = k * (1.0 - spread - spread.sqrt() / MAD_TO_SIGMA).powi(3);
         let usual = quantile(&mut squares, 0.25).unwrap_or(0.0);
-        let scatter = (usual / expected).max(1.0);
+        let scatter = excess * (usual / expected).max(1.0);
         Some(Tried { candidate, evidence, factors, scatter, prior })
     }
 
@@ -199,12 +205,13 @@ pub fn few_views(
     };
     let groups: Vec<Vec<Grouping>> = fine.par_iter().map(Grouping::all).collect();
     let views = Views::of(&fine, &coarse, &groups, &doubted, rules.prior);
+    let left_open = rules.learnt_from.map_or(1.0, |model| model.excess(fine.len() as f64));
     let tried: Vec<Tried<'_>> = candidates
         .par_iter()
         .filter(|c| c.family != Some(RECALIBRATE) && c.basis.count() <= MAX_COLUMNS)
         // Seams are many, and nearly the same.
         .filter(|c| c.family.is_some() || !matches!(c.basis, Basis::Curve { nodes: 2, .. }))
-        .filter_map(|c| Tried::of(c, views.evidence(&c.basis)?, rules.prior))
+        .filter_map(|c| Tried::of(c, views.evidence(&c.basis)?, rules.prior, left_open))
         .collect();
     let mut all: Vec<(&Candidate, Best)> =
         tried.par_iter().filter_map(|t| Some((t.candidate, t.best()?))).collect();
@@ -212,7 +219,9 @@ pub fn few_views(
     all.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
     let most = all.first()?.1.gain;
     let shared: f64 = outcome.chosen.iter().map(|c| c.gain.max(0.0)).sum();
-    if most * BESIDE_ALL < shared {
+    // Views beside those that a model was learnt from differ for reasons of their own.
+    let beside_all = if rules.learnt_from.is_some() { 1.0 } else { BESIDE_ALL };
+    if most * beside_all < shared {
         return None;
     }
     let noise = NoiseGains::simulated(REPLICATES, MIN_EXCESS, |replicate| {

@@ -30,7 +30,7 @@ fn the_views_that_show_it_are_found() {
 #[test]
 fn nearly_half_of_the_views_are_few() {
     let slope = Candidate::curve(Basis::powers(Coordinate::Column, 1, Modulation::One));
-    let tried = Tried::of(&slope, views("few-views/half", 1.0, 8), 0.1).unwrap();
+    let tried = Tried::of(&slope, views("few-views/half", 1.0, 8), 0.1, 1.0).unwrap();
     let found = tried.best().unwrap();
     assert_eq!((found.views.len(), found.gain > 90.0), (8, true), "{}", found.gain);
 }
