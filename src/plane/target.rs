@@ -262,9 +262,9 @@ fn finish(
     }
     let beside = beside(image, lattice, &filled);
     let (mut pixels, mut on, mut edge) = (Vec::new(), 0, 0);
-    for i in 0..image.w.len() {
+    for (i, beside) in beside.iter().enumerate() {
         let node = lattice.node_of(i, width);
-        if !filled[node] || beside[i] || !in_front(image, &best.fit.plane, i) {
+        if !filled[node] || *beside || !in_front(image, &best.fit.plane, i) {
             continue;
         }
         let fits = image.valid(i) && on_plane(image, &best.fit, i);

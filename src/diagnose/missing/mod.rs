@@ -138,6 +138,9 @@ impl DropoutSearch<'_> {
             if outcome.findings.is_empty() {
                 outcome.detectable = detectable(&always.ledger, &shapes.steps, always.threshold());
             }
+            if taken.is_empty() {
+                outcome.notes.extend(lost_everywhere(always.ledger.base));
+            }
             // Steps that begin in the midst of the session are tried where none is found that is always there.
             // Few views show how they scatter from then on: that is not trusted below what is usual.
             let begins = outcome.findings.is_empty() && always.won().is_none();
@@ -217,6 +220,17 @@ impl DropoutSearch<'_> {
             camera: self.camera,
         }
     }
+}
+
+/// A share of the readings that is lost wherever the target is: no model says how many there should be.
+fn lost_everywhere(share: f64) -> Option<String> {
+    const WORTH_A_WORD: f64 = 0.005;
+    (share > WORTH_A_WORD).then(|| {
+        format!(
+            "{:.1} % of the readings are missing wherever the target is: a model has no share for that, and it is no finding",
+            100.0 * share
+        )
+    })
 }
 
 fn touches(views: &[Vec<Cell<'_>>], end: &HardEnd) -> bool {
