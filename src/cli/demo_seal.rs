@@ -221,9 +221,8 @@ fn gained(diagnosis: &Diagnosis) -> String {
         return "No view could be kept out to show a gain.".into();
     };
     if h.is_nothing() {
-        let scored =
-            diagnosis.findings.is_empty() || diagnosis.findings.iter().any(Finding::is_scored);
-        let what = if scored { "nothing is gained" } else { "what was found has no score" };
+        let none = diagnosis.has_no_score();
+        let what = if none { "what was found has no score" } else { "nothing is gained" };
         return format!("On {} kept out of the fit {what}.", counted(h.views.len(), "view"));
     }
     let [low, high] = h.gain_interval;

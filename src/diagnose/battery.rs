@@ -174,7 +174,9 @@ impl Case<'_> {
             excess > 1.0
                 && f.share / excess < bias.outcome.noise.threshold(self.level(Self::MEAN_LEVEL))
         };
-        let far_errors = |t: &TextureFinding| !t.parameters.contains_key(EXCESS);
+        // Of all views, which words about some of them deny.
+        let far_errors =
+            |t: &TextureFinding| !t.parameters.contains_key(EXCESS) && t.words.is_none();
         let textures = !scatter.textures.is_empty() || scatter.tails.is_some();
         let textured = scatter.tails.as_ref().is_some_and(far_errors)
             || (textures && f.size.sigma < LEVEL_BESIDE_TEXTURE);

@@ -116,17 +116,6 @@ impl Finding {
         matches!(self.effect, Some("depth-scale" | "disparity-offset" | "thermal-drift"))
     }
 
-    /// Has it a part in the score of views kept aside? Losses, a step, an edge, a law of the distance, and what has no
-    /// terms and no name have none.
-    pub fn is_scored(&self) -> bool {
-        match self.statistic {
-            Statistic::Bias | Statistic::Variance => self.curve.is_some() && !self.terms.is_empty(),
-            Statistic::Dropout => false,
-            Statistic::Distribution => self.axis == Axis::Residual,
-            Statistic::Correlation => self.effect.is_some(),
-        }
-    }
-
     /// What was found of a parameter, without its error.
     pub fn value(&self, parameter: &str) -> Option<f64> {
         self.parameters.get(parameter)?.get("value")?.as_f64()

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::diagnosis::{CannotTell, Finding, Status, Verdict};
+use super::diagnosis::{CannotTell, Diagnosis, Finding, HeldOut, Status, Verdict};
 use super::distance::reference::can_happen;
 use super::finding::naming::unname;
 use super::finding::other_findings::named;
@@ -171,4 +171,27 @@ pub(super) fn extend<'a>(
         }
     }
     extended
+}
+
+impl Diagnosis {
+    /// Something was found, and none of it has a part in the score of views kept aside.
+    pub fn has_no_score(&self) -> bool {
+        let nothing = self.heldout.as_ref().is_some_and(HeldOut::is_nothing);
+        let mut found = self.findings.iter().filter(|f| f.status != Status::NotIdentifiable);
+        nothing && found.clone().next().is_some() && !found.any(Finding::is_scored)
+    }
+}
+
+impl Finding {
+    /// Has it a part in the score of views kept aside? Losses, a step, an edge, a law of the distance, and what has no
+    /// terms and no name have none.
+    pub fn is_scored(&self) -> bool {
+        match self.statistic {
+            Statistic::Bias if self.axis == Axis::Frame => self.effect.is_some(),
+            Statistic::Bias | Statistic::Variance => self.curve.is_some() && !self.terms.is_empty(),
+            Statistic::Dropout => false,
+            Statistic::Distribution => self.axis == Axis::Residual && self.effect.is_some(),
+            Statistic::Correlation => self.effect.is_some(),
+        }
+    }
 }

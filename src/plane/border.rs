@@ -12,10 +12,10 @@ pub(super) fn beside(
     target: &[bool],
 ) -> Vec<bool> {
     let (width, n) = (image.camera.width, image.w.len());
-    let last = [(width - 1) / lattice.pitch, (n / width - 1) / lattice.pitch];
     let at_border = |i: usize| {
-        let [c, r] = [i % width / lattice.pitch, i / width / lattice.pitch];
-        c == 0 || r == 0 || c == last[0] || r == last[1]
+        let node = lattice.node_of(i, width);
+        let (c, r) = (node % lattice.columns, node / lattice.columns);
+        c == 0 || r == 0 || c + 1 == lattice.columns || r + 1 == lattice.rows
     };
     let open = |i: usize| !image.valid(i) && at_border(i);
     let own = |i: usize| target[lattice.node_of(i, width)];

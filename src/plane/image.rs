@@ -13,7 +13,8 @@ use crate::stats::median_in_place;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Target {
     /// Indices into the image, ascending. All pixels of the target's region, also those without a
-    /// measurement and those off the plane: holes and gross errors belong to the sensor's noise.
+    /// measurement and those off the plane: holes and gross errors belong to the sensor's noise. Without those at the picture's
+    /// border that lie beside it.
     pub pixels: Vec<u32>,
     pub plane: Plane,
     /// Robust standard deviation about the plane, inverse depth, 1/m.

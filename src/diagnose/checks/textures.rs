@@ -6,6 +6,7 @@ use crate::diagnose::edges::Edges;
 use crate::diagnose::edges::mixing::mean_share;
 use crate::diagnose::noise::expected_window;
 use crate::diagnose::noise::in_time::{later, of_any_two};
+use crate::diagnose::noise::mixture::Mixture;
 use crate::diagnose::noise::structure::Structure;
 use crate::diagnose::noise::tail_counts::GAUSSIAN_TAIL;
 use crate::diagnose::noise::tails::EXCESS;
@@ -52,8 +53,9 @@ pub fn gained(
     [rest, aside]: [&[usize]; 2],
 ) -> Vec<f64> {
     let mut gains = vec![0.0; aside.len()];
-    // What has no name is in no model.
-    for texture in found.iter().filter(|t| !t.families.is_empty()) {
+    // What has no name is in no model, and what some views have, as words say, is no mean of all.
+    let tails_of_some = |t: &TextureFinding| t.axis == Axis::Residual && t.words.is_some();
+    for texture in found.iter().filter(|t| !t.families.is_empty() && !tails_of_some(t)) {
         let Some(beyond) = beyond_known(texture, known) else { continue };
         let of = |&v: &usize| {
             let s = &structure[v];
@@ -108,7 +110,10 @@ pub fn beyond<'a>(id: &str, known: &'a KnownTerms) -> Option<OfView<'a>> {
         "temporal-correlation" => Box::new(move |s| Some(s.lagged[0]? - rho)),
         "frozen-noise" => Box::new(move |s| Some(of_any_two(s)? - still(s) - fraction)),
         "row-noise" => Box::new(move |s| Some(s.row_px2? - px2)),
-        "heavy-tails" => Box::new(|s| Some(s.tail_share()? - GAUSSIAN_TAIL)),
+        "heavy-tails" => {
+            let own = Mixture::of(known).map_or(GAUSSIAN_TAIL, |m| m.tail(1.0, 0.0));
+            Box::new(move |s| Some(s.tail_share()? - own))
+        }
         "frame-jitter" => Box::new(move |s| {
             let j = s.jitter?;
             Some(j.scatter_px2 / j.freedom - j.expected_px2 - px2)

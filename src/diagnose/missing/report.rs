@@ -16,6 +16,7 @@ use crate::diagnose::finding::parameters::estimate;
 use crate::diagnose::finding::shape::digits;
 use crate::diagnose::views::field::Field;
 use crate::effects;
+use crate::stats::range;
 use crate::terms::{Axis, Basis, Extent, Statistic};
 
 /// An effect matters from this lost share on.
@@ -72,19 +73,22 @@ impl DropoutReporter<'_> {
         described(finding, family, rivals, Some(&won.shape))
     }
 
-    /// Do the losses follow the step, or are they farther from it than from none?
+    /// Do the losses follow the step, or are they farther from it than from none? The numbers of one that goes with
+    /// the angle of incidence are those of the nearest step over the plane's tilt, which is what a model has.
     fn step(&self, step: Step, finding: &mut Finding) -> bool {
-        let span = match step.axis {
-            Axis::Theta if step.incidence => {
-                crate::stats::range(self.fine.iter().flatten().map(|c| step.at(c.place)))
-            }
-            Axis::Theta => self.reach.theta,
-            _ => self.reach.z,
+        let follows = !step.incidence || self.fitted(step).is_some();
+        let step = Step { incidence: false, ..step };
+        let span = self.span(step);
+        let all = self.points(step);
+        let fitted = if follows { self.fitted(step) } else { None };
+        let Some(fitted) = fitted else {
+            finding.size.sigma = mean(&all, |p| (p.share - self.base).max(0.0));
+            let mut curve = binned(&all, step.axis, span, |_| self.base);
+            curve.model = curve.y.clone();
+            finding.interval = crowded(&curve, self.base, (span[1] - span[0]) / BINS as f64);
+            finding.curve = Some(curve);
+            return false;
         };
-        let at = |c: &Cell<'_>| (!step.before(c.place.session_s)).then(|| step.at(c.place));
-        let all = bounded(points(self.fine, &at, span), &step, self.region_given);
-        let own = Fitted { step, std_error: [None; 3] };
-        let fitted = fit(step, self.base, &all).unwrap_or(own);
         let loss = |x: f64| fitted.step.loss(x, self.base);
         finding.parameters = parameters(&fitted);
         finding.interval = interval(&fitted, span);
@@ -93,10 +97,34 @@ impl DropoutReporter<'_> {
         let asked: f64 = self.fine.iter().flatten().map(|c| c.asked).sum();
         finding.size.sigma = there / asked.max(1.0) * mean(&all, |p| loss(p.x) - self.base);
         finding.curve = Some(binned(&all, step.axis, span, loss));
+        true
+    }
+
+    fn span(&self, step: Step) -> [f64; 2] {
+        match step.axis {
+            Axis::Theta if step.incidence => {
+                range(self.fine.iter().flatten().map(|c| step.at(c.place)))
+            }
+            Axis::Theta => self.reach.theta,
+            _ => self.reach.z,
+        }
+    }
+
+    fn points(&self, step: Step) -> Vec<Point> {
+        let at = |c: &Cell<'_>| (!step.before(c.place.session_s)).then(|| step.at(c.place));
+        bounded(points(self.fine, &at, self.span(step)), &step, self.region_given)
+    }
+
+    /// The step where it is nearest to the losses; `None` where none is nearer.
+    fn fitted(&self, step: Step) -> Option<Fitted> {
+        let all = self.points(step);
+        let own = Fitted { step, std_error: [None; 3] };
+        let fitted = fit(step, self.base, &all).unwrap_or(own);
         let off = |loss: &dyn Fn(f64) -> f64| -> f64 {
             all.iter().map(|p| misfit(p, loss(p.x)).powi(2)).sum()
         };
-        off(&loss) < off(&|_| self.base)
+        let follows = off(&|x| fitted.step.loss(x, self.base)) < off(&|_| self.base);
+        follows.then_some(fitted)
     }
 
     fn curve(&self, basis: &Basis, finding: &mut Finding) {
@@ -125,7 +153,7 @@ fn mean(points: &[Point], of: impl Fn(&Point) -> f64) -> f64 {
 fn crowded(curve: &Curve, base: f64, bin: f64) -> [f64; 2] {
     let most = curve.y.iter().copied().fold(base, f64::max) - base;
     let high = curve.x.iter().zip(&curve.y).filter(|(_, y)| **y - base > 0.5 * most);
-    let [low, high] = crate::stats::range(high.map(|(x, _)| *x));
+    let [low, high] = range(high.map(|(x, _)| *x));
     [low - 0.5 * bin, high + 0.5 * bin]
 }
 
@@ -237,7 +265,7 @@ fn described(
     let shape = family.is_none().then(|| format!("more is lost from {from} to {to} {unit}"));
     let mut words = physics(status, family, Statistic::Dropout, found.axis, shape.as_deref());
     if by_incidence && family.is_some() {
-        words += " The angle is that at which each pixel sees the target.";
+        words += " It goes with the angle at which each pixel sees the target; the numbers are those of the plane's tilt that come nearest.";
     }
     if let Some(since) = since_s {
         words += &format!(" It began about {since:.1} s after the first view.");

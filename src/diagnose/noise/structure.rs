@@ -45,6 +45,8 @@ pub struct Structure {
     pub jitter: Option<Jitter>,
     /// Residuals beyond four local standard deviations.
     pub tails: TailCounts,
+    /// The places where such lie.
+    pub far_places: f64,
     /// Of the residuals near the middle, for tails too weak to count: of the disparity and, where the
     /// noise is large enough for it to differ, of the depth.
     pub fourth: Vec<FourthMoment>,

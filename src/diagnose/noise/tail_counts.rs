@@ -50,6 +50,38 @@ pub fn tail(image: &[f32], width: usize) -> TailCounts {
     counts
 }
 
+/// Places where a reading lies beyond the first edge, in any of these looks at one view: neighbours are one place.
+/// A speck that every frame has is one error and not many.
+pub fn far_places(looks: &[Vec<f32>], width: usize) -> f64 {
+    let mut far = vec![false; looks.first().map_or(0, Vec::len)];
+    for look in looks {
+        for patch in patches(look, width) {
+            let beyond = |i: &&usize| look[**i].abs() > TAIL_SIGMAS * patch.sigma;
+            patch.pixels.iter().filter(beyond).for_each(|i| far[*i] = true);
+        }
+    }
+    let (mut places, mut queue) = (0.0, Vec::new());
+    for start in 0..far.len() {
+        if !std::mem::take(&mut far[start]) {
+            continue;
+        }
+        places += 1.0;
+        queue.push(start);
+        while let Some(i) = queue.pop() {
+            let (u, v) = (i % width, i / width);
+            for row in v.saturating_sub(1)..=v + 1 {
+                for column in u.saturating_sub(1)..=(u + 1).min(width - 1) {
+                    let next = row * width + column;
+                    if far.get_mut(next).is_some_and(std::mem::take) {
+                        queue.push(next);
+                    }
+                }
+            }
+        }
+    }
+    places
+}
+
 /// So many patches fit across the picture ...
 const PATCHES_ACROSS: usize = 7;
 /// ... unless their sides would be shorter than this, px.

@@ -63,12 +63,13 @@ pub fn tails(
     if share.value >= heavy && share.p_above(expected) <= level {
         return far_out(views, parameters, own, share.p_above(own), confusers);
     }
+    // The second test of tails at this level.
     let of_some = || tailed_views(views, independent_readings, expected, heavy);
     let alike = !confusers.stepped && !confusers.simulated;
     let of_some = alike.then(of_some).flatten();
-    if let Some(TailedViews { views: some, p }) = of_some.filter(|t| t.p <= level) {
+    if let Some(TailedViews { views: some, p }) = of_some.filter(|t| 2.0 * t.p <= level) {
         let words = format!("in {} of {} views", some.len(), views.len());
-        let found = far_out(&some, parameters, own, p, confusers)?;
+        let found = far_out(&some, parameters, own, 2.0 * p, confusers)?;
         return Some(TextureFinding { words: Some(words), ..found });
     }
     let looked = mixture.is_none() && !confusers.uneven && !confusers.simulated;
@@ -122,8 +123,8 @@ pub const EXCESS: &str = "excess_kurtosis";
 /// catalogue's mixture has two.
 const WEAK_FRACTION: f64 = 0.1;
 
-/// Tails too weak to count, by the fourth moment. It is the second test of tails at this level, so that
-/// its chance is doubled.
+/// Tails too weak to count, by the fourth moment. It is the third test of tails at this level, so that
+/// its chance is trebled.
 fn weak(
     views: &[Structure],
     level: f64,
@@ -132,7 +133,7 @@ fn weak(
     // What is Gaussian in the disparity or in the depth has no tails.
     let each = [0, 1].map(|k| ViewMean::of(views, |s| Some(s.excess()?[k])));
     let excess = each.into_iter().flatten().min_by(|a, b| a.value.total_cmp(&b.value))?;
-    let p = 2.0 * excess.p_above(0.0);
+    let p = 3.0 * excess.p_above(0.0);
     if p > level {
         return None;
     }
@@ -185,7 +186,7 @@ mod tests {
                 // As exponential as a tail of matches gone astray.
                 let between = [0.4, 0.24, 0.2, 0.12, 0.03].map(|part| part * n * tail);
                 let tails = TailCounts { n, beyond: n * tail, between };
-                Structure { tails, ..Structure::default() }
+                Structure { tails, far_places: n * tail, ..Structure::default() }
             };
             (0..VIEWS).map(view).collect()
         };

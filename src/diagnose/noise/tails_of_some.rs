@@ -27,22 +27,39 @@ pub fn tailed_views(
     heavy: f64,
 ) -> Option<TailedViews> {
     let looked: Vec<&Structure> = views.iter().filter(|s| s.tails.n > FEWEST_READINGS).collect();
-    let chance = |s: &Structure| {
-        let n = readings(s);
-        let seen = (s.tails.share() * n).floor() as u64;
-        // So many or more.
-        let poisson = Poisson::new(expected * n).ok()?;
-        Some(seen.checked_sub(1).map_or(1.0, |fewer| poisson.sf(fewer)))
+    let tailed = |s: &&&Structure| {
+        s.tails.share() > heavy && chance(s, readings(s), expected).is_some_and(|p| p < CLEAR)
     };
-    let fewest = FEWEST.max((FEWEST_SHARE * looked.len() as f64).ceil() as usize);
-    let mut chances: Vec<f64> = looked.iter().filter_map(|s| chance(s)).collect();
+    let tailed: Vec<Structure> = looked.iter().filter(tailed).map(|s| (*s).clone()).collect();
+    if tailed.len() < fewest(looked.len()) {
+        return None;
+    }
+    Some(TailedViews { views: tailed, p: order_statistic(&looked, readings, expected)? })
+}
+
+/// That a view has so many places with far readings or more; of those that hang together one counts.
+fn chance(view: &Structure, readings: f64, expected: f64) -> Option<f64> {
+    let poisson = Poisson::new(expected * readings).ok()?;
+    Some((view.far_places as u64).checked_sub(1).map_or(1.0, |fewer| poisson.sf(fewer)))
+}
+
+fn fewest(views: usize) -> usize {
+    FEWEST.max((FEWEST_SHARE * views as f64).ceil() as usize)
+}
+
+/// Chance that the fewest views that count are all as improbable as the last of them.
+fn order_statistic(
+    views: &[&Structure],
+    readings: impl Fn(&Structure) -> f64,
+    expected: f64,
+) -> Option<f64> {
+    let all = views.iter().filter_map(|s| chance(s, readings(s), expected));
+    let mut chances: Vec<f64> = all.collect();
     chances.sort_by(f64::total_cmp);
+    let fewest = fewest(views.len());
     let p = chances.get(fewest - 1)?.clamp(0.0, 1.0);
     let of_views = Binomial::new(p, chances.len() as u64).ok()?;
-    let tailed = |s: &&&Structure| s.tails.share() > heavy && chance(s).is_some_and(|p| p < CLEAR);
-    let tailed: Vec<Structure> = looked.iter().filter(tailed).map(|s| (*s).clone()).collect();
-    (tailed.len() >= fewest)
-        .then(|| TailedViews { views: tailed, p: of_views.sf(fewest as u64 - 1).max(1e-300) })
+    Some(of_views.sf(fewest as u64 - 1).max(1e-300))
 }
 
 #[cfg(test)]
@@ -58,10 +75,8 @@ mod tests {
             let n = 2e4 * (1.0 + k as f64);
             let share = if k < tailed { share } else { GAUSSIAN_TAIL };
             let beyond = rand_distr::Poisson::new(share * n).unwrap().sample(rng);
-            Structure {
-                tails: TailCounts { n, beyond, ..Default::default() },
-                ..Default::default()
-            }
+            let tails = TailCounts { n, beyond, ..Default::default() };
+            Structure { tails, far_places: beyond, ..Default::default() }
         };
         (0..16).map(view).collect()
     }
@@ -82,11 +97,29 @@ mod tests {
         }
     }
 
-    /// At 3 in 10,000 none of 3,000 sessions of Gaussian noise is found.
+    /// Of sessions with as many as are expected, in all views, one in a hundred is found at that level.
     #[test]
-    fn gaussian_noise_has_none() {
+    fn what_is_expected_is_found_as_often_as_its_level_says() {
         let mut rng = Seed(4).stream("tails-of-some/null");
-        let seen = (0..3000).filter(|_| p(&session(0, 0.0, &mut rng)) < 3e-4).count();
-        assert!(seen <= 3, "{seen}");
+        let mut chance = || {
+            let expected = 1.5 * GAUSSIAN_TAIL;
+            let views = session(16, expected, &mut rng);
+            order_statistic(&views.iter().collect::<Vec<_>>(), |s| s.tails.n, expected).unwrap()
+        };
+        let seen = (0..4000).filter(|_| chance() < 0.01).count();
+        // Binomial: 40, give or take 6.3; that counts are whole numbers makes it fewer.
+        assert!((5..60).contains(&seen), "{seen}");
+    }
+
+    /// A speck of nine pixels in four frames is one place.
+    #[test]
+    fn specks_are_no_tails() {
+        let mut rng = Seed(5).stream("tails-of-some/specks");
+        let mut views = session(0, 0.0, &mut rng);
+        for view in &mut views[3..7] {
+            view.tails.beyond += 36.0;
+            view.far_places += 1.0;
+        }
+        assert!(p(&views) > 1e-3);
     }
 }

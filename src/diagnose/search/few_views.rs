@@ -54,12 +54,11 @@ struct Best {
     beta: DVector<f64>,
 }
 
-/// One candidate's information, view by view, and how much more than noise its views scatter.
+/// One candidate's information, view by view, less by how much more than noise its views scatter.
 struct Tried<'a> {
     candidate: &'a Candidate,
     evidence: Vec<Evidence>,
     factors: Vec<DMatrix<f64>>,
-    scatter: f64,
     prior: f64,
 }
 
@@ -100,7 +99,6 @@ impl<'a> Tried<'a> {
         excess: f64,
     ) -> Option<Self> {
         let k = candidate.basis.count();
-        let factors = evidence.iter().map(|e| root(&e.a)).collect();
         let mut squares = Vec::new();
         for e in evidence.iter().filter(|e| e.a.trace() > 0.0) {
             squares.push(evidence::fit(std::slice::from_ref(e), prior)?.dot(&e.b));
@@ -111,13 +109,15 @@ impl<'a> Tried<'a> {
         let expected = k * (1.0 - spread - spread.sqrt() / MAD_TO_SIGMA).powi(3);
         let usual = quantile(&mut squares, 0.25).unwrap_or(0.0);
         let scatter = excess * (usual / expected).max(1.0);
-        Some(Tried { candidate, evidence, factors, scatter, prior })
+        // What the choice of the views costs is paid in full.
+        let evidence: Vec<Evidence> =
+            evidence.iter().map(|e| Evidence { a: &e.a / scatter, b: &e.b / scatter }).collect();
+        let factors = evidence.iter().map(|e| root(&e.a)).collect();
+        Some(Tried { candidate, evidence, factors, prior })
     }
 
     fn best(&self) -> Option<Best> {
-        let mut best = best(&self.evidence, self.prior)?;
-        best.gain /= self.scatter;
-        Some(best)
+        best(&self.evidence, self.prior)
     }
 
     /// Gain of nothing but noise.

@@ -5,7 +5,7 @@ use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 use crate::diagnose::views::samples::{ViewData, finite};
 use crate::solve::{Left, fit_by_svd, left_by_fit};
-use crate::stats::median;
+use crate::stats::{median, range};
 use crate::terms::{PixelContext, ROOM_LUX};
 
 /// A model's sigma is not known better than this from view to view, in log variance, where the views
@@ -115,13 +115,19 @@ impl Law {
             Law::Turn => steep * (2.0 * place.azimuth).cos(),
             Law::Time => finite(place.session_s / 3600.0),
             Law::Warmth => finite(place.temperature_c / 10.0),
-            Law::Ambient => finite(place.ambient * place.z * place.z / ROOM_LUX),
+            Law::Ambient => finite(place.ambient * place.pattern_fall_off() / ROOM_LUX),
         }
     }
 }
 
 fn laws(levels: &[Level<'_>], among: &[Law]) -> DMatrix<f64> {
-    DMatrix::from_fn(levels.len(), among.len(), |i, k| among[k].at(levels[i].place))
+    // In one light for all views a law of the light is one of the distance.
+    let [dim, bright] = range(levels.iter().map(|l| l.place.ambient));
+    let at = |law: Law, place: &PixelContext| match law {
+        Law::Ambient if bright <= dim => 0.0,
+        _ => law.at(place),
+    };
+    DMatrix::from_fn(levels.len(), among.len(), |i, k| at(among[k], levels[i].place))
 }
 
 fn heights(levels: &[Level<'_>]) -> DVector<f64> {
@@ -234,6 +240,23 @@ mod tests {
             let hidden = median(&mut rng) / (sd * sd);
             assert!((0.35..0.55).contains(&hidden), "{hidden} of the sampling's variance");
         }
+    }
+
+    /// What follows the light of the room is no scatter where the views' light differs; in one light it is.
+    #[test]
+    fn the_light_of_the_room_is_a_law_where_it_differs() {
+        let mut rng = Seed(8).stream("levels");
+        let mut scatter = |lit: &dyn Fn(usize) -> f64| {
+            let mut views = session(18, 0.02, 0, 0.0, &mut rng);
+            for (n, view) in views.iter_mut().enumerate() {
+                let place = &mut Arc::make_mut(&mut view.places)[0];
+                place.ambient = lit(n);
+                view.response[0] += 0.1 * place.pattern_fall_off() * place.ambient / ROOM_LUX;
+            }
+            view_scatter(&views, MODEL_TOLERANCE).sqrt()
+        };
+        let (differs, same) = (scatter(&|n| 800.0 * (n % 3) as f64), scatter(&|_| 800.0));
+        assert!(differs < 0.04 && same > 0.06, "{differs} {same}");
     }
 
     /// With a trend of `rise` over a session whose views were taken at random distances.

@@ -7,7 +7,7 @@ use super::sentences::{
 };
 use super::story::{gained, smooth_residual};
 use super::{parameters, sentences};
-use crate::diagnose::{CannotTell, Diagnosis, Finding, MapRow, Reference, Verdict, ViewLine};
+use crate::diagnose::{CannotTell, Diagnosis, MapRow, Reference, Verdict, ViewLine};
 use crate::report::document::{
     self, Column, answer, fold, list, prose, row, section, table, table_of,
 };
@@ -87,8 +87,7 @@ fn tiles(diagnosis: &Diagnosis) -> Markup {
 /// The final test.
 pub(super) fn held_out(diagnosis: &Diagnosis) -> Markup {
     let Some(held) = &diagnosis.heldout else { return html! {} };
-    let not_scored = held.is_nothing() && !diagnosis.findings.is_empty();
-    let not_scored = not_scored && !diagnosis.findings.iter().any(Finding::is_scored);
+    let not_scored = diagnosis.has_no_score();
     let [gain, low, high] = nats([held.gain, held.gain_interval[0], held.gain_interval[1]]);
     let px = |v| format!("{} px", fixed(v, PX_DECIMALS));
     let every = "every pixel of every frame, noise included, rms";
@@ -112,7 +111,7 @@ pub(super) fn held_out(diagnosis: &Diagnosis) -> Markup {
             }
             (table(&["", ">before", ">after"], rows))
             @if not_scored {
-                p { "What was found has no part in this score: neither the means nor the size of the noise change by it." }
+                p { "What was found has no part in this score." }
             } @else { p {
                 @if held.gain_interval[0] > 0.0 { "The extended model predicts such a view better by " }
                 @else { "No gain beyond chance: the extended model differs by " }

@@ -142,7 +142,7 @@ pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
     let h = diagnosis.heldout.as_ref().filter(|_| diagnosis.verdict != Verdict::Match)?;
     let aside = count(h.views.len(), "view");
     if h.is_nothing() {
-        return diagnosis.findings.iter().any(Finding::is_scored).then(|| {
+        return (!diagnosis.has_no_score()).then(|| {
             format!("On {aside} kept aside nothing is gained: without them the same search finds nothing.")
         });
     }
