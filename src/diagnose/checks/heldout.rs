@@ -11,7 +11,6 @@ use crate::diagnose::finding::pixels::{pixel_terms, terms_of};
 use crate::diagnose::noise::lines::LearntLines;
 use crate::diagnose::noise::scatter::ScatterResult;
 use crate::diagnose::noise::still::beside_bias;
-use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::samples::ViewData;
 use crate::terms::{Statistic, Term};
@@ -56,10 +55,7 @@ impl Case<'_> {
         let mut before = Vec::new();
         let (mut of_bias, mut gains) = (Vec::new(), Vec::new());
         let of_lines = self.gained_by_lines(lines, &bias_terms, &rest, &aside);
-        let found: Vec<TextureFinding> =
-            scatter.textures.iter().chain(&scatter.tails).cloned().collect();
-        let of_textures =
-            textures::gained(&found, &scatter.structure, &self.known, [&rest, &aside]);
+        let of_textures = textures::gained(scatter, &self.known, [&rest, &aside]);
         let others = of_lines.iter().zip(of_textures);
         for ((mean, block), (lines, of_textures)) in means.iter().zip(&blocks).zip(others) {
             let (b0, b1) = (log_score(mean, &stored)?, log_score(mean, &bias_terms)?);

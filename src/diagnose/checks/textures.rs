@@ -7,9 +7,10 @@ use crate::diagnose::edges::mixing::mean_share;
 use crate::diagnose::noise::expected_window;
 use crate::diagnose::noise::in_time::{later, of_any_two};
 use crate::diagnose::noise::mixture::Mixture;
+use crate::diagnose::noise::scatter::ScatterResult;
 use crate::diagnose::noise::structure::Structure;
 use crate::diagnose::noise::tail_counts::GAUSSIAN_TAIL;
-use crate::diagnose::noise::tails::EXCESS;
+use crate::diagnose::noise::tails::{EXCESS, of_all_views};
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::view_mean::ViewMean;
 use crate::diagnose::views::field::Field;
@@ -45,17 +46,16 @@ pub fn replicated(
     agree([half(false), half(true)])
 }
 
-/// What textures of these names, learnt on the `rest` of the views, bring to each of those kept `aside`: nats.
+/// What named textures and tails, learnt on the `rest` of the views, bring to each of those kept `aside`: nats.
 pub fn gained(
-    found: &[TextureFinding],
-    structure: &[Structure],
+    ScatterResult { structure, textures, tails, .. }: &ScatterResult,
     known: &KnownTerms,
     [rest, aside]: [&[usize]; 2],
 ) -> Vec<f64> {
     let mut gains = vec![0.0; aside.len()];
-    // What has no name is in no model, and what some views have, as words say, is no mean of all.
-    let tails_of_some = |t: &TextureFinding| t.axis == Axis::Residual && t.words.is_some();
-    for texture in found.iter().filter(|t| !t.families.is_empty() && !tails_of_some(t)) {
+    // What has no name is in no model, and what some views have is no mean of all.
+    let named = textures.iter().filter(|t| !t.families.is_empty());
+    for texture in named.chain(tails.iter().filter(|t| of_all_views(t))) {
         let Some(beyond) = beyond_known(texture, known) else { continue };
         let of = |&v: &usize| {
             let s = &structure[v];

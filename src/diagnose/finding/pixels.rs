@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::diagnose::noise::kurtosis::FourthMoment;
 use crate::diagnose::noise::structure::Structure;
-use crate::diagnose::noise::tail_counts::{TailCounts, far_places, tail};
+use crate::diagnose::noise::tail_counts::{TailCounts, places, tail};
 use crate::diagnose::noise::texture::moving;
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::search::outcome::Outcome;
@@ -105,8 +105,9 @@ pub(in crate::diagnose) fn measure_tails(
         };
         let in_disparity = looks(&|_, error| error);
         s.tails = TailCounts::default();
-        in_disparity.iter().for_each(|look| s.tails.add(&tail(look, field.width)));
-        s.far_places = far_places(&in_disparity, field.width);
+        let mut far = vec![false; in_disparity.first().map_or(0, Vec::len)];
+        in_disparity.iter().for_each(|look| s.tails.add(&tail(look, field.width, &mut far)));
+        s.far_places = places(far, field.width);
         let disparity = |k| field.disparity(k, &bench.rays) as f32;
         let bends = (0..field.pixels.len()).any(|k| field.sigma[k] > BENDS * disparity(k));
         // An error of the depth is that of the disparity, e, over 1 + e / d.

@@ -76,17 +76,15 @@ impl DropoutReporter<'_> {
     /// Do the losses follow the step, or are they farther from it than from none? The numbers of one that goes with
     /// the angle of incidence are those of the nearest step over the plane's tilt, which is what a model has.
     fn step(&self, step: Step, finding: &mut Finding) -> bool {
-        let follows = !step.incidence || self.fitted(step).is_some();
+        let nearest = |step: Step| {
+            let all = self.points(step);
+            (self.nearest(step, &all), all)
+        };
+        let by_incidence = step.incidence.then(|| nearest(step).0.is_some());
         let step = Step { incidence: false, ..step };
-        let span = self.span(step);
-        let all = self.points(step);
-        let fitted = if follows { self.fitted(step) } else { None };
-        let Some(fitted) = fitted else {
-            finding.size.sigma = mean(&all, |p| (p.share - self.base).max(0.0));
-            let mut curve = binned(&all, step.axis, span, |_| self.base);
-            curve.model = curve.y.clone();
-            finding.interval = crowded(&curve, self.base, (span[1] - span[0]) / BINS as f64);
-            finding.curve = Some(curve);
+        let (span, (fitted, all)) = (self.span(step), nearest(step));
+        let Some(fitted) = fitted.filter(|_| by_incidence != Some(false)) else {
+            self.shapeless(&all, step.axis, span, finding);
             return false;
         };
         let loss = |x: f64| fitted.step.loss(x, self.base);
@@ -115,11 +113,10 @@ impl DropoutReporter<'_> {
         bounded(points(self.fine, &at, self.span(step)), &step, self.region_given)
     }
 
-    /// The step where it is nearest to the losses; `None` where none is nearer.
-    fn fitted(&self, step: Step) -> Option<Fitted> {
-        let all = self.points(step);
+    /// The step where it is nearest to these losses; `None` where none is nearer.
+    fn nearest(&self, step: Step, all: &[Point]) -> Option<Fitted> {
         let own = Fitted { step, std_error: [None; 3] };
-        let fitted = fit(step, self.base, &all).unwrap_or(own);
+        let fitted = fit(step, self.base, all).unwrap_or(own);
         let off = |loss: &dyn Fn(f64) -> f64| -> f64 {
             all.iter().map(|p| misfit(p, loss(p.x)).powi(2)).sum()
         };
@@ -135,9 +132,13 @@ impl DropoutReporter<'_> {
             }
             _ => ([0.0, self.camera.width as f64], Box::new(|c| Some(c.place.u))),
         };
-        let all = points(self.fine, &at, span);
-        finding.size.sigma = mean(&all, |p| (p.share - self.base).max(0.0));
-        let mut curve = binned(&all, basis.axis(), span, |_| self.base);
+        self.shapeless(&points(self.fine, &at, span), basis.axis(), span, finding);
+    }
+
+    /// What was measured, without a law.
+    fn shapeless(&self, all: &[Point], axis: Axis, span: [f64; 2], finding: &mut Finding) {
+        finding.size.sigma = mean(all, |p| (p.share - self.base).max(0.0));
+        let mut curve = binned(all, axis, span, |_| self.base);
         curve.model = curve.y.clone();
         finding.interval = crowded(&curve, self.base, (span[1] - span[0]) / BINS as f64);
         finding.curve = Some(curve);

@@ -77,8 +77,9 @@ impl LearntLines {
 }
 
 /// Of lines from which the mean over boxes of neighbours was taken, as [`pixel_scale`] does: what each had before,
-/// but for what is smooth; NaN of a line that was not seen. A line is part of the mean that it lost: of every second line an eighth more is left than
-/// there was, and a thousandth after these rounds; at the rims, where boxes are short, a twentieth (simulated).
+/// but for what is smooth; NaN of a line that was not seen. A line is part of the mean that it lost: of every second
+/// line an eighth more is left than there was, and a thousandth after these rounds; at the rims, where boxes are
+/// short, a twentieth (simulated).
 fn with_own_share(means: &[f32]) -> Vec<f32> {
     const ROUNDS: usize = 3;
     let beside_box = |values: &[f32], side: usize| {

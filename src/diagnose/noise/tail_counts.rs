@@ -41,25 +41,23 @@ impl TailCounts {
     }
 }
 
-/// The tail of an image's residuals: row by row, `width` px a row, NaN where there is none.
-pub fn tail(image: &[f32], width: usize) -> TailCounts {
+/// The tail of an image's residuals: row by row, `width` px a row, NaN where there is none. Pixels beyond the first
+/// edge are marked as `far`.
+pub fn tail(image: &[f32], width: usize, far: &mut [bool]) -> TailCounts {
     let mut counts = TailCounts::default();
     for patch in patches(image, width) {
-        patch.pixels.iter().for_each(|i| counts.count(image[*i].abs() / patch.sigma));
+        for &i in &patch.pixels {
+            let sigmas = image[i].abs() / patch.sigma;
+            counts.count(sigmas);
+            far[i] |= sigmas > TAIL_SIGMAS;
+        }
     }
     counts
 }
 
-/// Places where a reading lies beyond the first edge, in any of these looks at one view: neighbours are one place.
-/// A speck that every frame has is one error and not many.
-pub fn far_places(looks: &[Vec<f32>], width: usize) -> f64 {
-    let mut far = vec![false; looks.first().map_or(0, Vec::len)];
-    for look in looks {
-        for patch in patches(look, width) {
-            let beyond = |i: &&usize| look[**i].abs() > TAIL_SIGMAS * patch.sigma;
-            patch.pixels.iter().filter(beyond).for_each(|i| far[*i] = true);
-        }
-    }
+/// Places of `far` pixels, row by row, `width` px a row: neighbours are one place, so that a speck that every frame
+/// has is one error and not many.
+pub fn places(mut far: Vec<bool>, width: usize) -> f64 {
     let (mut places, mut queue) = (0.0, Vec::new());
     for start in 0..far.len() {
         if !std::mem::take(&mut far[start]) {

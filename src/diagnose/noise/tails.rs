@@ -33,8 +33,7 @@ pub struct Confusers {
     /// The views are a simulation's, or are compared with one: a simulation by formula lacks the
     /// unevenness from pixel to pixel that light brings, so that the two differ without heavy tails.
     pub simulated: bool,
-    /// The words step by about as much as the noise: how far out a view's residuals lie goes with where its words
-    /// fall.
+    /// The words step: how far out a view's residuals lie goes with where its words fall.
     pub stepped: bool,
 }
 
@@ -65,8 +64,8 @@ pub fn tails(
     }
     // The second test of tails at this level.
     let of_some = || tailed_views(views, independent_readings, expected, heavy);
-    let alike = !confusers.stepped && !confusers.simulated;
-    let of_some = alike.then(of_some).flatten();
+    let comparable = !confusers.stepped && !confusers.simulated;
+    let of_some = comparable.then(of_some).flatten();
     if let Some(TailedViews { views: some, p }) = of_some.filter(|t| 2.0 * t.p <= level) {
         let words = format!("in {} of {} views", some.len(), views.len());
         let found = far_out(&some, parameters, own, 2.0 * p, confusers)?;
@@ -115,6 +114,11 @@ fn independent_readings(view: &Structure) -> f64 {
     let side = view.window_px.unwrap_or(1.0).max(1.0);
     let repeats = (2.0 * side * side + 1.0) / (3.0 * side);
     view.tails.n / repeats.powi(2)
+}
+
+/// Do all views have these tails? Of some of them the words tell.
+pub fn of_all_views(tails: &TextureFinding) -> bool {
+    tails.words.is_none()
 }
 
 /// The parameter that tells a finding of [`weak`] from one of far errors.
@@ -241,7 +245,7 @@ mod tests {
                 };
                 let image: Vec<f32> = (0..SIZE[0] * SIZE[1]).map(&mut pixel).collect();
                 Structure {
-                    tails: tail(&image, SIZE[0]),
+                    tails: tail(&image, SIZE[0], &mut vec![false; image.len()]),
                     fourth: vec![FourthMoment::of(&image, SIZE[0])],
                     ..Structure::default()
                 }

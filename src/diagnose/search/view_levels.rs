@@ -14,8 +14,8 @@ pub const MODEL_TOLERANCE: f64 = 0.04;
 
 /// Variance of the views' own levels beyond what their samples explain (a moment estimate after
 /// DerSimonian and Laird), about laws of the distance, from nine views on of the tilt, from ten on
-/// of the time and the temperature instead, from twelve on of all, the room's light too: what a law explains is no scatter.
-/// Enlarged for the laws that so few views have to settle.
+/// of the time and the temperature instead, from twelve on of all, the room's light too: what a law
+/// explains is no scatter. Enlarged for the laws that so few views have to settle.
 pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
     let levels = Level::of(blocks);
     let choices: &[&[Law]] = match levels.len() {
