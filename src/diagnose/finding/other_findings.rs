@@ -52,6 +52,11 @@ pub fn texture(found: TextureFinding, sigma_mm: f64, replicated: Option<bool>) -
         1 => Status::Named,
         _ => Status::OneOf,
     };
+    let mut words = physics(status, effect, found.statistic, found.axis, found.words.as_deref());
+    // Beside a name what was measured would be lost.
+    if let Some(measured) = found.words.as_ref().filter(|_| effect.is_some()) {
+        words += &format!(" Measured here: {measured}.");
+    }
     Finding {
         status,
         effect,
@@ -66,8 +71,27 @@ pub fn texture(found: TextureFinding, sigma_mm: f64, replicated: Option<bool>) -
         size: Size { mm: found.size_sigma * sigma_mm, sigma: found.size_sigma },
         p_adjusted: Some(found.p),
         replicated,
-        physics: physics(status, effect, found.statistic, found.axis, found.words.as_deref()),
+        physics: words,
         shape: found.words,
         ..named(effect.unwrap_or_default(), found.statistic, found.axis)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_measured_is_told_with_a_name_and_without() {
+        let told = |families: Vec<&'static str>| {
+            let (statistic, axis) = (Statistic::Distribution, Axis::Residual);
+            let words = Some("in 4 of 14 views".to_string());
+            let found =
+                TextureFinding { words, ..TextureFinding::named(families, statistic, axis) };
+            texture(found, 1.0, None).physics
+        };
+        for families in [vec!["heavy-tails"], vec![]] {
+            assert_eq!(told(families).matches("in 4 of 14 views").count(), 1);
+        }
     }
 }
