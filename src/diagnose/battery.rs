@@ -11,7 +11,7 @@ use super::echoes::{echoes, fold_into_sigma, forget_noise_of_frames};
 use super::edges::mixing::mixing;
 use super::finding::findings;
 use super::finding::form::better_form;
-use super::finding::naming::{doubt_beside_the_unexplained, resembles_only, temper};
+use super::finding::naming::{doubt_beside_the_unexplained, resembles_only, tell_if_held, temper};
 use super::finding::other_findings;
 use super::finding::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::finding::scene::Scene;
@@ -142,6 +142,7 @@ impl Case<'_> {
         for f in &mut found {
             temper(&mut f.alternatives);
             resembles_only(f);
+            tell_if_held(f);
         }
         Battery { mean, scatter, found, refitted, better_form, ends, detectable_losses }
     }

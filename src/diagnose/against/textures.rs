@@ -39,6 +39,7 @@ impl Baseline {
             differ(&mut s.row_px2, twin.row_px2, rows.max(0.0));
             // Nothing is known of columns: what both have must vanish.
             differ(&mut s.column_px2, twin.column_px2, columns.min(0.0));
+            differ(&mut s.blotches_px2, twin.blotches_px2, 0.0);
             for (real, twin) in s.lines_px2.iter_mut().zip(twin.lines_px2) {
                 differ(real, twin, 0.0);
             }

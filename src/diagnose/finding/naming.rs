@@ -60,6 +60,16 @@ pub fn unname(f: &mut Finding) {
     f.physics = physics(f.status, None, f.statistic, f.axis, None);
 }
 
+/// Says of what has no name whether the extended model has it.
+pub fn tell_if_held(f: &mut Finding) {
+    if f.status == Status::Unexplained {
+        f.physics += match f.terms.is_empty() {
+            true => " The extended model has no term for it.",
+            false => " The extended model holds it as the curve that was measured.",
+        };
+    }
+}
+
 /// A name that is less probable than that the cause has none of those told is no name: what was found is
 /// told as what it resembles.
 pub fn resembles_only(f: &mut Finding) {
@@ -138,12 +148,8 @@ pub fn physics(
         };
         let shape = shape.map_or(String::new(), |s| format!(": {s}"));
         let over = axis.in_words();
-        let model = match axis {
-            Axis::Frame => "has no term for it",
-            _ => "holds it as the curve that was measured",
-        };
         return format!(
-            "Unexplained: {what} depends on the {over}{shape}. No effect of the catalogue explains it; the extended model {model}."
+            "Unexplained: {what} depends on the {over}{shape}. No effect of the catalogue explains it."
         );
     };
     format!(

@@ -2,7 +2,8 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 
-use super::structure::{Jitter, Structure};
+use super::frame_series::Jitter;
+use super::structure::Structure;
 use super::texture_finding::TextureFinding;
 use super::view_mean::variance_px2;
 use crate::diagnose::finding::parameters::one;
@@ -14,6 +15,9 @@ const UNEVEN: f64 = 0.2;
 
 /// The frames' means scatter by this factor more before it is called jitter.
 const JITTER: f64 = 2.0;
+
+/// Frames that shift as a whole.
+const JITTERS: &str = "frame-jitter";
 
 /// A target that moves by the same velocity in all views.
 struct Motion {
@@ -116,10 +120,17 @@ pub(in crate::diagnose) fn frame_means(
     // A motion that is not uniform scatters about its line.
     let trend_px2 = all.iter().map(|j| j.trend_px2).sum::<f64>() / all.len() as f64;
     if found.is_empty() || noise.extra_px2 >= 0.15 * trend_px2 {
-        let known_px = known.parameter("frame-jitter", "sigma_px").unwrap_or(0.0);
+        let known_px = jitter_px2(&[], known).sqrt();
         found.extend(jitter(&all, &noise, known_px, variance_px2(views), level));
     }
     found
+}
+
+/// What jitter moves frames by, px^2: as was found, or as is known.
+pub fn jitter_px2(found: &[TextureFinding], known: &KnownTerms) -> f64 {
+    let jitter = found.iter().find(|f| f.families.contains(&JITTERS));
+    let found = jitter.and_then(|f| f.parameters["sigma_px"]["value"].as_f64());
+    found.or_else(|| known.parameter(JITTERS, "sigma_px")).unwrap_or(0.0).powi(2)
 }
 
 /// Motion: the line explains more than the scatter about it does, or all views move alike.
@@ -183,7 +194,7 @@ fn jitter(
         size_sigma: (jitter_px2 / variance_px2.max(1e-12)).sqrt(),
         p: p.max(1e-300),
         nats: 0.5 * noise.freedom * (larger - 1.0 - larger.ln()),
-        ..TextureFinding::named(vec!["frame-jitter"], Statistic::Correlation, Axis::Frame)
+        ..TextureFinding::named(vec![JITTERS], Statistic::Correlation, Axis::Frame)
     })
 }
 

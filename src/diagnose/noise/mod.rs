@@ -1,6 +1,8 @@
 //! What the structure of the noise amounts to: each view is one sample of every statistic.
 
 pub mod frame_means;
+pub mod frame_series;
+pub mod frame_tilts;
 pub mod frames;
 pub mod in_time;
 pub mod kurtosis;
@@ -22,7 +24,8 @@ pub mod window;
 use crate::diagnose::finding::parameters::{estimate, one};
 use crate::diagnose::views::known::KnownTerms;
 use crate::terms::{Axis, Statistic};
-use frame_means::frame_means;
+use frame_means::{frame_means, jitter_px2};
+use frame_tilts::frame_tilts;
 use frames::unequal;
 use in_time::in_time;
 use pairs::{REACH_PX, window_of};
@@ -46,7 +49,9 @@ pub fn texture_findings(
         .find(|h| h.families.first() == Some(&"temporal-correlation"))
         .and_then(|h| h.parameters["rho"]["value"].as_f64())
         .unwrap_or(0.0);
-    found.extend(frame_means(views, known, level, rho));
+    let means = frame_means(views, known, level, rho);
+    found.extend(frame_tilts(views, jitter_px2(&means, known), level));
+    found.extend(means);
     found.extend(unequal(views, level));
     found
 }
@@ -128,19 +133,28 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
     };
     let afresh = "each column is shifted as one, afresh in every frame";
     let row = known_px * known_px;
-    let still = |k: usize, axis, words| {
+    let still = |of: fn(&Structure) -> Option<f64>, axis, words| {
         let known_px2 = known.error_of_lines_px2(axis);
         let line = line(vec![], Statistic::Bias, axis, known_px2, Some(words));
-        // Columns and rows have one error rate.
-        (ViewMean::of_pairs(views, move |s| s.lines_px2[k]), line, 2.0)
+        // Columns, rows and blotches have one error rate.
+        (ViewMean::of_pairs(views, of), line, 3.0)
     };
     let all = [
         still(
-            0,
+            |s| s.lines_px2[0],
             Axis::Column,
             "each column has a constant error of its own, unlike its neighbours'",
         ),
-        still(1, Axis::Row, "each row has a constant error of its own, unlike its neighbours'"),
+        still(
+            |s| s.lines_px2[1],
+            Axis::Row,
+            "each row has a constant error of its own, unlike its neighbours'",
+        ),
+        still(
+            |s| s.blotches_px2,
+            Axis::Pixel,
+            "a fine pattern over the picture is the same in all views",
+        ),
         (
             ViewMean::of(views, |s| s.row_px2),
             line(vec![ROW_NOISE], Statistic::Correlation, Axis::Row, row, None),

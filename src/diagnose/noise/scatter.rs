@@ -91,7 +91,8 @@ impl Case<'_> {
     fn learn_lines(&mut self, mean: &mut MeanResult, textures: &[TextureFinding]) {
         let still =
             textures.iter().filter(|t| t.families.is_empty() && t.statistic == Statistic::Bias);
-        let axes: Vec<Axis> = still.map(|t| t.axis).collect();
+        let axes: Vec<Axis> =
+            still.map(|t| t.axis).filter(|a| matches!(a, Axis::Column | Axis::Row)).collect();
         if axes.is_empty() || self.baseline.is_some() {
             return;
         }

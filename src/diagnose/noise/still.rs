@@ -3,14 +3,16 @@
 use rand::Rng;
 use rayon::prelude::*;
 
-use super::texture::{SHORT_LINE, pixel_scale, without_lines};
+use super::texture::{SHORT_LINE, at_two_scales, without_lines};
 use crate::diagnose::views::field::Field;
 use crate::rng::Seed;
 
-/// Covariances of a view's mean residual with the other views', px^2: of pixels, without what whole lines share,
-/// of whole columns and of whole rows, as far as they change from one to the next.
+/// Covariances of a view's mean residual with the other views', px^2: of pixels, without what whole lines share;
+/// of means over a few pixels, the same; of whole columns and of whole rows, as far as they change from one to the
+/// next.
 pub struct Still {
     pub fixed_px2: Option<f64>,
+    pub blotches_px2: Option<f64>,
     pub lines_px2: [Option<f64>; 2],
 }
 
@@ -19,11 +21,12 @@ impl Still {
     fn over(&self, kept: &Still) -> Still {
         let fixed_px2 =
             self.fixed_px2.zip(kept.fixed_px2.filter(|k| *k > 0.0)).map(|(seen, kept)| seen / kept);
-        let beyond = |k: usize| {
-            let of_pattern = fixed_px2.zip(kept.lines_px2[k]).map_or(0.0, |(px2, kept)| px2 * kept);
-            self.lines_px2[k].map(|seen| seen - of_pattern)
+        let beyond = |seen: Option<f64>, kept: Option<f64>| {
+            let of_pattern = fixed_px2.zip(kept).map_or(0.0, |(px2, kept)| px2 * kept);
+            seen.map(|seen| seen - of_pattern)
         };
-        Still { fixed_px2, lines_px2: [beyond(0), beyond(1)] }
+        let lines_px2 = [0, 1].map(|k| beyond(self.lines_px2[k], kept.lines_px2[k]));
+        Still { fixed_px2, blotches_px2: beyond(self.blotches_px2, kept.blotches_px2), lines_px2 }
     }
 }
 
@@ -35,7 +38,7 @@ impl KeptPattern {
     pub fn of(fields: &[Field]) -> Self {
         let coins = coins(fields.first().map_or(0, |f| f.width * f.height));
         let views = beside_bias(fields, &[]);
-        KeptPattern(covariances(&views, |f, _| pixel_scale(f, &tossed(f, &coins), &[])))
+        KeptPattern(covariances(&views, |f, _| at_two_scales(f, &tossed(f, &coins), &[])))
     }
 }
 
@@ -48,22 +51,35 @@ pub fn beside_bias<'a>(fields: &'a [Field], bias: &'a [Vec<f32>]) -> Vec<(&'a Fi
 /// Of the views that `kept` was made of, each with what is known of it to be no noise.
 pub fn still(views: &[(&Field, &[f32])], kept: &KeptPattern) -> Vec<Still> {
     debug_assert_eq!(views.len(), kept.0.len());
-    let seen = covariances(views, |f, b| pixel_scale(f, &f.mean, b));
+    let seen = covariances(views, |f, b| at_two_scales(f, &f.mean, b));
     seen.iter().zip(&kept.0).map(|(seen, kept)| seen.over(kept)).collect()
 }
 
 fn covariances(
     views: &[(&Field, &[f32])],
-    image: impl Fn(&Field, &[f32]) -> Vec<f32> + Sync,
+    images: impl Fn(&Field, &[f32]) -> [Vec<f32>; 2] + Sync,
 ) -> Vec<Still> {
-    let mut images: Vec<Vec<f32>> = views.par_iter().map(|(f, b)| image(f, b)).collect();
-    let profiles = images.par_iter().zip(views).map(|(m, (f, _))| sharp_lines(m, f.width));
-    let (columns, rows): (Vec<_>, Vec<_>) = profiles.unzip();
-    let [columns, rows] = [columns, rows].map(|lines| across_views(&lines, FEWEST_PAIRS[1]));
-    let of_views = images.par_iter_mut().zip(views);
-    of_views.for_each(|(m, (f, _))| *m = without_lines(m, f.width, SHORT_LINE));
-    let all = across_views(&images, FEWEST_PAIRS[0]).into_iter().zip(columns.into_iter().zip(rows));
-    all.map(|(fixed_px2, (u, v))| Still { fixed_px2, lines_px2: [u, v] }).collect()
+    let all = views.par_iter().map(|(f, b)| {
+        let [pixels, blotches] = images(f, b);
+        let (columns, rows) = sharp_lines(&pixels, f.width);
+        [pixels, blotches]
+            .map(|m| without_lines(&m, f.width, SHORT_LINE))
+            .into_iter()
+            .chain([columns, rows])
+    });
+    let mut all: Vec<_> = all.collect();
+    let mut next = |fewest| {
+        let images: Vec<Vec<f32>> = all.iter_mut().filter_map(Iterator::next).collect();
+        across_views(&images, fewest)
+    };
+    let [pixels, blotches] = [(); 2].map(|()| next(FEWEST_PAIRS[0]));
+    let [columns, rows] = [(); 2].map(|()| next(FEWEST_PAIRS[1]));
+    let still = |v: usize| Still {
+        fixed_px2: pixels[v],
+        blotches_px2: blotches[v],
+        lines_px2: [columns[v], rows[v]],
+    };
+    (0..views.len()).map(still).collect()
 }
 
 /// Of fewer pixels, and of fewer lines, that another view saw as well nothing is told.

@@ -4,6 +4,8 @@
 
 use rayon::prelude::*;
 
+use super::frame_series::Jitter;
+use super::frame_tilts::TiltScatter;
 use super::kurtosis::FourthMoment;
 use super::pairs::Pairs;
 use super::still::{KeptPattern, beside_bias, still};
@@ -36,6 +38,8 @@ pub struct Structure {
     pub frame_log_variance: [Option<f64>; FRAMES_KEPT],
     /// Covariance of the mean residual with the other views' at the same pixels, px^2.
     pub fixed_px2: Option<f64>,
+    /// The same of means over a few pixels, px^2.
+    pub blotches_px2: Option<f64>,
     /// The same of whole columns and rows, as far as it changes from one to the next, px^2.
     pub lines_px2: [Option<f64>; 2],
     /// Variance that a row (a column) of one frame shares, px^2.
@@ -43,6 +47,8 @@ pub struct Structure {
     pub column_px2: Option<f64>,
     /// Of the frames' means about a line in time.
     pub jitter: Option<Jitter>,
+    /// Of the frames' slopes over the picture.
+    pub tilts: Option<TiltScatter>,
     /// Residuals beyond four local standard deviations.
     pub tails: TailCounts,
     /// The places where such lie.
@@ -90,26 +96,13 @@ impl Structure {
     }
 }
 
-/// Frame by frame, the mean residual of the target.
-#[derive(Debug, Clone, Copy)]
-pub struct Jitter {
-    /// Sum of squares about the line, px^2, and its degrees of freedom.
-    pub scatter_px2: f64,
-    pub freedom: f64,
-    /// What the pixels' own noise lets one expect for scatter / freedom, px^2.
-    pub expected_px2: f64,
-    /// Sum of squares that the line explains, px^2.
-    pub trend_px2: f64,
-    /// Velocity along the optical axis, m/s.
-    pub velocity_mps: f64,
-}
-
 /// Measure all views. `bias` has, view by view, what is known to be no noise, px (or is empty).
 pub fn structures(fields: &[Field], bias: &[Vec<f32>], kept: &KeptPattern) -> Vec<Structure> {
     let views = beside_bias(fields, bias);
     let mut all: Vec<Structure> = views.par_iter().map(|(f, b)| structure(f, b)).collect();
     for (s, still) in all.iter_mut().zip(still(&views, kept)) {
-        (s.fixed_px2, s.lines_px2) = (still.fixed_px2, still.lines_px2);
+        (s.fixed_px2, s.blotches_px2) = (still.fixed_px2, still.blotches_px2);
+        s.lines_px2 = still.lines_px2;
     }
     all
 }
@@ -142,26 +135,14 @@ fn structure(field: &Field, bias: &[f32]) -> Structure {
     let shares = [share(s.row_px2), share(s.column_px2)];
     let window = area(&moving(&frames, s.lagged[0]), field.width, shares);
     s.window_px = Some(window.sqrt());
-    s.jitter = jitter(field, &s, window);
+    let of_mean_px2 = frame_mean_px2(field, &s, window);
+    s.jitter = Jitter::of(field, of_mean_px2);
+    s.tilts = TiltScatter::of(field, of_mean_px2);
     s
 }
 
-/// How the frames' means move.
-fn jitter(field: &Field, s: &Structure, correlation_sum: f64) -> Option<Jitter> {
-    let frames: Vec<(f64, f64)> =
-        field.frames.iter().copied().filter(|f| f.1.is_finite()).collect();
-    let n = frames.len() as f64;
-    let (t0, m0) = frames.iter().fold((0.0, 0.0), |(t, m), f| (t + f.0 / n, m + f.1 / n));
-    let (mut tt, mut tm, mut mm) = (0.0, 0.0, 0.0);
-    for (t, m) in frames {
-        tt += (t - t0).powi(2);
-        tm += (t - t0) * (m - m0);
-        mm += (m - m0).powi(2);
-    }
-    let disparity = field.scale_px_m * field.plane.q.z;
-    if n < 3.0 || tt <= 0.0 || disparity <= 0.0 || s.variance_px2 <= 0.0 {
-        return None;
-    }
+/// What the pixels' own noise, and the rows', makes a frame's mean err by, px^2.
+fn frame_mean_px2(field: &Field, s: &Structure, correlation_sum: f64) -> f64 {
     let still = s.lagged[0].unwrap_or(0.0).clamp(0.0, 1.0);
     let rows = field
         .pixels
@@ -169,15 +150,7 @@ fn jitter(field: &Field, s: &Structure, correlation_sum: f64) -> Option<Jitter> 
         .zip(field.pixels.first())
         .map_or(1.0, |(last, first)| f64::from(last - first) / field.width as f64 + 1.0);
     let own = s.variance_px2 * (1.0 - still) * correlation_sum / field.measured_pixels().max(1.0);
-    let trend_px2 = tm * tm / tt;
-    let z = field.scale_px_m / disparity;
-    Some(Jitter {
-        scatter_px2: (mm - trend_px2).max(0.0),
-        freedom: n - 2.0,
-        expected_px2: own + s.row_px2.unwrap_or(0.0).max(0.0) / rows,
-        trend_px2,
-        velocity_mps: -tm / tt / disparity * z,
-    })
+    own + s.row_px2.unwrap_or(0.0).max(0.0) / rows
 }
 
 /// What is left of the `power` without what rows and columns share, px^2.

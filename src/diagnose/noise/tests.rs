@@ -5,8 +5,8 @@ use rand_distr::{Distribution, StandardNormal};
 use serde_json::{Map, json};
 
 use super::*;
+use crate::diagnose::noise::frame_series::Jitter;
 use crate::diagnose::noise::in_time::still_share;
-use crate::diagnose::noise::structure::Jitter;
 use crate::model::{Effect, NoiseModel};
 use crate::rng::{Seed, Stream};
 use crate::simulate::kinect_v1;
