@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::diagnose::noise::kurtosis::FourthMoment;
+use crate::diagnose::noise::moments::Moments;
 use crate::diagnose::noise::structure::Structure;
 use crate::diagnose::noise::tail_counts::{TailCounts, places, tail};
 use crate::diagnose::noise::texture::moving;
@@ -98,9 +98,9 @@ pub(in crate::diagnose) fn measure_tails(
             let frames: Vec<Vec<f32>> = field.first.iter().map(whitened).collect();
             if apart || frames.is_empty() { frames } else { vec![moving(&frames, s.lagged[0])] }
         };
-        let fourth = |looks: &[Vec<f32>]| {
-            let mut sum = FourthMoment::default();
-            looks.iter().for_each(|look| sum.add(&FourthMoment::of(look, field.width)));
+        let moments = |looks: &[Vec<f32>]| {
+            let mut sum = Moments::default();
+            looks.iter().for_each(|look| sum.add(&Moments::of(look, field.width)));
             sum
         };
         let in_disparity = looks(&|_, error| error);
@@ -112,8 +112,8 @@ pub(in crate::diagnose) fn measure_tails(
         let bends = (0..field.pixels.len()).any(|k| field.sigma[k] > BENDS * disparity(k));
         // An error of the depth is that of the disparity, e, over 1 + e / d.
         let in_depth = |k: usize, error: f32| error / (1.0 + error / disparity(k));
-        s.fourth = vec![fourth(&in_disparity)];
-        s.fourth.extend(bends.then(|| fourth(&looks(&in_depth))));
+        s.moments = vec![moments(&in_disparity)];
+        s.moments.extend(bends.then(|| moments(&looks(&in_depth))));
     });
 }
 

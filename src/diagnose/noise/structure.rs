@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::frame_series::Jitter;
 use super::frame_tilts::TiltScatter;
-use super::kurtosis::FourthMoment;
+use super::moments::Moments;
 use super::pairs::Pairs;
 use super::still::{KeptPattern, beside_bias, still};
 use super::tail_counts::{FEWEST_READINGS, TailCounts};
@@ -55,7 +55,7 @@ pub struct Structure {
     pub far_places: f64,
     /// Of the residuals near the middle, for tails too weak to count: of the disparity and, where the
     /// noise is large enough for it to differ, of the depth.
-    pub fourth: Vec<FourthMoment>,
+    pub moments: Vec<Moments>,
 }
 
 impl Structure {
@@ -66,8 +66,8 @@ impl Structure {
 
     /// Excess kurtosis of the disparity, and of the depth where that differs.
     pub fn excess(&self) -> Option<[f64; 2]> {
-        let disparity = self.fourth.first()?.excess()?;
-        Some([disparity, self.fourth.get(1).map_or(Some(disparity), FourthMoment::excess)?])
+        let disparity = self.moments.first()?.excess()?;
+        Some([disparity, self.moments.get(1).map_or(Some(disparity), Moments::excess)?])
     }
 
     /// How many times the variance of a mean, and of a log variance, exceeds what pixels that hang

@@ -174,7 +174,7 @@ fn mean_size(counts: &TailCounts) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::noise::kurtosis::FourthMoment;
+    use crate::diagnose::noise::moments::Moments;
     use crate::diagnose::noise::tail_counts::tail;
     use crate::rng::Seed;
     use rand_distr::{Distribution, StandardNormal, StudentT};
@@ -246,7 +246,7 @@ mod tests {
                 let image: Vec<f32> = (0..SIZE[0] * SIZE[1]).map(&mut pixel).collect();
                 Structure {
                     tails: tail(&image, SIZE[0], &mut vec![false; image.len()]),
-                    fourth: vec![FourthMoment::of(&image, SIZE[0])],
+                    moments: vec![Moments::of(&image, SIZE[0])],
                     ..Structure::default()
                 }
             };
@@ -267,7 +267,7 @@ mod tests {
         assert!((had / excess - 1.0).abs() < 1e-3, "{had} {excess}");
         let in_depth = |other: &[Structure]| -> Vec<Structure> {
             let both = |(h, o): (&Structure, &Structure)| Structure {
-                fourth: [h.fourth.clone(), o.fourth.clone()].concat(),
+                moments: [h.moments.clone(), o.moments.clone()].concat(),
                 ..h.clone()
             };
             heavy.iter().zip(other).map(both).collect()

@@ -38,13 +38,13 @@ struct PairSums {
 
 /// What the residuals of some images say, direction by direction.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct FourthMoment([PairSums; DIRECTIONS.len()]);
+pub struct Moments([PairSums; DIRECTIONS.len()]);
 
-impl FourthMoment {
+impl Moments {
     /// Of an image's residuals: row by row, `width` px a row, in any unit, NaN where there is none.
     pub fn of(image: &[f32], width: usize) -> Self {
         let mut unit = vec![f64::NAN; image.len()];
-        let mut sums = FourthMoment::default();
+        let mut sums = Moments::default();
         for patch in patches(image, width).filter(|p| !p.coarse) {
             let near = || patch.pixels.iter().filter(|i| image[**i].abs() < CUT * patch.sigma);
             let (n, square) = near()
@@ -76,7 +76,7 @@ impl FourthMoment {
         }
     }
 
-    pub fn add(&mut self, other: &FourthMoment) {
+    pub fn add(&mut self, other: &Moments) {
         for (mine, other) in self.0.iter_mut().zip(&other.0) {
             mine.pairs += other.pairs;
             mine.fourth += other.fourth;
@@ -112,7 +112,7 @@ mod tests {
     fn excess(draw: impl Fn(&mut Stream) -> Vec<f32>) -> [f64; 2] {
         let of = |seed| {
             let image = draw(&mut Seed(seed).stream("kurtosis"));
-            FourthMoment::of(&image, SIZE[0]).excess().expect("an excess")
+            Moments::of(&image, SIZE[0]).excess().expect("an excess")
         };
         let all: Vec<f64> = (0..SEEDS).map(of).collect();
         let n = all.len() as f64;
@@ -180,18 +180,18 @@ mod tests {
             (0..values.len()).map(at).collect()
         };
         let image = along(&along(&white, 1), SIZE[0]);
-        assert_eq!(FourthMoment::of(&image, SIZE[0]).excess(), None);
-        assert!(FourthMoment::of(&white, SIZE[0]).excess().is_some());
+        assert_eq!(Moments::of(&image, SIZE[0]).excess(), None);
+        assert!(Moments::of(&white, SIZE[0]).excess().is_some());
     }
 
     /// Too small a picture, words so coarse that most residuals are none, no noise at all.
     #[test]
     fn what_shows_no_noise_tells_nothing() {
-        assert_eq!(FourthMoment::of(&vec![1.0; 2000], 50).excess(), None);
-        assert_eq!(FourthMoment::default().excess(), None);
+        assert_eq!(Moments::of(&vec![1.0; 2000], 50).excess(), None);
+        assert_eq!(Moments::default().excess(), None);
         let mut rng = Seed(1).stream("kurtosis/coarse");
         let coarse: Vec<f32> = white(&mut rng).iter().map(|x| (0.4 * x).round()).collect();
-        assert_eq!(FourthMoment::of(&coarse, SIZE[0]).excess(), None);
-        assert_eq!(FourthMoment::of(&vec![0.0; 320 * 240], SIZE[0]).excess(), None);
+        assert_eq!(Moments::of(&coarse, SIZE[0]).excess(), None);
+        assert_eq!(Moments::of(&vec![0.0; 320 * 240], SIZE[0]).excess(), None);
     }
 }
