@@ -113,6 +113,11 @@ pub(in crate::diagnose) fn measure_tails(
         // An error of the depth is that of the disparity, e, over 1 + e / d.
         let in_depth = |k: usize, error: f32| error / (1.0 + error / disparity(k));
         s.moments = vec![moments(&in_disparity)];
+        let relative = (0..field.pixels.len()).map(|k| {
+            let factor = factors.get(n).map_or(1.0, |f| (0.5 * f[k]).exp());
+            f64::from(field.sigma[k] * factor / disparity(k))
+        });
+        s.relative_sigma = mean(relative.filter(|s| s.is_finite())).unwrap_or(0.0);
         s.moments.extend(bends.then(|| moments(&looks(&in_depth))));
     });
 }

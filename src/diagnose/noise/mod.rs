@@ -11,6 +11,7 @@ pub mod moments;
 pub mod outliers;
 pub mod pairs;
 pub mod scatter;
+pub mod skewness;
 pub mod still;
 pub mod structure;
 pub mod tail_counts;

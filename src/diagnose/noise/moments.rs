@@ -1,4 +1,5 @@
-//! The noise's fourth moment beyond a Gaussian's, with what an uneven size of the noise adds taken off.
+//! The noise's third moment, and its fourth beyond a Gaussian's with what an uneven size of the noise adds taken
+//! off.
 //!
 //! Noise of a size s(u, v) that differs from place to place has a fourth moment of 3 (1 + c), where c is
 //! the variance of s^2 over its mean's square: as though its tails were heavy. Two pixels so near that
@@ -8,7 +9,7 @@
 //! excess = E x^4 - 3 E x^2 y^2 / (1 + 2 rho^2)        x, y of unit variance
 //! ```
 //!
-//! is none for Gaussian noise whose size changes little from x to y.
+//! is none for Gaussian noise whose size changes little from x to y. A third moment uneven sizes do not make.
 
 use super::tail_counts::{FEWEST_READINGS, patches};
 
@@ -38,7 +39,12 @@ struct PairSums {
 
 /// What the residuals of some images say, direction by direction.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Moments([PairSums; DIRECTIONS.len()]);
+pub struct Moments {
+    pairs: [PairSums; DIRECTIONS.len()],
+    readings: f64,
+    /// Sum of the third powers, each about its patch's mean and over its patch's spread.
+    thirds: f64,
+}
 
 impl Moments {
     /// Of an image's residuals: row by row, `width` px a row, in any unit, NaN where there is none.
@@ -52,6 +58,10 @@ impl Moments {
             if square > 0.0 {
                 let scale = f64::sqrt(n / square);
                 near().for_each(|i| unit[*i] = scale * f64::from(image[*i]));
+                let mean = near().map(|i| unit[*i]).sum::<f64>() / n;
+                let spread = (1.0 - mean * mean).sqrt();
+                sums.readings += n;
+                sums.thirds += near().map(|i| ((unit[*i] - mean) / spread).powi(3)).sum::<f64>();
                 // Both of a pair have the scale of this patch.
                 sums.add_pairs(&unit, width, &patch.pixels);
                 near().for_each(|i| unit[*i] = f64::NAN);
@@ -62,7 +72,7 @@ impl Moments {
 
     fn add_pairs(&mut self, unit: &[f64], width: usize, pixels: &[usize]) {
         for &i in pixels.iter().filter(|i| unit[**i].is_finite()) {
-            for (sums, [du, dv]) in self.0.iter_mut().zip(DIRECTIONS) {
+            for (sums, [du, dv]) in self.pairs.iter_mut().zip(DIRECTIONS) {
                 let inside = i % width + du < width;
                 let y = unit.get(i + dv * width + du).filter(|y| inside && y.is_finite());
                 if let Some(y) = y {
@@ -77,7 +87,9 @@ impl Moments {
     }
 
     pub fn add(&mut self, other: &Moments) {
-        for (mine, other) in self.0.iter_mut().zip(&other.0) {
+        self.readings += other.readings;
+        self.thirds += other.thirds;
+        for (mine, other) in self.pairs.iter_mut().zip(&other.pairs) {
             mine.pairs += other.pairs;
             mine.fourth += other.fourth;
             mine.products += other.products;
@@ -85,16 +97,21 @@ impl Moments {
         }
     }
 
+    /// Skewness, where enough was looked at.
+    pub fn skewness(&self) -> Option<f64> {
+        (self.readings >= FEWEST_READINGS).then(|| self.thirds / self.readings)
+    }
+
     /// Excess kurtosis, where enough was looked at and neighbours share little.
     pub fn excess(&self) -> Option<f64> {
         let rho = |s: &PairSums| s.products / s.pairs;
-        let shared = self.0.iter().map(rho).sum::<f64>() / self.0.len() as f64;
+        let shared = self.pairs.iter().map(rho).sum::<f64>() / self.pairs.len() as f64;
         let of = |s: &PairSums| {
             let uneven = s.products_of_squares / s.pairs / (1.0 + 2.0 * rho(s).powi(2));
             (s.pairs >= FEWEST_READINGS && shared < MAX_SHARED)
                 .then(|| s.fourth / s.pairs - GAUSSIAN_FOURTH - 3.0 * (uneven - 1.0))
         };
-        let all: Option<Vec<f64>> = self.0.iter().map(of).collect();
+        let all: Option<Vec<f64>> = self.pairs.iter().map(of).collect();
         all.map(|all| all.iter().sum::<f64>() / all.len() as f64)
     }
 }

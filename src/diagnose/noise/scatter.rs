@@ -1,6 +1,7 @@
 //! What scatters about the mean: how the noise hangs together, how large it is, and its tails.
 
 use super::lines::LearntLines;
+use super::skewness::skewness;
 use super::still::beside_bias;
 use super::structure::{Structure, structures};
 use super::tails::{Confusers, tails};
@@ -39,7 +40,7 @@ impl Case<'_> {
         let theirs = self.baseline.as_ref().map(|b| b.steps);
         let extra = |p: &PixelContext| (own.at(p) - theirs.map_or(0.0, |s| s.at(p))).max(0.0);
         let each = self.level(Self::EACH_LEVEL);
-        let textures = self.textures(&mut structure, each);
+        let mut textures = self.textures(&mut structure, each);
         self.learn_lines(mean, &textures);
         let excess = self.excess_of_rows(&structure, &textures);
         for (view, [_, of_log_variance]) in self.survey.views.iter_mut().zip(excess) {
@@ -84,6 +85,10 @@ impl Case<'_> {
         let confusers = Confusers { uneven, simulated: self.baseline.is_some(), stepped };
         let tails = tails(&structure, &self.known, each, confusers)
             .filter(|t| !alike && self.stands(t.p, each));
+        // Far errors to one side alone make both.
+        if tails.is_none() && self.baseline.is_none() {
+            textures.extend(skewness(&structure, each).filter(|t| self.stands(t.p, each)));
+        }
         ScatterResult { structure, textures, tails, outcome }
     }
 

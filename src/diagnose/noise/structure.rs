@@ -56,6 +56,8 @@ pub struct Structure {
     /// Of the residuals near the middle, for tails too weak to count: of the disparity and, where the
     /// noise is large enough for it to differ, of the depth.
     pub moments: Vec<Moments>,
+    /// Mean standard deviation of the disparity over the disparity.
+    pub relative_sigma: f64,
 }
 
 impl Structure {
@@ -68,6 +70,12 @@ impl Structure {
     pub fn excess(&self) -> Option<[f64; 2]> {
         let disparity = self.moments.first()?.excess()?;
         Some([disparity, self.moments.get(1).map_or(Some(disparity), Moments::excess)?])
+    }
+
+    /// Skewness of the disparity, and of the depth: of noise of s times the disparity 6 s less.
+    pub fn skewness(&self) -> Option<[f64; 2]> {
+        let disparity = self.moments.first()?.skewness()?;
+        Some([disparity, disparity - 6.0 * self.relative_sigma])
     }
 
     /// How many times the variance of a mean, and of a log variance, exceeds what pixels that hang

@@ -1,0 +1,98 @@
+//! Errors that reach farther to one side than to the other.
+
+use super::structure::Structure;
+use super::texture_finding::TextureFinding;
+use super::view_mean::{ViewMean, nats};
+use crate::diagnose::finding::parameters::one;
+use crate::terms::{Axis, Statistic};
+
+/// Noise that is symmetric in the disparity has a skewness of .05 in the depth of a Kinect at 4 m
+/// (docs/physics.md, 48); so little is no news.
+const LEAST: f64 = 0.05;
+
+/// Of all views, in the disparity and in the depth alike: noise that is symmetric in one of them is skewed in the
+/// other.
+pub fn skewness(views: &[Structure], level: f64) -> Option<TextureFinding> {
+    let of = |k: usize| ViewMean::of(views, |s| Some(s.skewness()?[k]));
+    let both = [of(0)?, of(1)?];
+    let by_size = |a: &&ViewMean, b: &&ViewMean| a.value.abs().total_cmp(&b.value.abs());
+    let m = both.iter().min_by(by_size)?;
+    let one_sided = both.iter().all(|b| b.value * m.value > 0.0);
+    // Either way.
+    let p = 2.0 * both.iter().map(|b| b.p_above(0.0).min(b.p_below(0.0))).fold(0.0, f64::max);
+    if !one_sided || m.value.abs() < LEAST || p > level {
+        return None;
+    }
+    let side = if m.value > 0.0 {
+        "large disparities than to small"
+    } else {
+        "small disparities than to large"
+    };
+    Some(TextureFinding {
+        parameters: one("skewness", m.value, m.std_error),
+        // What a Gaussian of the same variance would be off by, to first order of its series in Hermite polynomials.
+        size_sigma: m.value.abs() / 6f64.sqrt(),
+        p,
+        nats: nats(m, 0.0),
+        words: Some(format!("they reach farther to {side} ones")),
+        ..TextureFinding::named(vec![], Statistic::Distribution, Axis::Residual)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_distr::{Distribution, Gamma, StandardNormal};
+
+    use super::*;
+    use crate::diagnose::noise::moments::Moments;
+    use crate::rng::{Seed, Stream};
+
+    const SIZE: [usize; 2] = [200, 150];
+
+    fn views(
+        stream: &str,
+        relative_sigma: f64,
+        draw: impl Fn(&mut Stream) -> f64,
+    ) -> Vec<Structure> {
+        let mut rng = Seed(6).stream(stream);
+        let view = |_| {
+            let image: Vec<f32> = (0..SIZE[0] * SIZE[1]).map(|_| draw(&mut rng) as f32).collect();
+            let moments = vec![Moments::of(&image, SIZE[0])];
+            Structure {
+                pixels: image.len() as f64,
+                moments,
+                relative_sigma,
+                ..Structure::default()
+            }
+        };
+        (0..14).map(view).collect()
+    }
+
+    /// A gamma distribution of shape k has a skewness of 2 / sqrt(k).
+    #[test]
+    fn a_gamma_distribution_is_skewed_and_a_gaussian_is_not() {
+        const SHAPE: f64 = 100.0;
+        let gamma = Gamma::new(SHAPE, 1.0).unwrap();
+        let skewed = views("gamma", 0.001, |rng| (gamma.sample(rng) - SHAPE) / SHAPE.sqrt());
+        let found = skewness(&skewed, 1e-3).expect("skewed");
+        let told = found.parameters["skewness"]["value"].as_f64().unwrap();
+        // Four standard errors of 420,000 readings, beside what the cut at 4.5 sigma takes.
+        assert!((told - 0.194).abs() < 0.02, "{told}");
+        let gaussian = |rng: &mut Stream| StandardNormal.sample(rng);
+        assert!(skewness(&views("gaussian", 0.001, gaussian), 1e-3).is_none());
+    }
+
+    /// Gaussian noise of 3 % of the depth is skewed in the disparity only.
+    #[test]
+    fn what_is_symmetric_in_the_depth_is_not_skewed() {
+        const S: f64 = 0.03;
+        let normal = |rng: &mut Stream| -> f64 { StandardNormal.sample(rng) };
+        let in_disparity = views("depth", S, |rng| -> f64 {
+            let x = normal(rng);
+            x / (1.0 - S * x)
+        });
+        let told = in_disparity[0].skewness().unwrap();
+        assert!(told[0] > 0.12 && told[1].abs() < 0.06, "{told:?}");
+        assert!(skewness(&in_disparity, 1e-3).is_none());
+    }
+}
